@@ -1,0 +1,11 @@
+# Target gbt_embree: Embree 3 (Debian 12) or Embree 4 (Debian 13). The code sees the difference in src/bvh/embree_api.h only.
+find_package(embree 4 QUIET CONFIG)
+if(NOT embree_FOUND)
+  find_package(embree 3 QUIET CONFIG)
+endif()
+if(NOT embree_FOUND)
+  message(FATAL_ERROR "Embree 3 or 4 is needed (Debian: libembree-dev)")
+endif()
+add_library(gbt_embree INTERFACE)
+target_link_libraries(gbt_embree INTERFACE embree)
+target_compile_definitions(gbt_embree INTERFACE GBT_EMBREE_MAJOR=${embree_VERSION_MAJOR})

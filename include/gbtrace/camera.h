@@ -1,0 +1,74 @@
+/* gbtrace/camera.h -- a posed camera: lens model, image size, pose.
+
+   Camera axes are COLMAP's: x right, y down, z forward. The image spans [0, width] x [0, height] and the centre of the top-left
+   pixel is (0.5, 0.5). Lens formulas: docs/cameras.md. */
+#ifndef GBTRACE_CAMERA_H
+#define GBTRACE_CAMERA_H
+
+#include <stdbool.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** COLMAP's numbers and parameter orders. */
+typedef enum gbt_camera_model {
+    GBT_CAMERA_SIMPLE_PINHOLE = 0,             /* f cx cy */
+    GBT_CAMERA_PINHOLE = 1,                    /* fx fy cx cy */
+    GBT_CAMERA_SIMPLE_RADIAL = 2,              /* f cx cy k */
+    GBT_CAMERA_RADIAL = 3,                     /* f cx cy k1 k2 */
+    GBT_CAMERA_OPENCV = 4,                     /* fx fy cx cy k1 k2 p1 p2 */
+    GBT_CAMERA_OPENCV_FISHEYE = 5,             /* fx fy cx cy k1 k2 k3 k4 */
+    GBT_CAMERA_FULL_OPENCV = 6,                /* fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6 */
+    GBT_CAMERA_FOV = 7,                        /* fx fy cx cy omega */
+    GBT_CAMERA_SIMPLE_RADIAL_FISHEYE = 8,      /* f cx cy k */
+    GBT_CAMERA_RADIAL_FISHEYE = 9,             /* f cx cy k1 k2 */
+    GBT_CAMERA_THIN_PRISM_FISHEYE = 10,        /* fx fy cx cy k1 k2 p1 p2 k3 k4 sx1 sy1 */
+    GBT_CAMERA_RAD_TAN_THIN_PRISM_FISHEYE = 11, /* fx fy cx cy k0..k5 p0 p1 s0..s3 */
+    GBT_CAMERA_SIMPLE_DIVISION = 12,           /* f cx cy k */
+    GBT_CAMERA_DIVISION = 13,                  /* fx fy cx cy k */
+    GBT_CAMERA_SIMPLE_FISHEYE = 14,            /* f cx cy */
+    GBT_CAMERA_FISHEYE = 15,                   /* fx fy cx cy */
+    GBT_CAMERA_EUCM = 16,                      /* fx fy cx cy alpha beta */
+    GBT_CAMERA_EQUIRECTANGULAR = 17,           /* w h */
+    GBT_CAMERA_MODEL_COUNT
+} gbt_camera_model;
+
+enum { GBT_CAMERA_MAX_PARAMS = 16 };
+
+typedef struct gbt_camera {
+    gbt_camera_model model;
+    int width, height;                    /* pixels, > 0 */
+    double params[GBT_CAMERA_MAX_PARAMS]; /* in the model's order; lengths in pixels */
+    double rotation[9];                   /* world to camera, row-major, orthonormal, det +1 */
+    double center[3];                     /* camera centre, world (scene-local) units */
+} gbt_camera;
+
+/** Number of parameters of a model, and its COLMAP name; 0 and NULL for an unknown model. */
+int gbt_camera_param_count(gbt_camera_model model);
+const char *gbt_camera_model_name(gbt_camera_model model);
+
+/**
+ * Direction, in camera axes, of the ray through a point of the image.
+ *
+ * @param px, py   [in]  image point, pixels; a pixel (i, j) is sampled at (i + 0.5, j + 0.5)
+ * @param dir_cam  [out] unit vector; untouched on failure
+ * @return false where the lens model has no ray (outside its field of view, or the inversion does not converge)
+ *
+ * Threads: any. Cost: closed form for models without distortion, else Newton in double with an iteration cap.
+ */
+bool gbt_camera_unproject(const gbt_camera *camera, double px, double py, double dir_cam[3]);
+
+/** Image point of a point in camera axes; false where the model does not see it. The formulas that gbt_camera_unproject() inverts. */
+bool gbt_camera_project(const gbt_camera *camera, const double point_cam[3], double pixel[2]);
+
+/** The same camera for an image of another size: lengths in pixels are scaled per axis (single-f models need equal ratios within 1 px). */
+gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height);
+
+/** tan of half the horizontal and vertical field of view of the pinhole that best stands for this camera: width / (2 fx), height / (2 fy). */
+void gbt_camera_half_fov_tan(const gbt_camera *camera, double tan_half[2]);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,33 @@
+/* gbtrace/status.h -- how every entry of the library reports failure.
+
+   A status says what kind of failure it was; an error adds one line for a person. Nothing in the library prints or exits. */
+#ifndef GBTRACE_STATUS_H
+#define GBTRACE_STATUS_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum gbt_status {
+    GBT_OK = 0,
+    GBT_ERR_ARGUMENT,    /* the caller's fault: usage, exit code 2 */
+    GBT_ERR_FORMAT,      /* bad input: exit code 3 */
+    GBT_ERR_IO,          /* file system or device: exit code 4 */
+    GBT_ERR_NO_MEMORY,   /* out of memory or over a stated limit: exit code 5 */
+    GBT_ERR_INTERRUPTED, /* stopped by a signal after saving: exit code 128 + n */
+    GBT_ERR_INTERNAL     /* a library below us failed in a way that no input explains */
+} gbt_status;
+
+/** The first failure wins: an error that already holds a text is not overwritten. Start from `gbt_error err = {0};`. */
+typedef struct gbt_error {
+    gbt_status status;
+    char text[512]; /* one line, no newline: "FILE[:LINE|@OFFSET]: what was wrong (wanted, got)" */
+} gbt_error;
+
+/** The exit code that a program should end with for a status: 0, 2, 3, 4, 5; 1 for GBT_ERR_INTERNAL, 130 for GBT_ERR_INTERRUPTED. */
+int gbt_status_exit_code(gbt_status status);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,44 @@
+/* base/cpu.c -- choose the instruction set of the kernels at run time. */
+#include "base/cpu.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const names[] = {"plain", "avx2", "avx512"};
+static int chosen = -1;
+
+static cpu_isa detect(void)
+{
+    __builtin_cpu_init();
+    cpu_isa best = CPU_PLAIN;
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c"))
+        best = CPU_AVX2;
+    if (best == CPU_AVX2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+        __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
+        best = CPU_AVX512;
+    return best;
+}
+
+cpu_isa cpu_best_isa(void)
+{
+    if (chosen >= 0)
+        return (cpu_isa)chosen;
+    cpu_isa best = detect();
+    const char *wanted = getenv("GBT_ISA");
+    for (int i = 0; wanted != NULL && i < (int)best; i++)
+        if (strcmp(wanted, names[i]) == 0)
+            best = (cpu_isa)i;
+    chosen = (int)best;
+    return best;
+}
+
+void cpu_limit_isa(cpu_isa isa)
+{
+    const cpu_isa best = detect();
+    chosen = (int)(isa < best ? isa : best);
+}
+
+const char *cpu_isa_name(cpu_isa isa)
+{
+    return names[isa];
+}

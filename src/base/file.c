@@ -1,0 +1,148 @@
+/* base/file.c -- whole files to bytes and back. */
+#include "base/file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+
+enum { PATH_LIMIT = 4096 };
+
+gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count, gbt_error *err)
+{
+    *bytes = NULL, *byte_count = 0;
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* a FIFO without a writer must not hang us */
+    if (fd < 0)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", path, strerror(errno));
+    gbt_status status = GBT_OK;
+    struct stat info;
+    unsigned char *buffer = NULL;
+    if (fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
+        status = base_fail(err, GBT_ERR_IO, "%s: not a regular file", path);
+        goto done;
+    }
+    const size_t size = (size_t)info.st_size;
+    buffer = mem_alloc(size + 1, 1, path, err);
+    if (buffer == NULL) {
+        status = GBT_ERR_NO_MEMORY;
+        goto done;
+    }
+    size_t have = 0;
+    while (have < size) {
+        const ssize_t got = read(fd, buffer + have, size - have);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got <= 0) {
+            status = base_fail(err, GBT_ERR_IO, "%s@%zu: read failed: %s", path, have, got < 0 ? strerror(errno) : "file became shorter");
+            goto done;
+        }
+        have += (size_t)got;
+    }
+    buffer[size] = 0;
+    *bytes = buffer, *byte_count = size;
+    buffer = NULL;
+done:
+    mem_free(buffer);
+    close(fd);
+    return status;
+}
+
+static gbt_status write_all(int fd, const unsigned char *bytes, size_t byte_count, const char *path, gbt_error *err)
+{
+    size_t done = 0;
+    while (done < byte_count) {
+        const ssize_t put = write(fd, bytes + done, byte_count - done);
+        if (put < 0 && errno == EINTR)
+            continue;
+        if (put <= 0)
+            return base_fail(err, GBT_ERR_IO, "%s: write failed: %s", path, strerror(put < 0 ? errno : ENOSPC));
+        done += (size_t)put;
+    }
+    if (fsync(fd) != 0)
+        return base_fail(err, GBT_ERR_IO, "%s: fsync failed: %s", path, strerror(errno));
+    return GBT_OK;
+}
+
+static void sync_folder_of(const char *path)
+{
+    char folder[PATH_LIMIT];
+    const char *slash = strrchr(path, '/');
+    if (slash == NULL)
+        snprintf(folder, sizeof folder, ".");
+    else
+        snprintf(folder, sizeof folder, "%.*s", (int)(slash == path ? 1 : slash - path), path);
+    const int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd >= 0) {
+        fsync(fd); /* some file systems refuse this on folders; the rename itself has already succeeded */
+        close(fd);
+    }
+}
+
+gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err)
+{
+    char temporary[PATH_LIMIT];
+    const char *slash = strrchr(path, '/');
+    const int folder_length = slash == NULL ? 0 : (int)(slash - path) + 1;
+    if (snprintf(temporary, sizeof temporary, "%.*s.%s.tmp", folder_length, path, path + folder_length) >= (int)sizeof temporary)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
+    const int fd = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (fd < 0)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(errno));
+    gbt_status status = write_all(fd, bytes, byte_count, path, err);
+    if (close(fd) != 0 && status == GBT_OK)
+        status = base_fail(err, GBT_ERR_IO, "%s: close failed: %s", path, strerror(errno));
+    if (status == GBT_OK && rename(temporary, path) != 0)
+        status = base_fail(err, GBT_ERR_IO, "%s: cannot replace: %s", path, strerror(errno));
+    if (status != GBT_OK) {
+        unlink(temporary);
+        return status;
+    }
+    sync_folder_of(path);
+    return GBT_OK;
+}
+
+gbt_status file_make_folder(const char *path, gbt_error *err)
+{
+    char part[PATH_LIMIT];
+    if (path[0] == '\0' || strlen(path) >= sizeof part)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s: not a usable folder name", path);
+    for (size_t i = 1;; i++) {
+        if (path[i] != '/' && path[i] != '\0')
+            continue;
+        memcpy(part, path, i), part[i] = '\0';
+        if (mkdir(part, 0777) != 0 && errno != EEXIST)
+            return base_fail(err, GBT_ERR_IO, "%s: cannot create folder: %s", part, strerror(errno));
+        if (path[i] == '\0')
+            break;
+    }
+    if (!file_is_folder(path))
+        return base_fail(err, GBT_ERR_IO, "%s: exists and is not a folder", path);
+    return GBT_OK;
+}
+
+bool file_exists(const char *path)
+{
+    struct stat info;
+    return stat(path, &info) == 0;
+}
+
+bool file_is_folder(const char *path)
+{
+    struct stat info;
+    return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
+}
+
+gbt_status file_join(char *out, size_t size, const char *folder, const char *name, gbt_error *err)
+{
+    const size_t length = strlen(folder);
+    const char *separator = length > 0 && folder[length - 1] == '/' ? "" : "/";
+    const int wanted = snprintf(out, size, "%s%s%s", folder, separator, name);
+    if (wanted < 0 || (size_t)wanted >= size)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", folder);
+    return GBT_OK;
+}

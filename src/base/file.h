@@ -1,0 +1,29 @@
+/* base/file.h -- whole files to bytes and back; the only place that opens files by itself (images go through base/image.h). */
+#ifndef GBT_BASE_FILE_H
+#define GBT_BASE_FILE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "gbtrace/status.h"
+
+/** Read a regular file whole. `*bytes` has one extra zero byte at the end (not counted). Free with mem_free(). */
+gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count, gbt_error *err);
+
+/**
+ * Replace a file atomically: temporary name in the same folder, write, fsync, rename, fsync of the folder.
+ *
+ * After any failure, kill or full disk the old file is whole and no temporary file is left by a failure that we see.
+ */
+gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err);
+
+/** Create a folder and its parents; an existing folder is fine. */
+gbt_status file_make_folder(const char *path, gbt_error *err);
+
+bool file_exists(const char *path);
+bool file_is_folder(const char *path);
+
+/** "folder/name" in a buffer of `size` bytes; GBT_ERR_ARGUMENT when it does not fit. */
+gbt_status file_join(char *out, size_t size, const char *folder, const char *name, gbt_error *err);
+
+#endif

@@ -1,0 +1,51 @@
+/* base/gaussians.c -- the padded arrays of Gaussians. */
+#include "base/gaussians.h"
+
+#include <string.h>
+
+#include "base/memory.h"
+
+static size_t padded(size_t count)
+{
+    return (count + GAUSSIANS_LANES - 1) / GAUSSIANS_LANES * GAUSSIANS_LANES;
+}
+
+gbt_status gaussians_resize(gaussians *g, size_t count, gbt_error *err)
+{
+    if (padded(count) > g->capacity || g->mean_x == NULL) {
+        /* One block for all fields: one owner, one free. Grown by an eighth, because the count wanders from view to view. */
+        const size_t capacity = padded(count + count / 8 + 1);
+        float *block = mem_alloc(capacity, GAUSSIANS_FIELD_COUNT * sizeof *block, "gaussians", err);
+        if (block == NULL)
+            return GBT_ERR_NO_MEMORY;
+        mem_free(g->mean_x);
+        g->capacity = capacity;
+#define X(name, pad, meaning) g->name = block, block += capacity;
+        GAUSSIANS_FIELDS(X)
+#undef X
+    }
+    g->count = count;
+    return GBT_OK;
+}
+
+void gaussians_pad(gaussians *g)
+{
+    for (size_t i = g->count; i < padded(g->count); i++) {
+#define X(name, pad, meaning) g->name[i] = pad;
+        GAUSSIANS_FIELDS(X)
+#undef X
+    }
+}
+
+void gaussians_zero(gaussians *g)
+{
+#define X(name, pad, meaning) memset(g->name, 0, padded(g->count) * sizeof(float));
+    GAUSSIANS_FIELDS(X)
+#undef X
+}
+
+void gaussians_free(gaussians *g)
+{
+    mem_free(g->mean_x); /* the first field starts the one block */
+    memset(g, 0, sizeof *g);
+}

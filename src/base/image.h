@@ -1,0 +1,50 @@
+/* base/image.h -- pixels in memory, and the file formats behind them (implemented in shim/ on OpenImageIO). */
+#ifndef GBT_BASE_IMAGE_H
+#define GBT_BASE_IMAGE_H
+
+#include <stddef.h>
+
+#include "gbtrace/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Row-major, interleaved float pixels, [height][width][channels]. Colours are display-referred in [0, 1] as stored in 8-bit photos. */
+typedef struct image {
+    int width, height, channels;
+    float *pixels; /* owned; free with image_free() */
+} image;
+
+gbt_status image_alloc(image *out, int width, int height, int channels, gbt_error *err);
+void image_free(image *im); /* zeroes the struct */
+
+/** Size of an image file without reading its pixels. */
+gbt_status image_probe(const char *path, int *width, int *height, int *channels, gbt_error *err);
+
+/**
+ * Read a PNG, JPEG or EXR file.
+ *
+ * 8- and 16-bit integers become [0, 1]; grey becomes RGB; alpha is kept as a fourth channel. The format is taken from the file's
+ * magic, not its name. Orientation tags are not applied (COLMAP's choice). Truncated files, deep or multi-part EXR, and images of
+ * more than 2^28 samples are refused.
+ *
+ * @param out [out] 3 or 4 channels; free with image_free(); zeroed on failure
+ * @return GBT_OK, GBT_ERR_IO (cannot open), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * Threads: any.
+ */
+gbt_status image_read(const char *path, image *out, gbt_error *err);
+
+/** Write atomically (temporary name in the same folder, then rename). PNG: 8 bit, floor(clamp(x) * 255 + 0.5). EXR: 32-bit float. By extension. */
+gbt_status image_write(const char *path, const image *im, gbt_error *err);
+
+/** The PNG that image_write() would make, in memory (for the report). Free `*bytes` with mem_free(). */
+gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte_count, gbt_error *err);
+
+/** The same as JPEG at the given quality, [1, 100]. */
+gbt_status image_encode_jpeg(const image *im, int quality, unsigned char **bytes, size_t *byte_count, gbt_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

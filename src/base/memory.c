@@ -1,0 +1,79 @@
+/* base/memory.c -- checked, aligned allocation with a failure switch. */
+#include "base/memory.h"
+
+#include <stdatomic.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+
+#include "base/fail.h"
+
+static atomic_long fail_countdown = -1;
+
+static int must_fail(void)
+{
+    if (atomic_load_explicit(&fail_countdown, memory_order_relaxed) < 0)
+        return 0;
+    return atomic_fetch_sub(&fail_countdown, 1) == 0;
+}
+
+void mem_fail_after(long n)
+{
+    atomic_store(&fail_countdown, n < 0 ? -1 : n);
+}
+
+void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err)
+{
+    size_t bytes;
+    if (__builtin_mul_overflow(count, size, &bytes) || bytes > PTRDIFF_MAX - MEM_ALIGN) {
+        base_fail(err, GBT_ERR_NO_MEMORY, "%s: %zu elements of %zu bytes are more than memory can hold", what, count, size);
+        return NULL;
+    }
+    bytes = (bytes + MEM_ALIGN - 1) / MEM_ALIGN * MEM_ALIGN;
+    if (bytes == 0)
+        bytes = MEM_ALIGN;
+    void *pointer = must_fail() ? NULL : aligned_alloc(MEM_ALIGN, bytes);
+    if (pointer == NULL)
+        base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for %zu bytes", what, bytes);
+    return pointer;
+}
+
+void *mem_calloc(size_t count, size_t size, const char *what, gbt_error *err)
+{
+    void *pointer = mem_alloc(count, size, what, err);
+    if (pointer != NULL)
+        memset(pointer, 0, count * size);
+    return pointer;
+}
+
+gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count, size_t size, const char *what, gbt_error *err)
+{
+    if (count <= *capacity && *array != NULL)
+        return GBT_OK;
+    size_t grown = *capacity + *capacity / 2;
+    if (grown < count)
+        grown = count;
+    void *bigger = mem_alloc(grown, size, what, err);
+    if (bigger == NULL)
+        return GBT_ERR_NO_MEMORY;
+    if (used > 0)
+        memcpy(bigger, *array, used * size);
+    mem_free(*array);
+    *array = bigger;
+    *capacity = grown;
+    return GBT_OK;
+}
+
+void mem_free(void *pointer)
+{
+    free(pointer);
+}
+
+size_t mem_peak_bytes(void)
+{
+    struct rusage usage;
+    if (getrusage(RUSAGE_SELF, &usage) != 0)
+        return 0;
+    return (size_t)usage.ru_maxrss * 1024;
+}

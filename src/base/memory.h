@@ -1,0 +1,34 @@
+/* base/memory.h -- the only allocator: checked sizes, 64-byte alignment, a failure switch for tests, a count of bytes in use.
+
+   Every array of the library is owned by the object that allocated it here and is freed with mem_free(). */
+#ifndef GBT_BASE_MEMORY_H
+#define GBT_BASE_MEMORY_H
+
+#include <stddef.h>
+
+#include "gbtrace/status.h"
+
+enum { MEM_ALIGN = 64 };
+
+/** `count * size` bytes, uninitialised, 64-byte aligned; NULL with a message naming `what` on overflow or exhaustion. count 0 gives a valid pointer. */
+void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err);
+
+/** The same, filled with zeros. */
+void *mem_calloc(size_t count, size_t size, const char *what, gbt_error *err);
+
+/**
+ * Make `*array` hold at least `count` elements, keeping the first `used`.
+ *
+ * `*capacity` grows by half at least, so that repeated calls cost O(1) per element. On failure nothing changes.
+ */
+gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count, size_t size, const char *what, gbt_error *err);
+
+void mem_free(void *pointer); /* NULL is fine */
+
+/** Test only: the n-th allocation from now fails (0 = the next one); a negative n switches this off. */
+void mem_fail_after(long n);
+
+/** Highest resident memory of the process so far, bytes. */
+size_t mem_peak_bytes(void);
+
+#endif

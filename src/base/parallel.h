@@ -1,0 +1,34 @@
+/* base/parallel.h -- the only way to use threads. Implemented in shim/ (oneTBB, or pthreads for the tsan preset). */
+#ifndef GBT_BASE_PARALLEL_H
+#define GBT_BASE_PARALLEL_H
+
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Work on elements [begin, end), which are block number `block`. */
+typedef void parallel_body(size_t block, size_t begin, size_t end, void *context);
+
+/**
+ * Call `body` once per block of `grain` elements (the last may be shorter), on as many threads as parallel_set_threads() allows.
+ *
+ * The cut depends on `count` and `grain` only, so results that are kept per block and combined in block order have the same bits
+ * for 1 thread and for 64. Index results with `block`, never with a thread id. Returns when all blocks are done. May be nested.
+ */
+void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *context);
+
+/** Number of blocks that parallel_blocks() makes. */
+static inline size_t parallel_block_count(size_t count, size_t grain)
+{
+    return (count + grain - 1) / grain;
+}
+
+void parallel_set_threads(int threads); /* >= 1; process-wide */
+int parallel_threads(void);             /* the number set, else the number of processors this process may use */
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,58 @@
+/* shim/parallel_tbb.cpp -- base/parallel.h on oneTBB. */
+#include "base/parallel.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+
+#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+
+static std::unique_ptr<tbb::global_control> limit;
+static int thread_count = 0;
+
+extern "C" void parallel_set_threads(int threads)
+try {
+    if (threads < 1)
+        threads = 1;
+    limit.reset();
+    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
+    thread_count = threads;
+} catch (...) {
+    /* Without a limit TBB uses every processor: slower to share, never wrong. */
+}
+
+extern "C" int parallel_threads(void)
+try {
+    return thread_count > 0 ? thread_count : tbb::info::default_concurrency();
+} catch (...) {
+    return 1;
+}
+
+extern "C" void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *context)
+try {
+    const size_t blocks = parallel_block_count(count, grain);
+    const auto run = [=](size_t block) {
+        const size_t begin = block * grain;
+        const size_t end = begin + grain < count ? begin + grain : count;
+        body(block, begin, end, context);
+    };
+    if (blocks <= 1 || thread_count == 1) {
+        for (size_t block = 0; block < blocks; block++)
+            run(block);
+        return;
+    }
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, blocks, 1),
+                      [&](const tbb::blocked_range<size_t> &range) {
+                          for (size_t block = range.begin(); block != range.end(); block++)
+                              run(block);
+                      },
+                      tbb::simple_partitioner());
+} catch (...) {
+    /* The bodies are C and cannot throw, so only TBB's own start-up can fail, and then there is no way to go on. */
+    std::fputs("error: threads: oneTBB could not start\n", stderr);
+    std::abort();
+}

@@ -1,0 +1,53 @@
+/* anchor/adjust.h -- growing and pruning anchors (Scaffold-GS; docs/training.md). */
+#ifndef GBT_ANCHOR_ADJUST_H
+#define GBT_ANCHOR_ADJUST_H
+
+#include "anchor/anchors.h"
+
+/** Gathered every step between two adjusts. Row counts follow the anchors. Start from {0}. */
+typedef struct adjust_stats {
+    size_t count, capacity;
+    int offset_count;
+    float *opacity_accum;  /* [count] sum of decoded opacities */
+    float *visit_count;    /* [count] views in which the anchor was visible */
+    float *grad_accum;     /* [count][K] sum of screen-space gradient norms */
+    float *grad_count;     /* [count][K] views in which the Gaussian was geometrically visible */
+} adjust_stats;
+gbt_status adjust_stats_resize(adjust_stats *s, size_t count, int offset_count, gbt_error *err); /* keeps rows, new rows are zero */
+void adjust_stats_free(adjust_stats *s);
+
+typedef struct adjust_def {
+    float voxel_size;          /* v: cells are v * init_factor / hierarchy^level */
+    int level_count;           /* default 3 */
+    int init_factor;           /* default 16 */
+    int hierarchy_factor;      /* default 4 */
+    float grad_threshold;      /* tau, default 2e-4; level j uses tau * (hierarchy/2)^j */
+    float min_opacity;         /* default 0.005 */
+    float interval;            /* I: steps between adjusts, default 100 */
+    float success_threshold;   /* default 0.8: a Gaussian counts when grad_count > interval * success * 0.5; an anchor is judged when visit_count > interval * success */
+    float shape_log_max;       /* scale_log[3..5] are clamped to this at every adjust: 0.05 in compat mode, infinity else */
+    size_t max_anchors;        /* hard cap; when it bites, the cells with the largest gradient win, ties by cell. Default SIZE_MAX */
+    bool compat;               /* every quirk of the reference: a coarse level that adds nothing gates the finer ones; random candidate drop always on */
+    uint64_t seed;             /* of the random candidate drop */
+    uint64_t step;
+    bool grow, prune;          /* both true by default */
+} adjust_def;
+adjust_def adjust_def_default(void);
+
+/** What happened, and where every surviving or new row came from. */
+typedef struct adjust_result {
+    size_t grown, pruned;
+    size_t count;          /* rows after */
+    int64_t *source;       /* [count]: row before, or -1 for a new anchor (its Adam moments start at 0); owned, mem_free() */
+} adjust_result;
+
+/**
+ * Grow, then prune, as Scaffold-GS does; anchors and statistics are changed in place.
+ *
+ * New anchor: position = cell centre, log-scales log(cell), offsets 0, feature = elementwise maximum over the parents of the cell's
+ * candidates. Cells use 64-bit keys; a level whose cell is not > 0 is skipped. Never prunes the last anchor.
+ * Deterministic. Cost: O(N K) and one hash set per level.
+ */
+gbt_status anchors_adjust(anchors *a, adjust_stats *stats, const adjust_def *def, adjust_result *out, gbt_error *err);
+
+#endif

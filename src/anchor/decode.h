@@ -1,0 +1,47 @@
+/* anchor/decode.h -- anchors + camera centre -> Gaussians, and back (Scaffold-GS eqs 13-15; docs/equations.md). */
+#ifndef GBT_ANCHOR_DECODE_H
+#define GBT_ANCHOR_DECODE_H
+
+#include "anchor/anchors.h"
+#include "base/gaussians.h"
+
+/** What a forward decode keeps for its adjoint, and scratch. Start from {0}; reused from view to view; free with decode_tape_free(). */
+typedef struct decode_tape {
+    size_t visible_count, capacity;
+    const uint32_t *visible;  /* borrowed from decode_forward() until decode_backward() returns */
+    float *input;             /* internal: activations kept for the adjoint */
+    float *hidden;
+    float *output;
+    size_t block_count, block_capacity;
+    float *block_grad;        /* internal: one decoder gradient per block, summed in block order */
+    uint32_t *slot;           /* [gaussian count]: visible row * K + offset, ascending: which slot each Gaussian came from */
+    size_t slot_capacity;
+    float *opacity_sum;       /* [visible_count]: sum over offsets of max(alpha, 0), for pruning (sec. 5.1) */
+} decode_tape;
+
+/**
+ * Decode the visible anchors for one camera centre.
+ *
+ * Gaussian k of anchor i is kept iff its alpha > `opacity_min` (0 = the reference's rule); kept ones are packed in (visible row, offset) order.
+ *
+ * @param visible [in] [visible_count] anchor indices, ascending; borrowed until decode_backward()
+ * @param out     [out] resized and padded; out->count kept Gaussians; all finite for finite parameters
+ * Threads: same bits for every thread count. Cost: 6880 multiply-adds per visible anchor (K = 10).
+ */
+gbt_status decode_forward(const anchors *a, const decoder *d, const float camera_center[3], const uint32_t *visible, size_t visible_count,
+                          float opacity_min, gaussians *out, decode_tape *tape, gbt_error *err);
+
+/**
+ * Adjoint of the last decode_forward() on `tape`: adds dL/dparameter.
+ *
+ * @param d_gaussians [in]  gradients in the order of the forward's `out`; quat_* is dL/d(unit quaternion), any component along q is ignored
+ * @param d_anchors   [out] same shape as `a` (position unused); added to, rows of `visible` only
+ * @param d_params    [out] [d->param_count], added to
+ * Threads: same bits for every thread count (per-block sums in block order).
+ */
+gbt_status decode_backward(const anchors *a, const decoder *d, const decode_tape *tape, const gaussians *d_gaussians, anchors *d_anchors,
+                           float *d_params, gbt_error *err);
+
+void decode_tape_free(decode_tape *tape);
+
+#endif

@@ -1,0 +1,74 @@
+/* data/scene.h -- what a data set says: cameras, photos, sparse points; recentred in double.
+
+   Readers take bytes and fill a `scene`; scene_load() finds the files of a folder, reads them, recentres and splits. */
+#ifndef GBT_DATA_SCENE_H
+#define GBT_DATA_SCENE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/image.h"
+#include "gbtrace/camera.h"
+#include "gbtrace/status.h"
+
+typedef struct scene_view {
+    char *name;        /* image name as the data set gives it, may hold sub-folders; owned */
+    char *path;        /* where the pixels are; owned */
+    gbt_camera camera; /* pose in scene-local coordinates; width and height as the data set states them */
+    bool is_test;      /* held out */
+} scene_view;
+
+typedef struct scene_points {
+    size_t count;
+    float *position; /* [count][3], scene-local; all finite */
+    float *color;    /* [count][3] in [0, 1] */
+    bool has_color;  /* false: `color` is mid grey, because the source has none */
+} scene_points;
+
+typedef struct scene {
+    char *folder;     /* as given; owned */
+    char source[32];  /* "colmap-bin", "colmap-txt", "transforms" or "ply" */
+    double origin[3]; /* subtracted from every coordinate: world = local + origin */
+    size_t view_count;
+    scene_view *views; /* sorted by name (bytes) */
+    scene_points points;
+    size_t points_dropped; /* non-finite ones */
+} scene;
+
+typedef enum scene_split_kind { SCENE_SPLIT_EVERY, SCENE_SPLIT_NONE, SCENE_SPLIT_LIST } scene_split_kind;
+
+typedef struct scene_split {
+    scene_split_kind kind;
+    int every;             /* SCENE_SPLIT_EVERY: views 0, every, 2 every, ... of the sorted list are held out; >= 2. Default 8 */
+    const char *list_path; /* SCENE_SPLIT_LIST: text file, one image name per line */
+} scene_split;
+
+/** "every=8", "none" or "list=FILE", as on the command line. */
+gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err);
+
+/**
+ * Load a data set folder, or a .ply point cloud.
+ *
+ * A folder is COLMAP (sparse/0, sparse or the folder itself; binary preferred; images/ beside it) or holds a transforms.json.
+ * Checks that every photo exists and names all that do not. Photos are not read here (scene_read_photo).
+ * The origin is the median of the points (of the camera centres without points), so outliers cannot move it.
+ *
+ * @param out [out] free with scene_free(); zeroed on failure
+ * Threads: any, with distinct `out`.
+ */
+gbt_status scene_load(const char *path, const scene_split *split, scene *out, gbt_error *err);
+void scene_free(scene *s);
+
+/**
+ * Read one photo as 3-channel float, resized to `width` x `height` by exact area averaging (camera resized alike: gbt_camera_resized()).
+ *
+ * The photo may differ from the camera's stated size if the aspect agrees within 1 px; it is then resampled in one step. Alpha is
+ * composited on black.
+ */
+gbt_status scene_read_photo(const scene_view *view, int width, int height, image *out, gbt_error *err);
+
+/** Half the diagonal-like extent of the training cameras: 1.1 * max |c - mean c| (spatial_lr_scale); at least a small positive number. */
+double scene_camera_extent(const scene *s);
+
+#endif

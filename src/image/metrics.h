@@ -4,30 +4,73 @@
 
 #include "base/image.h"
 
-/** 3-channel images of equal size, values in [0, 1]. 20 log10(1 / sqrt(mse)) over all values, in double; 100 for identical images (stated cap). */
+#define METRIC_PSNR_MAX 100.0 /* dB, stated for images that are equal or nearly so */
+
+/**
+ * Peak signal to noise ratio, dB: 20 log10(1 / sqrt(mse)) over all values, in double, at most METRIC_PSNR_MAX.
+ *
+ * @param a, b  equal width, height and channels (any number), values in [0, 1]
+ * @return NaN when the sizes differ or a value is NaN
+ * Threads: any.
+ */
 double metric_psnr(const image *a, const image *b);
 
-/** Mean SSIM: 11x11 Gaussian (sigma 1.5), zero padding, C1 = 0.01^2, C2 = 0.03^2, variances from centred differences (two-pass), in double. Identical images give 1. */
+/**
+ * Mean SSIM over all pixels and channels, in double.
+ *
+ * 11 x 11 Gaussian of sigma 1.5, zero padding, window not renormalised at borders, C1 = 0.01^2, C2 = 0.03^2, variances E[x^2] - mu^2.
+ * Identical images give exactly 1. The products of floats are exact in double, so the variances are good to 1e-15 (a float32
+ * form needs two passes: it gives 1.00003 for constant images).
+ *
+ * @param a, b  equal width, height (from 1 x 1) and channels (any number)
+ * @return (-1, 1]; NaN when the sizes differ, a value is not finite, or memory is short
+ * Threads: any; the same bits for every thread count and instruction set.
+ */
 double metric_ssim(const image *a, const image *b);
 
-/** Mean LDR-FLIP (Andersson et al. 2020), 67 pixels per degree. `error_map` optional: 1-channel image of a's size, caller allocated. */
+/**
+ * Mean LDR-FLIP (Andersson et al. 2020) at 67.02 pixels per degree (0.7 m from a screen of 3840 pixels in 0.7 m).
+ *
+ * @param a, reference  3 channels, equal size; sRGB values, clamped to [0, 1], NaN as 0
+ * @param mean          [out] [0, 1], 0 for identical images
+ * @param error_map     [out] optional: 1 channel, of a's size, allocated by the caller
+ * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_NO_MEMORY
+ * Threads: any; the same bits for every thread count. Cost: 24 bytes of scratch per pixel.
+ */
 gbt_status metric_flip(const image *a, const image *reference, double *mean, image *error_map, gbt_error *err);
 
-/** Round to 8 bit as the PNG writer does, in place: floor(clamp(x) * 255 + 0.5) / 255. */
+/** Round to 8 bit as the PNG writer does, in place: floor(clamp(x) * 255 + 0.5) / 255; NaN becomes 0. */
 void image_quantize(image *im);
 
 /** Scratch of image_loss(), reused from step to step. Start from {0}. */
-typedef struct loss_scratch { float *buffer; size_t capacity; } loss_scratch;
-void loss_scratch_free(loss_scratch *s);
+typedef struct loss_scratch {
+    double *buffer;
+    size_t capacity; /* doubles */
+} loss_scratch;
 
-typedef struct image_loss_result { double loss, l1, ssim, mse; } image_loss_result;
+void loss_scratch_free(loss_scratch *s); /* zeroes the struct */
+
+typedef struct image_loss_result {
+    double loss, l1, ssim, mse; /* l1, ssim and mse are means over the valid pixels and their channels */
+} image_loss_result;
 
 /**
- * L = (1 - w) mean|x - y| + w (1 - SSIM(x, y)) and dL/dx, over the pixels where valid (NULL: all).
+ * L = (1 - w) mean|x - y| + w (1 - SSIM(x, y)) and dL/dx, over the pixels where `valid` (NULL: all).
  *
- * @param x       [in]  render, unclamped;  @param y [in] photo;  3 channels, equal size
- * @param d_x     [out] 3 channels, overwritten
- * Threads: same bits for every thread count. float32 SIMD inside; agrees with the double form to 1e-5 relative.
+ * SSIM is that of metric_ssim(). Pixels that are not valid are 0 in both images for its windows, count in no mean, and have
+ * gradient 0. No valid pixel: loss 0, ssim 1, gradient 0. At x = y the gradient of |x - y| is taken as 0.
+ * Values that are not finite are not an error: they make `out->loss` NaN or infinite, so test that before using d_x.
+ *
+ * @param x             [in]  render, unclamped, 3 channels
+ * @param y             [in]  photo, the size of x
+ * @param valid         [in]  optional, [height][width], 0 = leave out
+ * @param dssim_weight  [in]  w, [0, 1]
+ * @param scratch       [in,out] grows to 9 doubles per pixel, and 3 more with `valid`
+ * @param d_x           [out] the size of x, allocated by the caller, overwritten
+ * @return GBT_OK, GBT_ERR_ARGUMENT (sizes, weight), GBT_ERR_NO_MEMORY
+ * Threads: any with distinct `scratch`; the same bits for every thread count and instruction set. All sums are in double, only
+ * d_x is rounded to float.
+ * Cost: O(pixels); about 11 ms of one core for 480 x 359 with AVX-512, 12 ms with AVX2, 26 ms without.
  */
 gbt_status image_loss(const image *x, const image *y, const unsigned char *valid, double dssim_weight, loss_scratch *scratch, image *d_x,
                       image_loss_result *out, gbt_error *err);

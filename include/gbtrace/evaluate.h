@@ -1,0 +1,47 @@
+/* gbtrace/evaluate.h -- render a trained scene and score it against held-out photos. */
+#ifndef GBTRACE_EVALUATE_H
+#define GBTRACE_EVALUATE_H
+
+#include "gbtrace/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct gbt_evaluate_def {
+    const char *data; /* data set folder; NULL: the one the model was trained on. Default NULL */
+    const char *json; /* also write the scores here; NULL: only RUN/metrics.json. Default NULL */
+    int report;       /* 1: also write RUN/report.html. Default 1 */
+} gbt_evaluate_def;
+
+gbt_evaluate_def gbt_evaluate_def_default(void);
+
+/**
+ * Score the held-out views of a run: PSNR, SSIM and FLIP on 8-bit images, per view and mean.
+ *
+ * Renders go to RUN/renders/test/NAME.png, the photos they are compared with to RUN/renders/test/NAME.photo.png; scores to
+ * RUN/metrics.json; RUN/report.html shows all of it. Without held-out views the scores are null ("n/a"), never NaN.
+ *
+ * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ */
+gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err);
+
+typedef enum gbt_split { GBT_SPLIT_TEST, GBT_SPLIT_TRAIN, GBT_SPLIT_ALL } gbt_split;
+
+typedef struct gbt_render_def {
+    const char *data;     /* data set whose cameras are used; NULL: the model's. Default NULL */
+    gbt_split split;      /* default GBT_SPLIT_TEST */
+    const char *renderer; /* "trace" (default) or "reference" (double, every Gaussian against every ray: slow) */
+    const char *format;   /* "png" (default) or "exr" (32-bit float) */
+    double downscale;     /* 0: as in training. Default 0 */
+} gbt_render_def;
+
+gbt_render_def gbt_render_def_default(void);
+
+/** Render the views of a split into the folder `out`, one file per view. Camera models are traced as they are. */
+gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

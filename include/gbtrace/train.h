@@ -1,0 +1,63 @@
+/* gbtrace/train.h -- train a neural Gaussian scene from posed photos. */
+#ifndef GBTRACE_TRAIN_H
+#define GBTRACE_TRAIN_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "gbtrace/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { GBT_TRAIN_MAX_EVALS = 16 };
+
+typedef struct gbt_train_def {
+    const char *init;           /* "gb" (granular balls, default) or "voxel" */
+    const char *scale_prior;    /* "gb" (default) or "nn" */
+    int max_depth;              /* D_max of the balls, [0, 64]. Default 18 */
+    float voxel_size;           /* v, scene units; 0: the median spacing of the points. Default 0 */
+    int offsets;                /* K, Gaussians per anchor, [1, 16]. Default 10 */
+    const char *distance;       /* distance input of the networks: "auto" (default), "on", "off" */
+    uint64_t iterations;        /* length of the run; 0: the budget decides. Default 0 */
+    double budget_seconds;      /* wall time for training; used when iterations is 0. Default 600 */
+    const char *pace;           /* "n1,...,n20": iterations in each twentieth of the schedule, as a budget run records them. Default NULL */
+    double downscale;           /* photos are divided by this, >= 1. Default 1 */
+    int start_level;            /* coarse to fine: first resolution is 1 / 2^start_level, [0, 4]. Default 2 */
+    const char *eval_split;     /* "every=8" (default), "none", "list=FILE" */
+    uint64_t seed;              /* Default 0 */
+    size_t max_anchors;         /* growth stops there. Default 2,000,000 */
+    bool grow;                  /* grow and prune anchors. Default true */
+    bool compat;                /* every quirk of the reference method (docs/training.md). Default false */
+    double save_every_seconds;  /* wall time between checkpoints; 0: only at the end. Default 120 */
+    uint64_t save_at_step;      /* one extra checkpoint right after this step; 0: none. Default 0 */
+    uint64_t stop_at_step;      /* stop, as a signal would, after this step; 0: never. Default 0 */
+    bool resume;                /* go on from the run's last checkpoint; everything else comes from there */
+    double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* held-out PSNR after so many seconds of training; the clock stops meanwhile */
+    int eval_at_count;
+    const char *command;        /* the command line, for the report. Default "" */
+    uint32_t cookie_;           /* set by gbt_train_def_default() */
+} gbt_train_def;
+
+gbt_train_def gbt_train_def_default(void);
+
+/**
+ * Train on the data set in `data`, write everything into the folder `run`.
+ *
+ * `run` gets model.gbt, log.csv, config, train.json and checkpoints/. Progress goes to stderr. SIGINT and SIGTERM stop after the current
+ * step: a checkpoint is saved and GBT_ERR_INTERRUPTED is returned. The same seed and length give the same model.gbt, bit for bit, for
+ * any number of threads, interrupted and resumed or not.
+ *
+ * @return GBT_OK, or what failed; nothing already in `run` is damaged by a failure
+ */
+gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def, gbt_error *err);
+
+/** Threads for everything that follows, >= 1. Without this call: all processors of this process. */
+void gbt_set_threads(int threads);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

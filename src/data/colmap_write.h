@@ -1,0 +1,48 @@
+/* data/colmap_write.h -- COLMAP models from structs: binary, or text. */
+#ifndef GBT_DATA_COLMAP_WRITE_H
+#define GBT_DATA_COLMAP_WRITE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "gbtrace/camera.h"
+#include "gbtrace/status.h"
+
+typedef struct colmap_point {
+    double position[3]; /* world */
+    unsigned char color[3];
+    double error;          /* reprojection error, pixels; -1 when unknown */
+    uint32_t track_count;
+    const uint32_t *track; /* [track_count][2]: image index (from 0), observation index within that image */
+} colmap_point;
+
+/** `point` of an observation that belongs to no point. */
+#define COLMAP_NO_POINT UINT64_MAX
+
+typedef struct colmap_observation {
+    double x, y;    /* pixels; the centre of the top-left pixel is (0.5, 0.5) */
+    uint64_t point; /* index into the points, or COLMAP_NO_POINT */
+} colmap_observation;
+
+typedef struct colmap_image {
+    const char *name;
+    gbt_camera camera; /* pose in world coordinates */
+    size_t observation_count;
+    const colmap_observation *observations;
+} colmap_image;
+
+/**
+ * Write folder/cameras.bin, images.bin and points3D.bin; the folder is made when it is not there. Everything is borrowed.
+ *
+ * Ids are indices plus one; images with the same model, size and parameters share one camera id.
+ *
+ * @return GBT_OK; GBT_ERR_ARGUMENT for a bad name, camera or index; else as file_write_atomic()
+ */
+gbt_status colmap_write(const char *folder, const colmap_image *images, size_t image_count, const colmap_point *points, size_t point_count,
+                        gbt_error *err);
+
+/** The same as cameras.txt, images.txt and points3D.txt; doubles are written so that they read back bit for bit. */
+gbt_status colmap_write_text(const char *folder, const colmap_image *images, size_t image_count, const colmap_point *points,
+                             size_t point_count, gbt_error *err);
+
+#endif

@@ -1,0 +1,167 @@
+/* data/gaussian_ply.c -- plain 3DGS models from bytes. */
+#include "data/gaussian_ply.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "base/file.h"
+#include "data/ply.h"
+
+enum { COLUMN_MEAN = 0, COLUMN_OPACITY = 3, COLUMN_SCALE = 4, COLUMN_ROT = 7, COLUMN_DC = 11, COLUMN_REST = 14, FIXED_COLUMNS = 14 };
+
+#define VALUE_LIMIT 1e18 /* squares of anything below are floats */
+
+typedef struct gaussian_rows {
+    gaussian_cloud *out;
+    size_t rest_count; /* f_rest properties: 0, 9, 24 or 45 */
+} gaussian_rows;
+
+static double limited_log(double scale_log)
+{
+    return fmax(scale_log, -GAUSSIAN_SCALE_LOG_LIMIT);
+}
+
+/* False when the row is not usable. */
+static bool convert_row(const gaussian_rows *rows, const double *values, size_t i)
+{
+    gaussian_cloud *out = rows->out;
+    for (size_t k = 0; k < FIXED_COLUMNS + rows->rest_count; k++) {
+        const bool may_be_infinite = k >= COLUMN_OPACITY && k < COLUMN_ROT;
+        const double limit = k < COLUMN_OPACITY ? RAW_COORDINATE_LIMIT : VALUE_LIMIT;
+        if (isnan(values[k]) || (!may_be_infinite && fabs(values[k]) > limit))
+            return false;
+    }
+    double largest = -(double)INFINITY;
+    for (int k = 0; k < 3; k++)
+        largest = fmax(largest, values[COLUMN_SCALE + k]);
+    if (largest > GAUSSIAN_SCALE_LOG_LIMIT)
+        return false;
+    bool clamped = false;
+    const double least = limited_log(limited_log(largest) - log(GAUSSIAN_SCALE_RATIO));
+    for (size_t k = 0; k < 3; k++) {
+        const double scale_log = values[COLUMN_SCALE + k];
+        clamped = clamped || scale_log < least;
+        out->scale_log[3 * i + k] = (float)fmax(scale_log, least);
+        out->mean[3 * i + k] = (float)values[COLUMN_MEAN + k];
+    }
+    out->scales_clamped += clamped;
+    out->opacity[i] = (float)(1 / (1 + exp(-values[COLUMN_OPACITY])));
+    const double *q = values + COLUMN_ROT;
+    const double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    const bool has_rotation = norm > 1e-30;
+    out->identity_rotations += !has_rotation;
+    for (size_t k = 0; k < 4; k++)
+        out->quat[4 * i + k] = has_rotation ? (float)(q[k] / norm) : k == 0 ? 1.0f : 0.0f;
+    float(*sh)[3] = (float(*)[3])(out->sh + i * GAUSSIAN_SH_COUNT * 3);
+    memset(sh, 0, GAUSSIAN_SH_COUNT * sizeof *sh);
+    /* f_rest is channel-major in the file: all of red, then green, then blue. */
+    const size_t per_channel = rows->rest_count / 3;
+    for (size_t channel = 0; channel < 3; channel++) {
+        sh[0][channel] = (float)values[COLUMN_DC + channel];
+        for (size_t k = 0; k < per_channel; k++)
+            sh[1 + k][channel] = (float)values[COLUMN_REST + channel * per_channel + k];
+    }
+    return true;
+}
+
+static void add_row(void *context, const double *values)
+{
+    const gaussian_rows *rows = context;
+    if (convert_row(rows, values, rows->out->count))
+        rows->out->count++;
+    else
+        rows->out->dropped++;
+}
+
+/* Property indices of the columns; says what is missing. */
+static gbt_status find_columns(const source_file *file, const ply_header *header, int vertex, int *columns, size_t *rest_count,
+                               gbt_error *err)
+{
+    static const char *const names[FIXED_COLUMNS] = {"x",       "y",     "z",     "opacity", "scale_0", "scale_1", "scale_2",
+                                                     "rot_0",   "rot_1", "rot_2", "rot_3",   "f_dc_0",  "f_dc_1",  "f_dc_2"};
+    const ply_element *e = &header->elements[vertex];
+    if (ply_find_property(header, vertex, "f_anchor_feat_0") >= 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: holds anchors of a neural model, not Gaussians", file->name);
+    if (ply_find_property(header, vertex, "f_dc_0") < 0 && ply_find_property(header, vertex, "opacity") < 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: is a point cloud, not a Gaussian model (no property f_dc_0 nor opacity)", file->name);
+    for (int k = 0; k < FIXED_COLUMNS; k++) {
+        columns[k] = ply_find_property(header, vertex, names[k]);
+        if (columns[k] < 0)
+            return base_fail(err, GBT_ERR_FORMAT, "%s: element vertex has no property %s", file->name, names[k]);
+    }
+    size_t rest = 0;
+    for (; FIXED_COLUMNS + rest < PLY_MAX_COLUMNS; rest++) {
+        char name[32];
+        snprintf(name, sizeof name, "f_rest_%zu", rest);
+        columns[FIXED_COLUMNS + rest] = ply_find_property(header, vertex, name);
+        if (columns[FIXED_COLUMNS + rest] < 0)
+            break;
+    }
+    if (rest != 0 && rest != 9 && rest != 24 && rest != 45)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: wrong number of f_rest properties (wanted 0, 9, 24 or 45, got %zu)", file->name, rest);
+    for (size_t k = 0; k < FIXED_COLUMNS + rest; k++)
+        if (header->properties[e->first_property + (size_t)columns[k]].is_list)
+            return base_fail(err, GBT_ERR_FORMAT, "%s: property %zu of the Gaussians is a list", file->name, k);
+    *rest_count = rest;
+    return GBT_OK;
+}
+
+static gbt_status allocate(gaussian_cloud *out, size_t count, gbt_error *err)
+{
+    out->mean = mem_alloc(count, 3 * sizeof(float), "Gaussian means", err);
+    out->scale_log = mem_alloc(count, 3 * sizeof(float), "Gaussian scales", err);
+    out->quat = mem_alloc(count, 4 * sizeof(float), "Gaussian rotations", err);
+    out->opacity = mem_alloc(count, sizeof(float), "Gaussian opacities", err);
+    out->sh = mem_alloc(count, GAUSSIAN_SH_COUNT * 3 * sizeof(float), "Gaussian colours", err);
+    const bool complete = out->mean != NULL && out->scale_log != NULL && out->quat != NULL && out->opacity != NULL && out->sh != NULL;
+    return complete ? GBT_OK : GBT_ERR_NO_MEMORY;
+}
+
+gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    ply_header header;
+    GBT_TRY(ply_read_header(file, &header, err));
+    const int vertex = ply_find_element(&header, "vertex");
+    if (vertex < 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no element vertex in the header", file->name);
+    int columns[PLY_MAX_COLUMNS + 1];
+    gaussian_rows rows = {.out = out};
+    GBT_TRY(find_columns(file, &header, vertex, columns, &rows.rest_count, err));
+    out->sh_degree = rows.rest_count == 45 ? 3 : rows.rest_count == 24 ? 2 : rows.rest_count == 9 ? 1 : 0;
+    /* A column takes at least a byte, so this bounds the memory by a small multiple of the file. */
+    const uint64_t row_count = header.elements[vertex].count, least_bytes = FIXED_COLUMNS + rows.rest_count;
+    if (row_count > (file->size - header.data_at) / least_bytes)
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu Gaussians cannot be in the %zu bytes that follow", file->name, header.data_at,
+                         (unsigned long long)row_count, file->size - header.data_at);
+    gbt_status status = allocate(out, (size_t)row_count, err);
+    if (status == GBT_OK)
+        status = ply_read_rows(file, &header, vertex, columns, FIXED_COLUMNS + rows.rest_count, add_row, &rows, err);
+    if (status == GBT_OK && out->count == 0)
+        status = base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu rows dropped)", file->name, out->dropped);
+    if (status != GBT_OK)
+        gaussian_cloud_free(out);
+    return status;
+}
+
+gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    source_file file = {.name = path};
+    unsigned char *bytes;
+    GBT_TRY(file_read(path, &bytes, &file.size, err));
+    file.bytes = bytes;
+    const gbt_status status = gaussian_ply_read(&file, out, err);
+    mem_free(bytes);
+    return status;
+}
+
+void gaussian_cloud_free(gaussian_cloud *cloud)
+{
+    mem_free(cloud->mean);
+    mem_free(cloud->scale_log);
+    mem_free(cloud->quat);
+    mem_free(cloud->opacity);
+    mem_free(cloud->sh);
+    memset(cloud, 0, sizeof *cloud);
+}

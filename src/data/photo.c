@@ -1,0 +1,95 @@
+/* data/photo.c -- a photo as training wants it: three channels, alpha on black, area-averaged to the size asked for. */
+#include "data/photo.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "data/scene.h"
+
+/* One row of box sums: out[i] = mean of in over [i, i + 1) * in_count / out_count. `step` is the distance of neighbours in floats. */
+static void resize_line(const float *in, size_t in_count, size_t in_step, float *out, size_t out_count, size_t out_step)
+{
+    /* Edges are integers in units of 1 / out_count input pixels, so that weights are exact and sum to in_count exactly. */
+    for (size_t i = 0; i < out_count; i++) {
+        const uint64_t begin = (uint64_t)i * in_count, end = begin + in_count;
+        double sum = 0;
+        for (uint64_t pixel = begin / out_count; pixel * out_count < end; pixel++) {
+            const uint64_t left = pixel * out_count > begin ? pixel * out_count : begin;
+            const uint64_t right = (pixel + 1) * out_count < end ? (pixel + 1) * out_count : end;
+            sum += (double)(right - left) * (double)in[pixel * in_step];
+        }
+        out[i * out_step] = (float)(sum / (double)in_count);
+    }
+}
+
+gbt_status photo_resize(const image *in, int width, int height, image *out, gbt_error *err)
+{
+    image narrow = {0};
+    const size_t channels = (size_t)in->channels, in_width = (size_t)in->width, in_height = (size_t)in->height;
+    memset(out, 0, sizeof *out);
+    gbt_status status = image_alloc(&narrow, width, in->height, in->channels, err);
+    if (status == GBT_OK)
+        status = image_alloc(out, width, height, in->channels, err);
+    if (status == GBT_OK) {
+        const size_t out_row = (size_t)width * channels;
+        for (size_t y = 0; y < in_height; y++)
+            for (size_t c = 0; c < channels; c++)
+                resize_line(in->pixels + y * in_width * channels + c, in_width, channels, narrow.pixels + y * out_row + c, (size_t)width,
+                            channels);
+        for (size_t x = 0; x < out_row; x++)
+            resize_line(narrow.pixels + x, in_height, out_row, out->pixels + x, (size_t)height, out_row);
+    }
+    image_free(&narrow);
+    return status;
+}
+
+/* True when two sizes have the same aspect: one scaled to the other's width or height misses the rest by at most one pixel of the
+   smaller. */
+static bool same_aspect(double w0, double h0, double w1, double h1)
+{
+    if (w0 > w1) {
+        const double w = w0, h = h0;
+        w0 = w1, h0 = h1, w1 = w, h1 = h;
+    }
+    return fabs(h1 * w0 / w1 - h0) <= 1 || fabs(w1 * h0 / h1 - w0) <= 1;
+}
+
+/* Four channels to three. image_read() gives finite values, and alpha in [0, 1] keeps them so. */
+static gbt_status to_rgb(const image *in, image *out, gbt_error *err)
+{
+    GBT_TRY(image_alloc(out, in->width, in->height, 3, err));
+    const size_t count = (size_t)in->width * (size_t)in->height, channels = (size_t)in->channels;
+    for (size_t i = 0; i < count; i++) {
+        const float *pixel = in->pixels + i * channels;
+        const float alpha = channels < 4 ? 1 : fminf(fmaxf(pixel[3], 0), 1);
+        for (size_t c = 0; c < 3; c++)
+            out->pixels[3 * i + c] = pixel[c] * alpha;
+    }
+    return GBT_OK;
+}
+
+gbt_status scene_read_photo(const scene_view *view, int width, int height, image *out, gbt_error *err)
+{
+    image stored = {0}, rgb = {0};
+    memset(out, 0, sizeof *out);
+    if (width < 1 || height < 1)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: photo wanted at %d x %d (wanted both >= 1)", view->path, width, height);
+    gbt_status status = image_read(view->path, &stored, err);
+    if (status == GBT_OK && !same_aspect(stored.width, stored.height, view->camera.width, view->camera.height))
+        status = base_fail(err, GBT_ERR_FORMAT, "%s: photo does not have the camera's aspect (wanted %d x %d or a multiple, got %d x %d)",
+                           view->path, view->camera.width, view->camera.height, stored.width, stored.height);
+    if (status == GBT_OK)
+        status = to_rgb(&stored, &rgb, err);
+    image_free(&stored);
+    if (status == GBT_OK && rgb.width == width && rgb.height == height) {
+        *out = rgb;
+        rgb = (image){0};
+    } else if (status == GBT_OK) {
+        status = photo_resize(&rgb, width, height, out, err);
+    }
+    image_free(&rgb);
+    if (status != GBT_OK)
+        image_free(out);
+    return status;
+}

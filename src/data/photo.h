@@ -1,0 +1,16 @@
+/* data/photo.h -- exact area averaging of images. */
+#ifndef GBT_DATA_PHOTO_H
+#define GBT_DATA_PHOTO_H
+
+#include "base/image.h"
+
+/**
+ * Resample to `width` x `height`: each output pixel is the mean of `in`, taken as constant within each pixel, over the output
+ * pixel's rectangle. Exact for every ratio, up or down; the mean of the image is kept; a constant image stays constant to the bit.
+ *
+ * @param out [out] owned by the caller (image_free()); zeroed on failure; not `in`
+ * Cost: O(width * in->height + width * height) times the ratio's pixels; float between the two passes, double within each.
+ */
+gbt_status photo_resize(const image *in, int width, int height, image *out, gbt_error *err);
+
+#endif

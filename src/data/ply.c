@@ -1,0 +1,208 @@
+/* data/ply.c -- the rows of a PLY file, and point clouds made of them. */
+#include "data/ply.h"
+
+#include <math.h>
+
+#include "data/number.h"
+
+static const size_t type_bytes[PLY_TYPE_COUNT] = {
+    [PLY_INT8] = 1,  [PLY_UINT8] = 1,  [PLY_INT16] = 2, [PLY_UINT16] = 2,
+    [PLY_INT32] = 4, [PLY_UINT32] = 4, [PLY_FLOAT] = 4, [PLY_DOUBLE] = 8,
+};
+
+static double take_binary(cursor *c, ply_type type, ply_format format)
+{
+    uint64_t bits = cursor_uint(c, type_bytes[type]);
+    if (format == PLY_BIG_ENDIAN)
+        bits = __builtin_bswap64(bits) >> (64 - 8 * type_bytes[type]);
+    switch (type) {
+    case PLY_INT8: return (double)(int8_t)bits;
+    case PLY_INT16: return (double)(int16_t)bits;
+    case PLY_INT32: return (double)(int32_t)bits;
+    case PLY_FLOAT: {
+        const uint32_t low = (uint32_t)bits;
+        float value;
+        memcpy(&value, &low, sizeof value);
+        return (double)value;
+    }
+    case PLY_DOUBLE: {
+        double value;
+        memcpy(&value, &bits, sizeof value);
+        return value;
+    }
+    default: return (double)bits;
+    }
+}
+
+/* Fewest bytes that a row of this element takes. */
+static size_t least_row_bytes(const ply_header *header, const ply_element *e)
+{
+    if (header->format == PLY_ASCII)
+        return 2 * e->property_count; /* a digit and a separator each */
+    size_t bytes = 0;
+    for (size_t i = 0; i < e->property_count; i++) {
+        const ply_property *p = &header->properties[e->first_property + i];
+        bytes += type_bytes[p->is_list ? p->count_type : p->type];
+    }
+    return bytes;
+}
+
+static gbt_status check_count(const source_file *file, const cursor *c, const ply_header *header, const ply_element *e, gbt_error *err)
+{
+    if (e->count == 0)
+        return GBT_OK;
+    const int shown = e->name_length < 60 ? (int)e->name_length : 60;
+    if (e->property_count == 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: element %.*s has rows but no properties", file->name, shown, e->name);
+    /* The newline of the last ASCII row may be missing, so one byte is granted there. */
+    const size_t row_bytes = least_row_bytes(header, e), grant = header->format == PLY_ASCII ? 1 : 0;
+    if (e->count > (cursor_left(c) + grant) / row_bytes)
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu rows of element %.*s cannot be in the %zu bytes that follow", file->name, c->at,
+                         (unsigned long long)e->count, shown, e->name, cursor_left(c));
+    return GBT_OK;
+}
+
+/* One binary row; `values` gets every scalar property of the element, lists are skipped. */
+static gbt_status take_binary_row(cursor *c, const ply_header *header, const ply_element *e, double *values, gbt_error *err)
+{
+    const size_t start = c->at;
+    for (size_t i = 0; i < e->property_count && !c->short_read; i++) {
+        const ply_property *p = &header->properties[e->first_property + i];
+        if (!p->is_list) {
+            values[i] = take_binary(c, p->type, header->format);
+            continue;
+        }
+        const double count = take_binary(c, p->count_type, header->format);
+        if (count < 0)
+            return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: list of %g items", c->file->name, start, count);
+        cursor_skip(c, (uint64_t)count * type_bytes[p->type]); /* at most 2^32 * 8, so no overflow */
+    }
+    if (c->short_read)
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: file ends inside a row of element %.*s", c->file->name, start,
+                         e->name_length < 60 ? (int)e->name_length : 60, e->name);
+    return GBT_OK;
+}
+
+static gbt_status take_ascii_value(const char **at, const char *end, raw_place place, double *out, gbt_error *err)
+{
+    const char *token;
+    size_t length;
+    if (!number_next_token(at, end, &token, &length))
+        return raw_fail(err, place, "row has too few values");
+    const number_result result = number_parse_double(token, length, out);
+    if (result == NUMBER_OK)
+        return GBT_OK;
+    return raw_fail(err, place, result == NUMBER_RANGE ? "value is out of range: %.*s" : "value is not a number: %.*s",
+                    length < 60 ? (int)length : 60, token);
+}
+
+/* One ASCII row on a line of its own; blank lines before it are skipped. */
+static gbt_status take_ascii_row(cursor *c, size_t *line, const ply_header *header, const ply_element *e, double *values, gbt_error *err)
+{
+    const char *at = NULL, *end = NULL, *ahead = NULL, *token = NULL;
+    size_t length = 0;
+    raw_place place = {0};
+    do {
+        if (cursor_left(c) == 0)
+            return base_fail(err, GBT_ERR_FORMAT, "%s:%zu: file ends before the last row of element %.*s", c->file->name, *line,
+                             e->name_length < 60 ? (int)e->name_length : 60, e->name);
+        at = (const char *)c->file->bytes + c->at;
+        const char *newline = memchr(at, '\n', cursor_left(c));
+        end = newline != NULL ? newline : at + cursor_left(c);
+        c->at += (size_t)(end - at) + (newline != NULL);
+        place = (raw_place){c->file->name, ':', ++*line};
+        ahead = at;
+    } while (!number_next_token(&ahead, end, &token, &length));
+    for (size_t i = 0; i < e->property_count; i++) {
+        const ply_property *p = &header->properties[e->first_property + i];
+        double value;
+        GBT_TRY(take_ascii_value(&at, end, place, &value, err));
+        if (!p->is_list) {
+            values[i] = value;
+            continue;
+        }
+        if (!(value >= 0 && value <= UINT32_MAX))
+            return raw_fail(err, place, "list of %g items", value);
+        for (uint64_t k = (uint64_t)value; k > 0; k--)
+            GBT_TRY(take_ascii_value(&at, end, place, &(double){0}, err));
+    }
+    if (number_next_token(&at, end, &token, &length))
+        return raw_fail(err, place, "row has too many values, from %.*s", length < 60 ? (int)length : 60, token);
+    return GBT_OK;
+}
+
+gbt_status ply_read_rows(const source_file *file, const ply_header *header, int element, const int *columns, size_t column_count,
+                         ply_row *row, void *context, gbt_error *err)
+{
+    cursor c = {.file = file, .at = header->data_at};
+    size_t line = header->line_count;
+    double values[PLY_MAX_PROPERTIES], wanted[PLY_MAX_COLUMNS];
+    for (int i = 0; i <= element; i++) {
+        const ply_element *e = &header->elements[i];
+        GBT_TRY(check_count(file, &c, header, e, err));
+        for (uint64_t k = 0; k < e->count; k++) {
+            if (header->format == PLY_ASCII)
+                GBT_TRY(take_ascii_row(&c, &line, header, e, values, err));
+            else
+                GBT_TRY(take_binary_row(&c, header, e, values, err));
+            if (i < element)
+                continue;
+            for (size_t j = 0; j < column_count; j++)
+                wanted[j] = values[columns[j]];
+            row(context, wanted);
+        }
+    }
+    return GBT_OK;
+}
+
+typedef struct point_rows {
+    raw_scene *out;
+    bool has_color;
+    double color_scale[3];
+} point_rows;
+
+static void add_point_row(void *context, const double *values)
+{
+    const point_rows *rows = context;
+    float color[3] = {0.5f, 0.5f, 0.5f};
+    for (int k = 0; k < 3 && rows->has_color; k++)
+        color[k] = (float)(values[3 + k] / rows->color_scale[k]);
+    raw_add_point(rows->out, values, color);
+}
+
+gbt_status ply_read_points(const source_file *file, raw_scene *out, gbt_error *err)
+{
+    static const char *const names[9] = {"x", "y", "z", "red", "green", "blue", "diffuse_red", "diffuse_green", "diffuse_blue"};
+    ply_header header;
+    GBT_TRY(ply_read_header(file, &header, err));
+    const int vertex = ply_find_element(&header, "vertex");
+    if (vertex < 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no element vertex in the header", file->name);
+    const ply_element *e = &header.elements[vertex];
+    int columns[6];
+    point_rows rows = {.out = out, .has_color = true};
+    for (int k = 0; k < 6; k++) {
+        columns[k] = ply_find_property(&header, vertex, names[k]);
+        if (columns[k] < 0 && k >= 3)
+            columns[k] = ply_find_property(&header, vertex, names[k + 3]);
+        const ply_property *p = columns[k] < 0 ? NULL : &header.properties[e->first_property + (size_t)columns[k]];
+        const bool usable = p != NULL && !p->is_list;
+        if (!usable && k < 3)
+            return base_fail(err, GBT_ERR_FORMAT, "%s: element vertex has no property %s", file->name, names[k]);
+        if (k >= 3) {
+            rows.has_color = rows.has_color && usable;
+            const bool is_whole = usable && p->type != PLY_FLOAT && p->type != PLY_DOUBLE;
+            rows.color_scale[k - 3] = is_whole ? ldexp(1, 8 * (int)type_bytes[p->type]) - 1 : 1;
+        }
+    }
+    cursor c = {.file = file, .at = header.data_at};
+    if (vertex == 0)
+        GBT_TRY(check_count(file, &c, &header, e, err));
+    /* Behind other elements the exact place is not known yet; the whole rest still bounds the count: x, y and z take a byte each. */
+    if (e->count > cursor_left(&c) / 3)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %llu vertices cannot be in %zu bytes", file->name, (unsigned long long)e->count,
+                         file->size);
+    GBT_TRY(raw_reserve_points(out, (size_t)e->count, err));
+    out->has_color = rows.has_color;
+    return ply_read_rows(file, &header, vertex, columns, rows.has_color ? 6 : 3, add_point_row, &rows, err);
+}

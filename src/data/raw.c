@@ -1,0 +1,148 @@
+/* data/raw.c -- the container that readers fill, and the checks that every source shares. */
+#include "data/raw.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+
+gbt_status raw_fail(gbt_error *err, raw_place place, const char *format, ...)
+{
+    char text[400];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    if (place.mark == RAW_MARK_FRAME)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: %s", place.file, place.at, text);
+    return base_fail(err, GBT_ERR_FORMAT, "%s%c%zu: %s", place.file, place.mark, place.at, text);
+}
+
+void raw_free(raw_scene *raw)
+{
+    for (size_t i = 0; i < raw->view_count; i++) {
+        mem_free(raw->views[i].name);
+        mem_free(raw->views[i].path);
+    }
+    mem_free(raw->views);
+    mem_free(raw->position);
+    mem_free(raw->color);
+    memset(raw, 0, sizeof *raw);
+}
+
+char *raw_copy_text(const char *text, size_t length, gbt_error *err)
+{
+    char *copy = mem_alloc(length + 1, 1, "name", err);
+    if (copy != NULL) {
+        memcpy(copy, text, length);
+        copy[length] = '\0';
+    }
+    return copy;
+}
+
+raw_view *raw_next_view(raw_scene *raw, gbt_error *err)
+{
+    void *views = raw->views;
+    const gbt_status status =
+        mem_reserve(&views, &raw->view_capacity, raw->view_count, raw->view_count + 1, sizeof *raw->views, "views", err);
+    raw->views = views;
+    if (status != GBT_OK)
+        return NULL;
+    raw_view *view = &raw->views[raw->view_count];
+    memset(view, 0, sizeof *view);
+    return view;
+}
+
+gbt_status raw_reserve_points(raw_scene *raw, size_t count, gbt_error *err)
+{
+    raw->position = mem_alloc(count, 3 * sizeof *raw->position, "points", err);
+    raw->color = mem_alloc(count, 3 * sizeof *raw->color, "point colours", err);
+    return raw->position != NULL && raw->color != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+}
+
+void raw_add_point(raw_scene *raw, const double position[3], const float color[3])
+{
+    for (int k = 0; k < 3; k++)
+        if (!(fabs(position[k]) <= RAW_COORDINATE_LIMIT)) {
+            raw->points_dropped++;
+            return;
+        }
+    memcpy(raw->position + 3 * raw->point_count, position, 3 * sizeof *position);
+    for (int k = 0; k < 3; k++)
+        raw->color[3 * raw->point_count + k] = color[k] >= 0 ? fminf(color[k], 1) : 0; /* NaN becomes 0 */
+    raw->point_count++;
+}
+
+gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_error *err)
+{
+    if (length == 0)
+        return raw_fail(err, place, "image name is empty");
+    if (length > RAW_NAME_LIMIT)
+        return raw_fail(err, place, "image name is too long (wanted at most %d bytes, got %zu)", RAW_NAME_LIMIT, length);
+    const int shown = length < 100 ? (int)length : 100;
+    if (name[0] == '/')
+        return raw_fail(err, place, "image name is absolute (wanted a path inside the data set, got %.*s)", shown, name);
+    size_t part = 0;
+    for (size_t i = 0; i <= length; i++) {
+        if (i < length && ((unsigned char)name[i] < 0x20 || name[i] == 0x7f))
+            return raw_fail(err, place, "image name has a control character: %.*s", shown, name);
+        if (i < length && name[i] != '/')
+            continue;
+        if (i - part == 2 && memcmp(name + part, "..", 2) == 0)
+            return raw_fail(err, place, "image name leaves the data set by '..': %.*s", shown, name);
+        part = i + 1;
+    }
+    return GBT_OK;
+}
+
+static bool has_one_focal_length(gbt_camera_model model)
+{
+    switch (model) {
+    case GBT_CAMERA_SIMPLE_PINHOLE:
+    case GBT_CAMERA_SIMPLE_RADIAL:
+    case GBT_CAMERA_RADIAL:
+    case GBT_CAMERA_SIMPLE_RADIAL_FISHEYE:
+    case GBT_CAMERA_RADIAL_FISHEYE:
+    case GBT_CAMERA_SIMPLE_DIVISION:
+    case GBT_CAMERA_SIMPLE_FISHEYE: return true;
+    default: return false;
+    }
+}
+
+gbt_status raw_check_camera(const gbt_camera *camera, raw_place place, gbt_error *err)
+{
+    const int sizes[2] = {camera->width, camera->height};
+    for (int k = 0; k < 2; k++)
+        if (sizes[k] < 1 || sizes[k] > RAW_IMAGE_LIMIT)
+            return raw_fail(err, place, "image %s is out of range (wanted 1..%d, got %d)", k == 0 ? "width" : "height", RAW_IMAGE_LIMIT,
+                            sizes[k]);
+    const int param_count = gbt_camera_param_count(camera->model), focal_count = has_one_focal_length(camera->model) ? 1 : 2;
+    for (int k = 0; k < param_count; k++)
+        if (!(fabs(camera->params[k]) <= RAW_COORDINATE_LIMIT))
+            return raw_fail(err, place, "parameter %d of camera model %s is not usable (got %g)", k, gbt_camera_model_name(camera->model),
+                            camera->params[k]);
+    for (int k = 0; k < focal_count; k++)
+        if (camera->params[k] <= 0)
+            return raw_fail(err, place, "focal length of camera model %s is not positive (got %g)", gbt_camera_model_name(camera->model),
+                            camera->params[k]);
+    return GBT_OK;
+}
+
+static int by_name(const void *a, const void *b)
+{
+    return strcmp(((const raw_view *)a)->name, ((const raw_view *)b)->name);
+}
+
+gbt_status raw_sort_views(raw_scene *raw, const char *file, gbt_error *err)
+{
+    if (raw->view_count > 1)
+        qsort(raw->views, raw->view_count, sizeof *raw->views, by_name);
+    for (size_t i = 1; i < raw->view_count; i++)
+        if (strcmp(raw->views[i - 1].name, raw->views[i].name) == 0)
+            return base_fail(err, GBT_ERR_FORMAT, "%s: duplicate image name: %.200s", file, raw->views[i].name);
+    return GBT_OK;
+}

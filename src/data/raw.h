@@ -1,0 +1,73 @@
+/* data/raw.h -- what a reader fills: views and points in the data set's own world, in double, before recentring; and the checks that
+   every source shares. */
+#ifndef GBT_DATA_RAW_H
+#define GBT_DATA_RAW_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "gbtrace/camera.h"
+#include "gbtrace/status.h"
+
+typedef struct raw_view {
+    char *name;        /* owned */
+    char *path;        /* owned; NULL until the photo has been found */
+    gbt_camera camera; /* pose in world coordinates */
+    uint32_t id;       /* COLMAP's image id, 0 elsewhere */
+} raw_view;
+
+typedef struct raw_scene {
+    size_t view_count, view_capacity;
+    raw_view *views;
+    size_t point_count;
+    double *position; /* [point_count][3], all usable */
+    float *color;     /* [point_count][3] in [0, 1] */
+    bool has_color;
+    size_t points_dropped;     /* not finite, or beyond RAW_COORDINATE_LIMIT */
+    size_t tracks_missing;     /* track entries that name an image which is not there */
+    size_t trailing_bytes;     /* behind the last record */
+    size_t frames_missing;     /* transforms.json frames without a photo */
+    size_t angles_disagreeing; /* transforms.json cameras whose camera_angle_x contradicts fl_x (which wins) */
+} raw_scene;
+
+/** Larger coordinates mean nothing: a double keeps no tenth of a millimetre there, and float squares of them overflow. */
+#define RAW_COORDINATE_LIMIT 1e12
+
+enum { RAW_IMAGE_LIMIT = 65500, RAW_NAME_LIMIT = 4096 };
+
+enum { RAW_MARK_FRAME = '#' };
+
+/** Where a message points: "FILE@OFFSET" (mark '@'), "FILE:LINE" (mark ':') or "FILE: frame N" (RAW_MARK_FRAME). */
+typedef struct raw_place {
+    const char *file;
+    char mark;
+    size_t at;
+} raw_place;
+
+gbt_status raw_fail(gbt_error *err, raw_place place, const char *format, ...) __attribute__((format(printf, 3, 4)));
+
+void raw_free(raw_scene *raw);
+
+/** A zero-terminated copy of `length` bytes, owned by the caller (mem_free()); NULL without memory. */
+char *raw_copy_text(const char *text, size_t length, gbt_error *err);
+
+/** Room for one more view, zeroed; counted only by the caller. NULL without memory. */
+raw_view *raw_next_view(raw_scene *raw, gbt_error *err);
+
+/** Room for `count` points; point_count stays 0 and raw_add_point() fills. */
+gbt_status raw_reserve_points(raw_scene *raw, size_t count, gbt_error *err);
+
+/** Append a point, or count it as dropped when a coordinate is not usable. There must be room. */
+void raw_add_point(raw_scene *raw, const double position[3], const float color[3]);
+
+/** A relative path of 1..RAW_NAME_LIMIT bytes without control characters and without a ".." part. */
+gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_error *err);
+
+/** Size in 1..RAW_IMAGE_LIMIT, all parameters usable, focal lengths > 0. */
+gbt_status raw_check_camera(const gbt_camera *camera, raw_place place, gbt_error *err);
+
+/** Two views of one name cannot be told apart later. Sorts the views by the bytes of their names. */
+gbt_status raw_sort_views(raw_scene *raw, const char *file, gbt_error *err);
+
+#endif

@@ -1,0 +1,336 @@
+/* data/scene.c -- from a path to a scene: find the files, read them, recentre, split.
+
+   path --> [which source?] --> reader --> raw_scene (double, world) --> [photos there?] --> [origin] --> scene (local) --> [split] */
+#include "data/scene.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "data/colmap_bin.h"
+#include "data/colmap_txt.h"
+#include "data/ply.h"
+#include "data/split.h"
+#include "data/transforms.h"
+
+enum { PATH_SIZE = RAW_NAME_LIMIT + 4096, MISSING_SHOWN = 3 };
+
+static gbt_status load_file(const char *path, source_file *out, unsigned char **owned, gbt_error *err)
+{
+    *out = (source_file){.name = path};
+    const gbt_status status = file_read(path, owned, &out->size, err);
+    out->bytes = *owned;
+    return status;
+}
+
+/* Which of the three files of a COLMAP model with this ending are there. */
+static gbt_status count_model_files(const char *folder, const char *ending, int *count, gbt_error *err)
+{
+    static const char *const names[3] = {"cameras", "images", "points3D"};
+    *count = 0;
+    for (int i = 0; i < 3; i++) {
+        char name[32], path[PATH_SIZE];
+        snprintf(name, sizeof name, "%s.%s", names[i], ending);
+        GBT_TRY(file_join(path, sizeof path, folder, name, err));
+        *count += file_exists(path);
+    }
+    return GBT_OK;
+}
+
+/* The folder that holds a COLMAP model, complete or not; `model` is empty when there is none. */
+static gbt_status find_colmap(const char *folder, char model[PATH_SIZE], const char **ending, gbt_error *err)
+{
+    static const char *const places[] = {"sparse/0", "sparse", "."};
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
+        int binary, text;
+        if (strcmp(places[i], ".") == 0)
+            GBT_TRY(file_join(model, PATH_SIZE, folder, "", err));
+        else
+            GBT_TRY(file_join(model, PATH_SIZE, folder, places[i], err));
+        GBT_TRY(count_model_files(model, "bin", &binary, err));
+        GBT_TRY(count_model_files(model, "txt", &text, err));
+        /* A complete set wins over an incomplete one, then binary over text. */
+        *ending = binary == 3 || (text != 3 && binary > 0) ? "bin" : "txt";
+        if (binary > 0 || text == 3 || (text > 0 && i + 1 < sizeof places / sizeof places[0]))
+            return GBT_OK;
+    }
+    model[0] = '\0';
+    return GBT_OK;
+}
+
+static gbt_status load_colmap(const char *model, const char *ending, raw_scene *raw, gbt_error *err)
+{
+    static const char *const names[3] = {"cameras", "images", "points3D"};
+    char paths[3][PATH_SIZE];
+    unsigned char *owned[3] = {0};
+    source_file loaded[3] = {0};
+    gbt_status status = GBT_OK;
+    for (int i = 0; i < 3 && status == GBT_OK; i++) {
+        char name[32];
+        snprintf(name, sizeof name, "%s.%s", names[i], ending);
+        status = file_join(paths[i], sizeof paths[i], model, name, err);
+        if (status == GBT_OK && !file_exists(paths[i]))
+            status = base_fail(err, GBT_ERR_IO, "%s: missing (wanted cameras, images and points3D together)", paths[i]);
+        if (status == GBT_OK)
+            status = load_file(paths[i], &loaded[i], &owned[i], err);
+    }
+    const colmap_files files = {.cameras = loaded[0], .images = loaded[1], .points = loaded[2]};
+    if (status == GBT_OK)
+        status = strcmp(ending, "bin") == 0 ? colmap_bin_read(&files, raw, err) : colmap_txt_read(&files, raw, err);
+    if (status == GBT_OK && raw->view_count == 0)
+        status = base_fail(err, GBT_ERR_FORMAT, "%s: no registered image in the model", paths[1]);
+    if (status == GBT_OK)
+        status = raw_sort_views(raw, paths[1], err);
+    for (int i = 0; i < 3; i++)
+        mem_free(owned[i]);
+    return status;
+}
+
+static gbt_status load_points(const char *path, raw_scene *raw, gbt_error *err)
+{
+    source_file file;
+    unsigned char *owned;
+    GBT_TRY(load_file(path, &file, &owned, err));
+    const gbt_status status = ply_read_points(&file, raw, err);
+    mem_free(owned);
+    return status;
+}
+
+static gbt_status load_transforms(const char *path, const char *folder, raw_scene *raw, gbt_error *err)
+{
+    source_file file;
+    unsigned char *owned;
+    char *points_name = NULL;
+    GBT_TRY(load_file(path, &file, &owned, err));
+    gbt_status status = transforms_read(&file, folder, raw, &points_name, err);
+    mem_free(owned);
+    if (status == GBT_OK)
+        status = raw_sort_views(raw, path, err);
+    if (status == GBT_OK && points_name != NULL) {
+        char points_path[PATH_SIZE];
+        status = file_join(points_path, sizeof points_path, folder, points_name, err);
+        if (status == GBT_OK)
+            status = load_points(points_path, raw, err);
+    }
+    mem_free(points_name);
+    return status;
+}
+
+/* The photo of each COLMAP view: images/NAME, else NAME. Every one that is missing is counted before we give up. */
+static gbt_status find_photos(const char *folder, raw_scene *raw, gbt_error *err)
+{
+    char images[PATH_SIZE], path[PATH_SIZE], missing[256] = "";
+    size_t missing_count = 0, used = 0;
+    GBT_TRY(file_join(images, sizeof images, folder, "images", err));
+    for (size_t i = 0; i < raw->view_count; i++) {
+        raw_view *view = &raw->views[i];
+        GBT_TRY(file_join(path, sizeof path, images, view->name, err));
+        if (!file_exists(path) || file_is_folder(path))
+            GBT_TRY(file_join(path, sizeof path, folder, view->name, err));
+        if (!file_exists(path) || file_is_folder(path)) {
+            if (missing_count++ < MISSING_SHOWN)
+                used += (size_t)snprintf(missing + used, sizeof missing - used, "%s%.60s", used > 0 ? ", " : "", view->name);
+            continue;
+        }
+        view->path = raw_copy_text(path, strlen(path), err);
+        if (view->path == NULL)
+            return GBT_ERR_NO_MEMORY;
+    }
+    if (missing_count > 0)
+        return base_fail(err, GBT_ERR_IO, "%s: %zu of %zu photos are missing: %s%s", images, missing_count, raw->view_count, missing,
+                         missing_count > MISSING_SHOWN ? ", ..." : "");
+    return GBT_OK;
+}
+
+static bool ends_with(const char *text, const char *ending)
+{
+    const size_t length = strlen(text), ending_length = strlen(ending);
+    return length >= ending_length && strcasecmp(text + length - ending_length, ending) == 0;
+}
+
+static gbt_status load_raw(const char *path, raw_scene *raw, const char **source, gbt_error *err)
+{
+    char place[PATH_SIZE];
+    const char *ending;
+    if (!file_exists(path))
+        return base_fail(err, GBT_ERR_IO, "%s: no such file or folder", path);
+    if (!file_is_folder(path) && ends_with(path, ".ply")) {
+        *source = "ply";
+        GBT_TRY(load_points(path, raw, err));
+        if (raw->point_count == 0)
+            return base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable point (%zu dropped)", path, raw->points_dropped);
+        return GBT_OK;
+    }
+    if (!file_is_folder(path) && ends_with(path, ".json")) {
+        *source = "transforms";
+        const char *slash = strrchr(path, '/');
+        if (slash != NULL && (size_t)(slash - path) >= sizeof place)
+            return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
+        snprintf(place, sizeof place, "%.*s", slash == NULL ? 1 : (int)(slash - path) + (slash == path), slash == NULL ? "." : path);
+        return load_transforms(path, place, raw, err);
+    }
+    if (!file_is_folder(path))
+        return base_fail(err, GBT_ERR_FORMAT, "%s: not a data set (wanted a folder, a .ply or a transforms.json)", path);
+    GBT_TRY(find_colmap(path, place, &ending, err));
+    if (place[0] != '\0') {
+        *source = strcmp(ending, "bin") == 0 ? "colmap-bin" : "colmap-txt";
+        GBT_TRY(load_colmap(place, ending, raw, err));
+        return find_photos(path, raw, err);
+    }
+    GBT_TRY(file_join(place, sizeof place, path, "transforms.json", err));
+    if (!file_exists(place))
+        return base_fail(err, GBT_ERR_FORMAT, "%s: not a data set (wanted sparse/0/cameras.bin or transforms.json in it)", path);
+    *source = "transforms";
+    return load_transforms(place, path, raw, err);
+}
+
+static uint64_t ordered_bits(double value)
+{
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits >> 63 ? ~bits : bits | UINT64_C(1) << 63;
+}
+
+/* The lower median of values[0], values[stride], ...: radix selection, 8 passes whatever the data, no copy. */
+static double median(const double *values, size_t stride, size_t count)
+{
+    size_t rank = (count - 1) / 2;
+    uint64_t prefix = 0;
+    for (int shift = 56; shift >= 0; shift -= 8) {
+        size_t histogram[256] = {0};
+        for (size_t i = 0; i < count; i++) {
+            const uint64_t bits = ordered_bits(values[i * stride]);
+            if (shift == 56 || bits >> (shift + 8) == prefix)
+                histogram[bits >> shift & 255]++;
+        }
+        uint64_t digit = 0;
+        while (rank >= histogram[digit])
+            rank -= histogram[digit++];
+        prefix = prefix << 8 | digit;
+    }
+    const uint64_t bits = prefix >> 63 ? prefix & ~(UINT64_C(1) << 63) : ~prefix;
+    double value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+static gbt_status find_origin(const raw_scene *raw, double origin[3], gbt_error *err)
+{
+    for (size_t k = 0; k < 3 && raw->point_count > 0; k++)
+        origin[k] = median(raw->position + k, 3, raw->point_count);
+    if (raw->point_count > 0 || raw->view_count == 0)
+        return GBT_OK;
+    double *centers = mem_alloc(raw->view_count, 3 * sizeof *centers, "camera centres", err);
+    if (centers == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < raw->view_count; i++)
+        memcpy(centers + 3 * i, raw->views[i].camera.center, 3 * sizeof *centers);
+    for (size_t k = 0; k < 3; k++)
+        origin[k] = median(centers + k, 3, raw->view_count);
+    mem_free(centers);
+    return GBT_OK;
+}
+
+/* Move everything from `raw` to `out`, relative to the origin. */
+static gbt_status recentre(raw_scene *raw, scene *out, gbt_error *err)
+{
+    GBT_TRY(find_origin(raw, out->origin, err));
+    out->points.position = mem_alloc(raw->point_count, 3 * sizeof *out->points.position, "points", err);
+    out->views = mem_calloc(raw->view_count, sizeof *out->views, "views", err);
+    if (out->points.position == NULL || out->views == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < 3 * raw->point_count; i++)
+        out->points.position[i] = (float)(raw->position[i] - out->origin[i % 3]);
+    out->points.count = raw->point_count;
+    out->points.has_color = raw->has_color;
+    out->points.color = raw->color;
+    raw->color = NULL;
+    if (out->points.color == NULL)
+        out->points.color = mem_alloc(0, sizeof(float), "point colours", err); /* a scene always has its arrays, empty or not */
+    if (out->points.color == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < raw->view_count; i++) {
+        raw_view *view = &raw->views[i];
+        out->views[i] = (scene_view){.name = view->name, .path = view->path, .camera = view->camera};
+        view->name = NULL, view->path = NULL;
+        for (int k = 0; k < 3; k++)
+            out->views[i].camera.center[k] -= out->origin[k];
+    }
+    out->view_count = raw->view_count;
+    out->points_dropped = raw->points_dropped;
+    return GBT_OK;
+}
+
+static void warn_about(const char *path, const raw_scene *raw)
+{
+    if (raw->points_dropped > 0)
+        log_warn("%s: dropped %zu points with unusable coordinates", path, raw->points_dropped);
+    if (raw->tracks_missing > 0)
+        log_warn("%s: %zu track entries name images that are not there", path, raw->tracks_missing);
+    if (raw->trailing_bytes > 0)
+        log_warn("%s: %zu bytes behind the last record were ignored", path, raw->trailing_bytes);
+    if (raw->frames_missing > 0)
+        log_warn("%s: left out %zu frames whose photo is missing, %zu remain", path, raw->frames_missing, raw->view_count);
+    if (raw->angles_disagreeing > 0)
+        log_warn("%s: camera_angle_x contradicts fl_x in %zu frames, fl_x is used", path, raw->angles_disagreeing);
+    if (raw->view_count == 1)
+        log_warn("%s: only one view", path);
+}
+
+gbt_status scene_load(const char *path, const scene_split *split, scene *out, gbt_error *err)
+{
+    const scene_split usual = {.kind = SCENE_SPLIT_EVERY, .every = SCENE_SPLIT_DEFAULT_EVERY};
+    memset(out, 0, sizeof *out);
+    raw_scene raw = {0};
+    const char *source = "";
+    gbt_status status = load_raw(path, &raw, &source, err);
+    if (status == GBT_OK)
+        status = recentre(&raw, out, err);
+    if (status == GBT_OK) {
+        snprintf(out->source, sizeof out->source, "%s", source);
+        out->folder = raw_copy_text(path, strlen(path), err);
+        status = out->folder != NULL ? split_apply(split != NULL ? split : &usual, out, err) : GBT_ERR_NO_MEMORY;
+    }
+    if (status == GBT_OK)
+        warn_about(path, &raw);
+    else
+        scene_free(out);
+    raw_free(&raw);
+    return status;
+}
+
+void scene_free(scene *s)
+{
+    for (size_t i = 0; i < s->view_count; i++) {
+        mem_free(s->views[i].name);
+        mem_free(s->views[i].path);
+    }
+    mem_free(s->folder);
+    mem_free(s->views);
+    mem_free(s->points.position);
+    mem_free(s->points.color);
+    memset(s, 0, sizeof *s);
+}
+
+double scene_camera_extent(const scene *s)
+{
+    size_t count = 0;
+    double mean[3] = {0}, farthest = 0;
+    for (size_t i = 0; i < s->view_count; i++)
+        if (!s->views[i].is_test) {
+            count++;
+            for (int k = 0; k < 3; k++)
+                mean[k] += (s->views[i].camera.center[k] - mean[k]) / (double)count;
+        }
+    for (size_t i = 0; i < s->view_count; i++)
+        if (!s->views[i].is_test) {
+            const double *c = s->views[i].camera.center;
+            farthest = fmax(farthest, hypot(hypot(c[0] - mean[0], c[1] - mean[1]), c[2] - mean[2]));
+        }
+    return fmax(1.1 * farthest, 1e-3); /* one camera, or all at one place, must not freeze the learning rate at 0 */
+}

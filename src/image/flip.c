@@ -1,0 +1,318 @@
+/* image/flip.c -- LDR-FLIP: how visible the difference of two images is when one flips between them (Andersson et al. 2020).
+
+   sRGB --> YCxCz --+--> [contrast sensitivity filters] --> L*a*b*, Hunt --> HyAB --> colour difference c in [0, 1]
+                    +--> [edge and point detectors on Y] ------------------------> feature difference f in [0, 1]
+                                                                                   error = c^(1 - f)
+
+   Every 2-D filter of the paper is a sum of products of 1-D filters, so each is a column pass and a row pass. Borders repeat. */
+#include "image/metrics.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+
+enum {
+    ROWS_PER_BLOCK = 16,
+    RADIUS_MAX = 16,
+    TAPS_MAX = 2 * RADIUS_MAX + 1,
+    PLANES = 3,
+    COLUMN_FILTERS = 7, /* Y, Cx, Cz twice; then Y by Gauss, its first and its second derivative */
+    BLOCK_ROWS = COLUMN_FILTERS + 2 * 5
+};
+
+static const double pi = 3.14159265358979323846;
+
+/* Section 5 of the paper: 0.7 m from a monitor 0.7 m wide with 3840 pixels. */
+static const double pixels_per_degree = 0.7 * (3840 / 0.7) * (3.14159265358979323846 / 180);
+
+/* Linear sRGB to XYZ, from the primaries and the white point (0.3127, 0.3290) of IEC 61966-2-1. */
+static const double rgb_to_xyz[3][3] = {
+    {0.41239079926595934, 0.357584339383878, 0.18048078840183424},
+    {0.21263900587151027, 0.715168678767756, 0.0721923152607337},
+    {0.01933081871559182, 0.11919477979462598, 0.9505321522496605},
+};
+
+typedef struct filter {
+    int radius;
+    double taps[TAPS_MAX];
+} filter;
+
+typedef struct flip_filters {
+    filter luminance, red_green, blue_yellow[2]; /* each sums to 1 */
+    double blue_yellow_weight[2];
+    filter gauss, edge, point;
+    double white[3];
+    double xyz_to_rgb[3][3];
+    double color_max; /* the largest HyAB distance of two colours, to the power qc */
+} flip_filters;
+
+typedef struct flip_job {
+    const flip_filters *filters;
+    const image *sources[2];
+    float *planes[2]; /* [PLANES][height][width]: Y, Cx, Cz */
+    double *rows;     /* per block: BLOCK_ROWS padded rows */
+    double *sums;     /* one per row */
+    float *map;       /* optional */
+    size_t width, height, padded;
+} flip_job;
+
+static double srgb_to_linear(float value)
+{
+    const double v = !(value > 0.0f) ? 0 : value >= 1.0f ? 1 : (double)value;
+    return v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4);
+}
+
+static void apply(const double m[3][3], const double in[3], double out[3])
+{
+    for (int r = 0; r < 3; r++)
+        out[r] = m[r][0] * in[0] + m[r][1] * in[1] + m[r][2] * in[2];
+}
+
+static void invert(const double m[3][3], double out[3][3])
+{
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++) {
+            const int r1 = (c + 1) % 3, r2 = (c + 2) % 3, c1 = (r + 1) % 3, c2 = (r + 2) % 3;
+            out[r][c] = m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1];
+        }
+    const double determinant = m[0][0] * out[0][0] + m[0][1] * out[1][0] + m[0][2] * out[2][0];
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            out[r][c] /= determinant;
+}
+
+static double lab_curve(double t)
+{
+    const double delta = 6.0 / 29;
+    return t > delta * delta * delta ? cbrt(t) : t / (3 * delta * delta) + 4.0 / 29;
+}
+
+/* Linear RGB to L*a*b*; then the Hunt effect: colours look less colourful in the dark. */
+static void hunt_lab(const flip_filters *f, const double rgb[3], double lab[3])
+{
+    double xyz[3];
+    apply(rgb_to_xyz, rgb, xyz);
+    const double x = lab_curve(xyz[0] / f->white[0]), y = lab_curve(xyz[1] / f->white[1]), z = lab_curve(xyz[2] / f->white[2]);
+    lab[0] = 116 * y - 16;
+    lab[1] = 0.01 * lab[0] * 500 * (x - y);
+    lab[2] = 0.01 * lab[0] * 200 * (y - z);
+}
+
+/* HyAB distance to the power qc = 0.7. */
+static double color_distance(const double a[3], const double b[3])
+{
+    const double da = a[1] - b[1], db = a[2] - b[2];
+    return pow(fabs(a[0] - b[0]) + sqrt(da * da + db * db), 0.7);
+}
+
+/* Stretch [0, 0.4 max] to [0, 0.95], since small differences are what matters, and the rest to [0.95, 1]. */
+static double redistribute(const flip_filters *f, double distance)
+{
+    const double pc = 0.4, pt = 0.95, knee = pc * f->color_max;
+    return distance < knee ? pt / knee * distance : pt + (distance - knee) / (f->color_max - knee) * (1 - pt);
+}
+
+/* exp(-pi^2 x^2 / b) at x degrees, summing to 1; returns the sum before that. */
+static double make_csf(filter *out, double b)
+{
+    const double widest = 0.04;
+    out->radius = (int)ceil(3 * sqrt(widest / (2 * pi * pi)) * pixels_per_degree);
+    double sum = 0;
+    for (int k = -out->radius; k <= out->radius; k++) {
+        const double x = k / pixels_per_degree;
+        sum += out->taps[k + out->radius] = exp(-pi * pi * x * x / b);
+    }
+    for (int k = 0; k <= 2 * out->radius; k++)
+        out->taps[k] /= sum;
+    return sum;
+}
+
+/* Positive taps sum to 1, negative taps to -1. */
+static void normalize_signed(filter *f)
+{
+    double positive = 0, negative = 0;
+    for (int k = 0; k <= 2 * f->radius; k++)
+        if (f->taps[k] > 0)
+            positive += f->taps[k];
+        else
+            negative -= f->taps[k];
+    for (int k = 0; k <= 2 * f->radius; k++)
+        f->taps[k] /= f->taps[k] > 0 ? positive : negative;
+}
+
+static void make_filters(flip_filters *f)
+{
+    make_csf(&f->luminance, 0.0047);
+    make_csf(&f->red_green, 0.0053);
+    const double amplitude[2] = {34.1, 13.5}, b[2] = {0.04, 0.025};
+    for (int i = 0; i < 2; i++) {
+        const double sum = make_csf(&f->blue_yellow[i], b[i]);
+        f->blue_yellow_weight[i] = amplitude[i] * sqrt(pi / b[i]) * sum * sum; /* of the 2-D filter */
+    }
+    const double total = f->blue_yellow_weight[0] + f->blue_yellow_weight[1];
+    f->blue_yellow_weight[0] /= total, f->blue_yellow_weight[1] /= total;
+
+    const double feature_degrees = 0.082, sigma = 0.5 * feature_degrees * pixels_per_degree;
+    const int radius = (int)ceil(3 * sigma);
+    f->gauss.radius = f->edge.radius = f->point.radius = radius;
+    double sum = 0;
+    for (int k = -radius; k <= radius; k++) {
+        const double g = exp(-k * k / (2 * sigma * sigma));
+        f->gauss.taps[k + radius] = g, sum += g;
+        f->edge.taps[k + radius] = -k * g;
+        f->point.taps[k + radius] = (k * k / (sigma * sigma) - 1) * g;
+    }
+    for (int k = 0; k <= 2 * radius; k++)
+        f->gauss.taps[k] /= sum;
+    normalize_signed(&f->edge);
+    normalize_signed(&f->point);
+
+    for (int i = 0; i < 3; i++)
+        f->white[i] = rgb_to_xyz[i][0] + rgb_to_xyz[i][1] + rgb_to_xyz[i][2];
+    invert(rgb_to_xyz, f->xyz_to_rgb);
+    double green[3], blue[3];
+    hunt_lab(f, (const double[3]){0, 1, 0}, green);
+    hunt_lab(f, (const double[3]){0, 0, 1}, blue);
+    f->color_max = color_distance(green, blue);
+}
+
+static void opponent_rows(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const flip_job *job = context;
+    const flip_filters *f = job->filters;
+    const size_t plane = job->width * job->height;
+    for (int s = 0; s < 2; s++)
+        for (size_t i = begin * job->width; i < end * job->width; i++) {
+            const float *in = job->sources[s]->pixels + 3 * i;
+            const double rgb[3] = {srgb_to_linear(in[0]), srgb_to_linear(in[1]), srgb_to_linear(in[2])};
+            double xyz[3];
+            apply(rgb_to_xyz, rgb, xyz);
+            const double x = xyz[0] / f->white[0], y = xyz[1] / f->white[1], z = xyz[2] / f->white[2];
+            job->planes[s][i] = (float)(116 * y - 16);
+            job->planes[s][plane + i] = (float)(500 * (x - y));
+            job->planes[s][2 * plane + i] = (float)(200 * (y - z));
+        }
+}
+
+/* Column pass into a row that has RADIUS_MAX values of margin on both sides, filled by repeating its ends. */
+static void filter_columns(const flip_job *job, const float *plane, size_t row, const filter *f, double *restrict out)
+{
+    memset(out, 0, job->width * sizeof *out);
+    for (int k = -f->radius; k <= f->radius; k++) {
+        const ptrdiff_t at = (ptrdiff_t)row + k, last = (ptrdiff_t)job->height - 1;
+        const float *in = plane + (size_t)(at < 0 ? 0 : at > last ? last : at) * job->width;
+        const double tap = f->taps[k + f->radius];
+        for (size_t i = 0; i < job->width; i++)
+            out[i] += tap * (double)in[i];
+    }
+    for (int k = 1; k <= RADIUS_MAX; k++)
+        out[-k] = out[0], out[job->width - 1 + (size_t)k] = out[job->width - 1];
+}
+
+static double filter_row(const double *in, const filter *f)
+{
+    double sum = 0;
+    for (int k = -f->radius; k <= f->radius; k++)
+        sum += f->taps[k + f->radius] * in[k];
+    return sum;
+}
+
+/* L, a, b, edge and point strength of one row of one image. */
+static void appearance(const flip_job *job, int source, size_t row, double *const columns[COLUMN_FILTERS], double *const out[5])
+{
+    const flip_filters *f = job->filters;
+    const size_t plane = job->width * job->height;
+    const float *y = job->planes[source], *cx = y + plane, *cz = cx + plane;
+    filter_columns(job, y, row, &f->luminance, columns[0]);
+    filter_columns(job, cx, row, &f->red_green, columns[1]);
+    filter_columns(job, cz, row, &f->blue_yellow[0], columns[2]);
+    filter_columns(job, cz, row, &f->blue_yellow[1], columns[3]);
+    filter_columns(job, y, row, &f->gauss, columns[4]);
+    filter_columns(job, y, row, &f->edge, columns[5]);
+    filter_columns(job, y, row, &f->point, columns[6]);
+    for (size_t i = 0; i < job->width; i++) {
+        const double luminance = (filter_row(columns[0] + i, &f->luminance) + 16) / 116;
+        const double red_green = filter_row(columns[1] + i, &f->red_green) / 500;
+        const double blue_yellow = (f->blue_yellow_weight[0] * filter_row(columns[2] + i, &f->blue_yellow[0]) +
+                                    f->blue_yellow_weight[1] * filter_row(columns[3] + i, &f->blue_yellow[1])) / 200;
+        const double xyz[3] = {(luminance + red_green) * f->white[0], luminance * f->white[1], (luminance - blue_yellow) * f->white[2]};
+        double rgb[3], lab[3];
+        apply(f->xyz_to_rgb, xyz, rgb);
+        for (int c = 0; c < 3; c++)
+            rgb[c] = rgb[c] < 0 ? 0 : rgb[c] > 1 ? 1 : rgb[c];
+        hunt_lab(f, rgb, lab);
+        out[0][i] = lab[0], out[1][i] = lab[1], out[2][i] = lab[2];
+        /* The detectors work on Y scaled to [0, 1]; their taps sum to 0, so only the factor matters. */
+        out[3][i] = hypot(filter_row(columns[4] + i, &f->edge), filter_row(columns[5] + i, &f->gauss)) / 116;
+        out[4][i] = hypot(filter_row(columns[4] + i, &f->point), filter_row(columns[6] + i, &f->gauss)) / 116;
+    }
+}
+
+static void error_rows(size_t block, size_t begin, size_t end, void *context)
+{
+    const flip_job *job = context;
+    double *const rows = job->rows + block * BLOCK_ROWS * job->padded + RADIUS_MAX;
+    double *columns[COLUMN_FILTERS], *seen[2][5];
+    for (size_t r = 0; r < COLUMN_FILTERS; r++)
+        columns[r] = rows + r * job->padded;
+    for (size_t r = 0; r < 5; r++)
+        seen[0][r] = rows + (COLUMN_FILTERS + r) * job->padded, seen[1][r] = rows + (COLUMN_FILTERS + 5 + r) * job->padded;
+    for (size_t row = begin; row < end; row++) {
+        appearance(job, 0, row, columns, seen[0]);
+        appearance(job, 1, row, columns, seen[1]);
+        double sum = 0;
+        for (size_t i = 0; i < job->width; i++) {
+            const double a[3] = {seen[0][0][i], seen[0][1][i], seen[0][2][i]}, b[3] = {seen[1][0][i], seen[1][1][i], seen[1][2][i]};
+            const double color = redistribute(job->filters, color_distance(a, b));
+            const double feature = fmax(fabs(seen[0][3][i] - seen[1][3][i]), fabs(seen[0][4][i] - seen[1][4][i]));
+            const double error = pow(color, 1 - fmin(1, sqrt(feature / sqrt(2)))); /* qf = 0.5 */
+            sum += error;
+            if (job->map != NULL)
+                job->map[row * job->width + i] = (float)error;
+        }
+        job->sums[row] = sum;
+    }
+}
+
+gbt_status metric_flip(const image *a, const image *reference, double *mean, image *error_map, gbt_error *err)
+{
+    *mean = 0;
+    if (a->channels != 3 || reference->channels != 3 || a->width != reference->width || a->height != reference->height)
+        return base_fail(err, GBT_ERR_ARGUMENT, "FLIP: images of %d x %d x %d and %d x %d x %d (wanted equal, 3 channels)", a->width,
+                         a->height, a->channels, reference->width, reference->height, reference->channels);
+    if (error_map != NULL && (error_map->channels != 1 || error_map->width != a->width || error_map->height != a->height))
+        return base_fail(err, GBT_ERR_ARGUMENT, "FLIP: error map of %d x %d x %d (wanted %d x %d x 1)", error_map->width, error_map->height,
+                         error_map->channels, a->width, a->height);
+    flip_filters filters;
+    make_filters(&filters);
+    const size_t width = (size_t)a->width, height = (size_t)a->height, padded = width + 2 * RADIUS_MAX;
+    const size_t row_doubles = parallel_block_count(height, ROWS_PER_BLOCK) * BLOCK_ROWS * padded;
+    gbt_status status = GBT_ERR_NO_MEMORY;
+    float *planes = mem_alloc(2 * PLANES * height * width, sizeof *planes, "FLIP planes", err);
+    double *rows = mem_alloc(row_doubles + height, sizeof *rows, "FLIP rows", err);
+    if (planes != NULL && rows != NULL) {
+        flip_job job = {.filters = &filters,
+                        .sources = {a, reference},
+                        .planes = {planes, planes + PLANES * height * width},
+                        .rows = rows,
+                        .sums = rows + row_doubles,
+                        .map = error_map != NULL ? error_map->pixels : NULL,
+                        .width = width,
+                        .height = height,
+                        .padded = padded};
+        parallel_blocks(height, ROWS_PER_BLOCK, opponent_rows, &job);
+        parallel_blocks(height, ROWS_PER_BLOCK, error_rows, &job);
+        double sum = 0;
+        for (size_t row = 0; row < height; row++)
+            sum += job.sums[row];
+        *mean = sum / ((double)width * (double)height);
+        status = GBT_OK;
+    }
+    mem_free(planes);
+    mem_free(rows);
+    return status;
+}

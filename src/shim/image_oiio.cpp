@@ -1,0 +1,449 @@
+/* shim/image_oiio.cpp -- base/image.h on OpenImageIO: bytes to pixels and back, every exception stopped here.
+
+   file --> bytes --> [magic: png, jpeg, openexr] --> that one plugin, from memory --> native samples --> float in [0, 1]
+
+   The plugin is chosen from the first bytes, so a file cannot reach one of OpenImageIO's other 20 parsers by its name. A PNG is
+   cut down to its pixel chunks first: libpng prints on stderr about damaged and odd chunks, and OpenImageIO cannot stop it. */
+#include "base/image.h"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <string>
+#include <vector>
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+#include <OpenImageIO/strutil.h>
+
+extern "C" {
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/log.h"
+#include "base/memory.h"
+}
+
+namespace {
+
+constexpr int64_t max_samples = int64_t(1) << 28;
+constexpr size_t magic_bytes = 8;
+
+struct bytes_owner {
+    unsigned char *bytes = nullptr;
+    size_t count = 0;
+    bytes_owner() = default;
+    bytes_owner(const bytes_owner &) = delete;
+    bytes_owner &operator=(const bytes_owner &) = delete;
+    ~bytes_owner() { mem_free(bytes); }
+};
+
+/* Members are destroyed in reverse order, so the reader goes before the proxy and the bytes that it borrows. */
+struct opened_image {
+    bytes_owner file;
+    std::unique_ptr<OIIO::Filesystem::IOMemReader> proxy;
+    std::unique_ptr<OIIO::ImageInput> input;
+    bool is_grey = false;
+    int stored_channels = 0; /* how many of the leading channels we read: 1..4 */
+    int channels() const { return is_grey ? stored_channels + 2 : stored_channels; }
+};
+
+const char *plugin_of(const unsigned char *bytes, size_t count)
+{
+    static const unsigned char png[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+    static const unsigned char jpeg[3] = {0xff, 0xd8, 0xff};
+    static const unsigned char exr[4] = {0x76, 0x2f, 0x31, 0x01};
+    if (count >= sizeof png && std::memcmp(bytes, png, sizeof png) == 0)
+        return "png";
+    if (count >= sizeof jpeg && std::memcmp(bytes, jpeg, sizeof jpeg) == 0)
+        return "jpeg";
+    if (count >= sizeof exr && std::memcmp(bytes, exr, sizeof exr) == 0)
+        return "openexr";
+    return nullptr;
+}
+
+std::string first_line(const std::string &text)
+{
+    const std::string line = text.substr(0, text.find('\n'));
+    return line.empty() ? std::string("no reason given") : line;
+}
+
+/* OpenImageIO reports some failures on the object and some globally; both must be emptied or the next call inherits them. */
+std::string reason_of(const OIIO::ImageInput *input)
+{
+    const std::string global = OIIO::has_error() ? OIIO::geterror() : std::string();
+    const std::string own = input != nullptr && input->has_error() ? input->geterror() : std::string();
+    return first_line(own.empty() ? global : own);
+}
+
+uint32_t big_endian(const unsigned char *p)
+{
+    return uint32_t(p[0]) << 24 | uint32_t(p[1]) << 16 | uint32_t(p[2]) << 8 | uint32_t(p[3]);
+}
+
+/* The CRC of the PNG specification, annex D. */
+uint32_t png_crc(const unsigned char *bytes, size_t count)
+{
+    struct crc_table {
+        uint32_t entry[256];
+        crc_table()
+        {
+            for (uint32_t i = 0; i < 256; i++) {
+                uint32_t c = i;
+                for (int bit = 0; bit < 8; bit++)
+                    c = (c & 1) != 0 ? 0xEDB88320u ^ (c >> 1) : c >> 1;
+                entry[i] = c;
+            }
+        }
+    };
+    static const crc_table table;
+    uint32_t crc = 0xFFFFFFFFu;
+    for (size_t i = 0; i < count; i++)
+        crc = table.entry[(crc ^ bytes[i]) & 0xFF] ^ (crc >> 8);
+    return crc ^ 0xFFFFFFFFu;
+}
+
+/* Check every chunk and keep, in place, the ones that carry pixels; profiles, gamma and texts would not be applied anyway. */
+gbt_status png_reduce(const char *path, unsigned char *bytes, size_t *count, gbt_error *err)
+{
+    static const char kept[][5] = {"IHDR", "PLTE", "tRNS", "IDAT", "IEND"};
+    size_t read = magic_bytes, write = magic_bytes;
+    for (bool ended = false; !ended;) {
+        if (*count - read < 12)
+            return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: PNG is truncated (wanted a chunk of 12 bytes or more, got %zu)", path, read,
+                             *count - read);
+        const size_t length = big_endian(bytes + read);
+        if (length > *count - read - 12)
+            return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: PNG is truncated (wanted a chunk of %zu bytes, got %zu)", path, read, length,
+                             *count - read - 12);
+        const unsigned char *type = bytes + read + 4;
+        const uint32_t wanted = big_endian(type + 4 + length), got = png_crc(type, length + 4);
+        if (wanted != got)
+            return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: PNG chunk is damaged (wanted checksum %08x, got %08x)", path, read,
+                             (unsigned)wanted, (unsigned)got);
+        if (read == magic_bytes && (std::memcmp(type, "IHDR", 4) != 0 || length != 13))
+            return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: PNG does not start with an IHDR chunk of 13 bytes", path, read);
+        ended = std::memcmp(type, "IEND", 4) == 0;
+        bool keep = false;
+        for (const char *name : kept)
+            keep = keep || std::memcmp(type, name, 4) == 0;
+        if (keep) {
+            std::memmove(bytes + write, bytes + read, length + 12);
+            write += length + 12;
+        }
+        read += length + 12;
+    }
+    *count = write;
+    return GBT_OK;
+}
+
+/* libpng prints these too, and OpenImageIO allocates before it looks. */
+gbt_status png_check_header(const char *path, const unsigned char *bytes, gbt_error *err)
+{
+    const unsigned char *header = bytes + magic_bytes + 8;
+    const int64_t width = big_endian(header), height = big_endian(header + 4);
+    if (width < 1 || height < 1 || width > max_samples || height > max_samples || width * height > max_samples)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: image of %u x %u pixels (wanted 1 x 1 to 2^28 samples)", path, (unsigned)width,
+                         (unsigned)height);
+    return GBT_OK;
+}
+
+gbt_status check_spec(const char *path, const char *plugin, opened_image *o, gbt_error *err)
+{
+    const OIIO::ImageSpec &spec = o->input->spec();
+    if (spec.deep)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: deep EXR is not supported (wanted one flat part)", path);
+    if (std::strcmp(plugin, "openexr") == 0 && spec.get_int_attribute("oiio:subimages", 1) > 1)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: multi-part EXR is not supported (wanted one part, got %d)", path,
+                         spec.get_int_attribute("oiio:subimages", 1));
+    if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.nchannels < 1)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: image of %d x %d x %d pixels and %d channels (wanted at least 1 x 1 x 1 and 1)", path,
+                         spec.width, spec.height, spec.depth, spec.nchannels);
+    /* Every product stays below 2^62 because each factor is a positive int and the first two are checked before the third. */
+    const int64_t pixels = int64_t(spec.width) * spec.height, tile = int64_t(spec.tile_width) * spec.tile_height;
+    if (pixels > max_samples || pixels * spec.nchannels > max_samples || tile > max_samples || tile * spec.nchannels > max_samples)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: image of %d x %d pixels and %d channels (wanted at most 2^28 samples)", path, spec.width,
+                         spec.height, spec.nchannels);
+    o->is_grey = spec.nchannels == 1 || (spec.nchannels == 2 && spec.alpha_channel == 1);
+    if (!o->is_grey && spec.nchannels == 2)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: image has channels \"%s\" and \"%s\" (wanted grey, RGB or RGBA)", path,
+                         spec.channel_name(0).c_str(), spec.channel_name(1).c_str());
+    /* An EXR may go on with depth, normals and the like: they come after RGB and are left. */
+    o->stored_channels = o->is_grey ? spec.nchannels : spec.nchannels > 3 && spec.alpha_channel == 3 ? 4 : 3;
+    return GBT_OK;
+}
+
+/* `whole` reads the file into memory; otherwise only JPEG and EXR headers are read, from the path. */
+gbt_status open_image(const char *path, bool whole, opened_image *o, gbt_error *err)
+{
+    const char *plugin = nullptr;
+    if (!whole) {
+        if (!file_exists(path))
+            return base_fail(err, GBT_ERR_IO, "%s: cannot open: no such file", path);
+        if (!OIIO::Filesystem::is_regular(path))
+            return base_fail(err, GBT_ERR_IO, "%s: not a regular file", path);
+        unsigned char magic[magic_bytes];
+        const size_t got = OIIO::Filesystem::read_bytes(path, magic, sizeof magic);
+        plugin = plugin_of(magic, got);
+        whole = plugin == nullptr || std::strcmp(plugin, "png") == 0;
+    }
+    if (whole) {
+        const gbt_status status = file_read(path, &o->file.bytes, &o->file.count, err);
+        if (status != GBT_OK)
+            return status;
+        plugin = plugin_of(o->file.bytes, o->file.count);
+    }
+    if (plugin == nullptr)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: not a PNG, JPEG or EXR file", path);
+    if (std::strcmp(plugin, "png") == 0) {
+        gbt_status status = png_reduce(path, o->file.bytes, &o->file.count, err);
+        if (status == GBT_OK)
+            status = png_check_header(path, o->file.bytes, err);
+        if (status != GBT_OK)
+            return status;
+    }
+    o->input = OIIO::ImageInput::create(plugin);
+    if (!o->input)
+        return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO has no %s reader: %s", path, plugin, reason_of(nullptr).c_str());
+    OIIO::ImageSpec config, spec;
+    config.attribute("oiio:UnassociatedAlpha", 1); /* colours as stored, not multiplied by alpha */
+    if (whole) {
+        o->proxy = std::make_unique<OIIO::Filesystem::IOMemReader>(o->file.bytes, o->file.count);
+        if (!o->input->set_ioproxy(o->proxy.get()))
+            return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO's %s reader cannot read from memory", path, plugin);
+    }
+    if (!o->input->open(path, spec, config))
+        return base_fail(err, GBT_ERR_FORMAT, "%s: cannot be read as %s: %s", path, plugin, reason_of(o->input.get()).c_str());
+    return check_spec(path, plugin, o, err);
+}
+
+/* Division, not multiplication by a rounded 1/255, so that a stored level is the float nearest to level/255. */
+template<typename level> std::vector<float> level_table()
+{
+    const size_t count = size_t(level(-1)) + 1;
+    std::vector<float> table(count);
+    for (size_t i = 0; i < count; i++)
+        table[i] = float(i) / float(count - 1);
+    return table;
+}
+
+/* Grey becomes three equal channels. */
+template<typename sample, typename convert>
+void expand(const sample *in, const opened_image &o, size_t pixels, float *out, convert to_float)
+{
+    const size_t stored = size_t(o.stored_channels), wanted = size_t(o.channels());
+    for (size_t i = 0; i < pixels; i++, in += stored, out += wanted) {
+        if (!o.is_grey) {
+            for (size_t c = 0; c < stored; c++)
+                out[c] = to_float(in[c]);
+            continue;
+        }
+        out[0] = out[1] = out[2] = to_float(in[0]);
+        if (stored == 2)
+            out[3] = to_float(in[1]);
+    }
+}
+
+template<typename sample, typename convert>
+gbt_status read_samples(const char *path, opened_image *o, OIIO::TypeDesc type, image *out, convert to_float, gbt_error *err)
+{
+    const size_t pixels = size_t(out->width) * size_t(out->height);
+    std::vector<sample> samples(pixels * size_t(o->stored_channels));
+    const bool done = o->input->read_image(0, 0, 0, o->stored_channels, type, samples.data());
+    /* A truncated JPEG is "read" with grey in the missing part; only the error text tells. */
+    if (!done || o->input->has_error())
+        return base_fail(err, GBT_ERR_FORMAT, "%s: damaged or truncated: %s", path, reason_of(o->input.get()).c_str());
+    expand(samples.data(), *o, pixels, out->pixels, to_float);
+    return GBT_OK;
+}
+
+gbt_status read_pixels(const char *path, opened_image *o, image *out, gbt_error *err)
+{
+    const OIIO::ImageSpec &spec = o->input->spec();
+    gbt_status status = image_alloc(out, spec.width, spec.height, o->channels(), err);
+    if (status != GBT_OK)
+        return status;
+    switch (spec.format.basetype) {
+    case OIIO::TypeDesc::UINT8: {
+        static const std::vector<float> table = level_table<uint8_t>();
+        return read_samples<uint8_t>(path, o, OIIO::TypeUInt8, out, [](uint8_t v) { return table[v]; }, err);
+    }
+    case OIIO::TypeDesc::UINT16: {
+        static const std::vector<float> table = level_table<uint16_t>();
+        return read_samples<uint16_t>(path, o, OIIO::TypeUInt16, out, [](uint16_t v) { return table[v]; }, err);
+    }
+    default: break;
+    }
+    size_t bad = 0;
+    const auto keep_finite = [&bad](float v) {
+        if (std::isfinite(v))
+            return v;
+        bad++;
+        return 0.0f;
+    };
+    status = read_samples<float>(path, o, OIIO::TypeFloat, out, keep_finite, err);
+    if (status == GBT_OK && bad > 0)
+        log_warn("%s: %zu values that are not finite were read as 0", path, bad);
+    return status;
+}
+
+uint8_t to_byte(float value)
+{
+    if (!(value > 0.0f)) /* false for NaN as well */
+        return 0;
+    return value >= 1.0f ? 255 : uint8_t(std::floor(value * 255.0f + 0.5f));
+}
+
+gbt_status check_source(const image *im, gbt_error *err)
+{
+    if (im == nullptr || im->pixels == nullptr || im->width < 1 || im->height < 1 || im->channels < 1 || im->channels > 4)
+        return base_fail(err, GBT_ERR_ARGUMENT, "image: nothing that can be encoded (wanted pixels of 1 to 4 channels)");
+    if (int64_t(im->width) * im->height > max_samples || int64_t(im->width) * im->height * im->channels > max_samples)
+        return base_fail(err, GBT_ERR_ARGUMENT, "image: %d x %d x %d (wanted at most 2^28 samples)", im->width, im->height, im->channels);
+    return GBT_OK;
+}
+
+gbt_status encode(const char *plugin, const char *name, const OIIO::ImageSpec &spec, const void *samples, std::vector<unsigned char> *bytes,
+                  gbt_error *err)
+{
+    OIIO::Filesystem::IOVecOutput proxy(*bytes);
+    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin);
+    if (!output)
+        return base_fail(err, GBT_ERR_INTERNAL, "image: OpenImageIO has no %s writer: %s", plugin, first_line(OIIO::geterror()).c_str());
+    if (!output->set_ioproxy(&proxy) || !output->open(name, spec) || !output->write_image(spec.format, samples) || !output->close())
+        return base_fail(err, GBT_ERR_INTERNAL, "image: %s writer failed: %s", plugin, first_line(output->geterror()).c_str());
+    return GBT_OK;
+}
+
+/* `channels` leading channels of `im` as 8-bit samples. */
+std::vector<uint8_t> quantized(const image *im, int channels)
+{
+    const size_t pixels = size_t(im->width) * size_t(im->height);
+    std::vector<uint8_t> out(pixels * size_t(channels));
+    for (size_t i = 0; i < pixels; i++)
+        for (int c = 0; c < channels; c++)
+            out[i * size_t(channels) + size_t(c)] = to_byte(im->pixels[i * size_t(im->channels) + size_t(c)]);
+    return out;
+}
+
+gbt_status encode_png(const image *im, std::vector<unsigned char> *bytes, gbt_error *err)
+{
+    const std::vector<uint8_t> samples = quantized(im, im->channels);
+    OIIO::ImageSpec spec(im->width, im->height, im->channels, OIIO::TypeUInt8);
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    spec.attribute("oiio:ColorSpace", "sRGB");
+    return encode("png", "image.png", spec, samples.data(), bytes, err);
+}
+
+gbt_status encode_exr(const image *im, std::vector<unsigned char> *bytes, gbt_error *err)
+{
+    const OIIO::ImageSpec spec(im->width, im->height, im->channels, OIIO::TypeFloat);
+    return encode("openexr", "image.exr", spec, im->pixels, bytes, err);
+}
+
+gbt_status encode_jpeg(const image *im, int quality, std::vector<unsigned char> *bytes, gbt_error *err)
+{
+    const int channels = im->channels < 3 ? 1 : 3; /* JPEG has no alpha */
+    const std::vector<uint8_t> samples = quantized(im, channels);
+    OIIO::ImageSpec spec(im->width, im->height, channels, OIIO::TypeUInt8);
+    spec.attribute("Compression", "jpeg:" + std::to_string(quality));
+    spec.attribute("CompressionQuality", quality);
+    return encode("jpeg", "image.jpg", spec, samples.data(), bytes, err);
+}
+
+gbt_status hand_over(const std::vector<unsigned char> &from, unsigned char **bytes, size_t *byte_count, gbt_error *err)
+{
+    *bytes = static_cast<unsigned char *>(mem_alloc(from.size(), 1, "encoded image", err));
+    if (*bytes == nullptr)
+        return GBT_ERR_NO_MEMORY;
+    std::memcpy(*bytes, from.data(), from.size());
+    *byte_count = from.size();
+    return GBT_OK;
+}
+
+/* Called inside a catch handler only. */
+gbt_status caught(const char *path, gbt_status otherwise, gbt_error *err)
+try {
+    throw;
+} catch (const std::bad_alloc &) {
+    return base_fail(err, GBT_ERR_NO_MEMORY, "%s: out of memory", path);
+} catch (const std::exception &e) {
+    return base_fail(err, otherwise, "%s: %s", path, e.what());
+} catch (...) {
+    return base_fail(err, otherwise, "%s: OpenImageIO failed", path);
+}
+
+} // namespace
+
+extern "C" gbt_status image_probe(const char *path, int *width, int *height, int *channels, gbt_error *err)
+try {
+    *width = *height = *channels = 0;
+    opened_image o;
+    const gbt_status status = open_image(path, false, &o, err);
+    if (status != GBT_OK)
+        return status;
+    *width = o.input->spec().width, *height = o.input->spec().height, *channels = o.channels();
+    return GBT_OK;
+} catch (...) {
+    return caught(path, GBT_ERR_FORMAT, err);
+}
+
+extern "C" gbt_status image_read(const char *path, image *out, gbt_error *err)
+try {
+    std::memset(out, 0, sizeof *out);
+    opened_image o;
+    gbt_status status = open_image(path, true, &o, err);
+    if (status == GBT_OK)
+        status = read_pixels(path, &o, out, err);
+    if (status != GBT_OK)
+        image_free(out);
+    return status;
+} catch (...) {
+    image_free(out);
+    return caught(path, GBT_ERR_FORMAT, err);
+}
+
+extern "C" gbt_status image_write(const char *path, const image *im, gbt_error *err)
+try {
+    gbt_status status = check_source(im, err);
+    if (status != GBT_OK)
+        return status;
+    std::vector<unsigned char> bytes;
+    if (OIIO::Strutil::iends_with(path, ".png"))
+        status = encode_png(im, &bytes, err);
+    else if (OIIO::Strutil::iends_with(path, ".exr"))
+        status = encode_exr(im, &bytes, err);
+    else
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: cannot write this kind of file (wanted .png or .exr)", path);
+    return status != GBT_OK ? status : file_write_atomic(path, bytes.data(), bytes.size(), err);
+} catch (...) {
+    return caught(path, GBT_ERR_INTERNAL, err);
+}
+
+extern "C" gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte_count, gbt_error *err)
+try {
+    *bytes = nullptr, *byte_count = 0;
+    gbt_status status = check_source(im, err);
+    std::vector<unsigned char> encoded;
+    if (status == GBT_OK)
+        status = encode_png(im, &encoded, err);
+    return status != GBT_OK ? status : hand_over(encoded, bytes, byte_count, err);
+} catch (...) {
+    return caught("image", GBT_ERR_INTERNAL, err);
+}
+
+extern "C" gbt_status image_encode_jpeg(const image *im, int quality, unsigned char **bytes, size_t *byte_count, gbt_error *err)
+try {
+    *bytes = nullptr, *byte_count = 0;
+    gbt_status status = check_source(im, err);
+    if (status == GBT_OK && (quality < 1 || quality > 100))
+        status = base_fail(err, GBT_ERR_ARGUMENT, "image: JPEG quality %d (wanted 1 to 100)", quality);
+    std::vector<unsigned char> encoded;
+    if (status == GBT_OK)
+        status = encode_jpeg(im, quality, &encoded, err);
+    return status != GBT_OK ? status : hand_over(encoded, bytes, byte_count, err);
+} catch (...) {
+    return caught("image", GBT_ERR_INTERNAL, err);
+}

@@ -1,0 +1,490 @@
+/* tests/base/test_base.c -- what every room stands on: errors, memory, random numbers, files, Gaussian arrays, images, threads, vectors. */
+#include <dirent.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/cpu.h"
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/gaussians.h"
+#include "base/image.h"
+#include "base/memory.h"
+#include "base/near.h"
+#include "base/parallel.h"
+#include "base/rng.h"
+#include "base/vec.h"
+#include "test_support.h"
+
+static void first_cause_wins(void **state)
+{
+    (void)state;
+    gbt_error err = {0};
+    assert_int_equal(base_fail(&err, GBT_ERR_FORMAT, "a\nb:%d: wrong", 7), GBT_ERR_FORMAT);
+    assert_string_equal(err.text, "a?b:7: wrong"); /* one line, whatever the file name holds */
+    assert_int_equal(base_fail(&err, GBT_ERR_IO, "later"), GBT_ERR_IO);
+    assert_string_equal(err.text, "a?b:7: wrong");
+    assert_int_equal(err.status, GBT_ERR_FORMAT);
+    assert_int_equal(base_fail(NULL, GBT_ERR_IO, "nobody listens"), GBT_ERR_IO);
+    gbt_error cut = {0};
+    base_fail(&cut, GBT_ERR_IO, "%0600d", 1);
+    assert_int_equal(strlen(cut.text), sizeof cut.text - 1);
+}
+
+static void exit_codes(void **state)
+{
+    (void)state;
+    static const int wanted[] = {0, 2, 3, 4, 5, 130, 1};
+    for (int i = 0; i <= GBT_ERR_INTERNAL; i++)
+        assert_int_equal(gbt_status_exit_code((gbt_status)i), wanted[i]);
+}
+
+static void memory_is_aligned_and_zeroed(void **state)
+{
+    (void)state;
+    for (size_t bytes = 0; bytes < 300; bytes++) {
+        unsigned char *p = mem_calloc(bytes, 1, "test", NULL);
+        assert_non_null(p);
+        assert_int_equal((uintptr_t)p % MEM_ALIGN, 0);
+        for (size_t i = 0; i < bytes; i++)
+            assert_int_equal(p[i], 0);
+        mem_free(p);
+    }
+    mem_free(NULL);
+    assert_true(mem_peak_bytes() > 100000);
+}
+
+static void memory_sizes_are_checked(void **state)
+{
+    (void)state;
+    static const size_t sizes[][2] = {
+        {SIZE_MAX, 2}, {SIZE_MAX / 2 + 1, 2}, {SIZE_MAX, 1}, {(size_t)PTRDIFF_MAX, 1}, {(size_t)1 << 32, (size_t)1 << 32}};
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        gbt_error err = {0};
+        assert_null(mem_alloc(sizes[i][0], sizes[i][1], "points", &err));
+        assert_int_equal(err.status, GBT_ERR_NO_MEMORY);
+        assert_non_null(strstr(err.text, "points"));
+        assert_null(mem_calloc(sizes[i][0], sizes[i][1], "points", NULL));
+    }
+}
+
+static void memory_fails_on_demand(void **state)
+{
+    (void)state;
+    for (long n = 0; n < 3; n++) {
+        mem_fail_after(n);
+        for (long i = 0; i < n; i++) {
+            void *p = mem_alloc(1, 1, "test", NULL);
+            assert_non_null(p);
+            mem_free(p);
+        }
+        gbt_error err = {0};
+        assert_null(mem_alloc(8, 1, "the one", &err));
+        assert_int_equal(err.status, GBT_ERR_NO_MEMORY);
+        assert_string_equal(err.text, "the one: no memory for 64 bytes");
+        void *after = mem_alloc(1, 1, "test", NULL); /* only that one fails */
+        assert_non_null(after);
+        mem_free(after);
+    }
+    mem_fail_after(0);
+    mem_fail_after(-5);
+    void *p = mem_alloc(1, 1, "test", NULL);
+    assert_non_null(p);
+    mem_free(p);
+}
+
+static void memory_reserve_grows_and_keeps(void **state)
+{
+    (void)state;
+    int *array = NULL;
+    size_t capacity = 0, moves = 0;
+    for (int i = 0; i < 10000; i++) {
+        const size_t before = capacity;
+        assert_ok(mem_reserve((void **)&array, &capacity, (size_t)i, (size_t)i + 1, sizeof *array, "list", NULL));
+        moves += capacity != before;
+        array[i] = i;
+    }
+    for (int i = 0; i < 10000; i++)
+        assert_int_equal(array[i], i);
+    assert_true(moves < 40); /* grows by half at least */
+    int *const kept = array;
+    const size_t kept_capacity = capacity;
+    mem_fail_after(0);
+    gbt_error err = {0};
+    assert_int_equal(mem_reserve((void **)&array, &capacity, 10000, capacity + 1, sizeof *array, "list", &err), GBT_ERR_NO_MEMORY);
+    assert_ptr_equal(array, kept);
+    assert_int_equal(capacity, kept_capacity);
+    assert_int_equal(array[9999], 9999);
+    assert_int_equal(mem_reserve((void **)&array, &capacity, 10000, SIZE_MAX, sizeof *array, "list", NULL), GBT_ERR_NO_MEMORY);
+    assert_ptr_equal(array, kept);
+    mem_fail_after(-1);
+    mem_free(array);
+}
+
+/* Known answers of Philox4x32-10 (Random123): counter and key all 0, all ones, and the digits of pi. */
+static void philox_known_answers(void **state)
+{
+    (void)state;
+    static const struct { uint64_t seed, stream, index; uint32_t wanted[4]; } rows[] = {
+        {0, 0, 0, {0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}},
+        {UINT64_MAX, UINT64_MAX, UINT64_MAX, {0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}},
+        {0x299f31d0a4093822, 0x0370734413198a2e, 0x85a308d3243f6a88, {0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        uint32_t got[4];
+        rng_philox(rows[i].seed, rows[i].stream, rows[i].index, got);
+        assert_memory_equal(got, rows[i].wanted, sizeof got);
+    }
+}
+
+static void random_numbers_have_their_moments(void **state)
+{
+    (void)state;
+    enum { COUNT = 200000 };
+    double sum = 0, normal = 0, normal2 = 0, normal4 = 0;
+    for (uint64_t i = 0; i < COUNT; i++) {
+        const float u = rng_uniform(1, 2, i);
+        assert_true(u >= 0 && u < 1);
+        const double z = rng_normal(3, 4, i);
+        sum += (double)u, normal += z, normal2 += z * z, normal4 += z * z * z * z;
+    }
+    assert_near(sum / COUNT, 0.5, 0.004); /* six standard errors each */
+    assert_near(normal / COUNT, 0, 0.014);
+    assert_near(normal2 / COUNT, 1, 0.02);
+    assert_near(normal4 / COUNT, 3, 0.14);
+    assert_true(rng_uniform(1, 2, 5) != rng_uniform(1, 3, 5) && rng_uniform(1, 2, 5) != rng_uniform(2, 2, 5));
+}
+
+static char folder[256];
+
+static int make_folder(void **state)
+{
+    (void)state;
+    const char *root = getenv("TMPDIR");
+    snprintf(folder, sizeof folder, "%s/gbt_base_XXXXXX", root != NULL ? root : "/tmp");
+    return mkdtemp(folder) == NULL;
+}
+
+static int entry_count(const char *path)
+{
+    int count = 0;
+    DIR *dir = opendir(path);
+    assert_non_null(dir);
+    for (const struct dirent *entry; (entry = readdir(dir)) != NULL;)
+        count += entry->d_name[0] != '.' || (entry->d_name[1] != '\0' && entry->d_name[1] != '.');
+    closedir(dir);
+    return count;
+}
+
+static void remove_entries(const char *path)
+{
+    DIR *dir = opendir(path);
+    if (dir == NULL)
+        return;
+    for (const struct dirent *entry; (entry = readdir(dir)) != NULL;) {
+        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0)
+            continue;
+        char child[1024];
+        snprintf(child, sizeof child, "%s/%s", path, entry->d_name);
+        remove_entries(child);
+        remove(child);
+    }
+    closedir(dir);
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    remove_entries(folder);
+    return rmdir(folder);
+}
+
+static void files_come_back(void **state)
+{
+    (void)state;
+    char path[512];
+    assert_ok(file_join(path, sizeof path, folder, "a.bin", NULL));
+    static const size_t sizes[] = {0, 1, 100000};
+    for (size_t k = 0; k < 3; k++) {
+        unsigned char *bytes = mem_alloc(sizes[k], 1, "test", NULL), *back;
+        for (size_t i = 0; i < sizes[k]; i++)
+            bytes[i] = (unsigned char)(i * 7);
+        assert_ok(file_write_atomic(path, bytes, sizes[k], NULL)); /* replaces the one before */
+        size_t count = 77;
+        assert_ok(file_read(path, &back, &count, NULL));
+        assert_int_equal(count, sizes[k]);
+        assert_memory_equal(back, bytes, count);
+        assert_int_equal(back[count], 0);
+        mem_free(back);
+        mem_free(bytes);
+    }
+    assert_int_equal(entry_count(folder), 1); /* no temporary file */
+    assert_true(file_exists(path) && !file_is_folder(path) && file_is_folder(folder));
+    remove(path);
+    assert_false(file_exists(path));
+}
+
+static void failed_writes_leave_nothing(void **state)
+{
+    (void)state;
+    char path[512], inner[600];
+    assert_ok(file_join(path, sizeof path, folder, "is_a_folder", NULL));
+    assert_ok(file_make_folder(path, NULL));
+    assert_ok(file_join(inner, sizeof inner, path, "keep", NULL));
+    assert_ok(file_write_atomic(inner, "old", 3, NULL));
+    gbt_error err = {0};
+    assert_int_equal(file_write_atomic(path, "new", 3, &err), GBT_ERR_IO); /* the rename fails: a folder is there */
+    assert_int_equal(err.status, GBT_ERR_IO);
+    assert_ptr_equal(strstr(err.text, path), err.text);
+    assert_int_equal(entry_count(folder), 1);
+    assert_int_equal(entry_count(path), 1);
+    assert_int_equal(file_write_atomic("/nowhere/at/all", "x", 1, NULL), GBT_ERR_IO);
+    char long_path[5000];
+    memset(long_path, 'x', sizeof long_path), long_path[sizeof long_path - 1] = '\0';
+    assert_int_equal(file_write_atomic(long_path, "x", 1, NULL), GBT_ERR_ARGUMENT);
+    remove_entries(folder);
+}
+
+/* A write that stops half-way (here at a file size limit) leaves the old file whole and no temporary one. */
+static void full_disk_keeps_the_old_file(void **state)
+{
+    (void)state;
+    char path[512];
+    static const unsigned char big[100000];
+    assert_ok(file_join(path, sizeof path, folder, "model", NULL));
+    assert_ok(file_write_atomic(path, "old", 3, NULL));
+    struct rlimit keep, tight;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &keep), 0);
+    tight = keep, tight.rlim_cur = 1000;
+    void (*const handler)(int) = signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &tight), 0);
+    gbt_error err = {0};
+    const gbt_status status = file_write_atomic(path, big, sizeof big, &err);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &keep), 0);
+    signal(SIGXFSZ, handler);
+    assert_int_equal(status, GBT_ERR_IO);
+    assert_ptr_equal(strstr(err.text, path), err.text);
+    unsigned char *bytes;
+    size_t count;
+    assert_ok(file_read(path, &bytes, &count, NULL));
+    assert_int_equal(count, 3);
+    assert_memory_equal(bytes, "old", 3);
+    mem_free(bytes);
+    assert_int_equal(entry_count(folder), 1);
+    remove_entries(folder);
+}
+
+static void reads_refuse_what_is_no_file(void **state)
+{
+    (void)state;
+    unsigned char *bytes = (unsigned char *)1;
+    size_t count = 9;
+    gbt_error err = {0};
+    assert_int_equal(file_read(folder, &bytes, &count, &err), GBT_ERR_IO);
+    assert_null(bytes);
+    assert_int_equal(count, 0);
+    assert_ptr_equal(strstr(err.text, folder), err.text);
+    assert_int_equal(file_read("/nowhere", &bytes, &count, NULL), GBT_ERR_IO);
+    char path[512];
+    assert_ok(file_join(path, sizeof path, folder, "fifo", NULL));
+    assert_int_equal(mkfifo(path, 0600), 0);
+    assert_int_equal(file_read(path, &bytes, &count, NULL), GBT_ERR_IO); /* and does not hang */
+    remove(path);
+}
+
+static void folders_and_names(void **state)
+{
+    (void)state;
+    char path[512], file[600];
+    assert_ok(file_join(path, sizeof path, folder, "a/b//c", NULL));
+    assert_ok(file_make_folder(path, NULL));
+    assert_ok(file_make_folder(path, NULL)); /* there already */
+    assert_true(file_is_folder(path));
+    assert_ok(file_join(file, sizeof file, path, "f", NULL));
+    assert_ok(file_write_atomic(file, "x", 1, NULL));
+    assert_int_equal(file_make_folder(file, NULL), GBT_ERR_IO);
+    assert_int_equal(file_make_folder("", NULL), GBT_ERR_ARGUMENT);
+    remove_entries(folder);
+    char out[8];
+    assert_ok(file_join(out, sizeof out, "abc", "def", NULL)); /* 7 and the zero: just fits */
+    assert_string_equal(out, "abc/def");
+    assert_ok(file_join(out, sizeof out, "abc/", "def", NULL));
+    assert_string_equal(out, "abc/def");
+    assert_ok(file_join(out, sizeof out, "", "def", NULL));
+    assert_int_equal(file_join(out, sizeof out, "abcd", "def", NULL), GBT_ERR_ARGUMENT);
+}
+
+static void gaussians_resize_pad_zero(void **state)
+{
+    (void)state;
+    gaussians g = {0};
+    for (size_t count = 0; count <= 40; count++) {
+        assert_ok(gaussians_resize(&g, count, NULL));
+        assert_int_equal(g.count, count);
+        assert_int_equal(g.capacity % GAUSSIANS_LANES, 0);
+        assert_true(g.capacity >= count);
+        float *const fields[] = {
+#define X(name, pad, meaning) g.name,
+            GAUSSIANS_FIELDS(X)
+#undef X
+        };
+        const float pads[] = {
+#define X(name, pad, meaning) pad,
+            GAUSSIANS_FIELDS(X)
+#undef X
+        };
+        assert_int_equal(sizeof fields / sizeof fields[0], GAUSSIANS_FIELD_COUNT);
+        const size_t padded = (count + GAUSSIANS_LANES - 1) / GAUSSIANS_LANES * GAUSSIANS_LANES;
+        for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++) {
+            assert_int_equal((uintptr_t)fields[f] % 64, 0);
+            for (size_t i = 0; i < g.capacity; i++)
+                fields[f][i] = (float)(100 * f) + 0.5f;
+        }
+        gaussians_pad(&g);
+        for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
+            for (size_t i = 0; i < padded; i++)
+                assert_true(fields[f][i] == (i < count ? (float)(100 * f) + 0.5f : pads[f])); /* also: fields do not overlap */
+        gaussians_zero(&g);
+        for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
+            for (size_t i = 0; i < padded; i++)
+                assert_true(fields[f][i] == 0);
+    }
+    const gaussians before = g;
+    mem_fail_after(0);
+    assert_int_equal(gaussians_resize(&g, g.capacity + 1, NULL), GBT_ERR_NO_MEMORY);
+    mem_fail_after(-1);
+    assert_memory_equal(&g, &before, sizeof g); /* still the old arrays, still owned */
+    gaussians_free(&g);
+    assert_null(g.mean_x);
+    gaussians_free(&g);
+}
+
+static void image_sizes(void **state)
+{
+    (void)state;
+    image im;
+    assert_ok(image_alloc(&im, 3, 2, 4, NULL));
+    assert_int_equal(im.width * 100 + im.height * 10 + im.channels, 324);
+    im.pixels[23] = 1;
+    image_free(&im);
+    assert_null(im.pixels);
+    static const int bad[][3] = {{0, 1, 1}, {1, -1, 1}, {1, 1, 0}, {-2147483647, 5, 3}};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        gbt_error err = {0};
+        assert_int_equal(image_alloc(&im, bad[i][0], bad[i][1], bad[i][2], &err), GBT_ERR_ARGUMENT);
+        assert_null(im.pixels);
+        assert_true(err.text[0] != '\0');
+    }
+    assert_int_equal(image_alloc(&im, 2147483647, 2147483647, 4, NULL), GBT_ERR_NO_MEMORY);
+    assert_null(im.pixels);
+}
+
+enum { COVER = 1000 };
+static int covered[COVER];
+static size_t begin_of[COVER];
+
+static void cover(size_t block, size_t begin, size_t end, void *context)
+{
+    *(size_t *)context = 1;
+    begin_of[block] = begin;
+    for (size_t i = begin; i < end; i++)
+        covered[i]++;
+}
+
+static void blocks_cover_once(void **state)
+{
+    (void)state;
+    static const size_t grains[] = {1, 7, 16, 999, 1000, 5000};
+    for (int threads = 1; threads <= 3; threads++) {
+        parallel_set_threads(threads);
+        assert_int_equal(parallel_threads(), threads);
+        for (size_t k = 0; k < sizeof grains / sizeof grains[0]; k++) {
+            size_t ran = 0;
+            memset(covered, 0, sizeof covered);
+            parallel_blocks(COVER, grains[k], cover, &ran);
+            for (int i = 0; i < COVER; i++)
+                assert_int_equal(covered[i], 1);
+            for (size_t block = 0; block < parallel_block_count(COVER, grains[k]); block++)
+                assert_int_equal(begin_of[block], block * grains[k]);
+        }
+        size_t ran = 0;
+        parallel_blocks(0, 16, cover, &ran);
+        assert_int_equal(ran, 0);
+    }
+}
+
+static void instruction_sets_only_go_down(void **state)
+{
+    (void)state;
+    const cpu_isa best = cpu_best_isa();
+    assert_true(best >= CPU_PLAIN && best <= CPU_AVX512);
+    cpu_limit_isa(CPU_PLAIN);
+    assert_int_equal(cpu_best_isa(), CPU_PLAIN);
+    cpu_limit_isa(CPU_AVX512);
+    assert_true(cpu_best_isa() <= best);
+    assert_string_equal(cpu_isa_name(CPU_PLAIN), "plain");
+    assert_string_equal(cpu_isa_name(CPU_AVX2), "avx2");
+    assert_string_equal(cpu_isa_name(CPU_AVX512), "avx512");
+}
+
+/* A quarter turn about z takes x to y; matrices of unit quaternions are orthonormal; the transpose undoes them. */
+static void rotations(void **state)
+{
+    (void)state;
+    const double half = sqrt(0.5);
+    double m[9], v[3] = {1, 0, 0};
+    dquat_to_matrix((const double[4]){half, 0, 0, half}, m);
+    dmat_apply(m, v, v);
+    assert_near(v[0], 0, 1e-15);
+    assert_near(v[1], 1, 1e-15);
+    for (uint64_t i = 0; i < 100; i++) {
+        double q[4], a[3] = {1, -2, 3}, b[3], length = 0;
+        for (uint64_t k = 0; k < 4; k++)
+            q[k] = rng_normal(1, k, i), length += q[k] * q[k];
+        for (int k = 0; k < 4; k++)
+            q[k] /= sqrt(length);
+        dquat_to_matrix(q, m);
+        dmat_apply(m, a, b);
+        assert_near(dvec_length(b), sqrt(14), 1e-14);
+        dmat_apply_transposed(m, b, b);
+        for (int k = 0; k < 3; k++)
+            assert_near(b[k], a[k], 1e-14);
+        double third[3];
+        dvec_cross(m, m + 3, third); /* det + 1: the third row is the cross product of the others */
+        for (int k = 0; k < 3; k++)
+            assert_near(third[k], m[6 + k], 1e-15);
+        float mf[9];
+        quat_to_matrix((const float[4]){(float)q[0], (float)q[1], (float)q[2], (float)q[3]}, mf);
+        for (int k = 0; k < 9; k++)
+            assert_near((double)mf[k], m[k], 1e-6);
+    }
+    double zero[3] = {0, 0, 0};
+    dvec_normalize(zero);
+    assert_near(dvec_length(zero), 0, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(first_cause_wins),
+        cmocka_unit_test(exit_codes),
+        cmocka_unit_test(memory_is_aligned_and_zeroed),
+        cmocka_unit_test(memory_sizes_are_checked),
+        cmocka_unit_test(memory_fails_on_demand),
+        cmocka_unit_test(memory_reserve_grows_and_keeps),
+        cmocka_unit_test(philox_known_answers),
+        cmocka_unit_test(random_numbers_have_their_moments),
+        cmocka_unit_test(files_come_back),
+        cmocka_unit_test(failed_writes_leave_nothing),
+        cmocka_unit_test(full_disk_keeps_the_old_file),
+        cmocka_unit_test(reads_refuse_what_is_no_file),
+        cmocka_unit_test(folders_and_names),
+        cmocka_unit_test(gaussians_resize_pad_zero),
+        cmocka_unit_test(image_sizes),
+        cmocka_unit_test(blocks_cover_once),
+        cmocka_unit_test(instruction_sets_only_go_down),
+        cmocka_unit_test(rotations),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

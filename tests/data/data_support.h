@@ -1,0 +1,161 @@
+/* tests/data/data_support.h -- temporary folders, exact-size copies, and mutations of good files. */
+#ifndef GBT_TEST_DATA_SUPPORT_H
+#define GBT_TEST_DATA_SUPPORT_H
+
+#include "test_support.h"
+
+#include <ftw.h>
+#include <unistd.h>
+
+#include "base/file.h"
+#include "base/image.h"
+#include "data/bytes.h"
+#include "data/raw.h"
+
+/** Calls with a visible message on failure. */
+#define must(call)                                                     \
+    do {                                                               \
+        gbt_error err = {0};                                           \
+        const gbt_status must_status_ = (call);                        \
+        if (must_status_ != GBT_OK)                                    \
+            fail_msg("%s: status %d: %s", #call, (int)must_status_, err.text); \
+    } while (0)
+
+static inline int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *walk)
+{
+    (void)info, (void)kind, (void)walk;
+    return remove(path);
+}
+
+/** cmocka set-up and tear-down: *state is the path of an empty folder. */
+static inline int make_temporary(void **state)
+{
+    const char *root = getenv("TMPDIR");
+    char *path = malloc(4096);
+    snprintf(path, 4096, "%s/gbt_data_XXXXXX", root != NULL ? root : "/tmp");
+    *state = mkdtemp(path);
+    return *state != NULL ? 0 : -1;
+}
+
+static inline int remove_temporary(void **state)
+{
+    nftw(*state, remove_entry, 16, FTW_DEPTH | FTW_PHYS);
+    free(*state);
+    return 0;
+}
+
+/** folder/name; `slot` in 0..3 says which static buffer. */
+static inline const char *inside(const char *folder, const char *name, int slot)
+{
+    static char paths[4][8192];
+    snprintf(paths[slot], sizeof paths[slot], "%s/%s", folder, name);
+    return paths[slot];
+}
+
+static inline void make_parent(const char *path)
+{
+    char parent[4096];
+    snprintf(parent, sizeof parent, "%.*s", (int)(strrchr(path, '/') - path), path);
+    must(file_make_folder(parent, &err));
+}
+
+static inline void write_bytes(const char *folder, const char *name, const void *bytes, size_t size)
+{
+    const char *path = inside(folder, name, 3);
+    make_parent(path);
+    must(file_write_atomic(path, bytes, size, &err));
+}
+
+static inline void write_text(const char *folder, const char *name, const char *text)
+{
+    write_bytes(folder, name, text, strlen(text));
+}
+
+/** A picture whose pixel (x, y) is (x, y, 0) / 255. */
+static inline void write_picture(const char *folder, const char *name, int width, int height)
+{
+    const char *path = inside(folder, name, 3);
+    make_parent(path);
+    image im = {0};
+    must(image_alloc(&im, width, height, 3, &err));
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++) {
+            float *pixel = im.pixels + 3 * (y * width + x);
+            pixel[0] = (float)x / 255, pixel[1] = (float)y / 255, pixel[2] = 0;
+        }
+    must(image_write(path, &im, &err));
+    image_free(&im);
+}
+
+/** A malloc'ed copy of exactly `size` bytes, so that the sanitizer sees a read of one byte more. */
+static inline unsigned char *exact_copy(const void *bytes, size_t size)
+{
+    unsigned char *copy = calloc(size > 0 ? size : 1, 1);
+    if (size > 0)
+        memcpy(copy, bytes, size);
+    return copy;
+}
+
+/** What must hold for whatever a reader accepted. */
+static inline void check_raw(const raw_scene *raw)
+{
+    for (size_t i = 0; i < raw->view_count; i++) {
+        const gbt_camera *camera = &raw->views[i].camera;
+        assert_non_null(raw->views[i].name);
+        assert_true(raw->views[i].name[0] != '\0' && raw->views[i].name[0] != '/');
+        assert_true(camera->width >= 1 && camera->height >= 1 && camera->params[0] > 0);
+        for (int k = 0; k < 3; k++)
+            assert_true(isfinite(camera->center[k]));
+        for (int k = 0; k < 3; k++) {
+            const double *row = camera->rotation + 3 * k;
+            const double length = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
+            assert_true(fabs(length - 1) < 1e-9);
+        }
+    }
+    for (size_t i = 0; i < 3 * raw->point_count; i++) {
+        assert_true(isfinite(raw->position[i]));
+        assert_true(raw->color[i] >= 0 && raw->color[i] <= 1);
+    }
+}
+
+/** A failure must say why in one line; a success must say nothing. */
+static inline void check_message(gbt_status status, const gbt_error *err)
+{
+    assert_int_equal(err->status, status);
+    assert_true((status != GBT_OK) == (err->text[0] != '\0'));
+    assert_null(strchr(err->text, '\n'));
+}
+
+/** Feed one variant of a seed to a reader; `bytes` has exactly `size` bytes. */
+typedef void try_bytes(const unsigned char *bytes, size_t size, void *context);
+
+/** Truncate at every offset, flip every byte in three ways, put extreme 4- and 8-byte values at every offset. */
+static inline void mutate_all(const unsigned char *seed, size_t size, try_bytes *try_one, void *context)
+{
+    static const uint64_t extremes[] = {0,          1,          UINT64_MAX,           INT32_MAX, (uint64_t)INT32_MAX + 1,
+                                        UINT64_C(1) << 63, UINT64_C(1) << 61, UINT64_C(0x7FF8000000000000), UINT64_C(0x7FF0000000000000),
+                                        UINT64_C(0x7FC00000), UINT64_C(0x7F800000)};
+    for (size_t length = 0; length < size; length++) {
+        unsigned char *copy = exact_copy(seed, length);
+        try_one(copy, length, context);
+        free(copy);
+    }
+    for (size_t at = 0; at < size; at++) {
+        static const unsigned char flips[] = {0xff, 0x80, 0x01};
+        for (size_t k = 0; k < sizeof flips; k++) {
+            unsigned char *copy = exact_copy(seed, size);
+            copy[at] ^= flips[k];
+            try_one(copy, size, context);
+            free(copy);
+        }
+        for (size_t width = 4; width <= 8; width += 4)
+            for (size_t k = 0; k < sizeof extremes / sizeof extremes[0] && at + width <= size; k++) {
+                unsigned char *copy = exact_copy(seed, size);
+                memcpy(copy + at, &extremes[k], width);
+                try_one(copy, size, context);
+                free(copy);
+            }
+    }
+}
+
+#endif

@@ -1,0 +1,676 @@
+/* tests/data/test_scene.c -- scenes from folders: sniffing, photos, recentring, splits, memory failures, and the real data sets. */
+#include "data_support.h"
+
+#include <unistd.h>
+
+#include "base/rng.h"
+#include "base/vec.h"
+#include "data/colmap_write.h"
+#include "data/photo.h"
+#include "data/ply.h"
+#include "data/scene.h"
+
+enum { VIEW_COUNT = 9, POINT_COUNT = 5 };
+
+/* Nine images v1.png .. v9.png on a line at x = 1000 + 10 i, five points around (1000, 0, 0), one of them far off. */
+static void write_model(const char *folder, bool text, bool with_photos)
+{
+    colmap_image images[VIEW_COUNT] = {0};
+    colmap_point points[POINT_COUNT] = {0};
+    char names[VIEW_COUNT][16];
+    for (int i = 0; i < VIEW_COUNT; i++) {
+        snprintf(names[i], sizeof names[i], "v%d.png", VIEW_COUNT - i);
+        images[i].name = names[i];
+        images[i].camera = (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = 8, .height = 6, .params = {10, 10, 3.5, 2.5},
+                                        .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {1000 + 10 * i, 1, 2}};
+        char path[200];
+        snprintf(path, sizeof path, "images/%s", names[i]);
+        if (with_photos)
+            write_picture(folder, path, 8, 6);
+    }
+    for (int i = 0; i < POINT_COUNT; i++)
+        points[i] = (colmap_point){.position = {999 + i, -i, i == 4 ? 1e9 : 0}, .color = {10, 20, 30}};
+    char model[4096];
+    snprintf(model, sizeof model, "%s/sparse/0", folder);
+    if (text)
+        must(colmap_write_text(model, images, VIEW_COUNT, points, POINT_COUNT, &err));
+    else
+        must(colmap_write(model, images, VIEW_COUNT, points, POINT_COUNT, &err));
+}
+
+static void move(const char *folder, const char *from, const char *to)
+{
+    make_parent(inside(folder, to, 1));
+    assert_int_equal(rename(inside(folder, from, 0), inside(folder, to, 1)), 0);
+}
+
+static void recentred(void **state)
+{
+    const char *folder = *state;
+    write_model(folder, false, true);
+    scene s;
+    must(scene_load(folder, NULL, &s, &err));
+    assert_string_equal(s.source, "colmap-bin");
+    assert_string_equal(s.folder, folder);
+    /* The median of the points; the one at 1e9 does not move it. */
+    assert_true(s.origin[0] == 1001 && s.origin[1] == -2 && s.origin[2] == 0);
+    assert_int_equal(s.view_count, VIEW_COUNT);
+    for (size_t i = 0; i < VIEW_COUNT; i++) {
+        char name[16];
+        snprintf(name, sizeof name, "v%zu.png", i + 1);
+        assert_string_equal(s.views[i].name, name);
+        assert_true(file_exists(s.views[i].path));
+        const double *c = s.views[i].camera.center;
+        assert_true(c[0] == 1000 + 10 * (double)(VIEW_COUNT - 1 - i) - 1001 && c[1] == 3 && c[2] == 2);
+        assert_true(s.views[i].camera.params[2] == 3.5);
+        assert_int_equal(s.views[i].is_test, i % 8 == 0);
+    }
+    assert_int_equal(s.points.count, POINT_COUNT);
+    assert_true(s.points.position[0] == -2 && s.points.position[1] == 2 && s.points.position[14] == 1e9f);
+    assert_true(s.points.has_color && s.points.color[1] == 20.0f / 255);
+    /* Training cameras are v2..v8, x = 1070 .. 1010: mean 1040, farthest 30. */
+    assert_true(fabs(scene_camera_extent(&s) - 33) < 1e-9);
+    scene_free(&s);
+    assert_null(s.views);
+}
+
+static void folder_layouts(void **state)
+{
+    const char *folder = *state;
+    static const char *const files[] = {"cameras.bin", "images.bin", "points3D.bin"};
+    static const char *const places[] = {"sparse/0", "sparse", "."};
+    write_model(folder, false, true);
+    scene s;
+    char from[64], to[64];
+    for (int place = 0; place < 3; place++) {
+        for (int i = 0; i < 3 && place > 0; i++) {
+            snprintf(from, sizeof from, "%s/%s", places[place - 1], files[i]);
+            snprintf(to, sizeof to, "%s/%s", places[place], files[i]);
+            move(folder, from, to);
+        }
+        must(scene_load(folder, NULL, &s, &err));
+        assert_int_equal(s.view_count, VIEW_COUNT);
+        scene_free(&s);
+    }
+    /* Photos may lie in the folder itself. */
+    move(folder, "images/v3.png", "v3.png");
+    must(scene_load(folder, NULL, &s, &err));
+    assert_non_null(strstr(s.views[2].path, "/v3.png"));
+    assert_null(strstr(s.views[2].path, "images"));
+    scene_free(&s);
+}
+
+static void binary_is_preferred(void **state)
+{
+    const char *folder = *state;
+    write_model(folder, true, true);
+    scene s;
+    must(scene_load(folder, NULL, &s, &err));
+    assert_string_equal(s.source, "colmap-txt");
+    scene_free(&s);
+    write_model(folder, false, false);
+    write_text(folder, "sparse/0/rigs.bin", "ignored");
+    write_text(folder, "sparse/0/frames.bin", "ignored");
+    must(scene_load(folder, NULL, &s, &err));
+    assert_string_equal(s.source, "colmap-bin");
+    scene_free(&s);
+    /* 29: an incomplete binary set gives way to a complete text set, but not to an incomplete one. */
+    unlink(inside(folder, "sparse/0/images.bin", 0));
+    must(scene_load(folder, NULL, &s, &err));
+    assert_string_equal(s.source, "colmap-txt");
+    scene_free(&s);
+    unlink(inside(folder, "sparse/0/points3D.txt", 0));
+    gbt_error err = {0};
+    assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_IO);
+    assert_non_null(strstr(err.text, "images.bin: missing (wanted cameras, images and points3D together)"));
+    assert_null(s.views);
+}
+
+/* 27: every missing photo is counted, the first three are named. */
+static void missing_photos(void **state)
+{
+    const char *folder = *state;
+    write_model(folder, false, true);
+    static const char *const gone[] = {"images/v2.png", "images/v4.png", "images/v5.png", "images/v9.png"};
+    for (int i = 0; i < 4; i++) {
+        unlink(inside(folder, gone[i], 0));
+        scene s;
+        gbt_error err = {0};
+        assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_IO);
+        check_message(GBT_ERR_IO, &err);
+        char want[64];
+        snprintf(want, sizeof want, "%d of 9 photos are missing: v2.png%s%s%s", i + 1, i > 0 ? ", v4.png" : "", i > 1 ? ", v5.png" : "",
+                 i > 2 ? ", ..." : "");
+        if (strstr(err.text, want) == NULL || (i < 3 && strstr(err.text, "...") != NULL))
+            fail_msg("%s", err.text);
+    }
+    must(file_make_folder(inside(folder, "images/v2.png", 0), &err)); /* a folder is not a photo */
+    scene s;
+    gbt_error err = {0};
+    assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_IO);
+    assert_non_null(strstr(err.text, "4 of 9 photos"));
+}
+
+typedef struct place_case {
+    const char *name;
+    const char *file, *text; /* written first, when not NULL */
+    const char *path;        /* loaded, below the folder */
+    gbt_status status;
+    const char *says;
+} place_case;
+
+static const char empty_count[8];
+
+static void nothing_to_load(void **state)
+{
+    const char *folder = *state;
+    static const place_case cases[] = {
+        {"nothing there", NULL, NULL, "no/such", GBT_ERR_IO, "no such file or folder"},
+        {"empty folder", NULL, NULL, ".", GBT_ERR_FORMAT, "not a data set (wanted sparse/0/cameras.bin or transforms.json"},
+        {"some file", "photo.jpg", "x", "photo.jpg", GBT_ERR_FORMAT, "not a data set (wanted a folder, a .ply or a transforms.json)"},
+        {"bad ply", "p.ply", "x", "p.ply", GBT_ERR_FORMAT, "p.ply:1: not a PLY file"},
+        {"ply without points", "p.ply", "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n", "p.ply",
+         GBT_ERR_FORMAT, "holds no usable point (0 dropped)"},
+        {"ply of NaN", "p.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\nnan 1 2\n", "p.ply",
+         GBT_ERR_FORMAT, "holds no usable point (1 dropped)"},
+        {"bad json", "transforms.json", "x", ".", GBT_ERR_FORMAT, "transforms.json:1: not usable JSON"},
+        {"bad json by name", "transforms.json", "x", "transforms.json", GBT_ERR_FORMAT, "transforms.json:1: not usable JSON"},
+        {"empty cameras.txt", "b/cameras.txt", "", "b", GBT_ERR_FORMAT, "not a data set"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        if (cases[i].file != NULL)
+            write_text(folder, cases[i].file, cases[i].text);
+        scene s;
+        gbt_error err = {0};
+        const gbt_status status = scene_load(inside(folder, cases[i].path, 0), NULL, &s, &err);
+        check_message(status, &err);
+        if (status != cases[i].status || strstr(err.text, cases[i].says) == NULL)
+            fail_msg("%s: status %d, message: %s", cases[i].name, (int)status, err.text);
+        assert_null(s.views);
+    }
+    /* 28: a model without images. */
+    for (int i = 0; i < 3; i++)
+        write_bytes(folder, (const char *const[]){"sparse/cameras.bin", "sparse/images.bin", "sparse/points3D.bin"}[i], empty_count, 8);
+    scene s;
+    gbt_error err = {0};
+    assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_FORMAT);
+    assert_non_null(strstr(err.text, "images.bin: no registered image in the model"));
+}
+
+static void too_long_path(void **state)
+{
+    (void)state;
+    char *path = malloc(20001);
+    memset(path, 'a', 20000);
+    path[20000] = '\0';
+    scene s;
+    gbt_error err = {0};
+    assert_int_equal(scene_load(path, NULL, &s, &err), GBT_ERR_IO);
+    check_message(GBT_ERR_IO, &err);
+    free(path);
+}
+
+static void parse_split(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text;
+        bool good;
+        scene_split_kind kind;
+        int every;
+    } cases[] = {
+        {"every=8", true, SCENE_SPLIT_EVERY, 8},   {"every=2", true, SCENE_SPLIT_EVERY, 2}, {"every=2147483647", true, SCENE_SPLIT_EVERY, 2147483647},
+        {"none", true, SCENE_SPLIT_NONE, 8},       {"list=a b.txt", true, SCENE_SPLIT_LIST, 8},
+        {"every=1", false, 0, 0},                  {"every=0", false, 0, 0},                {"every=-8", false, 0, 0},
+        {"every=", false, 0, 0},                   {"every=8x", false, 0, 0},               {"every=2147483648", false, 0, 0},
+        {"every=99999999999999999999", false, 0, 0}, {"", false, 0, 0},                     {"list=", false, 0, 0},
+        {"nonee", false, 0, 0},                    {"8", false, 0, 0},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        scene_split split;
+        gbt_error err = {0};
+        const gbt_status status = scene_split_parse(cases[i].text, &split, &err);
+        check_message(status, &err);
+        if ((status == GBT_OK) != cases[i].good)
+            fail_msg("%s: status %d", cases[i].text, (int)status);
+        if (!cases[i].good) {
+            assert_int_equal(status, GBT_ERR_ARGUMENT);
+            continue;
+        }
+        assert_int_equal(split.kind, cases[i].kind);
+        assert_int_equal(split.every, cases[i].every);
+        if (split.kind == SCENE_SPLIT_LIST)
+            assert_string_equal(split.list_path, "a b.txt");
+    }
+}
+
+static size_t count_tests(const scene *s)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < s->view_count; i++)
+        count += s->views[i].is_test;
+    return count;
+}
+
+static void splits(void **state)
+{
+    const char *folder = *state;
+    write_model(folder, false, true);
+    scene s;
+    for (int every = 2; every <= 10; every++) {
+        must(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_EVERY, .every = every}, &s, &err));
+        assert_int_equal(count_tests(&s), (VIEW_COUNT + (size_t)every - 1) / (size_t)every);
+        for (size_t i = 0; i < VIEW_COUNT; i++)
+            assert_int_equal(s.views[i].is_test, i % (size_t)every == 0);
+        scene_free(&s);
+    }
+    must(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_NONE}, &s, &err));
+    assert_int_equal(count_tests(&s), 0);
+    scene_free(&s);
+
+    char list[4096];
+    snprintf(list, sizeof list, "%s/list.txt", folder);
+    const scene_split by_list = {.kind = SCENE_SPLIT_LIST, .list_path = list};
+    write_text(folder, "list.txt", "v9.png\r\n\nv2.png \nv9.png");
+    must(scene_load(folder, &by_list, &s, &err));
+    assert_int_equal(count_tests(&s), 2);
+    assert_true(s.views[1].is_test && s.views[8].is_test);
+    scene_free(&s);
+    static const struct {
+        const char *text;
+        gbt_status status;
+        const char *says;
+    } bad[] = {
+        {"v9.png\nv99.png\n", GBT_ERR_FORMAT, "list.txt:2: no image of the data set has this name: v99.png"},
+        {"v1.png\nv2.png\nv3.png\nv4.png\nv5.png\nv6.png\nv7.png\nv8.png\nv9.png\n", GBT_ERR_ARGUMENT, "all 9 views are held out"},
+    };
+    for (size_t i = 0; i < 2; i++) {
+        gbt_error err = {0};
+        write_text(folder, "list.txt", bad[i].text);
+        assert_int_equal(scene_load(folder, &by_list, &s, &err), bad[i].status);
+        check_message(bad[i].status, &err);
+        assert_non_null(strstr(err.text, bad[i].says));
+        assert_null(s.views);
+    }
+    unlink(list);
+    gbt_error err = {0};
+    assert_int_equal(scene_load(folder, &by_list, &s, &err), GBT_ERR_IO);
+    gbt_error err2 = {0};
+    assert_int_equal(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_EVERY, .every = 1}, &s, &err2), GBT_ERR_ARGUMENT);
+}
+
+static void transforms_folder(void **state)
+{
+    const char *folder = *state;
+    write_picture(folder, "photos/b.png", 8, 6);
+    write_picture(folder, "photos/a.png", 8, 6);
+    write_text(folder, "points.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n5 6 7\n");
+    static const char text[] = "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"ply_file_path\": \"points.ply\", \"frames\": ["
+                               "{\"file_path\": \"./photos/b.png\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
+                               "{\"file_path\": \"photos/a\", \"transform_matrix\": [[1,0,0,11],[0,1,0,22],[0,0,1,33],[0,0,0,1]]}]}";
+    write_text(folder, "transforms.json", text);
+    scene s;
+    for (int by_file = 0; by_file < 2; by_file++) {
+        must(scene_load(by_file == 0 ? folder : inside(folder, "transforms.json", 0), NULL, &s, &err));
+        assert_string_equal(s.source, "transforms");
+        assert_int_equal(s.view_count, 2);
+        assert_string_equal(s.views[0].name, "photos/a");
+        assert_string_equal(s.views[1].name, "photos/b.png");
+        assert_non_null(strstr(s.views[0].path, "photos/a.png"));
+        assert_true(s.origin[0] == 5 && s.origin[1] == 6 && s.origin[2] == 7);
+        assert_true(s.views[0].camera.center[0] == 6 && s.views[1].camera.center[2] == 23);
+        assert_int_equal(s.points.count, 1);
+        assert_false(s.points.has_color);
+        assert_true(s.points.color[0] == 0.5f);
+        scene_free(&s);
+    }
+    /* Without points the origin is the median of the cameras, the lower one of two. */
+    unlink(inside(folder, "points.ply", 0));
+    char rest[1024];
+    snprintf(rest, sizeof rest, "{\"w\": 8, \"h\": 6, \"fl_x\": 10, %s", strstr(text, "\"frames\""));
+    write_text(folder, "transforms.json", rest);
+    must(scene_load(folder, NULL, &s, &err));
+    assert_true(s.origin[0] == 10 && s.origin[1] == 20 && s.origin[2] == 30);
+    assert_int_equal(s.points.count, 0);
+    assert_non_null(s.points.position);
+    scene_free(&s);
+    /* A named cloud that is missing, and two frames of one photo, are errors. */
+    write_text(folder, "transforms.json", text);
+    gbt_error err2 = {0};
+    assert_int_equal(scene_load(folder, NULL, &s, &err2), GBT_ERR_IO);
+    assert_non_null(strstr(err2.text, "points.ply"));
+    snprintf(rest, sizeof rest, "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"frames\": ["
+             "{\"file_path\": \"./photos/b.png\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
+             "{\"file_path\": \"photos/b.png\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
+    write_text(folder, "transforms.json", rest);
+    gbt_error err3 = {0};
+    assert_int_equal(scene_load(folder, NULL, &s, &err3), GBT_ERR_FORMAT);
+    assert_non_null(strstr(err3.text, "duplicate image name: photos/b.png"));
+}
+
+/* The origin against a sort, over sizes and values that stress the radix selection. */
+static int by_value(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void origin_is_the_median(void **state)
+{
+    for (uint64_t seed = 0; seed < 60; seed++) {
+        const size_t count = 1 + (size_t)(seed * 7 % 40);
+        float *position = malloc(count * 3 * sizeof *position);
+        double *sorted = malloc(count * sizeof *sorted);
+        for (size_t i = 0; i < 3 * count; i++) {
+            const float u = rng_uniform(seed, 0, i) - 0.5f;
+            position[i] = seed % 4 == 0 ? roundf(4 * u) : seed % 4 == 1 ? u * 1e-30f : seed % 4 == 2 ? u * 1e11f : -fabsf(u);
+        }
+        must(ply_write(inside(*state, "m.ply", 0), &(ply_cloud){.vertex_count = count, .position = position}, &err));
+        scene s;
+        must(scene_load(inside(*state, "m.ply", 0), NULL, &s, &err));
+        assert_string_equal(s.source, "ply");
+        assert_int_equal(s.view_count, 0);
+        for (size_t k = 0; k < 3; k++) {
+            for (size_t i = 0; i < count; i++)
+                sorted[i] = (double)position[3 * i + k];
+            qsort(sorted, count, sizeof *sorted, by_value);
+            if (s.origin[k] != sorted[(count - 1) / 2])
+                fail_msg("seed %llu: axis %zu: %g, wanted %g", (unsigned long long)seed, k, s.origin[k], sorted[(count - 1) / 2]);
+            for (size_t i = 0; i < count; i++)
+                assert_true(s.points.position[3 * i + k] == (float)((double)position[3 * i + k] - s.origin[k]));
+        }
+        scene_free(&s);
+        free(position);
+        free(sorted);
+    }
+}
+
+static void extent_is_positive(void **state)
+{
+    (void)state;
+    scene_view one = {.camera = {.center = {5, 5, 5}}};
+    scene s = {.view_count = 1, .views = &one};
+    assert_true(scene_camera_extent(&s) == 1e-3);
+    assert_true(scene_camera_extent(&(scene){0}) == 1e-3);
+}
+
+/* The k-th allocation fails, for every k: the right status, a message, an empty result; nothing is left behind (the sanitizer sees). */
+static void no_memory(void **state)
+{
+    const char *folder = *state;
+    write_model(folder, false, false);
+    for (int i = 1; i <= VIEW_COUNT; i++) {
+        char name[32];
+        snprintf(name, sizeof name, "images/v%d.png", i);
+        write_text(folder, name, "not read here");
+    }
+    write_text(folder, "j/a.png", "not read here");
+    write_text(folder, "j/p.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n5 6 7\n");
+    write_text(folder, "j/transforms.json", "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"ply_file_path\": \"p.ply\", \"frames\": ["
+               "{\"file_path\": \"a\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
+    write_text(folder, "list.txt", "v9.png\n");
+    char list[4096], path[4096];
+    snprintf(list, sizeof list, "%s/list.txt", folder);
+    for (int which = 0; which < 2; which++) {
+        snprintf(path, sizeof path, "%s%s", folder, which == 0 ? "" : "/j");
+        const scene_split split = {.kind = which == 0 ? SCENE_SPLIT_LIST : SCENE_SPLIT_NONE, .list_path = list};
+        long failures = 0;
+        for (gbt_status status = GBT_ERR_NO_MEMORY; status != GBT_OK; failures++) {
+            scene s;
+            gbt_error err = {0};
+            mem_fail_after(failures);
+            status = scene_load(path, &split, &s, &err);
+            mem_fail_after(-1);
+            check_message(status, &err);
+            if (status != GBT_OK) {
+                assert_int_equal(status, GBT_ERR_NO_MEMORY);
+                assert_null(s.views);
+            }
+            scene_free(&s);
+        }
+        assert_true(failures > 5);
+    }
+}
+
+/* Area averages in double, straight from the definition. */
+static double box_mean(const image *in, int channel, double x0, double x1, double y0, double y1)
+{
+    double sum = 0;
+    for (int y = 0; y < in->height; y++)
+        for (int x = 0; x < in->width; x++) {
+            const double w = fmin(x1, x + 1) - fmax(x0, x), h = fmin(y1, y + 1) - fmax(y0, y);
+            if (w > 0 && h > 0)
+                sum += w * h * (double)in->pixels[(y * in->width + x) * in->channels + channel];
+        }
+    return sum / ((x1 - x0) * (y1 - y0));
+}
+
+static void resize_is_the_area_mean(void **state)
+{
+    (void)state;
+    static const int sizes[][4] = {{7, 5, 3, 2}, {8, 6, 4, 3}, {10, 9, 7, 9}, {5, 4, 5, 4}, {3, 2, 7, 5}, {1, 1, 4, 3}, {9, 11, 1, 1}, {640, 3, 641, 2}};
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        const int *n = sizes[i];
+        image in, out;
+        must(image_alloc(&in, n[0], n[1], 3, &err));
+        for (int k = 0; k < 3 * n[0] * n[1]; k++)
+            in.pixels[k] = rng_uniform(i, 1, (uint64_t)k);
+        must(photo_resize(&in, n[2], n[3], &out, &err));
+        assert_int_equal(out.width, n[2]);
+        assert_int_equal(out.height, n[3]);
+        for (int y = 0; y < n[3]; y++)
+            for (int x = 0; x < n[2]; x++)
+                for (int c = 0; c < 3; c++) {
+                    const double fx = (double)n[0] / n[2], fy = (double)n[1] / n[3];
+                    const double want = box_mean(&in, c, x * fx, (x + 1) * fx, y * fy, (y + 1) * fy);
+                    const double got = (double)out.pixels[(y * n[2] + x) * 3 + c];
+                    if (fabs(got - want) > 1.5e-7)
+                        fail_msg("%d x %d to %d x %d at %d, %d: %.9g, wanted %.9g", n[0], n[1], n[2], n[3], x, y, got, want);
+                }
+        for (int k = 0; k < 3 * n[0] * n[1]; k++)
+            in.pixels[k] = 0.6f;
+        image_free(&out);
+        must(photo_resize(&in, n[2], n[3], &out, &err));
+        for (int k = 0; k < 3 * n[2] * n[3]; k++)
+            assert_true(out.pixels[k] == 0.6f);
+        image_free(&in);
+        image_free(&out);
+    }
+}
+
+static void photos(void **state)
+{
+    const char *folder = *state;
+    write_picture(folder, "p.png", 8, 6);
+    char path[4096];
+    snprintf(path, sizeof path, "%s/p.png", folder);
+    scene_view view = {.name = path, .path = path, .camera = {.model = GBT_CAMERA_PINHOLE, .width = 8, .height = 6}};
+    image im;
+    must(scene_read_photo(&view, 8, 6, &im, &err));
+    assert_int_equal(im.channels, 3);
+    assert_true(fabsf(im.pixels[3 * (2 * 8 + 5)] - 5.0f / 255) < 1e-7f && fabsf(im.pixels[3 * (2 * 8 + 5) + 1] - 2.0f / 255) < 1e-7f);
+    image_free(&im);
+    must(scene_read_photo(&view, 4, 3, &im, &err));
+    assert_true(fabsf(im.pixels[3 * (2 * 4 + 1)] - 2.5f / 255) < 1e-7f && fabsf(im.pixels[3 * (2 * 4 + 1) + 1] - 4.5f / 255) < 1e-7f);
+    image_free(&im);
+    /* 80: the aspect may miss by one pixel of the smaller image. */
+    static const struct {
+        int width, height;
+        bool good;
+    } stated[] = {{16, 12, true}, {16, 13, true}, {16, 14, true}, {16, 16, false}, {17, 12, true}, {4, 3, true}, {5, 3, true},
+                  {6, 3, false},  {6, 8, false},  {8, 7, true},   {8, 8, false},   {800, 600, true}, {800, 750, false}};
+    for (size_t i = 0; i < sizeof stated / sizeof stated[0]; i++) {
+        view.camera.width = stated[i].width, view.camera.height = stated[i].height;
+        gbt_error err = {0};
+        const gbt_status status = scene_read_photo(&view, 4, 3, &im, &err);
+        if (status != (stated[i].good ? GBT_OK : GBT_ERR_FORMAT))
+            fail_msg("%d x %d: status %d: %s", stated[i].width, stated[i].height, (int)status, err.text);
+        check_message(status, &err);
+        image_free(&im);
+    }
+    gbt_error err = {0};
+    assert_int_equal(scene_read_photo(&view, 0, 3, &im, &err), GBT_ERR_ARGUMENT);
+    gbt_error err2 = {0};
+    view.path = (char[]){"/no/such/photo.png"};
+    assert_int_equal(scene_read_photo(&view, 4, 3, &im, &err2), GBT_ERR_IO);
+    assert_null(im.pixels);
+}
+
+/* Alpha is composited on black; values that are not numbers do not survive. */
+static void photo_alpha_and_nan(void **state)
+{
+    const char *folder = *state;
+    char path[4096];
+    image im;
+    must(image_alloc(&im, 2, 1, 4, &err));
+    const float pixels[8] = {1, 0.6f, 0.2f, 1, 1, 0.6f, 0.2f, 0.4f};
+    memcpy(im.pixels, pixels, sizeof pixels);
+    snprintf(path, sizeof path, "%s/alpha.png", folder);
+    must(image_write(path, &im, &err));
+    image_free(&im);
+    scene_view view = {.name = path, .path = path, .camera = {.width = 2, .height = 1}};
+    must(scene_read_photo(&view, 2, 1, &im, &err));
+    static const float want[6] = {1, 0.6f, 0.2f, 0.4f, 0.24f, 0.08f};
+    assert_int_equal(im.channels, 3);
+    for (int k = 0; k < 6; k++)
+        assert_true(fabsf(im.pixels[k] - want[k]) < 1e-6f);
+    image_free(&im);
+    must(image_alloc(&im, 2, 1, 3, &err));
+    const float poisoned[6] = {0.5f, NAN, INFINITY, 0.25f, 0.5f, 0.75f};
+    memcpy(im.pixels, poisoned, sizeof poisoned);
+    snprintf(path, sizeof path, "%s/nan.exr", folder);
+    must(image_write(path, &im, &err));
+    image_free(&im);
+    must(scene_read_photo(&view, 2, 1, &im, &err));
+    static const float cleaned[6] = {0.5f, 0, 0, 0.25f, 0.5f, 0.75f};
+    assert_memory_equal(im.pixels, cleaned, sizeof cleaned);
+    image_free(&im);
+}
+
+typedef struct real_case {
+    const char *path, *source;
+    size_t views, tests, points;
+    int width, height;
+    gbt_camera_model model;
+} real_case;
+
+static real_case real_cases[] = {
+    {"data/fox", "colmap-bin", 50, 7, 19317, 360, 640, GBT_CAMERA_PINHOLE},
+    {"data/castle", "colmap-bin", 30, 4, 50725, 640, 427, GBT_CAMERA_PINHOLE},
+    {"data/aerial", "colmap-bin", 28, 4, 41827, 478, 640, GBT_CAMERA_PINHOLE},
+    {"data/plush", "colmap-bin", 97, 13, 25784, 640, 479, GBT_CAMERA_PINHOLE},
+    {"data/fox_transforms", "transforms", 50, 7, 0, 540, 960, GBT_CAMERA_OPENCV},
+    {"data/garden_points/points.ply", "ply", 0, 0, 138766, 0, 0, 0},
+};
+
+static void real_data(void **state)
+{
+    const real_case *c = *state;
+    const char *path = shared_path(c->path);
+    if (path == NULL)
+        skip();
+    scene s;
+    must(scene_load(path, NULL, &s, &err));
+    assert_string_equal(s.source, c->source);
+    assert_int_equal(s.view_count, c->views);
+    assert_int_equal(count_tests(&s), c->tests);
+    assert_int_equal(s.points.count, c->points);
+    assert_int_equal(s.points_dropped, 0);
+    size_t seen = 0, looked_at = 0;
+    for (size_t i = 0; i < s.view_count; i++) {
+        const gbt_camera *camera = &s.views[i].camera;
+        assert_int_equal(camera->width, c->width);
+        assert_int_equal(camera->height, c->height);
+        assert_int_equal(camera->model, c->model);
+        for (size_t k = 0; k < s.points.count && i % 10 == 0; k += 100) {
+            const double d[3] = {(double)s.points.position[3 * k] - camera->center[0], (double)s.points.position[3 * k + 1] - camera->center[1],
+                                 (double)s.points.position[3 * k + 2] - camera->center[2]};
+            double in_camera[3], pixel[2];
+            dmat_apply(camera->rotation, d, in_camera);
+            looked_at++;
+            seen += in_camera[2] > 0 && gbt_camera_project(camera, in_camera, pixel) && pixel[0] >= 0 && pixel[0] <= camera->width &&
+                    pixel[1] >= 0 && pixel[1] <= camera->height;
+        }
+    }
+    /* Wrong axes or poses would put nearly all points behind the cameras or beside the photos. */
+    if (looked_at > 0 && (double)seen < 0.15 * (double)looked_at)
+        fail_msg("%s: only %zu of %zu points are seen", c->path, seen, looked_at);
+    if (s.view_count > 0) {
+        image im;
+        must(scene_read_photo(&s.views[0], c->width / 4, c->height / 4, &im, &err));
+        assert_int_equal(im.width, c->width / 4);
+        image_free(&im);
+    }
+    print_message("%s: origin %g %g %g, extent %g, seen %zu of %zu\n", c->path, s.origin[0], s.origin[1], s.origin[2], scene_camera_extent(&s),
+                  seen, looked_at);
+    scene_free(&s);
+}
+
+/* The two forms of fox share photos but not the world: angles between cameras must agree, so the axes of both readers do. */
+static void fox_twice(void **state)
+{
+    (void)state;
+    const char *path = shared_path("data/fox");
+    scene a, b;
+    if (path == NULL)
+        skip();
+    must(scene_load(path, NULL, &a, &err));
+    path = shared_path("data/fox_transforms");
+    if (path == NULL)
+        skip();
+    must(scene_load(path, NULL, &b, &err));
+    size_t compared = 0;
+    double worst = 0;
+    for (size_t i = 0; i < b.view_count; i++) {
+        const char *slash = strrchr(b.views[i].name, '/');
+        for (size_t k = 0; k < a.view_count; k++) {
+            if (strcmp(a.views[k].name, slash != NULL ? slash + 1 : b.views[i].name) != 0)
+                continue;
+            static const gbt_camera *first[2];
+            if (compared++ == 0)
+                first[0] = &a.views[k].camera, first[1] = &b.views[i].camera;
+            /* Rotation from the first camera to this one, in camera axes: R_i R_0^T, whatever the world is. */
+            const double *now[2] = {a.views[k].camera.rotation, b.views[i].camera.rotation};
+            for (int r = 0; r < 3; r++)
+                for (int q = 0; q < 3; q++) {
+                    double relative[2];
+                    for (int w = 0; w < 2; w++)
+                        relative[w] = dvec_dot(now[w] + 3 * r, first[w]->rotation + 3 * q);
+                    worst = fmax(worst, fabs(relative[0] - relative[1]));
+                }
+        }
+    }
+    assert_int_equal(compared, 50);
+    print_message("fox: largest difference of a relative rotation %g\n", worst);
+    assert_true(worst < 0.05); /* two separate reconstructions; wrong signs would give 2 */
+    scene_free(&a);
+    scene_free(&b);
+}
+
+int main(void)
+{
+    enum { REAL_COUNT = sizeof real_cases / sizeof real_cases[0] };
+    const struct CMUnitTest fixed[] = {
+        cmocka_unit_test_setup_teardown(recentred, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(folder_layouts, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(binary_is_preferred, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(missing_photos, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(nothing_to_load, make_temporary, remove_temporary),
+        cmocka_unit_test(too_long_path),
+        cmocka_unit_test(parse_split),
+        cmocka_unit_test_setup_teardown(splits, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(transforms_folder, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(origin_is_the_median, make_temporary, remove_temporary),
+        cmocka_unit_test(extent_is_positive),
+        cmocka_unit_test_setup_teardown(no_memory, make_temporary, remove_temporary),
+        cmocka_unit_test(resize_is_the_area_mean),
+        cmocka_unit_test_setup_teardown(photos, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(photo_alpha_and_nan, make_temporary, remove_temporary),
+        cmocka_unit_test(fox_twice),
+    };
+    static struct CMUnitTest real[REAL_COUNT];
+    for (size_t i = 0; i < REAL_COUNT; i++)
+        real[i] = (struct CMUnitTest){.name = real_cases[i].path, .test_func = real_data, .initial_state = &real_cases[i]};
+    const int failures = cmocka_run_group_tests_name("scene", fixed, NULL, NULL);
+    return failures + cmocka_run_group_tests_name("real data", real, NULL, NULL);
+}

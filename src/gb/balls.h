@@ -36,11 +36,13 @@ typedef struct balls {
  *
  * @param position [in] [count][3], finite
  * @param color    [in] [count][3] in [0, 1], or NULL: colour then never stops or forces a split (sigma_a = 0)
- * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, non-finite point: says which), GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, non-finite point, colour outside [0, 1]: says which), GBT_ERR_NO_MEMORY;
+ *         on failure *out is zeroed
  *
  * 0 points give 0 balls. Points that no axis can separate are one ball; a set whose points at the median are all equal is split
- * below the median, else along the next axis, else the set is terminal.
- * Threads: same bits for every thread count. Cost: O(n log n) time, about 24 n bytes of scratch.
+ * below the median, else along the next axis, else the set is terminal. Values beyond float (coordinates near its maximum) saturate.
+ * Every reading of an ambiguity of the paper: docs/balls.md.
+ * Threads: same bits for every thread count. Cost: O(n log n) time, 25 n bytes of scratch.
  */
 gbt_status balls_build(const float *position, const float *color, size_t count, const balls_def *def, balls *out, gbt_error *err);
 void balls_free(balls *b);
@@ -50,10 +52,23 @@ typedef enum voxel_rule {
     VOXEL_COMPAT_SQUARED  /* lower median of the mean of the 3 squared neighbour distances: what the reference code computes */
 } voxel_rule;
 
-/** Base spatial scale of a cloud, > 0 for >= 2 distinct points (median over the points whose value is > 0 if the plain median is 0); else 1. */
+/**
+ * Base spatial scale of a cloud (v), > 0 and finite for >= 2 distinct points, else 1.
+ *
+ * When the plain median is 0 (duplicates): the median over the points whose value is > 0; when there are none, over the distinct points.
+ * Fewer than 4 points have fewer than 3 neighbours to average.
+ * @return GBT_OK, GBT_ERR_ARGUMENT (non-finite point: says which), GBT_ERR_NO_MEMORY; *out is 1 on failure
+ * Threads: same bits for every thread count. Cost: one nearest-neighbour query per point.
+ */
 gbt_status balls_voxel_size(const float *position, size_t count, voxel_rule rule, float *out, gbt_error *err);
 
-/** Scaffold-GS's baseline (eq 12): distinct cells round(p / v) (half to even), times v, sorted by x, y, z cell. `*centers` [*out_count][3], free with mem_free(). */
+/**
+ * Scaffold-GS's baseline (eq 12): distinct cells round(p / v) (half to even, in float32), times v, sorted by x, y, z cell.
+ *
+ * @param centers [out] [*out_count][3], free with mem_free(); NULL on failure
+ * @return GBT_OK, GBT_ERR_ARGUMENT (voxel_size, non-finite point, or a cell out of the range of float: says which), GBT_ERR_NO_MEMORY
+ * Cost: O(n log n) time, one thread.
+ */
 gbt_status voxel_centers(const float *position, size_t count, float voxel_size, float **centers, size_t *out_count, gbt_error *err);
 
 #endif

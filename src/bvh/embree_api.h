@@ -1,0 +1,80 @@
+/* bvh/embree_api.h -- the only place that includes Embree, and the only one that knows whether it is Embree 3 or 4.
+
+   What differs: the header's path, the context that travels with a ray, and how one ray is traced. Everything else that the bvh
+   room uses (devices, scenes, point queries, rtcBuildBVH) has the same name and meaning in both and is called directly. */
+#ifndef GBT_BVH_EMBREE_API_H
+#define GBT_BVH_EMBREE_API_H
+
+#if GBT_EMBREE_MAJOR >= 4
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
+/** Travels with a ray into the callbacks as `args->context`. Put it first in a struct to hand data of your own to them. */
+#if GBT_EMBREE_MAJOR >= 4
+typedef struct RTCRayQueryContext embree_context;
+#else
+typedef struct RTCIntersectContext embree_context;
+#endif
+
+static inline void embree_context_init(embree_context *context)
+{
+#if GBT_EMBREE_MAJOR >= 4
+    rtcInitRayQueryContext(context);
+#else
+    rtcInitIntersectContext(context);
+#endif
+}
+
+/** Nearest hit of one ray. The caller has checked the ray with bvh_ray_ok(): Debian 12's Embree aborts on a bad one. */
+static inline void embree_intersect(RTCScene scene, embree_context *context, struct RTCRayHit *rayhit)
+{
+#if GBT_EMBREE_MAJOR >= 4
+    struct RTCIntersectArguments arguments;
+    rtcInitIntersectArguments(&arguments);
+    arguments.context = context;
+    rtcIntersect1(scene, rayhit, &arguments);
+#else
+    rtcIntersect1(scene, context, rayhit);
+#endif
+}
+
+/** Any hit of one ray: ray->tfar is -infinity afterwards when there is one. The ray is checked as for embree_intersect(). */
+static inline void embree_occluded(RTCScene scene, embree_context *context, struct RTCRay *ray)
+{
+#if GBT_EMBREE_MAJOR >= 4
+    struct RTCOccludedArguments arguments;
+    rtcInitOccludedArguments(&arguments);
+    arguments.context = context;
+    rtcOccluded1(scene, ray, &arguments);
+#else
+    rtcOccluded1(scene, context, ray);
+#endif
+}
+
+/** Around work that Embree spreads over threads: publish what the callbacks will read, receive it first thing in a callback.
+    ThreadSanitizer cannot see how Embree's own library hands work over, and takes it for a race; in other builds both are nothing. */
+#if defined(__SANITIZE_THREAD__)
+void __tsan_acquire(void *address);
+void __tsan_release(void *address);
+static inline void embree_publish(void *data)
+{
+    __tsan_release(data);
+}
+static inline void embree_receive(void *data)
+{
+    __tsan_acquire(data);
+}
+#else
+static inline void embree_publish(void *data)
+{
+    (void)data;
+}
+static inline void embree_receive(void *data)
+{
+    (void)data;
+}
+#endif
+
+#endif

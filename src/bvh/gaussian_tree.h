@@ -1,0 +1,53 @@
+/* bvh/gaussian_tree.h -- a 16-wide tree over the ellipsoid proxies of Gaussians, made by Embree's builder.
+
+   The proxy of Gaussian i is the ellipsoid at radius sqrt(2 ln(opacity / alpha_min)) std-devs: exactly the set where its response
+   reaches alpha_min. Boxes are the tight boxes of these ellipsoids, padded so that float32 traversal misses nothing.
+
+   The nodes are laid out for kernels that test all children of a node at once, so their layout is part of the interface. */
+#ifndef GBT_BVH_GAUSSIAN_TREE_H
+#define GBT_BVH_GAUSSIAN_TREE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "base/gaussians.h"
+
+enum { TREE_WIDTH = 16 };
+
+/** Boxes of up to 16 children. Unused slots hold an inverted box (lower +1e30, upper -1e30) and child 0: no query touches them. */
+typedef struct tree_node {
+    float lower_x[TREE_WIDTH], upper_x[TREE_WIDTH];
+    float lower_y[TREE_WIDTH], upper_y[TREE_WIDTH];
+    float lower_z[TREE_WIDTH], upper_z[TREE_WIDTH];
+    uint64_t child[TREE_WIDTH]; /* address of a tree_node, or (Gaussian index << 1 | 1) */
+} tree_node;
+
+static inline bool tree_child_is_gaussian(uint64_t child)
+{
+    return (child & 1) != 0;
+}
+
+typedef struct gaussian_tree {
+    const tree_node *root; /* NULL when no Gaussian is visible at all */
+    size_t box_count;      /* Gaussians in the tree; those with opacity <= alpha_min or non-finite fields are left out */
+    size_t rejected_count; /* of these, the non-finite or out-of-range ones */
+    size_t node_count, bytes;
+    float coordinate_max;  /* largest |coordinate| of any box */
+    void *internal;        /* Embree's builder memory */
+} gaussian_tree;
+
+/**
+ * Build (or rebuild) the tree.
+ *
+ * @param alpha_min  [in] smallest response that counts, (0, 1)
+ * @param reach      [in] largest |coordinate| of any ray origin that will be traced: boxes are padded for it
+ * @param tree       [in,out] start from {0}; memory is reused from build to build; free with gaussian_tree_free()
+ * @return GBT_OK, GBT_ERR_NO_MEMORY or GBT_ERR_INTERNAL (Embree's own words)
+ *
+ * Threads: one build at a time per tree; uses all threads inside; the same tree for every thread count.
+ * Cost: O(n log n); about 50 bytes per Gaussian.
+ */
+gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float reach, gaussian_tree *tree, gbt_error *err);
+void gaussian_tree_free(gaussian_tree *tree);
+
+#endif

@@ -1,0 +1,309 @@
+/* gb/balls.c -- the recursive granular-ball partition (3DGBGS sec. IV-A).
+
+   points --> [moments: mean, r; sigma_a] --stop?--> mark a ball where the set begins
+                   |
+                   +--> [principal axis, median] --> left, right (in place: the array stays in depth-first order)
+
+   The top of the tree is grown level by level, its sub-trees then one per block; marks and places depend on the points only, so the
+   number of threads changes nothing. Statistics live in moments.c, the cut in split.c. */
+#include "gb/balls.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "gb/cloud.h"
+#include "gb/moments.h"
+#include "gb/split.h"
+
+enum {
+    DEPTH_MAX = 64,
+    SUBTREES = 64,           /* the top is grown until there are this many sets to share out ... */
+    SUBTREE_POINTS = 4096,   /* ... or no set is larger than this */
+    BALLS_PER_BLOCK = 512,
+    INSERTION_POINTS = 24    /* sets up to this size are sorted in place, larger ones by qsort */
+};
+
+balls_def balls_def_default(void)
+{
+    return (balls_def){.voxel_size = 0.0f,
+                       .radius_factor = 1.25f,
+                       .color_std_max = 0.02f,
+                       .min_points = 2,
+                       .max_depth = 18,
+                       .min_scale = 0.25f};
+}
+
+static gbt_status check_def(const balls_def *def, gbt_error *err)
+{
+    if (!(def->voxel_size > 0.0f) || !isfinite(def->voxel_size))
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad voxel_size (wanted > 0, got %g)", (double)def->voxel_size);
+    if (!(def->radius_factor > 0.0f) || !isfinite(def->radius_factor))
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad radius_factor (wanted > 0, got %g)", (double)def->radius_factor);
+    if (!(def->color_std_max >= 0.0f && def->color_std_max <= 1.0f))
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad color_std_max (wanted 0 to 1, got %g)", (double)def->color_std_max);
+    if (def->min_points < 1)
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad min_points (wanted >= 1, got %d)", def->min_points);
+    if (def->max_depth < 0 || def->max_depth > DEPTH_MAX)
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad max_depth (wanted 0 to %d, got %d)", DEPTH_MAX, def->max_depth);
+    if (!(def->min_scale >= 0.0f) || !isfinite(def->min_scale))
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad min_scale (wanted >= 0, got %g)", (double)def->min_scale);
+    return GBT_OK;
+}
+
+typedef struct partition {
+    cloud_point *points;   /* [n], reordered in place */
+    double *keys;          /* [n], scratch of the cut */
+    uint8_t *leaf_depth;   /* [n]: 1 + depth where a ball begins, else 0 */
+    const float *color;    /* or NULL */
+    double radius_compact; /* eta v */
+    double radius_floor;   /* s_min, eq 21 */
+    double color_std_max;
+    size_t min_points;
+    int max_depth;
+} partition;
+
+typedef struct span {
+    size_t begin, count;
+    int depth;
+} span;
+
+/* Decides eq 23 and cuts; returns the size of the left part, 0 when the set is a ball. */
+static size_t try_split(const partition *p, const span *s)
+{
+    if (s->count <= p->min_points || s->depth >= p->max_depth)
+        return 0;
+    cloud_point *points = p->points + s->begin;
+    moments m;
+    moments_compute(points, s->count, &m);
+    if (fmax(moments_radius(&m), p->radius_floor) <= p->radius_compact) {
+        double mean[3];
+        /* Colours are read at random, so only for the few sets that are small enough to stop. */
+        if (p->color == NULL || moments_color_std(points, s->count, p->color, mean) <= p->color_std_max)
+            return 0;
+    }
+    return split_at_median(points, p->keys + s->begin, s->count, &m);
+}
+
+static void mark_ball(const partition *p, const span *s)
+{
+    p->leaf_depth[s->begin] = (uint8_t)(s->depth + 1);
+}
+
+static void children(const span *s, size_t left, span out[2])
+{
+    out[0] = (span){s->begin, left, s->depth + 1};
+    out[1] = (span){s->begin + left, s->count - left, s->depth + 1};
+}
+
+static void grow_subtree(const partition *p, span root)
+{
+    span stack[DEPTH_MAX + 2]; /* one waiting right part per level, and the set in hand */
+    int waiting = 0;
+    stack[waiting++] = root;
+    while (waiting > 0) {
+        const span s = stack[--waiting];
+        const size_t left = try_split(p, &s);
+        if (left == 0) {
+            mark_ball(p, &s);
+            continue;
+        }
+        span parts[2];
+        children(&s, left, parts);
+        stack[waiting++] = parts[1];
+        stack[waiting++] = parts[0];
+    }
+}
+
+typedef struct frontier {
+    const partition *partition;
+    size_t split_above; /* larger sets are cut while the top is grown, smaller ones wait for their block */
+    span open[2 * SUBTREES];
+    size_t left[2 * SUBTREES];
+    size_t count;
+} frontier;
+
+static void split_open(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)begin, (void)end;
+    frontier *f = context;
+    f->left[block] = f->open[block].count > f->split_above ? try_split(f->partition, &f->open[block]) : 0;
+}
+
+static void grow_open(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)begin, (void)end;
+    const frontier *f = context;
+    grow_subtree(f->partition, f->open[block]);
+}
+
+static void grow(const partition *p, size_t count)
+{
+    frontier f = {.partition = p, .open = {{0, count, 0}}, .count = 1};
+    f.split_above = count / SUBTREES > SUBTREE_POINTS ? count / SUBTREES : SUBTREE_POINTS;
+    bool grew = true;
+    while (grew && f.count < SUBTREES) {
+        parallel_blocks(f.count, 1, split_open, &f);
+        span next[2 * SUBTREES];
+        size_t next_count = 0;
+        grew = false;
+        for (size_t i = 0; i < f.count; i++) {
+            if (f.left[i] > 0) {
+                children(&f.open[i], f.left[i], next + next_count);
+                next_count += 2;
+                grew = true;
+            } else if (f.open[i].count > f.split_above) {
+                mark_ball(p, &f.open[i]);
+            } else {
+                next[next_count++] = f.open[i];
+            }
+        }
+        memcpy(f.open, next, next_count * sizeof *next);
+        f.count = next_count;
+    }
+    parallel_blocks(f.count, 1, grow_open, &f);
+}
+
+static int compare_indices(const void *a, const void *b)
+{
+    const uint32_t x = ((const cloud_point *)a)->index, y = ((const cloud_point *)b)->index;
+    return (x > y) - (x < y);
+}
+
+static void sort_by_index(cloud_point *points, size_t count)
+{
+    if (count > INSERTION_POINTS) {
+        qsort(points, count, sizeof *points, compare_indices);
+        return;
+    }
+    for (size_t i = 1; i < count; i++) {
+        const cloud_point point = points[i];
+        size_t j = i;
+        for (; j > 0 && points[j - 1].index > point.index; j--)
+            points[j] = points[j - 1];
+        points[j] = point;
+    }
+}
+
+/* Coordinates near FLT_MAX have variances that no float holds. */
+static float to_float(double x)
+{
+    return (float)fmin(fmax(x, (double)-FLT_MAX), (double)FLT_MAX);
+}
+
+typedef struct fill_job {
+    const partition *partition;
+    balls *out;
+} fill_job;
+
+/* Statistics are taken again in index order: they then depend on the set alone, not on the way to it. */
+static void fill_balls(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const fill_job *job = context;
+    const partition *p = job->partition;
+    balls *out = job->out;
+    for (size_t j = begin; j < end; j++) {
+        const size_t first = out->first[j], count = out->first[j + 1] - first;
+        cloud_point *points = p->points + first;
+        sort_by_index(points, count);
+        for (size_t i = 0; i < count; i++)
+            out->member[first + i] = points[i].index;
+        moments m;
+        moments_compute(points, count, &m);
+        double color[3] = {0, 0, 0}, color_std = 0;
+        if (p->color != NULL)
+            color_std = moments_color_std(points, count, p->color, color);
+        for (int k = 0; k < 3; k++) {
+            out->center[3 * j + k] = to_float(m.mean[k]);
+            out->color[3 * j + k] = (float)color[k];
+        }
+        for (int k = 0; k < 6; k++)
+            out->covariance[6 * j + k] = to_float(m.covariance[k]);
+        out->radius[j] = to_float(fmax(moments_radius(&m), p->radius_floor));
+        out->color_std[j] = (float)color_std;
+        out->depth[j] = p->leaf_depth[first] - 1;
+    }
+}
+
+static gbt_status alloc_balls(balls *out, size_t count, size_t point_count, gbt_error *err)
+{
+    out->count = count;
+    out->point_count = point_count;
+    if ((out->first = mem_alloc(count + 1, sizeof *out->first, "balls.first", err)) == NULL ||
+        (out->member = mem_alloc(point_count, sizeof *out->member, "balls.member", err)) == NULL ||
+        (out->center = mem_alloc(count, 3 * sizeof *out->center, "balls.center", err)) == NULL ||
+        (out->radius = mem_alloc(count, sizeof *out->radius, "balls.radius", err)) == NULL ||
+        (out->covariance = mem_alloc(count, 6 * sizeof *out->covariance, "balls.covariance", err)) == NULL ||
+        (out->color = mem_alloc(count, 3 * sizeof *out->color, "balls.color", err)) == NULL ||
+        (out->color_std = mem_alloc(count, sizeof *out->color_std, "balls.color_std", err)) == NULL ||
+        (out->depth = mem_alloc(count, sizeof *out->depth, "balls.depth", err)) == NULL)
+        return GBT_ERR_NO_MEMORY;
+    return GBT_OK;
+}
+
+gbt_status balls_build(const float *position, const float *color, size_t count, const balls_def *def, balls *out, gbt_error *err)
+{
+    *out = (balls){0};
+    GBT_TRY(check_def(def, err));
+    GBT_TRY(cloud_check("balls", position, color, count, err));
+
+    gbt_status status = GBT_ERR_NO_MEMORY;
+    const double voxel_size = (double)def->voxel_size;
+    partition p = {.color = color,
+                   .radius_compact = (double)def->radius_factor * voxel_size,
+                   .radius_floor = fmax((double)def->min_scale * voxel_size, 1e-6),
+                   .color_std_max = (double)def->color_std_max,
+                   .min_points = (size_t)def->min_points,
+                   .max_depth = def->max_depth};
+    if ((p.points = mem_alloc(count, sizeof *p.points, "balls.points", err)) == NULL ||
+        (p.keys = mem_alloc(count, sizeof *p.keys, "balls.keys", err)) == NULL ||
+        (p.leaf_depth = mem_calloc(count, sizeof *p.leaf_depth, "balls.leaf_depth", err)) == NULL)
+        goto done;
+    for (size_t i = 0; i < count; i++)
+        p.points[i] = (cloud_point){{position[3 * i], position[3 * i + 1], position[3 * i + 2]}, (uint32_t)i};
+    if (count > 0)
+        grow(&p, count);
+    mem_free(p.keys); /* before the balls are allocated: they take its place */
+    p.keys = NULL;
+
+    size_t ball_count = 0;
+    for (size_t i = 0; i < count; i++)
+        ball_count += p.leaf_depth[i] != 0;
+    if ((status = alloc_balls(out, ball_count, count, err)) != GBT_OK)
+        goto done;
+    size_t ball = 0;
+    for (size_t i = 0; i < count; i++)
+        if (p.leaf_depth[i] != 0)
+            out->first[ball++] = (uint32_t)i;
+    out->first[ball_count] = (uint32_t)count;
+    fill_job job = {&p, out};
+    parallel_blocks(ball_count, BALLS_PER_BLOCK, fill_balls, &job);
+done:
+    mem_free(p.points);
+    mem_free(p.keys);
+    mem_free(p.leaf_depth);
+    if (status != GBT_OK)
+        balls_free(out);
+    return status;
+}
+
+void balls_free(balls *b)
+{
+    if (b == NULL)
+        return;
+    mem_free(b->first);
+    mem_free(b->member);
+    mem_free(b->center);
+    mem_free(b->radius);
+    mem_free(b->covariance);
+    mem_free(b->color);
+    mem_free(b->color_std);
+    mem_free(b->depth);
+    *b = (balls){0};
+}

@@ -1,0 +1,165 @@
+/* gb/voxel.c -- the base spatial scale of a cloud, and Scaffold-GS's voxel centres, the baseline of the balls. */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "bvh/points.h"
+#include "gb/balls.h"
+#include "gb/cloud.h"
+#include "gb/split.h"
+
+enum { POINTS_PER_BLOCK = 1024 };
+
+typedef struct row {
+    float x[3];
+} row;
+
+/* x, then y, then z; -0 and 0 are equal. */
+static int compare_rows(const void *a, const void *b)
+{
+    const float *p = ((const row *)a)->x, *q = ((const row *)b)->x;
+    for (int k = 0; k < 3; k++)
+        if (p[k] != q[k])
+            return p[k] < q[k] ? -1 : 1;
+    return 0;
+}
+
+/* Sorts the rows and keeps one of each; returns how many. */
+static size_t sort_unique(row *rows, size_t count)
+{
+    qsort(rows, count, sizeof *rows, compare_rows);
+    size_t kept = 0;
+    for (size_t i = 0; i < count; i++)
+        if (i == 0 || compare_rows(&rows[i], &rows[kept - 1]) != 0)
+            rows[kept++] = rows[i];
+    return kept;
+}
+
+typedef struct spacing_job {
+    const point_tree *tree;
+    const float *position;
+    voxel_rule rule;
+    double *value; /* one per point of the tree */
+} spacing_job;
+
+static void measure_spacing(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const spacing_job *job = context;
+    for (size_t i = begin; i < end; i++) {
+        uint32_t index[3];
+        double squared[3], sum = 0;
+        const size_t wanted = job->rule == VOXEL_COMPAT_SQUARED ? 3 : 1;
+        const size_t found = point_tree_nearest(job->tree, job->position + 3 * i, wanted, i, index, squared);
+        for (size_t k = 0; k < found; k++)
+            sum += squared[k];
+        /* At least one neighbour: there are 2 points. Fewer than 4 points have fewer than 3 neighbours to average. */
+        job->value[i] = job->rule == VOXEL_COMPAT_SQUARED ? sum / (double)found : sqrt(sum);
+    }
+}
+
+/* Fills value[0 .. count) for count >= 2 points. */
+static gbt_status measure(const float *position, size_t count, voxel_rule rule, double *value, gbt_error *err)
+{
+    spacing_job job = {.position = position, .rule = rule, .value = value};
+    point_tree *tree;
+    GBT_TRY(point_tree_build(position, NULL, count, &tree, err));
+    job.tree = tree;
+    parallel_blocks(count, POINTS_PER_BLOCK, measure_spacing, &job);
+    point_tree_free(tree);
+    return GBT_OK;
+}
+
+/* Lower median: rank (n - 1) / 2. The reference code takes the k-th smallest, k = floor(n / 2) from 1: one rank lower when n is odd. */
+static double median_of(double *values, size_t count, voxel_rule rule)
+{
+    size_t rank = (count - 1) / 2;
+    if (rule == VOXEL_COMPAT_SQUARED)
+        rank = count >= 2 ? count / 2 - 1 : 0;
+    return split_select(values, count, rank);
+}
+
+static size_t keep_positive(double *values, size_t count)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < count; i++)
+        if (values[i] > 0)
+            values[kept++] = values[i];
+    return kept;
+}
+
+gbt_status balls_voxel_size(const float *position, size_t count, voxel_rule rule, float *out, gbt_error *err)
+{
+    *out = 1.0f;
+    GBT_TRY(cloud_check("voxel size", position, NULL, count, err));
+    if (rule != VOXEL_MEDIAN_SPACING && rule != VOXEL_COMPAT_SQUARED)
+        return base_fail(err, GBT_ERR_ARGUMENT, "voxel size: unknown rule %d", (int)rule);
+
+    if (count < 2)
+        return GBT_OK;
+    row *rows = NULL;
+    double *value = mem_alloc(count, sizeof *value, "voxel size.value", err);
+    if (value == NULL)
+        return GBT_ERR_NO_MEMORY;
+    gbt_status status = measure(position, count, rule, value, err);
+    if (status != GBT_OK)
+        goto done;
+    double median = median_of(value, count, rule);
+    if (median <= 0) {
+        const size_t positive = keep_positive(value, count);
+        median = positive > 0 ? median_of(value, positive, rule) : 0;
+    }
+    if (median <= 0) { /* every point has copies enough to be its neighbours: measure between the distinct points */
+        if ((rows = mem_alloc(count, sizeof *rows, "voxel size.rows", err)) == NULL) {
+            status = GBT_ERR_NO_MEMORY;
+            goto done;
+        }
+        memcpy(rows, position, count * sizeof *rows);
+        const size_t distinct = sort_unique(rows, count);
+        if (distinct < 2)
+            goto done;
+        if ((status = measure((const float *)rows, distinct, rule, value, err)) != GBT_OK)
+            goto done;
+        median = median_of(value, distinct, rule);
+    }
+    /* Squares may leave the range of float: the promise is only a positive, finite scale. */
+    *out = (float)fmin(fmax(median, (double)FLT_TRUE_MIN), (double)FLT_MAX);
+done:
+    mem_free(rows);
+    mem_free(value);
+    return status;
+}
+
+gbt_status voxel_centers(const float *position, size_t count, float voxel_size, float **centers, size_t *out_count, gbt_error *err)
+{
+    *centers = NULL;
+    *out_count = 0;
+    if (!(voxel_size > 0.0f) || !isfinite(voxel_size))
+        return base_fail(err, GBT_ERR_ARGUMENT, "voxel centers: bad voxel_size (wanted > 0, got %g)", (double)voxel_size);
+    GBT_TRY(cloud_check("voxel centers", position, NULL, count, err));
+    row *cells = mem_alloc(count, sizeof *cells, "voxel centers.cells", err);
+    if (cells == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            /* Cells stay floats, as in the reference: no integer overflow, and far cells merge as far floats do. */
+            const float cell = rintf(position[3 * i + k] / voxel_size);
+            if (!isfinite(cell * voxel_size)) {
+                mem_free(cells);
+                return base_fail(err, GBT_ERR_ARGUMENT, "voxel centers: point %zu is out of range (got coordinate %g in cells of %g)", i,
+                                 (double)position[3 * i + k], (double)voxel_size);
+            }
+            cells[i].x[k] = cell + 0.0f; /* -0 becomes 0 */
+        }
+    const size_t distinct = sort_unique(cells, count);
+    for (size_t i = 0; i < distinct; i++)
+        for (int k = 0; k < 3; k++)
+            cells[i].x[k] *= voxel_size;
+    *centers = (float *)cells;
+    *out_count = distinct;
+    return GBT_OK;
+}

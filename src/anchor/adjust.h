@@ -13,22 +13,26 @@ typedef struct adjust_stats {
     float *grad_accum;     /* [count][K] sum of screen-space gradient norms */
     float *grad_count;     /* [count][K] views in which the Gaussian was geometrically visible */
 } adjust_stats;
-gbt_status adjust_stats_resize(adjust_stats *s, size_t count, int offset_count, gbt_error *err); /* keeps rows, new rows are zero */
+
+/** Keeps the first min(old, new) rows; new rows are zero. offset_count is fixed while there are rows. On failure nothing changes. */
+gbt_status adjust_stats_resize(adjust_stats *s, size_t count, int offset_count, gbt_error *err);
 void adjust_stats_free(adjust_stats *s);
 
 typedef struct adjust_def {
-    float voxel_size;          /* v: cells are v * init_factor / hierarchy^level */
-    int level_count;           /* default 3 */
+    float voxel_size;          /* v: cells are v * init_factor / hierarchy^level (an integer division in compat mode: 4 / 16 is 0) */
+    int level_count;           /* [0, 8], default 3 */
     int init_factor;           /* default 16 */
     int hierarchy_factor;      /* default 4 */
     float grad_threshold;      /* tau, default 2e-4; level j uses tau * (hierarchy/2)^j */
     float min_opacity;         /* default 0.005 */
     float interval;            /* I: steps between adjusts, default 100 */
-    float success_threshold;   /* default 0.8: a Gaussian counts when grad_count > interval * success * 0.5; an anchor is judged when visit_count > interval * success */
+    float success_threshold;   /* default 0.8: a Gaussian counts when grad_count > interval * success * 0.5; an anchor is judged when
+                                  visit_count > interval * success. What was judged starts again from 0 */
     float shape_log_max;       /* scale_log[3..5] are clamped to this at every adjust: 0.05 in compat mode, infinity else */
-    size_t max_anchors;        /* hard cap; when it bites, the cells with the largest gradient win, ties by cell. Default SIZE_MAX */
-    bool compat;               /* every quirk of the reference: a coarse level that adds nothing gates the finer ones; random candidate drop always on */
-    uint64_t seed;             /* of the random candidate drop */
+    size_t max_anchors;        /* hard cap on the rows after the adjust; pruning makes room first, the cap prunes nothing. When it bites,
+                                  the cells with the largest gradient of all levels win, ties by level, then cell. Default SIZE_MAX */
+    bool compat;               /* every quirk of the reference: a coarse level that adds nothing gates the finer ones; integer cells */
+    uint64_t seed;             /* of the random candidate drop (in both modes): level j keeps 1 - 0.5^(j+1) of the candidates */
     uint64_t step;
     bool grow, prune;          /* both true by default */
 } adjust_def;
@@ -45,7 +49,12 @@ typedef struct adjust_result {
  * Grow, then prune, as Scaffold-GS does; anchors and statistics are changed in place.
  *
  * New anchor: position = cell centre, log-scales log(cell), offsets 0, feature = elementwise maximum over the parents of the cell's
- * candidates. Cells use 64-bit keys; a level whose cell is not > 0 is skipped. Never prunes the last anchor.
+ * candidates. Cells use 64-bit keys; a level whose cell is not > 0 is skipped. Never prunes the last anchor (the most opaque stays).
+ * Survivors keep their order; new anchors follow by level, then cell (x, y, z).
+ *
+ * @param stats [in, out] rows must match `a`
+ * @param out   [out] zeroed on failure
+ * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_NO_MEMORY: then anchors and statistics are as they were
  * Deterministic. Cost: O(N K) and one hash set per level.
  */
 gbt_status anchors_adjust(anchors *a, adjust_stats *stats, const adjust_def *def, adjust_result *out, gbt_error *err);

@@ -21,17 +21,19 @@ typedef struct anchors {
     float *scale_log;  /* [count][6]: 0..2 scale the offsets, 3..5 bound the Gaussians' std-devs */
 } anchors;
 
-gbt_status anchors_resize(anchors *a, size_t count, gbt_error *err); /* keeps the first min(old, new) rows; new rows are zero; offset_count must be set first */
+/** Keeps the first min(old, new) rows; new rows are zero; offset_count must be set first. On failure nothing changes. */
+gbt_status anchors_resize(anchors *a, size_t count, gbt_error *err);
 void anchors_free(anchors *a);
 
 /* ---- networks ---------------------------------------------------------------------------------------------------------------- */
 
-/** Inputs: feature(32), unit direction camera -> anchor (3), distance if has_distance (1). Hidden 32, ReLU. Heads: opacity K tanh, shape 7K, colour 3K sigmoid. */
+/** Inputs: feature(32), unit direction camera -> anchor (3), distance if has_distance (1). Hidden 32, ReLU. Heads: opacity K tanh,
+    shape 7K, colour 3K sigmoid. */
 typedef struct decoder {
     int offset_count;
     bool has_distance;
-    float distance_scale; /* the distance input is |x - c| * distance_scale; 1 / median training distance, so that it is near 1. 1 in compat mode */
-    float distance_min, distance_max; /* trained range (scaled): the input is clamped to [min / 2, 2 max] */
+    float distance_scale; /* the distance input is |x - c| * distance_scale: 1 / median training distance; 1 in compat mode */
+    float distance_min, distance_max; /* trained range (scaled): the input is cut to [min / 2, 2 max]. decoder_init() gives 0, infinity */
     size_t param_count;   /* all weights and biases, one flat array */
     float *params;        /* owned; layout: for opacity, shape, colour: W1 [32][in], b1 [32], W2 [out][32], b2 [out] */
 } decoder;

@@ -9,10 +9,17 @@
 typedef struct decode_tape {
     size_t visible_count, capacity;
     const uint32_t *visible;  /* borrowed from decode_forward() until decode_backward() returns */
-    float *input;             /* internal: activations kept for the adjoint */
+    float *input;             /* internal, kept for the adjoint: network inputs, hidden layers, opacities (one row per visible anchor) */
     float *hidden;
-    float *output;
-    size_t block_count, block_capacity;
+    float *alpha;
+    float *output;            /* internal: activations of the kept Gaussians, one array per field of `output_stride` floats */
+    size_t output_stride;
+    size_t kept_count;
+    size_t *first;            /* internal: first kept Gaussian of each chunk of rows */
+    size_t first_capacity;
+    float *weights;           /* internal: the networks as the kernels read them */
+    size_t weight_capacity;
+    size_t block_capacity;    /* floats */
     float *block_grad;        /* internal: one decoder gradient per block, summed in block order */
     uint32_t *slot;           /* [gaussian count]: visible row * K + offset, ascending: which slot each Gaussian came from */
     size_t slot_capacity;
@@ -22,10 +29,14 @@ typedef struct decode_tape {
 /**
  * Decode the visible anchors for one camera centre.
  *
- * Gaussian k of anchor i is kept iff its alpha > `opacity_min` (0 = the reference's rule); kept ones are packed in (visible row, offset) order.
+ * Input of the networks: feature, unit direction from the camera to the anchor ((0, 0, 1) for a camera on the anchor), distance if the
+ * decoder has it. Gaussian k of anchor i: opacity = alpha = tanh(.), mean = x + offset exp(l[0..2]), scale = exp(l[3..5]) sigmoid(c[0..2]),
+ * quaternion = c[3..6] normalised, colour = sigmoid(.). Log-scales and logits are cut to [-30, 30], where their gradient ends too.
+ * It is kept iff its alpha > `opacity_min` (0 = the reference's rule); kept ones are packed in (visible row, offset) order.
  *
  * @param visible [in] [visible_count] anchor indices, ascending; borrowed until decode_backward()
  * @param out     [out] resized and padded; out->count kept Gaussians; all finite for finite parameters
+ * @return GBT_OK, GBT_ERR_ARGUMENT (K of anchors and decoder differ, `visible` not ascending or out of range), GBT_ERR_NO_MEMORY
  * Threads: same bits for every thread count. Cost: 6880 multiply-adds per visible anchor (K = 10).
  */
 gbt_status decode_forward(const anchors *a, const decoder *d, const float camera_center[3], const uint32_t *visible, size_t visible_count,
@@ -37,9 +48,10 @@ gbt_status decode_forward(const anchors *a, const decoder *d, const float camera
  * @param d_gaussians [in]  gradients in the order of the forward's `out`; quat_* is dL/d(unit quaternion), any component along q is ignored
  * @param d_anchors   [out] same shape as `a` (position unused); added to, rows of `visible` only
  * @param d_params    [out] [d->param_count], added to
+ * @return GBT_OK, GBT_ERR_ARGUMENT (shapes differ from the forward's), GBT_ERR_NO_MEMORY: then nothing was added
  * Threads: same bits for every thread count (per-block sums in block order).
  */
-gbt_status decode_backward(const anchors *a, const decoder *d, const decode_tape *tape, const gaussians *d_gaussians, anchors *d_anchors,
+gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape, const gaussians *d_gaussians, anchors *d_anchors,
                            float *d_params, gbt_error *err);
 
 void decode_tape_free(decode_tape *tape);

@@ -22,10 +22,17 @@ anchor_init_def anchor_init_def_default(void);
 /**
  * Make anchors: offsets and features 0, log-scales from the scale rule.
  *
- * ANCHOR_SCALE_NN: root mean square distance to the 3 nearest anchors, floor sqrt(1e-7). ANCHOR_SCALE_GB: eqs 29-34 with the nearest
- * distinct anchor. Fewer than 4 anchors, coincident anchors and a lone anchor have defined results (docs/balls.md).
+ * ANCHOR_SCALE_NN: root mean square distance to the 3 nearest anchors (or as many as there are), floor sqrt(1e-7); a lone anchor takes
+ * the voxel size. ANCHOR_SCALE_GB: eqs 29-34 with the nearest anchor, floor max(gamma v, 1e-6); an anchor that is alone or coincides with
+ * another takes its ball's radius for the spacing. scale_max wins over both floors. No points give no anchors.
  *
+ * @param position  [in] [count][3], finite
+ * @param color     [in] [count][3] in [0, 1], or NULL
+ * @param out       [out] new anchors, free with anchors_free(); zeroed on failure
  * @param out_balls [out] optional (NULL): the balls behind the anchors, free with balls_free(); zeroed for voxels
+ * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, non-finite point), GBT_ERR_NO_MEMORY
+ *
+ * Threads: same bits for every thread count. Cost: the partition, one tree over the anchors and one query each.
  */
 gbt_status anchors_init(const float *position, const float *color, size_t count, const anchor_init_def *def, anchors *out, balls *out_balls,
                         gbt_error *err);

@@ -1,0 +1,112 @@
+/* anchor/anchors.c -- memory of anchors and decoders, and how a decoder starts. */
+#include "anchor/anchors.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/rng.h"
+
+enum { SCALES = 6 };
+
+gbt_status anchors_resize(anchors *a, size_t count, gbt_error *err)
+{
+    if (a->offset_count < 1 || a->offset_count > ANCHOR_MAX_OFFSETS)
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: offset_count %d (wanted 1 to %d)", a->offset_count, ANCHOR_MAX_OFFSETS);
+    const size_t widths[4] = {3, ANCHOR_FEATURE_DIM, (size_t)a->offset_count * 3, SCALES};
+    float **const fields[4] = {&a->position, &a->feature, &a->offset, &a->scale_log};
+    const size_t kept = count < a->count ? count : a->count;
+    if (count > a->capacity || a->position == NULL) {
+        size_t capacity = a->capacity + a->capacity / 2;
+        if (capacity < count)
+            capacity = count;
+        float *bigger[4] = {NULL};
+        for (int f = 0; f < 4; f++) {
+            bigger[f] = mem_alloc(capacity, widths[f] * sizeof(float), "anchors", err);
+            if (bigger[f] == NULL) {
+                while (f-- > 0)
+                    mem_free(bigger[f]);
+                return GBT_ERR_NO_MEMORY;
+            }
+        }
+        for (int f = 0; f < 4; f++) {
+            if (kept > 0)
+                memcpy(bigger[f], *fields[f], kept * widths[f] * sizeof(float));
+            mem_free(*fields[f]);
+            *fields[f] = bigger[f];
+        }
+        a->capacity = capacity;
+    }
+    for (int f = 0; f < 4; f++)
+        memset(*fields[f] + kept * widths[f], 0, (count - kept) * widths[f] * sizeof(float));
+    a->count = count;
+    return GBT_OK;
+}
+
+void anchors_free(anchors *a)
+{
+    mem_free(a->position);
+    mem_free(a->feature);
+    mem_free(a->offset);
+    mem_free(a->scale_log);
+    memset(a, 0, sizeof *a);
+}
+
+/* ---- networks ---------------------------------------------------------------------------------------------------------------- */
+
+static const int outputs_per_offset[3] = {1, 7, 3};
+
+static size_t part_size(int part, size_t offset_count, size_t input_count)
+{
+    const size_t out = offset_count * (size_t)outputs_per_offset[part];
+    return ANCHOR_HIDDEN_DIM * (input_count + 1) + out * (ANCHOR_HIDDEN_DIM + 1);
+}
+
+static size_t input_dim(bool has_distance)
+{
+    return ANCHOR_FEATURE_DIM + 3 + (has_distance ? 1 : 0);
+}
+
+gbt_status decoder_init(decoder *d, int offset_count, bool has_distance, uint64_t seed, gbt_error *err)
+{
+    memset(d, 0, sizeof *d);
+    if (offset_count < 1 || offset_count > ANCHOR_MAX_OFFSETS)
+        return base_fail(err, GBT_ERR_ARGUMENT, "decoder: offset_count %d (wanted 1 to %d)", offset_count, ANCHOR_MAX_OFFSETS);
+    const size_t in = input_dim(has_distance);
+    size_t param_count = 0;
+    for (int part = 0; part < 3; part++)
+        param_count += part_size(part, (size_t)offset_count, in);
+    float *params = mem_alloc(param_count, sizeof *params, "decoder", err);
+    if (params == NULL)
+        return GBT_ERR_NO_MEMORY;
+    *d = (decoder){.offset_count = offset_count, .has_distance = has_distance, .distance_scale = 1.0f, .distance_min = 0.0f,
+                   .distance_max = INFINITY, .param_count = param_count, .params = params};
+    decoder_part parts[3];
+    decoder_parts(d, parts);
+    for (int part = 0; part < 3; part++) {
+        const size_t first_layer = ANCHOR_HIDDEN_DIM * (in + 1);
+        for (size_t i = 0; i < parts[part].end - parts[part].begin; i++) {
+            const double bound = 1.0 / sqrt(i < first_layer ? (double)in : (double)ANCHOR_HIDDEN_DIM);
+            const double u = (double)rng_uniform(seed, (uint64_t)part, i);
+            params[parts[part].begin + i] = (float)((2.0 * u - 1.0) * bound);
+        }
+    }
+    return GBT_OK;
+}
+
+void decoder_free(decoder *d)
+{
+    mem_free(d->params);
+    memset(d, 0, sizeof *d);
+}
+
+void decoder_parts(const decoder *d, decoder_part parts[3])
+{
+    size_t begin = 0;
+    for (int part = 0; part < 3; part++) {
+        parts[part].begin = begin;
+        begin += part_size(part, (size_t)d->offset_count, input_dim(d->has_distance));
+        parts[part].end = begin;
+    }
+}

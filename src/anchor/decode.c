@@ -1,0 +1,278 @@
+/* anchor/decode.c -- anchors + camera centre -> Gaussians.
+
+   visible rows --> input --> hidden --> opacity --count per chunk--> prefix sum --> shape, colour of the kept --> packed arrays
+                            (kept for the adjoint)
+
+   Two passes over the same chunks: the first decides which Gaussians exist, the second computes the rest of those straight into place. */
+#include "anchor/decode.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "anchor/activations.h"
+#include "anchor/decode_layout.h"
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+
+typedef struct forward_job {
+    const anchors *a;
+    const decoder *d;
+    const dense_kernels *kernels;
+    decode_layout layout;
+    decode_weights weights;
+    double camera[3];
+    float opacity_min;
+    gaussians *out;
+    decode_tape *tape;
+} forward_job;
+
+static size_t min_size(size_t a, size_t b)
+{
+    return a < b ? a : b;
+}
+
+static size_t round_up(size_t count, size_t multiple)
+{
+    return (count + multiple - 1) / multiple * multiple;
+}
+
+/* In double: exact differences for any finite input, no overflow of the squares, the same bits on every machine. */
+static void view_inputs(const forward_job *job, const float *position, float out[4])
+{
+    double offset[3], square = 0;
+    for (int c = 0; c < 3; c++) {
+        offset[c] = (double)position[c] - job->camera[c];
+        square += offset[c] * offset[c];
+    }
+    const double distance = sqrt(square);
+    if (distance > 0 && distance < HUGE_VAL) {
+        for (int c = 0; c < 3; c++)
+            out[c] = (float)(offset[c] / distance);
+    } else {
+        out[0] = 0.0f, out[1] = 0.0f, out[2] = 1.0f;
+    }
+    out[3] = 0.0f;
+    if (job->d->has_distance) {
+        const double low = 0.5 * (double)job->d->distance_min, high = fmin(2.0 * (double)job->d->distance_max, 1e18);
+        out[3] = (float)fmin(fmax(distance * (double)job->d->distance_scale, low), high);
+    }
+}
+
+static void decide_rows(const forward_job *job, size_t begin, size_t end)
+{
+    decode_tape *tape = job->tape;
+    const size_t rows = end - begin, tiled = round_up(rows, DECODE_TILE), offsets = job->layout.offset_count;
+    float *input = tape->input + begin * INPUT_STRIDE, *hidden = tape->hidden + begin * HIDDEN_STRIDE;
+    float *alpha = tape->alpha + begin * ALPHA_STRIDE;
+    memset(input, 0, tiled * INPUT_STRIDE * sizeof *input);
+    for (size_t r = 0; r < rows; r++) {
+        const size_t anchor = tape->visible[begin + r];
+        float *row = input + r * INPUT_STRIDE;
+        memcpy(row, job->a->feature + anchor * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof *row);
+        view_inputs(job, job->a->position + anchor * 3, row + ANCHOR_FEATURE_DIM);
+        row[INPUT_ONE] = 1.0f;
+    }
+    job->kernels->product(&(dense_product){.m = tiled, .n = HIDDEN_STRIDE, .k = INPUT_COUNT, .a = input, .a_row = INPUT_STRIDE, .a_step = 1,
+                                           .b = job->weights.input_hidden, .b_row = HIDDEN_STRIDE, .bias = job->weights.hidden_bias,
+                                           .relu = true, .c = hidden, .c_row = HIDDEN_STRIDE});
+    job->kernels->product(&(dense_product){.m = tiled, .n = ALPHA_STRIDE, .k = ANCHOR_HIDDEN_DIM, .a = hidden, .a_row = HIDDEN_STRIDE,
+                                           .a_step = 1, .b = job->weights.hidden_out[0], .b_row = ALPHA_STRIDE,
+                                           .bias = job->weights.out_bias[0], .c = alpha, .c_row = ALPHA_STRIDE});
+    job->kernels->tanh(alpha, rows * ALPHA_STRIDE);
+    size_t kept = 0;
+    for (size_t r = 0; r < rows; r++) {
+        float sum = 0.0f;
+        for (size_t k = 0; k < offsets; k++) {
+            const float value = alpha[r * ALPHA_STRIDE + k];
+            sum += value > 0.0f ? value : 0.0f;
+            kept += value > job->opacity_min;
+        }
+        tape->opacity_sum[begin + r] = sum;
+    }
+    tape->first[begin / DECODE_CHUNK] = kept;
+}
+
+static void decide_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    for (size_t row = begin; row < end; row += DECODE_CHUNK)
+        decide_rows(context, row, min_size(row + DECODE_CHUNK, end));
+}
+
+/* Logits of the kept Gaussians into their places in the tape, and what needs no activation into `out`. */
+static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, const float *shape, const float *color, const float *extent,
+                          uint16_t *row_of)
+{
+    decode_tape *tape = job->tape;
+    gaussians *out = job->out;
+    const size_t offsets = job->layout.offset_count, first = tape->first[begin / DECODE_CHUNK], stride = tape->output_stride;
+    const size_t shape_stride = job->layout.out_stride[1], color_stride = job->layout.out_stride[2];
+    float *kept = tape->output;
+    size_t g = first;
+    for (size_t r = 0; r < rows; r++) {
+        const size_t anchor = tape->visible[begin + r];
+        const float *alpha = tape->alpha + (begin + r) * ALPHA_STRIDE, *e = extent + r * 6;
+        const float *x = job->a->position + anchor * 3, *offset = job->a->offset + anchor * offsets * 3;
+        for (size_t k = 0; k < offsets; k++) {
+            if (!(alpha[k] > job->opacity_min))
+                continue;
+            const float *s = shape + r * shape_stride + k * SHAPE_OUTPUTS, *c = color + r * color_stride + k * COLOR_OUTPUTS;
+            kept[KEPT_ALPHA * stride + g] = alpha[k];
+            for (int i = 0; i < SHAPE_OUTPUTS; i++) /* KEPT_QUAT follows KEPT_SIGMOID as the network's outputs do */
+                kept[(size_t)(KEPT_SIGMOID + i) * stride + g] = s[i];
+            for (int i = 0; i < COLOR_OUTPUTS; i++)
+                kept[(size_t)(KEPT_COLOR + i) * stride + g] = c[i];
+            out->opacity[g] = alpha[k];
+            out->mean_x[g] = activation_clamp(x[0] + offset[k * 3 + 0] * e[0], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
+            out->mean_y[g] = activation_clamp(x[1] + offset[k * 3 + 1] * e[1], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
+            out->mean_z[g] = activation_clamp(x[2] + offset[k * 3 + 2] * e[2], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
+            tape->slot[g] = (uint32_t)((begin + r) * offsets + k);
+            row_of[g - first] = (uint16_t)r;
+            g++;
+        }
+    }
+    return g - first;
+}
+
+static void emit_rows(const forward_job *job, size_t begin, size_t end)
+{
+    decode_tape *tape = job->tape;
+    const size_t rows = end - begin, tiled = round_up(rows, DECODE_TILE);
+    _Alignas(64) float shape[DECODE_CHUNK * SHAPE_STRIDE_MAX], color[DECODE_CHUNK * COLOR_STRIDE_MAX], extent[DECODE_CHUNK * 6];
+    uint16_t row_of[CHUNK_SLOTS];
+    float *const logits[2] = {shape, color};
+    for (int head = 1; head <= 2; head++) {
+        const size_t stride = job->layout.out_stride[head];
+        job->kernels->product(&(dense_product){.m = tiled, .n = stride, .k = ANCHOR_HIDDEN_DIM,
+                                               .a = tape->hidden + begin * HIDDEN_STRIDE + head * ANCHOR_HIDDEN_DIM, .a_row = HIDDEN_STRIDE,
+                                               .a_step = 1, .b = job->weights.hidden_out[head], .b_row = stride,
+                                               .bias = job->weights.out_bias[head], .c = logits[head - 1], .c_row = stride});
+    }
+    for (size_t r = 0; r < rows; r++)
+        memcpy(extent + r * 6, job->a->scale_log + (size_t)tape->visible[begin + r] * 6, 6 * sizeof *extent);
+    job->kernels->exp(extent, rows * 6);
+
+    const size_t n = gather_kept(job, begin, rows, shape, color, extent, row_of);
+    const size_t first = tape->first[begin / DECODE_CHUNK], stride = tape->output_stride;
+    float *kept = tape->output + first;
+    for (int i = 0; i < 3; i++) {
+        job->kernels->sigmoid(kept + (size_t)(KEPT_SIGMOID + i) * stride, n);
+        job->kernels->sigmoid(kept + (size_t)(KEPT_COLOR + i) * stride, n);
+    }
+    job->kernels->normalize(kept + (KEPT_QUAT + 0) * stride, kept + (KEPT_QUAT + 1) * stride, kept + (KEPT_QUAT + 2) * stride,
+                            kept + (KEPT_QUAT + 3) * stride, kept + KEPT_INVERSE_LENGTH * stride, n);
+
+    gaussians *out = job->out;
+    float *const scale[3] = {out->scale_x + first, out->scale_y + first, out->scale_z + first};
+    for (size_t i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++)
+            scale[c][i] = extent[row_of[i] * 6 + 3 + c] * kept[(size_t)(KEPT_SIGMOID + c) * stride + i];
+    float *const copied[7] = {out->quat_w, out->quat_x, out->quat_y, out->quat_z, out->red, out->green, out->blue};
+    const int field[7] = {KEPT_QUAT, KEPT_QUAT + 1, KEPT_QUAT + 2, KEPT_QUAT + 3, KEPT_COLOR, KEPT_COLOR + 1, KEPT_COLOR + 2};
+    for (int i = 0; i < 7; i++)
+        memcpy(copied[i] + first, kept + (size_t)field[i] * stride, n * sizeof(float));
+}
+
+static void emit_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    for (size_t row = begin; row < end; row += DECODE_CHUNK)
+        emit_rows(context, row, min_size(row + DECODE_CHUNK, end));
+}
+
+static gbt_status reserve_rows(decode_tape *tape, size_t visible_count, gbt_error *err)
+{
+    const size_t rows = round_up(visible_count, DECODE_TILE);
+    void *first = tape->first;
+    gbt_status status = mem_reserve(&first, &tape->first_capacity, 0, parallel_block_count(visible_count, DECODE_CHUNK) + 1,
+                                    sizeof(size_t), "decode tape", err);
+    if (status != GBT_OK)
+        return status;
+    tape->first = first;
+    if (rows <= tape->capacity && tape->input != NULL)
+        return GBT_OK;
+    const size_t capacity = round_up(rows + rows / 4, DECODE_TILE), width = INPUT_STRIDE + HIDDEN_STRIDE + ALPHA_STRIDE + 1;
+    float *block = mem_alloc(capacity, width * sizeof *block, "decode tape", err); /* one owner (input), four arrays */
+    if (block == NULL)
+        return GBT_ERR_NO_MEMORY;
+    mem_free(tape->input);
+    tape->capacity = capacity;
+    tape->input = block;
+    tape->hidden = tape->input + capacity * INPUT_STRIDE;
+    tape->alpha = tape->hidden + capacity * HIDDEN_STRIDE;
+    tape->opacity_sum = tape->alpha + capacity * ALPHA_STRIDE;
+    return GBT_OK;
+}
+
+static gbt_status reserve_kept(decode_tape *tape, size_t count, gbt_error *err)
+{
+    if (count <= tape->slot_capacity && tape->slot != NULL)
+        return GBT_OK;
+    const size_t capacity = round_up(count + count / 4 + 1, DENSE_COLUMNS);
+    uint32_t *slot = mem_alloc(capacity, sizeof *slot, "decode slots", err);
+    float *output = mem_alloc(capacity, KEPT_FIELDS * sizeof *output, "decode tape", err);
+    if (slot == NULL || output == NULL) {
+        mem_free(slot);
+        mem_free(output);
+        return GBT_ERR_NO_MEMORY;
+    }
+    mem_free(tape->slot);
+    mem_free(tape->output);
+    tape->slot = slot, tape->output = output;
+    tape->slot_capacity = tape->output_stride = capacity;
+    return GBT_OK;
+}
+
+static gbt_status check_arguments(const anchors *a, const decoder *d, const uint32_t *visible, size_t visible_count, gbt_error *err)
+{
+    if (d->offset_count < 1 || d->offset_count > ANCHOR_MAX_OFFSETS || a->offset_count != d->offset_count)
+        return base_fail(err, GBT_ERR_ARGUMENT, "decode: anchors have %d offsets, the decoder %d (wanted equal, 1 to %d)", a->offset_count,
+                         d->offset_count, ANCHOR_MAX_OFFSETS);
+    if (visible_count > UINT32_MAX / ANCHOR_MAX_OFFSETS)
+        return base_fail(err, GBT_ERR_ARGUMENT, "decode: %zu visible anchors (wanted at most %u)", visible_count,
+                         (unsigned)(UINT32_MAX / ANCHOR_MAX_OFFSETS));
+    for (size_t i = 0; i < visible_count; i++)
+        if (visible[i] >= a->count || (i > 0 && visible[i] <= visible[i - 1]))
+            return base_fail(err, GBT_ERR_ARGUMENT, "decode: visible[%zu] is %u (wanted ascending, below %zu)", i, visible[i], a->count);
+    return GBT_OK;
+}
+
+gbt_status decode_forward(const anchors *a, const decoder *d, const float camera_center[3], const uint32_t *visible, size_t visible_count,
+                          float opacity_min, gaussians *out, decode_tape *tape, gbt_error *err)
+{
+    tape->visible_count = 0, tape->kept_count = 0;
+    GBT_TRY(check_arguments(a, d, visible, visible_count, err));
+    forward_job job = {.a = a, .d = d, .kernels = dense_best(), .layout = decode_layout_of(d), .opacity_min = opacity_min, .out = out,
+                       .tape = tape, .camera = {(double)camera_center[0], (double)camera_center[1], (double)camera_center[2]}};
+    GBT_TRY(decode_pack_weights(d, &job.layout, tape, &job.weights, err));
+    GBT_TRY(reserve_rows(tape, visible_count, err));
+    tape->visible = visible;
+    parallel_blocks(visible_count, DECODE_GRAIN, decide_block, &job);
+
+    const size_t chunks = parallel_block_count(visible_count, DECODE_CHUNK);
+    size_t kept = 0;
+    for (size_t i = 0; i < chunks; i++) {
+        const size_t here = tape->first[i];
+        tape->first[i] = kept;
+        kept += here;
+    }
+    tape->first[chunks] = kept;
+    GBT_TRY(reserve_kept(tape, kept, err));
+    GBT_TRY(gaussians_resize(out, kept, err));
+    parallel_blocks(visible_count, DECODE_GRAIN, emit_block, &job);
+    gaussians_pad(out);
+    tape->visible_count = visible_count, tape->kept_count = kept;
+    return GBT_OK;
+}
+
+void decode_tape_free(decode_tape *tape)
+{
+    mem_free(tape->input);
+    mem_free(tape->output);
+    mem_free(tape->first);
+    mem_free(tape->weights);
+    mem_free(tape->block_grad);
+    mem_free(tape->slot);
+    memset(tape, 0, sizeof *tape);
+}

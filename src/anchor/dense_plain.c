@@ -1,0 +1,30 @@
+/* anchor/dense_plain.c -- the decoder's arithmetic in plain C: the definition, and the choice between the implementations. */
+#include "anchor/dense_elementwise.inc.h"
+#include "base/cpu.h"
+
+static void dense_multiply(const dense_product *job)
+{
+    for (size_t i = 0; i < job->m; i++) {
+        for (size_t j = 0; j < job->n; j++) {
+            float *c = &job->c[i * job->c_row + j];
+            float sum = job->bias != NULL ? job->bias[j] : *c;
+            for (size_t t = 0; t < job->k; t++)
+                sum = fmaf(job->a[i * job->a_row + t * job->a_step], job->b[t * job->b_row + j], sum);
+            *c = !job->relu || sum > 0.0f ? sum : 0.0f;
+        }
+    }
+}
+
+const dense_kernels dense_kernels_plain = {dense_multiply, dense_exp, dense_tanh, dense_sigmoid, dense_normalize};
+
+const dense_kernels *dense_best(void)
+{
+#if defined(__x86_64__)
+    const cpu_isa isa = cpu_best_isa();
+    if (isa == CPU_AVX512)
+        return &dense_kernels_avx512;
+    if (isa == CPU_AVX2)
+        return &dense_kernels_avx2;
+#endif
+    return &dense_kernels_plain;
+}

@@ -1,0 +1,147 @@
+/* anchor/init.c -- anchors from balls or voxels, and their first scale.
+
+   points --> balls (GBAI, eq 28) or voxels (eq 12) --> centres --> spacing of centres (+ ball radius: GBSP, eqs 29-34) --> log-scales */
+#include "anchor/init.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "bvh/points.h"
+
+anchor_init_def anchor_init_def_default(void)
+{
+    return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .balls = balls_def_default(), .offset_count = 10,
+                             .fusion = 0.5f, .clip_min = 0.25f, .clip_max = 4.0f, .scale_max = INFINITY};
+}
+
+static gbt_status check_def(const anchor_init_def *def, gbt_error *err)
+{
+    if (def->offset_count < 1 || def->offset_count > ANCHOR_MAX_OFFSETS)
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: offset_count %d (wanted 1 to %d)", def->offset_count, ANCHOR_MAX_OFFSETS);
+    if (!(def->balls.voxel_size > 0.0f && def->balls.voxel_size < HUGE_VALF))
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: voxel_size %g (wanted > 0)", (double)def->balls.voxel_size);
+    if (!(def->fusion >= 0.0f && def->fusion <= 1.0f))
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: fusion %g (wanted 0 to 1)", (double)def->fusion);
+    if (!(def->clip_min >= 0.0f && def->clip_min <= def->clip_max))
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: clip %g to %g (wanted 0 <= min <= max)", (double)def->clip_min,
+                         (double)def->clip_max);
+    if (!(def->scale_max > 0.0f))
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: scale_max %g (wanted > 0)", (double)def->scale_max);
+    return GBT_OK;
+}
+
+/* All six log-scales of an anchor. The cap wins over the floor. */
+static void set_scale(anchors *a, size_t i, double scale, double floor_scale, double scale_max)
+{
+    const float value = (float)log(fmin(fmax(scale, floor_scale), scale_max));
+    for (size_t c = 0; c < 6; c++)
+        a->scale_log[i * 6 + c] = value;
+}
+
+/* The baseline: RMS distance to the 3 nearest anchors. A lone anchor has no spacing and takes the voxel size. */
+static gbt_status scale_from_spacing(anchors *a, const anchor_init_def *def, gbt_error *err)
+{
+    point_tree *tree = NULL;
+    GBT_TRY(point_tree_build(a->position, NULL, a->count, &tree, err));
+    gbt_status status = GBT_ERR_NO_MEMORY;
+    float *spacing = mem_alloc(a->count, sizeof *spacing, "anchors", err);
+    if (spacing == NULL)
+        goto done;
+    status = point_tree_spacing(tree, 3, spacing, err);
+    if (status != GBT_OK)
+        goto done;
+    for (size_t i = 0; i < a->count; i++)
+        set_scale(a, i, (double)(a->count > 1 ? spacing[i] : def->balls.voxel_size), sqrt(1e-7), (double)def->scale_max);
+done:
+    mem_free(spacing);
+    point_tree_free(tree);
+    return status;
+}
+
+/* ---- GBSP -------------------------------------------------------------------------------------------------------------------- */
+
+typedef struct prior_job {
+    anchors *a;
+    const anchor_init_def *def;
+    const float *radius;
+    const point_tree *tree; /* over the centres */
+    double floor_scale;
+} prior_job;
+
+static void prior_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const prior_job *job = context;
+    const anchor_init_def *def = job->def;
+    for (size_t i = begin; i < end; i++) {
+        const double radius = (double)job->radius[i];
+        uint32_t index;
+        double square;
+        const bool spaced = point_tree_nearest(job->tree, job->a->position + i * 3, 1, i, &index, &square) == 1 && square > 0;
+        const double near = spaced ? sqrt(square) : radius; /* lone or coincident: the radius is all that is known */
+        const double clipped = fmin(fmax(radius, (double)def->clip_min * near), (double)def->clip_max * near);
+        set_scale(job->a, i, (double)def->fusion * near + (1.0 - (double)def->fusion) * clipped, job->floor_scale, (double)def->scale_max);
+    }
+}
+
+static gbt_status scale_from_balls(anchors *a, const float *radius, const anchor_init_def *def, gbt_error *err)
+{
+    point_tree *tree = NULL;
+    GBT_TRY(point_tree_build(a->position, NULL, a->count, &tree, err));
+    /* eps of eq 34 is s_min of eq 21: no scale is finer than the finest ball. */
+    prior_job job = {.a = a, .def = def, .radius = radius, .tree = tree,
+                     .floor_scale = fmax((double)def->balls.min_scale * (double)def->balls.voxel_size, 1e-6)};
+    parallel_blocks(a->count, 1024, prior_block, &job);
+    point_tree_free(tree);
+    return GBT_OK;
+}
+
+/* ---- entry ------------------------------------------------------------------------------------------------------------------- */
+
+static gbt_status place(anchors *a, const float *center, size_t count, gbt_error *err)
+{
+    GBT_TRY(anchors_resize(a, count, err));
+    memcpy(a->position, center, count * 3 * sizeof *center);
+    return GBT_OK;
+}
+
+gbt_status anchors_init(const float *position, const float *color, size_t count, const anchor_init_def *def, anchors *out, balls *out_balls,
+                        gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    if (out_balls != NULL)
+        memset(out_balls, 0, sizeof *out_balls);
+    GBT_TRY(check_def(def, err));
+    anchors a = {.offset_count = def->offset_count};
+    balls found = {0};
+    float *centers = NULL;
+    gbt_status status;
+    if (def->kind == ANCHOR_INIT_GB) {
+        status = balls_build(position, color, count, &def->balls, &found, err);
+        if (status == GBT_OK)
+            status = place(&a, found.center, found.count, err);
+    } else {
+        size_t center_count = 0;
+        status = voxel_centers(position, count, def->balls.voxel_size, &centers, &center_count, err);
+        if (status == GBT_OK)
+            status = place(&a, centers, center_count, err);
+    }
+    if (status == GBT_OK && a.count > 0)
+        status = def->kind == ANCHOR_INIT_GB && def->scale == ANCHOR_SCALE_GB ? scale_from_balls(&a, found.radius, def, err)
+                                                                              : scale_from_spacing(&a, def, err);
+    mem_free(centers);
+    if (status != GBT_OK) {
+        anchors_free(&a);
+        balls_free(&found);
+        return status;
+    }
+    *out = a;
+    if (out_balls != NULL)
+        *out_balls = found;
+    else
+        balls_free(&found);
+    return GBT_OK;
+}

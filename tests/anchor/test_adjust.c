@@ -1,0 +1,660 @@
+/* tests/anchor/test_adjust.c -- growing and pruning: the published oracles, every boundary, and a brute-force version of the whole. */
+#include "fixture.h"
+
+#include "anchor/activations.h"
+#include "anchor/adjust.h"
+#include "base/parallel.h"
+
+typedef struct scene {
+    anchors a;
+    adjust_stats s;
+} scene;
+
+static scene empty_scene(size_t count, int offset_count)
+{
+    scene sc = {.a = {.offset_count = offset_count}};
+    assert_ok(anchors_resize(&sc.a, count, NULL));
+    assert_ok(adjust_stats_resize(&sc.s, count, offset_count, NULL));
+    return sc;
+}
+
+static void free_scene(scene *sc, adjust_result *r)
+{
+    anchors_free(&sc->a);
+    adjust_stats_free(&sc->s);
+    if (r != NULL)
+        mem_free(r->source);
+}
+
+static void set_gradient(scene *sc, size_t slot, float gradient)
+{
+    sc->s.grad_count[slot] = 50.0f;
+    sc->s.grad_accum[slot] = 50.0f * gradient;
+}
+
+static bool survives(const adjust_def *def, int level, size_t slot)
+{
+    return rng_uniform(def->seed, def->step * 8 + (uint64_t)level, slot) > ldexpf(1.0f, -(level + 1));
+}
+
+/* The first seed for which slots [0, count) survive the drop at every level. */
+static void keep_all(adjust_def *def, size_t count)
+{
+    for (def->seed = 0;; def->seed++) {
+        bool all = true;
+        for (int level = 0; level < 3; level++)
+            for (size_t slot = 0; slot < count; slot++)
+                all = all && survives(def, level, slot);
+        if (all)
+            return;
+    }
+}
+
+/* ---- oracles ----------------------------------------------------------------------------------------------------------------- */
+
+static void two_candidates_in_one_cell(void **state) /* T6 */
+{
+    (void)state;
+    scene sc = empty_scene(2, 2); /* anchor 1 only sits in the way of nothing; its candidate shares the cell */
+    sc.a.offset[0] = 17.0f;
+    sc.a.position[3] = -3.0f;
+    sc.a.offset[6] = 19.4f; /* at 16.4 */
+    for (size_t i = 0; i < 32; i++)
+        sc.a.feature[i] = i % 2 == 0 ? 1.0f : -1.0f, sc.a.feature[32 + i] = i % 3 == 0 ? 2.0f : -3.0f;
+    set_gradient(&sc, 0, 3e-4f); /* passes 2e-4, not 4e-4 */
+    set_gradient(&sc, 2, 3e-4f);
+    adjust_def def = adjust_def_default();
+    def.voxel_size = 1.0f;
+    keep_all(&def, 4);
+    adjust_result r;
+    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    assert_int_equal(r.grown, 1);
+    assert_int_equal(r.pruned, 0);
+    assert_int_equal(r.count, 3);
+    assert_int_equal(sc.a.count, 3);
+    assert_int_equal(sc.s.count, 3);
+    assert_true(r.source[0] == 0 && r.source[1] == 1 && r.source[2] == -1);
+    assert_true(sc.a.position[6] == 16.0f && sc.a.position[7] == 0.0f && sc.a.position[8] == 0.0f);
+    for (size_t c = 0; c < 6; c++)
+        assert_true(fabs((double)sc.a.scale_log[12 + c] - log(16.0)) < 1e-6 && sc.a.offset[12 + c] == 0.0f);
+    for (size_t i = 0; i < 32; i++)
+        assert_true(sc.a.feature[64 + i] == fmaxf(sc.a.feature[i], sc.a.feature[32 + i]));
+    assert_true(sc.s.visit_count[2] == 0 && sc.s.opacity_accum[2] == 0 && sc.s.grad_count[4] == 0 && sc.s.grad_accum[5] == 0);
+    free_scene(&sc, &r);
+}
+
+typedef struct prune_case {
+    const char *name;
+    float accum, visits;
+    bool pruned, reset;
+} prune_case;
+
+static prune_case prune_cases[] = {
+    {"0.4 < 0.405 at 81 views (T7)", 0.4f, 81, true, false},
+    {"80 views are not enough (T7)", 0.4f, 80, false, false},
+    {"exactly 0.005 of the views stays", 0.005f * 81, 81, false, true},
+    {"a hair below goes", 0x1.fffffep-1f * 0.005f * 81, 81, true, false},
+    {"opaque stays and is reset", 20, 500, false, true},
+    {"never seen", 0, 0, false, false},
+};
+
+static void prunes(void **state)
+{
+    const prune_case *c = *state;
+    scene sc = empty_scene(2, 1); /* anchor 0 keeps the scene from becoming empty */
+    sc.s.opacity_accum[1] = c->accum, sc.s.visit_count[1] = c->visits;
+    adjust_def def = adjust_def_default();
+    def.voxel_size = 1.0f;
+    adjust_result r;
+    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    assert_int_equal(r.pruned, c->pruned);
+    assert_int_equal(sc.a.count, c->pruned ? 1 : 2);
+    if (!c->pruned) {
+        assert_true(sc.s.opacity_accum[1] == (c->reset ? 0 : c->accum));
+        assert_true(sc.s.visit_count[1] == (c->reset ? 0 : c->visits));
+    }
+    free_scene(&sc, &r);
+}
+
+typedef struct grow_case {
+    const char *name;
+    float gradient, views;
+    size_t grown;
+    bool reset;
+} grow_case;
+
+static grow_case grow_cases[] = {
+    {"gradient at the threshold", 2e-4f * 64 / 64, 64, 1, true},
+    {"gradient below the threshold", 1.99e-4f, 64, 0, true},
+    {"40 views are not enough", 1.0f, 40, 0, false},
+    {"41 views are", 1.0f, 41, 3, true}, /* one anchor per level */
+    {"no view: 0 / 0", 0.0f, 0, 0, false},
+    {"gradient is not a number", NAN, 50, 0, true},
+};
+
+static void grows(void **state)
+{
+    const grow_case *c = *state;
+    scene sc = empty_scene(1, 1);
+    sc.a.position[0] = 0.0f;
+    sc.a.offset[0] = 102.0f, sc.a.offset[1] = 50.0f; /* cells 6 (96), 26 (104), 102: three different places */
+    sc.s.grad_count[0] = c->views, sc.s.grad_accum[0] = c->gradient * c->views;
+    adjust_def def = adjust_def_default();
+    def.voxel_size = 1.0f;
+    keep_all(&def, 1);
+    adjust_result r;
+    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    assert_int_equal(r.grown, c->grown);
+    if (c->reset)
+        assert_true(sc.s.grad_count[0] == 0 && sc.s.grad_accum[0] == 0);
+    else
+        assert_true(sc.s.grad_count[0] == c->views);
+    free_scene(&sc, &r);
+}
+
+static void levels_have_their_own_cells_and_thresholds(void **state)
+{
+    (void)state;
+    const float gradients[3] = {2.5e-4f, 5e-4f, 9e-4f}, expected[3][3] = {{96}, {96, 104}, {96, 104, 102}};
+    for (size_t passes = 0; passes < 3; passes++) {
+        scene sc = empty_scene(1, 1);
+        sc.a.offset[0] = 102.0f;
+        set_gradient(&sc, 0, gradients[passes]);
+        adjust_def def = adjust_def_default();
+        def.voxel_size = 1.0f;
+        keep_all(&def, 1);
+        adjust_result r;
+        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        assert_int_equal(r.grown, passes + 1);
+        for (size_t i = 0; i <= passes; i++)
+            assert_true(sc.a.position[3 + 3 * i] == expected[passes][i]);
+        free_scene(&sc, &r);
+    }
+}
+
+static void a_silent_coarse_level_gates_only_in_compat_mode(void **state)
+{
+    (void)state;
+    for (int compat = 0; compat <= 1; compat++) {
+        scene sc = empty_scene(1, 1);
+        sc.a.offset[0] = 7.0f; /* the coarse cell is the anchor's own; the finer ones are free */
+        set_gradient(&sc, 0, 1.0f);
+        adjust_def def = adjust_def_default();
+        def.voxel_size = 1.0f;
+        def.compat = compat == 1;
+        keep_all(&def, 1);
+        adjust_result r;
+        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        assert_int_equal(r.grown, compat == 1 ? 0 : 2);
+        free_scene(&sc, &r);
+    }
+}
+
+static void cells_finer_than_one_exist_only_outside_compat_mode(void **state)
+{
+    (void)state; /* init_factor 4: cells 4, 1 and then 0 in the reference's integers, 0.25 in ours */
+    for (int compat = 0; compat <= 1; compat++) {
+        scene sc = empty_scene(1, 1);
+        sc.a.offset[0] = 11.3f;
+        set_gradient(&sc, 0, 1.0f);
+        adjust_def def = adjust_def_default();
+        def.voxel_size = 1.0f, def.init_factor = 4;
+        def.compat = compat == 1;
+        keep_all(&def, 1);
+        adjust_result r;
+        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        assert_int_equal(r.grown, compat == 1 ? 2 : 3);
+        assert_true(sc.a.position[3] == 12.0f && sc.a.position[6] == 11.0f);
+        if (compat == 0)
+            assert_true(sc.a.position[9] == 11.25f);
+        free_scene(&sc, &r);
+    }
+}
+
+static void cells_round_half_to_even(void **state)
+{
+    (void)state;
+    const float at[4] = {24.0f, 40.0f, -24.0f, 23.9f}, expected[4] = {32.0f, 32.0f, -32.0f, 16.0f}; /* 1.5 -> 2, 2.5 -> 2 */
+    for (size_t i = 0; i < 4; i++) {
+        scene sc = empty_scene(1, 1);
+        sc.a.offset[0] = at[i];
+        set_gradient(&sc, 0, 3e-4f);
+        adjust_def def = adjust_def_default();
+        def.voxel_size = 1.0f;
+        keep_all(&def, 1);
+        adjust_result r;
+        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        assert_int_equal(r.grown, 1);
+        assert_true(sc.a.position[3] == expected[i]);
+        free_scene(&sc, &r);
+    }
+}
+
+static void shape_scales_are_cut(void **state)
+{
+    (void)state;
+    scene sc = empty_scene(1, 1);
+    sc.a.offset[0] = 17.0f;
+    for (size_t c = 0; c < 6; c++)
+        sc.a.scale_log[c] = c == 4 ? -1.0f : 0.5f;
+    set_gradient(&sc, 0, 2.5e-4f);
+    adjust_def def = adjust_def_default();
+    def.voxel_size = 1.0f, def.shape_log_max = 0.05f;
+    keep_all(&def, 1);
+    adjust_result r;
+    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    const float expected[6] = {0.5f, 0.5f, 0.5f, 0.05f, -1.0f, 0.05f};
+    assert_memory_equal(sc.a.scale_log, expected, sizeof expected);
+    assert_int_equal(r.count, 2);
+    assert_true(sc.a.scale_log[6] > 2.7f && sc.a.scale_log[9] == 0.05f); /* the new one too */
+    free_scene(&sc, &r);
+}
+
+static void the_last_anchor_stays(void **state)
+{
+    (void)state;
+    scene sc = empty_scene(3, 1);
+    for (size_t i = 0; i < 3; i++)
+        sc.s.visit_count[i] = 100, sc.s.opacity_accum[i] = i == 1 ? 0.2f : 0.1f, sc.a.position[i * 3] = (float)i;
+    adjust_def def = adjust_def_default();
+    def.voxel_size = 1.0f;
+    adjust_result r;
+    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    assert_int_equal(r.count, 1);
+    assert_int_equal(r.pruned, 2);
+    assert_int_equal(r.source[0], 1); /* the most opaque of them */
+    assert_true(sc.a.position[0] == 1.0f);
+    free_scene(&sc, &r);
+}
+
+static void parts_can_be_switched_off(void **state)
+{
+    (void)state;
+    for (int mode = 0; mode < 4; mode++) {
+        scene sc = empty_scene(2, 1);
+        sc.a.offset[0] = 17.0f;
+        set_gradient(&sc, 0, 2.5e-4f);
+        sc.s.visit_count[1] = 100;
+        adjust_def def = adjust_def_default();
+        def.voxel_size = 1.0f, def.grow = mode & 1, def.prune = mode & 2;
+        keep_all(&def, 2);
+        adjust_result r;
+        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        assert_int_equal(r.grown, mode & 1);
+        assert_int_equal(r.pruned, mode >> 1);
+        assert_true(sc.s.grad_count[0] == (def.grow ? 0.0f : 50.0f)); /* what was not used is kept */
+        if (!def.prune)
+            assert_true(sc.s.visit_count[1] == 100);
+        free_scene(&sc, &r);
+    }
+}
+
+/* ---- the cap ----------------------------------------------------------------------------------------------------------------- */
+
+static void the_cap_takes_the_largest_gradients(void **state)
+{
+    (void)state;
+    /* Six free cells along x with gradients 3 1 2 3 3 1 (times 1e-4 above the threshold); one anchor is pruned and makes room. */
+    const float gradients[6] = {3, 1, 2, 3, 3, 1};
+    const struct {
+        size_t max_anchors, expected_count;
+        float expected[6]; /* cells, ascending */
+    } cases[] = {
+        {6 + 1, 1, {1}},          /* six survive: one place; ties by cell */
+        {6 + 2, 2, {1, 4}},
+        {6 + 4, 4, {1, 3, 4, 5}}, /* all the 3s and the 2 */
+        {100, 6, {1, 2, 3, 4, 5, 6}},
+        {3, 0, {0}},              /* never removes anything by itself */
+    };
+    for (size_t t = 0; t < 5; t++) {
+        scene sc = empty_scene(7, 1);
+        for (size_t i = 0; i < 6; i++) {
+            sc.a.offset[i * 3] = 16.0f * (float)(i + 1);
+            set_gradient(&sc, i, 2e-4f + gradients[i] * 1e-5f);
+        }
+        sc.s.visit_count[6] = 100;
+        adjust_def def = adjust_def_default();
+        def.voxel_size = 1.0f, def.max_anchors = cases[t].max_anchors;
+        keep_all(&def, 6);
+        adjust_result r;
+        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        assert_int_equal(r.pruned, 1);
+        assert_int_equal(r.grown, cases[t].expected_count);
+        for (size_t i = 0; i < r.grown; i++)
+            assert_true(sc.a.position[(6 + i) * 3] == 16.0f * cases[t].expected[i]);
+        free_scene(&sc, &r);
+    }
+}
+
+static void a_cell_is_worth_its_best_candidate(void **state)
+{
+    (void)state;
+    for (int order = 0; order <= 1; order++) {
+        scene sc = empty_scene(3, 1); /* 0 and 1 share the cell of 32, 2 is alone in that of 64 and between them in gradient */
+        const float to[3] = {32, 33, 64}, gradients[3] = {order == 0 ? 2.1e-4f : 3e-4f, order == 0 ? 3e-4f : 2.1e-4f, 2.5e-4f};
+        for (size_t i = 0; i < 3; i++) {
+            sc.a.offset[i * 3] = to[i];
+            set_gradient(&sc, i, gradients[i]);
+        }
+        adjust_def def = adjust_def_default();
+        def.voxel_size = 1.0f, def.max_anchors = 4;
+        keep_all(&def, 3);
+        adjust_result r;
+        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        assert_int_equal(r.count, 4);
+        assert_true(sc.a.position[9] == 32.0f);
+        free_scene(&sc, &r);
+    }
+}
+
+/* ---- brute force ------------------------------------------------------------------------------------------------------------- */
+
+typedef struct brute_anchor {
+    double position[3], cell, feature[32];
+} brute_anchor;
+
+static int by_place(const void *a, const void *b)
+{
+    const brute_anchor *x = a, *y = b;
+    for (int c = 0; c < 3; c++)
+        if (x->position[c] < y->position[c] || x->position[c] > y->position[c])
+            return x->position[c] < y->position[c] ? -1 : 1;
+    return 0;
+}
+
+/* New anchors as the text says it, with quadratic searches; voxel sizes are powers of two, so that cells are exact in both. */
+static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *added)
+{
+    const size_t offsets = (size_t)sc->a.offset_count;
+    size_t count = 0;
+    for (int level = 0; level < 3; level++) {
+        const double cell = (double)def->voxel_size * (double[3]){16, 4, 1}[level], threshold = (double)def->grad_threshold * (1 << level);
+        const size_t begin = count;
+        if (def->compat && level > 0 && count == 0)
+            break;
+        for (size_t slot = 0; slot < sc->a.count * offsets; slot++) {
+            const size_t i = slot / offsets;
+            if (!(sc->s.grad_count[slot] > 40) || (double)(sc->s.grad_accum[slot] / sc->s.grad_count[slot]) < threshold)
+                continue;
+            if (!survives(def, level, slot))
+                continue;
+            brute_anchor b = {.cell = cell};
+            for (size_t c = 0; c < 3; c++) {
+                const float mean = sc->a.position[i * 3 + c] + sc->a.offset[slot * 3 + c] * activation_exp(sc->a.scale_log[i * 6 + c]);
+                b.position[c] = rint((double)mean / cell) * cell;
+            }
+            bool taken = false;
+            for (size_t j = 0; j < sc->a.count + begin; j++) {
+                bool same = true;
+                for (size_t c = 0; c < 3; c++) {
+                    const double at = j < sc->a.count ? (double)sc->a.position[j * 3 + c] : added[j - sc->a.count].position[c];
+                    same = same && rint(at / cell) * cell == b.position[c];
+                }
+                taken = taken || same;
+            }
+            if (taken)
+                continue;
+            size_t known = begin;
+            while (known < count && by_place(&added[known], &b) != 0)
+                known++;
+            if (known == count) {
+                added[count++] = b;
+                for (int f = 0; f < 32; f++)
+                    added[known].feature[f] = -HUGE_VAL;
+            }
+            for (size_t f = 0; f < 32; f++)
+                added[known].feature[f] = fmax(added[known].feature[f], (double)sc->a.feature[i * 32 + f]);
+        }
+        qsort(added + begin, count - begin, sizeof *added, by_place);
+    }
+    return count;
+}
+
+static scene random_scene(uint64_t seed, size_t count, int offset_count)
+{
+    scene sc = {.a = random_anchors(count, offset_count, seed)};
+    assert_ok(adjust_stats_resize(&sc.s, count, offset_count, NULL));
+    for (size_t i = 0; i < count; i++) {
+        sc.s.visit_count[i] = floorf(spread(seed, 50, i, 0, 160));
+        sc.s.opacity_accum[i] = sc.s.visit_count[i] * spread(seed, 51, i, 0, 0.02f);
+    }
+    for (size_t i = 0; i < count * (size_t)offset_count; i++) {
+        sc.s.grad_count[i] = floorf(spread(seed, 52, i, 0, 80));
+        sc.s.grad_accum[i] = sc.s.grad_count[i] * spread(seed, 53, i, 0, 1.2e-3f);
+    }
+    return sc;
+}
+
+static void adjust_agrees_with_brute_force(void **state)
+{
+    (void)state;
+    size_t total_grown = 0, total_pruned = 0, total_gated = 0;
+    for (uint64_t seed = 0; seed < 120; seed++) {
+        const size_t count = 1 + (size_t)spread(seed, 60, 0, 0, 60);
+        const int offset_count = 1 + (int)spread(seed, 61, 0, 0, 5);
+        scene sc = random_scene(seed, count, offset_count), before = random_scene(seed, count, offset_count);
+        adjust_def def = adjust_def_default();
+        def.voxel_size = seed % 3 == 0 ? 0.5f : seed % 3 == 1 ? 0.03125f : 0.00390625f;
+        def.seed = seed, def.step = 100 * seed, def.compat = seed % 2 == 1;
+        brute_anchor *added = mem_calloc(3 * count * (size_t)offset_count, sizeof *added, "test", NULL);
+        const size_t grown = brute_grow(&before, &def, added);
+        total_gated += grown == 0;
+        adjust_result r;
+        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        if (r.grown != grown)
+            fail_msg("seed %llu: %zu grown, not %zu", (unsigned long long)seed, r.grown, grown);
+        total_grown += grown, total_pruned += r.pruned;
+        assert_true(r.count == sc.a.count && r.count == sc.s.count && r.count >= 1 && r.count == count - r.pruned + grown);
+        size_t row = 0;
+        const size_t k = (size_t)offset_count;
+        for (size_t i = 0; i < count; i++) {
+            const bool is_judged = before.s.visit_count[i] > 80;
+            const bool transparent = before.s.opacity_accum[i] < 0.005f * before.s.visit_count[i];
+            if (is_judged && transparent && (row >= r.count || r.source[row] != (int64_t)i)) /* the last one may have stayed */
+                continue;
+            assert_int_equal(r.source[row], i);
+            assert_memory_equal(sc.a.feature + row * 32, before.a.feature + i * 32, 32 * sizeof(float));
+            assert_memory_equal(sc.a.offset + row * k * 3, before.a.offset + i * k * 3, k * 3 * sizeof(float));
+            assert_memory_equal(sc.a.scale_log + row * 6, before.a.scale_log + i * 6, 6 * sizeof(float));
+            assert_memory_equal(sc.a.position + row * 3, before.a.position + i * 3, 3 * sizeof(float));
+            assert_true(sc.s.visit_count[row] == (is_judged ? 0 : before.s.visit_count[i]));
+            assert_true(sc.s.opacity_accum[row] == (is_judged ? 0 : before.s.opacity_accum[i]));
+            for (size_t j = 0; j < k; j++) {
+                const bool sampled = before.s.grad_count[i * k + j] > 40;
+                assert_true(sc.s.grad_count[row * k + j] == (sampled ? 0 : before.s.grad_count[i * k + j]));
+                assert_true(sc.s.grad_accum[row * k + j] == (sampled ? 0 : before.s.grad_accum[i * k + j]));
+            }
+            row++;
+        }
+        assert_int_equal(row + grown, r.count);
+        for (size_t i = 0; i < grown; i++, row++) {
+            assert_int_equal(r.source[row], -1);
+            for (size_t c = 0; c < 3; c++)
+                assert_true((double)sc.a.position[row * 3 + c] == added[i].position[c]);
+            for (size_t f = 0; f < 32; f++)
+                assert_true((double)sc.a.feature[row * 32 + f] == added[i].feature[f]);
+            assert_true(fabs((double)sc.a.scale_log[row * 6 + 5] - log(added[i].cell)) < 1e-6);
+            for (size_t j = 0; j < k; j++)
+                assert_true(sc.s.grad_count[row * k + j] == 0 && sc.s.grad_accum[row * k + j] == 0);
+        }
+        mem_free(added);
+        free_scene(&before, NULL);
+        free_scene(&sc, &r);
+    }
+    assert_true(total_grown > 1000 && total_pruned > 100 && total_gated > 0);
+}
+
+static void the_cap_holds_for_random_scenes(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 0; seed < 40; seed++) {
+        for (size_t cap = 0; cap < 140; cap += 20) {
+            scene sc = random_scene(seed, 50, 4);
+            adjust_def def = adjust_def_default();
+            def.voxel_size = 0.03125f, def.seed = seed, def.max_anchors = cap;
+            adjust_result r;
+            assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+            assert_true(sc.a.count <= cap || r.grown == 0);
+            assert_int_equal(50 + r.grown - r.pruned, sc.a.count);
+            free_scene(&sc, &r);
+        }
+    }
+}
+
+static uint64_t adjust_hash(uint64_t seed)
+{
+    scene sc = random_scene(7, 400, 10);
+    adjust_def def = adjust_def_default();
+    def.voxel_size = 0.01f, def.seed = seed, def.max_anchors = 1500;
+    adjust_result r;
+    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    uint64_t hash = hash_bytes(1, sc.a.position, sc.a.count * 3 * sizeof(float));
+    hash = hash_bytes(hash, sc.a.feature, sc.a.count * 32 * sizeof(float));
+    hash = hash_bytes(hash, r.source, r.count * sizeof *r.source);
+    hash = hash_bytes(hash, sc.s.grad_accum, sc.s.count * 10 * sizeof(float));
+    free_scene(&sc, &r);
+    return hash;
+}
+
+static void same_bits_for_all_threads(void **state)
+{
+    (void)state;
+    const int before = parallel_threads();
+    parallel_set_threads(1);
+    const uint64_t want = adjust_hash(5);
+    parallel_set_threads(4);
+    assert_true(adjust_hash(5) == want);
+    assert_true(adjust_hash(6) != want);
+    parallel_set_threads(before);
+}
+
+/* ---- edges ------------------------------------------------------------------------------------------------------------------- */
+
+static void wild_places_and_cells(void **state)
+{
+    (void)state;
+    const float cells[] = {1e-30f, 0.0f, -1.0f, NAN, INFINITY, 1e30f};
+    for (size_t t = 0; t < 6; t++) {
+        scene sc = empty_scene(4, 1);
+        const float offset[4] = {3e38f, NAN, 5.0f, INFINITY};
+        for (size_t i = 0; i < 4; i++) {
+            sc.a.offset[i * 3] = offset[i];
+            set_gradient(&sc, i, 1.0f);
+        }
+        sc.a.position[3] = 3e38f;
+        adjust_def def = adjust_def_default();
+        def.voxel_size = cells[t];
+        keep_all(&def, 4);
+        adjust_result r;
+        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        for (size_t i = 0; i < r.grown * 3; i++)
+            assert_true(isfinite(sc.a.position[12 + i]));
+        if (t >= 1 && t <= 4)
+            assert_int_equal(r.grown, 0);
+        free_scene(&sc, &r);
+    }
+}
+
+static void wrong_arguments_are_refused(void **state)
+{
+    (void)state;
+    scene sc = empty_scene(3, 2);
+    adjust_result r;
+    gbt_error err = {0};
+    adjust_def def = adjust_def_default();
+    def.voxel_size = 1.0f;
+    for (int t = 0; t < 5; t++) {
+        adjust_def wrong = def;
+        if (t == 0)
+            wrong.level_count = 9;
+        else if (t == 1)
+            wrong.init_factor = 0;
+        else if (t == 2)
+            wrong.hierarchy_factor = 0;
+        else if (t == 3)
+            wrong.grad_threshold = NAN;
+        else
+            wrong.shape_log_max = NAN;
+        assert_int_equal(anchors_adjust(&sc.a, &sc.s, &wrong, &r, &err), GBT_ERR_ARGUMENT);
+        assert_null(r.source);
+    }
+    assert_string_not_equal(err.text, "");
+    assert_ok(adjust_stats_resize(&sc.s, 2, 2, NULL));
+    assert_int_equal(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(adjust_stats_resize(&sc.s, 2, 3, NULL), GBT_ERR_ARGUMENT);
+    free_scene(&sc, NULL);
+}
+
+static void no_memory_changes_nothing(void **state)
+{
+    (void)state;
+    long n = 0;
+    for (;; n++) {
+        scene sc = random_scene(3, 40, 4);
+        const uint64_t before = hash_bytes(hash_bytes(1, sc.a.feature, 40 * 32 * 4), sc.s.grad_count, 40 * 4 * 4);
+        adjust_def def = adjust_def_default();
+        def.voxel_size = 0.03125f;
+        adjust_result r;
+        gbt_error err = {0};
+        mem_fail_after(n);
+        const gbt_status status = anchors_adjust(&sc.a, &sc.s, &def, &r, &err);
+        mem_fail_after(-1);
+        if (status != GBT_OK) {
+            assert_int_equal(status, GBT_ERR_NO_MEMORY);
+            assert_true(err.text[0] != '\0' && r.source == NULL && sc.a.count == 40 && sc.s.count == 40);
+            assert_true(hash_bytes(hash_bytes(1, sc.a.feature, 40 * 32 * 4), sc.s.grad_count, 40 * 4 * 4) == before);
+        }
+        free_scene(&sc, &r);
+        if (status == GBT_OK)
+            break;
+    }
+    assert_true(n > 10);
+}
+
+static void statistics_follow_rows(void **state)
+{
+    (void)state;
+    adjust_stats s = {0};
+    assert_ok(adjust_stats_resize(&s, 3, 2, NULL));
+    for (size_t i = 0; i < 6; i++)
+        s.grad_accum[i] = (float)i, s.visit_count[i / 2] = (float)i;
+    assert_ok(adjust_stats_resize(&s, 100, 2, NULL));
+    assert_true(s.grad_accum[5] == 5 && s.visit_count[2] == 5 && s.grad_accum[6] == 0 && s.grad_accum[199] == 0 && s.visit_count[99] == 0);
+    assert_ok(adjust_stats_resize(&s, 2, 2, NULL));
+    assert_ok(adjust_stats_resize(&s, 3, 2, NULL));
+    assert_true(s.grad_accum[3] == 3 && s.grad_accum[4] == 0 && s.visit_count[2] == 0);
+    adjust_stats_free(&s);
+    assert_int_equal(s.count, 0);
+}
+
+int main(void)
+{
+    struct CMUnitTest tests[64];
+    size_t count = 0;
+    for (size_t i = 0; i < sizeof prune_cases / sizeof *prune_cases; i++)
+        tests[count++] = (struct CMUnitTest){.name = prune_cases[i].name, .test_func = prunes, .initial_state = &prune_cases[i]};
+    for (size_t i = 0; i < sizeof grow_cases / sizeof *grow_cases; i++)
+        tests[count++] = (struct CMUnitTest){.name = grow_cases[i].name, .test_func = grows, .initial_state = &grow_cases[i]};
+    const struct CMUnitTest single[] = {
+        cmocka_unit_test(two_candidates_in_one_cell),
+        cmocka_unit_test(levels_have_their_own_cells_and_thresholds),
+        cmocka_unit_test(a_silent_coarse_level_gates_only_in_compat_mode),
+        cmocka_unit_test(cells_finer_than_one_exist_only_outside_compat_mode),
+        cmocka_unit_test(cells_round_half_to_even),
+        cmocka_unit_test(shape_scales_are_cut),
+        cmocka_unit_test(the_last_anchor_stays),
+        cmocka_unit_test(parts_can_be_switched_off),
+        cmocka_unit_test(the_cap_takes_the_largest_gradients),
+        cmocka_unit_test(a_cell_is_worth_its_best_candidate),
+        cmocka_unit_test(adjust_agrees_with_brute_force),
+        cmocka_unit_test(the_cap_holds_for_random_scenes),
+        cmocka_unit_test(same_bits_for_all_threads),
+        cmocka_unit_test(wild_places_and_cells),
+        cmocka_unit_test(wrong_arguments_are_refused),
+        cmocka_unit_test(no_memory_changes_nothing),
+        cmocka_unit_test(statistics_follow_rows),
+    };
+    for (size_t i = 0; i < sizeof single / sizeof *single; i++)
+        tests[count++] = single[i];
+    return _cmocka_run_group_tests("adjust", tests, count, NULL, NULL);
+}

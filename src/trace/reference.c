@@ -1,0 +1,321 @@
+/* trace/reference.c -- what one ray sees, in double and without any cleverness. The equations are in the header. */
+#include "trace/reference.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/vec.h"
+
+enum { RAY_GRAIN = 32 };
+
+typedef struct prepared {
+    double mean[3], canon[9]; /* canon = S^-1 R^T, row-major: row i belongs to local axis i */
+    double opacity, d2_max;   /* beyond d2_max alpha is below alpha_min for certain, so exp() is not needed */
+} prepared;
+
+static double field(const reference_scene *scene, enum reference_field f, size_t i)
+{
+    return scene->fields[(size_t)f * scene->count + i];
+}
+
+static prepared prepare(const reference_scene *scene, const trace_settings *s, size_t i)
+{
+    prepared p = {.opacity = field(scene, REFERENCE_opacity, i)};
+    double q[4], r[9];
+    for (int k = 0; k < 4; k++)
+        q[k] = field(scene, REFERENCE_quat_w + (unsigned)k, i);
+    dquat_to_matrix(q, r);
+    for (int axis = 0; axis < 3; axis++) {
+        p.mean[axis] = field(scene, REFERENCE_mean_x + (unsigned)axis, i);
+        for (int k = 0; k < 3; k++)
+            p.canon[3 * axis + k] = r[3 * k + axis] / field(scene, REFERENCE_scale_x + (unsigned)axis, i);
+    }
+    p.d2_max = 2 * log(p.opacity / (double)s->alpha_min) + 1e-6;
+    return p;
+}
+
+/* The response of one Gaussian; v = x' + t_c w'. NaN anywhere makes the last comparison false. */
+static bool respond(const prepared *p, const trace_settings *s, const double origin[3], const double dir[3], reference_hit *hit,
+                    double v[3])
+{
+    const double offset[3] = {origin[0] - p->mean[0], origin[1] - p->mean[1], origin[2] - p->mean[2]};
+    double x[3], w[3];
+    dmat_apply(p->canon, offset, x);
+    dmat_apply(p->canon, dir, w);
+    const double along = dvec_dot(w, w), nearest = -dvec_dot(x, w) / along, t_near = (double)s->t_near;
+    if (!isfinite(nearest))
+        return false;
+    hit->t = nearest > t_near ? nearest : t_near;
+    for (int k = 0; k < 3; k++)
+        v[k] = x[k] + hit->t * w[k];
+    hit->d2 = dvec_dot(v, v);
+    if (!(hit->d2 <= p->d2_max))
+        return false;
+    const double alpha = p->opacity * exp(-0.5 * hit->d2);
+    hit->alpha = alpha < (double)s->alpha_max ? alpha : (double)s->alpha_max;
+    return hit->alpha >= (double)s->alpha_min;
+}
+
+static int by_depth_then_id(const void *a, const void *b)
+{
+    const reference_hit *p = a, *q = b;
+    if (p->t != q->t)
+        return p->t < q->t ? -1 : 1;
+    return p->id < q->id ? -1 : p->id > q->id;
+}
+
+typedef struct hit_list {
+    reference_hit *hits;
+    size_t count, capacity;
+} hit_list;
+
+static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s, const double origin[3], const double dir[3],
+                         hit_list *list, gbt_error *err)
+{
+    list->count = 0;
+    if (dir[0] == 0 && dir[1] == 0 && dir[2] == 0)
+        return GBT_OK;
+    for (size_t i = 0; i < all_count; i++) {
+        reference_hit hit = {.id = (uint32_t)i};
+        double v[3];
+        if (!respond(&all[i], s, origin, dir, &hit, v))
+            continue;
+        GBT_TRY(mem_reserve((void **)&list->hits, &list->capacity, list->count, list->count + 1, sizeof hit, "reference hits", err));
+        list->hits[list->count++] = hit;
+    }
+    if (list->count > 1)
+        qsort(list->hits, list->count, sizeof *list->hits, by_depth_then_id);
+    return GBT_OK;
+}
+
+/* Front to back; returns how many hits were added. */
+static size_t blend(const reference_scene *scene, const trace_settings *s, const hit_list *list, double rgb[3], double *transmittance)
+{
+    double T = 1;
+    size_t n = 0;
+    rgb[0] = rgb[1] = rgb[2] = 0;
+    for (; n < list->count; n++) {
+        const reference_hit *hit = &list->hits[n];
+        const double T_next = T * (1 - hit->alpha);
+        if (T_next < (double)s->transmittance_min)
+            break;
+        for (int c = 0; c < 3; c++)
+            rgb[c] += T * hit->alpha * field(scene, REFERENCE_red + (unsigned)c, hit->id);
+        T = T_next;
+    }
+    for (int c = 0; c < 3; c++)
+        rgb[c] += T * (double)s->background[c];
+    *transmittance = T;
+    return n;
+}
+
+static gbt_status prepare_all(const reference_scene *scene, const trace_settings *s, prepared **out, gbt_error *err)
+{
+    *out = mem_alloc(scene->count, sizeof **out, "reference scene", err);
+    if (*out == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < scene->count; i++)
+        (*out)[i] = prepare(scene, s, i);
+    return GBT_OK;
+}
+
+static void ray_of(const ray_image *rays, size_t i, double origin[3], double dir[3])
+{
+    for (int k = 0; k < 3; k++)
+        origin[k] = (double)ray_image_origin(rays, i)[k], dir[k] = (double)rays->dir[3 * i + (size_t)k];
+}
+
+typedef struct forward_job {
+    const reference_scene *scene;
+    const trace_settings *s;
+    const ray_image *rays;
+    const prepared *all;
+    double *rgb, *transmittance;
+    uint32_t *blended;
+    gbt_status *status; /* per block */
+} forward_job;
+
+static void forward_block(size_t block, size_t begin, size_t end, void *context)
+{
+    const forward_job *job = context;
+    hit_list list = {0};
+    for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++) {
+        double origin[3], dir[3], transmittance;
+        ray_of(job->rays, i, origin, dir);
+        job->status[block] = gather(job->all, job->scene->count, job->s, origin, dir, &list, NULL);
+        const size_t n = blend(job->scene, job->s, &list, job->rgb + 3 * i, &transmittance);
+        if (job->transmittance != NULL)
+            job->transmittance[i] = transmittance;
+        if (job->blended != NULL)
+            job->blended[i] = (uint32_t)n;
+    }
+    mem_free(list.hits);
+}
+
+gbt_status reference_scene_forward(const reference_scene *scene, const trace_settings *s, const ray_image *rays, double *rgb,
+                                   double *transmittance, uint32_t *blended, gbt_error *err)
+{
+    const size_t ray_count = ray_image_count(rays), block_count = parallel_block_count(ray_count, RAY_GRAIN);
+    prepared *all = NULL;
+    gbt_status *block_status = mem_calloc(block_count, sizeof *block_status, "reference", err);
+    gbt_status status = block_status == NULL ? GBT_ERR_NO_MEMORY : prepare_all(scene, s, &all, err);
+    if (status == GBT_OK) {
+        forward_job job = {scene, s, rays, all, rgb, transmittance, blended, block_status};
+        parallel_blocks(ray_count, RAY_GRAIN, forward_block, &job);
+        for (size_t block = 0; block < block_count && status == GBT_OK; block++)
+            if (block_status[block] != GBT_OK)
+                status = base_fail(err, block_status[block], "reference: no memory for the hits of rays from %zu on", block * RAY_GRAIN);
+    }
+    mem_free(all);
+    mem_free(block_status);
+    return status;
+}
+
+/* Chain from dL/dalpha of one hit to the fields of its Gaussian. */
+static void respond_backward(const reference_scene *scene, const prepared *p, const trace_settings *s, const double origin[3],
+                             const double dir[3], size_t id, double d_alpha, double *d_gaussians)
+{
+    reference_hit hit;
+    double v[3], q[4], scale[3];
+    if (!respond(p, s, origin, dir, &hit, v))
+        return;
+    const double response = exp(-0.5 * hit.d2);
+    if (p->opacity * response >= (double)s->alpha_max)
+        return;
+    double *const d = d_gaussians + id;
+    const size_t n = scene->count;
+    const double d_d2 = -0.5 * hit.alpha * d_alpha;
+    d[REFERENCE_opacity * n] += response * d_alpha;
+    for (int k = 0; k < 3; k++)
+        scale[k] = field(scene, REFERENCE_scale_x + (unsigned)k, id);
+    for (int k = 0; k < 4; k++)
+        q[k] = field(scene, REFERENCE_quat_w + (unsigned)k, id);
+    double d_mean[3];
+    dmat_apply_transposed(p->canon, v, d_mean);
+    for (size_t k = 0; k < 3; k++) {
+        d[(REFERENCE_mean_x + k) * n] -= 2 * d_d2 * d_mean[k];
+        d[(REFERENCE_scale_x + k) * n] -= 2 * d_d2 * v[k] * v[k] / scale[k];
+    }
+    /* a = 2 dL/domega for the local turn R <- R exp[omega]; dL/dq = q (0, a), orthogonal to q. */
+    const double a0 = 4 * d_d2 * v[1] * v[2] * (scale[2] / scale[1] - scale[1] / scale[2]);
+    const double a1 = 4 * d_d2 * v[2] * v[0] * (scale[0] / scale[2] - scale[2] / scale[0]);
+    const double a2 = 4 * d_d2 * v[0] * v[1] * (scale[1] / scale[0] - scale[0] / scale[1]);
+    d[REFERENCE_quat_w * n] -= q[1] * a0 + q[2] * a1 + q[3] * a2;
+    d[REFERENCE_quat_x * n] += q[0] * a0 + q[2] * a2 - q[3] * a1;
+    d[REFERENCE_quat_y * n] += q[0] * a1 + q[3] * a0 - q[1] * a2;
+    d[REFERENCE_quat_z * n] += q[0] * a2 + q[1] * a1 - q[2] * a0;
+}
+
+/* Back to front: `behind` is the colour and `open` the transmittance of everything behind a hit, so nothing is divided by 1 - alpha. */
+static void ray_backward(const reference_scene *scene, const prepared *all, const trace_settings *s, const double origin[3],
+                         const double dir[3], const hit_list *list, const double d_rgb[3], double d_transmittance, double *d_gaussians,
+                         double d_background[3])
+{
+    double rgb[3], T, behind[3], open = 1;
+    const size_t blended = blend(scene, s, list, rgb, &T);
+    for (int c = 0; c < 3; c++)
+        behind[c] = (double)s->background[c], d_background[c] += T * d_rgb[c];
+    for (size_t i = blended; i-- > 0;) {
+        const reference_hit *hit = &list->hits[i];
+        double in_front = 1;
+        for (size_t j = 0; j < i; j++)
+            in_front *= 1 - list->hits[j].alpha;
+        double d_alpha = -in_front * open * d_transmittance;
+        for (size_t c = 0; c < 3; c++) {
+            const double colour = field(scene, REFERENCE_red + (unsigned)c, hit->id);
+            d_gaussians[(REFERENCE_red + c) * scene->count + hit->id] += in_front * hit->alpha * d_rgb[c];
+            d_alpha += in_front * (colour - behind[c]) * d_rgb[c];
+            behind[c] = hit->alpha * colour + (1 - hit->alpha) * behind[c];
+        }
+        open *= 1 - hit->alpha;
+        respond_backward(scene, &all[hit->id], s, origin, dir, hit->id, d_alpha, d_gaussians);
+    }
+}
+
+gbt_status reference_scene_backward(const reference_scene *scene, const trace_settings *s, const ray_image *rays, const double *d_rgb,
+                                    const double *d_transmittance, double *d_gaussians, double d_background[3], gbt_error *err)
+{
+    prepared *all = NULL;
+    hit_list list = {0};
+    gbt_status status = prepare_all(scene, s, &all, err);
+    for (size_t i = 0; i < ray_image_count(rays) && status == GBT_OK; i++) {
+        double origin[3], dir[3];
+        ray_of(rays, i, origin, dir);
+        status = gather(all, scene->count, s, origin, dir, &list, err);
+        if (status == GBT_OK)
+            ray_backward(scene, all, s, origin, dir, &list, d_rgb + 3 * i, d_transmittance != NULL ? d_transmittance[i] : 0, d_gaussians,
+                         d_background);
+    }
+    mem_free(list.hits);
+    mem_free(all);
+    return status;
+}
+
+gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_settings *s, const double origin[3], const double dir[3],
+                                    reference_hit **hits, size_t *count, size_t *capacity, gbt_error *err)
+{
+    hit_list list = {*hits, 0, *capacity};
+    prepared *all = NULL;
+    gbt_status status = prepare_all(scene, s, &all, err);
+    if (status == GBT_OK)
+        status = gather(all, scene->count, s, origin, dir, &list, err);
+    mem_free(all);
+    *hits = list.hits, *capacity = list.capacity, *count = status == GBT_OK ? list.count : 0;
+    return status;
+}
+
+gbt_status reference_scene_make(const gaussians *g, reference_scene *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    if (g->count > UINT32_MAX)
+        return base_fail(err, GBT_ERR_ARGUMENT, "reference: %zu Gaussians (wanted at most 2^32 - 1)", g->count);
+    out->fields = mem_alloc(g->count, GAUSSIANS_FIELD_COUNT * sizeof *out->fields, "reference scene", err);
+    if (out->fields == NULL)
+        return GBT_ERR_NO_MEMORY;
+    out->count = g->count;
+    double *to = out->fields;
+#define X(name, pad, meaning)             \
+    for (size_t i = 0; i < g->count; i++) \
+        *to++ = (double)g->name[i];
+    GAUSSIANS_FIELDS(X)
+#undef X
+    return GBT_OK;
+}
+
+void reference_scene_free(reference_scene *scene)
+{
+    mem_free(scene->fields);
+    memset(scene, 0, sizeof *scene);
+}
+
+/* Copy `g` as `scene`, run `call` on it. */
+#define ON_COPY(call)                                         \
+    reference_scene scene;                                    \
+    gbt_status status = reference_scene_make(g, &scene, err); \
+    if (status == GBT_OK)                                     \
+        status = call;                                        \
+    reference_scene_free(&scene);                             \
+    return status
+
+gbt_status reference_ray_hits(const gaussians *g, const trace_settings *s, const double origin[3], const double dir[3],
+                              reference_hit **hits, size_t *count, size_t *capacity, gbt_error *err)
+{
+    *count = 0;
+    ON_COPY(reference_scene_ray_hits(&scene, s, origin, dir, hits, count, capacity, err));
+}
+
+gbt_status reference_forward(const gaussians *g, const trace_settings *s, const ray_image *rays, double *rgb, double *transmittance,
+                             uint32_t *blended, gbt_error *err)
+{
+    ON_COPY(reference_scene_forward(&scene, s, rays, rgb, transmittance, blended, err));
+}
+
+gbt_status reference_backward(const gaussians *g, const trace_settings *s, const ray_image *rays, const double *d_rgb,
+                              const double *d_transmittance, double *d_gaussians, double d_background[3], gbt_error *err)
+{
+    ON_COPY(reference_scene_backward(&scene, s, rays, d_rgb, d_transmittance, d_gaussians, d_background, err));
+}

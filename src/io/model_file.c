@@ -1,0 +1,180 @@
+/* io/model_file.c -- the scene model to sections and back, with every value checked on the way in. */
+#include "io/model_file.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+
+/* Scalars travel in three vectors; the enums name their places. */
+enum { SCENE_VOXEL_SIZE, SCENE_EXTENT, SCENE_T_NEAR, SCENE_BACKGROUND, SCENE_NUMBERS = SCENE_BACKGROUND + 3 };
+enum { DECODER_DISTANCE_SCALE, DECODER_DISTANCE_MIN, DECODER_DISTANCE_MAX, DECODER_NUMBERS };
+
+void model_add(container_writer *w, const model *m)
+{
+    const anchors *a = &m->anchors;
+    const decoder *d = &m->decoder;
+    const size_t k = (size_t)a->offset_count;
+    container_add(w, "anchor.position", CONTAINER_F32, 2, (size_t[]){a->count, 3}, a->position);
+    container_add(w, "anchor.feature", CONTAINER_F32, 2, (size_t[]){a->count, ANCHOR_FEATURE_DIM}, a->feature);
+    container_add(w, "anchor.offset", CONTAINER_F32, 3, (size_t[]){a->count, k, 3}, a->offset);
+    container_add(w, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){a->count, 6}, a->scale_log);
+    container_add(w, "decoder.params", CONTAINER_F32, 1, (size_t[]){d->param_count}, d->params);
+    container_add_small(w, "decoder.has_distance", CONTAINER_U8, 1, &(uint8_t){d->has_distance ? 1 : 0});
+    container_add_small(w, "decoder.numbers", CONTAINER_F32, DECODER_NUMBERS, (float[DECODER_NUMBERS]){d->distance_scale, d->distance_min, d->distance_max});
+    container_add_small(w, "scene.origin", CONTAINER_F64, 3, m->origin);
+    container_add_small(w, "scene.numbers", CONTAINER_F32, SCENE_NUMBERS,
+                        (float[SCENE_NUMBERS]){m->voxel_size, m->extent, m->t_near, m->background[0], m->background[1], m->background[2]});
+    container_add_text(w, "scene.data_folder", m->data_folder);
+    container_add_text(w, "train.config", m->config);
+    container_add_small(w, "train.iterations", CONTAINER_U64, 1, &m->iterations);
+}
+
+static gbt_status check_finite(const char *path, const char *section, const float *values, size_t count, gbt_status failure, gbt_error *err)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!isfinite(values[i]))
+            return base_fail(err, failure, "%s: section %s: value %zu is not finite", path, section, i);
+    return GBT_OK;
+}
+
+/** What every part of the program may rely on; `failure` says whose fault it is. */
+static gbt_status check_model(const char *path, const model *m, gbt_status failure, gbt_error *err)
+{
+    const anchors *a = &m->anchors;
+    const decoder *d = &m->decoder;
+    if (a->offset_count < 1 || a->offset_count > ANCHOR_MAX_OFFSETS)
+        return base_fail(err, failure, "%s: section anchor.offset: bad number of offsets per anchor (wanted 1 to %d, got %d)", path, ANCHOR_MAX_OFFSETS,
+                         a->offset_count);
+    if (a->count > UINT32_MAX / ANCHOR_MAX_OFFSETS) /* Gaussians have 32-bit ids */
+        return base_fail(err, failure, "%s: section anchor.position: too many anchors (wanted at most %u, got %zu)", path,
+                         UINT32_MAX / ANCHOR_MAX_OFFSETS, a->count);
+    decoder_part parts[3];
+    decoder_parts(d, parts);
+    if (d->offset_count != a->offset_count || d->param_count != parts[2].end)
+        return base_fail(err, failure, "%s: section decoder.params does not fit %d offsets per anchor (wanted %zu values, got %zu)", path, a->offset_count,
+                         parts[2].end, d->param_count);
+    const struct { const char *section; const float *values; size_t count; } arrays[] = {
+        {"anchor.position", a->position, a->count * 3},
+        {"anchor.feature", a->feature, a->count * ANCHOR_FEATURE_DIM},
+        {"anchor.offset", a->offset, a->count * (size_t)a->offset_count * 3},
+        {"anchor.scale_log", a->scale_log, a->count * 6},
+        {"decoder.params", d->params, d->param_count},
+        {"scene.numbers", &m->voxel_size, 1}, {"scene.numbers", &m->extent, 1}, {"scene.numbers", &m->t_near, 1}, {"scene.numbers", m->background, 3},
+        {"decoder.numbers", &d->distance_scale, 1},
+    };
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+        GBT_TRY(check_finite(path, arrays[i].section, arrays[i].values, arrays[i].count, failure, err));
+    if (isnan(d->distance_min) || isnan(d->distance_max)) /* infinite: not limited */
+        return base_fail(err, failure, "%s: section decoder.numbers: the trained range of distances is not a number", path);
+    if (m->voxel_size < 0 || m->extent < 0 || m->t_near < 0)
+        return base_fail(err, failure, "%s: section scene.numbers: a length is negative (voxel %g, extent %g, near %g)", path, (double)m->voxel_size,
+                         (double)m->extent, (double)m->t_near);
+    for (int i = 0; i < 3; i++)
+        if (!isfinite(m->origin[i]))
+            return base_fail(err, failure, "%s: section scene.origin: value %d is not finite", path, i);
+    return GBT_OK;
+}
+
+gbt_status model_save(const char *path, const model *m, gbt_error *err)
+{
+    GBT_TRY(check_model(path, m, GBT_ERR_ARGUMENT, err));
+    container_writer w = {0};
+    model_add(&w, m);
+    const gbt_status status = container_save(&w, path, err);
+    container_writer_free(&w);
+    return status;
+}
+
+static gbt_status read_anchors(const container *c, anchors *a, gbt_error *err)
+{
+    size_t count = CONTAINER_ANY, k = CONTAINER_ANY;
+    const void *position, *feature, *offset, *scale_log;
+    size_t shape[3] = {count, 3};
+    GBT_TRY(container_find(c, "anchor.position", CONTAINER_F32, 2, shape, &position, err));
+    count = shape[0];
+    GBT_TRY(container_find(c, "anchor.feature", CONTAINER_F32, 2, (size_t[]){count, ANCHOR_FEATURE_DIM}, &feature, err));
+    shape[0] = count, shape[1] = k, shape[2] = 3;
+    GBT_TRY(container_find(c, "anchor.offset", CONTAINER_F32, 3, shape, &offset, err));
+    k = shape[1];
+    GBT_TRY(container_find(c, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){count, 6}, &scale_log, err));
+    if (k < 1 || k > ANCHOR_MAX_OFFSETS)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: section anchor.offset: bad number of offsets per anchor (wanted 1 to %d, got %zu)", c->path,
+                         ANCHOR_MAX_OFFSETS, k);
+    a->offset_count = (int)k;
+    GBT_TRY(anchors_resize(a, count, err));
+    if (count > 0) {
+        memcpy(a->position, position, count * 3 * sizeof(float));
+        memcpy(a->feature, feature, count * ANCHOR_FEATURE_DIM * sizeof(float));
+        memcpy(a->offset, offset, count * k * 3 * sizeof(float));
+        memcpy(a->scale_log, scale_log, count * 6 * sizeof(float));
+    }
+    return GBT_OK;
+}
+
+static gbt_status read_decoder(const container *c, int offset_count, decoder *d, gbt_error *err)
+{
+    uint8_t has_distance;
+    float numbers[DECODER_NUMBERS];
+    size_t param_count = CONTAINER_ANY;
+    const void *params;
+    GBT_TRY(container_get(c, "decoder.has_distance", CONTAINER_U8, 1, &has_distance, err));
+    GBT_TRY(container_get(c, "decoder.numbers", CONTAINER_F32, DECODER_NUMBERS, numbers, err));
+    GBT_TRY(container_find(c, "decoder.params", CONTAINER_F32, 1, &param_count, &params, err));
+    if (has_distance > 1)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: section decoder.has_distance: wanted 0 or 1, got %d", c->path, has_distance);
+    d->params = mem_alloc(param_count, sizeof *d->params, "decoder", err);
+    if (d->params == NULL)
+        return GBT_ERR_NO_MEMORY;
+    if (param_count > 0)
+        memcpy(d->params, params, param_count * sizeof *d->params);
+    d->param_count = param_count, d->offset_count = offset_count, d->has_distance = has_distance == 1;
+    d->distance_scale = numbers[DECODER_DISTANCE_SCALE];
+    d->distance_min = numbers[DECODER_DISTANCE_MIN], d->distance_max = numbers[DECODER_DISTANCE_MAX];
+    return GBT_OK;
+}
+
+static gbt_status read_scene(const container *c, model *m, gbt_error *err)
+{
+    float numbers[SCENE_NUMBERS];
+    GBT_TRY(container_get(c, "scene.origin", CONTAINER_F64, 3, m->origin, err));
+    GBT_TRY(container_get(c, "scene.numbers", CONTAINER_F32, SCENE_NUMBERS, numbers, err));
+    m->voxel_size = numbers[SCENE_VOXEL_SIZE], m->extent = numbers[SCENE_EXTENT], m->t_near = numbers[SCENE_T_NEAR];
+    memcpy(m->background, numbers + SCENE_BACKGROUND, sizeof m->background);
+    GBT_TRY(container_get_text(c, "scene.data_folder", m->data_folder, sizeof m->data_folder, err));
+    GBT_TRY(container_get_text(c, "train.config", m->config, sizeof m->config, err));
+    return container_get(c, "train.iterations", CONTAINER_U64, 1, &m->iterations, err);
+}
+
+gbt_status model_from_container(const container *c, model *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    gbt_status status = read_anchors(c, &out->anchors, err);
+    if (status == GBT_OK)
+        status = read_decoder(c, out->anchors.offset_count, &out->decoder, err);
+    if (status == GBT_OK)
+        status = read_scene(c, out, err);
+    if (status == GBT_OK)
+        status = check_model(c->path, out, GBT_ERR_FORMAT, err);
+    if (status != GBT_OK)
+        model_free(out);
+    return status;
+}
+
+gbt_status model_load(const char *path, model *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    container c;
+    GBT_TRY(container_load(path, &c, err));
+    const gbt_status status = model_from_container(&c, out, err);
+    container_free(&c);
+    return status;
+}
+
+void model_free(model *m)
+{
+    anchors_free(&m->anchors);
+    decoder_free(&m->decoder);
+    memset(m, 0, sizeof *m);
+}

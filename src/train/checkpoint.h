@@ -1,0 +1,20 @@
+/* train/checkpoint.h -- everything a run needs to go on to the same bits. */
+#ifndef GBT_TRAIN_CHECKPOINT_H
+#define GBT_TRAIN_CHECKPOINT_H
+
+#include "train/trainer.h"
+
+/** Write the trainer's state atomically; the checkpoint before it is kept as PATH.prev. */
+gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err);
+
+/**
+ * Put a saved state into a trainer that trainer_open() has made for the same data and the same settings.
+ *
+ * @return GBT_ERR_FORMAT when the file is damaged, or belongs to other data or settings (says which)
+ */
+gbt_status checkpoint_load(trainer *t, const char *path, gbt_error *err);
+
+/** The settings that a checkpoint was made with, as config text (config_text()). */
+gbt_status checkpoint_config(const char *path, char *out, size_t size, gbt_error *err);
+
+#endif

@@ -1,0 +1,95 @@
+/* train/config.c -- the settings of a run to text and back. */
+#include "train/config.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fail.h"
+
+void config_text(const gbt_train_def *d, const char *data, char *out, size_t size)
+{
+    snprintf(out, size,
+             "data = %s\ninit = %s\nscale-prior = %s\nmax-depth = %d\nvoxel-size = %.9g\noffsets = %d\ndistance = %s\niterations = %llu\n"
+             "budget-seconds = %.17g\npace = %s\ndownscale = %.17g\nstart-level = %d\neval-split = %s\nseed = %llu\nmax-anchors = %zu\n"
+             "grow = %d\ncompat = %d\n",
+             data, d->init, d->scale_prior, d->max_depth, (double)d->voxel_size, d->offsets, d->distance, (unsigned long long)d->iterations,
+             d->budget_seconds, d->pace != NULL ? d->pace : "", d->downscale, d->start_level, d->eval_split, (unsigned long long)d->seed,
+             d->max_anchors, d->grow, d->compat);
+}
+
+static void set_string(char *to, size_t size, const char *value, const char **field)
+{
+    snprintf(to, size, "%s", value);
+    *field = to;
+}
+
+static bool set_key(const char *key, const char *value, gbt_train_def *d, config_strings *s)
+{
+    char *end;
+    const double number = strtod(value, &end);
+    const unsigned long long whole = strtoull(value, NULL, 10);
+    const bool is_number = end != value && *end == '\0';
+    if (strcmp(key, "data") == 0)
+        return snprintf(s->data, sizeof s->data, "%s", value) < (int)sizeof s->data;
+    if (strcmp(key, "init") == 0)
+        return set_string(s->init, sizeof s->init, value, &d->init), true;
+    if (strcmp(key, "scale-prior") == 0)
+        return set_string(s->scale_prior, sizeof s->scale_prior, value, &d->scale_prior), true;
+    if (strcmp(key, "distance") == 0)
+        return set_string(s->distance, sizeof s->distance, value, &d->distance), true;
+    if (strcmp(key, "eval-split") == 0)
+        return set_string(s->eval_split, sizeof s->eval_split, value, &d->eval_split), true;
+    if (strcmp(key, "pace") == 0) {
+        set_string(s->pace, sizeof s->pace, value, &d->pace);
+        if (value[0] == '\0')
+            d->pace = NULL;
+        return true;
+    }
+    if (!is_number)
+        return false;
+    if (strcmp(key, "max-depth") == 0)
+        return d->max_depth = (int)number, true;
+    if (strcmp(key, "voxel-size") == 0)
+        return d->voxel_size = (float)number, true;
+    if (strcmp(key, "offsets") == 0)
+        return d->offsets = (int)number, true;
+    if (strcmp(key, "iterations") == 0)
+        return d->iterations = whole, true;
+    if (strcmp(key, "budget-seconds") == 0)
+        return d->budget_seconds = number, true;
+    if (strcmp(key, "downscale") == 0)
+        return d->downscale = number, true;
+    if (strcmp(key, "start-level") == 0)
+        return d->start_level = (int)number, true;
+    if (strcmp(key, "seed") == 0)
+        return d->seed = whole, true;
+    if (strcmp(key, "max-anchors") == 0)
+        return d->max_anchors = (size_t)whole, true;
+    if (strcmp(key, "grow") == 0)
+        return d->grow = number != 0, true;
+    if (strcmp(key, "compat") == 0)
+        return d->compat = number != 0, true;
+    return false;
+}
+
+gbt_status config_parse(const char *text, const char *path, gbt_train_def *def, config_strings *strings, gbt_error *err)
+{
+    int line_number = 1;
+    for (const char *line = text; *line != '\0'; line_number++) {
+        const char *end = strchr(line, '\n');
+        if (end == NULL)
+            end = line + strlen(line);
+        char copy[CONFIG_TEXT_SIZE];
+        snprintf(copy, sizeof copy, "%.*s", (int)(end - line), line);
+        char *equals = strstr(copy, " =");
+        if (equals == NULL)
+            return base_fail(err, GBT_ERR_FORMAT, "%s:%d: \"%.60s\" (wanted key = value)", path, line_number, copy);
+        *equals = '\0';
+        const char *value = equals + 2 + (equals[2] == ' ');
+        if (!set_key(copy, value, def, strings))
+            return base_fail(err, GBT_ERR_FORMAT, "%s:%d: unknown setting or bad value: %.60s = %.60s", path, line_number, copy, value);
+        line = *end == '\0' ? end : end + 1;
+    }
+    return GBT_OK;
+}

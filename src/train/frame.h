@@ -1,0 +1,56 @@
+/* train/frame.h -- one view of an anchor model, start to end: visible anchors, decode, tree, trace. Training and evaluation share it. */
+#ifndef GBT_TRAIN_FRAME_H
+#define GBT_TRAIN_FRAME_H
+
+#include "anchor/decode.h"
+#include "trace/trace.h"
+
+/** Wall seconds by stage of the last passes. */
+typedef struct frame_times {
+    double rays, visible, decode, build, trace, adjoint, decode_adjoint;
+} frame_times;
+
+/** Everything one view needs, reused from view to view. Start from {0}; free with frame_free(). */
+typedef struct frame {
+    ray_image rays;
+    uint32_t *visible; /* [visible_count] anchor indices, ascending */
+    size_t visible_count, visible_capacity;
+    gaussians gaussians, d_gaussians;
+    decode_tape tape;
+    trace_scene scene;
+    image rgb; /* the render */
+    kernel_counters counters;
+    frame_times times;
+    double half_fov_tan[2]; /* of the camera */
+    gbt_camera camera;
+} frame;
+
+/** Largest number of std-devs at which a Gaussian can matter: sqrt(2 ln(255)). */
+#define FRAME_REACH_SIGMAS 3.33f
+
+/**
+ * Render `camera` (any model) into f->rgb.
+ *
+ * An anchor is visible when the ball around it that holds all its Gaussians' proxies meets the camera's cone of rays, so nothing that
+ * could be seen is left out.
+ *
+ * @param keep_tape [in] true when frame_backward() follows
+ * Threads: one frame per thread; parallel inside; same bits for every thread count.
+ */
+gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
+                        gbt_error *err);
+
+/**
+ * Adjoint of the last frame_render(keep_tape): d_image -> d_anchors (rows of f->visible, added) and d_params (added).
+ *
+ * @param volume_weight [in] adds the gradient of volume_weight * mean(scale_x scale_y scale_z) over the frame's Gaussians
+ */
+gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image, float volume_weight, anchors *d_anchors,
+                          float *d_params, gbt_error *err);
+
+/** Mean volume term of the last render's Gaussians: mean(scale_x scale_y scale_z), 0 without Gaussians. */
+double frame_volume(const frame *f);
+
+void frame_free(frame *f);
+
+#endif

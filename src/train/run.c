@@ -1,0 +1,255 @@
+/* train/run.c -- a whole training run: the loop around the steps, its folder, its clock, its signals. */
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "base/cpu.h"
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "io/model_file.h"
+#include "train/checkpoint.h"
+#include "train/config.h"
+#include "train/run_log.h"
+#include "train/trainer.h"
+
+enum { PATH_SIZE = 4096 };
+
+void gbt_set_threads(int threads)
+{
+    parallel_set_threads(threads);
+}
+
+/* ---- signals: the first one asks the loop to stop after its step, a second one ends the process ------------------------------------- */
+
+static volatile sig_atomic_t stop_signal = 0;
+
+static void on_signal(int number)
+{
+    if (stop_signal != 0)
+        _exit(128 + number);
+    stop_signal = number;
+}
+
+typedef struct signal_guard {
+    struct sigaction old_int, old_term;
+} signal_guard;
+
+static void signals_catch(signal_guard *guard)
+{
+    struct sigaction action = {.sa_handler = on_signal};
+    sigemptyset(&action.sa_mask);
+    stop_signal = 0;
+    sigaction(SIGINT, &action, &guard->old_int);
+    sigaction(SIGTERM, &action, &guard->old_term);
+}
+
+static void signals_release(const signal_guard *guard)
+{
+    sigaction(SIGINT, &guard->old_int, NULL);
+    sigaction(SIGTERM, &guard->old_term, NULL);
+}
+
+/* ---- the run's folder ------------------------------------------------------------------------------------------------------------------ */
+
+typedef struct run_paths {
+    char model[PATH_SIZE], config[PATH_SIZE], log[PATH_SIZE], json[PATH_SIZE], checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
+} run_paths;
+
+static gbt_status open_folder(const char *run, run_paths *p, gbt_error *err)
+{
+    char checkpoints[PATH_SIZE];
+    GBT_TRY(file_join(checkpoints, sizeof checkpoints, run, "checkpoints", err));
+    GBT_TRY(file_make_folder(checkpoints, err));
+    GBT_TRY(file_join(p->model, sizeof p->model, run, "model.gbt", err));
+    GBT_TRY(file_join(p->config, sizeof p->config, run, "config", err));
+    GBT_TRY(file_join(p->log, sizeof p->log, run, "log.csv", err));
+    GBT_TRY(file_join(p->json, sizeof p->json, run, "train.json", err));
+    GBT_TRY(file_join(p->checkpoint, sizeof p->checkpoint, checkpoints, "last.gbt", err));
+    return file_join(p->checkpoint_previous, sizeof p->checkpoint_previous, checkpoints, "last.gbt.prev", err);
+}
+
+static gbt_status save_model(const trainer *t, const char *path, gbt_error *err)
+{
+    model m = {.anchors = t->anchors,
+               .decoder = t->decoder,
+               .voxel_size = t->voxel_size,
+               .extent = (float)t->extent,
+               .t_near = t->settings.t_near,
+               .iterations = t->step};
+    for (int i = 0; i < 3; i++)
+        m.origin[i] = t->scene.origin[i], m.background[i] = t->settings.background[i];
+    snprintf(m.data_folder, sizeof m.data_folder, "%s", t->scene.folder);
+    config_text(&t->def, t->scene.folder, m.config, sizeof m.config);
+    return model_save(path, &m, err);
+}
+
+/* ---- the time budget --------------------------------------------------------------------------------------------------------------------- */
+
+/* How long a step takes: so much by itself and so much per pixel, followed as the run changes. */
+typedef struct speed {
+    double fixed_seconds, pixel_seconds;
+    bool known;
+} speed;
+
+static void speed_follow(speed *s, const step_report *r, const frame_times *f)
+{
+    const double pixels = (double)r->width * (double)r->height;
+    const double per_pixel = (f->rays + f->trace + f->adjoint + r->loss_seconds) / pixels;
+    const double fixed = fmax(0, r->total_seconds - per_pixel * pixels - r->photo_seconds);
+    const double keep = s->known ? 0.95 : 0;
+    s->fixed_seconds = keep * s->fixed_seconds + (1 - keep) * fixed;
+    s->pixel_seconds = keep * s->pixel_seconds + (1 - keep) * per_pixel;
+    s->known = true;
+}
+
+/* Give the next part of the schedule its share of the time that is left. Resolutions may change inside the part. */
+static void pace_extend(trainer *t, const speed *s)
+{
+    const int part = t->pace.known;
+    const double seconds = fmax(0, t->def.budget_seconds - t->seconds) / (PACE_SEGMENTS - part);
+    double per_step = 0;
+    for (int i = 0; i < 8; i++) {
+        const double progress = (part + (i + 0.5) / 8) / PACE_SEGMENTS;
+        const int level = schedule_level(progress, t->def.compat ? 0 : t->def.start_level);
+        const gbt_camera camera = photos_camera(&t->photos, t->train_views[0], level);
+        per_step += (s->fixed_seconds + s->pixel_seconds * camera.width * camera.height) / 8;
+    }
+    /* Before anything has been measured: a few steps, and the rest of the first part's time goes to the next. */
+    const double steps = s->known && per_step > 0 ? seconds / per_step : 20;
+    t->pace.steps[part] = (uint64_t)fmin(fmax(steps, 1), 1e7);
+    t->pace.known++;
+}
+
+/* ---- the loop ------------------------------------------------------------------------------------------------------------------------------ */
+
+static gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *err)
+{
+    GBT_TRY(checkpoint_save(t, paths->checkpoint, err));
+    return save_model(t, paths->model, err);
+}
+
+static gbt_status evaluate_in_passing(trainer *t, run_log *log, gbt_error *err)
+{
+    double psnr;
+    GBT_TRY(trainer_held_out_psnr(t, &psnr, err));
+    run_log_evaluation(log, t, psnr);
+    return GBT_OK;
+}
+
+static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gbt_error *err)
+{
+    const gbt_train_def *def = &t->def;
+    speed measured = {0};
+    double last_save = 0, clock_offset = t->seconds;
+    struct timespec begin;
+    clock_gettime(CLOCK_MONOTONIC, &begin);
+    double paused = 0;
+    int next_eval = 0;
+    while (next_eval < def->eval_at_count && def->eval_at_seconds[next_eval] <= t->seconds)
+        next_eval++;
+    last_save = t->seconds;
+    for (;;) {
+        if (pace_segment(&t->pace, t->step) >= t->pace.known) {
+            if (t->pace.known >= PACE_SEGMENTS)
+                return GBT_OK;
+            pace_extend(t, &measured);
+            continue;
+        }
+        step_report report;
+        GBT_TRY(trainer_step(t, &report, err));
+        if (!report.skipped)
+            speed_follow(&measured, &report, &t->frame.times);
+        struct timespec now;
+        clock_gettime(CLOCK_MONOTONIC, &now);
+        t->seconds = clock_offset + (double)(now.tv_sec - begin.tv_sec) + 1e-9 * (double)(now.tv_nsec - begin.tv_nsec) - paused;
+        run_log_step(log, t, &report);
+
+        const bool stop = stop_signal != 0 || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
+        const bool due = def->save_every_seconds > 0 && t->seconds - last_save >= def->save_every_seconds;
+        const bool evaluate = next_eval < def->eval_at_count && t->seconds >= def->eval_at_seconds[next_eval];
+        if (stop || due || (def->save_at_step > 0 && t->step == def->save_at_step)) {
+            GBT_TRY(save_all(t, paths, err));
+            last_save = t->seconds;
+            if (stop)
+                return base_fail(err, GBT_ERR_INTERRUPTED, "stopped after step %llu; saved in %s (go on with --resume)", (unsigned long long)t->step,
+                                 paths->checkpoint);
+        }
+        if (evaluate) {
+            struct timespec before, after;
+            clock_gettime(CLOCK_MONOTONIC, &before);
+            GBT_TRY(evaluate_in_passing(t, log, err));
+            clock_gettime(CLOCK_MONOTONIC, &after);
+            paused += (double)(after.tv_sec - before.tv_sec) + 1e-9 * (double)(after.tv_nsec - before.tv_nsec);
+            next_eval++;
+        }
+    }
+}
+
+static gbt_status resume(trainer *t, const char *data, const run_paths *paths, const gbt_train_def *def, config_strings *strings, gbt_error *err)
+{
+    const char *path = file_exists(paths->checkpoint) ? paths->checkpoint : paths->checkpoint_previous;
+    char text[CONFIG_TEXT_SIZE];
+    gbt_error first = {0};
+    gbt_status status = checkpoint_config(path, text, sizeof text, &first);
+    if (status != GBT_OK && path == paths->checkpoint && file_exists(paths->checkpoint_previous)) {
+        log_warn("%s; going on from %s", first.text, paths->checkpoint_previous);
+        path = paths->checkpoint_previous;
+        status = checkpoint_config(path, text, sizeof text, err);
+    } else if (status != GBT_OK) {
+        return base_fail(err, status, "%s", first.text);
+    }
+    GBT_TRY(status);
+    gbt_train_def saved = *def;
+    GBT_TRY(config_parse(text, path, &saved, strings, err));
+    GBT_TRY(trainer_open(t, data, &saved, err));
+    return checkpoint_load(t, path, err);
+}
+
+static gbt_status run_with_folder(trainer *t, const char *data, const char *run, const gbt_train_def *def, config_strings *strings, gbt_error *err)
+{
+    run_paths paths;
+    GBT_TRY(open_folder(run, &paths, err)); /* before any work: a run that cannot be written must not start */
+    struct timespec begin, end;
+    clock_gettime(CLOCK_MONOTONIC, &begin);
+    if (def->resume)
+        GBT_TRY(resume(t, data, &paths, def, strings, err));
+    else
+        GBT_TRY(trainer_open(t, data, def, err));
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    if (t->step == 0)
+        t->seconds = (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec); /* loading counts */
+    char config[CONFIG_TEXT_SIZE];
+    config_text(&t->def, t->scene.folder, config, sizeof config);
+    GBT_TRY(file_write_atomic(paths.config, config, strlen(config), err));
+
+    run_log log;
+    GBT_TRY(run_log_open(&log, t, paths.log, err));
+    gbt_status status = run_steps(t, &paths, &log, err);
+    if (status == GBT_OK)
+        status = save_all(t, &paths, err);
+    if (status == GBT_OK)
+        status = run_log_summary(&log, t, paths.json, err);
+    run_log_close(&log);
+    return status;
+}
+
+gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def, gbt_error *err)
+{
+    trainer *t = mem_calloc(1, sizeof *t, "trainer", err);
+    config_strings *strings = mem_calloc(1, sizeof *strings, "settings", err);
+    signal_guard guard;
+    signals_catch(&guard);
+    gbt_status status = t == NULL || strings == NULL ? GBT_ERR_NO_MEMORY : run_with_folder(t, data, run, def, strings, err);
+    signals_release(&guard);
+    if (t != NULL)
+        trainer_free(t);
+    mem_free(t);
+    mem_free(strings);
+    return status;
+}

@@ -1,0 +1,35 @@
+/* train/run_log.h -- what a run says about itself: the progress line, log.csv, train.json. */
+#ifndef GBT_TRAIN_RUN_LOG_H
+#define GBT_TRAIN_RUN_LOG_H
+
+#include <stdio.h>
+
+#include "train/trainer.h"
+
+/* Sums since the last row of log.csv. */
+typedef struct run_sums {
+    uint64_t steps;
+    double loss, l1, ssim, psnr, gaussians, visible, rays, hits, blended;
+    double seconds, photo, rays_seconds, visible_seconds, decode, build, trace, loss_seconds, adjoint, decode_adjoint, optimizer, adjust;
+} run_sums;
+
+typedef struct run_log {
+    FILE *csv;
+    run_sums row, all;
+    double psnr_smooth, last_row_seconds, last_line_seconds;
+    bool on_terminal;
+    double evaluated_seconds[GBT_TRAIN_MAX_EVALS], evaluated_psnr[GBT_TRAIN_MAX_EVALS];
+    uint64_t evaluated_step[GBT_TRAIN_MAX_EVALS];
+    int evaluated_count;
+} run_log;
+
+/** Open log.csv (going on with it after --resume) and say what the run starts from. */
+gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, gbt_error *err);
+void run_log_step(run_log *log, const trainer *t, const step_report *report);
+void run_log_evaluation(run_log *log, const trainer *t, double psnr);
+
+/** train.json: counts, seconds by stage, pace, machine. */
+gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path, gbt_error *err);
+void run_log_close(run_log *log);
+
+#endif

@@ -1,0 +1,97 @@
+/* train/schedule.c -- progress, resolution, learning rates. */
+#include "train/schedule.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/fail.h"
+
+/* Full resolution from here on. */
+static const double full_from = 0.4;
+
+pace pace_of_iterations(uint64_t iterations)
+{
+    pace p = {.known = PACE_SEGMENTS};
+    for (uint64_t i = 0; i < PACE_SEGMENTS; i++)
+        p.steps[i] = (i + 1) * iterations / PACE_SEGMENTS - i * iterations / PACE_SEGMENTS;
+    return p;
+}
+
+gbt_status pace_parse(const char *text, pace *out, gbt_error *err)
+{
+    *out = (pace){.known = PACE_SEGMENTS};
+    const char *at = text;
+    for (int i = 0; i < PACE_SEGMENTS; i++) {
+        char *end;
+        const unsigned long long n = strtoull(at, &end, 10);
+        const char wanted = i + 1 < PACE_SEGMENTS ? ',' : '\0';
+        if (end == at || *at < '0' || *at > '9' || *end != wanted || n > 1000000000ull)
+            return base_fail(err, GBT_ERR_ARGUMENT, "pace: entry %d of \"%.60s\" (wanted %d counts, separated by commas)", i + 1, text, PACE_SEGMENTS);
+        out->steps[i] = n;
+        at = end + 1;
+    }
+    return GBT_OK;
+}
+
+uint64_t pace_total(const pace *p)
+{
+    uint64_t sum = 0;
+    for (int i = 0; i < p->known; i++)
+        sum += p->steps[i];
+    return sum;
+}
+
+int pace_segment(const pace *p, uint64_t step)
+{
+    uint64_t before = 0;
+    for (int i = 0; i < p->known; i++) {
+        before += p->steps[i];
+        if (step < before)
+            return i;
+    }
+    return p->known;
+}
+
+double pace_progress(const pace *p, uint64_t step)
+{
+    uint64_t before = 0;
+    for (int i = 0; i < p->known; i++) {
+        if (step < before + p->steps[i])
+            return ((double)i + (double)(step - before) / (double)p->steps[i]) / PACE_SEGMENTS;
+        before += p->steps[i];
+    }
+    return (double)p->known / PACE_SEGMENTS;
+}
+
+/* Each level lasts twice as long as the coarser one before it. */
+double schedule_level_start(int level, int start_level)
+{
+    if (level >= start_level)
+        return 0;
+    return full_from * (exp2(start_level - level) - 1) / (exp2(start_level) - 1);
+}
+
+int schedule_level(double progress, int start_level)
+{
+    int level = start_level;
+    while (level > 0 && progress >= schedule_level_start(level - 1, start_level))
+        level--;
+    return level;
+}
+
+static double decay(double first, double last, double progress)
+{
+    return exp((1 - progress) * log(first) + progress * log(last));
+}
+
+learning_rates schedule_rates(double progress, double extent)
+{
+    return (learning_rates){
+        .offset = decay(0.01, 0.0001, progress) * extent,
+        .feature = 0.0075,
+        .scale = 0.007,
+        .opacity_mlp = decay(0.002, 0.00002, progress),
+        .shape_mlp = 0.004,
+        .color_mlp = decay(0.008, 0.00005, progress),
+    };
+}

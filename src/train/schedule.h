@@ -1,0 +1,53 @@
+/* train/schedule.h -- where a run stands (progress in [0, 1)) and what follows from it: resolution, learning rates, growth.
+
+   Everything is a fraction of the run, so a short run is a whole run. A run is cut into PACE_SEGMENTS equal parts; the pace says how many
+   iterations each part has. With a fixed number of iterations they are equal; with a time budget each part is given its number when it
+   starts, from the speed measured so far, and the numbers are recorded: with them anyone repeats the run to the bit. */
+#ifndef GBT_TRAIN_SCHEDULE_H
+#define GBT_TRAIN_SCHEDULE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "gbtrace/status.h"
+
+enum { PACE_SEGMENTS = 20 };
+
+typedef struct pace {
+    uint64_t steps[PACE_SEGMENTS]; /* iterations of each part, >= 1 where known */
+    int known;                     /* parts decided so far; PACE_SEGMENTS from the start unless the time budget decides */
+} pace;
+
+/** Equal parts that sum to `iterations` (parts may be empty for fewer than PACE_SEGMENTS iterations). */
+pace pace_of_iterations(uint64_t iterations);
+
+/** "n1,...,n20"; GBT_ERR_ARGUMENT otherwise. */
+gbt_status pace_parse(const char *text, pace *out, gbt_error *err);
+
+uint64_t pace_total(const pace *p); /* of the known parts */
+
+/** Progress in front of step number `step` (0-based), which lies in a known part; 1 at or after the end. */
+double pace_progress(const pace *p, uint64_t step);
+
+/** The part that `step` lies in, or p->known when the known parts are used up. */
+int pace_segment(const pace *p, uint64_t step);
+
+/** Resolution level (0: full, l: 1 / 2^l) at `progress`, starting from `start_level`. */
+int schedule_level(double progress, int start_level);
+
+/** Progress at which `level` begins. */
+double schedule_level_start(int level, int start_level);
+
+typedef struct learning_rates {
+    double offset, feature, scale, opacity_mlp, shape_mlp, color_mlp;
+} learning_rates;
+
+/** Log-linear decays of the reference method (docs/training.md); `extent` multiplies the offsets' rate. */
+learning_rates schedule_rates(double progress, double extent);
+
+/** Statistics are gathered from STATS_FROM on; anchors grow and are pruned in [ADJUST_FROM, ADJUST_UNTIL). */
+#define SCHEDULE_STATS_FROM (500.0 / 30000)
+#define SCHEDULE_ADJUST_FROM (1500.0 / 30000)
+#define SCHEDULE_ADJUST_UNTIL 0.5
+
+#endif

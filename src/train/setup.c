@@ -1,0 +1,208 @@
+/* train/setup.c -- from a data set to a trainer that can take its first step. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "base/rng.h"
+#include "base/vec.h"
+#include "bvh/points.h"
+#include "train/seed_points.h"
+#include "train/trainer.h"
+
+enum { STREAM_NETWORKS = 2 };
+
+gbt_train_def gbt_train_def_default(void)
+{
+    return (gbt_train_def){.init = "gb",
+                           .scale_prior = "gb",
+                           .max_depth = 18,
+                           .offsets = 10,
+                           .distance = "auto",
+                           .budget_seconds = 600,
+                           .downscale = 1,
+                           .start_level = 2,
+                           .eval_split = "every=8",
+                           .max_anchors = 2000000,
+                           .grow = true,
+                           .save_every_seconds = 120,
+                           .command = "",
+                           .cookie_ = 0x67627431};
+}
+
+static gbt_status check_def(const gbt_train_def *d, gbt_error *err)
+{
+    if (d->cookie_ != 0x67627431)
+        return base_fail(err, GBT_ERR_ARGUMENT, "train: the def was not made by gbt_train_def_default()");
+    if (strcmp(d->init, "gb") != 0 && strcmp(d->init, "voxel") != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--init: \"%.40s\" (wanted gb or voxel)", d->init);
+    if (strcmp(d->scale_prior, "gb") != 0 && strcmp(d->scale_prior, "nn") != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--scale-prior: \"%.40s\" (wanted gb or nn)", d->scale_prior);
+    if (strcmp(d->distance, "auto") != 0 && strcmp(d->distance, "on") != 0 && strcmp(d->distance, "off") != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--distance: \"%.40s\" (wanted auto, on or off)", d->distance);
+    if (d->max_depth < 0 || d->max_depth > 64)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--max-depth: %d (wanted 0 to 64)", d->max_depth);
+    if (d->offsets < 1 || d->offsets > ANCHOR_MAX_OFFSETS)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--offsets: %d (wanted 1 to %d)", d->offsets, ANCHOR_MAX_OFFSETS);
+    if (!(d->downscale >= 1 && d->downscale <= 64))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: %g (wanted 1 to 64)", d->downscale);
+    if (d->start_level < 0 || d->start_level > 4)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--start-level: %d (wanted 0 to 4)", d->start_level);
+    if (!(d->voxel_size >= 0 && d->voxel_size < 1e9f))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--voxel-size: %g (wanted 0 or more)", (double)d->voxel_size);
+    if (d->iterations == 0 && d->pace == NULL && !(d->budget_seconds > 0 && d->budget_seconds < 1e9))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--budget: %g s (wanted more than 0)", d->budget_seconds);
+    if (d->max_anchors < 1)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--max-anchors: 0 (wanted 1 or more)");
+    return GBT_OK;
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    const float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+/* Distances from training cameras to a spread of anchors: they decide whether the networks see the distance, its unit, and t_near. */
+static gbt_status measure_distances(trainer *t, float *p5, float *median, float *p95, gbt_error *err)
+{
+    const size_t stride = t->anchors.count / 512 + 1, per_view = (t->anchors.count + stride - 1) / stride;
+    float *all = mem_alloc(per_view * t->train_count + 1, sizeof *all, "distances", err);
+    if (all == NULL)
+        return GBT_ERR_NO_MEMORY;
+    size_t count = 0;
+    for (size_t v = 0; v < t->train_count; v++) {
+        const gbt_camera *camera = &t->scene.views[t->train_views[v]].camera;
+        for (size_t i = 0; i < t->anchors.count; i += stride) {
+            double d[3], cam[3], pixel[2];
+            for (int k = 0; k < 3; k++)
+                d[k] = (double)t->anchors.position[3 * i + (size_t)k] - camera->center[k];
+            dmat_apply(camera->rotation, d, cam);
+            if (gbt_camera_project(camera, cam, pixel) && pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera->width && pixel[1] < camera->height)
+                all[count++] = (float)dvec_length(d);
+        }
+    }
+    *p5 = *median = *p95 = 1;
+    if (count > 0) {
+        qsort(all, count, sizeof *all, compare_floats);
+        *p5 = all[count / 20], *median = all[count / 2], *p95 = all[count - 1 - count / 20];
+    }
+    mem_free(all);
+    return GBT_OK;
+}
+
+/* The first features carry the colour of the nearest point: the networks need not discover it anchor by anchor. The rest is small noise. */
+static gbt_status start_features(trainer *t, gbt_error *err)
+{
+    point_tree *tree = NULL;
+    GBT_TRY(point_tree_build(t->scene.points.position, NULL, t->scene.points.count, &tree, err));
+    for (size_t i = 0; i < t->anchors.count; i++) {
+        uint32_t nearest;
+        double square;
+        if (point_tree_nearest(tree, t->anchors.position + 3 * i, 1, SIZE_MAX, &nearest, &square) == 0)
+            continue;
+        for (size_t c = 0; c < 3; c++)
+            t->anchors.feature[i * ANCHOR_FEATURE_DIM + c] = 2 * t->scene.points.color[3 * nearest + c] - 1;
+    }
+    point_tree_free(tree);
+    return GBT_OK;
+}
+
+static gbt_status make_anchors(trainer *t, gbt_error *err)
+{
+    anchor_init_def def = anchor_init_def_default();
+    def.kind = strcmp(t->def.init, "gb") == 0 ? ANCHOR_INIT_GB : ANCHOR_INIT_VOXEL;
+    def.scale = strcmp(t->def.scale_prior, "gb") == 0 ? ANCHOR_SCALE_GB : ANCHOR_SCALE_NN;
+    def.balls.max_depth = t->def.max_depth;
+    def.balls.voxel_size = t->voxel_size;
+    def.offset_count = t->def.offsets;
+    def.scale_max = t->def.compat ? INFINITY : (float)(0.1 * t->extent); /* an isolated point would start as a fog */
+    const scene_points *points = &t->scene.points;
+    GBT_TRY(anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def, &t->anchors, NULL, err));
+    t->anchors_initial = t->anchors.count;
+    return t->def.compat || !points->has_color ? GBT_OK : start_features(t, err);
+}
+
+static gbt_status choose_views(trainer *t, gbt_error *err)
+{
+    t->train_views = mem_alloc(t->scene.view_count + 1, sizeof *t->train_views, "training views", err);
+    t->order = mem_alloc(t->scene.view_count + 1, sizeof *t->order, "view order", err);
+    if (t->train_views == NULL || t->order == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < t->scene.view_count; i++) {
+        if (t->scene.views[i].is_test)
+            t->test_count++;
+        else
+            t->train_views[t->train_count++] = i;
+    }
+    if (t->train_count == 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no photo is left to train on (%zu views, %zu held out)", t->scene.folder, t->scene.view_count,
+                         t->test_count);
+    return GBT_OK;
+}
+
+static gbt_status make_state(trainer *t, gbt_error *err)
+{
+    anchors *same[] = {&t->gradient, &t->moment1, &t->moment2};
+    for (int i = 0; i < 3; i++) {
+        same[i]->offset_count = t->def.offsets;
+        GBT_TRY(anchors_resize(same[i], t->anchors.count, err));
+    }
+    const size_t n = t->decoder.param_count;
+    t->d_params = mem_calloc(n, sizeof *t->d_params, "network gradient", err);
+    t->params_m = mem_calloc(n, sizeof *t->params_m, "network moments", err);
+    t->params_v = mem_calloc(n, sizeof *t->params_v, "network moments", err);
+    if (t->d_params == NULL || t->params_m == NULL || t->params_v == NULL)
+        return GBT_ERR_NO_MEMORY;
+    return adjust_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
+}
+
+gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, gbt_error *err)
+{
+    GBT_TRY(check_def(def, err));
+    t->def = *def;
+    scene_split split;
+    GBT_TRY(scene_split_parse(def->eval_split, &split, err));
+    GBT_TRY(scene_load(data, &split, &t->scene, err));
+    if (t->scene.view_count == 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no photos to train on (a point cloud alone is not enough)", data);
+    GBT_TRY(choose_views(t, err));
+    GBT_TRY(photos_open(&t->photos, &t->scene, def->downscale, err));
+    t->extent = scene_camera_extent(&t->scene);
+    if (t->scene.points.count == 0) {
+        GBT_TRY(seed_points_make(&t->photos, t->train_views, t->train_count, def->seed, &t->scene.points, err));
+        t->points_made = true;
+    }
+    t->points_used = t->scene.points.count;
+    snprintf(t->start_text, sizeof t->start_text, "%zu %s", t->points_used,
+             t->points_made ? "points found by photo consistency (the data set has none)" : "sparse points");
+
+    t->voxel_size = def->voxel_size;
+    if (t->voxel_size == 0)
+        GBT_TRY(balls_voxel_size(t->scene.points.position, t->scene.points.count, def->compat ? VOXEL_COMPAT_SQUARED : VOXEL_MEDIAN_SPACING,
+                                 &t->voxel_size, err));
+    GBT_TRY(make_anchors(t, err));
+
+    float p5, median, p95;
+    GBT_TRY(measure_distances(t, &p5, &median, &p95, err));
+    /* Off by default in the reference, and a trap where distances vary widely. */
+    const bool wide = p95 > 3 * p5;
+    const bool has_distance = strcmp(def->distance, "on") == 0 || (strcmp(def->distance, "auto") == 0 && wide && !def->compat);
+    uint32_t words[4];
+    rng_philox(def->seed, STREAM_NETWORKS, 0, words);
+    GBT_TRY(decoder_init(&t->decoder, def->offsets, has_distance, (uint64_t)words[1] << 32 | words[0], err));
+    t->decoder.distance_scale = def->compat ? 1.0f : 1 / median;
+    t->decoder.distance_min = p5 * t->decoder.distance_scale, t->decoder.distance_max = p95 * t->decoder.distance_scale;
+    t->settings = trace_settings_default();
+    t->settings.t_near = 0.02f * median;
+    GBT_TRY(make_state(t, err));
+
+    if (def->pace != NULL)
+        GBT_TRY(pace_parse(def->pace, &t->pace, err));
+    else if (def->iterations > 0)
+        t->pace = pace_of_iterations(def->iterations);
+    return GBT_OK;
+}

@@ -1,0 +1,291 @@
+/* train/trainer.c -- one training step, readable from top to bottom. */
+#include "train/trainer.h"
+
+#include <math.h>
+#include <string.h>
+#include <time.h>
+
+#include "base/fail.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/rng.h"
+#include "base/vec.h"
+#include "train/adam.h"
+
+static const float dssim_weight = 0.2f, volume_weight = 0.01f;
+enum { ADAM_BLOCK = 512, MAX_SKIPPED_IN_ROW = 10, ADJUSTS_PER_RUN = 100 };
+enum { STREAM_VIEWS = 1 };
+
+static double now_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* ---- which view -------------------------------------------------------------------------------------------------------------------------- */
+
+/* Every view once per epoch, in an order that depends on (seed, epoch) only, so that there is no state to save. */
+static size_t pick_view(trainer *t)
+{
+    const uint64_t epoch = t->step / t->train_count;
+    if (!t->order_ready || t->order_epoch != epoch) {
+        for (size_t i = 0; i < t->train_count; i++)
+            t->order[i] = (uint32_t)i;
+        for (size_t i = t->train_count; i > 1; i--) { /* Fisher-Yates */
+            uint32_t words[4];
+            rng_philox(t->def.seed, STREAM_VIEWS, epoch << 32 | i, words);
+            const size_t j = (size_t)(((uint64_t)words[0] * i) >> 32);
+            const uint32_t swap = t->order[i - 1];
+            t->order[i - 1] = t->order[j], t->order[j] = swap;
+        }
+        t->order_epoch = epoch;
+        t->order_ready = true;
+    }
+    return t->train_views[t->order[t->step % t->train_count]];
+}
+
+/* ---- optimizer ------------------------------------------------------------------------------------------------------------------------------ */
+
+typedef struct adam_job {
+    trainer *t;
+    adam_rates feature, offset, scale;
+} adam_job;
+
+static void adam_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const adam_job *job = context;
+    anchors *p = &job->t->anchors, *g = &job->t->gradient, *m = &job->t->moment1, *v = &job->t->moment2;
+    const size_t rows = end - begin, feature = begin * ANCHOR_FEATURE_DIM, scale = begin * 6;
+    const size_t offset_floats = 3 * (size_t)p->offset_count, offset = begin * offset_floats;
+    adam_step(p->feature + feature, g->feature + feature, m->feature + feature, v->feature + feature, rows * ANCHOR_FEATURE_DIM, job->feature);
+    adam_step(p->offset + offset, g->offset + offset, m->offset + offset, v->offset + offset, rows * offset_floats, job->offset);
+    adam_step(p->scale_log + scale, g->scale_log + scale, m->scale_log + scale, v->scale_log + scale, rows * 6, job->scale);
+}
+
+static void step_networks(trainer *t, const learning_rates *rates)
+{
+    decoder_part parts[3];
+    decoder_parts(&t->decoder, parts);
+    const double rate[3] = {rates->opacity_mlp, rates->shape_mlp, rates->color_mlp};
+    for (int i = 0; i < 3; i++) {
+        const size_t b = parts[i].begin, n = parts[i].end - b;
+        adam_step(t->decoder.params + b, t->d_params + b, t->params_m + b, t->params_v + b, n, adam_rates_at(rate[i], t->step + 1));
+    }
+}
+
+static void step_anchors(trainer *t, const learning_rates *rates)
+{
+    t->anchor_t++;
+    adam_job job = {.t = t,
+                    .feature = adam_rates_at(rates->feature, t->anchor_t),
+                    .offset = adam_rates_at(rates->offset, t->anchor_t),
+                    .scale = adam_rates_at(rates->scale, t->anchor_t)};
+    parallel_blocks(t->anchors.count, ADAM_BLOCK, adam_block, &job);
+}
+
+/* ---- statistics, growing and pruning -------------------------------------------------------------------------------------------------------- */
+
+/* The norm of dL/d(projected mean in NDC), from the ray-traced gradient of the mean in camera axes (g): (z tan_x g.x, z tan_y g.y).
+   Counted for every Gaussian whose box may touch the image, hit or not: counting hits alone would grow what is mostly hidden. */
+static void gather_statistics(trainer *t)
+{
+    const frame *f = &t->frame;
+    const int k_count = t->anchors.offset_count;
+    adjust_stats *s = &t->stats;
+    for (size_t v = 0; v < f->visible_count; v++) {
+        s->opacity_accum[f->visible[v]] += f->tape.opacity_sum[v];
+        s->visit_count[f->visible[v]] += 1;
+    }
+    float r[9], c[3];
+    for (int i = 0; i < 9; i++)
+        r[i] = (float)f->camera.rotation[i];
+    for (int i = 0; i < 3; i++)
+        c[i] = (float)f->camera.center[i];
+    const float tan_x = (float)f->half_fov_tan[0], tan_y = (float)f->half_fov_tan[1];
+    const gaussians *g = &f->gaussians, *dg = &f->d_gaussians;
+    for (size_t i = 0; i < g->count; i++) {
+        const float x = g->mean_x[i] - c[0], y = g->mean_y[i] - c[1], z = g->mean_z[i] - c[2];
+        const float cam_z = r[6] * x + r[7] * y + r[8] * z;
+        if (!(cam_z > t->settings.t_near))
+            continue;
+        const float cam_x = r[0] * x + r[1] * y + r[2] * z, cam_y = r[3] * x + r[4] * y + r[5] * z;
+        const float reach = 3 * fmaxf(g->scale_x[i], fmaxf(g->scale_y[i], g->scale_z[i]));
+        if (fabsf(cam_x) > tan_x * cam_z + reach || fabsf(cam_y) > tan_y * cam_z + reach)
+            continue;
+        const float gx = r[0] * dg->mean_x[i] + r[1] * dg->mean_y[i] + r[2] * dg->mean_z[i];
+        const float gy = r[3] * dg->mean_x[i] + r[4] * dg->mean_y[i] + r[5] * dg->mean_z[i];
+        const float sx = cam_z * tan_x * gx, sy = cam_z * tan_y * gy;
+        const uint32_t slot = f->tape.slot[i];
+        const size_t at = (size_t)f->visible[slot / (uint32_t)k_count] * (size_t)k_count + slot % (uint32_t)k_count;
+        s->grad_accum[at] += sqrtf(sx * sx + sy * sy);
+        s->grad_count[at] += 1;
+    }
+}
+
+/* Rows of `a` in the order of `source`; -1 gives zeros (new anchors have no momentum yet). */
+static gbt_status follow_rows(anchors *a, const adjust_result *result, gbt_error *err)
+{
+    anchors old = *a;
+    *a = (anchors){.offset_count = old.offset_count};
+    const gbt_status status = anchors_resize(a, result->count, err);
+    const size_t offset_floats = 3 * (size_t)old.offset_count;
+    for (size_t i = 0; status == GBT_OK && i < result->count; i++) {
+        if (result->source[i] < 0)
+            continue;
+        const size_t from = (size_t)result->source[i];
+        memcpy(a->feature + i * ANCHOR_FEATURE_DIM, old.feature + from * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof(float));
+        memcpy(a->offset + i * offset_floats, old.offset + from * offset_floats, offset_floats * sizeof(float));
+        memcpy(a->scale_log + i * 6, old.scale_log + from * 6, 6 * sizeof(float));
+    }
+    anchors_free(&old);
+    return status;
+}
+
+static gbt_status grow_and_prune(trainer *t, uint64_t steps_since, gbt_error *err)
+{
+    adjust_def def = adjust_def_default();
+    def.voxel_size = t->voxel_size;
+    def.interval = (float)steps_since;
+    def.shape_log_max = t->def.compat ? 0.05f : INFINITY;
+    def.max_anchors = t->def.max_anchors;
+    def.compat = t->def.compat;
+    def.seed = t->def.seed;
+    def.step = t->step;
+    adjust_result result = {0};
+    gbt_status status = anchors_adjust(&t->anchors, &t->stats, &def, &result, err);
+    anchors *followers[] = {&t->gradient, &t->moment1, &t->moment2};
+    for (int i = 0; i < 3 && status == GBT_OK; i++)
+        status = follow_rows(followers[i], &result, err);
+    mem_free(result.source);
+    return status;
+}
+
+/* ---- one step --------------------------------------------------------------------------------------------------------------------------------- */
+
+/* True when `progress` has passed a multiple of 1 / ADJUSTS_PER_RUN since the step before. */
+static bool adjust_is_due(const trainer *t, double progress, double next)
+{
+    if (!t->def.grow || progress < SCHEDULE_ADJUST_FROM || progress >= SCHEDULE_ADJUST_UNTIL)
+        return false;
+    if (t->def.compat)
+        return (t->step + 1) % 100 == 0;
+    return floor(progress * ADJUSTS_PER_RUN) != floor(next * ADJUSTS_PER_RUN);
+}
+
+gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
+{
+    const double start = now_seconds();
+    memset(out, 0, sizeof *out);
+    const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
+    const learning_rates rates = schedule_rates(progress, t->def.compat ? t->extent : 1.0);
+
+    /* A view, at the resolution that the model can already use. */
+    const size_t view = pick_view(t);
+    out->level = schedule_level(progress, t->def.compat ? 0 : t->def.start_level);
+    double clock = now_seconds();
+    GBT_TRY(photos_get(&t->photos, view, out->level, &t->photo, err));
+    out->photo_seconds = now_seconds() - clock;
+    const gbt_camera camera = photos_camera(&t->photos, view, out->level);
+    out->width = camera.width, out->height = camera.height;
+
+    /* Render, compare. */
+    frame *f = &t->frame;
+    GBT_TRY(frame_render(f, &t->anchors, &t->decoder, &camera, &t->settings, true, err));
+    out->gaussians = f->gaussians.count, out->visible = f->visible_count;
+    clock = now_seconds();
+    if (t->d_image.width != camera.width || t->d_image.height != camera.height) {
+        image_free(&t->d_image);
+        GBT_TRY(image_alloc(&t->d_image, camera.width, camera.height, 3, err));
+    }
+    image_loss_result loss;
+    GBT_TRY(image_loss(&f->rgb, &t->photo, NULL, dssim_weight, &t->loss_scratch, &t->d_image, &loss, err));
+    out->loss = loss.loss + (double)volume_weight * frame_volume(f);
+    out->l1 = loss.l1, out->ssim = loss.ssim;
+    out->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
+    out->loss_seconds = now_seconds() - clock;
+
+    if (!isfinite(out->loss)) {
+        out->skipped = true;
+        t->skipped_steps++;
+        if (++t->skipped_in_row >= MAX_SKIPPED_IN_ROW)
+            return base_fail(err, GBT_ERR_FORMAT, "train: the loss was not finite in %d steps in a row (last photo: %s)", MAX_SKIPPED_IN_ROW,
+                             t->scene.views[view].name);
+        log_warn("step %llu skipped: the loss is not finite (photo %s)", (unsigned long long)t->step, t->scene.views[view].name);
+        t->step++;
+        return GBT_OK;
+    }
+    t->skipped_in_row = 0;
+
+    /* Gradients, then parameters. */
+    GBT_TRY(frame_backward(f, &t->anchors, &t->decoder, &t->d_image, volume_weight, &t->gradient, t->d_params, err));
+    clock = now_seconds();
+    const bool adjust = adjust_is_due(t, progress, next);
+    step_networks(t, &rates);
+    if (!(adjust && t->def.compat)) /* in the reference the per-anchor groups miss the step in which anchors change */
+        step_anchors(t, &rates);
+    out->optimizer_seconds = now_seconds() - clock;
+
+    /* Anchors. */
+    clock = now_seconds();
+    if (t->def.grow && progress >= SCHEDULE_STATS_FROM && progress < SCHEDULE_ADJUST_UNTIL)
+        gather_statistics(t);
+    if (adjust) {
+        const uint64_t since = t->def.compat ? 100 : t->step + 1 - t->adjust_step;
+        GBT_TRY(grow_and_prune(t, since, err));
+        t->adjust_step = t->step + 1;
+    }
+    out->adjust_seconds = now_seconds() - clock;
+    t->step++;
+    out->total_seconds = now_seconds() - start;
+    return GBT_OK;
+}
+
+gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
+{
+    double sum = 0;
+    size_t count = 0;
+    image photo = {0};
+    gbt_status status = GBT_OK;
+    for (size_t i = 0; i < t->scene.view_count && status == GBT_OK; i++) {
+        if (!t->scene.views[i].is_test)
+            continue;
+        const gbt_camera camera = photos_camera(&t->photos, i, 0);
+        status = frame_render(&t->frame, &t->anchors, &t->decoder, &camera, &t->settings, false, err);
+        if (status == GBT_OK)
+            status = scene_read_photo(&t->scene.views[i], camera.width, camera.height, &photo, err);
+        if (status == GBT_OK) {
+            image_quantize(&photo);
+            image_quantize(&t->frame.rgb);
+            sum += metric_psnr(&t->frame.rgb, &photo);
+            count++;
+        }
+        image_free(&photo);
+    }
+    *psnr = count > 0 ? sum / (double)count : (double)NAN;
+    return status;
+}
+
+void trainer_free(trainer *t)
+{
+    anchors *all[] = {&t->anchors, &t->gradient, &t->moment1, &t->moment2};
+    for (int i = 0; i < 4; i++)
+        anchors_free(all[i]);
+    decoder_free(&t->decoder);
+    mem_free(t->d_params);
+    mem_free(t->params_m);
+    mem_free(t->params_v);
+    adjust_stats_free(&t->stats);
+    frame_free(&t->frame);
+    image_free(&t->photo);
+    image_free(&t->d_image);
+    loss_scratch_free(&t->loss_scratch);
+    mem_free(t->order);
+    mem_free(t->train_views);
+    if (t->photos.source != NULL)
+        photos_close(&t->photos);
+    scene_free(&t->scene);
+    memset(t, 0, sizeof *t);
+}

@@ -1,0 +1,35 @@
+/* cli/cmd_bench.c -- gbtrace bench trace, and gbtrace check-grad. */
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/options.h"
+#include "gbtrace/bench.h"
+#include "gbtrace/train.h"
+
+static int run_bench(const command *self, int argc, char **argv)
+{
+    gbt_bench_def def = gbt_bench_def_default();
+    bool check = false;
+    int threads = 0;
+    const option options[] = {
+        {.name = "model", .kind = OPTION_STRING, .value = &def.model, .value_name = "FILE.ply|RUN", .help = "plain 3DGS Gaussians, or a trained run", .required = true},
+        {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json", .help = "origin, target, up, fov_x_deg, width, height"},
+        {.name = "repeats", .kind = OPTION_INT, .value = &def.repeats, .min = 1, .max = 1000, .value_name = "N", .help = "timed passes; the median counts"},
+        {.name = "check", .kind = OPTION_FLAG, .value = &check, .help = "compare with the double reference"},
+        {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the figures there"},
+        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
+    };
+    operands name;
+    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &name);
+    if (code >= 0)
+        return code;
+    if (strcmp(name.value[0], "trace") != 0)
+        return command_misused("bench: unknown workload \"%.60s\" (wanted trace)", name.value[0]);
+    if (threads > 0)
+        gbt_set_threads(threads);
+    def.check = check;
+    gbt_error err = {0};
+    return command_failed(gbt_bench_trace(&def, stdout, &err), &err);
+}
+
+const command command_bench = {.name = "bench", .summary = "time the tracer on given Gaussians", .usage = "trace --model FILE.ply --camera FILE.json", .run = run_bench};

@@ -1,0 +1,20 @@
+/* cli/cmd_eval.c -- gbtrace eval. */
+#include "cli/options.h"
+#include "gbtrace/evaluate.h"
+
+static int run(const command *self, int argc, char **argv)
+{
+    gbt_evaluate_def def = gbt_evaluate_def_default();
+    const option options[] = {
+        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "data set in place of the one it was trained on"},
+        {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the scores there too"},
+    };
+    operands model;
+    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);
+    if (code >= 0)
+        return code;
+    gbt_error err = {0};
+    return command_failed(gbt_evaluate(model.value[0], &def, &err), &err);
+}
+
+const command command_eval = {.name = "eval", .summary = "score the held-out views: PSNR, SSIM, FLIP; renders and report", .usage = "RUN", .run = run};

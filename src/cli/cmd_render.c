@@ -1,0 +1,34 @@
+/* cli/cmd_render.c -- gbtrace render. */
+#include <string.h>
+
+#include "cli/options.h"
+#include "gbtrace/evaluate.h"
+#include "gbtrace/train.h"
+
+static int run(const command *self, int argc, char **argv)
+{
+    gbt_render_def def = gbt_render_def_default();
+    const char *out = NULL, *split = "test";
+    int threads = 0;
+    const option options[] = {
+        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR", .help = "folder for the images", .required = true},
+        {.name = "split", .kind = OPTION_CHOICE, .value = &split, .choices = "test|train|all", .help = "which views of the data set"},
+        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "cameras from another data set"},
+        {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|reference", .help = "the tracer, or the double reference (slow)"},
+        {.name = "format", .kind = OPTION_CHOICE, .value = &def.format, .choices = "png|exr", .help = "8-bit PNG, or float EXR"},
+        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",
+         .help = "divide the photos' size by this; 0: as in training"},
+        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
+    };
+    operands model;
+    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);
+    if (code >= 0)
+        return code;
+    if (threads > 0)
+        gbt_set_threads(threads);
+    def.split = strcmp(split, "train") == 0 ? GBT_SPLIT_TRAIN : strcmp(split, "all") == 0 ? GBT_SPLIT_ALL : GBT_SPLIT_TEST;
+    gbt_error err = {0};
+    return command_failed(gbt_render(model.value[0], out, &def, &err), &err);
+}
+
+const command command_render = {.name = "render", .summary = "render the views of a trained scene", .usage = "RUN -o DIR", .run = run};

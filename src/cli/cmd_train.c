@@ -1,0 +1,32 @@
+/* cli/cmd_train.c -- gbtrace train. */
+#include "cli/options.h"
+#include "cli/train_options.h"
+#include "gbtrace/evaluate.h"
+
+static int run(const command *self, int argc, char **argv)
+{
+    train_options t;
+    train_options_init(&t);
+    const char *output = NULL;
+    const option own[] = {
+        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &output, .value_name = "RUN", .help = "folder for the model, scores and report",
+         .required = true},
+    };
+    option options[OPTIONS_MAX];
+    const int count = train_options_table(&t, own, sizeof own / sizeof *own, options);
+    operands data;
+    const int code = options_parse(self, options, count, 1, 1, argc, argv, &data);
+    if (code >= 0)
+        return code;
+    gbt_error err = {0};
+    gbt_status status = train_options_finish(&t, "gbtrace train", argc, argv, &err);
+    if (status == GBT_OK)
+        status = gbt_train(data.value[0], output, &t.def, &err);
+    if (status == GBT_OK) {
+        const gbt_evaluate_def score = gbt_evaluate_def_default();
+        status = gbt_evaluate(output, &score, &err);
+    }
+    return command_failed(status, &err);
+}
+
+const command command_train = {.name = "train", .summary = "train on posed photos, score the held-out ones, write a report", .usage = "DATA -o RUN", .run = run};

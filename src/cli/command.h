@@ -1,0 +1,26 @@
+/* cli/command.h -- what a subcommand is, and how it ends. */
+#ifndef GBT_CLI_COMMAND_H
+#define GBT_CLI_COMMAND_H
+
+#include "gbtrace/status.h"
+
+typedef struct command {
+    const char *name;
+    const char *summary; /* one line, for the list of commands */
+    const char *usage;   /* operands and the options that it needs, for example "DATA -o FILE.ply" */
+    int (*run)(const struct command *self, int argc, char **argv); /* arguments after the name; returns the exit code */
+} command;
+
+/** One `error: ...` line on stderr for a failure (control characters become ?); returns the exit code that belongs to the status. */
+int command_failed(gbt_status status, const gbt_error *err);
+
+/** The same for the caller's own text: usage, exit code 2. */
+int command_misused(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+/** The name of `names` (count of them) that is nearest to a mistyped one, or NULL if none is near. */
+const char *command_nearest(const char *typed, const char *const *names, int count);
+
+/* One line per subcommand; main.c lists them. */
+extern const command command_demo, command_info, command_init, command_train, command_eval, command_render, command_make_scene, command_bench;
+
+#endif

@@ -1,0 +1,184 @@
+/* cli/option_values.c -- the text of one option to its value: strict, without locale, within its range. */
+#include <ctype.h>
+#include <errno.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/options.h"
+
+/** Length of [+-]digits[.digits][e[+-]digits] at the start of `text`; 0 if there is none. No hex, nan, inf or blanks. */
+static size_t decimal_length(const char *text)
+{
+    size_t i = text[0] == '+' || text[0] == '-' ? 1 : 0, digits = 0;
+    for (; isdigit((unsigned char)text[i]); i++)
+        digits++;
+    if (text[i] == '.')
+        for (i++; isdigit((unsigned char)text[i]); i++)
+            digits++;
+    if (digits == 0)
+        return 0;
+    if (text[i] == 'e' || text[i] == 'E') {
+        size_t j = i + 1;
+        if (text[j] == '+' || text[j] == '-')
+            j++;
+        if (isdigit((unsigned char)text[j])) {
+            while (isdigit((unsigned char)text[j]))
+                j++;
+            i = j;
+        }
+    }
+    return i;
+}
+
+static bool read_decimal(const char *text, double min, double max, double *out)
+{
+    const size_t length = decimal_length(text);
+    if (length == 0 || text[length] != '\0')
+        return false;
+    *out = strtod(text, NULL); /* the program never leaves the C locale */
+    return isfinite(*out) && *out >= min && *out <= max;
+}
+
+static bool read_whole(const char *text, double min, double max, int64_t *out)
+{
+    const char *digits = text[0] == '-' ? text + 1 : text;
+    if (digits[0] == '\0' || strspn(digits, "0123456789") != strlen(digits))
+        return false;
+    errno = 0;
+    const long long value = strtoll(text, NULL, 10);
+    *out = value;
+    return errno == 0 && (double)value >= min && (double)value <= max;
+}
+
+static bool read_uint64(const char *text, double min, double max, uint64_t *out)
+{
+    if (text[0] == '\0' || strspn(text, "0123456789") != strlen(text))
+        return false;
+    errno = 0;
+    *out = strtoull(text, NULL, 10);
+    return errno == 0 && ((min == 0 && max == 0) || ((double)*out >= min && (double)*out <= max));
+}
+
+/** "90", "90s", "10m", "1h30m": parts from large to small, each unit once. */
+static bool read_duration(const char *text, double min, double max, double *out)
+{
+    static const char units[] = "hms";
+    static const double seconds[] = {3600, 60, 1};
+    double sum = 0;
+    int next = 0;
+    if (text[0] == '\0' || text[0] == '-' || text[0] == '+')
+        return false;
+    while (*text != '\0') {
+        const size_t length = decimal_length(text);
+        if (length == 0 || text[0] == '-' || text[0] == '+')
+            return false;
+        const char unit = text[length];
+        if (unit == '\0' && next > 0) /* a bare number is seconds only when it stands alone */
+            return false;
+        const char *place = unit == '\0' ? units + 2 : strchr(units, unit);
+        if (place == NULL || place - units < next)
+            return false;
+        sum += strtod(text, NULL) * seconds[place - units];
+        next = (int)(place - units) + 1;
+        text += length + (unit != '\0');
+    }
+    *out = sum;
+    return isfinite(sum) && sum >= min && sum <= max;
+}
+
+static bool read_size(const char *text, double min, double max, size_t *out)
+{
+    static const char units[] = "KMGT";
+    const size_t length = decimal_length(text);
+    if (length == 0 || text[0] == '-')
+        return false;
+    double bytes = strtod(text, NULL);
+    if (text[length] != '\0') {
+        const char *place = strchr(units, text[length]);
+        if (place == NULL || text[length + 1] != '\0')
+            return false;
+        bytes = ldexp(bytes, 10 * (int)(place - units + 1));
+    }
+    if (!isfinite(bytes) || bytes < min || bytes > max || bytes >= 0x1p63)
+        return false;
+    *out = (size_t)bytes;
+    return true;
+}
+
+static bool is_choice(const char *choices, const char *text)
+{
+    const size_t length = strcspn(text, "|"); /* several choices are not one */
+    if (text[length] != '\0')
+        return false;
+    for (const char *part = choices; part != NULL; part = strchr(part, '|') != NULL ? strchr(part, '|') + 1 : NULL)
+        if (length > 0 && strncmp(part, text, length) == 0 && (part[length] == '|' || part[length] == '\0'))
+            return true;
+    return false;
+}
+
+bool options_read_value(const option *o, const char *text, char *wanted, size_t wanted_size)
+{
+    bool ok = false;
+    int64_t whole;
+    double number;
+    switch (o->kind) {
+    case OPTION_FLAG:
+    case OPTION_FLAG_OFF: /* only from a configuration file: there a flag has a value */
+        ok = strcmp(text, "true") == 0 || strcmp(text, "false") == 0;
+        if (ok)
+            *(bool *)o->value = (strcmp(text, "true") == 0) == (o->kind == OPTION_FLAG);
+        snprintf(wanted, wanted_size, "true or false");
+        break;
+    case OPTION_INT:
+        ok = read_whole(text, o->min, o->max, &whole);
+        if (ok)
+            *(int *)o->value = (int)whole;
+        snprintf(wanted, wanted_size, "a whole number from %.0f to %.0f", o->min, o->max);
+        break;
+    case OPTION_UINT64:
+        ok = read_uint64(text, o->min, o->max, o->value);
+        if (o->min == 0 && o->max == 0)
+            snprintf(wanted, wanted_size, "a whole number from 0 to 18446744073709551615");
+        else
+            snprintf(wanted, wanted_size, "a whole number from %.0f to %.0f", o->min, o->max);
+        break;
+    case OPTION_FLOAT:
+        ok = read_decimal(text, o->min, o->max, &number);
+        if (ok)
+            *(float *)o->value = (float)number;
+        snprintf(wanted, wanted_size, "a number from %g to %g", o->min, o->max);
+        break;
+    case OPTION_DOUBLE:
+        ok = read_decimal(text, o->min, o->max, &number);
+        if (ok)
+            *(double *)o->value = number;
+        snprintf(wanted, wanted_size, "a number from %g to %g", o->min, o->max);
+        break;
+    case OPTION_STRING:
+        ok = text[0] != '\0';
+        if (ok)
+            *(const char **)o->value = text;
+        snprintf(wanted, wanted_size, "a text that is not empty");
+        break;
+    case OPTION_CHOICE:
+        ok = is_choice(o->choices, text);
+        if (ok)
+            *(const char **)o->value = text;
+        snprintf(wanted, wanted_size, "one of %s", o->choices);
+        break;
+    case OPTION_DURATION:
+        ok = read_duration(text, o->min, o->max, &number);
+        if (ok)
+            *(double *)o->value = number;
+        snprintf(wanted, wanted_size, "a duration like 90s, 10m or 1h30m, from %gs to %gs", o->min, o->max);
+        break;
+    case OPTION_SIZE:
+        ok = read_size(text, o->min, o->max, o->value);
+        snprintf(wanted, wanted_size, "a size like 512M or 6G, from %.0f to %.0f bytes", o->min, o->max);
+        break;
+    }
+    return ok;
+}

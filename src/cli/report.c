@@ -1,0 +1,75 @@
+/* cli/report.c -- the one line of an error, and the guess at what a mistyped name should have been. */
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/command.h"
+
+static void print_error(const char *text)
+{
+    fputs("error: ", stderr);
+    for (const char *c = text; *c != '\0'; c++)
+        fputc((unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c, stderr);
+    fputc('\n', stderr);
+}
+
+int command_failed(gbt_status status, const gbt_error *err)
+{
+    if (status == GBT_OK)
+        return 0;
+    print_error(err->text[0] != '\0' ? err->text : "failed without a reason");
+    return gbt_status_exit_code(status);
+}
+
+int command_misused(const char *format, ...)
+{
+    char text[1024];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    print_error(text);
+    return gbt_status_exit_code(GBT_ERR_ARGUMENT);
+}
+
+enum { NAME_LIMIT = 40 };
+
+static int smaller(int a, int b)
+{
+    return a < b ? a : b;
+}
+
+/** Insertions, deletions, replacements and swaps of neighbours that make `b` of `a`; both shorter than NAME_LIMIT. */
+static int edit_distance(const char *a, const char *b)
+{
+    const int m = (int)strlen(a), n = (int)strlen(b);
+    int d[NAME_LIMIT + 1][NAME_LIMIT + 1];
+    for (int i = 0; i <= m; i++)
+        d[i][0] = i;
+    for (int j = 0; j <= n; j++)
+        d[0][j] = j;
+    for (int i = 1; i <= m; i++)
+        for (int j = 1; j <= n; j++) {
+            d[i][j] = smaller(smaller(d[i - 1][j], d[i][j - 1]) + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1]));
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+                d[i][j] = smaller(d[i][j], d[i - 2][j - 2] + 1);
+        }
+    return d[m][n];
+}
+
+const char *command_nearest(const char *typed, const char *const *names, int count)
+{
+    const int length = (int)strnlen(typed, NAME_LIMIT);
+    if (length == 0 || length == NAME_LIMIT)
+        return NULL;
+    int best = length / 3 + 2; /* further away it would be a guess, not a help */
+    const char *nearest = NULL;
+    for (int i = 0; i < count; i++) {
+        if (strlen(names[i]) >= NAME_LIMIT)
+            continue;
+        const int distance = edit_distance(typed, names[i]);
+        if (distance < best && distance < (int)strlen(names[i]))
+            best = distance, nearest = names[i];
+    }
+    return nearest;
+}

@@ -1,0 +1,77 @@
+/* cli/train_options.c -- the options of a training run. */
+#include "cli/train_options.h"
+
+#include <stdio.h>
+#include <string.h>
+
+void train_options_init(train_options *t)
+{
+    memset(t, 0, sizeof *t);
+    t->def = gbt_train_def_default();
+}
+
+int train_options_table(train_options *t, const option *own, int own_count, option *out)
+{
+    gbt_train_def *d = &t->def;
+    const option shared[] = {
+        {.name = "budget", .kind = OPTION_DURATION, .value = &d->budget_seconds, .min = 1, .max = 1e7, .value_name = "TIME",
+         .help = "train this long; the schedules fit (10m, 90s, 1h)"},
+        {.name = "iterations", .kind = OPTION_UINT64, .value = &d->iterations, .min = 0, .max = 1e9, .value_name = "N", .help = "train so many steps in place of a budget; 0: the budget decides"},
+        {.name = "pace", .kind = OPTION_STRING, .value = &d->pace, .value_name = "N1,...,N20", .help = "repeat a budget run to the bit: the pace that it recorded in train.json"},
+        {.name = "init", .kind = OPTION_CHOICE, .value = &d->init, .choices = "gb|voxel", .help = "anchors from granular balls, or from voxels"},
+        {.name = "scale-prior", .kind = OPTION_CHOICE, .value = &d->scale_prior, .choices = "gb|nn", .help = "first scale from balls and spacing, or from spacing alone"},
+        {.name = "max-depth", .kind = OPTION_INT, .value = &d->max_depth, .min = 0, .max = 64, .value_name = "D", .help = "most splits of the cloud"},
+        {.name = "voxel-size", .kind = OPTION_FLOAT, .value = &d->voxel_size, .min = 0, .max = 1e9, .value_name = "V", .help = "base scale, scene units; 0: from the points"},
+        {.name = "offsets", .kind = OPTION_INT, .value = &d->offsets, .min = 1, .max = 16, .value_name = "K", .help = "Gaussians per anchor"},
+        {.name = "distance", .kind = OPTION_CHOICE, .value = &d->distance, .choices = "auto|on|off", .help = "whether the networks see the distance"},
+        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &d->downscale, .min = 1, .max = 64, .value_name = "F", .help = "divide the photos' size by this"},
+        {.name = "start-level", .kind = OPTION_INT, .value = &d->start_level, .min = 0, .max = 4, .value_name = "L", .help = "coarse to fine: start at 1/2^L of the size"},
+        {.name = "eval-split", .kind = OPTION_STRING, .value = &d->eval_split, .value_name = "SPLIT", .help = "held-out photos: every=N, none, list=FILE"},
+        {.name = "eval-at", .kind = OPTION_STRING, .value = &t->eval_at, .value_name = "T1,T2", .help = "held-out PSNR after so much training (1m,2m); the clock stops meanwhile"},
+        {.name = "max-anchors", .kind = OPTION_UINT64, .value = &d->max_anchors, .min = 1, .max = 1e8, .value_name = "N", .help = "growth stops there"},
+        {.name = "no-grow", .kind = OPTION_FLAG, .value = &t->no_grow, .help = "keep the first anchors"},
+        {.name = "compat", .kind = OPTION_FLAG, .value = &d->compat, .help = "every quirk of the reference method"},
+        {.name = "save-every", .kind = OPTION_DURATION, .value = &d->save_every_seconds, .min = 0, .max = 1e7, .value_name = "TIME", .help = "time between checkpoints; 0: only at the end"},
+        {.name = "resume", .kind = OPTION_FLAG, .value = &d->resume, .help = "go on from the last checkpoint of RUN, with its settings"},
+        {.name = "seed", .kind = OPTION_UINT64, .value = &d->seed, .value_name = "S", .help = "of everything that is random"},
+        {.name = "threads", .kind = OPTION_INT, .value = &t->threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors; never changes the result"},
+    };
+    const int shared_count = sizeof shared / sizeof *shared;
+    memcpy(out, own, (size_t)own_count * sizeof *own);
+    memcpy(out + own_count, shared, sizeof shared);
+    return own_count + shared_count;
+}
+
+static gbt_status read_times(train_options *t, gbt_error *err)
+{
+    char list[512];
+    if (snprintf(list, sizeof list, "%s", t->eval_at) >= (int)sizeof list) {
+        snprintf(err->text, sizeof err->text, "--eval-at: the list is too long");
+        return GBT_ERR_ARGUMENT;
+    }
+    double previous = 0;
+    char *rest = NULL;
+    for (char *item = strtok_r(list, ",", &rest); item != NULL; item = strtok_r(NULL, ",", &rest)) {
+        double seconds = 0;
+        const option one = {.name = "eval-at", .kind = OPTION_DURATION, .value = &seconds, .min = 0, .max = 1e7, .value_name = "TIME"};
+        char wanted[128];
+        if (!options_read_value(&one, item, wanted, sizeof wanted) || seconds <= previous || t->def.eval_at_count == GBT_TRAIN_MAX_EVALS) {
+            snprintf(err->text, sizeof err->text, "--eval-at: \"%.80s\" (wanted up to %d rising times, such as 1m,2m)", item, GBT_TRAIN_MAX_EVALS);
+            return GBT_ERR_ARGUMENT;
+        }
+        t->def.eval_at_seconds[t->def.eval_at_count++] = previous = seconds;
+    }
+    return GBT_OK;
+}
+
+gbt_status train_options_finish(train_options *t, const char *command_name, int argc, char **argv, gbt_error *err)
+{
+    if (t->threads > 0)
+        gbt_set_threads(t->threads);
+    t->def.grow = !t->no_grow;
+    size_t used = (size_t)snprintf(t->command, sizeof t->command, "%s", command_name);
+    for (int i = 0; i < argc && used < sizeof t->command; i++)
+        used += (size_t)snprintf(t->command + used, sizeof t->command - used, " %s", argv[i]);
+    t->def.command = t->command;
+    return t->eval_at != NULL ? read_times(t, err) : GBT_OK;
+}

@@ -1,0 +1,286 @@
+/* eval/bench_trace.c -- time build, forward and adjoint on given Gaussians, with the error against the double reference beside it. */
+#include <jansson.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "base/cpu.h"
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/vec.h"
+#include "data/gaussian_ply.h"
+#include "eval/json_out.h"
+#include "eval/loaded_run.h"
+#include "gbtrace/bench.h"
+#include "trace/reference.h"
+
+enum { CHECK_STRIDE = 8 };
+
+gbt_bench_def gbt_bench_def_default(void)
+{
+    return (gbt_bench_def){.repeats = 5};
+}
+
+static double seconds_of(clockid_t clock)
+{
+    struct timespec t;
+    clock_gettime(clock, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* ---- what is traced ---------------------------------------------------------------------------------------------------------------------- */
+
+/* Colour of a 3DGS Gaussian from its centre's direction: degree 0 only, so that the workload is tracing and nothing else. */
+static gbt_status gaussians_from_ply(const char *path, gaussians *out, gbt_error *err)
+{
+    gaussian_cloud cloud;
+    GBT_TRY(gaussian_ply_load(path, &cloud, err));
+    const gbt_status status = gaussians_resize(out, cloud.count, err);
+    for (size_t i = 0; status == GBT_OK && i < cloud.count; i++) {
+        out->mean_x[i] = cloud.mean[3 * i], out->mean_y[i] = cloud.mean[3 * i + 1], out->mean_z[i] = cloud.mean[3 * i + 2];
+        out->scale_x[i] = expf(cloud.scale_log[3 * i]), out->scale_y[i] = expf(cloud.scale_log[3 * i + 1]), out->scale_z[i] = expf(cloud.scale_log[3 * i + 2]);
+        out->quat_w[i] = cloud.quat[4 * i], out->quat_x[i] = cloud.quat[4 * i + 1], out->quat_y[i] = cloud.quat[4 * i + 2], out->quat_z[i] = cloud.quat[4 * i + 3];
+        out->opacity[i] = cloud.opacity[i];
+        const float *sh = cloud.sh + i * GAUSSIAN_SH_COUNT * 3;
+        out->red[i] = fmaxf(0, 0.5f + 0.28209479f * sh[0]), out->green[i] = fmaxf(0, 0.5f + 0.28209479f * sh[1]), out->blue[i] = fmaxf(0, 0.5f + 0.28209479f * sh[2]);
+    }
+    if (status == GBT_OK)
+        gaussians_pad(out);
+    gaussian_cloud_free(&cloud);
+    return status;
+}
+
+static bool read_vector(const json_t *root, const char *key, double out[3])
+{
+    const json_t *array = json_object_get(root, key);
+    for (size_t i = 0; i < 3; i++) {
+        const json_t *value = json_array_get(array, i);
+        if (!json_is_number(value))
+            return false;
+        out[i] = json_number_value(value);
+    }
+    return json_array_size(array) == 3;
+}
+
+/* A look-at camera: image x to the right, y down, as all our cameras. */
+static gbt_status camera_from_json(const char *path, gbt_camera *out, gbt_error *err)
+{
+    unsigned char *bytes;
+    size_t count;
+    GBT_TRY(file_read(path, &bytes, &count, err));
+    json_error_t where;
+    json_t *root = json_loadb((const char *)bytes, count, 0, &where);
+    mem_free(bytes);
+    if (root == NULL)
+        return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not JSON: %s", path, where.line, where.text);
+    double origin[3], target[3], up[3], forward[3], right[3], down[3];
+    const double fov = json_number_value(json_object_get(root, "fov_x_deg"));
+    const long long width = json_integer_value(json_object_get(root, "width")), height = json_integer_value(json_object_get(root, "height"));
+    bool fine = read_vector(root, "origin", origin) && read_vector(root, "target", target) && read_vector(root, "up", up);
+    fine = fine && fov > 0 && fov < 180 && width >= 1 && height >= 1 && width <= 65500 && height <= 65500;
+    json_decref(root);
+    for (int i = 0; i < 3; i++)
+        forward[i] = fine ? target[i] - origin[i] : 0;
+    if (fine) {
+        dvec_normalize(forward);
+        dvec_cross(forward, up, right);
+        fine = dvec_length(right) > 1e-9;
+    }
+    if (!fine)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: wanted origin, target, up (3 numbers each), fov_x_deg in (0, 180), width, height", path);
+    dvec_normalize(right);
+    dvec_cross(forward, right, down);
+    const double focal = 0.5 * (double)width / tan(fov * 3.14159265358979323846 / 360);
+    *out = (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = (int)width, .height = (int)height, .params = {focal, focal, 0.5 * (double)width, 0.5 * (double)height}};
+    for (int i = 0; i < 3; i++)
+        out->rotation[i] = right[i], out->rotation[3 + i] = down[i], out->rotation[6 + i] = forward[i], out->center[i] = origin[i];
+    return GBT_OK;
+}
+
+/* ---- figures -------------------------------------------------------------------------------------------------------------------------------- */
+
+typedef struct figures {
+    double build_ms, forward_seconds, adjoint_seconds, forward_us, adjoint_us; /* medians; us: core-microseconds per ray */
+    kernel_counters counters;
+    double psnr, max_error; /* NaN when not checked */
+    size_t check_rays;
+} figures;
+
+static int by_value(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double median(double *values, int count)
+{
+    qsort(values, (size_t)count, sizeof *values, by_value);
+    return values[count / 2];
+}
+
+static gbt_status time_passes(trace_scene *traced, const gaussians *g, const trace_settings *settings, const ray_image *rays, int repeats, image *rgb,
+                              figures *out, gbt_error *err)
+{
+    const double ray_count = (double)rays->width * (double)rays->height;
+    gaussians d_gaussians = {0};
+    image d_rgb = {0};
+    double *samples = mem_alloc((size_t)repeats, 5 * sizeof *samples, "timings", err);
+    gbt_status status = samples == NULL ? GBT_ERR_NO_MEMORY : image_alloc(&d_rgb, rays->width, rays->height, 3, err);
+    for (size_t i = 0; status == GBT_OK && i < 3 * (size_t)rays->width * (size_t)rays->height; i++)
+        d_rgb.pixels[i] = 1 / (float)ray_count;
+    const float reach = fmaxf(fabsf(rays->origin[0]), fmaxf(fabsf(rays->origin[1]), fabsf(rays->origin[2])));
+    for (int i = -1; i < repeats && status == GBT_OK; i++) { /* the first pass warms caches and memory up */
+        const double t0 = seconds_of(CLOCK_MONOTONIC);
+        status = trace_build(traced, g, settings, reach, err);
+        const double t1 = seconds_of(CLOCK_MONOTONIC), c1 = seconds_of(CLOCK_PROCESS_CPUTIME_ID);
+        memset(&out->counters, 0, sizeof out->counters);
+        if (status == GBT_OK)
+            status = trace_forward(traced, rays, true, rgb, NULL, &out->counters, err);
+        const double t2 = seconds_of(CLOCK_MONOTONIC), c2 = seconds_of(CLOCK_PROCESS_CPUTIME_ID);
+        if (status == GBT_OK)
+            status = trace_backward(traced, rays, &d_rgb, &d_gaussians, NULL, NULL, err);
+        const double t3 = seconds_of(CLOCK_MONOTONIC), c3 = seconds_of(CLOCK_PROCESS_CPUTIME_ID);
+        if (i < 0)
+            continue;
+        samples[i] = t1 - t0, samples[repeats + i] = t2 - t1, samples[2 * repeats + i] = t3 - t2;
+        samples[3 * repeats + i] = c2 - c1, samples[4 * repeats + i] = c3 - c2;
+    }
+    if (status == GBT_OK) {
+        out->build_ms = 1000 * median(samples, repeats);
+        out->forward_seconds = median(samples + repeats, repeats);
+        out->adjoint_seconds = median(samples + 2 * repeats, repeats);
+        out->forward_us = 1e6 * median(samples + 3 * repeats, repeats) / ray_count;
+        out->adjoint_us = 1e6 * median(samples + 4 * repeats, repeats) / ray_count;
+    }
+    gaussians_free(&d_gaussians);
+    image_free(&d_rgb);
+    mem_free(samples);
+    return status;
+}
+
+/* Every 8th pixel in both directions, in double. */
+static gbt_status check_image(const gaussians *g, const trace_settings *settings, const ray_image *rays, const image *rgb, figures *out, gbt_error *err)
+{
+    ray_image few = {.width = (rays->width + CHECK_STRIDE - 1) / CHECK_STRIDE, .height = (rays->height + CHECK_STRIDE - 1) / CHECK_STRIDE,
+                     .origin = rays->origin, .common_origin = rays->common_origin};
+    const size_t count = (size_t)few.width * (size_t)few.height;
+    few.dir = mem_alloc(count, 3 * sizeof *few.dir, "check rays", err);
+    double *want = mem_alloc(count, 3 * sizeof *want, "check image", err);
+    gbt_status status = few.dir == NULL || want == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    for (int y = 0; status == GBT_OK && y < few.height; y++)
+        for (int x = 0; x < few.width; x++)
+            memcpy(few.dir + 3 * ((size_t)y * (size_t)few.width + (size_t)x),
+                   rays->dir + 3 * ((size_t)y * CHECK_STRIDE * (size_t)rays->width + (size_t)x * CHECK_STRIDE), 3 * sizeof(float));
+    if (status == GBT_OK)
+        status = reference_forward(g, settings, &few, want, NULL, NULL, err);
+    double square = 0;
+    out->max_error = 0;
+    for (size_t i = 0; status == GBT_OK && i < count; i++) {
+        const size_t x = i % (size_t)few.width * CHECK_STRIDE, y = i / (size_t)few.width * CHECK_STRIDE;
+        for (size_t c = 0; c < 3; c++) {
+            const double error = fabs((double)rgb->pixels[3 * (y * (size_t)rays->width + x) + c] - want[3 * i + c]);
+            square += error * error;
+            out->max_error = fmax(out->max_error, error);
+        }
+    }
+    out->check_rays = count;
+    out->psnr = square > 0 ? -10 * log10(square / (3 * (double)count)) : 200;
+    mem_free(few.dir);
+    mem_free(want);
+    return status;
+}
+
+static gbt_status print_figures(const gbt_bench_def *def, const figures *f, const gaussians *g, const trace_scene *traced, const ray_image *rays, FILE *out,
+                                gbt_error *err)
+{
+    const double n = (double)rays->width * (double)rays->height;
+    fprintf(out, "%s: %zu Gaussians (%zu in the tree, %zu nodes, %.1f MB), %d x %d rays, %d threads, %s\n", def->model, g->count, traced->tree.box_count,
+            traced->tree.node_count, (double)(traced->tree.bytes + g->count * RECORD_FLOATS * sizeof(float)) * 1e-6, rays->width, rays->height, parallel_threads(),
+            cpu_isa_name(cpu_best_isa()));
+    fprintf(out, "build   %8.2f ms\nforward %8.2f ms  %6.3f core-us/ray\nadjoint %8.2f ms  %6.3f core-us/ray\n", f->build_ms, 1000 * f->forward_seconds,
+            f->forward_us, 1000 * f->adjoint_seconds, f->adjoint_us);
+    fprintf(out, "per ray: %.2f hits, %.2f blended, %.1f tests, %.2f nodes; %llu packets spilled\n", (double)f->counters.hits / n, (double)f->counters.blended / n,
+            (double)f->counters.tests / n, (double)f->counters.nodes / n, (unsigned long long)f->counters.spilled_packets);
+    if (def->check)
+        fprintf(out, "to the double reference (%zu rays): PSNR %.1f dB, max error %.3g\n", f->check_rays, f->psnr, f->max_error);
+    if (def->json == NULL)
+        return GBT_OK;
+    json_t *root = json_pack("{s:i,s:o,s:I,s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:I,s:s,s:s,s:i,s:I}", "schema", 1, "model", json_text(def->model), "rays", (json_int_t)n,
+                             "forward_core_us_per_ray", f->forward_us, "adjoint_core_us_per_ray", f->adjoint_us, "forward_seconds", f->forward_seconds,
+                             "adjoint_seconds", f->adjoint_seconds, "build_ms", f->build_ms, "hits_per_ray", (double)f->counters.hits / n, "blended_per_ray",
+                             (double)f->counters.blended / n, "tests_per_ray", (double)f->counters.tests / n, "nodes_per_ray", (double)f->counters.nodes / n,
+                             "spilled_packets", (json_int_t)f->counters.spilled_packets, "kernel", "packet", "isa", cpu_isa_name(cpu_best_isa()), "threads",
+                             parallel_threads(), "gaussians", (json_int_t)g->count);
+    if (def->check) {
+        json_object_set_new(root, "psnr_to_reference", json_real(f->psnr));
+        json_object_set_new(root, "max_error", json_real(f->max_error));
+    }
+    const gbt_status status = json_save(root, def->json, err);
+    json_decref(root);
+    return status;
+}
+
+static gbt_status bench(const gbt_bench_def *def, loaded_run *run, FILE *out, gbt_error *err)
+{
+    gaussians from_ply = {0};
+    const gaussians *g = &from_ply;
+    trace_settings settings = trace_settings_default();
+    gbt_camera camera;
+    trace_scene traced = {0};
+    ray_image rays = {0};
+    image rgb = {0};
+    figures f = {.psnr = NAN, .max_error = NAN};
+    const size_t length = strlen(def->model);
+    gbt_status status;
+    if (length > 4 && strcmp(def->model + length - 4, ".ply") == 0) {
+        if (def->camera == NULL)
+            return base_fail(err, GBT_ERR_ARGUMENT, "--camera: missing (a .ply has no cameras)");
+        status = gaussians_from_ply(def->model, &from_ply, err);
+        if (status == GBT_OK)
+            status = camera_from_json(def->camera, &camera, err);
+    } else {
+        status = loaded_run_open(def->model, NULL, 0, run, err);
+        size_t view = 0;
+        while (status == GBT_OK && view + 1 < run->scene.view_count && !run->scene.views[view].is_test)
+            view++;
+        if (status == GBT_OK && def->camera != NULL)
+            status = camera_from_json(def->camera, &camera, err);
+        else if (status == GBT_OK)
+            camera = photos_camera(&run->photos, view, 0);
+        if (status == GBT_OK)
+            status = frame_render(&run->frame, &run->model.anchors, &run->model.decoder, &camera, &run->settings, false, err);
+        g = &run->frame.gaussians;
+        settings = run->settings;
+    }
+    if (status == GBT_OK)
+        status = ray_image_from_camera(&camera, &rays, err);
+    if (status == GBT_OK)
+        status = image_alloc(&rgb, camera.width, camera.height, 3, err);
+    if (status == GBT_OK)
+        status = time_passes(&traced, g, &settings, &rays, def->repeats, &rgb, &f, err);
+    if (status == GBT_OK && def->check)
+        status = check_image(g, &settings, &rays, &rgb, &f, err);
+    if (status == GBT_OK)
+        status = print_figures(def, &f, g, &traced, &rays, out, err);
+    trace_scene_free(&traced);
+    ray_image_free(&rays);
+    image_free(&rgb);
+    gaussians_free(&from_ply);
+    return status;
+}
+
+gbt_status gbt_bench_trace(const gbt_bench_def *def, FILE *out, gbt_error *err)
+{
+    if (def->model == NULL || def->repeats < 1 || def->repeats > 1000)
+        return base_fail(err, GBT_ERR_ARGUMENT, "bench: wanted a model and 1 to 1000 repeats");
+    loaded_run *run = mem_calloc(1, sizeof *run, "run", err);
+    if (run == NULL)
+        return GBT_ERR_NO_MEMORY;
+    const gbt_status status = bench(def, run, out, err);
+    loaded_run_close(run);
+    mem_free(run);
+    return status;
+}

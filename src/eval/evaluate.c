@@ -1,0 +1,180 @@
+/* eval/evaluate.c -- score a run on its held-out views: renders, metrics.json. */
+#include "eval/evaluate.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "eval/loaded_run.h"
+#include "eval/report.h"
+#include "gbtrace/evaluate.h"
+#include "image/metrics.h"
+
+gbt_evaluate_def gbt_evaluate_def_default(void)
+{
+    return (gbt_evaluate_def){.report = 1};
+}
+
+static double now_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static gbt_status score_view(loaded_run *r, size_t index, const char *folder, view_score *score, gbt_error *err)
+{
+    const scene_view *view = &r->scene.views[index];
+    const double start = now_seconds();
+    GBT_TRY(loaded_run_render(r, index, err));
+    score->seconds = now_seconds() - start;
+    score->gaussians = r->frame.gaussians.count;
+    snprintf(score->name, sizeof score->name, "%s", view->name);
+    image photo = {0}, error_map = {0};
+    image *render = &r->frame.rgb;
+    gbt_status status = scene_read_photo(view, render->width, render->height, &photo, err);
+    if (status == GBT_OK)
+        status = image_alloc(&error_map, render->width, render->height, 1, err);
+    if (status != GBT_OK)
+        goto done;
+    image_quantize(render);
+    image_quantize(&photo);
+    score->psnr = metric_psnr(render, &photo);
+    score->ssim = metric_ssim(render, &photo);
+    status = metric_flip(render, &photo, &score->flip, &error_map, err);
+    char name[1024], file[1100];
+    loaded_run_view_name(view, name, sizeof name);
+    const struct { const char *suffix; const image *pixels; char *path; } outputs[] = {
+        {".png", render, score->render_path}, {".photo.png", &photo, score->photo_path}, {".flip.png", &error_map, score->error_path}};
+    for (int i = 0; i < 3 && status == GBT_OK; i++) {
+        snprintf(file, sizeof file, "%s%s", name, outputs[i].suffix);
+        status = file_join(outputs[i].path, VIEW_PATH_SIZE, folder, file, err);
+        if (status == GBT_OK)
+            status = image_write(outputs[i].path, outputs[i].pixels, err);
+    }
+done:
+    image_free(&photo);
+    image_free(&error_map);
+    return status;
+}
+
+static json_t *number_or_null(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
+static json_t *scores_to_json(const evaluation *e)
+{
+    json_t *root = json_object(), *views = json_array();
+    json_object_set_new(root, "schema", json_integer(1));
+    json_object_set_new(root, "psnr", number_or_null(e->psnr));
+    json_object_set_new(root, "ssim", number_or_null(e->ssim));
+    json_object_set_new(root, "flip", number_or_null(e->flip));
+    json_object_set_new(root, "protocol", json_string("8-bit images; SSIM 11x11 Gaussian, zero padding; FLIP 67 pixels per degree; means over held-out views"));
+    for (size_t i = 0; i < e->view_count; i++) {
+        const view_score *v = &e->views[i];
+        json_array_append_new(views, json_pack("{s:s,s:f,s:f,s:f,s:f,s:I}", "name", v->name, "psnr", v->psnr, "ssim", v->ssim, "flip", v->flip, "seconds",
+                                               v->seconds, "gaussians", (json_int_t)v->gaussians));
+    }
+    json_object_set_new(root, "views", views);
+    json_object_set_new(root, "anchors_final", json_integer((json_int_t)e->anchors));
+    json_object_set_new(root, "gaussians_per_view", number_or_null(e->gaussians_per_view));
+    json_object_set_new(root, "model_bytes", json_integer((json_int_t)e->model_bytes));
+    return root;
+}
+
+/* What training left in train.json goes into metrics.json too: one file says everything about a run. */
+static void add_training(json_t *root, const char *run)
+{
+    char path[4096];
+    gbt_error ignored = {0};
+    unsigned char *bytes = NULL;
+    size_t count;
+    if (file_join(path, sizeof path, run, "train.json", &ignored) != GBT_OK || file_read(path, &bytes, &count, &ignored) != GBT_OK)
+        return;
+    json_t *training = json_loadb((const char *)bytes, count, 0, NULL);
+    if (json_is_object(training))
+        json_object_update_missing(root, training);
+    json_decref(training);
+    mem_free(bytes);
+}
+
+static gbt_status write_json(const json_t *root, const char *path, gbt_error *err)
+{
+    char *text = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    if (text == NULL)
+        return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path);
+    const gbt_status status = file_write_atomic(path, text, strlen(text), err);
+    free(text);
+    return status;
+}
+
+static gbt_status score_run(loaded_run *r, const char *run, evaluation *e, gbt_error *err)
+{
+    char folder[4096];
+    GBT_TRY(file_join(folder, sizeof folder, run, "renders/test", err));
+    GBT_TRY(file_make_folder(folder, err));
+    e->views = mem_calloc(r->scene.view_count + 1, sizeof *e->views, "view scores", err);
+    if (e->views == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < r->scene.view_count; i++) {
+        if (!r->scene.views[i].is_test)
+            continue;
+        view_score *v = &e->views[e->view_count];
+        GBT_TRY(score_view(r, i, folder, v, err));
+        e->view_count++;
+        e->psnr += v->psnr, e->ssim += v->ssim, e->flip += v->flip, e->gaussians_per_view += (double)v->gaussians;
+    }
+    const double n = (double)e->view_count; /* 0 / 0 = NaN here becomes null in JSON and "n/a" on the page */
+    e->psnr /= n, e->ssim /= n, e->flip /= n, e->gaussians_per_view /= n;
+    e->anchors = r->model.anchors.count;
+    char model_path[4096];
+    struct stat info;
+    GBT_TRY(file_join(model_path, sizeof model_path, run, "model.gbt", err));
+    e->model_bytes = stat(model_path, &info) == 0 ? (size_t)info.st_size : 0;
+    return GBT_OK;
+}
+
+gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err)
+{
+    if (!file_is_folder(run))
+        return base_fail(err, GBT_ERR_IO, "%s: not a run folder (wanted what gbtrace train wrote)", run);
+    evaluation e = {0};
+    json_t *root = NULL;
+    loaded_run *r = mem_alloc(1, sizeof *r, "run", err);
+    if (r == NULL)
+        return GBT_ERR_NO_MEMORY;
+    gbt_status status = loaded_run_open(run, def->data, 0, r, err);
+    if (status == GBT_OK)
+        status = score_run(r, run, &e, err);
+    if (status != GBT_OK)
+        goto done;
+    char path[4096];
+    root = scores_to_json(&e);
+    add_training(root, run);
+    status = file_join(path, sizeof path, run, "metrics.json", err);
+    if (status == GBT_OK)
+        status = write_json(root, path, err);
+    if (status == GBT_OK && def->json != NULL)
+        status = write_json(root, def->json, err);
+    if (status == GBT_OK && def->report)
+        status = report_write(run, &e, root, err);
+    if (status == GBT_OK && e.view_count == 0)
+        log_info("no held-out views: scores are n/a");
+    else if (status == GBT_OK)
+        log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f", e.view_count, e.psnr, e.ssim, e.flip);
+done:
+    json_decref(root);
+    mem_free(e.views);
+    loaded_run_close(r);
+    mem_free(r);
+    return status;
+}

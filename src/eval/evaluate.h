@@ -1,0 +1,24 @@
+/* eval/evaluate.h -- the scores of a run, as the report reads them. */
+#ifndef GBT_EVAL_EVALUATE_H
+#define GBT_EVAL_EVALUATE_H
+
+#include <stddef.h>
+
+enum { VIEW_PATH_SIZE = 4096 };
+
+typedef struct view_score {
+    char name[1024];
+    double psnr, ssim, flip, seconds; /* seconds: decode, tree and trace of this view */
+    size_t gaussians;
+    char render_path[VIEW_PATH_SIZE], photo_path[VIEW_PATH_SIZE], error_path[VIEW_PATH_SIZE]; /* PNG files; the last is FLIP, 1 channel */
+} view_score;
+
+/** Means are NaN without held-out views. */
+typedef struct evaluation {
+    view_score *views;
+    size_t view_count;
+    double psnr, ssim, flip, gaussians_per_view;
+    size_t anchors, model_bytes;
+} evaluation;
+
+#endif

@@ -1,0 +1,64 @@
+/* eval/loaded_run.c -- open a trained run for rendering. */
+#include "eval/loaded_run.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/file.h"
+
+static gbt_status open_all(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)
+{
+    char path[4096];
+    if (file_is_folder(run))
+        GBT_TRY(file_join(path, sizeof path, run, "model.gbt", err));
+    else if (snprintf(path, sizeof path, "%s", run) >= (int)sizeof path)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", run);
+    GBT_TRY(model_load(path, &out->model, err));
+    out->def = gbt_train_def_default();
+    GBT_TRY(config_parse(out->model.config, path, &out->def, &out->strings, err));
+    scene_split split;
+    GBT_TRY(scene_split_parse(out->def.eval_split, &split, err));
+    GBT_TRY(scene_load(data != NULL ? data : out->model.data_folder, &split, &out->scene, err));
+    /* Another data set of the same place has another local origin. */
+    for (size_t i = 0; i < out->scene.view_count; i++)
+        for (int k = 0; k < 3; k++)
+            out->scene.views[i].camera.center[k] += out->scene.origin[k] - out->model.origin[k];
+    GBT_TRY(photos_open(&out->photos, &out->scene, downscale > 0 ? downscale : out->def.downscale, err));
+    out->settings = trace_settings_default();
+    out->settings.t_near = out->model.t_near;
+    memcpy(out->settings.background, out->model.background, sizeof out->settings.background);
+    return GBT_OK;
+}
+
+gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    return open_all(run, data, downscale, out, err);
+}
+
+void loaded_run_close(loaded_run *r)
+{
+    model_free(&r->model);
+    if (r->photos.source != NULL)
+        photos_close(&r->photos);
+    scene_free(&r->scene);
+    frame_free(&r->frame);
+}
+
+gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err)
+{
+    const gbt_camera camera = photos_camera(&r->photos, view, 0);
+    return frame_render(&r->frame, &r->model.anchors, &r->model.decoder, &camera, &r->settings, false, err);
+}
+
+void loaded_run_view_name(const scene_view *view, char *out, size_t size)
+{
+    snprintf(out, size, "%s", view->name);
+    char *dot = strrchr(out, '.');
+    if (dot != NULL && dot != out && strchr(dot, '/') == NULL)
+        *dot = '\0';
+    for (char *c = out; *c != '\0'; c++)
+        if (*c == '/')
+            *c = '_';
+}

@@ -1,0 +1,38 @@
+/* eval/loaded_run.h -- a trained run opened for rendering: its model, its settings, the views of its data set. */
+#ifndef GBT_EVAL_LOADED_RUN_H
+#define GBT_EVAL_LOADED_RUN_H
+
+#include "data/scene.h"
+#include "gbtrace/train.h"
+#include "io/model_file.h"
+#include "train/config.h"
+#include "train/frame.h"
+#include "train/photos.h"
+
+typedef struct loaded_run {
+    model model;
+    gbt_train_def def; /* the settings it was trained with; strings point into `strings` */
+    config_strings strings;
+    scene scene; /* cameras in the model's local coordinates */
+    photos photos;
+    trace_settings settings;
+    frame frame;
+} loaded_run;
+
+/**
+ * Open RUN (a folder with model.gbt, or a model file).
+ *
+ * @param data      [in] data set folder; NULL: the one it was trained on
+ * @param downscale [in] 0: as in training
+ * @param out       [out] start from {0}; free with loaded_run_close() after success or failure
+ */
+gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err);
+void loaded_run_close(loaded_run *r);
+
+/** Render a view into r->frame.rgb, at the run's resolution. */
+gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err);
+
+/** "folder/a/b.jpg" becomes "a_b": a file name for what belongs to a view. */
+void loaded_run_view_name(const scene_view *view, char *out, size_t size);
+
+#endif

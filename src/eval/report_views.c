@@ -1,0 +1,201 @@
+/* eval/report_views.c -- the held-out views of the page: photo against render, where they differ, and their scores. */
+#include "eval/report_views.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "eval/report_image.h"
+
+typedef struct ranked { double psnr; size_t index; } ranked;
+
+static int compare_psnr(const void *a, const void *b)
+{
+    const ranked *x = a, *y = b;
+    const double p = isnan(x->psnr) ? (double)INFINITY : x->psnr, q = isnan(y->psnr) ? (double)INFINITY : y->psnr;
+    if (p != q)
+        return p < q ? -1 : 1;
+    return x->index < y->index ? -1 : x->index > y->index;
+}
+
+size_t report_choose_views(const evaluation *e, size_t *shown, size_t *order)
+{
+    const size_t n = e->view_count, third = REPORT_MAX_VIEWS / 3;
+    gbt_error ignored = {0};
+    ranked *rank = mem_alloc(n, sizeof *rank, "views", &ignored);
+    for (size_t i = 0; i < n; i++)
+        order[i] = i;
+    if (rank != NULL) { /* without memory the order is that of the data set */
+        for (size_t i = 0; i < n; i++)
+            rank[i] = (ranked){e->views[i].psnr, i};
+        qsort(rank, n, sizeof *rank, compare_psnr);
+        for (size_t i = 0; i < n; i++)
+            order[i] = rank[i].index;
+        mem_free(rank);
+    }
+    if (n <= REPORT_MAX_VIEWS) {
+        memcpy(shown, order, n * sizeof *order);
+        return n;
+    }
+    for (size_t i = 0; i < third; i++) {
+        shown[i] = order[i];
+        shown[third + i] = order[n / 2 - third / 2 + i];
+        shown[2 * third + i] = order[n - third + i];
+    }
+    return REPORT_MAX_VIEWS;
+}
+
+/** PSNR of equal images is infinite. */
+static void add_psnr(text *out, double psnr)
+{
+    if (isinf(psnr) && psnr > 0)
+        text_add(out, "\xe2\x88\x9e");
+    else
+        text_number(out, psnr, 2);
+}
+
+/** An <img>, or a line that says that there is none. */
+static void add_picture(text *out, const char *class_name, const char *what, const view_score *v, const char *path, picture_kind kind)
+{
+    int width, height;
+    report_picture_size(path, &width, &height);
+    if (width > 0) {
+        const size_t before = out->length;
+        text_format(out, "<img class=\"%s\" alt=\"%s of ", class_name, what);
+        text_escaped(out, v->name);
+        text_add(out, "\" src=\"");
+        report_picture(out, path, kind, &width, &height);
+        text_format(out, "\" width=\"%d\" height=\"%d\" decoding=\"async\">", width, height);
+        if (width > 0 || out->status != GBT_OK)
+            return;
+        out->length = before; /* its head could be read, its pixels could not */
+    }
+    text_format(out, "<span class=\"missing\">%s: n/a</span>", what);
+}
+
+static void add_score(text *out, const char *name, double value, int decimals, const char *unit)
+{
+    text_format(out, "<span class=\"score\">%s <b>", name);
+    if (decimals == 2)
+        add_psnr(out, value);
+    else
+        text_number(out, value, decimals);
+    text_format(out, "</b>%s</span>", unit);
+}
+
+static void add_key(text *out, const char *name, double value, double absent)
+{
+    text_format(out, " data-%s=\"%.6f\"", name, isfinite(value) ? value : absent);
+}
+
+static void add_view(text *out, const view_score *v, size_t place)
+{
+    int width, height;
+    report_picture_size(v->render_path, &width, &height);
+    if (width == 0)
+        report_picture_size(v->photo_path, &width, &height);
+    text_format(out, "<figure class=\"view card\" data-place=\"%zu\"", place);
+    add_key(out, "psnr", v->psnr, 1e6);
+    add_key(out, "ssim", v->ssim, 1e6);
+    add_key(out, "flip", v->flip, -1);
+    text_format(out, " style=\"--ratio:%.4f\"><figcaption><h3>", width > 0 && height > 0 ? (double)width / (double)height : 1.5);
+    text_escaped(out, v->name);
+    text_add(out, "</h3>");
+    add_score(out, "PSNR", v->psnr, 2, " dB");
+    add_score(out, "SSIM", v->ssim, 4, "");
+    add_score(out, "FLIP", v->flip, 4, "");
+    text_add(out, "</figcaption><div class=\"pair\"><div class=\"compare\">");
+    add_picture(out, "render", "Render", v, v->render_path, PICTURE_COLOR);
+    add_picture(out, "photo", "Photo", v, v->photo_path, PICTURE_COLOR);
+    text_add(out, "<span class=\"tag l\">photo</span><span class=\"tag r\">render</span>"
+                  "<input type=\"range\" min=\"0\" max=\"100\" step=\"0.5\" value=\"50\" aria-label=\"How much of the photo to show over the render of ");
+    text_escaped(out, v->name);
+    text_add(out, "\"><span class=\"handle\"></span></div><div class=\"error\">");
+    add_picture(out, "map", "FLIP error map", v, v->error_path, PICTURE_ERROR);
+    text_add(out, "<span class=\"tag l\">FLIP error</span></div></div></figure>\n");
+}
+
+static void add_color_scale(text *out)
+{
+    enum { STOPS = 12 };
+    text_add(out, "<span class=\"scale\">FLIP error: 0 <i style=\"background:linear-gradient(90deg");
+    for (int i = 0; i <= STOPS; i++) {
+        float rgb[3];
+        error_color((double)i / STOPS, rgb);
+        text_format(out, ",#%02x%02x%02x", (unsigned)(rgb[0] * 255.0f + 0.5f), (unsigned)(rgb[1] * 255.0f + 0.5f), (unsigned)(rgb[2] * 255.0f + 0.5f));
+    }
+    text_add(out, ")\"></i> 1 (different at first sight)</span>");
+}
+
+static void add_table(text *out, const evaluation *e, const size_t *order)
+{
+    text_format(out, "<details class=\"card\"><summary>All %zu views as a table</summary><div class=\"scroll\"><table class=\"list\"><thead><tr><th>View</th>"
+                     "<th>PSNR, dB</th><th>SSIM</th><th>FLIP</th><th>Gaussians</th><th>Seconds</th></tr></thead><tbody>", e->view_count);
+    for (size_t i = 0; i < e->view_count; i++) {
+        const view_score *v = &e->views[order[i]];
+        text_add(out, "<tr><th>");
+        text_escaped(out, v->name);
+        text_add(out, "</th><td>");
+        add_psnr(out, v->psnr);
+        text_add(out, "</td><td>");
+        text_number(out, v->ssim, 4);
+        text_add(out, "</td><td>");
+        text_number(out, v->flip, 4);
+        text_add(out, "</td><td>");
+        text_count(out, (double)v->gaussians);
+        text_add(out, "</td><td>");
+        text_number(out, v->seconds, 3);
+        text_add(out, "</td></tr>");
+    }
+    text_add(out, "</tbody></table></div></details>\n");
+}
+
+/** Whether most of what is shown is higher than wide: then two of them go side by side. */
+static bool are_tall(const evaluation *e, const size_t *shown, size_t count)
+{
+    size_t tall = 0;
+    for (size_t i = 0; i < count; i++) {
+        int width, height;
+        report_picture_size(e->views[shown[i]].render_path, &width, &height);
+        tall += height > width;
+    }
+    return 2 * tall > count;
+}
+
+void report_views(text *out, const evaluation *e, const char *protocol)
+{
+    text_add(out, "<section><h2>Held-out views</h2>\n");
+    size_t shown[REPORT_MAX_VIEWS], *order = NULL;
+    if (e->view_count == 0) {
+        text_add(out, "<p class=\"none\">n/a: every photo was trained on, none was held out. Train with <code>--eval-split every=8</code> to see how the scene "
+                      "looks from where no photo was shown.</p></section>\n");
+        return;
+    }
+    order = mem_alloc(e->view_count, sizeof *order, "views", out->err);
+    if (order == NULL) {
+        out->status = GBT_ERR_NO_MEMORY;
+        return;
+    }
+    const size_t count = report_choose_views(e, shown, order);
+    text_add(out, "<p class=\"lead\">Training never saw these photos. Drag over a picture, or use the arrow keys, to go from the render to the photo.");
+    if (count < e->view_count)
+        text_format(out, " Shown are %d of %zu views: the %d worst, %d from the middle and the %d best by PSNR.", REPORT_MAX_VIEWS, e->view_count,
+                    REPORT_MAX_VIEWS / 3, REPORT_MAX_VIEWS / 3, REPORT_MAX_VIEWS / 3);
+    text_add(out, "</p>\n<div class=\"bar-top\"><label hidden>Order <select id=\"order\"><option value=\"psnr up\">worst PSNR first</option>"
+                  "<option value=\"psnr down\">best PSNR first</option><option value=\"ssim up\">worst SSIM first</option>"
+                  "<option value=\"flip down\">worst FLIP first</option></select></label>");
+    add_color_scale(out);
+    text_format(out, "</div>\n<div class=\"views%s\">\n", are_tall(e, shown, count) ? " tall" : "");
+    for (size_t i = 0; i < count && out->status == GBT_OK; i++)
+        add_view(out, &e->views[shown[i]], i);
+    text_add(out, "</div>\n");
+    if (protocol != NULL) {
+        text_add(out, "<p class=\"note\">How it is scored: ");
+        text_escaped(out, protocol);
+        text_add(out, ".</p>\n");
+    }
+    add_table(out, e, order);
+    text_add(out, "</section>\n");
+    mem_free(order);
+}

@@ -33,3 +33,21 @@ static int run_bench(const command *self, int argc, char **argv)
 }
 
 const command command_bench = {.name = "bench", .summary = "time the tracer on given Gaussians", .usage = "trace --model FILE.ply --camera FILE.json", .run = run_bench};
+
+static int run_check_grad(const command *self, int argc, char **argv)
+{
+    int threads = 0;
+    const option options[] = {
+        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
+    };
+    operands run;
+    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &run);
+    if (code >= 0)
+        return code;
+    if (threads > 0)
+        gbt_set_threads(threads);
+    gbt_error err = {0};
+    return command_failed(gbt_check_grad(run.value[0], stdout, &err), &err);
+}
+
+const command command_check_grad = {.name = "check-grad", .summary = "analytic gradients against double and differences, on a trained run", .usage = "RUN", .run = run_check_grad};

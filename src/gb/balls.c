@@ -26,6 +26,7 @@ enum {
     SUBTREES = 64,           /* the top is grown until there are this many sets to share out ... */
     SUBTREE_POINTS = 4096,   /* ... or no set is larger than this */
     BALLS_PER_BLOCK = 512,
+    KEPT_SPACINGS = 4,       /* the scale prior takes a radius beyond 4 spacings for 4 spacings: a wider tied set is not left whole */
     INSERTION_POINTS = 24    /* sets up to this size are sorted in place, larger ones by qsort */
 };
 
@@ -62,6 +63,7 @@ typedef struct partition {
     uint8_t *leaf_depth;   /* [n]: 1 + depth where a ball begins, else 0 */
     const float *color;    /* or NULL */
     double radius_compact; /* eta v */
+    double radius_tied;    /* KEPT_SPACINGS v */
     double radius_floor;   /* s_min, eq 21 */
     double color_std_max;
     size_t min_points;
@@ -81,13 +83,16 @@ static size_t try_split(const partition *p, const span *s)
     cloud_point *points = p->points + s->begin;
     moments m;
     moments_compute(points, s->count, &m);
-    if (fmax(moments_radius(&m), p->radius_floor) <= p->radius_compact) {
+    const double radius = fmax(moments_radius(&m), p->radius_floor);
+    if (radius <= p->radius_compact) {
         double mean[3];
         /* Colours are read at random, so only for the few sets that are small enough to stop. */
         if (p->color == NULL || moments_color_std(points, s->count, p->color, mean) <= p->color_std_max)
             return 0;
     }
-    return split_at_median(points, p->keys + s->begin, s->count, &m);
+    /* {a, b, b}: the paper keeps what its cut leaves on one side. Followed where that is harmless: one point too many, and not wide. */
+    const bool keep_tied = s->count == p->min_points + 1 && radius <= p->radius_tied;
+    return split_at_median(points, p->keys + s->begin, s->count, &m, keep_tied);
 }
 
 static void mark_ball(const partition *p, const span *s)
@@ -257,6 +262,7 @@ gbt_status balls_build(const float *position, const float *color, size_t count, 
     const double voxel_size = (double)def->voxel_size;
     partition p = {.color = color,
                    .radius_compact = (double)def->radius_factor * voxel_size,
+                   .radius_tied = KEPT_SPACINGS * voxel_size,
                    .radius_floor = fmax((double)def->min_scale * voxel_size, 1e-6),
                    .color_std_max = (double)def->color_std_max,
                    .min_points = (size_t)def->min_points,

@@ -39,8 +39,8 @@ typedef struct balls {
  * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, non-finite point, colour outside [0, 1]: says which), GBT_ERR_NO_MEMORY;
  *         on failure *out is zeroed
  *
- * 0 points give 0 balls. Points that no axis can separate are one ball; a set whose points at the median are all equal is split
- * below the median, else along the next axis, else the set is terminal. Values beyond float (coordinates near its maximum) saturate.
+ * 0 points give 0 balls. Points that no axis can separate are one ball; a set whose median is its maximum is split below the median,
+ * but kept whole when it has min_points + 1 points and a radius of at most 4 voxel_size. Values beyond float (coordinates near its maximum) saturate.
  * Every reading of an ambiguity of the paper: docs/balls.md.
  * Threads: same bits for every thread count. Cost: O(n log n) time, 25 n bytes of scratch.
  */

@@ -176,7 +176,7 @@ static size_t move_left(cloud_point *points, size_t count, const projection *p, 
     }
 }
 
-size_t split_at_median(cloud_point *points, double *keys, size_t count, const moments *m)
+size_t split_at_median(cloud_point *points, double *keys, size_t count, const moments *m, bool keep_tied)
 {
     double axes[3][3];
     split_axes(m->covariance, axes);
@@ -188,8 +188,11 @@ size_t split_at_median(cloud_point *points, double *keys, size_t count, const mo
             parallel_blocks(count, KEY_BLOCK, fill_keys, &p);
         const double median = split_select(keys, count, (count - 1) / 2);
         size_t left = move_left(points, count, &p, median, false);
-        if (left == count)
+        if (left == count) {
             left = move_left(points, count, &p, median, true);
+            if (left > 0 && keep_tied)
+                return 0;
+        }
         if (left > 0)
             return left;
     }

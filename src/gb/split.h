@@ -2,6 +2,7 @@
 #ifndef GBT_GB_SPLIT_H
 #define GBT_GB_SPLIT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "gb/moments.h"
@@ -29,8 +30,9 @@ double split_select(double *keys, size_t count, size_t rank);
  * z < median; when that leaves nothing on the left either, the next axis decides. The result depends on the order of `points` only
  * through the order inside the two parts.
  *
- * @param keys [in] scratch, [count]
+ * @param keys      [in] scratch, [count]
+ * @param keep_tied [in] true: return 0 where z < median would have to separate them, as the paper does
  */
-size_t split_at_median(cloud_point *points, double *keys, size_t count, const moments *m);
+size_t split_at_median(cloud_point *points, double *keys, size_t count, const moments *m, bool keep_tied);
 
 #endif

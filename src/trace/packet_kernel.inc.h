@@ -78,6 +78,36 @@ static inline response respond(const float *record, const ray_lanes *ray, f16 t_
     return r;
 }
 
+/* The canonical point at an inner t* once more, for the adjoint: v = w' x (x' x w') / |w'|^2 with x' x w' = cof(M) (p x w), M = S^-1 R^T.
+   On a flat Gaussian the v of respond() is a small difference of large numbers along the thin axis. d2 does not feel that, but the
+   gradients of the mean and of the rotation, which are divided by the thin axis, would be noise from a ratio of 1e4 on. */
+static inline void refine_point(const float *record, const ray_lanes *ray, f16 t_near, response *r)
+{
+    const float *m = record + RECORD_MATRIX;
+    const f16 ex = f16_sub(ray->origin[0], f16_set1(record[RECORD_MEAN]));
+    const f16 ey = f16_sub(ray->origin[1], f16_set1(record[RECORD_MEAN + 1]));
+    const f16 ez = f16_sub(ray->origin[2], f16_set1(record[RECORD_MEAN + 2]));
+    const f16 *d = ray->dir;
+    const f16 along = f16_fma(ez, d[2], f16_fma(ey, d[1], f16_mul(ex, d[0])));
+    const f16 px = f16_fnma(along, d[0], ex), py = f16_fnma(along, d[1], ey), pz = f16_fnma(along, d[2], ez);
+    const f16 q[3] = {f16_fnma(pz, d[1], f16_mul(py, d[2])), f16_fnma(px, d[2], f16_mul(pz, d[0])), f16_fnma(py, d[0], f16_mul(px, d[1]))};
+    f16 c[3], w[3];
+    for (int i = 0; i < 3; i++) {
+        const float *a = m + 3 * ((i + 1) % 3), *b = m + 3 * ((i + 2) % 3); /* row i of the cofactors is the product of the other two rows */
+        c[i] = f16_mul(f16_set1(a[1] * b[2] - a[2] * b[1]), q[0]);
+        c[i] = f16_fma(f16_set1(a[2] * b[0] - a[0] * b[2]), q[1], c[i]);
+        c[i] = f16_fma(f16_set1(a[0] * b[1] - a[1] * b[0]), q[2], c[i]);
+        w[i] = f16_fma(f16_set1(m[3 * i + 2]), d[2], f16_fma(f16_set1(m[3 * i + 1]), d[1], f16_mul(f16_set1(m[3 * i]), d[0])));
+    }
+    const f16 ww = f16_fma(w[2], w[2], f16_fma(w[1], w[1], f16_mul(w[0], w[0])));
+    const m16 clipped = f16_le(r->t, t_near);
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        const f16 v = f16_div(f16_fnma(w[k], c[j], f16_mul(w[j], c[k])), ww);
+        r->v[i] = f16_select(clipped, r->v[i], v);
+    }
+}
+
 /* opacity * exp(-d2 / 2); d2 is cut at 150, where the response is 0 for every alpha_min that can be set. */
 static inline f16 response_alpha(const float *record, f16 d2)
 {
@@ -672,11 +702,14 @@ static bool add_row(float *rows, size_t row, uint32_t id, const kernel_scene *sc
     const float *record = scene->records + (size_t)id * RECORD_FLOATS;
     const f16 d_alpha = f16_load(row_field(rows, row, ROW_D_ALPHA)), raw = f16_load(row_field(rows, row, ROW_ALPHA_RAW));
     const f16 weight = f16_load(row_field(rows, row, ROW_WEIGHT));
-    /* alpha = min(alpha_max, opacity G): beyond the cap nothing but the colour has a gradient. */
-    const m16 open = f16_le(raw, f16_set1(scene->settings.alpha_max));
+    /* alpha = min(alpha_max, opacity G): from the cap on nothing but the colour has a gradient. */
+    const m16 open = f16_lt(raw, f16_set1(scene->settings.alpha_max)), blended = f16_lt(f16_set1(0), weight);
     const f16 d_raw = f16_select(open, d_alpha, f16_set1(0));
     const f16 d_d2 = f16_mul(f16_set1(-0.5f), f16_mul(raw, d_raw));
-    const f16 x = f16_load(row_field(rows, row, ROW_V)), y = f16_load(row_field(rows, row, ROW_V + 1)), z = f16_load(row_field(rows, row, ROW_V + 2));
+    f16 v[3]; /* on rays that did not hit, v may be more than a float holds, and 0 times that is no 0 */
+    for (int k = 0; k < 3; k++)
+        v[k] = f16_select(blended, f16_load(row_field(rows, row, ROW_V + k)), f16_set1(0));
+    const f16 x = v[0], y = v[1], z = v[2];
     const f16 gx = f16_mul(d_d2, x), gy = f16_mul(d_d2, y), gz = f16_mul(d_d2, z);
     f16 terms[16];
     terms[GRADIENT_V] = gx, terms[GRADIENT_V + 1] = gy, terms[GRADIENT_V + 2] = gz;
@@ -743,7 +776,8 @@ static bool backward(const kernel_scene *scene, const packet_rays *rays, const f
             if (id == UINT32_MAX)
                 continue;
             const float *record = scene->records + (size_t)id * RECORD_FLOATS;
-            const response hit = respond(record, &ray, t_near);
+            response hit = respond(record, &ray, t_near);
+            refine_point(record, &ray, t_near, &hit);
             for (int k = 0; k < 3; k++)
                 f16_store(row_field(rows, base + i, ROW_V + k), hit.v[k]);
             f16_store(row_field(rows, base + i, ROW_ALPHA_RAW), response_alpha(record, hit.d2));

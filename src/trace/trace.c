@@ -222,11 +222,21 @@ static void backward_packet(pass *p, trace_block *block, int x0, int y0, size_t 
     packet_rays rays;
     size_t pixel[PACKET_LANES];
     _Alignas(64) float d_rgb[3][PACKET_LANES] = {0};
-    if (!load_packet(p->rays, x0, y0, &rays, pixel))
+    const bool any = load_packet(p->rays, x0, y0, &rays, pixel);
+    for (int lane = 0; lane < PACKET_LANES; lane++) {
+        if (x0 + lane % PACKET_PIXELS >= p->rays->width || y0 + lane / PACKET_PIXELS >= p->rays->height)
+            continue;
+        const bool traced = any && (rays.active >> lane & 1) != 0;
+        for (int c = 0; c < 3; c++) {
+            const float d = p->d_rgb->pixels[3 * pixel[lane] + (size_t)c];
+            if (traced)
+                d_rgb[c][lane] = d;
+            else
+                block->d_background[c] += d; /* the pixel is the background */
+        }
+    }
+    if (!any)
         return;
-    for (int lane = 0; lane < PACKET_LANES; lane++)
-        for (int c = 0; c < 3 && (rays.active >> lane & 1) != 0; c++)
-            d_rgb[c][lane] = p->d_rgb->pixels[3 * pixel[lane] + (size_t)c];
     if (!p->kernel->backward(&p->view, &rays, d_rgb, block->tape.data, cursor, &block->gradients, block->d_background, scratch))
         atomic_store(&p->failed, true);
 }

@@ -1,6 +1,7 @@
 /* train/config.c -- the settings of a run to text and back. */
 #include "train/config.h"
 
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,6 +23,12 @@ static void set_string(char *to, size_t size, const char *value, const char **fi
 {
     snprintf(to, size, "%s", value);
     *field = to;
+}
+
+/* What no int holds becomes a value that no setting allows. */
+static int to_int(double number)
+{
+    return number >= -1e9 && number <= 1e9 ? (int)number : INT_MIN;
 }
 
 static bool set_key(const char *key, const char *value, gbt_train_def *d, config_strings *s)
@@ -49,11 +56,11 @@ static bool set_key(const char *key, const char *value, gbt_train_def *d, config
     if (!is_number)
         return false;
     if (strcmp(key, "max-depth") == 0)
-        return d->max_depth = (int)number, true;
+        return d->max_depth = to_int(number), true;
     if (strcmp(key, "voxel-size") == 0)
         return d->voxel_size = (float)number, true;
     if (strcmp(key, "offsets") == 0)
-        return d->offsets = (int)number, true;
+        return d->offsets = to_int(number), true;
     if (strcmp(key, "iterations") == 0)
         return d->iterations = whole, true;
     if (strcmp(key, "budget-seconds") == 0)
@@ -61,7 +68,7 @@ static bool set_key(const char *key, const char *value, gbt_train_def *d, config
     if (strcmp(key, "downscale") == 0)
         return d->downscale = number, true;
     if (strcmp(key, "start-level") == 0)
-        return d->start_level = (int)number, true;
+        return d->start_level = to_int(number), true;
     if (strcmp(key, "seed") == 0)
         return d->seed = whole, true;
     if (strcmp(key, "max-anchors") == 0)

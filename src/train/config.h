@@ -4,7 +4,7 @@
 
 #include "gbtrace/train.h"
 
-enum { CONFIG_TEXT_SIZE = 4096, CONFIG_STRING_SIZE = 512 };
+enum { CONFIG_TEXT_SIZE = 4096, CONFIG_STRING_SIZE = 1024 };
 
 /** "key = value" lines for everything that decides the result (not threads, not when checkpoints are made), and the data folder. */
 void config_text(const gbt_train_def *def, const char *data, char *out, size_t size);

@@ -193,7 +193,8 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
 
 static gbt_status resume(trainer *t, const char *data, const run_paths *paths, const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
-    const char *path = file_exists(paths->checkpoint) ? paths->checkpoint : paths->checkpoint_previous;
+    const bool only_previous = !file_exists(paths->checkpoint) && file_exists(paths->checkpoint_previous);
+    const char *path = only_previous ? paths->checkpoint_previous : paths->checkpoint;
     char text[CONFIG_TEXT_SIZE];
     gbt_error first = {0};
     gbt_status status = checkpoint_config(path, text, sizeof text, &first);

@@ -151,6 +151,8 @@ gbt_status seed_points_make(photos *source, const size_t *views, size_t view_cou
         status = base_fail(err, GBT_ERR_FORMAT, "no sparse points, and no place that several photos see (check the poses)");
         goto done;
     }
+    mem_free(out->position); /* a cloud of no points owns its arrays too */
+    mem_free(out->color);
     out->position = mem_alloc(kept, 3 * sizeof *out->position, "seed points", err);
     out->color = mem_alloc(kept, 3 * sizeof *out->color, "seed points", err);
     status = out->position == NULL || out->color == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;

@@ -46,7 +46,7 @@ typedef struct trainer {
     uint64_t adjust_step; /* steps done at the last adjust */
     uint64_t anchor_t;    /* Adam steps of the per-anchor groups */
     uint64_t skipped_steps, skipped_in_row;
-    double seconds;       /* training time so far, over all sessions */
+    double seconds;       /* training time so far, over all runs that continued one another */
 
     frame frame;
     image photo, d_image;

@@ -190,27 +190,47 @@ static void an_axis_that_separates_nothing_gives_way(void **state)
     for (uint32_t i = 0; i < 5; i++)
         points[i] = (cloud_point){{7.0f, (float)(i * 3 % 5), 2.0f}, i};
     const moments m = {{7, 2, 2}, {9, 0, 0, 4, 0, 1}};
-    assert_int_equal(split_at_median(points, keys, 5, &m), 3);
+    assert_int_equal(split_at_median(points, keys, 5, &m, false), 3);
     for (int i = 0; i < 5; i++)
         assert_true(i < 3 ? points[i].position[1] <= 2.0f : points[i].position[1] > 2.0f);
     const moments third = {{7, 2, 2}, {9, 0, 0, 4, 0, 1}};
     for (uint32_t i = 0; i < 5; i++)
         points[i] = (cloud_point){{7.0f, 2.0f, i == 4 ? 3.0f : 1.0f}, i};
-    assert_int_equal(split_at_median(points, keys, 5, &third), 4);
+    assert_int_equal(split_at_median(points, keys, 5, &third, false), 4);
     for (uint32_t i = 0; i < 5; i++)
         points[i] = (cloud_point){{7.0f, 2.0f, 1.0f}, i};
-    assert_int_equal(split_at_median(points, keys, 5, &third), 0); /* no axis */
+    assert_int_equal(split_at_median(points, keys, 5, &third, false), 0); /* no axis */
+}
+
+/* {1, 4, 4}: the median is the maximum. A set that the first axis does not separate at all is not such a tie. */
+static void a_tied_set_may_be_kept(void **state)
+{
+    (void)state;
+    cloud_point points[3];
+    double keys[3];
+    for (uint32_t i = 0; i < 3; i++)
+        points[i] = (cloud_point){{i == 1 ? 1.0f : 4.0f, 2.0f, 0.0f}, i};
+    const moments m = {{3, 2, 0}, {2, 0, 0, 0, 0, 0}};
+    assert_int_equal(split_at_median(points, keys, 3, &m, true), 0);
+    assert_int_equal(split_at_median(points, keys, 3, &m, false), 1);
+    assert_int_equal(points[0].index, 1);
+    const moments other_axis = {{3, 2, 0}, {0, 0, 0, 0, 0, 9}};
+    assert_int_equal(split_at_median(points, keys, 3, &other_axis, true), 0); /* x comes second and ties */
+    for (uint32_t i = 0; i < 3; i++)
+        points[i] = (cloud_point){{(float)i, 2.0f, 0.0f}, i};
+    assert_int_equal(split_at_median(points, keys, 3, &other_axis, true), 2); /* x comes second and cuts */
 }
 
 int main(void)
 {
     enum { AXES = sizeof axes_cases / sizeof *axes_cases };
-    struct CMUnitTest tests[AXES + 4];
+    struct CMUnitTest tests[AXES + 5];
     for (int i = 0; i < AXES; i++)
         tests[i] = (struct CMUnitTest){.name = axes_cases[i].name, .test_func = first_axis, .initial_state = &axes_cases[i]};
     tests[AXES] = (struct CMUnitTest)cmocka_unit_test(select_finds_every_rank);
     tests[AXES + 1] = (struct CMUnitTest)cmocka_unit_test(select_survives_bad_pivots);
     tests[AXES + 2] = (struct CMUnitTest)cmocka_unit_test(axes_are_eigenvectors);
     tests[AXES + 3] = (struct CMUnitTest)cmocka_unit_test(an_axis_that_separates_nothing_gives_way);
-    return _cmocka_run_group_tests("split", tests, AXES + 4, NULL, NULL);
+    tests[AXES + 4] = (struct CMUnitTest)cmocka_unit_test(a_tied_set_may_be_kept);
+    return _cmocka_run_group_tests("split", tests, AXES + 5, NULL, NULL);
 }

@@ -1,0 +1,733 @@
+/* tests/trace/test_trace.c -- the packet tracer and its adjoint against the double reference; threads, instruction sets, limits, failures. */
+#include "base/memory.h"
+#include "base/near.h"
+#include "base/parallel.h"
+#include "base/rng.h"
+#include "base/vec.h"
+#include "data/gaussian_ply.h"
+#include "test_support.h"
+#include "trace/reference.h"
+#include "trace/trace.h"
+
+enum { CLASS_MEAN, CLASS_SCALE, CLASS_ROTATION, CLASS_OPACITY, CLASS_COLOR, CLASS_COUNT };
+static const char *const class_names[CLASS_COUNT] = {"mean", "scale", "rotation", "opacity", "colour"};
+static const size_t class_first[CLASS_COUNT + 1] = {REFERENCE_mean_x, REFERENCE_scale_x, REFERENCE_quat_w, REFERENCE_opacity, REFERENCE_red,
+                                                    GAUSSIANS_FIELD_COUNT};
+
+/* ---- scenes and rays ----------------------------------------------------------------------------------------------------------------- */
+
+typedef struct cloud_def {
+    const char *name;
+    size_t count;
+    float spread;             /* means are normal with this std-dev */
+    float scale_low, scale_high; /* log-uniform */
+    float flatness;           /* axis x is divided by this, and y too for odd ids: discs and needles */
+    float opacity_high;
+    double camera[3];         /* looks at the origin */
+} cloud_def;
+
+static gaussians make_cloud(const cloud_def *def, uint64_t seed)
+{
+    gaussians g = {0};
+    assert_ok(gaussians_resize(&g, def->count, NULL));
+    for (size_t i = 0; i < def->count; i++) {
+        const double s = (double)def->spread;
+        g.mean_x[i] = (float)(s * rng_normal(seed, 0, i)), g.mean_y[i] = (float)(s * rng_normal(seed, 1, i));
+        g.mean_z[i] = (float)(s * rng_normal(seed, 2, i));
+        const float ratio = def->scale_high / def->scale_low;
+        g.scale_x[i] = def->scale_low * powf(ratio, rng_uniform(seed, 3, i)) / def->flatness;
+        g.scale_y[i] = def->scale_low * powf(ratio, rng_uniform(seed, 4, i)) / (i % 2 == 1 ? def->flatness : 1);
+        g.scale_z[i] = def->scale_low * powf(ratio, rng_uniform(seed, 5, i));
+        double q[4], square = 0;
+        for (uint64_t k = 0; k < 4; k++)
+            q[k] = rng_normal(seed, 6 + k, i), square += q[k] * q[k];
+        const double inverse = 1 / sqrt(square);
+        g.quat_w[i] = (float)(q[0] * inverse), g.quat_x[i] = (float)(q[1] * inverse);
+        g.quat_y[i] = (float)(q[2] * inverse), g.quat_z[i] = (float)(q[3] * inverse);
+        g.opacity[i] = 0.02f + (def->opacity_high - 0.02f) * rng_uniform(seed, 10, i);
+        g.red[i] = rng_uniform(seed, 11, i), g.green[i] = rng_uniform(seed, 12, i), g.blue[i] = rng_uniform(seed, 13, i);
+    }
+    gaussians_pad(&g);
+    return g;
+}
+
+/* count copies of a round white Gaussian of size 1 at the origin. */
+static gaussians some(size_t count, float opacity)
+{
+    gaussians g = {0};
+    assert_ok(gaussians_resize(&g, count, NULL));
+    gaussians_zero(&g);
+    for (size_t i = 0; i < count; i++) {
+        g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 1, g.quat_w[i] = 1;
+        g.opacity[i] = opacity, g.red[i] = g.green[i] = g.blue[i] = 1;
+    }
+    gaussians_pad(&g);
+    return g;
+}
+
+static gbt_camera camera_at(const double center[3], const double target[3], int width, int height, double fov_degrees)
+{
+    const double focal = 0.5 * width / tan(fov_degrees * 3.14159265358979323846 / 360);
+    gbt_camera c = {.model = GBT_CAMERA_PINHOLE, .width = width, .height = height, .params = {focal, focal, 0.5 * width, 0.5 * height}};
+    double forward[3], right[3], down[3];
+    for (int k = 0; k < 3; k++)
+        forward[k] = target[k] - center[k], c.center[k] = center[k];
+    if (dvec_length(forward) == 0)
+        forward[2] = 1;
+    dvec_normalize(forward);
+    dvec_cross((double[3]){0.05, 1, 0.02}, forward, right);
+    dvec_normalize(right);
+    dvec_cross(forward, right, down);
+    for (int k = 0; k < 3; k++)
+        c.rotation[k] = right[k], c.rotation[3 + k] = down[k], c.rotation[6 + k] = forward[k];
+    return c;
+}
+
+static float reach_of(const ray_image *rays)
+{
+    float reach = 0;
+    const size_t count = rays->common_origin ? 1 : ray_image_count(rays);
+    for (size_t i = 0; i < 3 * count; i++)
+        reach = fmaxf(reach, fabsf(rays->origin[i]));
+    return reach;
+}
+
+/* ---- both renderers ------------------------------------------------------------------------------------------------------------------ */
+
+typedef struct traced {
+    image rgb;
+    float *T, *weight, d_background[3];
+    gaussians d;
+    kernel_counters counters;
+    size_t rejected;
+} traced;
+
+static traced trace_all(const gaussians *g, const trace_settings *s, const ray_image *rays, const image *d_rgb)
+{
+    traced out = {0};
+    trace_scene scene = {0};
+    assert_ok(image_alloc(&out.rgb, rays->width, rays->height, 3, NULL));
+    out.T = mem_alloc(ray_image_count(rays), sizeof(float), "test", NULL);
+    out.weight = mem_alloc(g->count, sizeof(float), "test", NULL);
+    assert_ok(trace_build(&scene, g, s, reach_of(rays), NULL));
+    assert_ok(trace_forward(&scene, rays, true, &out.rgb, out.T, &out.counters, NULL));
+    assert_ok(trace_backward(&scene, rays, d_rgb, &out.d, out.weight, out.d_background, NULL));
+    out.rejected = scene.tree.rejected_count;
+    trace_scene_free(&scene);
+    return out;
+}
+
+static void traced_free(traced *t)
+{
+    image_free(&t->rgb);
+    mem_free(t->T);
+    mem_free(t->weight);
+    gaussians_free(&t->d);
+}
+
+static image random_gradient(const ray_image *rays, uint64_t seed)
+{
+    image d;
+    assert_ok(image_alloc(&d, rays->width, rays->height, 3, NULL));
+    for (size_t i = 0; i < 3 * ray_image_count(rays); i++)
+        d.pixels[i] = (float)rng_normal(seed, 20, i);
+    return d;
+}
+
+static void field_list(const gaussians *g, const float *fields[GAUSSIANS_FIELD_COUNT])
+{
+    size_t i = 0;
+#define X(name, pad, meaning) fields[i++] = g->name;
+    GAUSSIANS_FIELDS(X)
+#undef X
+}
+
+/* Rays on which rounding may change the hits: alpha within 1e-6 of a cut, T within 1e-9 of the stop, depths closer than float32 can tell. */
+static bool is_in_band(const reference_scene *scene, const trace_settings *s, const reference_hit *hits, size_t count, double depth_band)
+{
+    double T = 1, before = -1;
+    for (size_t i = 0; i < count; i++) {
+        const double raw = scene->fields[REFERENCE_opacity * scene->count + hits[i].id] * exp(-0.5 * hits[i].d2);
+        if (fabs(raw - (double)s->alpha_min) < 1e-6 || fabs(raw - (double)s->alpha_max) < 1e-6)
+            return true;
+        if (hits[i].alpha < (double)s->alpha_min)
+            continue;
+        if (hits[i].t != before && hits[i].t - before < depth_band * hits[i].t)
+            return true;
+        before = hits[i].t;
+        T *= 1 - hits[i].alpha;
+        if (fabs(T - (double)s->transmittance_min) < 1e-9)
+            return true;
+        if (T < (double)s->transmittance_min)
+            return false;
+    }
+    return false;
+}
+
+typedef struct figures {
+    double psnr, max_error, T_error, gradient[CLASS_COUNT], background;
+    size_t band, rays, hits;
+    kernel_counters counters;
+} figures;
+
+static figures compare(const gaussians *g, const trace_settings *s, const ray_image *rays, uint64_t seed, double depth_band)
+{
+    figures out = {.rays = ray_image_count(rays)};
+    const size_t n = out.rays;
+    double *rgb = mem_alloc(n, 3 * sizeof *rgb, "test", NULL), *T = mem_alloc(n, sizeof *T, "test", NULL);
+    double *d_rgb = mem_calloc(n, 3 * sizeof *d_rgb, "test", NULL), *d = mem_calloc(g->count, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL);
+    bool *band = mem_calloc(n, sizeof *band, "test", NULL);
+    double d_background[3] = {0};
+    image d_image = random_gradient(rays, seed);
+    reference_scene scene;
+    assert_ok(reference_scene_make(g, &scene, NULL));
+    reference_hit *hits = NULL;
+    size_t count, capacity = 0;
+    trace_settings loose = *s;
+    loose.alpha_min = fmaxf(s->alpha_min - 2e-6f, 0.5f * s->alpha_min);
+    for (size_t i = 0; i < n; i++) {
+        double origin[3], dir[3];
+        for (size_t k = 0; k < 3; k++)
+            origin[k] = (double)ray_image_origin(rays, i)[k], dir[k] = (double)rays->dir[3 * i + k];
+        assert_ok(reference_scene_ray_hits(&scene, &loose, origin, dir, &hits, &count, &capacity, NULL));
+        band[i] = is_in_band(&scene, s, hits, count, depth_band);
+        out.band += band[i], out.hits += count;
+        for (size_t k = 3 * i; k < 3 * i + 3; k++) {
+            if (band[i])
+                d_image.pixels[k] = 0;
+            d_rgb[k] = (double)d_image.pixels[k];
+        }
+    }
+    mem_free(hits);
+    assert_ok(reference_scene_forward(&scene, s, rays, rgb, T, NULL, NULL));
+    assert_ok(reference_scene_backward(&scene, s, rays, d_rgb, NULL, d, d_background, NULL));
+    traced t = trace_all(g, s, rays, &d_image);
+    out.counters = t.counters;
+    double square = 0;
+    for (size_t i = 0; i < n; i++) {
+        for (size_t k = 3 * i; k < 3 * i + 3 && !band[i]; k++) {
+            const double error = fabs((double)t.rgb.pixels[k] - rgb[k]);
+            square += error * error, out.max_error = fmax(out.max_error, error);
+            if (!isfinite(error))
+                out.max_error = INFINITY;
+        }
+        if (!band[i])
+            out.T_error = fmax(out.T_error, fabs((double)t.T[i] - T[i]));
+    }
+    out.psnr = square > 0 ? -10 * log10(square / (3.0 * (double)(n - out.band))) : 200;
+    const float *got[GAUSSIANS_FIELD_COUNT];
+    field_list(&t.d, got);
+    for (int class = 0; class < CLASS_COUNT; class++) {
+        double error = 0, norm = 0;
+        for (size_t f = class_first[class]; f < class_first[class + 1]; f++)
+            for (size_t i = 0; i < g->count; i++) {
+                const double wanted = d[f * g->count + i], off = (double)got[f][i] - wanted;
+                error += off * off, norm += wanted * wanted;
+            }
+        out.gradient[class] = error > 0 ? sqrt(error / norm) : error; /* NaN stays NaN */
+    }
+    double error = 0, norm = 0;
+    for (int c = 0; c < 3; c++)
+        error += pow((double)t.d_background[c] - d_background[c], 2), norm += d_background[c] * d_background[c];
+    out.background = sqrt(error / norm);
+    traced_free(&t);
+    reference_scene_free(&scene);
+    image_free(&d_image);
+    mem_free(rgb), mem_free(T), mem_free(d_rgb), mem_free(d), mem_free(band);
+    return out;
+}
+
+static void print_figures(const char *name, const figures *f)
+{
+    print_message("%-14s %5.1f hits, %3zu of %zu rays in the band, %llu packets spilled: %.1f dB, max %.1e, T %.1e; adjoint", name,
+                  (double)f->hits / (double)f->rays, f->band, f->rays, (unsigned long long)f->counters.spilled_packets, f->psnr, f->max_error, f->T_error);
+    for (int class = 0; class < CLASS_COUNT; class++)
+        print_message(" %.1e", f->gradient[class]);
+    print_message(" %.1e\n", f->background);
+}
+
+static void assert_figures(const char *name, const figures *f, double gradient_limit)
+{
+    print_figures(name, f);
+    if (!(f->psnr >= 100 && f->max_error <= 2e-5 && f->T_error <= 2e-5))
+        fail_msg("%s: %.1f dB, max error %.3g, of T %.3g", name, f->psnr, f->max_error, f->T_error);
+    for (int class = 0; class < CLASS_COUNT; class++)
+        if (!(f->gradient[class] <= gradient_limit))
+            fail_msg("%s: gradient of %s is off by %.3g", name, class_names[class], f->gradient[class]);
+    if (!(f->background <= gradient_limit))
+        fail_msg("%s: gradient of the background is off by %.3g", name, f->background);
+    assert_true(f->band * 5 <= f->rays);
+}
+
+static trace_settings with_background(void)
+{
+    trace_settings s = trace_settings_default();
+    s.background[0] = 0.3f, s.background[1] = 0.6f, s.background[2] = 0.1f;
+    return s;
+}
+
+/* ---- against the reference ----------------------------------------------------------------------------------------------------------- */
+
+static void random_scenes(void **state)
+{
+    (void)state;
+    static const cloud_def rows[] = {
+        {"one", 1, 0.1f, 0.5f, 1.0f, 1, 0.9f, {0, 0, -4}},
+        {"twenty", 20, 1, 0.2f, 0.6f, 1, 1.2f, {3, 1, -4}},
+        {"three hundred", 300, 1, 0.03f, 0.3f, 1, 0.9f, {3, 1, -4}},
+        {"dense", 2000, 1, 0.05f, 0.3f, 1, 0.5f, {2, 1, -5}},
+        {"opaque", 2000, 1, 0.02f, 0.2f, 1, 1.1f, {2, 1, -5}},
+        {"inside", 1000, 1, 0.03f, 0.3f, 1, 0.6f, {0.1, 0.05, 0}},
+        {"flat 1:100", 500, 1, 0.1f, 0.5f, 100, 0.9f, {2, 1, -4}},
+        {"needles 1:1000", 500, 1, 0.2f, 0.8f, 1000, 0.9f, {2, 1, -4}},
+        {"1e-3 to 1e3", 600, 2, 1e-3f, 1e3f, 1, 0.1f, {3, 1, -6}},
+        {"tiny", 300, 1e-3f, 1e-4f, 3e-4f, 1, 0.9f, {2e-3, 1e-3, -4e-3}},
+        {"huge", 300, 1e6f, 1e5f, 3e5f, 1, 0.9f, {2e6, 1e6, -4e6}},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        gaussians g = make_cloud(&rows[i], 100 + i);
+        trace_settings s = with_background();
+        if (rows[i].spread < 0.01f)
+            s.t_near = 1e-5f;
+        const gbt_camera camera = camera_at(rows[i].camera, (double[3]){0, 0, 0}, 37, 21, 40);
+        ray_image rays = {0};
+        assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+        const figures f = compare(&g, &s, &rays, i, 1e-6);
+        /* At 1:100 and 1:1000 the thin axis is 1e-3 and 1e-4 of the distance: rounding of coordinates alone moves every hit by that much more
+           of a std-dev. */
+        const float thin = rows[i].flatness;
+        assert_figures(rows[i].name, &f, thin > 500 ? 5e-4 : thin > 50 ? 5e-5 : 1e-5);
+        assert_true(f.hits > 0);
+        ray_image_free(&rays);
+        gaussians_free(&g);
+    }
+}
+
+static void rays_that_do_not_run_together(void **state)
+{
+    (void)state;
+    const cloud_def def = {"", 600, 1, 0.05f, 0.4f, 1, 0.7f, {0, 0, 0}};
+    gaussians g = make_cloud(&def, 7);
+    const trace_settings s = with_background();
+    gbt_camera camera = camera_at((double[3]){0.1, 0.2, 0}, (double[3]){0, 0, 1}, 36, 18, 60);
+    static const struct {
+        gbt_camera_model model;
+        const char *name;
+        double params[8];
+    } rows[] = {{GBT_CAMERA_EQUIRECTANGULAR, "all around", {36, 18}}, {GBT_CAMERA_OPENCV_FISHEYE, "fisheye", {8, 8, 18, 9, 0.01, 0, 0, 0}}};
+    for (size_t i = 0; i < 2; i++) {
+        camera.model = rows[i].model;
+        memcpy(camera.params, rows[i].params, sizeof rows[i].params);
+        ray_image rays = {0};
+        assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+        const figures f = compare(&g, &s, &rays, 30 + i, 1e-6);
+        assert_figures(rows[i].name, &f, 1e-5);
+        ray_image_free(&rays);
+    }
+    /* Every ray from its own place into its own direction: no frustum, every packet lane by lane. */
+    enum { W = 19, H = 13 };
+    static float origin[3 * W * H], dir[3 * W * H];
+    for (size_t i = 0; i < W * H; i++) {
+        double d[3];
+        for (size_t k = 0; k < 3; k++)
+            d[k] = rng_normal(40, k, i), origin[3 * i + k] = (float)rng_normal(41, k, i);
+        dvec_normalize(d);
+        for (size_t k = 0; k < 3; k++)
+            dir[3 * i + k] = (float)d[k];
+    }
+    const ray_image rays = {.width = W, .height = H, .origin = origin, .dir = dir};
+    const figures f = compare(&g, &s, &rays, 42, 1e-6);
+    assert_figures("every way", &f, 1e-5);
+    assert_true(f.counters.spilled_packets >= 16); /* of 20; those in the corners have few rays */
+    gaussians_free(&g);
+}
+
+static void one_hundred_thousand_hits(void **state)
+{
+    (void)state;
+    for (size_t count = 10000; count <= 100000; count *= 10) {
+        gaussians g = some(count, 0);
+        for (size_t i = 0; i < count; i++) {
+            g.mean_z[i] = 2 * rng_uniform(1, 0, i), g.mean_x[i] = 0.2f * rng_uniform(1, 1, i);
+            g.opacity[i] = 4 / (float)count * (0.5f + rng_uniform(1, 2, i));
+            g.red[i] = rng_uniform(1, 3, i), g.blue[i] = 0;
+        }
+        trace_settings s = with_background();
+        s.alpha_min = 0.1f / (float)count;
+        float store[6] = {0, 0, -5, 0, 0, 1};
+        const ray_image rays = {.width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
+        image d_rgb = random_gradient(&rays, 3);
+        traced t = trace_all(&g, &s, &rays, &d_rgb);
+        double rgb[3], T;
+        uint32_t blended;
+        assert_ok(reference_forward(&g, &s, &rays, rgb, &T, &blended, NULL));
+        assert_int_equal(blended, count);
+        assert_int_equal(t.counters.blended, count);
+        assert_int_equal(t.counters.spilled_packets, 1);
+        for (int c = 0; c < 3; c++)
+            assert_near((double)t.rgb.pixels[c], rgb[c], 1e-4); /* 10^5 additions in float32 */
+        assert_near((double)t.T[0], T, 1e-4);
+        if (count == 10000) { /* the reference's adjoint is quadratic in the hits */
+            double *d = mem_calloc(count, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL), d_background[3] = {0}, worst = 0;
+            const double d_in[3] = {(double)d_rgb.pixels[0], (double)d_rgb.pixels[1], (double)d_rgb.pixels[2]};
+            assert_ok(reference_backward(&g, &s, &rays, d_in, NULL, d, d_background, NULL));
+            const float *got[GAUSSIANS_FIELD_COUNT];
+            field_list(&t.d, got);
+            for (int class = 0; class < CLASS_COUNT; class++) {
+                double error = 0, norm = 0;
+                for (size_t f = class_first[class]; f < class_first[class + 1]; f++)
+                    for (size_t i = 0; i < count; i++)
+                        error += pow((double)got[f][i] - d[f * count + i], 2), norm += pow(d[f * count + i], 2);
+                if (class != CLASS_ROTATION) /* round: no gradient */
+                    worst = fmax(worst, sqrt(error / norm));
+                else
+                    assert_true(error == 0 && norm == 0);
+            }
+            print_message("10,000 hits on one ray: adjoint within %.1e\n", worst);
+            assert_true(worst <= 5e-5);
+            mem_free(d);
+        }
+        traced_free(&t);
+        image_free(&d_rgb);
+        gaussians_free(&g);
+    }
+}
+
+/* Equal depths go by id: in the packet (150 rows fit) and on the spill path (400 do not). */
+static void coincident_gaussians(void **state)
+{
+    (void)state;
+    const trace_settings s = with_background();
+    for (size_t count = 150; count <= 400; count += 250) {
+        gaussians g = some(count, 0.01f);
+        for (size_t i = 0; i < count; i++)
+            g.red[i] = rng_uniform(8, 0, i), g.green[i] = i % 2 == 0, g.blue[i] = (float)i / (float)count, g.scale_y[i] = 2, g.scale_z[i] = 0.5f;
+        const gbt_camera camera = camera_at((double[3]){1, 0.5, -6}, (double[3]){0, 0, 0}, 16, 12, 20);
+        ray_image rays = {0};
+        assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+        const figures f = compare(&g, &s, &rays, 50, 1e-6);
+        assert_figures(count == 150 ? "150 at once" : "400 at once", &f, 1e-5);
+        assert_int_equal(f.counters.spilled_packets, count == 150 ? 0 : 12);
+        ray_image_free(&rays);
+        gaussians_free(&g);
+    }
+}
+
+/* At alpha_max exactly the gradient is already 0, as the reference has it; one float below it is open. */
+static void the_cap_is_exact(void **state)
+{
+    (void)state;
+    const trace_settings s = trace_settings_default();
+    float store[6] = {0, 0, -5, 0, 0, 1};
+    const ray_image rays = {.width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
+    image d_rgb;
+    assert_ok(image_alloc(&d_rgb, 1, 1, 3, NULL));
+    d_rgb.pixels[0] = d_rgb.pixels[1] = d_rgb.pixels[2] = 1;
+    const float opacities[3] = {nextafterf(s.alpha_max, 0), s.alpha_max, nextafterf(s.alpha_max, 1)};
+    for (cpu_isa isa = CPU_PLAIN; isa <= CPU_AVX512; isa++) {
+        cpu_limit_isa(isa);
+        for (int i = 0; i < 3; i++) {
+            gaussians g = some(1, opacities[i]);
+            traced t = trace_all(&g, &s, &rays, &d_rgb);
+            double d[GAUSSIANS_FIELD_COUNT] = {0}, d_background[3] = {0};
+            assert_ok(reference_backward(&g, &s, &rays, (double[3]){1, 1, 1}, NULL, d, d_background, NULL));
+            assert_near((double)t.d.opacity[0], i == 0 ? 3 : 0, 0);
+            assert_near(d[REFERENCE_opacity], i == 0 ? 3 : 0, 0);
+            assert_near((double)t.d.red[0], (double)(i == 0 ? opacities[0] : s.alpha_max), 0);
+            traced_free(&t);
+            gaussians_free(&g);
+        }
+    }
+    cpu_limit_isa(CPU_AVX512);
+    image_free(&d_rgb);
+}
+
+/* ---- the same bits ------------------------------------------------------------------------------------------------------------------- */
+
+static void assert_same(const traced *a, const traced *b, size_t rays, size_t count)
+{
+    assert_memory_equal(a->rgb.pixels, b->rgb.pixels, 3 * rays * sizeof(float));
+    assert_memory_equal(a->T, b->T, rays * sizeof(float));
+    assert_memory_equal(a->weight, b->weight, count * sizeof(float));
+    assert_memory_equal(a->d_background, b->d_background, sizeof a->d_background);
+    const float *x[GAUSSIANS_FIELD_COUNT], *y[GAUSSIANS_FIELD_COUNT];
+    field_list(&a->d, x);
+    field_list(&b->d, y);
+    for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
+        assert_memory_equal(x[f], y[f], count * sizeof(float));
+    assert_memory_equal(&a->counters, &b->counters, sizeof a->counters);
+}
+
+static void instruction_sets_and_threads_give_the_same_bits(void **state)
+{
+    (void)state;
+    const cloud_def defs[] = {{"", 3000, 1, 0.03f, 0.3f, 30, 0.9f, {2, 1, -5}}, {"", 500, 0.2f, 1, 2, 1, 0.03f, {0, 0, 0}}};
+    const int before = parallel_threads();
+    uint64_t spilled = 0;
+    for (size_t i = 0; i < 2; i++) {
+        gaussians g = make_cloud(&defs[i], 60 + i);
+        const trace_settings s = with_background();
+        gbt_camera camera = camera_at(defs[i].camera, (double[3]){0, 0, 0.5}, 22, 14, 50);
+        if (i == 1) /* wide and deep: packets spill */
+            camera.model = GBT_CAMERA_EQUIRECTANGULAR, camera.params[0] = 22, camera.params[1] = 14;
+        ray_image rays = {0};
+        assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+        image d_rgb = random_gradient(&rays, 70);
+        parallel_set_threads(1);
+        cpu_limit_isa(CPU_PLAIN);
+        traced first = trace_all(&g, &s, &rays, &d_rgb);
+        spilled += first.counters.spilled_packets;
+        for (cpu_isa isa = CPU_PLAIN; isa <= CPU_AVX512; isa++)
+            for (int threads = 1; threads <= 3; threads++) {
+                cpu_limit_isa(isa);
+                parallel_set_threads(threads);
+                traced again = trace_all(&g, &s, &rays, &d_rgb);
+                assert_same(&first, &again, ray_image_count(&rays), g.count);
+                traced_free(&again);
+            }
+        cpu_limit_isa(CPU_AVX512);
+        traced_free(&first);
+        image_free(&d_rgb);
+        ray_image_free(&rays);
+        gaussians_free(&g);
+    }
+    print_message("widest instruction set here: %s; %llu packets spilled\n", cpu_isa_name(cpu_best_isa()), (unsigned long long)spilled);
+    assert_true(spilled > 5);
+    parallel_set_threads(before);
+}
+
+/* ---- odd input ----------------------------------------------------------------------------------------------------------------------- */
+
+static void rays_that_are_none(void **state)
+{
+    (void)state;
+    enum { W = 6, H = 5, RAYS = W * H };
+    float origin[3 * RAYS], dir[3 * RAYS];
+    for (size_t i = 0; i < RAYS; i++) {
+        origin[3 * i] = 0.1f * (float)(i % W), origin[3 * i + 1] = 0, origin[3 * i + 2] = -4;
+        dir[3 * i] = dir[3 * i + 1] = 0, dir[3 * i + 2] = 1;
+    }
+    dir[3 * 2 + 2] = 0, dir[3 * 7] = NAN, dir[3 * 9 + 2] = INFINITY, origin[3 * 11] = NAN, origin[3 * 13 + 1] = INFINITY;
+    dir[3 * 28 + 2] = dir[3 * 29 + 2] = 0; /* a packet without any ray */
+    static const size_t none[] = {2, 7, 9, 11, 13, 28, 29};
+    const ray_image rays = {.width = W, .height = H, .origin = origin, .dir = dir};
+    const trace_settings s = with_background();
+    gaussians g = some(3, 0.5f);
+    image d_rgb = random_gradient(&rays, 80);
+    trace_scene scene = {0};
+    traced t = {0};
+    assert_ok(image_alloc(&t.rgb, W, H, 3, NULL));
+    float T[RAYS], want[3] = {0};
+    assert_ok(trace_build(&scene, &g, &s, 4, NULL));
+    assert_ok(trace_forward(&scene, &rays, true, &t.rgb, T, &t.counters, NULL));
+    assert_ok(trace_backward(&scene, &rays, &d_rgb, &t.d, NULL, t.d_background, NULL));
+    assert_int_equal(t.counters.rays, RAYS - 7);
+    for (size_t i = 0; i < RAYS; i++) {
+        bool is_none = false;
+        for (size_t k = 0; k < sizeof none / sizeof *none; k++)
+            is_none = is_none || none[k] == i;
+        assert_true(is_none == (T[i] == 1));
+        for (size_t c = 0; c < 3; c++) {
+            assert_true(is_none == (t.rgb.pixels[3 * i + c] == s.background[c]));
+            want[c] += T[i] * d_rgb.pixels[3 * i + c];
+        }
+    }
+    for (int c = 0; c < 3; c++) {
+        assert_near((double)t.d_background[c], (double)want[c], 1e-5);
+        assert_true(isfinite(t.d.mean_x[0]) && isfinite(t.d.scale_z[0]) && isfinite(t.d.opacity[0]));
+    }
+    trace_scene_free(&scene);
+    traced_free(&t);
+    image_free(&d_rgb);
+    gaussians_free(&g);
+}
+
+static void broken_gaussians_are_left_out(void **state)
+{
+    (void)state;
+    gaussians g = some(12, 0.4f);
+    g.mean_x[0] = NAN, g.scale_y[1] = 0, g.scale_x[2] = NAN, g.quat_w[3] = NAN, g.opacity[4] = NAN, g.mean_z[5] = INFINITY;
+    g.opacity[6] = -1, g.opacity[7] = 0; /* below alpha_min: not rejected, only never seen */
+    g.opacity[8] = 1.5f;                 /* cut at alpha_max near the centre, as any other */
+    g.mean_z[8] = 3;
+    const trace_settings s = with_background();
+    const gbt_camera camera = camera_at((double[3]){1, 0.5, -6}, (double[3]){0, 0, 0}, 13, 9, 30);
+    ray_image rays = {0};
+    assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+    image d_rgb = random_gradient(&rays, 90);
+    traced t = trace_all(&g, &s, &rays, &d_rgb);
+    assert_int_equal(t.rejected, 6);
+    const float *d[GAUSSIANS_FIELD_COUNT];
+    field_list(&t.d, d);
+    for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
+        for (size_t i = 0; i < 8; i++)
+            assert_true(d[f][i] == 0);
+    assert_true(t.weight[8] > 0 && t.weight[11] > 0);
+    traced_free(&t);
+    double rgb[3 * 13 * 9];
+    assert_ok(reference_forward(&g, &s, &rays, rgb, NULL, NULL, NULL));
+    t = trace_all(&g, &s, &rays, &d_rgb);
+    for (size_t i = 0; i < 3 * 13 * 9; i++)
+        assert_near((double)t.rgb.pixels[i], rgb[i], 2e-6);
+    traced_free(&t);
+    gaussians nobody = some(0, 0); /* no Gaussian, no tree */
+    t = trace_all(&nobody, &s, &rays, &d_rgb);
+    assert_true(t.rgb.pixels[0] == s.background[0] && t.T[20] == 1 && t.d.count == 0);
+    traced_free(&t);
+    gaussians_free(&nobody);
+    image_free(&d_rgb);
+    ray_image_free(&rays);
+    gaussians_free(&g);
+}
+
+/* A disc thinner than float32 can square: the ray inside its plane hits it, its neighbours make infinities. No gradient may be NaN. */
+static void no_nan_from_neighbours(void **state)
+{
+    (void)state;
+    gaussians g = some(2, 0.5f);
+    g.scale_x[0] = 1e-25f, g.mean_x[1] = 0.2f;
+    enum { W = 4, H = 1 };
+    float origin[3] = {0, 0, -4}, dir[3 * W] = {0, 0, 1, 0.02f, 0, 0.9998f, -0.02f, 0, 0.9998f, 0.04f, 0, 0.9992f};
+    const ray_image rays = {.width = W, .height = H, .origin = origin, .dir = dir, .common_origin = true};
+    const trace_settings s = with_background();
+    image d_rgb = random_gradient(&rays, 95);
+    traced t = trace_all(&g, &s, &rays, &d_rgb);
+    const float *d[GAUSSIANS_FIELD_COUNT];
+    field_list(&t.d, d);
+    for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
+        assert_true(isfinite(d[f][0]) && isfinite(d[f][1]));
+    for (size_t i = 0; i < 3 * W; i++)
+        assert_true(isfinite(t.rgb.pixels[i]));
+    assert_true(t.weight[0] > 0.1f && t.weight[1] > 0.1f);
+    traced_free(&t);
+    image_free(&d_rgb);
+    gaussians_free(&g);
+}
+
+static void wrong_sizes_are_refused(void **state)
+{
+    (void)state;
+    gaussians g = some(1, 0.5f), d = {0};
+    float store[9] = {0, 0, -5, 0, 0, 1, 0, 0, 1};
+    ray_image rays = {.width = 2, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
+    const trace_settings s = trace_settings_default();
+    trace_scene scene = {0};
+    image rgb, small;
+    gbt_error err = {0};
+    assert_ok(image_alloc(&rgb, 2, 1, 3, NULL));
+    assert_ok(image_alloc(&small, 1, 1, 3, NULL));
+    assert_ok(trace_build(&scene, &g, &s, 5, NULL));
+    assert_int_equal(trace_forward(&scene, &rays, true, &small, NULL, NULL, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT); /* no forward pass */
+    assert_ok(trace_forward(&scene, &rays, false, &rgb, NULL, NULL, NULL));
+    assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT); /* without a tape */
+    assert_ok(trace_forward(&scene, &rays, true, &rgb, NULL, NULL, NULL));
+    assert_int_equal(trace_backward(&scene, &rays, &small, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
+    assert_ok(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL));
+    assert_ok(trace_build(&scene, &g, &s, 5, NULL));
+    assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT); /* the tape was of another build */
+    trace_scene_free(&scene);
+    image_free(&rgb);
+    image_free(&small);
+    gaussians_free(&g);
+    gaussians_free(&d);
+}
+
+static gbt_status run_once(const gaussians *g, const trace_settings *s, const ray_image *rays, image *rgb, const image *d_rgb, gbt_error *err)
+{
+    trace_scene scene = {0};
+    gaussians d = {0};
+    gbt_status status = trace_build(&scene, g, s, reach_of(rays), err);
+    if (status == GBT_OK)
+        status = trace_forward(&scene, rays, true, rgb, NULL, NULL, err);
+    if (status == GBT_OK)
+        status = trace_backward(&scene, rays, d_rgb, &d, NULL, NULL, err);
+    trace_scene_free(&scene);
+    gaussians_free(&d);
+    return status;
+}
+
+static void memory_runs_out(void **state)
+{
+    (void)state;
+    const cloud_def defs[2] = {{"", 200, 1, 0.1f, 0.3f, 1, 0.9f, {2, 1, -5}}, {"", 300, 0.2f, 1, 2, 1, 0.03f, {2, 1, -5}}};
+    const trace_settings s = with_background();
+    const int before = parallel_threads();
+    parallel_set_threads(1);
+    for (size_t i = 0; i < 2; i++) { /* the second spills */
+        gaussians g = make_cloud(&defs[i], 5 + i);
+        const gbt_camera camera = camera_at(defs[i].camera, (double[3]){0, 0, 0}, 12, 6, 40);
+        ray_image rays = {0};
+        assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+        image d_rgb = random_gradient(&rays, 1), rgb;
+        assert_ok(image_alloc(&rgb, 12, 6, 3, NULL));
+        assert_ok(run_once(&g, &s, &rays, &rgb, &d_rgb, NULL)); /* Embree's device exists from here on */
+        long n = 0;
+        for (gbt_status status = GBT_ERR_NO_MEMORY; status != GBT_OK; n++) {
+            gbt_error err = {0};
+            mem_fail_after(n);
+            status = run_once(&g, &s, &rays, &rgb, &d_rgb, &err);
+            mem_fail_after(-1);
+            if (status != GBT_OK) {
+                assert_int_equal(status, GBT_ERR_NO_MEMORY);
+                assert_true(err.text[0] != '\0');
+            }
+        }
+        assert_true(n > 15);
+        image_free(&rgb);
+        image_free(&d_rgb);
+        ray_image_free(&rays);
+        gaussians_free(&g);
+    }
+    parallel_set_threads(before);
+}
+
+/* ---- a scene of others --------------------------------------------------------------------------------------------------------------- */
+
+static void peer_scene(void **state)
+{
+    (void)state;
+    const char *path = shared_path("peer/match2k/scene.ply");
+    if (path == NULL)
+        skip();
+    gaussian_cloud cloud;
+    assert_ok(gaussian_ply_load(path, &cloud, NULL));
+    gaussians g = some(cloud.count, 0);
+    for (size_t i = 0; i < cloud.count; i++) {
+        const float *m = cloud.mean + 3 * i, *l = cloud.scale_log + 3 * i, *q = cloud.quat + 4 * i, *sh = cloud.sh + i * GAUSSIAN_SH_COUNT * 3;
+        g.mean_x[i] = m[0], g.mean_y[i] = m[1], g.mean_z[i] = m[2];
+        g.scale_x[i] = expf(l[0]), g.scale_y[i] = expf(l[1]), g.scale_z[i] = expf(l[2]);
+        g.quat_w[i] = q[0], g.quat_x[i] = q[1], g.quat_y[i] = q[2], g.quat_z[i] = q[3], g.opacity[i] = cloud.opacity[i];
+        g.red[i] = 0.5f + 0.28209479f * sh[0], g.green[i] = 0.5f + 0.28209479f * sh[1], g.blue[i] = 0.5f + 0.28209479f * sh[2];
+    }
+    assert_int_equal(cloud.count, 2000);
+    const gbt_camera camera = camera_at((double[3]){0, -38, 9}, (double[3]){0, 0, 0}, 48, 48, 38);
+    ray_image rays = {0};
+    assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+    const trace_settings s = trace_settings_default();
+    const figures f = compare(&g, &s, &rays, 2, 1e-6);
+    assert_figures("peer match2k", &f, 1e-5);
+    assert_true(f.hits > 10 * f.rays);
+    ray_image_free(&rays);
+    gaussians_free(&g);
+    gaussian_cloud_free(&cloud);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(random_scenes),
+        cmocka_unit_test(rays_that_do_not_run_together),
+        cmocka_unit_test(one_hundred_thousand_hits),
+        cmocka_unit_test(coincident_gaussians),
+        cmocka_unit_test(the_cap_is_exact),
+        cmocka_unit_test(instruction_sets_and_threads_give_the_same_bits),
+        cmocka_unit_test(rays_that_are_none),
+        cmocka_unit_test(broken_gaussians_are_left_out),
+        cmocka_unit_test(no_nan_from_neighbours),
+        cmocka_unit_test(wrong_sizes_are_refused),
+        cmocka_unit_test(memory_runs_out),
+        cmocka_unit_test(peer_scene),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,1097 @@
+/* tests/train/test_trainer.c -- training runs: same bits whatever happens on the way, budget, growing, no points, hostile surroundings.
+
+   The scene is tiny (photos of 48 x 36), so a run takes a fraction of a second. Nothing here depends on a tuned constant. */
+#include "test_support.h"
+
+#include <ftw.h>
+#include <jansson.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "base/file.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "data/photo.h"
+#include "gbtrace/make_scene.h"
+#include "io/model_file.h"
+#include "train/checkpoint.h"
+#include "train/config.h"
+#include "train/seed_points.h"
+#include "train/trainer.h"
+
+enum { PATH_SIZE = 512, STEPS = 60, VIEWS = 9 };
+
+static char root[64], tiny[PATH_SIZE];
+
+/* ---- folders, files ----------------------------------------------------------------------------------------------------------- */
+
+static int remove_one(const char *path, const struct stat *info, int kind, struct FTW *walk)
+{
+    (void)info, (void)kind, (void)walk;
+    return remove(path);
+}
+
+static const char *in_root(const char *format, ...)
+{
+    static char paths[16][PATH_SIZE];
+    static int next = 0;
+    char *path = paths[next = (next + 1) % 16];
+    const int length = snprintf(path, PATH_SIZE, "%s/", root);
+    va_list list;
+    va_start(list, format);
+    vsnprintf(path + length, PATH_SIZE - (size_t)length, format, list);
+    va_end(list);
+    return path;
+}
+
+typedef struct bytes {
+    unsigned char *data;
+    size_t count;
+} bytes;
+
+static bytes read_bytes(const char *path)
+{
+    bytes b;
+    gbt_error err = {0};
+    if (file_read(path, &b.data, &b.count, &err) != GBT_OK)
+        fail_msg("%s", err.text);
+    return b;
+}
+
+static void assert_same_file(const char *a, const char *b)
+{
+    bytes x = read_bytes(a), y = read_bytes(b);
+    if (x.count != y.count || memcmp(x.data, y.data, x.count) != 0)
+        fail_msg("%s and %s differ", a, b);
+    mem_free(x.data);
+    mem_free(y.data);
+}
+
+static bool is_same_file(const char *a, const char *b)
+{
+    bytes x = read_bytes(a), y = read_bytes(b);
+    const bool same = x.count == y.count && memcmp(x.data, y.data, x.count) == 0;
+    mem_free(x.data);
+    mem_free(y.data);
+    return same;
+}
+
+static void make_tiny_scene(const char *folder)
+{
+    gbt_make_scene_def def = gbt_make_scene_def_default();
+    def.width = 48, def.height = 36, def.view_count = VIEWS, def.points = 150, def.samples = 4;
+    gbt_error err = {0};
+    if (gbt_make_scene(&def, folder, &err) != GBT_OK)
+        fail_msg("%s", err.text);
+}
+
+static int make_root(void **state)
+{
+    (void)state;
+    snprintf(root, sizeof root, "/tmp/gbt_train_XXXXXX");
+    if (mkdtemp(root) == NULL)
+        return -1;
+    snprintf(tiny, sizeof tiny, "%s/tiny", root);
+    make_tiny_scene(tiny);
+    return 0;
+}
+
+static int remove_root(void **state)
+{
+    (void)state;
+    return nftw(root, remove_one, 16, FTW_DEPTH | FTW_PHYS);
+}
+
+/* ---- runs --------------------------------------------------------------------------------------------------------------------- */
+
+static gbt_train_def run_def(void)
+{
+    gbt_train_def def = gbt_train_def_default();
+    def.iterations = STEPS;
+    def.seed = 5;
+    def.save_every_seconds = 0;
+    return def;
+}
+
+static void train_ok(const char *data, const char *run, const gbt_train_def *def)
+{
+    gbt_error err = {0};
+    if (gbt_train(data, run, def, &err) != GBT_OK)
+        fail_msg("%s: %s", run, err.text);
+}
+
+static void train_fails(const char *data, const char *run, const gbt_train_def *def, gbt_status wanted, const char *says)
+{
+    gbt_error err = {0};
+    const gbt_status status = gbt_train(data, run, def, &err);
+    if (status != wanted || err.status != wanted || strstr(err.text, says) == NULL || strchr(err.text, '\n') != NULL)
+        fail_msg("wanted status %d and \"%s\", got %d: %s", (int)wanted, says, (int)status, err.text);
+}
+
+static void open_ok(trainer *t, const char *data, const gbt_train_def *def)
+{
+    gbt_error err = {0};
+    *t = (trainer){0};
+    if (trainer_open(t, data, def, &err) != GBT_OK)
+        fail_msg("%s", err.text);
+}
+
+/* The run that others are compared with: STEPS steps in one go. */
+static const char *straight_run(void)
+{
+    static bool done = false;
+    if (!done) {
+        const gbt_train_def def = run_def();
+        train_ok(tiny, in_root("straight"), &def);
+        done = true;
+    }
+    return in_root("straight/model.gbt");
+}
+
+static void resume_ok(const char *run)
+{
+    gbt_train_def def = gbt_train_def_default();
+    def.resume = true;
+    def.save_every_seconds = 0;
+    train_ok(tiny, run, &def);
+}
+
+/* A run in a process of its own, so that it can be signalled. It is this program again: threads do not live through a bare fork(). */
+static pid_t start_child(const char *run)
+{
+    fflush(NULL);
+    const pid_t child = fork();
+    if (child == 0) {
+        execl("/proc/self/exe", "test_trainer", "--child", tiny, run, (char *)NULL);
+        _exit(99);
+    }
+    assert_true(child > 0);
+    return child;
+}
+
+static int child_main(const char *data, const char *run)
+{
+    log_set_quiet(1);
+    gbt_train_def def = run_def();
+    def.save_every_seconds = 1e-6; /* after every step */
+    gbt_error err = {0};
+    return gbt_status_exit_code(gbt_train(data, run, &def, &err));
+}
+
+static void nap(void)
+{
+    nanosleep(&(struct timespec){.tv_nsec = 500000}, NULL);
+}
+
+/* Wait for a checkpoint, signal, wait for the end; the child's status. */
+static int signal_once(const char *run, int number)
+{
+    char checkpoint[PATH_SIZE];
+    snprintf(checkpoint, sizeof checkpoint, "%s/checkpoints/last.gbt", run);
+    const pid_t child = start_child(run);
+    int status = 0;
+    for (int i = 0; !file_exists(checkpoint); i++) {
+        if (i > 60000 || waitpid(child, &status, WNOHANG) != 0) {
+            kill(child, SIGKILL);
+            fail_msg("%s: no checkpoint while the run goes on (status %x)", run, (unsigned)status);
+        }
+        nap();
+    }
+    kill(child, number);
+    assert_int_equal(waitpid(child, &status, 0), child);
+    return status;
+}
+
+/* On a busy machine the run may be over before the signal gets there: then once more. */
+static int signal_when_saved(const char *run, int number)
+{
+    for (int i = 0; i < 10; i++) {
+        const int status = signal_once(run, number);
+        if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
+            return status;
+        assert_int_equal(nftw(run, remove_one, 16, FTW_DEPTH | FTW_PHYS), 0);
+    }
+    fail_msg("%s: the run always ends before the signal", run);
+    return 0;
+}
+
+/* ---- the same bits ------------------------------------------------------------------------------------------------------------ */
+
+static void interrupted_and_resumed_is_straight(void **state)
+{
+    (void)state;
+    straight_run();
+    model m;
+    assert_ok(model_load(in_root("straight/model.gbt"), &m, NULL));
+    trainer t;
+    const gbt_train_def whole = run_def();
+    open_ok(&t, tiny, &whole);
+    assert_true(m.anchors.count != t.anchors.count); /* it grows, so that there is something to get wrong */
+    trainer_free(&t);
+    model_free(&m);
+    const char *run = in_root("pieces");
+    static const uint64_t stops[] = {1, 2, 29, 30, STEPS - 1}; /* around growing, around resolutions, at the ends */
+    for (size_t i = 0; i < sizeof stops / sizeof *stops; i++) {
+        gbt_train_def def = run_def();
+        def.resume = i > 0;
+        def.stop_at_step = stops[i];
+        train_fails(tiny, run, &def, GBT_ERR_INTERRUPTED, "saved in");
+    }
+    resume_ok(run);
+    assert_same_file(straight_run(), in_root("pieces/model.gbt"));
+    resume_ok(run); /* a finished run has nothing left to do */
+    assert_same_file(straight_run(), in_root("pieces/model.gbt"));
+}
+
+static void extra_checkpoints_change_nothing(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.save_every_seconds = 1e-6;
+    def.save_at_step = 7;
+    train_ok(tiny, in_root("saves"), &def);
+    assert_same_file(straight_run(), in_root("saves/model.gbt"));
+    assert_true(file_exists(in_root("saves/checkpoints/last.gbt.prev")));
+}
+
+static void killed_and_resumed_is_straight(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        const char *run = in_root("killed%d", i);
+        const int status = signal_when_saved(run, SIGKILL);
+        assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL);
+        resume_ok(run);
+        assert_same_file(straight_run(), in_root("killed%d/model.gbt", i));
+    }
+}
+
+/* A kill between the two renames of a save leaves the checkpoint before it only. */
+static void resumes_from_the_previous_checkpoint(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.stop_at_step = 20;
+    train_fails(tiny, in_root("previous"), &def, GBT_ERR_INTERRUPTED, "after step 20");
+    assert_int_equal(rename(in_root("previous/checkpoints/last.gbt"), in_root("previous/checkpoints/last.gbt.prev")), 0);
+    resume_ok(in_root("previous"));
+    assert_same_file(straight_run(), in_root("previous/model.gbt"));
+}
+
+static void a_signal_saves_and_ends(void **state)
+{
+    (void)state;
+    static const int numbers[] = {SIGINT, SIGTERM};
+    for (int i = 0; i < 2; i++) {
+        const int status = signal_when_saved(in_root("signal%d", i), numbers[i]);
+        assert_true(WIFEXITED(status));
+        assert_int_equal(WEXITSTATUS(status), 130);
+        trainer t = {0};
+        const gbt_train_def def = run_def();
+        gbt_error err = {0};
+        assert_ok(trainer_open(&t, tiny, &def, &err));
+        assert_ok(checkpoint_load(&t, in_root("signal%d/checkpoints/last.gbt", i), &err));
+        assert_in_range(t.step, 1, STEPS - 1);
+        trainer_free(&t);
+        resume_ok(in_root("signal%d", i));
+        assert_same_file(straight_run(), in_root("signal%d/model.gbt", i));
+    }
+}
+
+static void threads_do_not_change_bits(void **state)
+{
+    (void)state;
+    const int before = parallel_threads();
+    for (int threads = 1; threads <= 3; threads++) {
+        gbt_set_threads(threads);
+        const gbt_train_def def = run_def();
+        train_ok(tiny, in_root("threads%d", threads), &def);
+        assert_same_file(straight_run(), in_root("threads%d/model.gbt", threads));
+    }
+    gbt_set_threads(before);
+}
+
+static void another_seed_changes_bits(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.iterations = 3;
+    static const uint64_t seeds[] = {5, 6};
+    for (int i = 0; i < 2; i++) {
+        def.seed = seeds[i];
+        train_ok(tiny, in_root("seed%d", i), &def);
+    }
+    model a, b;
+    assert_ok(model_load(in_root("seed0/model.gbt"), &a, NULL));
+    assert_ok(model_load(in_root("seed1/model.gbt"), &b, NULL));
+    assert_int_equal(a.decoder.param_count, b.decoder.param_count);
+    assert_true(memcmp(a.decoder.params, b.decoder.params, a.decoder.param_count * sizeof(float)) != 0);
+    model_free(&a);
+    model_free(&b);
+}
+
+/* ---- the budget --------------------------------------------------------------------------------------------------------------- */
+
+static void assert_same_model(const char *path_a, const char *path_b)
+{
+    model a, b;
+    assert_ok(model_load(path_a, &a, NULL));
+    assert_ok(model_load(path_b, &b, NULL));
+    assert_int_equal(a.iterations, b.iterations);
+    assert_int_equal(a.anchors.count, b.anchors.count);
+    const size_t n = a.anchors.count, k = (size_t)a.anchors.offset_count;
+    assert_memory_equal(a.anchors.position, b.anchors.position, 3 * n * sizeof(float));
+    assert_memory_equal(a.anchors.feature, b.anchors.feature, ANCHOR_FEATURE_DIM * n * sizeof(float));
+    assert_memory_equal(a.anchors.offset, b.anchors.offset, 3 * k * n * sizeof(float));
+    assert_memory_equal(a.anchors.scale_log, b.anchors.scale_log, 6 * n * sizeof(float));
+    assert_memory_equal(a.decoder.params, b.decoder.params, a.decoder.param_count * sizeof(float));
+    model_free(&a);
+    model_free(&b);
+}
+
+static json_t *read_summary(const char *run)
+{
+    char path[PATH_SIZE];
+    snprintf(path, sizeof path, "%s/train.json", run);
+    json_t *summary = json_load_file(path, 0, NULL);
+    assert_non_null(summary);
+    return summary;
+}
+
+static void a_budget_run_can_be_repeated(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.iterations = 0;
+    def.budget_seconds = 1;
+    def.eval_at_seconds[0] = 0.3, def.eval_at_count = 1;
+    train_ok(tiny, in_root("budget"), &def);
+
+    json_t *summary = read_summary(in_root("budget"));
+    const json_t *parts = json_object_get(summary, "pace"), *held_out = json_object_get(summary, "held_out");
+    assert_int_equal(json_array_size(parts), PACE_SEGMENTS);
+    char text[512] = "";
+    json_int_t sum = 0;
+    for (size_t i = 0; i < PACE_SEGMENTS; i++) {
+        const json_int_t n = json_integer_value(json_array_get(parts, i));
+        assert_true(n >= 1);
+        sum += n;
+        snprintf(text + strlen(text), sizeof text - strlen(text), "%s%lld", i > 0 ? "," : "", (long long)n);
+    }
+    assert_int_equal(sum, json_integer_value(json_object_get(summary, "iterations")));
+    assert_int_equal(json_array_size(held_out), 1);
+    assert_true(json_number_value(json_object_get(json_array_get(held_out, 0), "psnr")) > 3);
+    /* Wide, for the machine may be busy with other things; a schedule that ignores the clock is off by far more. */
+    const double seconds = json_number_value(json_object_get(summary, "train_seconds"));
+    if (!(seconds > 0.4 && seconds < 4))
+        fail_msg("a budget of 1 s took %g s", seconds);
+    json_decref(summary);
+
+    gbt_train_def again = run_def();
+    again.iterations = 0;
+    again.pace = text;
+    train_ok(tiny, in_root("pace"), &again);
+    assert_same_model(in_root("budget/model.gbt"), in_root("pace/model.gbt"));
+    json_t *repeated = read_summary(in_root("pace"));
+    assert_int_equal(json_integer_value(json_object_get(repeated, "iterations")), sum);
+    json_decref(repeated);
+}
+
+/* The clock goes on where it stood, so an interrupted budget run does not get its time twice. */
+static void a_budget_run_resumes_its_clock(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.iterations = 0;
+    def.budget_seconds = 1;
+    def.stop_at_step = 30;
+    train_fails(tiny, in_root("clock"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    resume_ok(in_root("clock"));
+    json_t *summary = read_summary(in_root("clock"));
+    assert_int_equal(json_array_size(json_object_get(summary, "pace")), PACE_SEGMENTS);
+    assert_true(json_integer_value(json_object_get(summary, "iterations")) > 30);
+    assert_true(json_number_value(json_object_get(summary, "train_seconds")) < 4);
+    json_decref(summary);
+}
+
+/* ---- what a step does --------------------------------------------------------------------------------------------------------- */
+
+static void step_ok(trainer *t, step_report *report)
+{
+    gbt_error err = {0};
+    if (trainer_step(t, report, &err) != GBT_OK)
+        fail_msg("step %llu: %s", (unsigned long long)t->step, err.text);
+}
+
+static void assert_rows_agree(const trainer *t)
+{
+    assert_int_equal(t->gradient.count, t->anchors.count);
+    assert_int_equal(t->moment1.count, t->anchors.count);
+    assert_int_equal(t->moment2.count, t->anchors.count);
+    assert_int_equal(t->stats.count, t->anchors.count);
+}
+
+/* Measured: 6.2 dB at the start, 16.1 dB after 160 steps; 4 dB is what a run that learns cannot miss. */
+static void training_learns(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.iterations = 160;
+    def.start_level = 0;
+    trainer t;
+    open_ok(&t, tiny, &def);
+    double before, after, first_loss = 0, last_loss = 0;
+    assert_ok(trainer_held_out_psnr(&t, &before, NULL));
+    bool changed = false;
+    for (int i = 0; i < 160; i++) {
+        const size_t count = t.anchors.count;
+        step_report r;
+        step_ok(&t, &r);
+        assert_false(r.skipped);
+        assert_true(isfinite(r.loss) && r.loss > 0 && r.l1 >= 0 && r.ssim <= 1 && r.width == 48 && r.height == 36 && r.level == 0);
+        assert_rows_agree(&t);
+        changed |= t.anchors.count != count;
+        first_loss += i < 8 ? r.loss / 8 : 0;
+        last_loss += i >= 152 ? r.loss / 8 : 0;
+    }
+    assert_ok(trainer_held_out_psnr(&t, &after, NULL));
+    print_message("held out: %.2f -> %.2f dB, loss %.4f -> %.4f, anchors %zu -> %zu\n", before, after, first_loss, last_loss, t.anchors_initial,
+                  t.anchors.count);
+    assert_true(after > before + 4);
+    assert_true(last_loss < 0.6 * first_loss);
+    assert_true(changed);
+    trainer_free(&t);
+}
+
+static void without_growing_the_anchors_stay(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.grow = false;
+    trainer t;
+    open_ok(&t, tiny, &def);
+    const size_t count = t.anchors.count;
+    for (int i = 0; i < STEPS; i++) {
+        step_report r;
+        step_ok(&t, &r);
+        assert_int_equal(t.anchors.count, count);
+    }
+    trainer_free(&t);
+}
+
+static void growth_stops_at_max_anchors(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    trainer t;
+    open_ok(&t, tiny, &def);
+    const size_t start = t.anchors.count;
+    trainer_free(&t);
+    def.max_anchors = start + 7;
+    open_ok(&t, tiny, &def);
+    size_t most = 0;
+    for (int i = 0; i < STEPS; i++) {
+        step_report r;
+        step_ok(&t, &r);
+        most = t.anchors.count > most ? t.anchors.count : most;
+    }
+    assert_int_equal(most, start + 7);
+    trainer_free(&t);
+}
+
+/* One adjust of the reference's kind, in whose step the anchors' Adam groups rest: what moves is the rows alone. Every second anchor is
+   made transparent by its statistics, the first candidates are made to grow by theirs. Anchors never move, so a position names a row. */
+static void moments_follow_their_rows(void **state)
+{
+    (void)state;
+    enum { LAST = 99 };
+    gbt_train_def def = run_def();
+    def.compat = true;
+    def.voxel_size = 0.01f;
+    def.iterations = 400;
+    trainer t;
+    open_ok(&t, tiny, &def);
+    step_report r;
+    for (int i = 0; i < LAST; i++)
+        step_ok(&t, &r);
+    const size_t n = t.anchors.count, k = (size_t)t.anchors.offset_count;
+    assert_int_equal(n, t.anchors_initial);
+    float *position = malloc(3 * n * sizeof *position), *m1 = malloc(n * 3 * k * sizeof *m1), *m2 = malloc(n * 6 * sizeof *m2);
+    assert_true(position != NULL && m1 != NULL && m2 != NULL);
+    memcpy(position, t.anchors.position, 3 * n * sizeof *position);
+    memcpy(m1, t.moment1.offset, n * 3 * k * sizeof *m1);
+    memcpy(m2, t.moment2.scale_log, n * 6 * sizeof *m2);
+    for (size_t i = 0; i < n; i++) {
+        t.stats.visit_count[i] = 1e6f;
+        t.stats.opacity_accum[i] = i % 2 == 0 ? 0.0f : 1e6f;
+        for (size_t j = 0; j < k; j++) {
+            t.stats.grad_count[i * k + j] = 1e6f;
+            t.stats.grad_accum[i * k + j] = i < 20 ? 1e9f : 0.0f;
+        }
+    }
+    step_ok(&t, &r);
+    assert_rows_agree(&t);
+    size_t kept = 0, grown = 0;
+    for (size_t row = 0; row < t.anchors.count; row++) {
+        size_t from = 0;
+        while (from < n && memcmp(position + 3 * from, t.anchors.position + 3 * row, 3 * sizeof *position) != 0)
+            from++;
+        if (from < n) {
+            kept++;
+            assert_int_equal(from % 2, 1);
+            assert_memory_equal(t.moment1.offset + row * 3 * k, m1 + from * 3 * k, 3 * k * sizeof *m1);
+            assert_memory_equal(t.moment2.scale_log + row * 6, m2 + from * 6, 6 * sizeof *m2);
+        } else {
+            grown++;
+            for (size_t j = 0; j < 3 * k; j++)
+                assert_true(t.moment1.offset[row * 3 * k + j] == 0);
+            for (size_t j = 0; j < 6; j++)
+                assert_true(t.moment2.scale_log[row * 6 + j] == 0);
+        }
+    }
+    assert_int_equal(kept, n / 2);
+    assert_true(grown > 0);
+    for (int i = 0; i < 5; i++) /* and the next steps see consistent rows */
+        step_ok(&t, &r);
+    free(position), free(m1), free(m2);
+    trainer_free(&t);
+}
+
+/* ---- no sparse points --------------------------------------------------------------------------------------------------------- */
+
+/* The tiny scene's photos and cameras as a transforms.json, which has no points. */
+static void write_transforms(const char *folder)
+{
+    scene s;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(tiny, &split, &s, NULL));
+    assert_ok(file_make_folder(folder, NULL));
+    char path[PATH_SIZE];
+    snprintf(path, sizeof path, "%s/images", folder);
+    assert_int_equal(symlink("../tiny/images", path), 0);
+    snprintf(path, sizeof path, "%s/transforms.json", folder);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    const gbt_camera *c = &s.views[0].camera;
+    assert_int_equal(c->model, GBT_CAMERA_PINHOLE);
+    fprintf(file, "{\"w\": %d, \"h\": %d, \"fl_x\": %.17g, \"fl_y\": %.17g, \"cx\": %.17g, \"cy\": %.17g, \"frames\": [", c->width, c->height,
+            c->params[0], c->params[1], c->params[2], c->params[3]);
+    for (size_t i = 0; i < s.view_count; i++) {
+        const double *r = s.views[i].camera.rotation, *at = s.views[i].camera.center;
+        fprintf(file, "%s{\"file_path\": \"images/%s\", \"transform_matrix\": [", i > 0 ? ", " : "", s.views[i].name);
+        for (int k = 0; k < 3; k++) /* columns: x right, y up, z back */
+            fprintf(file, "[%.17g, %.17g, %.17g, %.17g], ", r[k], -r[3 + k], -r[6 + k], at[k] + s.origin[k]);
+        fprintf(file, "[0, 0, 0, 1]]}");
+    }
+    fprintf(file, "]}\n");
+    assert_int_equal(fclose(file), 0);
+    scene_free(&s);
+}
+
+static void points_are_made_where_there_are_none(void **state)
+{
+    (void)state;
+    const char *folder = in_root("no_points");
+    write_transforms(folder);
+    scene s;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(folder, &split, &s, NULL));
+    assert_int_equal(s.points.count, 0);
+    size_t views[VIEWS];
+    for (size_t i = 0; i < VIEWS; i++)
+        views[i] = i;
+    scene_points made[3] = {{0}};
+    const int before = parallel_threads();
+    static const struct { int threads; uint64_t seed; } runs[] = {{1, 5}, {2, 5}, {2, 6}};
+    for (int i = 0; i < 3; i++) {
+        gbt_set_threads(runs[i].threads);
+        photos p;
+        assert_ok(photos_open(&p, &s, 1, NULL));
+        gbt_error err = {0};
+        if (seed_points_make(&p, views, VIEWS, runs[i].seed, &made[i], &err) != GBT_OK)
+            fail_msg("%s", err.text);
+        photos_close(&p);
+    }
+    gbt_set_threads(before);
+    assert_true(made[0].count >= 100 && made[0].has_color);
+    assert_int_equal(made[0].count, made[1].count);
+    assert_memory_equal(made[0].position, made[1].position, 3 * made[0].count * sizeof(float));
+    assert_memory_equal(made[0].color, made[1].color, 3 * made[0].count * sizeof(float));
+    assert_true(made[0].count != made[2].count || memcmp(made[0].position, made[2].position, 3 * made[0].count * sizeof(float)) != 0);
+    for (size_t i = 0; i < 3 * made[0].count; i++)
+        assert_true(isfinite(made[0].position[i]) && made[0].color[i] >= 0 && made[0].color[i] <= 1);
+    for (int i = 0; i < 3; i++)
+        mem_free(made[i].position), mem_free(made[i].color);
+    scene_free(&s);
+
+    gbt_train_def def = run_def();
+    def.iterations = 4;
+    def.max_anchors = 20000;
+    train_ok(folder, in_root("made"), &def);
+    def.stop_at_step = 2;
+    train_fails(folder, in_root("made2"), &def, GBT_ERR_INTERRUPTED, "after step 2");
+    gbt_train_def on = gbt_train_def_default();
+    on.resume = true;
+    train_ok(folder, in_root("made2"), &on);
+    assert_same_file(in_root("made/model.gbt"), in_root("made2/model.gbt"));
+}
+
+/* ---- hostile surroundings ----------------------------------------------------------------------------------------------------- */
+
+static void data_without_training_photos_is_refused(void **state)
+{
+    (void)state;
+    FILE *list = fopen(in_root("all.txt"), "w");
+    assert_non_null(list);
+    scene s;
+    const scene_split none = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(tiny, &none, &s, NULL));
+    for (size_t i = 0; i < s.view_count; i++)
+        fprintf(list, "%s\n", s.views[i].name);
+    fclose(list);
+    scene_free(&s);
+    char split[PATH_SIZE];
+    snprintf(split, sizeof split, "list=%s", in_root("all.txt"));
+    gbt_train_def def = run_def();
+    def.eval_split = split;
+    train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "none is left to train on");
+    def = run_def();
+    train_fails(in_root("nowhere"), in_root("none"), &def, GBT_ERR_IO, "nowhere");
+    def.cookie_ = 0;
+    train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "gbt_train_def_default");
+    assert_false(file_exists(in_root("none/model.gbt")));
+}
+
+static void a_vanished_photo_is_named(void **state)
+{
+    (void)state;
+    const char *data = in_root("vanishing"), *run = in_root("vanished");
+    make_tiny_scene(data);
+    gbt_train_def def = run_def();
+    def.stop_at_step = 3;
+    train_fails(data, run, &def, GBT_ERR_INTERRUPTED, "after step 3");
+    bytes before = read_bytes(in_root("vanished/checkpoints/last.gbt"));
+
+    trainer t;
+    open_ok(&t, data, &def);
+    const char *photo = in_root("vanishing/images/%s", t.scene.views[t.train_views[0]].name);
+    assert_int_equal(rename(photo, in_root("vanishing/aside.png")), 0);
+    gbt_error err = {0};
+    gbt_status status = GBT_OK;
+    for (int i = 0; i < VIEWS && status == GBT_OK; i++) { /* each view once: one of them is gone */
+        step_report r;
+        status = trainer_step(&t, &r, &err);
+    }
+    assert_int_equal(status, GBT_ERR_IO);
+    if (strstr(err.text, t.scene.views[t.train_views[0]].name) == NULL)
+        fail_msg("does not name the photo: %s", err.text);
+    trainer_free(&t);
+
+    gbt_train_def on = gbt_train_def_default();
+    on.resume = true;
+    train_fails(data, run, &on, GBT_ERR_IO, strrchr(photo, '/') + 1);
+    bytes after = read_bytes(in_root("vanished/checkpoints/last.gbt"));
+    assert_int_equal(before.count, after.count);
+    assert_memory_equal(before.data, after.data, before.count);
+    mem_free(before.data);
+    mem_free(after.data);
+    assert_int_equal(rename(in_root("vanishing/aside.png"), photo), 0);
+    train_ok(data, run, &on);
+}
+
+/* A limit on file size stands for the full disk: write() fails half way. */
+static void a_full_disk_leaves_the_old_checkpoint(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.stop_at_step = 10;
+    train_fails(tiny, in_root("full"), &def, GBT_ERR_INTERRUPTED, "after step 10");
+    const char *last = in_root("full/checkpoints/last.gbt"), *copy = in_root("full_copy.gbt");
+    bytes old = read_bytes(last);
+    assert_ok(file_write_atomic(copy, old.data, old.count, NULL));
+    mem_free(old.data);
+    bytes old_model = read_bytes(in_root("full/model.gbt"));
+
+    fflush(NULL);
+    struct rlimit limit;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &limit), 0);
+    const struct rlimit small = {50000, limit.rlim_max};
+    void (*old_action)(int) = signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+    def.resume = true, def.stop_at_step = 20;
+    gbt_error err = {0};
+    const gbt_status status = gbt_train(tiny, in_root("full"), &def, &err);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
+    signal(SIGXFSZ, old_action);
+    if (status != GBT_ERR_IO || strstr(err.text, "last.gbt") == NULL)
+        fail_msg("wanted an error of the checkpoint, got %d: %s", (int)status, err.text);
+
+    /* Whole, under its own name or as the previous one; no half-written file beside it. */
+    assert_true((file_exists(last) && is_same_file(last, copy)) ||
+                (!file_exists(last) && is_same_file(in_root("full/checkpoints/last.gbt.prev"), copy)));
+    assert_false(file_exists(in_root("full/checkpoints/.last.gbt.tmp")));
+    bytes new_model = read_bytes(in_root("full/model.gbt"));
+    assert_int_equal(new_model.count, old_model.count);
+    assert_memory_equal(new_model.data, old_model.data, old_model.count);
+    mem_free(old_model.data);
+    mem_free(new_model.data);
+    resume_ok(in_root("full"));
+    assert_same_file(straight_run(), in_root("full/model.gbt"));
+}
+
+static void write_file(const char *path, const unsigned char *data, size_t count)
+{
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(data, 1, count, file), count);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void a_damaged_checkpoint_is_refused(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.stop_at_step = 5;
+    train_fails(tiny, in_root("damaged"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    const char *path = in_root("damaged/checkpoints/last.gbt");
+    bytes whole = read_bytes(path);
+    gbt_train_def on = gbt_train_def_default();
+    on.resume = true;
+    static const double cuts[] = {0, 1e-4, 0.01, 0.5, 0.999999}; /* parts of the file that are left */
+    for (size_t i = 0; i < sizeof cuts / sizeof *cuts; i++) {
+        write_file(path, whole.data, (size_t)(cuts[i] * (double)whole.count));
+        train_fails(tiny, in_root("damaged"), &on, GBT_ERR_FORMAT, "last.gbt");
+    }
+    for (int i = 0; i < 9; i++) {
+        const size_t at = (whole.count - 1) * (size_t)i / 8;
+        whole.data[at] ^= 0x10;
+        write_file(path, whole.data, whole.count);
+        whole.data[at] ^= 0x10;
+        train_fails(tiny, in_root("damaged"), &on, GBT_ERR_FORMAT, "last.gbt");
+    }
+    /* With an older one beside it, that one is used. */
+    write_file(in_root("damaged/checkpoints/last.gbt.prev"), whole.data, whole.count);
+    resume_ok(in_root("damaged"));
+    assert_same_file(straight_run(), in_root("damaged/model.gbt"));
+    mem_free(whole.data);
+
+    train_fails(tiny, in_root("empty"), &on, GBT_ERR_IO, "checkpoints/last.gbt: cannot open");
+}
+
+static void a_foreign_checkpoint_is_refused(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.stop_at_step = 2;
+    train_fails(tiny, in_root("mine"), &def, GBT_ERR_INTERRUPTED, "after step 2");
+    const char *path = in_root("mine/checkpoints/last.gbt");
+    trainer t;
+    gbt_error err = {0};
+
+    gbt_train_def other = run_def(); /* other settings */
+    other.offsets = 4;
+    open_ok(&t, tiny, &other);
+    assert_int_equal(checkpoint_load(&t, path, &err), GBT_ERR_FORMAT);
+    assert_true(strstr(err.text, path) != NULL);
+    trainer_free(&t);
+
+    gbt_make_scene_def scene_def = gbt_make_scene_def_default(); /* other data */
+    scene_def.width = 48, scene_def.height = 36, scene_def.view_count = VIEWS - 1, scene_def.points = 150, scene_def.samples = 1;
+    assert_ok(gbt_make_scene(&scene_def, in_root("other"), &err));
+    gbt_train_def on = gbt_train_def_default();
+    on.resume = true;
+    train_fails(in_root("other"), in_root("mine"), &on, GBT_ERR_FORMAT, "other data");
+
+    err = (gbt_error){0}; /* a model is not a checkpoint */
+    open_ok(&t, tiny, &def);
+    assert_int_equal(checkpoint_load(&t, in_root("mine/model.gbt"), &err), GBT_ERR_FORMAT);
+    trainer_free(&t);
+}
+
+/* ---- schedule and settings ---------------------------------------------------------------------------------------------------- */
+
+static void progress_rises_from_0_to_1(void **state)
+{
+    (void)state;
+    static const uint64_t lengths[] = {1, 2, 19, 20, 21, 137, 1000};
+    for (size_t l = 0; l < sizeof lengths / sizeof *lengths; l++) {
+        const uint64_t n = lengths[l];
+        const pace p = pace_of_iterations(n);
+        assert_int_equal(pace_total(&p), n);
+        double last = -1;
+        for (uint64_t step = 0; step < n; step++) {
+            const double progress = pace_progress(&p, step);
+            assert_true(progress > last && progress >= 0 && progress < 1);
+            assert_in_range(pace_segment(&p, step), 0, PACE_SEGMENTS - 1);
+            assert_true(p.steps[pace_segment(&p, step)] > 0);
+            last = progress;
+        }
+        assert_true(pace_progress(&p, n) == 1 && pace_progress(&p, n + 1000) == 1);
+        assert_int_equal(pace_segment(&p, n), PACE_SEGMENTS);
+        if (n >= PACE_SEGMENTS)
+            assert_true(pace_progress(&p, 0) == 0);
+    }
+    pace half = {.steps = {4, 2}, .known = 2}; /* a budget run on its way */
+    assert_true(fabs(pace_progress(&half, 2) - 0.5 / PACE_SEGMENTS) < 1e-15);
+    assert_true(fabs(pace_progress(&half, 5) - 1.5 / PACE_SEGMENTS) < 1e-15);
+    assert_int_equal(pace_segment(&half, 6), 2);
+    assert_true(pace_progress(&half, 6) == 2.0 / PACE_SEGMENTS);
+}
+
+static void pace_is_read(void **state)
+{
+    (void)state;
+    pace p;
+    gbt_error err = {0};
+    assert_ok(pace_parse("1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20", &p, &err));
+    assert_int_equal(p.known, PACE_SEGMENTS);
+    for (int i = 0; i < PACE_SEGMENTS; i++)
+        assert_int_equal(p.steps[i], i + 1);
+    static const char *const bad[] = {"", "1", "1,2", "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20,21", "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,",
+                                      "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,x", "-1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+                                      "1, 2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20", "1,,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+                                      "1.5,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20", "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,99999999999999999999"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        err = (gbt_error){0};
+        if (pace_parse(bad[i], &p, &err) != GBT_ERR_ARGUMENT || strstr(err.text, "pace") == NULL)
+            fail_msg("\"%s\" was taken: %s", bad[i], err.text);
+    }
+    gbt_train_def def = run_def();
+    def.iterations = 0, def.pace = "1,2";
+    train_fails(tiny, in_root("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace");
+}
+
+static void levels_and_rates(void **state)
+{
+    (void)state;
+    for (int start = 0; start <= 4; start++) {
+        int last = start;
+        assert_int_equal(schedule_level(0, start), start);
+        for (int i = 0; i <= 1000; i++) {
+            const int level = schedule_level(i / 1000.0, start);
+            assert_in_range(level, 0, last);
+            last = level;
+        }
+        assert_int_equal(schedule_level(1, start), 0);
+        for (int level = 0; level < start; level++) {
+            const double begin = schedule_level_start(level, start);
+            assert_true(begin > schedule_level_start(level + 1, start) && begin < 1);
+            assert_int_equal(schedule_level(begin, start), level);
+            assert_int_equal(schedule_level(begin - 1e-9, start), level + 1);
+        }
+    }
+    double before[6];
+    for (int i = 0; i <= 100; i++) { /* positive, finite, and none ever rises */
+        const learning_rates r = schedule_rates(i / 100.0, 2.0);
+        const double now[6] = {r.offset, r.feature, r.scale, r.opacity_mlp, r.shape_mlp, r.color_mlp};
+        for (int k = 0; k < 6; k++) {
+            assert_true(isfinite(now[k]) && now[k] > 0);
+            assert_true(i == 0 || now[k] <= before[k] * (1 + 1e-12));
+            before[k] = now[k];
+        }
+        assert_true(fabs(r.offset / schedule_rates(i / 100.0, 1.0).offset - 2) < 1e-12);
+    }
+}
+
+static void config_comes_back(void **state)
+{
+    (void)state;
+    gbt_train_def def = gbt_train_def_default();
+    def.init = "voxel", def.scale_prior = "nn", def.max_depth = 7, def.voxel_size = 0.1f, def.offsets = 3, def.distance = "off";
+    def.iterations = 123456789012ull, def.budget_seconds = 1 / 3.0, def.pace = "1,2,3", def.downscale = 1.1, def.start_level = 1;
+    def.eval_split = "list=a = b.txt", def.seed = UINT64_MAX, def.max_anchors = 77, def.grow = false, def.compat = true;
+    char text[CONFIG_TEXT_SIZE], again[CONFIG_TEXT_SIZE];
+    config_text(&def, "/some where/= data", text, sizeof text);
+    gbt_train_def back = gbt_train_def_default();
+    config_strings strings;
+    gbt_error err = {0};
+    if (config_parse(text, "config", &back, &strings, &err) != GBT_OK)
+        fail_msg("%s", err.text);
+    config_text(&back, strings.data, again, sizeof again);
+    assert_string_equal(text, again);
+    assert_true(back.voxel_size == def.voxel_size && back.budget_seconds == def.budget_seconds && back.seed == UINT64_MAX && !back.grow && back.compat);
+
+    def = gbt_train_def_default();
+    config_text(&def, "d", text, sizeof text);
+    back.pace = "1";
+    assert_ok(config_parse(text, "config", &back, &strings, &err));
+    assert_null(back.pace);
+
+    char folder[900]; /* a deep folder must not make a run that cannot go on */
+    memset(folder, 'd', sizeof folder - 1);
+    folder[sizeof folder - 1] = '\0';
+    config_text(&def, folder, text, sizeof text);
+    assert_ok(config_parse(text, "config", &back, &strings, &err));
+    assert_string_equal(strings.data, folder);
+
+    static const struct { const char *text, *says; } bad[] = {
+        {"seed = 1\nnonsense\n", "config:2"}, {"seed = x\n", "config:1"}, {"colour = 1\n", "colour"}, {"offsets = \n", "offsets"}, {"grow=1\n", "config:1"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        err = (gbt_error){0};
+        if (config_parse(bad[i].text, "config", &back, &strings, &err) != GBT_ERR_FORMAT || strstr(err.text, bad[i].says) == NULL)
+            fail_msg("\"%s\": %s", bad[i].text, err.text);
+    }
+    static const char *const wild[] = {"max-depth = 1e30\n", "max-depth = nan\n", "offsets = -1e300\n", "start-level = inf\n"};
+    for (size_t i = 0; i < sizeof wild / sizeof *wild; i++) { /* whole numbers out of range: refused here or where the def is checked */
+        err = (gbt_error){0};
+        back = gbt_train_def_default();
+        trainer t = {0};
+        const bool refused = config_parse(wild[i], "config", &back, &strings, &err) != GBT_OK || trainer_open(&t, tiny, &back, &err) != GBT_OK;
+        trainer_free(&t);
+        assert_true(refused);
+    }
+}
+
+/* ---- photos ------------------------------------------------------------------------------------------------------------------- */
+
+static void quantize(image *im)
+{
+    for (size_t i = 0; i < (size_t)im->width * (size_t)im->height * 3; i++)
+        im->pixels[i] = floorf(im->pixels[i] * 255 + 0.5f) / 255;
+}
+
+static void photos_are_the_resized_reference(void **state)
+{
+    (void)state;
+    scene s;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(tiny, &split, &s, NULL));
+    static const double downscales[] = {1, 1.5, 3};
+    for (size_t d = 0; d < 3; d++) {
+        photos p;
+        assert_ok(photos_open(&p, &s, downscales[d], NULL));
+        image got = {0};
+        static const int levels[] = {2, 2, 0, 1, 6, 0};
+        for (size_t l = 0; l < sizeof levels / sizeof *levels; l++)
+            for (size_t v = 0; v < 3; v++) {
+                const int level = levels[l];
+                const double divide = downscales[d] * exp2(level);
+                const int width = (int)fmax(1, floor(48 / divide + 0.5)), height = (int)fmax(1, floor(36 / divide + 0.5));
+                const gbt_camera camera = photos_camera(&p, v, level), full_camera = photos_camera(&p, v, 0);
+                assert_int_equal(camera.width, width);
+                assert_int_equal(camera.height, height);
+                assert_ok(photos_get(&p, v, level, &got, NULL));
+                assert_true(got.width == width && got.height == height && got.channels == 3);
+                image full, want;
+                assert_ok(scene_read_photo(&s.views[v], full_camera.width, full_camera.height, &full, NULL));
+                quantize(&full);
+                assert_ok(photo_resize(&full, width, height, &want, NULL));
+                quantize(&want);
+                for (size_t i = 0; i < (size_t)width * (size_t)height * 3; i++)
+                    if (!(fabsf(got.pixels[i] - want.pixels[i]) < 1e-6f))
+                        fail_msg("downscale %g level %d value %zu: wanted %.9g, got %.9g", downscales[d], level, i, (double)want.pixels[i],
+                                 (double)got.pixels[i]);
+                image_free(&full);
+                image_free(&want);
+                /* What is kept: the full photo, and one level above it at most, of the views asked for only. */
+                for (size_t other = 0; other < VIEWS; other++) {
+                    assert_true(other < 3 || (p.full[other] == NULL && p.pixels[other] == NULL));
+                    if (level == 0 || other > v)
+                        assert_true(p.pixels[other] == NULL || (level > 0 && l > 0 && levels[l - 1] == level));
+                }
+            }
+        image_free(&got);
+        photos_close(&p);
+    }
+    scene_free(&s);
+}
+
+/* ---- no memory ---------------------------------------------------------------------------------------------------------------- */
+
+static void every_allocation_may_fail(void **state)
+{
+    (void)state;
+    const gbt_train_def def = run_def();
+    trainer *t = calloc(1, sizeof *t);
+    assert_non_null(t);
+    long opened = -1, stepped = -1;
+    for (long n = 0; opened < 0; n += n < 40 ? 1 : 7) {
+        *t = (trainer){0};
+        gbt_error err = {0};
+        mem_fail_after(n);
+        const gbt_status status = trainer_open(t, tiny, &def, &err);
+        mem_fail_after(-1);
+        if (status == GBT_OK)
+            opened = n;
+        else if (status != GBT_ERR_NO_MEMORY || err.text[0] == '\0')
+            fail_msg("open, allocation %ld: status %d, %s", n, (int)status, err.text);
+        if (status != GBT_OK)
+            trainer_free(t);
+        assert_true(n < 100000);
+    }
+    /* Step after step with everything fresh: first the step's own allocations, then (adjusts) those of growing. */
+    for (long n = 0; stepped < 0; n += n < 40 ? 1 : 5) {
+        gbt_error err = {0};
+        step_report r;
+        mem_fail_after(n);
+        const gbt_status status = trainer_step(t, &r, &err);
+        mem_fail_after(-1);
+        if (status == GBT_OK)
+            stepped = n;
+        else if (status != GBT_ERR_NO_MEMORY || err.text[0] == '\0')
+            fail_msg("step, allocation %ld: status %d, %s", n, (int)status, err.text);
+        trainer_free(t);
+        if (status != GBT_OK)
+            open_ok(t, tiny, &def);
+    }
+    /* The step that grows: from a checkpoint-like state, so only the number of the allocation differs. */
+    for (long n = 0; n < 40; n += 3) {
+        open_ok(t, tiny, &def);
+        gbt_status status = GBT_OK;
+        gbt_error err = {0};
+        step_report r;
+        for (int i = 0; i < STEPS / 4; i++)
+            step_ok(t, &r);
+        mem_fail_after(n);
+        for (int i = 0; i < 4 && status == GBT_OK; i++)
+            status = trainer_step(t, &r, &err);
+        mem_fail_after(-1);
+        if (status != GBT_OK && status != GBT_ERR_NO_MEMORY)
+            fail_msg("growing step, allocation %ld: status %d, %s", n, (int)status, err.text);
+        trainer_free(t);
+    }
+    print_message("open: at most %ld allocations, step: %ld\n", opened, stepped);
+    assert_true(opened > 10 && stepped > 5);
+    free(t);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc == 4 && strcmp(argv[1], "--child") == 0)
+        return child_main(argv[2], argv[3]);
+    log_set_quiet(1);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(progress_rises_from_0_to_1),
+        cmocka_unit_test(pace_is_read),
+        cmocka_unit_test(levels_and_rates),
+        cmocka_unit_test(config_comes_back),
+        cmocka_unit_test(photos_are_the_resized_reference),
+        cmocka_unit_test(interrupted_and_resumed_is_straight),
+        cmocka_unit_test(extra_checkpoints_change_nothing),
+        cmocka_unit_test(killed_and_resumed_is_straight),
+        cmocka_unit_test(resumes_from_the_previous_checkpoint),
+        cmocka_unit_test(a_signal_saves_and_ends),
+        cmocka_unit_test(threads_do_not_change_bits),
+        cmocka_unit_test(another_seed_changes_bits),
+        cmocka_unit_test(a_budget_run_can_be_repeated),
+        cmocka_unit_test(a_budget_run_resumes_its_clock),
+        cmocka_unit_test(training_learns),
+        cmocka_unit_test(without_growing_the_anchors_stay),
+        cmocka_unit_test(growth_stops_at_max_anchors),
+        cmocka_unit_test(moments_follow_their_rows),
+        cmocka_unit_test(points_are_made_where_there_are_none),
+        cmocka_unit_test(data_without_training_photos_is_refused),
+        cmocka_unit_test(a_vanished_photo_is_named),
+        cmocka_unit_test(a_full_disk_leaves_the_old_checkpoint),
+        cmocka_unit_test(a_damaged_checkpoint_is_refused),
+        cmocka_unit_test(a_foreign_checkpoint_is_refused),
+        cmocka_unit_test(every_allocation_may_fail),
+    };
+    return _cmocka_run_group_tests("trainer", tests, sizeof tests / sizeof *tests, make_root, remove_root);
+}

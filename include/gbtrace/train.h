@@ -19,7 +19,7 @@ typedef struct gbt_train_def {
     const char *scale_prior;    /* "gb" (default) or "nn" */
     int max_depth;              /* D_max of the balls, [0, 64]. Default 18 */
     float voxel_size;           /* v, scene units; 0: the median spacing of the points. Default 0 */
-    int offsets;                /* K, Gaussians per anchor, [1, 16]. Default 10 */
+    int offsets;                /* K, Gaussians per anchor, [1, 16]; 0: 2, or 10 with compat. Default 0 */
     const char *distance;       /* distance input of the networks: "auto" (default), "on", "off" */
     uint64_t iterations;        /* length of the run; 0: the budget decides. Default 0 */
     double budget_seconds;      /* wall time for training; used when iterations is 0. Default 600 */

@@ -47,7 +47,7 @@ static bool proxy_box(const gaussians *g, size_t i, float alpha_min, float cente
     const float k = sqrtf(2 * logf(opacity / alpha_min));
     float m[9];
     quat_to_matrix(q, m);
-    bool fine = isfinite(opacity) && s[0] > 0 && s[1] > 0 && s[2] > 0;
+    bool fine = isfinite(opacity) && s[0] > 0 && s[1] > 0 && s[2] > 0 && isfinite(g->red[i]) && isfinite(g->green[i]) && isfinite(g->blue[i]);
     for (int j = 0; j < 3; j++) {
         const float a = m[3 * j] * s[0], b = m[3 * j + 1] * s[1], c = m[3 * j + 2] * s[2];
         half[j] = k * sqrtf(a * a + b * b + c * c);

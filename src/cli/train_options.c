@@ -22,7 +22,7 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
         {.name = "scale-prior", .kind = OPTION_CHOICE, .value = &d->scale_prior, .choices = "gb|nn", .help = "first scale from balls and spacing, or from spacing alone"},
         {.name = "max-depth", .kind = OPTION_INT, .value = &d->max_depth, .min = 0, .max = 64, .value_name = "D", .help = "most splits of the cloud"},
         {.name = "voxel-size", .kind = OPTION_FLOAT, .value = &d->voxel_size, .min = 0, .max = 1e9, .value_name = "V", .help = "base scale, scene units; 0: from the points"},
-        {.name = "offsets", .kind = OPTION_INT, .value = &d->offsets, .min = 1, .max = 16, .value_name = "K", .help = "Gaussians per anchor"},
+        {.name = "offsets", .kind = OPTION_INT, .value = &d->offsets, .min = 0, .max = 16, .value_name = "K", .help = "Gaussians per anchor; 0: 2, or 10 with --compat"},
         {.name = "distance", .kind = OPTION_CHOICE, .value = &d->distance, .choices = "auto|on|off", .help = "whether the networks see the distance"},
         {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &d->downscale, .min = 1, .max = 64, .value_name = "F", .help = "divide the photos' size by this"},
         {.name = "start-level", .kind = OPTION_INT, .value = &d->start_level, .min = 0, .max = 4, .value_name = "L", .help = "coarse to fine: start at 1/2^L of the size"},

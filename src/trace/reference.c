@@ -22,6 +22,18 @@ static double field(const reference_scene *scene, enum reference_field f, size_t
     return scene->fields[(size_t)f * scene->count + i];
 }
 
+/* Finite, and with positive scales. */
+static bool is_usable(const reference_scene *scene, size_t i)
+{
+    for (unsigned f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
+        if (!isfinite(field(scene, (enum reference_field)f, i)))
+            return false;
+    for (unsigned axis = 0; axis < 3; axis++)
+        if (!(field(scene, (enum reference_field)(REFERENCE_scale_x + axis), i) > 0))
+            return false;
+    return true;
+}
+
 static prepared prepare(const reference_scene *scene, const trace_settings *s, size_t i)
 {
     prepared p = {.opacity = field(scene, REFERENCE_opacity, i)};
@@ -34,7 +46,7 @@ static prepared prepare(const reference_scene *scene, const trace_settings *s, s
         for (int k = 0; k < 3; k++)
             p.canon[3 * axis + k] = r[3 * k + axis] / field(scene, REFERENCE_scale_x + (unsigned)axis, i);
     }
-    p.d2_max = 2 * log(p.opacity / (double)s->alpha_min) + 1e-6;
+    p.d2_max = is_usable(scene, i) ? 2 * log(p.opacity / (double)s->alpha_min) + 1e-6 : -HUGE_VAL;
     return p;
 }
 

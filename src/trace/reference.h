@@ -41,7 +41,7 @@ void reference_scene_free(reference_scene *scene); /* zeroes the struct */
  *
  * @param hits, capacity [in,out] array that grows by mem_reserve(); start from NULL and 0, free with mem_free()
  * @param count          [out]    number of hits; 0 for a zero direction
- * Gaussians with values that are not finite are never hit.
+ * Gaussians with values that are not finite, or scales that are not positive, are never hit.
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: any, with distinct `hits`. Cost: about 10 ns per Gaussian, plus making a scene in the first form.
  */

@@ -82,8 +82,8 @@ static void find_bounds(const ray_image *rays, const gbt_camera *camera, view_bo
         }
 }
 
-/* Radius of a ball around the anchor that holds the proxies of all its Gaussians. */
-static float anchor_reach(const anchors *a, size_t i)
+/* Radius of a ball around the anchor that holds the proxies of all its Gaussians: `sigmas` std-devs around each. */
+static float anchor_reach(const anchors *a, size_t i, float sigmas)
 {
     const float *l = a->scale_log + 6 * i;
     const float ex = expf(fminf(l[0], 30.0f)), ey = expf(fminf(l[1], 30.0f)), ez = expf(fminf(l[2], 30.0f));
@@ -93,7 +93,7 @@ static float anchor_reach(const anchors *a, size_t i)
         const float x = o[0] * ex, y = o[1] * ey, z = o[2] * ez;
         far_square = fmaxf(far_square, x * x + y * y + z * z);
     }
-    return sqrtf(far_square) + FRAME_REACH_SIGMAS * expf(fminf(fmaxf(l[3], fmaxf(l[4], l[5])), 30.0f));
+    return sqrtf(far_square) + sigmas * expf(fminf(fmaxf(l[3], fmaxf(l[4], l[5])), 30.0f));
 }
 
 static bool is_visible(const view_bounds *b, const float position[3], float reach)
@@ -118,6 +118,7 @@ static bool is_visible(const view_bounds *b, const float position[3], float reac
 typedef struct visible_job {
     const anchors *a;
     const view_bounds *bounds;
+    float sigmas;
     uint32_t *out;       /* [count]; block b writes from its own begin */
     uint32_t *out_count; /* per block */
 } visible_job;
@@ -127,16 +128,18 @@ static void visible_block(size_t block, size_t begin, size_t end, void *context)
     const visible_job *job = context;
     uint32_t kept = 0;
     for (size_t i = begin; i < end; i++)
-        if (is_visible(job->bounds, job->a->position + 3 * i, anchor_reach(job->a, i)))
+        if (is_visible(job->bounds, job->a->position + 3 * i, anchor_reach(job->a, i, job->sigmas)))
             job->out[begin + kept++] = (uint32_t)i;
     job->out_count[block] = kept;
 }
 
-static gbt_status find_visible(frame *f, const anchors *a, const view_bounds *bounds, gbt_error *err)
+static gbt_status find_visible(frame *f, const anchors *a, const view_bounds *bounds, float alpha_min, gbt_error *err)
 {
     const size_t blocks = parallel_block_count(a->count, ANCHOR_BLOCK);
     GBT_TRY(mem_reserve((void **)&f->visible, &f->visible_capacity, 0, a->count + blocks + 1, sizeof *f->visible, "visible anchors", err));
-    visible_job job = {a, bounds, f->visible, f->visible + a->count};
+    /* An opaque Gaussian falls to alpha_min at sqrt(2 ln(1 / alpha_min)) std-devs. */
+    const float sigmas = 1.001f * sqrtf(2 * logf(1 / alpha_min));
+    visible_job job = {a, bounds, sigmas, f->visible, f->visible + a->count};
     parallel_blocks(a->count, ANCHOR_BLOCK, visible_block, &job);
     f->visible_count = 0;
     for (size_t b = 0; b < blocks; b++) {
@@ -158,7 +161,7 @@ gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_
     f->times.rays = lap(&clock);
     view_bounds bounds;
     find_bounds(&f->rays, camera, &bounds);
-    GBT_TRY(find_visible(f, a, &bounds, err));
+    GBT_TRY(find_visible(f, a, &bounds, settings->alpha_min, err));
     f->times.visible = lap(&clock);
     /* A Gaussian below alpha_min is never blended and so has no gradient: it need not be made. */
     GBT_TRY(decode_forward(a, d, bounds.center, f->visible, f->visible_count, settings->alpha_min, &f->gaussians, &f->tape, err));

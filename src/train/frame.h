@@ -25,9 +25,6 @@ typedef struct frame {
     gbt_camera camera;
 } frame;
 
-/** Largest number of std-devs at which a Gaussian can matter: sqrt(2 ln(255)). */
-#define FRAME_REACH_SIGMAS 3.33f
-
 /**
  * Render `camera` (any model) into f->rgb.
  *

@@ -84,14 +84,15 @@ static double decay(double first, double last, double progress)
     return exp((1 - progress) * log(first) + progress * log(last));
 }
 
-learning_rates schedule_rates(double progress, double extent)
+learning_rates schedule_rates(double progress, bool compat, double extent)
 {
+    const double anchor = compat ? 1 : 1.5, network = compat ? 1 : 2;
     return (learning_rates){
-        .offset = decay(0.01, 0.0001, progress) * extent,
-        .feature = 0.0075,
-        .scale = 0.007,
-        .opacity_mlp = decay(0.002, 0.00002, progress),
-        .shape_mlp = 0.004,
-        .color_mlp = decay(0.008, 0.00005, progress),
+        .offset = anchor * decay(0.01, 0.0001, progress) * (compat ? extent : 1),
+        .feature = anchor * 0.0075,
+        .scale = anchor * 0.007,
+        .opacity_mlp = network * decay(0.002, 0.00002, progress),
+        .shape_mlp = network * 0.004,
+        .color_mlp = network * decay(0.008, 0.00005, progress),
     };
 }

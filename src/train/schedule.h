@@ -42,8 +42,13 @@ typedef struct learning_rates {
     double offset, feature, scale, opacity_mlp, shape_mlp, color_mlp;
 } learning_rates;
 
-/** Log-linear decays of the reference method (docs/training.md); `extent` multiplies the offsets' rate. */
-learning_rates schedule_rates(double progress, double extent);
+/**
+ * Log-linear decays (docs/training.md).
+ *
+ * @param compat [in] true: the reference method's rates; false: ours, higher, for runs of some thousand steps
+ * @param extent [in] of the cameras; the reference's rate of offsets is proportional to it
+ */
+learning_rates schedule_rates(double progress, bool compat, double extent);
 
 /** Statistics are gathered from STATS_FROM on; anchors grow and are pruned in [ADJUST_FROM, ADJUST_UNTIL). */
 #define SCHEDULE_STATS_FROM (500.0 / 30000)

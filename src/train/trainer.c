@@ -180,7 +180,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     const double start = now_seconds();
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
-    const learning_rates rates = schedule_rates(progress, t->def.compat ? t->extent : 1.0);
+    const learning_rates rates = schedule_rates(progress, t->def.compat, t->extent);
 
     /* A view, at the resolution that the model can already use. */
     const size_t view = pick_view(t);

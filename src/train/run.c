@@ -85,7 +85,15 @@ static gbt_status save_model(const trainer *t, const char *path, gbt_error *err)
     for (int i = 0; i < 3; i++)
         m.origin[i] = t->scene.origin[i], m.background[i] = t->settings.background[i];
     snprintf(m.data_folder, sizeof m.data_folder, "%s", t->scene.folder);
-    config_text(&t->def, t->scene.folder, m.config, sizeof m.config);
+    /* A run on a budget is told by its pace, so that a repetition by --pace writes the same file. */
+    gbt_train_def def = t->def;
+    char text[PACE_TEXT_SIZE];
+    if (def.iterations == 0 && t->pace.known == PACE_SEGMENTS) {
+        pace_text(&t->pace, text);
+        def.pace = text;
+        def.budget_seconds = 0;
+    }
+    config_text(&def, t->scene.folder, m.config, sizeof m.config);
     return model_save(path, &m, err);
 }
 

@@ -2,6 +2,7 @@
 #include "train/schedule.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "base/fail.h"
@@ -31,6 +32,13 @@ gbt_status pace_parse(const char *text, pace *out, gbt_error *err)
         at = end + 1;
     }
     return GBT_OK;
+}
+
+void pace_text(const pace *p, char out[PACE_TEXT_SIZE])
+{
+    size_t used = 0;
+    for (int i = 0; i < PACE_SEGMENTS; i++)
+        used += (size_t)snprintf(out + used, PACE_TEXT_SIZE - used, "%s%llu", i > 0 ? "," : "", (unsigned long long)p->steps[i]);
 }
 
 uint64_t pace_total(const pace *p)

@@ -24,6 +24,10 @@ pace pace_of_iterations(uint64_t iterations);
 /** "n1,...,n20"; GBT_ERR_ARGUMENT otherwise. */
 gbt_status pace_parse(const char *text, pace *out, gbt_error *err);
 
+/** The text that pace_parse() reads, of a pace whose parts are all known. */
+enum { PACE_TEXT_SIZE = PACE_SEGMENTS * 21 + 1 };
+void pace_text(const pace *p, char out[PACE_TEXT_SIZE]);
+
 uint64_t pace_total(const pace *p); /* of the known parts */
 
 /** Progress in front of step number `step` (0-based), which lies in a known part; 1 at or after the end. */

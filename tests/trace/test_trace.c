@@ -303,6 +303,74 @@ static void random_scenes(void **state)
     }
 }
 
+static int compare_doubles(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* One needle (1, 1/r, 1/r) at a time, and a ray through its one-sigma shell: the worst that float32 coordinates allow. */
+static void needles_one_by_one(void **state)
+{
+    (void)state;
+    static const double ratios[] = {1, 1e2, 1e3, 1e4, 1e6};
+    enum { NEEDLES = 200 };
+    const trace_settings s = trace_settings_default();
+    for (size_t k = 0; k < sizeof ratios / sizeof ratios[0]; k++) {
+        const double thin = 1 / ratios[k];
+        double error[NEEDLES];
+        size_t seen = 0;
+        for (uint64_t i = 0; i < NEEDLES; i++) {
+            gaussians g = some(1, 0.9f);
+            double q[4], rotation[9], shell[3], turned[3], dir[3], origin[3] = {0, 0, 0};
+            for (uint64_t j = 0; j < 4; j++)
+                q[j] = rng_normal(30 + k, j, i);
+            const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+            for (int j = 0; j < 4; j++)
+                q[j] /= length;
+            g.quat_w[0] = (float)q[0], g.quat_x[0] = (float)q[1], g.quat_y[0] = (float)q[2], g.quat_z[0] = (float)q[3];
+            dquat_to_matrix(q, rotation);
+            g.scale_y[0] = g.scale_z[0] = (float)thin;
+            g.mean_x[0] = (float)(2 * rng_normal(30 + k, 4, i)), g.mean_y[0] = (float)(2 * rng_normal(30 + k, 5, i));
+            g.mean_z[0] = (float)(6 + 2 * rng_normal(30 + k, 6, i));
+            for (uint64_t j = 0; j < 3; j++)
+                shell[j] = rng_normal(30 + k, 7 + j, i);
+            dvec_normalize(shell);
+            shell[1] *= thin, shell[2] *= thin;
+            dmat_apply(rotation, shell, turned);
+            dir[0] = turned[0] + (double)g.mean_x[0], dir[1] = turned[1] + (double)g.mean_y[0], dir[2] = turned[2] + (double)g.mean_z[0];
+            dvec_normalize(dir);
+            float store[6] = {0, 0, 0, (float)dir[0], (float)dir[1], (float)dir[2]};
+            const ray_image rays = {.width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
+            for (int j = 0; j < 3; j++)
+                dir[j] = (double)store[3 + j]; /* the reference sees the same float32 ray */
+            reference_hit *hits = NULL;
+            size_t count = 0, capacity = 0;
+            assert_ok(reference_ray_hits(&g, &s, origin, dir, &hits, &count, &capacity, NULL));
+            image d_rgb = random_gradient(&rays, i);
+            traced t = trace_all(&g, &s, &rays, &d_rgb);
+            const double alpha = 1 - (double)t.T[0];
+            assert_true(alpha >= 0 && alpha <= 0.9 + 1e-6); /* false for NaN */
+            seen += count;
+            error[i] = fabs(alpha - (count > 0 ? hits[0].alpha : 0));
+            const float *d[GAUSSIANS_FIELD_COUNT];
+            field_list(&t.d, d);
+            for (size_t f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
+                assert_true(isfinite(d[f][0]));
+            mem_free(hits);
+            image_free(&d_rgb);
+            traced_free(&t);
+            gaussians_free(&g);
+        }
+        qsort(error, NEEDLES, sizeof *error, compare_doubles);
+        print_message("needles 1:%g: |alpha - reference| 95 %% %.1e, worst %.1e\n", ratios[k], error[NEEDLES * 95 / 100], error[NEEDLES - 1]);
+        if (ratios[k] <= 1e4) {
+            assert_int_equal(seen, NEEDLES);
+            assert_true(error[NEEDLES * 95 / 100] <= 1.0 / 255);
+        }
+    }
+}
+
 static void rays_that_do_not_run_together(void **state)
 {
     (void)state;
@@ -717,6 +785,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_scenes),
+        cmocka_unit_test(needles_one_by_one),
         cmocka_unit_test(rays_that_do_not_run_together),
         cmocka_unit_test(one_hundred_thousand_hits),
         cmocka_unit_test(coincident_gaussians),

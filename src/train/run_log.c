@@ -17,19 +17,36 @@
 
 static const double row_every_seconds = 1, line_every_seconds = 10;
 
+static const char header[] =
+    "step,seconds,progress,width,height,loss,l1,ssim,train_psnr,test_psnr,anchors,gaussians,visible_anchors,blended_per_ray,rays_per_second,"
+    "photo_ms,rays_ms,visible_ms,decode_ms,build_ms,trace_ms,loss_ms,adjoint_ms,decode_adjoint_ms,optimizer_ms,adjust_ms,memory_bytes\n";
+
+/* Start the file, or go back to where the checkpoint was made: rows of steps that will be taken again, or that a kill cut short, go. */
+static gbt_status rewind_rows(const char *csv_path, uint64_t step, gbt_error *err)
+{
+    unsigned char *bytes = NULL;
+    size_t size = 0, kept = 0;
+    if (step > 0 && file_exists(csv_path))
+        GBT_TRY(file_read(csv_path, &bytes, &size, err));
+    if (size >= sizeof header - 1 && memcmp(bytes, header, sizeof header - 1) == 0)
+        kept = sizeof header - 1;
+    for (const unsigned char *end; kept > 0 && (end = memchr(bytes + kept, '\n', size - kept)) != NULL; kept = (size_t)(end - bytes) + 1)
+        if (strtoull((const char *)bytes + kept, NULL, 10) > step)
+            break;
+    const gbt_status status = kept > 0 ? file_write_atomic(csv_path, bytes, kept, err) : file_write_atomic(csv_path, header, sizeof header - 1, err);
+    mem_free(bytes);
+    return status;
+}
+
 gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, gbt_error *err)
 {
     memset(log, 0, sizeof *log);
     log->on_terminal = isatty(STDERR_FILENO);
     log->last_row_seconds = log->last_line_seconds = t->seconds;
-    const bool going_on = t->step > 0;
-    log->csv = fopen(csv_path, going_on ? "a" : "w");
+    GBT_TRY(rewind_rows(csv_path, t->step, err));
+    log->csv = fopen(csv_path, "a");
     if (log->csv == NULL)
-        return base_fail(err, GBT_ERR_IO, "%s: cannot create", csv_path);
-    if (!going_on)
-        fputs("step,seconds,progress,width,height,loss,l1,ssim,train_psnr,test_psnr,anchors,gaussians,visible_anchors,blended_per_ray,rays_per_second,"
-              "photo_ms,rays_ms,visible_ms,decode_ms,build_ms,trace_ms,loss_ms,adjoint_ms,decode_adjoint_ms,optimizer_ms,adjust_ms,memory_bytes\n",
-              log->csv);
+        return base_fail(err, GBT_ERR_IO, "%s: cannot write", csv_path);
     log_info("%s: %zu photos to train on, %zu held out; %s -> %zu anchors x %d (voxel size %.4g, extent %.4g, distance input %s)", t->scene.folder,
              t->train_count, t->test_count, t->start_text, t->anchors.count, t->anchors.offset_count, (double)t->voxel_size, t->extent,
              t->decoder.has_distance ? "on" : "off");

@@ -766,6 +766,28 @@ static void a_damaged_checkpoint_is_refused(void **state)
     train_fails(tiny, in_root("empty"), &on, GBT_ERR_IO, "checkpoints/last.gbt: cannot open");
 }
 
+/* A kill leaves rows of steps behind that the checkpoint does not know, and perhaps half a row: resuming takes them out. */
+static void the_log_goes_back_with_the_checkpoint(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.stop_at_step = 5;
+    train_fails(tiny, in_root("log"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    FILE *csv = fopen(in_root("log/log.csv"), "a");
+    assert_non_null(csv);
+    fputs("5,0.1\n6,0.2\n700000,0.3\n700001,0.", csv);
+    fclose(csv);
+    resume_ok(in_root("log"));
+    unsigned char *text = NULL;
+    size_t size = 0;
+    assert_ok(file_read(in_root("log/log.csv"), &text, &size, NULL));
+    assert_true(strncmp((const char *)text, "step,seconds,", 13) == 0);
+    assert_non_null(strstr((const char *)text, "\n5,0.1\n"));
+    assert_null(strstr((const char *)text, "\n6,0.2\n"));
+    assert_null(strstr((const char *)text, "70000"));
+    mem_free(text);
+}
+
 static void a_foreign_checkpoint_is_refused(void **state)
 {
     (void)state;
@@ -1074,6 +1096,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_vanished_photo_is_named),
         cmocka_unit_test(a_full_disk_leaves_the_old_checkpoint),
         cmocka_unit_test(a_damaged_checkpoint_is_refused),
+        cmocka_unit_test(the_log_goes_back_with_the_checkpoint),
         cmocka_unit_test(a_foreign_checkpoint_is_refused),
         cmocka_unit_test(every_allocation_may_fail),
     };

@@ -19,6 +19,9 @@ static gbt_status open_all(const char *run, const char *data, double downscale, 
     GBT_TRY(config_parse(out->model.config, path, &out->def, &out->strings, err));
     scene_split split;
     GBT_TRY(scene_split_parse(out->def.eval_split, &split, err));
+    if (data == NULL && !file_exists(out->model.data_folder) && !file_is_folder(out->model.data_folder))
+        return base_fail(err, GBT_ERR_IO, "%.1000s: the data set of %.1000s is not there; run the command in the folder where it was trained, or say where with --data",
+                         out->model.data_folder, run);
     GBT_TRY(scene_load(data != NULL ? data : out->model.data_folder, &split, &out->scene, err));
     /* Another data set of the same place has another local origin. */
     for (size_t i = 0; i < out->scene.view_count; i++)

@@ -1,4 +1,4 @@
-/* train/seed_points.c -- points from photo consistency, for data sets without any. */
+/* train/seed_points.c -- points by plane sweep: for a pixel, the depth at which its neighbourhood looks the same in the nearest photos. */
 #include "train/seed_points.h"
 
 #include <math.h>
@@ -11,33 +11,55 @@
 #include "base/rng.h"
 #include "base/vec.h"
 
-enum { CANDIDATES = 400000, KEPT = 20000, LEVEL = 3, MIN_VIEWS = 4, BLOCK = 1024, STREAM_SEEDS = 3 };
+enum {
+    SAMPLES = 40000, /* pixels that are swept */
+    KEPT = 20000,
+    KEPT_AT_LEAST = 1000, /* so many, however doubtful: a start that is better than none */
+    LONG_SIDE = 400,      /* photos are halved until they are no longer than this */
+    NEIGHBORS = 4,
+    DEPTHS = 96,
+    PATCH = 5, /* pixels, odd */
+    PATCH_AREA = PATCH * PATCH,
+    BLOCK = 64,
+    STREAM_SEEDS = 3
+};
+
+/* Normalised correlation that counts as the same place; and by how much it must beat every depth that is not next to it. */
+static const float agreement = 0.7f, lead = 0.05f;
 
 typedef struct candidate {
-    float position[3], color[3], deviation;
+    float position[3], color[3];
+    float doubt; /* 1 - correlation; more when other depths look as good; INFINITY: no point */
     uint32_t index;
 } candidate;
 
+typedef struct seed_view {
+    gbt_camera camera;
+    image photo;
+    float *gray; /* [height * width] */
+    size_t neighbor[NEIGHBORS];
+    size_t neighbor_count;
+} seed_view;
+
 typedef struct seeding {
-    const image *images; /* [view_count] small photos */
-    const gbt_camera *cameras;
+    seed_view *views;
     size_t view_count;
-    double near, far; /* depths along a ray */
+    double near, far; /* depths along the optical axis */
     uint64_t seed;
     candidate *out;
 } seeding;
 
 /* Point nearest to all optical axes in the least-squares sense; the mean distance to it is the scene's scale. */
-static void find_focus(const gbt_camera *cameras, size_t count, double focus[3], double *distance)
+static void find_focus(const seed_view *views, size_t count, double focus[3], double *distance)
 {
     double a[3][4] = {{0}};
     for (size_t i = 0; i < count; i++) {
-        const double *d = cameras[i].rotation + 6; /* third row: the optical axis in the world */
+        const double *d = views[i].camera.rotation + 6; /* third row: the optical axis in the world */
         for (int r = 0; r < 3; r++)
             for (int c = 0; c < 3; c++) {
                 const double p = (r == c ? 1 : 0) - d[r] * d[c];
                 a[r][c] += p;
-                a[r][3] += p * cameras[i].center[c];
+                a[r][3] += p * views[i].camera.center[c];
             }
     }
     for (int r = 0; r < 3; r++)
@@ -54,40 +76,169 @@ static void find_focus(const gbt_camera *cameras, size_t count, double focus[3],
         focus[k] = a[k][3] / a[k][k];
     double sum = 0;
     for (size_t i = 0; i < count; i++) {
-        const double d[3] = {focus[0] - cameras[i].center[0], focus[1] - cameras[i].center[1], focus[2] - cameras[i].center[2]};
+        const double d[3] = {focus[0] - views[i].camera.center[0], focus[1] - views[i].camera.center[1], focus[2] - views[i].camera.center[2]};
         sum += dvec_length(d);
     }
     *distance = sum / (double)count > 1e-6 ? sum / (double)count : 1;
 }
 
-/* Colours of the views that see the point: mean, and root mean square deviation; false when too few do. */
-static bool judge(const seeding *s, candidate *c)
+/* Photos from places that are about a fifth of the distance away and look the same way: near enough to look alike, far enough to tell depths. */
+static void find_neighbors(seeding *s, double distance)
 {
-    double sum[3] = {0}, square = 0;
-    size_t seen = 0;
-    for (size_t v = 0; v < s->view_count; v++) {
-        const gbt_camera *camera = &s->cameras[v];
-        double d[3], cam[3], pixel[2];
-        for (int k = 0; k < 3; k++)
-            d[k] = (double)c->position[k] - camera->center[k];
-        dmat_apply(camera->rotation, d, cam);
-        if (cam[2] <= 0 || !gbt_camera_project(camera, cam, pixel) || pixel[0] < 0 || pixel[1] < 0 || pixel[0] >= camera->width || pixel[1] >= camera->height)
-            continue;
-        const float *p = s->images[v].pixels + 3 * ((size_t)pixel[1] * (size_t)camera->width + (size_t)pixel[0]);
-        for (int k = 0; k < 3; k++)
-            sum[k] += (double)p[k], square += (double)p[k] * (double)p[k];
-        seen++;
+    for (size_t i = 0; i < s->view_count; i++) {
+        seed_view *v = &s->views[i];
+        double worst[NEIGHBORS];
+        for (size_t j = 0; j < s->view_count; j++) {
+            const gbt_camera *a = &v->camera, *b = &s->views[j].camera;
+            if (j == i || dvec_dot(a->rotation + 6, b->rotation + 6) < 0.7)
+                continue;
+            const double d[3] = {b->center[0] - a->center[0], b->center[1] - a->center[1], b->center[2] - a->center[2]};
+            const double baseline = dvec_length(d) / distance;
+            if (baseline < 0.01)
+                continue;
+            const double cost = fabs(log(baseline / 0.2));
+            size_t at = v->neighbor_count < NEIGHBORS ? v->neighbor_count++ : NEIGHBORS;
+            while (at > 0 && cost < worst[at - 1]) { /* insertion sort; what falls off the end is dropped */
+                if (at < NEIGHBORS)
+                    worst[at] = worst[at - 1], v->neighbor[at] = v->neighbor[at - 1];
+                at--;
+            }
+            if (at < NEIGHBORS)
+                worst[at] = cost, v->neighbor[at] = j;
+        }
     }
-    if (seen < MIN_VIEWS && seen < s->view_count)
+}
+
+static bool project(const gbt_camera *camera, const double world[3], double pixel[2])
+{
+    double d[3], cam[3];
+    for (int k = 0; k < 3; k++)
+        d[k] = world[k] - camera->center[k];
+    dmat_apply(camera->rotation, d, cam);
+    return cam[2] > 0 && gbt_camera_project(camera, cam, pixel);
+}
+
+/* Grey values on a grid of PATCH x PATCH points around `center` with steps `du`, `dv`, bilinear; false when a corner leaves the photo. */
+static bool read_patch(const seed_view *v, const double center[2], const double du[2], const double dv[2], float out[PATCH_AREA])
+{
+    const double half = PATCH / 2;
+    const int width = v->photo.width, height = v->photo.height;
+    const double reach_x = half * (fabs(du[0]) + fabs(dv[0])), reach_y = half * (fabs(du[1]) + fabs(dv[1]));
+    if (!(center[0] - reach_x >= 0.5 && center[0] + reach_x < width - 0.5 && center[1] - reach_y >= 0.5 && center[1] + reach_y < height - 0.5))
         return false;
-    double mean_square = 0;
-    for (int k = 0; k < 3; k++) {
-        c->color[k] = (float)(sum[k] / (double)seen);
-        mean_square += sum[k] / (double)seen * (sum[k] / (double)seen);
-    }
-    /* A point that few views see agrees by chance more often. */
-    c->deviation = (float)(sqrt(fmax(0, square / (double)seen - mean_square)) + 0.05 / sqrt((double)seen));
+    for (int j = 0; j < PATCH; j++)
+        for (int i = 0; i < PATCH; i++) {
+            const double x = center[0] - 0.5 + (i - half) * du[0] + (j - half) * dv[0];
+            const double y = center[1] - 0.5 + (i - half) * du[1] + (j - half) * dv[1];
+            const int x0 = (int)x, y0 = (int)y, x1 = x0 + 1 < width ? x0 + 1 : x0, y1 = y0 + 1 < height ? y0 + 1 : y0;
+            const float fx = (float)(x - x0), fy = (float)(y - y0);
+            const float *row0 = v->gray + (size_t)y0 * (size_t)width, *row1 = v->gray + (size_t)y1 * (size_t)width;
+            out[j * PATCH + i] = (1 - fy) * ((1 - fx) * row0[x0] + fx * row0[x1]) + fy * ((1 - fx) * row1[x0] + fx * row1[x1]);
+        }
     return true;
+}
+
+/* Subtract the mean and divide by the length; a flat patch becomes nearly 0 and so correlates with nothing. */
+static void normalize_patch(float p[PATCH_AREA])
+{
+    float mean = 0, square = 0;
+    for (int i = 0; i < PATCH_AREA; i++)
+        mean += p[i] / PATCH_AREA;
+    for (int i = 0; i < PATCH_AREA; i++)
+        p[i] -= mean, square += p[i] * p[i];
+    const float scale = 1 / sqrtf(square + PATCH_AREA * 1e-4f); /* noise of 0.01 */
+    for (int i = 0; i < PATCH_AREA; i++)
+        p[i] *= scale;
+}
+
+typedef struct sweep {
+    const seeding *s;
+    const seed_view *view;
+    double ray[3][3]; /* world directions with depth 1 through the pixel, one pixel to the right, one down */
+    float patch[PATCH_AREA];
+} sweep;
+
+/* Mean of the better half of the correlations: the other half may be hidden there. -1 when too few photos see the place. */
+static float agreement_at(const sweep *w, double depth)
+{
+    float best[NEIGHBORS];
+    size_t seen = 0;
+    double world[3][3];
+    for (int p = 0; p < 3; p++)
+        for (int k = 0; k < 3; k++)
+            world[p][k] = w->view->camera.center[k] + depth * w->ray[p][k];
+    for (size_t n = 0; n < w->view->neighbor_count; n++) {
+        const seed_view *other = &w->s->views[w->view->neighbor[n]];
+        double pixel[3][2], step[2][2];
+        float patch[PATCH_AREA], sum = 0;
+        if (!project(&other->camera, world[0], pixel[0]) || !project(&other->camera, world[1], pixel[1]) || !project(&other->camera, world[2], pixel[2]))
+            continue;
+        for (int k = 0; k < 2; k++)
+            step[0][k] = pixel[1][k] - pixel[0][k], step[1][k] = pixel[2][k] - pixel[0][k];
+        if (!read_patch(other, pixel[0], step[0], step[1], patch))
+            continue;
+        normalize_patch(patch);
+        for (int i = 0; i < PATCH_AREA; i++)
+            sum += patch[i] * w->patch[i];
+        size_t at = seen++;
+        for (; at > 0 && sum > best[at - 1]; at--)
+            best[at] = best[at - 1];
+        best[at] = sum;
+    }
+    if (seen < 2)
+        return -1;
+    const size_t half = (seen + 1) / 2;
+    float mean = 0;
+    for (size_t i = 0; i < half; i++)
+        mean += best[i] / (float)half;
+    return mean;
+}
+
+static bool start_sweep(const seeding *s, const seed_view *v, double px, double py, sweep *w)
+{
+    static const double step[3][2] = {{0, 0}, {1, 0}, {0, 1}};
+    w->s = s, w->view = v;
+    for (int p = 0; p < 3; p++) {
+        double dir[3];
+        if (!gbt_camera_unproject(&v->camera, px + step[p][0], py + step[p][1], dir) || dir[2] < 0.1)
+            return false;
+        const double plane[3] = {dir[0] / dir[2], dir[1] / dir[2], 1};
+        dmat_apply_transposed(v->camera.rotation, plane, w->ray[p]);
+    }
+    if (!read_patch(v, (double[2]){px, py}, step[1], step[2], w->patch))
+        return false;
+    normalize_patch(w->patch);
+    return true;
+}
+
+static double depth_of(const seeding *s, double index)
+{
+    const double u = index / (DEPTHS - 1);
+    return 1 / ((1 - u) / s->near + u / s->far); /* even in inverse depth: even steps along the other photos' lines */
+}
+
+static void find_depth(const sweep *w, candidate *c)
+{
+    float score[DEPTHS], rival = -1;
+    int best = 0;
+    for (int i = 0; i < DEPTHS; i++) {
+        score[i] = agreement_at(w, depth_of(w->s, i));
+        best = score[i] > score[best] ? i : best;
+    }
+    if (score[best] <= 0)
+        return;
+    for (int i = 0; i < DEPTHS; i++)
+        if (abs(i - best) > 2)
+            rival = fmaxf(rival, score[i]);
+    double index = best;
+    if (best > 0 && best + 1 < DEPTHS && score[best - 1] > -1 && score[best + 1] > -1) { /* the top of the parabola through three */
+        const double left = (double)score[best - 1], right = (double)score[best + 1], bend = left + right - 2 * (double)score[best];
+        index += bend < 0 ? 0.5 * (left - right) / bend : 0;
+    }
+    const double depth = depth_of(w->s, index);
+    for (int k = 0; k < 3; k++)
+        c->position[k] = (float)(w->view->camera.center[k] + depth * w->ray[0][k]);
+    c->doubt = 1 - score[best] + (rival > score[best] - lead ? 1.0f : 0.0f);
 }
 
 static void seed_block(size_t block, size_t begin, size_t end, void *context)
@@ -97,75 +248,89 @@ static void seed_block(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end; i++) {
         candidate *c = &s->out[i];
         c->index = (uint32_t)i;
-        c->deviation = INFINITY;
+        c->doubt = INFINITY;
         uint32_t words[4];
         rng_philox(s->seed, STREAM_SEEDS, i, words);
-        const gbt_camera *camera = &s->cameras[((uint64_t)words[0] * s->view_count) >> 32];
-        const double px = (double)words[1] * 0x1p-32 * camera->width, py = (double)words[2] * 0x1p-32 * camera->height;
-        double dir[3];
-        if (!gbt_camera_unproject(camera, px, py, dir))
-            continue;
-        dmat_apply_transposed(camera->rotation, dir, dir);
-        const double u = (double)words[3] * 0x1p-32;
-        const double depth = 1 / ((1 - u) / s->near + u / s->far); /* even in inverse depth: even steps along the other images' lines */
-        for (int k = 0; k < 3; k++)
-            c->position[k] = (float)(camera->center[k] + depth * dir[k]);
-        if (!judge(s, c))
-            c->deviation = INFINITY;
+        const seed_view *v = &s->views[((uint64_t)words[0] * s->view_count) >> 32];
+        const size_t x = (size_t)(((uint64_t)words[1] * (uint64_t)v->photo.width) >> 32), y = (size_t)(((uint64_t)words[2] * (uint64_t)v->photo.height) >> 32);
+        memcpy(c->color, v->photo.pixels + 3 * (y * (size_t)v->photo.width + x), sizeof c->color);
+        sweep w;
+        if (start_sweep(s, v, (double)x + 0.5, (double)y + 0.5, &w))
+            find_depth(&w, c);
     }
 }
 
-static int by_deviation(const void *a, const void *b)
+static int by_doubt(const void *a, const void *b)
 {
     const candidate *x = a, *y = b;
-    if (x->deviation != y->deviation)
-        return x->deviation < y->deviation ? -1 : 1;
+    if (x->doubt != y->doubt)
+        return x->doubt < y->doubt ? -1 : 1;
     return x->index < y->index ? -1 : x->index > y->index;
+}
+
+static gbt_status read_views(seeding *s, photos *source, const size_t *views, gbt_error *err)
+{
+    for (size_t i = 0; i < s->view_count; i++) {
+        seed_view *v = &s->views[i];
+        int level = 0;
+        v->camera = photos_camera(source, views[i], 0);
+        while (v->camera.width > LONG_SIDE || v->camera.height > LONG_SIDE)
+            v->camera = photos_camera(source, views[i], ++level);
+        GBT_TRY(photos_get(source, views[i], level, &v->photo, err));
+        const size_t pixels = (size_t)v->photo.width * (size_t)v->photo.height;
+        v->gray = mem_alloc(pixels, sizeof *v->gray, "seed images", err);
+        if (v->gray == NULL)
+            return GBT_ERR_NO_MEMORY;
+        for (size_t p = 0; p < pixels; p++) {
+            const float *rgb = v->photo.pixels + 3 * p;
+            v->gray[p] = 0.299f * rgb[0] + 0.587f * rgb[1] + 0.114f * rgb[2];
+        }
+    }
+    return GBT_OK;
+}
+
+static gbt_status keep_best(const seeding *s, scene_points *out, gbt_error *err)
+{
+    qsort(s->out, SAMPLES, sizeof *s->out, by_doubt);
+    size_t kept = 0;
+    while (kept < KEPT && isfinite(s->out[kept].doubt) && (kept < KEPT_AT_LEAST || s->out[kept].doubt <= 1 - agreement))
+        kept++;
+    if (kept == 0)
+        return base_fail(err, GBT_ERR_FORMAT, "no sparse points, and no place that several photos see (check the poses)");
+    mem_free(out->position); /* a cloud of no points owns its arrays too */
+    mem_free(out->color);
+    out->position = mem_alloc(kept, 3 * sizeof *out->position, "seed points", err);
+    out->color = mem_alloc(kept, 3 * sizeof *out->color, "seed points", err);
+    if (out->position == NULL || out->color == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < kept; i++)
+        for (size_t k = 0; k < 3; k++)
+            out->position[3 * i + k] = s->out[i].position[k], out->color[3 * i + k] = s->out[i].color[k];
+    out->count = kept, out->has_color = true;
+    return GBT_OK;
 }
 
 gbt_status seed_points_make(photos *source, const size_t *views, size_t view_count, uint64_t seed, scene_points *out, gbt_error *err)
 {
     seeding s = {.view_count = view_count, .seed = seed};
     gbt_status status = GBT_ERR_NO_MEMORY;
-    image *images = mem_calloc(view_count, sizeof *images, "seed images", err);
-    gbt_camera *cameras = mem_alloc(view_count, sizeof *cameras, "seed cameras", err);
-    s.out = mem_alloc(CANDIDATES, sizeof *s.out, "seed candidates", err);
-    if (images == NULL || cameras == NULL || s.out == NULL)
-        goto done;
-    for (size_t i = 0; i < view_count; i++) {
-        status = photos_get(source, views[i], LEVEL, &images[i], err);
-        if (status != GBT_OK)
-            goto done;
-        cameras[i] = photos_camera(source, views[i], LEVEL);
+    s.views = mem_calloc(view_count, sizeof *s.views, "seed images", err);
+    s.out = mem_alloc(SAMPLES, sizeof *s.out, "seed candidates", err);
+    if (s.views != NULL && s.out != NULL)
+        status = read_views(&s, source, views, err);
+    if (status == GBT_OK) {
+        double focus[3], distance;
+        find_focus(s.views, view_count, focus, &distance);
+        s.near = 0.2 * distance, s.far = 6 * distance;
+        find_neighbors(&s, distance);
+        parallel_blocks(SAMPLES, BLOCK, seed_block, &s);
+        status = keep_best(&s, out, err);
     }
-    s.images = images, s.cameras = cameras;
-    double focus[3], distance;
-    find_focus(cameras, view_count, focus, &distance);
-    s.near = 0.3 * distance, s.far = 6 * distance;
-    parallel_blocks(CANDIDATES, BLOCK, seed_block, &s);
-    qsort(s.out, CANDIDATES, sizeof *s.out, by_deviation);
-    size_t kept = 0;
-    while (kept < KEPT && isfinite(s.out[kept].deviation))
-        kept++;
-    if (kept == 0) {
-        status = base_fail(err, GBT_ERR_FORMAT, "no sparse points, and no place that several photos see (check the poses)");
-        goto done;
+    for (size_t i = 0; s.views != NULL && i < view_count; i++) {
+        image_free(&s.views[i].photo);
+        mem_free(s.views[i].gray);
     }
-    mem_free(out->position); /* a cloud of no points owns its arrays too */
-    mem_free(out->color);
-    out->position = mem_alloc(kept, 3 * sizeof *out->position, "seed points", err);
-    out->color = mem_alloc(kept, 3 * sizeof *out->color, "seed points", err);
-    status = out->position == NULL || out->color == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
-    for (size_t i = 0; status == GBT_OK && i < kept; i++)
-        for (size_t k = 0; k < 3; k++)
-            out->position[3 * i + k] = s.out[i].position[k], out->color[3 * i + k] = s.out[i].color[k];
-    if (status == GBT_OK)
-        out->count = kept, out->has_color = true;
-done:
-    for (size_t i = 0; images != NULL && i < view_count; i++)
-        image_free(&images[i]);
-    mem_free(images);
-    mem_free(cameras);
+    mem_free(s.views);
     mem_free(s.out);
     return status;
 }

@@ -1,14 +1,15 @@
-/* train/seed_points.h -- a starting cloud for data sets that have no sparse points: places where the photos agree on a colour. */
+/* train/seed_points.h -- a starting cloud for data sets that have no sparse points: places where the photos agree. */
 #ifndef GBT_TRAIN_SEED_POINTS_H
 #define GBT_TRAIN_SEED_POINTS_H
 
 #include "train/photos.h"
 
 /**
- * Make points by photo consistency.
+ * Make points by plane sweep, for data sets without any.
  *
- * Candidates are drawn along random pixels' rays, at depths around the point where the cameras' axes meet; each is projected into the
- * other photos (at 1/8 size), and those whose colour varies least among the views that see them are kept.
+ * Random pixels of the photos (halved until 400 pixels long) are swept through 96 depths around the point where the cameras' axes meet;
+ * a depth counts by the normalised correlation of 5 x 5 pixels with up to four neighbouring photos, the better half of them. Pixels
+ * whose best depth is good and beats all others become points; with few of these, the next best up to 1,000.
  *
  * @param source [in]  opened at the training resolution; left at its coarsest level in use
  * @param out    [in,out] scene_points without points; filled

@@ -113,6 +113,17 @@ static gbt_status start_features(trainer *t, gbt_error *err)
     return GBT_OK;
 }
 
+/* What lies behind everything and was never photographed looks least wrong in the scene's mean colour. */
+static void mean_color(const scene_points *points, float color[3])
+{
+    double sum[3] = {0, 0, 0};
+    for (size_t i = 0; i < points->count; i++)
+        for (size_t c = 0; c < 3; c++)
+            sum[c] += (double)points->color[3 * i + c];
+    for (int c = 0; c < 3; c++)
+        color[c] = (float)(sum[c] / (double)points->count);
+}
+
 static gbt_status make_anchors(trainer *t, gbt_error *err)
 {
     anchor_init_def def = anchor_init_def_default();
@@ -203,6 +214,8 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->settings = trace_settings_default();
     t->settings.t_near = 0.02f * median;
     GBT_TRY(make_state(t, err));
+    if (!def->compat && t->scene.points.has_color)
+        mean_color(&t->scene.points, t->settings.background);
 
     if (def->pace != NULL)
         GBT_TRY(pace_parse(def->pace, &t->pace, err));

@@ -15,7 +15,8 @@ typedef void parallel_body(size_t block, size_t begin, size_t end, void *context
  * Call `body` once per block of `grain` elements (the last may be shorter), on as many threads as parallel_set_threads() allows.
  *
  * The cut depends on `count` and `grain` only, so results that are kept per block and combined in block order have the same bits
- * for 1 thread and for 64. Index results with `block`, never with a thread id. Returns when all blocks are done. May be nested.
+ * for 1 thread and for 64. Index results with `block`, never with a thread id. Bodies run in the default
+ * floating-point environment (denormals are kept). Returns when all blocks are done. May be nested.
  */
 void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *context);
 

@@ -3,6 +3,7 @@
    Nested calls run on the calling thread. */
 #include "base/parallel.h"
 
+#include <fenv.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <unistd.h>
@@ -35,6 +36,9 @@ int parallel_threads(void)
 static void *work(void *argument)
 {
     job *j = argument;
+    fenv_t saved; /* the same floating-point environment on every thread, whatever a library made of it */
+    fegetenv(&saved);
+    fesetenv(FE_DFL_ENV);
     inside++;
     for (;;) {
         const size_t block = atomic_fetch_add(&j->next, 1);
@@ -45,6 +49,7 @@ static void *work(void *argument)
         j->body(block, begin, end, j->context);
     }
     inside--;
+    fesetenv(&saved);
     return NULL;
 }
 

@@ -1,6 +1,7 @@
 /* shim/parallel_tbb.cpp -- base/parallel.h on oneTBB. */
 #include "base/parallel.h"
 
+#include <cfenv>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -32,10 +33,25 @@ try {
     return 1;
 }
 
+/* The default floating-point environment as long as it lives. Embree switches its workers, which are ours too, to flush denormals to
+   zero: without this the bits would depend on the thread. */
+class default_float_environment {
+    std::fenv_t saved;
+
+  public:
+    default_float_environment()
+    {
+        std::fegetenv(&saved);
+        std::fesetenv(FE_DFL_ENV);
+    }
+    ~default_float_environment() { std::fesetenv(&saved); }
+};
+
 extern "C" void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *context)
 try {
     const size_t blocks = parallel_block_count(count, grain);
     const auto run = [=](size_t block) {
+        const default_float_environment environment;
         const size_t begin = block * grain;
         const size_t end = begin + grain < count ? begin + grain : count;
         body(block, begin, end, context);

@@ -414,6 +414,40 @@ static void blocks_cover_once(void **state)
     }
 }
 
+static void halve(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    volatile float *values = context;
+    for (size_t i = begin; i < end; i++)
+        values[i] = values[i] * 0.5f;
+}
+
+/* Denormals live on every thread, also when the caller, or a library in the worker threads, flushes them to zero. */
+static void denormals_are_kept(void **state)
+{
+    (void)state;
+    static float values[COVER];
+#ifdef __SSE__
+    const unsigned before = __builtin_ia32_stmxcsr();
+    __builtin_ia32_ldmxcsr(before | 0x8040);
+#endif
+    for (int threads = 1; threads <= 3; threads++) {
+        parallel_set_threads(threads);
+        for (int i = 0; i < COVER; i++)
+            memcpy(&values[i], &(uint32_t){0x00000100}, sizeof values[i]);
+        parallel_blocks(COVER, 1, halve, values);
+        for (int i = 0; i < COVER; i++) {
+            uint32_t bits;
+            memcpy(&bits, &values[i], sizeof bits);
+            assert_int_equal(bits, 0x80);
+        }
+    }
+#ifdef __SSE__
+    assert_int_equal(__builtin_ia32_stmxcsr() & 0x8040, 0x8040); /* and the caller's own environment is not touched */
+    __builtin_ia32_ldmxcsr(before);
+#endif
+}
+
 static void instruction_sets_only_go_down(void **state)
 {
     (void)state;
@@ -483,6 +517,7 @@ int main(void)
         cmocka_unit_test(gaussians_resize_pad_zero),
         cmocka_unit_test(image_sizes),
         cmocka_unit_test(blocks_cover_once),
+        cmocka_unit_test(denormals_are_kept),
         cmocka_unit_test(instruction_sets_only_go_down),
         cmocka_unit_test(rotations),
     };

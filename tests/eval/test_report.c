@@ -42,11 +42,11 @@ static int remove_folder(void **state)
     return rmdir(folder);
 }
 
-static void write_text(const char *name, const char *text)
+static void write_text(const char *name, const char *content)
 {
     char path[VIEW_PATH_SIZE];
     in_folder(path, name);
-    assert_ok(file_write_atomic(path, text, strlen(text), &assert_ok_err_));
+    assert_ok(file_write_atomic(path, content, strlen(content), &assert_ok_err_));
 }
 
 static void remove_file(const char *name)

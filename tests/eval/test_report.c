@@ -525,7 +525,7 @@ static const text_case text_cases[] = {
 static void assert_text(const text *t, const char *wanted)
 {
     assert_int_equal(t->status, GBT_OK);
-    if (t->length != strlen(wanted) || memcmp(t->bytes, wanted, t->length) != 0)
+    if (t->length != strlen(wanted) || (t->length > 0 && memcmp(t->bytes, wanted, t->length) != 0))
         fail_msg("\"%.*s\", wanted \"%s\"", (int)t->length, t->bytes != NULL ? t->bytes : "", wanted);
 }
 

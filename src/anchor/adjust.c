@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "anchor/activations.h"
+#include "anchor/rows.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/rng.h"
@@ -24,32 +25,11 @@ gbt_status adjust_stats_resize(adjust_stats *s, size_t count, int offset_count, 
 {
     if (offset_count < 1 || offset_count > ANCHOR_MAX_OFFSETS || (s->count > 0 && offset_count != s->offset_count))
         return base_fail(err, GBT_ERR_ARGUMENT, "statistics: offset_count %d (wanted 1 to %d, constant)", offset_count, ANCHOR_MAX_OFFSETS);
-    const size_t widths[4] = {1, 1, (size_t)offset_count, (size_t)offset_count};
-    float **const fields[4] = {&s->opacity_accum, &s->visit_count, &s->grad_accum, &s->grad_count};
-    const size_t kept = count < s->count ? count : s->count;
-    if (count > s->capacity || s->opacity_accum == NULL || offset_count != s->offset_count) {
-        size_t capacity = s->capacity + s->capacity / 2;
-        if (capacity < count)
-            capacity = count;
-        float *bigger[4] = {NULL};
-        for (int f = 0; f < 4; f++) {
-            bigger[f] = mem_alloc(capacity, widths[f] * sizeof(float), "statistics", err);
-            if (bigger[f] == NULL) {
-                while (f-- > 0)
-                    mem_free(bigger[f]);
-                return GBT_ERR_NO_MEMORY;
-            }
-        }
-        for (int f = 0; f < 4; f++) {
-            if (kept > 0)
-                memcpy(bigger[f], *fields[f], kept * widths[f] * sizeof(float));
-            mem_free(*fields[f]);
-            *fields[f] = bigger[f];
-        }
-        s->capacity = capacity;
-    }
-    for (int f = 0; f < 4; f++)
-        memset(*fields[f] + kept * widths[f], 0, (count - kept) * widths[f] * sizeof(float));
+    const size_t widths[ROWS_FIELDS] = {1, 1, (size_t)offset_count, (size_t)offset_count};
+    float **const fields[ROWS_FIELDS] = {&s->opacity_accum, &s->visit_count, &s->grad_accum, &s->grad_count};
+    if (offset_count != s->offset_count)
+        s->capacity = 0; /* no rows are in use: arrays of another width must be made */
+    GBT_TRY(rows_resize(fields, widths, &s->capacity, s->count, count, "statistics", err));
     s->count = count;
     s->offset_count = offset_count;
     return GBT_OK;

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "anchor/rows.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/rng.h"
@@ -14,32 +15,9 @@ gbt_status anchors_resize(anchors *a, size_t count, gbt_error *err)
 {
     if (a->offset_count < 1 || a->offset_count > ANCHOR_MAX_OFFSETS)
         return base_fail(err, GBT_ERR_ARGUMENT, "anchors: offset_count %d (wanted 1 to %d)", a->offset_count, ANCHOR_MAX_OFFSETS);
-    const size_t widths[4] = {3, ANCHOR_FEATURE_DIM, (size_t)a->offset_count * 3, SCALES};
-    float **const fields[4] = {&a->position, &a->feature, &a->offset, &a->scale_log};
-    const size_t kept = count < a->count ? count : a->count;
-    if (count > a->capacity || a->position == NULL) {
-        size_t capacity = a->capacity + a->capacity / 2;
-        if (capacity < count)
-            capacity = count;
-        float *bigger[4] = {NULL};
-        for (int f = 0; f < 4; f++) {
-            bigger[f] = mem_alloc(capacity, widths[f] * sizeof(float), "anchors", err);
-            if (bigger[f] == NULL) {
-                while (f-- > 0)
-                    mem_free(bigger[f]);
-                return GBT_ERR_NO_MEMORY;
-            }
-        }
-        for (int f = 0; f < 4; f++) {
-            if (kept > 0)
-                memcpy(bigger[f], *fields[f], kept * widths[f] * sizeof(float));
-            mem_free(*fields[f]);
-            *fields[f] = bigger[f];
-        }
-        a->capacity = capacity;
-    }
-    for (int f = 0; f < 4; f++)
-        memset(*fields[f] + kept * widths[f], 0, (count - kept) * widths[f] * sizeof(float));
+    const size_t widths[ROWS_FIELDS] = {3, ANCHOR_FEATURE_DIM, (size_t)a->offset_count * 3, SCALES};
+    float **const fields[ROWS_FIELDS] = {&a->position, &a->feature, &a->offset, &a->scale_log};
+    GBT_TRY(rows_resize(fields, widths, &a->capacity, a->count, count, "anchors", err));
     a->count = count;
     return GBT_OK;
 }

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "base/clock.h"
 #include "base/cpu.h"
 #include "base/fail.h"
 #include "base/file.h"
@@ -22,13 +22,6 @@ enum { CHECK_STRIDE = 8 };
 gbt_bench_def gbt_bench_def_default(void)
 {
     return (gbt_bench_def){.repeats = 5};
-}
-
-static double seconds_of(clockid_t clock)
-{
-    struct timespec t;
-    clock_gettime(clock, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 /* ---- what is traced ---------------------------------------------------------------------------------------------------------------------- */
@@ -133,16 +126,16 @@ static gbt_status time_passes(trace_scene *traced, const gaussians *g, const tra
         d_rgb.pixels[i] = 1 / (float)ray_count;
     const float reach = fmaxf(fabsf(rays->origin[0]), fmaxf(fabsf(rays->origin[1]), fabsf(rays->origin[2])));
     for (int i = -1; i < repeats && status == GBT_OK; i++) { /* the first pass warms caches and memory up */
-        const double t0 = seconds_of(CLOCK_MONOTONIC);
+        const double t0 = clock_wall();
         status = trace_build(traced, g, settings, reach, err);
-        const double t1 = seconds_of(CLOCK_MONOTONIC), c1 = seconds_of(CLOCK_PROCESS_CPUTIME_ID);
+        const double t1 = clock_wall(), c1 = clock_process();
         memset(&out->counters, 0, sizeof out->counters);
         if (status == GBT_OK)
             status = trace_forward(traced, rays, true, rgb, NULL, &out->counters, err);
-        const double t2 = seconds_of(CLOCK_MONOTONIC), c2 = seconds_of(CLOCK_PROCESS_CPUTIME_ID);
+        const double t2 = clock_wall(), c2 = clock_process();
         if (status == GBT_OK)
             status = trace_backward(traced, rays, &d_rgb, &d_gaussians, NULL, NULL, err);
-        const double t3 = seconds_of(CLOCK_MONOTONIC), c3 = seconds_of(CLOCK_PROCESS_CPUTIME_ID);
+        const double t3 = clock_wall(), c3 = clock_process();
         if (i < 0)
             continue;
         samples[i] = t1 - t0, samples[repeats + i] = t2 - t1, samples[2 * repeats + i] = t3 - t2;

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 
+#include "base/clock.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
@@ -23,19 +23,12 @@ gbt_evaluate_def gbt_evaluate_def_default(void)
     return (gbt_evaluate_def){.report = 1};
 }
 
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static gbt_status score_view(loaded_run *r, size_t index, const char *folder, view_score *score, gbt_error *err)
 {
     const scene_view *view = &r->scene.views[index];
-    const double start = now_seconds();
+    const double start = clock_wall();
     GBT_TRY(loaded_run_render(r, index, err));
-    score->seconds = now_seconds() - start;
+    score->seconds = clock_wall() - start;
     score->gaussians = r->frame.gaussians.count;
     snprintf(score->name, sizeof score->name, "%s", view->name);
     image photo = {0}, error_map = {0};

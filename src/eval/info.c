@@ -6,6 +6,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
@@ -38,12 +39,6 @@ static photo_counts count_photos(const scene *s)
         c.max_height = height > c.max_height ? height : c.max_height;
     }
     return c;
-}
-
-static int compare_floats(const void *a, const void *b)
-{
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
 }
 
 /** The box that leaves out 5 % of the points on each side of each axis, world coordinates: a few outliers must not be the size of a scene. */

@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 
 #include "anchor/init.h"
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "bvh/points.h"
@@ -127,12 +128,6 @@ static gbt_status write_mesh(const char *path, const scene *s, const anchors *a,
 }
 
 typedef struct spread { double min, median, mean, max; } spread;
-
-static int compare_floats(const void *a, const void *b)
-{
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
 
 /** `values` with a stride; scratch is [count]. */
 static spread spread_of(const float *values, size_t stride, size_t count, float *scratch)

@@ -3,8 +3,8 @@
 
 #include <math.h>
 #include <string.h>
-#include <time.h>
 
+#include "base/clock.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -12,16 +12,9 @@
 
 enum { ANCHOR_BLOCK = 4096 };
 
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static double lap(double *since)
 {
-    const double now = now_seconds(), passed = now - *since;
+    const double now = clock_wall(), passed = now - *since;
     *since = now;
     return passed;
 }
@@ -154,7 +147,7 @@ static gbt_status find_visible(frame *f, const anchors *a, const view_bounds *bo
 gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
                         gbt_error *err)
 {
-    double clock = now_seconds();
+    double clock = clock_wall();
     f->camera = *camera;
     gbt_camera_half_fov_tan(camera, f->half_fov_tan);
     GBT_TRY(ray_image_from_camera(camera, &f->rays, err));
@@ -191,7 +184,7 @@ double frame_volume(const frame *f)
 gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image, float volume_weight, anchors *d_anchors,
                           float *d_params, gbt_error *err)
 {
-    double clock = now_seconds();
+    double clock = clock_wall();
     GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, NULL, NULL, err));
     f->times.adjoint = lap(&clock);
     gaussians *g = &f->gaussians, *dg = &f->d_gaussians;

@@ -3,10 +3,9 @@
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
-#include "base/cpu.h"
+#include "base/clock.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
@@ -155,8 +154,7 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
     const gbt_train_def *def = &t->def;
     speed measured = {0};
     double last_save = 0, clock_offset = t->seconds;
-    struct timespec begin;
-    clock_gettime(CLOCK_MONOTONIC, &begin);
+    const double begin = clock_wall();
     double paused = 0;
     int next_eval = 0;
     while (next_eval < def->eval_at_count && def->eval_at_seconds[next_eval] <= t->seconds)
@@ -173,9 +171,7 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
         GBT_TRY(trainer_step(t, &report, err));
         if (!report.skipped)
             speed_follow(&measured, &report, &t->frame.times);
-        struct timespec now;
-        clock_gettime(CLOCK_MONOTONIC, &now);
-        t->seconds = clock_offset + (double)(now.tv_sec - begin.tv_sec) + 1e-9 * (double)(now.tv_nsec - begin.tv_nsec) - paused;
+        t->seconds = clock_offset + clock_wall() - begin - paused;
         run_log_step(log, t, &report);
 
         const bool stop = stop_signal != 0 || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
@@ -189,11 +185,9 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
                                  paths->checkpoint);
         }
         if (evaluate) {
-            struct timespec before, after;
-            clock_gettime(CLOCK_MONOTONIC, &before);
+            const double before = clock_wall();
             GBT_TRY(evaluate_in_passing(t, log, err));
-            clock_gettime(CLOCK_MONOTONIC, &after);
-            paused += (double)(after.tv_sec - before.tv_sec) + 1e-9 * (double)(after.tv_nsec - before.tv_nsec);
+            paused += clock_wall() - before;
             next_eval++;
         }
     }
@@ -224,15 +218,13 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
 {
     run_paths paths;
     GBT_TRY(open_folder(run, &paths, err)); /* before any work: a run that cannot be written must not start */
-    struct timespec begin, end;
-    clock_gettime(CLOCK_MONOTONIC, &begin);
+    const double begin = clock_wall();
     if (def->resume)
         GBT_TRY(resume(t, data, &paths, def, strings, err));
     else
         GBT_TRY(trainer_open(t, data, def, err));
-    clock_gettime(CLOCK_MONOTONIC, &end);
     if (t->step == 0)
-        t->seconds = (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec); /* loading counts */
+        t->seconds = clock_wall() - begin; /* loading counts */
     char config[CONFIG_TEXT_SIZE];
     config_text(&t->def, t->scene.folder, config, sizeof config);
     GBT_TRY(file_write_atomic(paths.config, config, strlen(config), err));

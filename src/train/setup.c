@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/log.h"
 #include "base/memory.h"
@@ -60,12 +61,6 @@ static gbt_status check_def(const gbt_train_def *d, gbt_error *err)
     if (d->max_anchors < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "--max-anchors: 0 (wanted 1 or more)");
     return GBT_OK;
-}
-
-static int compare_floats(const void *a, const void *b)
-{
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
 }
 
 /* Distances from training cameras to a spread of anchors: they decide whether the networks see the distance, its unit, and t_near. */

@@ -3,8 +3,8 @@
 
 #include <math.h>
 #include <string.h>
-#include <time.h>
 
+#include "base/clock.h"
 #include "base/fail.h"
 #include "base/log.h"
 #include "base/memory.h"
@@ -16,13 +16,6 @@
 static const float dssim_weight = 0.2f, volume_weight = 0.01f;
 enum { ADAM_BLOCK = 512, MAX_SKIPPED_IN_ROW = 10, ADJUSTS_PER_RUN = 100 };
 enum { STREAM_VIEWS = 1 };
-
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 /* ---- which view -------------------------------------------------------------------------------------------------------------------------- */
 
@@ -177,7 +170,7 @@ static bool adjust_is_due(const trainer *t, double progress, double next)
 
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 {
-    const double start = now_seconds();
+    const double start = clock_wall();
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
     const learning_rates rates = schedule_rates(progress, t->def.compat, t->extent);
@@ -185,9 +178,9 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     /* A view, at the resolution that the model can already use. */
     const size_t view = pick_view(t);
     out->level = schedule_level(progress, t->def.compat ? 0 : t->def.start_level);
-    double clock = now_seconds();
+    double clock = clock_wall();
     GBT_TRY(photos_get(&t->photos, view, out->level, &t->photo, err));
-    out->photo_seconds = now_seconds() - clock;
+    out->photo_seconds = clock_wall() - clock;
     const gbt_camera camera = photos_camera(&t->photos, view, out->level);
     out->width = camera.width, out->height = camera.height;
 
@@ -195,7 +188,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     frame *f = &t->frame;
     GBT_TRY(frame_render(f, &t->anchors, &t->decoder, &camera, &t->settings, true, err));
     out->gaussians = f->gaussians.count, out->visible = f->visible_count;
-    clock = now_seconds();
+    clock = clock_wall();
     if (t->d_image.width != camera.width || t->d_image.height != camera.height) {
         image_free(&t->d_image);
         GBT_TRY(image_alloc(&t->d_image, camera.width, camera.height, 3, err));
@@ -205,7 +198,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     out->loss = loss.loss + (double)volume_weight * frame_volume(f);
     out->l1 = loss.l1, out->ssim = loss.ssim;
     out->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
-    out->loss_seconds = now_seconds() - clock;
+    out->loss_seconds = clock_wall() - clock;
 
     if (!isfinite(out->loss)) {
         out->skipped = true;
@@ -221,15 +214,15 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 
     /* Gradients, then parameters. */
     GBT_TRY(frame_backward(f, &t->anchors, &t->decoder, &t->d_image, volume_weight, &t->gradient, t->d_params, err));
-    clock = now_seconds();
+    clock = clock_wall();
     const bool adjust = adjust_is_due(t, progress, next);
     step_networks(t, &rates);
     if (!(adjust && t->def.compat)) /* in the reference the per-anchor groups miss the step in which anchors change */
         step_anchors(t, &rates);
-    out->optimizer_seconds = now_seconds() - clock;
+    out->optimizer_seconds = clock_wall() - clock;
 
     /* Anchors. */
-    clock = now_seconds();
+    clock = clock_wall();
     if (t->def.grow && progress >= SCHEDULE_STATS_FROM && progress < SCHEDULE_ADJUST_UNTIL)
         gather_statistics(t);
     if (adjust) {
@@ -237,9 +230,9 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
         GBT_TRY(grow_and_prune(t, since, err));
         t->adjust_step = t->step + 1;
     }
-    out->adjust_seconds = now_seconds() - clock;
+    out->adjust_seconds = clock_wall() - clock;
     t->step++;
-    out->total_seconds = now_seconds() - start;
+    out->total_seconds = clock_wall() - start;
     return GBT_OK;
 }
 

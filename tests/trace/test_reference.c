@@ -6,21 +6,8 @@
 #include "base/rng.h"
 #include "base/vec.h"
 #include "test_support.h"
+#include "trace/fixture.h"
 #include "trace/reference.h"
-
-/* count copies of a round Gaussian of size 1 at the origin, white. */
-static gaussians some(size_t count, float opacity)
-{
-    gaussians g = {0};
-    assert_ok(gaussians_resize(&g, count, NULL));
-    gaussians_zero(&g);
-    for (size_t i = 0; i < count; i++) {
-        g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 1, g.quat_w[i] = 1;
-        g.opacity[i] = opacity, g.red[i] = g.green[i] = g.blue[i] = 1;
-    }
-    gaussians_pad(&g);
-    return g;
-}
 
 /* One ray along +z from (x, y, z). The arrays live in `store`. */
 static ray_image one_ray(float store[6], float x, float y, float z)

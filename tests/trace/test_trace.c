@@ -6,6 +6,7 @@
 #include "base/vec.h"
 #include "data/gaussian_ply.h"
 #include "test_support.h"
+#include "trace/fixture.h"
 #include "trace/reference.h"
 #include "trace/trace.h"
 
@@ -46,20 +47,6 @@ static gaussians make_cloud(const cloud_def *def, uint64_t seed)
         g.quat_y[i] = (float)(q[2] * inverse), g.quat_z[i] = (float)(q[3] * inverse);
         g.opacity[i] = 0.02f + (def->opacity_high - 0.02f) * rng_uniform(seed, 10, i);
         g.red[i] = rng_uniform(seed, 11, i), g.green[i] = rng_uniform(seed, 12, i), g.blue[i] = rng_uniform(seed, 13, i);
-    }
-    gaussians_pad(&g);
-    return g;
-}
-
-/* count copies of a round white Gaussian of size 1 at the origin. */
-static gaussians some(size_t count, float opacity)
-{
-    gaussians g = {0};
-    assert_ok(gaussians_resize(&g, count, NULL));
-    gaussians_zero(&g);
-    for (size_t i = 0; i < count; i++) {
-        g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 1, g.quat_w[i] = 1;
-        g.opacity[i] = opacity, g.red[i] = g.green[i] = g.blue[i] = 1;
     }
     gaussians_pad(&g);
     return g;

@@ -12,10 +12,13 @@ extern "C" {
 
 typedef struct gbt_bench_def {
     const char *model;  /* plain 3DGS .ply, or a run; required */
-    const char *camera; /* camera file: origin, target, up, fov_x_deg, width, height; required for a .ply, else the first held-out view */
+    const char *camera; /* camera file (docs/cameras.md; of an aperture the first sample); required for a .ply, else the first held-out view */
     int repeats;        /* timed passes after one warm-up; the median is reported. Default 5 */
     int check;          /* 1: compare with the double reference on every 8th pixel in both directions. Default 0 */
     const char *json;   /* where to write the figures; NULL: nowhere */
+    float alpha_min;    /* smallest response that counts, in (0, 1); 0 or NaN: that of the run, 1/255 for a .ply */
+    float alpha_max;    /* alpha is cut here, in (0, 1); 0 or NaN: that of the run, 0.99 for a .ply */
+    float t_min;        /* stop before transmittance falls below this, in (0, 1); 0 or NaN: that of the run, 1e-4 for a .ply */
 } gbt_bench_def;
 
 gbt_bench_def gbt_bench_def_default(void);

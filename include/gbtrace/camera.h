@@ -11,7 +11,7 @@
 extern "C" {
 #endif
 
-/** COLMAP's numbers and parameter orders. */
+/** COLMAP's numbers and parameter orders; behind them what COLMAP does not have. */
 typedef enum gbt_camera_model {
     GBT_CAMERA_SIMPLE_PINHOLE = 0,             /* f cx cy */
     GBT_CAMERA_PINHOLE = 1,                    /* fx fy cx cy */
@@ -31,7 +31,8 @@ typedef enum gbt_camera_model {
     GBT_CAMERA_FISHEYE = 15,                   /* fx fy cx cy */
     GBT_CAMERA_EUCM = 16,                      /* fx fy cx cy alpha beta */
     GBT_CAMERA_EQUIRECTANGULAR = 17,           /* w h */
-    GBT_CAMERA_MODEL_COUNT
+    GBT_CAMERA_MODEL_COUNT,                    /* of COLMAP's models: what a data set can hold */
+    GBT_CAMERA_ORTHOGRAPHIC = 100              /* sx sy cx cy, pixels per unit: parallel rays. COLMAP has no number for it */
 } gbt_camera_model;
 
 enum { GBT_CAMERA_MAX_PARAMS = 16 };
@@ -44,7 +45,7 @@ typedef struct gbt_camera {
     double center[3];                     /* camera centre, world (scene-local) units */
 } gbt_camera;
 
-/** Number of parameters of a model, and its COLMAP name; 0 and NULL for an unknown model. */
+/** Number of parameters of a model, and its name (COLMAP's where it has one); 0 and NULL for an unknown model. */
 int gbt_camera_param_count(gbt_camera_model model);
 const char *gbt_camera_model_name(gbt_camera_model model);
 
@@ -59,13 +60,25 @@ const char *gbt_camera_model_name(gbt_camera_model model);
  */
 bool gbt_camera_unproject(const gbt_camera *camera, double px, double py, double dir_cam[3]);
 
+/**
+ * The ray through a point of the image, in world axes.
+ *
+ * @param origin [out] the camera centre; for an orthographic camera the point of its plane through the centre
+ * @param dir    [out] unit vector; both untouched on failure
+ * @return as gbt_camera_unproject()
+ */
+bool gbt_camera_ray(const gbt_camera *camera, double px, double py, double origin[3], double dir[3]);
+
 /** Image point of a point in camera axes; false where the model does not see it. The formulas that gbt_camera_unproject() inverts. */
 bool gbt_camera_project(const gbt_camera *camera, const double point_cam[3], double pixel[2]);
 
 /** The same camera for an image of another size: lengths in pixels are scaled per axis (single-f models need equal ratios within 1 px). */
 gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height);
 
-/** tan of half the horizontal and vertical field of view of the pinhole that best stands for this camera: width / (2 fx), height / (2 fy). */
+/**
+ * tan of half the horizontal and vertical field of view of the pinhole that best stands for this camera: width / (2 fx), height / (2 fy).
+ * 0 for parallel rays.
+ */
 void gbt_camera_half_fov_tan(const gbt_camera *camera, double tan_half[2]);
 
 #ifdef __cplusplus

@@ -34,11 +34,19 @@ typedef struct gbt_render_def {
     const char *renderer; /* "trace" (default) or "reference" (double, every Gaussian against every ray: slow) */
     const char *format;   /* "png" (default) or "exr" (32-bit float) */
     double downscale;     /* 0: as in training. Default 0 */
+    const char *camera;   /* camera file (docs/cameras.md): render that and no views; the data set is not needed. Default NULL */
 } gbt_render_def;
 
 gbt_render_def gbt_render_def_default(void);
 
-/** Render the views of a split into the folder `out`, one file per view. Camera models are traced as they are. */
+/**
+ * Render the views of a split into the folder `out`, one file per view; or what a camera file says, as one file of its name.
+ *
+ * Camera models are traced as they are. `data`, `split` and `downscale` are about views: with a camera file the
+ * first two are not used, and the last is refused.
+ *
+ * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ */
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-/* base/camera.c -- the 18 COLMAP lens models: direction to pixel, pixel to direction, resizing.
+/* base/camera.c -- the 18 COLMAP lens models and the orthographic one: direction to pixel, pixel to direction, resizing.
 
    direction --[kind: X/Z | theta | closed form]--> plane point --[radial N/D, tangential, prism]--> distorted --[f, c]--> pixel
 
@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "base/poly.h"
+#include "base/vec.h"
 
 #define PI 3.14159265358979323846
 
@@ -48,8 +49,12 @@ static const model_row models[GBT_CAMERA_MODEL_COUNT] = {
     [GBT_CAMERA_EQUIRECTANGULAR] = {"EQUIRECTANGULAR", 2, false},
 };
 
+static const model_row orthographic_row = {"ORTHOGRAPHIC", 4, false};
+
 static const model_row *row_of(gbt_camera_model model)
 {
+    if (model == GBT_CAMERA_ORTHOGRAPHIC)
+        return &orthographic_row;
     return (unsigned)model < GBT_CAMERA_MODEL_COUNT ? &models[model] : NULL;
 }
 
@@ -138,6 +143,9 @@ bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
     lens->cx = p[0], lens->cy = p[1];
     const double *k = p + 2;
     switch (camera->model) {
+    case GBT_CAMERA_ORTHOGRAPHIC:
+        lens->kind = LENS_ORTHOGRAPHIC;
+        return true;
     case GBT_CAMERA_SIMPLE_PINHOLE:
     case GBT_CAMERA_PINHOLE:
         lens->kind = LENS_PERSPECTIVE;
@@ -376,6 +384,9 @@ bool camera_lens_unproject(const camera_lens *lens, double px, double py, double
         return false;
     double z = 1;
     switch (lens->kind) {
+    case LENS_ORTHOGRAPHIC:
+        p[0] = p[1] = 0;
+        break;
     case LENS_PERSPECTIVE:
     case LENS_FISHEYE:
         if ((lens->radial || lens->extra) && !undistort(lens, p))
@@ -411,6 +422,14 @@ bool camera_lens_unproject(const camera_lens *lens, double px, double py, double
     }
     memcpy(dir_cam, dir, sizeof dir);
     return true;
+}
+
+void camera_lens_origin(const camera_lens *lens, double px, double py, double origin_cam[3])
+{
+    const bool plane = lens->kind == LENS_ORTHOGRAPHIC;
+    origin_cam[0] = plane ? (px - lens->cx) / lens->fx : 0;
+    origin_cam[1] = plane ? (py - lens->cy) / lens->fy : 0;
+    origin_cam[2] = 0;
 }
 
 /* (X, Y) times the returned scale is the distorted point; false where the lens does not see. */
@@ -450,6 +469,11 @@ bool camera_lens_project(const camera_lens *lens, const double point_cam[3], dou
             return false;
         p[0] = x / z, p[1] = y / z;
         break;
+    case LENS_ORTHOGRAPHIC:
+        if (!(z > 0))
+            return false;
+        p[0] = x, p[1] = y;
+        break;
     case LENS_FISHEYE:
         if (rho == 0 && z < 0) /* exactly behind: every direction of the image border is equally right */
             return false;
@@ -483,6 +507,20 @@ bool gbt_camera_unproject(const gbt_camera *camera, double px, double py, double
     return camera_lens_prepare(camera, &lens) && camera_lens_unproject(&lens, px, py, dir_cam);
 }
 
+bool gbt_camera_ray(const gbt_camera *camera, double px, double py, double origin[3], double dir[3])
+{
+    camera_lens lens;
+    double start[3], forward[3];
+    if (!camera_lens_prepare(camera, &lens) || !camera_lens_unproject(&lens, px, py, forward))
+        return false;
+    camera_lens_origin(&lens, px, py, start);
+    dmat_apply_transposed(camera->rotation, start, start);
+    dmat_apply_transposed(camera->rotation, forward, dir);
+    for (int i = 0; i < 3; i++)
+        origin[i] = camera->center[i] + start[i];
+    return true;
+}
+
 bool gbt_camera_project(const gbt_camera *camera, const double point_cam[3], double pixel[2])
 {
     camera_lens lens;
@@ -512,7 +550,7 @@ void gbt_camera_half_fov_tan(const gbt_camera *camera, double tan_half[2])
 {
     camera_lens lens;
     tan_half[0] = tan_half[1] = 0;
-    if (!camera_lens_prepare(camera, &lens))
+    if (!camera_lens_prepare(camera, &lens) || lens.kind == LENS_ORTHOGRAPHIC)
         return;
     /* The full turn of an equirectangular image has, at its centre, w / (2 pi) pixels per radian. */
     const bool turn = lens.kind == LENS_EQUIRECTANGULAR;

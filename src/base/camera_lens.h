@@ -13,7 +13,8 @@ typedef enum lens_kind {
     LENS_FOV,         /* perspective, then radius atan(2 r tan(omega / 2)) / omega */
     LENS_DIVISION,
     LENS_EUCM,
-    LENS_EQUIRECTANGULAR
+    LENS_EQUIRECTANGULAR,
+    LENS_ORTHOGRAPHIC /* (X, Y), whatever Z > 0 */
 } lens_kind;
 
 enum { LENS_NUMERATOR = 7, LENS_DENOMINATOR = 4 };
@@ -40,6 +41,15 @@ typedef struct camera_lens {
  * Threads: any. Cost: about a microsecond, some more for the six-coefficient models.
  */
 bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens);
+
+/** Where the ray through an image point starts, in camera axes: the centre (0, 0, 0), or a point of the plane Z = 0 of an orthographic lens. */
+void camera_lens_origin(const camera_lens *lens, double px, double py, double origin_cam[3]);
+
+/** Do all rays of the lens have Z > 0, whatever its parameters? Such a lens has a plane in focus; others have a sphere. */
+static inline bool camera_lens_looks_forward(const camera_lens *lens)
+{
+    return lens->kind == LENS_PERSPECTIVE || lens->kind == LENS_FOV || lens->kind == LENS_ORTHOGRAPHIC;
+}
 
 /** As gbt_camera_unproject() and gbt_camera_project(), same bits. */
 bool camera_lens_unproject(const camera_lens *lens, double px, double py, double dir_cam[3]);

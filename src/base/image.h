@@ -35,6 +35,24 @@ gbt_status image_probe(const char *path, int *width, int *height, int *channels,
  */
 gbt_status image_read(const char *path, image *out, gbt_error *err);
 
+enum { IMAGE_RAW_CHANNELS = 64, IMAGE_NAME_SIZE = 64 };
+
+typedef struct image_names {
+    char name[IMAGE_RAW_CHANNELS][IMAGE_NAME_SIZE]; /* of each channel; longer names are cut */
+} image_names;
+
+/**
+ * Read every channel of a 32-bit float EXR as it is: values that are not finite too, nothing scaled or multiplied.
+ *
+ * Channels come in OpenImageIO's order: R, G, B, A first, the rest as in the file.
+ *
+ * @param out   [out] 1 to IMAGE_RAW_CHANNELS channels; free with image_free(); zeroed on failure
+ * @param names [out] out->channels names
+ * @return as image_read(); GBT_ERR_FORMAT also for samples of another type
+ * Threads: any.
+ */
+gbt_status image_read_raw(const char *path, image *out, image_names *names, gbt_error *err);
+
 /** Write atomically (temporary name in the same folder, then rename). PNG: 8 bit, floor(clamp(x) * 255 + 0.5). EXR: 32-bit float. By extension. */
 gbt_status image_write(const char *path, const image *im, gbt_error *err);
 

@@ -58,6 +58,19 @@ static inline bool bvh_ray_ok(const float origin[3], const float dir[3], float t
 }
 
 /**
+ * The exponent of a power of two: a direction divided by it, which is exact, can go to Embree, which replaces components below 1e-18 by
+ * others; t is multiplied by it. 0 for directions of usual length, and for those that are not finite.
+ */
+static inline int bvh_ray_exponent(const float dir[3])
+{
+    const float largest = fmaxf(fabsf(dir[0]), fmaxf(fabsf(dir[1]), fabsf(dir[2])));
+    int exponent = 0;
+    if (isfinite(largest) && (largest < 1e-3f || largest > 1e3f))
+        frexpf(largest, &exponent);
+    return exponent;
+}
+
+/**
  * How far the faces of a box must move out so that Embree's float32 slab test misses no ray, beside one nextafterf().
  *
  * Embree tests boxes of user geometry without any margin, whatever RTC_SCENE_FLAG_ROBUST says. A quarter of this removed every miss of

@@ -5,6 +5,8 @@
 #ifndef GBT_BVH_EMBREE_API_H
 #define GBT_BVH_EMBREE_API_H
 
+#include <stddef.h>
+
 #if GBT_EMBREE_MAJOR >= 4
 #include <embree4/rtcore.h>
 #else
@@ -51,6 +53,29 @@ static inline void embree_occluded(RTCScene scene, embree_context *context, stru
 #else
     rtcOccluded1(scene, context, ray);
 #endif
+}
+
+/** Nearest hits of sixteen rays that start and run close together (hint "coherent"); `valid` is -1 for the rays to trace, else 0, 64-byte
+    aligned. Each such ray is checked as for embree_intersect(). */
+static inline void embree_intersect16(RTCScene scene, embree_context *context, const int valid[16], struct RTCRayHit16 *rayhits)
+{
+#if GBT_EMBREE_MAJOR >= 4
+    struct RTCIntersectArguments arguments;
+    rtcInitIntersectArguments(&arguments);
+    arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+    arguments.context = context;
+    rtcIntersect16(valid, scene, rayhits, &arguments);
+#else
+    context->flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    rtcIntersect16(valid, scene, context, rayhits);
+#endif
+}
+
+/** `id` of ray i of the N in a callback. Embree's own accessor is C++; its layout, one array of N per field, is the same in both. */
+static inline unsigned embree_ray_id(const struct RTCRayHitN *rayhits, unsigned N, unsigned i)
+{
+    const size_t fields_before = offsetof(struct RTCRay, id) / sizeof(float);
+    return ((const unsigned *)rayhits)[fields_before * N + i];
 }
 
 /** Around work that Embree spreads over threads: publish what the callbacks will read, receive it first thing in a callback.

@@ -1,4 +1,4 @@
-/* bvh/gaussian_tree.c -- ellipsoid proxies, and Embree's builder over them. */
+/* bvh/gaussian_tree.c -- Embree's builder over the boxes of Gaussians, its nodes laid out for our kernels. */
 #include "bvh/gaussian_tree.h"
 
 #include <math.h>
@@ -7,89 +7,26 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "base/vec.h"
 #include "bvh/device.h"
 #include "bvh/embree_api.h"
+#include "bvh/proxy.h"
 
-/* Embree drops boxes beyond 1.844e18; squares of coordinates must stay finite in float32 as well. */
-static const float coordinate_limit = 1e17f;
-enum { BLOCK = 4096 };
+/* What Embree builds: binary, because its wider builders make as many children as they can and leave leaves almost empty. */
+typedef struct binary_node {
+    struct RTCBounds bounds[2];
+    uint64_t child[2]; /* address of a binary_node, or that of a tree_leaf + 1 */
+} binary_node;
 
 typedef struct builder {
-    tree_node single;
     RTCBVH bvh;
-    struct RTCBuildPrimitive *primitives;
-    size_t capacity;
-} builder;
-
-typedef struct box_job {
+    proxy_boxes boxes;
     const gaussians *g;
-    builder *b;
     float alpha_min;
-    uint32_t *block_kept;
-    float *block_max;
-    uint32_t *block_rejected;
-    int writing;
-    float pad;
-} box_job;
-
-/* Tight half extents of the proxy: k * sqrt(sum_i (R_ji s_i)^2). False when the Gaussian cannot be seen. */
-static bool proxy_box(const gaussians *g, size_t i, float alpha_min, float center[3], float half[3], bool *rejected)
-{
-    *rejected = false;
-    const float opacity = g->opacity[i];
-    const float q[4] = {g->quat_w[i], g->quat_x[i], g->quat_y[i], g->quat_z[i]};
-    const float s[3] = {g->scale_x[i], g->scale_y[i], g->scale_z[i]};
-    center[0] = g->mean_x[i], center[1] = g->mean_y[i], center[2] = g->mean_z[i];
-    if (opacity <= alpha_min)
-        return false;
-    const float k = sqrtf(2 * logf(opacity / alpha_min));
-    float m[9];
-    quat_to_matrix(q, m);
-    bool fine = isfinite(opacity) && s[0] > 0 && s[1] > 0 && s[2] > 0 && isfinite(g->red[i]) && isfinite(g->green[i]) && isfinite(g->blue[i]);
-    for (int j = 0; j < 3; j++) {
-        const float a = m[3 * j] * s[0], b = m[3 * j + 1] * s[1], c = m[3 * j + 2] * s[2];
-        half[j] = k * sqrtf(a * a + b * b + c * c);
-        fine = fine && fabsf(center[j]) + half[j] < coordinate_limit; /* false for NaN too */
-    }
-    *rejected = !fine;
-    return fine;
-}
-
-static void box_block(size_t block, size_t begin, size_t end, void *context)
-{
-    box_job *job = context;
-    uint32_t kept = 0, rejected_count = 0;
-    float largest = 0;
-    struct RTCBuildPrimitive *out = job->writing ? job->b->primitives + job->block_kept[block] : NULL;
-    for (size_t i = begin; i < end; i++) {
-        float center[3], half[3];
-        bool rejected;
-        if (!proxy_box(job->g, i, job->alpha_min, center, half, &rejected)) {
-            rejected_count += rejected;
-            continue;
-        }
-        if (!job->writing) {
-            for (int j = 0; j < 3; j++)
-                largest = fmaxf(largest, fabsf(center[j]) + half[j]);
-            kept++;
-            continue;
-        }
-        /* 1e-5 of the half extent covers the rounding of k and of the rotation; the pad covers that of the coordinates. */
-        struct RTCBuildPrimitive *p = &out[kept++];
-        p->lower_x = center[0] - half[0] * 1.00001f - job->pad, p->upper_x = center[0] + half[0] * 1.00001f + job->pad;
-        p->lower_y = center[1] - half[1] * 1.00001f - job->pad, p->upper_y = center[1] + half[1] * 1.00001f + job->pad;
-        p->lower_z = center[2] - half[2] * 1.00001f - job->pad, p->upper_z = center[2] + half[2] * 1.00001f + job->pad;
-        p->geomID = 0;
-        p->primID = (unsigned)i;
-    }
-    if (!job->writing) {
-        job->block_kept[block] = kept;
-        job->block_max[block] = largest;
-        job->block_rejected[block] = rejected_count;
-    }
-}
+    atomic_size_t binary_count, leaf_count;
+    tree_node *nodes;
+    size_t node_count, node_capacity;
+} builder;
 
 static void node_clear(tree_node *node)
 {
@@ -100,21 +37,49 @@ static void node_clear(tree_node *node)
     }
 }
 
-/* ---- Embree's callbacks: a leaf is one Gaussian, returned as a tagged integer in place of a pointer ---- */
+/* A little more than k^2 R S S R^T: the kernels' test adds what rounding needs beyond that. */
+static void set_ellipsoid(const builder *b, uint32_t id, tree_leaf *leaf, size_t slot)
+{
+    const gaussians *g = b->g;
+    const float q[4] = {g->quat_w[id], g->quat_x[id], g->quat_y[id], g->quat_z[id]};
+    const float s[3] = {g->scale_x[id], g->scale_y[id], g->scale_z[id]};
+    const float square = 2.0002f * logf(g->opacity[id] / b->alpha_min);
+    static const int pair[6][2] = {{0, 0}, {1, 1}, {2, 2}, {1, 2}, {2, 0}, {0, 1}};
+    float m[9];
+    quat_to_matrix(q, m);
+    for (int row = 0; row < 3; row++)
+        for (int axis = 0; axis < 3; axis++)
+            m[3 * row + axis] *= s[axis];
+    for (int k = 0; k < 6; k++) {
+        const float *x = m + 3 * pair[k][0], *y = m + 3 * pair[k][1];
+        leaf->spread[k][slot] = square * (x[0] * y[0] + x[1] * y[1] + x[2] * y[2]);
+    }
+    leaf->mean[0][slot] = g->mean_x[id], leaf->mean[1][slot] = g->mean_y[id], leaf->mean[2][slot] = g->mean_z[id];
+    leaf->id[slot] = id;
+}
+
+static void fill_leaf(const builder *b, const struct RTCBuildPrimitive *primitives, size_t count, tree_leaf *leaf)
+{
+    leaf->count = (uint32_t)count;
+    for (size_t i = 0; i < TREE_WIDTH; i++)
+        set_ellipsoid(b, primitives[i < count ? i : 0].primID, leaf, i);
+}
+
+/* ---- Embree's callbacks; a leaf is a tagged address in place of a pointer ---- */
 
 static void *create_node(RTCThreadLocalAllocator allocator, unsigned child_count, void *user)
 {
     (void)child_count;
-    atomic_fetch_add_explicit((atomic_size_t *)user, 1, memory_order_relaxed);
-    tree_node *node = rtcThreadLocalAlloc(allocator, sizeof *node, 64);
-    node_clear(node);
-    return node;
+    builder *b = user;
+    embree_receive(b);
+    atomic_fetch_add_explicit(&b->binary_count, 1, memory_order_relaxed);
+    return rtcThreadLocalAlloc(allocator, sizeof(binary_node), 16);
 }
 
 static void set_children(void *pointer, void **children, unsigned child_count, void *user)
 {
     (void)user;
-    tree_node *node = pointer;
+    binary_node *node = pointer;
     for (unsigned i = 0; i < child_count; i++)
         node->child[i] = (uint64_t)(uintptr_t)children[i];
 }
@@ -122,78 +87,115 @@ static void set_children(void *pointer, void **children, unsigned child_count, v
 static void set_bounds(void *pointer, const struct RTCBounds **bounds, unsigned child_count, void *user)
 {
     (void)user;
-    tree_node *node = pointer;
-    for (unsigned i = 0; i < child_count; i++) {
-        node->lower_x[i] = bounds[i]->lower_x, node->upper_x[i] = bounds[i]->upper_x;
-        node->lower_y[i] = bounds[i]->lower_y, node->upper_y[i] = bounds[i]->upper_y;
-        node->lower_z[i] = bounds[i]->lower_z, node->upper_z[i] = bounds[i]->upper_z;
-    }
+    binary_node *node = pointer;
+    for (unsigned i = 0; i < child_count; i++)
+        node->bounds[i] = *bounds[i];
 }
 
 static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuildPrimitive *primitives, size_t count, void *user)
 {
-    (void)allocator, (void)count, (void)user; /* count is 1: maxLeafSize says so */
-    return (void *)(uintptr_t)((uint64_t)primitives[0].primID << 1 | 1);
+    builder *b = user;
+    embree_receive(b);
+    atomic_fetch_add_explicit(&b->leaf_count, 1, memory_order_relaxed);
+    tree_leaf *leaf = rtcThreadLocalAlloc(allocator, sizeof *leaf, 64);
+    fill_leaf(b, primitives, count, leaf);
+    return (char *)leaf + 1;
 }
 
-static gbt_status run_builder(builder *b, size_t box_count, void *device, gaussian_tree *tree, gbt_error *err)
+/* ---- binary nodes --> nodes of 16 ---------------------------------------------------------------------------------------------------- */
+
+static float half_area(const struct RTCBounds *b)
+{
+    const float x = b->upper_x - b->lower_x, y = b->upper_y - b->lower_y, z = b->upper_z - b->lower_z;
+    return x * y + y * z + z * x;
+}
+
+/* The wide node for a binary one: its largest child is opened until there are 16. Depth first, so that neighbours lie side by side. */
+static tree_node *widen(builder *b, const binary_node *root)
+{
+    struct RTCBounds bounds[TREE_WIDTH];
+    uint64_t child[TREE_WIDTH];
+    int count = 2;
+    memcpy(bounds, root->bounds, 2 * sizeof *bounds);
+    memcpy(child, root->child, 2 * sizeof *child);
+    while (count < TREE_WIDTH) {
+        int largest = -1;
+        float area = -1;
+        for (int i = 0; i < count; i++)
+            if (tree_child_leaf(child[i]) == NULL && half_area(&bounds[i]) > area)
+                largest = i, area = half_area(&bounds[i]);
+        if (largest < 0)
+            break;
+        const binary_node *opened = (const binary_node *)(uintptr_t)child[largest];
+        bounds[largest] = opened->bounds[0], child[largest] = opened->child[0];
+        bounds[count] = opened->bounds[1], child[count++] = opened->child[1];
+    }
+    tree_node *node = &b->nodes[b->node_count++];
+    node_clear(node);
+    for (int i = 0; i < count; i++) {
+        node->lower_x[i] = bounds[i].lower_x, node->upper_x[i] = bounds[i].upper_x;
+        node->lower_y[i] = bounds[i].lower_y, node->upper_y[i] = bounds[i].upper_y;
+        node->lower_z[i] = bounds[i].lower_z, node->upper_z[i] = bounds[i].upper_z;
+        node->child[i] = tree_child_leaf(child[i]) != NULL ? child[i] : (uint64_t)(uintptr_t)widen(b, (const binary_node *)(uintptr_t)child[i]);
+    }
+    return node;
+}
+
+/* Few Gaussians make one leaf, and the node above it is ours. Nothing is culled there. */
+static void single_node(builder *b, uint64_t leaf)
+{
+    tree_node *node = &b->nodes[b->node_count++];
+    node_clear(node);
+    node->lower_x[0] = node->lower_y[0] = node->lower_z[0] = -1e30f;
+    node->upper_x[0] = node->upper_y[0] = node->upper_z[0] = 1e30f;
+    node->child[0] = leaf;
+}
+
+static gbt_status run_builder(builder *b, void *device, gbt_error *err)
 {
     if (b->bvh == NULL)
         b->bvh = rtcNewBVH(device);
-    atomic_size_t nodes = 0;
     struct RTCBuildArguments arguments = rtcDefaultBuildArguments();
     arguments.byteSize = sizeof arguments;
     arguments.buildQuality = RTC_BUILD_QUALITY_MEDIUM; /* deterministic, unlike HIGH */
-    arguments.maxBranchingFactor = TREE_WIDTH;
+    arguments.maxBranchingFactor = 2;
     arguments.maxDepth = 48;
-    arguments.sahBlockSize = 1;
+    arguments.sahBlockSize = TREE_WIDTH; /* a leaf costs the same, whether it holds 1 or 16 */
     arguments.minLeafSize = 1;
-    arguments.maxLeafSize = 1;
+    arguments.maxLeafSize = TREE_WIDTH;
     arguments.traversalCost = 1;
     arguments.intersectionCost = 1;
     arguments.bvh = b->bvh;
-    arguments.primitives = b->primitives;
-    arguments.primitiveCount = box_count;
-    arguments.primitiveArrayCapacity = b->capacity;
+    arguments.primitives = b->boxes.box;
+    arguments.primitiveCount = b->boxes.count;
+    arguments.primitiveArrayCapacity = b->boxes.capacity;
     arguments.createNode = create_node;
     arguments.setNodeChildren = set_children;
     arguments.setNodeBounds = set_bounds;
     arguments.createLeaf = create_leaf;
-    arguments.userPtr = &nodes;
+    arguments.userPtr = b;
+    atomic_store(&b->binary_count, 0), atomic_store(&b->leaf_count, 0);
+    embree_publish(b);
     void *root = rtcBuildBVH(&arguments);
     if (root == NULL)
-        return base_fail(err, GBT_ERR_INTERNAL, "bvh: Embree could not build a tree over %zu Gaussians (error %d)", box_count,
+        return base_fail(err, GBT_ERR_INTERNAL, "bvh: Embree could not build a tree over %zu Gaussians (error %d)", b->boxes.count,
                          (int)rtcGetDeviceError(device));
-    tree->root = root;
-    tree->node_count = nodes;
-    tree->bytes = tree->node_count * sizeof(tree_node);
+    b->node_count = 0;
+    GBT_TRY(mem_reserve((void **)&b->nodes, &b->node_capacity, 0, b->binary_count + 1, sizeof *b->nodes, "bvh nodes", err));
+    if (b->binary_count > 0)
+        widen(b, root);
+    else
+        single_node(b, (uint64_t)(uintptr_t)root);
     return GBT_OK;
-}
-
-/* A single Gaussian makes Embree return a bare leaf, so its node is ours. */
-static void single_node(builder *b, gaussian_tree *tree)
-{
-    tree_node *node = &b->single;
-    const struct RTCBuildPrimitive *p = &b->primitives[0];
-    node_clear(node);
-    node->lower_x[0] = p->lower_x, node->upper_x[0] = p->upper_x;
-    node->lower_y[0] = p->lower_y, node->upper_y[0] = p->upper_y;
-    node->lower_z[0] = p->lower_z, node->upper_z[0] = p->upper_z;
-    node->child[0] = (uint64_t)p->primID << 1 | 1;
-    tree->root = node;
-    tree->node_count = 1;
-    tree->bytes = sizeof *node;
 }
 
 gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float reach, gaussian_tree *tree, gbt_error *err)
 {
     tree->root = NULL;
-    tree->box_count = tree->rejected_count = tree->node_count = tree->bytes = 0;
+    tree->box_count = tree->rejected_count = tree->node_count = tree->leaf_count = tree->bytes = 0;
     tree->coordinate_max = 0;
     if (g->count == 0)
         return GBT_OK;
-    if (g->count > UINT32_MAX / 2)
-        return base_fail(err, GBT_ERR_NO_MEMORY, "bvh: %zu Gaussians (limit 2^31)", g->count);
     void *device = bvh_device(err);
     if (device == NULL)
         return GBT_ERR_INTERNAL;
@@ -203,35 +205,18 @@ gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float reach,
             return GBT_ERR_NO_MEMORY;
     }
     builder *b = tree->internal;
-    const size_t blocks = parallel_block_count(g->count, BLOCK);
-    uint32_t *scratch = mem_alloc(blocks, 3 * sizeof *scratch, "bvh blocks", err);
-    if (scratch == NULL)
-        return GBT_ERR_NO_MEMORY;
-    box_job job = {.g = g, .b = b, .alpha_min = alpha_min, .block_kept = scratch, .block_rejected = scratch + blocks, .block_max = (float *)(scratch + 2 * blocks)};
-    parallel_blocks(g->count, BLOCK, box_block, &job);
-    for (size_t i = 0; i < blocks; i++) {
-        const uint32_t kept = job.block_kept[i];
-        job.block_kept[i] = (uint32_t)tree->box_count;
-        tree->box_count += kept;
-        tree->rejected_count += job.block_rejected[i];
-        tree->coordinate_max = fmaxf(tree->coordinate_max, job.block_max[i]);
-    }
-    gbt_status status = GBT_OK;
+    GBT_TRY(proxy_boxes_make(g, alpha_min, reach, &b->boxes, err));
+    tree->box_count = b->boxes.count;
+    tree->rejected_count = b->boxes.rejected_count;
+    tree->coordinate_max = b->boxes.coordinate_max;
+    b->g = g, b->alpha_min = alpha_min;
     if (tree->box_count == 0)
-        goto done;
-    status = mem_reserve((void **)&b->primitives, &b->capacity, 0, tree->box_count + tree->box_count / 4 + 2, sizeof *b->primitives, "bvh boxes", err);
-    if (status != GBT_OK)
-        goto done;
-    job.pad = bvh_box_pad(fmaxf(tree->coordinate_max, reach));
-    job.writing = 1;
-    parallel_blocks(g->count, BLOCK, box_block, &job);
-    if (tree->box_count == 1)
-        single_node(b, tree);
-    else
-        status = run_builder(b, tree->box_count, device, tree, err);
-done:
-    mem_free(scratch);
-    return status;
+        return GBT_OK;
+    GBT_TRY(run_builder(b, device, err));
+    tree->root = b->nodes;
+    tree->node_count = b->node_count, tree->leaf_count = b->leaf_count;
+    tree->bytes = tree->node_count * sizeof(tree_node) + tree->leaf_count * sizeof(tree_leaf);
+    return GBT_OK;
 }
 
 void gaussian_tree_free(gaussian_tree *tree)
@@ -240,7 +225,8 @@ void gaussian_tree_free(gaussian_tree *tree)
     if (b != NULL) {
         if (b->bvh != NULL)
             rtcReleaseBVH(b->bvh);
-        mem_free(b->primitives);
+        proxy_boxes_free(&b->boxes);
+        mem_free(b->nodes);
         mem_free(b);
     }
     memset(tree, 0, sizeof *tree);

@@ -1,9 +1,9 @@
 /* bvh/gaussian_tree.h -- a 16-wide tree over the ellipsoid proxies of Gaussians, made by Embree's builder.
 
    The proxy of Gaussian i is the ellipsoid at radius sqrt(2 ln(opacity / alpha_min)) std-devs: exactly the set where its response
-   reaches alpha_min. Boxes are the tight boxes of these ellipsoids, padded so that float32 traversal misses nothing.
+   reaches alpha_min. Inner nodes hold the padded tight boxes of these ellipsoids (proxy.h); leaves hold up to 16 of the ellipsoids themselves.
 
-   The nodes are laid out for kernels that test all children of a node at once, so their layout is part of the interface. */
+   Both are laid out for kernels that test 16 children at once, so their layout is part of the interface. */
 #ifndef GBT_BVH_GAUSSIAN_TREE_H
 #define GBT_BVH_GAUSSIAN_TREE_H
 
@@ -19,19 +19,27 @@ typedef struct tree_node {
     float lower_x[TREE_WIDTH], upper_x[TREE_WIDTH];
     float lower_y[TREE_WIDTH], upper_y[TREE_WIDTH];
     float lower_z[TREE_WIDTH], upper_z[TREE_WIDTH];
-    uint64_t child[TREE_WIDTH]; /* address of a tree_node, or (Gaussian index << 1 | 1) */
+    uint64_t child[TREE_WIDTH]; /* address of a tree_node, or that of a tree_leaf + 1 */
 } tree_node;
 
-static inline bool tree_child_is_gaussian(uint64_t child)
+/** Ellipsoids { x : (x - mean)^T spread^-1 (x - mean) <= 1 }: spread = k^2 R S S R^T. Unused slots repeat the first. */
+typedef struct tree_leaf {
+    float mean[3][TREE_WIDTH];
+    float spread[6][TREE_WIDTH]; /* xx yy zz yz zx xy */
+    uint32_t id[TREE_WIDTH];
+    uint32_t count;
+} tree_leaf;
+
+static inline const tree_leaf *tree_child_leaf(uint64_t child) /* NULL for a tree_node */
 {
-    return (child & 1) != 0;
+    return (child & 1) != 0 ? (const tree_leaf *)(uintptr_t)(child - 1) : NULL;
 }
 
 typedef struct gaussian_tree {
     const tree_node *root; /* NULL when no Gaussian is visible at all */
     size_t box_count;      /* Gaussians in the tree; those with opacity <= alpha_min or non-finite fields are left out */
     size_t rejected_count; /* of these, the non-finite or out-of-range ones */
-    size_t node_count, bytes;
+    size_t node_count, leaf_count, bytes;
     float coordinate_max;  /* largest |coordinate| of any box */
     void *internal;        /* Embree's builder memory */
 } gaussian_tree;
@@ -45,7 +53,7 @@ typedef struct gaussian_tree {
  * @return GBT_OK, GBT_ERR_NO_MEMORY or GBT_ERR_INTERNAL (Embree's own words)
  *
  * Threads: one build at a time per tree; uses all threads inside; the same tree for every thread count.
- * Cost: O(n log n); about 50 bytes per Gaussian.
+ * Cost: O(n log n); about 70 bytes per Gaussian.
  */
 gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float reach, gaussian_tree *tree, gbt_error *err);
 void gaussian_tree_free(gaussian_tree *tree);

@@ -160,15 +160,9 @@ static bool prepare(const mesh_tree *tree, const float origin[3], const float di
 {
     if (tree->scene == NULL || !(t_min >= 0 && t_min <= t_max))
         return false;
-    float scaled[3] = {dir[0], dir[1], dir[2]}, t_end = t_max * (1 + 0x1p-18f);
-    const float largest = fmaxf(fabsf(dir[0]), fmaxf(fabsf(dir[1]), fabsf(dir[2])));
-    if (isfinite(largest) && (largest < 1e-3f || largest > 1e3f)) {
-        int exponent;
-        frexpf(largest, &exponent);
-        for (int i = 0; i < 3; i++)
-            scaled[i] = ldexpf(dir[i], -exponent);
-        t_end = ldexpf(t_end, exponent);
-    }
+    const int exponent = bvh_ray_exponent(dir);
+    const float scaled[3] = {ldexpf(dir[0], -exponent), ldexpf(dir[1], -exponent), ldexpf(dir[2], -exponent)};
+    const float t_end = ldexpf(t_max * (1 + 0x1p-18f), exponent);
     for (int i = 0; i < 3; i++)
         if (!(fabsf(origin[i]) <= MESH_COORDINATE_LIMIT))
             return false;

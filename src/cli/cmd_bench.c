@@ -13,7 +13,10 @@ static int run_bench(const command *self, int argc, char **argv)
     int threads = 0;
     const option options[] = {
         {.name = "model", .kind = OPTION_STRING, .value = &def.model, .value_name = "FILE.ply|RUN", .help = "plain 3DGS Gaussians, or a trained run", .required = true},
-        {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json", .help = "origin, target, up, fov_x_deg, width, height"},
+        {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json", .help = "a camera file (docs/cameras.md); needed for a .ply"},
+        {.name = "alpha-min", .kind = OPTION_FLOAT, .value = &def.alpha_min, .min = 1e-6, .max = 0.999, .value_name = "A", .help = "smallest response that counts; default: the run's, else 1/255"},
+        {.name = "alpha-max", .kind = OPTION_FLOAT, .value = &def.alpha_max, .min = 1e-6, .max = 0.999999, .value_name = "A", .help = "alpha is cut here; default: the run's, else 0.99"},
+        {.name = "t-min", .kind = OPTION_FLOAT, .value = &def.t_min, .min = 1e-9, .max = 0.999, .value_name = "T", .help = "stop below this transmittance; default: the run's, else 1e-4"},
         {.name = "repeats", .kind = OPTION_INT, .value = &def.repeats, .min = 1, .max = 1000, .value_name = "N", .help = "timed passes; the median counts"},
         {.name = "check", .kind = OPTION_FLAG, .value = &check, .help = "compare with the double reference"},
         {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the figures there"},

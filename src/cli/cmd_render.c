@@ -13,6 +13,8 @@ static int run(const command *self, int argc, char **argv)
     const option options[] = {
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR", .help = "folder for the images", .required = true},
         {.name = "split", .kind = OPTION_CHOICE, .value = &split, .choices = "test|train|all", .help = "which views of the data set"},
+        {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json",
+         .help = "one picture of this camera (lens, aperture, rolling shutter, rays: docs/cameras.md), no views"},
         {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "cameras from another data set"},
         {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|reference", .help = "the tracer, or the double reference (slow)"},
         {.name = "format", .kind = OPTION_CHOICE, .value = &def.format, .choices = "png|exr", .help = "8-bit PNG, or float EXR"},
@@ -31,4 +33,4 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_render(model.value[0], out, &def, &err), &err);
 }
 
-const command command_render = {.name = "render", .summary = "render the views of a trained scene", .usage = "RUN -o DIR", .run = run};
+const command command_render = {.name = "render", .summary = "render the views of a trained scene, or a camera of your own", .usage = "RUN -o DIR", .run = run};

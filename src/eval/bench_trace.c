@@ -7,11 +7,10 @@
 #include "base/clock.h"
 #include "base/cpu.h"
 #include "base/fail.h"
-#include "base/file.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/vec.h"
 #include "data/gaussian_ply.h"
+#include "eval/camera_file.h"
 #include "eval/json_out.h"
 #include "eval/loaded_run.h"
 #include "gbtrace/bench.h"
@@ -46,51 +45,22 @@ static gbt_status gaussians_from_ply(const char *path, gaussians *out, gbt_error
     return status;
 }
 
-static bool read_vector(const json_t *root, const char *key, double out[3])
+/* What the caller has given in place of the model's own. */
+static gbt_status override_setting(const char *name, float given, float *setting, gbt_error *err)
 {
-    const json_t *array = json_object_get(root, key);
-    for (size_t i = 0; i < 3; i++) {
-        const json_t *value = json_array_get(array, i);
-        if (!json_is_number(value))
-            return false;
-        out[i] = json_number_value(value);
-    }
-    return json_array_size(array) == 3;
+    if (isnan(given) || given == 0)
+        return GBT_OK;
+    if (!(given > 0 && given < 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "bench: bad %s (wanted a number in (0, 1), got %g)", name, (double)given);
+    *setting = given;
+    return GBT_OK;
 }
 
-/* A look-at camera: image x to the right, y down, as all our cameras. */
-static gbt_status camera_from_json(const char *path, gbt_camera *out, gbt_error *err)
+static gbt_status override_settings(const gbt_bench_def *def, trace_settings *settings, gbt_error *err)
 {
-    unsigned char *bytes;
-    size_t count;
-    GBT_TRY(file_read(path, &bytes, &count, err));
-    json_error_t where;
-    json_t *root = json_loadb((const char *)bytes, count, 0, &where);
-    mem_free(bytes);
-    if (root == NULL)
-        return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not JSON: %s", path, where.line, where.text);
-    double origin[3], target[3], up[3], forward[3], right[3], down[3];
-    const double fov = json_number_value(json_object_get(root, "fov_x_deg"));
-    const long long width = json_integer_value(json_object_get(root, "width")), height = json_integer_value(json_object_get(root, "height"));
-    bool fine = read_vector(root, "origin", origin) && read_vector(root, "target", target) && read_vector(root, "up", up);
-    fine = fine && fov > 0 && fov < 180 && width >= 1 && height >= 1 && width <= 65500 && height <= 65500;
-    json_decref(root);
-    for (int i = 0; i < 3; i++)
-        forward[i] = fine ? target[i] - origin[i] : 0;
-    if (fine) {
-        dvec_normalize(forward);
-        dvec_cross(forward, up, right);
-        fine = dvec_length(right) > 1e-9;
-    }
-    if (!fine)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: wanted origin, target, up (3 numbers each), fov_x_deg in (0, 180), width, height", path);
-    dvec_normalize(right);
-    dvec_cross(forward, right, down);
-    const double focal = 0.5 * (double)width / tan(fov * 3.14159265358979323846 / 360);
-    *out = (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = (int)width, .height = (int)height, .params = {focal, focal, 0.5 * (double)width, 0.5 * (double)height}};
-    for (int i = 0; i < 3; i++)
-        out->rotation[i] = right[i], out->rotation[3 + i] = down[i], out->rotation[6 + i] = forward[i], out->center[i] = origin[i];
-    return GBT_OK;
+    GBT_TRY(override_setting("alpha_min", def->alpha_min, &settings->alpha_min, err));
+    GBT_TRY(override_setting("alpha_max", def->alpha_max, &settings->alpha_max, err));
+    return override_setting("t_min", def->t_min, &settings->transmittance_min, err);
 }
 
 /* ---- figures -------------------------------------------------------------------------------------------------------------------------------- */
@@ -124,7 +94,7 @@ static gbt_status time_passes(trace_scene *traced, const gaussians *g, const tra
     gbt_status status = samples == NULL ? GBT_ERR_NO_MEMORY : image_alloc(&d_rgb, rays->width, rays->height, 3, err);
     for (size_t i = 0; status == GBT_OK && i < 3 * (size_t)rays->width * (size_t)rays->height; i++)
         d_rgb.pixels[i] = 1 / (float)ray_count;
-    const float reach = fmaxf(fabsf(rays->origin[0]), fmaxf(fabsf(rays->origin[1]), fabsf(rays->origin[2])));
+    const float reach = ray_image_reach(rays);
     for (int i = -1; i < repeats && status == GBT_OK; i++) { /* the first pass warms caches and memory up */
         const double t0 = clock_wall();
         status = trace_build(traced, g, settings, reach, err);
@@ -157,16 +127,16 @@ static gbt_status time_passes(trace_scene *traced, const gaussians *g, const tra
 /* Every 8th pixel in both directions, in double. */
 static gbt_status check_image(const gaussians *g, const trace_settings *settings, const ray_image *rays, const image *rgb, figures *out, gbt_error *err)
 {
-    ray_image few = {.width = (rays->width + CHECK_STRIDE - 1) / CHECK_STRIDE, .height = (rays->height + CHECK_STRIDE - 1) / CHECK_STRIDE,
-                     .origin = rays->origin, .common_origin = rays->common_origin};
-    const size_t count = (size_t)few.width * (size_t)few.height;
-    few.dir = mem_alloc(count, 3 * sizeof *few.dir, "check rays", err);
+    ray_image few = {0};
+    GBT_TRY(ray_image_reserve(&few, (rays->width + CHECK_STRIDE - 1) / CHECK_STRIDE, (rays->height + CHECK_STRIDE - 1) / CHECK_STRIDE, false, err));
+    const size_t count = ray_image_count(&few);
     double *want = mem_alloc(count, 3 * sizeof *want, "check image", err);
-    gbt_status status = few.dir == NULL || want == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
-    for (int y = 0; status == GBT_OK && y < few.height; y++)
-        for (int x = 0; x < few.width; x++)
-            memcpy(few.dir + 3 * ((size_t)y * (size_t)few.width + (size_t)x),
-                   rays->dir + 3 * ((size_t)y * CHECK_STRIDE * (size_t)rays->width + (size_t)x * CHECK_STRIDE), 3 * sizeof(float));
+    gbt_status status = want == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    for (size_t i = 0; i < count; i++) {
+        const size_t x = i % (size_t)few.width * CHECK_STRIDE, y = i / (size_t)few.width * CHECK_STRIDE, from = y * (size_t)rays->width + x;
+        memcpy(few.dir + 3 * i, rays->dir + 3 * from, 3 * sizeof *few.dir);
+        memcpy(few.origin + 3 * i, ray_image_origin(rays, from), 3 * sizeof *few.origin);
+    }
     if (status == GBT_OK)
         status = reference_forward(g, settings, &few, want, NULL, NULL, err);
     double square = 0;
@@ -181,7 +151,7 @@ static gbt_status check_image(const gaussians *g, const trace_settings *settings
     }
     out->check_rays = count;
     out->psnr = square > 0 ? -10 * log10(square / (3 * (double)count)) : 200;
-    mem_free(few.dir);
+    ray_image_free(&few);
     mem_free(want);
     return status;
 }
@@ -190,13 +160,16 @@ static gbt_status print_figures(const gbt_bench_def *def, const figures *f, cons
                                 gbt_error *err)
 {
     const double n = (double)rays->width * (double)rays->height;
-    fprintf(out, "%s: %zu Gaussians (%zu in the tree, %zu nodes, %.1f MB), %d x %d rays, %d threads, %s\n", def->model, g->count, traced->tree.box_count,
-            traced->tree.node_count, (double)(traced->tree.bytes + g->count * RECORD_FLOATS * sizeof(float)) * 1e-6, rays->width, rays->height, parallel_threads(),
+    fprintf(out, "%s: %zu Gaussians (%zu in the tree, %zu nodes, %zu leaves, %.1f MB), %d x %d rays, %d threads, %s\n", def->model, g->count, traced->tree.box_count,
+            traced->tree.node_count, traced->tree.leaf_count, (double)(traced->tree.bytes + g->count * RECORD_FLOATS * sizeof(float)) * 1e-6, rays->width, rays->height, parallel_threads(),
             cpu_isa_name(cpu_best_isa()));
     fprintf(out, "build   %8.2f ms\nforward %8.2f ms  %6.3f core-us/ray\nadjoint %8.2f ms  %6.3f core-us/ray\n", f->build_ms, 1000 * f->forward_seconds,
             f->forward_us, 1000 * f->adjoint_seconds, f->adjoint_us);
-    fprintf(out, "per ray: %.2f hits, %.2f blended, %.1f tests, %.2f nodes; %llu packets spilled\n", (double)f->counters.hits / n, (double)f->counters.blended / n,
-            (double)f->counters.tests / n, (double)f->counters.nodes / n, (unsigned long long)f->counters.spilled_packets);
+    const kernel_counters *c = &f->counters;
+    const double packets = (double)c->rays / PACKET_LANES;
+    fprintf(out, "per ray: %.2f hits, %.2f blended, %.1f tests, %.2f nodes; per packet: %.1f rows, %.1f pairs of rows, %.1f candidates; %llu packets spilled\n",
+            (double)c->hits / n, (double)c->blended / n, (double)c->tests / n, (double)c->nodes / n, (double)c->rows / packets, (double)c->pairs / packets,
+            (double)c->candidates / packets, (unsigned long long)c->spilled_packets);
     if (def->check)
         fprintf(out, "to the double reference (%zu rays): PSNR %.1f dB, max error %.3g\n", f->check_rays, f->psnr, f->max_error);
     if (def->json == NULL)
@@ -207,6 +180,9 @@ static gbt_status print_figures(const gbt_bench_def *def, const figures *f, cons
                              (double)f->counters.blended / n, "tests_per_ray", (double)f->counters.tests / n, "nodes_per_ray", (double)f->counters.nodes / n,
                              "spilled_packets", (json_int_t)f->counters.spilled_packets, "kernel", "packet", "isa", cpu_isa_name(cpu_best_isa()), "threads",
                              parallel_threads(), "gaussians", (json_int_t)g->count);
+    json_object_set_new(root, "alpha_min", json_real((double)traced->settings.alpha_min));
+    json_object_set_new(root, "alpha_max", json_real((double)traced->settings.alpha_max));
+    json_object_set_new(root, "transmittance_min", json_real((double)traced->settings.transmittance_min));
     if (def->check) {
         json_object_set_new(root, "psnr_to_reference", json_real(f->psnr));
         json_object_set_new(root, "max_error", json_real(f->max_error));
@@ -221,43 +197,53 @@ static gbt_status bench(const gbt_bench_def *def, loaded_run *run, FILE *out, gb
     gaussians from_ply = {0};
     const gaussians *g = &from_ply;
     trace_settings settings = trace_settings_default();
-    gbt_camera camera;
+    camera_file camera = {0};
     trace_scene traced = {0};
     ray_image rays = {0};
     image rgb = {0};
     figures f = {.psnr = NAN, .max_error = NAN};
     const size_t length = strlen(def->model);
+    const bool is_ply = length > 4 && strcmp(def->model + length - 4, ".ply") == 0;
     gbt_status status;
-    if (length > 4 && strcmp(def->model + length - 4, ".ply") == 0) {
+    if (is_ply) {
         if (def->camera == NULL)
             return base_fail(err, GBT_ERR_ARGUMENT, "--camera: missing (a .ply has no cameras)");
         status = gaussians_from_ply(def->model, &from_ply, err);
         if (status == GBT_OK)
-            status = camera_from_json(def->camera, &camera, err);
+            status = camera_file_read(def->camera, (const double[3]){0, 0, 0}, &camera, err);
+    } else if (def->camera != NULL) {
+        status = loaded_run_open_model(def->model, run, err);
+        if (status == GBT_OK)
+            status = camera_file_read(def->camera, run->model.origin, &camera, err);
     } else {
         status = loaded_run_open(def->model, NULL, 0, run, err);
         size_t view = 0;
         while (status == GBT_OK && view + 1 < run->scene.view_count && !run->scene.views[view].is_test)
             view++;
-        if (status == GBT_OK && def->camera != NULL)
-            status = camera_from_json(def->camera, &camera, err);
-        else if (status == GBT_OK)
-            camera = photos_camera(&run->photos, view, 0);
+        if (status == GBT_OK) {
+            const gbt_camera taken = photos_camera(&run->photos, view, 0);
+            camera.shot = ray_shot_of(&taken);
+        }
+    }
+    if (!is_ply) {
         if (status == GBT_OK)
-            status = frame_render(&run->frame, &run->model.anchors, &run->model.decoder, &camera, &run->settings, false, err);
+            status = frame_render_shot(&run->frame, &run->model.anchors, &run->model.decoder, &camera.shot, &run->settings, err);
         g = &run->frame.gaussians;
         settings = run->settings;
     }
     if (status == GBT_OK)
-        status = ray_image_from_camera(&camera, &rays, err);
+        status = override_settings(def, &settings, err);
     if (status == GBT_OK)
-        status = image_alloc(&rgb, camera.width, camera.height, 3, err);
+        status = ray_image_from_shot(&camera.shot, 0, &rays, err);
+    if (status == GBT_OK)
+        status = image_alloc(&rgb, rays.width, rays.height, 3, err);
     if (status == GBT_OK)
         status = time_passes(&traced, g, &settings, &rays, def->repeats, &rgb, &f, err);
     if (status == GBT_OK && def->check)
         status = check_image(g, &settings, &rays, &rgb, &f, err);
     if (status == GBT_OK)
         status = print_figures(def, &f, g, &traced, &rays, out, err);
+    camera_file_free(&camera);
     trace_scene_free(&traced);
     ray_image_free(&rays);
     image_free(&rgb);

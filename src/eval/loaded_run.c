@@ -7,7 +7,7 @@
 #include "base/fail.h"
 #include "base/file.h"
 
-static gbt_status open_all(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)
+static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
 {
     char path[4096];
     if (file_is_folder(run))
@@ -17,6 +17,14 @@ static gbt_status open_all(const char *run, const char *data, double downscale, 
     GBT_TRY(model_load(path, &out->model, err));
     out->def = gbt_train_def_default();
     GBT_TRY(config_parse(out->model.config, path, &out->def, &out->strings, err));
+    out->settings = trace_settings_default();
+    out->settings.t_near = out->model.t_near;
+    memcpy(out->settings.background, out->model.background, sizeof out->settings.background);
+    return GBT_OK;
+}
+
+static gbt_status open_views(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)
+{
     scene_split split;
     GBT_TRY(scene_split_parse(out->def.eval_split, &split, err));
     if (data == NULL && !file_exists(out->model.data_folder) && !file_is_folder(out->model.data_folder))
@@ -27,17 +35,20 @@ static gbt_status open_all(const char *run, const char *data, double downscale, 
     for (size_t i = 0; i < out->scene.view_count; i++)
         for (int k = 0; k < 3; k++)
             out->scene.views[i].camera.center[k] += out->scene.origin[k] - out->model.origin[k];
-    GBT_TRY(photos_open(&out->photos, &out->scene, downscale > 0 ? downscale : out->def.downscale, err));
-    out->settings = trace_settings_default();
-    out->settings.t_near = out->model.t_near;
-    memcpy(out->settings.background, out->model.background, sizeof out->settings.background);
-    return GBT_OK;
+    return photos_open(&out->photos, &out->scene, downscale > 0 ? downscale : out->def.downscale, err);
 }
 
 gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
-    return open_all(run, data, downscale, out, err);
+    GBT_TRY(open_model(run, out, err));
+    return open_views(run, data, downscale, out, err);
+}
+
+gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    return open_model(run, out, err);
 }
 
 void loaded_run_close(loaded_run *r)

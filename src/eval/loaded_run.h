@@ -27,6 +27,10 @@ typedef struct loaded_run {
  * @param out       [out] start from {0}; free with loaded_run_close() after success or failure
  */
 gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err);
+
+/** The same without the data set: no views, no photos. For cameras that come from elsewhere. */
+gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *err);
+
 void loaded_run_close(loaded_run *r);
 
 /** Render a view into r->frame.rgb, at the run's resolution. */

@@ -1,13 +1,12 @@
-/* eval/render.c -- the views of a split to image files. */
-#include <math.h>
+/* eval/render.c -- the views of a split, or the camera of a file, to image files. */
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "eval/camera_file.h"
 #include "eval/loaded_run.h"
 #include "gbtrace/evaluate.h"
 #include "trace/reference.h"
@@ -18,20 +17,37 @@ gbt_render_def gbt_render_def_default(void)
 }
 
 /* Same Gaussians, same rays, in double: the picture that the tracer is measured against. */
-static gbt_status render_reference(loaded_run *r, gbt_error *err)
+static gbt_status render_reference(loaded_run *r, const ray_shot *shot, gbt_error *err)
 {
     frame *f = &r->frame;
-    const size_t pixels = (size_t)f->rgb.width * (size_t)f->rgb.height;
+    const int samples = ray_shot_sample_count(shot);
+    const size_t pixels = ray_image_count(&f->rays);
     double *rgb = mem_alloc(pixels, 3 * sizeof *rgb, "reference image", err);
-    double *transmittance = mem_alloc(pixels, sizeof *transmittance, "reference image", err);
-    gbt_status status = rgb == NULL || transmittance == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
-    if (status == GBT_OK)
-        status = reference_forward(&f->gaussians, &r->settings, &f->rays, rgb, transmittance, NULL, err);
+    double *sum = mem_calloc(pixels, 3 * sizeof *sum, "reference image", err);
+    gbt_status status = rgb == NULL || sum == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    for (int s = 0; s < samples && status == GBT_OK; s++) {
+        status = ray_image_from_shot(shot, s, &f->rays, err);
+        if (status == GBT_OK)
+            status = reference_forward(&f->gaussians, &r->settings, &f->rays, rgb, NULL, NULL, err);
+        for (size_t i = 0; status == GBT_OK && i < 3 * pixels; i++)
+            sum[i] += rgb[i];
+    }
     for (size_t i = 0; status == GBT_OK && i < 3 * pixels; i++)
-        f->rgb.pixels[i] = (float)rgb[i];
+        f->rgb.pixels[i] = (float)(sum[i] / samples);
     mem_free(rgb);
-    mem_free(transmittance);
+    mem_free(sum);
     return status;
+}
+
+static gbt_status render_one(loaded_run *r, const ray_shot *shot, const char *out, const char *name, const gbt_render_def *def, gbt_error *err)
+{
+    char file[1100], path[4096];
+    GBT_TRY(frame_render_shot(&r->frame, &r->model.anchors, &r->model.decoder, shot, &r->settings, err));
+    if (strcmp(def->renderer, "reference") == 0)
+        GBT_TRY(render_reference(r, shot, err));
+    snprintf(file, sizeof file, "%s.%s", name, def->format);
+    GBT_TRY(file_join(path, sizeof path, out, file, err));
+    return image_write(path, &r->frame.rgb, err);
 }
 
 static gbt_status render_views(loaded_run *r, const char *out, const gbt_render_def *def, gbt_error *err)
@@ -41,20 +57,43 @@ static gbt_status render_views(loaded_run *r, const char *out, const gbt_render_
         const scene_view *view = &r->scene.views[i];
         if ((def->split == GBT_SPLIT_TEST && !view->is_test) || (def->split == GBT_SPLIT_TRAIN && view->is_test))
             continue;
-        GBT_TRY(loaded_run_render(r, i, err));
-        if (strcmp(def->renderer, "reference") == 0)
-            GBT_TRY(render_reference(r, err));
-        char name[1024], file[1100], path[4096];
+        char name[1024];
         loaded_run_view_name(view, name, sizeof name);
-        snprintf(file, sizeof file, "%s.%s", name, def->format);
-        GBT_TRY(file_join(path, sizeof path, out, file, err));
-        GBT_TRY(image_write(path, &r->frame.rgb, err));
+        const gbt_camera camera = photos_camera(&r->photos, i, 0);
+        const ray_shot shot = ray_shot_of(&camera);
+        GBT_TRY(render_one(r, &shot, out, name, def, err));
         rendered++;
     }
     if (rendered == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no views in this split (of %zu)", r->scene.folder, r->scene.view_count);
     log_info("%zu views rendered into %s", rendered, out);
     return GBT_OK;
+}
+
+/* "folder/name.json" becomes "name". */
+static void camera_name(const char *path, char *out, size_t size)
+{
+    const char *slash = strrchr(path, '/');
+    snprintf(out, size, "%s", slash != NULL ? slash + 1 : path);
+    char *dot = strrchr(out, '.');
+    if (dot != NULL && dot != out)
+        *dot = '\0';
+}
+
+static gbt_status render_camera(const char *run, loaded_run *r, const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    camera_file file = {0};
+    char name[1024];
+    camera_name(def->camera, name, sizeof name);
+    gbt_status status = loaded_run_open_model(run, r, err);
+    if (status == GBT_OK)
+        status = camera_file_read(def->camera, r->model.origin, &file, err);
+    if (status == GBT_OK)
+        status = render_one(r, &file.shot, out, name, def, err);
+    if (status == GBT_OK)
+        log_info("%s rendered into %s", name, out);
+    camera_file_free(&file);
+    return status;
 }
 
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)
@@ -65,13 +104,20 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
         return base_fail(err, GBT_ERR_ARGUMENT, "--format: \"%.40s\" (wanted png or exr)", def->format);
     if (!(def->downscale == 0 || (def->downscale >= 1 && def->downscale <= 64)))
         return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: %g (wanted 1 to 64)", def->downscale);
+    if (def->camera != NULL && def->downscale != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: not with --camera (the camera file says the size)");
     GBT_TRY(file_make_folder(out, err));
     loaded_run *r = mem_alloc(1, sizeof *r, "run", err);
     if (r == NULL)
         return GBT_ERR_NO_MEMORY;
-    gbt_status status = loaded_run_open(run, def->data, def->downscale, r, err);
-    if (status == GBT_OK)
-        status = render_views(r, out, def, err);
+    gbt_status status;
+    if (def->camera != NULL) {
+        status = render_camera(run, r, out, def, err);
+    } else {
+        status = loaded_run_open(run, def->data, def->downscale, r, err);
+        if (status == GBT_OK)
+            status = render_views(r, out, def, err);
+    }
     loaded_run_close(r);
     mem_free(r);
     return status;

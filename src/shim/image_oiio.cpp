@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <memory>
 #include <new>
@@ -289,6 +290,25 @@ gbt_status read_pixels(const char *path, opened_image *o, image *out, gbt_error 
     return status;
 }
 
+gbt_status read_raw(const char *path, opened_image *o, image *out, image_names *names, gbt_error *err)
+{
+    const OIIO::ImageSpec &spec = o->input->spec();
+    bool is_float = spec.format == OIIO::TypeFloat;
+    for (const OIIO::TypeDesc &type : spec.channelformats)
+        is_float = is_float && type == OIIO::TypeFloat;
+    if (!is_float || std::strcmp(o->input->format_name(), "openexr") != 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %s with samples of type %s (wanted an EXR of 32-bit floats)", path, o->input->format_name(),
+                         spec.format.c_str());
+    if (spec.nchannels > IMAGE_RAW_CHANNELS)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %d channels (wanted at most %d)", path, spec.nchannels, int(IMAGE_RAW_CHANNELS));
+    for (int c = 0; c < spec.nchannels; c++)
+        std::snprintf(names->name[c], sizeof names->name[c], "%s", spec.channel_name(c).c_str());
+    gbt_status status = image_alloc(out, spec.width, spec.height, spec.nchannels, err);
+    if (status == GBT_OK && (!o->input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeFloat, out->pixels) || o->input->has_error()))
+        status = base_fail(err, GBT_ERR_FORMAT, "%s: damaged or truncated: %s", path, reason_of(o->input.get()).c_str());
+    return status;
+}
+
 uint8_t to_byte(float value)
 {
     if (!(value > 0.0f)) /* false for NaN as well */
@@ -375,6 +395,22 @@ try {
     return base_fail(err, otherwise, "%s: OpenImageIO failed", path);
 }
 
+/* `read` makes `out` of the opened file. */
+template<typename reader> gbt_status read_file(const char *path, image *out, gbt_error *err, reader read)
+try {
+    std::memset(out, 0, sizeof *out);
+    opened_image o;
+    gbt_status status = open_image(path, true, &o, err);
+    if (status == GBT_OK)
+        status = read(&o);
+    if (status != GBT_OK)
+        image_free(out);
+    return status;
+} catch (...) {
+    image_free(out);
+    return caught(path, GBT_ERR_FORMAT, err);
+}
+
 } // namespace
 
 extern "C" gbt_status image_probe(const char *path, int *width, int *height, int *channels, gbt_error *err)
@@ -391,18 +427,13 @@ try {
 }
 
 extern "C" gbt_status image_read(const char *path, image *out, gbt_error *err)
-try {
-    std::memset(out, 0, sizeof *out);
-    opened_image o;
-    gbt_status status = open_image(path, true, &o, err);
-    if (status == GBT_OK)
-        status = read_pixels(path, &o, out, err);
-    if (status != GBT_OK)
-        image_free(out);
-    return status;
-} catch (...) {
-    image_free(out);
-    return caught(path, GBT_ERR_FORMAT, err);
+{
+    return read_file(path, out, err, [=](opened_image *o) { return read_pixels(path, o, out, err); });
+}
+
+extern "C" gbt_status image_read_raw(const char *path, image *out, image_names *names, gbt_error *err)
+{
+    return read_file(path, out, err, [=](opened_image *o) { return read_raw(path, o, out, names, err); });
 }
 
 extern "C" gbt_status image_write(const char *path, const image *im, gbt_error *err)

@@ -1,6 +1,6 @@
-/* trace/kernel.h -- the contract between trace.c and the packet kernels.
+/* trace/kernel.h -- the contract between trace.c and the tile kernels.
 
-   A kernel traces one packet of 16 rays. It is written once (packet_kernel.inc.h) and compiled per instruction set. */
+   A kernel traces one tile of neighbouring packets of 16 rays. It is written once (tile_kernel.inc.h) and compiled per instruction set. */
 #ifndef GBT_TRACE_KERNEL_H
 #define GBT_TRACE_KERNEL_H
 
@@ -8,11 +8,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/memory.h"
 #include "bvh/gaussian_tree.h"
 #include "trace/settings.h"
 
 enum {
     PACKET_LANES = 16,
+    PACKET_PIXELS = 4, /* a packet is 4 x 4 pixels */
+    TILE_ACROSS = 4,   /* a tile is 4 x 4 packets */
+    TILE_PACKETS = TILE_ACROSS * TILE_ACROSS,
     RECORD_FLOATS = 16 /* one cache line per Gaussian */
 };
 
@@ -29,7 +33,7 @@ typedef struct kernel_scene {
 typedef struct packet_rays {
     _Alignas(64) float origin[3][PACKET_LANES];
     _Alignas(64) float dir[3][PACKET_LANES]; /* unit; lanes that are not active repeat an active one */
-    unsigned active;                         /* bit per lane; never 0 */
+    unsigned active;                         /* bit per lane; 0: the packet is not traced */
 } packet_rays;
 
 typedef struct packet_color {
@@ -37,13 +41,30 @@ typedef struct packet_color {
     _Alignas(64) float transmittance[PACKET_LANES];
 } packet_color;
 
-/* What forward leaves for backward: a growing run of bytes per block of packets. */
-typedef struct tape_bytes {
-    uint8_t *data;
-    size_t size, capacity;
-} tape_bytes;
+/* What forward leaves for backward, per block of tiles: the Gaussians that were blended, tile after tile, each tile closed by TAPE_END. */
+enum { TAPE_SINGLE = 0x4000, TAPE_END = 0x8000 };
+typedef struct tape_entry {
+    uint32_t id;
+    uint16_t lanes;  /* bit per ray that blended it; with TAPE_SINGLE: the one ray's number, and entries of a ray are in blending order */
+    uint16_t packet; /* number in the tile, or flags */
+} tape_entry;
 
-/* What one block of packets adds to the gradient of one Gaussian. The sums are of one hit's v (canonical point), g = dL/d(d2), and so on. */
+typedef struct hit_tape {
+    tape_entry *entries;
+    size_t count, capacity;
+} hit_tape;
+
+/** False when memory ran out. */
+static inline bool tape_add(hit_tape *tape, tape_entry entry)
+{
+    if (tape->count == tape->capacity &&
+        mem_reserve((void **)&tape->entries, &tape->capacity, tape->count, tape->capacity + tape->capacity / 2 + 512, sizeof entry, "hit tape", NULL) != GBT_OK)
+        return false;
+    tape->entries[tape->count++] = entry;
+    return true;
+}
+
+/* What one block of tiles adds to the gradient of one Gaussian. The sums are of one hit's v (canonical point), g = dL/d(d2), and so on. */
 enum { GRADIENT_V = 0, GRADIENT_VV = 3, GRADIENT_OPACITY = 9, GRADIENT_COLOR = 10, GRADIENT_WEIGHT = 13, GRADIENT_FLOATS = 15 };
 typedef struct gradient_record {
     float sum[GRADIENT_FLOATS]; /* V: sum g v; VV: sum g (v v^T), xx yy zz yz zx xy; OPACITY, COLOR: dL/d; WEIGHT: sum T alpha */
@@ -62,35 +83,43 @@ typedef struct gradient_list {
 gradient_record *gradient_list_find(gradient_list *list, uint32_t id);
 
 typedef struct kernel_counters {
-    uint64_t rays, nodes, tests, hits, blended, sorted_rows, spilled_packets;
+    uint64_t rays, nodes, candidates, tests, hits, blended, rows, pairs, spilled_packets;
 } kernel_counters;
 
 /* Growing scratch of one worker. Start from {0}. */
 typedef struct kernel_scratch {
     float *rows;
     size_t row_capacity; /* floats */
-    void *hits;          /* forward: hits of one lane of the spill path; backward: starts of the rounds on the tape */
-    size_t hit_capacity; /* in elements of whichever it is: never share one scratch between the two */
+    void *hits;
+    size_t hit_bytes;
+    struct heap_entry *heap;
+    size_t heap_capacity;
 } kernel_scratch;
 
-/** Trace a packet. `tape` is NULL when no adjoint will follow. False when memory ran out. */
-typedef bool packet_forward_fn(const kernel_scene *scene, const packet_rays *rays, packet_color *out, tape_bytes *tape, kernel_scratch *scratch,
-                               kernel_counters *counters);
+/* The rays of a tile of pixels. */
+typedef struct tile_rays {
+    packet_rays packet[TILE_PACKETS];
+    bool common_origin; /* all of them start at one point */
+} tile_rays;
+
+/** Trace a tile. `tape` is NULL when no adjoint will follow. False when memory ran out. */
+typedef bool tile_forward_fn(const kernel_scene *scene, const tile_rays *rays, packet_color out[TILE_PACKETS], hit_tape *tape,
+                             kernel_scratch *scratch, kernel_counters *counters);
 
 /**
- * Adjoint of a packet: replay the hits that forward left in tape[*cursor...], add to the record of every Gaussian that was blended.
+ * Adjoint of a tile: replay the hits that forward left at tape[*cursor...], add to the record of every Gaussian that was blended.
  *
  * @param d_rgb        [in]  dL/d(rgb)
  * @param d_background [out] [3], added to
  */
-typedef bool packet_backward_fn(const kernel_scene *scene, const packet_rays *rays, const float d_rgb[3][PACKET_LANES], const uint8_t *tape,
-                                size_t *cursor, gradient_list *out, float d_background[3], kernel_scratch *scratch);
+typedef bool tile_backward_fn(const kernel_scene *scene, const tile_rays *rays, float d_rgb[TILE_PACKETS][3][PACKET_LANES],
+                              const tape_entry *tape, size_t *cursor, gradient_list *out, float d_background[3], kernel_scratch *scratch);
 
-typedef struct packet_kernel {
-    packet_forward_fn *forward;
-    packet_backward_fn *backward;
-} packet_kernel;
+typedef struct tile_kernel {
+    tile_forward_fn *forward;
+    tile_backward_fn *backward;
+} tile_kernel;
 
-extern const packet_kernel packet_kernel_plain, packet_kernel_avx2, packet_kernel_avx512;
+extern const tile_kernel tile_kernel_plain, tile_kernel_avx2, tile_kernel_avx512;
 
 #endif

@@ -1,29 +1,54 @@
-/* trace/rays.c -- the rays through the pixel centres of a camera. */
+/* trace/rays.c -- the rays through the pixel centres of a camera.
+
+   pixel --[lens]--> start and direction in camera axes --[aperture]--> --[pose of the row or column]--> world
+
+   Cameras without an aperture take the first and last step a row at a time. */
 #include "trace/rays.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "base/camera_lens.h"
+#include "base/camera_pose.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/rng.h"
 #include "base/vec.h"
 
 enum { ROW_GRAIN = 8 };
 
+#define PI 3.14159265358979323846
+
+/* The tracer sees no ray that starts farther out. */
+static const double origin_max = 1e17;
+
+typedef struct pose {
+    double rotation[9], center[3];
+} pose;
+
+/* Part of the aperture, in shares of its area and of a turn. */
+typedef struct aperture_cell {
+    double area_low, area_span, turn_low, turn_span;
+} aperture_cell;
+
 typedef struct ray_job {
-    const gbt_camera *camera;
+    const ray_shot *shot;
+    uint64_t sample;
     camera_lens lens;
-    const double *column_u; /* [width] (x + 0.5 - cx) / fx; pinhole only */
+    bool pinhole;
+    const double *column_u; /* [width] (x + 0.5 - cx) / fx; pinhole and orthographic only */
     double *camera_dir;     /* other lenses only */
+    const pose *poses;      /* [1], or one for each row or column */
+    aperture_cell cell;
+    float *origin;          /* NULL: one for all */
     float *dir;
 } ray_job;
 
-static void pinhole_row(const ray_job *job, int row, float *dir)
+static void pinhole_row(const ray_job *job, const double *r, int row, float *dir)
 {
-    const double *r = job->camera->rotation, v = (row + 0.5 - job->lens.cy) / job->lens.fy;
-    const int width = job->camera->width;
+    const double v = (row + 0.5 - job->lens.cy) / job->lens.fy;
+    const int width = job->shot->camera.width;
     /* Transposed rotation times (u, v, 1): only u changes along a row. */
     const double base_x = v * r[3] + r[6], base_y = v * r[4] + r[7], base_z = v * r[5] + r[8], base_length2 = v * v + 1;
     for (int i = 0; i < width; i++) {
@@ -34,19 +59,103 @@ static void pinhole_row(const ray_job *job, int row, float *dir)
     }
 }
 
+static void orthographic_row(const ray_job *job, const pose *at, int row, float *origin, float *dir)
+{
+    const double *r = at->rotation, v = (row + 0.5 - job->lens.cy) / job->lens.fy;
+    const float forward[3] = {(float)r[6], (float)r[7], (float)r[8]};
+    const double base[3] = {at->center[0] + v * r[3], at->center[1] + v * r[4], at->center[2] + v * r[5]};
+    for (int i = 0; i < job->shot->camera.width; i++)
+        for (int k = 0; k < 3; k++) {
+            origin[3 * i + k] = (float)(base[k] + job->column_u[i] * r[k]);
+            dir[3 * i + k] = forward[k];
+        }
+}
+
 static void unproject_row(const ray_job *job, int row, double *camera_dir)
 {
-    for (int i = 0; i < job->camera->width; i++, camera_dir += 3)
+    for (int i = 0; i < job->shot->camera.width; i++, camera_dir += 3)
         if (!camera_lens_unproject(&job->lens, i + 0.5, row + 0.5, camera_dir))
             memset(camera_dir, 0, 3 * sizeof *camera_dir);
 }
 
-static void turn_row(const ray_job *job, const double *camera_dir, float *dir)
+static void round3(const double from[3], float to[3])
 {
-    for (int i = 0; i < job->camera->width; i++, camera_dir += 3, dir += 3) {
+    to[0] = (float)from[0], to[1] = (float)from[1], to[2] = (float)from[2];
+}
+
+static void turn_row(const ray_job *job, const double *rotation, const double *camera_dir, float *dir)
+{
+    for (int i = 0; i < job->shot->camera.width; i++, camera_dir += 3, dir += 3) {
         double d[3];
-        dmat_apply_transposed(job->camera->rotation, camera_dir, d);
-        dir[0] = (float)d[0], dir[1] = (float)d[1], dir[2] = (float)d[2];
+        dmat_apply_transposed(rotation, camera_dir, d);
+        round3(d, dir);
+    }
+}
+
+static void repeat_origin(const double center[3], int width, float *origin)
+{
+    float start[3];
+    round3(center, start);
+    for (int i = 0; i < width; i++, origin += 3)
+        memcpy(origin, start, sizeof start);
+}
+
+/* Two directions at right angles to the unit vector d and to each other. */
+static void span_disc(const double d[3], double across[3], double along[3])
+{
+    const double axis[3] = {fabs(d[0]) < 0.6, fabs(d[0]) >= 0.6, 0};
+    dvec_cross(d, axis, across);
+    dvec_normalize(across);
+    dvec_cross(d, across, along);
+}
+
+/* Move a ray of camera axes to its place on the aperture; the point it has in focus stays. `dir` need not be a unit vector before. */
+static void open_aperture(const ray_job *job, uint64_t pixel, double start[3], double dir[3])
+{
+    uint32_t words[4];
+    rng_philox(job->shot->seed, job->sample, pixel, words);
+    const double radius = job->shot->aperture_radius * sqrt(job->cell.area_low + job->cell.area_span * (words[0] * 0x1p-32));
+    const double angle = 2 * PI * (job->cell.turn_low + job->cell.turn_span * (words[1] * 0x1p-32)), a = radius * cos(angle), b = radius * sin(angle);
+    const double focus = job->shot->focus_distance;
+    double across[3] = {1, 0, 0}, along[3] = {0, 1, 0}, reach = focus;
+    if (camera_lens_looks_forward(&job->lens))
+        reach /= dir[2];
+    else
+        span_disc(dir, across, along);
+    for (int k = 0; k < 3; k++) {
+        const double shift = a * across[k] + b * along[k];
+        dir[k] = dir[k] * reach - shift, start[k] += shift;
+    }
+    dvec_normalize(dir);
+}
+
+/* One ray at a time: what has an aperture, or a pose for each column. */
+static void any_row(const ray_job *job, int row, float *origin, float *dir)
+{
+    const ray_shot *shot = job->shot;
+    const int width = shot->camera.width;
+    const double v = (row + 0.5 - job->lens.cy) / job->lens.fy;
+    const bool opens = shot->aperture_radius > 0;
+    for (int i = 0; i < width; i++, origin += 3, dir += 3) {
+        const size_t pixel = (size_t)row * (size_t)width + (size_t)i;
+        const pose *at = job->poses + (shot->shutter == RAY_SHUTTER_ROWS ? row : shot->shutter == RAY_SHUTTER_COLUMNS ? i : 0);
+        double start[3] = {0, 0, 0}, d[3] = {0, 0, 1};
+        if (job->lens.kind == LENS_ORTHOGRAPHIC)
+            start[0] = job->column_u[i], start[1] = v;
+        else if (job->pinhole)
+            d[0] = job->column_u[i], d[1] = v;
+        else
+            memcpy(d, job->camera_dir + 3 * pixel, sizeof d);
+        if (d[0] != 0 || d[1] != 0 || d[2] != 0) {
+            if (opens)
+                open_aperture(job, pixel, start, d);
+            else
+                dvec_normalize(d);
+        }
+        dmat_apply_transposed(at->rotation, start, start);
+        dmat_apply_transposed(at->rotation, d, d);
+        for (int k = 0; k < 3; k++)
+            origin[k] = (float)(at->center[k] + start[k]), dir[k] = (float)d[k];
     }
 }
 
@@ -55,19 +164,33 @@ static void unproject_rows(size_t block, size_t begin, size_t end, void *context
     const ray_job *job = context;
     (void)block;
     for (size_t row = begin; row < end; row++)
-        unproject_row(job, (int)row, job->camera_dir + 3 * row * (size_t)job->camera->width);
+        unproject_row(job, (int)row, job->camera_dir + 3 * row * (size_t)job->shot->camera.width);
 }
 
 static void make_rows(size_t block, size_t begin, size_t end, void *context)
 {
     const ray_job *job = context;
+    const ray_shot *shot = job->shot;
+    const int width = shot->camera.width;
     (void)block;
     for (size_t row = begin; row < end; row++) {
-        const size_t at = 3 * row * (size_t)job->camera->width;
-        if (job->camera_dir != NULL)
-            turn_row(job, job->camera_dir + at, job->dir + at);
+        const size_t at = 3 * row * (size_t)width;
+        const pose *stand = job->poses + (shot->shutter == RAY_SHUTTER_ROWS ? row : 0);
+        float *origin = job->origin == NULL ? NULL : job->origin + at, *dir = job->dir + at;
+        if (shot->aperture_radius > 0 || shot->shutter == RAY_SHUTTER_COLUMNS) {
+            any_row(job, (int)row, origin, dir);
+            continue;
+        }
+        if (job->lens.kind == LENS_ORTHOGRAPHIC) {
+            orthographic_row(job, stand, (int)row, origin, dir);
+            continue;
+        }
+        if (job->pinhole)
+            pinhole_row(job, stand->rotation, (int)row, dir);
         else
-            pinhole_row(job, (int)row, job->dir + at);
+            turn_row(job, stand->rotation, job->camera_dir + at, dir);
+        if (origin != NULL)
+            repeat_origin(stand->center, width, origin);
     }
 }
 
@@ -87,36 +210,65 @@ static bool pose_is_finite(const gbt_camera *camera)
     return true;
 }
 
-static gbt_status check_camera(const gbt_camera *camera, camera_lens *lens, gbt_error *err)
+/* Farthest from 0 that a ray may start; not finite when anything is not. */
+static double origin_bound(const ray_shot *shot, const camera_lens *lens)
 {
+    double corner[3], far = 0;
+    for (int i = 0; i < 4; i++) {
+        camera_lens_origin(lens, i % 2 * shot->camera.width, i / 2 * shot->camera.height, corner);
+        far = fmax(far, dvec_length(corner));
+    }
+    return far + shot->aperture_radius + fmax(dvec_length(shot->camera.center), dvec_length(shot->end.center));
+}
+
+static gbt_status check_shot(const ray_shot *shot, camera_lens *lens, gbt_error *err)
+{
+    const gbt_camera *camera = &shot->camera;
     if (camera->width < 1 || camera->height < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: size %d x %d (wanted both >= 1)", camera->width, camera->height);
     if (!camera_lens_prepare(camera, lens))
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "camera: model %d has unusable parameters (wanted a known model, finite values, focal length > 0)",
                          (int)camera->model);
-    if (!pose_is_finite(camera))
+    if (!pose_is_finite(camera) || !pose_is_finite(&shot->end))
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: the pose is not finite");
+    if (!(shot->aperture_radius >= 0 && isfinite(shot->aperture_radius)))
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: aperture radius %g (wanted >= 0)", shot->aperture_radius);
+    if (shot->aperture_radius > 0 && !(shot->focus_distance > 0 && isfinite(shot->focus_distance)))
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: focus distance %g (wanted > 0, as there is an aperture)", shot->focus_distance);
+    if (ray_shot_sample_count(shot) < 1)
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: %d samples (wanted >= 1)", shot->samples);
+    if (!(origin_bound(shot, lens) < origin_max))
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: rays start farther out than %g", origin_max);
     return GBT_OK;
 }
 
-/* Arrays for width x height rays of one origin. */
-static gbt_status reserve(ray_image *rays, int width, int height, gbt_error *err)
+gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err)
 {
-    if (rays->common_origin && rays->width == width && rays->height == height)
+    camera_lens lens;
+    return shot->given != NULL ? GBT_OK : check_shot(shot, &lens, err);
+}
+
+gbt_status ray_image_reserve(ray_image *out, int width, int height, bool common_origin, gbt_error *err)
+{
+    if (out->dir != NULL && out->common_origin == common_origin && out->width == width && out->height == height)
         return GBT_OK;
-    ray_image_free(rays);
-    rays->origin = mem_alloc(3, sizeof *rays->origin, "rays", err);
-    rays->dir = rays->origin == NULL ? NULL : mem_alloc((size_t)width * (size_t)height, 3 * sizeof *rays->dir, "rays", err);
-    if (rays->dir == NULL)
+    ray_image_free(out);
+    const size_t count = (size_t)width * (size_t)height;
+    out->origin = mem_alloc(common_origin ? 1 : count, 3 * sizeof *out->origin, "rays", err);
+    out->dir = out->origin == NULL ? NULL : mem_alloc(count, 3 * sizeof *out->dir, "rays", err);
+    if (out->dir == NULL) {
+        ray_image_free(out);
         return GBT_ERR_NO_MEMORY;
-    rays->width = width, rays->height = height, rays->common_origin = true;
+    }
+    out->width = width, out->height = height, out->common_origin = common_origin;
     return GBT_OK;
 }
 
 /* Directions in camera axes, unless they are there from the pose before. */
-static gbt_status unproject_lens(const gbt_camera *camera, ray_job *job, ray_image *rays, gbt_error *err)
+static gbt_status unproject_lens(ray_job *job, ray_image *rays, gbt_error *err)
 {
+    const gbt_camera *camera = &job->shot->camera;
     if (rays->camera_dir == NULL || !same_lens(camera, &rays->camera)) {
         mem_free(rays->camera_dir);
         rays->camera_dir = mem_alloc(ray_image_count(rays), 3 * sizeof *rays->camera_dir, "rays", err);
@@ -130,32 +282,105 @@ static gbt_status unproject_lens(const gbt_camera *camera, ray_job *job, ray_ima
     return GBT_OK;
 }
 
+static double *make_columns(const ray_job *job, gbt_error *err)
+{
+    const int width = job->shot->camera.width;
+    double *u = mem_alloc((size_t)width, sizeof *u, "rays", err);
+    for (int i = 0; i < width && u != NULL; i++)
+        u[i] = (i + 0.5 - job->lens.cx) / job->lens.fx;
+    return u;
+}
+
+static gbt_status make_poses(const ray_shot *shot, pose **out, gbt_error *err)
+{
+    const gbt_camera *camera = &shot->camera;
+    const bool still = shot->shutter == RAY_SHUTTER_GLOBAL;
+    const int count = still ? 1 : shot->shutter == RAY_SHUTTER_ROWS ? camera->height : camera->width;
+    camera_motion motion;
+    if (!still && !camera_motion_prepare(camera, &shot->end, &motion))
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: a rolling shutter wants two poses whose rotations are rotations");
+    pose *poses = mem_alloc((size_t)count, sizeof *poses, "poses", err);
+    if (poses == NULL)
+        return GBT_ERR_NO_MEMORY;
+    memcpy(poses[0].rotation, camera->rotation, sizeof poses[0].rotation);
+    memcpy(poses[0].center, camera->center, sizeof poses[0].center);
+    for (int i = 1; i < count; i++)
+        camera_motion_at(&motion, (double)i / (count - 1), poses[i].rotation, poses[i].center);
+    *out = poses;
+    return GBT_OK;
+}
+
+/* The disc as m rings around each other, cut into `count` cells of the same area, about as long as wide (m^2 pi = count): ring j ends
+   with cell count ((j + 1) / m)^2. All pixels take a sample in the same cell, so that neighbouring rays stay close. */
+static aperture_cell find_cell(int sample, int count)
+{
+    const int rings = (int)fmax(1, floor(sqrt(count / PI) + 0.5));
+    int first = 0, end = 0;
+    for (int j = 0; end <= sample; j++) {
+        first = end;
+        end = (int)floor(count * ((j + 1.0) / rings) * ((j + 1.0) / rings) + 0.5);
+    }
+    const double cells = end - first;
+    return (aperture_cell){(double)first / count, cells / count, (sample - first) / cells, 1 / cells};
+}
+
+static gbt_status copy_given(const ray_image *given, ray_image *out, gbt_error *err)
+{
+    GBT_TRY(ray_image_reserve(out, given->width, given->height, given->common_origin, err));
+    const size_t count = ray_image_count(given);
+    memcpy(out->origin, given->origin, (given->common_origin ? 1 : count) * 3 * sizeof *out->origin);
+    memcpy(out->dir, given->dir, count * 3 * sizeof *out->dir);
+    return GBT_OK;
+}
+
+static gbt_status make_rays(const ray_shot *shot, int sample, ray_image *out, gbt_error *err)
+{
+    ray_job job = {.shot = shot, .sample = (uint64_t)sample};
+    GBT_TRY(check_shot(shot, &job.lens, err));
+    if (sample < 0 || sample >= ray_shot_sample_count(shot))
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: sample %d of %d", sample, ray_shot_sample_count(shot));
+    job.cell = find_cell(sample, ray_shot_sample_count(shot));
+    const bool flat = job.lens.kind == LENS_ORTHOGRAPHIC;
+    const bool common_origin = !flat && shot->shutter == RAY_SHUTTER_GLOBAL && !(shot->aperture_radius > 0);
+    job.pinhole = job.lens.kind == LENS_PERSPECTIVE && !job.lens.radial && !job.lens.extra;
+    GBT_TRY(ray_image_reserve(out, shot->camera.width, shot->camera.height, common_origin, err));
+    if (!flat && !job.pinhole)
+        GBT_TRY(unproject_lens(&job, out, err));
+    pose *poses = NULL;
+    GBT_TRY(make_poses(shot, &poses, err));
+    double *column_u = make_columns(&job, err);
+    if (column_u != NULL) {
+        if (common_origin)
+            round3(shot->camera.center, out->origin);
+        job.poses = poses, job.column_u = column_u, job.origin = common_origin ? NULL : out->origin, job.dir = out->dir;
+        parallel_blocks((size_t)shot->camera.height, ROW_GRAIN, make_rows, &job);
+    }
+    mem_free(poses);
+    mem_free(column_u);
+    return column_u == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+}
+
+gbt_status ray_image_from_shot(const ray_shot *shot, int sample, ray_image *out, gbt_error *err)
+{
+    const gbt_status status = shot->given != NULL ? copy_given(shot->given, out, err) : make_rays(shot, sample, out, err);
+    if (status != GBT_OK)
+        ray_image_free(out);
+    return status;
+}
+
 gbt_status ray_image_from_camera(const gbt_camera *camera, ray_image *out, gbt_error *err)
 {
-    ray_job job = {.camera = camera};
-    double *column_u = NULL;
-    gbt_status status = check_camera(camera, &job.lens, err);
-    if (status == GBT_OK)
-        status = reserve(out, camera->width, camera->height, err);
-    const bool pinhole = job.lens.kind == LENS_PERSPECTIVE && !job.lens.radial && !job.lens.extra;
-    if (status == GBT_OK && !pinhole)
-        status = unproject_lens(camera, &job, out, err);
-    if (status == GBT_OK && pinhole) {
-        column_u = mem_alloc((size_t)camera->width, sizeof *column_u, "rays", err);
-        status = column_u == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
-        for (int i = 0; i < camera->width && column_u != NULL; i++)
-            column_u[i] = (i + 0.5 - job.lens.cx) / job.lens.fx;
-    }
-    if (status == GBT_OK) {
-        for (int i = 0; i < 3; i++)
-            out->origin[i] = (float)camera->center[i];
-        job.column_u = column_u, job.dir = out->dir;
-        parallel_blocks((size_t)camera->height, ROW_GRAIN, make_rows, &job);
-    } else {
-        ray_image_free(out);
-    }
-    mem_free(column_u);
-    return status;
+    const ray_shot shot = ray_shot_of(camera);
+    return ray_image_from_shot(&shot, 0, out, err);
+}
+
+float ray_image_reach(const ray_image *rays)
+{
+    const size_t count = 3 * (rays->common_origin ? 1 : ray_image_count(rays));
+    float reach = 0;
+    for (size_t i = 0; i < count; i++)
+        reach = fmaxf(reach, fabsf(rays->origin[i]));
+    return reach;
 }
 
 void ray_image_free(ray_image *rays)

@@ -1,9 +1,10 @@
-/* trace/rays.h -- the rays of one view. */
+/* trace/rays.h -- the rays of one view: of a camera standing still, moving while it is read out, with an open aperture; or given. */
 #ifndef GBT_TRACE_RAYS_H
 #define GBT_TRACE_RAYS_H
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "gbtrace/camera.h"
 #include "gbtrace/status.h"
@@ -14,22 +15,66 @@ typedef struct ray_image {
     float *origin;      /* [3] when shared by all rays (common_origin), else [height * width][3]; scene-local units; owned */
     float *dir;         /* [height * width][3], unit (to float rounding) or zero; owned */
     bool common_origin;
-    /* Kept by ray_image_from_camera() for the next pose of the same lens; NULL for a pinhole. */
+    /* Kept by ray_image_from_shot() for the next pose of the same lens; NULL for a pinhole. */
     double *camera_dir; /* [height * width][3] in camera axes; owned */
     gbt_camera camera;  /* whose lens camera_dir is */
 } ray_image;
 
+typedef enum ray_shutter {
+    RAY_SHUTTER_GLOBAL, /* all pixels at once */
+    RAY_SHUTTER_ROWS,   /* rows one after the other, from the top */
+    RAY_SHUTTER_COLUMNS /* columns one after the other, from the left */
+} ray_shutter;
+
+/** How one picture is taken. Start from ray_shot_of(). Lengths in scene-local units. */
+typedef struct ray_shot {
+    gbt_camera camera;      /* lens, size, and the pose (of the first row or column, when the shutter rolls) */
+    ray_shutter shutter;    /* default RAY_SHUTTER_GLOBAL */
+    gbt_camera end;         /* pose of the last row or column; the rest is not used */
+    double aperture_radius; /* >= 0; 0, the default, is a pinhole */
+    double focus_distance;  /* > 0 when there is an aperture: depth of the plane in focus, or its radius where it is a sphere */
+    int samples;            /* per pixel, over the aperture; >= 1. Default 64; without an aperture one is enough, and is all there is */
+    uint64_t seed;          /* of the points on the aperture. Default 0 */
+    const ray_image *given; /* borrowed: these rays, in place of all above. Default NULL */
+} ray_shot;
+
+static inline ray_shot ray_shot_of(const gbt_camera *camera)
+{
+    return (ray_shot){.camera = *camera, .end = *camera, .samples = 64};
+}
+
+/** Number of different ray images of a shot: its picture is their mean. */
+static inline int ray_shot_sample_count(const ray_shot *shot)
+{
+    return shot->given == NULL && shot->aperture_radius > 0 ? shot->samples : 1;
+}
+
+/** GBT_OK, or GBT_ERR_ARGUMENT with what is wrong: see ray_image_from_shot(). */
+gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err);
+
 /**
- * The rays through the pixel centres of a camera, in world axes.
+ * The rays of sample `sample` of a shot through the pixel centres, in world axes.
  *
- * Directions are computed in double and rounded once. A pixel where the lens has no ray gets a zero direction.
+ * Everything is computed in double and rounded once. A pixel where the lens has no ray gets a zero direction. Formulas: docs/cameras.md.
+ * - Line i of n (row or column) of a rolling shutter is taken at the time i / (n - 1) of the way from `camera` to `end`.
+ * - The aperture is cut into N cells of the same area; sample s of N leaves it at a point of cell s, drawn evenly for (seed, s, pixel).
+ *   It goes through the point that the ray through the middle of the aperture has in focus.
  *
- * @param out [in,out] start from {0}, free with ray_image_free(); its arrays are used again when the size is the same; empty on failure
- * @return GBT_OK, GBT_ERR_ARGUMENT (a size < 1, a camera that sees nothing, a pose that is not finite), GBT_ERR_NO_MEMORY
+ * @param sample [in] 0 .. ray_shot_sample_count() - 1
+ * @param out    [in,out] start from {0}, free with ray_image_free(); its arrays are used again when the size is the same; empty on failure
+ * @return GBT_OK, GBT_ERR_ARGUMENT (a size < 1, a camera that sees nothing, a pose that is not finite or not a rotation, rays that start
+ *         beyond 1e17, an aperture without a focus), GBT_ERR_NO_MEMORY
  * Threads: runs in parallel over rows; same bits for every thread count.
- * Cost: about 1 ms of one core per 10^5 rays; a distorted lens 20 to 60 times that when it is not the lens of the call before.
+ * Cost: 0.4 to 1 ms of one core per 10^5 rays of a pinhole or orthographic camera, also when it moves by rows; 2 ms by columns; 7 ms with
+ * an aperture; a distorted lens 20 to 60 ms more when it is not the lens of the call before.
  */
+gbt_status ray_image_from_shot(const ray_shot *shot, int sample, ray_image *out, gbt_error *err);
+
+/** The rays of a camera that stands still: ray_image_from_shot() of ray_shot_of(camera). */
 gbt_status ray_image_from_camera(const gbt_camera *camera, ray_image *out, gbt_error *err);
+
+/** Arrays for width x height rays, not set; those of `out` when they fit. Empty on failure. */
+gbt_status ray_image_reserve(ray_image *out, int width, int height, bool common_origin, gbt_error *err);
 
 void ray_image_free(ray_image *rays); /* zeroes the struct */
 
@@ -43,5 +88,8 @@ static inline const float *ray_image_origin(const ray_image *rays, size_t i)
 {
     return rays->common_origin ? rays->origin : rays->origin + 3 * i;
 }
+
+/** Largest |coordinate| of an origin: what trace_build() wants to know. */
+float ray_image_reach(const ray_image *rays);
 
 #endif

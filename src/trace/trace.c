@@ -13,23 +13,23 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 
-enum { BLOCK_PIXELS = 16, PACKET_PIXELS = 4, RECORD_BLOCK = 2048 };
+enum { BLOCK_PIXELS = 16, TILE_PIXELS = TILE_ACROSS * PACKET_PIXELS, RECORD_BLOCK = 2048 };
 
 typedef struct trace_block {
-    tape_bytes tape;
+    hit_tape tape;
     gradient_list gradients;
     kernel_counters counters;
     float d_background[3];
 } trace_block;
 
-static const packet_kernel *kernel_for(cpu_isa isa)
+static const tile_kernel *kernel_for(cpu_isa isa)
 {
     switch (isa) {
-    case CPU_AVX512: return &packet_kernel_avx512;
-    case CPU_AVX2: return &packet_kernel_avx2;
+    case CPU_AVX512: return &tile_kernel_avx512;
+    case CPU_AVX2: return &tile_kernel_avx2;
     case CPU_PLAIN: break;
     }
-    return &packet_kernel_plain;
+    return &tile_kernel_plain;
 }
 
 /* ---- build ------------------------------------------------------------------------------------------------------------------------- */
@@ -136,7 +136,7 @@ static bool keep_exactly(void **array, size_t *capacity, size_t used, size_t siz
 typedef struct pass {
     trace_scene *scene;
     kernel_scene view;
-    const packet_kernel *kernel;
+    const tile_kernel *kernel;
     const ray_image *rays;
     int blocks_across;
     bool keep_tape;
@@ -146,40 +146,48 @@ typedef struct pass {
     atomic_bool failed;
 } pass;
 
-/* Rays of the packet whose first pixel is (x0, y0); lanes outside the image or without a ray are not active. False: no active lane. */
-static bool load_packet(const ray_image *rays, int x0, int y0, packet_rays *out, size_t pixel[PACKET_LANES])
+/* Pixel of a lane; false when it lies outside the image. */
+static bool lane_pixel(const ray_image *rays, int x0, int y0, int packet, int lane, size_t *out)
 {
-    out->active = 0;
-    int first = -1;
-    for (int lane = 0; lane < PACKET_LANES; lane++) {
-        const int x = x0 + lane % PACKET_PIXELS, y = y0 + lane / PACKET_PIXELS;
-        if (x >= rays->width || y >= rays->height)
-            continue;
-        const size_t at = (size_t)y * (size_t)rays->width + (size_t)x;
-        const float *d = rays->dir + 3 * at, *o = rays->common_origin ? rays->origin : rays->origin + 3 * at;
-        pixel[lane] = at;
-        const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        /* Written so that NaN fails: a ray that is not a unit vector from a sensible place sees the background. */
-        if (!(square > 0.99f && square < 1.01f) || !(fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f))
-            continue;
-        for (int axis = 0; axis < 3; axis++)
-            out->dir[axis][lane] = d[axis], out->origin[axis][lane] = o[axis];
-        out->active |= 1u << lane;
-        if (first < 0)
-            first = lane;
-    }
-    if (first < 0)
-        return false;
-    for (int lane = 0; lane < PACKET_LANES; lane++)
-        if ((out->active >> lane & 1) == 0)
-            for (int axis = 0; axis < 3; axis++)
-                out->dir[axis][lane] = out->dir[axis][first], out->origin[axis][lane] = out->origin[axis][first];
-    return true;
+    const int x = x0 + packet % TILE_ACROSS * PACKET_PIXELS + lane % PACKET_PIXELS;
+    const int y = y0 + packet / TILE_ACROSS * PACKET_PIXELS + lane / PACKET_PIXELS;
+    *out = (size_t)y * (size_t)rays->width + (size_t)x;
+    return x < rays->width && y < rays->height;
 }
 
-static void drop_tape(tape_bytes *tape)
+/* Rays of the tile whose first pixel is (x0, y0); lanes outside the image or without a ray are not active. */
+static void load_tile(const ray_image *rays, int x0, int y0, tile_rays *out)
 {
-    mem_free(tape->data);
+    out->common_origin = rays->common_origin;
+    for (int packet = 0; packet < TILE_PACKETS; packet++) {
+        packet_rays *p = &out->packet[packet];
+        p->active = 0;
+        for (int lane = 0; lane < PACKET_LANES; lane++) {
+            size_t at;
+            if (!lane_pixel(rays, x0, y0, packet, lane, &at))
+                continue;
+            const float *d = rays->dir + 3 * at, *o = ray_image_origin(rays, at);
+            const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            /* Written so that NaN fails: a ray that is not a unit vector from a sensible place sees the background. */
+            if (!(square > 0.99f && square < 1.01f) || !(fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f))
+                continue;
+            for (int axis = 0; axis < 3; axis++)
+                p->dir[axis][lane] = d[axis], p->origin[axis][lane] = o[axis];
+            p->active |= 1u << lane;
+        }
+        if (p->active == 0 || p->active == (1u << PACKET_LANES) - 1)
+            continue;
+        const int first = __builtin_ctz(p->active);
+        for (int lane = 0; lane < PACKET_LANES; lane++)
+            if ((p->active >> lane & 1) == 0)
+                for (int axis = 0; axis < 3; axis++)
+                    p->dir[axis][lane] = p->dir[axis][first], p->origin[axis][lane] = p->origin[axis][first];
+    }
+}
+
+static void drop_tape(hit_tape *tape)
+{
+    mem_free(tape->entries);
     memset(tape, 0, sizeof *tape);
 }
 
@@ -194,50 +202,49 @@ static void free_scratch(kernel_scratch *scratch)
 {
     mem_free(scratch->rows);
     mem_free(scratch->hits);
+    mem_free(scratch->heap);
 }
 
-static void forward_packet(pass *p, trace_block *block, int x0, int y0, kernel_scratch *scratch)
+static void forward_tile(pass *p, trace_block *block, int x0, int y0, kernel_scratch *scratch)
 {
-    packet_rays rays;
-    packet_color color;
-    size_t pixel[PACKET_LANES];
-    const bool any = load_packet(p->rays, x0, y0, &rays, pixel);
-    if (any && !p->kernel->forward(&p->view, &rays, &color, p->keep_tape ? &block->tape : NULL, scratch, &block->counters)) {
+    tile_rays rays;
+    packet_color color[TILE_PACKETS];
+    load_tile(p->rays, x0, y0, &rays);
+    if (!p->kernel->forward(&p->view, &rays, color, p->keep_tape ? &block->tape : NULL, scratch, &block->counters)) {
         atomic_store(&p->failed, true);
         return;
     }
-    for (int lane = 0; lane < PACKET_LANES; lane++) {
-        if (x0 + lane % PACKET_PIXELS >= p->rays->width || y0 + lane / PACKET_PIXELS >= p->rays->height)
-            continue;
-        const bool traced = any && (rays.active >> lane & 1) != 0;
-        for (int c = 0; c < 3; c++)
-            p->rgb->pixels[3 * pixel[lane] + (size_t)c] = traced ? color.rgb[c][lane] : p->view.settings.background[c];
-        if (p->transmittance != NULL)
-            p->transmittance[pixel[lane]] = traced ? color.transmittance[lane] : 1.0f;
-    }
+    for (int packet = 0; packet < TILE_PACKETS; packet++)
+        for (int lane = 0; lane < PACKET_LANES; lane++) {
+            size_t at;
+            if (!lane_pixel(p->rays, x0, y0, packet, lane, &at))
+                continue;
+            const bool traced = (rays.packet[packet].active >> lane & 1) != 0;
+            for (int c = 0; c < 3; c++)
+                p->rgb->pixels[3 * at + (size_t)c] = traced ? color[packet].rgb[c][lane] : p->view.settings.background[c];
+            if (p->transmittance != NULL)
+                p->transmittance[at] = traced ? color[packet].transmittance[lane] : 1.0f;
+        }
 }
 
-static void backward_packet(pass *p, trace_block *block, int x0, int y0, size_t *cursor, kernel_scratch *scratch)
+static void backward_tile(pass *p, trace_block *block, int x0, int y0, size_t *cursor, kernel_scratch *scratch)
 {
-    packet_rays rays;
-    size_t pixel[PACKET_LANES];
-    _Alignas(64) float d_rgb[3][PACKET_LANES] = {0};
-    const bool any = load_packet(p->rays, x0, y0, &rays, pixel);
-    for (int lane = 0; lane < PACKET_LANES; lane++) {
-        if (x0 + lane % PACKET_PIXELS >= p->rays->width || y0 + lane / PACKET_PIXELS >= p->rays->height)
-            continue;
-        const bool traced = any && (rays.active >> lane & 1) != 0;
-        for (int c = 0; c < 3; c++) {
-            const float d = p->d_rgb->pixels[3 * pixel[lane] + (size_t)c];
-            if (traced)
-                d_rgb[c][lane] = d;
-            else
-                block->d_background[c] += d; /* the pixel is the background */
+    tile_rays rays;
+    _Alignas(64) float d_rgb[TILE_PACKETS][3][PACKET_LANES] = {0};
+    load_tile(p->rays, x0, y0, &rays);
+    for (int packet = 0; packet < TILE_PACKETS; packet++)
+        for (int lane = 0; lane < PACKET_LANES; lane++) {
+            size_t at;
+            if (!lane_pixel(p->rays, x0, y0, packet, lane, &at))
+                continue;
+            const float *d = p->d_rgb->pixels + 3 * at;
+            for (int c = 0; c < 3; c++)
+                if (rays.packet[packet].active >> lane & 1)
+                    d_rgb[packet][c][lane] = d[c];
+                else
+                    block->d_background[c] += d[c]; /* the pixel is the background */
         }
-    }
-    if (!any)
-        return;
-    if (!p->kernel->backward(&p->view, &rays, d_rgb, block->tape.data, cursor, &block->gradients, block->d_background, scratch))
+    if (!p->kernel->backward(&p->view, &rays, d_rgb, block->tape.entries, cursor, &block->gradients, block->d_background, scratch))
         atomic_store(&p->failed, true);
 }
 
@@ -255,19 +262,19 @@ static void run_block(size_t index, size_t begin, size_t end, void *context)
         drop_tape(&block->tape);
         memset(&block->counters, 0, sizeof block->counters);
     }
-    for (int y = y_first; y < y_first + BLOCK_PIXELS && y < p->rays->height; y += PACKET_PIXELS)
-        for (int x = x_first; x < x_first + BLOCK_PIXELS && x < p->rays->width; x += PACKET_PIXELS) {
+    for (int y = y_first; y < y_first + BLOCK_PIXELS && y < p->rays->height; y += TILE_PIXELS)
+        for (int x = x_first; x < x_first + BLOCK_PIXELS && x < p->rays->width; x += TILE_PIXELS) {
             if (atomic_load_explicit(&p->failed, memory_order_relaxed))
                 break;
             if (p->d_rgb == NULL)
-                forward_packet(p, block, x, y, &scratch);
+                forward_tile(p, block, x, y, &scratch);
             else
-                backward_packet(p, block, x, y, &cursor, &scratch);
+                backward_tile(p, block, x, y, &cursor, &scratch);
         }
     free_scratch(&scratch);
     mem_free(block->gradients.slots);
     block->gradients.slots = NULL, block->gradients.slot_count = 0;
-    if (!keep_exactly((void **)&block->tape.data, &block->tape.capacity, block->tape.size, 1) ||
+    if (!keep_exactly((void **)&block->tape.entries, &block->tape.capacity, block->tape.count, sizeof *block->tape.entries) ||
         !keep_exactly((void **)&block->gradients.records, &block->gradients.capacity, block->gradients.count, sizeof *block->gradients.records))
         atomic_store(&p->failed, true);
 }
@@ -305,8 +312,9 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
         scene->tape_width = rays->width, scene->tape_height = rays->height;
     for (size_t i = 0; counters != NULL && i < scene->block_count; i++) {
         const kernel_counters *c = &scene->blocks[i].counters;
-        counters->rays += c->rays, counters->nodes += c->nodes, counters->tests += c->tests, counters->hits += c->hits;
-        counters->blended += c->blended, counters->sorted_rows += c->sorted_rows, counters->spilled_packets += c->spilled_packets;
+        counters->rays += c->rays, counters->nodes += c->nodes, counters->candidates += c->candidates, counters->tests += c->tests;
+        counters->hits += c->hits, counters->blended += c->blended, counters->rows += c->rows, counters->pairs += c->pairs;
+        counters->spilled_packets += c->spilled_packets;
     }
     return GBT_OK;
 }

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/camera_lens.h"
+#include "base/camera_pose.h"
 #include "base/clock.h"
 #include "base/fail.h"
 #include "base/memory.h"
@@ -21,58 +23,215 @@ static double lap(double *since)
 
 /* ---- visible anchors ------------------------------------------------------------------------------------------------------------------ */
 
-/* The camera's rays lie inside a cone around `axis` and, when they all look forward, inside four planes through the centre. */
+enum { PLANE_COUNT = 5, ROW_GRAIN = 16 };
+
+/* All rays start in a ball around `center` and point into a cone around `axis`. When they all look forward, all that they reach is on
+   the inner side of planes too: where n.d <= 0 for every direction, n.x is nowhere larger than at the rays' own origins. */
 typedef struct view_bounds {
-    float center[3];
+    float center[3], origin_radius;
     float axis[3], cos_angle, sin_angle;
-    bool has_planes;
-    float plane[4][3]; /* unit normals pointing out: visible ball -> n.(x - c) <= radius */
+    int plane_count;
+    float plane[PLANE_COUNT][3]; /* unit normals pointing out: visible ball -> n.(x - center) <= offset + radius */
+    float offset[PLANE_COUNT];
 } view_bounds;
 
-static void find_bounds(const ray_image *rays, const gbt_camera *camera, view_bounds *out)
+/* What is asked of the rays: `axes` turns world to the axes in which slopes are taken. */
+typedef struct bounds_job {
+    const ray_image *rays;
+    double axes[9], center[3], axis[3];
+    double normal[PLANE_COUNT][3];
+    struct block_bounds *blocks;
+} bounds_job;
+
+typedef struct block_bounds {
+    double cos_min, depth_min, low[2], high[2], origin_square, offset[PLANE_COUNT];
+} block_bounds;
+
+static bool ray_at(const ray_image *rays, size_t i, const double center[3], double start[3], double dir[3])
 {
-    double axis[3] = {0, 0, 0};
-    const size_t count = (size_t)rays->width * (size_t)rays->height;
+    const float *o = ray_image_origin(rays, i), *d = rays->dir + 3 * i;
+    for (int k = 0; k < 3; k++)
+        start[k] = (double)o[k] - center[k], dir[k] = (double)d[k];
+    return d[0] != 0 || d[1] != 0 || d[2] != 0;
+}
+
+/* The smaller or larger of two, and the second when the first is not a number; fmin() would be a call for every ray. */
+static inline double least(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+static inline double most(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+static void bound_directions(size_t block, size_t begin, size_t end, void *context)
+{
+    const bounds_job *job = context;
+    const size_t width = (size_t)job->rays->width;
+    block_bounds out = job->blocks[block];
+    for (size_t i = begin * width; i < end * width; i++) {
+        double start[3], dir[3], turned[3];
+        if (!ray_at(job->rays, i, job->center, start, dir))
+            continue;
+        dmat_apply(job->axes, dir, turned);
+        out.cos_min = least(dvec_dot(dir, job->axis), out.cos_min);
+        out.depth_min = least(turned[2], out.depth_min);
+        out.origin_square = most(dvec_dot(start, start), out.origin_square);
+        if (turned[2] > 0.05) {
+            const double x = turned[0] / turned[2], y = turned[1] / turned[2];
+            out.low[0] = least(x, out.low[0]), out.high[0] = most(x, out.high[0]);
+            out.low[1] = least(y, out.low[1]), out.high[1] = most(y, out.high[1]);
+        }
+    }
+    job->blocks[block] = out;
+}
+
+static void bound_offsets(size_t block, size_t begin, size_t end, void *context)
+{
+    const bounds_job *job = context;
+    const size_t width = (size_t)job->rays->width;
+    for (size_t i = begin * width; i < end * width; i++) {
+        double start[3], dir[3];
+        if (ray_at(job->rays, i, job->center, start, dir))
+            for (int p = 0; p < PLANE_COUNT; p++)
+                job->blocks[block].offset[p] = most(dvec_dot(job->normal[p], start), job->blocks[block].offset[p]);
+    }
+}
+
+static block_bounds no_bounds(void)
+{
+    block_bounds b = {.cos_min = 1, .depth_min = 1, .low = {1e9, 1e9}, .high = {-1e9, -1e9}};
+    for (int p = 0; p < PLANE_COUNT; p++)
+        b.offset[p] = -HUGE_VAL;
+    return b;
+}
+
+static block_bounds join(const block_bounds *blocks, size_t count)
+{
+    block_bounds all = no_bounds();
+    for (size_t i = 0; i < count; i++) {
+        const block_bounds *b = &blocks[i];
+        all.cos_min = fmin(all.cos_min, b->cos_min), all.depth_min = fmin(all.depth_min, b->depth_min);
+        all.origin_square = fmax(all.origin_square, b->origin_square);
+        for (int k = 0; k < 2; k++)
+            all.low[k] = fmin(all.low[k], b->low[k]), all.high[k] = fmax(all.high[k], b->high[k]);
+        for (int p = 0; p < PLANE_COUNT; p++)
+            all.offset[p] = fmax(all.offset[p], b->offset[p]);
+    }
+    return all;
+}
+
+/* The mean direction of every 7th ray; 0 without rays. */
+static void find_axis(const ray_image *rays, double axis[3])
+{
+    axis[0] = axis[1] = axis[2] = 0;
+    const size_t count = ray_image_count(rays);
     for (size_t i = 0; i < count; i += 7)
         for (int k = 0; k < 3; k++)
             axis[k] += (double)rays->dir[3 * i + (size_t)k];
     dvec_normalize(axis);
-    double cos_min = 1, low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9}, depth_min = 1;
-    for (size_t i = 0; i < count; i++) {
-        /* For lenses the widest rays are on the border of the image or of the field of view: look at the border and at every 5th pixel. */
-        const size_t x = i % (size_t)rays->width, y = i / (size_t)rays->width;
-        const bool border = x == 0 || y == 0 || x + 1 == (size_t)rays->width || y + 1 == (size_t)rays->height;
-        if (!border && i % 5 != 0)
+}
+
+/* Axes in which to take slopes: the camera's, or for given rays some with z along their mean direction. */
+static void find_axes(const ray_shot *shot, const double axis[3], double axes[9])
+{
+    gbt_camera look = shot->camera;
+    const double here[3] = {0, 0, 0}, up[3] = {fabs(axis[0]) < 0.6, fabs(axis[0]) >= 0.6, 0};
+    if (shot->given != NULL)
+        camera_look_at(here, axis, up, &look); /* fails for a zero axis: then no ray looks forward in any axes */
+    memcpy(axes, look.rotation, sizeof look.rotation);
+}
+
+/* The mean of the ray origins, rounded to float. */
+static void find_center(const ray_image *rays, float center[3])
+{
+    const double none[3] = {0, 0, 0};
+    double sum[3] = {0, 0, 0}, start[3], dir[3];
+    size_t used = 0;
+    if (rays->common_origin) {
+        memcpy(center, rays->origin, 3 * sizeof *center);
+        return;
+    }
+    for (size_t i = 0; i < ray_image_count(rays); i++) {
+        if (!ray_at(rays, i, none, start, dir))
             continue;
-        const float *d = rays->dir + 3 * i;
-        if (d[0] == 0 && d[1] == 0 && d[2] == 0)
-            continue;
-        const double dir[3] = {(double)d[0], (double)d[1], (double)d[2]};
-        double cam[3];
-        dmat_apply(camera->rotation, dir, cam);
-        cos_min = fmin(cos_min, dvec_dot(dir, axis));
-        depth_min = fmin(depth_min, cam[2]);
-        if (cam[2] > 0.05)
-            for (int k = 0; k < 2; k++)
-                low[k] = fmin(low[k], cam[k] / cam[2]), high[k] = fmax(high[k], cam[k] / cam[2]);
+        used++;
+        for (int k = 0; k < 3; k++)
+            sum[k] += start[k];
     }
     for (int k = 0; k < 3; k++)
-        out->center[k] = (float)camera->center[k], out->axis[k] = (float)axis[k];
-    cos_min = fmax(cos_min - 2e-3, -1); /* pixels between the ones looked at */
-    out->cos_angle = (float)cos_min;
-    out->sin_angle = (float)sqrt(fmax(0, 1 - cos_min * cos_min));
-    out->has_planes = depth_min > 0.05;
-    for (int k = 0; k < 2 && out->has_planes; k++)
+        center[k] = used > 0 ? (float)(sum[k] / (double)used) : 0;
+}
+
+/* Unit normals in world axes: right, left, bottom, top of the slopes, and what is behind. */
+static void find_normals(bounds_job *job, const block_bounds *all, double spread)
+{
+    for (int k = 0; k < 2; k++)
         for (int sign = 0; sign < 2; sign++) {
-            const double slope = sign == 0 ? high[k] * (1 + 1e-3) + 1e-3 : low[k] * (1 + 1e-3) - 1e-3;
-            double n[3] = {0, 0, 0}, world[3];
+            const double slope = sign == 0 ? (all->high[k] + spread) * (1 + 1e-3) + 1e-3 : (all->low[k] - spread) * (1 + 1e-3) - 1e-3;
+            double n[3] = {0, 0, 0};
             n[k] = sign == 0 ? 1 : -1;
             n[2] = sign == 0 ? -slope : slope;
             dvec_normalize(n);
-            dmat_apply_transposed(camera->rotation, n, world);
-            for (int j = 0; j < 3; j++)
-                out->plane[2 * k + sign][j] = (float)world[j];
+            dmat_apply_transposed(job->axes, n, job->normal[2 * k + sign]);
         }
+    for (int k = 0; k < 3; k++)
+        job->normal[4][k] = -job->axis[k];
+}
+
+/* Is the image of a slope under another point of the aperture known? With a plane in focus every ray of a pixel is divided by the same
+   depth, in the axes of the pose that took it. */
+static bool slopes_are_known(const ray_shot *shot, double aperture)
+{
+    camera_lens lens;
+    return aperture <= 0 || (shot->shutter == RAY_SHUTTER_GLOBAL && camera_lens_prepare(&shot->camera, &lens) && camera_lens_looks_forward(&lens));
+}
+
+/* `rays` are those through the middle of the aperture. Another point of it shifts an origin by at most its radius R, and with the focus
+   at F a slope by at most R / F and a direction by at most asin(R / F). */
+static gbt_status find_bounds(const ray_shot *shot, const ray_image *rays, view_bounds *out, gbt_error *err)
+{
+    bounds_job job = {.rays = rays};
+    const double aperture = shot->given == NULL ? shot->aperture_radius : 0, spread = aperture > 0 ? aperture / shot->focus_distance : 0;
+    const size_t rows = (size_t)rays->height, count = parallel_block_count(rows, ROW_GRAIN);
+    find_axis(rays, job.axis);
+    find_axes(shot, job.axis, job.axes);
+    find_center(rays, out->center);
+    for (int k = 0; k < 3; k++)
+        job.center[k] = (double)out->center[k], out->axis[k] = (float)job.axis[k];
+    job.blocks = mem_alloc(count, sizeof *job.blocks, "view bounds", err);
+    if (job.blocks == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < count; i++)
+        job.blocks[i] = no_bounds();
+    parallel_blocks(rows, ROW_GRAIN, bound_directions, &job);
+    block_bounds all = join(job.blocks, count);
+    const double widest = fmin(1, fmax(-1, all.cos_min)), sine = sqrt(1 - widest * widest);
+    const double cos_spread = sqrt(fmax(0, 1 - spread * spread));
+    const bool all_around = spread >= 1 || sine * cos_spread + widest * spread < 0; /* angles beyond 180 degrees */
+    const double cos_wide = all_around ? -1 : widest * cos_spread - sine * spread, cos_min = fmax(cos_wide - 2e-3, -1);
+    out->cos_angle = (float)cos_min;
+    out->sin_angle = (float)sqrt(fmax(0, 1 - cos_min * cos_min));
+    out->plane_count = all.depth_min > 0.05 && slopes_are_known(shot, aperture) ? cos_wide > 0 ? 5 : 4 : 0;
+    find_normals(&job, &all, spread);
+    if (!rays->common_origin) {
+        parallel_blocks(rows, ROW_GRAIN, bound_offsets, &job);
+        all = join(job.blocks, count);
+    }
+    mem_free(job.blocks);
+    /* Origins were rounded to float. */
+    const double rounding = 1e-6 * (dvec_length(job.center) + sqrt(all.origin_square) + aperture);
+    const bool one_origin = rays->common_origin && aperture <= 0;
+    out->origin_radius = one_origin ? 0 : (float)(sqrt(all.origin_square) + aperture + rounding);
+    for (int p = 0; p < PLANE_COUNT; p++) {
+        const double farthest = rays->common_origin ? 0 : fmax(all.offset[p], -1e18);
+        out->offset[p] = one_origin ? 0 : (float)(farthest + aperture + rounding);
+        for (int k = 0; k < 3; k++)
+            out->plane[p][k] = (float)job.normal[p][k];
+    }
+    return GBT_OK;
 }
 
 /* Radius of a ball around the anchor that holds the proxies of all its Gaussians: `sigmas` std-devs around each. */
@@ -92,15 +251,16 @@ static float anchor_reach(const anchors *a, size_t i, float sigmas)
 static bool is_visible(const view_bounds *b, const float position[3], float reach)
 {
     const float d[3] = {position[0] - b->center[0], position[1] - b->center[1], position[2] - b->center[2]};
+    for (int i = 0; i < b->plane_count; i++)
+        if (!(b->plane[i][0] * d[0] + b->plane[i][1] * d[1] + b->plane[i][2] * d[2] <= b->offset[i] + reach))
+            return false; /* and an anchor that is not a number */
+    if (b->plane_count > 0)
+        return true;
+    /* A ray from elsewhere reaches the ball only if one from the centre reaches a ball that is larger by its distance. */
+    reach += b->origin_radius;
     const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     if (square <= reach * reach)
         return true;
-    if (b->has_planes) {
-        for (int i = 0; i < 4; i++)
-            if (b->plane[i][0] * d[0] + b->plane[i][1] * d[1] + b->plane[i][2] * d[2] > reach)
-                return false;
-        return b->axis[0] * d[0] + b->axis[1] * d[1] + b->axis[2] * d[2] > -reach;
-    }
     /* Cone of half angle A, ball seen under half angle B: they meet when the angle between axis and centre is at most A + B. */
     const float length = sqrtf(square), along = (b->axis[0] * d[0] + b->axis[1] * d[1] + b->axis[2] * d[2]) / length;
     const float sin_ball = reach / length, cos_ball = sqrtf(1 - sin_ball * sin_ball);
@@ -144,32 +304,79 @@ static gbt_status find_visible(frame *f, const anchors *a, const view_bounds *bo
 
 /* ---- render and back --------------------------------------------------------------------------------------------------------------------- */
 
-gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
-                        gbt_error *err)
+static gbt_status fit_picture(image *rgb, int width, int height, gbt_error *err)
+{
+    if (rgb->width == width && rgb->height == height)
+        return GBT_OK;
+    image_free(rgb);
+    return image_alloc(rgb, width, height, 3, err);
+}
+
+/* Everything up to the tree, and f->rays through the middle of the aperture. */
+static gbt_status prepare(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, gbt_error *err)
 {
     double clock = clock_wall();
-    f->camera = *camera;
-    gbt_camera_half_fov_tan(camera, f->half_fov_tan);
-    GBT_TRY(ray_image_from_camera(camera, &f->rays, err));
+    ray_shot middle = *shot;
+    middle.aperture_radius = 0;
+    f->camera = shot->camera;
+    gbt_camera_half_fov_tan(&shot->camera, f->half_fov_tan);
+    GBT_TRY(ray_image_from_shot(&middle, 0, &f->rays, err));
     f->times.rays = lap(&clock);
     view_bounds bounds;
-    find_bounds(&f->rays, camera, &bounds);
+    GBT_TRY(find_bounds(shot, &f->rays, &bounds, err));
+    memcpy(f->eye, bounds.center, sizeof f->eye);
     GBT_TRY(find_visible(f, a, &bounds, settings->alpha_min, err));
     f->times.visible = lap(&clock);
     /* A Gaussian below alpha_min is never blended and so has no gradient: it need not be made. */
-    GBT_TRY(decode_forward(a, d, bounds.center, f->visible, f->visible_count, settings->alpha_min, &f->gaussians, &f->tape, err));
+    GBT_TRY(decode_forward(a, d, f->eye, f->visible, f->visible_count, settings->alpha_min, &f->gaussians, &f->tape, err));
     f->times.decode = lap(&clock);
-    const float reach = fmaxf(fabsf(bounds.center[0]), fmaxf(fabsf(bounds.center[1]), fabsf(bounds.center[2])));
-    GBT_TRY(trace_build(&f->scene, &f->gaussians, settings, reach, err));
+    const float aperture = shot->given == NULL ? (float)shot->aperture_radius : 0;
+    GBT_TRY(trace_build(&f->scene, &f->gaussians, settings, ray_image_reach(&f->rays) + aperture, err));
     f->times.build = lap(&clock);
-    if (f->rgb.width != camera->width || f->rgb.height != camera->height) {
-        image_free(&f->rgb);
-        GBT_TRY(image_alloc(&f->rgb, camera->width, camera->height, 3, err));
-    }
     memset(&f->counters, 0, sizeof f->counters);
+    return fit_picture(&f->rgb, f->rays.width, f->rays.height, err);
+}
+
+gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
+                        gbt_error *err)
+{
+    const ray_shot shot = ray_shot_of(camera);
+    GBT_TRY(prepare(f, a, d, &shot, settings, err));
+    double clock = clock_wall();
     GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &f->rgb, NULL, &f->counters, err));
     f->times.trace = lap(&clock);
     return GBT_OK;
+}
+
+/* Trace every sample and add them up, in order, in double. */
+static gbt_status trace_samples(frame *f, const ray_shot *shot, double *sum, gbt_error *err)
+{
+    const size_t values = 3 * ray_image_count(&f->rays);
+    const int samples = ray_shot_sample_count(shot);
+    for (int s = 0; s < samples; s++) {
+        double clock = clock_wall();
+        if (shot->given == NULL && shot->aperture_radius > 0)
+            GBT_TRY(ray_image_from_shot(shot, s, &f->rays, err));
+        f->times.rays += lap(&clock);
+        GBT_TRY(trace_forward(&f->scene, &f->rays, false, &f->rgb, NULL, &f->counters, err));
+        f->times.trace += lap(&clock);
+        for (size_t i = 0; i < values; i++)
+            sum[i] += (double)f->rgb.pixels[i];
+    }
+    for (size_t i = 0; i < values; i++)
+        f->rgb.pixels[i] = (float)(sum[i] / samples);
+    return GBT_OK;
+}
+
+gbt_status frame_render_shot(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, gbt_error *err)
+{
+    GBT_TRY(ray_shot_check(shot, err));
+    GBT_TRY(prepare(f, a, d, shot, settings, err));
+    f->times.trace = 0;
+    double *sum = mem_calloc(ray_image_count(&f->rays), 3 * sizeof *sum, "picture", err);
+    const gbt_status status = sum == NULL ? GBT_ERR_NO_MEMORY : trace_samples(f, shot, sum, err);
+    mem_free(sum);
+    return status;
 }
 
 double frame_volume(const frame *f)

@@ -23,19 +23,34 @@ typedef struct frame {
     frame_times times;
     double half_fov_tan[2]; /* of the camera */
     gbt_camera camera;
+    float eye[3]; /* from where the networks saw the anchors */
 } frame;
 
 /**
  * Render `camera` (any model) into f->rgb.
  *
- * An anchor is visible when the ball around it that holds all its Gaussians' proxies meets the camera's cone of rays, so nothing that
- * could be seen is left out.
+ * An anchor is visible when the ball around it that holds all its Gaussians' proxies meets a region that holds all rays, so nothing that
+ * could be seen is left out: planes along the sides of the picture for cameras that look forward, else a cone around their mean
+ * direction, thickened by the distance between their origins. The networks see the anchors from the camera centre.
  *
  * @param keep_tape [in] true when frame_backward() follows
  * Threads: one frame per thread; parallel inside; same bits for every thread count.
  */
 gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
                         gbt_error *err);
+
+/**
+ * Render a shot (trace/rays.h) into f->rgb: the mean over its samples, added up in their order in double.
+ *
+ * Anchors are decoded once, for one point: the mean of the origins of the rays through the middle of the aperture. That is the camera
+ * centre, the middle of the way of a rolling shutter, the middle of an orthographic picture (a point far behind it, where parallel rays
+ * would meet, is farther than any the networks were trained for: measured, it spoils the picture). f->rays are left those of the last
+ * sample. There is no adjoint.
+ *
+ * @return GBT_OK, GBT_ERR_ARGUMENT (ray_shot_check()), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
+ * Threads: as frame_render(). Cost: decoding and building once, rays and tracing for every sample.
+ */
+gbt_status frame_render_shot(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, gbt_error *err);
 
 /**
  * Adjoint of the last frame_render(keep_tape): d_image -> d_anchors (rows of f->visible, added) and d_params (added).

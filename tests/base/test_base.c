@@ -1,6 +1,7 @@
 /* tests/base/test_base.c -- what every room stands on: errors, memory, random numbers, files, Gaussian arrays, images, threads, vectors. */
 #include <dirent.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -386,7 +387,7 @@ static size_t begin_of[COVER];
 
 static void cover(size_t block, size_t begin, size_t end, void *context)
 {
-    *(size_t *)context = 1;
+    atomic_fetch_add((atomic_size_t *)context, 1);
     begin_of[block] = begin;
     for (size_t i = begin; i < end; i++)
         covered[i]++;
@@ -400,15 +401,16 @@ static void blocks_cover_once(void **state)
         parallel_set_threads(threads);
         assert_int_equal(parallel_threads(), threads);
         for (size_t k = 0; k < sizeof grains / sizeof grains[0]; k++) {
-            size_t ran = 0;
+            atomic_size_t ran = 0;
             memset(covered, 0, sizeof covered);
             parallel_blocks(COVER, grains[k], cover, &ran);
+            assert_int_equal(ran, parallel_block_count(COVER, grains[k]));
             for (int i = 0; i < COVER; i++)
                 assert_int_equal(covered[i], 1);
             for (size_t block = 0; block < parallel_block_count(COVER, grains[k]); block++)
                 assert_int_equal(begin_of[block], block * grains[k]);
         }
-        size_t ran = 0;
+        atomic_size_t ran = 0;
         parallel_blocks(0, 16, cover, &ran);
         assert_int_equal(ran, 0);
     }

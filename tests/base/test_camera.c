@@ -435,6 +435,44 @@ static void half_fov(void **state)
     assert_near(tan_half[1], 0, 0);
 }
 
+/* Parallel rays: not one of COLMAP's models, so a data set cannot hold it; a pixel is a point of the plane, a point its place across the view. */
+static void orthographic(void **state)
+{
+    (void)state;
+    assert_true(GBT_CAMERA_ORTHOGRAPHIC >= GBT_CAMERA_MODEL_COUNT);
+    assert_string_equal(gbt_camera_model_name(GBT_CAMERA_ORTHOGRAPHIC), "ORTHOGRAPHIC");
+    assert_int_equal(gbt_camera_param_count(GBT_CAMERA_ORTHOGRAPHIC), 4);
+    gbt_camera camera = camera_of(GBT_CAMERA_ORTHOGRAPHIC, (const double[GBT_CAMERA_MAX_PARAMS]){40, 50, 320, 240});
+    double dir[3], origin[3], pixel[2], tan_half[2];
+    assert_true(gbt_camera_unproject(&camera, 17, 400, dir));
+    assert_memory_equal(dir, ((const double[3]){0, 0, 1}), sizeof dir);
+    assert_true(gbt_camera_project(&camera, (const double[3]){-2, 3, 0.001}, pixel));
+    assert_near(pixel[0], 240, 1e-12);
+    assert_near(pixel[1], 390, 1e-12);
+    assert_false(gbt_camera_project(&camera, (const double[3]){-2, 3, 0}, pixel)); /* on the plane, where the rays start */
+    assert_false(gbt_camera_project(&camera, (const double[3]){-2, 3, -1}, pixel));
+    assert_false(gbt_camera_unproject(&camera, NAN, 400, dir));
+    /* right = +y, down = -x of the world */
+    const double turned[9] = {0, 1, 0, -1, 0, 0, 0, 0, 1};
+    memcpy(camera.rotation, turned, sizeof turned);
+    camera.center[0] = 10, camera.center[2] = -4;
+    assert_true(gbt_camera_ray(&camera, 360, 290, origin, dir)); /* one unit right and one down */
+    assert_memory_equal(origin, ((const double[3]){9, 1, -4}), sizeof origin);
+    assert_memory_equal(dir, ((const double[3]){0, 0, 1}), sizeof dir);
+    const gbt_camera half = gbt_camera_resized(&camera, WIDTH / 2, HEIGHT / 4);
+    assert_memory_equal(half.params, ((const double[4]){20, 12.5, 160, 60}), 4 * sizeof(double));
+    gbt_camera_half_fov_tan(&camera, tan_half);
+    assert_true(tan_half[0] == 0 && tan_half[1] == 0);
+    camera.params[1] = 0;
+    assert_false(gbt_camera_ray(&camera, 360, 290, origin, dir));
+    assert_memory_equal(origin, ((const double[3]){9, 1, -4}), sizeof origin);
+    camera = camera_of(GBT_CAMERA_PINHOLE, (const double[GBT_CAMERA_MAX_PARAMS]){40, 50, 320, 240});
+    camera.center[1] = 5;
+    assert_true(gbt_camera_ray(&camera, 360, 240, origin, dir));
+    assert_memory_equal(origin, camera.center, sizeof origin);
+    assert_near(dir[0], sqrt(0.5), 1e-15);
+}
+
 /* A tiny distortion is close to none: no model has a jump at 0. */
 static void continuous_at_zero(void **state)
 {
@@ -488,6 +526,7 @@ int main(void)
         cmocka_unit_test(resizing_keeps_rays),
         cmocka_unit_test(resizing_exact_numbers),
         cmocka_unit_test(half_fov),
+        cmocka_unit_test(orthographic),
         cmocka_unit_test(continuous_at_zero),
         cmocka_unit_test(polynomial_roots),
     };

@@ -132,6 +132,8 @@ config 'a\0b\n' ' not a configuration file (wanted name = value lines, at most 1
 # ---- files
 misuse 4 "nothing: no such file or folder" info nothing
 misuse 4 "no.gbt: cannot open: No such file or directory" info no.gbt
+misuse 4 "nothing/model.gbt: cannot open: No such file or directory" render nothing/model.gbt -o o --camera c.json
+misuse 2 "--downscale: not with --camera (the camera file says the size)" render nothing -o o --camera c.json --downscale 2
 mkdir empty
 misuse 3 "empty: not a data set (wanted sparse/0/cameras.bin or transforms.json in it)" info empty
 printf 'GBTMODEL' >short.gbt

@@ -160,6 +160,7 @@ static bin_case bin_cases[] = {
     {"6 model 99", CAMERAS, SET_UINT, 12, 4, 99, .status = BAD, .says = "cameras.bin@8: unknown camera model id 99"},
     {"6 model -1", CAMERAS, SET_UINT, 12, 4, UINT32_MAX, .status = BAD, .says = "unknown camera model id -1"},
     {"6 model 18", CAMERAS, SET_UINT, 12, 4, 18, .status = BAD, .says = "unknown camera model id 18"},
+    {"6 model 100 is ours alone", CAMERAS, SET_UINT, 12, 4, 100, .status = BAD, .says = "unknown camera model id 100"},
     {"7 model with distortion, too short", CAMERAS, SET_UINT, 12, 4, 4, .status = BAD, .says = "wanted 64 more bytes, got 32"},
     {"8 width 0", CAMERAS, SET_UINT, 16, 8, 0, .status = BAD, .says = "wanted 1..65500, got 0 x 480"},
     {"8 height 65501", CAMERAS, SET_UINT, 24, 8, 65501, .status = BAD, .says = "got 640 x 65501"},
@@ -414,6 +415,7 @@ static txt_case txt_cases[] = {
     {"41 no final newline", "7 PINHOLE 640 480 500 510 321 239", "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png", "3 1 1 1 255 51 0 0.5", GBT_OK, NULL, 1, 1, 0},
     {"6 unknown model", "7 MAGIC 640 480 500\n", NULL, NULL, BAD, "cameras.txt:1: unknown camera model: MAGIC", 0, 0, 0},
     {"6 model name cut", "7 PINHOL 640 480 500 510 321 239\n", NULL, NULL, BAD, "unknown camera model: PINHOL", 0, 0, 0},
+    {"6 model is ours alone", "7 ORTHOGRAPHIC 640 480 1 1 0 0\n", NULL, NULL, BAD, "unknown camera model: ORTHOGRAPHIC", 0, 0, 0},
     {"11 duplicate camera", "7 PINHOLE 640 480 500 510 321 239\n7 PINHOLE 640 480 500 510 321 239\n", NULL, NULL, BAD, "duplicate camera id 7", 0, 0, 0},
     {"15 name leaves", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7 a/../../b.png\n\n", NULL, BAD, "images.txt:1: image name leaves", 0, 0, 0},
 };

@@ -448,12 +448,12 @@ static void one_hundred_thousand_hits(void **state)
     }
 }
 
-/* Equal depths go by id: in the packet (150 rows fit) and on the spill path (400 do not). */
+/* Equal depths go by id: in the packet (150 rows fit) and ray by ray (800 do not). */
 static void coincident_gaussians(void **state)
 {
     (void)state;
     const trace_settings s = with_background();
-    for (size_t count = 150; count <= 400; count += 250) {
+    for (size_t count = 150; count <= 800; count += 650) {
         gaussians g = some(count, 0.01f);
         for (size_t i = 0; i < count; i++)
             g.red[i] = rng_uniform(8, 0, i), g.green[i] = i % 2 == 0, g.blue[i] = (float)i / (float)count, g.scale_y[i] = 2, g.scale_z[i] = 0.5f;
@@ -461,7 +461,7 @@ static void coincident_gaussians(void **state)
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
         const figures f = compare(&g, &s, &rays, 50, 1e-6);
-        assert_figures(count == 150 ? "150 at once" : "400 at once", &f, 1e-5);
+        assert_figures(count == 150 ? "150 at once" : "800 at once", &f, count == 150 ? 1e-5 : 5e-5); /* T is a product of 800 roundings */
         assert_int_equal(f.counters.spilled_packets, count == 150 ? 0 : 12);
         ray_image_free(&rays);
         gaussians_free(&g);

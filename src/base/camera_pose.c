@@ -1,0 +1,101 @@
+/* base/camera_pose.c -- where a camera stands: from what it looks at, and on the way between two poses. */
+#include "base/camera_pose.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/vec.h"
+
+static bool is_finite(const double *values, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (!isfinite(values[i]))
+            return false;
+    return true;
+}
+
+bool camera_look_at(const double origin[3], const double target[3], const double up[3], gbt_camera *camera)
+{
+    double forward[3], right[3], down[3], upward[3];
+    for (int i = 0; i < 3; i++)
+        forward[i] = target[i] - origin[i], upward[i] = up[i];
+    dvec_normalize(forward);
+    dvec_normalize(upward);
+    dvec_cross(forward, upward, right);
+    if (!is_finite(origin, 3) || !(dvec_length(right) > 1e-9)) /* false for NaN too */
+        return false;
+    dvec_normalize(right);
+    dvec_cross(forward, right, down);
+    for (int i = 0; i < 3; i++) {
+        camera->rotation[i] = right[i], camera->rotation[3 + i] = down[i], camera->rotation[6 + i] = forward[i];
+        camera->center[i] = origin[i];
+    }
+    return true;
+}
+
+static void multiply(const double a[9], const double b[9], double out[9])
+{
+    for (int row = 0; row < 3; row++)
+        dmat_apply_transposed(b, a + 3 * row, out + 3 * row);
+}
+
+static bool is_rotation(const double m[9])
+{
+    double third[3];
+    dvec_cross(m, m + 3, third);
+    double off = fabs(dvec_dot(m, m) - 1) + fabs(dvec_dot(m + 3, m + 3) - 1) + fabs(dvec_dot(m, m + 3));
+    for (int i = 0; i < 3; i++)
+        off += fabs(third[i] - m[6 + i]);
+    return off < 1e-6; /* false for NaN */
+}
+
+/* Axis and angle in [0, pi]. The antisymmetric part is 2 sin(angle) axis, the trace 1 + 2 cos(angle); near pi the former vanishes,
+   and the axis is the longest column of R + R^T - (trace - 1) I = 2 (1 - cos(angle)) axis axis^T. */
+static double axis_angle(const double r[9], double axis[3])
+{
+    const double odd[3] = {r[7] - r[5], r[2] - r[6], r[3] - r[1]}, trace = r[0] + r[4] + r[8];
+    const double angle = atan2(dvec_length(odd), trace - 1);
+    memcpy(axis, odd, sizeof odd);
+    if (trace < 0) {
+        double best = -1;
+        for (int column = 0; column < 3; column++) {
+            double c[3];
+            for (int i = 0; i < 3; i++)
+                c[i] = r[3 * i + column] + r[3 * column + i] - (i == column ? trace - 1 : 0);
+            if (dvec_dot(c, c) > best) {
+                best = dvec_dot(c, c);
+                const double sign = dvec_dot(c, odd) < 0 ? -1 : 1;
+                for (int i = 0; i < 3; i++)
+                    axis[i] = sign * c[i];
+            }
+        }
+    }
+    dvec_normalize(axis);
+    return angle;
+}
+
+bool camera_motion_prepare(const gbt_camera *start, const gbt_camera *end, camera_motion *out)
+{
+    double back[9], turn[9];
+    if (!is_rotation(start->rotation) || !is_rotation(end->rotation) || !is_finite(start->center, 3) || !is_finite(end->center, 3))
+        return false;
+    for (int i = 0; i < 9; i++)
+        back[i] = start->rotation[3 * (i % 3) + i / 3];
+    multiply(end->rotation, back, turn);
+    out->angle = axis_angle(turn, out->axis);
+    memcpy(out->start_rotation, start->rotation, sizeof out->start_rotation);
+    for (int i = 0; i < 3; i++)
+        out->start_center[i] = start->center[i], out->way[i] = end->center[i] - start->center[i];
+    return true;
+}
+
+void camera_motion_at(const camera_motion *motion, double t, double rotation[9], double center[3])
+{
+    const double half = 0.5 * t * motion->angle, s = sin(half);
+    const double q[4] = {cos(half), s * motion->axis[0], s * motion->axis[1], s * motion->axis[2]};
+    double turn[9];
+    dquat_to_matrix(q, turn);
+    multiply(turn, motion->start_rotation, rotation);
+    for (int i = 0; i < 3; i++)
+        center[i] = motion->start_center[i] + t * motion->way[i];
+}

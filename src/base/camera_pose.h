@@ -1,0 +1,28 @@
+/* base/camera_pose.h -- where a camera stands: from what it looks at, and on the way between two poses. */
+#ifndef GBT_BASE_CAMERA_POSE_H
+#define GBT_BASE_CAMERA_POSE_H
+
+#include <stdbool.h>
+
+#include "gbtrace/camera.h"
+
+/**
+ * Set the pose of `camera`: at `origin`, `target` in the middle of the image, `up` towards its top.
+ *
+ * @return false, and nothing changed, when `target` is at `origin`, `up` is along the view (within 1e-9 rad), or a value is not finite
+ */
+bool camera_look_at(const double origin[3], const double target[3], const double up[3], gbt_camera *camera);
+
+/** A camera on its way from one pose to another: turning about one axis at one rate (slerp), moving along a line. */
+typedef struct camera_motion {
+    double start_rotation[9], axis[3], angle; /* the turn, in the axes of the starting camera; angle in [0, pi] radians */
+    double start_center[3], way[3];
+} camera_motion;
+
+/** False when one of the two rotations is not one (to 1e-6), or a centre is not finite. */
+bool camera_motion_prepare(const gbt_camera *start, const gbt_camera *end, camera_motion *out);
+
+/** World to camera and centre at time t: 0 gives the start's bits, 1 the end to rounding. */
+void camera_motion_at(const camera_motion *motion, double t, double rotation[9], double center[3]);
+
+#endif

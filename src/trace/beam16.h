@@ -1,0 +1,247 @@
+/* trace/beam16.h -- the beam of a tile and of its packets: which nodes and which ellipsoids can they touch. Conservative, never exact.
+
+   Everything is measured in the tile's frame: axis w runs along the middle of the tile, u and v across. A ray is a + s (slope_u, slope_v, 1);
+   a beam is the four planes that hold all of its rays. Included by kernels after simd16.h. */
+#ifndef GBT_TRACE_BEAM16_H
+#define GBT_TRACE_BEAM16_H
+
+#include <float.h>
+#include <math.h>
+
+#include "trace/kernel.h"
+#include "trace/simd16.h"
+
+/* Half-space n.x <= limit; `pick` says for each axis which face of a box has the smallest n.x. */
+typedef struct half_space {
+    float n[3], limit;
+    int pick[3]; /* float offset of lower_* or upper_* in a tree_node */
+} half_space;
+
+/* Planes of a packet in the tile's frame: low and high of u, low and high of v. Inside: side (x - slope w) <= limit, side -1 for low. */
+typedef struct packet_beam {
+    float slope[4], limit[4];
+} packet_beam;
+
+typedef struct tile_beam {
+    float axis[3][3], origin[3]; /* u, v, w; the frame's origin, world */
+    float square[5][6];          /* products of the axes: uu vv ww uw vw */
+    half_space side[5];          /* world: u low and high, v low and high, behind */
+    half_space depth;            /* n = w: smallest n.x of a box gives its entry bound */
+    float depth_start, depth_scale; /* t >= (n.x - start) * scale */
+    float frame_start;              /* and from the depth in the frame: t >= (w - frame_start) * scale */
+    packet_beam packet[TILE_PACKETS], whole; /* whole: the same planes as side[0..3], in the frame */
+} tile_beam;
+
+static inline float dot3(const float a[3], const float b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline half_space make_half_space(const float n[3], float limit)
+{
+    half_space h = {.limit = limit};
+    for (int axis = 0; axis < 3; axis++) {
+        h.n[axis] = n[axis];
+        h.pick[axis] = 2 * axis * TREE_WIDTH + (n[axis] < 0 ? TREE_WIDTH : 0);
+    }
+    return h;
+}
+
+static inline f16 dot_lanes(const float n[3], const f16 x[3])
+{
+    return f16_fma(f16_set1(n[2]), x[2], f16_fma(f16_set1(n[1]), x[1], f16_mul(f16_set1(n[0]), x[0])));
+}
+
+static void axis_products(const float a[3], const float b[3], float out[6])
+{
+    out[0] = a[0] * b[0], out[1] = a[1] * b[1], out[2] = a[2] * b[2];
+    out[3] = a[1] * b[2] + a[2] * b[1], out[4] = a[2] * b[0] + a[0] * b[2], out[5] = a[0] * b[1] + a[1] * b[0];
+}
+
+/* w along the mean direction, u along a row of pixels when that has an extent, so that the planes hug the pixels. */
+static bool make_frame(const packet_rays *rays, tile_beam *out)
+{
+    float *u = out->axis[0], *v = out->axis[1], *w = out->axis[2];
+    int count = 0;
+    const packet_rays *first = NULL;
+    w[0] = w[1] = w[2] = 0;
+    for (int p = 0; p < TILE_PACKETS; p++) {
+        if (rays[p].active == 0)
+            continue;
+        if (first == NULL)
+            first = &rays[p];
+        for (int axis = 0; axis < 3; axis++)
+            w[axis] += rays[p].dir[axis][0] + rays[p].dir[axis][3] + rays[p].dir[axis][12] + rays[p].dir[axis][15]; /* the corners */
+        count++;
+    }
+    const float length = sqrtf(dot3(w, w));
+    if (!(length > 2 * (float)count)) /* 4 for parallel rays */
+        return false;
+    for (int axis = 0; axis < 3; axis++)
+        w[axis] /= length, u[axis] = first->dir[axis][3] - first->dir[axis][0], out->origin[axis] = first->origin[axis][0];
+    const float along = dot3(u, w);
+    for (int axis = 0; axis < 3; axis++)
+        u[axis] -= along * w[axis];
+    float size = sqrtf(dot3(u, u));
+    if (!(size > 1e-6f)) {
+        const int least = fabsf(w[0]) < fabsf(w[1]) ? (fabsf(w[0]) < fabsf(w[2]) ? 0 : 2) : (fabsf(w[1]) < fabsf(w[2]) ? 1 : 2);
+        for (int axis = 0; axis < 3; axis++)
+            u[axis] = (axis == least ? 1.0f : 0.0f) - w[least] * w[axis];
+        size = sqrtf(dot3(u, u));
+    }
+    for (int axis = 0; axis < 3; axis++)
+        u[axis] /= size;
+    v[0] = w[1] * u[2] - w[2] * u[1], v[1] = w[2] * u[0] - w[0] * u[2], v[2] = w[0] * u[1] - w[1] * u[0];
+    axis_products(u, u, out->square[0]), axis_products(v, v, out->square[1]), axis_products(w, w, out->square[2]);
+    axis_products(u, w, out->square[3]), axis_products(v, w, out->square[4]);
+    return true;
+}
+
+/* False when the rays fan out so far that a beam makes no sense; they are then traced one by one. */
+static bool make_beam(const packet_rays *rays, const kernel_scene *scene, tile_beam *out)
+{
+    if (!make_frame(rays, out))
+        return false;
+    /* Every bound is opened by what rounding could have taken: a few ulps of the slopes and of the largest coordinate. */
+    const float slack = 0x1p-20f * scene->coordinate_max;
+    float slope[4] = {FLT_MAX, -FLT_MAX, FLT_MAX, -FLT_MAX}; /* of the whole tile */
+    float forward_low = FLT_MAX, forward_high = 0, start_low = FLT_MAX, start_high = -FLT_MAX;
+    f16 at[TILE_PACKETS][3];
+    for (int p = 0; p < TILE_PACKETS; p++) {
+        packet_beam *b = &out->packet[p];
+        if (rays[p].active == 0)
+            continue;
+        const f16 dir[3] = {f16_load(rays[p].dir[0]), f16_load(rays[p].dir[1]), f16_load(rays[p].dir[2])};
+        f16 offset[3];
+        for (int axis = 0; axis < 3; axis++)
+            offset[axis] = f16_sub(f16_load(rays[p].origin[axis]), f16_set1(out->origin[axis]));
+        const f16 forward = dot_lanes(out->axis[2], dir);
+        const float lowest = f16_lowest(forward);
+        if (!(lowest > 0.3f))
+            return false;
+        forward_low = fminf(forward_low, lowest), forward_high = fmaxf(forward_high, f16_highest(forward));
+        for (int axis = 0; axis < 3; axis++)
+            at[p][axis] = dot_lanes(out->axis[axis], offset);
+        start_low = fminf(start_low, f16_lowest(at[p][2])), start_high = fmaxf(start_high, f16_highest(at[p][2]));
+        for (int k = 0; k < 2; k++) {
+            const f16 s = f16_div(dot_lanes(out->axis[k], dir), forward);
+            const float low = f16_lowest(s), high = f16_highest(s), open = 0x1p-21f * (1 + fabsf(low) + fabsf(high));
+            b->slope[2 * k] = low - open, b->slope[2 * k + 1] = high + open;
+            slope[2 * k] = fminf(slope[2 * k], low - open), slope[2 * k + 1] = fmaxf(slope[2 * k + 1], high + open);
+            b->limit[2 * k] = f16_highest(f16_sub(f16_mul(f16_set1(b->slope[2 * k]), at[p][2]), at[p][k])) + slack * (1 + fabsf(b->slope[2 * k]));
+            b->limit[2 * k + 1] = f16_highest(f16_sub(at[p][k], f16_mul(f16_set1(b->slope[2 * k + 1]), at[p][2]))) + slack * (1 + fabsf(b->slope[2 * k + 1]));
+        }
+    }
+    for (int side = 0; side < 4; side++) {
+        const float sign = side % 2 == 0 ? -1.0f : 1.0f;
+        float limit = -FLT_MAX, n[3];
+        for (int axis = 0; axis < 3; axis++)
+            n[axis] = sign * (out->axis[side / 2][axis] - slope[side] * out->axis[2][axis]);
+        for (int p = 0; p < TILE_PACKETS; p++)
+            if (rays[p].active != 0)
+                limit = fmaxf(limit, sign * (sign > 0 ? f16_highest(f16_sub(at[p][side / 2], f16_mul(f16_set1(slope[side]), at[p][2])))
+                                                      : f16_lowest(f16_sub(at[p][side / 2], f16_mul(f16_set1(slope[side]), at[p][2])))));
+        limit += slack * (1 + fabsf(slope[side]));
+        out->whole.slope[side] = slope[side], out->whole.limit[side] = limit;
+        out->side[side] = make_half_space(n, limit + dot3(n, out->origin));
+    }
+    const float *w = out->axis[2], back[3] = {-w[0], -w[1], -w[2]}, base = dot3(w, out->origin);
+    out->side[4] = make_half_space(back, -(base + start_low + scene->settings.t_near * forward_low * 0.999999f) + slack);
+    out->depth = make_half_space(w, 0);
+    out->depth_start = base + start_high + slack;
+    out->frame_start = start_high + slack;
+    out->depth_scale = 0.999999f / forward_high;
+    return true;
+}
+
+static inline f16 smallest_dot(const half_space *h, const float *node)
+{
+    f16 sum = f16_mul(f16_set1(h->n[0]), f16_load(node + h->pick[0]));
+    sum = f16_fma(f16_set1(h->n[1]), f16_load(node + h->pick[1]), sum);
+    return f16_fma(f16_set1(h->n[2]), f16_load(node + h->pick[2]), sum);
+}
+
+/* Which children the tile may touch, and a lower bound of t_c inside each. */
+static inline unsigned test_children(const tile_beam *b, const tree_node *node, float t_near, float entry[TREE_WIDTH])
+{
+    const float *base = (const float *)node;
+    m16 inside = f16_le(smallest_dot(&b->side[0], base), f16_set1(b->side[0].limit));
+    for (int i = 1; i < 5; i++)
+        inside = m16_and(inside, f16_le(smallest_dot(&b->side[i], base), f16_set1(b->side[i].limit)));
+    const f16 depth = f16_mul(f16_sub(smallest_dot(&b->depth, base), f16_set1(b->depth_start)), f16_set1(b->depth_scale));
+    f16_store(entry, f16_max(depth, f16_set1(t_near)));
+    return m16_bits(inside);
+}
+
+/* Sixteen ellipsoids in the tile's frame: centre, and covariance of the proxy opened by its rounding errors. */
+typedef struct ellipsoids16 {
+    f16 u, v, w, uu, vv, ww, uw, vw;
+} ellipsoids16;
+
+/* a^T S b from the products of a and b (axis_products); S = xx yy zz yz zx xy. */
+static inline f16 spread_dot(const f16 s[6], const float product[6])
+{
+    f16 sum = f16_mul(f16_set1(product[0]), s[0]);
+    for (int k = 1; k < 6; k++)
+        sum = f16_fma(f16_set1(product[k]), s[k], sum);
+    return sum;
+}
+
+static inline void turn_ellipsoids(const tree_leaf *leaf, const tile_beam *b, ellipsoids16 *out)
+{
+    f16 offset[3], s[6];
+    for (int axis = 0; axis < 3; axis++)
+        offset[axis] = f16_sub(f16_load(leaf->mean[axis]), f16_set1(b->origin[axis]));
+    for (int k = 0; k < 6; k++)
+        s[k] = f16_load(leaf->spread[k]);
+    const f16 slack = f16_mul(f16_set1(0x1p-18f), f16_add(s[0], f16_add(s[1], s[2])));
+    out->u = dot_lanes(b->axis[0], offset), out->v = dot_lanes(b->axis[1], offset), out->w = dot_lanes(b->axis[2], offset);
+    out->uu = f16_add(spread_dot(s, b->square[0]), slack);
+    out->vv = f16_add(spread_dot(s, b->square[1]), slack);
+    out->ww = spread_dot(s, b->square[2]);
+    out->uw = spread_dot(s, b->square[3]);
+    out->vw = spread_dot(s, b->square[4]);
+}
+
+/* Which of the ellipsoids reach into the four planes: n.c - limit <= sqrt(n^T S n). */
+static inline unsigned test_ellipsoids(const packet_beam *b, const ellipsoids16 *e)
+{
+    m16 outside = m16_from_bits(0);
+    for (int side = 0; side < 4; side++) {
+        const f16 slope = f16_set1(b->slope[side]), x = side < 2 ? e->u : e->v, xx = side < 2 ? e->uu : e->vv, xw = side < 2 ? e->uw : e->vw;
+        const f16 across = f16_fnma(slope, e->w, x); /* x - slope w */
+        const f16 beyond = side % 2 == 0 ? f16_sub(f16_set1(-b->limit[side]), across) : f16_sub(across, f16_set1(b->limit[side]));
+        const f16 reach = f16_fma(slope, f16_fma(slope, e->ww, f16_sub(f16_set1(0), f16_add(xw, xw))), xx);
+        outside = m16_or(outside, m16_and(f16_lt(f16_set1(0), beyond), f16_lt(reach, f16_mul(beyond, beyond))));
+    }
+    return m16_bits(outside) ^ 0xFFFF;
+}
+
+/* A lower bound of t_c on every ray of the tile that hits. */
+static inline f16 ellipsoid_nearest(const ellipsoids16 *e, const tile_beam *b, float t_near)
+{
+    const f16 nearest = f16_fnma(f16_sqrt(e->ww), f16_set1(1.0001f), e->w);
+    return f16_max(f16_mul(f16_sub(nearest, f16_set1(b->frame_start)), f16_set1(b->depth_scale)), f16_set1(t_near));
+}
+
+/* How far an ellipsoid reaches in slopes as seen from the frame's origin, its tangent planes through there: low and high of u, low and high
+   of v. `beyond` are the lanes that lie wholly in front of the depth `near`; only for them. `open`: what coordinates may be off. */
+static inline m16 ellipsoid_slopes(const ellipsoids16 *e, float near, float open, f16 slope[4])
+{
+    const f16 in_front = f16_sub(e->w, f16_set1(near));
+    const m16 front = m16_and(f16_lt(f16_set1(0), in_front), f16_lt(e->ww, f16_mul(in_front, in_front)));
+    /* (w^2 - ww) s^2 - 2 (x w - xw) s + (x^2 - xx) = 0, its discriminant without large terms that cancel */
+    const f16 inverse = f16_div(f16_set1(1), f16_fnma(f16_set1(1), e->ww, f16_mul(e->w, e->w)));
+    for (int k = 0; k < 2; k++) {
+        const f16 x = k == 0 ? e->u : e->v, xx = k == 0 ? e->uu : e->vv, xw = k == 0 ? e->uw : e->vw;
+        const f16 quadratic = f16_fma(e->w, f16_fma(e->w, xx, f16_mul(f16_set1(-2), f16_mul(x, xw))), f16_mul(f16_mul(x, x), e->ww));
+        const f16 half = f16_sqrt(f16_max(f16_fma(xw, xw, f16_fnma(xx, e->ww, quadratic)), f16_set1(0)));
+        const f16 middle = f16_sub(f16_mul(x, e->w), xw);
+        const f16 low = f16_mul(f16_sub(middle, half), inverse), high = f16_mul(f16_add(middle, half), inverse);
+        const f16 slack = f16_fma(f16_sub(high, low), f16_set1(1e-4f), f16_mul(f16_mul(f16_set1(open), e->w), inverse));
+        slope[2 * k] = f16_sub(low, slack), slope[2 * k + 1] = f16_add(high, slack);
+    }
+    return front;
+}
+
+#endif

@@ -1,0 +1,142 @@
+/* trace/gaussian16.h -- Gaussians against rays, sixteen pairs at a time: depth, canonical point, response.
+
+   The same arithmetic serves one Gaussian on sixteen rays (lanes of `gaussian_lanes` all equal) and sixteen Gaussians on one ray, so
+   both give the same bits for the same pair. Included by kernels after simd16.h. */
+#ifndef GBT_TRACE_GAUSSIAN16_H
+#define GBT_TRACE_GAUSSIAN16_H
+
+#include "trace/kernel.h"
+#include "trace/simd16.h"
+
+typedef struct ray_lanes {
+    f16 origin[3], dir[3];
+} ray_lanes;
+
+typedef struct response {
+    f16 t;    /* t_c */
+    f16 v[3]; /* canonical point at t_c */
+    f16 d2;
+} response;
+
+static inline void load_rays(const packet_rays *rays, ray_lanes *out)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        out->origin[axis] = f16_load(rays->origin[axis]);
+        out->dir[axis] = f16_load(rays->dir[axis]);
+    }
+}
+
+/* Sixteen Gaussians, or one of them sixteen times. */
+typedef struct gaussian_lanes {
+    f16 mean[3], matrix[9], opacity;
+} gaussian_lanes;
+
+static inline gaussian_lanes spread_gaussian(const float *record)
+{
+    gaussian_lanes g;
+    for (int i = 0; i < 3; i++)
+        g.mean[i] = f16_set1(record[RECORD_MEAN + i]);
+    for (int i = 0; i < 9; i++)
+        g.matrix[i] = f16_set1(record[RECORD_MATRIX + i]);
+    g.opacity = f16_set1(record[RECORD_OPACITY]);
+    return g;
+}
+
+/* Sixteen Gaussians, and their colours. */
+static inline gaussian_lanes load_gaussians(const kernel_scene *scene, const uint32_t id[16], f16 color[3])
+{
+    const float *rows[16];
+    f16 field[16];
+    gaussian_lanes g;
+    for (int i = 0; i < 16; i++)
+        rows[i] = scene->records + (size_t)id[i] * RECORD_FLOATS;
+    f16_load_turned(rows, field);
+    for (int i = 0; i < 3; i++)
+        g.mean[i] = field[RECORD_MEAN + i], color[i] = field[RECORD_COLOR + i];
+    g.opacity = field[RECORD_OPACITY];
+    for (int i = 0; i < 9; i++)
+        g.matrix[i] = field[RECORD_MATRIX + i];
+    return g;
+}
+
+/* The ray seen from the mean: its point nearest to the mean, p, and how far along that is. */
+typedef struct ray_to_mean {
+    f16 p[3], along;
+} ray_to_mean;
+
+static inline ray_to_mean approach(const gaussian_lanes *g, const ray_lanes *ray)
+{
+    ray_to_mean r;
+    f16 e[3];
+    for (int i = 0; i < 3; i++)
+        e[i] = f16_sub(ray->origin[i], g->mean[i]);
+    r.along = f16_fma(e[2], ray->dir[2], f16_fma(e[1], ray->dir[1], f16_mul(e[0], ray->dir[0])));
+    for (int i = 0; i < 3; i++)
+        r.p[i] = f16_fnma(r.along, ray->dir[i], e[i]);
+    return r;
+}
+
+static inline void to_canonical(const gaussian_lanes *g, const f16 x[3], f16 out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = f16_fma(g->matrix[3 * i + 2], x[2], f16_fma(g->matrix[3 * i + 1], x[1], f16_mul(g->matrix[3 * i], x[0])));
+}
+
+static inline f16 dot16(const f16 a[3], const f16 b[3])
+{
+    return f16_fma(a[2], b[2], f16_fma(a[1], b[1], f16_mul(a[0], b[0])));
+}
+
+/* The ray is first moved to the point nearest the mean, so that the canonical product subtracts nothing large (float32 keeps its digits
+   at any distance / scale ratio that float32 coordinates allow). */
+static inline response respond(const gaussian_lanes *g, const ray_lanes *ray, f16 t_near)
+{
+    const ray_to_mean at = approach(g, ray);
+    f16 o[3], w[3];
+    to_canonical(g, at.p, o);
+    to_canonical(g, ray->dir, w);
+    f16 step = f16_sub(f16_set1(0), f16_div(dot16(o, w), dot16(w, w)));
+    response r;
+    r.t = f16_sub(step, at.along);
+    const m16 clipped = f16_lt(r.t, t_near);
+    r.t = f16_select(clipped, t_near, r.t);
+    step = f16_select(clipped, f16_add(t_near, at.along), step);
+    for (int i = 0; i < 3; i++)
+        r.v[i] = f16_fma(step, w[i], o[i]);
+    r.d2 = dot16(r.v, r.v);
+    return r;
+}
+
+/* The canonical point at an inner t* once more, for the adjoint: v = w' x (x' x w') / |w'|^2 with x' x w' = cof(M) (p x w), M = S^-1 R^T.
+   On a flat Gaussian the v of respond() is a small difference of large numbers along the thin axis. d2 does not feel that, but the
+   gradients of the mean and of the rotation, which are divided by the thin axis, would be noise from a ratio of 1e4 on. */
+static inline void refine_point(const gaussian_lanes *g, const ray_lanes *ray, f16 t_near, response *r)
+{
+    const f16 *m = g->matrix, *d = ray->dir;
+    const ray_to_mean at = approach(g, ray);
+    const f16 *p = at.p;
+    const f16 q[3] = {f16_fnma(p[2], d[1], f16_mul(p[1], d[2])), f16_fnma(p[0], d[2], f16_mul(p[2], d[0])), f16_fnma(p[1], d[0], f16_mul(p[0], d[1]))};
+    f16 c[3], w[3];
+    to_canonical(g, d, w);
+    for (int i = 0; i < 3; i++) {
+        const f16 *a = m + 3 * ((i + 1) % 3), *b = m + 3 * ((i + 2) % 3); /* row i of the cofactors is the product of the other two rows */
+        const f16 cofactor[3] = {f16_sub(f16_mul(a[1], b[2]), f16_mul(a[2], b[1])), f16_sub(f16_mul(a[2], b[0]), f16_mul(a[0], b[2])),
+                                 f16_sub(f16_mul(a[0], b[1]), f16_mul(a[1], b[0]))};
+        c[i] = f16_fma(cofactor[2], q[2], f16_fma(cofactor[1], q[1], f16_mul(cofactor[0], q[0])));
+    }
+    const f16 ww = dot16(w, w);
+    const m16 clipped = f16_le(r->t, t_near);
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        const f16 v = f16_div(f16_fnma(w[k], c[j], f16_mul(w[j], c[k])), ww);
+        r->v[i] = f16_select(clipped, r->v[i], v);
+    }
+}
+
+/* opacity exp(-d2 / 2). What 2^-120 cuts off is far below every alpha_min that can be set. */
+static inline f16 response_alpha(const gaussian_lanes *g, f16 d2)
+{
+    return f16_mul(g->opacity, f16_exp2(f16_max(f16_mul(f16_set1(-0.72134752f), d2), f16_set1(-120.0f))));
+}
+
+#endif

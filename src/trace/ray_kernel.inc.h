@@ -1,0 +1,174 @@
+/* trace/ray_kernel.inc.h -- one ray through the tree, sixteen Gaussians at a time: for rays that do not run together, and for packets whose
+   hits do not fit. No limit but memory. Compiled once per instruction set, by tile_kernel.inc.h. */
+
+#include "trace/beam16.h"
+#include "trace/gaussian16.h"
+#include "trace/heap.h"
+#include "trace/kernel.h"
+
+enum { RAY_ROUND = 48, SHORT_RUN = 8 };
+
+/* Ordered by (t_c, index): depths are positive, so their bits are in the order of their values. */
+typedef struct ray_hit {
+    uint64_t key; /* bits of t_c << 32 | index */
+    float alpha;
+} ray_hit;
+
+static inline float hit_depth(const ray_hit *h)
+{
+    const uint32_t bits = (uint32_t)(h->key >> 32);
+    float t;
+    memcpy(&t, &bits, sizeof t);
+    return t;
+}
+
+/* Merge sort from runs of SHORT_RUN; `spare` has room for n. */
+static void sort_hits(ray_hit *hits, ray_hit *spare, size_t n)
+{
+    for (size_t first = 0; first < n; first += SHORT_RUN)
+        for (size_t i = first + 1; i < n && i < first + SHORT_RUN; i++) {
+            const ray_hit moved = hits[i];
+            size_t j = i;
+            for (; j > first && hits[j - 1].key > moved.key; j--)
+                hits[j] = hits[j - 1];
+            hits[j] = moved;
+        }
+    ray_hit *from = hits, *to = spare;
+    for (size_t run = SHORT_RUN; run < n; run *= 2) {
+        for (size_t first = 0; first < n; first += 2 * run) {
+            const size_t middle = first + run < n ? first + run : n, end = first + 2 * run < n ? first + 2 * run : n;
+            size_t a = first, b = middle;
+            for (size_t i = first; i < end; i++)
+                to[i] = b == end || (a < middle && from[a].key <= from[b].key) ? from[a++] : from[b++];
+        }
+        ray_hit *swap = from;
+        from = to, to = swap;
+    }
+    if (from != hits)
+        memcpy(hits, from, n * sizeof *hits);
+}
+
+typedef struct ray_state {
+    float transmittance, rgb[3];
+    bool alive;
+    ray_hit *hits; /* in scratch; as many spare ones follow */
+    size_t count, capacity;
+} ray_state;
+
+static bool reserve_hits(ray_state *r, size_t more, kernel_scratch *scratch)
+{
+    if (r->count + more > r->capacity) {
+        const size_t wanted = r->count + more + r->capacity;
+        if (mem_reserve(&scratch->hits, &scratch->hit_bytes, r->count * sizeof *r->hits, 2 * wanted * sizeof *r->hits, 1, "hits of a ray", NULL) != GBT_OK)
+            return false;
+        r->capacity = wanted;
+    }
+    r->hits = scratch->hits;
+    return true;
+}
+
+/* Blend all hits nearer than `horizon`; keep the rest. */
+static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, unsigned packet, int lane, hit_tape *tape, kernel_counters *counters)
+{
+    sort_hits(r->hits, r->hits + r->capacity, r->count);
+    size_t done = 0;
+    for (; done < r->count && hit_depth(&r->hits[done]) < horizon; done++) {
+        const ray_hit *h = &r->hits[done];
+        const uint32_t id = (uint32_t)h->key;
+        const float next = r->transmittance * (1 - h->alpha), weight = r->transmittance * h->alpha;
+        if (next < scene->settings.transmittance_min) {
+            r->alive = false;
+            return true;
+        }
+        const float *color = scene->records + (size_t)id * RECORD_FLOATS + RECORD_COLOR;
+        for (int c = 0; c < 3; c++)
+            r->rgb[c] = fmaf(weight, color[c], r->rgb[c]);
+        r->transmittance = next;
+        counters->blended++;
+        if (tape != NULL && !tape_add(tape, (tape_entry){id, (uint16_t)lane, (uint16_t)(packet | TAPE_SINGLE)}))
+            return false;
+    }
+    memmove(r->hits, r->hits + done, (r->count - done) * sizeof *r->hits);
+    r->count -= done;
+    return true;
+}
+
+static bool hit_leaf(ray_state *r, const kernel_scene *scene, const tree_leaf *leaf, const tile_beam *beam, const ray_lanes *ray, kernel_scratch *scratch,
+                     kernel_counters *counters)
+{
+    ellipsoids16 e;
+    turn_ellipsoids(leaf, beam, &e);
+    const unsigned near = test_ellipsoids(&beam->whole, &e) & (0xFFFFu >> (TREE_WIDTH - leaf->count));
+    if (near == 0)
+        return true;
+    f16 color[3];
+    const gaussian_lanes g = load_gaussians(scene, leaf->id, color);
+    const response at = respond(&g, ray, f16_set1(scene->settings.t_near));
+    const f16 raw = response_alpha(&g, at.d2);
+    counters->tests += (uint64_t)__builtin_popcount(near);
+    _Alignas(64) float t[TREE_WIDTH], alpha[TREE_WIDTH];
+    f16_store(t, at.t), f16_store(alpha, f16_min(raw, f16_set1(scene->settings.alpha_max)));
+    if (!reserve_hits(r, TREE_WIDTH, scratch))
+        return false;
+    for (unsigned bits = m16_bits(f16_le(f16_set1(scene->settings.alpha_min), raw)) & near; bits != 0; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        uint32_t depth;
+        memcpy(&depth, &t[i], sizeof depth);
+        r->hits[r->count++] = (ray_hit){(uint64_t)depth << 32 | leaf->id[i], alpha[i]};
+        counters->hits++;
+    }
+    return true;
+}
+
+static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam *beam, const ray_lanes *ray, unsigned packet, int lane, hit_tape *tape,
+                       kernel_scratch *scratch, kernel_counters *counters)
+{
+    int heap_count = 0;
+    size_t round = RAY_ROUND;
+    for (uint64_t child = (uint64_t)(uintptr_t)scene->root;;) {
+        const tree_leaf *leaf = tree_child_leaf(child);
+        counters->nodes++;
+        if (leaf != NULL) {
+            if (!hit_leaf(r, scene, leaf, beam, ray, scratch, counters))
+                return false;
+        } else {
+            const tree_node *node = (const tree_node *)(uintptr_t)child;
+            _Alignas(64) float entry[TREE_WIDTH];
+            if (mem_reserve((void **)&scratch->heap, &scratch->heap_capacity, (size_t)heap_count, (size_t)heap_count + TREE_WIDTH, sizeof *scratch->heap,
+                            "nodes of a ray", NULL) != GBT_OK)
+                return false;
+            for (unsigned bits = test_children(beam, node, scene->settings.t_near, entry); bits != 0; bits &= bits - 1)
+                heap_push(scratch->heap, &heap_count, entry[__builtin_ctz(bits)], node->child[__builtin_ctz(bits)]);
+        }
+        if (r->count >= round || heap_count == 0) {
+            if (r->count > 0 && !blend_hits(r, scene, heap_count > 0 ? scratch->heap[0].t : INFINITY, packet, lane, tape, counters))
+                return false;
+            if (!r->alive || heap_count == 0)
+                return true;
+            round = 2 * r->count + RAY_ROUND; /* what stays is sorted again, but not often */
+        }
+        child = heap_pop(scratch->heap, &heap_count);
+    }
+}
+
+static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, unsigned packet, int lane, packet_color *out, hit_tape *tape,
+                      kernel_scratch *scratch, kernel_counters *counters)
+{
+    packet_rays alone[TILE_PACKETS];
+    ray_state r = {.transmittance = 1, .alive = true};
+    tile_beam beam;
+    ray_lanes ray;
+    for (int p = 0; p < TILE_PACKETS; p++)
+        alone[p].active = p == 0;
+    for (int axis = 0; axis < 3; axis++)
+        for (int i = 0; i < PACKET_LANES; i++)
+            alone[0].origin[axis][i] = rays->origin[axis][lane], alone[0].dir[axis][i] = rays->dir[axis][lane];
+    load_rays(&alone[0], &ray);
+    r.capacity = scratch->hit_bytes / sizeof *r.hits / 2;
+    if (scene->root != NULL && make_beam(alone, scene, &beam) && !gather_ray(&r, scene, &beam, &ray, packet, lane, tape, scratch, counters))
+        return false;
+    for (int c = 0; c < 3; c++)
+        out->rgb[c][lane] = fmaf(r.transmittance, scene->settings.background[c], r.rgb[c]);
+    out->transmittance[lane] = r.transmittance;
+    return true;
+}

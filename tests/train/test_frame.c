@@ -1,0 +1,212 @@
+/* tests/train/test_frame.c -- frames of any shot: nothing that a ray reaches is left out, samples are averaged in order, same bits for all threads. */
+#include "anchor/fixture.h"
+#include "base/near.h"
+#include "base/parallel.h"
+#include "base/vec.h"
+#include "train/frame.h"
+
+enum { OFFSETS = 3, ANCHORS = 400, W = 24, H = 16, KINDS = 9 };
+
+static double uniform(uint64_t seed, uint64_t index, double low, double high)
+{
+    return low + (high - low) * (double)rng_uniform(seed, 77, index);
+}
+
+static void random_pose(uint64_t seed, uint64_t first, double distance, gbt_camera *camera)
+{
+    double q[4], length = 0;
+    for (uint64_t i = 0; i < 4; i++)
+        q[i] = rng_normal(seed, first, i), length += q[i] * q[i];
+    for (int i = 0; i < 4; i++)
+        q[i] /= sqrt(length);
+    dquat_to_matrix(q, camera->rotation);
+    for (int k = 0; k < 3; k++) /* looking at somewhere near the middle */
+        camera->center[k] = uniform(seed, first * 16 + (uint64_t)k, -0.5, 0.5) - distance * camera->rotation[6 + k];
+}
+
+/* A shot of each kind: lenses, open apertures, shutters, rays given anyhow. */
+static ray_shot random_shot(uint64_t seed, int kind, ray_image *given)
+{
+    static const gbt_camera_model models[KINDS] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_PINHOLE, GBT_CAMERA_FISHEYE, GBT_CAMERA_PINHOLE,
+                                                   GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_PINHOLE, GBT_CAMERA_EQUIRECTANGULAR, GBT_CAMERA_PINHOLE};
+    const bool turn = models[kind] == GBT_CAMERA_EQUIRECTANGULAR;
+    const double focal = kind == 3 ? 8 : uniform(seed, 0, 20, 60);
+    gbt_camera camera = {.model = models[kind], .width = W, .height = H, .params = {turn ? W : focal, turn ? H : focal, 0.5 * W, 0.4 * H}};
+    random_pose(seed, 1, uniform(seed, 2, 0, 5), &camera);
+    ray_shot shot = ray_shot_of(&camera);
+    shot.samples = 3, shot.seed = seed;
+    if (kind == 2 || kind == 3 || kind == 5 || kind == 6)
+        shot.aperture_radius = uniform(seed, 3, 0.01, 0.6), shot.focus_distance = uniform(seed, 4, 0.5, 6);
+    if (kind == 4 || kind == 6) {
+        shot.shutter = seed % 2 == 0 ? RAY_SHUTTER_ROWS : RAY_SHUTTER_COLUMNS;
+        if (kind == 4)
+            random_pose(seed, 9, 3, &shot.end);
+        else
+            shot.end.center[0] += 0.3;
+    }
+    if (kind == 8) {
+        assert_ok(ray_image_reserve(given, W, H, false, NULL));
+        const double wide = seed % 2 == 0 ? 0.2 : 2; /* around an axis, or everywhere */
+        for (size_t i = 0; i < W * H; i++) {
+            double dir[3];
+            for (size_t k = 0; k < 3; k++)
+                given->origin[3 * i + k] = (float)(camera.center[k] + 0.5 * rng_normal(seed, 20 + k, i)), dir[k] = camera.rotation[6 + k] + wide * rng_normal(seed, 30 + k, i);
+            dvec_normalize(dir);
+            for (size_t k = 0; k < 3; k++)
+                given->dir[3 * i + k] = i % 50 == 7 ? 0 : (float)dir[k];
+        }
+        shot.given = given;
+    }
+    return shot;
+}
+
+typedef struct world {
+    anchors a;
+    decoder d;
+    trace_settings s;
+} world;
+
+static world make_world(uint64_t seed)
+{
+    world w = {.a = random_anchors(ANCHORS, OFFSETS, seed), .d = random_decoder(OFFSETS, false, seed + 1000), .s = trace_settings_default()};
+    for (size_t i = 0; i < ANCHORS; i++)
+        for (size_t k = 0; k < 6; k++)
+            w.a.scale_log[6 * i + k] = spread(seed, 200 + k, i, -4.0f, -2.0f);
+    decoder_part parts[3];
+    decoder_parts(&w.d, parts);
+    for (size_t i = 0; i < OFFSETS; i++) /* biases of the opacities */
+        w.d.params[parts[0].end - 1 - i] = 0.7f;
+    w.s.background[1] = 0.3f;
+    return w;
+}
+
+static void free_world(world *w)
+{
+    anchors_free(&w->a);
+    decoder_free(&w->d);
+}
+
+/* Against all anchors, decoded for the same eye, the same rays, sample after sample. */
+static void nothing_reached_is_left_out(void **state)
+{
+    (void)state;
+    size_t left_out[KINDS] = {0}, seen[KINDS] = {0};
+    uint32_t all[ANCHORS];
+    for (uint32_t i = 0; i < ANCHORS; i++)
+        all[i] = i;
+    for (uint64_t seed = 0; seed < 12; seed++)
+        for (int kind = 0; kind < KINDS; kind++) {
+            world w = make_world(seed);
+            frame f = {0};
+            ray_image given = {0}, rays = {0};
+            gaussians g = {0};
+            decode_tape tape = {0};
+            trace_scene scene = {0};
+            image rgb = {0};
+            static double sum[3 * W * H];
+            memset(sum, 0, sizeof sum);
+            const ray_shot shot = random_shot(seed * KINDS + (uint64_t)kind, kind, &given);
+            assert_ok(frame_render_shot(&f, &w.a, &w.d, &shot, &w.s, NULL));
+            left_out[kind] += ANCHORS - f.visible_count;
+            assert_ok(decode_forward(&w.a, &w.d, f.eye, all, ANCHORS, w.s.alpha_min, &g, &tape, NULL));
+            assert_ok(trace_build(&scene, &g, &w.s, 20, NULL));
+            assert_ok(image_alloc(&rgb, W, H, 3, NULL));
+            const int samples = ray_shot_sample_count(&shot);
+            for (int s = 0; s < samples; s++) {
+                assert_ok(ray_image_from_shot(&shot, s, &rays, NULL));
+                assert_ok(trace_forward(&scene, &rays, false, &rgb, NULL, NULL, NULL));
+                for (size_t i = 0; i < 3 * W * H; i++)
+                    sum[i] += (double)rgb.pixels[i];
+            }
+            for (size_t i = 0; i < 3 * W * H; i++) {
+                const double want = sum[i] / samples;
+                if (!(fabs((double)f.rgb.pixels[i] - want) < 3e-6))
+                    fail_msg("seed %d, kind %d, pixel %zu: %.9g, with all anchors %.9g (%zu of them visible)", (int)seed, kind, i / 3,
+                             (double)f.rgb.pixels[i], want, f.visible_count);
+                seen[kind] += fabs(want - (double)w.s.background[i % 3]) > 0.01;
+            }
+            frame_free(&f);
+            ray_image_free(&given);
+            ray_image_free(&rays);
+            gaussians_free(&g);
+            decode_tape_free(&tape);
+            trace_scene_free(&scene);
+            image_free(&rgb);
+            free_world(&w);
+        }
+    for (int kind = 0; kind < KINDS; kind++) { /* the test sees something, and something is left out (a panorama sees all) */
+        if (seen[kind] < 500 || (kind == 7) != (left_out[kind] < 15))
+            fail_msg("kind %d: %zu values seen, %zu anchors left out", kind, seen[kind], left_out[kind]);
+    }
+}
+
+/* frame_render() is the shot of a still camera. */
+static void a_camera_is_a_shot(void **state)
+{
+    (void)state;
+    world w = make_world(3);
+    frame a = {0}, b = {0};
+    const ray_shot shot = random_shot(5, 0, NULL);
+    assert_ok(frame_render(&a, &w.a, &w.d, &shot.camera, &w.s, true, NULL));
+    assert_ok(frame_render_shot(&b, &w.a, &w.d, &shot, &w.s, NULL));
+    assert_memory_equal(a.rgb.pixels, b.rgb.pixels, 3 * W * H * sizeof(float));
+    for (int k = 0; k < 3; k++)
+        assert_true(a.eye[k] == (float)shot.camera.center[k]);
+    frame_free(&a);
+    frame_free(&b);
+    free_world(&w);
+}
+
+static void same_bits_for_every_thread_count(void **state)
+{
+    (void)state;
+    world w = make_world(4);
+    for (int kind = 0; kind < KINDS; kind++) {
+        uint64_t hash[3];
+        for (int t = 0; t < 3; t++) {
+            frame f = {0};
+            ray_image given = {0};
+            const ray_shot shot = random_shot(100 + (uint64_t)kind, kind, &given);
+            parallel_set_threads(t == 2 ? 7 : t + 1);
+            assert_ok(frame_render_shot(&f, &w.a, &w.d, &shot, &w.s, NULL));
+            hash[t] = hash_bytes(0, f.rgb.pixels, 3 * W * H * sizeof(float));
+            frame_free(&f);
+            ray_image_free(&given);
+        }
+        assert_true(hash[0] == hash[1] && hash[0] == hash[2]);
+    }
+    parallel_set_threads(2);
+    free_world(&w);
+}
+
+/* Rays that are all nowhere show the background. */
+static void no_rays(void **state)
+{
+    (void)state;
+    world w = make_world(5);
+    frame f = {0};
+    ray_image given = {0};
+    ray_shot shot = random_shot(8, 8, &given);
+    memset(given.dir, 0, 3 * W * H * sizeof *given.dir);
+    assert_ok(frame_render_shot(&f, &w.a, &w.d, &shot, &w.s, NULL));
+    for (size_t i = 0; i < 3 * W * H; i++)
+        assert_true(f.rgb.pixels[i] == w.s.background[i % 3]);
+    shot.given = NULL, shot.aperture_radius = 1, shot.focus_distance = 0;
+    gbt_error err = {0};
+    assert_int_equal(frame_render_shot(&f, &w.a, &w.d, &shot, &w.s, &err), GBT_ERR_ARGUMENT);
+    assert_string_equal(err.text, "camera: focus distance 0 (wanted > 0, as there is an aperture)");
+    frame_free(&f);
+    ray_image_free(&given);
+    free_world(&w);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(nothing_reached_is_left_out),
+        cmocka_unit_test(a_camera_is_a_shot),
+        cmocka_unit_test(same_bits_for_every_thread_count),
+        cmocka_unit_test(no_rays),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

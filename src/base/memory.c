@@ -65,6 +65,20 @@ gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count
     return GBT_OK;
 }
 
+gbt_status mem_trim(void **array, size_t *capacity, size_t used, size_t size, const char *what, gbt_error *err)
+{
+    if (used == *capacity)
+        return GBT_OK;
+    void *exact = mem_alloc(used, size, what, err);
+    if (exact == NULL)
+        return GBT_ERR_NO_MEMORY;
+    if (used > 0)
+        memcpy(exact, *array, used * size);
+    mem_free(*array);
+    *array = exact, *capacity = used;
+    return GBT_OK;
+}
+
 void mem_free(void *pointer)
 {
     free(pointer);

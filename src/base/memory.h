@@ -23,6 +23,9 @@ void *mem_calloc(size_t count, size_t size, const char *what, gbt_error *err);
  */
 gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count, size_t size, const char *what, gbt_error *err);
 
+/** Cut `*array` to the `used` elements that it holds: what grew by half must not be kept by the hundred. On failure nothing changes. */
+gbt_status mem_trim(void **array, size_t *capacity, size_t used, size_t size, const char *what, gbt_error *err);
+
 void mem_free(void *pointer); /* NULL is fine */
 
 /** Test only: the n-th allocation from now fails (0 = the next one); a negative n switches this off. */

@@ -48,6 +48,7 @@ typedef struct gaussian_tree {
  * Build (or rebuild) the tree.
  *
  * @param alpha_min  [in] smallest response that counts, (0, 1)
+ * @param radius    [in] largest distance that counts, in std-devs, > 0, may be infinite
  * @param reach      [in] largest |coordinate| of any ray origin that will be traced: boxes are padded for it
  * @param tree       [in,out] start from {0}; memory is reused from build to build; free with gaussian_tree_free()
  * @return GBT_OK, GBT_ERR_NO_MEMORY or GBT_ERR_INTERNAL (Embree's own words)
@@ -55,7 +56,7 @@ typedef struct gaussian_tree {
  * Threads: one build at a time per tree; uses all threads inside; the same tree for every thread count.
  * Cost: O(n log n); about 70 bytes per Gaussian.
  */
-gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float reach, gaussian_tree *tree, gbt_error *err);
+gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float radius, float reach, gaussian_tree *tree, gbt_error *err);
 void gaussian_tree_free(gaussian_tree *tree);
 
 #endif

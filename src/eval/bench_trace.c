@@ -101,7 +101,7 @@ static gbt_status time_passes(trace_scene *traced, const gaussians *g, const tra
         const double t1 = clock_wall(), c1 = clock_process();
         memset(&out->counters, 0, sizeof out->counters);
         if (status == GBT_OK)
-            status = trace_forward(traced, rays, true, rgb, NULL, &out->counters, err);
+            status = trace_forward(traced, rays, true, &(trace_outputs){.rgb = rgb}, &out->counters, err);
         const double t2 = clock_wall(), c2 = clock_process();
         if (status == GBT_OK)
             status = trace_backward(traced, rays, &d_rgb, &d_gaussians, NULL, NULL, err);

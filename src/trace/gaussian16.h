@@ -133,6 +133,26 @@ static inline void refine_point(const gaussian_lanes *g, const ray_lanes *ray, f
     }
 }
 
+/* The smallest alpha that is a hit: trace_threshold(). */
+static inline f16 alpha_threshold(const kernel_scene *scene, f16 opacity)
+{
+    return f16_max(f16_set1(scene->settings.alpha_min), f16_mul(opacity, f16_set1(scene->radius_response)));
+}
+
+/* Direction of the shortest axis, world. */
+static inline void shortest_axis(const float *record, float normal[3])
+{
+    const float *best = NULL;
+    float square = 0;
+    for (int i = 0; i < 3; i++) {
+        const float *row = record + RECORD_MATRIX + 3 * i, length = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
+        if (best == NULL || length > square)
+            best = row, square = length;
+    }
+    for (int k = 0; k < 3; k++)
+        normal[k] = best[k] / sqrtf(square);
+}
+
 /* opacity exp(-d2 / 2). What 2^-120 cuts off is far below every alpha_min that can be set. */
 static inline f16 response_alpha(const gaussian_lanes *g, f16 d2)
 {

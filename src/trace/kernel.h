@@ -25,23 +25,30 @@ enum { RECORD_MATRIX = 0, RECORD_MEAN = 9, RECORD_OPACITY = 12, RECORD_COLOR = 1
 
 typedef struct kernel_scene {
     const tree_node *root; /* NULL: nothing to hit */
+    const struct gaussian_scene *embree; /* for forward_embree only */
     const float *records;  /* [count][RECORD_FLOATS], 64-byte aligned */
     float coordinate_max;  /* of boxes and ray origins */
+    bool extra;            /* all of packet_output is wanted, not only colour and transmittance */
     trace_settings settings;
+    float radius_response; /* exp(-proxy_radius^2 / 2) */
 } kernel_scene;
 
 typedef struct packet_rays {
     _Alignas(64) float origin[3][PACKET_LANES];
     _Alignas(64) float dir[3][PACKET_LANES]; /* unit; lanes that are not active repeat an active one */
+    _Alignas(64) float far[PACKET_LANES];    /* hits at this t_c or behind are not seen */
     unsigned active;                         /* bit per lane; 0: the packet is not traced */
 } packet_rays;
 
-typedef struct packet_color {
+typedef struct packet_output {
     _Alignas(64) float rgb[3][PACKET_LANES]; /* with the background */
     _Alignas(64) float transmittance[PACKET_LANES];
-} packet_color;
+    /* with kernel_scene.extra; see trace_outputs */
+    _Alignas(64) float weighted_depth[PACKET_LANES], median_depth[PACKET_LANES], normal[3][PACKET_LANES], hit_count[PACKET_LANES];
+    _Alignas(64) uint32_t strongest[PACKET_LANES];
+} packet_output;
 
-/* What forward leaves for backward, per block of tiles: the Gaussians that were blended, tile after tile, each tile closed by TAPE_END. */
+/* What forward leaves for backward, per tile: the Gaussians that were blended, closed by TAPE_END. */
 enum { TAPE_SINGLE = 0x4000, TAPE_END = 0x8000 };
 typedef struct tape_entry {
     uint32_t id;
@@ -54,6 +61,12 @@ typedef struct hit_tape {
     size_t count, capacity;
 } hit_tape;
 
+static inline void hit_tape_free(hit_tape *tape)
+{
+    mem_free(tape->entries);
+    *tape = (hit_tape){0};
+}
+
 /** False when memory ran out. */
 static inline bool tape_add(hit_tape *tape, tape_entry entry)
 {
@@ -64,14 +77,14 @@ static inline bool tape_add(hit_tape *tape, tape_entry entry)
     return true;
 }
 
-/* What one block of tiles adds to the gradient of one Gaussian. The sums are of one hit's v (canonical point), g = dL/d(d2), and so on. */
+/* What one tile adds to the gradient of one Gaussian. The sums are of one hit's v (canonical point), g = dL/d(d2), and so on. */
 enum { GRADIENT_V = 0, GRADIENT_VV = 3, GRADIENT_OPACITY = 9, GRADIENT_COLOR = 10, GRADIENT_WEIGHT = 13, GRADIENT_FLOATS = 15 };
 typedef struct gradient_record {
     float sum[GRADIENT_FLOATS]; /* V: sum g v; VV: sum g (v v^T), xx yy zz yz zx xy; OPACITY, COLOR: dL/d; WEIGHT: sum T alpha */
     uint32_t id;
 } gradient_record;
 
-/* The records of a block, one per Gaussian, in the order in which its packets met them. */
+/* The records of a tile, one per Gaussian, in the order in which its packets met them. */
 typedef struct gradient_list {
     gradient_record *records;
     size_t count, capacity;
@@ -83,8 +96,14 @@ typedef struct gradient_list {
 gradient_record *gradient_list_find(gradient_list *list, uint32_t id);
 
 typedef struct kernel_counters {
-    uint64_t rays, nodes, candidates, tests, hits, blended, rows, pairs, spilled_packets;
+    uint64_t rays, nodes, candidates, tests, hits, blended, rows, pairs, spilled_packets, tape_bytes;
 } kernel_counters;
+
+/* Ordered by (t_c, index): depths are positive, so their bits are in the order of their values. */
+typedef struct ray_hit {
+    uint64_t key; /* bits of t_c << 32 | index */
+    float alpha;
+} ray_hit;
 
 /* Growing scratch of one worker. Start from {0}. */
 typedef struct kernel_scratch {
@@ -94,6 +113,11 @@ typedef struct kernel_scratch {
     size_t hit_bytes;
     struct heap_entry *heap;
     size_t heap_capacity;
+    struct lane_hit {
+        ray_hit hit;
+        uint32_t lane;
+    } *lane_hits;
+    size_t lane_hit_capacity;
 } kernel_scratch;
 
 /* The rays of a tile of pixels. */
@@ -103,20 +127,20 @@ typedef struct tile_rays {
 } tile_rays;
 
 /** Trace a tile. `tape` is NULL when no adjoint will follow. False when memory ran out. */
-typedef bool tile_forward_fn(const kernel_scene *scene, const tile_rays *rays, packet_color out[TILE_PACKETS], hit_tape *tape,
+typedef bool tile_forward_fn(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape,
                              kernel_scratch *scratch, kernel_counters *counters);
 
 /**
- * Adjoint of a tile: replay the hits that forward left at tape[*cursor...], add to the record of every Gaussian that was blended.
+ * Adjoint of a tile: replay the hits that forward left on the tape, add to the record of every Gaussian that was blended.
  *
  * @param d_rgb        [in]  dL/d(rgb)
  * @param d_background [out] [3], added to
  */
 typedef bool tile_backward_fn(const kernel_scene *scene, const tile_rays *rays, float d_rgb[TILE_PACKETS][3][PACKET_LANES],
-                              const tape_entry *tape, size_t *cursor, gradient_list *out, float d_background[3], kernel_scratch *scratch);
+                              const tape_entry *tape, gradient_list *out, float d_background[3], kernel_scratch *scratch);
 
 typedef struct tile_kernel {
-    tile_forward_fn *forward;
+    tile_forward_fn *forward, *forward_single, *forward_embree; /* in tiles; ray by ray; by Embree's traversal */
     tile_backward_fn *backward;
 } tile_kernel;
 

@@ -387,6 +387,7 @@ void ray_image_free(ray_image *rays)
 {
     mem_free(rays->origin);
     mem_free(rays->dir);
+    mem_free(rays->far);
     mem_free(rays->camera_dir);
     memset(rays, 0, sizeof *rays);
 }

@@ -15,6 +15,7 @@ typedef struct ray_image {
     float *origin;      /* [3] when shared by all rays (common_origin), else [height * width][3]; scene-local units; owned */
     float *dir;         /* [height * width][3], unit (to float rounding) or zero; owned */
     bool common_origin;
+    float *far;         /* [height * width] or NULL: nothing at this distance or behind it is seen (a surface stands there); owned */
     /* Kept by ray_image_from_shot() for the next pose of the same lens; NULL for a pinhole. */
     double *camera_dir; /* [height * width][3] in camera axes; owned */
     gbt_camera camera;  /* whose lens camera_dir is */

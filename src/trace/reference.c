@@ -46,7 +46,7 @@ static prepared prepare(const reference_scene *scene, const trace_settings *s, s
         for (int k = 0; k < 3; k++)
             p.canon[3 * axis + k] = r[3 * k + axis] / field(scene, REFERENCE_scale_x + (unsigned)axis, i);
     }
-    p.d2_max = is_usable(scene, i) ? 2 * log(p.opacity / (double)s->alpha_min) + 1e-6 : -HUGE_VAL;
+    p.d2_max = is_usable(scene, i) ? fmin(2 * log(p.opacity / (double)s->alpha_min) + 1e-6, pow((double)s->proxy_radius, 2)) : -HUGE_VAL;
     return p;
 }
 
@@ -85,7 +85,7 @@ typedef struct hit_list {
     size_t count, capacity;
 } hit_list;
 
-static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s, const double origin[3], const double dir[3],
+static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s, const double origin[3], const double dir[3], double far,
                          hit_list *list, gbt_error *err)
 {
     list->count = 0;
@@ -94,7 +94,7 @@ static gbt_status gather(const prepared *all, size_t all_count, const trace_sett
     for (size_t i = 0; i < all_count; i++) {
         reference_hit hit = {.id = (uint32_t)i};
         double v[3];
-        if (!respond(&all[i], s, origin, dir, &hit, v))
+        if (!respond(&all[i], s, origin, dir, &hit, v) || !(hit.t < far))
             continue;
         GBT_TRY(mem_reserve((void **)&list->hits, &list->capacity, list->count, list->count + 1, sizeof hit, "reference hits", err));
         list->hits[list->count++] = hit;
@@ -141,6 +141,11 @@ static void ray_of(const ray_image *rays, size_t i, double origin[3], double dir
         origin[k] = (double)ray_image_origin(rays, i)[k], dir[k] = (double)rays->dir[3 * i + (size_t)k];
 }
 
+static double far_of(const ray_image *rays, size_t i)
+{
+    return rays->far == NULL ? HUGE_VAL : (double)rays->far[i];
+}
+
 typedef struct forward_job {
     const reference_scene *scene;
     const trace_settings *s;
@@ -158,7 +163,7 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++) {
         double origin[3], dir[3], transmittance;
         ray_of(job->rays, i, origin, dir);
-        job->status[block] = gather(job->all, job->scene->count, job->s, origin, dir, &list, NULL);
+        job->status[block] = gather(job->all, job->scene->count, job->s, origin, dir, far_of(job->rays, i), &list, NULL);
         const size_t n = blend(job->scene, job->s, &list, job->rgb + 3 * i, &transmittance);
         if (job->transmittance != NULL)
             job->transmittance[i] = transmittance;
@@ -257,7 +262,7 @@ gbt_status reference_scene_backward(const reference_scene *scene, const trace_se
     for (size_t i = 0; i < ray_image_count(rays) && status == GBT_OK; i++) {
         double origin[3], dir[3];
         ray_of(rays, i, origin, dir);
-        status = gather(all, scene->count, s, origin, dir, &list, err);
+        status = gather(all, scene->count, s, origin, dir, far_of(rays, i), &list, err);
         if (status == GBT_OK)
             ray_backward(scene, all, s, origin, dir, &list, d_rgb + 3 * i, d_transmittance != NULL ? d_transmittance[i] : 0, d_gaussians,
                          d_background);
@@ -274,7 +279,7 @@ gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_se
     prepared *all = NULL;
     gbt_status status = prepare_all(scene, s, &all, err);
     if (status == GBT_OK)
-        status = gather(all, scene->count, s, origin, dir, &list, err);
+        status = gather(all, scene->count, s, origin, dir, HUGE_VAL, &list, err);
     mem_free(all);
     *hits = list.hits, *capacity = list.capacity, *count = status == GBT_OK ? list.count : 0;
     return status;

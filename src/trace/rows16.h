@@ -16,6 +16,12 @@
 
 enum { ROW_CAPACITY = 512, ROW_BLOCK = 4 /* rows whose windows are walked together */ };
 
+/* What a ray shows beside its colour. */
+typedef struct packet_extra {
+    f16 depth, median, normal[3], count, top_weight;
+    _Alignas(64) uint32_t top_id[PACKET_LANES];
+} packet_extra;
+
 typedef struct packet_rows {
     _Alignas(64) float t[ROW_CAPACITY * PACKET_LANES];     /* infinity where the ray has no hit left in this row */
     _Alignas(64) float alpha[ROW_CAPACITY * PACKET_LANES]; /* 0 there */
@@ -23,7 +29,8 @@ typedef struct packet_rows {
     uint16_t blended[ROW_CAPACITY]; /* rays that have blended the row */
     int count;
     m16 alive;
-    f16 transmittance, rgb[3];
+    f16 transmittance, rgb[3], far;
+    packet_extra extra;
 } packet_rows;
 
 /* Rows in the order of their nearest depth, whole vectors of PACKET_LANES; ROW_BLOCK more rows follow the last, so that blocks are whole. */

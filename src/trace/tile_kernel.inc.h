@@ -3,12 +3,13 @@
    Wanted before inclusion: KERNEL_NAME, the name of the exported tile_kernel. */
 
 #include "trace/beam16.h"
+#include "trace/embree16.h"
 #include "trace/gaussian16.h"
 #include "trace/heap.h"
 #include "trace/kernel.h"
-#include "trace/ray_kernel.inc.h"
+#include "trace/ray16.h"
 #include "trace/rows16.h"
-#include "trace/tile_adjoint.inc.h"
+#include "trace/adjoint16.h"
 #include "trace/view16.h"
 
 enum {
@@ -20,18 +21,22 @@ enum {
 
 /* ---- a packet ------------------------------------------------------------------------------------------------------------------------ */
 
-static void start_packet(packet_rows *p, unsigned active)
+static void start_packet(packet_rows *p, const packet_rays *rays)
 {
+    const f16 zero = f16_set1(0);
+    p->extra = (packet_extra){zero, f16_set1(INFINITY), {zero, zero, zero}, zero, zero, {0}};
+    memset(p->extra.top_id, 0xFF, sizeof p->extra.top_id);
+    p->far = f16_load(rays->far);
     p->count = 0;
     p->transmittance = f16_set1(1);
     for (int c = 0; c < 3; c++)
         p->rgb[c] = f16_set1(0);
-    p->alive = m16_from_bits(active);
+    p->alive = m16_from_bits(rays->active);
 }
 
-static inline void append_row(packet_rows *p, uint32_t id, f16 t, f16 raw, const trace_settings *settings, kernel_counters *counters)
+static inline void append_row(packet_rows *p, uint32_t id, f16 t, f16 raw, f16 threshold, const trace_settings *settings, kernel_counters *counters)
 {
-    const m16 hit = m16_and(f16_le(f16_set1(settings->alpha_min), raw), p->alive);
+    const m16 hit = m16_and(m16_and(f16_le(threshold, raw), f16_lt(t, p->far)), p->alive);
     row_store(p->t, p->count, f16_select(hit, t, f16_set1(INFINITY)));
     row_store(p->alpha, p->count, f16_select(hit, f16_min(raw, f16_set1(settings->alpha_max)), f16_set1(0)));
     p->id[p->count] = id;
@@ -75,8 +80,29 @@ static bool close_rows(packet_rows *p, int packet, float horizon, const round_ro
     return true;
 }
 
+/* What a blended row adds to the outputs beside colour. */
+static void note_row(packet_rows *p, const packet_rays *rays, const float *record, uint32_t id, m16 blend, f16 weight, f16 next, f16 t)
+{
+    packet_extra *e = &p->extra;
+    const f16 zero = f16_set1(0);
+    float normal[3];
+    shortest_axis(record, normal);
+    const f16 dir[3] = {f16_load(rays->dir[0]), f16_load(rays->dir[1]), f16_load(rays->dir[2])};
+    const f16 facing = f16_fma(f16_set1(normal[2]), dir[2], f16_fma(f16_set1(normal[1]), dir[1], f16_mul(f16_set1(normal[0]), dir[0])));
+    const f16 toward = f16_select(f16_lt(facing, zero), weight, f16_sub(zero, weight)); /* normals look at the camera */
+    for (int k = 0; k < 3; k++)
+        e->normal[k] = f16_fma(toward, f16_set1(normal[k]), e->normal[k]);
+    e->depth = f16_fma(weight, f16_select(blend, t, zero), e->depth);
+    e->median = f16_min(e->median, f16_select(m16_and(blend, f16_lt(next, f16_set1(0.5f))), t, f16_set1(INFINITY)));
+    e->count = f16_add_where(blend, e->count, f16_set1(1));
+    const m16 top = f16_lt(e->top_weight, weight);
+    e->top_weight = f16_max(e->top_weight, weight);
+    for (unsigned bits = m16_bits(top); bits != 0; bits &= bits - 1)
+        e->top_id[__builtin_ctz(bits)] = id;
+}
+
 /* Blend all hits nearer than `horizon`; keep the rest. */
-static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, float horizon, hit_tape *tape, round_rows *o, kernel_counters *counters)
+static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, const packet_rays *rays, float horizon, hit_tape *tape, round_rows *o, kernel_counters *counters)
 {
     if (p->count == 0 || row_depths(p, o) >= horizon)
         return true;
@@ -104,6 +130,8 @@ static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, fl
             const float *color = scene->records + (size_t)p->id[row] * RECORD_FLOATS + RECORD_COLOR;
             for (int c = 0; c < 3; c++)
                 p->rgb[c] = f16_fma(weight, f16_set1(color[c]), p->rgb[c]);
+            if (scene->extra)
+                note_row(p, rays, color - RECORD_COLOR, p->id[row], blend, weight, next, row_load(o->t, first + k));
             p->blended[row] = (uint16_t)(p->blended[row] | m16_bits(blend));
         }
     }
@@ -230,14 +258,14 @@ static inline void evaluate(tile_state *s, const kernel_scene *scene, const pack
     if (s->in_front[number / 16] >> number % 16 & 1) {
         const view_gaussians *view = &s->view[number / 16];
         const view_response r = view_respond(view, number % 16, &s->view_rays[packet]);
-        append_row(rows, id, r.t, view_alpha(view, number % 16, r.exponent), &scene->settings, counters);
+        append_row(rows, id, r.t, view_alpha(view, number % 16, r.exponent), f16_set1(view->field[VIEW_THRESHOLD][number % 16]), &scene->settings, counters);
         return;
     }
     const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
     ray_lanes ray;
     load_rays(rays, &ray);
     const response r = respond(&g, &ray, f16_set1(scene->settings.t_near));
-    append_row(rows, id, r.t, response_alpha(&g, r.d2), &scene->settings, counters);
+    append_row(rows, id, r.t, response_alpha(&g, r.d2), alpha_threshold(scene, g.opacity), &scene->settings, counters);
 }
 
 /* Every live packet evaluates the candidates that reach into its beam and blends what lies before `horizon`. A packet whose rows do not fit
@@ -250,7 +278,7 @@ static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays
         for (int i = 0; i < 16; i++)
             id[i] = s->id[first + i < s->count ? first + i : first];
         const gaussian_lanes g = load_gaussians(scene, id, color);
-        const m16 sound = view_gaussians_from(&g, color, &s->beam, &s->view[first / 16], NULL);
+        const m16 sound = view_gaussians_from(scene, &g, color, &s->beam, &s->view[first / 16], NULL);
         s->in_front[first / 16] &= (uint16_t)m16_bits(sound);
     }
     for (unsigned packets = s->alive_packets; packets != 0; packets &= packets - 1) {
@@ -259,7 +287,7 @@ static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays
         int first = 0;
         for (; first < s->count; first += 16) {
             /* No room for sixteen more: blend what the candidates that are left cannot come before. */
-            if (rows->count > ROW_CAPACITY - 16 && !blend_rows(rows, p, scene, fminf(horizon, s->nearest[first]), tape, &s->order, counters))
+            if (rows->count > ROW_CAPACITY - 16 && !blend_rows(rows, p, scene, &rays->packet[p], fminf(horizon, s->nearest[first]), tape, &s->order, counters))
                 return false;
             if (rows->count > ROW_CAPACITY - 16 || !m16_any(rows->alive))
                 break;
@@ -269,7 +297,7 @@ static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays
         const bool no_room = first < s->count && m16_any(rows->alive);
         if (no_room)
             s->spilled_packets |= 1u << p;
-        else if (!blend_rows(rows, p, scene, horizon, tape, &s->order, counters))
+        else if (!blend_rows(rows, p, scene, &rays->packet[p], horizon, tape, &s->order, counters))
             return false;
         if (no_room || !m16_any(rows->alive))
             s->alive_packets &= ~(1u << p);
@@ -321,7 +349,7 @@ static bool gather_tile(tile_state *s, const kernel_scene *scene, const tile_ray
 }
 
 /* The packets that are done in `done`; the others are traced ray by ray. */
-static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const tile_state *s, unsigned done, packet_color out[TILE_PACKETS], hit_tape *tape,
+static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const tile_state *s, unsigned done, packet_output out[TILE_PACKETS], hit_tape *tape,
                         kernel_scratch *scratch, kernel_counters *counters)
 {
     for (int p = 0; p < TILE_PACKETS; p++) {
@@ -329,6 +357,11 @@ static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const 
             for (int c = 0; c < 3; c++)
                 f16_store(out[p].rgb[c], f16_fma(s->packet[p].transmittance, f16_set1(scene->settings.background[c]), s->packet[p].rgb[c]));
             f16_store(out[p].transmittance, s->packet[p].transmittance);
+            const packet_extra *e = &s->packet[p].extra;
+            f16_store(out[p].weighted_depth, e->depth), f16_store(out[p].median_depth, e->median), f16_store(out[p].hit_count, e->count);
+            for (int k = 0; k < 3; k++)
+                f16_store(out[p].normal[k], e->normal[k]);
+            memcpy(out[p].strongest, e->top_id, sizeof e->top_id);
             continue;
         }
         counters->spilled_packets += rays->packet[p].active != 0;
@@ -339,7 +372,7 @@ static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const 
     return tape == NULL || tape_add(tape, (tape_entry){0, 0, TAPE_END});
 }
 
-static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_color out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch,
+static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch,
                     kernel_counters *counters)
 {
     tile_state s;
@@ -348,7 +381,7 @@ static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_col
     for (int p = 0; p < TILE_PACKETS; p++)
         if (rays->packet[p].active != 0) {
             packets |= 1u << p;
-            start_packet(&s.packet[p], rays->packet[p].active);
+            start_packet(&s.packet[p], &rays->packet[p]);
             counters->rays += (uint64_t)__builtin_popcount(rays->packet[p].active);
         }
     s.alive_packets = packets, s.spilled_packets = 0;
@@ -366,4 +399,25 @@ static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_col
     return finish_tile(scene, rays, &s, packets & ~s.spilled_packets, out, tape, scratch, counters);
 }
 
-const tile_kernel KERNEL_NAME = {forward, backward};
+static bool forward_single(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch,
+                           kernel_counters *counters)
+{
+    for (unsigned p = 0; p < TILE_PACKETS; p++)
+        for (unsigned bits = rays->packet[p].active; bits != 0; bits &= bits - 1, counters->rays++)
+            if (!trace_ray(scene, &rays->packet[p], p, __builtin_ctz(bits), &out[p], tape, scratch, counters))
+                return false;
+    return tape == NULL || tape_add(tape, (tape_entry){0, 0, TAPE_END});
+}
+
+static bool forward_embree(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch,
+                           kernel_counters *counters)
+{
+    for (unsigned p = 0; p < TILE_PACKETS; p++) {
+        counters->rays += (uint64_t)__builtin_popcount(rays->packet[p].active);
+        if (rays->packet[p].active != 0 && !embree_packet(scene, &rays->packet[p], p, &out[p], tape, scratch, counters))
+            return false;
+    }
+    return tape == NULL || tape_add(tape, (tape_entry){0, 0, TAPE_END});
+}
+
+const tile_kernel KERNEL_NAME = {forward, forward_single, forward_embree, backward};

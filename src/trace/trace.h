@@ -8,26 +8,46 @@
 #include "base/cpu.h"
 #include "base/gaussians.h"
 #include "base/image.h"
+#include "bvh/gaussian_scene.h"
+#include "trace/gradients.h"
 #include "trace/kernel.h"
 #include "trace/rays.h"
 #include "trace/settings.h"
 
+/** Which way rays go. All give the same picture to float rounding; the adjoint is the same for all. */
+typedef enum trace_kernel {
+    TRACE_TILE,   /* 16 x 16 pixels share one way through the tree: for cameras */
+    TRACE_SINGLE, /* ray by ray: for rays that do not run together */
+    TRACE_EMBREE  /* packets of 16 under Embree's own traversal: the baseline of every benchmark */
+} trace_kernel;
+
 /** One view's Gaussians, ready to be traced; and the memory of passes over them, reused from view to view. Start from {0}. */
 typedef struct trace_scene {
+    trace_kernel kernel;     /* set before trace_build(); default TRACE_TILE */
+    size_t tape_bytes_max;   /* tiles whose hits would go beyond this are traced again by trace_backward(), to the same bits; 0: no limit */
     const gaussians *source; /* borrowed from trace_build() */
     gaussian_tree tree;
+    gaussian_scene embree; /* in place of the tree, for TRACE_EMBREE */
     trace_settings settings;
     float *records;
     size_t record_capacity;
     float reach; /* largest |coordinate| of the ray origins announced to trace_build() */
-    struct trace_block *blocks; /* internal: tape and gradient records of each block of packets */
-    size_t block_count, block_capacity;
+    struct trace_tile *tiles; /* internal: tape and gradient records of each tile */
+    size_t tile_count, tile_capacity;
     int tape_width, tape_height; /* rays of the forward pass that the tape holds; 0: none */
-    const gradient_record **record_order; /* internal: gradient records sorted by Gaussian, */
-    size_t record_order_capacity;
-    uint32_t *record_first;               /* and where each Gaussian's begin */
-    size_t record_first_capacity;
+    gradient_order order;        /* internal */
 } trace_scene;
+
+/** What trace_forward() writes; arrays of one value per ray unless said otherwise. All but `rgb` are optional (NULL). */
+typedef struct trace_outputs {
+    image *rgb;           /* 3 channels, size of the rays, allocated by the caller; with the background */
+    float *transmittance; /* what is left for the background, in [0, 1] */
+    float *depth;         /* expected t_c: sum of T alpha t_c / (1 - transmittance); 0 where nothing is hit */
+    float *median_depth;  /* t_c of the hit that takes T below 1/2; 0 where none does */
+    float *normal;        /* [3] sum of T alpha n; n: the shortest axis, unit, world, turned towards the ray's origin */
+    float *hit_count;     /* hits that were blended */
+    uint32_t *strongest;  /* Gaussian of the largest T alpha; UINT32_MAX where there is none */
+} trace_outputs;
 
 /**
  * Prepare `g` for tracing.
@@ -42,17 +62,16 @@ gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_setti
 /**
  * Trace rays.
  *
- * @param rgb            [out] 3 channels, size of `rays`, allocated by the caller; with the background
- * @param transmittance  [out] optional (NULL), [height * width]
- * @param keep_tape      [in]  true when trace_backward() will follow: keeps about 25 bytes per blended hit
- * @param counters       [in,out] optional, added to
+ * @param keep_tape [in]  true when trace_backward() will follow: keeps about one byte per blended hit (trace_scene.tape_bytes_max)
+ * @param out       [out] colour costs what tracing costs; each other output a few per cent more
+ * @param counters  [in,out] optional, added to
+ * @return GBT_OK, GBT_ERR_ARGUMENT (size of out->rgb), GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count.
  */
-gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, image *rgb, float *transmittance, kernel_counters *counters,
-                         gbt_error *err);
+gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out, kernel_counters *counters, gbt_error *err);
 
 /**
- * Adjoint of the last trace_forward(keep_tape) on `scene`, with the same rays.
+ * Adjoint of the last trace_forward(keep_tape) on `scene`, with the same rays. Once: the tape is given back.
  *
  * @param d_rgb        [in]  dL/d(rgb), size of `rays`
  * @param d_gaussians  [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion tangent)

@@ -24,7 +24,7 @@ typedef struct view_rays {
 } view_rays;
 
 /* Sixteen Gaussians; a row reads one of them. */
-enum { VIEW_A, VIEW_B, VIEW_Q, VIEW_DEPTH = VIEW_Q + 5, VIEW_FALLOFF, VIEW_OPACITY, VIEW_RED, VIEW_GREEN, VIEW_BLUE, VIEW_FIELDS };
+enum { VIEW_A, VIEW_B, VIEW_Q, VIEW_DEPTH = VIEW_Q + 5, VIEW_FALLOFF, VIEW_OPACITY, VIEW_THRESHOLD, VIEW_RED, VIEW_GREEN, VIEW_BLUE, VIEW_FIELDS };
 typedef struct view_gaussians {
     _Alignas(64) float field[VIEW_FIELDS][16]; /* FALLOFF: R^2 log2(e) / 2, so that the response is 2^(-FALLOFF y / den) */
 } view_gaussians;
@@ -52,7 +52,7 @@ static inline void cross16(const f16 a[3], const f16 b[3], f16 out[3])
 }
 
 /* The lanes whose form is sound: everything finite and nothing lost to underflow. */
-static inline m16 view_gaussians_from(const gaussian_lanes *g, const f16 color[3], const tile_beam *b, view_gaussians *out, view_axes *axes)
+static inline m16 view_gaussians_from(const kernel_scene *scene, const gaussian_lanes *g, const f16 color[3], const tile_beam *b, view_gaussians *out, view_axes *axes)
 {
     const f16 one = f16_set1(1);
     f16 offset[3], unit[9], stretch[9], square[3];
@@ -96,6 +96,7 @@ static inline m16 view_gaussians_from(const gaussian_lanes *g, const f16 color[3
     const f16 falloff = f16_mul(f16_set1(0.72134752f), f16_mul(distance, distance));
     f16_store(out->field[VIEW_FALLOFF], falloff);
     f16_store(out->field[VIEW_OPACITY], g->opacity);
+    f16_store(out->field[VIEW_THRESHOLD], alpha_threshold(scene, g->opacity));
     for (int i = 0; i < 3; i++)
         f16_store(out->field[VIEW_RED + i], color[i]);
     if (axes != NULL) {

@@ -343,7 +343,7 @@ gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_
     const ray_shot shot = ray_shot_of(camera);
     GBT_TRY(prepare(f, a, d, &shot, settings, err));
     double clock = clock_wall();
-    GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &f->rgb, NULL, &f->counters, err));
+    GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
     f->times.trace = lap(&clock);
     return GBT_OK;
 }
@@ -358,7 +358,7 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, double *sum, gbt
         if (shot->given == NULL && shot->aperture_radius > 0)
             GBT_TRY(ray_image_from_shot(shot, s, &f->rays, err));
         f->times.rays += lap(&clock);
-        GBT_TRY(trace_forward(&f->scene, &f->rays, false, &f->rgb, NULL, &f->counters, err));
+        GBT_TRY(trace_forward(&f->scene, &f->rays, false, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
         f->times.trace += lap(&clock);
         for (size_t i = 0; i < values; i++)
             sum[i] += (double)f->rgb.pixels[i];

@@ -97,7 +97,7 @@ static traced trace_all(const gaussians *g, const trace_settings *s, const ray_i
     out.T = mem_alloc(ray_image_count(rays), sizeof(float), "test", NULL);
     out.weight = mem_alloc(g->count, sizeof(float), "test", NULL);
     assert_ok(trace_build(&scene, g, s, reach_of(rays), NULL));
-    assert_ok(trace_forward(&scene, rays, true, &out.rgb, out.T, &out.counters, NULL));
+    assert_ok(trace_forward(&scene, rays, true, &(trace_outputs){.rgb = &out.rgb, .transmittance = out.T}, &out.counters, NULL));
     assert_ok(trace_backward(&scene, rays, d_rgb, &out.d, out.weight, out.d_background, NULL));
     out.rejected = scene.tree.rejected_count;
     trace_scene_free(&scene);
@@ -574,7 +574,7 @@ static void rays_that_are_none(void **state)
     assert_ok(image_alloc(&t.rgb, W, H, 3, NULL));
     float T[RAYS], want[3] = {0};
     assert_ok(trace_build(&scene, &g, &s, 4, NULL));
-    assert_ok(trace_forward(&scene, &rays, true, &t.rgb, T, &t.counters, NULL));
+    assert_ok(trace_forward(&scene, &rays, true, &(trace_outputs){.rgb = &t.rgb, .transmittance = T}, &t.counters, NULL));
     assert_ok(trace_backward(&scene, &rays, &d_rgb, &t.d, NULL, t.d_background, NULL));
     assert_int_equal(t.counters.rays, RAYS - 7);
     for (size_t i = 0; i < RAYS; i++) {
@@ -672,11 +672,11 @@ static void wrong_sizes_are_refused(void **state)
     assert_ok(image_alloc(&rgb, 2, 1, 3, NULL));
     assert_ok(image_alloc(&small, 1, 1, 3, NULL));
     assert_ok(trace_build(&scene, &g, &s, 5, NULL));
-    assert_int_equal(trace_forward(&scene, &rays, true, &small, NULL, NULL, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(trace_forward(&scene, &rays, true, &(trace_outputs){.rgb = &small}, NULL, &err), GBT_ERR_ARGUMENT);
     assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT); /* no forward pass */
-    assert_ok(trace_forward(&scene, &rays, false, &rgb, NULL, NULL, NULL));
+    assert_ok(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = &rgb}, NULL, NULL));
     assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT); /* without a tape */
-    assert_ok(trace_forward(&scene, &rays, true, &rgb, NULL, NULL, NULL));
+    assert_ok(trace_forward(&scene, &rays, true, &(trace_outputs){.rgb = &rgb}, NULL, NULL));
     assert_int_equal(trace_backward(&scene, &rays, &small, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
     assert_ok(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL));
     assert_ok(trace_build(&scene, &g, &s, 5, NULL));
@@ -694,7 +694,7 @@ static gbt_status run_once(const gaussians *g, const trace_settings *s, const ra
     gaussians d = {0};
     gbt_status status = trace_build(&scene, g, s, reach_of(rays), err);
     if (status == GBT_OK)
-        status = trace_forward(&scene, rays, true, rgb, NULL, NULL, err);
+        status = trace_forward(&scene, rays, true, &(trace_outputs){.rgb = rgb}, NULL, err);
     if (status == GBT_OK)
         status = trace_backward(&scene, rays, d_rgb, &d, NULL, NULL, err);
     trace_scene_free(&scene);

@@ -114,7 +114,7 @@ static void nothing_reached_is_left_out(void **state)
             const int samples = ray_shot_sample_count(&shot);
             for (int s = 0; s < samples; s++) {
                 assert_ok(ray_image_from_shot(&shot, s, &rays, NULL));
-                assert_ok(trace_forward(&scene, &rays, false, &rgb, NULL, NULL, NULL));
+                assert_ok(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = &rgb}, NULL, NULL));
                 for (size_t i = 0; i < 3 * W * H; i++)
                     sum[i] += (double)rgb.pixels[i];
             }

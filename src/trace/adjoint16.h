@@ -1,5 +1,7 @@
-/* trace/tile_adjoint.inc.h -- the adjoint of a tile: evaluate what was blended again, follow T to the back and the colour to the front, and add
-   every Gaussian's sums to its record. Compiled once per instruction set, by tile_kernel.inc.h. docs/tracing.md has the formulas. */
+/* trace/adjoint16.h -- the adjoint of a tile: evaluate what was blended again, follow T to the back and the colour to the front, and add
+   every Gaussian's sums to its record. Included by tile_kernel.inc.h. docs/tracing.md has the formulas. */
+#ifndef GBT_TRACE_ADJOINT16_H
+#define GBT_TRACE_ADJOINT16_H
 
 #include "trace/beam16.h"
 #include "trace/gaussian16.h"
@@ -84,7 +86,7 @@ static void view_rows(const kernel_scene *scene, const tile_beam *beam, const ta
         for (int i = 0; i < 16; i++)
             id[i] = entry[first + i < o->sorted.count ? first + i : first].id;
         const gaussian_lanes g = load_gaussians(scene, id, color);
-        const m16 sound = view_gaussians_from(&g, color, beam, &group->view, &axes);
+        const m16 sound = view_gaussians_from(scene, &g, color, beam, &group->view, &axes);
         /* Beside the camera the slopes of the mean run away. */
         const f16 wide = f16_set1(8), a = f16_load(group->view.field[VIEW_A]), b = f16_load(group->view.field[VIEW_B]);
         const m16 ahead = m16_and(f16_lt(f16_set1(scene->settings.t_near), f16_load(group->view.field[VIEW_DEPTH])),
@@ -348,11 +350,10 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
     return true;
 }
 
-static bool backward(const kernel_scene *scene, const tile_rays *tile, float d_rgb[TILE_PACKETS][3][PACKET_LANES], const tape_entry *tape,
-                     size_t *cursor, gradient_list *out, float d_background[3], kernel_scratch *scratch)
+static bool backward(const kernel_scene *scene, const tile_rays *tile, float d_rgb[TILE_PACKETS][3][PACKET_LANES], const tape_entry *entry,
+                     gradient_list *out, float d_background[3], kernel_scratch *scratch)
 {
     const packet_rays *rays = tile->packet;
-    const tape_entry *entry = tape + *cursor;
     size_t count = 0, of_packet[TILE_PACKETS] = {0};
     unsigned singles = 0;
     for (; entry[count].packet != TAPE_END; count++)
@@ -360,7 +361,6 @@ static bool backward(const kernel_scene *scene, const tile_rays *tile, float d_r
             singles |= 1u << (entry[count].packet & ~TAPE_SINGLE);
         else
             of_packet[entry[count].packet]++;
-    *cursor += count + 1;
     if (mem_reserve(&scratch->hits, &scratch->hit_bytes, 0, count * sizeof(tape_entry), 1, "adjoint entries", NULL) != GBT_OK)
         return false;
     tape_entry *sorted = scratch->hits, *at[TILE_PACKETS];
@@ -393,3 +393,5 @@ static bool backward(const kernel_scene *scene, const tile_rays *tile, float d_r
     }
     return true;
 }
+
+#endif

@@ -1,5 +1,7 @@
-/* trace/ray_kernel.inc.h -- one ray through the tree, sixteen Gaussians at a time: for rays that do not run together, and for packets whose
-   hits do not fit. No limit but memory. Compiled once per instruction set, by tile_kernel.inc.h. */
+/* trace/ray16.h -- one ray through the tree, sixteen Gaussians at a time: for rays that do not run together, and for packets whose
+   hits do not fit. No limit but memory. Included by tile_kernel.inc.h. */
+#ifndef GBT_TRACE_RAY16_H
+#define GBT_TRACE_RAY16_H
 
 #include "trace/beam16.h"
 #include "trace/gaussian16.h"
@@ -8,11 +10,12 @@
 
 enum { RAY_ROUND = 48, SHORT_RUN = 8 };
 
-/* Ordered by (t_c, index): depths are positive, so their bits are in the order of their values. */
-typedef struct ray_hit {
-    uint64_t key; /* bits of t_c << 32 | index */
-    float alpha;
-} ray_hit;
+static inline ray_hit make_hit(float t, float alpha, uint32_t id)
+{
+    uint32_t bits;
+    memcpy(&bits, &t, sizeof bits);
+    return (ray_hit){(uint64_t)bits << 32 | id, alpha};
+}
 
 static inline float hit_depth(const ray_hit *h)
 {
@@ -50,10 +53,30 @@ static void sort_hits(ray_hit *hits, ray_hit *spare, size_t n)
 
 typedef struct ray_state {
     float transmittance, rgb[3];
+    float far, depth, median, normal[3], top_weight;
+    uint32_t blended, top_id;
     bool alive;
+    float dir[3];
     ray_hit *hits; /* in scratch; as many spare ones follow */
     size_t count, capacity;
 } ray_state;
+
+static ray_state start_ray(const packet_rays *rays, int lane, const kernel_scratch *scratch)
+{
+    return (ray_state){.transmittance = 1, .far = rays->far[lane], .median = INFINITY, .top_id = UINT32_MAX, .alive = true,
+                       .dir = {rays->dir[0][lane], rays->dir[1][lane], rays->dir[2][lane]},
+                       .hits = scratch->hits, .capacity = scratch->hit_bytes / sizeof(ray_hit) / 2};
+}
+
+static void finish_ray(const ray_state *r, const kernel_scene *scene, int lane, packet_output *out)
+{
+    for (int k = 0; k < 3; k++) {
+        out->rgb[k][lane] = fmaf(r->transmittance, scene->settings.background[k], r->rgb[k]);
+        out->normal[k][lane] = r->normal[k];
+    }
+    out->transmittance[lane] = r->transmittance;
+    out->weighted_depth[lane] = r->depth, out->median_depth[lane] = r->median, out->hit_count[lane] = (float)r->blended, out->strongest[lane] = r->top_id;
+}
 
 static bool reserve_hits(ray_state *r, size_t more, kernel_scratch *scratch)
 {
@@ -65,6 +88,22 @@ static bool reserve_hits(ray_state *r, size_t more, kernel_scratch *scratch)
     }
     r->hits = scratch->hits;
     return true;
+}
+
+/* What a blended hit adds to the outputs beside colour. */
+static void note_hit(ray_state *r, const float *record, uint32_t id, float weight, float next, float t)
+{
+    float normal[3];
+    shortest_axis(record, normal);
+    const float toward = dot3(normal, r->dir) < 0 ? weight : -weight; /* normals look at the camera */
+    for (int k = 0; k < 3; k++)
+        r->normal[k] = fmaf(toward, normal[k], r->normal[k]);
+    r->depth = fmaf(weight, t, r->depth);
+    if (next < 0.5f)
+        r->median = fminf(r->median, t);
+    r->blended++;
+    if (weight > r->top_weight)
+        r->top_weight = weight, r->top_id = id;
 }
 
 /* Blend all hits nearer than `horizon`; keep the rest. */
@@ -83,6 +122,8 @@ static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, u
         const float *color = scene->records + (size_t)id * RECORD_FLOATS + RECORD_COLOR;
         for (int c = 0; c < 3; c++)
             r->rgb[c] = fmaf(weight, color[c], r->rgb[c]);
+        if (scene->extra)
+            note_hit(r, color - RECORD_COLOR, id, weight, next, hit_depth(h));
         r->transmittance = next;
         counters->blended++;
         if (tape != NULL && !tape_add(tape, (tape_entry){id, (uint16_t)lane, (uint16_t)(packet | TAPE_SINGLE)}))
@@ -110,11 +151,10 @@ static bool hit_leaf(ray_state *r, const kernel_scene *scene, const tree_leaf *l
     f16_store(t, at.t), f16_store(alpha, f16_min(raw, f16_set1(scene->settings.alpha_max)));
     if (!reserve_hits(r, TREE_WIDTH, scratch))
         return false;
-    for (unsigned bits = m16_bits(f16_le(f16_set1(scene->settings.alpha_min), raw)) & near; bits != 0; bits &= bits - 1) {
+    const m16 hit = m16_and(f16_le(alpha_threshold(scene, g.opacity), raw), f16_lt(at.t, f16_set1(r->far)));
+    for (unsigned bits = m16_bits(hit) & near; bits != 0; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
-        uint32_t depth;
-        memcpy(&depth, &t[i], sizeof depth);
-        r->hits[r->count++] = (ray_hit){(uint64_t)depth << 32 | leaf->id[i], alpha[i]};
+        r->hits[r->count++] = make_hit(t[i], alpha[i], leaf->id[i]);
         counters->hits++;
     }
     return true;
@@ -151,11 +191,11 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam 
     }
 }
 
-static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, unsigned packet, int lane, packet_color *out, hit_tape *tape,
+static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, unsigned packet, int lane, packet_output *out, hit_tape *tape,
                       kernel_scratch *scratch, kernel_counters *counters)
 {
     packet_rays alone[TILE_PACKETS];
-    ray_state r = {.transmittance = 1, .alive = true};
+    ray_state r = start_ray(rays, lane, scratch);
     tile_beam beam;
     ray_lanes ray;
     for (int p = 0; p < TILE_PACKETS; p++)
@@ -164,11 +204,10 @@ static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, unsign
         for (int i = 0; i < PACKET_LANES; i++)
             alone[0].origin[axis][i] = rays->origin[axis][lane], alone[0].dir[axis][i] = rays->dir[axis][lane];
     load_rays(&alone[0], &ray);
-    r.capacity = scratch->hit_bytes / sizeof *r.hits / 2;
     if (scene->root != NULL && make_beam(alone, scene, &beam) && !gather_ray(&r, scene, &beam, &ray, packet, lane, tape, scratch, counters))
         return false;
-    for (int c = 0; c < 3; c++)
-        out->rgb[c][lane] = fmaf(r.transmittance, scene->settings.background[c], r.rgb[c]);
-    out->transmittance[lane] = r.transmittance;
+    finish_ray(&r, scene, lane, out);
     return true;
 }
+
+#endif

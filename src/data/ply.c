@@ -62,8 +62,22 @@ static gbt_status check_count(const source_file *file, const cursor *c, const pl
     return GBT_OK;
 }
 
-/* One binary row; `values` gets every scalar property of the element, lists are skipped. */
-static gbt_status take_binary_row(cursor *c, const ply_header *header, const ply_element *e, double *values, gbt_error *err)
+/* The one list that is kept of each row. */
+typedef struct kept_list {
+    int property; /* within the element; -1: none */
+    double *items;
+    size_t count, capacity;
+} kept_list;
+
+static gbt_status keep_item(kept_list *list, double value, gbt_error *err)
+{
+    GBT_TRY(mem_reserve((void **)&list->items, &list->capacity, list->count, list->count + 1, sizeof *list->items, "list of a PLY row", err));
+    list->items[list->count++] = value;
+    return GBT_OK;
+}
+
+/* One binary row; `values` gets every scalar property of the element, `list` one of the lists; the others are skipped. */
+static gbt_status take_binary_row(cursor *c, const ply_header *header, const ply_element *e, double *values, kept_list *list, gbt_error *err)
 {
     const size_t start = c->at;
     for (size_t i = 0; i < e->property_count && !c->short_read; i++) {
@@ -75,7 +89,10 @@ static gbt_status take_binary_row(cursor *c, const ply_header *header, const ply
         const double count = take_binary(c, p->count_type, header->format);
         if (count < 0)
             return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: list of %g items", c->file->name, start, count);
-        cursor_skip(c, (uint64_t)count * type_bytes[p->type]); /* at most 2^32 * 8, so no overflow */
+        if ((int)i != list->property)
+            cursor_skip(c, (uint64_t)count * type_bytes[p->type]); /* at most 2^32 * 8, so no overflow */
+        for (uint64_t k = 0; (int)i == list->property && k < (uint64_t)count && !c->short_read; k++)
+            GBT_TRY(keep_item(list, take_binary(c, p->type, header->format), err));
     }
     if (c->short_read)
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: file ends inside a row of element %.*s", c->file->name, start,
@@ -97,7 +114,8 @@ static gbt_status take_ascii_value(const char **at, const char *end, raw_place p
 }
 
 /* One ASCII row on a line of its own; blank lines before it are skipped. */
-static gbt_status take_ascii_row(cursor *c, size_t *line, const ply_header *header, const ply_element *e, double *values, gbt_error *err)
+static gbt_status take_ascii_row(cursor *c, size_t *line, const ply_header *header, const ply_element *e, double *values, kept_list *list,
+                                 gbt_error *err)
 {
     const char *at = NULL, *end = NULL, *ahead = NULL, *token = NULL;
     size_t length = 0;
@@ -123,36 +141,88 @@ static gbt_status take_ascii_row(cursor *c, size_t *line, const ply_header *head
         }
         if (!(value >= 0 && value <= UINT32_MAX))
             return raw_fail(err, place, "list of %g items", value);
-        for (uint64_t k = (uint64_t)value; k > 0; k--)
-            GBT_TRY(take_ascii_value(&at, end, place, &(double){0}, err));
+        for (uint64_t k = (uint64_t)value; k > 0; k--) {
+            double item;
+            GBT_TRY(take_ascii_value(&at, end, place, &item, err));
+            if ((int)i == list->property)
+                GBT_TRY(keep_item(list, item, err));
+        }
     }
     if (number_next_token(&at, end, &token, &length))
         return raw_fail(err, place, "row has too many values, from %.*s", length < 60 ? (int)length : 60, token);
     return GBT_OK;
 }
 
-gbt_status ply_read_rows(const source_file *file, const ply_header *header, int element, const int *columns, size_t column_count,
-                         ply_row *row, void *context, gbt_error *err)
+/* What becomes of each row of the wanted element. */
+typedef gbt_status use_row(void *context, const double *values, const kept_list *list, gbt_error *err);
+
+static gbt_status read_rows(const source_file *file, const ply_header *header, int element, kept_list *list, use_row *use, void *context,
+                            gbt_error *err)
 {
     cursor c = {.file = file, .at = header->data_at};
     size_t line = header->line_count;
-    double values[PLY_MAX_PROPERTIES], wanted[PLY_MAX_COLUMNS];
+    double values[PLY_MAX_PROPERTIES];
+    kept_list none = {.property = -1};
     for (int i = 0; i <= element; i++) {
         const ply_element *e = &header->elements[i];
         GBT_TRY(check_count(file, &c, header, e, err));
         for (uint64_t k = 0; k < e->count; k++) {
+            list->count = 0;
             if (header->format == PLY_ASCII)
-                GBT_TRY(take_ascii_row(&c, &line, header, e, values, err));
+                GBT_TRY(take_ascii_row(&c, &line, header, e, values, i < element ? &none : list, err));
             else
-                GBT_TRY(take_binary_row(&c, header, e, values, err));
-            if (i < element)
-                continue;
-            for (size_t j = 0; j < column_count; j++)
-                wanted[j] = values[columns[j]];
-            row(context, wanted);
+                GBT_TRY(take_binary_row(&c, header, e, values, i < element ? &none : list, err));
+            if (i == element)
+                GBT_TRY(use(context, values, list, err));
         }
     }
     return GBT_OK;
+}
+
+typedef struct column_rows {
+    const int *columns;
+    size_t column_count;
+    ply_row *row;
+    void *context;
+} column_rows;
+
+static gbt_status use_columns(void *context, const double *values, const kept_list *list, gbt_error *err)
+{
+    (void)list, (void)err;
+    const column_rows *rows = context;
+    double wanted[PLY_MAX_COLUMNS];
+    for (size_t j = 0; j < rows->column_count; j++)
+        wanted[j] = values[rows->columns[j]];
+    rows->row(rows->context, wanted);
+    return GBT_OK;
+}
+
+gbt_status ply_read_rows(const source_file *file, const ply_header *header, int element, const int *columns, size_t column_count,
+                         ply_row *row, void *context, gbt_error *err)
+{
+    column_rows rows = {columns, column_count, row, context};
+    return read_rows(file, header, element, &(kept_list){.property = -1}, use_columns, &rows, err);
+}
+
+typedef struct list_rows {
+    ply_list *take;
+    void *context;
+} list_rows;
+
+static gbt_status use_list(void *context, const double *values, const kept_list *list, gbt_error *err)
+{
+    (void)values;
+    const list_rows *rows = context;
+    return rows->take(rows->context, list->items, list->count, err);
+}
+
+gbt_status ply_read_lists(const source_file *file, const ply_header *header, int element, int property, ply_list *take, void *context,
+                          gbt_error *err)
+{
+    kept_list list = {.property = property};
+    const gbt_status status = read_rows(file, header, element, &list, use_list, &(list_rows){take, context}, err);
+    mem_free(list.items);
+    return status;
 }
 
 typedef struct point_rows {

@@ -57,6 +57,13 @@ enum { PLY_MAX_COLUMNS = 128 };
 gbt_status ply_read_rows(const source_file *file, const ply_header *header, int element, const int *columns, size_t column_count,
                          ply_row *row, void *context, gbt_error *err);
 
+/** One list of a row, integers as they are; `items` is borrowed for the call. A failure ends the reading. */
+typedef gbt_status ply_list(void *context, const double *items, size_t count, gbt_error *err);
+
+/** Call `take` with the list `property` (index within the element) of each row; else as ply_read_rows(). Also GBT_ERR_NO_MEMORY. */
+gbt_status ply_read_lists(const source_file *file, const ply_header *header, int element, int property, ply_list *take, void *context,
+                          gbt_error *err);
+
 /** x y z of element "vertex", with red green blue when there; the rest is skipped. `out` zeroed by the caller; free with raw_free(). */
 gbt_status ply_read_points(const source_file *file, raw_scene *out, gbt_error *err);
 

@@ -19,6 +19,8 @@ gbt_status raw_fail(gbt_error *err, raw_place place, const char *format, ...)
     va_end(args);
     if (place.mark == RAW_MARK_FRAME)
         return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: %s", place.file, place.at, text);
+    if (place.mark == RAW_MARK_FILE)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %s", place.file, text);
     return base_fail(err, GBT_ERR_FORMAT, "%s%c%zu: %s", place.file, place.mark, place.at, text);
 }
 

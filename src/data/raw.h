@@ -36,9 +36,9 @@ typedef struct raw_scene {
 
 enum { RAW_IMAGE_LIMIT = 65500, RAW_NAME_LIMIT = 4096 };
 
-enum { RAW_MARK_FRAME = '#' };
+enum { RAW_MARK_FILE = 0, RAW_MARK_FRAME = '#' };
 
-/** Where a message points: "FILE@OFFSET" (mark '@'), "FILE:LINE" (mark ':') or "FILE: frame N" (RAW_MARK_FRAME). */
+/** Where a message points: "FILE@OFFSET" (mark '@'), "FILE:LINE" (mark ':'), "FILE: frame N" (RAW_MARK_FRAME) or "FILE" (RAW_MARK_FILE). */
 typedef struct raw_place {
     const char *file;
     char mark;

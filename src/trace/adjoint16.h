@@ -175,7 +175,7 @@ static f16 sort_rows(const tape_entry *entry, adjoint_rows *o)
         row_store(s->clear, i, clear);
         row_store(s->before, i, product);
         product = f16_mul(product, clear);
-        reached = fmaxf(reached, o->row_far[row]);
+        reached = larger(reached, o->row_far[row]);
         s->near[i] = o->row_near[row], s->far_reached[i] = reached;
     }
     end_rows(s);
@@ -315,7 +315,7 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
     float transmittance = 1;
     for (int i = 0; i < count; i++) {
         field[T][i] = transmittance;
-        transmittance *= 1 - fminf(field[RAW][i], scene->settings.alpha_max);
+        transmittance *= 1 - smaller(field[RAW][i], scene->settings.alpha_max);
     }
     float behind = 0;
     for (int c = 0; c < 3; c++) {
@@ -325,7 +325,7 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
     for (int i = count; i-- > 0;) {
         const float difference = field[COLOR][i] - behind;
         field[D_ALPHA][i] = field[T][i] * difference;
-        behind = fmaf(fminf(field[RAW][i], scene->settings.alpha_max), difference, behind);
+        behind = fmaf(smaller(field[RAW][i], scene->settings.alpha_max), difference, behind);
     }
     for (int first = 0; first < count; first += 16) {
         f16 v[3], terms[16], color[3];

@@ -119,15 +119,15 @@ static bool make_beam(const packet_rays *rays, const kernel_scene *scene, tile_b
         const float lowest = f16_lowest(forward);
         if (!(lowest > 0.3f))
             return false;
-        forward_low = fminf(forward_low, lowest), forward_high = fmaxf(forward_high, f16_highest(forward));
+        forward_low = smaller(forward_low, lowest), forward_high = larger(forward_high, f16_highest(forward));
         for (int axis = 0; axis < 3; axis++)
             at[p][axis] = dot_lanes(out->axis[axis], offset);
-        start_low = fminf(start_low, f16_lowest(at[p][2])), start_high = fmaxf(start_high, f16_highest(at[p][2]));
+        start_low = smaller(start_low, f16_lowest(at[p][2])), start_high = larger(start_high, f16_highest(at[p][2]));
         for (int k = 0; k < 2; k++) {
             const f16 s = f16_div(dot_lanes(out->axis[k], dir), forward);
             const float low = f16_lowest(s), high = f16_highest(s), open = 0x1p-21f * (1 + fabsf(low) + fabsf(high));
             b->slope[2 * k] = low - open, b->slope[2 * k + 1] = high + open;
-            slope[2 * k] = fminf(slope[2 * k], low - open), slope[2 * k + 1] = fmaxf(slope[2 * k + 1], high + open);
+            slope[2 * k] = smaller(slope[2 * k], low - open), slope[2 * k + 1] = larger(slope[2 * k + 1], high + open);
             b->limit[2 * k] = f16_highest(f16_sub(f16_mul(f16_set1(b->slope[2 * k]), at[p][2]), at[p][k])) + slack * (1 + fabsf(b->slope[2 * k]));
             b->limit[2 * k + 1] = f16_highest(f16_sub(at[p][k], f16_mul(f16_set1(b->slope[2 * k + 1]), at[p][2]))) + slack * (1 + fabsf(b->slope[2 * k + 1]));
         }
@@ -139,7 +139,7 @@ static bool make_beam(const packet_rays *rays, const kernel_scene *scene, tile_b
             n[axis] = sign * (out->axis[side / 2][axis] - slope[side] * out->axis[2][axis]);
         for (int p = 0; p < TILE_PACKETS; p++)
             if (rays[p].active != 0)
-                limit = fmaxf(limit, sign * (sign > 0 ? f16_highest(f16_sub(at[p][side / 2], f16_mul(f16_set1(slope[side]), at[p][2])))
+                limit = larger(limit, sign * (sign > 0 ? f16_highest(f16_sub(at[p][side / 2], f16_mul(f16_set1(slope[side]), at[p][2])))
                                                       : f16_lowest(f16_sub(at[p][side / 2], f16_mul(f16_set1(slope[side]), at[p][2])))));
         limit += slack * (1 + fabsf(slope[side]));
         out->whole.slope[side] = slope[side], out->whole.limit[side] = limit;

@@ -41,6 +41,24 @@ static void visit_gaussian(uint32_t id, unsigned lanes, void *user)
     }
 }
 
+/* The hits, those of lane 0 first; end[lane]: where those of a lane end. In the place of scratch->rows. NULL without memory. */
+static ray_hit *by_lane(kernel_scratch *s, size_t count, size_t end[PACKET_LANES])
+{
+    if (mem_reserve((void **)&s->rows, &s->row_capacity, 0, count * (sizeof(ray_hit) / sizeof(float)), sizeof(float), "hits of a packet", NULL) != GBT_OK)
+        return NULL;
+    ray_hit *out = (ray_hit *)(void *)s->rows;
+    for (size_t i = 0; i < count; i++)
+        end[s->lane_hits[i].lane]++;
+    size_t at = 0;
+    for (int lane = 0; lane < PACKET_LANES; lane++) {
+        const size_t n = end[lane];
+        end[lane] = at, at += n;
+    }
+    for (size_t i = 0; i < count; i++)
+        out[end[s->lane_hits[i].lane]++] = s->lane_hits[i].hit;
+    return out;
+}
+
 static bool embree_packet(const kernel_scene *scene, const packet_rays *rays, unsigned packet, packet_output *out, hit_tape *tape, kernel_scratch *scratch,
                           kernel_counters *counters)
 {
@@ -51,14 +69,19 @@ static bool embree_packet(const kernel_scene *scene, const packet_rays *rays, un
         gaussian_scene_visit(scene->embree, rays->origin, rays->dir, scene->settings.t_near, INFINITY, rays->active, visit_gaussian, &v);
     if (v.failed)
         return false;
+    size_t end[PACKET_LANES] = {0};
+    ray_hit *sorted = NULL;
+    if (v.count > 0 && (sorted = by_lane(scratch, v.count, end)) == NULL)
+        return false;
     for (unsigned bits = rays->active; bits != 0; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
+        const size_t begin = lane == 0 ? 0 : end[lane - 1], count = end[lane] - begin;
         ray_state r = start_ray(rays, lane, scratch);
-        if (!reserve_hits(&r, v.count, scratch))
+        if (!reserve_hits(&r, count, scratch))
             return false;
-        for (size_t i = 0; i < v.count; i++)
-            if (scratch->lane_hits[i].lane == (uint32_t)lane)
-                r.hits[r.count++] = scratch->lane_hits[i].hit;
+        if (count > 0)
+            memcpy(r.hits, sorted + begin, count * sizeof *r.hits);
+        r.count = count;
         if (!blend_hits(&r, scene, INFINITY, packet, lane, tape, counters))
             return false;
         finish_ray(&r, scene, lane, out);

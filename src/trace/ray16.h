@@ -57,6 +57,8 @@ typedef struct ray_state {
     uint32_t blended, top_id;
     bool alive;
     float dir[3];
+    uint32_t waiting[2 * TREE_WIDTH]; /* Gaussians that may be hit */
+    int waiting_count;                /* at most TREE_WIDTH - 1 between two leaves */
     ray_hit *hits; /* in scratch; as many spare ones follow */
     size_t count, capacity;
 } ray_state;
@@ -100,7 +102,7 @@ static void note_hit(ray_state *r, const float *record, uint32_t id, float weigh
         r->normal[k] = fmaf(toward, normal[k], r->normal[k]);
     r->depth = fmaf(weight, t, r->depth);
     if (next < 0.5f)
-        r->median = fminf(r->median, t);
+        r->median = smaller(r->median, t);
     r->blended++;
     if (weight > r->top_weight)
         r->top_weight = weight, r->top_id = id;
@@ -134,29 +136,28 @@ static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, u
     return true;
 }
 
-static bool hit_leaf(ray_state *r, const kernel_scene *scene, const tree_leaf *leaf, const tile_beam *beam, const ray_lanes *ray, kernel_scratch *scratch,
-                     kernel_counters *counters)
+/* Evaluate `count` of the waiting Gaussians, at most sixteen, from the end. */
+static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes *ray, int count, kernel_scratch *scratch, kernel_counters *counters)
 {
-    ellipsoids16 e;
-    turn_ellipsoids(leaf, beam, &e);
-    const unsigned near = test_ellipsoids(&beam->whole, &e) & (0xFFFFu >> (TREE_WIDTH - leaf->count));
-    if (near == 0)
-        return true;
     f16 color[3];
-    const gaussian_lanes g = load_gaussians(scene, leaf->id, color);
+    uint32_t id[TREE_WIDTH];
+    for (int i = 0; i < TREE_WIDTH; i++)
+        id[i] = r->waiting[r->waiting_count - 1 - (i < count ? i : 0)];
+    const gaussian_lanes g = load_gaussians(scene, id, color);
     const response at = respond(&g, ray, f16_set1(scene->settings.t_near));
     const f16 raw = response_alpha(&g, at.d2);
-    counters->tests += (uint64_t)__builtin_popcount(near);
+    const m16 hit = m16_and(f16_le(alpha_threshold(scene, g.opacity), raw), f16_lt(at.t, f16_set1(r->far)));
     _Alignas(64) float t[TREE_WIDTH], alpha[TREE_WIDTH];
     f16_store(t, at.t), f16_store(alpha, f16_min(raw, f16_set1(scene->settings.alpha_max)));
     if (!reserve_hits(r, TREE_WIDTH, scratch))
         return false;
-    const m16 hit = m16_and(f16_le(alpha_threshold(scene, g.opacity), raw), f16_lt(at.t, f16_set1(r->far)));
-    for (unsigned bits = m16_bits(hit) & near; bits != 0; bits &= bits - 1) {
+    for (unsigned bits = m16_bits(hit) & (0xFFFFu >> (TREE_WIDTH - count)); bits != 0; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
-        r->hits[r->count++] = make_hit(t[i], alpha[i], leaf->id[i]);
+        r->hits[r->count++] = make_hit(t[i], alpha[i], id[i]);
         counters->hits++;
     }
+    r->waiting_count -= count;
+    counters->tests += (uint64_t)count;
     return true;
 }
 
@@ -169,7 +170,15 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam 
         const tree_leaf *leaf = tree_child_leaf(child);
         counters->nodes++;
         if (leaf != NULL) {
-            if (!hit_leaf(r, scene, leaf, beam, ray, scratch, counters))
+            ellipsoids16 e;
+            turn_ellipsoids(leaf, beam, &e);
+            for (unsigned bits = test_ellipsoids(&beam->whole, &e) & (0xFFFFu >> (TREE_WIDTH - leaf->count)); bits != 0; bits &= bits - 1) {
+                const uint32_t id = leaf->id[__builtin_ctz(bits)];
+                __builtin_prefetch(scene->records + (size_t)id * RECORD_FLOATS);
+                r->waiting[r->waiting_count++] = id;
+            }
+            /* Few Gaussians of a leaf lie on the ray: those of several leaves are evaluated together. */
+            if (r->waiting_count >= TREE_WIDTH && !hit_waiting(r, scene, ray, TREE_WIDTH, scratch, counters))
                 return false;
         } else {
             const tree_node *node = (const tree_node *)(uintptr_t)child;
@@ -181,6 +190,8 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam 
                 heap_push(scratch->heap, &heap_count, entry[__builtin_ctz(bits)], node->child[__builtin_ctz(bits)]);
         }
         if (r->count >= round || heap_count == 0) {
+            if (r->waiting_count > 0 && !hit_waiting(r, scene, ray, r->waiting_count, scratch, counters))
+                return false;
             if (r->count > 0 && !blend_hits(r, scene, heap_count > 0 ? scratch->heap[0].t : INFINITY, packet, lane, tape, counters))
                 return false;
             if (!r->alive || heap_count == 0)

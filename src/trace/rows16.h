@@ -218,7 +218,7 @@ static inline void arrange_rows(const packet_rows *p, float horizon, round_rows 
         row_store(o->clear, i, clear);
         row_store(o->before, i, product);
         product = f16_mul(product, clear);
-        reached = fmaxf(reached, fminf(o->row_far[row], horizon));
+        reached = larger(reached, smaller(o->row_far[row], horizon));
         o->near[i] = o->row_near[row], o->far_reached[i] = reached;
     }
     end_rows(&o->sorted);

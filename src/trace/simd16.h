@@ -268,6 +268,10 @@ static inline void f16_load_turned(const float *const rows[16], f16 out[16])
 #undef EACH
 #endif
 
+/* As fmaxf() and fminf() of numbers, but not calls. */
+static inline float larger(float a, float b) { return a > b ? a : b; }
+static inline float smaller(float a, float b) { return a < b ? a : b; }
+
 static inline int m16_any(m16 m) { return m16_bits(m) != 0; }
 
 /** 2^x for x in [-120, 0]; largest error about 1 ulp. Taylor of 2^r to r^6 on [-1/2, 1/2], in pairs, for the sake of latency. */

@@ -287,7 +287,7 @@ static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays
         int first = 0;
         for (; first < s->count; first += 16) {
             /* No room for sixteen more: blend what the candidates that are left cannot come before. */
-            if (rows->count > ROW_CAPACITY - 16 && !blend_rows(rows, p, scene, &rays->packet[p], fminf(horizon, s->nearest[first]), tape, &s->order, counters))
+            if (rows->count > ROW_CAPACITY - 16 && !blend_rows(rows, p, scene, &rays->packet[p], smaller(horizon, s->nearest[first]), tape, &s->order, counters))
                 return false;
             if (rows->count > ROW_CAPACITY - 16 || !m16_any(rows->alive))
                 break;
@@ -338,7 +338,7 @@ static bool gather_tile(tile_state *s, const kernel_scene *scene, const tile_ray
         pick_candidates(s, next_node);
         float horizon = next_node;
         for (int i = 0; i < s->waiting_count; i++)
-            horizon = fminf(horizon, s->waiting[i].nearest);
+            horizon = smaller(horizon, s->waiting[i].nearest);
         if (!take_chunk(s, scene, rays, horizon, tape, counters))
             return false;
         if (s->alive_packets == 0)

@@ -312,8 +312,9 @@ static gbt_status fit_picture(image *rgb, int width, int height, gbt_error *err)
     return image_alloc(rgb, width, height, 3, err);
 }
 
-/* Everything up to the tree, and f->rays through the middle of the aperture. */
-static gbt_status prepare(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, gbt_error *err)
+/* Everything up to the tree, and f->rays through the middle of the aperture. `guest` is optional. */
+static gbt_status prepare(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, const frame_guest *guest,
+                          gbt_error *err)
 {
     double clock = clock_wall();
     ray_shot middle = *shot;
@@ -325,13 +326,16 @@ static gbt_status prepare(frame *f, const anchors *a, const decoder *d, const ra
     view_bounds bounds;
     GBT_TRY(find_bounds(shot, &f->rays, &bounds, err));
     memcpy(f->eye, bounds.center, sizeof f->eye);
+    if (guest != NULL)
+        bounds = (view_bounds){.origin_radius = INFINITY, .cos_angle = -1}; /* no planes, and every ball holds an origin */
     GBT_TRY(find_visible(f, a, &bounds, settings->alpha_min, err));
     f->times.visible = lap(&clock);
     /* A Gaussian below alpha_min is never blended and so has no gradient: it need not be made. */
     GBT_TRY(decode_forward(a, d, f->eye, f->visible, f->visible_count, settings->alpha_min, &f->gaussians, &f->tape, err));
     f->times.decode = lap(&clock);
     const float aperture = shot->given == NULL ? (float)shot->aperture_radius : 0;
-    GBT_TRY(trace_build(&f->scene, &f->gaussians, settings, ray_image_reach(&f->rays) + aperture, err));
+    const float reach = fmaxf(ray_image_reach(&f->rays) + aperture, guest != NULL ? guest->reach : 0);
+    GBT_TRY(trace_build(&f->scene, &f->gaussians, settings, reach, err));
     f->times.build = lap(&clock);
     memset(&f->counters, 0, sizeof f->counters);
     return fit_picture(&f->rgb, f->rays.width, f->rays.height, err);
@@ -341,7 +345,7 @@ gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_
                         gbt_error *err)
 {
     const ray_shot shot = ray_shot_of(camera);
-    GBT_TRY(prepare(f, a, d, &shot, settings, err));
+    GBT_TRY(prepare(f, a, d, &shot, settings, NULL, err));
     double clock = clock_wall();
     GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
     f->times.trace = lap(&clock);
@@ -349,7 +353,7 @@ gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_
 }
 
 /* Trace every sample and add them up, in order, in double. */
-static gbt_status trace_samples(frame *f, const ray_shot *shot, double *sum, gbt_error *err)
+static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_guest *guest, double *sum, gbt_error *err)
 {
     const size_t values = 3 * ray_image_count(&f->rays);
     const int samples = ray_shot_sample_count(shot);
@@ -358,7 +362,10 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, double *sum, gbt
         if (shot->given == NULL && shot->aperture_radius > 0)
             GBT_TRY(ray_image_from_shot(shot, s, &f->rays, err));
         f->times.rays += lap(&clock);
-        GBT_TRY(trace_forward(&f->scene, &f->rays, false, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
+        if (guest != NULL)
+            GBT_TRY(guest->trace(guest->context, &f->scene, &f->rays, &f->rgb, err));
+        else
+            GBT_TRY(trace_forward(&f->scene, &f->rays, false, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
         f->times.trace += lap(&clock);
         for (size_t i = 0; i < values; i++)
             sum[i] += (double)f->rgb.pixels[i];
@@ -368,15 +375,21 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, double *sum, gbt
     return GBT_OK;
 }
 
-gbt_status frame_render_shot(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, gbt_error *err)
+gbt_status frame_render_guest(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings,
+                              const frame_guest *guest, gbt_error *err)
 {
     GBT_TRY(ray_shot_check(shot, err));
-    GBT_TRY(prepare(f, a, d, shot, settings, err));
+    GBT_TRY(prepare(f, a, d, shot, settings, guest, err));
     f->times.trace = 0;
     double *sum = mem_calloc(ray_image_count(&f->rays), 3 * sizeof *sum, "picture", err);
-    const gbt_status status = sum == NULL ? GBT_ERR_NO_MEMORY : trace_samples(f, shot, sum, err);
+    const gbt_status status = sum == NULL ? GBT_ERR_NO_MEMORY : trace_samples(f, shot, guest, sum, err);
     mem_free(sum);
     return status;
+}
+
+gbt_status frame_render_shot(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, gbt_error *err)
+{
+    return frame_render_guest(f, a, d, shot, settings, NULL, err);
 }
 
 double frame_volume(const frame *f)

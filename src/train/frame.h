@@ -52,6 +52,17 @@ gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_
  */
 gbt_status frame_render_shot(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, gbt_error *err);
 
+/** What traces the rays of a shot in place of trace_forward(), and sends rays of its own where the picture does not look. */
+typedef struct frame_guest {
+    gbt_status (*trace)(void *context, trace_scene *scene, const ray_image *rays, image *rgb, gbt_error *err); /* rgb has the size of rays */
+    void *context;
+    float reach; /* largest |coordinate| of an origin of its own rays */
+} frame_guest;
+
+/** frame_render_shot() with a guest: every anchor is decoded, seen from the camera or not, all from the one point. */
+gbt_status frame_render_guest(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings,
+                              const frame_guest *guest, gbt_error *err);
+
 /**
  * Adjoint of the last frame_render(keep_tape): d_image -> d_anchors (rows of f->visible, added) and d_params (added).
  *

@@ -2,12 +2,16 @@
 #include "base/memory.h"
 
 #include <stdatomic.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 
 #include "base/fail.h"
+
+static const size_t LARGE_PAGE = (size_t)2 << 20;
 
 static atomic_long fail_countdown = -1;
 
@@ -26,14 +30,18 @@ void mem_fail_after(long n)
 void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err)
 {
     size_t bytes;
-    if (__builtin_mul_overflow(count, size, &bytes) || bytes > PTRDIFF_MAX - MEM_ALIGN) {
+    if (__builtin_mul_overflow(count, size, &bytes) || bytes > PTRDIFF_MAX - LARGE_PAGE) {
         base_fail(err, GBT_ERR_NO_MEMORY, "%s: %zu elements of %zu bytes are more than memory can hold", what, count, size);
         return NULL;
     }
     bytes = (bytes + MEM_ALIGN - 1) / MEM_ALIGN * MEM_ALIGN;
     if (bytes == 0)
         bytes = MEM_ALIGN;
-    void *pointer = must_fail() ? NULL : aligned_alloc(MEM_ALIGN, bytes);
+    /* Large arrays ask for large pages: a tree is walked in no order, and misses of the address cache cost as much as misses of the data. */
+    const bool large = bytes >= 4 * LARGE_PAGE;
+    void *pointer = must_fail() ? NULL : aligned_alloc(large ? LARGE_PAGE : MEM_ALIGN, large ? (bytes + LARGE_PAGE - 1) / LARGE_PAGE * LARGE_PAGE : bytes);
+    if (pointer != NULL && large)
+        madvise(pointer, bytes, MADV_HUGEPAGE); /* a wish */
     if (pointer == NULL)
         base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for %zu bytes", what, bytes);
     return pointer;

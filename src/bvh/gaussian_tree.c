@@ -7,16 +7,23 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "base/vec.h"
 #include "bvh/device.h"
 #include "bvh/embree_api.h"
 #include "bvh/proxy.h"
 
+enum { LEAF_BLOCK = 256 };
+
 /* What Embree builds: binary, because its wider builders make as many children as they can and leave leaves almost empty. */
 typedef struct binary_node {
     struct RTCBounds bounds[2];
-    uint64_t child[2]; /* address of a binary_node, or that of a tree_leaf + 1 */
+    uint64_t child[2]; /* address of a binary_node, or that of leaf_members + 1 */
 } binary_node;
+
+typedef struct leaf_members {
+    uint32_t count, id[TREE_WIDTH];
+} leaf_members;
 
 typedef struct builder {
     RTCBVH bvh;
@@ -26,6 +33,9 @@ typedef struct builder {
     atomic_size_t binary_count, leaf_count;
     tree_node *nodes;
     size_t node_count, node_capacity;
+    tree_leaf *leaves;
+    const leaf_members **members; /* of each leaf */
+    size_t filled_count, leaf_capacity, member_capacity;
 } builder;
 
 static void node_clear(tree_node *node)
@@ -58,11 +68,16 @@ static void set_ellipsoid(const builder *b, uint32_t id, tree_leaf *leaf, size_t
     leaf->id[slot] = id;
 }
 
-static void fill_leaf(const builder *b, const struct RTCBuildPrimitive *primitives, size_t count, tree_leaf *leaf)
+static void fill_leaves(size_t block, size_t begin, size_t end, void *context)
 {
-    leaf->count = (uint32_t)count;
-    for (size_t i = 0; i < TREE_WIDTH; i++)
-        set_ellipsoid(b, primitives[i < count ? i : 0].primID, leaf, i);
+    (void)block;
+    const builder *b = context;
+    for (size_t at = begin; at < end; at++) {
+        const leaf_members *members = b->members[at];
+        b->leaves[at].count = members->count;
+        for (size_t i = 0; i < TREE_WIDTH; i++)
+            set_ellipsoid(b, members->id[i < members->count ? i : 0], &b->leaves[at], i);
+    }
 }
 
 /* ---- Embree's callbacks; a leaf is a tagged address in place of a pointer ---- */
@@ -97,8 +112,10 @@ static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuil
     builder *b = user;
     embree_receive(b);
     atomic_fetch_add_explicit(&b->leaf_count, 1, memory_order_relaxed);
-    tree_leaf *leaf = rtcThreadLocalAlloc(allocator, sizeof *leaf, 64);
-    fill_leaf(b, primitives, count, leaf);
+    leaf_members *leaf = rtcThreadLocalAlloc(allocator, sizeof *leaf, 16);
+    leaf->count = (uint32_t)count;
+    for (size_t i = 0; i < count; i++)
+        leaf->id[i] = primitives[i].primID;
     return (char *)leaf + 1;
 }
 
@@ -108,6 +125,12 @@ static float half_area(const struct RTCBounds *b)
 {
     const float x = b->upper_x - b->lower_x, y = b->upper_y - b->lower_y, z = b->upper_z - b->lower_z;
     return x * y + y * z + z * x;
+}
+
+static uint64_t place_leaf(builder *b, uint64_t child)
+{
+    b->members[b->filled_count] = (const leaf_members *)(uintptr_t)(child - 1);
+    return (uint64_t)(uintptr_t)&b->leaves[b->filled_count++] + 1;
 }
 
 /* The wide node for a binary one: its largest child is opened until there are 16. Depth first, so that neighbours lie side by side. */
@@ -122,7 +145,7 @@ static tree_node *widen(builder *b, const binary_node *root)
         int largest = -1;
         float area = -1;
         for (int i = 0; i < count; i++)
-            if (tree_child_leaf(child[i]) == NULL && half_area(&bounds[i]) > area)
+            if ((child[i] & 1) == 0 && half_area(&bounds[i]) > area)
                 largest = i, area = half_area(&bounds[i]);
         if (largest < 0)
             break;
@@ -136,7 +159,7 @@ static tree_node *widen(builder *b, const binary_node *root)
         node->lower_x[i] = bounds[i].lower_x, node->upper_x[i] = bounds[i].upper_x;
         node->lower_y[i] = bounds[i].lower_y, node->upper_y[i] = bounds[i].upper_y;
         node->lower_z[i] = bounds[i].lower_z, node->upper_z[i] = bounds[i].upper_z;
-        node->child[i] = tree_child_leaf(child[i]) != NULL ? child[i] : (uint64_t)(uintptr_t)widen(b, (const binary_node *)(uintptr_t)child[i]);
+        node->child[i] = (child[i] & 1) != 0 ? place_leaf(b, child[i]) : (uint64_t)(uintptr_t)widen(b, (const binary_node *)(uintptr_t)child[i]);
     }
     return node;
 }
@@ -148,7 +171,7 @@ static void single_node(builder *b, uint64_t leaf)
     node_clear(node);
     node->lower_x[0] = node->lower_y[0] = node->lower_z[0] = -1e30f;
     node->upper_x[0] = node->upper_y[0] = node->upper_z[0] = 1e30f;
-    node->child[0] = leaf;
+    node->child[0] = place_leaf(b, leaf);
 }
 
 static gbt_status run_builder(builder *b, void *device, gbt_error *err)
@@ -182,16 +205,20 @@ static gbt_status run_builder(builder *b, void *device, gbt_error *err)
                          (int)rtcGetDeviceError(device));
     b->node_count = 0;
     GBT_TRY(mem_reserve((void **)&b->nodes, &b->node_capacity, 0, b->binary_count + 1, sizeof *b->nodes, "bvh nodes", err));
+    GBT_TRY(mem_reserve((void **)&b->leaves, &b->leaf_capacity, 0, b->leaf_count, sizeof *b->leaves, "bvh leaves", err));
+    GBT_TRY(mem_reserve((void **)&b->members, &b->member_capacity, 0, b->leaf_count, sizeof *b->members, "bvh leaves", err));
+    b->filled_count = 0;
     if (b->binary_count > 0)
         widen(b, root);
     else
         single_node(b, (uint64_t)(uintptr_t)root);
+    parallel_blocks(b->leaf_count, LEAF_BLOCK, fill_leaves, b);
     return GBT_OK;
 }
 
 gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float radius, float reach, gaussian_tree *tree, gbt_error *err)
 {
-    tree->root = NULL;
+    tree->root = NULL, tree->leaves = NULL;
     tree->box_count = tree->rejected_count = tree->node_count = tree->leaf_count = tree->bytes = 0;
     tree->coordinate_max = 0;
     if (g->count == 0)
@@ -213,7 +240,7 @@ gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float radius
     if (tree->box_count == 0)
         return GBT_OK;
     GBT_TRY(run_builder(b, device, err));
-    tree->root = b->nodes;
+    tree->root = b->nodes, tree->leaves = b->leaves;
     tree->node_count = b->node_count, tree->leaf_count = b->leaf_count;
     tree->bytes = tree->node_count * sizeof(tree_node) + tree->leaf_count * sizeof(tree_leaf);
     return GBT_OK;
@@ -227,6 +254,8 @@ void gaussian_tree_free(gaussian_tree *tree)
             rtcReleaseBVH(b->bvh);
         proxy_boxes_free(&b->boxes);
         mem_free(b->nodes);
+        mem_free(b->leaves);
+        mem_free(b->members);
         mem_free(b);
     }
     memset(tree, 0, sizeof *tree);

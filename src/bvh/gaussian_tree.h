@@ -16,7 +16,7 @@ enum { TREE_WIDTH = 16 };
 
 /** Boxes of up to 16 children. Unused slots hold an inverted box (lower +1e30, upper -1e30) and child 0: no query touches them. */
 typedef struct tree_node {
-    float lower_x[TREE_WIDTH], upper_x[TREE_WIDTH];
+    _Alignas(64) float lower_x[TREE_WIDTH], upper_x[TREE_WIDTH];
     float lower_y[TREE_WIDTH], upper_y[TREE_WIDTH];
     float lower_z[TREE_WIDTH], upper_z[TREE_WIDTH];
     uint64_t child[TREE_WIDTH]; /* address of a tree_node, or that of a tree_leaf + 1 */
@@ -24,7 +24,7 @@ typedef struct tree_node {
 
 /** Ellipsoids { x : (x - mean)^T spread^-1 (x - mean) <= 1 }: spread = k^2 R S S R^T. Unused slots repeat the first. */
 typedef struct tree_leaf {
-    float mean[3][TREE_WIDTH];
+    _Alignas(64) float mean[3][TREE_WIDTH];
     float spread[6][TREE_WIDTH]; /* xx yy zz yz zx xy */
     uint32_t id[TREE_WIDTH];
     uint32_t count;
@@ -37,6 +37,7 @@ static inline const tree_leaf *tree_child_leaf(uint64_t child) /* NULL for a tre
 
 typedef struct gaussian_tree {
     const tree_node *root; /* NULL when no Gaussian is visible at all */
+    const tree_leaf *leaves; /* [leaf_count], in the order of the tree */
     size_t box_count;      /* Gaussians in the tree; those with opacity <= alpha_min or non-finite fields are left out */
     size_t rejected_count; /* of these, the non-finite or out-of-range ones */
     size_t node_count, leaf_count, bytes;

@@ -3,6 +3,8 @@
 #define GBT_TRACE_SETTINGS_H
 
 #include <math.h>
+#include <stdbool.h>
+#include <string.h>
 
 typedef struct trace_settings {
     float alpha_min;         /* a hit counts when alpha >= this; > 0. Default 1/255 */
@@ -16,6 +18,24 @@ typedef struct trace_settings {
 static inline trace_settings trace_settings_default(void)
 {
     return (trace_settings){.alpha_min = 1.0f / 255.0f, .alpha_max = 0.99f, .transmittance_min = 1e-4f, .proxy_radius = INFINITY, .t_near = 0.01f};
+}
+
+/**
+ * Set how much is left out of a picture, by name: "exact", "default" or "fast"; bounds on what that changes: docs/accuracy.md.
+ *
+ * Sets alpha_min, transmittance_min and proxy_radius. The rest is what the model was trained with, and stays. False, and nothing is set,
+ * for another name.
+ */
+static inline bool trace_settings_preset(const char *name, trace_settings *out)
+{
+    static const struct { const char *name; float alpha_min, transmittance_min; } presets[] = {
+        {"exact", 1e-5f, 1e-6f}, {"default", 1.0f / 255.0f, 1e-4f}, {"fast", 0.02f, 1e-3f}};
+    for (size_t i = 0; i < sizeof presets / sizeof *presets; i++)
+        if (strcmp(name, presets[i].name) == 0) {
+            out->alpha_min = presets[i].alpha_min, out->transmittance_min = presets[i].transmittance_min, out->proxy_radius = INFINITY;
+            return true;
+        }
+    return false;
 }
 
 #endif

@@ -1,7 +1,16 @@
 /* trace/tile_kernel.inc.h -- a tile of neighbouring packets through the tree: gather, cull, evaluate, blend. Compiled once per instruction set.
 
+     heap of nodes by a lower bound of t --> nearest --> inner node: its children that meet the tile, back to the heap
+                                                     --> leaf: its ellipsoids that reach into the tile become candidates, which wait
+                                                               until nothing nearer can still come
+     candidates --> every packet evaluates those that reach into its beam, one row each --> blends the rows before the horizon (rows16.h)
+
+   The horizon is the nearest bound of what is left in the heap or waiting: nothing can still come before it. A packet stops when all of
+   its rays are opaque; one that needs more rows than there are goes ray by ray (ray16.h).
+
    Wanted before inclusion: KERNEL_NAME, the name of the exported tile_kernel. */
 
+#include "trace/adjoint16.h"
 #include "trace/beam16.h"
 #include "trace/embree16.h"
 #include "trace/gaussian16.h"
@@ -9,7 +18,6 @@
 #include "trace/kernel.h"
 #include "trace/ray16.h"
 #include "trace/rows16.h"
-#include "trace/adjoint16.h"
 #include "trace/view16.h"
 
 enum {
@@ -215,7 +223,6 @@ static void pick_candidates(tile_state *s, float horizon)
 {
     int waiting = 0, i = 0, n = 0;
     const bool crowded = s->waiting_count > CANDIDATE_CAPACITY / 2;
-    const candidate *picked[CHUNK_CAPACITY];
     candidate copy[CHUNK_CAPACITY];
     uint16_t order[CHUNK_CAPACITY];
     for (; i < s->waiting_count && n < CHUNK_CAPACITY; i++)
@@ -229,14 +236,13 @@ static void pick_candidates(tile_state *s, float horizon)
     rank_keys(s->nearest, n, order);
     memset(s->in_front, 0, sizeof s->in_front);
     for (i = 0; i < n; i++) {
-        const candidate *c = picked[i] = &copy[order[i]];
+        const candidate *c = &copy[order[i]];
+        s->nearest[i] = c->nearest;
         for (int k = 0; k < 8; k++)
             s->bound[k][i] = c->bound[k];
         s->id[i] = c->id;
         s->in_front[i / 16] |= (uint16_t)((unsigned)c->in_front << i % 16);
     }
-    for (i = 0; i < n; i++)
-        s->nearest[i] = picked[i]->nearest;
 }
 
 /* Which of sixteen candidates reach into a packet's beam. */
@@ -324,8 +330,8 @@ static bool gather_tile(tile_state *s, const kernel_scene *scene, const tile_ray
         if (s->heap_count > 0) {
             const uint64_t child = heap_pop(s->heap, &s->heap_count);
             const tree_leaf *leaf = tree_child_leaf(child);
-            if (s->heap_count > 0)
-                prefetch_child(s->heap[0].child); /* most likely the next */
+            for (int i = 0; i < 3 && i < s->heap_count; i++)
+                prefetch_child(s->heap[i].child); /* the next is most likely one of these */
             counters->nodes++;
             if (leaf == NULL) {
                 const tree_node *node = (const tree_node *)(uintptr_t)child;

@@ -28,6 +28,8 @@ typedef struct gbt_train_def {
     int start_level;            /* coarse to fine: first resolution is 1 / 2^start_level, [0, 4]. Default 2 */
     const char *eval_split;     /* "every=8" (default), "none", "list=FILE" */
     uint64_t seed;              /* Default 0 */
+    size_t hit_bytes_max;       /* memory for the hits of a view that are kept for the adjoint; tiles beyond are traced again, to the same bits.
+                                   0: no limit. Default 0 */
     size_t max_anchors;         /* growth stops there. Default 2,000,000 */
     bool grow;                  /* grow and prune anchors. Default true */
     bool compat;                /* every quirk of the reference method (docs/training.md). Default false */

@@ -34,6 +34,8 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
         {.name = "save-every", .kind = OPTION_DURATION, .value = &d->save_every_seconds, .min = 0, .max = 1e7, .value_name = "TIME", .help = "time between checkpoints; 0: only at the end"},
         {.name = "resume", .kind = OPTION_FLAG, .value = &d->resume, .help = "go on from the last checkpoint of RUN, with its settings"},
         {.name = "seed", .kind = OPTION_UINT64, .value = &d->seed, .value_name = "S", .help = "of everything that is random"},
+        {.name = "memory", .kind = OPTION_SIZE, .value = &d->hit_bytes_max, .min = 0, .max = 0x1p60, .value_name = "BYTES",
+         .help = "for the hits kept for the adjoint (100M); what goes beyond is traced again; 0: no limit; never changes the result"},
         {.name = "threads", .kind = OPTION_INT, .value = &t->threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors; never changes the result"},
     };
     const int shared_count = sizeof shared / sizeof *shared;

@@ -223,6 +223,7 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
         GBT_TRY(resume(t, data, &paths, def, strings, err));
     else
         GBT_TRY(trainer_open(t, data, def, err));
+    t->frame.scene.tape_bytes_max = def->hit_bytes_max;
     if (t->step == 0)
         t->seconds = clock_wall() - begin; /* loading counts */
     char config[CONFIG_TEXT_SIZE];

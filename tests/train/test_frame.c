@@ -157,6 +157,39 @@ static void a_camera_is_a_shot(void **state)
     free_world(&w);
 }
 
+static gbt_status plain_guest(void *context, trace_scene *scene, const ray_image *rays, image *rgb, gbt_error *err)
+{
+    int *calls = context;
+    assert_true(scene->reach >= 30);
+    ++*calls;
+    return trace_forward(scene, rays, false, &(trace_outputs){.rgb = rgb}, NULL, err);
+}
+
+/* A guest gets every sample and every anchor; one that does nothing of its own changes nothing. */
+static void a_guest_that_only_traces(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < KINDS; kind++) {
+        world w = make_world(6);
+        frame a = {0}, b = {0};
+        ray_image given = {0};
+        int calls = 0;
+        const ray_shot shot = random_shot(200 + (uint64_t)kind, kind, &given);
+        const frame_guest guest = {.trace = plain_guest, .context = &calls, .reach = 30};
+        w.a.position[0] = NAN; /* an anchor that is nowhere is not decoded */
+        assert_ok(frame_render_shot(&a, &w.a, &w.d, &shot, &w.s, NULL));
+        assert_ok(frame_render_guest(&b, &w.a, &w.d, &shot, &w.s, &guest, NULL));
+        assert_int_equal(b.visible_count, ANCHORS - 1);
+        assert_int_equal(calls, ray_shot_sample_count(&shot));
+        for (size_t i = 0; i < 3 * W * H; i++)
+            assert_near((double)b.rgb.pixels[i], (double)a.rgb.pixels[i], 3e-6);
+        frame_free(&a);
+        frame_free(&b);
+        ray_image_free(&given);
+        free_world(&w);
+    }
+}
+
 static void same_bits_for_every_thread_count(void **state)
 {
     (void)state;
@@ -205,6 +238,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_reached_is_left_out),
         cmocka_unit_test(a_camera_is_a_shot),
+        cmocka_unit_test(a_guest_that_only_traces),
         cmocka_unit_test(same_bits_for_every_thread_count),
         cmocka_unit_test(no_rays),
     };

@@ -1,7 +1,8 @@
-/* gbtrace/bench.h -- measure the tracer on given Gaussians, and check gradients on the user's own scene. */
+/* gbtrace/bench.h -- measure the tracer on given Gaussians, its speed against its accuracy, and check gradients on the user's own scene. */
 #ifndef GBTRACE_BENCH_H
 #define GBTRACE_BENCH_H
 
+#include <stddef.h>
 #include <stdio.h>
 
 #include "gbtrace/status.h"
@@ -19,12 +20,41 @@ typedef struct gbt_bench_def {
     float alpha_min;    /* smallest response that counts, in (0, 1); 0 or NaN: that of the run, 1/255 for a .ply */
     float alpha_max;    /* alpha is cut here, in (0, 1); 0 or NaN: that of the run, 0.99 for a .ply */
     float t_min;        /* stop before transmittance falls below this, in (0, 1); 0 or NaN: that of the run, 1e-4 for a .ply */
+    float proxy_radius; /* a Gaussian ends at this many std-devs, > 0; 0 or NaN: where its response falls to alpha_min. Default 0 */
+    const char *preset; /* "exact", "default" or "fast" (docs/accuracy.md); the four numbers above win over it. NULL: as the model is. Default NULL */
+    const char *kernel; /* "tile" (default, and NULL), "single" or "embree"; or some of them, as "tile,embree": measured in turn and compared with the first */
+    size_t tape_bytes_max; /* memory for the hits that forward keeps for the adjoint; what goes beyond is traced again. 0, the default: no limit */
 } gbt_bench_def;
 
 gbt_bench_def gbt_bench_def_default(void);
 
-/** Time build, forward and adjoint; figures as text to `out` and as JSON. Times of one core per ray are process CPU time / rays. */
+/**
+ * Time build, forward and adjoint; figures as text to `out` and as JSON. Times of one core per ray are process CPU time / rays.
+ *
+ * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ */
 gbt_status gbt_bench_trace(const gbt_bench_def *def, FILE *out, gbt_error *err);
+
+typedef struct gbt_study_def {
+    const char *const *models; /* plain 3DGS .ply, or runs */
+    size_t model_count;        /* 1 to 16 */
+    const char *camera;        /* camera file of every .ply; NULL: the camera.json beside each. Runs: their first held-out view. Default NULL */
+    int repeats;               /* timed passes of each setting after one warm-up; the median counts. Default 3 */
+} gbt_study_def;
+
+gbt_study_def gbt_study_def_default(void);
+
+/**
+ * Speed against accuracy: core-microseconds per ray and the error to the picture without any cut-off, for every setting that trades one
+ * for the other (docs/accuracy.md).
+ *
+ * Writes speed.csv, speed.json, speed.md, speed.svg (the chart) and speed.html (chart and table, one file that loads nothing) into the
+ * folder `folder`, and the table as Markdown to `out`.
+ *
+ * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * Cost: about a minute per model of 10,000 Gaussians and 512 x 512 rays.
+ */
+gbt_status gbt_study_speed(const gbt_study_def *def, const char *folder, FILE *out, gbt_error *err);
 
 /**
  * Compare analytic gradients with the double adjoint and with differences, on a trained run: tracer, decode and the whole chain.

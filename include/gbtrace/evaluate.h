@@ -12,6 +12,7 @@ typedef struct gbt_evaluate_def {
     const char *data; /* data set folder; NULL: the one the model was trained on. Default NULL */
     const char *json; /* also write the scores here; NULL: only RUN/metrics.json. Default NULL */
     int report;       /* 1: also write RUN/report.html. Default 1 */
+    const char *preset; /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is "default". Default NULL */
 } gbt_evaluate_def;
 
 gbt_evaluate_def gbt_evaluate_def_default(void);
@@ -35,6 +36,9 @@ typedef struct gbt_render_def {
     const char *format;   /* "png" (default) or "exr" (32-bit float) */
     double downscale;     /* 0: as in training. Default 0 */
     const char *camera;   /* camera file (docs/cameras.md): render that and no views; the data set is not needed. Default NULL */
+    const char *outputs;  /* also write these, as float EXR (docs/formats.md): "depth,normal". Always by the tracer, without meshes. Default NULL */
+    const char *preset;   /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is "default". Default NULL */
+    const char *insert;   /* meshes to put into the scene (docs/inserting.md); with the renderer "trace" only. Default NULL */
 } gbt_render_def;
 
 gbt_render_def gbt_render_def_default(void);

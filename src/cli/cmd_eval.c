@@ -8,6 +8,7 @@ static int run(const command *self, int argc, char **argv)
     const option options[] = {
         {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "data set in place of the one it was trained on"},
         {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the scores there too"},
+        {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast", .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
     };
     operands model;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);

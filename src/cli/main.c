@@ -14,6 +14,7 @@ static const command *const commands[] = {
     &command_render,
     &command_make_scene,
     &command_bench,
+    &command_study,
     &command_check_grad,
 };
 

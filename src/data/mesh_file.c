@@ -81,7 +81,7 @@ static gbt_status take_face(mesh_data *out, const char *at, const char *end, raw
     size_t length;
     fan f = {0};
     while (number_next_token(&at, end, &token, &length)) {
-        uint32_t corner;
+        uint32_t corner = 0;
         GBT_TRY(parse_corner(out, token, length, place, &corner, err));
         GBT_TRY(add_corner(out, &f, corner, place, err));
     }

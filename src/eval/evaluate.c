@@ -147,11 +147,15 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
         return GBT_ERR_NO_MEMORY;
     gbt_status status = loaded_run_open(run, def->data, 0, r, err);
     if (status == GBT_OK)
+        status = loaded_run_preset(def->preset, &r->settings, err);
+    if (status == GBT_OK)
         status = score_run(r, run, &e, err);
     if (status != GBT_OK)
         goto done;
     char path[4096];
     root = scores_to_json(&e);
+    if (def->preset != NULL)
+        json_object_set_new(root, "preset", json_string(def->preset));
     add_training(root, run);
     status = file_join(path, sizeof path, run, "metrics.json", err);
     if (status == GBT_OK)

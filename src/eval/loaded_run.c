@@ -66,6 +66,13 @@ gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err)
     return frame_render(&r->frame, &r->model.anchors, &r->model.decoder, &camera, &r->settings, false, err);
 }
 
+gbt_status loaded_run_preset(const char *name, trace_settings *settings, gbt_error *err)
+{
+    if (name != NULL && !trace_settings_preset(name, settings))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--preset: \"%.40s\" (wanted exact, default or fast)", name);
+    return GBT_OK;
+}
+
 void loaded_run_view_name(const scene_view *view, char *out, size_t size)
 {
     snprintf(out, size, "%s", view->name);

@@ -7,7 +7,9 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "eval/camera_file.h"
+#include "eval/insert_file.h"
 #include "eval/loaded_run.h"
+#include "eval/render_outputs.h"
 #include "gbtrace/evaluate.h"
 #include "trace/reference.h"
 
@@ -39,19 +41,30 @@ static gbt_status render_reference(loaded_run *r, const ray_shot *shot, gbt_erro
     return status;
 }
 
-static gbt_status render_one(loaded_run *r, const ray_shot *shot, const char *out, const char *name, const gbt_render_def *def, gbt_error *err)
+/* What to render with: the run, and what is put into it. */
+typedef struct studio {
+    loaded_run run;
+    insert_scene insert;
+    unsigned outputs; /* render_outputs_parse() */
+} studio;
+
+static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, const char *name, const gbt_render_def *def, gbt_error *err)
 {
     char file[1100], path[4096];
-    GBT_TRY(frame_render_shot(&r->frame, &r->model.anchors, &r->model.decoder, shot, &r->settings, err));
+    loaded_run *r = &st->run;
+    const frame_guest guest = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
+    GBT_TRY(frame_render_guest(&r->frame, &r->model.anchors, &r->model.decoder, shot, &r->settings, def->insert != NULL ? &guest : NULL, err));
     if (strcmp(def->renderer, "reference") == 0)
         GBT_TRY(render_reference(r, shot, err));
     snprintf(file, sizeof file, "%s.%s", name, def->format);
     GBT_TRY(file_join(path, sizeof path, out, file, err));
-    return image_write(path, &r->frame.rgb, err);
+    GBT_TRY(image_write(path, &r->frame.rgb, err));
+    return render_outputs_write(r, shot, st->outputs, out, name, err);
 }
 
-static gbt_status render_views(loaded_run *r, const char *out, const gbt_render_def *def, gbt_error *err)
+static gbt_status render_views(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
 {
+    loaded_run *r = &st->run;
     size_t rendered = 0;
     for (size_t i = 0; i < r->scene.view_count; i++) {
         const scene_view *view = &r->scene.views[i];
@@ -61,7 +74,7 @@ static gbt_status render_views(loaded_run *r, const char *out, const gbt_render_
         loaded_run_view_name(view, name, sizeof name);
         const gbt_camera camera = photos_camera(&r->photos, i, 0);
         const ray_shot shot = ray_shot_of(&camera);
-        GBT_TRY(render_one(r, &shot, out, name, def, err));
+        GBT_TRY(render_one(st, &shot, out, name, def, err));
         rendered++;
     }
     if (rendered == 0)
@@ -80,16 +93,14 @@ static void camera_name(const char *path, char *out, size_t size)
         *dot = '\0';
 }
 
-static gbt_status render_camera(const char *run, loaded_run *r, const char *out, const gbt_render_def *def, gbt_error *err)
+static gbt_status render_camera(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
 {
     camera_file file = {0};
     char name[1024];
     camera_name(def->camera, name, sizeof name);
-    gbt_status status = loaded_run_open_model(run, r, err);
+    gbt_status status = camera_file_read(def->camera, st->run.model.origin, &file, err);
     if (status == GBT_OK)
-        status = camera_file_read(def->camera, r->model.origin, &file, err);
-    if (status == GBT_OK)
-        status = render_one(r, &file.shot, out, name, def, err);
+        status = render_one(st, &file.shot, out, name, def, err);
     if (status == GBT_OK)
         log_info("%s rendered into %s", name, out);
     camera_file_free(&file);
@@ -106,19 +117,23 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
         return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: %g (wanted 1 to 64)", def->downscale);
     if (def->camera != NULL && def->downscale != 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: not with --camera (the camera file says the size)");
+    if (def->insert != NULL && strcmp(def->renderer, "trace") != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: %s has no meshes (wanted trace with --insert)", def->renderer);
     GBT_TRY(file_make_folder(out, err));
-    loaded_run *r = mem_alloc(1, sizeof *r, "run", err);
-    if (r == NULL)
+    studio *st = mem_calloc(1, sizeof *st, "run", err);
+    if (st == NULL)
         return GBT_ERR_NO_MEMORY;
-    gbt_status status;
-    if (def->camera != NULL) {
-        status = render_camera(run, r, out, def, err);
-    } else {
-        status = loaded_run_open(run, def->data, def->downscale, r, err);
-        if (status == GBT_OK)
-            status = render_views(r, out, def, err);
-    }
-    loaded_run_close(r);
-    mem_free(r);
+    gbt_status status = render_outputs_parse(def->outputs, &st->outputs, err);
+    if (status == GBT_OK)
+        status = def->camera != NULL ? loaded_run_open_model(run, &st->run, err) : loaded_run_open(run, def->data, def->downscale, &st->run, err);
+    if (status == GBT_OK)
+        status = loaded_run_preset(def->preset, &st->run.settings, err);
+    if (status == GBT_OK && def->insert != NULL)
+        status = insert_file_read(def->insert, st->run.model.origin, &st->insert, err);
+    if (status == GBT_OK)
+        status = def->camera != NULL ? render_camera(st, out, def, err) : render_views(st, out, def, err);
+    insert_scene_free(&st->insert);
+    loaded_run_close(&st->run);
+    mem_free(st);
     return status;
 }

@@ -134,6 +134,7 @@ misuse 4 "nothing: no such file or folder" info nothing
 misuse 4 "no.gbt: cannot open: No such file or directory" info no.gbt
 misuse 4 "nothing/model.gbt: cannot open: No such file or directory" render nothing/model.gbt -o o --camera c.json
 misuse 2 "--downscale: not with --camera (the camera file says the size)" render nothing -o o --camera c.json --downscale 2
+misuse 2 "--renderer: reference has no meshes (wanted trace with --insert)" render nothing -o o --insert i.json --renderer reference
 mkdir empty
 misuse 3 "empty: not a data set (wanted sparse/0/cameras.bin or transforms.json in it)" info empty
 printf 'GBTMODEL' >short.gbt
@@ -180,6 +181,95 @@ prints "make-scene" '^wrote made$' make-scene tabletop -o made --width 32 --heig
 [ -s made/sparse/0/cameras.bin ] && [ -s made/sparse/0/images.bin ] && [ -s made/sparse/0/points3D.bin ]
 report $? "make-scene writes a COLMAP model" "$(find made)"
 prints "info of a made scene" '^  photos    4 found, 0 unreadable, 32 x 24 pixels' info made
+
+# ---- meshes among the Gaussians of a tiny run
+"$program" train made -o tiny --iterations 2 --eval-split none >out 2>err
+report $? "a tiny run" "$(cat err)"
+printf '{"origin": [0, -2, -3], "target": [0, 0, 0], "up": [0, -1, 0], "fov_x_deg": 50, "width": 24, "height": 16}' >c.json
+printf 'v -50 -50 -1\nv 50 -50 -1\nv 0 50 -1\nf 1 2 3\n' >wall.obj
+insert() { # objects and light
+    printf '%s' "$1" >i.json
+}
+drawn() { # name, same or different, arguments...: renders the camera, and compares the picture with the one without a mesh
+    name=$1
+    wanted=$2
+    shift 2
+    "$program" render tiny -o "$wanted" --camera c.json "$@" >out 2>err
+    got=$?
+    cmp -s plain/c.png "$wanted/c.png" && is=same || is=different
+    [ "$got" = 0 ] && [ "$is" = "$wanted" ]
+    report $? "$name" "  wanted 0 and $wanted, got $got and $is: $(cat err)"
+}
+"$program" render tiny -o plain --camera c.json >out 2>err
+insert '{"light": {"towards": [0, -1, -1]}, "objects": [{"mesh": "wall.obj", "color": [0, 1, 0]}]}'
+drawn "a mesh in front of the camera" different --insert i.json
+insert '{"objects": [{"mesh": "wall.obj", "position": [0, 0, -20]}]}'
+drawn "a mesh behind the camera" same --insert i.json
+insert '{"objects": [{"mesh": "wall.obj", "material": "glass"}]}'
+misuse 3 "i.json: objects[0].material: wanted one of matt, mirror" render tiny -o o --camera c.json --insert i.json
+insert '{"objects": [{"mesh": "none.obj"}]}'
+misuse 4 "none.obj: cannot open: No such file or directory" render tiny -o o --camera c.json --insert i.json
+insert '{"objects": [{"mesh": "wall.obj"}]}'
+printf 'v 0 0 0\nf 1 2 3\n' >wall.obj
+misuse 3 "wall.obj:2: no such vertex: 2 (there are 1 so far)" render tiny -o o --camera c.json --insert i.json
+misuse 4 "i2.json: cannot open: No such file or directory" render tiny -o o --camera c.json --insert i2.json
+
+# ---- Gaussians: time, speed against accuracy
+{
+    printf 'ply\nformat ascii 1.0\nelement vertex 60\n'
+    for name in x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3; do
+        echo "property float $name"
+    done
+    echo end_header
+    awk 'BEGIN { for (i = 0; i < 60; i++) print i % 5 - 2, int(i / 5) % 4 - 1.5, int(i / 20), i % 3 - 1, 0.5, -0.5, i % 7 - 3, -1, -1.5, -2, 1, 0, i % 2, 0.5 }'
+} >gaussians.ply
+printf '{"origin": [0, 0, -8], "target": [0, 0, 0], "up": [0, 1, 0], "fov_x_deg": 40, "width": 40, "height": 32}' >camera.json
+bench="bench trace --model gaussians.ply --camera camera.json --repeats 1"
+prints "bench" '^forward, core-us/ray  *[0-9.]*$' $bench --json one.json
+prints "bench of several kernels gives ratios" '^adjoint, core-us/ray  *[0-9.]*  *[0-9.]*  *[0-9.]*x' $bench --kernel tile,embree --check --json two.json
+for name in forward_core_us_per_ray adjoint_core_us_per_ray nodes_per_ray candidates_per_packet tests_per_ray hits_per_ray blended_per_ray rows_per_packet \
+    row_pairs_per_packet tape_bytes tree_bytes record_bytes forward_seconds build_ms; do
+    [ "$(grep -c "\"$name\": [0-9]" one.json)" = 2 ] && [ "$(grep -c "\"$name\": [0-9]" two.json)" = 3 ] # at the top, and once per kernel
+    report $? "bench writes $name" "$(cat two.json)"
+done
+[ "$(grep -c '"kernel": "embree"' two.json)" = 1 ] && [ "$(grep -c '"kernel": "tile"' two.json)" = 2 ] && [ "$(grep -c '"psnr_to_reference": [0-9][0-9]' two.json)" = 3 ]
+report $? "bench names kernels and their errors" "$(cat two.json)"
+prints "bench with little memory" '^tape, MB  *0.00$' $bench --memory 64
+prints "bench with a preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001, proxy radius inf; medians of 1$' $bench --preset fast
+prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.001, proxy radius 2; medians of 1$' $bench --preset fast --alpha-min 0.05 --alpha-max 0.9 --proxy-radius 2
+misuse 2 '--kernel: "tile,tile" (wanted tile, single or embree, or some of them with commas between)' $bench --kernel tile,tile
+misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
+misuse 2 "--camera: missing (a .ply has no cameras)" bench trace --model gaussians.ply
+misuse 2 'study: unknown study "pace" (wanted speed)' study pace gaussians.ply -o study
+misuse 2 "argument missing (usage: gbtrace study speed MODEL... -o DIR)" study speed -o study
+"$program" study speed gaussians.ply -o study --repeats 1 >out 2>err
+got=$?
+[ "$got" = 0 ] && [ "$(grep -c '^| preset | [a-z]* | [0-9.]* | [0-9.]* | [0-9.]* | [0-9]* | [0-9.]* | [0-9.e-]* |$' out)" = 3 ] && cmp -s out study/speed.md
+report $? "study prints its table" "  got $got: $(cat err out)"
+[ "$(grep -c '^"gaussians.ply",' study/speed.csv)" -ge 24 ] && [ "$(grep -c '"knob": ' study/speed.json)" -ge 21 ] &&
+    [ "$(grep -c '<svg xmlns' study/speed.svg)" = 1 ] && [ "$(grep -o '>exact</text>' study/speed.html | wc -l)" = 1 ]
+report $? "study writes data and charts" "$(ls -l study)"
+
+# ---- what is rendered beside the picture
+if "$program" train made -o run --iterations 3 >out 2>err; then
+    outputs=transmittance,depth,median-depth,normal,hits,anchor
+    "$program" render run -o pictures --outputs $outputs --preset exact >out 2>err
+    got=$?
+    ls pictures >listed
+    [ "$got" = 0 ] && [ "$(wc -l <listed)" = 7 ] && [ "$(grep -c -e '\.png$' listed)" = 1 ]
+    report $? "render writes its outputs" "  got $got: $(cat err listed)"
+    for name in transmittance depth median-depth normal hits anchor; do
+        channels=Y
+        [ $name = normal ] && channels='B.*G.*R'
+        head -c 500 pictures/*.$name.exr 2>err | tr -c 'A-Za-z' ' ' | grep -q "channels chlist *[A-Za-z ]*$channels .*compression"
+        report $? "channels of $name" "$(head -c 300 pictures/*.$name.exr | tr -c 'A-Za-z0-9' ' ')"
+    done
+    "$program" eval run --preset fast >out 2>err && [ "$(grep -c '^  "preset": "fast"' run/metrics.json)" = 1 ]
+    report $? "eval says with which preset it scored" "$(cat err)"
+    misuse 2 '--outputs: "dept" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)' render run -o pictures --outputs hits,dept
+else
+    report 1 "a run to render" "$(cat err)"
+fi
 
 # ---- real data, where it is
 if [ -n "$shared" ] && [ -d "$shared/data/fox" ]; then

@@ -1,0 +1,59 @@
+#!/usr/bin/env python3
+# scaling -- the same hits per ray from 10 thousand to 1 million Gaussians: time of one core per ray, build, bytes.
+#
+#     python3 bench/scaling.py [--gbtrace build/release/gbtrace] [--size 512] [--counts 10000,100000,1000000]      (needs numpy)
+#
+# Gaussians fill a cube evenly. Their size goes with the inverse square root of their number, so that a ray always crosses about 30.
+import argparse
+import json
+import os
+import subprocess
+import tempfile
+
+import numpy as np
+
+parser = argparse.ArgumentParser()
+parser.add_argument("--gbtrace", default="build/release/gbtrace")
+parser.add_argument("--size", type=int, default=512, help="pixels across and down")
+parser.add_argument("--counts", default="10000,100000,1000000")
+parser.add_argument("--repeats", type=int, default=5)
+args = parser.parse_args()
+
+FIELDS = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"]
+
+
+def write_cloud(path, count):
+    random = np.random.default_rng(count)
+    half = 10.0
+    size = 0.8 * np.sqrt(45 * (2 * half) ** 2 / (count * np.pi * 9))
+    rows = np.empty((count, len(FIELDS)), "<f4")
+    rows[:, 0:3] = random.uniform(-half, half, (count, 3))
+    rows[:, 3:6] = random.normal(0, 1, (count, 3))
+    rows[:, 6] = random.normal(-0.7, 1, count)  # logit
+    rows[:, 7:10] = np.log(size) + 0.45 * random.normal(size=(count, 1)) + 0.45 * random.normal(size=(count, 3))
+    turn = random.normal(size=(count, 4))
+    rows[:, 10:14] = turn / np.linalg.norm(turn, axis=1, keepdims=True)
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {count}\n" + "".join(f"property float {name}\n" for name in FIELDS) + "end_header\n"
+    with open(path, "wb") as out:
+        out.write(header.encode())
+        out.write(rows.tobytes())
+
+
+print("| Gaussians | hits | blended | forward, core-us/ray | to the first | adjoint, core-us/ray | build, ms | bytes per Gaussian |")
+print("|---|---|---|---|---|---|---|---|")
+with tempfile.TemporaryDirectory() as folder:
+    camera = os.path.join(folder, "camera.json")
+    with open(camera, "w") as out:
+        json.dump({"origin": [0, -38, 9], "target": [0, 0, 0], "up": [0, 0, 1], "fov_x_deg": 38.0, "width": args.size, "height": args.size}, out)
+    first = None
+    for count in [int(c) for c in args.counts.split(",")]:
+        model, result = os.path.join(folder, "cloud.ply"), os.path.join(folder, "result.json")
+        write_cloud(model, count)
+        subprocess.run([args.gbtrace, "bench", "trace", "--model", model, "--camera", camera, "--repeats", str(args.repeats), "--json", result],
+                       check=True, stdout=subprocess.DEVNULL)
+        with open(result) as text:
+            r = json.load(text)
+        forward = r["forward_core_us_per_ray"]
+        first = first or forward
+        print(f"| {count:,} | {r['hits_per_ray']:.1f} | {r['blended_per_ray']:.1f} | {forward:.3f} | {forward / first:.2f} | {r['adjoint_core_us_per_ray']:.3f} "
+              f"| {r['build_ms']:.0f} | {r.get('scene_bytes', 0) / count:.0f} |")

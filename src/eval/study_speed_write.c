@@ -1,0 +1,214 @@
+/* eval/study_speed_write.c -- the study "speed against accuracy" as a table, as data, and as a chart. */
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+
+#include "base/cpu.h"
+#include "base/fail.h"
+#include "base/file.h"
+#include "eval/json_out.h"
+#include "eval/report_style.h"
+#include "eval/study_chart.h"
+#include "eval/study_speed.h"
+
+enum { PANEL_GAP = 18 };
+
+static const char x_unit[] = "core-microseconds per ray, forward (log)";
+static const char y_unit[] = "PSNR to the picture without cut-offs, dB";
+
+/* ---- tables -------------------------------------------------------------------------------------------------------------------------------- */
+
+static void add_error(text *out, const bench_error *e, const char *between)
+{
+    text_number(out, e->psnr, 1);
+    text_add(out, between);
+    text_format(out, "%.2g", e->max);
+}
+
+void speed_table(const speed_study *study, text *out)
+{
+    for (size_t m = 0; m < study->model_count; m++) {
+        const speed_model *model = &study->models[m];
+        text_format(out, "%s**%s**: %zu Gaussians, %zu rays, %zu of them checked; %d threads, medians of %d\n\n", m > 0 ? "\n" : "", model->name, model->gaussians,
+                    model->rays, model->check_rays, study->threads, study->repeats);
+        text_add(out, "| knob | value | forward, core-us/ray | with adjoint | blended per ray | pairs per packet | PSNR, dB | max error |\n|---|---|---|---|---|---|---|---|\n");
+        for (size_t i = 0; i < model->row_count; i++) {
+            const speed_row *row = &model->rows[i];
+            text_format(out, "| %s | %s | %.3f | %.3f | %.1f | %.0f | ", speed_knob_name(row->knob), row->value, row->forward_us, row->both_us, row->blended, row->pairs);
+            add_error(out, &row->error, " | ");
+            text_add(out, " |\n");
+        }
+        for (size_t i = 0; i < SPEED_ERRORS; i++) {
+            text_format(out, "| not built | %s | error only | %s | | | ", model->ideas[i].name, model->ideas[i].reason);
+            add_error(out, &model->ideas[i].error, " | ");
+            text_add(out, " |\n");
+        }
+    }
+}
+
+static void add_csv_text(text *out, const char *value)
+{
+    text_add(out, "\"");
+    for (; *value != '\0'; value++)
+        text_format(out, *value == '"' ? "\"\"" : "%c", *value);
+    text_add(out, "\"");
+}
+
+static void add_csv(const speed_study *study, text *out)
+{
+    text_add(out, "model,knob,value,kernel,isa,alpha_min,t_min,proxy_radius,forward_core_us_per_ray,forward_adjoint_core_us_per_ray,blended_per_ray,"
+                  "row_pairs_per_packet,psnr,max_error\n");
+    for (size_t m = 0; m < study->model_count; m++) {
+        const speed_model *model = &study->models[m];
+        for (size_t i = 0; i < model->row_count; i++) {
+            const speed_row *r = &model->rows[i];
+            add_csv_text(out, model->name);
+            text_format(out, ",%s,%s,%s,%s,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", speed_knob_name(r->knob), r->value, bench_kernel_name(r->kernel),
+                        cpu_isa_name(r->isa), (double)r->settings.alpha_min, (double)r->settings.transmittance_min, (double)r->settings.proxy_radius, r->forward_us,
+                        r->both_us, r->blended, r->pairs, r->error.psnr, r->error.max);
+        }
+        for (size_t i = 0; i < SPEED_ERRORS; i++) {
+            add_csv_text(out, model->name);
+            text_format(out, ",not built,%s,,,,,,,,,,%.6g,%.6g\n", model->ideas[i].name, model->ideas[i].error.psnr, model->ideas[i].error.max);
+        }
+    }
+}
+
+static json_t *model_to_json(const speed_model *model)
+{
+    json_t *rows = json_array(), *ideas = json_array();
+    const double promised = 0.5 / 255, kept = model->rows[0].error.max; /* of the preset "exact", which comes first */
+    for (size_t i = 0; i < model->row_count; i++) {
+        const speed_row *r = &model->rows[i];
+        json_array_append_new(rows, json_pack("{s:s,s:s,s:s,s:s,s:f,s:f,s:o,s:f,s:f,s:f,s:f,s:f,s:f}", "knob", speed_knob_name(r->knob), "value", r->value, "kernel",
+                                              bench_kernel_name(r->kernel), "isa", cpu_isa_name(r->isa), "alpha_min", (double)r->settings.alpha_min, "transmittance_min",
+                                              (double)r->settings.transmittance_min, "proxy_radius",
+                                              isfinite(r->settings.proxy_radius) ? json_real((double)r->settings.proxy_radius) : json_null(),
+                                              "forward_core_us_per_ray", r->forward_us, "forward_adjoint_core_us_per_ray", r->both_us, "blended_per_ray", r->blended,
+                                              "row_pairs_per_packet", r->pairs, "psnr", r->error.psnr, "max_error", r->error.max));
+    }
+    for (size_t i = 0; i < SPEED_ERRORS; i++)
+        json_array_append_new(ideas, json_pack("{s:s,s:s,s:f,s:f}", "name", model->ideas[i].name, "reason", model->ideas[i].reason, "psnr", model->ideas[i].error.psnr,
+                                               "max_error", model->ideas[i].error.max));
+    json_t *check = json_pack("{s:s,s:f,s:f,s:b}", "row", "exact: largest error", "limit", promised, "value", kept, "pass", kept <= promised);
+    return json_pack("{s:o,s:I,s:I,s:I,s:o,s:o,s:[o]}", "model", json_text(model->name), "gaussians", (json_int_t)model->gaussians, "rays", (json_int_t)model->rays, "check_rays",
+                     (json_int_t)model->check_rays, "settings", rows, "not_built", ideas, "checks", check);
+}
+
+static gbt_status write_json(const speed_study *study, const char *path, gbt_error *err)
+{
+    json_t *models = json_array();
+    for (size_t m = 0; m < study->model_count; m++)
+        json_array_append_new(models, model_to_json(&study->models[m]));
+    json_t *root = json_pack("{s:i,s:s,s:i,s:i,s:o}", "schema", 1, "study", "speed", "repeats", study->repeats, "threads", study->threads, "models", models);
+    const gbt_status status = json_save(root, path, err);
+    json_decref(root);
+    return status;
+}
+
+/* ---- chart --------------------------------------------------------------------------------------------------------------------------------- */
+
+static void draw_panel(const speed_study *study, size_t m, int top, text *out)
+{
+    const speed_model *model = &study->models[m];
+    scatter_point points[SPEED_WAYS_MAX];
+    scatter_level levels[SPEED_ERRORS];
+    char note[160];
+    snprintf(note, sizeof note, "%zu Gaussians, %zu rays, %d threads, %s", model->gaussians, model->rays, study->threads, cpu_isa_name(cpu_best_isa()));
+    scatter_chart chart = {.title = model->name, .note = note, .x_unit = x_unit, .y_unit = y_unit, .points = points, .point_count = model->row_count,
+                           .levels = levels, .level_count = SPEED_ERRORS};
+    for (int k = 0; k < KNOB_COUNT; k++)
+        chart.series[k] = speed_knob_name((speed_knob)k);
+    for (size_t i = 0; i < model->row_count; i++) {
+        const speed_row *r = &model->rows[i];
+        points[i] = (scatter_point){(int)r->knob, r->forward_us, r->error.psnr, r->is_default ? "" : r->value};
+    }
+    for (size_t i = 0; i < SPEED_ERRORS; i++)
+        levels[i] = (scatter_level){model->ideas[i].error.psnr, model->ideas[i].name};
+    scatter_draw(out, &chart, top);
+}
+
+static void add_svg(const speed_study *study, size_t first, size_t count, bool alone, text *out)
+{
+    const int height = (int)count * (SCATTER_HEIGHT + PANEL_GAP) - PANEL_GAP;
+    text_format(out, "<svg %sclass=\"scatter\" viewBox=\"0 0 %d %d\"%s role=\"img\" aria-label=\"speed against accuracy\">",
+                alone ? "xmlns=\"http://www.w3.org/2000/svg\" " : "", SCATTER_WIDTH, height, alone ? " width=\"760\"" : "");
+    if (alone) {
+        text_add(out, "<style>");
+        text_add(out, scatter_css);
+        text_add(out, "</style>");
+        text_format(out, "<rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH, height);
+    }
+    for (size_t i = 0; i < count; i++)
+        draw_panel(study, first + i, (int)i * (SCATTER_HEIGHT + PANEL_GAP), out);
+    text_add(out, "</svg>\n");
+}
+
+static void add_page_table(const speed_model *model, text *out)
+{
+    text_add(out, "<details class=\"card\"><summary>The figures</summary><div class=\"scroll\"><table class=\"list\"><thead><tr><th>knob</th><th>value</th>"
+                  "<th>forward, core-\xc2\xb5s/ray</th><th>with adjoint</th><th>blended per ray</th><th>PSNR, dB</th><th>max error</th></tr></thead><tbody>");
+    for (size_t i = 0; i < model->row_count; i++) {
+        const speed_row *r = &model->rows[i];
+        text_format(out, "<tr><th>%s</th><td>%s</td><td>%.3f</td><td>%.3f</td><td>%.1f</td><td>", speed_knob_name(r->knob), r->value, r->forward_us, r->both_us, r->blended);
+        add_error(out, &r->error, "</td><td>");
+        text_add(out, "</td></tr>");
+    }
+    for (size_t i = 0; i < SPEED_ERRORS; i++) {
+        text_format(out, "<tr><th>not built: %s</th><td></td><td colspan=\"3\">error only: %s</td><td>", model->ideas[i].name, model->ideas[i].reason);
+        add_error(out, &model->ideas[i].error, "</td><td>");
+        text_add(out, "</td></tr>");
+    }
+    text_add(out, "</tbody></table></div></details>\n");
+}
+
+static void add_page(const speed_study *study, text *out)
+{
+    text_add(out, "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
+                  "<title>Speed against accuracy</title>\n<style>\n");
+    text_add(out, report_css);
+    text_add(out, scatter_css);
+    text_add(out, ".panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n</style></head>\n<body>\n<header><h1>Speed against accuracy</h1>"
+                  "<p class=\"lead\">What each setting of the tracer costs, and how far its picture is from the one without any cut-off, traced in double. Up and left is "
+                  "better. Each line moves one knob away from the preset <b>default</b>; dashed heights are ideas that were not built, of which only the error was "
+                  "measured.</p></header>\n<main>\n");
+    for (size_t m = 0; m < study->model_count; m++) {
+        text_add(out, "<figure class=\"card panel\">");
+        add_svg(study, m, 1, false, out);
+        text_add(out, "</figure>\n");
+        add_page_table(&study->models[m], out);
+    }
+    text_add(out, "</main>\n<footer><p>Processor time of all threads per ray, median of ");
+    text_format(out, "%d", study->repeats);
+    text_add(out, " passes taken in turn. What the settings mean, and what their errors are bounded by: <code>docs/accuracy.md</code>. This page is one file and loads "
+                  "nothing.</p></footer>\n</body></html>\n");
+}
+
+/* ---- files --------------------------------------------------------------------------------------------------------------------------------- */
+
+static void add_picture(const speed_study *study, text *out)
+{
+    add_svg(study, 0, study->model_count, true, out);
+}
+
+static gbt_status write_text(const speed_study *study, const char *folder, const char *name, void (*add)(const speed_study *, text *), gbt_error *err)
+{
+    char path[4096];
+    GBT_TRY(file_join(path, sizeof path, folder, name, err));
+    text out = {.err = err};
+    add(study, &out);
+    const gbt_status status = out.status != GBT_OK ? out.status : file_write_atomic(path, out.bytes, out.length, err);
+    text_free(&out);
+    return status;
+}
+
+gbt_status speed_write(const speed_study *study, const char *folder, gbt_error *err)
+{
+    char path[4096];
+    GBT_TRY(file_join(path, sizeof path, folder, "speed.json", err));
+    GBT_TRY(write_json(study, path, err));
+    GBT_TRY(write_text(study, folder, "speed.csv", add_csv, err));
+    GBT_TRY(write_text(study, folder, "speed.md", speed_table, err));
+    GBT_TRY(write_text(study, folder, "speed.svg", add_picture, err));
+    return write_text(study, folder, "speed.html", add_page, err);
+}

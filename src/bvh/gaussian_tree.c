@@ -88,23 +88,27 @@ static void *create_node(RTCThreadLocalAllocator allocator, unsigned child_count
     builder *b = user;
     embree_receive(b);
     atomic_fetch_add_explicit(&b->binary_count, 1, memory_order_relaxed);
-    return rtcThreadLocalAlloc(allocator, sizeof(binary_node), 16);
+    binary_node *node = rtcThreadLocalAlloc(allocator, sizeof(binary_node), 16);
+    embree_publish(b);
+    return node;
 }
 
 static void set_children(void *pointer, void **children, unsigned child_count, void *user)
 {
-    (void)user;
     binary_node *node = pointer;
+    embree_receive(user);
     for (unsigned i = 0; i < child_count; i++)
         node->child[i] = (uint64_t)(uintptr_t)children[i];
+    embree_publish(user);
 }
 
 static void set_bounds(void *pointer, const struct RTCBounds **bounds, unsigned child_count, void *user)
 {
-    (void)user;
     binary_node *node = pointer;
+    embree_receive(user);
     for (unsigned i = 0; i < child_count; i++)
         node->bounds[i] = *bounds[i];
+    embree_publish(user);
 }
 
 static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuildPrimitive *primitives, size_t count, void *user)
@@ -116,6 +120,7 @@ static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuil
     leaf->count = (uint32_t)count;
     for (size_t i = 0; i < count; i++)
         leaf->id[i] = primitives[i].primID;
+    embree_publish(b);
     return (char *)leaf + 1;
 }
 
@@ -200,6 +205,7 @@ static gbt_status run_builder(builder *b, void *device, gbt_error *err)
     atomic_store(&b->binary_count, 0), atomic_store(&b->leaf_count, 0);
     embree_publish(b);
     void *root = rtcBuildBVH(&arguments);
+    embree_receive(b);
     if (root == NULL)
         return base_fail(err, GBT_ERR_INTERNAL, "bvh: Embree could not build a tree over %zu Gaussians (error %d)", b->boxes.count,
                          (int)rtcGetDeviceError(device));

@@ -79,11 +79,12 @@ static bool embree_packet(const kernel_scene *scene, const packet_rays *rays, un
         ray_state r = start_ray(rays, lane, scratch);
         if (!reserve_hits(&r, count, scratch))
             return false;
-        if (count > 0)
+        if (count > 0) {
             memcpy(r.hits, sorted + begin, count * sizeof *r.hits);
-        r.count = count;
-        if (!blend_hits(&r, scene, INFINITY, packet, lane, tape, counters))
-            return false;
+            r.count = count;
+            if (!blend_hits(&r, scene, INFINITY, packet, lane, tape, counters))
+                return false;
+        }
         finish_ray(&r, scene, lane, out);
     }
     return true;

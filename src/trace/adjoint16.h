@@ -30,13 +30,23 @@ static inline void gradient_terms(f16 d_alpha, f16 raw, f16 weight, const f16 v_
     terms[14] = terms[15] = zero;
 }
 
-static bool add_sums(gradient_list *out, uint32_t id, const float sums[16])
+/* terms[k] lane i, i < count and 16, is added to sum k of the record of entry i. */
+static bool add_turned(const tape_entry *entry, int count, const f16 terms[16], gradient_list *out)
 {
-    gradient_record *g = gradient_list_find(out, id);
-    if (g == NULL)
-        return false;
-    for (int i = 0; i < GRADIENT_FLOATS; i++)
-        g->sum[i] += sums[i];
+    _Alignas(64) float field[16][16], sums[16];
+    const float *rows[16];
+    f16 of_entry[16];
+    for (int k = 0; k < 16; k++)
+        f16_store(field[k], terms[k]), rows[k] = field[k];
+    f16_load_turned(rows, of_entry);
+    for (int i = 0; i < 16 && i < count; i++) {
+        gradient_record *g = gradient_list_find(out, entry[i].id);
+        if (g == NULL)
+            return false;
+        f16_store(sums, of_entry[i]);
+        for (int k = 0; k < GRADIENT_FLOATS; k++)
+            g->sum[k] += sums[k];
+    }
     return true;
 }
 
@@ -75,18 +85,23 @@ static bool reserve_rows(int count, kernel_scratch *scratch, adjoint_rows *out)
     return true;
 }
 
+/* Those of entries first .. first + 15; the last one is repeated behind the end. */
+static inline gaussian_lanes entry_gaussians(const kernel_scene *scene, const tape_entry *entry, int first, int count, f16 *color)
+{
+    uint32_t id[16];
+    for (int i = 0; i < 16; i++)
+        id[i] = entry[first + i < count ? first + i : count - 1].id;
+    return load_gaussians(scene, id, color);
+}
+
 /* The Gaussians of all rows as seen from the tile's common origin. */
 static void view_rows(const kernel_scene *scene, const tile_beam *beam, const tape_entry *entry, adjoint_rows *o)
 {
     for (int first = 0; first < o->sorted.count; first += 16) {
         adjoint_group *group = &o->group[first / 16];
-        uint32_t id[16];
-        f16 color[3];
         view_axes axes;
-        for (int i = 0; i < 16; i++)
-            id[i] = entry[first + i < o->sorted.count ? first + i : first].id;
-        const gaussian_lanes g = load_gaussians(scene, id, color);
-        const m16 sound = view_gaussians_from(scene, &g, color, beam, &group->view, &axes);
+        const gaussian_lanes g = entry_gaussians(scene, entry, first, o->sorted.count, NULL);
+        const m16 sound = view_gaussians_from(scene, &g, beam, &group->view, &axes);
         /* Beside the camera the slopes of the mean run away. */
         const f16 wide = f16_set1(8), a = f16_load(group->view.field[VIEW_A]), b = f16_load(group->view.field[VIEW_B]);
         const m16 ahead = m16_and(f16_lt(f16_set1(scene->settings.t_near), f16_load(group->view.field[VIEW_DEPTH])),
@@ -110,7 +125,7 @@ static void replay_rows(const kernel_scene *scene, const packet_rays *rays, cons
         view_rows(scene, beam, entry, o);
     }
     for (int i = 0; i < o->sorted.count; i++) {
-        const float *record = scene->records + (size_t)entry[i].id * RECORD_FLOATS, *color = record + RECORD_COLOR;
+        const float *record = scene->records + (size_t)entry[i].id * RECORD_FLOATS;
         const m16 blended = m16_from_bits(entry[i].lanes);
         adjoint_group *group = &o->group[i / 16];
         f16 t, raw, v[3];
@@ -138,18 +153,9 @@ static void replay_rows(const kernel_scene *scene, const packet_rays *rays, cons
         row_store(o->field[FIELD_RAW], i, raw);
         for (int k = 0; k < 3; k++)
             row_store(o->field[FIELD_V + k], i, v[k]);
-        row_store(o->field[FIELD_COLOR], i,
-                  f16_fma(f16_set1(color[2]), d_rgb[2], f16_fma(f16_set1(color[1]), d_rgb[1], f16_mul(f16_set1(color[0]), d_rgb[0]))));
+        row_store(o->field[FIELD_COLOR], i, dot_lanes(record + RECORD_COLOR, d_rgb));
     }
-    for (int first = 0; first < o->sorted.count; first += 16) {
-        f16 low[16], high[16];
-        for (int i = 0; i < 16; i++) {
-            low[i] = first + i < o->sorted.count ? row_load(o->field[FIELD_T], first + i) : infinite;
-            high[i] = f16_select(f16_lt(low[i], infinite), low[i], zero);
-        }
-        f16_store(o->row_near + first, f16_min_rows(low));
-        f16_store(o->row_far + first, f16_max_rows(high));
-    }
+    row_depths(o->field[FIELD_T], o->sorted.count, o->row_near, o->row_far);
 }
 
 /* By (nearest depth, index); the tape is nearly in that order. */
@@ -170,13 +176,7 @@ static f16 sort_rows(const tape_entry *entry, adjoint_rows *o)
     float reached = 0;
     for (int i = 0; i < s->count; i++) {
         const int row = (int)o->row[i];
-        const f16 clear = row_load(o->field[FIELD_CLEAR], row);
-        row_store(s->t, i, row_load(o->field[FIELD_T], row));
-        row_store(s->clear, i, clear);
-        row_store(s->before, i, product);
-        product = f16_mul(product, clear);
-        reached = larger(reached, o->row_far[row]);
-        s->near[i] = o->row_near[row], s->far_reached[i] = reached;
+        place_row(s, i, row_load(o->field[FIELD_T], row), row_load(o->field[FIELD_CLEAR], row), o->row_near[row], o->row_far[row], &product, &reached);
     }
     end_rows(s);
     return product;
@@ -205,16 +205,7 @@ static bool add_rows(const tape_entry *entry, const adjoint_rows *o, int first, 
         turned[GRADIENT_V + i] = f16_fma(e[2][i], sum[2], f16_fma(e[1][i], sum[1], f16_mul(e[0][i], sum[0])));
     for (int k = GRADIENT_OPACITY; k < 16; k++)
         turned[k] = sum[k];
-    _Alignas(64) float field[16][16], record[16][16];
-    for (int k = 0; k < 16; k++)
-        f16_store(field[k], turned[k]), rows[k] = field[k];
-    f16_load_turned(rows, turned);
-    for (int k = 0; k < 16; k++)
-        f16_store(record[k], turned[k]);
-    for (int i = 0; i < 16 && first + i < o->sorted.count; i++)
-        if (!add_sums(out, entry[first + i].id, record[i]))
-            return false;
-    return true;
+    return add_turned(entry + first, o->sorted.count - first, turned, out);
 }
 
 /*   dL/dalpha_i = T_i c_i.g - (sum of w_j c_j.g behind i, with the background) / (1 - alpha_i)   */
@@ -225,11 +216,9 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
     if (!reserve_rows(count, scratch, &o))
         return false;
     const f16 alpha_max = f16_set1(scene->settings.alpha_max), infinite = f16_set1(INFINITY), zero = f16_set1(0);
-    f16 d_rgb[3], behind = zero;
-    for (int c = 0; c < 3; c++) {
+    f16 d_rgb[3];
+    for (int c = 0; c < 3; c++)
         d_rgb[c] = f16_load(d_rgb_in[c]);
-        behind = f16_fma(f16_set1(scene->settings.background[c]), d_rgb[c], behind);
-    }
     replay_rows(scene, rays, beam, entry, d_rgb, &o);
     const f16 transmittance = sort_rows(entry, &o);
     row_window window = {0};
@@ -249,7 +238,7 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
     }
     for (int i = count; i < count + ROW_BLOCK; i++)
         row_store(o.term, i, zero);
-    behind = f16_mul(behind, transmittance);
+    f16 behind = f16_mul(dot_lanes(scene->settings.background, d_rgb), transmittance);
     row_store(o.after, count, behind);
     for (int i = count; i-- > 0;)
         row_store(o.after, i, behind = f16_add(behind, row_load(o.term, i)));
@@ -285,7 +274,7 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
 static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int lane, const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry,
                         int count, gradient_list *out, float d_background[3], kernel_scratch *scratch)
 {
-    enum { RAW, V, COLOR = V + 3, T, D_ALPHA, FIELDS };
+    enum { RAW, V, COLOR = V + 3, OPACITY, T, D_ALPHA, FIELDS };
     const size_t n = ((size_t)count + 15) & ~(size_t)15;
     if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, FIELDS * n, sizeof(float), "adjoint of a ray", NULL) != GBT_OK)
         return false;
@@ -300,17 +289,15 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
         d_rgb[k] = f16_set1(d_rgb_in[k][lane]);
     }
     for (int first = 0; first < count; first += 16) {
-        uint32_t id[16];
         f16 color[3];
-        for (int i = 0; i < 16; i++)
-            id[i] = entry[first + i < count ? first + i : count - 1].id;
-        const gaussian_lanes g = load_gaussians(scene, id, color);
+        const gaussian_lanes g = entry_gaussians(scene, entry, first, count, color);
         response r = respond(&g, &ray, t_near);
         refine_point(&g, &ray, t_near, &r);
         f16_store(field[RAW] + first, response_alpha(&g, r.d2));
         for (int k = 0; k < 3; k++)
             f16_store(field[V + k] + first, r.v[k]);
         f16_store(field[COLOR] + first, dot16(color, d_rgb));
+        f16_store(field[OPACITY] + first, g.opacity);
     }
     float transmittance = 1;
     for (int i = 0; i < count; i++) {
@@ -328,24 +315,13 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
         behind = fmaf(smaller(field[RAW][i], scene->settings.alpha_max), difference, behind);
     }
     for (int first = 0; first < count; first += 16) {
-        f16 v[3], terms[16], color[3];
-        uint32_t id[16];
-        for (int i = 0; i < 16; i++)
-            id[i] = entry[first + i < count ? first + i : count - 1].id;
+        f16 v[3], terms[16];
         for (int k = 0; k < 3; k++)
             v[k] = f16_load(field[V + k] + first);
         const f16 raw = f16_load(field[RAW] + first), weight = f16_mul(f16_load(field[T] + first), f16_min(raw, alpha_max));
-        gradient_terms(f16_load(field[D_ALPHA] + first), raw, weight, v, load_gaussians(scene, id, color).opacity, alpha_max, d_rgb, terms);
-        _Alignas(64) float turned[16][16];
-        for (int k = 0; k < 16; k++)
-            f16_store(turned[k], terms[k]);
-        for (int i = 0; i < 16 && first + i < count; i++) {
-            float sums[16];
-            for (int k = 0; k < 16; k++)
-                sums[k] = turned[k][i];
-            if (!add_sums(out, id[i], sums))
-                return false;
-        }
+        gradient_terms(f16_load(field[D_ALPHA] + first), raw, weight, v, f16_load(field[OPACITY] + first), alpha_max, d_rgb, terms);
+        if (!add_turned(entry + first, count - first, terms, out))
+            return false;
     }
     return true;
 }

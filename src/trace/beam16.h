@@ -1,15 +1,14 @@
 /* trace/beam16.h -- the beam of a tile and of its packets: which nodes and which ellipsoids can they touch. Conservative, never exact.
 
    Everything is measured in the tile's frame: axis w runs along the middle of the tile, u and v across. A ray is a + s (slope_u, slope_v, 1);
-   a beam is the four planes that hold all of its rays. Included by kernels after simd16.h. */
+   a beam is the four planes that hold all of its rays. Included by tile_kernel.inc.h. */
 #ifndef GBT_TRACE_BEAM16_H
 #define GBT_TRACE_BEAM16_H
 
 #include <float.h>
 #include <math.h>
 
-#include "trace/kernel.h"
-#include "trace/simd16.h"
+#include "trace/gaussian16.h"
 
 /* Half-space n.x <= limit; `pick` says for each axis which face of a box has the smallest n.x. */
 typedef struct half_space {
@@ -45,11 +44,6 @@ static inline half_space make_half_space(const float n[3], float limit)
         h.pick[axis] = 2 * axis * TREE_WIDTH + (n[axis] < 0 ? TREE_WIDTH : 0);
     }
     return h;
-}
-
-static inline f16 dot_lanes(const float n[3], const f16 x[3])
-{
-    return f16_fma(f16_set1(n[2]), x[2], f16_fma(f16_set1(n[1]), x[1], f16_mul(f16_set1(n[0]), x[0])));
 }
 
 static void axis_products(const float a[3], const float b[3], float out[6])
@@ -97,6 +91,13 @@ static bool make_frame(const packet_rays *rays, tile_beam *out)
     return true;
 }
 
+/* How far out to a side the origins of a packet lie, `at` in the frame: the largest side (x - slope w). */
+static inline float farthest_start(const f16 at[3], int side, float slope)
+{
+    const f16 x = at[side / 2], along = f16_mul(f16_set1(slope), at[2]);
+    return f16_highest(side % 2 == 0 ? f16_sub(along, x) : f16_sub(x, along));
+}
+
 /* False when the rays fan out so far that a beam makes no sense; they are then traced one by one. */
 static bool make_beam(const packet_rays *rays, const kernel_scene *scene, tile_beam *out)
 {
@@ -128,8 +129,8 @@ static bool make_beam(const packet_rays *rays, const kernel_scene *scene, tile_b
             const float low = f16_lowest(s), high = f16_highest(s), open = 0x1p-21f * (1 + fabsf(low) + fabsf(high));
             b->slope[2 * k] = low - open, b->slope[2 * k + 1] = high + open;
             slope[2 * k] = smaller(slope[2 * k], low - open), slope[2 * k + 1] = larger(slope[2 * k + 1], high + open);
-            b->limit[2 * k] = f16_highest(f16_sub(f16_mul(f16_set1(b->slope[2 * k]), at[p][2]), at[p][k])) + slack * (1 + fabsf(b->slope[2 * k]));
-            b->limit[2 * k + 1] = f16_highest(f16_sub(at[p][k], f16_mul(f16_set1(b->slope[2 * k + 1]), at[p][2]))) + slack * (1 + fabsf(b->slope[2 * k + 1]));
+            for (int side = 2 * k; side < 2 * k + 2; side++)
+                b->limit[side] = farthest_start(at[p], side, b->slope[side]) + slack * (1 + fabsf(b->slope[side]));
         }
     }
     for (int side = 0; side < 4; side++) {
@@ -139,8 +140,7 @@ static bool make_beam(const packet_rays *rays, const kernel_scene *scene, tile_b
             n[axis] = sign * (out->axis[side / 2][axis] - slope[side] * out->axis[2][axis]);
         for (int p = 0; p < TILE_PACKETS; p++)
             if (rays[p].active != 0)
-                limit = larger(limit, sign * (sign > 0 ? f16_highest(f16_sub(at[p][side / 2], f16_mul(f16_set1(slope[side]), at[p][2])))
-                                                      : f16_lowest(f16_sub(at[p][side / 2], f16_mul(f16_set1(slope[side]), at[p][2])))));
+                limit = larger(limit, farthest_start(at[p], side, slope[side]));
         limit += slack * (1 + fabsf(slope[side]));
         out->whole.slope[side] = slope[side], out->whole.limit[side] = limit;
         out->side[side] = make_half_space(n, limit + dot3(n, out->origin));
@@ -225,13 +225,13 @@ static inline f16 ellipsoid_nearest(const ellipsoids16 *e, const tile_beam *b, f
 }
 
 /* How far an ellipsoid reaches in slopes as seen from the frame's origin, its tangent planes through there: low and high of u, low and high
-   of v. `beyond` are the lanes that lie wholly in front of the depth `near`; only for them. `open`: what coordinates may be off. */
+   of v. Returned are the lanes that lie wholly in front of the depth `near`; the slopes are theirs alone. `open`: what coordinates may be off. */
 static inline m16 ellipsoid_slopes(const ellipsoids16 *e, float near, float open, f16 slope[4])
 {
     const f16 in_front = f16_sub(e->w, f16_set1(near));
     const m16 front = m16_and(f16_lt(f16_set1(0), in_front), f16_lt(e->ww, f16_mul(in_front, in_front)));
     /* (w^2 - ww) s^2 - 2 (x w - xw) s + (x^2 - xx) = 0, its discriminant without large terms that cancel */
-    const f16 inverse = f16_div(f16_set1(1), f16_fnma(f16_set1(1), e->ww, f16_mul(e->w, e->w)));
+    const f16 inverse = f16_div(f16_set1(1), f16_sub(f16_mul(e->w, e->w), e->ww));
     for (int k = 0; k < 2; k++) {
         const f16 x = k == 0 ? e->u : e->v, xx = k == 0 ? e->uu : e->vv, xw = k == 0 ? e->uw : e->vw;
         const f16 quadratic = f16_fma(e->w, f16_fma(e->w, xx, f16_mul(f16_set1(-2), f16_mul(x, xw))), f16_mul(f16_mul(x, x), e->ww));

@@ -26,6 +26,24 @@ static inline void load_rays(const packet_rays *rays, ray_lanes *out)
     }
 }
 
+static inline f16 dot16(const f16 a[3], const f16 b[3])
+{
+    return f16_fma(a[2], b[2], f16_fma(a[1], b[1], f16_mul(a[0], b[0])));
+}
+
+static inline f16 dot_lanes(const float n[3], const f16 x[3])
+{
+    return f16_fma(f16_set1(n[2]), x[2], f16_fma(f16_set1(n[1]), x[1], f16_mul(f16_set1(n[0]), x[0])));
+}
+
+static inline void cross16(const f16 a[3], const f16 b[3], f16 out[3])
+{
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        out[i] = f16_fnma(a[k], b[j], f16_mul(a[j], b[k]));
+    }
+}
+
 /* Sixteen Gaussians, or one of them sixteen times. */
 typedef struct gaussian_lanes {
     f16 mean[3], matrix[9], opacity;
@@ -42,8 +60,8 @@ static inline gaussian_lanes spread_gaussian(const float *record)
     return g;
 }
 
-/* Sixteen Gaussians, and their colours. */
-static inline gaussian_lanes load_gaussians(const kernel_scene *scene, const uint32_t id[16], f16 color[3])
+/* Sixteen Gaussians; their colours too, unless `color` is NULL. */
+static inline gaussian_lanes load_gaussians(const kernel_scene *scene, const uint32_t id[16], f16 *color)
 {
     const float *rows[16];
     f16 field[16];
@@ -52,7 +70,9 @@ static inline gaussian_lanes load_gaussians(const kernel_scene *scene, const uin
         rows[i] = scene->records + (size_t)id[i] * RECORD_FLOATS;
     f16_load_turned(rows, field);
     for (int i = 0; i < 3; i++)
-        g.mean[i] = field[RECORD_MEAN + i], color[i] = field[RECORD_COLOR + i];
+        g.mean[i] = field[RECORD_MEAN + i];
+    for (int i = 0; i < 3 && color != NULL; i++)
+        color[i] = field[RECORD_COLOR + i];
     g.opacity = field[RECORD_OPACITY];
     for (int i = 0; i < 9; i++)
         g.matrix[i] = field[RECORD_MATRIX + i];
@@ -70,7 +90,7 @@ static inline ray_to_mean approach(const gaussian_lanes *g, const ray_lanes *ray
     f16 e[3];
     for (int i = 0; i < 3; i++)
         e[i] = f16_sub(ray->origin[i], g->mean[i]);
-    r.along = f16_fma(e[2], ray->dir[2], f16_fma(e[1], ray->dir[1], f16_mul(e[0], ray->dir[0])));
+    r.along = dot16(e, ray->dir);
     for (int i = 0; i < 3; i++)
         r.p[i] = f16_fnma(r.along, ray->dir[i], e[i]);
     return r;
@@ -79,12 +99,7 @@ static inline ray_to_mean approach(const gaussian_lanes *g, const ray_lanes *ray
 static inline void to_canonical(const gaussian_lanes *g, const f16 x[3], f16 out[3])
 {
     for (int i = 0; i < 3; i++)
-        out[i] = f16_fma(g->matrix[3 * i + 2], x[2], f16_fma(g->matrix[3 * i + 1], x[1], f16_mul(g->matrix[3 * i], x[0])));
-}
-
-static inline f16 dot16(const f16 a[3], const f16 b[3])
-{
-    return f16_fma(a[2], b[2], f16_fma(a[1], b[1], f16_mul(a[0], b[0])));
+        out[i] = dot16(g->matrix + 3 * i, x);
 }
 
 /* The ray is first moved to the point nearest the mean, so that the canonical product subtracts nothing large (float32 keeps its digits
@@ -112,28 +127,24 @@ static inline response respond(const gaussian_lanes *g, const ray_lanes *ray, f1
    gradients of the mean and of the rotation, which are divided by the thin axis, would be noise from a ratio of 1e4 on. */
 static inline void refine_point(const gaussian_lanes *g, const ray_lanes *ray, f16 t_near, response *r)
 {
-    const f16 *m = g->matrix, *d = ray->dir;
     const ray_to_mean at = approach(g, ray);
-    const f16 *p = at.p;
-    const f16 q[3] = {f16_fnma(p[2], d[1], f16_mul(p[1], d[2])), f16_fnma(p[0], d[2], f16_mul(p[2], d[0])), f16_fnma(p[1], d[0], f16_mul(p[0], d[1]))};
-    f16 c[3], w[3];
-    to_canonical(g, d, w);
-    for (int i = 0; i < 3; i++) {
-        const f16 *a = m + 3 * ((i + 1) % 3), *b = m + 3 * ((i + 2) % 3); /* row i of the cofactors is the product of the other two rows */
+    f16 q[3], c[3], w[3], v[3];
+    cross16(at.p, ray->dir, q);
+    to_canonical(g, ray->dir, w);
+    for (int i = 0; i < 3; i++) { /* row i of the cofactors is the product of the other two rows */
+        const f16 *a = g->matrix + 3 * ((i + 1) % 3), *b = g->matrix + 3 * ((i + 2) % 3);
         const f16 cofactor[3] = {f16_sub(f16_mul(a[1], b[2]), f16_mul(a[2], b[1])), f16_sub(f16_mul(a[2], b[0]), f16_mul(a[0], b[2])),
                                  f16_sub(f16_mul(a[0], b[1]), f16_mul(a[1], b[0]))};
-        c[i] = f16_fma(cofactor[2], q[2], f16_fma(cofactor[1], q[1], f16_mul(cofactor[0], q[0])));
+        c[i] = dot16(cofactor, q);
     }
     const f16 ww = dot16(w, w);
     const m16 clipped = f16_le(r->t, t_near);
-    for (int i = 0; i < 3; i++) {
-        const int j = (i + 1) % 3, k = (i + 2) % 3;
-        const f16 v = f16_div(f16_fnma(w[k], c[j], f16_mul(w[j], c[k])), ww);
-        r->v[i] = f16_select(clipped, r->v[i], v);
-    }
+    cross16(w, c, v);
+    for (int i = 0; i < 3; i++)
+        r->v[i] = f16_select(clipped, r->v[i], f16_div(v[i], ww));
 }
 
-/* The smallest alpha that is a hit: trace_threshold(). */
+/* The smallest alpha that is a hit: alpha_min, or what is left of the opacity at the proxy's radius. */
 static inline f16 alpha_threshold(const kernel_scene *scene, f16 opacity)
 {
     return f16_max(f16_set1(scene->settings.alpha_min), f16_mul(opacity, f16_set1(scene->radius_response)));

@@ -56,6 +56,36 @@ static inline void row_store(float *rows, int i, f16 a)
     f16_store(rows + (size_t)i * PACKET_LANES, a);
 }
 
+/* Nearest and farthest hit of each of `count` rows (room for whole sixteens), 0 for the farthest of none; returned is the nearest of all. */
+static inline float row_depths(const float *t, int count, float *near, float *far)
+{
+    const f16 infinite = f16_set1(INFINITY);
+    f16 nearest = infinite;
+    for (int first = 0; first < count; first += 16) {
+        f16 low[16], high[16];
+        for (int i = 0; i < 16; i++) {
+            low[i] = first + i < count ? row_load(t, first + i) : infinite;
+            high[i] = f16_select(f16_lt(low[i], infinite), low[i], f16_set1(0));
+        }
+        const f16 near_rows = f16_min_rows(low);
+        nearest = f16_min(nearest, near_rows);
+        f16_store(near + first, near_rows);
+        f16_store(far + first, f16_max_rows(high));
+    }
+    return f16_lowest(nearest);
+}
+
+/* Row `i` of the order, after row i - 1. `product` and `reached` run along: transmittance in front of it, farthest depth so far. */
+static inline void place_row(sorted_rows *o, int i, f16 t, f16 clear, float near, float far, f16 *product, float *reached)
+{
+    row_store(o->t, i, t);
+    row_store(o->clear, i, clear);
+    row_store(o->before, i, *product);
+    *product = f16_mul(*product, clear);
+    *reached = larger(*reached, far);
+    o->near[i] = near, o->far_reached[i] = *reached;
+}
+
 static inline void end_rows(sorted_rows *o)
 {
     for (int i = o->count; i < o->count + ROW_BLOCK; i++) {
@@ -135,25 +165,6 @@ typedef struct round_rows {
     sorted_rows sorted;
 } round_rows;
 
-/* Nearest and farthest hit of every row; the nearest of all. */
-static inline float row_depths(const packet_rows *p, round_rows *o)
-{
-    const f16 infinite = f16_set1(INFINITY);
-    f16 nearest = infinite;
-    for (int first = 0; first < p->count; first += 16) {
-        f16 low[16], high[16];
-        for (int i = 0; i < 16; i++) {
-            low[i] = first + i < p->count ? row_load(p->t, first + i) : infinite;
-            high[i] = f16_select(f16_lt(low[i], infinite), low[i], f16_set1(0));
-        }
-        const f16 near = f16_min_rows(low);
-        nearest = f16_min(nearest, near);
-        f16_store(o->row_near + first, near);
-        f16_store(o->row_far + first, f16_max_rows(high));
-    }
-    return f16_lowest(nearest);
-}
-
 static inline bool row_before(const packet_rows *p, const round_rows *o, int a, int b)
 {
     return o->row_near[a] < o->row_near[b] || (o->row_near[a] == o->row_near[b] && p->id[a] < p->id[b]);
@@ -214,12 +225,7 @@ static inline void arrange_rows(const packet_rows *p, float horizon, round_rows 
         const f16 t = row_load(p->t, row);
         const m16 now = f16_lt(t, limit);
         const f16 clear = f16_select(now, f16_sub(one, row_load(p->alpha, row)), one);
-        row_store(o->t, i, f16_select(now, t, infinite));
-        row_store(o->clear, i, clear);
-        row_store(o->before, i, product);
-        product = f16_mul(product, clear);
-        reached = larger(reached, smaller(o->row_far[row], horizon));
-        o->near[i] = o->row_near[row], o->far_reached[i] = reached;
+        place_row(&o->sorted, i, f16_select(now, t, infinite), clear, o->row_near[row], smaller(o->row_far[row], horizon), &product, &reached);
     }
     end_rows(&o->sorted);
 }

@@ -96,8 +96,7 @@ static void note_row(packet_rows *p, const packet_rays *rays, const float *recor
     float normal[3];
     shortest_axis(record, normal);
     const f16 dir[3] = {f16_load(rays->dir[0]), f16_load(rays->dir[1]), f16_load(rays->dir[2])};
-    const f16 facing = f16_fma(f16_set1(normal[2]), dir[2], f16_fma(f16_set1(normal[1]), dir[1], f16_mul(f16_set1(normal[0]), dir[0])));
-    const f16 toward = f16_select(f16_lt(facing, zero), weight, f16_sub(zero, weight)); /* normals look at the camera */
+    const f16 toward = f16_select(f16_lt(dot_lanes(normal, dir), zero), weight, f16_sub(zero, weight)); /* normals look at the camera */
     for (int k = 0; k < 3; k++)
         e->normal[k] = f16_fma(toward, f16_set1(normal[k]), e->normal[k]);
     e->depth = f16_fma(weight, f16_select(blend, t, zero), e->depth);
@@ -112,7 +111,7 @@ static void note_row(packet_rows *p, const packet_rays *rays, const float *recor
 /* Blend all hits nearer than `horizon`; keep the rest. */
 static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, const packet_rays *rays, float horizon, hit_tape *tape, round_rows *o, kernel_counters *counters)
 {
-    if (p->count == 0 || row_depths(p, o) >= horizon)
+    if (p->count == 0 || row_depths(p->t, p->count, o->row_near, o->row_far) >= horizon)
         return true;
     order_rows(p, horizon, o);
     arrange_rows(p, horizon, o);
@@ -280,11 +279,10 @@ static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays
 {
     for (int first = 0; s->common_origin && first < s->count; first += 16) {
         uint32_t id[16];
-        f16 color[3];
         for (int i = 0; i < 16; i++)
             id[i] = s->id[first + i < s->count ? first + i : first];
-        const gaussian_lanes g = load_gaussians(scene, id, color);
-        const m16 sound = view_gaussians_from(scene, &g, color, &s->beam, &s->view[first / 16], NULL);
+        const gaussian_lanes g = load_gaussians(scene, id, NULL);
+        const m16 sound = view_gaussians_from(scene, &g, &s->beam, &s->view[first / 16], NULL);
         s->in_front[first / 16] &= (uint16_t)m16_bits(sound);
     }
     for (unsigned packets = s->alive_packets; packets != 0; packets &= packets - 1) {

@@ -24,7 +24,7 @@ typedef struct view_rays {
 } view_rays;
 
 /* Sixteen Gaussians; a row reads one of them. */
-enum { VIEW_A, VIEW_B, VIEW_Q, VIEW_DEPTH = VIEW_Q + 5, VIEW_FALLOFF, VIEW_OPACITY, VIEW_THRESHOLD, VIEW_RED, VIEW_GREEN, VIEW_BLUE, VIEW_FIELDS };
+enum { VIEW_A, VIEW_B, VIEW_Q, VIEW_DEPTH = VIEW_Q + 5, VIEW_FALLOFF, VIEW_OPACITY, VIEW_THRESHOLD, VIEW_FIELDS };
 typedef struct view_gaussians {
     _Alignas(64) float field[VIEW_FIELDS][16]; /* FALLOFF: R^2 log2(e) / 2, so that the response is 2^(-FALLOFF y / den) */
 } view_gaussians;
@@ -43,16 +43,8 @@ static inline view_rays see_rays(const packet_rays *rays, const tile_beam *b)
     return v;
 }
 
-static inline void cross16(const f16 a[3], const f16 b[3], f16 out[3])
-{
-    for (int i = 0; i < 3; i++) {
-        const int j = (i + 1) % 3, k = (i + 2) % 3;
-        out[i] = f16_fnma(a[k], b[j], f16_mul(a[j], b[k]));
-    }
-}
-
-/* The lanes whose form is sound: everything finite and nothing lost to underflow. */
-static inline m16 view_gaussians_from(const kernel_scene *scene, const gaussian_lanes *g, const f16 color[3], const tile_beam *b, view_gaussians *out, view_axes *axes)
+/* Returned are the lanes whose form is sound: everything finite and nothing lost to underflow. `axes` may be NULL. */
+static inline m16 view_gaussians_from(const kernel_scene *scene, const gaussian_lanes *g, const tile_beam *b, view_gaussians *out, view_axes *axes)
 {
     const f16 one = f16_set1(1);
     f16 offset[3], unit[9], stretch[9], square[3];
@@ -79,7 +71,7 @@ static inline m16 view_gaussians_from(const kernel_scene *scene, const gaussian_
     for (int i = 0; i < 3; i++) {
         cw[i] = f16_fma(a, along[0][i], f16_fma(c, along[1][i], along[2][i]));
         bu[i] = f16_fnma(c, wide[2][i], wide[1][i]);
-        bv[i] = f16_fnma(wide[0][i], one, f16_mul(a, wide[2][i]));
+        bv[i] = f16_sub(f16_mul(a, wide[2][i]), wide[0][i]);
     }
     const f16 det = f16_sqrt(f16_mul(f16_div(smallest_square, square[0]), f16_mul(f16_div(smallest_square, square[1]), f16_div(smallest_square, square[2]))));
     const f16 cw2 = dot16(cw, cw), bu_length = f16_sqrt(dot16(bu, bu));
@@ -97,8 +89,6 @@ static inline m16 view_gaussians_from(const kernel_scene *scene, const gaussian_
     f16_store(out->field[VIEW_FALLOFF], falloff);
     f16_store(out->field[VIEW_OPACITY], g->opacity);
     f16_store(out->field[VIEW_THRESHOLD], alpha_threshold(scene, g->opacity));
-    for (int i = 0; i < 3; i++)
-        f16_store(out->field[VIEW_RED + i], color[i]);
     if (axes != NULL) {
         for (int i = 0; i < 3; i++)
             axes->e[0][i] = f16_div(cw[i], length), axes->e[2][i] = f16_mul(bu[i], bu_inverse);

@@ -6,7 +6,7 @@
 #define GBT_TRACE_GAUSSIAN16_H
 
 #include "trace/kernel.h"
-#include "trace/simd16.h"
+#include "base/simd16.h"
 
 typedef struct ray_lanes {
     f16 origin[3], dir[3];

@@ -1,12 +1,12 @@
-/* trace/simd16.h -- sixteen floats at a time: one name per operation, three instruction sets.
+/* base/simd16.h -- sixteen floats at a time: one name per operation, three instruction sets.
 
-   A kernel includes this file and is compiled once per instruction set (see CMakeLists.txt of this folder). Every operation gives the
+   A kernel includes this file and is compiled once per instruction set (see CMakeLists.txt of trace and raster). Every operation gives the
    same bits in all three, because fused multiply-adds are named and sums have a fixed order; so a kernel's result does not depend on
    the machine. The plain form is the definition.
 
    f16: 16 floats; m16: 16 truth values. */
-#ifndef GBT_TRACE_SIMD16_H
-#define GBT_TRACE_SIMD16_H
+#ifndef GBT_BASE_SIMD16_H
+#define GBT_BASE_SIMD16_H
 
 #include <math.h>
 #include <stdint.h>

@@ -8,7 +8,7 @@
 #include "trace/rays.h"
 
 /* Around the origin, sizes 0.05 to 0.6, opacities from `opacity_low` to 1, colours in [0, 1]. */
-static gaussians random_gaussians(size_t count, float opacity_low, uint64_t seed)
+static inline gaussians random_gaussians(size_t count, float opacity_low, uint64_t seed)
 {
     gaussians g = {0};
     assert_ok(gaussians_resize(&g, count, NULL));
@@ -32,7 +32,7 @@ static gaussians random_gaussians(size_t count, float opacity_low, uint64_t seed
 }
 
 /* From (0, 0, -6) along z. */
-static ray_image pinhole_rays(int width, int height)
+static inline ray_image pinhole_rays(int width, int height)
 {
     const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = width, .height = height, .center = {0, 0, -6},
                                .params = {0.7 * width, 0.7 * width, 0.5 * width, 0.5 * height}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};

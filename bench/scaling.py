@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # scaling -- the same hits per ray from 10 thousand to 1 million Gaussians: time of one core per ray, build, bytes.
 #
-#     python3 bench/scaling.py [--gbtrace build/release/gbtrace] [--size 512] [--counts 10000,100000,1000000]      (needs numpy)
+#     python3 bench/scaling.py [--gbtrace build/release/gbtrace] [--sizes 1600,512] [--counts 10000,100000,1000000]      (needs numpy)
 #
-# Gaussians fill a cube evenly. Their size goes with the inverse square root of their number, so that a ray always crosses about 30.
+# Gaussians fill a cube evenly. Their size goes with the inverse square root of their number, so that a ray always crosses about 30. In a picture
+# of 1600 x 1600 pixels, a photo's size, the Gaussians of a million are some pixels wide; at 512 x 512 there are four Gaussians for every ray.
 import argparse
 import json
 import os
@@ -14,7 +15,7 @@ import numpy as np
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--gbtrace", default="build/release/gbtrace")
-parser.add_argument("--size", type=int, default=512, help="pixels across and down")
+parser.add_argument("--sizes", default="1600,512", help="pixels across and down")
 parser.add_argument("--counts", default="10000,100000,1000000")
 parser.add_argument("--repeats", type=int, default=5)
 args = parser.parse_args()
@@ -39,21 +40,27 @@ def write_cloud(path, count):
         out.write(rows.tobytes())
 
 
-print("| Gaussians | hits | blended | forward, core-us/ray | to the first | adjoint, core-us/ray | build, ms | bytes per Gaussian |")
-print("|---|---|---|---|---|---|---|---|")
-with tempfile.TemporaryDirectory() as folder:
-    camera = os.path.join(folder, "camera.json")
+def bench(model, size, folder):
+    camera, result = os.path.join(folder, "camera.json"), os.path.join(folder, "result.json")
     with open(camera, "w") as out:
-        json.dump({"origin": [0, -38, 9], "target": [0, 0, 0], "up": [0, 0, 1], "fov_x_deg": 38.0, "width": args.size, "height": args.size}, out)
-    first = None
-    for count in [int(c) for c in args.counts.split(",")]:
-        model, result = os.path.join(folder, "cloud.ply"), os.path.join(folder, "result.json")
-        write_cloud(model, count)
-        subprocess.run([args.gbtrace, "bench", "trace", "--model", model, "--camera", camera, "--repeats", str(args.repeats), "--json", result],
-                       check=True, stdout=subprocess.DEVNULL)
-        with open(result) as text:
-            r = json.load(text)
-        forward = r["forward_core_us_per_ray"]
-        first = first or forward
-        print(f"| {count:,} | {r['hits_per_ray']:.1f} | {r['blended_per_ray']:.1f} | {forward:.3f} | {forward / first:.2f} | {r['adjoint_core_us_per_ray']:.3f} "
-              f"| {r['build_ms']:.0f} | {(r['tree_bytes'] + r['record_bytes']) / count:.0f} |")
+        json.dump({"origin": [0, -38, 9], "target": [0, 0, 0], "up": [0, 0, 1], "fov_x_deg": 38.0, "width": size, "height": size}, out)
+    subprocess.run([args.gbtrace, "bench", "trace", "--model", model, "--camera", camera, "--repeats", str(args.repeats), "--json", result],
+                   check=True, stdout=subprocess.DEVNULL)
+    with open(result) as text:
+        return json.load(text)
+
+
+print("| picture | Gaussians | hits | blended | forward, core-us/ray | to the first | adjoint, core-us/ray | build, ms | bytes per Gaussian |")
+print("|---|---|---|---|---|---|---|---|---|")
+with tempfile.TemporaryDirectory() as folder:
+    counts = [int(c) for c in args.counts.split(",")]
+    for count in counts:
+        write_cloud(os.path.join(folder, f"{count}.ply"), count)
+    for size in [int(s) for s in args.sizes.split(",")]:
+        first = None
+        for count in counts:
+            r = bench(os.path.join(folder, f"{count}.ply"), size, folder)
+            forward = r["forward_core_us_per_ray"]
+            first = first or forward
+            print(f"| {size} x {size} | {count:,} | {r['hits_per_ray']:.1f} | {r['blended_per_ray']:.1f} | {forward:.3f} | {forward / first:.2f} "
+                  f"| {r['adjoint_core_us_per_ray']:.3f} | {r['build_ms']:.0f} | {(r['tree_bytes'] + r['record_bytes']) / count:.0f} |")

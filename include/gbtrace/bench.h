@@ -57,6 +57,37 @@ gbt_study_def gbt_study_def_default(void);
 gbt_status gbt_study_speed(const gbt_study_def *def, const char *folder, FILE *out, gbt_error *err);
 
 /**
+ * Tracer against rasterizer: how far each is from its double reference and they from each other, and the causes, one change at a time:
+ * order, projection, dilation, cut-offs (docs/crosscheck.md).
+ *
+ * `def` as for gbt_study_speed(), without repeats; of a run up to four held-out views, spread over all. A camera with a lens is replaced
+ * by its pinhole. Writes crosscheck.json, .md, .svg (chart), .html and one PNG of pictures per view into `folder`, the tables to `out`.
+ * A row beyond its limit is no failure: it is told in the table.
+ *
+ * @return GBT_OK, GBT_ERR_ARGUMENT (rays given in place of a camera too), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * Cost: about ten seconds per view of 10,000 Gaussians and 512 x 512 pixels.
+ */
+gbt_status gbt_study_crosscheck(const gbt_study_def *def, const char *folder, FILE *out, gbt_error *err);
+
+typedef struct gbt_stability_def {
+    const char *only; /* cases, as "A1,A9"; NULL: all. Default NULL */
+    int quick;        /* 1: smaller sizes where a scene file gives them. Default 0 */
+} gbt_stability_def;
+
+gbt_stability_def gbt_stability_def_default(void);
+
+/**
+ * Stability: scenes on which renderers are known to fail, each measured against a limit, beside the rasterizer (docs/stability.md).
+ *
+ * Writes stability.json, stability.md, stability.svg (charts) and pictures into the folder `folder`, and the table to `out`. A row beyond
+ * its limit is no failure: it is told in the table.
+ *
+ * @return GBT_OK, GBT_ERR_ARGUMENT (an unknown case), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * Threads: one study at a time (it switches instruction sets and Embree's memory limit and back). Cost: about a minute of two cores.
+ */
+gbt_status gbt_study_stability(const gbt_stability_def *def, const char *folder, FILE *out, gbt_error *err);
+
+/**
  * Compare analytic gradients with the double adjoint and with differences, on a trained run: tracer, decode and the whole chain.
  *
  * Prints one row per parameter class: relative L2 error and limit. GBT_ERR_INTERNAL when a limit is broken.

@@ -11,6 +11,8 @@ extern "C" {
 typedef struct gbt_evaluate_def {
     const char *data; /* data set folder; NULL: the one the model was trained on. Default NULL */
     const char *json; /* also write the scores here; NULL: only RUN/metrics.json. Default NULL */
+    const char *renderer; /* "trace", "raster" or "per-ray"; NULL: as in training. Default NULL */
+    double downscale; /* photos are divided by this, >= 1; 0: as in training. Default 0 */
     int report;       /* 1: also write RUN/report.html. Default 1 */
     const char *preset; /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is "default". Default NULL */
 } gbt_evaluate_def;
@@ -18,7 +20,8 @@ typedef struct gbt_evaluate_def {
 gbt_evaluate_def gbt_evaluate_def_default(void);
 
 /**
- * Score the held-out views of a run: PSNR, SSIM and FLIP on 8-bit images, per view and mean.
+ * Score the held-out views of a run: PSNR, SSIM and FLIP on 8-bit images, per view and mean. A run trained with `exposure` is scored on
+ * the right half of each photo, after a 3 x 4 colour matrix that its left half gives; metrics.json says so in "scored".
  *
  * Renders go to RUN/renders/test/NAME.png, the photos they are compared with to RUN/renders/test/NAME.photo.png; scores to
  * RUN/metrics.json; RUN/report.html shows all of it. Without held-out views the scores are null ("n/a"), never NaN.
@@ -27,12 +30,29 @@ gbt_evaluate_def gbt_evaluate_def_default(void);
  */
 gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err);
 
+/** Two pictures compared. */
+typedef struct gbt_comparison {
+    int width, height;
+    double psnr;          /* dB, at most 100 */
+    double ssim;          /* as everywhere here: every pixel counts, windows see 0 beyond the border */
+    double ssim_interior; /* over the windows that lie wholly inside; NaN below 11 x 11 pixels */
+    double flip;          /* at 67.02 pixels per degree */
+} gbt_comparison;
+
+/**
+ * Compare two image files of one size (PNG, JPEG, EXR; alpha is left out), rounded to 8 bit; `reference` is the original.
+ *
+ * @return GBT_OK, GBT_ERR_ARGUMENT (sizes differ), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ */
+gbt_status gbt_compare_images(const char *path, const char *reference, gbt_comparison *out, gbt_error *err);
+
 typedef enum gbt_split { GBT_SPLIT_TEST, GBT_SPLIT_TRAIN, GBT_SPLIT_ALL } gbt_split;
 
 typedef struct gbt_render_def {
     const char *data;     /* data set whose cameras are used; NULL: the model's. Default NULL */
     gbt_split split;      /* default GBT_SPLIT_TEST */
-    const char *renderer; /* "trace" (default) or "reference" (double, every Gaussian against every ray: slow) */
+    const char *renderer; /* "trace", "raster" (EWA splats; pinhole cameras), "per-ray" (the same tiles, response and order of rays), or "reference"
+                             (double, every Gaussian against every ray: slow). NULL: as in training. Default NULL */
     const char *format;   /* "png" (default) or "exr" (32-bit float) */
     double downscale;     /* 0: as in training. Default 0 */
     const char *camera;   /* camera file (docs/cameras.md): render that and no views; the data set is not needed. Default NULL */

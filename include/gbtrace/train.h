@@ -25,6 +25,9 @@ typedef struct gbt_train_def {
     double budget_seconds;      /* wall time for training; used when iterations is 0. Default 600 */
     const char *pace;           /* "n1,...,n20": iterations in each twentieth of the schedule, as a budget run records them. Default NULL */
     double downscale;           /* photos are divided by this, >= 1. Default 1 */
+    const char *renderer;       /* what the photos are compared with: "trace" (default), "raster" (EWA splats; pinhole photos), or "per-ray" */
+    double footprint;           /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays.
+                                   Default 0.1; 0 with compat; splats are dilated instead */
     int start_level;            /* coarse to fine: first resolution is 1 / 2^start_level, [0, 4]. Default 2 */
     const char *eval_split;     /* "every=8" (default), "none", "list=FILE" */
     uint64_t seed;              /* Default 0 */
@@ -33,6 +36,9 @@ typedef struct gbt_train_def {
     size_t max_anchors;         /* growth stops there. Default 2,000,000 */
     bool grow;                  /* grow and prune anchors. Default true */
     bool compat;                /* every quirk of the reference method (docs/training.md). Default false */
+    bool exposure;              /* learn a colour matrix per photo, for photos whose exposure differs; held-out photos are then scored on
+                                   their right half, with a matrix fitted to the left. Default false */
+    double learning_rate_factor; /* of all learning rates, [1e-3, 1e3]. Default 1 */
     double save_every_seconds;  /* wall time between checkpoints; 0: only at the end. Default 120 */
     uint64_t save_at_step;      /* one extra checkpoint right after this step; 0: none. Default 0 */
     uint64_t stop_at_step;      /* stop, as a signal would, after this step; 0: never. Default 0 */
@@ -51,6 +57,9 @@ gbt_train_def gbt_train_def_default(void);
  * `run` gets model.gbt, log.csv, config, train.json and checkpoints/. Progress goes to stderr. SIGINT and SIGTERM stop after the current
  * step: a checkpoint is saved and GBT_ERR_INTERRUPTED is returned. The same seed and length give the same model.gbt, bit for bit, for
  * any number of threads, interrupted and resumed or not.
+ *
+ * A step whose loss or gradient is not finite changes nothing but a count; ten in a row end the run with GBT_ERR_FORMAT and one line that
+ * names the photo or the parameter. Pixels of a float photo that are not finite count in no loss.
  *
  * @return GBT_OK, or what failed; nothing already in `run` is damaged by a failure
  */

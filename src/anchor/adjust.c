@@ -305,8 +305,8 @@ static gbt_status check_arguments(const anchors *a, const adjust_stats *stats, c
     if (def->level_count < 0 || def->level_count > LEVEL_MAX || def->init_factor < 1 || def->hierarchy_factor < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "adjust: %d levels, factors %d and %d (wanted 0 to %d, and both at least 1)",
                          def->level_count, def->init_factor, def->hierarchy_factor, LEVEL_MAX);
-    if (!(def->grad_threshold > 0.0f) || !(def->interval >= 0.0f) || !(def->success_threshold >= 0.0f) || isnan(def->shape_log_max))
-        return base_fail(err, GBT_ERR_ARGUMENT, "adjust: threshold %g, interval %g, success %g (wanted > 0, >= 0, >= 0)",
+    if (!(def->grad_threshold >= 0.0f) || !(def->interval >= 0.0f) || !(def->success_threshold >= 0.0f) || isnan(def->shape_log_max))
+        return base_fail(err, GBT_ERR_ARGUMENT, "adjust: threshold %g, interval %g, success %g (wanted all >= 0)",
                          (double)def->grad_threshold, (double)def->interval, (double)def->success_threshold);
     return GBT_OK;
 }
@@ -368,7 +368,8 @@ gbt_status anchors_adjust(anchors *a, adjust_stats *stats, const adjust_def *def
         g.added_count = room;
         qsort(g.added, g.added_count, sizeof *g.added, by_level_and_cell);
     }
-    if (survivors + g.added_count == 0 && before > 0) {
+    const bool kept_last = survivors + g.added_count == 0 && before > 0;
+    if (kept_last) {
         pruned[most_opaque] = false;
         survivors = 1;
     }
@@ -398,7 +399,7 @@ gbt_status anchors_adjust(anchors *a, adjust_stats *stats, const adjust_def *def
     for (size_t i = 0; i < after; i++)
         for (size_t c = 3; c < 6; c++)
             a->scale_log[i * 6 + c] = fminf(a->scale_log[i * 6 + c], def->shape_log_max);
-    *out = (adjust_result){.grown = g.added_count, .pruned = before - survivors, .count = after, .source = source};
+    *out = (adjust_result){.grown = g.added_count, .pruned = before - survivors, .count = after, .source = source, .kept_last = kept_last};
     source = NULL;
 done:
     mem_free(source);

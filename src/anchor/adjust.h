@@ -23,7 +23,7 @@ typedef struct adjust_def {
     int level_count;           /* [0, 8], default 3 */
     int init_factor;           /* default 16 */
     int hierarchy_factor;      /* default 4 */
-    float grad_threshold;      /* tau, default 2e-4; level j uses tau * (hierarchy/2)^j */
+    float grad_threshold;      /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */
     float min_opacity;         /* default 0.005 */
     float interval;            /* I: steps between adjusts, default 100 */
     float success_threshold;   /* default 0.8: a Gaussian counts when grad_count > interval * success * 0.5; an anchor is judged when
@@ -41,6 +41,7 @@ adjust_def adjust_def_default(void);
 /** What happened, and where every surviving or new row came from. */
 typedef struct adjust_result {
     size_t grown, pruned;
+    bool kept_last;        /* all would have gone: the most opaque was kept against the rule */
     size_t count;          /* rows after */
     int64_t *source;       /* [count]: row before, or -1 for a new anchor (its Adam moments start at 0); owned, mem_free() */
 } adjust_result;

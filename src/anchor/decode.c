@@ -135,6 +135,20 @@ static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, con
     return g - first;
 }
 
+static float larger(float a, float b)
+{
+    return a > b ? a : b;
+}
+
+static void hold_ratio(float *const scale[3], size_t count)
+{
+    float *restrict x = scale[0], *restrict y = scale[1], *restrict z = scale[2];
+    for (size_t i = 0; i < count; i++) {
+        const float least = DECODE_SCALE_RATIO * larger(x[i], larger(y[i], z[i]));
+        x[i] = larger(x[i], least), y[i] = larger(y[i], least), z[i] = larger(z[i], least);
+    }
+}
+
 static void emit_rows(const forward_job *job, size_t begin, size_t end)
 {
     decode_tape *tape = job->tape;
@@ -168,6 +182,7 @@ static void emit_rows(const forward_job *job, size_t begin, size_t end)
     for (size_t i = 0; i < n; i++)
         for (int c = 0; c < 3; c++)
             scale[c][i] = extent[row_of[i] * 6 + 3 + c] * kept[(size_t)(KEPT_SIGMOID + c) * stride + i];
+    hold_ratio(scale, n);
     float *const copied[7] = {out->quat_w, out->quat_x, out->quat_y, out->quat_z, out->red, out->green, out->blue};
     const int field[7] = {KEPT_QUAT, KEPT_QUAT + 1, KEPT_QUAT + 2, KEPT_QUAT + 3, KEPT_COLOR, KEPT_COLOR + 1, KEPT_COLOR + 2};
     for (int i = 0; i < 7; i++)

@@ -31,7 +31,8 @@ typedef struct decode_tape {
  *
  * Input of the networks: feature, unit direction from the camera to the anchor ((0, 0, 1) for a camera on the anchor), distance if the
  * decoder has it. Gaussian k of anchor i: opacity = alpha = tanh(.), mean = x + offset exp(l[0..2]), scale = exp(l[3..5]) sigmoid(c[0..2]),
- * quaternion = c[3..6] normalised, colour = sigmoid(.). Log-scales and logits are cut to [-30, 30], where their gradient ends too.
+ * quaternion = c[3..6] normalised, colour = sigmoid(.). Log-scales and logits are cut to [-30, 30], where their gradient ends too. A
+ * scale below 1e-4 of the Gaussian's largest is raised to that: its gradient is then the largest one's.
  * It is kept iff its alpha > `opacity_min` (0 = the reference's rule); kept ones are packed in (visible row, offset) order.
  *
  * @param visible [in] [visible_count] anchor indices, ascending; borrowed until decode_backward()
@@ -53,6 +54,15 @@ gbt_status decode_forward(const anchors *a, const decoder *d, const float camera
  */
 gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape, const gaussians *d_gaussians, anchors *d_anchors,
                            float *d_params, gbt_error *err);
+
+/**
+ * Shift output biases of the opacity network: each offset whose mean opacity over the anchors of the last decode_forward() is below
+ * `least` comes to a mean of about `opacity`; the others stay.
+ *
+ * A Gaussian below opacity 0 is not made and has no gradient: when all have fallen there, nothing else brings them back.
+ * @param opacity [in] (-1, 1)
+ */
+void decode_raise_opacity(const decode_tape *tape, float least, float opacity, decoder *d);
 
 void decode_tape_free(decode_tape *tape);
 

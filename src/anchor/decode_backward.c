@@ -46,6 +46,17 @@ static record_layout record_layout_of(const decode_layout *layout)
     return record;
 }
 
+/* A scale that was raised to DECODE_SCALE_RATIO of the largest moves with that one alone. `scale` is before the raising. */
+static void pass_held_scales(const float scale[3], float d_scale[3])
+{
+    const int large = scale[1] > scale[0] ? (scale[2] > scale[1] ? 2 : 1) : scale[2] > scale[0] ? 2 : 0;
+    for (int c = 0; c < 3; c++)
+        if (scale[c] < DECODE_SCALE_RATIO * scale[large]) {
+            d_scale[large] += DECODE_SCALE_RATIO * d_scale[c];
+            d_scale[c] = 0.0f;
+        }
+}
+
 /* Through the activations: logit gradients into `d_out`, offsets and log-scales straight into the anchors' gradient. */
 static void activations_backward(const backward_job *job, size_t begin, size_t rows, const float *extent, float *d_out)
 {
@@ -67,7 +78,7 @@ static void activations_backward(const backward_job *job, size_t begin, size_t r
         for (; g < last && tape->slot[g] < slot_begin + offsets; g++) {
             const size_t k = tape->slot[g] - slot_begin;
             const float d_mean[3] = {d->mean_x[g], d->mean_y[g], d->mean_z[g]};
-            const float d_scale[3] = {d->scale_x[g], d->scale_y[g], d->scale_z[g]};
+            float d_scale[3] = {d->scale_x[g], d->scale_y[g], d->scale_z[g]}, scale[3];
             const float d_color[3] = {d->red[g], d->green[g], d->blue[g]};
             const float d_quat[4] = {d->quat_w[g], d->quat_x[g], d->quat_y[g], d->quat_z[g]};
             float *d_shape = row + job->out_first[1] + k * SHAPE_OUTPUTS, *d_logit = row + job->out_first[2] + k * COLOR_OUTPUTS;
@@ -77,11 +88,15 @@ static void activations_backward(const backward_job *job, size_t begin, size_t r
                     d_offset[k * 3 + (size_t)c] += d_mean[c] * e[c];
                     sum[c] += d_mean[c] * shift;
                 }
-                const float s = kept[(size_t)(KEPT_SIGMOID + c) * stride + g], scaled = d_scale[c] * (e[3 + c] * s);
-                sum[3 + c] += scaled;
-                d_shape[c] = scaled * (1.0f - s);
+                scale[c] = e[3 + c] * kept[(size_t)(KEPT_SIGMOID + c) * stride + g];
                 const float value = kept[(size_t)(KEPT_COLOR + c) * stride + g];
                 d_logit[c] = d_color[c] * (value * (1.0f - value));
+            }
+            pass_held_scales(scale, d_scale);
+            for (int c = 0; c < 3; c++) {
+                const float scaled = d_scale[c] * scale[c];
+                sum[3 + c] += scaled;
+                d_shape[c] = scaled * (1.0f - kept[(size_t)(KEPT_SIGMOID + c) * stride + g]);
             }
             float q[4], along = 0.0f;
             for (int c = 0; c < 4; c++) {

@@ -39,6 +39,9 @@ enum {
 /** Means beyond this are cut, so that a wild offset cannot become an infinity. */
 #define DECODE_MEAN_LIMIT 1e18f
 
+/* A std-dev is at least this part of the Gaussian's largest: thinner needles and sheets are beyond what float32 can evaluate. */
+#define DECODE_SCALE_RATIO 1e-4f
+
 typedef struct decode_layout {
     size_t offset_count, input_count; /* input_count is the decoder's own: 35 or 36 */
     size_t out_count[HEAD_COUNT];     /* K, 7K, 3K */

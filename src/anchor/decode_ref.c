@@ -91,6 +91,13 @@ static double slope(double x) /* of cut() */
     return x >= -limit && x <= limit ? 1.0 : 0.0;
 }
 
+static const double scale_ratio = (double)1e-4f; /* the least scale, as part of the largest */
+
+static size_t largest_of(const double scale[3])
+{
+    return scale[1] > scale[0] ? (scale[2] > scale[1] ? 2 : 1) : scale[2] > scale[0] ? 2 : 0;
+}
+
 static double sigmoid(double x)
 {
     return 1.0 / (1.0 + exp(-cut(x)));
@@ -158,6 +165,9 @@ void decode_ref_forward(const decode_ref *r, const double camera_center[3], cons
                 g[3 + c] = exp(cut(r->scale_log[i * 6 + 3 + c])) * sigmoid(shape[c]);
                 g[11 + c] = sigmoid(color[c]);
             }
+            const double least = scale_ratio * g[3 + largest_of(g + 3)];
+            for (size_t c = 3; c < 6; c++)
+                g[c] = fmax(g[c], least);
             unit_quaternion(shape + 3, g + 6);
             g[10] = tanh(act.out[k]);
         }
@@ -206,13 +216,20 @@ void decode_ref_backward(const decode_ref *r, const double camera_center[3], con
             const double *d = d_out + (v * offsets + k) * DECODE_REF_FIELDS;
             const double *shape = act.out + offsets + k * 7, *color = act.out + offsets * 8 + k * 3;
             double *d_shape = d_logit + offsets + k * 7, *d_color = d_logit + offsets * 8 + k * 3, q[4], along = 0;
+            double raw[3], d_scale[3] = {d[3], d[4], d[5]};
+            for (size_t c = 0; c < 3; c++)
+                raw[c] = exp(cut(r->scale_log[i * 6 + 3 + c])) * sigmoid(shape[c]);
+            const size_t large = largest_of(raw);
+            for (size_t c = 0; c < 3; c++)
+                if (raw[c] < scale_ratio * raw[large])
+                    d_scale[large] += scale_ratio * d_scale[c], d_scale[c] = 0;
             for (size_t c = 0; c < 3; c++) {
                 const double log_mean = r->scale_log[i * 6 + c], log_scale = r->scale_log[i * 6 + 3 + c];
-                const double e = exp(cut(log_mean)), s = sigmoid(shape[c]), scale = exp(cut(log_scale)) * s;
+                const double e = exp(cut(log_mean)), s = sigmoid(shape[c]), scaled = d_scale[c] * raw[c];
                 grad->offset[(i * offsets + k) * 3 + c] += d[c] * e;
                 grad->scale_log[i * 6 + c] += d[c] * r->offset[(i * offsets + k) * 3 + c] * e * slope(log_mean);
-                grad->scale_log[i * 6 + 3 + c] += d[3 + c] * scale * slope(log_scale);
-                d_shape[c] = d[3 + c] * scale * (1 - s);
+                grad->scale_log[i * 6 + 3 + c] += scaled * slope(log_scale);
+                d_shape[c] = scaled * (1 - s);
                 const double value = sigmoid(color[c]);
                 d_color[c] = d[11 + c] * value * (1 - value);
             }

@@ -18,6 +18,14 @@ gbt_status image_alloc(image *out, int width, int height, int channels, gbt_erro
     return GBT_OK;
 }
 
+gbt_status image_fit(image *im, int width, int height, int channels, gbt_error *err)
+{
+    if (im->width == width && im->height == height && im->channels == channels)
+        return GBT_OK;
+    image_free(im);
+    return image_alloc(im, width, height, channels, err);
+}
+
 void image_free(image *im)
 {
     mem_free(im->pixels);

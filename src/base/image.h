@@ -19,6 +19,9 @@ typedef struct image {
 gbt_status image_alloc(image *out, int width, int height, int channels, gbt_error *err);
 void image_free(image *im); /* zeroes the struct */
 
+/** Make `im` of that size, unless it is: what it held is lost then. Start from {0}. */
+gbt_status image_fit(image *im, int width, int height, int channels, gbt_error *err);
+
 /** Size of an image file without reading its pixels. */
 gbt_status image_probe(const char *path, int *width, int *height, int *channels, gbt_error *err);
 
@@ -27,13 +30,20 @@ gbt_status image_probe(const char *path, int *width, int *height, int *channels,
  *
  * 8- and 16-bit integers become [0, 1]; grey becomes RGB; alpha is kept as a fourth channel. The format is taken from the file's
  * magic, not its name. Orientation tags are not applied (COLMAP's choice). Truncated files, deep or multi-part EXR, and images of
- * more than 2^28 samples are refused.
+ * more than 2^28 samples are refused. Float values that are not finite become 0, with one warning.
  *
  * @param out [out] 3 or 4 channels; free with image_free(); zeroed on failure
  * @return GBT_OK, GBT_ERR_IO (cannot open), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  * Threads: any.
  */
 gbt_status image_read(const char *path, image *out, gbt_error *err);
+
+/**
+ * image_read(), and where it replaced values that are not finite by 0.
+ *
+ * @param valid [out] NULL when every value is finite, else [height][width]: 0 for pixels with a value that is not; free with mem_free()
+ */
+gbt_status image_read_valid(const char *path, image *out, unsigned char **valid, gbt_error *err);
 
 enum { IMAGE_RAW_CHANNELS = 64, IMAGE_NAME_SIZE = 64 };
 

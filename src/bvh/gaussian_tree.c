@@ -31,6 +31,7 @@ typedef struct builder {
     const gaussians *g;
     float alpha_min, radius;
     atomic_size_t binary_count, leaf_count;
+    atomic_bool refused; /* an allocation of Embree's was refused: the tree has holes */
     tree_node *nodes;
     size_t node_count, node_capacity;
     tree_leaf *leaves;
@@ -89,6 +90,8 @@ static void *create_node(RTCThreadLocalAllocator allocator, unsigned child_count
     embree_receive(b);
     atomic_fetch_add_explicit(&b->binary_count, 1, memory_order_relaxed);
     binary_node *node = rtcThreadLocalAlloc(allocator, sizeof(binary_node), 16);
+    if (node == NULL) /* the memory limit (bvh_limit_memory) */
+        atomic_store_explicit(&b->refused, true, memory_order_relaxed);
     embree_publish(b);
     return node;
 }
@@ -97,7 +100,7 @@ static void set_children(void *pointer, void **children, unsigned child_count, v
 {
     binary_node *node = pointer;
     embree_receive(user);
-    for (unsigned i = 0; i < child_count; i++)
+    for (unsigned i = 0; i < child_count && node != NULL; i++)
         node->child[i] = (uint64_t)(uintptr_t)children[i];
     embree_publish(user);
 }
@@ -106,7 +109,7 @@ static void set_bounds(void *pointer, const struct RTCBounds **bounds, unsigned 
 {
     binary_node *node = pointer;
     embree_receive(user);
-    for (unsigned i = 0; i < child_count; i++)
+    for (unsigned i = 0; i < child_count && node != NULL; i++)
         node->bounds[i] = *bounds[i];
     embree_publish(user);
 }
@@ -117,6 +120,11 @@ static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuil
     embree_receive(b);
     atomic_fetch_add_explicit(&b->leaf_count, 1, memory_order_relaxed);
     leaf_members *leaf = rtcThreadLocalAlloc(allocator, sizeof *leaf, 16);
+    if (leaf == NULL) {
+        atomic_store_explicit(&b->refused, true, memory_order_relaxed);
+        embree_publish(b);
+        return NULL;
+    }
     leaf->count = (uint32_t)count;
     for (size_t i = 0; i < count; i++)
         leaf->id[i] = primitives[i].primID;
@@ -202,10 +210,13 @@ static gbt_status run_builder(builder *b, void *device, gbt_error *err)
     arguments.setNodeBounds = set_bounds;
     arguments.createLeaf = create_leaf;
     arguments.userPtr = b;
-    atomic_store(&b->binary_count, 0), atomic_store(&b->leaf_count, 0);
+    atomic_store(&b->binary_count, 0), atomic_store(&b->leaf_count, 0), atomic_store(&b->refused, false);
     embree_publish(b);
     void *root = rtcBuildBVH(&arguments);
     embree_receive(b);
+    const gbt_status complaint = bvh_check("tree", err);
+    if (b->refused || complaint != GBT_OK)
+        return base_fail(err, GBT_ERR_NO_MEMORY, "bvh: no memory for a tree over %zu Gaussians", b->boxes.count);
     if (root == NULL)
         return base_fail(err, GBT_ERR_INTERNAL, "bvh: Embree could not build a tree over %zu Gaussians (error %d)", b->boxes.count,
                          (int)rtcGetDeviceError(device));

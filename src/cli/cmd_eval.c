@@ -8,6 +8,9 @@ static int run(const command *self, int argc, char **argv)
     const option options[] = {
         {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "data set in place of the one it was trained on"},
         {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the scores there too"},
+        {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray", .help = "what draws the model; default: what it was trained with"},
+        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",
+         .help = "divide the photos' size by this; 0: as in training"},
         {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast", .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
     };
     operands model;

@@ -21,7 +21,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "insert", .kind = OPTION_STRING, .value = &def.insert, .value_name = "FILE.json",
          .help = "put meshes into the scene: matt or mirrors, with shadows (docs/inserting.md)"},
         {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "cameras from another data set"},
-        {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|reference", .help = "the tracer, or the double reference (slow)"},
+        {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray|reference", .help = "what draws the model; default: what it was trained with. The reference is in double, and slow"},
         {.name = "format", .kind = OPTION_CHOICE, .value = &def.format, .choices = "png|exr", .help = "8-bit PNG, or float EXR"},
         {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",
          .help = "divide the photos' size by this; 0: as in training"},

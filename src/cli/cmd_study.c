@@ -6,28 +6,68 @@
 #include "gbtrace/bench.h"
 #include "gbtrace/train.h"
 
+/* What the command line says, for all studies. */
+typedef struct study_request {
+    gbt_study_def def; /* of the studies of models */
+    gbt_stability_def stability;
+    const char *folder;
+} study_request;
+
+static gbt_status run_speed(const study_request *r, gbt_error *err)
+{
+    return gbt_study_speed(&r->def, r->folder, stdout, err);
+}
+
+static gbt_status run_crosscheck(const study_request *r, gbt_error *err)
+{
+    return gbt_study_crosscheck(&r->def, r->folder, stdout, err);
+}
+
+static gbt_status run_stability(const study_request *r, gbt_error *err)
+{
+    return gbt_study_stability(&r->stability, r->folder, stdout, err);
+}
+
+static const struct { const char *name; int models_min, models_max; gbt_status (*run)(const study_request *, gbt_error *); } studies[] = {
+    {"speed", 1, 16, run_speed},
+    {"crosscheck", 1, 16, run_crosscheck},
+    {"stability", 0, 0, run_stability},
+};
+
 static int run(const command *self, int argc, char **argv)
 {
-    gbt_study_def def = gbt_study_def_default();
-    const char *out = NULL;
+    study_request request = {.def = gbt_study_def_default(), .stability = gbt_stability_def_default()};
+    bool quick = false;
+    gbt_study_def *def = &request.def;
     int threads = 0;
     const option options[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR", .help = "folder for the tables and the chart", .required = true},
-        {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json", .help = "the camera of every .ply; default: camera.json beside it"},
-        {.name = "repeats", .kind = OPTION_INT, .value = &def.repeats, .min = 1, .max = 1000, .value_name = "N", .help = "timed passes of each setting; the median counts"},
+        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &request.folder, .value_name = "DIR", .help = "folder for the tables and the chart", .required = true},
+        {.name = "camera", .kind = OPTION_STRING, .value = &def->camera, .value_name = "FILE.json", .help = "the camera of every .ply; default: camera.json beside it"},
+        {.name = "repeats", .kind = OPTION_INT, .value = &def->repeats, .min = 1, .max = 1000, .value_name = "N", .help = "speed: timed passes of each setting; the median counts"},
+        {.name = "only", .kind = OPTION_STRING, .value = &request.stability.only, .value_name = "A1,A9", .help = "stability: these cases; default: all"},
+        {.name = "quick", .kind = OPTION_FLAG, .value = &quick, .help = "stability: the smaller sizes of its tests"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
     };
     operands named;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 2, 17, argc, argv, &named);
+    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 17, argc, argv, &named);
     if (code >= 0)
         return code;
-    if (strcmp(named.value[0], "speed") != 0)
-        return command_misused("study: unknown study \"%.60s\" (wanted speed)", named.value[0]);
+    size_t which = 0;
+    while (which < sizeof studies / sizeof *studies && strcmp(named.value[0], studies[which].name) != 0)
+        which++;
+    if (which == sizeof studies / sizeof *studies)
+        return command_misused("study: unknown study \"%.60s\" (wanted speed, crosscheck or stability)", named.value[0]);
+    if (named.count - 1 < studies[which].models_min)
+        return command_misused("study %s: wanted a model", studies[which].name);
+    if (named.count - 1 > studies[which].models_max)
+        return command_misused("study %s: \"%.60s\" is one model too many", studies[which].name, named.value[1 + studies[which].models_max]);
     if (threads > 0)
         gbt_set_threads(threads);
-    def.models = named.value + 1, def.model_count = (size_t)named.count - 1;
+    request.stability.quick = quick;
+    def->models = named.value + 1, def->model_count = (size_t)named.count - 1;
     gbt_error err = {0};
-    return command_failed(gbt_study_speed(&def, out, stdout, &err), &err);
+    return command_failed(studies[which].run(&request, &err), &err);
 }
 
-const command command_study = {.name = "study", .summary = "speed against accuracy: measure every setting, draw the chart", .usage = "speed MODEL... -o DIR", .run = run};
+const command command_study = {.name = "study", .summary = "speed against accuracy, tracer against rasterizer, or stability: measure, draw the chart",
+                               .usage = "speed|crosscheck|stability [MODEL...] -o DIR", .run = run};

@@ -11,6 +11,7 @@ static const command *const commands[] = {
     &command_init,
     &command_train,
     &command_eval,
+    &command_compare,
     &command_render,
     &command_make_scene,
     &command_bench,

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/memory.h"
 #include "data/scene.h"
 
 /* One row of box sums: out[i] = mean of in over [i, i + 1) * in_count / out_count. `step` is the distance of neighbours in floats. */
@@ -44,6 +45,27 @@ gbt_status photo_resize(const image *in, int width, int height, image *out, gbt_
     return status;
 }
 
+gbt_status photo_resize_valid(const unsigned char *in, int in_width, int in_height, int width, int height, unsigned char **out, gbt_error *err)
+{
+    image bad = {0}, resized = {0};
+    *out = NULL;
+    gbt_status status = image_alloc(&bad, in_width, in_height, 1, err);
+    for (size_t i = 0; status == GBT_OK && i < (size_t)in_width * (size_t)in_height; i++)
+        bad.pixels[i] = in[i] == 0;
+    if (status == GBT_OK)
+        status = photo_resize(&bad, width, height, &resized, err);
+    if (status == GBT_OK) {
+        const size_t count = (size_t)width * (size_t)height;
+        *out = mem_alloc(count, 1, "valid pixels", err);
+        status = *out == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+        for (size_t i = 0; status == GBT_OK && i < count; i++)
+            (*out)[i] = !(resized.pixels[i] > 0);
+    }
+    image_free(&bad);
+    image_free(&resized);
+    return status;
+}
+
 /* True when two sizes have the same aspect: one scaled to the other's width or height misses the rest by at most one pixel of the
    smaller. */
 static bool same_aspect(double w0, double h0, double w1, double h1)
@@ -69,16 +91,23 @@ static gbt_status to_rgb(const image *in, image *out, gbt_error *err)
     return GBT_OK;
 }
 
-gbt_status scene_read_photo(const scene_view *view, int width, int height, image *out, gbt_error *err)
+/* Read a photo and look at its shape; `valid` is optional. */
+static gbt_status read_stored(const scene_view *view, image *stored, unsigned char **valid, gbt_error *err)
+{
+    GBT_TRY(valid != NULL ? image_read_valid(view->path, stored, valid, err) : image_read(view->path, stored, err));
+    if (same_aspect(stored->width, stored->height, view->camera.width, view->camera.height))
+        return GBT_OK;
+    return base_fail(err, GBT_ERR_FORMAT, "%s: photo does not have the camera's aspect (wanted %d x %d or a multiple, got %d x %d)", view->path,
+                     view->camera.width, view->camera.height, stored->width, stored->height);
+}
+
+static gbt_status read_photo(const scene_view *view, int width, int height, image *out, unsigned char **valid, gbt_error *err)
 {
     image stored = {0}, rgb = {0};
     memset(out, 0, sizeof *out);
     if (width < 1 || height < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: photo wanted at %d x %d (wanted both >= 1)", view->path, width, height);
-    gbt_status status = image_read(view->path, &stored, err);
-    if (status == GBT_OK && !same_aspect(stored.width, stored.height, view->camera.width, view->camera.height))
-        status = base_fail(err, GBT_ERR_FORMAT, "%s: photo does not have the camera's aspect (wanted %d x %d or a multiple, got %d x %d)",
-                           view->path, view->camera.width, view->camera.height, stored.width, stored.height);
+    gbt_status status = read_stored(view, &stored, valid, err);
     if (status == GBT_OK)
         status = to_rgb(&stored, &rgb, err);
     image_free(&stored);
@@ -87,9 +116,30 @@ gbt_status scene_read_photo(const scene_view *view, int width, int height, image
         rgb = (image){0};
     } else if (status == GBT_OK) {
         status = photo_resize(&rgb, width, height, out, err);
+        if (status == GBT_OK && valid != NULL && *valid != NULL) {
+            unsigned char *stored_valid = *valid;
+            status = photo_resize_valid(stored_valid, rgb.width, rgb.height, width, height, valid, err);
+            mem_free(stored_valid);
+        }
     }
     image_free(&rgb);
     if (status != GBT_OK)
         image_free(out);
+    return status;
+}
+
+gbt_status scene_read_photo(const scene_view *view, int width, int height, image *out, gbt_error *err)
+{
+    return read_photo(view, width, height, out, NULL, err);
+}
+
+gbt_status scene_read_photo_valid(const scene_view *view, int width, int height, image *out, unsigned char **valid, gbt_error *err)
+{
+    *valid = NULL;
+    const gbt_status status = read_photo(view, width, height, out, valid, err);
+    if (status != GBT_OK) {
+        mem_free(*valid);
+        *valid = NULL;
+    }
     return status;
 }

@@ -13,4 +13,7 @@
  */
 gbt_status photo_resize(const image *in, int width, int height, image *out, gbt_error *err);
 
+/** The same for marks of valid pixels, [height][width] of 0 and not 0: an output pixel is valid (1) if its whole rectangle is. `out` is owned. */
+gbt_status photo_resize_valid(const unsigned char *in, int in_width, int in_height, int width, int height, unsigned char **out, gbt_error *err);
+
 #endif

@@ -64,9 +64,16 @@ void scene_free(scene *s);
  * Read one photo as 3-channel float, resized to `width` x `height` by exact area averaging (camera resized alike: gbt_camera_resized()).
  *
  * The photo may differ from the camera's stated size if the aspect agrees within 1 px; it is then resampled in one step. Alpha is
- * composited on black.
+ * composited on black. Values that are not finite are 0.
  */
 gbt_status scene_read_photo(const scene_view *view, int width, int height, image *out, gbt_error *err);
+
+/**
+ * scene_read_photo(), and which pixels mean something.
+ *
+ * @param valid [out] NULL when all do, else [height][width]: 0 where a value that is not finite had a part in it; free with mem_free()
+ */
+gbt_status scene_read_photo_valid(const scene_view *view, int width, int height, image *out, unsigned char **valid, gbt_error *err);
 
 /** Half the diagonal-like extent of the training cameras: 1.1 * max |c - mean c| (spatial_lr_scale); at least a small positive number. */
 double scene_camera_extent(const scene *s);

@@ -1,4 +1,4 @@
-/* eval/bench_passes.c -- time passes over the same Gaussians and rays, traced in several ways in turn. */
+/* eval/bench_passes.c -- time passes over the same Gaussians and rays, traced or splatted in several ways in turn. */
 #include "eval/bench_passes.h"
 
 #include <stdlib.h>
@@ -9,7 +9,7 @@
 #include "base/memory.h"
 #include "bvh/device.h"
 
-enum { SAMPLE_BUILD, SAMPLE_FORWARD, SAMPLE_ADJOINT, SAMPLE_FORWARD_CPU, SAMPLE_ADJOINT_CPU, SAMPLE_COUNT };
+enum { SAMPLE_BUILD, SAMPLE_FORWARD, SAMPLE_ADJOINT, SAMPLE_FORWARD_CPU, SAMPLE_ADJOINT_CPU, SAMPLE_BUILD_CPU, SAMPLE_COUNT };
 
 static const char *const kernel_names[] = {[TRACE_TILE] = "tile", [TRACE_SINGLE] = "single", [TRACE_EMBREE] = "embree"};
 
@@ -59,25 +59,50 @@ typedef struct passes {
     int repeats;
 } passes;
 
+static gbt_status build(passes *p, bench_way *w, gbt_error *err)
+{
+    memset(&w->figures.counters, 0, sizeof w->figures.counters);
+    return w->splat != NULL ? GBT_OK : trace_build(&w->traced, p->g, &w->settings, p->reach, err);
+}
+
+static gbt_status forward(passes *p, bench_way *w, gbt_error *err)
+{
+    if (w->splat == NULL)
+        return trace_forward(&w->traced, p->rays, true, &(trace_outputs){.rgb = &w->rgb}, &w->figures.counters, err);
+    raster_settings s = raster_settings_default();
+    raster_counters counted = {0};
+    s.form = w->splat->form, s.near = w->settings.t_near;
+    s.alpha_min = w->settings.alpha_min, s.alpha_max = w->settings.alpha_max, s.transmittance_min = w->settings.transmittance_min;
+    memcpy(s.background, w->settings.background, sizeof s.background);
+    GBT_TRY(raster_forward(&w->splatted, w->splat->g, w->splat->camera, &s, true, &w->rgb, NULL, &counted, err));
+    w->figures.counters.rays = counted.pixels, w->figures.counters.blended = counted.blended;
+    return GBT_OK;
+}
+
+static gbt_status backward(passes *p, bench_way *w, gbt_error *err)
+{
+    return w->splat != NULL ? raster_backward(&w->splatted, &p->d_rgb, &p->d_gaussians, NULL, err)
+                            : trace_backward(&w->traced, p->rays, &p->d_rgb, &p->d_gaussians, NULL, NULL, err);
+}
+
 /* Build, forward, adjoint; `sample` counts from 0, and -1 is not kept. */
 static gbt_status pass(passes *p, bench_way *w, int sample, gbt_error *err)
 {
     cpu_limit_isa(w->isa);
     const size_t embree_bytes = bvh_memory_bytes();
-    const double t0 = clock_wall();
-    GBT_TRY(trace_build(&w->traced, p->g, &w->settings, p->reach, err));
+    const double t0 = clock_wall(), c0 = clock_process();
+    GBT_TRY(build(p, w, err));
     const double t1 = clock_wall(), c1 = clock_process();
-    memset(&w->figures.counters, 0, sizeof w->figures.counters);
-    GBT_TRY(trace_forward(&w->traced, p->rays, true, &(trace_outputs){.rgb = &w->rgb}, &w->figures.counters, err));
+    GBT_TRY(forward(p, w, err));
     const double t2 = clock_wall(), c2 = clock_process();
-    GBT_TRY(trace_backward(&w->traced, p->rays, &p->d_rgb, &p->d_gaussians, NULL, NULL, err));
+    GBT_TRY(backward(p, w, err));
     const double t3 = clock_wall(), c3 = clock_process();
     if (sample < 0) { /* the first build: what Embree holds for it is new */
         w->figures.tree_bytes = w->kernel == TRACE_EMBREE ? bvh_memory_bytes() - embree_bytes : w->traced.tree.bytes;
         w->figures.record_bytes = p->g->count * RECORD_FLOATS * sizeof(float);
         return GBT_OK;
     }
-    const double taken[SAMPLE_COUNT] = {t1 - t0, t2 - t1, t3 - t2, c2 - c1, c3 - c2};
+    const double taken[SAMPLE_COUNT] = {t1 - t0, t2 - t1, t3 - t2, c2 - c1, c3 - c2, c1 - c0};
     for (int i = 0; i < SAMPLE_COUNT; i++)
         w->samples[i * p->repeats + sample] = taken[i];
     return GBT_OK;
@@ -109,6 +134,7 @@ static void find_medians(const passes *p, bench_way *w)
     w->figures.build_ms = 1000 * at[SAMPLE_BUILD];
     w->figures.forward_seconds = at[SAMPLE_FORWARD], w->figures.adjoint_seconds = at[SAMPLE_ADJOINT];
     w->figures.forward_us = 1e6 * at[SAMPLE_FORWARD_CPU] / rays, w->figures.adjoint_us = 1e6 * at[SAMPLE_ADJOINT_CPU] / rays;
+    w->figures.build_us = 1e6 * at[SAMPLE_BUILD_CPU] / rays;
 }
 
 gbt_status bench_measure(bench_way *ways, size_t count, const gaussians *g, const ray_image *rays, int repeats, gbt_error *err)
@@ -130,6 +156,7 @@ gbt_status bench_measure(bench_way *ways, size_t count, const gaussians *g, cons
 void bench_way_free(bench_way *way)
 {
     trace_scene_free(&way->traced);
+    raster_scene_free(&way->splatted);
     image_free(&way->rgb);
     mem_free(way->samples);
     way->samples = NULL;

@@ -1,23 +1,33 @@
-/* eval/bench_passes.h -- time passes over the same Gaussians and rays, traced in several ways in turn. */
+/* eval/bench_passes.h -- time passes over the same Gaussians and rays, traced or splatted in several ways in turn. */
 #ifndef GBT_EVAL_BENCH_PASSES_H
 #define GBT_EVAL_BENCH_PASSES_H
 
 #include "base/cpu.h"
+#include "raster/raster.h"
 #include "trace/trace.h"
 
 typedef struct bench_figures {
     double build_ms, forward_seconds, adjoint_seconds; /* wall time, medians */
-    double forward_us, adjoint_us;                     /* core-microseconds per ray: processor time of all threads / rays, medians */
+    double build_us, forward_us, adjoint_us;                    /* core-microseconds per ray: processor time of all threads / rays, medians */
     kernel_counters counters;                          /* of one forward pass */
     size_t tree_bytes, record_bytes;
 } bench_figures;
 
-/** One way of tracing. Start from the fields of the first line, the rest 0; free with bench_way_free(). */
+/** Splats in place of rays. */
+typedef struct bench_splat {
+    const gbt_camera *camera; /* pinhole, whose rays are those of the other ways */
+    const gaussians *g;       /* what is splatted: without the footprint that its dilation stands for */
+    raster_form form;
+} bench_splat;
+
+/** One way of making the picture. Start from the fields of the first line, the rest 0; free with bench_way_free(). */
 typedef struct bench_way {
     trace_kernel kernel; cpu_isa isa; trace_settings settings; size_t tape_bytes_max;
+    const bench_splat *splat; /* NULL: traced */
     bench_figures figures;
     image rgb;          /* of the last pass */
     trace_scene traced; /* as built for it */
+    raster_scene splatted;
     double *samples;    /* internal */
 } bench_way;
 

@@ -60,8 +60,8 @@ static gbt_status open_run(const char *path, const char *camera, bench_scene *ou
         const gbt_camera taken = photos_camera(&run->photos, view, 0);
         out->camera.shot = ray_shot_of(&taken);
     }
-    out->gaussians = &run->frame.gaussians;
     out->settings = run->settings;
+    run->frame.draw.renderer = FRAME_TRACE; /* of a run trained with splats too: who measures chooses */
     return GBT_OK;
 }
 
@@ -72,8 +72,10 @@ gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *o
 
 gbt_status bench_scene_decode(bench_scene *s, gbt_error *err)
 {
-    if (s->run != NULL)
+    if (s->run != NULL) {
         GBT_TRY(frame_render_shot(&s->run->frame, &s->run->model.anchors, &s->run->model.decoder, &s->camera.shot, &s->settings, err));
+        s->gaussians = frame_drawn(&s->run->frame);
+    }
     return ray_image_from_shot(&s->camera.shot, 0, &s->rays, err);
 }
 

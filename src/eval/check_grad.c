@@ -82,7 +82,7 @@ static gbt_status allocate(checker *c, gbt_error *err)
     const size_t slot_count = c->frame->visible_count * (size_t)c->run->model.anchors.offset_count;
     GBT_TRY(image_alloc(&c->d_image, c->width, c->height, 3, err));
     GBT_TRY(image_alloc(&c->d_masked, c->width, c->height, 3, err));
-    GBT_TRY(reference_scene_make(&c->frame->gaussians, &c->scene, err));
+    GBT_TRY(reference_scene_make(frame_drawn(c->frame), &c->scene, err));
     GBT_TRY(decode_ref_load(&c->parameters, &c->run->model.anchors, &c->run->model.decoder, err));
     GBT_TRY(decode_ref_zero(&c->d_parameters, &c->parameters, err));
     c->d_anchors.offset_count = c->run->model.anchors.offset_count;
@@ -348,10 +348,11 @@ static gbt_status chain_loss(checker *c, reference_scene *seen, int which, gbt_e
     double volume = 0;
     size_t to = 0;
     for (size_t i = 0; i < f->gaussians.count; i++) {
-        const double *slot = c->slots + f->tape.slot[i] * (size_t)DECODE_REF_FIELDS;
+        double *slot = c->slots + f->tape.slot[i] * (size_t)DECODE_REF_FIELDS;
         volume += slot[3] * slot[4] * slot[5];
         if (!(c->weight[i] > 0))
             continue;
+        frame_widen_exact(f, i, slot);
         for (size_t k = 0; k < GAUSSIANS_FIELD_COUNT; k++)
             seen->fields[k * seen->count + to] = slot[k];
         to++;

@@ -16,11 +16,33 @@
 #include "eval/loaded_run.h"
 #include "eval/report.h"
 #include "gbtrace/evaluate.h"
+#include "image/affine.h"
 #include "image/metrics.h"
 
 gbt_evaluate_def gbt_evaluate_def_default(void)
 {
     return (gbt_evaluate_def){.report = 1};
+}
+
+/* PSNR, SSIM and FLIP of two pictures, rounded to 8 bit here. */
+static gbt_status score_pictures(image *render, image *photo, view_score *score, gbt_error *err)
+{
+    image_quantize(render);
+    image_quantize(photo);
+    score->psnr = metric_psnr(render, photo);
+    score->ssim = metric_ssim(render, photo);
+    return metric_flip(render, photo, &score->flip, NULL, err);
+}
+
+/* The same of the right halves, after a colour matrix that the left halves give; `render` becomes the whole picture through it. */
+static gbt_status score_right_half(image *render, const image *photo, view_score *score, gbt_error *err)
+{
+    image render_right, photo_right;
+    GBT_TRY(affine_split(render, photo, &render_right, &photo_right, err));
+    const gbt_status status = score_pictures(&render_right, &photo_right, score, err);
+    image_free(&render_right);
+    image_free(&photo_right);
+    return status;
 }
 
 static gbt_status score_view(loaded_run *r, size_t index, const char *folder, view_score *score, gbt_error *err)
@@ -36,13 +58,16 @@ static gbt_status score_view(loaded_run *r, size_t index, const char *folder, vi
     gbt_status status = scene_read_photo(view, render->width, render->height, &photo, err);
     if (status == GBT_OK)
         status = image_alloc(&error_map, render->width, render->height, 1, err);
+    if (status == GBT_OK && r->def.exposure)
+        status = score_right_half(render, &photo, score, err);
+    if (status == GBT_OK && !r->def.exposure)
+        status = score_pictures(render, &photo, score, err);
     if (status != GBT_OK)
         goto done;
     image_quantize(render);
     image_quantize(&photo);
-    score->psnr = metric_psnr(render, &photo);
-    score->ssim = metric_ssim(render, &photo);
-    status = metric_flip(render, &photo, &score->flip, &error_map, err);
+    double whole;
+    status = metric_flip(render, &photo, &whole, &error_map, err);
     char name[1024], file[1100];
     loaded_run_view_name(view, name, sizeof name);
     const struct { const char *suffix; const image *pixels; char *path; } outputs[] = {
@@ -77,6 +102,8 @@ static json_t *scores_to_json(const evaluation *e)
         json_array_append_new(views, json_pack("{s:s,s:f,s:f,s:f,s:f,s:I}", "name", v->name, "psnr", v->psnr, "ssim", v->ssim, "flip", v->flip, "seconds",
                                                v->seconds, "gaussians", (json_int_t)v->gaussians));
     }
+    json_object_set_new(root, "exposure", json_boolean(e->exposure));
+    json_object_set_new(root, "scored", json_string(e->exposure ? "right half, with a colour matrix fitted to the left half" : "whole image"));
     json_object_set_new(root, "views", views);
     json_object_set_new(root, "anchors_final", json_integer((json_int_t)e->anchors));
     json_object_set_new(root, "gaussians_per_view", number_or_null(e->gaussians_per_view));
@@ -128,7 +155,7 @@ static gbt_status score_run(loaded_run *r, const char *run, evaluation *e, gbt_e
     }
     const double n = (double)e->view_count; /* 0 / 0 = NaN here becomes null in JSON and "n/a" on the page */
     e->psnr /= n, e->ssim /= n, e->flip /= n, e->gaussians_per_view /= n;
-    e->anchors = r->model.anchors.count;
+    e->anchors = r->model.anchors.count, e->exposure = r->def.exposure;
     char model_path[4096];
     struct stat info;
     GBT_TRY(file_join(model_path, sizeof model_path, run, "model.gbt", err));
@@ -145,9 +172,11 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
     loaded_run *r = mem_alloc(1, sizeof *r, "run", err);
     if (r == NULL)
         return GBT_ERR_NO_MEMORY;
-    gbt_status status = loaded_run_open(run, def->data, 0, r, err);
+    gbt_status status = loaded_run_open(run, def->data, def->downscale, r, err);
     if (status == GBT_OK)
         status = loaded_run_preset(def->preset, &r->settings, err);
+    if (status == GBT_OK && def->renderer != NULL && !frame_renderer_named(def->renderer, &r->frame.draw.renderer))
+        status = base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)", def->renderer);
     if (status == GBT_OK)
         status = score_run(r, run, &e, err);
     if (status != GBT_OK)

@@ -2,6 +2,7 @@
 #ifndef GBT_EVAL_EVALUATE_H
 #define GBT_EVAL_EVALUATE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 enum { VIEW_PATH_SIZE = 4096 };
@@ -19,6 +20,7 @@ typedef struct evaluation {
     size_t view_count;
     double psnr, ssim, flip, gaussians_per_view;
     size_t anchors, model_bytes;
+    bool exposure; /* scored on the right halves of the photos (image/affine.h) */
 } evaluation;
 
 #endif

@@ -16,7 +16,12 @@ static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", run);
     GBT_TRY(model_load(path, &out->model, err));
     out->def = gbt_train_def_default();
+    out->def.footprint = 0; /* of models that do not say */
     GBT_TRY(config_parse(out->model.config, path, &out->def, &out->strings, err));
+    if (!frame_renderer_named(out->def.renderer, &out->frame.draw.renderer))
+        return base_fail(err, GBT_ERR_FORMAT, "%.1000s: section train.config: unknown renderer \"%.40s\"", path, out->def.renderer);
+    out->frame.draw.footprint = (float)out->def.footprint;
+    out->frame.draw.anchor_pixel = out->model.anchor_pixel;
     out->settings = trace_settings_default();
     out->settings.t_near = out->model.t_near;
     memcpy(out->settings.background, out->model.background, sizeof out->settings.background);

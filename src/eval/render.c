@@ -15,7 +15,7 @@
 
 gbt_render_def gbt_render_def_default(void)
 {
-    return (gbt_render_def){.split = GBT_SPLIT_TEST, .renderer = "trace", .format = "png"};
+    return (gbt_render_def){.split = GBT_SPLIT_TEST, .format = "png"};
 }
 
 /* Same Gaussians, same rays, in double: the picture that the tracer is measured against. */
@@ -30,7 +30,7 @@ static gbt_status render_reference(loaded_run *r, const ray_shot *shot, gbt_erro
     for (int s = 0; s < samples && status == GBT_OK; s++) {
         status = ray_image_from_shot(shot, s, &f->rays, err);
         if (status == GBT_OK)
-            status = reference_forward(&f->gaussians, &r->settings, &f->rays, rgb, NULL, NULL, err);
+            status = reference_forward(frame_drawn(f), &r->settings, &f->rays, rgb, NULL, NULL, err);
         for (size_t i = 0; status == GBT_OK && i < 3 * pixels; i++)
             sum[i] += rgb[i];
     }
@@ -46,6 +46,7 @@ typedef struct studio {
     loaded_run run;
     insert_scene insert;
     unsigned outputs; /* render_outputs_parse() */
+    bool in_double;   /* by the reference */
 } studio;
 
 static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, const char *name, const gbt_render_def *def, gbt_error *err)
@@ -54,7 +55,7 @@ static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, 
     loaded_run *r = &st->run;
     const frame_guest guest = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
     GBT_TRY(frame_render_guest(&r->frame, &r->model.anchors, &r->model.decoder, shot, &r->settings, def->insert != NULL ? &guest : NULL, err));
-    if (strcmp(def->renderer, "reference") == 0)
+    if (st->in_double)
         GBT_TRY(render_reference(r, shot, err));
     snprintf(file, sizeof file, "%s.%s", name, def->format);
     GBT_TRY(file_join(path, sizeof path, out, file, err));
@@ -107,18 +108,34 @@ static gbt_status render_camera(studio *st, const char *out, const gbt_render_de
     return status;
 }
 
+static const char insert_is_traced[] = "--insert: meshes are traced (wanted --renderer trace)";
+
+/* What draws the model that is open. */
+static gbt_status choose_renderer(studio *st, const gbt_render_def *def, gbt_error *err)
+{
+    frame_renderer *renderer = &st->run.frame.draw.renderer;
+    st->in_double = def->renderer != NULL && strcmp(def->renderer, "reference") == 0;
+    if (st->in_double)
+        *renderer = FRAME_TRACE;
+    else if (def->renderer != NULL && !frame_renderer_named(def->renderer, renderer))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster, per-ray or reference)", def->renderer);
+    if (def->insert != NULL && *renderer != FRAME_TRACE)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
+    if (st->outputs != 0 && *renderer != FRAME_TRACE)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--outputs: these are traced (wanted --renderer trace)");
+    return GBT_OK;
+}
+
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)
 {
-    if (strcmp(def->renderer, "trace") != 0 && strcmp(def->renderer, "reference") != 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace or reference)", def->renderer);
     if (strcmp(def->format, "png") != 0 && strcmp(def->format, "exr") != 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "--format: \"%.40s\" (wanted png or exr)", def->format);
     if (!(def->downscale == 0 || (def->downscale >= 1 && def->downscale <= 64)))
         return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: %g (wanted 1 to 64)", def->downscale);
     if (def->camera != NULL && def->downscale != 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: not with --camera (the camera file says the size)");
-    if (def->insert != NULL && strcmp(def->renderer, "trace") != 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: %s has no meshes (wanted trace with --insert)", def->renderer);
+    if (def->insert != NULL && def->renderer != NULL && strcmp(def->renderer, "trace") != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
     GBT_TRY(file_make_folder(out, err));
     studio *st = mem_calloc(1, sizeof *st, "run", err);
     if (st == NULL)
@@ -128,6 +145,8 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
         status = def->camera != NULL ? loaded_run_open_model(run, &st->run, err) : loaded_run_open(run, def->data, def->downscale, &st->run, err);
     if (status == GBT_OK)
         status = loaded_run_preset(def->preset, &st->run.settings, err);
+    if (status == GBT_OK)
+        status = choose_renderer(st, def, err);
     if (status == GBT_OK && def->insert != NULL)
         status = insert_file_read(def->insert, st->run.model.origin, &st->insert, err);
     if (status == GBT_OK)

@@ -9,15 +9,15 @@
 enum { LEFT = 58, RIGHT = 738, TOP = 84, BOTTOM = 450, BOXES_MAX = 256 };
 
 const char scatter_css[] =
-    ".scatter{--k0:#1b1c1e;--k1:#0b62c4;--k2:#d9480f;--k3:#2b8a3e;--k4:#7b3fc4;--k5:#b0246e;--page:#fff;--text:#1b1c1e;--dim:#62666d;--rule:#e8e8e5}\n"
-    "@media(prefers-color-scheme:dark){.scatter{--k0:#f2f2f0;--k1:#6cb0ff;--k2:#ff9a5c;--k3:#6fd08c;--k4:#c19bff;--k5:#ff8cc2;--page:#1c1e22;--text:#e8e8e6;"
+    ".scatter{--k0:#1b1c1e;--k1:#0b62c4;--k2:#d9480f;--k3:#2b8a3e;--k4:#7b3fc4;--k5:#b0246e;--k6:#0a7f8c;--page:#fff;--text:#1b1c1e;--dim:#62666d;--rule:#e8e8e5}\n"
+    "@media(prefers-color-scheme:dark){.scatter{--k0:#f2f2f0;--k1:#6cb0ff;--k2:#ff9a5c;--k3:#6fd08c;--k4:#c19bff;--k5:#ff8cc2;--k6:#5fd3e0;--page:#1c1e22;--text:#e8e8e6;"
     "--dim:#9ba0a8;--rule:#2e3136}}\n"
     ".scatter .paper{fill:var(--page)}\n"
     ".scatter text{font:12px system-ui,-apple-system,\"Segoe UI\",Roboto,Arial,sans-serif;fill:var(--dim)}\n"
     ".scatter .title{font-size:15px;font-weight:600;fill:var(--text)}\n"
     ".scatter .tick-y{text-anchor:end}.scatter .tick-x{text-anchor:middle}\n"
     ".scatter .rule{stroke:var(--rule);stroke-width:1}.scatter .axis{stroke:var(--dim);stroke-width:1}\n"
-    ".scatter .s0{--k:var(--k0)}.scatter .s1{--k:var(--k1)}.scatter .s2{--k:var(--k2)}.scatter .s3{--k:var(--k3)}.scatter .s4{--k:var(--k4)}.scatter .s5{--k:var(--k5)}\n"
+    ".scatter .s0{--k:var(--k0)}.scatter .s1{--k:var(--k1)}.scatter .s2{--k:var(--k2)}.scatter .s3{--k:var(--k3)}.scatter .s4{--k:var(--k4)}.scatter .s5{--k:var(--k5)}.scatter .s6{--k:var(--k6)}\n"
     ".scatter .join{fill:none;stroke:var(--k);stroke-width:1.5;opacity:.45}\n"
     ".scatter .mark{fill:var(--k);stroke:var(--page);stroke-width:1.5}\n"
     ".scatter .label,.scatter .level-label{font-size:11px;paint-order:stroke;stroke:var(--page);stroke-width:3px;stroke-linejoin:round}\n"
@@ -156,6 +156,8 @@ static void draw_joins(text *out, const scatter_chart *c, const plane *p)
 {
     for (int s = 1; s < SCATTER_SERIES_MAX; s++) {
         bool open = false;
+        if (c->apart >> s & 1)
+            continue;
         text_format(out, "<path class=\"join s%d\" d=\"", s);
         for (size_t i = 0; i < c->point_count; i++)
             if (c->points[i].series == s && can_show(&c->points[i])) {

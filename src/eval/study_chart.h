@@ -7,7 +7,7 @@
 
 #include "eval/report_text.h"
 
-enum { SCATTER_WIDTH = 760, SCATTER_HEIGHT = 506, SCATTER_SERIES_MAX = 6 };
+enum { SCATTER_WIDTH = 760, SCATTER_HEIGHT = 506, SCATTER_SERIES_MAX = 7 };
 
 /* One measured setting. Series 0 are the named ones: large marks in the colour of the text. */
 typedef struct scatter_point {
@@ -24,7 +24,8 @@ typedef struct scatter_level {
 
 typedef struct scatter_chart {
     const char *title, *note, *x_unit, *y_unit; /* escaped here */
-    const char *series[SCATTER_SERIES_MAX];     /* names for the legend; NULL: not used. Points of a series are joined in their order */
+    const char *series[SCATTER_SERIES_MAX];     /* names for the legend; NULL: not used */
+    unsigned apart;                             /* bit per series whose points stand alone; those of the others are joined in their order */
     const scatter_point *points;
     size_t point_count;
     const scatter_level *levels;

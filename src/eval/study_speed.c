@@ -12,6 +12,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "eval/bench_scene.h"
+#include "eval/study_model.h"
 #include "gbtrace/bench.h"
 #include "trace/reference.h"
 
@@ -33,12 +34,13 @@ static const speed_step steps[] = {
     {KNOB_STOP, "0.001", 1e-3f, 0},     {KNOB_STOP, "0.01", 0.01f, 0},       {KNOB_STOP, "0.03", 0.03f, 0},       {KNOB_RADIUS, "inf", 0, 0},
     {KNOB_RADIUS, "3", 3, 0},           {KNOB_RADIUS, "2.5", 2.5f, 0},       {KNOB_RADIUS, "2", 2, 0},            {KNOB_KERNEL, "embree", 0, TRACE_EMBREE},
     {KNOB_KERNEL, "single", 0, TRACE_SINGLE}, {KNOB_KERNEL, "tile", 0, TRACE_TILE}, {KNOB_ISA, "plain", 0, CPU_PLAIN}, {KNOB_ISA, "avx2", 0, CPU_AVX2},
-    {KNOB_ISA, "avx512", 0, CPU_AVX512},
+    {KNOB_ISA, "avx512", 0, CPU_AVX512}, {KNOB_RENDERER, "rays", 0, -1},      {KNOB_RENDERER, "splats, per-ray order", 0, RASTER_PER_RAY},
+    {KNOB_RENDERER, "EWA splats", 0, RASTER_EWA},
 };
 
 const char *speed_knob_name(speed_knob knob)
 {
-    static const char *const names[KNOB_COUNT] = {"preset", "alpha_min", "T_min", "proxy radius", "kernel", "instruction set"};
+    static const char *const names[KNOB_COUNT] = {"preset", "alpha_min", "T_min", "proxy radius", "kernel", "instruction set", "renderer"};
     return names[knob];
 }
 
@@ -59,6 +61,7 @@ static void list_rows(const trace_settings *own, speed_model *out)
         case KNOB_RADIUS: row->settings.proxy_radius = row->is_default ? row->settings.proxy_radius : s->number; break;
         case KNOB_KERNEL: row->kernel = (trace_kernel)s->choice, row->is_default = row->kernel == TRACE_TILE; break;
         case KNOB_ISA: row->isa = (cpu_isa)s->choice, row->is_default = row->isa == best; break;
+        case KNOB_RENDERER: row->is_default = s->choice < 0, row->splats = s->choice >= 0, row->form = row->splats ? (raster_form)s->choice : RASTER_EWA; break;
         case KNOB_PRESET:
         case KNOB_COUNT: break;
         }
@@ -213,6 +216,8 @@ static gbt_status measure_ideas(const bench_scene *s, const trace_settings *sett
 static void keep_figures(const bench_scene *s, const bench_way *way, const bench_reference *want, speed_row *row)
 {
     const double rays = (double)ray_image_count(&s->rays);
+    row->photo_psnr = NAN;
+    row->picture_us = way->figures.build_us + way->figures.forward_us;
     row->forward_us = way->figures.forward_us, row->both_us = row->forward_us + way->figures.adjoint_us;
     row->blended = (double)way->figures.counters.blended / rays, row->pairs = (double)way->figures.counters.pairs / (rays / PACKET_LANES);
     row->error = bench_reference_compare(want, &way->rgb);
@@ -221,6 +226,8 @@ static void keep_figures(const bench_scene *s, const bench_way *way, const bench
 /* The default once, however many knobs go through it. */
 static gbt_status measure_rows(const bench_scene *s, const bench_reference *want, int repeats, speed_model *out, gbt_error *err)
 {
+    const gaussians *thin = s->run != NULL ? &s->run->frame.gaussians : s->gaussians;
+    const bench_splat splats[] = {[RASTER_EWA] = {&s->camera.shot.camera, thin, RASTER_EWA}, [RASTER_PER_RAY] = {&s->camera.shot.camera, s->gaussians, RASTER_PER_RAY}};
     bench_way *ways = mem_calloc(out->row_count, sizeof *ways, "ways", err);
     if (ways == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -229,7 +236,7 @@ static gbt_status measure_rows(const bench_scene *s, const bench_reference *want
         const speed_row *row = &out->rows[i];
         place[i] = row->is_default ? 1 : count++; /* the second row is the preset "default" */
         if (!row->is_default)
-            ways[place[i]] = (bench_way){.kernel = row->kernel, .isa = row->isa, .settings = row->settings};
+            ways[place[i]] = (bench_way){.kernel = row->kernel, .isa = row->isa, .settings = row->settings, .splat = row->splats ? &splats[row->form] : NULL};
     }
     const gbt_status status = bench_measure(ways, count, s->gaussians, &s->rays, repeats, err);
     for (size_t i = 0; i < out->row_count && status == GBT_OK; i++)
@@ -254,7 +261,8 @@ static gbt_status measure_scene(bench_scene *s, bench_reference *want, const cha
     out->check_rays = ray_image_count(&want->rays);
     GBT_TRY(measure_ideas(s, &out->rows[0].settings, want, out, err));
     log_info("%s: timing %zu settings", out->name, out->row_count);
-    return measure_rows(s, want, repeats, out, err);
+    GBT_TRY(measure_rows(s, want, repeats, out, err));
+    return speed_measure_photos(s, out, err);
 }
 
 static gbt_status measure_path(const char *path, const char *camera, int repeats, speed_model *out, gbt_error *err)
@@ -274,36 +282,13 @@ gbt_study_def gbt_study_def_default(void)
     return (gbt_study_def){.repeats = 3};
 }
 
-/* "a/b/scene.ply" and "a/b/run1/" have names "b/scene.ply" and "b/run1": short, and different for models of one layout. */
-static void name_model(const char *path, char *out, size_t size)
-{
-    size_t length = strlen(path);
-    while (length > 1 && path[length - 1] == '/')
-        length--;
-    size_t start = length;
-    for (int parts = 0; start > 0; start--)
-        if (path[start - 1] == '/' && ++parts == 2)
-            break;
-    snprintf(out, size, "%.*s", (int)(length - start), path + start);
-}
-
-/* The camera of a .ply: what the caller says, else camera.json beside it. */
-static gbt_status find_camera(const char *path, const char *given, char *out, size_t size, gbt_error *err)
-{
-    const char *slash = strrchr(path, '/');
-    if (given == NULL && slash == NULL)
-        given = "camera.json";
-    const int length = given != NULL ? snprintf(out, size, "%s", given) : snprintf(out, size, "%.*s/camera.json", (int)(slash - path), path);
-    return length < (int)size ? GBT_OK : base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
-}
-
 static gbt_status measure_model(const gbt_study_def *def, size_t i, speed_model *out, gbt_error *err)
 {
     char camera[4096];
     const bool is_ply = bench_scene_is_ply(def->models[i]);
-    name_model(def->models[i], out->name, sizeof out->name);
+    study_model_name(def->models[i], out->name, sizeof out->name);
     if (is_ply)
-        GBT_TRY(find_camera(def->models[i], def->camera, camera, sizeof camera, err));
+        GBT_TRY(study_model_camera(def->models[i], def->camera, camera, sizeof camera, err));
     return measure_path(def->models[i], is_ply ? camera : NULL, def->repeats, out, err);
 }
 

@@ -6,9 +6,11 @@
 #include "eval/bench_reference.h"
 #include "eval/report_text.h"
 
-enum { SPEED_WAYS_MAX = 24, SPEED_ERRORS = 3, SPEED_MODELS_MAX = 16 };
+struct bench_scene;
 
-typedef enum speed_knob { KNOB_PRESET, KNOB_ALPHA, KNOB_STOP, KNOB_RADIUS, KNOB_KERNEL, KNOB_ISA, KNOB_COUNT } speed_knob;
+enum { SPEED_WAYS_MAX = 28, SPEED_ERRORS = 3, SPEED_MODELS_MAX = 16 };
+
+typedef enum speed_knob { KNOB_PRESET, KNOB_ALPHA, KNOB_STOP, KNOB_RADIUS, KNOB_KERNEL, KNOB_ISA, KNOB_RENDERER, KNOB_COUNT } speed_knob;
 
 /** A setting that was measured. */
 typedef struct speed_row {
@@ -18,7 +20,11 @@ typedef struct speed_row {
     trace_settings settings;
     trace_kernel kernel;
     cpu_isa isa;
-    double forward_us, both_us; /* core-microseconds per ray: forward; forward and adjoint */
+    bool splats;            /* in place of rays, in this form */
+    raster_form form;
+    double picture_us;      /* core-microseconds per pixel: tree and forward */
+    double forward_us, both_us; /* forward; forward and adjoint */
+    double photo_psnr;      /* mean over the held-out photos of a run; NaN without them */
     double blended, pairs;      /* per ray; pairs of rows per packet */
     bench_error error;          /* to the picture without cut-offs */
 } speed_row;
@@ -34,6 +40,7 @@ typedef struct speed_model {
     size_t gaussians, rays, check_rays;
     speed_row rows[SPEED_WAYS_MAX];
     size_t row_count;
+    size_t photo_count; /* held-out photos; 0 for a .ply */
     speed_idea ideas[SPEED_ERRORS];
 } speed_model;
 
@@ -44,6 +51,9 @@ typedef struct speed_study {
 } speed_study;
 
 const char *speed_knob_name(speed_knob knob);
+
+/** PSNR of every row to the held-out photos of `s`, which is decoded anew; row->photo_psnr and photo_count. Nothing for a .ply. */
+gbt_status speed_measure_photos(struct bench_scene *s, speed_model *out, gbt_error *err);
 
 /** speed.csv, .json, .md, .svg and .html into `folder`. */
 gbt_status speed_write(const speed_study *study, const char *folder, gbt_error *err);

@@ -13,8 +13,9 @@
 
 enum { PANEL_GAP = 18 };
 
-static const char x_unit[] = "core-microseconds per ray, forward (log)";
+static const char x_unit[] = "core-microseconds per pixel: tree and picture (log)";
 static const char y_unit[] = "PSNR to the picture without cut-offs, dB";
+static const char y_photo_unit[] = "PSNR to the held-out photos, mean, dB";
 
 /* ---- tables -------------------------------------------------------------------------------------------------------------------------------- */
 
@@ -31,17 +32,21 @@ void speed_table(const speed_study *study, text *out)
         const speed_model *model = &study->models[m];
         text_format(out, "%s**%s**: %zu Gaussians, %zu rays, %zu of them checked; %d threads, medians of %d\n\n", m > 0 ? "\n" : "", model->name, model->gaussians,
                     model->rays, model->check_rays, study->threads, study->repeats);
-        text_add(out, "| knob | value | forward, core-us/ray | with adjoint | blended per ray | pairs per packet | PSNR, dB | max error |\n|---|---|---|---|---|---|---|---|\n");
+        text_add(out, "| knob | value | tree and forward, core-us/ray | forward | with adjoint | blended per ray | pairs per packet | PSNR, dB | max error | to photos, dB |\n"
+                      "|---|---|---|---|---|---|---|---|---|---|\n");
         for (size_t i = 0; i < model->row_count; i++) {
             const speed_row *row = &model->rows[i];
-            text_format(out, "| %s | %s | %.3f | %.3f | %.1f | %.0f | ", speed_knob_name(row->knob), row->value, row->forward_us, row->both_us, row->blended, row->pairs);
+            text_format(out, "| %s | %s | %.3f | %.3f | %.3f | %.1f | %.0f | ", speed_knob_name(row->knob), row->value, row->picture_us, row->forward_us, row->both_us,
+                        row->blended, row->pairs);
             add_error(out, &row->error, " | ");
+            text_add(out, " | ");
+            text_number(out, row->photo_psnr, 2);
             text_add(out, " |\n");
         }
         for (size_t i = 0; i < SPEED_ERRORS; i++) {
-            text_format(out, "| not built | %s | error only | %s | | | ", model->ideas[i].name, model->ideas[i].reason);
+            text_format(out, "| not built | %s | error only | %s | | | | ", model->ideas[i].name, model->ideas[i].reason);
             add_error(out, &model->ideas[i].error, " | ");
-            text_add(out, " |\n");
+            text_add(out, " | |\n");
         }
     }
 }
@@ -56,20 +61,20 @@ static void add_csv_text(text *out, const char *value)
 
 static void add_csv(const speed_study *study, text *out)
 {
-    text_add(out, "model,knob,value,kernel,isa,alpha_min,t_min,proxy_radius,forward_core_us_per_ray,forward_adjoint_core_us_per_ray,blended_per_ray,"
-                  "row_pairs_per_packet,psnr,max_error\n");
+    text_add(out, "model,knob,value,kernel,isa,alpha_min,t_min,proxy_radius,tree_forward_core_us_per_ray,forward_core_us_per_ray,forward_adjoint_core_us_per_ray,blended_per_ray,"
+                  "row_pairs_per_packet,psnr,max_error,photo_psnr\n");
     for (size_t m = 0; m < study->model_count; m++) {
         const speed_model *model = &study->models[m];
         for (size_t i = 0; i < model->row_count; i++) {
             const speed_row *r = &model->rows[i];
             add_csv_text(out, model->name);
-            text_format(out, ",%s,%s,%s,%s,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", speed_knob_name(r->knob), r->value, bench_kernel_name(r->kernel),
-                        cpu_isa_name(r->isa), (double)r->settings.alpha_min, (double)r->settings.transmittance_min, (double)r->settings.proxy_radius, r->forward_us,
-                        r->both_us, r->blended, r->pairs, r->error.psnr, r->error.max);
+            text_format(out, ",%s,\"%s\",%s,%s,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", speed_knob_name(r->knob), r->value, r->splats ? "" : bench_kernel_name(r->kernel),
+                        cpu_isa_name(r->isa), (double)r->settings.alpha_min, (double)r->settings.transmittance_min, (double)r->settings.proxy_radius, r->picture_us,
+                        r->forward_us, r->both_us, r->blended, r->pairs, r->error.psnr, r->error.max, r->photo_psnr);
         }
         for (size_t i = 0; i < SPEED_ERRORS; i++) {
             add_csv_text(out, model->name);
-            text_format(out, ",not built,%s,,,,,,,,,,%.6g,%.6g\n", model->ideas[i].name, model->ideas[i].error.psnr, model->ideas[i].error.max);
+            text_format(out, ",not built,%s,,,,,,,,,,,%.6g,%.6g,\n", model->ideas[i].name, model->ideas[i].error.psnr, model->ideas[i].error.max);
         }
     }
 }
@@ -80,12 +85,13 @@ static json_t *model_to_json(const speed_model *model)
     const double promised = 0.5 / 255, kept = model->rows[0].error.max; /* of the preset "exact", which comes first */
     for (size_t i = 0; i < model->row_count; i++) {
         const speed_row *r = &model->rows[i];
-        json_array_append_new(rows, json_pack("{s:s,s:s,s:s,s:s,s:f,s:f,s:o,s:f,s:f,s:f,s:f,s:f,s:f}", "knob", speed_knob_name(r->knob), "value", r->value, "kernel",
-                                              bench_kernel_name(r->kernel), "isa", cpu_isa_name(r->isa), "alpha_min", (double)r->settings.alpha_min, "transmittance_min",
+        json_array_append_new(rows, json_pack("{s:s,s:s,s:s,s:s,s:f,s:f,s:o,s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:o}", "knob", speed_knob_name(r->knob), "value", r->value, "kernel",
+                                              r->splats ? "" : bench_kernel_name(r->kernel), "isa", cpu_isa_name(r->isa), "alpha_min", (double)r->settings.alpha_min, "transmittance_min",
                                               (double)r->settings.transmittance_min, "proxy_radius",
                                               isfinite(r->settings.proxy_radius) ? json_real((double)r->settings.proxy_radius) : json_null(),
-                                              "forward_core_us_per_ray", r->forward_us, "forward_adjoint_core_us_per_ray", r->both_us, "blended_per_ray", r->blended,
-                                              "row_pairs_per_packet", r->pairs, "psnr", r->error.psnr, "max_error", r->error.max));
+                                              "tree_forward_core_us_per_ray", r->picture_us, "forward_core_us_per_ray", r->forward_us, "forward_adjoint_core_us_per_ray", r->both_us, "blended_per_ray", r->blended,
+                                              "row_pairs_per_packet", r->pairs, "psnr", r->error.psnr, "max_error", r->error.max, "photo_psnr",
+                                              isfinite(r->photo_psnr) ? json_real(r->photo_psnr) : json_null()));
     }
     for (size_t i = 0; i < SPEED_ERRORS; i++)
         json_array_append_new(ideas, json_pack("{s:s,s:s,s:f,s:f}", "name", model->ideas[i].name, "reason", model->ideas[i].reason, "psnr", model->ideas[i].error.psnr,
@@ -108,20 +114,30 @@ static gbt_status write_json(const speed_study *study, const char *path, gbt_err
 
 /* ---- chart --------------------------------------------------------------------------------------------------------------------------------- */
 
-static void draw_panel(const speed_study *study, size_t m, int top, text *out)
+/* Panels of a model: to the picture without cut-offs; of a run also to the photos. */
+static size_t panel_count(const speed_model *model)
+{
+    return model->photo_count > 0 ? 2 : 1;
+}
+
+static void draw_panel(const speed_study *study, size_t m, bool photos, int top, text *out)
 {
     const speed_model *model = &study->models[m];
     scatter_point points[SPEED_WAYS_MAX];
     scatter_level levels[SPEED_ERRORS];
     char note[160];
-    snprintf(note, sizeof note, "%zu Gaussians, %zu rays, %d threads, %s", model->gaussians, model->rays, study->threads, cpu_isa_name(cpu_best_isa()));
-    scatter_chart chart = {.title = model->name, .note = note, .x_unit = x_unit, .y_unit = y_unit, .points = points, .point_count = model->row_count,
-                           .levels = levels, .level_count = SPEED_ERRORS};
+    if (photos)
+        snprintf(note, sizeof note, "%zu held-out photos", model->photo_count);
+    else
+        snprintf(note, sizeof note, "%zu Gaussians, %zu rays, %d threads, %s", model->gaussians, model->rays, study->threads, cpu_isa_name(cpu_best_isa()));
+    scatter_chart chart = {.title = model->name, .note = note, .x_unit = x_unit, .y_unit = photos ? y_photo_unit : y_unit, .points = points,
+                           .point_count = model->row_count, .levels = levels, .level_count = photos ? 0 : SPEED_ERRORS,
+                           .apart = 1u << KNOB_KERNEL | 1u << KNOB_ISA | 1u << KNOB_RENDERER};
     for (int k = 0; k < KNOB_COUNT; k++)
         chart.series[k] = speed_knob_name((speed_knob)k);
     for (size_t i = 0; i < model->row_count; i++) {
         const speed_row *r = &model->rows[i];
-        points[i] = (scatter_point){(int)r->knob, r->forward_us, r->error.psnr, r->is_default ? "" : r->value};
+        points[i] = (scatter_point){(int)r->knob, r->picture_us, photos ? r->photo_psnr : r->error.psnr, r->is_default ? "" : r->value};
     }
     for (size_t i = 0; i < SPEED_ERRORS; i++)
         levels[i] = (scatter_level){model->ideas[i].error.psnr, model->ideas[i].name};
@@ -130,7 +146,10 @@ static void draw_panel(const speed_study *study, size_t m, int top, text *out)
 
 static void add_svg(const speed_study *study, size_t first, size_t count, bool alone, text *out)
 {
-    const int height = (int)count * (SCATTER_HEIGHT + PANEL_GAP) - PANEL_GAP;
+    size_t panels = 0;
+    for (size_t i = 0; i < count; i++)
+        panels += panel_count(&study->models[first + i]);
+    const int height = (int)panels * (SCATTER_HEIGHT + PANEL_GAP) - PANEL_GAP;
     text_format(out, "<svg %sclass=\"scatter\" viewBox=\"0 0 %d %d\"%s role=\"img\" aria-label=\"speed against accuracy\">",
                 alone ? "xmlns=\"http://www.w3.org/2000/svg\" " : "", SCATTER_WIDTH, height, alone ? " width=\"760\"" : "");
     if (alone) {
@@ -139,25 +158,29 @@ static void add_svg(const speed_study *study, size_t first, size_t count, bool a
         text_add(out, "</style>");
         text_format(out, "<rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH, height);
     }
+    int top = 0;
     for (size_t i = 0; i < count; i++)
-        draw_panel(study, first + i, (int)i * (SCATTER_HEIGHT + PANEL_GAP), out);
+        for (size_t panel = 0; panel < panel_count(&study->models[first + i]); panel++, top += SCATTER_HEIGHT + PANEL_GAP)
+            draw_panel(study, first + i, panel == 1, top, out);
     text_add(out, "</svg>\n");
 }
 
 static void add_page_table(const speed_model *model, text *out)
 {
     text_add(out, "<details class=\"card\"><summary>The figures</summary><div class=\"scroll\"><table class=\"list\"><thead><tr><th>knob</th><th>value</th>"
-                  "<th>forward, core-\xc2\xb5s/ray</th><th>with adjoint</th><th>blended per ray</th><th>PSNR, dB</th><th>max error</th></tr></thead><tbody>");
+                  "<th>tree and forward, core-\xc2\xb5s/ray</th><th>forward</th><th>with adjoint</th><th>blended per ray</th><th>PSNR, dB</th><th>max error</th><th>to photos, dB</th></tr></thead><tbody>");
     for (size_t i = 0; i < model->row_count; i++) {
         const speed_row *r = &model->rows[i];
-        text_format(out, "<tr><th>%s</th><td>%s</td><td>%.3f</td><td>%.3f</td><td>%.1f</td><td>", speed_knob_name(r->knob), r->value, r->forward_us, r->both_us, r->blended);
+        text_format(out, "<tr><th>%s</th><td>%s</td><td>%.3f</td><td>%.3f</td><td>%.3f</td><td>%.1f</td><td>", speed_knob_name(r->knob), r->value, r->picture_us, r->forward_us, r->both_us, r->blended);
         add_error(out, &r->error, "</td><td>");
+        text_add(out, "</td><td>");
+        text_number(out, r->photo_psnr, 2);
         text_add(out, "</td></tr>");
     }
     for (size_t i = 0; i < SPEED_ERRORS; i++) {
-        text_format(out, "<tr><th>not built: %s</th><td></td><td colspan=\"3\">error only: %s</td><td>", model->ideas[i].name, model->ideas[i].reason);
+        text_format(out, "<tr><th>not built: %s</th><td></td><td colspan=\"4\">error only: %s</td><td>", model->ideas[i].name, model->ideas[i].reason);
         add_error(out, &model->ideas[i].error, "</td><td>");
-        text_add(out, "</td></tr>");
+        text_add(out, "</td><td></td></tr>");
     }
     text_add(out, "</tbody></table></div></details>\n");
 }

@@ -17,6 +17,7 @@ typedef struct ssim_job {
     double *rows;         /* per block: WINDOW_MOMENTS padded rows, one row of the map */
     double *sums;         /* one per row */
     size_t count, padded; /* values in a row, doubles in a padded row */
+    size_t skip;          /* values left out at both ends of a row of the map */
 } ssim_job;
 
 static void ssim_rows(size_t block, size_t begin, size_t end, void *context)
@@ -34,13 +35,15 @@ static void ssim_rows(size_t block, size_t begin, size_t end, void *context)
         window_rows(job->y->pixels, job->count, (size_t)job->x->height, row, job->zeros, y);
         job->kernels->moments(x, y, job->count, moments);
         job->kernels->map((const double *const *)moments, job->count, step, map);
-        job->sums[row] = window_sum(map, job->count);
+        job->sums[row] = window_sum(map + job->skip, job->count - 2 * job->skip);
     }
 }
 
-double metric_ssim(const image *a, const image *b)
+/* Mean over the pixels that are at least `border` from all four sides. */
+static double mean_ssim(const image *a, const image *b, size_t border)
 {
-    if (a->width != b->width || a->height != b->height || a->channels != b->channels)
+    if (a->width != b->width || a->height != b->height || a->channels != b->channels || 2 * border >= (size_t)a->width ||
+        2 * border >= (size_t)a->height)
         return (double)NAN;
     const size_t count = (size_t)a->width * (size_t)a->channels, height = (size_t)a->height;
     const size_t padded = count + 2 * WINDOW_RADIUS * (size_t)a->channels;
@@ -49,11 +52,21 @@ double metric_ssim(const image *a, const image *b)
     double *rows = mem_alloc(row_doubles + height, sizeof *rows, "SSIM rows", NULL);
     float *zeros = mem_calloc(count, sizeof *zeros, "SSIM rows", NULL);
     if (rows != NULL && zeros != NULL) {
-        ssim_job job = {window_kernels_best(), a, b, zeros, rows, rows + row_doubles, count, padded};
+        ssim_job job = {window_kernels_best(), a, b, zeros, rows, rows + row_doubles, count, padded, border * (size_t)a->channels};
         parallel_blocks(height, ROWS_PER_BLOCK, ssim_rows, &job);
-        ssim = window_sum(job.sums, height) / ((double)count * (double)height);
+        ssim = window_sum(job.sums + border, height - 2 * border) / ((double)(count - 2 * job.skip) * (double)(height - 2 * border));
     }
     mem_free(rows);
     mem_free(zeros);
     return ssim;
+}
+
+double metric_ssim(const image *a, const image *b)
+{
+    return mean_ssim(a, b, 0);
+}
+
+double metric_ssim_interior(const image *a, const image *b)
+{
+    return mean_ssim(a, b, WINDOW_RADIUS);
 }

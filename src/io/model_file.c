@@ -20,6 +20,8 @@ void model_add(container_writer *w, const model *m)
     container_add(w, "anchor.feature", CONTAINER_F32, 2, (size_t[]){a->count, ANCHOR_FEATURE_DIM}, a->feature);
     container_add(w, "anchor.offset", CONTAINER_F32, 3, (size_t[]){a->count, k, 3}, a->offset);
     container_add(w, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){a->count, 6}, a->scale_log);
+    if (m->anchor_pixel != NULL)
+        container_add(w, "anchor.pixel", CONTAINER_F32, 1, (size_t[]){a->count}, m->anchor_pixel);
     container_add(w, "decoder.params", CONTAINER_F32, 1, (size_t[]){d->param_count}, d->params);
     container_add_small(w, "decoder.has_distance", CONTAINER_U8, 1, &(uint8_t){d->has_distance ? 1 : 0});
     container_add_small(w, "decoder.numbers", CONTAINER_F32, DECODER_NUMBERS, (float[DECODER_NUMBERS]){d->distance_scale, d->distance_min, d->distance_max});
@@ -60,12 +62,16 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
         {"anchor.feature", a->feature, a->count * ANCHOR_FEATURE_DIM},
         {"anchor.offset", a->offset, a->count * (size_t)a->offset_count * 3},
         {"anchor.scale_log", a->scale_log, a->count * 6},
+        {"anchor.pixel", m->anchor_pixel, m->anchor_pixel != NULL ? a->count : 0},
         {"decoder.params", d->params, d->param_count},
         {"scene.numbers", &m->voxel_size, 1}, {"scene.numbers", &m->extent, 1}, {"scene.numbers", &m->t_near, 1}, {"scene.numbers", m->background, 3},
         {"decoder.numbers", &d->distance_scale, 1},
     };
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         GBT_TRY(check_finite(path, arrays[i].section, arrays[i].values, arrays[i].count, failure, err));
+    for (size_t i = 0; m->anchor_pixel != NULL && i < a->count; i++)
+        if (m->anchor_pixel[i] < 0)
+            return base_fail(err, failure, "%s: section anchor.pixel: value %zu is negative", path, i);
     if (isnan(d->distance_min) || isnan(d->distance_max)) /* infinite: not limited */
         return base_fail(err, failure, "%s: section decoder.numbers: the trained range of distances is not a number", path);
     if (m->voxel_size < 0 || m->extent < 0 || m->t_near < 0)
@@ -113,6 +119,21 @@ static gbt_status read_anchors(const container *c, anchors *a, gbt_error *err)
     return GBT_OK;
 }
 
+/* Models that were not trained with a footprint do not have it. */
+static gbt_status read_anchor_pixel(const container *c, size_t count, float **out, gbt_error *err)
+{
+    const void *pixel;
+    if (container_section_named(c, "anchor.pixel") == NULL)
+        return GBT_OK;
+    GBT_TRY(container_find(c, "anchor.pixel", CONTAINER_F32, 1, &count, &pixel, err));
+    *out = mem_alloc(count, sizeof **out, "pixel sizes", err);
+    if (*out == NULL)
+        return GBT_ERR_NO_MEMORY;
+    if (count > 0)
+        memcpy(*out, pixel, count * sizeof **out);
+    return GBT_OK;
+}
+
 static gbt_status read_decoder(const container *c, int offset_count, decoder *d, gbt_error *err)
 {
     uint8_t has_distance;
@@ -152,6 +173,8 @@ gbt_status model_from_container(const container *c, model *out, gbt_error *err)
     memset(out, 0, sizeof *out);
     gbt_status status = read_anchors(c, &out->anchors, err);
     if (status == GBT_OK)
+        status = read_anchor_pixel(c, out->anchors.count, &out->anchor_pixel, err);
+    if (status == GBT_OK)
         status = read_decoder(c, out->anchors.offset_count, &out->decoder, err);
     if (status == GBT_OK)
         status = read_scene(c, out, err);
@@ -175,6 +198,7 @@ gbt_status model_load(const char *path, model *out, gbt_error *err)
 void model_free(model *m)
 {
     anchors_free(&m->anchors);
+    mem_free(m->anchor_pixel);
     decoder_free(&m->decoder);
     memset(m, 0, sizeof *m);
 }

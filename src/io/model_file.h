@@ -12,6 +12,7 @@ enum { MODEL_FOLDER_SIZE = 1024, MODEL_CONFIG_SIZE = 4096 };
 
 typedef struct model {
     anchors anchors;
+    float *anchor_pixel;   /* optional (NULL), [anchors.count]: smallest pixel with which training saw an anchor, scene units, >= 0; 0: none did */
     decoder decoder;       /* decoder.offset_count equals anchors.offset_count */
     double origin[3];      /* world = local + origin */
     float voxel_size;      /* v, scene units, >= 0 */

@@ -27,6 +27,7 @@ typedef struct raster_settings {
     float near;              /* EWA: centres at this depth z or nearer are not drawn, default 0.2; per ray: the tracer's t_near */
     float dilation;          /* EWA: variance added to the projection, px^2. Default 0.3 */
     bool exact_cut;          /* EWA: draw to where alpha falls to alpha_min, not to 3 std-devs. Default false */
+    bool order_by_center;    /* per ray: blend in the order of the centres' depths, as EWA does. Default false */
     float background[3];     /* default 0 */
 } raster_settings;
 
@@ -50,14 +51,19 @@ typedef struct raster_scene {
  * @param rgb           [out] 3 channels, size of the camera, allocated by the caller; with the background
  * @param transmittance [out] optional (NULL), [height * width]
  * @param counters      [in,out] optional, added to
- * @return GBT_OK, GBT_ERR_ARGUMENT (a camera with another lens, size of rgb), GBT_ERR_NO_MEMORY
- * Threads: uses all; same bits for every thread count and instruction set.
+ * @return GBT_OK, GBT_ERR_ARGUMENT (a camera with another lens, settings out of range, size of rgb), GBT_ERR_NO_MEMORY (2^32 pairs of
+ *         Gaussian and tile, 2^24 Gaussians in one tile, too)
+ * Threads: uses all; same bits for every thread count and instruction set. Formulas, and what differs from other rasterizers:
+ * docs/crosscheck.md. Memory: about 92 bytes per Gaussian (per ray: 172), 12 per pair; for the adjoint 38 (54) more per pair and 8 per pixel.
  */
 gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera, const raster_settings *settings, bool keep_tape,
                           image *rgb, float *transmittance, raster_counters *counters, gbt_error *err);
 
 /**
- * Adjoint of the last raster_forward(keep_tape).
+ * Adjoint of the last raster_forward(keep_tape); the tape is kept, so it may be called again.
+ *
+ * The gradient is that of the formulas: exactly 0 where alpha is cut at alpha_max, and where x / z is kept at its limit in the Jacobian. Per
+ * ray the depth of the response is a constant of the derivative (envelope theorem, trace/reference.h).
  *
  * @param d_rgb        [in]  dL/d(rgb)
  * @param d_gaussians  [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion tangent)

@@ -260,7 +260,31 @@ gbt_status read_samples(const char *path, opened_image *o, OIIO::TypeDesc type, 
     return GBT_OK;
 }
 
-gbt_status read_pixels(const char *path, opened_image *o, image *out, gbt_error *err)
+/* Values that are not finite become 0; `valid`, if wanted, says in which pixels. */
+gbt_status drop_not_finite(const char *path, image *out, unsigned char **valid, gbt_error *err)
+{
+    const size_t pixels = size_t(out->width) * size_t(out->height), channels = size_t(out->channels);
+    size_t bad = 0;
+    for (size_t i = 0; i < pixels * channels; i++) {
+        if (std::isfinite(out->pixels[i]))
+            continue;
+        if (valid != nullptr && *valid == nullptr) {
+            *valid = static_cast<unsigned char *>(mem_alloc(pixels, 1, "valid pixels", err));
+            if (*valid == nullptr)
+                return GBT_ERR_NO_MEMORY;
+            std::memset(*valid, 1, pixels);
+        }
+        if (valid != nullptr)
+            (*valid)[i / channels] = 0;
+        out->pixels[i] = 0;
+        bad++;
+    }
+    if (bad > 0)
+        log_warn("%s: %zu values that are not finite %s", path, bad, valid != nullptr ? "count in no loss" : "were read as 0");
+    return GBT_OK;
+}
+
+gbt_status read_pixels(const char *path, opened_image *o, image *out, unsigned char **valid, gbt_error *err)
 {
     const OIIO::ImageSpec &spec = o->input->spec();
     gbt_status status = image_alloc(out, spec.width, spec.height, o->channels(), err);
@@ -277,17 +301,8 @@ gbt_status read_pixels(const char *path, opened_image *o, image *out, gbt_error 
     }
     default: break;
     }
-    size_t bad = 0;
-    const auto keep_finite = [&bad](float v) {
-        if (std::isfinite(v))
-            return v;
-        bad++;
-        return 0.0f;
-    };
-    status = read_samples<float>(path, o, OIIO::TypeFloat, out, keep_finite, err);
-    if (status == GBT_OK && bad > 0)
-        log_warn("%s: %zu values that are not finite were read as 0", path, bad);
-    return status;
+    status = read_samples<float>(path, o, OIIO::TypeFloat, out, [](float v) { return v; }, err);
+    return status == GBT_OK ? drop_not_finite(path, out, valid, err) : status;
 }
 
 gbt_status read_raw(const char *path, opened_image *o, image *out, image_names *names, gbt_error *err)
@@ -428,7 +443,18 @@ try {
 
 extern "C" gbt_status image_read(const char *path, image *out, gbt_error *err)
 {
-    return read_file(path, out, err, [=](opened_image *o) { return read_pixels(path, o, out, err); });
+    return read_file(path, out, err, [=](opened_image *o) { return read_pixels(path, o, out, nullptr, err); });
+}
+
+extern "C" gbt_status image_read_valid(const char *path, image *out, unsigned char **valid, gbt_error *err)
+{
+    *valid = nullptr;
+    const gbt_status status = read_file(path, out, err, [=](opened_image *o) { return read_pixels(path, o, out, valid, err); });
+    if (status != GBT_OK) {
+        mem_free(*valid);
+        *valid = nullptr;
+    }
+    return status;
 }
 
 extern "C" gbt_status image_read_raw(const char *path, image *out, image_names *names, gbt_error *err)

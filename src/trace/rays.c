@@ -333,10 +333,20 @@ static gbt_status copy_given(const ray_image *given, ray_image *out, gbt_error *
     return GBT_OK;
 }
 
-static gbt_status make_rays(const ray_shot *shot, int sample, ray_image *out, gbt_error *err)
+/* A rolling shutter between two equal poses is none: all rays start at one point, which is quicker to trace. */
+static bool stands_still(const ray_shot *shot)
 {
+    return memcmp(shot->camera.rotation, shot->end.rotation, sizeof shot->end.rotation) == 0 &&
+           memcmp(shot->camera.center, shot->end.center, sizeof shot->end.center) == 0;
+}
+
+static gbt_status make_rays(const ray_shot *given, int sample, ray_image *out, gbt_error *err)
+{
+    ray_shot still = *given;
+    still.shutter = RAY_SHUTTER_GLOBAL;
+    const ray_shot *shot = stands_still(given) ? &still : given;
     ray_job job = {.shot = shot, .sample = (uint64_t)sample};
-    GBT_TRY(check_shot(shot, &job.lens, err));
+    GBT_TRY(check_shot(given, &job.lens, err));
     if (sample < 0 || sample >= ray_shot_sample_count(shot))
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: sample %d of %d", sample, ray_shot_sample_count(shot));
     job.cell = find_cell(sample, ray_shot_sample_count(shot));

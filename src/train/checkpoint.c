@@ -61,7 +61,16 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     container_add_text(&w, "config", config);
     container_add_small(&w, "counters", CONTAINER_U64, sizeof counters / sizeof *counters, counters);
     container_add(&w, "pace", CONTAINER_U64, 1, (const size_t[]){PACE_SEGMENTS}, t->pace.steps);
+    container_add_small(&w, "in_row", CONTAINER_U64, 3, (const uint64_t[]){t->skipped_in_row, t->barren_in_row, t->revivals});
     container_add_small(&w, "seconds", CONTAINER_F64, 1, &t->seconds);
+    const exposures *e = &t->exposures;
+    const size_t exposure_dims[2] = {e->count, AFFINE_NUMBERS};
+    if (e->count > 0) {
+        add_field(&w, "exposure", "matrix", 2, exposure_dims, e->matrix);
+        add_field(&w, "exposure", "moment1", 2, exposure_dims, e->moment1);
+        add_field(&w, "exposure", "moment2", 2, exposure_dims, e->moment2);
+        container_add(&w, "exposure.visits", CONTAINER_U64, 1, &e->count, e->visits);
+    }
     add_anchors(&w, "anchors", &t->anchors);
     add_anchors(&w, "moment1", &t->moment1);
     add_anchors(&w, "moment2", &t->moment2);
@@ -94,6 +103,14 @@ gbt_status checkpoint_config(const char *path, char *out, size_t size, gbt_error
     return status;
 }
 
+static gbt_status read_exposures(const container *c, exposures *e, gbt_error *err)
+{
+    const struct { const char *field; float *out; } fields[] = {{"matrix", e->matrix}, {"moment1", e->moment1}, {"moment2", e->moment2}};
+    for (int i = 0; i < 3; i++)
+        GBT_TRY(copy_field(c, "exposure", fields[i].field, e->count, AFFINE_NUMBERS, 2, (const size_t[]){AFFINE_NUMBERS, 0}, fields[i].out, err));
+    return container_get(c, "exposure.visits", CONTAINER_U64, e->count, e->visits, err);
+}
+
 static gbt_status read_state(trainer *t, const container *c, const char *path, gbt_error *err)
 {
     uint64_t counters[8];
@@ -121,8 +138,14 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     memcpy(t->stats.grad_accum, data, rows * k * sizeof(float));
     GBT_TRY(container_find(c, "stats.grad_count", CONTAINER_F32, 2, (size_t[]){rows, k}, &data, err));
     memcpy(t->stats.grad_count, data, rows * k * sizeof(float));
+    if (t->exposures.count > 0)
+        GBT_TRY(read_exposures(c, &t->exposures, err));
     GBT_TRY(container_get(c, "pace", CONTAINER_U64, PACE_SEGMENTS, t->pace.steps, err));
     GBT_TRY(container_get(c, "seconds", CONTAINER_F64, 1, &t->seconds, err));
+    uint64_t in_row[3] = {0, 0, 0};
+    if (container_section_named(c, "in_row") != NULL) /* older checkpoints have none */
+        GBT_TRY(container_get(c, "in_row", CONTAINER_U64, 3, in_row, err));
+    t->skipped_in_row = in_row[0], t->barren_in_row = in_row[1], t->revivals = in_row[2];
     t->step = counters[0], t->adjust_step = counters[1], t->anchor_t = counters[2], t->skipped_steps = counters[3];
     t->pace.known = (int)counters[4];
     t->anchors_initial = counters[7];

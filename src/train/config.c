@@ -12,11 +12,11 @@ void config_text(const gbt_train_def *d, const char *data, char *out, size_t siz
 {
     snprintf(out, size,
              "data = %s\ninit = %s\nscale-prior = %s\nmax-depth = %d\nvoxel-size = %.9g\noffsets = %d\ndistance = %s\niterations = %llu\n"
-             "budget-seconds = %.17g\npace = %s\ndownscale = %.17g\nstart-level = %d\neval-split = %s\nseed = %llu\nmax-anchors = %zu\n"
-             "grow = %d\ncompat = %d\n",
+             "budget-seconds = %.17g\npace = %s\ndownscale = %.17g\nrenderer = %s\nfootprint = %.17g\nstart-level = %d\neval-split = %s\nseed = %llu\nmax-anchors = %zu\n"
+             "grow = %d\ncompat = %d\nexposure = %d\nlearning-rate = %.17g\n",
              data, d->init, d->scale_prior, d->max_depth, (double)d->voxel_size, d->offsets, d->distance, (unsigned long long)d->iterations,
-             d->budget_seconds, d->pace != NULL ? d->pace : "", d->downscale, d->start_level, d->eval_split, (unsigned long long)d->seed,
-             d->max_anchors, d->grow, d->compat);
+             d->budget_seconds, d->pace != NULL ? d->pace : "", d->downscale, d->renderer, d->footprint, d->start_level, d->eval_split, (unsigned long long)d->seed,
+             d->max_anchors, d->grow, d->compat, d->exposure, d->learning_rate_factor);
 }
 
 static void set_string(char *to, size_t size, const char *value, const char **field)
@@ -45,6 +45,8 @@ static bool set_key(const char *key, const char *value, gbt_train_def *d, config
         return set_string(s->scale_prior, sizeof s->scale_prior, value, &d->scale_prior), true;
     if (strcmp(key, "distance") == 0)
         return set_string(s->distance, sizeof s->distance, value, &d->distance), true;
+    if (strcmp(key, "renderer") == 0)
+        return set_string(s->renderer, sizeof s->renderer, value, &d->renderer), true;
     if (strcmp(key, "eval-split") == 0)
         return set_string(s->eval_split, sizeof s->eval_split, value, &d->eval_split), true;
     if (strcmp(key, "pace") == 0) {
@@ -67,6 +69,8 @@ static bool set_key(const char *key, const char *value, gbt_train_def *d, config
         return d->budget_seconds = number, true;
     if (strcmp(key, "downscale") == 0)
         return d->downscale = number, true;
+    if (strcmp(key, "footprint") == 0)
+        return d->footprint = number, true;
     if (strcmp(key, "start-level") == 0)
         return d->start_level = to_int(number), true;
     if (strcmp(key, "seed") == 0)
@@ -77,6 +81,10 @@ static bool set_key(const char *key, const char *value, gbt_train_def *d, config
         return d->grow = number != 0, true;
     if (strcmp(key, "compat") == 0)
         return d->compat = number != 0, true;
+    if (strcmp(key, "exposure") == 0)
+        return d->exposure = number != 0, true;
+    if (strcmp(key, "learning-rate") == 0)
+        return d->learning_rate_factor = number, true;
     return false;
 }
 

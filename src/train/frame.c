@@ -4,302 +4,25 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/camera_lens.h"
-#include "base/camera_pose.h"
 #include "base/clock.h"
 #include "base/fail.h"
 #include "base/memory.h"
-#include "base/parallel.h"
-#include "base/vec.h"
+#include "train/visible.h"
 
-enum { ANCHOR_BLOCK = 4096 };
+bool frame_renderer_named(const char *name, frame_renderer *out)
+{
+    static const char *const names[] = {[FRAME_TRACE] = "trace", [FRAME_SPLAT] = "raster", [FRAME_SPLAT_PER_RAY] = "per-ray"};
+    for (int i = 0; i < (int)(sizeof names / sizeof *names); i++)
+        if (strcmp(name, names[i]) == 0)
+            return *out = (frame_renderer)i, true;
+    return false;
+}
 
 static double lap(double *since)
 {
     const double now = clock_wall(), passed = now - *since;
     *since = now;
     return passed;
-}
-
-/* ---- visible anchors ------------------------------------------------------------------------------------------------------------------ */
-
-enum { PLANE_COUNT = 5, ROW_GRAIN = 16 };
-
-/* All rays start in a ball around `center` and point into a cone around `axis`. When they all look forward, all that they reach is on
-   the inner side of planes too: where n.d <= 0 for every direction, n.x is nowhere larger than at the rays' own origins. */
-typedef struct view_bounds {
-    float center[3], origin_radius;
-    float axis[3], cos_angle, sin_angle;
-    int plane_count;
-    float plane[PLANE_COUNT][3]; /* unit normals pointing out: visible ball -> n.(x - center) <= offset + radius */
-    float offset[PLANE_COUNT];
-} view_bounds;
-
-/* What is asked of the rays: `axes` turns world to the axes in which slopes are taken. */
-typedef struct bounds_job {
-    const ray_image *rays;
-    double axes[9], center[3], axis[3];
-    double normal[PLANE_COUNT][3];
-    struct block_bounds *blocks;
-} bounds_job;
-
-typedef struct block_bounds {
-    double cos_min, depth_min, low[2], high[2], origin_square, offset[PLANE_COUNT];
-} block_bounds;
-
-static bool ray_at(const ray_image *rays, size_t i, const double center[3], double start[3], double dir[3])
-{
-    const float *o = ray_image_origin(rays, i), *d = rays->dir + 3 * i;
-    for (int k = 0; k < 3; k++)
-        start[k] = (double)o[k] - center[k], dir[k] = (double)d[k];
-    return d[0] != 0 || d[1] != 0 || d[2] != 0;
-}
-
-/* The smaller or larger of two, and the second when the first is not a number; fmin() would be a call for every ray. */
-static inline double least(double a, double b)
-{
-    return a < b ? a : b;
-}
-
-static inline double most(double a, double b)
-{
-    return a > b ? a : b;
-}
-
-static void bound_directions(size_t block, size_t begin, size_t end, void *context)
-{
-    const bounds_job *job = context;
-    const size_t width = (size_t)job->rays->width;
-    block_bounds out = job->blocks[block];
-    for (size_t i = begin * width; i < end * width; i++) {
-        double start[3], dir[3], turned[3];
-        if (!ray_at(job->rays, i, job->center, start, dir))
-            continue;
-        dmat_apply(job->axes, dir, turned);
-        out.cos_min = least(dvec_dot(dir, job->axis), out.cos_min);
-        out.depth_min = least(turned[2], out.depth_min);
-        out.origin_square = most(dvec_dot(start, start), out.origin_square);
-        if (turned[2] > 0.05) {
-            const double x = turned[0] / turned[2], y = turned[1] / turned[2];
-            out.low[0] = least(x, out.low[0]), out.high[0] = most(x, out.high[0]);
-            out.low[1] = least(y, out.low[1]), out.high[1] = most(y, out.high[1]);
-        }
-    }
-    job->blocks[block] = out;
-}
-
-static void bound_offsets(size_t block, size_t begin, size_t end, void *context)
-{
-    const bounds_job *job = context;
-    const size_t width = (size_t)job->rays->width;
-    for (size_t i = begin * width; i < end * width; i++) {
-        double start[3], dir[3];
-        if (ray_at(job->rays, i, job->center, start, dir))
-            for (int p = 0; p < PLANE_COUNT; p++)
-                job->blocks[block].offset[p] = most(dvec_dot(job->normal[p], start), job->blocks[block].offset[p]);
-    }
-}
-
-static block_bounds no_bounds(void)
-{
-    block_bounds b = {.cos_min = 1, .depth_min = 1, .low = {1e9, 1e9}, .high = {-1e9, -1e9}};
-    for (int p = 0; p < PLANE_COUNT; p++)
-        b.offset[p] = -HUGE_VAL;
-    return b;
-}
-
-static block_bounds join(const block_bounds *blocks, size_t count)
-{
-    block_bounds all = no_bounds();
-    for (size_t i = 0; i < count; i++) {
-        const block_bounds *b = &blocks[i];
-        all.cos_min = fmin(all.cos_min, b->cos_min), all.depth_min = fmin(all.depth_min, b->depth_min);
-        all.origin_square = fmax(all.origin_square, b->origin_square);
-        for (int k = 0; k < 2; k++)
-            all.low[k] = fmin(all.low[k], b->low[k]), all.high[k] = fmax(all.high[k], b->high[k]);
-        for (int p = 0; p < PLANE_COUNT; p++)
-            all.offset[p] = fmax(all.offset[p], b->offset[p]);
-    }
-    return all;
-}
-
-/* The mean direction of every 7th ray; 0 without rays. */
-static void find_axis(const ray_image *rays, double axis[3])
-{
-    axis[0] = axis[1] = axis[2] = 0;
-    const size_t count = ray_image_count(rays);
-    for (size_t i = 0; i < count; i += 7)
-        for (int k = 0; k < 3; k++)
-            axis[k] += (double)rays->dir[3 * i + (size_t)k];
-    dvec_normalize(axis);
-}
-
-/* Axes in which to take slopes: the camera's, or for given rays some with z along their mean direction. */
-static void find_axes(const ray_shot *shot, const double axis[3], double axes[9])
-{
-    gbt_camera look = shot->camera;
-    const double here[3] = {0, 0, 0}, up[3] = {fabs(axis[0]) < 0.6, fabs(axis[0]) >= 0.6, 0};
-    if (shot->given != NULL)
-        camera_look_at(here, axis, up, &look); /* fails for a zero axis: then no ray looks forward in any axes */
-    memcpy(axes, look.rotation, sizeof look.rotation);
-}
-
-/* The mean of the ray origins, rounded to float. */
-static void find_center(const ray_image *rays, float center[3])
-{
-    const double none[3] = {0, 0, 0};
-    double sum[3] = {0, 0, 0}, start[3], dir[3];
-    size_t used = 0;
-    if (rays->common_origin) {
-        memcpy(center, rays->origin, 3 * sizeof *center);
-        return;
-    }
-    for (size_t i = 0; i < ray_image_count(rays); i++) {
-        if (!ray_at(rays, i, none, start, dir))
-            continue;
-        used++;
-        for (int k = 0; k < 3; k++)
-            sum[k] += start[k];
-    }
-    for (int k = 0; k < 3; k++)
-        center[k] = used > 0 ? (float)(sum[k] / (double)used) : 0;
-}
-
-/* Unit normals in world axes: right, left, bottom, top of the slopes, and what is behind. */
-static void find_normals(bounds_job *job, const block_bounds *all, double spread)
-{
-    for (int k = 0; k < 2; k++)
-        for (int sign = 0; sign < 2; sign++) {
-            const double slope = sign == 0 ? (all->high[k] + spread) * (1 + 1e-3) + 1e-3 : (all->low[k] - spread) * (1 + 1e-3) - 1e-3;
-            double n[3] = {0, 0, 0};
-            n[k] = sign == 0 ? 1 : -1;
-            n[2] = sign == 0 ? -slope : slope;
-            dvec_normalize(n);
-            dmat_apply_transposed(job->axes, n, job->normal[2 * k + sign]);
-        }
-    for (int k = 0; k < 3; k++)
-        job->normal[4][k] = -job->axis[k];
-}
-
-/* Is the image of a slope under another point of the aperture known? With a plane in focus every ray of a pixel is divided by the same
-   depth, in the axes of the pose that took it. */
-static bool slopes_are_known(const ray_shot *shot, double aperture)
-{
-    camera_lens lens;
-    return aperture <= 0 || (shot->shutter == RAY_SHUTTER_GLOBAL && camera_lens_prepare(&shot->camera, &lens) && camera_lens_looks_forward(&lens));
-}
-
-/* `rays` are those through the middle of the aperture. Another point of it shifts an origin by at most its radius R, and with the focus
-   at F a slope by at most R / F and a direction by at most asin(R / F). */
-static gbt_status find_bounds(const ray_shot *shot, const ray_image *rays, view_bounds *out, gbt_error *err)
-{
-    bounds_job job = {.rays = rays};
-    const double aperture = shot->given == NULL ? shot->aperture_radius : 0, spread = aperture > 0 ? aperture / shot->focus_distance : 0;
-    const size_t rows = (size_t)rays->height, count = parallel_block_count(rows, ROW_GRAIN);
-    find_axis(rays, job.axis);
-    find_axes(shot, job.axis, job.axes);
-    find_center(rays, out->center);
-    for (int k = 0; k < 3; k++)
-        job.center[k] = (double)out->center[k], out->axis[k] = (float)job.axis[k];
-    job.blocks = mem_alloc(count, sizeof *job.blocks, "view bounds", err);
-    if (job.blocks == NULL)
-        return GBT_ERR_NO_MEMORY;
-    for (size_t i = 0; i < count; i++)
-        job.blocks[i] = no_bounds();
-    parallel_blocks(rows, ROW_GRAIN, bound_directions, &job);
-    block_bounds all = join(job.blocks, count);
-    const double widest = fmin(1, fmax(-1, all.cos_min)), sine = sqrt(1 - widest * widest);
-    const double cos_spread = sqrt(fmax(0, 1 - spread * spread));
-    const bool all_around = spread >= 1 || sine * cos_spread + widest * spread < 0; /* angles beyond 180 degrees */
-    const double cos_wide = all_around ? -1 : widest * cos_spread - sine * spread, cos_min = fmax(cos_wide - 2e-3, -1);
-    out->cos_angle = (float)cos_min;
-    out->sin_angle = (float)sqrt(fmax(0, 1 - cos_min * cos_min));
-    out->plane_count = all.depth_min > 0.05 && slopes_are_known(shot, aperture) ? cos_wide > 0 ? 5 : 4 : 0;
-    find_normals(&job, &all, spread);
-    if (!rays->common_origin) {
-        parallel_blocks(rows, ROW_GRAIN, bound_offsets, &job);
-        all = join(job.blocks, count);
-    }
-    mem_free(job.blocks);
-    /* Origins were rounded to float. */
-    const double rounding = 1e-6 * (dvec_length(job.center) + sqrt(all.origin_square) + aperture);
-    const bool one_origin = rays->common_origin && aperture <= 0;
-    out->origin_radius = one_origin ? 0 : (float)(sqrt(all.origin_square) + aperture + rounding);
-    for (int p = 0; p < PLANE_COUNT; p++) {
-        const double farthest = rays->common_origin ? 0 : fmax(all.offset[p], -1e18);
-        out->offset[p] = one_origin ? 0 : (float)(farthest + aperture + rounding);
-        for (int k = 0; k < 3; k++)
-            out->plane[p][k] = (float)job.normal[p][k];
-    }
-    return GBT_OK;
-}
-
-/* Radius of a ball around the anchor that holds the proxies of all its Gaussians: `sigmas` std-devs around each. */
-static float anchor_reach(const anchors *a, size_t i, float sigmas)
-{
-    const float *l = a->scale_log + 6 * i;
-    const float ex = expf(fminf(l[0], 30.0f)), ey = expf(fminf(l[1], 30.0f)), ez = expf(fminf(l[2], 30.0f));
-    const float *o = a->offset + 3 * (size_t)a->offset_count * i;
-    float far_square = 0;
-    for (int k = 0; k < a->offset_count; k++, o += 3) {
-        const float x = o[0] * ex, y = o[1] * ey, z = o[2] * ez;
-        far_square = fmaxf(far_square, x * x + y * y + z * z);
-    }
-    return sqrtf(far_square) + sigmas * expf(fminf(fmaxf(l[3], fmaxf(l[4], l[5])), 30.0f));
-}
-
-static bool is_visible(const view_bounds *b, const float position[3], float reach)
-{
-    const float d[3] = {position[0] - b->center[0], position[1] - b->center[1], position[2] - b->center[2]};
-    for (int i = 0; i < b->plane_count; i++)
-        if (!(b->plane[i][0] * d[0] + b->plane[i][1] * d[1] + b->plane[i][2] * d[2] <= b->offset[i] + reach))
-            return false; /* and an anchor that is not a number */
-    if (b->plane_count > 0)
-        return true;
-    /* A ray from elsewhere reaches the ball only if one from the centre reaches a ball that is larger by its distance. */
-    reach += b->origin_radius;
-    const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    if (square <= reach * reach)
-        return true;
-    /* Cone of half angle A, ball seen under half angle B: they meet when the angle between axis and centre is at most A + B. */
-    const float length = sqrtf(square), along = (b->axis[0] * d[0] + b->axis[1] * d[1] + b->axis[2] * d[2]) / length;
-    const float sin_ball = reach / length, cos_ball = sqrtf(1 - sin_ball * sin_ball);
-    const float cos_sum = b->cos_angle * cos_ball - b->sin_angle * sin_ball;
-    return b->sin_angle * cos_ball + b->cos_angle * sin_ball < 0 || along >= cos_sum; /* A + B beyond 180 degrees sees everything */
-}
-
-typedef struct visible_job {
-    const anchors *a;
-    const view_bounds *bounds;
-    float sigmas;
-    uint32_t *out;       /* [count]; block b writes from its own begin */
-    uint32_t *out_count; /* per block */
-} visible_job;
-
-static void visible_block(size_t block, size_t begin, size_t end, void *context)
-{
-    const visible_job *job = context;
-    uint32_t kept = 0;
-    for (size_t i = begin; i < end; i++)
-        if (is_visible(job->bounds, job->a->position + 3 * i, anchor_reach(job->a, i, job->sigmas)))
-            job->out[begin + kept++] = (uint32_t)i;
-    job->out_count[block] = kept;
-}
-
-static gbt_status find_visible(frame *f, const anchors *a, const view_bounds *bounds, float alpha_min, gbt_error *err)
-{
-    const size_t blocks = parallel_block_count(a->count, ANCHOR_BLOCK);
-    GBT_TRY(mem_reserve((void **)&f->visible, &f->visible_capacity, 0, a->count + blocks + 1, sizeof *f->visible, "visible anchors", err));
-    /* An opaque Gaussian falls to alpha_min at sqrt(2 ln(1 / alpha_min)) std-devs. */
-    const float sigmas = 1.001f * sqrtf(2 * logf(1 / alpha_min));
-    visible_job job = {a, bounds, sigmas, f->visible, f->visible + a->count};
-    parallel_blocks(a->count, ANCHOR_BLOCK, visible_block, &job);
-    f->visible_count = 0;
-    for (size_t b = 0; b < blocks; b++) {
-        memmove(f->visible + f->visible_count, f->visible + b * ANCHOR_BLOCK, job.out_count[b] * sizeof *f->visible);
-        f->visible_count += job.out_count[b];
-    }
-    return GBT_OK;
 }
 
 /* ---- render and back --------------------------------------------------------------------------------------------------------------------- */
@@ -310,6 +33,19 @@ static gbt_status fit_picture(image *rgb, int width, int height, gbt_error *err)
         return GBT_OK;
     image_free(rgb);
     return image_alloc(rgb, width, height, 3, err);
+}
+
+/* f->gaussians as wide as the view's pixels make them. */
+static gbt_status widen(frame *f, const anchors *a, gbt_error *err)
+{
+    const float *pixel_min = NULL;
+    if (f->draw.anchor_pixel != NULL) {
+        GBT_TRY(mem_reserve((void **)&f->pixel_min, &f->pixel_min_capacity, 0, f->gaussians.count + 1, sizeof *f->pixel_min, "pixel sizes", err));
+        for (size_t i = 0; i < f->gaussians.count; i++)
+            f->pixel_min[i] = f->draw.anchor_pixel[f->visible[f->tape.slot[i] / (uint32_t)a->offset_count]];
+        pixel_min = f->pixel_min;
+    }
+    return footprint_forward(&f->view, f->draw.footprint, pixel_min, &f->gaussians, &f->wide, err);
 }
 
 /* Everything up to the tree, and f->rays through the middle of the aperture. `guest` is optional. */
@@ -324,21 +60,46 @@ static gbt_status prepare(frame *f, const anchors *a, const decoder *d, const ra
     GBT_TRY(ray_image_from_shot(&middle, 0, &f->rays, err));
     f->times.rays = lap(&clock);
     view_bounds bounds;
-    GBT_TRY(find_bounds(shot, &f->rays, &bounds, err));
+    GBT_TRY(view_bounds_find(shot, &f->rays, &bounds, err));
     memcpy(f->eye, bounds.center, sizeof f->eye);
     if (guest != NULL)
-        bounds = (view_bounds){.origin_radius = INFINITY, .cos_angle = -1}; /* no planes, and every ball holds an origin */
-    GBT_TRY(find_visible(f, a, &bounds, settings->alpha_min, err));
+        bounds = view_bounds_none();
+    f->view = footprint_view_of(&shot->camera);
+    const bool splats = f->draw.renderer == FRAME_SPLAT;
+    f->widened = f->draw.footprint > 0 && shot->given == NULL && !splats; /* nobody says how wide given rays are; splats are dilated instead */
+    const visible_reach extent = {.sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)), /* where an opaque Gaussian falls to alpha_min */
+                                  .width = splats ? sqrtf(raster_settings_default().dilation) : f->widened ? sqrtf(f->draw.footprint) : 0,
+                                  .pixel = (float)f->view.pixel,
+                                  .parallel = f->view.kind == FOOTPRINT_PARALLEL,
+                                  .pixel_min = f->draw.anchor_pixel};
+    GBT_TRY(visible_find(a, &bounds, &extent, &f->visible, &f->visible_count, &f->visible_capacity, err));
     f->times.visible = lap(&clock);
     /* A Gaussian below alpha_min is never blended and so has no gradient: it need not be made. */
     GBT_TRY(decode_forward(a, d, f->eye, f->visible, f->visible_count, settings->alpha_min, &f->gaussians, &f->tape, err));
+    if (f->widened)
+        GBT_TRY(widen(f, a, err));
     f->times.decode = lap(&clock);
+    f->times.build = 0;
+    memset(&f->counters, 0, sizeof f->counters);
+    GBT_TRY(fit_picture(&f->rgb, f->rays.width, f->rays.height, err));
+    if (f->draw.renderer != FRAME_TRACE)
+        return GBT_OK;
     const float aperture = shot->given == NULL ? (float)shot->aperture_radius : 0;
     const float reach = fmaxf(ray_image_reach(&f->rays) + aperture, guest != NULL ? guest->reach : 0);
-    GBT_TRY(trace_build(&f->scene, &f->gaussians, settings, reach, err));
+    GBT_TRY(trace_build(&f->scene, frame_drawn(f), settings, reach, err));
     f->times.build = lap(&clock);
-    memset(&f->counters, 0, sizeof f->counters);
-    return fit_picture(&f->rgb, f->rays.width, f->rays.height, err);
+    return GBT_OK;
+}
+
+/* Near and far cuts, and all else, as the tracer's settings say. */
+static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape, gbt_error *err)
+{
+    raster_settings s = raster_settings_default();
+    s.form = f->draw.renderer == FRAME_SPLAT ? RASTER_EWA : RASTER_PER_RAY;
+    s.alpha_min = settings->alpha_min, s.alpha_max = settings->alpha_max, s.transmittance_min = settings->transmittance_min;
+    s.near = settings->t_near;
+    memcpy(s.background, settings->background, sizeof s.background);
+    return raster_forward(&f->splats, frame_drawn(f), &f->camera, &s, keep_tape, &f->rgb, NULL, NULL, err);
 }
 
 gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
@@ -347,7 +108,10 @@ gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_
     const ray_shot shot = ray_shot_of(camera);
     GBT_TRY(prepare(f, a, d, &shot, settings, NULL, err));
     double clock = clock_wall();
-    GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
+    if (f->draw.renderer == FRAME_TRACE)
+        GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
+    else
+        GBT_TRY(splat(f, settings, keep_tape, err));
     f->times.trace = lap(&clock);
     return GBT_OK;
 }
@@ -379,6 +143,11 @@ gbt_status frame_render_guest(frame *f, const anchors *a, const decoder *d, cons
                               const frame_guest *guest, gbt_error *err)
 {
     GBT_TRY(ray_shot_check(shot, err));
+    if (f->draw.renderer != FRAME_TRACE) {
+        if (guest != NULL || shot->given != NULL || shot->aperture_radius > 0 || shot->shutter != RAY_SHUTTER_GLOBAL)
+            return base_fail(err, GBT_ERR_ARGUMENT, "the rasterizer draws what a pinhole camera sees that stands still, and no more; trace this picture");
+        return frame_render(f, a, d, &shot->camera, settings, false, err);
+    }
     GBT_TRY(prepare(f, a, d, shot, settings, guest, err));
     f->times.trace = 0;
     double *sum = mem_calloc(ray_image_count(&f->rays), 3 * sizeof *sum, "picture", err);
@@ -390,6 +159,16 @@ gbt_status frame_render_guest(frame *f, const anchors *a, const decoder *d, cons
 gbt_status frame_render_shot(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, gbt_error *err)
 {
     return frame_render_guest(f, a, d, shot, settings, NULL, err);
+}
+
+void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_COUNT])
+{
+    footprint_gaussian g; /* the first fields, in their order */
+    if (!f->widened)
+        return;
+    memcpy(&g, field, sizeof g);
+    footprint_widen(&f->view, (double)f->draw.footprint, f->draw.anchor_pixel != NULL ? (double)f->pixel_min[i] : 0, &g);
+    memcpy(field, &g, sizeof g);
 }
 
 double frame_volume(const frame *f)
@@ -405,7 +184,12 @@ gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const im
                           float *d_params, gbt_error *err)
 {
     double clock = clock_wall();
-    GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, NULL, NULL, err));
+    if (f->draw.renderer == FRAME_TRACE)
+        GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, NULL, NULL, err));
+    else
+        GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, NULL, err));
+    if (f->widened)
+        footprint_backward(&f->view, f->draw.footprint, f->draw.anchor_pixel != NULL ? f->pixel_min : NULL, &f->gaussians, &f->d_gaussians);
     f->times.adjoint = lap(&clock);
     gaussians *g = &f->gaussians, *dg = &f->d_gaussians;
     const float share = g->count > 0 ? volume_weight / (float)g->count : 0;
@@ -423,10 +207,13 @@ void frame_free(frame *f)
 {
     ray_image_free(&f->rays);
     mem_free(f->visible);
+    mem_free(f->pixel_min);
     gaussians_free(&f->gaussians);
+    gaussians_free(&f->wide);
     gaussians_free(&f->d_gaussians);
     decode_tape_free(&f->tape);
     trace_scene_free(&f->scene);
+    raster_scene_free(&f->splats);
     image_free(&f->rgb);
     memset(f, 0, sizeof *f);
 }

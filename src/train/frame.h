@@ -3,6 +3,8 @@
 #define GBT_TRAIN_FRAME_H
 
 #include "anchor/decode.h"
+#include "raster/raster.h"
+#include "trace/footprint.h"
 #include "trace/trace.h"
 
 /** Wall seconds by stage of the last passes. */
@@ -10,14 +12,37 @@ typedef struct frame_times {
     double rays, visible, decode, build, trace, adjoint, decode_adjoint;
 } frame_times;
 
+typedef enum frame_renderer {
+    FRAME_TRACE,
+    FRAME_SPLAT,        /* raster/raster.h: EWA splats in the order of their centres; pinhole cameras only */
+    FRAME_SPLAT_PER_RAY /* the same tiles, with the response and the order of each ray */
+} frame_renderer;
+
+/** The renderer called "trace", "raster" or "per-ray"; false for another name. */
+bool frame_renderer_named(const char *name, frame_renderer *out);
+
+/** How Gaussians become a picture. Set in the frame before rendering; {0}: traced, thin rays. */
+typedef struct frame_drawing {
+    frame_renderer renderer;
+    float footprint;           /* variance of a pixel, px^2 (trace/footprint.h); 0: rays are thin */
+    const float *anchor_pixel; /* optional (NULL), [anchors]: the smallest pixel an anchor was made for; borrowed */
+} frame_drawing;
+
 /** Everything one view needs, reused from view to view. Start from {0}; free with frame_free(). */
 typedef struct frame {
     ray_image rays;
     uint32_t *visible; /* [visible_count] anchor indices, ascending */
     size_t visible_count, visible_capacity;
-    gaussians gaussians, d_gaussians;
+    frame_drawing draw;
+    gaussians gaussians, d_gaussians; /* as decoded */
+    gaussians wide;                   /* with the view's footprint; frame_drawn() says which were traced */
+    bool widened;
+    footprint_view view;
+    float *pixel_min; /* [gaussians] */
+    size_t pixel_min_capacity;
     decode_tape tape;
     trace_scene scene;
+    raster_scene splats;
     image rgb; /* the render */
     kernel_counters counters;
     frame_times times;
@@ -70,6 +95,15 @@ gbt_status frame_render_guest(frame *f, const anchors *a, const decoder *d, cons
  */
 gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image, float volume_weight, anchors *d_anchors,
                           float *d_params, gbt_error *err);
+
+/** The Gaussians that were traced. */
+static inline const gaussians *frame_drawn(const frame *f)
+{
+    return f->widened ? &f->wide : &f->gaussians;
+}
+
+/** What widening did to Gaussian `i` of the last render, in double: for checks. `field`: in the order of GAUSSIANS_FIELDS. */
+void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_COUNT]);
 
 /** Mean volume term of the last render's Gaussians: mean(scale_x scale_y scale_z), 0 without Gaussians. */
 double frame_volume(const frame *f);

@@ -13,7 +13,9 @@ gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_err
     *p = (photos){.source = source, .downscale = downscale};
     p->full = mem_calloc(source->view_count, sizeof *p->full, "photo cache", err);
     p->pixels = mem_calloc(source->view_count, sizeof *p->pixels, "photo cache", err);
-    return p->full == NULL || p->pixels == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    p->full_valid = mem_calloc(source->view_count, sizeof *p->full_valid, "photo cache", err);
+    p->valid = mem_calloc(source->view_count, sizeof *p->valid, "photo cache", err);
+    return p->full == NULL || p->pixels == NULL || p->full_valid == NULL || p->valid == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
 }
 
 static void drop_all(unsigned char **pixels, size_t count)
@@ -26,10 +28,11 @@ static void drop_all(unsigned char **pixels, size_t count)
 
 void photos_close(photos *p)
 {
-    drop_all(p->full, p->source->view_count);
-    drop_all(p->pixels, p->source->view_count);
-    mem_free(p->full);
-    mem_free(p->pixels);
+    unsigned char **const caches[] = {p->full, p->pixels, p->full_valid, p->valid};
+    for (int i = 0; i < 4; i++) {
+        drop_all(caches[i], p->source->view_count);
+        mem_free(caches[i]);
+    }
     memset(p, 0, sizeof *p);
 }
 
@@ -39,14 +42,6 @@ gbt_camera photos_camera(const photos *p, size_t view, int level)
     const double divide = p->downscale * exp2(level);
     const int width = (int)fmax(1, floor(stated->width / divide + 0.5)), height = (int)fmax(1, floor(stated->height / divide + 0.5));
     return gbt_camera_resized(stated, width, height);
-}
-
-static gbt_status fit_image(image *out, int width, int height, gbt_error *err)
-{
-    if (out->width == width && out->height == height && out->channels == 3)
-        return GBT_OK;
-    image_free(out);
-    return image_alloc(out, width, height, 3, err);
 }
 
 static gbt_status to_bytes(const image *im, unsigned char **out, gbt_error *err)
@@ -72,20 +67,39 @@ static gbt_status get_full(photos *p, size_t view, image *out, gbt_error *err)
     const gbt_camera camera = photos_camera(p, view, 0);
     if (p->full[view] == NULL) {
         image photo;
-        GBT_TRY(scene_read_photo(&p->source->views[view], camera.width, camera.height, &photo, err));
+        GBT_TRY(scene_read_photo_valid(&p->source->views[view], camera.width, camera.height, &photo, &p->full_valid[view], err));
         const gbt_status status = to_bytes(&photo, &p->full[view], err);
         image_free(&photo);
-        GBT_TRY(status);
+        if (status != GBT_OK) {
+            mem_free(p->full_valid[view]);
+            p->full_valid[view] = NULL;
+            return status;
+        }
     }
-    GBT_TRY(fit_image(out, camera.width, camera.height, err));
+    GBT_TRY(image_fit(out, camera.width, camera.height, 3, err));
     from_bytes(p->full[view], out);
     return GBT_OK;
+}
+
+/* The marks of a photo at p->level, if it has any. Made before its pixels, which say that both are there. */
+static gbt_status resize_valid(photos *p, size_t view, const gbt_camera *camera, gbt_error *err)
+{
+    if (p->full_valid[view] == NULL || p->valid[view] != NULL)
+        return GBT_OK;
+    const gbt_camera full = photos_camera(p, view, 0);
+    return photo_resize_valid(p->full_valid[view], full.width, full.height, camera->width, camera->height, &p->valid[view], err);
+}
+
+const unsigned char *photos_valid(const photos *p, size_t view)
+{
+    return p->level == 0 ? p->full_valid[view] : p->valid[view];
 }
 
 gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *err)
 {
     if (level != p->level) {
         drop_all(p->pixels, p->source->view_count);
+        drop_all(p->valid, p->source->view_count);
         p->level = level;
     }
     if (level == 0)
@@ -97,12 +111,14 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *
         if (status == GBT_OK)
             status = photo_resize(&full, camera.width, camera.height, &small, err);
         if (status == GBT_OK)
+            status = resize_valid(p, view, &camera, err);
+        if (status == GBT_OK)
             status = to_bytes(&small, &p->pixels[view], err);
         image_free(&full);
         image_free(&small);
         GBT_TRY(status);
     }
-    GBT_TRY(fit_image(out, camera.width, camera.height, err));
+    GBT_TRY(image_fit(out, camera.width, camera.height, 3, err));
     from_bytes(p->pixels[view], out);
     return GBT_OK;
 }

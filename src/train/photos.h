@@ -10,6 +10,7 @@ typedef struct photos {
     int level;
     unsigned char **full;   /* [view_count] at level 0, NULL until asked for */
     unsigned char **pixels; /* [view_count] at `level` > 0, made from `full` */
+    unsigned char **full_valid, **valid; /* [view_count] marks of the same pixels; NULL for a photo whose values are all finite */
 } photos;
 
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err);
@@ -20,5 +21,8 @@ gbt_camera photos_camera(const photos *p, size_t view, int level);
 
 /** A photo as float at a level; asking for another level drops what is kept. `out` is resized as needed (start from {0}). */
 gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *err);
+
+/** Which pixels of the photo that photos_get() gave last for this view mean something: 0 where a value was not finite; NULL: all. */
+const unsigned char *photos_valid(const photos *p, size_t view);
 
 #endif

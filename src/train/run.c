@@ -15,6 +15,7 @@
 #include "train/checkpoint.h"
 #include "train/config.h"
 #include "train/run_log.h"
+#include "train/sampling.h"
 #include "train/trainer.h"
 
 enum { PATH_SIZE = 4096 };
@@ -57,7 +58,7 @@ static void signals_release(const signal_guard *guard)
 /* ---- the run's folder ------------------------------------------------------------------------------------------------------------------ */
 
 typedef struct run_paths {
-    char model[PATH_SIZE], config[PATH_SIZE], log[PATH_SIZE], json[PATH_SIZE], checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
+    char model[PATH_SIZE], config[PATH_SIZE], log[PATH_SIZE], json[PATH_SIZE], exposure[PATH_SIZE], checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
 } run_paths;
 
 static gbt_status open_folder(const char *run, run_paths *p, gbt_error *err)
@@ -69,8 +70,27 @@ static gbt_status open_folder(const char *run, run_paths *p, gbt_error *err)
     GBT_TRY(file_join(p->config, sizeof p->config, run, "config", err));
     GBT_TRY(file_join(p->log, sizeof p->log, run, "log.csv", err));
     GBT_TRY(file_join(p->json, sizeof p->json, run, "train.json", err));
+    GBT_TRY(file_join(p->exposure, sizeof p->exposure, run, "exposure.json", err));
     GBT_TRY(file_join(p->checkpoint, sizeof p->checkpoint, checkpoints, "last.gbt", err));
     return file_join(p->checkpoint_previous, sizeof p->checkpoint_previous, checkpoints, "last.gbt.prev", err);
+}
+
+/* The smallest pixel of each anchor, from the training views; NULL without a footprint. */
+static gbt_status find_anchor_pixels(const trainer *t, float **out, gbt_error *err)
+{
+    *out = NULL;
+    if (t->def.footprint == 0)
+        return GBT_OK;
+    gbt_camera *cameras = mem_alloc(t->train_count, sizeof *cameras, "cameras", err);
+    *out = mem_alloc(t->anchors.count, sizeof **out, "pixel sizes", err);
+    const bool fine = cameras != NULL && *out != NULL;
+    if (fine) {
+        for (size_t i = 0; i < t->train_count; i++)
+            cameras[i] = photos_camera(&t->photos, t->train_views[i], 0);
+        sampling_find(&t->anchors, cameras, t->train_count, *out);
+    }
+    mem_free(cameras);
+    return fine ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
 static gbt_status save_model(const trainer *t, const char *path, gbt_error *err)
@@ -93,7 +113,23 @@ static gbt_status save_model(const trainer *t, const char *path, gbt_error *err)
         def.budget_seconds = 0;
     }
     config_text(&def, t->scene.folder, m.config, sizeof m.config);
-    return model_save(path, &m, err);
+    gbt_status status = find_anchor_pixels(t, &m.anchor_pixel, err);
+    if (status == GBT_OK)
+        status = model_save(path, &m, err);
+    mem_free(m.anchor_pixel);
+    return status;
+}
+
+static gbt_status save_exposures(const trainer *t, const char *path, gbt_error *err)
+{
+    const char **names = mem_alloc(t->train_count, sizeof *names, "photo names", err);
+    if (names == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < t->train_count; i++)
+        names[i] = t->scene.views[t->train_views[i]].name;
+    const gbt_status status = exposures_write(&t->exposures, names, path, err);
+    mem_free(names);
+    return status;
 }
 
 /* ---- the time budget --------------------------------------------------------------------------------------------------------------------- */
@@ -138,6 +174,8 @@ static void pace_extend(trainer *t, const speed *s)
 static gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *err)
 {
     GBT_TRY(checkpoint_save(t, paths->checkpoint, err));
+    if (t->exposures.count > 0)
+        GBT_TRY(save_exposures(t, paths->exposure, err));
     return save_model(t, paths->model, err);
 }
 

@@ -92,9 +92,9 @@ static double decay(double first, double last, double progress)
     return exp((1 - progress) * log(first) + progress * log(last));
 }
 
-learning_rates schedule_rates(double progress, bool compat, double extent)
+learning_rates schedule_rates(double progress, bool compat, double extent, double factor)
 {
-    const double anchor = compat ? 1 : 1.5, network = compat ? 1 : 2;
+    const double anchor = factor * (compat ? 1 : 1.5), network = factor * (compat ? 1 : 2);
     return (learning_rates){
         .offset = anchor * decay(0.01, 0.0001, progress) * (compat ? extent : 1),
         .feature = anchor * 0.0075,

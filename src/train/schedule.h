@@ -51,8 +51,9 @@ typedef struct learning_rates {
  *
  * @param compat [in] true: the reference method's rates; false: ours, higher, for runs of some thousand steps
  * @param extent [in] of the cameras; the reference's rate of offsets is proportional to it
+ * @param factor [in] of all rates
  */
-learning_rates schedule_rates(double progress, bool compat, double extent);
+learning_rates schedule_rates(double progress, bool compat, double extent, double factor);
 
 /** Statistics are gathered from STATS_FROM on; anchors grow and are pruned in [ADJUST_FROM, ADJUST_UNTIL). */
 #define SCHEDULE_STATS_FROM (500.0 / 30000)

@@ -14,7 +14,7 @@
 #include "train/seed_points.h"
 #include "train/trainer.h"
 
-enum { STREAM_NETWORKS = 2 };
+enum { STREAM_NETWORKS = 2, FEW_PLACES = 128 };
 
 /* Fewer Gaussians per anchor than in the paper's base: at equal time the models are better (docs/training.md). */
 enum { default_offsets = 2 };
@@ -27,10 +27,13 @@ gbt_train_def gbt_train_def_default(void)
                            .distance = "auto",
                            .budget_seconds = 600,
                            .downscale = 1,
+                           .renderer = "trace",
+                           .footprint = 0.1,
                            .start_level = 2,
                            .eval_split = "every=8",
                            .max_anchors = 2000000,
                            .grow = true,
+                           .learning_rate_factor = 1,
                            .save_every_seconds = 120,
                            .command = "",
                            .cookie_ = 0x67627431};
@@ -52,15 +55,111 @@ static gbt_status check_def(const gbt_train_def *d, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "--offsets: %d (wanted 0 to %d)", d->offsets, ANCHOR_MAX_OFFSETS);
     if (!(d->downscale >= 1 && d->downscale <= 64))
         return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: %g (wanted 1 to 64)", d->downscale);
+    frame_renderer unused;
+    if (!frame_renderer_named(d->renderer, &unused))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)", d->renderer);
+    if (!(d->footprint >= 0 && d->footprint <= 4))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--footprint: %g (wanted 0 to 4)", d->footprint);
     if (d->start_level < 0 || d->start_level > 4)
         return base_fail(err, GBT_ERR_ARGUMENT, "--start-level: %d (wanted 0 to 4)", d->start_level);
     if (!(d->voxel_size >= 0 && d->voxel_size < 1e9f))
         return base_fail(err, GBT_ERR_ARGUMENT, "--voxel-size: %g (wanted 0 or more)", (double)d->voxel_size);
     if (d->iterations == 0 && d->pace == NULL && !(d->budget_seconds > 0 && d->budget_seconds < 1e9))
         return base_fail(err, GBT_ERR_ARGUMENT, "--budget: %g s (wanted more than 0)", d->budget_seconds);
+    if (!(d->learning_rate_factor >= 1e-3 && d->learning_rate_factor <= 1e3))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--learning-rate: %g (wanted 0.001 to 1000)", d->learning_rate_factor);
     if (d->max_anchors < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "--max-anchors: 0 (wanted 1 or more)");
     return GBT_OK;
+}
+
+/* Is a point in the picture? */
+static bool view_sees(const gbt_camera *camera, const float position[3], double *distance)
+{
+    double d[3], cam[3], pixel[2];
+    for (int k = 0; k < 3; k++)
+        d[k] = (double)position[k] - camera->center[k];
+    dmat_apply(camera->rotation, d, cam);
+    *distance = dvec_length(d);
+    return gbt_camera_project(camera, cam, pixel) && pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera->width && pixel[1] < camera->height;
+}
+
+/* Points that no training photo sees say nothing about what to render. */
+static bool any_point_is_seen(const trainer *t)
+{
+    double distance;
+    for (size_t i = 0; i < t->scene.points.count; i++)
+        for (size_t v = 0; v < t->train_count; v++)
+            if (view_sees(&t->scene.views[t->train_views[v]].camera, t->scene.points.position + 3 * i, &distance))
+                return true;
+    return false;
+}
+
+static int compare_points(const void *a, const void *b)
+{
+    return memcmp(a, b, 3 * sizeof(float));
+}
+
+/* How many points there are at different places; `most` is enough. */
+static gbt_status count_places(const scene_points *points, size_t most, size_t *out, gbt_error *err)
+{
+    float *sorted = mem_alloc(points->count, 3 * sizeof *sorted, "points", err);
+    if (sorted == NULL)
+        return GBT_ERR_NO_MEMORY;
+    memcpy(sorted, points->position, points->count * 3 * sizeof *sorted);
+    qsort(sorted, points->count, 3 * sizeof *sorted, compare_points);
+    *out = points->count > 0;
+    for (size_t i = 1; i < points->count && *out < most; i++)
+        *out += compare_points(sorted + 3 * i, sorted + 3 * (i - 1)) != 0;
+    mem_free(sorted);
+    return GBT_OK;
+}
+
+/* `more` after the points that are there; both have colours then. */
+static gbt_status append_points(scene_points *points, const scene_points *more, gbt_error *err)
+{
+    const size_t before = points->count, after = before + more->count;
+    size_t rows[2] = {before, before};
+    GBT_TRY(mem_reserve((void **)&points->position, &rows[0], before, after, 3 * sizeof(float), "points", err));
+    GBT_TRY(mem_reserve((void **)&points->color, &rows[1], before, after, 3 * sizeof(float), "points", err));
+    memcpy(points->position + 3 * before, more->position, 3 * more->count * sizeof(float));
+    memcpy(points->color + 3 * before, more->color, 3 * more->count * sizeof(float));
+    points->count = after, points->has_color = true;
+    return GBT_OK;
+}
+
+/* Points of our own where the data set has none, none that a photo sees, or few; the reference method takes what there is. */
+static gbt_status provide_points(trainer *t, gbt_error *err)
+{
+    scene_points *points = &t->scene.points, made = {0};
+    size_t places = 0;
+    if (any_point_is_seen(t))
+        GBT_TRY(count_places(points, FEW_PLACES, &places, err));
+    const bool blind = places == 0, few = places < FEW_PLACES && !t->def.compat;
+    t->points_used = points->count;
+    snprintf(t->start_text, sizeof t->start_text, "%zu sparse points", points->count);
+    if (!blind && !few)
+        return GBT_OK;
+    if (blind && points->count > 0)
+        log_warn("%s: no training photo sees any of the %zu sparse points", t->scene.folder, points->count);
+    if (blind)
+        points->count = 0;
+    gbt_error why = {0};
+    gbt_status status = seed_points_make(&t->photos, t->train_views, t->train_count, t->def.seed, &made, &why);
+    if (status == GBT_OK)
+        status = append_points(points, &made, err);
+    else if (blind || status == GBT_ERR_NO_MEMORY)
+        status = base_fail(err, status, "%s", why.text);
+    else
+        status = GBT_OK; /* the few must do */
+    snprintf(t->start_text, sizeof t->start_text, "%zu sparse points and %zu found by photo consistency", t->points_used, made.count);
+    if (blind)
+        snprintf(t->start_text, sizeof t->start_text, "%zu points found by photo consistency (the data set has none that are seen)", made.count);
+    t->points_made = blind;
+    t->points_used = points->count;
+    mem_free(made.position);
+    mem_free(made.color);
+    return status;
 }
 
 /* Distances from training cameras to a spread of anchors: they decide whether the networks see the distance, its unit, and t_near. */
@@ -74,12 +173,9 @@ static gbt_status measure_distances(trainer *t, float *p5, float *median, float 
     for (size_t v = 0; v < t->train_count; v++) {
         const gbt_camera *camera = &t->scene.views[t->train_views[v]].camera;
         for (size_t i = 0; i < t->anchors.count; i += stride) {
-            double d[3], cam[3], pixel[2];
-            for (int k = 0; k < 3; k++)
-                d[k] = (double)t->anchors.position[3 * i + (size_t)k] - camera->center[k];
-            dmat_apply(camera->rotation, d, cam);
-            if (gbt_camera_project(camera, cam, pixel) && pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera->width && pixel[1] < camera->height)
-                all[count++] = (float)dvec_length(d);
+            double distance;
+            if (view_sees(camera, t->anchors.position + 3 * i, &distance))
+                all[count++] = (float)distance;
         }
     }
     *p5 = *median = *p95 = 1;
@@ -127,7 +223,9 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
     def.balls.max_depth = t->def.max_depth;
     def.balls.voxel_size = t->voxel_size;
     def.offset_count = t->def.offsets;
-    def.scale_max = t->def.compat ? INFINITY : (float)(0.1 * t->extent); /* an isolated point would start as a fog */
+    /* An isolated point would start as a fog. Cameras that stand together say nothing of the size of what they see. */
+    const double away = dvec_length(t->scene.views[t->train_views[0]].camera.center); /* from the middle of the points */
+    def.scale_max = t->def.compat ? INFINITY : (float)(0.1 * fmax(t->extent, 0.1 * away));
     const scene_points *points = &t->scene.points;
     GBT_TRY(anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def, &t->anchors, NULL, err));
     t->anchors_initial = t->anchors.count;
@@ -165,6 +263,8 @@ static gbt_status make_state(trainer *t, gbt_error *err)
     t->params_v = mem_calloc(n, sizeof *t->params_v, "network moments", err);
     if (t->d_params == NULL || t->params_m == NULL || t->params_v == NULL)
         return GBT_ERR_NO_MEMORY;
+    if (t->def.exposure)
+        GBT_TRY(exposures_make(&t->exposures, t->train_count, err));
     return adjust_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
 }
 
@@ -174,6 +274,8 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->def = *def;
     if (def->offsets == 0)
         t->def.offsets = def->compat ? 10 : default_offsets;
+    if (def->compat)
+        t->def.footprint = 0;
     scene_split split;
     GBT_TRY(scene_split_parse(def->eval_split, &split, err));
     GBT_TRY(scene_load(data, &split, &t->scene, err));
@@ -182,14 +284,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     GBT_TRY(choose_views(t, err));
     GBT_TRY(photos_open(&t->photos, &t->scene, def->downscale, err));
     t->extent = scene_camera_extent(&t->scene);
-    if (t->scene.points.count == 0) {
-        GBT_TRY(seed_points_make(&t->photos, t->train_views, t->train_count, def->seed, &t->scene.points, err));
-        t->points_made = true;
-    }
-    t->points_used = t->scene.points.count;
-    snprintf(t->start_text, sizeof t->start_text, "%zu %s", t->points_used,
-             t->points_made ? "points found by photo consistency (the data set has none)" : "sparse points");
-
+    GBT_TRY(provide_points(t, err));
     t->voxel_size = def->voxel_size;
     if (t->voxel_size == 0)
         GBT_TRY(balls_voxel_size(t->scene.points.position, t->scene.points.count, def->compat ? VOXEL_COMPAT_SQUARED : VOXEL_MEDIAN_SPACING,
@@ -207,7 +302,11 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->decoder.distance_scale = def->compat ? 1.0f : 1 / median;
     t->decoder.distance_min = p5 * t->decoder.distance_scale, t->decoder.distance_max = p95 * t->decoder.distance_scale;
     t->settings = trace_settings_default();
+    frame_renderer_named(t->def.renderer, &t->frame.draw.renderer);
+    t->frame.draw.footprint = (float)t->def.footprint;
     t->settings.t_near = 0.02f * median;
+    const double size = fmax(t->extent, (double)median);
+    t->scale_log_min = (float)log(1e-6 * size), t->scale_log_max = (float)log(100 * size);
     GBT_TRY(make_state(t, err));
     if (!def->compat && t->scene.points.has_color)
         mean_color(&t->scene.points, t->settings.background);

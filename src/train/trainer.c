@@ -2,6 +2,7 @@
 #include "train/trainer.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/clock.h"
@@ -12,14 +13,15 @@
 #include "base/rng.h"
 #include "base/vec.h"
 #include "train/adam.h"
+#include "train/gradient_check.h"
 
-static const float dssim_weight = 0.2f, volume_weight = 0.01f;
+static const float dssim_weight = 0.2f, volume_weight = 0.01f, revived_opacity = 0.1f;
 enum { ADAM_BLOCK = 512, MAX_SKIPPED_IN_ROW = 10, ADJUSTS_PER_RUN = 100 };
-enum { STREAM_VIEWS = 1 };
+enum { STREAM_VIEWS = 1, CULPRIT_SIZE = 384, BARREN_STEPS = 5 };
 
 /* ---- which view -------------------------------------------------------------------------------------------------------------------------- */
 
-/* Every view once per epoch, in an order that depends on (seed, epoch) only, so that there is no state to save. */
+/* An index into train_views: every view once per epoch, in an order that depends on (seed, epoch) only, so that there is no state to save. */
 static size_t pick_view(trainer *t)
 {
     const uint64_t epoch = t->step / t->train_count;
@@ -36,7 +38,7 @@ static size_t pick_view(trainer *t)
         t->order_epoch = epoch;
         t->order_ready = true;
     }
-    return t->train_views[t->order[t->step % t->train_count]];
+    return t->order[t->step % t->train_count];
 }
 
 /* ---- optimizer ------------------------------------------------------------------------------------------------------------------------------ */
@@ -56,6 +58,8 @@ static void adam_block(size_t block, size_t begin, size_t end, void *context)
     adam_step(p->feature + feature, g->feature + feature, m->feature + feature, v->feature + feature, rows * ANCHOR_FEATURE_DIM, job->feature);
     adam_step(p->offset + offset, g->offset + offset, m->offset + offset, v->offset + offset, rows * offset_floats, job->offset);
     adam_step(p->scale_log + scale, g->scale_log + scale, m->scale_log + scale, v->scale_log + scale, rows * 6, job->scale);
+    for (size_t i = scale; i < 6 * end; i++)
+        p->scale_log[i] = fminf(fmaxf(p->scale_log[i], job->t->scale_log_min), job->t->scale_log_max);
 }
 
 static void step_networks(trainer *t, const learning_rates *rates)
@@ -113,7 +117,7 @@ static void gather_statistics(trainer *t)
         const float sx = cam_z * tan_x * gx, sy = cam_z * tan_y * gy;
         const uint32_t slot = f->tape.slot[i];
         const size_t at = (size_t)f->visible[slot / (uint32_t)k_count] * (size_t)k_count + slot % (uint32_t)k_count;
-        s->grad_accum[at] += sqrtf(sx * sx + sy * sy);
+        s->grad_accum[at] += fminf(sqrtf(sx * sx + sy * sy), GRADIENT_LIMIT);
         s->grad_count[at] += 1;
     }
 }
@@ -153,6 +157,8 @@ static gbt_status grow_and_prune(trainer *t, uint64_t steps_since, gbt_error *er
     for (int i = 0; i < 3 && status == GBT_OK; i++)
         status = follow_rows(followers[i], &result, err);
     mem_free(result.source);
+    if (result.kept_last)
+        log_warn("step %llu: every anchor had become transparent; the most opaque one stays", (unsigned long long)t->step);
     return status;
 }
 
@@ -168,15 +174,72 @@ static bool adjust_is_due(const trainer *t, double progress, double next)
     return floor(progress * ADJUSTS_PER_RUN) != floor(next * ADJUSTS_PER_RUN);
 }
 
+/* Count a step that teaches nothing; nothing may have changed yet but the gradients, which are cleared. `what` names the culprit. */
+static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_error *err)
+{
+    anchors *g = &t->gradient;
+    memset(g->feature, 0, g->count * ANCHOR_FEATURE_DIM * sizeof *g->feature);
+    memset(g->offset, 0, g->count * 3 * (size_t)g->offset_count * sizeof *g->offset);
+    memset(g->scale_log, 0, g->count * 6 * sizeof *g->scale_log);
+    memset(t->d_params, 0, t->decoder.param_count * sizeof *t->d_params);
+    out->skipped = true;
+    t->skipped_steps++;
+    if (++t->skipped_in_row >= MAX_SKIPPED_IN_ROW)
+        return base_fail(err, GBT_ERR_FORMAT, "train: %d steps in a row taught nothing, last step %llu: %s", MAX_SKIPPED_IN_ROW,
+                         (unsigned long long)t->step, what);
+    log_warn("step %llu skipped: %s", (unsigned long long)t->step, what);
+    t->step++;
+    return GBT_OK;
+}
+
+/* After the last render: is the scene empty, and for good? And in the first: is one offset of all anchors? The networks begin at random,
+   and an offset that begins below 0 everywhere would hardly ever be used. */
+static void revive_when_barren(trainer *t)
+{
+    const frame *f = &t->frame;
+    if (t->step == 0 && !t->def.compat)
+        decode_raise_opacity(&f->tape, 0, revived_opacity, &t->decoder);
+    const bool barren = f->visible_count > 0 && f->gaussians.count == 0;
+    t->barren_in_row = barren ? t->barren_in_row + 1 : 0;
+    if (t->barren_in_row < BARREN_STEPS)
+        return;
+    decode_raise_opacity(&f->tape, revived_opacity, revived_opacity, &t->decoder);
+    decoder_part parts[3];
+    decoder_parts(&t->decoder, parts);
+    const size_t begin = parts[0].begin, count = parts[0].end - begin; /* what pulled the opacities down must not go on */
+    memset(t->params_m + begin, 0, count * sizeof *t->params_m);
+    memset(t->params_v + begin, 0, count * sizeof *t->params_v);
+    t->barren_in_row = 0;
+    if (t->revivals++ == 0)
+        log_info("step %llu: no anchor makes a Gaussian; opacities are raised", (unsigned long long)t->step);
+}
+
+/* The loss of the last render as the photo's exposure shows it; d_image becomes dL/drender, d_exposure dL/dmatrix. */
+static gbt_status compare(trainer *t, size_t slot, image_loss_result *loss, double d_exposure[AFFINE_NUMBERS], gbt_error *err)
+{
+    const image *shown = &t->frame.rgb;
+    const unsigned char *valid = photos_valid(&t->photos, t->train_views[slot]);
+    image *fitted[] = {&t->d_image, &t->exposed};
+    for (int i = 0; i < (t->exposures.count > 0 ? 2 : 1); i++)
+        GBT_TRY(image_fit(fitted[i], shown->width, shown->height, 3, err));
+    if (t->exposures.count == 0)
+        return image_loss(shown, &t->photo, valid, dssim_weight, &t->loss_scratch, &t->d_image, loss, err);
+    const float *matrix = t->exposures.matrix + slot * AFFINE_NUMBERS;
+    affine_apply(matrix, shown, &t->exposed);
+    GBT_TRY(image_loss(&t->exposed, &t->photo, valid, dssim_weight, &t->loss_scratch, &t->d_image, loss, err));
+    affine_backward(matrix, shown, &t->d_image, d_exposure);
+    return GBT_OK;
+}
+
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 {
     const double start = clock_wall();
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
-    const learning_rates rates = schedule_rates(progress, t->def.compat, t->extent);
+    const learning_rates rates = schedule_rates(progress, t->def.compat, t->extent, t->def.learning_rate_factor);
 
     /* A view, at the resolution that the model can already use. */
-    const size_t view = pick_view(t);
+    const size_t slot = pick_view(t), view = t->train_views[slot];
     out->level = schedule_level(progress, t->def.compat ? 0 : t->def.start_level);
     double clock = clock_wall();
     GBT_TRY(photos_get(&t->photos, view, out->level, &t->photo, err));
@@ -188,33 +251,33 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     frame *f = &t->frame;
     GBT_TRY(frame_render(f, &t->anchors, &t->decoder, &camera, &t->settings, true, err));
     out->gaussians = f->gaussians.count, out->visible = f->visible_count;
+    revive_when_barren(t);
     clock = clock_wall();
-    if (t->d_image.width != camera.width || t->d_image.height != camera.height) {
-        image_free(&t->d_image);
-        GBT_TRY(image_alloc(&t->d_image, camera.width, camera.height, 3, err));
-    }
     image_loss_result loss;
-    GBT_TRY(image_loss(&f->rgb, &t->photo, NULL, dssim_weight, &t->loss_scratch, &t->d_image, &loss, err));
+    double d_exposure[AFFINE_NUMBERS];
+    GBT_TRY(compare(t, slot, &loss, d_exposure, err));
     out->loss = loss.loss + (double)volume_weight * frame_volume(f);
     out->l1 = loss.l1, out->ssim = loss.ssim;
     out->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
     out->loss_seconds = clock_wall() - clock;
 
+    char culprit[CULPRIT_SIZE];
     if (!isfinite(out->loss)) {
-        out->skipped = true;
-        t->skipped_steps++;
-        if (++t->skipped_in_row >= MAX_SKIPPED_IN_ROW)
-            return base_fail(err, GBT_ERR_FORMAT, "train: the loss was not finite in %d steps in a row (last photo: %s)", MAX_SKIPPED_IN_ROW,
-                             t->scene.views[view].name);
-        log_warn("step %llu skipped: the loss is not finite (photo %s)", (unsigned long long)t->step, t->scene.views[view].name);
-        t->step++;
-        return GBT_OK;
+        snprintf(culprit, sizeof culprit, "the loss is not finite (photo %.200s)", t->scene.views[view].name);
+        return skip_step(t, out, culprit, err);
     }
-    t->skipped_in_row = 0;
 
     /* Gradients, then parameters. */
     GBT_TRY(frame_backward(f, &t->anchors, &t->decoder, &t->d_image, volume_weight, &t->gradient, t->d_params, err));
     clock = clock_wall();
+    char where[80];
+    if (gradient_is_bad(t, t->exposures.count > 0 ? d_exposure : NULL, where, sizeof where)) {
+        snprintf(culprit, sizeof culprit, "the gradient is not finite (%s; photo %.200s)", where, t->scene.views[view].name);
+        return skip_step(t, out, culprit, err);
+    }
+    t->skipped_in_row = 0;
+    if (t->exposures.count > 0)
+        exposures_step(&t->exposures, slot, d_exposure, t->def.learning_rate_factor * exposures_rate(t->train_count, progress, next - progress));
     const bool adjust = adjust_is_due(t, progress, next);
     step_networks(t, &rates);
     if (!(adjust && t->def.compat)) /* in the reference the per-anchor groups miss the step in which anchors change */
@@ -240,7 +303,7 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
 {
     double sum = 0;
     size_t count = 0;
-    image photo = {0};
+    image photo = {0}, right[2] = {{0}};
     gbt_status status = GBT_OK;
     for (size_t i = 0; i < t->scene.view_count && status == GBT_OK; i++) {
         if (!t->scene.views[i].is_test)
@@ -249,13 +312,20 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
         status = frame_render(&t->frame, &t->anchors, &t->decoder, &camera, &t->settings, false, err);
         if (status == GBT_OK)
             status = scene_read_photo(&t->scene.views[i], camera.width, camera.height, &photo, err);
+        image *pair[2] = {&t->frame.rgb, &photo};
+        if (status == GBT_OK && t->exposures.count > 0) {
+            status = affine_split(&t->frame.rgb, &photo, &right[0], &right[1], err);
+            pair[0] = &right[0], pair[1] = &right[1];
+        }
         if (status == GBT_OK) {
-            image_quantize(&photo);
-            image_quantize(&t->frame.rgb);
-            sum += metric_psnr(&t->frame.rgb, &photo);
+            image_quantize(pair[0]);
+            image_quantize(pair[1]);
+            sum += metric_psnr(pair[0], pair[1]);
             count++;
         }
         image_free(&photo);
+        image_free(&right[0]);
+        image_free(&right[1]);
     }
     *psnr = count > 0 ? sum / (double)count : (double)NAN;
     return status;
@@ -274,6 +344,8 @@ void trainer_free(trainer *t)
     frame_free(&t->frame);
     image_free(&t->photo);
     image_free(&t->d_image);
+    image_free(&t->exposed);
+    exposures_free(&t->exposures);
     loss_scratch_free(&t->loss_scratch);
     mem_free(t->order);
     mem_free(t->train_views);

@@ -8,6 +8,7 @@
 #include "data/scene.h"
 #include "gbtrace/train.h"
 #include "image/metrics.h"
+#include "train/exposure.h"
 #include "train/frame.h"
 #include "train/photos.h"
 #include "train/schedule.h"
@@ -18,7 +19,7 @@ typedef struct step_report {
     int width, height, level;
     size_t gaussians, visible;
     double photo_seconds, loss_seconds, optimizer_seconds, adjust_seconds, total_seconds; /* frame times are in trainer.frame */
-    bool skipped;                                                                          /* the loss was not finite */
+    bool skipped; /* the loss or a gradient was not finite: nothing has learned */
 } step_report;
 
 typedef struct trainer {
@@ -33,9 +34,11 @@ typedef struct trainer {
     decoder decoder;
     float *d_params, *params_m, *params_v;
     adjust_stats stats;
+    exposures exposures; /* of the training photos, in the order of train_views; count 0 without --exposure */
 
     float voxel_size;
     double extent;
+    float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs, far inside what floats hold */
     trace_settings settings;
     size_t anchors_initial, points_used;
     bool points_made;        /* the data set has no sparse points: ours */
@@ -46,10 +49,11 @@ typedef struct trainer {
     uint64_t adjust_step; /* steps done at the last adjust */
     uint64_t anchor_t;    /* Adam steps of the per-anchor groups */
     uint64_t skipped_steps, skipped_in_row;
+    uint64_t barren_in_row, revivals; /* steps in a row without a Gaussian though anchors were in sight; how often that was mended */
     double seconds;       /* training time so far, over all runs that continued one another */
 
     frame frame;
-    image photo, d_image;
+    image photo, d_image, exposed; /* exposed: the render as the photo's exposure shows it */
     loss_scratch loss_scratch;
     uint32_t *order; /* views of the epoch */
     uint64_t order_epoch;
@@ -59,10 +63,19 @@ typedef struct trainer {
 /** Load the data, make the anchors. Start from {0}; free with trainer_free() after success or failure. */
 gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, gbt_error *err);
 
-/** One iteration: pick a view, render, loss, adjoint, Adam, statistics, grow and prune. The pace must know this step. */
+/**
+ * One iteration: pick a view, render, loss, adjoint, Adam, statistics, grow and prune. The pace must know this step.
+ *
+ * A step whose loss or gradient is not finite is skipped: parameters, moments and statistics stay, it is counted, and a warning names the
+ * photo or the first bad gradient. GBT_ERR_FORMAT after ten such steps in a row.
+ *
+ * Gaussians below opacity 0 have no gradient, so a scene that has lost all of them (or begins without: the first networks are random)
+ * would stay empty. After five views in a row with anchors in sight and not one Gaussian, opacities are raised to 0.1; in the first step
+ * (not with `compat`) those of each offset whose mean is below 0.
+ */
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err);
 
-/** Mean PSNR over the held-out views at full training resolution, on 8-bit images. */
+/** Mean PSNR over the held-out views at full training resolution, on 8-bit images; of their right halves with --exposure (affine_split()). */
 gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err);
 
 void trainer_free(trainer *t);

@@ -263,7 +263,7 @@ static void the_last_anchor_stays(void **state)
     assert_int_equal(r.count, 1);
     assert_int_equal(r.pruned, 2);
     assert_int_equal(r.source[0], 1); /* the most opaque of them */
-    assert_true(sc.a.position[0] == 1.0f);
+    assert_true(sc.a.position[0] == 1.0f && r.kept_last);
     free_scene(&sc, &r);
 }
 
@@ -528,6 +528,59 @@ static void same_bits_for_all_threads(void **state)
     parallel_set_threads(before);
 }
 
+/* Every Gaussian a candidate: the largest gradients win, then the lower level, then the lower cell; the threshold may be 0. */
+static void an_explosion_is_capped(void **state)
+{
+    (void)state;
+    enum { COUNT = 400, OFFSETS = 5, SLOTS = COUNT * OFFSETS };
+    for (int equal = 0; equal <= 1; equal++)
+        for (size_t cap = COUNT; cap <= COUNT + 300; cap += 100) {
+            scene capped = random_scene(77, COUNT, OFFSETS), whole = random_scene(77, COUNT, OFFSETS);
+            scene *const both[2] = {&capped, &whole};
+            adjust_result r[2];
+            for (int i = 0; i < 2; i++) {
+                for (size_t slot = 0; slot < SLOTS; slot++)
+                    set_gradient(both[i], slot, equal ? 1.0f : spread(78, 0, slot, 0, 1));
+                adjust_def def = adjust_def_default();
+                def.voxel_size = 0.01f, def.grad_threshold = 0.0f, def.prune = false, def.max_anchors = i == 0 ? cap : SIZE_MAX;
+                assert_ok(anchors_adjust(&both[i]->a, &both[i]->s, &def, &r[i], NULL));
+            }
+            assert_true(r[1].count > COUNT + 300);
+            assert_int_equal(r[0].count, cap);
+            size_t from = COUNT; /* what was kept is in the order of what could have been */
+            for (size_t row = COUNT; row < cap; row++, from++) {
+                while (from < r[1].count && memcmp(whole.a.position + 3 * from, capped.a.position + 3 * row, 3 * sizeof(float)) != 0)
+                    from++;
+                assert_true(from < r[1].count);
+                if (equal) /* ties: the first cells of the first levels */
+                    assert_int_equal(from, row);
+            }
+            free_scene(&capped, &r[0]);
+            free_scene(&whole, &r[1]);
+        }
+}
+
+/* Cells of a millimetre at the coordinates of a map grid have indices beyond 2^32. */
+static void far_cells_have_addresses(void **state)
+{
+    (void)state;
+    scene sc = empty_scene(2, 1);
+    sc.a.position[0] = 4.5e6f, sc.a.position[3] = -4.5e6f;
+    for (size_t i = 0; i < 2; i++) {
+        sc.a.offset[3 * i + 1] = i == 0 ? 8.0f : -8.0f;
+        set_gradient(&sc, i, 1.0f);
+    }
+    adjust_def def = adjust_def_default();
+    def.voxel_size = 0.001f / 16.0f, def.level_count = 1;
+    keep_all(&def, 2);
+    adjust_result r;
+    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    assert_int_equal(r.grown, 2);
+    assert_true(fabsf(sc.a.position[6] + 4.5e6f) <= 0.5f && fabsf(sc.a.position[9] - 4.5e6f) <= 0.5f);
+    assert_true(fabsf(sc.a.position[7] + 8.0f) < 0.001f && fabsf(sc.a.position[10] - 8.0f) < 0.001f);
+    free_scene(&sc, &r);
+}
+
 /* ---- edges ------------------------------------------------------------------------------------------------------------------- */
 
 static void wild_places_and_cells(void **state)
@@ -649,6 +702,8 @@ int main(void)
         cmocka_unit_test(adjust_agrees_with_brute_force),
         cmocka_unit_test(the_cap_holds_for_random_scenes),
         cmocka_unit_test(same_bits_for_all_threads),
+        cmocka_unit_test(an_explosion_is_capped),
+        cmocka_unit_test(far_cells_have_addresses),
         cmocka_unit_test(wild_places_and_cells),
         cmocka_unit_test(wrong_arguments_are_refused),
         cmocka_unit_test(no_memory_changes_nothing),

@@ -13,6 +13,16 @@ static void widen_camera(double out[3])
         out[c] = (double)camera_center[c];
 }
 
+/* In every fifth anchor one axis, or two, so thin that the least ratio of scales holds them. */
+static void make_needles(anchors *a)
+{
+    for (size_t i = 0; i < a->count; i += 5) {
+        a->scale_log[i * 6 + 3 + i % 3] = -14.0f;
+        if (i % 2 == 0)
+            a->scale_log[i * 6 + 3 + (i + 1) % 3] = -13.0f;
+    }
+}
+
 /* ---- forward ----------------------------------------------------------------------------------------------------------------- */
 
 typedef struct decode_case {
@@ -39,6 +49,7 @@ static void forward_agrees_with_double(void **state)
     const decode_case *c = *state;
     anchors a = random_anchors(c->count, c->offset_count, 11);
     decoder d = random_decoder(c->offset_count, c->has_distance, 12);
+    make_needles(&a);
     size_t visible_count;
     uint32_t *visible = every(c->count, c->step, &visible_count);
     gaussians g = {0};
@@ -123,6 +134,7 @@ static void double_adjoint_agrees_with_differences(void **state)
     anchors a = random_anchors(FD_ANCHORS, c->offset_count, 21);
     decoder d = random_decoder(c->offset_count, c->has_distance, 22);
     a.scale_log[3] = 31.0f, a.scale_log[9] = -31.0f; /* beyond the cut: both must say 0 */
+    a.scale_log[4 * 6 + 4] = -14.0f;                 /* held to a part of the largest scale */
     decode_ref r, grad;
     assert_ok(decode_ref_load(&r, &a, &d, NULL));
     assert_ok(decode_ref_zero(&grad, &r, NULL));
@@ -135,7 +147,8 @@ static void double_adjoint_agrees_with_differences(void **state)
     for (size_t s = 0; s < slots; s += 3) /* dropped slots have gradient 0 */
         memset(weight + s * DECODE_REF_FIELDS, 0, DECODE_REF_FIELDS * sizeof *weight);
     for (size_t k = 0; k < (size_t)c->offset_count; k++)
-        weight[k * DECODE_REF_FIELDS + 3] *= 1e-12; /* a scale of exp(30) would drown every other difference */
+        for (size_t f = 3; f < 6; f++)
+            weight[k * DECODE_REF_FIELDS + f] *= 1e-12; /* a scale of exp(30), and those held to it, would drown every other difference */
     widen_camera(camera);
     decode_ref_backward(&r, camera, visible, 3, weight, &grad);
 
@@ -159,7 +172,7 @@ static void double_adjoint_agrees_with_differences(void **state)
         }
         assert_true(nonzero > 0);
     }
-    assert_true(grad.scale_log[3] == 0 && grad.scale_log[9] == 0);
+    assert_true(grad.scale_log[3] == 0 && grad.scale_log[9] == 0 && grad.scale_log[4 * 6 + 4] == 0);
     for (size_t i = 2 * 32; i < 4 * 32; i++)
         assert_true(grad.feature[i] == 0); /* anchors 2 and 3 are not visible */
     mem_free(weight);
@@ -198,6 +211,7 @@ static void adjoint_agrees_with_double(void **state)
     const decode_case *c = *state;
     anchors a = random_anchors(c->count, c->offset_count, 11), da = {.offset_count = c->offset_count};
     decoder d = random_decoder(c->offset_count, c->has_distance, 12);
+    make_needles(&a);
     a.scale_log[3] = 30.5f, a.scale_log[1] = -30.5f;
     size_t visible_count;
     uint32_t *visible = every(c->count, c->step, &visible_count);

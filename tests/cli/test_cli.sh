@@ -134,7 +134,7 @@ misuse 4 "nothing: no such file or folder" info nothing
 misuse 4 "no.gbt: cannot open: No such file or directory" info no.gbt
 misuse 4 "nothing/model.gbt: cannot open: No such file or directory" render nothing/model.gbt -o o --camera c.json
 misuse 2 "--downscale: not with --camera (the camera file says the size)" render nothing -o o --camera c.json --downscale 2
-misuse 2 "--renderer: reference has no meshes (wanted trace with --insert)" render nothing -o o --insert i.json --renderer reference
+misuse 2 "--insert: meshes are traced (wanted --renderer trace)" render nothing -o o --insert i.json --renderer reference
 mkdir empty
 misuse 3 "empty: not a data set (wanted sparse/0/cameras.bin or transforms.json in it)" info empty
 printf 'GBTMODEL' >short.gbt
@@ -240,15 +240,24 @@ prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.00
 misuse 2 '--kernel: "tile,tile" (wanted tile, single or embree, or some of them with commas between)' $bench --kernel tile,tile
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
 misuse 2 "--camera: missing (a .ply has no cameras)" bench trace --model gaussians.ply
-misuse 2 'study: unknown study "pace" (wanted speed)' study pace gaussians.ply -o study
-misuse 2 "argument missing (usage: gbtrace study speed MODEL... -o DIR)" study speed -o study
+misuse 2 'study: unknown study "pace" (wanted speed, crosscheck or stability)' study pace gaussians.ply -o study
+misuse 2 "argument missing (usage: gbtrace study speed|crosscheck|stability [MODEL...] -o DIR)" study -o study
+misuse 2 "study crosscheck: wanted a model" study crosscheck -o study
+misuse 2 'study stability: "gaussians.ply" is one model too many' study stability gaussians.ply -o study
+misuse 2 'study stability: "A99" is not a list of different cases (wanted some of A1 to A18, as A1,A9)' study stability --only A99 -o study
 "$program" study speed gaussians.ply -o study --repeats 1 >out 2>err
 got=$?
-[ "$got" = 0 ] && [ "$(grep -c '^| preset | [a-z]* | [0-9.]* | [0-9.]* | [0-9.]* | [0-9]* | [0-9.]* | [0-9.e-]* |$' out)" = 3 ] && cmp -s out study/speed.md
+[ "$got" = 0 ] && [ "$(grep -c '^| preset | [a-z]* | [0-9.]* | [0-9.]* | [0-9.]* | [0-9.]* | [0-9]* | [0-9.]* | [0-9.e-]* | n/a |$' out)" = 3 ] && cmp -s out study/speed.md
 report $? "study prints its table" "  got $got: $(cat err out)"
 [ "$(grep -c '^"gaussians.ply",' study/speed.csv)" -ge 24 ] && [ "$(grep -c '"knob": ' study/speed.json)" -ge 21 ] &&
     [ "$(grep -c '<svg xmlns' study/speed.svg)" = 1 ] && [ "$(grep -o '>exact</text>' study/speed.html | wc -l)" = 1 ]
 report $? "study writes data and charts" "$(ls -l study)"
+"$program" study crosscheck gaussians.ply -o cross >out 2>err
+got=$?
+[ "$got" = 0 ] && [ "$(grep -c '^| [a-z-]* | [0-9.]* | [0-9.e-]* | [0-9.]* | [0-9.e-]* |$' out)" = 5 ] && [ "$(grep -c '"pass": true' cross/crosscheck.json)" = 5 ] &&
+    grep -q 'dilation' cross/crosscheck.md && grep -q '<svg xmlns' cross/crosscheck.svg && grep -q 'data:image/jpeg' cross/crosscheck.html &&
+    [ -s cross/crosscheck_gaussians.ply_camera.png ]
+report $? "study crosscheck: every row within its limit" "  got $got: $(cat err out)"
 
 # ---- what is rendered beside the picture
 if "$program" train made -o run --iterations 3 >out 2>err; then

@@ -193,6 +193,32 @@ static void ssim_of_constant_images(void **state)
     image_free(&c), image_free(&d), image_free(&e);
 }
 
+/* Of a picture of one whole window only the middle counts; of noise, what is left without five pixels around. */
+static void ssim_inside(void **state)
+{
+    (void)state;
+    double taps[121];
+    brute_taps(taps);
+    static const int shapes[][2] = {{11, 11}, {12, 33}, {40, 17}};
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++)
+        for (int channels = 1; channels <= 4; channels += 2) {
+            const int width = shapes[i][0], height = shapes[i][1];
+            image a = make_noise(width, height, channels, 1), b = make_noise(width, height, channels, 2);
+            double *x = widened(&a), *y = widened(&b), sum = 0;
+            for (int row = 5; row < height - 5; row++)
+                for (int column = 5; column < width - 5; column++)
+                    for (int c = 0; c < channels; c++)
+                        sum += brute_at(x, y, width, height, channels, column, row, c, taps).ssim;
+            assert_near(metric_ssim_interior(&a, &b), sum / ((width - 10) * (height - 10) * channels), 1e-13);
+            assert_true(metric_ssim_interior(&a, &a) == 1.0);
+            free(x), free(y);
+            image_free(&a), image_free(&b);
+        }
+    image small = make_constant(10, 30, 0.5f);
+    assert_true(isnan(metric_ssim_interior(&small, &small)));
+    image_free(&small);
+}
+
 static void flip_properties(void **state)
 {
     (void)state;
@@ -272,6 +298,7 @@ int main(void)
         cmocka_unit_test(quantize_rounds_half_up),
         cmocka_unit_test(ssim_equals_brute_force),
         cmocka_unit_test(ssim_of_constant_images),
+        cmocka_unit_test(ssim_inside),
         cmocka_unit_test(flip_properties),
         cmocka_unit_test(flip_refusals),
         cmocka_unit_test(same_bits_for_threads_and_instructions),

@@ -23,6 +23,11 @@ static void make_model(model *m, size_t count, int offset_count, bool has_distan
     fill_values(m->anchors.feature, count * ANCHOR_FEATURE_DIM, 2);
     fill_values(m->anchors.offset, count * (size_t)offset_count * 3, 3);
     fill_values(m->anchors.scale_log, count * 6, 4);
+    if (has_distance) { /* every second model has what is optional */
+        m->anchor_pixel = mem_alloc(count, sizeof *m->anchor_pixel, "test", NULL);
+        for (size_t i = 0; i < count; i++)
+            m->anchor_pixel[i] = rng_uniform(7, 5, i);
+    }
     assert_ok(decoder_init(&m->decoder, offset_count, has_distance, 9, NULL));
     m->decoder.distance_scale = 0.25f, m->decoder.distance_min = 0.5f, m->decoder.distance_max = INFINITY;
 }
@@ -38,6 +43,9 @@ static void check_same(const model *a, const model *b)
         assert_memory_equal(a->anchors.offset, b->anchors.offset, n * k * 12);
         assert_memory_equal(a->anchors.scale_log, b->anchors.scale_log, n * 24);
     }
+    assert_true((a->anchor_pixel == NULL) == (b->anchor_pixel == NULL));
+    if (a->anchor_pixel != NULL && n > 0)
+        assert_memory_equal(a->anchor_pixel, b->anchor_pixel, n * 4);
     assert_int_equal(a->decoder.offset_count, b->decoder.offset_count);
     assert_int_equal(a->decoder.has_distance, b->decoder.has_distance);
     assert_true(a->decoder.distance_scale == b->decoder.distance_scale);

@@ -31,11 +31,16 @@ static inline gaussians random_gaussians(size_t count, float opacity_low, uint64
     return g;
 }
 
-/* From (0, 0, -6) along z. */
+/* At (0, 0, -6), looking along z; and its rays. */
+static inline gbt_camera pinhole_camera(int width, int height)
+{
+    return (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = width, .height = height, .center = {0, 0, -6},
+                        .params = {0.7 * width, 0.7 * width, 0.5 * width, 0.5 * height}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+}
+
 static inline ray_image pinhole_rays(int width, int height)
 {
-    const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = width, .height = height, .center = {0, 0, -6},
-                               .params = {0.7 * width, 0.7 * width, 0.5 * width, 0.5 * height}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    const gbt_camera camera = pinhole_camera(width, height);
     ray_image rays = {0};
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
     return rays;

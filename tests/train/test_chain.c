@@ -24,6 +24,7 @@ typedef struct view {
     double center[3];
     double *slots;      /* [visible * K][14] */
     reference_scene g;  /* the slots that became Gaussians */
+    footprint_gaussian *narrow; /* [g.count], before they are widened */
     double rgb[3 * RAYS];
 } view;
 
@@ -36,6 +37,7 @@ static void make_view(view *v, uint64_t seed, bool has_distance)
     for (size_t i = 0; i < count; i++)
         for (size_t k = 0; k < 6; k++)
             v->a.scale_log[6 * i + k] = spread(seed, 200 + k, i, -1.5f, -0.2f);
+    v->a.scale_log[6 * (seed % count) + 3 + seed % 3] = -14; /* a sheet or needle that the least ratio of scales holds */
     decoder_part parts[3];
     decoder_parts(&v->d, parts);
     for (size_t i = 0; i < OFFSETS; i++) /* biases of the opacities: most Gaussians are there */
@@ -49,11 +51,13 @@ static void make_view(view *v, uint64_t seed, bool has_distance)
     assert_ok(image_alloc(&v->photo, WIDTH, HEIGHT, 3, NULL));
     for (size_t i = 0; i < 3 * RAYS; i++)
         v->photo.pixels[i] = rng_uniform(seed, 300, i);
+    v->f.draw.footprint = seed % 3 == 0 ? 0 : 0.25f; /* some with rays as wide as pixels */
     assert_ok(frame_render(&v->f, &v->a, &v->d, &v->camera, &v->s, true, NULL));
     assert_true(v->f.visible_count >= 6 && v->f.gaussians.count >= 12);
     assert_ok(decode_ref_load(&v->p, &v->a, &v->d, NULL));
     v->slots = mem_calloc(v->f.visible_count * OFFSETS, DECODE_REF_FIELDS * sizeof *v->slots, "test", NULL);
-    assert_ok(reference_scene_make(&v->f.gaussians, &v->g, NULL));
+    assert_ok(reference_scene_make(frame_drawn(&v->f), &v->g, NULL));
+    v->narrow = mem_alloc(v->g.count, sizeof *v->narrow, "test", NULL);
 }
 
 static void view_free(view *v)
@@ -64,6 +68,7 @@ static void view_free(view *v)
     frame_free(&v->f);
     decode_ref_free(&v->p);
     mem_free(v->slots);
+    mem_free(v->narrow);
     reference_scene_free(&v->g);
 }
 
@@ -128,8 +133,10 @@ static double loss_of(view *v)
     decode_ref_forward(&v->p, v->center, v->f.visible, v->f.visible_count, v->slots);
     double volume = 0;
     for (size_t i = 0; i < v->g.count; i++) {
-        const double *slot = v->slots + v->f.tape.slot[i] * (size_t)DECODE_REF_FIELDS;
+        double *slot = v->slots + v->f.tape.slot[i] * (size_t)DECODE_REF_FIELDS;
         volume += slot[3] * slot[4] * slot[5];
+        memcpy(&v->narrow[i], slot, sizeof *v->narrow);
+        frame_widen_exact(&v->f, i, slot);
         for (size_t k = 0; k < DECODE_REF_FIELDS; k++)
             v->g.fields[k * v->g.count + i] = slot[k];
     }
@@ -151,8 +158,15 @@ static void gradient_of(view *v, decode_ref *out)
         double *to = d_slots + v->f.tape.slot[i] * (size_t)DECODE_REF_FIELDS;
         for (size_t k = 0; k < DECODE_REF_FIELDS; k++)
             to[k] = d[k * n + i];
+        const footprint_gaussian *g = &v->narrow[i];
+        if (v->f.widened) {
+            footprint_gaussian back;
+            memcpy(&back, to, sizeof back);
+            footprint_adjoint(&v->f.view, (double)v->f.draw.footprint, 0, g, &back);
+            memcpy(to, &back, sizeof back);
+        }
         for (size_t k = 0; k < 3; k++)
-            to[3 + k] += volume_weight / (double)n * v->g.fields[(3 + (k + 1) % 3) * n + i] * v->g.fields[(3 + (k + 2) % 3) * n + i];
+            to[3 + k] += volume_weight / (double)n * g->scale[(k + 1) % 3] * g->scale[(k + 2) % 3];
     }
     assert_ok(decode_ref_zero(out, &v->p, NULL));
     decode_ref_backward(&v->p, v->center, v->f.visible, v->f.visible_count, d_slots, out);

@@ -1,145 +1,21 @@
 /* tests/train/test_trainer.c -- training runs: same bits whatever happens on the way, budget, growing, no points, hostile surroundings.
 
-   The scene is tiny (photos of 48 x 36), so a run takes a fraction of a second. Nothing here depends on a tuned constant. */
-#include "test_support.h"
+   Nothing here depends on a tuned constant. */
+#include "run_support.h"
 
-#include <ftw.h>
 #include <jansson.h>
 #include <signal.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
-#include <unistd.h>
 
-#include "base/file.h"
 #include "base/log.h"
-#include "base/memory.h"
 #include "base/parallel.h"
 #include "data/photo.h"
-#include "gbtrace/make_scene.h"
 #include "io/model_file.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
 #include "train/seed_points.h"
-#include "train/trainer.h"
-
-enum { PATH_SIZE = 512, STEPS = 60, VIEWS = 9 };
-
-static char root[64], tiny[PATH_SIZE];
-
-/* ---- folders, files ----------------------------------------------------------------------------------------------------------- */
-
-static int remove_one(const char *path, const struct stat *info, int kind, struct FTW *walk)
-{
-    (void)info, (void)kind, (void)walk;
-    return remove(path);
-}
-
-static const char *in_root(const char *format, ...)
-{
-    static char paths[16][PATH_SIZE];
-    static int next = 0;
-    char *path = paths[next = (next + 1) % 16];
-    const int length = snprintf(path, PATH_SIZE, "%s/", root);
-    va_list list;
-    va_start(list, format);
-    vsnprintf(path + length, PATH_SIZE - (size_t)length, format, list);
-    va_end(list);
-    return path;
-}
-
-typedef struct bytes {
-    unsigned char *data;
-    size_t count;
-} bytes;
-
-static bytes read_bytes(const char *path)
-{
-    bytes b;
-    gbt_error err = {0};
-    if (file_read(path, &b.data, &b.count, &err) != GBT_OK)
-        fail_msg("%s", err.text);
-    return b;
-}
-
-static void assert_same_file(const char *a, const char *b)
-{
-    bytes x = read_bytes(a), y = read_bytes(b);
-    if (x.count != y.count || memcmp(x.data, y.data, x.count) != 0)
-        fail_msg("%s and %s differ", a, b);
-    mem_free(x.data);
-    mem_free(y.data);
-}
-
-static bool is_same_file(const char *a, const char *b)
-{
-    bytes x = read_bytes(a), y = read_bytes(b);
-    const bool same = x.count == y.count && memcmp(x.data, y.data, x.count) == 0;
-    mem_free(x.data);
-    mem_free(y.data);
-    return same;
-}
-
-static void make_tiny_scene(const char *folder)
-{
-    gbt_make_scene_def def = gbt_make_scene_def_default();
-    def.width = 48, def.height = 36, def.view_count = VIEWS, def.points = 150, def.samples = 4;
-    gbt_error err = {0};
-    if (gbt_make_scene(&def, folder, &err) != GBT_OK)
-        fail_msg("%s", err.text);
-}
-
-static int make_root(void **state)
-{
-    (void)state;
-    snprintf(root, sizeof root, "/tmp/gbt_train_XXXXXX");
-    if (mkdtemp(root) == NULL)
-        return -1;
-    snprintf(tiny, sizeof tiny, "%s/tiny", root);
-    make_tiny_scene(tiny);
-    return 0;
-}
-
-static int remove_root(void **state)
-{
-    (void)state;
-    return nftw(root, remove_one, 16, FTW_DEPTH | FTW_PHYS);
-}
-
-/* ---- runs --------------------------------------------------------------------------------------------------------------------- */
-
-static gbt_train_def run_def(void)
-{
-    gbt_train_def def = gbt_train_def_default();
-    def.iterations = STEPS;
-    def.seed = 5;
-    def.save_every_seconds = 0;
-    return def;
-}
-
-static void train_ok(const char *data, const char *run, const gbt_train_def *def)
-{
-    gbt_error err = {0};
-    if (gbt_train(data, run, def, &err) != GBT_OK)
-        fail_msg("%s: %s", run, err.text);
-}
-
-static void train_fails(const char *data, const char *run, const gbt_train_def *def, gbt_status wanted, const char *says)
-{
-    gbt_error err = {0};
-    const gbt_status status = gbt_train(data, run, def, &err);
-    if (status != wanted || err.status != wanted || strstr(err.text, says) == NULL || strchr(err.text, '\n') != NULL)
-        fail_msg("wanted status %d and \"%s\", got %d: %s", (int)wanted, says, (int)status, err.text);
-}
-
-static void open_ok(trainer *t, const char *data, const gbt_train_def *def)
-{
-    gbt_error err = {0};
-    *t = (trainer){0};
-    if (trainer_open(t, data, def, &err) != GBT_OK)
-        fail_msg("%s", err.text);
-}
 
 /* The run that others are compared with: STEPS steps in one go. */
 static const char *straight_run(void)
@@ -404,13 +280,6 @@ static void a_budget_run_resumes_its_clock(void **state)
 }
 
 /* ---- what a step does --------------------------------------------------------------------------------------------------------- */
-
-static void step_ok(trainer *t, step_report *report)
-{
-    gbt_error err = {0};
-    if (trainer_step(t, report, &err) != GBT_OK)
-        fail_msg("step %llu: %s", (unsigned long long)t->step, err.text);
-}
 
 static void assert_rows_agree(const trainer *t)
 {
@@ -894,15 +763,15 @@ static void levels_and_rates(void **state)
     }
     double before[6];
     for (int i = 0; i <= 100; i++) { /* positive, finite, and none ever rises */
-        const learning_rates r = schedule_rates(i / 100.0, true, 2.0);
+        const learning_rates r = schedule_rates(i / 100.0, true, 2.0, 1);
         const double now[6] = {r.offset, r.feature, r.scale, r.opacity_mlp, r.shape_mlp, r.color_mlp};
         for (int k = 0; k < 6; k++) {
             assert_true(isfinite(now[k]) && now[k] > 0);
             assert_true(i == 0 || now[k] <= before[k] * (1 + 1e-12));
             before[k] = now[k];
         }
-        assert_true(fabs(r.offset / schedule_rates(i / 100.0, true, 1.0).offset - 2) < 1e-12);
-        assert_true(schedule_rates(i / 100.0, false, 2.0).offset == schedule_rates(i / 100.0, false, 1.0).offset);
+        assert_true(fabs(r.offset / schedule_rates(i / 100.0, true, 1.0, 1).offset - 2) < 1e-12);
+        assert_true(schedule_rates(i / 100.0, false, 2.0, 1).offset == schedule_rates(i / 100.0, false, 1.0, 1).offset);
     }
 }
 
@@ -913,6 +782,7 @@ static void config_comes_back(void **state)
     def.init = "voxel", def.scale_prior = "nn", def.max_depth = 7, def.voxel_size = 0.1f, def.offsets = 3, def.distance = "off";
     def.iterations = 123456789012ull, def.budget_seconds = 1 / 3.0, def.pace = "1,2,3", def.downscale = 1.1, def.start_level = 1;
     def.eval_split = "list=a = b.txt", def.seed = UINT64_MAX, def.max_anchors = 77, def.grow = false, def.compat = true;
+    def.exposure = true, def.learning_rate_factor = 0.3;
     char text[CONFIG_TEXT_SIZE], again[CONFIG_TEXT_SIZE];
     config_text(&def, "/some where/= data", text, sizeof text);
     gbt_train_def back = gbt_train_def_default();
@@ -923,6 +793,7 @@ static void config_comes_back(void **state)
     config_text(&back, strings.data, again, sizeof again);
     assert_string_equal(text, again);
     assert_true(back.voxel_size == def.voxel_size && back.budget_seconds == def.budget_seconds && back.seed == UINT64_MAX && !back.grow && back.compat);
+    assert_true(back.exposure && back.learning_rate_factor == 0.3);
 
     def = gbt_train_def_default();
     config_text(&def, "d", text, sizeof text);

@@ -1,0 +1,67 @@
+#!/usr/bin/env python3
+# renderers -- the same scenes trained by ray tracing and by splatting: held-out PSNR and time, at equal iterations and at equal time.
+#
+#     python3 bench/renderers.py DATA... -o DIR [--gbtrace build/release/gbtrace] [--iterations 1500] [--seeds 0,1,2] [--downscale 1]
+#
+# Three runs per scene and seed: traced, N iterations; splatted, N iterations; splatted for as long as the traced run took. A run that is
+# already in DIR is not repeated. Each model is scored as it was trained, and drawn by the other renderer too.
+import argparse
+import json
+import os
+import statistics
+import subprocess
+
+parser = argparse.ArgumentParser()
+parser.add_argument("data", nargs="+")
+parser.add_argument("-o", "--output", required=True)
+parser.add_argument("--gbtrace", default="build/release/gbtrace")
+parser.add_argument("--iterations", type=int, default=1500)
+parser.add_argument("--seeds", default="0,1,2")
+parser.add_argument("--downscale", type=float, default=1)
+args = parser.parse_args()
+
+
+def call(*words):
+    subprocess.run([args.gbtrace, *words], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def read(path):
+    with open(path) as text:
+        return json.load(text)
+
+
+def train(data, run, renderer, seed, *length):
+    if not os.path.exists(os.path.join(run, "metrics.json")):
+        call("train", data, "-o", run, "--renderer", renderer, "--seed", str(seed), "--downscale", str(args.downscale), *length)
+    if not os.path.exists(os.path.join(run, "crossed.json")):
+        other = "raster" if renderer == "trace" else "trace"
+        call("eval", run, "--renderer", other, "--json", os.path.join(run, "crossed.json"))
+        call("eval", run)
+    figures = read(os.path.join(run, "metrics.json"))
+    figures["crossed"] = read(os.path.join(run, "crossed.json"))["psnr"]
+    return figures
+
+
+def show(values, digits):
+    mean = statistics.mean(values)
+    spread = statistics.stdev(values) if len(values) > 1 else 0
+    return f"{mean:.{digits}f} ± {spread:.{digits}f}"
+
+
+seeds = [int(s) for s in args.seeds.split(",")]
+print("| scene | trained by | iterations | training, s | PSNR, dB | SSIM | drawn by the other, dB | anchors |")
+print("|---|---|---|---|---|---|---|---|")
+for data in args.data:
+    scene = os.path.basename(os.path.normpath(data))
+    rows = {"rays": [], "splats, equal iterations": [], "splats, equal time": []}
+    for seed in seeds:
+        place = os.path.join(args.output, f"{scene}-{seed}")
+        os.makedirs(place, exist_ok=True)
+        traced = train(data, os.path.join(place, "traced"), "trace", seed, "--iterations", str(args.iterations))
+        rows["rays"].append(traced)
+        rows["splats, equal iterations"].append(train(data, os.path.join(place, "splatted"), "raster", seed, "--iterations", str(args.iterations)))
+        rows["splats, equal time"].append(train(data, os.path.join(place, "splatted-time"), "raster", seed, "--budget", f"{traced['train_seconds']:.0f}s"))
+    for name, runs in rows.items():
+        print(f"| {scene} | {name} | {show([r['iterations'] for r in runs], 0)} | {show([r['train_seconds'] for r in runs], 0)} "
+              f"| {show([r['psnr'] for r in runs], 2)} | {show([r['ssim'] for r in runs], 4)} | {show([r['crossed'] for r in runs], 2)} "
+              f"| {show([r['anchors_final'] for r in runs], 0)} |", flush=True)

@@ -1,0 +1,22 @@
+/* anchor/decode_raise.c -- bring Gaussians back to where gradients reach them. */
+#include "anchor/decode.h"
+
+#include <math.h>
+
+#include "anchor/decode_layout.h"
+
+void decode_raise_opacity(const decode_tape *tape, float least, float opacity, decoder *d)
+{
+    decoder_part parts[HEAD_COUNT];
+    decoder_parts(d, parts);
+    const size_t offsets = (size_t)d->offset_count;
+    float *bias = d->params + parts[0].end - offsets;
+    for (size_t k = 0; k < offsets && tape->visible_count > 0; k++) {
+        double sum = 0;
+        for (size_t v = 0; v < tape->visible_count; v++)
+            sum += (double)tape->alpha[v * ALPHA_STRIDE + k];
+        const double mean = sum / (double)tape->visible_count, lowest = -0.9999;
+        if (mean < (double)least)
+            bias[k] += (float)(atanh((double)opacity) - atanh(fmax(mean, lowest)));
+    }
+}

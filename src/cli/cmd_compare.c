@@ -1,0 +1,43 @@
+/* cli/cmd_compare.c -- gbtrace compare. */
+#include <math.h>
+#include <stdio.h>
+
+#include "cli/options.h"
+#include "gbtrace/evaluate.h"
+
+static void print_number(const char *name, double value, const char *end)
+{
+    if (isfinite(value))
+        printf("\"%s\": %.9g%s", name, value, end);
+    else
+        printf("\"%s\": null%s", name, end);
+}
+
+static int run(const command *self, int argc, char **argv)
+{
+    bool json = false;
+    const option options[] = {
+        {.name = "json", .kind = OPTION_FLAG, .value = &json, .help = "as JSON"},
+    };
+    operands named;
+    const int code = options_parse(self, options, sizeof options / sizeof *options, 2, 2, argc, argv, &named);
+    if (code >= 0)
+        return code;
+    gbt_error err = {0};
+    gbt_comparison c;
+    const gbt_status status = gbt_compare_images(named.value[0], named.value[1], &c, &err);
+    if (status != GBT_OK)
+        return command_failed(status, &err);
+    if (json) {
+        printf("{\"schema\": 1, \"width\": %d, \"height\": %d, ", c.width, c.height);
+        print_number("psnr", c.psnr, ", ");
+        print_number("ssim", c.ssim, ", ");
+        print_number("ssim_interior", c.ssim_interior, ", ");
+        print_number("flip", c.flip, "}\n");
+    } else {
+        printf("%d x %d: PSNR %.4f dB, SSIM %.6f (windows inside: %.6f), FLIP %.6f\n", c.width, c.height, c.psnr, c.ssim, c.ssim_interior, c.flip);
+    }
+    return 0;
+}
+
+const command command_compare = {.name = "compare", .summary = "two pictures: PSNR, SSIM, FLIP", .usage = "IMAGE REFERENCE", .run = run};

@@ -1,0 +1,38 @@
+/* eval/compare_images.c -- two image files, how far apart: what bench/versus_metrics holds against other programs. */
+#include <math.h>
+
+#include "base/fail.h"
+#include "base/image.h"
+#include "gbtrace/evaluate.h"
+#include "image/metrics.h"
+
+/* Three channels, rounded to 8 bit. */
+static gbt_status read_colors(const char *path, image *out, gbt_error *err)
+{
+    GBT_TRY(image_read(path, out, err));
+    const size_t pixels = (size_t)out->width * (size_t)out->height, stored = (size_t)out->channels;
+    for (size_t i = 0; i < pixels; i++)
+        for (size_t c = 0; c < 3; c++)
+            out->pixels[3 * i + c] = out->pixels[stored * i + c];
+    out->channels = 3;
+    image_quantize(out);
+    return GBT_OK;
+}
+
+gbt_status gbt_compare_images(const char *path, const char *reference, gbt_comparison *out, gbt_error *err)
+{
+    image a = {0}, b = {0};
+    *out = (gbt_comparison){0};
+    gbt_status status = read_colors(path, &a, err);
+    if (status == GBT_OK)
+        status = read_colors(reference, &b, err);
+    if (status == GBT_OK && (a.width != b.width || a.height != b.height))
+        status = base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted %d x %d as %s)", path, a.width, a.height, b.width, b.height, reference);
+    if (status == GBT_OK) {
+        *out = (gbt_comparison){a.width, a.height, metric_psnr(&a, &b), metric_ssim(&a, &b), metric_ssim_interior(&a, &b), 0};
+        status = metric_flip(&a, &b, &out->flip, NULL, err);
+    }
+    image_free(&a);
+    image_free(&b);
+    return status;
+}

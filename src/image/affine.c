@@ -1,0 +1,174 @@
+/* image/affine.c -- colour matrices: apply, adjoint, least squares. */
+#include "image/affine.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/parallel.h"
+
+enum { INPUTS = 4, OUTPUTS = 3, BLOCKS_MAX = 64 };
+
+void affine_identity(float m[AFFINE_NUMBERS])
+{
+    for (int i = 0; i < AFFINE_NUMBERS; i++)
+        m[i] = i % (INPUTS + 1) == 0 ? 1.0f : 0.0f;
+}
+
+typedef struct affine_job {
+    const float *m;
+    const image *in;
+    image *out;
+    double sums[BLOCKS_MAX][AFFINE_NUMBERS];
+} affine_job;
+
+static size_t pixel_count(const image *im)
+{
+    return (size_t)im->width * (size_t)im->height;
+}
+
+/* At most BLOCKS_MAX blocks, by the size alone. */
+static size_t block_grain(size_t pixels)
+{
+    const size_t even = (pixels + BLOCKS_MAX - 1) / BLOCKS_MAX;
+    return even < 4096 ? 4096 : even;
+}
+
+static void apply_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const affine_job *job = context;
+    const float *m = job->m;
+    for (size_t i = 3 * begin; i < 3 * end; i += 3) {
+        const float r = job->in->pixels[i], g = job->in->pixels[i + 1], b = job->in->pixels[i + 2];
+        for (size_t c = 0; c < OUTPUTS; c++)
+            job->out->pixels[i + c] = m[4 * c] * r + m[4 * c + 1] * g + m[4 * c + 2] * b + m[4 * c + 3];
+    }
+}
+
+void affine_apply(const float m[AFFINE_NUMBERS], const image *in, image *out)
+{
+    affine_job job = {.m = m, .in = in, .out = out};
+    parallel_blocks(pixel_count(in), block_grain(pixel_count(in)), apply_block, &job);
+}
+
+static void backward_block(size_t block, size_t begin, size_t end, void *context)
+{
+    affine_job *job = context;
+    const float *m = job->m;
+    double *sum = job->sums[block];
+    for (size_t i = 3 * begin; i < 3 * end; i += 3) {
+        const float *in = job->in->pixels + i;
+        float *d = job->out->pixels + i;
+        const float up[OUTPUTS] = {d[0], d[1], d[2]};
+        for (size_t c = 0; c < OUTPUTS; c++) {
+            for (size_t k = 0; k < 3; k++)
+                sum[4 * c + k] += (double)up[c] * (double)in[k];
+            sum[4 * c + 3] += (double)up[c];
+            d[c] = m[c] * up[0] + m[4 + c] * up[1] + m[8 + c] * up[2];
+        }
+    }
+}
+
+void affine_backward(const float m[AFFINE_NUMBERS], const image *in, image *d, double d_m[AFFINE_NUMBERS])
+{
+    affine_job job = {.m = m, .in = in, .out = d};
+    const size_t count = pixel_count(in), grain = block_grain(count);
+    parallel_blocks(count, grain, backward_block, &job);
+    for (int k = 0; k < AFFINE_NUMBERS; k++)
+        d_m[k] = 0;
+    for (size_t b = 0; b < parallel_block_count(count, grain); b++)
+        for (int k = 0; k < AFFINE_NUMBERS; k++)
+            d_m[k] += job.sums[b][k];
+}
+
+/* ---- least squares ------------------------------------------------------------------------------------------------------------ */
+
+/* a x = b for a symmetric positive definite 4 x 4 and three right sides, by a = l l^T in place. */
+static void solve(double a[INPUTS][INPUTS], double b[OUTPUTS][INPUTS])
+{
+    for (int i = 0; i < INPUTS; i++)
+        for (int j = 0; j <= i; j++) {
+            double sum = a[i][j];
+            for (int k = 0; k < j; k++)
+                sum -= a[i][k] * a[j][k];
+            a[i][j] = i == j ? sqrt(sum) : sum / a[j][j];
+        }
+    for (int r = 0; r < OUTPUTS; r++) {
+        for (int i = 0; i < INPUTS; i++) {
+            for (int k = 0; k < i; k++)
+                b[r][i] -= a[i][k] * b[r][k];
+            b[r][i] /= a[i][i];
+        }
+        for (int i = INPUTS - 1; i >= 0; i--) {
+            for (int k = i + 1; k < INPUTS; k++)
+                b[r][i] -= a[k][i] * b[r][k];
+            b[r][i] /= a[i][i];
+        }
+    }
+}
+
+static double finite_or_0(float value)
+{
+    return isfinite(value) ? (double)value : 0;
+}
+
+void affine_fit(const image *from, const image *to, int begin, int end, float m[AFFINE_NUMBERS])
+{
+    const double ridge = 1e-6;
+    double a[INPUTS][INPUTS] = {{0}}, b[OUTPUTS][INPUTS] = {{0}};
+    for (int y = 0; y < from->height; y++)
+        for (int x = begin; x < end; x++) {
+            const size_t at = 3 * ((size_t)y * (size_t)from->width + (size_t)x);
+            const float *p = from->pixels + at, *q = to->pixels + at;
+            const double in[INPUTS] = {finite_or_0(p[0]), finite_or_0(p[1]), finite_or_0(p[2]), 1};
+            for (int i = 0; i < INPUTS; i++) {
+                for (int j = 0; j <= i; j++)
+                    a[i][j] += in[i] * in[j];
+                for (int r = 0; r < OUTPUTS; r++)
+                    b[r][i] += in[i] * finite_or_0(q[r]);
+            }
+        }
+    const double weight = ridge * fmax(1, (double)from->height * (double)(end - begin));
+    for (int i = 0; i < INPUTS; i++) {
+        a[i][i] += weight;
+        if (i < OUTPUTS)
+            b[i][i] += weight;
+    }
+    solve(a, b);
+    for (int r = 0; r < OUTPUTS; r++)
+        for (int i = 0; i < INPUTS; i++)
+            m[4 * r + i] = (float)b[r][i];
+}
+
+/* ---- left and right ------------------------------------------------------------------------------------------------------------- */
+
+static void copy_right(const image *in, image *out)
+{
+    const size_t row = 3 * (size_t)in->width, kept = 3 * (size_t)out->width;
+    for (size_t y = 0; y < (size_t)in->height; y++)
+        memcpy(out->pixels + y * kept, in->pixels + y * row + (row - kept), kept * sizeof *out->pixels);
+}
+
+gbt_status affine_split(image *render, const image *photo, image *render_right, image *photo_right, gbt_error *err)
+{
+    memset(render_right, 0, sizeof *render_right);
+    memset(photo_right, 0, sizeof *photo_right);
+    if (render->channels != 3 || photo->channels != 3 || render->width != photo->width || render->height != photo->height)
+        return base_fail(err, GBT_ERR_ARGUMENT, "exposure: images of %d x %d x %d and %d x %d x %d (wanted equal, 3 channels)", render->width,
+                         render->height, render->channels, photo->width, photo->height, photo->channels);
+    const int left = render->width / 2;
+    gbt_status status = image_alloc(render_right, render->width - left, render->height, 3, err);
+    if (status == GBT_OK)
+        status = image_alloc(photo_right, render->width - left, render->height, 3, err);
+    if (status != GBT_OK) {
+        image_free(render_right);
+        return status;
+    }
+    float m[AFFINE_NUMBERS];
+    affine_fit(render, photo, 0, left, m);
+    affine_apply(m, render, render);
+    copy_right(render, render_right);
+    copy_right(photo, photo_right);
+    return GBT_OK;
+}

@@ -1,0 +1,3 @@
+/* raster/kernel_plain.c -- the rasterizer's kernels for plain; compiled with the flags of that instruction set. */
+#define KERNEL_NAME raster_kernel_plain
+#include "raster/kernel.inc.h"

@@ -1,0 +1,52 @@
+/* train/sampling.c -- smallest pixel per anchor. */
+#include "train/sampling.h"
+
+#include <math.h>
+
+#include "base/parallel.h"
+#include "base/vec.h"
+#include "trace/footprint.h"
+
+enum { ANCHOR_BLOCK = 1024 };
+
+typedef struct sampling_job {
+    const anchors *a;
+    const gbt_camera *cameras;
+    size_t camera_count;
+    float *out;
+} sampling_job;
+
+static bool is_in_picture(const gbt_camera *camera, const double point[3])
+{
+    double local[3], pixel[2];
+    for (int k = 0; k < 3; k++)
+        local[k] = point[k] - camera->center[k];
+    dmat_apply(camera->rotation, local, local);
+    return gbt_camera_project(camera, local, pixel) && pixel[0] >= 0 && pixel[0] <= camera->width && pixel[1] >= 0 && pixel[1] <= camera->height;
+}
+
+static void sampling_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const sampling_job *job = context;
+    for (size_t i = begin; i < end; i++)
+        job->out[i] = INFINITY;
+    for (size_t c = 0; c < job->camera_count; c++) {
+        const footprint_view view = footprint_view_of(&job->cameras[c]);
+        for (size_t i = begin; i < end; i++) {
+            const float *p = job->a->position + 3 * i;
+            const double point[3] = {(double)p[0], (double)p[1], (double)p[2]};
+            const float pixel = (float)footprint_pixel(&view, point);
+            if (pixel < job->out[i] && is_in_picture(&job->cameras[c], point))
+                job->out[i] = pixel;
+        }
+    }
+    for (size_t i = begin; i < end; i++)
+        job->out[i] = isfinite(job->out[i]) ? job->out[i] : 0;
+}
+
+void sampling_find(const anchors *a, const gbt_camera *cameras, size_t camera_count, float *out)
+{
+    sampling_job job = {a, cameras, camera_count, out};
+    parallel_blocks(a->count, ANCHOR_BLOCK, sampling_block, &job);
+}

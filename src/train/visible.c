@@ -1,0 +1,286 @@
+/* train/visible.c -- bounds on all rays of a view, and the anchors that they may reach. */
+#include "train/visible.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/camera_lens.h"
+#include "base/camera_pose.h"
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/vec.h"
+
+enum { ANCHOR_BLOCK = 4096, ROW_GRAIN = 16 };
+
+/* What is asked of the rays: `axes` turns world to the axes in which slopes are taken. */
+typedef struct bounds_job {
+    const ray_image *rays;
+    double axes[9], center[3], axis[3];
+    double normal[VIEW_PLANES][3];
+    struct block_bounds *blocks;
+} bounds_job;
+
+typedef struct block_bounds {
+    double cos_min, depth_min, low[2], high[2], origin_square, offset[VIEW_PLANES];
+} block_bounds;
+
+static bool ray_at(const ray_image *rays, size_t i, const double center[3], double start[3], double dir[3])
+{
+    const float *o = ray_image_origin(rays, i), *d = rays->dir + 3 * i;
+    for (int k = 0; k < 3; k++)
+        start[k] = (double)o[k] - center[k], dir[k] = (double)d[k];
+    return d[0] != 0 || d[1] != 0 || d[2] != 0;
+}
+
+/* The smaller or larger of two, and the second when the first is not a number; fmin() would be a call for every ray. */
+static inline double least(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+static inline double most(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+static void bound_directions(size_t block, size_t begin, size_t end, void *context)
+{
+    const bounds_job *job = context;
+    const size_t width = (size_t)job->rays->width;
+    block_bounds out = job->blocks[block];
+    for (size_t i = begin * width; i < end * width; i++) {
+        double start[3], dir[3], turned[3];
+        if (!ray_at(job->rays, i, job->center, start, dir))
+            continue;
+        dmat_apply(job->axes, dir, turned);
+        out.cos_min = least(dvec_dot(dir, job->axis), out.cos_min);
+        out.depth_min = least(turned[2], out.depth_min);
+        out.origin_square = most(dvec_dot(start, start), out.origin_square);
+        if (turned[2] > 0.05) {
+            const double x = turned[0] / turned[2], y = turned[1] / turned[2];
+            out.low[0] = least(x, out.low[0]), out.high[0] = most(x, out.high[0]);
+            out.low[1] = least(y, out.low[1]), out.high[1] = most(y, out.high[1]);
+        }
+    }
+    job->blocks[block] = out;
+}
+
+static void bound_offsets(size_t block, size_t begin, size_t end, void *context)
+{
+    const bounds_job *job = context;
+    const size_t width = (size_t)job->rays->width;
+    for (size_t i = begin * width; i < end * width; i++) {
+        double start[3], dir[3];
+        if (ray_at(job->rays, i, job->center, start, dir))
+            for (int p = 0; p < VIEW_PLANES; p++)
+                job->blocks[block].offset[p] = most(dvec_dot(job->normal[p], start), job->blocks[block].offset[p]);
+    }
+}
+
+static block_bounds no_bounds(void)
+{
+    block_bounds b = {.cos_min = 1, .depth_min = 1, .low = {1e9, 1e9}, .high = {-1e9, -1e9}};
+    for (int p = 0; p < VIEW_PLANES; p++)
+        b.offset[p] = -HUGE_VAL;
+    return b;
+}
+
+static block_bounds join(const block_bounds *blocks, size_t count)
+{
+    block_bounds all = no_bounds();
+    for (size_t i = 0; i < count; i++) {
+        const block_bounds *b = &blocks[i];
+        all.cos_min = fmin(all.cos_min, b->cos_min), all.depth_min = fmin(all.depth_min, b->depth_min);
+        all.origin_square = fmax(all.origin_square, b->origin_square);
+        for (int k = 0; k < 2; k++)
+            all.low[k] = fmin(all.low[k], b->low[k]), all.high[k] = fmax(all.high[k], b->high[k]);
+        for (int p = 0; p < VIEW_PLANES; p++)
+            all.offset[p] = fmax(all.offset[p], b->offset[p]);
+    }
+    return all;
+}
+
+/* The mean direction of every 7th ray; 0 without rays. */
+static void find_axis(const ray_image *rays, double axis[3])
+{
+    axis[0] = axis[1] = axis[2] = 0;
+    const size_t count = ray_image_count(rays);
+    for (size_t i = 0; i < count; i += 7)
+        for (int k = 0; k < 3; k++)
+            axis[k] += (double)rays->dir[3 * i + (size_t)k];
+    dvec_normalize(axis);
+}
+
+/* Axes in which to take slopes: the camera's, or for given rays some with z along their mean direction. */
+static void find_axes(const ray_shot *shot, const double axis[3], double axes[9])
+{
+    gbt_camera look = shot->camera;
+    const double here[3] = {0, 0, 0}, up[3] = {fabs(axis[0]) < 0.6, fabs(axis[0]) >= 0.6, 0};
+    if (shot->given != NULL)
+        camera_look_at(here, axis, up, &look); /* fails for a zero axis: then no ray looks forward in any axes */
+    memcpy(axes, look.rotation, sizeof look.rotation);
+}
+
+/* The mean of the ray origins, rounded to float. */
+static void find_center(const ray_image *rays, float center[3])
+{
+    const double none[3] = {0, 0, 0};
+    double sum[3] = {0, 0, 0}, start[3], dir[3];
+    size_t used = 0;
+    if (rays->common_origin) {
+        memcpy(center, rays->origin, 3 * sizeof *center);
+        return;
+    }
+    for (size_t i = 0; i < ray_image_count(rays); i++) {
+        if (!ray_at(rays, i, none, start, dir))
+            continue;
+        used++;
+        for (int k = 0; k < 3; k++)
+            sum[k] += start[k];
+    }
+    for (int k = 0; k < 3; k++)
+        center[k] = used > 0 ? (float)(sum[k] / (double)used) : 0;
+}
+
+/* Unit normals in world axes: right, left, bottom, top of the slopes, and what is behind. */
+static void find_normals(bounds_job *job, const block_bounds *all, double spread)
+{
+    for (int k = 0; k < 2; k++)
+        for (int sign = 0; sign < 2; sign++) {
+            const double slope = sign == 0 ? (all->high[k] + spread) * (1 + 1e-3) + 1e-3 : (all->low[k] - spread) * (1 + 1e-3) - 1e-3;
+            double n[3] = {0, 0, 0};
+            n[k] = sign == 0 ? 1 : -1;
+            n[2] = sign == 0 ? -slope : slope;
+            dvec_normalize(n);
+            dmat_apply_transposed(job->axes, n, job->normal[2 * k + sign]);
+        }
+    for (int k = 0; k < 3; k++)
+        job->normal[4][k] = -job->axis[k];
+}
+
+/* Is the image of a slope under another point of the aperture known? With a plane in focus every ray of a pixel is divided by the same
+   depth, in the axes of the pose that took it. */
+static bool slopes_are_known(const ray_shot *shot, double aperture)
+{
+    camera_lens lens;
+    return aperture <= 0 || (shot->shutter == RAY_SHUTTER_GLOBAL && camera_lens_prepare(&shot->camera, &lens) && camera_lens_looks_forward(&lens));
+}
+
+/* `rays` are those through the middle of the aperture. Another point of it shifts an origin by at most its radius R, and with the focus
+   at F a slope by at most R / F and a direction by at most asin(R / F). */
+gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bounds *out, gbt_error *err)
+{
+    bounds_job job = {.rays = rays};
+    const double aperture = shot->given == NULL ? shot->aperture_radius : 0, spread = aperture > 0 ? aperture / shot->focus_distance : 0;
+    const size_t rows = (size_t)rays->height, count = parallel_block_count(rows, ROW_GRAIN);
+    find_axis(rays, job.axis);
+    find_axes(shot, job.axis, job.axes);
+    find_center(rays, out->center);
+    for (int k = 0; k < 3; k++)
+        job.center[k] = (double)out->center[k], out->axis[k] = (float)job.axis[k];
+    job.blocks = mem_alloc(count, sizeof *job.blocks, "view bounds", err);
+    if (job.blocks == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < count; i++)
+        job.blocks[i] = no_bounds();
+    parallel_blocks(rows, ROW_GRAIN, bound_directions, &job);
+    block_bounds all = join(job.blocks, count);
+    const double widest = fmin(1, fmax(-1, all.cos_min)), sine = sqrt(1 - widest * widest);
+    const double cos_spread = sqrt(fmax(0, 1 - spread * spread));
+    const bool all_around = spread >= 1 || sine * cos_spread + widest * spread < 0; /* angles beyond 180 degrees */
+    const double cos_wide = all_around ? -1 : widest * cos_spread - sine * spread, cos_min = fmax(cos_wide - 2e-3, -1);
+    out->cos_angle = (float)cos_min;
+    out->sin_angle = (float)sqrt(fmax(0, 1 - cos_min * cos_min));
+    out->plane_count = all.depth_min > 0.05 && slopes_are_known(shot, aperture) ? cos_wide > 0 ? 5 : 4 : 0;
+    find_normals(&job, &all, spread);
+    if (!rays->common_origin) {
+        parallel_blocks(rows, ROW_GRAIN, bound_offsets, &job);
+        all = join(job.blocks, count);
+    }
+    mem_free(job.blocks);
+    /* Origins were rounded to float. */
+    const double rounding = 1e-6 * (dvec_length(job.center) + sqrt(all.origin_square) + aperture);
+    const bool one_origin = rays->common_origin && aperture <= 0;
+    out->origin_radius = one_origin ? 0 : (float)(sqrt(all.origin_square) + aperture + rounding);
+    for (int p = 0; p < VIEW_PLANES; p++) {
+        const double farthest = rays->common_origin ? 0 : fmax(all.offset[p], -1e18);
+        out->offset[p] = one_origin ? 0 : (float)(farthest + aperture + rounding);
+        for (int k = 0; k < 3; k++)
+            out->plane[p][k] = (float)job.normal[p][k];
+    }
+    return GBT_OK;
+}
+
+/* Radius of a ball around the anchor that holds the proxies of all its Gaussians. */
+static float anchor_reach(const anchors *a, size_t i, const visible_reach *reach, const float eye[3])
+{
+    const float *l = a->scale_log + 6 * i;
+    const float ex = expf(fminf(l[0], 30.0f)), ey = expf(fminf(l[1], 30.0f)), ez = expf(fminf(l[2], 30.0f));
+    const float *o = a->offset + 3 * (size_t)a->offset_count * i;
+    float far_square = 0;
+    for (int k = 0; k < a->offset_count; k++, o += 3) {
+        const float x = o[0] * ex, y = o[1] * ey, z = o[2] * ez;
+        far_square = fmaxf(far_square, x * x + y * y + z * z);
+    }
+    const float scale = expf(fminf(fmaxf(l[3], fmaxf(l[4], l[5])), 30.0f)), farthest = sqrtf(far_square);
+    if (reach->width <= 0)
+        return farthest + reach->sigmas * scale;
+    const float d[3] = {a->position[3 * i] - eye[0], a->position[3 * i + 1] - eye[1], a->position[3 * i + 2] - eye[2]};
+    const float pixel = reach->pixel * (reach->parallel ? 1 : sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) + farthest);
+    return farthest + reach->sigmas * (scale + reach->width * fmaxf(pixel, reach->pixel_min != NULL ? reach->pixel_min[i] : 0));
+}
+
+static bool is_visible(const view_bounds *b, const float position[3], float reach)
+{
+    const float d[3] = {position[0] - b->center[0], position[1] - b->center[1], position[2] - b->center[2]};
+    for (int i = 0; i < b->plane_count; i++)
+        if (!(b->plane[i][0] * d[0] + b->plane[i][1] * d[1] + b->plane[i][2] * d[2] <= b->offset[i] + reach))
+            return false; /* and an anchor that is not a number */
+    if (b->plane_count > 0)
+        return true;
+    /* A ray from elsewhere reaches the ball only if one from the centre reaches a ball that is larger by its distance. */
+    reach += b->origin_radius;
+    const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    if (square <= reach * reach)
+        return true;
+    /* Cone of half angle A, ball seen under half angle B: they meet when the angle between axis and centre is at most A + B. */
+    const float length = sqrtf(square), along = (b->axis[0] * d[0] + b->axis[1] * d[1] + b->axis[2] * d[2]) / length;
+    const float sin_ball = reach / length, cos_ball = sqrtf(1 - sin_ball * sin_ball);
+    const float cos_sum = b->cos_angle * cos_ball - b->sin_angle * sin_ball;
+    return b->sin_angle * cos_ball + b->cos_angle * sin_ball < 0 || along >= cos_sum; /* A + B beyond 180 degrees sees everything */
+}
+
+typedef struct visible_job {
+    const anchors *a;
+    const view_bounds *bounds;
+    const visible_reach *reach;
+    uint32_t *out;       /* [count]; block b writes from its own begin */
+    uint32_t *out_count; /* per block */
+} visible_job;
+
+static void visible_block(size_t block, size_t begin, size_t end, void *context)
+{
+    const visible_job *job = context;
+    uint32_t kept = 0;
+    for (size_t i = begin; i < end; i++)
+        if (is_visible(job->bounds, job->a->position + 3 * i, anchor_reach(job->a, i, job->reach, job->bounds->center)))
+            job->out[begin + kept++] = (uint32_t)i;
+    job->out_count[block] = kept;
+}
+
+gbt_status visible_find(const anchors *a, const view_bounds *bounds, const visible_reach *reach, uint32_t **visible, size_t *count, size_t *capacity,
+                        gbt_error *err)
+{
+    const size_t blocks = parallel_block_count(a->count, ANCHOR_BLOCK);
+    GBT_TRY(mem_reserve((void **)visible, capacity, 0, a->count + blocks + 1, sizeof **visible, "visible anchors", err));
+    uint32_t *list = *visible;
+    visible_job job = {a, bounds, reach, list, list + a->count};
+    parallel_blocks(a->count, ANCHOR_BLOCK, visible_block, &job);
+    *count = 0;
+    for (size_t b = 0; b < blocks; b++) {
+        memmove(list + *count, list + b * ANCHOR_BLOCK, job.out_count[b] * sizeof *list);
+        *count += job.out_count[b];
+    }
+    return GBT_OK;
+}

@@ -1,0 +1,109 @@
+/* tests/eval/test_compare.c -- two image files compared: the figures of the metrics themselves, alpha and formats, what is refused. */
+#include "test_support.h"
+
+#include <unistd.h>
+
+#include "base/image.h"
+#include "base/rng.h"
+#include "gbtrace/evaluate.h"
+#include "image/metrics.h"
+
+static char folder[] = "/tmp/gbt_compare_XXXXXX";
+
+static const char *in_folder(const char *name)
+{
+    static char paths[4][128];
+    static int next = 0;
+    char *path = paths[next = (next + 1) % 4];
+    snprintf(path, sizeof paths[0], "%s/%s", folder, name);
+    return path;
+}
+
+/* Noise on an even grid of levels, so that a PNG keeps it. */
+static image noise(int width, int height, int channels, uint64_t seed)
+{
+    image im;
+    assert_ok(image_alloc(&im, width, height, channels, NULL));
+    for (int i = 0; i < width * height * channels; i++)
+        im.pixels[i] = floorf(rng_uniform(seed, 0, (uint64_t)i) * 255.0f) / 255.0f;
+    return im;
+}
+
+static void write_noise(const char *name, int width, int height, int channels, uint64_t seed)
+{
+    image im = noise(width, height, channels, seed);
+    assert_ok(image_write(in_folder(name), &im, NULL));
+    image_free(&im);
+}
+
+static void figures_are_those_of_the_metrics(void **state)
+{
+    (void)state;
+    write_noise("a.png", 24, 20, 3, 1);
+    write_noise("b.exr", 24, 20, 3, 2);
+    image a = noise(24, 20, 3, 1), b = noise(24, 20, 3, 2);
+    gbt_comparison c;
+    double flip;
+    assert_ok(gbt_compare_images(in_folder("a.png"), in_folder("b.exr"), &c, NULL));
+    assert_ok(metric_flip(&a, &b, &flip, NULL, NULL));
+    assert_true(c.width == 24 && c.height == 20 && c.psnr == metric_psnr(&a, &b) && c.flip == flip);
+    assert_true(c.ssim == metric_ssim(&a, &b) && c.ssim_interior == metric_ssim_interior(&a, &b));
+    assert_true(c.ssim != c.ssim_interior);
+    assert_ok(gbt_compare_images(in_folder("a.png"), in_folder("a.png"), &c, NULL));
+    assert_true(c.psnr == METRIC_PSNR_MAX && c.ssim == 1 && c.ssim_interior == 1 && c.flip == 0);
+    image_free(&a), image_free(&b);
+}
+
+static void alpha_is_left_out(void **state)
+{
+    (void)state;
+    image with = noise(16, 16, 4, 5), without;
+    assert_ok(image_alloc(&without, 16, 16, 3, NULL));
+    for (int i = 0; i < 16 * 16; i++)
+        memcpy(without.pixels + 3 * i, with.pixels + 4 * i, 3 * sizeof(float));
+    assert_ok(image_write(in_folder("with.png"), &with, NULL));
+    assert_ok(image_write(in_folder("without.png"), &without, NULL));
+    gbt_comparison c;
+    assert_ok(gbt_compare_images(in_folder("with.png"), in_folder("without.png"), &c, NULL));
+    assert_true(c.psnr == METRIC_PSNR_MAX && c.ssim == 1);
+    image_free(&with), image_free(&without);
+}
+
+static void what_cannot_be_compared(void **state)
+{
+    (void)state;
+    write_noise("small.png", 8, 8, 3, 1);
+    write_noise("wide.png", 9, 8, 3, 1);
+    const struct { const char *a, *b; gbt_status status; const char *says; } cases[] = {
+        {"small.png", "wide.png", GBT_ERR_ARGUMENT, "8 x 8"}, {"none.png", "wide.png", GBT_ERR_IO, "none.png"}, {"wide.png", "none.png", GBT_ERR_IO, "none.png"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        gbt_comparison c;
+        gbt_error err = {0};
+        assert_int_equal(gbt_compare_images(in_folder(cases[i].a), in_folder(cases[i].b), &c, &err), cases[i].status);
+        assert_non_null(strstr(err.text, cases[i].says));
+    }
+    gbt_comparison c;
+    assert_ok(gbt_compare_images(in_folder("small.png"), in_folder("small.png"), &c, NULL));
+    assert_true(c.ssim == 1 && isnan(c.ssim_interior)); /* no window fits */
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"a.png", "b.exr", "with.png", "without.png", "small.png", "wide.png"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        remove(in_folder(names[i]));
+    return rmdir(folder);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(figures_are_those_of_the_metrics),
+        cmocka_unit_test(alpha_is_left_out),
+        cmocka_unit_test(what_cannot_be_compared),
+    };
+    if (mkdtemp(folder) == NULL)
+        return 1;
+    return cmocka_run_group_tests(tests, NULL, remove_folder);
+}

@@ -1,0 +1,171 @@
+/* tests/image/test_affine.c -- colour matrices: by hand, adjoint against differences, least squares that come back, halves. */
+#include "image_support.h"
+
+#include "base/parallel.h"
+#include "image/affine.h"
+
+static void fill_matrix(float m[AFFINE_NUMBERS], uint64_t seed)
+{
+    affine_identity(m);
+    for (uint64_t i = 0; i < AFFINE_NUMBERS; i++)
+        m[i] += 0.8f * rng_uniform(seed, 1, i) - 0.4f;
+}
+
+static void by_hand(void **state)
+{
+    (void)state;
+    float m[AFFINE_NUMBERS] = {2, 0, 0, 0.5f, 0, 0, 1, 0, 0, -1, 0, 0.25f};
+    image im = make_image(1, 1, 3);
+    im.pixels[0] = 0.25f, im.pixels[1] = 0.5f, im.pixels[2] = 0.75f;
+    affine_apply(m, &im, &im);
+    assert_true(im.pixels[0] == 1.0f && im.pixels[1] == 0.75f && im.pixels[2] == -0.25f);
+    affine_identity(m);
+    image noise = make_noise(9, 7, 3, 1), same = make_image(9, 7, 3);
+    affine_apply(m, &noise, &same);
+    assert_memory_equal(noise.pixels, same.pixels, 9 * 7 * 3 * sizeof(float));
+    image_free(&im), image_free(&noise), image_free(&same);
+}
+
+/* f = sum of weight * m(in), in double. */
+static double weighted(const float m[AFFINE_NUMBERS], const image *in, const image *weight)
+{
+    double sum = 0;
+    for (int i = 0; i < 3 * in->width * in->height; i += 3)
+        for (int r = 0; r < 3; r++) {
+            double value = (double)m[4 * r + 3];
+            for (int k = 0; k < 3; k++)
+                value += (double)m[4 * r + k] * (double)in->pixels[i + k];
+            sum += (double)weight->pixels[i + r] * value;
+        }
+    return sum;
+}
+
+/* f is linear in the matrix and in the picture, so a difference of any size is exact but for rounding. */
+static void adjoint_agrees_with_differences(void **state)
+{
+    (void)state;
+    enum { WIDTH = 83, HEIGHT = 61 };
+    float m[AFFINE_NUMBERS];
+    fill_matrix(m, 3);
+    image in = make_noise(WIDTH, HEIGHT, 3, 4), weight = make_noise(WIDTH, HEIGHT, 3, 5), d = make_noise(WIDTH, HEIGHT, 3, 5);
+    double d_m[AFFINE_NUMBERS];
+    affine_backward(m, &in, &d, d_m);
+    for (int k = 0; k < AFFINE_NUMBERS; k++) {
+        float up[AFFINE_NUMBERS], down[AFFINE_NUMBERS];
+        memcpy(up, m, sizeof m), memcpy(down, m, sizeof m);
+        up[k] += 0.5f, down[k] -= 0.5f;
+        const double step = (double)up[k] - (double)down[k];
+        assert_near(d_m[k], (weighted(up, &in, &weight) - weighted(down, &in, &weight)) / step, 1e-8 * fabs(d_m[k]));
+    }
+    for (int i = 0; i < 3 * WIDTH * HEIGHT; i += 37) {
+        const float keep = in.pixels[i];
+        in.pixels[i] = keep + 0.5f;
+        const double high = weighted(m, &in, &weight);
+        in.pixels[i] = keep;
+        assert_near((double)d.pixels[i], (high - weighted(m, &in, &weight)) / ((double)(keep + 0.5f) - (double)keep), 1e-6);
+    }
+    image_free(&in), image_free(&weight), image_free(&d);
+}
+
+static void threads_give_the_same_bits(void **state)
+{
+    (void)state;
+    const int before = parallel_threads();
+    float m[AFFINE_NUMBERS];
+    fill_matrix(m, 8);
+    image in = make_noise(512, 300, 3, 9);
+    double d_m[3][AFFINE_NUMBERS];
+    for (int threads = 1; threads <= 3; threads++) {
+        parallel_set_threads(threads);
+        image d = make_noise(512, 300, 3, 10);
+        affine_backward(m, &in, &d, d_m[threads - 1]);
+        image_free(&d);
+    }
+    parallel_set_threads(before);
+    assert_memory_equal(d_m[0], d_m[1], sizeof d_m[0]);
+    assert_memory_equal(d_m[0], d_m[2], sizeof d_m[0]);
+    image_free(&in);
+}
+
+static void a_fit_finds_the_matrix(void **state)
+{
+    (void)state;
+    float m[AFFINE_NUMBERS], got[AFFINE_NUMBERS];
+    fill_matrix(m, 11);
+    image from = make_noise(40, 30, 3, 12), to = make_image(40, 30, 3);
+    affine_apply(m, &from, &to);
+    for (int i = 0; i < 40 * 30; i++) /* outside the columns that count */
+        if (i % 40 < 10 || i % 40 >= 30)
+            to.pixels[3 * i] = 77;
+    affine_fit(&from, &to, 10, 30, got);
+    for (int k = 0; k < AFFINE_NUMBERS; k++)
+        assert_near((double)got[k], (double)m[k], 3e-5); /* the pull to the identity is 1e-6 against variances of 1/12 */
+    image_free(&from), image_free(&to);
+}
+
+/* Pictures that say little leave the identity as it is, or the nearest matrix that explains them; nothing is ever not finite. */
+static void poor_pictures_fit_too(void **state)
+{
+    (void)state;
+    static const struct { float from, to; int begin, end; float identity_error; } cases[] = {
+        {0, 0, 0, 8, 0}, {0.5f, 0.5f, 0, 8, 0}, {0.3f, 0.3f, 4, 4, 0}, {0, 0.4f, 0, 8, 0.41f}, {NAN, 0.5f, 0, 8, 0.51f}, {INFINITY, INFINITY, 0, 8, 0},
+        {1e-30f, 1e-30f, 0, 8, 0},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        image from = make_constant(8, 6, cases[i].from), to = make_constant(8, 6, cases[i].to);
+        float m[AFFINE_NUMBERS], identity[AFFINE_NUMBERS];
+        affine_fit(&from, &to, cases[i].begin, cases[i].end, m);
+        affine_identity(identity);
+        for (int k = 0; k < AFFINE_NUMBERS; k++)
+            assert_near((double)m[k], (double)identity[k], (double)cases[i].identity_error + 1e-9);
+        image_free(&from), image_free(&to);
+    }
+}
+
+static void halves(void **state)
+{
+    (void)state;
+    enum { WIDTH = 21, HEIGHT = 9, RIGHT = 11 };
+    float m[AFFINE_NUMBERS];
+    fill_matrix(m, 21);
+    image render = make_noise(WIDTH, HEIGHT, 3, 22), photo = make_image(WIDTH, HEIGHT, 3), render_right, photo_right;
+    affine_apply(m, &render, &photo);
+    for (int i = 0; i < WIDTH * HEIGHT; i++) /* the right half shows something else: it must not be fitted to */
+        if (i % WIDTH >= WIDTH / 2)
+            photo.pixels[3 * i + 1] = 5;
+    assert_ok(affine_split(&render, &photo, &render_right, &photo_right, NULL));
+    assert_true(render_right.width == RIGHT && photo_right.width == RIGHT && render_right.height == HEIGHT && photo_right.height == HEIGHT);
+    for (int y = 0; y < HEIGHT; y++)
+        for (int x = 0; x < WIDTH; x++)
+            for (int c = 0; c < 3; c++) {
+                const int at = 3 * (y * WIDTH + x) + c, right = 3 * (y * RIGHT + x - WIDTH / 2) + c;
+                if (x < WIDTH / 2)
+                    assert_near((double)render.pixels[at], (double)photo.pixels[at], 1e-4);
+                else
+                    assert_true(render_right.pixels[right] == render.pixels[at] && photo_right.pixels[right] == photo.pixels[at]);
+            }
+    image_free(&render_right), image_free(&photo_right), image_free(&render), image_free(&photo);
+
+    image thin = make_noise(1, 3, 3, 1), same = make_noise(1, 3, 3, 1); /* no left half: the identity */
+    assert_ok(affine_split(&thin, &same, &render_right, &photo_right, NULL));
+    assert_memory_equal(thin.pixels, same.pixels, 9 * sizeof(float));
+    assert_int_equal(render_right.width, 1);
+    image_free(&render_right), image_free(&photo_right), image_free(&thin);
+    image other = make_image(2, 3, 3);
+    assert_int_equal(affine_split(&other, &same, &render_right, &photo_right, NULL), GBT_ERR_ARGUMENT);
+    assert_null(render_right.pixels);
+    image_free(&same), image_free(&other);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(by_hand),
+        cmocka_unit_test(adjoint_agrees_with_differences),
+        cmocka_unit_test(threads_give_the_same_bits),
+        cmocka_unit_test(a_fit_finds_the_matrix),
+        cmocka_unit_test(poor_pictures_fit_too),
+        cmocka_unit_test(halves),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,115 @@
+/* tests/raster/raster_support.h -- random Gaussians, cameras, and passes over them. */
+#ifndef GBT_TESTS_RASTER_SUPPORT_H
+#define GBT_TESTS_RASTER_SUPPORT_H
+
+#include "base/camera_pose.h"
+#include "base/memory.h"
+#include "base/rng.h"
+#include "raster/raster.h"
+#include "test_support.h"
+
+enum { FIELD_MEAN = 0, FIELD_SCALE = 3, FIELD_QUAT = 6, FIELD_OPACITY = 10, FIELD_COLOR = 11 };
+
+typedef struct cloud_def {
+    const char *name;
+    size_t count;
+    float spread, scale_low, scale_high; /* means are normal, scales log-uniform */
+    float flatness;                      /* the x axis is divided by this, and y too for odd ids: discs and needles */
+    double camera[3];                    /* looks at the origin */
+    int width, height;
+} cloud_def;
+
+/* Of both forms' tests; discs and needles as flat as each can be held to. */
+#define RASTER_CLOUDS(flatness)                                                                   \
+    {"one", 1, 0.5f, 0.2f, 0.5f, 1, {0, 0.5, -4}, 40, 24},                                        \
+    {"ordinary, from outside", 400, 1, 0.05f, 0.4f, 1, {3, -2, -5}, 70, 53},                      \
+    {"ordinary, from inside", 300, 2, 0.05f, 0.4f, 1, {0.2, 0.1, -0.3}, 64, 48},                  \
+    {"discs and needles", 400, 1, 0.2f, 0.6f, flatness, {2, 1, -5}, 64, 48},                      \
+    {"one pixel", 200, 1, 0.05f, 0.5f, 1, {0, 0, -5}, 1, 1}
+
+static inline void field_list(const gaussians *g, float *fields[GAUSSIANS_FIELD_COUNT])
+{
+    size_t i = 0;
+#define X(name, pad, meaning) fields[i++] = g->name;
+    GAUSSIANS_FIELDS(X)
+#undef X
+}
+
+static inline gaussians make_cloud(const cloud_def *def, uint64_t seed)
+{
+    gaussians g = {0};
+    assert_ok(gaussians_resize(&g, def->count, NULL));
+    float *f[GAUSSIANS_FIELD_COUNT];
+    field_list(&g, f);
+    for (size_t i = 0; i < def->count; i++) {
+        double square = 0;
+        for (uint64_t k = 0; k < 3; k++) {
+            f[FIELD_MEAN + k][i] = (float)((double)def->spread * rng_normal(seed, k, i));
+            f[FIELD_SCALE + k][i] = def->scale_low * powf(def->scale_high / def->scale_low, rng_uniform(seed, 3 + k, i));
+            f[FIELD_COLOR + k][i] = rng_uniform(seed, 11 + k, i);
+        }
+        f[FIELD_SCALE][i] /= def->flatness, f[FIELD_SCALE + 1][i] /= i % 2 == 1 ? def->flatness : 1;
+        for (uint64_t k = 0; k < 4; k++)
+            f[FIELD_QUAT + k][i] = (float)rng_normal(seed, 6 + k, i), square += pow((double)f[FIELD_QUAT + k][i], 2);
+        for (int k = 0; k < 4; k++)
+            f[FIELD_QUAT + k][i] = (float)((double)f[FIELD_QUAT + k][i] / sqrt(square));
+        g.opacity[i] = 0.02f + 0.98f * rng_uniform(seed, 10, i);
+    }
+    gaussians_pad(&g);
+    return g;
+}
+
+static inline gbt_camera make_camera(int width, int height, const double center[3])
+{
+    gbt_camera c = {.model = GBT_CAMERA_PINHOLE, .width = width, .height = height,
+                    .params = {0.8 * width, 0.85 * width, 0.5 * width + 0.3, 0.5 * height - 0.2}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    assert_true(camera_look_at(center, (const double[3]){0, 0, 0}, (const double[3]){0.05, -1, 0.1}, &c));
+    return c;
+}
+
+/* One view, forward and back. */
+typedef struct drawn {
+    image rgb;
+    float *T, d_background[3];
+    gaussians d;
+    raster_counters counters;
+} drawn;
+
+static inline image random_image(int width, int height, uint64_t seed)
+{
+    image im;
+    assert_ok(image_alloc(&im, width, height, 3, NULL));
+    for (size_t i = 0; i < 3 * (size_t)width * (size_t)height; i++)
+        im.pixels[i] = (float)rng_normal(seed, 20, i);
+    return im;
+}
+
+static inline drawn draw(const gaussians *g, const gbt_camera *camera, const raster_settings *s, const image *d_rgb)
+{
+    drawn out = {0};
+    raster_scene scene = {0};
+    assert_ok(image_alloc(&out.rgb, camera->width, camera->height, 3, NULL));
+    out.T = mem_alloc((size_t)camera->width * (size_t)camera->height, sizeof *out.T, "test", NULL);
+    assert_ok(raster_forward(&scene, g, camera, s, d_rgb != NULL, &out.rgb, out.T, &out.counters, NULL));
+    if (d_rgb != NULL)
+        assert_ok(raster_backward(&scene, d_rgb, &out.d, out.d_background, NULL));
+    raster_scene_free(&scene);
+    return out;
+}
+
+static inline void drawn_free(drawn *d)
+{
+    image_free(&d->rgb);
+    mem_free(d->T);
+    gaussians_free(&d->d);
+}
+
+static inline double psnr_of(const float *got, const double *wanted, size_t count)
+{
+    double sum = 0;
+    for (size_t i = 0; i < count; i++)
+        sum += pow((double)got[i] - wanted[i], 2);
+    return sum == 0 ? 200 : -10 * log10(sum / (double)count);
+}
+
+#endif

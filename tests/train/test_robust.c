@@ -1,0 +1,627 @@
+/* tests/train/test_robust.c -- training that cannot break: photos, learning rates and gradients that are not numbers; photos that differ in
+   exposure. */
+#include "run_support.h"
+
+#include <jansson.h>
+
+#include "base/log.h"
+#include "base/parallel.h"
+#include "data/colmap_write.h"
+#include "gbtrace/evaluate.h"
+#include "io/container.h"
+#include "io/model_file.h"
+#include "train/checkpoint.h"
+#include "train/config.h"
+#include "train/gradient_check.h"
+
+/* A path that lives for the next few calls. */
+static const char *joined(const char *folder, const char *name)
+{
+    static char paths[8][2 * PATH_SIZE];
+    static int next = 0;
+    char *path = paths[next = (next + 1) % 8];
+    snprintf(path, sizeof paths[0], "%s/%s", folder, name);
+    return path;
+}
+
+/* ---- scenes ------------------------------------------------------------------------------------------------------------------- */
+
+static void copy_file(const char *from, const char *to)
+{
+    bytes b = read_bytes(from);
+    assert_ok(file_write_atomic(to, b.data, b.count, NULL));
+    mem_free(b.data);
+}
+
+/* A data set like `from`, whose photos `change` has gone over. They become EXR files under their old names: magic decides. */
+static void copy_scene(const char *from, const char *folder, void (*change)(image *photo, size_t view))
+{
+    scene s;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(from, &split, &s, NULL));
+    assert_ok(file_make_folder(joined(folder, "images"), NULL));
+    assert_ok(file_make_folder(joined(folder, "sparse/0"), NULL));
+    static const char *const models[] = {"sparse/0/cameras.bin", "sparse/0/images.bin", "sparse/0/points3D.bin"};
+    for (int i = 0; i < 3; i++)
+        copy_file(joined(from, models[i]), joined(folder, models[i]));
+    for (size_t i = 0; i < s.view_count; i++) {
+        image photo;
+        assert_ok(image_read(s.views[i].path, &photo, NULL));
+        change(&photo, i);
+        assert_ok(image_write(joined(folder, "photo.exr"), &photo, NULL));
+        char target[PATH_SIZE];
+        snprintf(target, sizeof target, "images/%.100s", s.views[i].name);
+        assert_int_equal(rename(joined(folder, "photo.exr"), joined(folder, target)), 0);
+        image_free(&photo);
+    }
+    scene_free(&s);
+}
+
+enum { POISONED_VIEW = 3, POISONED_X = 20, POISONED_Y = 10 };
+
+static float poison;
+
+static void poison_one(image *photo, size_t view)
+{
+    if (view == POISONED_VIEW)
+        photo->pixels[3 * (POISONED_Y * photo->width + POISONED_X) + 1] = poison;
+}
+
+static const char *poisoned_scene(void)
+{
+    static bool done = false;
+    if (!done) {
+        poison = NAN;
+        copy_scene(tiny, in_root("poisoned"), poison_one);
+        done = true;
+    }
+    return in_root("poisoned");
+}
+
+/* ---- nothing that is not a number in any file ----------------------------------------------------------------------------------- */
+
+static void assert_no_nan_in_text(const char *path)
+{
+    bytes b = read_bytes(path);
+    const char *text = (const char *)b.data;
+    static const char *const words[] = {"nan", "NaN", "inf", "Inf"};
+    for (int i = 0; i < 4; i++)
+        for (const char *at = text; (at = strstr(at, words[i])) != NULL; at++)
+            if (strchr(",: ", at[-1]) != NULL || at[-1] == '-')
+                fail_msg("%s: ...%.40s", path, at - 10);
+    mem_free(b.data);
+}
+
+static void assert_no_nan_in_container(const char *path)
+{
+    container c;
+    assert_ok(container_load(path, &c, NULL));
+    size_t floats = 0;
+    for (size_t s = 0; s < c.count; s++) {
+        const container_section *section = &c.sections[s];
+        for (size_t i = 0; section->dtype == CONTAINER_F32 && i < section->byte_count / sizeof(float); i++, floats++)
+            if (!isfinite(((const float *)section->data)[i]) && strcmp(section->name, "decoder.numbers") != 0)
+                fail_msg("%s: %s[%zu] is not finite", path, section->name, i);
+    }
+    assert_true(floats > 1000);
+    container_free(&c);
+}
+
+static void assert_no_nan_in_renders(const char *run, const char *data)
+{
+    gbt_render_def def = gbt_render_def_default();
+    def.data = data, def.split = GBT_SPLIT_ALL, def.format = "exr";
+    assert_ok(gbt_render(run, joined(run, "exr"), &def, NULL));
+    scene s;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(data, &split, &s, NULL));
+    for (size_t i = 0; i < s.view_count; i++) {
+        char name[64];
+        snprintf(name, sizeof name, "exr/%.40s", s.views[i].name);
+        strcpy(strrchr(name, '.'), ".exr");
+        image render;
+        image_names names;
+        assert_ok(image_read_raw(joined(run, name), &render, &names, NULL));
+        for (int k = 0; k < render.width * render.height * render.channels; k++)
+            assert_true(isfinite(render.pixels[k]));
+        image_free(&render);
+    }
+    scene_free(&s);
+}
+
+static void assert_sound(const char *run, const char *data)
+{
+    const gbt_evaluate_def score = gbt_evaluate_def_default();
+    assert_ok(gbt_evaluate(run, &score, NULL));
+    static const char *const texts[] = {"log.csv", "train.json", "metrics.json", "config"};
+    for (int i = 0; i < 4; i++)
+        assert_no_nan_in_text(joined(run, texts[i]));
+    assert_no_nan_in_container(joined(run, "model.gbt"));
+    assert_no_nan_in_container(joined(run, "checkpoints/last.gbt"));
+    assert_no_nan_in_renders(run, data);
+}
+
+static int64_t skipped_in(const char *run)
+{
+    json_t *metrics = json_load_file(joined(run, "metrics.json"), 0, NULL);
+    assert_true(json_is_integer(json_object_get(metrics, "skipped_steps")));
+    const int64_t skipped = json_integer_value(json_object_get(metrics, "skipped_steps"));
+    json_decref(metrics);
+    return skipped;
+}
+
+/* A thousand steps where a photo holds a NaN, at rates that tear the scene apart. */
+static void wild_rates_and_photos_leave_no_nan(void **state)
+{
+    (void)state;
+    static const struct { const char *name; double factor; bool exposure, compat; const char *distance; uint64_t steps; } runs[] = {
+        {"rates 1", 1, false, false, "auto", 200},   {"rates 100", 100, false, false, "on", 1000},
+        {"rates 1000", 1000, true, false, "on", 200}, {"compat 100", 100, false, true, "off", 200},
+    };
+    for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
+        gbt_train_def def = run_def();
+        def.iterations = runs[i].steps, def.learning_rate_factor = runs[i].factor, def.exposure = runs[i].exposure, def.compat = runs[i].compat;
+        def.distance = runs[i].distance;
+        const char *run = in_root("%s", runs[i].name);
+        train_ok(poisoned_scene(), run, &def);
+        assert_sound(run, poisoned_scene());
+        print_message("%s: %d of %d steps skipped\n", runs[i].name, (int)skipped_in(run), (int)runs[i].steps);
+    }
+}
+
+/* ---- a pixel that is not a number counts in no loss ----------------------------------------------------------------------------- */
+
+static void pixels_that_are_not_numbers_are_marked(void **state)
+{
+    (void)state;
+    scene s;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(poisoned_scene(), &split, &s, NULL));
+    photos p;
+    assert_ok(photos_open(&p, &s, 1, NULL));
+    image photo = {0};
+    for (int level = 0; level <= 2; level++)
+        for (size_t view = 0; view < s.view_count; view++) {
+            assert_ok(photos_get(&p, view, level, &photo, NULL));
+            const unsigned char *valid = photos_valid(&p, view);
+            if (view != POISONED_VIEW) {
+                assert_null(valid);
+                continue;
+            }
+            assert_non_null(valid);
+            for (int y = 0; y < photo.height; y++)
+                for (int x = 0; x < photo.width; x++) /* 48 x 36 halves evenly */
+                    assert_int_equal(valid[y * photo.width + x], x != POISONED_X >> level || y != POISONED_Y >> level);
+        }
+    assert_ok(photos_get(&p, POISONED_VIEW, 1, &photo, NULL)); /* back to a level that was dropped */
+    assert_non_null(photos_valid(&p, POISONED_VIEW));
+    image_free(&photo);
+    photos_close(&p);
+    scene_free(&s);
+}
+
+/* What stands in the bad pixel does not matter, and no step is lost for it. */
+static void a_bad_pixel_has_no_say(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    train_ok(poisoned_scene(), in_root("nan"), &def);
+    poison = INFINITY;
+    copy_scene(tiny, in_root("infinite"), poison_one);
+    train_ok(in_root("infinite"), in_root("inf"), &def);
+    model a, b;
+    assert_ok(model_load(in_root("nan/model.gbt"), &a, NULL));
+    assert_ok(model_load(in_root("inf/model.gbt"), &b, NULL));
+    assert_int_equal(a.anchors.count, b.anchors.count);
+    assert_memory_equal(a.anchors.feature, b.anchors.feature, a.anchors.count * ANCHOR_FEATURE_DIM * sizeof(float));
+    assert_memory_equal(a.decoder.params, b.decoder.params, a.decoder.param_count * sizeof(float));
+    assert_int_equal(a.iterations, STEPS);
+    model_free(&a), model_free(&b);
+    const gbt_evaluate_def score = gbt_evaluate_def_default();
+    assert_ok(gbt_evaluate(in_root("nan"), &score, NULL));
+    assert_int_equal(skipped_in(in_root("nan")), 0);
+}
+
+/* ---- steps that teach nothing ----------------------------------------------------------------------------------------------------- */
+
+typedef struct learned {
+    float *values;
+    size_t count;
+} learned;
+
+static void append(learned *out, const float *values, size_t count)
+{
+    out->values = realloc(out->values, (out->count + count) * sizeof *values);
+    assert_non_null(out->values);
+    memcpy(out->values + out->count, values, count * sizeof *values);
+    out->count += count;
+}
+
+/* Everything that a step changes: parameters, moments, statistics, exposures. */
+static learned snapshot(const trainer *t)
+{
+    learned out = {0};
+    const anchors *sets[] = {&t->anchors, &t->moment1, &t->moment2};
+    for (int i = 0; i < 3; i++) {
+        append(&out, sets[i]->feature, sets[i]->count * ANCHOR_FEATURE_DIM);
+        append(&out, sets[i]->offset, sets[i]->count * 3 * (size_t)sets[i]->offset_count);
+        append(&out, sets[i]->scale_log, sets[i]->count * 6);
+    }
+    const float *networks[] = {t->decoder.params, t->params_m, t->params_v};
+    for (int i = 0; i < 3; i++)
+        append(&out, networks[i], t->decoder.param_count);
+    append(&out, t->stats.opacity_accum, t->stats.count);
+    append(&out, t->stats.visit_count, t->stats.count);
+    append(&out, t->stats.grad_accum, t->stats.count * (size_t)t->stats.offset_count);
+    const float *exposure[] = {t->exposures.matrix, t->exposures.moment1, t->exposures.moment2};
+    for (int i = 0; i < 3 && t->exposures.count > 0; i++)
+        append(&out, exposure[i], t->exposures.count * AFFINE_NUMBERS);
+    return out;
+}
+
+static void assert_unchanged(const trainer *t, learned before)
+{
+    learned now = snapshot(t);
+    assert_int_equal(now.count, before.count);
+    assert_memory_equal(now.values, before.values, now.count * sizeof(float));
+    free(now.values), free(before.values);
+}
+
+static void assert_no_gradient_left(const trainer *t)
+{
+    const anchors *g = &t->gradient;
+    for (size_t i = 0; i < g->count * ANCHOR_FEATURE_DIM; i++)
+        assert_true(g->feature[i] == 0);
+    for (size_t i = 0; i < g->count * 6; i++)
+        assert_true(g->scale_log[i] == 0);
+    for (size_t i = 0; i < t->decoder.param_count; i++)
+        assert_true(t->d_params[i] == 0);
+}
+
+/* A background that is not a number makes the loss one; an exposure of 1e30 makes gradients too large for Adam. */
+static void a_bad_step_changes_nothing(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind <= 1; kind++) {
+        gbt_train_def def = run_def();
+        def.exposure = true;
+        trainer t;
+        step_report r;
+        open_ok(&t, tiny, &def);
+        for (int i = 0; i < 5; i++)
+            step_ok(&t, &r);
+        assert_false(r.skipped);
+        const float background = t.settings.background[0];
+        float *matrix = mem_alloc(t.exposures.count * AFFINE_NUMBERS, sizeof *matrix, "test", NULL);
+        memcpy(matrix, t.exposures.matrix, t.exposures.count * AFFINE_NUMBERS * sizeof *matrix);
+        if (kind == 0)
+            t.settings.background[0] = NAN;
+        for (size_t i = 0; kind == 1 && i < t.exposures.count; i++)
+            t.exposures.matrix[i * AFFINE_NUMBERS] = 1e30f;
+        const learned before = snapshot(&t);
+        step_ok(&t, &r);
+        assert_true(r.skipped && t.skipped_steps == 1 && t.skipped_in_row == 1 && t.step == 6);
+        assert_unchanged(&t, before);
+        assert_no_gradient_left(&t);
+        t.settings.background[0] = background;
+        memcpy(t.exposures.matrix, matrix, t.exposures.count * AFFINE_NUMBERS * sizeof *matrix);
+        step_ok(&t, &r); /* and the run goes on */
+        assert_true(!r.skipped && t.skipped_steps == 1 && t.skipped_in_row == 0 && t.step == 7);
+        mem_free(matrix);
+        trainer_free(&t);
+    }
+}
+
+static void ten_bad_steps_end_the_run(void **state)
+{
+    (void)state;
+    static const struct { bool exposure; const char *says; } cases[] = {{false, "the loss is not finite (photo 00"}, {true, "of anchor"}};
+    for (int kind = 0; kind <= 1; kind++) {
+        gbt_train_def def = run_def();
+        def.exposure = cases[kind].exposure;
+        trainer t;
+        step_report r;
+        open_ok(&t, tiny, &def);
+        if (kind == 0)
+            t.settings.background[1] = INFINITY;
+        for (size_t i = 0; kind == 1 && i < t.exposures.count; i++)
+            t.exposures.matrix[i * AFFINE_NUMBERS] = 1e30f;
+        for (int i = 0; i < 9; i++)
+            step_ok(&t, &r);
+        gbt_error err = {0};
+        assert_int_equal(trainer_step(&t, &r, &err), GBT_ERR_FORMAT);
+        if (strstr(err.text, "10 steps in a row") == NULL || strstr(err.text, cases[kind].says) == NULL || strchr(err.text, '\n') != NULL)
+            fail_msg("%s", err.text);
+        print_message("%s\n", err.text);
+        trainer_free(&t);
+    }
+}
+
+/* Every place of a gradient, every value that is no good. */
+static void a_bad_gradient_is_named(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    trainer t;
+    step_report r;
+    open_ok(&t, tiny, &def);
+    step_ok(&t, &r);
+    char where[80] = "untouched";
+    double exposure[AFFINE_NUMBERS] = {1};
+    assert_false(gradient_is_bad(&t, exposure, where, sizeof where));
+    assert_string_equal(where, "untouched");
+    const size_t anchor = t.frame.visible[t.frame.visible_count - 1], k = (size_t)t.gradient.offset_count;
+    decoder_part parts[3];
+    decoder_parts(&t.decoder, parts);
+    const struct { float *place; const char *name; size_t value; bool of_anchor; } places[] = {
+        {t.gradient.feature + anchor * 32 + 31, "feature", 31, true},
+        {t.gradient.offset + anchor * 3 * k, "offset", 0, true},
+        {t.gradient.scale_log + anchor * 6 + 5, "scale", 5, true},
+        {t.d_params, "opacity network", 0, false},
+        {t.d_params + parts[1].begin + 7, "shape network", 7, false},
+        {t.d_params + parts[2].end - 1, "colour network", parts[2].end - 1 - parts[2].begin, false},
+    };
+    static const float values[] = {NAN, INFINITY, -INFINITY, 1.1e18f, -3e38f};
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++)
+        for (size_t v = 0; v < sizeof values / sizeof *values; v++) {
+            char wanted[80];
+            *places[i].place = values[v];
+            assert_true(gradient_is_bad(&t, exposure, where, sizeof where));
+            if (places[i].of_anchor)
+                snprintf(wanted, sizeof wanted, "%s of anchor %zu, value %zu", places[i].name, anchor, places[i].value);
+            else
+                snprintf(wanted, sizeof wanted, "%s, value %zu", places[i].name, places[i].value);
+            assert_string_equal(where, wanted);
+            *places[i].place = v == 3 ? GRADIENT_LIMIT : 0; /* the limit itself is good */
+            assert_false(gradient_is_bad(&t, exposure, where, sizeof where));
+            *places[i].place = 0;
+        }
+    exposure[11] = NAN;
+    assert_true(gradient_is_bad(&t, exposure, where, sizeof where));
+    assert_string_equal(where, "exposure, value 11");
+    assert_false(gradient_is_bad(&t, NULL, where, sizeof where));
+    trainer_free(&t);
+}
+
+/* Log-scales that run away are held, whatever the rate. */
+static void scales_stay_in_their_range(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.learning_rate_factor = 1000;
+    trainer t;
+    step_report r;
+    open_ok(&t, tiny, &def);
+    size_t held = 0;
+    for (int i = 0; i < STEPS; i++)
+        step_ok(&t, &r);
+    for (size_t i = 0; i < t.anchors.count * 6; i++) {
+        assert_true(t.anchors.scale_log[i] >= t.scale_log_min && t.anchors.scale_log[i] <= t.scale_log_max);
+        held += t.anchors.scale_log[i] <= t.scale_log_min || t.anchors.scale_log[i] >= t.scale_log_max;
+    }
+    assert_true(held > 0);
+    assert_true(exp((double)t.scale_log_max) > 50 * t.extent && exp((double)t.scale_log_min) < 1e-5 * t.extent);
+    trainer_free(&t);
+}
+
+/* ---- a scene that has lost all its Gaussians ---------------------------------------------------------------------------------------- */
+
+/* Opacities far below 0 have no gradient: without help the scene would stay empty for ever. */
+static void an_empty_scene_comes_back(void **state)
+{
+    (void)state;
+    for (int compat = 0; compat <= 1; compat++) {
+        gbt_train_def def = run_def();
+        def.compat = compat == 1, def.grow = false;
+        trainer t;
+        step_report r;
+        open_ok(&t, tiny, &def);
+        decoder_part parts[3];
+        decoder_parts(&t.decoder, parts);
+        step_ok(&t, &r);
+        for (int k = 0; k < t.decoder.offset_count; k++)
+            t.decoder.params[parts[0].end - 1 - (size_t)k] = -4;
+        for (int i = 0; i < 4; i++) {
+            step_ok(&t, &r);
+            assert_true(r.gaussians == 0 && r.visible > 0 && t.revivals == 0);
+        }
+        step_ok(&t, &r);
+        assert_int_equal(t.revivals, 1);
+        for (int i = 0; i < 10; i++)
+            step_ok(&t, &r);
+        assert_true(r.gaussians > t.anchors.count / 2 && t.revivals == 1);
+        trainer_free(&t);
+    }
+}
+
+/* An offset that begins below 0 for every anchor is raised in the first step; with --compat it stays as the reference has it. */
+static void no_offset_is_born_dead(void **state)
+{
+    (void)state;
+    for (int compat = 0; compat <= 1; compat++) {
+        gbt_train_def def = run_def();
+        def.compat = compat == 1;
+        trainer t;
+        step_report r;
+        open_ok(&t, tiny, &def);
+        decoder_part parts[3];
+        decoder_parts(&t.decoder, parts);
+        const size_t k_count = (size_t)t.decoder.offset_count;
+        t.decoder.params[parts[0].end - k_count] = -2;
+        size_t count[2] = {0, 0};
+        for (int step = 0; step < 2; step++) {
+            step_ok(&t, &r);
+            for (size_t i = 0; i < t.frame.gaussians.count; i++)
+                count[step] += t.frame.tape.slot[i] % k_count == 0;
+        }
+        assert_int_equal(count[0], 0);
+        assert_true(compat ? count[1] == 0 : count[1] > t.frame.visible_count / 2);
+        trainer_free(&t);
+    }
+}
+
+/* The mean opacity of an offset that is too low becomes what was asked for; one that is high stays. */
+static void opacities_are_raised(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    trainer t;
+    open_ok(&t, tiny, &def);
+    decoder_part parts[3];
+    decoder_parts(&t.decoder, parts);
+    const size_t k_count = (size_t)t.decoder.offset_count;
+    float *bias = t.decoder.params + parts[0].end - k_count;
+    bias[0] = -1, bias[1] = 1.5f;
+    const gbt_camera camera = photos_camera(&t.photos, 0, 0);
+    for (int pass = 0; pass < 2; pass++) {
+        assert_ok(frame_render(&t.frame, &t.anchors, &t.decoder, &camera, &t.settings, true, NULL));
+        if (pass == 0)
+            decode_raise_opacity(&t.frame.tape, 0.1f, 0.25f, &t.decoder);
+    }
+    assert_true(bias[0] > 0 && bias[1] == 1.5f);
+    double sum = 0;
+    for (size_t i = 0; i < t.frame.gaussians.count; i++)
+        if (t.frame.tape.slot[i] % k_count == 0)
+            sum += (double)t.frame.gaussians.opacity[i];
+    assert_true(fabs(sum / (double)t.frame.visible_count - 0.25) < 0.05);
+    trainer_free(&t);
+}
+
+/* ---- poor points ---------------------------------------------------------------------------------------------------------------------- */
+
+/* A copy of the tiny scene with only its first points, moved along the optical axes by `shift`. */
+static void points_that_tell_nothing_are_replaced(void **state)
+{
+    (void)state;
+    static const struct { const char *name; size_t keep; double shift; bool made; const char *says; } cases[] = {
+        {"few", 60, 0, false, "60 sparse points and "}, {"unseen", 150, 1e4, true, "none that are seen"}, {"all", 150, 0, false, "150 sparse points"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        scene s;
+        const scene_split split = {.kind = SCENE_SPLIT_NONE};
+        assert_ok(scene_load(tiny, &split, &s, NULL));
+        colmap_image pictures[VIEWS];
+        colmap_point points[200];
+        memset(pictures, 0, sizeof pictures), memset(points, 0, sizeof points);
+        const char *folder = in_root("%s", cases[i].name);
+        assert_ok(file_make_folder(folder, NULL));
+        assert_int_equal(symlink("../tiny/images", joined(folder, "images")), 0);
+        for (size_t v = 0; v < s.view_count; v++)
+            pictures[v] = (colmap_image){.name = s.views[v].name, .camera = s.views[v].camera};
+        for (size_t p = 0; p < cases[i].keep; p++)
+            for (size_t k = 0; k < 3; k++)
+                points[p].position[k] = (double)s.points.position[3 * p + k] + (k == 2 ? cases[i].shift : 0);
+        assert_ok(colmap_write(joined(folder, "sparse/0"), pictures, s.view_count, points, cases[i].keep, NULL));
+        gbt_train_def def = run_def();
+        trainer t;
+        step_report r;
+        open_ok(&t, folder, &def);
+        if (t.points_made != cases[i].made || strstr(t.start_text, cases[i].says) == NULL)
+            fail_msg("%s: %s", cases[i].name, t.start_text);
+        assert_true(i == 2 ? t.scene.points.count == 150 : t.scene.points.count > 400);
+        step_ok(&t, &r);
+        trainer_free(&t);
+        scene_free(&s);
+    }
+}
+
+/* ---- photos that differ in exposure ----------------------------------------------------------------------------------------------- */
+
+/* Half as bright, so that twice that does not clip. */
+static void expose(image *photo, size_t view)
+{
+    static const float factors[3] = {0.5f, 1, 2};
+    for (int i = 0; i < 3 * photo->width * photo->height; i++)
+        photo->pixels[i] *= 0.5f * factors[view * 7 % 3];
+}
+
+static double score_of(const char *run, const char *data, gbt_train_def def)
+{
+    train_ok(data, run, &def);
+    const gbt_evaluate_def score = gbt_evaluate_def_default();
+    assert_ok(gbt_evaluate(run, &score, NULL));
+    json_t *metrics = json_load_file(joined(run, "metrics.json"), 0, NULL);
+    const double psnr = json_number_value(json_object_get(metrics, "psnr"));
+    assert_int_equal(json_is_true(json_object_get(metrics, "exposure")), def.exposure);
+    assert_int_equal(strncmp(json_string_value(json_object_get(metrics, "scored")), def.exposure ? "right half" : "whole image", 10), 0);
+    json_decref(metrics);
+
+    trainer t; /* in passing and at the end: one protocol. Eval also knows the smallest pixel of each anchor (train/frame.h). */
+    double in_passing;
+    open_ok(&t, data, &def);
+    assert_ok(checkpoint_load(&t, joined(run, "checkpoints/last.gbt"), NULL));
+    assert_ok(trainer_held_out_psnr(&t, &in_passing, NULL));
+    if (!(fabs(in_passing - psnr) < 0.01))
+        fail_msg("%.9f dB in passing, %.9f dB by eval", in_passing, psnr);
+    trainer_free(&t);
+    return psnr;
+}
+
+/* Measured with 400 steps: 15.4 dB without, 27.9 dB with. */
+static void exposure_is_learned(void **state)
+{
+    (void)state;
+    gbt_make_scene_def make = gbt_make_scene_def_default();
+    make.width = 80, make.height = 60, make.view_count = 20, make.points = 800, make.samples = 4;
+    assert_ok(gbt_make_scene(&make, in_root("even"), NULL));
+    copy_scene(in_root("even"), in_root("exposed"), expose);
+    gbt_train_def def = run_def();
+    def.iterations = 400;
+    const double without = score_of(in_root("without"), in_root("exposed"), def);
+    def.exposure = true;
+    const double with = score_of(in_root("with"), in_root("exposed"), def);
+    print_message("held-out PSNR %.2f dB without, %.2f dB with exposure\n", without, with);
+    assert_true(with >= without + 10);
+    assert_true(file_exists(in_root("with/exposure.json")) && !file_exists(in_root("without/exposure.json")));
+
+    /* The mean of the matrices is the identity, and each shows its photo's factor. */
+    json_t *file = json_load_file(in_root("with/exposure.json"), 0, NULL);
+    const json_t *list = json_object_get(file, "photos");
+    double sum[AFFINE_NUMBERS] = {0};
+    for (size_t i = 0; i < json_array_size(list); i++)
+        for (size_t k = 0; k < AFFINE_NUMBERS; k++)
+            sum[k] += json_number_value(json_array_get(json_object_get(json_array_get(list, i), "matrix"), k));
+    assert_int_equal(json_array_size(list), 17);
+    for (size_t k = 0; k < AFFINE_NUMBERS; k++)
+        assert_true(fabs(sum[k] / 17 - (k % 5 == 0)) < 1e-5);
+    json_decref(file);
+}
+
+/* Interrupted or not, one thread or three. */
+static void exposure_resumes_to_the_same_bits(void **state)
+{
+    (void)state;
+    const int before = parallel_threads();
+    gbt_train_def def = run_def();
+    def.exposure = true;
+    train_ok(tiny, in_root("exposure straight"), &def);
+    def.stop_at_step = 23;
+    train_fails(tiny, in_root("exposure halves"), &def, GBT_ERR_INTERRUPTED, "--resume");
+    gbt_train_def more = gbt_train_def_default();
+    more.resume = true;
+    gbt_set_threads(3);
+    train_ok(tiny, in_root("exposure halves"), &more);
+    gbt_set_threads(before);
+    assert_same_file(in_root("exposure straight/model.gbt"), in_root("exposure halves/model.gbt"));
+    assert_same_file(in_root("exposure straight/exposure.json"), in_root("exposure halves/exposure.json"));
+}
+
+int main(void)
+{
+    log_set_quiet(1);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(pixels_that_are_not_numbers_are_marked),
+        cmocka_unit_test(a_bad_pixel_has_no_say),
+        cmocka_unit_test(a_bad_gradient_is_named),
+        cmocka_unit_test(a_bad_step_changes_nothing),
+        cmocka_unit_test(ten_bad_steps_end_the_run),
+        cmocka_unit_test(scales_stay_in_their_range),
+        cmocka_unit_test(an_empty_scene_comes_back),
+        cmocka_unit_test(no_offset_is_born_dead),
+        cmocka_unit_test(opacities_are_raised),
+        cmocka_unit_test(points_that_tell_nothing_are_replaced),
+        cmocka_unit_test(wild_rates_and_photos_leave_no_nan),
+        cmocka_unit_test(exposure_is_learned),
+        cmocka_unit_test(exposure_resumes_to_the_same_bits),
+    };
+    return cmocka_run_group_tests_name("robust training", tests, make_root, remove_root);
+}

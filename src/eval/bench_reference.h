@@ -11,9 +11,14 @@
 typedef struct bench_reference {
     ray_image rays; /* of those pixels */
     double *rgb;    /* [rays][3] */
+    bool *left_out; /* optional (NULL), [rays]: what does not count in bench_reference_compare() */
 } bench_reference;
 
 gbt_status bench_reference_make(const gaussians *g, const trace_settings *settings, const ray_image *rays, bench_reference *out, gbt_error *err);
+
+/** Leave out the rays of the rounding band (eval/rounding_band.h), on which a picture in float32 may be right in another way. */
+gbt_status bench_reference_leave_band(const gaussians *g, const trace_settings *settings, bench_reference *reference, gbt_error *err);
+
 void bench_reference_free(bench_reference *reference);
 
 typedef struct bench_error {

@@ -15,6 +15,7 @@
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "eval/loaded_run.h"
+#include "eval/rounding_band.h"
 #include "gbtrace/bench.h"
 #include "image/metrics.h"
 #include "trace/reference.h"
@@ -25,9 +26,6 @@ enum { CHECK_WIDTH = 48, CHECK_WIDTH_LARGE = 24, LARGE_COUNT = 50000, RAY_GRAIN 
    of a std-dev: the tracer's limit is five times that of the tests' random scenes. The chain's is wider again: its two sides do not decode
    the same bits, so a hit in ten thousand falls on the other side of a cut. */
 static const double tracer_limit = 5e-5, decode_limit = 1e-5, chain_limit = 1e-3;
-
-/* Where float and double may decide differently. Relative to the value, but for alpha. */
-static const double alpha_band = 1e-6, transmittance_band = 1e-5, depth_band = 2e-6;
 
 static const double step = 1e-8;           /* of a difference, in standard deviations of the direction: few cuts are crossed */
 static const double smooth_limit = 1e-4;   /* the differences to both sides agree to this part of the gradient, or a cut was crossed */
@@ -129,48 +127,14 @@ typedef struct band_job {
     gbt_status *status; /* per block */
 } band_job;
 
-/* Whether rounding may change which hits this ray blends, or their order. `hits` go a little below alpha_min. */
-static bool is_in_band(const checker *c, const reference_hit *hits, size_t count)
-{
-    const trace_settings *s = &c->run->settings;
-    const double alpha_min = (double)s->alpha_min, alpha_max = (double)s->alpha_max, stop = (double)s->transmittance_min;
-    double T = 1, before = -1;
-    for (size_t i = 0; i < count; i++) {
-        const reference_hit *h = &hits[i];
-        const double raw = c->scene.fields[REFERENCE_opacity * c->scene.count + h->id] * exp(-0.5 * h->d2);
-        if (fabs(raw - alpha_min) < alpha_band || fabs(raw - alpha_max) < alpha_band)
-            return true;
-        if (h->alpha < alpha_min)
-            continue;
-        if (h->t != before && h->t - before < depth_band * h->t)
-            return true;
-        before = h->t;
-        const double next = T * (1 - h->alpha);
-        if (fabs(next - stop) < transmittance_band * stop)
-            return true;
-        if (next < stop)
-            return false;
-        T = next;
-    }
-    return false;
-}
-
 static void band_block(size_t block, size_t begin, size_t end, void *context)
 {
     const band_job *job = context;
     const ray_image *rays = &job->c->frame->rays;
-    trace_settings loose = job->c->run->settings;
-    loose.alpha_min -= 2 * (float)alpha_band;
-    reference_hit *hits = NULL;
-    size_t count, capacity = 0;
-    for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++) {
-        double origin[3], dir[3];
-        for (size_t k = 0; k < 3; k++)
-            origin[k] = (double)ray_image_origin(rays, i)[k], dir[k] = (double)rays->dir[3 * i + k];
-        job->status[block] = reference_scene_ray_hits(&job->c->scene, &loose, origin, dir, &hits, &count, &capacity, NULL);
-        job->in_band[i] = is_in_band(job->c, hits, count);
-    }
-    mem_free(hits);
+    band_scratch scratch = {0};
+    for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++)
+        job->status[block] = rounding_band_find(&job->c->scene, &job->c->run->settings, ray_image_origin(rays, i), rays->dir + 3 * i, &scratch, &job->in_band[i]);
+    band_scratch_free(&scratch);
 }
 
 static gbt_status mask_band(checker *c, size_t *left_out, gbt_error *err)

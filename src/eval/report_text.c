@@ -16,6 +16,14 @@ void text_free(text *t)
     t->bytes = NULL, t->length = t->capacity = 0;
 }
 
+gbt_status text_print(text *t, FILE *out)
+{
+    if (t->status == GBT_OK)
+        fwrite(t->bytes, 1, t->length, out);
+    text_free(t);
+    return t->status;
+}
+
 static bool make_room(text *t, size_t count)
 {
     if (t->status == GBT_OK && count > t->capacity - t->length)

@@ -3,6 +3,7 @@
 #define GBT_EVAL_REPORT_TEXT_H
 
 #include <stddef.h>
+#include <stdio.h>
 
 #include "gbtrace/status.h"
 
@@ -18,6 +19,9 @@ typedef struct text {
 } text;
 
 void text_free(text *t);
+
+/** Write it to a stream and free it; t->status. */
+gbt_status text_print(text *t, FILE *out);
 
 void text_add(text *t, const char *markup); /* as it is: only what this program wrote */
 void text_format(text *t, const char *format, ...) __attribute__((format(printf, 2, 3)));

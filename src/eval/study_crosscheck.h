@@ -8,7 +8,7 @@
 #include "eval/bench_reference.h"
 #include "eval/report_text.h"
 
-enum { CROSS_MODELS_MAX = 16, CROSS_VIEWS_MAX = 4, CROSS_CHECKS = 5, CROSS_NAME_SIZE = 320 };
+enum { CROSS_MODELS_MAX = 16, CROSS_VIEWS_MAX = 4, CROSS_CHECKS = 7, CROSS_NAME_SIZE = 320 };
 
 /** From the tracer to the splats of 3DGS, one change at a time; each keeps the changes before it. */
 typedef enum cross_step { CROSS_TILES, CROSS_ORDER, CROSS_PROJECTION, CROSS_DILATION, CROSS_CUTS, CROSS_STEPS } cross_step;

@@ -306,14 +306,11 @@ gbt_status gbt_study_speed(const gbt_study_def *def, const char *folder, FILE *o
         status = measure_model(def, i, &study->models[i], err);
     if (status == GBT_OK)
         status = speed_write(study, folder, err);
-    text table = {.err = err};
     if (status == GBT_OK) {
+        text table = {.err = err};
         speed_table(study, &table);
-        status = table.status;
+        status = text_print(&table, out);
     }
-    if (status == GBT_OK)
-        fwrite(table.bytes, 1, table.length, out);
-    text_free(&table);
     mem_free(study);
     return status;
 }

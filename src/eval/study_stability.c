@@ -145,15 +145,12 @@ gbt_status gbt_study_stability(const gbt_stability_def *def, const char *folder,
     gbt_status status = stability_measure(def->only, def->quick != 0, folder, study, err);
     if (status == GBT_OK)
         status = stability_write(study, folder, err);
-    text table = {.err = err};
     if (status == GBT_OK) {
+        text table = {.err = err};
         stability_table(study, &table);
         text_format(&table, "\n%zu of %zu rows within their limits\n", count_passes(study), study->row_count);
-        status = table.status;
+        status = text_print(&table, out);
     }
-    if (status == GBT_OK)
-        fwrite(table.bytes, 1, table.length, out);
-    text_free(&table);
     mem_free(study);
     return status;
 }

@@ -128,6 +128,7 @@ void stability_check(stability *s, const char *row, double value, double raster,
     stability_row *r = &study->rows[study->row_count++];
     *r = (stability_row){.part = (int)study->part_count - 1, .at_least = least != NULL, .value = value, .raster = raster};
     r->open = json_is_true(json_object_get(check, "open"));
+    r->timed = json_is_true(json_object_get(check, "timed"));
     r->limit = json_number_value(r->at_least ? least : most);
     r->pass = r->at_least ? value >= r->limit : value <= r->limit;
     snprintf(r->id, sizeof r->id, "%s", row);

@@ -46,6 +46,7 @@ typedef struct stability_row {
     double raster;       /* the same quantity of the rasterizer; NaN: not measured, or it has none */
     bool pass;
     bool open;           /* the scene file says that the limit is not kept yet */
+    bool timed;          /* the value is a time: the study judges it, tests do not, since machines are shared */
     char note[400];
 } stability_row;
 

@@ -31,7 +31,7 @@ static void rows_of(const char *id)
     for (size_t i = 0; i < study->row_count; i++) {
         const stability_row *r = &study->rows[i];
         print_message("%s %s: %.4g (limit %.4g, rasterizer %.4g)\n", r->id, r->quantity, r->value, r->limit, r->raster);
-        broken += r->pass == r->open; /* an open row that passes is open no more */
+        broken += !r->timed && r->pass == r->open; /* an open row that passes is open no more */
     }
     assert_int_equal(broken, 0);
     mem_free(study);

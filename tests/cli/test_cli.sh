@@ -254,7 +254,7 @@ report $? "study prints its table" "  got $got: $(cat err out)"
 report $? "study writes data and charts" "$(ls -l study)"
 "$program" study crosscheck gaussians.ply -o cross >out 2>err
 got=$?
-[ "$got" = 0 ] && [ "$(grep -c '^| [a-z-]* | [0-9.]* | [0-9.e-]* | [0-9.]* | [0-9.e-]* |$' out)" = 5 ] && [ "$(grep -c '"pass": true' cross/crosscheck.json)" = 5 ] &&
+[ "$got" = 0 ] && [ "$(grep -c '^| [a-z-]* | [0-9.]* | [0-9.e-]* | [0-9.]* | [0-9.e-]* |$' out)" = 5 ] && [ "$(grep -c '"pass": true' cross/crosscheck.json)" = 7 ] &&
     grep -q 'dilation' cross/crosscheck.md && grep -q '<svg xmlns' cross/crosscheck.svg && grep -q 'data:image/jpeg' cross/crosscheck.html &&
     [ -s cross/crosscheck_gaussians.ply_camera.png ]
 report $? "study crosscheck: every row within its limit" "  got $got: $(cat err out)"

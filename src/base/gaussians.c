@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "base/fail.h"
 #include "base/memory.h"
 
 static size_t padded(size_t count)
@@ -42,6 +43,18 @@ void gaussians_zero(gaussians *g)
 #define X(name, pad, meaning) memset(g->name, 0, padded(g->count) * sizeof(float));
     GAUSSIANS_FIELDS(X)
 #undef X
+}
+
+gbt_status gaussians_copy(const gaussians *g, gaussians *out, gbt_error *err)
+{
+    GBT_TRY(gaussians_resize(out, g->count, err));
+#define X(name, pad, meaning) \
+    if (g->count > 0)         \
+        memcpy(out->name, g->name, g->count * sizeof *g->name);
+    GAUSSIANS_FIELDS(X)
+#undef X
+    gaussians_pad(out);
+    return GBT_OK;
 }
 
 void gaussians_free(gaussians *g)

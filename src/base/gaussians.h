@@ -44,6 +44,9 @@ void gaussians_pad(gaussians *g);
 /** All fields to 0, padding included: the state in which gradients start. */
 void gaussians_zero(gaussians *g);
 
+/** `out` becomes a copy of `g`, padded. `out` as for gaussians_resize(); not `g`. */
+gbt_status gaussians_copy(const gaussians *g, gaussians *out, gbt_error *err);
+
 void gaussians_free(gaussians *g);
 
 #endif

@@ -8,6 +8,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "bvh/device.h"
+#include "train/frame.h"
 
 enum { SAMPLE_BUILD, SAMPLE_FORWARD, SAMPLE_ADJOINT, SAMPLE_FORWARD_CPU, SAMPLE_ADJOINT_CPU, SAMPLE_BUILD_CPU, SAMPLE_COUNT };
 
@@ -69,11 +70,8 @@ static gbt_status forward(passes *p, bench_way *w, gbt_error *err)
 {
     if (w->splat == NULL)
         return trace_forward(&w->traced, p->rays, true, &(trace_outputs){.rgb = &w->rgb}, &w->figures.counters, err);
-    raster_settings s = raster_settings_default();
+    const raster_settings s = frame_splat_settings(&w->settings, w->splat->form);
     raster_counters counted = {0};
-    s.form = w->splat->form, s.near = w->settings.t_near;
-    s.alpha_min = w->settings.alpha_min, s.alpha_max = w->settings.alpha_max, s.transmittance_min = w->settings.transmittance_min;
-    memcpy(s.background, w->settings.background, sizeof s.background);
     GBT_TRY(raster_forward(&w->splatted, w->splat->g, w->splat->camera, &s, true, &w->rgb, NULL, &counted, err));
     w->figures.counters.rays = counted.pixels, w->figures.counters.blended = counted.blended;
     return GBT_OK;

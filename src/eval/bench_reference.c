@@ -57,13 +57,13 @@ void bench_reference_free(bench_reference *reference)
 
 static void add_error(bench_error *sum, double error)
 {
-    sum->psnr += error * error; /* a sum of squares, until finish_error() */
+    sum->psnr += error * error; /* a sum of squares, until bench_error_of() */
     sum->max = fmax(sum->max, fabs(error));
 }
 
-static bench_error finish_error(bench_error sum, size_t values)
+bench_error bench_error_of(double square_sum, double max, size_t values)
 {
-    return (bench_error){.psnr = sum.psnr > 0 ? fmin(-10 * log10(sum.psnr / (double)values), 200) : 200, .max = sum.max};
+    return (bench_error){.psnr = square_sum > 0 ? fmin(-10 * log10(square_sum / (double)values), 200) : 200, .max = max};
 }
 
 bench_error bench_reference_compare(const bench_reference *reference, const image *rgb)
@@ -74,7 +74,7 @@ bench_error bench_reference_compare(const bench_reference *reference, const imag
     for (size_t i = 0; i < count; i++)
         for (size_t c = 0; c < 3 && (reference->left_out == NULL || !reference->left_out[i]); c++, values++)
             add_error(&sum, (double)rgb->pixels[3 * pixel_of(&reference->rays, rgb->width, i) + c] - reference->rgb[3 * i + c]);
-    return finish_error(sum, values);
+    return bench_error_of(sum.psnr, sum.max, values);
 }
 
 bench_error bench_reference_compare_some(const bench_reference *reference, const double *rgb, size_t stride)
@@ -84,5 +84,5 @@ bench_error bench_reference_compare_some(const bench_reference *reference, const
     for (size_t i = 0; i < ray_image_count(&reference->rays); i += stride)
         for (size_t c = 0; c < 3; c++, values++)
             add_error(&sum, rgb[values] - reference->rgb[3 * i + c]);
-    return finish_error(sum, values);
+    return bench_error_of(sum.psnr, sum.max, values);
 }

@@ -25,6 +25,9 @@ typedef struct bench_error {
     double psnr, max; /* psnr: of values in [0, 1], at most 200 dB */
 } bench_error;
 
+/** From the sum of the squared errors of `values` values, and the largest of them. */
+bench_error bench_error_of(double square_sum, double max, size_t values);
+
 /** Error of a picture of all rays; only the pixels of the reference count. */
 bench_error bench_reference_compare(const bench_reference *reference, const image *rgb);
 

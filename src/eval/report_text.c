@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/file.h"
 #include "base/memory.h"
 
 void text_free(text *t)
@@ -22,6 +23,18 @@ gbt_status text_print(text *t, FILE *out)
         fwrite(t->bytes, 1, t->length, out);
     text_free(t);
     return t->status;
+}
+
+gbt_status text_save(text *t, const char *folder, const char *name)
+{
+    char path[4096];
+    gbt_status status = t->status;
+    if (status == GBT_OK)
+        status = file_join(path, sizeof path, folder, name, t->err);
+    if (status == GBT_OK)
+        status = file_write_atomic(path, t->bytes, t->length, t->err);
+    text_free(t);
+    return status;
 }
 
 static bool make_room(text *t, size_t count)

@@ -23,6 +23,9 @@ void text_free(text *t);
 /** Write it to a stream and free it; t->status. */
 gbt_status text_print(text *t, FILE *out);
 
+/** Write it whole into folder/name and free it; t->status, or that of the file. */
+gbt_status text_save(text *t, const char *folder, const char *name);
+
 void text_add(text *t, const char *markup); /* as it is: only what this program wrote */
 void text_format(text *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 

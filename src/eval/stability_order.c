@@ -92,12 +92,8 @@ static void stacks(stability *s)
 /* The same Gaussians stored in another order. */
 static void shuffle(stability *s, const gaussians *g, gaussians *out)
 {
-    draw_some(s, out, g->count);
-    if (s->status != GBT_OK)
+    if (s->status != GBT_OK || !stability_ok(s, gaussians_copy(g, out, s->err)))
         return;
-#define X(name, pad, meaning) memcpy(out->name, g->name, g->count * sizeof(float));
-    GAUSSIANS_FIELDS(X)
-#undef X
     for (size_t i = g->count - 1; i > 0; i--) {
         const size_t j = (size_t)((double)rng_uniform(5, 50, i) * (double)(i + 1));
         float swap;

@@ -10,6 +10,7 @@
 #include "base/rng.h"
 #include "base/vec.h"
 #include "eval/stability_practice.h"
+#include "image/metrics.h"
 
 static gbt_train_def practice_def(stability *s)
 {
@@ -38,25 +39,6 @@ typedef struct far_views {
     size_t bad;
     double out_of_range;
 } far_views;
-
-static void keep_gaussians(stability *s, const gaussians *g, gaussians *out)
-{
-    draw_some(s, out, g->count);
-    if (s->status != GBT_OK)
-        return;
-#define X(name, pad, meaning) memcpy(out->name, g->name, g->count * sizeof(float));
-    GAUSSIANS_FIELDS(X)
-#undef X
-}
-
-static double psnr_of(const image *a, const image *b)
-{
-    double sum = 0;
-    const size_t values = 3 * (size_t)a->width * (size_t)a->height;
-    for (size_t i = 0; i < values; i++)
-        sum += pow((double)a->pixels[i] - (double)b->pixels[i], 2);
-    return -10 * log10(fmax(sum / (double)values, 1e-10));
-}
 
 /* The largest factor by which a distance that the networks saw is outside [min / 2, 2 max]; 0 when none is. */
 static double beyond_range(const far_views *f)
@@ -110,8 +92,7 @@ static double loss_to_baked(stability *s, far_views *f, double azimuth, double e
     const gbt_camera near = practice_camera(f->p, azimuth, 0, own_radius), far = practice_camera(f->p, azimuth, elevation, radius);
     if (!render_model(s, f, &near))
         return NAN;
-    keep_gaussians(s, &f->t.frame.gaussians, &f->fixed);
-    if (!render_model(s, f, &far))
+    if (!stability_ok(s, gaussians_copy(&f->t.frame.gaussians, &f->fixed, s->err)) || !render_model(s, f, &far))
         return NAN;
     f->bad += draw_count_bad(f->t.frame.rgb.pixels, 3 * (size_t)far.width * (size_t)far.height) + draw_count_bad_fields(&f->t.frame.gaussians);
     f->out_of_range = fmax(f->out_of_range, beyond_range(f));
@@ -124,7 +105,7 @@ static double loss_to_baked(stability *s, far_views *f, double azimuth, double e
     const trace_settings settings = practice_settings();
     if (s->status == GBT_OK && stability_ok(s, ray_image_from_camera(&far, &f->rays, s->err)))
         draw_traced(s, &f->truth, &f->p->truth, &settings, &f->rays);
-    return s->status == GBT_OK ? psnr_of(&f->baked.rgb, &f->truth.rgb) - psnr_of(&f->t.frame.rgb, &f->truth.rgb) : (double)NAN;
+    return s->status == GBT_OK ? metric_psnr(&f->baked.rgb, &f->truth.rgb) - metric_psnr(&f->t.frame.rgb, &f->truth.rgb) : (double)NAN;
 }
 
 static void look_from_everywhere(stability *s, far_views *f)

@@ -41,14 +41,11 @@ const char *cross_step_text(cross_step step)
 
 static raster_settings settings_of_step(const trace_settings *s, cross_step step)
 {
-    raster_settings r = raster_settings_default();
-    r.alpha_min = s->alpha_min, r.alpha_max = s->alpha_max, r.transmittance_min = s->transmittance_min;
-    memcpy(r.background, s->background, sizeof r.background);
-    r.form = step < CROSS_PROJECTION ? RASTER_PER_RAY : RASTER_EWA;
+    raster_settings r = frame_splat_settings(s, step < CROSS_PROJECTION ? RASTER_PER_RAY : RASTER_EWA);
     r.order_by_center = step >= CROSS_ORDER;
     r.dilation = step < CROSS_DILATION ? 0 : r.dilation;
     r.exact_cut = step < CROSS_CUTS;
-    r.near = step < CROSS_CUTS ? s->t_near : r.near;
+    r.near = step < CROSS_CUTS ? r.near : raster_settings_default().near;
     return r;
 }
 
@@ -77,12 +74,6 @@ static gbt_status splat_picture(const bench_scene *s, const trace_settings *sett
     return status;
 }
 
-/* What is left of the sum of squares, in dB of `count` values. */
-static double psnr_of(double sum, size_t count)
-{
-    return sum > 0 ? fmin(-10 * log10(sum / (double)count), 200) : 200;
-}
-
 static bench_error compare(const image *a, const image *b)
 {
     const size_t count = 3 * (size_t)a->width * (size_t)a->height;
@@ -91,7 +82,7 @@ static bench_error compare(const image *a, const image *b)
         const double off = fabs((double)a->pixels[i] - (double)b->pixels[i]);
         sum += off * off, max = fmax(max, off);
     }
-    return (bench_error){.psnr = psnr_of(sum, count), .max = max};
+    return bench_error_of(sum, max, count);
 }
 
 /* Per-ray form against tracer, both in float32. Pixels that differ by more than 1e-5 are looked at in double: on those of the rounding band either
@@ -118,7 +109,7 @@ static gbt_status compare_outside_band(const bench_scene *s, const trace_setting
     }
     band_scratch_free(&scratch);
     reference_scene_free(&exact);
-    *psnr = psnr_of(sum, 3 * (pixels - left_out)), *kept = (double)(pixels - left_out) / (double)pixels;
+    *psnr = bench_error_of(sum, 0, 3 * (pixels - left_out)).psnr, *kept = (double)(pixels - left_out) / (double)pixels;
     return status;
 }
 

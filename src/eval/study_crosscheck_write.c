@@ -218,24 +218,14 @@ static void add_page(const cross_study *study, const char *folder, text *out)
 
 /* ---- files --------------------------------------------------------------------------------------------------------------------------------- */
 
-static gbt_status save_text(text *out, const char *folder, const char *name, gbt_error *err)
-{
-    char path[4096];
-    gbt_status status = file_join(path, sizeof path, folder, name, err);
-    if (status == GBT_OK)
-        status = out->status != GBT_OK ? out->status : file_write_atomic(path, out->bytes, out->length, err);
-    text_free(out);
-    return status;
-}
-
 gbt_status cross_write(const cross_study *study, const char *folder, gbt_error *err)
 {
     text markdown = {.err = err}, picture = {.err = err}, page = {.err = err};
     GBT_TRY(write_json(study, folder, err));
     add_markdown(study, &markdown);
-    GBT_TRY(save_text(&markdown, folder, "crosscheck.md", err));
+    GBT_TRY(text_save(&markdown, folder, "crosscheck.md"));
     add_picture(study, &picture);
-    GBT_TRY(save_text(&picture, folder, "crosscheck.svg", err));
+    GBT_TRY(text_save(&picture, folder, "crosscheck.svg"));
     add_page(study, folder, &page);
-    return save_text(&page, folder, "crosscheck.html", err);
+    return text_save(&page, folder, "crosscheck.html");
 }

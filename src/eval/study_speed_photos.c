@@ -14,9 +14,7 @@ static gbt_status draw(const bench_scene *s, const speed_row *row, trace_scene *
         GBT_TRY(trace_build(traced, s->gaussians, &row->settings, ray_image_reach(&s->rays), err));
         return trace_forward(traced, &s->rays, false, &(trace_outputs){.rgb = rgb}, NULL, err);
     }
-    raster_settings settings = raster_settings_default();
-    settings.form = row->form, settings.near = row->settings.t_near;
-    memcpy(settings.background, row->settings.background, sizeof settings.background);
+    const raster_settings settings = frame_splat_settings(&row->settings, row->form);
     return raster_forward(splatted, row->form == RASTER_EWA ? &s->run->frame.gaussians : s->gaussians, &s->camera.shot.camera, &settings, false, rgb, NULL, NULL, err);
 }
 

@@ -216,13 +216,9 @@ static void add_picture(const speed_study *study, text *out)
 
 static gbt_status write_text(const speed_study *study, const char *folder, const char *name, void (*add)(const speed_study *, text *), gbt_error *err)
 {
-    char path[4096];
-    GBT_TRY(file_join(path, sizeof path, folder, name, err));
     text out = {.err = err};
     add(study, &out);
-    const gbt_status status = out.status != GBT_OK ? out.status : file_write_atomic(path, out.bytes, out.length, err);
-    text_free(&out);
-    return status;
+    return text_save(&out, folder, name);
 }
 
 gbt_status speed_write(const speed_study *study, const char *folder, gbt_error *err)

@@ -104,18 +104,6 @@ static gbt_status write_json(const stability_study *study, const char *path, gbt
     return status;
 }
 
-static gbt_status write_text(const char *folder, const char *name, text *out)
-{
-    char path[4096];
-    gbt_status status = out->status;
-    if (status == GBT_OK)
-        status = file_join(path, sizeof path, folder, name, out->err);
-    if (status == GBT_OK)
-        status = file_write_atomic(path, out->bytes, out->length, out->err);
-    text_free(out);
-    return status;
-}
-
 gbt_status stability_write(const stability_study *study, const char *folder, gbt_error *err)
 {
     char path[4096];
@@ -125,9 +113,9 @@ gbt_status stability_write(const stability_study *study, const char *folder, gbt
     text_format(&page, "# Stability: %zu of %zu rows within their limits\n\n", count_passes(study), study->row_count);
     stability_table(study, &page);
     add_parts(study, &page);
-    GBT_TRY(write_text(folder, "stability.md", &page));
+    GBT_TRY(text_save(&page, folder, "stability.md"));
     stability_draw_charts(study, &charts);
-    return write_text(folder, "stability.svg", &charts);
+    return text_save(&charts, folder, "stability.svg");
 }
 
 /* ---- the study ------------------------------------------------------------------------------------------------------------------- */

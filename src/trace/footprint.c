@@ -204,15 +204,9 @@ static void adjoint_block(size_t block, size_t begin, size_t end, void *context)
 
 gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min, const gaussians *g, gaussians *out, gbt_error *err)
 {
-    GBT_TRY(gaussians_resize(out, g->count, err));
-#define X(name, pad, meaning) \
-    if (g->count > 0)         \
-        memcpy(out->name, g->name, g->count * sizeof *g->name);
-    GAUSSIANS_FIELDS(X)
-#undef X
+    GBT_TRY(gaussians_copy(g, out, err));
     widen_job job = {view, (double)variance, pixel_min, g, out};
     parallel_blocks(g->count, WIDEN_BLOCK, widen_block, &job);
-    gaussians_pad(out);
     return GBT_OK;
 }
 

@@ -35,17 +35,21 @@ static gbt_status fit_picture(image *rgb, int width, int height, gbt_error *err)
     return image_alloc(rgb, width, height, 3, err);
 }
 
+/* Of every Gaussian of the last render; NULL: no limit. */
+static const float *pixel_min_of(const frame *f)
+{
+    return f->draw.anchor_pixel != NULL ? f->pixel_min : NULL;
+}
+
 /* f->gaussians as wide as the view's pixels make them. */
 static gbt_status widen(frame *f, const anchors *a, gbt_error *err)
 {
-    const float *pixel_min = NULL;
     if (f->draw.anchor_pixel != NULL) {
         GBT_TRY(mem_reserve((void **)&f->pixel_min, &f->pixel_min_capacity, 0, f->gaussians.count + 1, sizeof *f->pixel_min, "pixel sizes", err));
         for (size_t i = 0; i < f->gaussians.count; i++)
             f->pixel_min[i] = f->draw.anchor_pixel[f->visible[f->tape.slot[i] / (uint32_t)a->offset_count]];
-        pixel_min = f->pixel_min;
     }
-    return footprint_forward(&f->view, f->draw.footprint, pixel_min, &f->gaussians, &f->wide, err);
+    return footprint_forward(&f->view, f->draw.footprint, pixel_min_of(f), &f->gaussians, &f->wide, err);
 }
 
 /* Everything up to the tree, and f->rays through the middle of the aperture. `guest` is optional. */
@@ -91,14 +95,19 @@ static gbt_status prepare(frame *f, const anchors *a, const decoder *d, const ra
     return GBT_OK;
 }
 
-/* Near and far cuts, and all else, as the tracer's settings say. */
-static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape, gbt_error *err)
+raster_settings frame_splat_settings(const trace_settings *settings, raster_form form)
 {
     raster_settings s = raster_settings_default();
-    s.form = f->draw.renderer == FRAME_SPLAT ? RASTER_EWA : RASTER_PER_RAY;
+    s.form = form;
     s.alpha_min = settings->alpha_min, s.alpha_max = settings->alpha_max, s.transmittance_min = settings->transmittance_min;
     s.near = settings->t_near;
     memcpy(s.background, settings->background, sizeof s.background);
+    return s;
+}
+
+static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape, gbt_error *err)
+{
+    const raster_settings s = frame_splat_settings(settings, f->draw.renderer == FRAME_SPLAT ? RASTER_EWA : RASTER_PER_RAY);
     return raster_forward(&f->splats, frame_drawn(f), &f->camera, &s, keep_tape, &f->rgb, NULL, NULL, err);
 }
 
@@ -189,7 +198,7 @@ gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const im
     else
         GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, NULL, err));
     if (f->widened)
-        footprint_backward(&f->view, f->draw.footprint, f->draw.anchor_pixel != NULL ? f->pixel_min : NULL, &f->gaussians, &f->d_gaussians);
+        footprint_backward(&f->view, f->draw.footprint, pixel_min_of(f), &f->gaussians, &f->d_gaussians);
     f->times.adjoint = lap(&clock);
     gaussians *g = &f->gaussians, *dg = &f->d_gaussians;
     const float share = g->count > 0 ? volume_weight / (float)g->count : 0;

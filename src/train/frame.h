@@ -21,6 +21,9 @@ typedef enum frame_renderer {
 /** The renderer called "trace", "raster" or "per-ray"; false for another name. */
 bool frame_renderer_named(const char *name, frame_renderer *out);
 
+/** The rasterizer's settings for what the tracer's say: alphas, T, near, background. The rest is its default. */
+raster_settings frame_splat_settings(const trace_settings *settings, raster_form form);
+
 /** How Gaussians become a picture. Set in the frame before rendering; {0}: traced, thin rays. */
 typedef struct frame_drawing {
     frame_renderer renderer;

@@ -346,6 +346,13 @@ static void gaussians_resize_pad_zero(void **state)
         for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
             for (size_t i = 0; i < padded; i++)
                 assert_true(fields[f][i] == (i < count ? (float)(100 * f) + 0.5f : pads[f])); /* also: fields do not overlap */
+        gaussians copy = {0};
+        assert_ok(gaussians_copy(&g, &copy, NULL));
+        assert_int_equal(copy.count, count);
+#define X(name, pad, meaning) assert_memory_equal(copy.name, g.name, padded * sizeof *g.name);
+        GAUSSIANS_FIELDS(X)
+#undef X
+        gaussians_free(&copy);
         gaussians_zero(&g);
         for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
             for (size_t i = 0; i < padded; i++)

@@ -102,6 +102,8 @@ static json_t *scores_to_json(const evaluation *e)
         json_array_append_new(views, json_pack("{s:s,s:f,s:f,s:f,s:f,s:I}", "name", v->name, "psnr", v->psnr, "ssim", v->ssim, "flip", v->flip, "seconds",
                                                v->seconds, "gaussians", (json_int_t)v->gaussians));
     }
+    json_object_set_new(root, "renderer", json_string(e->renderer));
+    json_object_set_new(root, "downscale", json_real(e->downscale));
     json_object_set_new(root, "exposure", json_boolean(e->exposure));
     json_object_set_new(root, "scored", json_string(e->exposure ? "right half, with a colour matrix fitted to the left half" : "whole image"));
     json_object_set_new(root, "views", views);
@@ -156,6 +158,7 @@ static gbt_status score_run(loaded_run *r, const char *run, evaluation *e, gbt_e
     const double n = (double)e->view_count; /* 0 / 0 = NaN here becomes null in JSON and "n/a" on the page */
     e->psnr /= n, e->ssim /= n, e->flip /= n, e->gaussians_per_view /= n;
     e->anchors = r->model.anchors.count, e->exposure = r->def.exposure;
+    e->renderer = frame_renderer_name(r->frame.draw.renderer), e->downscale = r->photos.downscale;
     char model_path[4096];
     struct stat info;
     GBT_TRY(file_join(model_path, sizeof model_path, run, "model.gbt", err));

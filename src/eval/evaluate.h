@@ -20,6 +20,8 @@ typedef struct evaluation {
     size_t view_count;
     double psnr, ssim, flip, gaussians_per_view;
     size_t anchors, model_bytes;
+    const char *renderer; /* what drew the views: "trace", "raster", "per-ray" */
+    double downscale;     /* the photos were divided by this */
     bool exposure; /* scored on the right halves of the photos (image/affine.h) */
 } evaluation;
 

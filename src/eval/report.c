@@ -103,7 +103,9 @@ static void add_head(text *out, const char *run, const evaluation *e, const json
     text_add(out, report_css);
     text_add(out, "</style>\n</head>\n<body>\n<header>\n<h1>");
     text_escaped(out, name);
-    text_add(out, "</h1>\n<p class=\"lead\">A neural Gaussian scene, trained and rendered by CPU ray tracing. Data: ");
+    const char *renderer = text_of(metrics, "renderer");
+    const bool splats = renderer != NULL && strcmp(renderer, "trace") != 0;
+    text_format(out, "</h1>\n<p class=\"lead\">A neural Gaussian scene, %s. Data: ", splats ? "rendered by splats on the CPU" : "rendered by CPU ray tracing");
     text_escaped(out, data);
     text_format(out, " \xc2\xb7 %zu held-out view%s</p>\n</header>\n<main>\n", e->view_count, e->view_count == 1 ? "" : "s");
     add_tiles(out, e, metrics);

@@ -9,11 +9,17 @@
 #include "base/memory.h"
 #include "train/visible.h"
 
+static const char *const renderer_names[] = {[FRAME_TRACE] = "trace", [FRAME_SPLAT] = "raster", [FRAME_SPLAT_PER_RAY] = "per-ray"};
+
+const char *frame_renderer_name(frame_renderer renderer)
+{
+    return renderer_names[renderer];
+}
+
 bool frame_renderer_named(const char *name, frame_renderer *out)
 {
-    static const char *const names[] = {[FRAME_TRACE] = "trace", [FRAME_SPLAT] = "raster", [FRAME_SPLAT_PER_RAY] = "per-ray"};
-    for (int i = 0; i < (int)(sizeof names / sizeof *names); i++)
-        if (strcmp(name, names[i]) == 0)
+    for (int i = 0; i < (int)(sizeof renderer_names / sizeof *renderer_names); i++)
+        if (strcmp(name, renderer_names[i]) == 0)
             return *out = (frame_renderer)i, true;
     return false;
 }

@@ -20,6 +20,7 @@ typedef enum frame_renderer {
 
 /** The renderer called "trace", "raster" or "per-ray"; false for another name. */
 bool frame_renderer_named(const char *name, frame_renderer *out);
+const char *frame_renderer_name(frame_renderer renderer);
 
 /** The rasterizer's settings for what the tracer's say: alphas, T, near, background. The rest is its default. */
 raster_settings frame_splat_settings(const trace_settings *settings, raster_form form);

@@ -5,24 +5,18 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/file.h"
 #include "base/memory.h"
+#include "io/model_code.h"
 
 /* Scalars travel in three vectors; the enums name their places. */
 enum { SCENE_VOXEL_SIZE, SCENE_EXTENT, SCENE_T_NEAR, SCENE_BACKGROUND, SCENE_NUMBERS = SCENE_BACKGROUND + 3 };
 enum { DECODER_DISTANCE_SCALE, DECODER_DISTANCE_MIN, DECODER_DISTANCE_MAX, DECODER_NUMBERS };
 
-void model_add(container_writer *w, const model *m)
+/* All but anchors and the networks' parameters. */
+static void add_scene(container_writer *w, const model *m)
 {
-    const anchors *a = &m->anchors;
     const decoder *d = &m->decoder;
-    const size_t k = (size_t)a->offset_count;
-    container_add(w, "anchor.position", CONTAINER_F32, 2, (size_t[]){a->count, 3}, a->position);
-    container_add(w, "anchor.feature", CONTAINER_F32, 2, (size_t[]){a->count, ANCHOR_FEATURE_DIM}, a->feature);
-    container_add(w, "anchor.offset", CONTAINER_F32, 3, (size_t[]){a->count, k, 3}, a->offset);
-    container_add(w, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){a->count, 6}, a->scale_log);
-    if (m->anchor_pixel != NULL)
-        container_add(w, "anchor.pixel", CONTAINER_F32, 1, (size_t[]){a->count}, m->anchor_pixel);
-    container_add(w, "decoder.params", CONTAINER_F32, 1, (size_t[]){d->param_count}, d->params);
     container_add_small(w, "decoder.has_distance", CONTAINER_U8, 1, &(uint8_t){d->has_distance ? 1 : 0});
     container_add_small(w, "decoder.numbers", CONTAINER_F32, DECODER_NUMBERS, (float[DECODER_NUMBERS]){d->distance_scale, d->distance_min, d->distance_max});
     container_add_small(w, "scene.origin", CONTAINER_F64, 3, m->origin);
@@ -31,6 +25,20 @@ void model_add(container_writer *w, const model *m)
     container_add_text(w, "scene.data_folder", m->data_folder);
     container_add_text(w, "train.config", m->config);
     container_add_small(w, "train.iterations", CONTAINER_U64, 1, &m->iterations);
+}
+
+void model_add(container_writer *w, const model *m)
+{
+    const anchors *a = &m->anchors;
+    const size_t k = (size_t)a->offset_count;
+    container_add(w, "anchor.position", CONTAINER_F32, 2, (size_t[]){a->count, 3}, a->position);
+    container_add(w, "anchor.feature", CONTAINER_F32, 2, (size_t[]){a->count, ANCHOR_FEATURE_DIM}, a->feature);
+    container_add(w, "anchor.offset", CONTAINER_F32, 3, (size_t[]){a->count, k, 3}, a->offset);
+    container_add(w, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){a->count, 6}, a->scale_log);
+    if (m->anchor_pixel != NULL)
+        container_add(w, "anchor.pixel", CONTAINER_F32, 1, (size_t[]){a->count}, m->anchor_pixel);
+    container_add(w, "decoder.params", CONTAINER_F32, 1, (size_t[]){m->decoder.param_count}, m->decoder.params);
+    add_scene(w, m);
 }
 
 static gbt_status check_finite(const char *path, const char *section, const float *values, size_t count, gbt_status failure, gbt_error *err)
@@ -93,6 +101,71 @@ gbt_status model_save(const char *path, const model *m, gbt_error *err)
     return status;
 }
 
+/* Same bits in all that the coded parts hold? */
+static bool same_parts(const model *a, const model *b)
+{
+    const size_t n = a->anchors.count, k = (size_t)a->anchors.offset_count;
+    if (b->anchors.count != n || b->anchors.offset_count != a->anchors.offset_count || a->decoder.param_count != b->decoder.param_count ||
+        (a->anchor_pixel == NULL) != (b->anchor_pixel == NULL))
+        return false;
+    if (memcmp(a->decoder.params, b->decoder.params, a->decoder.param_count * sizeof(float)) != 0)
+        return false;
+    return n == 0 || (memcmp(a->anchors.position, b->anchors.position, n * 3 * sizeof(float)) == 0 &&
+                      memcmp(a->anchors.feature, b->anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float)) == 0 &&
+                      memcmp(a->anchors.offset, b->anchors.offset, n * k * 3 * sizeof(float)) == 0 &&
+                      memcmp(a->anchors.scale_log, b->anchors.scale_log, n * 6 * sizeof(float)) == 0 &&
+                      (a->anchor_pixel == NULL || memcmp(a->anchor_pixel, b->anchor_pixel, n * sizeof(float)) == 0));
+}
+
+/* Read what is about to be written: a model that cannot come back is not saved. */
+static gbt_status check_bytes(const char *path, const unsigned char *bytes, size_t byte_count, const model *wanted, gbt_error *err)
+{
+    container c;
+    model back = {0};
+    GBT_TRY(container_parse(bytes, byte_count, path, &c, err));
+    gbt_status status = model_from_container(&c, &back, err);
+    if (status == GBT_OK && !same_parts(wanted, &back))
+        status = base_fail(err, GBT_ERR_INTERNAL, "%s: the coded model does not come back as it was meant", path);
+    model_free(&back);
+    container_free(&c);
+    return status;
+}
+
+gbt_status model_save_coded(const char *path, const model *m, const model_steps *steps, model_sizes *sizes, gbt_error *err)
+{
+    const char *called = path != NULL ? path : "coded model";
+    GBT_TRY(check_model(called, m, GBT_ERR_ARGUMENT, err));
+    container_writer w = {0};
+    model_coded coded = {0};
+    model back = {0};
+    unsigned char *bytes = NULL;
+    size_t byte_count = 0;
+    gbt_status status = model_code(m, steps, &coded, &back, err);
+    if (status == GBT_OK) {
+        model_add_coded(&w, &coded);
+        add_scene(&w, m);
+        status = container_encode(&w, &bytes, &byte_count, err);
+    }
+    if (status == GBT_OK)
+        status = check_bytes(called, bytes, byte_count, &back, err);
+    if (status == GBT_OK && path != NULL)
+        status = file_write_atomic(path, bytes, byte_count, err);
+    if (status == GBT_OK && sizes != NULL)
+        *sizes = (model_sizes){.positions = coded.part_bytes[CODE_POSITIONS],
+                               .features = coded.part_bytes[CODE_FEATURES],
+                               .offsets = coded.part_bytes[CODE_OFFSETS],
+                               .scales = coded.part_bytes[CODE_SCALES],
+                               .pixels = coded.part_bytes[CODE_PIXELS],
+                               .networks = coded.part_bytes[CODE_NETWORKS],
+                               .steps = coded.part_bytes[CODE_DOUBLINGS] + coded.part_bytes[CODE_RULES],
+                               .total = byte_count};
+    container_writer_free(&w);
+    model_coded_free(&coded);
+    model_free(&back);
+    mem_free(bytes);
+    return status;
+}
+
 static gbt_status read_anchors(const container *c, anchors *a, gbt_error *err)
 {
     size_t count = CONTAINER_ANY, k = CONTAINER_ANY;
@@ -134,26 +207,46 @@ static gbt_status read_anchor_pixel(const container *c, size_t count, float **ou
     return GBT_OK;
 }
 
-static gbt_status read_decoder(const container *c, int offset_count, decoder *d, gbt_error *err)
+static gbt_status read_decoder_inputs(const container *c, decoder *d, gbt_error *err)
 {
     uint8_t has_distance;
     float numbers[DECODER_NUMBERS];
-    size_t param_count = CONTAINER_ANY;
-    const void *params;
     GBT_TRY(container_get(c, "decoder.has_distance", CONTAINER_U8, 1, &has_distance, err));
     GBT_TRY(container_get(c, "decoder.numbers", CONTAINER_F32, DECODER_NUMBERS, numbers, err));
-    GBT_TRY(container_find(c, "decoder.params", CONTAINER_F32, 1, &param_count, &params, err));
     if (has_distance > 1)
         return base_fail(err, GBT_ERR_FORMAT, "%s: section decoder.has_distance: wanted 0 or 1, got %d", c->path, has_distance);
+    d->has_distance = has_distance == 1;
+    d->distance_scale = numbers[DECODER_DISTANCE_SCALE];
+    d->distance_min = numbers[DECODER_DISTANCE_MIN], d->distance_max = numbers[DECODER_DISTANCE_MAX];
+    return GBT_OK;
+}
+
+static gbt_status read_params(const container *c, int offset_count, decoder *d, gbt_error *err)
+{
+    size_t param_count = CONTAINER_ANY;
+    const void *params;
+    GBT_TRY(container_find(c, "decoder.params", CONTAINER_F32, 1, &param_count, &params, err));
     d->params = mem_alloc(param_count, sizeof *d->params, "decoder", err);
     if (d->params == NULL)
         return GBT_ERR_NO_MEMORY;
     if (param_count > 0)
         memcpy(d->params, params, param_count * sizeof *d->params);
-    d->param_count = param_count, d->offset_count = offset_count, d->has_distance = has_distance == 1;
-    d->distance_scale = numbers[DECODER_DISTANCE_SCALE];
-    d->distance_min = numbers[DECODER_DISTANCE_MIN], d->distance_max = numbers[DECODER_DISTANCE_MAX];
+    d->param_count = param_count, d->offset_count = offset_count;
     return GBT_OK;
+}
+
+static gbt_status read_plain(const container *c, model *m, gbt_error *err)
+{
+    GBT_TRY(read_anchors(c, &m->anchors, err));
+    GBT_TRY(read_anchor_pixel(c, m->anchors.count, &m->anchor_pixel, err));
+    GBT_TRY(read_decoder_inputs(c, &m->decoder, err));
+    return read_params(c, m->anchors.offset_count, &m->decoder, err);
+}
+
+static gbt_status read_coded(const container *c, model *m, gbt_error *err)
+{
+    GBT_TRY(read_decoder_inputs(c, &m->decoder, err));
+    return model_decode(c, m->decoder.has_distance, m, err);
 }
 
 static gbt_status read_scene(const container *c, model *m, gbt_error *err)
@@ -171,11 +264,7 @@ static gbt_status read_scene(const container *c, model *m, gbt_error *err)
 gbt_status model_from_container(const container *c, model *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
-    gbt_status status = read_anchors(c, &out->anchors, err);
-    if (status == GBT_OK)
-        status = read_anchor_pixel(c, out->anchors.count, &out->anchor_pixel, err);
-    if (status == GBT_OK)
-        status = read_decoder(c, out->anchors.offset_count, &out->decoder, err);
+    gbt_status status = model_is_coded(c) ? read_coded(c, out, err) : read_plain(c, out, err);
     if (status == GBT_OK)
         status = read_scene(c, out, err);
     if (status == GBT_OK)

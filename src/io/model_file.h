@@ -27,8 +27,29 @@ typedef struct model {
 /** Save atomically: after any failure the old file is whole. GBT_ERR_ARGUMENT if the model is not one that model_load() would take. */
 gbt_status model_save(const char *path, const model *m, gbt_error *err);
 
+/** Bytes of a coded model by what they hold. */
+typedef struct model_sizes {
+    size_t positions, features, offsets, scales, pixels, networks;
+    size_t steps; /* of each anchor, and the rules of prediction */
+    size_t total; /* the file: all of these, and the container with what is about the scene */
+} model_sizes;
+
+struct model_steps;
+
 /**
- * Load and check: every byte by checksum, shapes, ranges, all values finite.
+ * Save in one of the two small forms (docs/compression.md), then as model_save(). What the file gives back is compared with what it should
+ * before anything is written.
+ *
+ * @param path  [in]  NULL: write nothing, only measure
+ * @param steps [in]  of this model (io/model_steps.h): anchors are put in order of their positions, values are rounded. NULL: lossless, all bits
+ *                    and the order are kept
+ * @param sizes [out] optional (NULL)
+ * @return also GBT_ERR_ARGUMENT for values that no steps can hold, GBT_ERR_INTERNAL when the comparison fails
+ */
+gbt_status model_save_coded(const char *path, const model *m, const struct model_steps *steps, model_sizes *sizes, gbt_error *err);
+
+/**
+ * Load and check, whichever form it has: every byte by checksum, shapes, ranges, all values finite.
  *
  * @param out [out] free with model_free(); zeroed on failure
  * @return GBT_OK, GBT_ERR_IO (cannot read), GBT_ERR_FORMAT (damaged, or not a model: says which section), GBT_ERR_NO_MEMORY

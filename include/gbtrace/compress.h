@@ -1,0 +1,41 @@
+/* gbtrace/compress.h -- make the file of a trained model small. */
+#ifndef GBTRACE_COMPRESS_H
+#define GBTRACE_COMPRESS_H
+
+#include <stddef.h>
+#include <stdio.h>
+
+#include "gbtrace/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct gbt_compress_def {
+    double quality;   /* dB: what the pictures of the model may differ from before, as a PSNR; [20, 90]. Default 55 */
+    int lossless;     /* 1: every bit of the model is kept; `quality` is not used. Default 0 */
+    const char *data; /* data set whose training cameras tell what counts; NULL: the one it was trained on. Default NULL */
+    const char *json; /* also write the figures here; NULL: nowhere. Default NULL */
+} gbt_compress_def;
+
+gbt_compress_def gbt_compress_def_default(void);
+
+/**
+ * Write a trained model in a small form that every command reads as it reads the large one (docs/compression.md).
+ *
+ * Steps of quantisation come from adjoint passes through the training views (photos are not needed); when the data set is not there, from
+ * the model alone, with a line on stderr: the file is then some 5 to 40 % larger at the same loss. What the file gives back is checked before it is written.
+ *
+ * @param run [in] RUN (a folder with model.gbt) or a model file; also one that is already small
+ * @param out [in] written atomically; may be the model itself
+ * @param report [in] open stream for the table of bytes
+ * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ *
+ * Threads: same bytes for every thread count. Cost: 64 views with their adjoint, and about 50 us per anchor.
+ */
+gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report, gbt_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

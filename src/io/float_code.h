@@ -1,0 +1,13 @@
+/* io/float_code.h -- floats kept bit for bit: the upper half of each in contexts, the lower, which is noise, as it is. */
+#ifndef GBT_IO_FLOAT_CODE_H
+#define GBT_IO_FLOAT_CODE_H
+
+#include <stddef.h>
+
+#include "gbtrace/status.h"
+#include "io/range_coder.h"
+
+/** Write or read values [rows][columns]; any bits are fine. GBT_OK or GBT_ERR_NO_MEMORY. */
+gbt_status floats_code(range_coder *c, float *values, size_t rows, size_t columns, gbt_error *err);
+
+#endif

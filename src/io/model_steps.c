@@ -1,0 +1,227 @@
+/* io/model_steps.c -- sensitivities to steps; features turned into their best basis. */
+#include "io/model_steps.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "anchor/decode.h"
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/rng.h"
+
+enum { DIM = ANCHOR_FEATURE_DIM, GUESS_VIEWS = 16, DOUBLINGS_MAX = 2 };
+
+/* Of what Gaussians could cover this part is in front and in the picture: measured against views, on three scenes (docs/compression.md). */
+#define HIDDEN 30.0
+
+/* ---- sums --------------------------------------------------------------------------------------------------------------------- */
+
+gbt_status model_sensitivity_start(model_sensitivity *s, size_t count, gbt_error *err)
+{
+    *s = (model_sensitivity){.count = count, .anchor = mem_calloc(count, sizeof *s->anchor, "sensitivities", err)};
+    return s->anchor != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+}
+
+static double sum_squares(const float *x, size_t count)
+{
+    double sum = 0;
+    for (size_t i = 0; i < count; i++)
+        sum += (double)x[i] * (double)x[i];
+    return sum;
+}
+
+void model_sensitivity_add(model_sensitivity *s, const anchors *a, const anchors *gradient, double values)
+{
+    const size_t k3 = (size_t)a->offset_count * 3;
+    s->values += values;
+    for (size_t i = 0; i < s->count; i++) {
+        const float *f = gradient->feature + i * DIM, *offset = gradient->offset + i * k3, *scale = gradient->scale_log + i * 6;
+        const double all = sum_squares(f, DIM) + sum_squares(offset, k3) + sum_squares(scale, 6);
+        if (!(all > 0) || !isfinite(all))
+            continue;
+        s->anchor[i] += all / (double)(DIM + k3 + 6);
+        for (size_t c = 0; c < k3; c++)
+            s->offset[c] += (double)offset[c] * (double)offset[c];
+        for (size_t c = 0; c < 6; c++)
+            s->scale_log[c] += (double)scale[c] * (double)scale[c];
+        for (size_t axis = 0; axis < 3; axis++) { /* the mean is position + offset exp(scale) */
+            double sum = 0;
+            for (size_t c = axis; c < k3; c += 3)
+                sum += (double)offset[c];
+            sum *= exp(-fmax(fmin((double)a->scale_log[i * 6 + axis], 30), -30));
+            s->position += sum * sum / 3;
+        }
+        for (size_t c = 0; c < DIM; c++)
+            for (size_t d = 0; d <= c; d++)
+                s->feature[c][d] += (double)f[c] * (double)f[d];
+    }
+}
+
+void model_sensitivity_end(model_sensitivity *s)
+{
+    const double count = s->count > 0 ? (double)s->count : 1, scale = s->values > 0 ? 1 / s->values : 0;
+    for (size_t i = 0; i < s->count; i++)
+        s->anchor[i] *= scale;
+    s->position *= scale / count;
+    for (size_t c = 0; c < ANCHOR_MAX_OFFSETS * 3; c++)
+        s->offset[c] *= scale / count;
+    for (size_t c = 0; c < 6; c++)
+        s->scale_log[c] *= scale / count;
+    double trace = 0;
+    for (size_t c = 0; c < DIM; c++)
+        trace += s->feature[c][c] *= scale / count;
+    for (size_t c = 0; c < DIM; c++) {
+        for (size_t d = 0; d < c; d++)
+            s->feature[c][d] = s->feature[d][c] = s->feature[c][d] * scale / count;
+        s->feature[c][c] += 0.05 * trace / DIM + 1e-30;
+    }
+    s->values = 1;
+}
+
+void model_sensitivity_free(model_sensitivity *s)
+{
+    mem_free(s->anchor);
+    *s = (model_sensitivity){0};
+}
+
+/* ---- a guess without views ---------------------------------------------------------------------------------------------------- */
+
+/* Around an anchor, as far from it as training cameras were from what they saw. */
+static void guess_camera(const model *m, uint64_t view, float camera[3])
+{
+    const decoder *d = &m->decoder;
+    const float distance = d->has_distance && d->distance_scale > 0 ? 1 / d->distance_scale : m->extent;
+    const size_t at = (size_t)((double)rng_uniform(1, 0, view) * (double)m->anchors.count);
+    double way[3], length = 0;
+    for (uint64_t k = 0; k < 3; k++) {
+        way[k] = (double)rng_normal(1, 1 + k, view);
+        length += way[k] * way[k];
+    }
+    for (int k = 0; k < 3; k++)
+        camera[k] = m->anchors.position[3 * at + (size_t)k] + distance * (float)(way[k] / sqrt(length + 1e-30));
+}
+
+/* What a sign on every pixel that a Gaussian covers alone would give: its area (of the two longer axes) under the root, times how far its
+   colour, its opacity, its outline change. Returns that area times opacity. */
+static double guess_gradient(const gaussians *g, size_t i, uint64_t view, gaussians *out)
+{
+    const float x = g->scale_x[i], y = g->scale_y[i], z = g->scale_z[i];
+    const float most = fmaxf(x, fmaxf(y, z)), least = fminf(x, fminf(y, z)), middle = fmaxf(fminf(x, y), fminf(fmaxf(x, y), z));
+    const float opacity = fmaxf(g->opacity[i], 0), root = sqrtf(most * middle), seen = root * opacity, turn = 0.5f * seen * logf(most / least);
+    const float half = 0.5f * seen, move = half / middle;
+    float *const fields[] = {out->opacity, out->red,     out->green,   out->blue,   out->mean_x, out->mean_y, out->mean_z,
+                             out->scale_x, out->scale_y, out->scale_z, out->quat_w, out->quat_x, out->quat_y, out->quat_z};
+    const float size[] = {root, seen, seen, seen, move, move, move, half / x, half / y, half / z, turn, turn, turn, turn};
+    for (size_t f = 0; f < sizeof fields / sizeof *fields; f++)
+        fields[f][i] = rng_uniform(2 + view, f, i) < 0.5f ? -size[f] : size[f];
+    return (double)(seen * root);
+}
+
+typedef struct guess {
+    gaussians drawn, gradient;
+    decode_tape tape;
+    anchors d_anchors;
+    float *d_params;
+    uint32_t *visible;
+} guess;
+
+static gbt_status guess_view(const model *m, guess *g, uint64_t view, model_sensitivity *s, gbt_error *err)
+{
+    const anchors *a = &m->anchors;
+    float camera[3];
+    guess_camera(m, view, camera);
+    GBT_TRY(decode_forward(a, &m->decoder, camera, g->visible, a->count, -0.3f, &g->drawn, &g->tape, err)); /* and what is about to be drawn */
+    GBT_TRY(gaussians_resize(&g->gradient, g->drawn.count, err));
+    gaussians_zero(&g->gradient);
+    double covered = 0;
+    for (size_t i = 0; i < g->drawn.count; i++)
+        covered += guess_gradient(&g->drawn, i, view, &g->gradient);
+    memset(g->d_anchors.feature, 0, a->count * DIM * sizeof(float));
+    memset(g->d_anchors.offset, 0, a->count * (size_t)a->offset_count * 3 * sizeof(float));
+    memset(g->d_anchors.scale_log, 0, a->count * 6 * sizeof(float));
+    GBT_TRY(decode_backward(a, &m->decoder, &g->tape, &g->gradient, &g->d_anchors, g->d_params, err));
+    model_sensitivity_add(s, a, &g->d_anchors, 3 * HIDDEN * covered);
+    return GBT_OK;
+}
+
+gbt_status model_sensitivity_guess(const model *m, model_sensitivity *s, gbt_error *err)
+{
+    const size_t count = m->anchors.count;
+    GBT_TRY(model_sensitivity_start(s, count, err));
+    guess g = {.d_anchors.offset_count = m->anchors.offset_count};
+    gbt_status status = anchors_resize(&g.d_anchors, count, err);
+    g.d_params = mem_calloc(m->decoder.param_count, sizeof *g.d_params, "gradient", err);
+    g.visible = mem_alloc(count, sizeof *g.visible, "anchors", err);
+    if (status == GBT_OK && (g.d_params == NULL || g.visible == NULL))
+        status = GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < count && status == GBT_OK; i++)
+        g.visible[i] = (uint32_t)i;
+    for (uint64_t view = 0; view < GUESS_VIEWS && count > 0 && status == GBT_OK; view++)
+        status = guess_view(m, &g, view, s, err);
+    model_sensitivity_end(s);
+    mem_free(s->anchor);
+    s->anchor = NULL;
+    gaussians_free(&g.drawn);
+    gaussians_free(&g.gradient);
+    decode_tape_free(&g.tape);
+    anchors_free(&g.d_anchors);
+    mem_free(g.d_params);
+    mem_free(g.visible);
+    return status;
+}
+
+/* ---- steps -------------------------------------------------------------------------------------------------------------------- */
+
+/* Within limits; the upper one where nothing counts. */
+static double step_of(double noise, double sensitivity, double least, double most)
+{
+    const double step = sensitivity > 0 ? noise / sqrt(sensitivity) : most;
+    return fmin(fmax(isfinite(step) ? step : most, least), most);
+}
+
+static gbt_status find_doublings(const model_sensitivity *s, model_steps *out, gbt_error *err)
+{
+    out->count = s->count;
+    out->doubling = mem_calloc(s->count, sizeof *out->doubling, "steps", err);
+    if (out->doubling == NULL)
+        return GBT_ERR_NO_MEMORY;
+    double mean = 0;
+    for (size_t i = 0; i < s->count; i++)
+        mean += s->anchor[i] / (double)s->count;
+    for (size_t i = 0; i < s->count; i++) {
+        const double doublings = mean > 0 ? floor(0.5 * log2(mean / (s->anchor[i] + 1e-6 * mean)) + 0.5) : 0;
+        out->doubling[i] = (uint8_t)fmin(fmax(doublings, 0), DOUBLINGS_MAX);
+    }
+    return GBT_OK;
+}
+
+gbt_status model_steps_at(const model *m, const model_sensitivity *s, double quality, model_steps *out, gbt_error *err)
+{
+    const anchors *a = &m->anchors;
+    const size_t k3 = (size_t)a->offset_count * 3, channels = DIM + k3 + 6;
+    if (!(quality > 0 && quality < 200))
+        return base_fail(err, GBT_ERR_ARGUMENT, "quality: wanted 0 to 200 dB, got %g", quality);
+    if (s->count != a->count)
+        return base_fail(err, GBT_ERR_ARGUMENT, "sensitivities of another model (wanted %zu anchors, got %zu)", a->count, s->count);
+    /* Uniform noise of one step has the variance 1/12. */
+    const double noise = sqrt(12 * pow(10, -quality / 10) / ((double)channels * fmax((double)a->count, 1)));
+    double largest = 0, side = 0;
+    for (size_t i = 0; i < a->count * DIM; i++)
+        largest = fmax(largest, fabs((double)a->feature[i]));
+    for (size_t i = 0; i < a->count * 3; i++)
+        side = fmax(side, fabs((double)a->position[i] - (double)a->position[i % 3]));
+    for (size_t c = 0; c < DIM; c++)
+        out->feature[c] = (float)step_of(noise, s->feature[c][c], fmax(largest, 1e-20) / 65536, fmax(largest, 1e-20));
+    for (size_t c = 0; c < k3; c++)
+        out->offset[c] = (float)step_of(noise, s->offset[c], 1.0 / 4096, 0.25);
+    for (size_t c = 0; c < 6; c++)
+        out->scale_log[c] = (float)step_of(noise, s->scale_log[c], 1.0 / 1024, 0.25);
+    out->position = step_of(noise, s->position, fmax(side, 1e-20) / (1 << 20), fmax(side, 1e-20) / 64);
+    return s->anchor != NULL ? find_doublings(s, out, err) : GBT_OK;
+}
+
+void model_steps_free(model_steps *steps)
+{
+    mem_free(steps->doubling);
+    *steps = (model_steps){0};
+}

@@ -1,0 +1,170 @@
+/* io/model_turn.c -- the features of a model in the basis that codes best, and its networks to fit. */
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "io/model_steps.h"
+
+enum { DIM = ANCHOR_FEATURE_DIM, SWEEPS_MAX = 60 };
+
+typedef double square[DIM][DIM];
+
+/* m = l l^T; m is positive definite: model_sensitivity_end(). */
+static void cholesky(const square m, square l)
+{
+    memset(l, 0, sizeof(square));
+    for (size_t i = 0; i < DIM; i++)
+        for (size_t j = 0; j <= i; j++) {
+            double sum = m[i][j];
+            for (size_t k = 0; k < j; k++)
+                sum -= l[i][k] * l[j][k];
+            l[i][j] = i == j ? sqrt(fmax(sum, 1e-12)) : sum / l[j][j];
+        }
+}
+
+/* One turn of Jacobi's: makes m[p][q] zero; the columns of u follow. */
+static void jacobi_turn(square m, square u, size_t p, size_t q)
+{
+    const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]), t = copysign(1, theta) / (fabs(theta) + sqrt(theta * theta + 1));
+    const double c = 1 / sqrt(t * t + 1), s = t * c;
+    for (size_t k = 0; k < DIM; k++) {
+        const double a = m[k][p], b = m[k][q], x = u[k][p], y = u[k][q];
+        m[k][p] = c * a - s * b, m[k][q] = s * a + c * b;
+        u[k][p] = c * x - s * y, u[k][q] = s * x + c * y;
+    }
+    for (size_t k = 0; k < DIM; k++) {
+        const double a = m[p][k], b = m[q][k];
+        m[p][k] = c * a - s * b, m[q][k] = s * a + c * b;
+    }
+}
+
+/* Eigenvectors of a symmetric matrix as the columns of u, largest eigenvalue first. m is left with the eigenvalues. */
+static void eigenvectors(square m, square u)
+{
+    double trace = 0;
+    for (size_t i = 0; i < DIM; i++) {
+        trace += fabs(m[i][i]);
+        for (size_t j = 0; j < DIM; j++)
+            u[i][j] = i == j;
+    }
+    bool turned = true;
+    for (int sweep = 0; sweep < SWEEPS_MAX && turned; sweep++) {
+        turned = false;
+        for (size_t p = 0; p < DIM; p++)
+            for (size_t q = p + 1; q < DIM; q++)
+                if (fabs(m[p][q]) > 1e-14 * trace)
+                    jacobi_turn(m, u, p, q), turned = true;
+    }
+    for (size_t i = 0; i < DIM; i++) {
+        size_t best = i;
+        for (size_t j = i + 1; j < DIM; j++)
+            best = m[j][j] > m[best][best] ? j : best;
+        const double value = m[i][i];
+        m[i][i] = m[best][best], m[best][best] = value;
+        for (size_t k = 0; k < DIM; k++) {
+            const double x = u[k][i];
+            u[k][i] = u[k][best], u[k][best] = x;
+        }
+    }
+}
+
+static void find_covariance(const anchors *a, double mean[DIM], square covariance)
+{
+    const double n = a->count > 0 ? (double)a->count : 1;
+    memset(covariance, 0, sizeof(square));
+    memset(mean, 0, DIM * sizeof *mean);
+    for (size_t i = 0; i < a->count * DIM; i++)
+        mean[i % DIM] += (double)a->feature[i] / n;
+    for (size_t i = 0; i < a->count; i++)
+        for (size_t c = 0; c < DIM; c++)
+            for (size_t d = 0; d < DIM; d++)
+                covariance[c][d] += ((double)a->feature[i * DIM + c] - mean[c]) * ((double)a->feature[i * DIM + d] - mean[d]) / n;
+}
+
+/* forth = U^T L^T, back = L^-T U, where L L^T = S / m and U diagonalises L^T C L. */
+static void find_basis(const square sensitivity, const square covariance, square forth, square back)
+{
+    square scaled, l, product, u;
+    double mean = 0;
+    for (size_t c = 0; c < DIM; c++)
+        mean += sensitivity[c][c] / DIM;
+    for (size_t c = 0; c < DIM; c++)
+        for (size_t d = 0; d < DIM; d++)
+            scaled[c][d] = sensitivity[c][d] / mean;
+    cholesky(scaled, l);
+    for (size_t i = 0; i < DIM; i++)
+        for (size_t j = 0; j < DIM; j++) {
+            scaled[i][j] = 0;
+            for (size_t k = 0; k < DIM; k++)
+                scaled[i][j] += covariance[i][k] * l[k][j];
+        }
+    for (size_t i = 0; i < DIM; i++)
+        for (size_t j = 0; j < DIM; j++) {
+            product[i][j] = 0;
+            for (size_t k = 0; k < DIM; k++)
+                product[i][j] += l[k][i] * scaled[k][j];
+        }
+    eigenvectors(product, u);
+    for (size_t i = 0; i < DIM; i++)
+        for (size_t j = 0; j < DIM; j++) {
+            forth[i][j] = 0;
+            for (size_t k = 0; k < DIM; k++)
+                forth[i][j] += u[k][i] * l[j][k];
+        }
+    for (size_t j = 0; j < DIM; j++) /* L^T x = u_j, from the last row up */
+        for (size_t i = DIM; i-- > 0;) {
+            double sum = u[i][j];
+            for (size_t k = i + 1; k < DIM; k++)
+                sum -= l[k][i] * back[k][j];
+            back[i][j] = sum / l[i][i];
+        }
+}
+
+/* Rows of W1 as they see the turned features; b1 takes what the mean did. */
+static void turn_networks(decoder *d, const double mean[DIM], const square back)
+{
+    decoder_part parts[3];
+    decoder_parts(d, parts);
+    const size_t inputs = DIM + 3 + (d->has_distance ? 1 : 0);
+    for (int head = 0; head < 3; head++)
+        for (size_t h = 0; h < ANCHOR_HIDDEN_DIM; h++) {
+            float *w = d->params + parts[head].begin + h * inputs, *bias = d->params + parts[head].begin + ANCHOR_HIDDEN_DIM * inputs + h;
+            double turned[DIM] = {0}, sum = (double)*bias;
+            for (size_t c = 0; c < DIM; c++) {
+                sum += (double)w[c] * mean[c];
+                for (size_t e = 0; e < DIM; e++)
+                    turned[e] += (double)w[c] * back[c][e];
+            }
+            for (size_t e = 0; e < DIM; e++)
+                w[e] = (float)turned[e];
+            *bias = (float)sum;
+        }
+}
+
+gbt_status model_turn_features(model *m, model_sensitivity *s, gbt_error *err)
+{
+    struct { square covariance, forth, back; double mean[DIM]; } *t = mem_alloc(1, sizeof *t, "basis of features", err);
+    if (t == NULL)
+        return GBT_ERR_NO_MEMORY;
+    find_covariance(&m->anchors, t->mean, t->covariance);
+    find_basis(s->feature, t->covariance, t->forth, t->back);
+    double all = 0;
+    for (size_t c = 0; c < DIM; c++)
+        all += s->feature[c][c] / DIM;
+    for (size_t c = 0; c < DIM; c++)
+        for (size_t d = 0; d < DIM; d++)
+            s->feature[c][d] = c == d ? all : 0;
+    for (size_t i = 0; i < m->anchors.count; i++) {
+        float *f = m->anchors.feature + i * DIM;
+        double turned[DIM] = {0};
+        for (size_t c = 0; c < DIM; c++)
+            for (size_t d = 0; d < DIM; d++)
+                turned[c] += t->forth[c][d] * ((double)f[d] - t->mean[d]);
+        for (size_t c = 0; c < DIM; c++)
+            f[c] = (float)turned[c];
+    }
+    turn_networks(&m->decoder, t->mean, t->back);
+    mem_free(t);
+    return GBT_OK;
+}

@@ -69,6 +69,18 @@ gbt_status gbt_study_speed(const gbt_study_def *def, const char *folder, FILE *o
  */
 gbt_status gbt_study_crosscheck(const gbt_study_def *def, const char *folder, FILE *out, gbt_error *err);
 
+/**
+ * Size against picture: what trained models lose on their held-out views when their files are made small (gbtrace/compress.h).
+ *
+ * `def->models`: 1 to 6 runs whose data sets are there; the rest of `def` is not used. Each is coded at a ladder of qualities and without
+ * loss, read back and scored by its own renderer at its own size. Writes rate.json, .csv, .md and .svg (chart) into `folder`, the tables to
+ * `out`. A row beyond its limit is no failure: it is told in the table.
+ *
+ * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * Cost: gbt_compress() and eleven renders of the held-out views per model.
+ */
+gbt_status gbt_study_rate(const gbt_study_def *def, const char *folder, FILE *out, gbt_error *err);
+
 typedef struct gbt_stability_def {
     const char *only; /* cases, as "A1,A9"; NULL: all. Default NULL */
     int quick;        /* 1: smaller sizes where a scene file gives them. Default 0 */

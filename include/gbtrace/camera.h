@@ -76,6 +76,14 @@ bool gbt_camera_project(const gbt_camera *camera, const double point_cam[3], dou
 gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height);
 
 /**
+ * The camera whose pixels are every `step`-th of this one's, in both directions, from pixel (x, y) on: ray (i, j) of `out` is ray
+ * (x + step i, y + step j) of `camera`. Its size is floor(size / step), whatever x and y are in [0, step).
+ *
+ * @return false for a model without a principal point (equirectangular), and where no pixel would be left; `out` is untouched then
+ */
+bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_camera *out);
+
+/**
  * tan of half the horizontal and vertical field of view of the pinhole that best stands for this camera: width / (2 fx), height / (2 fy).
  * 0 for parallel rays.
  */

@@ -11,8 +11,9 @@ extern "C" {
 #endif
 
 typedef struct gbt_init_def {
-    const char *init;        /* "gb" (granular balls, default) or "voxel" */
-    const char *scale_prior; /* "gb" (default) or "nn"; voxels always use "nn" */
+    const char *init;        /* "gb" (granular balls, default), "adaptive" (balls where the scene needs them), "voxel", or "random" points */
+    double init_count;       /* anchors per point of adaptive and random, (0, 1]. Default 0.25 */
+    const char *scale_prior; /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use "nn" */
     int max_depth;           /* D_max of the balls, [0, 64]. Default 18 */
     float voxel_size;        /* v, scene units; 0: from the points by `voxel_rule`. Default 0 */
     const char *voxel_rule;  /* "median" (spacing of the points, default) or "squared" (what the reference code computes) */
@@ -22,7 +23,8 @@ typedef struct gbt_init_def {
 gbt_init_def gbt_init_def_default(void);
 
 /**
- * Make balls and anchors from a data set's sparse points, write them as PLY, print their number beside the voxel baseline's.
+ * Make balls and anchors from a data set's sparse points, write them as PLY, print their number beside the voxel baseline's, and how far points
+ * are from the centres of the paper's balls, of adaptive ones, and of as many voxels.
  *
  * The PLY opens in any mesh viewer. Points: a vertex per anchor with x y z, radius, scale_0..scale_5 (std-devs, not logs), count (points in
  * its ball), depth, red green blue. Mesh: an icosphere of 42 vertices and 80 triangles per anchor with the ball's radius (the scale when

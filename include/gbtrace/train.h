@@ -15,8 +15,9 @@ extern "C" {
 enum { GBT_TRAIN_MAX_EVALS = 16 };
 
 typedef struct gbt_train_def {
-    const char *init;           /* "gb" (granular balls, default) or "voxel" */
-    const char *scale_prior;    /* "gb" (default) or "nn" */
+    const char *init;           /* "gb" (granular balls, default), "adaptive" (balls where the scene needs them), "voxel", or "random" points */
+    double init_count;          /* anchors per point of adaptive and random, (0, 1]. Default 0.25 */
+    const char *scale_prior;    /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use "nn" */
     int max_depth;              /* D_max of the balls, [0, 64]. Default 18 */
     float voxel_size;           /* v, scene units; 0: the median spacing of the points. Default 0 */
     int offsets;                /* K, Gaussians per anchor, [1, 16]; 0: 2, or 10 with compat. Default 0 */
@@ -28,7 +29,7 @@ typedef struct gbt_train_def {
     const char *renderer;       /* what the photos are compared with: "trace" (default), "raster" (EWA splats; pinhole photos), or "per-ray" */
     double footprint;           /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays.
                                    Default 0.1; 0 with compat; splats are dilated instead */
-    int start_level;            /* coarse to fine: first resolution is 1 / 2^start_level, [0, 4]. Default 2 */
+    int start_level;            /* first steps look at 1 pixel in 4^start_level, at random places; all come last. [0, 4]. Default 2; 0 with compat */
     const char *eval_split;     /* "every=8" (default), "none", "list=FILE" */
     uint64_t seed;              /* Default 0 */
     size_t hit_bytes_max;       /* memory for the hits of a view that are kept for the adjoint; tiles beyond are traced again, to the same bits.
@@ -38,6 +39,8 @@ typedef struct gbt_train_def {
     bool compat;                /* every quirk of the reference method (docs/training.md). Default false */
     bool exposure;              /* learn a colour matrix per photo, for photos whose exposure differs; held-out photos are then scored on
                                    their right half, with a matrix fitted to the left. Default false */
+    double grow_until;          /* anchors grow and are pruned until this fraction of the run, [0, 1]. Default 0.5 */
+    double scale_factor;        /* of the anchors' first scales, [0.01, 100]; 0: 2, or 1 with compat. Default 0 */
     double learning_rate_factor; /* of all learning rates, [1e-3, 1e3]. Default 1 */
     double save_every_seconds;  /* wall time between checkpoints; 0: only at the end. Default 120 */
     uint64_t save_at_step;      /* one extra checkpoint right after this step; 0: none. Default 0 */

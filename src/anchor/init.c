@@ -1,6 +1,6 @@
-/* anchor/init.c -- anchors from balls or voxels, and their first scale.
+/* anchor/init.c -- anchors from balls, voxels or points, and their first scale.
 
-   points --> balls (GBAI, eq 28) or voxels (eq 12) --> centres --> spacing of centres (+ ball radius: GBSP, eqs 29-34) --> log-scales */
+   points --> balls (GBAI, eq 28), voxels (eq 12) or some points --> centres --> spacing (+ ball radius: GBSP, eqs 29-34) --> log-scales */
 #include "anchor/init.h"
 
 #include <math.h>
@@ -9,12 +9,23 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/rng.h"
 #include "bvh/points.h"
+#include "gb/cloud.h"
 
 anchor_init_def anchor_init_def_default(void)
 {
-    return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .balls = balls_def_default(), .offset_count = 10,
-                             .fusion = 0.5f, .clip_min = 0.25f, .clip_max = 4.0f, .scale_max = INFINITY};
+    return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .fraction = 0.25, .balls = balls_def_default(),
+                             .offset_count = 10, .fusion = 0.5f, .clip_min = 0.25f, .clip_max = 4.0f, .scale_max = INFINITY};
+}
+
+bool anchor_init_kind_named(const char *name, anchor_init_kind *out)
+{
+    static const char *const names[] = {"gb", "voxel", "adaptive", "random"}; /* in the order of the enum */
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (strcmp(name, names[i]) == 0)
+            return *out = (anchor_init_kind)i, true;
+    return false;
 }
 
 static gbt_status check_def(const anchor_init_def *def, gbt_error *err)
@@ -23,6 +34,8 @@ static gbt_status check_def(const anchor_init_def *def, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "anchors: offset_count %d (wanted 1 to %d)", def->offset_count, ANCHOR_MAX_OFFSETS);
     if (!(def->balls.voxel_size > 0.0f && def->balls.voxel_size < HUGE_VALF))
         return base_fail(err, GBT_ERR_ARGUMENT, "anchors: voxel_size %g (wanted > 0)", (double)def->balls.voxel_size);
+    if (!(def->fraction > 0 && def->fraction <= 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: fraction %g (wanted more than 0, up to 1)", def->fraction);
     if (!(def->fusion >= 0.0f && def->fusion <= 1.0f))
         return base_fail(err, GBT_ERR_ARGUMENT, "anchors: fusion %g (wanted 0 to 1)", (double)def->fusion);
     if (!(def->clip_min >= 0.0f && def->clip_min <= def->clip_max))
@@ -108,6 +121,37 @@ static gbt_status place(anchors *a, const float *center, size_t count, gbt_error
     return GBT_OK;
 }
 
+/* `wanted` of the points, each set of so many with equal chances, in their order. */
+static gbt_status choose_points(const float *position, size_t count, size_t wanted, float **out, gbt_error *err)
+{
+    GBT_TRY(cloud_check("random anchors", position, NULL, count, err));
+    *out = mem_alloc(wanted, 3 * sizeof **out, "anchors", err);
+    if (*out == NULL)
+        return GBT_ERR_NO_MEMORY;
+    size_t chosen = 0;
+    for (size_t i = 0; i < count && chosen < wanted; i++)
+        if ((double)rng_uniform(0, 0, i) * (double)(count - i) < (double)(wanted - chosen))
+            memcpy(*out + 3 * chosen++, position + 3 * i, 3 * sizeof **out);
+    return GBT_OK;
+}
+
+/* Where the anchors are, and the balls that they stand for, if any. */
+static gbt_status find_centers(const float *position, const float *color, size_t count, const anchor_init_def *def, balls *found,
+                               float **centers, size_t *center_count, gbt_error *err)
+{
+    const size_t wanted = (size_t)ceil(def->fraction * (double)count);
+    if (def->kind == ANCHOR_INIT_VOXEL)
+        return voxel_centers(position, count, def->balls.voxel_size, centers, center_count, err);
+    if (def->kind == ANCHOR_INIT_RANDOM)
+        return *center_count = wanted, choose_points(position, count, wanted, centers, err);
+    if (def->kind == ANCHOR_INIT_GB)
+        return balls_build(position, color, count, &def->balls, found, err);
+    adaptive_def adaptive = adaptive_def_default();
+    adaptive.voxel_size = def->balls.voxel_size, adaptive.min_scale = def->balls.min_scale;
+    adaptive.balls_max = wanted > 0 ? wanted : 1;
+    return balls_adapt(position, color, count, &adaptive, found, err);
+}
+
 gbt_status anchors_init(const float *position, const float *color, size_t count, const anchor_init_def *def, anchors *out, balls *out_balls,
                         gbt_error *err)
 {
@@ -118,17 +162,10 @@ gbt_status anchors_init(const float *position, const float *color, size_t count,
     anchors a = {.offset_count = def->offset_count};
     balls found = {0};
     float *centers = NULL;
-    gbt_status status;
-    if (def->kind == ANCHOR_INIT_GB) {
-        status = balls_build(position, color, count, &def->balls, &found, err);
-        if (status == GBT_OK)
-            status = place(&a, found.center, found.count, err);
-    } else {
-        size_t center_count = 0;
-        status = voxel_centers(position, count, def->balls.voxel_size, &centers, &center_count, err);
-        if (status == GBT_OK)
-            status = place(&a, centers, center_count, err);
-    }
+    size_t center_count = 0;
+    gbt_status status = find_centers(position, color, count, def, &found, &centers, &center_count, err);
+    if (status == GBT_OK)
+        status = centers != NULL ? place(&a, centers, center_count, err) : place(&a, found.center, found.count, err);
     if (status == GBT_OK && a.count > 0)
         status = def->kind == ANCHOR_INIT_GB && def->scale == ANCHOR_SCALE_GB ? scale_from_balls(&a, found.radius, def, err)
                                                                               : scale_from_spacing(&a, def, err);

@@ -1,16 +1,25 @@
-/* anchor/init.h -- where anchors come from: balls (GBAI) or voxels, with a scale from balls (GBSP) or from neighbours. */
+/* anchor/init.h -- where anchors come from: balls (GBAI), voxels or points, with a scale from balls (GBSP) or from neighbours. */
 #ifndef GBT_ANCHOR_INIT_H
 #define GBT_ANCHOR_INIT_H
 
+#include <stdbool.h>
+
 #include "anchor/anchors.h"
+#include "gb/adaptive.h"
 #include "gb/balls.h"
 
-typedef enum anchor_init_kind { ANCHOR_INIT_GB, ANCHOR_INIT_VOXEL } anchor_init_kind;
+typedef enum anchor_init_kind {
+    ANCHOR_INIT_GB,       /* the paper's balls */
+    ANCHOR_INIT_VOXEL,    /* the baseline's voxels */
+    ANCHOR_INIT_ADAPTIVE, /* balls where the scene needs them */
+    ANCHOR_INIT_RANDOM    /* points at random, for comparison */
+} anchor_init_kind;
 typedef enum anchor_scale_kind { ANCHOR_SCALE_GB, ANCHOR_SCALE_NN } anchor_scale_kind;
 
 typedef struct anchor_init_def {
     anchor_init_kind kind;        /* default ANCHOR_INIT_GB */
-    anchor_scale_kind scale;      /* default ANCHOR_SCALE_GB; voxels always use ANCHOR_SCALE_NN */
+    anchor_scale_kind scale;      /* default ANCHOR_SCALE_GB, for ANCHOR_INIT_GB alone: the others always use ANCHOR_SCALE_NN */
+    double fraction;              /* anchors per point of ANCHOR_INIT_ADAPTIVE and _RANDOM, (0, 1], at least one. Default 0.25 */
     balls_def balls;              /* voxel_size must be set; also the voxel edge of ANCHOR_INIT_VOXEL */
     int offset_count;             /* K, default 10 */
     float fusion;                 /* alpha, eq 34: weight of the neighbour scale. Default 0.5 */
@@ -18,6 +27,9 @@ typedef struct anchor_init_def {
     float scale_max;              /* largest initial scale, scene units; isolated points would get huge ones. Default infinity */
 } anchor_init_def;
 anchor_init_def anchor_init_def_default(void);
+
+/** The kind called "gb", "voxel", "adaptive" or "random"; false for any other name. */
+bool anchor_init_kind_named(const char *name, anchor_init_kind *out);
 
 /**
  * Make anchors: offsets and features 0, log-scales from the scale rule.
@@ -29,7 +41,7 @@ anchor_init_def anchor_init_def_default(void);
  * @param position  [in] [count][3], finite
  * @param color     [in] [count][3] in [0, 1], or NULL
  * @param out       [out] new anchors, free with anchors_free(); zeroed on failure
- * @param out_balls [out] optional (NULL): the balls behind the anchors, free with balls_free(); zeroed for voxels
+ * @param out_balls [out] optional (NULL): the balls behind the anchors, free with balls_free(); zeroed when there are none
  * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, non-finite point), GBT_ERR_NO_MEMORY
  *
  * Threads: same bits for every thread count. Cost: the partition, one tree over the anchors and one query each.

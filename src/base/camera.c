@@ -546,6 +546,22 @@ gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height)
     return out;
 }
 
+bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_camera *out)
+{
+    const model_row *row = row_of(camera->model);
+    if (row == NULL || row->param_count < 3 || step < 1 || camera->width < step || camera->height < step)
+        return false;
+    *out = *camera;
+    out->width = camera->width / step, out->height = camera->height / step;
+    /* The middle of pixel i of `out`, i + 0.5, is the middle of pixel x + step i of `camera`. */
+    const int focal_count = row->single_f ? 1 : 2;
+    for (int i = 0; i < focal_count; i++)
+        out->params[i] /= step;
+    out->params[focal_count] = (camera->params[focal_count] - x - 0.5) / step + 0.5;
+    out->params[focal_count + 1] = (camera->params[focal_count + 1] - y - 0.5) / step + 0.5;
+    return true;
+}
+
 void gbt_camera_half_fov_tan(const gbt_camera *camera, double tan_half[2])
 {
     camera_lens lens;

@@ -10,8 +10,11 @@ static int run(const command *self, int argc, char **argv)
     const option options[] = {
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "FILE.ply", .help = "where to write balls and anchors",
          .required = true},
-        {.name = "init", .kind = OPTION_CHOICE, .value = &def.init, .choices = "gb|voxel", .help = "granular balls, or the voxel baseline"},
-        {.name = "scale-prior", .kind = OPTION_CHOICE, .value = &def.scale_prior, .choices = "gb|nn", .help = "first scale: balls and spacing, or spacing alone"},
+        {.name = "init", .kind = OPTION_CHOICE, .value = &def.init, .choices = "gb|adaptive|voxel|random",
+         .help = "granular balls; balls where the scene needs them; the voxel baseline; or random points"},
+        {.name = "init-count", .kind = OPTION_DOUBLE, .value = &def.init_count, .min = 0, .max = 1, .value_name = "F",
+         .help = "anchors per point of adaptive and random"},
+        {.name = "scale-prior", .kind = OPTION_CHOICE, .value = &def.scale_prior, .choices = "gb|nn", .help = "first scale of --init gb: balls and spacing, or spacing alone, as the others have"},
         {.name = "max-depth", .kind = OPTION_INT, .value = &def.max_depth, .min = 0, .max = 64, .value_name = "D", .help = "most splits of the cloud"},
         {.name = "voxel-size", .kind = OPTION_FLOAT, .value = &def.voxel_size, .min = 0, .max = 1e30, .value_name = "V",
          .help = "base scale, scene units; 0: from the points"},

@@ -23,6 +23,11 @@ static gbt_status run_crosscheck(const study_request *r, gbt_error *err)
     return gbt_study_crosscheck(&r->def, r->folder, stdout, err);
 }
 
+static gbt_status run_rate(const study_request *r, gbt_error *err)
+{
+    return gbt_study_rate(&r->def, r->folder, stdout, err);
+}
+
 static gbt_status run_stability(const study_request *r, gbt_error *err)
 {
     return gbt_study_stability(&r->stability, r->folder, stdout, err);
@@ -31,6 +36,7 @@ static gbt_status run_stability(const study_request *r, gbt_error *err)
 static const struct { const char *name; int models_min, models_max; gbt_status (*run)(const study_request *, gbt_error *); } studies[] = {
     {"speed", 1, 16, run_speed},
     {"crosscheck", 1, 16, run_crosscheck},
+    {"rate", 1, 6, run_rate},
     {"stability", 0, 0, run_stability},
 };
 
@@ -56,7 +62,7 @@ static int run(const command *self, int argc, char **argv)
     while (which < sizeof studies / sizeof *studies && strcmp(named.value[0], studies[which].name) != 0)
         which++;
     if (which == sizeof studies / sizeof *studies)
-        return command_misused("study: unknown study \"%.60s\" (wanted speed, crosscheck or stability)", named.value[0]);
+        return command_misused("study: unknown study \"%.60s\" (wanted speed, crosscheck, rate or stability)", named.value[0]);
     if (named.count - 1 < studies[which].models_min)
         return command_misused("study %s: wanted a model", studies[which].name);
     if (named.count - 1 > studies[which].models_max)
@@ -69,5 +75,5 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(studies[which].run(&request, &err), &err);
 }
 
-const command command_study = {.name = "study", .summary = "speed against accuracy, tracer against rasterizer, or stability: measure, draw the chart",
-                               .usage = "speed|crosscheck|stability [MODEL...] -o DIR", .run = run};
+const command command_study = {.name = "study", .summary = "speed against accuracy, tracer against rasterizer, size against picture, or stability: measure, draw the chart",
+                               .usage = "speed|crosscheck|rate|stability [MODEL...] -o DIR", .run = run};

@@ -12,6 +12,7 @@ static const command *const commands[] = {
     &command_train,
     &command_eval,
     &command_compare,
+    &command_compress,
     &command_render,
     &command_make_scene,
     &command_bench,

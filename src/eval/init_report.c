@@ -16,13 +16,15 @@
 #include "data/ply.h"
 #include "data/scene.h"
 #include "eval/ball_mesh.h"
+#include "eval/init_quality.h"
 #include "eval/json_out.h"
 
 enum { ANCHOR_SCALES = 6 };
 
 gbt_init_def gbt_init_def_default(void)
 {
-    return (gbt_init_def){.init = "gb", .scale_prior = "gb", .max_depth = balls_def_default().max_depth, .voxel_size = 0.0f, .voxel_rule = "median"};
+    return (gbt_init_def){.init = "gb", .init_count = anchor_init_def_default().fraction, .scale_prior = "gb", .max_depth = balls_def_default().max_depth,
+                          .voxel_size = 0.0f, .voxel_rule = "median"};
 }
 
 /** Index of `text` among `a`, `b`; -1 with a message. */
@@ -148,7 +150,9 @@ typedef struct init_facts {
     const char *kind, *scale_prior, *voxel_rule;
     size_t points, anchors, voxel_anchors;
     float voxel_size;
+    bool has_balls;
     spread radius, scale, count, depth;
+    init_quality quality[INIT_QUALITY_ROWS];
 } init_facts;
 
 static json_t *spread_to_json(const spread *s)
@@ -156,13 +160,22 @@ static json_t *spread_to_json(const spread *s)
     return json_pack("{s:f,s:f,s:f,s:f}", "min", s->min, "median", s->median, "mean", s->mean, "max", s->max);
 }
 
+static json_t *qualities_to_json(const init_quality *rows)
+{
+    json_t *list = json_array();
+    for (int i = 0; i < INIT_QUALITY_ROWS; i++)
+        json_array_append_new(list, json_pack("{s:s,s:I,s:f,s:f}", "init", rows[i].name, "anchors", (json_int_t)rows[i].anchors, "distance_rms",
+                                              rows[i].distance, "color_rms", rows[i].color));
+    return list;
+}
+
 static gbt_status save_json(const char *path, const char *data, const init_facts *f, gbt_error *err)
 {
-    json_t *value = json_pack("{s:i,s:o,s:s,s:s,s:s,s:f,s:I,s:I,s:I,s:o,s:o,s:o,s:o}", "schema", 1, "data", json_text(data), "init", f->kind,
+    json_t *value = json_pack("{s:i,s:o,s:s,s:s,s:s,s:f,s:I,s:I,s:I,s:o,s:o,s:o,s:o,s:o}", "schema", 1, "data", json_text(data), "init", f->kind,
                               "scale_prior", f->scale_prior, "voxel_rule", f->voxel_rule, "voxel_size", (double)f->voxel_size, "points",
                               (json_int_t)f->points, "anchors", (json_int_t)f->anchors, "voxel_anchors", (json_int_t)f->voxel_anchors, "radius",
                               spread_to_json(&f->radius), "scale", spread_to_json(&f->scale), "points_per_anchor", spread_to_json(&f->count), "depth",
-                              spread_to_json(&f->depth));
+                              spread_to_json(&f->depth), "quality", qualities_to_json(f->quality));
     const gbt_status status = json_save(value, path, err);
     json_decref(value);
     return status;
@@ -173,19 +186,26 @@ static void print_spread(FILE *out, const char *name, const spread *s)
     fprintf(out, "  %-18s %10.4g %10.4g %10.4g %10.4g\n", name, s->min, s->median, s->mean, s->max);
 }
 
+static const char *what_they_are(const char *kind)
+{
+    return strcmp(kind, "gb") == 0 ? "granular balls" : strcmp(kind, "adaptive") == 0 ? "adaptive balls" : strcmp(kind, "voxel") == 0 ? "voxels" : "random points";
+}
+
 static void print_facts(FILE *out, const init_facts *f)
 {
-    const bool is_gb = strcmp(f->kind, "gb") == 0;
     fprintf(out, "points             %zu\n", f->points);
     fprintf(out, "voxel size         %g (%s)\n", (double)f->voxel_size, f->voxel_rule);
-    fprintf(out, "anchors            %zu (%s), %.3g points each\n", f->anchors, is_gb ? "granular balls" : "voxels", (double)f->points / (double)f->anchors);
+    fprintf(out, "anchors            %zu (%s), %.3g points each\n", f->anchors, what_they_are(f->kind), (double)f->points / (double)f->anchors);
     fprintf(out, "voxel baseline     %zu anchors at the same voxel size\n", f->voxel_anchors);
     fprintf(out, "%-20s %10s %10s %10s %10s\n", "per anchor", "min", "median", "mean", "max");
     print_spread(out, "radius", &f->radius);
     print_spread(out, "scale", &f->scale);
     print_spread(out, "points", &f->count);
-    if (is_gb)
+    if (f->has_balls)
         print_spread(out, "depth", &f->depth);
+    fprintf(out, "%-20s %10s %10s %10s\n", "points to centres", "anchors", "distance", "colour");
+    for (const init_quality *q = f->quality; q < f->quality + INIT_QUALITY_ROWS; q++)
+        fprintf(out, "  %-18s %10zu %10.4g %10.4g\n", q->name, q->anchors, q->distance, q->color);
 }
 
 /** Everything after the anchors are made. */
@@ -229,9 +249,11 @@ done:
 
 gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path, FILE *report, gbt_error *err)
 {
-    const int kind = choose("init", def->init, "gb", "voxel", err), scale = choose("scale prior", def->scale_prior, "gb", "nn", err),
-              rule = choose("voxel rule", def->voxel_rule, "median", "squared", err);
-    if (kind < 0 || scale < 0 || rule < 0)
+    anchor_init_def how = anchor_init_def_default();
+    if (def->init == NULL || !anchor_init_kind_named(def->init, &how.kind))
+        return base_fail(err, GBT_ERR_ARGUMENT, "init: wanted gb, adaptive, voxel or random, got %.80s", def->init != NULL ? def->init : "nothing");
+    const int scale = choose("scale prior", def->scale_prior, "gb", "nn", err), rule = choose("voxel rule", def->voxel_rule, "median", "squared", err);
+    if (scale < 0 || rule < 0)
         return GBT_ERR_ARGUMENT;
     if (!(def->voxel_size >= 0.0f && isfinite(def->voxel_size)))
         return base_fail(err, GBT_ERR_ARGUMENT, "voxel size: wanted a finite number >= 0, got %g", (double)def->voxel_size);
@@ -243,7 +265,7 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
     float *centers = NULL;
     GBT_TRY(scene_load(data, NULL, &s, err));
     const scene_points *points = &s.points;
-    init_facts facts = {.kind = kind == 0 ? "gb" : "voxel", .scale_prior = kind == 0 && scale == 0 ? "gb" : "nn", .points = points->count,
+    init_facts facts = {.kind = def->init, .points = points->count,
                         .voxel_rule = def->voxel_size > 0.0f ? "given" : def->voxel_rule, .voxel_size = def->voxel_size};
     gbt_status status = GBT_OK;
     if (points->count == 0)
@@ -251,8 +273,7 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
     if (status == GBT_OK && !(facts.voxel_size > 0.0f))
         status = balls_voxel_size(points->position, points->count, rule == 0 ? VOXEL_MEDIAN_SPACING : VOXEL_COMPAT_SQUARED, &facts.voxel_size, err);
     if (status == GBT_OK) {
-        anchor_init_def how = anchor_init_def_default();
-        how.kind = kind == 0 ? ANCHOR_INIT_GB : ANCHOR_INIT_VOXEL;
+        how.fraction = def->init_count;
         how.scale = scale == 0 ? ANCHOR_SCALE_GB : ANCHOR_SCALE_NN;
         how.balls.voxel_size = facts.voxel_size, how.balls.max_depth = def->max_depth;
         status = anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &how, &a, &b, err);
@@ -260,9 +281,12 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
     if (status == GBT_OK)
         status = voxel_centers(points->position, points->count, facts.voxel_size, &centers, &facts.voxel_anchors, err);
     if (status == GBT_OK) {
-        facts.anchors = a.count;
-        status = report_anchors(data, def, out_ply, json_path, report, &s, &a, &b, &facts, err);
+        facts.anchors = a.count, facts.has_balls = b.count > 0;
+        facts.scale_prior = how.kind == ANCHOR_INIT_GB && scale == 0 ? "gb" : "nn";
+        status = init_quality_measure(points, facts.voxel_size, def->max_depth, def->init_count, facts.quality, err);
     }
+    if (status == GBT_OK)
+        status = report_anchors(data, def, out_ply, json_path, report, &s, &a, &b, &facts, err);
     mem_free(centers);
     balls_free(&b);
     anchors_free(&a);

@@ -5,29 +5,25 @@
                    +--> [principal axis, median] --> left, right (in place: the array stays in depth-first order)
 
    The top of the tree is grown level by level, its sub-trees then one per block; marks and places depend on the points only, so the
-   number of threads changes nothing. Statistics live in moments.c, the cut in split.c. */
+   number of threads changes nothing. Statistics live in moments.c, the cut in split.c, the balls are written by fill.c. */
 #include "gb/balls.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdbool.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "gb/cloud.h"
+#include "gb/fill.h"
 #include "gb/moments.h"
 #include "gb/split.h"
 
 enum {
-    DEPTH_MAX = 64,
     SUBTREES = 64,           /* the top is grown until there are this many sets to share out ... */
     SUBTREE_POINTS = 4096,   /* ... or no set is larger than this */
-    BALLS_PER_BLOCK = 512,
-    KEPT_SPACINGS = 4,       /* the scale prior takes a radius beyond 4 spacings for 4 spacings: a wider tied set is not left whole */
-    INSERTION_POINTS = 24    /* sets up to this size are sorted in place, larger ones by qsort */
+    KEPT_SPACINGS = 4        /* the scale prior takes a radius beyond 4 spacings for 4 spacings: a wider tied set is not left whole */
 };
 
 balls_def balls_def_default(void)
@@ -50,8 +46,8 @@ static gbt_status check_def(const balls_def *def, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad color_std_max (wanted 0 to 1, got %g)", (double)def->color_std_max);
     if (def->min_points < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad min_points (wanted >= 1, got %d)", def->min_points);
-    if (def->max_depth < 0 || def->max_depth > DEPTH_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad max_depth (wanted 0 to %d, got %d)", DEPTH_MAX, def->max_depth);
+    if (def->max_depth < 0 || def->max_depth > BALL_DEPTH_MAX)
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad max_depth (wanted 0 to %d, got %d)", BALL_DEPTH_MAX, def->max_depth);
     if (!(def->min_scale >= 0.0f) || !isfinite(def->min_scale))
         return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad min_scale (wanted >= 0, got %g)", (double)def->min_scale);
     return GBT_OK;
@@ -108,7 +104,7 @@ static void children(const span *s, size_t left, span out[2])
 
 static void grow_subtree(const partition *p, span root)
 {
-    span stack[DEPTH_MAX + 2]; /* one waiting right part per level, and the set in hand */
+    span stack[BALL_DEPTH_MAX + 2]; /* one waiting right part per level, and the set in hand */
     int waiting = 0;
     stack[waiting++] = root;
     while (waiting > 0) {
@@ -174,84 +170,6 @@ static void grow(const partition *p, size_t count)
     parallel_blocks(f.count, 1, grow_open, &f);
 }
 
-static int compare_indices(const void *a, const void *b)
-{
-    const uint32_t x = ((const cloud_point *)a)->index, y = ((const cloud_point *)b)->index;
-    return (x > y) - (x < y);
-}
-
-static void sort_by_index(cloud_point *points, size_t count)
-{
-    if (count > INSERTION_POINTS) {
-        qsort(points, count, sizeof *points, compare_indices);
-        return;
-    }
-    for (size_t i = 1; i < count; i++) {
-        const cloud_point point = points[i];
-        size_t j = i;
-        for (; j > 0 && points[j - 1].index > point.index; j--)
-            points[j] = points[j - 1];
-        points[j] = point;
-    }
-}
-
-/* Coordinates near FLT_MAX have variances that no float holds. */
-static float to_float(double x)
-{
-    return (float)fmin(fmax(x, (double)-FLT_MAX), (double)FLT_MAX);
-}
-
-typedef struct fill_job {
-    const partition *partition;
-    balls *out;
-} fill_job;
-
-/* Statistics are taken again in index order: they then depend on the set alone, not on the way to it. */
-static void fill_balls(size_t block, size_t begin, size_t end, void *context)
-{
-    (void)block;
-    const fill_job *job = context;
-    const partition *p = job->partition;
-    balls *out = job->out;
-    for (size_t j = begin; j < end; j++) {
-        const size_t first = out->first[j], count = out->first[j + 1] - first;
-        cloud_point *points = p->points + first;
-        sort_by_index(points, count);
-        for (size_t i = 0; i < count; i++)
-            out->member[first + i] = points[i].index;
-        moments m;
-        moments_compute(points, count, &m);
-        double color[3] = {0, 0, 0}, color_std = 0;
-        if (p->color != NULL)
-            color_std = moments_color_std(points, count, p->color, color);
-        for (int k = 0; k < 3; k++) {
-            out->center[3 * j + k] = to_float(m.mean[k]);
-            out->color[3 * j + k] = (float)color[k];
-        }
-        for (int k = 0; k < 6; k++)
-            out->covariance[6 * j + k] = to_float(m.covariance[k]);
-        out->radius[j] = to_float(fmax(moments_radius(&m), p->radius_floor));
-        out->color_std[j] = (float)color_std;
-        out->depth[j] = p->leaf_depth[first] - 1;
-    }
-}
-
-static gbt_status alloc_balls(balls *out, size_t count, size_t point_count, gbt_error *err)
-{
-    out->count = count;
-    out->point_count = point_count;
-    if ((out->first = mem_alloc(count + 1, sizeof *out->first, "balls.first", err)) == NULL ||
-        (out->member = mem_alloc(point_count, sizeof *out->member, "balls.member", err)) == NULL ||
-        (out->center = mem_alloc(count, 3 * sizeof *out->center, "balls.center", err)) == NULL ||
-        (out->radius = mem_alloc(count, sizeof *out->radius, "balls.radius", err)) == NULL ||
-        (out->covariance = mem_alloc(count, 6 * sizeof *out->covariance, "balls.covariance", err)) == NULL ||
-        (out->color = mem_alloc(count, 3 * sizeof *out->color, "balls.color", err)) == NULL ||
-        (out->color_std = mem_alloc(count, sizeof *out->color_std, "balls.color_std", err)) == NULL ||
-        (out->depth = mem_alloc(count, sizeof *out->depth, "balls.depth", err)) == NULL)
-        return GBT_ERR_NO_MEMORY;
-    return GBT_OK;
-}
-
 gbt_status balls_build(const float *position, const float *color, size_t count, const balls_def *def, balls *out, gbt_error *err)
 {
     *out = (balls){0};
@@ -278,18 +196,7 @@ gbt_status balls_build(const float *position, const float *color, size_t count, 
     mem_free(p.keys); /* before the balls are allocated: they take its place */
     p.keys = NULL;
 
-    size_t ball_count = 0;
-    for (size_t i = 0; i < count; i++)
-        ball_count += p.leaf_depth[i] != 0;
-    if ((status = alloc_balls(out, ball_count, count, err)) != GBT_OK)
-        goto done;
-    size_t ball = 0;
-    for (size_t i = 0; i < count; i++)
-        if (p.leaf_depth[i] != 0)
-            out->first[ball++] = (uint32_t)i;
-    out->first[ball_count] = (uint32_t)count;
-    fill_job job = {&p, out};
-    parallel_blocks(ball_count, BALLS_PER_BLOCK, fill_balls, &job);
+    status = balls_fill(p.points, p.leaf_depth, count, color, p.radius_floor, out, err);
 done:
     mem_free(p.points);
     mem_free(p.keys);
@@ -297,19 +204,4 @@ done:
     if (status != GBT_OK)
         balls_free(out);
     return status;
-}
-
-void balls_free(balls *b)
-{
-    if (b == NULL)
-        return;
-    mem_free(b->first);
-    mem_free(b->member);
-    mem_free(b->center);
-    mem_free(b->radius);
-    mem_free(b->covariance);
-    mem_free(b->color);
-    mem_free(b->color_std);
-    mem_free(b->depth);
-    *b = (balls){0};
 }

@@ -41,6 +41,13 @@ static gbt_status fit_picture(image *rgb, int width, int height, gbt_error *err)
     return image_alloc(rgb, width, height, 3, err);
 }
 
+/* A variance in pixels of the picture, in pixels of the camera. */
+static float pixel_variance(const frame *f, float variance)
+{
+    const float step = (float)(f->draw.pixel_step > 1 ? f->draw.pixel_step : 1);
+    return variance / (step * step);
+}
+
 /* Of every Gaussian of the last render; NULL: no limit. */
 static const float *pixel_min_of(const frame *f)
 {
@@ -55,7 +62,7 @@ static gbt_status widen(frame *f, const anchors *a, gbt_error *err)
         for (size_t i = 0; i < f->gaussians.count; i++)
             f->pixel_min[i] = f->draw.anchor_pixel[f->visible[f->tape.slot[i] / (uint32_t)a->offset_count]];
     }
-    return footprint_forward(&f->view, f->draw.footprint, pixel_min_of(f), &f->gaussians, &f->wide, err);
+    return footprint_forward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians, &f->wide, err);
 }
 
 /* Everything up to the tree, and f->rays through the middle of the aperture. `guest` is optional. */
@@ -78,7 +85,7 @@ static gbt_status prepare(frame *f, const anchors *a, const decoder *d, const ra
     const bool splats = f->draw.renderer == FRAME_SPLAT;
     f->widened = f->draw.footprint > 0 && shot->given == NULL && !splats; /* nobody says how wide given rays are; splats are dilated instead */
     const visible_reach extent = {.sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)), /* where an opaque Gaussian falls to alpha_min */
-                                  .width = splats ? sqrtf(raster_settings_default().dilation) : f->widened ? sqrtf(f->draw.footprint) : 0,
+                                  .width = sqrtf(pixel_variance(f, splats ? raster_settings_default().dilation : f->widened ? f->draw.footprint : 0)),
                                   .pixel = (float)f->view.pixel,
                                   .parallel = f->view.kind == FOOTPRINT_PARALLEL,
                                   .pixel_min = f->draw.anchor_pixel};
@@ -113,7 +120,8 @@ raster_settings frame_splat_settings(const trace_settings *settings, raster_form
 
 static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape, gbt_error *err)
 {
-    const raster_settings s = frame_splat_settings(settings, f->draw.renderer == FRAME_SPLAT ? RASTER_EWA : RASTER_PER_RAY);
+    raster_settings s = frame_splat_settings(settings, f->draw.renderer == FRAME_SPLAT ? RASTER_EWA : RASTER_PER_RAY);
+    s.dilation = pixel_variance(f, s.dilation);
     return raster_forward(&f->splats, frame_drawn(f), &f->camera, &s, keep_tape, &f->rgb, NULL, NULL, err);
 }
 
@@ -182,7 +190,7 @@ void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_CO
     if (!f->widened)
         return;
     memcpy(&g, field, sizeof g);
-    footprint_widen(&f->view, (double)f->draw.footprint, f->draw.anchor_pixel != NULL ? (double)f->pixel_min[i] : 0, &g);
+    footprint_widen(&f->view, (double)pixel_variance(f, f->draw.footprint), f->draw.anchor_pixel != NULL ? (double)f->pixel_min[i] : 0, &g);
     memcpy(field, &g, sizeof g);
 }
 
@@ -204,7 +212,7 @@ gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const im
     else
         GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, NULL, err));
     if (f->widened)
-        footprint_backward(&f->view, f->draw.footprint, pixel_min_of(f), &f->gaussians, &f->d_gaussians);
+        footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians, &f->d_gaussians);
     f->times.adjoint = lap(&clock);
     gaussians *g = &f->gaussians, *dg = &f->d_gaussians;
     const float share = g->count > 0 ? volume_weight / (float)g->count : 0;

@@ -1,4 +1,4 @@
-/* train/photos.c -- training photos, cached at the resolution in use. */
+/* train/photos.c -- training photos, cached as bytes: at full size, and at the level in use. */
 #include "train/photos.h"
 
 #include <math.h>
@@ -6,6 +6,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "data/photo.h"
 
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err)
@@ -33,6 +34,7 @@ void photos_close(photos *p)
         drop_all(caches[i], p->source->view_count);
         mem_free(caches[i]);
     }
+    mem_free(p->sample_valid);
     memset(p, 0, sizeof *p);
 }
 
@@ -62,20 +64,56 @@ static void from_bytes(const unsigned char *bytes, image *out)
         out->pixels[i] = (float)bytes[i] * (1.0f / 255);
 }
 
+/* Into p->full, if it is not there. */
+static gbt_status read_full(photos *p, size_t view, gbt_error *err)
+{
+    if (p->full[view] != NULL)
+        return GBT_OK;
+    const gbt_camera camera = photos_camera(p, view, 0);
+    image photo;
+    GBT_TRY(scene_read_photo_valid(&p->source->views[view], camera.width, camera.height, &photo, &p->full_valid[view], err));
+    const gbt_status status = to_bytes(&photo, &p->full[view], err);
+    image_free(&photo);
+    if (status != GBT_OK) {
+        mem_free(p->full_valid[view]);
+        p->full_valid[view] = NULL;
+    }
+    return status;
+}
+
+typedef struct load_job {
+    photos *photos;
+    const size_t *views;
+    gbt_status *status; /* of each */
+    gbt_error *error;
+} load_job;
+
+static void load_one(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)end;
+    const load_job *job = context;
+    job->status[block] = read_full(job->photos, job->views[begin], &job->error[block]);
+}
+
+gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *err)
+{
+    load_job job = {.photos = p, .views = views, .status = mem_calloc(count, sizeof *job.status, "photos", err),
+                    .error = mem_calloc(count, sizeof *job.error, "photos", err)};
+    gbt_status status = job.status == NULL || job.error == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    if (status == GBT_OK)
+        parallel_blocks(count, 1, load_one, &job);
+    for (size_t i = 0; status == GBT_OK && i < count; i++)
+        if (job.status[i] != GBT_OK)
+            status = base_fail(err, job.status[i], "%s", job.error[i].text);
+    mem_free(job.status);
+    mem_free(job.error);
+    return status;
+}
+
 static gbt_status get_full(photos *p, size_t view, image *out, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(p, view, 0);
-    if (p->full[view] == NULL) {
-        image photo;
-        GBT_TRY(scene_read_photo_valid(&p->source->views[view], camera.width, camera.height, &photo, &p->full_valid[view], err));
-        const gbt_status status = to_bytes(&photo, &p->full[view], err);
-        image_free(&photo);
-        if (status != GBT_OK) {
-            mem_free(p->full_valid[view]);
-            p->full_valid[view] = NULL;
-            return status;
-        }
-    }
+    GBT_TRY(read_full(p, view, err));
     GBT_TRY(image_fit(out, camera.width, camera.height, 3, err));
     from_bytes(p->full[view], out);
     return GBT_OK;
@@ -121,4 +159,46 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *
     GBT_TRY(image_fit(out, camera.width, camera.height, 3, err));
     from_bytes(p->pixels[view], out);
     return GBT_OK;
+}
+
+/* The marks of every `stride`-th pixel from `phase` on, if the photo has any. */
+static gbt_status pick_valid(photos *p, size_t view, int full_width, const photo_sample *sample, int width, int height, const unsigned char **valid,
+                             gbt_error *err)
+{
+    const unsigned char *full = p->full_valid[view];
+    *valid = NULL;
+    if (full == NULL)
+        return GBT_OK;
+    const size_t w = (size_t)width, h = (size_t)height, step = (size_t)1 << sample->level;
+    GBT_TRY(mem_reserve((void **)&p->sample_valid, &p->sample_valid_capacity, 0, w * h, 1, "valid pixels", err));
+    for (size_t y = 0; y < h; y++)
+        for (size_t x = 0; x < w; x++)
+            p->sample_valid[y * w + x] = full[(y * step + (size_t)sample->phase[1]) * (size_t)full_width + x * step + (size_t)sample->phase[0]];
+    *valid = p->sample_valid;
+    return GBT_OK;
+}
+
+gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out, gbt_camera *camera, const unsigned char **valid,
+                             int *step, gbt_error *err)
+{
+    const gbt_camera full = photos_camera(p, view, 0);
+    if (sample->level == 0 || !gbt_camera_every(&full, 1 << sample->level, sample->phase[0], sample->phase[1], camera)) {
+        *camera = photos_camera(p, view, sample->level);
+        *step = 1;
+        GBT_TRY(photos_get(p, view, sample->level, out, err));
+        *valid = photos_valid(p, view);
+        return GBT_OK;
+    }
+    *step = 1 << sample->level;
+    GBT_TRY(read_full(p, view, err));
+    GBT_TRY(image_fit(out, camera->width, camera->height, 3, err));
+    const size_t stride = 3 * (size_t)*step, row = 3 * (size_t)full.width;
+    for (size_t y = 0; y < (size_t)camera->height; y++) {
+        const unsigned char *from = p->full[view] + (y * (size_t)*step + (size_t)sample->phase[1]) * row + 3 * (size_t)sample->phase[0];
+        float *to = out->pixels + 3 * y * (size_t)camera->width;
+        for (size_t x = 0; x < (size_t)camera->width; x++)
+            for (size_t c = 0; c < 3; c++)
+                to[3 * x + c] = (float)from[x * stride + c] * (1.0f / 255);
+    }
+    return pick_valid(p, view, full.width, sample, camera->width, camera->height, valid, err);
 }

@@ -159,8 +159,7 @@ static void pace_extend(trainer *t, const speed *s)
     double per_step = 0;
     for (int i = 0; i < 8; i++) {
         const double progress = (part + (i + 0.5) / 8) / PACE_SEGMENTS;
-        const int level = schedule_level(progress, t->def.compat ? 0 : t->def.start_level);
-        const gbt_camera camera = photos_camera(&t->photos, t->train_views[0], level);
+        const gbt_camera camera = photos_camera(&t->photos, t->train_views[0], trainer_level(t, t->train_views[0], progress));
         per_step += (s->fixed_seconds + s->pixel_seconds * camera.width * camera.height) / 8;
     }
     /* Before anything has been measured: a few steps, and the rest of the first part's time goes to the next. */

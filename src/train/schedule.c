@@ -7,9 +7,6 @@
 
 #include "base/fail.h"
 
-/* Full resolution from here on. */
-static const double full_from = 0.4;
-
 pace pace_of_iterations(uint64_t iterations)
 {
     pace p = {.known = PACE_SEGMENTS};
@@ -71,12 +68,11 @@ double pace_progress(const pace *p, uint64_t step)
     return (double)p->known / PACE_SEGMENTS;
 }
 
-/* Each level lasts twice as long as the coarser one before it. */
 double schedule_level_start(int level, int start_level)
 {
     if (level >= start_level)
         return 0;
-    return full_from * (exp2(start_level - level) - 1) / (exp2(start_level) - 1);
+    return level == 0 ? SCHEDULE_WHOLE_FROM : 0.3 * exp2(1 - level);
 }
 
 int schedule_level(double progress, int start_level)
@@ -94,11 +90,11 @@ static double decay(double first, double last, double progress)
 
 learning_rates schedule_rates(double progress, bool compat, double extent, double factor)
 {
-    const double anchor = factor * (compat ? 1 : 1.5), network = factor * (compat ? 1 : 2);
+    const double network = factor * (compat ? 1 : 2);
     return (learning_rates){
-        .offset = anchor * decay(0.01, 0.0001, progress) * (compat ? extent : 1),
-        .feature = anchor * 0.0075,
-        .scale = anchor * 0.007,
+        .offset = factor * decay(0.01, 0.0001, progress) * (compat ? extent : 4.5),
+        .feature = factor * 0.0075 * (compat ? 1 : 1.5),
+        .scale = factor * 0.007 * (compat ? 1 : 3),
         .opacity_mlp = network * decay(0.002, 0.00002, progress),
         .shape_mlp = network * 0.004,
         .color_mlp = network * decay(0.008, 0.00005, progress),

@@ -36,11 +36,21 @@ double pace_progress(const pace *p, uint64_t step);
 /** The part that `step` lies in, or p->known when the known parts are used up. */
 int pace_segment(const pace *p, uint64_t step);
 
-/** Resolution level (0: full, l: 1 / 2^l) at `progress`, starting from `start_level`. */
+/**
+ * How many of a photo's pixels a step looks at: 1 in 4^level (train/photos.h).
+ *
+ * A step teaches nearly as much from a sixteenth of the pixels as from all (docs/training.md), so all of them come last: level 0 from
+ * SCHEDULE_WHOLE_FROM on, level 1 from 0.3 on, each coarser one until half of where the finer begins; `start_level` is the first.
+ */
 int schedule_level(double progress, int start_level);
 
 /** Progress at which `level` begins. */
 double schedule_level_start(int level, int start_level);
+
+/** From here on all pixels, and the cut-offs of rendering; before, SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN: half as many hits per ray. */
+#define SCHEDULE_WHOLE_FROM 0.85
+#define SCHEDULE_ALPHA_MIN 0.02f
+#define SCHEDULE_T_MIN 0.003f
 
 typedef struct learning_rates {
     double offset, feature, scale, opacity_mlp, shape_mlp, color_mlp;
@@ -55,9 +65,8 @@ typedef struct learning_rates {
  */
 learning_rates schedule_rates(double progress, bool compat, double extent, double factor);
 
-/** Statistics are gathered from STATS_FROM on; anchors grow and are pruned in [ADJUST_FROM, ADJUST_UNTIL). */
+/** Statistics are gathered from STATS_FROM on; anchors grow and are pruned from ADJUST_FROM on. */
 #define SCHEDULE_STATS_FROM (500.0 / 30000)
 #define SCHEDULE_ADJUST_FROM (1500.0 / 30000)
-#define SCHEDULE_ADJUST_UNTIL 0.5
 
 #endif

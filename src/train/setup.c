@@ -19,9 +19,13 @@ enum { STREAM_NETWORKS = 2, FEW_PLACES = 128 };
 /* Fewer Gaussians per anchor than in the paper's base: at equal time the models are better (docs/training.md). */
 enum { default_offsets = 2 };
 
+/* Gaussians that overlap from the start leave no holes to look through, and are found by gradients from farther away (docs/training.md). */
+static const double default_scale_factor = 2;
+
 gbt_train_def gbt_train_def_default(void)
 {
     return (gbt_train_def){.init = "gb",
+                           .init_count = anchor_init_def_default().fraction,
                            .scale_prior = "gb",
                            .max_depth = 18,
                            .distance = "auto",
@@ -33,6 +37,7 @@ gbt_train_def gbt_train_def_default(void)
                            .eval_split = "every=8",
                            .max_anchors = 2000000,
                            .grow = true,
+                           .grow_until = 0.5,
                            .learning_rate_factor = 1,
                            .save_every_seconds = 120,
                            .command = "",
@@ -43,8 +48,11 @@ static gbt_status check_def(const gbt_train_def *d, gbt_error *err)
 {
     if (d->cookie_ != 0x67627431)
         return base_fail(err, GBT_ERR_ARGUMENT, "train: the def was not made by gbt_train_def_default()");
-    if (strcmp(d->init, "gb") != 0 && strcmp(d->init, "voxel") != 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--init: \"%.40s\" (wanted gb or voxel)", d->init);
+    anchor_init_kind unused_kind;
+    if (!anchor_init_kind_named(d->init, &unused_kind))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--init: \"%.40s\" (wanted gb, adaptive, voxel or random)", d->init);
+    if (!(d->init_count > 0 && d->init_count <= 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--init-count: %g (wanted more than 0, up to 1)", d->init_count);
     if (strcmp(d->scale_prior, "gb") != 0 && strcmp(d->scale_prior, "nn") != 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "--scale-prior: \"%.40s\" (wanted gb or nn)", d->scale_prior);
     if (strcmp(d->distance, "auto") != 0 && strcmp(d->distance, "on") != 0 && strcmp(d->distance, "off") != 0)
@@ -68,6 +76,10 @@ static gbt_status check_def(const gbt_train_def *d, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "--budget: %g s (wanted more than 0)", d->budget_seconds);
     if (!(d->learning_rate_factor >= 1e-3 && d->learning_rate_factor <= 1e3))
         return base_fail(err, GBT_ERR_ARGUMENT, "--learning-rate: %g (wanted 0.001 to 1000)", d->learning_rate_factor);
+    if (!(d->grow_until >= 0 && d->grow_until <= 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--grow-until: %g (wanted 0 to 1)", d->grow_until);
+    if (!(d->scale_factor == 0 || (d->scale_factor >= 0.01 && d->scale_factor <= 100)))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--scale-factor: %g (wanted 0.01 to 100, or 0)", d->scale_factor);
     if (d->max_anchors < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "--max-anchors: 0 (wanted 1 or more)");
     return GBT_OK;
@@ -218,7 +230,8 @@ static void mean_color(const scene_points *points, float color[3])
 static gbt_status make_anchors(trainer *t, gbt_error *err)
 {
     anchor_init_def def = anchor_init_def_default();
-    def.kind = strcmp(t->def.init, "gb") == 0 ? ANCHOR_INIT_GB : ANCHOR_INIT_VOXEL;
+    anchor_init_kind_named(t->def.init, &def.kind);
+    def.fraction = t->def.init_count;
     def.scale = strcmp(t->def.scale_prior, "gb") == 0 ? ANCHOR_SCALE_GB : ANCHOR_SCALE_NN;
     def.balls.max_depth = t->def.max_depth;
     def.balls.voxel_size = t->voxel_size;
@@ -228,6 +241,8 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
     def.scale_max = t->def.compat ? INFINITY : (float)(0.1 * fmax(t->extent, 0.1 * away));
     const scene_points *points = &t->scene.points;
     GBT_TRY(anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def, &t->anchors, NULL, err));
+    for (size_t i = 0; i < 6 * t->anchors.count; i++)
+        t->anchors.scale_log[i] += (float)log(t->def.scale_factor);
     t->anchors_initial = t->anchors.count;
     return t->def.compat || !points->has_color ? GBT_OK : start_features(t, err);
 }
@@ -274,6 +289,8 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->def = *def;
     if (def->offsets == 0)
         t->def.offsets = def->compat ? 10 : default_offsets;
+    if (def->scale_factor == 0)
+        t->def.scale_factor = def->compat ? 1 : default_scale_factor;
     if (def->compat)
         t->def.footprint = 0;
     scene_split split;
@@ -283,6 +300,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
         return base_fail(err, GBT_ERR_FORMAT, "%s: no photos to train on (a point cloud alone is not enough)", data);
     GBT_TRY(choose_views(t, err));
     GBT_TRY(photos_open(&t->photos, &t->scene, def->downscale, err));
+    GBT_TRY(photos_load(&t->photos, t->train_views, t->train_count, err));
     t->extent = scene_camera_extent(&t->scene);
     GBT_TRY(provide_points(t, err));
     t->voxel_size = def->voxel_size;

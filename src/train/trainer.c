@@ -17,7 +17,7 @@
 
 static const float dssim_weight = 0.2f, volume_weight = 0.01f, revived_opacity = 0.1f;
 enum { ADAM_BLOCK = 512, MAX_SKIPPED_IN_ROW = 10, ADJUSTS_PER_RUN = 100 };
-enum { STREAM_VIEWS = 1, CULPRIT_SIZE = 384, BARREN_STEPS = 5 };
+enum { STREAM_VIEWS = 1, STREAM_PIXELS = 4, LEAST_PIXELS_ACROSS = 32, CULPRIT_SIZE = 384, BARREN_STEPS = 5 };
 
 /* ---- which view -------------------------------------------------------------------------------------------------------------------------- */
 
@@ -39,6 +39,24 @@ static size_t pick_view(trainer *t)
         t->order_ready = true;
     }
     return t->order[t->step % t->train_count];
+}
+
+int trainer_level(const trainer *t, size_t view, double progress)
+{
+    const gbt_camera camera = photos_camera(&t->photos, view, 0);
+    const int across = camera.width < camera.height ? camera.width : camera.height;
+    int level = schedule_level(progress, t->def.compat ? 0 : t->def.start_level);
+    while (level > 0 && across >> level < LEAST_PIXELS_ACROSS)
+        level--;
+    return level;
+}
+
+/* Which of its pixels: every 2^level-th, the first at random. */
+static photo_sample pick_pixels(const trainer *t, int level)
+{
+    uint32_t words[4];
+    rng_philox(t->def.seed, STREAM_PIXELS, t->step, words);
+    return (photo_sample){.level = level, .phase = {(int)(words[0] & ((1u << level) - 1)), (int)(words[1] & ((1u << level) - 1))}};
 }
 
 /* ---- optimizer ------------------------------------------------------------------------------------------------------------------------------ */
@@ -167,7 +185,7 @@ static gbt_status grow_and_prune(trainer *t, uint64_t steps_since, gbt_error *er
 /* True when `progress` has passed a multiple of 1 / ADJUSTS_PER_RUN since the step before. */
 static bool adjust_is_due(const trainer *t, double progress, double next)
 {
-    if (!t->def.grow || progress < SCHEDULE_ADJUST_FROM || progress >= SCHEDULE_ADJUST_UNTIL)
+    if (!t->def.grow || progress < SCHEDULE_ADJUST_FROM || progress >= t->def.grow_until)
         return false;
     if (t->def.compat)
         return (t->step + 1) % 100 == 0;
@@ -215,10 +233,9 @@ static void revive_when_barren(trainer *t)
 }
 
 /* The loss of the last render as the photo's exposure shows it; d_image becomes dL/drender, d_exposure dL/dmatrix. */
-static gbt_status compare(trainer *t, size_t slot, image_loss_result *loss, double d_exposure[AFFINE_NUMBERS], gbt_error *err)
+static gbt_status compare(trainer *t, size_t slot, const unsigned char *valid, image_loss_result *loss, double d_exposure[AFFINE_NUMBERS], gbt_error *err)
 {
     const image *shown = &t->frame.rgb;
-    const unsigned char *valid = photos_valid(&t->photos, t->train_views[slot]);
     image *fitted[] = {&t->d_image, &t->exposed};
     for (int i = 0; i < (t->exposures.count > 0 ? 2 : 1); i++)
         GBT_TRY(image_fit(fitted[i], shown->width, shown->height, 3, err));
@@ -238,24 +255,29 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
     const learning_rates rates = schedule_rates(progress, t->def.compat, t->extent, t->def.learning_rate_factor);
 
-    /* A view, at the resolution that the model can already use. */
+    /* A view, and as many of its pixels as the model can already use. */
     const size_t slot = pick_view(t), view = t->train_views[slot];
-    out->level = schedule_level(progress, t->def.compat ? 0 : t->def.start_level);
+    out->level = trainer_level(t, view, progress);
     double clock = clock_wall();
-    GBT_TRY(photos_get(&t->photos, view, out->level, &t->photo, err));
+    const photo_sample sample = pick_pixels(t, out->level);
+    gbt_camera camera;
+    const unsigned char *valid;
+    frame *f = &t->frame;
+    GBT_TRY(photos_get_sample(&t->photos, view, &sample, &t->photo, &camera, &valid, &f->draw.pixel_step, err));
     out->photo_seconds = clock_wall() - clock;
-    const gbt_camera camera = photos_camera(&t->photos, view, out->level);
     out->width = camera.width, out->height = camera.height;
 
     /* Render, compare. */
-    frame *f = &t->frame;
-    GBT_TRY(frame_render(f, &t->anchors, &t->decoder, &camera, &t->settings, true, err));
+    trace_settings settings = t->settings;
+    if (!t->def.compat && progress < SCHEDULE_WHOLE_FROM)
+        settings.alpha_min = SCHEDULE_ALPHA_MIN, settings.transmittance_min = SCHEDULE_T_MIN;
+    GBT_TRY(frame_render(f, &t->anchors, &t->decoder, &camera, &settings, true, err));
     out->gaussians = f->gaussians.count, out->visible = f->visible_count;
     revive_when_barren(t);
     clock = clock_wall();
     image_loss_result loss;
     double d_exposure[AFFINE_NUMBERS];
-    GBT_TRY(compare(t, slot, &loss, d_exposure, err));
+    GBT_TRY(compare(t, slot, valid, &loss, d_exposure, err));
     out->loss = loss.loss + (double)volume_weight * frame_volume(f);
     out->l1 = loss.l1, out->ssim = loss.ssim;
     out->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
@@ -286,7 +308,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 
     /* Anchors. */
     clock = clock_wall();
-    if (t->def.grow && progress >= SCHEDULE_STATS_FROM && progress < SCHEDULE_ADJUST_UNTIL)
+    if (t->def.grow && progress >= SCHEDULE_STATS_FROM && progress < t->def.grow_until)
         gather_statistics(t);
     if (adjust) {
         const uint64_t since = t->def.compat ? 100 : t->step + 1 - t->adjust_step;
@@ -309,6 +331,7 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
         if (!t->scene.views[i].is_test)
             continue;
         const gbt_camera camera = photos_camera(&t->photos, i, 0);
+        t->frame.draw.pixel_step = 1;
         status = frame_render(&t->frame, &t->anchors, &t->decoder, &camera, &t->settings, false, err);
         if (status == GBT_OK)
             status = scene_read_photo(&t->scene.views[i], camera.width, camera.height, &photo, err);

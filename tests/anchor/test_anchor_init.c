@@ -1,4 +1,4 @@
-/* tests/anchor/test_anchor_init.c -- GBAI, GBSP and the voxel baseline, against hand values and double. */
+/* tests/anchor/test_anchor_init.c -- GBAI, GBSP, adaptive balls, random points and the voxel baseline, against hand values and double. */
 #include "fixture.h"
 
 #include "anchor/init.h"
@@ -98,6 +98,73 @@ static void anchors_stand_on_ball_centers(void **state)
         balls_free(&b);
         balls_free(&again);
     }
+}
+
+static void adaptive_anchors_stand_on_adaptive_balls(void **state)
+{
+    (void)state;
+    static float position[900 * 3], color[900 * 3];
+    random_cloud(position, 900, 6);
+    for (size_t i = 0; i < 900 * 3; i++)
+        color[i] = spread(6, 1, i, 0.0f, 1.0f);
+    const struct { double fraction; size_t count; } rows[] = {{0.25, 225}, {0.3334, 301}, {1e-6, 1}, {1, 900}};
+    for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
+        anchor_init_def def = def_with_voxel(0.05f);
+        def.kind = ANCHOR_INIT_ADAPTIVE, def.fraction = rows[r].fraction;
+        adaptive_def like = adaptive_def_default();
+        like.voxel_size = 0.05f, like.balls_max = rows[r].count;
+        anchors a;
+        balls b, again;
+        assert_ok(anchors_init(position, color, 900, &def, &a, &b, NULL));
+        assert_ok(balls_adapt(position, color, 900, &like, &again, NULL));
+        assert_true(a.count == rows[r].count && b.count == a.count && again.count == a.count);
+        assert_memory_equal(a.position, again.center, a.count * 3 * sizeof(float));
+        for (size_t i = 0; i < a.count; i++)
+            assert_scale(&a, i, a.count > 1 ? expected_spacing(&a, i) : 0.05); /* whatever def.scale says */
+        anchors_free(&a);
+        balls_free(&b);
+        balls_free(&again);
+    }
+}
+
+static void random_anchors_are_some_of_the_points(void **state)
+{
+    (void)state;
+    static float position[1000 * 3];
+    random_cloud(position, 1000, 7);
+    const struct { double fraction; size_t count; } rows[] = {{0.25, 250}, {0.0001, 1}, {0.9991, 1000}, {1, 1000}};
+    for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
+        anchor_init_def def = def_with_voxel(0.05f);
+        def.kind = ANCHOR_INIT_RANDOM, def.fraction = rows[r].fraction;
+        anchors a;
+        balls b;
+        assert_ok(anchors_init(position, NULL, 1000, &def, &a, &b, NULL));
+        assert_true(a.count == rows[r].count && b.count == 0);
+        size_t i = 0, first_half = 0;
+        for (size_t j = 0; j < a.count; j++, i++) { /* a subsequence: each point once at most */
+            while (i < 1000 && memcmp(a.position + 3 * j, position + 3 * i, 3 * sizeof(float)) != 0)
+                i++;
+            assert_true(i < 1000);
+            first_half += i < 500;
+            if (a.count > 1)
+                assert_scale(&a, j, expected_spacing(&a, j));
+        }
+        assert_true(a.count < 100 || (first_half > a.count * 4 / 10 && first_half < a.count * 6 / 10));
+        anchors_free(&a);
+    }
+}
+
+static void kinds_have_names(void **state)
+{
+    (void)state;
+    const struct { const char *name; anchor_init_kind kind; } rows[] = {
+        {"gb", ANCHOR_INIT_GB}, {"voxel", ANCHOR_INIT_VOXEL}, {"adaptive", ANCHOR_INIT_ADAPTIVE}, {"random", ANCHOR_INIT_RANDOM}};
+    anchor_init_kind kind;
+    for (size_t i = 0; i < 4; i++) {
+        assert_true(anchor_init_kind_named(rows[i].name, &kind));
+        assert_int_equal(kind, rows[i].kind);
+    }
+    assert_false(anchor_init_kind_named("", &kind) || anchor_init_kind_named("gbx", &kind) || anchor_init_kind_named("g", &kind));
 }
 
 static void neighbour_scale(void **state)
@@ -215,7 +282,7 @@ static void wrong_arguments_are_refused(void **state)
 {
     (void)state;
     const float position[3] = {0};
-    for (int t = 0; t < 8; t++) {
+    for (int t = 0; t < 11; t++) {
         anchor_init_def def = def_with_voxel(1.0f);
         switch (t) {
         case 0: def.balls.voxel_size = 0.0f; break;
@@ -225,6 +292,9 @@ static void wrong_arguments_are_refused(void **state)
         case 4: def.fusion = 1.5f; break;
         case 5: def.clip_min = 5.0f; break;
         case 6: def.scale_max = 0.0f; break;
+        case 7: def.fraction = 0; break;
+        case 8: def.fraction = 1.001; break;
+        case 9: def.fraction = NAN; break;
         default: def.balls.max_depth = 65; break;
         }
         anchors a;
@@ -236,9 +306,9 @@ static void wrong_arguments_are_refused(void **state)
     }
     const float bad[3] = {0, NAN, 0};
     anchors a;
-    for (int kind = 0; kind <= 1; kind++) {
+    for (anchor_init_kind kind = ANCHOR_INIT_GB; kind <= ANCHOR_INIT_RANDOM; kind++) {
         anchor_init_def def = def_with_voxel(1.0f);
-        def.kind = kind == 0 ? ANCHOR_INIT_GB : ANCHOR_INIT_VOXEL;
+        def.kind = kind;
         assert_int_equal(anchors_init(bad, NULL, 1, &def, &a, NULL, NULL), GBT_ERR_ARGUMENT);
     }
 }
@@ -248,9 +318,9 @@ static void no_memory_is_an_error(void **state)
     (void)state;
     static float position[50 * 3];
     random_cloud(position, 50, 4);
-    for (int kind = 0; kind <= 1; kind++) {
+    for (anchor_init_kind kind = ANCHOR_INIT_GB; kind <= ANCHOR_INIT_RANDOM; kind++) {
         anchor_init_def def = def_with_voxel(0.1f);
-        def.kind = kind == 0 ? ANCHOR_INIT_GB : ANCHOR_INIT_VOXEL;
+        def.kind = kind;
         long n = 0;
         for (;; n++) {
             anchors a;
@@ -279,6 +349,8 @@ int main(void)
         tests[count++] = (struct CMUnitTest){.name = hand_cases[i].name, .test_func = scales_by_hand, .initial_state = &hand_cases[i]};
     const struct CMUnitTest single[] = {
         cmocka_unit_test(anchors_stand_on_ball_centers), cmocka_unit_test(neighbour_scale),
+        cmocka_unit_test(adaptive_anchors_stand_on_adaptive_balls), cmocka_unit_test(random_anchors_are_some_of_the_points),
+        cmocka_unit_test(kinds_have_names),
         cmocka_unit_test(tiny_scales_have_a_floor), cmocka_unit_test(same_bits_for_all_threads),
         cmocka_unit_test(wrong_arguments_are_refused), cmocka_unit_test(no_memory_is_an_error),
     };

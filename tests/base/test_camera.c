@@ -397,6 +397,28 @@ static void resizing_keeps_rays(void **state)
     }
 }
 
+static void every_step_keeps_rays(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < CASE_COUNT; i++) {
+        const gbt_camera camera = camera_of(lens_cases[i].model, lens_cases[i].params);
+        gbt_camera few = {.width = 7};
+        const bool can = camera.model != GBT_CAMERA_EQUIRECTANGULAR;
+        assert_int_equal(gbt_camera_every(&camera, 3, 1, 2, &few), can);
+        assert_int_equal(few.width, can ? WIDTH / 3 : 7);
+        for (int k = 0; can && k < 50; k++) {
+            const int x = k * few.width / 50, y = k * few.height / 50;
+            double dir[3], other[3];
+            assert_true(gbt_camera_unproject(&camera, 3 * x + 1.5, 3 * y + 2.5, dir));
+            assert_true(gbt_camera_unproject(&few, x + 0.5, y + 0.5, other));
+            for (int axis = 0; axis < 3; axis++)
+                assert_near(dir[axis], other[axis], 1e-12);
+        }
+        assert_false(gbt_camera_every(&camera, WIDTH + 1, 0, 0, &few)); /* no pixel would be left */
+        assert_false(gbt_camera_every(&camera, 0, 0, 0, &few));
+    }
+}
+
 static void resizing_exact_numbers(void **state)
 {
     (void)state;
@@ -524,6 +546,7 @@ int main(void)
         cmocka_unit_test(limits_are_inside),
         cmocka_unit_test(wild_parameters_stay_honest),
         cmocka_unit_test(resizing_keeps_rays),
+        cmocka_unit_test(every_step_keeps_rays),
         cmocka_unit_test(resizing_exact_numbers),
         cmocka_unit_test(half_fov),
         cmocka_unit_test(orthographic),

@@ -50,7 +50,8 @@ prints "help about a verb" '^usage: gbtrace init DATA -o FILE.ply \[options\]$' 
 prints "help of a verb" '^      --max-depth D  *most splits of the cloud (default 18)$' init --help
 prints "help wins over what is wrong" '^usage: gbtrace init' init --nonsense -h
 prints "needed options say so" '^  -o, --output FILE.ply  *.* (needed)$' init --help
-prints "choices with their default" '--init gb|voxel .*(default gb)' init --help
+prints "choices" '--init gb|adaptive|voxel|random$' init --help
+prints "choices with their default" '--scale-prior gb|nn .*(default gb)' init --help
 prints "version" '^gbtrace [0-9][0-9]*\.[0-9][0-9]*\.[0-9][0-9]*$' --version
 
 # ---- verbs
@@ -85,7 +86,7 @@ for bad in -1 nan 1,5; do
     misuse 2 "--voxel-size: bad value (wanted a number from 0 to 1e+30, got $bad)" init d -o p --voxel-size "$bad"
 done
 for bad in gbx 'gb|voxel'; do
-    misuse 2 "--init: bad value (wanted one of gb|voxel, got $bad)" init d -o p --init "$bad"
+    misuse 2 "--init: bad value (wanted one of gb|adaptive|voxel|random, got $bad)" init d -o p --init "$bad"
 done
 misuse 2 "--seed: bad value (wanted a whole number from 0 to 18446744073709551615, got -1)" make-scene tabletop -o d --seed -1
 misuse 2 "--seed: bad value (wanted a whole number from 0 to 18446744073709551615, got 18446744073709551616)" make-scene tabletop -o d --seed 18446744073709551616
@@ -156,6 +157,8 @@ prints "a name behind --" '^cloud.ply: data set (ply)$' info -- cloud.ply
 prints "init" '^anchors  *[1-9][0-9]* (granular balls)' init cloud.ply -o balls.ply --json balls.json
 prints "init keeps voxels beside it" '^voxel baseline  *64 anchors' init cloud.ply -o balls.ply
 prints "init with voxels" '^anchors  *64 (voxels), 1 points each$' init cloud.ply -o voxels.ply --init voxel
+prints "init with adaptive balls" '^anchors  *16 (adaptive balls), 4 points each$' init cloud.ply -o adaptive.ply --init adaptive
+prints "init with so many of them" '^anchors  *32 (adaptive balls), 2 points each$' init cloud.ply -o adaptive.ply --init adaptive --init-count 0.5
 prints "init, depth 0 is one ball" '^anchors  *1 (granular balls), 64 points each$' init cloud.ply -o one.ply --max-depth 0
 printf 'max-depth = 0\noutput = from_config.ply\n' >one.conf
 prints "a configuration file is used" '^anchors  *1 (granular balls)' init cloud.ply --config one.conf
@@ -240,8 +243,8 @@ prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.00
 misuse 2 '--kernel: "tile,tile" (wanted tile, single or embree, or some of them with commas between)' $bench --kernel tile,tile
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
 misuse 2 "--camera: missing (a .ply has no cameras)" bench trace --model gaussians.ply
-misuse 2 'study: unknown study "pace" (wanted speed, crosscheck or stability)' study pace gaussians.ply -o study
-misuse 2 "argument missing (usage: gbtrace study speed|crosscheck|stability [MODEL...] -o DIR)" study -o study
+misuse 2 'study: unknown study "pace" (wanted speed, crosscheck, rate or stability)' study pace gaussians.ply -o study
+misuse 2 "argument missing (usage: gbtrace study speed|crosscheck|rate|stability [MODEL...] -o DIR)" study -o study
 misuse 2 "study crosscheck: wanted a model" study crosscheck -o study
 misuse 2 'study stability: "gaussians.ply" is one model too many' study stability gaussians.ply -o study
 misuse 2 'study stability: "A99" is not a list of different cases (wanted some of A1 to A18, as A1,A9)' study stability --only A99 -o study
@@ -275,6 +278,20 @@ if "$program" train made -o run --iterations 3 >out 2>err; then
     done
     "$program" eval run --preset fast >out 2>err && [ "$(grep -c '^  "preset": "fast"' run/metrics.json)" = 1 ]
     report $? "eval says with which preset it scored" "$(cat err)"
+    "$program" compress run -o small.gbt --json small.json >out 2>err && "$program" compress small.gbt -o same.gbt --lossless >>out 2>>err &&
+        [ "$(wc -c <small.gbt)" -lt "$(wc -c <run/model.gbt)" ] && grep -q '"steps_from": "training views"' small.json &&
+        [ "$("$program" info small.gbt | grep anchors)" = "$("$program" info run/model.gbt | grep anchors)" ] &&
+        "$program" render small.gbt -o pictures-small >>out 2>>err && "$program" render same.gbt -o pictures-same >>out 2>>err &&
+        cmp -s pictures-small/*.png pictures-same/*.png
+    report $? "a small model is read as a large one, and keeps every bit without loss" "$(cat err out)"
+    mv made moved && "$program" compress run -o alone.gbt >out 2>err && grep -q '(steps: the model alone)$' out && grep -q '^made is not there: ' err &&
+        "$program" info alone.gbt >>out 2>>err
+    report $? "a model without its data set becomes small too" "$(cat err out)"
+    mv moved made
+    "$program" study rate run -o rate >out 2>err && cmp -s out rate/rate.md && [ "$(grep -c '"row": ' rate/rate.json)" = 2 ] && grep -q '<svg xmlns' rate/rate.svg &&
+        [ "$(ls rate | wc -l)" = 4 ]
+    report $? "study rate writes its tables and its chart" "$(cat err out)"
+    misuse 2 "--quality: bad value (wanted a number from 20 to 90, got 10)" compress run -o small.gbt --quality 10
     misuse 2 '--outputs: "dept" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)' render run -o pictures --outputs hits,dept
 else
     report 1 "a run to render" "$(cat err)"

@@ -155,10 +155,10 @@ static void init_counts(void **state)
     const char *data = write_grid("cloud.ply", 4, 1.0, 0.0);
     FILE *report = fopen("/dev/null", "w");
     gbt_init_def def = gbt_init_def_default();
-    const struct { const char *init; int max_depth; float voxel_size; double anchors, voxels; } rows[] = {
-        {"gb", 0, 0.0f, 1, 64}, {"gb", 1, 0.0f, 2, 64}, {"gb", 2, 0.0f, 4, 64}, {"gb", 18, 0.0f, 8, 64}, /* cubes of 8 points: compact (eq 23) */
-        {"gb", 18, 0.125f, 32, 64}, /* never compact: leaves of N_min = 2 points */
-        {"voxel", 18, 0.0f, 64, 64}, {"voxel", 18, 100.0f, 1, 1},
+    const struct { const char *init; int max_depth; float voxel_size; double anchors, voxels, balls; } rows[] = {
+        {"gb", 0, 0.0f, 1, 64, 1}, {"gb", 1, 0.0f, 2, 64, 2}, {"gb", 2, 0.0f, 4, 64, 4}, {"gb", 18, 0.0f, 8, 64, 8}, /* cubes of 8 points: compact (eq 23) */
+        {"gb", 18, 0.125f, 32, 64, 32}, /* never compact: leaves of N_min = 2 points */
+        {"voxel", 18, 0.0f, 64, 64, 8}, {"voxel", 18, 100.0f, 1, 1, 1}, {"adaptive", 18, 0.0f, 16, 64, 8}, {"random", 18, 0.0f, 16, 64, 8},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         def.init = rows[i].init, def.max_depth = rows[i].max_depth, def.voxel_size = rows[i].voxel_size;
@@ -172,6 +172,13 @@ static void init_counts(void **state)
         assert_true(number(value, "voxel_size") == (rows[i].voxel_size > 0 ? (double)rows[i].voxel_size : 1.0));
         const double mean = number(json_object_get(value, "points_per_anchor"), "mean");
         assert_true(fabs(mean * rows[i].anchors - 64) < 1e-4); /* every point in one anchor */
+        const json_t *quality = json_object_get(value, "quality"), *gb = json_array_get(quality, 0), *adaptive = json_array_get(quality, 1),
+                     *voxel = json_array_get(quality, 2);
+        assert_int_equal(json_array_size(quality), 3);
+        assert_true(number(gb, "anchors") == rows[i].balls && number(adaptive, "anchors") == 16 && number(voxel, "anchors") <= 16);
+        /* 16 sets of 4 in a unit grid: squares, whose corners are sqrt(1/2) from their centre, are the best there is. */
+        assert_true(number(adaptive, "distance_rms") >= 0.7071 && number(adaptive, "distance_rms") < number(voxel, "distance_rms"));
+        assert_true(number(adaptive, "color_rms") == 0);
         json_decref(value);
         json_t *back = info_as_json(in_folder("out.ply"));
         assert_true(number(back, "points") == rows[i].anchors);
@@ -185,7 +192,8 @@ static void init_writes_world_coordinates(void **state)
     (void)state;
     const char *data = write_grid("far.ply", 2, 1.0, 4e6);
     FILE *report = fopen("/dev/null", "w");
-    const gbt_init_def def = {.init = "gb", .scale_prior = "gb", .max_depth = 0, .voxel_rule = "median"};
+    gbt_init_def def = gbt_init_def_default();
+    def.max_depth = 0;
     assert_ok(gbt_init(data, &def, in_folder("out.ply"), NULL, report, NULL));
     fclose(report);
     json_t *back = info_as_json(in_folder("out.ply"));
@@ -199,11 +207,13 @@ static void init_refuses(void **state)
     (void)state;
     const char *data = write_grid("cloud.ply", 2, 1.0, 0.0);
     const gbt_init_def good = gbt_init_def_default();
-    gbt_init_def bad[6];
-    for (int i = 0; i < 6; i++)
+    enum { BAD = 9 };
+    gbt_init_def bad[BAD];
+    for (int i = 0; i < BAD; i++)
         bad[i] = good;
     bad[0].init = "ball", bad[1].scale_prior = NULL, bad[2].voxel_rule = "", bad[3].voxel_size = -1, bad[4].voxel_size = NAN, bad[5].max_depth = 65;
-    for (int i = 0; i < 6; i++) {
+    bad[6].init = NULL, bad[7].init_count = 0, bad[8].init_count = 1.5;
+    for (int i = 0; i < BAD; i++) {
         gbt_error err = {0};
         assert_int_equal(gbt_init(data, &bad[i], in_folder("none.ply"), NULL, stdout, &err), GBT_ERR_ARGUMENT);
         assert_int_not_equal(err.text[0], '\0');

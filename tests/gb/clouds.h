@@ -38,6 +38,29 @@ static inline cloud cloud_random(size_t count, uint64_t seed, double center, dou
     return c;
 }
 
+/** A copy in another order; the map from its indices to those of `c`, to be freed. */
+static inline uint32_t *cloud_shuffle(const cloud *c, uint64_t seed, cloud *out)
+{
+    const size_t n = c->count;
+    uint32_t *to = malloc((n + 1) * sizeof *to);
+    assert_non_null(to);
+    for (size_t i = 0; i < n; i++)
+        to[i] = (uint32_t)i;
+    for (size_t i = n; i-- > 1;) {
+        uint32_t words[4];
+        rng_philox(seed, 9, i, words);
+        const size_t j = words[0] % (i + 1);
+        const uint32_t keep = to[i];
+        to[i] = to[j], to[j] = keep;
+    }
+    *out = cloud_alloc(n);
+    for (size_t i = 0; i < n; i++) {
+        memcpy(out->position + 3 * i, c->position + 3 * to[i], 3 * sizeof(float));
+        memcpy(out->color + 3 * i, c->color + 3 * to[i], 3 * sizeof(float));
+    }
+    return to;
+}
+
 /** The garden points: binary PLY, float x y z, uchar red green blue. NULL position when the file is not there. */
 static inline cloud cloud_garden(void)
 {

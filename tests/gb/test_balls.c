@@ -1,70 +1,12 @@
 /* tests/gb/test_balls.c -- the partition: closed form, equations, stop rules, ties, degenerate clouds, threads, no memory. */
-#include <float.h>
 #include <stdbool.h>
 #include <time.h>
 
+#include "ball_checks.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "clouds.h"
 #include "gb/balls.h"
-
-/* Eq 17 (disjoint and covering), order inside a ball, and eqs 19-22 recomputed in double from the input. */
-static void check_balls(const balls *b, const float *position, const float *color, size_t count, const balls_def *def)
-{
-    assert_int_equal(b->point_count, count);
-    assert_int_equal(b->first[0], 0);
-    assert_int_equal(b->first[b->count], count);
-    unsigned char *seen = calloc(count + 1, 1);
-    assert_non_null(seen);
-    for (size_t j = 0; j < b->count; j++) {
-        const size_t begin = b->first[j], end = b->first[j + 1];
-        const double n = (double)(end - begin);
-        assert_true(begin < end);
-        assert_in_range(b->depth[j], 0, def->max_depth);
-        double mean[3], tint[3] = {0, 0, 0}, cov[6] = {0}, var[3] = {0, 0, 0};
-        const float *origin = position + 3 * (size_t)b->member[begin]; /* else a thousand equal points get a mean beside them */
-        for (int k = 0; k < 3; k++)
-            mean[k] = (double)origin[k];
-        for (size_t i = begin; i < end; i++) {
-            const uint32_t m = b->member[i];
-            assert_true(m < count && !seen[m]);
-            seen[m] = 1;
-            assert_true(i == begin || b->member[i - 1] < m);
-            for (int k = 0; k < 3; k++) {
-                mean[k] += ((double)position[3 * m + k] - (double)origin[k]) / n;
-                tint[k] += color != NULL ? (double)color[3 * m + k] / n : 0;
-            }
-        }
-        double size = 0;
-        for (size_t i = begin; i < end; i++) {
-            const uint32_t m = b->member[i];
-            double d[3];
-            for (int k = 0; k < 3; k++) {
-                d[k] = (double)position[3 * m + k] - mean[k];
-                const double c = color != NULL ? (double)color[3 * m + k] - tint[k] : 0;
-                var[k] += c * c / n;
-            }
-            cov[0] += d[0] * d[0] / n, cov[1] += d[0] * d[1] / n, cov[2] += d[0] * d[2] / n;
-            cov[3] += d[1] * d[1] / n, cov[4] += d[1] * d[2] / n, cov[5] += d[2] * d[2] / n;
-        }
-        size = cov[0] + cov[3] + cov[5];
-        const double floor_radius = fmax((double)def->min_scale * (double)def->voxel_size, 1e-6);
-        const double radius = fmax(sqrt(size), floor_radius);
-        if (!(fabs((double)b->radius[j] - radius) <= 1e-5 * radius))
-            fail_msg("ball %zu of %g points: radius wanted %.9g, got %.9g", j, n, radius, (double)b->radius[j]);
-        for (int k = 0; k < 3; k++) {
-            if (!(fabs((double)b->center[3 * j + k] - mean[k]) <= 1e-6 * fabs(mean[k]) + 1e-6 * radius))
-                fail_msg("ball %zu: center wanted %.9g, got %.9g", j, mean[k], (double)b->center[3 * j + k]);
-            assert_true(fabs((double)b->color[3 * j + k] - tint[k]) <= 1e-5);
-        }
-        for (int k = 0; k < 6; k++)
-            if (!(fabs((double)b->covariance[6 * j + k] - cov[k]) <= 1e-5 * size + (double)FLT_TRUE_MIN))
-                fail_msg("ball %zu: covariance %d wanted %.9g, got %.9g", j, k, cov[k], (double)b->covariance[6 * j + k]);
-        const double spread = (sqrt(var[0]) + sqrt(var[1]) + sqrt(var[2])) / 3;
-        assert_true(fabs((double)b->color_std[j] - spread) <= 1e-5);
-    }
-    free(seen);
-}
 
 /* b = 2^(ceil(log2 n) - 2), M = min(n - b, 2 b): balls of the published settings when the quality stop does not fire. */
 static size_t closed_form(size_t n)
@@ -384,79 +326,27 @@ static void denormal_points_are_separated(void **state)
     balls_free(&b);
 }
 
-static int by_index(const void *a, const void *b)
-{
-    const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
 /* Without ties the tree is a property of the set: shuffled input gives the same balls in the same order under new labels. */
 static void input_order_does_not_matter(void **state)
 {
     (void)state;
     for (uint64_t seed = 0; seed < 60; seed++) {
         const size_t n = 3 + (size_t)(seed * seed * 7);
-        cloud c = cloud_random(n, seed, seed % 3 == 0 ? 1e5 : 0, seed % 3 == 0 ? 1e3 : 1), s = cloud_alloc(n);
-        uint32_t *to = malloc(n * sizeof *to), *mapped = malloc(n * sizeof *mapped); /* shuffled index -> index */
-        assert_true(to != NULL && mapped != NULL);
-        for (size_t i = 0; i < n; i++)
-            to[i] = (uint32_t)i;
-        for (size_t i = n; i-- > 1;) {
-            uint32_t words[4];
-            rng_philox(seed, 9, i, words);
-            const size_t j = words[0] % (i + 1);
-            const uint32_t keep = to[i];
-            to[i] = to[j], to[j] = keep;
-        }
-        for (size_t i = 0; i < n; i++) {
-            memcpy(s.position + 3 * i, c.position + 3 * to[i], 3 * sizeof(float));
-            memcpy(s.color + 3 * i, c.color + 3 * to[i], 3 * sizeof(float));
-        }
+        cloud c = cloud_random(n, seed, seed % 3 == 0 ? 1e5 : 0, seed % 3 == 0 ? 1e3 : 1), s;
+        uint32_t *to = cloud_shuffle(&c, seed, &s);
         balls_def def = balls_def_default();
         def.voxel_size = seed % 2 == 0 ? 0.3f : 1e-4f;
         def.color_std_max = 0.2f;
         balls a, b;
         assert_ok(balls_build(c.position, c.color, n, &def, &a, &assert_ok_err_));
         assert_ok(balls_build(s.position, s.color, n, &def, &b, &assert_ok_err_));
-        assert_int_equal(a.count, b.count);
-        assert_memory_equal(a.first, b.first, (a.count + 1) * sizeof *a.first);
-        assert_memory_equal(a.depth, b.depth, a.count * sizeof *a.depth);
-        for (size_t i = 0; i < n; i++)
-            mapped[i] = to[b.member[i]];
-        for (size_t j = 0; j < a.count; j++)
-            qsort(mapped + b.first[j], b.first[j + 1] - b.first[j], sizeof *mapped, by_index);
-        if (memcmp(mapped, a.member, n * sizeof *mapped) != 0)
-            fail_msg("seed %llu: another partition of the shuffled cloud", (unsigned long long)seed);
-        for (size_t j = 0; j < a.count; j++)
-            assert_true(fabsf(a.radius[j] - b.radius[j]) <= 1e-6f * a.radius[j]);
+        check_same_partition(&a, &b, to);
         balls_free(&a);
         balls_free(&b);
         cloud_free(&c);
         cloud_free(&s);
         free(to);
-        free(mapped);
     }
-}
-
-static uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t count)
-{
-    const unsigned char *p = bytes;
-    for (size_t i = 0; i < count; i++)
-        hash = (hash ^ p[i]) * 0x100000001b3u;
-    return hash;
-}
-
-static uint64_t hash_balls(const balls *b)
-{
-    uint64_t h = 0xcbf29ce484222325u;
-    h = hash_bytes(h, b->first, (b->count + 1) * sizeof *b->first);
-    h = hash_bytes(h, b->member, b->point_count * sizeof *b->member);
-    h = hash_bytes(h, b->center, 3 * b->count * sizeof *b->center);
-    h = hash_bytes(h, b->radius, b->count * sizeof *b->radius);
-    h = hash_bytes(h, b->covariance, 6 * b->count * sizeof *b->covariance);
-    h = hash_bytes(h, b->color, 3 * b->count * sizeof *b->color);
-    h = hash_bytes(h, b->color_std, b->count * sizeof *b->color_std);
-    return hash_bytes(h, b->depth, b->count * sizeof *b->depth);
 }
 
 static void same_bits_for_any_thread_count(void **state)

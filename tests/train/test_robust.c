@@ -193,6 +193,16 @@ static void pixels_that_are_not_numbers_are_marked(void **state)
                 for (int x = 0; x < photo.width; x++) /* 48 x 36 halves evenly */
                     assert_int_equal(valid[y * photo.width + x], x != POISONED_X >> level || y != POISONED_Y >> level);
         }
+    for (int phase = 0; phase < 4; phase++) { /* picked pixels carry their own marks */
+        const photo_sample sample = {.level = 1, .phase = {phase % 2, phase / 2}};
+        gbt_camera camera;
+        const unsigned char *valid;
+        int step;
+        assert_ok(photos_get_sample(&p, POISONED_VIEW, &sample, &photo, &camera, &valid, &step, NULL));
+        for (int y = 0; y < photo.height; y++)
+            for (int x = 0; x < photo.width; x++)
+                assert_int_equal(valid[y * photo.width + x], 2 * x + sample.phase[0] != POISONED_X || 2 * y + sample.phase[1] != POISONED_Y);
+    }
     assert_ok(photos_get(&p, POISONED_VIEW, 1, &photo, NULL)); /* back to a level that was dropped */
     assert_non_null(photos_valid(&p, POISONED_VIEW));
     image_free(&photo);
@@ -389,6 +399,7 @@ static void scales_stay_in_their_range(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.learning_rate_factor = 1000;
+    def.grow = false; /* transparent anchors stay */
     trainer t;
     step_report r;
     open_ok(&t, tiny, &def);

@@ -521,6 +521,7 @@ static void data_without_training_photos_is_refused(void **state)
     assert_false(file_exists(in_root("none/model.gbt")));
 }
 
+/* A run has read its photos when it starts; one that is resumed reads them again. */
 static void a_vanished_photo_is_named(void **state)
 {
     (void)state;
@@ -535,15 +536,9 @@ static void a_vanished_photo_is_named(void **state)
     open_ok(&t, data, &def);
     const char *photo = in_root("vanishing/images/%s", t.scene.views[t.train_views[0]].name);
     assert_int_equal(rename(photo, in_root("vanishing/aside.png")), 0);
-    gbt_error err = {0};
-    gbt_status status = GBT_OK;
-    for (int i = 0; i < VIEWS && status == GBT_OK; i++) { /* each view once: one of them is gone */
-        step_report r;
-        status = trainer_step(&t, &r, &err);
-    }
-    assert_int_equal(status, GBT_ERR_IO);
-    if (strstr(err.text, t.scene.views[t.train_views[0]].name) == NULL)
-        fail_msg("does not name the photo: %s", err.text);
+    step_report r;
+    for (int i = 0; i < VIEWS; i++)
+        step_ok(&t, &r);
     trainer_free(&t);
 
     gbt_train_def on = gbt_train_def_default();
@@ -829,6 +824,59 @@ static void config_comes_back(void **state)
 
 /* ---- photos ------------------------------------------------------------------------------------------------------------------- */
 
+/* Every pixel of every phase is the photo's, seen by the photo's ray. */
+static void samples_are_pixels_of_the_photo(void **state)
+{
+    (void)state;
+    scene s;
+    photos p;
+    image full = {0}, got = {0};
+    const unsigned char *valid;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(tiny, &split, &s, NULL));
+    assert_ok(photos_open(&p, &s, 1, NULL));
+    const size_t views[] = {2, 0};
+    assert_ok(photos_load(&p, views, 2, NULL));
+    assert_true(p.full[0] != NULL && p.full[2] != NULL && p.full[1] == NULL);
+    assert_ok(photos_get(&p, 0, 0, &full, NULL));
+    const gbt_camera whole = photos_camera(&p, 0, 0);
+    size_t seen = 0;
+    for (int level = 0; level <= 2; level++)
+        for (int phase = 0; phase < 1 << 2 * level; phase++) {
+            const photo_sample sample = {.level = level, .phase = {phase % (1 << level), phase / (1 << level)}};
+            gbt_camera camera;
+            int step;
+            assert_ok(photos_get_sample(&p, 0, &sample, &got, &camera, &valid, &step, NULL));
+            assert_null(valid);
+            assert_int_equal(step, 1 << level);
+            assert_true(got.width == whole.width / step && got.height == whole.height / step);
+            assert_true(camera.width == got.width && camera.height == got.height);
+            for (int y = 0; y < got.height; y++)
+                for (int x = 0; x < got.width; x++, seen++) {
+                    const int at[2] = {x * step + sample.phase[0], y * step + sample.phase[1]};
+                    assert_memory_equal(got.pixels + 3 * (y * got.width + x), full.pixels + 3 * (at[1] * full.width + at[0]), 3 * sizeof(float));
+                    double a[3], b[3];
+                    assert_true(gbt_camera_unproject(&camera, x + 0.5, y + 0.5, a) && gbt_camera_unproject(&whole, at[0] + 0.5, at[1] + 0.5, b));
+                    for (int c = 0; c < 3; c++)
+                        assert_true(fabs(a[c] - b[c]) < 1e-14);
+                }
+        }
+    assert_int_equal(seen, 3 * whole.width * whole.height); /* all of them, once a level: the size is a multiple of 4 */
+    const size_t bad[] = {1, 0};
+    mem_free(p.full[0]);
+    p.full[0] = NULL;
+    char *missing = s.views[0].path;
+    s.views[0].path = (char *)"/nowhere/photo.png";
+    gbt_error err = {0};
+    assert_int_equal(photos_load(&p, bad, 2, &err), GBT_ERR_IO);
+    assert_non_null(strstr(err.text, "/nowhere/photo.png"));
+    s.views[0].path = missing;
+    image_free(&full);
+    image_free(&got);
+    photos_close(&p);
+    scene_free(&s);
+}
+
 static void quantize(image *im)
 {
     for (size_t i = 0; i < (size_t)im->width * (size_t)im->height * 3; i++)
@@ -950,6 +998,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(pace_is_read),
         cmocka_unit_test(levels_and_rates),
         cmocka_unit_test(config_comes_back),
+        cmocka_unit_test(samples_are_pixels_of_the_photo),
         cmocka_unit_test(photos_are_the_resized_reference),
         cmocka_unit_test(interrupted_and_resumed_is_straight),
         cmocka_unit_test(extra_checkpoints_change_nothing),

@@ -1,0 +1,26 @@
+/* gb/fill.h -- from a reordered cloud and the places where balls begin to their members and statistics. */
+#ifndef GBT_GB_FILL_H
+#define GBT_GB_FILL_H
+
+#include "gb/balls.h"
+#include "gb/moments.h"
+
+enum { BALL_DEPTH_MAX = 64 };
+
+/**
+ * Fill *out from points in the order of the balls.
+ *
+ * Statistics are summed in index order: they depend on the set alone, not on the way to it.
+ *
+ * @param points       [in] [count], those of a ball together; sorted by index inside a ball on return
+ * @param leaf_depth   [in] [count]: 1 + depth where a ball begins, else 0
+ * @param color        [in] [..][3], indexed by the points' index, or NULL
+ * @param radius_floor [in] s_min, eq 21
+ * @param out          [out] free with balls_free(); also after GBT_ERR_NO_MEMORY
+ *
+ * Threads: same bits for every thread count.
+ */
+gbt_status balls_fill(cloud_point *points, const uint8_t *leaf_depth, size_t count, const float *color, double radius_floor, balls *out,
+                      gbt_error *err);
+
+#endif

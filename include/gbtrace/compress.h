@@ -12,7 +12,7 @@ extern "C" {
 #endif
 
 typedef struct gbt_compress_def {
-    double quality;   /* dB: what the pictures of the model may differ from before, as a PSNR; [20, 90]. Default 55 */
+    double quality;   /* dB: what the pictures of the model may differ from before, as a PSNR; [20, 90]. Default 60 */
     int lossless;     /* 1: every bit of the model is kept; `quality` is not used. Default 0 */
     const char *data; /* data set whose training cameras tell what counts; NULL: the one it was trained on. Default NULL */
     const char *json; /* also write the figures here; NULL: nowhere. Default NULL */
@@ -28,7 +28,7 @@ gbt_compress_def gbt_compress_def_default(void);
  *
  * @param run [in] RUN (a folder with model.gbt) or a model file; also one that is already small
  * @param out [in] written atomically; may be the model itself
- * @param report [in] open stream for the table of bytes
+ * @param report [in] open stream for the table of bytes; NULL: none
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *
  * Threads: same bytes for every thread count. Cost: 64 views with their adjoint, and about 50 us per anchor.

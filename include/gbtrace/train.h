@@ -15,7 +15,8 @@ extern "C" {
 enum { GBT_TRAIN_MAX_EVALS = 16 };
 
 typedef struct gbt_train_def {
-    const char *init;           /* "gb" (granular balls, default), "adaptive" (balls where the scene needs them), "voxel", or "random" points */
+    const char *init;           /* "gb" (the paper's granular balls), "adaptive" (balls where the scene needs them), "voxel", "random" points; "auto": adaptive,
+                                   or gb with compat. Default "auto" */
     double init_count;          /* anchors per point of adaptive and random, (0, 1]. Default 0.25 */
     const char *scale_prior;    /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use "nn" */
     int max_depth;              /* D_max of the balls, [0, 64]. Default 18 */
@@ -40,7 +41,7 @@ typedef struct gbt_train_def {
     bool exposure;              /* learn a colour matrix per photo, for photos whose exposure differs; held-out photos are then scored on
                                    their right half, with a matrix fitted to the left. Default false */
     double grow_until;          /* anchors grow and are pruned until this fraction of the run, [0, 1]. Default 0.5 */
-    double scale_factor;        /* of the anchors' first scales, [0.01, 100]; 0: 2, or 1 with compat. Default 0 */
+    double scale_factor;        /* of the anchors' first scales, [0.01, 100]; 0: 2 with the balls' scale prior, 1.2 with spacing, 1 with compat. Default 0 */
     double learning_rate_factor; /* of all learning rates, [1e-3, 1e3]. Default 1 */
     double save_every_seconds;  /* wall time between checkpoints; 0: only at the end. Default 120 */
     uint64_t save_at_step;      /* one extra checkpoint right after this step; 0: none. Default 0 */

@@ -26,7 +26,7 @@ gbt_status adjust_stats_resize(adjust_stats *s, size_t count, int offset_count, 
     if (offset_count < 1 || offset_count > ANCHOR_MAX_OFFSETS || (s->count > 0 && offset_count != s->offset_count))
         return base_fail(err, GBT_ERR_ARGUMENT, "statistics: offset_count %d (wanted 1 to %d, constant)", offset_count, ANCHOR_MAX_OFFSETS);
     const size_t widths[ROWS_FIELDS] = {1, 1, (size_t)offset_count, (size_t)offset_count};
-    float **const fields[ROWS_FIELDS] = {&s->opacity_accum, &s->visit_count, &s->grad_accum, &s->grad_count};
+    float **const fields[ROWS_FIELDS] = {&s->use_accum, &s->visit_count, &s->grad_accum, &s->grad_count};
     if (offset_count != s->offset_count)
         s->capacity = 0; /* no rows are in use: arrays of another width must be made */
     GBT_TRY(rows_resize(fields, widths, &s->capacity, s->count, count, "statistics", err));
@@ -37,7 +37,7 @@ gbt_status adjust_stats_resize(adjust_stats *s, size_t count, int offset_count, 
 
 void adjust_stats_free(adjust_stats *s)
 {
-    mem_free(s->opacity_accum);
+    mem_free(s->use_accum);
     mem_free(s->visit_count);
     mem_free(s->grad_accum);
     mem_free(s->grad_count);
@@ -47,7 +47,7 @@ void adjust_stats_free(adjust_stats *s)
 adjust_def adjust_def_default(void)
 {
     return (adjust_def){.voxel_size = 0.0f, .level_count = 3, .init_factor = 16, .hierarchy_factor = 4, .grad_threshold = 2e-4f,
-                        .min_opacity = 0.005f, .interval = 100.0f, .success_threshold = 0.8f, .shape_log_max = INFINITY,
+                        .min_use = 0.005f, .interval = 100.0f, .success_threshold = 0.8f, .shape_log_max = INFINITY,
                         .max_anchors = SIZE_MAX, .compat = false, .seed = 0, .step = 0, .grow = true, .prune = true};
 }
 
@@ -291,7 +291,7 @@ static bool judged(const adjust_def *def, float visit_count)
 
 static bool is_pruned(const adjust_stats *stats, const adjust_def *def, size_t i)
 {
-    return def->prune && judged(def, stats->visit_count[i]) && stats->opacity_accum[i] < def->min_opacity * stats->visit_count[i];
+    return def->prune && judged(def, stats->visit_count[i]) && stats->use_accum[i] < def->min_use * stats->visit_count[i];
 }
 
 static gbt_status check_arguments(const anchors *a, const adjust_stats *stats, const adjust_def *def, gbt_error *err)
@@ -325,7 +325,7 @@ static size_t compact(anchors *a, adjust_stats *s, const adjust_def *def, const 
         memmove(a->offset + to * offsets * 3, a->offset + i * offsets * 3, offsets * 3 * sizeof(float));
         memmove(a->scale_log + to * 6, a->scale_log + i * 6, 6 * sizeof(float));
         const bool used = def->prune && judged(def, s->visit_count[i]);
-        s->opacity_accum[to] = used ? 0.0f : s->opacity_accum[i];
+        s->use_accum[to] = used ? 0.0f : s->use_accum[i];
         s->visit_count[to] = used ? 0.0f : s->visit_count[i];
         for (size_t k = 0; k < offsets; k++) {
             const bool sampled = def->grow && well_sampled(def, s->grad_count[i * offsets + k]);
@@ -358,7 +358,7 @@ gbt_status anchors_adjust(anchors *a, adjust_stats *stats, const adjust_def *def
     for (size_t i = 0; i < before; i++) {
         pruned[i] = is_pruned(stats, def, i);
         survivors += !pruned[i];
-        if (stats->opacity_accum[i] * stats->visit_count[most_opaque] > stats->opacity_accum[most_opaque] * stats->visit_count[i])
+        if (stats->use_accum[i] * stats->visit_count[most_opaque] > stats->use_accum[most_opaque] * stats->visit_count[i])
             most_opaque = i;
     }
     /* The cap counts the room that pruning makes; it never removes an anchor by itself. */

@@ -2,8 +2,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "cli/finish_run.h"
 #include "cli/options.h"
-#include "gbtrace/evaluate.h"
 #include "gbtrace/make_scene.h"
 #include "gbtrace/train.h"
 
@@ -42,8 +42,7 @@ static int run(const command *self, int argc, char **argv)
     }
     if (status == GBT_OK) {
         fprintf(stderr, "3/3 scoring the held-out views\n");
-        const gbt_evaluate_def score = gbt_evaluate_def_default();
-        status = gbt_evaluate(run_folder, &score, &err);
+        status = finish_run(run_folder, false, &err);
     }
     if (status == GBT_OK)
         printf("Open %s/report.html in a browser.\nYour own photos: gbtrace train DATA -o RUN --budget 10m   (DATA holds images/ and sparse/0 from COLMAP)\n",

@@ -4,12 +4,15 @@
 
 #include "cli/options.h"
 #include "gbtrace/bench.h"
+#include "gbtrace/study.h"
 #include "gbtrace/train.h"
 
 /* What the command line says, for all studies. */
 typedef struct study_request {
     gbt_study_def def; /* of the studies of models */
     gbt_stability_def stability;
+    gbt_paper_def paper;
+    gbt_time_def time;
     const char *folder;
 } study_request;
 
@@ -33,25 +36,45 @@ static gbt_status run_stability(const study_request *r, gbt_error *err)
     return gbt_study_stability(&r->stability, r->folder, stdout, err);
 }
 
+static gbt_status run_paper(const study_request *r, gbt_error *err)
+{
+    return gbt_study_paper(&r->paper, r->folder, stdout, err);
+}
+
+static gbt_status run_time(const study_request *r, gbt_error *err)
+{
+    return gbt_study_time(&r->time, r->folder, stdout, err);
+}
+
 static const struct { const char *name; int models_min, models_max; gbt_status (*run)(const study_request *, gbt_error *); } studies[] = {
     {"speed", 1, 16, run_speed},
     {"crosscheck", 1, 16, run_crosscheck},
     {"rate", 1, 6, run_rate},
     {"stability", 0, 0, run_stability},
+    {"paper", 1, 16, run_paper},
+    {"time", 1, 16, run_time},
 };
 
 static int run(const command *self, int argc, char **argv)
 {
-    study_request request = {.def = gbt_study_def_default(), .stability = gbt_stability_def_default()};
+    study_request request = {.def = gbt_study_def_default(), .stability = gbt_stability_def_default(), .paper = gbt_paper_def_default(), .time = gbt_time_def_default()};
     bool quick = false;
     gbt_study_def *def = &request.def;
-    int threads = 0;
+    gbt_paper_def *paper = &request.paper;
+    int threads = 0, seeds = 0;
+    double downscale = 1;
     const option options[] = {
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &request.folder, .value_name = "DIR", .help = "folder for the tables and the chart", .required = true},
         {.name = "camera", .kind = OPTION_STRING, .value = &def->camera, .value_name = "FILE.json", .help = "the camera of every .ply; default: camera.json beside it"},
         {.name = "repeats", .kind = OPTION_INT, .value = &def->repeats, .min = 1, .max = 1000, .value_name = "N", .help = "speed: timed passes of each setting; the median counts"},
         {.name = "only", .kind = OPTION_STRING, .value = &request.stability.only, .value_name = "A1,A9", .help = "stability: these cases; default: all"},
         {.name = "quick", .kind = OPTION_FLAG, .value = &quick, .help = "stability: the smaller sizes of its tests"},
+        {.name = "iterations", .kind = OPTION_UINT64, .value = &paper->iterations, .min = 20, .max = 1e9, .value_name = "N", .help = "paper: steps of every run"},
+        {.name = "renderer", .kind = OPTION_CHOICE, .value = &paper->renderer, .choices = "raster|trace|per-ray", .help = "paper: what photos are compared with"},
+        {.name = "tables", .kind = OPTION_STRING, .value = &paper->tables, .value_name = "1,3", .help = "paper: which of its four"},
+        {.name = "budget", .kind = OPTION_DURATION, .value = &request.time.budget_seconds, .min = 1, .max = 1e6, .value_name = "TIME", .help = "time: of a run"},
+        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &downscale, .min = 1, .max = 64, .value_name = "F", .help = "paper, time: divide the photos' size by this"},
+        {.name = "seeds", .kind = OPTION_INT, .value = &seeds, .min = 0, .max = 10, .value_name = "N", .help = "paper, time: runs of each variant; 0: 3 and 1"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
     };
     operands named;
@@ -62,18 +85,22 @@ static int run(const command *self, int argc, char **argv)
     while (which < sizeof studies / sizeof *studies && strcmp(named.value[0], studies[which].name) != 0)
         which++;
     if (which == sizeof studies / sizeof *studies)
-        return command_misused("study: unknown study \"%.60s\" (wanted speed, crosscheck, rate or stability)", named.value[0]);
+        return command_misused("study: unknown study \"%.60s\" (wanted speed, crosscheck, rate, stability, paper or time)", named.value[0]);
     if (named.count - 1 < studies[which].models_min)
-        return command_misused("study %s: wanted a model", studies[which].name);
+        return command_misused("study %s: wanted a model, or data to train on", studies[which].name);
     if (named.count - 1 > studies[which].models_max)
-        return command_misused("study %s: \"%.60s\" is one model too many", studies[which].name, named.value[1 + studies[which].models_max]);
+        return command_misused("study %s: \"%.60s\" is one too many", studies[which].name, named.value[1 + studies[which].models_max]);
     if (threads > 0)
         gbt_set_threads(threads);
     request.stability.quick = quick;
-    def->models = named.value + 1, def->model_count = (size_t)named.count - 1;
+    def->models = paper->data = request.time.data = named.value + 1;
+    def->model_count = paper->data_count = request.time.data_count = (size_t)named.count - 1;
+    paper->downscale = request.time.downscale = downscale;
+    if (seeds > 0)
+        paper->seeds = request.time.seeds = seeds;
     gbt_error err = {0};
     return command_failed(studies[which].run(&request, &err), &err);
 }
 
-const command command_study = {.name = "study", .summary = "speed against accuracy, tracer against rasterizer, size against picture, or stability: measure, draw the chart",
-                               .usage = "speed|crosscheck|rate|stability [MODEL...] -o DIR", .run = run};
+const command command_study = {.name = "study", .summary = "speed against accuracy, tracer against rasterizer, size against picture, stability; the paper's tables, quality against time: measure, draw the chart",
+                               .usage = "speed|crosscheck|rate|stability|paper|time [MODEL|DATA...] -o DIR", .run = run};

@@ -1,16 +1,18 @@
 /* cli/cmd_train.c -- gbtrace train. */
+#include "cli/finish_run.h"
 #include "cli/options.h"
 #include "cli/train_options.h"
-#include "gbtrace/evaluate.h"
 
 static int run(const command *self, int argc, char **argv)
 {
     train_options t;
     train_options_init(&t);
     const char *output = NULL;
+    bool lossless = false;
     const option own[] = {
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &output, .value_name = "RUN", .help = "folder for the model, scores and report",
          .required = true},
+        {.name = "lossless", .kind = OPTION_FLAG, .value = &lossless, .help = "keep every bit of the model (see compress); the file is some seven times larger"},
     };
     option options[OPTIONS_MAX];
     const int count = train_options_table(&t, own, sizeof own / sizeof *own, options);
@@ -22,10 +24,8 @@ static int run(const command *self, int argc, char **argv)
     gbt_status status = train_options_finish(&t, "gbtrace train", argc, argv, &err);
     if (status == GBT_OK)
         status = gbt_train(data.value[0], output, &t.def, &err);
-    if (status == GBT_OK) {
-        const gbt_evaluate_def score = gbt_evaluate_def_default();
-        status = gbt_evaluate(output, &score, &err);
-    }
+    if (status == GBT_OK)
+        status = finish_run(output, lossless, &err);
     return command_failed(status, &err);
 }
 

@@ -14,7 +14,7 @@
 
 gbt_compress_def gbt_compress_def_default(void)
 {
-    return (gbt_compress_def){.quality = 55};
+    return (gbt_compress_def){.quality = 60};
 }
 
 /* What is reported. */
@@ -137,7 +137,7 @@ gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char
     gbt_status status = open_run(run, def, r, &has_views, err);
     if (status == GBT_OK)
         status = code_run(r, has_views, def, out, &c, err);
-    if (status == GBT_OK)
+    if (status == GBT_OK && report != NULL)
         print_report(&c, out, report);
     if (status == GBT_OK && def->json != NULL)
         status = save_report(&c, def, err);

@@ -42,7 +42,7 @@ static void colony_make(stability *s, colony *c, size_t count, double at, float 
             c->a.offset[15 * i + k] = rng_uniform(14, 10 + k, i);
         for (size_t k = 0; k < 5; k++)
             c->stats.grad_count[5 * i + k] = 100, c->stats.grad_accum[5 * i + k] = 100;
-        c->stats.visit_count[i] = 100, c->stats.opacity_accum[i] = 100 * opacity * (1 + rng_uniform(14, 30, i));
+        c->stats.visit_count[i] = 100, c->stats.use_accum[i] = 100 * opacity * (1 + rng_uniform(14, 30, i));
     }
 }
 

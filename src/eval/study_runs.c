@@ -32,10 +32,10 @@ static void make_slug(const char *name, char *out, size_t size)
     out[i] = '\0';
 }
 
-gbt_status study_runs_folder(const char *folder, const char *scene, const char *variant, uint64_t seed, char *out, size_t size, gbt_error *err)
+gbt_status study_runs_folder(const char *folder, const char *data_name, const char *variant, uint64_t seed, char *out, size_t size, gbt_error *err)
 {
     char place[STUDY_NAME_SIZE], what[STUDY_NAME_SIZE];
-    make_slug(scene, place, sizeof place);
+    make_slug(data_name, place, sizeof place);
     make_slug(variant, what, sizeof what);
     if (snprintf(out, size, "%s/runs/%s/%s/seed-%llu", folder, place, what, (unsigned long long)seed) >= (int)size)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", folder);
@@ -52,9 +52,13 @@ gbt_status study_runs_names(const char *const *data, size_t count, char names[][
             return base_fail(err, GBT_ERR_IO, "%.400s: no such data set", data[i]);
         snprintf(names[i], STUDY_NAME_SIZE, "%s", strrchr(whole, '/') + 1);
         free(whole);
-        for (size_t j = 0; j < i; j++)
-            if (strcmp(names[i], names[j]) == 0)
-                return base_fail(err, GBT_ERR_ARGUMENT, "study: two data sets are called %.200s; their runs would share a folder", names[i]);
+        char slug[STUDY_NAME_SIZE], other[STUDY_NAME_SIZE];
+        make_slug(names[i], slug, sizeof slug);
+        for (size_t j = 0; j < i; j++) {
+            make_slug(names[j], other, sizeof other);
+            if (strcmp(slug, other) == 0)
+                return base_fail(err, GBT_ERR_ARGUMENT, "study: two data sets are called %.200s; their runs would share a folder", slug);
+        }
     }
     return GBT_OK;
 }
@@ -76,7 +80,7 @@ static void settings_text(const char *data, const gbt_train_def *def, char *out,
 static bool read_number(const json_t *object, const char *field, double *out)
 {
     const json_t *value = json_object_get(object, field);
-    *out = json_is_number(value) ? json_number_value(value) : NAN;
+    *out = json_is_number(value) ? json_number_value(value) : (double)NAN;
     return json_is_number(value);
 }
 
@@ -186,13 +190,23 @@ static void remove_checkpoints(const char *run)
             remove(path);
 }
 
+/* An interrupted run starts anew: sums and scores taken in passing are not in its checkpoint. */
+static gbt_status train(const char *data, const char *run, const gbt_train_def *def, gbt_error *err)
+{
+    gbt_error why = {0};
+    const gbt_status status = gbt_train(data, run, def, &why);
+    if (status == GBT_ERR_INTERRUPTED)
+        return base_fail(err, status, "%.400s: interrupted; the same command goes on with this run", run);
+    return status == GBT_OK ? GBT_OK : base_fail(err, status, "%s", why.text);
+}
+
 static gbt_status make_run(const char *data, const char *run, const gbt_train_def *def, const char *study_path, const char *settings, gbt_error *err)
 {
     gbt_evaluate_def evaluate = gbt_evaluate_def_default();
     evaluate.report = 0;
     study_figures measured;
     unlink(study_path);
-    GBT_TRY(gbt_train(data, run, def, err));
+    GBT_TRY(train(data, run, def, err));
     GBT_TRY(gbt_evaluate(run, &evaluate, err));
     GBT_TRY(measure(run, &measured, err));
     remove_checkpoints(run);
@@ -212,4 +226,19 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
     log_info("%s", run);
     GBT_TRY(make_run(data, run, def, study_path, settings, err));
     return read_run(study_path, metrics_path, settings, out) ? GBT_OK : base_fail(err, GBT_ERR_INTERNAL, "%.400s: the run cannot be read back", run);
+}
+
+gbt_status study_texts_save(study_texts *texts, const char *folder, const char *name, FILE *out)
+{
+    const struct { const char *suffix; text *body; } files[] = {{"csv", &texts->csv}, {"svg", &texts->charts}, {"md", &texts->page}};
+    gbt_status status = GBT_OK;
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        char file[STUDY_NAME_SIZE];
+        snprintf(file, sizeof file, "%s.%s", name, files[i].suffix);
+        if (files[i].body == &texts->page && files[i].body->status == GBT_OK)
+            fwrite(texts->page.bytes, 1, texts->page.length, out);
+        const gbt_status saved = text_save(files[i].body, folder, file);
+        status = status == GBT_OK ? saved : status;
+    }
+    return status;
 }

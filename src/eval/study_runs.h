@@ -1,7 +1,10 @@
-/* eval/study_runs.h -- one training run of a study: made, or taken from an earlier call; its figures read back. */
+/* eval/study_runs.h -- the training runs of a study: made, or taken from an earlier call; their figures read back; what is said of them saved. */
 #ifndef GBT_EVAL_STUDY_RUNS_H
 #define GBT_EVAL_STUDY_RUNS_H
 
+#include <stdio.h>
+
+#include "eval/report_text.h"
 #include "gbtrace/train.h"
 
 enum { STUDY_SCENES_MAX = 16, STUDY_SEEDS_MAX = 10, STUDY_NAME_SIZE = 256, STUDY_MARKS_MAX = GBT_TRAIN_MAX_EVALS };
@@ -21,7 +24,7 @@ typedef struct study_figures {
 } study_figures;
 
 /** FOLDER/runs/SCENE/VARIANT/seed-S, where everything in a name but letters, digits, '.' and '_' becomes '-'. */
-gbt_status study_runs_folder(const char *folder, const char *scene, const char *variant, uint64_t seed, char *out, size_t size, gbt_error *err);
+gbt_status study_runs_folder(const char *folder, const char *data_name, const char *variant, uint64_t seed, char *out, size_t size, gbt_error *err);
 
 /**
  * What data sets are called: the last parts of their paths.
@@ -38,5 +41,13 @@ gbt_status study_runs_names(const char *const *data, size_t count, char names[][
  * @return as gbt_train() and gbt_evaluate(); what was found of another run is lost only when this one starts
  */
 gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def *def, study_figures *out, gbt_error *err);
+
+/** What a study has to say. Each starts from {.err = err}. */
+typedef struct study_texts {
+    text csv, page, charts;
+} study_texts;
+
+/** NAME.csv, NAME.md and NAME.svg into `folder`, the page to `out` too. Frees them, whatever happens. */
+gbt_status study_texts_save(study_texts *texts, const char *folder, const char *name, FILE *out);
 
 #endif

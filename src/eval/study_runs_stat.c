@@ -35,15 +35,31 @@ bool stat_is_apart(const stat_sample *s, double value)
     return fabs(s->mean - value) > stat_half_width(s) + 1e-12 * fabs(value); /* false when the width is NaN; sums of equal numbers round */
 }
 
-void stat_add(text *out, const stat_sample *s, int decimals, bool sign)
+void stat_add_change(text *out, double value, int decimals)
 {
-    if (!isfinite(s->mean)) {
-        text_add(out, "n/a");
-        return;
-    }
-    text_format(out, sign ? "%+.*f" : "%.*f", decimals, s->mean);
+    const double least = 0.5 * pow(10, -decimals); /* what rounds to zero has no sign */
+    text_format(out, fabs(value) < least ? "%.*f" : "%+.*f", decimals, fabs(value) < least ? 0 : value);
+}
+
+void stat_add(text *out, const stat_sample *s, int decimals, bool is_change)
+{
+    if (is_change && isfinite(s->mean))
+        stat_add_change(out, s->mean, decimals);
+    else
+        text_number(out, s->mean, decimals);
     if (isfinite(s->deviation))
         text_format(out, " ± %.*f", decimals, s->deviation);
+}
+
+void stat_csv_text(text *out, const char *outside)
+{
+    text_add(out, "\"");
+    for (const char *c = outside; *c != '\0'; c++)
+        if (*c == '"')
+            text_add(out, "\"\"");
+        else
+            text_format(out, "%c", *c);
+    text_add(out, "\"");
 }
 
 json_t *stat_number(double value)

@@ -22,8 +22,14 @@ double stat_half_width(const stat_sample *s);
 /** Is `value` outside the 95 % interval of the mean? Never below two values; without spread, when it is not the mean. */
 bool stat_is_apart(const stat_sample *s, double value);
 
-/** "1.23 ± 0.04"; without a spread the mean alone; "n/a" without a mean. `sign`: the mean has its sign even when positive. */
-void stat_add(text *out, const stat_sample *s, int decimals, bool sign);
+/** "1.23 ± 0.04"; without a spread the mean alone; "n/a" without a mean. A change has its sign even when positive. */
+void stat_add(text *out, const stat_sample *s, int decimals, bool is_change);
+
+/** "+1.23", "-1.23", "0.00" for what rounds to that; `value` is finite. */
+void stat_add_change(text *out, double value, int decimals);
+
+/** Any text as a quoted field of a CSV file. */
+void stat_csv_text(text *out, const char *outside);
 
 /** {"mean", "deviation", "count"}; null for what is not finite. */
 json_t *stat_to_json(const stat_sample *s);

@@ -26,7 +26,8 @@ adaptive_def adaptive_def_default(void);
  * @param out      [out] free with balls_free(); in the order of the tree, left before right; zeroed on failure
  * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, non-finite point, colour outside [0, 1]: says which), GBT_ERR_NO_MEMORY
  *
- * Threads: same bits for every thread count. Cost: O(n log balls_max) time on one thread where cuts are even, 49 n bytes of scratch.
+ * Threads: same bits for every thread count. Cost: O(n log balls_max) time on one thread where cuts are even, 25 n + 24 balls_max bytes of
+ * scratch.
  */
 gbt_status balls_adapt(const float *position, const float *color, size_t count, const adaptive_def *def, balls *out, gbt_error *err);
 

@@ -77,7 +77,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     container_add(&w, "networks", CONTAINER_F32, 1, &n, t->decoder.params);
     container_add(&w, "networks.moment1", CONTAINER_F32, 1, &n, t->params_m);
     container_add(&w, "networks.moment2", CONTAINER_F32, 1, &n, t->params_v);
-    container_add(&w, "stats.opacity_accum", CONTAINER_F32, 1, &rows, t->stats.opacity_accum);
+    container_add(&w, "stats.use_accum", CONTAINER_F32, 1, &rows, t->stats.use_accum);
     container_add(&w, "stats.visit_count", CONTAINER_F32, 1, &rows, t->stats.visit_count);
     container_add(&w, "stats.grad_accum", CONTAINER_F32, 2, (const size_t[]){rows, k}, t->stats.grad_accum);
     container_add(&w, "stats.grad_count", CONTAINER_F32, 2, (const size_t[]){rows, k}, t->stats.grad_count);
@@ -132,7 +132,7 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     GBT_TRY(container_get(c, "networks.moment1", CONTAINER_F32, n, t->params_m, err));
     GBT_TRY(container_get(c, "networks.moment2", CONTAINER_F32, n, t->params_v, err));
     GBT_TRY(adjust_stats_resize(&t->stats, rows, t->def.offsets, err));
-    GBT_TRY(container_get(c, "stats.opacity_accum", CONTAINER_F32, rows, t->stats.opacity_accum, err));
+    GBT_TRY(container_get(c, "stats.use_accum", CONTAINER_F32, rows, t->stats.use_accum, err));
     GBT_TRY(container_get(c, "stats.visit_count", CONTAINER_F32, rows, t->stats.visit_count, err));
     GBT_TRY(container_find(c, "stats.grad_accum", CONTAINER_F32, 2, (size_t[]){rows, k}, &data, err));
     memcpy(t->stats.grad_accum, data, rows * k * sizeof(float));

@@ -207,8 +207,9 @@ gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const im
                           float *d_params, gbt_error *err)
 {
     double clock = clock_wall();
+    GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen, "weights", err));
     if (f->draw.renderer == FRAME_TRACE)
-        GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, NULL, NULL, err));
+        GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, f->seen, NULL, err));
     else
         GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, NULL, err));
     if (f->widened)
@@ -231,6 +232,7 @@ void frame_free(frame *f)
     ray_image_free(&f->rays);
     mem_free(f->visible);
     mem_free(f->pixel_min);
+    mem_free(f->seen);
     gaussians_free(&f->gaussians);
     gaussians_free(&f->wide);
     gaussians_free(&f->d_gaussians);

@@ -79,7 +79,7 @@ static void two_candidates_in_one_cell(void **state) /* T6 */
         assert_true(fabs((double)sc.a.scale_log[12 + c] - log(16.0)) < 1e-6 && sc.a.offset[12 + c] == 0.0f);
     for (size_t i = 0; i < 32; i++)
         assert_true(sc.a.feature[64 + i] == fmaxf(sc.a.feature[i], sc.a.feature[32 + i]));
-    assert_true(sc.s.visit_count[2] == 0 && sc.s.opacity_accum[2] == 0 && sc.s.grad_count[4] == 0 && sc.s.grad_accum[5] == 0);
+    assert_true(sc.s.visit_count[2] == 0 && sc.s.use_accum[2] == 0 && sc.s.grad_count[4] == 0 && sc.s.grad_accum[5] == 0);
     free_scene(&sc, &r);
 }
 
@@ -102,7 +102,7 @@ static void prunes(void **state)
 {
     const prune_case *c = *state;
     scene sc = empty_scene(2, 1); /* anchor 0 keeps the scene from becoming empty */
-    sc.s.opacity_accum[1] = c->accum, sc.s.visit_count[1] = c->visits;
+    sc.s.use_accum[1] = c->accum, sc.s.visit_count[1] = c->visits;
     adjust_def def = adjust_def_default();
     def.voxel_size = 1.0f;
     adjust_result r;
@@ -110,7 +110,7 @@ static void prunes(void **state)
     assert_int_equal(r.pruned, c->pruned);
     assert_int_equal(sc.a.count, c->pruned ? 1 : 2);
     if (!c->pruned) {
-        assert_true(sc.s.opacity_accum[1] == (c->reset ? 0 : c->accum));
+        assert_true(sc.s.use_accum[1] == (c->reset ? 0 : c->accum));
         assert_true(sc.s.visit_count[1] == (c->reset ? 0 : c->visits));
     }
     free_scene(&sc, &r);
@@ -255,7 +255,7 @@ static void the_last_anchor_stays(void **state)
     (void)state;
     scene sc = empty_scene(3, 1);
     for (size_t i = 0; i < 3; i++)
-        sc.s.visit_count[i] = 100, sc.s.opacity_accum[i] = i == 1 ? 0.2f : 0.1f, sc.a.position[i * 3] = (float)i;
+        sc.s.visit_count[i] = 100, sc.s.use_accum[i] = i == 1 ? 0.2f : 0.1f, sc.a.position[i * 3] = (float)i;
     adjust_def def = adjust_def_default();
     def.voxel_size = 1.0f;
     adjust_result r;
@@ -416,7 +416,7 @@ static scene random_scene(uint64_t seed, size_t count, int offset_count)
     assert_ok(adjust_stats_resize(&sc.s, count, offset_count, NULL));
     for (size_t i = 0; i < count; i++) {
         sc.s.visit_count[i] = floorf(spread(seed, 50, i, 0, 160));
-        sc.s.opacity_accum[i] = sc.s.visit_count[i] * spread(seed, 51, i, 0, 0.02f);
+        sc.s.use_accum[i] = sc.s.visit_count[i] * spread(seed, 51, i, 0, 0.02f);
     }
     for (size_t i = 0; i < count * (size_t)offset_count; i++) {
         sc.s.grad_count[i] = floorf(spread(seed, 52, i, 0, 80));
@@ -449,7 +449,7 @@ static void adjust_agrees_with_brute_force(void **state)
         const size_t k = (size_t)offset_count;
         for (size_t i = 0; i < count; i++) {
             const bool is_judged = before.s.visit_count[i] > 80;
-            const bool transparent = before.s.opacity_accum[i] < 0.005f * before.s.visit_count[i];
+            const bool transparent = before.s.use_accum[i] < 0.005f * before.s.visit_count[i];
             if (is_judged && transparent && (row >= r.count || r.source[row] != (int64_t)i)) /* the last one may have stayed */
                 continue;
             assert_int_equal(r.source[row], i);
@@ -458,7 +458,7 @@ static void adjust_agrees_with_brute_force(void **state)
             assert_memory_equal(sc.a.scale_log + row * 6, before.a.scale_log + i * 6, 6 * sizeof(float));
             assert_memory_equal(sc.a.position + row * 3, before.a.position + i * 3, 3 * sizeof(float));
             assert_true(sc.s.visit_count[row] == (is_judged ? 0 : before.s.visit_count[i]));
-            assert_true(sc.s.opacity_accum[row] == (is_judged ? 0 : before.s.opacity_accum[i]));
+            assert_true(sc.s.use_accum[row] == (is_judged ? 0 : before.s.use_accum[i]));
             for (size_t j = 0; j < k; j++) {
                 const bool sampled = before.s.grad_count[i * k + j] > 40;
                 assert_true(sc.s.grad_count[row * k + j] == (sampled ? 0 : before.s.grad_count[i * k + j]));

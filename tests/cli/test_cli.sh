@@ -243,11 +243,13 @@ prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.00
 misuse 2 '--kernel: "tile,tile" (wanted tile, single or embree, or some of them with commas between)' $bench --kernel tile,tile
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
 misuse 2 "--camera: missing (a .ply has no cameras)" bench trace --model gaussians.ply
-misuse 2 'study: unknown study "pace" (wanted speed, crosscheck, rate or stability)' study pace gaussians.ply -o study
-misuse 2 "argument missing (usage: gbtrace study speed|crosscheck|rate|stability [MODEL...] -o DIR)" study -o study
-misuse 2 "study crosscheck: wanted a model" study crosscheck -o study
-misuse 2 'study stability: "gaussians.ply" is one model too many' study stability gaussians.ply -o study
+misuse 2 'study: unknown study "pace" (wanted speed, crosscheck, rate, stability, paper or time)' study pace gaussians.ply -o study
+misuse 2 "argument missing (usage: gbtrace study speed|crosscheck|rate|stability|paper|time [MODEL|DATA...] -o DIR)" study -o study
+misuse 2 "study crosscheck: wanted a model, or data to train on" study crosscheck -o study
+misuse 2 'study stability: "gaussians.ply" is one too many' study stability gaussians.ply -o study
 misuse 2 'study stability: "A99" is not a list of different cases (wanted some of A1 to A18, as A1,A9)' study stability --only A99 -o study
+misuse 2 '--tables: "1,5" (wanted some of 1,2,3,4)' study paper made -o study --tables 1,5
+misuse 2 "study: two data sets are called made; their runs would share a folder" study time made made -o study
 "$program" study speed gaussians.ply -o study --repeats 1 >out 2>err
 got=$?
 [ "$got" = 0 ] && [ "$(grep -c '^| preset | [a-z]* | [0-9.]* | [0-9.]* | [0-9.]* | [0-9.]* | [0-9]* | [0-9.]* | [0-9.e-]* | n/a |$' out)" = 3 ] && cmp -s out study/speed.md
@@ -263,7 +265,7 @@ got=$?
 report $? "study crosscheck: every row within its limit" "  got $got: $(cat err out)"
 
 # ---- what is rendered beside the picture
-if "$program" train made -o run --iterations 3 >out 2>err; then
+if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     outputs=transmittance,depth,median-depth,normal,hits,anchor
     "$program" render run -o pictures --outputs $outputs --preset exact >out 2>err
     got=$?
@@ -284,6 +286,8 @@ if "$program" train made -o run --iterations 3 >out 2>err; then
         "$program" render small.gbt -o pictures-small >>out 2>>err && "$program" render same.gbt -o pictures-same >>out 2>>err &&
         cmp -s pictures-small/*.png pictures-same/*.png
     report $? "a small model is read as a large one, and keeps every bit without loss" "$(cat err out)"
+    "$program" train made -o run-small --iterations 3 >out 2>err && cmp -s small.gbt run-small/model.gbt
+    report $? "train leaves the small model, unless it shall be lossless" "$(cat err out)"
     mv made moved && "$program" compress run -o alone.gbt >out 2>err && grep -q '(steps: the model alone)$' out && grep -q '^made is not there: ' err &&
         "$program" info alone.gbt >>out 2>>err
     report $? "a model without its data set becomes small too" "$(cat err out)"

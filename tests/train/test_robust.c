@@ -260,7 +260,7 @@ static learned snapshot(const trainer *t)
     const float *networks[] = {t->decoder.params, t->params_m, t->params_v};
     for (int i = 0; i < 3; i++)
         append(&out, networks[i], t->decoder.param_count);
-    append(&out, t->stats.opacity_accum, t->stats.count);
+    append(&out, t->stats.use_accum, t->stats.count);
     append(&out, t->stats.visit_count, t->stats.count);
     append(&out, t->stats.grad_accum, t->stats.count * (size_t)t->stats.offset_count);
     const float *exposure[] = {t->exposures.matrix, t->exposures.moment1, t->exposures.moment2};

@@ -1,0 +1,19 @@
+/* cli/finish_run.c -- a small model, scores, a report. */
+#include "cli/finish_run.h"
+
+#include <stdio.h>
+
+#include "gbtrace/compress.h"
+#include "gbtrace/evaluate.h"
+
+gbt_status finish_run(const char *run, bool lossless, gbt_error *err)
+{
+    char model[4096];
+    gbt_status status = GBT_OK;
+    if (!lossless && snprintf(model, sizeof model, "%s/model.gbt", run) < (int)sizeof model) {
+        const gbt_compress_def small = gbt_compress_def_default();
+        status = gbt_compress(run, &small, model, NULL, err);
+    }
+    const gbt_evaluate_def score = gbt_evaluate_def_default();
+    return status == GBT_OK ? gbt_evaluate(run, &score, err) : status;
+}

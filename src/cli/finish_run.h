@@ -1,0 +1,12 @@
+/* cli/finish_run.h -- what follows training, for every command that trains. */
+#ifndef GBT_CLI_FINISH_RUN_H
+#define GBT_CLI_FINISH_RUN_H
+
+#include <stdbool.h>
+
+#include "gbtrace/status.h"
+
+/** Make RUN/model.gbt small, unless `lossless`; then score the held-out views with what it gives back, and write the report. */
+gbt_status finish_run(const char *run, bool lossless, gbt_error *err);
+
+#endif

@@ -120,8 +120,11 @@ bool paper_published_range(const paper_claim *claim, double range[2]);
 
 /* ---- out ------------------------------------------------------------------------------------------------------------------------ */
 
-/** What a change says: "agrees with the paper", ... */
-const char *paper_verdict(const stat_sample *ours, double published);
+/** What a change says beside the paper's: "agrees with the paper", ... */
+const char *paper_verdict(const stat_sample *ours, const paper_claim *claim);
+
+/** The same, of its numbers; `range`: from the smallest to the largest of the paper's scenes. `published` is NaN without one. */
+const char *paper_verdict_of(const stat_sample *ours, double published, const double range[2]);
 
 void paper_tables(const paper_study *s, text *out); /* Markdown */
 void paper_csv(const paper_study *s, text *out);

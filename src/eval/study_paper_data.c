@@ -68,7 +68,7 @@ static void add_change_rows(const paper_study *s, json_t *rows)
                      paper_figure_texts[claim->figure].change_name);
             json_array_append_new(rows, json_pack("{s:o,s:n,s:o,s:n,s:o,s:o,s:s}", "row", json_text(row), "limit", "value", stat_number(ours.mean),
                                                   "pass", "ours", stat_to_json(&ours), "paper", stat_number(published), "says",
-                                                  paper_verdict(&ours, published)));
+                                                  paper_verdict(&ours, claim)));
         }
     }
 }

@@ -52,7 +52,7 @@ static void add_figures(const paper_study *s, int table, text *out)
 
 /* ---- changes ---------------------------------------------------------------------------------------------------------------------- */
 
-const char *paper_verdict(const stat_sample *ours, double published)
+const char *paper_verdict_of(const stat_sample *ours, double published, const double range[2])
 {
     const bool has_paper = isfinite(published);
     if (!isfinite(ours->mean))
@@ -71,7 +71,16 @@ const char *paper_verdict(const stat_sample *ours, double published)
         return "the other way than the paper";
     if (!stat_is_apart(ours, published))
         return "agrees with the paper";
+    if (ours->mean >= range[0] && ours->mean <= range[1])
+        return "within the range of the paper's scenes";
     return fabs(ours->mean) < fabs(published) ? "the same way as the paper, but less" : "the same way as the paper, and more";
+}
+
+const char *paper_verdict(const stat_sample *ours, const paper_claim *claim)
+{
+    double range[2];
+    paper_published_range(claim, range); /* an empty one, from infinity down, holds nothing */
+    return paper_verdict_of(ours, paper_published(claim), range);
 }
 
 static void add_change_row(const paper_study *s, const paper_claim *claim, text *out)
@@ -95,7 +104,7 @@ static void add_change_row(const paper_study *s, const paper_claim *claim, text 
     text_add(out, " | ");
     if (paper_published_range(claim, range) && range[0] < range[1])
         text_format(out, "%+.*f to %+.*f", figure->change_decimals, range[0], figure->change_decimals, range[1]);
-    text_format(out, " | %s |\n", paper_verdict(&all, published));
+    text_format(out, " | %s |\n", paper_verdict(&all, claim));
 }
 
 static void add_changes(const paper_study *s, int table, text *out)

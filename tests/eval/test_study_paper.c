@@ -98,6 +98,8 @@ static void verdicts(void **state)
     (void)state;
     const struct { double ours[3]; size_t count; double paper; const char *wanted; } cases[] = {
         {{-9, -10, -11}, 3, -10, "agrees with the paper"},
+        {{-11.9, -12, -12}, 3, -10, "within the range of the paper's scenes"},
+        {{-12.1, -12.1, -12.1}, 3, -10, "the same way as the paper, and more"},
         {{-3, -3.1, -3.2}, 3, -10, "the same way as the paper, but less"},
         {{-20, -21, -22}, 3, -10, "the same way as the paper, and more"},
         {{3, 3.1, 3.2}, 3, -10, "the other way than the paper"},
@@ -111,7 +113,7 @@ static void verdicts(void **state)
         {{NAN}, 1, -10, "not measured"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const stat_sample s = stat_of(cases[i].ours, cases[i].count);
-        assert_string_equal(paper_verdict(&s, cases[i].paper), cases[i].wanted);
+        assert_string_equal(paper_verdict_of(&s, cases[i].paper, (const double[]){-12, -8}), cases[i].wanted);
     }
 }
 

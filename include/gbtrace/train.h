@@ -15,8 +15,7 @@ extern "C" {
 enum { GBT_TRAIN_MAX_EVALS = 16 };
 
 typedef struct gbt_train_def {
-    const char *init;           /* "gb" (the paper's granular balls), "adaptive" (balls where the scene needs them), "voxel", "random" points; "auto": adaptive,
-                                   or gb with compat. Default "auto" */
+    const char *init;           /* "gb" (the paper's granular balls, default), "adaptive" (balls where the scene needs them), "voxel", "random" points */
     double init_count;          /* anchors per point of adaptive and random, (0, 1]. Default 0.25 */
     const char *scale_prior;    /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use "nn" */
     int max_depth;              /* D_max of the balls, [0, 64]. Default 18 */

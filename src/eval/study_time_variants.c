@@ -11,7 +11,7 @@ const time_variant time_variants[] = {
     {"first scales x 1", "scale-factor = 1", 1},
     {"no growth", "grow = 0", 1},
     {"K = 10", "offsets = 10", 1},
-    {"balls of the paper", "init = gb\nscale-prior = gb", 1},
+    {"adaptive balls", "init = adaptive", 1},
     {"voxels", "init = voxel", 1},
     {"splats", "renderer = raster", 1},
 };

@@ -24,7 +24,7 @@ static const double ball_scale_factor = 2, spacing_scale_factor = 1.2;
 
 gbt_train_def gbt_train_def_default(void)
 {
-    return (gbt_train_def){.init = "auto",
+    return (gbt_train_def){.init = "gb",
                            .init_count = anchor_init_def_default().fraction,
                            .scale_prior = "gb",
                            .max_depth = 18,
@@ -49,8 +49,8 @@ static gbt_status check_def(const gbt_train_def *d, gbt_error *err)
     if (d->cookie_ != 0x67627431)
         return base_fail(err, GBT_ERR_ARGUMENT, "train: the def was not made by gbt_train_def_default()");
     anchor_init_kind unused_kind;
-    if (strcmp(d->init, "auto") != 0 && !anchor_init_kind_named(d->init, &unused_kind))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--init: \"%.40s\" (wanted auto, gb, adaptive, voxel or random)", d->init);
+    if (!anchor_init_kind_named(d->init, &unused_kind))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--init: \"%.40s\" (wanted gb, adaptive, voxel or random)", d->init);
     if (!(d->init_count > 0 && d->init_count <= 1))
         return base_fail(err, GBT_ERR_ARGUMENT, "--init-count: %g (wanted more than 0, up to 1)", d->init_count);
     if (strcmp(d->scale_prior, "gb") != 0 && strcmp(d->scale_prior, "nn") != 0)
@@ -289,8 +289,6 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->def = *def;
     if (def->offsets == 0)
         t->def.offsets = def->compat ? 10 : default_offsets;
-    if (strcmp(def->init, "auto") == 0)
-        t->def.init = def->compat ? "gb" : "adaptive";
     if (def->scale_factor == 0) {
         const bool from_balls = strcmp(t->def.init, "gb") == 0 && strcmp(def->scale_prior, "gb") == 0;
         t->def.scale_factor = def->compat ? 1 : from_balls ? ball_scale_factor : spacing_scale_factor;

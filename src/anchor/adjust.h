@@ -8,7 +8,7 @@
 typedef struct adjust_stats {
     size_t count, capacity;
     int offset_count;
-    float *use_accum;      /* [count] sum over views of what the anchor was good for: decoded opacities, or pixels covered (sum over rays of T alpha) */
+    float *use_accum;      /* [count] sum over views of what the anchor was good for: decoded opacities, or shares of the picture (mean over rays of T alpha) */
     float *visit_count;    /* [count] views in which the anchor was visible */
     float *grad_accum;     /* [count][K] sum of screen-space gradient norms */
     float *grad_count;     /* [count][K] views in which the Gaussian was geometrically visible */

@@ -16,7 +16,7 @@
 anchor_init_def anchor_init_def_default(void)
 {
     return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .fraction = 0.25, .balls = balls_def_default(),
-                             .offset_count = 10, .fusion = 0.5f, .clip_min = 0.25f, .clip_max = 4.0f, .scale_max = INFINITY};
+                             .offset_count = 10, .fusion = 0.5f, .clip_min = 0.25f, .clip_max = 4.0f, .scale_factor = 1.0f, .scale_max = INFINITY};
 }
 
 bool anchor_init_kind_named(const char *name, anchor_init_kind *out)
@@ -41,15 +41,16 @@ static gbt_status check_def(const anchor_init_def *def, gbt_error *err)
     if (!(def->clip_min >= 0.0f && def->clip_min <= def->clip_max))
         return base_fail(err, GBT_ERR_ARGUMENT, "anchors: clip %g to %g (wanted 0 <= min <= max)", (double)def->clip_min,
                          (double)def->clip_max);
-    if (!(def->scale_max > 0.0f))
-        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: scale_max %g (wanted > 0)", (double)def->scale_max);
+    if (!(def->scale_max > 0.0f && def->scale_factor > 0.0f && def->scale_factor < HUGE_VALF))
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: scale_max %g, scale_factor %g (wanted > 0)", (double)def->scale_max,
+                         (double)def->scale_factor);
     return GBT_OK;
 }
 
-/* All six log-scales of an anchor. The cap wins over the floor. */
-static void set_scale(anchors *a, size_t i, double scale, double floor_scale, double scale_max)
+/* All six log-scales of an anchor. The cap wins over floor and factor. */
+static void set_scale(anchors *a, size_t i, double scale, double floor_scale, const anchor_init_def *def)
 {
-    const float value = (float)log(fmin(fmax(scale, floor_scale), scale_max));
+    const float value = (float)log(fmin((double)def->scale_factor * fmax(scale, floor_scale), (double)def->scale_max));
     for (size_t c = 0; c < 6; c++)
         a->scale_log[i * 6 + c] = value;
 }
@@ -67,7 +68,7 @@ static gbt_status scale_from_spacing(anchors *a, const anchor_init_def *def, gbt
     if (status != GBT_OK)
         goto done;
     for (size_t i = 0; i < a->count; i++)
-        set_scale(a, i, (double)(a->count > 1 ? spacing[i] : def->balls.voxel_size), sqrt(1e-7), (double)def->scale_max);
+        set_scale(a, i, (double)(a->count > 1 ? spacing[i] : def->balls.voxel_size), sqrt(1e-7), def);
 done:
     mem_free(spacing);
     point_tree_free(tree);
@@ -96,7 +97,7 @@ static void prior_block(size_t block, size_t begin, size_t end, void *context)
         const bool spaced = point_tree_nearest(job->tree, job->a->position + i * 3, 1, i, &index, &square) == 1 && square > 0;
         const double near = spaced ? sqrt(square) : radius; /* lone or coincident: the radius is all that is known */
         const double clipped = fmin(fmax(radius, (double)def->clip_min * near), (double)def->clip_max * near);
-        set_scale(job->a, i, (double)def->fusion * near + (1.0 - (double)def->fusion) * clipped, job->floor_scale, (double)def->scale_max);
+        set_scale(job->a, i, (double)def->fusion * near + (1.0 - (double)def->fusion) * clipped, job->floor_scale, def);
     }
 }
 

@@ -24,6 +24,7 @@ typedef struct anchor_init_def {
     int offset_count;             /* K, default 10 */
     float fusion;                 /* alpha, eq 34: weight of the neighbour scale. Default 0.5 */
     float clip_min, clip_max;     /* lambda_min, lambda_max, eq 33: defaults 0.25 and 4 */
+    float scale_factor;           /* of the first scales, > 0: wider ones overlap. Default 1 */
     float scale_max;              /* largest initial scale, scene units; isolated points would get huge ones. Default infinity */
 } anchor_init_def;
 anchor_init_def anchor_init_def_default(void);
@@ -36,7 +37,7 @@ bool anchor_init_kind_named(const char *name, anchor_init_kind *out);
  *
  * ANCHOR_SCALE_NN: root mean square distance to the 3 nearest anchors (or as many as there are), floor sqrt(1e-7); a lone anchor takes
  * the voxel size. ANCHOR_SCALE_GB: eqs 29-34 with the nearest anchor, floor max(gamma v, 1e-6); an anchor that is alone or coincides with
- * another takes its ball's radius for the spacing. scale_max wins over both floors. No points give no anchors.
+ * another takes its ball's radius for the spacing. Then all are multiplied by scale_factor; scale_max wins over floors and factor. No points give no anchors.
  *
  * @param position  [in] [count][3], finite
  * @param color     [in] [count][3] in [0, 1], or NULL

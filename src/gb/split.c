@@ -6,49 +6,21 @@
 #include <stdlib.h>
 
 #include "base/parallel.h"
+#include "base/symmetric.h"
 
 enum { KEY_BLOCK = 8192 };
-
-/* One Jacobi rotation that makes a[p][q] zero; `v` collects the rotations in its columns. */
-static void rotate(double a[3][3], double v[3][3], int p, int q)
-{
-    if (a[p][q] == 0)
-        return;
-    /* theta may overflow to infinity when a[p][q] is tiny: t is then 0 and the rotation is the identity, as it should be. */
-    const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-    const double t = copysign(1.0, theta) / (fabs(theta) + sqrt(theta * theta + 1));
-    const double c = 1 / sqrt(t * t + 1), s = t * c;
-    const double apq = a[p][q];
-    const int r = 3 - p - q;
-    a[p][p] -= t * apq, a[q][q] += t * apq;
-    a[p][q] = a[q][p] = 0;
-    const double arp = a[r][p], arq = a[r][q];
-    a[r][p] = a[p][r] = c * arp - s * arq;
-    a[r][q] = a[q][r] = s * arp + c * arq;
-    for (int k = 0; k < 3; k++) {
-        const double vp = v[k][p], vq = v[k][q];
-        v[k][p] = c * vp - s * vq;
-        v[k][q] = s * vp + c * vq;
-    }
-}
 
 void split_axes(const double covariance[6], double axes[3][3])
 {
     double largest = 0;
     for (int k = 0; k < 6; k++)
         largest = fmax(largest, fabs(covariance[k]));
-    /* Scaled so that the threshold below is relative and nothing over- or underflows, whatever the units of the cloud. */
+    /* Scaled so that nothing over- or underflows, whatever the units of the cloud. */
     const double unit = largest > 0 ? largest : 1;
     const double xx = covariance[0] / unit, xy = covariance[1] / unit, xz = covariance[2] / unit;
     const double yy = covariance[3] / unit, yz = covariance[4] / unit, zz = covariance[5] / unit;
-    double a[3][3] = {{xx, xy, xz}, {xy, yy, yz}, {xz, yz, zz}};
-    double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    /* Convergence is quadratic: 4 to 6 sweeps; the bound only states that the loop ends. */
-    for (int sweep = 0; sweep < 32 && fabs(a[0][1]) + fabs(a[0][2]) + fabs(a[1][2]) > 1e-18; sweep++) {
-        rotate(a, v, 0, 1);
-        rotate(a, v, 0, 2);
-        rotate(a, v, 1, 2);
-    }
+    double a[3][3] = {{xx, xy, xz}, {xy, yy, yz}, {xz, yz, zz}}, v[3][3];
+    symmetric_eigen(&a[0][0], &v[0][0], 3, 1e-18);
     int order[3] = {0, 1, 2};
     for (int i = 1; i < 3; i++)
         for (int j = i; j > 0 && a[order[j]][order[j]] > a[order[j - 1]][order[j - 1]]; j--) {

@@ -4,58 +4,17 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/symmetric.h"
 #include "io/model_steps.h"
 
-enum { DIM = ANCHOR_FEATURE_DIM, SWEEPS_MAX = 60 };
+enum { DIM = ANCHOR_FEATURE_DIM };
 
 typedef double square[DIM][DIM];
-
-/* m = l l^T; m is positive definite: model_sensitivity_end(). */
-static void cholesky(const square m, square l)
-{
-    memset(l, 0, sizeof(square));
-    for (size_t i = 0; i < DIM; i++)
-        for (size_t j = 0; j <= i; j++) {
-            double sum = m[i][j];
-            for (size_t k = 0; k < j; k++)
-                sum -= l[i][k] * l[j][k];
-            l[i][j] = i == j ? sqrt(fmax(sum, 1e-12)) : sum / l[j][j];
-        }
-}
-
-/* One turn of Jacobi's: makes m[p][q] zero; the columns of u follow. */
-static void jacobi_turn(square m, square u, size_t p, size_t q)
-{
-    const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]), t = copysign(1, theta) / (fabs(theta) + sqrt(theta * theta + 1));
-    const double c = 1 / sqrt(t * t + 1), s = t * c;
-    for (size_t k = 0; k < DIM; k++) {
-        const double a = m[k][p], b = m[k][q], x = u[k][p], y = u[k][q];
-        m[k][p] = c * a - s * b, m[k][q] = s * a + c * b;
-        u[k][p] = c * x - s * y, u[k][q] = s * x + c * y;
-    }
-    for (size_t k = 0; k < DIM; k++) {
-        const double a = m[p][k], b = m[q][k];
-        m[p][k] = c * a - s * b, m[q][k] = s * a + c * b;
-    }
-}
 
 /* Eigenvectors of a symmetric matrix as the columns of u, largest eigenvalue first. m is left with the eigenvalues. */
 static void eigenvectors(square m, square u)
 {
-    double trace = 0;
-    for (size_t i = 0; i < DIM; i++) {
-        trace += fabs(m[i][i]);
-        for (size_t j = 0; j < DIM; j++)
-            u[i][j] = i == j;
-    }
-    bool turned = true;
-    for (int sweep = 0; sweep < SWEEPS_MAX && turned; sweep++) {
-        turned = false;
-        for (size_t p = 0; p < DIM; p++)
-            for (size_t q = p + 1; q < DIM; q++)
-                if (fabs(m[p][q]) > 1e-14 * trace)
-                    jacobi_turn(m, u, p, q), turned = true;
-    }
+    symmetric_eigen(&m[0][0], &u[0][0], DIM, 1e-14);
     for (size_t i = 0; i < DIM; i++) {
         size_t best = i;
         for (size_t j = i + 1; j < DIM; j++)
@@ -92,7 +51,7 @@ static void find_basis(const square sensitivity, const square covariance, square
     for (size_t c = 0; c < DIM; c++)
         for (size_t d = 0; d < DIM; d++)
             scaled[c][d] = sensitivity[c][d] / mean;
-    cholesky(scaled, l);
+    symmetric_cholesky(&scaled[0][0], &l[0][0], DIM, 1e-12); /* positive definite: model_sensitivity_end() */
     for (size_t i = 0; i < DIM; i++)
         for (size_t j = 0; j < DIM; j++) {
             scaled[i][j] = 0;

@@ -207,10 +207,10 @@ gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const im
                           float *d_params, gbt_error *err)
 {
     double clock = clock_wall();
-    GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen, "weights", err));
-    if (f->draw.renderer == FRAME_TRACE)
+    if (f->draw.renderer == FRAME_TRACE) {
+        GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen, "weights", err));
         GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, f->seen, NULL, err));
-    else
+    } else
         GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, NULL, err));
     if (f->widened)
         footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians, &f->d_gaussians);

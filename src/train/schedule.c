@@ -68,6 +68,20 @@ double pace_progress(const pace *p, uint64_t step)
     return (double)p->known / PACE_SEGMENTS;
 }
 
+double pace_expected(const pace *p, uint64_t step)
+{
+    const int parts = pace_segment(p, step) + 1;
+    uint64_t sum = 0;
+    for (int i = 0; i < parts && i < p->known; i++)
+        sum += p->steps[i];
+    return (double)sum * PACE_SEGMENTS / parts;
+}
+
+float schedule_thrift(double steps)
+{
+    return (float)fmin(fmax(sqrt(1000 / fmax(steps, 1)), 0.25), 1);
+}
+
 double schedule_level_start(int level, int start_level)
 {
     if (level >= start_level)

@@ -33,6 +33,9 @@ uint64_t pace_total(const pace *p); /* of the known parts */
 /** Progress in front of step number `step` (0-based), which lies in a known part; 1 at or after the end. */
 double pace_progress(const pace *p, uint64_t step);
 
+/** How long the whole run will be, in steps, if the parts up to that of `step` (known) are like the rest: what comes later has no say, as with a budget. */
+double pace_expected(const pace *p, uint64_t step);
+
 /** The part that `step` lies in, or p->known when the known parts are used up. */
 int pace_segment(const pace *p, uint64_t step);
 
@@ -46,6 +49,13 @@ int schedule_level(double progress, int start_level);
 
 /** Progress at which `level` begins. */
 double schedule_level_start(int level, int start_level);
+
+/**
+ * How much an anchor must bring, (0, 1]: what growth and pruning ask of it is multiplied by this.
+ *
+ * A long run has the steps to teach more anchors: 1 up to 1000 steps, then falling with their square root, down to 0.25 (docs/training.md).
+ */
+float schedule_thrift(double steps);
 
 /** From here on all pixels, and the cut-offs of rendering; before, SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN: half as many hits per ray. */
 #define SCHEDULE_WHOLE_FROM 0.85

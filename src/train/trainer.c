@@ -15,9 +15,10 @@
 #include "train/adam.h"
 #include "train/gradient_check.h"
 
-static const float dssim_weight = 0.2f, volume_weight = 0.01f, revived_opacity = 0.1f, pixels_min = 0.5f;
+static const float dssim_weight = 0.2f, volume_weight = 0.01f, revived_opacity = 0.1f;
+static const float growth_gradient = 2e-4f, share_min = 2.5e-6f; /* of short runs: schedule_thrift() */
 enum { ADAM_BLOCK = 512, MAX_SKIPPED_IN_ROW = 10, ADJUSTS_PER_RUN = 100, INTERVAL_MIN = 20 /* a judgement of fewer views is chance */ };
-enum { STREAM_VIEWS = 1, STREAM_PIXELS = 4, LEAST_PIXELS_ACROSS = 32, CULPRIT_SIZE = 384, BARREN_STEPS = 5 };
+enum { STREAM_VIEWS = 1, STREAM_PIXELS = 4, LEAST_PIXELS_ACROSS = 80 /* with fewer a step would not be faster */, CULPRIT_SIZE = 384, BARREN_STEPS = 5 };
 
 /* ---- which view -------------------------------------------------------------------------------------------------------------------------- */
 
@@ -103,9 +104,9 @@ static void step_anchors(trainer *t, const learning_rates *rates)
 
 /* ---- statistics, growing and pruning -------------------------------------------------------------------------------------------------------- */
 
-/* What an anchor is good for is what pictures would miss without it: the pixels that its Gaussians cover, T alpha added up. Opacity, which the reference
-   takes, says nothing of Gaussians that are hidden or tiny: a third of all anchors. The rasterizer does not tell weights. */
-static bool judged_by_pixels(const trainer *t)
+/* What an anchor is good for is what pictures would miss without it: the share of them that its Gaussians cover, the mean over rays of T alpha. Opacity,
+   which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of all anchors. The rasterizer does not tell weights. */
+static bool judged_by_share(const trainer *t)
 {
     return !t->def.compat && t->frame.draw.renderer == FRAME_TRACE;
 }
@@ -113,16 +114,16 @@ static bool judged_by_pixels(const trainer *t)
 static void gather_use(trainer *t)
 {
     const frame *f = &t->frame;
-    const bool by_pixels = judged_by_pixels(t);
-    const float pixels_per_ray = (float)(f->draw.pixel_step * f->draw.pixel_step);
+    const bool by_share = judged_by_share(t);
+    const float rays = (float)ray_image_count(&f->rays);
     float *use = t->stats.use_accum;
     for (size_t v = 0; v < f->visible_count; v++) {
         t->stats.visit_count[f->visible[v]] += 1;
-        if (!by_pixels)
+        if (!by_share)
             use[f->visible[v]] += f->tape.opacity_sum[v];
     }
-    for (size_t i = 0; by_pixels && i < f->gaussians.count; i++)
-        use[f->visible[f->tape.slot[i] / (uint32_t)t->anchors.offset_count]] += f->seen[i] * pixels_per_ray;
+    for (size_t i = 0; by_share && i < f->gaussians.count; i++)
+        use[f->visible[f->tape.slot[i] / (uint32_t)t->anchors.offset_count]] += f->seen[i] / rays;
 }
 
 /* The norm of dL/d(projected mean in NDC), from the ray-traced gradient of the mean in camera axes (g): (z tan_x g.x, z tan_y g.y).
@@ -185,8 +186,10 @@ static gbt_status grow_and_prune(trainer *t, uint64_t steps_since, gbt_error *er
     def.interval = (float)steps_since;
     if (!t->def.compat)
         def.interval = fmaxf(def.interval, (float)INTERVAL_MIN);
-    if (judged_by_pixels(t))
-        def.min_use = pixels_min;
+    const float thrift = t->def.compat ? 1 : schedule_thrift(pace_expected(&t->pace, t->step));
+    def.grad_threshold = thrift * growth_gradient;
+    if (judged_by_share(t))
+        def.min_use = thrift * share_min;
     def.shape_log_max = t->def.compat ? 0.05f : INFINITY;
     def.max_anchors = t->def.max_anchors;
     def.compat = t->def.compat;

@@ -75,7 +75,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
  */
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err);
 
-/** Level at which a step at `progress` looks at a view: the schedule's, but never fewer than 32 pixels across. */
+/** Level at which a step at `progress` looks at a view: the schedule's, but never fewer than 80 pixels across. */
 int trainer_level(const trainer *t, size_t view, double progress);
 
 /** Mean PSNR over the held-out views at full training resolution, on 8-bit images; of their right halves with --exposure (affine_split()). */

@@ -6,6 +6,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/file.h"
+#include "base/memory.h"
 #include "test_support.h"
 
 static char test_folder[256];
@@ -38,6 +40,19 @@ static inline const char *test_path(const char *name)
     static char path[512];
     snprintf(path, sizeof path, "%s/%s", test_folder, name);
     return path;
+}
+
+/** Two files of test_folder hold the same bytes. */
+static inline void assert_same_files(const char *name_a, const char *name_b)
+{
+    unsigned char *a, *b;
+    size_t a_count, b_count;
+    assert_ok(file_read(test_path(name_a), &a, &a_count, NULL));
+    assert_ok(file_read(test_path(name_b), &b, &b_count, NULL));
+    assert_int_equal(a_count, b_count);
+    assert_memory_equal(a, b, a_count);
+    mem_free(a);
+    mem_free(b);
 }
 
 /** Files in a folder, without . and .. */

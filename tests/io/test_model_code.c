@@ -149,13 +149,7 @@ static void lossless_keeps_bits_and_order(void **state)
     assert_ok(model_save_coded(test_path("small.gbt"), &m, NULL, NULL, NULL));
     assert_ok(model_load(test_path("small.gbt"), &back, NULL));
     assert_ok(model_save(test_path("again.gbt"), &back, NULL));
-    unsigned char *plain, *again;
-    size_t plain_bytes, again_bytes;
-    assert_ok(file_read(test_path("plain.gbt"), &plain, &plain_bytes, NULL));
-    assert_ok(file_read(test_path("again.gbt"), &again, &again_bytes, NULL));
-    assert_int_equal(plain_bytes, again_bytes);
-    assert_memory_equal(plain, again, plain_bytes);
-    mem_free(plain), mem_free(again);
+    assert_same_files("plain.gbt", "again.gbt");
     model_free(&m);
     model_free(&back);
 }

@@ -97,14 +97,7 @@ static void same_model_same_bytes(void **state)
     assert_ok(model_save(test_path("a.gbt"), &m, NULL));
     assert_ok(model_load(test_path("a.gbt"), &back, NULL));
     assert_ok(model_save(test_path("b.gbt"), &back, NULL));
-    unsigned char *a, *b;
-    size_t a_count, b_count;
-    assert_ok(file_read(test_path("a.gbt"), &a, &a_count, NULL));
-    assert_ok(file_read(test_path("b.gbt"), &b, &b_count, NULL));
-    assert_int_equal(a_count, b_count);
-    assert_memory_equal(a, b, a_count);
-    mem_free(a);
-    mem_free(b);
+    assert_same_files("a.gbt", "b.gbt");
     model_free(&m);
     model_free(&back);
 }

@@ -39,6 +39,8 @@ typedef struct gbt_train_def {
     bool compat;                /* every quirk of the reference method (docs/training.md). Default false */
     bool exposure;              /* learn a colour matrix per photo, for photos whose exposure differs; held-out photos are then scored on
                                    their right half, with a matrix fitted to the left. Default false */
+    double splats_until;        /* splats stand for rays until this part of the run, [0, 1]: their steps are quicker. Pinhole photos, the renderer "trace",
+                                   not with compat. Default 0.7 */
     double grow_until;          /* anchors grow and are pruned until this fraction of the run, [0, 1]. Default 0.5 */
     double scale_factor;        /* of the anchors' first scales, [0.01, 100]; 0: 2 with the balls' scale prior, 1.2 with spacing, 1 with compat. Default 0 */
     double learning_rate_factor; /* of all learning rates, [1e-3, 1e3]. Default 1 */

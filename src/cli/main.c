@@ -13,6 +13,7 @@ static const command *const commands[] = {
     &command_eval,
     &command_compare,
     &command_compress,
+    &command_export,
     &command_render,
     &command_make_scene,
     &command_bench,

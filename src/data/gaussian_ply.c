@@ -106,17 +106,6 @@ static gbt_status find_columns(const source_file *file, const ply_header *header
     return GBT_OK;
 }
 
-static gbt_status allocate(gaussian_cloud *out, size_t count, gbt_error *err)
-{
-    out->mean = mem_alloc(count, 3 * sizeof(float), "Gaussian means", err);
-    out->scale_log = mem_alloc(count, 3 * sizeof(float), "Gaussian scales", err);
-    out->quat = mem_alloc(count, 4 * sizeof(float), "Gaussian rotations", err);
-    out->opacity = mem_alloc(count, sizeof(float), "Gaussian opacities", err);
-    out->sh = mem_alloc(count, GAUSSIAN_SH_COUNT * 3 * sizeof(float), "Gaussian colours", err);
-    const bool complete = out->mean != NULL && out->scale_log != NULL && out->quat != NULL && out->opacity != NULL && out->sh != NULL;
-    return complete ? GBT_OK : GBT_ERR_NO_MEMORY;
-}
-
 gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
@@ -128,13 +117,14 @@ gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_e
     int columns[PLY_MAX_COLUMNS + 1];
     gaussian_rows rows = {.out = out};
     GBT_TRY(find_columns(file, &header, vertex, columns, &rows.rest_count, err));
-    out->sh_degree = rows.rest_count == 45 ? 3 : rows.rest_count == 24 ? 2 : rows.rest_count == 9 ? 1 : 0;
     /* A column takes at least a byte, so this bounds the memory by a small multiple of the file. */
     const uint64_t row_count = header.elements[vertex].count, least_bytes = FIXED_COLUMNS + rows.rest_count;
     if (row_count > (file->size - header.data_at) / least_bytes)
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu Gaussians cannot be in the %zu bytes that follow", file->name, header.data_at,
                          (unsigned long long)row_count, file->size - header.data_at);
-    gbt_status status = allocate(out, (size_t)row_count, err);
+    gbt_status status = gaussian_cloud_alloc(out, (size_t)row_count, err);
+    out->count = 0; /* of rows that are usable */
+    out->sh_degree = rows.rest_count == 45 ? 3 : rows.rest_count == 24 ? 2 : rows.rest_count == 9 ? 1 : 0;
     if (status == GBT_OK)
         status = ply_read_rows(file, &header, vertex, columns, FIXED_COLUMNS + rows.rest_count, add_row, &rows, err);
     if (status == GBT_OK && out->count == 0)
@@ -154,14 +144,4 @@ gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *e
     const gbt_status status = gaussian_ply_read(&file, out, err);
     mem_free(bytes);
     return status;
-}
-
-void gaussian_cloud_free(gaussian_cloud *cloud)
-{
-    mem_free(cloud->mean);
-    mem_free(cloud->scale_log);
-    mem_free(cloud->quat);
-    mem_free(cloud->opacity);
-    mem_free(cloud->sh);
-    memset(cloud, 0, sizeof *cloud);
 }

@@ -3,28 +3,7 @@
 #define GBT_DATA_GAUSSIAN_PLY_H
 
 #include "data/bytes.h"
-
-enum { GAUSSIAN_SH_COUNT = 16 };
-
-/** Largest ratio of two scales of one Gaussian: canonical-space float arithmetic keeps 1/255 up to it. */
-#define GAUSSIAN_SCALE_RATIO 1e4
-
-/** Log-scales stay within +-GAUSSIAN_SCALE_LOG_LIMIT, so that scales, their inverses and the squares of both are floats. */
-#define GAUSSIAN_SCALE_LOG_LIMIT 30
-
-/** Gaussians as a 3DGS file gives them, checked and normalised. World coordinates of the file. */
-typedef struct gaussian_cloud {
-    size_t count;
-    float *mean;      /* [count][3] */
-    float *scale_log; /* [count][3], natural log of the std-dev; ratio limited */
-    float *quat;      /* [count][4], w x y z, unit */
-    float *opacity;   /* [count], [0, 1], the sigmoid applied */
-    float *sh;        /* [count][GAUSSIAN_SH_COUNT][3], coefficient-major; those above sh_degree are 0 */
-    int sh_degree;    /* 0..3 */
-    size_t dropped;            /* rows with a value that is not usable */
-    size_t identity_rotations; /* zero quaternions, read as no rotation */
-    size_t scales_clamped;     /* rows with a scale raised to 1e-4 of their largest */
-} gaussian_cloud;
+#include "data/gaussian_cloud.h"
 
 /**
  * Read a 3DGS .ply: any property order and types, extra properties ignored, ASCII or binary.
@@ -40,6 +19,12 @@ gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_e
 
 /** The same from a path. */
 gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *err);
-void gaussian_cloud_free(gaussian_cloud *cloud);
+
+/**
+ * Write one as the reference implementation does: binary, normals of 0, f_rest channel-major, opacity as a logit, scales as logs.
+ *
+ * @param origin [in] added to every mean in double
+ */
+gbt_status gaussian_ply_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err);
 
 #endif

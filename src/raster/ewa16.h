@@ -173,6 +173,7 @@ static inline void return_through(const tile_job *job, const splat *s, const flo
     sum[3] = f16_fma(qu, r.u, sum[3]), sum[4] = f16_fma(qu, r.v, sum[4]), sum[5] = f16_fma(qv, r.v, sum[5]);
     for (int c = 0; c < 3; c++)
         sum[EWA_COLOR + c] = f16_fma(weight, b->d_rgb[c], sum[EWA_COLOR + c]);
+    sum[EWA_WEIGHT] = f16_add(sum[EWA_WEIGHT], weight);
 }
 
 /* Each of `count` rows, summed over its lanes. */

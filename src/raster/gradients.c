@@ -10,6 +10,8 @@
    dL/domega = (P_yz (s_y / s_z - s_z / s_y), ...): a Gaussian that is round does not feel it. */
 #include "raster/gradients.h"
 
+#include <string.h>
+
 #include "base/fail.h"
 #include "base/parallel.h"
 #include "base/vec.h"
@@ -24,6 +26,7 @@ typedef struct gradient_job {
     const tile_lists *lists;
     const float *records;
     gaussians *out;
+    float *weight;
 } gradient_job;
 
 /* What both forms leave: dL/dmean in world axes, and P. */
@@ -141,6 +144,8 @@ static void return_block(size_t block, size_t begin, size_t end, void *context)
         const one_gaussian g = read_gaussian(job->g, i);
         const shape_gradient d = job->view->settings.form == RASTER_EWA ? return_ewa(job->view, &g, s, sum) : return_ray(&g, sum);
         const double *color = sum + (job->view->settings.form == RASTER_EWA ? EWA_COLOR : RAY_COLOR);
+        if (job->weight != NULL)
+            job->weight[i] = (float)color[3]; /* it stands behind the colour in both forms */
         store_gradient(&g, &d, i, job->out);
         job->out->opacity[i] = (float)(sum[0] / (double)s->opacity);
         job->out->red[i] = (float)color[0], job->out->green[i] = (float)color[1], job->out->blue[i] = (float)color[2];
@@ -148,11 +153,13 @@ static void return_block(size_t block, size_t begin, size_t end, void *context)
 }
 
 gbt_status raster_gradients(const raster_view *view, const gaussians *g, const splat *splats, const size_t *drawn, const tile_lists *lists,
-                            const float *records, gaussians *out, gbt_error *err)
+                            const float *records, gaussians *out, float *weight, gbt_error *err)
 {
     GBT_TRY(gaussians_resize(out, g->count, err));
     gaussians_zero(out);
-    gradient_job job = {view, g, splats, drawn, lists, records, out};
+    if (weight != NULL)
+        memset(weight, 0, g->count * sizeof *weight);
+    gradient_job job = {view, g, splats, drawn, lists, records, out, weight};
     parallel_blocks(g->count, SPLAT_GRAIN, return_block, &job);
     return GBT_OK;
 }

@@ -64,10 +64,15 @@ static gbt_status check_settings(const raster_settings *s, gbt_error *err)
                      (double)s->alpha_min, (double)s->alpha_max, (double)s->transmittance_min, (double)s->near, (double)s->dilation);
 }
 
+bool raster_takes(const gbt_camera *camera)
+{
+    return camera->model == GBT_CAMERA_PINHOLE || camera->model == GBT_CAMERA_SIMPLE_PINHOLE;
+}
+
 static gbt_status make_view(const gbt_camera *camera, const raster_settings *settings, raster_view *out, gbt_error *err)
 {
     const bool one_focal = camera->model == GBT_CAMERA_SIMPLE_PINHOLE;
-    if (!one_focal && camera->model != GBT_CAMERA_PINHOLE)
+    if (!raster_takes(camera))
         return base_fail(err, GBT_ERR_ARGUMENT, "raster: camera model %d (wanted SIMPLE_PINHOLE or PINHOLE: splats are projected)",
                          (int)camera->model);
     GBT_TRY(check_settings(settings, err));
@@ -230,7 +235,7 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
     return GBT_OK;
 }
 
-gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float d_background[3], gbt_error *err)
+gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err)
 {
     struct raster_state *state = scene->state;
     if (state == NULL || !state->tape_kept)
@@ -248,7 +253,7 @@ gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d
         for (size_t i = 0; i < tile_count_of(view); i++)
             d_background[c] += state->d_background[i][c];
     }
-    return raster_gradients(view, state->source, state->splats, state->drawn, &state->lists, state->records, d_gaussians, err);
+    return raster_gradients(view, state->source, state->splats, state->drawn, &state->lists, state->records, d_gaussians, weight, err);
 }
 
 void raster_scene_free(raster_scene *scene)

@@ -42,6 +42,9 @@ typedef struct raster_scene {
     struct raster_state *state; /* internal */
 } raster_scene;
 
+/** Whether a camera is one that raster_forward() takes: PINHOLE or SIMPLE_PINHOLE. */
+bool raster_takes(const gbt_camera *camera);
+
 /**
  * Draw `g` as `camera` sees it.
  *
@@ -54,7 +57,7 @@ typedef struct raster_scene {
  * @return GBT_OK, GBT_ERR_ARGUMENT (a camera with another lens, settings out of range, size of rgb), GBT_ERR_NO_MEMORY (2^32 pairs of
  *         Gaussian and tile, 2^24 Gaussians in one tile, too)
  * Threads: uses all; same bits for every thread count and instruction set. Formulas, and what differs from other rasterizers:
- * docs/crosscheck.md. Memory: about 92 bytes per Gaussian (per ray: 172), 12 per pair; for the adjoint 38 (54) more per pair and 8 per pixel.
+ * docs/crosscheck.md. Memory: about 92 bytes per Gaussian (per ray: 172), 12 per pair; for the adjoint 42 (58) more per pair and 8 per pixel.
  */
 gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera, const raster_settings *settings, bool keep_tape,
                           image *rgb, float *transmittance, raster_counters *counters, gbt_error *err);
@@ -67,10 +70,11 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
  *
  * @param d_rgb        [in]  dL/d(rgb)
  * @param d_gaussians  [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion tangent)
+ * @param weight       [out] optional (NULL), [count]: sum over pixels of T alpha, how much each Gaussian was seen
  * @param d_background [out] optional (NULL), [3], overwritten
  * Threads: uses all; same bits for every thread count.
  */
-gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float d_background[3], gbt_error *err);
+gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err);
 
 void raster_scene_free(raster_scene *scene);
 

@@ -245,6 +245,7 @@ static inline void add_row(const tile_job *job, const ray_row *row, const block_
         sum[4 + k] = f16_mul(sum[1 + k], v[k]);
         sum[RAY_COLOR + k] = f16_mul(weight, d_rgb[k]);
     }
+    sum[RAY_WEIGHT] = weight;
     sum[7] = f16_mul(sum[2], v[2]), sum[8] = f16_mul(sum[3], v[0]), sum[9] = f16_mul(sum[1], v[1]);
     float total[RAY_SUMS], *record = job->records + (size_t)entry->pair * RAY_SUMS;
     store_sums(sum, RAY_SUMS, total);

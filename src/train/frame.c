@@ -122,7 +122,10 @@ static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape
 {
     raster_settings s = frame_splat_settings(settings, f->draw.renderer == FRAME_SPLAT ? RASTER_EWA : RASTER_PER_RAY);
     s.dilation = pixel_variance(f, s.dilation);
-    return raster_forward(&f->splats, frame_drawn(f), &f->camera, &s, keep_tape, &f->rgb, NULL, NULL, err);
+    raster_counters counted = {0};
+    GBT_TRY(raster_forward(&f->splats, frame_drawn(f), &f->camera, &s, keep_tape, &f->rgb, NULL, &counted, err));
+    f->counters.rays = counted.pixels, f->counters.hits = f->counters.blended = counted.blended;
+    return GBT_OK;
 }
 
 gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
@@ -207,11 +210,11 @@ gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const im
                           float *d_params, gbt_error *err)
 {
     double clock = clock_wall();
-    if (f->draw.renderer == FRAME_TRACE) {
-        GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen, "weights", err));
+    GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen, "weights", err));
+    if (f->draw.renderer == FRAME_TRACE)
         GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, f->seen, NULL, err));
-    } else
-        GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, NULL, err));
+    else
+        GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, f->seen, NULL, err));
     if (f->widened)
         footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians, &f->d_gaussians);
     f->times.adjoint = lap(&clock);

@@ -48,7 +48,7 @@ typedef struct frame {
     decode_tape tape;
     trace_scene scene;
     raster_scene splats;
-    float *seen; /* [gaussians] after frame_backward() of a traced frame: sum over rays of T alpha */
+    float *seen; /* [gaussians] after frame_backward(): sum over rays of T alpha */
     size_t seen_capacity;
     image rgb; /* the render */
     kernel_counters counters;

@@ -37,6 +37,7 @@ gbt_train_def gbt_train_def_default(void)
                            .eval_split = "every=8",
                            .max_anchors = 2000000,
                            .grow = true,
+                           .splats_until = 0.7,
                            .grow_until = 0.5,
                            .learning_rate_factor = 1,
                            .save_every_seconds = 120,
@@ -76,6 +77,8 @@ static gbt_status check_def(const gbt_train_def *d, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "--budget: %g s (wanted more than 0)", d->budget_seconds);
     if (!(d->learning_rate_factor >= 1e-3 && d->learning_rate_factor <= 1e3))
         return base_fail(err, GBT_ERR_ARGUMENT, "--learning-rate: %g (wanted 0.001 to 1000)", d->learning_rate_factor);
+    if (!(d->splats_until >= 0 && d->splats_until <= 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--splats-until: %g (wanted 0 to 1)", d->splats_until);
     if (!(d->grow_until >= 0 && d->grow_until <= 1))
         return base_fail(err, GBT_ERR_ARGUMENT, "--grow-until: %g (wanted 0 to 1)", d->grow_until);
     if (!(d->scale_factor == 0 || (d->scale_factor >= 0.01 && d->scale_factor <= 100)))
@@ -321,7 +324,8 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->decoder.distance_scale = def->compat ? 1.0f : 1 / median;
     t->decoder.distance_min = p5 * t->decoder.distance_scale, t->decoder.distance_max = p95 * t->decoder.distance_scale;
     t->settings = trace_settings_default();
-    frame_renderer_named(t->def.renderer, &t->frame.draw.renderer);
+    frame_renderer_named(t->def.renderer, &t->renderer);
+    t->frame.draw.renderer = t->renderer;
     t->frame.draw.footprint = (float)t->def.footprint;
     t->settings.t_near = 0.02f * median;
     const double size = fmax(t->extent, (double)median);

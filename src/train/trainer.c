@@ -60,6 +60,13 @@ static photo_sample pick_pixels(const trainer *t, int level)
     return (photo_sample){.level = level, .phase = {(int)(words[0] & ((1u << level) - 1)), (int)(words[1] & ((1u << level) - 1))}};
 }
 
+/* Splats teach a model that is still rough in half the time of rays, which have the last word. */
+static frame_renderer renderer_of_step(const trainer *t, const gbt_camera *camera, double progress)
+{
+    const bool rays = t->renderer != FRAME_TRACE || t->def.compat || progress >= t->def.splats_until || !raster_takes(camera);
+    return rays ? t->renderer : FRAME_SPLAT;
+}
+
 /* ---- optimizer ------------------------------------------------------------------------------------------------------------------------------ */
 
 typedef struct adam_job {
@@ -105,24 +112,18 @@ static void step_anchors(trainer *t, const learning_rates *rates)
 /* ---- statistics, growing and pruning -------------------------------------------------------------------------------------------------------- */
 
 /* What an anchor is good for is what pictures would miss without it: the share of them that its Gaussians cover, the mean over rays of T alpha. Opacity,
-   which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of all anchors. The rasterizer does not tell weights. */
-static bool judged_by_share(const trainer *t)
-{
-    return !t->def.compat && t->frame.draw.renderer == FRAME_TRACE;
-}
-
+   which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of all anchors. */
 static void gather_use(trainer *t)
 {
     const frame *f = &t->frame;
-    const bool by_share = judged_by_share(t);
     const float rays = (float)ray_image_count(&f->rays);
     float *use = t->stats.use_accum;
     for (size_t v = 0; v < f->visible_count; v++) {
         t->stats.visit_count[f->visible[v]] += 1;
-        if (!by_share)
+        if (t->def.compat)
             use[f->visible[v]] += f->tape.opacity_sum[v];
     }
-    for (size_t i = 0; by_share && i < f->gaussians.count; i++)
+    for (size_t i = 0; !t->def.compat && i < f->gaussians.count; i++)
         use[f->visible[f->tape.slot[i] / (uint32_t)t->anchors.offset_count]] += f->seen[i] / rays;
 }
 
@@ -188,7 +189,7 @@ static gbt_status grow_and_prune(trainer *t, uint64_t steps_since, gbt_error *er
         def.interval = fmaxf(def.interval, (float)INTERVAL_MIN);
     const float thrift = t->def.compat ? 1 : schedule_thrift(pace_expected(&t->pace, t->step));
     def.grad_threshold = thrift * growth_gradient;
-    if (judged_by_share(t))
+    if (!t->def.compat)
         def.min_use = thrift * share_min;
     def.shape_log_max = t->def.compat ? 0.05f : INFINITY;
     def.max_anchors = t->def.max_anchors;
@@ -294,6 +295,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     out->width = camera.width, out->height = camera.height;
 
     /* Render, compare. */
+    f->draw.renderer = renderer_of_step(t, &camera, progress);
     trace_settings settings = t->settings;
     if (!t->def.compat && progress < SCHEDULE_WHOLE_FROM)
         settings.alpha_min = SCHEDULE_ALPHA_MIN, settings.transmittance_min = SCHEDULE_T_MIN;
@@ -358,6 +360,7 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
             continue;
         const gbt_camera camera = photos_camera(&t->photos, i, 0);
         t->frame.draw.pixel_step = 1;
+        t->frame.draw.renderer = t->renderer;
         status = frame_render(&t->frame, &t->anchors, &t->decoder, &camera, &t->settings, false, err);
         if (status == GBT_OK)
             status = scene_read_photo(&t->scene.views[i], camera.width, camera.height, &photo, err);

@@ -36,6 +36,7 @@ typedef struct trainer {
     adjust_stats stats;
     exposures exposures; /* of the training photos, in the order of train_views; count 0 without --exposure */
 
+    frame_renderer renderer; /* that the model is for */
     float voxel_size;
     double extent;
     float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs, far inside what floats hold */

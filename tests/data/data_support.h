@@ -5,11 +5,13 @@
 #include "test_support.h"
 
 #include <ftw.h>
+#include <math.h>
 #include <unistd.h>
 
 #include "base/file.h"
 #include "base/image.h"
 #include "data/bytes.h"
+#include "data/gaussian_cloud.h"
 #include "data/raw.h"
 
 /** Calls with a visible message on failure. */
@@ -115,6 +117,24 @@ static inline void check_raw(const raw_scene *raw)
     for (size_t i = 0; i < 3 * raw->point_count; i++) {
         assert_true(isfinite(raw->position[i]));
         assert_true(raw->color[i] >= 0 && raw->color[i] <= 1);
+    }
+}
+
+/** What must hold for Gaussians that a reader accepted. */
+static inline void check_cloud(const gaussian_cloud *cloud)
+{
+    assert_true(cloud->count > 0 && cloud->sh_degree >= 0 && cloud->sh_degree <= 3);
+    for (size_t i = 0; i < cloud->count; i++) {
+        const float *q = cloud->quat + 4 * i;
+        assert_true(fabsf(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1) < 1e-5f);
+        assert_true(cloud->opacity[i] >= 0 && cloud->opacity[i] <= 1);
+        for (size_t k = 0; k < 3; k++) {
+            assert_true(isfinite(cloud->mean[3 * i + k]));
+            assert_true(fabsf(cloud->scale_log[3 * i + k]) <= 30);
+            assert_true(cloud->scale_log[3 * i + k] >= cloud->scale_log[3 * i + (k + 1) % 3] - 9.211f);
+        }
+        for (size_t k = 0; k < 48; k++)
+            assert_true(isfinite(cloud->sh[48 * i + k]));
     }
 }
 

@@ -215,18 +215,7 @@ static void try_model(const unsigned char *bytes, size_t size, void *context)
     check_message(status, &err);
     if (status == GBT_OK) {
         ++*accepted;
-        for (size_t i = 0; i < cloud.count; i++) {
-            const float *q = cloud.quat + 4 * i;
-            assert_true(fabsf(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1) < 1e-5f);
-            assert_true(cloud.opacity[i] >= 0 && cloud.opacity[i] <= 1);
-            for (size_t k = 0; k < 3; k++) {
-                assert_true(isfinite(cloud.mean[3 * i + k]));
-                assert_true(fabsf(cloud.scale_log[3 * i + k]) <= 30);
-                assert_true(cloud.scale_log[3 * i + k] >= cloud.scale_log[3 * i + (k + 1) % 3] - 9.211f);
-            }
-            for (size_t k = 0; k < 48; k++)
-                assert_true(isfinite(cloud.sh[48 * i + k]));
-        }
+        check_cloud(&cloud);
     }
     gaussian_cloud_free(&cloud);
 }

@@ -47,7 +47,7 @@ static void run(bench *b, renderer which, bool back, bool tape)
     if (which == RENDER_PER_RAY)
         settings.form = RASTER_PER_RAY, settings.near = s->settings.t_near;
     if (back)
-        need(raster_backward(&b->raster, &b->d_rgb, &b->d, NULL, &err), &err);
+        need(raster_backward(&b->raster, &b->d_rgb, &b->d, NULL, NULL, &err), &err);
     else {
         memset(&b->counters[which], 0, sizeof b->counters[which]);
         need(raster_forward(&b->raster, s->gaussians, &s->camera.shot.camera, &settings, tape, &b->rgb[which], NULL, &b->counters[which], &err), &err);

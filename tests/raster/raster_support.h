@@ -70,7 +70,7 @@ static inline gbt_camera make_camera(int width, int height, const double center[
 /* One view, forward and back. */
 typedef struct drawn {
     image rgb;
-    float *T, d_background[3];
+    float *T, *weight, d_background[3];
     gaussians d;
     raster_counters counters;
 } drawn;
@@ -90,9 +90,10 @@ static inline drawn draw(const gaussians *g, const gbt_camera *camera, const ras
     raster_scene scene = {0};
     assert_ok(image_alloc(&out.rgb, camera->width, camera->height, 3, NULL));
     out.T = mem_alloc((size_t)camera->width * (size_t)camera->height, sizeof *out.T, "test", NULL);
+    out.weight = mem_alloc(g->count, sizeof *out.weight, "test", NULL);
     assert_ok(raster_forward(&scene, g, camera, s, d_rgb != NULL, &out.rgb, out.T, &out.counters, NULL));
     if (d_rgb != NULL)
-        assert_ok(raster_backward(&scene, d_rgb, &out.d, out.d_background, NULL));
+        assert_ok(raster_backward(&scene, d_rgb, &out.d, out.weight, out.d_background, NULL));
     raster_scene_free(&scene);
     return out;
 }
@@ -101,6 +102,7 @@ static inline void drawn_free(drawn *d)
 {
     image_free(&d->rgb);
     mem_free(d->T);
+    mem_free(d->weight);
     gaussians_free(&d->d);
 }
 

@@ -250,6 +250,34 @@ static void assert_same(const char *what, const drawn *a, const drawn *b)
         if (memcmp(f[0][k], f[1][k], a->d.count * sizeof(float)) != 0)
             fail_msg("%s: another gradient of field %d", what, k);
     assert_memory_equal(a->d_background, b->d_background, sizeof a->d_background);
+    assert_memory_equal(a->weight, b->weight, a->d.count * sizeof(float));
+}
+
+/* Under dL/dred = 1 everywhere a Gaussian's red feels exactly the sum of T alpha. */
+static void weights_are_what_colors_feel(void **state)
+{
+    (void)state;
+    const cloud_def def = {"weights", 2000, 1.5f, 0.03f, 0.3f, 5, {1, 0.5, -4}, 60, 50};
+    gaussians g = make_cloud(&def, 3);
+    const gbt_camera camera = make_camera(def.width, def.height, def.camera);
+    image d_rgb;
+    assert_ok(image_alloc(&d_rgb, def.width, def.height, 3, NULL));
+    for (size_t i = 0; i < 3 * (size_t)def.width * (size_t)def.height; i++)
+        d_rgb.pixels[i] = i % 3 == 0;
+    for (int form = 0; form < 2; form++) {
+        const raster_settings s = form_settings(form);
+        drawn d = draw(&g, &camera, &s, &d_rgb);
+        size_t seen = 0;
+        for (size_t i = 0; i < g.count; i++) {
+            seen += d.weight[i] > 0;
+            if (fabsf(d.weight[i] - d.d.red[i]) > 1e-6f * d.weight[i])
+                fail_msg("form %d, Gaussian %zu: weight %g, gradient %g", form, i, (double)d.weight[i], (double)d.d.red[i]);
+        }
+        assert_true(seen > 300);
+        drawn_free(&d);
+    }
+    image_free(&d_rgb);
+    gaussians_free(&g);
 }
 
 static void threads_and_instruction_sets_give_the_same_bits(void **state)
@@ -300,7 +328,7 @@ static void memory_is_used_again(void **state)
         assert_ok(image_alloc(&rgb, camera.width, camera.height, 3, NULL));
         assert_ok(raster_forward(&scene, &g, &camera, &s, true, &rgb, NULL, NULL, NULL));
         for (int twice = 0; twice < 2; twice++) /* the tape is kept */
-            assert_ok(raster_backward(&scene, &d_rgb, &d, NULL, NULL));
+            assert_ok(raster_backward(&scene, &d_rgb, &d, NULL, NULL, NULL));
         assert_memory_equal(rgb.pixels, fresh.rgb.pixels, 3 * (size_t)(camera.width * camera.height) * sizeof(float));
         assert_memory_equal(d.mean_z, fresh.d.mean_z, g.count * sizeof(float));
         drawn_free(&fresh);
@@ -321,7 +349,7 @@ static void wrong_arguments(void **state)
     raster_settings s = raster_settings_default();
     assert_ok(image_alloc(&rgb, 20, 20, 3, NULL));
     assert_ok(image_alloc(&small, 19, 20, 3, NULL));
-    assert_int_equal(raster_backward(&scene, &rgb, &d, NULL, NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(raster_backward(&scene, &rgb, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
     assert_int_equal(raster_forward(&scene, &g, &camera, &s, true, &small, NULL, NULL, &err), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "19 x 20"));
     other.model = GBT_CAMERA_OPENCV;
@@ -334,10 +362,10 @@ static void wrong_arguments(void **state)
     assert_int_equal(raster_forward(&scene, &g, &camera, &s, true, &rgb, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
     s = raster_settings_default();
     assert_ok(raster_forward(&scene, &g, &camera, &s, false, &rgb, NULL, NULL, NULL));
-    assert_int_equal(raster_backward(&scene, &rgb, &d, NULL, NULL), GBT_ERR_ARGUMENT); /* no tape */
+    assert_int_equal(raster_backward(&scene, &rgb, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT); /* no tape */
     assert_ok(raster_forward(&scene, &g, &camera, &s, true, &rgb, NULL, NULL, NULL));
-    assert_int_equal(raster_backward(&scene, &small, &d, NULL, NULL), GBT_ERR_ARGUMENT);
-    assert_ok(raster_backward(&scene, &rgb, &d, NULL, NULL));
+    assert_int_equal(raster_backward(&scene, &small, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
+    assert_ok(raster_backward(&scene, &rgb, &d, NULL, NULL, NULL));
     raster_scene_free(&scene);
     raster_scene_free(&scene); /* twice is fine */
     image_free(&rgb), image_free(&small);
@@ -363,7 +391,7 @@ static void memory_runs_out(void **state)
             mem_fail_after(n);
             status = raster_forward(&scene, &g, &camera, &s, true, &rgb, NULL, NULL, &err);
             if (status == GBT_OK)
-                status = raster_backward(&scene, &d_rgb, &d, NULL, &err);
+                status = raster_backward(&scene, &d_rgb, &d, NULL, NULL, &err);
             mem_fail_after(-1);
             if (status != GBT_OK) {
                 failures++;
@@ -390,6 +418,7 @@ int main(void)
         cmocka_unit_test(unusable_fields_are_not_drawn),
         cmocka_unit_test(nothing_to_draw),
         cmocka_unit_test(any_size),
+        cmocka_unit_test(weights_are_what_colors_feel),
         cmocka_unit_test(threads_and_instruction_sets_give_the_same_bits),
         cmocka_unit_test(memory_is_used_again),
         cmocka_unit_test(wrong_arguments),

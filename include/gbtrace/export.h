@@ -1,0 +1,42 @@
+/* gbtrace/export.h -- trained scenes as files of plain Gaussians, for every viewer there is. */
+#ifndef GBTRACE_EXPORT_H
+#define GBTRACE_EXPORT_H
+
+#include <stddef.h>
+#include <stdio.h>
+
+#include "gbtrace/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct gbt_export_def {
+    int sh_degree;    /* of the colours' dependence on the direction, 0 to 3. Default 3 */
+    int refine_steps; /* steps that fit the plain Gaussians to the model's own pictures, >= 0. Default 300 */
+    const char *data; /* data set with the training cameras; NULL: the one it was trained on. Default NULL */
+    const char *json; /* also write the figures here; NULL: nowhere. Default NULL */
+} gbt_export_def;
+
+gbt_export_def gbt_export_def_default(void);
+
+/**
+ * Write a scene as plain 3DGS Gaussians: .ply, .splat, .spz (version 3) or .glb (KHR_gaussian_splatting), by the ending of each name. World
+ * coordinates and axes are those of the data set; .glb has glTF's (x and y change signs).
+ *
+ * A trained model is baked: networks become spherical harmonics (docs/exporting.md). What that loses is measured on the held-out views, for
+ * each file as it reads back, and reported. A .ply, .splat or .spz is converted.
+ *
+ * @param input  [in] RUN (a folder with model.gbt), a model file, or a .ply, .splat or .spz
+ * @param outputs [in] [output_count] file names, each written atomically; their endings are checked before any work
+ * @param report [in] open stream; NULL: none
+ * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ *
+ * Threads: same bytes for every thread count. Cost: one pass over the training cameras, the steps, and the held-out views once per file.
+ */
+gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, FILE *report, gbt_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

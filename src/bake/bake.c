@@ -1,0 +1,264 @@
+/* bake/bake.c -- means over the cameras that see a Gaussian.
+
+   cameras --> decode, trace, weights --> sums per Gaussian --+
+   64 directions --> decode --> sums of colours --------------+--> opacity, shape, spherical harmonics */
+#include "bake/bake.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "bake/sh.h"
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/symmetric.h"
+#include "base/vec.h"
+
+enum { TERMS = GAUSSIAN_SH_COUNT, PAIRS = TERMS * (TERMS + 1) / 2, DIRECTIONS = 64, PIXEL_STEP = 2 };
+
+static const float opacity_min = 1.0f / 255;
+static const double ridge = 1e-4; /* of the mean of the diagonal: keeps directions from one side solvable */
+
+/* What is known of one Gaussian so far. */
+typedef struct sums {
+    double weight;             /* of the views in which it was made: w */
+    double opaque;             /* w / opacity */
+    double covariance[6];      /* w (xx xy xz yy yz zz) */
+    double normal[PAIRS];      /* w y_k y_l, l <= k */
+    double color[TERMS][3];    /* w y_k (c - 0.5) */
+    float mean[3];
+    uint32_t kept;             /* views in which it was made */
+} sums;
+
+typedef struct baking {
+    const anchors *a;
+    int functions;
+    sums *sums;        /* [anchor][offset] */
+    uint32_t *visible; /* [anchor] views in which it was decoded */
+} baking;
+
+bake_def bake_def_default(void)
+{
+    return (bake_def){.sh_degree = 3, .prior = 0.3};
+}
+
+static void add_color(const baking *b, sums *s, const float direction[3], const float color[3], double weight)
+{
+    float y[TERMS];
+    sh_basis(direction, y);
+    for (int k = 0, at = 0; k < b->functions; k++) {
+        for (int l = 0; l <= k; l++)
+            s->normal[at++] += weight * (double)y[k] * (double)y[l];
+        for (int c = 0; c < 3; c++)
+            s->color[k][c] += weight * (double)y[k] * ((double)color[c] - 0.5);
+    }
+}
+
+static void add_covariance(sums *s, const gaussians *g, size_t i, double weight)
+{
+    const float q[4] = {g->quat_w[i], g->quat_x[i], g->quat_y[i], g->quat_z[i]}, scale[3] = {g->scale_x[i], g->scale_y[i], g->scale_z[i]};
+    float r[9];
+    quat_to_matrix(q, r);
+    for (int row = 0, at = 0; row < 3; row++)
+        for (int column = row; column < 3; column++, at++)
+            for (int k = 0; k < 3; k++)
+                s->covariance[at] += weight * (double)r[3 * row + k] * (double)r[3 * column + k] * (double)scale[k] * (double)scale[k];
+}
+
+static void direction_to(const double eye[3], const float mean[3], float out[3])
+{
+    double d[3];
+    for (int k = 0; k < 3; k++)
+        d[k] = (double)mean[k] - eye[k];
+    dvec_normalize(d);
+    for (int k = 0; k < 3; k++)
+        out[k] = (float)d[k];
+}
+
+/* One camera: what it makes of each Gaussian, and how much of that it sees. */
+static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_camera *camera, const trace_settings *settings, image *nothing, gbt_error *err)
+{
+    gbt_camera sparse = *camera;
+    f->draw.pixel_step = gbt_camera_every(camera, PIXEL_STEP, 0, 0, &sparse) ? PIXEL_STEP : 1;
+    GBT_TRY(frame_render(f, b->a, d, &sparse, settings, true, err));
+    GBT_TRY(image_fit(nothing, f->rgb.width, f->rgb.height, 3, err));
+    memset(nothing->pixels, 0, (size_t)nothing->width * (size_t)nothing->height * 3 * sizeof *nothing->pixels);
+    GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen, "weights", err));
+    GBT_TRY(trace_backward(&f->scene, &f->rays, nothing, &f->d_gaussians, f->seen, NULL, err));
+    for (size_t v = 0; v < f->visible_count; v++)
+        b->visible[f->visible[v]]++;
+    const gaussians *g = &f->gaussians;
+    const size_t k_count = (size_t)b->a->offset_count;
+    for (size_t i = 0; i < g->count; i++) {
+        const size_t row = f->tape.slot[i] / k_count, k = f->tape.slot[i] % k_count;
+        sums *s = &b->sums[f->visible[row] * k_count + k];
+        const double weight = (double)f->seen[i];
+        s->kept++;
+        s->mean[0] = g->mean_x[i], s->mean[1] = g->mean_y[i], s->mean[2] = g->mean_z[i];
+        if (!(weight > 0))
+            continue;
+        float direction[3];
+        direction_to(camera->center, s->mean, direction);
+        s->weight += weight;
+        s->opaque += weight / (double)g->opacity[i];
+        add_covariance(s, g, i, weight);
+        add_color(b, s, direction, (const float[3]){g->red[i], g->green[i], g->blue[i]}, weight);
+    }
+    return GBT_OK;
+}
+
+/* Evenly over the sphere: a Fibonacci spiral. */
+static void spread_direction(int i, double out[3])
+{
+    const double z = 1 - (2 * i + 1.0) / DIRECTIONS, r = sqrt(1 - z * z), turn = i * 2.399963229728653;
+    out[0] = r * cos(turn), out[1] = r * sin(turn), out[2] = z;
+}
+
+/* All Gaussians from so far away that one direction leads to all; the networks are told a distance of the middle of those trained. */
+static gbt_status add_directions(baking *b, frame *f, const decoder *trained, double prior, gbt_error *err)
+{
+    decoder d = *trained;
+    const float middle = 0.5f * (trained->distance_min + fminf(trained->distance_max, 1e30f));
+    d.distance_min = 2 * middle, d.distance_max = 0.5f * middle; /* distances are cut to [min / 2, 2 max] */
+    float size = 1;
+    for (size_t i = 0; i < 3 * b->a->count; i++)
+        size = fmaxf(size, fabsf(b->a->position[i]));
+    uint32_t *all = mem_alloc(b->a->count, sizeof *all, "anchors", err);
+    if (all == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < b->a->count; i++)
+        all[i] = (uint32_t)i;
+    gbt_status status = GBT_OK;
+    for (int n = 0; n < DIRECTIONS && status == GBT_OK; n++) {
+        double toward[3];
+        spread_direction(n, toward);
+        const float direction[3] = {(float)toward[0], (float)toward[1], (float)toward[2]};
+        const float far[3] = {-1e4f * size * direction[0], -1e4f * size * direction[1], -1e4f * size * direction[2]};
+        status = decode_forward(b->a, &d, far, all, b->a->count, 0, &f->gaussians, &f->tape, err);
+        for (size_t i = 0; i < f->gaussians.count && status == GBT_OK; i++) {
+            sums *s = &b->sums[f->tape.slot[i]]; /* every anchor is in its own row */
+            if (s->weight > 0)
+                add_color(b, s, direction, (const float[3]){f->gaussians.red[i], f->gaussians.green[i], f->gaussians.blue[i]}, prior * s->weight / DIRECTIONS);
+        }
+    }
+    mem_free(all);
+    return status;
+}
+
+/* Least squares by Cholesky's factor. */
+static void solve_color(const baking *b, const sums *s, float *sh)
+{
+    const int n = b->functions;
+    double m[TERMS * TERMS], l[TERMS * TERMS], trace = 0;
+    for (int k = 0, at = 0; k < n; k++)
+        for (int j = 0; j <= k; j++, at++)
+            m[k * n + j] = m[j * n + k] = s->normal[at];
+    for (int k = 0; k < n; k++)
+        trace += m[k * n + k];
+    for (int k = 0; k < n; k++)
+        m[k * n + k] += ridge * trace / n;
+    symmetric_cholesky(m, l, n, 1e-12 * trace);
+    memset(sh, 0, TERMS * 3 * sizeof *sh);
+    for (int c = 0; c < 3; c++) {
+        double x[TERMS];
+        for (int k = 0; k < n; k++) {
+            x[k] = s->color[k][c];
+            for (int j = 0; j < k; j++)
+                x[k] -= l[k * n + j] * x[j];
+            x[k] /= l[k * n + k];
+        }
+        for (int k = n; k-- > 0;) {
+            for (int j = k + 1; j < n; j++)
+                x[k] -= l[j * n + k] * x[j];
+            x[k] /= l[k * n + k];
+            sh[3 * k + c] = (float)x[k];
+        }
+    }
+}
+
+/* Standard deviations along the axes of a covariance, and the rotation to them. */
+static void solve_shape(const sums *s, float scale_log[3], float quat[4])
+{
+    const double *c = s->covariance;
+    double m[9] = {c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5]}, v[9];
+    symmetric_eigen(m, v, 3, 1e-15);
+    const double det = v[0] * (v[4] * v[8] - v[5] * v[7]) - v[1] * (v[3] * v[8] - v[5] * v[6]) + v[2] * (v[3] * v[7] - v[4] * v[6]);
+    for (int k = 0; k < 3 && det < 0; k++)
+        v[3 * k + 2] = -v[3 * k + 2];
+    double largest = fmax(m[0], fmax(m[4], m[8]));
+    largest = largest > 0 ? largest : s->weight;
+    for (int k = 0; k < 3; k++)
+        scale_log[k] = (float)(0.5 * log(fmax(m[4 * k], largest / (GAUSSIAN_SCALE_RATIO * GAUSSIAN_SCALE_RATIO)) / s->weight));
+    /* The largest of the four is found first, from the diagonal: nothing is divided by something small. */
+    const double four[4] = {1 + v[0] + v[4] + v[8], 1 + v[0] - v[4] - v[8], 1 - v[0] + v[4] - v[8], 1 - v[0] - v[4] + v[8]};
+    int big = 0;
+    for (int k = 1; k < 4; k++)
+        big = four[k] > four[big] ? k : big;
+    const double wx = v[7] - v[5], wy = v[2] - v[6], wz = v[3] - v[1], xy = v[3] + v[1], xz = v[2] + v[6], yz = v[7] + v[5];
+    const double rows[4][4] = {{four[0], wx, wy, wz}, {wx, four[1], xy, xz}, {wy, xy, four[2], yz}, {wz, xz, yz, four[3]}};
+    double norm = 0;
+    for (int k = 0; k < 4; k++)
+        norm += rows[big][k] * rows[big][k];
+    for (int k = 0; k < 4; k++)
+        quat[k] = (float)(rows[big][k] / sqrt(norm));
+}
+
+/* Over the views in which the anchor was decoded: where the Gaussian was not made its opacity was 0, and it would have been as large as elsewhere. */
+static float opacity_of(const sums *s, uint32_t visible)
+{
+    const double missed = visible > s->kept && s->kept > 0 ? (double)(visible - s->kept) / s->kept : 0;
+    return s->weight > 0 ? (float)fmin(s->weight / (s->opaque * (1 + missed)), 1) : 0;
+}
+
+static gbt_status solve(const baking *b, int sh_degree, bake_result *out, gbt_error *err)
+{
+    const size_t k_count = (size_t)b->a->offset_count, slots = b->a->count * k_count;
+    size_t count = 0;
+    for (size_t i = 0; i < slots; i++)
+        count += opacity_of(&b->sums[i], b->visible[i / k_count]) >= opacity_min;
+    if (count == 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "no camera sees any Gaussian: nothing to bake");
+    gaussian_cloud *cloud = &out->cloud;
+    GBT_TRY(gaussian_cloud_alloc(cloud, count, err));
+    cloud->sh_degree = sh_degree;
+    size_t to = 0;
+    for (size_t i = 0; i < slots; i++) {
+        const sums *s = &b->sums[i];
+        const float opacity = opacity_of(s, b->visible[i / k_count]);
+        if (opacity < opacity_min) {
+            out->unseen++;
+            continue;
+        }
+        memcpy(cloud->mean + 3 * to, s->mean, sizeof s->mean);
+        cloud->opacity[to] = opacity;
+        solve_shape(s, cloud->scale_log + 3 * to, cloud->quat + 4 * to);
+        solve_color(b, s, cloud->sh + to * TERMS * 3);
+        to++;
+    }
+    return GBT_OK;
+}
+
+gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_camera *cameras, size_t camera_count, const trace_settings *settings,
+                      const bake_def *def, bake_result *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    if (def->sh_degree < 0 || def->sh_degree > 3 || !(def->prior >= 0 && def->prior <= 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "bake: degree %d, prior %g (wanted 0 to 3, 0 to 1)", def->sh_degree, def->prior);
+    baking b = {.a = a, .functions = sh_count(def->sh_degree)};
+    b.sums = mem_calloc(a->count * (size_t)a->offset_count, sizeof *b.sums, "Gaussians to bake", err);
+    b.visible = mem_calloc(a->count, sizeof *b.visible, "anchors to bake", err);
+    gbt_status status = b.sums == NULL || b.visible == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    const frame_drawing drawing = f->draw;
+    f->draw.renderer = FRAME_TRACE;
+    image nothing = {0};
+    for (size_t i = 0; i < camera_count && status == GBT_OK; i++)
+        status = add_view(&b, f, d, &cameras[i], settings, &nothing, err);
+    f->draw = drawing;
+    if (status == GBT_OK && def->prior > 0)
+        status = add_directions(&b, f, d, def->prior, err);
+    if (status == GBT_OK)
+        status = solve(&b, def->sh_degree, out, err);
+    image_free(&nothing);
+    mem_free(b.sums);
+    mem_free(b.visible);
+    return status;
+}

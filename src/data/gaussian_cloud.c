@@ -1,0 +1,30 @@
+/* data/gaussian_cloud.c -- memory of plain Gaussians. */
+#include "data/gaussian_cloud.h"
+
+#include <string.h>
+
+#include "base/memory.h"
+
+gbt_status gaussian_cloud_alloc(gaussian_cloud *cloud, size_t count, gbt_error *err)
+{
+    *cloud = (gaussian_cloud){.count = count};
+    cloud->mean = mem_alloc(count, 3 * sizeof(float), "Gaussian means", err);
+    cloud->scale_log = mem_alloc(count, 3 * sizeof(float), "Gaussian scales", err);
+    cloud->quat = mem_alloc(count, 4 * sizeof(float), "Gaussian rotations", err);
+    cloud->opacity = mem_alloc(count, sizeof(float), "Gaussian opacities", err);
+    cloud->sh = mem_alloc(count, GAUSSIAN_SH_COUNT * 3 * sizeof(float), "Gaussian colours", err);
+    if (cloud->mean != NULL && cloud->scale_log != NULL && cloud->quat != NULL && cloud->opacity != NULL && cloud->sh != NULL)
+        return GBT_OK;
+    gaussian_cloud_free(cloud);
+    return GBT_ERR_NO_MEMORY;
+}
+
+void gaussian_cloud_free(gaussian_cloud *cloud)
+{
+    mem_free(cloud->mean);
+    mem_free(cloud->scale_log);
+    mem_free(cloud->quat);
+    mem_free(cloud->opacity);
+    mem_free(cloud->sh);
+    memset(cloud, 0, sizeof *cloud);
+}

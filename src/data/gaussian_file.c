@@ -1,0 +1,66 @@
+/* data/gaussian_file.c -- formats by the ending of a name. */
+#include "data/gaussian_file.h"
+
+#include <string.h>
+#include <strings.h>
+
+#include "base/file.h"
+#include "data/glb_file.h"
+#include "data/gaussian_ply.h"
+#include "data/splat_file.h"
+#include "data/spz_file.h"
+
+static const struct {
+    const char *ending;
+    gbt_status (*read)(const source_file *file, gaussian_cloud *out, gbt_error *err); /* NULL: cannot */
+    gbt_status (*write)(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err);
+} formats[] = {
+    {".ply", gaussian_ply_read, gaussian_ply_write},
+    {".splat", splat_file_read, splat_file_write},
+    {".spz", spz_file_read, spz_file_write},
+    {".glb", NULL, glb_file_write},
+};
+
+enum { FORMAT_COUNT = sizeof formats / sizeof *formats };
+
+static int format_of(const char *path)
+{
+    const size_t length = strlen(path);
+    for (int i = 0; i < FORMAT_COUNT; i++) {
+        const size_t ending = strlen(formats[i].ending);
+        if (length > ending && strcasecmp(path + length - ending, formats[i].ending) == 0)
+            return i;
+    }
+    return -1;
+}
+
+bool gaussian_file_readable(const char *path)
+{
+    const int format = format_of(path);
+    return format >= 0 && formats[format].read != NULL;
+}
+
+gbt_status gaussian_file_read(const char *path, gaussian_cloud *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    if (!gaussian_file_readable(path))
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: cannot be read as Gaussians (wanted .ply, .splat or .spz)", path);
+    source_file file = {.name = path};
+    unsigned char *bytes;
+    GBT_TRY(file_read(path, &bytes, &file.size, err));
+    file.bytes = bytes;
+    const gbt_status status = formats[format_of(path)].read(&file, out, err);
+    mem_free(bytes);
+    return status;
+}
+
+gbt_status gaussian_file_check_writable(const char *path, gbt_error *err)
+{
+    return format_of(path) >= 0 ? GBT_OK : base_fail(err, GBT_ERR_ARGUMENT, "%s: which format? (wanted .ply, .splat, .spz or .glb)", path);
+}
+
+gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)
+{
+    GBT_TRY(gaussian_file_check_writable(path, err));
+    return formats[format_of(path)].write(path, cloud, origin, err);
+}

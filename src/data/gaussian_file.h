@@ -1,0 +1,21 @@
+/* data/gaussian_file.h -- plain Gaussians in whatever file people have: the format follows from the name. */
+#ifndef GBT_DATA_GAUSSIAN_FILE_H
+#define GBT_DATA_GAUSSIAN_FILE_H
+
+#include <stdbool.h>
+
+#include "data/gaussian_cloud.h"
+
+/** Whether the name ends as one that gaussian_file_read() takes: .ply, .splat, .spz. */
+bool gaussian_file_readable(const char *path);
+
+/** Read a .ply, .splat or .spz. GBT_ERR_ARGUMENT for another ending; else as its reader. Free with gaussian_cloud_free(). */
+gbt_status gaussian_file_read(const char *path, gaussian_cloud *out, gbt_error *err);
+
+/** GBT_ERR_ARGUMENT unless the name ends in .ply, .splat, .spz or .glb: before any work is done. */
+gbt_status gaussian_file_check_writable(const char *path, gbt_error *err);
+
+/** Write one of these, atomically; `origin` is added to every mean in double. As its writer. */
+gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err);
+
+#endif

@@ -1,0 +1,60 @@
+/* data/gaussian_ply_write.c -- plain 3DGS models as the .ply that every viewer reads. */
+#include <math.h>
+#include <stdio.h>
+
+#include "base/file.h"
+#include "data/gaussian_ply.h"
+
+/* The inverse of the sigmoid; 0 and 1 are as near as a float's sigmoid comes. */
+static double logit(double opacity)
+{
+    const double p = fmin(fmax(opacity, 1e-7), 1 - 1e-7);
+    return log(p / (1 - p));
+}
+
+static void put_properties(sink *s, const char *stem, size_t count)
+{
+    char line[64];
+    for (size_t i = 0; i < count; i++) {
+        snprintf(line, sizeof line, "property float %s%zu\n", stem, i);
+        sink_put_text(s, line);
+    }
+}
+
+gbt_status gaussian_ply_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)
+{
+    const size_t functions = (size_t)((cloud->sh_degree + 1) * (cloud->sh_degree + 1));
+    sink s = {.err = err};
+    char line[128];
+    snprintf(line, sizeof line, "ply\nformat binary_little_endian 1.0\nelement vertex %zu\n", cloud->count);
+    sink_put_text(&s, line);
+    sink_put_text(&s, "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\n");
+    put_properties(&s, "f_dc_", 3);
+    put_properties(&s, "f_rest_", 3 * (functions - 1));
+    sink_put_text(&s, "property float opacity\n");
+    put_properties(&s, "scale_", 3);
+    put_properties(&s, "rot_", 4);
+    sink_put_text(&s, "end_header\n");
+    for (size_t i = 0; i < cloud->count && s.status == GBT_OK; i++) {
+        const float(*sh)[3] = (const float(*)[3])(cloud->sh + i * GAUSSIAN_SH_COUNT * 3);
+        for (size_t k = 0; k < 3; k++)
+            sink_put_f32(&s, (float)((double)cloud->mean[3 * i + k] + origin[k]));
+        for (size_t k = 0; k < 3; k++)
+            sink_put_f32(&s, 0);
+        for (size_t c = 0; c < 3; c++)
+            sink_put_f32(&s, sh[0][c]);
+        for (size_t c = 0; c < 3; c++)
+            for (size_t k = 1; k < functions; k++)
+                sink_put_f32(&s, sh[k][c]);
+        sink_put_f32(&s, (float)logit((double)cloud->opacity[i]));
+        for (size_t k = 0; k < 3; k++)
+            sink_put_f32(&s, cloud->scale_log[3 * i + k]);
+        for (size_t k = 0; k < 4; k++)
+            sink_put_f32(&s, cloud->quat[4 * i + k]);
+    }
+    gbt_status status = s.status;
+    if (status == GBT_OK)
+        status = file_write_atomic(path, s.bytes, s.size, err);
+    sink_free(&s);
+    return status;
+}

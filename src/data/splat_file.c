@@ -1,0 +1,130 @@
+/* data/splat_file.c -- rows of { f32 x y z; f32 scale[3]; u8 r g b a; u8 quaternion w x y z as 128 + 128 q }. */
+#include "data/splat_file.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/file.h"
+
+enum { ROW_BYTES = 32 };
+
+#define SH_0 0.28209479177387814
+
+static unsigned byte_of(double value)
+{
+    return value >= 255 ? 255 : value > 0 ? (unsigned)(value + 0.5) : 0; /* NaN becomes 0 */
+}
+
+static float cursor_f32(cursor *c)
+{
+    const uint32_t bits = cursor_u32(c);
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/* False when the row is not usable. */
+static bool read_row(cursor *c, gaussian_cloud *out, size_t i)
+{
+    bool fine = true;
+    float largest = 0;
+    for (size_t k = 0; k < 3; k++) {
+        out->mean[3 * i + k] = cursor_f32(c);
+        fine = fine && fabsf(out->mean[3 * i + k]) < 1e12f;
+    }
+    float scale[3];
+    for (size_t k = 0; k < 3; k++) {
+        scale[k] = cursor_f32(c);
+        fine = fine && scale[k] >= 0 && scale[k] < 1e12f;
+        largest = fmaxf(largest, scale[k]);
+    }
+    bool clamped = false;
+    for (size_t k = 0; k < 3; k++) {
+        const float least = fmaxf(largest / (float)GAUSSIAN_SCALE_RATIO, 1e-12f);
+        clamped = clamped || scale[k] < least;
+        out->scale_log[3 * i + k] = logf(fmaxf(scale[k], least));
+    }
+    float *sh = out->sh + i * GAUSSIAN_SH_COUNT * 3;
+    memset(sh, 0, GAUSSIAN_SH_COUNT * 3 * sizeof *sh);
+    for (size_t k = 0; k < 3; k++)
+        sh[k] = (float)(((double)cursor_uint(c, 1) / 255 - 0.5) / SH_0);
+    out->opacity[i] = (float)cursor_uint(c, 1) / 255;
+    float q[4], square = 0;
+    for (int k = 0; k < 4; k++) {
+        q[k] = ((float)cursor_uint(c, 1) - 128) / 128;
+        square += q[k] * q[k];
+    }
+    for (size_t k = 0; k < 4; k++)
+        out->quat[4 * i + k] = square > 0 ? q[k] / sqrtf(square) : k == 0;
+    out->identity_rotations += fine && !(square > 0);
+    out->scales_clamped += fine && clamped;
+    return fine;
+}
+
+gbt_status splat_file_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    if (file->size == 0 || file->size % ROW_BYTES != 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no .splat file (wanted a multiple of %d bytes, got %zu)", file->name, (int)ROW_BYTES, file->size);
+    const size_t rows = file->size / ROW_BYTES;
+    GBT_TRY(gaussian_cloud_alloc(out, rows, err));
+    out->count = 0;
+    cursor c = {.file = file};
+    for (size_t i = 0; i < rows; i++) {
+        if (read_row(&c, out, out->count))
+            out->count++;
+        else
+            out->dropped++;
+    }
+    if (out->count > 0)
+        return GBT_OK;
+    gaussian_cloud_free(out);
+    return base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu rows dropped)", file->name, rows);
+}
+
+typedef struct ranked {
+    float weight;
+    uint32_t row;
+} ranked;
+
+static int by_weight(const void *a, const void *b)
+{
+    const ranked *x = a, *y = b;
+    if (x->weight > y->weight || x->weight < y->weight)
+        return x->weight > y->weight ? -1 : 1;
+    return (x->row > y->row) - (x->row < y->row);
+}
+
+static void put_row(sink *s, const gaussian_cloud *cloud, size_t i, const double origin[3])
+{
+    for (size_t k = 0; k < 3; k++)
+        sink_put_f32(s, (float)((double)cloud->mean[3 * i + k] + origin[k]));
+    for (size_t k = 0; k < 3; k++)
+        sink_put_f32(s, expf(cloud->scale_log[3 * i + k]));
+    for (size_t k = 0; k < 3; k++)
+        sink_put_uint(s, byte_of(255 * (0.5 + SH_0 * (double)cloud->sh[i * GAUSSIAN_SH_COUNT * 3 + k])), 1);
+    sink_put_uint(s, byte_of(255 * (double)cloud->opacity[i]), 1);
+    for (size_t k = 0; k < 4; k++)
+        sink_put_uint(s, byte_of(128 + 128 * (double)cloud->quat[4 * i + k]), 1);
+}
+
+gbt_status splat_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)
+{
+    ranked *order = mem_alloc(cloud->count, sizeof *order, "order of splats", err);
+    if (order == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < cloud->count; i++) {
+        const float *l = cloud->scale_log + 3 * i;
+        order[i] = (ranked){.weight = l[0] + l[1] + l[2] + logf(fmaxf(cloud->opacity[i], 1e-9f)), .row = (uint32_t)i};
+    }
+    qsort(order, cloud->count, sizeof *order, by_weight);
+    sink s = {.err = err};
+    for (size_t i = 0; i < cloud->count && s.status == GBT_OK; i++)
+        put_row(&s, cloud, order[i].row, origin);
+    mem_free(order);
+    gbt_status status = s.status;
+    if (status == GBT_OK)
+        status = file_write_atomic(path, s.bytes, s.size, err);
+    sink_free(&s);
+    return status;
+}

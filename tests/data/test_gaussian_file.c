@@ -1,0 +1,291 @@
+/* tests/data/test_gaussian_file.c -- plain Gaussians to .ply, .splat, .spz, .glb and back: what each format keeps, its bytes, damaged files. */
+#include <jansson.h>
+#include <zlib.h>
+
+#include "base/rng.h"
+#include "data/data_support.h"
+#include "data/gaussian_file.h"
+#include "data/splat_file.h"
+#include "data/spz_file.h"
+
+static const double nowhere[3] = {0, 0, 0};
+
+static float between(uint64_t stream, uint64_t index, float low, float high)
+{
+    return low + (high - low) * rng_uniform(7, stream, index);
+}
+
+static void make_cloud(gaussian_cloud *c, size_t count, int degree)
+{
+    must(gaussian_cloud_alloc(c, count, &err));
+    c->sh_degree = degree;
+    for (size_t i = 0; i < count; i++) {
+        float square = 0;
+        c->opacity[i] = between(1, i, 0.01f, 0.99f);
+        for (size_t k = 0; k < 3; k++)
+            c->mean[3 * i + k] = between(2, 3 * i + k, -20, 20), c->scale_log[3 * i + k] = between(3, 3 * i + k, -6, 0);
+        for (size_t k = 0; k < 4; k++)
+            c->quat[4 * i + k] = (float)rng_normal(7, 4, 4 * i + k), square += c->quat[4 * i + k] * c->quat[4 * i + k];
+        for (size_t k = 0; k < 4; k++)
+            c->quat[4 * i + k] /= sqrtf(square);
+        for (size_t k = 0; k < 48; k++)
+            c->sh[48 * i + k] = k < 3 * (size_t)((degree + 1) * (degree + 1)) ? between(5, 48 * i + k, -0.9f, 0.9f) : 0;
+    }
+}
+
+/* How far a format may move a value; scales as logs. */
+typedef struct limits {
+    double mean, scale, quat, opacity, color, harmonics;
+} limits;
+
+static void check_near(const gaussian_cloud *a, const gaussian_cloud *b, const double origin[3], const limits *l)
+{
+    assert_int_equal(a->count, b->count);
+    check_cloud(b);
+    for (size_t i = 0; i < a->count; i++) {
+        double dot = 0;
+        for (size_t k = 0; k < 3; k++) {
+            assert_true(fabs((double)a->mean[3 * i + k] + origin[k] - (double)b->mean[3 * i + k]) <= l->mean);
+            assert_true(fabs((double)a->scale_log[3 * i + k] - (double)b->scale_log[3 * i + k]) <= l->scale);
+            assert_true(fabs((double)a->sh[48 * i + k] - (double)b->sh[48 * i + k]) <= l->color);
+        }
+        for (size_t k = 0; k < 4; k++)
+            dot += (double)a->quat[4 * i + k] * (double)b->quat[4 * i + k];
+        assert_true(1 - fabs(dot) <= l->quat);
+        assert_true(fabs((double)a->opacity[i] - (double)b->opacity[i]) <= l->opacity);
+        for (size_t k = 3; k < 48; k++)
+            assert_true(fabs((double)a->sh[48 * i + k] - (double)b->sh[48 * i + k]) <= l->harmonics);
+    }
+}
+
+static void ply_keeps_everything(void **state)
+{
+    for (int degree = 0; degree <= 3; degree++) {
+        gaussian_cloud a, b;
+        make_cloud(&a, 50, degree);
+        const double origin[3] = {100, -200, 300};
+        must(gaussian_file_write(inside(*state, "a.ply", 0), &a, origin, &err));
+        must(gaussian_file_read(inside(*state, "a.ply", 0), &b, &err));
+        assert_int_equal(b.sh_degree, degree);
+        check_near(&a, &b, origin, &(limits){.mean = 2e-5, .quat = 1e-6, .opacity = 1e-6});
+        gaussian_cloud_free(&a);
+        gaussian_cloud_free(&b);
+    }
+}
+
+static void spz_keeps_its_steps(void **state)
+{
+    for (int degree = 0; degree <= 3; degree++) {
+        gaussian_cloud a, b;
+        make_cloud(&a, 300, degree);
+        must(gaussian_file_write(inside(*state, "a.SPZ", 0), &a, nowhere, &err));
+        must(gaussian_file_read(inside(*state, "a.SPZ", 0), &b, &err));
+        assert_int_equal(b.sh_degree, degree);
+        check_near(&a, &b, nowhere, &(limits){.mean = 0x1p-17 + 1e-6, .scale = 1.0 / 32 + 1e-6, .quat = 1e-5, .opacity = 1.0 / 510 + 1e-6,
+                                              .color = 0.5 / (0.15 * 255) + 1e-6, .harmonics = 8.5 / 128});
+        gaussian_cloud_free(&a);
+        gaussian_cloud_free(&b);
+    }
+}
+
+/* By rows of the file: the writer sorts them. */
+static void splat_keeps_one_color(void **state)
+{
+    gaussian_cloud a, b;
+    make_cloud(&a, 40, 3);
+    for (size_t i = 0; i < a.count; i++) { /* sorted already */
+        for (size_t k = 0; k < 3; k++)
+            a.scale_log[3 * i + k] = -0.1f * (float)i - 0.01f * (float)k;
+        a.opacity[i] = 0.5f;
+    }
+    must(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &err));
+    must(gaussian_file_read(inside(*state, "a.splat", 0), &b, &err));
+    check_near(&a, &b, nowhere, &(limits){.mean = 1e-9, .scale = 1e-6, .quat = 1e-4, .opacity = 1.0 / 510 + 1e-6, .color = 0.5 / (255 * 0.28209479) + 1e-6, .harmonics = 1});
+    gaussian_cloud_free(&a);
+    gaussian_cloud_free(&b);
+    make_cloud(&a, 100, 0);
+    must(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &err));
+    must(gaussian_file_read(inside(*state, "a.splat", 0), &b, &err));
+    double before = INFINITY;
+    for (size_t i = 0; i < b.count; i++) { /* opacity is rounded to 1 / 255 */
+        const double size = exp((double)b.scale_log[3 * i] + (double)b.scale_log[3 * i + 1] + (double)b.scale_log[3 * i + 2]);
+        assert_true(size * ((double)b.opacity[i] - 0.5 / 255) <= before * (1 + 1e-5));
+        before = size * ((double)b.opacity[i] + 0.5 / 255);
+    }
+    gaussian_cloud_free(&a);
+    gaussian_cloud_free(&b);
+}
+
+/* One Gaussian whose bytes follow from the format's description by hand. */
+static void spz_bytes(void **state)
+{
+    gaussian_cloud a;
+    make_cloud(&a, 1, 1);
+    const float mean[3] = {1, -2, 64}, scale_log[3] = {-10, 0, -1.5f}, quat[4] = {0.5f, -0.5f, 0.5f, -0.5f};
+    memcpy(a.mean, mean, sizeof mean), memcpy(a.scale_log, scale_log, sizeof scale_log), memcpy(a.quat, quat, sizeof quat);
+    a.opacity[0] = 0.6f;
+    memset(a.sh, 0, 48 * sizeof *a.sh);
+    a.sh[0] = 1, a.sh[1] = -1, a.sh[3] = 0.25f, a.sh[11] = -0.5f;
+    must(gaussian_file_write(inside(*state, "one.spz", 0), &a, nowhere, &err));
+    gaussian_cloud_free(&a);
+    gzFile zipped = gzopen(inside(*state, "one.spz", 0), "rb");
+    unsigned char got[64];
+    assert_int_equal(gzread(zipped, got, sizeof got), 16 + 9 + 1 + 3 + 3 + 4 + 9);
+    gzclose(zipped);
+    /* 64 2^16 is the largest power that fits: 16 fractional bits. */
+    static const unsigned char want[] = {'N', 'G', 'S', 'P', 3, 0, 0, 0, 1, 0, 0, 0, 1, 16, 0, 0,
+                                         0, 0, 1, 0, 0, 0xfe, 0, 0, 0x40,              /* 1, -2, 64 */
+                                         153,                                          /* 0.6 255 */
+                                         166, 89, 128,                                 /* 38.25 c + 127.5, ties to even */
+                                         0, 160, 136,                                  /* 16 (l + 10) */
+                                         0, 0, 0, 0,                                   /* the rotation: below */
+                                         160, 128, 128, 128, 128, 128, 128, 128, 64};
+    unsigned char expected[sizeof want];
+    memcpy(expected, want, sizeof want);
+    /* x y z w = -.5 .5 -.5 .5: x is the first of the largest, left out and made positive, so the others change signs; 361 = 511 sqrt(2) / 2. */
+    const uint32_t rotation = 0u << 30 | (1u << 9 | 361u) << 20 | (0u << 9 | 361u) << 10 | (1u << 9 | 361u);
+    for (int k = 0; k < 4; k++)
+        expected[32 + k] = (unsigned char)(rotation >> (8 * k));
+    for (size_t k = 0; k < sizeof want; k++)
+        if (got[k] != expected[k])
+            fail_msg("byte %zu: %u (wanted %u)", k, got[k], expected[k]);
+}
+
+static void glb_is_what_gltf_wants(void **state)
+{
+    gaussian_cloud a;
+    make_cloud(&a, 33, 2);
+    must(gaussian_file_write(inside(*state, "a.glb", 0), &a, nowhere, &err));
+    unsigned char *bytes;
+    size_t size;
+    must(file_read(inside(*state, "a.glb", 0), &bytes, &size, &err));
+    const source_file file = {"a.glb", bytes, size};
+    cursor c = {.file = &file};
+    assert_int_equal(cursor_u32(&c), 0x46546C67);
+    assert_int_equal(cursor_u32(&c), 2);
+    assert_int_equal(cursor_u32(&c), size);
+    const size_t json_size = cursor_u32(&c);
+    assert_int_equal(cursor_u32(&c), 0x4E4F534A);
+    assert_int_equal(json_size % 4, 0);
+    json_t *root = json_loadb((const char *)bytes + c.at, json_size, 0, NULL);
+    assert_non_null(root);
+    const size_t data_at = c.at + json_size + 8;
+    json_t *primitive = json_array_get(json_object_get(json_array_get(json_object_get(root, "meshes"), 0), "primitives"), 0);
+    json_t *attributes = json_object_get(primitive, "attributes"), *accessors = json_object_get(root, "accessors"), *views = json_object_get(root, "bufferViews");
+    assert_int_equal(json_object_size(attributes), 1 + 1 + 3 + 9);
+    assert_int_equal(json_integer_value(json_object_get(json_array_get(json_object_get(root, "buffers"), 0), "byteLength")), size - data_at);
+    json_t *position = json_array_get(accessors, (size_t)json_integer_value(json_object_get(attributes, "POSITION")));
+    double low = INFINITY;
+    for (size_t i = 0; i < a.count; i++)
+        low = fmin(low, -(double)a.mean[3 * i]);
+    assert_true(fabs(json_number_value(json_array_get(json_object_get(position, "min"), 0)) - low) < 1e-12);
+    /* The last value of the last accessor, and the quaternion of the first Gaussian. */
+    json_t *last = json_array_get(views, json_array_size(views) - 1);
+    assert_int_equal(json_integer_value(json_object_get(last, "byteOffset")) + json_integer_value(json_object_get(last, "byteLength")), size - data_at);
+    float value, quat[4];
+    memcpy(&value, bytes + size - 4, 4);
+    assert_true(value == a.sh[48 * 32 + 3 * 8 + 2]); /* function 8: even, keeps its sign */
+    json_t *rotation = json_array_get(accessors, (size_t)json_integer_value(json_object_get(attributes, "KHR_gaussian_splatting:ROTATION")));
+    json_t *view = json_array_get(views, (size_t)json_integer_value(json_object_get(rotation, "bufferView")));
+    memcpy(quat, bytes + data_at + (size_t)json_integer_value(json_object_get(view, "byteOffset")), sizeof quat);
+    const float want[4] = {-a.quat[1], -a.quat[2], a.quat[3], a.quat[0]};
+    for (int k = 0; k < 4; k++)
+        assert_true(fabsf(quat[k] - want[k]) < 1e-6f);
+    json_decref(root);
+    mem_free(bytes);
+    gaussian_cloud_free(&a);
+}
+
+static void try_spz(const unsigned char *bytes, size_t size, void *context)
+{
+    (void)context;
+    const source_file file = {"x.spz", bytes, size};
+    gaussian_cloud cloud;
+    gbt_error err = {0};
+    const gbt_status status = spz_file_read(&file, &cloud, &err);
+    check_message(status, &err);
+    if (status == GBT_OK)
+        check_cloud(&cloud);
+    gaussian_cloud_free(&cloud);
+}
+
+static void try_splat(const unsigned char *bytes, size_t size, void *context)
+{
+    (void)context;
+    const source_file file = {"x.splat", bytes, size};
+    gaussian_cloud cloud;
+    gbt_error err = {0};
+    const gbt_status status = splat_file_read(&file, &cloud, &err);
+    check_message(status, &err);
+    if (status == GBT_OK)
+        check_cloud(&cloud);
+    gaussian_cloud_free(&cloud);
+}
+
+/* Every truncation and flip of the zipped bytes, then of what was zipped. */
+static void damaged_files(void **state)
+{
+    gaussian_cloud a;
+    make_cloud(&a, 2, 1);
+    must(gaussian_file_write(inside(*state, "a.spz", 0), &a, nowhere, &err));
+    must(gaussian_file_write(inside(*state, "a.splat", 1), &a, nowhere, &err));
+    gaussian_cloud_free(&a);
+    unsigned char *bytes, plain[256];
+    size_t size;
+    must(file_read(inside(*state, "a.spz", 0), &bytes, &size, &err));
+    mutate_all(bytes, size, try_spz, NULL);
+    mem_free(bytes);
+    gzFile zipped = gzopen(inside(*state, "a.spz", 0), "rb");
+    const int plain_size = gzread(zipped, plain, sizeof plain);
+    gzclose(zipped);
+    for (int at = 0; at < plain_size; at++)
+        for (int flip = 1; flip < 256; flip = 2 * flip + 1) {
+            unsigned char changed[256], packed[512];
+            memcpy(changed, plain, sizeof changed);
+            changed[at] = (unsigned char)(changed[at] ^ flip);
+            z_stream z = {.next_in = changed, .avail_in = (uInt)plain_size, .next_out = packed, .avail_out = sizeof packed};
+            assert_int_equal(deflateInit2(&z, 6, Z_DEFLATED, 31, 8, Z_DEFAULT_STRATEGY), Z_OK);
+            assert_int_equal(deflate(&z, Z_FINISH), Z_STREAM_END);
+            try_spz(packed, z.total_out, NULL);
+            deflateEnd(&z);
+        }
+    must(file_read(inside(*state, "a.splat", 0), &bytes, &size, &err));
+    mutate_all(bytes, size, try_splat, NULL);
+    mem_free(bytes);
+}
+
+static void refusals(void **state)
+{
+    (void)state;
+    gaussian_cloud cloud;
+    gbt_error err = {0};
+    assert_int_equal(gaussian_file_read("scene.obj", &cloud, &err), GBT_ERR_ARGUMENT);
+    assert_non_null(strstr(err.text, "scene.obj: cannot be read as Gaussians"));
+    err = (gbt_error){0};
+    assert_int_equal(gaussian_file_check_writable("scene", &err), GBT_ERR_ARGUMENT);
+    assert_non_null(strstr(err.text, "wanted .ply, .splat, .spz or .glb"));
+    err = (gbt_error){0};
+    const source_file four = {"v4.spz", (const unsigned char *)"NGSP\4\0\0\0", 8};
+    assert_int_equal(spz_file_read(&four, &cloud, &err), GBT_ERR_FORMAT);
+    assert_non_null(strstr(err.text, "version 4"));
+    make_cloud(&cloud, 1, 0);
+    err = (gbt_error){0};
+    assert_int_equal(gaussian_file_write(inside(*state, "far.spz", 0), &cloud, (const double[3]){1e7, 0, 0}, &err), GBT_ERR_ARGUMENT);
+    assert_non_null(strstr(err.text, "does not fit"));
+    assert_false(file_exists(inside(*state, "far.spz", 0)));
+    gaussian_cloud_free(&cloud);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(ply_keeps_everything, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(spz_keeps_its_steps, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(splat_keeps_one_color, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(spz_bytes, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(glb_is_what_gltf_wants, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(damaged_files, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(refusals, make_temporary, remove_temporary),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

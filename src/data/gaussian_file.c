@@ -12,13 +12,14 @@
 
 static const struct {
     const char *ending;
+    int degree; /* of the colours it keeps */
     gbt_status (*read)(const source_file *file, gaussian_cloud *out, gbt_error *err); /* NULL: cannot */
     gbt_status (*write)(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err);
 } formats[] = {
-    {".ply", gaussian_ply_read, gaussian_ply_write},
-    {".splat", splat_file_read, splat_file_write},
-    {".spz", spz_file_read, spz_file_write},
-    {".glb", NULL, glb_file_write},
+    {".ply", 3, gaussian_ply_read, gaussian_ply_write},
+    {".splat", 0, splat_file_read, splat_file_write},
+    {".spz", 3, spz_file_read, spz_file_write},
+    {".glb", 3, NULL, glb_file_write},
 };
 
 enum { FORMAT_COUNT = sizeof formats / sizeof *formats };
@@ -57,6 +58,12 @@ gbt_status gaussian_file_read(const char *path, gaussian_cloud *out, gbt_error *
 gbt_status gaussian_file_check_writable(const char *path, gbt_error *err)
 {
     return format_of(path) >= 0 ? GBT_OK : base_fail(err, GBT_ERR_ARGUMENT, "%s: which format? (wanted .ply, .splat, .spz or .glb)", path);
+}
+
+int gaussian_file_degree(const char *path)
+{
+    const int format = format_of(path);
+    return format >= 0 ? formats[format].degree : 3;
 }
 
 gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)

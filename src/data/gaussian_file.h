@@ -15,6 +15,9 @@ gbt_status gaussian_file_read(const char *path, gaussian_cloud *out, gbt_error *
 /** GBT_ERR_ARGUMENT unless the name ends in .ply, .splat, .spz or .glb: before any work is done. */
 gbt_status gaussian_file_check_writable(const char *path, gbt_error *err);
 
+/** The largest degree of colours that the format keeps: 0 for .splat, else 3. */
+int gaussian_file_degree(const char *path);
+
 /** Write one of these, atomically; `origin` is added to every mean in double. As its writer. */
 gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err);
 

@@ -69,18 +69,25 @@ static gbt_status training_cameras(const loaded_run *r, gbt_camera **out, size_t
     return GBT_OK;
 }
 
-static gbt_status bake_run(exporting *e, const char *run, gbt_error *err)
+static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
 {
     loaded_run *r = &e->run;
     GBT_TRY(loaded_run_open(run, e->def->data, 0, r, err));
     choose_views(e);
     memcpy(e->origin, r->model.origin, sizeof e->origin);
     e->frame.footprint = r->frame.draw.footprint;
+    return GBT_OK;
+}
+
+/* e->cloud, from the networks. */
+static gbt_status bake_run(exporting *e, int sh_degree, gbt_error *err)
+{
+    loaded_run *r = &e->run;
     gbt_camera *cameras = NULL;
     size_t count;
     GBT_TRY(training_cameras(r, &cameras, &count, err));
     bake_def bake = bake_def_default();
-    bake.sh_degree = e->def->sh_degree;
+    bake.sh_degree = sh_degree;
     bake_result result = {0};
     double clock = clock_wall();
     gbt_status status = bake_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count, &r->settings, &bake, &result, err);
@@ -164,7 +171,7 @@ static void say_source(const exporting *e, const char *input, FILE *report)
     fprintf(report, "\n");
 }
 
-static gbt_status write_one(exporting *e, const char *path, FILE *report, json_t *files, gbt_error *err)
+static gbt_status write_file(exporting *e, const char *path, FILE *report, json_t *files, gbt_error *err)
 {
     GBT_TRY(gaussian_file_write(path, &e->cloud, e->origin, err));
     struct stat info = {0};
@@ -172,7 +179,7 @@ static gbt_status write_one(exporting *e, const char *path, FILE *report, json_t
     loss_of_view loss = {NAN, NAN};
     if (e->baked && e->view_count > 0)
         GBT_TRY(compare_file(e, path, &loss, err));
-    json_t *row = json_pack("{s:s,s:I}", "file", path, "bytes", (json_int_t)info.st_size);
+    json_t *row = json_pack("{s:s,s:I,s:i}", "file", path, "bytes", (json_int_t)info.st_size, "sh_degree", e->cloud.sh_degree);
     if (isfinite(loss.to_model)) {
         json_object_set_new(row, "psnr_to_model", json_real(loss.to_model));
         json_object_set_new(row, "psnr_to_photos", json_real(loss.to_photo));
@@ -191,6 +198,29 @@ static gbt_status write_one(exporting *e, const char *path, FILE *report, json_t
     return GBT_OK;
 }
 
+/* All files whose format keeps colours of this degree, or only `flat` ones. Where a format keeps one colour, that colour is fitted: the first term of a
+   longer series is not the best constant. */
+static gbt_status write_kind(exporting *e, const char *input, bool flat, const char *const *outputs, size_t output_count, FILE *report, json_t *files,
+                             gbt_error *err)
+{
+    bool any = false;
+    for (size_t i = 0; i < output_count; i++)
+        any = any || (gaussian_file_degree(outputs[i]) == 0) == flat;
+    if (!any)
+        return GBT_OK;
+    const int degree = flat ? 0 : e->def->sh_degree;
+    gaussian_cloud_free(&e->cloud);
+    GBT_TRY(e->baked ? bake_run(e, degree, err) : gaussian_file_read(input, &e->cloud, err));
+    if (e->cloud.sh_degree > degree)
+        e->cloud.sh_degree = degree;
+    if (report != NULL)
+        say_source(e, input, report);
+    for (size_t i = 0; i < output_count; i++)
+        if ((gaussian_file_degree(outputs[i]) == 0) == flat)
+            GBT_TRY(write_file(e, outputs[i], report, files, err));
+    return GBT_OK;
+}
+
 gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, FILE *report, gbt_error *err)
 {
     GBT_TRY(check(input, def, outputs, output_count, err));
@@ -199,17 +229,13 @@ gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *
         return GBT_ERR_NO_MEMORY;
     e->def = def;
     e->baked = !gaussian_file_readable(input);
-    gbt_status status = e->baked ? bake_run(e, input, err) : gaussian_file_read(input, &e->cloud, err);
-    if (status == GBT_OK && e->cloud.sh_degree > def->sh_degree)
-        e->cloud.sh_degree = def->sh_degree;
+    gbt_status status = e->baked ? open_run(e, input, err) : GBT_OK;
     json_t *files = json_array();
-    if (status == GBT_OK && report != NULL)
-        say_source(e, input, report);
-    for (size_t i = 0; i < output_count && status == GBT_OK; i++)
-        status = write_one(e, outputs[i], report, files, err);
+    for (int flat = 0; flat < 2 && status == GBT_OK; flat++)
+        status = write_kind(e, input, flat, outputs, output_count, report, files, err);
     if (status == GBT_OK && def->json != NULL)
-        status = json_save(json_pack("{s:i,s:s,s:I,s:I,s:i,s:O}", "schema", 1, "input", input, "gaussians", (json_int_t)e->cloud.count, "unseen",
-                                         (json_int_t)e->unseen, "sh_degree", e->cloud.sh_degree, "files", files),
+        status = json_save(json_pack("{s:i,s:s,s:I,s:I,s:O}", "schema", 1, "input", input, "gaussians", (json_int_t)e->cloud.count, "unseen",
+                                         (json_int_t)e->unseen, "files", files),
                                def->json, err);
     json_decref(files);
     gaussian_cloud_free(&e->cloud);

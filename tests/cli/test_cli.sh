@@ -295,6 +295,12 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     "$program" study rate run -o rate >out 2>err && cmp -s out rate/rate.md && [ "$(grep -c '"row": ' rate/rate.json)" = 2 ] && grep -q '<svg xmlns' rate/rate.svg &&
         [ "$(ls rate | wc -l)" = 4 ]
     report $? "study rate writes its tables and its chart" "$(cat err out)"
+    "$program" export run plain.ply plain.spz plain.splat plain.glb --refine 5 --json plain.json >out 2>err && [ "$(grep -c 'dB to the model' out)" = 4 ] &&
+        [ "$(grep -c '"psnr_to_model": ' plain.json)" = 4 ] && [ "$(head -c 4 plain.glb)" = glTF ] && "$program" export plain.spz back.ply >>out 2>>err &&
+        [ "$(grep -a '^element vertex' back.ply)" = "$(grep -a '^element vertex' plain.ply)" ]
+    report $? "export bakes a run into every format, and converts" "$(cat err out)"
+    misuse 2 "scene.obj: which format? (wanted .ply, .splat, .spz or .glb)" export run scene.obj
+    misuse 2 "--sh-degree: bad value (wanted a whole number from 0 to 3, got 4)" export run scene.ply --sh-degree 4
     misuse 2 "--quality: bad value (wanted a number from 20 to 90, got 10)" compress run -o small.gbt --quality 10
     misuse 2 '--outputs: "dept" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)' render run -o pictures --outputs hits,dept
 else

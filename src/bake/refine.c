@@ -80,13 +80,11 @@ static void step_block(size_t block, size_t begin, size_t end, void *context)
         adam_step(p->sh + at, g->sh + at, m->sh + at, v->sh + at, 3, r->color);
         adam_step(p->sh + at + 3, g->sh + at + 3, m->sh + at + 3, v->sh + at + 3, REST, r->harmonics);
         p->opacity[i] = 1 / (1 + expf(-r->logit[i]));
-        float *q = p->quat + 4 * i, *l = p->scale_log + 3 * i;
+        float *q = p->quat + 4 * i;
         const float norm = sqrtf(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
         for (int k = 0; k < 4; k++)
             q[k] /= norm;
-        const float least = fmaxf(l[0], fmaxf(l[1], l[2])) - (float)log(GAUSSIAN_SCALE_RATIO);
-        for (int k = 0; k < 3; k++)
-            l[k] = fmaxf(l[k], least);
+        gaussian_limit_scales(p->scale_log + 3 * i);
     }
 }
 

@@ -78,6 +78,14 @@ static inline uint64_t cursor_u64(cursor *c)
     return cursor_uint(c, 8);
 }
 
+static inline float cursor_f32(cursor *c)
+{
+    const uint32_t bits = cursor_u32(c);
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
 static inline double cursor_f64(cursor *c)
 {
     const uint64_t bits = cursor_uint(c, 8);

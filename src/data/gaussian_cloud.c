@@ -1,6 +1,7 @@
 /* data/gaussian_cloud.c -- memory of plain Gaussians. */
 #include "data/gaussian_cloud.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/memory.h"
@@ -27,4 +28,15 @@ void gaussian_cloud_free(gaussian_cloud *cloud)
     mem_free(cloud->opacity);
     mem_free(cloud->sh);
     memset(cloud, 0, sizeof *cloud);
+}
+
+bool gaussian_limit_scales(float scale_log[3])
+{
+    const float least = fmaxf(scale_log[0], fmaxf(scale_log[1], scale_log[2])) - (float)log(GAUSSIAN_SCALE_RATIO);
+    bool changed = false;
+    for (int k = 0; k < 3; k++) {
+        changed = changed || scale_log[k] < least;
+        scale_log[k] = fmaxf(scale_log[k], least);
+    }
+    return changed;
 }

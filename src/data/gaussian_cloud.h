@@ -2,11 +2,15 @@
 #ifndef GBT_DATA_GAUSSIAN_CLOUD_H
 #define GBT_DATA_GAUSSIAN_CLOUD_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "gbtrace/status.h"
 
 enum { GAUSSIAN_SH_COUNT = 16 };
+
+/** Y_0, the same in all directions. */
+#define GAUSSIAN_SH_0 0.28209479177387814
 
 /** Largest ratio of two scales of one Gaussian: canonical-space float arithmetic keeps 1/255 up to it. */
 #define GAUSSIAN_SCALE_RATIO 1e4
@@ -31,5 +35,8 @@ typedef struct gaussian_cloud {
 /** Room for `count` Gaussians, in use; values undefined. On failure zeroed. */
 gbt_status gaussian_cloud_alloc(gaussian_cloud *cloud, size_t count, gbt_error *err);
 void gaussian_cloud_free(gaussian_cloud *cloud);
+
+/** Raise the scales of one Gaussian to GAUSSIAN_SCALE_RATIO below their largest; true when that changed one. */
+bool gaussian_limit_scales(float scale_log[3]);
 
 #endif

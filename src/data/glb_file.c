@@ -11,8 +11,6 @@
 
 enum { GLB_MAGIC = 0x46546C67, CHUNK_JSON = 0x4E4F534A, CHUNK_BIN = 0x004E4942, TYPE_UBYTE = 5121, TYPE_FLOAT = 5126, MODE_POINTS = 0 };
 
-#define SH_0 0.28209479177387814
-
 typedef struct glb {
     sink data; /* the binary chunk */
     json_t *attributes, *accessors, *views;
@@ -58,7 +56,7 @@ static void put_shape(glb *g, const gaussian_cloud *cloud)
     for (size_t i = 0; i < cloud->count; i++) {
         const float *sh = cloud->sh + i * GAUSSIAN_SH_COUNT * 3;
         for (int c = 0; c < 3; c++)
-            sink_put_uint(s, (uint64_t)(255 * linear_of(0.5 + SH_0 * (double)sh[c]) + 0.5), 1);
+            sink_put_uint(s, (uint64_t)(255 * linear_of(0.5 + GAUSSIAN_SH_0 * (double)sh[c]) + 0.5), 1);
         sink_put_uint(s, (uint64_t)(255 * fmin(fmax((double)cloud->opacity[i], 0), 1) + 0.5), 1);
     }
     json_object_set_new(add_attribute(g, "COLOR_0", "VEC4", TYPE_UBYTE, from), "normalized", json_true());

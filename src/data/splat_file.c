@@ -8,19 +8,9 @@
 
 enum { ROW_BYTES = 32 };
 
-#define SH_0 0.28209479177387814
-
 static unsigned byte_of(double value)
 {
     return value >= 255 ? 255 : value > 0 ? (unsigned)(value + 0.5) : 0; /* NaN becomes 0 */
-}
-
-static float cursor_f32(cursor *c)
-{
-    const uint32_t bits = cursor_u32(c);
-    float value;
-    memcpy(&value, &bits, sizeof value);
-    return value;
 }
 
 /* False when the row is not usable. */
@@ -47,7 +37,7 @@ static bool read_row(cursor *c, gaussian_cloud *out, size_t i)
     float *sh = out->sh + i * GAUSSIAN_SH_COUNT * 3;
     memset(sh, 0, GAUSSIAN_SH_COUNT * 3 * sizeof *sh);
     for (size_t k = 0; k < 3; k++)
-        sh[k] = (float)(((double)cursor_uint(c, 1) / 255 - 0.5) / SH_0);
+        sh[k] = (float)(((double)cursor_uint(c, 1) / 255 - 0.5) / GAUSSIAN_SH_0);
     out->opacity[i] = (float)cursor_uint(c, 1) / 255;
     float q[4], square = 0;
     for (int k = 0; k < 4; k++) {
@@ -102,7 +92,7 @@ static void put_row(sink *s, const gaussian_cloud *cloud, size_t i, const double
     for (size_t k = 0; k < 3; k++)
         sink_put_f32(s, expf(cloud->scale_log[3 * i + k]));
     for (size_t k = 0; k < 3; k++)
-        sink_put_uint(s, byte_of(255 * (0.5 + SH_0 * (double)cloud->sh[i * GAUSSIAN_SH_COUNT * 3 + k])), 1);
+        sink_put_uint(s, byte_of(255 * (0.5 + GAUSSIAN_SH_0 * (double)cloud->sh[i * GAUSSIAN_SH_COUNT * 3 + k])), 1);
     sink_put_uint(s, byte_of(255 * (double)cloud->opacity[i]), 1);
     for (size_t k = 0; k < 4; k++)
         sink_put_uint(s, byte_of(128 + 128 * (double)cloud->quat[4 * i + k]), 1);

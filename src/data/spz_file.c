@@ -200,11 +200,7 @@ static void unpack(const unsigned char *at, unsigned version, int degree, int fr
         for (size_t k = 0; k < l.harmonics; k++)
             sh[3 + k] = ((float)harmonics[l.harmonics * i + k] - 128) / 128;
         unpack_rotation(rotation + l.rotation * i, version, out->quat + 4 * i);
-        float *log_scale = out->scale_log + 3 * i;
-        const float largest = fmaxf(log_scale[0], fmaxf(log_scale[1], log_scale[2])), least = largest - (float)log(GAUSSIAN_SCALE_RATIO);
-        out->scales_clamped += log_scale[0] < least || log_scale[1] < least || log_scale[2] < least;
-        for (int k = 0; k < 3; k++)
-            log_scale[k] = fmaxf(log_scale[k], least);
+        out->scales_clamped += gaussian_limit_scales(out->scale_log + 3 * i);
     }
 }
 

@@ -16,7 +16,7 @@
 #include "train/gradient_check.h"
 
 static const float dssim_weight = 0.2f, volume_weight = 0.01f, revived_opacity = 0.1f;
-static const float growth_gradient = 2e-4f, share_min = 2.5e-6f; /* of short runs: schedule_thrift() */
+static const float share_min = 2.5e-6f; /* of short runs: schedule_thrift() */
 enum { ADAM_BLOCK = 512, MAX_SKIPPED_IN_ROW = 10, ADJUSTS_PER_RUN = 100, INTERVAL_MIN = 20 /* a judgement of fewer views is chance */ };
 enum { STREAM_VIEWS = 1, STREAM_PIXELS = 4, LEAST_PIXELS_ACROSS = 80 /* with fewer a step would not be faster */, CULPRIT_SIZE = 384, BARREN_STEPS = 5 };
 
@@ -185,13 +185,14 @@ static gbt_status grow_and_prune(trainer *t, uint64_t steps_since, gbt_error *er
     adjust_def def = adjust_def_default();
     def.voxel_size = t->voxel_size;
     def.interval = (float)steps_since;
-    if (!t->def.compat)
+    if (t->def.compat)
+        def.shape_log_max = 0.05f;
+    else {
+        const float thrift = schedule_thrift(pace_expected(&t->pace, t->step));
         def.interval = fmaxf(def.interval, (float)INTERVAL_MIN);
-    const float thrift = t->def.compat ? 1 : schedule_thrift(pace_expected(&t->pace, t->step));
-    def.grad_threshold = thrift * growth_gradient;
-    if (!t->def.compat)
+        def.grad_threshold *= thrift;
         def.min_use = thrift * share_min;
-    def.shape_log_max = t->def.compat ? 0.05f : INFINITY;
+    }
     def.max_anchors = t->def.max_anchors;
     def.compat = t->def.compat;
     def.seed = t->def.seed;

@@ -146,6 +146,28 @@ static inline void check_message(gbt_status status, const gbt_error *err)
     assert_null(strchr(err->text, '\n'));
 }
 
+/** A reader of Gaussians, and how many variants it took: the context of try_gaussians(). */
+typedef struct gaussian_attempts {
+    gbt_status (*read)(const source_file *file, gaussian_cloud *out, gbt_error *err);
+    size_t accepted;
+} gaussian_attempts;
+
+/** A try_bytes: what is taken is sound, what is refused says why. */
+static inline void try_gaussians(const unsigned char *bytes, size_t size, void *context)
+{
+    gaussian_attempts *attempts = context;
+    const source_file file = {"variant", bytes, size};
+    gaussian_cloud cloud;
+    gbt_error err = {0};
+    const gbt_status status = attempts->read(&file, &cloud, &err);
+    check_message(status, &err);
+    if (status == GBT_OK) {
+        attempts->accepted++;
+        check_cloud(&cloud);
+    }
+    gaussian_cloud_free(&cloud);
+}
+
 /** Feed one variant of a seed to a reader; `bytes` has exactly `size` bytes. */
 typedef void try_bytes(const unsigned char *bytes, size_t size, void *context);
 

@@ -196,35 +196,10 @@ static void glb_is_what_gltf_wants(void **state)
     gaussian_cloud_free(&a);
 }
 
-static void try_spz(const unsigned char *bytes, size_t size, void *context)
-{
-    (void)context;
-    const source_file file = {"x.spz", bytes, size};
-    gaussian_cloud cloud;
-    gbt_error err = {0};
-    const gbt_status status = spz_file_read(&file, &cloud, &err);
-    check_message(status, &err);
-    if (status == GBT_OK)
-        check_cloud(&cloud);
-    gaussian_cloud_free(&cloud);
-}
-
-static void try_splat(const unsigned char *bytes, size_t size, void *context)
-{
-    (void)context;
-    const source_file file = {"x.splat", bytes, size};
-    gaussian_cloud cloud;
-    gbt_error err = {0};
-    const gbt_status status = splat_file_read(&file, &cloud, &err);
-    check_message(status, &err);
-    if (status == GBT_OK)
-        check_cloud(&cloud);
-    gaussian_cloud_free(&cloud);
-}
-
 /* Every truncation and flip of the zipped bytes, then of what was zipped. */
 static void damaged_files(void **state)
 {
+    gaussian_attempts spz = {.read = spz_file_read}, splat = {.read = splat_file_read};
     gaussian_cloud a;
     make_cloud(&a, 2, 1);
     must(gaussian_file_write(inside(*state, "a.spz", 0), &a, nowhere, &err));
@@ -233,7 +208,7 @@ static void damaged_files(void **state)
     unsigned char *bytes, plain[256];
     size_t size;
     must(file_read(inside(*state, "a.spz", 0), &bytes, &size, &err));
-    mutate_all(bytes, size, try_spz, NULL);
+    mutate_all(bytes, size, try_gaussians, &spz);
     mem_free(bytes);
     gzFile zipped = gzopen(inside(*state, "a.spz", 0), "rb");
     const int plain_size = gzread(zipped, plain, sizeof plain);
@@ -246,11 +221,11 @@ static void damaged_files(void **state)
             z_stream z = {.next_in = changed, .avail_in = (uInt)plain_size, .next_out = packed, .avail_out = sizeof packed};
             assert_int_equal(deflateInit2(&z, 6, Z_DEFLATED, 31, 8, Z_DEFAULT_STRATEGY), Z_OK);
             assert_int_equal(deflate(&z, Z_FINISH), Z_STREAM_END);
-            try_spz(packed, z.total_out, NULL);
+            try_gaussians(packed, z.total_out, &spz);
             deflateEnd(&z);
         }
     must(file_read(inside(*state, "a.splat", 0), &bytes, &size, &err));
-    mutate_all(bytes, size, try_splat, NULL);
+    mutate_all(bytes, size, try_gaussians, &splat);
     mem_free(bytes);
 }
 

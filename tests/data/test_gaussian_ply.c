@@ -205,30 +205,15 @@ static void other_files(void **state)
     refused(&s, "1000000000 Gaussians cannot be");
 }
 
-static void try_model(const unsigned char *bytes, size_t size, void *context)
-{
-    size_t *accepted = context;
-    const source_file file = {"g.ply", bytes, size};
-    gaussian_cloud cloud;
-    gbt_error err = {0};
-    const gbt_status status = gaussian_ply_read(&file, &cloud, &err);
-    check_message(status, &err);
-    if (status == GBT_OK) {
-        ++*accepted;
-        check_cloud(&cloud);
-    }
-    gaussian_cloud_free(&cloud);
-}
-
 static void mutations(void **state)
 {
     (void)state;
     sink s = {0};
     put_header(&s, 1, 0, NULL);
     put_row(&s, "1 -2.5 3", 0, "0.5", "-1 -2 -3", "1 0.5 0 0");
-    size_t accepted = 0;
-    mutate_all(s.bytes, s.size, try_model, &accepted);
-    assert_true(accepted > 0);
+    gaussian_attempts ascii = {.read = gaussian_ply_read}, little_endian = {.read = gaussian_ply_read};
+    mutate_all(s.bytes, s.size, try_gaussians, &ascii);
+    assert_true(ascii.accepted > 0);
     sink_free(&s);
     /* The same in binary, one row of 17 floats. */
     put_header(&s, 1, 0, NULL);
@@ -237,9 +222,8 @@ static void mutations(void **state)
     sink_put(&binary, s.bytes + strlen("ply\nformat ascii 1.0\n"), s.size - strlen("ply\nformat ascii 1.0\n"));
     for (int k = 0; k < 17; k++)
         sink_put_f32(&binary, 0.25f * (float)(k - 8));
-    accepted = 0;
-    mutate_all(binary.bytes, binary.size, try_model, &accepted);
-    assert_true(accepted > 0);
+    mutate_all(binary.bytes, binary.size, try_gaussians, &little_endian);
+    assert_true(little_endian.accepted > 0);
     sink_free(&s);
     sink_free(&binary);
 }

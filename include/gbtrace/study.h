@@ -1,4 +1,4 @@
-/* gbtrace/study.h -- studies that train: the paper's tables, and held-out quality against time, from real runs on the user's own scenes. */
+/* gbtrace/study.h -- studies that train: the paper's tables, held-out quality against time and against anchors, from real runs on the user's own scenes. */
 #ifndef GBTRACE_STUDY_H
 #define GBTRACE_STUDY_H
 
@@ -12,7 +12,7 @@
 extern "C" {
 #endif
 
-/* Both studies train each variant with each seed into FOLDER/runs/SCENE/VARIANT/seed-S, where a scene is called as its folder. A run that is
+/* These studies train each variant with each seed into FOLDER/runs/SCENE/VARIANT/seed-S, where a scene is called as its folder. A run that is
    there, whole and of the same settings, is taken as it is; any other is made again. Models and scores stay, checkpoints do not. A row beyond
    its limit is no failure: it is told in the table. SIGINT and SIGTERM end the study after the current step with GBT_ERR_INTERRUPTED; the
    same call goes on with the run that was interrupted, from its start. */
@@ -60,6 +60,27 @@ gbt_time_def gbt_time_def_default(void);
  * Cost: about fifteen budgets per scene and seed. Nothing else should run meanwhile.
  */
 gbt_status gbt_study_time(const gbt_time_def *def, const char *folder, FILE *out, gbt_error *err);
+
+typedef struct gbt_anchors_def {
+    const char *const *data; /* as above */
+    size_t data_count;       /* 1 to 16 */
+    uint64_t iterations;     /* of every run, at least 20. Default 1000 */
+    double downscale;        /* photos are divided by this, [1, 64]. Default 1 */
+    int seeds;               /* runs of each variant, [1, 10]. Default 3 */
+} gbt_anchors_def;
+
+gbt_anchors_def gbt_anchors_def_default(void);
+
+/**
+ * What a scene needs: the default settings with anchors that start at voxels, at the paper's balls, at adaptive balls and at as many random points, and with
+ * more or less asked of an anchor; anchors, bytes and hits per ray against held-out PSNR, all after the same number of steps.
+ *
+ * Writes anchors.md, .csv (every run), .json and .svg into `folder`, and the tables as Markdown to `out`.
+ *
+ * @return as gbt_study_paper()
+ * Cost: seven runs per scene and seed. What else runs meanwhile changes nothing but the time.
+ */
+gbt_status gbt_study_anchors(const gbt_anchors_def *def, const char *folder, FILE *out, gbt_error *err);
 
 #ifdef __cplusplus
 }

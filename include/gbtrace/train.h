@@ -36,6 +36,7 @@ typedef struct gbt_train_def {
                                    0: no limit. Default 0 */
     size_t max_anchors;         /* growth stops there. Default 2,000,000 */
     bool grow;                  /* grow and prune anchors. Default true */
+    double thrift;              /* anchors must bring so many times as much to be made and to be kept, [0.1, 10]. Not with compat. Default 1 */
     bool compat;                /* every quirk of the reference method (docs/training.md). Default false */
     bool exposure;              /* learn a colour matrix per photo, for photos whose exposure differs; held-out photos are then scored on
                                    their right half, with a matrix fitted to the left. Default false */

@@ -7,11 +7,11 @@
 #include <math.h>
 #include <string.h>
 
-#include "bake/sh.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/symmetric.h"
 #include "base/vec.h"
+#include "frame/sh.h"
 
 enum { TERMS = GAUSSIAN_SH_COUNT, PAIRS = TERMS * (TERMS + 1) / 2, DIRECTIONS = 64, PIXEL_STEP = 2 };
 
@@ -75,15 +75,12 @@ static void direction_to(const double eye[3], const float mean[3], float out[3])
 }
 
 /* One camera: what it makes of each Gaussian, and how much of that it sees. */
-static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_camera *camera, const trace_settings *settings, image *nothing, gbt_error *err)
+static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_camera *camera, const trace_settings *settings, gbt_error *err)
 {
     gbt_camera sparse = *camera;
     f->draw.pixel_step = gbt_camera_every(camera, PIXEL_STEP, 0, 0, &sparse) ? PIXEL_STEP : 1;
-    GBT_TRY(frame_render(f, b->a, d, &sparse, settings, true, err));
-    GBT_TRY(image_fit(nothing, f->rgb.width, f->rgb.height, 3, err));
-    memset(nothing->pixels, 0, (size_t)nothing->width * (size_t)nothing->height * 3 * sizeof *nothing->pixels);
-    GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen, "weights", err));
-    GBT_TRY(trace_backward(&f->scene, &f->rays, nothing, &f->d_gaussians, f->seen, NULL, err));
+    GBT_TRY(frame_render(f, frame_neural(b->a, d), &sparse, settings, true, err));
+    GBT_TRY(frame_weigh(f, err));
     for (size_t v = 0; v < f->visible_count; v++)
         b->visible[f->visible[v]]++;
     const gaussians *g = &f->gaussians;
@@ -249,15 +246,13 @@ gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_ca
     gbt_status status = b.sums == NULL || b.visible == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     const frame_drawing drawing = f->draw;
     f->draw.renderer = FRAME_TRACE;
-    image nothing = {0};
     for (size_t i = 0; i < camera_count && status == GBT_OK; i++)
-        status = add_view(&b, f, d, &cameras[i], settings, &nothing, err);
+        status = add_view(&b, f, d, &cameras[i], settings, err);
     f->draw = drawing;
     if (status == GBT_OK && def->prior > 0)
         status = add_directions(&b, f, d, def->prior, err);
     if (status == GBT_OK)
         status = solve(&b, def->sh_degree, out, err);
-    image_free(&nothing);
     mem_free(b.sums);
     mem_free(b.visible);
     return status;

@@ -3,7 +3,7 @@
 #define GBT_BAKE_BAKE_H
 
 #include "data/gaussian_cloud.h"
-#include "train/frame.h"
+#include "frame/frame.h"
 
 typedef struct bake_def {
     int sh_degree; /* of the colours, [0, 3]. Default 3 */

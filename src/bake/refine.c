@@ -19,7 +19,7 @@ static const struct { double opacity, scale, rotation, color, harmonics; } first
 typedef struct refining {
     gaussian_cloud *cloud, gradient, moment1, moment2;
     float *logit; /* [count] of the opacities: what is stepped */
-    cloud_frame frame;
+    frame frame;
     image d_image;
     loss_scratch scratch;
     adam_rates opacity, scale, rotation, color, harmonics;
@@ -59,7 +59,7 @@ static void close_state(refining *r)
     gaussian_cloud_free(&r->moment1);
     gaussian_cloud_free(&r->moment2);
     mem_free(r->logit);
-    cloud_frame_free(&r->frame);
+    frame_free(&r->frame);
     image_free(&r->d_image);
     loss_scratch_free(&r->scratch);
 }
@@ -104,13 +104,13 @@ static gbt_status refine_step(refining *r, frame *teacher, const anchors *a, con
 {
     gbt_camera sparse = *camera;
     const bool some = gbt_camera_every(camera, PIXEL_STEP, (int)(words[1] % PIXEL_STEP), (int)(words[2] % PIXEL_STEP), &sparse);
-    teacher->draw.pixel_step = r->frame.pixel_step = some ? PIXEL_STEP : 1;
-    GBT_TRY(frame_render(teacher, a, d, &sparse, settings, false, err));
-    GBT_TRY(cloud_frame_render(&r->frame, r->cloud, &sparse, settings, true, err));
+    teacher->draw.pixel_step = r->frame.draw.pixel_step = some ? PIXEL_STEP : 1;
+    GBT_TRY(frame_render(teacher, frame_neural(a, d), &sparse, settings, false, err));
+    GBT_TRY(frame_render(&r->frame, frame_plain(r->cloud), &sparse, settings, true, err));
     GBT_TRY(image_fit(&r->d_image, sparse.width, sparse.height, 3, err));
     image_loss_result loss;
     GBT_TRY(image_loss(&r->frame.rgb, &teacher->rgb, NULL, dssim_weight, &r->scratch, &r->d_image, &loss, err));
-    GBT_TRY(cloud_frame_backward(&r->frame, r->cloud, &r->d_image, &r->gradient, NULL, err));
+    GBT_TRY(frame_backward_plain(&r->frame, r->cloud, &r->d_image, &r->gradient, err));
     parallel_blocks(r->cloud->count, BLOCK, step_block, r);
     return GBT_OK;
 }
@@ -120,7 +120,7 @@ gbt_status refine_cloud(frame *teacher, const anchors *a, const decoder *d, cons
 {
     if (def->steps < 0 || camera_count == 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "refine: %d steps, %zu cameras (wanted 0 or more, 1 or more)", def->steps, camera_count);
-    refining r = {.frame.footprint = teacher->draw.footprint};
+    refining r = {.frame.draw.footprint = teacher->draw.footprint};
     gbt_status status = open_state(&r, cloud, err);
     const int pixel_step = teacher->draw.pixel_step;
     for (int i = 0; i < def->steps && status == GBT_OK; i++) {

@@ -2,8 +2,7 @@
 #ifndef GBT_BAKE_REFINE_H
 #define GBT_BAKE_REFINE_H
 
-#include "bake/cloud_frame.h"
-#include "train/frame.h"
+#include "frame/frame.h"
 
 typedef struct refine_def {
     int steps;     /* >= 0. Default 300 */

@@ -20,7 +20,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast", .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
         {.name = "insert", .kind = OPTION_STRING, .value = &def.insert, .value_name = "FILE.json",
          .help = "put meshes into the scene: matt or mirrors, with shadows (docs/inserting.md)"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "cameras from another data set"},
+        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "cameras of this data set; needed for plain Gaussians (.ply, .splat, .spz) without --camera"},
         {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray|reference", .help = "what draws the model; default: what it was trained with. The reference is in double, and slow"},
         {.name = "format", .kind = OPTION_CHOICE, .value = &def.format, .choices = "png|exr", .help = "8-bit PNG, or float EXR"},
         {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",
@@ -38,4 +38,4 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_render(model.value[0], out, &def, &err), &err);
 }
 
-const command command_render = {.name = "render", .summary = "render the views of a trained scene, or a camera of your own", .usage = "RUN -o DIR", .run = run};
+const command command_render = {.name = "render", .summary = "render the views of a scene, or a camera of your own", .usage = "RUN|GAUSSIANS -o DIR", .run = run};

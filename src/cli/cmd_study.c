@@ -13,6 +13,7 @@ typedef struct study_request {
     gbt_stability_def stability;
     gbt_paper_def paper;
     gbt_time_def time;
+    gbt_anchors_def anchors;
     const char *folder;
 } study_request;
 
@@ -46,6 +47,11 @@ static gbt_status run_time(const study_request *r, gbt_error *err)
     return gbt_study_time(&r->time, r->folder, stdout, err);
 }
 
+static gbt_status run_anchors(const study_request *r, gbt_error *err)
+{
+    return gbt_study_anchors(&r->anchors, r->folder, stdout, err);
+}
+
 static const struct { const char *name; int models_min, models_max; gbt_status (*run)(const study_request *, gbt_error *); } studies[] = {
     {"speed", 1, 16, run_speed},
     {"crosscheck", 1, 16, run_crosscheck},
@@ -53,28 +59,32 @@ static const struct { const char *name; int models_min, models_max; gbt_status (
     {"stability", 0, 0, run_stability},
     {"paper", 1, 16, run_paper},
     {"time", 1, 16, run_time},
+    {"anchors", 1, 16, run_anchors},
 };
 
 static int run(const command *self, int argc, char **argv)
 {
-    study_request request = {.def = gbt_study_def_default(), .stability = gbt_stability_def_default(), .paper = gbt_paper_def_default(), .time = gbt_time_def_default()};
+    study_request request = {.def = gbt_study_def_default(), .stability = gbt_stability_def_default(), .paper = gbt_paper_def_default(), .time = gbt_time_def_default(),
+                             .anchors = gbt_anchors_def_default()};
     bool quick = false;
     gbt_study_def *def = &request.def;
     gbt_paper_def *paper = &request.paper;
+    gbt_anchors_def *anchors = &request.anchors;
     int threads = 0, seeds = 0;
     double downscale = 1;
+    uint64_t iterations = 0;
     const option options[] = {
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &request.folder, .value_name = "DIR", .help = "folder for the tables and the chart", .required = true},
         {.name = "camera", .kind = OPTION_STRING, .value = &def->camera, .value_name = "FILE.json", .help = "the camera of every .ply; default: camera.json beside it"},
         {.name = "repeats", .kind = OPTION_INT, .value = &def->repeats, .min = 1, .max = 1000, .value_name = "N", .help = "speed: timed passes of each setting; the median counts"},
         {.name = "only", .kind = OPTION_STRING, .value = &request.stability.only, .value_name = "A1,A9", .help = "stability: these cases; default: all"},
         {.name = "quick", .kind = OPTION_FLAG, .value = &quick, .help = "stability: the smaller sizes of its tests"},
-        {.name = "iterations", .kind = OPTION_UINT64, .value = &paper->iterations, .min = 20, .max = 1e9, .value_name = "N", .help = "paper: steps of every run"},
+        {.name = "iterations", .kind = OPTION_UINT64, .value = &iterations, .min = 0, .max = 1e9, .value_name = "N", .help = "paper, anchors: steps of every run; 0: 3000 and 1000"},
         {.name = "renderer", .kind = OPTION_CHOICE, .value = &paper->renderer, .choices = "raster|trace|per-ray", .help = "paper: what photos are compared with"},
         {.name = "tables", .kind = OPTION_STRING, .value = &paper->tables, .value_name = "1,3", .help = "paper: which of its four"},
         {.name = "budget", .kind = OPTION_DURATION, .value = &request.time.budget_seconds, .min = 1, .max = 1e6, .value_name = "TIME", .help = "time: of a run"},
-        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &downscale, .min = 1, .max = 64, .value_name = "F", .help = "paper, time: divide the photos' size by this"},
-        {.name = "seeds", .kind = OPTION_INT, .value = &seeds, .min = 0, .max = 10, .value_name = "N", .help = "paper, time: runs of each variant; 0: 3 and 1"},
+        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &downscale, .min = 1, .max = 64, .value_name = "F", .help = "paper, time, anchors: divide the photos' size by this"},
+        {.name = "seeds", .kind = OPTION_INT, .value = &seeds, .min = 0, .max = 10, .value_name = "N", .help = "paper, time, anchors: runs of each variant; 0: 3, 1 and 3"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
     };
     operands named;
@@ -85,7 +95,7 @@ static int run(const command *self, int argc, char **argv)
     while (which < sizeof studies / sizeof *studies && strcmp(named.value[0], studies[which].name) != 0)
         which++;
     if (which == sizeof studies / sizeof *studies)
-        return command_misused("study: unknown study \"%.60s\" (wanted speed, crosscheck, rate, stability, paper or time)", named.value[0]);
+        return command_misused("study: unknown study \"%.60s\" (wanted speed, crosscheck, rate, stability, paper, time or anchors)", named.value[0]);
     if (named.count - 1 < studies[which].models_min)
         return command_misused("study %s: wanted a model, or data to train on", studies[which].name);
     if (named.count - 1 > studies[which].models_max)
@@ -93,14 +103,16 @@ static int run(const command *self, int argc, char **argv)
     if (threads > 0)
         gbt_set_threads(threads);
     request.stability.quick = quick;
-    def->models = paper->data = request.time.data = named.value + 1;
-    def->model_count = paper->data_count = request.time.data_count = (size_t)named.count - 1;
-    paper->downscale = request.time.downscale = downscale;
+    def->models = paper->data = request.time.data = anchors->data = named.value + 1;
+    def->model_count = paper->data_count = request.time.data_count = anchors->data_count = (size_t)named.count - 1;
+    paper->downscale = request.time.downscale = anchors->downscale = downscale;
     if (seeds > 0)
-        paper->seeds = request.time.seeds = seeds;
+        paper->seeds = request.time.seeds = anchors->seeds = seeds;
+    if (iterations > 0)
+        paper->iterations = anchors->iterations = iterations;
     gbt_error err = {0};
     return command_failed(studies[which].run(&request, &err), &err);
 }
 
-const command command_study = {.name = "study", .summary = "speed against accuracy, tracer against rasterizer, size against picture, stability; the paper's tables, quality against time: measure, draw the chart",
-                               .usage = "speed|crosscheck|rate|stability|paper|time [MODEL|DATA...] -o DIR", .run = run};
+const command command_study = {.name = "study", .summary = "speed against accuracy, tracer against rasterizer, size against picture, stability; the paper's tables, quality against time and anchors: measure, draw the chart",
+                               .usage = "speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR", .run = run};

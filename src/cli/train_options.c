@@ -36,6 +36,8 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
         {.name = "eval-at", .kind = OPTION_STRING, .value = &t->eval_at, .value_name = "T1,T2", .help = "held-out PSNR after so much training (1m,2m); the clock stops meanwhile"},
         {.name = "max-anchors", .kind = OPTION_UINT64, .value = &d->max_anchors, .min = 1, .max = 1e8, .value_name = "N", .help = "growth stops there"},
         {.name = "no-grow", .kind = OPTION_FLAG, .value = &t->no_grow, .help = "keep the first anchors"},
+        {.name = "thrift", .kind = OPTION_DOUBLE, .value = &d->thrift, .min = 0.1, .max = 10, .value_name = "F",
+         .help = "what an anchor must bring to be made and kept, times F: above 1 for smaller models, below for larger"},
         {.name = "splats-until", .kind = OPTION_DOUBLE, .value = &d->splats_until, .min = 0, .max = 1, .value_name = "F", .help = "splats, which are quicker, stand for rays up to this part of the run; 0: rays from the start"},
         {.name = "grow-until", .kind = OPTION_DOUBLE, .value = &d->grow_until, .min = 0, .max = 1, .value_name = "F", .help = "anchors grow and are pruned up to this part of the run"},
         {.name = "scale-factor", .kind = OPTION_DOUBLE, .value = &d->scale_factor, .min = 0, .max = 100, .value_name = "F", .help = "of the anchors' first scales; 0: 2 with the balls' prior, 1.2 with spacing, 1 with --compat"},

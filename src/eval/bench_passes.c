@@ -8,7 +8,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "bvh/device.h"
-#include "train/frame.h"
+#include "frame/frame.h"
 
 enum { SAMPLE_BUILD, SAMPLE_FORWARD, SAMPLE_ADJOINT, SAMPLE_FORWARD_CPU, SAMPLE_ADJOINT_CPU, SAMPLE_BUILD_CPU, SAMPLE_COUNT };
 

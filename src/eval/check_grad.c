@@ -72,7 +72,7 @@ static gbt_status render_at(checker *c, size_t view, int width, gbt_error *err)
     const gbt_camera camera = gbt_camera_resized(&full, c->width, c->height);
     for (int k = 0; k < 3; k++)
         c->camera[k] = (double)(float)camera.center[k];
-    return frame_render(c->frame, &c->run->model.anchors, &c->run->model.decoder, &camera, &c->run->settings, true, err);
+    return frame_render(c->frame, frame_neural(&c->run->model.anchors, &c->run->model.decoder), &camera, &c->run->settings, true, err);
 }
 
 static gbt_status allocate(checker *c, gbt_error *err)

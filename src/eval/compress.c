@@ -39,6 +39,7 @@ static gbt_status open_run(const char *run, const gbt_compress_def *def, loaded_
 {
     *has_views = false;
     GBT_TRY(loaded_run_open_model(run, r, err));
+    GBT_TRY(loaded_run_need_anchors(r, run, err));
     if (def->lossless)
         return GBT_OK;
     *has_views = def->data != NULL || file_exists(r->model.data_folder) || file_is_folder(r->model.data_folder);

@@ -37,7 +37,7 @@ typedef struct exporting {
     double origin[3], bake_seconds, refine_seconds, model_to_photo;
     size_t view_count, views[VIEWS_MAX]; /* that are compared */
     bool held_out;
-    cloud_frame frame;
+    frame frame;
 } exporting;
 
 /* ---- from a run to Gaussians ------------------------------------------------------------------------------------------------------------ */
@@ -75,7 +75,7 @@ static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
     GBT_TRY(loaded_run_open(run, e->def->data, 0, r, err));
     choose_views(e);
     memcpy(e->origin, r->model.origin, sizeof e->origin);
-    e->frame.footprint = r->frame.draw.footprint;
+    e->frame.draw.footprint = r->frame.draw.footprint;
     return GBT_OK;
 }
 
@@ -110,7 +110,7 @@ static gbt_status compare_view(exporting *e, const gaussian_cloud *cloud, size_t
     loaded_run *r = &e->run;
     const gbt_camera camera = photos_camera(&r->photos, view, 0);
     GBT_TRY(loaded_run_render(r, view, err));
-    GBT_TRY(cloud_frame_render(&e->frame, cloud, &camera, &r->settings, false, err));
+    GBT_TRY(frame_render(&e->frame, frame_plain(cloud), &camera, &r->settings, false, err));
     image photo = {0};
     GBT_TRY(scene_read_photo(&r->scene.views[view], camera.width, camera.height, &photo, err));
     image_quantize(&photo);
@@ -239,7 +239,7 @@ gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *
                                def->json, err);
     json_decref(files);
     gaussian_cloud_free(&e->cloud);
-    cloud_frame_free(&e->frame);
+    frame_free(&e->frame);
     loaded_run_close(&e->run);
     mem_free(e);
     return status;

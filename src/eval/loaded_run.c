@@ -1,15 +1,37 @@
 /* eval/loaded_run.c -- open a trained run for rendering. */
 #include "eval/loaded_run.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "data/gaussian_file.h"
+
+/* Around the middle of their bounds, where floats are fine; drawn on black, as every viewer does. */
+static gbt_status open_cloud(const char *path, loaded_run *out, gbt_error *err)
+{
+    GBT_TRY(gaussian_file_read(path, &out->cloud, err));
+    gaussian_cloud *c = &out->cloud;
+    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    for (size_t i = 0; i < 3 * c->count; i++)
+        low[i % 3] = fmin(low[i % 3], (double)c->mean[i]), high[i % 3] = fmax(high[i % 3], (double)c->mean[i]);
+    for (int k = 0; k < 3; k++)
+        out->model.origin[k] = 0.5 * (low[k] + high[k]);
+    for (size_t i = 0; i < 3 * c->count; i++)
+        c->mean[i] = (float)((double)c->mean[i] - out->model.origin[i % 3]);
+    out->def = gbt_train_def_default();
+    out->frame.draw.footprint = (float)out->def.footprint;
+    out->settings = trace_settings_default();
+    return GBT_OK;
+}
 
 static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
 {
     char path[4096];
+    if (gaussian_file_readable(run))
+        return open_cloud(run, out, err);
     if (file_is_folder(run))
         GBT_TRY(file_join(path, sizeof path, run, "model.gbt", err));
     else if (snprintf(path, sizeof path, "%s", run) >= (int)sizeof path)
@@ -32,6 +54,8 @@ static gbt_status open_views(const char *run, const char *data, double downscale
 {
     scene_split split;
     GBT_TRY(scene_split_parse(out->def.eval_split, &split, err));
+    if (data == NULL && out->cloud.count > 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.1000s: plain Gaussians know no cameras: name a camera or a data set (--camera or --data)", run);
     if (data == NULL && !file_exists(out->model.data_folder) && !file_is_folder(out->model.data_folder))
         return base_fail(err, GBT_ERR_IO, "%.1000s: the data set of %.1000s is not there; run the command in the folder where it was trained, or say where with --data",
                          out->model.data_folder, run);
@@ -59,16 +83,27 @@ gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *er
 void loaded_run_close(loaded_run *r)
 {
     model_free(&r->model);
+    gaussian_cloud_free(&r->cloud);
     if (r->photos.source != NULL)
         photos_close(&r->photos);
     scene_free(&r->scene);
     frame_free(&r->frame);
 }
 
+gbt_status loaded_run_need_anchors(const loaded_run *r, const char *run, gbt_error *err)
+{
+    return r->cloud.count == 0 ? GBT_OK : base_fail(err, GBT_ERR_ARGUMENT, "%.1000s: plain Gaussians, no anchors (wanted a run or its model.gbt)", run);
+}
+
+frame_subject loaded_run_subject(const loaded_run *r)
+{
+    return r->cloud.count > 0 ? frame_plain(&r->cloud) : frame_neural(&r->model.anchors, &r->model.decoder);
+}
+
 gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(&r->photos, view, 0);
-    return frame_render(&r->frame, &r->model.anchors, &r->model.decoder, &camera, &r->settings, false, err);
+    return frame_render(&r->frame, loaded_run_subject(r), &camera, &r->settings, false, err);
 }
 
 gbt_status loaded_run_preset(const char *name, trace_settings *settings, gbt_error *err)

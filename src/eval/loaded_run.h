@@ -6,11 +6,12 @@
 #include "gbtrace/train.h"
 #include "io/model_file.h"
 #include "train/config.h"
-#include "train/frame.h"
+#include "frame/frame.h"
 #include "train/photos.h"
 
 typedef struct loaded_run {
     model model;
+    gaussian_cloud cloud; /* of a file of plain Gaussians, local coordinates; then `model` has no anchors and is about the scene alone */
     gbt_train_def def; /* the settings it was trained with; strings point into `strings` */
     config_strings strings;
     scene scene; /* cameras in the model's local coordinates */
@@ -20,13 +21,19 @@ typedef struct loaded_run {
 } loaded_run;
 
 /**
- * Open RUN (a folder with model.gbt, or a model file).
+ * Open RUN: a folder with model.gbt, a model file, or plain Gaussians (.ply, .splat, .spz), which know no data set.
  *
  * @param data      [in] data set folder; NULL: the one it was trained on
  * @param downscale [in] 0: as in training
  * @param out       [out] start from {0}; free with loaded_run_close() after success or failure
  */
 gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err);
+
+/** GBT_ERR_ARGUMENT when it holds plain Gaussians, `run` is their file, and anchors are wanted. */
+gbt_status loaded_run_need_anchors(const loaded_run *r, const char *run, gbt_error *err);
+
+/** What frames show. */
+frame_subject loaded_run_subject(const loaded_run *r);
 
 /** The same without the data set: no views, no photos. For cameras that come from elsewhere. */
 gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *err);

@@ -54,7 +54,7 @@ static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, 
     char file[1100], path[4096];
     loaded_run *r = &st->run;
     const frame_guest guest = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
-    GBT_TRY(frame_render_guest(&r->frame, &r->model.anchors, &r->model.decoder, shot, &r->settings, def->insert != NULL ? &guest : NULL, err));
+    GBT_TRY(frame_render_guest(&r->frame, loaded_run_subject(r), shot, &r->settings, def->insert != NULL ? &guest : NULL, err));
     if (st->in_double)
         GBT_TRY(render_reference(r, shot, err));
     snprintf(file, sizeof file, "%s.%s", name, def->format);

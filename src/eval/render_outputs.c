@@ -30,13 +30,12 @@ gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *e
     return GBT_OK;
 }
 
-/* The anchor that each ray's strongest Gaussian was decoded from; -1 where there is none. */
+/* The anchor that each ray's strongest Gaussian was decoded from, or the plain Gaussian; -1 where there is none. */
 static void name_anchors(const loaded_run *r, const uint32_t *strongest, image *out)
 {
     const frame *f = &r->frame;
-    const uint32_t offsets = (uint32_t)r->model.anchors.offset_count;
     for (size_t i = 0; i < (size_t)out->width * (size_t)out->height; i++)
-        out->pixels[i] = strongest[i] < f->tape.kept_count ? (float)f->visible[f->tape.slot[strongest[i]] / offsets] : -1;
+        out->pixels[i] = strongest[i] < f->gaussians.count ? (float)frame_part(f, loaded_run_subject(r), strongest[i]) : -1;
 }
 
 static gbt_status write_one(const image *pixels, render_output which, const char *folder, const char *name, gbt_error *err)

@@ -11,7 +11,7 @@
 #include "eval/stability_draw.h"
 #include "gb/balls.h"
 #include "image/metrics.h"
-#include "train/frame.h"
+#include "frame/frame.h"
 
 /* ---- A14: growth explodes, or all anchors go ----------------------------------------------------------------------------------------------- */
 
@@ -89,7 +89,7 @@ static void nobody_left(stability *s)
     settings.background[0] = 0.25f, settings.background[1] = 0.5f, settings.background[2] = 0.75f;
     double off = NAN;
     if (s->status == GBT_OK && stability_ok(s, decoder_init(&d, 5, false, 1, s->err)) &&
-        stability_ok(s, frame_render(&f, &none, &d, &camera, &settings, false, s->err))) {
+        stability_ok(s, frame_render(&f, frame_neural(&none, &d), &camera, &settings, false, s->err))) {
         off = 0;
         for (size_t i = 0; i < 3 * 40 * 30; i++)
             off = fmax(off, fabs((double)f.rgb.pixels[i] - (double)settings.background[i % 3]));

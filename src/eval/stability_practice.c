@@ -195,7 +195,7 @@ static gbt_status look_at(trainer *t, practice_result *out, gbt_error *why)
     mean_of_photos(t, mean, &status, why);
     for (size_t i = 0; i < t->train_count && status == GBT_OK; i++) {
         const gbt_camera camera = photos_camera(&t->photos, t->train_views[i], 0);
-        status = frame_render(&t->frame, &t->anchors, &t->decoder, &camera, &t->settings, false, why);
+        status = frame_render(&t->frame, frame_neural(&t->anchors, &t->decoder), &camera, &t->settings, false, why);
         if (status == GBT_OK)
             status = photos_get(&t->photos, t->train_views[i], 0, &t->photo, why);
         if (status != GBT_OK)

@@ -83,7 +83,7 @@ static bool render_model(stability *s, far_views *f, const gbt_camera *camera)
     for (int k = 0; k < 3; k++)
         local.center[k] -= f->t.scene.origin[k];
     return s->status == GBT_OK &&
-           stability_ok(s, frame_render(&f->t.frame, &f->t.anchors, &f->t.decoder, &local, &f->t.settings, false, s->err));
+           stability_ok(s, frame_render(&f->t.frame, frame_neural(&f->t.anchors, &f->t.decoder), &local, &f->t.settings, false, s->err));
 }
 
 /* PSNR to the truth of the model minus that of the Gaussians it makes for the nearest photo. */

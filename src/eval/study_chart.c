@@ -218,6 +218,16 @@ static void draw_levels(text *out, const scatter_chart *c, plane *p)
     }
 }
 
+void scatter_begin(text *out, const char *label, const char *css, int height)
+{
+    text_format(out, "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"scatter\" viewBox=\"0 0 %d %d\" width=\"%d\" role=\"img\"", SCATTER_WIDTH, height,
+                SCATTER_WIDTH);
+    text_format(out, " aria-label=\"%s\"><style>", label);
+    text_add(out, scatter_css);
+    text_add(out, css);
+    text_format(out, "</style><rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH, height);
+}
+
 void scatter_draw(text *out, const scatter_chart *c, int top)
 {
     plane p = {.taken_count = 0};

@@ -128,13 +128,7 @@ void paper_charts(const paper_study *s, text *out)
     const paper_variant_id *variants = NULL;
     const size_t count = spread_table > 0 ? paper_table_variants(spread_table, &variants) : 0;
     const int spread = spread_table > 0 ? panel_height(count) : 0, one = spread + (has_growth ? SCATTER_HEIGHT : 0);
-    const int height = one * (int)s->scene_count;
-    text_format(out, "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"scatter\" viewBox=\"0 0 %d %d\" width=\"%d\" role=\"img\"", SCATTER_WIDTH, height,
-                SCATTER_WIDTH);
-    text_add(out, " aria-label=\"anchors and PSNR by start\"><style>");
-    text_add(out, scatter_css);
-    text_add(out, css);
-    text_format(out, "</style><rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH, height);
+    scatter_begin(out, "anchors and PSNR by start", css, one * (int)s->scene_count);
     for (size_t scene = 0; scene < s->scene_count; scene++) {
         if (spread_table > 0)
             draw_panel(out, s, scene, variants, count, (int)scene * one);

@@ -142,10 +142,7 @@ static void add_picture(const rate_study *study, text *out)
             chart.point_count++;
         }
     }
-    text_format(out, "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"scatter\" viewBox=\"0 0 %d %d\" width=\"%d\" role=\"img\" aria-label=\"size against picture\"><style>", SCATTER_WIDTH,
-                SCATTER_HEIGHT, SCATTER_WIDTH);
-    text_add(out, scatter_css);
-    text_format(out, "</style><rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH, SCATTER_HEIGHT);
+    scatter_begin(out, "size against picture", "", SCATTER_HEIGHT);
     scatter_draw(out, &chart, 0);
     text_add(out, "</svg>\n");
 }

@@ -8,12 +8,12 @@ const time_variant time_variants[] = {
     {"default", "", 1},
     {"faithful protocol", "compat = 1", 5},
     {"all pixels from the start", "start-level = 0", 1},
+    {"rays from the start", "splats-until = 0", 1},
     {"first scales x 1", "scale-factor = 1", 1},
     {"no growth", "grow = 0", 1},
     {"K = 10", "offsets = 10", 1},
     {"adaptive balls", "init = adaptive", 1},
     {"voxels", "init = voxel", 1},
-    {"splats", "renderer = raster", 1},
 };
 
 const size_t time_variant_count = sizeof time_variants / sizeof *time_variants;

@@ -196,12 +196,7 @@ static void draw_scene(const time_study *s, size_t scene, int top, text *out)
 
 void time_charts(const time_study *s, text *out)
 {
-    const int height = SCATTER_HEIGHT * (int)s->def.data_count;
-    text_format(out, "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"scatter\" viewBox=\"0 0 %d %d\" width=\"%d\" role=\"img\"", SCATTER_WIDTH, height,
-                SCATTER_WIDTH);
-    text_add(out, " aria-label=\"PSNR against seconds\"><style>");
-    text_add(out, scatter_css);
-    text_format(out, "</style><rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH, height);
+    scatter_begin(out, "PSNR against seconds", "", SCATTER_HEIGHT * (int)s->def.data_count);
     for (size_t scene = 0; scene < s->def.data_count; scene++)
         draw_scene(s, scene, SCATTER_HEIGHT * (int)scene, out);
     text_add(out, "</svg>\n");

@@ -188,7 +188,7 @@ static gbt_status grow_and_prune(trainer *t, uint64_t steps_since, gbt_error *er
     if (t->def.compat)
         def.shape_log_max = 0.05f;
     else {
-        const float thrift = schedule_thrift(pace_expected(&t->pace, t->step));
+        const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
         def.interval = fmaxf(def.interval, (float)INTERVAL_MIN);
         def.grad_threshold *= thrift;
         def.min_use = thrift * share_min;
@@ -300,7 +300,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     trace_settings settings = t->settings;
     if (!t->def.compat && progress < SCHEDULE_WHOLE_FROM)
         settings.alpha_min = SCHEDULE_ALPHA_MIN, settings.transmittance_min = SCHEDULE_T_MIN;
-    GBT_TRY(frame_render(f, &t->anchors, &t->decoder, &camera, &settings, true, err));
+    GBT_TRY(frame_render(f, frame_neural(&t->anchors, &t->decoder), &camera, &settings, true, err));
     out->gaussians = f->gaussians.count, out->visible = f->visible_count;
     revive_when_barren(t);
     clock = clock_wall();
@@ -362,7 +362,7 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
         const gbt_camera camera = photos_camera(&t->photos, i, 0);
         t->frame.draw.pixel_step = 1;
         t->frame.draw.renderer = t->renderer;
-        status = frame_render(&t->frame, &t->anchors, &t->decoder, &camera, &t->settings, false, err);
+        status = frame_render(&t->frame, frame_neural(&t->anchors, &t->decoder), &camera, &t->settings, false, err);
         if (status == GBT_OK)
             status = scene_read_photo(&t->scene.views[i], camera.width, camera.height, &photo, err);
         image *pair[2] = {&t->frame.rgb, &photo};

@@ -9,7 +9,7 @@
 #include "gbtrace/train.h"
 #include "image/metrics.h"
 #include "train/exposure.h"
-#include "train/frame.h"
+#include "frame/frame.h"
 #include "train/photos.h"
 #include "train/schedule.h"
 

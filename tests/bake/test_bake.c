@@ -1,51 +1,13 @@
-/* tests/bake/test_bake.c -- spherical harmonics, the adjoint of plain Gaussians' colours and shapes, baked models against their networks. */
+/* tests/bake/test_bake.c -- baked models against their networks. */
 #include "anchor/fixture.h"
 #include "bake/bake.h"
 #include "bake/refine.h"
-#include "bake/sh.h"
 #include "base/near.h"
 #include "base/parallel.h"
 #include "base/vec.h"
 #include "image/metrics.h"
 
 enum { ANCHORS = 150, OFFSETS = 2, CAMERAS = 12, W = 48, H = 36 };
-
-/* ---- spherical harmonics ---------------------------------------------------------------------------------------------------------- */
-
-static void basis_is_orthonormal(void **state)
-{
-    (void)state;
-    enum { N = 20000 };
-    double product[16][16] = {{0}};
-    for (int i = 0; i < N; i++) {
-        const double z = 1 - (2 * i + 1.0) / N, r = sqrt(1 - z * z), turn = i * 2.399963229728653;
-        float y[16];
-        sh_basis((const float[3]){(float)(r * cos(turn)), (float)(r * sin(turn)), (float)z}, y);
-        for (int k = 0; k < 16; k++)
-            for (int l = 0; l < 16; l++)
-                product[k][l] += 4 * 3.14159265358979 / N * (double)y[k] * (double)y[l];
-    }
-    for (int k = 0; k < 16; k++)
-        for (int l = 0; l < 16; l++)
-            assert_near(product[k][l], k == l, 1e-4);
-}
-
-/* Half a turn about z, which .glb files need: every second function changes its sign. */
-static void half_a_turn(void **state)
-{
-    (void)state;
-    for (uint64_t i = 0; i < 100; i++) {
-        double d[3] = {rng_normal(1, 1, i), rng_normal(1, 2, i), rng_normal(1, 3, i)};
-        dvec_normalize(d);
-        float y[16], turned[16];
-        sh_basis((const float[3]){(float)d[0], (float)d[1], (float)d[2]}, y);
-        sh_basis((const float[3]){(float)-d[0], (float)-d[1], (float)d[2]}, turned);
-        for (int k = 0; k < 16; k++)
-            assert_near((double)turned[k], k % 2 == 0 ? (double)y[k] : -(double)y[k], 2e-6);
-    }
-}
-
-/* ---- adjoint ---------------------------------------------------------------------------------------------------------------------- */
 
 static gbt_camera ring_camera(int i)
 {
@@ -60,75 +22,6 @@ static gbt_camera ring_camera(int i)
     for (int k = 0; k < 3; k++)
         camera.rotation[k] = x[k], camera.rotation[3 + k] = y[k], camera.rotation[6 + k] = z[k], camera.center[k] = -distance * z[k];
     return camera;
-}
-
-static void random_cloud(gaussian_cloud *c, size_t count)
-{
-    assert_ok(gaussian_cloud_alloc(c, count, NULL));
-    c->sh_degree = 3;
-    for (size_t i = 0; i < count; i++) {
-        double q[4], length = 0;
-        for (uint64_t k = 0; k < 4; k++)
-            q[k] = rng_normal(3, 1, 4 * i + k), length += q[k] * q[k];
-        for (size_t k = 0; k < 4; k++)
-            c->quat[4 * i + k] = (float)(q[k] / sqrt(length));
-        for (size_t k = 0; k < 3; k++)
-            c->mean[3 * i + k] = spread(3, 2, 3 * i + k, -1.5f, 1.5f), c->scale_log[3 * i + k] = spread(3, 3, 3 * i + k, -2.5f, -0.7f);
-        c->opacity[i] = spread(3, 4, i, 0.1f, 0.9f);
-        for (size_t k = 0; k < 48; k++)
-            c->sh[48 * i + k] = spread(3, 5, 48 * i + k, -0.8f, 0.8f);
-    }
-}
-
-/* The tracer's adjoint has its own tests: here it is taken as it is, and the way from the cloud's parameters to its fields is differentiated in double. */
-static void adjoint_of_colors_and_shapes(void **state)
-{
-    (void)state;
-    enum { COUNT = 60 };
-    gaussian_cloud cloud, d;
-    random_cloud(&cloud, COUNT);
-    assert_ok(gaussian_cloud_alloc(&d, COUNT, NULL));
-    for (int wide = 0; wide < 2; wide++) {
-        const trace_settings settings = trace_settings_default();
-        const gbt_camera camera = ring_camera(1);
-        cloud_frame f = {.footprint = wide ? 0.3f : 0};
-        assert_ok(cloud_frame_render(&f, &cloud, &camera, &settings, true, NULL));
-        image d_image;
-        assert_ok(image_alloc(&d_image, W, H, 3, NULL));
-        for (size_t i = 0; i < 3 * W * H; i++)
-            d_image.pixels[i] = spread(4, 1, i, -1, 1);
-        float weight[COUNT];
-        assert_ok(cloud_frame_backward(&f, &cloud, &d_image, &d, weight, NULL));
-        size_t cut = 0, seen = 0;
-        for (size_t i = 0; i < COUNT; i++) {
-            double direction[3];
-            for (size_t k = 0; k < 3; k++)
-                direction[k] = (double)cloud.mean[3 * i + k] - camera.center[k];
-            dvec_normalize(direction);
-            float y[16];
-            sh_basis((const float[3]){(float)direction[0], (float)direction[1], (float)direction[2]}, y);
-            const float *const field[3] = {f.seen.red, f.seen.green, f.seen.blue}, *const d_field[3] = {f.d_seen.red, f.d_seen.green, f.d_seen.blue};
-            const float *const d_scale[3] = {f.d_seen.scale_x, f.d_seen.scale_y, f.d_seen.scale_z};
-            seen += weight[i] > 0;
-            for (size_t c = 0; c < 3; c++) {
-                double color = 0.5;
-                for (size_t k = 0; k < 16; k++)
-                    color += (double)y[k] * (double)cloud.sh[48 * i + 3 * k + c];
-                assert_near((double)field[c][i], fmax(color, 0), 1e-6);
-                cut += color < 0;
-                for (size_t k = 0; k < 16; k++)
-                    assert_near((double)d.sh[48 * i + 3 * k + c], color > 0 ? (double)y[k] * (double)d_field[c][i] : 0, 1e-5 * (1 + fabs((double)d_field[c][i])));
-                const double scale = exp((double)cloud.scale_log[3 * i + c]);
-                assert_near((double)d.scale_log[3 * i + c], scale * (double)d_scale[c][i], 1e-5 * (1 + fabs((double)d_scale[c][i])));
-            }
-            assert_near((double)d.opacity[i], (double)f.d_seen.opacity[i], 0);
-        }
-        assert_true(cut > 5 && seen > COUNT / 2);
-        image_free(&d_image);
-        cloud_frame_free(&f);
-    }
-    gaussian_cloud_free(&cloud);
-    gaussian_cloud_free(&d);
 }
 
 /* ---- baking ------------------------------------------------------------------------------------------------------------------------- */
@@ -170,16 +63,16 @@ static void free_world(world *w)
 /* Mean PSNR of the cloud's pictures to the model's, cameras between those of the ring. */
 static double likeness(world *w, const gaussian_cloud *cloud)
 {
-    cloud_frame f = {.footprint = w->f.draw.footprint};
+    frame f = {.draw.footprint = w->f.draw.footprint};
     double sum = 0;
     for (int i = 0; i < 4; i++) {
         gbt_camera camera = ring_camera(3 * i);
         camera.center[1] += 0.3;
-        assert_ok(frame_render(&w->f, &w->a, &w->d, &camera, &w->s, false, NULL));
-        assert_ok(cloud_frame_render(&f, cloud, &camera, &w->s, false, NULL));
+        assert_ok(frame_render(&w->f, frame_neural(&w->a, &w->d), &camera, &w->s, false, NULL));
+        assert_ok(frame_render(&f, frame_plain(cloud), &camera, &w->s, false, NULL));
         sum += metric_psnr(&f.rgb, &w->f.rgb) / 4;
     }
-    cloud_frame_free(&f);
+    frame_free(&f);
     return sum;
 }
 
@@ -278,9 +171,6 @@ static void refusals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(basis_is_orthonormal),
-        cmocka_unit_test(half_a_turn),
-        cmocka_unit_test(adjoint_of_colors_and_shapes),
         cmocka_unit_test(nothing_is_lost_without_directions),
         cmocka_unit_test(more_functions_and_steps_come_nearer),
         cmocka_unit_test(same_bits_for_all_threads),

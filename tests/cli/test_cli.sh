@@ -243,8 +243,8 @@ prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.00
 misuse 2 '--kernel: "tile,tile" (wanted tile, single or embree, or some of them with commas between)' $bench --kernel tile,tile
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
 misuse 2 "--camera: missing (a .ply has no cameras)" bench trace --model gaussians.ply
-misuse 2 'study: unknown study "pace" (wanted speed, crosscheck, rate, stability, paper or time)' study pace gaussians.ply -o study
-misuse 2 "argument missing (usage: gbtrace study speed|crosscheck|rate|stability|paper|time [MODEL|DATA...] -o DIR)" study -o study
+misuse 2 'study: unknown study "pace" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study pace gaussians.ply -o study
+misuse 2 "argument missing (usage: gbtrace study speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR)" study -o study
 misuse 2 "study crosscheck: wanted a model, or data to train on" study crosscheck -o study
 misuse 2 'study stability: "gaussians.ply" is one too many' study stability gaussians.ply -o study
 misuse 2 'study stability: "A99" is not a list of different cases (wanted some of A1 to A18, as A1,A9)' study stability --only A99 -o study

@@ -4,6 +4,7 @@
 #include "base/near.h"
 #include "eval/json_fields.h"
 #include "eval/study_paper.h"
+#include "eval/study_anchors.h"
 #include "eval/study_time.h"
 
 /* ---- numbers ------------------------------------------------------------------------------------------------------------------ */
@@ -366,6 +367,11 @@ static void bad_requests(void **state)
     assert_int_equal(gbt_study_time(&time, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     time.budget_seconds = 1, time.seeds = 11;
     assert_int_equal(gbt_study_time(&time, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    gbt_anchors_def needs = gbt_anchors_def_default();
+    needs.data = data, needs.data_count = 1, needs.iterations = 19;
+    assert_int_equal(gbt_study_anchors(&needs, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    needs.iterations = 20, needs.seeds = 0;
+    assert_int_equal(gbt_study_anchors(&needs, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     assert_false(file_exists(in_root("bad")));
 }
 
@@ -419,6 +425,51 @@ static void quality_against_time(void **state)
     }
 }
 
+/* ---- anchors ---------------------------------------------------------------------------------------------------------------------------- */
+
+static double figure_of(const json_t *run, const char *name)
+{
+    return json_number_value(json_object_get(json_object_get(run, name), "mean"));
+}
+
+static void what_a_scene_needs(void **state)
+{
+    (void)state;
+    const char *data[] = {tiny};
+    gbt_anchors_def def = gbt_anchors_def_default();
+    def.data = data, def.data_count = 1, def.iterations = 40, def.seeds = 2;
+    gbt_error err = {0};
+    FILE *out = tmpfile();
+    if (gbt_study_anchors(&def, in_root("anchors"), out, &err) != GBT_OK)
+        fail_msg("%s", err.text);
+    fclose(out);
+    json_t *whole;
+    assert_ok(json_read(in_root("anchors/anchors.json"), &whole, NULL));
+    const json_t *runs = json_object_get(whole, "runs");
+    assert_int_equal(json_array_size(runs), anchors_variant_count);
+    for (size_t v = 0; v < anchors_variant_count; v++) {
+        char run[PATH_SIZE];
+        double psnr = 0, final = 0;
+        for (uint64_t seed = 0; seed < 2; seed++) {
+            assert_ok(study_runs_folder(in_root("anchors"), "tiny", anchors_variants[v].name, seed, run, sizeof run, NULL));
+            psnr += metric_of(run, "psnr") / 2, final += metric_of(run, "anchors_final") / 2;
+        }
+        assert_near(figure_of(json_array_get(runs, v), "psnr"), psnr, 1e-6);
+        assert_near(figure_of(json_array_get(runs, v), "anchors_final"), final, 1e-6);
+    }
+    /* More is asked of an anchor from 0.5 to 1 to 1.5 to 2.5. */
+    assert_true(figure_of(json_array_get(runs, 6), "anchors_final") > figure_of(json_array_get(runs, 5), "anchors_final"));
+    assert_true(figure_of(json_array_get(runs, 2), "anchors_initial") <= 0.5 * figure_of(json_array_get(runs, ANCHORS_BALLS), "anchors_initial"));
+    json_decref(whole);
+    char *page = read_text(in_root("anchors/anchors.md")), *svg = read_text(in_root("anchors/anchors.svg")), *csv = read_text(in_root("anchors/anchors.csv"));
+    assert_int_equal(count_of(page, "| random points |"), 1);
+    assert_int_equal(count_of(csv, "\n"), 1 + 2 * anchors_variant_count);
+    assert_null(strstr(svg, "nan"));
+    mem_free(csv);
+    mem_free(svg);
+    mem_free(page);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -426,6 +477,7 @@ int main(void)
         cmocka_unit_test(constant_of_pairs),   cmocka_unit_test(what_the_paper_says),      cmocka_unit_test(verdicts),
         cmocka_unit_test(names_and_folders),   cmocka_unit_test(when_a_curve_comes_there), cmocka_unit_test(bad_requests),
         cmocka_unit_test(the_papers_tables),   cmocka_unit_test(runs_are_made_once),       cmocka_unit_test(quality_against_time),
+        cmocka_unit_test(what_a_scene_needs),
     };
     return cmocka_run_group_tests(tests, make_root, remove_root);
 }

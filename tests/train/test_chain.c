@@ -6,7 +6,7 @@
 #include "base/parallel.h"
 #include "image/metrics.h"
 #include "trace/reference.h"
-#include "train/frame.h"
+#include "frame/frame.h"
 
 enum { OFFSETS = 5, WIDTH = 20, HEIGHT = 14, RAYS = WIDTH * HEIGHT, CLASS_COUNT = 6, RADIUS = 5 };
 static const char *const class_names[CLASS_COUNT] = {"feature", "offset", "scale", "opacity mlp", "shape mlp", "colour mlp"};
@@ -52,7 +52,7 @@ static void make_view(view *v, uint64_t seed, bool has_distance)
     for (size_t i = 0; i < 3 * RAYS; i++)
         v->photo.pixels[i] = rng_uniform(seed, 300, i);
     v->f.draw.footprint = seed % 3 == 0 ? 0 : 0.25f; /* some with rays as wide as pixels */
-    assert_ok(frame_render(&v->f, &v->a, &v->d, &v->camera, &v->s, true, NULL));
+    assert_ok(frame_render(&v->f, frame_neural(&v->a, &v->d), &v->camera, &v->s, true, NULL));
     assert_true(v->f.visible_count >= 6 && v->f.gaussians.count >= 12);
     assert_ok(decode_ref_load(&v->p, &v->a, &v->d, NULL));
     v->slots = mem_calloc(v->f.visible_count * OFFSETS, DECODE_REF_FIELDS * sizeof *v->slots, "test", NULL);

@@ -487,7 +487,7 @@ static void opacities_are_raised(void **state)
     bias[0] = -1, bias[1] = 1.5f;
     const gbt_camera camera = photos_camera(&t.photos, 0, 0);
     for (int pass = 0; pass < 2; pass++) {
-        assert_ok(frame_render(&t.frame, &t.anchors, &t.decoder, &camera, &t.settings, true, NULL));
+        assert_ok(frame_render(&t.frame, frame_neural(&t.anchors, &t.decoder), &camera, &t.settings, true, NULL));
         if (pass == 0)
             decode_raise_opacity(&t.frame.tape, 0.1f, 0.25f, &t.decoder);
     }
@@ -558,7 +558,7 @@ static double score_of(const char *run, const char *data, gbt_train_def def)
     assert_int_equal(strncmp(json_string_value(json_object_get(metrics, "scored")), def.exposure ? "right half" : "whole image", 10), 0);
     json_decref(metrics);
 
-    trainer t; /* in passing and at the end: one protocol. Eval also knows the smallest pixel of each anchor (train/frame.h). */
+    trainer t; /* in passing and at the end: one protocol. Eval also knows the smallest pixel of each anchor (frame/frame.h). */
     double in_passing;
     open_ok(&t, data, &def);
     assert_ok(checkpoint_load(&t, joined(run, "checkpoints/last.gbt"), NULL));

@@ -1,5 +1,5 @@
-/* train/visible.c -- bounds on all rays of a view, and the anchors that they may reach. */
-#include "train/visible.h"
+/* frame/visible.c -- bounds on all rays of a view, and what they may reach. */
+#include "frame/visible.h"
 
 #include <math.h>
 #include <string.h>
@@ -11,7 +11,7 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 
-enum { ANCHOR_BLOCK = 4096, ROW_GRAIN = 16 };
+enum { PART_BLOCK = 4096, ROW_GRAIN = 16 };
 
 /* What is asked of the rays: `axes` turns world to the axes in which slopes are taken. */
 typedef struct bounds_job {
@@ -212,8 +212,13 @@ gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bo
     return GBT_OK;
 }
 
-/* Radius of a ball around the anchor that holds the proxies of all its Gaussians. */
-static float anchor_reach(const anchors *a, size_t i, const visible_reach *reach, const float eye[3])
+/* The Gaussians of one part: no mean is farther from the centre, no std-dev larger. */
+typedef struct part_ball {
+    const float *center;
+    float farthest, scale;
+} part_ball;
+
+static part_ball anchor_ball(const anchors *a, size_t i)
 {
     const float *l = a->scale_log + 6 * i;
     const float ex = expf(fminf(l[0], 30.0f)), ey = expf(fminf(l[1], 30.0f)), ez = expf(fminf(l[2], 30.0f));
@@ -223,12 +228,23 @@ static float anchor_reach(const anchors *a, size_t i, const visible_reach *reach
         const float x = o[0] * ex, y = o[1] * ey, z = o[2] * ez;
         far_square = fmaxf(far_square, x * x + y * y + z * z);
     }
-    const float scale = expf(fminf(fmaxf(l[3], fmaxf(l[4], l[5])), 30.0f)), farthest = sqrtf(far_square);
+    return (part_ball){a->position + 3 * i, sqrtf(far_square), expf(fminf(fmaxf(l[3], fmaxf(l[4], l[5])), 30.0f))};
+}
+
+static part_ball plain_ball(const gaussian_cloud *cloud, size_t i)
+{
+    const float *l = cloud->scale_log + 3 * i;
+    return (part_ball){cloud->mean + 3 * i, 0, expf(fmaxf(l[0], fmaxf(l[1], l[2])))};
+}
+
+/* Radius of a ball around the part that holds the proxies of all its Gaussians. */
+static float reach_of(const part_ball *part, const visible_reach *reach, float pixel_min, const float eye[3])
+{
     if (reach->width <= 0)
-        return farthest + reach->sigmas * scale;
-    const float d[3] = {a->position[3 * i] - eye[0], a->position[3 * i + 1] - eye[1], a->position[3 * i + 2] - eye[2]};
-    const float pixel = reach->pixel * (reach->parallel ? 1 : sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) + farthest);
-    return farthest + reach->sigmas * (scale + reach->width * fmaxf(pixel, reach->pixel_min != NULL ? reach->pixel_min[i] : 0));
+        return part->farthest + reach->sigmas * part->scale;
+    const float d[3] = {part->center[0] - eye[0], part->center[1] - eye[1], part->center[2] - eye[2]};
+    const float pixel = reach->pixel * (reach->parallel ? 1 : sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) + part->farthest);
+    return part->farthest + reach->sigmas * (part->scale + reach->width * fmaxf(pixel, pixel_min));
 }
 
 static bool is_visible(const view_bounds *b, const float position[3], float reach)
@@ -236,7 +252,7 @@ static bool is_visible(const view_bounds *b, const float position[3], float reac
     const float d[3] = {position[0] - b->center[0], position[1] - b->center[1], position[2] - b->center[2]};
     for (int i = 0; i < b->plane_count; i++)
         if (!(b->plane[i][0] * d[0] + b->plane[i][1] * d[1] + b->plane[i][2] * d[2] <= b->offset[i] + reach))
-            return false; /* and an anchor that is not a number */
+            return false; /* and a place that is not a number */
     if (b->plane_count > 0)
         return true;
     /* A ray from elsewhere reaches the ball only if one from the centre reaches a ball that is larger by its distance. */
@@ -252,7 +268,7 @@ static bool is_visible(const view_bounds *b, const float position[3], float reac
 }
 
 typedef struct visible_job {
-    const anchors *a;
+    frame_subject subject;
     const view_bounds *bounds;
     const visible_reach *reach;
     uint32_t *out;       /* [count]; block b writes from its own begin */
@@ -263,23 +279,26 @@ static void visible_block(size_t block, size_t begin, size_t end, void *context)
 {
     const visible_job *job = context;
     uint32_t kept = 0;
-    for (size_t i = begin; i < end; i++)
-        if (is_visible(job->bounds, job->a->position + 3 * i, anchor_reach(job->a, i, job->reach, job->bounds->center)))
+    for (size_t i = begin; i < end; i++) {
+        const part_ball part = job->subject.cloud != NULL ? plain_ball(job->subject.cloud, i) : anchor_ball(job->subject.anchors, i);
+        const float pixel_min = job->reach->pixel_min != NULL ? job->reach->pixel_min[i] : 0;
+        if (is_visible(job->bounds, part.center, reach_of(&part, job->reach, pixel_min, job->bounds->center)))
             job->out[begin + kept++] = (uint32_t)i;
+    }
     job->out_count[block] = kept;
 }
 
-gbt_status visible_find(const anchors *a, const view_bounds *bounds, const visible_reach *reach, uint32_t **visible, size_t *count, size_t *capacity,
+gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach, uint32_t **visible, size_t *count, size_t *capacity,
                         gbt_error *err)
 {
-    const size_t blocks = parallel_block_count(a->count, ANCHOR_BLOCK);
-    GBT_TRY(mem_reserve((void **)visible, capacity, 0, a->count + blocks + 1, sizeof **visible, "visible anchors", err));
+    const size_t parts = frame_subject_count(subject), blocks = parallel_block_count(parts, PART_BLOCK);
+    GBT_TRY(mem_reserve((void **)visible, capacity, 0, parts + blocks + 1, sizeof **visible, "visible parts", err));
     uint32_t *list = *visible;
-    visible_job job = {a, bounds, reach, list, list + a->count};
-    parallel_blocks(a->count, ANCHOR_BLOCK, visible_block, &job);
+    visible_job job = {subject, bounds, reach, list, list + parts};
+    parallel_blocks(parts, PART_BLOCK, visible_block, &job);
     *count = 0;
     for (size_t b = 0; b < blocks; b++) {
-        memmove(list + *count, list + b * ANCHOR_BLOCK, job.out_count[b] * sizeof *list);
+        memmove(list + *count, list + b * PART_BLOCK, job.out_count[b] * sizeof *list);
         *count += job.out_count[b];
     }
     return GBT_OK;

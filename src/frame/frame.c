@@ -1,5 +1,5 @@
-/* train/frame.c -- one view of an anchor model: rays, visible anchors, decode, tree, trace; and back. */
-#include "train/frame.h"
+/* frame/frame.c -- one view of a model: rays, what is visible, its Gaussians, tree, trace; and back. */
+#include "frame/frame.h"
 
 #include <math.h>
 #include <string.h>
@@ -7,7 +7,8 @@
 #include "base/clock.h"
 #include "base/fail.h"
 #include "base/memory.h"
-#include "train/visible.h"
+#include "frame/plain.h"
+#include "frame/visible.h"
 
 static const char *const renderer_names[] = {[FRAME_TRACE] = "trace", [FRAME_SPLAT] = "raster", [FRAME_SPLAT_PER_RAY] = "per-ray"};
 
@@ -51,23 +52,22 @@ static float pixel_variance(const frame *f, float variance)
 /* Of every Gaussian of the last render; NULL: no limit. */
 static const float *pixel_min_of(const frame *f)
 {
-    return f->draw.anchor_pixel != NULL ? f->pixel_min : NULL;
+    return f->pixel_limited ? f->pixel_min : NULL;
 }
 
 /* f->gaussians as wide as the view's pixels make them. */
-static gbt_status widen(frame *f, const anchors *a, gbt_error *err)
+static gbt_status widen(frame *f, frame_subject subject, gbt_error *err)
 {
-    if (f->draw.anchor_pixel != NULL) {
+    if (f->pixel_limited) {
         GBT_TRY(mem_reserve((void **)&f->pixel_min, &f->pixel_min_capacity, 0, f->gaussians.count + 1, sizeof *f->pixel_min, "pixel sizes", err));
         for (size_t i = 0; i < f->gaussians.count; i++)
-            f->pixel_min[i] = f->draw.anchor_pixel[f->visible[f->tape.slot[i] / (uint32_t)a->offset_count]];
+            f->pixel_min[i] = f->draw.anchor_pixel[frame_part(f, subject, i)];
     }
     return footprint_forward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians, &f->wide, err);
 }
 
 /* Everything up to the tree, and f->rays through the middle of the aperture. `guest` is optional. */
-static gbt_status prepare(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, const frame_guest *guest,
-                          gbt_error *err)
+static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, const frame_guest *guest, gbt_error *err)
 {
     double clock = clock_wall();
     ray_shot middle = *shot;
@@ -83,18 +83,22 @@ static gbt_status prepare(frame *f, const anchors *a, const decoder *d, const ra
         bounds = view_bounds_none();
     f->view = footprint_view_of(&shot->camera);
     const bool splats = f->draw.renderer == FRAME_SPLAT;
+    f->pixel_limited = f->draw.anchor_pixel != NULL && subject.cloud == NULL;
     f->widened = f->draw.footprint > 0 && shot->given == NULL && !splats; /* nobody says how wide given rays are; splats are dilated instead */
     const visible_reach extent = {.sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)), /* where an opaque Gaussian falls to alpha_min */
                                   .width = sqrtf(pixel_variance(f, splats ? raster_settings_default().dilation : f->widened ? f->draw.footprint : 0)),
                                   .pixel = (float)f->view.pixel,
                                   .parallel = f->view.kind == FOOTPRINT_PARALLEL,
-                                  .pixel_min = f->draw.anchor_pixel};
-    GBT_TRY(visible_find(a, &bounds, &extent, &f->visible, &f->visible_count, &f->visible_capacity, err));
+                                  .pixel_min = f->pixel_limited ? f->draw.anchor_pixel : NULL};
+    GBT_TRY(visible_find(subject, &bounds, &extent, &f->visible, &f->visible_count, &f->visible_capacity, err));
     f->times.visible = lap(&clock);
     /* A Gaussian below alpha_min is never blended and so has no gradient: it need not be made. */
-    GBT_TRY(decode_forward(a, d, f->eye, f->visible, f->visible_count, settings->alpha_min, &f->gaussians, &f->tape, err));
+    if (subject.cloud != NULL)
+        GBT_TRY(plain_forward(subject.cloud, f->eye, f->visible, f->visible_count, &f->gaussians, err));
+    else
+        GBT_TRY(decode_forward(subject.anchors, subject.decoder, f->eye, f->visible, f->visible_count, settings->alpha_min, &f->gaussians, &f->tape, err));
     if (f->widened)
-        GBT_TRY(widen(f, a, err));
+        GBT_TRY(widen(f, subject, err));
     f->times.decode = lap(&clock);
     f->times.build = 0;
     memset(&f->counters, 0, sizeof f->counters);
@@ -128,11 +132,10 @@ static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape
     return GBT_OK;
 }
 
-gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
-                        gbt_error *err)
+gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, bool keep_tape, gbt_error *err)
 {
     const ray_shot shot = ray_shot_of(camera);
-    GBT_TRY(prepare(f, a, d, &shot, settings, NULL, err));
+    GBT_TRY(prepare(f, subject, &shot, settings, NULL, err));
     double clock = clock_wall();
     if (f->draw.renderer == FRAME_TRACE)
         GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
@@ -165,16 +168,15 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_gues
     return GBT_OK;
 }
 
-gbt_status frame_render_guest(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings,
-                              const frame_guest *guest, gbt_error *err)
+gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, const frame_guest *guest, gbt_error *err)
 {
     GBT_TRY(ray_shot_check(shot, err));
     if (f->draw.renderer != FRAME_TRACE) {
         if (guest != NULL || shot->given != NULL || shot->aperture_radius > 0 || shot->shutter != RAY_SHUTTER_GLOBAL)
             return base_fail(err, GBT_ERR_ARGUMENT, "the rasterizer draws what a pinhole camera sees that stands still, and no more; trace this picture");
-        return frame_render(f, a, d, &shot->camera, settings, false, err);
+        return frame_render(f, subject, &shot->camera, settings, false, err);
     }
-    GBT_TRY(prepare(f, a, d, shot, settings, guest, err));
+    GBT_TRY(prepare(f, subject, shot, settings, guest, err));
     f->times.trace = 0;
     double *sum = mem_calloc(ray_image_count(&f->rays), 3 * sizeof *sum, "picture", err);
     const gbt_status status = sum == NULL ? GBT_ERR_NO_MEMORY : trace_samples(f, shot, guest, sum, err);
@@ -182,9 +184,9 @@ gbt_status frame_render_guest(frame *f, const anchors *a, const decoder *d, cons
     return status;
 }
 
-gbt_status frame_render_shot(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, gbt_error *err)
+gbt_status frame_render_shot(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, gbt_error *err)
 {
-    return frame_render_guest(f, a, d, shot, settings, NULL, err);
+    return frame_render_guest(f, subject, shot, settings, NULL, err);
 }
 
 void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_COUNT])
@@ -193,7 +195,7 @@ void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_CO
     if (!f->widened)
         return;
     memcpy(&g, field, sizeof g);
-    footprint_widen(&f->view, (double)pixel_variance(f, f->draw.footprint), f->draw.anchor_pixel != NULL ? (double)f->pixel_min[i] : 0, &g);
+    footprint_widen(&f->view, (double)pixel_variance(f, f->draw.footprint), f->pixel_limited ? (double)f->pixel_min[i] : 0, &g);
     memcpy(field, &g, sizeof g);
 }
 
@@ -206,8 +208,8 @@ double frame_volume(const frame *f)
     return g->count > 0 ? sum / (double)g->count : 0;
 }
 
-gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image, float volume_weight, anchors *d_anchors,
-                          float *d_params, gbt_error *err)
+/* From the picture to f->d_gaussians and f->seen. */
+static gbt_status backward_gaussians(frame *f, const image *d_image, gbt_error *err)
 {
     double clock = clock_wall();
     GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen, "weights", err));
@@ -218,6 +220,14 @@ gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const im
     if (f->widened)
         footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians, &f->d_gaussians);
     f->times.adjoint = lap(&clock);
+    return GBT_OK;
+}
+
+gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image, float volume_weight, anchors *d_anchors,
+                          float *d_params, gbt_error *err)
+{
+    GBT_TRY(backward_gaussians(f, d_image, err));
+    double clock = clock_wall();
     gaussians *g = &f->gaussians, *dg = &f->d_gaussians;
     const float share = g->count > 0 ? volume_weight / (float)g->count : 0;
     for (size_t i = 0; i < g->count; i++) {
@@ -228,6 +238,23 @@ gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const im
     GBT_TRY(decode_backward(a, d, &f->tape, dg, d_anchors, d_params, err));
     f->times.decode_adjoint = lap(&clock);
     return GBT_OK;
+}
+
+gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const image *d_image, gaussian_cloud *d_cloud, gbt_error *err)
+{
+    GBT_TRY(backward_gaussians(f, d_image, err));
+    plain_backward(cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, d_cloud);
+    return GBT_OK;
+}
+
+gbt_status frame_weigh(frame *f, gbt_error *err)
+{
+    image nothing = {0};
+    GBT_TRY(image_alloc(&nothing, f->rgb.width, f->rgb.height, 3, err));
+    memset(nothing.pixels, 0, 3 * (size_t)nothing.width * (size_t)nothing.height * sizeof *nothing.pixels);
+    const gbt_status status = backward_gaussians(f, &nothing, err);
+    image_free(&nothing);
+    return status;
 }
 
 void frame_free(frame *f)

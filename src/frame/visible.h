@@ -1,10 +1,10 @@
-/* train/visible.h -- which anchors the rays of a view may reach. */
-#ifndef GBT_TRAIN_VISIBLE_H
-#define GBT_TRAIN_VISIBLE_H
+/* frame/visible.h -- which parts of a subject the rays of a view may reach. */
+#ifndef GBT_FRAME_VISIBLE_H
+#define GBT_FRAME_VISIBLE_H
 
 #include <math.h>
 
-#include "anchor/anchors.h"
+#include "frame/subject.h"
 #include "trace/rays.h"
 
 enum { VIEW_PLANES = 5 };
@@ -41,11 +41,11 @@ typedef struct visible_reach {
     float width;            /* std-dev of a pixel, in pixels; 0: rays are thin */
     float pixel;            /* at most the size of a pixel at distance 1, or anywhere when parallel */
     bool parallel;
-    const float *pixel_min; /* optional, [anchors] */
+    const float *pixel_min; /* optional, [parts] */
 } visible_reach;
 
-/** Indices of the anchors whose Gaussians a ray may meet, ascending, into a growing array. GBT_OK or GBT_ERR_NO_MEMORY. */
-gbt_status visible_find(const anchors *a, const view_bounds *bounds, const visible_reach *reach, uint32_t **visible, size_t *count, size_t *capacity,
+/** Indices of the anchors whose Gaussians a ray may meet, or of such Gaussians, ascending, into a growing array. GBT_OK or GBT_ERR_NO_MEMORY. */
+gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach, uint32_t **visible, size_t *count, size_t *capacity,
                         gbt_error *err);
 
 #endif

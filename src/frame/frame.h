@@ -1,8 +1,8 @@
-/* train/frame.h -- one view of an anchor model, start to end: visible anchors, decode, tree, trace. Training and evaluation share it. */
-#ifndef GBT_TRAIN_FRAME_H
-#define GBT_TRAIN_FRAME_H
+/* frame/frame.h -- one view of a model, start to end: what is visible, its Gaussians, tree, trace; and back. Training and evaluation share it. */
+#ifndef GBT_FRAME_FRAME_H
+#define GBT_FRAME_FRAME_H
 
-#include "anchor/decode.h"
+#include "frame/subject.h"
 #include "raster/raster.h"
 #include "trace/footprint.h"
 #include "trace/trace.h"
@@ -36,19 +36,20 @@ typedef struct frame_drawing {
 /** Everything one view needs, reused from view to view. Start from {0}; free with frame_free(). */
 typedef struct frame {
     ray_image rays;
-    uint32_t *visible; /* [visible_count] anchor indices, ascending */
+    uint32_t *visible; /* [visible_count] anchors, or plain Gaussians, ascending */
     size_t visible_count, visible_capacity;
     frame_drawing draw;
-    gaussians gaussians, d_gaussians; /* as decoded */
+    gaussians gaussians, d_gaussians; /* as decoded, or the visible plain ones */
     gaussians wide;                   /* with the view's footprint; frame_drawn() says which were traced */
     bool widened;
     footprint_view view;
     float *pixel_min; /* [gaussians] */
+    bool pixel_limited;
     size_t pixel_min_capacity;
     decode_tape tape;
     trace_scene scene;
     raster_scene splats;
-    float *seen; /* [gaussians] after frame_backward(): sum over rays of T alpha */
+    float *seen; /* [gaussians] after an adjoint: sum over rays of T alpha */
     size_t seen_capacity;
     image rgb; /* the render */
     kernel_counters counters;
@@ -61,20 +62,19 @@ typedef struct frame {
 /**
  * Render `camera` (any model) into f->rgb.
  *
- * An anchor is visible when the ball around it that holds all its Gaussians' proxies meets a region that holds all rays, so nothing that
+ * An anchor or plain Gaussian is visible when the ball around it that holds all its proxies meets a region that holds all rays, so nothing that
  * could be seen is left out: planes along the sides of the picture for cameras that look forward, else a cone around their mean
- * direction, thickened by the distance between their origins. The networks see the anchors from the camera centre.
+ * direction, thickened by the distance between their origins. Networks and spherical harmonics see it from the camera centre.
  *
- * @param keep_tape [in] true when frame_backward() follows
+ * @param keep_tape [in] true when frame_backward(), frame_backward_plain() or frame_weigh() follows
  * Threads: one frame per thread; parallel inside; same bits for every thread count.
  */
-gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
-                        gbt_error *err);
+gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, bool keep_tape, gbt_error *err);
 
 /**
  * Render a shot (trace/rays.h) into f->rgb: the mean over its samples, added up in their order in double.
  *
- * Anchors are decoded once, for one point: the mean of the origins of the rays through the middle of the aperture. That is the camera
+ * Anchors are decoded (harmonics summed) once, for one point: the mean of the origins of the rays through the middle of the aperture. That is the camera
  * centre, the middle of the way of a rolling shutter, the middle of an orthographic picture (a point far behind it, where parallel rays
  * would meet, is farther than any the networks were trained for: measured, it spoils the picture). f->rays are left those of the last
  * sample. There is no adjoint.
@@ -82,7 +82,7 @@ gbt_status frame_render(frame *f, const anchors *a, const decoder *d, const gbt_
  * @return GBT_OK, GBT_ERR_ARGUMENT (ray_shot_check()), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
  * Threads: as frame_render(). Cost: decoding and building once, rays and tracing for every sample.
  */
-gbt_status frame_render_shot(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings, gbt_error *err);
+gbt_status frame_render_shot(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, gbt_error *err);
 
 /** What traces the rays of a shot in place of trace_forward(), and sends rays of its own where the picture does not look. */
 typedef struct frame_guest {
@@ -91,17 +91,28 @@ typedef struct frame_guest {
     float reach; /* largest |coordinate| of an origin of its own rays */
 } frame_guest;
 
-/** frame_render_shot() with a guest: every anchor is decoded, seen from the camera or not, all from the one point. */
-gbt_status frame_render_guest(frame *f, const anchors *a, const decoder *d, const ray_shot *shot, const trace_settings *settings,
-                              const frame_guest *guest, gbt_error *err);
+/** frame_render_shot() with a guest: everything is made, seen from the camera or not, all from the one point. */
+gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, const frame_guest *guest, gbt_error *err);
 
 /**
- * Adjoint of the last frame_render(keep_tape): d_image -> d_anchors (rows of f->visible, added) and d_params (added).
+ * Adjoint of the last frame_render(keep_tape) of anchors: d_image -> d_anchors (rows of f->visible, added) and d_params (added).
  *
  * @param volume_weight [in] adds the gradient of volume_weight * mean(scale_x scale_y scale_z) over the frame's Gaussians
  */
 gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image, float volume_weight, anchors *d_anchors,
                           float *d_params, gbt_error *err);
+
+/** Adjoint of the last frame_render(keep_tape) of a cloud. `d_cloud`: as many Gaussians as it has; see plain_backward(). */
+gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const image *d_image, gaussian_cloud *d_cloud, gbt_error *err);
+
+/** f->seen of the last frame_render(keep_tape), and no gradient. */
+gbt_status frame_weigh(frame *f, gbt_error *err);
+
+/** The part of the subject, an anchor or a plain Gaussian, that Gaussian `i` of the last render is of. */
+static inline uint32_t frame_part(const frame *f, frame_subject subject, size_t i)
+{
+    return f->visible[subject.cloud != NULL ? i : f->tape.slot[i] / (uint32_t)subject.anchors->offset_count];
+}
 
 /** The Gaussians that were traced. */
 static inline const gaussians *frame_drawn(const frame *f)

@@ -1,6 +1,6 @@
-/* bake/sh.h -- real spherical harmonics up to degree 3, in the order and with the signs of 3DGS files. */
-#ifndef GBT_BAKE_SH_H
-#define GBT_BAKE_SH_H
+/* frame/sh.h -- real spherical harmonics up to degree 3, in the order and with the signs of 3DGS files. */
+#ifndef GBT_FRAME_SH_H
+#define GBT_FRAME_SH_H
 
 #include "data/gaussian_cloud.h"
 

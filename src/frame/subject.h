@@ -1,0 +1,30 @@
+/* frame/subject.h -- what a frame shows: the neural Gaussians of anchors, or plain ones. */
+#ifndef GBT_FRAME_SUBJECT_H
+#define GBT_FRAME_SUBJECT_H
+
+#include "anchor/decode.h"
+#include "data/gaussian_cloud.h"
+
+/** One of the two: anchors with their networks, or a cloud. Borrowed. Its parts, anchors or Gaussians, are what may be visible or not. */
+typedef struct frame_subject {
+    const anchors *anchors;
+    const decoder *decoder;
+    const gaussian_cloud *cloud; /* NULL: neural */
+} frame_subject;
+
+static inline frame_subject frame_neural(const anchors *a, const decoder *d)
+{
+    return (frame_subject){.anchors = a, .decoder = d};
+}
+
+static inline frame_subject frame_plain(const gaussian_cloud *cloud)
+{
+    return (frame_subject){.cloud = cloud};
+}
+
+static inline size_t frame_subject_count(frame_subject s)
+{
+    return s.cloud != NULL ? s.cloud->count : s.anchors->count;
+}
+
+#endif

@@ -62,12 +62,15 @@ float schedule_thrift(double steps);
 #define SCHEDULE_ALPHA_MIN 0.02f
 #define SCHEDULE_T_MIN 0.003f
 
+/** In the last part of a run all rates fall: a step teaches a model of one photo at a time, and what it takes from the others comes to rest. */
+#define SCHEDULE_COOL_FROM 0.9
+
 typedef struct learning_rates {
     double offset, feature, scale, opacity_mlp, shape_mlp, color_mlp;
 } learning_rates;
 
 /**
- * Log-linear decays (docs/training.md).
+ * Log-linear decays, and in the end, from SCHEDULE_COOL_FROM on, straight to nearly nothing (docs/training.md).
  *
  * @param compat [in] true: the reference method's rates; false: ours, higher, for runs of some thousand steps
  * @param extent [in] of the cameras; the reference's rate of offsets is proportional to it

@@ -757,14 +757,20 @@ static void levels_and_rates(void **state)
         }
     }
     double before[6];
-    for (int i = 0; i <= 100; i++) { /* positive, finite, and none ever rises */
-        const learning_rates r = schedule_rates(i / 100.0, true, 2.0, 1);
-        const double now[6] = {r.offset, r.feature, r.scale, r.opacity_mlp, r.shape_mlp, r.color_mlp};
-        for (int k = 0; k < 6; k++) {
-            assert_true(isfinite(now[k]) && now[k] > 0);
-            assert_true(i == 0 || now[k] <= before[k] * (1 + 1e-12));
-            before[k] = now[k];
+    for (int compat = 0; compat < 2; compat++)
+        for (int i = 0; i <= 100; i++) { /* positive, finite, and none ever rises */
+            const learning_rates r = schedule_rates(i / 100.0, compat, 2.0, 1);
+            const double now[6] = {r.offset, r.feature, r.scale, r.opacity_mlp, r.shape_mlp, r.color_mlp};
+            for (int k = 0; k < 6; k++) {
+                assert_true(isfinite(now[k]) && now[k] > 0);
+                assert_true(i == 0 || now[k] <= before[k] * (1 + 1e-12));
+                before[k] = now[k];
+            }
         }
+    assert_true(schedule_rates(1, false, 1, 1).feature < 0.05 * schedule_rates(0.9, false, 1, 1).feature);
+    assert_true(schedule_rates(1, true, 1, 1).feature == schedule_rates(0.9, true, 1, 1).feature);
+    for (int i = 0; i <= 100; i++) {
+        const learning_rates r = schedule_rates(i / 100.0, true, 2.0, 1);
         assert_true(fabs(r.offset / schedule_rates(i / 100.0, true, 1.0, 1).offset - 2) < 1e-12);
         assert_true(schedule_rates(i / 100.0, false, 2.0, 1).offset == schedule_rates(i / 100.0, false, 1.0, 1).offset);
     }

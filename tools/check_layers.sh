@@ -2,8 +2,8 @@
 # tools/check_layers.sh -- holds every #include of the library to tools/layers.txt; prints each offence, exits 1 if there is one.
 #
 # Usage: check_layers.sh [TREE]. Needs sh, find and awk only. The rooms are src/ROOM/, and scenes/ at the top.
-# Beside the table: only src/bvh/embree_api.h includes Embree; C++ is in src/shim only, and nobody includes shim/; cli and view see
-# nothing but gbtrace/*.h and themselves, public headers nothing but each other; an include with quotes is written "room/file.h" or "gbtrace/file.h".
+# Beside the table: only src/bvh/embree_api.h includes Embree; C++ is in src/shim only, and nobody includes shim/; cli sees
+# nothing but gbtrace/*.h and itself, public headers nothing but each other; an include with quotes is written "room/file.h" or "gbtrace/file.h".
 set -u
 cd "${1:-$(dirname "$0")/..}" || exit 2
 [ -f tools/layers.txt ] || { echo "tools/layers.txt is not there" >&2; exit 2; }

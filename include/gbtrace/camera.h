@@ -84,6 +84,13 @@ gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height);
 bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_camera *out);
 
 /**
+ * The camera whose pixel (i, j) has its middle at the point (i + 0.5 + dx, j + 0.5 + dy) of this one's picture.
+ *
+ * @return false for a model without a principal point (equirectangular); `out` is untouched then
+ */
+bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_camera *out);
+
+/**
  * tan of half the horizontal and vertical field of view of the pinhole that best stands for this camera: width / (2 fx), height / (2 fy).
  * 0 for parallel rays.
  */

@@ -562,6 +562,15 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
     return true;
 }
 
+bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_camera *out)
+{
+    if (!gbt_camera_every(camera, 1, 0, 0, out))
+        return false;
+    const int focal_count = row_of(camera->model)->single_f ? 1 : 2;
+    out->params[focal_count] -= dx, out->params[focal_count + 1] -= dy;
+    return true;
+}
+
 void gbt_camera_half_fov_tan(const gbt_camera *camera, double tan_half[2])
 {
     camera_lens lens;

@@ -22,6 +22,6 @@ const char *command_nearest(const char *typed, const char *const *names, int cou
 
 /* One line per subcommand; main.c lists them. */
 extern const command command_demo, command_info, command_init, command_train, command_eval, command_render, command_make_scene, command_bench,
-    command_check_grad, command_study, command_compare, command_compress, command_export;
+    command_check_grad, command_study, command_compare, command_compress, command_export, command_view;
 
 #endif

@@ -139,6 +139,18 @@ gbt_status camera_file_read(const char *path, const double origin[3], camera_fil
     return status;
 }
 
+gbt_status camera_text_read(const char *text, const char *name, const double origin[3], ray_shot *out, gbt_error *err)
+{
+    json_t *root;
+    camera_file taken = {0};
+    GBT_TRY(json_read_text(text, strlen(text), name, &root, err));
+    const json_fields r = {name, "", root, err};
+    const gbt_status status = json_field_given(&r, "rays") ? json_field_fail(&r, "rays", "only a camera file can name them") : take_all(&r, origin, &taken);
+    json_decref(root);
+    *out = taken.shot;
+    return status;
+}
+
 void camera_file_free(camera_file *file)
 {
     ray_image_free(&file->rays);

@@ -17,6 +17,10 @@ typedef struct camera_file {
  * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT ("FILE: field: what was wrong"), GBT_ERR_NO_MEMORY
  */
 gbt_status camera_file_read(const char *path, const double origin[3], camera_file *out, gbt_error *err);
+
+/** The same from a text, which cannot name an image of rays: what it says is the shot. `name` stands for the file in messages. */
+gbt_status camera_text_read(const char *text, const char *name, const double origin[3], ray_shot *out, gbt_error *err);
+
 void camera_file_free(camera_file *file); /* zeroes the struct */
 
 #endif

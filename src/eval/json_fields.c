@@ -13,16 +13,22 @@ gbt_status json_read(const char *path, json_t **out, gbt_error *err)
 {
     unsigned char *bytes;
     size_t count;
-    json_error_t where;
     GBT_TRY(file_read(path, &bytes, &count, err));
-    *out = json_loadb((const char *)bytes, count, JSON_REJECT_DUPLICATES, &where);
+    const gbt_status status = json_read_text((const char *)bytes, count, path, out, err);
     mem_free(bytes);
+    return status;
+}
+
+gbt_status json_read_text(const char *text, size_t length, const char *name, json_t **out, gbt_error *err)
+{
+    json_error_t where;
+    *out = json_loadb(text, length, JSON_REJECT_DUPLICATES, &where);
     if (*out == NULL)
-        return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not JSON: %s", path, where.line, where.text);
+        return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not JSON: %s", name, where.line, where.text);
     if (json_is_object(*out))
         return GBT_OK;
     json_decref(*out);
-    return base_fail(err, GBT_ERR_FORMAT, "%s: wanted a JSON object", path);
+    return base_fail(err, GBT_ERR_FORMAT, "%s: wanted a JSON object", name);
 }
 
 gbt_status json_field_fail(const json_fields *r, const char *field, const char *what)

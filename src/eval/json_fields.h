@@ -22,6 +22,9 @@ typedef struct json_fields {
 /** The JSON object that a file holds; names may not be given twice. Free with json_decref(). GBT_ERR_IO or GBT_ERR_FORMAT. */
 gbt_status json_read(const char *path, json_t **out, gbt_error *err);
 
+/** The same of a text; `name` stands for the file in messages. */
+gbt_status json_read_text(const char *text, size_t length, const char *name, json_t **out, gbt_error *err);
+
 gbt_status json_field_fail(const json_fields *r, const char *field, const char *what); /* GBT_ERR_FORMAT */
 bool json_field_given(const json_fields *r, const char *field);
 

@@ -8,8 +8,6 @@
 #include "base/file.h"
 #include "base/memory.h"
 
-typedef enum render_output { OUTPUT_TRANSMITTANCE, OUTPUT_DEPTH, OUTPUT_MEDIAN_DEPTH, OUTPUT_NORMAL, OUTPUT_HITS, OUTPUT_ANCHOR, OUTPUT_COUNT } render_output;
-
 static const struct { const char *name; int channels; } outputs[OUTPUT_COUNT] = {
     {"transmittance", 1}, {"depth", 1}, {"median-depth", 1}, {"normal", 3}, {"hits", 1}, {"anchor", 1}};
 
@@ -46,13 +44,17 @@ static gbt_status write_one(const image *pixels, render_output which, const char
     return image_write(path, pixels, err);
 }
 
-typedef struct output_images {
-    ray_image rays;
-    image rgb, of[OUTPUT_COUNT];
-    uint32_t *strongest;
-} output_images;
+void render_output_images_free(render_output_images *o)
+{
+    for (int i = 0; i < OUTPUT_COUNT; i++)
+        image_free(&o->of[i]);
+    image_free(&o->rgb);
+    ray_image_free(&o->rays);
+    mem_free(o->strongest);
+    memset(o, 0, sizeof *o);
+}
 
-static gbt_status trace_outputs_of(loaded_run *r, const ray_shot *shot, unsigned wanted, output_images *o, gbt_error *err)
+gbt_status render_outputs_trace(loaded_run *r, const ray_shot *shot, unsigned wanted, render_output_images *o, gbt_error *err)
 {
     ray_shot middle = *shot;
     middle.aperture_radius = 0;
@@ -79,15 +81,11 @@ gbt_status render_outputs_write(loaded_run *r, const ray_shot *shot, unsigned wa
 {
     if (wanted == 0)
         return GBT_OK;
-    output_images o = {0};
-    gbt_status status = trace_outputs_of(r, shot, wanted, &o, err);
-    for (int i = 0; i < OUTPUT_COUNT; i++) {
+    render_output_images o = {0};
+    gbt_status status = render_outputs_trace(r, shot, wanted, &o, err);
+    for (int i = 0; i < OUTPUT_COUNT; i++)
         if (status == GBT_OK && wanted >> i & 1)
             status = write_one(&o.of[i], (render_output)i, folder, name, err);
-        image_free(&o.of[i]);
-    }
-    image_free(&o.rgb);
-    ray_image_free(&o.rays);
-    mem_free(o.strongest);
+    render_output_images_free(&o);
     return status;
 }

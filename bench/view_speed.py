@@ -1,0 +1,78 @@
+#!/usr/bin/env python3
+"""bench/view_speed.py -- pictures a second of `gbtrace view` in headless Chromium while the scene is turned, and where the time goes.
+
+Usage: view_speed.py PROGRAM RUN [--size 0.5|1|2|window] [--window 1280x900] [--seconds 10] [--screenshots FOLDER]
+"""
+import argparse
+import os
+import signal
+import subprocess
+import sys
+import time
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "tests", "view"))
+import browser  # noqa: E402
+
+STILL = "gbtrace.look.done && gbtrace.look.done.generation === gbtrace.pictures.generation && gbtrace.look.done.scale === 1"
+PARTS = ("prepare", "trace", "encode", "transfer", "draw")
+
+
+def choose(page, name, value):
+    page.run(f"""(e => {{ if (![...e.options].some(o => o.value === '{value}')) e.append(new Option('{value}'));
+        e.value = '{value}'; e.dispatchEvent(new Event('change')); }})(document.getElementById('{name}'))""")
+
+
+def turn(page, seconds):
+    """Drag to and fro; the pictures that came in the meantime."""
+    page.run("window.seen = []")
+    x, y = page.run("(() => { const b = document.getElementById('render').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()")
+    page.mouse("mousePressed", x, y, button="left", clickCount=1)
+    begin = now = time.monotonic()
+    while now - begin < seconds:
+        way = (now - begin) * 60 % 240
+        page.mouse("mouseMoved", x + (way if way < 120 else 240 - way) - 60, y + way / 12, button="left")
+        time.sleep(0.015)
+        now = time.monotonic()
+    page.mouse("mouseReleased", x, y, button="left", clickCount=1)
+    seen = page.run("window.seen.filter(a => a.draw_ms !== undefined)")
+    page.wait(STILL)
+    return seen, now - begin
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program")
+    parser.add_argument("run")
+    parser.add_argument("--size", default="1")
+    parser.add_argument("--window", default="1280x900")
+    parser.add_argument("--seconds", type=float, default=10)
+    parser.add_argument("--screenshots")
+    wanted = parser.parse_args()
+    width, height = map(int, wanted.window.split("x"))
+    server = subprocess.Popen([wanted.program, "view", wanted.run, "--port", "0"], stdout=subprocess.PIPE, text=True)
+    page = browser.Browser(browser.find(), width, height)
+    try:
+        page.open(server.stdout.readline().strip())
+        page.wait(STILL)
+        page.run("""(learn => gbtrace.pictures.learn = about => { window.seen.push(about); learn.call(gbtrace.pictures, about); })(gbtrace.pictures.learn)""")
+        page.run("window.seen = []")
+        choose(page, "size", wanted.size)
+        print("| pixels as | while moving | pictures/s | mean size | " + " | ".join(f"{p} ms" for p in PARTS) + " |\n|---|---|---|---|" + "---|" * len(PARTS))
+        for transfer, moving in (("raw", "full"), ("jpeg", "full"), ("png", "full"), ("raw", "auto")):
+            choose(page, "transfer", transfer)
+            choose(page, "moving", moving)
+            turn(page, 1)
+            seen, seconds = turn(page, wanted.seconds)
+            mean = {name: sum(a[name] for a in seen) / len(seen) for name in [p + "_ms" for p in PARTS] + ["width", "height"]}
+            print(f"| {transfer} | {moving} | {len(seen) / seconds:.1f} | {mean['width']:.0f} x {mean['height']:.0f} | " + " | ".join(f"{mean[p + '_ms']:.1f}" for p in PARTS) + " |",
+                  flush=True)
+            if wanted.screenshots:
+                page.screenshot(os.path.join(wanted.screenshots, f"{transfer}_{moving}.png"))
+    finally:
+        page.close()
+        server.send_signal(signal.SIGINT)
+        server.wait()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,36 @@
+/* cli/cmd_view.c -- gbtrace view. */
+#include <stdio.h>
+
+#include "cli/options.h"
+#include "gbtrace/train.h"
+#include "gbtrace/view.h"
+
+static void print_address(int port, void *context)
+{
+    (void)context;
+    printf("http://127.0.0.1:%d\n", port);
+    fflush(stdout);
+    fputs("open this in a browser; Ctrl-C ends\n", stderr);
+}
+
+static int run(const command *self, int argc, char **argv)
+{
+    gbt_view_def def = gbt_view_def_default();
+    int threads = 0;
+    def.ready = print_address;
+    const option options[] = {
+        {.name = "port", .short_name = 'p', .kind = OPTION_INT, .value = &def.port, .min = 0, .max = 65535, .value_name = "N", .help = "on 127.0.0.1; 0: any free one"},
+        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "photos of another data set"},
+        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
+    };
+    operands input;
+    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &input);
+    if (code >= 0)
+        return code;
+    if (threads > 0)
+        gbt_set_threads(threads);
+    gbt_error err = {0};
+    return command_failed(gbt_view(input.value[0], &def, &err), &err);
+}
+
+const command command_view = {.name = "view", .summary = "look at a scene in the browser, beside its photos, while it trains too", .usage = "RUN|MODEL.gbt|SCENE.ply|.splat|.spz", .run = run};

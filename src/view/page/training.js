@@ -1,0 +1,99 @@
+// training.js -- how the run goes on: polls /status, reads what log.csv has new, draws PSNR by step.
+
+const pollMs = 1000, liveSeconds = 15;
+
+export class Training {
+    // changed(status): the model is another one, or there is one at last.
+    constructor(part, now, chart, live, changed) {
+        Object.assign(this, { part, now, chart, live, changed });
+        this.bytes = 0;
+        this.rest = "";
+        this.columns = null;
+        this.rows = [];
+        this.version = -1;
+        this.poll();
+    }
+
+    async poll() {
+        try {
+            const status = await (await fetch("status")).json();
+            this.live.hidden = !(status.log_age >= 0 && status.log_age < liveSeconds);
+            if (status.log_bytes !== this.bytes)
+                await this.readLog();
+            this.describe(status);
+            if (status.version !== this.version) {
+                this.version = status.version;
+                this.changed(status);
+            }
+            this.gone = false;
+        } catch {
+            if (!this.gone)
+                this.changed(null); // the server has ended
+            this.gone = true;
+        }
+        setTimeout(() => this.poll(), pollMs);
+    }
+
+    async readLog() {
+        const response = await fetch("log?from=" + this.bytes);
+        if (!response.ok)
+            return;
+        const bytes = await response.arrayBuffer();
+        if (JSON.parse(response.headers.get("X-Picture")).from === 0)
+            this.columns = null, this.rows = [], this.rest = "", this.bytes = 0;
+        this.bytes += bytes.byteLength;
+        const lines = (this.rest + new TextDecoder().decode(bytes)).split("\n");
+        this.rest = lines.pop();
+        for (const line of lines) {
+            const words = line.split(",");
+            if (this.columns === null)
+                this.columns = words;
+            else
+                this.rows.push(Object.fromEntries(this.columns.map((name, i) => [name, words[i] === "" ? NaN : Number(words[i])])));
+        }
+        this.draw();
+    }
+
+    describe(status) {
+        const row = this.rows[this.rows.length - 1];
+        this.part.hidden = row === undefined;
+        if (row === undefined)
+            return;
+        const parts = [`step ${row.step}`, `${Math.round(100 * row.progress)} %`, `${row.train_psnr.toFixed(1)} dB`, `${row.anchors.toLocaleString("en")} anchors`];
+        this.now.textContent = parts.join(" · ") + (status.iterations > 0 && status.iterations < row.step ? ` (shown: step ${status.iterations})` : "");
+    }
+
+    draw() {
+        const rows = this.rows.filter(r => r.train_psnr > 0), left = 26, right = 278, top = 6, bottom = 94;
+        this.chart.replaceChildren();
+        if (rows.length < 2)
+            return;
+        const values = rows.flatMap(r => r.test_psnr > 0 ? [r.train_psnr, r.test_psnr] : [r.train_psnr]);
+        const low = Math.floor(Math.min(...values)), high = Math.max(low + 1, Math.ceil(Math.max(...values))), last = rows[rows.length - 1].step;
+        const x = step => left + (right - left) * step / last, y = psnr => bottom - (bottom - top) * (psnr - low) / (high - low);
+        const put = (kind, attributes, text) => {
+            const e = document.createElementNS("http://www.w3.org/2000/svg", kind);
+            for (const [name, value] of Object.entries(attributes))
+                e.setAttribute(name, value);
+            if (text !== undefined)
+                e.textContent = text;
+            this.chart.append(e);
+        };
+        for (const psnr of [low, high]) {
+            put("line", { class: "axis", x1: left, x2: right, y1: y(psnr), y2: y(psnr) });
+            put("text", { x: left - 4, y: y(psnr) + 3, "text-anchor": "end" }, psnr);
+        }
+        put("text", { x: left, y: 107 }, "dB, training photos by step");
+        put("text", { x: right, y: 107, "text-anchor": "end" }, last);
+        const every = Math.ceil(rows.length / 500); // steps of one photo each: means are easier to look at
+        const points = [];
+        for (let i = 0; i < rows.length; i += every) {
+            const some = rows.slice(i, i + every);
+            points.push(`${x(some[some.length - 1].step).toFixed(1)},${y(some.reduce((s, r) => s + r.train_psnr, 0) / some.length).toFixed(1)}`);
+        }
+        put("polyline", { class: "train", points: points.join(" ") });
+        for (const r of rows)
+            if (r.test_psnr > 0)
+                put("circle", { class: "test", cx: x(r.step), cy: y(r.test_psnr), r: 3 });
+    }
+}

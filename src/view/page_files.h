@@ -1,0 +1,16 @@
+/* view/page_files.h -- the files of src/view/page/ as bytes; page_files.c is made of them at build time (page_files.cmake). */
+#ifndef GBT_VIEW_PAGE_FILES_H
+#define GBT_VIEW_PAGE_FILES_H
+
+#include <stddef.h>
+
+typedef struct page_file {
+    const char *name; /* "index.html" */
+    const unsigned char *bytes;
+    size_t count;
+} page_file;
+
+/** The file of that name; NULL for another. */
+const page_file *page_file_find(const char *name);
+
+#endif

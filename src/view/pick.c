@@ -1,0 +1,66 @@
+/* view/pick.c -- the point of the scene behind a pixel. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/camera_pose.h"
+#include "base/fail.h"
+#include "eval/render_outputs.h"
+#include "view/studio.h"
+
+/* One pixel, as wide as those of `camera`, that looks along its ray through `pixel`. False where the lens has no ray. */
+static bool aim(const gbt_camera *camera, const double pixel[2], gbt_camera *out)
+{
+    double origin[3], dir[3], target[3], half_fov_tan[2];
+    if (!gbt_camera_ray(camera, pixel[0], pixel[1], origin, dir))
+        return false;
+    gbt_camera_half_fov_tan(camera, half_fov_tan);
+    const double focal = half_fov_tan[0] > 0 ? 0.5 * camera->width / half_fov_tan[0] : 1000;
+    int least = 0;
+    for (int k = 0; k < 3; k++) {
+        target[k] = origin[k] + dir[k];
+        if (fabs(dir[k]) < fabs(dir[least]))
+            least = k;
+    }
+    double up[3] = {0, 0, 0};
+    up[least] = 1; /* never along the view */
+    memset(out, 0, sizeof *out);
+    out->model = GBT_CAMERA_PINHOLE, out->width = out->height = 1;
+    out->params[0] = out->params[1] = focal, out->params[2] = out->params[3] = 0.5;
+    return camera_look_at(origin, target, up, out);
+}
+
+/* Where the ray of a camera of one pixel passes the half of what it sees; 0: nowhere. */
+static gbt_status find_depth(studio *s, const gbt_camera *one, double *depth, gbt_error *err)
+{
+    const ray_shot shot = ray_shot_of(one);
+    render_output_images images = {0};
+    GBT_TRY(studio_prepare(s, one, FRAME_TRACE, "default", err));
+    const gbt_status status = render_outputs_trace(s->run, &shot, 1u << OUTPUT_MEDIAN_DEPTH, &images, err);
+    *depth = status == GBT_OK ? (double)images.of[OUTPUT_MEDIAN_DEPTH].pixels[0] : 0;
+    render_output_images_free(&images);
+    return status;
+}
+
+gbt_status studio_pick(studio *s, const request *what, answer *out, gbt_error *err)
+{
+    gbt_camera camera, one;
+    double depth = 0;
+    char text[256];
+    GBT_TRY(studio_camera(s, what, &camera, err));
+    if (!(what->pixel[0] < camera.width && what->pixel[1] < camera.height))
+        return base_fail(err, GBT_ERR_ARGUMENT, "x, y: %g, %g (the picture has %d x %d pixels)", what->pixel[0], what->pixel[1], camera.width, camera.height);
+    if (aim(&camera, what->pixel, &one))
+        GBT_TRY(find_depth(s, &one, &depth, err));
+    if (depth > 0) {
+        const double *forward = one.rotation + 6, *origin = s->run->model.origin;
+        double point[3];
+        for (int k = 0; k < 3; k++)
+            point[k] = one.center[k] + origin[k] + depth * forward[k];
+        snprintf(text, sizeof text, "{\"hit\":true,\"depth\":%.9g,\"point\":[%.17g,%.17g,%.17g]}", depth, point[0], point[1], point[2]);
+    } else {
+        snprintf(text, sizeof text, "{\"hit\":false}");
+    }
+    answer_text(out, 200, "application/json", text);
+    return GBT_OK;
+}

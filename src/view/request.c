@@ -1,0 +1,126 @@
+/* view/request.c -- a query's words, each checked. */
+#include "view/request.h"
+
+#include <string.h>
+
+#include "base/fail.h"
+#include "data/number.h"
+#include "eval/camera_file.h"
+#include "eval/render_outputs.h"
+
+typedef struct words {
+    request_word *word;
+    void *query;
+    gbt_error *err;
+} words;
+
+static const char *word_of(const words *w, const char *name)
+{
+    return w->word(w->query, name);
+}
+
+static gbt_status take_number(const words *w, const char *name, double low, double high, double *out)
+{
+    const char *text = word_of(w, name);
+    if (text == NULL)
+        return GBT_OK;
+    if (number_parse_double(text, strlen(text), out) != NUMBER_OK || !(*out >= low && *out <= high))
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "%s: \"%.40s\" (wanted a number from %g to %g)", name, text, low, high);
+    return GBT_OK;
+}
+
+static gbt_status take_whole(const words *w, const char *name, int low, int high, int *out)
+{
+    double value = *out;
+    GBT_TRY(take_number(w, name, low, high, &value));
+    *out = (int)value;
+    return *out == value ? GBT_OK : base_fail(w->err, GBT_ERR_ARGUMENT, "%s: %g (wanted a whole number)", name, value);
+}
+
+static gbt_status take_choice(const words *w, const char *name, const char *const *choices, int count, int *out)
+{
+    const char *text = word_of(w, name);
+    for (int i = 0; i < count && text != NULL; i++)
+        if (strcmp(text, choices[i]) == 0)
+            return *out = i, GBT_OK;
+    return text == NULL ? GBT_OK : base_fail(w->err, GBT_ERR_ARGUMENT, "%s: \"%.40s\": unknown", name, text);
+}
+
+static gbt_status check_size(int width, int height, gbt_error *err)
+{
+    if (width > REQUEST_SIDE_MAX || height > REQUEST_SIDE_MAX || (double)width * height > REQUEST_PIXELS_MAX)
+        return base_fail(err, GBT_ERR_ARGUMENT, "picture of %d x %d pixels (wanted sides of at most %d, and at most %d pixels)", width, height, REQUEST_SIDE_MAX,
+                         REQUEST_PIXELS_MAX);
+    return GBT_OK;
+}
+
+static gbt_status take_camera(const words *w, request *out)
+{
+    static const double none[3] = {0, 0, 0};
+    const char *text = word_of(w, "camera");
+    if ((text != NULL) == (word_of(w, "view") != NULL))
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "wanted either camera=JSON or view=NUMBER");
+    GBT_TRY(take_whole(w, "view", 0, INT32_MAX, &out->view));
+    GBT_TRY(take_whole(w, "width", 1, REQUEST_SIDE_MAX, &out->width));
+    GBT_TRY(take_whole(w, "height", 1, REQUEST_SIDE_MAX, &out->height));
+    if ((out->width > 0) != (out->height > 0))
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "wanted width and height, or neither");
+    if (text == NULL)
+        return check_size(out->width, out->height, w->err);
+    if (out->width > 0)
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "width: the camera says its own");
+    ray_shot shot;
+    GBT_TRY(camera_text_read(text, "camera", none, &shot, w->err));
+    if (shot.aperture_radius > 0 || shot.shutter != RAY_SHUTTER_GLOBAL)
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "camera: an open aperture or a rolling shutter is for gbtrace render");
+    out->camera = shot.camera;
+    return check_size(shot.camera.width, shot.camera.height, w->err);
+}
+
+static gbt_status take_picture(const words *w, request *out)
+{
+    static const char *const formats[] = {"raw", "jpeg", "png", "float"}, *const presets[] = {"exact", "default", "fast"};
+    int format = REQUEST_RAW, preset = 1;
+    const char *output = word_of(w, "output"), *renderer = word_of(w, "renderer");
+    if (output != NULL && strcmp(output, "color") != 0)
+        GBT_TRY(render_outputs_parse(output, &out->output, w->err));
+    if ((out->output & (out->output - 1)) != 0)
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "output: \"%.40s\" (wanted one)", output);
+    if (renderer != NULL && !frame_renderer_named(renderer, &out->renderer))
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "renderer: \"%.40s\" (wanted trace, raster or per-ray)", renderer);
+    GBT_TRY(take_choice(w, "format", formats, 4, &format));
+    GBT_TRY(take_choice(w, "preset", presets, 3, &preset));
+    GBT_TRY(take_whole(w, "quality", 1, 100, &out->quality));
+    GBT_TRY(take_whole(w, "sample", 0, REQUEST_SAMPLE_MAX, &out->sample));
+    out->format = (request_format)format, out->preset = presets[preset];
+    if (out->output != 0 && (out->renderer != FRAME_TRACE || out->format != REQUEST_FLOAT))
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "output: \"%.40s\" is traced, and has the format float alone", output);
+    return GBT_OK;
+}
+
+static gbt_status take_pixel(const words *w, request *out)
+{
+    if (word_of(w, "x") == NULL || word_of(w, "y") == NULL)
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "wanted x and y");
+    GBT_TRY(take_number(w, "x", 0, REQUEST_SIDE_MAX, &out->pixel[0]));
+    return take_number(w, "y", 0, REQUEST_SIDE_MAX, &out->pixel[1]);
+}
+
+gbt_status request_parse(const char *path, request_word *word, void *query, request *out, gbt_error *err)
+{
+    static const char *const paths[] = {"/scene", "/render", "/pick", "/photo"};
+    const words w = {word, query, err};
+    int kind = 0;
+    while (kind < 4 && strcmp(path, paths[kind]) != 0)
+        kind++;
+    if (kind == 4)
+        return base_fail(err, GBT_ERR_IO, "%.100s: not here", path);
+    *out = (request){.kind = (request_kind)kind, .view = -1, .renderer = FRAME_TRACE, .preset = "default", .quality = 85};
+    if (kind == REQUEST_SCENE)
+        return GBT_OK;
+    GBT_TRY(take_camera(&w, out));
+    GBT_TRY(take_picture(&w, out));
+    if (kind == REQUEST_PHOTO && out->view < 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "wanted view=NUMBER");
+    return kind == REQUEST_PICK ? take_pixel(&w, out) : GBT_OK;
+}

@@ -1,0 +1,80 @@
+/* view/scene.c -- what there is to see, as JSON: counts, the scene's middle, the views and their cameras. */
+#include <jansson.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "eval/json_out.h"
+#include "view/studio.h"
+
+#define DEGREES (180 / 3.14159265358979323846)
+
+/* origin, target and up as a camera file has them. */
+static json_t *describe_pose(const gbt_camera *camera, const double origin[3])
+{
+    const double *down = camera->rotation + 3, *forward = camera->rotation + 6;
+    double at[3], to[3];
+    for (int k = 0; k < 3; k++)
+        at[k] = camera->center[k] + origin[k], to[k] = at[k] + forward[k];
+    return json_pack("{s:[fff],s:[fff],s:[fff]}", "origin", at[0], at[1], at[2], "target", to[0], to[1], to[2], "up", -down[0], -down[1], -down[2]);
+}
+
+static json_t *describe_view(const loaded_run *r, size_t i)
+{
+    const scene_view *view = &r->scene.views[i];
+    const gbt_camera camera = photos_camera(&r->photos, i, 0);
+    double half_fov_tan[2];
+    gbt_camera_half_fov_tan(&camera, half_fov_tan);
+    return json_pack("{s:o,s:b,s:i,s:i,s:s,s:f,s:o}", "name", json_text(view->name), "test", view->is_test, "width", camera.width, "height", camera.height, "lens",
+                     gbt_camera_model_name(camera.model), "fov_x_deg", 2 * DEGREES * atan(half_fov_tan[0]), "camera", describe_pose(&camera, r->model.origin));
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    const float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+/* The middle half of what there is, in each direction: its centre, and the largest of its three sides. */
+static gbt_status find_middle(const loaded_run *r, double center[3], double *size, gbt_error *err)
+{
+    const bool plain = r->cloud.count > 0;
+    const size_t count = plain ? r->cloud.count : r->model.anchors.count;
+    const float *position = plain ? r->cloud.mean : r->model.anchors.position;
+    float *sorted = mem_alloc(count + 1, sizeof *sorted, "positions", err);
+    if (sorted == NULL)
+        return GBT_ERR_NO_MEMORY;
+    *size = 0;
+    for (int k = 0; k < 3; k++) {
+        for (size_t i = 0; i < count; i++)
+            sorted[i] = position[3 * i + (size_t)k];
+        qsort(sorted, count, sizeof *sorted, compare_floats);
+        const double low = count > 0 ? (double)sorted[count / 4] : 0, high = count > 0 ? (double)sorted[count - 1 - count / 4] : 0;
+        center[k] = 0.5 * (low + high) + r->model.origin[k];
+        *size = fmax(*size, high - low);
+    }
+    mem_free(sorted);
+    return GBT_OK;
+}
+
+gbt_status studio_scene(const studio *s, answer *out, gbt_error *err)
+{
+    const loaded_run *r = s->run;
+    double center[3], size;
+    GBT_TRY(find_middle(r, center, &size, err));
+    json_t *views = json_array();
+    for (size_t i = 0; i < r->scene.view_count; i++)
+        json_array_append_new(views, describe_view(r, i));
+    json_t *root = json_pack("{s:i,s:o,s:i,s:b,s:I,s:I,s:s,s:[fff],s:f,s:o}", "schema", 1, "input", json_text(s->input), "version", (int)s->version, "plain",
+                              r->cloud.count > 0, "gaussians", (json_int_t)r->cloud.count, "anchors", (json_int_t)r->model.anchors.count, "renderer",
+                              frame_renderer_name(s->trained), "center", center[0], center[1], center[2], "size", size, "views", views);
+    char *text = root != NULL ? json_dumps(root, JSON_COMPACT) : NULL;
+    json_decref(root);
+    if (text == NULL)
+        return base_fail(err, GBT_ERR_NO_MEMORY, "scene: no memory");
+    answer_text(out, 200, "application/json", text);
+    free(text);
+    return GBT_OK;
+}

@@ -1,0 +1,45 @@
+/* view/server.h -- HTTP on loopback: the page and small texts at once, all else as jobs for one worker, the newest picture first to last. */
+#ifndef GBT_VIEW_SERVER_H
+#define GBT_VIEW_SERVER_H
+
+#include "view/answer.h"
+#include "view/request.h"
+
+/** Fixed limits: connections at once, waiting jobs, bytes of a request's head, seconds that a silent connection stays. */
+enum { SERVER_CONNECTIONS = 32, SERVER_JOBS = 16, SERVER_HEAD_BYTES = 32 * 1024, SERVER_SILENT_SECONDS = 60 };
+
+typedef struct server server;
+
+/** A request that waits for its answer. */
+typedef struct server_job server_job;
+
+/**
+ * Listen at 127.0.0.1.
+ *
+ * Only GET is answered, only with a Host of 127.0.0.1 or localhost (so that no foreign name can be made to mean this server), and nothing but the
+ * page itself to requests that a browser marks as another site's.
+ *
+ * @param port     [in] 0: any free one
+ * @param log_path [in] file that /log?from=BYTE gives the rest of; empty: none. Borrowed
+ * @return GBT_OK, GBT_ERR_IO (the port is in use), GBT_ERR_NO_MEMORY
+ */
+gbt_status server_start(int port, const char *log_path, server **out, gbt_error *err);
+int server_port(const server *s);
+
+/** Give up what waits (503), close, free. Every job that server_next() gave must have been answered. */
+void server_stop(server *s);
+
+/** What /status says from now on: JSON, taken over, mem_free(). NULL: stays as it is. */
+void server_set_status(server *s, char *json);
+
+/** The oldest waiting job, for at most so many seconds; NULL: none, or server_wake(). Its request stays valid until it is answered. */
+server_job *server_next(server *s, double seconds);
+const request *server_request(const server_job *job);
+
+/** Send; the answer's bytes are taken over. */
+void server_answer(server *s, server_job *job, const answer *with);
+
+/** Let server_next() return. May be called in a signal handler. */
+void server_wake(server *s);
+
+#endif

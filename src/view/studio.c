@@ -1,0 +1,178 @@
+/* view/studio.c -- open, follow, prepare; the picture itself is made in picture.c. */
+#include "view/studio.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "eval/json_out.h"
+
+static bool is_same_file(const struct stat *a, const struct stat *b)
+{
+    return a->st_ino == b->st_ino && a->st_size == b->st_size && a->st_mtim.tv_sec == b->st_mtim.tv_sec && a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
+}
+
+/* With photos when they can be had; `note` says why they cannot. */
+static gbt_status open_run(studio *s, loaded_run *run, char *note, size_t note_size, gbt_error *err)
+{
+    gbt_error first = {0};
+    const gbt_status status = loaded_run_open(s->input, s->data, 0, run, &first);
+    note[0] = '\0';
+    if (status == GBT_OK)
+        return GBT_OK;
+    loaded_run_close(run);
+    if (s->data != NULL)
+        return base_fail(err, status, "%s", first.text);
+    GBT_TRY(loaded_run_open_model(s->input, run, err));
+    if (run->cloud.count == 0)
+        snprintf(note, note_size, "No photos: %s", first.text);
+    return GBT_OK;
+}
+
+static gbt_status reopen(studio *s, const struct stat *file, gbt_error *err)
+{
+    char note[sizeof s->note];
+    loaded_run *fresh = mem_calloc(1, sizeof *fresh, "run", err);
+    if (fresh == NULL)
+        return GBT_ERR_NO_MEMORY;
+    const gbt_status status = open_run(s, fresh, note, sizeof note, err);
+    if (status != GBT_OK) {
+        loaded_run_close(fresh);
+        mem_free(fresh);
+        return status;
+    }
+    if (s->run != NULL)
+        loaded_run_close(s->run);
+    mem_free(s->run);
+    s->run = fresh;
+    s->trained = fresh->frame.draw.renderer;
+    s->loaded = *file;
+    s->version++;
+    s->last.known = false;
+    memcpy(s->note, note, sizeof note);
+    return GBT_OK;
+}
+
+gbt_status studio_open(const char *input, const char *data, studio *out, gbt_error *err)
+{
+    struct stat file;
+    char config[4096];
+    *out = (studio){.input = input, .data = data};
+    const bool folder = file_is_folder(input);
+    if (folder) {
+        GBT_TRY(file_join(out->model_path, sizeof out->model_path, input, "model.gbt", err));
+        GBT_TRY(file_join(out->log_path, sizeof out->log_path, input, "log.csv", err));
+        GBT_TRY(file_join(config, sizeof config, input, "config", err));
+    } else if (snprintf(out->model_path, sizeof out->model_path, "%s", input) >= (int)sizeof out->model_path) {
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", input);
+    }
+    if (stat(out->model_path, &file) == 0)
+        return reopen(out, &file, err);
+    if (!folder || !file_exists(config))
+        return base_fail(err, GBT_ERR_IO, "%.1000s: not there (wanted a run, a model file or plain Gaussians)", out->model_path);
+    snprintf(out->note, sizeof out->note, "Training has not saved a model yet; it will be shown as soon as it has.");
+    return GBT_OK;
+}
+
+void studio_close(studio *s)
+{
+    if (s->run != NULL)
+        loaded_run_close(s->run);
+    mem_free(s->run);
+    s->run = NULL;
+}
+
+bool studio_follow(studio *s)
+{
+    struct stat file;
+    gbt_error err = {0};
+    if (stat(s->model_path, &file) != 0 || is_same_file(&file, &s->loaded))
+        return false;
+    if (reopen(s, &file, &err) == GBT_OK)
+        return true;
+    s->loaded = file; /* said once for each file */
+    snprintf(s->note, sizeof s->note, "%s", err.text);
+    log_warn("%s", err.text);
+    return false;
+}
+
+char *studio_status(const studio *s)
+{
+    struct stat log;
+    const bool has_log = s->log_path[0] != '\0' && stat(s->log_path, &log) == 0;
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    json_t *note = json_text(s->note);
+    json_t *status = json_pack("{s:i,s:I,s:f,s:o?}", "version", (int)s->version, "log_bytes", has_log ? (json_int_t)log.st_size : (json_int_t)0, "log_age",
+                               has_log ? (double)(now.tv_sec - log.st_mtim.tv_sec) : -1.0, "note", note);
+    if (status != NULL && s->run != NULL) {
+        json_object_set_new(status, "iterations", json_integer((json_int_t)s->run->model.iterations));
+        json_object_set_new(status, "anchors", json_integer((json_int_t)s->run->model.anchors.count));
+    }
+    char *text = status != NULL ? json_dumps(status, JSON_COMPACT) : NULL;
+    json_decref(status);
+    char *out = text != NULL ? mem_alloc(strlen(text) + 1, 1, "status", NULL) : NULL;
+    if (out != NULL)
+        strcpy(out, text);
+    free(text);
+    return out;
+}
+
+gbt_status studio_camera(const studio *s, const request *what, gbt_camera *out, gbt_error *err)
+{
+    const loaded_run *r = s->run;
+    if (what->view < 0) {
+        *out = what->camera;
+        for (int k = 0; k < 3; k++)
+            out->center[k] -= r->model.origin[k];
+        return GBT_OK;
+    }
+    if ((size_t)what->view >= r->scene.view_count)
+        return base_fail(err, GBT_ERR_ARGUMENT, "view: %d (there are %zu)", what->view, r->scene.view_count);
+    *out = photos_camera(&r->photos, (size_t)what->view, 0);
+    if (what->width > 0)
+        *out = gbt_camera_resized(out, what->width, what->height);
+    return GBT_OK;
+}
+
+gbt_status studio_prepare(studio *s, const gbt_camera *camera, frame_renderer renderer, const char *preset, gbt_error *err)
+{
+    loaded_run *r = s->run;
+    studio_picture wanted;
+    memset(&wanted, 0, sizeof wanted);
+    wanted.camera = *camera, wanted.renderer = renderer, wanted.preset = preset, wanted.known = true;
+    if (memcmp(&wanted, &s->last, sizeof wanted) == 0)
+        return GBT_OK;
+    memset(&s->last, 0, sizeof s->last);
+    r->frame.draw.renderer = renderer;
+    GBT_TRY(loaded_run_preset(preset, &r->settings, err));
+    GBT_TRY(frame_render(&r->frame, loaded_run_subject(r), camera, &r->settings, false, err));
+    s->last = wanted;
+    return GBT_OK;
+}
+
+void studio_answer(studio *s, const request *what, answer *out)
+{
+    gbt_error err = {0};
+    gbt_status status;
+    if (s->run == NULL) {
+        answer_text(out, 503, "text/plain; charset=utf-8", s->note);
+        return;
+    }
+    if (what->kind == REQUEST_SCENE)
+        status = studio_scene(s, out, &err);
+    else if (what->kind == REQUEST_PICK)
+        status = studio_pick(s, what, out, &err);
+    else if (what->kind == REQUEST_PHOTO)
+        status = studio_photo(s, what, out, &err);
+    else
+        status = studio_render(s, what, out, &err);
+    if (status != GBT_OK)
+        answer_failure(out, status, &err);
+}

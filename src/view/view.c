@@ -1,0 +1,84 @@
+/* view/view.c -- the page's server from start to Ctrl-C. */
+#include "gbtrace/view.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "base/fail.h"
+#include "base/memory.h"
+#include "view/server.h"
+#include "view/studio.h"
+
+static const double look_every_seconds = 1; /* for a newer model */
+
+gbt_view_def gbt_view_def_default(void)
+{
+    return (gbt_view_def){.port = 8470};
+}
+
+/* ---- signals: the first one ends the loop, a second one the process -------------------------------------------------------------- */
+
+static volatile sig_atomic_t stop_signal = 0;
+static server *signalled = NULL; /* set before the handler is */
+
+static void on_signal(int number)
+{
+    if (stop_signal != 0)
+        _exit(128 + number);
+    stop_signal = number;
+    server_wake(signalled);
+}
+
+static void serve(studio *s, server *http)
+{
+    double looked = clock_wall();
+    while (stop_signal == 0) {
+        server_job *job = server_next(http, look_every_seconds);
+        if (job != NULL) {
+            answer made = {0};
+            studio_answer(s, server_request(job), &made);
+            server_answer(http, job, &made);
+        }
+        if (clock_wall() - looked >= look_every_seconds) {
+            studio_follow(s);
+            server_set_status(http, studio_status(s));
+            looked = clock_wall();
+        }
+    }
+}
+
+static void serve_until_signal(studio *s, server *http, const gbt_view_def *def)
+{
+    struct sigaction action = {.sa_handler = on_signal}, old_int, old_term;
+    sigemptyset(&action.sa_mask);
+    stop_signal = 0, signalled = http;
+    sigaction(SIGINT, &action, &old_int);
+    sigaction(SIGTERM, &action, &old_term);
+    if (def->ready != NULL)
+        def->ready(server_port(http), def->context);
+    serve(s, http);
+    sigaction(SIGINT, &old_int, NULL);
+    sigaction(SIGTERM, &old_term, NULL);
+}
+
+gbt_status gbt_view(const char *input, const gbt_view_def *def, gbt_error *err)
+{
+    server *http = NULL;
+    if (def->port < 0 || def->port > 65535)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--port: %d (wanted 0 to 65535)", def->port);
+    studio *s = mem_calloc(1, sizeof *s, "scene", err);
+    if (s == NULL)
+        return GBT_ERR_NO_MEMORY;
+    gbt_status status = studio_open(input, def->data, s, err);
+    if (status == GBT_OK)
+        status = server_start(def->port, s->log_path, &http, err);
+    if (status == GBT_OK) {
+        server_set_status(http, studio_status(s));
+        serve_until_signal(s, http, def);
+        server_stop(http);
+    }
+    studio_close(s);
+    mem_free(s);
+    return status;
+}

@@ -1,0 +1,326 @@
+/* tests/view/test_server.c -- the server alone, with this program as its worker: bad requests, the queue, limits, the end. */
+#include "view/http_client.h"
+
+#include "base/file.h"
+#include "view/server.h"
+
+static server *s;
+static int port;
+static char log_path[] = "/tmp/gbt_view_log_XXXXXX";
+
+static int start(void **state)
+{
+    (void)state;
+    gbt_error err = {0};
+    const int fd = mkstemp(log_path);
+    if (fd < 0 || write(fd, "a,b\n1,2\n", 8) != 8 || close(fd) != 0 || server_start(0, log_path, &s, &err) != GBT_OK)
+        return -1;
+    port = server_port(s);
+    return 0;
+}
+
+static int stop(void **state)
+{
+    (void)state;
+    server_stop(s);
+    return unlink(log_path);
+}
+
+/* ---- requests that are wrong ----------------------------------------------------------------------------------------------------- */
+
+#define GET(path) "GET " path " HTTP/1.1\r\n"
+#define BAD_OR_CLOSED (-1)
+
+typedef struct bad_case {
+    const char *name, *bytes;
+    int code;     /* wanted; BAD_OR_CLOSED: 400 to 599, or the connection just closes */
+    size_t count; /* 0: strlen */
+} bad_case;
+
+static bad_case bad[] = {
+    {"no Host", GET("/") "\r\n", BAD_OR_CLOSED, 0},
+    {"no Host in HTTP/1.0", "GET / HTTP/1.0\r\n\r\n", 403, 0},
+    {"a foreign Host", GET("/") "Host: evil.example\r\nConnection: close\r\n\r\n", 403, 0},
+    {"a foreign Host for data", GET("/status") "Host: evil.example\r\nConnection: close\r\n\r\n", 403, 0},
+    {"a name that begins like ours", GET("/") "Host: 127.0.0.1.evil.example\r\nConnection: close\r\n\r\n", 403, 0},
+    {"another site's script", GET("/status") "Sec-Fetch-Site: cross-site\r\n" GOOD_HEAD, 403, 0},
+    {"another port's script", GET("/render?view=0") "Sec-Fetch-Site: same-site\r\n" GOOD_HEAD, 403, 0},
+    {"POST", "POST /render HTTP/1.1\r\nContent-Length: 4\r\n" GOOD_HEAD "view", 405, 0},
+    {"PUT", "PUT /index.html HTTP/1.1\r\nContent-Length: 0\r\n" GOOD_HEAD, 405, 0},
+    {"HEAD", "HEAD / HTTP/1.1\r\n" GOOD_HEAD, 405, 0},
+    {"a method of its own", "FROB / HTTP/1.1\r\n" GOOD_HEAD, BAD_OR_CLOSED, 0},
+    {"a body that never comes", "POST / HTTP/1.1\r\nContent-Length: 1000000\r\n" GOOD_HEAD "x", BAD_OR_CLOSED, 0},
+    {"a length that is none", "POST / HTTP/1.1\r\nContent-Length: -5\r\n" GOOD_HEAD, BAD_OR_CLOSED, 0},
+    {"a length beyond 64 bits", "POST / HTTP/1.1\r\nContent-Length: 99999999999999999999999\r\n" GOOD_HEAD, BAD_OR_CLOSED, 0},
+    {"chunks that are none", "POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n" GOOD_HEAD "zz\r\n", BAD_OR_CLOSED, 0},
+    {"no path", "GET\r\n\r\n", BAD_OR_CLOSED, 0},
+    {"nothing", "", BAD_OR_CLOSED, 0},
+    {"one byte", "G", BAD_OR_CLOSED, 0},
+    {"half a head", "GET / HTTP/1.1\r\nHost: 127.0", BAD_OR_CLOSED, 0},
+    {"no protocol", "GET /status\r\n\r\n", BAD_OR_CLOSED, 0},
+    {"a protocol to come", "GET / HTTP/9.9\r\n" GOOD_HEAD, BAD_OR_CLOSED, 0},
+    {"zeros", "\0\0\0\0\r\n\r\n\0\0", BAD_OR_CLOSED, 10},
+    {"a zero in a header", GET("/nowhere") "X: a\0b\r\n" GOOD_HEAD, BAD_OR_CLOSED, sizeof(GET("/nowhere") "X: a\0b\r\n" GOOD_HEAD) - 1},
+    {"TLS", "\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n", BAD_OR_CLOSED, 15},
+    {"a header without a name", GET("/nowhere") ": x\r\n" GOOD_HEAD, BAD_OR_CLOSED, 0},
+    {"no such path", GET("/nowhere") GOOD_HEAD, 404, 0},
+    {"up and away", GET("/../../etc/passwd") GOOD_HEAD, 404, 0},
+    {"up and away, written otherwise", GET("/%2e%2e/%2e%2e/etc/passwd") GOOD_HEAD, 404, 0},
+    {"a zero ends the path", GET("/nowhere%00/index.html") GOOD_HEAD, 404, 0},
+    {"percent and no number", GET("/%zz%") GOOD_HEAD, 404, 0},
+    {"a star", "GET * HTTP/1.1\r\n" GOOD_HEAD, 404, 0},
+    {"an address in place of a path", "GET http://evil.example/ HTTP/1.1\r\n" GOOD_HEAD, BAD_OR_CLOSED, 0},
+    {"a word without a value", GET("/render?camera") GOOD_HEAD, 400, 0},
+    {"words twice", GET("/render?view=&view=&&&=&") GOOD_HEAD, 400, 0},
+    {"a camera cut short", GET("/render?camera=%7B%22origin%22:%5B1,") GOOD_HEAD, 400, 0},
+    {"a log from nowhere", GET("/log?from=-1") GOOD_HEAD, 400, 0},
+    {"a log from beyond 64 bits", GET("/log?from=99999999999999999999") GOOD_HEAD, 400, 0},
+};
+
+static void assert_lives(void)
+{
+    reply r = http_get(port, "/status");
+    assert_int_equal(r.code, 200);
+    free(r.text);
+}
+
+static void refused(void **state)
+{
+    const bad_case *c = *state;
+    reply r = http_raw(port, c->bytes, c->count > 0 ? c->count : strlen(c->bytes));
+    const bool fine = c->code == BAD_OR_CLOSED ? r.code == 0 || (r.code >= 400 && r.code < 600) : r.code == c->code;
+    if (!fine)
+        fail_msg("wanted %d, got %.200s", c->code, r.text);
+    free(r.text);
+    assert_lives();
+}
+
+/* A head, or a query, of `count` bytes. */
+static void too_long(bool in_query, size_t count)
+{
+    char *bytes = malloc(count + 256);
+    size_t length = (size_t)sprintf(bytes, in_query ? "GET /render?camera=" : "GET / HTTP/1.1\r\nX: ");
+    memset(bytes + length, '[', count);
+    length += count;
+    length += (size_t)sprintf(bytes + length, in_query ? " HTTP/1.1\r\n" GOOD_HEAD : "\r\n" GOOD_HEAD);
+    reply r = http_raw(port, bytes, length);
+    if (r.code != 0 && (r.code < 400 || r.code > 499))
+        fail_msg("%zu bytes: %.200s", count, r.text);
+    free(r.text);
+    free(bytes);
+    assert_lives();
+}
+
+static void long_heads_are_refused(void **state)
+{
+    (void)state;
+    too_long(false, 40000);
+    too_long(true, 20000); /* fits, and is a list in a list in a list ... */
+    too_long(true, 40000);
+    too_long(true, 3000000);
+}
+
+/* ---- what is there --------------------------------------------------------------------------------------------------------------- */
+
+static void assert_has(const reply *r, const char *text)
+{
+    if (strstr(r->text, text) == NULL)
+        fail_msg("no \"%s\" in %.1000s", text, r->text);
+}
+
+static void the_page_is_there(void **state)
+{
+    (void)state;
+    static const struct { const char *path, *type, *text; } files[] = {
+        {"/", "text/html", "<title>gbtrace</title>"}, {"/index.html", "text/html", "</html>"}, {"/view.js", "text/javascript", "import"},
+        {"/view.css", "text/css", "prefers-color-scheme"}, {"/icon.svg", "image/svg+xml", "</svg>"}};
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        reply r = http_get(port, files[i].path);
+        assert_int_equal(r.code, 200);
+        assert_has(&r, files[i].type);
+        assert_has(&r, files[i].text);
+        assert_has(&r, "Content-Security-Policy: default-src 'self'");
+        assert_has(&r, "X-Content-Type-Options: nosniff");
+        free(r.text);
+    }
+}
+
+static void the_log_is_read_on(void **state)
+{
+    (void)state;
+    static const struct { const char *path, *body, *about; } parts[] = {
+        {"/log", "a,b\n1,2\n", "{\"from\":0}"}, {"/log?from=4", "1,2\n", "{\"from\":4}"}, {"/log?from=8", "", "{\"from\":8}"}, {"/log?from=9", "a,b\n1,2\n", "{\"from\":0}"}};
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        reply r = http_get(port, parts[i].path);
+        assert_int_equal(r.code, 200);
+        assert_string_equal(r.body, parts[i].body);
+        assert_has(&r, parts[i].about);
+        free(r.text);
+    }
+}
+
+static void status_is_what_was_set(void **state)
+{
+    (void)state;
+    char *json = mem_alloc(16, 1, "test", NULL);
+    strcpy(json, "{\"version\":7}");
+    server_set_status(s, json);
+    server_set_status(s, NULL); /* no memory for a new one: the old one stays */
+    reply r = http_get(port, "/status");
+    assert_string_equal(r.body, "{\"version\":7}");
+    free(r.text);
+}
+
+/* ---- the queue --------------------------------------------------------------------------------------------------------------------- */
+
+static void expect(int fd, int code, const char *body)
+{
+    reply r = http_read(fd);
+    assert_int_equal(r.code, code);
+    assert_string_equal(r.body, body);
+    free(r.text);
+}
+
+static server_job *wait_for_job(server *from)
+{
+    server_job *job = NULL;
+    while (job == NULL)
+        job = server_next(from, 5);
+    return job;
+}
+
+/* What was sent before has been read after this: the server looks at all connections in each round of its one thread. */
+static void settle(int at)
+{
+    for (int i = 0; i < 2; i++) {
+        reply r = http_get(at, "/status");
+        assert_int_equal(r.code, 200);
+        free(r.text);
+    }
+}
+
+static void answer_with(server *by, server_job *job, const char *text)
+{
+    answer a = {0};
+    answer_text(&a, 200, "text/plain", text);
+    strcpy(a.about, "{\"width\":1}");
+    server_answer(by, job, &a);
+}
+
+static void the_newest_picture_wins(void **state)
+{
+    (void)state;
+    const int first = http_ask(port, "/render?view=1"), photo = http_ask(port, "/photo?view=9");
+    server_job *job = wait_for_job(s);
+    server_job *other = wait_for_job(s);
+    if (server_request(job)->kind != REQUEST_RENDER) { /* they came on two connections, in any order */
+        server_job *swap = job;
+        job = other, other = swap;
+    }
+    assert_true(server_request(job)->kind == REQUEST_RENDER && server_request(job)->view == 1 && server_request(other)->kind == REQUEST_PHOTO);
+    /* While the first is drawn three more are asked for: the last one is what the page wants to see. */
+    const int second = http_ask(port, "/render?view=2"), scene = http_ask(port, "/scene");
+    settle(port);
+    const int third = http_ask(port, "/render?view=3");
+    expect(second, 503, "error: a newer picture was asked for\n");
+    settle(port);
+    const int fourth = http_ask(port, "/render?view=4");
+    expect(third, 503, "error: a newer picture was asked for\n");
+    answer_with(s, job, "first");
+    answer_with(s, other, "photo");
+    expect(first, 200, "first");
+    expect(photo, 200, "photo");
+    for (int i = 0; i < 2; i++) {
+        job = wait_for_job(s);
+        if (server_request(job)->kind == REQUEST_RENDER)
+            assert_int_equal(server_request(job)->view, 4);
+        answer_with(s, job, "next");
+    }
+    expect(scene, 200, "next");
+    reply r = http_read(fourth);
+    assert_int_equal(r.code, 200);
+    assert_has(&r, "X-Picture: {\"width\":1}");
+    free(r.text);
+}
+
+static void the_queue_has_an_end(void **state)
+{
+    (void)state;
+    int fd[SERVER_JOBS + 1], refused_count = 0;
+    for (int i = 0; i <= SERVER_JOBS; i++)
+        fd[i] = http_ask(port, "/scene");
+    for (int i = 0; i < SERVER_JOBS; i++)
+        answer_with(s, wait_for_job(s), "here");
+    for (int i = 0; i <= SERVER_JOBS; i++) {
+        reply r = http_read(fd[i]);
+        assert_true(r.code == 200 || r.code == 503);
+        refused_count += r.code == 503;
+        free(r.text);
+    }
+    assert_true(refused_count <= 1); /* none when the worker took one before the last came */
+    if (refused_count == 0)
+        assert_null(server_next(s, 0.01));
+}
+
+static void nobody_waits_for_an_answer_that_nobody_wants(void **state)
+{
+    (void)state;
+    const int fd = http_ask(port, "/render?view=0");
+    server_job *job = wait_for_job(s);
+    close(fd);
+    answer_with(s, job, "late");
+    assert_lives();
+}
+
+static void the_end_answers_all(void **state)
+{
+    (void)state;
+    server *other;
+    assert_ok(server_start(0, "", &other, NULL));
+    reply none = http_get(server_port(other), "/log");
+    assert_int_equal(none.code, 404);
+    free(none.text);
+    const int fd = http_ask(server_port(other), "/scene");
+    answer_with(other, wait_for_job(other), "last");
+    expect(fd, 200, "last");
+    server_wake(other);
+    assert_null(server_next(other, 5));
+    const int waits = http_ask(server_port(other), "/render?view=0");
+    settle(server_port(other));
+    server_stop(other);
+    reply r = http_read(waits); /* told so, or cut off while it was told */
+    assert_true(r.code == 503 || r.code == 0);
+    free(r.text);
+}
+
+static void a_port_belongs_to_one(void **state)
+{
+    (void)state;
+    server *other;
+    gbt_error err = {0};
+    assert_int_equal(server_start(port, "", &other, &err), GBT_ERR_IO);
+    assert_non_null(strstr(err.text, "cannot listen"));
+    assert_null(other);
+}
+
+int main(void)
+{
+    enum { BAD = sizeof bad / sizeof *bad };
+    const struct CMUnitTest rest[] = {
+        cmocka_unit_test(long_heads_are_refused),
+        cmocka_unit_test(the_page_is_there),
+        cmocka_unit_test(the_log_is_read_on),
+        cmocka_unit_test(status_is_what_was_set),
+        cmocka_unit_test(the_newest_picture_wins),
+        cmocka_unit_test(the_queue_has_an_end),
+        cmocka_unit_test(nobody_waits_for_an_answer_that_nobody_wants),
+        cmocka_unit_test(the_end_answers_all),
+        cmocka_unit_test(a_port_belongs_to_one),
+    };
+    enum { REST = sizeof rest / sizeof *rest };
+    struct CMUnitTest tests[BAD + REST];
+    for (size_t i = 0; i < BAD; i++)
+        tests[i] = (struct CMUnitTest){.name = bad[i].name, .test_func = refused, .initial_state = &bad[i]};
+    memcpy(tests + BAD, rest, sizeof rest);
+    return cmocka_run_group_tests(tests, start, stop);
+}

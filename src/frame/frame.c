@@ -132,6 +132,12 @@ static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape
     return GBT_OK;
 }
 
+gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, gbt_error *err)
+{
+    const ray_shot shot = ray_shot_of(camera);
+    return prepare(f, subject, &shot, settings, NULL, err);
+}
+
 gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, bool keep_tape, gbt_error *err)
 {
     const ray_shot shot = ray_shot_of(camera);

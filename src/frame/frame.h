@@ -71,6 +71,9 @@ typedef struct frame {
  */
 gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, bool keep_tape, gbt_error *err);
 
+/** frame_render() up to the picture: f->scene is built, for other passes over it (FRAME_TRACE). f->rgb has its size and no meaning. */
+gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, gbt_error *err);
+
 /**
  * Render a shot (trace/rays.h) into f->rgb: the mean over its samples, added up in their order in double.
  *

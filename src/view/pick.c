@@ -35,7 +35,7 @@ static gbt_status find_depth(studio *s, const gbt_camera *one, double *depth, gb
 {
     const ray_shot shot = ray_shot_of(one);
     render_output_images images = {0};
-    GBT_TRY(studio_prepare(s, one, FRAME_TRACE, "default", err));
+    GBT_TRY(studio_prepare(s, one, FRAME_TRACE, "default", false, err));
     const gbt_status status = render_outputs_trace(s->run, &shot, 1u << OUTPUT_MEDIAN_DEPTH, &images, err);
     *depth = status == GBT_OK ? (double)images.of[OUTPUT_MEDIAN_DEPTH].pixels[0] : 0;
     render_output_images_free(&images);

@@ -1,4 +1,5 @@
 /* view/picture.c -- a request for a picture: render or trace again, and the bytes of it. */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -116,19 +117,19 @@ gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error 
     gbt_camera camera, shifted;
     GBT_TRY(studio_camera(s, what, &camera, err));
     shifted = sample_camera(&camera, what->sample);
-    const bool traced = what->renderer == FRAME_TRACE;
+    const bool traced = what->renderer == FRAME_TRACE, whole = !traced || (what->output == 0 && what->sample == 0);
     const double begin = clock_wall();
-    GBT_TRY(studio_prepare(s, traced ? &camera : &shifted, what->renderer, what->preset, err));
-    const double prepared = clock_wall();
-    if (!traced || (what->output == 0 && what->sample == 0)) {
-        picture_times times = {.trace = 1000 * f->times.trace};
-        times.prepare = 1000 * (prepared - begin) - times.trace;
+    GBT_TRY(studio_prepare(s, traced ? &camera : &shifted, what->renderer, what->preset, whole, err));
+    const double prepared = clock_wall(), before = 1000 * (prepared - begin);
+    if (whole) {
+        picture_times times = {.trace = fmin(1000 * f->times.trace, before)}; /* nothing, when it was drawn already */
+        times.prepare = before - times.trace;
         return finish(s, &f->rgb, what, &times, out, err);
     }
     const ray_shot shot = ray_shot_of(&shifted);
     render_output_images images = {0};
     gbt_status status = render_outputs_trace(s->run, &shot, what->output, &images, err);
-    picture_times times = {.prepare = 1000 * (prepared - begin), .trace = 1000 * (clock_wall() - prepared)};
+    picture_times times = {.prepare = before, .trace = 1000 * (clock_wall() - prepared)};
     if (status == GBT_OK)
         status = finish(s, what->output == 0 ? &images.rgb : &images.of[output_index(what->output)], what, &times, out, err);
     render_output_images_free(&images);

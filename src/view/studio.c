@@ -141,19 +141,20 @@ gbt_status studio_camera(const studio *s, const request *what, gbt_camera *out, 
     return GBT_OK;
 }
 
-gbt_status studio_prepare(studio *s, const gbt_camera *camera, frame_renderer renderer, const char *preset, gbt_error *err)
+gbt_status studio_prepare(studio *s, const gbt_camera *camera, frame_renderer renderer, const char *preset, bool draw, gbt_error *err)
 {
     loaded_run *r = s->run;
     studio_picture wanted;
     memset(&wanted, 0, sizeof wanted);
     wanted.camera = *camera, wanted.renderer = renderer, wanted.preset = preset, wanted.known = true;
-    if (memcmp(&wanted, &s->last, sizeof wanted) == 0)
+    if (memcmp(&wanted, &s->last, sizeof wanted) == 0 && (s->drawn || !draw))
         return GBT_OK;
     memset(&s->last, 0, sizeof s->last);
     r->frame.draw.renderer = renderer;
     GBT_TRY(loaded_run_preset(preset, &r->settings, err));
-    GBT_TRY(frame_render(&r->frame, loaded_run_subject(r), camera, &r->settings, false, err));
-    s->last = wanted;
+    GBT_TRY(draw ? frame_render(&r->frame, loaded_run_subject(r), camera, &r->settings, false, err)
+                 : frame_prepare(&r->frame, loaded_run_subject(r), camera, &r->settings, err));
+    s->last = wanted, s->drawn = draw;
     return GBT_OK;
 }
 

@@ -25,6 +25,7 @@ typedef struct studio {
     unsigned version;    /* 1, 2, ... counts what was opened */
     char note[600];      /* for people: why there is no picture, or no photo; empty: all is well */
     studio_picture last;
+    bool drawn; /* the frame's picture is that of `last` too, not the tree alone */
 } studio;
 
 /**
@@ -50,8 +51,8 @@ void studio_answer(studio *s, const request *what, answer *out);
 /** The camera of a request, scene-local. GBT_ERR_ARGUMENT for a view that is not there. */
 gbt_status studio_camera(const studio *s, const request *what, gbt_camera *out, gbt_error *err);
 
-/** Make the frame's picture, or its tree, that of `camera`, unless it is. */
-gbt_status studio_prepare(studio *s, const gbt_camera *camera, frame_renderer renderer, const char *preset, gbt_error *err);
+/** Make the frame's tree that of `camera`, and with `draw` its picture too, unless they are. */
+gbt_status studio_prepare(studio *s, const gbt_camera *camera, frame_renderer renderer, const char *preset, bool draw, gbt_error *err);
 
 gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error *err); /* picture.c */
 gbt_status studio_photo(studio *s, const request *what, answer *out, gbt_error *err);  /* picture.c */

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """bench/view_speed.py -- pictures a second of `gbtrace view` in headless Chromium while the scene is turned, and where the time goes.
 
-Usage: view_speed.py PROGRAM RUN [--size 0.5|1|2|window] [--window 1280x900] [--seconds 10] [--screenshots FOLDER]
+Usage: view_speed.py PROGRAM RUN [--size 480x640] [--window 1280x900] [--seconds 10] [--screenshots FOLDER]
 """
 import argparse
 import os
@@ -43,7 +43,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
     parser.add_argument("run")
-    parser.add_argument("--size", default="1")
+    parser.add_argument("--size", default="480x640")
     parser.add_argument("--window", default="1280x900")
     parser.add_argument("--seconds", type=float, default=10)
     parser.add_argument("--screenshots")

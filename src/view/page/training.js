@@ -85,7 +85,7 @@ export class Training {
         }
         put("text", { x: left, y: 107 }, "dB, training photos by step");
         put("text", { x: right, y: 107, "text-anchor": "end" }, last);
-        const every = Math.ceil(rows.length / 500); // steps of one photo each: means are easier to look at
+        const every = Math.ceil(rows.length / 120); // rows of few photos each: means are easier to look at
         const points = [];
         for (let i = 0; i < rows.length; i += every) {
             const some = rows.slice(i, i + every);

@@ -20,10 +20,10 @@ function baseSize() {
 }
 
 function pictureSize() {
-    const stage = byId("stage"), size = byId("size").value;
-    let [width, height] = size === "window" ? [stage.clientWidth, stage.clientHeight] : baseSize().map(n => n * Number(size));
+    const stage = byId("stage"), size = byId("size").value; // "window", "480x640" or a factor
+    let [width, height] = size === "window" ? [stage.clientWidth, stage.clientHeight] : size.includes("x") ? size.split("x").map(Number) : baseSize().map(n => n * size);
     if (camera.model === "equirectangular")
-        height = width / 2;
+        height = Math.min(width, height), width = 2 * height;
     const fit = Math.min(1, 8192 / Math.max(width, height), Math.sqrt((1 << 23) / (width * height)));
     return [Math.max(1, Math.floor(width * fit)), Math.max(1, Math.floor(height * fit))];
 }
@@ -109,7 +109,7 @@ function average(pixels, done) {
 async function show(picture, done) {
     const { about, bytes } = picture, output = done.output, canvas = byId("render");
     let pixels;
-    look.values = null, look.range = null;
+    look.values = null, look.range = null, look.pointed = undefined;
     if (output !== "color") {
         const values = new Float32Array(bytes);
         pixels = new Uint8ClampedArray(4 * about.width * about.height);
@@ -137,7 +137,7 @@ async function show(picture, done) {
 
 function describe(about, done) {
     const parts = [`${about.width} × ${about.height}`];
-    if (pictures.perSecond() >= 2)
+    if (pictures.perSecond() >= 1 && performance.now() - pictures.movedAt < 1000)
         parts.push(`${pictures.perSecond().toFixed(0)} pictures/s`);
     parts.push(`${about.total_ms.toFixed(0)} ms (make ${about.prepare_ms.toFixed(0)}, trace ${about.trace_ms.toFixed(0)}, send ${(about.encode_ms + about.transfer_ms).toFixed(0)}, draw ${about.draw_ms.toFixed(0)})`);
     if (done.samples > 1)

@@ -49,7 +49,8 @@ gbt_status studio_pick(studio *s, const request *what, answer *out, gbt_error *e
     char text[256];
     GBT_TRY(studio_camera(s, what, &camera, err));
     if (!(what->pixel[0] < camera.width && what->pixel[1] < camera.height))
-        return base_fail(err, GBT_ERR_ARGUMENT, "x, y: %g, %g (the picture has %d x %d pixels)", what->pixel[0], what->pixel[1], camera.width, camera.height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "x, y: %g, %g (the picture has %d x %d pixels)", what->pixel[0], what->pixel[1],
+                         camera.width, camera.height);
     if (aim(&camera, what->pixel, &one))
         GBT_TRY(find_depth(s, &one, &depth, err));
     if (depth > 0) {

@@ -299,6 +299,15 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
         [ "$(grep -c '"psnr_to_model": ' plain.json)" = 4 ] && [ "$(head -c 4 plain.glb)" = glTF ] && "$program" export plain.spz back.ply >>out 2>>err &&
         [ "$(grep -a '^element vertex' back.ply)" = "$(grep -a '^element vertex' plain.ply)" ]
     report $? "export bakes a run into every format, and converts" "$(cat err out)"
+    "$program" view run --port 0 >out 2>err &
+    viewer=$!
+    while kill -0 "$viewer" 2>/dev/null && [ ! -s out ]; do sleep 0.1; done
+    kill -INT "$viewer"
+    wait "$viewer" && grep -q '^http://127\.0\.0\.1:[1-9][0-9]*$' out && ! grep -q error err
+    report $? "view says where, and Ctrl-C ends it with 0" "$(cat err out)"
+    misuse 4 "nowhere: not there (wanted a run, a model file or plain Gaussians)" view nowhere
+    misuse 4 "made/model.gbt: not there (wanted a run, a model file or plain Gaussians)" view made
+    misuse 2 "--port: bad value (wanted a whole number from 0 to 65535, got 65536)" view run --port 65536
     misuse 2 "scene.obj: which format? (wanted .ply, .splat, .spz or .glb)" export run scene.obj
     misuse 2 "--sh-degree: bad value (wanted a whole number from 0 to 3, got 4)" export run scene.ply --sh-degree 4
     misuse 2 "--quality: bad value (wanted a number from 20 to 90, got 10)" compress run -o small.gbt --quality 10

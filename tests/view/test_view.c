@@ -9,6 +9,7 @@
 
 #include "base/image.h"
 #include "gbtrace/evaluate.h"
+#include "gbtrace/export.h"
 #include "gbtrace/view.h"
 
 /* ---- the viewer in a thread of its own ---------------------------------------------------------------------------------------------- */
@@ -328,6 +329,37 @@ static void newer_models_are_shown(void **state)
     free(live);
 }
 
+static void plain_gaussians_are_shown(void **state)
+{
+    (void)state;
+    static const char camera[] = "{\"origin\":[0.5,-2,1],\"target\":[0,0,0.2],\"up\":[0,0,1],\"width\":40,\"height\":30,\"fov_x_deg\":60}";
+    const char *ply = in_root("plain.ply");
+    gbt_export_def baked = gbt_export_def_default();
+    baked.refine_steps = 0;
+    assert_ok(gbt_export(run_folder, &baked, &ply, 1, NULL, NULL));
+    viewer v;
+    const int port = open_viewer(&v, ply);
+    json_t *there = get_json(port, "/scene"), *status = get_json(port, "/status");
+    assert_true(json_is_true(json_object_get(there, "plain")) && number_of(there, "gaussians") > 0 && number_of(there, "size") > 0);
+    assert_int_equal(json_array_size(json_object_get(there, "views")), 0);
+    assert_string_equal(json_string_value(json_object_get(status, "note")), "");
+    gbt_render_def def = gbt_render_def_default();
+    def.camera = in_root("plain.json");
+    assert_ok(file_write_atomic(def.camera, camera, sizeof camera - 1, NULL));
+    assert_ok(gbt_render(ply, in_root("drawn"), &def, NULL));
+    char path[256];
+    snprintf(path, sizeof path, "/render?camera=%s", camera);
+    reply r = get_ok(port, path);
+    assert_same_pixels(&r, in_root("drawn/plain.png"));
+    free(r.text);
+    snprintf(path, sizeof path, "/render?format=float&output=anchor&camera=%s", camera);
+    r = get_ok(port, path);
+    assert_int_equal(r.body_count, 40 * 30 * 4);
+    free(r.text);
+    json_decref(there), json_decref(status);
+    close_viewer(&v, SIGINT);
+}
+
 static void what_cannot_be_shown(void **state)
 {
     (void)state;
@@ -371,6 +403,7 @@ int main(void)
         cmocka_unit_test(every_format_and_output),
         cmocka_unit_test(points_lie_behind_their_pixels),
         cmocka_unit_test(newer_models_are_shown),
+        cmocka_unit_test(plain_gaussians_are_shown),
         cmocka_unit_test(what_cannot_be_shown),
         cmocka_unit_test(a_model_without_its_photos),
     };

@@ -61,7 +61,7 @@ export class Pictures {
         const moving = performance.now() - this.movedAt < stillMs;
         const scale = moving ? this.scaleFor(want) : 1;
         const sample = fresh || last.scale < 1 ? 0 : last.samples;
-        if (!fresh && (moving || sample >= want.samples))
+        if (!fresh && (moving || last.failed || sample >= want.samples))
             return null;
         const width = Math.max(1, Math.round(want.width * scale)), height = Math.max(1, Math.round(want.height * scale));
         const query = want.query(width, height);
@@ -88,9 +88,8 @@ export class Pictures {
                 await this.show(picture, done);
                 picture.about.draw_ms = performance.now() - begin;
             } catch (error) {
-                this.shown = asked;
+                this.shown = { ...asked, failed: true }; // until something changes
                 this.fail(error);
-                await new Promise(done => setTimeout(done, 500));
                 asked = this.next(this.shown);
             }
         }

@@ -21,7 +21,7 @@ export class Training {
             if (status.log_bytes !== this.bytes)
                 await this.readLog();
             this.describe(status);
-            if (status.version !== this.version) {
+            if (status.version !== this.version || this.gone) {
                 this.version = status.version;
                 this.changed(status);
             }
@@ -59,8 +59,9 @@ export class Training {
         this.part.hidden = row === undefined;
         if (row === undefined)
             return;
-        const parts = [`step ${row.step}`, `${Math.round(100 * row.progress)} %`, `${row.train_psnr.toFixed(1)} dB`, `${row.anchors.toLocaleString("en")} anchors`];
-        this.now.textContent = parts.join(" · ") + (status.iterations > 0 && status.iterations < row.step ? ` (shown: step ${status.iterations})` : "");
+        const counts = `${Math.round(100 * row.progress)} % · ${row.train_psnr.toFixed(1)} dB · ${row.anchors.toLocaleString("en")} anchors`;
+        const older = status.iterations > 0 && status.iterations < row.step;
+        this.now.textContent = `step ${row.step} · ${counts}${older ? ` (shown: step ${status.iterations})` : ""}`;
     }
 
     draw() {

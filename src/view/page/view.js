@@ -4,13 +4,16 @@ import { difference, paintOutput, ramp, rangeOf } from "./paint.js";
 import { Pictures } from "./pictures.js";
 import { Training } from "./training.js";
 import { listen } from "./hands.js";
+import { copyText, savePicture } from "./keep.js";
 
 const byId = id => document.getElementById(id);
 const chosen = name => document.querySelector(`input[name=${name}]:checked`).value;
 const words = new URLSearchParams(location.search);
 const camera = new Camera();
-const look = { scene: null, view: -1, middle: [0, 0, 0], photo: null, values: null, first: null, sum: null, count: 0, range: null, about: null, psnr: null };
-let training = null;
+const look = {
+    scene: null, view: -1, middle: [0, 0, 0], photo: null, split: 0.5, // what there is, and beside what
+    done: null, about: null, first: null, sum: null, values: null, range: null, psnr: null, pointed: undefined, // what is shown
+};
 
 // ---- sizes ---------------------------------------------------------------------------------------------------------------------
 
@@ -21,7 +24,11 @@ function baseSize() {
 
 function pictureSize() {
     const stage = byId("stage"), size = byId("size").value; // "window", "480x640" or a factor
-    let [width, height] = size === "window" ? [stage.clientWidth, stage.clientHeight] : size.includes("x") ? size.split("x").map(Number) : baseSize().map(n => n * size);
+    let [width, height] = baseSize().map(n => n * size);
+    if (size === "window")
+        [width, height] = [stage.clientWidth, stage.clientHeight];
+    else if (size.includes("x"))
+        [width, height] = size.split("x").map(Number);
     if (camera.model === "equirectangular")
         height = Math.min(width, height), width = 2 * height;
     const fit = Math.min(1, 8192 / Math.max(width, height), Math.sqrt((1 << 23) / (width * height)));
@@ -53,7 +60,6 @@ function layout() {
     Object.assign(byId("handle").style, { left: `${left + w * look.split}px`, top: `${top}px`, height: `${h}px` });
     byId("handle").setAttribute("aria-valuenow", Math.round(100 * look.split));
 }
-look.split = 0.5;
 
 // ---- what is asked for, what comes ------------------------------------------------------------------------------------------------
 
@@ -64,7 +70,7 @@ function compareMode() {
 }
 
 function cameraQuery(width, height) {
-    return camera.view >= 0 ? new URLSearchParams({ view: camera.view, width, height }) : new URLSearchParams({ camera: JSON.stringify(camera.file(width, height)) });
+    return new URLSearchParams(camera.view >= 0 ? { view: camera.view, width, height } : { camera: JSON.stringify(camera.file(width, height)) });
 }
 
 function wanted() {
@@ -139,7 +145,8 @@ function describe(about, done) {
     const parts = [`${about.width} × ${about.height}`];
     if (pictures.perSecond() >= 1 && performance.now() - pictures.movedAt < 1000)
         parts.push(`${pictures.perSecond().toFixed(0)} pictures/s`);
-    parts.push(`${about.total_ms.toFixed(0)} ms (make ${about.prepare_ms.toFixed(0)}, trace ${about.trace_ms.toFixed(0)}, send ${(about.encode_ms + about.transfer_ms).toFixed(0)}, draw ${about.draw_ms.toFixed(0)})`);
+    const ms = [about.total_ms, about.prepare_ms, about.trace_ms, about.encode_ms + about.transfer_ms, about.draw_ms].map(t => t.toFixed(0));
+    parts.push(`${ms[0]} ms (make ${ms[1]}, trace ${ms[2]}, send ${ms[3]}, draw ${ms[4]})`);
     if (done.samples > 1)
         parts.push(`${done.samples} rays/pixel`);
     if (look.psnr !== null)
@@ -158,7 +165,8 @@ const pictures = new Pictures(wanted, show, fail);
 
 function changed(moving = false) {
     layout();
-    byId("compare-note").textContent = look.view >= 0 && chosen("compare") !== "off" && compareMode() === "off" ? "The camera has left the photo: R goes back." : "";
+    const left = look.view >= 0 && chosen("compare") !== "off" && compareMode() === "off";
+    byId("compare-note").textContent = left ? "The camera has left the photo: R goes back." : "";
     byId("model").value = camera.view >= 0 ? "photo" : camera.model;
     byId("fov-row").hidden = camera.view >= 0 || camera.model === "equirectangular";
     byId("fov").max = camera.model === "fisheye" ? 360 : 150;
@@ -188,7 +196,8 @@ async function fetchPhoto(view) {
     look.photo = canvas;
 }
 
-const lensOf = name => name === "EQUIRECTANGULAR" ? "equirectangular" : name.includes("FISHEYE") ? "fisheye" : name === "ORTHOGRAPHIC" ? "orthographic" : "pinhole";
+// The lens of a camera file that comes nearest to one of a data set.
+const lensOf = name => name === "EQUIRECTANGULAR" ? "equirectangular" : name.includes("FISHEYE") ? "fisheye" : "pinhole";
 
 function goTo(index) {
     const view = look.scene.views[index];
@@ -299,25 +308,10 @@ function pointAt(event) {
         describe(look.about, look.done);
 }
 
-function savePicture() {
-    byId("render").toBlob(blob => {
-        const link = document.createElement("a"), view = look.scene.views[camera.view];
-        link.href = URL.createObjectURL(blob);
-        link.download = `${view ? view.name.replace(/\.[^.]*$/, "").replaceAll("/", "_") : "picture"}${chosen("output") === "color" ? "" : "." + chosen("output")}.png`;
-        link.click();
-        setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-    }, "image/png");
-}
-
-async function copyCamera() {
-    const text = JSON.stringify(camera.file(...pictureSize()), null, 1), button = byId("copy");
-    try {
-        await navigator.clipboard.writeText(text);
-        button.textContent = "Copied";
-    } catch {
-        prompt("Camera file:", text);
-    }
-    setTimeout(() => button.textContent = "Copy camera", 1200);
+// "folder/a.jpg" shown as depth is kept as "folder_a.depth.png".
+function pictureName() {
+    const view = look.scene.views[camera.view], output = look.done.output;
+    return (view ? view.name.replace(/\.[^.]*$/, "").replaceAll("/", "_") : "picture") + (output === "color" ? "" : "." + output) + ".png";
 }
 
 const moved = () => {
@@ -338,9 +332,14 @@ listen(byId("stage"), {
 byId("view").addEventListener("change", () => goTo(Number(byId("view").value)));
 byId("previous").addEventListener("click", () => step(-1));
 byId("next").addEventListener("click", () => step(1));
-byId("save").addEventListener("click", savePicture);
-byId("copy").addEventListener("click", copyCamera);
-byId("model").addEventListener("change", () => { leave(); camera.model = byId("model").value; camera.fov = Math.min(camera.fov, camera.model === "fisheye" ? 360 : 150); changed(); });
+byId("save").addEventListener("click", () => look.done !== null && savePicture(byId("render"), pictureName()));
+byId("copy").addEventListener("click", () => copyText(byId("copy"), JSON.stringify(camera.file(...pictureSize()), null, 1)));
+byId("model").addEventListener("change", () => {
+    leave();
+    camera.model = byId("model").value;
+    camera.fov = Math.min(camera.fov, camera.model === "fisheye" ? 360 : 150);
+    changed();
+});
 byId("fov").addEventListener("input", () => { camera.fov = Number(byId("fov").value); moved(); });
 for (const id of ["compare", "output", "size", "renderer", "preset", "moving", "samples", "transfer"])
     byId(id).addEventListener("change", () => changed());
@@ -351,5 +350,5 @@ if (words.get("transfer") === "jpeg")
 const rampData = new ImageData(256, 1);
 ramp.forEach((c, i) => rampData.data.set([...c, 255], 4 * i));
 byId("ramp").getContext("2d").putImageData(rampData, 0, 0);
-training = new Training(byId("training-part"), byId("training-now"), byId("chart"), byId("live"), status => statusChanged(status).catch?.(fail));
+const training = new Training(byId("training-part"), byId("training-now"), byId("chart"), byId("live"), status => statusChanged(status).catch(fail));
 window.gbtrace = { camera, look, pictures, training, changed }; // for the console, and for tests

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """bench/view_speed.py -- pictures a second of `gbtrace view` in headless Chromium while the scene is turned, and where the time goes.
 
+Milliseconds are wall time; the last column is processor time of the server, per picture.
+
 Usage: view_speed.py PROGRAM RUN [--size 480x640] [--window 1280x900] [--seconds 10] [--screenshots FOLDER]
 """
 import argparse
@@ -39,6 +41,13 @@ def turn(page, seconds):
     return seen, now - begin
 
 
+def core_ms(process):
+    """Processor time of all its threads so far: steadier than wall time on a machine that others use too."""
+    with open(f"/proc/{process.pid}/stat", encoding="ascii") as file:
+        words = file.read().rpartition(")")[2].split()
+    return 1000 * (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
@@ -57,15 +66,20 @@ def main():
         page.run("""(learn => gbtrace.pictures.learn = about => { window.seen.push(about); learn.call(gbtrace.pictures, about); })(gbtrace.pictures.learn)""")
         page.run("window.seen = []")
         choose(page, "size", wanted.size)
-        print("| pixels as | while moving | pictures/s | mean size | " + " | ".join(f"{p} ms" for p in PARTS) + " |\n|---|---|---|---|" + "---|" * len(PARTS))
+        choose(page, "samples", "1")
+        print("| pixels as | while moving | pictures/s | mean size | " + " | ".join(f"{p} ms" for p in PARTS) + " | core ms of the server |")
+        print("|---" * (len(PARTS) + 5) + "|")
         for transfer, moving in (("raw", "full"), ("jpeg", "full"), ("png", "full"), ("raw", "auto")):
             choose(page, "transfer", transfer)
             choose(page, "moving", moving)
             turn(page, 1)
+            before = core_ms(server)
             seen, seconds = turn(page, wanted.seconds)
+            used = (core_ms(server) - before) / len(seen)
             mean = {name: sum(a[name] for a in seen) / len(seen) for name in [p + "_ms" for p in PARTS] + ["width", "height"]}
-            print(f"| {transfer} | {moving} | {len(seen) / seconds:.1f} | {mean['width']:.0f} x {mean['height']:.0f} | " + " | ".join(f"{mean[p + '_ms']:.1f}" for p in PARTS) + " |",
-                  flush=True)
+            size = f"{mean['width']:.0f} x {mean['height']:.0f}"
+            parts = " | ".join(f"{mean[p + '_ms']:.1f}" for p in PARTS)
+            print(f"| {transfer} | {moving} | {len(seen) / seconds:.1f} | {size} | {parts} | {used:.0f} |", flush=True)
             if wanted.screenshots:
                 page.screenshot(os.path.join(wanted.screenshots, f"{transfer}_{moving}.png"))
     finally:

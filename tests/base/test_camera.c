@@ -419,6 +419,26 @@ static void every_step_keeps_rays(void **state)
     }
 }
 
+static void shifting_keeps_rays(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < CASE_COUNT; i++) {
+        const gbt_camera camera = camera_of(lens_cases[i].model, lens_cases[i].params);
+        gbt_camera shifted = {.width = 7};
+        const bool can = camera.model != GBT_CAMERA_EQUIRECTANGULAR;
+        assert_int_equal(gbt_camera_shifted(&camera, 0.25, -0.375, &shifted), can);
+        assert_int_equal(shifted.width, can ? WIDTH : 7);
+        for (int k = 1; can && k < 50; k++) {
+            const double x = k * camera.width / 50, y = k * camera.height / 50;
+            double dir[3], other[3];
+            assert_true(gbt_camera_unproject(&camera, x + 0.25, y - 0.375, dir));
+            assert_true(gbt_camera_unproject(&shifted, x, y, other));
+            for (int axis = 0; axis < 3; axis++)
+                assert_near(dir[axis], other[axis], 1e-12);
+        }
+    }
+}
+
 static void resizing_exact_numbers(void **state)
 {
     (void)state;
@@ -547,6 +567,7 @@ int main(void)
         cmocka_unit_test(wild_parameters_stay_honest),
         cmocka_unit_test(resizing_keeps_rays),
         cmocka_unit_test(every_step_keeps_rays),
+        cmocka_unit_test(shifting_keeps_rays),
         cmocka_unit_test(resizing_exact_numbers),
         cmocka_unit_test(half_fov),
         cmocka_unit_test(orthographic),

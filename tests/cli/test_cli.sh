@@ -299,6 +299,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
         [ "$(grep -c '"psnr_to_model": ' plain.json)" = 4 ] && [ "$(head -c 4 plain.glb)" = glTF ] && "$program" export plain.spz back.ply >>out 2>>err &&
         [ "$(grep -a '^element vertex' back.ply)" = "$(grep -a '^element vertex' plain.ply)" ]
     report $? "export bakes a run into every format, and converts" "$(cat err out)"
+    rm -f out # of the row before: an old one would be read as the address
     "$program" view run --port 0 >out 2>err &
     viewer=$!
     while kill -0 "$viewer" 2>/dev/null && [ ! -s out ]; do sleep 0.1; done

@@ -7,9 +7,7 @@
 
 #include "gbtrace/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+GBT_API_BEGIN
 
 typedef struct gbt_bench_def {
     const char *model;  /* plain 3DGS .ply, or a run; required */
@@ -106,7 +104,5 @@ gbt_status gbt_study_stability(const gbt_stability_def *def, const char *folder,
  */
 gbt_status gbt_check_grad(const char *run, FILE *out, gbt_error *err);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

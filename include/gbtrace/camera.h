@@ -7,9 +7,9 @@
 
 #include <stdbool.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+#include "gbtrace/api.h"
+
+GBT_API_BEGIN
 
 /** COLMAP's numbers and parameter orders; behind them what COLMAP does not have. */
 typedef enum gbt_camera_model {
@@ -91,12 +91,18 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
 bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_camera *out);
 
 /**
+ * The camera after a small motion of its own, and the motion for which pose gradients are taken (gbtrace/model.h).
+ *
+ * @param motion [in] (v, omega): v moves the centre along the camera's axes (right, down, forward), scene units; omega turns the camera about the
+ *                    same axes through its centre, right-handed, radians: center + R^T v and exp([omega]x)^T R for a rotation R, [omega]x a = omega x a
+ */
+gbt_camera gbt_camera_moved(const gbt_camera *camera, const double motion[6]);
+
+/**
  * tan of half the horizontal and vertical field of view of the pinhole that best stands for this camera: width / (2 fx), height / (2 fy).
  * 0 for parallel rays.
  */
 void gbt_camera_half_fov_tan(const gbt_camera *camera, double tan_half[2]);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

@@ -7,9 +7,7 @@
 
 #include "gbtrace/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+GBT_API_BEGIN
 
 typedef struct gbt_compress_def {
     double quality;   /* dB: what the pictures of the model may differ from before, as a PSNR; [20, 90]. Default 60 */
@@ -35,7 +33,5 @@ gbt_compress_def gbt_compress_def_default(void);
  */
 gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report, gbt_error *err);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

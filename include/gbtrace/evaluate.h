@@ -4,9 +4,7 @@
 
 #include "gbtrace/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+GBT_API_BEGIN
 
 typedef struct gbt_evaluate_def {
     const char *data; /* data set folder; NULL: the one the model was trained on. Default NULL */
@@ -73,7 +71,5 @@ gbt_render_def gbt_render_def_default(void);
  */
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

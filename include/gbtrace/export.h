@@ -7,9 +7,7 @@
 
 #include "gbtrace/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+GBT_API_BEGIN
 
 typedef struct gbt_export_def {
     int sh_degree;    /* of the colours' dependence on the direction, 0 to 3. Default 3 */
@@ -36,7 +34,5 @@ gbt_export_def gbt_export_def_default(void);
  */
 gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, FILE *report, gbt_error *err);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

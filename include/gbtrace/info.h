@@ -6,9 +6,7 @@
 
 #include "gbtrace/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+GBT_API_BEGIN
 
 /**
  * Print what a path holds.
@@ -27,7 +25,5 @@ extern "C" {
  */
 gbt_status gbt_info(const char *path, int json, FILE *out, gbt_error *err);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

@@ -6,9 +6,7 @@
 
 #include "gbtrace/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+GBT_API_BEGIN
 
 typedef struct gbt_init_def {
     const char *init;        /* "gb" (granular balls, default), "adaptive" (balls where the scene needs them), "voxel", or "random" points */
@@ -40,7 +38,5 @@ gbt_init_def gbt_init_def_default(void);
  */
 gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path, FILE *report, gbt_error *err);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

@@ -6,9 +6,7 @@
 
 #include "gbtrace/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+GBT_API_BEGIN
 
 typedef struct gbt_make_scene_def {
     const char *name;   /* one of gbt_make_scene_names(). Default "tabletop". */
@@ -53,7 +51,5 @@ const char *const *gbt_make_scene_names(void);
  */
 gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt_error *err);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

@@ -4,9 +4,9 @@
 #ifndef GBTRACE_STATUS_H
 #define GBTRACE_STATUS_H
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+#include "gbtrace/api.h"
+
+GBT_API_BEGIN
 
 typedef enum gbt_status {
     GBT_OK = 0,
@@ -27,7 +27,5 @@ typedef struct gbt_error {
 /** The exit code that a program should end with for a status: 0, 2, 3, 4, 5; 1 for GBT_ERR_INTERNAL, 130 for GBT_ERR_INTERRUPTED. */
 int gbt_status_exit_code(gbt_status status);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

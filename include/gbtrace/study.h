@@ -8,9 +8,7 @@
 
 #include "gbtrace/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+GBT_API_BEGIN
 
 /* These studies train each variant with each seed into FOLDER/runs/SCENE/VARIANT/seed-S, where a scene is called as its folder. A run that is
    there, whole and of the same settings, is taken as it is; any other is made again. Models and scores stay, checkpoints do not. A row beyond
@@ -82,7 +80,5 @@ gbt_anchors_def gbt_anchors_def_default(void);
  */
 gbt_status gbt_study_anchors(const gbt_anchors_def *def, const char *folder, FILE *out, gbt_error *err);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

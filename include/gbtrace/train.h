@@ -8,9 +8,7 @@
 
 #include "gbtrace/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+GBT_API_BEGIN
 
 enum { GBT_TRAIN_MAX_EVALS = 16 };
 
@@ -74,7 +72,5 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
 /** Threads for everything that follows, >= 1. Without this call: all processors of this process. */
 void gbt_set_threads(int threads);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

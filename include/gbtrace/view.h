@@ -4,9 +4,7 @@
 
 #include "gbtrace/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+GBT_API_BEGIN
 
 typedef struct gbt_view_def {
     const char *data; /* data set whose photos are shown beside; NULL: the one it was trained on, and without it no photos. Default NULL */
@@ -29,7 +27,5 @@ gbt_view_def gbt_view_def_default(void);
  */
 gbt_status gbt_view(const char *input, const gbt_view_def *def, gbt_error *err);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

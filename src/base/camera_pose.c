@@ -99,3 +99,18 @@ void camera_motion_at(const camera_motion *motion, double t, double rotation[9],
     for (int i = 0; i < 3; i++)
         center[i] = motion->start_center[i] + t * motion->way[i];
 }
+
+gbt_camera gbt_camera_moved(const gbt_camera *camera, const double motion[6])
+{
+    gbt_camera out = *camera;
+    double step[3], axis[3] = {motion[3], motion[4], motion[5]}, back[9];
+    dmat_apply_transposed(camera->rotation, motion, step);
+    const double half = 0.5 * dvec_length(axis);
+    dvec_normalize(axis);
+    const double s = -sin(half), q[4] = {cos(half), s * axis[0], s * axis[1], s * axis[2]};
+    dquat_to_matrix(q, back);
+    multiply(back, camera->rotation, out.rotation);
+    for (int i = 0; i < 3; i++)
+        out.center[i] += step[i];
+    return out;
+}

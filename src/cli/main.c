@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cli/command.h"
+#include "gbtrace/version.h"
 
 static const command *const commands[] = {
     &command_demo,
@@ -59,7 +60,7 @@ static int dispatch(int argc, char **argv)
         return command_misused("command missing (see gbtrace --help)");
     const char *verb = argv[1];
     if (strcmp(verb, "--version") == 0) {
-        puts("gbtrace " GBT_VERSION);
+        printf("gbtrace %s\n", gbt_version());
         return 0;
     }
     if (strcmp(verb, "--help") == 0 || strcmp(verb, "-h") == 0)

@@ -44,6 +44,9 @@ typedef struct gbt_comparison {
  */
 gbt_status gbt_compare_images(const char *path, const char *reference, gbt_comparison *out, gbt_error *err);
 
+/** The same for pictures in memory, [height][width][3], also rounded to 8 bit. GBT_OK, GBT_ERR_ARGUMENT (no pixels), GBT_ERR_NO_MEMORY. */
+gbt_status gbt_compare_pictures(const float *picture, const float *reference, int width, int height, gbt_comparison *out, gbt_error *err);
+
 typedef enum gbt_split { GBT_SPLIT_TEST, GBT_SPLIT_TRAIN, GBT_SPLIT_ALL } gbt_split;
 
 typedef struct gbt_render_def {

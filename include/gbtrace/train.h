@@ -69,6 +69,14 @@ gbt_train_def gbt_train_def_default(void);
  */
 gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def, gbt_error *err);
 
+/**
+ * gbt_train() with its settings as text, for other languages and for scripts.
+ *
+ * @param settings [in] lines "key = value" with the keys of RUN/config; what is not named is as in gbt_train_def_default()
+ * @return as gbt_train(); GBT_ERR_FORMAT ("settings:LINE: ...") for a line that says nothing
+ */
+gbt_status gbt_train_with(const char *data, const char *run, const char *settings, gbt_error *err);
+
 /** Threads for everything that follows, >= 1. Without this call: all processors of this process. */
 void gbt_set_threads(int threads);
 

@@ -1,5 +1,6 @@
-/* eval/compare_images.c -- two image files, how far apart: what bench/versus_metrics holds against other programs. */
+/* eval/compare_images.c -- two pictures, how far apart: what bench/versus_metrics holds against other programs. */
 #include <math.h>
+#include <string.h>
 
 #include "base/fail.h"
 #include "base/image.h"
@@ -19,6 +20,13 @@ static gbt_status read_colors(const char *path, image *out, gbt_error *err)
     return GBT_OK;
 }
 
+/* Of two quantized images. */
+static gbt_status compare(const image *a, const image *b, gbt_comparison *out, gbt_error *err)
+{
+    *out = (gbt_comparison){a->width, a->height, metric_psnr(a, b), metric_ssim(a, b), metric_ssim_interior(a, b), 0};
+    return metric_flip(a, b, &out->flip, NULL, err);
+}
+
 gbt_status gbt_compare_images(const char *path, const char *reference, gbt_comparison *out, gbt_error *err)
 {
     image a = {0}, b = {0};
@@ -28,11 +36,31 @@ gbt_status gbt_compare_images(const char *path, const char *reference, gbt_compa
         status = read_colors(reference, &b, err);
     if (status == GBT_OK && (a.width != b.width || a.height != b.height))
         status = base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted %d x %d as %s)", path, a.width, a.height, b.width, b.height, reference);
-    if (status == GBT_OK) {
-        *out = (gbt_comparison){a.width, a.height, metric_psnr(&a, &b), metric_ssim(&a, &b), metric_ssim_interior(&a, &b), 0};
-        status = metric_flip(&a, &b, &out->flip, NULL, err);
-    }
+    if (status == GBT_OK)
+        status = compare(&a, &b, out, err);
     image_free(&a);
     image_free(&b);
+    return status;
+}
+
+gbt_status gbt_compare_pictures(const float *picture, const float *reference, int width, int height, gbt_comparison *out, gbt_error *err)
+{
+    const float *const from[2] = {picture, reference};
+    image copies[2] = {{0}, {0}};
+    *out = (gbt_comparison){0};
+    if (width < 1 || height < 1)
+        return base_fail(err, GBT_ERR_ARGUMENT, "pictures: %d x %d pixels (wanted both >= 1)", width, height);
+    gbt_status status = GBT_OK;
+    for (int i = 0; i < 2 && status == GBT_OK; i++) {
+        status = image_alloc(&copies[i], width, height, 3, err);
+        if (status == GBT_OK) {
+            memcpy(copies[i].pixels, from[i], 3 * (size_t)width * (size_t)height * sizeof(float));
+            image_quantize(&copies[i]);
+        }
+    }
+    if (status == GBT_OK)
+        status = compare(&copies[0], &copies[1], out, err);
+    image_free(&copies[0]);
+    image_free(&copies[1]);
     return status;
 }

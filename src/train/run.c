@@ -292,3 +292,11 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
     mem_free(strings);
     return status;
 }
+
+gbt_status gbt_train_with(const char *data, const char *run, const char *settings, gbt_error *err)
+{
+    gbt_train_def def = gbt_train_def_default();
+    config_strings strings;
+    GBT_TRY(config_parse(settings, "settings", &def, &strings, err));
+    return gbt_train(data, run, &def, err);
+}

@@ -49,6 +49,10 @@ static void figures_are_those_of_the_metrics(void **state)
     assert_true(c.width == 24 && c.height == 20 && c.psnr == metric_psnr(&a, &b) && c.flip == flip);
     assert_true(c.ssim == metric_ssim(&a, &b) && c.ssim_interior == metric_ssim_interior(&a, &b));
     assert_true(c.ssim != c.ssim_interior);
+    gbt_comparison in_memory;
+    assert_ok(gbt_compare_pictures(a.pixels, b.pixels, 24, 20, &in_memory, NULL));
+    assert_memory_equal(&in_memory, &c, sizeof c);
+    assert_int_equal(gbt_compare_pictures(a.pixels, b.pixels, 0, 20, &in_memory, NULL), GBT_ERR_ARGUMENT);
     assert_ok(gbt_compare_images(in_folder("a.png"), in_folder("a.png"), &c, NULL));
     assert_true(c.psnr == METRIC_PSNR_MAX && c.ssim == 1 && c.ssim_interior == 1 && c.flip == 0);
     image_free(&a), image_free(&b);

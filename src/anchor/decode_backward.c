@@ -1,6 +1,6 @@
-/* anchor/decode_backward.c -- dL/dGaussians -> dL/danchors and dL/dnetworks: the adjoint of decode.c, over the same chunks.
+/* anchor/decode_backward.c -- dL/dGaussians -> dL/danchors and dL/dnetworks, or dL/dcamera: the adjoint of decode.c, over the same chunks.
 
-   Rows of the anchors' gradient belong to one chunk each. The networks' gradient is one record per block, added in block order. */
+   Rows of the anchors' gradient belong to one chunk each. The networks' gradient, or the camera's, is one record per block, added in block order. */
 #include "anchor/decode.h"
 
 #include <math.h>
@@ -26,8 +26,11 @@ typedef struct backward_job {
     record_layout record;
     const decode_tape *tape;
     const gaussians *d_gaussians;
-    anchors *d_anchors;
+    anchors *d_anchors; /* with d_params; NULL: the camera's gradient alone is wanted */
     float *d_params;
+    const decoder *d;           /* for the camera's gradient: */
+    double camera[3];
+    double *d_camera;           /* [block_count][3] */
     size_t block_count;
     size_t out_first[HEAD_COUNT], out_stride; /* columns of one row of logit gradients */
 } backward_job;
@@ -73,8 +76,9 @@ static void activations_backward(const backward_job *job, size_t begin, size_t r
         const size_t anchor = tape->visible[begin + r];
         const float *x = job->a->position + anchor * 3, *offset = job->a->offset + anchor * offsets * 3;
         const float *e = extent + r * 6, *scale_log = job->a->scale_log + anchor * 6;
-        float *d_offset = job->d_anchors->offset + anchor * offsets * 3, *row = d_out + r * job->out_stride;
-        float sum[6] = {0};
+        float *row = d_out + r * job->out_stride;
+        float sum[6] = {0}, unwanted[3 * ANCHOR_MAX_OFFSETS] = {0};
+        float *d_offset = job->d_anchors != NULL ? job->d_anchors->offset + anchor * offsets * 3 : unwanted;
         for (; g < last && tape->slot[g] < slot_begin + offsets; g++) {
             const size_t k = tape->slot[g] - slot_begin;
             const float d_mean[3] = {d->mean_x[g], d->mean_y[g], d->mean_z[g]};
@@ -109,10 +113,49 @@ static void activations_backward(const backward_job *job, size_t begin, size_t r
             const float alpha = kept[KEPT_ALPHA * stride + g];
             row[job->out_first[0] + k] = d->opacity[g] * (1.0f - alpha * alpha);
         }
+        if (job->d_anchors == NULL)
+            continue;
         float *d_scale_log = job->d_anchors->scale_log + anchor * 6;
         for (int c = 0; c < 6; c++)
             d_scale_log[c] += decode_cut_gradient(scale_log[c], sum[c]);
     }
+}
+
+/* Logit gradients back through the second layer and the ReLU. */
+static void hidden_backward(const backward_job *job, size_t begin, size_t tiled, const float *d_out, float *d_hidden)
+{
+    const float *hidden = job->tape->hidden + begin * HIDDEN_STRIDE;
+    for (int head = 0; head < HEAD_COUNT; head++)
+        job->kernels->product(&(dense_product){.m = tiled, .n = ANCHOR_HIDDEN_DIM, .k = job->layout.out_count[head],
+                                               .a = d_out + job->out_first[head], .a_row = job->out_stride, .a_step = 1,
+                                               .b = job->weights.out_hidden[head], .b_row = ANCHOR_HIDDEN_DIM, .bias = zeros,
+                                               .c = d_hidden + head * ANCHOR_HIDDEN_DIM, .c_row = HIDDEN_STRIDE});
+    for (size_t i = 0; i < tiled * HIDDEN_STRIDE; i++)
+        d_hidden[i] = hidden[i] > 0.0f ? d_hidden[i] : 0.0f;
+}
+
+/* dL/dcamera of one row from the gradient of its direction and distance: moving the camera is moving every anchor the other way. */
+static void view_backward(const backward_job *job, size_t row, const float *d_hidden, double d_camera[3])
+{
+    double d_input[4] = {0}, offset[3], square = 0, along = 0;
+    for (int i = 0; i < 4; i++) {
+        const float *weight = job->weights.input_hidden + (ANCHOR_FEATURE_DIM + i) * HIDDEN_STRIDE;
+        for (int h = 0; h < HIDDEN_STRIDE; h++)
+            d_input[i] += (double)weight[h] * (double)d_hidden[h];
+    }
+    const float *position = job->a->position + job->tape->visible[row] * (size_t)3;
+    for (int c = 0; c < 3; c++) {
+        offset[c] = (double)position[c] - job->camera[c];
+        square += offset[c] * offset[c];
+        along += offset[c] * d_input[c];
+    }
+    const double distance = sqrt(square), scaled = distance * (double)job->d->distance_scale;
+    if (!(distance > 0 && distance < HUGE_VAL))
+        return;
+    const bool in_range = job->d->has_distance && scaled > 0.5 * (double)job->d->distance_min && scaled < 2.0 * (double)job->d->distance_max;
+    const double d_distance = in_range ? (double)job->d->distance_scale * d_input[3] : 0;
+    for (int c = 0; c < 3; c++)
+        d_camera[c] -= (d_input[c] - offset[c] * (along / square) + offset[c] * d_distance) / distance;
 }
 
 /* Logit gradients back through the two layers of the three networks. */
@@ -122,12 +165,9 @@ static void layers_backward(const backward_job *job, size_t begin, size_t rows, 
     const size_t tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
     const float *hidden = job->tape->hidden + begin * HIDDEN_STRIDE, *input = job->tape->input + begin * INPUT_STRIDE;
     _Alignas(64) float d_hidden[DECODE_CHUNK * HIDDEN_STRIDE], d_feature[DECODE_CHUNK * ANCHOR_FEATURE_DIM];
+    hidden_backward(job, begin, tiled, d_out, d_hidden);
     for (int head = 0; head < HEAD_COUNT; head++) {
         const float *d_logit = d_out + job->out_first[head];
-        kernels->product(&(dense_product){.m = tiled, .n = ANCHOR_HIDDEN_DIM, .k = job->layout.out_count[head], .a = d_logit,
-                                          .a_row = job->out_stride, .a_step = 1, .b = job->weights.out_hidden[head],
-                                          .b_row = ANCHOR_HIDDEN_DIM, .bias = zeros, .c = d_hidden + head * ANCHOR_HIDDEN_DIM,
-                                          .c_row = HIDDEN_STRIDE});
         kernels->product(&(dense_product){.m = job->layout.out_count[head], .n = ANCHOR_HIDDEN_DIM, .k = rows, .a = d_logit, .a_row = 1,
                                           .a_step = job->out_stride, .b = hidden + head * ANCHOR_HIDDEN_DIM, .b_row = HIDDEN_STRIDE,
                                           .c = record + job->record.weight_first[head], .c_row = ANCHOR_HIDDEN_DIM});
@@ -136,8 +176,6 @@ static void layers_backward(const backward_job *job, size_t begin, size_t rows, 
             for (size_t o = 0; o < job->layout.out_stride[head]; o++)
                 d_bias[o] += d_logit[r * job->out_stride + o];
     }
-    for (size_t i = 0; i < tiled * HIDDEN_STRIDE; i++)
-        d_hidden[i] = hidden[i] > 0.0f ? d_hidden[i] : 0.0f;
     kernels->product(&(dense_product){.m = HIDDEN_STRIDE, .n = INPUT_STRIDE, .k = rows, .a = d_hidden, .a_row = 1, .a_step = HIDDEN_STRIDE,
                                       .b = input, .b_row = INPUT_STRIDE, .c = record, .c_row = INPUT_STRIDE});
     kernels->product(&(dense_product){.m = tiled, .n = ANCHOR_FEATURE_DIM, .k = HIDDEN_STRIDE, .a = d_hidden, .a_row = HIDDEN_STRIDE,
@@ -150,25 +188,36 @@ static void layers_backward(const backward_job *job, size_t begin, size_t rows, 
     }
 }
 
+static void chunk_backward(const backward_job *job, size_t begin, size_t rows, float *record, double *d_camera)
+{
+    _Alignas(64) float d_out[DECODE_CHUNK * OUT_STRIDE_MAX], extent[DECODE_CHUNK * 6];
+    const size_t tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
+    memset(d_out, 0, tiled * job->out_stride * sizeof *d_out);
+    for (size_t r = 0; r < rows; r++)
+        memcpy(extent + r * 6, job->a->scale_log + (size_t)job->tape->visible[begin + r] * 6, 6 * sizeof *extent);
+    job->kernels->exp(extent, rows * 6);
+    activations_backward(job, begin, rows, extent, d_out);
+    if (job->d_anchors != NULL) {
+        layers_backward(job, begin, rows, d_out, record);
+        return;
+    }
+    _Alignas(64) float d_hidden[DECODE_CHUNK * HIDDEN_STRIDE];
+    hidden_backward(job, begin, tiled, d_out, d_hidden);
+    for (size_t r = 0; r < rows; r++)
+        view_backward(job, begin + r, d_hidden + r * HIDDEN_STRIDE, d_camera);
+}
+
 static void backward_block(size_t block, size_t begin, size_t end, void *context)
 {
     const backward_job *job = context;
     const decode_tape *tape = job->tape;
-    float *record = tape->block_grad + block * job->record.size;
-    memset(record, 0, job->record.size * sizeof *record);
-    _Alignas(64) float d_out[DECODE_CHUNK * OUT_STRIDE_MAX], extent[DECODE_CHUNK * 6];
-    for (size_t row = begin; row < end; row += DECODE_CHUNK) {
-        const size_t rows = end - row < DECODE_CHUNK ? end - row : DECODE_CHUNK;
-        if (tape->first[row / DECODE_CHUNK] == tape->first[row / DECODE_CHUNK + 1])
-            continue;
-        const size_t tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
-        memset(d_out, 0, tiled * job->out_stride * sizeof *d_out);
-        for (size_t r = 0; r < rows; r++)
-            memcpy(extent + r * 6, job->a->scale_log + (size_t)tape->visible[row + r] * 6, 6 * sizeof *extent);
-        job->kernels->exp(extent, rows * 6);
-        activations_backward(job, row, rows, extent, d_out);
-        layers_backward(job, row, rows, d_out, record);
-    }
+    float *record = job->d_anchors != NULL ? tape->block_grad + block * job->record.size : NULL;
+    double *d_camera = job->d_camera != NULL ? job->d_camera + 3 * block : NULL;
+    if (record != NULL)
+        memset(record, 0, job->record.size * sizeof *record);
+    for (size_t row = begin; row < end; row += DECODE_CHUNK)
+        if (tape->first[row / DECODE_CHUNK] != tape->first[row / DECODE_CHUNK + 1])
+            chunk_backward(job, row, end - row < DECODE_CHUNK ? end - row : DECODE_CHUNK, record, d_camera);
 }
 
 /* Entries [entry, entry + count) of the records, summed in block order. */
@@ -211,32 +260,61 @@ static void reduce_rows(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
+/* What both adjoints begin with; after it tape->kept_count may be 0, and nothing is left to do. */
+static gbt_status open_job(const anchors *a, const decoder *d, decode_tape *tape, const gaussians *d_gaussians, backward_job *job, gbt_error *err)
+{
+    if (a->offset_count != d->offset_count)
+        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: anchors have %d offsets, the decoder %d", a->offset_count, d->offset_count);
+    if (d_gaussians->count != tape->kept_count)
+        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: gradient of %zu Gaussians (wanted %zu)", d_gaussians->count, tape->kept_count);
+    *job = (backward_job){.a = a, .d = d, .kernels = dense_best(), .layout = decode_layout_of(d), .tape = tape, .d_gaussians = d_gaussians,
+                          .block_count = parallel_block_count(tape->visible_count, DECODE_GRAIN)};
+    for (int head = 0; head < HEAD_COUNT; head++) {
+        job->out_first[head] = job->out_stride;
+        job->out_stride += job->layout.out_stride[head];
+    }
+    return decode_pack_weights(d, &job->layout, tape, &job->weights, err);
+}
+
 gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape, const gaussians *d_gaussians, anchors *d_anchors,
                            float *d_params, gbt_error *err)
 {
-    if (a->offset_count != d->offset_count || d_anchors->offset_count != d->offset_count || d_anchors->count != a->count)
+    backward_job job;
+    if (d_anchors->offset_count != a->offset_count || d_anchors->count != a->count)
         return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: gradient of %zu anchors with %d offsets (wanted %zu, %d)",
-                         d_anchors->count, d_anchors->offset_count, a->count, d->offset_count);
-    if (d_gaussians->count != tape->kept_count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: gradient of %zu Gaussians (wanted %zu)", d_gaussians->count,
-                         tape->kept_count);
+                         d_anchors->count, d_anchors->offset_count, a->count, a->offset_count);
+    GBT_TRY(open_job(a, d, tape, d_gaussians, &job, err));
     if (tape->kept_count == 0)
         return GBT_OK;
-    backward_job job = {.a = a, .kernels = dense_best(), .layout = decode_layout_of(d), .tape = tape, .d_gaussians = d_gaussians,
-                        .d_anchors = d_anchors, .d_params = d_params,
-                        .block_count = parallel_block_count(tape->visible_count, DECODE_GRAIN)};
+    job.d_anchors = d_anchors, job.d_params = d_params;
     job.record = record_layout_of(&job.layout);
     size_t row_count = HIDDEN_STRIDE;
-    for (int head = 0; head < HEAD_COUNT; head++) {
-        job.out_first[head] = job.out_stride;
-        job.out_stride += job.layout.out_stride[head];
+    for (int head = 0; head < HEAD_COUNT; head++)
         row_count += job.layout.out_count[head];
-    }
-    GBT_TRY(decode_pack_weights(d, &job.layout, tape, &job.weights, err));
     void *records = tape->block_grad;
     GBT_TRY(mem_reserve(&records, &tape->block_capacity, 0, job.block_count * job.record.size, sizeof(float), "decode adjoint", err));
     tape->block_grad = records;
     parallel_blocks(tape->visible_count, DECODE_GRAIN, backward_block, &job);
     parallel_blocks(row_count, 8, reduce_rows, &job);
+    return GBT_OK;
+}
+
+gbt_status decode_backward_camera(const anchors *a, const decoder *d, const float camera_center[3], decode_tape *tape, const gaussians *d_gaussians,
+                                  double d_camera[3], gbt_error *err)
+{
+    backward_job job;
+    d_camera[0] = d_camera[1] = d_camera[2] = 0;
+    GBT_TRY(open_job(a, d, tape, d_gaussians, &job, err));
+    if (tape->kept_count == 0)
+        return GBT_OK;
+    job.d_camera = mem_calloc(job.block_count, 3 * sizeof *job.d_camera, "decode adjoint", err);
+    if (job.d_camera == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (int c = 0; c < 3; c++)
+        job.camera[c] = (double)camera_center[c];
+    parallel_blocks(tape->visible_count, DECODE_GRAIN, backward_block, &job);
+    for (size_t i = 0; i < 3 * job.block_count; i++)
+        d_camera[i % 3] += job.d_camera[i];
+    mem_free(job.d_camera);
     return GBT_OK;
 }

@@ -91,6 +91,13 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
 bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_camera *out);
 
 /**
+ * Set the pose of `camera`: at `origin`, `target` in the middle of the image, `up` towards its top.
+ *
+ * @return false, and nothing changed, when `target` is at `origin`, `up` is along the view (within 1e-9 rad), or a value is not finite
+ */
+bool gbt_camera_look_at(const double origin[3], const double target[3], const double up[3], gbt_camera *camera);
+
+/**
  * The camera after a small motion of its own, and the motion for which pose gradients are taken (gbtrace/model.h).
  *
  * @param motion [in] (v, omega): v moves the centre along the camera's axes (right, down, forward), scene units; omega turns the camera about the

@@ -1,4 +1,4 @@
-/* base/camera_pose.c -- where a camera stands: from what it looks at, and on the way between two poses. */
+/* base/camera_pose.c -- where a camera stands: from what it looks at, after a small motion, and on the way between two poses. */
 #include "base/camera_pose.h"
 
 #include <math.h>
@@ -14,7 +14,7 @@ static bool is_finite(const double *values, int count)
     return true;
 }
 
-bool camera_look_at(const double origin[3], const double target[3], const double up[3], gbt_camera *camera)
+bool gbt_camera_look_at(const double origin[3], const double target[3], const double up[3], gbt_camera *camera)
 {
     double forward[3], right[3], down[3], upward[3];
     for (int i = 0; i < 3; i++)

@@ -1,17 +1,10 @@
-/* base/camera_pose.h -- where a camera stands: from what it looks at, and on the way between two poses. */
+/* base/camera_pose.h -- where a camera stands on the way between two poses. */
 #ifndef GBT_BASE_CAMERA_POSE_H
 #define GBT_BASE_CAMERA_POSE_H
 
 #include <stdbool.h>
 
 #include "gbtrace/camera.h"
-
-/**
- * Set the pose of `camera`: at `origin`, `target` in the middle of the image, `up` towards its top.
- *
- * @return false, and nothing changed, when `target` is at `origin`, `up` is along the view (within 1e-9 rad), or a value is not finite
- */
-bool camera_look_at(const double origin[3], const double target[3], const double up[3], gbt_camera *camera);
 
 /** A camera on its way from one pose to another: turning about one axis at one rate (slerp), moving along a line. */
 typedef struct camera_motion {

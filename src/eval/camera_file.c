@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/camera_pose.h"
 #include "base/fail.h"
 #include "eval/json_fields.h"
 #include "trace/ray_file.h"
@@ -59,7 +58,7 @@ static gbt_status take_pose(const json_fields *r, bool needed, const double orig
     double local[3], target[3];
     for (int i = 0; i < 3; i++)
         local[i] = at->origin[i] - origin[i], target[i] = at->target[i] - origin[i];
-    if (camera_look_at(local, target, at->up, camera))
+    if (gbt_camera_look_at(local, target, at->up, camera))
         return GBT_OK;
     const bool same = memcmp(at->origin, at->target, sizeof at->origin) == 0;
     return same ? json_field_fail(r, "target", "is the origin (wanted another point)") : json_field_fail(r, "up", "is 0, or along the view");

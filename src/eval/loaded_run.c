@@ -9,21 +9,34 @@
 #include "base/file.h"
 #include "data/gaussian_file.h"
 
-/* Around the middle of their bounds, where floats are fine; drawn on black, as every viewer does. */
-static gbt_status open_cloud(const char *path, loaded_run *out, gbt_error *err)
+void loaded_run_draw_plain(loaded_run *r)
 {
-    GBT_TRY(gaussian_file_read(path, &out->cloud, err));
-    gaussian_cloud *c = &out->cloud;
+    r->def = gbt_train_def_default();
+    r->frame.draw.footprint = (float)r->def.footprint;
+    r->settings = trace_settings_default();
+}
+
+void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud)
+{
+    gaussian_cloud_free(&r->cloud);
+    r->cloud = *cloud;
+    memset(cloud, 0, sizeof *cloud);
+    gaussian_cloud *c = &r->cloud;
     double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
     for (size_t i = 0; i < 3 * c->count; i++)
         low[i % 3] = fmin(low[i % 3], (double)c->mean[i]), high[i % 3] = fmax(high[i % 3], (double)c->mean[i]);
     for (int k = 0; k < 3; k++)
-        out->model.origin[k] = 0.5 * (low[k] + high[k]);
+        r->model.origin[k] = 0.5 * (low[k] + high[k]);
     for (size_t i = 0; i < 3 * c->count; i++)
-        c->mean[i] = (float)((double)c->mean[i] - out->model.origin[i % 3]);
-    out->def = gbt_train_def_default();
-    out->frame.draw.footprint = (float)out->def.footprint;
-    out->settings = trace_settings_default();
+        c->mean[i] = (float)((double)c->mean[i] - r->model.origin[i % 3]);
+}
+
+static gbt_status open_cloud(const char *path, loaded_run *out, gbt_error *err)
+{
+    gaussian_cloud cloud;
+    GBT_TRY(gaussian_file_read(path, &cloud, err));
+    loaded_run_draw_plain(out);
+    loaded_run_take_cloud(out, &cloud);
     return GBT_OK;
 }
 
@@ -50,7 +63,7 @@ static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
     return GBT_OK;
 }
 
-static gbt_status open_views(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)
+gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)
 {
     scene_split split;
     GBT_TRY(scene_split_parse(out->def.eval_split, &split, err));
@@ -71,7 +84,7 @@ gbt_status loaded_run_open(const char *run, const char *data, double downscale, 
 {
     memset(out, 0, sizeof *out);
     GBT_TRY(open_model(run, out, err));
-    return open_views(run, data, downscale, out, err);
+    return loaded_run_open_views(run, data, downscale, out, err);
 }
 
 gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *err)
@@ -80,13 +93,18 @@ gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *er
     return open_model(run, out, err);
 }
 
+void loaded_run_close_views(loaded_run *r)
+{
+    if (r->photos.source != NULL)
+        photos_close(&r->photos);
+    scene_free(&r->scene);
+}
+
 void loaded_run_close(loaded_run *r)
 {
     model_free(&r->model);
     gaussian_cloud_free(&r->cloud);
-    if (r->photos.source != NULL)
-        photos_close(&r->photos);
-    scene_free(&r->scene);
+    loaded_run_close_views(r);
     frame_free(&r->frame);
 }
 

@@ -38,6 +38,18 @@ frame_subject loaded_run_subject(const loaded_run *r);
 /** The same without the data set: no views, no photos. For cameras that come from elsewhere. */
 gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *err);
 
+/** The other half of loaded_run_open(), for a run that has no views open: `run` is what messages call it. */
+gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err);
+
+/** Back to no views, whether there were any or not. */
+void loaded_run_close_views(loaded_run *r);
+
+/** Draw as plain Gaussians are drawn: on black, as every viewer does. */
+void loaded_run_draw_plain(loaded_run *r);
+
+/** Let `r` show these plain Gaussians, in world coordinates, around the middle of their bounds, where floats are fine. `cloud` is taken over, and is {0} then. */
+void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud);
+
 void loaded_run_close(loaded_run *r);
 
 /** Render a view into r->frame.rgb, at the run's resolution. */

@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/camera_pose.h"
 #include "base/file.h"
 #include "base/memory.h"
 #include "base/rng.h"
@@ -45,7 +44,7 @@ gbt_camera practice_camera(const practice *p, double azimuth_deg, double elevati
     const double center[3] = {radius * cos(e) * sin(a), radius * sin(e), -radius * cos(e) * cos(a)};
     const double up[3] = {fabs(elevation_deg) > 89 ? 1 : 0, fabs(elevation_deg) > 89 ? 0 : 1, 0};
     gbt_camera camera = p->camera[0];
-    camera_look_at(center, middle, up, &camera);
+    gbt_camera_look_at(center, middle, up, &camera);
     return camera;
 }
 

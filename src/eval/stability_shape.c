@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/camera_pose.h"
 #include "base/compare.h"
 #include "base/cpu.h"
 #include "base/file.h"
@@ -63,7 +62,7 @@ static void measure_needle(stability *s, needles *n, size_t i, double opacity, c
     const double alpha = alpha_at(s, &n->ours, 0);
     n->bad += !(alpha >= 0 && alpha <= opacity + 1e-6) || draw_count_bad(n->ours.rgb.pixels, 3) > 0;
     n->error[i] = isfinite(alpha) ? (float)fabs(alpha - (1 - T)) : 1;
-    if (camera_look_at(here, through, up, &camera))
+    if (gbt_camera_look_at(here, through, up, &camera))
         draw_splatted(s, &n->theirs, &n->g, &splat, &camera);
     n->raster_error[i] = (float)fabs(alpha_at(s, &n->theirs, NEEDLE_MIDDLE) - (1 - T));
 }

@@ -143,8 +143,9 @@ gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camer
     const ray_shot shot = ray_shot_of(camera);
     GBT_TRY(prepare(f, subject, &shot, settings, NULL, err));
     double clock = clock_wall();
+    const trace_outputs outputs = {.rgb = &f->rgb, .depth = f->draw.depth, .transmittance = f->draw.transmittance};
     if (f->draw.renderer == FRAME_TRACE)
-        GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
+        GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &outputs, &f->counters, err));
     else
         GBT_TRY(splat(f, settings, keep_tape, err));
     f->times.trace = lap(&clock);
@@ -214,8 +215,7 @@ double frame_volume(const frame *f)
     return g->count > 0 ? sum / (double)g->count : 0;
 }
 
-/* From the picture to f->d_gaussians and f->seen. */
-static gbt_status backward_gaussians(frame *f, const image *d_image, gbt_error *err)
+gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err)
 {
     double clock = clock_wall();
     GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen, "weights", err));
@@ -232,7 +232,7 @@ static gbt_status backward_gaussians(frame *f, const image *d_image, gbt_error *
 gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image, float volume_weight, anchors *d_anchors,
                           float *d_params, gbt_error *err)
 {
-    GBT_TRY(backward_gaussians(f, d_image, err));
+    GBT_TRY(frame_backward_gaussians(f, d_image, err));
     double clock = clock_wall();
     gaussians *g = &f->gaussians, *dg = &f->d_gaussians;
     const float share = g->count > 0 ? volume_weight / (float)g->count : 0;
@@ -248,7 +248,7 @@ gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const im
 
 gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const image *d_image, gaussian_cloud *d_cloud, gbt_error *err)
 {
-    GBT_TRY(backward_gaussians(f, d_image, err));
+    GBT_TRY(frame_backward_gaussians(f, d_image, err));
     plain_backward(cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, d_cloud);
     return GBT_OK;
 }
@@ -258,7 +258,7 @@ gbt_status frame_weigh(frame *f, gbt_error *err)
     image nothing = {0};
     GBT_TRY(image_alloc(&nothing, f->rgb.width, f->rgb.height, 3, err));
     memset(nothing.pixels, 0, 3 * (size_t)nothing.width * (size_t)nothing.height * sizeof *nothing.pixels);
-    const gbt_status status = backward_gaussians(f, &nothing, err);
+    const gbt_status status = frame_backward_gaussians(f, &nothing, err);
     image_free(&nothing);
     return status;
 }

@@ -31,6 +31,7 @@ typedef struct frame_drawing {
     float footprint;           /* variance of a pixel, px^2 (trace/footprint.h); 0: rays are thin */
     int pixel_step;            /* the camera's pixels are every n-th of a picture, and as wide as that one's; 0 and 1: all */
     const float *anchor_pixel; /* optional (NULL), [anchors]: the smallest pixel an anchor was made for; borrowed */
+    float *depth, *transmittance; /* optional (NULL), [pixels]: frame_render() writes these too when it traces (trace/trace.h); borrowed */
 } frame_drawing;
 
 /** Everything one view needs, reused from view to view. Start from {0}; free with frame_free(). */
@@ -107,6 +108,9 @@ gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const im
 
 /** Adjoint of the last frame_render(keep_tape) of a cloud. `d_cloud`: as many Gaussians as it has; see plain_backward(). */
 gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const image *d_image, gaussian_cloud *d_cloud, gbt_error *err);
+
+/** The part that both have in common: d_image -> f->d_gaussians and f->seen. */
+gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err);
 
 /** f->seen of the last frame_render(keep_tape), and no gradient. */
 gbt_status frame_weigh(frame *f, gbt_error *err);

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/camera_lens.h"
-#include "base/camera_pose.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -118,7 +117,7 @@ static void find_axes(const ray_shot *shot, const double axis[3], double axes[9]
     gbt_camera look = shot->camera;
     const double here[3] = {0, 0, 0}, up[3] = {fabs(axis[0]) < 0.6, fabs(axis[0]) >= 0.6, 0};
     if (shot->given != NULL)
-        camera_look_at(here, axis, up, &look); /* fails for a zero axis: then no ray looks forward in any axes */
+        gbt_camera_look_at(here, axis, up, &look); /* fails for a zero axis: then no ray looks forward in any axes */
     memcpy(axes, look.rotation, sizeof look.rotation);
 }
 

@@ -2,7 +2,6 @@
 #ifndef GBT_TESTS_RASTER_SUPPORT_H
 #define GBT_TESTS_RASTER_SUPPORT_H
 
-#include "base/camera_pose.h"
 #include "base/memory.h"
 #include "base/rng.h"
 #include "raster/raster.h"
@@ -63,7 +62,7 @@ static inline gbt_camera make_camera(int width, int height, const double center[
 {
     gbt_camera c = {.model = GBT_CAMERA_PINHOLE, .width = width, .height = height,
                     .params = {0.8 * width, 0.85 * width, 0.5 * width + 0.3, 0.5 * height - 0.2}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-    assert_true(camera_look_at(center, (const double[3]){0, 0, 0}, (const double[3]){0.05, -1, 0.1}, &c));
+    assert_true(gbt_camera_look_at(center, (const double[3]){0, 0, 0}, (const double[3]){0.05, -1, 0.1}, &c));
     return c;
 }
 

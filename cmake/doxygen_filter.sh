@@ -1,0 +1,3 @@
+#!/bin/sh
+# cmake/doxygen_filter.sh -- a public header in the form that Doxygen reads: comments behind members and values as /**<, the first one as the file's.
+exec sed -E -e '1s,^/\* ([^ ]+) -- ,/** @file \1\n ,' -e 's,^([[:space:]]+[^/*[:space:]][^/]*[;\,]|[[:space:]]+GBT_[A-Z_]+)([[:space:]]*)/\* ,\1\2/**< ,' "$1"

@@ -1,0 +1,49 @@
+# What is installed, by cmake --install, into a Debian package (cpack -G DEB) and into a Python wheel.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/gbtrace)
+
+install(TARGETS gbtrace RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS gbtrace_library ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS gbtrace_shared EXPORT gbtrace LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(DIRECTORY include/gbtrace DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(FILES README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY docs examples DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN "*.html" EXCLUDE)
+
+# find_package(gbtrace), target gbtrace::gbtrace: the shared library.
+install(EXPORT gbtrace NAMESPACE gbtrace:: FILE gbtraceConfig.cmake DESTINATION ${package_folder})
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake DESTINATION ${package_folder})
+
+# pkg-config gbtrace, and --static. Paths are found from the file's own place, so the tree can be moved.
+set(private_libs "")
+foreach(link ${library_links})
+  if(link STREQUAL "m")
+    list(APPEND private_libs -lm)
+  elseif(link MATCHES "^/")
+    list(APPEND private_libs ${link})
+  endif()
+endforeach()
+list(JOIN private_libs " " GBT_PRIVATE_LIBS)
+file(RELATIVE_PATH GBT_PC_PREFIX ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
+configure_file(cmake/gbtrace.pc.in ${CMAKE_BINARY_DIR}/gbtrace.pc @ONLY)
+install(FILES ${CMAKE_BINARY_DIR}/gbtrace.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+
+if(SKBUILD)
+  install(FILES $<TARGET_FILE:gbtrace_shared> DESTINATION gbtrace RENAME libgbtrace.so COMPONENT python)
+endif()
+
+# One package: program, library, headers, documents. What it depends on is read from the binaries.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME gbtrace)
+set(CPACK_PACKAGE_CONTACT "gbtrace developers")
+set(CPACK_PACKAGE_DESCRIPTION "gbtrace turns posed photos into scenes that can be seen from anywhere: granular balls become anchors, anchors decode into Gaussians, rays through\
+ a tree of their ellipsoids make the picture and carry gradients back. No GPU is needed. The package holds the program, the library and its headers.")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+include(CPack)

@@ -1,0 +1,94 @@
+"""A posed camera: lens model, image size, pose."""
+
+import ctypes as c
+import math
+
+import numpy as np
+
+from gbtrace._library import ArgumentError, CCamera, library
+
+MODELS = {library.gbt_camera_model_name(i).decode(): i for i in list(range(18)) + [100]}
+
+
+class Camera:
+    """COLMAP's axes (x right, y down, z forward), lens models and parameters; docs/cameras.md has them all.
+
+    `rotation` (3 x 3, world to camera), `center` and `params` are views of the camera's own memory: writing into them changes it.
+    """
+
+    def __init__(self, model="PINHOLE", width=0, height=0, params=(), rotation=None, center=(0, 0, 0)):
+        if model not in MODELS:
+            raise ValueError(f"model: {model!r} (wanted one of {', '.join(MODELS)})")
+        wanted = library.gbt_camera_param_count(MODELS[model])
+        if len(params) != wanted:
+            raise ValueError(f"params: {len(params)} (wanted {wanted} for {model})")
+        self._c = CCamera(MODELS[model], width, height)
+        self.params[:] = params
+        self.rotation[:] = np.eye(3) if rotation is None else rotation
+        self.center[:] = center
+
+    @classmethod
+    def pinhole(cls, width, height, fov_x_deg):
+        """At the origin, looking along z."""
+        f = 0.5 * width / math.tan(math.radians(0.5 * fov_x_deg))
+        return cls("PINHOLE", width, height, (f, f, 0.5 * width, 0.5 * height))
+
+    @classmethod
+    def _of(cls, struct):
+        camera = cls.__new__(cls)
+        camera._c = CCamera.from_buffer_copy(struct)
+        return camera
+
+    @property
+    def model(self):
+        return library.gbt_camera_model_name(self._c.model).decode()
+
+    @property
+    def width(self):
+        return self._c.width
+
+    @property
+    def height(self):
+        return self._c.height
+
+    @property
+    def params(self):
+        return np.ctypeslib.as_array(self._c.params)[:library.gbt_camera_param_count(self._c.model)]
+
+    @property
+    def rotation(self):
+        return np.ctypeslib.as_array(self._c.rotation).reshape(3, 3)
+
+    @property
+    def center(self):
+        return np.ctypeslib.as_array(self._c.center)
+
+    def looking_at(self, origin, target, up=(0, -1, 0)):
+        """The same lens at `origin`, with `target` in the middle of its picture and `up` towards its top."""
+        out = Camera._of(self._c)
+        if not library.gbt_camera_look_at(_doubles(origin, 3), _doubles(target, 3), _doubles(up, 3), c.byref(out._c)):
+            raise ArgumentError("camera: the target is at the origin, or up is along the view")
+        return out
+
+    def moved(self, motion):
+        """After a small motion: along its axes (right, down, forward), then the turn about them in radians. What pose gradients are taken for."""
+        return Camera._of(library.gbt_camera_moved(c.byref(self._c), _doubles(motion, 6)))
+
+    def resized(self, width, height):
+        """The same camera for a picture of another size."""
+        return Camera._of(library.gbt_camera_resized(c.byref(self._c), width, height))
+
+    def distance(self, other):
+        """How far apart two poses are: between the centres, and the angle in radians."""
+        cosine = 0.5 * (np.trace(self.rotation @ other.rotation.T) - 1)
+        return float(np.linalg.norm(self.center - other.center)), float(np.arccos(np.clip(cosine, -1, 1)))
+
+    def __repr__(self):
+        return f"Camera({self.model!r}, {self.width}, {self.height}, params={self.params.tolist()}, center={self.center.tolist()})"
+
+
+def _doubles(values, count):
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape != (count,):
+        raise ValueError(f"shape {array.shape} (wanted ({count},))")
+    return (c.c_double * count)(*array)

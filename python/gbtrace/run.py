@@ -1,0 +1,58 @@
+"""What takes whole folders: training, scoring, exporting, comparing."""
+
+import ctypes as c
+from typing import NamedTuple
+
+import numpy as np
+
+from gbtrace import _library as lib
+from gbtrace.model import Model
+
+
+class Comparison(NamedTuple):
+    """Two pictures compared."""
+
+    psnr: float           # dB, at most 100
+    ssim: float           # windows see 0 beyond the border
+    ssim_interior: float  # windows that lie wholly inside; NaN below 11 x 11 pixels
+    flip: float
+
+
+def train(data, run, **settings):
+    """Train on the posed photos in the folder `data`, write everything into the folder `run`, open the model.
+
+    Settings have the names of RUN/config, with _ for -: train("photos", "run", iterations=2000, downscale=2). Progress goes to stderr; Ctrl-C
+    saves a checkpoint and raises KeyboardInterrupt.
+    """
+    lines = "".join(f"{key.replace('_', '-')} = {int(value) if isinstance(value, bool) else value}\n" for key, value in settings.items())
+    lib.call("gbt_train_with", lib.encode(data), lib.encode(run), lines.encode())
+    return Model(run)
+
+
+def evaluate(run, data=None):
+    """Score the held-out views of a run; RUN/metrics.json and RUN/report.html have the figures."""
+    settings = lib.library.gbt_evaluate_def_default()
+    settings.data = lib.encode(data)
+    lib.call("gbt_evaluate", lib.encode(run), c.byref(settings))
+
+
+def export(path, *outputs, sh_degree=3, refine_steps=300, data=None):
+    """Write a trained model, or plain Gaussians, as plain Gaussians: .ply, .splat, .spz or .glb by the ending of each name."""
+    settings = lib.library.gbt_export_def_default()
+    settings.sh_degree, settings.refine_steps, settings.data = sh_degree, refine_steps, lib.encode(data)
+    names = (c.c_char_p * len(outputs))(*(lib.encode(name) for name in outputs))
+    lib.call("gbt_export", lib.encode(path), c.byref(settings), names, len(outputs), None)
+
+
+def compare(picture, reference):
+    """PSNR, SSIM and FLIP of two pictures, rounded to 8 bit: float32 arrays (height, width, 3), or image files."""
+    out = lib.CComparison()
+    if isinstance(picture, np.ndarray) or isinstance(reference, np.ndarray):
+        if getattr(picture, "ndim", 0) != 3:
+            raise TypeError("picture: wanted two arrays (height, width, 3), or two files")
+        height, width = picture.shape[:2]
+        lib.call("gbt_compare_pictures", lib.address(picture, "picture", (height, width, 3)), lib.address(reference, "reference", (height, width, 3)),
+                 width, height, c.byref(out))
+    else:
+        lib.call("gbt_compare_images", lib.encode(picture), lib.encode(reference), c.byref(out))
+    return Comparison(out.psnr, out.ssim, out.ssim_interior, out.flip)

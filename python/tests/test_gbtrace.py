@@ -1,0 +1,222 @@
+"""The Python package on a small model: GBT_MODEL is a run, GBT_INCLUDE the headers, GBT_SCRATCH a folder to write into."""
+import ctypes
+import os
+import subprocess
+import sys
+import threading
+import unittest
+from pathlib import Path
+
+import gbtrace
+import numpy as np
+from gbtrace import _library
+
+MODEL, SCRATCH = os.environ["GBT_MODEL"], Path(os.environ["GBT_SCRATCH"])
+
+
+def some_gaussians(count=50, degree=2, seed=1):
+    random = np.random.default_rng(seed)
+    return gbtrace.Gaussians(*(a.astype(np.float32) for a in (
+        random.normal(0, 0.5, (count, 3)), random.normal(-1.5, 0.3, (count, 3)), random.normal(0, 1, (count, 4)), random.uniform(0.2, 0.9, count),
+        random.normal(0, 0.3, (count, (degree + 1) ** 2, 3)))))
+
+
+def a_camera(width=40, height=30):
+    return gbtrace.Camera.pinhole(width, height, 50).looking_at((0.3, -0.4, -3), (0, 0, 0))
+
+
+class Structs(unittest.TestCase):
+    def test_every_field_is_where_c_has_it(self):
+        lines = []
+        for name, struct in _library.STRUCTS.items():
+            lines.append(f'printf("%s. %zu\\n", "{name}", sizeof({name}));')
+            lines += [f'printf("%s.%s %zu\\n", "{name}", "{field}", offsetof({name}, {field}));' for field, _ in struct._fields_]
+        headers = "\n".join(f'#include "gbtrace/{h}.h"' for h in ("camera", "evaluate", "export", "model", "status"))
+        source, program = SCRATCH / "layout.c", SCRATCH / "layout"
+        source.write_text(f"#include <stddef.h>\n#include <stdio.h>\n{headers}\nint main(void)\n{{\n" + "\n".join(lines) + "\nreturn 0;\n}\n")
+        subprocess.run(["cc", "-I", os.environ["GBT_INCLUDE"], str(source), "-o", str(program)], check=True)
+        got = []
+        for name, struct in _library.STRUCTS.items():
+            got.append(f"{name}. {ctypes.sizeof(struct)}")
+            got += [f"{name}.{field} {getattr(struct, field).offset}" for field, _ in struct._fields_]
+        self.assertEqual(subprocess.run([str(program)], check=True, capture_output=True, text=True).stdout.split("\n")[:-1], got)
+
+
+class Cameras(unittest.TestCase):
+    def test_arrays_are_views(self):
+        camera = a_camera()
+        camera.center[2] = -5
+        self.assertEqual(camera.center.tolist(), camera._c.center[:])
+        self.assertEqual((camera.model, camera.width, camera.height, camera.params.shape), ("PINHOLE", 40, 30, (4,)))
+
+    def test_moved_and_back(self):
+        camera, motion = a_camera(), np.array([0.1, 0.2, 0.3, 0.1, -0.2, 0.05])
+        moved = camera.moved(motion)
+        np.testing.assert_allclose(moved.center, camera.center + camera.rotation.T @ motion[:3], atol=1e-14)
+        np.testing.assert_allclose(moved.distance(camera)[1], np.linalg.norm(motion[3:]), atol=1e-12)
+        np.testing.assert_allclose(moved.moved([0, 0, 0, *-motion[3:]]).rotation, camera.rotation, atol=1e-14)
+        turned = camera.moved([0, 0, 0, 0, 0.1, 0])  # about down, right-handed: forward turns to the right
+        self.assertGreater(turned.rotation[2] @ camera.rotation[0], 0.09)
+
+    def test_what_is_wrong_is_said(self):
+        with self.assertRaisesRegex(ValueError, "OPENCV_FISHEYE"):
+            gbtrace.Camera("FISHY", 4, 4)
+        with self.assertRaisesRegex(ValueError, "wanted 4 for PINHOLE"):
+            gbtrace.Camera("PINHOLE", 4, 4, (1, 2))
+        with self.assertRaisesRegex(ValueError, "target"):
+            a_camera().looking_at((0, 0, 0), (0, 0, 0))
+
+
+class Trained(unittest.TestCase):
+    def setUp(self):
+        self.model = gbtrace.Model(MODEL)
+
+    def test_info_and_views(self):
+        info, views = self.model.info, self.model.views()
+        self.assertTrue(info.anchors > 0 and info.sh_degree == -1 and info.gaussians >= info.anchors)
+        self.assertTrue(all(low < high for low, high in zip(info.low, info.high)))
+        self.assertTrue(any(v.held_out for v in views) and not all(v.held_out for v in views))
+        self.assertEqual([v.name for v in views], sorted(v.name for v in views))
+
+    def test_arrays_are_written_in_place(self):
+        camera = self.model.views()[0].camera
+        rgb = np.full((camera.height, camera.width, 3), -1, np.float32)
+        depth, clear = np.full(rgb.shape[:2], -1, np.float32), np.full(rgb.shape[:2], -1, np.float32)
+        at = rgb.ctypes.data
+        self.assertIs(self.model.render(camera, rgb, depth, clear), rgb)
+        self.assertEqual(rgb.ctypes.data, at)
+        self.assertEqual(_library.address(rgb, "rgb", rgb.shape), at)
+        self.assertTrue((rgb >= 0).all() and (depth >= 0).all() and (clear >= 0).all() and (clear <= 1).all() and clear.min() < 0.1)
+        np.testing.assert_array_equal(self.model.render(camera), rgb)
+
+    def test_wrong_arrays(self):
+        camera = a_camera()
+        for array, error, says in ((np.zeros((30, 40, 3)), TypeError, "float64"), ([1], TypeError, "list"),
+                                   (np.zeros((40, 30, 3), np.float32), ValueError, r"\(40, 30, 3\) \(wanted \(30, 40, 3\)"),
+                                   (np.zeros((3, 40, 30), np.float32).transpose(2, 1, 0), ValueError, "contiguous")):
+            with self.assertRaisesRegex(error, says):
+                self.model.render(camera, array)
+        frozen = np.zeros((30, 40, 3), np.float32)
+        frozen.flags.writeable = False
+        with self.assertRaisesRegex(ValueError, "read-only"):
+            self.model.render(camera, frozen)
+
+    def test_errors_are_the_library_s_one_line(self):
+        with self.assertRaises(gbtrace.FileError) as caught:
+            gbtrace.Model("/nowhere/model.gbt")
+        self.assertIn("/nowhere/model.gbt", str(caught.exception))
+        self.assertIsInstance(caught.exception, OSError)
+        with self.assertRaisesRegex(ValueError, "keep"):
+            self.model.gradient(np.zeros((30, 40, 3), np.float32))
+        camera = a_camera()
+        picture = self.model.render(camera, keep=True)
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "networks"):
+            self.model.gradient(picture, gaussians=True)
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "finite"):
+            self.model.gradient(picture * np.nan)
+        self.model.gradient(picture)
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "keep"):
+            self.model.gradient(picture)
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "camera"):
+            self.model.render(gbtrace.Camera("PINHOLE", 4, 4, (0, 0, 0, 0)))
+        self.model.close()
+        with self.assertRaisesRegex(ValueError, "closed"):
+            self.model.render(camera)
+
+    def test_settings(self):
+        camera = a_camera(8, 8).looking_at((0, 0, 1e4), (0, 0, 2e4))  # nothing there
+        self.model.settings = self.model.settings._replace(background=(0.25, 0.5, 1))
+        np.testing.assert_array_equal(self.model.render(camera)[0, 0], np.float32((0.25, 0.5, 1)))
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "footprint"):
+            self.model.settings = self.model.settings._replace(footprint=-1)
+
+    def test_models_on_threads(self):
+        camera = self.model.views()[0].camera
+        wanted, got = self.model.render(camera), {}
+
+        def work(key):
+            with gbtrace.Model(MODEL) as model:
+                got[key] = model.render(camera)
+
+        threads = [threading.Thread(target=work, args=(i,)) for i in range(3)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for picture in got.values():
+            np.testing.assert_array_equal(picture, wanted)
+        self.assertEqual(len(got), 3)
+
+
+class Plain(unittest.TestCase):
+    def test_gradients_go_into_arrays(self):
+        g = some_gaussians()
+        model, camera = gbtrace.Model.from_gaussians(*g), a_camera()
+        self.assertEqual((model.info.gaussians, model.info.anchors, model.info.sh_degree), (50, 0, 2))
+        model.render(camera, keep=True)
+        d_rgb = np.random.default_rng(2).normal(0, 1, (30, 40, 3)).astype(np.float32)
+        pose, gradient = model.gradient(d_rgb, gaussians=True)
+        self.assertEqual([a.shape for a in gradient], [a.shape for a in g])
+        self.assertTrue(all(np.isfinite(a).all() and np.abs(a).max() > 0 for a in gradient) and np.abs(pose).min() > 0)
+        np.testing.assert_allclose((gradient.quat * g.quat).sum(1), 0, atol=1e-4)
+        mean = np.full_like(g.mean, 7)
+        model.render(camera, keep=True)
+        again, filled = model.gradient(d_rgb, gbtrace.Gaussians(mean, None, None, None, None))
+        self.assertIs(filled.mean, mean)
+        np.testing.assert_array_equal(mean, gradient.mean)
+        np.testing.assert_array_equal(again, pose)
+
+    def test_descent_brings_the_picture_nearer(self):
+        g, camera = some_gaussians(), a_camera()
+        model = gbtrace.Model.from_gaussians(*g)
+        wanted = gbtrace.Model.from_gaussians(*some_gaussians(seed=1)._replace(opacity=g.opacity * 0.5)).render(camera)
+        losses = []
+        for _ in range(20):
+            difference = model.render(camera, keep=True) - wanted
+            losses.append(float((difference**2).mean()))
+            _, gradient = model.gradient(2 * difference, gaussians=True)
+            g.opacity[:] = np.clip(g.opacity - 0.01 * np.sign(gradient.opacity), 0, 1)
+            model.set_gaussians(*g)
+        self.assertLess(losses[-1], 0.3 * losses[0])
+
+    def test_wrong_gaussians(self):
+        g = some_gaussians()
+        for field, value, error, says in (("mean", g.mean[:7], ValueError, "scale_log: shape"), ("opacity", g.opacity + 2, gbtrace.ArgumentError, "opacity of Gaussian 0"),
+                                          ("quat", g.quat * 0, gbtrace.ArgumentError, "quat of Gaussian 0"), ("sh", g.sh[:, :5], ValueError, "wanted .count, 1, 4, 9 or 16"),
+                                          ("mean", g.mean * np.float32(np.nan), gbtrace.ArgumentError, "mean of Gaussian 0"), ("sh", g.sh.tolist(), ValueError, "sh")):
+            with self.assertRaisesRegex(error, says):
+                gbtrace.Model.from_gaussians(*g._replace(**{field: value}))
+
+
+class Runs(unittest.TestCase):
+    def test_export_and_open_again(self):
+        path = SCRATCH / "plain.ply"
+        gbtrace.export(MODEL, path, refine_steps=0, sh_degree=1)
+        model = gbtrace.Model(path)
+        self.assertEqual((model.info.anchors, model.info.sh_degree), (0, 1))
+        camera = gbtrace.Model(MODEL).views()[0].camera
+        both = gbtrace.compare(model.render(camera), gbtrace.Model(MODEL).render(camera))
+        self.assertGreater(both.psnr, 12)
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "xyz"):
+            gbtrace.export(MODEL, SCRATCH / "scene.xyz")
+
+    def test_compare(self):
+        a = np.random.default_rng(3).uniform(0, 1, (20, 24, 3)).astype(np.float32)
+        self.assertEqual(gbtrace.compare(a, a), (100, 1, 1, 0))
+        self.assertLess(gbtrace.compare(a, np.float32(1) - a).psnr, 10)
+        with self.assertRaisesRegex(ValueError, "reference: shape"):
+            gbtrace.compare(a, a[:10])
+
+    def test_settings_of_training_are_checked(self):
+        with self.assertRaisesRegex(gbtrace.FormatError, "settings:1"):
+            gbtrace.train("/nowhere", SCRATCH / "run", no_such_setting=3)
+        with self.assertRaises(gbtrace.Error):
+            gbtrace.train("/nowhere", SCRATCH / "run", iterations=3)
+
+    def test_train(self):
+        model = gbtrace.train(os.environ["GBT_DATA"], SCRATCH / "run", iterations=3, downscale=2, grow=False)
+        self.assertEqual(model.info.iterations, 3)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=1)

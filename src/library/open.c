@@ -1,0 +1,194 @@
+/* library/open.c -- models from files and arrays, and what can be asked of them. */
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "library/handle.h"
+
+static gbt_status make(gbt_model **out, gbt_error *err)
+{
+    *out = mem_calloc(1, sizeof **out, "model", err);
+    return *out != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+}
+
+/* The result of opening `m`, which is closed when that failed. */
+static gbt_status opened(gbt_model *m, gbt_status status, gbt_model **out)
+{
+    m->run.frame.draw.renderer = FRAME_TRACE;
+    *out = status == GBT_OK ? m : NULL;
+    if (status != GBT_OK)
+        gbt_model_close(m);
+    return status;
+}
+
+gbt_status gbt_model_open(const char *path, gbt_model **out, gbt_error *err)
+{
+    gbt_model *m;
+    *out = NULL;
+    GBT_TRY(make(&m, err));
+    return opened(m, loaded_run_open_model(path, &m->run, err), out);
+}
+
+void gbt_model_close(gbt_model *model)
+{
+    if (model == NULL)
+        return;
+    loaded_run_close(&model->run);
+    mem_free(model->quat_length);
+    gaussian_cloud_free(&model->gradient);
+    mem_free(model->d_mean);
+    mem_free(model);
+}
+
+/* ---- Gaussians of the caller ------------------------------------------------------------------------------------------------- */
+
+typedef struct value_range {
+    const char *name;
+    const float *values;
+    size_t width;
+    float low, high;
+} value_range;
+
+static gbt_status check(const gbt_gaussians *g, gbt_error *err)
+{
+    if (g->count < 1 || g->count > UINT32_MAX)
+        return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: %zu (wanted 1 to 2^32 - 1)", g->count);
+    if (g->sh_degree < 0 || g->sh_degree > 3)
+        return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: sh_degree %d (wanted 0 to 3)", g->sh_degree);
+    const size_t functions = (size_t)((g->sh_degree + 1) * (g->sh_degree + 1));
+    const float far = 1e17f, large = 1e18f, log_limit = GAUSSIAN_SCALE_LOG_LIMIT;
+    const value_range ranges[] = {{"mean", g->mean, 3, -far, far}, {"scale_log", g->scale_log, 3, -log_limit, log_limit}, {"quat", g->quat, 4, -large, large},
+                                  {"opacity", g->opacity, 1, 0, 1}, {"sh", g->sh, 3 * functions, -large, large}};
+    for (size_t k = 0; k < sizeof ranges / sizeof *ranges; k++) {
+        const value_range *r = &ranges[k];
+        if (r->values == NULL)
+            return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: %s is NULL", r->name);
+        for (size_t i = 0; i < g->count * r->width; i++)
+            if (!(r->values[i] >= r->low && r->values[i] <= r->high))
+                return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: %s of Gaussian %zu is %g (wanted %g to %g)", r->name, i / r->width,
+                                 (double)r->values[i], (double)r->low, (double)r->high);
+    }
+    return GBT_OK;
+}
+
+/* Copies, in the form that files are read into; and the lengths of the quaternions. */
+static gbt_status copy(const gbt_gaussians *g, gaussian_cloud *cloud, float *quat_length, gbt_error *err)
+{
+    const size_t width = 3 * (size_t)((g->sh_degree + 1) * (g->sh_degree + 1));
+    cloud->sh_degree = g->sh_degree;
+    memcpy(cloud->mean, g->mean, 3 * g->count * sizeof *g->mean);
+    memcpy(cloud->scale_log, g->scale_log, 3 * g->count * sizeof *g->scale_log);
+    memcpy(cloud->opacity, g->opacity, g->count * sizeof *g->opacity);
+    memset(cloud->sh, 0, g->count * GAUSSIAN_SH_COUNT * 3 * sizeof *cloud->sh);
+    for (size_t i = 0; i < g->count; i++) {
+        const float *q = g->quat + 4 * i;
+        double square = 0;
+        for (int k = 0; k < 4; k++)
+            square += (double)q[k] * (double)q[k];
+        const double length = sqrt(square);
+        if (!(length >= 1e-18))
+            return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: quat of Gaussian %zu has length %g (wanted > 0)", i, length);
+        quat_length[i] = (float)length;
+        for (size_t k = 0; k < 4; k++)
+            cloud->quat[4 * i + k] = (float)((double)q[k] / length);
+        memcpy(cloud->sh + i * GAUSSIAN_SH_COUNT * 3, g->sh + i * width, width * sizeof *g->sh);
+        gaussian_limit_scales(cloud->scale_log + 3 * i);
+    }
+    return GBT_OK;
+}
+
+gbt_status gbt_model_set_gaussians(gbt_model *model, const gbt_gaussians *gaussians, gbt_error *err)
+{
+    if (model->run.cloud.count == 0 && model->run.model.anchors.count > 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "model: networks make its Gaussians (wanted a model of plain ones)");
+    GBT_TRY(check(gaussians, err));
+    gaussian_cloud cloud = {0};
+    GBT_TRY(gaussian_cloud_alloc(&cloud, gaussians->count, err));
+    float *quat_length = mem_alloc(gaussians->count, sizeof *quat_length, "quaternions", err);
+    const gbt_status status = quat_length == NULL ? GBT_ERR_NO_MEMORY : copy(gaussians, &cloud, quat_length, err);
+    if (status != GBT_OK) {
+        gaussian_cloud_free(&cloud);
+        mem_free(quat_length);
+        return status;
+    }
+    loaded_run_take_cloud(&model->run, &cloud);
+    mem_free(model->quat_length);
+    model->quat_length = quat_length;
+    model->kept = false;
+    return GBT_OK;
+}
+
+gbt_status gbt_model_from_gaussians(const gbt_gaussians *gaussians, gbt_model **out, gbt_error *err)
+{
+    gbt_model *m;
+    *out = NULL;
+    GBT_TRY(make(&m, err));
+    loaded_run_draw_plain(&m->run);
+    return opened(m, gbt_model_set_gaussians(m, gaussians, err), out);
+}
+
+/* ---- questions --------------------------------------------------------------------------------------------------------------- */
+
+gbt_model_info gbt_model_get_info(const gbt_model *model)
+{
+    const loaded_run *r = &model->run;
+    const anchors *a = &r->model.anchors;
+    const bool plain = r->cloud.count > 0;
+    const size_t count = plain ? r->cloud.count : a->count;
+    const float *position = plain ? r->cloud.mean : a->position;
+    gbt_model_info info = {.gaussians = plain ? count : count * (size_t)a->offset_count, .anchors = plain ? 0 : count,
+                           .sh_degree = plain ? r->cloud.sh_degree : -1, .iterations = r->model.iterations};
+    for (int k = 0; k < 3 && count > 0; k++)
+        info.low[k] = HUGE_VAL, info.high[k] = -HUGE_VAL;
+    for (size_t i = 0; i < 3 * count; i++) {
+        const double world = (double)position[i] + r->model.origin[i % 3];
+        info.low[i % 3] = fmin(info.low[i % 3], world), info.high[i % 3] = fmax(info.high[i % 3], world);
+    }
+    return info;
+}
+
+gbt_model_settings gbt_model_get_settings(const gbt_model *model)
+{
+    const trace_settings *s = &model->run.settings;
+    return (gbt_model_settings){.background = {s->background[0], s->background[1], s->background[2]}, .footprint = model->run.frame.draw.footprint,
+                                .t_near = s->t_near, .alpha_min = s->alpha_min, .alpha_max = s->alpha_max, .transmittance_min = s->transmittance_min};
+}
+
+gbt_status gbt_model_set_settings(gbt_model *model, const gbt_model_settings *settings, gbt_error *err)
+{
+    const gbt_model_settings *g = settings;
+    const bool fine = isfinite(g->background[0]) && isfinite(g->background[1]) && isfinite(g->background[2]) && g->footprint >= 0 && g->footprint <= 4 &&
+                      g->t_near >= 0 && g->t_near < 1e17f && g->alpha_min > 0 && g->alpha_min < 1 && g->alpha_max > 0 && g->alpha_max < 1 &&
+                      g->transmittance_min > 0 && g->transmittance_min < 1;
+    if (!fine)
+        return base_fail(err, GBT_ERR_ARGUMENT, "settings: background %g %g %g, footprint %g, t_near %g, alpha %g to %g, transmittance_min %g (wanted finite, "
+                         "0 to 4, >= 0, and the rest in (0, 1))", (double)g->background[0], (double)g->background[1], (double)g->background[2],
+                         (double)g->footprint, (double)g->t_near, (double)g->alpha_min, (double)g->alpha_max, (double)g->transmittance_min);
+    trace_settings *s = &model->run.settings;
+    memcpy(s->background, g->background, sizeof s->background);
+    s->t_near = g->t_near, s->alpha_min = g->alpha_min, s->alpha_max = g->alpha_max, s->transmittance_min = g->transmittance_min;
+    model->run.frame.draw.footprint = g->footprint;
+    model->kept = false;
+    return GBT_OK;
+}
+
+gbt_status gbt_model_open_views(gbt_model *model, const char *data, size_t *count, gbt_error *err)
+{
+    *count = 0;
+    loaded_run_close_views(&model->run);
+    GBT_TRY(loaded_run_open_views("model", data, 0, &model->run, err));
+    *count = model->run.scene.view_count;
+    return GBT_OK;
+}
+
+gbt_status gbt_model_get_view(const gbt_model *model, size_t index, gbt_model_view *out, gbt_error *err)
+{
+    const loaded_run *r = &model->run;
+    if (r->photos.source == NULL || index >= r->scene.view_count)
+        return base_fail(err, GBT_ERR_ARGUMENT, "view %zu: there are %zu open", index, r->photos.source == NULL ? 0 : r->scene.view_count);
+    *out = (gbt_model_view){.name = r->scene.views[index].name, .held_out = r->scene.views[index].is_test, .camera = photos_camera(&r->photos, index, 0)};
+    for (int k = 0; k < 3; k++)
+        out->camera.center[k] += r->model.origin[k];
+    return GBT_OK;
+}

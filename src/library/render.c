@@ -1,0 +1,103 @@
+/* library/render.c -- pictures into the caller's arrays, and gradients out of them. */
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "frame/plain.h"
+#include "library/handle.h"
+#include "trace/pose_gradient.h"
+
+gbt_status gbt_model_render(gbt_model *model, const gbt_camera *camera, int keep, const gbt_picture *out, gbt_error *err)
+{
+    loaded_run *r = &model->run;
+    frame *f = &r->frame;
+    model->kept = false;
+    if (out->rgb == NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT, "picture: rgb is NULL");
+    gbt_camera local = *camera;
+    for (int k = 0; k < 3; k++)
+        local.center[k] -= r->model.origin[k];
+    /* The frame draws into the caller's array, which is taken back from it whatever happens: it would be freed as the frame's own. */
+    image_free(&f->rgb);
+    f->rgb = (image){.width = camera->width, .height = camera->height, .channels = 3, .pixels = out->rgb};
+    f->draw.depth = out->depth, f->draw.transmittance = out->transmittance;
+    const gbt_status status = frame_render(f, loaded_run_subject(r), &local, &r->settings, keep != 0, err);
+    f->rgb = (image){0};
+    f->draw.depth = f->draw.transmittance = NULL;
+    model->kept = status == GBT_OK && keep != 0;
+    return status;
+}
+
+/* Room for the gradients of the cloud. */
+static gbt_status reserve_gradient(gbt_model *model, gbt_error *err)
+{
+    const size_t count = model->run.cloud.count;
+    if (model->gradient.count == count)
+        return GBT_OK;
+    gaussian_cloud_free(&model->gradient);
+    mem_free(model->d_mean);
+    model->d_mean = mem_alloc(count, 3 * sizeof *model->d_mean, "gradient", err);
+    return model->d_mean == NULL ? GBT_ERR_NO_MEMORY : gaussian_cloud_alloc(&model->gradient, count, err);
+}
+
+static void hand_out(const float *from, size_t count, float *to)
+{
+    if (to != NULL)
+        memcpy(to, from, count * sizeof *to);
+}
+
+/* f->d_gaussians to the arrays of the caller. */
+static gbt_status plain_gradient(gbt_model *model, const gbt_gaussians_gradient *out, gbt_error *err)
+{
+    const gaussian_cloud *cloud = &model->run.cloud;
+    gaussian_cloud *g = &model->gradient;
+    const frame *f = &model->run.frame;
+    const size_t n = cloud->count, width = 3 * (size_t)((cloud->sh_degree + 1) * (cloud->sh_degree + 1));
+    GBT_TRY(reserve_gradient(model, err));
+    double d_eye[3];
+    plain_backward(cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, g);
+    GBT_TRY(plain_backward_view(cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, model->d_mean, d_eye, err));
+    for (size_t i = 0; i < n && model->quat_length != NULL; i++)
+        for (size_t k = 0; k < 4; k++)
+            g->quat[4 * i + k] /= model->quat_length[i];
+    hand_out(model->d_mean, 3 * n, out->mean);
+    hand_out(g->scale_log, 3 * n, out->scale_log);
+    hand_out(g->quat, 4 * n, out->quat);
+    hand_out(g->opacity, n, out->opacity);
+    for (size_t i = 0; i < n && out->sh != NULL; i++)
+        hand_out(g->sh + i * GAUSSIAN_SH_COUNT * 3, width, out->sh + i * width);
+    return GBT_OK;
+}
+
+static gbt_status camera_gradient(gbt_model *model, double d_pose[6], gbt_error *err)
+{
+    loaded_run *r = &model->run;
+    frame *f = &r->frame;
+    double d_eye[3];
+    if (r->cloud.count > 0)
+        GBT_TRY(plain_backward_view(&r->cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, NULL, d_eye, err));
+    else
+        GBT_TRY(decode_backward_camera(&r->model.anchors, &r->model.decoder, f->eye, &f->tape, &f->d_gaussians, d_eye, err));
+    const double eye[3] = {(double)f->eye[0], (double)f->eye[1], (double)f->eye[2]};
+    return pose_gradient(&f->gaussians, &f->d_gaussians, &f->camera, eye, d_eye, d_pose, err);
+}
+
+gbt_status gbt_model_gradient(gbt_model *model, const float *d_rgb, double d_pose[6], const gbt_gaussians_gradient *d_gaussians, gbt_error *err)
+{
+    frame *f = &model->run.frame;
+    if (!model->kept)
+        return base_fail(err, GBT_ERR_ARGUMENT, "gradient: there is no render to differentiate (wanted gbt_model_render() with keep before each)");
+    if (d_gaussians != NULL && model->run.cloud.count == 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "gradient: networks make this model's Gaussians (wanted a model of plain ones)");
+    const size_t values = 3 * ray_image_count(&f->rays);
+    for (size_t i = 0; i < values; i++)
+        if (!isfinite(d_rgb[i]))
+            return base_fail(err, GBT_ERR_ARGUMENT, "gradient: value %zu of d_rgb is %g (wanted finite)", i, (double)d_rgb[i]);
+    model->kept = false;
+    const image d_image = {.width = f->rays.width, .height = f->rays.height, .channels = 3, .pixels = (float *)d_rgb}; /* only read */
+    GBT_TRY(frame_backward_gaussians(f, &d_image, err));
+    if (d_pose != NULL)
+        GBT_TRY(camera_gradient(model, d_pose, err));
+    return d_gaussians != NULL ? plain_gradient(model, d_gaussians, err) : GBT_OK;
+}

@@ -1,0 +1,32 @@
+#!/bin/sh
+# tests/package/test_deb.sh -- makes the Debian package and looks into it. Usage: test_deb.sh SOURCE BUILD. Needs cpack, dpkg-deb, dpkg-shlibdeps.
+set -u
+source=$1
+build=$2
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+. "$source/tests/package/checks.sh"
+for tool in dpkg-deb dpkg-shlibdeps; do
+    command -v "$tool" >/dev/null 2>&1 || give_up "$tool is not there (Debian: dpkg-dev)"
+done
+
+check "cpack" cpack -G DEB --config "$build/CPackConfig.cmake" -B "$work"
+deb=$(find "$work" -maxdepth 1 -name '*.deb')
+dpkg-deb -c "$deb" >"$work/contents"
+has() { awk -v wanted="$1" '$6 ~ "^\\./usr/" wanted "$" { found = 1 } END { exit !found }' "$work/contents"; }
+check "the program" has bin/gbtrace
+check "the library by its version" has 'lib/.*libgbtrace\.so\.[0-9.]+'
+check "the library by its name" has 'lib/.*libgbtrace\.so'
+check "the static library" has 'lib/.*libgbtrace\.a'
+check "headers" has include/gbtrace/model.h
+check "pkg-config" has 'lib/.*pkgconfig/gbtrace\.pc'
+check "CMake" has 'lib/.*cmake/gbtrace/gbtraceConfig\.cmake'
+check "documents" has share/doc/gbtrace/README.md
+check "files belong to root, nobody else may write" awk '$2 != "root/root" || substr($1, 9, 1) == "w" { print; bad = 1 } END { exit bad }' "$work/contents"
+check "nothing from this machine's folders" sh -c "! grep -v ' \./usr/' '$work/contents' | grep -q ' \./.*[^/]$'"
+dpkg-deb -I "$deb" >"$work/info"
+for wanted in libc6 libstdc++6 libembree libtbb12 libopenimageio libjansson4 zlib1g libflann; do
+    check "depends on $wanted" grep -q "^ Depends:.*$wanted" "$work/info"
+done
+check "ldconfig is asked for" sh -c "dpkg-deb --ctrl-tarfile '$deb' | tar -xO ./triggers | grep -q ldconfig"
+report "$work/info" "$work/contents"

@@ -36,14 +36,17 @@ endif()
 # One package: program, library, headers, documents. What it depends on is read from the binaries.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME gbtrace)
-set(CPACK_PACKAGE_CONTACT "gbtrace developers")
-set(CPACK_PACKAGE_DESCRIPTION "gbtrace turns posed photos into scenes that can be seen from anywhere: granular balls become anchors, anchors decode into Gaussians, rays through\
- a tree of their ellipsoids make the picture and carry gradients back. No GPU is needed. The package holds the program, the library and its headers.")
+set(CPACK_PACKAGE_CONTACT "gbtrace developers" CACHE STRING "who answers for the package: Name <mail>")
+set(CPACK_PACKAGE_DESCRIPTION "gbtrace turns posed photos into scenes that can be seen from anywhere:
+granular balls become anchors, anchors decode into Gaussians, rays through
+a tree of their ellipsoids make the picture and carry gradients back.
+No GPU is needed. Program, library and headers.")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+file(WRITE ${CMAKE_BINARY_DIR}/debian/triggers "activate-noawait ldconfig\n")
+set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/triggers)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 include(CPack)

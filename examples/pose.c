@@ -6,7 +6,7 @@
 
 #include <gbtrace/model.h>
 
-enum { STEPS = 80 };
+enum { STEPS = 200 };
 
 /* How far apart two cameras are: distance of their centres, and the angle between them in degrees. */
 static double angle_between(const gbt_camera *a, const gbt_camera *b)
@@ -27,9 +27,9 @@ static void adam_step(const double gradient[6], int step, double rate, double fi
 {
     double motion[6];
     for (int k = 0; k < 6; k++) {
-        first[k] = 0.8 * first[k] + 0.2 * gradient[k];
+        first[k] = 0.9 * first[k] + 0.1 * gradient[k];
         second[k] = 0.95 * second[k] + 0.05 * gradient[k] * gradient[k];
-        const double mean = first[k] / (1 - pow(0.8, step)), size = sqrt(second[k] / (1 - pow(0.95, step)));
+        const double mean = first[k] / (1 - pow(0.9, step)), size = sqrt(second[k] / (1 - pow(0.95, step)));
         motion[k] = size > 0 ? -rate * mean / size : 0;
     }
     *camera = gbt_camera_moved(camera, motion);

@@ -50,15 +50,15 @@ typedef struct gbt_gaussians {
  *
  * The arrays are copied. Quaternions are normalised; a scale below 1e-4 of its Gaussian's largest is raised to that.
  *
- * @param gaussians [in]  borrowed for the call; every value finite
+ * @param g   [in]  borrowed for the call; every value finite
  * @param out       [out] free with gbt_model_close(); NULL on failure
  * @param err       [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT (names the first value that is not usable), GBT_ERR_NO_MEMORY
  */
-gbt_status gbt_model_from_gaussians(const gbt_gaussians *gaussians, gbt_model **out, gbt_error *err);
+gbt_status gbt_model_from_gaussians(const gbt_gaussians *g, gbt_model **out, gbt_error *err);
 
 /** Give a model of plain Gaussians other ones, as many as you like; settings stay. As gbt_model_from_gaussians(); on failure nothing changes. */
-gbt_status gbt_model_set_gaussians(gbt_model *model, const gbt_gaussians *gaussians, gbt_error *err);
+gbt_status gbt_model_set_gaussians(gbt_model *model, const gbt_gaussians *g, gbt_error *err);
 
 /** NULL is fine. */
 void gbt_model_close(gbt_model *model);

@@ -2,6 +2,8 @@
 #ifndef GBT_FRAME_PLAIN_VIEW_H
 #define GBT_FRAME_PLAIN_VIEW_H
 
+#include <stdint.h>
+
 #include "base/gaussians.h"
 #include "data/gaussian_cloud.h"
 

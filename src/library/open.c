@@ -30,15 +30,15 @@ gbt_status gbt_model_open(const char *path, gbt_model **out, gbt_error *err)
     return opened(m, loaded_run_open_model(path, &m->run, err), out);
 }
 
-void gbt_model_close(gbt_model *model)
+void gbt_model_close(gbt_model *m)
 {
-    if (model == NULL)
+    if (m == NULL)
         return;
-    loaded_run_close(&model->run);
-    mem_free(model->quat_length);
-    gaussian_cloud_free(&model->gradient);
-    mem_free(model->d_mean);
-    mem_free(model);
+    loaded_run_close(&m->run);
+    mem_free(m->quat_length);
+    gaussian_cloud_free(&m->gradient);
+    mem_free(m->d_mean);
+    mem_free(m);
 }
 
 /* ---- Gaussians of the caller ------------------------------------------------------------------------------------------------- */
@@ -98,41 +98,41 @@ static gbt_status copy(const gbt_gaussians *g, gaussian_cloud *cloud, float *qua
     return GBT_OK;
 }
 
-gbt_status gbt_model_set_gaussians(gbt_model *model, const gbt_gaussians *gaussians, gbt_error *err)
+gbt_status gbt_model_set_gaussians(gbt_model *m, const gbt_gaussians *g, gbt_error *err)
 {
-    if (model->run.cloud.count == 0 && model->run.model.anchors.count > 0)
+    if (m->run.cloud.count == 0 && m->run.model.anchors.count > 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "model: networks make its Gaussians (wanted a model of plain ones)");
-    GBT_TRY(check(gaussians, err));
+    GBT_TRY(check(g, err));
     gaussian_cloud cloud = {0};
-    GBT_TRY(gaussian_cloud_alloc(&cloud, gaussians->count, err));
-    float *quat_length = mem_alloc(gaussians->count, sizeof *quat_length, "quaternions", err);
-    const gbt_status status = quat_length == NULL ? GBT_ERR_NO_MEMORY : copy(gaussians, &cloud, quat_length, err);
+    GBT_TRY(gaussian_cloud_alloc(&cloud, g->count, err));
+    float *quat_length = mem_alloc(g->count, sizeof *quat_length, "quaternions", err);
+    const gbt_status status = quat_length == NULL ? GBT_ERR_NO_MEMORY : copy(g, &cloud, quat_length, err);
     if (status != GBT_OK) {
         gaussian_cloud_free(&cloud);
         mem_free(quat_length);
         return status;
     }
-    loaded_run_take_cloud(&model->run, &cloud);
-    mem_free(model->quat_length);
-    model->quat_length = quat_length;
-    model->kept = false;
+    loaded_run_take_cloud(&m->run, &cloud);
+    mem_free(m->quat_length);
+    m->quat_length = quat_length;
+    m->kept = false;
     return GBT_OK;
 }
 
-gbt_status gbt_model_from_gaussians(const gbt_gaussians *gaussians, gbt_model **out, gbt_error *err)
+gbt_status gbt_model_from_gaussians(const gbt_gaussians *g, gbt_model **out, gbt_error *err)
 {
     gbt_model *m;
     *out = NULL;
     GBT_TRY(make(&m, err));
     loaded_run_draw_plain(&m->run);
-    return opened(m, gbt_model_set_gaussians(m, gaussians, err), out);
+    return opened(m, gbt_model_set_gaussians(m, g, err), out);
 }
 
 /* ---- questions --------------------------------------------------------------------------------------------------------------- */
 
-gbt_model_info gbt_model_get_info(const gbt_model *model)
+gbt_model_info gbt_model_get_info(const gbt_model *m)
 {
-    const loaded_run *r = &model->run;
+    const loaded_run *r = &m->run;
     const anchors *a = &r->model.anchors;
     const bool plain = r->cloud.count > 0;
     const size_t count = plain ? r->cloud.count : a->count;
@@ -148,14 +148,14 @@ gbt_model_info gbt_model_get_info(const gbt_model *model)
     return info;
 }
 
-gbt_model_settings gbt_model_get_settings(const gbt_model *model)
+gbt_model_settings gbt_model_get_settings(const gbt_model *m)
 {
-    const trace_settings *s = &model->run.settings;
-    return (gbt_model_settings){.background = {s->background[0], s->background[1], s->background[2]}, .footprint = model->run.frame.draw.footprint,
+    const trace_settings *s = &m->run.settings;
+    return (gbt_model_settings){.background = {s->background[0], s->background[1], s->background[2]}, .footprint = m->run.frame.draw.footprint,
                                 .t_near = s->t_near, .alpha_min = s->alpha_min, .alpha_max = s->alpha_max, .transmittance_min = s->transmittance_min};
 }
 
-gbt_status gbt_model_set_settings(gbt_model *model, const gbt_model_settings *settings, gbt_error *err)
+gbt_status gbt_model_set_settings(gbt_model *m, const gbt_model_settings *settings, gbt_error *err)
 {
     const gbt_model_settings *g = settings;
     const bool fine = isfinite(g->background[0]) && isfinite(g->background[1]) && isfinite(g->background[2]) && g->footprint >= 0 && g->footprint <= 4 &&
@@ -165,26 +165,26 @@ gbt_status gbt_model_set_settings(gbt_model *model, const gbt_model_settings *se
         return base_fail(err, GBT_ERR_ARGUMENT, "settings: background %g %g %g, footprint %g, t_near %g, alpha %g to %g, transmittance_min %g (wanted finite, "
                          "0 to 4, >= 0, and the rest in (0, 1))", (double)g->background[0], (double)g->background[1], (double)g->background[2],
                          (double)g->footprint, (double)g->t_near, (double)g->alpha_min, (double)g->alpha_max, (double)g->transmittance_min);
-    trace_settings *s = &model->run.settings;
+    trace_settings *s = &m->run.settings;
     memcpy(s->background, g->background, sizeof s->background);
     s->t_near = g->t_near, s->alpha_min = g->alpha_min, s->alpha_max = g->alpha_max, s->transmittance_min = g->transmittance_min;
-    model->run.frame.draw.footprint = g->footprint;
-    model->kept = false;
+    m->run.frame.draw.footprint = g->footprint;
+    m->kept = false;
     return GBT_OK;
 }
 
-gbt_status gbt_model_open_views(gbt_model *model, const char *data, size_t *count, gbt_error *err)
+gbt_status gbt_model_open_views(gbt_model *m, const char *data, size_t *count, gbt_error *err)
 {
     *count = 0;
-    loaded_run_close_views(&model->run);
-    GBT_TRY(loaded_run_open_views("model", data, 0, &model->run, err));
-    *count = model->run.scene.view_count;
+    loaded_run_close_views(&m->run);
+    GBT_TRY(loaded_run_open_views("model", data, 0, &m->run, err));
+    *count = m->run.scene.view_count;
     return GBT_OK;
 }
 
-gbt_status gbt_model_get_view(const gbt_model *model, size_t index, gbt_model_view *out, gbt_error *err)
+gbt_status gbt_model_get_view(const gbt_model *m, size_t index, gbt_model_view *out, gbt_error *err)
 {
-    const loaded_run *r = &model->run;
+    const loaded_run *r = &m->run;
     if (r->photos.source == NULL || index >= r->scene.view_count)
         return base_fail(err, GBT_ERR_ARGUMENT, "view %zu: there are %zu open", index, r->photos.source == NULL ? 0 : r->scene.view_count);
     *out = (gbt_model_view){.name = r->scene.views[index].name, .held_out = r->scene.views[index].is_test, .camera = photos_camera(&r->photos, index, 0)};

@@ -5,14 +5,15 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "frame/plain.h"
+#include "frame/plain_view.h"
 #include "library/handle.h"
 #include "trace/pose_gradient.h"
 
-gbt_status gbt_model_render(gbt_model *model, const gbt_camera *camera, int keep, const gbt_picture *out, gbt_error *err)
+gbt_status gbt_model_render(gbt_model *m, const gbt_camera *camera, int keep, const gbt_picture *out, gbt_error *err)
 {
-    loaded_run *r = &model->run;
+    loaded_run *r = &m->run;
     frame *f = &r->frame;
-    model->kept = false;
+    m->kept = false;
     if (out->rgb == NULL)
         return base_fail(err, GBT_ERR_ARGUMENT, "picture: rgb is NULL");
     gbt_camera local = *camera;
@@ -25,20 +26,20 @@ gbt_status gbt_model_render(gbt_model *model, const gbt_camera *camera, int keep
     const gbt_status status = frame_render(f, loaded_run_subject(r), &local, &r->settings, keep != 0, err);
     f->rgb = (image){0};
     f->draw.depth = f->draw.transmittance = NULL;
-    model->kept = status == GBT_OK && keep != 0;
+    m->kept = status == GBT_OK && keep != 0;
     return status;
 }
 
 /* Room for the gradients of the cloud. */
-static gbt_status reserve_gradient(gbt_model *model, gbt_error *err)
+static gbt_status reserve_gradient(gbt_model *m, gbt_error *err)
 {
-    const size_t count = model->run.cloud.count;
-    if (model->gradient.count == count)
+    const size_t count = m->run.cloud.count;
+    if (m->gradient.count == count)
         return GBT_OK;
-    gaussian_cloud_free(&model->gradient);
-    mem_free(model->d_mean);
-    model->d_mean = mem_alloc(count, 3 * sizeof *model->d_mean, "gradient", err);
-    return model->d_mean == NULL ? GBT_ERR_NO_MEMORY : gaussian_cloud_alloc(&model->gradient, count, err);
+    gaussian_cloud_free(&m->gradient);
+    mem_free(m->d_mean);
+    m->d_mean = mem_alloc(count, 3 * sizeof *m->d_mean, "gradient", err);
+    return m->d_mean == NULL ? GBT_ERR_NO_MEMORY : gaussian_cloud_alloc(&m->gradient, count, err);
 }
 
 static void hand_out(const float *from, size_t count, float *to)
@@ -48,20 +49,20 @@ static void hand_out(const float *from, size_t count, float *to)
 }
 
 /* f->d_gaussians to the arrays of the caller. */
-static gbt_status plain_gradient(gbt_model *model, const gbt_gaussians_gradient *out, gbt_error *err)
+static gbt_status plain_gradient(gbt_model *m, const gbt_gaussians_gradient *out, gbt_error *err)
 {
-    const gaussian_cloud *cloud = &model->run.cloud;
-    gaussian_cloud *g = &model->gradient;
-    const frame *f = &model->run.frame;
+    const gaussian_cloud *cloud = &m->run.cloud;
+    gaussian_cloud *g = &m->gradient;
+    const frame *f = &m->run.frame;
     const size_t n = cloud->count, width = 3 * (size_t)((cloud->sh_degree + 1) * (cloud->sh_degree + 1));
-    GBT_TRY(reserve_gradient(model, err));
+    GBT_TRY(reserve_gradient(m, err));
     double d_eye[3];
     plain_backward(cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, g);
-    GBT_TRY(plain_backward_view(cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, model->d_mean, d_eye, err));
-    for (size_t i = 0; i < n && model->quat_length != NULL; i++)
+    GBT_TRY(plain_backward_view(cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, m->d_mean, d_eye, err));
+    for (size_t i = 0; i < n && m->quat_length != NULL; i++)
         for (size_t k = 0; k < 4; k++)
-            g->quat[4 * i + k] /= model->quat_length[i];
-    hand_out(model->d_mean, 3 * n, out->mean);
+            g->quat[4 * i + k] /= m->quat_length[i];
+    hand_out(m->d_mean, 3 * n, out->mean);
     hand_out(g->scale_log, 3 * n, out->scale_log);
     hand_out(g->quat, 4 * n, out->quat);
     hand_out(g->opacity, n, out->opacity);
@@ -70,9 +71,9 @@ static gbt_status plain_gradient(gbt_model *model, const gbt_gaussians_gradient 
     return GBT_OK;
 }
 
-static gbt_status camera_gradient(gbt_model *model, double d_pose[6], gbt_error *err)
+static gbt_status camera_gradient(gbt_model *m, double d_pose[6], gbt_error *err)
 {
-    loaded_run *r = &model->run;
+    loaded_run *r = &m->run;
     frame *f = &r->frame;
     double d_eye[3];
     if (r->cloud.count > 0)
@@ -83,21 +84,21 @@ static gbt_status camera_gradient(gbt_model *model, double d_pose[6], gbt_error 
     return pose_gradient(&f->gaussians, &f->d_gaussians, &f->camera, eye, d_eye, d_pose, err);
 }
 
-gbt_status gbt_model_gradient(gbt_model *model, const float *d_rgb, double d_pose[6], const gbt_gaussians_gradient *d_gaussians, gbt_error *err)
+gbt_status gbt_model_gradient(gbt_model *m, const float *d_rgb, double d_pose[6], const gbt_gaussians_gradient *d_gaussians, gbt_error *err)
 {
-    frame *f = &model->run.frame;
-    if (!model->kept)
+    frame *f = &m->run.frame;
+    if (!m->kept)
         return base_fail(err, GBT_ERR_ARGUMENT, "gradient: there is no render to differentiate (wanted gbt_model_render() with keep before each)");
-    if (d_gaussians != NULL && model->run.cloud.count == 0)
+    if (d_gaussians != NULL && m->run.cloud.count == 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "gradient: networks make this model's Gaussians (wanted a model of plain ones)");
     const size_t values = 3 * ray_image_count(&f->rays);
     for (size_t i = 0; i < values; i++)
         if (!isfinite(d_rgb[i]))
             return base_fail(err, GBT_ERR_ARGUMENT, "gradient: value %zu of d_rgb is %g (wanted finite)", i, (double)d_rgb[i]);
-    model->kept = false;
+    m->kept = false;
     const image d_image = {.width = f->rays.width, .height = f->rays.height, .channels = 3, .pixels = (float *)d_rgb}; /* only read */
     GBT_TRY(frame_backward_gaussians(f, &d_image, err));
     if (d_pose != NULL)
-        GBT_TRY(camera_gradient(model, d_pose, err));
-    return d_gaussians != NULL ? plain_gradient(model, d_gaussians, err) : GBT_OK;
+        GBT_TRY(camera_gradient(m, d_pose, err));
+    return d_gaussians != NULL ? plain_gradient(m, d_gaussians, err) : GBT_OK;
 }

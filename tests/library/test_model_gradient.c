@@ -24,7 +24,7 @@ typedef struct camera_case {
 
 static const camera_case cameras[] = {
     {"PINHOLE", GBT_CAMERA_PINHOLE, {20, 21, 11, 7}, 4},
-    {"PINHOLE, inside", GBT_CAMERA_PINHOLE, {14, 14, 11.5, 7}, 0.5},
+    {"PINHOLE, inside", GBT_CAMERA_PINHOLE, {14, 14, 11.5, 7}, 0.6}, /* at 0.5 a cut lies within the step of the differences */
     {"OPENCV", GBT_CAMERA_OPENCV, {18, 18, 11, 7.5, -0.12, 0.03, 0.01, -0.02}, 4},
     {"OPENCV_FISHEYE", GBT_CAMERA_OPENCV_FISHEYE, {9, 9, 11, 7.5, 0.02, -0.01, 0.003, 0}, 2},
     {"EQUIRECTANGULAR", GBT_CAMERA_EQUIRECTANGULAR, {W, H}, 1},
@@ -200,9 +200,9 @@ static void pose_agrees_with_differences(void **state)
         error += (got[k] - wanted[k]) * (got[k] - wanted[k]), size += wanted[k] * wanted[k];
     }
     print_message("| %s | %.1e | %.3g | %.1e |\n", c->name, picture, sqrt(size), sqrt(error / size));
-    if (!(picture < 2e-4))
+    if (!(picture < 3e-6))
         fail_msg("the pictures differ by %g", picture);
-    if (!(sqrt(error / size) < 2e-4) || !(size > 1e-3))
+    if (!(sqrt(error / size) < 3e-5) || !(size > 1e-3))
         fail_msg("got %g %g %g  %g %g %g, wanted %g %g %g  %g %g %g", got[0], got[1], got[2], got[3], got[4], got[5], wanted[0], wanted[1], wanted[2], wanted[3],
                  wanted[4], wanted[5]);
     free_world(&w);
@@ -241,7 +241,7 @@ static void gaussians_agree_with_differences(void **state)
                 size += (double)got[class][i] * (double)got[class][i];
             }
             const double wanted = (losses[0] - losses[1]) / (2 * motion_step);
-            if (!(fabs(along - wanted) < 3e-4 * sqrt(size)) || !(size > 1e-6))
+            if (!(fabs(along - wanted) < 3e-5 * sqrt(size)) || !(size > 1e-6))
                 fail_msg("%s along direction %d: %g, not %g (gradient of size %g)", class_names[class], (int)attempt, along, wanted, sqrt(size));
         }
     for (int k = 0; k < 5; k++)

@@ -62,5 +62,5 @@ check "the picture has its size" test "$(head -c 9 "$work/view.ppm" | tr '\n' ' 
 check "the static one draws the same" sh -c "'$work/render_static' '$work/run' '$work/other.ppm' 1 && cmp '$work/view.ppm' '$work/other.ppm'"
 check "example render says what is missing" sh -c "! '$work/render' '$work/none' '$work/x.ppm' 2>'$work/said' && grep -q '^error: .*none' '$work/said'"
 check "example pose" sh -c "'$work/pose' '$work/run' >'$work/pose.txt'"
-check "the pose is found" awk '/^before/ { d = $2; a = $5 } /^after/ { ok = $2 < 0.1 * d && $5 < 0.1 * a } END { exit !ok }' "$work/pose.txt"
+check "the pose is found" awk '/^before/ { d = $2; a = $5 } /^after/ { ok = $2 < 0.01 * d && $5 < 0.01 * a } END { exit !ok }' "$work/pose.txt"
 report "$work/pose.txt"

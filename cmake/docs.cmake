@@ -19,6 +19,7 @@ set(DOXYGEN_PREDEFINED GBT_API_BEGIN= GBT_API_END=)
 set(DOXYGEN_WARN_IF_INCOMPLETE_DOC NO) # "err" and "def" mean the same everywhere
 set(DOXYGEN_WARN_AS_ERROR FAIL_ON_WARNINGS)
 set(DOXYGEN_QUIET YES)
+set(DOXYGEN_SORT_MEMBER_DOCS NO)
 set(DOXYGEN_HAVE_DOT NO)
 set(DOXYGEN_DISABLE_INDEX NO)
 # Comments behind a member say what it is; the first lines of a header say what it is for.

@@ -57,7 +57,11 @@ typedef struct gbt_gaussians {
  */
 gbt_status gbt_model_from_gaussians(const gbt_gaussians *g, gbt_model **out, gbt_error *err);
 
-/** Give a model of plain Gaussians other ones, as many as you like; settings stay. As gbt_model_from_gaussians(); on failure nothing changes. */
+/**
+ * Give a model of plain Gaussians other ones, as many as you like; settings stay.
+ *
+ * @return as gbt_model_from_gaussians(); on failure nothing changes
+ */
 gbt_status gbt_model_set_gaussians(gbt_model *model, const gbt_gaussians *g, gbt_error *err);
 
 /** NULL is fine. */
@@ -80,8 +84,9 @@ gbt_model_info gbt_model_get_info(const gbt_model *model);
 /** How pictures are made. */
 typedef struct gbt_model_settings {
     float background[3];     /* behind everything. Default as trained; black for plain Gaussians */
-    float footprint;         /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays. Default as trained; 0.1 for plain Gaussians */
-    float t_near;            /* nearest distance at which anything is seen, > = 0. Default as trained; 0.01 for plain Gaussians */
+    float footprint;         /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays. Default as trained; 0.1 for plain
+                                Gaussians */
+    float t_near;            /* nearest distance at which anything is seen, >= 0. Default as trained; 0.01 for plain Gaussians */
     float alpha_min;         /* smallest response that counts, (0, 1). Default 1/255 */
     float alpha_max;         /* responses are cut here, (0, 1). Default 0.99 */
     float transmittance_min; /* a ray ends before less than this is left, (0, 1). Default 1e-4 */
@@ -141,19 +146,20 @@ typedef struct gbt_gaussians_gradient {
 } gbt_gaussians_gradient;
 
 /**
- * Adjoint of the last gbt_model_render() with `keep`: from dL/d(rgb) to the pose of its camera, and to plain Gaussians. Once for each render.
+ * Adjoint of the last gbt_model_render() with `keep`, once for each: from dL/d(rgb) to the pose of its camera, and to plain Gaussians.
  *
- * The pose is differentiated by the motion (v, omega) of gbt_camera_move() at 0: v moves the camera along its own axes (right, down, forward), omega turns
- * it about them, radians. With W the rotation from world to camera, c the camera's centre, e the eye for which colours are made (c; of an
- * orthographic camera the middle of its picture), mu_i, q_i the Gaussians' means and quaternions, and every derivative by a mean or quaternion the
- * one at fixed colours:
+ * The pose is differentiated by the motion (v, omega) of gbt_camera_moved() at 0: v moves the camera along its own axes (right, down, forward),
+ * omega turns it about them, radians. With W the rotation from world to camera, c the camera's centre, e the eye for which colours are made (c;
+ * of an orthographic camera the middle of its picture), mu_i, q_i the Gaussians' means and quaternions, and every derivative by a mean or
+ * quaternion the one at fixed colours:
  *
  *     dL/dv     = W (dL/de - sum_i dL/dmu_i)
  *     dL/domega = W ((e - c) x dL/de - sum_i [(mu_i - c) x dL/dmu_i + vec(dL/dq_i q_i*) / 2])
  *
- * because moving the camera is moving all Gaussians the other way, but for the eye: dL/de goes through the directions of the spherical harmonics, or
- * through the direction and distance that the networks are given. Pixels' footprints move with the camera and are in these sums.
- * It is the gradient of the picture between cuts: where a response crosses alpha_min, or a ray its end, a picture jumps a little, and no gradient says so.
+ * because moving the camera is moving all Gaussians the other way, but for the eye: dL/de goes through the directions of the spherical
+ * harmonics, or through the direction and distance that the networks are given. Pixels' footprints move with the camera and are in these sums.
+ * It is the gradient of the picture between cuts: where a response crosses alpha_min, or a ray its end, a picture jumps a little, and no gradient
+ * says so.
  *
  * @param d_rgb       [in]  [height][width][3], finite
  * @param d_pose      [out] dL/d(v, omega); optional (NULL)
@@ -162,7 +168,8 @@ typedef struct gbt_gaussians_gradient {
  * @return GBT_OK, GBT_ERR_ARGUMENT (no kept render, d_rgb not finite, gradients of networks wanted), GBT_ERR_NO_MEMORY
  * Cost: 1 to 3 times the render.
  */
-gbt_status gbt_model_gradient(gbt_model *model, const float *d_rgb, double d_pose[6], const gbt_gaussians_gradient *d_gaussians, gbt_error *err);
+gbt_status gbt_model_gradient(gbt_model *model, const float *d_rgb, double d_pose[6], const gbt_gaussians_gradient *d_gaussians,
+                              gbt_error *err);
 
 GBT_API_END
 #endif

@@ -8,7 +8,8 @@
 #include "data/gaussian_cloud.h"
 
 /**
- * The part of the adjoint of plain_forward() (frame/plain.h) that goes through the direction d = (mu - eye) / r: dd/dmu = (1 - d d^T) / r = -dd/deye.
+ * The part of the adjoint of plain_forward() (frame/plain.h) that goes through the direction d = (mu - eye) / r:
+ * dd/dmu = (1 - d d^T) / r = -dd/deye.
  *
  * @param visible, count [in]  as given to plain_forward()
  * @param seen           [in]  what it gave

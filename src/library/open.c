@@ -1,4 +1,5 @@
 /* library/open.c -- models from files and arrays, and what can be asked of them. */
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -43,6 +44,8 @@ void gbt_model_close(gbt_model *m)
 
 /* ---- Gaussians of the caller ------------------------------------------------------------------------------------------------- */
 
+static const float below_one = 1 - FLT_EPSILON;
+
 typedef struct value_range {
     const char *name;
     const float *values;
@@ -58,8 +61,9 @@ static gbt_status check(const gbt_gaussians *g, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: sh_degree %d (wanted 0 to 3)", g->sh_degree);
     const size_t functions = (size_t)((g->sh_degree + 1) * (g->sh_degree + 1));
     const float far = 1e17f, large = 1e18f, log_limit = GAUSSIAN_SCALE_LOG_LIMIT;
-    const value_range ranges[] = {{"mean", g->mean, 3, -far, far}, {"scale_log", g->scale_log, 3, -log_limit, log_limit}, {"quat", g->quat, 4, -large, large},
-                                  {"opacity", g->opacity, 1, 0, 1}, {"sh", g->sh, 3 * functions, -large, large}};
+    const value_range ranges[] = {{"mean", g->mean, 3, -far, far}, {"scale_log", g->scale_log, 3, -log_limit, log_limit},
+                                  {"quat", g->quat, 4, -large, large}, {"opacity", g->opacity, 1, 0, 1},
+                                  {"sh", g->sh, 3 * functions, -large, large}};
     for (size_t k = 0; k < sizeof ranges / sizeof *ranges; k++) {
         const value_range *r = &ranges[k];
         if (r->values == NULL)
@@ -151,20 +155,27 @@ gbt_model_info gbt_model_get_info(const gbt_model *m)
 gbt_model_settings gbt_model_get_settings(const gbt_model *m)
 {
     const trace_settings *s = &m->run.settings;
-    return (gbt_model_settings){.background = {s->background[0], s->background[1], s->background[2]}, .footprint = m->run.frame.draw.footprint,
-                                .t_near = s->t_near, .alpha_min = s->alpha_min, .alpha_max = s->alpha_max, .transmittance_min = s->transmittance_min};
+    return (gbt_model_settings){.background = {s->background[0], s->background[1], s->background[2]},
+                                .footprint = m->run.frame.draw.footprint,
+                                .t_near = s->t_near,
+                                .alpha_min = s->alpha_min,
+                                .alpha_max = s->alpha_max,
+                                .transmittance_min = s->transmittance_min};
 }
 
 gbt_status gbt_model_set_settings(gbt_model *m, const gbt_model_settings *settings, gbt_error *err)
 {
     const gbt_model_settings *g = settings;
-    const bool fine = isfinite(g->background[0]) && isfinite(g->background[1]) && isfinite(g->background[2]) && g->footprint >= 0 && g->footprint <= 4 &&
-                      g->t_near >= 0 && g->t_near < 1e17f && g->alpha_min > 0 && g->alpha_min < 1 && g->alpha_max > 0 && g->alpha_max < 1 &&
-                      g->transmittance_min > 0 && g->transmittance_min < 1;
-    if (!fine)
-        return base_fail(err, GBT_ERR_ARGUMENT, "settings: background %g %g %g, footprint %g, t_near %g, alpha %g to %g, transmittance_min %g (wanted finite, "
-                         "0 to 4, >= 0, and the rest in (0, 1))", (double)g->background[0], (double)g->background[1], (double)g->background[2],
-                         (double)g->footprint, (double)g->t_near, (double)g->alpha_min, (double)g->alpha_max, (double)g->transmittance_min);
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(g->background[k]))
+            return base_fail(err, GBT_ERR_ARGUMENT, "settings: background %g (wanted finite)", (double)g->background[k]);
+    const value_range ranges[] = {{"footprint", &g->footprint, 1, 0, 4}, {"t_near", &g->t_near, 1, 0, 1e17f},
+                                  {"alpha_min", &g->alpha_min, 1, FLT_MIN, below_one}, {"alpha_max", &g->alpha_max, 1, FLT_MIN, below_one},
+                                  {"transmittance_min", &g->transmittance_min, 1, FLT_MIN, below_one}};
+    for (size_t k = 0; k < sizeof ranges / sizeof *ranges; k++)
+        if (!(*ranges[k].values >= ranges[k].low && *ranges[k].values <= ranges[k].high))
+            return base_fail(err, GBT_ERR_ARGUMENT, "settings: %s %g (wanted %g to %g)", ranges[k].name, (double)*ranges[k].values,
+                             (double)ranges[k].low, (double)ranges[k].high);
     trace_settings *s = &m->run.settings;
     memcpy(s->background, g->background, sizeof s->background);
     s->t_near = g->t_near, s->alpha_min = g->alpha_min, s->alpha_max = g->alpha_max, s->transmittance_min = g->transmittance_min;
@@ -187,7 +198,8 @@ gbt_status gbt_model_get_view(const gbt_model *m, size_t index, gbt_model_view *
     const loaded_run *r = &m->run;
     if (r->photos.source == NULL || index >= r->scene.view_count)
         return base_fail(err, GBT_ERR_ARGUMENT, "view %zu: there are %zu open", index, r->photos.source == NULL ? 0 : r->scene.view_count);
-    *out = (gbt_model_view){.name = r->scene.views[index].name, .held_out = r->scene.views[index].is_test, .camera = photos_camera(&r->photos, index, 0)};
+    const scene_view *view = &r->scene.views[index];
+    *out = (gbt_model_view){.name = view->name, .held_out = view->is_test, .camera = photos_camera(&r->photos, index, 0)};
     for (int k = 0; k < 3; k++)
         out->camera.center[k] += r->model.origin[k];
     return GBT_OK;

@@ -88,7 +88,7 @@ gbt_status gbt_model_gradient(gbt_model *m, const float *d_rgb, double d_pose[6]
 {
     frame *f = &m->run.frame;
     if (!m->kept)
-        return base_fail(err, GBT_ERR_ARGUMENT, "gradient: there is no render to differentiate (wanted gbt_model_render() with keep before each)");
+        return base_fail(err, GBT_ERR_ARGUMENT, "gradient: no render is kept (wanted gbt_model_render() with keep before each)");
     if (d_gaussians != NULL && m->run.cloud.count == 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "gradient: networks make this model's Gaussians (wanted a model of plain ones)");
     const size_t values = 3 * ray_image_count(&f->rays);

@@ -47,7 +47,8 @@ static inline double harmonic(int index, const double d[3])
     double ratio = 1;
     for (int i = l - n + 1; i <= l + n; i++)
         ratio /= i;
-    const double angle = atan2(d[1], d[0]), norm = sqrt((2 * l + 1) / (4 * 3.14159265358979323846) * ratio), p = norm * legendre(l, n, d[2]);
+    const double angle = atan2(d[1], d[0]), norm = sqrt((2 * l + 1) / (4 * 3.14159265358979323846) * ratio);
+    const double p = norm * legendre(l, n, d[2]);
     return m == 0 ? p : sqrt(2) * p * (m > 0 ? cos(n * angle) : sin(n * angle));
 }
 
@@ -83,7 +84,8 @@ static inline reference_scene seen_from(const double_scene *s, const gbt_camera 
             see_plain(s, i, eye, fields);
         if (s->footprint > 0) {
             memcpy(&wide, fields, sizeof wide);
-            footprint_widen(&view, s->footprint, s->anchor_pixel != NULL ? (double)s->anchor_pixel[i / (size_t)s->networks->offset_count] : 0, &wide);
+            const double least = s->anchor_pixel != NULL ? (double)s->anchor_pixel[i / (size_t)s->networks->offset_count] : 0;
+            footprint_widen(&view, s->footprint, least, &wide);
             memcpy(fields, &wide, sizeof wide);
         }
         for (size_t f = 0; f < FIELDS; f++)
@@ -93,13 +95,19 @@ static inline reference_scene seen_from(const double_scene *s, const gbt_camera 
     return out;
 }
 
+static inline void pixel_ray(const gbt_camera *camera, size_t i, double origin[3], double dir[3])
+{
+    const size_t width = (size_t)camera->width;
+    assert_true(gbt_camera_ray(camera, (double)(i % width) + 0.5, (double)(i / width) + 0.5, origin, dir));
+}
+
 /* sum of weight . rgb over all pixels; `rgb` is optional, [height][width][3]. */
 static inline double double_loss(const double_scene *s, const gbt_camera *camera, const float *weight, double *rgb)
 {
     double eye[3] = {0, 0, 0}, origin[3], dir[3], loss = 0;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     for (size_t i = 0; i < pixels; i++) {
-        assert_true(gbt_camera_ray(camera, (double)(i % (size_t)camera->width) + 0.5, (double)(i / (size_t)camera->width) + 0.5, origin, dir));
+        pixel_ray(camera, i, origin, dir);
         for (int k = 0; k < 3; k++)
             eye[k] += origin[k] / (double)pixels;
     }
@@ -108,7 +116,7 @@ static inline double double_loss(const double_scene *s, const gbt_camera *camera
     size_t count, capacity = 0;
     for (size_t i = 0; i < pixels; i++) {
         double clear = 1, color[3] = {0, 0, 0};
-        assert_true(gbt_camera_ray(camera, (double)(i % (size_t)camera->width) + 0.5, (double)(i / (size_t)camera->width) + 0.5, origin, dir));
+        pixel_ray(camera, i, origin, dir);
         assert_ok(reference_scene_ray_hits(&scene, &s->settings, origin, dir, &hits, &count, &capacity, NULL));
         for (size_t h = 0; h < count && clear * (1 - hits[h].alpha) >= (double)s->settings.transmittance_min; h++) {
             for (size_t k = 0; k < 3; k++)

@@ -8,7 +8,8 @@
 enum { W = 9, H = 7, COUNT = 2 };
 
 /* A white opaque ball at (0, 0, 5), and a faint one behind the camera. */
-static float mean[3 * COUNT] = {0, 0, 5, 1, 2, -9}, scale_log[3 * COUNT] = {-1, -1, -1, -2, -2, -2}, quat[4 * COUNT] = {2, 0, 0, 0, 0, 1, 0, 0};
+static float mean[3 * COUNT] = {0, 0, 5, 1, 2, -9}, scale_log[3 * COUNT] = {-1, -1, -1, -2, -2, -2};
+static float quat[4 * COUNT] = {2, 0, 0, 0, 0, 1, 0, 0};
 static float opacity[COUNT] = {1, 0.25f}, sh[3 * COUNT] = {1.7724539f, 1.7724539f, 1.7724539f, 0, 0, 0};
 
 static gbt_gaussians two(void)
@@ -16,7 +17,8 @@ static gbt_gaussians two(void)
     return (gbt_gaussians){.count = COUNT, .sh_degree = 0, .mean = mean, .scale_log = scale_log, .quat = quat, .opacity = opacity, .sh = sh};
 }
 
-static const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = W, .height = H, .params = {12, 12, 4.5, 3.5}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+static const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = W, .height = H, .params = {12, 12, 4.5, 3.5},
+                                  .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 
 static gbt_model *made(void)
 {
@@ -55,11 +57,14 @@ static void what_cannot_be_opened(void **state)
 static void gaussians_that_are_refused(void **state)
 {
     (void)state;
-    static float bad_mean[3 * COUNT] = {0, NAN}, bad_scale[3 * COUNT] = {0, 0, 0, 31}, bad_quat[4 * COUNT] = {1}, bad_opacity[COUNT] = {0, 1.5f}, bad_sh[3 * COUNT] = {INFINITY};
+    static float bad_mean[3 * COUNT] = {0, NAN}, bad_scale[3 * COUNT] = {0, 0, 0, 31}, bad_quat[4 * COUNT] = {1};
+    static float bad_opacity[COUNT] = {0, 1.5f}, bad_sh[3 * COUNT] = {INFINITY};
     const struct { gbt_gaussians g; const char *says; } rows[] = {
         {{0, 0, mean, scale_log, quat, opacity, sh}, "0 (wanted 1"}, {{COUNT, 4, mean, scale_log, quat, opacity, sh}, "sh_degree 4"},
-        {{COUNT, 0, bad_mean, scale_log, quat, opacity, sh}, "mean of Gaussian 0 is nan"}, {{COUNT, 0, mean, bad_scale, quat, opacity, sh}, "scale_log of Gaussian 1 is 31"},
-        {{COUNT, 0, mean, scale_log, bad_quat, opacity, sh}, "quat of Gaussian 1 has length 0"}, {{COUNT, 0, mean, scale_log, quat, bad_opacity, sh}, "opacity of Gaussian 1 is 1.5"},
+        {{COUNT, 0, bad_mean, scale_log, quat, opacity, sh}, "mean of Gaussian 0 is nan"},
+        {{COUNT, 0, mean, bad_scale, quat, opacity, sh}, "scale_log of Gaussian 1 is 31"},
+        {{COUNT, 0, mean, scale_log, bad_quat, opacity, sh}, "quat of Gaussian 1 has length 0"},
+        {{COUNT, 0, mean, scale_log, quat, bad_opacity, sh}, "opacity of Gaussian 1 is 1.5"},
         {{COUNT, 0, mean, scale_log, quat, opacity, bad_sh}, "sh of Gaussian 0 is inf"}, {{COUNT, 0, mean, scale_log, quat, NULL, sh}, "opacity is NULL"}};
     gbt_model *kept = made();
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -100,8 +105,8 @@ static void settings_are_checked(void **state)
     gbt_model_settings rows[8];
     for (int i = 0; i < 8; i++)
         rows[i] = fine;
-    rows[0].background[2] = NAN, rows[1].footprint = 5, rows[2].t_near = -1, rows[3].alpha_min = 0, rows[4].alpha_max = 1, rows[5].transmittance_min = NAN;
-    rows[6].footprint = NAN, rows[7].t_near = INFINITY;
+    rows[0].background[2] = NAN, rows[1].footprint = 5, rows[2].t_near = -1, rows[3].alpha_min = 0, rows[4].alpha_max = 1;
+    rows[5].transmittance_min = NAN, rows[6].footprint = NAN, rows[7].t_near = INFINITY;
     for (int i = 0; i < 8; i++) {
         gbt_error err = {0};
         assert_refused(gbt_model_set_settings(model, &rows[i], &err), &err, GBT_ERR_ARGUMENT, "settings:");

@@ -166,7 +166,7 @@ typedef struct gbt_gaussians_gradient {
  * @param d_gaussians [out] optional (NULL); plain Gaussians only
  * @param err         [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT (no kept render, d_rgb not finite, gradients of networks wanted), GBT_ERR_NO_MEMORY
- * Cost: 1 to 3 times the render.
+ * Cost: about that of the render.
  */
 gbt_status gbt_model_gradient(gbt_model *model, const float *d_rgb, double d_pose[6], const gbt_gaussians_gradient *d_gaussians,
                               gbt_error *err);

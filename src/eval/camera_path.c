@@ -30,10 +30,22 @@ void camera_path_free(camera_path *path)
 
 /* ---- around ----------------------------------------------------------------------------------------------------------------------------- */
 
+/** Where a camera stands around the axis. */
+typedef struct station {
+    double angle, radius, height; /* radians in (-pi, pi], from the first camera */
+} station;
+
 typedef struct circle {
-    double middle[3], axis[3], across[2][3]; /* axis and across: right-handed, unit */
-    double radius, start, arc;               /* radians; an arc of 2 pi is all around */
+    double focus[3], axis[3], across[2][3]; /* axis and across: right-handed, unit */
+    double start, arc;                      /* radians; an arc of 2 pi is all around */
+    station *stations;                      /* [count], by angle; owned */
+    size_t count;
 } circle;
+
+static int compare_angles(const void *a, const void *b)
+{
+    return compare_doubles(&((const station *)a)->angle, &((const station *)b)->angle);
+}
 
 static void make_axes(const double up[3], const double towards[3], circle *c)
 {
@@ -50,28 +62,33 @@ static void make_axes(const double up[3], const double towards[3], circle *c)
     dvec_cross(c->axis, c->across[0], c->across[1]);
 }
 
-/** The arc that sorted angles in (-pi, pi] cover: what the largest gap between neighbours leaves. */
-static void find_arc(const double *angle, size_t count, circle *c)
+/** The arc that the stations cover: what the largest gap between neighbours leaves, without the outermost of many. */
+static void find_arc(circle *c)
 {
     static const double gap_most = PI / 2, arc_least = 40 * PI / 180;
-    double gap = angle[0] + 2 * PI - angle[count - 1];
-    c->start = angle[0];
-    for (size_t i = 1; i < count; i++)
-        if (angle[i] - angle[i - 1] > gap)
-            gap = angle[i] - angle[i - 1], c->start = angle[i];
-    c->arc = 2 * PI - gap;
+    const size_t n = c->count, spare = n / 25;
+    size_t first = 0;
+    double gap = c->stations[0].angle + 2 * PI - c->stations[n - 1].angle;
+    for (size_t i = 1; i < n; i++)
+        if (c->stations[i].angle - c->stations[i - 1].angle > gap)
+            gap = c->stations[i].angle - c->stations[i - 1].angle, first = i;
+    c->start = 0, c->arc = 2 * PI; /* from the first camera, where the angle is 0 */
     if (gap <= gap_most)
-        c->start = 0, c->arc = 2 * PI; /* from the first camera, where the angle is 0 */
-    else if (c->arc < arc_least)
+        return;
+    const size_t low = first + spare, high = first + n - 1 - spare;
+    c->start = c->stations[low % n].angle + (low >= n ? 2 * PI : 0);
+    c->arc = c->stations[high % n].angle + (high >= n ? 2 * PI : 0) - c->start;
+    if (c->arc < arc_least)
         c->start -= (arc_least - c->arc) / 2, c->arc = arc_least;
 }
 
-static gbt_status make_circle(const gbt_camera *cameras, size_t count, const camera_group *g, circle *c, gbt_error *err)
+static gbt_status circle_make(const gbt_camera *cameras, size_t count, const camera_group *g, circle *c, gbt_error *err)
 {
-    double *angle = mem_alloc(count, 3 * sizeof *angle, "orbit", err);
-    if (angle == NULL)
+    *c = (circle){.count = count};
+    memcpy(c->focus, g->focus, sizeof c->focus);
+    c->stations = mem_alloc(count, sizeof *c->stations, "orbit", err);
+    if (c->stations == NULL)
         return GBT_ERR_NO_MEMORY;
-    double *radius = angle + count, *height = radius + count;
     for (size_t i = 0; i < count; i++) {
         double way[3];
         for (int k = 0; k < 3; k++)
@@ -79,17 +96,25 @@ static gbt_status make_circle(const gbt_camera *cameras, size_t count, const cam
         if (i == 0)
             make_axes(g->up, way, c);
         const double x = dvec_dot(way, c->across[0]), y = dvec_dot(way, c->across[1]);
-        angle[i] = atan2(y, x), radius[i] = hypot(x, y), height[i] = dvec_dot(way, g->up);
+        c->stations[i] = (station){atan2(y, x), fmax(hypot(x, y), 0.05 * g->distance), dvec_dot(way, g->up)}; /* from straight above there is no way around */
     }
-    qsort(angle, count, sizeof *angle, compare_doubles);
-    qsort(radius, count, sizeof *radius, compare_doubles);
-    qsort(height, count, sizeof *height, compare_doubles);
-    find_arc(angle, count, c);
-    c->radius = fmax(radius[count / 2], 0.05 * g->distance); /* from straight above there is no way around */
-    for (int k = 0; k < 3; k++)
-        c->middle[k] = g->focus[k] + height[count / 2] * g->up[k];
-    mem_free(angle);
+    qsort(c->stations, count, sizeof *c->stations, compare_angles);
+    find_arc(c);
     return GBT_OK;
+}
+
+/** As far and as high as the cameras are at about that angle: means, weighed with a spread of 20 degrees. */
+static void circle_at(const circle *c, double angle, double out[3])
+{
+    static const double spread = 0.122; /* squared, radians */
+    double weight = 0, radius = 0, height = 0;
+    for (size_t i = 0; i < c->count; i++) {
+        const double w = exp((cos(angle - c->stations[i].angle) - 1) / spread);
+        weight += w, radius += w * c->stations[i].radius, height += w * c->stations[i].height;
+    }
+    radius /= weight, height /= weight;
+    for (int k = 0; k < 3; k++)
+        out[k] = c->focus[k] + height * c->axis[k] + radius * (cos(angle) * c->across[0][k] + sin(angle) * c->across[1][k]);
 }
 
 gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const camera_group *group, const gbt_camera *lens, size_t frames, camera_path *out,
@@ -97,19 +122,20 @@ gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const came
 {
     circle c;
     GBT_TRY(camera_path_alloc(out, frames, err));
-    GBT_TRY(make_circle(cameras, count, group, &c, err));
-    for (size_t i = 0; i < frames; i++) {
+    GBT_TRY(circle_make(cameras, count, group, &c, err));
+    gbt_status status = GBT_OK;
+    for (size_t i = 0; i < frames && status == GBT_OK; i++) {
         const double turn = (double)i / (double)frames;
         const double angle = c.arc < 2 * PI ? c.start + c.arc * 0.5 * (1 - cos(2 * PI * turn)) : c.start + c.arc * turn;
         gbt_camera camera = *lens;
         double at[3];
-        for (int k = 0; k < 3; k++)
-            at[k] = c.middle[k] + c.radius * (cos(angle) * c.across[0][k] + sin(angle) * c.across[1][k]);
-        if (!camera_look_at(at, group->focus, c.axis, &camera))
-            return base_fail(err, GBT_ERR_FORMAT, "--path orbit: the cameras say no way around (wanted them apart from what they look at)");
+        circle_at(&c, angle, at);
+        if (!camera_look_at(at, c.focus, c.axis, &camera))
+            status = base_fail(err, GBT_ERR_FORMAT, "--path orbit: the cameras say no way around (wanted them apart from what they look at)");
         out->shots[i] = ray_shot_of(&camera);
     }
-    return GBT_OK;
+    mem_free(c.stations);
+    return status;
 }
 
 /* ---- through cameras -------------------------------------------------------------------------------------------------------------------- */

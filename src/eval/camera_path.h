@@ -17,10 +17,11 @@ gbt_status camera_path_alloc(camera_path *out, size_t count, gbt_error *err); /*
 void camera_path_free(camera_path *path);                                       /* zeroes the struct */
 
 /**
- * Around the focus, looking at it: at the median distance from the axis through it along `up`, at the median height. Frame `count` would be frame 0.
+ * Around the focus, looking at it, at even angles about the axis through it along `up`: as far from the axis and as high as the cameras are at about
+ * that angle. Frame `count` would be frame 0.
  *
  * Where the cameras leave out more than a quarter of the circle nothing is known of what would be seen from there: the way then goes along the
- * arc that they cover (at least 40 degrees) and back, slowest where it turns.
+ * arc that they cover (of many, all but the outermost 4 % at both ends; at least 40 degrees) and back, slowest where it turns.
  *
  * @param cameras [in] [count] that stand around, count >= 1
  * @param lens    [in] of every frame; its pose is not used

@@ -262,6 +262,10 @@ if command -v ffmpeg >/dev/null; then
 fi
 # ---- the page of a run, made again with the chart of a study
 cp tiny/report.html before.html
+for part in 'From above' 'From the side' 'alt="Points"' 'alt="Granular balls"' 'alt="Anchors"' 'alt="The photo"'; do
+    [ "$(grep -c -e "$part" tiny/report.html)" -ge 1 ]
+    report $? "the page has: $part" "$(wc -c tiny/report.html)"
+done
 mkdir charts
 printf '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><circle r="3"/></svg>' >charts/speed.svg
 "$program" report tiny >out 2>err && cmp -s before.html tiny/report.html

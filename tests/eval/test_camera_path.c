@@ -175,6 +175,27 @@ static void orbit_of_an_arc(void **state)
     camera_path_free(&path);
 }
 
+/** A ring that rises: the way follows it. */
+static void orbit_follows_the_cameras(void **state)
+{
+    (void)state;
+    gbt_camera cameras[72];
+    for (int i = 0; i < 72; i++) {
+        const double angle = i * PI / 36;
+        cameras[i] = looking(4 * cos(angle), -2 - cos(angle), 4 * sin(angle), none);
+    }
+    const camera_group g = {.up = {0, -1, 0}, .focus = {0, 0, 0}, .distance = 4, .lens = cameras[0]};
+    camera_path path;
+    assert_ok(camera_path_orbit(cameras, 72, &g, &g.lens, 36, &path, &assert_ok_err_));
+    for (int i = 0; i < 36; i++) {
+        const double *c = path.shots[i].camera.center;
+        assert_near(hypot(c[0], c[2]), 4, 1e-9);
+        assert_near(c[1], -2 - cos(atan2(c[2], c[0])), 0.1); /* smoothed over 20 degrees */
+    }
+    assert_true(path.shots[0].camera.center[1] < -2.9 && path.shots[18].camera.center[1] > -1.1);
+    camera_path_free(&path);
+}
+
 /* ---- through -------------------------------------------------------------------------------------------------------------------------------- */
 
 enum { KEYS = 9, FRAMES = 2001 };
@@ -515,7 +536,7 @@ static void film_and_back(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_cameras_look_at), cmocka_unit_test(parallel_cameras), cmocka_unit_test(closed_orbit), cmocka_unit_test(orbit_of_an_arc),
+        cmocka_unit_test(what_cameras_look_at), cmocka_unit_test(parallel_cameras), cmocka_unit_test(closed_orbit), cmocka_unit_test(orbit_of_an_arc), cmocka_unit_test(orbit_follows_the_cameras),
         cmocka_unit_test(through_all_keys), cmocka_unit_test(turning_on_the_spot), cmocka_unit_test(order_to_go_through), cmocka_unit_test(our_file),
         cmocka_unit_test(nerfstudio_file), cmocka_unit_test(nerfstudio_world), cmocka_unit_test(says_what_is_wrong), cmocka_unit_test(film_without_ffmpeg),
         cmocka_unit_test(film_that_fails),

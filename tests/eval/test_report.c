@@ -4,9 +4,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/camera_pose.h"
 #include "base/file.h"
 #include "base/image.h"
 #include "base/memory.h"
+#include "base/rng.h"
 #include "eval/report.h"
 #include "eval/report_chart.h"
 #include "eval/report_image.h"
@@ -82,16 +84,17 @@ static char *read_page(void)
     char *page = malloc(count + 1);
     assert_non_null(page);
     for (size_t i = 0; i < count;) {
-        static const char start[] = "data:image/jpeg;base64,";
-        if (strncmp((char *)bytes + i, start, sizeof start - 1) == 0) {
+        static const char start[] = "data:image/jpeg;base64,", other_start[] = "data:image/png;base64,";
+        const bool is_jpeg = strncmp((char *)bytes + i, start, sizeof start - 1) == 0;
+        if (is_jpeg || strncmp((char *)bytes + i, other_start, sizeof other_start - 1) == 0) {
             memcpy(page + used, "PIXELS", 6), used += 6;
-            i += sizeof start - 1;
+            i += is_jpeg ? sizeof start - 1 : sizeof other_start - 1;
             const size_t first = i;
             while (isalnum(bytes[i]) || bytes[i] == '+' || bytes[i] == '/' || bytes[i] == '=')
                 i++;
             assert_int_equal((i - first) % 4, 0);
             assert_int_equal(bytes[i], '"');
-            assert_memory_equal(bytes + first, "/9j/", 4); /* FF D8 FF: a JPEG */
+            assert_memory_equal(bytes + first, is_jpeg ? "/9j/" : "iVBO", 4); /* FF D8 FF: a JPEG; 89 50 4E: a PNG */
         } else {
             page[used++] = (char)bytes[i++];
         }
@@ -332,6 +335,84 @@ static void bare_page(void **state)
     free(page);
     json_decref(metrics);
     free(e.views);
+}
+
+/* ---- the scene ---------------------------------------------------------------------------------------------------------------- */
+
+enum { POINTS = 200, VIEWS = 5 };
+
+/** A cloud in a box, an untrained model of it, cameras around it; the photos are the pictures of this folder. Free with loaded_run_close(). */
+static loaded_run *make_run(gbt_camera_model lens)
+{
+    loaded_run *r = calloc(1, sizeof *r);
+    assert_non_null(r);
+    r->def = gbt_train_def_default(), r->settings = trace_settings_default();
+    scene *s = &r->scene;
+    s->view_count = VIEWS, s->points.count = POINTS, s->points.has_color = true;
+    s->views = mem_calloc(VIEWS, sizeof *s->views, "views", NULL);
+    s->points.position = mem_calloc(POINTS, 3 * sizeof(float), "points", NULL), s->points.color = mem_calloc(POINTS, 3 * sizeof(float), "points", NULL);
+    r->model.anchors.offset_count = 2, r->model.voxel_size = 0.1f;
+    assert_ok(anchors_resize(&r->model.anchors, POINTS, &assert_ok_err_));
+    assert_ok(decoder_init(&r->model.decoder, 2, false, 1, &assert_ok_err_));
+    for (uint64_t i = 0; i < 3 * POINTS; i++) {
+        s->points.position[i] = r->model.anchors.position[i] = 2 * rng_uniform(1, 0, i) - 1;
+        s->points.color[i] = rng_uniform(2, 0, i);
+    }
+    for (size_t i = 0; i < 6 * POINTS; i++)
+        r->model.anchors.scale_log[i] = -2;
+    for (int i = 0; i < VIEWS; i++) {
+        const double at[3] = {4 * cos(i), -1, 4 * sin(i)}, middle[3] = {0, 0, 0}, up[3] = {0, -1, 0};
+        scene_view *v = &s->views[i];
+        char name[32];
+        snprintf(name, sizeof name, "view_%d<&>.jpg", i);
+        v->name = strdup(name), v->path = mem_calloc(VIEW_PATH_SIZE, 1, "path", NULL), v->is_test = i < 2;
+        in_folder(v->path, "photo.png");
+        v->camera = (gbt_camera){.model = lens, .width = 24, .height = 16, .params = {24, 24, 12, 8}};
+        assert_true(camera_look_at(at, middle, up, &v->camera));
+    }
+    assert_ok(photos_open(&r->photos, s, 1, &assert_ok_err_));
+    return r;
+}
+
+static void close_run(loaded_run *r)
+{
+    for (int i = 0; i < VIEWS; i++) { /* strdup's are free()'s */
+        free(r->scene.views[i].name);
+        r->scene.views[i].name = NULL;
+    }
+    loaded_run_close(r);
+    free(r);
+}
+
+static void scene_on_the_page(void **state)
+{
+    (void)state;
+    static const struct { gbt_camera_model lens; size_t layers; bool has_photos, has_points; } cases[] = {
+        {GBT_CAMERA_PINHOLE, 6, true, true}, {GBT_CAMERA_PINHOLE, 5, false, true}, {GBT_CAMERA_PINHOLE, 4, true, false}, {GBT_CAMERA_EQUIRECTANGULAR, 0, true, true}};
+    write_log(5, "");
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        write_pictures();
+        evaluation e = make_views(2);
+        loaded_run *r = make_run(cases[i].lens);
+        for (size_t k = 0; k < 2; k++)
+            snprintf(e.views[k].name, sizeof e.views[k].name, "%s", r->scene.views[k].name);
+        if (!cases[i].has_photos)
+            remove_file("photo.png");
+        if (!cases[i].has_points)
+            r->scene.points.count = 0;
+        snprintf(r->model.config, sizeof r->model.config, "init = gb\nnoise\nseed = <7>\n");
+        assert_ok(report_write(folder, &e, NULL, &(report_more){.open = r}, &assert_ok_err_));
+        char *page = check_page();
+        assert_int_equal(occurrences(page, "<figure class=\"card\"><img"), cases[i].layers);
+        assert_int_equal(occurrences(page, "class=\"camera\""), 2 * (VIEWS - 2));
+        assert_int_equal(occurrences(page, "class=\"camera held\""), 2 * 2);
+        assert_int_equal(occurrences(page, "href=\"#view-1\""), 2 + 1); /* both maps, and the table */
+        assert_int_equal(occurrences(page, "href=\"PIXELS\""), 2);
+        assert_int_equal(occurrences(page, "<th>seed</th><td>&lt;7&gt;</td>"), 1);
+        free(page);
+        close_run(r);
+        free(e.views);
+    }
 }
 
 /** Values that no sane run has, of the wrong type or out of range. */
@@ -685,6 +766,7 @@ int main(void)
     tests[count++] = (struct CMUnitTest){.name = rows[i].name, .test_func = function, .initial_state = (void *)(uintptr_t)&rows[i]}
     ADD(whole_page);
     ADD_ROWS(bare_page, bare_cases);
+    ADD(scene_on_the_page);
     ADD(odd_metrics);
     ADD(many_views);
     ADD(no_memory);

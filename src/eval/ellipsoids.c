@@ -66,6 +66,8 @@ static bool make_solid(const ellipsoids *set, size_t i, const drawing *d, solid 
         axes[k] = fmax((double)set->axes[3 * i + (size_t)k], (double)set->least_pixels * pixel);
         radius = fmax(radius, axes[k]);
     }
+    if (set->most_pixels > 0.0f && radius > (double)set->most_pixels * pixel)
+        return false;
     if (!(radius > 0 && isfinite(radius)) || !find_box(c, center, radius, d, out))
         return false;
     float turn[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};

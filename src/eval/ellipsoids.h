@@ -16,12 +16,13 @@ typedef struct ellipsoids {
     const float *quat;   /* [count][4] w x y z, local to world, unit; NULL: world axes */
     const float *color;  /* [count][3] */
     float least_pixels;  /* smaller ones are drawn as large as this: half their width, pixels */
+    float most_pixels;   /* what is larger than this at its distance is left out; 0: no limit */
 } ellipsoids;
 
 /**
  * Draw them over what `out` holds: for each quarter of a pixel the nearest along its ray, brighter where it faces the camera.
  *
- * What lies around the camera's plane is left out: it would hide everything.
+ * What lies around the camera's plane is left out too: it would hide everything.
  *
  * @param camera [in]     GBT_CAMERA_PINHOLE or GBT_CAMERA_ORTHOGRAPHIC; others give GBT_ERR_ARGUMENT
  * @param out    [in,out] 4 channels of the camera's size: colour and how much of the pixel is covered; start from zeros. Several calls: the later in front

@@ -123,12 +123,12 @@ static gbt_status make_gaussians(const loaded_run *r, solids *s, gbt_error *err)
 typedef struct layer {
     const char *name, *text;
     gbt_status (*make)(const loaded_run *r, solids *s, gbt_error *err);
-    float least_pixels;
+    float least_pixels, most_pixels;
 } layer;
 
 static void open_figure(text *out, const char *name)
 {
-    text_format(out, "<figure class=\"card\"><img alt=\"%s\" decoding=\"async\" src=\"", name);
+    text_format(out, "<figure class=\"card\"><img alt=\"%s\" src=\"", name);
 }
 
 static void close_figure(text *out, const char *name, double count, const char *what)
@@ -150,7 +150,8 @@ static void add_solids(text *out, const loaded_run *r, const gbt_camera *camera,
         out->status = image_alloc(&picture, camera->width, camera->height, 4, out->err);
     if (out->status == GBT_OK && s.count > 0) {
         const size_t pixels = (size_t)camera->width * (size_t)camera->height;
-        const ellipsoids set = {.count = s.count, .center = s.center, .axes = s.axes, .quat = s.quat, .color = s.color, .least_pixels = l->least_pixels};
+        const ellipsoids set = {.count = s.count, .center = s.center, .axes = s.axes, .quat = s.quat, .color = s.color,
+                                .least_pixels = l->least_pixels, .most_pixels = l->most_pixels};
         for (size_t i = 0; i < 4 * pixels; i++)
             picture.pixels[i] = i % 4 < 3 ? stage_color[i % 4] : 1.0f;
         out->status = ellipsoids_draw(&set, camera, &picture, out->err);
@@ -222,10 +223,10 @@ static void add_photo(text *out, const loaded_run *r, size_t view)
 void report_layers(text *out, loaded_run *r, const evaluation *e)
 {
     static const layer layers[] = {
-        {"Points", "that the photos' matching gave", make_points, 1.6f},
-        {"Granular balls", "of these points, by their radii and mean colours; the large ones are of points that lie alone", make_balls, 1.6f},
-        {"Anchors", "after training, each in the mean colour of its Gaussians; grey: not seen from here", make_anchors, 1.6f},
-        {"Gaussians", "that the anchors decode to for this view, at one standard deviation", make_gaussians, 0.7f},
+        {"Points", "that the photos' matching gave", make_points, 1.6f, 0},
+        {"Granular balls", "of these points, by their radii and mean colours; the huge ones of lone points are not drawn", make_balls, 1.6f, SIDE_MAX / 16},
+        {"Anchors", "after training, each in the mean colour of its Gaussians; grey: not seen from here", make_anchors, 1.6f, 0},
+        {"Gaussians", "that the anchors decode to for this view, at one standard deviation", make_gaussians, 0.7f, 0},
     };
     const size_t view = r->scene.view_count > 0 ? choose_view(r, e) : 0;
     gbt_camera camera;

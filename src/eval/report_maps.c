@@ -173,7 +173,8 @@ static void add_camera(text *out, const map *m, const gbt_camera *c, bool is_hel
     for (int i = 0; i < 4; i++) {
         double at[3];
         for (int k = 0; k < 3; k++)
-            at[k] = c->center[k] + length * (c->rotation[6 + k] + sides[i][0] * fmin(tan_half[0], 1.5) * c->rotation[k] + sides[i][1] * fmin(tan_half[1], 1.5) * c->rotation[3 + k]);
+            at[k] = c->center[k] + length * (c->rotation[6 + k] + sides[i][0] * fmin(tan_half[0], 1.5) * c->rotation[k] +
+                                             sides[i][1] * fmin(tan_half[1], 1.5) * c->rotation[3 + k]);
         place(m, at, corner[i]);
     }
     text_format(out, "<path class=\"camera%s\" d=\"M%.1f %.1fL%.1f %.1fL%.1f %.1fL%.1f %.1fZ", is_held ? " held" : "", corner[0][0], corner[0][1], corner[1][0],

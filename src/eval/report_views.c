@@ -69,7 +69,7 @@ static void add_picture(text *out, const char *class_name, const char *what, con
         text_escaped(out, v->name);
         text_add(out, "\" src=\"");
         report_picture(out, path, kind, most, &width, &height);
-        text_format(out, "\" width=\"%d\" height=\"%d\" decoding=\"async\">", width, height);
+        text_format(out, "\" width=\"%d\" height=\"%d\">", width, height);
         if (width > 0 || out->status != GBT_OK)
             return;
         out->length = before; /* its head could be read, its pixels could not */

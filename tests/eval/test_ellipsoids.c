@@ -58,6 +58,13 @@ static void a_sphere(void **state)
     assert_true(at(&im, 32 + 15, 32, 0) < 0.75); /* the rim is darker */
     assert_near(at(&im, 32 + 18, 32, 3), 0, 0);
     image_free(&im);
+    ellipsoids limited = set;
+    for (int k = 0; k < 2; k++) { /* 16 pixels at its distance */
+        limited.most_pixels = 15.9f + 0.2f * (float)k;
+        im = draw(&limited, &camera);
+        assert_true((area(&im) > 0) == (k == 1));
+        image_free(&im);
+    }
     camera = parallel_rays();
     im = draw(&set, &camera);
     assert_near(area(&im), 3.14159265 * 256, 0.02 * area(&im));

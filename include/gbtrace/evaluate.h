@@ -2,6 +2,8 @@
 #ifndef GBTRACE_EVALUATE_H
 #define GBTRACE_EVALUATE_H
 
+#include <stddef.h>
+
 #include "gbtrace/status.h"
 
 GBT_API_BEGIN
@@ -27,6 +29,15 @@ gbt_evaluate_def gbt_evaluate_def_default(void);
  * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */
 gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err);
+
+/**
+ * Make RUN/report.html again from RUN/metrics.json, log.csv and renders/test: nothing is scored, one view is rendered. The charts (SVG) of RUN,
+ * RUN/studies and `studies` go in too. Without the model or its data set, maps and pictures of the scene are left out, with a warning.
+ *
+ * @param studies [in] [study_count] folders that gbtrace study wrote, or SVG files; NULL with 0
+ * @return GBT_OK, GBT_ERR_IO (no metrics.json, no such study), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ */
+gbt_status gbt_report(const char *run, const char *const *studies, size_t study_count, gbt_error *err);
 
 /** Two pictures compared. */
 typedef struct gbt_comparison {
@@ -60,15 +71,20 @@ typedef struct gbt_render_def {
     const char *outputs;  /* also write these, as float EXR (docs/formats.md): "depth,normal". Always by the tracer, without meshes. Default NULL */
     const char *preset;   /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is "default". Default NULL */
     const char *insert;   /* meshes to put into the scene (docs/inserting.md); with the renderer "trace" only. Default NULL */
+    const char *path;     /* a film in place of views (docs/video.md): "orbit", "interpolate", or the name of a path file. Default NULL */
+    int frames;           /* of the film, [0, 100000]; 0: 240 around, 15 for each training camera (900 at most), as many as a file has. Default 0 */
+    double fps;           /* frames per second, [0, 1000]; 0: what a path file says, else 30. Default 0 */
+    int width, height;    /* of the film, both 0 or in [1, 65500]; the shorter side sees as much as in the photos. Default 0: as they, to even numbers */
 } gbt_render_def;
 
 gbt_render_def gbt_render_def_default(void);
 
 /**
- * Render the views of a split into the folder `out`, one file per view; or what a camera file says, as one file of its name.
+ * Render the views of a split into the folder `out`, one file per view; or what a camera file says, as one file of its name; or a path, as
+ * frame_00001.png and so on, or as one film when `out` ends in .mp4, .webm or .gif (by the program ffmpeg, which must be there).
  *
  * Camera models are traced as they are. `data`, `split` and `downscale` are about views: with a camera file the
- * first two are not used, and the last is refused.
+ * first two are not used, and the last is refused. A path file needs no data set either. A film has its name when it is whole, not before.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */

@@ -9,4 +9,11 @@ static inline int compare_floats(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/** Ascending doubles, none of them NaN. */
+static inline int compare_doubles(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
 #endif

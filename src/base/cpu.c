@@ -1,6 +1,7 @@
 /* base/cpu.c -- choose the instruction set of the kernels at run time. */
 #include "base/cpu.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -41,4 +42,21 @@ void cpu_limit_isa(cpu_isa isa)
 const char *cpu_isa_name(cpu_isa isa)
 {
     return names[isa];
+}
+
+void cpu_processor_name(char *out, size_t size)
+{
+    char line[256];
+    FILE *file = fopen("/proc/cpuinfo", "r");
+    snprintf(out, size, "?");
+    while (file != NULL && fgets(line, sizeof line, file) != NULL) {
+        const char *value = strchr(line, ':');
+        if (strncmp(line, "model name", 10) != 0 || value == NULL)
+            continue;
+        value += strspn(value, ": \t");
+        snprintf(out, size, "%.*s", (int)strcspn(value, "\r\n"), value);
+        break;
+    }
+    if (file != NULL)
+        fclose(file);
 }

@@ -1,20 +1,34 @@
 /* cli/cmd_render.c -- gbtrace render. */
+#include <stdio.h>
 #include <string.h>
 
 #include "cli/options.h"
 #include "gbtrace/evaluate.h"
 #include "gbtrace/train.h"
 
+/** "1280x720", nothing more. */
+static bool read_size(const char *text, int *width, int *height)
+{
+    int used = 0;
+    return strspn(text, "0123456789x") == strlen(text) && sscanf(text, "%5dx%5d%n", width, height, &used) == 2 && text[used] == '\0' && *width > 0 && *height > 0;
+}
+
 static int run(const command *self, int argc, char **argv)
 {
     gbt_render_def def = gbt_render_def_default();
-    const char *out = NULL, *split = "test";
+    const char *out = NULL, *split = "test", *size = NULL;
     int threads = 0;
     const option options[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR", .help = "folder for the images", .required = true},
+        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR",
+         .help = "folder for the images; with --path also a film: .mp4, .webm, .gif (by ffmpeg)", .required = true},
         {.name = "split", .kind = OPTION_CHOICE, .value = &split, .choices = "test|train|all", .help = "which views of the data set"},
         {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json",
          .help = "one picture of this camera (lens, aperture, rolling shutter, rays: docs/cameras.md), no views"},
+        {.name = "path", .kind = OPTION_STRING, .value = &def.path, .value_name = "orbit|interpolate|FILE.json",
+         .help = "a film: around what the photos show, through their cameras, or along those of a file (docs/video.md)"},
+        {.name = "frames", .kind = OPTION_INT, .value = &def.frames, .min = 0, .max = 100000, .value_name = "N", .help = "of the film; 0: 240 around, 15 for each photo, all of a file"},
+        {.name = "fps", .kind = OPTION_DOUBLE, .value = &def.fps, .min = 0, .max = 1000, .value_name = "F", .help = "frames per second; 0: what a path file says, else 30"},
+        {.name = "size", .kind = OPTION_STRING, .value = &size, .value_name = "WxH", .help = "of the film, as 1280x720; default: that of the photos"},
         {.name = "outputs", .kind = OPTION_STRING, .value = &def.outputs, .value_name = "LIST",
          .help = "EXR files beside the picture: transmittance,depth,median-depth,normal,hits,anchor or some of them (docs/formats.md)"},
         {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast", .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
@@ -31,6 +45,8 @@ static int run(const command *self, int argc, char **argv)
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);
     if (code >= 0)
         return code;
+    if (size != NULL && !read_size(size, &def.width, &def.height))
+        return command_misused("--size: bad value (wanted WxH like 1280x720, got %.80s)", size);
     if (threads > 0)
         gbt_set_threads(threads);
     def.split = strcmp(split, "train") == 0 ? GBT_SPLIT_TRAIN : strcmp(split, "all") == 0 ? GBT_SPLIT_ALL : GBT_SPLIT_TEST;
@@ -38,4 +54,4 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_render(model.value[0], out, &def, &err), &err);
 }
 
-const command command_render = {.name = "render", .summary = "render the views of a scene, or a camera of your own", .usage = "RUN|GAUSSIANS -o DIR", .run = run};
+const command command_render = {.name = "render", .summary = "render the views of a scene, a camera of your own, or a film", .usage = "RUN|GAUSSIANS -o DIR", .run = run};

@@ -16,6 +16,7 @@ static const command *const commands[] = {
     &command_compress,
     &command_export,
     &command_render,
+    &command_report,
     &command_view,
     &command_make_scene,
     &command_bench,

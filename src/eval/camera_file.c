@@ -5,10 +5,9 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "eval/json_fields.h"
 #include "trace/ray_file.h"
 
-enum { SIZE_MAX_PIXELS = 65500, SAMPLES_MAX = 65536 };
+enum { SAMPLES_MAX = 65536 };
 #define PI 3.14159265358979323846
 
 typedef enum file_model { FILE_PINHOLE, FILE_ORTHOGRAPHIC, FILE_EQUIRECTANGULAR, FILE_FISHEYE, FILE_MODEL_COUNT } file_model;
@@ -21,8 +20,8 @@ static gbt_status take_lens(const json_fields *r, gbt_camera *camera)
     GBT_TRY(json_field_choice(r, "model", names, FILE_MODEL_COUNT, &model));
     GBT_TRY(json_field_needed(r, "width", "pixels"));
     GBT_TRY(json_field_needed(r, "height", "pixels"));
-    GBT_TRY(json_field_whole(r, "width", 1, SIZE_MAX_PIXELS, &camera->width));
-    GBT_TRY(json_field_whole(r, "height", 1, SIZE_MAX_PIXELS, &camera->height));
+    GBT_TRY(json_field_whole(r, "width", 1, CAMERA_FILE_SIZE_MAX, &camera->width));
+    GBT_TRY(json_field_whole(r, "height", 1, CAMERA_FILE_SIZE_MAX, &camera->height));
     const bool has_fov = model == FILE_PINHOLE || model == FILE_FISHEYE;
     if (has_fov)
         GBT_TRY(json_field_needed(r, "fov_x_deg", "degrees from the left edge of the picture to the right"));
@@ -108,7 +107,7 @@ static gbt_status take_rays(const json_fields *r, const double origin[3], camera
     return ray_image_read(path, origin, &out->rays, r->err);
 }
 
-static gbt_status take_all(const json_fields *r, const double origin[3], camera_file *out)
+gbt_status camera_file_take(const json_fields *r, const double origin[3], camera_file *out)
 {
     gbt_camera camera = {0};
     out->shot = ray_shot_of(&camera);
@@ -133,7 +132,7 @@ gbt_status camera_file_read(const char *path, const double origin[3], camera_fil
     memset(out, 0, sizeof *out);
     GBT_TRY(json_read(path, &root, err));
     const json_fields r = {path, "", root, err};
-    const gbt_status status = take_all(&r, origin, out);
+    const gbt_status status = camera_file_take(&r, origin, out);
     json_decref(root);
     return status;
 }
@@ -144,7 +143,8 @@ gbt_status camera_text_read(const char *text, const char *name, const double ori
     camera_file taken = {0};
     GBT_TRY(json_read_text(text, strlen(text), name, &root, err));
     const json_fields r = {name, "", root, err};
-    const gbt_status status = json_field_given(&r, "rays") ? json_field_fail(&r, "rays", "only a camera file can name them") : take_all(&r, origin, &taken);
+    const gbt_status status = json_field_given(&r, "rays") ? json_field_fail(&r, "rays", "only a camera file can name them")
+                                                            : camera_file_take(&r, origin, &taken);
     json_decref(root);
     *out = taken.shot;
     return status;

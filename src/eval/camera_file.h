@@ -2,6 +2,7 @@
 #ifndef GBT_EVAL_CAMERA_FILE_H
 #define GBT_EVAL_CAMERA_FILE_H
 
+#include "eval/json_fields.h"
 #include "trace/rays.h"
 
 typedef struct camera_file {
@@ -22,5 +23,10 @@ gbt_status camera_file_read(const char *path, const double origin[3], camera_fil
 gbt_status camera_text_read(const char *text, const char *name, const double origin[3], ray_shot *out, gbt_error *err);
 
 void camera_file_free(camera_file *file); /* zeroes the struct */
+
+/** The same of an object inside a larger file. `out` zeroed before; as camera_file_read(). */
+gbt_status camera_file_take(const json_fields *fields, const double origin[3], camera_file *out);
+
+enum { CAMERA_FILE_SIZE_MAX = 65500 }; /* pixels, of either side */
 
 #endif

@@ -45,6 +45,19 @@ static gbt_status score_right_half(image *render, const image *photo, view_score
     return status;
 }
 
+gbt_status view_score_paths(view_score *score, const char *folder, gbt_error *err)
+{
+    char name[1024], file[1100];
+    loaded_run_file_name(score->name, name, sizeof name);
+    const struct { const char *suffix; char *path; } outputs[] = {
+        {".png", score->render_path}, {".photo.png", score->photo_path}, {".flip.png", score->error_path}};
+    for (int i = 0; i < 3; i++) {
+        snprintf(file, sizeof file, "%s%s", name, outputs[i].suffix);
+        GBT_TRY(file_join(outputs[i].path, VIEW_PATH_SIZE, folder, file, err));
+    }
+    return GBT_OK;
+}
+
 static gbt_status score_view(loaded_run *r, size_t index, const char *folder, view_score *score, gbt_error *err)
 {
     const scene_view *view = &r->scene.views[index];
@@ -68,16 +81,12 @@ static gbt_status score_view(loaded_run *r, size_t index, const char *folder, vi
     image_quantize(&photo);
     double whole;
     status = metric_flip(render, &photo, &whole, &error_map, err);
-    char name[1024], file[1100];
-    loaded_run_view_name(view, name, sizeof name);
-    const struct { const char *suffix; const image *pixels; char *path; } outputs[] = {
-        {".png", render, score->render_path}, {".photo.png", &photo, score->photo_path}, {".flip.png", &error_map, score->error_path}};
-    for (int i = 0; i < 3 && status == GBT_OK; i++) {
-        snprintf(file, sizeof file, "%s%s", name, outputs[i].suffix);
-        status = file_join(outputs[i].path, VIEW_PATH_SIZE, folder, file, err);
-        if (status == GBT_OK)
-            status = image_write(outputs[i].path, outputs[i].pixels, err);
-    }
+    if (status == GBT_OK)
+        status = view_score_paths(score, folder, err);
+    const image *const pictures[] = {render, &photo, &error_map};
+    const char *const paths[] = {score->render_path, score->photo_path, score->error_path};
+    for (int i = 0; i < 3 && status == GBT_OK; i++)
+        status = image_write(paths[i], pictures[i], err);
 done:
     image_free(&photo);
     image_free(&error_map);
@@ -195,7 +204,7 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
     if (status == GBT_OK && def->json != NULL)
         status = write_json(root, def->json, err);
     if (status == GBT_OK && def->report)
-        status = report_write(run, &e, root, err);
+        status = report_write(run, &e, root, &(report_more){.open = r}, err);
     if (status == GBT_OK && e.view_count == 0)
         log_info("no held-out views: scores are n/a");
     else if (status == GBT_OK)

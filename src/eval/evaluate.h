@@ -5,6 +5,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "gbtrace/status.h"
+
 enum { VIEW_PATH_SIZE = 4096 };
 
 typedef struct view_score {
@@ -24,5 +26,8 @@ typedef struct evaluation {
     double downscale;     /* the photos were divided by this */
     bool exposure; /* scored on the right halves of the photos (image/affine.h) */
 } evaluation;
+
+/** Where the pictures of score->name are: FOLDER/NAME.png, .photo.png, .flip.png. GBT_ERR_ARGUMENT when a path is too long. */
+gbt_status view_score_paths(view_score *score, const char *folder, gbt_error *err);
 
 #endif

@@ -77,6 +77,8 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     for (size_t i = 0; i < out->scene.view_count; i++)
         for (int k = 0; k < 3; k++)
             out->scene.views[i].camera.center[k] += out->scene.origin[k] - out->model.origin[k];
+    for (size_t i = 0; i < 3 * out->scene.points.count; i++)
+        out->scene.points.position[i] += (float)(out->scene.origin[i % 3] - out->model.origin[i % 3]);
     return photos_open(&out->photos, &out->scene, downscale > 0 ? downscale : out->def.downscale, err);
 }
 
@@ -133,7 +135,12 @@ gbt_status loaded_run_preset(const char *name, trace_settings *settings, gbt_err
 
 void loaded_run_view_name(const scene_view *view, char *out, size_t size)
 {
-    snprintf(out, size, "%s", view->name);
+    loaded_run_file_name(view->name, out, size);
+}
+
+void loaded_run_file_name(const char *name, char *out, size_t size)
+{
+    snprintf(out, size, "%s", name);
     char *dot = strrchr(out, '.');
     if (dot != NULL && dot != out && strchr(dot, '/') == NULL)
         *dot = '\0';

@@ -14,7 +14,7 @@ typedef struct loaded_run {
     gaussian_cloud cloud; /* of a file of plain Gaussians, local coordinates; then `model` has no anchors and is about the scene alone */
     gbt_train_def def; /* the settings it was trained with; strings point into `strings` */
     config_strings strings;
-    scene scene; /* cameras in the model's local coordinates */
+    scene scene; /* cameras and points in the model's local coordinates */
     photos photos;
     trace_settings settings;
     frame frame;
@@ -61,5 +61,6 @@ gbt_status loaded_run_preset(const char *name, trace_settings *settings, gbt_err
 
 /** "folder/a/b.jpg" becomes "a_b": a file name for what belongs to a view. */
 void loaded_run_view_name(const scene_view *view, char *out, size_t size);
+void loaded_run_file_name(const char *view_name, char *out, size_t size);
 
 #endif

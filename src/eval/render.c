@@ -1,7 +1,8 @@
-/* eval/render.c -- the views of a split, or the camera of a file, to image files. */
+/* eval/render.c -- the views of a split, the camera of a file, or a path, to image files or a film. */
 #include <stdio.h>
 #include <string.h>
 
+#include "base/clock.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
@@ -10,6 +11,8 @@
 #include "eval/insert_file.h"
 #include "eval/loaded_run.h"
 #include "eval/render_outputs.h"
+#include "eval/render_path.h"
+#include "eval/video.h"
 #include "gbtrace/evaluate.h"
 #include "trace/reference.h"
 
@@ -49,14 +52,20 @@ typedef struct studio {
     bool in_double;   /* by the reference */
 } studio;
 
+/* Into run.frame.rgb. */
+static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *def, gbt_error *err)
+{
+    loaded_run *r = &st->run;
+    const frame_guest guest = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
+    GBT_TRY(frame_render_guest(&r->frame, loaded_run_subject(r), shot, &r->settings, def->insert != NULL ? &guest : NULL, err));
+    return st->in_double ? render_reference(r, shot, err) : GBT_OK;
+}
+
 static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, const char *name, const gbt_render_def *def, gbt_error *err)
 {
     char file[1100], path[4096];
     loaded_run *r = &st->run;
-    const frame_guest guest = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
-    GBT_TRY(frame_render_guest(&r->frame, loaded_run_subject(r), shot, &r->settings, def->insert != NULL ? &guest : NULL, err));
-    if (st->in_double)
-        GBT_TRY(render_reference(r, shot, err));
+    GBT_TRY(draw(st, shot, def, err));
     snprintf(file, sizeof file, "%s.%s", name, def->format);
     GBT_TRY(file_join(path, sizeof path, out, file, err));
     GBT_TRY(image_write(path, &r->frame.rgb, err));
@@ -108,6 +117,51 @@ static gbt_status render_camera(studio *st, const char *out, const gbt_render_de
     return status;
 }
 
+static void say_progress(size_t done, size_t count, double start, double *said)
+{
+    const double now = clock_wall();
+    if (done < count && now - *said < 5)
+        return;
+    log_info("frame %zu of %zu, %.0f s left", done, count, (now - start) / (double)done * (double)(count - done));
+    *said = now;
+}
+
+static gbt_status render_frames(studio *st, const camera_path *path, video *film, const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    const double start = clock_wall();
+    double said = start;
+    for (size_t i = 0; i < path->count; i++) {
+        char name[32];
+        snprintf(name, sizeof name, "frame_%05zu", i + 1);
+        if (film == NULL) {
+            GBT_TRY(render_one(st, &path->shots[i], out, name, def, err));
+        } else {
+            GBT_TRY(draw(st, &path->shots[i], def, err));
+            GBT_TRY(video_add(film, &st->run.frame.rgb, err));
+        }
+        say_progress(i + 1, path->count, start, &said);
+    }
+    return GBT_OK;
+}
+
+static gbt_status render_film(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    camera_path path;
+    video *film = NULL;
+    gbt_status status = render_path_make(&st->run, def, &path, err);
+    if (status == GBT_OK && video_named(out))
+        status = video_open(out, path.shots[0].camera.width, path.shots[0].camera.height, path.fps, &film, err);
+    if (status == GBT_OK)
+        status = render_frames(st, &path, film, out, def, err);
+    const gbt_status closed = video_close(film, status == GBT_OK, err);
+    if (status == GBT_OK)
+        status = closed;
+    if (status == GBT_OK)
+        log_info("%zu frames rendered into %s, %.2f s at %g frames per second", path.count, out, (double)path.count / path.fps, path.fps);
+    camera_path_free(&path);
+    return status;
+}
+
 static const char insert_is_traced[] = "--insert: meshes are traced (wanted --renderer trace)";
 
 /* What draws the model that is open. */
@@ -126,7 +180,28 @@ static gbt_status choose_renderer(studio *st, const gbt_render_def *def, gbt_err
     return GBT_OK;
 }
 
-gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)
+static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    if (def->path == NULL && (def->frames != 0 || def->fps != 0 || def->width != 0 || def->height != 0))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--frames, --fps, --size: of a path (wanted --path)");
+    if (def->path == NULL)
+        return video_named(out) ? base_fail(err, GBT_ERR_ARGUMENT, "%s: a film wants --path", out) : GBT_OK;
+    if (def->camera != NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--path: not with --camera");
+    if (!render_path_wants_views(def->path) && def->downscale != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: not with a path file (wanted --size)");
+    if (def->frames < 0 || def->frames > CAMERA_PATH_FRAMES_MAX)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--frames: %d (wanted 1 to %d)", def->frames, (int)CAMERA_PATH_FRAMES_MAX);
+    if (!(def->fps >= 0 && def->fps <= 1000))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--fps: %g (wanted up to 1000)", def->fps);
+    if ((def->width != 0 || def->height != 0) && !(def->width > 0 && def->height > 0 && def->width <= 65500 && def->height <= 65500))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--size: %d x %d (wanted 1 to 65500 pixels)", def->width, def->height);
+    if (video_named(out) && def->outputs != NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--outputs: not with a film (wanted -o DIR)");
+    return GBT_OK;
+}
+
+static gbt_status check_def(const char *out, const gbt_render_def *def, gbt_error *err)
 {
     if (strcmp(def->format, "png") != 0 && strcmp(def->format, "exr") != 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "--format: \"%.40s\" (wanted png or exr)", def->format);
@@ -136,13 +211,21 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
         return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: not with --camera (the camera file says the size)");
     if (def->insert != NULL && def->renderer != NULL && strcmp(def->renderer, "trace") != 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
-    GBT_TRY(file_make_folder(out, err));
+    return check_path(out, def, err);
+}
+
+gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    GBT_TRY(check_def(out, def, err));
+    if (!video_named(out))
+        GBT_TRY(file_make_folder(out, err));
     studio *st = mem_calloc(1, sizeof *st, "run", err);
     if (st == NULL)
         return GBT_ERR_NO_MEMORY;
+    const bool wants_views = def->path != NULL ? render_path_wants_views(def->path) : def->camera == NULL;
     gbt_status status = render_outputs_parse(def->outputs, &st->outputs, err);
     if (status == GBT_OK)
-        status = def->camera != NULL ? loaded_run_open_model(run, &st->run, err) : loaded_run_open(run, def->data, def->downscale, &st->run, err);
+        status = wants_views ? loaded_run_open(run, def->data, def->downscale, &st->run, err) : loaded_run_open_model(run, &st->run, err);
     if (status == GBT_OK)
         status = loaded_run_preset(def->preset, &st->run.settings, err);
     if (status == GBT_OK)
@@ -150,7 +233,7 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
     if (status == GBT_OK && def->insert != NULL)
         status = insert_file_read(def->insert, st->run.model.origin, &st->insert, err);
     if (status == GBT_OK)
-        status = def->camera != NULL ? render_camera(st, out, def, err) : render_views(st, out, def, err);
+        status = def->path != NULL ? render_film(st, out, def, err) : def->camera != NULL ? render_camera(st, out, def, err) : render_views(st, out, def, err);
     insert_scene_free(&st->insert);
     loaded_run_close(&st->run);
     mem_free(st);

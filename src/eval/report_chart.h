@@ -43,13 +43,25 @@ typedef struct line_chart {
 typedef struct chart_bar {
     const char *name; /* escaped here */
     double value;     /* not finite or below 0: "n/a" */
+    int color;        /* 0 to 8: style sheet classes s0 to s8 */
 } chart_bar;
+
+/* What one part of a whole was over time. */
+typedef struct chart_layer {
+    const char *name; /* escaped here */
+    const double *y;  /* [count] of chart_stack() */
+    int color;        /* as chart_bar's */
+} chart_layer;
 
 /** A <figure>. Without a finite value it says so. Long series are averaged down to about one point per pixel. */
 void chart_lines(text *out, const line_chart *chart);
 
 /** Horizontal bars in the order given, each with its value and its share of `whole` (of the sum when that is not above 0). */
 void chart_bars(text *out, const char *title, const char *unit, const chart_bar *bars, size_t count, double whole);
+
+/** Layers on top of each other over training time, at most 16, the first at the bottom; rows with an unknown layer are left out. */
+void chart_stack(text *out, const char *title, const char *x_unit, const char *y_unit, const double *x, size_t count, const chart_layer *layers,
+                 size_t layer_count);
 
 /**
  * Round numbers (1, 2 or 5 times a power of ten apart) that reach from at or below `low` to at or above `high`, about `wanted` of them.

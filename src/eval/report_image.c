@@ -2,12 +2,13 @@
 #include "eval/report_image.h"
 
 #include <math.h>
+#include <stdint.h>
 
 #include "base/fail.h"
 #include "base/image.h"
 #include "base/memory.h"
 
-enum { LONGEST_SIDE = 1280, JPEG_QUALITY = 88, COLORS = 256 };
+enum { LONGEST_SIDE = 1280, JPEG_QUALITY = 84, COLORS = 256 };
 
 /** OKLab (Ottosson 2020) to linear sRGB. */
 static void oklab_to_linear(double lightness, double chroma, double hue, double rgb[3])
@@ -72,14 +73,32 @@ static void shrink(const image *from, int factor, picture_kind kind, image *to)
         }
 }
 
-static int shrink_factor(int width, int height)
+static int shrink_factor(int width, int height, size_t most)
 {
-    const int longest = width > height ? width : height, factor = (longest + LONGEST_SIDE - 1) / LONGEST_SIDE;
-    const int shortest = width > height ? height : width;
+    const int longest = width > height ? width : height, shortest = width > height ? height : width;
+    int factor = (longest + LONGEST_SIDE - 1) / LONGEST_SIDE;
+    while (factor < shortest && (size_t)(width / factor) * (size_t)(height / factor) > most)
+        factor++;
     return factor <= shortest ? factor : shortest; /* a strip keeps one row */
 }
 
-gbt_status report_picture(text *out, const char *path, picture_kind kind, int *width, int *height)
+static void add_uri(text *out, const char *type, unsigned char *bytes, size_t count)
+{
+    text_format(out, "data:image/%s;base64,", type);
+    text_base64(out, bytes, count);
+    mem_free(bytes);
+}
+
+/** The JPEG of a picture, averaged down; its size in *small. */
+static gbt_status make_jpeg(const image *full, picture_kind kind, size_t most, image *small, unsigned char **bytes, size_t *count, gbt_error *err)
+{
+    const int factor = shrink_factor(full->width, full->height, most);
+    GBT_TRY(image_alloc(small, full->width / factor, full->height / factor, 3, err));
+    shrink(full, factor, kind, small);
+    return image_encode_jpeg(small, JPEG_QUALITY, bytes, count, err);
+}
+
+gbt_status report_picture(text *out, const char *path, picture_kind kind, size_t most, int *width, int *height)
 {
     *width = *height = 0;
     image full = {0}, small = {0};
@@ -89,25 +108,39 @@ gbt_status report_picture(text *out, const char *path, picture_kind kind, int *w
     if (out->status != GBT_OK)
         return out->status;
     gbt_status status = image_read(path, &full, &why);
+    if (status == GBT_OK)
+        status = make_jpeg(&full, kind, most, &small, &jpeg, &jpeg_bytes, &why);
     if (status == GBT_OK) {
-        const int factor = shrink_factor(full.width, full.height);
-        status = image_alloc(&small, full.width / factor, full.height / factor, 3, &why);
-        if (status == GBT_OK) {
-            shrink(&full, factor, kind, &small);
-            status = image_encode_jpeg(&small, JPEG_QUALITY, &jpeg, &jpeg_bytes, &why);
-        }
-    }
-    if (status == GBT_OK) {
-        text_add(out, "data:image/jpeg;base64,");
-        text_base64(out, jpeg, jpeg_bytes);
+        add_uri(out, "jpeg", jpeg, jpeg_bytes);
         *width = small.width, *height = small.height;
     } else if (status == GBT_ERR_NO_MEMORY) {
         out->status = base_fail(out->err, status, "%s", why.text);
     }
-    mem_free(jpeg);
     image_free(&small);
     image_free(&full);
     return out->status;
+}
+
+void report_image_png(text *out, const image *picture)
+{
+    unsigned char *bytes;
+    size_t count;
+    if (out->status == GBT_OK)
+        out->status = image_encode_png(picture, &bytes, &count, out->err);
+    if (out->status == GBT_OK)
+        add_uri(out, "png", bytes, count);
+}
+
+void report_image_jpeg(text *out, const image *picture)
+{
+    image small = {0};
+    unsigned char *bytes;
+    size_t count;
+    if (out->status == GBT_OK)
+        out->status = make_jpeg(picture, PICTURE_COLOR, SIZE_MAX, &small, &bytes, &count, out->err);
+    if (out->status == GBT_OK)
+        add_uri(out, "jpeg", bytes, count);
+    image_free(&small);
 }
 
 void report_picture_size(const char *path, int *width, int *height)

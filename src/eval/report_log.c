@@ -12,8 +12,9 @@
 
 enum { FIELD_LIMIT = 128 };
 
-static const char *const column_names[LOG_COLUMNS] = {"step",       "seconds", "width",     "height",         "loss",
-                                                      "train_psnr", "anchors", "gaussians", "rays_per_second"};
+static const char *const column_names[LOG_COLUMNS] = {
+    "step", "seconds", "width", "height", "loss", "train_psnr", "anchors", "gaussians", "rays_per_second", "blended_per_ray", "memory_bytes", "photo_ms", "rays_ms", "visible_ms",
+    "decode_ms", "build_ms", "trace_ms", "loss_ms", "adjoint_ms", "decode_adjoint_ms", "optimizer_ms", "adjust_ms"};
 
 /** Cut a line at its commas, in place. More fields than FIELD_LIMIT are not looked at. */
 static size_t split_fields(char *line, char **fields)
@@ -75,7 +76,9 @@ static void read_rows(char *at, training_log *log)
             row[i] = place[i] < field_count ? parse_field(fields[place[i]]) : (double)NAN;
         /* A held-out score right after a row has no steps of its own: its means are zeros, not measurements. */
         if (row[LOG_RAYS_PER_SECOND] <= 0)
-            row[LOG_LOSS] = row[LOG_TRAIN_PSNR] = row[LOG_GAUSSIANS] = row[LOG_RAYS_PER_SECOND] = (double)NAN;
+            for (int i = LOG_LOSS; i < LOG_COLUMNS; i++)
+                if (i != LOG_ANCHORS && i != LOG_MEMORY)
+                    row[i] = (double)NAN;
         if (isfinite(row[LOG_STEP]) && isfinite(row[LOG_SECONDS]))
             add_row(log, row);
     }

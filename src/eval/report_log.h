@@ -16,6 +16,19 @@ typedef enum log_column {
     LOG_ANCHORS,
     LOG_GAUSSIANS,
     LOG_RAYS_PER_SECOND,
+    LOG_BLENDED,
+    LOG_MEMORY,
+    LOG_PHOTO_MS, /* from here on: stages of a step, in the order in which they happen */
+    LOG_RAYS_MS,
+    LOG_VISIBLE_MS,
+    LOG_DECODE_MS,
+    LOG_BUILD_MS,
+    LOG_TRACE_MS,
+    LOG_LOSS_MS,
+    LOG_ADJOINT_MS,
+    LOG_DECODE_ADJOINT_MS,
+    LOG_OPTIMIZER_MS,
+    LOG_ADJUST_MS,
     LOG_COLUMNS
 } log_column;
 

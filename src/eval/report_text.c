@@ -57,6 +57,14 @@ void text_add(text *t, const char *markup)
     add_bytes(t, markup, strlen(markup));
 }
 
+void text_append(text *t, text *other)
+{
+    if (t->status == GBT_OK)
+        t->status = other->status;
+    add_bytes(t, other->bytes, other->length);
+    text_free(other);
+}
+
 void text_format(text *t, const char *format, ...)
 {
     va_list args, again;
@@ -109,6 +117,14 @@ void text_escaped(text *t, const char *outside)
         else
             add_bytes(t, (const char *)s, length);
         s += length > 0 ? length : 1;
+    }
+}
+
+void text_url(text *t, const char *name)
+{
+    for (const unsigned char *s = (const unsigned char *)name; *s != '\0'; s++) {
+        const bool plain = (*s >= 'a' && *s <= 'z') || (*s >= 'A' && *s <= 'Z') || (*s >= '0' && *s <= '9') || strchr("-._~/", *s) != NULL;
+        text_format(t, plain ? "%c" : "%%%02X", *s);
     }
 }
 

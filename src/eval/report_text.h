@@ -31,6 +31,11 @@ void text_format(text *t, const char *format, ...) __attribute__((format(printf,
 
 /** Anything from outside, for content and quoted attributes: markup characters escaped, control bytes become ?, what is not UTF-8 U+FFFD. NULL is "n/a". */
 void text_escaped(text *t, const char *outside);
+/** A file name as part of a link: what is not a letter, a digit or one of -._~/ becomes %XX. */
+void text_url(text *t, const char *name);
+
+/** Add what another text holds, and free that one; its failure becomes that of `t`. */
+void text_append(text *t, text *other);
 void text_base64(text *t, const unsigned char *bytes, size_t count);
 
 /* What is not finite is "n/a", in all four. */

@@ -8,6 +8,9 @@
 #include "base/memory.h"
 #include "eval/report_image.h"
 
+/* What keeps a page to a few megabytes: three pictures a view take about 0.4 bytes for each of its pixels. The whole ones are beside it. */
+enum { PICTURES_MAX_PIXELS = 5600000, PICTURE_MAX_PIXELS = 1000000 };
+
 typedef struct ranked { double psnr; size_t index; } ranked;
 
 static int compare_psnr(const void *a, const void *b)
@@ -56,7 +59,7 @@ static void add_psnr(text *out, double psnr)
 }
 
 /** An <img>, or a line that says that there is none. */
-static void add_picture(text *out, const char *class_name, const char *what, const view_score *v, const char *path, picture_kind kind)
+static void add_picture(text *out, const char *class_name, const char *what, const view_score *v, const char *path, picture_kind kind, size_t most)
 {
     int width, height;
     report_picture_size(path, &width, &height);
@@ -65,8 +68,8 @@ static void add_picture(text *out, const char *class_name, const char *what, con
         text_format(out, "<img class=\"%s\" alt=\"%s of ", class_name, what);
         text_escaped(out, v->name);
         text_add(out, "\" src=\"");
-        report_picture(out, path, kind, &width, &height);
-        text_format(out, "\" width=\"%d\" height=\"%d\" decoding=\"async\">", width, height);
+        report_picture(out, path, kind, most, &width, &height);
+        text_format(out, "\" width=\"%d\" height=\"%d\">", width, height);
         if (width > 0 || out->status != GBT_OK)
             return;
         out->length = before; /* its head could be read, its pixels could not */
@@ -89,13 +92,14 @@ static void add_key(text *out, const char *name, double value, double absent)
     text_format(out, " data-%s=\"%.6f\"", name, isfinite(value) ? value : absent);
 }
 
-static void add_view(text *out, const view_score *v, size_t place)
+static void add_view(text *out, const evaluation *e, size_t index, size_t place, size_t most)
 {
+    const view_score *v = &e->views[index];
     int width, height;
     report_picture_size(v->render_path, &width, &height);
     if (width == 0)
         report_picture_size(v->photo_path, &width, &height);
-    text_format(out, "<figure class=\"view card\" data-place=\"%zu\"", place);
+    text_format(out, "<figure class=\"view card\" id=\"view-%zu\" data-place=\"%zu\"", index, place);
     add_key(out, "psnr", v->psnr, 1e6);
     add_key(out, "ssim", v->ssim, 1e6);
     add_key(out, "flip", v->flip, -1);
@@ -106,13 +110,13 @@ static void add_view(text *out, const view_score *v, size_t place)
     add_score(out, "SSIM", v->ssim, 4, "");
     add_score(out, "FLIP", v->flip, 4, "");
     text_add(out, "</figcaption><div class=\"pair\"><div class=\"compare\">");
-    add_picture(out, "render", "Render", v, v->render_path, PICTURE_COLOR);
-    add_picture(out, "photo", "Photo", v, v->photo_path, PICTURE_COLOR);
+    add_picture(out, "render", "Render", v, v->render_path, PICTURE_COLOR, most);
+    add_picture(out, "photo", "Photo", v, v->photo_path, PICTURE_COLOR, most);
     text_add(out, "<span class=\"tag l\">photo</span><span class=\"tag r\">render</span>"
                   "<input type=\"range\" min=\"0\" max=\"100\" step=\"0.5\" value=\"50\" aria-label=\"How much of the photo to show over the render of ");
     text_escaped(out, v->name);
     text_add(out, "\"><span class=\"handle\"></span></div><div class=\"error\">");
-    add_picture(out, "map", "FLIP error map", v, v->error_path, PICTURE_ERROR);
+    add_picture(out, "map", "FLIP error map", v, v->error_path, PICTURE_ERROR, most);
     text_add(out, "<span class=\"tag l\">FLIP error</span></div></div></figure>\n");
 }
 
@@ -128,26 +132,65 @@ static void add_color_scale(text *out)
     text_add(out, ")\"></i> 1 (different at first sight)</span>");
 }
 
-static void add_table(text *out, const evaluation *e, const size_t *order)
+/** A link to a file of the run, from the page that lies in its folder; nothing when it is elsewhere. */
+static void add_link(text *out, const char *run, const char *path, const char *name)
 {
-    text_format(out, "<details class=\"card\"><summary>All %zu views as a table</summary><div class=\"scroll\"><table class=\"list\"><thead><tr><th>View</th>"
-                     "<th>PSNR, dB</th><th>SSIM</th><th>FLIP</th><th>Gaussians</th><th>Seconds</th></tr></thead><tbody>", e->view_count);
-    for (size_t i = 0; i < e->view_count; i++) {
-        const view_score *v = &e->views[order[i]];
-        text_add(out, "<tr><th>");
-        text_escaped(out, v->name);
-        text_add(out, "</th><td>");
-        add_psnr(out, v->psnr);
-        text_add(out, "</td><td>");
-        text_number(out, v->ssim, 4);
-        text_add(out, "</td><td>");
-        text_number(out, v->flip, 4);
-        text_add(out, "</td><td>");
-        text_count(out, (double)v->gaussians);
-        text_add(out, "</td><td>");
-        text_number(out, v->seconds, 3);
-        text_add(out, "</td></tr>");
-    }
+    const size_t length = strlen(run);
+    if (strncmp(path, run, length) != 0)
+        return;
+    path += length;
+    path += strspn(path, "/");
+    text_add(out, " <a href=\"");
+    text_url(out, path);
+    text_format(out, "\">%s</a>", name);
+}
+
+static void add_cell(text *out, double value, int decimals)
+{
+    text_format(out, "<td data-value=\"%.9g\">", isfinite(value) ? value : value > 0 ? 1e9 : -1e9);
+    if (decimals == 2)
+        add_psnr(out, value);
+    else if (decimals == 0)
+        text_count(out, value);
+    else
+        text_number(out, value, decimals);
+}
+
+static void add_row(text *out, const char *run, const evaluation *e, size_t index, size_t place, double low, double high)
+{
+    const view_score *v = &e->views[index];
+    text_format(out, "<tr data-place=\"%zu\"><th><a href=\"#view-%zu\">", place, index);
+    text_escaped(out, v->name);
+    text_add(out, "</a></th>");
+    add_cell(out, v->psnr, 2);
+    const double share = isfinite(v->psnr) && high > low ? (v->psnr - low) / (high - low) : 1;
+    text_format(out, "<i class=\"meter\" style=\"--share:%.0f%%\"></i></td>", 100 * fmin(fmax(share, 0), 1));
+    add_cell(out, v->ssim, 4);
+    text_add(out, "</td>");
+    add_cell(out, v->flip, 4);
+    text_add(out, "</td>");
+    add_cell(out, (double)v->gaussians, 0);
+    text_add(out, "</td>");
+    add_cell(out, v->seconds, 3);
+    text_add(out, "</td><td class=\"links\">");
+    add_link(out, run, v->render_path, "render");
+    add_link(out, run, v->photo_path, "photo");
+    add_link(out, run, v->error_path, "error");
+    text_add(out, "</td></tr>");
+}
+
+static void add_table(text *out, const char *run, const evaluation *e, const size_t *order)
+{
+    double low = INFINITY, high = -INFINITY;
+    for (size_t i = 0; i < e->view_count; i++)
+        if (isfinite(e->views[i].psnr))
+            low = fmin(low, e->views[i].psnr), high = fmax(high, e->views[i].psnr);
+    low = floor(low - 1); /* so that the worst has a bar too */
+    text_format(out, "<details class=\"card\" open><summary>All %zu views as a table</summary><div class=\"scroll\"><table class=\"list sortable\"><thead><tr>"
+                     "<th data-sort=\"text\">View</th><th data-sort=\"number\">PSNR, dB</th><th data-sort=\"number\">SSIM</th><th data-sort=\"number\">FLIP</th>"
+                     "<th data-sort=\"number\">Gaussians</th><th data-sort=\"number\">Seconds</th><th>Whole pictures</th></tr></thead><tbody>", e->view_count);
+    for (size_t i = 0; i < e->view_count; i++)
+        add_row(out, run, e, order[i], i, low, high);
     text_add(out, "</tbody></table></div></details>\n");
 }
 
@@ -163,9 +206,9 @@ static bool are_tall(const evaluation *e, const size_t *shown, size_t count)
     return 2 * tall > count;
 }
 
-void report_views(text *out, const evaluation *e, const char *protocol)
+void report_views(text *out, const char *run, const evaluation *e, const char *protocol)
 {
-    text_add(out, "<section><h2>Held-out views</h2>\n");
+    text_add(out, "<section id=\"views\"><h2>Held-out views</h2>\n");
     size_t shown[REPORT_MAX_VIEWS], *order = NULL;
     if (e->view_count == 0) {
         text_add(out, "<p class=\"none\">n/a: every photo was trained on, none was held out. Train with <code>--eval-split every=8</code> to see how the scene "
@@ -187,15 +230,16 @@ void report_views(text *out, const evaluation *e, const char *protocol)
                   "<option value=\"flip down\">worst FLIP first</option></select></label>");
     add_color_scale(out);
     text_format(out, "</div>\n<div class=\"views%s\">\n", are_tall(e, shown, count) ? " tall" : "");
+    const size_t most = count > PICTURES_MAX_PIXELS / PICTURE_MAX_PIXELS ? PICTURES_MAX_PIXELS / count : PICTURE_MAX_PIXELS;
     for (size_t i = 0; i < count && out->status == GBT_OK; i++)
-        add_view(out, &e->views[shown[i]], i);
+        add_view(out, e, shown[i], i, most);
     text_add(out, "</div>\n");
     if (protocol != NULL) {
         text_add(out, "<p class=\"note\">How it is scored: ");
         text_escaped(out, protocol);
         text_add(out, ".</p>\n");
     }
-    add_table(out, e, order);
+    add_table(out, run, e, order);
     text_add(out, "</section>\n");
     mem_free(order);
 }

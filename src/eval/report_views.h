@@ -7,8 +7,8 @@
 
 enum { REPORT_MAX_VIEWS = 24 }; /* of more, a third each: worst, middle, best */
 
-/** Add the section, worst PSNR first. `protocol`: how scores are made, one sentence; NULL: nothing is said. */
-void report_views(text *out, const evaluation *e, const char *protocol);
+/** Add the section, worst PSNR first. Pictures below the folder `run` get links. `protocol`: how scores are made, one sentence; NULL: nothing is said. */
+void report_views(text *out, const char *run, const evaluation *e, const char *protocol);
 
 /**
  * Which views to show, worst first (without a score: last).

@@ -1,6 +1,7 @@
 /* eval/study_crosscheck_write.c -- the study "tracer against rasterizer" as tables, as data, as a chart and as a page. */
 #include <jansson.h>
 #include <math.h>
+#include <stdint.h>
 
 #include "base/fail.h"
 #include "base/file.h"
@@ -185,7 +186,7 @@ static void add_page_view(const cross_model *model, const cross_view *v, const c
     text_format(out, ": %zu Gaussians%s</figcaption>", v->gaussians, v->stand_in ? "; without the camera's lens" : "");
     if (file_join(path, sizeof path, folder, v->sheet, out->err) == GBT_OK) {
         text_add(out, "<img style=\"width:100%;height:auto\" alt=\"tracer, splats and differences\" src=\"");
-        report_picture(out, path, PICTURE_COLOR, &width, &height);
+        report_picture(out, path, PICTURE_COLOR, SIZE_MAX, &width, &height);
         text_add(out, "\">");
     }
     text_add(out, "<div class=\"scroll\"><table class=\"list\"><thead><tr><th>row</th><th>limit</th><th>value</th><th>pass</th></tr></thead><tbody>");

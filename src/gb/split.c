@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
+#include "base/compare.h"
 #include "base/parallel.h"
 #include "base/symmetric.h"
 
@@ -38,12 +39,6 @@ void split_axes(const double covariance[6], double axes[3][3])
         if (axis[decides] < 0)
             axis[0] = -axis[0], axis[1] = -axis[1], axis[2] = -axis[2];
     }
-}
-
-static int compare_doubles(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
 }
 
 static double median3(double a, double b, double c)

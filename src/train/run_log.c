@@ -156,6 +156,9 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     json_object_set_new(root, "eval_split", json_string(t->def.eval_split));
     json_object_set_new(root, "seed", json_integer((json_int_t)t->def.seed));
     json_object_set_new(root, "threads", json_integer(parallel_threads()));
+    char processor[128];
+    cpu_processor_name(processor, sizeof processor);
+    json_object_set_new(root, "processor", json_string(processor));
     json_object_set_new(root, "isa", json_string(cpu_isa_name(cpu_best_isa())));
     json_object_set_new(root, "embree_version", json_string(bvh_embree_version()));
     json_object_set_new(root, "peak_memory_bytes", json_integer((json_int_t)mem_peak_bytes()));

@@ -217,6 +217,65 @@ printf 'v 0 0 0\nf 1 2 3\n' >wall.obj
 misuse 3 "wall.obj:2: no such vertex: 2 (there are 1 so far)" render tiny -o o --camera c.json --insert i.json
 misuse 4 "i2.json: cannot open: No such file or directory" render tiny -o o --camera c.json --insert i2.json
 
+# ---- films of the same run
+film() { # name, number of frames, folder, arguments...
+    name=$1
+    wanted=$2
+    folder=$3
+    shift 3
+    "$program" render tiny -o "$folder" "$@" >out 2>err
+    got=$?
+    [ "$got" = 0 ] && [ "$(ls "$folder" | wc -l)" = "$wanted" ] && [ -s "$folder/frame_0000$wanted.png" ] && grep -q "^$wanted frames rendered into $folder, " err
+    report $? "$name" "  wanted 0 and $wanted frames, got $got: $(cat err) $(ls "$folder")"
+}
+film "a film around the scene" 3 around --path orbit --frames 3 --threads 1
+film "a film on three threads" 3 around-3 --path orbit --frames 3 --threads 3
+for frame in 1 2 3; do
+    cmp -s around/frame_0000$frame.png around-3/frame_0000$frame.png
+    report $? "frame $frame does not depend on the threads" ""
+done
+film "a film through the cameras" 4 through --path interpolate --frames 4 --size 20x10
+printf '{"frames": 5, "fps": 12, "up": [0, -1, 0], "fov_x_deg": 50, "width": 24, "height": 16, "cameras": [
+    {"origin": [0, -2, -3], "target": [0, 0, 0]}, {"origin": [1, -2, -3], "target": [0, 0, 0]}]}' >path.json
+film "a film along a file" 5 along --path path.json
+cmp -s along/frame_00001.png plain/c.png
+report $? "its first frame is what that camera takes" "$(ls -l along plain)"
+misuse 2 "--frames, --fps, --size: of a path (wanted --path)" render tiny -o o --frames 3
+misuse 2 "film.mp4: a film wants --path" render tiny -o film.mp4
+misuse 2 "--path: not with --camera" render tiny -o o --path orbit --camera c.json
+misuse 2 "--downscale: not with a path file (wanted --size)" render tiny -o o --path path.json --downscale 2
+misuse 2 "--outputs: not with a film (wanted -o DIR)" render tiny -o film.mp4 --path orbit --outputs depth
+misuse 2 "film.mp4: 21 x 10 pixels (wanted even numbers: films keep colours for 2 x 2 pixels)" render tiny -o film.mp4 --path orbit --size 21x10
+for bad in 20x10x5 -3x4; do
+    misuse 2 "--size: bad value (wanted WxH like 1280x720, got $bad)" render tiny -o o --path orbit --size="$bad"
+done
+misuse 4 "none.json: cannot open: No such file or directory" render tiny -o o --path none.json
+printf '{}' >path.json
+misuse 3 "path.json: not a camera path (wanted \"cameras\", or nerfstudio's \"camera_path\")" render tiny -o o --path path.json
+PATH=/nowhere "$program" render tiny -o film.mp4 --path orbit --frames 2 >out 2>err
+got=$?
+[ "$got" = 4 ] && [ "$(cat err)" = "error: film.mp4: a film wants the program ffmpeg, which is not there (install it, or give a folder for pictures)" ] && [ ! -e film.mp4 ]
+report $? "a film without ffmpeg" "  got $got: $(cat err)"
+if command -v ffmpeg >/dev/null; then
+    "$program" render tiny -o film.gif --path orbit --frames 2 >out 2>err && [ "$(head -c 4 film.gif)" = GIF8 ] && [ ! -e .film.gif.tmp ]
+    report $? "a film with ffmpeg" "$(cat err)"
+fi
+# ---- the page of a run, made again with the chart of a study
+cp tiny/report.html before.html
+for part in 'From above' 'From the side' 'alt="Points"' 'alt="Granular balls"' 'alt="Anchors"' 'alt="The photo"'; do
+    [ "$(grep -c -e "$part" tiny/report.html)" -ge 1 ]
+    report $? "the page has: $part" "$(wc -c tiny/report.html)"
+done
+mkdir charts
+printf '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><circle r="3"/></svg>' >charts/speed.svg
+"$program" report tiny >out 2>err && cmp -s before.html tiny/report.html
+report $? "report makes the same page again" "$(cat err)"
+"$program" report tiny charts >out 2>err && [ "$(grep -c 'Speed against accuracy.*data:image/svg+xml;base64,PHN2' tiny/report.html)" = 1 ] &&
+    grep -q '^tiny/report.html: 0 held-out views$' err
+report $? "report takes the charts of studies" "$(cat err)"
+misuse 4 "no-charts: no such file or folder (wanted what gbtrace study wrote)" report tiny no-charts
+misuse 4 "nothing/metrics.json: cannot open: No such file or directory" report nothing
+
 # ---- Gaussians: time, speed against accuracy
 {
     printf 'ply\nformat ascii 1.0\nelement vertex 60\n'

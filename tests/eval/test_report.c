@@ -4,9 +4,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/camera_pose.h"
 #include "base/file.h"
 #include "base/image.h"
 #include "base/memory.h"
+#include "base/rng.h"
 #include "eval/report.h"
 #include "eval/report_chart.h"
 #include "eval/report_image.h"
@@ -82,16 +84,17 @@ static char *read_page(void)
     char *page = malloc(count + 1);
     assert_non_null(page);
     for (size_t i = 0; i < count;) {
-        static const char start[] = "data:image/jpeg;base64,";
-        if (strncmp((char *)bytes + i, start, sizeof start - 1) == 0) {
+        static const char start[] = "data:image/jpeg;base64,", other_start[] = "data:image/png;base64,";
+        const bool is_jpeg = strncmp((char *)bytes + i, start, sizeof start - 1) == 0;
+        if (is_jpeg || strncmp((char *)bytes + i, other_start, sizeof other_start - 1) == 0) {
             memcpy(page + used, "PIXELS", 6), used += 6;
-            i += sizeof start - 1;
+            i += is_jpeg ? sizeof start - 1 : sizeof other_start - 1;
             const size_t first = i;
             while (isalnum(bytes[i]) || bytes[i] == '+' || bytes[i] == '/' || bytes[i] == '=')
                 i++;
             assert_int_equal((i - first) % 4, 0);
             assert_int_equal(bytes[i], '"');
-            assert_memory_equal(bytes + first, "/9j/", 4); /* FF D8 FF: a JPEG */
+            assert_memory_equal(bytes + first, is_jpeg ? "/9j/" : "iVBO", 4); /* FF D8 FF: a JPEG; 89 50 4E: a PNG */
         } else {
             page[used++] = (char)bytes[i++];
         }
@@ -200,13 +203,15 @@ static char *check_page(void)
 static const char log_header[] = "step,seconds,progress,width,height,loss,l1,ssim,train_psnr,test_psnr,anchors,gaussians,visible_anchors,blended_per_ray,"
                                  "rays_per_second,memory_bytes\n";
 
+static const char stage_names[] = ",photo_ms,rays_ms,visible_ms,decode_ms,build_ms,trace_ms,loss_ms,adjoint_ms,decode_adjoint_ms,optimizer_ms,adjust_ms\n";
+
 static void write_log(int rows, const char *tail)
 {
-    char *csv = malloc((size_t)rows * 128 + 4096);
+    char *csv = malloc((size_t)rows * 192 + 4096);
     assert_non_null(csv);
-    int used = sprintf(csv, "%s", log_header);
+    int used = sprintf(csv, "%.*s%s", (int)strlen(log_header) - 1, log_header, stage_names);
     for (int i = 0; i < rows; i++)
-        used += sprintf(csv + used, "%d,%.3f,0.1,%d,%d,%.6f,0.1,0.5,%.4f,,%d,%d,300,20.5,%d,1000\n", 10 * (i + 1), 1.01 * (i + 1), i < rows / 2 ? 120 : 240,
+        used += sprintf(csv + used, "%d,%.3f,0.1,%d,%d,%.6f,0.1,0.5,%.4f,,%d,%d,300,20.5,%d,1000,1,2,3,4,5,6,7,8,9,10,11\n", 10 * (i + 1), 1.01 * (i + 1), i < rows / 2 ? 120 : 240,
                         i < rows / 2 ? 90 : 180, 0.4 / (1 + i), 10 + 15.0 * i / rows, 1000 + i, 5000 + 7 * i, 400000 + 100 * i);
     strcpy(csv + used, tail);
     write_text("log.csv", csv);
@@ -249,7 +254,7 @@ static void write_pictures(void)
 
 static char *write_report(const evaluation *e, const json_t *metrics)
 {
-    assert_ok(report_write(folder, e, metrics, &assert_ok_err_));
+    assert_ok(report_write(folder, e, metrics, NULL, &assert_ok_err_));
     return check_page();
 }
 
@@ -289,12 +294,12 @@ static void whole_page(void **state)
 typedef struct bare_case { const char *name, *log; bool has_metrics; size_t views; bool has_pictures; size_t empty_charts; } bare_case;
 
 static const bare_case bare_cases[] = {
-    {"nothing at all", NULL, false, 0, false, 5},
+    {"nothing at all", NULL, false, 0, false, 8},
     {"no views", "full", true, 0, false, 0},
-    {"no log: the PSNR chart still has its points", NULL, true, 2, true, 3},
-    {"an empty log", "", true, 2, true, 3},
-    {"a header alone", "header", true, 2, true, 3},
-    {"a log of something else", "a,b\n1,2\n", true, 1, true, 3},
+    {"no log: the PSNR chart still has its points", NULL, true, 2, true, 6},
+    {"an empty log", "", true, 2, true, 6},
+    {"a header alone", "header", true, 2, true, 6},
+    {"a log of something else", "a,b\n1,2\n", true, 1, true, 6},
     {"pictures are gone", "full", true, 2, false, 0},
 };
 
@@ -330,6 +335,84 @@ static void bare_page(void **state)
     free(page);
     json_decref(metrics);
     free(e.views);
+}
+
+/* ---- the scene ---------------------------------------------------------------------------------------------------------------- */
+
+enum { POINTS = 200, VIEWS = 5 };
+
+/** A cloud in a box, an untrained model of it, cameras around it; the photos are the pictures of this folder. Free with loaded_run_close(). */
+static loaded_run *make_run(gbt_camera_model lens)
+{
+    loaded_run *r = calloc(1, sizeof *r);
+    assert_non_null(r);
+    r->def = gbt_train_def_default(), r->settings = trace_settings_default();
+    scene *s = &r->scene;
+    s->view_count = VIEWS, s->points.count = POINTS, s->points.has_color = true;
+    s->views = mem_calloc(VIEWS, sizeof *s->views, "views", NULL);
+    s->points.position = mem_calloc(POINTS, 3 * sizeof(float), "points", NULL), s->points.color = mem_calloc(POINTS, 3 * sizeof(float), "points", NULL);
+    r->model.anchors.offset_count = 2, r->model.voxel_size = 0.1f;
+    assert_ok(anchors_resize(&r->model.anchors, POINTS, &assert_ok_err_));
+    assert_ok(decoder_init(&r->model.decoder, 2, false, 1, &assert_ok_err_));
+    for (uint64_t i = 0; i < 3 * POINTS; i++) {
+        s->points.position[i] = r->model.anchors.position[i] = 2 * rng_uniform(1, 0, i) - 1;
+        s->points.color[i] = rng_uniform(2, 0, i);
+    }
+    for (size_t i = 0; i < 6 * POINTS; i++)
+        r->model.anchors.scale_log[i] = -2;
+    for (int i = 0; i < VIEWS; i++) {
+        const double at[3] = {4 * cos(i), -1, 4 * sin(i)}, middle[3] = {0, 0, 0}, up[3] = {0, -1, 0};
+        scene_view *v = &s->views[i];
+        char name[32];
+        snprintf(name, sizeof name, "view_%d<&>.jpg", i);
+        v->name = strdup(name), v->path = mem_calloc(VIEW_PATH_SIZE, 1, "path", NULL), v->is_test = i < 2;
+        in_folder(v->path, "photo.png");
+        v->camera = (gbt_camera){.model = lens, .width = 24, .height = 16, .params = {24, 24, 12, 8}};
+        assert_true(camera_look_at(at, middle, up, &v->camera));
+    }
+    assert_ok(photos_open(&r->photos, s, 1, &assert_ok_err_));
+    return r;
+}
+
+static void close_run(loaded_run *r)
+{
+    for (int i = 0; i < VIEWS; i++) { /* strdup's are free()'s */
+        free(r->scene.views[i].name);
+        r->scene.views[i].name = NULL;
+    }
+    loaded_run_close(r);
+    free(r);
+}
+
+static void scene_on_the_page(void **state)
+{
+    (void)state;
+    static const struct { gbt_camera_model lens; size_t layers; bool has_photos, has_points; } cases[] = {
+        {GBT_CAMERA_PINHOLE, 6, true, true}, {GBT_CAMERA_PINHOLE, 5, false, true}, {GBT_CAMERA_PINHOLE, 4, true, false}, {GBT_CAMERA_EQUIRECTANGULAR, 0, true, true}};
+    write_log(5, "");
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        write_pictures();
+        evaluation e = make_views(2);
+        loaded_run *r = make_run(cases[i].lens);
+        for (size_t k = 0; k < 2; k++)
+            snprintf(e.views[k].name, sizeof e.views[k].name, "%s", r->scene.views[k].name);
+        if (!cases[i].has_photos)
+            remove_file("photo.png");
+        if (!cases[i].has_points)
+            r->scene.points.count = 0;
+        snprintf(r->model.config, sizeof r->model.config, "init = gb\nnoise\nseed = <7>\n");
+        assert_ok(report_write(folder, &e, NULL, &(report_more){.open = r}, &assert_ok_err_));
+        char *page = check_page();
+        assert_int_equal(occurrences(page, "<figure class=\"card\"><img"), cases[i].layers);
+        assert_int_equal(occurrences(page, "class=\"camera\""), 2 * (VIEWS - 2));
+        assert_int_equal(occurrences(page, "class=\"camera held\""), 2 * 2);
+        assert_int_equal(occurrences(page, "href=\"#view-1\""), 2 + 1); /* both maps, and the table */
+        assert_int_equal(occurrences(page, "href=\"PIXELS\""), 2);
+        assert_int_equal(occurrences(page, "<th>seed</th><td>&lt;7&gt;</td>"), 1);
+        free(page);
+        close_run(r);
+        free(e.views);
+    }
 }
 
 /** Values that no sane run has, of the wrong type or out of range. */
@@ -381,7 +464,7 @@ static void many_views(void **state)
         char *page = write_report(&e, NULL);
         assert_int_equal(occurrences(page, "class=\"compare\""), shown_count);
         assert_int_equal(occurrences(page, "Shown are 24 of "), count > REPORT_MAX_VIEWS);
-        assert_int_equal(occurrences(page, "<tr><th>view_"), count); /* the table has them all */
+        assert_int_equal(occurrences(page, "<tr data-place="), count); /* the table has them all */
         free(page);
         free(e.views);
     }
@@ -409,7 +492,7 @@ static void no_memory(void **state)
         gbt_error err = {0};
         assert_true(n < 500);
         mem_fail_after(n);
-        status = report_write(folder, &e, metrics, &err);
+        status = report_write(folder, &e, metrics, NULL, &err);
         mem_fail_after(-1);
         if (status == GBT_OK)
             break;
@@ -427,7 +510,7 @@ static void not_a_folder(void **state)
     (void)state;
     evaluation e = {0};
     gbt_error err = {0};
-    assert_int_equal(report_write("/nonexistent/run", &e, NULL, &err), GBT_ERR_IO);
+    assert_int_equal(report_write("/nonexistent/run", &e, NULL, NULL, &err), GBT_ERR_IO);
     assert_non_null(strstr(err.text, "/nonexistent/run/report.html"));
 }
 
@@ -652,14 +735,15 @@ static void error_colors_are_even(void **state)
 static void large_pictures_shrink(void **state)
 {
     (void)state;
-    static const struct { int width, height, out_width, out_height; } cases[] = {{1280, 8, 1280, 8}, {1281, 8, 640, 4}, {4, 2570, 1, 856}, {2600, 1, 2600, 1}};
+    static const struct { int width, height, out_width, out_height; } cases[] = {{1280, 8, 1280, 8}, {1281, 8, 640, 4}, {4, 2570, 1, 856}, {2600, 1, 2600, 1}, {400, 300, 200, 150}};
+    const size_t most = 100 * 1000;
     char path[VIEW_PATH_SIZE];
     in_folder(path, "render.png");
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         write_picture("render.png", cases[i].width, cases[i].height, 3, 0.5f);
         text t = {0};
         int width, height;
-        assert_int_equal(report_picture(&t, path, PICTURE_COLOR, &width, &height), GBT_OK);
+        assert_int_equal(report_picture(&t, path, PICTURE_COLOR, most, &width, &height), GBT_OK);
         assert_int_equal(width, cases[i].out_width);
         assert_int_equal(height, cases[i].out_height);
         assert_true(t.length > 100);
@@ -667,7 +751,7 @@ static void large_pictures_shrink(void **state)
     }
     text t = {0};
     int width, height;
-    assert_int_equal(report_picture(&t, "/nonexistent.png", PICTURE_COLOR, &width, &height), GBT_OK);
+    assert_int_equal(report_picture(&t, "/nonexistent.png", PICTURE_COLOR, most, &width, &height), GBT_OK);
     assert_int_equal(width, 0);
     assert_int_equal(t.length, 0);
 }
@@ -682,6 +766,7 @@ int main(void)
     tests[count++] = (struct CMUnitTest){.name = rows[i].name, .test_func = function, .initial_state = (void *)(uintptr_t)&rows[i]}
     ADD(whole_page);
     ADD_ROWS(bare_page, bare_cases);
+    ADD(scene_on_the_page);
     ADD(odd_metrics);
     ADD(many_views);
     ADD(no_memory);

@@ -1,0 +1,17 @@
+/* eval/report_studies.h -- charts that studies left, as a section of the page. */
+#ifndef GBT_EVAL_REPORT_STUDIES_H
+#define GBT_EVAL_REPORT_STUDIES_H
+
+#include <stdbool.h>
+
+#include "eval/report_text.h"
+
+/**
+ * Add every SVG file of RUN, of RUN/studies and of the given folders, or those given by name; nothing when there is none.
+ *
+ * They go in as pictures: whatever they hold, nothing in them runs or is loaded. Files that cannot be read, or are larger than a megabyte, are
+ * left out with a warning.
+ */
+void report_studies(text *out, const char *run, const char *const *studies, size_t count);
+
+#endif

@@ -1,6 +1,7 @@
 /* gbtrace/status.h -- how every entry of the library reports failure.
 
-   A status says what kind of failure it was; an error adds one line for a person. Nothing in the library prints or exits. */
+   A status says what kind of failure it was; an error adds one line for a person. Nothing in the library exits; what it
+   tells meanwhile goes to whoever gbtrace/progress.h names. */
 #ifndef GBTRACE_STATUS_H
 #define GBTRACE_STATUS_H
 
@@ -26,6 +27,9 @@ typedef struct gbt_error {
 
 /** The exit code that a program should end with for a status: 0, 2, 3, 4, 5; 1 for GBT_ERR_INTERNAL, 130 for GBT_ERR_INTERRUPTED. */
 int gbt_status_exit_code(gbt_status status);
+
+/** Version of the library, "0.1.0". */
+const char *gbt_version(void);
 
 #ifdef __cplusplus
 }

@@ -48,6 +48,7 @@ typedef struct gbt_train_def {
     double save_every_seconds;  /* wall time between checkpoints; 0: only at the end. Default 120 */
     uint64_t save_at_step;      /* one extra checkpoint right after this step; 0: none. Default 0 */
     uint64_t stop_at_step;      /* stop, as a signal would, after this step; 0: never. Default 0 */
+    bool tensorboard;           /* also write `run`/events.out.tfevents.0.train: scalars of log.csv. Default false */
     bool resume;                /* go on from the run's last checkpoint; everything else comes from there */
     double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* held-out PSNR after so many seconds of training; the clock stops meanwhile */
     int eval_at_count;

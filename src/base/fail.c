@@ -33,3 +33,8 @@ int gbt_status_exit_code(gbt_status status)
     }
     return 1;
 }
+
+const char *gbt_version(void)
+{
+    return GBT_VERSION;
+}

@@ -10,7 +10,7 @@ static int run(const command *self, int argc, char **argv)
     const option options[] = {
         {.name = "sh-degree", .kind = OPTION_INT, .value = &def.sh_degree, .min = 0, .max = 3, .value_name = "N", .help = "how colours depend on the direction: spherical harmonics up to this"},
         {.name = "refine", .kind = OPTION_INT, .value = &def.refine_steps, .min = 0, .max = 100000, .value_name = "N", .help = "steps that fit the Gaussians to the model's own pictures"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "data set in place of the one it was trained on"},
+        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "data set in place of the one it was trained on", .aliases = "s source-path"},
         {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the figures there"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
     };

@@ -7,7 +7,7 @@ static void write_names(const command *self, const option *options, int option_c
     fprintf(out, "    %s%s%s) options='", self->name, self->alias != NULL ? "|" : "", self->alias != NULL ? self->alias : "");
     for (int i = 0; i < option_count; i++)
         if (options[i].kind != OPTION_ELSEWHERE)
-            describe_names(out, &options[i], i > 0 ? " " : "", false);
+            describe_names(out, &options[i], " ", false);
     fputs("' ;;\n", out);
 }
 

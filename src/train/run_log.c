@@ -81,6 +81,13 @@ static gbt_status rewind_rows(const char *csv_path, uint64_t step, gbt_error *er
     return status;
 }
 
+static void flush_events(run_log *log)
+{
+    fwrite(log->records.bytes, 1, log->records.count, log->events);
+    fflush(log->events);
+    log->records.count = 0;
+}
+
 /* The same for TensorBoard, which is also told that steps may come again. */
 static gbt_status rewind_events(run_log *log, const char *path, uint64_t step, gbt_error *err)
 {
@@ -98,14 +105,9 @@ static gbt_status rewind_events(run_log *log, const char *path, uint64_t step, g
     mem_free(bytes);
     if (status == GBT_OK && (log->events = fopen(path, "ab")) == NULL)
         status = base_fail(err, GBT_ERR_IO, "%s: cannot write", path);
+    if (status == GBT_OK)
+        flush_events(log);
     return status;
-}
-
-static void flush_events(run_log *log)
-{
-    fwrite(log->records.bytes, 1, log->records.count, log->events);
-    fflush(log->events);
-    log->records.count = 0;
 }
 
 gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, const char *events_path, gbt_error *err)
@@ -204,6 +206,8 @@ void run_log_evaluation(run_log *log, const trainer *t, double psnr)
 
 gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path, gbt_error *err)
 {
+    if (log->row.steps > 0)
+        write_row(log, t, log->last.width, log->last.height, (double)NAN);
     tell_progress(log, t);
     const run_sums *s = &log->all;
     const double n = s->steps > 0 ? (double)s->steps : 1, ms = 1000 / n;

@@ -88,7 +88,7 @@ void describe_bash(FILE *out)
           "    elif [ \"$want\" != none ]; then\n"
           "        compopt -o filenames 2>/dev/null\n"
           "        local IFS=$'\\n'\n"
-          "        [ \"$want\" = folder ] && COMPREPLY=($(compgen -d -- \"$current\")) || COMPREPLY=($(compgen -f -- \"$current\"))\n"
+          "        COMPREPLY=($(compgen -A $([ \"$want\" = folder ] && echo directory || echo file) -- \"$current\"))\n"
           "    fi\n"
           "}\n"
           "complete -F _gbtrace gbtrace\n", out);

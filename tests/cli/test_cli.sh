@@ -3,21 +3,10 @@
 set -u
 program=$1
 shared=${2:-}
+. "$(dirname "$0")/report.sh"
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
-passed=0
-failed=0
-
-report() { # ok?, name, details
-    if [ "$1" = 0 ]; then
-        passed=$((passed + 1))
-    else
-        failed=$((failed + 1))
-        printf 'FAILED: %s\n%s\n' "$2" "$3"
-    fi
-}
-
 # misuse CODE MESSAGE ARGUMENTS...: exactly one line on stderr, nothing on stdout.
 misuse() {
     code=$1
@@ -347,7 +336,4 @@ if [ -n "$shared" ] && [ -d "$shared/data/fox" ]; then
     prints "info of real photos: split" '^  views     50: 43 to train, 7 held out$' info "$shared/data/fox"
 fi
 
-printf '[  PASSED  ] %d test(s).\n' "$passed"
-[ "$failed" -eq 0 ] && exit 0
-printf '[  FAILED  ] %d test(s), listed above\n\n %d FAILED TEST(S)\n' "$failed" "$failed"
-exit 1
+finish

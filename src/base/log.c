@@ -5,7 +5,9 @@
 #include <pthread.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include "base/clock.h"
@@ -25,16 +27,25 @@ void gbt_listen(gbt_listener *to, void *context)
     listener = to, listener_context = context;
 }
 
+/* Where a line can be written over. */
 static bool on_terminal(void)
 {
-    return isatty(STDERR_FILENO);
+    const char *kind = getenv("TERM");
+    return isatty(STDERR_FILENO) && kind != NULL && strcmp(kind, "dumb") != 0;
+}
+
+/* A line that wraps cannot be written over. */
+static int terminal_width(void)
+{
+    struct winsize size;
+    return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col - 1 : LINE_SIZE;
 }
 
 static void print_event(const gbt_event *e)
 {
     const bool over = e->kind == GBT_EVENT_PROGRESS && on_terminal();
     if (over)
-        fprintf(stderr, "\r%s\033[K", e->text); /* to the end of the line: the one before may have been longer */
+        fprintf(stderr, "\r%.*s\033[K", terminal_width(), e->text); /* to the end of the line: the one before may have been longer */
     else
         fprintf(stderr, "%s%s%s\n", line_is_open ? "\n" : "", e->kind == GBT_EVENT_WARNING ? "warning: " : "", e->text);
     line_is_open = over && e->fraction < 1;

@@ -34,6 +34,13 @@ void describe_escaped(FILE *out, const char *text, const char *special)
         fprintf(out, strchr(special, *text) != NULL ? "\\%c" : "%c", *text);
 }
 
+void describe_words(FILE *out, const command *c)
+{
+    const char *const *words = c->words != NULL ? c->words() : NULL;
+    for (int i = 0; words != NULL && words[i] != NULL; i++)
+        fprintf(out, "%s%s", i > 0 ? " " : "", words[i]);
+}
+
 void describe_names(FILE *out, const option *o, const char *before, bool all)
 {
     if (o->short_name != 0)

@@ -24,6 +24,9 @@ void describe_choices(const option *o, char *out, size_t size);
 /** `text` with a backslash before every byte of `special`. */
 void describe_escaped(FILE *out, const char *text, const char *special);
 
+/** What the first operand of `c` may be, with blanks between; nothing where that is anything. */
+void describe_words(FILE *out, const command *c);
+
 /** Every name of a row with its dashes, after `before` each: aliases too when `all`. */
 void describe_names(FILE *out, const option *o, const char *before, bool all);
 

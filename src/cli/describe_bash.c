@@ -69,10 +69,8 @@ void describe_bash(FILE *out)
     for (int i = 0; i < command_list_count; i++) {
         if (command_list[i]->words == NULL)
             continue;
-        const char *const *words = command_list[i]->words();
         fprintf(out, "        %s) want=none words='", command_list[i]->name);
-        for (int w = 0; words[w] != NULL; w++)
-            fprintf(out, "%s%s", w > 0 ? " " : "", words[w]);
+        describe_words(out, command_list[i]);
         fputs("' ;;\n", out);
     }
     fputs("        esac\n"

@@ -33,10 +33,8 @@ static void write_rows(const command *self, const option *options, int option_co
     }
     if (self->words == NULL)
         return;
-    const char *const *words = self->words();
     fprintf(out, "complete -c gbtrace -n '__fish_seen_subcommand_from %s; and test (count (commandline -opc)) -eq 2' -f -a '", self->name);
-    for (int w = 0; words[w] != NULL; w++)
-        fprintf(out, "%s%s", w > 0 ? " " : "", words[w]);
+    describe_words(out, self);
     fputs("'\n", out);
 }
 

@@ -42,9 +42,7 @@ static void write_rows(const command *self, const option *options, int option_co
     }
     if (self->words != NULL) {
         fputs(" \\\n      '1:what:(", out);
-        const char *const *words = self->words();
-        for (int w = 0; words[w] != NULL; w++)
-            fprintf(out, "%s%s", w > 0 ? " " : "", words[w]);
+        describe_words(out, self);
         fputs(")'", out);
     }
     fputs(" \\\n      '*:file:_files'\n    ;;\n", out);

@@ -61,7 +61,7 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
         {.name = "save-iterations", .kind = OPTION_ELSEWHERE, .aliases = "checkpoint-iterations", .help = "use --save-every 2m"},
         {.name = "start-checkpoint", .kind = OPTION_ELSEWHERE, .help = "use --resume with the same -o RUN"},
         {.name = "data-device", .kind = OPTION_ELSEWHERE, .aliases = "gpu", .help = "everything runs on the CPU; leave it out"},
-        {.name = "ip", .kind = OPTION_ELSEWHERE, .aliases = "port", .help = "training has no viewer; --progress json or --tensorboard tell how it goes"},
+        {.name = "ip", .kind = OPTION_ELSEWHERE, .aliases = "port", .help = "gbtrace view RUN shows a run while it trains"},
         {.name = "lambda-dssim", .kind = OPTION_ELSEWHERE, .help = "it is 0.2; leave it out"},
         {.name = "densify-until-iter", .kind = OPTION_ELSEWHERE, .aliases = "update-until densify-from-iter start-stat update-from", .help = "use --grow-until F, a part of the run"},
         {.name = "densify-grad-threshold", .kind = OPTION_ELSEWHERE, .aliases = "densification-interval opacity-reset-interval percent-dense update-interval",

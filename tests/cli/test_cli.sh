@@ -312,6 +312,9 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
         [ "$(grep -c '"psnr_to_model": ' plain.json)" = 4 ] && [ "$(head -c 4 plain.glb)" = glTF ] && "$program" export plain.spz back.ply >>out 2>>err &&
         [ "$(grep -a '^element vertex' back.ply)" = "$(grep -a '^element vertex' plain.ply)" ]
     report $? "export bakes a run into every format, and converts" "$(cat err out)"
+    "$program" export plain.spz -o named.ply >out 2>err && cmp -s named.ply back.ply
+    report $? "export takes -o too" "$(cat err out)"
+    misuse 2 "argument missing (usage: $("$program" export --help | sed -n 's/^usage: \(.*\) \[options\]$/\1/p'))" export run
     rm -f out # of the row before: an old one would be read as the address
     "$program" view run --port 0 >out 2>err &
     viewer=$!

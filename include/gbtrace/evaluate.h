@@ -15,6 +15,7 @@ typedef struct gbt_evaluate_def {
     double downscale; /* photos are divided by this, >= 1; 0: as in training. Default 0 */
     int report;       /* 1: also write RUN/report.html. Default 1 */
     const char *preset; /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is "default". Default NULL */
+    int tensorboard;  /* 1: also write RUN/events.out.tfevents.1.eval: scores, up to eight renders and photos. Default 0 */
 } gbt_evaluate_def;
 
 gbt_evaluate_def gbt_evaluate_def_default(void);

@@ -1,6 +1,7 @@
 /* gbtrace/status.h -- how every entry of the library reports failure.
 
-   A status says what kind of failure it was; an error adds one line for a person. Nothing in the library prints or exits. */
+   A status says what kind of failure it was; an error adds one line for a person. Nothing in the library exits; what it
+   tells meanwhile goes to whoever gbtrace/progress.h names. */
 #ifndef GBTRACE_STATUS_H
 #define GBTRACE_STATUS_H
 

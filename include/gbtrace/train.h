@@ -46,6 +46,7 @@ typedef struct gbt_train_def {
     double save_every_seconds;  /* wall time between checkpoints; 0: only at the end. Default 120 */
     uint64_t save_at_step;      /* one extra checkpoint right after this step; 0: none. Default 0 */
     uint64_t stop_at_step;      /* stop, as a signal would, after this step; 0: never. Default 0 */
+    bool tensorboard;           /* also write `run`/events.out.tfevents.0.train: scalars of log.csv. Default false */
     bool resume;                /* go on from the run's last checkpoint; everything else comes from there */
     double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* held-out PSNR after so many seconds of training; the clock stops meanwhile */
     int eval_at_count;
@@ -58,7 +59,7 @@ gbt_train_def gbt_train_def_default(void);
 /**
  * Train on the data set in `data`, write everything into the folder `run`.
  *
- * `run` gets model.gbt, log.csv, config, train.json and checkpoints/. Progress goes to stderr. SIGINT and SIGTERM stop after the current
+ * `run` gets model.gbt, log.csv, config, train.json and checkpoints/. What happens meanwhile goes where gbtrace/progress.h says. SIGINT and SIGTERM stop after the current
  * step: a checkpoint is saved and GBT_ERR_INTERRUPTED is returned. The same seed and length give the same model.gbt, bit for bit, for
  * any number of threads, interrupted and resumed or not.
  *

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "base/symmetric.h"
 #include "base/vec.h"
@@ -246,8 +247,10 @@ gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_ca
     gbt_status status = b.sums == NULL || b.visible == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     const frame_drawing drawing = f->draw;
     f->draw.renderer = FRAME_TRACE;
-    for (size_t i = 0; i < camera_count && status == GBT_OK; i++)
+    for (size_t i = 0; i < camera_count && status == GBT_OK; i++) {
         status = add_view(&b, f, d, &cameras[i], settings, err);
+        log_count("bake", i + 1, camera_count, (double)NAN);
+    }
     f->draw = drawing;
     if (status == GBT_OK && def->prior > 0)
         status = add_directions(&b, f, d, def->prior, err);

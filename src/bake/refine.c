@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/rng.h"
@@ -128,6 +129,7 @@ gbt_status refine_cloud(frame *teacher, const anchors *a, const decoder *d, cons
         rng_philox(def->seed, STREAM, (uint64_t)i, words);
         set_rates(&r, i, def->steps);
         status = refine_step(&r, teacher, a, d, &cameras[words[0] % camera_count], settings, words, err);
+        log_count("refine", (uint64_t)i + 1, (uint64_t)def->steps, (double)NAN);
     }
     teacher->draw.pixel_step = pixel_step;
     close_state(&r);

@@ -72,6 +72,9 @@ gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte
 /** The same as JPEG at the given quality, [1, 100]. */
 gbt_status image_encode_jpeg(const image *im, int quality, unsigned char **bytes, size_t *byte_count, gbt_error *err);
 
+/** Name and version of the library behind these, as it runs: "OpenImageIO 2.4.7". Static. */
+const char *image_library(void);
+
 #ifdef __cplusplus
 }
 #endif

@@ -1,29 +1,81 @@
-/* base/log.c -- one line to stderr. */
+/* base/log.c -- events to the listener, or to stderr. */
 #include "base/log.h"
 
+#include <math.h>
+#include <pthread.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
+#include "base/clock.h"
+
+enum { LINE_SIZE = 1024 };
+
+static const double often_seconds = 0.5, line_seconds = 10;
+
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER; /* lines of two threads never mix */
+static gbt_listener *listener;
+static void *listener_context;
 static int is_quiet = 0;
+static bool line_is_open; /* progress stands at the end of the terminal, without a newline */
 
-static void print_line(const char *prefix, const char *format, va_list args)
+void gbt_listen(gbt_listener *to, void *context)
 {
-    /* One write per line, so that lines of two threads never mix. */
-    char line[1024];
-    int used = snprintf(line, sizeof line, "%s", prefix);
-    const int more = vsnprintf(line + used, sizeof line - (size_t)used - 1, format, args);
-    used = more < 0 ? used : used + more;
-    if (used > (int)sizeof line - 2)
-        used = (int)sizeof line - 2;
-    line[used] = '\n', line[used + 1] = '\0';
-    fputs(line, stderr);
+    listener = to, listener_context = context;
+}
+
+/* Where a line can be written over. */
+static bool on_terminal(void)
+{
+    const char *kind = getenv("TERM");
+    return isatty(STDERR_FILENO) && kind != NULL && strcmp(kind, "dumb") != 0;
+}
+
+/* A line that wraps cannot be written over. */
+static int terminal_width(void)
+{
+    struct winsize size;
+    return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col - 1 : LINE_SIZE;
+}
+
+static void print_event(const gbt_event *e)
+{
+    const bool over = e->kind == GBT_EVENT_PROGRESS && on_terminal();
+    if (over)
+        fprintf(stderr, "\r%.*s\033[K", terminal_width(), e->text); /* to the end of the line: the one before may have been longer */
+    else
+        fprintf(stderr, "%s%s%s\n", line_is_open ? "\n" : "", e->kind == GBT_EVENT_WARNING ? "warning: " : "", e->text);
+    line_is_open = over && e->fraction < 1;
+    if (over && !line_is_open)
+        fputc('\n', stderr);
+}
+
+static void tell(const gbt_event *e)
+{
+    pthread_mutex_lock(&lock);
+    if (listener != NULL)
+        listener(e, listener_context);
+    else
+        print_event(e);
+    pthread_mutex_unlock(&lock);
+}
+
+static void tell_text(gbt_event_kind kind, const char *format, va_list args)
+{
+    char line[LINE_SIZE];
+    vsnprintf(line, sizeof line, format, args);
+    const gbt_event e = {.kind = kind, .text = line};
+    tell(&e);
 }
 
 void log_warn(const char *format, ...)
 {
     va_list args;
     va_start(args, format);
-    print_line("warning: ", format, args);
+    tell_text(GBT_EVENT_WARNING, format, args);
     va_end(args);
 }
 
@@ -33,8 +85,48 @@ void log_info(const char *format, ...)
         return;
     va_list args;
     va_start(args, format);
-    print_line("", format, args);
+    tell_text(GBT_EVENT_MESSAGE, format, args);
     va_end(args);
+}
+
+bool log_progress_due(void)
+{
+    static double last = -1;
+    const double now = clock_wall(), interval = listener != NULL || on_terminal() ? often_seconds : line_seconds;
+    if (last >= 0 && now - last < interval)
+        return false;
+    const bool due = last >= 0;
+    last = now;
+    return due;
+}
+
+void log_progress(const gbt_event *event)
+{
+    if (is_quiet)
+        return;
+    gbt_event e = *event;
+    e.kind = GBT_EVENT_PROGRESS;
+    tell(&e);
+}
+
+void log_count(const char *stage, uint64_t done, uint64_t total, double psnr)
+{
+    static struct { const char *stage; uint64_t done; double start; } current;
+    if (current.stage == NULL || strcmp(current.stage, stage) != 0 || done <= current.done)
+        current.stage = stage, current.start = clock_wall();
+    current.done = done;
+    /* A person is told in other words when a stage ends. */
+    if (!log_progress_due() && !(done == total && (listener != NULL || line_is_open)))
+        return;
+    char line[LINE_SIZE];
+    gbt_event e = {.text = line, .stage = stage, .done = done, .total = total, .psnr = psnr, .loss = (double)NAN};
+    e.fraction = total > 0 ? (double)done / (double)total : 0;
+    e.seconds = clock_wall() - current.start;
+    e.seconds_left = done > 0 ? e.seconds * (double)(total - done) / (double)done : (double)NAN;
+    const int used = snprintf(line, sizeof line, "%s: %llu of %llu", stage, (unsigned long long)done, (unsigned long long)total);
+    if (isfinite(e.seconds_left))
+        snprintf(line + used, sizeof line - (size_t)used, "  %.0f:%02.0f left", floor(e.seconds_left / 60), floor(fmod(e.seconds_left, 60)));
+    log_progress(&e);
 }
 
 void log_set_quiet(int quiet)

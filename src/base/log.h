@@ -1,13 +1,31 @@
-/* base/log.h -- one line to stderr. Results never go through here. */
+/* base/log.h -- messages, warnings and progress: to whoever gbt_listen() names, else one line to stderr. Results never go through here. */
 #ifndef GBT_BASE_LOG_H
 #define GBT_BASE_LOG_H
 
-/** "warning: ..." on stderr, one line. */
+#include <stdbool.h>
+
+#include "gbtrace/progress.h"
+
+/** A warning; "warning: ..." on stderr. Threads: any. */
 void log_warn(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
-/** Plain line on stderr, unless log_set_quiet(1). */
+/** A message, unless log_set_quiet(1). Threads: any. */
 void log_info(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
-void log_set_quiet(int quiet);
+/** Whether so much time has passed since the last progress that more is wanted. The first call starts the time. */
+bool log_progress_due(void);
+
+/** Progress, as the caller fills it in; `kind` is set here. Ask log_progress_due() before, but for the end of a stage. */
+void log_progress(const gbt_event *event);
+
+/**
+ * The same for stages that count: "STAGE: DONE of TOTAL", when due and at the end. `done` from 0 or 1 on: a stage starts when its name is
+ * new, or when `done` is not larger than before.
+ *
+ * @param psnr [in] of what was just done; NaN: none
+ */
+void log_count(const char *stage, uint64_t done, uint64_t total, double psnr);
+
+void log_set_quiet(int quiet); /* warnings stay */
 
 #endif

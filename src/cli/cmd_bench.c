@@ -1,10 +1,15 @@
 /* cli/cmd_bench.c -- gbtrace bench trace, and gbtrace check-grad. */
 #include <stdio.h>
-#include <string.h>
 
 #include "cli/options.h"
 #include "gbtrace/bench.h"
 #include "gbtrace/train.h"
+
+static const char *const *workload_names(void)
+{
+    static const char *const names[] = {"trace", NULL};
+    return names;
+}
 
 static int run_bench(const command *self, int argc, char **argv)
 {
@@ -30,8 +35,6 @@ static int run_bench(const command *self, int argc, char **argv)
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &name);
     if (code >= 0)
         return code;
-    if (strcmp(name.value[0], "trace") != 0)
-        return command_misused("bench: unknown workload \"%.60s\" (wanted trace)", name.value[0]);
     if (threads > 0)
         gbt_set_threads(threads);
     def.check = check;
@@ -39,7 +42,7 @@ static int run_bench(const command *self, int argc, char **argv)
     return command_failed(gbt_bench_trace(&def, stdout, &err), &err);
 }
 
-const command command_bench = {.name = "bench", .summary = "time the tracer on given Gaussians", .usage = "trace --model FILE.ply --camera FILE.json", .run = run_bench};
+const command command_bench = {.name = "bench", .summary = "time the tracer on given Gaussians", .usage = "trace --model FILE.ply --camera FILE.json", .run = run_bench, .words = workload_names};
 
 static int run_check_grad(const command *self, int argc, char **argv)
 {

@@ -1,16 +1,15 @@
 /* cli/cmd_compare.c -- gbtrace compare. */
-#include <math.h>
 #include <stdio.h>
 
 #include "cli/options.h"
+#include "cli/progress.h"
 #include "gbtrace/evaluate.h"
 
 static void print_number(const char *name, double value, const char *end)
 {
-    if (isfinite(value))
-        printf("\"%s\": %.9g%s", name, value, end);
-    else
-        printf("\"%s\": null%s", name, end);
+    printf("\"%s\": ", name);
+    json_write_number(stdout, value);
+    fputs(end, stdout);
 }
 
 static int run(const command *self, int argc, char **argv)

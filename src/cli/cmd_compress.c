@@ -14,7 +14,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "quality", .short_name = 'q', .kind = OPTION_DOUBLE, .value = &def.quality, .min = 20, .max = 90, .value_name = "DB",
          .help = "PSNR of its pictures to those of the model before; more is larger"},
         {.name = "lossless", .kind = OPTION_FLAG, .value = &lossless, .help = "keep every bit"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "data set in place of the one it was trained on"},
+        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "data set in place of the one it was trained on", .aliases = "s source-path"},
         {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the figures there"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
     };

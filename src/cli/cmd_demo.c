@@ -4,6 +4,7 @@
 
 #include "cli/finish_run.h"
 #include "cli/options.h"
+#include "cli/progress.h"
 #include "gbtrace/make_scene.h"
 #include "gbtrace/train.h"
 
@@ -34,15 +35,15 @@ static int run(const command *self, int argc, char **argv)
     train.budget_seconds = 60 * minutes;
     train.command = command_line;
     gbt_error err = {0};
-    fprintf(stderr, "1/3 photographing the procedural scene \"%s\"\n", scene.name);
+    progress_say("1/3 photographing the procedural scene \"%s\"", scene.name);
     gbt_status status = gbt_make_scene(&scene, data, &err);
     if (status == GBT_OK) {
-        fprintf(stderr, "2/3 training: %s\n", command_line);
+        progress_say("2/3 training: %s", command_line);
         status = gbt_train(data, run_folder, &train, &err);
     }
     if (status == GBT_OK) {
-        fprintf(stderr, "3/3 scoring the held-out views\n");
-        status = finish_run(run_folder, false, &err);
+        progress_say("3/3 scoring the held-out views");
+        status = finish_run(run_folder, false, false, &err);
     }
     if (status == GBT_OK)
         printf("Open %s/report.html in a browser.\nYour own photos: gbtrace train DATA -o RUN --budget 10m   (DATA holds images/ and sparse/0 from COLMAP)\n",

@@ -7,17 +7,23 @@ static int run(const command *self, int argc, char **argv)
 {
     gbt_export_def def = gbt_export_def_default();
     int threads = 0;
+    const char *output = NULL;
     const option options[] = {
+        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &output, .value_name = "FILE", .help = "the same as one more OUT"},
         {.name = "sh-degree", .kind = OPTION_INT, .value = &def.sh_degree, .min = 0, .max = 3, .value_name = "N", .help = "how colours depend on the direction: spherical harmonics up to this"},
         {.name = "refine", .kind = OPTION_INT, .value = &def.refine_steps, .min = 0, .max = 100000, .value_name = "N", .help = "steps that fit the Gaussians to the model's own pictures"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "data set in place of the one it was trained on"},
+        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "data set in place of the one it was trained on", .aliases = "s source-path"},
         {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the figures there"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
     };
     operands files;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 2, 9, argc, argv, &files);
+    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 9, argc, argv, &files);
     if (code >= 0)
         return code;
+    if (output != NULL)
+        files.value[files.count++] = output;
+    if (files.count < 2)
+        return command_misused("argument missing (usage: gbtrace %s %s)", self->name, self->usage);
     if (threads > 0)
         gbt_set_threads(threads);
     gbt_error err = {0};

@@ -35,4 +35,5 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_make_scene = {
-    .name = "make-scene", .summary = "procedural scene with known ground truth, as photos and a COLMAP model", .usage = "NAME -o DIR", .run = run};
+    .name = "make-scene", .summary = "procedural scene with known ground truth, as photos and a COLMAP model", .usage = "NAME -o DIR", .run = run,
+    .words = gbt_make_scene_names};

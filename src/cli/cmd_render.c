@@ -1,10 +1,13 @@
 /* cli/cmd_render.c -- gbtrace render. */
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "cli/options.h"
 #include "gbtrace/evaluate.h"
 #include "gbtrace/train.h"
+
+static const char splits[] = "test|train|all";
 
 /** "1280x720", nothing more. */
 static bool read_size(const char *text, int *width, int *height)
@@ -20,8 +23,12 @@ static int run(const command *self, int argc, char **argv)
     int threads = 0;
     const option options[] = {
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR",
-         .help = "folder for the images; with --path also a film: .mp4, .webm, .gif (by ffmpeg)", .required = true},
-        {.name = "split", .kind = OPTION_CHOICE, .value = &split, .choices = "test|train|all", .help = "which views of the data set"},
+         .help = "folder for the images; default: RUN/renders/SPLIT; with --path also a film: .mp4, .webm, .gif (by ffmpeg)"},
+        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN", .help = "the same as RUN"},
+        {.name = "split", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .help = "which views of the data set"},
+        {.name = "skip-train", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .fixed = "test", .help = "the same as --split test"},
+        {.name = "skip-test", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .fixed = "train", .help = "the same as --split train"},
+        {.name = "iteration", .kind = OPTION_ELSEWHERE, .help = "a run keeps its last model alone"},
         {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json",
          .help = "one picture of this camera (lens, aperture, rolling shutter, rays: docs/cameras.md), no views"},
         {.name = "path", .kind = OPTION_STRING, .value = &def.path, .value_name = "orbit|interpolate|FILE.json",
@@ -30,15 +37,15 @@ static int run(const command *self, int argc, char **argv)
         {.name = "fps", .kind = OPTION_DOUBLE, .value = &def.fps, .min = 0, .max = 1000, .value_name = "F", .help = "frames per second; 0: what a path file says, else 30"},
         {.name = "size", .kind = OPTION_STRING, .value = &size, .value_name = "WxH", .help = "of the film, as 1280x720; default: that of the photos"},
         {.name = "outputs", .kind = OPTION_STRING, .value = &def.outputs, .value_name = "LIST",
-         .help = "EXR files beside the picture: transmittance,depth,median-depth,normal,hits,anchor or some of them (docs/formats.md)"},
+         .help = "EXR files beside the picture: transmittance,depth,median-depth,normal,hits,anchor or some of them (docs/formats.md)", .aliases = "aov"},
         {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast", .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
         {.name = "insert", .kind = OPTION_STRING, .value = &def.insert, .value_name = "FILE.json",
          .help = "put meshes into the scene: matt or mirrors, with shadows (docs/inserting.md)"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "cameras of this data set; needed for plain Gaussians (.ply, .splat, .spz) without --camera"},
+        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "cameras of this data set; needed for plain Gaussians (.ply, .splat, .spz) without --camera", .aliases = "s source-path"},
         {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray|reference", .help = "what draws the model; default: what it was trained with. The reference is in double, and slow"},
         {.name = "format", .kind = OPTION_CHOICE, .value = &def.format, .choices = "png|exr", .help = "8-bit PNG, or float EXR"},
         {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",
-         .help = "divide the photos' size by this; 0: as in training"},
+         .help = "divide the photos' size by this; 0: as in training", .aliases = "r resolution"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
     };
     operands model;
@@ -49,9 +56,18 @@ static int run(const command *self, int argc, char **argv)
         return command_misused("--size: bad value (wanted WxH like 1280x720, got %.80s)", size);
     if (threads > 0)
         gbt_set_threads(threads);
+    char folder[4096];
+    if (out == NULL) {
+        struct stat info;
+        if (stat(model.value[0], &info) != 0 || !S_ISDIR(info.st_mode))
+            return command_misused("--output is missing (usage: gbtrace %s %s)", self->name, self->usage);
+        if (snprintf(folder, sizeof folder, "%s/renders%s%s", model.value[0], def.camera == NULL ? "/" : "", def.camera == NULL ? split : "") >= (int)sizeof folder)
+            return command_misused("%.60s...: the path is too long", model.value[0]);
+        out = folder;
+    }
     def.split = strcmp(split, "train") == 0 ? GBT_SPLIT_TRAIN : strcmp(split, "all") == 0 ? GBT_SPLIT_ALL : GBT_SPLIT_TEST;
     gbt_error err = {0};
     return command_failed(gbt_render(model.value[0], out, &def, &err), &err);
 }
 
-const command command_render = {.name = "render", .summary = "render the views of a scene, a camera of your own, or a film", .usage = "RUN|GAUSSIANS -o DIR", .run = run};
+const command command_render = {.name = "render", .summary = "render the views of a scene, a camera of your own, or a film", .usage = "RUN|GAUSSIANS [-o DIR]", .run = run};

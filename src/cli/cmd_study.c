@@ -52,15 +52,16 @@ static gbt_status run_anchors(const study_request *r, gbt_error *err)
     return gbt_study_anchors(&r->anchors, r->folder, stdout, err);
 }
 
-static const struct { const char *name; int models_min, models_max; gbt_status (*run)(const study_request *, gbt_error *); } studies[] = {
-    {"speed", 1, 16, run_speed},
-    {"crosscheck", 1, 16, run_crosscheck},
-    {"rate", 1, 6, run_rate},
-    {"stability", 0, 0, run_stability},
-    {"paper", 1, 16, run_paper},
-    {"time", 1, 16, run_time},
-    {"anchors", 1, 16, run_anchors},
-};
+enum { STUDY_COUNT = 7 };
+
+static const char *const study_names[STUDY_COUNT + 1] = {"speed", "crosscheck", "rate", "stability", "paper", "time", "anchors", NULL};
+static const struct { int models_min, models_max; gbt_status (*run)(const study_request *, gbt_error *); } studies[STUDY_COUNT] = {
+    {1, 16, run_speed}, {1, 16, run_crosscheck}, {1, 6, run_rate}, {0, 0, run_stability}, {1, 16, run_paper}, {1, 16, run_time}, {1, 16, run_anchors}};
+
+static const char *const *names_of_studies(void)
+{
+    return study_names;
+}
 
 static int run(const command *self, int argc, char **argv)
 {
@@ -92,14 +93,12 @@ static int run(const command *self, int argc, char **argv)
     if (code >= 0)
         return code;
     size_t which = 0;
-    while (which < sizeof studies / sizeof *studies && strcmp(named.value[0], studies[which].name) != 0)
+    while (strcmp(named.value[0], study_names[which]) != 0) /* options_parse() takes no others */
         which++;
-    if (which == sizeof studies / sizeof *studies)
-        return command_misused("study: unknown study \"%.60s\" (wanted speed, crosscheck, rate, stability, paper, time or anchors)", named.value[0]);
     if (named.count - 1 < studies[which].models_min)
-        return command_misused("study %s: wanted a model, or data to train on", studies[which].name);
+        return command_misused("study %s: wanted a model, or data to train on", study_names[which]);
     if (named.count - 1 > studies[which].models_max)
-        return command_misused("study %s: \"%.60s\" is one too many", studies[which].name, named.value[1 + studies[which].models_max]);
+        return command_misused("study %s: \"%.60s\" is one too many", study_names[which], named.value[1 + studies[which].models_max]);
     if (threads > 0)
         gbt_set_threads(threads);
     request.stability.quick = quick;
@@ -115,4 +114,5 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_study = {.name = "study", .summary = "speed against accuracy, tracer against rasterizer, size against picture, stability; the paper's tables, quality against time and anchors: measure, draw the chart",
-                               .usage = "speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR", .run = run};
+                               .usage = "speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR", .run = run,
+                               .words = names_of_studies};

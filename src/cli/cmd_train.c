@@ -11,7 +11,8 @@ static int run(const command *self, int argc, char **argv)
     bool lossless = false;
     const option own[] = {
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &output, .value_name = "RUN", .help = "folder for the model, scores and report",
-         .required = true},
+         .aliases = "m model-path", .required = true},
+        {.name = "source-path", .short_name = 's', .kind = OPTION_OPERAND, .value_name = "DATA", .help = "the same as DATA", .aliases = "data"},
         {.name = "lossless", .kind = OPTION_FLAG, .value = &lossless, .help = "keep every bit of the model (see compress); the file is some seven times larger"},
     };
     option options[OPTIONS_MAX];
@@ -25,7 +26,7 @@ static int run(const command *self, int argc, char **argv)
     if (status == GBT_OK)
         status = gbt_train(data.value[0], output, &t.def, &err);
     if (status == GBT_OK)
-        status = finish_run(output, lossless, &err);
+        status = finish_run(output, lossless, t.def.tensorboard, &err);
     return command_failed(status, &err);
 }
 

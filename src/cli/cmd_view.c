@@ -2,6 +2,7 @@
 #include <stdio.h>
 
 #include "cli/options.h"
+#include "cli/progress.h"
 #include "gbtrace/train.h"
 #include "gbtrace/view.h"
 
@@ -10,7 +11,7 @@ static void print_address(int port, void *context)
     (void)context;
     printf("http://127.0.0.1:%d\n", port);
     fflush(stdout);
-    fputs("open this in a browser; Ctrl-C ends\n", stderr);
+    progress_say("open this in a browser; Ctrl-C ends");
 }
 
 static int run(const command *self, int argc, char **argv)
@@ -19,8 +20,9 @@ static int run(const command *self, int argc, char **argv)
     int threads = 0;
     def.ready = print_address;
     const option options[] = {
+        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN", .help = "the same as RUN"},
         {.name = "port", .short_name = 'p', .kind = OPTION_INT, .value = &def.port, .min = 0, .max = 65535, .value_name = "N", .help = "on 127.0.0.1; 0: any free one"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "photos of another data set"},
+        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "photos of another data set", .aliases = "s source-path"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
     };
     operands input;

@@ -9,6 +9,8 @@ typedef struct command {
     const char *summary; /* one line, for the list of commands */
     const char *usage;   /* operands and the options that it needs, for example "DATA -o FILE.ply" */
     int (*run)(const struct command *self, int argc, char **argv); /* arguments after the name; returns the exit code */
+    const char *alias;                  /* a second name, or NULL */
+    const char *const *(*words)(void);  /* what the first operand may be, NULL-terminated; NULL: anything, such as a path */
 } command;
 
 /** One `error: ...` line on stderr for a failure (control characters become ?); returns the exit code that belongs to the status. */
@@ -20,8 +22,12 @@ int command_misused(const char *format, ...) __attribute__((format(printf, 1, 2)
 /** The name of `names` (count of them) that is nearest to a mistyped one, or NULL if none is near. */
 const char *command_nearest(const char *typed, const char *const *names, int count);
 
-/* One line per subcommand; main.c lists them. */
+/* One line per subcommand; command_list.c lists them. */
 extern const command command_demo, command_info, command_init, command_train, command_eval, command_render, command_report, command_make_scene, command_bench,
-    command_check_grad, command_study, command_compare, command_compress, command_export, command_view;
+    command_check_grad, command_study, command_compare, command_compress, command_export, command_view, command_doctor, command_describe;
+
+/** All of them, in the order of the help. */
+extern const command *const command_list[];
+extern const int command_list_count;
 
 #endif

@@ -6,7 +6,7 @@
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
 
-gbt_status finish_run(const char *run, bool lossless, gbt_error *err)
+gbt_status finish_run(const char *run, bool lossless, bool tensorboard, gbt_error *err)
 {
     char model[4096];
     gbt_status status = GBT_OK;
@@ -14,6 +14,7 @@ gbt_status finish_run(const char *run, bool lossless, gbt_error *err)
         const gbt_compress_def small = gbt_compress_def_default();
         status = gbt_compress(run, &small, model, NULL, err);
     }
-    const gbt_evaluate_def score = gbt_evaluate_def_default();
+    gbt_evaluate_def score = gbt_evaluate_def_default();
+    score.tensorboard = tensorboard;
     return status == GBT_OK ? gbt_evaluate(run, &score, err) : status;
 }

@@ -1,36 +1,19 @@
-/* cli/main.c -- find the subcommand and run it. A new one is a file cmd_NAME.c, a line in command.h and a line here. */
+/* cli/main.c -- find the subcommand and run it. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "cli/command.h"
+#include "cli/progress.h"
 #include "gbtrace/version.h"
 
-static const command *const commands[] = {
-    &command_demo,
-    &command_info,
-    &command_init,
-    &command_train,
-    &command_eval,
-    &command_compare,
-    &command_compress,
-    &command_export,
-    &command_render,
-    &command_report,
-    &command_view,
-    &command_make_scene,
-    &command_bench,
-    &command_study,
-    &command_check_grad,
-};
-
-enum { COMMAND_COUNT = sizeof commands / sizeof *commands };
+enum { NAMES_MAX = 64 };
 
 static int print_help(void)
 {
     puts("usage: gbtrace COMMAND [arguments]\n\nneural Gaussian scenes from photos, traced on the CPU\n\ncommands:");
-    for (int i = 0; i < COMMAND_COUNT; i++)
-        printf("  %-12s%s\n", commands[i]->name, commands[i]->summary);
+    for (int i = 0; i < command_list_count; i++)
+        printf("  %-12s%s\n", command_list[i]->name, command_list[i]->summary);
     puts("\n`gbtrace COMMAND --help` lists the options of one; `gbtrace --version` prints the version.\n"
          "Exit codes: 0 done, 2 usage, 3 bad input, 4 input or output failed, 5 out of memory or over a limit, 128+n stopped by signal n.");
     return 0;
@@ -38,18 +21,19 @@ static int print_help(void)
 
 static const command *find(const char *name)
 {
-    for (int i = 0; i < COMMAND_COUNT; i++)
-        if (strcmp(commands[i]->name, name) == 0)
-            return commands[i];
+    for (int i = 0; i < command_list_count; i++)
+        if (strcmp(command_list[i]->name, name) == 0 || (command_list[i]->alias != NULL && strcmp(command_list[i]->alias, name) == 0))
+            return command_list[i];
     return NULL;
 }
 
 static int unknown(const char *name)
 {
-    const char *names[COMMAND_COUNT];
-    for (int i = 0; i < COMMAND_COUNT; i++)
-        names[i] = commands[i]->name;
-    const char *nearest = command_nearest(name, names, COMMAND_COUNT);
+    const char *names[NAMES_MAX];
+    int count = 0;
+    for (; count < command_list_count && count < NAMES_MAX; count++)
+        names[count] = command_list[count]->name;
+    const char *nearest = command_nearest(name, names, count);
     if (nearest != NULL)
         return command_misused("%.100s: unknown command (did you mean %s?)", name, nearest);
     return command_misused("%.100s: unknown command (see gbtrace --help)", name);
@@ -78,11 +62,12 @@ static int dispatch(int argc, char **argv)
 
 int main(int argc, char **argv)
 {
-    const int code = dispatch(argc, argv);
+    int code = dispatch(argc, argv);
     if ((fflush(stdout) != 0 || ferror(stdout)) && code == 0) { /* a full disk must not look like success */
         gbt_error err = {.status = GBT_ERR_IO};
         snprintf(err.text, sizeof err.text, "standard output: write failed: %s", strerror(errno));
-        return command_failed(GBT_ERR_IO, &err);
+        code = command_failed(GBT_ERR_IO, &err);
     }
+    progress_end(code);
     return code;
 }

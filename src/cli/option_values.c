@@ -9,6 +9,8 @@
 
 #include "cli/options.h"
 
+enum { CHOICES_MAX = 16 };
+
 /** Length of [+-]digits[.digits][e[+-]digits] at the start of `text`; 0 if there is none. No hex, nan, inf or blanks. */
 static size_t decimal_length(const char *text)
 {
@@ -126,12 +128,14 @@ bool options_read_value(const option *o, const char *text, char *wanted, size_t 
     double number;
     switch (o->kind) {
     case OPTION_FLAG:
-    case OPTION_FLAG_OFF: /* only from a configuration file: there a flag has a value */
-        ok = strcmp(text, "true") == 0 || strcmp(text, "false") == 0;
+    case OPTION_FLAG_OFF: {
+        const bool on = strcmp(text, "true") == 0 || strcmp(text, "1") == 0;
+        ok = on || strcmp(text, "false") == 0 || strcmp(text, "0") == 0;
         if (ok)
-            *(bool *)o->value = (strcmp(text, "true") == 0) == (o->kind == OPTION_FLAG);
+            *(bool *)o->value = on == (o->kind == OPTION_FLAG);
         snprintf(wanted, wanted_size, "true or false");
         break;
+    }
     case OPTION_INT:
         ok = read_whole(text, o->min, o->max, &whole);
         if (ok)
@@ -158,6 +162,7 @@ bool options_read_value(const option *o, const char *text, char *wanted, size_t 
         snprintf(wanted, wanted_size, "a number from %g to %g", o->min, o->max);
         break;
     case OPTION_STRING:
+    case OPTION_OPERAND:
         ok = text[0] != '\0';
         if (ok)
             *(const char **)o->value = text;
@@ -179,6 +184,23 @@ bool options_read_value(const option *o, const char *text, char *wanted, size_t 
         ok = read_size(text, o->min, o->max, o->value);
         snprintf(wanted, wanted_size, "a size like 512M or 6G, from %.0f to %.0f bytes", o->min, o->max);
         break;
+    case OPTION_ELSEWHERE: break;
     }
     return ok;
+}
+
+void options_bad_value(const option *o, const char *wanted, const char *text, char *out, size_t size)
+{
+    char list[OPTIONS_WANTED_SIZE];
+    const char *names[CHOICES_MAX], *nearest = NULL;
+    int count = 0;
+    if (o->kind == OPTION_CHOICE) {
+        snprintf(list, sizeof list, "%s", o->choices);
+        char *rest = NULL;
+        for (char *name = strtok_r(list, "|", &rest); name != NULL && count < CHOICES_MAX; name = strtok_r(NULL, "|", &rest))
+            names[count++] = name;
+        nearest = command_nearest(text, names, count);
+    }
+    snprintf(out, size, "bad value (wanted %s, got %.80s%s%s%s)", wanted, text[0] != '\0' ? text : "nothing", nearest != NULL ? "; did you mean " : "",
+             nearest != NULL ? nearest : "", nearest != NULL ? "?" : "");
 }

@@ -4,13 +4,16 @@
 #include <string.h>
 
 #include "cli/command.h"
+#include "cli/progress.h"
 
 static void print_error(const char *text)
 {
-    fputs("error: ", stderr);
-    for (const char *c = text; *c != '\0'; c++)
-        fputc((unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c, stderr);
-    fputc('\n', stderr);
+    char line[1024];
+    snprintf(line, sizeof line, "%s", text);
+    for (char *c = line; *c != '\0'; c++)
+        if ((unsigned char)*c < 0x20 || *c == 0x7f)
+            *c = '?';
+    progress_error(line);
 }
 
 int command_failed(gbt_status status, const gbt_error *err)

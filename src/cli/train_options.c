@@ -15,8 +15,8 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
     gbt_train_def *d = &t->def;
     const option shared[] = {
         {.name = "budget", .kind = OPTION_DURATION, .value = &d->budget_seconds, .min = 1, .max = 1e7, .value_name = "TIME",
-         .help = "train this long; the schedules fit (10m, 90s, 1h)"},
-        {.name = "iterations", .kind = OPTION_UINT64, .value = &d->iterations, .min = 0, .max = 1e9, .value_name = "N", .help = "train so many steps in place of a budget; 0: the budget decides"},
+         .help = "train this long; the schedules fit (10m, 90s, 1h)", .aliases = "budget-seconds"},
+        {.name = "iterations", .kind = OPTION_UINT64, .value = &d->iterations, .min = 0, .max = 1e9, .value_name = "N", .help = "train so many steps in place of a budget; 0: the budget decides", .aliases = "max-steps num-iters"},
         {.name = "pace", .kind = OPTION_STRING, .value = &d->pace, .value_name = "N1,...,N20", .help = "repeat a budget run to the bit: the pace that it recorded in train.json"},
         {.name = "init", .kind = OPTION_CHOICE, .value = &d->init, .choices = "gb|adaptive|voxel|random",
          .help = "anchors from the paper's balls, balls where the scene needs them, voxels, random points"},
@@ -24,18 +24,20 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
         {.name = "scale-prior", .kind = OPTION_CHOICE, .value = &d->scale_prior, .choices = "gb|nn", .help = "first scale of --init gb from balls and spacing, or from spacing alone, as the others have"},
         {.name = "max-depth", .kind = OPTION_INT, .value = &d->max_depth, .min = 0, .max = 64, .value_name = "D", .help = "most splits of the cloud"},
         {.name = "voxel-size", .kind = OPTION_FLOAT, .value = &d->voxel_size, .min = 0, .max = 1e9, .value_name = "V", .help = "base scale, scene units; 0: from the points"},
-        {.name = "offsets", .kind = OPTION_INT, .value = &d->offsets, .min = 0, .max = 16, .value_name = "K", .help = "Gaussians per anchor; 0: 2, or 10 with --compat"},
+        {.name = "offsets", .kind = OPTION_INT, .value = &d->offsets, .min = 0, .max = 16, .value_name = "K", .help = "Gaussians per anchor; 0: 2, or 10 with --compat", .aliases = "n-offsets"},
         {.name = "distance", .kind = OPTION_CHOICE, .value = &d->distance, .choices = "auto|on|off", .help = "whether the networks see the distance"},
-        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &d->downscale, .min = 1, .max = 64, .value_name = "F", .help = "divide the photos' size by this"},
+        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &d->downscale, .min = 1, .max = 64, .value_name = "F", .help = "divide the photos' size by this", .aliases = "r resolution data-factor"},
         {.name = "renderer", .kind = OPTION_CHOICE, .value = &d->renderer, .choices = "trace|raster|per-ray",
          .help = "ray traced; or splats in tiles, for comparison; or those tiles with the order of rays"},
         {.name = "footprint", .kind = OPTION_DOUBLE, .value = &d->footprint, .min = 0, .max = 4, .value_name = "V",
          .help = "rays as wide as pixels: their variance, px^2; 0: thin rays"},
         {.name = "start-level", .kind = OPTION_INT, .value = &d->start_level, .min = 0, .max = 4, .value_name = "L", .help = "first look at one pixel in 4^L, at random places"},
         {.name = "eval-split", .kind = OPTION_STRING, .value = &d->eval_split, .value_name = "SPLIT", .help = "held-out photos: every=N, none, list=FILE"},
+        {.name = "eval", .kind = OPTION_STRING, .value = &d->eval_split, .fixed = "every=8", .help = "the same as --eval-split every=8"},
         {.name = "eval-at", .kind = OPTION_STRING, .value = &t->eval_at, .value_name = "T1,T2", .help = "held-out PSNR after so much training (1m,2m); the clock stops meanwhile"},
         {.name = "max-anchors", .kind = OPTION_UINT64, .value = &d->max_anchors, .min = 1, .max = 1e8, .value_name = "N", .help = "growth stops there"},
-        {.name = "no-grow", .kind = OPTION_FLAG, .value = &t->no_grow, .help = "keep the first anchors"},
+        {.name = "no-grow", .kind = OPTION_FLAG_OFF, .value = &d->grow, .help = "keep the first anchors"},
+        {.name = "grow", .kind = OPTION_FLAG, .value = &d->grow, .help = "add and remove anchors, as without it"},
         {.name = "thrift", .kind = OPTION_DOUBLE, .value = &d->thrift, .min = 0.1, .max = 10, .value_name = "F",
          .help = "what an anchor must bring to be made and kept, times F: above 1 for smaller models, below for larger"},
         {.name = "splats-until", .kind = OPTION_DOUBLE, .value = &d->splats_until, .min = 0, .max = 1, .value_name = "F", .help = "splats, which are quicker, stand for rays up to this part of the run; 0: rays from the start"},
@@ -45,11 +47,31 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
         {.name = "learning-rate", .kind = OPTION_DOUBLE, .value = &d->learning_rate_factor, .min = 1e-3, .max = 1e3, .value_name = "F", .help = "multiply all learning rates"},
         {.name = "compat", .kind = OPTION_FLAG, .value = &d->compat, .help = "every quirk of the reference method"},
         {.name = "save-every", .kind = OPTION_DURATION, .value = &d->save_every_seconds, .min = 0, .max = 1e7, .value_name = "TIME", .help = "time between checkpoints; 0: only at the end"},
+        {.name = "tensorboard", .kind = OPTION_FLAG, .value = &d->tensorboard, .help = "also write RUN/events.out.tfevents.* for TensorBoard"},
         {.name = "resume", .kind = OPTION_FLAG, .value = &d->resume, .help = "go on from the last checkpoint of RUN, with its settings"},
         {.name = "seed", .kind = OPTION_UINT64, .value = &d->seed, .value_name = "S", .help = "of everything that is random"},
         {.name = "memory", .kind = OPTION_SIZE, .value = &d->hit_bytes_max, .min = 0, .max = 0x1p60, .value_name = "BYTES",
          .help = "for the hits kept for the adjoint (100M); what goes beyond is traced again; 0: no limit; never changes the result"},
         {.name = "threads", .kind = OPTION_INT, .value = &t->threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors; never changes the result"},
+        /* What people type who come from 3DGS and Scaffold-GS. */
+        {.name = "images", .kind = OPTION_ELSEWHERE, .aliases = "i", .help = "photos are found from the cameras; for smaller ones use --downscale F"},
+        {.name = "white-background", .kind = OPTION_ELSEWHERE, .aliases = "w", .help = "what no Gaussian covers shows the mean colour of the points; leave it out"},
+        {.name = "sh-degree", .kind = OPTION_ELSEWHERE, .help = "colours come from networks; gbtrace export has --sh-degree"},
+        {.name = "test-iterations", .kind = OPTION_ELSEWHERE, .help = "use --eval-at 1m,2m for scores on the way"},
+        {.name = "save-iterations", .kind = OPTION_ELSEWHERE, .aliases = "checkpoint-iterations", .help = "use --save-every 2m"},
+        {.name = "start-checkpoint", .kind = OPTION_ELSEWHERE, .help = "use --resume with the same -o RUN"},
+        {.name = "data-device", .kind = OPTION_ELSEWHERE, .aliases = "gpu", .help = "everything runs on the CPU; leave it out"},
+        {.name = "ip", .kind = OPTION_ELSEWHERE, .aliases = "port", .help = "gbtrace view RUN shows a run while it trains"},
+        {.name = "lambda-dssim", .kind = OPTION_ELSEWHERE, .help = "it is 0.2; leave it out"},
+        {.name = "densify-until-iter", .kind = OPTION_ELSEWHERE, .aliases = "update-until densify-from-iter start-stat update-from", .help = "use --grow-until F, a part of the run"},
+        {.name = "densify-grad-threshold", .kind = OPTION_ELSEWHERE, .aliases = "densification-interval opacity-reset-interval percent-dense update-interval",
+         .help = "growth follows the length of the run; --max-anchors N limits it"},
+        {.name = "position-lr-init", .kind = OPTION_ELSEWHERE,
+         .aliases = "position-lr-final position-lr-max-steps feature-lr opacity-lr scaling-lr rotation-lr offset-lr-init offset-lr-final",
+         .help = "use --learning-rate F, which multiplies all rates"},
+        {.name = "train-test-exp", .kind = OPTION_ELSEWHERE, .aliases = "appearance-dim", .help = "use --exposure"},
+        {.name = "antialiasing", .kind = OPTION_ELSEWHERE, .help = "rays are as wide as pixels already (--footprint)"},
+        {.name = "depths", .kind = OPTION_ELSEWHERE, .help = "depth maps are not read; leave it out"},
     };
     const int shared_count = sizeof shared / sizeof *shared;
     memcpy(out, own, (size_t)own_count * sizeof *own);
@@ -83,7 +105,6 @@ gbt_status train_options_finish(train_options *t, const char *command_name, int 
 {
     if (t->threads > 0)
         gbt_set_threads(t->threads);
-    t->def.grow = !t->no_grow;
     size_t used = (size_t)snprintf(t->command, sizeof t->command, "%s", command_name);
     for (int i = 0; i < argc && used < sizeof t->command; i++)
         used += (size_t)snprintf(t->command + used, sizeof t->command - used, " %s", argv[i]);

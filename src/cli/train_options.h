@@ -8,7 +8,6 @@
 typedef struct train_options {
     gbt_train_def def;
     int threads;         /* 0: all */
-    bool no_grow;
     const char *eval_at; /* "1m,2m" or NULL */
     char command[2048];
 } train_options;

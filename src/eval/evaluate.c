@@ -18,6 +18,9 @@
 #include "gbtrace/evaluate.h"
 #include "image/affine.h"
 #include "image/metrics.h"
+#include "train/event_records.h"
+
+enum { EVENTS_VIEWS = 8 };
 
 gbt_evaluate_def gbt_evaluate_def_default(void)
 {
@@ -156,12 +159,15 @@ static gbt_status score_run(loaded_run *r, const char *run, evaluation *e, gbt_e
     e->views = mem_calloc(r->scene.view_count + 1, sizeof *e->views, "view scores", err);
     if (e->views == NULL)
         return GBT_ERR_NO_MEMORY;
+    size_t wanted = 0;
+    for (size_t i = 0; i < r->scene.view_count; i++)
+        wanted += r->scene.views[i].is_test;
     for (size_t i = 0; i < r->scene.view_count; i++) {
         if (!r->scene.views[i].is_test)
             continue;
         view_score *v = &e->views[e->view_count];
         GBT_TRY(score_view(r, i, folder, v, err));
-        e->view_count++;
+        log_count("score", ++e->view_count, wanted, v->psnr);
         e->psnr += v->psnr, e->ssim += v->ssim, e->flip += v->flip, e->gaussians_per_view += (double)v->gaussians;
     }
     const double n = (double)e->view_count; /* 0 / 0 = NaN here becomes null in JSON and "n/a" on the page */
@@ -173,6 +179,43 @@ static gbt_status score_run(loaded_run *r, const char *run, evaluation *e, gbt_e
     GBT_TRY(file_join(model_path, sizeof model_path, run, "model.gbt", err));
     e->model_bytes = stat(model_path, &info) == 0 ? (size_t)info.st_size : 0;
     return GBT_OK;
+}
+
+static gbt_status add_picture(event_records *r, uint64_t step, const char *group, const char *name, const char *path, gbt_error *err)
+{
+    char tag[VIEW_PATH_SIZE];
+    unsigned char *bytes = NULL;
+    size_t count;
+    GBT_TRY(file_read(path, &bytes, &count, err));
+    snprintf(tag, sizeof tag, "%s/%s", group, name);
+    event_add_png(r, step, tag, bytes, count);
+    mem_free(bytes);
+    return GBT_OK;
+}
+
+/* Scores and the first pictures for TensorBoard, in place of what an earlier call wrote. */
+static gbt_status write_events(const loaded_run *loaded, const char *run, const evaluation *e, gbt_error *err)
+{
+    char path[4096];
+    event_records r = {0};
+    const uint64_t step = loaded->model.iterations;
+    const event_scalar scores[] = {{"eval/psnr", e->psnr}, {"eval/ssim", e->ssim}, {"eval/flip", e->flip}};
+    event_add_version(&r);
+    if (e->view_count > 0)
+        event_add_scalars(&r, step, scores, sizeof scores / sizeof *scores);
+    gbt_status status = file_join(path, sizeof path, run, EVENTS_EVAL_NAME, err);
+    for (size_t i = 0; i < e->view_count && i < EVENTS_VIEWS && status == GBT_OK; i++) {
+        const view_score *v = &e->views[i];
+        status = add_picture(&r, step, "render", v->name, v->render_path, err);
+        if (status == GBT_OK)
+            status = add_picture(&r, step, "photo", v->name, v->photo_path, err);
+    }
+    if (status == GBT_OK && r.status != GBT_OK)
+        status = base_fail(err, r.status, "%s: no memory", path);
+    if (status == GBT_OK)
+        status = file_write_atomic(path, r.bytes, r.count, err);
+    event_records_free(&r);
+    return status;
 }
 
 gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err)
@@ -205,6 +248,8 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
         status = write_json(root, def->json, err);
     if (status == GBT_OK && def->report)
         status = report_write(run, &e, root, &(report_more){.open = r}, err);
+    if (status == GBT_OK && def->tensorboard)
+        status = write_events(r, run, &e, err);
     if (status == GBT_OK && e.view_count == 0)
         log_info("no held-out views: scores are n/a");
     else if (status == GBT_OK)

@@ -1,4 +1,5 @@
 /* eval/render.c -- the views of a split, the camera of a file, or a path, to image files or a film. */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -72,20 +73,27 @@ static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, 
     return render_outputs_write(r, shot, st->outputs, out, name, err);
 }
 
+static bool is_wanted(const scene_view *view, gbt_split split)
+{
+    return split == GBT_SPLIT_ALL || view->is_test == (split == GBT_SPLIT_TEST);
+}
+
 static gbt_status render_views(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
 {
     loaded_run *r = &st->run;
-    size_t rendered = 0;
+    size_t rendered = 0, wanted = 0;
+    for (size_t i = 0; i < r->scene.view_count; i++)
+        wanted += is_wanted(&r->scene.views[i], def->split);
     for (size_t i = 0; i < r->scene.view_count; i++) {
         const scene_view *view = &r->scene.views[i];
-        if ((def->split == GBT_SPLIT_TEST && !view->is_test) || (def->split == GBT_SPLIT_TRAIN && view->is_test))
+        if (!is_wanted(view, def->split))
             continue;
         char name[1024];
         loaded_run_view_name(view, name, sizeof name);
         const gbt_camera camera = photos_camera(&r->photos, i, 0);
         const ray_shot shot = ray_shot_of(&camera);
         GBT_TRY(render_one(st, &shot, out, name, def, err));
-        rendered++;
+        log_count("render", ++rendered, wanted, (double)NAN);
     }
     if (rendered == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no views in this split (of %zu)", r->scene.folder, r->scene.view_count);

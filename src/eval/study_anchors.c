@@ -46,7 +46,7 @@ static gbt_status run_all(anchors_study *s, const char *folder, gbt_error *err)
     for (int seed = 0; seed < s->def.seeds; seed++)
         for (size_t scene = 0; scene < s->def.data_count; scene++)
             for (size_t v = 0; v < anchors_variant_count; v++) {
-                log_info("run %zu of %zu", ++done, (size_t)s->def.seeds * s->def.data_count * anchors_variant_count);
+                study_runs_tell(++done, (size_t)s->def.seeds * s->def.data_count * anchors_variant_count);
                 GBT_TRY(run_one(s, scene, v, seed, folder, (study_figures *)anchors_run(s, scene, v, seed), err));
             }
     return GBT_OK;

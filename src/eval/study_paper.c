@@ -114,7 +114,7 @@ static gbt_status run_all(paper_study *s, const char *folder, gbt_error *err)
                 study_figures *out = paper_run(s, scene, (paper_variant_id)v, seed);
                 if (!s->has_variant[v])
                     continue;
-                log_info("run %zu of %zu", ++done, wanted);
+                study_runs_tell(++done, wanted);
                 if (paper_variants[v].max_depth < D_MAX && paper_variants[v].max_depth >= s->scenes[scene].tree_depth)
                     *out = *paper_run(s, scene, PAPER_GBSP, seed); /* the same balls, so the same run to the bit */
                 else

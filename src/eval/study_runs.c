@@ -228,6 +228,15 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
     return read_run(study_path, metrics_path, settings, out) ? GBT_OK : base_fail(err, GBT_ERR_INTERNAL, "%.400s: the run cannot be read back", run);
 }
 
+void study_runs_tell(size_t number, size_t count)
+{
+    char line[64];
+    gbt_event e = {.text = line, .stage = "study", .done = number - 1, .total = count, .fraction = (double)(number - 1) / (double)count};
+    e.seconds = e.seconds_left = e.psnr = e.loss = (double)NAN;
+    snprintf(line, sizeof line, "run %zu of %zu", number, count);
+    log_progress(&e);
+}
+
 gbt_status study_texts_save(study_texts *texts, const char *folder, const char *name, FILE *out)
 {
     const struct { const char *suffix; text *body; } files[] = {{"csv", &texts->csv}, {"svg", &texts->charts}, {"md", &texts->page}};

@@ -42,6 +42,9 @@ gbt_status study_runs_names(const char *const *data, size_t count, char names[][
  */
 gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def *def, study_figures *out, gbt_error *err);
 
+/** Say that run `number` of `count`, from 1 on, begins. */
+void study_runs_tell(size_t number, size_t count);
+
 /** What a study has to say. Each starts from {.err = err}. */
 typedef struct study_texts {
     text csv, page, charts;

@@ -504,3 +504,11 @@ try {
 } catch (...) {
     return caught("image", GBT_ERR_INTERNAL, err);
 }
+
+extern "C" const char *image_library(void)
+{
+    static char text[40];
+    const unsigned version = OIIO::openimageio_version();
+    std::snprintf(text, sizeof text, "OpenImageIO %u.%u.%u", version / 10000, version / 100 % 100, version % 100);
+    return text;
+}

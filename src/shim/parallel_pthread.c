@@ -67,3 +67,8 @@ void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *cont
     for (int i = 0; i < started; i++)
         pthread_join(threads[i], NULL);
 }
+
+const char *parallel_library(void)
+{
+    return "pthreads";
+}

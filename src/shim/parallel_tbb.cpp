@@ -11,6 +11,7 @@
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
+#include <tbb/version.h>
 
 static std::unique_ptr<tbb::global_control> limit;
 static int thread_count = 0;
@@ -71,4 +72,11 @@ try {
     /* The bodies are C and cannot throw, so only TBB's own start-up can fail, and then there is no way to go on. */
     std::fputs("error: threads: oneTBB could not start\n", stderr);
     std::abort();
+}
+
+extern "C" const char *parallel_library(void)
+{
+    static char text[40];
+    std::snprintf(text, sizeof text, "oneTBB %.20s", TBB_runtime_version());
+    return text;
 }

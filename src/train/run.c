@@ -58,7 +58,7 @@ static void signals_release(const signal_guard *guard)
 /* ---- the run's folder ------------------------------------------------------------------------------------------------------------------ */
 
 typedef struct run_paths {
-    char model[PATH_SIZE], config[PATH_SIZE], log[PATH_SIZE], json[PATH_SIZE], exposure[PATH_SIZE], checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
+    char model[PATH_SIZE], config[PATH_SIZE], log[PATH_SIZE], events[PATH_SIZE], json[PATH_SIZE], exposure[PATH_SIZE], checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
 } run_paths;
 
 static gbt_status open_folder(const char *run, run_paths *p, gbt_error *err)
@@ -69,6 +69,7 @@ static gbt_status open_folder(const char *run, run_paths *p, gbt_error *err)
     GBT_TRY(file_join(p->model, sizeof p->model, run, "model.gbt", err));
     GBT_TRY(file_join(p->config, sizeof p->config, run, "config", err));
     GBT_TRY(file_join(p->log, sizeof p->log, run, "log.csv", err));
+    GBT_TRY(file_join(p->events, sizeof p->events, run, EVENTS_TRAIN_NAME, err));
     GBT_TRY(file_join(p->json, sizeof p->json, run, "train.json", err));
     GBT_TRY(file_join(p->exposure, sizeof p->exposure, run, "exposure.json", err));
     GBT_TRY(file_join(p->checkpoint, sizeof p->checkpoint, checkpoints, "last.gbt", err));
@@ -268,7 +269,7 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
     GBT_TRY(file_write_atomic(paths.config, config, strlen(config), err));
 
     run_log log;
-    GBT_TRY(run_log_open(&log, t, paths.log, err));
+    GBT_TRY(run_log_open(&log, t, paths.log, paths.events, err));
     gbt_status status = run_steps(t, &paths, &log, err);
     if (status == GBT_OK)
         status = save_all(t, &paths, err);

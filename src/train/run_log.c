@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "base/cpu.h"
 #include "base/fail.h"
@@ -15,35 +14,109 @@
 #include "base/parallel.h"
 #include "bvh/device.h"
 
-static const double row_every_seconds = 1, line_every_seconds = 10;
+static const double row_every_seconds = 1;
 
-static const char header[] =
-    "step,seconds,progress,width,height,loss,l1,ssim,train_psnr,test_psnr,anchors,gaussians,visible_anchors,blended_per_ray,rays_per_second,"
-    "photo_ms,rays_ms,visible_ms,decode_ms,build_ms,trace_ms,loss_ms,adjoint_ms,decode_adjoint_ms,optimizer_ms,adjust_ms,memory_bytes\n";
+/* One row: its column in log.csv, its tag for TensorBoard ("": not there), how it is printed, its value. */
+#define ROW_COLUMNS(X)                                                                          \
+    X("step", "", "%.0f", (double)t->step)                                                      \
+    X("seconds", "run/seconds", "%.3f", t->seconds)                                             \
+    X("progress", "run/progress", "%.5f", pace_progress(&t->pace, t->step))                     \
+    X("width", "run/width", "%.0f", (double)width)                                              \
+    X("height", "run/height", "%.0f", (double)height)                                           \
+    X("loss", "loss/all", "%.6f", s->loss / n)                                                  \
+    X("l1", "loss/l1", "%.6f", s->l1 / n)                                                       \
+    X("ssim", "train/ssim", "%.6f", s->ssim / n)                                                \
+    X("train_psnr", "train/psnr", "%.4f", s->psnr / n)                                          \
+    X("test_psnr", "held_out/psnr", "%.4f", test_psnr)                                          \
+    X("anchors", "scene/anchors", "%.0f", (double)t->anchors.count)                             \
+    X("gaussians", "scene/gaussians", "%.0f", s->gaussians / n)                                 \
+    X("visible_anchors", "scene/visible_anchors", "%.0f", s->visible / n)                       \
+    X("blended_per_ray", "scene/blended_per_ray", "%.2f", s->blended / fmax(s->rays, 1))        \
+    X("rays_per_second", "run/rays_per_second", "%.0f", s->rays / fmax(s->seconds, 1e-9))       \
+    X("photo_ms", "ms/photo", "%.3f", s->photo * ms)                                            \
+    X("rays_ms", "ms/rays", "%.3f", s->rays_seconds * ms)                                       \
+    X("visible_ms", "ms/visible", "%.3f", s->visible_seconds * ms)                              \
+    X("decode_ms", "ms/decode", "%.3f", s->decode * ms)                                         \
+    X("build_ms", "ms/build", "%.3f", s->build * ms)                                            \
+    X("trace_ms", "ms/trace", "%.3f", s->trace * ms)                                            \
+    X("loss_ms", "ms/loss", "%.3f", s->loss_seconds * ms)                                       \
+    X("adjoint_ms", "ms/adjoint", "%.3f", s->adjoint * ms)                                      \
+    X("decode_adjoint_ms", "ms/decode_adjoint", "%.3f", s->decode_adjoint * ms)                 \
+    X("optimizer_ms", "ms/optimizer", "%.3f", s->optimizer * ms)                                \
+    X("adjust_ms", "ms/adjust", "%.3f", s->adjust * ms)                                         \
+    X("memory_bytes", "run/memory_bytes", "%.0f", (double)mem_peak_bytes())
+
+static const struct { const char *name, *tag, *format; } columns[] = {
+#define X(name, tag, format, value) {name, tag, format},
+    ROW_COLUMNS(X)
+#undef X
+};
+
+enum { COLUMN_COUNT = sizeof columns / sizeof *columns };
+
+static size_t header_text(char *out, size_t size)
+{
+    size_t used = 0;
+    for (int i = 0; i < COLUMN_COUNT; i++)
+        used += (size_t)snprintf(out + used, size - used, "%s%c", columns[i].name, i + 1 < COLUMN_COUNT ? ',' : '\n');
+    return used;
+}
 
 /* Start the file, or go back to where the checkpoint was made: rows of steps that will be taken again, or that a kill cut short, go. */
 static gbt_status rewind_rows(const char *csv_path, uint64_t step, gbt_error *err)
 {
+    char header[1024];
+    const size_t header_size = header_text(header, sizeof header);
     unsigned char *bytes = NULL;
     size_t size = 0, kept = 0;
     if (step > 0 && file_exists(csv_path))
         GBT_TRY(file_read(csv_path, &bytes, &size, err));
-    if (size >= sizeof header - 1 && memcmp(bytes, header, sizeof header - 1) == 0)
-        kept = sizeof header - 1;
+    if (size >= header_size && memcmp(bytes, header, header_size) == 0)
+        kept = header_size;
     for (const unsigned char *end; kept > 0 && (end = memchr(bytes + kept, '\n', size - kept)) != NULL; kept = (size_t)(end - bytes) + 1)
         if (strtoull((const char *)bytes + kept, NULL, 10) > step)
             break;
-    const gbt_status status = kept > 0 ? file_write_atomic(csv_path, bytes, kept, err) : file_write_atomic(csv_path, header, sizeof header - 1, err);
+    const gbt_status status = kept > 0 ? file_write_atomic(csv_path, bytes, kept, err) : file_write_atomic(csv_path, header, header_size, err);
     mem_free(bytes);
     return status;
 }
 
-gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, gbt_error *err)
+static void flush_events(run_log *log)
+{
+    fwrite(log->records.bytes, 1, log->records.count, log->events);
+    fflush(log->events);
+    log->records.count = 0;
+}
+
+/* The same for TensorBoard, which is also told that steps may come again. */
+static gbt_status rewind_events(run_log *log, const char *path, uint64_t step, gbt_error *err)
+{
+    unsigned char *bytes = NULL;
+    size_t size = 0;
+    if (step > 0 && file_exists(path))
+        GBT_TRY(file_read(path, &bytes, &size, err));
+    const size_t kept = event_records_until(bytes, size, step);
+    event_records *r = &log->records;
+    if (kept == 0)
+        event_add_version(r);
+    if (step > 0)
+        event_add_start(r, step);
+    gbt_status status = file_write_atomic(path, bytes, kept, err);
+    mem_free(bytes);
+    if (status == GBT_OK && (log->events = fopen(path, "ab")) == NULL)
+        status = base_fail(err, GBT_ERR_IO, "%s: cannot write", path);
+    if (status == GBT_OK)
+        flush_events(log);
+    return status;
+}
+
+gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, const char *events_path, gbt_error *err)
 {
     memset(log, 0, sizeof *log);
-    log->on_terminal = isatty(STDERR_FILENO);
-    log->last_row_seconds = log->last_line_seconds = t->seconds;
+    log->last_row_seconds = t->seconds;
     GBT_TRY(rewind_rows(csv_path, t->step, err));
+    if (t->def.tensorboard)
+        GBT_TRY(rewind_events(log, events_path, t->step, err));
     log->csv = fopen(csv_path, "a");
     if (log->csv == NULL)
         return base_fail(err, GBT_ERR_IO, "%s: cannot write", csv_path);
@@ -70,28 +143,42 @@ static void write_row(run_log *log, const trainer *t, int width, int height, dou
 {
     const run_sums *s = &log->row;
     const double n = s->steps > 0 ? (double)s->steps : 1, ms = 1000 / n;
-    char test[32] = "";
-    if (isfinite(test_psnr))
-        snprintf(test, sizeof test, "%.4f", test_psnr);
-    fprintf(log->csv, "%llu,%.3f,%.5f,%d,%d,%.6f,%.6f,%.6f,%.4f,%s,%zu,%.0f,%.0f,%.2f,%.0f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%zu\n",
-            (unsigned long long)t->step, t->seconds, pace_progress(&t->pace, t->step), width, height, s->loss / n, s->l1 / n, s->ssim / n, s->psnr / n,
-            test, t->anchors.count, s->gaussians / n, s->visible / n, s->blended / fmax(s->rays, 1), s->rays / fmax(s->seconds, 1e-9), s->photo * ms,
-            s->rays_seconds * ms, s->visible_seconds * ms, s->decode * ms, s->build * ms, s->trace * ms, s->loss_seconds * ms, s->adjoint * ms,
-            s->decode_adjoint * ms, s->optimizer * ms, s->adjust * ms, mem_peak_bytes());
+    const double values[] = {
+#define X(name, tag, format, value) value,
+        ROW_COLUMNS(X)
+#undef X
+    };
+    event_scalar scalars[COLUMN_COUNT];
+    size_t scalar_count = 0;
+    for (int i = 0; i < COLUMN_COUNT; i++) {
+        if (isfinite(values[i]))
+            fprintf(log->csv, columns[i].format, values[i]);
+        fputc(i + 1 < COLUMN_COUNT ? ',' : '\n', log->csv);
+        if (isfinite(values[i]) && columns[i].tag[0] != '\0')
+            scalars[scalar_count++] = (event_scalar){columns[i].tag, values[i]};
+    }
     fflush(log->csv);
+    if (log->events != NULL) {
+        event_add_scalars(&log->records, t->step, scalars, scalar_count);
+        flush_events(log);
+    }
     memset(&log->row, 0, sizeof log->row);
     log->last_row_seconds = t->seconds;
 }
 
-static void progress_line(run_log *log, const trainer *t, const step_report *r)
+static void tell_progress(const run_log *log, const trainer *t)
 {
+    const step_report *r = &log->last;
     const double progress = pace_progress(&t->pace, t->step), left = progress > 0 ? t->seconds * (1 - progress) / progress : 0;
-    const double left_shown = t->pace.known < PACE_SEGMENTS ? fmax(0, t->def.budget_seconds - t->seconds) : left;
-    fprintf(stderr, "%sstep %llu  %3.0f %%  %dx%d  loss %.4f  psnr %.2f  anchors %zu  gaussians %zu  %.2f Mrays/s  %zu MB  %.0f:%02.0f left%s",
-            log->on_terminal ? "\r" : "", (unsigned long long)t->step, 100 * progress, r->width, r->height, r->loss, log->psnr_smooth, t->anchors.count,
-            r->gaussians, log->row.steps > 0 ? log->row.rays / fmax(log->row.seconds, 1e-9) * 1e-6 : (double)t->frame.counters.rays / r->total_seconds * 1e-6,
-            mem_peak_bytes() / 1000000, floor(left_shown / 60), floor(fmod(left_shown, 60)), log->on_terminal ? "  " : "\n");
-    log->last_line_seconds = t->seconds;
+    const run_sums *s = log->row.steps > 0 ? &log->row : &log->all;
+    char line[512];
+    gbt_event e = {.text = line, .stage = "train", .done = t->step, .total = t->def.iterations, .fraction = progress, .seconds = t->seconds};
+    e.seconds_left = t->pace.known < PACE_SEGMENTS ? fmax(0, t->def.budget_seconds - t->seconds) : left;
+    e.psnr = log->psnr_smooth, e.loss = r->loss, e.anchors = t->anchors.count, e.gaussians = r->gaussians;
+    snprintf(line, sizeof line, "step %llu  %3.0f %%  %dx%d  loss %.4f  psnr %.2f  anchors %zu  gaussians %zu  %.2f Mrays/s  %zu MB  %.0f:%02.0f left",
+             (unsigned long long)t->step, 100 * progress, r->width, r->height, r->loss, log->psnr_smooth, t->anchors.count, r->gaussians,
+             s->rays / fmax(s->seconds, 1e-9) * 1e-6, mem_peak_bytes() / 1000000, floor(e.seconds_left / 60), floor(fmod(e.seconds_left, 60)));
+    log_progress(&e);
 }
 
 void run_log_step(run_log *log, const trainer *t, const step_report *report)
@@ -99,8 +186,9 @@ void run_log_step(run_log *log, const trainer *t, const step_report *report)
     add_step(&log->row, t, report);
     add_step(&log->all, t, report);
     log->psnr_smooth = log->all.steps == 1 ? report->psnr : 0.98 * log->psnr_smooth + 0.02 * report->psnr;
-    if (t->seconds - log->last_line_seconds >= (log->on_terminal ? 0.5 : line_every_seconds))
-        progress_line(log, t, report);
+    log->last = *report;
+    if (log_progress_due())
+        tell_progress(log, t);
     if (t->seconds - log->last_row_seconds >= row_every_seconds)
         write_row(log, t, report->width, report->height, NAN);
 }
@@ -113,13 +201,14 @@ void run_log_evaluation(run_log *log, const trainer *t, double psnr)
         log->evaluated_psnr[log->evaluated_count++] = psnr;
     }
     write_row(log, t, t->frame.rgb.width, t->frame.rgb.height, psnr);
-    log_info("%sheld-out PSNR after %.1f s (step %llu): %.3f dB", log->on_terminal ? "\n" : "", t->seconds, (unsigned long long)t->step, psnr);
+    log_info("held-out PSNR after %.1f s (step %llu): %.3f dB", t->seconds, (unsigned long long)t->step, psnr);
 }
 
 gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path, gbt_error *err)
 {
-    if (log->on_terminal)
-        fputc('\n', stderr);
+    if (log->row.steps > 0)
+        write_row(log, t, log->last.width, log->last.height, (double)NAN);
+    tell_progress(log, t);
     const run_sums *s = &log->all;
     const double n = s->steps > 0 ? (double)s->steps : 1, ms = 1000 / n;
     json_t *root = json_object(), *stages = json_object(), *parts = json_array(), *evals = json_array();
@@ -175,5 +264,8 @@ void run_log_close(run_log *log)
 {
     if (log->csv != NULL)
         fclose(log->csv);
-    log->csv = NULL;
+    if (log->events != NULL)
+        fclose(log->events);
+    event_records_free(&log->records);
+    log->csv = log->events = NULL;
 }

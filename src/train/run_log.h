@@ -1,9 +1,10 @@
-/* train/run_log.h -- what a run says about itself: the progress line, log.csv, train.json. */
+/* train/run_log.h -- what a run says about itself: progress, log.csv, TensorBoard events, train.json. */
 #ifndef GBT_TRAIN_RUN_LOG_H
 #define GBT_TRAIN_RUN_LOG_H
 
 #include <stdio.h>
 
+#include "train/event_records.h"
 #include "train/trainer.h"
 
 /* Sums since the last row of log.csv. */
@@ -16,15 +17,17 @@ typedef struct run_sums {
 typedef struct run_log {
     FILE *csv;
     run_sums row, all;
-    double psnr_smooth, last_row_seconds, last_line_seconds;
-    bool on_terminal;
+    FILE *events; /* NULL: none */
+    event_records records;
+    step_report last;
+    double psnr_smooth, last_row_seconds;
     double evaluated_seconds[GBT_TRAIN_MAX_EVALS], evaluated_psnr[GBT_TRAIN_MAX_EVALS];
     uint64_t evaluated_step[GBT_TRAIN_MAX_EVALS];
     int evaluated_count;
 } run_log;
 
-/** Open log.csv (going on with it after --resume) and say what the run starts from. */
-gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, gbt_error *err);
+/** Open log.csv, and the events if t->def.tensorboard (going on with both after --resume), and say what the run starts from. */
+gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, const char *events_path, gbt_error *err);
 void run_log_step(run_log *log, const trainer *t, const step_report *report);
 void run_log_evaluation(run_log *log, const trainer *t, double psnr);
 

@@ -3,21 +3,10 @@
 set -u
 program=$1
 shared=${2:-}
+. "$(dirname "$0")/report.sh"
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
-passed=0
-failed=0
-
-report() { # ok?, name, details
-    if [ "$1" = 0 ]; then
-        passed=$((passed + 1))
-    else
-        failed=$((failed + 1))
-        printf 'FAILED: %s\n%s\n' "$2" "$3"
-    fi
-}
-
 # misuse CODE MESSAGE ARGUMENTS...: exactly one line on stderr, nothing on stdout.
 misuse() {
     code=$1
@@ -85,9 +74,10 @@ done
 for bad in -1 nan 1,5; do
     misuse 2 "--voxel-size: bad value (wanted a number from 0 to 1e+30, got $bad)" init d -o p --voxel-size "$bad"
 done
-for bad in gbx 'gb|voxel'; do
-    misuse 2 "--init: bad value (wanted one of gb|adaptive|voxel|random, got $bad)" init d -o p --init "$bad"
+for bad in gbx=gb 'gb|voxel=voxel' adaptiv=adaptive; do
+    misuse 2 "--init: bad value (wanted one of gb|adaptive|voxel|random, got ${bad%=*}; did you mean ${bad#*=}?)" init d -o p --init "${bad%=*}"
 done
+misuse 2 "--init: bad value (wanted one of gb|adaptive|voxel|random, got zzzz)" init d -o p --init zzzz
 misuse 2 "--seed: bad value (wanted a whole number from 0 to 18446744073709551615, got -1)" make-scene tabletop -o d --seed -1
 misuse 2 "--seed: bad value (wanted a whole number from 0 to 18446744073709551615, got 18446744073709551616)" make-scene tabletop -o d --seed 18446744073709551616
 misuse 2 "--width: bad value (wanted a whole number from 8 to 8192, got 0)" make-scene tabletop -o d --width 0
@@ -115,7 +105,7 @@ misuse 4 "nothing: no such file or folder" init nothing -o p --config good.conf 
 misuse 2 "--max-depth: bad value (wanted $depth, got 65)" init d -o p --config good.conf --max-depth 65
 misuse 4 "none.conf: cannot open: No such file or directory" init d -o p --config none.conf
 misuse 4 ".: not a regular file" init d -o p --config .
-misuse 2 "--config: value missing (wanted a file)" init d -o p --config
+misuse 2 "--config: value missing (wanted a text that is not empty)" init d -o p --config
 misuse 2 "--config: given twice" init d -o p --config good.conf --config=good.conf
 config() { # text, message
     printf "$1" >bad.conf
@@ -129,6 +119,27 @@ config 'max-depth =\n' "1: max-depth: bad value (wanted $depth, got nothing)"
 config 'mesh = yes\n' '1: mesh: bad value (wanted true or false, got yes)'
 config 'config = other\n' '1: config: unknown option'
 config 'a\0b\n' ' not a configuration file (wanted name = value lines, at most 1 MiB)'
+
+# ---- the environment, between the configuration file and the command line
+prints "help with a variable" '--max-depth D  *most splits of the cloud (default 18)$' init --help
+export GBTRACE_MAX_DEPTH=65
+misuse 2 "GBTRACE_MAX_DEPTH: bad value (wanted $depth, got 65)" init d -o p
+export GBTRACE_MAX_DEPTH=5 GBTRACE_INIT_VOXEL_SIZE=nan
+misuse 2 "GBTRACE_INIT_VOXEL_SIZE: bad value (wanted a number from 0 to 1e+30, got nan)" init d -o p
+unset GBTRACE_MAX_DEPTH GBTRACE_INIT_VOXEL_SIZE
+
+# ---- what people type who come from other programs
+misuse 4 "nothing: no such file or folder" train -s nothing -m run -r 2 --eval --iterations 7000 --quiet
+misuse 4 "nothing: no such file or folder" train --source_path nothing --model_path run --resolution 2 --n_offsets 10 --voxel_size 0.01
+misuse 2 "--output: given twice" train -s nothing -m run --output run
+misuse 2 "-r: bad value (wanted a number from 1 to 64, got 800)" train -s nothing -m run -r 800
+misuse 2 "--white_background: not here; what no Gaussian covers shows the mean colour of the points; leave it out" train -s d -m r --white_background
+misuse 2 "-i: not here; photos are found from the cameras; for smaller ones use --downscale F" train -s d -m r -i images_4
+misuse 2 "--test_iterations: not here; use --eval-at 1m,2m for scores on the way" train -s d -m r --test_iterations 7000 30000
+misuse 2 "--position_lr_init: not here; use --learning-rate F, which multiplies all rates" train -s d -m r --position_lr_init 0.0001
+misuse 4 "nothing: not a run folder (wanted what gbtrace train wrote)" metrics -m nothing
+misuse 2 "--output is missing (usage: gbtrace render RUN|GAUSSIANS [-o DIR])" render -m nothing
+misuse 2 "--iteration: not here; a run keeps its last model alone" render -m nothing --iteration 7000
 
 # ---- files
 misuse 4 "nothing: no such file or folder" info nothing
@@ -302,7 +313,9 @@ prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.00
 misuse 2 '--kernel: "tile,tile" (wanted tile, single or embree, or some of them with commas between)' $bench --kernel tile,tile
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
 misuse 2 "--camera: missing (a .ply has no cameras)" bench trace --model gaussians.ply
-misuse 2 'study: unknown study "pace" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study pace gaussians.ply -o study
+misuse 2 'study: "pace" (wanted speed, crosscheck, rate, stability, paper, time or anchors; did you mean rate?)' study pace gaussians.ply -o study
+misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study zzzzzz gaussians.ply -o study
+misuse 2 'bench: "tarce" (wanted trace; did you mean trace?)' bench tarce --model gaussians.ply
 misuse 2 "argument missing (usage: gbtrace study speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR)" study -o study
 misuse 2 "study crosscheck: wanted a model, or data to train on" study crosscheck -o study
 misuse 2 'study stability: "gaussians.ply" is one too many' study stability gaussians.ply -o study
@@ -358,6 +371,9 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
         [ "$(grep -c '"psnr_to_model": ' plain.json)" = 4 ] && [ "$(head -c 4 plain.glb)" = glTF ] && "$program" export plain.spz back.ply >>out 2>>err &&
         [ "$(grep -a '^element vertex' back.ply)" = "$(grep -a '^element vertex' plain.ply)" ]
     report $? "export bakes a run into every format, and converts" "$(cat err out)"
+    "$program" export plain.spz -o named.ply >out 2>err && cmp -s named.ply back.ply
+    report $? "export takes -o too" "$(cat err out)"
+    misuse 2 "argument missing (usage: $("$program" export --help | sed -n 's/^usage: \(.*\) \[options\]$/\1/p'))" export run
     rm -f out # of the row before: an old one would be read as the address
     "$program" view run --port 0 >out 2>err &
     viewer=$!
@@ -382,7 +398,4 @@ if [ -n "$shared" ] && [ -d "$shared/data/fox" ]; then
     prints "info of real photos: split" '^  views     50: 43 to train, 7 held out$' info "$shared/data/fox"
 fi
 
-printf '[  PASSED  ] %d test(s).\n' "$passed"
-[ "$failed" -eq 0 ] && exit 0
-printf '[  FAILED  ] %d test(s), listed above\n\n %d FAILED TEST(S)\n' "$failed" "$failed"
-exit 1
+finish

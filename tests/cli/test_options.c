@@ -1,5 +1,8 @@
 /* tests/cli/test_options.c -- the text of one option to its value, at and beyond every edge; guesses at mistyped names. */
+#include <unistd.h>
+
 #include "cli/options.h"
+#include "cli/progress.h"
 #include "test_support.h"
 
 typedef union any_value {
@@ -48,8 +51,9 @@ static const value_case value_cases[] = {
     {OPTION_STRING, "a b", 0, 0, true, 0}, {OPTION_STRING, "", 0, 0, false, 0},
     {OPTION_CHOICE, "one", 0, 0, true, 0}, {OPTION_CHOICE, "two", 0, 0, true, 0}, {OPTION_CHOICE, "three", 0, 0, true, 0}, {OPTION_CHOICE, "on", 0, 0, false, 0},
     {OPTION_CHOICE, "one|two", 0, 0, false, 0}, {OPTION_CHOICE, "", 0, 0, false, 0}, {OPTION_CHOICE, "One", 0, 0, false, 0}, {OPTION_CHOICE, "threes", 0, 0, false, 0},
-    {OPTION_FLAG, "true", 0, 0, true, 1}, {OPTION_FLAG, "false", 0, 0, true, 0}, {OPTION_FLAG, "1", 0, 0, false, 0},
-    {OPTION_FLAG_OFF, "true", 0, 0, true, 0}, {OPTION_FLAG_OFF, "false", 0, 0, true, 1},
+    {OPTION_FLAG, "true", 0, 0, true, 1}, {OPTION_FLAG, "false", 0, 0, true, 0}, {OPTION_FLAG, "1", 0, 0, true, 1}, {OPTION_FLAG, "0", 0, 0, true, 0}, {OPTION_FLAG, "yes", 0, 0, false, 0},
+    {OPTION_FLAG_OFF, "true", 0, 0, true, 0}, {OPTION_FLAG_OFF, "false", 0, 0, true, 1}, {OPTION_FLAG_OFF, "1", 0, 0, true, 0}, {OPTION_FLAG_OFF, "", 0, 0, false, 0},
+    {OPTION_OPERAND, "a b", 0, 0, true, 0}, {OPTION_OPERAND, "", 0, 0, false, 0},
 };
 
 static double number_of(option_kind kind, const any_value *v)
@@ -64,7 +68,9 @@ static double number_of(option_kind kind, const any_value *v)
     case OPTION_DURATION: return v->number;
     case OPTION_SIZE: return (double)v->size;
     case OPTION_STRING:
-    case OPTION_CHOICE: return 0;
+    case OPTION_CHOICE:
+    case OPTION_OPERAND:
+    case OPTION_ELSEWHERE: return 0;
     }
     return NAN;
 }
@@ -85,7 +91,7 @@ static void values(void **state)
             fail_msg("kind %d says nothing about what is wanted", (int)c->kind);
         if (!ok)
             continue;
-        if ((c->kind == OPTION_STRING || c->kind == OPTION_CHOICE) && value.text != c->text)
+        if ((c->kind == OPTION_STRING || c->kind == OPTION_CHOICE || c->kind == OPTION_OPERAND) && value.text != c->text)
             fail_msg("\"%s\" was not kept", c->text);
         if (number_of(c->kind, &value) != c->value)
             fail_msg("kind %d, \"%s\": got %.17g", (int)c->kind, c->text, number_of(c->kind, &value));
@@ -148,6 +154,107 @@ static void order_of_config_and_command_line(void **state)
     remove(path);
 }
 
+/* One command of every kind of spelling, for the tests below. */
+typedef struct spelled {
+    int depth;
+    bool grow;
+    const char *split, *name, *folder;
+} spelled;
+
+static int parse_spelled(spelled *s, int argc, char **argv, operands *found)
+{
+    *s = (spelled){.depth = 1, .grow = true, .split = "test"};
+    const option options[] = {
+        {.name = "folder", .short_name = 'o', .kind = OPTION_STRING, .value = &s->folder, .value_name = "DIR", .help = "", .aliases = "m model-path"},
+        {.name = "source", .short_name = 's', .kind = OPTION_OPERAND, .value_name = "DATA", .help = "", .aliases = "data"},
+        {.name = "max-depth", .kind = OPTION_INT, .value = &s->depth, .min = 0, .max = 9, .value_name = "N", .help = "", .aliases = "r resolution"},
+        {.name = "split", .kind = OPTION_CHOICE, .value = &s->split, .choices = "test|train|all", .help = ""},
+        {.name = "skip-test", .kind = OPTION_CHOICE, .value = &s->split, .choices = "test|train|all", .fixed = "train", .help = ""},
+        {.name = "no-grow", .kind = OPTION_FLAG_OFF, .value = &s->grow, .help = ""},
+        {.name = "gpu", .kind = OPTION_ELSEWHERE, .aliases = "w", .help = "leave it out"},
+    };
+    static const command self = {.name = "my-test", .summary = "", .usage = ""};
+    return options_parse(&self, options, sizeof options / sizeof *options, 1, 2, argc, argv, found);
+}
+
+static void other_names(void **state)
+{
+    (void)state;
+    spelled s;
+    operands found;
+    assert_int_equal(parse_spelled(&s, 8, (char *[]){"-s", "data", "-m", "run", "-r", "4", "--skip_test", "--no_grow"}, &found), -1);
+    assert_true(found.count == 1 && strcmp(found.value[0], "data") == 0);
+    assert_true(strcmp(s.folder, "run") == 0 && s.depth == 4 && strcmp(s.split, "train") == 0 && !s.grow);
+    assert_int_equal(parse_spelled(&s, 5, (char *[]){"second", "--data=first", "--skip-test", "--split", "all"}, &found), -1);
+    assert_true(found.count == 2 && strcmp(found.value[0], "first") == 0 && strcmp(found.value[1], "second") == 0);
+    assert_string_equal(s.split, "all");
+    static char *const wrong[][4] = {{"x", "-w"}, {"x", "--gpu=0"}, {"x", "--r", "4"}, {"x", "--skip-test=all"}, {"x", "-data", "y"},
+                                     {"-s", "a", "b", "c"}, {"x", "-o", "y", "--model_path=z"}, {"x", "--resolution", "10"}};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        int argc = 0;
+        while (argc < 4 && wrong[i][argc] != NULL)
+            argc++;
+        if (parse_spelled(&s, argc, (char **)wrong[i], &found) != 2)
+            fail_msg("%s %s was accepted", wrong[i][0], wrong[i][1]);
+    }
+}
+
+static void environment(void **state)
+{
+    (void)state;
+    spelled s;
+    operands found;
+    char path[] = "/tmp/gbt_options_XXXXXX";
+    const int fd = mkstemp(path);
+    assert_true(fd >= 0 && write(fd, "max-depth = 2\nsplit = all\ndata = here\nfolder =\n", 47) == 47);
+    close(fd);
+    const struct { const char *general, *own, *typed; int depth; } rows[] = {
+        {NULL, NULL, NULL, 2}, {"3", NULL, NULL, 3}, {"3", "4", NULL, 4}, {NULL, "4", NULL, 4}, {"3", "4", "--max-depth=5", 5}, {"", "", NULL, 2}, {"3", "", NULL, 3}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        unsetenv("GBTRACE_MAX_DEPTH"), unsetenv("GBTRACE_MY_TEST_MAX_DEPTH");
+        if (rows[i].general != NULL)
+            setenv("GBTRACE_MAX_DEPTH", rows[i].general, 1);
+        if (rows[i].own != NULL)
+            setenv("GBTRACE_MY_TEST_MAX_DEPTH", rows[i].own, 1);
+        char *argv[] = {"--config", path, (char *)rows[i].typed};
+        assert_int_equal(parse_spelled(&s, rows[i].typed != NULL ? 3 : 2, argv, &found), -1);
+        if (s.depth != rows[i].depth)
+            fail_msg("row %zu: got %d", i, s.depth);
+        assert_true(strcmp(s.split, "all") == 0 && s.folder == NULL);
+        assert_true(found.count == 1 && strcmp(found.value[0], "here") == 0);
+    }
+    setenv("GBTRACE_MY_TEST_MAX_DEPTH", "10", 1);
+    assert_int_equal(parse_spelled(&s, 1, (char *[]){"x"}, &found), 2);
+    setenv("GBTRACE_MY_TEST_MAX_DEPTH", "1", 1);
+    setenv("GBTRACE_NO_GROW", "true", 1);
+    setenv("GBTRACE_SKIP_TEST", "true", 1); /* a spelling, not an option */
+    setenv("GBTRACE_CONFIG", path, 1);
+    assert_int_equal(parse_spelled(&s, 1, (char *[]){"x"}, &found), -1);
+    assert_false(s.grow);
+    assert_string_equal(s.split, "all"); /* from the file that the environment named */
+    assert_string_equal(found.value[0], "x");
+    unsetenv("GBTRACE_CONFIG"), unsetenv("GBTRACE_NO_GROW"), unsetenv("GBTRACE_SKIP_TEST"), unsetenv("GBTRACE_MY_TEST_MAX_DEPTH"), unsetenv("GBTRACE_MAX_DEPTH");
+    remove(path);
+}
+
+static void json_texts(void **state)
+{
+    (void)state;
+    const struct { const char *text, *json; } rows[] = {
+        {"", "\"\""}, {"a\"b\\c", "\"a\\\"b\\\\c\""}, {"\n\x01\x7f", "\"\\u000a\\u0001\\u007f\""}, {"\xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80", "\"\xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80\""},
+        {"\xff|\xc3|\xc0\x80|\xed\xa0\x80|\xe2\x82", "\"?|?|\?\?|\?\?\?|\?\?\""}, {"\xf4\x90\x80\x80", "\"\?\?\?\?\""}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char *got = NULL;
+        size_t size;
+        FILE *out = open_memstream(&got, &size);
+        json_write_text(out, rows[i].text);
+        fclose(out);
+        if (strcmp(got, rows[i].json) != 0)
+            fail_msg("row %zu: got %s", i, got);
+        free(got);
+    }
+}
+
 static void nearest_names(void **state)
 {
     (void)state;
@@ -169,6 +276,9 @@ int main(void)
         cmocka_unit_test(values),
         cmocka_unit_test(refused_values_change_nothing),
         cmocka_unit_test(order_of_config_and_command_line),
+        cmocka_unit_test(other_names),
+        cmocka_unit_test(environment),
+        cmocka_unit_test(json_texts),
         cmocka_unit_test(nearest_names),
     };
     return cmocka_run_group_tests_name("options", tests, NULL, NULL);

@@ -1,0 +1,93 @@
+/* cli/describe_bash.c -- completion for bash. */
+#include "cli/describe.h"
+
+static void write_names(const command *self, const option *options, int option_count, void *context)
+{
+    FILE *out = context;
+    fprintf(out, "    %s%s%s) options='", self->name, self->alias != NULL ? "|" : "", self->alias != NULL ? self->alias : "");
+    for (int i = 0; i < option_count; i++)
+        if (options[i].kind != OPTION_ELSEWHERE)
+            describe_names(out, &options[i], " ", false);
+    fputs("' ;;\n", out);
+}
+
+static void write_pattern(FILE *out, const command *self, const option *o)
+{
+    char before[64];
+    snprintf(before, sizeof before, "|%s:", self->name);
+    fputs("    (''", out); /* so that every name may start with a bar */
+    describe_names(out, o, before, true);
+    fputs(") ", out);
+}
+
+static void write_values(const command *self, const option *options, int option_count, void *context)
+{
+    FILE *out = context;
+    for (int i = 0; i < option_count; i++) {
+        const option *o = &options[i];
+        char words[512];
+        const value_kind kind = describe_value(o);
+        if (kind == VALUE_NONE)
+            continue;
+        write_pattern(out, self, o);
+        if (kind == VALUE_CHOICES)
+            describe_choices(o, words, sizeof words);
+        fprintf(out, kind == VALUE_CHOICES ? "words='%s' ;;\n" : "words= want=%s ;;\n", kind == VALUE_CHOICES ? words : kind == VALUE_FILE ? "file" : kind == VALUE_FOLDER ? "folder" : "none");
+    }
+}
+
+static void write_command_words(FILE *out)
+{
+    for (int i = 0; i < command_list_count; i++)
+        fprintf(out, "%s%s", i > 0 ? " " : "", command_list[i]->name);
+}
+
+void describe_bash(FILE *out)
+{
+    fputs("# Completion of gbtrace for bash. Made by gbtrace describe bash.\n"
+          "_gbtrace() {\n"
+          "    local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]} options= words= want=file\n"
+          "    COMPREPLY=()\n"
+          "    # bash parts a word at =: --name=VALUE comes as three.\n"
+          "    [ \"$current\" = = ] && current=\n"
+          "    [ \"$before\" = = ] && before=${COMP_WORDS[COMP_CWORD-2]}\n"
+          "    if [ \"$COMP_CWORD\" = 1 ]; then\n"
+          "        COMPREPLY=($(compgen -W 'help --help --version ", out);
+    write_command_words(out);
+    fputs("' -- \"$current\"))\n"
+          "        return\n"
+          "    fi\n"
+          "    case $command in\n"
+          "    help) words='", out);
+    write_command_words(out);
+    fputs("' want=none ;;\n", out);
+    for (int i = 0; i < command_list_count; i++)
+        options_visit(command_list[i], write_names, out);
+    fputs("    esac\n"
+          "    if [ \"$COMP_CWORD\" = 2 ]; then\n"
+          "        case $command in\n", out);
+    for (int i = 0; i < command_list_count; i++) {
+        if (command_list[i]->words == NULL)
+            continue;
+        fprintf(out, "        %s) want=none words='", command_list[i]->name);
+        describe_words(out, command_list[i]);
+        fputs("' ;;\n", out);
+    }
+    fputs("        esac\n"
+          "    fi\n"
+          "    case $command:$before in\n", out);
+    for (int i = 0; i < command_list_count; i++)
+        options_visit(command_list[i], write_values, out);
+    fputs("    esac\n"
+          "    if [[ $current = -* ]]; then\n"
+          "        COMPREPLY=($(compgen -W \"$options\" -- \"$current\"))\n"
+          "    elif [ -n \"$words\" ]; then\n"
+          "        COMPREPLY=($(compgen -W \"$words\" -- \"$current\"))\n"
+          "    elif [ \"$want\" != none ]; then\n"
+          "        compopt -o filenames 2>/dev/null\n"
+          "        local IFS=$'\\n'\n"
+          "        COMPREPLY=($(compgen -A $([ \"$want\" = folder ] && echo directory || echo file) -- \"$current\"))\n"
+          "    fi\n"
+          "}\n"
+          "complete -F _gbtrace gbtrace\n", out);
+}

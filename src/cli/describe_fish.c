@@ -1,0 +1,50 @@
+/* cli/describe_fish.c -- completion for fish. */
+#include "cli/describe.h"
+
+static void write_note(FILE *out, const char *text)
+{
+    fputs(" -d '", out);
+    describe_escaped(out, text, "'\\");
+    fputs("'\n", out);
+}
+
+static void write_rows(const command *self, const option *options, int option_count, void *context)
+{
+    FILE *out = context;
+    for (int i = 0; i < option_count; i++) {
+        const option *o = &options[i];
+        if (o->kind == OPTION_ELSEWHERE)
+            continue;
+        fprintf(out, "complete -c gbtrace -n '__fish_seen_subcommand_from %s' -l %s", self->name, o->name);
+        if (o->short_name != 0)
+            fprintf(out, " -s %c", o->short_name);
+        char words[512];
+        switch (describe_value(o)) {
+        case VALUE_NONE: break;
+        case VALUE_ANY: fputs(" -x", out); break;
+        case VALUE_CHOICES:
+            describe_choices(o, words, sizeof words);
+            fprintf(out, " -x -a '%s'", words);
+            break;
+        case VALUE_FILE: fputs(" -r -F", out); break;
+        case VALUE_FOLDER: fputs(" -x -a '(__fish_complete_directories)'", out); break;
+        }
+        write_note(out, o->help);
+    }
+    if (self->words == NULL)
+        return;
+    fprintf(out, "complete -c gbtrace -n '__fish_seen_subcommand_from %s; and test (count (commandline -opc)) -eq 2' -f -a '", self->name);
+    describe_words(out, self);
+    fputs("'\n", out);
+}
+
+void describe_fish(FILE *out)
+{
+    fputs("# Completion of gbtrace for fish. Made by gbtrace describe fish.\n", out);
+    for (int i = 0; i < command_list_count; i++) {
+        fprintf(out, "complete -c gbtrace -n __fish_use_subcommand -f -a %s", command_list[i]->name);
+        write_note(out, command_list[i]->summary);
+    }
+    for (int i = 0; i < command_list_count; i++)
+        options_visit(command_list[i], write_rows, out);
+}

@@ -1,0 +1,123 @@
+/* cli/describe_man.c -- the manual page. */
+#include "cli/describe.h"
+#include "gbtrace/version.h"
+
+/* One line of text: nothing in it is a request or an escape of roff. */
+static void write_text(FILE *out, const char *text)
+{
+    if (*text == '.' || *text == '\'')
+        fputs("\\&", out);
+    for (; *text != '\0'; text++)
+        switch (*text) {
+        case '\\': fputs("\\e", out); break;
+        case '-': fputs("\\-", out); break;
+        case '\'': fputs("\\(aq", out); break;
+        case '`': fputs("\\(ga", out); break;
+        case '^': fputs("\\(ha", out); break;
+        case '~': fputs("\\(ti", out); break;
+        default: fputc(*text, out);
+        }
+}
+
+static void write_rows(const command *self, const option *options, int option_count, void *context)
+{
+    FILE *out = context;
+    (void)self;
+    for (int i = 0; i < option_count - OPTIONS_COMMON; i++) {
+        const option *o = &options[i];
+        if (o->kind == OPTION_ELSEWHERE)
+            continue;
+        const char *value_name = options_value_name(o);
+        char notes[512];
+        fputs(".TP\n\\fB", out);
+        if (o->short_name != 0)
+            fprintf(out, "\\-%c\\fR, \\fB", o->short_name);
+        fputs("\\-\\-", out);
+        write_text(out, o->name);
+        fputs("\\fR", out);
+        if (value_name[0] != '\0') {
+            fputs(" \\fI", out);
+            write_text(out, value_name);
+            fputs("\\fR", out);
+        }
+        fputc('\n', out);
+        write_text(out, o->help);
+        options_notes(o, notes, sizeof notes);
+        write_text(out, notes);
+        fputc('\n', out);
+    }
+}
+
+static const char head[] =
+    ".SH NAME\n"
+    "gbtrace \\- neural Gaussian scenes from photos, traced on the CPU\n"
+    ".SH SYNOPSIS\n"
+    ".B gbtrace\n"
+    ".I COMMAND\n"
+    ".RI [ arguments ]\n"
+    ".br\n"
+    ".B gbtrace help\n"
+    ".RI [ COMMAND ]\n"
+    ".br\n"
+    ".B gbtrace \\-\\-version\n"
+    ".SH DESCRIPTION\n"
+    "gbtrace trains neural Gaussian scenes from posed photos, renders them by ray tracing with Embree, scores, compresses and exports them.\n"
+    "Results go to standard output, progress and errors to standard error.\n"
+    ".PP\n"
+    "In place of an option\\(aqs full name its other names may stand, and an underscore for a dash.\n"
+    ".SH COMMANDS\n";
+
+static const char tail[] =
+    ".SH COMMON OPTIONS\n"
+    "Every command has these.\n"
+    ".TP\n\\fB\\-\\-config\\fR \\fIFILE\\fR\n"
+    "Read lines\n.I name\n=\n.I value\nfirst, where # starts a comment and flags are true or false.\n"
+    ".TP\n\\fB\\-\\-progress\\fR \\fIauto|json|none\\fR\n"
+    "What standard error tells meanwhile: lines for a person, one JSON object a line for a program, or warnings and errors alone.\n"
+    ".TP\n\\fB\\-\\-quiet\\fR\nThe same as\n.BR \"\\-\\-progress none\" .\n"
+    ".TP\n\\fB\\-h\\fR, \\fB\\-\\-help\\fR\n"
+    "List the options of the command.\n"
+    ".SH ENVIRONMENT\n"
+    ".TP\n\\fBGBTRACE_\\fIOPTION\\fR\n"
+    "Value of an option for every command that has it: its name in capitals, underscores for dashes.\n"
+    ".B GBTRACE_THREADS=4\n"
+    "is\n.B \\-\\-threads 4.\n"
+    ".TP\n\\fBGBTRACE_\\fICOMMAND\\fB_\\fIOPTION\\fR\n"
+    "The same for one command, which wins:\n.BR GBTRACE_TRAIN_BUDGET=10m .\n"
+    ".PP\n"
+    "The environment wins over\n.BR \\-\\-config ,\nthe command line over both. Empty variables are as none.\n"
+    ".TP\n\\fBGBT_ISA\\fR\n"
+    "Instruction set of the kernels at most:\n.BR plain ,\n.B avx2\nor\n.BR avx512 .\nResults are the same.\n"
+    ".SH EXIT STATUS\n"
+    ".TP\n0\ndone\n"
+    ".TP\n1\na check failed (doctor, check\\-grad), or a library below\n"
+    ".TP\n2\nusage\n"
+    ".TP\n3\nbad input\n"
+    ".TP\n4\ninput or output failed\n"
+    ".TP\n5\nout of memory, or over a limit\n"
+    ".TP\n128+\\fIn\\fR\nstopped by signal\n.I n\nafter saving\n"
+    ".SH EXAMPLES\n"
+    ".nf\n"
+    "gbtrace train PHOTOS \\-o RUN \\-\\-budget 10m\n"
+    "gbtrace render RUN \\-o FOLDER \\-\\-split all\n"
+    "gbtrace export RUN scene.ply scene.spz\n"
+    ".fi\n";
+
+void describe_man(FILE *out)
+{
+    fprintf(out, ".\\\" Made by gbtrace describe man.\n.TH GBTRACE 1 \"\" \"gbtrace %s\" \"User Commands\"\n%s", gbt_version(), head);
+    for (int i = 0; i < command_list_count; i++) {
+        const command *c = command_list[i];
+        fputs(".SS gbtrace ", out);
+        write_text(out, c->name);
+        fputc(' ', out);
+        write_text(out, c->usage);
+        fputc('\n', out);
+        write_text(out, c->summary);
+        fputs(c->alias != NULL ? " (also " : "", out);
+        write_text(out, c->alias != NULL ? c->alias : "");
+        fputs(c->alias != NULL ? ").\n" : ".\n", out);
+        options_visit(c, write_rows, out);
+    }
+    fputs(tail, out);
+}

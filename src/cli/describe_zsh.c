@@ -1,0 +1,80 @@
+/* cli/describe_zsh.c -- completion for zsh. */
+#include "cli/describe.h"
+
+#include <string.h>
+
+/* Text inside '...[text]...': a quote ends the string, brackets and colons end the text. */
+static void write_note(FILE *out, const char *text)
+{
+    for (; *text != '\0'; text++)
+        fprintf(out, *text == '\'' ? "'\\''" : strchr("[]:\\", *text) != NULL ? "\\%c" : "%c", *text);
+}
+
+static void write_rows(const command *self, const option *options, int option_count, void *context)
+{
+    FILE *out = context;
+    fprintf(out, "  %s%s%s)\n    _arguments -S", self->name, self->alias != NULL ? "|" : "", self->alias != NULL ? self->alias : "");
+    for (int i = 0; i < option_count; i++) {
+        const option *o = &options[i];
+        if (o->kind == OPTION_ELSEWHERE)
+            continue;
+        fputs(" \\\n      ", out);
+        if (o->short_name != 0)
+            fprintf(out, "'(-%c --%s)'{-%c,--%s}'[", o->short_name, o->name, o->short_name, o->name);
+        else
+            fprintf(out, "'--%s[", o->name);
+        write_note(out, o->help);
+        fputc(']', out);
+        char words[512];
+        const value_kind kind = describe_value(o);
+        if (kind != VALUE_NONE) {
+            fputc(':', out);
+            write_note(out, kind == VALUE_CHOICES ? o->name : o->value_name);
+            fputc(':', out);
+        }
+        if (kind == VALUE_CHOICES) {
+            describe_choices(o, words, sizeof words);
+            fprintf(out, "(%s)", words);
+        } else if (kind == VALUE_FILE || kind == VALUE_FOLDER) {
+            fputs(kind == VALUE_FILE ? "_files" : "_files -/", out);
+        }
+        fputc('\'', out);
+    }
+    if (self->words != NULL) {
+        fputs(" \\\n      '1:what:(", out);
+        describe_words(out, self);
+        fputs(")'", out);
+    }
+    fputs(" \\\n      '*:file:_files'\n    ;;\n", out);
+}
+
+void describe_zsh(FILE *out)
+{
+    fputs("#compdef gbtrace\n"
+          "# Completion of gbtrace for zsh. Made by gbtrace describe zsh.\n"
+          "_gbtrace() {\n"
+          "  local -a commands\n"
+          "  commands=(\n"
+          "    'help:the commands, or the options of one'\n", out);
+    for (int i = 0; i < command_list_count; i++) {
+        fprintf(out, "    '%s:", command_list[i]->name);
+        write_note(out, command_list[i]->summary);
+        fputs("'\n", out);
+    }
+    fputs("  )\n"
+          "  if (( CURRENT == 2 )); then\n"
+          "    _describe command commands\n"
+          "    return\n"
+          "  fi\n"
+          "  local command=$words[2]\n"
+          "  shift words\n"
+          "  (( CURRENT-- ))\n"
+          "  case $command in\n"
+          "  help) _describe command commands ;;\n", out);
+    for (int i = 0; i < command_list_count; i++)
+        options_visit(command_list[i], write_rows, out);
+    fputs("  esac\n"
+          "}\n"
+          "# Read as a function of completion, or by source.\n"
+          "if [ \"$funcstack[1]\" = _gbtrace ]; then _gbtrace \"$@\"; else compdef _gbtrace gbtrace; fi\n", out);
+}

@@ -1,0 +1,139 @@
+/* cli/option_help.c -- what a row says for a person: its names, its value, its default; and the help that is made of them. */
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/options.h"
+
+bool options_takes_value(const option *o)
+{
+    return o->kind != OPTION_FLAG && o->kind != OPTION_FLAG_OFF && o->kind != OPTION_ELSEWHERE && o->fixed == NULL;
+}
+
+const char *options_value_name(const option *o)
+{
+    return !options_takes_value(o) ? "" : o->kind == OPTION_CHOICE ? o->choices : o->value_name;
+}
+
+/** Whether `name` is `typed`, where _ may stand for -. */
+static bool same_name(const char *name, size_t name_length, const char *typed, size_t length)
+{
+    if (name_length != length)
+        return false;
+    for (size_t i = 0; i < length; i++)
+        if (name[i] != (typed[i] == '_' ? '-' : typed[i]))
+            return false;
+    return true;
+}
+
+static bool row_is(const option *o, const char *typed, size_t length)
+{
+    if (length == 1 ? o->short_name == typed[0] : same_name(o->name, strlen(o->name), typed, length))
+        return true;
+    for (const char *name = o->aliases; name != NULL && *name != '\0';) {
+        const size_t end = strcspn(name, " ");
+        if (same_name(name, end, typed, length))
+            return true;
+        name += end + strspn(name + end, " ");
+    }
+    return false;
+}
+
+int options_find(const option *options, int option_count, const char *name, size_t length)
+{
+    for (int i = 0; i < option_count && length > 0; i++)
+        if (row_is(&options[i], name, length))
+            return i;
+    return -1;
+}
+
+/* ---- notes -------------------------------------------------------------------------------------------------------------------------- */
+
+static void add(char *out, size_t size, const char *format, ...) __attribute__((format(printf, 3, 4)));
+
+static void add(char *out, size_t size, const char *format, ...)
+{
+    const size_t used = strlen(out);
+    va_list args;
+    va_start(args, format);
+    vsnprintf(out + used, size - used, format, args);
+    va_end(args);
+}
+
+static void add_duration(char *out, size_t size, double seconds)
+{
+    if (seconds >= 60 && seconds / 60 == (double)(long)(seconds / 60))
+        add(out, size, " (default %gm)", seconds / 60);
+    else
+        add(out, size, " (default %gs)", seconds);
+}
+
+static void add_size(char *out, size_t size, double bytes)
+{
+    int unit = 0;
+    while (unit < 4 && bytes >= 1024)
+        bytes /= 1024, unit++;
+    if (bytes > 0 && bytes <= 0x1p30) /* 0: no default; beyond: no limit */
+        add(out, size, " (default %g%.*s)", bytes, unit > 0, unit > 0 ? &"KMGT"[unit - 1] : "");
+}
+
+static void add_default(const option *o, char *out, size_t size)
+{
+    switch (o->kind) {
+    case OPTION_FLAG:
+    case OPTION_FLAG_OFF:
+    case OPTION_OPERAND:
+    case OPTION_ELSEWHERE: return;
+    case OPTION_INT: add(out, size, " (default %d)", *(const int *)o->value); return;
+    case OPTION_UINT64: add(out, size, " (default %llu)", (unsigned long long)*(const uint64_t *)o->value); return;
+    case OPTION_FLOAT: add(out, size, " (default %g)", (double)*(const float *)o->value); return;
+    case OPTION_DOUBLE: add(out, size, " (default %g)", *(const double *)o->value); return;
+    case OPTION_DURATION: add_duration(out, size, *(const double *)o->value); return;
+    case OPTION_SIZE: add_size(out, size, (double)*(const size_t *)o->value); return;
+    case OPTION_STRING:
+    case OPTION_CHOICE: {
+        const char *text = *(const char *const *)o->value;
+        if (text != NULL && text[0] != '\0')
+            add(out, size, " (default %s)", text);
+        return;
+    }
+    }
+}
+
+void options_notes(const option *o, char *out, size_t size)
+{
+    out[0] = '\0';
+    if (o->required)
+        add(out, size, " (needed)");
+    else if (o->fixed == NULL)
+        add_default(o, out, size);
+    const char *name = o->aliases != NULL ? o->aliases : "";
+    for (const char *before = " (also "; *name != '\0'; before = ", ") {
+        const int end = (int)strcspn(name, " ");
+        add(out, size, "%s%s%.*s", before, end > 1 ? "--" : "-", end, name);
+        name += (size_t)end + strspn(name + end, " ");
+        if (*name == '\0')
+            add(out, size, ")");
+    }
+}
+
+/* ---- help --------------------------------------------------------------------------------------------------------------------------- */
+
+void options_print_help(const command *self, const option *options, int option_count)
+{
+    printf("usage: gbtrace %s %s%s[options]\n\n%s\n\noptions:\n", self->name, self->usage, self->usage[0] != '\0' ? " " : "", self->summary);
+    for (int i = 0; i < option_count; i++) {
+        const option *o = &options[i];
+        if (o->kind == OPTION_ELSEWHERE)
+            continue;
+        char left[128], notes[512], short_text[8] = "    ";
+        const char *value_name = options_value_name(o);
+        if (o->short_name != 0)
+            snprintf(short_text, sizeof short_text, "-%c, ", o->short_name);
+        const int used = snprintf(left, sizeof left, "  %s--%s%s%s", short_text, o->name, value_name[0] != '\0' ? " " : "", value_name);
+        options_notes(o, notes, sizeof notes);
+        printf(used > 30 ? "%s\n%32s" : "%-32s%s", left, "");
+        printf("%s%s\n", o->help, notes);
+    }
+}

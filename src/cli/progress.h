@@ -1,0 +1,25 @@
+/* cli/progress.h -- stderr as lines for a person, or as one JSON object a line for a program. */
+#ifndef GBT_CLI_PROGRESS_H
+#define GBT_CLI_PROGRESS_H
+
+#include <stdio.h>
+
+/** "auto", "json" or "none", for the rest of the program. With "json" everything on stderr is JSON from here on (docs/command-line.md). */
+void progress_start(const char *mode, const char *command_name);
+
+/** A message of the program's own. */
+void progress_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+/** One line of an error. */
+void progress_error(const char *text);
+
+/** The last line with "json": how the program ends. */
+void progress_end(int exit_code);
+
+/** A JSON string with its quotes; bytes that are not UTF-8 become ?. */
+void json_write_text(FILE *out, const char *text);
+
+/** A JSON number; null when it is not finite. */
+void json_write_number(FILE *out, double value);
+
+#endif

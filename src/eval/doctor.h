@@ -1,0 +1,13 @@
+/* eval/doctor.h -- how the doctor's checks write their lines. */
+#ifndef GBT_EVAL_DOCTOR_H
+#define GBT_EVAL_DOCTOR_H
+
+#include "gbtrace/doctor.h"
+
+/** The next line, with level ok. The caller writes its texts. */
+gbt_check *doctor_line(gbt_diagnosis *d, const char *name);
+
+/** Tracer and adjoint against the double references on a procedural cloud; and how many rays go through a larger one in a second. */
+gbt_status doctor_self_test(gbt_diagnosis *d, gbt_error *err);
+
+#endif

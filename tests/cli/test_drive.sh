@@ -1,0 +1,100 @@
+#!/bin/sh
+# tests/cli/test_drive.sh -- what programs that start gbtrace read: JSON progress, TensorBoard events, the doctor, a run's own configuration.
+# Usage: test_drive.sh PROGRAM BUILD
+set -u
+program=$1
+build=$2
+. "$(dirname "$0")/report.sh"
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+
+# as_json FILE SCRIPT: the lines as a list of objects, and a Python condition on it.
+as_json() {
+    python3 -c 'import json, sys; e = [json.loads(line) for line in open(sys.argv[1])]; sys.exit(0 if eval(sys.argv[2]) else 1)' "$1" "$2"
+}
+command -v python3 >/dev/null || { skip "all" "python3 is not installed"; finish; }
+
+# ---- a run, told as JSON
+"$program" make-scene tabletop -o made --width 32 --height 24 --views 9 --samples 1 --points 50 >out 2>&1
+report $? "a scene" "$(cat out)"
+"$program" train -s made -m run --iterations 40 --eval-split every=3 --tensorboard --progress json >out 2>err
+[ $? = 0 ] && [ ! -s out ] &&
+    as_json err 'e[0] == {"event": "start", "schema": 1, "command": "train", "version": e[0]["version"]} and e[-1] == {"event": "done", "exit": 0}'
+report $? "every line is JSON, the first and the last say so" "$(cat err)"
+as_json err 'any(x["event"] == "progress" and x["stage"] == "train" and x["done"] == x["total"] == 40 and x["fraction"] == 1 and x["seconds_left"] == 0 and x["psnr"] > 5 and x["anchors"] > 0 for x in e)'
+report $? "progress of training" "$(cat err)"
+as_json err 'any(x["event"] == "progress" and x["stage"] == "score" and x["done"] == x["total"] == 3 for x in e) and any(x["event"] == "message" and x["text"].startswith("3 held-out views: PSNR ") for x in e)'
+report $? "progress of scoring" "$(cat err)"
+GBTRACE_PROGRESS=json "$program" render run --split all 2>err && [ "$(ls run/renders/all | wc -l)" = 9 ] && as_json err 'any(x.get("stage") == "render" and x["done"] == 9 for x in e)'
+report $? "progress of rendering, into the run's own folder, by the environment" "$(cat err)"
+"$program" export run plain.ply --refine 3 --progress=json >out 2>err && as_json err '{"bake", "refine"} <= {x.get("stage") for x in e}'
+report $? "progress of an export" "$(cat err)"
+"$program" eval "no\"thing" --progress json 2>err
+[ $? = 4 ] && as_json err 'e[-1] == {"event": "failed", "exit": 4, "error": "no\"thing: not a run folder (wanted what gbtrace train wrote)"}'
+report $? "a failure" "$(cat err)"
+"$program" eval --progress json --prest fast 2>err
+[ $? = 2 ] && [ "$(cat err)" = "error: --prest: unknown option (did you mean --preset?)" ]
+report $? "a command line that was not understood is told in plain words" "$(cat err)"
+"$program" eval run --quiet >out 2>err && [ ! -s err ] && [ ! -s out ]
+report $? "quiet" "$(cat err)"
+
+# ---- the same run again, from its configuration
+"$program" train --config run/config -o again 2>err && cmp run/model.gbt again/model.gbt >>err 2>&1
+report $? "RUN/config repeats a run" "$(cat err)"
+
+# ---- TensorBoard, read by itself
+python=python3
+if ! $python -c 'import tensorboard' 2>/dev/null; then
+    python=$build/tensorboard-env/bin/python
+    [ -x "$python" ] || { python3 -m venv "$build/tensorboard-env" && "$build/tensorboard-env/bin/pip" -q --retries 1 --timeout 10 install tensorboard setuptools; } >out 2>&1
+fi
+if "$python" -c 'import tensorboard' 2>/dev/null; then
+    cat >read.py <<'END'
+import csv, sys
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+run, last_step, pictures = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+events = EventAccumulator(run, size_guidance={"images": 0, "scalars": 0})
+events.Reload()
+rows = list(csv.DictReader(open(run + "/log.csv")))
+for column, tag in (("loss", "loss/all"), ("train_psnr", "train/psnr"), ("anchors", "scene/anchors"), ("trace_ms", "ms/trace")):
+    got = [(e.step, e.value) for e in events.Scalars(tag)]
+    assert [g[0] for g in got] == [int(r["step"]) for r in rows] and got[-1][0] == last_step, (tag, got)
+    assert all(abs(g[1] - float(r[column])) <= 1e-3 + 1e-5 * abs(g[1]) for g, r in zip(got, rows)), (tag, got)
+assert len(events.Scalars("eval/psnr")) == 1 and events.Scalars("eval/psnr")[0].step == last_step
+assert len(events.Tags()["images"]) == pictures, events.Tags()["images"]
+for tag in events.Tags()["images"]:
+    picture = events.Images(tag)[0]
+    assert (picture.width, picture.height) == (32, 24) and picture.encoded_image_string[:4] == b"\x89PNG", tag
+END
+    "$python" read.py run 40 6 >out 2>&1
+    report $? "TensorBoard reads scalars and pictures" "$(cat out)"
+    # Stopped, its last record cut, and gone on: every step once, in order.
+    "$program" train -s made -o long --iterations 1500 --eval-split every=3 --tensorboard >out 2>&1 &
+    pid=$!
+    while [ "$(wc -l 2>/dev/null <long/log.csv || echo 0)" -lt 3 ] && kill -0 $pid 2>/dev/null; do sleep 0.2; done
+    kill -INT $pid
+    wait $pid
+    [ $? = 130 ] && printf 'cut record' >>long/events.out.tfevents.0.train
+    "$program" train -s made -o long --resume --tensorboard >>out 2>&1 && "$python" read.py long 1500 6 >>out 2>&1
+    report $? "TensorBoard reads a run that was stopped and resumed" "$(cat out)"
+else
+    skip "TensorBoard" "the package tensorboard cannot be had here"
+fi
+
+# ---- the doctor
+"$program" doctor >out 2>err
+code=$?
+[ $code -le 1 ] && [ ! -s err ] && [ "$(grep -c -e '^ok ' -e '^warn ' -e '^fail ' out)" = 11 ] && [ "$(grep -c '^ok   \(tracer\|gradients\|speed\|locale\|folder\|libraries\) ' out)" = 6 ]
+report $? "the doctor" "$(cat err out)"
+GBTRACE_THREDS=1 GBTRACE_THREADS=2 GBT_ISA=plain "$program" doctor nowhere --json >out 2>err
+[ $? = 1 ] && python3 -c 'import json, sys
+d = json.load(open("out"))
+c = {x["name"]: x for x in d["checks"]}
+assert d["schema"] == 1 and d["failed"] == sum(x["level"] == "fail" for x in d["checks"]) >= 1
+assert c["folder"]["level"] == "fail" and c["folder"]["found"] == "nowhere: no such folder" and c["folder"]["advice"]
+assert c["environment"]["level"] == "warn" and "GBTRACE_THREDS" in c["environment"]["advice"] and c["environment"]["found"].startswith("1 variables set options, 1 ")
+assert c["processor"]["level"] == "warn" and "GBT_ISA=plain" in c["processor"]["advice"] and c["tracer"]["level"] == c["gradients"]["level"] == "ok"' 2>>err
+report $? "the doctor finds what is wrong" "$(cat err out)"
+finish

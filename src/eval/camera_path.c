@@ -130,7 +130,7 @@ gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const came
         gbt_camera camera = *lens;
         double at[3];
         circle_at(&c, angle, at);
-        if (!camera_look_at(at, c.focus, c.axis, &camera))
+        if (!gbt_camera_look_at(at, c.focus, c.axis, &camera))
             status = base_fail(err, GBT_ERR_FORMAT, "--path orbit: the cameras say no way around (wanted them apart from what they look at)");
         out->shots[i] = ray_shot_of(&camera);
     }

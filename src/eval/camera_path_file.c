@@ -169,7 +169,7 @@ static gbt_status take_pose(const json_fields *r, const similarity *s, const dou
     dmat_apply_transposed(s->rotation, up, up);
     dmat_apply_transposed(s->rotation, forward, forward);
     dmat_apply_transposed(s->rotation, at, at);
-    camera_look_at(zero, forward, up, camera); /* makes it orthonormal; cannot fail for what is nearly a rotation */
+    gbt_camera_look_at(zero, forward, up, camera); /* makes it orthonormal; cannot fail for what is nearly a rotation */
     for (int k = 0; k < 3; k++)
         camera->center[k] = at[k] - origin[k];
     return GBT_OK;

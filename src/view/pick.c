@@ -27,7 +27,7 @@ static bool aim(const gbt_camera *camera, const double pixel[2], gbt_camera *out
     memset(out, 0, sizeof *out);
     out->model = GBT_CAMERA_PINHOLE, out->width = out->height = 1;
     out->params[0] = out->params[1] = focal, out->params[2] = out->params[3] = 0.5;
-    return camera_look_at(origin, target, up, out);
+    return gbt_camera_look_at(origin, target, up, out);
 }
 
 /* Where the ray of a camera of one pixel passes the half of what it sees; 0: nowhere. */

@@ -40,7 +40,7 @@ static gbt_camera looking(double x, double y, double z, const double target[3])
 {
     const double up[3] = {0, -1, 0}, at[3] = {x, y, z};
     gbt_camera c = {.model = GBT_CAMERA_PINHOLE, .width = 80, .height = 60, .params = {60, 60, 40, 30}};
-    assert_true(camera_look_at(at, target, up, &c));
+    assert_true(gbt_camera_look_at(at, target, up, &c));
     return c;
 }
 

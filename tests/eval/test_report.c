@@ -368,7 +368,7 @@ static loaded_run *make_run(gbt_camera_model lens)
         v->name = strdup(name), v->path = mem_calloc(VIEW_PATH_SIZE, 1, "path", NULL), v->is_test = i < 2;
         in_folder(v->path, "photo.png");
         v->camera = (gbt_camera){.model = lens, .width = 24, .height = 16, .params = {24, 24, 12, 8}};
-        assert_true(camera_look_at(at, middle, up, &v->camera));
+        assert_true(gbt_camera_look_at(at, middle, up, &v->camera));
     }
     assert_ok(photos_open(&r->photos, s, 1, &assert_ok_err_));
     return r;

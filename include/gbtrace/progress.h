@@ -28,7 +28,7 @@ typedef struct gbt_event {
     size_t anchors, gaussians; /* of the model; of the last view */
 } gbt_event;
 
-typedef void gbt_listener(const gbt_event *event, void *context);
+typedef void (*gbt_listener)(const gbt_event *event, void *context);
 
 /**
  * Who is told of events, for the whole process. Without a listener (NULL) they are lines on stderr: one line that is written over, on a
@@ -37,7 +37,7 @@ typedef void gbt_listener(const gbt_event *event, void *context);
  * The listener is called by one thread at a time, and must not call the library.
  * Threads: not while another call runs.
  */
-void gbt_listen(gbt_listener *listener, void *context);
+void gbt_listen(gbt_listener listener, void *context);
 
 GBT_API_END
 #endif

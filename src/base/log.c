@@ -17,12 +17,12 @@ enum { LINE_SIZE = 1024 };
 static const double often_seconds = 0.5, line_seconds = 10;
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER; /* lines of two threads never mix */
-static gbt_listener *listener;
+static gbt_listener listener;
 static void *listener_context;
 static int is_quiet = 0;
 static bool line_is_open; /* progress stands at the end of the terminal, without a newline */
 
-void gbt_listen(gbt_listener *to, void *context)
+void gbt_listen(gbt_listener to, void *context)
 {
     listener = to, listener_context = context;
 }

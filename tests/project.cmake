@@ -20,3 +20,7 @@ target_include_directories(public_headers PRIVATE ${CMAKE_SOURCE_DIR}/include)
 target_compile_options(public_headers PRIVATE -Wall -Wextra -Wpedantic -Werror)
 set_target_properties(public_headers PROPERTIES C_EXTENSIONS OFF CXX_EXTENSIONS OFF)
 add_test(NAME public_headers COMMAND ${CMAKE_COMMAND} -E echo "compiled with the build: ${public_headers}")
+
+# Exported files read by other programs.
+add_test(NAME readers COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/test_readers.sh $<TARGET_FILE:gbtrace> ${CMAKE_SOURCE_DIR})
+set_tests_properties(readers PROPERTIES SKIP_RETURN_CODE 77)

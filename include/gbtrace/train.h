@@ -28,7 +28,9 @@ typedef struct gbt_train_def {
     double footprint;           /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays.
                                    Default 0.1; 0 with compat; splats are dilated instead */
     int start_level;            /* first steps look at 1 pixel in 4^start_level, at random places; all come last. [0, 4]. Default 2; 0 with compat */
-    const char *eval_split;     /* "every=8" (default), "none", "list=FILE" */
+    const char *eval_split;     /* "auto" (default: as the data set says, else every=8), "every=8", "none", "list=FILE" */
+    const char *alpha;          /* the transparent part of photos: "black", "white", "mask" (it counts neither in the loss nor in the scores); "auto" (default):
+                                   white for Blender's synthetic scenes, else black. Black and white are also the background then */
     uint64_t seed;              /* Default 0 */
     size_t hit_bytes_max;       /* memory for the hits of a view that are kept for the adjoint; tiles beyond are traced again, to the same bits.
                                    0: no limit. Default 0 */

@@ -1,9 +1,12 @@
 /* base/file.c -- whole files to bytes and back. */
 #include "base/file.h"
 
+#include <ctype.h>
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -135,6 +138,25 @@ bool file_is_folder(const char *path)
 {
     struct stat info;
     return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
+}
+
+bool file_largest_number(const char *folder, const char *prefix, unsigned long *out)
+{
+    DIR *entries = opendir(folder);
+    if (entries == NULL)
+        return false;
+    const size_t length = strlen(prefix);
+    bool found = false;
+    for (const struct dirent *entry; (entry = readdir(entries)) != NULL;) {
+        const char *digits = entry->d_name + length;
+        if (strncmp(entry->d_name, prefix, length) != 0 || !isdigit((unsigned char)digits[0]) || digits[strspn(digits, "0123456789")] != '\0')
+            continue;
+        const unsigned long number = strtoul(digits, NULL, 10);
+        *out = found && number < *out ? *out : number;
+        found = true;
+    }
+    closedir(entries);
+    return found;
 }
 
 gbt_status file_join(char *out, size_t size, const char *folder, const char *name, gbt_error *err)

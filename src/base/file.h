@@ -23,6 +23,9 @@ gbt_status file_make_folder(const char *path, gbt_error *err);
 bool file_exists(const char *path);
 bool file_is_folder(const char *path);
 
+/** The largest N of the entries PREFIXN of a folder, N in decimal digits: false when there is none. */
+bool file_largest_number(const char *folder, const char *prefix, unsigned long *out);
+
 /** "folder/name" in a buffer of `size` bytes; GBT_ERR_ARGUMENT when it does not fit. */
 gbt_status file_join(char *out, size_t size, const char *folder, const char *name, gbt_error *err);
 

@@ -10,6 +10,7 @@ const command *const command_list[] = {
     &command_compare,
     &command_compress,
     &command_export,
+    &command_import,
     &command_render,
     &command_report,
     &command_view,

@@ -138,6 +138,12 @@ static inline void sink_put_f32(sink *s, float value)
     sink_put_uint(s, bits, 4);
 }
 
+/** The nearest of 0..255, halves upwards; NaN becomes 0. */
+static inline void sink_put_level(sink *s, double value)
+{
+    sink_put_uint(s, value >= 255 ? 255 : value > 0 ? (uint64_t)(value + 0.5) : 0, 1);
+}
+
 static inline void sink_put_text(sink *s, const char *text)
 {
     sink_put(s, text, strlen(text));

@@ -7,6 +7,7 @@
 #include "base/file.h"
 #include "data/glb_file.h"
 #include "data/gaussian_ply.h"
+#include "data/result_folder.h"
 #include "data/splat_file.h"
 #include "data/spz_file.h"
 
@@ -35,17 +36,45 @@ static int format_of(const char *path)
     return -1;
 }
 
-bool gaussian_file_readable(const char *path)
+/* The file itself, or the newest one of a result folder; NULL when there is none that can be read. */
+static const char *find_file(const char *path, result_folder *folder)
 {
+    bool found;
+    if (file_is_folder(path))
+        return result_folder_find(path, folder, &found, NULL) == GBT_OK && found ? folder->ply : NULL;
     const int format = format_of(path);
-    return format >= 0 && formats[format].read != NULL;
+    return format >= 0 && formats[format].read != NULL ? path : NULL;
 }
 
-gbt_status gaussian_file_read(const char *path, gaussian_cloud *out, gbt_error *err)
+bool gaussian_file_readable(const char *path)
+{
+    result_folder folder;
+    return find_file(path, &folder) != NULL;
+}
+
+bool gaussian_file_has_gaussians(const char *given)
+{
+    result_folder folder;
+    const char *path = find_file(given, &folder);
+    if (path == NULL || formats[format_of(path)].read != gaussian_ply_read)
+        return path != NULL;
+    source_file file = {.name = path};
+    unsigned char *bytes;
+    if (file_read(path, &bytes, &file.size, NULL) != GBT_OK)
+        return false;
+    file.bytes = bytes;
+    const bool has = gaussian_ply_has_gaussians(&file);
+    mem_free(bytes);
+    return has;
+}
+
+gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
-    if (!gaussian_file_readable(path))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: cannot be read as Gaussians (wanted .ply, .splat or .spz)", path);
+    result_folder folder;
+    const char *path = find_file(given, &folder);
+    if (path == NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: cannot be read as Gaussians (wanted .ply, .splat, .spz or a 3DGS result folder)", given);
     source_file file = {.name = path};
     unsigned char *bytes;
     GBT_TRY(file_read(path, &bytes, &file.size, err));

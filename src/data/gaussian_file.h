@@ -6,10 +6,14 @@
 
 #include "data/gaussian_cloud.h"
 
-/** Whether the name ends as one that gaussian_file_read() takes: .ply, .splat, .spz. */
+/** Whether gaussian_file_read() takes it: a name that ends in .ply, .splat or .spz, or a result folder of 3DGS (data/result_folder.h). */
 bool gaussian_file_readable(const char *path);
 
-/** Read a .ply, .splat or .spz. GBT_ERR_ARGUMENT for another ending; else as its reader. Free with gaussian_cloud_free(). */
+/** gaussian_file_readable(), and a .ply is not a cloud of points or of another program's anchors: its header is looked at. */
+bool gaussian_file_has_gaussians(const char *path);
+
+/** Read a .ply, .splat or .spz, or the newest .ply of a result folder. GBT_ERR_ARGUMENT for anything else; else as its reader. Free with
+    gaussian_cloud_free(). */
 gbt_status gaussian_file_read(const char *path, gaussian_cloud *out, gbt_error *err);
 
 /** GBT_ERR_ARGUMENT unless the name ends in .ply, .splat, .spz or .glb: before any work is done. */

@@ -81,7 +81,7 @@ static gbt_status find_columns(const source_file *file, const ply_header *header
                                                      "rot_0",   "rot_1", "rot_2", "rot_3",   "f_dc_0",  "f_dc_1",  "f_dc_2"};
     const ply_element *e = &header->elements[vertex];
     if (ply_find_property(header, vertex, "f_anchor_feat_0") >= 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: holds anchors of a neural model, not Gaussians", file->name);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: holds anchors of a neural model, not Gaussians (see gbtrace import)", file->name);
     if (ply_find_property(header, vertex, "f_dc_0") < 0 && ply_find_property(header, vertex, "opacity") < 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: is a point cloud, not a Gaussian model (no property f_dc_0 nor opacity)", file->name);
     for (int k = 0; k < FIXED_COLUMNS; k++) {
@@ -132,6 +132,15 @@ gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_e
     if (status != GBT_OK)
         gaussian_cloud_free(out);
     return status;
+}
+
+bool gaussian_ply_has_gaussians(const source_file *file)
+{
+    ply_header header;
+    if (ply_read_header(file, &header, NULL) != GBT_OK)
+        return false;
+    const int vertex = ply_find_element(&header, "vertex");
+    return vertex >= 0 && ply_find_property(&header, vertex, "f_dc_0") >= 0 && ply_find_property(&header, vertex, "rot_0") >= 0;
 }
 
 gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *err)

@@ -20,6 +20,9 @@ gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_e
 /** The same from a path. */
 gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *err);
 
+/** Whether the header names what every Gaussian has: false for points, anchors, and what is no .ply. */
+bool gaussian_ply_has_gaussians(const source_file *file);
+
 /**
  * Write one as the reference implementation does: binary, normals of 0, f_rest channel-major, opacity as a logit, scales as logs.
  *

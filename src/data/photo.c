@@ -1,4 +1,4 @@
-/* data/photo.c -- a photo as training wants it: three channels, alpha on black, area-averaged to the size asked for. */
+/* data/photo.c -- a photo as training wants it: three channels, alpha on a colour, area-averaged to the size asked for. */
 #include "data/photo.h"
 
 #include <math.h>
@@ -6,7 +6,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "data/scene.h"
+#include "data/mask.h"
 
 /* The input pixels under output pixel i of `out_count`, and how much of each. Edges are integers in units of 1 / out_count input pixels, so
    that weights are exact and sum to in_count exactly. */
@@ -100,27 +100,25 @@ gbt_status photo_resize_valid(const unsigned char *in, int in_width, int in_heig
     return status;
 }
 
-/* True when two sizes have the same aspect: one scaled to the other's width or height misses the rest by at most one pixel of the
-   smaller. */
-static bool same_aspect(double w0, double h0, double w1, double h1)
+bool photo_same_aspect(int width0, int height0, int width1, int height1)
 {
-    if (w0 > w1) {
-        const double w = w0, h = h0;
-        w0 = w1, h0 = h1, w1 = w, h1 = h;
-    }
+    const bool first_is_small = width0 <= width1;
+    const double w0 = first_is_small ? width0 : width1, h0 = first_is_small ? height0 : height1;
+    const double w1 = first_is_small ? width1 : width0, h1 = first_is_small ? height1 : height0;
     return fabs(h1 * w0 / w1 - h0) <= 1 || fabs(w1 * h0 / h1 - w0) <= 1;
 }
 
 /* Four channels to three. image_read() gives finite values, and alpha in [0, 1] keeps them so. */
-static gbt_status to_rgb(const image *in, image *out, gbt_error *err)
+static gbt_status to_rgb(const image *in, scene_alpha kind, image *out, gbt_error *err)
 {
+    const float behind = kind == SCENE_ALPHA_WHITE;
     GBT_TRY(image_alloc(out, in->width, in->height, 3, err));
     const size_t count = (size_t)in->width * (size_t)in->height, channels = (size_t)in->channels;
     for (size_t i = 0; i < count; i++) {
         const float *pixel = in->pixels + i * channels;
-        const float alpha = channels < 4 ? 1 : fminf(fmaxf(pixel[3], 0), 1);
+        const float alpha = channels < 4 || kind == SCENE_ALPHA_MASK ? 1 : fminf(fmaxf(pixel[3], 0), 1);
         for (size_t c = 0; c < 3; c++)
-            out->pixels[3 * i + c] = pixel[c] * alpha;
+            out->pixels[3 * i + c] = pixel[c] * alpha + behind * (1 - alpha);
     }
     return GBT_OK;
 }
@@ -129,8 +127,8 @@ static gbt_status to_rgb(const image *in, image *out, gbt_error *err)
 static gbt_status read_stored(const scene_view *view, image *stored, unsigned char **valid, gbt_error *err)
 {
     GBT_TRY(valid != NULL ? image_read_valid(view->path, stored, valid, err) : image_read(view->path, stored, err));
-    if (same_aspect(stored->width, stored->height, view->camera.width, view->camera.height))
-        return GBT_OK;
+    if (photo_same_aspect(stored->width, stored->height, view->camera.width, view->camera.height))
+        return valid != NULL ? mask_apply(view, stored, valid, err) : GBT_OK;
     return base_fail(err, GBT_ERR_FORMAT, "%s: photo does not have the camera's aspect (wanted %d x %d or a multiple, got %d x %d)", view->path,
                      view->camera.width, view->camera.height, stored->width, stored->height);
 }
@@ -139,11 +137,13 @@ static gbt_status read_photo(const scene_view *view, int width, int height, imag
 {
     image stored = {0}, rgb = {0};
     memset(out, 0, sizeof *out);
+    if (view->path == NULL)
+        return base_fail(err, GBT_ERR_IO, "%s: a camera without a photo", view->name);
     if (width < 1 || height < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: photo wanted at %d x %d (wanted both >= 1)", view->path, width, height);
     gbt_status status = read_stored(view, &stored, valid, err);
     if (status == GBT_OK)
-        status = to_rgb(&stored, &rgb, err);
+        status = to_rgb(&stored, view->alpha, &rgb, err);
     image_free(&stored);
     if (status == GBT_OK && rgb.width == width && rgb.height == height) {
         *out = rgb;

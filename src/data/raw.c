@@ -24,12 +24,18 @@ gbt_status raw_fail(gbt_error *err, raw_place place, const char *format, ...)
     return base_fail(err, GBT_ERR_FORMAT, "%s%c%zu: %s", place.file, place.mark, place.at, text);
 }
 
+void raw_view_free(raw_view *view)
+{
+    mem_free(view->name);
+    mem_free(view->path);
+    mem_free(view->mask_path);
+    memset(view, 0, sizeof *view);
+}
+
 void raw_free(raw_scene *raw)
 {
-    for (size_t i = 0; i < raw->view_count; i++) {
-        mem_free(raw->views[i].name);
-        mem_free(raw->views[i].path);
-    }
+    for (size_t i = 0; i < raw->view_count; i++)
+        raw_view_free(&raw->views[i]);
     mem_free(raw->views);
     mem_free(raw->position);
     mem_free(raw->color);
@@ -134,6 +140,17 @@ gbt_status raw_check_camera(const gbt_camera *camera, raw_place place, gbt_error
     return GBT_OK;
 }
 
+void raw_count_missing(raw_scene *raw, const char *name)
+{
+    enum { SHOWN = 3 };
+    const size_t used = strlen(raw->missing_names);
+    if (raw->photos_missing < SHOWN)
+        snprintf(raw->missing_names + used, sizeof raw->missing_names - used, "%s%.60s", used > 0 ? ", " : "", name);
+    else if (raw->photos_missing == SHOWN)
+        snprintf(raw->missing_names + used, sizeof raw->missing_names - used, ", ...");
+    raw->photos_missing++;
+}
+
 static int by_name(const void *a, const void *b)
 {
     return strcmp(((const raw_view *)a)->name, ((const raw_view *)b)->name);
@@ -143,6 +160,8 @@ gbt_status raw_sort_views(raw_scene *raw, const char *file, gbt_error *err)
 {
     if (raw->view_count > 1)
         qsort(raw->views, raw->view_count, sizeof *raw->views, by_name);
+    for (size_t i = 0; i < raw->view_count; i++)
+        raw->views[i].rank = i;
     for (size_t i = 1; i < raw->view_count; i++)
         if (strcmp(raw->views[i - 1].name, raw->views[i].name) == 0)
             return base_fail(err, GBT_ERR_FORMAT, "%s: duplicate image name: %.200s", file, raw->views[i].name);

@@ -13,8 +13,11 @@
 typedef struct raw_view {
     char *name;        /* owned */
     char *path;        /* owned; NULL until the photo has been found */
+    char *mask_path;   /* owned; NULL: no mask */
+    bool is_test;      /* held out by the data set itself (raw_scene.has_split) */
     gbt_camera camera; /* pose in world coordinates */
     uint32_t id;       /* COLMAP's image id, 0 elsewhere */
+    size_t rank;       /* place in the sorted list, set by raw_sort_views(); stays when others are left out */
 } raw_view;
 
 typedef struct raw_scene {
@@ -27,7 +30,9 @@ typedef struct raw_scene {
     size_t points_dropped;     /* not finite, or beyond RAW_COORDINATE_LIMIT */
     size_t tracks_missing;     /* track entries that name an image which is not there */
     size_t trailing_bytes;     /* behind the last record */
-    size_t frames_missing;     /* transforms.json frames without a photo */
+    size_t photos_missing;     /* views left out because their photo is not there */
+    char missing_names[256];   /* the first of them, ended by "..." when there are more */
+    bool has_split;            /* the data set says which views are held out */
     size_t angles_disagreeing; /* transforms.json cameras whose camera_angle_x contradicts fl_x (which wins) */
 } raw_scene;
 
@@ -47,6 +52,7 @@ typedef struct raw_place {
 
 gbt_status raw_fail(gbt_error *err, raw_place place, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
+void raw_view_free(raw_view *view); /* zeroes the struct */
 void raw_free(raw_scene *raw);
 
 /** A zero-terminated copy of `length` bytes, owned by the caller (mem_free()); NULL without memory. */
@@ -67,7 +73,10 @@ gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_
 /** Size in 1..RAW_IMAGE_LIMIT, all parameters usable, focal lengths > 0. */
 gbt_status raw_check_camera(const gbt_camera *camera, raw_place place, gbt_error *err);
 
-/** Two views of one name cannot be told apart later. Sorts the views by the bytes of their names. */
+/** Count a view whose photo is not there, and remember its name among the first. */
+void raw_count_missing(raw_scene *raw, const char *name);
+
+/** Two views of one name cannot be told apart later. Sorts the views by the bytes of their names, and ranks them. */
 gbt_status raw_sort_views(raw_scene *raw, const char *file, gbt_error *err);
 
 #endif

@@ -15,10 +15,11 @@
 #include "data/colmap_bin.h"
 #include "data/colmap_txt.h"
 #include "data/ply.h"
+#include "data/scene_photos.h"
 #include "data/split.h"
 #include "data/transforms.h"
 
-enum { PATH_SIZE = RAW_NAME_LIMIT + 4096, MISSING_SHOWN = 3 };
+enum { PATH_SIZE = RAW_NAME_LIMIT + 4096 };
 
 static gbt_status load_file(const char *path, source_file *out, unsigned char **owned, gbt_error *err)
 {
@@ -63,6 +64,15 @@ static gbt_status find_colmap(const char *folder, char model[PATH_SIZE], const c
     return GBT_OK;
 }
 
+/* COLMAP 4 has poses of rigs beside those of images, which are composed of them already. */
+static void say_rigs(const char *model, const char *ending)
+{
+    char name[32], path[PATH_SIZE];
+    snprintf(name, sizeof name, "rigs.%s", ending);
+    if (file_join(path, sizeof path, model, name, NULL) == GBT_OK && file_exists(path))
+        log_info("%s: not needed: every image has its whole pose", path);
+}
+
 static gbt_status load_colmap(const char *model, const char *ending, raw_scene *raw, gbt_error *err)
 {
     static const char *const names[3] = {"cameras", "images", "points3D"};
@@ -88,6 +98,8 @@ static gbt_status load_colmap(const char *model, const char *ending, raw_scene *
         status = raw_sort_views(raw, paths[1], err);
     for (int i = 0; i < 3; i++)
         mem_free(owned[i]);
+    if (status == GBT_OK)
+        say_rigs(model, ending);
     return status;
 }
 
@@ -101,7 +113,8 @@ static gbt_status load_points(const char *path, raw_scene *raw, gbt_error *err)
     return status;
 }
 
-static gbt_status load_transforms(const char *path, const char *folder, raw_scene *raw, gbt_error *err)
+/* Adds views; points replace what is there. */
+static gbt_status add_transforms(const char *path, const char *folder, raw_scene *raw, gbt_error *err)
 {
     source_file file;
     unsigned char *owned;
@@ -109,9 +122,7 @@ static gbt_status load_transforms(const char *path, const char *folder, raw_scen
     GBT_TRY(load_file(path, &file, &owned, err));
     gbt_status status = transforms_read(&file, folder, raw, &points_name, err);
     mem_free(owned);
-    if (status == GBT_OK)
-        status = raw_sort_views(raw, path, err);
-    if (status == GBT_OK && points_name != NULL) {
+    if (status == GBT_OK && points_name != NULL && raw->position == NULL) {
         char points_path[PATH_SIZE];
         status = file_join(points_path, sizeof points_path, folder, points_name, err);
         if (status == GBT_OK)
@@ -121,30 +132,29 @@ static gbt_status load_transforms(const char *path, const char *folder, raw_scen
     return status;
 }
 
-/* The photo of each COLMAP view: images/NAME, else NAME. Every one that is missing is counted before we give up. */
-static gbt_status find_photos(const char *folder, raw_scene *raw, gbt_error *err)
+static gbt_status load_transforms(const char *path, const char *folder, raw_scene *raw, gbt_error *err)
 {
-    char images[PATH_SIZE], path[PATH_SIZE], missing[256] = "";
-    size_t missing_count = 0, used = 0;
-    GBT_TRY(file_join(images, sizeof images, folder, "images", err));
-    for (size_t i = 0; i < raw->view_count; i++) {
-        raw_view *view = &raw->views[i];
-        GBT_TRY(file_join(path, sizeof path, images, view->name, err));
-        if (!file_exists(path) || file_is_folder(path))
-            GBT_TRY(file_join(path, sizeof path, folder, view->name, err));
-        if (!file_exists(path) || file_is_folder(path)) {
-            if (missing_count++ < MISSING_SHOWN)
-                used += (size_t)snprintf(missing + used, sizeof missing - used, "%s%.60s", used > 0 ? ", " : "", view->name);
+    GBT_TRY(add_transforms(path, folder, raw, err));
+    return raw_sort_views(raw, path, err);
+}
+
+/* Blender's synthetic scenes: the views to train on in `train`, held-out ones in a file beside it. */
+static gbt_status load_blender(const char *train, const char *folder, raw_scene *raw, gbt_error *err)
+{
+    static const char *const held_out[] = {"transforms_test.json", "transforms_val.json"};
+    GBT_TRY(add_transforms(train, folder, raw, err));
+    for (size_t i = 0; i < sizeof held_out / sizeof held_out[0] && !raw->has_split; i++) {
+        char path[PATH_SIZE];
+        GBT_TRY(file_join(path, sizeof path, folder, held_out[i], err));
+        if (!file_exists(path))
             continue;
-        }
-        view->path = raw_copy_text(path, strlen(path), err);
-        if (view->path == NULL)
-            return GBT_ERR_NO_MEMORY;
+        const size_t first = raw->view_count;
+        GBT_TRY(add_transforms(path, folder, raw, err));
+        for (size_t v = first; v < raw->view_count; v++)
+            raw->views[v].is_test = true;
+        raw->has_split = raw->view_count > first;
     }
-    if (missing_count > 0)
-        return base_fail(err, GBT_ERR_IO, "%s: %zu of %zu photos are missing: %s%s", images, missing_count, raw->view_count, missing,
-                         missing_count > MISSING_SHOWN ? ", ..." : "");
-    return GBT_OK;
+    return raw_sort_views(raw, train, err);
 }
 
 static bool ends_with(const char *text, const char *ending)
@@ -180,13 +190,18 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
     if (place[0] != '\0') {
         *source = strcmp(ending, "bin") == 0 ? "colmap-bin" : "colmap-txt";
         GBT_TRY(load_colmap(place, ending, raw, err));
-        return find_photos(path, raw, err);
+        return scene_find_photos(path, raw, err);
     }
     GBT_TRY(file_join(place, sizeof place, path, "transforms.json", err));
+    if (file_exists(place)) {
+        *source = "transforms";
+        return load_transforms(place, path, raw, err);
+    }
+    GBT_TRY(file_join(place, sizeof place, path, "transforms_train.json", err));
     if (!file_exists(place))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: not a data set (wanted sparse/0/cameras.bin or transforms.json in it)", path);
-    *source = "transforms";
-    return load_transforms(place, path, raw, err);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json in it)", path);
+    *source = "blender";
+    return load_blender(place, path, raw, err);
 }
 
 static uint64_t ordered_bits(double value)
@@ -256,17 +271,20 @@ static gbt_status recentre(raw_scene *raw, scene *out, gbt_error *err)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < raw->view_count; i++) {
         raw_view *view = &raw->views[i];
-        out->views[i] = (scene_view){.name = view->name, .path = view->path, .camera = view->camera};
-        view->name = NULL, view->path = NULL;
+        out->views[i] = (scene_view){.name = view->name, .path = view->path, .mask_path = view->mask_path, .camera = view->camera, .is_test = view->is_test, .rank = view->rank};
+        view->name = NULL, view->path = NULL, view->mask_path = NULL;
         for (int k = 0; k < 3; k++)
             out->views[i].camera.center[k] -= out->origin[k];
     }
     out->view_count = raw->view_count;
     out->points_dropped = raw->points_dropped;
+    out->photos_missing = raw->photos_missing;
+    memcpy(out->missing_names, raw->missing_names, sizeof out->missing_names);
+    out->has_split = raw->has_split;
     return GBT_OK;
 }
 
-static void warn_about(const char *path, const raw_scene *raw)
+static void warn_about(const char *path, const raw_scene *raw, const scene *s)
 {
     if (raw->points_dropped > 0)
         log_warn("%s: dropped %zu points with unusable coordinates", path, raw->points_dropped);
@@ -274,8 +292,14 @@ static void warn_about(const char *path, const raw_scene *raw)
         log_warn("%s: %zu track entries name images that are not there", path, raw->tracks_missing);
     if (raw->trailing_bytes > 0)
         log_warn("%s: %zu bytes behind the last record were ignored", path, raw->trailing_bytes);
-    if (raw->frames_missing > 0)
-        log_warn("%s: left out %zu frames whose photo is missing, %zu remain", path, raw->frames_missing, raw->view_count);
+    if (raw->photos_missing > 0)
+        log_warn("%s: left out %zu views whose photo is missing, %zu remain%s%s", path, raw->photos_missing, raw->view_count,
+                 raw->missing_names[0] != '\0' ? ": " : "", raw->missing_names);
+    size_t masks = 0;
+    for (size_t i = 0; i < s->view_count; i++)
+        masks += s->views[i].mask_path != NULL;
+    if (masks > 0 && masks < s->view_count)
+        log_warn("%s: %zu of %zu photos have no mask, and count whole", path, s->view_count - masks, s->view_count);
     if (raw->angles_disagreeing > 0)
         log_warn("%s: camera_angle_x contradicts fl_x in %zu frames, fl_x is used", path, raw->angles_disagreeing);
     if (raw->view_count == 1)
@@ -284,7 +308,7 @@ static void warn_about(const char *path, const raw_scene *raw)
 
 gbt_status scene_load(const char *path, const scene_split *split, scene *out, gbt_error *err)
 {
-    const scene_split usual = {.kind = SCENE_SPLIT_EVERY, .every = SCENE_SPLIT_DEFAULT_EVERY};
+    const scene_split usual = {.kind = SCENE_SPLIT_AUTO};
     memset(out, 0, sizeof *out);
     raw_scene raw = {0};
     const char *source = "";
@@ -297,7 +321,7 @@ gbt_status scene_load(const char *path, const scene_split *split, scene *out, gb
         status = out->folder != NULL ? split_apply(split != NULL ? split : &usual, out, err) : GBT_ERR_NO_MEMORY;
     }
     if (status == GBT_OK)
-        warn_about(path, &raw);
+        warn_about(path, &raw, out);
     else
         scene_free(out);
     raw_free(&raw);
@@ -309,6 +333,7 @@ void scene_free(scene *s)
     for (size_t i = 0; i < s->view_count; i++) {
         mem_free(s->views[i].name);
         mem_free(s->views[i].path);
+        mem_free(s->views[i].mask_path);
     }
     mem_free(s->folder);
     mem_free(s->views);

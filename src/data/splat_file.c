@@ -8,11 +8,6 @@
 
 enum { ROW_BYTES = 32 };
 
-static unsigned byte_of(double value)
-{
-    return value >= 255 ? 255 : value > 0 ? (unsigned)(value + 0.5) : 0; /* NaN becomes 0 */
-}
-
 /* False when the row is not usable. */
 static bool read_row(cursor *c, gaussian_cloud *out, size_t i)
 {
@@ -92,10 +87,10 @@ static void put_row(sink *s, const gaussian_cloud *cloud, size_t i, const double
     for (size_t k = 0; k < 3; k++)
         sink_put_f32(s, expf(cloud->scale_log[3 * i + k]));
     for (size_t k = 0; k < 3; k++)
-        sink_put_uint(s, byte_of(255 * (0.5 + GAUSSIAN_SH_0 * (double)cloud->sh[i * GAUSSIAN_SH_COUNT * 3 + k])), 1);
-    sink_put_uint(s, byte_of(255 * (double)cloud->opacity[i]), 1);
+        sink_put_level(s, 255 * (0.5 + GAUSSIAN_SH_0 * (double)cloud->sh[i * GAUSSIAN_SH_COUNT * 3 + k]));
+    sink_put_level(s, 255 * (double)cloud->opacity[i]);
     for (size_t k = 0; k < 4; k++)
-        sink_put_uint(s, byte_of(128 + 128 * (double)cloud->quat[4 * i + k]), 1);
+        sink_put_level(s, 128 + 128 * (double)cloud->quat[4 * i + k]);
 }
 
 gbt_status splat_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)

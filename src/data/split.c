@@ -14,7 +14,9 @@ gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err)
 {
     *out = (scene_split){.kind = SCENE_SPLIT_EVERY, .every = SCENE_SPLIT_DEFAULT_EVERY};
     uint64_t every;
-    if (strcmp(text, "none") == 0) {
+    if (strcmp(text, "auto") == 0) {
+        out->kind = SCENE_SPLIT_AUTO;
+    } else if (strcmp(text, "none") == 0) {
         out->kind = SCENE_SPLIT_NONE;
     } else if (strncmp(text, "list=", 5) == 0 && text[5] != '\0') {
         out->kind = SCENE_SPLIT_LIST;
@@ -23,7 +25,7 @@ gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err)
                every <= INT_MAX) {
         out->every = (int)every;
     } else {
-        return base_fail(err, GBT_ERR_ARGUMENT, "split: wanted every=N with N >= 2, none or list=FILE, got %.200s", text);
+        return base_fail(err, GBT_ERR_ARGUMENT, "split: wanted auto, every=N with N >= 2, none or list=FILE, got %.200s", text);
     }
     return GBT_OK;
 }
@@ -56,16 +58,27 @@ static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *pa
     return GBT_OK;
 }
 
+/* A single photo is trained on: holding it out would leave nothing. */
+static void mark_every(scene *s, int every)
+{
+    for (size_t i = 0; i < s->view_count && s->view_count > 1; i++)
+        s->views[i].is_test = s->views[i].rank % (size_t)every == 0;
+}
+
 gbt_status split_apply(const scene_split *split, scene *s, gbt_error *err)
 {
+    for (size_t i = 0; i < s->view_count && split->kind != SCENE_SPLIT_AUTO; i++)
+        s->views[i].is_test = false;
     switch (split->kind) {
+    case SCENE_SPLIT_AUTO:
+        if (!s->has_split)
+            mark_every(s, SCENE_SPLIT_DEFAULT_EVERY);
+        break;
     case SCENE_SPLIT_NONE: break;
     case SCENE_SPLIT_EVERY:
         if (split->every < 2)
             return base_fail(err, GBT_ERR_ARGUMENT, "split: wanted every >= 2, got %d", split->every);
-        /* A single photo is trained on: holding it out would leave nothing. */
-        for (size_t i = 0; i < s->view_count && s->view_count > 1; i += (size_t)split->every)
-            s->views[i].is_test = true;
+        mark_every(s, split->every);
         break;
     case SCENE_SPLIT_LIST: {
         unsigned char *bytes;

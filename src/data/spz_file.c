@@ -24,12 +24,6 @@ static layout layout_of(unsigned version, int degree)
     return l;
 }
 
-static unsigned byte_of(double value)
-{
-    const double rounded = nearbyint(value);
-    return rounded >= 255 ? 255 : rounded > 0 ? (unsigned)rounded : 0;
-}
-
 /* ---- writing ------------------------------------------------------------------------------------------------------------------------- */
 
 static gbt_status find_fraction(const gaussian_cloud *cloud, const double origin[3], const char *path, int *bits, gbt_error *err)
@@ -79,12 +73,12 @@ static void put_streams(sink *s, const gaussian_cloud *cloud, const double origi
     for (size_t i = 0; i < 3 * n; i++)
         sink_put_uint(s, (uint64_t)(int64_t)llrint(((double)cloud->mean[i] + origin[i % 3]) * exp2(fraction)), 3);
     for (size_t i = 0; i < n; i++)
-        sink_put_uint(s, byte_of(255 * (double)cloud->opacity[i]), 1);
+        sink_put_level(s, 255 * (double)cloud->opacity[i]);
     for (size_t i = 0; i < n; i++)
         for (size_t c = 0; c < 3; c++)
-            sink_put_uint(s, byte_of((double)cloud->sh[i * GAUSSIAN_SH_COUNT * 3 + c] * color_step * 255 + 127.5), 1);
+            sink_put_level(s, (double)cloud->sh[i * GAUSSIAN_SH_COUNT * 3 + c] * color_step * 255 + 127.5);
     for (size_t i = 0; i < 3 * n; i++)
-        sink_put_uint(s, byte_of(((double)cloud->scale_log[i] + 10) * 16), 1);
+        sink_put_level(s, ((double)cloud->scale_log[i] + 10) * 16);
     for (size_t i = 0; i < n; i++)
         sink_put_uint(s, pack_rotation(cloud->quat + 4 * i), 4);
     for (size_t i = 0; i < n; i++)

@@ -3,6 +3,7 @@
 
 #include <jansson.h>
 #include <math.h>
+#include <stdio.h>
 
 #include "base/file.h"
 #include "base/image.h"
@@ -56,12 +57,19 @@ static gbt_status find_size(const scope *s, const char *key, int *out, bool *fou
     return GBT_OK;
 }
 
-/* camera_angle_x or _y, radians, to a focal length in pixels; 0 when the key is not there. */
-static gbt_status focal_from_angle(const scope *s, const char *key, int size, double *focal, gbt_error *err)
+/* camera_angle_x or _y, radians, else x_fov or y_fov, degrees, to a focal length in pixels; 0 when neither is there. */
+static gbt_status focal_from_angle(const scope *s, char axis, int size, double *focal, gbt_error *err)
 {
     double angle = 0;
     bool found;
+    char key[16];
+    snprintf(key, sizeof key, "camera_angle_%c", axis);
     GBT_TRY(find_number(s, key, &angle, &found, err));
+    if (!found) {
+        snprintf(key, sizeof key, "%c_fov", axis);
+        GBT_TRY(find_number(s, key, &angle, &found, err));
+        angle *= 3.14159265358979 / 180;
+    }
     *focal = 0;
     if (!found)
         return GBT_OK;
@@ -134,8 +142,8 @@ static gbt_status find_focal(const scope *s, const gbt_camera *camera, double fo
     double from_angle[2];
     GBT_TRY(find_number(s, "fl_x", &focal[0], &has_x, err));
     GBT_TRY(find_number(s, "fl_y", &focal[1], &has_y, err));
-    GBT_TRY(focal_from_angle(s, "camera_angle_x", camera->width, &from_angle[0], err));
-    GBT_TRY(focal_from_angle(s, "camera_angle_y", camera->height, &from_angle[1], err));
+    GBT_TRY(focal_from_angle(s, 'x', camera->width, &from_angle[0], err));
+    GBT_TRY(focal_from_angle(s, 'y', camera->height, &from_angle[1], err));
     if (!has_x && !has_y && from_angle[0] == 0 && from_angle[1] == 0)
         return scope_fail(s, err, "neither fl_x nor camera_angle_x is there", "focal length");
     if (has_x && from_angle[0] > 0 && fabs(from_angle[0] - focal[0]) > 0.01 * fabs(focal[0]))
@@ -272,6 +280,15 @@ static gbt_status read_pose(const scope *s, gbt_camera *camera, gbt_error *err)
     return GBT_OK;
 }
 
+/* A leading ./ says nothing. */
+static const char *plain_name(const json_t *text)
+{
+    const char *name = json_string_value(text);
+    while (strncmp(name, "./", 2) == 0)
+        name += 2;
+    return name;
+}
+
 /* The photo of a frame: the name as it is, then with .png and .jpg. False when none is there. */
 static gbt_status find_photo(const char *folder, const char *name, char path[PATH_SIZE], bool *found, gbt_error *err)
 {
@@ -285,14 +302,31 @@ static gbt_status find_photo(const char *folder, const char *name, char path[PAT
     return GBT_OK;
 }
 
+/* The frame's mask, or NULL when it names none. */
+static gbt_status find_mask(const scope *s, const char *folder, char **out, gbt_error *err)
+{
+    *out = NULL;
+    const json_t *value = json_object_get(s->frame, "mask_path");
+    if (value == NULL || json_is_null(value))
+        return GBT_OK;
+    if (!json_is_string(value))
+        return scope_fail(s, err, "wanted a string", "mask_path");
+    const char *name = json_string_value(value);
+    char path[PATH_SIZE];
+    GBT_TRY(raw_check_name(name, strlen(name), (raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, err));
+    GBT_TRY(file_join(path, sizeof path, folder, name, err));
+    if (!file_exists(path) || file_is_folder(path))
+        return base_fail(err, GBT_ERR_IO, "%s: frame %zu: mask is missing: %.200s", s->file->name, s->frame_index, path);
+    *out = raw_copy_text(path, strlen(path), err);
+    return *out != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+}
+
 static gbt_status read_frame(const scope *s, const char *folder, raw_scene *out, gbt_error *err)
 {
     const json_t *value = json_object_get(s->frame, "file_path");
     if (!json_is_string(value))
         return scope_fail(s, err, "wanted a string", "file_path");
-    const char *name = json_string_value(value);
-    while (strncmp(name, "./", 2) == 0)
-        name += 2;
+    const char *name = plain_name(value);
     GBT_TRY(raw_check_name(name, strlen(name), (raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, err));
     char path[PATH_SIZE];
     bool found;
@@ -300,16 +334,42 @@ static gbt_status read_frame(const scope *s, const char *folder, raw_scene *out,
     GBT_TRY(read_pose(s, &camera, err));
     GBT_TRY(find_photo(folder, name, path, &found, err));
     if (!found) {
-        out->frames_missing++;
+        raw_count_missing(out, name);
         return GBT_OK;
     }
     GBT_TRY(read_camera(s, path, &camera, out, err));
+    char *mask;
+    GBT_TRY(find_mask(s, folder, &mask, err));
     raw_view *view = raw_next_view(out, err);
-    if (view == NULL)
+    if (view == NULL) {
+        mem_free(mask);
         return GBT_ERR_NO_MEMORY;
-    *view = (raw_view){.name = raw_copy_text(name, strlen(name), err), .path = raw_copy_text(path, strlen(path), err), .camera = camera};
+    }
+    *view = (raw_view){.name = raw_copy_text(name, strlen(name), err), .path = raw_copy_text(path, strlen(path), err), .mask_path = mask, .camera = camera};
     out->view_count++;
     return view->name != NULL && view->path != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+}
+
+/* With a list train_filenames, every view that is not in it is held out. */
+static gbt_status read_split(const source_file *file, const json_t *root, raw_scene *out, gbt_error *err)
+{
+    const json_t *list = json_object_get(root, "train_filenames");
+    if (list == NULL)
+        return GBT_OK;
+    json_t *names = json_object();
+    gbt_status status = json_is_array(list) ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "%s: train_filenames: wanted a list", file->name);
+    for (size_t i = 0; i < json_array_size(list) && status == GBT_OK; i++) {
+        const json_t *name = json_array_get(list, i);
+        if (!json_is_string(name))
+            status = base_fail(err, GBT_ERR_FORMAT, "%s: train_filenames: entry %zu is not a string", file->name, i);
+        else if (json_object_set_new(names, plain_name(name), json_true()) != 0)
+            status = base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for the names", file->name);
+    }
+    for (size_t i = 0; i < out->view_count && status == GBT_OK; i++)
+        out->views[i].is_test = json_object_get(names, out->views[i].name) == NULL;
+    out->has_split = true;
+    json_decref(names);
+    return status;
 }
 
 static gbt_status read_root(const source_file *file, const json_t *root, const char *folder, raw_scene *out, char **points_name,
@@ -328,8 +388,9 @@ static gbt_status read_root(const source_file *file, const json_t *root, const c
     }
     if (out->view_count == 0) {
         const char *first = json_string_value(json_object_get(json_array_get(frames, 0), "file_path"));
-        return base_fail(err, GBT_ERR_IO, "%s: none of the %zu photos exists, the first is %.200s", file->name, out->frames_missing, first);
+        return base_fail(err, GBT_ERR_IO, "%s: none of the %zu photos exists, the first is %.200s", file->name, out->photos_missing, first);
     }
+    GBT_TRY(read_split(file, root, out, err));
     const json_t *points = json_object_get(root, "ply_file_path");
     if (points == NULL || json_is_null(points))
         return GBT_OK;

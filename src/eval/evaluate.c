@@ -16,7 +16,6 @@
 #include "eval/loaded_run.h"
 #include "eval/report.h"
 #include "gbtrace/evaluate.h"
-#include "image/affine.h"
 #include "image/metrics.h"
 #include "train/event_records.h"
 
@@ -25,27 +24,6 @@ enum { EVENTS_VIEWS = 8 };
 gbt_evaluate_def gbt_evaluate_def_default(void)
 {
     return (gbt_evaluate_def){.report = 1};
-}
-
-/* PSNR, SSIM and FLIP of two pictures, rounded to 8 bit here. */
-static gbt_status score_pictures(image *render, image *photo, view_score *score, gbt_error *err)
-{
-    image_quantize(render);
-    image_quantize(photo);
-    score->psnr = metric_psnr(render, photo);
-    score->ssim = metric_ssim(render, photo);
-    return metric_flip(render, photo, &score->flip, NULL, err);
-}
-
-/* The same of the right halves, after a colour matrix that the left halves give; `render` becomes the whole picture through it. */
-static gbt_status score_right_half(image *render, const image *photo, view_score *score, gbt_error *err)
-{
-    image render_right, photo_right;
-    GBT_TRY(affine_split(render, photo, &render_right, &photo_right, err));
-    const gbt_status status = score_pictures(&render_right, &photo_right, score, err);
-    image_free(&render_right);
-    image_free(&photo_right);
-    return status;
 }
 
 gbt_status view_score_paths(view_score *score, const char *folder, gbt_error *err)
@@ -71,26 +49,22 @@ static gbt_status score_view(loaded_run *r, size_t index, const char *folder, vi
     snprintf(score->name, sizeof score->name, "%s", view->name);
     image photo = {0}, error_map = {0};
     image *render = &r->frame.rgb;
-    gbt_status status = scene_read_photo(view, render->width, render->height, &photo, err);
+    unsigned char *valid = NULL;
+    image_scores scores = {0};
+    gbt_status status = scene_read_photo_valid(view, render->width, render->height, &photo, &valid, err);
     if (status == GBT_OK)
         status = image_alloc(&error_map, render->width, render->height, 1, err);
-    if (status == GBT_OK && r->def.exposure)
-        status = score_right_half(render, &photo, score, err);
-    if (status == GBT_OK && !r->def.exposure)
-        status = score_pictures(render, &photo, score, err);
-    if (status != GBT_OK)
-        goto done;
-    image_quantize(render);
-    image_quantize(&photo);
-    double whole;
-    status = metric_flip(render, &photo, &whole, &error_map, err);
+    if (status == GBT_OK)
+        status = image_score_photo(render, &photo, valid, r->def.exposure, &error_map, &scores, err);
+    score->psnr = scores.psnr, score->ssim = scores.ssim, score->flip = scores.flip;
+    score->masked = valid != NULL;
     if (status == GBT_OK)
         status = view_score_paths(score, folder, err);
     const image *const pictures[] = {render, &photo, &error_map};
     const char *const paths[] = {score->render_path, score->photo_path, score->error_path};
     for (int i = 0; i < 3 && status == GBT_OK; i++)
         status = image_write(paths[i], pictures[i], err);
-done:
+    mem_free(valid);
     image_free(&photo);
     image_free(&error_map);
     return status;
@@ -111,13 +85,16 @@ static json_t *scores_to_json(const evaluation *e)
     json_object_set_new(root, "protocol", json_string("8-bit images; SSIM 11x11 Gaussian, zero padding; FLIP 67 pixels per degree; means over held-out views"));
     for (size_t i = 0; i < e->view_count; i++) {
         const view_score *v = &e->views[i];
-        json_array_append_new(views, json_pack("{s:s,s:f,s:f,s:f,s:f,s:I}", "name", v->name, "psnr", v->psnr, "ssim", v->ssim, "flip", v->flip, "seconds",
-                                               v->seconds, "gaussians", (json_int_t)v->gaussians));
+        json_array_append_new(views, json_pack("{s:s,s:o,s:o,s:o,s:f,s:I}", "name", v->name, "psnr", number_or_null(v->psnr), "ssim", number_or_null(v->ssim),
+                                               "flip", number_or_null(v->flip), "seconds", v->seconds, "gaussians", (json_int_t)v->gaussians));
     }
     json_object_set_new(root, "renderer", json_string(e->renderer));
     json_object_set_new(root, "downscale", json_real(e->downscale));
     json_object_set_new(root, "exposure", json_boolean(e->exposure));
-    json_object_set_new(root, "scored", json_string(e->exposure ? "right half, with a colour matrix fitted to the left half" : "whole image"));
+    char scored[128];
+    snprintf(scored, sizeof scored, "%s%s", e->exposure ? "right half, with a colour matrix fitted to the left half" : "whole image",
+             e->masked ? ", without masked pixels" : "");
+    json_object_set_new(root, "scored", json_string(scored));
     json_object_set_new(root, "views", views);
     json_object_set_new(root, "anchors_final", json_integer((json_int_t)e->anchors));
     json_object_set_new(root, "gaussians_per_view", number_or_null(e->gaussians_per_view));
@@ -156,6 +133,7 @@ static gbt_status score_run(loaded_run *r, const char *run, evaluation *e, gbt_e
     char folder[4096];
     GBT_TRY(file_join(folder, sizeof folder, run, "renders/test", err));
     GBT_TRY(file_make_folder(folder, err));
+    size_t scored = 0;
     e->views = mem_calloc(r->scene.view_count + 1, sizeof *e->views, "view scores", err);
     if (e->views == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -168,10 +146,15 @@ static gbt_status score_run(loaded_run *r, const char *run, evaluation *e, gbt_e
         view_score *v = &e->views[e->view_count];
         GBT_TRY(score_view(r, i, folder, v, err));
         log_count("score", ++e->view_count, wanted, v->psnr);
-        e->psnr += v->psnr, e->ssim += v->ssim, e->flip += v->flip, e->gaussians_per_view += (double)v->gaussians;
+        e->masked = e->masked || v->masked;
+        e->gaussians_per_view += (double)v->gaussians;
+        if (!isfinite(v->psnr)) /* every pixel is masked */
+            continue;
+        scored++;
+        e->psnr += v->psnr, e->ssim += v->ssim, e->flip += v->flip;
     }
-    const double n = (double)e->view_count; /* 0 / 0 = NaN here becomes null in JSON and "n/a" on the page */
-    e->psnr /= n, e->ssim /= n, e->flip /= n, e->gaussians_per_view /= n;
+    const double n = (double)scored; /* 0 / 0 = NaN here becomes null in JSON and "n/a" on the page */
+    e->psnr /= n, e->ssim /= n, e->flip /= n, e->gaussians_per_view /= (double)e->view_count;
     e->anchors = r->model.anchors.count, e->exposure = r->def.exposure;
     e->renderer = frame_renderer_name(r->frame.draw.renderer), e->downscale = r->photos.downscale;
     char model_path[4096];

@@ -13,6 +13,7 @@ typedef struct view_score {
     char name[1024];
     double psnr, ssim, flip, seconds; /* seconds: decode, tree and trace of this view */
     size_t gaussians;
+    bool masked; /* some pixels of the photo do not count */
     char render_path[VIEW_PATH_SIZE], photo_path[VIEW_PATH_SIZE], error_path[VIEW_PATH_SIZE]; /* PNG files; the last is FLIP, 1 channel */
 } view_score;
 
@@ -24,6 +25,7 @@ typedef struct evaluation {
     size_t anchors, model_bytes;
     const char *renderer; /* what drew the views: "trace", "raster", "per-ray" */
     double downscale;     /* the photos were divided by this */
+    bool masked;   /* some view is */
     bool exposure; /* scored on the right halves of the photos (image/affine.h) */
 } evaluation;
 

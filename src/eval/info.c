@@ -10,7 +10,10 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/parallel.h"
+#include "data/gaussian_file.h"
 #include "data/scene.h"
+#include "eval/expect.h"
 #include "eval/json_out.h"
 #include "io/model_file.h"
 
@@ -18,6 +21,7 @@
 
 typedef struct photo_counts {
     size_t found, unreadable, other_size; /* other_size: readable, but not the camera's size */
+    size_t with_alpha, with_mask;
     int min_width, min_height, max_width, max_height;
 } photo_counts;
 
@@ -32,6 +36,8 @@ static photo_counts count_photos(const scene *s)
             continue;
         }
         const bool is_first = c.found++ == 0;
+        c.with_alpha += channels == 4;
+        c.with_mask += view->mask_path != NULL;
         c.other_size += width != view->camera.width || height != view->camera.height;
         c.min_width = is_first || width < c.min_width ? width : c.min_width;
         c.min_height = is_first || height < c.min_height ? height : c.min_height;
@@ -42,18 +48,17 @@ static photo_counts count_photos(const scene *s)
 }
 
 /** The box that leaves out 5 % of the points on each side of each axis, world coordinates: a few outliers must not be the size of a scene. */
-static gbt_status find_box(const scene *s, double low[3], double high[3], gbt_error *err)
+static gbt_status find_box(const float *position, size_t count, const double origin[3], double low[3], double high[3], gbt_error *err)
 {
-    const size_t count = s->points.count;
     float *axis = mem_alloc(count, sizeof *axis, "points", err);
     if (axis == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t k = 0; k < 3 && count > 0; k++) {
         for (size_t i = 0; i < count; i++)
-            axis[i] = s->points.position[3 * i + k];
+            axis[i] = position[3 * i + k];
         qsort(axis, count, sizeof *axis, compare_floats);
-        low[k] = (double)axis[count / 20] + s->origin[k];
-        high[k] = (double)axis[count - 1 - count / 20] + s->origin[k];
+        low[k] = (double)axis[count / 20] + origin[k];
+        high[k] = (double)axis[count - 1 - count / 20] + origin[k];
     }
     mem_free(axis);
     return GBT_OK;
@@ -64,7 +69,14 @@ typedef struct dataset_facts {
     photo_counts photos;
     size_t views_by_model[GBT_CAMERA_MODEL_COUNT], test_views;
     double low[3], high[3], extent;
+    expectation expect;
 } dataset_facts;
+
+/* Which views are held out when nobody says otherwise. */
+static const char *split_name(const scene *s)
+{
+    return s->has_split ? "own" : "every=8";
+}
 
 static json_t *dataset_to_json(const char *path, const dataset_facts *f)
 {
@@ -75,14 +87,15 @@ static json_t *dataset_to_json(const char *path, const dataset_facts *f)
             json_object_set_new(cameras, gbt_camera_model_name((gbt_camera_model)m), json_integer((json_int_t)f->views_by_model[m]));
     json_t *box = s->points.count == 0 ? json_null()
                                        : json_pack("[[f,f,f],[f,f,f]]", f->low[0], f->low[1], f->low[2], f->high[0], f->high[1], f->high[2]);
-    return json_pack("{s:i,s:s,s:o,s:s,s:I,s:o,s:{s:I,s:I,s:I,s:[i,i],s:[i,i]},s:I,s:I,s:I,s:b,s:I,s:[f,f,f],s:o,s:f}", "schema", 1, "kind", "dataset",
+    return json_pack("{s:i,s:s,s:o,s:s,s:I,s:o,s:{s:I,s:I,s:I,s:I,s:I,s:I,s:[i,i],s:[i,i]},s:I,s:I,s:s,s:I,s:b,s:I,s:[f,f,f],s:o,s:f,s:o}", "schema", 1, "kind", "dataset",
                      "path", json_text(path), "source", s->source, "views", (json_int_t)s->view_count, "cameras", cameras,
-                     "photos", "found", (json_int_t)f->photos.found, "unreadable", (json_int_t)f->photos.unreadable, "other_size",
-                     (json_int_t)f->photos.other_size, "min_size", f->photos.min_width, f->photos.min_height, "max_size", f->photos.max_width,
+                     "photos", "found", (json_int_t)f->photos.found, "missing", (json_int_t)s->photos_missing, "unreadable",
+                     (json_int_t)f->photos.unreadable, "other_size", (json_int_t)f->photos.other_size, "with_alpha", (json_int_t)f->photos.with_alpha, "with_mask",
+                     (json_int_t)f->photos.with_mask, "min_size", f->photos.min_width, f->photos.min_height, "max_size", f->photos.max_width,
                      f->photos.max_height,
-                     "train_views", (json_int_t)(s->view_count - f->test_views), "test_views", (json_int_t)f->test_views, "points",
+                     "train_views", (json_int_t)(s->view_count - f->test_views), "test_views", (json_int_t)f->test_views, "split", split_name(s), "points",
                      (json_int_t)s->points.count, "points_have_color", (int)s->points.has_color, "points_dropped", (json_int_t)s->points_dropped,
-                     "origin", s->origin[0], s->origin[1], s->origin[2], "point_box", box, "camera_extent", f->extent);
+                     "origin", s->origin[0], s->origin[1], s->origin[2], "point_box", box, "camera_extent", f->extent, "expect", expect_to_json(&f->expect));
 }
 
 static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
@@ -90,7 +103,8 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
     const scene *s = f->s;
     const photo_counts *p = &f->photos;
     fprintf(out, "%s: data set (%s)\n", path, s->source);
-    fprintf(out, "  views     %zu: %zu to train, %zu held out\n", s->view_count, s->view_count - f->test_views, f->test_views);
+    fprintf(out, "  views     %zu: %zu to train, %zu held out (%s)\n", s->view_count, s->view_count - f->test_views, f->test_views,
+            s->has_split ? "by the data set" : "every 8th");
     if (s->view_count > 0) {
         fprintf(out, "  cameras   ");
         const char *separator = "";
@@ -100,12 +114,17 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
                 separator = ", ";
             }
         fprintf(out, "\n  photos    %zu found, %zu unreadable", p->found, p->unreadable);
+        if (s->photos_missing > 0)
+            fprintf(out, ", %zu missing", s->photos_missing);
         if (p->found > 0 && p->min_width == p->max_width && p->min_height == p->max_height)
             fprintf(out, ", %d x %d pixels", p->max_width, p->max_height);
         else if (p->found > 0)
             fprintf(out, ", %d x %d to %d x %d pixels", p->min_width, p->min_height, p->max_width, p->max_height);
         if (p->other_size > 0)
             fprintf(out, ", %zu not of their camera's size", p->other_size);
+        if (p->with_alpha + p->with_mask > 0)
+            fprintf(out, "\n  masks     %zu photos have a mask, %zu an alpha channel (on %s; --alpha)", p->with_mask, p->with_alpha,
+                    strcmp(s->source, "blender") == 0 ? "white" : "black");
         fprintf(out, "\n  extent    %g (of the training cameras)\n", f->extent);
     }
     fprintf(out, "  points    %zu%s", s->points.count, s->points.count > 0 && !s->points.has_color ? ", without colour" : "");
@@ -114,6 +133,8 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
     if (s->points.count > 0)
         fprintf(out, ", 90 %% within %g x %g x %g", f->high[0] - f->low[0], f->high[1] - f->low[1], f->high[2] - f->low[2]);
     fprintf(out, "\n  origin    %.9g %.9g %.9g\n", s->origin[0], s->origin[1], s->origin[2]);
+    if (s->view_count > 0)
+        expect_print(&f->expect, out);
 }
 
 static gbt_status info_of_dataset(const char *path, int json, FILE *out, gbt_error *err)
@@ -125,7 +146,8 @@ static gbt_status info_of_dataset(const char *path, int json, FILE *out, gbt_err
         facts.views_by_model[s.views[i].camera.model]++;
         facts.test_views += s.views[i].is_test;
     }
-    gbt_status status = find_box(&s, facts.low, facts.high, err);
+    facts.expect = expect_training(&s, 1, parallel_threads());
+    gbt_status status = find_box(s.points.position, s.points.count, s.origin, facts.low, facts.high, err);
     if (status == GBT_OK && json) {
         json_t *value = dataset_to_json(path, &facts);
         status = json_print(value, out, err);
@@ -133,6 +155,32 @@ static gbt_status info_of_dataset(const char *path, int json, FILE *out, gbt_err
     } else if (status == GBT_OK)
         print_dataset(path, &facts, out);
     scene_free(&s);
+    return status;
+}
+
+/* ---- plain Gaussians ------------------------------------------------------------------------------------------------------------- */
+
+static gbt_status info_of_gaussians(const char *path, int json, FILE *out, gbt_error *err)
+{
+    static const double world[3] = {0, 0, 0};
+    gaussian_cloud cloud;
+    double low[3], high[3];
+    GBT_TRY(gaussian_file_read(path, &cloud, err));
+    gbt_status status = find_box(cloud.mean, cloud.count, world, low, high, err);
+    if (status == GBT_OK && json) {
+        json_t *value = json_pack("{s:i,s:s,s:o,s:I,s:i,s:I,s:[[f,f,f],[f,f,f]]}", "schema", 1, "kind", "gaussians", "path", json_text(path), "gaussians",
+                                  (json_int_t)cloud.count, "sh_degree", cloud.sh_degree, "dropped", (json_int_t)cloud.dropped, "box", low[0], low[1], low[2],
+                                  high[0], high[1], high[2]);
+        status = json_print(value, out, err);
+        json_decref(value);
+    } else if (status == GBT_OK) {
+        fprintf(out, "%s: plain Gaussians\n  gaussians %zu, colours of degree %d", path, cloud.count, cloud.sh_degree);
+        if (cloud.dropped > 0)
+            fprintf(out, ", %zu unusable rows dropped", cloud.dropped);
+        fprintf(out, "\n  box       90 %% within %g x %g x %g around %g %g %g\n", high[0] - low[0], high[1] - low[1], high[2] - low[2], 0.5 * (low[0] + high[0]),
+                0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]));
+    }
+    gaussian_cloud_free(&cloud);
     return status;
 }
 
@@ -193,7 +241,10 @@ gbt_status gbt_info(const char *path, int json, FILE *out, gbt_error *err)
     char inside[4096];
     if (file_is_folder(path)) {
         GBT_TRY(file_join(inside, sizeof inside, path, "model.gbt", err));
-        return file_exists(inside) ? info_of_model(inside, json, out, err) : info_of_dataset(path, json, out, err);
+        if (file_exists(inside))
+            return info_of_model(inside, json, out, err);
     }
+    if (gaussian_file_has_gaussians(path))
+        return info_of_gaussians(path, json, out, err);
     return is_model_name(path) ? info_of_model(path, json, out, err) : info_of_dataset(path, json, out, err);
 }

@@ -7,7 +7,23 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "data/cameras_json.h"
 #include "data/gaussian_file.h"
+#include "data/result_folder.h"
+
+/* What a result folder says beside its Gaussians: the data set, and what is behind them. */
+static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *err)
+{
+    result_folder folder;
+    bool found;
+    GBT_TRY(result_folder_find(path, &folder, &found, err));
+    snprintf(out->model.data_folder, sizeof out->model.data_folder, "%.*s", (int)sizeof out->model.data_folder - 1, folder.source);
+    out->model.iterations = folder.iteration;
+    out->def.alpha = folder.white_background ? "white" : "black";
+    for (int c = 0; c < 3; c++)
+        out->settings.background[c] = folder.white_background;
+    return GBT_OK;
+}
 
 void loaded_run_draw_plain(loaded_run *r)
 {
@@ -37,7 +53,7 @@ static gbt_status open_cloud(const char *path, loaded_run *out, gbt_error *err)
     GBT_TRY(gaussian_file_read(path, &cloud, err));
     loaded_run_draw_plain(out);
     loaded_run_take_cloud(out, &cloud);
-    return GBT_OK;
+    return file_is_folder(path) ? describe_folder(path, out, err) : GBT_OK;
 }
 
 static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
@@ -63,23 +79,36 @@ static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
     return GBT_OK;
 }
 
-gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)
+/* Another data set of the same place has another local origin. */
+static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
 {
-    scene_split split;
-    GBT_TRY(scene_split_parse(out->def.eval_split, &split, err));
-    if (data == NULL && out->cloud.count > 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%.1000s: plain Gaussians know no cameras: name a camera or a data set (--camera or --data)", run);
-    if (data == NULL && !file_exists(out->model.data_folder) && !file_is_folder(out->model.data_folder))
-        return base_fail(err, GBT_ERR_IO, "%.1000s: the data set of %.1000s is not there; run the command in the folder where it was trained, or say where with --data",
-                         out->model.data_folder, run);
-    GBT_TRY(scene_load(data != NULL ? data : out->model.data_folder, &split, &out->scene, err));
-    /* Another data set of the same place has another local origin. */
     for (size_t i = 0; i < out->scene.view_count; i++)
         for (int k = 0; k < 3; k++)
             out->scene.views[i].camera.center[k] += out->scene.origin[k] - out->model.origin[k];
     for (size_t i = 0; i < 3 * out->scene.points.count; i++)
         out->scene.points.position[i] += (float)(out->scene.origin[i % 3] - out->model.origin[i % 3]);
     return photos_open(&out->photos, &out->scene, downscale > 0 ? downscale : out->def.downscale, err);
+}
+
+gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)
+{
+    scene_split split;
+    GBT_TRY(scene_split_parse(out->def.eval_split, &split, err));
+    const bool has_data = out->model.data_folder[0] != '\0' && file_exists(out->model.data_folder);
+    char cameras[4096];
+    GBT_TRY(file_join(cameras, sizeof cameras, run, "cameras.json", err));
+    if (data == NULL && out->cloud.count > 0 && !has_data && file_exists(cameras)) {
+        GBT_TRY(cameras_json_load(cameras, &out->scene, err));
+        return place_views(downscale, out, err);
+    }
+    if (data == NULL && out->cloud.count > 0 && !has_data)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.1000s: plain Gaussians know no cameras: name a camera or a data set (--camera or --data)", run);
+    if (data == NULL && !has_data)
+        return base_fail(err, GBT_ERR_IO, "%.1000s: the data set of %.1000s is not there; run the command in the folder where it was trained, or say where with --data",
+                         out->model.data_folder, run);
+    GBT_TRY(scene_load(data != NULL ? data : out->model.data_folder, &split, &out->scene, err));
+    GBT_TRY(scene_set_alpha(&out->scene, out->def.alpha, err));
+    return place_views(downscale, out, err);
 }
 
 gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)

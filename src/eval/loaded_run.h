@@ -21,7 +21,8 @@ typedef struct loaded_run {
 } loaded_run;
 
 /**
- * Open RUN: a folder with model.gbt, a model file, or plain Gaussians (.ply, .splat, .spz), which know no data set.
+ * Open RUN: a folder with model.gbt, a model file, or plain Gaussians (.ply, .splat, .spz), which know no data set. A result folder of 3DGS may:
+ * the one that its cfg_args names, else its cameras.json.
  *
  * @param data      [in] data set folder; NULL: the one it was trained on
  * @param downscale [in] 0: as in training

@@ -12,7 +12,6 @@
 #include "eval/run_sensitivity.h"
 #include "eval/study_model.h"
 #include "gbtrace/bench.h"
-#include "image/affine.h"
 #include "image/metrics.h"
 
 static const double ladder[] = {48, 50, 52, 54, 55, 56, 58, 60, 65, 0};
@@ -21,39 +20,32 @@ _Static_assert(sizeof ladder / sizeof *ladder <= RATE_ROWS_MAX, "every quality h
 
 /* ---- scores ------------------------------------------------------------------------------------------------------------------- */
 
-static void score_pair(image *render, image *photo, double *psnr, double *ssim)
-{
-    image_quantize(render);
-    image_quantize(photo);
-    *psnr += metric_psnr(render, photo);
-    *ssim += metric_ssim(render, photo);
-}
-
-static gbt_status score_view(loaded_run *r, size_t view, double *psnr, double *ssim, gbt_error *err)
+static gbt_status score_view(loaded_run *r, size_t view, image_scores *sum, gbt_error *err)
 {
     GBT_TRY(loaded_run_render(r, view, err));
-    image photo = {0}, render_right = {0}, photo_right = {0};
-    gbt_status status = scene_read_photo(&r->scene.views[view], r->frame.rgb.width, r->frame.rgb.height, &photo, err);
-    if (status == GBT_OK && r->def.exposure)
-        status = affine_split(&r->frame.rgb, &photo, &render_right, &photo_right, err);
+    image photo = {0};
+    unsigned char *valid = NULL;
+    image_scores scores = {0};
+    gbt_status status = scene_read_photo_valid(&r->scene.views[view], r->frame.rgb.width, r->frame.rgb.height, &photo, &valid, err);
     if (status == GBT_OK)
-        score_pair(r->def.exposure ? &render_right : &r->frame.rgb, r->def.exposure ? &photo_right : &photo, psnr, ssim);
+        status = image_score_photo(&r->frame.rgb, &photo, valid, r->def.exposure, NULL, &scores, err);
+    sum->psnr += scores.psnr, sum->ssim += scores.ssim;
     image_free(&photo);
-    image_free(&render_right);
-    image_free(&photo_right);
+    mem_free(valid);
     return status;
 }
 
 /* As gbtrace eval: means over the held-out views, NaN without them. */
 static gbt_status score_model(loaded_run *r, size_t *views, double *psnr, double *ssim, gbt_error *err)
 {
-    *views = 0, *psnr = *ssim = 0;
+    image_scores sum = {0};
+    *views = 0;
     for (size_t view = 0; view < r->scene.view_count; view++)
         if (r->scene.views[view].is_test) {
-            GBT_TRY(score_view(r, view, psnr, ssim, err));
+            GBT_TRY(score_view(r, view, &sum, err));
             ++*views;
         }
-    *psnr /= (double)*views, *ssim /= (double)*views;
+    *psnr = sum.psnr / (double)*views, *ssim = sum.ssim / (double)*views;
     return GBT_OK;
 }
 

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/memory.h"
 #include "eval/bench_scene.h"
 #include "eval/study_speed.h"
 #include "image/metrics.h"
@@ -32,7 +33,8 @@ static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_
     image photo = {0}, rgb = {0};
     trace_scene traced = {0};
     raster_scene splatted = {0};
-    gbt_status status = scene_read_photo(&s->run->scene.views[view], camera.width, camera.height, &photo, err);
+    unsigned char *valid = NULL;
+    gbt_status status = scene_read_photo_valid(&s->run->scene.views[view], camera.width, camera.height, &photo, &valid, err);
     if (status == GBT_OK)
         status = image_alloc(&rgb, camera.width, camera.height, 3, err);
     image_quantize(&photo);
@@ -41,11 +43,12 @@ static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_
             continue;
         status = draw(s, &out->rows[i], &traced, &splatted, &rgb, err);
         image_quantize(&rgb);
-        out->rows[i].photo_psnr += metric_psnr(&rgb, &photo);
+        out->rows[i].photo_psnr += metric_psnr_valid(&rgb, &photo, valid);
     }
     trace_scene_free(&traced);
     raster_scene_free(&splatted);
     image_free(&photo);
+    mem_free(valid);
     image_free(&rgb);
     return status;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/memory.h"
 #include "base/parallel.h"
 
 enum { INPUTS = 4, OUTPUTS = 3, BLOCKS_MAX = 64 };
@@ -113,13 +114,15 @@ static double finite_or_0(float value)
     return isfinite(value) ? (double)value : 0;
 }
 
-void affine_fit(const image *from, const image *to, int begin, int end, float m[AFFINE_NUMBERS])
+void affine_fit(const image *from, const image *to, const unsigned char *valid, int begin, int end, float m[AFFINE_NUMBERS])
 {
     const double ridge = 1e-6;
     double a[INPUTS][INPUTS] = {{0}}, b[OUTPUTS][INPUTS] = {{0}};
     for (int y = 0; y < from->height; y++)
         for (int x = begin; x < end; x++) {
-            const size_t at = 3 * ((size_t)y * (size_t)from->width + (size_t)x);
+            const size_t pixel = (size_t)y * (size_t)from->width + (size_t)x, at = 3 * pixel;
+            if (valid != NULL && !valid[pixel])
+                continue;
             const float *p = from->pixels + at, *q = to->pixels + at;
             const double in[INPUTS] = {finite_or_0(p[0]), finite_or_0(p[1]), finite_or_0(p[2]), 1};
             for (int i = 0; i < INPUTS; i++) {
@@ -143,32 +146,46 @@ void affine_fit(const image *from, const image *to, int begin, int end, float m[
 
 /* ---- left and right ------------------------------------------------------------------------------------------------------------- */
 
-static void copy_right(const image *in, image *out)
+/* The last `kept` bytes of each of `rows` rows. */
+static void copy_right(const void *in, size_t row, size_t kept, int rows, void *out)
 {
-    const size_t row = 3 * (size_t)in->width, kept = 3 * (size_t)out->width;
-    for (size_t y = 0; y < (size_t)in->height; y++)
-        memcpy(out->pixels + y * kept, in->pixels + y * row + (row - kept), kept * sizeof *out->pixels);
+    for (size_t y = 0; y < (size_t)rows; y++)
+        memcpy((char *)out + y * kept, (const char *)in + y * row + (row - kept), kept);
 }
 
-gbt_status affine_split(image *render, const image *photo, image *render_right, image *photo_right, gbt_error *err)
+gbt_status affine_split(image *render, const image *photo, const unsigned char *valid, affine_half *out, gbt_error *err)
 {
-    memset(render_right, 0, sizeof *render_right);
-    memset(photo_right, 0, sizeof *photo_right);
+    memset(out, 0, sizeof *out);
     if (render->channels != 3 || photo->channels != 3 || render->width != photo->width || render->height != photo->height)
         return base_fail(err, GBT_ERR_ARGUMENT, "exposure: images of %d x %d x %d and %d x %d x %d (wanted equal, 3 channels)", render->width,
                          render->height, render->channels, photo->width, photo->height, photo->channels);
-    const int left = render->width / 2;
-    gbt_status status = image_alloc(render_right, render->width - left, render->height, 3, err);
+    const int left = render->width / 2, right = render->width - left;
+    gbt_status status = image_alloc(&out->render, right, render->height, 3, err);
     if (status == GBT_OK)
-        status = image_alloc(photo_right, render->width - left, render->height, 3, err);
+        status = image_alloc(&out->photo, right, render->height, 3, err);
+    if (status == GBT_OK && valid != NULL) {
+        out->valid = mem_alloc((size_t)right * (size_t)render->height, 1, "valid pixels", err);
+        status = out->valid == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    }
     if (status != GBT_OK) {
-        image_free(render_right);
+        affine_half_free(out);
         return status;
     }
     float m[AFFINE_NUMBERS];
-    affine_fit(render, photo, 0, left, m);
+    affine_fit(render, photo, valid, 0, left, m);
     affine_apply(m, render, render);
-    copy_right(render, render_right);
-    copy_right(photo, photo_right);
+    const size_t pixel = 3 * sizeof(float), width = (size_t)render->width, kept = (size_t)right;
+    copy_right(render->pixels, width * pixel, kept * pixel, render->height, out->render.pixels);
+    copy_right(photo->pixels, width * pixel, kept * pixel, render->height, out->photo.pixels);
+    if (valid != NULL)
+        copy_right(valid, width, kept, render->height, out->valid);
     return GBT_OK;
+}
+
+void affine_half_free(affine_half *half)
+{
+    image_free(&half->render);
+    image_free(&half->photo);
+    mem_free(half->valid);
+    memset(half, 0, sizeof *half);
 }

@@ -23,12 +23,18 @@ void affine_apply(const float m[AFFINE_NUMBERS], const image *in, image *out);
 void affine_backward(const float m[AFFINE_NUMBERS], const image *in, image *d, double d_m[AFFINE_NUMBERS]);
 
 /**
- * The matrix that brings the columns [begin, end) of `from` nearest to those of `to`, by least squares.
+ * The matrix that brings the columns [begin, end) of `from` nearest to those of `to`, by least squares, over the pixels where `valid` (NULL: all).
  *
  * Minimises mean |m(from) - to|^2 + 1e-6 |m - identity|^2, so that colours which tell nothing (a black or one-coloured picture, no columns)
  * leave the matrix as near to the identity as they allow. Values that are not finite count as 0.
  */
-void affine_fit(const image *from, const image *to, int begin, int end, float m[AFFINE_NUMBERS]);
+void affine_fit(const image *from, const image *to, const unsigned char *valid, int begin, int end, float m[AFFINE_NUMBERS]);
+
+/** The right halves of a render and its photo, and which of their pixels count. Free with affine_half_free(). */
+typedef struct affine_half {
+    image render, photo;
+    unsigned char *valid; /* NULL: all */
+} affine_half;
 
 /**
  * How a picture is scored when every photo may have an exposure of its own: fit on its left half, score its right half.
@@ -37,10 +43,12 @@ void affine_fit(const image *from, const image *to, int begin, int end, float m[
  *
  * @param render       [in,out] 3 channels, not clamped; replaced by m(render), whole
  * @param photo        [in]     the size of render
- * @param render_right [out]    free with image_free(); zeroed on failure
- * @param photo_right  [out]    the same
+ * @param valid        [in]     NULL (all) or [height][width]: 0 for pixels that are not fitted
+ * @param out          [out]    free with affine_half_free(); zeroed on failure
  * @return GBT_OK, GBT_ERR_ARGUMENT (sizes), GBT_ERR_NO_MEMORY
  */
-gbt_status affine_split(image *render, const image *photo, image *render_right, image *photo_right, gbt_error *err);
+gbt_status affine_split(image *render, const image *photo, const unsigned char *valid, affine_half *out, gbt_error *err);
+
+void affine_half_free(affine_half *half);
 
 #endif

@@ -2,6 +2,8 @@
 #ifndef GBT_IMAGE_METRICS_H
 #define GBT_IMAGE_METRICS_H
 
+#include <stdbool.h>
+
 #include "base/image.h"
 
 #define METRIC_PSNR_MAX 100.0 /* dB, stated for images that are equal or nearly so */
@@ -14,6 +16,9 @@
  * Threads: any.
  */
 double metric_psnr(const image *a, const image *b);
+
+/** The same over the pixels where `valid`, [height][width], is not 0 (NULL: all); NaN where there is none. */
+double metric_psnr_valid(const image *a, const image *b, const unsigned char *valid);
 
 /**
  * Mean SSIM over all pixels and channels, in double.
@@ -45,6 +50,30 @@ gbt_status metric_flip(const image *a, const image *reference, double *mean, ima
 
 /** Round to 8 bit as the PNG writer does, in place: floor(clamp(x) * 255 + 0.5) / 255; NaN becomes 0. */
 void image_quantize(image *im);
+
+/** What a picture is scored by. NaN without a pixel that counts. */
+typedef struct image_scores {
+    double psnr, ssim, flip;
+} image_scores;
+
+/**
+ * PSNR, SSIM and FLIP of the pixels where `valid` (NULL: all). The others are 0 in both images for the windows and filters, and count in no mean.
+ *
+ * @param a, photo  3 channels, equal size; round them first (image_quantize()), as everybody scores pictures
+ * @param flip_map  [out] optional: 1 channel, of their size, allocated by the caller; 0 where not valid
+ * @return GBT_OK, GBT_ERR_ARGUMENT (sizes), GBT_ERR_NO_MEMORY
+ */
+gbt_status image_score(const image *a, const image *photo, const unsigned char *valid, image *flip_map, image_scores *out, gbt_error *err);
+
+/**
+ * image_score() as every command scores a render against its photo: both are rounded to 8 bit; with `exposure` the right halves count, after
+ * affine_split().
+ *
+ * @param render, photo [in,out] rounded; the render through the matrix of affine_split()
+ * @param flip_map      [out] optional, as for image_score(); always of the whole pictures
+ */
+gbt_status image_score_photo(image *render, image *photo, const unsigned char *valid, bool exposure, image *flip_map, image_scores *out,
+                             gbt_error *err);
 
 /** Scratch of image_loss(), reused from step to step. Start from {0}. */
 typedef struct loss_scratch {

@@ -116,8 +116,9 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     uint64_t counters[8];
     GBT_TRY(container_get(c, "counters", CONTAINER_U64, 8, counters, err));
     if (counters[5] != t->scene.view_count || counters[6] != t->scene.points.count)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: made from other data (wanted %zu views and %zu points, got %llu and %llu)", path, t->scene.view_count,
-                         t->scene.points.count, (unsigned long long)counters[5], (unsigned long long)counters[6]);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: made from other data (wanted %zu views and %zu points, got %llu and %llu)%s%s", path, t->scene.view_count,
+                         t->scene.points.count, (unsigned long long)counters[5], (unsigned long long)counters[6],
+                         t->scene.photos_missing > 0 ? "; photos that are missing: " : "", t->scene.missing_names);
     if (counters[4] > PACE_SEGMENTS)
         return base_fail(err, GBT_ERR_FORMAT, "%s: pace of %llu parts (limit %d)", path, (unsigned long long)counters[4], PACE_SEGMENTS);
     size_t position[2] = {CONTAINER_ANY, 3};

@@ -12,10 +12,10 @@ void config_text(const gbt_train_def *d, const char *data, char *out, size_t siz
 {
     snprintf(out, size,
              "data = %s\ninit = %s\ninit-count = %.17g\nscale-prior = %s\nmax-depth = %d\nvoxel-size = %.9g\noffsets = %d\ndistance = %s\niterations = %llu\n"
-             "budget-seconds = %.17g\npace = %s\ndownscale = %.17g\nrenderer = %s\nfootprint = %.17g\nstart-level = %d\neval-split = %s\nseed = %llu\nmax-anchors = %zu\n"
+             "budget-seconds = %.17g\npace = %s\ndownscale = %.17g\nrenderer = %s\nfootprint = %.17g\nstart-level = %d\neval-split = %s\nalpha = %s\nseed = %llu\nmax-anchors = %zu\n"
              "grow = %d\nthrift = %.17g\ncompat = %d\nexposure = %d\nsplats-until = %.17g\ngrow-until = %.17g\nscale-factor = %.17g\nlearning-rate = %.17g\n",
              data, d->init, d->init_count, d->scale_prior, d->max_depth, (double)d->voxel_size, d->offsets, d->distance, (unsigned long long)d->iterations,
-             d->budget_seconds, d->pace != NULL ? d->pace : "", d->downscale, d->renderer, d->footprint, d->start_level, d->eval_split, (unsigned long long)d->seed,
+             d->budget_seconds, d->pace != NULL ? d->pace : "", d->downscale, d->renderer, d->footprint, d->start_level, d->eval_split, d->alpha, (unsigned long long)d->seed,
              d->max_anchors, d->grow, d->thrift, d->compat, d->exposure, d->splats_until, d->grow_until, d->scale_factor, d->learning_rate_factor);
 }
 
@@ -49,6 +49,8 @@ static bool set_key(const char *key, const char *value, gbt_train_def *d, config
         return set_string(s->renderer, sizeof s->renderer, value, &d->renderer), true;
     if (strcmp(key, "eval-split") == 0)
         return set_string(s->eval_split, sizeof s->eval_split, value, &d->eval_split), true;
+    if (strcmp(key, "alpha") == 0)
+        return set_string(s->alpha, sizeof s->alpha, value, &d->alpha), true;
     if (strcmp(key, "pace") == 0) {
         set_string(s->pace, sizeof s->pace, value, &d->pace);
         if (value[0] == '\0')

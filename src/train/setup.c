@@ -34,7 +34,8 @@ gbt_train_def gbt_train_def_default(void)
                            .renderer = "trace",
                            .footprint = 0.1,
                            .start_level = 2,
-                           .eval_split = "every=8",
+                           .eval_split = "auto",
+                           .alpha = "auto",
                            .max_anchors = 2000000,
                            .grow = true,
                            .thrift = 1,
@@ -303,6 +304,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     scene_split split;
     GBT_TRY(scene_split_parse(def->eval_split, &split, err));
     GBT_TRY(scene_load(data, &split, &t->scene, err));
+    GBT_TRY(scene_set_alpha(&t->scene, def->alpha, err));
     if (t->scene.view_count == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no photos to train on (a point cloud alone is not enough)", data);
     GBT_TRY(choose_views(t, err));
@@ -334,7 +336,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     const double size = fmax(t->extent, (double)median);
     t->scale_log_min = (float)log(1e-6 * size), t->scale_log_max = (float)log(100 * size);
     GBT_TRY(make_state(t, err));
-    if (!def->compat && t->scene.points.has_color)
+    if (!scene_background(&t->scene, t->settings.background) && !def->compat && t->scene.points.has_color)
         mean_color(&t->scene.points, t->settings.background);
 
     if (def->pace != NULL)

@@ -354,31 +354,27 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
 {
     double sum = 0;
     size_t count = 0;
-    image photo = {0}, right[2] = {{0}};
+    image photo = {0};
     gbt_status status = GBT_OK;
     for (size_t i = 0; i < t->scene.view_count && status == GBT_OK; i++) {
         if (!t->scene.views[i].is_test)
             continue;
+        unsigned char *valid = NULL;
         const gbt_camera camera = photos_camera(&t->photos, i, 0);
         t->frame.draw.pixel_step = 1;
         t->frame.draw.renderer = t->renderer;
         status = frame_render(&t->frame, frame_neural(&t->anchors, &t->decoder), &camera, &t->settings, false, err);
         if (status == GBT_OK)
-            status = scene_read_photo(&t->scene.views[i], camera.width, camera.height, &photo, err);
-        image *pair[2] = {&t->frame.rgb, &photo};
-        if (status == GBT_OK && t->exposures.count > 0) {
-            status = affine_split(&t->frame.rgb, &photo, &right[0], &right[1], err);
-            pair[0] = &right[0], pair[1] = &right[1];
-        }
-        if (status == GBT_OK) {
-            image_quantize(pair[0]);
-            image_quantize(pair[1]);
-            sum += metric_psnr(pair[0], pair[1]);
+            status = scene_read_photo_valid(&t->scene.views[i], camera.width, camera.height, &photo, &valid, err);
+        image_scores scores = {0};
+        if (status == GBT_OK)
+            status = image_score_photo(&t->frame.rgb, &photo, valid, t->exposures.count > 0, NULL, &scores, err);
+        if (status == GBT_OK && isfinite(scores.psnr)) { /* else every pixel is masked */
+            sum += scores.psnr;
             count++;
         }
         image_free(&photo);
-        image_free(&right[0]);
-        image_free(&right[1]);
+        mem_free(valid);
     }
     *psnr = count > 0 ? sum / (double)count : (double)NAN;
     return status;

@@ -126,29 +126,55 @@ static void binary_is_preferred(void **state)
     assert_null(s.views);
 }
 
-/* 27: every missing photo is counted, the first three are named. */
+/* 27: views without a photo are left out and counted, the first three named; without any photo there is nothing to do. */
 static void missing_photos(void **state)
 {
     const char *folder = *state;
     write_model(folder, false, true);
-    static const char *const gone[] = {"images/v2.png", "images/v4.png", "images/v5.png", "images/v9.png"};
-    for (int i = 0; i < 4; i++) {
-        unlink(inside(folder, gone[i], 0));
-        scene s;
-        gbt_error err = {0};
-        assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_IO);
-        check_message(GBT_ERR_IO, &err);
-        char want[64];
-        snprintf(want, sizeof want, "%d of 9 photos are missing: v2.png%s%s%s", i + 1, i > 0 ? ", v4.png" : "", i > 1 ? ", v5.png" : "",
-                 i > 2 ? ", ..." : "");
-        if (strstr(err.text, want) == NULL || (i < 3 && strstr(err.text, "...") != NULL))
-            fail_msg("%s", err.text);
-    }
-    must(file_make_folder(inside(folder, "images/v2.png", 0), &err)); /* a folder is not a photo */
     scene s;
+    for (int i = 1; i <= VIEW_COUNT; i++) {
+        char name[32];
+        snprintf(name, sizeof name, "images/v%d.png", i == 1 ? 2 : i == 2 ? 1 : i); /* a first and a later one */
+        unlink(inside(folder, name, 0));
+        if (i == 1)
+            must(file_make_folder(inside(folder, "images/v2.png", 0), &err)); /* a folder is not a photo */
+        if (i == VIEW_COUNT)
+            break;
+        must(scene_load(folder, NULL, &s, &err));
+        assert_int_equal(s.photos_missing, i);
+        assert_int_equal(s.view_count, VIEW_COUNT - i);
+        assert_string_equal(s.views[0].name, i == 1 ? "v1.png" : (snprintf(name, sizeof name, "v%d.png", i + 1), name));
+        assert_string_equal(s.views[s.view_count - 1].name, "v9.png");
+        for (size_t v = 0; v < s.view_count; v++) { /* who is held out does not depend on who is missing */
+            const int number = s.views[v].name[1] - '1';
+            assert_int_equal(s.views[v].is_test, s.view_count > 1 && number % 8 == 0);
+        }
+        scene_free(&s);
+    }
     gbt_error err = {0};
     assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_IO);
-    assert_non_null(strstr(err.text, "4 of 9 photos"));
+    check_message(GBT_ERR_IO, &err);
+    if (strstr(err.text, "all 9 photos are missing: v1.png, v2.png, v3.png, ...") == NULL)
+        fail_msg("%s", err.text);
+}
+
+/* COLMAP's NAME.png, and two other habits; what has none stays without. */
+static void masks_are_found(void **state)
+{
+    const char *folder = *state;
+    write_model(folder, false, true);
+    static const char *const files[] = {"masks/v1.png.png", "masks/v2.png"};
+    scene s;
+    must(scene_load(folder, NULL, &s, &err));
+    assert_null(s.views[0].mask_path);
+    scene_free(&s);
+    for (int i = 0; i < 2; i++)
+        write_picture(folder, files[i], 8, 6);
+    must(scene_load(folder, NULL, &s, &err));
+    for (int i = 0; i < 2; i++)
+        assert_string_equal(s.views[i].mask_path, inside(folder, files[i], 0));
+    assert_null(s.views[2].mask_path);
+    scene_free(&s);
 }
 
 typedef struct place_case {
@@ -166,7 +192,7 @@ static void nothing_to_load(void **state)
     const char *folder = *state;
     static const place_case cases[] = {
         {"nothing there", NULL, NULL, "no/such", GBT_ERR_IO, "no such file or folder"},
-        {"empty folder", NULL, NULL, ".", GBT_ERR_FORMAT, "not a data set (wanted sparse/0/cameras.bin or transforms.json"},
+        {"empty folder", NULL, NULL, ".", GBT_ERR_FORMAT, "not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json"},
         {"some file", "photo.jpg", "x", "photo.jpg", GBT_ERR_FORMAT, "not a data set (wanted a folder, a .ply or a transforms.json)"},
         {"bad ply", "p.ply", "x", "p.ply", GBT_ERR_FORMAT, "p.ply:1: not a PLY file"},
         {"ply without points", "p.ply", "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n", "p.ply",
@@ -220,6 +246,7 @@ static void parse_split(void **state)
         int every;
     } cases[] = {
         {"every=8", true, SCENE_SPLIT_EVERY, 8},   {"every=2", true, SCENE_SPLIT_EVERY, 2}, {"every=2147483647", true, SCENE_SPLIT_EVERY, 2147483647},
+        {"auto", true, SCENE_SPLIT_AUTO, 8},       {"autos", false, 0, 0},
         {"none", true, SCENE_SPLIT_NONE, 8},       {"list=a b.txt", true, SCENE_SPLIT_LIST, 8},
         {"every=1", false, 0, 0},                  {"every=0", false, 0, 0},                {"every=-8", false, 0, 0},
         {"every=", false, 0, 0},                   {"every=8x", false, 0, 0},               {"every=2147483648", false, 0, 0},
@@ -478,6 +505,98 @@ static void resize_is_the_area_mean(void **state)
     }
 }
 
+/* Blender's synthetic scenes: two files, names without endings, one angle for all. */
+static void blender_folder(void **state)
+{
+    const char *folder = *state;
+    static const char form[] = "{\"camera_angle_x\": 0.7853981633974483, \"frames\": [{\"file_path\": \"./%s/r_0\", \"transform_matrix\": "
+                               "[[1,0,0,%d],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]}";
+    static const char *const sets[] = {"train", "val", "test"};
+    scene s;
+    for (int i = 0; i < 3; i++) {
+        char text[512], name[64];
+        snprintf(name, sizeof name, "%s/r_0.png", sets[i]);
+        write_picture(folder, name, 8, 6);
+        snprintf(name, sizeof name, "transforms_%s.json", sets[i]);
+        snprintf(text, sizeof text, form, sets[i], i);
+        write_text(folder, name, text);
+        must(scene_load(folder, NULL, &s, &err));
+        assert_string_equal(s.source, "blender");
+        assert_int_equal(s.has_split, i > 0);
+        assert_int_equal(s.view_count, i == 0 ? 1 : 2);
+        for (size_t v = 0; v < s.view_count; v++) {
+            const bool is_train = strcmp(s.views[v].name, "train/r_0") == 0;
+            assert_int_equal(s.views[v].is_test, i > 0 && !is_train);
+            assert_int_equal(s.views[v].alpha, SCENE_ALPHA_BLACK);
+        }
+        if (i > 0)
+            assert_string_equal(s.views[i == 1].name, i == 1 ? "val/r_0" : "test/r_0");
+        assert_true(fabs(s.views[0].camera.params[0] - 4 / tan(0.39269908169872414)) < 1e-12 && s.views[0].camera.params[3] == 3);
+        must(scene_set_alpha(&s, "auto", &err));
+        assert_int_equal(s.views[0].alpha, SCENE_ALPHA_WHITE);
+        scene_free(&s);
+    }
+    /* Another split replaces the data set's. */
+    must(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_NONE}, &s, &err));
+    assert_int_equal(count_tests(&s), 0);
+    scene_free(&s);
+    /* By its name a file is a data set like any other. */
+    must(scene_load(inside(folder, "transforms_test.json", 0), NULL, &s, &err));
+    assert_string_equal(s.source, "transforms");
+    assert_int_equal(s.view_count, 1);
+    scene_free(&s);
+}
+
+/* nerfstudio's mask_path and train_filenames; instant-ngp's x_fov. */
+static void transforms_masks_and_split(void **state)
+{
+    const char *folder = *state;
+    static const char form[] = "{\"x_fov\": 45, \"train_filenames\": [\"./b.png\"], \"frames\": ["
+                               "{\"file_path\": \"a.png\", \"mask_path\": %s, \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
+                               "{\"file_path\": \"b.png\", \"transform_matrix\": [[1,0,0,11],[0,1,0,22],[0,0,1,33],[0,0,0,1]]}]}";
+    static const struct { const char *mask; gbt_status status; const char *says; } cases[] = {
+        {"\"m.png\"", GBT_OK, ""},
+        {"null", GBT_OK, ""},
+        {"\"none.png\"", GBT_ERR_IO, "frame 0: mask is missing"},
+        {"\"../m.png\"", GBT_ERR_FORMAT, "'..'"},
+        {"7", GBT_ERR_FORMAT, "mask_path: wanted a string"},
+    };
+    write_picture(folder, "a.png", 8, 6);
+    write_picture(folder, "b.png", 8, 6);
+    write_picture(folder, "m.png", 8, 6);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char text[1024];
+        snprintf(text, sizeof text, form, cases[i].mask);
+        write_text(folder, "transforms.json", text);
+        scene s;
+        gbt_error err = {0};
+        const gbt_status status = scene_load(folder, NULL, &s, &err);
+        check_message(status, &err);
+        if (status != cases[i].status || strstr(err.text, cases[i].says) == NULL)
+            fail_msg("%s: status %d: %s", cases[i].mask, (int)status, err.text);
+        if (status == GBT_OK) {
+            assert_int_equal(s.views[0].mask_path != NULL, i == 0);
+            assert_null(s.views[1].mask_path);
+            assert_true(s.views[0].is_test && !s.views[1].is_test);
+            assert_true(fabs(s.views[0].camera.params[0] - 4 / tan(0.39269908169872414)) < 1e-9);
+        }
+        scene_free(&s);
+    }
+    static const struct { const char *list, *says; } bad[] = {{"7", "train_filenames: wanted a list"}, {"[7]", "entry 0 is not a string"},
+                                                             {"[]", "all 1 views are held out"}};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        char text[512];
+        snprintf(text, sizeof text, "{\"x_fov\": 45, \"train_filenames\": %s, \"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": "
+                 "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}", bad[i].list);
+        write_text(folder, "transforms.json", text);
+        scene s;
+        gbt_error err = {0};
+        assert_int_not_equal(scene_load(folder, NULL, &s, &err), GBT_OK);
+        if (strstr(err.text, bad[i].says) == NULL)
+            fail_msg("%s", err.text);
+    }
+}
+
 static void photos(void **state)
 {
     const char *folder = *state;
@@ -545,6 +664,58 @@ static void photo_alpha_and_nan(void **state)
     static const float cleaned[6] = {0.5f, 0, 0, 0.25f, 0.5f, 0.75f};
     assert_memory_equal(im.pixels, cleaned, sizeof cleaned);
     image_free(&im);
+}
+
+/* A mask of 0 and 1, of 0 and 255, lossy, half the size; alpha as a mask, on white; and what is no mask. */
+static void masked_photos(void **state)
+{
+    const char *folder = *state;
+    char photo[4096], mask_path[4096];
+    snprintf(photo, sizeof photo, "%s/p.png", folder);
+    snprintf(mask_path, sizeof mask_path, "%s/m.exr", folder);
+    image im;
+    must(image_alloc(&im, 4, 2, 4, &err));
+    for (int i = 0; i < 8; i++)
+        for (int c = 0; c < 4; c++)
+            im.pixels[4 * i + c] = c < 3 ? 0.2f : i == 5 ? 0.4f : 1;
+    must(image_write(photo, &im, &err));
+    image_free(&im);
+    static const struct { int width, height; float values[8]; scene_alpha alpha; unsigned valid; } cases[] = {
+        {4, 2, {1, 0, 1, 1, 1, 1, 0, 1}, SCENE_ALPHA_BLACK, 0xbd},
+        {4, 2, {0.004f, 0, 0.004f, 0.004f, 0.004f, 0.004f, 0, 0.004f}, SCENE_ALPHA_BLACK, 0xbd},
+        {4, 2, {0.97f, 0.04f, 1, 0.5f, 0.99f, 0.6f, 0.49f, 1}, SCENE_ALPHA_BLACK, 0xbd},
+        {4, 2, {1, 0, 1, 1, 1, 1, 0, 1}, SCENE_ALPHA_MASK, 0x9d},
+        {4, 2, {0}, SCENE_ALPHA_BLACK, 0},
+        {2, 1, {1, 0}, SCENE_ALPHA_WHITE, 0x33},
+        {0, 0, {0}, SCENE_ALPHA_MASK, 0xdf}, /* no mask */
+        {0, 0, {0}, SCENE_ALPHA_WHITE, 0xff},
+        {2, 8, {0}, SCENE_ALPHA_WHITE, 0x100}, /* another aspect */
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        scene_view view = {.name = photo, .path = photo, .alpha = cases[k].alpha, .camera = {.width = 4, .height = 2}};
+        if (cases[k].width > 0) {
+            must(image_alloc(&im, cases[k].width, cases[k].height, 1, &err));
+            for (int i = 0; i < cases[k].width * cases[k].height; i++)
+                im.pixels[i] = i < 8 ? cases[k].values[i] : 0;
+            must(image_write(mask_path, &im, &err));
+            image_free(&im);
+            view.mask_path = mask_path;
+        }
+        unsigned char *valid;
+        gbt_error err = {0};
+        const gbt_status status = scene_read_photo_valid(&view, 4, 2, &im, &valid, &err);
+        check_message(status, &err);
+        assert_int_equal(status, cases[k].valid == 0x100 ? GBT_ERR_FORMAT : GBT_OK);
+        for (unsigned i = 0; i < 8 && status == GBT_OK; i++)
+            if ((valid == NULL || valid[i]) != (cases[k].valid >> i & 1))
+                fail_msg("case %zu, pixel %u", k, i);
+        if (status == GBT_OK) {
+            const float want = cases[k].alpha == SCENE_ALPHA_BLACK ? 0.08f : cases[k].alpha == SCENE_ALPHA_WHITE ? 0.68f : 0.2f;
+            assert_true(fabsf(im.pixels[3 * 5] - want) < 1e-6f && fabsf(im.pixels[0] - 0.2f) < 1e-6f);
+        }
+        mem_free(valid);
+        image_free(&im);
+    }
 }
 
 typedef struct real_case {
@@ -655,11 +826,15 @@ int main(void)
         cmocka_unit_test_setup_teardown(folder_layouts, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(binary_is_preferred, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(missing_photos, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(masks_are_found, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(nothing_to_load, make_temporary, remove_temporary),
         cmocka_unit_test(too_long_path),
         cmocka_unit_test(parse_split),
         cmocka_unit_test_setup_teardown(splits, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_folder, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(blender_folder, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(transforms_masks_and_split, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(masked_photos, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(origin_is_the_median, make_temporary, remove_temporary),
         cmocka_unit_test(extent_is_positive),
         cmocka_unit_test_setup_teardown(no_memory, make_temporary, remove_temporary),

@@ -222,7 +222,7 @@ static void missing_frames_are_counted(void **state)
     char *points_name = NULL;
     must(read_json(text, strlen(text), &raw, &points_name, &err));
     assert_int_equal(raw.view_count, 1);
-    assert_int_equal(raw.frames_missing, 2);
+    assert_int_equal(raw.photos_missing, 2);
     assert_string_equal(points_name, "p.ply");
     mem_free(points_name);
     raw_free(&raw);

@@ -4,7 +4,9 @@
 
 #include "base/file.h"
 #include "base/memory.h"
+#include "data/scene.h"
 #include "eval/ball_mesh.h"
+#include "eval/expect.h"
 #include "eval/json_out.h"
 #include "gbtrace/info.h"
 #include "gbtrace/init.h"
@@ -95,6 +97,27 @@ static void info_of_a_cloud(void **state)
         assert_true(json_number_value(json_array_get(json_array_get(box, 1), k)) == 1e6 + 3);
     }
     json_decref(value);
+}
+
+/* What runs of 42 s took (docs/training.md), within a factor of 1.5. plush at 3/4 of its width and height. */
+static void expectations_hold(void **state)
+{
+    (void)state;
+    static const struct { const char *data; double downscale, bytes, step_seconds; } runs[] = {
+        {"data/fox", 1, 319.8e6, 41.72 / 1161}, {"data/plush", 1.33333, 338.3e6, 41.91 / 1483}, {"data/castle", 1, 348.0e6, 41.74 / 1410}};
+    for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
+        const char *path = shared_path(runs[i].data);
+        if (path == NULL)
+            skip();
+        scene s;
+        assert_ok(scene_load(path, NULL, &s, NULL));
+        const expectation e = expect_training(&s, runs[i].downscale, 2);
+        print_message("%s: %.2f of the memory, %.2f of the time\n", runs[i].data, e.bytes / runs[i].bytes, e.step_seconds / runs[i].step_seconds);
+        assert_true(e.bytes < 1.5 * runs[i].bytes && e.bytes > runs[i].bytes / 1.5);
+        assert_true(e.step_seconds < 1.5 * runs[i].step_seconds && e.step_seconds > runs[i].step_seconds / 1.5);
+        assert_true(e.score_seconds > 0);
+        scene_free(&s);
+    }
 }
 
 static void info_of_a_model(void **state)
@@ -314,6 +337,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(info_of_a_cloud),
+        cmocka_unit_test(expectations_hold),
         cmocka_unit_test(info_of_a_model),
         cmocka_unit_test(info_writes_nothing_when_it_fails),
         cmocka_unit_test(init_counts),

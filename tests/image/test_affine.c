@@ -97,10 +97,34 @@ static void a_fit_finds_the_matrix(void **state)
     for (int i = 0; i < 40 * 30; i++) /* outside the columns that count */
         if (i % 40 < 10 || i % 40 >= 30)
             to.pixels[3 * i] = 77;
-    affine_fit(&from, &to, 10, 30, got);
+    affine_fit(&from, &to, NULL, 10, 30, got);
     for (int k = 0; k < AFFINE_NUMBERS; k++)
         assert_near((double)got[k], (double)m[k], 3e-5); /* the pull to the identity is 1e-6 against variances of 1/12 */
     image_free(&from), image_free(&to);
+}
+
+static void masked_pixels_are_not_fitted(void **state)
+{
+    (void)state;
+    enum { WIDTH = 20, HEIGHT = 8 };
+    float m[AFFINE_NUMBERS], got[AFFINE_NUMBERS];
+    unsigned char valid[WIDTH * HEIGHT];
+    fill_matrix(m, 31);
+    image from = make_noise(WIDTH, HEIGHT, 3, 32), to = make_image(WIDTH, HEIGHT, 3);
+    affine_apply(m, &from, &to);
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
+        valid[i] = i % 3 != 0;
+        if (!valid[i])
+            to.pixels[3 * i + 2] = 9;
+    }
+    affine_fit(&from, &to, valid, 0, WIDTH, got);
+    for (int k = 0; k < AFFINE_NUMBERS; k++)
+        assert_near((double)got[k], (double)m[k], 3e-4);
+    affine_half half;
+    assert_ok(affine_split(&from, &to, valid, &half, NULL));
+    for (int y = 0; y < HEIGHT; y++)
+        assert_memory_equal(half.valid + y * WIDTH / 2, valid + y * WIDTH + WIDTH / 2, WIDTH / 2);
+    affine_half_free(&half), image_free(&from), image_free(&to);
 }
 
 /* Pictures that say little leave the identity as it is, or the nearest matrix that explains them; nothing is ever not finite. */
@@ -114,7 +138,7 @@ static void poor_pictures_fit_too(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         image from = make_constant(8, 6, cases[i].from), to = make_constant(8, 6, cases[i].to);
         float m[AFFINE_NUMBERS], identity[AFFINE_NUMBERS];
-        affine_fit(&from, &to, cases[i].begin, cases[i].end, m);
+        affine_fit(&from, &to, NULL, cases[i].begin, cases[i].end, m);
         affine_identity(identity);
         for (int k = 0; k < AFFINE_NUMBERS; k++)
             assert_near((double)m[k], (double)identity[k], (double)cases[i].identity_error + 1e-9);
@@ -128,13 +152,14 @@ static void halves(void **state)
     enum { WIDTH = 21, HEIGHT = 9, RIGHT = 11 };
     float m[AFFINE_NUMBERS];
     fill_matrix(m, 21);
-    image render = make_noise(WIDTH, HEIGHT, 3, 22), photo = make_image(WIDTH, HEIGHT, 3), render_right, photo_right;
+    image render = make_noise(WIDTH, HEIGHT, 3, 22), photo = make_image(WIDTH, HEIGHT, 3);
+    affine_half right_half;
     affine_apply(m, &render, &photo);
     for (int i = 0; i < WIDTH * HEIGHT; i++) /* the right half shows something else: it must not be fitted to */
         if (i % WIDTH >= WIDTH / 2)
             photo.pixels[3 * i + 1] = 5;
-    assert_ok(affine_split(&render, &photo, &render_right, &photo_right, NULL));
-    assert_true(render_right.width == RIGHT && photo_right.width == RIGHT && render_right.height == HEIGHT && photo_right.height == HEIGHT);
+    assert_ok(affine_split(&render, &photo, NULL, &right_half, NULL));
+    assert_true(right_half.render.width == RIGHT && right_half.photo.width == RIGHT && right_half.render.height == HEIGHT && right_half.photo.height == HEIGHT);
     for (int y = 0; y < HEIGHT; y++)
         for (int x = 0; x < WIDTH; x++)
             for (int c = 0; c < 3; c++) {
@@ -142,18 +167,18 @@ static void halves(void **state)
                 if (x < WIDTH / 2)
                     assert_near((double)render.pixels[at], (double)photo.pixels[at], 1e-4);
                 else
-                    assert_true(render_right.pixels[right] == render.pixels[at] && photo_right.pixels[right] == photo.pixels[at]);
+                    assert_true(right_half.render.pixels[right] == render.pixels[at] && right_half.photo.pixels[right] == photo.pixels[at]);
             }
-    image_free(&render_right), image_free(&photo_right), image_free(&render), image_free(&photo);
+    affine_half_free(&right_half), image_free(&render), image_free(&photo);
 
     image thin = make_noise(1, 3, 3, 1), same = make_noise(1, 3, 3, 1); /* no left half: the identity */
-    assert_ok(affine_split(&thin, &same, &render_right, &photo_right, NULL));
+    assert_ok(affine_split(&thin, &same, NULL, &right_half, NULL));
     assert_memory_equal(thin.pixels, same.pixels, 9 * sizeof(float));
-    assert_int_equal(render_right.width, 1);
-    image_free(&render_right), image_free(&photo_right), image_free(&thin);
+    assert_int_equal(right_half.render.width, 1);
+    affine_half_free(&right_half), image_free(&thin);
     image other = make_image(2, 3, 3);
-    assert_int_equal(affine_split(&other, &same, &render_right, &photo_right, NULL), GBT_ERR_ARGUMENT);
-    assert_null(render_right.pixels);
+    assert_int_equal(affine_split(&other, &same, NULL, &right_half, NULL), GBT_ERR_ARGUMENT);
+    assert_null(right_half.render.pixels);
     image_free(&same), image_free(&other);
 }
 
@@ -165,6 +190,7 @@ int main(void)
         cmocka_unit_test(threads_give_the_same_bits),
         cmocka_unit_test(a_fit_finds_the_matrix),
         cmocka_unit_test(poor_pictures_fit_too),
+        cmocka_unit_test(masked_pixels_are_not_fitted),
         cmocka_unit_test(halves),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -290,6 +290,44 @@ static void same_bits_for_threads_and_instructions(void **state)
     image_free(&a), image_free(&b);
 }
 
+/* PSNR by hand; SSIM and FLIP do not see what is masked, and equal the plain ones without a mask. */
+static void masked_scores(void **state)
+{
+    (void)state;
+    enum { WIDTH = 40, HEIGHT = 30, COUNT = WIDTH * HEIGHT };
+    image a = make_noise(WIDTH, HEIGHT, 3, 1), b = make_noise(WIDTH, HEIGHT, 3, 2), map = make_image(WIDTH, HEIGHT, 1);
+    unsigned char valid[COUNT], none[COUNT] = {0}, all[COUNT];
+    memset(all, 1, COUNT);
+    for (int i = 0; i < COUNT; i++)
+        valid[i] = i % WIDTH >= 7 && (i / WIDTH) % 5 != 0;
+    image_scores plain, whole, masked, again;
+    assert_ok(image_score(&a, &b, NULL, NULL, &plain, NULL));
+    assert_ok(image_score(&a, &b, all, NULL, &whole, NULL));
+    assert_near(whole.psnr, plain.psnr, 0);
+    assert_near(whole.ssim, plain.ssim, 1e-12);
+    assert_near(whole.flip, plain.flip, 1e-7); /* the map is float */
+    assert_ok(image_score(&a, &b, valid, &map, &masked, NULL));
+    double square = 0, flip = 0;
+    int count = 0;
+    for (int i = 0; i < COUNT; i++) {
+        for (int c = 0; c < 3 && valid[i]; c++)
+            square += pow((double)a.pixels[3 * i + c] - (double)b.pixels[3 * i + c], 2);
+        count += valid[i];
+        flip += (double)map.pixels[i];
+        assert_true(valid[i] ? map.pixels[i] > 0 : map.pixels[i] == 0);
+    }
+    assert_near(masked.psnr, -10 * log10(square / (3 * count)), 1e-12);
+    assert_near(masked.flip, flip / count, 1e-12);
+    for (int i = 0; i < COUNT; i++)
+        for (int c = 0; c < 3 && !valid[i]; c++)
+            a.pixels[3 * i + c] = 0.9f, b.pixels[3 * i + c] = 0.1f;
+    assert_ok(image_score(&a, &b, valid, NULL, &again, NULL));
+    assert_memory_equal(&again, &masked, sizeof masked);
+    assert_ok(image_score(&a, &b, none, &map, &masked, NULL));
+    assert_true(isnan(masked.psnr) && isnan(masked.ssim) && isnan(masked.flip));
+    image_free(&a), image_free(&b), image_free(&map);
+}
+
 int main(void)
 {
     enum { GOLDEN_COUNT = sizeof golden_cases / sizeof *golden_cases };
@@ -302,6 +340,7 @@ int main(void)
         cmocka_unit_test(flip_properties),
         cmocka_unit_test(flip_refusals),
         cmocka_unit_test(same_bits_for_threads_and_instructions),
+        cmocka_unit_test(masked_scores),
     };
     struct CMUnitTest tests[GOLDEN_COUNT + sizeof others / sizeof *others];
     size_t count = 0;

@@ -543,7 +543,7 @@ static void a_vanished_photo_is_named(void **state)
 
     gbt_train_def on = gbt_train_def_default();
     on.resume = true;
-    train_fails(data, run, &on, GBT_ERR_IO, strrchr(photo, '/') + 1);
+    train_fails(data, run, &on, GBT_ERR_FORMAT, strrchr(photo, '/') + 1);
     bytes after = read_bytes(in_root("vanished/checkpoints/last.gbt"));
     assert_int_equal(before.count, after.count);
     assert_memory_equal(before.data, after.data, before.count);

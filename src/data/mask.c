@@ -1,0 +1,79 @@
+/* data/mask.c -- masks and alpha channels to marks of pixels. */
+#include "data/mask.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "data/photo.h"
+
+/* valid = valid and marks; `marks` is taken over or freed. */
+static void combine(unsigned char *marks, size_t count, unsigned char **valid)
+{
+    if (*valid == NULL) {
+        *valid = marks;
+        return;
+    }
+    for (size_t i = 0; i < count; i++)
+        (*valid)[i] = (*valid)[i] && marks[i];
+    mem_free(marks);
+}
+
+/* 1 where `channel` has at least `least`. */
+static gbt_status mark_pixels(const image *im, size_t channel, float least, unsigned char **out, gbt_error *err)
+{
+    const size_t count = (size_t)im->width * (size_t)im->height, channels = (size_t)im->channels;
+    *out = mem_alloc(count, 1, "valid pixels", err);
+    if (*out == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < count; i++)
+        (*out)[i] = im->pixels[i * channels + channel] >= least;
+    return GBT_OK;
+}
+
+static float half_of_largest(const image *im)
+{
+    float largest = 0;
+    for (size_t i = 0; i < (size_t)im->width * (size_t)im->height; i++)
+        largest = fmaxf(largest, im->pixels[i * (size_t)im->channels]);
+    return largest > 0 ? 0.5f * largest : 1; /* a black mask leaves nothing */
+}
+
+static gbt_status read_marks(const char *path, const image *photo, unsigned char **out, gbt_error *err)
+{
+    image mask;
+    GBT_TRY(image_read(path, &mask, err));
+    gbt_status status = GBT_OK;
+    if (!photo_same_aspect(mask.width, mask.height, photo->width, photo->height))
+        status = base_fail(err, GBT_ERR_FORMAT, "%s: mask does not have the photo's aspect (wanted %d x %d or a multiple, got %d x %d)", path,
+                           photo->width, photo->height, mask.width, mask.height);
+    if (status == GBT_OK)
+        status = mark_pixels(&mask, 0, half_of_largest(&mask), out, err);
+    if (status == GBT_OK && (mask.width != photo->width || mask.height != photo->height)) {
+        unsigned char *stored = *out;
+        status = photo_resize_valid(stored, mask.width, mask.height, photo->width, photo->height, out, err);
+        mem_free(stored);
+    }
+    image_free(&mask);
+    return status;
+}
+
+gbt_status mask_apply(const scene_view *view, const image *stored, unsigned char **valid, gbt_error *err)
+{
+    const size_t count = (size_t)stored->width * (size_t)stored->height;
+    unsigned char *marks = NULL;
+    if (view->alpha == SCENE_ALPHA_MASK && stored->channels == 4) {
+        GBT_TRY(mark_pixels(stored, 3, 0.5f, &marks, err));
+        combine(marks, count, valid);
+    }
+    if (view->mask_path == NULL)
+        return GBT_OK;
+    marks = NULL;
+    const gbt_status status = read_marks(view->mask_path, stored, &marks, err);
+    if (status == GBT_OK)
+        combine(marks, count, valid);
+    else
+        mem_free(marks);
+    return status;
+}

@@ -1,0 +1,47 @@
+/* data/result_folder.c -- find the newest iteration, read the settings that matter. */
+#include "data/result_folder.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/memory.h"
+
+/* The text behind "key='", up to the next quote, of Python's Namespace(...). */
+static void find_text(const char *text, const char *key, char *out, size_t size)
+{
+    const char *at = strstr(text, key), *end = at == NULL ? NULL : strchr(at + strlen(key), '\'');
+    if (end != NULL && (size_t)(end - at) - strlen(key) < size)
+        snprintf(out, size, "%.*s", (int)((size_t)(end - at) - strlen(key)), at + strlen(key));
+}
+
+static gbt_status read_settings(const char *folder, result_folder *out, gbt_error *err)
+{
+    char path[RESULT_PATH_SIZE];
+    unsigned char *bytes;
+    size_t size;
+    GBT_TRY(file_join(path, sizeof path, folder, "cfg_args", err));
+    if (!file_exists(path))
+        return GBT_OK;
+    GBT_TRY(file_read(path, &bytes, &size, err));
+    find_text((const char *)bytes, "source_path='", out->source, sizeof out->source);
+    out->white_background = strstr((const char *)bytes, "white_background=True") != NULL;
+    mem_free(bytes);
+    return GBT_OK;
+}
+
+gbt_status result_folder_find(const char *folder, result_folder *out, bool *found, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    *found = false;
+    char clouds[RESULT_PATH_SIZE], name[64];
+    GBT_TRY(file_join(clouds, sizeof clouds, folder, "point_cloud", err));
+    if (!file_largest_number(clouds, "iteration_", &out->iteration))
+        return GBT_OK;
+    snprintf(name, sizeof name, "iteration_%lu/point_cloud.ply", out->iteration);
+    GBT_TRY(file_join(out->ply, sizeof out->ply, clouds, name, err));
+    GBT_TRY(file_join(clouds, sizeof clouds, folder, "model.gbt", err));
+    *found = file_exists(out->ply) && !file_exists(clouds); /* a run of ours may have such a folder beside its model */
+    return *found ? read_settings(folder, out, err) : GBT_OK;
+}

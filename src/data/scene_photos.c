@@ -1,0 +1,106 @@
+/* data/scene_photos.c -- photos and masks by their names, and what their transparent parts are. */
+#include "data/scene_photos.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/memory.h"
+#include "data/scene.h"
+
+enum { PATH_SIZE = RAW_NAME_LIMIT + 4096 };
+
+static bool is_file(const char *path)
+{
+    return file_exists(path) && !file_is_folder(path);
+}
+
+/* A copy of folder/name in `out` when that is a file; else `out` stays. */
+static gbt_status take_file(const char *folder, const char *name, char **out, gbt_error *err)
+{
+    char path[PATH_SIZE];
+    GBT_TRY(file_join(path, sizeof path, folder, name, err));
+    if (!is_file(path))
+        return GBT_OK;
+    *out = raw_copy_text(path, strlen(path), err);
+    return *out != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+}
+
+static gbt_status find_mask(const char *masks, raw_view *view, gbt_error *err)
+{
+    char name[RAW_NAME_LIMIT + 8];
+    snprintf(name, sizeof name, "%s.png", view->name);
+    GBT_TRY(take_file(masks, name, &view->mask_path, err));
+    if (view->mask_path == NULL)
+        GBT_TRY(take_file(masks, view->name, &view->mask_path, err));
+    const char *dot = strrchr(view->name, '.');
+    if (view->mask_path != NULL || dot == NULL || strchr(dot, '/') != NULL)
+        return GBT_OK;
+    snprintf(name, sizeof name, "%.*s.png", (int)(dot - view->name), view->name);
+    return take_file(masks, name, &view->mask_path, err);
+}
+
+static gbt_status find_files(const char *folder, const char *images, const char *masks, raw_view *view, gbt_error *err)
+{
+    GBT_TRY(take_file(images, view->name, &view->path, err));
+    if (view->path == NULL)
+        GBT_TRY(take_file(folder, view->name, &view->path, err));
+    return masks == NULL || view->path == NULL ? GBT_OK : find_mask(masks, view, err);
+}
+
+gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
+{
+    char images[PATH_SIZE], masks[PATH_SIZE];
+    GBT_TRY(file_join(images, sizeof images, folder, "images", err));
+    GBT_TRY(file_join(masks, sizeof masks, folder, "masks", err));
+    const bool has_masks = file_is_folder(masks);
+    size_t kept = 0;
+    gbt_status status = GBT_OK;
+    for (size_t i = 0; i < raw->view_count && status == GBT_OK; i++) {
+        raw_view view = raw->views[i];
+        status = find_files(folder, images, has_masks ? masks : NULL, &view, err);
+        if (view.path == NULL)
+            raw_count_missing(raw, view.name);
+        raw->views[i] = raw->views[kept]; /* what is left out goes behind, where raw_free() finds it */
+        raw->views[kept] = view;
+        kept += view.path != NULL;
+    }
+    GBT_TRY(status);
+    if (kept == 0)
+        return base_fail(err, GBT_ERR_IO, "%s: all %zu photos are missing: %s", images, raw->view_count, raw->missing_names);
+    for (size_t i = kept; i < raw->view_count; i++)
+        raw_view_free(&raw->views[i]);
+    raw->view_count = kept;
+    return GBT_OK;
+}
+
+/* ---- what is transparent ---------------------------------------------------------------------------------------------------------------- */
+
+gbt_status scene_set_alpha(scene *s, const char *name, gbt_error *err)
+{
+    static const char *const names[] = {[SCENE_ALPHA_BLACK] = "black", [SCENE_ALPHA_WHITE] = "white", [SCENE_ALPHA_MASK] = "mask"};
+    int alpha = strcmp(name, "auto") == 0 ? (strcmp(s->source, "blender") == 0 ? SCENE_ALPHA_WHITE : SCENE_ALPHA_BLACK) : -1;
+    for (int i = 0; i < 3; i++)
+        if (strcmp(name, names[i]) == 0)
+            alpha = i;
+    if (alpha < 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--alpha: \"%.40s\" (wanted auto, black, white or mask)", name);
+    for (size_t i = 0; i < s->view_count; i++)
+        s->views[i].alpha = (scene_alpha)alpha;
+    return GBT_OK;
+}
+
+bool scene_background(const scene *s, float color[3])
+{
+    for (size_t i = 0; i < s->view_count; i++) {
+        const scene_view *view = &s->views[i];
+        int width, height, channels;
+        if (view->is_test || view->alpha == SCENE_ALPHA_MASK || image_probe(view->path, &width, &height, &channels, NULL) != GBT_OK || channels != 4)
+            continue;
+        for (int c = 0; c < 3; c++)
+            color[c] = view->alpha == SCENE_ALPHA_WHITE;
+        return true;
+    }
+    return false;
+}

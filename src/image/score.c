@@ -1,0 +1,89 @@
+/* image/score.c -- a picture against a photo: all three measures, over the pixels that mean something. */
+#include "image/metrics.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "image/affine.h"
+
+static gbt_status copy_masked(const image *in, const unsigned char *valid, image *out, gbt_error *err)
+{
+    GBT_TRY(image_alloc(out, in->width, in->height, in->channels, err));
+    const size_t channels = (size_t)in->channels;
+    for (size_t i = 0; i < (size_t)in->width * (size_t)in->height; i++)
+        for (size_t c = 0; c < channels; c++)
+            out->pixels[channels * i + c] = valid[i] ? in->pixels[channels * i + c] : 0;
+    return GBT_OK;
+}
+
+/* The mean of the map where it is valid; elsewhere it becomes 0, since what a filter carries there is nobody's error. */
+static double masked_mean(image *map, const unsigned char *valid)
+{
+    double sum = 0;
+    size_t count = 0;
+    for (size_t i = 0; i < (size_t)map->width * (size_t)map->height; i++) {
+        count += valid[i] != 0;
+        sum += valid[i] ? (double)map->pixels[i] : 0;
+        if (!valid[i])
+            map->pixels[i] = 0;
+    }
+    return sum / (double)count;
+}
+
+static gbt_status score_masked(const image *a, const image *photo, const unsigned char *valid, image *flip_map, image_scores *out, gbt_error *err)
+{
+    image seen[2] = {{0}}, map = {0}, gradient = {0};
+    loss_scratch scratch = {0};
+    image_loss_result loss;
+    gbt_status status = copy_masked(a, valid, &seen[0], err);
+    if (status == GBT_OK)
+        status = copy_masked(photo, valid, &seen[1], err);
+    if (status == GBT_OK)
+        status = image_alloc(&gradient, a->width, a->height, 3, err);
+    if (status == GBT_OK)
+        status = image_loss(a, photo, valid, 1, &scratch, &gradient, &loss, err); /* it knows how to leave pixels out of SSIM's windows */
+    if (status == GBT_OK && flip_map == NULL)
+        status = image_alloc(&map, a->width, a->height, 1, err);
+    image *const used = flip_map != NULL ? flip_map : &map;
+    if (status == GBT_OK)
+        status = metric_flip(&seen[0], &seen[1], &out->flip, used, err);
+    if (status == GBT_OK) {
+        out->psnr = metric_psnr_valid(a, photo, valid);
+        out->ssim = isfinite(out->psnr) ? loss.ssim : (double)NAN;
+        out->flip = masked_mean(used, valid);
+    }
+    loss_scratch_free(&scratch);
+    image *const all[] = {&seen[0], &seen[1], &map, &gradient};
+    for (int i = 0; i < 4; i++)
+        image_free(all[i]);
+    return status;
+}
+
+gbt_status image_score(const image *a, const image *photo, const unsigned char *valid, image *flip_map, image_scores *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    if (valid != NULL)
+        return score_masked(a, photo, valid, flip_map, out, err);
+    out->psnr = metric_psnr(a, photo);
+    out->ssim = metric_ssim(a, photo);
+    return metric_flip(a, photo, &out->flip, flip_map, err);
+}
+
+gbt_status image_score_photo(image *render, image *photo, const unsigned char *valid, bool exposure, image *flip_map, image_scores *out, gbt_error *err)
+{
+    image_scores whole;
+    if (exposure) {
+        affine_half right;
+        GBT_TRY(affine_split(render, photo, valid, &right, err));
+        image_quantize(&right.render);
+        image_quantize(&right.photo);
+        const gbt_status status = image_score(&right.render, &right.photo, right.valid, NULL, out, err);
+        affine_half_free(&right);
+        GBT_TRY(status);
+    }
+    image_quantize(render);
+    image_quantize(photo);
+    return exposure && flip_map == NULL ? GBT_OK : image_score(render, photo, valid, flip_map, exposure ? &whole : out, err);
+}

@@ -1,0 +1,91 @@
+// Gaussians written by gbtrace export, read by splat-transform and glTF-Transform: counts and every attribute. See test_readers.sh.
+import {execFileSync} from "node:child_process";
+import fs from "node:fs";
+import os from "node:os";
+import path from "node:path";
+
+import {attributes, columns} from "./count.mjs";
+
+const program = process.argv[2], COUNT = 200;
+const folder = fs.mkdtempSync(path.join(os.tmpdir(), "gbt_readers_"));
+let failures = 0, state = 1;
+
+function random() { // the same numbers everywhere
+    state = (state * 48271) % 2147483647;
+    return state / 2147483647;
+}
+
+function check(what, worst, limit) {
+    console.log(`${worst <= limit ? "ok" : "FAILED"}: ${what}: ${worst.toPrecision(3)} (limit ${limit})`);
+    failures += !(worst <= limit);
+}
+
+const names = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", ...Array.from({length: 45}, (_, i) => `f_rest_${i}`), "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"];
+const rows = Array.from({length: COUNT}, () => {
+    const quaternion = Array.from({length: 4}, () => 2 * random() - 1), length = Math.hypot(...quaternion);
+    return names.map((name) => name.startsWith("rot_") ? quaternion[Number(name[4])] / length : name.startsWith("scale_") ? -4 * random() - 1
+        : name === "opacity" ? 8 * random() - 4 : name.startsWith("f_") ? 1.6 * random() - 0.8 : 20 * random() - 10);
+});
+const value = (i, name) => rows[i][names.indexOf(name)];
+const source = path.join(folder, "source.ply");
+const data = new Float32Array(rows.flat());
+fs.writeFileSync(source, Buffer.concat([Buffer.from(`ply\nformat binary_little_endian 1.0\nelement vertex ${COUNT}\n${names.map((n) => `property float ${n}\n`).join("")}end_header\n`),
+    Buffer.from(data.buffer)]));
+const files = ["out.ply", "out.splat", "out.spz", "out.glb"].map((name) => path.join(folder, name));
+execFileSync(program, ["export", source, ...files], {stdio: "ignore"});
+
+// Readers may put Gaussians in another order: partners are those of the nearest place.
+function partners(place) {
+    return Array.from({length: COUNT}, (_, j) => rows.reduce((best, row, i) => {
+        const distance = Math.hypot(...place(j).map((x, k) => x - row[k]));
+        return distance < best.distance ? {distance, i} : best;
+    }, {distance: Infinity, i: -1}));
+}
+
+const alpha = (logit) => 1 / (1 + Math.exp(-logit));
+const limits = {ply: {place: 1e-6, scale: 1e-6, rotation: 1e-6, alpha: 1e-6, dc: 1e-6, rest: 1e-6}, splat: {place: 1e-6, scale: 1e-5, rotation: 0.001, alpha: 0.003, dc: 0.008},
+    spz: {place: 1e-4, scale: 0.032, rotation: 1e-5, alpha: 0.003, dc: 0.014, rest: 0.07}};
+for (const file of files.slice(0, 3)) {
+    const ending = path.extname(file).slice(1), read = columns(file), limit = limits[ending];
+    check(`${ending}: Gaussians missing`, Math.abs(read.rows - COUNT), 0);
+    const get = Object.fromEntries(read.names.map((name) => [name, read.column(name)]));
+    const pairs = partners((j) => [get.x[j], get.y[j], get.z[j]]);
+    const worst = {place: 0, scale: 0, rotation: 0, alpha: 0, dc: 0, rest: 0};
+    pairs.forEach(({distance, i}, j) => {
+        worst.place = Math.max(worst.place, distance);
+        for (let k = 0; k < 3; k++) {
+            worst.scale = Math.max(worst.scale, Math.abs(get[`scale_${k}`][j] - value(i, `scale_${k}`)));
+            const dc = Math.min(Math.max(value(i, `f_dc_${k}`), ending === "splat" ? -1.7724 : -9), ending === "splat" ? 1.7724 : 9);
+            worst.dc = Math.max(worst.dc, Math.abs(get[`f_dc_${k}`][j] - dc));
+        }
+        const q = [0, 1, 2, 3].map((k) => get[`rot_${k}`][j]), length = Math.hypot(...q);
+        worst.rotation = Math.max(worst.rotation, 1 - Math.abs(q.reduce((sum, x, k) => sum + x * value(i, `rot_${k}`), 0)) / length);
+        worst.alpha = Math.max(worst.alpha, Math.abs(alpha(get.opacity[j]) - alpha(value(i, "opacity"))));
+        for (let k = 0; k < 45 && limit.rest; k++)
+            worst.rest = Math.max(worst.rest, Math.abs(get[`f_rest_${k}`][j] - value(i, `f_rest_${k}`)));
+    });
+    for (const [name, most] of Object.entries(limit))
+        check(`${ending}: ${name}`, worst[name], most);
+}
+
+// glTF has y up: half a turn about z.
+const glb = await attributes(files[3]);
+const at = (name, j) => glb[name].getElement(j, []);
+check("glb: Gaussians missing", Math.abs(glb.POSITION.getCount() - COUNT), 0);
+const worst = {place: 0, scale: 0, rotation: 0, alpha: 0, dc: 0, rest: 0};
+partners((j) => [-at("POSITION", j)[0], -at("POSITION", j)[1], at("POSITION", j)[2]]).forEach(({distance, i}, j) => {
+    worst.place = Math.max(worst.place, distance);
+    const turned = [-value(i, "rot_1"), -value(i, "rot_2"), value(i, "rot_3"), value(i, "rot_0")]; // up to the half turn's own axes
+    const q = at("KHR_gaussian_splatting:ROTATION", j);
+    worst.rotation = Math.max(worst.rotation, 1 - Math.abs(q.reduce((sum, x, k) => sum + x * turned[k], 0)));
+    worst.alpha = Math.max(worst.alpha, Math.abs(at("KHR_gaussian_splatting:OPACITY", j)[0] - alpha(value(i, "opacity"))));
+    for (let k = 0; k < 3; k++) {
+        worst.scale = Math.max(worst.scale, Math.abs(Math.log(at("KHR_gaussian_splatting:SCALE", j)[k]) - value(i, `scale_${k}`)));
+        worst.dc = Math.max(worst.dc, Math.abs(at("KHR_gaussian_splatting:SH_DEGREE_0_COEF_0", j)[k] - value(i, `f_dc_${k}`)));
+        worst.rest = Math.max(worst.rest, Math.abs(at("KHR_gaussian_splatting:SH_DEGREE_1_COEF_0", j)[k] + value(i, `f_rest_${15 * k}`)));
+    }
+});
+for (const [name, most] of Object.entries({place: 1e-6, scale: 1e-6, rotation: 1e-6, alpha: 1e-6, dc: 1e-6, rest: 1e-6}))
+    check(`glb: ${name}`, worst[name], most);
+fs.rmSync(folder, {recursive: true});
+process.exit(failures > 0 ? 1 : 0);

@@ -1,0 +1,195 @@
+/* tests/train/test_masks.c -- what a mask or an alpha channel leaves out has no say in training and in scores; what is transparent is the background. */
+#include "run_support.h"
+
+#include <jansson.h>
+
+#include "base/log.h"
+#include "gbtrace/evaluate.h"
+#include "io/model_file.h"
+
+/* Photos of `scene`, changed in place. */
+static void change_photos(const char *folder, void (*change)(image *photo, size_t view))
+{
+    scene s;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(folder, &split, &s, NULL));
+    for (size_t i = 0; i < s.view_count; i++) {
+        image photo;
+        assert_ok(image_read(s.views[i].path, &photo, NULL));
+        change(&photo, i);
+        assert_ok(image_write(s.views[i].path, &photo, NULL));
+        image_free(&photo);
+    }
+    scene_free(&s);
+}
+
+/* The left third, and a block that moves with the view. */
+static bool is_masked(int x, int y, size_t view)
+{
+    const int left = 20 + (int)view;
+    return x < 16 || (x >= left && x < left + 9 && y >= 7 && y < 20);
+}
+
+static float scrambled;
+
+static void scramble(image *photo, size_t view)
+{
+    for (int y = 0; y < photo->height; y++)
+        for (int x = 0; x < photo->width; x++)
+            for (int c = 0; c < 3 && is_masked(x, y, view); c++)
+                photo->pixels[photo->channels * (y * photo->width + x) + c] = (x + y + c) % 2 == 0 ? scrambled : 0;
+}
+
+static void write_mask(const char *folder, const char *name, int width, int height, size_t view)
+{
+    image mask;
+    assert_ok(image_alloc(&mask, width, height, 1, NULL));
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++)
+            mask.pixels[y * width + x] = !is_masked(x, y, view);
+    char path[2 * PATH_SIZE];
+    snprintf(path, sizeof path, "%s/masks/%.60s.png", folder, name);
+    assert_ok(image_write(path, &mask, NULL));
+    image_free(&mask);
+}
+
+static const char *masked_scene(void)
+{
+    const char *folder = in_root("masked");
+    static bool done = false;
+    if (done)
+        return folder;
+    make_tiny_scene(folder);
+    char masks[PATH_SIZE + 8];
+    snprintf(masks, sizeof masks, "%s/masks", folder);
+    assert_ok(file_make_folder(masks, NULL));
+    scene s;
+    assert_ok(scene_load(folder, NULL, &s, NULL));
+    for (size_t i = 0; i < s.view_count; i++)
+        write_mask(folder, s.views[i].name, s.views[i].camera.width, s.views[i].camera.height, i);
+    scene_free(&s);
+    done = true;
+    return folder;
+}
+
+static json_t *scores_of(const char *run)
+{
+    const gbt_evaluate_def score = gbt_evaluate_def_default();
+    assert_ok(gbt_evaluate(run, &score, NULL));
+    char path[PATH_SIZE + 16];
+    snprintf(path, sizeof path, "%s/metrics.json", run);
+    json_t *metrics = json_load_file(path, 0, NULL);
+    assert_non_null(metrics);
+    return metrics;
+}
+
+/* Whatever stands under the masks, the model is the same to the bit, and so are its scores, with and without exposures. */
+static void masked_pixels_have_no_say(void **state)
+{
+    (void)state;
+    for (int exposure = 0; exposure < 2; exposure++) {
+        json_t *metrics[2];
+        const char *runs[2] = {in_root("a%d", exposure), in_root("b%d", exposure)};
+        for (int i = 0; i < 2; i++) {
+            scrambled = (float)i;
+            masked_scene();
+            change_photos(masked_scene(), scramble);
+            gbt_train_def def = run_def();
+            def.exposure = exposure;
+            train_ok(masked_scene(), runs[i], &def);
+            metrics[i] = scores_of(runs[i]);
+        }
+        assert_same_file(in_root("a%d/model.gbt", exposure), in_root("b%d/model.gbt", exposure));
+        static const char *const names[] = {"psnr", "ssim", "flip"};
+        for (int k = 0; k < 3; k++) {
+            const double a = json_real_value(json_object_get(metrics[0], names[k])), b = json_real_value(json_object_get(metrics[1], names[k]));
+            assert_true(a > 0 && a == b);
+        }
+        assert_non_null(strstr(json_string_value(json_object_get(metrics[0], "scored")), "without masked pixels"));
+        json_decref(metrics[0]);
+        json_decref(metrics[1]);
+    }
+}
+
+/* A photo that is masked whole is no score, and no step that fails. */
+static void a_black_mask_leaves_nothing(void **state)
+{
+    (void)state;
+    const char *folder = in_root("black");
+    make_tiny_scene(folder);
+    char masks[PATH_SIZE + 8];
+    snprintf(masks, sizeof masks, "%s/masks", folder);
+    assert_ok(file_make_folder(masks, NULL));
+    scene s;
+    assert_ok(scene_load(folder, NULL, &s, NULL));
+    image black;
+    assert_ok(image_alloc(&black, 48, 36, 1, NULL));
+    memset(black.pixels, 0, 48 * 36 * sizeof *black.pixels);
+    const size_t chosen[] = {0, 1}; /* the first is held out, the second trained on */
+    for (int i = 0; i < 2; i++) {
+        char path[2 * PATH_SIZE];
+        snprintf(path, sizeof path, "%s/%.60s.png", masks, s.views[chosen[i]].name);
+        assert_ok(image_write(path, &black, NULL));
+    }
+    image_free(&black);
+    scene_free(&s);
+    gbt_train_def def = run_def();
+    train_ok(folder, in_root("black_run"), &def);
+    json_t *metrics = scores_of(in_root("black_run"));
+    assert_true(json_is_null(json_object_get(json_array_get(json_object_get(metrics, "views"), 0), "psnr")));
+    assert_true(json_real_value(json_object_get(metrics, "psnr")) > 5);
+    json_decref(metrics);
+}
+
+/* ---- alpha ------------------------------------------------------------------------------------------------------------------------------- */
+
+/* An alpha channel with the shape of the masks; beneath it the colour stays. */
+static void cut_out(image *photo, size_t view)
+{
+    image with_alpha;
+    assert_ok(image_alloc(&with_alpha, photo->width, photo->height, 4, NULL));
+    for (int i = 0; i < photo->width * photo->height; i++) {
+        memcpy(with_alpha.pixels + 4 * i, photo->pixels + photo->channels * i, 3 * sizeof(float));
+        with_alpha.pixels[4 * i + 3] = is_masked(i % photo->width, i / photo->width, view) ? 0.25f : 1;
+    }
+    image_free(photo);
+    *photo = with_alpha;
+}
+
+static void alpha_is_what_it_is_said_to_be(void **state)
+{
+    (void)state;
+    const char *folder = in_root("alpha");
+    make_tiny_scene(folder);
+    change_photos(folder, cut_out);
+    static const struct { const char *alpha; float background; bool masked; } cases[] = {
+        {"auto", 0, false}, {"black", 0, false}, {"white", 1, false}, {"mask", -1, true}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        gbt_train_def def = run_def();
+        def.alpha = cases[i].alpha;
+        const char *run = in_root("alpha_%s", cases[i].alpha);
+        train_ok(folder, run, &def);
+        json_t *metrics = scores_of(run);
+        assert_int_equal(strstr(json_string_value(json_object_get(metrics, "scored")), "masked") != NULL, cases[i].masked);
+        json_decref(metrics);
+        model m;
+        assert_ok(model_load(in_root("alpha_%s/model.gbt", cases[i].alpha), &m, NULL));
+        for (int c = 0; c < 3; c++)
+            assert_true(cases[i].background < 0 ? m.background[c] > 0 && m.background[c] < 1 : m.background[c] == cases[i].background);
+        model_free(&m);
+    }
+    gbt_train_def def = run_def();
+    def.alpha = "green";
+    train_fails(folder, in_root("alpha_green"), &def, GBT_ERR_ARGUMENT, "--alpha: \"green\" (wanted auto, black, white or mask)");
+}
+
+int main(void)
+{
+    log_set_quiet(1);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(masked_pixels_have_no_say),
+        cmocka_unit_test(a_black_mask_leaves_nothing),
+        cmocka_unit_test(alpha_is_what_it_is_said_to_be),
+    };
+    return cmocka_run_group_tests_name("masks", tests, make_root, remove_root);
+}

@@ -4,11 +4,10 @@
 
 #include <stdio.h>
 
+#include "gbtrace/api.h"
 #include "gbtrace/status.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+GBT_API_BEGIN
 
 typedef struct gbt_import_def {
     const char *data;     /* data set for rendering and scoring; NULL: what the result folder's cfg_args names, if anything. Default NULL */
@@ -28,7 +27,5 @@ gbt_import_def gbt_import_def_default(void);
  */
 gbt_status gbt_import(const char *input, const gbt_import_def *def, const char *run, FILE *report, gbt_error *err);
 
-#ifdef __cplusplus
-}
-#endif
+GBT_API_END
 #endif

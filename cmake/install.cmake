@@ -15,16 +15,7 @@ install(EXPORT gbtrace NAMESPACE gbtrace:: FILE gbtraceConfig.cmake DESTINATION 
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake DESTINATION ${package_folder})
 
-# pkg-config gbtrace, and --static. Paths are found from the file's own place, so the tree can be moved.
-set(private_libs "")
-foreach(link ${library_links})
-  if(link STREQUAL "m")
-    list(APPEND private_libs -lm)
-  elseif(link MATCHES "^/")
-    list(APPEND private_libs ${link})
-  endif()
-endforeach()
-list(JOIN private_libs " " GBT_PRIVATE_LIBS)
+# pkg-config gbtrace, and --static: our archive on the shared libraries of others. Paths are found from the file's own place, so the tree can be moved.
 file(RELATIVE_PATH GBT_PC_PREFIX ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
 configure_file(cmake/gbtrace.pc.in ${CMAKE_BINARY_DIR}/gbtrace.pc @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/gbtrace.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

@@ -97,7 +97,7 @@ static void write_photo(stability *s, const practice *p, size_t i, drawing *d, r
 static void write_model(stability *s, const practice *p)
 {
     colmap_image images[PRACTICE_VIEWS_MAX] = {0};
-    char names[PRACTICE_VIEWS_MAX][24], path[PRACTICE_PATH_SIZE + 32];
+    char names[PRACTICE_VIEWS_MAX][32], path[PRACTICE_PATH_SIZE + 32];
     colmap_point *points = mem_calloc(p->point_count + 1, sizeof *points, "points", s->err);
     if (points == NULL) {
         stability_ok(s, GBT_ERR_NO_MEMORY);

@@ -143,9 +143,8 @@ gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camer
     const ray_shot shot = ray_shot_of(camera);
     GBT_TRY(prepare(f, subject, &shot, settings, NULL, err));
     double clock = clock_wall();
-    const trace_outputs outputs = {.rgb = &f->rgb, .depth = f->draw.depth, .transmittance = f->draw.transmittance};
     if (f->draw.renderer == FRAME_TRACE)
-        GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &outputs, &f->counters, err));
+        GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
     else
         GBT_TRY(splat(f, settings, keep_tape, err));
     f->times.trace = lap(&clock);

@@ -31,7 +31,6 @@ typedef struct frame_drawing {
     float footprint;           /* variance of a pixel, px^2 (trace/footprint.h); 0: rays are thin */
     int pixel_step;            /* the camera's pixels are every n-th of a picture, and as wide as that one's; 0 and 1: all */
     const float *anchor_pixel; /* optional (NULL), [anchors]: the smallest pixel an anchor was made for; borrowed */
-    float *depth, *transmittance; /* optional (NULL), [pixels]: frame_render() writes these too when it traces (trace/trace.h); borrowed */
 } frame_drawing;
 
 /** Everything one view needs, reused from view to view. Start from {0}; free with frame_free(). */

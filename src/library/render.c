@@ -19,15 +19,12 @@ gbt_status gbt_model_render(gbt_model *m, const gbt_camera *camera, int keep, co
     gbt_camera local = *camera;
     for (int k = 0; k < 3; k++)
         local.center[k] -= r->model.origin[k];
-    /* The frame draws into the caller's array, which is taken back from it whatever happens: it would be freed as the frame's own. */
-    image_free(&f->rgb);
-    f->rgb = (image){.width = camera->width, .height = camera->height, .channels = 3, .pixels = out->rgb};
-    f->draw.depth = out->depth, f->draw.transmittance = out->transmittance;
-    const gbt_status status = frame_render(f, loaded_run_subject(r), &local, &r->settings, keep != 0, err);
-    f->rgb = (image){0};
-    f->draw.depth = f->draw.transmittance = NULL;
-    m->kept = status == GBT_OK && keep != 0;
-    return status;
+    GBT_TRY(frame_prepare(f, loaded_run_subject(r), &local, &r->settings, err));
+    image rgb = {.width = camera->width, .height = camera->height, .channels = 3, .pixels = out->rgb}; /* the caller's own, written in place */
+    const trace_outputs outputs = {.rgb = &rgb, .depth = out->depth, .transmittance = out->transmittance};
+    GBT_TRY(trace_forward(&f->scene, &f->rays, keep != 0, &outputs, NULL, err));
+    m->kept = keep != 0;
+    return GBT_OK;
 }
 
 /* Room for the gradients of the cloud. */

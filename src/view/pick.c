@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/camera_pose.h"
 #include "base/fail.h"
 #include "eval/render_outputs.h"
 #include "view/studio.h"

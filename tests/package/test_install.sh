@@ -1,6 +1,6 @@
 #!/bin/sh
 # tests/package/test_install.sh -- installs into a temporary prefix and uses what is there as somebody else would.
-# Usage: test_install.sh SOURCE BUILD. Needs cmake, cc, c++, pkg-config, nm.
+# Usage: test_install.sh SOURCE BUILD. Needs cmake, ninja, cc, c++, pkg-config, nm.
 set -u
 source=$1
 build=$2
@@ -47,7 +47,7 @@ by_pkg_config_static() {
         $(pkg-config --static --libs gbtrace | sed "s,-lgbtrace,$folder/libgbtrace.a,") && ! ldd "$work/render_static" | grep -q libgbtrace
 }
 by_cmake() {
-    cmake -S "$source/examples" -B "$work/by_cmake" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Release && cmake --build "$work/by_cmake"
+    cmake -G Ninja -S "$source/examples" -B "$work/by_cmake" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Release && cmake --build "$work/by_cmake"
 }
 check "examples by pkg-config" by_pkg_config
 check "an example on the static library" by_pkg_config_static

@@ -5,6 +5,7 @@
 #define GBT_BASE_VEC_H
 
 #include <math.h>
+#include <stdbool.h>
 
 static inline double dvec_dot(const double a[3], const double b[3])
 {
@@ -37,6 +38,17 @@ static inline void dmat_apply(const double m[9], const double a[3], double out[3
     const double y = m[3] * a[0] + m[4] * a[1] + m[5] * a[2];
     const double z = m[6] * a[0] + m[7] * a[1] + m[8] * a[2];
     out[0] = x, out[1] = y, out[2] = z;
+}
+
+/** |m m^T - 1| is nowhere above the tolerance, and m does not reflect. */
+static inline bool dmat_is_rotation(const double m[9], double tolerance)
+{
+    double cross[3], worst = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            worst = fmax(worst, fabs(dvec_dot(m + 3 * i, m + 3 * k) - (i == k)));
+    dvec_cross(m, m + 3, cross);
+    return worst <= tolerance && dvec_dot(cross, m + 6) > 0;
 }
 
 /** out = transpose(m) a. `out` may be `a`. */

@@ -18,17 +18,6 @@ static bool get_number(const json_t *value, double *out)
     return json_is_number(value) && fabs(*out) <= RAW_COORDINATE_LIMIT;
 }
 
-/* Orthonormal within 1e-3, no reflection. */
-static bool is_rotation(const double m[9])
-{
-    double cross[3], worst = 0;
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++)
-            worst = fmax(worst, fabs(dvec_dot(m + 3 * i, m + 3 * k) - (i == k)));
-    dvec_cross(m, m + 3, cross);
-    return worst <= 1e-3 && dvec_dot(cross, m + 6) > 0;
-}
-
 static gbt_status read_camera(const json_t *entry, raw_place place, gbt_camera *out, gbt_error *err)
 {
     const json_t *position = json_object_get(entry, "position"), *rotation = json_object_get(entry, "rotation");
@@ -44,7 +33,7 @@ static gbt_status read_camera(const json_t *entry, raw_place place, gbt_camera *
     }
     if (!fine)
         return raw_fail(err, place, "not a camera (wanted width, height, fx, fy, position [3] and rotation [3][3])");
-    if (!is_rotation(out->rotation))
+    if (!dmat_is_rotation(out->rotation, 1e-3))
         return raw_fail(err, place, "rotation is not one (wanted orthonormal within 1e-3, no reflection)");
     if (!(width >= 1 && width <= RAW_IMAGE_LIMIT && height >= 1 && height <= RAW_IMAGE_LIMIT))
         return raw_fail(err, place, "%g x %g pixels (wanted 1 to %d)", width, height, (int)RAW_IMAGE_LIMIT);

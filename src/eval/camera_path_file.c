@@ -106,17 +106,6 @@ typedef struct similarity {
     double rotation[9], move[3], scale;
 } similarity;
 
-/** |R^T R - I| over the rows of a 3 x 3 matrix, and whether it is no reflection. */
-static bool is_rotation(const double m[9])
-{
-    double cross[3], worst = 0;
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++)
-            worst = fmax(worst, fabs(dvec_dot(m + 3 * i, m + 3 * k) - (i == k)));
-    dvec_cross(m, m + 3, cross);
-    return worst <= rotation_tolerance && dvec_dot(cross, m + 6) > 0;
-}
-
 /** Rows of 4 numbers, as lists or one after the other: `rows` 3 x 4 of them into a rotation and what follows it. */
 static gbt_status take_matrix(const json_fields *r, const char *field, double rotation[9], double move[3])
 {
@@ -131,7 +120,7 @@ static gbt_status take_matrix(const json_fields *r, const char *field, double ro
             return json_field_fail(r, field, "wanted 12 or 16 numbers, row after row, within 1e15");
         *(i % 4 == 3 ? &move[i / 4] : &rotation[3 * (i / 4) + i % 4]) = json_number_value(value);
     }
-    return is_rotation(rotation) ? GBT_OK : json_field_fail(r, field, "not a rotation (wanted |R R' - I| <= 1e-3, and no reflection)");
+    return dmat_is_rotation(rotation, rotation_tolerance) ? GBT_OK : json_field_fail(r, field, "not a rotation (wanted |R R' - I| <= 1e-3, and no reflection)");
 }
 
 static gbt_status take_similarity(const json_fields *r, similarity *out)

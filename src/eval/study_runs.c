@@ -228,6 +228,16 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
     return read_run(study_path, metrics_path, settings, out) ? GBT_OK : base_fail(err, GBT_ERR_INTERNAL, "%.400s: the run cannot be read back", run);
 }
 
+gbt_status study_runs_do_variant(const char *folder, const char *data, const char *data_name, const char *variant, const char *settings, gbt_train_def def,
+                                 study_figures *out, gbt_error *err)
+{
+    char run[PATH_SIZE];
+    config_strings strings;
+    GBT_TRY(config_parse(settings, variant, &def, &strings, err));
+    GBT_TRY(study_runs_folder(folder, data_name, variant, def.seed, run, sizeof run, err));
+    return study_runs_do(data, run, &def, out, err);
+}
+
 void study_runs_tell(size_t number, size_t count)
 {
     char line[64];

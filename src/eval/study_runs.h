@@ -42,6 +42,14 @@ gbt_status study_runs_names(const char *const *data, size_t count, char names[][
  */
 gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def *def, study_figures *out, gbt_error *err);
 
+/**
+ * study_runs_do() of a variant: what `settings`, lines as in a run's `config`, change in `def`, in the variant's folder.
+ *
+ * @param variant [in] its name, in messages and as folder (study_runs_folder())
+ */
+gbt_status study_runs_do_variant(const char *folder, const char *data, const char *data_name, const char *variant, const char *settings, gbt_train_def def,
+                                 study_figures *out, gbt_error *err);
+
 /** Say that run `number` of `count`, from 1 on, begins. */
 void study_runs_tell(size_t number, size_t count);
 

@@ -8,7 +8,6 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "train/config.h"
 
 gbt_time_def gbt_time_def_default(void)
 {
@@ -76,17 +75,13 @@ stat_sample time_saved(const time_study *s, size_t scene)
 
 static gbt_status run_one(const time_study *s, size_t scene, size_t variant, int seed, const char *folder, study_figures *out, gbt_error *err)
 {
-    char run[4096];
     const time_variant *v = &time_variants[variant];
-    config_strings strings;
     gbt_train_def def = gbt_train_def_default();
     def.downscale = s->def.downscale, def.seed = (uint64_t)seed, def.save_every_seconds = 0, def.command = "gbtrace study time";
     def.budget_seconds = v->budgets * s->def.budget_seconds;
     for (int i = 0; i < TIME_MARKS; i++)
         def.eval_at_seconds[def.eval_at_count++] = def.budget_seconds * (i + 1) / (TIME_MARKS + 1);
-    GBT_TRY(config_parse(v->settings, v->name, &def, &strings, err));
-    GBT_TRY(study_runs_folder(folder, s->names[scene], v->name, def.seed, run, sizeof run, err));
-    return study_runs_do(s->def.data[scene], run, &def, out, err);
+    return study_runs_do_variant(folder, s->def.data[scene], s->names[scene], v->name, v->settings, def, out, err);
 }
 
 static gbt_status run_all(time_study *s, const char *folder, gbt_error *err)

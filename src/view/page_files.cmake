@@ -1,14 +1,14 @@
 # gbt_page_files(FILE.c): the files of src/view/page/ as C arrays. Byte by byte: string literals have a limit that compilers warn about.
+include(${CMAKE_SOURCE_DIR}/tools/embed.cmake)
+
 function(gbt_page_files out)
   file(GLOB files CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/page/*)
   set(arrays "")
   set(rows "")
   foreach(path ${files})
-    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${path})
     get_filename_component(name ${path} NAME)
     string(MAKE_C_IDENTIFIER ${name} id)
-    file(READ ${path} bytes HEX)
-    string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${bytes}")
+    gbt_bytes_of(${path} bytes)
     string(APPEND arrays "static const unsigned char ${id}[] = {${bytes}};\n")
     string(APPEND rows "    {\"${name}\", ${id}, sizeof ${id}},\n")
   endforeach()

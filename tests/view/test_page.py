@@ -47,8 +47,7 @@ def middle(page):
 
 
 def first_picture(page, work):
-    page.wait("gbtrace.look.done.samples === 16")
-    check("16 rays a pixel", "16 rays/pixel" in page.run("document.getElementById('numbers').textContent"))
+    page.wait("gbtrace.look.done.samples === 16 && document.getElementById('numbers').textContent.includes('16 rays/pixel')") # the line is written in the frame after
     check("views are listed", page.run("document.getElementById('view').options.length") == 9)
     page.run("document.getElementById('samples').value = '1'; gbtrace.changed()")
     page.wait(STILL)

@@ -1,5 +1,5 @@
-/* bench/machine.c -- what one core of this machine can do: fused multiply-adds a second, bytes a second and latency at each level of memory.
-   The ceilings in docs/performance.md. Build and run: cc -O3 -march=native bench/machine.c -o build/machine && build/machine */
+/* bench/machine.c -- what one core of this machine can do: fused multiply-adds a second, bytes a second and latency at each level of
+   memory. The ceilings in docs/performance.md. Build and run: cc -O3 -march=native bench/machine.c -o build/machine && build/machine */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,6 @@
-/* bench/versus_blas.c -- the decoder's matrix products by our kernels and by OpenBLAS, in turns, one thread. Needs libopenblas-dev. Build and run:
-   cc -O3 -march=native -Isrc -Iinclude bench/versus_blas.c build/release/libgbtrace.a -lopenblas -lm -o build/versus_blas && build/versus_blas */
+/* bench/versus_blas.c -- the decoder's matrix products by our kernels and by OpenBLAS, in turns, one thread. Needs libopenblas-dev. Build
+   and run: cc -O3 -march=native -Isrc -Iinclude bench/versus_blas.c build/release/libgbtrace.a -lopenblas -lm -o build/versus_blas &&
+   build/versus_blas */
 #include <cblas.h>
 #include <math.h>
 #include <stdio.h>
@@ -58,15 +59,16 @@ static void compare(const char *name, size_t m, size_t k, size_t n)
     for (int way = 0; way < 2; way++)
         qsort(times[way], REPEATS, sizeof(double), by_size);
     const double flops = 2e-9 * (double)(m * k * n) * PASSES;
-    printf("| %s | %zu x %zu x %zu | %.0f | %.0f | %.2f | %.1g |\n", name, m, k, n, flops / times[0][REPEATS / 2], flops / times[1][REPEATS / 2],
-           times[1][REPEATS / 2] / times[0][REPEATS / 2], worst);
+    printf("| %s | %zu x %zu x %zu | %.0f | %.0f | %.2f | %.1g |\n", name, m, k, n, flops / times[0][REPEATS / 2],
+           flops / times[1][REPEATS / 2], times[1][REPEATS / 2] / times[0][REPEATS / 2], worst);
     free(a), free(b), free(ours), free(theirs);
 }
 
 int main(void)
 {
     openblas_set_num_threads(1);
-    printf("| product | rows x inputs x outputs | ours, GFLOP/s | OpenBLAS | ours faster by | largest difference |\n|---|---|---|---|---|---|\n");
+    printf("| product | rows x inputs x outputs | ours, GFLOP/s | OpenBLAS | ours faster by | largest difference "
+           "|\n|---|---|---|---|---|---|\n");
     compare("hidden layer", ROWS, 36, 32);
     compare("scales and rotations, K = 2", ROWS, 32, 16);
     compare("the same, K = 10", ROWS, 32, 80);

@@ -31,7 +31,8 @@ static inline void exr_put_attribute(exr_bytes *b, const char *name, const char 
 }
 
 /* `names` in alphabetical order; `pixels` [height][width][channels]. Sample type 2 is float, 1 half (then zeros are written). */
-static inline void exr_write(const char *path, int width, int height, int channels, const char *const *names, int32_t type, const float *pixels)
+static inline void exr_write(const char *path, int width, int height, int channels, const char *const *names, int32_t type,
+                             const float *pixels)
 {
     static exr_bytes b, list;
     b.count = list.count = 0;

@@ -11,7 +11,8 @@ GBT_API_BEGIN
 
 typedef struct gbt_bench_def {
     const char *model;  /* plain 3DGS .ply, or a run; required */
-    const char *camera; /* camera file (docs/cameras.md; of an aperture the first sample); required for a .ply, else the first held-out view */
+    const char *camera; /* camera file (docs/cameras.md; of an aperture the first sample); required for a .ply, else the first held-out
+                           view */
     int repeats;        /* timed passes after one warm-up; the median is reported. Default 5 */
     int check;          /* 1: compare with the double reference on every 8th pixel in both directions. Default 0 */
     const char *json;   /* where to write the figures; NULL: nowhere */
@@ -19,9 +20,12 @@ typedef struct gbt_bench_def {
     float alpha_max;    /* alpha is cut here, in (0, 1); 0 or NaN: that of the run, 0.99 for a .ply */
     float t_min;        /* stop before transmittance falls below this, in (0, 1); 0 or NaN: that of the run, 1e-4 for a .ply */
     float proxy_radius; /* a Gaussian ends at this many std-devs, > 0; 0 or NaN: where its response falls to alpha_min. Default 0 */
-    const char *preset; /* "exact", "default" or "fast" (docs/accuracy.md); the four numbers above win over it. NULL: as the model is. Default NULL */
-    const char *kernel; /* "tile" (default, and NULL), "single" or "embree"; or some of them, as "tile,embree": measured in turn and compared with the first */
-    size_t tape_bytes_max; /* memory for the hits that forward keeps for the adjoint; what goes beyond is traced again. 0, the default: no limit */
+    const char *preset; /* "exact", "default" or "fast" (docs/accuracy.md); the four numbers above win over it. NULL: as the model is.
+                           Default NULL */
+    const char *kernel; /* "tile" (default, and NULL), "single" or "embree"; or some of them, as "tile,embree": measured in turn and
+                           compared with the first */
+    size_t tape_bytes_max; /* memory for the hits that forward keeps for the adjoint; what goes beyond is traced again. 0, the default: no
+                              limit */
 } gbt_bench_def;
 
 gbt_bench_def gbt_bench_def_default(void);
@@ -36,7 +40,8 @@ gbt_status gbt_bench_trace(const gbt_bench_def *def, FILE *out, gbt_error *err);
 typedef struct gbt_study_def {
     const char *const *models; /* plain 3DGS .ply, or runs */
     size_t model_count;        /* 1 to 16 */
-    const char *camera;        /* camera file of every .ply; NULL: the camera.json beside each. Runs: their first held-out view. Default NULL */
+    const char *camera;        /* camera file of every .ply; NULL: the camera.json beside each. Runs: their first held-out view. Default
+                                  NULL */
     int repeats;               /* timed passes of each setting after one warm-up; the median counts. Default 3 */
 } gbt_study_def;
 

@@ -100,8 +100,9 @@ bool gbt_camera_look_at(const double origin[3], const double target[3], const do
 /**
  * The camera after a small motion of its own, and the motion for which pose gradients are taken (gbtrace/model.h).
  *
- * @param motion [in] (v, omega): v moves the centre along the camera's axes (right, down, forward), scene units; omega turns the camera about the
- *                    same axes through its centre, right-handed, radians: center + R^T v and exp([omega]x)^T R for a rotation R, [omega]x a = omega x a
+ * @param motion [in] (v, omega): v moves the centre along the camera's axes (right, down, forward), scene units; omega turns the camera
+ *                    about the same axes through its centre, right-handed, radians: center + R^T v and exp([omega]x)^T R for a rotation R,
+ *                    [omega]x a = omega x a
  */
 gbt_camera gbt_camera_moved(const gbt_camera *camera, const double motion[6]);
 

@@ -22,7 +22,8 @@ gbt_compress_def gbt_compress_def_default(void);
  * Write a trained model in a small form that every command reads as it reads the large one (docs/compression.md).
  *
  * Steps of quantisation come from adjoint passes through the training views (photos are not needed); when the data set is not there, from
- * the model alone, with a line on stderr: the file is then some 5 to 40 % larger at the same loss. What the file gives back is checked before it is written.
+ * the model alone, with a line on stderr: the file is then some 5 to 40 % larger at the same loss. What the file gives back is checked
+ * before it is written.
  *
  * @param run [in] RUN (a folder with model.gbt) or a model file; also one that is already small
  * @param out [in] written atomically; may be the model itself

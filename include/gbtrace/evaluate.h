@@ -32,8 +32,8 @@ gbt_evaluate_def gbt_evaluate_def_default(void);
 gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err);
 
 /**
- * Make RUN/report.html again from RUN/metrics.json, log.csv and renders/test: nothing is scored, one view is rendered. The charts (SVG) of RUN,
- * RUN/studies and `studies` go in too. Without the model or its data set, maps and pictures of the scene are left out, with a warning.
+ * Make RUN/report.html again from RUN/metrics.json, log.csv and renders/test: nothing is scored, one view is rendered. The charts (SVG) of
+ * RUN, RUN/studies and `studies` go in too. Without the model or its data set, maps and pictures of the scene are left out, with a warning.
  *
  * @param studies [in] [study_count] folders that gbtrace study wrote, or SVG files; NULL with 0
  * @return GBT_OK, GBT_ERR_IO (no metrics.json, no such study), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
@@ -64,18 +64,21 @@ typedef enum gbt_split { GBT_SPLIT_TEST, GBT_SPLIT_TRAIN, GBT_SPLIT_ALL } gbt_sp
 typedef struct gbt_render_def {
     const char *data;     /* data set whose cameras are used; NULL: the model's. Default NULL */
     gbt_split split;      /* default GBT_SPLIT_TEST */
-    const char *renderer; /* "trace", "raster" (EWA splats; pinhole cameras), "per-ray" (the same tiles, response and order of rays), or "reference"
-                             (double, every Gaussian against every ray: slow). NULL: as in training. Default NULL */
+    const char *renderer; /* "trace", "raster" (EWA splats; pinhole cameras), "per-ray" (the same tiles, response and order of rays), or
+                             "reference" (double, every Gaussian against every ray: slow). NULL: as in training. Default NULL */
     const char *format;   /* "png" (default) or "exr" (32-bit float) */
     double downscale;     /* 0: as in training. Default 0 */
     const char *camera;   /* camera file (docs/cameras.md): render that and no views; the data set is not needed. Default NULL */
-    const char *outputs;  /* also write these, as float EXR (docs/formats.md): "depth,normal". Always by the tracer, without meshes. Default NULL */
+    const char *outputs;  /* also write these, as float EXR (docs/formats.md): "depth,normal". Always by the tracer, without meshes. Default
+                             NULL */
     const char *preset;   /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is "default". Default NULL */
     const char *insert;   /* meshes to put into the scene (docs/inserting.md); with the renderer "trace" only. Default NULL */
     const char *path;     /* a film in place of views (docs/video.md): "orbit", "interpolate", or the name of a path file. Default NULL */
-    int frames;           /* of the film, [0, 100000]; 0: 240 around, 15 for each training camera (900 at most), as many as a file has. Default 0 */
+    int frames;           /* of the film, [0, 100000]; 0: 240 around, 15 for each training camera (900 at most), as many as a file has.
+                             Default 0 */
     double fps;           /* frames per second, [0, 1000]; 0: what a path file says, else 30. Default 0 */
-    int width, height;    /* of the film, both 0 or in [1, 65500]; the shorter side sees as much as in the photos. Default 0: as they, to even numbers */
+    int width, height;    /* of the film, both 0 or in [1, 65500]; the shorter side sees as much as in the photos. Default 0: as they, to
+                             even numbers */
 } gbt_render_def;
 
 gbt_render_def gbt_render_def_default(void);

@@ -26,16 +26,19 @@ gbt_export_def gbt_export_def_default(void);
  * each file as it reads back, and reported. A .ply, .splat, .spz or result folder of 3DGS is converted.
  *
  * A name that ends in / is a folder: it gets what the reference implementation of 3DGS leaves, cfg_args, cameras.json, input.ply,
- * point_cloud/iteration_N/point_cloud.ply, and of the held-out views test/ours_N/, results.json and per_view.json. Runs alone can be written so.
+ * point_cloud/iteration_N/point_cloud.ply, and of the held-out views test/ours_N/, results.json and per_view.json. Runs alone can be
+ * written so.
  *
  * @param input  [in] RUN (a folder with model.gbt), a model file, a .ply, .splat or .spz, or a result folder of 3DGS
  * @param outputs [in] [output_count] file names, each written atomically; their endings are checked before any work
  * @param report [in] open stream; NULL: none
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *
- * Threads: same bytes for every thread count. Cost: one pass over the training cameras, the steps, and up to 16 held-out views (all of them for a folder).
+ * Threads: same bytes for every thread count. Cost: one pass over the training cameras, the steps, and up to 16 held-out views (all of them
+ * for a folder).
  */
-gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, FILE *report, gbt_error *err);
+gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, FILE *report,
+                      gbt_error *err);
 
 GBT_API_END
 #endif

@@ -9,7 +9,8 @@
 GBT_API_BEGIN
 
 typedef struct gbt_init_def {
-    const char *init;        /* "gb" (granular balls, default), "adaptive" (balls where the scene needs them), "voxel", or "random" points */
+    const char *init;        /* "gb" (granular balls, default), "adaptive" (balls where the scene needs them), "voxel", or "random"
+                                points */
     double init_count;       /* anchors per point of adaptive and random, (0, 1]. Default 0.25 */
     const char *scale_prior; /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use "nn" */
     int max_depth;           /* D_max of the balls, [0, 64]. Default 18 */
@@ -21,8 +22,8 @@ typedef struct gbt_init_def {
 gbt_init_def gbt_init_def_default(void);
 
 /**
- * Make balls and anchors from a data set's sparse points, write them as PLY, print their number beside the voxel baseline's, and how far points
- * are from the centres of the paper's balls, of adaptive ones, and of as many voxels.
+ * Make balls and anchors from a data set's sparse points, write them as PLY, print their number beside the voxel baseline's, and how far
+ * points are from the centres of the paper's balls, of adaptive ones, and of as many voxels.
  *
  * The PLY opens in any mesh viewer. Points: a vertex per anchor with x y z, radius, scale_0..scale_5 (std-devs, not logs), count (points in
  * its ball), depth, red green blue. Mesh: an icosphere of 42 vertices and 80 triangles per anchor with the ball's radius (the scale when
@@ -32,7 +33,8 @@ gbt_init_def gbt_init_def_default(void);
  * @param out_ply   [in]  written atomically
  * @param json_path [in]  the counts as JSON with "schema": 1; NULL: none
  * @param report    [in]  open stream for the lines for a person
- * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, output is an input), GBT_ERR_FORMAT (bad data, no points), GBT_ERR_IO, GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, output is an input), GBT_ERR_FORMAT (bad data, no points), GBT_ERR_IO,
+ *         GBT_ERR_NO_MEMORY
  *
  * Threads: same bytes for every thread count. Cost: O(n log n) for n points.
  */

@@ -13,7 +13,8 @@ typedef struct gbt_make_scene_def {
     int width, height;  /* photo size, pixels, [8, 8192]. Default 320 x 240. */
     int view_count;     /* photos, [3, 9999]. Default 64. */
     int points;         /* sparse points wanted, [1, 10000000]. Default 6000. */
-    double point_noise; /* std-dev per axis of a sparse point, part of its distance to the nearest camera that saw it, [0, 0.1]. Default 0.001. */
+    double point_noise; /* std-dev per axis of a sparse point, part of its distance to the nearest camera that saw it, [0, 0.1]. Default
+                           0.001. */
     int samples;        /* rays per pixel at most, rounded up to a square number, [1, 1024]. Default 16. */
     uint64_t seed;      /* of the camera jitter, the samples and the sparse cloud; the geometry is fixed. Default 1. */
     int depth;          /* 1: also write exact depth, depth/NNNN.exr. Default 0. */

@@ -84,8 +84,8 @@ gbt_model_info gbt_model_get_info(const gbt_model *model);
 /** How pictures are made. */
 typedef struct gbt_model_settings {
     float background[3];     /* behind everything. Default as trained; black for plain Gaussians */
-    float footprint;         /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays. Default as trained; 0.1 for plain
-                                Gaussians */
+    float footprint;         /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays. Default as trained; 0.1 for
+                                plain Gaussians */
     float t_near;            /* nearest distance at which anything is seen, >= 0. Default as trained; 0.01 for plain Gaussians */
     float alpha_min;         /* smallest response that counts, (0, 1). Default 1/255 */
     float alpha_max;         /* responses are cut here, (0, 1). Default 0.99 */
@@ -148,18 +148,18 @@ typedef struct gbt_gaussians_gradient {
 /**
  * Adjoint of the last gbt_model_render() with `keep`, once for each: from dL/d(rgb) to the pose of its camera, and to plain Gaussians.
  *
- * The pose is differentiated by the motion (v, omega) of gbt_camera_moved() at 0: v moves the camera along its own axes (right, down, forward),
- * omega turns it about them, radians. With W the rotation from world to camera, c the camera's centre, e the eye for which colours are made (c;
- * of an orthographic camera the middle of its picture), mu_i, q_i the Gaussians' means and quaternions, and every derivative by a mean or
- * quaternion the one at fixed colours:
+ * The pose is differentiated by the motion (v, omega) of gbt_camera_moved() at 0: v moves the camera along its own axes (right, down,
+ * forward), omega turns it about them, radians. With W the rotation from world to camera, c the camera's centre, e the eye for which
+ * colours are made (c; of an orthographic camera the middle of its picture), mu_i, q_i the Gaussians' means and quaternions, and every
+ * derivative by a mean or quaternion the one at fixed colours:
  *
  *     dL/dv     = W (dL/de - sum_i dL/dmu_i)
  *     dL/domega = W ((e - c) x dL/de - sum_i [(mu_i - c) x dL/dmu_i + vec(dL/dq_i q_i*) / 2])
  *
  * because moving the camera is moving all Gaussians the other way, but for the eye: dL/de goes through the directions of the spherical
- * harmonics, or through the direction and distance that the networks are given. Pixels' footprints move with the camera and are in these sums.
- * It is the gradient of the picture between cuts: where a response crosses alpha_min, or a ray its end, a picture jumps a little, and no gradient
- * says so.
+ * harmonics, or through the direction and distance that the networks are given. Pixels' footprints move with the camera and are in these
+ * sums. It is the gradient of the picture between cuts: where a response crosses alpha_min, or a ray its end, a picture jumps a little, and
+ * no gradient says so.
  *
  * @param d_rgb       [in]  [height][width][3], finite
  * @param d_pose      [out] dL/d(v, omega); optional (NULL)

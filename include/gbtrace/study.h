@@ -1,4 +1,5 @@
-/* gbtrace/study.h -- studies that train: the paper's tables, held-out quality against time and against anchors, from real runs on the user's own scenes. */
+/* gbtrace/study.h -- studies that train: the paper's tables, held-out quality against time and against anchors, from real runs on the
+   user's own scenes. */
 #ifndef GBTRACE_STUDY_H
 #define GBTRACE_STUDY_H
 
@@ -10,10 +11,10 @@
 
 GBT_API_BEGIN
 
-/* These studies train each variant with each seed into FOLDER/runs/SCENE/VARIANT/seed-S, where a scene is called as its folder. A run that is
-   there, whole and of the same settings, is taken as it is; any other is made again. Models and scores stay, checkpoints do not. A row beyond
-   its limit is no failure: it is told in the table. SIGINT and SIGTERM end the study after the current step with GBT_ERR_INTERRUPTED; the
-   same call goes on with the run that was interrupted, from its start. */
+/* These studies train each variant with each seed into FOLDER/runs/SCENE/VARIANT/seed-S, where a scene is called as its folder. A run that
+   is there, whole and of the same settings, is taken as it is; any other is made again. Models and scores stay, checkpoints do not. A row
+   beyond its limit is no failure: it is told in the table. SIGINT and SIGTERM end the study after the current step with
+   GBT_ERR_INTERRUPTED; the same call goes on with the run that was interrupted, from its start. */
 
 typedef struct gbt_paper_def {
     const char *const *data; /* data set folders, the last parts of their paths distinct */
@@ -70,8 +71,9 @@ typedef struct gbt_anchors_def {
 gbt_anchors_def gbt_anchors_def_default(void);
 
 /**
- * What a scene needs: the default settings with anchors that start at voxels, at the paper's balls, at adaptive balls and at as many random points, and with
- * more or less asked of an anchor; anchors, bytes and hits per ray against held-out PSNR, all after the same number of steps.
+ * What a scene needs: the default settings with anchors that start at voxels, at the paper's balls, at adaptive balls and at as many random
+ * points, and with more or less asked of an anchor; anchors, bytes and hits per ray against held-out PSNR, all after the same number of
+ * steps.
  *
  * Writes anchors.md, .csv (every run), .json and .svg into `folder`, and the tables as Markdown to `out`.
  *

@@ -13,7 +13,8 @@ GBT_API_BEGIN
 enum { GBT_TRAIN_MAX_EVALS = 16 };
 
 typedef struct gbt_train_def {
-    const char *init;           /* "gb" (the paper's granular balls, default), "adaptive" (balls where the scene needs them), "voxel", "random" points */
+    const char *init;           /* "gb" (the paper's granular balls, default), "adaptive" (balls where the scene needs them), "voxel",
+                                   "random" points */
     double init_count;          /* anchors per point of adaptive and random, (0, 1]. Default 0.25 */
     const char *scale_prior;    /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use "nn" */
     int max_depth;              /* D_max of the balls, [0, 64]. Default 18 */
@@ -24,26 +25,31 @@ typedef struct gbt_train_def {
     double budget_seconds;      /* wall time for training; used when iterations is 0. Default 600 */
     const char *pace;           /* "n1,...,n20": iterations in each twentieth of the schedule, as a budget run records them. Default NULL */
     double downscale;           /* photos are divided by this, >= 1. Default 1 */
-    const char *renderer;       /* what the photos are compared with: "trace" (default), "raster" (EWA splats; pinhole photos), or "per-ray" */
+    const char *renderer;       /* what the photos are compared with: "trace" (default), "raster" (EWA splats; pinhole photos), or
+                                   "per-ray" */
     double footprint;           /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays.
                                    Default 0.1; 0 with compat; splats are dilated instead */
-    int start_level;            /* first steps look at 1 pixel in 4^start_level, at random places; all come last. [0, 4]. Default 2; 0 with compat */
+    int start_level;            /* first steps look at 1 pixel in 4^start_level, at random places; all come last. [0, 4]. Default 2; 0 with
+                                   compat */
     const char *eval_split;     /* "auto" (default: as the data set says, else every=8), "every=8", "none", "list=FILE" */
-    const char *alpha;          /* the transparent part of photos: "black", "white", "mask" (it counts neither in the loss nor in the scores); "auto" (default):
-                                   white for Blender's synthetic scenes, else black. Black and white are also the background then */
+    const char *alpha;          /* the transparent part of photos: "black", "white", "mask" (it counts neither in the loss nor in the
+                                   scores); "auto" (default): white for Blender's synthetic scenes, else black. Black and white are also the
+                                   background then */
     uint64_t seed;              /* Default 0 */
-    size_t hit_bytes_max;       /* memory for the hits of a view that are kept for the adjoint; tiles beyond are traced again, to the same bits.
-                                   0: no limit. Default 0 */
+    size_t hit_bytes_max;       /* memory for the hits of a view that are kept for the adjoint; tiles beyond are traced again, to the same
+                                   bits. 0: no limit. Default 0 */
     size_t max_anchors;         /* growth stops there. Default 2,000,000 */
     bool grow;                  /* grow and prune anchors. Default true */
-    double thrift;              /* anchors must bring so many times as much to be made and to be kept, [0.1, 10]. Not with compat. Default 1 */
+    double thrift;              /* anchors must bring so many times as much to be made and to be kept, [0.1, 10]. Not with compat. Default
+                                   1 */
     bool compat;                /* every quirk of the reference method (docs/training.md). Default false */
     bool exposure;              /* learn a colour matrix per photo, for photos whose exposure differs; held-out photos are then scored on
                                    their right half, with a matrix fitted to the left. Default false */
-    double splats_until;        /* splats stand for rays until this part of the run, [0, 1]: their steps are quicker. Pinhole photos, the renderer "trace",
-                                   not with compat. Default 0.7 */
+    double splats_until;        /* splats stand for rays until this part of the run, [0, 1]: their steps are quicker. Pinhole photos, the
+                                   renderer "trace", not with compat. Default 0.7 */
     double grow_until;          /* anchors grow and are pruned until this fraction of the run, [0, 1]. Default 0.5 */
-    double scale_factor;        /* of the anchors' first scales, [0.01, 100]; 0: 2 with the balls' scale prior, 1.2 with spacing, 1 with compat. Default 0 */
+    double scale_factor;        /* of the anchors' first scales, [0.01, 100]; 0: 2 with the balls' scale prior, 1.2 with spacing, 1 with
+                                   compat. Default 0 */
     double learning_rate_factor; /* of all learning rates, [1e-3, 1e3]. Default 1 */
     double save_every_seconds;  /* wall time between checkpoints; 0: only at the end. Default 120 */
     uint64_t save_at_step;      /* one extra checkpoint right after this step; 0: none. Default 0 */
@@ -61,9 +67,9 @@ gbt_train_def gbt_train_def_default(void);
 /**
  * Train on the data set in `data`, write everything into the folder `run`.
  *
- * `run` gets model.gbt, log.csv, config, train.json and checkpoints/. What happens meanwhile goes where gbtrace/progress.h says. SIGINT and SIGTERM stop after the current
- * step: a checkpoint is saved and GBT_ERR_INTERRUPTED is returned. The same seed and length give the same model.gbt, bit for bit, for
- * any number of threads, interrupted and resumed or not.
+ * `run` gets model.gbt, log.csv, config, train.json and checkpoints/. What happens meanwhile goes where gbtrace/progress.h says. SIGINT and
+ * SIGTERM stop after the current step: a checkpoint is saved and GBT_ERR_INTERRUPTED is returned. The same seed and length give the same
+ * model.gbt, bit for bit, for any number of threads, interrupted and resumed or not.
  *
  * A step whose loss or gradient is not finite changes nothing but a count; ten in a row end the run with GBT_ERR_FORMAT and one line that
  * names the photo or the parameter. Pixels of a float photo that are not finite count in no loss.
@@ -80,7 +86,7 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
  */
 gbt_status gbt_train_with(const char *data, const char *run, const char *settings, gbt_error *err);
 
-/** Threads for everything that follows, >= 1. Without this call: all processors of this process. */
+/** Threads for everything that follows, >= 1. Without this call: the processors of this process, at most its control group's quota. */
 void gbt_set_threads(int threads);
 
 GBT_API_END

@@ -23,7 +23,8 @@ gbt_view_def gbt_view_def_default(void);
  * @param input [in] RUN (a folder that training writes), a model file, or plain Gaussians (.ply, .splat, .spz)
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO (also: the port is in use), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *
- * Threads: one call at a time (it catches signals); it renders in the calling thread and all that gbt_set_threads() allows, answers HTTP in one more.
+ * Threads: one call at a time (it catches signals); it renders in the calling thread and all that gbt_set_threads() allows, answers HTTP in
+ * one more.
  */
 gbt_status gbt_view(const char *input, const gbt_view_def *def, gbt_error *err);
 

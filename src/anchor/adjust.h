@@ -8,7 +8,8 @@
 typedef struct adjust_stats {
     size_t count, capacity;
     int offset_count;
-    float *use_accum;      /* [count] sum over views of what the anchor was good for: decoded opacities, or shares of the picture (mean over rays of T alpha) */
+    float *use_accum;      /* [count] sum over views of what the anchor was good for: decoded opacities, or shares of the picture (mean over
+                              rays of T alpha) */
     float *visit_count;    /* [count] views in which the anchor was visible */
     float *grad_accum;     /* [count][K] sum of screen-space gradient norms */
     float *grad_count;     /* [count][K] views in which the Gaussian was geometrically visible */
@@ -24,7 +25,8 @@ typedef struct adjust_def {
     int init_factor;           /* default 16 */
     int hierarchy_factor;      /* default 4 */
     float grad_threshold;      /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */
-    float min_use;             /* anchors with less in the mean over their views are pruned, in units of use_accum. Default 0.005, an opacity */
+    float min_use;             /* anchors with less in the mean over their views are pruned, in units of use_accum. Default 0.005, an
+                                  opacity */
     float interval;            /* I: steps between adjusts, default 100 */
     float success_threshold;   /* default 0.8: a Gaussian counts when grad_count > interval * success * 0.5; an anchor is judged when
                                   visit_count > interval * success. What was judged starts again from 0 */

@@ -56,16 +56,17 @@ gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape
                            float *d_params, gbt_error *err);
 
 /**
- * The camera's part of the adjoint: dL/d(camera_center), for Gaussians that stay where they are. Their shapes, opacities and colours follow the
- * direction u = (x - c) / r and the distance r of each anchor x: du/dc = -(1 - u u^T) / r, dr/dc = -u; nothing follows a distance that was cut.
+ * The camera's part of the adjoint: dL/d(camera_center), for Gaussians that stay where they are. Their shapes, opacities and colours follow
+ * the direction u = (x - c) / r and the distance r of each anchor x: du/dc = -(1 - u u^T) / r, dr/dc = -u; nothing follows a distance that
+ * was cut.
  *
  * @param camera_center [in]  of the last decode_forward() on `tape`
  * @param d_camera      [out] overwritten
  * @return GBT_OK, GBT_ERR_ARGUMENT (shapes differ from the forward's), GBT_ERR_NO_MEMORY
  * Threads: same bits for every thread count. Cost: about half of decode_backward().
  */
-gbt_status decode_backward_camera(const anchors *a, const decoder *d, const float camera_center[3], decode_tape *tape, const gaussians *d_gaussians,
-                                  double d_camera[3], gbt_error *err);
+gbt_status decode_backward_camera(const anchors *a, const decoder *d, const float camera_center[3], decode_tape *tape,
+                                  const gaussians *d_gaussians, double d_camera[3], gbt_error *err);
 
 /**
  * Shift output biases of the opacity network: each offset whose mean opacity over the anchors of the last decode_forward() is below

@@ -1,6 +1,7 @@
 /* anchor/decode_backward.c -- dL/dGaussians -> dL/danchors and dL/dnetworks, or dL/dcamera: the adjoint of decode.c, over the same chunks.
 
-   Rows of the anchors' gradient belong to one chunk each. The networks' gradient, or the camera's, is one record per block, added in block order. */
+   Rows of the anchors' gradient belong to one chunk each. The networks' gradient, or the camera's, is one record per block, added in block
+   order. */
 #include "anchor/decode.h"
 
 #include <math.h>
@@ -152,7 +153,8 @@ static void view_backward(const backward_job *job, size_t row, const float *d_hi
     const double distance = sqrt(square), scaled = distance * (double)job->d->distance_scale;
     if (!(distance > 0 && distance < HUGE_VAL))
         return;
-    const bool in_range = job->d->has_distance && scaled > 0.5 * (double)job->d->distance_min && scaled < 2.0 * (double)job->d->distance_max;
+    const bool in_range = job->d->has_distance && scaled > 0.5 * (double)job->d->distance_min &&
+                          scaled < 2.0 * (double)job->d->distance_max;
     const double d_distance = in_range ? (double)job->d->distance_scale * d_input[3] : 0;
     for (int c = 0; c < 3; c++)
         d_camera[c] -= (d_input[c] - offset[c] * (along / square) + offset[c] * d_distance) / distance;
@@ -261,12 +263,15 @@ static void reduce_rows(size_t block, size_t begin, size_t end, void *context)
 }
 
 /* What both adjoints begin with; after it tape->kept_count may be 0, and nothing is left to do. */
-static gbt_status open_job(const anchors *a, const decoder *d, decode_tape *tape, const gaussians *d_gaussians, backward_job *job, gbt_error *err)
+static gbt_status open_job(const anchors *a, const decoder *d, decode_tape *tape, const gaussians *d_gaussians, backward_job *job,
+                           gbt_error *err)
 {
     if (a->offset_count != d->offset_count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: anchors have %d offsets, the decoder %d", a->offset_count, d->offset_count);
+        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: anchors have %d offsets, the decoder %d", a->offset_count,
+                         d->offset_count);
     if (d_gaussians->count != tape->kept_count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: gradient of %zu Gaussians (wanted %zu)", d_gaussians->count, tape->kept_count);
+        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: gradient of %zu Gaussians (wanted %zu)", d_gaussians->count,
+                         tape->kept_count);
     *job = (backward_job){.a = a, .d = d, .kernels = dense_best(), .layout = decode_layout_of(d), .tape = tape, .d_gaussians = d_gaussians,
                           .block_count = parallel_block_count(tape->visible_count, DECODE_GRAIN)};
     for (int head = 0; head < HEAD_COUNT; head++) {
@@ -299,8 +304,8 @@ gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape
     return GBT_OK;
 }
 
-gbt_status decode_backward_camera(const anchors *a, const decoder *d, const float camera_center[3], decode_tape *tape, const gaussians *d_gaussians,
-                                  double d_camera[3], gbt_error *err)
+gbt_status decode_backward_camera(const anchors *a, const decoder *d, const float camera_center[3], decode_tape *tape,
+                                  const gaussians *d_gaussians, double d_camera[3], gbt_error *err)
 {
     backward_job job;
     d_camera[0] = d_camera[1] = d_camera[2] = 0;

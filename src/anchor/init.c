@@ -16,7 +16,8 @@
 anchor_init_def anchor_init_def_default(void)
 {
     return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .fraction = 0.25, .balls = balls_def_default(),
-                             .offset_count = 10, .fusion = 0.5f, .clip_min = 0.25f, .clip_max = 4.0f, .scale_factor = 1.0f, .scale_max = INFINITY};
+                             .offset_count = 10, .fusion = 0.5f, .clip_min = 0.25f, .clip_max = 4.0f, .scale_factor = 1.0f,
+                             .scale_max = INFINITY};
 }
 
 bool anchor_init_kind_named(const char *name, anchor_init_kind *out)

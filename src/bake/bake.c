@@ -135,7 +135,8 @@ static gbt_status add_directions(baking *b, frame *f, const decoder *trained, do
         for (size_t i = 0; i < f->gaussians.count && status == GBT_OK; i++) {
             sums *s = &b->sums[f->tape.slot[i]]; /* every anchor is in its own row */
             if (s->weight > 0)
-                add_color(b, s, direction, (const float[3]){f->gaussians.red[i], f->gaussians.green[i], f->gaussians.blue[i]}, prior * s->weight / DIRECTIONS);
+                add_color(b, s, direction, (const float[3]){f->gaussians.red[i], f->gaussians.green[i], f->gaussians.blue[i]},
+                          prior * s->weight / DIRECTIONS);
         }
     }
     mem_free(all);
@@ -200,7 +201,8 @@ static void solve_shape(const sums *s, float scale_log[3], float quat[4])
         quat[k] = (float)(rows[big][k] / sqrt(norm));
 }
 
-/* Over the views in which the anchor was decoded: where the Gaussian was not made its opacity was 0, and it would have been as large as elsewhere. */
+/* Over the views in which the anchor was decoded: where the Gaussian was not made its opacity was 0, and it would have been as large as
+   elsewhere. */
 static float opacity_of(const sums *s, uint32_t visible)
 {
     const double missed = visible > s->kept && s->kept > 0 ? (double)(visible - s->kept) / s->kept : 0;
@@ -235,8 +237,8 @@ static gbt_status solve(const baking *b, int sh_degree, bake_result *out, gbt_er
     return GBT_OK;
 }
 
-gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_camera *cameras, size_t camera_count, const trace_settings *settings,
-                      const bake_def *def, bake_result *out, gbt_error *err)
+gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_camera *cameras, size_t camera_count,
+                      const trace_settings *settings, const bake_def *def, bake_result *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
     if (def->sh_degree < 0 || def->sh_degree > 3 || !(def->prior >= 0 && def->prior <= 1))

@@ -100,8 +100,8 @@ static void set_rates(refining *r, int step, int steps)
     r->harmonics = adam_rates_at(fall * first_rates.harmonics, t);
 }
 
-static gbt_status refine_step(refining *r, frame *teacher, const anchors *a, const decoder *d, const gbt_camera *camera, const trace_settings *settings,
-                              const uint32_t words[4], gbt_error *err)
+static gbt_status refine_step(refining *r, frame *teacher, const anchors *a, const decoder *d, const gbt_camera *camera,
+                              const trace_settings *settings, const uint32_t words[4], gbt_error *err)
 {
     gbt_camera sparse = *camera;
     const bool some = gbt_camera_every(camera, PIXEL_STEP, (int)(words[1] % PIXEL_STEP), (int)(words[2] % PIXEL_STEP), &sparse);
@@ -116,8 +116,8 @@ static gbt_status refine_step(refining *r, frame *teacher, const anchors *a, con
     return GBT_OK;
 }
 
-gbt_status refine_cloud(frame *teacher, const anchors *a, const decoder *d, const gbt_camera *cameras, size_t camera_count, const trace_settings *settings,
-                        const refine_def *def, gaussian_cloud *cloud, gbt_error *err)
+gbt_status refine_cloud(frame *teacher, const anchors *a, const decoder *d, const gbt_camera *cameras, size_t camera_count,
+                        const trace_settings *settings, const refine_def *def, gaussian_cloud *cloud, gbt_error *err)
 {
     if (def->steps < 0 || camera_count == 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "refine: %d steps, %zu cameras (wanted 0 or more, 1 or more)", def->steps, camera_count);

@@ -19,7 +19,7 @@ refine_def refine_def_default(void);
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count. Cost: some 30 ms of two cores a step at 480 x 359 and 40,000 Gaussians.
  */
-gbt_status refine_cloud(frame *teacher, const anchors *a, const decoder *d, const gbt_camera *cameras, size_t camera_count, const trace_settings *settings,
-                        const refine_def *def, gaussian_cloud *cloud, gbt_error *err);
+gbt_status refine_cloud(frame *teacher, const anchors *a, const decoder *d, const gbt_camera *cameras, size_t camera_count,
+                        const trace_settings *settings, const refine_def *def, gaussian_cloud *cloud, gbt_error *err);
 
 #endif

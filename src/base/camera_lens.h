@@ -42,7 +42,9 @@ typedef struct camera_lens {
  */
 bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens);
 
-/** Where the ray through an image point starts, in camera axes: the centre (0, 0, 0), or a point of the plane Z = 0 of an orthographic lens. */
+/**
+ * Where the ray through an image point starts, in camera axes: the centre (0, 0, 0), or a point of the plane Z = 0 of an orthographic lens.
+ */
 void camera_lens_origin(const camera_lens *lens, double px, double py, double origin_cam[3]);
 
 /** Do all rays of the lens have Z > 0, whatever its parameters? Such a lens has a plane in focus; others have a sphere. */

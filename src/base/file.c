@@ -149,7 +149,8 @@ bool file_largest_number(const char *folder, const char *prefix, unsigned long *
     bool found = false;
     for (const struct dirent *entry; (entry = readdir(entries)) != NULL;) {
         const char *digits = entry->d_name + length;
-        if (strncmp(entry->d_name, prefix, length) != 0 || !isdigit((unsigned char)digits[0]) || digits[strspn(digits, "0123456789")] != '\0')
+        if (strncmp(entry->d_name, prefix, length) != 0 || !isdigit((unsigned char)digits[0]) ||
+            digits[strspn(digits, "0123456789")] != '\0')
             continue;
         const unsigned long number = strtoul(digits, NULL, 10);
         *out = found && number < *out ? *out : number;

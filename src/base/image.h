@@ -63,7 +63,10 @@ typedef struct image_names {
  */
 gbt_status image_read_raw(const char *path, image *out, image_names *names, gbt_error *err);
 
-/** Write atomically (temporary name in the same folder, then rename). PNG: 8 bit, floor(clamp(x) * 255 + 0.5). EXR: 32-bit float. By extension. */
+/**
+ * Write atomically (temporary name in the same folder, then rename). PNG: 8 bit, floor(clamp(x) * 255 + 0.5). EXR: 32-bit float. By
+ * extension.
+ */
 gbt_status image_write(const char *path, const image *im, gbt_error *err);
 
 /** The PNG that image_write() would make, in memory (for the report). Free `*bytes` with mem_free(). */

@@ -125,7 +125,8 @@ void log_count(const char *stage, uint64_t done, uint64_t total, double psnr)
     e.seconds_left = done > 0 ? e.seconds * (double)(total - done) / (double)done : (double)NAN;
     const int used = snprintf(line, sizeof line, "%s: %llu of %llu", stage, (unsigned long long)done, (unsigned long long)total);
     if (isfinite(e.seconds_left))
-        snprintf(line + used, sizeof line - (size_t)used, "  %.0f:%02.0f left", floor(e.seconds_left / 60), floor(fmod(e.seconds_left, 60)));
+        snprintf(line + used, sizeof line - (size_t)used, "  %.0f:%02.0f left", floor(e.seconds_left / 60),
+                 floor(fmod(e.seconds_left, 60)));
     log_progress(&e);
 }
 

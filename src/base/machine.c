@@ -124,3 +124,8 @@ machine machine_read(const char *root)
         m.memory_limit_bytes = smaller(m.memory_limit_bytes, (size_t)space.rlim_cur);
     return m;
 }
+
+int machine_threads(const machine *m)
+{
+    return (int)fmax(1, floor(fmin((double)m->processors_allowed, m->processors_quota) + 0.5));
+}

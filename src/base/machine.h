@@ -22,4 +22,11 @@ typedef struct machine {
  */
 machine machine_read(const char *root);
 
+/**
+ * Threads that find processor time: the processors this process may run on, at most its group's quota, rounded; >= 1.
+ *
+ * More of them would only wait for each other: a group that has used up its time stands still until the next period.
+ */
+int machine_threads(const machine *m);
+
 #endif

@@ -37,9 +37,11 @@ void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err)
     bytes = (bytes + MEM_ALIGN - 1) / MEM_ALIGN * MEM_ALIGN;
     if (bytes == 0)
         bytes = MEM_ALIGN;
-    /* Large arrays ask for large pages: a tree is walked in no order, and misses of the address cache cost as much as misses of the data. */
+    /* Large arrays ask for large pages: a tree is walked in no order, and misses of the address cache cost as much as misses of the
+       data. */
     const bool large = bytes >= 4 * LARGE_PAGE;
-    void *pointer = must_fail() ? NULL : aligned_alloc(large ? LARGE_PAGE : MEM_ALIGN, large ? (bytes + LARGE_PAGE - 1) / LARGE_PAGE * LARGE_PAGE : bytes);
+    void *pointer = must_fail() ? NULL : aligned_alloc(large ? LARGE_PAGE : MEM_ALIGN,
+                                                       large ? (bytes + LARGE_PAGE - 1) / LARGE_PAGE * LARGE_PAGE : bytes);
     if (pointer != NULL && large)
         madvise(pointer, bytes, MADV_HUGEPAGE); /* a wish */
     if (pointer == NULL)

@@ -10,7 +10,10 @@
 
 enum { MEM_ALIGN = 64 };
 
-/** `count * size` bytes, uninitialised, 64-byte aligned; NULL with a message naming `what` on overflow or exhaustion. count 0 gives a valid pointer. */
+/**
+ * `count * size` bytes, uninitialised, 64-byte aligned; NULL with a message naming `what` on overflow or exhaustion. count 0 gives a valid
+ * pointer.
+ */
 void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err);
 
 /** The same, filled with zeros. */

@@ -27,7 +27,7 @@ static inline size_t parallel_block_count(size_t count, size_t grain)
 }
 
 void parallel_set_threads(int threads); /* >= 1; process-wide */
-int parallel_threads(void);             /* the number set, else the number of processors this process may use */
+int parallel_threads(void);             /* the number set, else machine_threads() of this machine */
 
 /** Name and version of the library behind these, as it runs: "oneTBB 2021.8". Static. */
 const char *parallel_library(void);

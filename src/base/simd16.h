@@ -79,7 +79,8 @@ static inline void f16_load_turned(const float *const rows[16], f16 out[16])
     for (int i = 0; i < 8; i++)
         y[2 * i] = _mm512_unpacklo_ps(x[2 * i], x[2 * i + 1]), y[2 * i + 1] = _mm512_unpackhi_ps(x[2 * i], x[2 * i + 1]);
     for (int i = 0; i < 4; i++) {
-        const __m512d a = _mm512_castps_pd(y[4 * i]), b = _mm512_castps_pd(y[4 * i + 1]), c = _mm512_castps_pd(y[4 * i + 2]), d = _mm512_castps_pd(y[4 * i + 3]);
+        const __m512d a = _mm512_castps_pd(y[4 * i]), b = _mm512_castps_pd(y[4 * i + 1]);
+        const __m512d c = _mm512_castps_pd(y[4 * i + 2]), d = _mm512_castps_pd(y[4 * i + 3]);
         x[4 * i] = _mm512_castpd_ps(_mm512_unpacklo_pd(a, c)), x[4 * i + 1] = _mm512_castpd_ps(_mm512_unpackhi_pd(a, c));
         x[4 * i + 2] = _mm512_castpd_ps(_mm512_unpacklo_pd(b, d)), x[4 * i + 3] = _mm512_castpd_ps(_mm512_unpackhi_pd(b, d));
     }
@@ -115,17 +116,22 @@ static inline f16 f16_min(f16 x, f16 y) { return F16_BOTH(_mm256_min_ps, x, y); 
 static inline f16 f16_max(f16 x, f16 y) { return F16_BOTH(_mm256_max_ps, x, y); }
 static inline m16 f16_le(f16 x, f16 y) { return (m16){_mm256_cmp_ps(x.a, y.a, _CMP_LE_OQ), _mm256_cmp_ps(x.b, y.b, _CMP_LE_OQ)}; }
 static inline m16 f16_lt(f16 x, f16 y) { return (m16){_mm256_cmp_ps(x.a, y.a, _CMP_LT_OQ), _mm256_cmp_ps(x.b, y.b, _CMP_LT_OQ)}; }
-static inline f16 f16_select(m16 m, f16 yes, f16 no) { return (f16){_mm256_blendv_ps(no.a, yes.a, m.a), _mm256_blendv_ps(no.b, yes.b, m.b)}; }
+static inline f16 f16_select(m16 m, f16 yes, f16 no)
+{
+    return (f16){_mm256_blendv_ps(no.a, yes.a, m.a), _mm256_blendv_ps(no.b, yes.b, m.b)};
+}
 static inline f16 f16_mul_where(m16 m, f16 x, f16 y) { return f16_select(m, f16_mul(x, y), x); }
 static inline f16 f16_add_where(m16 m, f16 x, f16 y) { return f16_select(m, f16_add(x, y), x); }
 static inline f16 f16_round(f16 x)
 {
-    return (f16){_mm256_round_ps(x.a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC), _mm256_round_ps(x.b, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)};
+    return (f16){_mm256_round_ps(x.a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC),
+                 _mm256_round_ps(x.b, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)};
 }
 static inline f16 f16_scale_pow2(f16 x, f16 n)
 {
     const __m256i na = _mm256_slli_epi32(_mm256_cvtps_epi32(n.a), 23), nb = _mm256_slli_epi32(_mm256_cvtps_epi32(n.b), 23);
-    return (f16){_mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(x.a), na)), _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(x.b), nb))};
+    return (f16){_mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(x.a), na)),
+                 _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(x.b), nb))};
 }
 #define F16_REDUCE(name, op8, op4)                                                                        \
     static inline float name(f16 x)                                                                       \

@@ -42,7 +42,8 @@ static void box_bounds(const struct RTCBoundsFunctionArguments *args)
 }
 
 /* Interval of t in which each ray is between two planes, cut with what is there. */
-static inline __attribute__((always_inline)) void cut_interval(float lower, float upper, const float *origin, const float *inverse, float *enter, float *leave)
+static inline __attribute__((always_inline)) void cut_interval(float lower, float upper, const float *origin, const float *inverse,
+                                                               float *enter, float *leave)
 {
     for (int i = 0; i < SCENE_LANES; i++) {
         const float a = (lower - origin[i]) * inverse[i], b = (upper - origin[i]) * inverse[i];
@@ -54,7 +55,7 @@ static inline __attribute__((always_inline)) void cut_interval(float lower, floa
 
 /* Embree's coherent traversal follows the hull of the packet and calls every box that this meets crossed by all rays, and a scene of one
    box is called crossed unseen: which rays cross it is found here, with the same bits for every instruction set. */
-#define CROSSING_VARIANT(isa, attribute)                                                                                                    \
+#define CROSSING_VARIANT(isa, attribute)                                                                                                   \
     attribute static unsigned crossing_lanes_##isa(const packet *p, const struct RTCBuildPrimitive *box)                                   \
     {                                                                                                                                      \
         const struct RTCRay16 *ray = &p->rays->ray;                                                                                        \
@@ -174,8 +175,8 @@ static bool set_lane(packet *p, struct RTCRay16 *ray, unsigned i, const float or
     return true;
 }
 
-void gaussian_scene_visit(const gaussian_scene *scene, const float origin[3][SCENE_LANES], const float dir[3][SCENE_LANES], float t_near, float t_far,
-                          unsigned active, gaussian_visit_fn *visit, void *user)
+void gaussian_scene_visit(const gaussian_scene *scene, const float origin[3][SCENE_LANES], const float dir[3][SCENE_LANES], float t_near,
+                          float t_far, unsigned active, gaussian_visit_fn *visit, void *user)
 {
     if (scene->box_count == 0)
         return;

@@ -50,7 +50,7 @@ typedef void gaussian_visit_fn(uint32_t id, unsigned lanes, void *user);
  *
  * Threads: any number at a time on a built scene. Cost: one rtcIntersect16.
  */
-void gaussian_scene_visit(const gaussian_scene *scene, const float origin[3][SCENE_LANES], const float dir[3][SCENE_LANES], float t_near, float t_far,
-                          unsigned active, gaussian_visit_fn *visit, void *user);
+void gaussian_scene_visit(const gaussian_scene *scene, const float origin[3][SCENE_LANES], const float dir[3][SCENE_LANES], float t_near,
+                          float t_far, unsigned active, gaussian_visit_fn *visit, void *user);
 
 #endif

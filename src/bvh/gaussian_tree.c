@@ -172,7 +172,8 @@ static tree_node *widen(builder *b, const binary_node *root)
         node->lower_x[i] = bounds[i].lower_x, node->upper_x[i] = bounds[i].upper_x;
         node->lower_y[i] = bounds[i].lower_y, node->upper_y[i] = bounds[i].upper_y;
         node->lower_z[i] = bounds[i].lower_z, node->upper_z[i] = bounds[i].upper_z;
-        node->child[i] = (child[i] & 1) != 0 ? place_leaf(b, child[i]) : (uint64_t)(uintptr_t)widen(b, (const binary_node *)(uintptr_t)child[i]);
+        node->child[i] = (child[i] & 1) != 0 ? place_leaf(b, child[i])
+                                             : (uint64_t)(uintptr_t)widen(b, (const binary_node *)(uintptr_t)child[i]);
     }
     return node;
 }

@@ -1,7 +1,8 @@
 /* bvh/gaussian_tree.h -- a 16-wide tree over the ellipsoid proxies of Gaussians, made by Embree's builder.
 
    The proxy of Gaussian i is the ellipsoid at radius sqrt(2 ln(opacity / alpha_min)) std-devs: exactly the set where its response
-   reaches alpha_min. Inner nodes hold the padded tight boxes of these ellipsoids (proxy.h); leaves hold up to 16 of the ellipsoids themselves.
+   reaches alpha_min. Inner nodes hold the padded tight boxes of these ellipsoids (proxy.h); leaves hold up to 16 of the ellipsoids
+   themselves.
 
    Both are laid out for kernels that test 16 children at once, so their layout is part of the interface. */
 #ifndef GBT_BVH_GAUSSIAN_TREE_H

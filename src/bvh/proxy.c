@@ -38,7 +38,8 @@ static bool proxy_box(const gaussians *g, size_t i, float alpha_min, float radiu
     const float k = fminf(sqrtf(2 * logf(opacity / alpha_min)), radius);
     float m[9];
     quat_to_matrix(q, m);
-    bool fine = isfinite(opacity) && s[0] > 0 && s[1] > 0 && s[2] > 0 && isfinite(g->red[i]) && isfinite(g->green[i]) && isfinite(g->blue[i]);
+    bool fine = isfinite(opacity) && s[0] > 0 && s[1] > 0 && s[2] > 0 && isfinite(g->red[i]) && isfinite(g->green[i]) &&
+                isfinite(g->blue[i]);
     for (int j = 0; j < 3; j++) {
         const float a = m[3 * j] * s[0], b = m[3 * j + 1] * s[1], c = m[3 * j + 2] * s[2];
         half[j] = k * sqrtf(a * a + b * b + c * c);
@@ -94,7 +95,8 @@ gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float radius, f
     uint32_t *scratch = mem_alloc(blocks, 3 * sizeof *scratch, "bvh blocks", err);
     if (scratch == NULL)
         return GBT_ERR_NO_MEMORY;
-    box_job job = {.g = g, .alpha_min = alpha_min, .radius = radius, .block_kept = scratch, .block_rejected = scratch + blocks, .block_max = (float *)(scratch + 2 * blocks)};
+    box_job job = {.g = g, .alpha_min = alpha_min, .radius = radius, .block_kept = scratch, .block_rejected = scratch + blocks,
+                   .block_max = (float *)(scratch + 2 * blocks)};
     parallel_blocks(g->count, BLOCK, box_block, &job);
     size_t count = 0;
     for (size_t i = 0; i < blocks; i++) {

@@ -34,7 +34,8 @@ static int run(const command *self, int argc, char **argv)
         print_number("ssim_interior", c.ssim_interior, ", ");
         print_number("flip", c.flip, "}\n");
     } else {
-        printf("%d x %d: PSNR %.4f dB, SSIM %.6f (windows inside: %.6f), FLIP %.6f\n", c.width, c.height, c.psnr, c.ssim, c.ssim_interior, c.flip);
+        printf("%d x %d: PSNR %.4f dB, SSIM %.6f (windows inside: %.6f), FLIP %.6f\n", c.width, c.height, c.psnr, c.ssim, c.ssim_interior,
+               c.flip);
     }
     return 0;
 }

@@ -16,11 +16,15 @@ static int run(const command *self, int argc, char **argv)
     double minutes = 2;
     int threads = 0;
     const option options[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR", .help = "folder for the scene and the run"},
-        {.name = "minutes", .kind = OPTION_DOUBLE, .value = &minutes, .min = 0.05, .max = 600, .value_name = "M", .help = "time for training"},
-        {.name = "scene", .kind = OPTION_STRING, .value = &scene.name, .value_name = "NAME", .help = "which procedural scene (see make-scene)"},
+        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR",
+         .help = "folder for the scene and the run"},
+        {.name = "minutes", .kind = OPTION_DOUBLE, .value = &minutes, .min = 0.05, .max = 600, .value_name = "M",
+         .help = "time for training"},
+        {.name = "scene", .kind = OPTION_STRING, .value = &scene.name, .value_name = "NAME",
+         .help = "which procedural scene (see make-scene)"},
         {.name = "seed", .kind = OPTION_UINT64, .value = &train.seed, .value_name = "S", .help = "of everything that is random"},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
+        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+         .help = "0: all processors, at most the container's share"},
     };
     operands none;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 0, 0, argc, argv, &none);
@@ -29,7 +33,8 @@ static int run(const command *self, int argc, char **argv)
     if (threads > 0)
         gbt_set_threads(threads);
     char data[4096], run_folder[4096], command_line[8400];
-    if (snprintf(data, sizeof data, "%s/scene", out) >= (int)sizeof data || snprintf(run_folder, sizeof run_folder, "%s/run", out) >= (int)sizeof run_folder)
+    if (snprintf(data, sizeof data, "%s/scene", out) >= (int)sizeof data || snprintf(run_folder, sizeof run_folder, "%s/run",
+                                                                                     out) >= (int)sizeof run_folder)
         return command_misused("--output: the path is too long");
     snprintf(command_line, sizeof command_line, "gbtrace train %s -o %s --budget %.0fs", data, run_folder, 60 * minutes);
     train.budget_seconds = 60 * minutes;
@@ -46,9 +51,11 @@ static int run(const command *self, int argc, char **argv)
         status = finish_run(run_folder, false, false, &err);
     }
     if (status == GBT_OK)
-        printf("Open %s/report.html in a browser.\nYour own photos: gbtrace train DATA -o RUN --budget 10m   (DATA holds images/ and sparse/0 from COLMAP)\n",
+        printf("Open %s/report.html in a browser.\nYour own photos: gbtrace train DATA -o RUN --budget 10m   (DATA holds images/ and "
+               "sparse/0 from COLMAP)\n",
                run_folder);
     return command_failed(status, &err);
 }
 
-const command command_demo = {.name = "demo", .summary = "make a scene, train on it, score it, report, in one go", .usage = "[--minutes M] [-o DIR]", .run = run};
+const command command_demo = {.name = "demo", .summary = "make a scene, train on it, score it, report, in one go",
+                              .usage = "[--minutes M] [-o DIR]", .run = run};

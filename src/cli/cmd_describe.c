@@ -24,4 +24,5 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_describe = {
-    .name = "describe", .summary = "this command line as a manual page, or as completion for a shell", .usage = "man|bash|zsh|fish", .run = run, .words = form_names};
+    .name = "describe", .summary = "this command line as a manual page, or as completion for a shell", .usage = "man|bash|zsh|fish",
+        .run = run, .words = form_names};

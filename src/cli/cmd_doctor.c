@@ -47,7 +47,8 @@ static void check_environment(gbt_diagnosis *d)
             options_visit(command_list[i], look_in, &s);
         known += s.found, unknown += !s.found;
         if (!s.found && unknown == 1)
-            snprintf(c->advice, sizeof c->advice, "no command has the option of %.*s: unset it, or mend the name", (int)strcspn(s.name, "="), s.name);
+            snprintf(c->advice, sizeof c->advice, "no command has the option of %.*s: unset it, or mend the name",
+                     (int)strcspn(s.name, "="), s.name);
     }
     c->level = unknown > 0 ? GBT_CHECK_WARN : GBT_CHECK_OK;
     snprintf(c->found, sizeof c->found, "%d variables set options, %d are called so and set nothing", known, unknown);
@@ -105,4 +106,5 @@ static int run(const command *self, int argc, char **argv)
     return failed > 0;
 }
 
-const command command_doctor = {.name = "doctor", .summary = "is this build all right, on this machine, in this folder", .usage = "[FOLDER]", .run = run};
+const command command_doctor = {.name = "doctor", .summary = "is this build all right, on this machine, in this folder",
+                                .usage = "[FOLDER]", .run = run};

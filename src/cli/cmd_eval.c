@@ -8,14 +8,19 @@ static int run(const command *self, int argc, char **argv)
     gbt_evaluate_def def = gbt_evaluate_def_default();
     int threads = 0;
     const option options[] = {
-        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN", .help = "the same as RUN", .aliases = "model-paths"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "data set in place of the one it was trained on", .aliases = "s source-path"},
+        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN", .help = "the same as RUN",
+         .aliases = "model-paths"},
+        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA",
+         .help = "data set in place of the one it was trained on", .aliases = "s source-path"},
         {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the scores there too"},
-        {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray", .help = "what draws the model; default: what it was trained with"},
+        {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray",
+         .help = "what draws the model; default: what it was trained with"},
         {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",
          .help = "divide the photos' size by this; 0: as in training", .aliases = "r resolution"},
-        {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast", .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
+        {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast",
+         .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
+        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+         .help = "0: all processors, at most the container's share"},
     };
     operands model;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);
@@ -27,4 +32,5 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_evaluate(model.value[0], &def, &err), &err);
 }
 
-const command command_eval = {.name = "eval", .summary = "score the held-out views: PSNR, SSIM, FLIP; renders and report", .usage = "RUN", .run = run, .alias = "metrics"};
+const command command_eval = {.name = "eval", .summary = "score the held-out views: PSNR, SSIM, FLIP; renders and report", .usage = "RUN",
+                              .run = run, .alias = "metrics"};

@@ -13,7 +13,8 @@ static const char splits[] = "test|train|all";
 static bool read_size(const char *text, int *width, int *height)
 {
     int used = 0;
-    return strspn(text, "0123456789x") == strlen(text) && sscanf(text, "%5dx%5d%n", width, height, &used) == 2 && text[used] == '\0' && *width > 0 && *height > 0;
+    return strspn(text, "0123456789x") == strlen(text) && sscanf(text, "%5dx%5d%n", width, height, &used) == 2 && text[used] == '\0' &&
+           *width > 0 && *height > 0;
 }
 
 static int run(const command *self, int argc, char **argv)
@@ -26,27 +27,37 @@ static int run(const command *self, int argc, char **argv)
          .help = "folder for the images; default: RUN/renders/SPLIT; with --path also a film: .mp4, .webm, .gif (by ffmpeg)"},
         {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN", .help = "the same as RUN"},
         {.name = "split", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .help = "which views of the data set"},
-        {.name = "skip-train", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .fixed = "test", .help = "the same as --split test"},
-        {.name = "skip-test", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .fixed = "train", .help = "the same as --split train"},
+        {.name = "skip-train", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .fixed = "test",
+         .help = "the same as --split test"},
+        {.name = "skip-test", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .fixed = "train",
+         .help = "the same as --split train"},
         {.name = "iteration", .kind = OPTION_ELSEWHERE, .help = "a run keeps its last model alone"},
         {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json",
          .help = "one picture of this camera (lens, aperture, rolling shutter, rays: docs/cameras.md), no views"},
         {.name = "path", .kind = OPTION_STRING, .value = &def.path, .value_name = "orbit|interpolate|FILE.json",
          .help = "a film: around what the photos show, through their cameras, or along those of a file (docs/video.md)"},
-        {.name = "frames", .kind = OPTION_INT, .value = &def.frames, .min = 0, .max = 100000, .value_name = "N", .help = "of the film; 0: 240 around, 15 for each photo, all of a file"},
-        {.name = "fps", .kind = OPTION_DOUBLE, .value = &def.fps, .min = 0, .max = 1000, .value_name = "F", .help = "frames per second; 0: what a path file says, else 30"},
-        {.name = "size", .kind = OPTION_STRING, .value = &size, .value_name = "WxH", .help = "of the film, as 1280x720; default: that of the photos"},
+        {.name = "frames", .kind = OPTION_INT, .value = &def.frames, .min = 0, .max = 100000, .value_name = "N",
+         .help = "of the film; 0: 240 around, 15 for each photo, all of a file"},
+        {.name = "fps", .kind = OPTION_DOUBLE, .value = &def.fps, .min = 0, .max = 1000, .value_name = "F",
+         .help = "frames per second; 0: what a path file says, else 30"},
+        {.name = "size", .kind = OPTION_STRING, .value = &size, .value_name = "WxH",
+         .help = "of the film, as 1280x720; default: that of the photos"},
         {.name = "outputs", .kind = OPTION_STRING, .value = &def.outputs, .value_name = "LIST",
-         .help = "EXR files beside the picture: transmittance,depth,median-depth,normal,hits,anchor or some of them (docs/formats.md)", .aliases = "aov"},
-        {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast", .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
+         .help = "EXR files beside the picture: transmittance,depth,median-depth,normal,hits,anchor or some of them (docs/formats.md)",
+         .aliases = "aov"},
+        {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast",
+         .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
         {.name = "insert", .kind = OPTION_STRING, .value = &def.insert, .value_name = "FILE.json",
          .help = "put meshes into the scene: matt or mirrors, with shadows (docs/inserting.md)"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "cameras of this data set; needed for plain Gaussians (.ply, .splat, .spz) without --camera", .aliases = "s source-path"},
-        {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray|reference", .help = "what draws the model; default: what it was trained with. The reference is in double, and slow"},
+        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA",
+         .help = "cameras of this data set; needed for plain Gaussians (.ply, .splat, .spz) without --camera", .aliases = "s source-path"},
+        {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray|reference",
+         .help = "what draws the model; default: what it was trained with. The reference is in double, and slow"},
         {.name = "format", .kind = OPTION_CHOICE, .value = &def.format, .choices = "png|exr", .help = "8-bit PNG, or float EXR"},
         {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",
          .help = "divide the photos' size by this; 0: as in training", .aliases = "r resolution"},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
+        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+         .help = "0: all processors, at most the container's share"},
     };
     operands model;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);
@@ -61,7 +72,8 @@ static int run(const command *self, int argc, char **argv)
         struct stat info;
         if (stat(model.value[0], &info) != 0 || !S_ISDIR(info.st_mode))
             return command_misused("--output is missing (usage: gbtrace %s %s)", self->name, self->usage);
-        if (snprintf(folder, sizeof folder, "%s/renders%s%s", model.value[0], def.camera == NULL ? "/" : "", def.camera == NULL ? split : "") >= (int)sizeof folder)
+        if (snprintf(folder, sizeof folder, "%s/renders%s%s", model.value[0], def.camera == NULL ? "/" : "",
+                     def.camera == NULL ? split : "") >= (int)sizeof folder)
             return command_misused("%.60s...: the path is too long", model.value[0]);
         out = folder;
     }
@@ -70,4 +82,5 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_render(model.value[0], out, &def, &err), &err);
 }
 
-const command command_render = {.name = "render", .summary = "render the views of a scene, a camera of your own, or a film", .usage = "RUN|GAUSSIANS [-o DIR]", .run = run};
+const command command_render = {.name = "render", .summary = "render the views of a scene, a camera of your own, or a film",
+                                .usage = "RUN|GAUSSIANS [-o DIR]", .run = run};

@@ -56,7 +56,8 @@ enum { STUDY_COUNT = 7 };
 
 static const char *const study_names[STUDY_COUNT + 1] = {"speed", "crosscheck", "rate", "stability", "paper", "time", "anchors", NULL};
 static const struct { int models_min, models_max; gbt_status (*run)(const study_request *, gbt_error *); } studies[STUDY_COUNT] = {
-    {1, 16, run_speed}, {1, 16, run_crosscheck}, {1, 6, run_rate}, {0, 0, run_stability}, {1, 16, run_paper}, {1, 16, run_time}, {1, 16, run_anchors}};
+    {1, 16, run_speed}, {1, 16, run_crosscheck}, {1, 6, run_rate}, {0, 0, run_stability}, {1, 16, run_paper}, {1, 16, run_time},
+    {1, 16, run_anchors}};
 
 static const char *const *names_of_studies(void)
 {
@@ -65,8 +66,8 @@ static const char *const *names_of_studies(void)
 
 static int run(const command *self, int argc, char **argv)
 {
-    study_request request = {.def = gbt_study_def_default(), .stability = gbt_stability_def_default(), .paper = gbt_paper_def_default(), .time = gbt_time_def_default(),
-                             .anchors = gbt_anchors_def_default()};
+    study_request request = {.def = gbt_study_def_default(), .stability = gbt_stability_def_default(), .paper = gbt_paper_def_default(),
+                             .time = gbt_time_def_default(), .anchors = gbt_anchors_def_default()};
     bool quick = false;
     gbt_study_def *def = &request.def;
     gbt_paper_def *paper = &request.paper;
@@ -75,18 +76,28 @@ static int run(const command *self, int argc, char **argv)
     double downscale = 1;
     uint64_t iterations = 0;
     const option options[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &request.folder, .value_name = "DIR", .help = "folder for the tables and the chart", .required = true},
-        {.name = "camera", .kind = OPTION_STRING, .value = &def->camera, .value_name = "FILE.json", .help = "the camera of every .ply; default: camera.json beside it"},
-        {.name = "repeats", .kind = OPTION_INT, .value = &def->repeats, .min = 1, .max = 1000, .value_name = "N", .help = "speed: timed passes of each setting; the median counts"},
-        {.name = "only", .kind = OPTION_STRING, .value = &request.stability.only, .value_name = "A1,A9", .help = "stability: these cases; default: all"},
+        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &request.folder, .value_name = "DIR",
+         .help = "folder for the tables and the chart", .required = true},
+        {.name = "camera", .kind = OPTION_STRING, .value = &def->camera, .value_name = "FILE.json",
+         .help = "the camera of every .ply; default: camera.json beside it"},
+        {.name = "repeats", .kind = OPTION_INT, .value = &def->repeats, .min = 1, .max = 1000, .value_name = "N",
+         .help = "speed: timed passes of each setting; the median counts"},
+        {.name = "only", .kind = OPTION_STRING, .value = &request.stability.only, .value_name = "A1,A9",
+         .help = "stability: these cases; default: all"},
         {.name = "quick", .kind = OPTION_FLAG, .value = &quick, .help = "stability: the smaller sizes of its tests"},
-        {.name = "iterations", .kind = OPTION_UINT64, .value = &iterations, .min = 0, .max = 1e9, .value_name = "N", .help = "paper, anchors: steps of every run; 0: 3000 and 1000"},
-        {.name = "renderer", .kind = OPTION_CHOICE, .value = &paper->renderer, .choices = "raster|trace|per-ray", .help = "paper: what photos are compared with"},
+        {.name = "iterations", .kind = OPTION_UINT64, .value = &iterations, .min = 0, .max = 1e9, .value_name = "N",
+         .help = "paper, anchors: steps of every run; 0: 3000 and 1000"},
+        {.name = "renderer", .kind = OPTION_CHOICE, .value = &paper->renderer, .choices = "raster|trace|per-ray",
+         .help = "paper: what photos are compared with"},
         {.name = "tables", .kind = OPTION_STRING, .value = &paper->tables, .value_name = "1,3", .help = "paper: which of its four"},
-        {.name = "budget", .kind = OPTION_DURATION, .value = &request.time.budget_seconds, .min = 1, .max = 1e6, .value_name = "TIME", .help = "time: of a run"},
-        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &downscale, .min = 1, .max = 64, .value_name = "F", .help = "paper, time, anchors: divide the photos' size by this"},
-        {.name = "seeds", .kind = OPTION_INT, .value = &seeds, .min = 0, .max = 10, .value_name = "N", .help = "paper, time, anchors: runs of each variant; 0: 3, 1 and 3"},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T", .help = "0: all processors"},
+        {.name = "budget", .kind = OPTION_DURATION, .value = &request.time.budget_seconds, .min = 1, .max = 1e6, .value_name = "TIME",
+         .help = "time: of a run"},
+        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &downscale, .min = 1, .max = 64, .value_name = "F",
+         .help = "paper, time, anchors: divide the photos' size by this"},
+        {.name = "seeds", .kind = OPTION_INT, .value = &seeds, .min = 0, .max = 10, .value_name = "N",
+         .help = "paper, time, anchors: runs of each variant; 0: 3, 1 and 3"},
+        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+         .help = "0: all processors, at most the container's share"},
     };
     operands named;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 17, argc, argv, &named);
@@ -113,6 +124,9 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(studies[which].run(&request, &err), &err);
 }
 
-const command command_study = {.name = "study", .summary = "speed against accuracy, tracer against rasterizer, size against picture, stability; the paper's tables, quality against time and anchors: measure, draw the chart",
-                               .usage = "speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR", .run = run,
+const command command_study = {.name = "study",
+                               .summary = "speed against accuracy, tracer against rasterizer, size against picture, stability; the paper's "
+                                          "tables, quality against time and anchors: measure, draw the chart",
+                                              .usage = "speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR",
+                                              .run = run,
                                .words = names_of_studies};

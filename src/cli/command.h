@@ -23,8 +23,9 @@ int command_misused(const char *format, ...) __attribute__((format(printf, 1, 2)
 const char *command_nearest(const char *typed, const char *const *names, int count);
 
 /* One line per subcommand; command_list.c lists them. */
-extern const command command_demo, command_info, command_init, command_train, command_eval, command_render, command_report, command_make_scene, command_bench,
-    command_check_grad, command_study, command_compare, command_compress, command_export, command_import, command_view, command_doctor, command_describe;
+extern const command command_demo, command_info, command_init, command_train, command_eval, command_render, command_report,
+    command_make_scene, command_bench, command_check_grad, command_study, command_compare, command_compress, command_export, command_import,
+    command_view, command_doctor, command_describe;
 
 /** All of them, in the order of the help. */
 extern const command *const command_list[];

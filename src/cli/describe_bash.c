@@ -32,7 +32,8 @@ static void write_values(const command *self, const option *options, int option_
         write_pattern(out, self, o);
         if (kind == VALUE_CHOICES)
             describe_choices(o, words, sizeof words);
-        fprintf(out, kind == VALUE_CHOICES ? "words='%s' ;;\n" : "words= want=%s ;;\n", kind == VALUE_CHOICES ? words : kind == VALUE_FILE ? "file" : kind == VALUE_FOLDER ? "folder" : "none");
+        fprintf(out, kind == VALUE_CHOICES ? "words='%s' ;;\n" : "words= want=%s ;;\n",
+                kind == VALUE_CHOICES ? words : kind == VALUE_FILE ? "file" : kind == VALUE_FOLDER ? "folder" : "none");
     }
 }
 
@@ -46,7 +47,8 @@ void describe_bash(FILE *out)
 {
     fputs("# Completion of gbtrace for bash. Made by gbtrace describe bash.\n"
           "_gbtrace() {\n"
-          "    local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]} options= words= want=file\n"
+          "    local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]} options= words= "
+          "want=file\n"
           "    COMPREPLY=()\n"
           "    # bash parts a word at =: --name=VALUE comes as three.\n"
           "    [ \"$current\" = = ] && current=\n"

@@ -6,7 +6,10 @@
 
 #include "gbtrace/status.h"
 
-/** Make RUN/model.gbt small, unless `lossless`; then score the held-out views with what it gives back, and write the report; with `tensorboard`, scores and pictures for it too. */
+/**
+ * Make RUN/model.gbt small, unless `lossless`; then score the held-out views with what it gives back, and write the report; with
+ * `tensorboard`, scores and pictures for it too.
+ */
 gbt_status finish_run(const char *run, bool lossless, bool tensorboard, gbt_error *err);
 
 #endif

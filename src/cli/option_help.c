@@ -122,7 +122,8 @@ void options_notes(const option *o, char *out, size_t size)
 
 void options_print_help(const command *self, const option *options, int option_count)
 {
-    printf("usage: gbtrace %s %s%s[options]\n\n%s\n\noptions:\n", self->name, self->usage, self->usage[0] != '\0' ? " " : "", self->summary);
+    printf("usage: gbtrace %s %s%s[options]\n\n%s\n\noptions:\n", self->name, self->usage, self->usage[0] != '\0' ? " " : "",
+           self->summary);
     for (int i = 0; i < option_count; i++) {
         const option *o = &options[i];
         if (o->kind == OPTION_ELSEWHERE)

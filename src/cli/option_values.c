@@ -201,6 +201,6 @@ void options_bad_value(const option *o, const char *wanted, const char *text, ch
             names[count++] = name;
         nearest = command_nearest(text, names, count);
     }
-    snprintf(out, size, "bad value (wanted %s, got %.80s%s%s%s)", wanted, text[0] != '\0' ? text : "nothing", nearest != NULL ? "; did you mean " : "",
-             nearest != NULL ? nearest : "", nearest != NULL ? "?" : "");
+    snprintf(out, size, "bad value (wanted %s, got %.80s%s%s%s)", wanted, text[0] != '\0' ? text : "nothing",
+             nearest != NULL ? "; did you mean " : "", nearest != NULL ? nearest : "", nearest != NULL ? "?" : "");
 }

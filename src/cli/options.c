@@ -26,8 +26,10 @@ static void make_table(table *t, const option *options, int option_count)
     const option common[OPTIONS_COMMON] = {
         {.name = "progress", .kind = OPTION_CHOICE, .value = &progress_mode, .choices = progress_modes,
          .help = "what stderr tells meanwhile: lines for a person, JSON lines (docs/command-line.md), warnings alone"},
-        {.name = "quiet", .kind = OPTION_CHOICE, .value = &progress_mode, .choices = progress_modes, .fixed = "none", .help = "the same as --progress none"},
-        {.name = "config", .kind = OPTION_STRING, .value = &config_path, .value_name = "FILE", .help = "read name = value lines first; the environment and the command line win"},
+        {.name = "quiet", .kind = OPTION_CHOICE, .value = &progress_mode, .choices = progress_modes, .fixed = "none",
+         .help = "the same as --progress none"},
+        {.name = "config", .kind = OPTION_STRING, .value = &config_path, .value_name = "FILE",
+         .help = "read name = value lines first; the environment and the command line win"},
         {.name = "help", .short_name = 'h', .kind = OPTION_FLAG, .value = &help_wanted, .help = "print this"},
     };
     progress_mode = "auto", config_path = NULL, first_operand = NULL, help_wanted = false;

@@ -23,8 +23,8 @@ static gbt_status read_camera(const json_t *entry, raw_place place, gbt_camera *
     const json_t *position = json_object_get(entry, "position"), *rotation = json_object_get(entry, "rotation");
     double width = 0, height = 0, fx = 0, fy = 0;
     bool fine = get_number(json_object_get(entry, "width"), &width) && get_number(json_object_get(entry, "height"), &height) &&
-                get_number(json_object_get(entry, "fx"), &fx) && get_number(json_object_get(entry, "fy"), &fy) && json_array_size(position) == 3 &&
-                json_array_size(rotation) == 3;
+                get_number(json_object_get(entry, "fx"), &fx) && get_number(json_object_get(entry, "fy"), &fy) &&
+                json_array_size(position) == 3 && json_array_size(rotation) == 3;
     for (size_t i = 0; i < 3 && fine; i++) {
         const json_t *row = json_array_get(rotation, i);
         fine = json_array_size(row) == 3 && get_number(json_array_get(position, i), &out->center[i]);

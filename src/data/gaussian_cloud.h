@@ -18,7 +18,9 @@ enum { GAUSSIAN_SH_COUNT = 16 };
 /** Log-scales stay within +-GAUSSIAN_SCALE_LOG_LIMIT, so that scales, their inverses and the squares of both are floats. */
 #define GAUSSIAN_SCALE_LOG_LIMIT 30
 
-/** Checked and normalised. colour = max(0, 0.5 + sum sh_k Y_k(d)), d: unit, from the camera to the Gaussian (frame/sh.h). Start from {0}. */
+/**
+ * Checked and normalised. colour = max(0, 0.5 + sum sh_k Y_k(d)), d: unit, from the camera to the Gaussian (frame/sh.h). Start from {0}.
+ */
 typedef struct gaussian_cloud {
     size_t count;
     float *mean;      /* [count][3] */

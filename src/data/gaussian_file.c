@@ -74,7 +74,8 @@ gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error 
     result_folder folder;
     const char *path = find_file(given, &folder);
     if (path == NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: cannot be read as Gaussians (wanted .ply, .splat, .spz or a 3DGS result folder)", given);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: cannot be read as Gaussians (wanted .ply, .splat, .spz or a 3DGS result folder)",
+                         given);
     source_file file = {.name = path};
     unsigned char *bytes;
     GBT_TRY(file_read(path, &bytes, &file.size, err));

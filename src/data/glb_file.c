@@ -20,9 +20,10 @@ typedef struct glb {
 /* What was put into the binary chunk since `from` is an attribute. */
 static json_t *add_attribute(glb *g, const char *name, const char *type, int component, size_t from)
 {
-    json_t *accessor = json_pack("{s:i,s:i,s:I,s:s}", "bufferView", (int)json_array_size(g->views), "componentType", component, "count", (json_int_t)g->count,
-                                 "type", type);
-    json_array_append_new(g->views, json_pack("{s:i,s:I,s:I}", "buffer", 0, "byteOffset", (json_int_t)from, "byteLength", (json_int_t)(g->data.size - from)));
+    json_t *accessor = json_pack("{s:i,s:i,s:I,s:s}", "bufferView", (int)json_array_size(g->views), "componentType", component, "count",
+                                 (json_int_t)g->count, "type", type);
+    json_array_append_new(g->views, json_pack("{s:i,s:I,s:I}", "buffer", 0, "byteOffset", (json_int_t)from, "byteLength",
+                                              (json_int_t)(g->data.size - from)));
     json_object_set_new(g->attributes, name, json_integer((json_int_t)json_array_size(g->accessors)));
     json_array_append_new(g->accessors, accessor);
     return accessor;
@@ -98,11 +99,13 @@ static void put_harmonics(glb *g, const gaussian_cloud *cloud)
 
 static json_t *document(const glb *g)
 {
-    json_t *primitive = json_pack("{s:i,s:O,s:{s:{s:s,s:s,s:s,s:s}}}", "mode", (int)MODE_POINTS, "attributes", g->attributes, "extensions", "KHR_gaussian_splatting",
-                                  "kernel", "ellipse", "colorSpace", "srgb_rec709_display", "sortingMethod", "cameraDistance", "projection", "perspective");
-    return json_pack("{s:{s:s,s:s},s:[s],s:[{s:I}],s:O,s:O,s:[{s:[o]}],s:[{s:i}],s:[{s:[i]}],s:i}", "asset", "version", "2.0", "generator", "gbtrace",
-                     "extensionsUsed", "KHR_gaussian_splatting", "buffers", "byteLength", (json_int_t)g->data.size, "bufferViews", g->views, "accessors",
-                     g->accessors, "meshes", "primitives", primitive, "nodes", "mesh", 0, "scenes", "nodes", 0, "scene", 0);
+    json_t *primitive = json_pack("{s:i,s:O,s:{s:{s:s,s:s,s:s,s:s}}}", "mode", (int)MODE_POINTS, "attributes", g->attributes, "extensions",
+                                  "KHR_gaussian_splatting", "kernel", "ellipse", "colorSpace", "srgb_rec709_display", "sortingMethod",
+                                  "cameraDistance", "projection", "perspective");
+    return json_pack("{s:{s:s,s:s},s:[s],s:[{s:I}],s:O,s:O,s:[{s:[o]}],s:[{s:i}],s:[{s:[i]}],s:i}", "asset", "version", "2.0", "generator",
+                     "gbtrace", "extensionsUsed", "KHR_gaussian_splatting", "buffers", "byteLength", (json_int_t)g->data.size,
+                     "bufferViews", g->views, "accessors", g->accessors, "meshes", "primitives", primitive, "nodes", "mesh", 0, "scenes",
+                     "nodes", 0, "scene", 0);
 }
 
 static gbt_status write_chunks(const char *path, const glb *g, const char *json, gbt_error *err)

@@ -46,8 +46,8 @@ static gbt_status read_marks(const char *path, const image *photo, unsigned char
     GBT_TRY(image_read(path, &mask, err));
     gbt_status status = GBT_OK;
     if (!photo_same_aspect(mask.width, mask.height, photo->width, photo->height))
-        status = base_fail(err, GBT_ERR_FORMAT, "%s: mask does not have the photo's aspect (wanted %d x %d or a multiple, got %d x %d)", path,
-                           photo->width, photo->height, mask.width, mask.height);
+        status = base_fail(err, GBT_ERR_FORMAT, "%s: mask does not have the photo's aspect (wanted %d x %d or a multiple, got %d x %d)",
+                           path, photo->width, photo->height, mask.width, mask.height);
     if (status == GBT_OK)
         status = mark_pixels(&mask, 0, half_of_largest(&mask), out, err);
     if (status == GBT_OK && (mask.width != photo->width || mask.height != photo->height)) {

@@ -15,8 +15,10 @@ static gbt_status add_vertex(mesh_data *out, const double position[3], raw_place
         return raw_fail(err, place, "too many vertices (at most %u)", UINT32_MAX - 1);
     for (int k = 0; k < 3; k++)
         if (!(fabs(position[k]) <= RAW_COORDINATE_LIMIT))
-            return raw_fail(err, place, "vertex %zu: bad coordinate (wanted |x| <= %g, got %g)", out->vertex_count, RAW_COORDINATE_LIMIT, position[k]);
-    GBT_TRY(mem_reserve((void **)&out->position, &out->vertex_capacity, out->vertex_count, out->vertex_count + 1, 3 * sizeof *out->position, "mesh", err));
+            return raw_fail(err, place, "vertex %zu: bad coordinate (wanted |x| <= %g, got %g)", out->vertex_count, RAW_COORDINATE_LIMIT,
+                            position[k]);
+    GBT_TRY(mem_reserve((void **)&out->position, &out->vertex_capacity, out->vertex_count, out->vertex_count + 1, 3 * sizeof *out->position,
+                        "mesh", err));
     memcpy(out->position + 3 * out->vertex_count++, position, 3 * sizeof *position);
     return GBT_OK;
 }
@@ -34,8 +36,8 @@ static gbt_status add_corner(mesh_data *out, fan *f, uint32_t corner, raw_place 
     if (f->count++ >= 2) {
         if (out->triangle_count >= UINT32_MAX - 1)
             return raw_fail(err, place, "too many triangles (at most %u)", UINT32_MAX - 1);
-        GBT_TRY(mem_reserve((void **)&out->triangles, &out->triangle_capacity, out->triangle_count, out->triangle_count + 1, 3 * sizeof *out->triangles,
-                            "mesh", err));
+        GBT_TRY(mem_reserve((void **)&out->triangles, &out->triangle_capacity, out->triangle_count, out->triangle_count + 1,
+                            3 * sizeof *out->triangles, "mesh", err));
         uint32_t *triangle = out->triangles + 3 * out->triangle_count++;
         triangle[0] = f->first, triangle[1] = f->last, triangle[2] = corner;
     }
@@ -43,7 +45,7 @@ static gbt_status add_corner(mesh_data *out, fan *f, uint32_t corner, raw_place 
     return GBT_OK;
 }
 
-/* ---- OBJ ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- OBJ ----------------------------------------------------------------------------------------------------------------------------- */
 
 static gbt_status take_vertex(mesh_data *out, const char *at, const char *end, raw_place place, gbt_error *err)
 {
@@ -119,7 +121,7 @@ static gbt_status parse_obj(const source_file *file, mesh_data *out, gbt_error *
     return GBT_OK;
 }
 
-/* ---- PLY ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- PLY ----------------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct ply_mesh {
     mesh_data *out;

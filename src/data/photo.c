@@ -79,7 +79,8 @@ gbt_status photo_resize(const image *in, int width, int height, image *out, gbt_
     return status;
 }
 
-gbt_status photo_resize_valid(const unsigned char *in, int in_width, int in_height, int width, int height, unsigned char **out, gbt_error *err)
+gbt_status photo_resize_valid(const unsigned char *in, int in_width, int in_height, int width, int height, unsigned char **out,
+                              gbt_error *err)
 {
     image bad = {0}, resized = {0};
     *out = NULL;
@@ -129,8 +130,8 @@ static gbt_status read_stored(const scene_view *view, image *stored, unsigned ch
     GBT_TRY(valid != NULL ? image_read_valid(view->path, stored, valid, err) : image_read(view->path, stored, err));
     if (photo_same_aspect(stored->width, stored->height, view->camera.width, view->camera.height))
         return valid != NULL ? mask_apply(view, stored, valid, err) : GBT_OK;
-    return base_fail(err, GBT_ERR_FORMAT, "%s: photo does not have the camera's aspect (wanted %d x %d or a multiple, got %d x %d)", view->path,
-                     view->camera.width, view->camera.height, stored->width, stored->height);
+    return base_fail(err, GBT_ERR_FORMAT, "%s: photo does not have the camera's aspect (wanted %d x %d or a multiple, got %d x %d)",
+                     view->path, view->camera.width, view->camera.height, stored->width, stored->height);
 }
 
 static gbt_status read_photo(const scene_view *view, int width, int height, image *out, unsigned char **valid, gbt_error *err)

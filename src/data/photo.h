@@ -15,10 +15,16 @@
  */
 gbt_status photo_resize(const image *in, int width, int height, image *out, gbt_error *err);
 
-/** True when two sizes have the same aspect: one scaled to the other's width or height misses the rest by at most one pixel of the smaller. */
+/**
+ * True when two sizes have the same aspect: one scaled to the other's width or height misses the rest by at most one pixel of the smaller.
+ */
 bool photo_same_aspect(int width0, int height0, int width1, int height1);
 
-/** The same for marks of valid pixels, [height][width] of 0 and not 0: an output pixel is valid (1) if its whole rectangle is. `out` is owned. */
-gbt_status photo_resize_valid(const unsigned char *in, int in_width, int in_height, int width, int height, unsigned char **out, gbt_error *err);
+/**
+ * The same for marks of valid pixels, [height][width] of 0 and not 0: an output pixel is valid (1) if its whole rectangle is. `out` is
+ * owned.
+ */
+gbt_status photo_resize_valid(const unsigned char *in, int in_width, int in_height, int width, int height, unsigned char **out,
+                              gbt_error *err);
 
 #endif

@@ -71,13 +71,15 @@ typedef struct kept_list {
 
 static gbt_status keep_item(kept_list *list, double value, gbt_error *err)
 {
-    GBT_TRY(mem_reserve((void **)&list->items, &list->capacity, list->count, list->count + 1, sizeof *list->items, "list of a PLY row", err));
+    GBT_TRY(mem_reserve((void **)&list->items, &list->capacity, list->count, list->count + 1, sizeof *list->items, "list of a PLY row",
+                        err));
     list->items[list->count++] = value;
     return GBT_OK;
 }
 
 /* One binary row; `values` gets every scalar property of the element, `list` one of the lists; the others are skipped. */
-static gbt_status take_binary_row(cursor *c, const ply_header *header, const ply_element *e, double *values, kept_list *list, gbt_error *err)
+static gbt_status take_binary_row(cursor *c, const ply_header *header, const ply_element *e, double *values, kept_list *list,
+                                  gbt_error *err)
 {
     const size_t start = c->at;
     for (size_t i = 0; i < e->property_count && !c->short_read; i++) {

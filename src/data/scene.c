@@ -199,7 +199,8 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
     }
     GBT_TRY(file_join(place, sizeof place, path, "transforms_train.json", err));
     if (!file_exists(place))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json in it)", path);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json in it)", path);
     *source = "blender";
     return load_blender(place, path, raw, err);
 }
@@ -271,7 +272,8 @@ static gbt_status recentre(raw_scene *raw, scene *out, gbt_error *err)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < raw->view_count; i++) {
         raw_view *view = &raw->views[i];
-        out->views[i] = (scene_view){.name = view->name, .path = view->path, .mask_path = view->mask_path, .camera = view->camera, .is_test = view->is_test, .rank = view->rank};
+        out->views[i] = (scene_view){.name = view->name, .path = view->path, .mask_path = view->mask_path, .camera = view->camera,
+                                     .is_test = view->is_test, .rank = view->rank};
         view->name = NULL, view->path = NULL, view->mask_path = NULL;
         for (int k = 0; k < 3; k++)
             out->views[i].camera.center[k] -= out->origin[k];

@@ -58,7 +58,8 @@ typedef enum scene_split_kind {
 
 typedef struct scene_split {
     scene_split_kind kind;
-    int every;             /* SCENE_SPLIT_EVERY: views 0, every, 2 every, ... of the sorted list are held out, a missing photo does not shift them; >= 2. Default 8 */
+    int every;             /* SCENE_SPLIT_EVERY: views 0, every, 2 every, ... of the sorted list are held out, a missing photo does not
+                              shift them; >= 2. Default 8 */
     const char *list_path; /* SCENE_SPLIT_LIST: text file, one image name per line */
 } scene_split;
 
@@ -81,14 +82,17 @@ gbt_status scene_load(const char *path, const scene_split *split, scene *out, gb
 void scene_free(scene *s);
 
 /**
- * Say what the transparent part of photos is: "black", "white", "mask" or "auto", which is white for Blender's synthetic scenes, as everybody scores them,
- * else black, which is also what scene_load() leaves.
+ * Say what the transparent part of photos is: "black", "white", "mask" or "auto", which is white for Blender's synthetic scenes, as
+ * everybody scores them, else black, which is also what scene_load() leaves.
  *
  * @return GBT_OK or GBT_ERR_ARGUMENT ("--alpha: ...")
  */
 gbt_status scene_set_alpha(scene *s, const char *name, gbt_error *err);
 
-/** What is behind everything, when a training photo has an alpha channel and lies on a colour: true, and the colour. Cost: opens every training photo. */
+/**
+ * What is behind everything, when a training photo has an alpha channel and lies on a colour: true, and the colour. Cost: opens every
+ * training photo.
+ */
 bool scene_background(const scene *s, float color[3]);
 
 /**
@@ -102,8 +106,8 @@ gbt_status scene_read_photo(const scene_view *view, int width, int height, image
 /**
  * scene_read_photo(), and which pixels mean something.
  *
- * @param valid [out] NULL when all do, else [height][width]: 0 where a value that is not finite, or a pixel that the mask or the alpha channel
- *                    (SCENE_ALPHA_MASK) leaves out, had a part in it; free with mem_free()
+ * @param valid [out] NULL when all do, else [height][width]: 0 where a value that is not finite, or a pixel that the mask or the alpha
+ *                    channel (SCENE_ALPHA_MASK) leaves out, had a part in it; free with mem_free()
  */
 gbt_status scene_read_photo_valid(const scene_view *view, int width, int height, image *out, unsigned char **valid, gbt_error *err);
 

@@ -75,7 +75,7 @@ gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
     return GBT_OK;
 }
 
-/* ---- what is transparent ---------------------------------------------------------------------------------------------------------------- */
+/* ---- what is transparent ------------------------------------------------------------------------------------------------------------- */
 
 gbt_status scene_set_alpha(scene *s, const char *name, gbt_error *err)
 {
@@ -96,7 +96,8 @@ bool scene_background(const scene *s, float color[3])
     for (size_t i = 0; i < s->view_count; i++) {
         const scene_view *view = &s->views[i];
         int width, height, channels;
-        if (view->is_test || view->alpha == SCENE_ALPHA_MASK || image_probe(view->path, &width, &height, &channels, NULL) != GBT_OK || channels != 4)
+        if (view->is_test || view->alpha == SCENE_ALPHA_MASK || image_probe(view->path, &width, &height, &channels, NULL) != GBT_OK ||
+            channels != 4)
             continue;
         for (int c = 0; c < 3; c++)
             color[c] = view->alpha == SCENE_ALPHA_WHITE;

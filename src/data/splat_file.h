@@ -13,7 +13,10 @@
  */
 gbt_status splat_file_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
-/** Write one, most opaque volume first: viewers show what has been loaded. Only the first spherical harmonic is kept. `origin` as in gaussian_ply.h. */
+/**
+ * Write one, most opaque volume first: viewers show what has been loaded. Only the first spherical harmonic is kept. `origin` as in
+ * gaussian_ply.h.
+ */
 gbt_status splat_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err);
 
 #endif

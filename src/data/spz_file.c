@@ -1,5 +1,5 @@
-/* data/spz_file.c -- header { "NGSP", version, count, degree, fractional bits, flags, 0 }, then streams of positions, opacities, colours, scales,
-   rotations and spherical harmonics; all of it gzipped. */
+/* data/spz_file.c -- header { "NGSP", version, count, degree, fractional bits, flags, 0 }, then streams of positions, opacities, colours,
+   scales, rotations and spherical harmonics; all of it gzipped. */
 #include "data/spz_file.h"
 
 #include <math.h>
@@ -32,14 +32,16 @@ static gbt_status find_fraction(const gaussian_cloud *cloud, const double origin
     for (size_t i = 0; i < 3 * cloud->count; i++)
         largest = fmax(largest, fabs((double)cloud->mean[i] + origin[i % 3]));
     if (!(largest <= COORDINATE_MAX))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a coordinate of %g does not fit a .spz file (limit %d)", path, largest, (int)COORDINATE_MAX);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a coordinate of %g does not fit a .spz file (limit %d)", path, largest,
+                         (int)COORDINATE_MAX);
     *bits = 0;
     while (*bits < FRACTION_BITS_MAX && largest * exp2(*bits + 1) <= COORDINATE_MAX)
         ++*bits;
     return GBT_OK;
 }
 
-/* The largest of four components is left out, with the sign that makes it positive: 2 bits say which, then sign and 9 bits for each other. */
+/* The largest of four components is left out, with the sign that makes it positive: 2 bits say which, then sign and 9 bits for each
+   other. */
 static uint32_t pack_rotation(const float wxyz[4])
 {
     const float q[4] = {wxyz[1], wxyz[2], wxyz[3], wxyz[0]};
@@ -128,7 +130,7 @@ gbt_status spz_file_write(const char *path, const gaussian_cloud *cloud, const d
     return status;
 }
 
-/* ---- reading -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- reading ------------------------------------------------------------------------------------------------------------------------- */
 
 /* Inflate exactly `size` bytes more into `out`. */
 static gbt_status unzip(z_stream *z, const char *name, unsigned char *out, size_t size, gbt_error *err)
@@ -178,7 +180,8 @@ static void unpack(const unsigned char *at, unsigned version, int degree, int fr
 {
     const size_t n = out->count;
     const layout l = layout_of(version, degree);
-    const unsigned char *alpha = at + 9 * n, *color = alpha + n, *scale = color + 3 * n, *rotation = scale + 3 * n, *harmonics = rotation + l.rotation * n;
+    const unsigned char *alpha = at + 9 * n, *color = alpha + n, *scale = color + 3 * n, *rotation = scale + 3 * n,
+        *harmonics = rotation + l.rotation * n;
     out->sh_degree = degree;
     for (size_t i = 0; i < 3 * n; i++) {
         const uint32_t bits = (uint32_t)at[3 * i] | (uint32_t)at[3 * i + 1] << 8 | (uint32_t)at[3 * i + 2] << 16;
@@ -209,7 +212,8 @@ static gbt_status read_zipped(z_stream *z, const source_file *file, gaussian_clo
     if (magic != MAGIC || (version != 2 && version != 3))
         return base_fail(err, GBT_ERR_FORMAT, "%s: .spz version %u (wanted 2 or 3)", file->name, magic == MAGIC ? version : 0u);
     if (degree > 3 || fraction > 24 || count == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: %u Gaussians, degree %d, %d fractional bits (wanted 1 or more, 0 to 3, 0 to 24)", file->name, count, degree, fraction);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %u Gaussians, degree %d, %d fractional bits (wanted 1 or more, 0 to 3, 0 to 24)",
+                         file->name, count, degree, fraction);
     const size_t row = layout_of(version, degree).row;
     if ((double)count * (double)row > 1032.0 * (double)file->size) /* gzip makes nothing smaller than that */
         return base_fail(err, GBT_ERR_FORMAT, "%s: %u Gaussians cannot be in %zu bytes", file->name, count, file->size);

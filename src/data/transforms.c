@@ -345,7 +345,8 @@ static gbt_status read_frame(const scope *s, const char *folder, raw_scene *out,
         mem_free(mask);
         return GBT_ERR_NO_MEMORY;
     }
-    *view = (raw_view){.name = raw_copy_text(name, strlen(name), err), .path = raw_copy_text(path, strlen(path), err), .mask_path = mask, .camera = camera};
+    *view = (raw_view){.name = raw_copy_text(name, strlen(name), err), .path = raw_copy_text(path, strlen(path), err), .mask_path = mask,
+                       .camera = camera};
     out->view_count++;
     return view->name != NULL && view->path != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }

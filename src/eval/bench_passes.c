@@ -25,7 +25,8 @@ size_t bench_kernels_parse(const char *list, trace_kernel *out, size_t capacity)
     for (const char *word = list;; word++) {
         const size_t length = strcspn(word, ",");
         size_t kernel = 0;
-        while (kernel < sizeof kernel_names / sizeof *kernel_names && (strlen(kernel_names[kernel]) != length || strncmp(word, kernel_names[kernel], length) != 0))
+        while (kernel < sizeof kernel_names / sizeof *kernel_names &&
+               (strlen(kernel_names[kernel]) != length || strncmp(word, kernel_names[kernel], length) != 0))
             kernel++;
         if (kernel == sizeof kernel_names / sizeof *kernel_names || count == capacity)
             return 0;

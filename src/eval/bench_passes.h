@@ -8,7 +8,8 @@
 
 typedef struct bench_figures {
     double build_ms, forward_seconds, adjoint_seconds; /* wall time, medians */
-    double build_us, forward_us, adjoint_us;                    /* core-microseconds per ray: processor time of all threads / rays, medians */
+    double build_us, forward_us, adjoint_us;                    /* core-microseconds per ray: processor time of all threads / rays,
+                                                                   medians */
     kernel_counters counters;                          /* of one forward pass */
     size_t tree_bytes, record_bytes;
 } bench_figures;

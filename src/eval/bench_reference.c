@@ -16,10 +16,12 @@ static size_t pixel_of(const ray_image *few, int width, size_t i)
     return i / (size_t)few->width * CHECK_STRIDE * (size_t)width + i % (size_t)few->width * CHECK_STRIDE;
 }
 
-gbt_status bench_reference_make(const gaussians *g, const trace_settings *settings, const ray_image *rays, bench_reference *out, gbt_error *err)
+gbt_status bench_reference_make(const gaussians *g, const trace_settings *settings, const ray_image *rays, bench_reference *out,
+                                gbt_error *err)
 {
     ray_image *few = &out->rays;
-    GBT_TRY(ray_image_reserve(few, (rays->width + CHECK_STRIDE - 1) / CHECK_STRIDE, (rays->height + CHECK_STRIDE - 1) / CHECK_STRIDE, false, err));
+    GBT_TRY(ray_image_reserve(few, (rays->width + CHECK_STRIDE - 1) / CHECK_STRIDE, (rays->height + CHECK_STRIDE - 1) / CHECK_STRIDE, false,
+                              err));
     const size_t count = ray_image_count(few);
     for (size_t i = 0; i < count; i++) {
         const size_t from = pixel_of(few, rays->width, i);

@@ -16,11 +16,14 @@ static gbt_status gaussians_from_ply(const char *path, gaussians *out, gbt_error
     const gbt_status status = gaussians_resize(out, cloud.count, err);
     for (size_t i = 0; status == GBT_OK && i < cloud.count; i++) {
         out->mean_x[i] = cloud.mean[3 * i], out->mean_y[i] = cloud.mean[3 * i + 1], out->mean_z[i] = cloud.mean[3 * i + 2];
-        out->scale_x[i] = expf(cloud.scale_log[3 * i]), out->scale_y[i] = expf(cloud.scale_log[3 * i + 1]), out->scale_z[i] = expf(cloud.scale_log[3 * i + 2]);
-        out->quat_w[i] = cloud.quat[4 * i], out->quat_x[i] = cloud.quat[4 * i + 1], out->quat_y[i] = cloud.quat[4 * i + 2], out->quat_z[i] = cloud.quat[4 * i + 3];
+        out->scale_x[i] = expf(cloud.scale_log[3 * i]), out->scale_y[i] = expf(cloud.scale_log[3 * i + 1]),
+            out->scale_z[i] = expf(cloud.scale_log[3 * i + 2]);
+        out->quat_w[i] = cloud.quat[4 * i], out->quat_x[i] = cloud.quat[4 * i + 1], out->quat_y[i] = cloud.quat[4 * i + 2],
+            out->quat_z[i] = cloud.quat[4 * i + 3];
         out->opacity[i] = cloud.opacity[i];
         const float *sh = cloud.sh + i * GAUSSIAN_SH_COUNT * 3;
-        out->red[i] = fmaxf(0, 0.5f + 0.28209479f * sh[0]), out->green[i] = fmaxf(0, 0.5f + 0.28209479f * sh[1]), out->blue[i] = fmaxf(0, 0.5f + 0.28209479f * sh[2]);
+        out->red[i] = fmaxf(0, 0.5f + 0.28209479f * sh[0]), out->green[i] = fmaxf(0, 0.5f + 0.28209479f * sh[1]),
+            out->blue[i] = fmaxf(0, 0.5f + 0.28209479f * sh[2]);
     }
     if (status == GBT_OK)
         gaussians_pad(out);

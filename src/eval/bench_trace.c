@@ -38,7 +38,7 @@ static gbt_status override_settings(const gbt_bench_def *def, trace_settings *se
     return override_setting("proxy_radius", def->proxy_radius, INFINITY, &settings->proxy_radius, err);
 }
 
-/* ---- figures: one table for the text and for the file --------------------------------------------------------------------------------------- */
+/* ---- figures: one table for the text and for the file -------------------------------------------------------------------------------- */
 
 typedef struct measured {
     const gbt_bench_def *def;
@@ -93,9 +93,10 @@ static void print_head(const measured *m, FILE *out)
     const bench_way *first = &m->ways[0];
     const bool embree = first->kernel == TRACE_EMBREE;
     fprintf(out, "%s: %zu Gaussians (%zu can be seen), %d x %d rays, %d threads, %s\n", m->def->model, s->gaussians->count,
-            embree ? first->traced.embree.box_count : first->traced.tree.box_count, s->rays.width, s->rays.height, parallel_threads(), cpu_isa_name(first->isa));
-    fprintf(out, "alpha_min %g, alpha_max %g, T_min %g, proxy radius %g; medians of %d\n\n", (double)s->settings.alpha_min, (double)s->settings.alpha_max,
-            (double)s->settings.transmittance_min, (double)s->settings.proxy_radius, m->def->repeats);
+            embree ? first->traced.embree.box_count : first->traced.tree.box_count, s->rays.width, s->rays.height, parallel_threads(),
+            cpu_isa_name(first->isa));
+    fprintf(out, "alpha_min %g, alpha_max %g, T_min %g, proxy radius %g; medians of %d\n\n", (double)s->settings.alpha_min,
+            (double)s->settings.alpha_max, (double)s->settings.transmittance_min, (double)s->settings.proxy_radius, m->def->repeats);
 }
 
 /* One column per kernel; of the second and third, how often the first's is in it. */
@@ -124,8 +125,8 @@ static void print_figures(const measured *m, FILE *out)
         fputs("\n", out);
     }
     for (size_t k = 0; m->def->check && k < m->count; k++)
-        fprintf(out, "%s to the double reference (%zu rays): PSNR %.1f dB, max error %.3g\n", bench_kernel_name(m->ways[k].kernel), m->check_rays, m->error[k].psnr,
-                m->error[k].max);
+        fprintf(out, "%s to the double reference (%zu rays): PSNR %.1f dB, max error %.3g\n", bench_kernel_name(m->ways[k].kernel),
+                m->check_rays, m->error[k].psnr, m->error[k].max);
 }
 
 static json_t *way_to_json(const measured *m, size_t way)
@@ -148,9 +149,10 @@ static json_t *way_to_json(const measured *m, size_t way)
 static gbt_status save_figures(const measured *m, gbt_error *err)
 {
     const trace_settings *s = &m->scene->settings;
-    json_t *root = json_pack("{s:i,s:o,s:I,s:I,s:i,s:f,s:f,s:f,s:o}", "schema", 2, "model", json_text(m->def->model), "rays", (json_int_t)ray_image_count(&m->scene->rays),
-                             "gaussians", (json_int_t)m->scene->gaussians->count, "threads", parallel_threads(), "alpha_min", (double)s->alpha_min, "alpha_max",
-                             (double)s->alpha_max, "transmittance_min", (double)s->transmittance_min, "proxy_radius",
+    json_t *root = json_pack("{s:i,s:o,s:I,s:I,s:i,s:f,s:f,s:f,s:o}", "schema", 2, "model", json_text(m->def->model), "rays",
+                             (json_int_t)ray_image_count(&m->scene->rays), "gaussians", (json_int_t)m->scene->gaussians->count, "threads",
+                             parallel_threads(), "alpha_min", (double)s->alpha_min, "alpha_max", (double)s->alpha_max, "transmittance_min",
+                             (double)s->transmittance_min, "proxy_radius",
                              isfinite(s->proxy_radius) ? json_real((double)s->proxy_radius) : json_null());
     json_t *kernels = json_array();
     for (size_t k = 0; k < m->count; k++)
@@ -191,7 +193,8 @@ gbt_status gbt_bench_trace(const gbt_bench_def *def, FILE *out, gbt_error *err)
     const char *list = def->kernel != NULL ? def->kernel : "tile";
     m.count = bench_kernels_parse(list, kernels, KERNELS_MAX);
     if (m.count == 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--kernel: \"%.60s\" (wanted tile, single or embree, or some of them with commas between)", list);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--kernel: \"%.60s\" (wanted tile, single or embree, or some of them with commas between)",
+                         list);
     for (size_t k = 0; k < m.count; k++)
         m.ways[k].kernel = kernels[k];
     const gbt_status status = bench(&m, &traced, &want, out, err);

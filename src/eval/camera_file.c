@@ -34,8 +34,10 @@ static gbt_status take_lens(const json_fields *r, gbt_camera *camera)
     GBT_TRY(json_field_number(r, "fov_x_deg", 0, false, model == FILE_FISHEYE ? 360 : 179.9, &fov_deg));
     GBT_TRY(json_field_number(r, "view_width", 0, false, JSON_VALUE_MAX, &view_width));
     const double half_width = 0.5 * camera->width, half_height = 0.5 * camera->height, half_fov = fov_deg * PI / 360;
-    const double scale = model == FILE_PINHOLE ? half_width / tan(half_fov) : model == FILE_FISHEYE ? half_width / half_fov : camera->width / view_width;
-    static const gbt_camera_model models[FILE_MODEL_COUNT] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_EQUIRECTANGULAR, GBT_CAMERA_FISHEYE};
+    const double scale = model == FILE_PINHOLE ? half_width / tan(half_fov) : model == FILE_FISHEYE ? half_width / half_fov
+                         : camera->width / view_width;
+    static const gbt_camera_model models[FILE_MODEL_COUNT] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_EQUIRECTANGULAR,
+                                                              GBT_CAMERA_FISHEYE};
     camera->model = models[model];
     if (model == FILE_EQUIRECTANGULAR)
         camera->params[0] = camera->width, camera->params[1] = camera->height;
@@ -60,7 +62,8 @@ static gbt_status take_pose(const json_fields *r, bool needed, const double orig
     if (gbt_camera_look_at(local, target, at->up, camera))
         return GBT_OK;
     const bool same = memcmp(at->origin, at->target, sizeof at->origin) == 0;
-    return same ? json_field_fail(r, "target", "is the origin (wanted another point)") : json_field_fail(r, "up", "is 0, or along the view");
+    return same ? json_field_fail(r, "target", "is the origin (wanted another point)")
+           : json_field_fail(r, "up", "is 0, or along the view");
 }
 
 static gbt_status take_shutter(const json_fields *r, const double origin[3], const stand *start, ray_shot *shot)
@@ -71,7 +74,8 @@ static gbt_status take_shutter(const json_fields *r, const double origin[3], con
     const json_t *end = json_object_get(r->object, "end");
     shot->end = shot->camera;
     if (end == NULL)
-        return json_field_given(r, "shutter") ? json_field_fail(r, "end", "missing (a shutter wants the pose at the end of its way)") : GBT_OK;
+        return json_field_given(r, "shutter") ? json_field_fail(r, "end", "missing (a shutter wants the pose at the end of its way)")
+               : GBT_OK;
     if (!json_is_object(end))
         return json_field_fail(r, "end", "wanted an object with origin, target or up");
     const json_fields inner = {r->path, "end.", end, r->err};
@@ -113,7 +117,8 @@ gbt_status camera_file_take(const json_fields *r, const double origin[3], camera
     out->shot = ray_shot_of(&camera);
     if (json_field_given(r, "rays"))
         return take_rays(r, origin, out);
-    GBT_TRY(json_field_names(r, " origin target up model width height fov_x_deg view_width aperture focus samples seed end shutter rays near_clip far_clip "));
+    GBT_TRY(json_field_names(r, " origin target up model width height fov_x_deg view_width aperture focus samples seed end shutter rays "
+                                "near_clip far_clip "));
     stand start = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     GBT_TRY(take_lens(r, &camera));
     GBT_TRY(take_pose(r, true, origin, &start, &camera));

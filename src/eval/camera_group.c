@@ -96,8 +96,8 @@ static bool nearest_to_axes(const gbt_camera *cameras, size_t count, const doubl
 }
 
 /** Along the mean direction of view, as deep as the points in front; false without such. */
-static bool amid_points(const gbt_camera *cameras, size_t count, const double middle[3], const float *points, size_t point_count, double *depth,
-                        double out[3])
+static bool amid_points(const gbt_camera *cameras, size_t count, const double middle[3], const float *points, size_t point_count,
+                        double *depth, double out[3])
 {
     double forward[3];
     size_t found = 0;
@@ -106,7 +106,8 @@ static bool amid_points(const gbt_camera *cameras, size_t count, const double mi
         return false;
     dvec_normalize(forward);
     for (size_t i = 0; i < point_count; i++) {
-        const double way[3] = {(double)points[3 * i] - middle[0], (double)points[3 * i + 1] - middle[1], (double)points[3 * i + 2] - middle[2]};
+        const double way[3] = {(double)points[3 * i] - middle[0], (double)points[3 * i + 1] - middle[1],
+                               (double)points[3 * i + 2] - middle[2]};
         const double along = dvec_dot(way, forward);
         if (along > 0)
             depth[found++] = along;
@@ -135,7 +136,8 @@ static void find_lens(const gbt_camera *cameras, size_t count, double *scratch, 
                         .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 }
 
-gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const float *points, size_t point_count, camera_group *out, gbt_error *err)
+gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const float *points, size_t point_count, camera_group *out,
+                             gbt_error *err)
 {
     double middle[3], *scratch = mem_alloc(count > point_count ? count : point_count, sizeof *scratch, "cameras", err);
     if (scratch == NULL)
@@ -143,7 +145,8 @@ gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const floa
     memset(out, 0, sizeof *out);
     mean_center(cameras, count, middle);
     find_up(cameras, count, middle, out->up);
-    if (!nearest_to_axes(cameras, count, middle, out->focus) && !amid_points(cameras, count, middle, points, point_count, scratch, out->focus))
+    if (!nearest_to_axes(cameras, count, middle, out->focus) && !amid_points(cameras, count, middle, points, point_count, scratch,
+                                                                             out->focus))
         memset(out->focus, 0, sizeof out->focus);
     for (size_t i = 0; i < count; i++) {
         double way[3];

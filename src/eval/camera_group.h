@@ -15,14 +15,16 @@ typedef struct camera_group {
 } camera_group;
 
 /**
- * The focus is the point nearest to all axes of view (least squares). Where the axes are within about 6 degrees of each other, or most cameras
- * look away from that point, it is the median depth of the points in front of the mean camera; without such points the local origin.
+ * The focus is the point nearest to all axes of view (least squares). Where the axes are within about 6 degrees of each other, or most
+ * cameras look away from that point, it is the median depth of the points in front of the mean camera; without such points the local
+ * origin.
  *
  * @param cameras [in] [count], count >= 1, poses finite
  * @param points  [in] [point_count][3], scene-local
  * @return GBT_OK, GBT_ERR_NO_MEMORY
  */
-gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const float *points, size_t point_count, camera_group *out, gbt_error *err);
+gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const float *points, size_t point_count, camera_group *out,
+                             gbt_error *err);
 
 /** The group's lens for pictures of another size: the shorter side sees as much as before. */
 gbt_camera camera_group_lens(const camera_group *group, int width, int height);

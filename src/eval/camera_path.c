@@ -28,7 +28,7 @@ void camera_path_free(camera_path *path)
     *path = (camera_path){0};
 }
 
-/* ---- around ----------------------------------------------------------------------------------------------------------------------------- */
+/* ---- around -------------------------------------------------------------------------------------------------------------------------- */
 
 /** Where a camera stands around the axis. */
 typedef struct station {
@@ -96,7 +96,8 @@ static gbt_status circle_make(const gbt_camera *cameras, size_t count, const cam
         if (i == 0)
             make_axes(g->up, way, c);
         const double x = dvec_dot(way, c->across[0]), y = dvec_dot(way, c->across[1]);
-        c->stations[i] = (station){atan2(y, x), fmax(hypot(x, y), 0.05 * g->distance), dvec_dot(way, g->up)}; /* from straight above there is no way around */
+        /* from straight above there is no way around */
+        c->stations[i] = (station){atan2(y, x), fmax(hypot(x, y), 0.05 * g->distance), dvec_dot(way, g->up)};
     }
     qsort(c->stations, count, sizeof *c->stations, compare_angles);
     find_arc(c);
@@ -117,8 +118,8 @@ static void circle_at(const circle *c, double angle, double out[3])
         out[k] = c->focus[k] + height * c->axis[k] + radius * (cos(angle) * c->across[0][k] + sin(angle) * c->across[1][k]);
 }
 
-gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const camera_group *group, const gbt_camera *lens, size_t frames, camera_path *out,
-                             gbt_error *err)
+gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const camera_group *group, const gbt_camera *lens, size_t frames,
+                             camera_path *out, gbt_error *err)
 {
     circle c;
     GBT_TRY(camera_path_alloc(out, frames, err));
@@ -131,14 +132,15 @@ gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const came
         double at[3];
         circle_at(&c, angle, at);
         if (!gbt_camera_look_at(at, c.focus, c.axis, &camera))
-            status = base_fail(err, GBT_ERR_FORMAT, "--path orbit: the cameras say no way around (wanted them apart from what they look at)");
+            status = base_fail(err, GBT_ERR_FORMAT,
+                               "--path orbit: the cameras say no way around (wanted them apart from what they look at)");
         out->shots[i] = ray_shot_of(&camera);
     }
     mem_free(c.stations);
     return status;
 }
 
-/* ---- through cameras -------------------------------------------------------------------------------------------------------------------- */
+/* ---- through cameras ----------------------------------------------------------------------------------------------------------------- */
 
 enum { DIMENSIONS = 7, STEPS = 64 /* of a segment, to measure its length */ };
 
@@ -161,7 +163,8 @@ static void matrix_to_quat(const double m[9], double q[4])
         if (square[k] > square[big])
             big = k;
     const double s = sqrt(square[big]), t = 0.5 / s;
-    const double odd[3] = {m[7] - m[5], m[2] - m[6], m[3] - m[1]}, even[3] = {m[1] + m[3], m[2] + m[6], m[5] + m[7]}; /* 4 w x ..; 4 xy, xz, yz */
+    /* 4 w x ..; 4 xy, xz, yz */
+    const double odd[3] = {m[7] - m[5], m[2] - m[6], m[3] - m[1]}, even[3] = {m[1] + m[3], m[2] + m[6], m[5] + m[7]};
     q[big] = 0.5 * s;
     if (big == 0)
         q[1] = t * odd[0], q[2] = t * odd[1], q[3] = t * odd[2];
@@ -246,7 +249,8 @@ static void curve_at(const pose_curve *c, size_t segment, double u, double out[D
         memcpy(out, c->point[0], DIMENSIONS * sizeof *out);
         return;
     }
-    const double v = 1 - u, h00 = v * v * (1 + 2 * u), h01 = u * u * (3 - 2 * u), h10 = u * v * v * c->gap[segment], h11 = -u * u * v * c->gap[segment];
+    const double v = 1 - u, h00 = v * v * (1 + 2 * u), h01 = u * u * (3 - 2 * u), h10 = u * v * v * c->gap[segment],
+        h11 = -u * u * v * c->gap[segment];
     double length = 0;
     for (int k = 0; k < DIMENSIONS; k++)
         out[k] = h00 * c->point[segment][k] + h01 * c->point[segment + 1][k] + h10 * c->slope[segment][k] + h11 * c->slope[segment + 1][k];
@@ -291,7 +295,8 @@ static void place_frames(const pose_curve *c, const double *length, camera_path 
         const double wanted = out->count > 1 ? length[steps] * (double)frame / (double)(out->count - 1) : 0;
         while (i + 1 < steps && length[i + 1] < wanted)
             i++;
-        const double step = steps > 0 ? length[i + 1] - length[i] : 0, within = step > 0 ? fmin(fmax((wanted - length[i]) / step, 0), 1) : 0;
+        const double step = steps > 0 ? length[i + 1] - length[i] : 0,
+            within = step > 0 ? fmin(fmax((wanted - length[i]) / step, 0), 1) : 0;
         gbt_camera camera;
         set_camera(c, i / STEPS, ((double)(i % STEPS) + within) / STEPS, &camera);
         out->shots[frame] = ray_shot_of(&camera);

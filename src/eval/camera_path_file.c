@@ -15,7 +15,7 @@
 #define PI 3.14159265358979323846
 static const double rotation_tolerance = 1e-3, fps_most = 1000;
 
-/* ---- both ------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- both ---------------------------------------------------------------------------------------------------------------------------- */
 
 /** Element i of the list called `field`, as an object to take fields from. */
 static gbt_status element_of(const json_fields *root, const char *field, size_t i, char prefix[64], json_fields *out)
@@ -32,11 +32,12 @@ static gbt_status count_of(const json_fields *root, const char *field, size_t *c
     const json_t *list = json_object_get(root->object, field);
     *count = json_array_size(list);
     if (!json_is_array(list) || *count < 1 || *count > CAMERA_PATH_FRAMES_MAX)
-        return base_fail(root->err, GBT_ERR_FORMAT, "%s: %s: wanted a list of 1 to %d cameras", root->path, field, (int)CAMERA_PATH_FRAMES_MAX);
+        return base_fail(root->err, GBT_ERR_FORMAT, "%s: %s: wanted a list of 1 to %d cameras", root->path, field,
+                         (int)CAMERA_PATH_FRAMES_MAX);
     return GBT_OK;
 }
 
-/* ---- ours ------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- ours ---------------------------------------------------------------------------------------------------------------------------- */
 
 /** A camera of the list: its own fields over those that stand beside the list for all. */
 static gbt_status take_camera(const json_fields *root, const json_t *common, size_t i, const double origin[3], ray_shot *shot)
@@ -70,14 +71,16 @@ static gbt_status check_alike(const json_fields *root, const camera_path *path, 
     for (size_t i = 1; i < path->count; i++) {
         const gbt_camera *camera = &path->shots[i].camera;
         if (camera->width != first->width || camera->height != first->height)
-            return base_fail(root->err, GBT_ERR_FORMAT, "%s: cameras[%zu]: %d x %d pixels (wanted %d x %d, as the first)", root->path, i, camera->width,
-                             camera->height, first->width, first->height);
+            return base_fail(root->err, GBT_ERR_FORMAT, "%s: cameras[%zu]: %d x %d pixels (wanted %d x %d, as the first)", root->path, i,
+                             camera->width, camera->height, first->width, first->height);
         if (same_lens && camera->model != first->model)
-            return base_fail(root->err, GBT_ERR_FORMAT, "%s: cameras[%zu].model: not that of the first (wanted one lens on a way with \"frames\")", root->path, i);
+            return base_fail(root->err, GBT_ERR_FORMAT,
+                             "%s: cameras[%zu].model: not that of the first (wanted one lens on a way with \"frames\")", root->path, i);
     }
     for (size_t i = 0; i < path->count && same_lens; i++)
         if (is_moving(&path->shots[i]))
-            return base_fail(root->err, GBT_ERR_FORMAT, "%s: cameras[%zu]: an aperture or a shutter (wanted none on a way with \"frames\")", root->path, i);
+            return base_fail(root->err, GBT_ERR_FORMAT, "%s: cameras[%zu]: an aperture or a shutter (wanted none on a way with \"frames\")",
+                             root->path, i);
     return GBT_OK;
 }
 
@@ -99,7 +102,7 @@ static gbt_status take_cameras(const json_fields *root, const double origin[3], 
     return status;
 }
 
-/* ---- nerfstudio ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- nerfstudio ---------------------------------------------------------------------------------------------------------------------- */
 
 /* Its trainer turns, moves and scales the world: p' = scale (rotation p + move). */
 typedef struct similarity {
@@ -120,7 +123,9 @@ static gbt_status take_matrix(const json_fields *r, const char *field, double ro
             return json_field_fail(r, field, "wanted 12 or 16 numbers, row after row, within 1e15");
         *(i % 4 == 3 ? &move[i / 4] : &rotation[3 * (i / 4) + i % 4]) = json_number_value(value);
     }
-    return dmat_is_rotation(rotation, rotation_tolerance) ? GBT_OK : json_field_fail(r, field, "not a rotation (wanted |R R' - I| <= 1e-3, and no reflection)");
+    return dmat_is_rotation(rotation, rotation_tolerance) ? GBT_OK : json_field_fail(r, field,
+                                                                                     "not a rotation (wanted |R R' - I| <= 1e-3, and no "
+                                                                                     "reflection)");
 }
 
 static gbt_status take_similarity(const json_fields *r, similarity *out)
@@ -138,7 +143,8 @@ static gbt_status find_similarity(const json_fields *root, similarity *out)
     json_t *beside;
     const char *slash = strrchr(root->path, '/');
     const int folder = slash != NULL ? (int)(slash - root->path) + 1 : 0;
-    if (json_field_given(root, "transform") || snprintf(path, sizeof path, "%.*s%s", folder, root->path, name) >= (int)sizeof path || !file_exists(path))
+    if (json_field_given(root, "transform") || snprintf(path, sizeof path, "%.*s%s", folder, root->path, name) >= (int)sizeof path ||
+        !file_exists(path))
         return take_similarity(root, out);
     GBT_TRY(json_read(path, &beside, root->err));
     const json_fields r = {path, "", beside, root->err};
@@ -177,7 +183,8 @@ static gbt_status take_lens(const json_fields *r, int type, gbt_camera *camera)
     }
     GBT_TRY(json_field_needed(r, "fov", "degrees from the top of the picture to the bottom"));
     GBT_TRY(json_field_number(r, "fov", 0, false, 179.9, &fov_deg));
-    camera->params[0] = camera->params[1] = 0.5 * camera->height / tan(fov_deg * PI / 360); /* a fisheye too: that is how its renderer reads it */
+    /* a fisheye too: that is how its renderer reads it */
+    camera->params[0] = camera->params[1] = 0.5 * camera->height / tan(fov_deg * PI / 360);
     camera->params[2] = 0.5 * camera->width, camera->params[3] = 0.5 * camera->height;
     return GBT_OK;
 }
@@ -213,7 +220,7 @@ static gbt_status take_nerfstudio(const json_fields *root, const double origin[3
     return GBT_OK;
 }
 
-/* ---- entry ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- entry --------------------------------------------------------------------------------------------------------------------------- */
 
 /** Cameras of the file become those of a smooth way through them. */
 static gbt_status smooth(const json_fields *root, size_t frames, camera_path *path)

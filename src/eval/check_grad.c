@@ -1,4 +1,5 @@
-/* eval/check_grad.c -- gradients on the user's own scene: tracer and decode against their double twins, the whole chain against differences.
+/* eval/check_grad.c -- gradients on the user's own scene: tracer and decode against their double twins, the whole chain against
+   differences.
 
    tracer   float adjoint of the image gradient      | reference_backward() on the same Gaussians
    decode   float adjoint of the Gaussians' gradient | decode_ref_backward() on the same anchors
@@ -114,8 +115,8 @@ static gbt_status set_up(checker *c, gbt_error *err)
     GBT_TRY(allocate(c, err));
     image_loss_result loss;
     GBT_TRY(image_loss(&c->frame->rgb, &c->photo, NULL, dssim_weight, &c->scratch, &c->d_image, &loss, err));
-    fprintf(c->out, "%s, %d x %d: %zu Gaussians of %zu visible anchors, loss %.6g\n", s->views[view].name, c->width, c->height, c->scene.count,
-            c->frame->visible_count, loss.loss + volume_weight * frame_volume(c->frame));
+    fprintf(c->out, "%s, %d x %d: %zu Gaussians of %zu visible anchors, loss %.6g\n", s->views[view].name, c->width, c->height,
+            c->scene.count, c->frame->visible_count, loss.loss + volume_weight * frame_volume(c->frame));
     return GBT_OK;
 }
 
@@ -133,7 +134,8 @@ static void band_block(size_t block, size_t begin, size_t end, void *context)
     const ray_image *rays = &job->c->frame->rays;
     band_scratch scratch = {0};
     for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++)
-        job->status[block] = rounding_band_find(&job->c->scene, &job->c->run->settings, ray_image_origin(rays, i), rays->dir + 3 * i, &scratch, &job->in_band[i]);
+        job->status[block] = rounding_band_find(&job->c->scene, &job->c->run->settings, ray_image_origin(rays, i), rays->dir + 3 * i,
+                                                &scratch, &job->in_band[i]);
     band_scratch_free(&scratch);
 }
 
@@ -185,7 +187,8 @@ static void fields_of(const gaussians *g, const float *fields[GAUSSIANS_FIELD_CO
 static gbt_status check_tracer(checker *c, gbt_error *err)
 {
     static const char *const names[] = {"mean", "scale", "rotation", "opacity", "colour"};
-    static const size_t first[] = {REFERENCE_mean_x, REFERENCE_scale_x, REFERENCE_quat_w, REFERENCE_opacity, REFERENCE_red, GAUSSIANS_FIELD_COUNT};
+    static const size_t first[] = {REFERENCE_mean_x, REFERENCE_scale_x, REFERENCE_quat_w, REFERENCE_opacity, REFERENCE_red,
+                                   GAUSSIANS_FIELD_COUNT};
     size_t left_out;
     float d_background[3];
     double d_background_wanted[3] = {0};
@@ -201,7 +204,8 @@ static gbt_status check_tracer(checker *c, gbt_error *err)
     if (status == GBT_OK) {
         const float *got[GAUSSIANS_FIELD_COUNT];
         fields_of(&c->d_gaussians, got);
-        fprintf(c->out, "%zu of %zu rays are left out of the tracer's rows: rounding may change their hits or the order\n", left_out, c->ray_count);
+        fprintf(c->out, "%zu of %zu rays are left out of the tracer's rows: rounding may change their hits or the order\n", left_out,
+                c->ray_count);
         fprintf(c->out, "%-8s%-12s%12s%12s\n", "stage", "class", "error", "limit");
         for (size_t class = 0; class < sizeof names / sizeof *names; class++) {
             difference d = {0};
@@ -238,13 +242,15 @@ static void list_classes(checker *c, parameter_class out[CLASS_COUNT])
     static const char *const networks[] = {"opacity mlp", "shape mlp", "colour mlp"};
     const size_t n = c->parameters.count;
     out[0] = (parameter_class){"feature", c->parameters.feature, c->d_parameters.feature, c->d_anchors.feature, n * ANCHOR_FEATURE_DIM};
-    out[1] = (parameter_class){"offset", c->parameters.offset, c->d_parameters.offset, c->d_anchors.offset, n * 3 * (size_t)c->parameters.offset_count};
+    out[1] = (parameter_class){"offset", c->parameters.offset, c->d_parameters.offset, c->d_anchors.offset,
+                               n * 3 * (size_t)c->parameters.offset_count};
     out[2] = (parameter_class){"scale", c->parameters.scale_log, c->d_parameters.scale_log, c->d_anchors.scale_log, n * 6};
     decoder_part parts[3];
     decoder_parts(&c->run->model.decoder, parts);
     for (int i = 0; i < 3; i++) {
         const size_t b = parts[i].begin;
-        out[3 + i] = (parameter_class){networks[i], c->parameters.params + b, c->d_parameters.params + b, c->d_params + b, parts[i].end - b};
+        out[3 + i] = (parameter_class){networks[i], c->parameters.params + b, c->d_parameters.params + b, c->d_params + b,
+                                       parts[i].end - b};
     }
 }
 
@@ -252,7 +258,8 @@ static void list_classes(checker *c, parameter_class out[CLASS_COUNT])
 static gbt_status check_decode(checker *c, gbt_error *err)
 {
     frame *f = c->frame;
-    GBT_TRY(frame_backward(f, &c->run->model.anchors, &c->run->model.decoder, &c->d_image, (float)volume_weight, &c->d_anchors, c->d_params, err));
+    GBT_TRY(frame_backward(f, &c->run->model.anchors, &c->run->model.decoder, &c->d_image, (float)volume_weight, &c->d_anchors, c->d_params,
+                           err));
     const float *d_fields[GAUSSIANS_FIELD_COUNT];
     fields_of(&f->d_gaussians, d_fields);
     for (size_t i = 0; i < f->gaussians.count; i++)
@@ -287,7 +294,8 @@ static void loss_terms(const checker *c, double *terms)
                         if (x + dx < 0 || x + dx >= c->width || y + dy < 0 || y + dy >= c->height)
                             continue;
                         const size_t at = 3 * ((size_t)(y + dy) * (size_t)c->width + (size_t)(x + dx)) + (size_t)channel;
-                        const double tap = taps[dx + RADIUS] * taps[dy + RADIUS] / (total * total), p = c->rgb[at], q = (double)c->photo.pixels[at];
+                        const double tap = taps[dx + RADIUS] * taps[dy + RADIUS] / (total * total), p = c->rgb[at],
+                            q = (double)c->photo.pixels[at];
                         a += tap * p, b += tap * q, aa += tap * p * p, bb += tap * q * q, ab += tap * p * q;
                     }
                 const double ssim = (2 * a * b + c1) * (2 * (ab - a * b) + c2) / ((a * a + b * b + c1) * (aa - a * a + bb - b * b + c2));
@@ -304,7 +312,8 @@ static void decode_block(size_t block, size_t begin, size_t end, void *context)
                        c->slots + begin * (size_t)c->parameters.offset_count * DECODE_REF_FIELDS);
 }
 
-/* The training loss of c->parameters, in double from end to end. Gaussians that no ray blended are not traced: they are not in the image. */
+/* The training loss of c->parameters, in double from end to end. Gaussians that no ray blended are not traced: they are not in the
+   image. */
 static gbt_status chain_loss(checker *c, reference_scene *seen, int which, gbt_error *err)
 {
     const frame *f = c->frame;
@@ -347,8 +356,8 @@ static gbt_status differences_along(checker *c, const parameter_class *class, co
 }
 
 /* `scratch` holds two arrays of the class's size. `error` is NaN when too few directions crossed no cut. */
-static gbt_status check_class(checker *c, const parameter_class *class, uint64_t stream, double *scratch, reference_scene *seen, size_t *crossed,
-                              double *error, gbt_error *err)
+static gbt_status check_class(checker *c, const parameter_class *class, uint64_t stream, double *scratch, reference_scene *seen,
+                              size_t *crossed, double *error, gbt_error *err)
 {
     double *const direction = scratch, *const keep = scratch + class->count;
     double length = 0, square = 0;

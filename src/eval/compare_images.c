@@ -35,7 +35,8 @@ gbt_status gbt_compare_images(const char *path, const char *reference, gbt_compa
     if (status == GBT_OK)
         status = read_colors(reference, &b, err);
     if (status == GBT_OK && (a.width != b.width || a.height != b.height))
-        status = base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted %d x %d as %s)", path, a.width, a.height, b.width, b.height, reference);
+        status = base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted %d x %d as %s)", path, a.width, a.height, b.width, b.height,
+                           reference);
     if (status == GBT_OK)
         status = compare(&a, &b, out, err);
     image_free(&a);

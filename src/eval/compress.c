@@ -102,11 +102,13 @@ static void print_report(const compression *c, const char *out, FILE *report)
     part_row rows[PARTS];
     const double count = c->anchors > 0 ? (double)c->anchors : 1;
     list_parts(&c->after, rows);
-    fprintf(report, "%s: %zu anchors, %zu bytes before, %zu after: %.1f times smaller, %.2f bytes per anchor (steps: %s)\n", out, c->anchors, c->before, c->after.total,
-            (double)c->before / (double)c->after.total, (double)c->after.total / count, c->steps_from);
+    fprintf(report, "%s: %zu anchors, %zu bytes before, %zu after: %.1f times smaller, %.2f bytes per anchor (steps: %s)\n", out,
+            c->anchors, c->before, c->after.total, (double)c->before / (double)c->after.total, (double)c->after.total / count,
+            c->steps_from);
     for (int i = 0; i < PARTS; i++)
         fprintf(report, "  %-10s%10zu bytes %8.2f per anchor\n", rows[i].name, rows[i].bytes, (double)rows[i].bytes / count);
-    fprintf(report, "  steps found in %.2f s, encoded and checked in %.2f s, decoded in %.2f s\n", c->probe_seconds, c->encode_seconds, c->decode_seconds);
+    fprintf(report, "  steps found in %.2f s, encoded and checked in %.2f s, decoded in %.2f s\n", c->probe_seconds, c->encode_seconds,
+            c->decode_seconds);
 }
 
 static gbt_status save_report(const compression *c, const gbt_compress_def *def, gbt_error *err)
@@ -116,11 +118,13 @@ static gbt_status save_report(const compression *c, const gbt_compress_def *def,
     json_t *parts = json_object();
     list_parts(&c->after, rows);
     for (int i = 0; i < PARTS; i++)
-        json_object_set_new(parts, rows[i].name, json_pack("{s:I,s:f}", "bytes", (json_int_t)rows[i].bytes, "per_anchor", (double)rows[i].bytes / count));
-    json_t *root = json_pack("{s:i,s:I,s:I,s:I,s:f,s:s,s:o,s:o,s:f,s:f,s:f}", "schema", 1, "anchors", (json_int_t)c->anchors, "bytes_before", (json_int_t)c->before,
-                             "bytes", (json_int_t)c->after.total, "bytes_per_anchor", (double)c->after.total / count, "steps_from", c->steps_from, "quality",
-                             def->lossless ? json_null() : json_real(def->quality), "parts", parts, "probe_seconds", c->probe_seconds, "encode_seconds",
-                             c->encode_seconds, "decode_seconds", c->decode_seconds);
+        json_object_set_new(parts, rows[i].name, json_pack("{s:I,s:f}", "bytes", (json_int_t)rows[i].bytes, "per_anchor",
+                                                           (double)rows[i].bytes / count));
+    json_t *root = json_pack("{s:i,s:I,s:I,s:I,s:f,s:s,s:o,s:o,s:f,s:f,s:f}", "schema", 1, "anchors", (json_int_t)c->anchors,
+                             "bytes_before", (json_int_t)c->before, "bytes", (json_int_t)c->after.total, "bytes_per_anchor",
+                             (double)c->after.total / count, "steps_from", c->steps_from, "quality",
+                             def->lossless ? json_null() : json_real(def->quality), "parts", parts, "probe_seconds", c->probe_seconds,
+                             "encode_seconds", c->encode_seconds, "decode_seconds", c->decode_seconds);
     const gbt_status status = json_save(root, def->json, err);
     json_decref(root);
     return status;

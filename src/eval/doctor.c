@@ -80,13 +80,12 @@ static void check_threads(gbt_diagnosis *d, const machine *m)
 {
     gbt_check *c = doctor_line(d, "threads");
     const int threads = parallel_threads();
-    const double quota = fmin((double)m->processors_allowed, m->processors_quota);
     size_t used = (size_t)snprintf(c->found, sizeof c->found, "%d of %d processors", threads, m->processors);
     if (m->processors_allowed < m->processors)
         used += (size_t)snprintf(c->found + used, sizeof c->found - used, "; %d are allowed to this process", m->processors_allowed);
     if (isfinite(m->processors_quota))
         snprintf(c->found + used, sizeof c->found - used, "; the control group gives the time of %.2g", m->processors_quota);
-    const int best = (int)fmax(1, floor(quota + 0.5));
+    const int best = machine_threads(m);
     if (threads > best)
         advise(c, GBT_CHECK_WARN, "more threads than processor time only wait for each other: GBTRACE_THREADS=%d", best);
 }
@@ -100,18 +99,21 @@ static void check_memory(gbt_diagnosis *d, const machine *m)
         snprintf(c->found, sizeof c->found, "not known");
         return;
     }
-    const size_t used = (size_t)snprintf(c->found, sizeof c->found, "%.1f GB, %.1f GB free", (double)m->memory_bytes / 1e9, (double)m->memory_free_bytes / 1e9);
+    const size_t used = (size_t)snprintf(c->found, sizeof c->found, "%.1f GB, %.1f GB free", (double)m->memory_bytes / 1e9,
+                                         (double)m->memory_free_bytes / 1e9);
     if (limited)
         snprintf(c->found + used, sizeof c->found - used, "; this process may have %.1f GB", (double)m->memory_limit_bytes / 1e9);
     if (usable < memory_warn)
-        advise(c, usable < memory_fail ? GBT_CHECK_FAIL : GBT_CHECK_WARN, "train with --downscale 2 or more and --memory 200M, or make room");
+        advise(c, usable < memory_fail ? GBT_CHECK_FAIL : GBT_CHECK_WARN,
+               "train with --downscale 2 or more and --memory 200M, or make room");
 }
 
 static void check_libraries(gbt_diagnosis *d)
 {
     gbt_check *c = doctor_line(d, "libraries");
     gbt_error why = {0};
-    snprintf(c->found, sizeof c->found, "Embree %s, %s, %s, jansson %s", bvh_embree_version(), image_library(), parallel_library(), jansson_version_str());
+    snprintf(c->found, sizeof c->found, "Embree %s, %s, %s, jansson %s", bvh_embree_version(), image_library(), parallel_library(),
+             jansson_version_str());
     if (bvh_device(&why) == NULL)
         advise(c, GBT_CHECK_FAIL, "Embree does not start: %.150s", why.text);
 }
@@ -149,7 +151,8 @@ static void check_folder(gbt_diagnosis *d, const char *folder)
     const double room = statvfs(folder, &space) == 0 ? (double)space.f_bavail * (double)space.f_frsize : (double)INFINITY;
     snprintf(c->found, sizeof c->found, "%.300s can be written, %.1f GB free", folder, room / 1e9);
     if (room < disk_warn)
-        advise(c, room < disk_fail ? GBT_CHECK_FAIL : GBT_CHECK_WARN, "a run needs some hundred megabytes, for its checkpoints most: make room");
+        advise(c, room < disk_fail ? GBT_CHECK_FAIL : GBT_CHECK_WARN,
+               "a run needs some hundred megabytes, for its checkpoints most: make room");
 }
 
 gbt_status gbt_doctor(const char *folder, gbt_diagnosis *out, gbt_error *err)

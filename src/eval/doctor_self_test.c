@@ -11,7 +11,8 @@
 #include "trace/reference.h"
 #include "trace/trace.h"
 
-enum { SMALL = 1500, LARGE = 30000, SMALL_WIDTH = 64, SMALL_HEIGHT = 48, LARGE_SIDE = 256, PASSES = 3, STREAM_PLACE = 1, STREAM_GRADIENT = 2 };
+enum { SMALL = 1500, LARGE = 30000, SMALL_WIDTH = 64, SMALL_HEIGHT = 48, LARGE_SIDE = 256, PASSES = 3, STREAM_PLACE = 1,
+      STREAM_GRADIENT = 2 };
 
 /* A float picture differs by rounding of its sums alone, where no cut-off is near; the tests hold random scenes to the same. */
 static const double picture_limit = 1e-4, gradient_limit = 5e-5;
@@ -54,8 +55,8 @@ static gbt_status make_cloud(gaussians *g, size_t count, double size, gbt_error 
 
 static gbt_status set_up(patient *p, size_t count, double size, int width, int height, gbt_error *err)
 {
-    const gbt_camera camera = {.model = GBT_CAMERA_SIMPLE_PINHOLE, .width = width, .height = height, .params = {width, 0.5 * width, 0.5 * height},
-                               .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0, 0, -3}};
+    const gbt_camera camera = {.model = GBT_CAMERA_SIMPLE_PINHOLE, .width = width, .height = height,
+                               .params = {width, 0.5 * width, 0.5 * height}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0, 0, -3}};
     p->settings = trace_settings_default();
     GBT_TRY(make_cloud(&p->g, count, size, err));
     GBT_TRY(ray_image_from_camera(&camera, &p->rays, err));
@@ -79,7 +80,8 @@ static gbt_status find_band(patient *p, const reference_scene *exact, size_t *le
 static void write_result(gbt_diagnosis *d, const char *name, const char *what, double error, double limit, size_t rays, size_t left_out)
 {
     gbt_check *c = doctor_line(d, name);
-    snprintf(c->found, sizeof c->found, "%d Gaussians, %zu rays (%zu at a cut-off left out): %s %.1e from the double reference (limit %.0e)", (int)SMALL, rays,
+    snprintf(c->found, sizeof c->found,
+             "%d Gaussians, %zu rays (%zu at a cut-off left out): %s %.1e from the double reference (limit %.0e)", (int)SMALL, rays,
              left_out, what, error, limit);
     if (!(error <= limit)) {
         c->level = GBT_CHECK_FAIL;
@@ -163,8 +165,8 @@ static gbt_status measure_speed(patient *p, gbt_diagnosis *d, gbt_error *err)
         best = i > 0 ? fmin(best, clock_wall() - start) : best;
     }
     gbt_check *c = doctor_line(d, "speed");
-    snprintf(c->found, sizeof c->found, "%.2f million rays per second through %d Gaussians, %d x %d pixels", (double)ray_image_count(&p->rays) / best * 1e-6, (int)LARGE,
-             (int)LARGE_SIDE, (int)LARGE_SIDE);
+    snprintf(c->found, sizeof c->found, "%.2f million rays per second through %d Gaussians, %d x %d pixels",
+             (double)ray_image_count(&p->rays) / best * 1e-6, (int)LARGE, (int)LARGE_SIDE, (int)LARGE_SIDE);
     return GBT_OK;
 }
 

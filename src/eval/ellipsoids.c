@@ -45,7 +45,8 @@ static bool find_box(const gbt_camera *c, const double center[3], double radius,
         return false;
     for (int corner = 0; corner < 8; corner++) {
         double p[2];
-        project(c, at[0] + (corner & 1 ? radius : -radius), at[1] + (corner & 2 ? radius : -radius), at[2] + (corner & 4 ? radius : -radius), p);
+        project(c, at[0] + (corner & 1 ? radius : -radius), at[1] + (corner & 2 ? radius : -radius),
+                at[2] + (corner & 4 ? radius : -radius), p);
         for (int k = 0; k < 2; k++)
             low[k] = fmin(low[k], p[k]), high[k] = fmax(high[k], p[k]);
     }
@@ -176,9 +177,10 @@ static void blend(const drawing *d, image *out)
 
 gbt_status ellipsoids_draw(const ellipsoids *set, const gbt_camera *camera, image *out, gbt_error *err)
 {
-    if ((camera->model != GBT_CAMERA_PINHOLE && camera->model != GBT_CAMERA_ORTHOGRAPHIC) || out->channels != 4 || out->width != camera->width ||
-        out->height != camera->height)
-        return base_fail(err, GBT_ERR_ARGUMENT, "ellipsoids: wanted a pinhole or orthographic camera, and a picture of its size with 4 channels");
+    if ((camera->model != GBT_CAMERA_PINHOLE && camera->model != GBT_CAMERA_ORTHOGRAPHIC) || out->channels != 4 ||
+        out->width != camera->width || out->height != camera->height)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "ellipsoids: wanted a pinhole or orthographic camera, and a picture of its size with 4 channels");
     drawing d = {.camera = camera, .width = FINE * out->width, .height = FINE * out->height};
     const size_t rays = (size_t)d.width * (size_t)d.height;
     solid *solids = mem_alloc(set->count, sizeof *solids, "ellipsoids", err);

@@ -25,7 +25,8 @@ typedef struct ellipsoids {
  * What lies around the camera's plane is left out too: it would hide everything.
  *
  * @param camera [in]     GBT_CAMERA_PINHOLE or GBT_CAMERA_ORTHOGRAPHIC; others give GBT_ERR_ARGUMENT
- * @param out    [in,out] 4 channels of the camera's size: colour and how much of the pixel is covered; start from zeros. Several calls: the later in front
+ * @param out    [in,out] 4 channels of the camera's size: colour and how much of the pixel is covered; start from zeros. Several calls: the
+ *                        later in front
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_NO_MEMORY
  * Threads: same bits for every thread count. Cost: each ellipsoid's pixels, four rays each.
  */

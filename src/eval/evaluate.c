@@ -82,11 +82,14 @@ static json_t *scores_to_json(const evaluation *e)
     json_object_set_new(root, "psnr", number_or_null(e->psnr));
     json_object_set_new(root, "ssim", number_or_null(e->ssim));
     json_object_set_new(root, "flip", number_or_null(e->flip));
-    json_object_set_new(root, "protocol", json_string("8-bit images; SSIM 11x11 Gaussian, zero padding; FLIP 67 pixels per degree; means over held-out views"));
+    json_object_set_new(root, "protocol",
+                        json_string("8-bit images; SSIM 11x11 Gaussian, zero padding; FLIP 67 pixels per degree; means over held-out "
+                                    "views"));
     for (size_t i = 0; i < e->view_count; i++) {
         const view_score *v = &e->views[i];
-        json_array_append_new(views, json_pack("{s:s,s:o,s:o,s:o,s:f,s:I}", "name", v->name, "psnr", number_or_null(v->psnr), "ssim", number_or_null(v->ssim),
-                                               "flip", number_or_null(v->flip), "seconds", v->seconds, "gaussians", (json_int_t)v->gaussians));
+        json_array_append_new(views, json_pack("{s:s,s:o,s:o,s:o,s:f,s:I}", "name", v->name, "psnr", number_or_null(v->psnr), "ssim",
+                                               number_or_null(v->ssim), "flip", number_or_null(v->flip), "seconds", v->seconds, "gaussians",
+                                               (json_int_t)v->gaussians));
     }
     json_object_set_new(root, "renderer", json_string(e->renderer));
     json_object_set_new(root, "downscale", json_real(e->downscale));

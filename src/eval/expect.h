@@ -14,7 +14,10 @@ typedef struct expectation {
     int threads;          /* that the times are for */
 } expectation;
 
-/** Of a run with the default settings and photos divided by `downscale`. Good within a factor of 1.5 on scenes like those it was measured on. */
+/**
+ * Of a run with the default settings and photos divided by `downscale`. Good within a factor of 1.5 on scenes like those it was measured
+ * on.
+ */
 expectation expect_training(const scene *s, double downscale, int threads);
 
 json_t *expect_to_json(const expectation *e);

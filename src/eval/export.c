@@ -49,7 +49,7 @@ typedef struct exporting {
     image_scores *scores; /* [view_count], of what it gives back */
 } exporting;
 
-/* ---- from a run to Gaussians ------------------------------------------------------------------------------------------------------------ */
+/* ---- from a run to Gaussians --------------------------------------------------------------------------------------------------------- */
 
 /* Held-out views, at most VIEWS_MAX evenly chosen, but all for a result folder; training views when there are none. */
 static gbt_status choose_views(exporting *e, gbt_error *err)
@@ -117,10 +117,11 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
     return status;
 }
 
-/* ---- what is lost ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- what is lost -------------------------------------------------------------------------------------------------------------------- */
 
 /* One view of the model and of every file. */
-static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *camera, image *photo, const unsigned char *valid, gbt_error *err)
+static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *camera, image *photo, const unsigned char *valid,
+                               gbt_error *err)
 {
     const double share = 1 / (double)e->view_count;
     image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb;
@@ -159,7 +160,7 @@ static gbt_status compare(exporting *e, gbt_error *err)
     return GBT_OK;
 }
 
-/* ---- entry -------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- entry --------------------------------------------------------------------------------------------------------------------------- */
 
 static gbt_status check(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, gbt_error *err)
 {
@@ -184,7 +185,8 @@ static void say_source(const exporting *e, const gaussian_cloud *cloud, const ch
 {
     fprintf(report, "%s: %zu Gaussians, colours of degree %d", input, cloud->count, cloud->sh_degree);
     if (e->baked)
-        fprintf(report, "; %zu that no training camera sees are left out; baked in %.1f s, refined in %.1f s", e->unseen, e->bake_seconds, e->refine_seconds);
+        fprintf(report, "; %zu that no training camera sees are left out; baked in %.1f s, refined in %.1f s", e->unseen, e->bake_seconds,
+                e->refine_seconds);
     else if (cloud->dropped > 0)
         fprintf(report, "; %zu unusable rows dropped", cloud->dropped);
     fprintf(report, "\n");
@@ -232,9 +234,10 @@ static void say_file(const exporting *e, const exported *f, FILE *report)
     fprintf(report, "\n");
 }
 
-/* All files whose format keeps colours of this degree, or only `flat` ones. Where a format keeps one colour, that colour is fitted: the first term of a
-   longer series is not the best constant. */
-static gbt_status write_kind(exporting *e, const char *input, bool flat, const char *const *outputs, size_t output_count, FILE *report, gbt_error *err)
+/* All files whose format keeps colours of this degree, or only `flat` ones. Where a format keeps one colour, that colour is fitted: the
+   first term of a longer series is not the best constant. */
+static gbt_status write_kind(exporting *e, const char *input, bool flat, const char *const *outputs, size_t output_count, FILE *report,
+                             gbt_error *err)
 {
     bool any = false;
     for (size_t i = 0; i < output_count; i++)
@@ -265,8 +268,8 @@ static gbt_status report_all(const exporting *e, const char *input, FILE *report
     gbt_status status = GBT_OK;
     if (e->def->json != NULL) {
         const size_t count = e->file_count > 0 ? e->files[e->file_count - 1].shown->count : 0;
-        json_t *root = json_pack("{s:i,s:s,s:I,s:I,s:O}", "schema", 1, "input", input, "gaussians", (json_int_t)count, "unseen", (json_int_t)e->unseen, "files",
-                                 files);
+        json_t *root = json_pack("{s:i,s:s,s:I,s:I,s:O}", "schema", 1, "input", input, "gaussians", (json_int_t)count, "unseen",
+                                 (json_int_t)e->unseen, "files", files);
         status = json_save(root, e->def->json, err);
         json_decref(root);
     }
@@ -287,7 +290,8 @@ static void exporting_free(exporting *e)
     mem_free(e);
 }
 
-gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, FILE *report, gbt_error *err)
+gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, FILE *report,
+                      gbt_error *err)
 {
     GBT_TRY(check(input, def, outputs, output_count, err));
     exporting *e = mem_calloc(1, sizeof *e, "export", err);

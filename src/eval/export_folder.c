@@ -22,7 +22,7 @@ bool export_folder_is(const char *path)
     return length > 0 && path[length - 1] == '/';
 }
 
-/* ---- what the run was ------------------------------------------------------------------------------------------------------------------- */
+/* ---- what the run was ---------------------------------------------------------------------------------------------------------------- */
 
 /* The text of Python's Namespace(...), which the tools evaluate: a quote or a backslash in a path is not for them. */
 static void put_path(const char *path, char *out, size_t size)
@@ -44,7 +44,8 @@ static gbt_status write_settings(const char *folder, const loaded_run *r, int sh
     put_path(r->scene.folder, source, sizeof source);
     put_path(folder, result, sizeof result);
     snprintf(text, sizeof text,
-             "Namespace(sh_degree=%d, source_path='%s', model_path='%s', images='images', resolution=-1, white_background=%s, data_device='cpu', eval=True)",
+             "Namespace(sh_degree=%d, source_path='%s', model_path='%s', images='images', resolution=-1, white_background=%s, "
+             "data_device='cpu', eval=True)",
              sh_degree, source, result, white ? "True" : "False");
     GBT_TRY(file_join(path, sizeof path, folder, "cfg_args", err));
     return file_write_atomic(path, text, strlen(text), err);
@@ -64,9 +65,10 @@ static json_t *camera_to_json(const loaded_run *r, size_t view, size_t id)
     for (int k = 0; k < 3; k++)
         at[k] = c.center[k] + r->model.origin[k];
     const double *w = c.rotation;
-    return json_pack("{s:i,s:o,s:i,s:i,s:[f,f,f],s:[[f,f,f],[f,f,f],[f,f,f]],s:f,s:f}", "id", (int)id, "img_name", json_text(name), "width", c.width, "height",
-                     c.height, "position", at[0], at[1], at[2], "rotation", w[0], w[3], w[6], w[1], w[4], w[7], w[2], w[5], w[8], "fy",
-                     tan_half[1] > 0 ? c.height / (2 * tan_half[1]) : 0.0, "fx", tan_half[0] > 0 ? c.width / (2 * tan_half[0]) : 0.0);
+    return json_pack("{s:i,s:o,s:i,s:i,s:[f,f,f],s:[[f,f,f],[f,f,f],[f,f,f]],s:f,s:f}", "id", (int)id, "img_name", json_text(name), "width",
+                     c.width, "height", c.height, "position", at[0], at[1], at[2], "rotation", w[0], w[3], w[6], w[1], w[4], w[7], w[2],
+                     w[5], w[8], "fy", tan_half[1] > 0 ? c.height / (2 * tan_half[1]) : 0.0, "fx",
+                     tan_half[0] > 0 ? c.width / (2 * tan_half[0]) : 0.0);
 }
 
 static gbt_status write_cameras(const char *folder, const loaded_run *r, gbt_error *err)
@@ -121,9 +123,10 @@ gbt_status export_folder_write(const char *folder, const loaded_run *r, const ga
     return write_settings(folder, r, cloud->sh_degree, err);
 }
 
-/* ---- how it looks ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- how it looks -------------------------------------------------------------------------------------------------------------------- */
 
-static gbt_status write_picture(const char *folder, const loaded_run *r, const char *kind, size_t index, const image *picture, gbt_error *err)
+static gbt_status write_picture(const char *folder, const loaded_run *r, const char *kind, size_t index, const image *picture,
+                                gbt_error *err)
 {
     char place[PATH_SIZE], path[PATH_SIZE], name[96];
     snprintf(name, sizeof name, "test/ours_%llu/%s", (unsigned long long)r->model.iterations, kind);
@@ -134,7 +137,8 @@ static gbt_status write_picture(const char *folder, const loaded_run *r, const c
     return image_write(path, picture, err);
 }
 
-gbt_status export_folder_picture(const char *folder, const loaded_run *r, size_t index, const image *render, const image *photo, gbt_error *err)
+gbt_status export_folder_picture(const char *folder, const loaded_run *r, size_t index, const image *render, const image *photo,
+                                 gbt_error *err)
 {
     GBT_TRY(write_picture(folder, r, "renders", index, render, err));
     return write_picture(folder, r, "gt", index, photo, err);
@@ -160,7 +164,8 @@ gbt_status export_folder_scores(const char *folder, const loaded_run *r, const i
             sums[0] += scores[i].psnr, sums[1] += scores[i].ssim, scored++;
     }
     snprintf(method, sizeof method, "ours_%llu", (unsigned long long)r->model.iterations);
-    json_t *means = json_pack("{s:{s:o,s:o}}", method, "SSIM", number_or_null(sums[1] / (double)scored), "PSNR", number_or_null(sums[0] / (double)scored));
+    json_t *means = json_pack("{s:{s:o,s:o}}", method, "SSIM", number_or_null(sums[1] / (double)scored), "PSNR",
+                              number_or_null(sums[0] / (double)scored));
     json_t *values = json_pack("{s:{s:o,s:o}}", method, "SSIM", ssim, "PSNR", psnr);
     gbt_status status = file_join(path, sizeof path, folder, "results.json", err);
     if (status == GBT_OK)

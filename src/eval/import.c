@@ -30,7 +30,9 @@ static gbt_status find_input(const char *input, result_folder *out, gbt_error *e
             return GBT_OK;
         GBT_TRY(file_join(out->ply, sizeof out->ply, input, "point_cloud.ply", err));
         if (!file_exists(out->ply))
-            return base_fail(err, GBT_ERR_IO, "%s: no model of Scaffold-GS (wanted point_cloud/iteration_N/point_cloud.ply or point_cloud.ply in it)", input);
+            return base_fail(err, GBT_ERR_IO,
+                             "%s: no model of Scaffold-GS (wanted point_cloud/iteration_N/point_cloud.ply or point_cloud.ply in it)",
+                             input);
         return GBT_OK;
     }
     return snprintf(out->ply, sizeof out->ply, "%s", input) < (int)sizeof out->ply
@@ -83,7 +85,8 @@ gbt_status gbt_import(const char *input, const gbt_import_def *def, const char *
     if (status == GBT_OK)
         status = write_run(m, run, err);
     if (status == GBT_OK && report != NULL)
-        fprintf(report, "%s: %zu anchors with %d Gaussians each at most, %zu unusable ones dropped; networks %s the distance; written to %s\n", from->ply,
+        fprintf(report, "%s: %zu anchors with %d Gaussians each at most, %zu unusable ones dropped; networks %s the distance; written to "
+                        "%s\n", from->ply,
                 m->anchors.count, m->anchors.offset_count, dropped, m->decoder.has_distance ? "with" : "without", run);
     if (m != NULL)
         model_free(m);

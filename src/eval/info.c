@@ -47,7 +47,9 @@ static photo_counts count_photos(const scene *s)
     return c;
 }
 
-/** The box that leaves out 5 % of the points on each side of each axis, world coordinates: a few outliers must not be the size of a scene. */
+/**
+ * The box that leaves out 5 % of the points on each side of each axis, world coordinates: a few outliers must not be the size of a scene.
+ */
 static gbt_status find_box(const float *position, size_t count, const double origin[3], double low[3], double high[3], gbt_error *err)
 {
     float *axis = mem_alloc(count, sizeof *axis, "points", err);
@@ -86,16 +88,18 @@ static json_t *dataset_to_json(const char *path, const dataset_facts *f)
         if (f->views_by_model[m] > 0)
             json_object_set_new(cameras, gbt_camera_model_name((gbt_camera_model)m), json_integer((json_int_t)f->views_by_model[m]));
     json_t *box = s->points.count == 0 ? json_null()
-                                       : json_pack("[[f,f,f],[f,f,f]]", f->low[0], f->low[1], f->low[2], f->high[0], f->high[1], f->high[2]);
-    return json_pack("{s:i,s:s,s:o,s:s,s:I,s:o,s:{s:I,s:I,s:I,s:I,s:I,s:I,s:[i,i],s:[i,i]},s:I,s:I,s:s,s:I,s:b,s:I,s:[f,f,f],s:o,s:f,s:o}", "schema", 1, "kind", "dataset",
-                     "path", json_text(path), "source", s->source, "views", (json_int_t)s->view_count, "cameras", cameras,
-                     "photos", "found", (json_int_t)f->photos.found, "missing", (json_int_t)s->photos_missing, "unreadable",
-                     (json_int_t)f->photos.unreadable, "other_size", (json_int_t)f->photos.other_size, "with_alpha", (json_int_t)f->photos.with_alpha, "with_mask",
-                     (json_int_t)f->photos.with_mask, "min_size", f->photos.min_width, f->photos.min_height, "max_size", f->photos.max_width,
-                     f->photos.max_height,
-                     "train_views", (json_int_t)(s->view_count - f->test_views), "test_views", (json_int_t)f->test_views, "split", split_name(s), "points",
-                     (json_int_t)s->points.count, "points_have_color", (int)s->points.has_color, "points_dropped", (json_int_t)s->points_dropped,
-                     "origin", s->origin[0], s->origin[1], s->origin[2], "point_box", box, "camera_extent", f->extent, "expect", expect_to_json(&f->expect));
+                                       : json_pack("[[f,f,f],[f,f,f]]", f->low[0], f->low[1], f->low[2], f->high[0], f->high[1],
+                                                   f->high[2]);
+    return json_pack("{s:i,s:s,s:o,s:s,s:I,s:o,s:{s:I,s:I,s:I,s:I,s:I,s:I,s:[i,i],s:[i,i]},s:I,s:I,s:s,s:I,s:b,s:I,s:[f,f,f],s:o,s:f,s:o}",
+                     "schema", 1, "kind", "dataset", "path", json_text(path), "source", s->source, "views", (json_int_t)s->view_count,
+                     "cameras", cameras, "photos", "found", (json_int_t)f->photos.found, "missing", (json_int_t)s->photos_missing,
+                     "unreadable", (json_int_t)f->photos.unreadable, "other_size", (json_int_t)f->photos.other_size, "with_alpha",
+                     (json_int_t)f->photos.with_alpha, "with_mask", (json_int_t)f->photos.with_mask, "min_size", f->photos.min_width,
+                     f->photos.min_height, "max_size", f->photos.max_width, f->photos.max_height,
+                     "train_views", (json_int_t)(s->view_count - f->test_views), "test_views", (json_int_t)f->test_views, "split",
+                     split_name(s), "points", (json_int_t)s->points.count, "points_have_color", (int)s->points.has_color, "points_dropped",
+                     (json_int_t)s->points_dropped, "origin", s->origin[0], s->origin[1], s->origin[2], "point_box", box, "camera_extent",
+                     f->extent, "expect", expect_to_json(&f->expect));
 }
 
 static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
@@ -168,17 +172,17 @@ static gbt_status info_of_gaussians(const char *path, int json, FILE *out, gbt_e
     GBT_TRY(gaussian_file_read(path, &cloud, err));
     gbt_status status = find_box(cloud.mean, cloud.count, world, low, high, err);
     if (status == GBT_OK && json) {
-        json_t *value = json_pack("{s:i,s:s,s:o,s:I,s:i,s:I,s:[[f,f,f],[f,f,f]]}", "schema", 1, "kind", "gaussians", "path", json_text(path), "gaussians",
-                                  (json_int_t)cloud.count, "sh_degree", cloud.sh_degree, "dropped", (json_int_t)cloud.dropped, "box", low[0], low[1], low[2],
-                                  high[0], high[1], high[2]);
+        json_t *value = json_pack("{s:i,s:s,s:o,s:I,s:i,s:I,s:[[f,f,f],[f,f,f]]}", "schema", 1, "kind", "gaussians", "path",
+                                  json_text(path), "gaussians", (json_int_t)cloud.count, "sh_degree", cloud.sh_degree, "dropped",
+                                  (json_int_t)cloud.dropped, "box", low[0], low[1], low[2], high[0], high[1], high[2]);
         status = json_print(value, out, err);
         json_decref(value);
     } else if (status == GBT_OK) {
         fprintf(out, "%s: plain Gaussians\n  gaussians %zu, colours of degree %d", path, cloud.count, cloud.sh_degree);
         if (cloud.dropped > 0)
             fprintf(out, ", %zu unusable rows dropped", cloud.dropped);
-        fprintf(out, "\n  box       90 %% within %g x %g x %g around %g %g %g\n", high[0] - low[0], high[1] - low[1], high[2] - low[2], 0.5 * (low[0] + high[0]),
-                0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]));
+        fprintf(out, "\n  box       90 %% within %g x %g x %g around %g %g %g\n", high[0] - low[0], high[1] - low[1], high[2] - low[2],
+                0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]));
     }
     gaussian_cloud_free(&cloud);
     return status;
@@ -203,23 +207,24 @@ static gbt_status info_of_model(const char *path, int json, FILE *out, gbt_error
         return status;
     const anchors *a = &m.anchors;
     if (json) {
-        json_t *value = json_pack("{s:i,s:s,s:o,s:I,s:i,s:b,s:I,s:I,s:I,s:o,s:o,s:f,s:f,s:f,s:[f,f,f],s:[f,f,f]}", "schema", 1, "kind", "model", "path",
-                                  json_text(path), "anchors", (json_int_t)a->count, "offsets", a->offset_count, "has_distance",
-                                  (int)m.decoder.has_distance, "decoder_parameters", (json_int_t)m.decoder.param_count, "iterations",
-                                  (json_int_t)m.iterations, "bytes", (json_int_t)byte_count, "data", json_text(m.data_folder), "config",
-                                  json_text(m.config), "voxel_size", (double)m.voxel_size, "camera_extent", (double)m.extent, "t_near", (double)m.t_near,
-                                  "background", (double)m.background[0], (double)m.background[1], (double)m.background[2], "origin", m.origin[0],
-                                  m.origin[1], m.origin[2]);
+        json_t *value = json_pack("{s:i,s:s,s:o,s:I,s:i,s:b,s:I,s:I,s:I,s:o,s:o,s:f,s:f,s:f,s:[f,f,f],s:[f,f,f]}", "schema", 1, "kind",
+                                  "model", "path", json_text(path), "anchors", (json_int_t)a->count, "offsets", a->offset_count,
+                                  "has_distance", (int)m.decoder.has_distance, "decoder_parameters", (json_int_t)m.decoder.param_count,
+                                  "iterations", (json_int_t)m.iterations, "bytes", (json_int_t)byte_count, "data", json_text(m.data_folder),
+                                  "config", json_text(m.config), "voxel_size", (double)m.voxel_size, "camera_extent", (double)m.extent,
+                                  "t_near", (double)m.t_near, "background", (double)m.background[0], (double)m.background[1],
+                                  (double)m.background[2], "origin", m.origin[0], m.origin[1], m.origin[2]);
         status = json_print(value, out, err);
         json_decref(value);
     } else {
         fprintf(out, "%s: model\n", path);
         fprintf(out, "  anchors   %zu, with %d Gaussians each at most\n", a->count, a->offset_count);
         fprintf(out, "  decoder   %zu parameters, %s distance input\n", m.decoder.param_count, m.decoder.has_distance ? "with" : "without");
-        fprintf(out, "  trained   %llu iterations on %s\n", (unsigned long long)m.iterations, m.data_folder[0] != '\0' ? m.data_folder : "unnamed data");
+        fprintf(out, "  trained   %llu iterations on %s\n", (unsigned long long)m.iterations,
+                m.data_folder[0] != '\0' ? m.data_folder : "unnamed data");
         fprintf(out, "  size      %zu bytes\n", byte_count);
-        fprintf(out, "  scene     voxel size %g, extent %g, near %g, origin %.9g %.9g %.9g\n", (double)m.voxel_size, (double)m.extent, (double)m.t_near,
-                m.origin[0], m.origin[1], m.origin[2]);
+        fprintf(out, "  scene     voxel size %g, extent %g, near %g, origin %.9g %.9g %.9g\n", (double)m.voxel_size, (double)m.extent,
+                (double)m.t_near, m.origin[0], m.origin[1], m.origin[2]);
         for (const char *line = m.config; *line != '\0';) {
             const size_t length = strcspn(line, "\n");
             fprintf(out, "  config    %.*s\n", (int)length, line);

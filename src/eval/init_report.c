@@ -23,8 +23,8 @@ enum { ANCHOR_SCALES = 6 };
 
 gbt_init_def gbt_init_def_default(void)
 {
-    return (gbt_init_def){.init = "gb", .init_count = anchor_init_def_default().fraction, .scale_prior = "gb", .max_depth = balls_def_default().max_depth,
-                          .voxel_size = 0.0f, .voxel_rule = "median"};
+    return (gbt_init_def){.init = "gb", .init_count = anchor_init_def_default().fraction, .scale_prior = "gb",
+                          .max_depth = balls_def_default().max_depth, .voxel_size = 0.0f, .voxel_rule = "median"};
 }
 
 /** Index of `text` among `a`, `b`; -1 with a message. */
@@ -107,7 +107,8 @@ static gbt_status rows_from_nearest(anchor_rows *r, const anchors *a, const scen
 static gbt_status write_points(const char *path, const scene *s, const anchors *a, const anchor_rows *r, gbt_error *err)
 {
     const ply_extra extras[] = {
-        {"radius", r->radius, 1}, {"scale_0", r->scale, ANCHOR_SCALES}, {"scale_1", r->scale + 1, ANCHOR_SCALES}, {"scale_2", r->scale + 2, ANCHOR_SCALES},
+        {"radius", r->radius, 1}, {"scale_0", r->scale, ANCHOR_SCALES}, {"scale_1", r->scale + 1, ANCHOR_SCALES},
+        {"scale_2", r->scale + 2, ANCHOR_SCALES},
         {"scale_3", r->scale + 3, ANCHOR_SCALES}, {"scale_4", r->scale + 4, ANCHOR_SCALES}, {"scale_5", r->scale + 5, ANCHOR_SCALES},
         {"count", r->count, 1}, {"depth", r->depth, 1},
     };
@@ -164,18 +165,19 @@ static json_t *qualities_to_json(const init_quality *rows)
 {
     json_t *list = json_array();
     for (int i = 0; i < INIT_QUALITY_ROWS; i++)
-        json_array_append_new(list, json_pack("{s:s,s:I,s:f,s:f}", "init", rows[i].name, "anchors", (json_int_t)rows[i].anchors, "distance_rms",
-                                              rows[i].distance, "color_rms", rows[i].color));
+        json_array_append_new(list, json_pack("{s:s,s:I,s:f,s:f}", "init", rows[i].name, "anchors", (json_int_t)rows[i].anchors,
+                                              "distance_rms", rows[i].distance, "color_rms", rows[i].color));
     return list;
 }
 
 static gbt_status save_json(const char *path, const char *data, const init_facts *f, gbt_error *err)
 {
-    json_t *value = json_pack("{s:i,s:o,s:s,s:s,s:s,s:f,s:I,s:I,s:I,s:o,s:o,s:o,s:o,s:o}", "schema", 1, "data", json_text(data), "init", f->kind,
-                              "scale_prior", f->scale_prior, "voxel_rule", f->voxel_rule, "voxel_size", (double)f->voxel_size, "points",
-                              (json_int_t)f->points, "anchors", (json_int_t)f->anchors, "voxel_anchors", (json_int_t)f->voxel_anchors, "radius",
-                              spread_to_json(&f->radius), "scale", spread_to_json(&f->scale), "points_per_anchor", spread_to_json(&f->count), "depth",
-                              spread_to_json(&f->depth), "quality", qualities_to_json(f->quality));
+    json_t *value = json_pack("{s:i,s:o,s:s,s:s,s:s,s:f,s:I,s:I,s:I,s:o,s:o,s:o,s:o,s:o}", "schema", 1, "data", json_text(data), "init",
+                              f->kind, "scale_prior", f->scale_prior, "voxel_rule", f->voxel_rule, "voxel_size", (double)f->voxel_size,
+                              "points", (json_int_t)f->points, "anchors", (json_int_t)f->anchors, "voxel_anchors",
+                              (json_int_t)f->voxel_anchors, "radius", spread_to_json(&f->radius), "scale", spread_to_json(&f->scale),
+                              "points_per_anchor", spread_to_json(&f->count), "depth", spread_to_json(&f->depth), "quality",
+                              qualities_to_json(f->quality));
     const gbt_status status = json_save(value, path, err);
     json_decref(value);
     return status;
@@ -188,14 +190,16 @@ static void print_spread(FILE *out, const char *name, const spread *s)
 
 static const char *what_they_are(const char *kind)
 {
-    return strcmp(kind, "gb") == 0 ? "granular balls" : strcmp(kind, "adaptive") == 0 ? "adaptive balls" : strcmp(kind, "voxel") == 0 ? "voxels" : "random points";
+    return strcmp(kind, "gb") == 0 ? "granular balls" : strcmp(kind, "adaptive") == 0 ? "adaptive balls" : strcmp(kind, "voxel") == 0
+           ? "voxels" : "random points";
 }
 
 static void print_facts(FILE *out, const init_facts *f)
 {
     fprintf(out, "points             %zu\n", f->points);
     fprintf(out, "voxel size         %g (%s)\n", (double)f->voxel_size, f->voxel_rule);
-    fprintf(out, "anchors            %zu (%s), %.3g points each\n", f->anchors, what_they_are(f->kind), (double)f->points / (double)f->anchors);
+    fprintf(out, "anchors            %zu (%s), %.3g points each\n", f->anchors, what_they_are(f->kind),
+            (double)f->points / (double)f->anchors);
     fprintf(out, "voxel baseline     %zu anchors at the same voxel size\n", f->voxel_anchors);
     fprintf(out, "%-20s %10s %10s %10s %10s\n", "per anchor", "min", "median", "mean", "max");
     print_spread(out, "radius", &f->radius);
@@ -209,8 +213,8 @@ static void print_facts(FILE *out, const init_facts *f)
 }
 
 /** Everything after the anchors are made. */
-static gbt_status report_anchors(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path, FILE *report, const scene *s,
-                                 const anchors *a, const balls *b, init_facts *facts, gbt_error *err)
+static gbt_status report_anchors(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path, FILE *report,
+                                 const scene *s, const anchors *a, const balls *b, init_facts *facts, gbt_error *err)
 {
     anchor_rows rows = {0};
     float *scratch = NULL;
@@ -251,14 +255,17 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
 {
     anchor_init_def how = anchor_init_def_default();
     if (def->init == NULL || !anchor_init_kind_named(def->init, &how.kind))
-        return base_fail(err, GBT_ERR_ARGUMENT, "init: wanted gb, adaptive, voxel or random, got %.80s", def->init != NULL ? def->init : "nothing");
-    const int scale = choose("scale prior", def->scale_prior, "gb", "nn", err), rule = choose("voxel rule", def->voxel_rule, "median", "squared", err);
+        return base_fail(err, GBT_ERR_ARGUMENT, "init: wanted gb, adaptive, voxel or random, got %.80s",
+                         def->init != NULL ? def->init : "nothing");
+    const int scale = choose("scale prior", def->scale_prior, "gb", "nn", err),
+        rule = choose("voxel rule", def->voxel_rule, "median", "squared", err);
     if (scale < 0 || rule < 0)
         return GBT_ERR_ARGUMENT;
     if (!(def->voxel_size >= 0.0f && isfinite(def->voxel_size)))
         return base_fail(err, GBT_ERR_ARGUMENT, "voxel size: wanted a finite number >= 0, got %g", (double)def->voxel_size);
     if (is_same_file(data, out_ply) || (json_path != NULL && (is_same_file(data, json_path) || strcmp(out_ply, json_path) == 0)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (the output must be another file)", is_same_file(data, out_ply) ? out_ply : json_path);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (the output must be another file)",
+                         is_same_file(data, out_ply) ? out_ply : json_path);
     scene s;
     anchors a = {0};
     balls b = {0};
@@ -271,7 +278,8 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
     if (points->count == 0)
         status = base_fail(err, GBT_ERR_FORMAT, "%s: no sparse points to start from", data);
     if (status == GBT_OK && !(facts.voxel_size > 0.0f))
-        status = balls_voxel_size(points->position, points->count, rule == 0 ? VOXEL_MEDIAN_SPACING : VOXEL_COMPAT_SQUARED, &facts.voxel_size, err);
+        status = balls_voxel_size(points->position, points->count, rule == 0 ? VOXEL_MEDIAN_SPACING : VOXEL_COMPAT_SQUARED,
+                                  &facts.voxel_size, err);
     if (status == GBT_OK) {
         how.fraction = def->init_count;
         how.scale = scale == 0 ? ANCHOR_SCALE_GB : ANCHOR_SCALE_NN;

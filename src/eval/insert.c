@@ -21,7 +21,7 @@ enum { RAY_BLOCK = 512, BOUNCES_MAX = 4, LAMP_SEED = 1 };
 /* Points are rounded to a relative error of 2^-24; rays that leave a surface start some of these away from it. */
 static const float offset_share = 0x1p-18f;
 
-/* ---- objects ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- objects ------------------------------------------------------------------------------------------------------------------------- */
 
 static void add_normals(insert_scene *in, size_t first)
 {
@@ -45,18 +45,22 @@ gbt_status insert_add(insert_scene *in, const insert_object *object, const float
     const size_t vertex_first = in->vertex_count, triangle_first = in->triangle_count;
     if (vertex_first + vertex_count >= UINT32_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "mesh: %zu vertices (wanted fewer than 2^32 - 1)", vertex_first + vertex_count);
-    GBT_TRY(mem_reserve((void **)&in->objects, &in->object_capacity, in->object_count, in->object_count + 1, sizeof *in->objects, "objects", err));
-    GBT_TRY(mem_reserve((void **)&in->normals, &in->normal_capacity, vertex_first, vertex_first + vertex_count, 3 * sizeof *in->normals, "mesh", err));
-    GBT_TRY(mem_reserve((void **)&in->vertices, &in->vertex_capacity, vertex_first, vertex_first + vertex_count, 3 * sizeof *in->vertices, "mesh", err));
-    GBT_TRY(mem_reserve((void **)&in->triangles, &in->triangle_capacity, triangle_first, triangle_first + triangle_count, 3 * sizeof *in->triangles, "mesh",
+    GBT_TRY(mem_reserve((void **)&in->objects, &in->object_capacity, in->object_count, in->object_count + 1, sizeof *in->objects, "objects",
                         err));
+    GBT_TRY(mem_reserve((void **)&in->normals, &in->normal_capacity, vertex_first, vertex_first + vertex_count, 3 * sizeof *in->normals,
+                        "mesh", err));
+    GBT_TRY(mem_reserve((void **)&in->vertices, &in->vertex_capacity, vertex_first, vertex_first + vertex_count, 3 * sizeof *in->vertices,
+                        "mesh", err));
+    GBT_TRY(mem_reserve((void **)&in->triangles, &in->triangle_capacity, triangle_first, triangle_first + triangle_count,
+                        3 * sizeof *in->triangles, "mesh", err));
     for (size_t i = 0; i < 3 * vertex_count; i++) {
         in->vertices[3 * vertex_first + i] = vertices[i];
         in->normals[3 * vertex_first + i] = 0;
     }
     for (size_t i = 0; i < 3 * triangle_count; i++) {
         if (triangles[i] >= vertex_count)
-            return base_fail(err, GBT_ERR_ARGUMENT, "mesh: triangle %zu: bad vertex number (wanted < %zu, got %u)", i / 3, vertex_count, triangles[i]);
+            return base_fail(err, GBT_ERR_ARGUMENT, "mesh: triangle %zu: bad vertex number (wanted < %zu, got %u)", i / 3, vertex_count,
+                             triangles[i]);
         in->triangles[3 * triangle_first + i] = (uint32_t)vertex_first + triangles[i];
     }
     in->vertex_count += vertex_count, in->triangle_count += triangle_count;
@@ -88,7 +92,7 @@ void insert_scene_free(insert_scene *in)
     memset(in, 0, sizeof *in);
 }
 
-/* ---- what one ray meets ------------------------------------------------------------------------------------------------------------------- */
+/* ---- what one ray meets -------------------------------------------------------------------------------------------------------------- */
 
 /* Normals are unit and on the side that the ray came from. */
 typedef struct surface {
@@ -140,7 +144,8 @@ static void move_over_lamp(const insert_scene *in, int sample, size_t ray, const
 {
     const double golden = 2.399963229728653, turn = 6.283185307179586;
     const double angle = golden * sample + turn * (double)rng_uniform(LAMP_SEED, 0, ray);
-    const double radius = in->lamp_radius * sqrt((sample + 0.5) / INSERT_LAMP_SAMPLES), any[3] = {fabs(dir[0]) < 0.6, fabs(dir[0]) >= 0.6, 0};
+    const double radius = in->lamp_radius * sqrt((sample + 0.5) / INSERT_LAMP_SAMPLES),
+        any[3] = {fabs(dir[0]) < 0.6, fabs(dir[0]) >= 0.6, 0};
     double right[3], up[3];
     dvec_cross(any, dir, right);
     dvec_normalize(right);
@@ -188,7 +193,7 @@ static void reflect(const surface *s, const float dir[3], float out[3])
         out[k] = (float)r[k];
 }
 
-/* ---- one picture of rays ------------------------------------------------------------------------------------------------------------------- */
+/* ---- one picture of rays ------------------------------------------------------------------------------------------------------------- */
 
 /* Arrays have a value per ray. */
 typedef struct sight {
@@ -402,7 +407,8 @@ static gbt_status see_surfaces(sight *s, trace_scene *scene, gbt_error *err)
     }
     for (s->sample = 0; matt_count > 0 && s->sample < lamp_samples(s->in); s->sample++) {
         parallel_blocks(count, RAY_BLOCK, lamp_rays, s);
-        GBT_TRY(trace_forward(scene, &s->next, false, &(trace_outputs){.rgb = &s->next_rgb, .transmittance = s->lamp_transmittance}, NULL, err));
+        GBT_TRY(trace_forward(scene, &s->next, false, &(trace_outputs){.rgb = &s->next_rgb, .transmittance = s->lamp_transmittance}, NULL,
+                              err));
         parallel_blocks(count, RAY_BLOCK, add_lamp, s);
     }
     if (matt_count > 0)
@@ -417,7 +423,8 @@ static gbt_status see(sight *s, trace_scene *scene, gbt_error *err)
     parallel_blocks(count, RAY_BLOCK, find_surfaces, s);
     ray_image ended = *s->rays; /* the same rays; only their ends are ours */
     ended.far = s->far;
-    GBT_TRY(trace_forward(scene, &ended, false, &(trace_outputs){.rgb = s->rgb, .transmittance = s->transmittance, .depth = s->depth}, NULL, err));
+    GBT_TRY(trace_forward(scene, &ended, false, &(trace_outputs){.rgb = s->rgb, .transmittance = s->transmittance, .depth = s->depth}, NULL,
+                          err));
     if (s->in->lamp != INSERT_NO_LAMP)
         parallel_blocks(count, RAY_BLOCK, shadow_gaussians, s);
     GBT_TRY(see_surfaces(s, scene, err));

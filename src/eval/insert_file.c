@@ -85,7 +85,8 @@ static gbt_status take_look(const json_fields *r, insert_object *out)
     return GBT_OK;
 }
 
-static gbt_status add_placed(const json_fields *r, const insert_object *object, const placement *place, const mesh_data *mesh, insert_scene *out)
+static gbt_status add_placed(const json_fields *r, const insert_object *object, const placement *place, const mesh_data *mesh,
+                             insert_scene *out)
 {
     float *vertices = mem_alloc(mesh->vertex_count, 3 * sizeof *vertices, "mesh", r->err);
     gbt_status status = vertices == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
@@ -96,7 +97,8 @@ static gbt_status add_placed(const json_fields *r, const insert_object *object, 
             x[k] = place->scale * x[k] + place->position[k];
             vertices[3 * i + k] = (float)x[k];
             if (!(fabsf(vertices[3 * i + k]) <= MESH_COORDINATE_LIMIT))
-                status = base_fail(r->err, GBT_ERR_FORMAT, "%s: %smesh: vertex %zu lies beyond %g", r->path, r->prefix, i, (double)MESH_COORDINATE_LIMIT);
+                status = base_fail(r->err, GBT_ERR_FORMAT, "%s: %smesh: vertex %zu lies beyond %g", r->path, r->prefix, i,
+                                   (double)MESH_COORDINATE_LIMIT);
         }
     }
     if (status == GBT_OK)

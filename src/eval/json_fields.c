@@ -50,7 +50,8 @@ gbt_status json_field_names(const json_fields *r, const char *names)
         char padded[64];
         const int length = snprintf(padded, sizeof padded, " %s ", key);
         if (length >= (int)sizeof padded || length < 3 || strchr(key, ' ') != NULL || strstr(names, padded) == NULL)
-            return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%.60s: unknown field (wanted one of%.*s)", r->path, r->prefix, key, (int)strlen(names) - 1, names);
+            return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%.60s: unknown field (wanted one of%.*s)", r->path, r->prefix, key,
+                             (int)strlen(names) - 1, names);
     }
     return GBT_OK;
 }
@@ -78,7 +79,8 @@ gbt_status json_field_number(const json_fields *r, const char *field, double low
         return GBT_OK;
     const double number = json_number_value(value);
     if (!json_is_number(value) || !(closed ? number >= low : number > low) || !(number <= high))
-        return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: wanted a number in %c%g, %g]", r->path, r->prefix, field, closed ? '[' : '(', low, high);
+        return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: wanted a number in %c%g, %g]", r->path, r->prefix, field, closed ? '[' : '(',
+                         low, high);
     *out = number;
     return GBT_OK;
 }
@@ -113,7 +115,8 @@ gbt_status json_field_choice(const json_fields *r, const char *field, const char
 
 gbt_status json_field_needed(const json_fields *r, const char *field, const char *why)
 {
-    return json_field_given(r, field) ? GBT_OK : base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: missing (%s)", r->path, r->prefix, field, why);
+    return json_field_given(r, field) ? GBT_OK : base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: missing (%s)", r->path, r->prefix, field,
+                                                           why);
 }
 
 gbt_status json_field_bool(const json_fields *r, const char *field, bool *out)

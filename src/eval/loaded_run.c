@@ -102,10 +102,12 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
         return place_views(downscale, out, err);
     }
     if (data == NULL && out->cloud.count > 0 && !has_data)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%.1000s: plain Gaussians know no cameras: name a camera or a data set (--camera or --data)", run);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%.1000s: plain Gaussians know no cameras: name a camera or a data set (--camera or --data)", run);
     if (data == NULL && !has_data)
-        return base_fail(err, GBT_ERR_IO, "%.1000s: the data set of %.1000s is not there; run the command in the folder where it was trained, or say where with --data",
-                         out->model.data_folder, run);
+        return base_fail(err, GBT_ERR_IO,
+                         "%.1000s: the data set of %.1000s is not there; run the command in the folder where it was trained, or say where "
+                         "with --data", out->model.data_folder, run);
     GBT_TRY(scene_load(data != NULL ? data : out->model.data_folder, &split, &out->scene, err));
     GBT_TRY(scene_set_alpha(&out->scene, out->def.alpha, err));
     return place_views(downscale, out, err);
@@ -141,7 +143,8 @@ void loaded_run_close(loaded_run *r)
 
 gbt_status loaded_run_need_anchors(const loaded_run *r, const char *run, gbt_error *err)
 {
-    return r->cloud.count == 0 ? GBT_OK : base_fail(err, GBT_ERR_ARGUMENT, "%.1000s: plain Gaussians, no anchors (wanted a run or its model.gbt)", run);
+    return r->cloud.count == 0 ? GBT_OK : base_fail(err, GBT_ERR_ARGUMENT,
+                                                    "%.1000s: plain Gaussians, no anchors (wanted a run or its model.gbt)", run);
 }
 
 frame_subject loaded_run_subject(const loaded_run *r)

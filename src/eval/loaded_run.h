@@ -21,8 +21,8 @@ typedef struct loaded_run {
 } loaded_run;
 
 /**
- * Open RUN: a folder with model.gbt, a model file, or plain Gaussians (.ply, .splat, .spz), which know no data set. A result folder of 3DGS may:
- * the one that its cfg_args names, else its cameras.json.
+ * Open RUN: a folder with model.gbt, a model file, or plain Gaussians (.ply, .splat, .spz), which know no data set. A result folder of 3DGS
+ * may: the one that its cfg_args names, else its cameras.json.
  *
  * @param data      [in] data set folder; NULL: the one it was trained on
  * @param downscale [in] 0: as in training
@@ -48,7 +48,8 @@ void loaded_run_close_views(loaded_run *r);
 /** Draw as plain Gaussians are drawn: on black, as every viewer does. */
 void loaded_run_draw_plain(loaded_run *r);
 
-/** Let `r` show these plain Gaussians, given in world coordinates, around the middle of their bounds, where floats are fine. `cloud` is taken
+/** Let `r` show these plain Gaussians, given in world coordinates, around the middle of their bounds, where floats are fine. `cloud` is
+ * taken
     over, and is {0} then. */
 void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud);
 

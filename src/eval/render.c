@@ -134,7 +134,8 @@ static void say_progress(size_t done, size_t count, double start, double *said)
     *said = now;
 }
 
-static gbt_status render_frames(studio *st, const camera_path *path, video *film, const char *out, const gbt_render_def *def, gbt_error *err)
+static gbt_status render_frames(studio *st, const camera_path *path, video *film, const char *out, const gbt_render_def *def,
+                                gbt_error *err)
 {
     const double start = clock_wall();
     double said = start;
@@ -241,7 +242,8 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
     if (status == GBT_OK && def->insert != NULL)
         status = insert_file_read(def->insert, st->run.model.origin, &st->insert, err);
     if (status == GBT_OK)
-        status = def->path != NULL ? render_film(st, out, def, err) : def->camera != NULL ? render_camera(st, out, def, err) : render_views(st, out, def, err);
+        status = def->path != NULL ? render_film(st, out, def, err) : def->camera != NULL ? render_camera(st, out, def, err)
+                 : render_views(st, out, def, err);
     insert_scene_free(&st->insert);
     loaded_run_close(&st->run);
     mem_free(st);

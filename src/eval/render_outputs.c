@@ -20,7 +20,8 @@ gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *e
         while (i < OUTPUT_COUNT && (strlen(outputs[i].name) != length || strncmp(word, outputs[i].name, length) != 0))
             i++;
         if (i == OUTPUT_COUNT)
-            return base_fail(err, GBT_ERR_ARGUMENT, "--outputs: \"%.*s\" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)",
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "--outputs: \"%.*s\" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)",
                              length < 40 ? (int)length : 40, word);
         *wanted |= 1u << i;
         word = word[length] == ',' ? word + length + 1 : NULL;

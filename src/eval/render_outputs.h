@@ -4,7 +4,8 @@
 
 #include "eval/loaded_run.h"
 
-typedef enum render_output { OUTPUT_TRANSMITTANCE, OUTPUT_DEPTH, OUTPUT_MEDIAN_DEPTH, OUTPUT_NORMAL, OUTPUT_HITS, OUTPUT_ANCHOR, OUTPUT_COUNT } render_output;
+typedef enum render_output { OUTPUT_TRANSMITTANCE, OUTPUT_DEPTH, OUTPUT_MEDIAN_DEPTH, OUTPUT_NORMAL, OUTPUT_HITS, OUTPUT_ANCHOR,
+                            OUTPUT_COUNT } render_output;
 
 /** Pictures of one pass. Start from {0}; render_output_images_free() after success or failure. */
 typedef struct render_output_images {
@@ -23,8 +24,8 @@ typedef struct render_output_images {
 gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *err);
 
 /**
- * Trace the Gaussians of the last render of `r` once more, along the rays of `shot` through the middle of its aperture. They may be others than
- * the render's, but see nothing more: what was left out then is not seen.
+ * Trace the Gaussians of the last render of `r` once more, along the rays of `shot` through the middle of its aperture. They may be others
+ * than the render's, but see nothing more: what was left out then is not seen.
  *
  * @param wanted [in] bits of render_outputs_parse()
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_NO_MEMORY

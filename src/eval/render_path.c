@@ -26,7 +26,8 @@ static gbt_status take_cameras(const loaded_run *r, gbt_camera **out, size_t *co
         for (size_t i = 0; i < r->scene.view_count; i++)
             if (r->scene.views[i].is_test == (held_out > 0))
                 (*out)[(*count)++] = photos_camera(&r->photos, i, 0);
-    return *count > 0 ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "--path: %s has no cameras (wanted a data set with photos, or a path file)", r->scene.folder);
+    return *count > 0 ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "--path: %s has no cameras (wanted a data set with photos, or a path file)",
+                                           r->scene.folder);
 }
 
 /** Sides of the pictures: as asked for, else those of the first photo, made even for films. */
@@ -75,7 +76,8 @@ static gbt_status resize(camera_path *path, const gbt_render_def *def, gbt_error
         ray_shot *shot = &path->shots[i];
         camera_group group = {.lens = shot->camera};
         if (shot->camera.model != GBT_CAMERA_PINHOLE)
-            return base_fail(err, GBT_ERR_ARGUMENT, "--size: not with a path of %s cameras (its file says the size)", gbt_camera_model_name(shot->camera.model));
+            return base_fail(err, GBT_ERR_ARGUMENT, "--size: not with a path of %s cameras (its file says the size)",
+                             gbt_camera_model_name(shot->camera.model));
         const gbt_camera lens = camera_group_lens(&group, def->width, def->height);
         shot->camera.width = lens.width, shot->camera.height = lens.height;
         memcpy(shot->camera.params, lens.params, sizeof lens.params);

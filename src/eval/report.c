@@ -79,7 +79,8 @@ static void add_tiles(text *out, const evaluation *e, const json_t *metrics)
 static void add_contents(text *out, bool has_scene, bool has_studies)
 {
     const struct { const char *id, *name; bool there; } parts[] = {
-        {"views", "Held-out views", true}, {"scene", "The scene", has_scene}, {"training", "Training", true}, {"time", "Time", true}, {"studies", "Studies", has_studies},
+        {"views", "Held-out views", true}, {"scene", "The scene", has_scene}, {"training", "Training", true}, {"time", "Time", true},
+        {"studies", "Studies", has_studies},
         {"facts", "Facts", true}, {"again", "Make it again", true}};
     text_add(out, "<nav>");
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
@@ -93,7 +94,8 @@ static void add_head(text *out, const char *run, const evaluation *e, const json
     char name[256];
     const char *data = metrics_text(metrics, "data"), *command = metrics_text(metrics, "command");
     base_name(data != NULL ? data : run, name, sizeof name);
-    text_add(out, "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+    text_add(out, "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+                  "content=\"width=device-width, initial-scale=1\">\n"
                   "<title>");
     text_escaped(out, name);
     text_add(out, " \xc2\xb7 gbtrace</title>\n<style>\n");
@@ -102,7 +104,8 @@ static void add_head(text *out, const char *run, const evaluation *e, const json
     text_escaped(out, name);
     const char *renderer = metrics_text(metrics, "renderer");
     const bool splats = renderer != NULL && strcmp(renderer, "trace") != 0;
-    text_format(out, "</h1>\n<p class=\"lead\">A neural Gaussian scene, %s. Data: ", splats ? "rendered by splats on the CPU" : "rendered by CPU ray tracing");
+    text_format(out, "</h1>\n<p class=\"lead\">A neural Gaussian scene, %s. Data: ",
+                splats ? "rendered by splats on the CPU" : "rendered by CPU ray tracing");
     text_escaped(out, data);
     text_format(out, " \xc2\xb7 %zu held-out view%s</p>\n", e->view_count, e->view_count == 1 ? "" : "s");
     add_contents(out, has_scene, has_studies);

@@ -22,8 +22,9 @@ static gbt_status read_scores(const char *run, const json_t *metrics, evaluation
 {
     char folder[4096];
     const json_t *views = json_object_get(metrics, "views");
-    *e = (evaluation){.psnr = metrics_number(metrics, "psnr"), .ssim = metrics_number(metrics, "ssim"), .flip = metrics_number(metrics, "flip"),
-                      .gaussians_per_view = metrics_number(metrics, "gaussians_per_view"), .anchors = count_or_zero(metrics_number(metrics, "anchors_final")),
+    *e = (evaluation){.psnr = metrics_number(metrics, "psnr"), .ssim = metrics_number(metrics, "ssim"),
+                      .flip = metrics_number(metrics, "flip"), .gaussians_per_view = metrics_number(metrics, "gaussians_per_view"),
+                      .anchors = count_or_zero(metrics_number(metrics, "anchors_final")),
                       .model_bytes = count_or_zero(metrics_number(metrics, "model_bytes"))};
     GBT_TRY(file_join(folder, sizeof folder, run, "renders/test", err));
     e->views = mem_calloc(json_array_size(views) + 1, sizeof *e->views, "view scores", err);
@@ -61,7 +62,8 @@ gbt_status gbt_report(const char *run, const char *const *studies, size_t study_
         const gbt_status opened = loaded_run_open(run, NULL, 0, r, &why);
         if (opened != GBT_OK)
             log_warn("no maps and layers: %s", why.text);
-        status = report_write(run, &e, metrics, &(report_more){.open = opened == GBT_OK ? r : NULL, .studies = studies, .study_count = study_count}, err);
+        status = report_write(run, &e, metrics, &(report_more){.open = opened == GBT_OK ? r : NULL, .studies = studies,
+                                                               .study_count = study_count}, err);
     }
     if (status == GBT_OK)
         log_info("%s/report.html: %zu held-out views", run, e.view_count);

@@ -119,7 +119,8 @@ void chart_draw_axes(text *out, const line_chart *c, chart_axes *a)
     a->y_low = ticks[0], a->y_high = ticks[count - 1];
     text_add(out, "<g class=\"grid\">");
     for (int i = 0; i < count; i++)
-        text_format(out, "<line x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/>", CHART_LEFT, chart_place_y(a, ticks[i]), CHART_RIGHT, chart_place_y(a, ticks[i]));
+        text_format(out, "<line x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/>", CHART_LEFT, chart_place_y(a, ticks[i]), CHART_RIGHT,
+                    chart_place_y(a, ticks[i]));
     text_add(out, "</g><g class=\"y\">");
     for (int i = 0; i < count; i++) {
         text_format(out, "<text x=\"%d\" y=\"%.1f\">", CHART_LEFT - 7, chart_place_y(a, ticks[i]) + 4);
@@ -135,13 +136,13 @@ void chart_draw_axes(text *out, const line_chart *c, chart_axes *a)
     for (int i = 0; i < count; i++) {
         if (ticks[i] < a->x_low - 1e-9 * fabs(a->x_low) || ticks[i] > a->x_high * (1 + 1e-9))
             continue;
-        text_format(out, "<line x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text x=\"%.1f\" y=\"%d\">", chart_place_x(a, ticks[i]), CHART_BOTTOM,
-                    chart_place_x(a, ticks[i]), CHART_BOTTOM + 4, chart_place_x(a, ticks[i]), CHART_BOTTOM + 18);
+        text_format(out, "<line x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text x=\"%.1f\" y=\"%d\">", chart_place_x(a, ticks[i]),
+                    CHART_BOTTOM, chart_place_x(a, ticks[i]), CHART_BOTTOM + 4, chart_place_x(a, ticks[i]), CHART_BOTTOM + 18);
         add_tick_label(out, ticks[i], ticks[1] - ticks[0]);
         text_add(out, "</text>");
     }
-    text_format(out, "<line x1=\"%d\" y1=\"%d\" x2=\"%d\" y2=\"%d\"/><text class=\"unit\" x=\"%d\" y=\"%d\">training time, ", CHART_LEFT, CHART_BOTTOM, CHART_RIGHT, CHART_BOTTOM,
-                (CHART_LEFT + CHART_RIGHT) / 2, CHART_HEIGHT - 8);
+    text_format(out, "<line x1=\"%d\" y1=\"%d\" x2=\"%d\" y2=\"%d\"/><text class=\"unit\" x=\"%d\" y=\"%d\">training time, ", CHART_LEFT,
+                CHART_BOTTOM, CHART_RIGHT, CHART_BOTTOM, (CHART_LEFT + CHART_RIGHT) / 2, CHART_HEIGHT - 8);
     text_escaped(out, c->x_unit);
     text_format(out, "</text></g><text class=\"unit\" x=\"%d\" y=\"%d\">", 6, CHART_TOP - 12);
     text_escaped(out, c->y_unit);

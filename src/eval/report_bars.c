@@ -38,8 +38,8 @@ void chart_bars(text *out, const char *title, const char *unit, const chart_bar 
             continue;
         }
         const double width = fmax((BAR_RIGHT - BAR_LEFT) * (bars[i].value / longest), 1);
-        text_format(out, "<rect x=\"%d\" y=\"%zu\" width=\"%.1f\" height=\"%d\" rx=\"2\"/><text x=\"%.1f\" y=\"%zu\">", BAR_LEFT, top, width, BAR,
-                    BAR_LEFT + width + 6, base);
+        text_format(out, "<rect x=\"%d\" y=\"%zu\" width=\"%.1f\" height=\"%d\" rx=\"2\"/><text x=\"%.1f\" y=\"%zu\">", BAR_LEFT, top,
+                    width, BAR, BAR_LEFT + width + 6, base);
         text_number(out, bars[i].value, bars[i].value < 9.995 ? 2 : bars[i].value < 99.95 ? 1 : 0);
         text_add(out, " ");
         text_escaped(out, unit);
@@ -94,8 +94,8 @@ static void draw_layer(text *out, const stack *s, size_t layer, const chart_axes
     text_add(out, "</title></path>");
 }
 
-void chart_stack(text *out, const char *title, const char *x_unit, const char *y_unit, const double *x, size_t count, const chart_layer *layers,
-                 size_t layer_count)
+void chart_stack(text *out, const char *title, const char *x_unit, const char *y_unit, const double *x, size_t count,
+                 const chart_layer *layers, size_t layer_count)
 {
     stack s;
     chart_axes a;

@@ -57,7 +57,8 @@ static void draw_dots(text *out, const line_chart *c, const chart_series *line, 
     for (size_t i = 0; i < line->count; i++) {
         if (!chart_can_show(c, line->x[i], line->y[i]))
             continue;
-        text_format(out, "<circle class=\"dot c%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"4\"><title>", line->color & 3, chart_place_x(a, line->x[i]), chart_place_y(a, line->y[i]));
+        text_format(out, "<circle class=\"dot c%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"4\"><title>", line->color & 3, chart_place_x(a, line->x[i]),
+                    chart_place_y(a, line->y[i]));
         text_escaped(out, line->name != NULL ? line->name : "");
         text_add(out, " ");
         add_value(out, c, line->y[i]);
@@ -97,10 +98,11 @@ static void draw_strips(text *out, const line_chart *c, const chart_axes *a)
     const double width = (double)(CHART_RIGHT - CHART_LEFT) / STRIPS;
     for (int i = 0; i < STRIPS; i++) {
         const double left = CHART_LEFT + i * width, middle = left + width / 2, x = a->x_low + (a->x_high - a->x_low) * (i + 0.5) / STRIPS;
-        text_format(out, "<g class=\"tip\"><rect x=\"%.1f\" y=\"%d\" width=\"%.1f\" height=\"%d\"><title>", left, CHART_TOP, width, CHART_BOTTOM - CHART_TOP);
+        text_format(out, "<g class=\"tip\"><rect x=\"%.1f\" y=\"%d\" width=\"%.1f\" height=\"%d\"><title>", left, CHART_TOP, width,
+                    CHART_BOTTOM - CHART_TOP);
         add_readout(out, c, x);
-        text_format(out, "</title></rect><line x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text x=\"%d\" y=\"%d\">", middle, CHART_TOP, middle, CHART_BOTTOM, CHART_RIGHT,
-                    CHART_TOP - 12);
+        text_format(out, "</title></rect><line x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text x=\"%d\" y=\"%d\">", middle, CHART_TOP,
+                    middle, CHART_BOTTOM, CHART_RIGHT, CHART_TOP - 12);
         add_readout(out, c, x);
         text_add(out, "</text></g>");
     }
@@ -113,7 +115,8 @@ static void draw_legend(text *out, const line_chart *c)
         const chart_series *line = &c->series[s];
         if (line->name == NULL || line->count == 0)
             continue;
-        text_format(out, "<span class=\"key %s c%d\">", line->style == CHART_DOTS ? "dots" : line->style == CHART_FAINT ? "faint" : "line", line->color & 3);
+        text_format(out, "<span class=\"key %s c%d\">", line->style == CHART_DOTS ? "dots" : line->style == CHART_FAINT ? "faint" : "line",
+                    line->color & 3);
         text_escaped(out, line->name);
         text_add(out, "</span>");
     }

@@ -60,8 +60,8 @@ void chart_lines(text *out, const line_chart *chart);
 void chart_bars(text *out, const char *title, const char *unit, const chart_bar *bars, size_t count, double whole);
 
 /** Layers on top of each other over training time, at most 16, the first at the bottom; rows with an unknown layer are left out. */
-void chart_stack(text *out, const char *title, const char *x_unit, const char *y_unit, const double *x, size_t count, const chart_layer *layers,
-                 size_t layer_count);
+void chart_stack(text *out, const char *title, const char *x_unit, const char *y_unit, const double *x, size_t count,
+                 const chart_layer *layers, size_t layer_count);
 
 /**
  * Round numbers (1, 2 or 5 times a power of ten apart) that reach from at or below `low` to at or above `high`, about `wanted` of them.

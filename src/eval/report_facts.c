@@ -18,7 +18,8 @@ static void add_speed(text *out, const evaluation *e, const json_t *metrics)
 {
     text_add(out, "<div class=\"box card\"><h3>Speed</h3><table class=\"facts\"><tbody>\n");
     report_number_row(out, "One training step", metrics_number(json_object_get(metrics, "stage_ms_per_step"), "all"), 1, "ms");
-    report_number_row(out, "Rays in training", metrics_number(metrics, "rays_per_second") * 1e-6, 3, "million per second, forward and adjoint");
+    report_number_row(out, "Rays in training", metrics_number(metrics, "rays_per_second") * 1e-6, 3,
+                      "million per second, forward and adjoint");
     report_number_row(out, "Gaussians met per ray", metrics_number(metrics, "hits_per_ray"), 1, "");
     report_number_row(out, "Gaussians blended per ray", metrics_number(metrics, "blended_per_ray"), 1, "");
     report_number_row(out, "One held-out view", mean_seconds(e), 3, "s: decode, tree and trace");
@@ -115,7 +116,8 @@ void report_facts(text *out, const evaluation *e, const json_t *metrics, const c
 void report_again(text *out, const char *run, const json_t *metrics)
 {
     const char *command = metrics_text(metrics, "command");
-    text_add(out, "</main>\n<footer id=\"again\">\n<h2>Make it again</h2>\n<p>A time budget decides only how many steps there are. With the pace that this run recorded, the "
+    text_add(out, "</main>\n<footer id=\"again\">\n<h2>Make it again</h2>\n<p>A time budget decides only how many steps there are. With "
+                  "the pace that this run recorded, the "
                   "same photos give the same model, bit for bit, on any number of threads:</p>\n<pre class=\"card\">");
     if (command != NULL) {
         text_escaped(out, command);
@@ -130,9 +132,12 @@ void report_again(text *out, const char *run, const json_t *metrics)
         if (!add_pace(out, metrics))
             out->length = out->status == GBT_OK ? before : out->length;
     }
-    text_add(out, "</pre>\n<p>The scores, the pictures and this page, from the model (<code>gbtrace report</code> makes the page alone):</p>\n<pre class=\"card\">gbtrace eval ");
+    text_add(out, "</pre>\n<p>The scores, the pictures and this page, from the model (<code>gbtrace report</code> makes the page "
+                  "alone):</p>\n<pre class=\"card\">gbtrace eval ");
     text_escaped(out, run);
-    text_add(out, "</pre>\n<p>Pictures here are JPEG for size; the scores were made from the PNG files in <code>renders/test</code>. Every number is in "
-                  "<code>metrics.json</code>, every curve in <code>log.csv</code>. This page is one file and loads nothing.</p>\n</footer>\n");
+    text_add(out, "</pre>\n<p>Pictures here are JPEG for size; the scores were made from the PNG files in <code>renders/test</code>. Every "
+                  "number is in "
+                  "<code>metrics.json</code>, every curve in <code>log.csv</code>. This page is one file and loads "
+                  "nothing.</p>\n</footer>\n");
 }
 

@@ -31,7 +31,8 @@ static bool is_in_gamut(const double rgb[3])
 
 void error_color(double error, float rgb[3])
 {
-    static const double lightness_low = 0.09, lightness_high = 0.97, hue_low = 288, hue_high = 465, chroma_most = 0.19; /* degrees: violet, red, yellow */
+    /* degrees: violet, red, yellow */
+    static const double lightness_low = 0.09, lightness_high = 0.97, hue_low = 288, hue_high = 465, chroma_most = 0.19;
     const double t = error > 0 ? fmin(error, 1) : 0; /* NaN is 0 */
     const double lightness = lightness_low + (lightness_high - lightness_low) * t;
     const double hue = (hue_low + (hue_high - hue_low) * t) * (3.14159265358979323846 / 180);
@@ -61,7 +62,8 @@ static void shrink(const image *from, int factor, picture_kind kind, image *to)
             float sum[3] = {0};
             for (int v = 0; v < factor; v++)
                 for (int u = 0; u < factor; u++) {
-                    const float *pixel = from->pixels + ((size_t)(y * factor + v) * (size_t)from->width + (size_t)(x * factor + u)) * channels;
+                    const float *pixel = from->pixels + ((size_t)(y * factor + v) * (size_t)from->width +
+                                                         (size_t)(x * factor + u)) * channels;
                     for (size_t k = 0; k < 3; k++)
                         sum[k] += weight * pixel[k < channels ? k : 0];
                 }
@@ -90,7 +92,8 @@ static void add_uri(text *out, const char *type, unsigned char *bytes, size_t co
 }
 
 /** The JPEG of a picture, averaged down; its size in *small. */
-static gbt_status make_jpeg(const image *full, picture_kind kind, size_t most, image *small, unsigned char **bytes, size_t *count, gbt_error *err)
+static gbt_status make_jpeg(const image *full, picture_kind kind, size_t most, image *small, unsigned char **bytes, size_t *count,
+                            gbt_error *err)
 {
     const int factor = shrink_factor(full->width, full->height, most);
     GBT_TRY(image_alloc(small, full->width / factor, full->height / factor, 3, err));

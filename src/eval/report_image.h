@@ -10,8 +10,8 @@
 typedef enum picture_kind { PICTURE_COLOR, PICTURE_ERROR /* one channel in [0, 1], shown through error_color() */ } picture_kind;
 
 /**
- * Add `data:image/jpeg;base64,...` of an image file. A longer one than 1280 pixels, or one of more than `most` pixels, is averaged down by a whole
- * factor.
+ * Add `data:image/jpeg;base64,...` of an image file. A longer one than 1280 pixels, or one of more than `most` pixels, is averaged down by
+ * a whole factor.
  *
  * @param width, height [out] of what was added; 0 when the file cannot be read, and then nothing is added
  * @return GBT_OK, GBT_ERR_NO_MEMORY (also in out->status)

@@ -39,7 +39,7 @@ static void set_sphere(solids *s, size_t i, const float center[3], float radius,
         s->center[3 * i + k] = center[k], s->axes[3 * i + k] = radius, s->color[3 * i + k] = color[k];
 }
 
-/* ---- the four layers that are solids ------------------------------------------------------------------------------------------------------ */
+/* ---- the four layers that are solids ------------------------------------------------------------------------------------------------- */
 
 static gbt_status make_points(const loaded_run *r, solids *s, gbt_error *err)
 {
@@ -111,14 +111,15 @@ static gbt_status make_gaussians(const loaded_run *r, solids *s, gbt_error *err)
         const float center[3] = {g->mean_x[i], g->mean_y[i], g->mean_z[i]}, color[3] = {g->red[i], g->green[i], g->blue[i]};
         set_sphere(s, kept, center, 0, color);
         s->axes[3 * kept] = g->scale_x[i], s->axes[3 * kept + 1] = g->scale_y[i], s->axes[3 * kept + 2] = g->scale_z[i];
-        s->quat[4 * kept] = g->quat_w[i], s->quat[4 * kept + 1] = g->quat_x[i], s->quat[4 * kept + 2] = g->quat_y[i], s->quat[4 * kept + 3] = g->quat_z[i];
+        s->quat[4 * kept] = g->quat_w[i], s->quat[4 * kept + 1] = g->quat_x[i], s->quat[4 * kept + 2] = g->quat_y[i],
+            s->quat[4 * kept + 3] = g->quat_z[i];
         kept++;
     }
     s->count = kept;
     return GBT_OK;
 }
 
-/* ---- the section --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- the section --------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct layer {
     const char *name, *text;
@@ -224,7 +225,8 @@ void report_layers(text *out, loaded_run *r, const evaluation *e)
 {
     static const layer layers[] = {
         {"Points", "that the photos' matching gave", make_points, 1.6f, 0},
-        {"Granular balls", "of these points, by their radii and mean colours; the huge ones of lone points are not drawn", make_balls, 1.6f, SIDE_MAX / 16},
+        {"Granular balls", "of these points, by their radii and mean colours; the huge ones of lone points are not drawn", make_balls, 1.6f,
+         SIDE_MAX / 16},
         {"Anchors", "after training, each in the mean colour of its Gaussians; grey: not seen from here", make_anchors, 1.6f, 0},
         {"Gaussians", "that the anchors decode to for this view, at one standard deviation", make_gaussians, 0.7f, 0},
     };

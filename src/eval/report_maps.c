@@ -32,7 +32,8 @@ static gbt_status find_range(const loaded_run *r, const double axis[3], double r
     if (along == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < p->count; i++)
-        along[i] = (float)(axis[0] * (double)p->position[3 * i] + axis[1] * (double)p->position[3 * i + 1] + axis[2] * (double)p->position[3 * i + 2]);
+        along[i] = (float)(axis[0] * (double)p->position[3 * i] + axis[1] * (double)p->position[3 * i + 1] +
+                           axis[2] * (double)p->position[3 * i + 2]);
     qsort(along, p->count, sizeof *along, compare_floats);
     range[0] = INFINITY, range[1] = -INFINITY;
     if (p->count > 0)
@@ -92,21 +93,24 @@ static gbt_status make_maps(const loaded_run *r, map maps[2], gbt_error *err)
     const double scale = fmin(MAP_WIDTH / width, MAP_HEIGHT_MAX / fmax(depth, height));
     for (int i = 0; i < 2; i++) {
         map *m = &maps[i];
-        *m = i == 0 ? (map){.title = "From above", .name = "above", .scale = scale} : (map){.title = "From the side", .name = "side", .scale = scale};
+        *m = i == 0 ? (map){.title = "From above", .name = "above",
+                            .scale = scale} : (map){.title = "From the side", .name = "side", .scale = scale};
         for (int k = 0; k < 3; k++) {
             m->right[k] = right[k];
             m->down[k] = i == 0 ? -away[k] : -group.up[k];
-            m->middle[k] = 0.5 * ((range[0][0] + range[0][1]) * right[k] + (range[1][0] + range[1][1]) * away[k] + (range[2][0] + range[2][1]) * group.up[k]);
+            m->middle[k] = 0.5 * ((range[0][0] + range[0][1]) * right[k] + (range[1][0] + range[1][1]) * away[k] +
+                                  (range[2][0] + range[2][1]) * group.up[k]);
         }
         m->height = (int)fmax(ceil(scale * (i == 0 ? depth : height)), MAP_HEIGHT_MIN);
     }
     return GBT_OK;
 }
 
-/* ---- dust ------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- dust ---------------------------------------------------------------------------------------------------------------------------- */
 
 /** Up to DUST_MAX of them, evenly chosen; color NULL: grey. */
-static gbt_status draw_dust(const float *position, const float *color, size_t count, float pixels, const gbt_camera *camera, image *picture, gbt_error *err)
+static gbt_status draw_dust(const float *position, const float *color, size_t count, float pixels, const gbt_camera *camera, image *picture,
+                            gbt_error *err)
 {
     const size_t step = (count + DUST_MAX - 1) / DUST_MAX, kept = count > 0 ? (count + step - 1) / step : 0;
     float *block = mem_calloc(kept, 9 * sizeof *block, "map", err);
@@ -152,7 +156,7 @@ static void add_dust(text *out, const loaded_run *r, const map *m)
     image_free(&picture);
 }
 
-/* ---- cameras ------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- cameras ------------------------------------------------------------------------------------------------------------------------- */
 
 static void place(const map *m, const double at[3], double out[2])
 {
@@ -177,8 +181,8 @@ static void add_camera(text *out, const map *m, const gbt_camera *c, bool is_hel
                                              sides[i][1] * fmin(tan_half[1], 1.5) * c->rotation[3 + k]);
         place(m, at, corner[i]);
     }
-    text_format(out, "<path class=\"camera%s\" d=\"M%.1f %.1fL%.1f %.1fL%.1f %.1fL%.1f %.1fZ", is_held ? " held" : "", corner[0][0], corner[0][1], corner[1][0],
-                corner[1][1], corner[2][0], corner[2][1], corner[3][0], corner[3][1]);
+    text_format(out, "<path class=\"camera%s\" d=\"M%.1f %.1fL%.1f %.1fL%.1f %.1fL%.1f %.1fZ", is_held ? " held" : "", corner[0][0],
+                corner[0][1], corner[1][0], corner[1][1], corner[2][0], corner[2][1], corner[3][0], corner[3][1]);
     for (int i = 0; i < 4; i++)
         text_format(out, "M%.1f %.1fL%.1f %.1f", apex[0], apex[1], corner[i][0], corner[i][1]);
     text_add(out, "\">");
@@ -220,8 +224,8 @@ static void add_ruler(text *out, const map *m)
     double ticks[CHART_MAX_TICKS];
     chart_ticks(0, MAP_WIDTH / m->scale, 5, ticks);
     const double length = ticks[1] * m->scale;
-    text_format(out, "<path class=\"ruler\" d=\"M8 %dv6h%.1fv-6\"/><text x=\"%.1f\" y=\"%d\">%g</text>", m->height + 8, length, 16 + length, m->height + 16,
-                ticks[1]);
+    text_format(out, "<path class=\"ruler\" d=\"M8 %dv6h%.1fv-6\"/><text x=\"%.1f\" y=\"%d\">%g</text>", m->height + 8, length, 16 + length,
+                m->height + 16, ticks[1]);
 }
 
 void report_maps(text *out, const loaded_run *r, const evaluation *e)
@@ -232,12 +236,14 @@ void report_maps(text *out, const loaded_run *r, const evaluation *e)
         return;
     for (size_t i = 0; i < r->scene.view_count; i++)
         held += r->scene.views[i].is_test;
-    text_add(out, "<p class=\"lead\">Where the cameras stood, over what they saw. The ruler is in units of the data set; a held-out camera leads to its picture.</p>\n"
+    text_add(out, "<p class=\"lead\">Where the cameras stood, over what they saw. The ruler is in units of the data set; a held-out camera "
+                  "leads to its picture.</p>\n"
                   "<div class=\"grid2\">\n");
     out->status = make_maps(r, maps, out->err);
     for (int i = 0; i < 2 && out->status == GBT_OK; i++) {
         const map *m = &maps[i];
-        text_format(out, "<figure class=\"chart map card\"><figcaption><h3>%s</h3><p class=\"legend\"><span class=\"key block train\">", m->title);
+        text_format(out, "<figure class=\"chart map card\"><figcaption><h3>%s</h3><p class=\"legend\"><span class=\"key block train\">",
+                    m->title);
         text_count(out, (double)(r->scene.view_count - held));
         text_add(out, " trained on</span><span class=\"key block held\">");
         text_count(out, (double)held);

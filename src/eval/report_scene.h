@@ -6,7 +6,10 @@
 #include "eval/loaded_run.h"
 #include "eval/report_text.h"
 
-/** Add the section: two maps, and one view as points, balls, anchors, Gaussians, render and photo. `r` with its data set; it renders that view. */
+/**
+ * Add the section: two maps, and one view as points, balls, anchors, Gaussians, render and photo. `r` with its data set; it renders that
+ * view.
+ */
 void report_scene(text *out, loaded_run *r, const evaluation *e);
 
 /** The two maps: cameras from above and from the side, held-out ones marked, over points and anchors. */

@@ -9,8 +9,8 @@
 /**
  * Add every SVG file of RUN, of RUN/studies and of the given folders, or those given by name; nothing when there is none.
  *
- * They go in as pictures: whatever they hold, nothing in them runs or is loaded. Files that cannot be read, or are larger than a megabyte, are
- * left out with a warning.
+ * They go in as pictures: whatever they hold, nothing in them runs or is loaded. Files that cannot be read, or are larger than a megabyte,
+ * are left out with a warning.
  */
 void report_studies(text *out, const char *run, const char *const *studies, size_t count);
 

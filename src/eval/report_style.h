@@ -1,4 +1,5 @@
-/* eval/report_style.h -- the style sheet and the script of the page: src/eval/report/page.css and page.js, embedded by tools/embed.cmake. */
+/* eval/report_style.h -- the style sheet and the script of the page: src/eval/report/page.css and page.js, embedded by
+   tools/embed.cmake. */
 #ifndef GBT_EVAL_REPORT_STYLE_H
 #define GBT_EVAL_REPORT_STYLE_H
 

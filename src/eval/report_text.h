@@ -29,7 +29,10 @@ gbt_status text_save(text *t, const char *folder, const char *name);
 void text_add(text *t, const char *markup); /* as it is: only what this program wrote */
 void text_format(text *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-/** Anything from outside, for content and quoted attributes: markup characters escaped, control bytes become ?, what is not UTF-8 U+FFFD. NULL is "n/a". */
+/**
+ * Anything from outside, for content and quoted attributes: markup characters escaped, control bytes become ?, what is not UTF-8 U+FFFD.
+ * NULL is "n/a".
+ */
 void text_escaped(text *t, const char *outside);
 /** A file name as part of a link: what is not a letter, a digit or one of -._~/ becomes %XX. */
 void text_url(text *t, const char *name);

@@ -47,8 +47,10 @@ static void find_marks(curves *c)
         const double w = c->log.column[LOG_WIDTH][i], h = c->log.column[LOG_HEIGHT][i];
         if (!(w >= 1 && h >= 1 && w < 1e6 && h < 1e6))
             continue;
-        /* Photos of a set differ by a pixel or two, and a held-out score is at full size; only a step up to stay is a step of the schedule. */
-        const bool stays = i + 1 == c->log.count || c->log.column[LOG_WIDTH][i + 1] * c->log.column[LOG_HEIGHT][i + 1] > 1.5 * width * height;
+        /* Photos of a set differ by a pixel or two, and a held-out score is at full size; only a step up to stay is a step of the
+           schedule. */
+        const bool stays = i + 1 == c->log.count ||
+                           c->log.column[LOG_WIDTH][i + 1] * c->log.column[LOG_HEIGHT][i + 1] > 1.5 * width * height;
         if (w * h > 1.5 * width * height && stays) {
             chart_mark *mark = &c->marks[c->mark_count++];
             mark->x = c->mark_count == 1 ? 0 : c->time[i];
@@ -103,23 +105,28 @@ static void add_curves(text *out, const curves *c)
 {
     const size_t n = c->log.count;
     double *const *column = c->log.column;
-    const chart_series loss[] = {{NULL, c->time, column[LOG_LOSS], n, 0, CHART_FAINT}, {"loss, smoothed", c->time, c->loss, n, 0, CHART_LINE}};
+    const chart_series loss[] = {{NULL, c->time, column[LOG_LOSS], n, 0, CHART_FAINT},
+                                 {"loss, smoothed", c->time, c->loss, n, 0, CHART_LINE}};
     const chart_series psnr[] = {{NULL, c->time, column[LOG_TRAIN_PSNR], n, 0, CHART_FAINT},
                                  {"training, smoothed", c->time, c->psnr, n, 0, CHART_LINE},
                                  {"held-out", c->held_out_time, c->held_out_psnr, c->held_out_count, 1, CHART_DOTS}};
     const chart_series counts[] = {{NULL, c->time, column[LOG_GAUSSIANS], n, 1, CHART_FAINT},
                                    {"Gaussians per view, smoothed", c->time, c->gaussians, n, 1, CHART_LINE},
                                    {"anchors", c->time, column[LOG_ANCHORS], n, 0, CHART_LINE}};
-    const chart_series rays[] = {{NULL, c->time, column[LOG_RAYS_PER_SECOND], n, 2, CHART_FAINT}, {"rays, smoothed", c->time, c->rays, n, 2, CHART_LINE}};
-    const chart_series blended[] = {{NULL, c->time, column[LOG_BLENDED], n, 3, CHART_FAINT}, {"blended, smoothed", c->time, c->blended, n, 3, CHART_LINE}};
+    const chart_series rays[] = {{NULL, c->time, column[LOG_RAYS_PER_SECOND], n, 2, CHART_FAINT},
+                                 {"rays, smoothed", c->time, c->rays, n, 2, CHART_LINE}};
+    const chart_series blended[] = {{NULL, c->time, column[LOG_BLENDED], n, 3, CHART_FAINT},
+                                    {"blended, smoothed", c->time, c->blended, n, 3, CHART_LINE}};
     const chart_series memory[] = {{"resident memory", c->time, c->megabytes, n, 0, CHART_LINE}};
     const line_chart charts[] = {
         {.title = "Loss", .y_unit = "log scale", .log_y = true, .y_decimals = 4, .series = loss, .series_count = 2},
         {.title = "PSNR", .y_unit = "dB", .y_decimals = 2, .series = psnr, .series_count = 3,
          .note = "Training photos are scored at the resolution of the moment, held-out views at full size."},
         {.title = "Anchors and Gaussians", .y_unit = "count", .from_zero = true, .y_decimals = -1, .series = counts, .series_count = 3},
-        {.title = "Rays per second", .y_unit = "rays/s, forward and adjoint", .from_zero = true, .y_decimals = -1, .series = rays, .series_count = 2},
-        {.title = "Gaussians per ray", .y_unit = "blended on a ray", .from_zero = true, .y_decimals = 1, .series = blended, .series_count = 2},
+        {.title = "Rays per second", .y_unit = "rays/s, forward and adjoint", .from_zero = true, .y_decimals = -1, .series = rays,
+         .series_count = 2},
+        {.title = "Gaussians per ray", .y_unit = "blended on a ray", .from_zero = true, .y_decimals = 1, .series = blended,
+         .series_count = 2},
         {.title = "Memory", .y_unit = "MB, highest so far", .from_zero = true, .y_decimals = 0, .series = memory, .series_count = 1},
     };
     text_add(out, "<section id=\"training\"><h2>Training</h2>\n");
@@ -140,8 +147,10 @@ static void add_stage_layers(text *out, const curves *c)
 {
     /* Stages of one kind are one layer: more than these cannot be told apart. */
     static const struct { const char *name; log_column first, last; int color; } kinds[] = {
-        {"photo and rays", LOG_PHOTO_MS, LOG_RAYS_MS, 0}, {"anchors, decode", LOG_VISIBLE_MS, LOG_DECODE_MS, 1}, {"build tree", LOG_BUILD_MS, LOG_BUILD_MS, 2},
-        {"draw", LOG_TRACE_MS, LOG_TRACE_MS, 3}, {"loss", LOG_LOSS_MS, LOG_LOSS_MS, 4}, {"draw, adjoint", LOG_ADJOINT_MS, LOG_ADJOINT_MS, 5},
+        {"photo and rays", LOG_PHOTO_MS, LOG_RAYS_MS, 0}, {"anchors, decode", LOG_VISIBLE_MS, LOG_DECODE_MS, 1},
+        {"build tree", LOG_BUILD_MS, LOG_BUILD_MS, 2},
+        {"draw", LOG_TRACE_MS, LOG_TRACE_MS, 3}, {"loss", LOG_LOSS_MS, LOG_LOSS_MS, 4},
+        {"draw, adjoint", LOG_ADJOINT_MS, LOG_ADJOINT_MS, 5},
         {"decode, adjoint", LOG_DECODE_ADJOINT_MS, LOG_DECODE_ADJOINT_MS, 6}, {"optimizer", LOG_OPTIMIZER_MS, LOG_OPTIMIZER_MS, 7},
         {"grow and prune", LOG_ADJUST_MS, LOG_ADJUST_MS, 8}};
     enum { KINDS = sizeof kinds / sizeof *kinds };

@@ -59,7 +59,8 @@ static void add_psnr(text *out, double psnr)
 }
 
 /** An <img>, or a line that says that there is none. */
-static void add_picture(text *out, const char *class_name, const char *what, const view_score *v, const char *path, picture_kind kind, size_t most)
+static void add_picture(text *out, const char *class_name, const char *what, const view_score *v, const char *path, picture_kind kind,
+                        size_t most)
 {
     int width, height;
     report_picture_size(path, &width, &height);
@@ -113,7 +114,8 @@ static void add_view(text *out, const evaluation *e, size_t index, size_t place,
     add_picture(out, "render", "Render", v, v->render_path, PICTURE_COLOR, most);
     add_picture(out, "photo", "Photo", v, v->photo_path, PICTURE_COLOR, most);
     text_add(out, "<span class=\"tag l\">photo</span><span class=\"tag r\">render</span>"
-                  "<input type=\"range\" min=\"0\" max=\"100\" step=\"0.5\" value=\"50\" aria-label=\"How much of the photo to show over the render of ");
+                  "<input type=\"range\" min=\"0\" max=\"100\" step=\"0.5\" value=\"50\" aria-label=\"How much of the photo to show over "
+                  "the render of ");
     text_escaped(out, v->name);
     text_add(out, "\"><span class=\"handle\"></span></div><div class=\"error\">");
     add_picture(out, "map", "FLIP error map", v, v->error_path, PICTURE_ERROR, most);
@@ -127,7 +129,8 @@ static void add_color_scale(text *out)
     for (int i = 0; i <= STOPS; i++) {
         float rgb[3];
         error_color((double)i / STOPS, rgb);
-        text_format(out, ",#%02x%02x%02x", (unsigned)(rgb[0] * 255.0f + 0.5f), (unsigned)(rgb[1] * 255.0f + 0.5f), (unsigned)(rgb[2] * 255.0f + 0.5f));
+        text_format(out, ",#%02x%02x%02x", (unsigned)(rgb[0] * 255.0f + 0.5f), (unsigned)(rgb[1] * 255.0f + 0.5f),
+                    (unsigned)(rgb[2] * 255.0f + 0.5f));
     }
     text_add(out, ")\"></i> 1 (different at first sight)</span>");
 }
@@ -186,9 +189,12 @@ static void add_table(text *out, const char *run, const evaluation *e, const siz
         if (isfinite(e->views[i].psnr))
             low = fmin(low, e->views[i].psnr), high = fmax(high, e->views[i].psnr);
     low = floor(low - 1); /* so that the worst has a bar too */
-    text_format(out, "<details class=\"card\" open><summary>All %zu views as a table</summary><div class=\"scroll\"><table class=\"list sortable\"><thead><tr>"
-                     "<th data-sort=\"text\">View</th><th data-sort=\"number\">PSNR, dB</th><th data-sort=\"number\">SSIM</th><th data-sort=\"number\">FLIP</th>"
-                     "<th data-sort=\"number\">Gaussians</th><th data-sort=\"number\">Seconds</th><th>Whole pictures</th></tr></thead><tbody>", e->view_count);
+    text_format(out, "<details class=\"card\" open><summary>All %zu views as a table</summary><div class=\"scroll\"><table class=\"list "
+                     "sortable\"><thead><tr>"
+                     "<th data-sort=\"text\">View</th><th data-sort=\"number\">PSNR, dB</th><th data-sort=\"number\">SSIM</th><th "
+                     "data-sort=\"number\">FLIP</th>"
+                     "<th data-sort=\"number\">Gaussians</th><th data-sort=\"number\">Seconds</th><th>Whole "
+                     "pictures</th></tr></thead><tbody>", e->view_count);
     for (size_t i = 0; i < e->view_count; i++)
         add_row(out, run, e, order[i], i, low, high);
     text_add(out, "</tbody></table></div></details>\n");
@@ -211,7 +217,8 @@ void report_views(text *out, const char *run, const evaluation *e, const char *p
     text_add(out, "<section id=\"views\"><h2>Held-out views</h2>\n");
     size_t shown[REPORT_MAX_VIEWS], *order = NULL;
     if (e->view_count == 0) {
-        text_add(out, "<p class=\"none\">n/a: every photo was trained on, none was held out. Train with <code>--eval-split every=8</code> to see how the scene "
+        text_add(out, "<p class=\"none\">n/a: every photo was trained on, none was held out. Train with <code>--eval-split every=8</code> "
+                      "to see how the scene "
                       "looks from where no photo was shown.</p></section>\n");
         return;
     }
@@ -221,11 +228,13 @@ void report_views(text *out, const char *run, const evaluation *e, const char *p
         return;
     }
     const size_t count = report_choose_views(e, shown, order);
-    text_add(out, "<p class=\"lead\">Training never saw these photos. Drag over a picture, or use the arrow keys, to go from the render to the photo.");
+    text_add(out, "<p class=\"lead\">Training never saw these photos. Drag over a picture, or use the arrow keys, to go from the render to "
+                  "the photo.");
     if (count < e->view_count)
-        text_format(out, " Shown are %d of %zu views: the %d worst, %d from the middle and the %d best by PSNR.", REPORT_MAX_VIEWS, e->view_count,
-                    REPORT_MAX_VIEWS / 3, REPORT_MAX_VIEWS / 3, REPORT_MAX_VIEWS / 3);
-    text_add(out, "</p>\n<div class=\"bar-top\"><label hidden>Order <select id=\"order\"><option value=\"psnr up\">worst PSNR first</option>"
+        text_format(out, " Shown are %d of %zu views: the %d worst, %d from the middle and the %d best by PSNR.", REPORT_MAX_VIEWS,
+                    e->view_count, REPORT_MAX_VIEWS / 3, REPORT_MAX_VIEWS / 3, REPORT_MAX_VIEWS / 3);
+    text_add(out, "</p>\n<div class=\"bar-top\"><label hidden>Order <select id=\"order\"><option value=\"psnr up\">worst PSNR "
+                  "first</option>"
                   "<option value=\"psnr down\">best PSNR first</option><option value=\"ssim up\">worst SSIM first</option>"
                   "<option value=\"flip down\">worst FLIP first</option></select></label>");
     add_color_scale(out);

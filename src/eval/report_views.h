@@ -7,7 +7,10 @@
 
 enum { REPORT_MAX_VIEWS = 24 }; /* of more, a third each: worst, middle, best */
 
-/** Add the section, worst PSNR first. Pictures below the folder `run` get links. `protocol`: how scores are made, one sentence; NULL: nothing is said. */
+/**
+ * Add the section, worst PSNR first. Pictures below the folder `run` get links. `protocol`: how scores are made, one sentence; NULL:
+ * nothing is said.
+ */
 void report_views(text *out, const char *run, const evaluation *e, const char *protocol);
 
 /**

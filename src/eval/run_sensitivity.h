@@ -8,7 +8,8 @@
 /**
  * Sensitivities of the run's model (io/model_steps.h), from its training cameras alone: photos are not read.
  *
- * Renders at most 64 of the views, spread over all, at half the run's resolution, with one adjoint pass each. Without training views: the guess.
+ * Renders at most 64 of the views, spread over all, at half the run's resolution, with one adjoint pass each. Without training views: the
+ * guess.
  *
  * @param out [out] free with model_sensitivity_free(), after failure too
  * Threads: same bits for every thread count.

@@ -11,7 +11,8 @@ enum { WIDTH = 430, HEIGHT = 316, LEFT = 56, RIGHT = 412, TOP = 106, BOTTOM = 26
 
 static const char css[] =
     ".panels{--k0:#0b62c4;--k1:#d9480f;--k2:#7b3fc4;--k3:#2b8a3e;--page:#fff;--text:#1b1c1e;--dim:#62666d;--rule:#e8e8e5}\n"
-    "@media(prefers-color-scheme:dark){.panels{--k0:#6cb0ff;--k1:#ff9a5c;--k2:#c19bff;--k3:#6fd08c;--page:#1c1e22;--text:#e8e8e6;--dim:#9ba0a8;--rule:#2e3136}}\n"
+    "@media(prefers-color-scheme:dark){.panels{--k0:#6cb0ff;--k1:#ff9a5c;--k2:#c19bff;--k3:#6fd08c;--page:#1c1e22;--text:#e8e8e6;"
+    "--dim:#9ba0a8;--rule:#2e3136}}\n"
     ".panels .paper{fill:var(--page)}\n"
     ".panels text{font:11px system-ui,-apple-system,\"Segoe UI\",Roboto,Arial,sans-serif;fill:var(--dim)}\n"
     ".panels .title{font-size:15px;font-weight:600;fill:var(--text)}\n"

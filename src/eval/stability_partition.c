@@ -13,7 +13,7 @@
 #include "image/metrics.h"
 #include "frame/frame.h"
 
-/* ---- A14: growth explodes, or all anchors go ----------------------------------------------------------------------------------------------- */
+/* ---- A14: growth explodes, or all anchors go ----------------------------------------------------------------------------------------- */
 
 typedef struct colony {
     anchors a;
@@ -33,7 +33,8 @@ static void colony_free(colony *c)
 static void colony_make(stability *s, colony *c, size_t count, double at, float opacity)
 {
     c->a.offset_count = 5;
-    if (s->status != GBT_OK || !stability_ok(s, anchors_resize(&c->a, count, s->err)) || !stability_ok(s, adjust_stats_resize(&c->stats, count, 5, s->err)))
+    if (s->status != GBT_OK || !stability_ok(s, anchors_resize(&c->a, count, s->err)) ||
+        !stability_ok(s, adjust_stats_resize(&c->stats, count, 5, s->err)))
         return;
     for (size_t i = 0; i < count; i++) {
         for (size_t k = 0; k < 3; k++)
@@ -69,8 +70,10 @@ static void explosion(stability *s)
     colony_adjust(s, &whole, SIZE_MAX, 0.001f);
     const size_t rows = c[0].a.count;
     const bool same = rows == c[1].a.count && memcmp(c[0].a.position, c[1].a.position, 3 * rows * sizeof(float)) == 0;
-    const bool best = s->status == GBT_OK && rows <= whole.a.count && memcmp(c[0].a.position, whole.a.position, 3 * rows * sizeof(float)) == 0;
-    stability_check(s, "A14a", (double)rows - (double)cap, NAN, "%zu anchors, all %zu Gaussians ask for more; without a cap there would be %zu.", count, 5 * count, whole.a.count);
+    const bool best = s->status == GBT_OK && rows <= whole.a.count && memcmp(c[0].a.position, whole.a.position,
+                                                                             3 * rows * sizeof(float)) == 0;
+    stability_check(s, "A14a", (double)rows - (double)cap, NAN,
+                    "%zu anchors, all %zu Gaussians ask for more; without a cap there would be %zu.", count, 5 * count, whole.a.count);
     stability_check(s, "A14b", !same + !best, NAN, "With 1 and 2 threads; equal gradients go by level and cell.");
     colony_free(&c[0]);
     colony_free(&c[1]);
@@ -118,12 +121,13 @@ gbt_status stability_a14(stability *s)
     for (size_t i = 100; i < c.a.count; i++)
         for (size_t k = 0; k < 3; k++)
             far = fmax(far, fabs((double)c.a.position[3 * i + k] - 4.5e6));
-    stability_check(s, "A14e", c.a.count > 100 ? far : (double)NAN, NAN, "%zu new anchors; a 32-bit index would have put them 2,147 km away.", c.a.count - 100);
+    stability_check(s, "A14e", c.a.count > 100 ? far : (double)NAN, NAN,
+                    "%zu new anchors; a 32-bit index would have put them 2,147 km away.", c.a.count - 100);
     colony_free(&c);
     return s->status;
 }
 
-/* ---- A15: balls ------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- A15: balls ---------------------------------------------------------------------------------------------------------------------- */
 
 typedef void cloud_shape(size_t i, size_t n, double out[3]);
 
@@ -175,7 +179,8 @@ static void far_away(size_t i, size_t n, double out[3])
 
 static const struct { const char *name; cloud_shape *shape; size_t count; } clouds[] = {
     {"one", in_a_cube, 1},         {"two", in_a_cube, 2},         {"identical", same_place, 1000},  {"a line", on_a_line, 1000},
-    {"a plane", on_a_plane, 1000}, {"octahedron", octahedron, 6}, {"octahedra", octahedron, 600},   {"an outlier at 1e6", one_outlier, 1000},
+    {"a plane", on_a_plane, 1000}, {"octahedron", octahedron, 6}, {"octahedra", octahedron, 600},
+    {"an outlier at 1e6", one_outlier, 1000},
     {"at 4.5e6", far_away, 1000},  {"a cube", in_a_cube, 1000},
 };
 
@@ -275,15 +280,18 @@ gbt_status stability_a15(stability *s)
     if (s->status == GBT_OK)
         stability_ok(s, build_cloud(s, same_place, large, false, &many));
     const double seconds = clock_wall() - start;
-    stability_check(s, "A15a", (double)wrong, NAN, "One, two, identical, in a line, in a plane, an octahedron, an outlier at 1e6, coordinates of 4.5e6, a cube.");
+    stability_check(s, "A15a", (double)wrong, NAN,
+                    "One, two, identical, in a line, in a plane, an octahedron, an outlier at 1e6, coordinates of 4.5e6, a cube.");
     stability_check(s, "A15b", (double)threads_differ, NAN, "%s", "");
-    stability_check(s, "A15c", (double)order_differs, NAN, "Centres and radii, bit for bit. Of a hundred octahedra, whose three variances tie, the same balls come in another order.");
+    stability_check(s, "A15c", (double)order_differs, NAN,
+                    "Centres and radii, bit for bit. Of a hundred octahedra, whose three variances tie, the same balls come in another "
+                    "order.");
     stability_check(s, "A15d", seconds, NAN, "%zu points, %zu ball.", large, many.count);
     balls_free(&many);
     return s->status;
 }
 
-/* ---- A17: SSIM ---------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- A17: SSIM ----------------------------------------------------------------------------------------------------------------------- */
 
 /* By definition, in two passes in long double; windows see 0 beyond the border. */
 static double ssim_exact(const image *a, const image *b)
@@ -306,9 +314,12 @@ static double ssim_exact(const image *a, const image *b)
                             if (pass == 0)
                                 mean[0] += w * p, mean[1] += w * q;
                             else
-                                var[0] += w * (p - mean[0]) * (p - mean[0]), var[1] += w * (q - mean[1]) * (q - mean[1]), cov += w * (p - mean[0]) * (q - mean[1]);
+                                var[0] += w * (p - mean[0]) * (p - mean[0]), var[1] += w * (q - mean[1]) * (q - mean[1]),
+                                    cov += w * (p - mean[0]) * (q - mean[1]);
                         }
-                sum += (2 * mean[0] * mean[1] + 1e-4L) * (2 * cov + 9e-4L) / ((mean[0] * mean[0] + mean[1] * mean[1] + 1e-4L) * (var[0] + var[1] + 9e-4L));
+                sum += (2 * mean[0] * mean[1] + 1e-4L) * (2 * cov +
+                                                          9e-4L) / ((mean[0] * mean[0] + mean[1] * mean[1] +
+                                                                     1e-4L) * (var[0] + var[1] + 9e-4L));
             }
     return (double)(sum / (3 * width * height));
 }
@@ -344,7 +355,8 @@ static void compare_pictures(stability *s, int width, int height, float low, flo
 gbt_status stability_a17(stability *s)
 {
     static const int sizes[][2] = {{1, 1}, {1, 11}, {10, 10}, {11, 11}, {31, 29}};
-    static const float ranges[][3] = {{0, 0, 0}, {0.6f, 0.6f, 1e-7f}, {1, 1, 0}, {100, 100, 0}, {255, 255, 1e-4f}, {0, 1, 0.1f}, {0, 255, 20}, {0, 1, -2}};
+    static const float ranges[][3] = {{0, 0, 0}, {0.6f, 0.6f, 1e-7f}, {1, 1, 0}, {100, 100, 0}, {255, 255, 1e-4f}, {0, 1, 0.1f},
+                                      {0, 255, 20}, {0, 1, -2}};
     similarity all = {.beyond = -INFINITY};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
         for (size_t k = 0; k < sizeof ranges / sizeof *ranges && s->status == GBT_OK; k++)

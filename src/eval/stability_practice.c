@@ -14,7 +14,7 @@
 
 static const double degree = 0.017453292519943295;
 
-/* ---- the scene -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- the scene ----------------------------------------------------------------------------------------------------------------------- */
 
 /* Evenly spread (Fibonacci), coloured in smooth bands: something to learn from every side. */
 static void put_gaussian(practice *p, size_t i, size_t count)
@@ -77,7 +77,7 @@ void practice_free(practice *p)
     mem_free(p);
 }
 
-/* ---- on disk ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- on disk ------------------------------------------------------------------------------------------------------------------------- */
 
 static void write_photo(stability *s, const practice *p, size_t i, drawing *d, ray_image *rays)
 {
@@ -147,7 +147,7 @@ void practice_remove(practice *p)
         nftw(p->folder, remove_one, 8, FTW_DEPTH | FTW_PHYS);
 }
 
-/* ---- runs -------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- runs ---------------------------------------------------------------------------------------------------------------------------- */
 
 gbt_status practice_open(stability *s, const practice *p, const gbt_train_def *def, trainer *t, gbt_error *why)
 {

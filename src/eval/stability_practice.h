@@ -1,4 +1,5 @@
-/* eval/stability_practice.h -- small data sets made of known Gaussians, and training runs on them, for the cases of the study "stability". */
+/* eval/stability_practice.h -- small data sets made of known Gaussians, and training runs on them, for the cases of the study
+   "stability". */
 #ifndef GBT_EVAL_STABILITY_PRACTICE_H
 #define GBT_EVAL_STABILITY_PRACTICE_H
 

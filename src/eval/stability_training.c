@@ -1,4 +1,5 @@
-/* eval/stability_training.c -- cases of the study "stability" about training: views far from the photos, poor sparse points, the same bits. */
+/* eval/stability_training.c -- cases of the study "stability" about training: views far from the photos, poor sparse points, the same
+   bits. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -28,7 +29,7 @@ static bool must(stability *s, gbt_status status, const gbt_error *why)
     return stability_ok(s, status);
 }
 
-/* ---- A12: views far from the photos ------------------------------------------------------------------------------------------------------ */
+/* ---- A12: views far from the photos -------------------------------------------------------------------------------------------------- */
 
 typedef struct far_views {
     practice *p;
@@ -94,7 +95,8 @@ static double loss_to_baked(stability *s, far_views *f, double azimuth, double e
         return NAN;
     if (!stability_ok(s, gaussians_copy(&f->t.frame.gaussians, &f->fixed, s->err)) || !render_model(s, f, &far))
         return NAN;
-    f->bad += draw_count_bad(f->t.frame.rgb.pixels, 3 * (size_t)far.width * (size_t)far.height) + draw_count_bad_fields(&f->t.frame.gaussians);
+    f->bad += draw_count_bad(f->t.frame.rgb.pixels,
+                             3 * (size_t)far.width * (size_t)far.height) + draw_count_bad_fields(&f->t.frame.gaussians);
     f->out_of_range = fmax(f->out_of_range, beyond_range(f));
     gbt_camera local = far;
     for (int k = 0; k < 3; k++)
@@ -128,11 +130,16 @@ static void look_from_everywhere(stability *s, far_views *f)
     for (size_t k = 0; k < 3 && s->status == GBT_OK; k++)
         on.center[k] = (double)f->t.anchors.position[k] + f->t.scene.origin[k];
     if (render_model(s, f, &on))
-        f->bad += draw_count_bad(f->t.frame.rgb.pixels, 3 * (size_t)on.width * (size_t)on.height) + draw_count_bad_fields(&f->t.frame.gaussians);
-    stability_check(s, "A12a", (double)f->bad, NAN, "%zu places, one of them on an anchor, %.3g units from the origin.", radius_count * elevation_count + 1, own);
+        f->bad += draw_count_bad(f->t.frame.rgb.pixels,
+                                 3 * (size_t)on.width * (size_t)on.height) + draw_count_bad_fields(&f->t.frame.gaussians);
+    stability_check(s, "A12a", (double)f->bad, NAN, "%zu places, one of them on an anchor, %.3g units from the origin.",
+                    radius_count * elevation_count + 1, own);
     stability_check(s, "A12b", f->out_of_range, NAN, "As a factor beyond the range; 0: none.");
-    stability_check(s, "A12c", lost[0], NAN, "Level with the photos. From 45 and 90 degrees above, where no photo was taken: up to %.1f dB, both near and far.", elsewhere);
-    stability_check(s, "A12d", lost[1], NAN, "Up to %.0f %% of the anchors are seen from outside the cone of directions that the photos cover.", 100 * outside_most);
+    stability_check(s, "A12c", lost[0], NAN,
+                    "Level with the photos. From 45 and 90 degrees above, where no photo was taken: up to %.1f dB, both near and far.",
+                    elsewhere);
+    stability_check(s, "A12d", lost[1], NAN,
+                    "Up to %.0f %% of the anchors are seen from outside the cone of directions that the photos cover.", 100 * outside_most);
 }
 
 gbt_status stability_a12(stability *s)
@@ -162,7 +169,7 @@ gbt_status stability_a12(stability *s)
     return s->status;
 }
 
-/* ---- A13: poor sparse points and photos --------------------------------------------------------------------------------------------------- */
+/* ---- A13: poor sparse points and photos ---------------------------------------------------------------------------------------------- */
 
 static void first_points(practice *p, size_t count)
 {
@@ -250,8 +257,8 @@ static const poor_case poor_cases[] = {
 
 static practice *poor_scene(stability *s, size_t views, double arc_deg)
 {
-    return practice_make(s, (size_t)stability_number(s, "points"), views, stability_number(s, "radius"), arc_deg, (int)stability_number(s, "width"),
-                         (int)stability_number(s, "height"));
+    return practice_make(s, (size_t)stability_number(s, "points"), views, stability_number(s, "radius"), arc_deg,
+                         (int)stability_number(s, "width"), (int)stability_number(s, "height"));
 }
 
 static void try_poor(stability *s, const poor_case *c, size_t *bad)
@@ -299,7 +306,9 @@ static void exposures_differ(stability *s)
         p->gain[i] = 0.5f * factors[i % 3]; /* half as bright: twice that does not clip */
     practice_write(s, p, "a13p11");
     const double without = held_out(s, p, false), with = held_out(s, p, true);
-    stability_check(s, "A13P11", with - without, NAN, "Held-out photos: %.1f dB without --exposure, %.1f dB with it (right halves, a matrix fitted to the left).", without, with);
+    stability_check(s, "A13P11", with - without, NAN,
+                    "Held-out photos: %.1f dB without --exposure, %.1f dB with it (right halves, a matrix fitted to the left).", without,
+                    with);
     practice_remove(p);
     practice_free(p);
 }
@@ -315,7 +324,7 @@ gbt_status stability_a13(stability *s)
     return s->status;
 }
 
-/* ---- A18: the same bits --------------------------------------------------------------------------------------------------------------------- */
+/* ---- A18: the same bits -------------------------------------------------------------------------------------------------------------- */
 
 static uint64_t add_hash(uint64_t hash, const void *bytes, size_t count)
 {
@@ -373,7 +382,8 @@ gbt_status stability_a18(stability *s)
         by_isa += hash_of_run(s, p, &def) != first;
     }
     cpu_limit_isa(isa_before);
-    stability_check(s, "A18a", (double)by_threads, NAN, "%zu numbers of threads, %d times each, %llu steps; anchors, networks and moments: %016llx.", thread_count, repeats,
+    stability_check(s, "A18a", (double)by_threads, NAN,
+                    "%zu numbers of threads, %d times each, %llu steps; anchors, networks and moments: %016llx.", thread_count, repeats,
                     (unsigned long long)def.iterations, (unsigned long long)first);
     stability_check(s, "A18b", (double)by_isa, NAN, "Up to %s, which this machine has.", cpu_isa_name(isa_before));
     practice_remove(p);

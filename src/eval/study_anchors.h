@@ -2,7 +2,7 @@
 #ifndef GBT_EVAL_STUDY_ANCHORS_H
 #define GBT_EVAL_STUDY_ANCHORS_H
 
-#include "eval/study_runs.h"
+#include "eval/study_grid.h"
 #include "eval/study_runs_stat.h"
 #include "gbtrace/study.h"
 
@@ -18,13 +18,12 @@ extern const size_t anchors_variant_count;
 
 typedef struct anchors_study {
     gbt_anchors_def def; /* borrowed */
-    char names[STUDY_SCENES_MAX][STUDY_NAME_SIZE];
-    study_figures *figures; /* [scene][variant][seed] */
+    study_grid grid;
 } anchors_study;
 
 static inline const study_figures *anchors_run(const anchors_study *s, size_t place, size_t variant, int seed)
 {
-    return &s->figures[(place * anchors_variant_count + variant) * (size_t)s->def.seeds + (size_t)seed];
+    return study_grid_at(&s->grid, place, variant, seed);
 }
 
 void anchors_tables(const anchors_study *s, text *out); /* Markdown */

@@ -9,15 +9,18 @@
 enum { LEFT = 58, RIGHT = 738, TOP = 84, BOTTOM = 450, BOXES_MAX = 256 };
 
 const char scatter_css[] =
-    ".scatter{--k0:#1b1c1e;--k1:#0b62c4;--k2:#d9480f;--k3:#2b8a3e;--k4:#7b3fc4;--k5:#b0246e;--k6:#0a7f8c;--page:#fff;--text:#1b1c1e;--dim:#62666d;--rule:#e8e8e5}\n"
-    "@media(prefers-color-scheme:dark){.scatter{--k0:#f2f2f0;--k1:#6cb0ff;--k2:#ff9a5c;--k3:#6fd08c;--k4:#c19bff;--k5:#ff8cc2;--k6:#5fd3e0;--page:#1c1e22;--text:#e8e8e6;"
+    ".scatter{--k0:#1b1c1e;--k1:#0b62c4;--k2:#d9480f;--k3:#2b8a3e;--k4:#7b3fc4;--k5:#b0246e;--k6:#0a7f8c;--page:#fff;"
+    "--text:#1b1c1e;--dim:#62666d;--rule:#e8e8e5}\n"
+    "@media(prefers-color-scheme:dark){.scatter{--k0:#f2f2f0;--k1:#6cb0ff;--k2:#ff9a5c;--k3:#6fd08c;--k4:#c19bff;--k5:#ff8cc2;"
+    "--k6:#5fd3e0;--page:#1c1e22;--text:#e8e8e6;"
     "--dim:#9ba0a8;--rule:#2e3136}}\n"
     ".scatter .paper{fill:var(--page)}\n"
     ".scatter text{font:12px system-ui,-apple-system,\"Segoe UI\",Roboto,Arial,sans-serif;fill:var(--dim)}\n"
     ".scatter .title{font-size:15px;font-weight:600;fill:var(--text)}\n"
     ".scatter .tick-y{text-anchor:end}.scatter .tick-x{text-anchor:middle}\n"
     ".scatter .rule{stroke:var(--rule);stroke-width:1}.scatter .axis{stroke:var(--dim);stroke-width:1}\n"
-    ".scatter .s0{--k:var(--k0)}.scatter .s1{--k:var(--k1)}.scatter .s2{--k:var(--k2)}.scatter .s3{--k:var(--k3)}.scatter .s4{--k:var(--k4)}.scatter .s5{--k:var(--k5)}.scatter .s6{--k:var(--k6)}\n"
+    ".scatter .s0{--k:var(--k0)}.scatter .s1{--k:var(--k1)}.scatter .s2{--k:var(--k2)}.scatter .s3{--k:var(--k3)}.scatter "
+    ".s4{--k:var(--k4)}.scatter .s5{--k:var(--k5)}.scatter .s6{--k:var(--k6)}\n"
     ".scatter .join{fill:none;stroke:var(--k);stroke-width:1.5;opacity:.45}\n"
     ".scatter .mark{fill:var(--k);stroke:var(--page);stroke-width:1.5}\n"
     ".scatter .label,.scatter .level-label{font-size:11px;paint-order:stroke;stroke:var(--page);stroke-width:3px;stroke-linejoin:round}\n"
@@ -25,7 +28,7 @@ const char scatter_css[] =
     ".scatter .key{font-size:12px;fill:var(--text)}\n"
     ".scatter .level{stroke:var(--dim);stroke-width:1;stroke-dasharray:5 4}.scatter .level-label{font-style:italic}\n";
 
-/* ---- room ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- room ---------------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct box {
     double x0, y0, x1, y1;
@@ -76,7 +79,8 @@ static bool find_room(plane *p, double x, double y, double radius, const char *l
     const double width = text_width(label, large), height = large ? 15 : 12, gap = radius + 3;
     for (int i = 0; i < 8; i++) {
         const double middle = y + sides[i][1] * (gap + height / 2);
-        const double start = sides[i][0] > 0 ? x + (sides[i][1] == 0 ? gap : 2) : sides[i][0] < 0 ? x - width - (sides[i][1] == 0 ? gap : 2) : x - width / 2;
+        const double start = sides[i][0] > 0 ? x + (sides[i][1] == 0 ? gap : 2) : sides[i][0] < 0 ? x - width - (sides[i][1] == 0 ? gap : 2)
+                             : x - width / 2;
         const box b = {start - 1, middle - height / 2, start + width + 1, middle + height / 2};
         if (!is_free(p, b))
             continue;
@@ -87,7 +91,7 @@ static bool find_room(plane *p, double x, double y, double radius, const char *l
     return false;
 }
 
-/* ---- drawing --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- drawing ------------------------------------------------------------------------------------------------------------------------- */
 
 static bool can_show(const scatter_point *point)
 {
@@ -114,15 +118,17 @@ static void draw_axes(text *out, const scatter_chart *c, plane *p)
     int count = chart_ticks(p->y_low, p->y_high, 6, ticks);
     p->y_low = ticks[0], p->y_high = ticks[count - 1];
     for (int i = 0; i < count; i++)
-        text_format(out, "<line class=\"rule\" x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/><text class=\"tick-y\" x=\"%d\" y=\"%.1f\">%g</text>", LEFT,
+        text_format(out, "<line class=\"rule\" x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/><text class=\"tick-y\" x=\"%d\" "
+                         "y=\"%.1f\">%g</text>", LEFT,
                     place_y(p, ticks[i]), RIGHT, place_y(p, ticks[i]), LEFT - 8, place_y(p, ticks[i]) + 4, ticks[i]);
     count = chart_log_ticks(p->x_low, p->x_high, ticks);
     p->x_low = ticks[0], p->x_high = ticks[count - 1];
     for (int i = 0; i < count; i++)
-        text_format(out, "<line class=\"rule\" x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text class=\"tick-x\" x=\"%.1f\" y=\"%d\">%g</text>",
+        text_format(out, "<line class=\"rule\" x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text class=\"tick-x\" x=\"%.1f\" "
+                         "y=\"%d\">%g</text>",
                     place_x(p, ticks[i]), TOP, place_x(p, ticks[i]), BOTTOM, place_x(p, ticks[i]), BOTTOM + 18, ticks[i]);
-    text_format(out, "<line class=\"axis\" x1=\"%d\" y1=\"%d\" x2=\"%d\" y2=\"%d\"/><text class=\"tick-x\" x=\"%d\" y=\"%d\">", LEFT, BOTTOM, RIGHT, BOTTOM,
-                (LEFT + RIGHT) / 2, BOTTOM + 40);
+    text_format(out, "<line class=\"axis\" x1=\"%d\" y1=\"%d\" x2=\"%d\" y2=\"%d\"/><text class=\"tick-x\" x=\"%d\" y=\"%d\">", LEFT,
+                BOTTOM, RIGHT, BOTTOM, (LEFT + RIGHT) / 2, BOTTOM + 40);
     text_escaped(out, c->x_unit);
     text_format(out, "</text><text x=\"%d\" y=\"%d\">", 10, TOP - 14);
     text_escaped(out, c->y_unit);
@@ -220,8 +226,8 @@ static void draw_levels(text *out, const scatter_chart *c, plane *p)
 
 void scatter_begin(text *out, const char *label, const char *css, int height)
 {
-    text_format(out, "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"scatter\" viewBox=\"0 0 %d %d\" width=\"%d\" role=\"img\"", SCATTER_WIDTH, height,
-                SCATTER_WIDTH);
+    text_format(out, "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"scatter\" viewBox=\"0 0 %d %d\" width=\"%d\" role=\"img\"",
+                SCATTER_WIDTH, height, SCATTER_WIDTH);
     text_format(out, " aria-label=\"%s\"><style>", label);
     text_add(out, scatter_css);
     text_add(out, css);

@@ -35,10 +35,16 @@ typedef struct scatter_chart {
 /** Rules for the SVG of scatter_draw(), light and dark; they stand alone. */
 extern const char scatter_css[];
 
-/** A file of charts begins: SVG of SCATTER_WIDTH x `height` with their rules and its paper; what ends it is "</svg>". `css`: further rules, or "". */
+/**
+ * A file of charts begins: SVG of SCATTER_WIDTH x `height` with their rules and its paper; what ends it is "</svg>". `css`: further rules,
+ * or "".
+ */
 void scatter_begin(text *out, const char *label, const char *css, int height);
 
-/** The chart as an SVG group, SCATTER_WIDTH x SCATTER_HEIGHT, its upper left corner at (0, top). Log x from the points; y from points and levels. */
+/**
+ * The chart as an SVG group, SCATTER_WIDTH x SCATTER_HEIGHT, its upper left corner at (0, top). Log x from the points; y from points and
+ * levels.
+ */
 void scatter_draw(text *out, const scatter_chart *chart, int top);
 
 #endif

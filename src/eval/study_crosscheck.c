@@ -1,4 +1,5 @@
-/* eval/study_crosscheck.c -- measure how far the tracer, the rasterizer and their double references are apart, and what takes one to the other. */
+/* eval/study_crosscheck.c -- measure how far the tracer, the rasterizer and their double references are apart, and what takes one to the
+   other. */
 #include "eval/study_crosscheck.h"
 
 #include <math.h>
@@ -37,7 +38,7 @@ const char *cross_step_text(cross_step step)
     return texts[step];
 }
 
-/* ---- pictures ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- pictures ------------------------------------------------------------------------------------------------------------------------ */
 
 static raster_settings settings_of_step(const trace_settings *s, cross_step step)
 {
@@ -85,10 +86,10 @@ static bench_error compare(const image *a, const image *b)
     return bench_error_of(sum, max, count);
 }
 
-/* Per-ray form against tracer, both in float32. Pixels that differ by more than 1e-5 are looked at in double: on those of the rounding band either
-   may be right, and they are left out; `kept` is the share of the others. */
-static gbt_status compare_outside_band(const bench_scene *s, const trace_settings *settings, const image *traced, const image *splatted, double *psnr,
-                                       double *kept, gbt_error *err)
+/* Per-ray form against tracer, both in float32. Pixels that differ by more than 1e-5 are looked at in double: on those of the rounding band
+   either may be right, and they are left out; `kept` is the share of the others. */
+static gbt_status compare_outside_band(const bench_scene *s, const trace_settings *settings, const image *traced, const image *splatted,
+                                       double *psnr, double *kept, gbt_error *err)
 {
     const size_t pixels = ray_image_count(&s->rays);
     size_t left_out = 0;
@@ -113,7 +114,7 @@ static gbt_status compare_outside_band(const bench_scene *s, const trace_setting
     return status;
 }
 
-/* ---- references ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- references ---------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct references {
     bench_reference rays, splats; /* splats borrows the rays, of which only the size counts */
@@ -177,15 +178,18 @@ static gbt_status compare_exact(const bench_scene *s, image scratch[3], cross_vi
         cross_check *c = out->checks + 2; /* splats a thousand pixels long lose digits in float32, hence the last limit */
         c[0] = (cross_check){"preset exact: per-ray form to tracer outside the rounding band, dB", 100, psnr};
         c[1] = (cross_check){"preset exact: share of pixels outside that band", 0.999, kept};
-        c[2] = (cross_check){"preset exact: tracer to double reference outside that band, dB", 100, bench_reference_compare(&want.rays, &scratch[0]).psnr};
-        c[3] = (cross_check){"preset exact: per-ray form to double reference outside that band, dB", 100, bench_reference_compare(&want.rays, &scratch[1]).psnr};
-        c[4] = (cross_check){"preset exact: EWA form, not cut at 3 std-devs, to its double reference, dB", 90, bench_reference_compare(&want.splats, &scratch[2]).psnr};
+        c[2] = (cross_check){"preset exact: tracer to double reference outside that band, dB", 100,
+                             bench_reference_compare(&want.rays, &scratch[0]).psnr};
+        c[3] = (cross_check){"preset exact: per-ray form to double reference outside that band, dB", 100,
+                             bench_reference_compare(&want.rays, &scratch[1]).psnr};
+        c[4] = (cross_check){"preset exact: EWA form, not cut at 3 std-devs, to its double reference, dB", 90,
+                             bench_reference_compare(&want.splats, &scratch[2]).psnr};
     }
     references_free(&want);
     return status;
 }
 
-/* ---- one view ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- one view ------------------------------------------------------------------------------------------------------------------------ */
 
 /* Letters, digits, '.' and '-' stay. */
 static void name_sheet(const char *of, const char *view, char out[CROSS_NAME_SIZE])
@@ -199,8 +203,8 @@ static void name_sheet(const char *of, const char *view, char out[CROSS_NAME_SIZ
 }
 
 /* With `pictures` and `traced` of the size of the camera. */
-static gbt_status measure_pictures(const bench_scene *s, const char *folder, image *traced, image pictures[CROSS_STEPS], image scratch[3], cross_view *out,
-                                   gbt_error *err)
+static gbt_status measure_pictures(const bench_scene *s, const char *folder, image *traced, image pictures[CROSS_STEPS], image scratch[3],
+                                   cross_view *out, gbt_error *err)
 {
     char path[4096];
     double psnr, kept;
@@ -256,7 +260,7 @@ static bool make_pinhole(ray_shot *shot)
     return true;
 }
 
-/* ---- one model ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- one model ----------------------------------------------------------------------------------------------------------------------- */
 
 static gbt_status measure_shot(bench_scene *s, const ray_shot *shot, const char *view, const char *folder, cross_model *out, gbt_error *err)
 {

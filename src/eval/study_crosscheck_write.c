@@ -28,7 +28,7 @@ static size_t count_failures(const cross_study *study)
     return failures;
 }
 
-/* ---- tables -------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- tables -------------------------------------------------------------------------------------------------------------------------- */
 
 static void add_error_row(text *out, const char *name, const bench_error *a, const bench_error *b)
 {
@@ -51,7 +51,8 @@ static void add_view_table(const cross_model *model, const cross_view *v, text *
     add_error_row(out, "EWA form", &v->splat, NULL);
     text_add(out, "\n| row | limit | value | pass |\n|---|---|---|---|\n");
     for (size_t i = 0; i < CROSS_CHECKS; i++)
-        text_format(out, "| %s | &ge; %g | %.5g | %s |\n", v->checks[i].row, v->checks[i].limit, v->checks[i].value, passes(&v->checks[i]) ? "yes" : "**NO**");
+        text_format(out, "| %s | &ge; %g | %.5g | %s |\n", v->checks[i].row, v->checks[i].limit, v->checks[i].value,
+                    passes(&v->checks[i]) ? "yes" : "**NO**");
 }
 
 void cross_table(const cross_study *study, text *out)
@@ -66,12 +67,15 @@ void cross_table(const cross_study *study, text *out)
 
 static void add_markdown(const cross_study *study, text *out)
 {
-    text_format(out, "# Tracer against rasterizer\n\nFrom the tracer's picture to that of 3D Gaussian splatting, one change at a time; each keeps those before it. Rows beyond "
+    text_format(out, "# Tracer against rasterizer\n\nFrom the tracer's picture to that of 3D Gaussian splatting, one change at a time; "
+                     "each keeps those before it. Rows beyond "
                      "their limit: %zu.\n\n", count_failures(study));
     for (cross_step step = 0; step < CROSS_STEPS; step++)
         text_format(out, "- **%s**: %s\n", cross_step_name(step), cross_step_text(step));
-    text_format(out, "\nPictures of each view, from the upper left: tracer, splats, their difference x %d, that of the tiles x %d; order, projection, dilation and cut-offs, each x %d. "
-                     "Differences are the largest of the three channels, dark to light for 0 to 1. Against double: every 8th pixel in both directions.\n\n",
+    text_format(out, "\nPictures of each view, from the upper left: tracer, splats, their difference x %d, that of the tiles x %d; order, "
+                     "projection, dilation and cut-offs, each x %d. "
+                     "Differences are the largest of the three channels, dark to light for 0 to 1. Against double: every 8th pixel in both "
+                     "directions.\n\n",
                 (int)CROSS_AMPLIFIED, (int)CROSS_AMPLIFIED_TILES, (int)CROSS_AMPLIFIED);
     cross_table(study, out);
     text_add(out, "\n");
@@ -90,13 +94,16 @@ static json_t *view_to_json(const cross_view *v)
     json_t *rows = json_array(), *chain = json_array();
     for (size_t i = 0; i < CROSS_CHECKS; i++)
         json_array_append_new(rows, json_pack("{s:s,s:f,s:o,s:b}", "row", v->checks[i].row, "limit", v->checks[i].limit, "value",
-                                              isfinite(v->checks[i].value) ? json_real(v->checks[i].value) : json_null(), "pass", passes(&v->checks[i])));
+                                              isfinite(v->checks[i].value) ? json_real(v->checks[i].value) : json_null(), "pass",
+                                              passes(&v->checks[i])));
     for (cross_step step = 0; step < CROSS_STEPS; step++)
-        json_array_append_new(chain, json_pack("{s:s,s:s,s:o,s:o}", "change", cross_step_name(step), "what", cross_step_text(step), "to_step_before",
-                                               error_to_json(&v->step[step]), "to_tracer", error_to_json(&v->total[step])));
-    return json_pack("{s:o,s:i,s:i,s:I,s:b,s:o,s:o,s:{s:o,s:o,s:o},s:o}", "view", json_text(v->name), "width", v->width, "height", v->height, "gaussians",
-                     (json_int_t)v->gaussians, "pinhole_stand_in", v->stand_in, "chain", chain, "rows", rows, "to_double", "tracer", error_to_json(&v->traced),
-                     "per_ray", error_to_json(&v->per_ray), "ewa", error_to_json(&v->splat), "pictures", json_text(v->sheet));
+        json_array_append_new(chain, json_pack("{s:s,s:s,s:o,s:o}", "change", cross_step_name(step), "what", cross_step_text(step),
+                                               "to_step_before", error_to_json(&v->step[step]), "to_tracer",
+                                               error_to_json(&v->total[step])));
+    return json_pack("{s:o,s:i,s:i,s:I,s:b,s:o,s:o,s:{s:o,s:o,s:o},s:o}", "view", json_text(v->name), "width", v->width, "height",
+                     v->height, "gaussians", (json_int_t)v->gaussians, "pinhole_stand_in", v->stand_in, "chain", chain, "rows", rows,
+                     "to_double", "tracer", error_to_json(&v->traced), "per_ray", error_to_json(&v->per_ray), "ewa",
+                     error_to_json(&v->splat), "pictures", json_text(v->sheet));
 }
 
 static gbt_status write_json(const cross_study *study, const char *folder, gbt_error *err)
@@ -110,14 +117,14 @@ static gbt_status write_json(const cross_study *study, const char *folder, gbt_e
             json_array_append_new(views, view_to_json(&study->models[m].views[v]));
         json_array_append_new(models, json_pack("{s:o,s:o}", "model", json_text(study->models[m].name), "views", views));
     }
-    json_t *root = json_pack("{s:i,s:s,s:i,s:i,s:o}", "schema", 1, "study", "crosscheck", "amplified", (int)CROSS_AMPLIFIED, "amplified_tiles",
-                             (int)CROSS_AMPLIFIED_TILES, "models", models);
+    json_t *root = json_pack("{s:i,s:s,s:i,s:i,s:o}", "schema", 1, "study", "crosscheck", "amplified", (int)CROSS_AMPLIFIED,
+                             "amplified_tiles", (int)CROSS_AMPLIFIED_TILES, "models", models);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);
     return status;
 }
 
-/* ---- chart --------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- chart --------------------------------------------------------------------------------------------------------------------------- */
 
 static int view_height(void)
 {
@@ -141,7 +148,8 @@ static void draw_bars(const cross_model *model, const cross_view *v, int top, te
         const int y = top + VIEW_GAP - 4 + i * (BAR_HEIGHT + BAR_GAP);
         const double end = bar_end(v->step[i].psnr), total = bar_end(v->total[i].psnr);
         text_format(out, "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%s</text>", LABEL_WIDTH - 8, y + 12, cross_step_name((cross_step)i));
-        text_format(out, "<rect class=\"s1 bar\" x=\"%d\" y=\"%d\" width=\"%.1f\" height=\"%d\"/>", LABEL_WIDTH, y, end - LABEL_WIDTH, BAR_HEIGHT);
+        text_format(out, "<rect class=\"s1 bar\" x=\"%d\" y=\"%d\" width=\"%.1f\" height=\"%d\"/>", LABEL_WIDTH, y, end - LABEL_WIDTH,
+                    BAR_HEIGHT);
         text_format(out, "<path class=\"s2 total\" d=\"M%.1f %dv%d\"/>", total, y - 2, BAR_HEIGHT + 4);
         text_format(out, "<text x=\"%.1f\" y=\"%d\">%.1f</text>", fmax(end, total) + 6, y + 12, v->step[i].psnr);
     }
@@ -173,7 +181,7 @@ static void add_picture(const cross_study *study, text *out)
     add_svg(study, true, out);
 }
 
-/* ---- page ---------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- page ---------------------------------------------------------------------------------------------------------------------------- */
 
 static void add_page_view(const cross_model *model, const cross_view *v, const char *folder, text *out)
 {
@@ -189,35 +197,41 @@ static void add_page_view(const cross_model *model, const cross_view *v, const c
         report_picture(out, path, PICTURE_COLOR, SIZE_MAX, &width, &height);
         text_add(out, "\">");
     }
-    text_add(out, "<div class=\"scroll\"><table class=\"list\"><thead><tr><th>row</th><th>limit</th><th>value</th><th>pass</th></tr></thead><tbody>");
+    text_add(out, "<div class=\"scroll\"><table "
+                  "class=\"list\"><thead><tr><th>row</th><th>limit</th><th>value</th><th>pass</th></tr></thead><tbody>");
     for (size_t i = 0; i < CROSS_CHECKS; i++)
-        text_format(out, "<tr><th>%s</th><td>&ge; %g</td><td>%.5g</td><td>%s</td></tr>", v->checks[i].row, v->checks[i].limit, v->checks[i].value,
-                    passes(&v->checks[i]) ? "yes" : "<b>no</b>");
+        text_format(out, "<tr><th>%s</th><td>&ge; %g</td><td>%.5g</td><td>%s</td></tr>", v->checks[i].row, v->checks[i].limit,
+                    v->checks[i].value, passes(&v->checks[i]) ? "yes" : "<b>no</b>");
     text_add(out, "</tbody></table></div></figure>\n");
 }
 
 static void add_page(const cross_study *study, const char *folder, text *out)
 {
-    text_add(out, "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
+    text_add(out, "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+                  "content=\"width=device-width,initial-scale=1\">"
                   "<title>Tracer against rasterizer</title>\n<style>\n");
     text_add(out, report_css);
     text_add(out, scatter_css);
-    text_add(out, ".scatter .bar{fill:var(--k);opacity:.55}.scatter .total{stroke:var(--k);stroke-width:2.5}.panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n"
-                  "</style></head>\n<body>\n<header><h1>Tracer against rasterizer</h1><p class=\"lead\">From the tracer's picture to that of 3D Gaussian splatting, one change "
+    text_add(out, ".scatter .bar{fill:var(--k);opacity:.55}.scatter .total{stroke:var(--k);stroke-width:2.5}.panel{margin:1rem 0 "
+                  ".5rem;padding:.6rem .9rem}\n"
+                  "</style></head>\n<body>\n<header><h1>Tracer against rasterizer</h1><p class=\"lead\">From the tracer's picture to that "
+                  "of 3D Gaussian splatting, one change "
                   "at a time; each keeps those before it.</p></header>\n<main>\n<ul>");
     for (cross_step step = 0; step < CROSS_STEPS; step++)
         text_format(out, "<li><b>%s</b>: %s</li>", cross_step_name(step), cross_step_text(step));
     text_add(out, "</ul>\n<figure class=\"card panel\">");
     add_svg(study, false, out);
-    text_format(out, "</figure>\n<p>Pictures, from the upper left: tracer, splats, their difference &times; %d, that of the tiles &times; %d; order, projection, dilation and cut-offs, "
+    text_format(out, "</figure>\n<p>Pictures, from the upper left: tracer, splats, their difference &times; %d, that of the tiles &times; "
+                     "%d; order, projection, dilation and cut-offs, "
                      "each &times; %d.</p>\n", (int)CROSS_AMPLIFIED, (int)CROSS_AMPLIFIED_TILES, (int)CROSS_AMPLIFIED);
     for (size_t m = 0; m < study->model_count; m++)
         for (size_t v = 0; v < study->models[m].view_count; v++)
             add_page_view(&study->models[m], &study->models[m].views[v], folder, out);
-    text_add(out, "</main>\n<footer><p>The two share the cameras and the Gaussians, and no code that draws. This page is one file and loads nothing.</p></footer>\n</body></html>\n");
+    text_add(out, "</main>\n<footer><p>The two share the cameras and the Gaussians, and no code that draws. This page is one file and "
+                  "loads nothing.</p></footer>\n</body></html>\n");
 }
 
-/* ---- files --------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- files --------------------------------------------------------------------------------------------------------------------------- */
 
 gbt_status cross_write(const cross_study *study, const char *folder, gbt_error *err)
 {

@@ -2,11 +2,8 @@
 #include "eval/study_paper.h"
 
 #include <stdio.h>
-#include <string.h>
 
 #include "base/fail.h"
-#include "base/file.h"
-#include "base/log.h"
 #include "base/memory.h"
 
 /* The paper's growth ends at half of its run, 15000 of 30000. */
@@ -64,63 +61,41 @@ static gbt_status choose_tables(const char *list, bool has_table[PAPER_TABLES + 
 
 static gbt_status plan(paper_study *s, const gbt_paper_def *def, gbt_error *err)
 {
-    char names[STUDY_SCENES_MAX][STUDY_NAME_SIZE];
-    s->def = *def, s->scene_count = def->data_count;
-    if (def->seeds < 1 || def->seeds > STUDY_SEEDS_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--seeds: %d (wanted 1 to %d)", def->seeds, (int)STUDY_SEEDS_MAX);
+    s->def = *def;
     if (def->iterations < LEAST_ITERATIONS)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least %d)", (unsigned long long)def->iterations, (int)LEAST_ITERATIONS);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least %d)", (unsigned long long)def->iterations,
+                         (int)LEAST_ITERATIONS);
     GBT_TRY(choose_tables(def->tables, s->has_table, err));
-    GBT_TRY(study_runs_names(def->data, def->data_count, names, err));
-    for (size_t i = 0; i < s->scene_count; i++) {
-        s->scenes[i].data = def->data[i];
-        snprintf(s->scenes[i].name, STUDY_NAME_SIZE, "%s", names[i]);
+    GBT_TRY(study_grid_open(&s->grid, def->data, def->data_count, PAPER_VARIANTS, def->seeds, err));
+    for (size_t i = 0; i < s->grid.scene_count; i++)
         GBT_TRY(paper_scene_look(def->data[i], &s->scenes[i], err));
-    }
     for (int table = 1; table <= PAPER_TABLES; table++) {
         const paper_variant_id *variants;
         const size_t count = paper_table_variants(table, &variants);
         for (size_t i = 0; i < count && s->has_table[table]; i++)
             s->has_variant[variants[i]] = true;
     }
-    s->figures = mem_calloc(s->scene_count * PAPER_VARIANTS * (size_t)def->seeds, sizeof *s->figures, "figures of runs", err);
-    return s->figures != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+    return GBT_OK;
 }
 
-static gbt_status run_one(const paper_study *s, const paper_scene *scene, paper_variant_id id, int seed, const char *folder, study_figures *out, gbt_error *err)
+static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder, study_figures *out, gbt_error *err)
 {
     char run[4096];
-    const paper_variant *v = &paper_variants[id];
+    const paper_study *s = study;
+    const paper_variant *v = &paper_variants[variant];
+    if (v->max_depth < D_MAX && v->max_depth >= s->scenes[scene].tree_depth) {
+        *out = *paper_run(s, scene, PAPER_GBSP, seed); /* the same balls, so the same run to the bit */
+        return GBT_OK;
+    }
     gbt_train_def def = gbt_train_def_default();
     def.compat = true, def.eval_split = "every=8", def.save_every_seconds = 0;
     def.start_level = 0, def.splats_until = 0, def.footprint = 0; /* as compat has them: a new default must not make old runs look like others */
     def.iterations = s->def.iterations, def.downscale = s->def.downscale, def.renderer = s->def.renderer, def.seed = (uint64_t)seed;
     def.init = v->init, def.scale_prior = v->scale_prior, def.grow_until = v->grow_until, def.max_depth = v->max_depth;
-    def.scale_factor = v->scaled ? scene->scale_constant : 1;
+    def.scale_factor = v->scaled ? s->scenes[scene].scale_constant : 1;
     def.command = "gbtrace study paper";
-    GBT_TRY(study_runs_folder(folder, scene->name, v->name, def.seed, run, sizeof run, err));
-    return study_runs_do(scene->data, run, &def, out, err);
-}
-
-/* Seeds outermost: an interrupted study has whole comparisons of the first seeds. */
-static gbt_status run_all(paper_study *s, const char *folder, gbt_error *err)
-{
-    size_t wanted = 0, done = 0;
-    for (int v = 0; v < PAPER_VARIANTS; v++)
-        wanted += s->has_variant[v] ? s->scene_count * (size_t)s->def.seeds : 0;
-    for (int seed = 0; seed < s->def.seeds; seed++)
-        for (size_t scene = 0; scene < s->scene_count; scene++)
-            for (int v = 0; v < PAPER_VARIANTS; v++) {
-                study_figures *out = paper_run(s, scene, (paper_variant_id)v, seed);
-                if (!s->has_variant[v])
-                    continue;
-                study_runs_tell(++done, wanted);
-                if (paper_variants[v].max_depth < D_MAX && paper_variants[v].max_depth >= s->scenes[scene].tree_depth)
-                    *out = *paper_run(s, scene, PAPER_GBSP, seed); /* the same balls, so the same run to the bit */
-                else
-                    GBT_TRY(run_one(s, &s->scenes[scene], (paper_variant_id)v, seed, folder, out, err));
-            }
-    return GBT_OK;
+    GBT_TRY(study_runs_folder(folder, s->grid.names[scene], v->name, def.seed, run, sizeof run, err));
+    return study_runs_do(s->def.data[scene], run, &def, out, err);
 }
 
 static gbt_status write_all(const paper_study *s, const char *folder, FILE *out, gbt_error *err)
@@ -140,12 +115,10 @@ gbt_status gbt_study_paper(const gbt_paper_def *def, const char *folder, FILE *o
         return GBT_ERR_NO_MEMORY;
     gbt_status status = plan(s, def, err);
     if (status == GBT_OK)
-        status = file_make_folder(folder, err);
-    if (status == GBT_OK)
-        status = run_all(s, folder, err);
+        status = study_grid_fill(&s->grid, folder, s->has_variant, run_one, s, err);
     if (status == GBT_OK)
         status = write_all(s, folder, out, err);
-    mem_free(s->figures);
+    study_grid_close(&s->grid);
     mem_free(s);
     return status;
 }

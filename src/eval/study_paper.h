@@ -4,7 +4,7 @@
 #ifndef GBT_EVAL_STUDY_PAPER_H
 #define GBT_EVAL_STUDY_PAPER_H
 
-#include "eval/study_runs.h"
+#include "eval/study_grid.h"
 #include "eval/study_runs_stat.h"
 #include "gbtrace/study.h"
 
@@ -44,8 +44,6 @@ extern const paper_variant paper_variants[PAPER_VARIANTS];
 size_t paper_table_variants(int table, const paper_variant_id **out);
 
 typedef struct paper_scene {
-    const char *data;
-    char name[STUDY_NAME_SIZE];
     int tree_depth;        /* of the balls without a limit: larger limits change nothing */
     double scale_constant; /* the first scales of GBSP over those from spacing alone, of the same balls: geometric mean */
 } paper_scene;
@@ -61,13 +59,12 @@ typedef struct paper_study {
     bool has_table[PAPER_TABLES + 1]; /* by number */
     bool has_variant[PAPER_VARIANTS];
     paper_scene scenes[STUDY_SCENES_MAX];
-    size_t scene_count;
-    study_figures *figures; /* [scene][variant][seed] */
+    study_grid grid;
 } paper_study;
 
 static inline study_figures *paper_run(const paper_study *s, size_t place, paper_variant_id variant, int seed)
 {
-    return &s->figures[(place * PAPER_VARIANTS + (size_t)variant) * (size_t)s->def.seeds + (size_t)seed];
+    return study_grid_at(&s->grid, place, (size_t)variant, seed);
 }
 
 /* ---- figures and changes -------------------------------------------------------------------------------------------------------- */
@@ -98,7 +95,9 @@ double paper_figure_of(const study_figures *run, paper_figure figure);
 /** Over the seeds of a variant on a scene. */
 stat_sample paper_stat(const paper_study *s, size_t scene, paper_variant_id variant, paper_figure figure);
 
-/** Over the seeds: the change from `base` to `variant` at the same seed, per cent or a difference; of PAPER_ALL the mean over the scenes. */
+/**
+ * Over the seeds: the change from `base` to `variant` at the same seed, per cent or a difference; of PAPER_ALL the mean over the scenes.
+ */
 stat_sample paper_change(const paper_study *s, size_t scene, paper_variant_id variant, paper_variant_id base, paper_figure figure);
 
 /** A change that is looked at. */

@@ -10,7 +10,8 @@
 enum { NAMES_RIGHT = 196, PLOT_WIDTH = 252, PLOT_GAP = 38, ROW = 24, HEAD = 66, FOOT = 42, MARGIN = 12 };
 
 static const char css[] =
-    ".scatter .seed{fill:var(--k);opacity:.45}.scatter .bar{stroke:var(--k);stroke-width:2}.scatter .name{text-anchor:end;fill:var(--text)}\n";
+    ".scatter .seed{fill:var(--k);opacity:.45}.scatter .bar{stroke:var(--k);stroke-width:2}.scatter "
+    ".name{text-anchor:end;fill:var(--text)}\n";
 
 typedef struct plot {
     paper_figure figure;
@@ -36,7 +37,7 @@ static bool find_range(const paper_study *s, size_t scene, const paper_variant_i
         const double reach = isfinite(stat.deviation) ? stat.deviation : 0;
         if (isfinite(stat.mean))
             p->low = fmin(p->low, stat.mean - reach), p->high = fmax(p->high, stat.mean + reach);
-        for (int seed = 0; seed < s->def.seeds; seed++) {
+        for (int seed = 0; seed < s->grid.seeds; seed++) {
             const double value = paper_figure_of(paper_run(s, scene, variants[v], seed), p->figure);
             if (isfinite(value))
                 p->low = fmin(p->low, value), p->high = fmax(p->high, value);
@@ -51,8 +52,8 @@ static void draw_frame(text *out, plot *p, int top, int bottom)
     const int count = chart_ticks(p->low, p->high, 4, ticks);
     p->low = ticks[0], p->high = ticks[count - 1];
     for (int i = 0; i < count; i++)
-        text_format(out, "<path class=\"rule\" d=\"M%.1f %dV%d\"/><text class=\"tick-x\" x=\"%.1f\" y=\"%d\">%.6g</text>", place(p, ticks[i]), top, bottom,
-                    place(p, ticks[i]), bottom + 17, ticks[i]);
+        text_format(out, "<path class=\"rule\" d=\"M%.1f %dV%d\"/><text class=\"tick-x\" x=\"%.1f\" y=\"%d\">%.6g</text>",
+                    place(p, ticks[i]), top, bottom, place(p, ticks[i]), bottom + 17, ticks[i]);
     text_format(out, "<text x=\"%.1f\" y=\"%d\">%s</text>", p->left, top - 10, paper_figure_texts[p->figure].value_name);
 }
 
@@ -63,8 +64,9 @@ static void draw_row(text *out, const paper_study *s, size_t scene, paper_varian
     if (!isfinite(stat.mean))
         return;
     if (isfinite(stat.deviation))
-        text_format(out, "<path class=\"bar s%d\" d=\"M%.1f %dH%.1f\"/>", color, place(p, stat.mean - stat.deviation), y, place(p, stat.mean + stat.deviation));
-    for (int seed = 0; seed < s->def.seeds; seed++) {
+        text_format(out, "<path class=\"bar s%d\" d=\"M%.1f %dH%.1f\"/>", color, place(p, stat.mean - stat.deviation), y,
+                    place(p, stat.mean + stat.deviation));
+    for (int seed = 0; seed < s->grid.seeds; seed++) {
         const double value = paper_figure_of(paper_run(s, scene, variant, seed), p->figure);
         if (isfinite(value))
             text_format(out, "<circle class=\"seed s%d\" cx=\"%.1f\" cy=\"%d\" r=\"2.5\"/>", color, place(p, value), y);
@@ -78,7 +80,7 @@ static void draw_panel(text *out, const paper_study *s, size_t scene, const pape
 {
     const int bottom = HEAD + ROW * (int)count;
     text_format(out, "<g transform=\"translate(0 %d)\"><text class=\"title\" x=\"10\" y=\"24\">", top);
-    text_escaped(out, s->scenes[scene].name);
+    text_escaped(out, s->grid.names[scene]);
     text_add(out, "</text>");
     for (size_t v = 0; v < count; v++)
         text_format(out, "<text class=\"name\" x=\"%d\" y=\"%d\">%s</text>", NAMES_RIGHT - MARGIN, HEAD + ROW * (int)v + ROW / 2 + 4,
@@ -105,7 +107,7 @@ static void draw_growth(text *out, const paper_study *s, size_t scene, int top)
     enum { MARKS = sizeof marks / sizeof *marks };
     scatter_point points[MARKS];
     char title[STUDY_NAME_SIZE + 40];
-    snprintf(title, sizeof title, "%s: anchors against PSNR", s->scenes[scene].name);
+    snprintf(title, sizeof title, "%s: anchors against PSNR", s->grid.names[scene]);
     scatter_chart chart = {.title = title, .note = "means over the seeds", .x_unit = "final anchors (log)", .y_unit = "held-out PSNR, dB",
                            .points = points};
     if (s->has_table[3])
@@ -128,8 +130,8 @@ void paper_charts(const paper_study *s, text *out)
     const paper_variant_id *variants = NULL;
     const size_t count = spread_table > 0 ? paper_table_variants(spread_table, &variants) : 0;
     const int spread = spread_table > 0 ? panel_height(count) : 0, one = spread + (has_growth ? SCATTER_HEIGHT : 0);
-    scatter_begin(out, "anchors and PSNR by start", css, one * (int)s->scene_count);
-    for (size_t scene = 0; scene < s->scene_count; scene++) {
+    scatter_begin(out, "anchors and PSNR by start", css, one * (int)s->grid.scene_count);
+    for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         if (spread_table > 0)
             draw_panel(out, s, scene, variants, count, (int)scene * one);
         if (has_growth)

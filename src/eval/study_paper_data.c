@@ -16,20 +16,20 @@ static const double ball_count_limit = 0.015;
 static void add_csv_run(const paper_study *s, size_t scene, paper_variant_id variant, int seed, text *out)
 {
     const study_figures *r = paper_run(s, scene, variant, seed);
-    stat_csv_text(out, s->scenes[scene].name);
-    text_format(out, ",%s,%d,%.0f,%.0f,%.0f,%.6g,%.0f,%.9g,%.9g,", paper_variants[variant].name, seed, r->points, r->anchors_initial, r->anchors_final,
-                paper_figure_of(r, PAPER_STORAGE), r->model_bytes, r->psnr, r->ssim);
-    text_format(out, "%.6g,%.6g,%.6g,%.0f,%.6g\n", r->anchors_in_view, paper_figure_of(r, PAPER_ARITHMETIC), r->blended_per_ray, r->iterations,
-                r->train_seconds);
+    stat_csv_text(out, s->grid.names[scene]);
+    text_format(out, ",%s,%d,%.0f,%.0f,%.0f,%.6g,%.0f,%.9g,%.9g,", paper_variants[variant].name, seed, r->points, r->anchors_initial,
+                r->anchors_final, paper_figure_of(r, PAPER_STORAGE), r->model_bytes, r->psnr, r->ssim);
+    text_format(out, "%.6g,%.6g,%.6g,%.0f,%.6g\n", r->anchors_in_view, paper_figure_of(r, PAPER_ARITHMETIC), r->blended_per_ray,
+                r->iterations, r->train_seconds);
 }
 
 void paper_csv(const paper_study *s, text *out)
 {
     text_add(out, "scene,variant,seed,points,anchors_initial,anchors_final,storage_mib,model_bytes,psnr,ssim,"
                   "anchors_in_view,giga_macs_per_view,blended_per_ray,iterations,train_seconds\n");
-    for (size_t scene = 0; scene < s->scene_count; scene++)
+    for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         for (int v = 0; v < PAPER_VARIANTS; v++)
-            for (int seed = 0; seed < s->def.seeds && s->has_variant[v]; seed++)
+            for (int seed = 0; seed < s->grid.seeds && s->has_variant[v]; seed++)
                 add_csv_run(s, scene, (paper_variant_id)v, seed, out);
 }
 
@@ -46,9 +46,10 @@ static void add_count_rows(const paper_study *s, size_t scene, json_t *rows)
         char row[STUDY_NAME_SIZE + 80];
         const study_figures *run = paper_run(s, scene, (paper_variant_id)v, 0);
         const double wanted = paper_ball_count(run->points, paper_variants[v].max_depth), value = fabs(run->anchors_initial / wanted - 1);
-        snprintf(row, sizeof row, "%s: initial anchors at D_max %d against the closed form", s->scenes[scene].name, paper_variants[v].max_depth);
-        json_array_append_new(rows, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", ball_count_limit, "value", stat_number(value),
-                                              "pass", value <= ball_count_limit));
+        snprintf(row, sizeof row, "%s: initial anchors at D_max %d against the closed form", s->grid.names[scene],
+                 paper_variants[v].max_depth);
+        json_array_append_new(rows, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", ball_count_limit, "value",
+                                              stat_number(value), "pass", value <= ball_count_limit));
     }
 }
 
@@ -59,23 +60,23 @@ static void add_change_rows(const paper_study *s, json_t *rows)
         const paper_claim *claim = &paper_claims[i];
         if (!s->has_table[claim->table])
             continue;
-        for (size_t scene = 0; scene <= s->scene_count; scene++) {
+        for (size_t scene = 0; scene <= s->grid.scene_count; scene++) {
             char row[2 * STUDY_NAME_SIZE];
-            const bool is_all = scene == s->scene_count;
+            const bool is_all = scene == s->grid.scene_count;
             const stat_sample ours = paper_change(s, is_all ? PAPER_ALL : scene, claim->variant, claim->base, claim->figure);
             const double published = paper_published(claim);
-            snprintf(row, sizeof row, "table %d, %s: %s: change of %s", claim->table, is_all ? "all" : s->scenes[scene].name, claim->what,
+            snprintf(row, sizeof row, "table %d, %s: %s: change of %s", claim->table, is_all ? "all" : s->grid.names[scene], claim->what,
                      paper_figure_texts[claim->figure].change_name);
-            json_array_append_new(rows, json_pack("{s:o,s:n,s:o,s:n,s:o,s:o,s:s}", "row", json_text(row), "limit", "value", stat_number(ours.mean),
-                                                  "pass", "ours", stat_to_json(&ours), "paper", stat_number(published), "says",
-                                                  paper_verdict(&ours, claim)));
+            json_array_append_new(rows, json_pack("{s:o,s:n,s:o,s:n,s:o,s:o,s:s}", "row", json_text(row), "limit", "value",
+                                                  stat_number(ours.mean), "pass", "ours", stat_to_json(&ours), "paper",
+                                                  stat_number(published), "says", paper_verdict(&ours, claim)));
         }
     }
 }
 
 static json_t *variant_to_json(const paper_study *s, size_t scene, paper_variant_id variant)
 {
-    json_t *root = json_pack("{s:o,s:s}", "scene", json_text(s->scenes[scene].name), "variant", paper_variants[variant].name);
+    json_t *root = json_pack("{s:o,s:s}", "scene", json_text(s->grid.names[scene]), "variant", paper_variants[variant].name);
     for (int f = 0; f < PAPER_FIGURES; f++) {
         const stat_sample stat = paper_stat(s, scene, variant, (paper_figure)f);
         json_object_set_new(root, paper_figure_texts[f].name, stat_to_json(&stat));
@@ -88,18 +89,18 @@ gbt_status paper_json(const paper_study *s, const char *folder, gbt_error *err)
     char path[4096];
     GBT_TRY(file_join(path, sizeof path, folder, "paper.json", err));
     json_t *rows = json_array(), *figures = json_array(), *scenes = json_array();
-    for (size_t scene = 0; scene < s->scene_count; scene++) {
+    for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         add_count_rows(s, scene, rows);
-        json_array_append_new(scenes, json_pack("{s:o,s:f}", "scene", json_text(s->scenes[scene].name), "scale_constant",
+        json_array_append_new(scenes, json_pack("{s:o,s:f}", "scene", json_text(s->grid.names[scene]), "scale_constant",
                                                 s->scenes[scene].scale_constant));
         for (int v = 0; v < PAPER_VARIANTS; v++)
             if (s->has_variant[v])
                 json_array_append_new(figures, variant_to_json(s, scene, (paper_variant_id)v));
     }
     add_change_rows(s, rows);
-    json_t *root = json_pack("{s:i,s:s,s:I,s:f,s:s,s:i,s:o,s:o,s:o}", "schema", 1, "study", "paper", "iterations", (json_int_t)s->def.iterations,
-                             "downscale", s->def.downscale, "renderer", s->def.renderer, "seeds", s->def.seeds, "rows", rows, "scenes", scenes,
-                             "figures", figures);
+    json_t *root = json_pack("{s:i,s:s,s:I,s:f,s:s,s:i,s:o,s:o,s:o}", "schema", 1, "study", "paper", "iterations",
+                             (json_int_t)s->def.iterations, "downscale", s->def.downscale, "renderer", s->def.renderer, "seeds",
+                             s->grid.seeds, "rows", rows, "scenes", scenes, "figures", figures);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);
     return status;

@@ -10,7 +10,8 @@ const paper_figure_text paper_figure_texts[PAPER_FIGURES] = {
     [PAPER_MODEL] = {"model.gbt", "model.gbt, MiB", "model.gbt, %", 2, true, 1},
     [PAPER_PSNR] = {"PSNR", "PSNR, dB", "PSNR, dB", 2, false, 2},
     [PAPER_SSIM] = {"SSIM", "SSIM", "SSIM", 4, false, 4},
-    [PAPER_ARITHMETIC] = {"arithmetic", "arithmetic of the networks per view, 10^9 multiply-adds", "arithmetic of the networks per view, %", 4, true, 1},
+    [PAPER_ARITHMETIC] = {"arithmetic", "arithmetic of the networks per view, 10^9 multiply-adds", "arithmetic of the networks per view, %",
+                          4, true, 1},
     [PAPER_BLENDED] = {"blended", "hits that a ray blends", "hits that a ray blends, %", 1, true, 1},
 };
 
@@ -42,29 +43,30 @@ double paper_figure_of(const study_figures *run, paper_figure figure)
 stat_sample paper_stat(const paper_study *s, size_t scene, paper_variant_id variant, paper_figure figure)
 {
     double values[STUDY_SEEDS_MAX];
-    for (int seed = 0; seed < s->def.seeds; seed++)
+    for (int seed = 0; seed < s->grid.seeds; seed++)
         values[seed] = paper_figure_of(paper_run(s, scene, variant, seed), figure);
-    return stat_of(values, (size_t)s->def.seeds);
+    return stat_of(values, (size_t)s->grid.seeds);
 }
 
 static double change_of(const paper_study *s, size_t scene, paper_variant_id variant, paper_variant_id base, paper_figure figure, int seed)
 {
-    const double from = paper_figure_of(paper_run(s, scene, base, seed), figure), to = paper_figure_of(paper_run(s, scene, variant, seed), figure);
+    const double from = paper_figure_of(paper_run(s, scene, base, seed), figure),
+        to = paper_figure_of(paper_run(s, scene, variant, seed), figure);
     return paper_figure_texts[figure].is_relative ? 100 * (to / from - 1) : to - from;
 }
 
 stat_sample paper_change(const paper_study *s, size_t scene, paper_variant_id variant, paper_variant_id base, paper_figure figure)
 {
     double values[STUDY_SEEDS_MAX];
-    for (int seed = 0; seed < s->def.seeds; seed++) {
+    for (int seed = 0; seed < s->grid.seeds; seed++) {
         double over_scenes[STUDY_SCENES_MAX];
         size_t count = 0;
-        for (size_t i = 0; i < s->scene_count; i++)
+        for (size_t i = 0; i < s->grid.scene_count; i++)
             if (scene == PAPER_ALL || scene == i)
                 over_scenes[count++] = change_of(s, i, variant, base, figure, seed);
         values[seed] = stat_of(over_scenes, count).mean;
     }
-    return stat_of(values, (size_t)s->def.seeds);
+    return stat_of(values, (size_t)s->grid.seeds);
 }
 
 /* ---- the changes that are looked at ----------------------------------------------------------------------------------------------- */

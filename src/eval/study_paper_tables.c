@@ -4,8 +4,8 @@
 
 #include "eval/study_paper.h"
 
-static const char *const titles[PAPER_TABLES] = {"Voxels against balls", "What each part does, and what a constant does", "Growth stopped early",
-                                                 "Depth of the balls"};
+static const char *const titles[PAPER_TABLES] = {"Voxels against balls", "What each part does, and what a constant does",
+                                                 "Growth stopped early", "Depth of the balls"};
 
 /* ---- figures ---------------------------------------------------------------------------------------------------------------------- */
 
@@ -33,10 +33,10 @@ static void add_figures(const paper_study *s, int table, text *out)
     for (size_t c = 0; c < column_count; c++)
         text_add(out, "---|");
     text_add(out, "\n");
-    for (size_t scene = 0; scene < s->scene_count; scene++)
+    for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         for (size_t v = 0; v < variant_count; v++) {
             text_add(out, "| ");
-            text_escaped(out, s->scenes[scene].name);
+            text_escaped(out, s->grid.names[scene]);
             text_add(out, " | ");
             text_count(out, paper_run(s, scene, variants[v], 0)->points);
             text_format(out, " | %s |", row_name(table, variants[v]));
@@ -62,7 +62,8 @@ const char *paper_verdict_of(const stat_sample *ours, double published, const do
     if (ours->count < 2)
         return "one seed says nothing of the spread";
     if (!stat_is_apart(ours, 0) && has_paper)
-        return stat_is_apart(ours, published) ? "not told apart from zero, but from the paper" : "told apart neither from zero nor from the paper";
+        return stat_is_apart(ours, published) ? "not told apart from zero, but from the paper"
+               : "told apart neither from zero nor from the paper";
     if (!stat_is_apart(ours, 0))
         return "not told apart from zero";
     if (!has_paper)
@@ -89,7 +90,7 @@ static void add_change_row(const paper_study *s, const paper_claim *claim, text 
     const double published = paper_published(claim);
     double range[2];
     text_format(out, "| %s | %s |", claim->what, figure->change_name);
-    for (size_t scene = 0; scene < s->scene_count; scene++) {
+    for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         const stat_sample change = paper_change(s, scene, claim->variant, claim->base, claim->figure);
         text_add(out, " ");
         stat_add(out, &change, figure->change_decimals, true);
@@ -110,13 +111,13 @@ static void add_change_row(const paper_study *s, const paper_claim *claim, text 
 static void add_changes(const paper_study *s, int table, text *out)
 {
     text_add(out, "\n| change | of |");
-    for (size_t scene = 0; scene < s->scene_count; scene++) {
+    for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         text_add(out, " ");
-        text_escaped(out, s->scenes[scene].name);
+        text_escaped(out, s->grid.names[scene]);
         text_add(out, " |");
     }
     text_add(out, " all | the paper | its scenes | all against the paper |\n|---|---|");
-    for (size_t scene = 0; scene < s->scene_count; scene++)
+    for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         text_add(out, "---|");
     text_add(out, "---|---|---|---|\n");
     for (size_t i = 0; i < paper_claim_count; i++)
@@ -129,10 +130,10 @@ static void add_changes(const paper_study *s, int table, text *out)
 static void add_scenes(const paper_study *s, text *out)
 {
     text_add(out, "| scene | depth of the balls without a limit | constant in place of GBSP |\n|---|---|---|\n");
-    for (size_t scene = 0; scene < s->scene_count; scene++) {
+    for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         const paper_scene *p = &s->scenes[scene];
         text_add(out, "| ");
-        text_escaped(out, p->name);
+        text_escaped(out, s->grid.names[scene]);
         text_format(out, p->tree_depth < INT_MAX ? " | %d |" : " | n/a |", p->tree_depth);
         text_format(out, " %.3f |\n", p->scale_constant);
     }
@@ -140,10 +141,12 @@ static void add_scenes(const paper_study *s, text *out)
 
 void paper_tables(const paper_study *s, text *out)
 {
-    text_format(out, "# The paper's tables, from our runs\n\n%llu iterations of the faithful protocol (`--compat`), photos divided by %g, %s, ",
+    text_format(out, "# The paper's tables, from our runs\n\n%llu iterations of the faithful protocol (`--compat`), photos divided by %g, "
+                     "%s, ",
                 (unsigned long long)s->def.iterations, s->def.downscale, s->def.renderer);
-    text_format(out, "seeds 0 to %d; every eighth photo held out.\n", s->def.seeds - 1);
-    text_add(out, "Mean ± standard deviation over the seeds. Changes compare runs of the same seed; \"all\" is the mean over the scenes. Told apart: "
+    text_format(out, "seeds 0 to %d; every eighth photo held out.\n", s->grid.seeds - 1);
+    text_add(out, "Mean ± standard deviation over the seeds. Changes compare runs of the same seed; \"all\" is the mean over the scenes. "
+                  "Told apart: "
                   "outside the 95 % interval of the mean (Student's t over the seeds). The paper gives single runs on other scenes.\n\n");
     add_scenes(s, out);
     for (int table = 1; table <= PAPER_TABLES; table++) {

@@ -30,20 +30,22 @@ void rate_table(const rate_study *study, text *out)
     char name[32];
     for (size_t i = 0; i < study->model_count; i++) {
         const rate_model *m = &study->models[i];
-        text_format(out, "%s**%s**: %zu anchors, %zu bytes as trained (%.1f per anchor), PSNR ", i > 0 ? "\n" : "", m->name, m->anchors, m->plain_bytes,
-                    per_anchor(m, m->plain_bytes));
+        text_format(out, "%s**%s**: %zu anchors, %zu bytes as trained (%.1f per anchor), PSNR ", i > 0 ? "\n" : "", m->name, m->anchors,
+                    m->plain_bytes, per_anchor(m, m->plain_bytes));
         text_number(out, m->psnr, 3);
         text_add(out, " dB, SSIM ");
         text_number(out, m->ssim, 4);
         text_format(out, ", %zu held-out views; steps found in %.1f s\n\n", m->views, m->probe_seconds);
-        text_add(out, "| quality | bytes | per anchor | times smaller | positions | features | offsets | scales | pixels | steps | networks | rest | PSNR loss, dB | SSIM loss | encoded, s | decoded, s |\n"
+        text_add(out, "| quality | bytes | per anchor | times smaller | positions | features | offsets | scales | pixels | steps | "
+                      "networks | rest | PSNR loss, dB | SSIM loss | encoded, s | decoded, s |\n"
                       "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
         for (size_t j = 0; j < m->row_count; j++) {
             const rate_row *r = &m->rows[j];
             const model_sizes *s = &r->sizes;
             const size_t parts[] = {s->positions, s->features, s->offsets, s->scales, s->pixels, s->steps, s->networks};
             size_t rest = s->total;
-            text_format(out, "| %s | %zu | %.2f | %.1f |", row_name(r, name, sizeof name), s->total, per_anchor(m, s->total), (double)m->plain_bytes / (double)s->total);
+            text_format(out, "| %s | %zu | %.2f | %.1f |", row_name(r, name, sizeof name), s->total, per_anchor(m, s->total),
+                        (double)m->plain_bytes / (double)s->total);
             for (size_t p = 0; p < sizeof parts / sizeof *parts; p++) {
                 text_format(out, " %.2f |", per_anchor(m, parts[p]));
                 rest -= parts[p];
@@ -59,7 +61,8 @@ void rate_table(const rate_study *study, text *out)
 
 static void add_csv(const rate_study *study, text *out)
 {
-    text_add(out, "model,quality,anchors,bytes,positions,features,offsets,scales,pixels,steps,networks,psnr,ssim,psnr_loss,encode_seconds,decode_seconds\n");
+    text_add(out, "model,quality,anchors,bytes,positions,features,offsets,scales,pixels,steps,networks,psnr,ssim,psnr_loss,"
+                  "encode_seconds,decode_seconds\n");
     for (size_t i = 0; i < study->model_count; i++) {
         const rate_model *m = &study->models[i];
         for (size_t j = 0; j < m->row_count; j++) {
@@ -68,8 +71,9 @@ static void add_csv(const rate_study *study, text *out)
             text_add(out, "\"");
             for (const char *c = m->name; *c != '\0'; c++)
                 text_format(out, *c == '"' ? "\"\"" : "%c", *c);
-            text_format(out, "\",%g,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%.6g,%.6g,%.6g,%.6g,%.6g\n", r->quality, m->anchors, s->total, s->positions, s->features, s->offsets,
-                        s->scales, s->pixels, s->steps, s->networks, r->psnr, r->ssim, m->psnr - r->psnr, r->encode_seconds, r->decode_seconds);
+            text_format(out, "\",%g,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%.6g,%.6g,%.6g,%.6g,%.6g\n", r->quality, m->anchors, s->total,
+                        s->positions, s->features, s->offsets, s->scales, s->pixels, s->steps, s->networks, r->psnr, r->ssim,
+                        m->psnr - r->psnr, r->encode_seconds, r->decode_seconds);
         }
     }
 }
@@ -85,21 +89,26 @@ static json_t *model_to_json(const rate_model *m)
     for (size_t j = 0; j < m->row_count; j++) {
         const rate_row *r = &m->rows[j];
         const model_sizes *s = &r->sizes;
-        json_array_append_new(rows, json_pack("{s:o,s:I,s:f,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:o,s:o,s:o,s:f,s:f}", "quality", r->quality > 0 ? json_real(r->quality) : json_null(), "bytes",
-                                              (json_int_t)s->total, "bytes_per_anchor", per_anchor(m, s->total), "positions", (json_int_t)s->positions, "features",
-                                              (json_int_t)s->features, "offsets", (json_int_t)s->offsets, "scales", (json_int_t)s->scales, "pixels", (json_int_t)s->pixels,
-                                              "steps", (json_int_t)s->steps, "networks", (json_int_t)s->networks, "psnr", number(r->psnr), "ssim", number(r->ssim), "psnr_loss",
-                                              number(m->psnr - r->psnr), "encode_seconds", r->encode_seconds, "decode_seconds", r->decode_seconds));
+        json_array_append_new(rows, json_pack("{s:o,s:I,s:f,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:o,s:o,s:o,s:f,s:f}", "quality",
+                                              r->quality > 0 ? json_real(r->quality) : json_null(), "bytes", (json_int_t)s->total,
+                                              "bytes_per_anchor", per_anchor(m, s->total), "positions", (json_int_t)s->positions,
+                                              "features", (json_int_t)s->features, "offsets", (json_int_t)s->offsets, "scales",
+                                              (json_int_t)s->scales, "pixels", (json_int_t)s->pixels, "steps", (json_int_t)s->steps,
+                                              "networks", (json_int_t)s->networks, "psnr", number(r->psnr), "ssim", number(r->ssim),
+                                              "psnr_loss", number(m->psnr - r->psnr), "encode_seconds", r->encode_seconds, "decode_seconds",
+                                              r->decode_seconds));
     }
-    return json_pack("{s:o,s:I,s:I,s:I,s:o,s:o,s:f,s:o}", "model", json_text(m->name), "anchors", (json_int_t)m->anchors, "plain_bytes", (json_int_t)m->plain_bytes, "views",
-                     (json_int_t)m->views, "psnr", number(m->psnr), "ssim", number(m->ssim), "probe_seconds", m->probe_seconds, "settings", rows);
+    return json_pack("{s:o,s:I,s:I,s:I,s:o,s:o,s:f,s:o}", "model", json_text(m->name), "anchors", (json_int_t)m->anchors, "plain_bytes",
+                     (json_int_t)m->plain_bytes, "views", (json_int_t)m->views, "psnr", number(m->psnr), "ssim", number(m->ssim),
+                     "probe_seconds", m->probe_seconds, "settings", rows);
 }
 
 static void add_check(json_t *checks, const rate_model *m, const char *what, double limit, double value)
 {
     char row[400];
     snprintf(row, sizeof row, "%s: %s", m->name, what);
-    json_array_append_new(checks, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", limit, "value", number(value), "pass", value <= limit));
+    json_array_append_new(checks, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", limit, "value", number(value), "pass",
+                                            value <= limit));
 }
 
 static gbt_status write_json(const rate_study *study, const char *path, gbt_error *err)
@@ -128,8 +137,9 @@ static void add_picture(const rate_study *study, text *out)
     scatter_point points[RATE_MODELS_MAX * RATE_ROWS_MAX];
     char names[RATE_MODELS_MAX * RATE_ROWS_MAX][32];
     const scatter_level levels[] = {{0, "as trained"}, {-loss_limit, "0.05 dB less"}};
-    scatter_chart chart = {.title = "Size of a model file against its picture", .note = "held-out views; steps by quality, dB", .x_unit = "bytes per anchor, everything counted (log)",
-                           .y_unit = "change of PSNR, dB", .points = points, .levels = levels, .level_count = sizeof levels / sizeof *levels};
+    scatter_chart chart = {.title = "Size of a model file against its picture", .note = "held-out views; steps by quality, dB",
+                           .x_unit = "bytes per anchor, everything counted (log)", .y_unit = "change of PSNR, dB", .points = points,
+                           .levels = levels, .level_count = sizeof levels / sizeof *levels};
     for (size_t i = 0; i < study->model_count; i++) {
         const rate_model *m = &study->models[i];
         chart.series[1 + i] = m->name;
@@ -138,7 +148,8 @@ static void add_picture(const rate_study *study, text *out)
             if (!(r->quality > 0))
                 continue;
             snprintf(names[chart.point_count], sizeof names[0], "%g", r->quality);
-            points[chart.point_count] = (scatter_point){1 + (int)i, per_anchor(m, r->sizes.total), r->psnr - m->psnr, names[chart.point_count]};
+            points[chart.point_count] = (scatter_point){1 + (int)i, per_anchor(m, r->sizes.total), r->psnr - m->psnr,
+                                                        names[chart.point_count]};
             chart.point_count++;
         }
     }
@@ -147,7 +158,8 @@ static void add_picture(const rate_study *study, text *out)
     text_add(out, "</svg>\n");
 }
 
-static gbt_status write_text(const rate_study *study, const char *folder, const char *name, void (*add)(const rate_study *, text *), gbt_error *err)
+static gbt_status write_text(const rate_study *study, const char *folder, const char *name, void (*add)(const rate_study *, text *),
+                             gbt_error *err)
 {
     text out = {.err = err};
     add(study, &out);

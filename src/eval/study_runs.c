@@ -32,7 +32,8 @@ static void make_slug(const char *name, char *out, size_t size)
     out[i] = '\0';
 }
 
-gbt_status study_runs_folder(const char *folder, const char *data_name, const char *variant, uint64_t seed, char *out, size_t size, gbt_error *err)
+gbt_status study_runs_folder(const char *folder, const char *data_name, const char *variant, uint64_t seed, char *out, size_t size,
+                             gbt_error *err)
 {
     char place[STUDY_NAME_SIZE], what[STUDY_NAME_SIZE];
     make_slug(data_name, place, sizeof place);
@@ -172,8 +173,9 @@ static gbt_status measure(const char *run, study_figures *f, gbt_error *err)
 
 static gbt_status save_measured(const char *path, const char *settings, const study_figures *f, gbt_error *err)
 {
-    json_t *root = json_pack("{s:i,s:o,s:o,s:o,s:f,s:f}", "schema", 1, "settings", json_text(settings), "anchors_in_view", stat_number(f->anchors_in_view),
-                             "blended_per_ray", stat_number(f->blended_per_ray), "macs_per_anchor", f->macs_per_anchor, "network_bytes", f->network_bytes);
+    json_t *root = json_pack("{s:i,s:o,s:o,s:o,s:f,s:f}", "schema", 1, "settings", json_text(settings), "anchors_in_view",
+                             stat_number(f->anchors_in_view), "blended_per_ray", stat_number(f->blended_per_ray), "macs_per_anchor",
+                             f->macs_per_anchor, "network_bytes", f->network_bytes);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);
     return status;
@@ -200,7 +202,8 @@ static gbt_status train(const char *data, const char *run, const gbt_train_def *
     return status == GBT_OK ? GBT_OK : base_fail(err, status, "%s", why.text);
 }
 
-static gbt_status make_run(const char *data, const char *run, const gbt_train_def *def, const char *study_path, const char *settings, gbt_error *err)
+static gbt_status make_run(const char *data, const char *run, const gbt_train_def *def, const char *study_path, const char *settings,
+                           gbt_error *err)
 {
     gbt_evaluate_def evaluate = gbt_evaluate_def_default();
     evaluate.report = 0;
@@ -225,26 +228,18 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
     }
     log_info("%s", run);
     GBT_TRY(make_run(data, run, def, study_path, settings, err));
-    return read_run(study_path, metrics_path, settings, out) ? GBT_OK : base_fail(err, GBT_ERR_INTERNAL, "%.400s: the run cannot be read back", run);
+    return read_run(study_path, metrics_path, settings, out) ? GBT_OK : base_fail(err, GBT_ERR_INTERNAL,
+                                                                                  "%.400s: the run cannot be read back", run);
 }
 
-gbt_status study_runs_do_variant(const char *folder, const char *data, const char *data_name, const char *variant, const char *settings, gbt_train_def def,
-                                 study_figures *out, gbt_error *err)
+gbt_status study_runs_do_variant(const char *folder, const char *data, const char *data_name, const char *variant, const char *settings,
+                                 gbt_train_def def, study_figures *out, gbt_error *err)
 {
     char run[PATH_SIZE];
     config_strings strings;
     GBT_TRY(config_parse(settings, variant, &def, &strings, err));
     GBT_TRY(study_runs_folder(folder, data_name, variant, def.seed, run, sizeof run, err));
     return study_runs_do(data, run, &def, out, err);
-}
-
-void study_runs_tell(size_t number, size_t count)
-{
-    char line[64];
-    gbt_event e = {.text = line, .stage = "study", .done = number - 1, .total = count, .fraction = (double)(number - 1) / (double)count};
-    e.seconds = e.seconds_left = e.psnr = e.loss = (double)NAN;
-    snprintf(line, sizeof line, "run %zu of %zu", number, count);
-    log_progress(&e);
 }
 
 gbt_status study_texts_save(study_texts *texts, const char *folder, const char *name, FILE *out)

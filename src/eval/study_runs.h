@@ -1,4 +1,5 @@
-/* eval/study_runs.h -- the training runs of a study: made, or taken from an earlier call; their figures read back; what is said of them saved. */
+/* eval/study_runs.h -- the training runs of a study: made, or taken from an earlier call; their figures read back; what is said of them
+   saved. */
 #ifndef GBT_EVAL_STUDY_RUNS_H
 #define GBT_EVAL_STUDY_RUNS_H
 
@@ -24,7 +25,8 @@ typedef struct study_figures {
 } study_figures;
 
 /** FOLDER/runs/SCENE/VARIANT/seed-S, where everything in a name but letters, digits, '.' and '_' becomes '-'. */
-gbt_status study_runs_folder(const char *folder, const char *data_name, const char *variant, uint64_t seed, char *out, size_t size, gbt_error *err);
+gbt_status study_runs_folder(const char *folder, const char *data_name, const char *variant, uint64_t seed, char *out, size_t size,
+                             gbt_error *err);
 
 /**
  * What data sets are called: the last parts of their paths.
@@ -47,11 +49,8 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
  *
  * @param variant [in] its name, in messages and as folder (study_runs_folder())
  */
-gbt_status study_runs_do_variant(const char *folder, const char *data, const char *data_name, const char *variant, const char *settings, gbt_train_def def,
-                                 study_figures *out, gbt_error *err);
-
-/** Say that run `number` of `count`, from 1 on, begins. */
-void study_runs_tell(size_t number, size_t count);
+gbt_status study_runs_do_variant(const char *folder, const char *data, const char *data_name, const char *variant, const char *settings,
+                                 gbt_train_def def, study_figures *out, gbt_error *err);
 
 /** What a study has to say. Each starts from {.err = err}. */
 typedef struct study_texts {

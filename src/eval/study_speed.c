@@ -16,7 +16,7 @@
 #include "gbtrace/bench.h"
 #include "trace/reference.h"
 
-/* ---- what is tried ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- what is tried ------------------------------------------------------------------------------------------------------------------- */
 
 /* One step of one knob; the others stand as in the preset "default". */
 typedef struct speed_step {
@@ -29,11 +29,15 @@ typedef struct speed_step {
 /* Along each knob from exact to fast, through the default. */
 static const speed_step steps[] = {
     {KNOB_PRESET, "exact", 0, 0},       {KNOB_PRESET, "default", 0, 0},      {KNOB_PRESET, "fast", 0, 0},
-    {KNOB_ALPHA, "1e-4", 1e-4f, 0},     {KNOB_ALPHA, "0.001", 1e-3f, 0},     {KNOB_ALPHA, "1/255", 0, 0},         {KNOB_ALPHA, "0.01", 0.01f, 0},
+    {KNOB_ALPHA, "1e-4", 1e-4f, 0},     {KNOB_ALPHA, "0.001", 1e-3f, 0},     {KNOB_ALPHA, "1/255", 0, 0},
+    {KNOB_ALPHA, "0.01", 0.01f, 0},
     {KNOB_ALPHA, "0.02", 0.02f, 0},     {KNOB_ALPHA, "0.05", 0.05f, 0},      {KNOB_STOP, "1e-6", 1e-6f, 0},       {KNOB_STOP, "1e-4", 0, 0},
-    {KNOB_STOP, "0.001", 1e-3f, 0},     {KNOB_STOP, "0.01", 0.01f, 0},       {KNOB_STOP, "0.03", 0.03f, 0},       {KNOB_RADIUS, "inf", 0, 0},
-    {KNOB_RADIUS, "3", 3, 0},           {KNOB_RADIUS, "2.5", 2.5f, 0},       {KNOB_RADIUS, "2", 2, 0},            {KNOB_KERNEL, "embree", 0, TRACE_EMBREE},
-    {KNOB_KERNEL, "single", 0, TRACE_SINGLE}, {KNOB_KERNEL, "tile", 0, TRACE_TILE}, {KNOB_ISA, "plain", 0, CPU_PLAIN}, {KNOB_ISA, "avx2", 0, CPU_AVX2},
+    {KNOB_STOP, "0.001", 1e-3f, 0},     {KNOB_STOP, "0.01", 0.01f, 0},       {KNOB_STOP, "0.03", 0.03f, 0},
+    {KNOB_RADIUS, "inf", 0, 0},
+    {KNOB_RADIUS, "3", 3, 0},           {KNOB_RADIUS, "2.5", 2.5f, 0},       {KNOB_RADIUS, "2", 2, 0},
+    {KNOB_KERNEL, "embree", 0, TRACE_EMBREE},
+    {KNOB_KERNEL, "single", 0, TRACE_SINGLE}, {KNOB_KERNEL, "tile", 0, TRACE_TILE}, {KNOB_ISA, "plain", 0, CPU_PLAIN},
+    {KNOB_ISA, "avx2", 0, CPU_AVX2},
     {KNOB_ISA, "avx512", 0, CPU_AVX512}, {KNOB_RENDERER, "rays", 0, -1},      {KNOB_RENDERER, "splats, per-ray order", 0, RASTER_PER_RAY},
     {KNOB_RENDERER, "EWA splats", 0, RASTER_EWA},
 };
@@ -61,14 +65,15 @@ static void list_rows(const trace_settings *own, speed_model *out)
         case KNOB_RADIUS: row->settings.proxy_radius = row->is_default ? row->settings.proxy_radius : s->number; break;
         case KNOB_KERNEL: row->kernel = (trace_kernel)s->choice, row->is_default = row->kernel == TRACE_TILE; break;
         case KNOB_ISA: row->isa = (cpu_isa)s->choice, row->is_default = row->isa == best; break;
-        case KNOB_RENDERER: row->is_default = s->choice < 0, row->splats = s->choice >= 0, row->form = row->splats ? (raster_form)s->choice : RASTER_EWA; break;
+        case KNOB_RENDERER: row->is_default = s->choice < 0, row->splats = s->choice >= 0,
+            row->form = row->splats ? (raster_form)s->choice : RASTER_EWA; break;
         case KNOB_PRESET:
         case KNOB_COUNT: break;
         }
     }
 }
 
-/* ---- ideas that were not built: only what they do to the picture ---------------------------------------------------------------------------- */
+/* ---- ideas that were not built: only what they do to the picture --------------------------------------------------------------------- */
 
 enum { ORDER_STRIDE = 4 }; /* rays are slow in double, one by one: every 4th of the reference's */
 
@@ -146,7 +151,8 @@ static void order_block(size_t block, size_t begin, size_t end, void *context)
             job->rgb[i] = NAN; /* seen by the caller */
 }
 
-static gbt_status order_by_centre(const gaussians *g, const trace_settings *settings, const bench_reference *want, bench_error *out, gbt_error *err)
+static gbt_status order_by_centre(const gaussians *g, const trace_settings *settings, const bench_reference *want, bench_error *out,
+                                  gbt_error *err)
 {
     reference_scene exact = {0};
     const size_t all = ray_image_count(&want->rays), count = (all + ORDER_STRIDE - 1) / ORDER_STRIDE;
@@ -179,7 +185,8 @@ static float round_to_half(float x)
 }
 
 /* Records of half the size: every number rounded to a half, or all but the mean. */
-static gbt_status half_records(const bench_scene *s, const trace_settings *settings, bool keep_mean, const bench_reference *want, bench_error *out, gbt_error *err)
+static gbt_status half_records(const bench_scene *s, const trace_settings *settings, bool keep_mean, const bench_reference *want,
+                               bench_error *out, gbt_error *err)
 {
     trace_scene traced = {0};
     image rgb = {0};
@@ -201,7 +208,8 @@ static gbt_status half_records(const bench_scene *s, const trace_settings *setti
 }
 
 /* With the cut-offs of "exact", so that the error is the idea's own. */
-static gbt_status measure_ideas(const bench_scene *s, const trace_settings *settings, const bench_reference *want, speed_model *out, gbt_error *err)
+static gbt_status measure_ideas(const bench_scene *s, const trace_settings *settings, const bench_reference *want, speed_model *out,
+                                gbt_error *err)
 {
     out->ideas[0] = (speed_idea){.name = "order by centre", .reason = "wrong order; would save the comparison of pairs of rows at most"};
     out->ideas[1] = (speed_idea){.name = "half-precision records", .reason = "a record is read once per tile: little to save"};
@@ -211,7 +219,7 @@ static gbt_status measure_ideas(const bench_scene *s, const trace_settings *sett
     return half_records(s, settings, true, want, &out->ideas[2].error, err);
 }
 
-/* ---- one model ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- one model ----------------------------------------------------------------------------------------------------------------------- */
 
 static void keep_figures(const bench_scene *s, const bench_way *way, const bench_reference *want, speed_row *row)
 {
@@ -227,7 +235,8 @@ static void keep_figures(const bench_scene *s, const bench_way *way, const bench
 static gbt_status measure_rows(const bench_scene *s, const bench_reference *want, int repeats, speed_model *out, gbt_error *err)
 {
     const gaussians *thin = s->run != NULL ? &s->run->frame.gaussians : s->gaussians;
-    const bench_splat splats[] = {[RASTER_EWA] = {&s->camera.shot.camera, thin, RASTER_EWA}, [RASTER_PER_RAY] = {&s->camera.shot.camera, s->gaussians, RASTER_PER_RAY}};
+    const bench_splat splats[] = {[RASTER_EWA] = {&s->camera.shot.camera, thin, RASTER_EWA},
+                                  [RASTER_PER_RAY] = {&s->camera.shot.camera, s->gaussians, RASTER_PER_RAY}};
     bench_way *ways = mem_calloc(out->row_count, sizeof *ways, "ways", err);
     if (ways == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -236,7 +245,8 @@ static gbt_status measure_rows(const bench_scene *s, const bench_reference *want
         const speed_row *row = &out->rows[i];
         place[i] = row->is_default ? 1 : count++; /* the second row is the preset "default" */
         if (!row->is_default)
-            ways[place[i]] = (bench_way){.kernel = row->kernel, .isa = row->isa, .settings = row->settings, .splat = row->splats ? &splats[row->form] : NULL};
+            ways[place[i]] = (bench_way){.kernel = row->kernel, .isa = row->isa, .settings = row->settings,
+                                         .splat = row->splats ? &splats[row->form] : NULL};
     }
     const gbt_status status = bench_measure(ways, count, s->gaussians, &s->rays, repeats, err);
     for (size_t i = 0; i < out->row_count && status == GBT_OK; i++)
@@ -247,7 +257,8 @@ static gbt_status measure_rows(const bench_scene *s, const bench_reference *want
     return status;
 }
 
-static gbt_status measure_scene(bench_scene *s, bench_reference *want, const char *path, const char *camera, int repeats, speed_model *out, gbt_error *err)
+static gbt_status measure_scene(bench_scene *s, bench_reference *want, const char *path, const char *camera, int repeats, speed_model *out,
+                                gbt_error *err)
 {
     GBT_TRY(bench_scene_open(path, camera, s, err));
     trace_settings whole = s->settings;
@@ -275,7 +286,7 @@ static gbt_status measure_path(const char *path, const char *camera, int repeats
     return status;
 }
 
-/* ---- all of them ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- all of them --------------------------------------------------------------------------------------------------------------------- */
 
 gbt_study_def gbt_study_def_default(void)
 {

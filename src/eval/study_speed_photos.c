@@ -16,7 +16,8 @@ static gbt_status draw(const bench_scene *s, const speed_row *row, trace_scene *
         return trace_forward(traced, &s->rays, false, &(trace_outputs){.rgb = rgb}, NULL, err);
     }
     const raster_settings settings = frame_splat_settings(&row->settings, row->form);
-    return raster_forward(splatted, row->form == RASTER_EWA ? &s->run->frame.gaussians : s->gaussians, &s->camera.shot.camera, &settings, false, rgb, NULL, NULL, err);
+    return raster_forward(splatted, row->form == RASTER_EWA ? &s->run->frame.gaussians : s->gaussians, &s->camera.shot.camera, &settings,
+                          false, rgb, NULL, NULL, err);
 }
 
 /* Other kernels and instruction sets give the picture of the default. */
@@ -66,6 +67,7 @@ gbt_status speed_measure_photos(bench_scene *s, speed_model *out, gbt_error *err
         out->photo_count++;
     }
     for (size_t i = 0; i < out->row_count; i++) /* the second row is the preset "default" */
-        out->rows[i].photo_psnr = is_own_picture(&out->rows[i]) ? out->rows[i].photo_psnr / (double)out->photo_count : out->rows[1].photo_psnr;
+        out->rows[i].photo_psnr = is_own_picture(&out->rows[i]) ? out->rows[i].photo_psnr / (double)out->photo_count
+                                  : out->rows[1].photo_psnr;
     return GBT_OK;
 }

@@ -2,7 +2,7 @@
 #ifndef GBT_EVAL_STUDY_TIME_H
 #define GBT_EVAL_STUDY_TIME_H
 
-#include "eval/study_runs.h"
+#include "eval/study_grid.h"
 #include "eval/study_runs_stat.h"
 #include "gbtrace/study.h"
 
@@ -20,25 +20,26 @@ extern const size_t time_variant_count;
 
 typedef struct time_study {
     gbt_time_def def; /* borrowed */
-    char names[STUDY_SCENES_MAX][STUDY_NAME_SIZE];
-    study_figures *figures; /* [scene][variant][seed] */
+    study_grid grid;
 } time_study;
 
 static inline const study_figures *time_run(const time_study *s, size_t place, size_t variant, int seed)
 {
-    return &s->figures[(place * time_variant_count + variant) * (size_t)s->def.seeds + (size_t)seed];
+    return study_grid_at(&s->grid, place, variant, seed);
 }
 
 /** Held-out PSNR at the end over the seeds; and its change from the default's of the same seed. */
 stat_sample time_psnr(const time_study *s, size_t scene, size_t variant);
 stat_sample time_change(const time_study *s, size_t scene, size_t variant);
 
-/** Mark `mark` of a curve over the seeds; mark TIME_MARKS is the end. False when a run has no such mark (a step may pass several at once). */
+/**
+ * Mark `mark` of a curve over the seeds; mark TIME_MARKS is the end. False when a run has no such mark (a step may pass several at once).
+ */
 bool time_mark(const time_study *s, size_t scene, size_t variant, size_t mark, double *seconds, double *psnr);
 
 /**
- * When a run first shows `psnr` or more: straight between its marks and its end, over log seconds; NaN when it never does, or there is no score.
- * Before the first mark nothing is known: a run that is there already is said to reach it at that mark.
+ * When a run first shows `psnr` or more: straight between its marks and its end, over log seconds; NaN when it never does, or there is no
+ * score. Before the first mark nothing is known: a run that is there already is said to reach it at that mark.
  */
 double time_to_reach(const study_figures *run, double psnr);
 

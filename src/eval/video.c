@@ -70,7 +70,8 @@ static gbt_status start(video *v, char *const *arguments, gbt_error *err)
         return GBT_OK;
     v->process = 0;
     if (code == ENOENT)
-        return base_fail(err, GBT_ERR_IO, "%s: a film wants the program ffmpeg, which is not there (install it, or give a folder for pictures)", v->path);
+        return base_fail(err, GBT_ERR_IO,
+                         "%s: a film wants the program ffmpeg, which is not there (install it, or give a folder for pictures)", v->path);
     return base_fail(err, GBT_ERR_IO, "%s: ffmpeg does not start: %s", v->path, strerror(code));
 }
 
@@ -82,7 +83,8 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
     if (kind == KINDS)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: not the name of a film (wanted .mp4, .webm or .gif)", path);
     if (strcmp(kinds[kind].ending, ".gif") != 0 && (width % 2 != 0 || height % 2 != 0))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted even numbers: films keep colours for 2 x 2 pixels)", path, width, height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted even numbers: films keep colours for 2 x 2 pixels)", path,
+                         width, height);
     /* ./: a name that begins with a dash is no option. */
     if (snprintf(v->path, sizeof v->path, "%s", path) >= (int)sizeof v->path ||
         snprintf(v->part, sizeof v->part, "%s%.*s.%s.tmp", folder == 0 ? "./" : "", folder, path, path + folder) >= (int)sizeof v->part)
@@ -97,8 +99,8 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
     char size[32], rate[32];
     snprintf(size, sizeof size, "%dx%d", width, height);
     snprintf(rate, sizeof rate, "%.6g", fps);
-    const char *head[] = {"ffmpeg", "-hide_banner", "-nostdin", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", rate,
-                          "-i", "pipe:0", "-an"};
+    const char *head[] = {"ffmpeg", "-hide_banner", "-nostdin", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s",
+                          size, "-r", rate, "-i", "pipe:0", "-an"};
     char *arguments[ARGUMENTS_MAX];
     size_t count = 0;
     for (size_t i = 0; i < sizeof head / sizeof *head; i++)
@@ -157,7 +159,8 @@ static gbt_status failed(video *v, int code, gbt_error *err)
 gbt_status video_add(video *v, const image *picture, gbt_error *err)
 {
     if (picture->width != v->width || picture->height != v->height || picture->channels != 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a picture of %d x %d (wanted %d x %d)", v->path, picture->width, picture->height, v->width, v->height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a picture of %d x %d (wanted %d x %d)", v->path, picture->width, picture->height,
+                         v->width, v->height);
     const size_t count = 3 * (size_t)v->width * (size_t)v->height;
     for (size_t i = 0; i < count; i++) {
         const float value = picture->pixels[i];

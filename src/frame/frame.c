@@ -32,7 +32,7 @@ static double lap(double *since)
     return passed;
 }
 
-/* ---- render and back --------------------------------------------------------------------------------------------------------------------- */
+/* ---- render and back ----------------------------------------------------------------------------------------------------------------- */
 
 static gbt_status fit_picture(image *rgb, int width, int height, gbt_error *err)
 {
@@ -59,7 +59,8 @@ static const float *pixel_min_of(const frame *f)
 static gbt_status widen(frame *f, frame_subject subject, gbt_error *err)
 {
     if (f->pixel_limited) {
-        GBT_TRY(mem_reserve((void **)&f->pixel_min, &f->pixel_min_capacity, 0, f->gaussians.count + 1, sizeof *f->pixel_min, "pixel sizes", err));
+        GBT_TRY(mem_reserve((void **)&f->pixel_min, &f->pixel_min_capacity, 0, f->gaussians.count + 1, sizeof *f->pixel_min, "pixel sizes",
+                            err));
         for (size_t i = 0; i < f->gaussians.count; i++)
             f->pixel_min[i] = f->draw.anchor_pixel[frame_part(f, subject, i)];
     }
@@ -67,7 +68,8 @@ static gbt_status widen(frame *f, frame_subject subject, gbt_error *err)
 }
 
 /* Everything up to the tree, and f->rays through the middle of the aperture. `guest` is optional. */
-static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, const frame_guest *guest, gbt_error *err)
+static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, const frame_guest *guest,
+                          gbt_error *err)
 {
     double clock = clock_wall();
     ray_shot middle = *shot;
@@ -84,9 +86,13 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     f->view = footprint_view_of(&shot->camera);
     const bool splats = f->draw.renderer == FRAME_SPLAT;
     f->pixel_limited = f->draw.anchor_pixel != NULL && subject.cloud == NULL;
-    f->widened = f->draw.footprint > 0 && shot->given == NULL && !splats; /* nobody says how wide given rays are; splats are dilated instead */
-    const visible_reach extent = {.sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)), /* where an opaque Gaussian falls to alpha_min */
-                                  .width = sqrtf(pixel_variance(f, splats ? raster_settings_default().dilation : f->widened ? f->draw.footprint : 0)),
+    f->widened = f->draw.footprint > 0 && shot->given == NULL && !splats; /* nobody says how wide given rays are; splats are dilated
+                                                                             instead */
+    /* where an opaque Gaussian falls to alpha_min */
+    const visible_reach extent = {.sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)),
+                                  .width = sqrtf(pixel_variance(f,
+                                                                splats ? raster_settings_default().dilation : f->widened ? f->draw.footprint
+                                                                : 0)),
                                   .pixel = (float)f->view.pixel,
                                   .parallel = f->view.kind == FOOTPRINT_PARALLEL,
                                   .pixel_min = f->pixel_limited ? f->draw.anchor_pixel : NULL};
@@ -96,7 +102,8 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     if (subject.cloud != NULL)
         GBT_TRY(plain_forward(subject.cloud, f->eye, f->visible, f->visible_count, &f->gaussians, err));
     else
-        GBT_TRY(decode_forward(subject.anchors, subject.decoder, f->eye, f->visible, f->visible_count, settings->alpha_min, &f->gaussians, &f->tape, err));
+        GBT_TRY(decode_forward(subject.anchors, subject.decoder, f->eye, f->visible, f->visible_count, settings->alpha_min, &f->gaussians,
+                               &f->tape, err));
     if (f->widened)
         GBT_TRY(widen(f, subject, err));
     f->times.decode = lap(&clock);
@@ -138,7 +145,8 @@ gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *came
     return prepare(f, subject, &shot, settings, NULL, err);
 }
 
-gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, bool keep_tape, gbt_error *err)
+gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
+                        gbt_error *err)
 {
     const ray_shot shot = ray_shot_of(camera);
     GBT_TRY(prepare(f, subject, &shot, settings, NULL, err));
@@ -174,12 +182,14 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_gues
     return GBT_OK;
 }
 
-gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, const frame_guest *guest, gbt_error *err)
+gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings,
+                              const frame_guest *guest, gbt_error *err)
 {
     GBT_TRY(ray_shot_check(shot, err));
     if (f->draw.renderer != FRAME_TRACE) {
         if (guest != NULL || shot->given != NULL || shot->aperture_radius > 0 || shot->shutter != RAY_SHUTTER_GLOBAL)
-            return base_fail(err, GBT_ERR_ARGUMENT, "the rasterizer draws what a pinhole camera sees that stands still, and no more; trace this picture");
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "the rasterizer draws what a pinhole camera sees that stands still, and no more; trace this picture");
         return frame_render(f, subject, &shot->camera, settings, false, err);
     }
     GBT_TRY(prepare(f, subject, shot, settings, guest, err));

@@ -1,4 +1,5 @@
-/* frame/frame.h -- one view of a model, start to end: what is visible, its Gaussians, tree, trace; and back. Training and evaluation share it. */
+/* frame/frame.h -- one view of a model, start to end: what is visible, its Gaussians, tree, trace; and back. Training and evaluation share
+   it. */
 #ifndef GBT_FRAME_FRAME_H
 #define GBT_FRAME_FRAME_H
 
@@ -62,14 +63,15 @@ typedef struct frame {
 /**
  * Render `camera` (any model) into f->rgb.
  *
- * An anchor or plain Gaussian is visible when the ball around it that holds all its proxies meets a region that holds all rays, so nothing that
- * could be seen is left out: planes along the sides of the picture for cameras that look forward, else a cone around their mean
+ * An anchor or plain Gaussian is visible when the ball around it that holds all its proxies meets a region that holds all rays, so nothing
+ * that could be seen is left out: planes along the sides of the picture for cameras that look forward, else a cone around their mean
  * direction, thickened by the distance between their origins. Networks and spherical harmonics see it from the camera centre.
  *
  * @param keep_tape [in] true when frame_backward(), frame_backward_plain() or frame_weigh() follows
  * Threads: one frame per thread; parallel inside; same bits for every thread count.
  */
-gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, bool keep_tape, gbt_error *err);
+gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
+                        gbt_error *err);
 
 /** frame_render() up to the picture: f->scene is built, for other passes over it (FRAME_TRACE). f->rgb has its size and no meaning. */
 gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, gbt_error *err);
@@ -77,10 +79,10 @@ gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *came
 /**
  * Render a shot (trace/rays.h) into f->rgb: the mean over its samples, added up in their order in double.
  *
- * Anchors are decoded (harmonics summed) once, for one point: the mean of the origins of the rays through the middle of the aperture. That is the camera
- * centre, the middle of the way of a rolling shutter, the middle of an orthographic picture (a point far behind it, where parallel rays
- * would meet, is farther than any the networks were trained for: measured, it spoils the picture). f->rays are left those of the last
- * sample. There is no adjoint.
+ * Anchors are decoded (harmonics summed) once, for one point: the mean of the origins of the rays through the middle of the aperture. That
+ * is the camera centre, the middle of the way of a rolling shutter, the middle of an orthographic picture (a point far behind it, where
+ * parallel rays would meet, is farther than any the networks were trained for: measured, it spoils the picture). f->rays are left those of
+ * the last sample. There is no adjoint.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT (ray_shot_check()), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
  * Threads: as frame_render(). Cost: decoding and building once, rays and tracing for every sample.
@@ -89,13 +91,15 @@ gbt_status frame_render_shot(frame *f, frame_subject subject, const ray_shot *sh
 
 /** What traces the rays of a shot in place of trace_forward(), and sends rays of its own where the picture does not look. */
 typedef struct frame_guest {
-    gbt_status (*trace)(void *context, trace_scene *scene, const ray_image *rays, image *rgb, gbt_error *err); /* rgb has the size of rays */
+    /* rgb has the size of rays */
+    gbt_status (*trace)(void *context, trace_scene *scene, const ray_image *rays, image *rgb, gbt_error *err);
     void *context;
     float reach; /* largest |coordinate| of an origin of its own rays */
 } frame_guest;
 
 /** frame_render_shot() with a guest: everything is made, seen from the camera or not, all from the one point. */
-gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, const frame_guest *guest, gbt_error *err);
+gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings,
+                              const frame_guest *guest, gbt_error *err);
 
 /**
  * Adjoint of the last frame_render(keep_tape) of anchors: d_image -> d_anchors (rows of f->visible, added) and d_params (added).

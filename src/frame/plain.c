@@ -54,7 +54,8 @@ static void see_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-gbt_status plain_forward(const gaussian_cloud *cloud, const float eye[3], const uint32_t *visible, size_t count, gaussians *out, gbt_error *err)
+gbt_status plain_forward(const gaussian_cloud *cloud, const float eye[3], const uint32_t *visible, size_t count, gaussians *out,
+                         gbt_error *err)
 {
     GBT_TRY(gaussians_resize(out, count, err));
     plain_job job = {.cloud = cloud, .eye = eye, .visible = visible, .out = out};
@@ -84,8 +85,8 @@ static void back_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-void plain_backward(const gaussian_cloud *cloud, const float eye[3], const uint32_t *visible, size_t count, const gaussians *seen, const gaussians *d_seen,
-                    gaussian_cloud *d_cloud)
+void plain_backward(const gaussian_cloud *cloud, const float eye[3], const uint32_t *visible, size_t count, const gaussians *seen,
+                    const gaussians *d_seen, gaussian_cloud *d_cloud)
 {
     const size_t n = cloud->count;
     memset(d_cloud->scale_log, 0, 3 * n * sizeof *d_cloud->scale_log);

@@ -65,8 +65,8 @@ static void view_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-gbt_status plain_backward_view(const gaussian_cloud *cloud, const float eye[3], const uint32_t *visible, size_t count, const gaussians *seen,
-                               const gaussians *d_seen, float *d_mean, double d_eye[3], gbt_error *err)
+gbt_status plain_backward_view(const gaussian_cloud *cloud, const float eye[3], const uint32_t *visible, size_t count,
+                               const gaussians *seen, const gaussians *d_seen, float *d_mean, double d_eye[3], gbt_error *err)
 {
     const size_t blocks = parallel_block_count(count, BLOCK);
     view_job job = {cloud, eye, visible, seen, d_seen, d_mean, mem_calloc(blocks, sizeof *job.d_eye, "gradient", err)};

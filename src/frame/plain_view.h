@@ -19,7 +19,7 @@
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count.
  */
-gbt_status plain_backward_view(const gaussian_cloud *cloud, const float eye[3], const uint32_t *visible, size_t count, const gaussians *seen,
-                               const gaussians *d_seen, float *d_mean, double d_eye[3], gbt_error *err);
+gbt_status plain_backward_view(const gaussian_cloud *cloud, const float eye[3], const uint32_t *visible, size_t count,
+                               const gaussians *seen, const gaussians *d_seen, float *d_mean, double d_eye[3], gbt_error *err);
 
 #endif

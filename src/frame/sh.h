@@ -36,7 +36,8 @@ static inline void sh_basis_gradient(const float d[3], float out[GAUSSIAN_SH_COU
         {0, -one, 0}, {0, 0, one}, {-one, 0, 0},
         {two * v, two * x, 0}, {0, -two * z, -two * v}, {-flat * x, -flat * v, 2 * flat * z},
         {-two * z, 0, -two * x}, {cross * x, -cross * v, 0},
-        {-6 * a * x * v, -3 * a * (xx - yy), 0}, {b * v * z, b * x * z, b * x * v}, {2 * c * x * v, -c * (4 * zz - xx - 3 * yy), -8 * c * v * z},
+        {-6 * a * x * v, -3 * a * (xx - yy), 0}, {b * v * z, b * x * z, b * x * v},
+        {2 * c * x * v, -c * (4 * zz - xx - 3 * yy), -8 * c * v * z},
         {-6 * e * x * z, -6 * e * v * z, 3 * e * (2 * zz - xx - yy)}, {-c * (4 * zz - 3 * xx - yy), 2 * c * x * v, -8 * c * x * z},
         {2 * h * x * z, -2 * h * v * z, h * (xx - yy)}, {-3 * a * (xx - yy), 6 * a * x * v, 0}};
     memcpy(out, rows, sizeof rows);

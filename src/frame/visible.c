@@ -163,7 +163,8 @@ static void find_normals(bounds_job *job, const block_bounds *all, double spread
 static bool slopes_are_known(const ray_shot *shot, double aperture)
 {
     camera_lens lens;
-    return aperture <= 0 || (shot->shutter == RAY_SHUTTER_GLOBAL && camera_lens_prepare(&shot->camera, &lens) && camera_lens_looks_forward(&lens));
+    return aperture <= 0 || (shot->shutter == RAY_SHUTTER_GLOBAL && camera_lens_prepare(&shot->camera, &lens) &&
+                             camera_lens_looks_forward(&lens));
 }
 
 /* `rays` are those through the middle of the aperture. Another point of it shifts an origin by at most its radius R, and with the focus
@@ -287,8 +288,8 @@ static void visible_block(size_t block, size_t begin, size_t end, void *context)
     job->out_count[block] = kept;
 }
 
-gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach, uint32_t **visible, size_t *count, size_t *capacity,
-                        gbt_error *err)
+gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach, uint32_t **visible, size_t *count,
+                        size_t *capacity, gbt_error *err)
 {
     const size_t parts = frame_subject_count(subject), blocks = parallel_block_count(parts, PART_BLOCK);
     GBT_TRY(mem_reserve((void **)visible, capacity, 0, parts + blocks + 1, sizeof **visible, "visible parts", err));

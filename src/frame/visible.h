@@ -44,8 +44,11 @@ typedef struct visible_reach {
     const float *pixel_min; /* optional, [parts] */
 } visible_reach;
 
-/** Indices of the anchors whose Gaussians a ray may meet, or of such Gaussians, ascending, into a growing array. GBT_OK or GBT_ERR_NO_MEMORY. */
-gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach, uint32_t **visible, size_t *count, size_t *capacity,
-                        gbt_error *err);
+/**
+ * Indices of the anchors whose Gaussians a ray may meet, or of such Gaussians, ascending, into a growing array. GBT_OK or
+ * GBT_ERR_NO_MEMORY.
+ */
+gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach, uint32_t **visible, size_t *count,
+                        size_t *capacity, gbt_error *err);
 
 #endif

@@ -40,8 +40,8 @@ typedef struct balls {
  *         on failure *out is zeroed
  *
  * 0 points give 0 balls. Points that no axis can separate are one ball; a set whose median is its maximum is split below the median,
- * but kept whole when it has min_points + 1 points and a radius of at most 4 voxel_size. Values beyond float (coordinates near its maximum) saturate.
- * Every reading of an ambiguity of the paper: docs/balls.md.
+ * but kept whole when it has min_points + 1 points and a radius of at most 4 voxel_size. Values beyond float (coordinates near its maximum)
+ * saturate. Every reading of an ambiguity of the paper: docs/balls.md.
  * Threads: same bits for every thread count. Cost: O(n log n) time, 25 n bytes of scratch.
  */
 gbt_status balls_build(const float *position, const float *color, size_t count, const balls_def *def, balls *out, gbt_error *err);

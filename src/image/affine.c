@@ -157,8 +157,8 @@ gbt_status affine_split(image *render, const image *photo, const unsigned char *
 {
     memset(out, 0, sizeof *out);
     if (render->channels != 3 || photo->channels != 3 || render->width != photo->width || render->height != photo->height)
-        return base_fail(err, GBT_ERR_ARGUMENT, "exposure: images of %d x %d x %d and %d x %d x %d (wanted equal, 3 channels)", render->width,
-                         render->height, render->channels, photo->width, photo->height, photo->channels);
+        return base_fail(err, GBT_ERR_ARGUMENT, "exposure: images of %d x %d x %d and %d x %d x %d (wanted equal, 3 channels)",
+                         render->width, render->height, render->channels, photo->width, photo->height, photo->channels);
     const int left = render->width / 2, right = render->width - left;
     gbt_status status = image_alloc(&out->render, right, render->height, 3, err);
     if (status == GBT_OK)

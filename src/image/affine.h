@@ -23,7 +23,8 @@ void affine_apply(const float m[AFFINE_NUMBERS], const image *in, image *out);
 void affine_backward(const float m[AFFINE_NUMBERS], const image *in, image *d, double d_m[AFFINE_NUMBERS]);
 
 /**
- * The matrix that brings the columns [begin, end) of `from` nearest to those of `to`, by least squares, over the pixels where `valid` (NULL: all).
+ * The matrix that brings the columns [begin, end) of `from` nearest to those of `to`, by least squares, over the pixels where `valid`
+ * (NULL: all).
  *
  * Minimises mean |m(from) - to|^2 + 1e-6 |m - identity|^2, so that colours which tell nothing (a black or one-coloured picture, no columns)
  * leave the matrix as near to the identity as they allow. Values that are not finite count as 0.

@@ -57,7 +57,8 @@ typedef struct image_scores {
 } image_scores;
 
 /**
- * PSNR, SSIM and FLIP of the pixels where `valid` (NULL: all). The others are 0 in both images for the windows and filters, and count in no mean.
+ * PSNR, SSIM and FLIP of the pixels where `valid` (NULL: all). The others are 0 in both images for the windows and filters, and count in no
+ * mean.
  *
  * @param a, photo  3 channels, equal size; round them first (image_quantize()), as everybody scores pictures
  * @param flip_map  [out] optional: 1 channel, of their size, allocated by the caller; 0 where not valid
@@ -66,8 +67,8 @@ typedef struct image_scores {
 gbt_status image_score(const image *a, const image *photo, const unsigned char *valid, image *flip_map, image_scores *out, gbt_error *err);
 
 /**
- * image_score() as every command scores a render against its photo: both are rounded to 8 bit; with `exposure` the right halves count, after
- * affine_split().
+ * image_score() as every command scores a render against its photo: both are rounded to 8 bit; with `exposure` the right halves count,
+ * after affine_split().
  *
  * @param render, photo [in,out] rounded; the render through the matrix of affine_split()
  * @param flip_map      [out] optional, as for image_score(); always of the whole pictures

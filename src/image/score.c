@@ -32,7 +32,8 @@ static double masked_mean(image *map, const unsigned char *valid)
     return sum / (double)count;
 }
 
-static gbt_status score_masked(const image *a, const image *photo, const unsigned char *valid, image *flip_map, image_scores *out, gbt_error *err)
+static gbt_status score_masked(const image *a, const image *photo, const unsigned char *valid, image *flip_map, image_scores *out,
+                               gbt_error *err)
 {
     image seen[2] = {{0}}, map = {0}, gradient = {0};
     loss_scratch scratch = {0};
@@ -71,7 +72,8 @@ gbt_status image_score(const image *a, const image *photo, const unsigned char *
     return metric_flip(a, photo, &out->flip, flip_map, err);
 }
 
-gbt_status image_score_photo(image *render, image *photo, const unsigned char *valid, bool exposure, image *flip_map, image_scores *out, gbt_error *err)
+gbt_status image_score_photo(image *render, image *photo, const unsigned char *valid, bool exposure, image *flip_map, image_scores *out,
+                             gbt_error *err)
 {
     image_scores whole;
     if (exposure) {

@@ -21,7 +21,8 @@ enum {
     ATTRIBUTE_ONE = 256        /* a coefficient of 1 */
 };
 
-/** Expected value of column c in a row: (bias + sum of weight x input) / ATTRIBUTE_ONE. Inputs: column c of the neighbours, columns 0 .. c - 1
+/** Expected value of column c in a row: (bias + sum of weight x input) / ATTRIBUTE_ONE. Inputs: column c of the neighbours, columns 0 .. c
+ * - 1
     of the row. */
 typedef struct attribute_rule {
     int32_t bias;

@@ -126,7 +126,8 @@ static container_section *add_section(container_writer *w, const char *name, con
             base_fail(failure, GBT_ERR_ARGUMENT, "section %s: added twice", name);
             return NULL;
         }
-    if (mem_reserve((void **)&w->sections, &w->capacity, w->count, w->count + 1, sizeof *w->sections, "container sections", failure) != GBT_OK)
+    if (mem_reserve((void **)&w->sections, &w->capacity, w->count, w->count + 1, sizeof *w->sections, "container sections",
+                    failure) != GBT_OK)
         return NULL;
     container_section *s = &w->sections[w->count++];
     memset(s, 0, sizeof *s);
@@ -152,7 +153,8 @@ void container_add_small(container_writer *w, const char *name, container_dtype 
     if (s == NULL)
         return;
     if (s->byte_count > CONTAINER_SMALL_BYTES) {
-        base_fail(&w->failure, GBT_ERR_ARGUMENT, "section %s: %zu bytes are not small (at most %d)", name, s->byte_count, CONTAINER_SMALL_BYTES);
+        base_fail(&w->failure, GBT_ERR_ARGUMENT, "section %s: %zu bytes are not small (at most %d)", name, s->byte_count,
+                  CONTAINER_SMALL_BYTES);
         return;
     }
     memcpy(s->small, data, s->byte_count);
@@ -225,24 +227,27 @@ void container_writer_free(container_writer *w)
 static gbt_status check_header(const unsigned char *bytes, size_t byte_count, const char *path, header *h, gbt_error *err)
 {
     if (byte_count < sizeof *h)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: too short for a gbtrace file (wanted at least %zu bytes, got %zu)", path, sizeof *h, byte_count);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: too short for a gbtrace file (wanted at least %zu bytes, got %zu)", path, sizeof *h,
+                         byte_count);
     memcpy(h, bytes, sizeof *h);
     if (memcmp(h->magic, magic, sizeof magic) != 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s@0: not a gbtrace file (wanted \"GBTMODEL\")", path);
     if (h->crc != checksum(h, sizeof *h - sizeof h->crc))
         return base_fail(err, GBT_ERR_FORMAT, "%s@0: the header is damaged (checksum)", path);
     if (h->version != VERSION)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@8: written by another version of gbtrace (wanted format %d, got %u)", path, VERSION, h->version);
+        return base_fail(err, GBT_ERR_FORMAT, "%s@8: written by another version of gbtrace (wanted format %d, got %u)", path, VERSION,
+                         h->version);
     if (h->file_bytes != byte_count)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: the file is %s (wanted %llu bytes, got %zu)", path, byte_count < h->file_bytes ? "cut short" : "too long",
-                         (unsigned long long)h->file_bytes, byte_count);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: the file is %s (wanted %llu bytes, got %zu)", path,
+                         byte_count < h->file_bytes ? "cut short" : "too long", (unsigned long long)h->file_bytes, byte_count);
     if (h->section_count > CONTAINER_MAX_SECTIONS || h->section_count > (byte_count - sizeof *h) / sizeof(table_row))
         return base_fail(err, GBT_ERR_FORMAT, "%s@12: %u sections cannot be in %zu bytes", path, h->section_count, byte_count);
     return GBT_OK;
 }
 
 /** Row `i` of the table to a section; `*end` is where the parts before it end and is moved on. */
-static gbt_status check_row(const unsigned char *bytes, size_t byte_count, const char *path, size_t i, size_t *end, container_section *s, gbt_error *err)
+static gbt_status check_row(const unsigned char *bytes, size_t byte_count, const char *path, size_t i, size_t *end, container_section *s,
+                            gbt_error *err)
 {
     const size_t place = sizeof(header) + i * sizeof(table_row);
     table_row row;
@@ -253,8 +258,8 @@ static gbt_status check_row(const unsigned char *bytes, size_t byte_count, const
     if (row.dtype > CONTAINER_U8 || dtype_size(s->dtype) == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s: unknown type %u", path, place, row.name, row.dtype);
     if (row.dim_count < 1 || row.dim_count > CONTAINER_MAX_DIMS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s: bad number of dimensions (wanted 1 to %d, got %u)", path, place, row.name,
-                         CONTAINER_MAX_DIMS, row.dim_count);
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s: bad number of dimensions (wanted 1 to %d, got %u)", path, place,
+                         row.name, CONTAINER_MAX_DIMS, row.dim_count);
     s->dim_count = (int)row.dim_count;
     for (int d = 0; d < s->dim_count; d++)
         s->dims[d] = row.dims[d];
@@ -334,10 +339,12 @@ static void describe(container_dtype dtype, int dim_count, const size_t *dims, c
 {
     size_t used = (size_t)snprintf(out, size, "%s", dtype_name(dtype));
     for (int i = 0; i < dim_count && used < size; i++)
-        used += (size_t)(dims[i] == CONTAINER_ANY ? snprintf(out + used, size - used, "[*]") : snprintf(out + used, size - used, "[%zu]", dims[i]));
+        used += (size_t)(dims[i] == CONTAINER_ANY ? snprintf(out + used, size - used,
+                                                             "[*]") : snprintf(out + used, size - used, "[%zu]", dims[i]));
 }
 
-gbt_status container_find(const container *c, const char *name, container_dtype dtype, int dim_count, size_t *dims, const void **data, gbt_error *err)
+gbt_status container_find(const container *c, const char *name, container_dtype dtype, int dim_count, size_t *dims, const void **data,
+                          gbt_error *err)
 {
     *data = NULL;
     const container_section *s = container_section_named(c, name);
@@ -372,7 +379,8 @@ gbt_status container_get_text(const container *c, const char *name, char *out, s
     const void *data;
     GBT_TRY(container_find(c, name, CONTAINER_U8, 1, &length, &data, err));
     if (length >= size)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: section %s: the text is too long (wanted at most %zu bytes, got %zu)", c->path, name, size - 1, length);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: section %s: the text is too long (wanted at most %zu bytes, got %zu)", c->path, name,
+                         size - 1, length);
     if (memchr(data, 0, length) != NULL)
         return base_fail(err, GBT_ERR_FORMAT, "%s: section %s: a zero byte in a text", c->path, name);
     memcpy(out, data, length);

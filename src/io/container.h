@@ -102,7 +102,8 @@ const container_section *container_section_named(const container *c, const char 
  * @param data [out]    borrowed until container_free(); aligned for its type; NULL on failure
  * @return GBT_OK or GBT_ERR_FORMAT with file, section, wanted and got
  */
-gbt_status container_find(const container *c, const char *name, container_dtype dtype, int dim_count, size_t *dims, const void **data, gbt_error *err);
+gbt_status container_find(const container *c, const char *name, container_dtype dtype, int dim_count, size_t *dims, const void **data,
+                          gbt_error *err);
 
 /** Copy a vector of exactly `count` values out. */
 gbt_status container_get(const container *c, const char *name, container_dtype dtype, size_t count, void *out, gbt_error *err);

@@ -65,7 +65,8 @@ static gbt_status read_parts(const model_parts *parts, const char *path, const u
         coder_read_start(c, bytes, part_bytes[part]);
         status = model_parts_code(parts, (code_part)part, c, err);
         if (status == GBT_ERR_FORMAT || (status == GBT_OK && !coder_read_whole(c)))
-            status = base_fail(err, GBT_ERR_FORMAT, "%s: section coded.bytes: the part \"%s\" is not what its model codes to", path, names[part]);
+            status = base_fail(err, GBT_ERR_FORMAT, "%s: section coded.bytes: the part \"%s\" is not what its model codes to", path,
+                               names[part]);
     }
     mem_free(c);
     return status;
@@ -96,7 +97,8 @@ gbt_status model_code(const model *m, const model_steps *steps, model_coded *out
                               [SHAPE_OFFSETS] = (uint32_t)a->offset_count, [SHAPE_PIXELS] = m->anchor_pixel != NULL, [SHAPE_LEVELS] = 0};
     memcpy(out->shape, shape, sizeof shape);
     model_parts parts = {0};
-    gbt_status status = model_parts_make(&parts, a->count, a->offset_count, m->anchor_pixel != NULL, m->decoder.has_distance, steps != NULL, err);
+    gbt_status status = model_parts_make(&parts, a->count, a->offset_count, m->anchor_pixel != NULL, m->decoder.has_distance, steps != NULL,
+                                         err);
     if (status == GBT_OK)
         status = model_parts_fill(&parts, m, steps, err);
     out->shape[SHAPE_LEVELS] = (uint32_t)parts.grid.levels;
@@ -141,13 +143,16 @@ bool model_is_coded(const container *c)
 static gbt_status check_shape(const char *path, const uint32_t shape[SHAPE_NUMBERS], size_t bytes, gbt_error *err)
 {
     if (shape[SHAPE_FORM] != FORM_COARSE && shape[SHAPE_FORM] != FORM_LOSSLESS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: section coded.shape: coded by another version of gbtrace (wanted form 1 or 2, got %u)", path,
-                         shape[SHAPE_FORM]);
-    if (shape[SHAPE_OFFSETS] < 1 || shape[SHAPE_OFFSETS] > ANCHOR_MAX_OFFSETS || shape[SHAPE_PIXELS] > 1 || shape[SHAPE_LEVELS] > POSITION_LEVELS_MAX)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: section coded.shape: %u offsets per anchor, pixel sizes %u, %u levels (wanted 1 to %d, 0 or 1, 0 to %d)",
+        return base_fail(err, GBT_ERR_FORMAT, "%s: section coded.shape: coded by another version of gbtrace (wanted form 1 or 2, got %u)",
+                         path, shape[SHAPE_FORM]);
+    if (shape[SHAPE_OFFSETS] < 1 || shape[SHAPE_OFFSETS] > ANCHOR_MAX_OFFSETS || shape[SHAPE_PIXELS] > 1 ||
+        shape[SHAPE_LEVELS] > POSITION_LEVELS_MAX)
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: section coded.shape: %u offsets per anchor, pixel sizes %u, %u levels (wanted 1 to %d, 0 or 1, 0 to %d)",
                          path, shape[SHAPE_OFFSETS], shape[SHAPE_PIXELS], shape[SHAPE_LEVELS], ANCHOR_MAX_OFFSETS, POSITION_LEVELS_MAX);
     if (shape[SHAPE_COUNT] > ANCHORS_ANYWAY && (shape[SHAPE_COUNT] - ANCHORS_ANYWAY) / ANCHORS_PER_BYTE > bytes)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: section coded.shape: %u anchors cannot be in %zu bytes", path, shape[SHAPE_COUNT], bytes);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: section coded.shape: %u anchors cannot be in %zu bytes", path, shape[SHAPE_COUNT],
+                         bytes);
     return GBT_OK;
 }
 
@@ -173,7 +178,8 @@ static gbt_status read_sizes(const container *c, uint32_t part_bytes[CODE_PARTS]
     GBT_TRY(container_get(c, "coded.parts", CONTAINER_U32, CODE_PARTS, part_bytes, err));
     for (int part = 0; part < CODE_PARTS; part++)
         sum += part_bytes[part];
-    return sum == size ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "%s: section coded.parts: the parts do not add up to %zu bytes", c->path, size);
+    return sum == size ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "%s: section coded.parts: the parts do not add up to %zu bytes", c->path,
+                                            size);
 }
 
 gbt_status model_decode(const container *c, bool has_distance, model *out, gbt_error *err)
@@ -187,7 +193,8 @@ gbt_status model_decode(const container *c, bool has_distance, model *out, gbt_e
     GBT_TRY(read_sizes(c, part_bytes, size, err));
     const bool coarse = shape[SHAPE_FORM] == FORM_COARSE;
     model_parts parts = {0};
-    gbt_status status = model_parts_make(&parts, shape[SHAPE_COUNT], (int)shape[SHAPE_OFFSETS], shape[SHAPE_PIXELS] == 1, has_distance, coarse, err);
+    gbt_status status = model_parts_make(&parts, shape[SHAPE_COUNT], (int)shape[SHAPE_OFFSETS], shape[SHAPE_PIXELS] == 1, has_distance,
+                                         coarse, err);
     parts.grid.levels = (int)shape[SHAPE_LEVELS];
     if (status == GBT_OK && coarse)
         status = read_steps(c, &parts, err);

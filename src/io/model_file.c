@@ -18,7 +18,8 @@ static void add_scene(container_writer *w, const model *m)
 {
     const decoder *d = &m->decoder;
     container_add_small(w, "decoder.has_distance", CONTAINER_U8, 1, &(uint8_t){d->has_distance ? 1 : 0});
-    container_add_small(w, "decoder.numbers", CONTAINER_F32, DECODER_NUMBERS, (float[DECODER_NUMBERS]){d->distance_scale, d->distance_min, d->distance_max});
+    container_add_small(w, "decoder.numbers", CONTAINER_F32, DECODER_NUMBERS,
+                        (float[DECODER_NUMBERS]){d->distance_scale, d->distance_min, d->distance_max});
     container_add_small(w, "scene.origin", CONTAINER_F64, 3, m->origin);
     container_add_small(w, "scene.numbers", CONTAINER_F32, SCENE_NUMBERS,
                         (float[SCENE_NUMBERS]){m->voxel_size, m->extent, m->t_near, m->background[0], m->background[1], m->background[2]});
@@ -55,16 +56,16 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
     const anchors *a = &m->anchors;
     const decoder *d = &m->decoder;
     if (a->offset_count < 1 || a->offset_count > ANCHOR_MAX_OFFSETS)
-        return base_fail(err, failure, "%s: section anchor.offset: bad number of offsets per anchor (wanted 1 to %d, got %d)", path, ANCHOR_MAX_OFFSETS,
-                         a->offset_count);
+        return base_fail(err, failure, "%s: section anchor.offset: bad number of offsets per anchor (wanted 1 to %d, got %d)", path,
+                         ANCHOR_MAX_OFFSETS, a->offset_count);
     if (a->count > UINT32_MAX / ANCHOR_MAX_OFFSETS) /* Gaussians have 32-bit ids */
         return base_fail(err, failure, "%s: section anchor.position: too many anchors (wanted at most %u, got %zu)", path,
                          UINT32_MAX / ANCHOR_MAX_OFFSETS, a->count);
     decoder_part parts[3];
     decoder_parts(d, parts);
     if (d->offset_count != a->offset_count || d->param_count != parts[2].end)
-        return base_fail(err, failure, "%s: section decoder.params does not fit %d offsets per anchor (wanted %zu values, got %zu)", path, a->offset_count,
-                         parts[2].end, d->param_count);
+        return base_fail(err, failure, "%s: section decoder.params does not fit %d offsets per anchor (wanted %zu values, got %zu)", path,
+                         a->offset_count, parts[2].end, d->param_count);
     const struct { const char *section; const float *values; size_t count; } arrays[] = {
         {"anchor.position", a->position, a->count * 3},
         {"anchor.feature", a->feature, a->count * ANCHOR_FEATURE_DIM},
@@ -72,7 +73,8 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
         {"anchor.scale_log", a->scale_log, a->count * 6},
         {"anchor.pixel", m->anchor_pixel, m->anchor_pixel != NULL ? a->count : 0},
         {"decoder.params", d->params, d->param_count},
-        {"scene.numbers", &m->voxel_size, 1}, {"scene.numbers", &m->extent, 1}, {"scene.numbers", &m->t_near, 1}, {"scene.numbers", m->background, 3},
+        {"scene.numbers", &m->voxel_size, 1}, {"scene.numbers", &m->extent, 1}, {"scene.numbers", &m->t_near, 1},
+        {"scene.numbers", m->background, 3},
         {"decoder.numbers", &d->distance_scale, 1},
     };
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
@@ -83,8 +85,8 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
     if (isnan(d->distance_min) || isnan(d->distance_max)) /* infinite: not limited */
         return base_fail(err, failure, "%s: section decoder.numbers: the trained range of distances is not a number", path);
     if (m->voxel_size < 0 || m->extent < 0 || m->t_near < 0)
-        return base_fail(err, failure, "%s: section scene.numbers: a length is negative (voxel %g, extent %g, near %g)", path, (double)m->voxel_size,
-                         (double)m->extent, (double)m->t_near);
+        return base_fail(err, failure, "%s: section scene.numbers: a length is negative (voxel %g, extent %g, near %g)", path,
+                         (double)m->voxel_size, (double)m->extent, (double)m->t_near);
     for (int i = 0; i < 3; i++)
         if (!isfinite(m->origin[i]))
             return base_fail(err, failure, "%s: section scene.origin: value %d is not finite", path, i);
@@ -179,8 +181,8 @@ static gbt_status read_anchors(const container *c, anchors *a, gbt_error *err)
     k = shape[1];
     GBT_TRY(container_find(c, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){count, 6}, &scale_log, err));
     if (k < 1 || k > ANCHOR_MAX_OFFSETS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: section anchor.offset: bad number of offsets per anchor (wanted 1 to %d, got %zu)", c->path,
-                         ANCHOR_MAX_OFFSETS, k);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: section anchor.offset: bad number of offsets per anchor (wanted 1 to %d, got %zu)",
+                         c->path, ANCHOR_MAX_OFFSETS, k);
     a->offset_count = (int)k;
     GBT_TRY(anchors_resize(a, count, err));
     if (count > 0) {

@@ -12,7 +12,8 @@ enum { MODEL_FOLDER_SIZE = 1024, MODEL_CONFIG_SIZE = 4096 };
 
 typedef struct model {
     anchors anchors;
-    float *anchor_pixel;   /* optional (NULL), [anchors.count]: smallest pixel with which training saw an anchor, scene units, >= 0; 0: none did */
+    float *anchor_pixel;   /* optional (NULL), [anchors.count]: smallest pixel with which training saw an anchor, scene units, >= 0; 0: none
+                              did */
     decoder decoder;       /* decoder.offset_count equals anchors.offset_count */
     double origin[3];      /* world = local + origin */
     float voxel_size;      /* v, scene units, >= 0 */
@@ -41,8 +42,8 @@ struct model_steps;
  * before anything is written.
  *
  * @param path  [in]  NULL: write nothing, only measure
- * @param steps [in]  of this model (io/model_steps.h): anchors are put in order of their positions, values are rounded. NULL: lossless, all bits
- *                    and the order are kept
+ * @param steps [in]  of this model (io/model_steps.h): anchors are put in order of their positions, values are rounded. NULL: lossless, all
+ *                    bits and the order are kept
  * @param sizes [out] optional (NULL)
  * @return also GBT_ERR_ARGUMENT for values that no steps can hold, GBT_ERR_INTERNAL when the comparison fails
  */

@@ -35,7 +35,8 @@ gbt_status model_parts_make(model_parts *p, size_t count, int offset_count, bool
 {
     decoder_part networks[3];
     decoder_parts(&(decoder){.offset_count = offset_count, .has_distance = has_distance}, networks);
-    *p = (model_parts){.coarse = coarse, .count = count, .offset_count = offset_count, .has_distance = has_distance, .param_count = networks[2].end};
+    *p = (model_parts){.coarse = coarse, .count = count, .offset_count = offset_count, .has_distance = has_distance,
+                       .param_count = networks[2].end};
     if (coarse)
         return make_coarse(p, has_pixel, err);
     p->anchors.offset_count = offset_count;
@@ -252,7 +253,8 @@ static void spread_columns(const model_parts *p, int first, int width, float *ou
 {
     for (size_t i = 0; i < p->count; i++)
         for (int c = 0; c < width; c++)
-            out[i * (size_t)width + (size_t)c] = (float)p->table.value[i * (size_t)p->table.columns + (size_t)(first + c)] * p->step[first + c];
+            out[i * (size_t)width + (size_t)c] = (float)p->table.value[i * (size_t)p->table.columns +
+                                                                       (size_t)(first + c)] * p->step[first + c];
 }
 
 gbt_status model_parts_to_model(const model_parts *p, model *out, gbt_error *err)

@@ -107,7 +107,8 @@ static double guess_gradient(const gaussians *g, size_t i, uint64_t view, gaussi
 {
     const float x = g->scale_x[i], y = g->scale_y[i], z = g->scale_z[i];
     const float most = fmaxf(x, fmaxf(y, z)), least = fminf(x, fminf(y, z)), middle = fmaxf(fminf(x, y), fminf(fmaxf(x, y), z));
-    const float opacity = fmaxf(g->opacity[i], 0), root = sqrtf(most * middle), seen = root * opacity, turn = 0.5f * seen * logf(most / least);
+    const float opacity = fmaxf(g->opacity[i], 0), root = sqrtf(most * middle), seen = root * opacity,
+        turn = 0.5f * seen * logf(most / least);
     const float half = 0.5f * seen, move = half / middle;
     float *const fields[] = {out->opacity, out->red,     out->green,   out->blue,   out->mean_x, out->mean_y, out->mean_z,
                              out->scale_x, out->scale_y, out->scale_z, out->quat_w, out->quat_x, out->quat_y, out->quat_z};
@@ -130,7 +131,8 @@ static gbt_status guess_view(const model *m, guess *g, uint64_t view, model_sens
     const anchors *a = &m->anchors;
     float camera[3];
     guess_camera(m, view, camera);
-    GBT_TRY(decode_forward(a, &m->decoder, camera, g->visible, a->count, -0.3f, &g->drawn, &g->tape, err)); /* and what is about to be drawn */
+    /* and what is about to be drawn */
+    GBT_TRY(decode_forward(a, &m->decoder, camera, g->visible, a->count, -0.3f, &g->drawn, &g->tape, err));
     GBT_TRY(gaussians_resize(&g->gradient, g->drawn.count, err));
     gaussians_zero(&g->gradient);
     double covered = 0;

@@ -13,7 +13,9 @@
 #include "gbtrace/status.h"
 #include "io/model_file.h"
 
-/** Between _start() and _end() sums over pictures, then: mean squared change of a pixel per squared change of the parameter of one anchor. */
+/**
+ * Between _start() and _end() sums over pictures, then: mean squared change of a pixel per squared change of the parameter of one anchor.
+ */
 typedef struct model_sensitivity {
     size_t count;  /* anchors */
     double values; /* pixels x 3 of all pictures, of a moment: 1 after _end() */
@@ -34,7 +36,10 @@ gbt_status model_sensitivity_start(model_sensitivity *s, size_t count, gbt_error
  */
 void model_sensitivity_add(model_sensitivity *s, const anchors *a, const anchors *gradient, double values);
 
-/** Sums to means. Directions of the features that hardly count are made to count a little: what is far beyond their linear range is not known. */
+/**
+ * Sums to means. Directions of the features that hardly count are made to count a little: what is far beyond their linear range is not
+ * known.
+ */
 void model_sensitivity_end(model_sensitivity *s);
 
 /**
@@ -51,7 +56,8 @@ void model_sensitivity_free(model_sensitivity *s);
  * Turn the features of a model into the basis in which the fewest bits code them, and its networks with them: f becomes T (f - mean f),
  * W1 becomes W1 T^-1. The model decodes to the same Gaussians but for rounding. `s` is turned too.
  *
- * T^-T S T^-1 is a multiple of 1 (noise counts the same in every direction) and T C T^T is diagonal, falling (C: covariance of the features).
+ * T^-T S T^-1 is a multiple of 1 (noise counts the same in every direction) and T C T^T is diagonal, falling (C: covariance of the
+ * features).
  */
 gbt_status model_turn_features(model *m, model_sensitivity *s, gbt_error *err);
 

@@ -54,7 +54,8 @@ position_grid position_grid_over(const float *position, size_t count, double cel
         side = fmax(side, (double)high[k] - (double)grid.origin[k]);
     while (grid.levels < POSITION_LEVELS_MAX && side > cell_wanted * ldexp(1, grid.levels))
         grid.levels++;
-    const double least = side / ldexp(1, grid.levels) * (1 + 1e-6); /* else the wanted size itself: the box is not cut finer than asked for */
+    const double least = side / ldexp(1, grid.levels) * (1 + 1e-6); /* else the wanted size itself: the box is not cut finer than asked
+                                                                       for */
     grid.cell = (float)fmin(fmax(fmax(least, cell_wanted), 1e-37), 1e38);
     return grid;
 }
@@ -152,8 +153,8 @@ static unsigned code_children(range_coder *c, tree_models *m, int level, unsigne
 }
 
 /* The children of all nodes of one level. `codes`: the points, when writing. */
-static gbt_status code_level(range_coder *c, tree_models *m, int level, int levels, const node_list *nodes, const uint64_t *codes, size_t count,
-                             node_list *next)
+static gbt_status code_level(range_coder *c, tree_models *m, int level, int levels, const node_list *nodes, const uint64_t *codes,
+                             size_t count, node_list *next)
 {
     const int shift = 3 * (levels - level - 1);
     size_t point = 0;

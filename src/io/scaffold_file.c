@@ -18,7 +18,7 @@ enum { PATH_SIZE = 4096, DIMENSIONS = 3, SCALES = 6, NETWORKS = 3, VIEW_INPUTS =
 static const char *const network_names[NETWORKS] = {"opacity", "cov", "color"}; /* in the order of decoder_parts() */
 static const size_t outputs_per_offset[NETWORKS] = {1, 7, 3};
 
-/* ---- anchors ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- anchors ------------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct anchor_rows {
     anchors *out;
@@ -83,7 +83,8 @@ static gbt_status read_anchors(const source_file *file, anchors *out, size_t *dr
     GBT_TRY(find_columns(file, &header, vertex, "f_offset_", 0, columns, &used, err));
     const size_t offsets = used - fixed;
     if (offsets == 0 || offsets % DIMENSIONS != 0 || offsets / DIMENSIONS > ANCHOR_MAX_OFFSETS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: %zu properties f_offset_ (wanted 3 for each of 1 to %d offsets)", file->name, offsets, (int)ANCHOR_MAX_OFFSETS);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %zu properties f_offset_ (wanted 3 for each of 1 to %d offsets)", file->name, offsets,
+                         (int)ANCHOR_MAX_OFFSETS);
     out->offset_count = (int)(offsets / DIMENSIONS);
     const uint64_t count = header.elements[vertex].count;
     if (count > (file->size - header.data_at) / used) /* a column takes at least a byte */
@@ -94,7 +95,8 @@ static gbt_status read_anchors(const source_file *file, anchors *out, size_t *dr
     out->count = 0; /* of rows that are usable */
     GBT_TRY(ply_read_rows(file, &header, vertex, columns, used, add_row, &rows, err));
     *dropped = rows.dropped;
-    return out->count > 0 ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable anchor (%zu rows dropped)", file->name, rows.dropped);
+    return out->count > 0 ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable anchor (%zu rows dropped)", file->name,
+                                               rows.dropped);
 }
 
 /* Positions relative to their median, so that floats keep what they have. */
@@ -115,7 +117,7 @@ static gbt_status recentre(anchors *a, double origin[DIMENSIONS], gbt_error *err
     return GBT_OK;
 }
 
-/* ---- networks --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- networks ------------------------------------------------------------------------------------------------------------------------ */
 
 /* Two layers, as the file has them. */
 typedef struct network {
@@ -133,17 +135,19 @@ static gbt_status check_shape(const char *path, const char *name, const tensor *
 {
     return t->rows == rows && t->columns == columns
                ? GBT_OK
-               : base_fail(err, GBT_ERR_FORMAT, "%s: array %s is %zu x %zu (wanted %zu x %zu)", path, name, t->rows, t->columns, rows, columns);
+               : base_fail(err, GBT_ERR_FORMAT, "%s: array %s is %zu x %zu (wanted %zu x %zu)", path, name, t->rows, t->columns, rows,
+                           columns);
 }
 
 static gbt_status parse_network(const source_file *file, size_t outputs, network *out, gbt_error *err)
 {
-    const struct { const char *name; tensor *place; } parts[] = {{"0.weight", &out->w1}, {"0.bias", &out->b1}, {"2.weight", &out->w2}, {"2.bias", &out->b2}};
+    const struct { const char *name; tensor *place; } parts[] = {{"0.weight", &out->w1}, {"0.bias", &out->b1}, {"2.weight", &out->w2},
+                                                                 {"2.bias", &out->b2}};
     for (int i = 0; i < 4; i++)
         GBT_TRY(safetensors_read(file, parts[i].name, parts[i].place, err));
     if (out->w1.columns > VIEW_INPUTS + 1)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: 0.weight takes %zu inputs (wanted %d or %d: an appearance embedding is not supported)", file->name,
-                         out->w1.columns, (int)VIEW_INPUTS, VIEW_INPUTS + 1);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: 0.weight takes %zu inputs (wanted %d or %d: an appearance embedding is not supported)",
+                         file->name, out->w1.columns, (int)VIEW_INPUTS, VIEW_INPUTS + 1);
     const size_t in = out->w1.columns == VIEW_INPUTS + 1 ? VIEW_INPUTS + 1 : VIEW_INPUTS;
     GBT_TRY(check_shape(file->name, "0.weight", &out->w1, ANCHOR_HIDDEN_DIM, in, err));
     GBT_TRY(check_shape(file->name, "0.bias", &out->b1, 1, ANCHOR_HIDDEN_DIM, err));
@@ -159,8 +163,10 @@ static gbt_status load_network(const char *folder, const char *name, size_t outp
     snprintf(file_name, sizeof file_name, "%s_mlp.pt", name);
     GBT_TRY(file_join(pickle, sizeof pickle, folder, file_name, err));
     if (!file_exists(path) && file_exists(pickle))
-        return base_fail(err, GBT_ERR_IO, "%.150s: missing; make it there of the .pt: python3 -c \"import torch; from safetensors.torch import save_file; "
-                         "[save_file(torch.jit.load(n + '_mlp.pt', 'cpu').state_dict(), n + '_mlp.safetensors') for n in ('opacity', 'cov', 'color')]\"", path);
+        return base_fail(err, GBT_ERR_IO,
+                         "%.150s: missing; make it there of the .pt: python3 -c \"import torch; from safetensors.torch import save_file; "
+                         "[save_file(torch.jit.load(n + '_mlp.pt', 'cpu').state_dict(), n + '_mlp.safetensors') for n in ('opacity', "
+                         "'cov', 'color')]\"", path);
     source_file file = {.name = path};
     unsigned char *bytes;
     GBT_TRY(file_read(path, &bytes, &file.size, err));
@@ -217,7 +223,8 @@ gbt_status scaffold_file_read(const char *ply, model *out, size_t *dropped, gbt_
     *dropped = 0;
     char folder[PATH_SIZE];
     const char *slash = strrchr(ply, '/');
-    if (snprintf(folder, sizeof folder, "%.*s", slash == NULL ? 1 : (int)(slash - ply) + 1, slash == NULL ? "." : ply) >= (int)sizeof folder)
+    if (snprintf(folder, sizeof folder, "%.*s", slash == NULL ? 1 : (int)(slash - ply) + 1,
+                 slash == NULL ? "." : ply) >= (int)sizeof folder)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", ply);
     source_file file = {.name = ply};
     unsigned char *bytes;

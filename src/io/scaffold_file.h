@@ -11,7 +11,8 @@
  * 0.bias, 2.weight and 2.bias. 32 features, 32 hidden units, up to ANCHOR_MAX_OFFSETS offsets; no feature bank, no appearance embedding.
  *
  * @param ply     [in]  path of point_cloud.ply
- * @param out     [out] anchors, decoder and origin (the median of the anchors) are set, the rest is zero; free with model_free(); zeroed on failure
+ * @param out     [out] anchors, decoder and origin (the median of the anchors) are set, the rest is zero; free with model_free(); zeroed on
+ *                      failure
  * @param dropped [out] rows with a value that is not finite
  * @return GBT_OK; GBT_ERR_IO (a file is missing; says how to make a .safetensors of a .pt), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */

@@ -20,7 +20,8 @@ gbt_status gbt_model_render(gbt_model *m, const gbt_camera *camera, int keep, co
     for (int k = 0; k < 3; k++)
         local.center[k] -= r->model.origin[k];
     GBT_TRY(frame_prepare(f, loaded_run_subject(r), &local, &r->settings, err));
-    image rgb = {.width = camera->width, .height = camera->height, .channels = 3, .pixels = out->rgb}; /* the caller's own, written in place */
+    /* the caller's own, written in place */
+    image rgb = {.width = camera->width, .height = camera->height, .channels = 3, .pixels = out->rgb};
     const trace_outputs outputs = {.rgb = &rgb, .depth = out->depth, .transmittance = out->transmittance};
     GBT_TRY(trace_forward(&f->scene, &f->rays, keep != 0, &outputs, NULL, err));
     m->kept = keep != 0;

@@ -60,7 +60,8 @@ static inline void blend_block(tile_job *job, const ewa_chunk *chunk, size_t fir
     ewa_block b = *state; /* a copy, which can stay in registers */
     uint16_t *const blocks = job->blocks;
     const raster_settings *settings = &job->view->settings;
-    const f16 alpha_min = f16_set1(settings->alpha_min), alpha_max = f16_set1(settings->alpha_max), stop_at = f16_set1(settings->transmittance_min);
+    const f16 alpha_min = f16_set1(settings->alpha_min), alpha_max = f16_set1(settings->alpha_max),
+        stop_at = f16_set1(settings->transmittance_min);
     const f16 zero = f16_set1(0);
     uint64_t blended = 0;
     int i = 0;
@@ -154,7 +155,8 @@ typedef struct ewa_return {
     f16 d_rgb[3], stop;
 } ewa_return;
 
-static inline void return_through(const tile_job *job, const splat *s, const float at[2], int block, f16 number, ewa_return *b, f16 sum[EWA_SUMS])
+static inline void return_through(const tile_job *job, const splat *s, const float at[2], int block, f16 number, ewa_return *b,
+                                  f16 sum[EWA_SUMS])
 {
     const raster_settings *settings = &job->view->settings;
     const f16 alpha_max = f16_set1(settings->alpha_max), zero = f16_set1(0);

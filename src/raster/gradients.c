@@ -49,10 +49,10 @@ static one_gaussian read_gaussian(const gaussians *g, size_t i)
     return out;
 }
 
-/* One row of the projection (x or y), with ratio = X / Z: the image point is focal ratio + shift, the axes' image focal / Z (a_row - k a_z), and
-   k is the ratio kept within limits. Sets dL/d(X or Y) and adds to dL/dZ. */
-static void return_row(double focal, double ratio, double k, double z_inverse, const double a[3], const double az[3], double d_point, const double d_y[3],
-                       double *d_x, double *d_z)
+/* One row of the projection (x or y), with ratio = X / Z: the image point is focal ratio + shift, the axes' image focal / Z (a_row - k
+   a_z), and k is the ratio kept within limits. Sets dL/d(X or Y) and adds to dL/dZ. */
+static void return_row(double focal, double ratio, double k, double z_inverse, const double a[3], const double az[3], double d_point,
+                       const double d_y[3], double *d_x, double *d_z)
 {
     const double gain = focal * z_inverse;
     double d_gain = 0, d_k = 0;
@@ -68,7 +68,8 @@ static shape_gradient return_ewa(const raster_view *view, const one_gaussian *g,
     const double unit = 1 / HALF_LOG2_E, l[3] = {(double)s->chol[0], (double)s->chol[1], (double)s->chol[2]};
     const double d_point[2] = {-unit * l[0] * sum[1], -unit * (l[1] * sum[1] + l[2] * sum[2])};
     const double half = 0.5 * unit * unit, uu = half * sum[3], uv = half * sum[4], vv = half * sum[5];
-    const double dxx = l[0] * l[0] * uu, dxy = l[0] * (l[1] * uu + l[2] * uv), dyy = l[1] * l[1] * uu + 2 * l[1] * l[2] * uv + l[2] * l[2] * vv;
+    const double dxx = l[0] * l[0] * uu, dxy = l[0] * (l[1] * uu + l[2] * uv),
+        dyy = l[1] * l[1] * uu + 2 * l[1] * l[2] * uv + l[2] * l[2] * vv;
     double t[3], axis[3][3], y[2][3], d_y[2][3], d_t[3] = {0};
     const double offset[3] = {g->mean[0] - view->center[0], g->mean[1] - view->center[1], g->mean[2] - view->center[2]};
     dmat_apply(view->rotation, offset, t);
@@ -115,7 +116,8 @@ static void store_gradient(const one_gaussian *g, const shape_gradient *d, size_
     const double wx = d->p[1][2] * (s[1] * inverse[2] - s[2] * inverse[1]), wy = d->p[2][0] * (s[2] * inverse[0] - s[0] * inverse[2]);
     const double wz = d->p[0][1] * (s[0] * inverse[1] - s[1] * inverse[0]);
     out->mean_x[i] = (float)d->mean[0], out->mean_y[i] = (float)d->mean[1], out->mean_z[i] = (float)d->mean[2];
-    out->scale_x[i] = (float)(d->p[0][0] * inverse[0]), out->scale_y[i] = (float)(d->p[1][1] * inverse[1]), out->scale_z[i] = (float)(d->p[2][2] * inverse[2]);
+    out->scale_x[i] = (float)(d->p[0][0] * inverse[0]), out->scale_y[i] = (float)(d->p[1][1] * inverse[1]),
+        out->scale_z[i] = (float)(d->p[2][2] * inverse[2]);
     /* dL/dq = 2 q (0, dL/domega), a quaternion product: tangent to the unit sphere */
     out->quat_w[i] = (float)(-2 * (q[1] * wx + q[2] * wy + q[3] * wz));
     out->quat_x[i] = (float)(2 * (q[0] * wx + q[2] * wz - q[3] * wy));

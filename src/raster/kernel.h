@@ -67,8 +67,8 @@ typedef struct tile_tape {
     size_t used;                                       /* EWA: entries that were looked at */
 } tile_tape;
 
-/* Sums that a tile leaves per pair. EWA, with q = dL/d(log alpha), 0 where alpha is cut: q, q u, q v, q u u, q u v, q v v; colour; weight T alpha.
-   Per ray: q, q v (3), q v v (xx yy zz yz zx xy); colour; weight. */
+/* Sums that a tile leaves per pair. EWA, with q = dL/d(log alpha), 0 where alpha is cut: q, q u, q v, q u u, q u v, q v v; colour; weight T
+   alpha. Per ray: q, q v (3), q v v (xx yy zz yz zx xy); colour; weight. */
 enum { EWA_COLOR = 6, EWA_WEIGHT = 9, EWA_SUMS, RAY_COLOR = 10, RAY_WEIGHT = 13, RAY_SUMS };
 
 static inline size_t raster_sum_count(raster_form form)

@@ -9,7 +9,8 @@
 #include "base/fail.h"
 #include "base/parallel.h"
 
-enum { RADIX_BITS = 11, RADIX = 1 << RADIX_BITS, RADIX_PASSES = 3, SORT_BLOCKS = 16, PAIR_BLOCKS = 64, BLOCK_LEAST = 2048, TILE_ENTRIES = 1 << 24 };
+enum { RADIX_BITS = 11, RADIX = 1 << RADIX_BITS, RADIX_PASSES = 3, SORT_BLOCKS = 16, PAIR_BLOCKS = 64, BLOCK_LEAST = 2048,
+      TILE_ENTRIES = 1 << 24 };
 
 /* Elements per block, so that there are no more than `blocks`. */
 static size_t grain_of(size_t count, size_t blocks)
@@ -80,7 +81,8 @@ static void counts_to_places(uint32_t (*place)[RADIX], size_t blocks)
 static gbt_status number_splats(tile_lists *lists, const size_t *drawn, size_t count, gbt_error *err)
 {
     const size_t blocks = parallel_block_count(count, SPLAT_GRAIN);
-    GBT_TRY(mem_reserve((void **)&lists->key_first, &lists->key_first_capacity, 0, blocks + 1, sizeof *lists->key_first, "depth order", err));
+    GBT_TRY(mem_reserve((void **)&lists->key_first, &lists->key_first_capacity, 0, blocks + 1, sizeof *lists->key_first, "depth order",
+                        err));
     lists->splat_count = 0;
     for (size_t i = 0; i < blocks; i++) {
         lists->key_first[i] = lists->splat_count;
@@ -95,7 +97,8 @@ static gbt_status sort_by_depth(tile_lists *lists, const splat *splats, size_t g
     const size_t count = lists->splat_count, grain = grain_of(count, SORT_BLOCKS);
     GBT_TRY(mem_reserve((void **)&lists->keys, &lists->key_capacity, 0, count, sizeof *lists->keys, "depth order", err));
     GBT_TRY(mem_reserve((void **)&lists->spare, &lists->spare_capacity, 0, count, sizeof *lists->spare, "depth order", err));
-    GBT_TRY(mem_reserve((void **)&lists->histogram, &lists->histogram_capacity, 0, (size_t)SORT_BLOCKS * RADIX, sizeof *lists->histogram, "depth order", err));
+    GBT_TRY(mem_reserve((void **)&lists->histogram, &lists->histogram_capacity, 0, (size_t)SORT_BLOCKS * RADIX, sizeof *lists->histogram,
+                        "depth order", err));
     radix_job job = {.splats = splats, .key_first = lists->key_first, .to = lists->keys, .place = (uint32_t (*)[RADIX])lists->histogram};
     parallel_blocks(gaussian_count, SPLAT_GRAIN, write_keys, &job);
     for (int pass = 0; pass < RADIX_PASSES; pass++) {
@@ -140,7 +143,8 @@ static void find_pairs(size_t block, size_t begin, size_t end, void *context)
         if (i + 4 < end)
             __builtin_prefetch(splat_at(job, i + 4));
         const size_t area = (size_t)(s->box[1] - s->box[0]) * (size_t)(s->box[3] - s->box[2]);
-        if (mem_reserve((void **)&out->tiles, &out->capacity, out->count, out->count + area, sizeof *out->tiles, "raster pairs", NULL) != GBT_OK) {
+        if (mem_reserve((void **)&out->tiles, &out->capacity, out->count, out->count + area, sizeof *out->tiles, "raster pairs",
+                        NULL) != GBT_OK) {
             atomic_store(&job->failed, true);
             return;
         }
@@ -221,8 +225,8 @@ static gbt_status reserve_blocks(tile_lists *lists, size_t count, gbt_error *err
     return GBT_OK;
 }
 
-gbt_status tile_lists_make(tile_lists *lists, const raster_kernel *kernel, const raster_view *view, const splat *splats, const size_t *drawn, size_t count,
-                           gbt_error *err)
+gbt_status tile_lists_make(tile_lists *lists, const raster_kernel *kernel, const raster_view *view, const splat *splats,
+                           const size_t *drawn, size_t count, gbt_error *err)
 {
     GBT_TRY(number_splats(lists, drawn, count, err));
     GBT_TRY(sort_by_depth(lists, splats, count, err));
@@ -231,15 +235,18 @@ gbt_status tile_lists_make(tile_lists *lists, const raster_kernel *kernel, const
     job.tile_count = (size_t)view->tiles_across * (size_t)view->tiles_down;
     atomic_init(&job.failed, false);
     GBT_TRY(reserve_blocks(lists, block_count, err));
-    GBT_TRY(mem_reserve((void **)&lists->histogram, &lists->histogram_capacity, 0, block_count * job.tile_count, sizeof *lists->histogram, "raster tiles", err));
+    GBT_TRY(mem_reserve((void **)&lists->histogram, &lists->histogram_capacity, 0, block_count * job.tile_count, sizeof *lists->histogram,
+                        "raster tiles", err));
     GBT_TRY(mem_reserve((void **)&lists->first, &lists->first_capacity, 0, job.tile_count + 1, sizeof *lists->first, "raster tiles", err));
     GBT_TRY(mem_reserve((void **)&lists->ranges, &lists->range_capacity, 0, count, sizeof *lists->ranges, "raster pairs", err));
     parallel_blocks(lists->splat_count, grain, find_pairs, &job);
     if (atomic_load(&job.failed))
-        return base_fail(err, GBT_ERR_NO_MEMORY, "raster: no memory for the pairs of %zu Gaussians and %zu tiles", lists->splat_count, job.tile_count);
+        return base_fail(err, GBT_ERR_NO_MEMORY, "raster: no memory for the pairs of %zu Gaussians and %zu tiles", lists->splat_count,
+                         job.tile_count);
     GBT_TRY(place_blocks(&job, block_count, err));
     number_pairs(lists, count);
-    GBT_TRY(mem_reserve((void **)&lists->entries, &lists->entry_capacity, 0, lists->pair_count, sizeof *lists->entries, "raster pairs", err));
+    GBT_TRY(mem_reserve((void **)&lists->entries, &lists->entry_capacity, 0, lists->pair_count, sizeof *lists->entries, "raster pairs",
+                        err));
     parallel_blocks(lists->splat_count, grain, place_pairs, &job);
     return GBT_OK;
 }
@@ -248,7 +255,8 @@ void tile_lists_free(tile_lists *lists)
 {
     for (size_t i = 0; i < lists->block_capacity; i++)
         mem_free(lists->blocks[i].tiles);
-    void *const owned[] = {lists->entries, lists->first, lists->ranges, lists->key_first, lists->keys, lists->spare, lists->blocks, lists->histogram};
+    void *const owned[] = {lists->entries, lists->first, lists->ranges, lists->key_first, lists->keys, lists->spare, lists->blocks,
+                           lists->histogram};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         mem_free(owned[i]);
     memset(lists, 0, sizeof *lists);

@@ -28,7 +28,8 @@ typedef struct tile_lists {
     uint64_t *keys, *spare;
     pair_block *blocks;
     uint32_t *histogram;
-    size_t entry_capacity, first_capacity, range_capacity, key_first_capacity, key_capacity, spare_capacity, block_capacity, histogram_capacity;
+    size_t entry_capacity, first_capacity, range_capacity, key_first_capacity, key_capacity, spare_capacity, block_capacity,
+        histogram_capacity;
 } tile_lists;
 
 /**
@@ -39,8 +40,8 @@ typedef struct tile_lists {
  * @return GBT_OK, GBT_ERR_NO_MEMORY (2^32 pairs, 2^24 splats in one tile, too)
  * Threads: uses all; same lists for every thread count.
  */
-gbt_status tile_lists_make(tile_lists *lists, const raster_kernel *kernel, const raster_view *view, const splat *splats, const size_t *drawn, size_t count,
-                           gbt_error *err);
+gbt_status tile_lists_make(tile_lists *lists, const raster_kernel *kernel, const raster_view *view, const splat *splats,
+                           const size_t *drawn, size_t count, gbt_error *err);
 
 void tile_lists_free(tile_lists *lists); /* back to {0} */
 

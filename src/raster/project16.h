@@ -66,8 +66,8 @@ static inline bool is_drawable(const raster_view *view, const gaussians *g, size
 {
     const float q = g->quat_w[i] + g->quat_x[i] + g->quat_y[i] + g->quat_z[i], color = g->red[i] + g->green[i] + g->blue[i];
     const float s = g->scale_x[i] + g->scale_y[i] + g->scale_z[i], m = g->mean_x[i] + g->mean_y[i] + g->mean_z[i];
-    return g->opacity[i] >= view->settings.alpha_min && isfinite(g->opacity[i]) && isfinite(q) && isfinite(color) && isfinite(s) && isfinite(m) &&
-           g->scale_x[i] > 0 && g->scale_y[i] > 0 && g->scale_z[i] > 0;
+    return g->opacity[i] >= view->settings.alpha_min && isfinite(g->opacity[i]) && isfinite(q) && isfinite(color) && isfinite(s) &&
+           isfinite(m) && g->scale_x[i] > 0 && g->scale_y[i] > 0 && g->scale_z[i] > 0;
 }
 
 /* Tiles from that of point `low` to before that of point `high`, cut to [0, tiles]. */
@@ -113,8 +113,8 @@ static inline bool finish_ewa(const raster_view *view, const lane_splats *s, int
     return out->box[0] < out->box[1] && out->box[2] < out->box[3];
 }
 
-/* The outline of the proxy ellipsoid at `cut`, exactly: with Q its shape in camera space and m the mean, lines l of the image plane touch it
-   where l^T (m m^T - Q) l = 0, the dual of an ellipse. An ellipsoid that reaches behind the eye may be seen anywhere. */
+/* The outline of the proxy ellipsoid at `cut`, exactly: with Q its shape in camera space and m the mean, lines l of the image plane touch
+   it where l^T (m m^T - Q) l = 0, the dual of an ellipse. An ellipsoid that reaches behind the eye may be seen anywhere. */
 static inline bool store_outline(const raster_view *view, const lane_splats *s, int lane, splat *out)
 {
     const double cut = cut_square(view, out->opacity);

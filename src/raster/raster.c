@@ -25,7 +25,8 @@ struct raster_state {
     float *records;
     tile_counts *counts;
     float (*d_background)[3];
-    size_t splat_capacity, ray_capacity, drawn_capacity, tape_capacity, blocks_capacity, record_capacity, count_capacity, background_capacity;
+    size_t splat_capacity, ray_capacity, drawn_capacity, tape_capacity, blocks_capacity, record_capacity, count_capacity,
+        background_capacity;
     bool tape_kept;
 };
 
@@ -54,12 +55,14 @@ static size_t tile_count_of(const raster_view *view)
 static gbt_status check_settings(const raster_settings *s, gbt_error *err)
 {
     /* The smallest alpha and T: 2^-120 of an opacity is nothing, and T is found again by division. */
-    const bool fine = (s->form == RASTER_EWA || s->form == RASTER_PER_RAY) && s->alpha_min >= 1e-30f && s->alpha_min < 1 && s->alpha_max > 0 &&
-                      s->alpha_max < 1 && s->transmittance_min >= 1e-30f && s->transmittance_min < 1 && s->near >= 0 && isfinite(s->near) &&
-                      s->dilation >= 0 && s->dilation < 1e6f && isfinite(s->background[0] + s->background[1] + s->background[2]);
+    const bool fine = (s->form == RASTER_EWA || s->form == RASTER_PER_RAY) && s->alpha_min >= 1e-30f && s->alpha_min < 1 &&
+                      s->alpha_max > 0 && s->alpha_max < 1 && s->transmittance_min >= 1e-30f && s->transmittance_min < 1 && s->near >= 0 &&
+                      isfinite(s->near) && s->dilation >= 0 && s->dilation < 1e6f &&
+                      isfinite(s->background[0] + s->background[1] + s->background[2]);
     if (fine)
         return GBT_OK;
-    return base_fail(err, GBT_ERR_ARGUMENT, "raster: alpha in [%g, %g], T down to %g, near %g, dilation %g (wanted alpha and T in [1e-30, 1), "
+    return base_fail(err, GBT_ERR_ARGUMENT,
+                     "raster: alpha in [%g, %g], T down to %g, near %g, dilation %g (wanted alpha and T in [1e-30, 1), "
                                             "near and dilation >= 0)",
                      (double)s->alpha_min, (double)s->alpha_max, (double)s->transmittance_min, (double)s->near, (double)s->dilation);
 }
@@ -108,7 +111,8 @@ static gbt_status project_all(struct raster_state *state, gbt_error *err)
     if (count > UINT32_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "raster: %zu Gaussians (wanted at most 2^32 - 1)", count);
     GBT_TRY(mem_reserve((void **)&state->splats, &state->splat_capacity, 0, count, sizeof *state->splats, "splats", err));
-    GBT_TRY(mem_reserve((void **)&state->drawn, &state->drawn_capacity, 0, parallel_block_count(count, SPLAT_GRAIN), sizeof *state->drawn, "splats", err));
+    GBT_TRY(mem_reserve((void **)&state->drawn, &state->drawn_capacity, 0, parallel_block_count(count, SPLAT_GRAIN), sizeof *state->drawn,
+                        "splats", err));
     if (state->view.settings.form == RASTER_PER_RAY)
         GBT_TRY(mem_reserve((void **)&state->rays, &state->ray_capacity, 0, count, sizeof *state->rays, "splats", err));
     parallel_blocks(count, SPLAT_GRAIN, project_block, state);
@@ -177,9 +181,9 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
         return;
     memset(state->d_background[index], 0, sizeof *state->d_background);
     tile_job job = {.view = &state->view, .splats = state->splats, .rays = state->rays, .entries = state->lists.entries + first,
-                    .count = state->lists.first[index + 1] - first, .x0 = (int)(index % across) * TILE_PIXELS, .y0 = (int)(index / across) * TILE_PIXELS,
-                    .pixels = &pixels, .tape = tape ? &state->tapes[index] : NULL, .blocks = tape ? state->blocks + first : NULL,
-                    .records = state->records, .d_background = state->d_background[index]};
+                    .count = state->lists.first[index + 1] - first, .x0 = (int)(index % across) * TILE_PIXELS,
+                    .y0 = (int)(index / across) * TILE_PIXELS, .pixels = &pixels, .tape = tape ? &state->tapes[index] : NULL,
+                    .blocks = tape ? state->blocks + first : NULL, .records = state->records, .d_background = state->d_background[index]};
     if (!(p->d_rgb == NULL ? forward_tile(p, &job, &scratch) : backward_tile(p, &job, &scratch)))
         atomic_store(&p->failed, true);
     state->counts[index] = job.counts;
@@ -193,11 +197,13 @@ static gbt_status run_pass(pass *p, gbt_error *err)
     struct raster_state *state = p->state;
     const size_t count = tile_count_of(&state->view);
     GBT_TRY(mem_reserve((void **)&state->counts, &state->count_capacity, 0, count, sizeof *state->counts, "raster tiles", err));
-    GBT_TRY(mem_reserve((void **)&state->d_background, &state->background_capacity, 0, count, sizeof *state->d_background, "raster tiles", err));
+    GBT_TRY(mem_reserve((void **)&state->d_background, &state->background_capacity, 0, count, sizeof *state->d_background, "raster tiles",
+                        err));
     atomic_init(&p->failed, false);
     parallel_blocks(count, 1, run_tile, p);
     if (atomic_load(&p->failed))
-        return base_fail(err, GBT_ERR_NO_MEMORY, "raster: no memory for the hits of a %d x %d image", state->view.width, state->view.height);
+        return base_fail(err, GBT_ERR_NO_MEMORY, "raster: no memory for the hits of a %d x %d image", state->view.width,
+                         state->view.height);
     return GBT_OK;
 }
 
@@ -209,12 +215,12 @@ static void add_counters(const struct raster_state *state, raster_counters *coun
         counters->tests += state->counts[i].tests, counters->blended += state->counts[i].blended;
 }
 
-gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera, const raster_settings *settings, bool keep_tape,
-                          image *rgb, float *transmittance, raster_counters *counters, gbt_error *err)
+gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera, const raster_settings *settings,
+                          bool keep_tape, image *rgb, float *transmittance, raster_counters *counters, gbt_error *err)
 {
     if (rgb->width != camera->width || rgb->height != camera->height || rgb->channels != 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "raster: image is %d x %d x %d (wanted %d x %d x 3)", rgb->width, rgb->height, rgb->channels,
-                         camera->width, camera->height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "raster: image is %d x %d x %d (wanted %d x %d x 3)", rgb->width, rgb->height,
+                         rgb->channels, camera->width, camera->height);
     if (scene->state == NULL && (scene->state = mem_calloc(1, sizeof *scene->state, "rasterizer", err)) == NULL)
         return GBT_ERR_NO_MEMORY;
     struct raster_state *state = scene->state;
@@ -224,8 +230,10 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
     state->source = g;
     GBT_TRY(project_all(state, err));
     if (keep_tape) {
-        GBT_TRY(mem_reserve((void **)&state->tapes, &state->tape_capacity, 0, tile_count_of(&state->view), sizeof *state->tapes, "raster tape", err));
-        GBT_TRY(mem_reserve((void **)&state->blocks, &state->blocks_capacity, 0, state->lists.pair_count, sizeof *state->blocks, "raster tape", err));
+        GBT_TRY(mem_reserve((void **)&state->tapes, &state->tape_capacity, 0, tile_count_of(&state->view), sizeof *state->tapes,
+                            "raster tape", err));
+        GBT_TRY(mem_reserve((void **)&state->blocks, &state->blocks_capacity, 0, state->lists.pair_count, sizeof *state->blocks,
+                            "raster tape", err));
     }
     pass p = {.state = state, .keep_tape = keep_tape, .rgb = rgb, .transmittance = transmittance};
     GBT_TRY(run_pass(&p, err));
@@ -235,15 +243,16 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
     return GBT_OK;
 }
 
-gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err)
+gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight, float d_background[3],
+                           gbt_error *err)
 {
     struct raster_state *state = scene->state;
     if (state == NULL || !state->tape_kept)
         return base_fail(err, GBT_ERR_ARGUMENT, "raster: adjoint without a forward pass that kept its tape");
     const raster_view *view = &state->view;
     if (d_rgb->width != view->width || d_rgb->height != view->height || d_rgb->channels != 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "raster: gradient is %d x %d x %d (wanted %d x %d x 3)", d_rgb->width, d_rgb->height, d_rgb->channels,
-                         view->width, view->height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "raster: gradient is %d x %d x %d (wanted %d x %d x 3)", d_rgb->width, d_rgb->height,
+                         d_rgb->channels, view->width, view->height);
     const size_t floats = state->lists.pair_count * raster_sum_count(view->settings.form);
     GBT_TRY(mem_reserve((void **)&state->records, &state->record_capacity, 0, floats, sizeof *state->records, "raster gradients", err));
     pass p = {.state = state, .d_rgb = d_rgb};
@@ -262,7 +271,8 @@ void raster_scene_free(raster_scene *scene)
     if (state == NULL)
         return;
     tile_lists_free(&state->lists);
-    void *const owned[] = {state->splats, state->rays, state->drawn, state->tapes, state->blocks, state->records, state->counts, state->d_background};
+    void *const owned[] = {state->splats, state->rays, state->drawn, state->tapes, state->blocks, state->records, state->counts,
+                           state->d_background};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         mem_free(owned[i]);
     mem_free(state);

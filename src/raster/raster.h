@@ -48,7 +48,8 @@ bool raster_takes(const gbt_camera *camera);
 /**
  * Draw `g` as `camera` sees it.
  *
- * @param g             [in]  borrowed until the last pass over this view; padded (gaussians_pad). Those with non-finite fields are not drawn
+ * @param g             [in]  borrowed until the last pass over this view; padded (gaussians_pad). Those with non-finite fields are not
+ *                            drawn
  * @param camera        [in]  PINHOLE or SIMPLE_PINHOLE
  * @param keep_tape     [in]  true when raster_backward() will follow
  * @param rgb           [out] 3 channels, size of the camera, allocated by the caller; with the background
@@ -57,16 +58,17 @@ bool raster_takes(const gbt_camera *camera);
  * @return GBT_OK, GBT_ERR_ARGUMENT (a camera with another lens, settings out of range, size of rgb), GBT_ERR_NO_MEMORY (2^32 pairs of
  *         Gaussian and tile, 2^24 Gaussians in one tile, too)
  * Threads: uses all; same bits for every thread count and instruction set. Formulas, and what differs from other rasterizers:
- * docs/crosscheck.md. Memory: about 92 bytes per Gaussian (per ray: 172), 12 per pair; for the adjoint 42 (58) more per pair and 8 per pixel.
+ * docs/crosscheck.md. Memory: about 92 bytes per Gaussian (per ray: 172), 12 per pair; for the adjoint 42 (58) more per pair and 8 per
+ * pixel.
  */
-gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera, const raster_settings *settings, bool keep_tape,
-                          image *rgb, float *transmittance, raster_counters *counters, gbt_error *err);
+gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera, const raster_settings *settings,
+                          bool keep_tape, image *rgb, float *transmittance, raster_counters *counters, gbt_error *err);
 
 /**
  * Adjoint of the last raster_forward(keep_tape); the tape is kept, so it may be called again.
  *
- * The gradient is that of the formulas: exactly 0 where alpha is cut at alpha_max, and where x / z is kept at its limit in the Jacobian. Per
- * ray the depth of the response is a constant of the derivative (envelope theorem, trace/reference.h).
+ * The gradient is that of the formulas: exactly 0 where alpha is cut at alpha_max, and where x / z is kept at its limit in the Jacobian.
+ * Per ray the depth of the response is a constant of the derivative (envelope theorem, trace/reference.h).
  *
  * @param d_rgb        [in]  dL/d(rgb)
  * @param d_gaussians  [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion tangent)
@@ -74,7 +76,8 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
  * @param d_background [out] optional (NULL), [3], overwritten
  * Threads: uses all; same bits for every thread count.
  */
-gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err);
+gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight, float d_background[3],
+                           gbt_error *err);
 
 void raster_scene_free(raster_scene *scene);
 

@@ -115,8 +115,8 @@ static int by_depth_then_id(const void *a, const void *b)
     return p->id < q->id ? -1 : p->id > q->id;
 }
 
-static gbt_status flatten_all(const raster_reference *scene, const gbt_camera *camera, const raster_settings *s, lens *l, flat **out, size_t *count,
-                              gbt_error *err)
+static gbt_status flatten_all(const raster_reference *scene, const gbt_camera *camera, const raster_settings *s, lens *l, flat **out,
+                              size_t *count, gbt_error *err)
 {
     GBT_TRY(read_lens(camera, l, err));
     *count = 0;
@@ -144,7 +144,8 @@ static double response(const raster_reference *scene, const raster_settings *s, 
 }
 
 /* Front to back. Returns how many Gaussians of the list were passed. */
-static size_t blend(const raster_reference *scene, const raster_settings *s, const flat *all, size_t count, int x, int y, double rgb[3], double *T)
+static size_t blend(const raster_reference *scene, const raster_settings *s, const flat *all, size_t count, int x, int y, double rgb[3],
+                    double *T)
 {
     size_t i = 0;
     *T = 1;
@@ -177,13 +178,13 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
     const forward_job *job = context;
     for (size_t i = begin; i < end; i++) {
         double T;
-        blend(job->scene, job->s, job->all, job->count, (int)(i % (size_t)job->across) * job->step, (int)(i / (size_t)job->across) * job->step,
-              job->rgb + 3 * i, &T);
+        blend(job->scene, job->s, job->all, job->count, (int)(i % (size_t)job->across) * job->step,
+              (int)(i / (size_t)job->across) * job->step, job->rgb + 3 * i, &T);
     }
 }
 
-gbt_status raster_reference_forward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings, int step, double *rgb,
-                                    gbt_error *err)
+gbt_status raster_reference_forward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings, int step,
+                                    double *rgb, gbt_error *err)
 {
     lens l;
     forward_job job = {.scene = scene, .s = settings, .across = (camera->width + step - 1) / step, .step = step, .rgb = rgb};
@@ -197,7 +198,8 @@ gbt_status raster_reference_forward(const raster_reference *scene, const gbt_cam
 }
 
 /* Chain from dL/dp of one Gaussian on one pixel to its fields, matrix by matrix. */
-static void respond_backward(const raster_reference *scene, const gbt_camera *camera, const lens *l, const flat *f, int x, int y, double d_p, double *d)
+static void respond_backward(const raster_reference *scene, const gbt_camera *camera, const lens *l, const flat *f, int x, int y,
+                             double d_p, double *d)
 {
     const size_t n = scene->count, i = f->id;
     const double delta[2] = {f->point[0] - x, f->point[1] - y};
@@ -244,8 +246,8 @@ static void respond_backward(const raster_reference *scene, const gbt_camera *ca
         d[(size_t)(QUAT + c) * n + i] += d_q[c] - off * q[c];
 }
 
-static void pixel_backward(const raster_reference *scene, const gbt_camera *camera, const lens *l, const raster_settings *s, const flat *all, size_t count,
-                           int x, int y, const double d_rgb[3], double *d_fields, double d_background[3])
+static void pixel_backward(const raster_reference *scene, const gbt_camera *camera, const lens *l, const raster_settings *s,
+                           const flat *all, size_t count, int x, int y, const double d_rgb[3], double *d_fields, double d_background[3])
 {
     double rgb[3], T, behind[3];
     const size_t n = scene->count, passed = blend(scene, s, all, count, x, y, rgb, &T);
@@ -270,8 +272,8 @@ static void pixel_backward(const raster_reference *scene, const gbt_camera *came
     }
 }
 
-gbt_status raster_reference_backward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings, const double *d_rgb,
-                                     double *d_fields, double d_background[3], gbt_error *err)
+gbt_status raster_reference_backward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings,
+                                     const double *d_rgb, double *d_fields, double d_background[3], gbt_error *err)
 {
     lens l;
     flat *all = NULL;
@@ -279,7 +281,8 @@ gbt_status raster_reference_backward(const raster_reference *scene, const gbt_ca
     const gbt_status status = flatten_all(scene, camera, settings, &l, &all, &count, err);
     for (int y = 0; y < camera->height && status == GBT_OK; y++)
         for (int x = 0; x < camera->width; x++)
-            pixel_backward(scene, camera, &l, settings, all, count, x, y, d_rgb + 3 * ((size_t)y * (size_t)camera->width + (size_t)x), d_fields, d_background);
+            pixel_backward(scene, camera, &l, settings, all, count, x, y, d_rgb + 3 * ((size_t)y * (size_t)camera->width + (size_t)x),
+                           d_fields, d_background);
     mem_free(all);
     return status;
 }

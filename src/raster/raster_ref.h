@@ -13,7 +13,9 @@
 
 #include "raster/raster.h"
 
-/** Gaussians in double, so that differences can move them by less than a float can hold: [GAUSSIANS_FIELD_COUNT][count], fields in order. */
+/**
+ * Gaussians in double, so that differences can move them by less than a float can hold: [GAUSSIANS_FIELD_COUNT][count], fields in order.
+ */
 typedef struct raster_reference {
     size_t count;
     double *fields; /* owned; free with mem_free() */
@@ -30,12 +32,12 @@ gbt_status raster_reference_make(const gaussians *g, raster_reference *out, gbt_
  * @return GBT_OK, GBT_ERR_ARGUMENT (a camera with another lens), GBT_ERR_NO_MEMORY
  * Threads: parallel over pixels; same bits for every thread count. Cost: about 5 ns for each pair of pixel and Gaussian.
  */
-gbt_status raster_reference_forward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings, int step, double *rgb,
-                                    gbt_error *err);
+gbt_status raster_reference_forward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings, int step,
+                                    double *rgb, gbt_error *err);
 
 /** Adjoint with step 1: adds dL/dfield (scales linear, quaternion tangent) and dL/dbackground. One thread. */
-gbt_status raster_reference_backward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings, const double *d_rgb,
-                                     double *d_fields, double d_background[3], gbt_error *err);
+gbt_status raster_reference_backward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings,
+                                     const double *d_rgb, double *d_fields, double d_background[3], gbt_error *err);
 
 /** Pixels that raster_reference_forward() computes. */
 static inline size_t raster_reference_pixels(const gbt_camera *camera, int step)

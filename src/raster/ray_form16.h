@@ -59,7 +59,8 @@ static inline f16 dot_rays(const f16 a[3], const f16 b[3])
 
 static inline ray_response ray_respond(const ray_splat *g, float opacity, const block_rays *rays, float t_near)
 {
-    const f16 da = f16_sub(rays->a, f16_set1((float)(g->a0 - rays->middle[0]))), db = f16_sub(rays->b, f16_set1((float)(g->b0 - rays->middle[1])));
+    const f16 da = f16_sub(rays->a, f16_set1((float)(g->a0 - rays->middle[0]))),
+        db = f16_sub(rays->b, f16_set1((float)(g->b0 - rays->middle[1])));
     ray_response r;
     f16 w[3], y[3];
     for (int k = 0; k < 3; k++) {
@@ -82,7 +83,8 @@ static inline ray_response ray_respond(const ray_splat *g, float opacity, const 
 /* Which blocks does every entry of the tile reach. False when memory ran out. */
 static inline bool find_reached(const tile_job *job, ray_scratch *scratch)
 {
-    if (mem_reserve((void **)&scratch->reached, &scratch->reached_capacity, 0, job->count, sizeof *scratch->reached, "entries of a tile", NULL) != GBT_OK)
+    if (mem_reserve((void **)&scratch->reached, &scratch->reached_capacity, 0, job->count, sizeof *scratch->reached, "entries of a tile",
+                    NULL) != GBT_OK)
         return false;
     for (size_t e = 0; e < job->count; e++) {
         const splat *s = &job->splats[job->entries[e].splat];
@@ -108,7 +110,8 @@ static inline bool gather_rows(tile_job *job, int block, const block_rays *rays,
         job->counts.tests += PIXEL_LANES;
         if (!m16_any(hit))
             continue;
-        if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, *count, *count + 1, sizeof(ray_row), "rows of a block", NULL) != GBT_OK)
+        if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, *count, *count + 1, sizeof(ray_row), "rows of a block",
+                        NULL) != GBT_OK)
             return false;
         ray_row *row = &scratch->rows[(*count)++];
         f16_store(row->t, r.t), f16_store(row->alpha, f16_select(hit, f16_min(r.raw, f16_set1(settings->alpha_max)), f16_set1(0)));

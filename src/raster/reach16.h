@@ -49,7 +49,8 @@ static size_t reach(const raster_view *view, const splat *s, uint32_t *tiles)
         for (int x = x0; x < x1; x += 4) {
             const int columns = x1 - x < 4 ? x1 - x : 4, rows = y1 - y < 4 ? y1 - y : 4;
             const unsigned inside = (0xFu >> (4 - columns)) * 0x1111u & 0xFFFFu >> (16 - 4 * rows);
-            unsigned bits = reached_squares(s, (float)(s->center[0] - x * TILE_PIXELS), (float)(s->center[1] - y * TILE_PIXELS), TILE_PIXELS) & inside;
+            unsigned bits = reached_squares(s, (float)(s->center[0] - x * TILE_PIXELS), (float)(s->center[1] - y * TILE_PIXELS),
+                                            TILE_PIXELS) & inside;
             for (; bits != 0; bits &= bits - 1) {
                 const int i = __builtin_ctz(bits);
                 tiles[count++] = (uint32_t)((y + i / 4) * view->tiles_across + x + i % 4);

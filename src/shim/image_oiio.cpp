@@ -312,8 +312,8 @@ gbt_status read_raw(const char *path, opened_image *o, image *out, image_names *
     for (const OIIO::TypeDesc &type : spec.channelformats)
         is_float = is_float && type == OIIO::TypeFloat;
     if (!is_float || std::strcmp(o->input->format_name(), "openexr") != 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: %s with samples of type %s (wanted an EXR of 32-bit floats)", path, o->input->format_name(),
-                         spec.format.c_str());
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %s with samples of type %s (wanted an EXR of 32-bit floats)", path,
+                         o->input->format_name(), spec.format.c_str());
     if (spec.nchannels > IMAGE_RAW_CHANNELS)
         return base_fail(err, GBT_ERR_FORMAT, "%s: %d channels (wanted at most %d)", path, spec.nchannels, int(IMAGE_RAW_CHANNELS));
     for (int c = 0; c < spec.nchannels; c++)

@@ -6,7 +6,8 @@
 #include <fenv.h>
 #include <pthread.h>
 #include <stdatomic.h>
-#include <unistd.h>
+
+#include "base/machine.h"
 
 enum { MAX_THREADS = 64 };
 
@@ -29,8 +30,9 @@ int parallel_threads(void)
 {
     if (thread_count > 0)
         return thread_count;
-    const long online = sysconf(_SC_NPROCESSORS_ONLN);
-    return online < 1 ? 1 : online > MAX_THREADS ? MAX_THREADS : (int)online;
+    const machine m = machine_read("");
+    const int usable = machine_threads(&m);
+    return usable > MAX_THREADS ? MAX_THREADS : usable;
 }
 
 static void *work(void *argument)

@@ -5,13 +5,17 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <mutex>
 
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
-#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 #include <tbb/version.h>
+
+extern "C" {
+#include "base/machine.h"
+}
 
 static std::unique_ptr<tbb::global_control> limit;
 static int thread_count = 0;
@@ -29,9 +33,25 @@ try {
 
 extern "C" int parallel_threads(void)
 try {
-    return thread_count > 0 ? thread_count : tbb::info::default_concurrency();
+    if (thread_count > 0)
+        return thread_count;
+    static const int usable = [] {
+        const machine m = machine_read("");
+        return machine_threads(&m);
+    }();
+    return usable;
 } catch (...) {
     return 1;
+}
+
+/* oneTBB counts processors and knows nothing of the quotas of containers. */
+static void limit_once()
+{
+    static std::once_flag once;
+    std::call_once(once, [] {
+        if (thread_count == 0)
+            parallel_set_threads(parallel_threads());
+    });
 }
 
 /* The default floating-point environment as long as it lives. Embree switches its workers, which are ours too, to flush denormals to
@@ -50,6 +70,7 @@ class default_float_environment {
 
 extern "C" void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *context)
 try {
+    limit_once();
     const size_t blocks = parallel_block_count(count, grain);
     const auto run = [=](size_t block) {
         const default_float_environment environment;

@@ -10,7 +10,8 @@
 #include "trace/view16.h"
 
 /* What one hit, or the sixteen of a row, add to a Gaussian's record. */
-static inline void gradient_terms(f16 d_alpha, f16 raw, f16 weight, const f16 v_in[3], f16 opacity, f16 alpha_max, const f16 d_rgb[3], f16 terms[16])
+static inline void gradient_terms(f16 d_alpha, f16 raw, f16 weight, const f16 v_in[3], f16 opacity, f16 alpha_max, const f16 d_rgb[3],
+                                  f16 terms[16])
 {
     /* alpha = min(alpha_max, opacity G): from the cap on nothing but the colour has a gradient. */
     const f16 zero = f16_set1(0), d_raw = f16_select(f16_lt(raw, alpha_max), d_alpha, zero);
@@ -22,7 +23,8 @@ static inline void gradient_terms(f16 d_alpha, f16 raw, f16 weight, const f16 v_
     f16 g[3];
     for (int k = 0; k < 3; k++)
         terms[GRADIENT_V + k] = g[k] = f16_mul(d_d2, v[k]), terms[GRADIENT_VV + k] = f16_mul(g[k], v[k]);
-    terms[GRADIENT_VV + 3] = f16_mul(g[1], v[2]), terms[GRADIENT_VV + 4] = f16_mul(g[2], v[0]), terms[GRADIENT_VV + 5] = f16_mul(g[0], v[1]);
+    terms[GRADIENT_VV + 3] = f16_mul(g[1], v[2]), terms[GRADIENT_VV + 4] = f16_mul(g[2], v[0]),
+        terms[GRADIENT_VV + 5] = f16_mul(g[0], v[1]);
     terms[GRADIENT_OPACITY] = f16_div(f16_mul(raw, d_raw), opacity);
     for (int c = 0; c < 3; c++)
         terms[GRADIENT_COLOR + c] = f16_mul(weight, d_rgb[c]);
@@ -70,17 +72,21 @@ typedef struct adjoint_rows {
 
 static bool reserve_rows(int count, kernel_scratch *scratch, adjoint_rows *out)
 {
-    const size_t n = ((size_t)count + 16 + ROW_BLOCK) & ~(size_t)15, wide = n * PACKET_LANES, groups = n / 16 * (sizeof(adjoint_group) / sizeof(float));
-    if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, (FIELD_COUNT + 5) * wide + 5 * n + groups, sizeof(float), "adjoint rows", NULL) !=
+    const size_t n = ((size_t)count + 16 + ROW_BLOCK) & ~(size_t)15, wide = n * PACKET_LANES,
+        groups = n / 16 * (sizeof(adjoint_group) / sizeof(float));
+    if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, (FIELD_COUNT + 5) * wide + 5 * n + groups, sizeof(float),
+                    "adjoint rows", NULL) !=
         GBT_OK)
         return false;
     float *at = scratch->rows;
     out->group = (adjoint_group *)(void *)at, at += groups;
     for (int f = 0; f < FIELD_COUNT; f++, at += wide)
         out->field[f] = at;
-    out->term = at, out->after = at + wide, out->sorted.t = at + 2 * wide, out->sorted.clear = at + 3 * wide, out->sorted.before = at + 4 * wide;
+    out->term = at, out->after = at + wide, out->sorted.t = at + 2 * wide, out->sorted.clear = at + 3 * wide,
+        out->sorted.before = at + 4 * wide;
     at += 5 * wide;
-    out->sorted.near = at, out->sorted.far_reached = at + n, out->row_near = at + 2 * n, out->row_far = at + 3 * n, out->row = (uint32_t *)(void *)(at + 4 * n);
+    out->sorted.near = at, out->sorted.far_reached = at + n, out->row_near = at + 2 * n, out->row_far = at + 3 * n,
+        out->row = (uint32_t *)(void *)(at + 4 * n);
     out->sorted.count = count;
     return true;
 }
@@ -114,8 +120,8 @@ static void view_rows(const kernel_scene *scene, const tile_beam *beam, const ta
 }
 
 /* Evaluate the rows again; `beam` is NULL when there is no common origin. */
-static void replay_rows(const kernel_scene *scene, const packet_rays *rays, const tile_beam *beam, const tape_entry *entry, const f16 d_rgb[3],
-                        adjoint_rows *o)
+static void replay_rows(const kernel_scene *scene, const packet_rays *rays, const tile_beam *beam, const tape_entry *entry,
+                        const f16 d_rgb[3], adjoint_rows *o)
 {
     const f16 t_near = f16_set1(scene->settings.t_near), alpha_max = f16_set1(scene->settings.alpha_max);
     const f16 infinite = f16_set1(INFINITY), one = f16_set1(1), zero = f16_set1(0);
@@ -176,7 +182,8 @@ static f16 sort_rows(const tape_entry *entry, adjoint_rows *o)
     float reached = 0;
     for (int i = 0; i < s->count; i++) {
         const int row = (int)o->row[i];
-        place_row(s, i, row_load(o->field[FIELD_T], row), row_load(o->field[FIELD_CLEAR], row), o->row_near[row], o->row_far[row], &product, &reached);
+        place_row(s, i, row_load(o->field[FIELD_T], row), row_load(o->field[FIELD_CLEAR], row), o->row_near[row], o->row_far[row], &product,
+                  &reached);
     }
     end_rows(s);
     return product;
@@ -250,7 +257,8 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
         for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
             const int row = (int)o.row[first + k];
             const m16 blended = f16_lt(row_load(o.sorted.t, first + k), infinite);
-            const f16 d_alpha = f16_select(blended, f16_sub(row_load(o.field[FIELD_COLOR], row), f16_div(sum[k], row_load(o.sorted.clear, first + k))), zero);
+            const f16 d_alpha = f16_select(blended, f16_sub(row_load(o.field[FIELD_COLOR], row),
+                                                            f16_div(sum[k], row_load(o.sorted.clear, first + k))), zero);
             const f16 v[3] = {row_load(o.field[FIELD_V], row), row_load(o.field[FIELD_V + 1], row), row_load(o.field[FIELD_V + 2], row)};
             f16 terms[16];
             gradient_terms(d_alpha, row_load(o.field[FIELD_RAW], row), row_load(o.field[FIELD_WEIGHT], row), v,
@@ -271,8 +279,8 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
 }
 
 /* The hits of one ray, in order: no windows, and no division. */
-static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int lane, const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry,
-                        int count, gradient_list *out, float d_background[3], kernel_scratch *scratch)
+static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int lane, const float d_rgb_in[3][PACKET_LANES],
+                        const tape_entry *entry, int count, gradient_list *out, float d_background[3], kernel_scratch *scratch)
 {
     enum { RAW, V, COLOR = V + 3, OPACITY, T, D_ALPHA, FIELDS };
     const size_t n = ((size_t)count + 15) & ~(size_t)15;
@@ -350,8 +358,8 @@ static bool backward(const kernel_scene *scene, const tile_rays *tile, float d_r
     const tape_entry *next = entry, *end = entry + count;
     for (int p = 0; p < TILE_PACKETS; p++) {
         if ((singles >> p & 1) == 0) {
-            if (rays[p].active != 0 && !packet_adjoint(scene, &rays[p], seen ? &beam : NULL, d_rgb[p], at[p] - of_packet[p], (int)of_packet[p], out,
-                                                       d_background, scratch))
+            if (rays[p].active != 0 && !packet_adjoint(scene, &rays[p], seen ? &beam : NULL, d_rgb[p], at[p] - of_packet[p],
+                                                       (int)of_packet[p], out, d_background, scratch))
                 return false;
             continue;
         }

@@ -1,7 +1,7 @@
 /* trace/beam16.h -- the beam of a tile and of its packets: which nodes and which ellipsoids can they touch. Conservative, never exact.
 
-   Everything is measured in the tile's frame: axis w runs along the middle of the tile, u and v across. A ray is a + s (slope_u, slope_v, 1);
-   a beam is the four planes that hold all of its rays. Included by tile_kernel.inc.h. */
+   Everything is measured in the tile's frame: axis w runs along the middle of the tile, u and v across. A ray is a + s (slope_u, slope_v,
+   1); a beam is the four planes that hold all of its rays. Included by tile_kernel.inc.h. */
 #ifndef GBT_TRACE_BEAM16_H
 #define GBT_TRACE_BEAM16_H
 
@@ -208,7 +208,8 @@ static inline unsigned test_ellipsoids(const packet_beam *b, const ellipsoids16 
 {
     m16 outside = m16_from_bits(0);
     for (int side = 0; side < 4; side++) {
-        const f16 slope = f16_set1(b->slope[side]), x = side < 2 ? e->u : e->v, xx = side < 2 ? e->uu : e->vv, xw = side < 2 ? e->uw : e->vw;
+        const f16 slope = f16_set1(b->slope[side]), x = side < 2 ? e->u : e->v, xx = side < 2 ? e->uu : e->vv,
+            xw = side < 2 ? e->uw : e->vw;
         const f16 across = f16_fnma(slope, e->w, x); /* x - slope w */
         const f16 beyond = side % 2 == 0 ? f16_sub(f16_set1(-b->limit[side]), across) : f16_sub(across, f16_set1(b->limit[side]));
         const f16 reach = f16_fma(slope, f16_fma(slope, e->ww, f16_sub(f16_set1(0), f16_add(xw, xw))), xx);
@@ -225,7 +226,8 @@ static inline f16 ellipsoid_nearest(const ellipsoids16 *e, const tile_beam *b, f
 }
 
 /* How far an ellipsoid reaches in slopes as seen from the frame's origin, its tangent planes through there: low and high of u, low and high
-   of v. Returned are the lanes that lie wholly in front of the depth `near`; the slopes are theirs alone. `open`: what coordinates may be off. */
+   of v. Returned are the lanes that lie wholly in front of the depth `near`; the slopes are theirs alone. `open`: what coordinates may be
+   off. */
 static inline m16 ellipsoid_slopes(const ellipsoids16 *e, float near, float open, f16 slope[4])
 {
     const f16 in_front = f16_sub(e->w, f16_set1(near));

@@ -29,8 +29,8 @@ static void visit_gaussian(uint32_t id, unsigned lanes, void *user)
     f16_store(t, r.t), f16_store(alpha, f16_min(raw, f16_set1(v->scene->settings.alpha_max)));
     v->counters->tests += (uint64_t)__builtin_popcount(lanes);
     kernel_scratch *s = v->scratch;
-    if (v->failed || mem_reserve((void **)&s->lane_hits, &s->lane_hit_capacity, v->count, v->count + PACKET_LANES, sizeof *s->lane_hits, "hits of a packet",
-                                 NULL) != GBT_OK) {
+    if (v->failed || mem_reserve((void **)&s->lane_hits, &s->lane_hit_capacity, v->count, v->count + PACKET_LANES, sizeof *s->lane_hits,
+                                 "hits of a packet", NULL) != GBT_OK) {
         v->failed = true;
         return;
     }
@@ -44,7 +44,8 @@ static void visit_gaussian(uint32_t id, unsigned lanes, void *user)
 /* The hits, those of lane 0 first; end[lane]: where those of a lane end. In the place of scratch->rows. NULL without memory. */
 static ray_hit *by_lane(kernel_scratch *s, size_t count, size_t end[PACKET_LANES])
 {
-    if (mem_reserve((void **)&s->rows, &s->row_capacity, 0, count * (sizeof(ray_hit) / sizeof(float)), sizeof(float), "hits of a packet", NULL) != GBT_OK)
+    if (mem_reserve((void **)&s->rows, &s->row_capacity, 0, count * (sizeof(ray_hit) / sizeof(float)), sizeof(float), "hits of a packet",
+                    NULL) != GBT_OK)
         return NULL;
     ray_hit *out = (ray_hit *)(void *)s->rows;
     for (size_t i = 0; i < count; i++)
@@ -59,8 +60,8 @@ static ray_hit *by_lane(kernel_scratch *s, size_t count, size_t end[PACKET_LANES
     return out;
 }
 
-static bool embree_packet(const kernel_scene *scene, const packet_rays *rays, unsigned packet, packet_output *out, hit_tape *tape, kernel_scratch *scratch,
-                          kernel_counters *counters)
+static bool embree_packet(const kernel_scene *scene, const packet_rays *rays, unsigned packet, packet_output *out, hit_tape *tape,
+                          kernel_scratch *scratch, kernel_counters *counters)
 {
     ray_lanes ray;
     load_rays(rays, &ray);

@@ -151,7 +151,7 @@ void footprint_adjoint(const footprint_view *view, double variance, double pixel
     d->quat[3] += 2 * (q[0] * omega[2] + q[1] * omega[1] - q[2] * omega[0]);
 }
 
-/* ---- arrays ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- arrays -------------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct widen_job {
     const footprint_view *view;
@@ -197,12 +197,14 @@ static void adjoint_block(size_t block, size_t begin, size_t end, void *context)
         footprint_adjoint(job->view, job->variance, pixel_min_of(job, i), &one, &back);
         d->mean_x[i] = (float)back.mean[0], d->mean_y[i] = (float)back.mean[1], d->mean_z[i] = (float)back.mean[2];
         d->scale_x[i] = (float)back.scale[0], d->scale_y[i] = (float)back.scale[1], d->scale_z[i] = (float)back.scale[2];
-        d->quat_w[i] = (float)back.quat[0], d->quat_x[i] = (float)back.quat[1], d->quat_y[i] = (float)back.quat[2], d->quat_z[i] = (float)back.quat[3];
+        d->quat_w[i] = (float)back.quat[0], d->quat_x[i] = (float)back.quat[1], d->quat_y[i] = (float)back.quat[2],
+            d->quat_z[i] = (float)back.quat[3];
         d->opacity[i] = (float)back.opacity;
     }
 }
 
-gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min, const gaussians *g, gaussians *out, gbt_error *err)
+gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min, const gaussians *g, gaussians *out,
+                             gbt_error *err)
 {
     GBT_TRY(gaussians_copy(g, out, err));
     widen_job job = {view, (double)variance, pixel_min, g, out};

@@ -16,7 +16,8 @@
 typedef struct footprint_view {
     enum footprint_kind { FOOTPRINT_PERSPECTIVE, FOOTPRINT_ANGULAR, FOOTPRINT_PARALLEL } kind;
     double center[3], axis[3]; /* of the camera; axis: forward, unit */
-    double pixel;              /* size of a pixel at distance 1: on the axis (perspective), everywhere (angular); at any distance (parallel) */
+    double pixel;              /* size of a pixel at distance 1: on the axis (perspective), everywhere (angular); at any distance
+                                  (parallel) */
 } footprint_view;
 
 /** Distorted lenses are taken as the lens without distortion. A camera that sees nothing has pixels of size 0. */
@@ -45,7 +46,8 @@ void footprint_adjoint(const footprint_view *view, double variance, double pixel
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count. Cost: about 50 ns per Gaussian.
  */
-gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min, const gaussians *g, gaussians *out, gbt_error *err);
+gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min, const gaussians *g, gaussians *out,
+                             gbt_error *err);
 
 /** Adjoint of footprint_forward(): `d` holds dL/d(out), and then dL/d(g). Colours keep their gradient. */
 void footprint_backward(const footprint_view *view, float variance, const float *pixel_min, const gaussians *g, gaussians *d);

@@ -41,7 +41,8 @@ gradient_record *gradient_list_find(gradient_list *list, uint32_t id)
         if (record->id == id)
             return record;
     }
-    if (mem_reserve((void **)&list->records, &list->capacity, list->count, list->count + 1, sizeof *list->records, "gradient records", NULL) != GBT_OK)
+    if (mem_reserve((void **)&list->records, &list->capacity, list->count, list->count + 1, sizeof *list->records, "gradient records",
+                    NULL) != GBT_OK)
         return NULL;
     list->slots[at] = (uint32_t)++list->count;
     gradient_record *record = &list->records[list->count - 1];
@@ -110,8 +111,8 @@ static void reduce_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *lists, size_t list_count, const gaussians *g, const float *records,
-                            gaussians *out, float *weight, gbt_error *err)
+gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *lists, size_t list_count, const gaussians *g,
+                            const float *records, gaussians *out, float *weight, gbt_error *err)
 {
     size_t total = 0;
     for (size_t i = 0; i < list_count; i++)

@@ -31,8 +31,8 @@ typedef struct gradient_order {
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count.
  */
-gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *lists, size_t list_count, const gaussians *g, const float *records,
-                            gaussians *out, float *weight, gbt_error *err);
+gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *lists, size_t list_count, const gaussians *g,
+                            const float *records, gaussians *out, float *weight, gbt_error *err);
 
 void gradient_order_free(gradient_order *order); /* back to {0} */
 

@@ -71,7 +71,8 @@ static inline void hit_tape_free(hit_tape *tape)
 static inline bool tape_add(hit_tape *tape, tape_entry entry)
 {
     if (tape->count == tape->capacity &&
-        mem_reserve((void **)&tape->entries, &tape->capacity, tape->count, tape->capacity + tape->capacity / 2 + 512, sizeof entry, "hit tape", NULL) != GBT_OK)
+        mem_reserve((void **)&tape->entries, &tape->capacity, tape->count, tape->capacity + tape->capacity / 2 + 512, sizeof entry,
+                    "hit tape", NULL) != GBT_OK)
         return false;
     tape->entries[tape->count++] = entry;
     return true;

@@ -8,9 +8,9 @@
 /**
  * Gradient by the six numbers of a small motion of the camera, (v, omega) in camera axes as gbt_camera_moved() takes them.
  *
- * What a ray sees, and how wide its pixel is, depends on camera and Gaussians together only: a rigid motion of both changes nothing. So moving
- * the camera is moving every Gaussian the other way, and what remains is the eye that colours and shapes are decoded for, which moves along. In
- * world axes, with c the camera's centre, e the eye, q the quaternion and vec() the last three components of a quaternion:
+ * What a ray sees, and how wide its pixel is, depends on camera and Gaussians together only: a rigid motion of both changes nothing. So
+ * moving the camera is moving every Gaussian the other way, and what remains is the eye that colours and shapes are decoded for, which
+ * moves along. In world axes, with c the camera's centre, e the eye, q the quaternion and vec() the last three components of a quaternion:
  *     dL/dv     = dL/de - sum_i dL/dmu_i
  *     dL/domega = (e - c) x dL/de - sum_i [(mu_i - c) x dL/dmu_i + vec(dL/dq_i q_i*) / 2]
  * and out = (W dL/dv, W dL/domega), W the rotation from world to camera. It is exact: depth order, cut-offs and t_near move along too.

@@ -77,14 +77,16 @@ static void finish_ray(const ray_state *r, const kernel_scene *scene, int lane, 
         out->normal[k][lane] = r->normal[k];
     }
     out->transmittance[lane] = r->transmittance;
-    out->weighted_depth[lane] = r->depth, out->median_depth[lane] = r->median, out->hit_count[lane] = (float)r->blended, out->strongest[lane] = r->top_id;
+    out->weighted_depth[lane] = r->depth, out->median_depth[lane] = r->median, out->hit_count[lane] = (float)r->blended,
+        out->strongest[lane] = r->top_id;
 }
 
 static bool reserve_hits(ray_state *r, size_t more, kernel_scratch *scratch)
 {
     if (r->count + more > r->capacity) {
         const size_t wanted = r->count + more + r->capacity;
-        if (mem_reserve(&scratch->hits, &scratch->hit_bytes, r->count * sizeof *r->hits, 2 * wanted * sizeof *r->hits, 1, "hits of a ray", NULL) != GBT_OK)
+        if (mem_reserve(&scratch->hits, &scratch->hit_bytes, r->count * sizeof *r->hits, 2 * wanted * sizeof *r->hits, 1, "hits of a ray",
+                        NULL) != GBT_OK)
             return false;
         r->capacity = wanted;
     }
@@ -109,7 +111,8 @@ static void note_hit(ray_state *r, const float *record, uint32_t id, float weigh
 }
 
 /* Blend all hits nearer than `horizon`; keep the rest. */
-static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, unsigned packet, int lane, hit_tape *tape, kernel_counters *counters)
+static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, unsigned packet, int lane, hit_tape *tape,
+                       kernel_counters *counters)
 {
     sort_hits(r->hits, r->hits + r->capacity, r->count);
     size_t done = 0;
@@ -137,7 +140,8 @@ static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, u
 }
 
 /* Evaluate `count` of the waiting Gaussians, at most sixteen, from the end. */
-static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes *ray, int count, kernel_scratch *scratch, kernel_counters *counters)
+static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes *ray, int count, kernel_scratch *scratch,
+                        kernel_counters *counters)
 {
     f16 color[3];
     uint32_t id[TREE_WIDTH];
@@ -161,8 +165,8 @@ static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes
     return true;
 }
 
-static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam *beam, const ray_lanes *ray, unsigned packet, int lane, hit_tape *tape,
-                       kernel_scratch *scratch, kernel_counters *counters)
+static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam *beam, const ray_lanes *ray, unsigned packet, int lane,
+                       hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
 {
     int heap_count = 0;
     size_t round = RAY_ROUND;
@@ -183,8 +187,8 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam 
         } else {
             const tree_node *node = (const tree_node *)(uintptr_t)child;
             _Alignas(64) float entry[TREE_WIDTH];
-            if (mem_reserve((void **)&scratch->heap, &scratch->heap_capacity, (size_t)heap_count, (size_t)heap_count + TREE_WIDTH, sizeof *scratch->heap,
-                            "nodes of a ray", NULL) != GBT_OK)
+            if (mem_reserve((void **)&scratch->heap, &scratch->heap_capacity, (size_t)heap_count, (size_t)heap_count + TREE_WIDTH,
+                            sizeof *scratch->heap, "nodes of a ray", NULL) != GBT_OK)
                 return false;
             for (unsigned bits = test_children(beam, node, scene->settings.t_near, entry); bits != 0; bits &= bits - 1)
                 heap_push(scratch->heap, &heap_count, entry[__builtin_ctz(bits)], node->child[__builtin_ctz(bits)]);

@@ -33,7 +33,8 @@ static gbt_status find_channels(const char *path, const image *im, const image_n
         if (slot < 0)
             continue;
         if (channel[slot] >= 0)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: channels \"%s\" and \"%s\" name the same thing", path, names->name[channel[slot]], names->name[c]);
+            return base_fail(err, GBT_ERR_FORMAT, "%s: channels \"%s\" and \"%s\" name the same thing", path, names->name[channel[slot]],
+                             names->name[c]);
         channel[slot] = c;
         found++;
     }
@@ -41,12 +42,14 @@ static gbt_status find_channels(const char *path, const image *im, const image_n
         for (int k = 0; k < RAY_CHANNELS; k++)
             channel[k] = k;
     else if (found != RAY_CHANNELS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: %d channels, %d of them named as rays (wanted ox oy oz dx dy dz, or just six with other names)", path,
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: %d channels, %d of them named as rays (wanted ox oy oz dx dy dz, or just six with other names)", path,
                          im->channels, found);
     return GBT_OK;
 }
 
-static gbt_status take_rays(const char *path, const image *im, const int channel[RAY_CHANNELS], const double origin[3], ray_image *out, gbt_error *err)
+static gbt_status take_rays(const char *path, const image *im, const int channel[RAY_CHANNELS], const double origin[3], ray_image *out,
+                            gbt_error *err)
 {
     const size_t count = (size_t)im->width * (size_t)im->height;
     for (size_t i = 0; i < count; i++) {
@@ -57,7 +60,8 @@ static gbt_status take_rays(const char *path, const image *im, const int channel
             fine = fine && (k < 3 ? fabs(value[k]) < origin_max : isfinite(value[k])); /* both false for NaN */
         }
         if (!fine)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: pixel (%zu, %zu): ray (%g, %g, %g) -> (%g, %g, %g) (wanted finite values, origins within 1e17)", path,
+            return base_fail(err, GBT_ERR_FORMAT,
+                             "%s: pixel (%zu, %zu): ray (%g, %g, %g) -> (%g, %g, %g) (wanted finite values, origins within 1e17)", path,
                              i % (size_t)im->width, i / (size_t)im->width, value[0], value[1], value[2], value[3], value[4], value[5]);
         dvec_normalize(value + 3);
         for (int k = 0; k < 3; k++)

@@ -115,7 +115,8 @@ static void open_aperture(const ray_job *job, uint64_t pixel, double start[3], d
     uint32_t words[4];
     rng_philox(job->shot->seed, job->sample, pixel, words);
     const double radius = job->shot->aperture_radius * sqrt(job->cell.area_low + job->cell.area_span * (words[0] * 0x1p-32));
-    const double angle = 2 * PI * (job->cell.turn_low + job->cell.turn_span * (words[1] * 0x1p-32)), a = radius * cos(angle), b = radius * sin(angle);
+    const double angle = 2 * PI * (job->cell.turn_low + job->cell.turn_span * (words[1] * 0x1p-32)), a = radius * cos(angle),
+        b = radius * sin(angle);
     const double focus = job->shot->focus_distance;
     double across[3] = {1, 0, 0}, along[3] = {0, 1, 0}, reach = focus;
     if (camera_lens_looks_forward(&job->lens))

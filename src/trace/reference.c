@@ -85,8 +85,8 @@ typedef struct hit_list {
     size_t count, capacity;
 } hit_list;
 
-static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s, const double origin[3], const double dir[3], double far,
-                         hit_list *list, gbt_error *err)
+static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s, const double origin[3], const double dir[3],
+                         double far, hit_list *list, gbt_error *err)
 {
     list->count = 0;
     if (dir[0] == 0 && dir[1] == 0 && dir[2] == 0)

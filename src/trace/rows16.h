@@ -1,7 +1,7 @@
 /* trace/rows16.h -- rows: hits of one Gaussian on the sixteen rays of a packet; put in order and blended.
 
-   Nothing is sorted per ray. Rows are put in the order of their nearest depth; then, on every ray, the transmittance in front of a hit is the
-   product over the rows that end before this row begins (one running product for all of them) times the product over the few rows whose
+   Nothing is sorted per ray. Rows are put in the order of their nearest depth; then, on every ray, the transmittance in front of a hit is
+   the product over the rows that end before this row begins (one running product for all of them) times the product over the few rows whose
    depths overlap with it, compared one by one:
 
        T_i = T Q[first_i] prod { 1 - alpha_j : first_i <= j < last_i, t_j before t_i }
@@ -33,7 +33,8 @@ typedef struct packet_rows {
     packet_extra extra;
 } packet_rows;
 
-/* Rows in the order of their nearest depth, whole vectors of PACKET_LANES; ROW_BLOCK more rows follow the last, so that blocks are whole. */
+/* Rows in the order of their nearest depth, whole vectors of PACKET_LANES; ROW_BLOCK more rows follow the last, so that blocks are
+   whole. */
 typedef struct sorted_rows {
     float *t, *clear;          /* depth, infinity where there is no hit; 1 - alpha, 1 there */
     float *before;             /* Q: transmittance in front of row i if all rows before it were in front */
@@ -56,7 +57,8 @@ static inline void row_store(float *rows, int i, f16 a)
     f16_store(rows + (size_t)i * PACKET_LANES, a);
 }
 
-/* Nearest and farthest hit of each of `count` rows (room for whole sixteens), 0 for the farthest of none; returned is the nearest of all. */
+/* Nearest and farthest hit of each of `count` rows (room for whole sixteens), 0 for the farthest of none; returned is the nearest of
+   all. */
 static inline float row_depths(const float *t, int count, float *near, float *far)
 {
     const f16 infinite = f16_set1(INFINITY);
@@ -129,8 +131,10 @@ static inline void window_transmittance(const sorted_rows *o, int first, const r
     }
 }
 
-/* Sum of `term` over the hits behind those of rows first .. first + ROW_BLOCK - 1; after[i] is the sum over rows i and on, and what is behind them. */
-static inline void window_behind(const sorted_rows *o, int first, const row_window *w, const float *term, const float *after, f16 sum[ROW_BLOCK])
+/* Sum of `term` over the hits behind those of rows first .. first + ROW_BLOCK - 1; after[i] is the sum over rows i and on, and what is
+   behind them. */
+static inline void window_behind(const sorted_rows *o, int first, const row_window *w, const float *term, const float *after,
+                                 f16 sum[ROW_BLOCK])
 {
     f16 t[ROW_BLOCK];
     for (int k = 0; k < ROW_BLOCK; k++)
@@ -153,7 +157,7 @@ static inline void window_behind(const sorted_rows *o, int first, const row_wind
     }
 }
 
-/* ---- forward: the rows of one round ---------------------------------------------------------------------------------------------------- */
+/* ---- forward: the rows of one round -------------------------------------------------------------------------------------------------- */
 
 typedef struct round_rows {
     _Alignas(64) float t[(ROW_CAPACITY + ROW_BLOCK) * PACKET_LANES], clear[(ROW_CAPACITY + ROW_BLOCK) * PACKET_LANES];
@@ -170,8 +174,8 @@ static inline bool row_before(const packet_rows *p, const round_rows *o, int a, 
     return o->row_near[a] < o->row_near[b] || (o->row_near[a] == o->row_near[b] && p->id[a] < p->id[b]);
 }
 
-/* order[place] = number of the key that comes there: as many keys are smaller. Room for 16 more keys is overwritten. True when some keys are
-   equal; they are in the order of their numbers then. */
+/* order[place] = number of the key that comes there: as many keys are smaller. Room for 16 more keys is overwritten. True when some keys
+   are equal; they are in the order of their numbers then. */
 static inline bool rank_keys(float *key, int n, uint16_t *order)
 {
     const int blocks = (n + 15) / 16;
@@ -225,7 +229,8 @@ static inline void arrange_rows(const packet_rows *p, float horizon, round_rows 
         const f16 t = row_load(p->t, row);
         const m16 now = f16_lt(t, limit);
         const f16 clear = f16_select(now, f16_sub(one, row_load(p->alpha, row)), one);
-        place_row(&o->sorted, i, f16_select(now, t, infinite), clear, o->row_near[row], smaller(o->row_far[row], horizon), &product, &reached);
+        place_row(&o->sorted, i, f16_select(now, t, infinite), clear, o->row_near[row], smaller(o->row_far[row], horizon), &product,
+                  &reached);
     }
     end_rows(&o->sorted);
 }

@@ -17,7 +17,8 @@ typedef struct trace_settings {
 
 static inline trace_settings trace_settings_default(void)
 {
-    return (trace_settings){.alpha_min = 1.0f / 255.0f, .alpha_max = 0.99f, .transmittance_min = 1e-4f, .proxy_radius = INFINITY, .t_near = 0.01f};
+    return (trace_settings){.alpha_min = 1.0f / 255.0f, .alpha_max = 0.99f, .transmittance_min = 1e-4f, .proxy_radius = INFINITY,
+                            .t_near = 0.01f};
 }
 
 /**

@@ -1,4 +1,5 @@
-/* trace/tile_kernel.inc.h -- a tile of neighbouring packets through the tree: gather, cull, evaluate, blend. Compiled once per instruction set.
+/* trace/tile_kernel.inc.h -- a tile of neighbouring packets through the tree: gather, cull, evaluate, blend. Compiled once per instruction
+   set.
 
      heap of nodes by a lower bound of t --> nearest --> inner node: its children that meet the tile, back to the heap
                                                      --> leaf: its ellipsoids that reach into the tile become candidates, which wait
@@ -42,7 +43,8 @@ static void start_packet(packet_rows *p, const packet_rays *rays)
     p->alive = m16_from_bits(rays->active);
 }
 
-static inline void append_row(packet_rows *p, uint32_t id, f16 t, f16 raw, f16 threshold, const trace_settings *settings, kernel_counters *counters)
+static inline void append_row(packet_rows *p, uint32_t id, f16 t, f16 raw, f16 threshold, const trace_settings *settings,
+                              kernel_counters *counters)
 {
     const m16 hit = m16_and(m16_and(f16_le(threshold, raw), f16_lt(t, p->far)), p->alive);
     row_store(p->t, p->count, f16_select(hit, t, f16_set1(INFINITY)));
@@ -109,7 +111,8 @@ static void note_row(packet_rows *p, const packet_rays *rays, const float *recor
 }
 
 /* Blend all hits nearer than `horizon`; keep the rest. */
-static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, const packet_rays *rays, float horizon, hit_tape *tape, round_rows *o, kernel_counters *counters)
+static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, const packet_rays *rays, float horizon, hit_tape *tape,
+                       round_rows *o, kernel_counters *counters)
 {
     if (p->count == 0 || row_depths(p->t, p->count, o->row_near, o->row_far) >= horizon)
         return true;
@@ -217,7 +220,8 @@ static inline void take_leaf(tile_state *s, const kernel_scene *scene, const tre
     }
 }
 
-/* Move candidates that may lie before the horizon (any, when there is no room to wait) from the waiting to those that are taken, nearest first. */
+/* Move candidates that may lie before the horizon (any, when there is no room to wait) from the waiting to those that are taken, nearest
+   first. */
 static void pick_candidates(tile_state *s, float horizon)
 {
     int waiting = 0, i = 0, n = 0;
@@ -256,14 +260,16 @@ static inline unsigned packet_candidates(const tile_state *s, int packet, int fi
     return test_ellipsoids(&s->beam.packet[packet], (const ellipsoids16 *)bound) & filled;
 }
 
-static inline void evaluate(tile_state *s, const kernel_scene *scene, const packet_rays *rays, int packet, int number, kernel_counters *counters)
+static inline void evaluate(tile_state *s, const kernel_scene *scene, const packet_rays *rays, int packet, int number,
+                            kernel_counters *counters)
 {
     const uint32_t id = s->id[number];
     packet_rows *rows = &s->packet[packet];
     if (s->in_front[number / 16] >> number % 16 & 1) {
         const view_gaussians *view = &s->view[number / 16];
         const view_response r = view_respond(view, number % 16, &s->view_rays[packet]);
-        append_row(rows, id, r.t, view_alpha(view, number % 16, r.exponent), f16_set1(view->field[VIEW_THRESHOLD][number % 16]), &scene->settings, counters);
+        append_row(rows, id, r.t, view_alpha(view, number % 16, r.exponent), f16_set1(view->field[VIEW_THRESHOLD][number % 16]),
+                   &scene->settings, counters);
         return;
     }
     const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
@@ -275,7 +281,8 @@ static inline void evaluate(tile_state *s, const kernel_scene *scene, const pack
 
 /* Every live packet evaluates the candidates that reach into its beam and blends what lies before `horizon`. A packet whose rows do not fit
    is given up here. */
-static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays *rays, float horizon, hit_tape *tape, kernel_counters *counters)
+static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays *rays, float horizon, hit_tape *tape,
+                       kernel_counters *counters)
 {
     for (int first = 0; s->common_origin && first < s->count; first += 16) {
         uint32_t id[16];
@@ -291,7 +298,8 @@ static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays
         int first = 0;
         for (; first < s->count; first += 16) {
             /* No room for sixteen more: blend what the candidates that are left cannot come before. */
-            if (rows->count > ROW_CAPACITY - 16 && !blend_rows(rows, p, scene, &rays->packet[p], smaller(horizon, s->nearest[first]), tape, &s->order, counters))
+            if (rows->count > ROW_CAPACITY - 16 && !blend_rows(rows, p, scene, &rays->packet[p], smaller(horizon, s->nearest[first]), tape,
+                                                               &s->order, counters))
                 return false;
             if (rows->count > ROW_CAPACITY - 16 || !m16_any(rows->alive))
                 break;
@@ -363,8 +371,8 @@ static bool gather_tile(tile_state *s, const kernel_scene *scene, const tile_ray
 }
 
 /* The packets that are done in `done`; the others are traced ray by ray. */
-static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const tile_state *s, unsigned done, packet_output out[TILE_PACKETS], hit_tape *tape,
-                        kernel_scratch *scratch, kernel_counters *counters)
+static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const tile_state *s, unsigned done,
+                        packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
 {
     for (int p = 0; p < TILE_PACKETS; p++) {
         if (done >> p & 1) {
@@ -386,8 +394,8 @@ static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const 
     return tape == NULL || tape_add(tape, (tape_entry){0, 0, TAPE_END});
 }
 
-static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch,
-                    kernel_counters *counters)
+static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape,
+                    kernel_scratch *scratch, kernel_counters *counters)
 {
     tile_state s;
     unsigned packets = 0;
@@ -413,8 +421,8 @@ static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_out
     return finish_tile(scene, rays, &s, packets & ~s.spilled_packets, out, tape, scratch, counters);
 }
 
-static bool forward_single(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch,
-                           kernel_counters *counters)
+static bool forward_single(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape,
+                           kernel_scratch *scratch, kernel_counters *counters)
 {
     for (unsigned p = 0; p < TILE_PACKETS; p++)
         for (unsigned bits = rays->packet[p].active; bits != 0; bits &= bits - 1, counters->rays++)
@@ -423,8 +431,8 @@ static bool forward_single(const kernel_scene *scene, const tile_rays *rays, pac
     return tape == NULL || tape_add(tape, (tape_entry){0, 0, TAPE_END});
 }
 
-static bool forward_embree(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch,
-                           kernel_counters *counters)
+static bool forward_embree(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape,
+                           kernel_scratch *scratch, kernel_counters *counters)
 {
     for (unsigned p = 0; p < TILE_PACKETS; p++) {
         counters->rays += (uint64_t)__builtin_popcount(rays->packet[p].active);

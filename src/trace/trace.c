@@ -61,7 +61,8 @@ gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_setti
     scene->settings = *settings;
     scene->reach = reach;
     scene->tape_width = scene->tape_height = 0;
-    GBT_TRY(mem_reserve((void **)&scene->records, &scene->record_capacity, 0, g->count + 1, RECORD_FLOATS * sizeof(float), "gaussian records", err));
+    GBT_TRY(mem_reserve((void **)&scene->records, &scene->record_capacity, 0, g->count + 1, RECORD_FLOATS * sizeof(float),
+                        "gaussian records", err));
     parallel_blocks(g->count, RECORD_BLOCK, write_records, scene);
     if (scene->kernel == TRACE_EMBREE)
         return gaussian_scene_build(g, settings->alpha_min, settings->proxy_radius, reach, &scene->embree, err);
@@ -172,9 +173,11 @@ static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x
                 store_pixel(p, at, rays->packet[packet].active >> lane & 1 ? &out[packet] : NULL, lane);
         }
     const size_t bytes = tile->tape.count * sizeof *tile->tape.entries;
-    tile->tape_dropped = p->keep_tape && atomic_fetch_add(&p->tape_bytes, bytes) + bytes > p->scene->tape_bytes_max && p->scene->tape_bytes_max > 0;
+    tile->tape_dropped = p->keep_tape && atomic_fetch_add(&p->tape_bytes, bytes) + bytes > p->scene->tape_bytes_max &&
+                         p->scene->tape_bytes_max > 0;
     if (!tile->tape_dropped)
-        return mem_trim((void **)&tile->tape.entries, &tile->tape.capacity, tile->tape.count, sizeof *tile->tape.entries, "hit tape", NULL) == GBT_OK;
+        return mem_trim((void **)&tile->tape.entries, &tile->tape.capacity, tile->tape.count, sizeof *tile->tape.entries, "hit tape",
+                        NULL) == GBT_OK;
     hit_tape_free(&tile->tape);
     return true;
 }
@@ -240,7 +243,8 @@ static gbt_status run_pass(pass *p, gbt_error *err)
     }
     scene->tile_count = count;
     p->kernel = kernel_for(cpu_best_isa());
-    p->forward = scene->kernel == TRACE_EMBREE ? p->kernel->forward_embree : scene->kernel == TRACE_SINGLE ? p->kernel->forward_single : p->kernel->forward;
+    p->forward = scene->kernel == TRACE_EMBREE ? p->kernel->forward_embree : scene->kernel == TRACE_SINGLE ? p->kernel->forward_single
+                 : p->kernel->forward;
     atomic_init(&p->tape_bytes, 0);
     atomic_init(&p->failed, false);
     parallel_blocks(count, 1, run_tile, p);
@@ -249,14 +253,16 @@ static gbt_status run_pass(pass *p, gbt_error *err)
     return GBT_OK;
 }
 
-gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out, kernel_counters *counters, gbt_error *err)
+gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out, kernel_counters *counters,
+                         gbt_error *err)
 {
     const image *rgb = out->rgb;
     if (rgb->width != rays->width || rgb->height != rays->height || rgb->channels != 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "trace: image is %d x %d x %d (wanted %d x %d x 3)", rgb->width, rgb->height, rgb->channels, rays->width,
-                         rays->height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "trace: image is %d x %d x %d (wanted %d x %d x 3)", rgb->width, rgb->height, rgb->channels,
+                         rays->width, rays->height);
     pass p = {.scene = scene, .view = scene_for_kernel(scene), .rays = rays, .keep_tape = keep_tape, .out = *out};
-    p.view.extra = out->depth != NULL || out->median_depth != NULL || out->normal != NULL || out->hit_count != NULL || out->strongest != NULL;
+    p.view.extra = out->depth != NULL || out->median_depth != NULL || out->normal != NULL || out->hit_count != NULL ||
+                   out->strongest != NULL;
     scene->tape_width = scene->tape_height = 0;
     GBT_TRY(run_pass(&p, err));
     if (keep_tape)
@@ -274,9 +280,10 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
 gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb, gaussians *d_gaussians, float *weight,
                           float d_background[3], gbt_error *err)
 {
-    if (scene->tape_width != rays->width || scene->tape_height != rays->height || d_rgb->width != rays->width || d_rgb->height != rays->height)
-        return base_fail(err, GBT_ERR_ARGUMENT, "trace: adjoint of %d x %d rays, but the kept forward pass has %d x %d", rays->width, rays->height,
-                         scene->tape_width, scene->tape_height);
+    if (scene->tape_width != rays->width || scene->tape_height != rays->height || d_rgb->width != rays->width ||
+        d_rgb->height != rays->height)
+        return base_fail(err, GBT_ERR_ARGUMENT, "trace: adjoint of %d x %d rays, but the kept forward pass has %d x %d", rays->width,
+                         rays->height, scene->tape_width, scene->tape_height);
     pass p = {.scene = scene, .view = scene_for_kernel(scene), .rays = rays, .d_rgb = d_rgb};
     scene->tape_width = scene->tape_height = 0; /* each tile lets go of its tape */
     GBT_TRY(run_pass(&p, err));
@@ -285,7 +292,8 @@ gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < scene->tile_count; i++)
         lists[i] = &scene->tiles[i].gradients;
-    const gbt_status status = gradients_reduce(&scene->order, lists, scene->tile_count, scene->source, scene->records, d_gaussians, weight, err);
+    const gbt_status status = gradients_reduce(&scene->order, lists, scene->tile_count, scene->source, scene->records, d_gaussians, weight,
+                                               err);
     mem_free(lists);
     for (size_t i = 0; i < scene->tile_count; i++)
         gradient_list_free(&scene->tiles[i].gradients);

@@ -68,7 +68,8 @@ gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_setti
  * @return GBT_OK, GBT_ERR_ARGUMENT (size of out->rgb), GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count.
  */
-gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out, kernel_counters *counters, gbt_error *err);
+gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out, kernel_counters *counters,
+                         gbt_error *err);
 
 /**
  * Adjoint of the last trace_forward(keep_tape) on `scene`, with the same rays. Once: the tape is given back.

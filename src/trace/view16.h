@@ -44,7 +44,8 @@ static inline view_rays see_rays(const packet_rays *rays, const tile_beam *b)
 }
 
 /* Returned are the lanes whose form is sound: everything finite and nothing lost to underflow. `axes` may be NULL. */
-static inline m16 view_gaussians_from(const kernel_scene *scene, const gaussian_lanes *g, const tile_beam *b, view_gaussians *out, view_axes *axes)
+static inline m16 view_gaussians_from(const kernel_scene *scene, const gaussian_lanes *g, const tile_beam *b, view_gaussians *out,
+                                      view_axes *axes)
 {
     const f16 one = f16_set1(1);
     f16 offset[3], unit[9], stretch[9], square[3];
@@ -73,7 +74,8 @@ static inline m16 view_gaussians_from(const kernel_scene *scene, const gaussian_
         bu[i] = f16_fnma(c, wide[2][i], wide[1][i]);
         bv[i] = f16_sub(f16_mul(a, wide[2][i]), wide[0][i]);
     }
-    const f16 det = f16_sqrt(f16_mul(f16_div(smallest_square, square[0]), f16_mul(f16_div(smallest_square, square[1]), f16_div(smallest_square, square[2]))));
+    const f16 det = f16_sqrt(f16_mul(f16_div(smallest_square, square[0]),
+                                     f16_mul(f16_div(smallest_square, square[1]), f16_div(smallest_square, square[2]))));
     const f16 cw2 = dot16(cw, cw), bu_length = f16_sqrt(dot16(bu, bu));
     const f16 inverse = f16_div(one, cw2), scale = f16_mul(det, inverse), bu_inverse = f16_div(one, bu_length), length = f16_sqrt(cw2);
     const f16 distance = f16_div(f16_mul(depth, length), smallest);

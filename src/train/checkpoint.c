@@ -107,7 +107,8 @@ static gbt_status read_exposures(const container *c, exposures *e, gbt_error *er
 {
     const struct { const char *field; float *out; } fields[] = {{"matrix", e->matrix}, {"moment1", e->moment1}, {"moment2", e->moment2}};
     for (int i = 0; i < 3; i++)
-        GBT_TRY(copy_field(c, "exposure", fields[i].field, e->count, AFFINE_NUMBERS, 2, (const size_t[]){AFFINE_NUMBERS, 0}, fields[i].out, err));
+        GBT_TRY(copy_field(c, "exposure", fields[i].field, e->count, AFFINE_NUMBERS, 2, (const size_t[]){AFFINE_NUMBERS, 0}, fields[i].out,
+                           err));
     return container_get(c, "exposure.visits", CONTAINER_U64, e->count, e->visits, err);
 }
 
@@ -116,8 +117,8 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     uint64_t counters[8];
     GBT_TRY(container_get(c, "counters", CONTAINER_U64, 8, counters, err));
     if (counters[5] != t->scene.view_count || counters[6] != t->scene.points.count)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: made from other data (wanted %zu views and %zu points, got %llu and %llu)%s%s", path, t->scene.view_count,
-                         t->scene.points.count, (unsigned long long)counters[5], (unsigned long long)counters[6],
+        return base_fail(err, GBT_ERR_FORMAT, "%s: made from other data (wanted %zu views and %zu points, got %llu and %llu)%s%s", path,
+                         t->scene.view_count, t->scene.points.count, (unsigned long long)counters[5], (unsigned long long)counters[6],
                          t->scene.photos_missing > 0 ? "; photos that are missing: " : "", t->scene.missing_names);
     if (counters[4] > PACE_SEGMENTS)
         return base_fail(err, GBT_ERR_FORMAT, "%s: pace of %llu parts (limit %d)", path, (unsigned long long)counters[4], PACE_SEGMENTS);

@@ -11,7 +11,8 @@ void config_text(const gbt_train_def *def, const char *data, char *out, size_t s
 
 /** Where config_parse() keeps the strings that the def points to. */
 typedef struct config_strings {
-    char init[32], alpha[32], renderer[32], scale_prior[32], distance[32], pace[CONFIG_STRING_SIZE], eval_split[CONFIG_STRING_SIZE], data[CONFIG_STRING_SIZE];
+    char init[32], alpha[32], renderer[32], scale_prior[32], distance[32], pace[CONFIG_STRING_SIZE], eval_split[CONFIG_STRING_SIZE],
+        data[CONFIG_STRING_SIZE];
 } config_strings;
 
 /** Read such text over `def` (other fields stay). GBT_ERR_FORMAT with file and line for anything else. */

@@ -162,8 +162,8 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *
 }
 
 /* The marks of every `stride`-th pixel from `phase` on, if the photo has any. */
-static gbt_status pick_valid(photos *p, size_t view, int full_width, const photo_sample *sample, int width, int height, const unsigned char **valid,
-                             gbt_error *err)
+static gbt_status pick_valid(photos *p, size_t view, int full_width, const photo_sample *sample, int width, int height,
+                             const unsigned char **valid, gbt_error *err)
 {
     const unsigned char *full = p->full_valid[view];
     *valid = NULL;
@@ -173,13 +173,14 @@ static gbt_status pick_valid(photos *p, size_t view, int full_width, const photo
     GBT_TRY(mem_reserve((void **)&p->sample_valid, &p->sample_valid_capacity, 0, w * h, 1, "valid pixels", err));
     for (size_t y = 0; y < h; y++)
         for (size_t x = 0; x < w; x++)
-            p->sample_valid[y * w + x] = full[(y * step + (size_t)sample->phase[1]) * (size_t)full_width + x * step + (size_t)sample->phase[0]];
+            p->sample_valid[y * w + x] = full[(y * step + (size_t)sample->phase[1]) * (size_t)full_width + x * step +
+                                              (size_t)sample->phase[0]];
     *valid = p->sample_valid;
     return GBT_OK;
 }
 
-gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out, gbt_camera *camera, const unsigned char **valid,
-                             int *step, gbt_error *err)
+gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out, gbt_camera *camera,
+                             const unsigned char **valid, int *step, gbt_error *err)
 {
     const gbt_camera full = photos_camera(p, view, 0);
     if (sample->level == 0 || !gbt_camera_every(&full, 1 << sample->level, sample->phase[0], sample->phase[1], camera)) {

@@ -34,15 +34,16 @@ gbt_camera photos_camera(const photos *p, size_t view, int level);
 gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *err);
 
 /**
- * Pixels picked from a photo, not averaged, and the camera whose pixels they are: its rays are those of the photo at full size through the middle of these pixels.
+ * Pixels picked from a photo, not averaged, and the camera whose pixels they are: its rays are those of the photo at full size through the
+ * middle of these pixels.
  *
  * Where the lens model has no principal point to shift (equirectangular), photo and camera are those of the level instead.
  * @param camera [out] may be smaller than the photo / 2^level by a pixel: the same size for every phase
  * @param valid  [out] as photos_valid(), of these pixels; borrowed until the next call
  * @param step   [out] how many of the photo's pixels lie from one pixel of `camera` to the next: 2^level, or 1 for a smaller photo
  */
-gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out, gbt_camera *camera, const unsigned char **valid,
-                             int *step, gbt_error *err);
+gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out, gbt_camera *camera,
+                             const unsigned char **valid, int *step, gbt_error *err);
 
 /** Which pixels of the photo that photos_get() gave last for this view mean something: 0 where a value was not finite; NULL: all. */
 const unsigned char *photos_valid(const photos *p, size_t view);

@@ -55,10 +55,11 @@ static void signals_release(const signal_guard *guard)
     sigaction(SIGTERM, &guard->old_term, NULL);
 }
 
-/* ---- the run's folder ------------------------------------------------------------------------------------------------------------------ */
+/* ---- the run's folder ---------------------------------------------------------------------------------------------------------------- */
 
 typedef struct run_paths {
-    char model[PATH_SIZE], config[PATH_SIZE], log[PATH_SIZE], events[PATH_SIZE], json[PATH_SIZE], exposure[PATH_SIZE], checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
+    char model[PATH_SIZE], config[PATH_SIZE], log[PATH_SIZE], events[PATH_SIZE], json[PATH_SIZE], exposure[PATH_SIZE],
+        checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
 } run_paths;
 
 static gbt_status open_folder(const char *run, run_paths *p, gbt_error *err)
@@ -133,7 +134,7 @@ static gbt_status save_exposures(const trainer *t, const char *path, gbt_error *
     return status;
 }
 
-/* ---- the time budget --------------------------------------------------------------------------------------------------------------------- */
+/* ---- the time budget ----------------------------------------------------------------------------------------------------------------- */
 
 /* How long a step takes: so much by itself and so much per pixel, followed as the run changes. */
 typedef struct speed {
@@ -169,7 +170,7 @@ static void pace_extend(trainer *t, const speed *s)
     t->pace.known++;
 }
 
-/* ---- the loop ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- the loop ------------------------------------------------------------------------------------------------------------------------ */
 
 static gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *err)
 {
@@ -219,8 +220,8 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
             GBT_TRY(save_all(t, paths, err));
             last_save = t->seconds;
             if (stop)
-                return base_fail(err, GBT_ERR_INTERRUPTED, "stopped after step %llu; saved in %s (go on with --resume)", (unsigned long long)t->step,
-                                 paths->checkpoint);
+                return base_fail(err, GBT_ERR_INTERRUPTED, "stopped after step %llu; saved in %s (go on with --resume)",
+                                 (unsigned long long)t->step, paths->checkpoint);
         }
         if (evaluate) {
             const double before = clock_wall();
@@ -231,7 +232,8 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
     }
 }
 
-static gbt_status resume(trainer *t, const char *data, const run_paths *paths, const gbt_train_def *def, config_strings *strings, gbt_error *err)
+static gbt_status resume(trainer *t, const char *data, const run_paths *paths, const gbt_train_def *def, config_strings *strings,
+                         gbt_error *err)
 {
     const bool only_previous = !file_exists(paths->checkpoint) && file_exists(paths->checkpoint_previous);
     const char *path = only_previous ? paths->checkpoint_previous : paths->checkpoint;
@@ -252,7 +254,8 @@ static gbt_status resume(trainer *t, const char *data, const run_paths *paths, c
     return checkpoint_load(t, path, err);
 }
 
-static gbt_status run_with_folder(trainer *t, const char *data, const char *run, const gbt_train_def *def, config_strings *strings, gbt_error *err)
+static gbt_status run_with_folder(trainer *t, const char *data, const char *run, const gbt_train_def *def, config_strings *strings,
+                                  gbt_error *err)
 {
     run_paths paths;
     GBT_TRY(open_folder(run, &paths, err)); /* before any work: a run that cannot be written must not start */

@@ -76,7 +76,8 @@ static gbt_status rewind_rows(const char *csv_path, uint64_t step, gbt_error *er
     for (const unsigned char *end; kept > 0 && (end = memchr(bytes + kept, '\n', size - kept)) != NULL; kept = (size_t)(end - bytes) + 1)
         if (strtoull((const char *)bytes + kept, NULL, 10) > step)
             break;
-    const gbt_status status = kept > 0 ? file_write_atomic(csv_path, bytes, kept, err) : file_write_atomic(csv_path, header, header_size, err);
+    const gbt_status status = kept > 0 ? file_write_atomic(csv_path, bytes, kept,
+                                                           err) : file_write_atomic(csv_path, header, header_size, err);
     mem_free(bytes);
     return status;
 }
@@ -120,9 +121,9 @@ gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, co
     log->csv = fopen(csv_path, "a");
     if (log->csv == NULL)
         return base_fail(err, GBT_ERR_IO, "%s: cannot write", csv_path);
-    log_info("%s: %zu photos to train on, %zu held out; %s -> %zu anchors x %d (voxel size %.4g, extent %.4g, distance input %s)", t->scene.folder,
-             t->train_count, t->test_count, t->start_text, t->anchors.count, t->anchors.offset_count, (double)t->voxel_size, t->extent,
-             t->decoder.has_distance ? "on" : "off");
+    log_info("%s: %zu photos to train on, %zu held out; %s -> %zu anchors x %d (voxel size %.4g, extent %.4g, distance input %s)",
+             t->scene.folder, t->train_count, t->test_count, t->start_text, t->anchors.count, t->anchors.offset_count,
+             (double)t->voxel_size, t->extent, t->decoder.has_distance ? "on" : "off");
     return GBT_OK;
 }
 
@@ -172,12 +173,15 @@ static void tell_progress(const run_log *log, const trainer *t)
     const double progress = pace_progress(&t->pace, t->step), left = progress > 0 ? t->seconds * (1 - progress) / progress : 0;
     const run_sums *s = log->row.steps > 0 ? &log->row : &log->all;
     char line[512];
-    gbt_event e = {.text = line, .stage = "train", .done = t->step, .total = t->def.iterations, .fraction = progress, .seconds = t->seconds};
+    gbt_event e = {.text = line, .stage = "train", .done = t->step, .total = t->def.iterations, .fraction = progress,
+                   .seconds = t->seconds};
     e.seconds_left = t->pace.known < PACE_SEGMENTS ? fmax(0, t->def.budget_seconds - t->seconds) : left;
     e.psnr = log->psnr_smooth, e.loss = r->loss, e.anchors = t->anchors.count, e.gaussians = r->gaussians;
-    snprintf(line, sizeof line, "step %llu  %3.0f %%  %dx%d  loss %.4f  psnr %.2f  anchors %zu  gaussians %zu  %.2f Mrays/s  %zu MB  %.0f:%02.0f left",
+    snprintf(line, sizeof line, "step %llu  %3.0f %%  %dx%d  loss %.4f  psnr %.2f  anchors %zu  gaussians %zu  %.2f Mrays/s  %zu MB  "
+                                "%.0f:%02.0f left",
              (unsigned long long)t->step, 100 * progress, r->width, r->height, r->loss, log->psnr_smooth, t->anchors.count, r->gaussians,
-             s->rays / fmax(s->seconds, 1e-9) * 1e-6, mem_peak_bytes() / 1000000, floor(e.seconds_left / 60), floor(fmod(e.seconds_left, 60)));
+             s->rays / fmax(s->seconds, 1e-9) * 1e-6, mem_peak_bytes() / 1000000, floor(e.seconds_left / 60),
+             floor(fmod(e.seconds_left, 60)));
     log_progress(&e);
 }
 
@@ -213,15 +217,17 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     const double n = s->steps > 0 ? (double)s->steps : 1, ms = 1000 / n;
     json_t *root = json_object(), *stages = json_object(), *parts = json_array(), *evals = json_array();
     const struct { const char *name; double value; } stage[] = {
-        {"photo", s->photo}, {"rays", s->rays_seconds}, {"visible", s->visible_seconds}, {"decode", s->decode}, {"build", s->build}, {"trace", s->trace},
-        {"loss", s->loss_seconds}, {"adjoint", s->adjoint}, {"decode_adjoint", s->decode_adjoint}, {"optimizer", s->optimizer}, {"adjust", s->adjust}, {"all", s->seconds}};
+        {"photo", s->photo}, {"rays", s->rays_seconds}, {"visible", s->visible_seconds}, {"decode", s->decode}, {"build", s->build},
+        {"trace", s->trace},
+        {"loss", s->loss_seconds}, {"adjoint", s->adjoint}, {"decode_adjoint", s->decode_adjoint}, {"optimizer", s->optimizer},
+        {"adjust", s->adjust}, {"all", s->seconds}};
     for (size_t i = 0; i < sizeof stage / sizeof *stage; i++)
         json_object_set_new(stages, stage[i].name, json_real(stage[i].value * ms));
     for (int i = 0; i < t->pace.known; i++)
         json_array_append_new(parts, json_integer((json_int_t)t->pace.steps[i]));
     for (int i = 0; i < log->evaluated_count; i++)
-        json_array_append_new(evals, json_pack("{s:f,s:I,s:f}", "seconds", log->evaluated_seconds[i], "step", (json_int_t)log->evaluated_step[i], "psnr",
-                                               log->evaluated_psnr[i]));
+        json_array_append_new(evals, json_pack("{s:f,s:I,s:f}", "seconds", log->evaluated_seconds[i], "step",
+                                               (json_int_t)log->evaluated_step[i], "psnr", log->evaluated_psnr[i]));
     json_object_set_new(root, "schema", json_integer(1));
     json_object_set_new(root, "command", json_string(t->def.command));
     json_object_set_new(root, "data", json_string(t->scene.folder));

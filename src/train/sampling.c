@@ -22,7 +22,8 @@ static bool is_in_picture(const gbt_camera *camera, const double point[3])
     for (int k = 0; k < 3; k++)
         local[k] = point[k] - camera->center[k];
     dmat_apply(camera->rotation, local, local);
-    return gbt_camera_project(camera, local, pixel) && pixel[0] >= 0 && pixel[0] <= camera->width && pixel[1] >= 0 && pixel[1] <= camera->height;
+    return gbt_camera_project(camera, local, pixel) && pixel[0] >= 0 && pixel[0] <= camera->width && pixel[1] >= 0 &&
+           pixel[1] <= camera->height;
 }
 
 static void sampling_block(size_t block, size_t begin, size_t end, void *context)

@@ -24,7 +24,8 @@ gbt_status pace_parse(const char *text, pace *out, gbt_error *err)
         const unsigned long long n = strtoull(at, &end, 10);
         const char wanted = i + 1 < PACE_SEGMENTS ? ',' : '\0';
         if (end == at || *at < '0' || *at > '9' || *end != wanted || n > 1000000000ull)
-            return base_fail(err, GBT_ERR_ARGUMENT, "pace: entry %d of \"%.60s\" (wanted %d counts, separated by commas)", i + 1, text, PACE_SEGMENTS);
+            return base_fail(err, GBT_ERR_ARGUMENT, "pace: entry %d of \"%.60s\" (wanted %d counts, separated by commas)", i + 1, text,
+                             PACE_SEGMENTS);
         out->steps[i] = n;
         at = end + 1;
     }

@@ -33,7 +33,10 @@ uint64_t pace_total(const pace *p); /* of the known parts */
 /** Progress in front of step number `step` (0-based), which lies in a known part; 1 at or after the end. */
 double pace_progress(const pace *p, uint64_t step);
 
-/** How long the whole run will be, in steps, if the parts up to that of `step` (known) are like the rest: what comes later has no say, as with a budget. */
+/**
+ * How long the whole run will be, in steps, if the parts up to that of `step` (known) are like the rest: what comes later has no say, as
+ * with a budget.
+ */
 double pace_expected(const pace *p, uint64_t step);
 
 /** The part that `step` lies in, or p->known when the known parts are used up. */
@@ -62,7 +65,9 @@ float schedule_thrift(double steps);
 #define SCHEDULE_ALPHA_MIN 0.02f
 #define SCHEDULE_T_MIN 0.003f
 
-/** In the last part of a run all rates fall: a step teaches a model of one photo at a time, and what it takes from the others comes to rest. */
+/**
+ * In the last part of a run all rates fall: a step teaches a model of one photo at a time, and what it takes from the others comes to rest.
+ */
 #define SCHEDULE_COOL_FROM 0.9
 
 typedef struct learning_rates {

@@ -76,13 +76,15 @@ static void find_focus(const seed_view *views, size_t count, double focus[3], do
         focus[k] = a[k][3] / a[k][k];
     double sum = 0;
     for (size_t i = 0; i < count; i++) {
-        const double d[3] = {focus[0] - views[i].camera.center[0], focus[1] - views[i].camera.center[1], focus[2] - views[i].camera.center[2]};
+        const double d[3] = {focus[0] - views[i].camera.center[0], focus[1] - views[i].camera.center[1],
+                             focus[2] - views[i].camera.center[2]};
         sum += dvec_length(d);
     }
     *distance = sum / (double)count > 1e-6 ? sum / (double)count : 1;
 }
 
-/* Photos from places that are about a fifth of the distance away and look the same way: near enough to look alike, far enough to tell depths. */
+/* Photos from places that are about a fifth of the distance away and look the same way: near enough to look alike, far enough to tell
+   depths. */
 static void find_neighbors(seeding *s, double distance)
 {
     for (size_t i = 0; i < s->view_count; i++) {
@@ -124,7 +126,8 @@ static bool read_patch(const seed_view *v, const double center[2], const double 
     const double half = PATCH / 2;
     const int width = v->photo.width, height = v->photo.height;
     const double reach_x = half * (fabs(du[0]) + fabs(dv[0])), reach_y = half * (fabs(du[1]) + fabs(dv[1]));
-    if (!(center[0] - reach_x >= 0.5 && center[0] + reach_x < width - 0.5 && center[1] - reach_y >= 0.5 && center[1] + reach_y < height - 0.5))
+    if (!(center[0] - reach_x >= 0.5 && center[0] + reach_x < width - 0.5 && center[1] - reach_y >= 0.5 &&
+          center[1] + reach_y < height - 0.5))
         return false;
     for (int j = 0; j < PATCH; j++)
         for (int i = 0; i < PATCH; i++) {
@@ -171,7 +174,8 @@ static float agreement_at(const sweep *w, double depth)
         const seed_view *other = &w->s->views[w->view->neighbor[n]];
         double pixel[3][2], step[2][2];
         float patch[PATCH_AREA], sum = 0;
-        if (!project(&other->camera, world[0], pixel[0]) || !project(&other->camera, world[1], pixel[1]) || !project(&other->camera, world[2], pixel[2]))
+        if (!project(&other->camera, world[0], pixel[0]) || !project(&other->camera, world[1], pixel[1]) ||
+            !project(&other->camera, world[2], pixel[2]))
             continue;
         for (int k = 0; k < 2; k++)
             step[0][k] = pixel[1][k] - pixel[0][k], step[1][k] = pixel[2][k] - pixel[0][k];
@@ -252,7 +256,8 @@ static void seed_block(size_t block, size_t begin, size_t end, void *context)
         uint32_t words[4];
         rng_philox(s->seed, STREAM_SEEDS, i, words);
         const seed_view *v = &s->views[((uint64_t)words[0] * s->view_count) >> 32];
-        const size_t x = (size_t)(((uint64_t)words[1] * (uint64_t)v->photo.width) >> 32), y = (size_t)(((uint64_t)words[2] * (uint64_t)v->photo.height) >> 32);
+        const size_t x = (size_t)(((uint64_t)words[1] * (uint64_t)v->photo.width) >> 32),
+            y = (size_t)(((uint64_t)words[2] * (uint64_t)v->photo.height) >> 32);
         memcpy(c->color, v->photo.pixels + 3 * (y * (size_t)v->photo.width + x), sizeof c->color);
         sweep w;
         if (start_sweep(s, v, (double)x + 0.5, (double)y + 0.5, &w))

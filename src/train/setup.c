@@ -100,7 +100,8 @@ static bool view_sees(const gbt_camera *camera, const float position[3], double 
         d[k] = (double)position[k] - camera->center[k];
     dmat_apply(camera->rotation, d, cam);
     *distance = dvec_length(d);
-    return gbt_camera_project(camera, cam, pixel) && pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera->width && pixel[1] < camera->height;
+    return gbt_camera_project(camera, cam, pixel) && pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera->width &&
+           pixel[1] < camera->height;
 }
 
 /* Points that no training photo sees say nothing about what to render. */
@@ -173,7 +174,8 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
         status = GBT_OK; /* the few must do */
     snprintf(t->start_text, sizeof t->start_text, "%zu sparse points and %zu found by photo consistency", t->points_used, made.count);
     if (blind)
-        snprintf(t->start_text, sizeof t->start_text, "%zu points found by photo consistency (the data set has none that are seen)", made.count);
+        snprintf(t->start_text, sizeof t->start_text, "%zu points found by photo consistency (the data set has none that are seen)",
+                 made.count);
     t->points_made = blind;
     t->points_used = points->count;
     mem_free(made.position);
@@ -266,8 +268,8 @@ static gbt_status choose_views(trainer *t, gbt_error *err)
             t->train_views[t->train_count++] = i;
     }
     if (t->train_count == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no photo is left to train on (%zu views, %zu held out)", t->scene.folder, t->scene.view_count,
-                         t->test_count);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no photo is left to train on (%zu views, %zu held out)", t->scene.folder,
+                         t->scene.view_count, t->test_count);
     return GBT_OK;
 }
 

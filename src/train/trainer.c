@@ -18,11 +18,18 @@
 static const float dssim_weight = 0.2f, volume_weight = 0.01f, revived_opacity = 0.1f;
 static const float share_min = 2.5e-6f; /* of short runs: schedule_thrift() */
 enum { ADAM_BLOCK = 512, MAX_SKIPPED_IN_ROW = 10, ADJUSTS_PER_RUN = 100, INTERVAL_MIN = 20 /* a judgement of fewer views is chance */ };
-enum { STREAM_VIEWS = 1, STREAM_PIXELS = 4, LEAST_PIXELS_ACROSS = 80 /* with fewer a step would not be faster */, CULPRIT_SIZE = 384, BARREN_STEPS = 5 };
+enum {
+    STREAM_VIEWS = 1,
+    STREAM_PIXELS = 4,
+    LEAST_PIXELS_ACROSS = 80, /* with fewer a step would not be faster */
+    CULPRIT_SIZE = 384,
+    BARREN_STEPS = 5
+};
 
-/* ---- which view -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- which view ---------------------------------------------------------------------------------------------------------------------- */
 
-/* An index into train_views: every view once per epoch, in an order that depends on (seed, epoch) only, so that there is no state to save. */
+/* An index into train_views: every view once per epoch, in an order that depends on (seed, epoch) only, so that there is no state to
+   save. */
 static size_t pick_view(trainer *t)
 {
     const uint64_t epoch = t->step / t->train_count;
@@ -67,7 +74,7 @@ static frame_renderer renderer_of_step(const trainer *t, const gbt_camera *camer
     return rays ? t->renderer : FRAME_SPLAT;
 }
 
-/* ---- optimizer ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- optimizer ----------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct adam_job {
     trainer *t;
@@ -81,7 +88,8 @@ static void adam_block(size_t block, size_t begin, size_t end, void *context)
     anchors *p = &job->t->anchors, *g = &job->t->gradient, *m = &job->t->moment1, *v = &job->t->moment2;
     const size_t rows = end - begin, feature = begin * ANCHOR_FEATURE_DIM, scale = begin * 6;
     const size_t offset_floats = 3 * (size_t)p->offset_count, offset = begin * offset_floats;
-    adam_step(p->feature + feature, g->feature + feature, m->feature + feature, v->feature + feature, rows * ANCHOR_FEATURE_DIM, job->feature);
+    adam_step(p->feature + feature, g->feature + feature, m->feature + feature, v->feature + feature, rows * ANCHOR_FEATURE_DIM,
+              job->feature);
     adam_step(p->offset + offset, g->offset + offset, m->offset + offset, v->offset + offset, rows * offset_floats, job->offset);
     adam_step(p->scale_log + scale, g->scale_log + scale, m->scale_log + scale, v->scale_log + scale, rows * 6, job->scale);
     for (size_t i = scale; i < 6 * end; i++)
@@ -109,10 +117,10 @@ static void step_anchors(trainer *t, const learning_rates *rates)
     parallel_blocks(t->anchors.count, ADAM_BLOCK, adam_block, &job);
 }
 
-/* ---- statistics, growing and pruning -------------------------------------------------------------------------------------------------------- */
+/* ---- statistics, growing and pruning ------------------------------------------------------------------------------------------------- */
 
-/* What an anchor is good for is what pictures would miss without it: the share of them that its Gaussians cover, the mean over rays of T alpha. Opacity,
-   which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of all anchors. */
+/* What an anchor is good for is what pictures would miss without it: the share of them that its Gaussians cover, the mean over rays of T
+   alpha. Opacity, which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of all anchors. */
 static void gather_use(trainer *t)
 {
     const frame *f = &t->frame;
@@ -208,7 +216,7 @@ static gbt_status grow_and_prune(trainer *t, uint64_t steps_since, gbt_error *er
     return status;
 }
 
-/* ---- one step --------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- one step ------------------------------------------------------------------------------------------------------------------------ */
 
 /* True when `progress` has passed a multiple of 1 / ADJUSTS_PER_RUN since the step before. */
 static bool adjust_is_due(const trainer *t, double progress, double next)
@@ -261,7 +269,8 @@ static void revive_when_barren(trainer *t)
 }
 
 /* The loss of the last render as the photo's exposure shows it; d_image becomes dL/drender, d_exposure dL/dmatrix. */
-static gbt_status compare(trainer *t, size_t slot, const unsigned char *valid, image_loss_result *loss, double d_exposure[AFFINE_NUMBERS], gbt_error *err)
+static gbt_status compare(trainer *t, size_t slot, const unsigned char *valid, image_loss_result *loss, double d_exposure[AFFINE_NUMBERS],
+                          gbt_error *err)
 {
     const image *shown = &t->frame.rgb;
     image *fitted[] = {&t->d_image, &t->exposed};
@@ -328,7 +337,8 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     }
     t->skipped_in_row = 0;
     if (t->exposures.count > 0)
-        exposures_step(&t->exposures, slot, d_exposure, t->def.learning_rate_factor * exposures_rate(t->train_count, progress, next - progress));
+        exposures_step(&t->exposures, slot, d_exposure,
+                       t->def.learning_rate_factor * exposures_rate(t->train_count, progress, next - progress));
     const bool adjust = adjust_is_due(t, progress, next);
     step_networks(t, &rates);
     if (!(adjust && t->def.compat)) /* in the reference the per-anchor groups miss the step in which anchors change */

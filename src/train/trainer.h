@@ -79,7 +79,9 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err);
 /** Level at which a step at `progress` looks at a view: the schedule's, but never fewer than 80 pixels across. */
 int trainer_level(const trainer *t, size_t view, double progress);
 
-/** Mean PSNR over the held-out views at full training resolution, on 8-bit images; of their right halves with --exposure (affine_split()). */
+/**
+ * Mean PSNR over the held-out views at full training resolution, on 8-bit images; of their right halves with --exposure (affine_split()).
+ */
 gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err);
 
 void trainer_free(trainer *t);

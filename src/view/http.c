@@ -40,7 +40,8 @@ enum MHD_Result http_send(struct MHD_Connection *connection, const answer *with,
         {"X-Content-Type-Options", "nosniff"},
         {"Cross-Origin-Resource-Policy", "same-origin"},
         {"Referrer-Policy", "no-referrer"},
-        {"Content-Security-Policy", "default-src 'self'; img-src 'self' blob: data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"},
+        {"Content-Security-Policy", "default-src 'self'; img-src 'self' blob: data:; frame-ancestors 'none'; base-uri 'none'; form-action "
+                                    "'none'"},
     };
     struct MHD_Response *response = keeps ? MHD_create_response_from_buffer(with->count, with->bytes, MHD_RESPMEM_PERSISTENT)
                                           : MHD_create_response_from_buffer_with_free_callback(with->count, with->bytes, mem_free);
@@ -64,7 +65,8 @@ enum MHD_Result http_send(struct MHD_Connection *connection, const answer *with,
 bool http_page(const char *path, answer *out)
 {
     static const struct { const char *ending, *type; } types[] = {
-        {".html", "text/html; charset=utf-8"}, {".css", "text/css; charset=utf-8"}, {".js", "text/javascript; charset=utf-8"}, {".svg", "image/svg+xml"}};
+        {".html", "text/html; charset=utf-8"}, {".css", "text/css; charset=utf-8"}, {".js", "text/javascript; charset=utf-8"},
+        {".svg", "image/svg+xml"}};
     const page_file *file = page_file_find(strcmp(path, "/") == 0 ? "index.html" : path + 1);
     if (path[0] != '/' || file == NULL)
         return false;

@@ -78,8 +78,10 @@ static gbt_status finish(const studio *s, const image *im, const request *what, 
     GBT_TRY(encode(im, what, out, err));
     times->encode = 1000 * (clock_wall() - begin);
     snprintf(out->about, sizeof out->about,
-             "{\"width\":%d,\"height\":%d,\"channels\":%d,\"version\":%u,\"gaussians\":%zu,\"prepare_ms\":%.3f,\"trace_ms\":%.3f,\"encode_ms\":%.3f}", im->width,
-             im->height, what->format == REQUEST_RAW ? 4 : im->channels, s->version, s->run->frame.gaussians.count, times->prepare, times->trace, times->encode);
+             "{\"width\":%d,\"height\":%d,\"channels\":%d,\"version\":%u,\"gaussians\":%zu,"
+             "\"prepare_ms\":%.3f,\"trace_ms\":%.3f,\"encode_ms\":%.3f}",
+             im->width, im->height, what->format == REQUEST_RAW ? 4 : im->channels, s->version, s->run->frame.gaussians.count,
+             times->prepare, times->trace, times->encode);
     return GBT_OK;
 }
 
@@ -94,7 +96,8 @@ static double halton(int n, int base)
     return value;
 }
 
-/* The camera of sample `n`: its rays meet other points of the pixels. Sample 0, and any of a lens without a principal point, is the camera itself. */
+/* The camera of sample `n`: its rays meet other points of the pixels. Sample 0, and any of a lens without a principal point, is the camera
+   itself. */
 static gbt_camera sample_camera(const gbt_camera *camera, int n)
 {
     gbt_camera shifted = *camera;

@@ -49,8 +49,8 @@ static gbt_status take_choice(const words *w, const char *name, const char *cons
 static gbt_status check_size(int width, int height, gbt_error *err)
 {
     if (width > REQUEST_SIDE_MAX || height > REQUEST_SIDE_MAX || (double)width * height > REQUEST_PIXELS_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "picture of %d x %d pixels (wanted sides of at most %d, and at most %d pixels)", width, height,
-                         REQUEST_SIDE_MAX, REQUEST_PIXELS_MAX);
+        return base_fail(err, GBT_ERR_ARGUMENT, "picture of %d x %d pixels (wanted sides of at most %d, and at most %d pixels)", width,
+                         height, REQUEST_SIDE_MAX, REQUEST_PIXELS_MAX);
     return GBT_OK;
 }
 

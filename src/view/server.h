@@ -1,4 +1,5 @@
-/* view/server.h -- HTTP on loopback: the page and small texts at once, all else as jobs for one worker, the newest picture first to last. */
+/* view/server.h -- HTTP on loopback: the page and small texts at once, all else as jobs for one worker, the newest picture first to
+   last. */
 #ifndef GBT_VIEW_SERVER_H
 #define GBT_VIEW_SERVER_H
 
@@ -16,8 +17,8 @@ typedef struct server_job server_job;
 /**
  * Listen at 127.0.0.1.
  *
- * Only GET is answered, only with a Host of 127.0.0.1 or localhost (so that no foreign name can be made to mean this server), and nothing but the
- * page itself to requests that a browser marks as another site's.
+ * Only GET is answered, only with a Host of 127.0.0.1 or localhost (so that no foreign name can be made to mean this server), and nothing
+ * but the page itself to requests that a browser marks as another site's.
  *
  * @param port     [in] 0: any free one
  * @param log_path [in] file that /log?from=BYTE gives the rest of; empty: none. Borrowed

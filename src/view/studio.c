@@ -15,7 +15,8 @@
 
 static bool is_same_file(const struct stat *a, const struct stat *b)
 {
-    return a->st_ino == b->st_ino && a->st_size == b->st_size && a->st_mtim.tv_sec == b->st_mtim.tv_sec && a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
+    return a->st_ino == b->st_ino && a->st_size == b->st_size && a->st_mtim.tv_sec == b->st_mtim.tv_sec &&
+           a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
 }
 
 /* With photos when they can be had; `note` says why they cannot. */
@@ -109,7 +110,8 @@ char *studio_status(const studio *s)
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     json_t *note = json_text(s->note);
-    json_t *status = json_pack("{s:i,s:I,s:f,s:o?}", "version", (int)s->version, "log_bytes", has_log ? (json_int_t)log.st_size : (json_int_t)0, "log_age",
+    json_t *status = json_pack("{s:i,s:I,s:f,s:o?}", "version", (int)s->version, "log_bytes",
+                               has_log ? (json_int_t)log.st_size : (json_int_t)0, "log_age",
                                has_log ? (double)(now.tv_sec - log.st_mtim.tv_sec) : -1.0, "note", note);
     if (status != NULL && s->run != NULL) {
         json_object_set_new(status, "iterations", json_integer((json_int_t)s->run->model.iterations));

@@ -22,7 +22,8 @@ typedef struct world {
 /* `blind`: networks that do not look at the direction, so that a bake loses nothing. */
 static void make_world(world *w, bool blind)
 {
-    *w = (world){.a = random_anchors(ANCHORS, OFFSETS, 5), .d = random_decoder(OFFSETS, true, 9), .s = trace_settings_default(), .f.draw.footprint = 0.1f};
+    *w = (world){.a = random_anchors(ANCHORS, OFFSETS, 5), .d = random_decoder(OFFSETS, true, 9), .s = trace_settings_default(),
+                 .f.draw.footprint = 0.1f};
     for (size_t i = 0; i < ANCHORS; i++)
         for (size_t k = 0; k < 6; k++)
             w->a.scale_log[6 * i + k] = spread(5, 200 + k, i, -2.5f, -0.5f);

@@ -477,7 +477,8 @@ static void half_fov(void **state)
     assert_near(tan_half[1], 0, 0);
 }
 
-/* Parallel rays: not one of COLMAP's models, so a data set cannot hold it; a pixel is a point of the plane, a point its place across the view. */
+/* Parallel rays: not one of COLMAP's models, so a data set cannot hold it; a pixel is a point of the plane, a point its place across the
+   view. */
 static void orthographic(void **state)
 {
     (void)state;

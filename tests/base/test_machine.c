@@ -5,6 +5,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/machine.h"
+#include "base/parallel.h"
 #include "test_support.h"
 
 enum { FILES_MAX = 6 };
@@ -22,17 +23,22 @@ static const char info[] = "MemTotal:        2048 kB\nMemFree: 1 kB\nMemAvailabl
 /* Limits of address space come from the process itself, so rows stay below what a test runs under. */
 static const machine_case cases[] = {
     {"nothing can be read", {{NULL, NULL}}, INFINITY, 0, 0, SIZE_MAX, ""},
-    {"version 2 without limits", {{"proc/meminfo", info}, {"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "max 100000\n"}, {"sys/fs/cgroup/memory.max", "max\n"}},
+    {"version 2 without limits", {{"proc/meminfo", info}, {"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "max 100000\n"},
+                                  {"sys/fs/cgroup/memory.max", "max\n"}},
      INFINITY, 2097152, 1048576, SIZE_MAX, ""},
-    {"version 2 with limits", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "150000 100000\n"}, {"sys/fs/cgroup/memory.max", "1000000\n"}}, 1.5, 0, 0, 1000000, ""},
+    {"version 2 with limits", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "150000 100000\n"},
+                               {"sys/fs/cgroup/memory.max", "1000000\n"}}, 1.5, 0, 0, 1000000, ""},
     {"the smallest of a group and those it is in",
      {{"proc/self/cgroup", "0::/a/b\n"}, {"sys/fs/cgroup/a/cpu.max", "50000 100000\n"}, {"sys/fs/cgroup/a/b/cpu.max", "300000 100000\n"},
       {"sys/fs/cgroup/a/memory.max", "max\n"}, {"sys/fs/cgroup/a/b/memory.max", "2000000\n"}}, 0.5, 0, 0, 2000000, ""},
     {"version 1", {{"proc/self/cgroup", "5:memory:/x\n4:cpu,cpuacct:/x\n3:pids:/x\n"}, {"sys/fs/cgroup/cpu/x/cpu.cfs_quota_us", "200000\n"},
-     {"sys/fs/cgroup/cpu/x/cpu.cfs_period_us", "100000\n"}, {"sys/fs/cgroup/memory/x/memory.limit_in_bytes", "3000000\n"}}, 2, 0, 0, 3000000, ""},
-    {"version 1 without limits", {{"proc/self/cgroup", "4:cpu,cpuacct:/\n"}, {"sys/fs/cgroup/cpu/cpu.cfs_quota_us", "-1\n"}, {"sys/fs/cgroup/cpu/cpu.cfs_period_us", "100000\n"}},
+     {"sys/fs/cgroup/cpu/x/cpu.cfs_period_us", "100000\n"}, {"sys/fs/cgroup/memory/x/memory.limit_in_bytes", "3000000\n"}}, 2, 0, 0,
+     3000000, ""},
+    {"version 1 without limits", {{"proc/self/cgroup", "4:cpu,cpuacct:/\n"}, {"sys/fs/cgroup/cpu/cpu.cfs_quota_us", "-1\n"},
+                                  {"sys/fs/cgroup/cpu/cpu.cfs_period_us", "100000\n"}},
      INFINITY, 0, 0, SIZE_MAX, ""},
-    {"odd texts", {{"proc/self/cgroup", "0\n\n::\n0:/\n"}, {"proc/meminfo", "MemTotal: many\n"}, {"proc/cpuinfo", "processor: 0\nmodel name\t: A chip (TM)\n"}}, INFINITY, 0, 0, SIZE_MAX, "A chip (TM)"},
+    {"odd texts", {{"proc/self/cgroup", "0\n\n::\n0:/\n"}, {"proc/meminfo", "MemTotal: many\n"},
+                   {"proc/cpuinfo", "processor: 0\nmodel name\t: A chip (TM)\n"}}, INFINITY, 0, 0, SIZE_MAX, "A chip (TM)"},
 };
 
 static void reads_limits(void **state)
@@ -64,6 +70,18 @@ static void reads_this_machine(void **state)
     const machine m = machine_read("");
     assert_true(m.memory_bytes > 1000000 && m.memory_free_bytes <= m.memory_bytes && m.memory_limit_bytes > 1000000);
     assert_true(m.processors_allowed <= m.processors && m.processors_quota > 0);
+    assert_int_equal(parallel_threads(), machine_threads(&m)); /* nobody has set another number in this program */
+}
+
+static void threads_follow_the_quota(void **state)
+{
+    (void)state;
+    const struct { int allowed; double quota; int threads; } rows[] = {{64, INFINITY, 64}, {64, 2, 2}, {64, 1.5, 2}, {64, 0.2, 1},
+                                                                       {4, 16, 4}, {1, 0.5, 1}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const machine m = {.processors_allowed = rows[i].allowed, .processors_quota = rows[i].quota};
+        assert_int_equal(machine_threads(&m), rows[i].threads);
+    }
 }
 
 typedef struct heard {
@@ -108,10 +126,11 @@ static void tells_a_listener(void **state)
 int main(void)
 {
     enum { CASES = sizeof cases / sizeof *cases };
-    struct CMUnitTest tests[CASES + 2];
+    struct CMUnitTest tests[CASES + 3];
     for (int i = 0; i < CASES; i++)
         tests[i] = (struct CMUnitTest){.name = cases[i].name, .test_func = reads_limits, .initial_state = (void *)&cases[i]};
     tests[CASES] = (struct CMUnitTest)cmocka_unit_test(reads_this_machine);
     tests[CASES + 1] = (struct CMUnitTest)cmocka_unit_test(tells_a_listener);
+    tests[CASES + 2] = (struct CMUnitTest)cmocka_unit_test(threads_follow_the_quota);
     return cmocka_run_group_tests_name("machine", tests, NULL, NULL);
 }

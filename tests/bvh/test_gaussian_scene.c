@@ -1,4 +1,5 @@
-/* tests/bvh/test_gaussian_scene.c -- boxes of Gaussians under Embree's traversal: brute force in double, what is left out, bad rays, memory. */
+/* tests/bvh/test_gaussian_scene.c -- boxes of Gaussians under Embree's traversal: brute force in double, what is left out, bad rays,
+   memory. */
 #include "test_support.h"
 
 #include "base/gaussians.h"
@@ -189,8 +190,8 @@ static void agrees_with_brute_force(void **state)
                 }
                 const verdict want = judge(&g, i, origin, dir, c->t_near, c->t_far, reach);
                 if (times > 1 || (want.reached && times != 1) || (!want.boxed && times != 0))
-                    fail_msg("packet %d, ray %u, Gaussian %zu: visited %u times, reached %d, boxed %d", (int)number, lane, i, times, want.reached,
-                             want.boxed);
+                    fail_msg("packet %d, ray %u, Gaussian %zu: visited %u times, reached %d, boxed %d", (int)number, lane, i, times,
+                             want.reached, want.boxed);
                 reached_count += want.reached, visited_count += times;
             }
         }
@@ -282,7 +283,8 @@ static void empty_scenes(void **state)
     gaussians_free(&g);
 }
 
-/* The box is tight and not too tight: rays beside each of its faces, just inside and just outside of the point where the proxy touches it. */
+/* The box is tight and not too tight: rays beside each of its faces, just inside and just outside of the point where the proxy touches
+   it. */
 static void boxes_are_tight(void **state)
 {
     (void)state;
@@ -293,7 +295,8 @@ static void boxes_are_tight(void **state)
         fill_cloud(&c, seed, &g);
         g.opacity[0] = 0.9f;
         assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 20, &scene, NULL));
-        const double q[4] = {(double)g.quat_w[0], (double)g.quat_x[0], (double)g.quat_y[0], (double)g.quat_z[0]}, k = sqrt(2 * log(0.9 * 255));
+        const double q[4] = {(double)g.quat_w[0], (double)g.quat_x[0], (double)g.quat_y[0], (double)g.quat_z[0]},
+            k = sqrt(2 * log(0.9 * 255));
         const double scale[3] = {(double)g.scale_x[0], (double)g.scale_y[0], (double)g.scale_z[0]};
         const double mean[3] = {(double)g.mean_x[0], (double)g.mean_y[0], (double)g.mean_z[0]};
         double r[9];
@@ -459,9 +462,11 @@ int main(void)
     enum { CASES = sizeof cloud_cases / sizeof *cloud_cases };
     struct CMUnitTest tests[CASES + 7];
     for (size_t i = 0; i < CASES; i++)
-        tests[i] = (struct CMUnitTest){.name = cloud_cases[i].name, .test_func = agrees_with_brute_force, .initial_state = (void *)(uintptr_t)&cloud_cases[i]};
+        tests[i] = (struct CMUnitTest){.name = cloud_cases[i].name, .test_func = agrees_with_brute_force,
+                                       .initial_state = (void *)(uintptr_t)&cloud_cases[i]};
     const struct CMUnitTest others[] = {
-        cmocka_unit_test(the_same_for_every_thread_count), cmocka_unit_test(empty_scenes), cmocka_unit_test(boxes_are_tight), cmocka_unit_test(bad_gaussians_are_counted),
+        cmocka_unit_test(the_same_for_every_thread_count), cmocka_unit_test(empty_scenes), cmocka_unit_test(boxes_are_tight),
+            cmocka_unit_test(bad_gaussians_are_counted),
         cmocka_unit_test(bad_rays_cross_nothing), cmocka_unit_test(memory_is_counted_and_limited), cmocka_unit_test(no_memory_is_an_error),
     };
     memcpy(tests + CASES, others, sizeof others);

@@ -24,35 +24,53 @@ typedef struct value_case {
 } value_case;
 
 static const value_case value_cases[] = {
-    {OPTION_INT, "0", 0, 10, true, 0}, {OPTION_INT, "10", 0, 10, true, 10}, {OPTION_INT, "11", 0, 10, false, 0}, {OPTION_INT, "-1", 0, 10, false, 0},
+    {OPTION_INT, "0", 0, 10, true, 0}, {OPTION_INT, "10", 0, 10, true, 10}, {OPTION_INT, "11", 0, 10, false, 0},
+    {OPTION_INT, "-1", 0, 10, false, 0},
     {OPTION_INT, "-5", -5, 5, true, -5}, {OPTION_INT, "-6", -5, 5, false, 0}, {OPTION_INT, "2147483647", 0, 2147483647, true, 2147483647},
-    {OPTION_INT, "2147483648", 0, 2147483647, false, 0}, {OPTION_INT, "9223372036854775808", 0, 2147483647, false, 0}, {OPTION_INT, "", 0, 10, false, 0},
-    {OPTION_INT, "-", -5, 5, false, 0}, {OPTION_INT, "1e1", 0, 10, false, 0}, {OPTION_INT, "--1", -5, 5, false, 0}, {OPTION_INT, "007", 0, 10, true, 7},
-    {OPTION_INT, " 3", 0, 10, false, 0}, {OPTION_INT, "3 ", 0, 10, false, 0}, {OPTION_INT, "3.0", 0, 10, false, 0}, {OPTION_INT, "+3", 0, 10, false, 0},
+    {OPTION_INT, "2147483648", 0, 2147483647, false, 0}, {OPTION_INT, "9223372036854775808", 0, 2147483647, false, 0},
+    {OPTION_INT, "", 0, 10, false, 0},
+    {OPTION_INT, "-", -5, 5, false, 0}, {OPTION_INT, "1e1", 0, 10, false, 0}, {OPTION_INT, "--1", -5, 5, false, 0},
+    {OPTION_INT, "007", 0, 10, true, 7},
+    {OPTION_INT, " 3", 0, 10, false, 0}, {OPTION_INT, "3 ", 0, 10, false, 0}, {OPTION_INT, "3.0", 0, 10, false, 0},
+    {OPTION_INT, "+3", 0, 10, false, 0},
     {OPTION_INT, "0x10", 0, 99, false, 0}, {OPTION_INT, "-9223372036854775809", -5, 5, false, 0}, {OPTION_FLOAT, "1,5", 0, 9, false, 0},
     {OPTION_FLOAT, ".", 0, 9, false, 0}, {OPTION_FLOAT, "1e", 0, 9, false, 0}, {OPTION_FLOAT, "-inf", -9, 9, false, 0},
     {OPTION_UINT64, "18446744073709551615", 0, 0, true, 0x1p64}, {OPTION_UINT64, "18446744073709551616", 0, 0, false, 0},
-    {OPTION_UINT64, "0", 1, 5, false, 0}, {OPTION_UINT64, "1", 1, 5, true, 1}, {OPTION_UINT64, "6", 1, 5, false, 0}, {OPTION_UINT64, "+1", 0, 0, false, 0},
-    {OPTION_FLOAT, "0.5", 0, 1, true, 0.5}, {OPTION_FLOAT, "1", 0, 1, true, 1}, {OPTION_FLOAT, "1.0000001", 0, 1, false, 0}, {OPTION_FLOAT, ".5", 0, 1, true, 0.5},
-    {OPTION_FLOAT, "5.", 0, 9, true, 5}, {OPTION_FLOAT, "5e-1", 0, 1, true, 0.5}, {OPTION_FLOAT, "5E0", 0, 9, true, 5}, {OPTION_FLOAT, "e5", 0, 9, false, 0},
-    {OPTION_FLOAT, "infinity", 0, 9, false, 0}, {OPTION_FLOAT, "nan", 0, 9, false, 0}, {OPTION_FLOAT, "0x1p0", 0, 9, false, 0}, {OPTION_FLOAT, "-0", 0, 9, true, 0},
+    {OPTION_UINT64, "0", 1, 5, false, 0}, {OPTION_UINT64, "1", 1, 5, true, 1}, {OPTION_UINT64, "6", 1, 5, false, 0},
+    {OPTION_UINT64, "+1", 0, 0, false, 0},
+    {OPTION_FLOAT, "0.5", 0, 1, true, 0.5}, {OPTION_FLOAT, "1", 0, 1, true, 1}, {OPTION_FLOAT, "1.0000001", 0, 1, false, 0},
+    {OPTION_FLOAT, ".5", 0, 1, true, 0.5},
+    {OPTION_FLOAT, "5.", 0, 9, true, 5}, {OPTION_FLOAT, "5e-1", 0, 1, true, 0.5}, {OPTION_FLOAT, "5E0", 0, 9, true, 5},
+    {OPTION_FLOAT, "e5", 0, 9, false, 0},
+    {OPTION_FLOAT, "infinity", 0, 9, false, 0}, {OPTION_FLOAT, "nan", 0, 9, false, 0}, {OPTION_FLOAT, "0x1p0", 0, 9, false, 0},
+    {OPTION_FLOAT, "-0", 0, 9, true, 0},
     {OPTION_FLOAT, "1 ", 0, 9, false, 0}, {OPTION_FLOAT, "1_0", 0, 99, false, 0},
-    {OPTION_DOUBLE, "1e308", 0, 1e308, true, 1e308}, {OPTION_DOUBLE, "1e309", 0, HUGE_VAL, false, 0}, {OPTION_DOUBLE, "-2.5e+0", -3, 0, true, -2.5},
+    {OPTION_DOUBLE, "1e308", 0, 1e308, true, 1e308}, {OPTION_DOUBLE, "1e309", 0, HUGE_VAL, false, 0},
+    {OPTION_DOUBLE, "-2.5e+0", -3, 0, true, -2.5},
     {OPTION_DURATION, "90", 1, 1e6, true, 90}, {OPTION_DURATION, "90s", 1, 1e6, true, 90}, {OPTION_DURATION, "10m", 1, 1e6, true, 600},
-    {OPTION_DURATION, "1h", 1, 1e6, true, 3600}, {OPTION_DURATION, "1h30m", 1, 1e6, true, 5400}, {OPTION_DURATION, "1h1s", 1, 1e6, true, 3601},
+    {OPTION_DURATION, "1h", 1, 1e6, true, 3600}, {OPTION_DURATION, "1h30m", 1, 1e6, true, 5400},
+    {OPTION_DURATION, "1h1s", 1, 1e6, true, 3601},
     {OPTION_DURATION, "1.5m", 1, 1e6, true, 90}, {OPTION_DURATION, "30m1h", 1, 1e6, false, 0}, {OPTION_DURATION, "1m1m", 1, 1e6, false, 0},
     {OPTION_DURATION, "1m30", 1, 1e6, false, 0}, {OPTION_DURATION, "10d", 1, 1e6, false, 0}, {OPTION_DURATION, "m", 1, 1e6, false, 0},
     {OPTION_DURATION, "-1m", -1e6, 1e6, false, 0}, {OPTION_DURATION, "1h-1m", 1, 1e6, false, 0}, {OPTION_DURATION, "0.5", 1, 1e6, false, 0},
-    {OPTION_DURATION, "", 0, 1e6, false, 0}, {OPTION_DURATION, "10 m", 1, 1e6, false, 0}, {OPTION_DURATION, "1e400h", 1, HUGE_VAL, false, 0},
-    {OPTION_SIZE, "6G", 1, 0x1p50, true, 6442450944.0}, {OPTION_SIZE, "512M", 1, 0x1p50, true, 536870912}, {OPTION_SIZE, "1K", 1, 0x1p50, true, 1024},
-    {OPTION_SIZE, "0.5K", 1, 0x1p50, true, 512}, {OPTION_SIZE, "100", 1, 0x1p50, true, 100}, {OPTION_SIZE, "2T", 1, 0x1p50, true, 2199023255552.0},
+    {OPTION_DURATION, "", 0, 1e6, false, 0}, {OPTION_DURATION, "10 m", 1, 1e6, false, 0},
+    {OPTION_DURATION, "1e400h", 1, HUGE_VAL, false, 0},
+    {OPTION_SIZE, "6G", 1, 0x1p50, true, 6442450944.0}, {OPTION_SIZE, "512M", 1, 0x1p50, true, 536870912},
+    {OPTION_SIZE, "1K", 1, 0x1p50, true, 1024},
+    {OPTION_SIZE, "0.5K", 1, 0x1p50, true, 512}, {OPTION_SIZE, "100", 1, 0x1p50, true, 100},
+    {OPTION_SIZE, "2T", 1, 0x1p50, true, 2199023255552.0},
     {OPTION_SIZE, "6g", 1, 0x1p50, false, 0}, {OPTION_SIZE, "6GB", 1, 0x1p50, false, 0}, {OPTION_SIZE, "-6G", -1e9, 0x1p50, false, 0},
-    {OPTION_SIZE, "1023", 1024, 0x1p50, false, 0}, {OPTION_SIZE, "9223372036854775808", 0, 1e30, false, 0}, {OPTION_SIZE, "G", 0, 1e30, false, 0},
+    {OPTION_SIZE, "1023", 1024, 0x1p50, false, 0}, {OPTION_SIZE, "9223372036854775808", 0, 1e30, false, 0},
+    {OPTION_SIZE, "G", 0, 1e30, false, 0},
     {OPTION_STRING, "a b", 0, 0, true, 0}, {OPTION_STRING, "", 0, 0, false, 0},
-    {OPTION_CHOICE, "one", 0, 0, true, 0}, {OPTION_CHOICE, "two", 0, 0, true, 0}, {OPTION_CHOICE, "three", 0, 0, true, 0}, {OPTION_CHOICE, "on", 0, 0, false, 0},
-    {OPTION_CHOICE, "one|two", 0, 0, false, 0}, {OPTION_CHOICE, "", 0, 0, false, 0}, {OPTION_CHOICE, "One", 0, 0, false, 0}, {OPTION_CHOICE, "threes", 0, 0, false, 0},
-    {OPTION_FLAG, "true", 0, 0, true, 1}, {OPTION_FLAG, "false", 0, 0, true, 0}, {OPTION_FLAG, "1", 0, 0, true, 1}, {OPTION_FLAG, "0", 0, 0, true, 0}, {OPTION_FLAG, "yes", 0, 0, false, 0},
-    {OPTION_FLAG_OFF, "true", 0, 0, true, 0}, {OPTION_FLAG_OFF, "false", 0, 0, true, 1}, {OPTION_FLAG_OFF, "1", 0, 0, true, 0}, {OPTION_FLAG_OFF, "", 0, 0, false, 0},
+    {OPTION_CHOICE, "one", 0, 0, true, 0}, {OPTION_CHOICE, "two", 0, 0, true, 0}, {OPTION_CHOICE, "three", 0, 0, true, 0},
+    {OPTION_CHOICE, "on", 0, 0, false, 0},
+    {OPTION_CHOICE, "one|two", 0, 0, false, 0}, {OPTION_CHOICE, "", 0, 0, false, 0}, {OPTION_CHOICE, "One", 0, 0, false, 0},
+    {OPTION_CHOICE, "threes", 0, 0, false, 0},
+    {OPTION_FLAG, "true", 0, 0, true, 1}, {OPTION_FLAG, "false", 0, 0, true, 0}, {OPTION_FLAG, "1", 0, 0, true, 1},
+    {OPTION_FLAG, "0", 0, 0, true, 0}, {OPTION_FLAG, "yes", 0, 0, false, 0},
+    {OPTION_FLAG_OFF, "true", 0, 0, true, 0}, {OPTION_FLAG_OFF, "false", 0, 0, true, 1}, {OPTION_FLAG_OFF, "1", 0, 0, true, 0},
+    {OPTION_FLAG_OFF, "", 0, 0, false, 0},
     {OPTION_OPERAND, "a b", 0, 0, true, 0}, {OPTION_OPERAND, "", 0, 0, false, 0},
 };
 
@@ -107,7 +125,8 @@ static void refused_values_change_nothing(void **state)
     double seconds = 600;
     const char *choice = "one";
     const option rows[] = {
-        {.name = "a", .kind = OPTION_INT, .value = &whole, .min = 0, .max = 9}, {.name = "b", .kind = OPTION_FLOAT, .value = &single, .min = 0, .max = 1},
+        {.name = "a", .kind = OPTION_INT, .value = &whole, .min = 0, .max = 9},
+        {.name = "b", .kind = OPTION_FLOAT, .value = &single, .min = 0, .max = 1},
         {.name = "c", .kind = OPTION_DURATION, .value = &seconds, .min = 1, .max = 1e6},
         {.name = "d", .kind = OPTION_CHOICE, .value = &choice, .choices = "one|two"},
     };
@@ -165,9 +184,11 @@ static int parse_spelled(spelled *s, int argc, char **argv, operands *found)
 {
     *s = (spelled){.depth = 1, .grow = true, .split = "test"};
     const option options[] = {
-        {.name = "folder", .short_name = 'o', .kind = OPTION_STRING, .value = &s->folder, .value_name = "DIR", .help = "", .aliases = "m model-path"},
+        {.name = "folder", .short_name = 'o', .kind = OPTION_STRING, .value = &s->folder, .value_name = "DIR", .help = "",
+         .aliases = "m model-path"},
         {.name = "source", .short_name = 's', .kind = OPTION_OPERAND, .value_name = "DATA", .help = "", .aliases = "data"},
-        {.name = "max-depth", .kind = OPTION_INT, .value = &s->depth, .min = 0, .max = 9, .value_name = "N", .help = "", .aliases = "r resolution"},
+        {.name = "max-depth", .kind = OPTION_INT, .value = &s->depth, .min = 0, .max = 9, .value_name = "N", .help = "",
+         .aliases = "r resolution"},
         {.name = "split", .kind = OPTION_CHOICE, .value = &s->split, .choices = "test|train|all", .help = ""},
         {.name = "skip-test", .kind = OPTION_CHOICE, .value = &s->split, .choices = "test|train|all", .fixed = "train", .help = ""},
         {.name = "no-grow", .kind = OPTION_FLAG_OFF, .value = &s->grow, .help = ""},
@@ -209,7 +230,8 @@ static void environment(void **state)
     assert_true(fd >= 0 && write(fd, "max-depth = 2\nsplit = all\ndata = here\nfolder =\n", 47) == 47);
     close(fd);
     const struct { const char *general, *own, *typed; int depth; } rows[] = {
-        {NULL, NULL, NULL, 2}, {"3", NULL, NULL, 3}, {"3", "4", NULL, 4}, {NULL, "4", NULL, 4}, {"3", "4", "--max-depth=5", 5}, {"", "", NULL, 2}, {"3", "", NULL, 3}};
+        {NULL, NULL, NULL, 2}, {"3", NULL, NULL, 3}, {"3", "4", NULL, 4}, {NULL, "4", NULL, 4}, {"3", "4", "--max-depth=5", 5},
+        {"", "", NULL, 2}, {"3", "", NULL, 3}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         unsetenv("GBTRACE_MAX_DEPTH"), unsetenv("GBTRACE_MY_TEST_MAX_DEPTH");
         if (rows[i].general != NULL)
@@ -233,7 +255,8 @@ static void environment(void **state)
     assert_false(s.grow);
     assert_string_equal(s.split, "all"); /* from the file that the environment named */
     assert_string_equal(found.value[0], "x");
-    unsetenv("GBTRACE_CONFIG"), unsetenv("GBTRACE_NO_GROW"), unsetenv("GBTRACE_SKIP_TEST"), unsetenv("GBTRACE_MY_TEST_MAX_DEPTH"), unsetenv("GBTRACE_MAX_DEPTH");
+    unsetenv("GBTRACE_CONFIG"), unsetenv("GBTRACE_NO_GROW"), unsetenv("GBTRACE_SKIP_TEST"), unsetenv("GBTRACE_MY_TEST_MAX_DEPTH"),
+        unsetenv("GBTRACE_MAX_DEPTH");
     remove(path);
 }
 
@@ -241,7 +264,8 @@ static void json_texts(void **state)
 {
     (void)state;
     const struct { const char *text, *json; } rows[] = {
-        {"", "\"\""}, {"a\"b\\c", "\"a\\\"b\\\\c\""}, {"\n\x01\x7f", "\"\\u000a\\u0001\\u007f\""}, {"\xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80", "\"\xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80\""},
+        {"", "\"\""}, {"a\"b\\c", "\"a\\\"b\\\\c\""}, {"\n\x01\x7f", "\"\\u000a\\u0001\\u007f\""},
+        {"\xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80", "\"\xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80\""},
         {"\xff|\xc3|\xc0\x80|\xed\xa0\x80|\xe2\x82", "\"?|?|\?\?|\?\?\?|\?\?\""}, {"\xf4\x90\x80\x80", "\"\?\?\?\?\""}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         char *got = NULL;
@@ -260,7 +284,8 @@ static void nearest_names(void **state)
     (void)state;
     static const char *const names[] = {"info", "init", "make-scene", "train", "render", "eval"};
     const struct { const char *typed, *nearest; } rows[] = {
-        {"info", "info"}, {"ifno", "info"}, {"inif", "init"}, {"trian", "train"}, {"makescene", "make-scene"}, {"rendr", "render"}, {"evaluate", NULL},
+        {"info", "info"}, {"ifno", "info"}, {"inif", "init"}, {"trian", "train"}, {"makescene", "make-scene"}, {"rendr", "render"},
+        {"evaluate", NULL},
         {"x", NULL}, {"", NULL}, {"completely else", NULL}, {"an absurdly long word that no table can hold", NULL},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

@@ -1,4 +1,5 @@
-/* tests/data/test_gaussian_file.c -- plain Gaussians to .ply, .splat, .spz, .glb and back: what each format keeps, its bytes, damaged files. */
+/* tests/data/test_gaussian_file.c -- plain Gaussians to .ply, .splat, .spz, .glb and back: what each format keeps, its bytes, damaged
+   files. */
 #include <jansson.h>
 #include <zlib.h>
 
@@ -100,7 +101,8 @@ static void splat_keeps_one_color(void **state)
     }
     must(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &err));
     must(gaussian_file_read(inside(*state, "a.splat", 0), &b, &err));
-    check_near(&a, &b, nowhere, &(limits){.mean = 1e-9, .scale = 1e-6, .quat = 1e-4, .opacity = 1.0 / 510 + 1e-6, .color = 0.5 / (255 * 0.28209479) + 1e-6, .harmonics = 1});
+    check_near(&a, &b, nowhere, &(limits){.mean = 1e-9, .scale = 1e-6, .quat = 1e-4, .opacity = 1.0 / 510 + 1e-6,
+                                          .color = 0.5 / (255 * 0.28209479) + 1e-6, .harmonics = 1});
     gaussian_cloud_free(&a);
     gaussian_cloud_free(&b);
     make_cloud(&a, 100, 0);
@@ -142,7 +144,8 @@ static void spz_bytes(void **state)
                                          160, 128, 128, 128, 128, 128, 128, 128, 64};
     unsigned char expected[sizeof want];
     memcpy(expected, want, sizeof want);
-    /* x y z w = -.5 .5 -.5 .5: x is the first of the largest, left out and made positive, so the others change signs; 361 = 511 sqrt(2) / 2. */
+    /* x y z w = -.5 .5 -.5 .5: x is the first of the largest, left out and made positive, so the others change signs; 361 = 511 sqrt(2) /
+       2. */
     const uint32_t rotation = 0u << 30 | (1u << 9 | 361u) << 20 | (0u << 9 | 361u) << 10 | (1u << 9 | 361u);
     for (int k = 0; k < 4; k++)
         expected[32 + k] = (unsigned char)(rotation >> (8 * k));
@@ -171,9 +174,11 @@ static void glb_is_what_gltf_wants(void **state)
     assert_non_null(root);
     const size_t data_at = c.at + json_size + 8;
     json_t *primitive = json_array_get(json_object_get(json_array_get(json_object_get(root, "meshes"), 0), "primitives"), 0);
-    json_t *attributes = json_object_get(primitive, "attributes"), *accessors = json_object_get(root, "accessors"), *views = json_object_get(root, "bufferViews");
+    json_t *attributes = json_object_get(primitive, "attributes"), *accessors = json_object_get(root, "accessors"),
+        *views = json_object_get(root, "bufferViews");
     assert_int_equal(json_object_size(attributes), 1 + 1 + 3 + 9);
-    assert_int_equal(json_integer_value(json_object_get(json_array_get(json_object_get(root, "buffers"), 0), "byteLength")), size - data_at);
+    assert_int_equal(json_integer_value(json_object_get(json_array_get(json_object_get(root, "buffers"), 0), "byteLength")),
+                     size - data_at);
     json_t *position = json_array_get(accessors, (size_t)json_integer_value(json_object_get(attributes, "POSITION")));
     double low = INFINITY;
     for (size_t i = 0; i < a.count; i++)
@@ -181,11 +186,13 @@ static void glb_is_what_gltf_wants(void **state)
     assert_true(fabs(json_number_value(json_array_get(json_object_get(position, "min"), 0)) - low) < 1e-12);
     /* The last value of the last accessor, and the quaternion of the first Gaussian. */
     json_t *last = json_array_get(views, json_array_size(views) - 1);
-    assert_int_equal(json_integer_value(json_object_get(last, "byteOffset")) + json_integer_value(json_object_get(last, "byteLength")), size - data_at);
+    assert_int_equal(json_integer_value(json_object_get(last, "byteOffset")) + json_integer_value(json_object_get(last, "byteLength")),
+                     size - data_at);
     float value, quat[4];
     memcpy(&value, bytes + size - 4, 4);
     assert_true(value == a.sh[48 * 32 + 3 * 8 + 2]); /* function 8: even, keeps its sign */
-    json_t *rotation = json_array_get(accessors, (size_t)json_integer_value(json_object_get(attributes, "KHR_gaussian_splatting:ROTATION")));
+    json_t *rotation = json_array_get(accessors,
+                                      (size_t)json_integer_value(json_object_get(attributes, "KHR_gaussian_splatting:ROTATION")));
     json_t *view = json_array_get(views, (size_t)json_integer_value(json_object_get(rotation, "bufferView")));
     memcpy(quat, bytes + data_at + (size_t)json_integer_value(json_object_get(view, "byteOffset")), sizeof quat);
     const float want[4] = {-a.quat[1], -a.quat[2], a.quat[3], a.quat[0]};

@@ -193,7 +193,8 @@ static void other_files(void **state)
     sink s = {0};
     sink_put_text(&s, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n");
     refused(&s, "is a point cloud, not a Gaussian model");
-    sink_put_text(&s, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float f_anchor_feat_0\nproperty float opacity\nend_header\n1 2 3\n");
+    sink_put_text(&s, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float f_anchor_feat_0\nproperty float "
+                      "opacity\nend_header\n1 2 3\n");
     refused(&s, "anchors of a neural model");
     put_header(&s, 0, 0, NULL);
     refused(&s, "holds no usable Gaussian (0 rows dropped)");
@@ -267,7 +268,8 @@ static void same_as_arrays(void **state)
     assert_int_equal(cloud.count, COUNT);
     for (size_t i = 0; i < COUNT; i++) {
         const float *q = cloud.quat + 4 * i, *want = quat + 4 * i;
-        const double flip = sign_of((double)q[0] * (double)want[3] + (double)q[1] * (double)want[0] + (double)q[2] * (double)want[1] + (double)q[3] * (double)want[2]);
+        const double flip = sign_of((double)q[0] * (double)want[3] + (double)q[1] * (double)want[0] + (double)q[2] * (double)want[1] +
+                                    (double)q[3] * (double)want[2]);
         for (size_t k = 0; k < 3; k++) {
             assert_true(cloud.mean[3 * i + k] == center[3 * i + k]);
             assert_true(fabs(exp((double)cloud.scale_log[3 * i + k]) / (double)scale[3 * i + k] - 1) < 2e-6);

@@ -16,14 +16,17 @@ static struct good_case {
     {"a triangle", V3 "f 1 2 3\n", 3, 1, {0, 1, 2}},
     {"no newline at the end, Windows lines", "v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3", 3, 1, {0, 1, 2}},
     {"polygons are fans", V4 "f 1 2 4 3\n", 4, 2, {0, 1, 3, 0, 3, 2}},
-    {"texture and normal numbers", V3 "vt 0 0\nvn 0 0 1\nf 1/1 2/1 3/1\nf 1//1 2//1 3//1\nf 3/1/1 2/1/1 1/1/1\n", 3, 3, {0, 1, 2, 0, 1, 2, 2, 1, 0}},
+    {"texture and normal numbers", V3 "vt 0 0\nvn 0 0 1\nf 1/1 2/1 3/1\nf 1//1 2//1 3//1\nf 3/1/1 2/1/1 1/1/1\n", 3, 3,
+     {0, 1, 2, 0, 1, 2, 2, 1, 0}},
     {"negative numbers count back from here", V3 "f -3 -2 -1\nv 1 1 0\nf -3 -2 -1\n", 4, 2, {0, 1, 2, 1, 2, 3}},
-    {"what is passed over", "# a\n\n  \t\nmtllib a.mtl\no b\n" V3 "g c d\nusemtl e\ns off\nl 1 2\np 1\n#f 9 9 9\n\tf  1\t2 3  \n", 3, 1, {0, 1, 2}},
+    {"what is passed over", "# a\n\n  \t\nmtllib a.mtl\no b\n" V3 "g c d\nusemtl e\ns off\nl 1 2\np 1\n#f 9 9 9\n\tf  1\t2 3  \n", 3, 1,
+     {0, 1, 2}},
     {"a weight or a colour behind the position", "v 0 0 0 1\nv 1 0 0 .5 .5 .5\nv 0 1e0 -0 x\nf 1 2 3\n", 3, 1, {0, 1, 2}},
     {"a corner twice", V3 "f 1 1 2\n", 3, 1, {0, 0, 1}},
     {"PLY", PLY_HEAD PLY_FACES(2) PLY_V4 "3 0 1 2\n4 0 1 3 2\n", 4, 3, {0, 1, 2, 0, 1, 3, 0, 3, 2}},
     {"PLY with other lists and the other name",
-     PLY_HEAD "property list uchar int n\nelement face 1\nproperty list uchar float a\nproperty list int uint vertex_index\nproperty int b\nend_header\n"
+     PLY_HEAD "property list uchar int n\nelement face 1\nproperty list uchar float a\nproperty list int uint vertex_index\nproperty int "
+              "b\nend_header\n"
               "0 0 0 1 9\n1 0 0 0\n0 1 0 2 9 9\n1 1 0 0\n2 7 7 3 3 2 1 -5\n",
      4, 1, {3, 2, 1}},
 };
@@ -70,7 +73,8 @@ static struct bad_case {
     {"solid cube\n", "m:1: not a line of an OBJ mesh: solid"},
     {PLY_HEAD "end_header\n" PLY_V4, "m: no element face in the header"},
     {PLY_HEAD "element face 1\nproperty int vertex_indices\nend_header\n" PLY_V4 "3\n", "m: element face has no list vertex_indices"},
-    {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n" PLY_FACES(1) "0 0\n3 0 0 0\n", "m: element vertex has no property z"},
+    {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n" PLY_FACES(1) "0 0\n3 0 0 0\n",
+     "m: element vertex has no property z"},
     {PLY_HEAD PLY_FACES(0) PLY_V4, "m: no triangles in it (wanted an OBJ or PLY mesh)"},
     {PLY_HEAD PLY_FACES(1) PLY_V4 "3 0 1 4\n", "m: face 0: no such vertex: 4 (there are 4)"},
     {PLY_HEAD PLY_FACES(2) PLY_V4 "3 0 1 2\n3 0 1 -1\n", "m: face 1: no such vertex: -1 (there are 4)"},
@@ -125,7 +129,8 @@ static void mutations(void **state)
 {
     (void)state;
     static const char obj[] = "v 0 0 0\nv 1 0 .5\nv 0 1 2e1\nv 1 1 0\nf 1//1 2//1 -1\nf 1 2 3 4\n";
-    static const char ply[] = "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uchar short a\nproperty list uchar uchar vertex_index\n"
+    static const char ply[] = "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uchar short a\nproperty list uchar "
+                              "uchar vertex_index\n"
                               "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
                               "\x01" "ab" "\x03\x00\x01\x02" "0123" "0124" "0125" "0223" "0224" "0225" "0323" "0324" "0325";
     size_t accepted = 0;

@@ -192,12 +192,15 @@ static void nothing_to_load(void **state)
     const char *folder = *state;
     static const place_case cases[] = {
         {"nothing there", NULL, NULL, "no/such", GBT_ERR_IO, "no such file or folder"},
-        {"empty folder", NULL, NULL, ".", GBT_ERR_FORMAT, "not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json"},
+        {"empty folder", NULL, NULL, ".", GBT_ERR_FORMAT,
+         "not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json"},
         {"some file", "photo.jpg", "x", "photo.jpg", GBT_ERR_FORMAT, "not a data set (wanted a folder, a .ply or a transforms.json)"},
         {"bad ply", "p.ply", "x", "p.ply", GBT_ERR_FORMAT, "p.ply:1: not a PLY file"},
-        {"ply without points", "p.ply", "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n", "p.ply",
+        {"ply without points", "p.ply",
+         "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n", "p.ply",
          GBT_ERR_FORMAT, "holds no usable point (0 dropped)"},
-        {"ply of NaN", "p.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\nnan 1 2\n", "p.ply",
+        {"ply of NaN", "p.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+                                "z\nend_header\nnan 1 2\n", "p.ply",
          GBT_ERR_FORMAT, "holds no usable point (1 dropped)"},
         {"bad json", "transforms.json", "x", ".", GBT_ERR_FORMAT, "transforms.json:1: not usable JSON"},
         {"bad json by name", "transforms.json", "x", "transforms.json", GBT_ERR_FORMAT, "transforms.json:1: not usable JSON"},
@@ -245,7 +248,8 @@ static void parse_split(void **state)
         scene_split_kind kind;
         int every;
     } cases[] = {
-        {"every=8", true, SCENE_SPLIT_EVERY, 8},   {"every=2", true, SCENE_SPLIT_EVERY, 2}, {"every=2147483647", true, SCENE_SPLIT_EVERY, 2147483647},
+        {"every=8", true, SCENE_SPLIT_EVERY, 8},   {"every=2", true, SCENE_SPLIT_EVERY, 2},
+        {"every=2147483647", true, SCENE_SPLIT_EVERY, 2147483647},
         {"auto", true, SCENE_SPLIT_AUTO, 8},       {"autos", false, 0, 0},
         {"none", true, SCENE_SPLIT_NONE, 8},       {"list=a b.txt", true, SCENE_SPLIT_LIST, 8},
         {"every=1", false, 0, 0},                  {"every=0", false, 0, 0},                {"every=-8", false, 0, 0},
@@ -331,7 +335,8 @@ static void transforms_folder(void **state)
     const char *folder = *state;
     write_picture(folder, "photos/b.png", 8, 6);
     write_picture(folder, "photos/a.png", 8, 6);
-    write_text(folder, "points.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n5 6 7\n");
+    write_text(folder, "points.ply",
+               "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n5 6 7\n");
     static const char text[] = "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"ply_file_path\": \"points.ply\", \"frames\": ["
                                "{\"file_path\": \"./photos/b.png\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
                                "{\"file_path\": \"photos/a\", \"transform_matrix\": [[1,0,0,11],[0,1,0,22],[0,0,1,33],[0,0,0,1]]}]}";
@@ -432,7 +437,8 @@ static void no_memory(void **state)
         write_text(folder, name, "not read here");
     }
     write_text(folder, "j/a.png", "not read here");
-    write_text(folder, "j/p.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n5 6 7\n");
+    write_text(folder, "j/p.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+                                  "z\nend_header\n5 6 7\n");
     write_text(folder, "j/transforms.json", "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"ply_file_path\": \"p.ply\", \"frames\": ["
                "{\"file_path\": \"a\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
     write_text(folder, "list.txt", "v9.png\n");
@@ -475,7 +481,8 @@ static double box_mean(const image *in, int channel, double x0, double x1, doubl
 static void resize_is_the_area_mean(void **state)
 {
     (void)state;
-    static const int sizes[][4] = {{7, 5, 3, 2}, {8, 6, 4, 3}, {10, 9, 7, 9}, {5, 4, 5, 4}, {3, 2, 7, 5}, {1, 1, 4, 3}, {9, 11, 1, 1}, {640, 3, 641, 2}};
+    static const int sizes[][4] = {{7, 5, 3, 2}, {8, 6, 4, 3}, {10, 9, 7, 9}, {5, 4, 5, 4}, {3, 2, 7, 5}, {1, 1, 4, 3}, {9, 11, 1, 1},
+                                   {640, 3, 641, 2}};
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         const int *n = sizes[i];
         image in, out;
@@ -552,7 +559,8 @@ static void transforms_masks_and_split(void **state)
 {
     const char *folder = *state;
     static const char form[] = "{\"x_fov\": 45, \"train_filenames\": [\"./b.png\"], \"frames\": ["
-                               "{\"file_path\": \"a.png\", \"mask_path\": %s, \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
+                               "{\"file_path\": \"a.png\", \"mask_path\": %s, \"transform_matrix\": "
+                               "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
                                "{\"file_path\": \"b.png\", \"transform_matrix\": [[1,0,0,11],[0,1,0,22],[0,0,1,33],[0,0,0,1]]}]}";
     static const struct { const char *mask; gbt_status status; const char *says; } cases[] = {
         {"\"m.png\"", GBT_OK, ""},
@@ -586,7 +594,8 @@ static void transforms_masks_and_split(void **state)
                                                              {"[]", "all 1 views are held out"}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         char text[512];
-        snprintf(text, sizeof text, "{\"x_fov\": 45, \"train_filenames\": %s, \"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": "
+        snprintf(text, sizeof text, "{\"x_fov\": 45, \"train_filenames\": %s, \"frames\": [{\"file_path\": \"a.png\", "
+                                    "\"transform_matrix\": "
                  "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}", bad[i].list);
         write_text(folder, "transforms.json", text);
         scene s;
@@ -754,7 +763,8 @@ static void real_data(void **state)
         assert_int_equal(camera->height, c->height);
         assert_int_equal(camera->model, c->model);
         for (size_t k = 0; k < s.points.count && i % 10 == 0; k += 100) {
-            const double d[3] = {(double)s.points.position[3 * k] - camera->center[0], (double)s.points.position[3 * k + 1] - camera->center[1],
+            const double d[3] = {(double)s.points.position[3 * k] - camera->center[0],
+                                 (double)s.points.position[3 * k + 1] - camera->center[1],
                                  (double)s.points.position[3 * k + 2] - camera->center[2]};
             double in_camera[3], pixel[2];
             dmat_apply(camera->rotation, d, in_camera);
@@ -772,8 +782,8 @@ static void real_data(void **state)
         assert_int_equal(im.width, c->width / 4);
         image_free(&im);
     }
-    print_message("%s: origin %g %g %g, extent %g, seen %zu of %zu\n", c->path, s.origin[0], s.origin[1], s.origin[2], scene_camera_extent(&s),
-                  seen, looked_at);
+    print_message("%s: origin %g %g %g, extent %g, seen %zu of %zu\n", c->path, s.origin[0], s.origin[1], s.origin[2],
+                  scene_camera_extent(&s), seen, looked_at);
     scene_free(&s);
 }
 

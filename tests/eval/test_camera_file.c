@@ -138,9 +138,11 @@ static const struct bad_case {
     {"{" POSE ", \"fov_x_deg\": 0}", ": fov_x_deg: wanted a number in (0, 179.9]"},
     {"{" POSE ", \"fov_x_deg\": \"60\"}", ": fov_x_deg: wanted a number in (0, 179.9]"},
     {"{" POSE ", \"model\": \"fisheye\", \"fov_x_deg\": 361}", ": fov_x_deg: wanted a number in (0, 360]"},
-    {"{" POSE ", \"model\": \"orthographic\"}", ": view_width: missing (units of the data set from the left edge of the picture to the right)"},
+    {"{" POSE ", \"model\": \"orthographic\"}",
+     ": view_width: missing (units of the data set from the left edge of the picture to the right)"},
     {"{" POSE ", \"model\": \"orthographic\", \"view_width\": 0}", ": view_width: wanted a number in (0, 1e+15]"},
-    {"{" POSE ", \"model\": \"orthographic\", \"view_width\": 3, \"fov_x_deg\": 60}", ": fov_x_deg: this model has none (wanted it with pinhole or fisheye)"},
+    {"{" POSE ", \"model\": \"orthographic\", \"view_width\": 3, \"fov_x_deg\": 60}",
+     ": fov_x_deg: this model has none (wanted it with pinhole or fisheye)"},
     {"{" POSE ", \"view_width\": 3, \"fov_x_deg\": 60}", ": view_width: this model has none (wanted it with orthographic)"},
     {"{" POSE ", \"model\": \"pinhoel\"}", ": model: wanted one of pinhole, orthographic, equirectangular, fisheye"},
     {"{" POSE ", \"model\": 3}", ": model: wanted one of pinhole, orthographic, equirectangular, fisheye"},
@@ -156,9 +158,12 @@ static const struct bad_case {
     {"{\"width\": 0, \"height\": 4}", ": width: wanted a whole number in [1, 65500]"},
     {"{\"width\": 4.5, \"height\": 4}", ": width: wanted a whole number in [1, 65500]"},
     {"{\"width\": 4, \"height\": 65501}", ": height: wanted a whole number in [1, 65500]"},
-    {"{\"origin\": [1, 2, 3], \"target\": [1, 2, 3], \"up\": [0, 1, 0], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}", ": target: is the origin (wanted another point)"},
-    {"{\"origin\": [1, 2, 3], \"target\": [1, 3, 3], \"up\": [0, 1, 0], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}", ": up: is 0, or along the view"},
-    {"{\"origin\": [1, 2, 3], \"target\": [1, 3, 3], \"up\": [0, 0, 0], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}", ": up: is 0, or along the view"},
+    {"{\"origin\": [1, 2, 3], \"target\": [1, 2, 3], \"up\": [0, 1, 0], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}",
+     ": target: is the origin (wanted another point)"},
+    {"{\"origin\": [1, 2, 3], \"target\": [1, 3, 3], \"up\": [0, 1, 0], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}",
+     ": up: is 0, or along the view"},
+    {"{\"origin\": [1, 2, 3], \"target\": [1, 3, 3], \"up\": [0, 0, 0], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}",
+     ": up: is 0, or along the view"},
     {"{" POSE ", \"fov_x_deg\": 60, \"focus\": 1}", ": aperture: missing (there is a focus, samples or seed)"},
     {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": 1}", ": focus: missing (distance that is sharp, units of the data set)"},
     {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": -1, \"focus\": 1}", ": aperture: wanted a number in [0, 1e+15]"},
@@ -183,7 +188,8 @@ static void says_what_is_wrong(void **state)
         write_text(bad_cases[i].text);
         const gbt_status status = camera_file_read(path, none, &f, &err);
         const size_t length = strlen(path);
-        if (status != GBT_ERR_FORMAT || strncmp(err.text, path, length) != 0 || strncmp(err.text + length, bad_cases[i].message, strlen(bad_cases[i].message)) != 0)
+        if (status != GBT_ERR_FORMAT || strncmp(err.text, path, length) != 0 ||
+            strncmp(err.text + length, bad_cases[i].message, strlen(bad_cases[i].message)) != 0)
             fail_msg("%s: %d: %s", bad_cases[i].text, (int)status, err.text);
         assert_null(f.rays.dir);
         camera_file_free(&f);

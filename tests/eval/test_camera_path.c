@@ -34,7 +34,7 @@ static int remove_folder(void **state)
     return rmdir(folder);
 }
 
-/* ---- cameras ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- cameras ------------------------------------------------------------------------------------------------------------------------- */
 
 static gbt_camera looking(double x, double y, double z, const double target[3])
 {
@@ -122,7 +122,7 @@ static void parallel_cameras(void **state)
     assert_true(g.distance > 0);
 }
 
-/* ---- around ----------------------------------------------------------------------------------------------------------------------------- */
+/* ---- around -------------------------------------------------------------------------------------------------------------------------- */
 
 static void closed_orbit(void **state)
 {
@@ -196,7 +196,7 @@ static void orbit_follows_the_cameras(void **state)
     camera_path_free(&path);
 }
 
-/* ---- through -------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- through ------------------------------------------------------------------------------------------------------------------------- */
 
 enum { KEYS = 9, FRAMES = 2001 };
 
@@ -247,7 +247,8 @@ static void turning_on_the_spot(void **state)
     (void)state;
     gbt_camera keys[8];
     for (int i = 0; i < 8; i++) {
-        const double angle = (i / 2) * 170 * PI / 180, target[3] = {sin(angle), 0, cos(angle)}; /* each twice; quaternions change their signs on the way */
+        /* each twice; quaternions change their signs on the way */
+        const double angle = (i / 2) * 170 * PI / 180, target[3] = {sin(angle), 0, cos(angle)};
         keys[i] = looking(0, 0, 0, target);
     }
     camera_path path;
@@ -285,7 +286,7 @@ static void order_to_go_through(void **state)
     assert_near(distance_between(&keys[4], &known[5]), 0, 0);
 }
 
-/* ---- files ------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- files --------------------------------------------------------------------------------------------------------------------------- */
 
 static void write_text(const char *path, const char *text)
 {
@@ -338,7 +339,8 @@ static void our_file(void **state)
 static void nerfstudio_file(void **state)
 {
     (void)state;
-    camera_path p = read_good("{\"keyframes\": [], \"camera_type\": \"perspective\", " NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90, \"aspect\": 1}]}", none, 0);
+    camera_path p = read_good("{\"keyframes\": [], \"camera_type\": \"perspective\", " NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90, "
+                              "\"aspect\": 1}]}", none, 0);
     const gbt_camera *c = &p.shots[0].camera;
     const double axes[9] = {1, 0, 0, 0, -1, 0, 0, 0, -1}; /* OpenGL's y up, z back: right x, down -y, forward -z */
     for (int k = 0; k < 9; k++)
@@ -352,7 +354,8 @@ static void nerfstudio_file(void **state)
     assert_int_equal(p.shots[0].camera.model, GBT_CAMERA_FISHEYE);
     assert_near(p.shots[0].camera.params[0], 30, 1e-9);
     camera_path_free(&p);
-    p = read_good("{\"camera_type\": \"equirectangular\", \"render_width\": 80, \"render_height\": 40, \"seconds\": 2, \"camera_path\": [{" AT_123 "}, {" AT_123 "}]}", none, 0);
+    p = read_good("{\"camera_type\": \"equirectangular\", \"render_width\": 80, \"render_height\": 40, \"seconds\": 2, \"camera_path\": "
+                  "[{" AT_123 "}, {" AT_123 "}]}", none, 0);
     assert_int_equal(p.shots[1].camera.model, GBT_CAMERA_EQUIRECTANGULAR);
     assert_near(p.fps, 1, 1e-12);
     camera_path_free(&p);
@@ -394,9 +397,11 @@ static const struct bad_case { const char *text, *message; } bad_cases[] = {
     {"{" COMMON ", \"cameras\": [{\"rays\": \"x.exr\"}]}", ": cameras[0].rays: not in a path (wanted a camera)"},
     {"{\"width\": 64, \"up\": [0, 1, 0], \"fov_x_deg\": 90, \"cameras\": [{\"origin\": [0, 0, 0], \"target\": [0, 0, 1], \"height\": 32},"
      " {\"origin\": [0, 0, 0], \"target\": [0, 0, 1], \"height\": 16}]}", ": cameras[1]: 64 x 16 pixels (wanted 64 x 32, as the first)"},
-    {"{\"frames\": 9, " COMMON ", \"cameras\": [{\"origin\": [0, 0, 0], \"target\": [0, 0, 1]}, {\"origin\": [0, 0, 0], \"target\": [0, 0, 1], \"model\": \"fisheye\"}]}",
+    {"{\"frames\": 9, " COMMON ", \"cameras\": [{\"origin\": [0, 0, 0], \"target\": [0, 0, 1]}, {\"origin\": [0, 0, 0], \"target\": [0, 0, "
+                               "1], \"model\": \"fisheye\"}]}",
      ": cameras[1].model: not that of the first (wanted one lens on a way with \"frames\")"},
-    {"{\"frames\": 9, \"aperture\": 1, \"focus\": 2, " COMMON ", \"cameras\": " TWO "}", ": cameras[0]: an aperture or a shutter (wanted none"},
+    {"{\"frames\": 9, \"aperture\": 1, \"focus\": 2, " COMMON ", \"cameras\": " TWO "}",
+     ": cameras[0]: an aperture or a shutter (wanted none"},
     {"{\"camera_path\": []}", ": camera_path: wanted a list of 1 to 100000 cameras"},
     {"{\"camera_path\": [{}]}", ": render_width: missing (pixels)"},
     {"{\"render_width\": 8, \"camera_path\": [{}]}", ": render_height: missing (pixels)"},
@@ -406,11 +411,16 @@ static const struct bad_case { const char *text, *message; } bad_cases[] = {
     {"{" NERF ", \"camera_path\": [{}]}", ": camera_path[0].fov: missing (degrees from the top"},
     {"{" NERF ", \"camera_path\": [{\"fov\": 180}]}", ": camera_path[0].fov: wanted a number in (0, 179.9]"},
     {"{" NERF ", \"camera_path\": [{\"fov\": 50}]}", ": camera_path[0].camera_to_world: wanted 12 or 16 numbers, row after row"},
-    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [1, 2, 3]}]}", ": camera_path[0].camera_to_world: wanted 12 or 16 numbers, row after row"},
-    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [1,0,0,0,0,1,0,0,0,0,1,\"0\"]}]}", ": camera_path[0].camera_to_world: wanted 12 or 16 numbers"},
-    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [[1,0,0,0],[0,1,0,0],5]}]}", ": camera_path[0].camera_to_world: wanted 12 or 16 numbers"},
-    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [2,0,0,0,0,1,0,0,0,0,1,0]}]}", ": camera_path[0].camera_to_world: not a rotation"},
-    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [-1,0,0,0,0,1,0,0,0,0,1,0]}]}", ": camera_path[0].camera_to_world: not a rotation"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [1, 2, 3]}]}",
+     ": camera_path[0].camera_to_world: wanted 12 or 16 numbers, row after row"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [1,0,0,0,0,1,0,0,0,0,1,\"0\"]}]}",
+     ": camera_path[0].camera_to_world: wanted 12 or 16 numbers"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [[1,0,0,0],[0,1,0,0],5]}]}",
+     ": camera_path[0].camera_to_world: wanted 12 or 16 numbers"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [2,0,0,0,0,1,0,0,0,0,1,0]}]}",
+     ": camera_path[0].camera_to_world: not a rotation"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [-1,0,0,0,0,1,0,0,0,0,1,0]}]}",
+     ": camera_path[0].camera_to_world: not a rotation"},
     {"{\"transform\": [], " NERF ", \"camera_path\": [{}]}", ": transform: wanted 12 or 16 numbers, row after row"},
     {"{\"scale\": 0, \"transform\": [], " NERF ", \"camera_path\": [{}]}", ": scale: wanted a number in (0, 1e+15]"},
 };
@@ -424,7 +434,8 @@ static void says_what_is_wrong(void **state)
         write_text(file_path, bad_cases[i].text);
         const gbt_status status = camera_path_file_read(file_path, none, 0, &p, &err);
         const size_t length = strlen(file_path);
-        if (status != GBT_ERR_FORMAT || strncmp(err.text, file_path, length) != 0 || strncmp(err.text + length, bad_cases[i].message, strlen(bad_cases[i].message)) != 0)
+        if (status != GBT_ERR_FORMAT || strncmp(err.text, file_path, length) != 0 ||
+            strncmp(err.text + length, bad_cases[i].message, strlen(bad_cases[i].message)) != 0)
             fail_msg("%s: %d: %s", bad_cases[i].text, (int)status, err.text);
         camera_path_free(&p);
     }
@@ -434,7 +445,7 @@ static void says_what_is_wrong(void **state)
     camera_path_free(&p);
 }
 
-/* ---- films ------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- films --------------------------------------------------------------------------------------------------------------------------- */
 
 static void no_film_left(const char *path)
 {
@@ -536,10 +547,11 @@ static void film_and_back(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_cameras_look_at), cmocka_unit_test(parallel_cameras), cmocka_unit_test(closed_orbit), cmocka_unit_test(orbit_of_an_arc), cmocka_unit_test(orbit_follows_the_cameras),
-        cmocka_unit_test(through_all_keys), cmocka_unit_test(turning_on_the_spot), cmocka_unit_test(order_to_go_through), cmocka_unit_test(our_file),
-        cmocka_unit_test(nerfstudio_file), cmocka_unit_test(nerfstudio_world), cmocka_unit_test(says_what_is_wrong), cmocka_unit_test(film_without_ffmpeg),
-        cmocka_unit_test(film_that_fails),
+        cmocka_unit_test(what_cameras_look_at), cmocka_unit_test(parallel_cameras), cmocka_unit_test(closed_orbit),
+            cmocka_unit_test(orbit_of_an_arc), cmocka_unit_test(orbit_follows_the_cameras),
+        cmocka_unit_test(through_all_keys), cmocka_unit_test(turning_on_the_spot), cmocka_unit_test(order_to_go_through),
+        cmocka_unit_test(our_file), cmocka_unit_test(nerfstudio_file), cmocka_unit_test(nerfstudio_world),
+        cmocka_unit_test(says_what_is_wrong), cmocka_unit_test(film_without_ffmpeg), cmocka_unit_test(film_that_fails),
         {.name = "film and back: mp4", .test_func = film_and_back, .initial_state = "mp4"},
         {.name = "film and back: webm", .test_func = film_and_back, .initial_state = "webm"},
         {.name = "film and back: gif", .test_func = film_and_back, .initial_state = "gif"},

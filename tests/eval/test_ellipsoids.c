@@ -8,7 +8,8 @@ enum { SIDE = 64 };
 
 static gbt_camera pinhole(void)
 {
-    return (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = SIDE, .height = SIDE, .params = {64, 64, 32, 32}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    return (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = SIDE, .height = SIDE, .params = {64, 64, 32, 32},
+                        .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 }
 
 static gbt_camera parallel_rays(void)

@@ -49,9 +49,11 @@ static const char *write_grid(const char *name, int side, double step, double of
     const char *path = in_folder(name);
     FILE *file = fopen(path, "w");
     assert_non_null(file);
-    fprintf(file, "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\nend_header\n", side * side * side);
+    fprintf(file, "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\nend_header\n",
+            side * side * side);
     for (int i = 0; i < side * side * side; i++)
-        fprintf(file, "%.17g %.17g %.17g\n", offset + step * (i % side), offset + step * (i / side % side), offset + step * (i / side / side));
+        fprintf(file, "%.17g %.17g %.17g\n", offset + step * (i % side), offset + step * (i / side % side),
+                offset + step * (i / side / side));
     fclose(file);
     return path;
 }
@@ -112,7 +114,8 @@ static void expectations_hold(void **state)
         scene s;
         assert_ok(scene_load(path, NULL, &s, NULL));
         const expectation e = expect_training(&s, runs[i].downscale, 2);
-        print_message("%s: %.2f of the memory, %.2f of the time\n", runs[i].data, e.bytes / runs[i].bytes, e.step_seconds / runs[i].step_seconds);
+        print_message("%s: %.2f of the memory, %.2f of the time\n", runs[i].data, e.bytes / runs[i].bytes,
+                      e.step_seconds / runs[i].step_seconds);
         assert_true(e.bytes < 1.5 * runs[i].bytes && e.bytes > runs[i].bytes / 1.5);
         assert_true(e.step_seconds < 1.5 * runs[i].step_seconds && e.step_seconds > runs[i].step_seconds / 1.5);
         assert_true(e.score_seconds > 0);
@@ -123,8 +126,8 @@ static void expectations_hold(void **state)
 static void info_of_a_model(void **state)
 {
     (void)state;
-    model m = {.anchors.offset_count = 3, .origin = {1, 2, 4.5e6}, .voxel_size = 0.25f, .extent = 2, .data_folder = "photos", .config = "a = 1\nb = \"x\"\n",
-               .iterations = 1234};
+    model m = {.anchors.offset_count = 3, .origin = {1, 2, 4.5e6}, .voxel_size = 0.25f, .extent = 2, .data_folder = "photos",
+               .config = "a = 1\nb = \"x\"\n", .iterations = 1234};
     assert_ok(anchors_resize(&m.anchors, 17, NULL));
     assert_ok(decoder_init(&m.decoder, 3, true, 1, NULL));
     assert_ok(model_save(in_folder("model.gbt"), &m, NULL));
@@ -179,7 +182,8 @@ static void init_counts(void **state)
     FILE *report = fopen("/dev/null", "w");
     gbt_init_def def = gbt_init_def_default();
     const struct { const char *init; int max_depth; float voxel_size; double anchors, voxels, balls; } rows[] = {
-        {"gb", 0, 0.0f, 1, 64, 1}, {"gb", 1, 0.0f, 2, 64, 2}, {"gb", 2, 0.0f, 4, 64, 4}, {"gb", 18, 0.0f, 8, 64, 8}, /* cubes of 8 points: compact (eq 23) */
+        /* cubes of 8 points: compact (eq 23) */
+        {"gb", 0, 0.0f, 1, 64, 1}, {"gb", 1, 0.0f, 2, 64, 2}, {"gb", 2, 0.0f, 4, 64, 4}, {"gb", 18, 0.0f, 8, 64, 8},
         {"gb", 18, 0.125f, 32, 64, 32}, /* never compact: leaves of N_min = 2 points */
         {"voxel", 18, 0.0f, 64, 64, 8}, {"voxel", 18, 100.0f, 1, 1, 1}, {"adaptive", 18, 0.0f, 16, 64, 8}, {"random", 18, 0.0f, 16, 64, 8},
     };
@@ -221,7 +225,8 @@ static void init_writes_world_coordinates(void **state)
     fclose(report);
     json_t *back = info_as_json(in_folder("out.ply"));
     for (size_t k = 0; k < 3; k++)
-        assert_true(fabs(json_number_value(json_array_get(json_object_get(back, "origin"), k)) - (4e6 + 0.5)) <= 0.5); /* a float there has steps of 0.25 */
+        /* a float there has steps of 0.25 */
+        assert_true(fabs(json_number_value(json_array_get(json_object_get(back, "origin"), k)) - (4e6 + 0.5)) <= 0.5);
     json_decref(back);
 }
 
@@ -234,7 +239,8 @@ static void init_refuses(void **state)
     gbt_init_def bad[BAD];
     for (int i = 0; i < BAD; i++)
         bad[i] = good;
-    bad[0].init = "ball", bad[1].scale_prior = NULL, bad[2].voxel_rule = "", bad[3].voxel_size = -1, bad[4].voxel_size = NAN, bad[5].max_depth = 65;
+    bad[0].init = "ball", bad[1].scale_prior = NULL, bad[2].voxel_rule = "", bad[3].voxel_size = -1, bad[4].voxel_size = NAN,
+        bad[5].max_depth = 65;
     bad[6].init = NULL, bad[7].init_count = 0, bad[8].init_count = 1.5;
     for (int i = 0; i < BAD; i++) {
         gbt_error err = {0};

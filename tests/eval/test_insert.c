@@ -23,7 +23,8 @@ static gaussians cloud(uint64_t seed, const double low[3], const double high[3])
         g.mean_x[i] = (float)(low[0] + value[0] * (high[0] - low[0]));
         g.mean_y[i] = (float)(low[1] + value[1] * (high[1] - low[1]));
         g.mean_z[i] = (float)(low[2] + value[2] * (high[2] - low[2]));
-        g.scale_x[i] = (float)(0.05 + 0.3 * value[3]), g.scale_y[i] = (float)(0.05 + 0.3 * value[4]), g.scale_z[i] = (float)(0.05 + 0.3 * value[5]);
+        g.scale_x[i] = (float)(0.05 + 0.3 * value[3]), g.scale_y[i] = (float)(0.05 + 0.3 * value[4]),
+            g.scale_z[i] = (float)(0.05 + 0.3 * value[5]);
         const double length = sqrt(value[6] * value[6] + value[7] * value[7] + value[8] * value[8] + 1);
         g.quat_w[i] = (float)(1 / length), g.quat_x[i] = (float)(value[6] / length);
         g.quat_y[i] = (float)(value[7] / length), g.quat_z[i] = (float)(value[8] / length);
@@ -37,7 +38,8 @@ static gaussians cloud(uint64_t seed, const double low[3], const double high[3])
 /* A pinhole at the origin of the world that looks along z. */
 static ray_image look(void)
 {
-    const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = W, .height = H, .params = {30, 30, 0.5 * W, 0.5 * H}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = W, .height = H, .params = {30, 30, 0.5 * W, 0.5 * H},
+                               .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     ray_image rays = {0};
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
     return rays;
@@ -65,7 +67,8 @@ typedef struct studio {
 /* A cloud with z from `near` to `far`. */
 static studio open_studio(uint64_t seed, double near, double far)
 {
-    studio st = {.g = cloud(seed, (const double[3]){-2, -1.5, near}, (const double[3]){2, 1.5, far}), .settings = trace_settings_default(), .rays = look()};
+    studio st = {.g = cloud(seed, (const double[3]){-2, -1.5, near}, (const double[3]){2, 1.5, far}), .settings = trace_settings_default(),
+                 .rays = look()};
     memcpy(st.settings.background, background, sizeof background);
     assert_ok(image_alloc(&st.rgb, W, H, 3, NULL));
     return st;
@@ -173,7 +176,8 @@ static void mirrored_camera(void **state)
         for (size_t i = 0; i < W * H; i++) {
             seen += 1 - left[i];
             for (size_t k = 0; k < 3; k++)
-                assert_near((double)st.rgb.pixels[3 * i + k], (double)mirror.color[k] * (rgb[3 * i + k] + left[i] * (double)background[k]), 1e-4);
+                assert_near((double)st.rgb.pixels[3 * i + k], (double)mirror.color[k] * (rgb[3 * i + k] + left[i] * (double)background[k]),
+                            1e-4);
         }
         assert_true(seen > 50);
         close_studio(&st, &in);
@@ -346,7 +350,8 @@ static void shadow_on_a_mesh(void **state)
     assert_ok(insert_add(&in, &red, vertices, 4, triangles, 2, NULL));
     shoot(&st, &in);
     for (size_t i = 0; i < W * H; i++) {
-        const double slope[2] = {(double)st.rays.dir[3 * i] / (double)st.rays.dir[3 * i + 2], (double)st.rays.dir[3 * i + 1] / (double)st.rays.dir[3 * i + 2]};
+        const double slope[2] = {(double)st.rays.dir[3 * i] / (double)st.rays.dir[3 * i + 2],
+                                 (double)st.rays.dir[3 * i + 1] / (double)st.rays.dir[3 * i + 2]};
         const bool on_screen = slope[0] > -0.12 && slope[0] < -0.04;
         const double z = on_screen ? 5 : 7, point[3] = {z * slope[0], z * slope[1], z}, normal[3] = {0, 0, 1};
         const bool in_shadow = !on_screen && point[0] > 1.8 && point[0] < 2.6;
@@ -385,7 +390,8 @@ static void no_surface_hides_itself(void **state)
                 continue;
             for (size_t k = 0; k < 3; k++)
                 assert_near((double)st.rgb.pixels[3 * i + k],
-                            mirrors ? (double)(mirror.color[k] * background[k]) : (double)matt.color[k] * lit(normal, point, in.lamp_at, 0.25), 2e-5);
+                            mirrors ? (double)(mirror.color[k] * background[k])
+                                    : (double)matt.color[k] * lit(normal, point, in.lamp_at, 0.25), 2e-5);
         }
         close_studio(&st, &in);
     }
@@ -443,7 +449,8 @@ int main(void)
     for (size_t i = 0; i < PLANES; i++)
         tables[i] = (struct CMUnitTest){.name = plane_cases[i].name, .test_func = occlusion, .initial_state = &plane_cases[i]};
     for (size_t i = 0; i < LAMPS; i++)
-        tables[PLANES + i] = (struct CMUnitTest){.name = lamp_cases[i].name, .test_func = shadow_of_gaussians, .initial_state = &lamp_cases[i]};
+        tables[PLANES + i] = (struct CMUnitTest){.name = lamp_cases[i].name, .test_func = shadow_of_gaussians,
+                                                 .initial_state = &lamp_cases[i]};
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(elsewhere_nothing_changes), cmocka_unit_test(mirrored_camera),  cmocka_unit_test(smooth_plane),
         cmocka_unit_test(mirrors_end),               cmocka_unit_test(shadow_on_gaussians), cmocka_unit_test(shadow_on_a_mesh),

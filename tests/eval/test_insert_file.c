@@ -49,7 +49,8 @@ static void defaults(void **state)
     insert_scene in = read_good("{\"objects\": [{\"mesh\": \"m.obj\"}]}", none);
     assert_true(in.lamp == INSERT_NO_LAMP && in.ambient == 1 && in.object_count == 1 && in.triangle_count == 1 && in.vertex_count == 4);
     const insert_object *o = in.objects;
-    assert_true(o->material == INSERT_MATT && !o->smooth && o->color[0] == 0.8f && o->color[1] == 0.8f && o->color[2] == 0.8f && o->triangle_end == 1);
+    assert_true(o->material == INSERT_MATT && !o->smooth && o->color[0] == 0.8f && o->color[1] == 0.8f && o->color[2] == 0.8f &&
+                o->triangle_end == 1);
     const float vertices[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 9, 9, 9};
     assert_memory_equal(in.vertices, vertices, sizeof vertices);
     assert_true(in.reach >= 9 && in.reach < 9.01f && in.offset_min > 0);
@@ -63,13 +64,16 @@ static void placed(void **state)
     (void)state;
     const double origin[3] = {1000000, 0, -5};
     insert_scene in = read_good("{\"light\": {\"position\": [1000001, 2, 3], \"radius\": 0.5, \"ambient\": 0.125},"
-                                " \"objects\": [{\"mesh\": \"m.obj\", \"material\": \"mirror\", \"color\": [0, 0.5, 1], \"smooth\": true, \"position\": [1000000.25, 1, 0],"
-                                " \"scale\": 2, \"axis\": [0, 0, 3], \"angle_deg\": 90}, {\"mesh\": \"m.obj\", \"position\": [1000000, 0, -5]}]}", origin);
+                                " \"objects\": [{\"mesh\": \"m.obj\", \"material\": \"mirror\", \"color\": [0, 0.5, 1], \"smooth\": true, "
+                                "\"position\": [1000000.25, 1, 0],"
+                                " \"scale\": 2, \"axis\": [0, 0, 3], \"angle_deg\": 90}, {\"mesh\": \"m.obj\", \"position\": [1000000, 0, "
+                                "-5]}]}", origin);
     const double wanted[6] = {0.25, 3, 5, -1.75, 1, 5};
     for (int i = 0; i < 6; i++)
         assert_near((double)in.vertices[i], wanted[i], 1e-6);
     assert_near((double)in.vertices[12], 1, 0);
-    assert_true(in.lamp == INSERT_LAMP_POINT && in.lamp_at[0] == 1 && in.lamp_at[1] == 2 && in.lamp_at[2] == 8 && in.lamp_radius == 0.5 && in.ambient == 0.125f);
+    assert_true(in.lamp == INSERT_LAMP_POINT && in.lamp_at[0] == 1 && in.lamp_at[1] == 2 && in.lamp_at[2] == 8 && in.lamp_radius == 0.5 &&
+                in.ambient == 0.125f);
     assert_true(in.objects[0].material == INSERT_MIRROR && in.objects[0].smooth && in.objects[0].color[1] == 0.5f);
     assert_true(in.objects[1].material == INSERT_MATT && in.objects[1].triangle_end == 2 && in.triangles[3] == 4);
     insert_scene_free(&in);
@@ -125,7 +129,8 @@ static void says_what_is_wrong(void **state)
         write_text(path, bad_cases[i].text);
         const gbt_status status = insert_file_read(path, none, &in, &err);
         const size_t length = strlen(path);
-        if (status != GBT_ERR_FORMAT || strncmp(err.text, path, length) != 0 || strncmp(err.text + length, bad_cases[i].message, strlen(bad_cases[i].message)) != 0)
+        if (status != GBT_ERR_FORMAT || strncmp(err.text, path, length) != 0 ||
+            strncmp(err.text + length, bad_cases[i].message, strlen(bad_cases[i].message)) != 0)
             fail_msg("%s: %d: %s", bad_cases[i].text, (int)status, err.text);
         insert_scene_free(&in);
     }
@@ -156,6 +161,7 @@ static void without_memory(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(defaults), cmocka_unit_test(placed), cmocka_unit_test(says_what_is_wrong), cmocka_unit_test(without_memory)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(defaults), cmocka_unit_test(placed), cmocka_unit_test(says_what_is_wrong),
+                                       cmocka_unit_test(without_memory)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -13,7 +13,8 @@ static void lists_of_outputs(void **state)
 {
     (void)state;
     static const struct { const char *list; unsigned wanted; } good[] = {
-        {NULL, 0}, {"transmittance", 1}, {"depth", 2}, {"median-depth", 4}, {"normal", 8}, {"hits", 16}, {"anchor", 32}, {"anchor,depth", 34},
+        {NULL, 0}, {"transmittance", 1}, {"depth", 2}, {"median-depth", 4}, {"normal", 8}, {"hits", 16}, {"anchor", 32},
+        {"anchor,depth", 34},
         {"depth,depth", 2}, {"transmittance,depth,median-depth,normal,hits,anchor", 63}};
     static const char *const bad[] = {"", "Depth", "dept", "depths", "depth,", ",depth", "depth,,hits", "depth hits"};
     unsigned wanted;
@@ -45,7 +46,8 @@ static bool belongs_to(const gaussians *g, size_t i, const anchors *a, size_t an
     for (size_t k = 0; k < OFFSETS; k++) {
         float square = 0;
         for (size_t c = 0; c < 3; c++) {
-            const float d = a->position[3 * anchor + c] + a->offset[3 * (OFFSETS * anchor + k) + c] * expf(a->scale_log[6 * anchor + c]) - mean[c];
+            const float d = a->position[3 * anchor + c] + a->offset[3 * (OFFSETS * anchor + k) +
+                                                                    c] * expf(a->scale_log[6 * anchor + c]) - mean[c];
             square += d * d;
         }
         if (square < 1e-10f)
@@ -58,7 +60,8 @@ static void files_hold_what_was_traced(void **state)
 {
     (void)state;
     char folder[] = "/tmp/gbt_outputs_XXXXXX", path[96];
-    gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = WIDTH, .height = HEIGHT, .center = {0, 0, -5}, .params = {24, 24, 20, 12}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = WIDTH, .height = HEIGHT, .center = {0, 0, -5}, .params = {24, 24, 20, 12},
+                         .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     ray_shot shot = ray_shot_of(&camera);
     shot.aperture_radius = 0.05, shot.focus_distance = 5, shot.samples = 2; /* outputs are those of the pinhole in its middle */
     loaded_run *r = random_run(&shot);
@@ -82,7 +85,8 @@ static void files_hold_what_was_traced(void **state)
     ray_image rays = {0};
     assert_ok(image_alloc(&rgb, WIDTH, HEIGHT, 3, NULL));
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-    assert_ok(trace_forward(&r->frame.scene, &rays, false, &(trace_outputs){.rgb = &rgb, .depth = depth, .hit_count = hits, .strongest = strongest}, NULL, NULL));
+    assert_ok(trace_forward(&r->frame.scene, &rays, false, &(trace_outputs){.rgb = &rgb, .depth = depth, .hit_count = hits,
+                                                                            .strongest = strongest}, NULL, NULL));
     size_t seen = 0, empty = 0, anchors_seen = 0;
     float last = -1;
     for (size_t i = 0; i < WIDTH * HEIGHT; i++) {

@@ -200,10 +200,12 @@ static char *check_page(void)
 
 /* ---- inputs ------------------------------------------------------------------------------------------------------------------- */
 
-static const char log_header[] = "step,seconds,progress,width,height,loss,l1,ssim,train_psnr,test_psnr,anchors,gaussians,visible_anchors,blended_per_ray,"
+static const char log_header[] =
+    "step,seconds,progress,width,height,loss,l1,ssim,train_psnr,test_psnr,anchors,gaussians,visible_anchors,blended_per_ray,"
                                  "rays_per_second,memory_bytes\n";
 
-static const char stage_names[] = ",photo_ms,rays_ms,visible_ms,decode_ms,build_ms,trace_ms,loss_ms,adjoint_ms,decode_adjoint_ms,optimizer_ms,adjust_ms\n";
+static const char stage_names[] =
+    ",photo_ms,rays_ms,visible_ms,decode_ms,build_ms,trace_ms,loss_ms,adjoint_ms,decode_adjoint_ms,optimizer_ms,adjust_ms\n";
 
 static void write_log(int rows, const char *tail)
 {
@@ -211,8 +213,9 @@ static void write_log(int rows, const char *tail)
     assert_non_null(csv);
     int used = sprintf(csv, "%.*s%s", (int)strlen(log_header) - 1, log_header, stage_names);
     for (int i = 0; i < rows; i++)
-        used += sprintf(csv + used, "%d,%.3f,0.1,%d,%d,%.6f,0.1,0.5,%.4f,,%d,%d,300,20.5,%d,1000,1,2,3,4,5,6,7,8,9,10,11\n", 10 * (i + 1), 1.01 * (i + 1), i < rows / 2 ? 120 : 240,
-                        i < rows / 2 ? 90 : 180, 0.4 / (1 + i), 10 + 15.0 * i / rows, 1000 + i, 5000 + 7 * i, 400000 + 100 * i);
+        used += sprintf(csv + used, "%d,%.3f,0.1,%d,%d,%.6f,0.1,0.5,%.4f,,%d,%d,300,20.5,%d,1000,1,2,3,4,5,6,7,8,9,10,11\n", 10 * (i + 1),
+                        1.01 * (i + 1), i < rows / 2 ? 120 : 240, i < rows / 2 ? 90 : 180, 0.4 / (1 + i), 10 + 15.0 * i / rows, 1000 + i,
+                        5000 + 7 * i, 400000 + 100 * i);
     strcpy(csv + used, tail);
     write_text("log.csv", csv);
     free(csv);
@@ -221,17 +224,18 @@ static void write_log(int rows, const char *tail)
 static json_t *full_metrics(void)
 {
     return json_pack("{s:s,s:s,s:s,s:s,s:i,s:i,s:i,s:i,s:i,s:f,s:f,s:f,s:f,s:{s:f,s:f,s:f,s:f},s:[i,i,i],s:[{s:f,s:i,s:f}],s:f,s:s,s:i,s:i,s:s,s:s,s:I}", "command",
-                     "gbtrace train 'a <b> & \"c\"' -o run", "data", "/data/<script>alert(1)</script>/", "start", "900 sparse points", "protocol",
-                     "8-bit images", "points", 900, "anchors_initial", 700, "anchors_final", 1234567, "iterations", 1000, "skipped_steps", 0,
-                     "train_seconds", 61.5, "rays_per_second", 387187.4, "hits_per_ray", 87.7, "blended_per_ray", 75.6, "stage_ms_per_step", "trace", 146.9,
-                     "adjoint", 90.6, "build", 32.4, "all", 300.1, "pace", 333, 333, 334, "held_out", "seconds", 20.1, "step", 168, "psnr", 19.88,
-                     "downscale", 2.0, "eval_split", "every=8", "seed", 7, "threads", 2, "isa", "avx2", "embree_version", "3.13.5", "peak_memory_bytes",
-                     (json_int_t)2518880256);
+                     "gbtrace train 'a <b> & \"c\"' -o run", "data", "/data/<script>alert(1)</script>/", "start", "900 sparse points",
+                     "protocol", "8-bit images", "points", 900, "anchors_initial", 700, "anchors_final", 1234567, "iterations", 1000,
+                     "skipped_steps", 0, "train_seconds", 61.5, "rays_per_second", 387187.4, "hits_per_ray", 87.7, "blended_per_ray", 75.6,
+                     "stage_ms_per_step", "trace", 146.9, "adjoint", 90.6, "build", 32.4, "all", 300.1, "pace", 333, 333, 334, "held_out",
+                     "seconds", 20.1, "step", 168, "psnr", 19.88, "downscale", 2.0, "eval_split", "every=8", "seed", 7, "threads", 2, "isa",
+                     "avx2", "embree_version", "3.13.5", "peak_memory_bytes", (json_int_t)2518880256);
 }
 
 static evaluation make_views(size_t count)
 {
-    evaluation e = {.view_count = count, .psnr = 24.25, .ssim = 0.8125, .flip = 0.125, .gaussians_per_view = 54321, .anchors = 1234567, .model_bytes = 5182216};
+    evaluation e = {.view_count = count, .psnr = 24.25, .ssim = 0.8125, .flip = 0.125, .gaussians_per_view = 54321, .anchors = 1234567,
+                    .model_bytes = 5182216};
     e.views = calloc(count + 1, sizeof *e.views);
     assert_non_null(e.views);
     for (size_t i = 0; i < count; i++) {
@@ -274,9 +278,12 @@ static void whole_page(void **state)
         {"&lt;img src=x onerror=&#39;a&#39;&gt;&amp;&quot;\xef\xbf\xbd?.jpg", 5}, /* heading, slider, three pictures' texts */
         {"<h1>script&gt;</h1>", 1},                                                /* the last part of the path */
         {"gbtrace train &#39;a &lt;b&gt; &amp; &quot;c&quot;&#39; -o run", 2},
-        {"--pace 333,333,334", 1}, {"24.25", 1}, {"0.8125", 1}, {"0.1250", 1}, {"1,234,567", 2}, {"54,321", 2}, {"5.18 MB", 2}, {"61.5 s", 2},
-        {"5,182,216 bytes", 1}, {"2.52 GB", 1}, {"PIXELS", 9}, {"type=\"range\"", 3}, {"<svg ", 5}, {"<title>", 100}, {"held-out 19.88 at 20.10 s", 1},
-        {"held-out 24.25 at 61.50 s", 1}, {"240\xc3\x97" "180 px", 1}, {"avx2", 1}, {"every=8", 1}, {"900 sparse points", 1}, {"grow and prune", 1},
+        {"--pace 333,333,334", 1}, {"24.25", 1}, {"0.8125", 1}, {"0.1250", 1}, {"1,234,567", 2}, {"54,321", 2}, {"5.18 MB", 2},
+        {"61.5 s", 2},
+        {"5,182,216 bytes", 1}, {"2.52 GB", 1}, {"PIXELS", 9}, {"type=\"range\"", 3}, {"<svg ", 5}, {"<title>", 100},
+        {"held-out 19.88 at 20.10 s", 1},
+        {"held-out 24.25 at 61.50 s", 1}, {"240\xc3\x97" "180 px", 1}, {"avx2", 1}, {"every=8", 1}, {"900 sparse points", 1},
+        {"grow and prune", 1},
     };
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++)
         if (occurrences(page, wanted[i].text) < wanted[i].least)
@@ -341,7 +348,9 @@ static void bare_page(void **state)
 
 enum { POINTS = 200, VIEWS = 5 };
 
-/** A cloud in a box, an untrained model of it, cameras around it; the photos are the pictures of this folder. Free with loaded_run_close(). */
+/**
+ * A cloud in a box, an untrained model of it, cameras around it; the photos are the pictures of this folder. Free with loaded_run_close().
+ */
 static loaded_run *make_run(gbt_camera_model lens)
 {
     loaded_run *r = calloc(1, sizeof *r);
@@ -350,7 +359,8 @@ static loaded_run *make_run(gbt_camera_model lens)
     scene *s = &r->scene;
     s->view_count = VIEWS, s->points.count = POINTS, s->points.has_color = true;
     s->views = mem_calloc(VIEWS, sizeof *s->views, "views", NULL);
-    s->points.position = mem_calloc(POINTS, 3 * sizeof(float), "points", NULL), s->points.color = mem_calloc(POINTS, 3 * sizeof(float), "points", NULL);
+    s->points.position = mem_calloc(POINTS, 3 * sizeof(float), "points", NULL),
+        s->points.color = mem_calloc(POINTS, 3 * sizeof(float), "points", NULL);
     r->model.anchors.offset_count = 2, r->model.voxel_size = 0.1f;
     assert_ok(anchors_resize(&r->model.anchors, POINTS, &assert_ok_err_));
     assert_ok(decoder_init(&r->model.decoder, 2, false, 1, &assert_ok_err_));
@@ -388,7 +398,8 @@ static void scene_on_the_page(void **state)
 {
     (void)state;
     static const struct { gbt_camera_model lens; size_t layers; bool has_photos, has_points; } cases[] = {
-        {GBT_CAMERA_PINHOLE, 6, true, true}, {GBT_CAMERA_PINHOLE, 5, false, true}, {GBT_CAMERA_PINHOLE, 4, true, false}, {GBT_CAMERA_EQUIRECTANGULAR, 0, true, true}};
+        {GBT_CAMERA_PINHOLE, 6, true, true}, {GBT_CAMERA_PINHOLE, 5, false, true}, {GBT_CAMERA_PINHOLE, 4, true, false},
+        {GBT_CAMERA_EQUIRECTANGULAR, 0, true, true}};
     write_log(5, "");
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         write_pictures();
@@ -427,9 +438,12 @@ static void odd_metrics(void **state)
     evaluation e = make_views(1);
     e.views[0].psnr = e.psnr = (double)INFINITY, e.views[0].ssim = -1e300, e.views[0].flip = 1e300, e.views[0].seconds = 1e300;
     static const char *const texts[] = {
-        "{\"command\": 5, \"data\": null, \"pace\": [1, \"x\"], \"held_out\": 3, \"stage_ms_per_step\": [1], \"seed\": \"s\", \"iterations\": -5}",
-        "{\"command\": \"\", \"data\": \"/\", \"pace\": [], \"held_out\": [1, null, {\"seconds\": 1e300, \"psnr\": 1e300}, {\"seconds\": -4, \"psnr\": 3}],"
-        " \"stage_ms_per_step\": {\"all\": -3, \"trace\": 1e308, \"build\": -1, \"loss\": 0}, \"train_seconds\": 1e300, \"iterations\": 1e300, \"isa\": {}}",
+        "{\"command\": 5, \"data\": null, \"pace\": [1, \"x\"], \"held_out\": 3, \"stage_ms_per_step\": [1], \"seed\": \"s\", "
+        "\"iterations\": -5}",
+        "{\"command\": \"\", \"data\": \"/\", \"pace\": [], \"held_out\": [1, null, {\"seconds\": 1e300, \"psnr\": 1e300}, {\"seconds\": "
+        "-4, \"psnr\": 3}],"
+        " \"stage_ms_per_step\": {\"all\": -3, \"trace\": 1e308, \"build\": -1, \"loss\": 0}, \"train_seconds\": 1e300, \"iterations\": "
+        "1e300, \"isa\": {}}",
         "{\"train_seconds\": -1, \"peak_memory_bytes\": 1e300, \"stage_ms_per_step\": {\"all\": 0, \"trace\": 0}, \"downscale\": -0.0}",
         "[]", "3", "{}",
     };
@@ -526,7 +540,8 @@ static const log_case log_cases[] = {
     {"too many fields", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0,9\n", 0, 0, 0},
     {"no time", "1,x,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n", 0, 0, 0},
     {"DOS line ends", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\r\n", 1, 1, 0.5},
-    {"resumed from step 1", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n3,3.0,0,8,6,0.2,0,0,9,,5,6,0,0,7,0\n2,2.0,0,8,6,0.3,0,0,9,,5,6,0,0,7,0\n", 2, 2, 0.3},
+    {"resumed from step 1", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n3,3.0,0,8,6,0.2,0,0,9,,5,6,0,0,7,0\n2,2.0,0,8,6,0.3,0,0,9,,5,6,0,0,7,0\n",
+     2, 2, 0.3},
     {"a score right after a row has no loss", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n1,1.0,0,8,6,0,0,0,0,21.5,5,0,0,0,0,0\n", 2, 1, NAN},
     {"time that falls", "1,2.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n2,1.0,0,8,6,0.2,0,0,9,,5,6,0,0,7,0\n", 1, 1, 0.5},
     {"zero bytes, blank lines", "\n\n1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n\n", 1, 1, 0.5},
@@ -595,14 +610,20 @@ static void add_2_decimals(text *t, double value)
 }
 
 static const text_case text_cases[] = {
-    {"number", add_2_decimals, 1.005, "1.00"}, {"number NaN", add_2_decimals, NAN, "n/a"}, {"number infinite", add_2_decimals, -INFINITY, "n/a"},
+    {"number", add_2_decimals, 1.005, "1.00"}, {"number NaN", add_2_decimals, NAN, "n/a"},
+    {"number infinite", add_2_decimals, -INFINITY, "n/a"},
     {"count 0", text_count, 0, "0"}, {"count 999", text_count, 999, "999"}, {"count 1000", text_count, 1000, "1,000"},
     {"count rounds up to four digits", text_count, 999.6, "1,000"}, {"count -1234567", text_count, -1234567, "-1,234,567"},
-    {"count -0.4", text_count, -0.4, "0"}, {"count NaN", text_count, NAN, "n/a"}, {"bytes 0", text_bytes, 0, "0 B"}, {"bytes 999", text_bytes, 999, "999 B"},
-    {"bytes 1000", text_bytes, 1000, "1.00 kB"}, {"bytes 999600", text_bytes, 999600, "1.00 MB"}, {"bytes 12.34 M", text_bytes, 12.34e6, "12.3 MB"},
-    {"bytes 2.5e12", text_bytes, 2.5e12, "2.50 TB"}, {"bytes NaN", text_bytes, NAN, "n/a"}, {"duration 1.234", text_duration, 1.234, "1.23 s"},
-    {"duration 99.9", text_duration, 99.9, "99.9 s"}, {"duration 119.7", text_duration, 119.7, "2 min 00 s"}, {"duration 300.4", text_duration, 300.4, "5 min 00 s"},
-    {"duration 7199.9", text_duration, 7199.9, "2 h 00 min"}, {"duration 2 h 5 min", text_duration, 7500, "2 h 05 min"}, {"duration NaN", text_duration, NAN, "n/a"},
+    {"count -0.4", text_count, -0.4, "0"}, {"count NaN", text_count, NAN, "n/a"}, {"bytes 0", text_bytes, 0, "0 B"},
+    {"bytes 999", text_bytes, 999, "999 B"},
+    {"bytes 1000", text_bytes, 1000, "1.00 kB"}, {"bytes 999600", text_bytes, 999600, "1.00 MB"},
+    {"bytes 12.34 M", text_bytes, 12.34e6, "12.3 MB"},
+    {"bytes 2.5e12", text_bytes, 2.5e12, "2.50 TB"}, {"bytes NaN", text_bytes, NAN, "n/a"},
+    {"duration 1.234", text_duration, 1.234, "1.23 s"},
+    {"duration 99.9", text_duration, 99.9, "99.9 s"}, {"duration 119.7", text_duration, 119.7, "2 min 00 s"},
+    {"duration 300.4", text_duration, 300.4, "5 min 00 s"},
+    {"duration 7199.9", text_duration, 7199.9, "2 h 00 min"}, {"duration 2 h 5 min", text_duration, 7500, "2 h 05 min"},
+    {"duration NaN", text_duration, NAN, "n/a"},
 };
 
 static void assert_text(const text *t, const char *wanted)
@@ -625,9 +646,12 @@ static void escapes(void **state)
 {
     (void)state;
     static const struct { const char *in, *out; } cases[] = {
-        {"a<b>&\"'", "a&lt;b&gt;&amp;&quot;&#39;"}, {NULL, "n/a"}, {"", ""}, {"\t\n\x01\x7f", "  ??"}, {"gr\xc3\xbc\xc3\x9f \xe2\x82\xac \xf0\x9f\xa6\x8a", "gr\xc3\xbc\xc3\x9f \xe2\x82\xac \xf0\x9f\xa6\x8a"},
-        {"\xff" "a", "\xef\xbf\xbd" "a"}, {"\xc3", "\xef\xbf\xbd"}, {"\xc0\x80", "\xef\xbf\xbd\xef\xbf\xbd"}, {"\xe2\x82", "\xef\xbf\xbd\xef\xbf\xbd"},
-        {"\xed\xa0\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"}, {"\xf4\x90\x80\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"}, {"\xe2<b>", "\xef\xbf\xbd&lt;b&gt;"},
+        {"a<b>&\"'", "a&lt;b&gt;&amp;&quot;&#39;"}, {NULL, "n/a"}, {"", ""}, {"\t\n\x01\x7f", "  ??"},
+        {"gr\xc3\xbc\xc3\x9f \xe2\x82\xac \xf0\x9f\xa6\x8a", "gr\xc3\xbc\xc3\x9f \xe2\x82\xac \xf0\x9f\xa6\x8a"},
+        {"\xff" "a", "\xef\xbf\xbd" "a"}, {"\xc3", "\xef\xbf\xbd"}, {"\xc0\x80", "\xef\xbf\xbd\xef\xbf\xbd"},
+        {"\xe2\x82", "\xef\xbf\xbd\xef\xbf\xbd"},
+        {"\xed\xa0\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"}, {"\xf4\x90\x80\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"},
+        {"\xe2<b>", "\xef\xbf\xbd&lt;b&gt;"},
         {"%s%n", "%s%n"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -656,7 +680,8 @@ static void base64(void **state)
 static void ticks_are_round(void **state)
 {
     (void)state;
-    static const double ranges[][2] = {{0, 1}, {0, 0.3}, {9.885, 29.6}, {0, 18138}, {-3, 7}, {5, 5}, {0, 0}, {1e-9, 2e-9}, {1e9, 1e9 + 1}, {-1e99, 1e99}, {99.99, 100}, {0, 61.5}};
+    static const double ranges[][2] = {{0, 1}, {0, 0.3}, {9.885, 29.6}, {0, 18138}, {-3, 7}, {5, 5}, {0, 0}, {1e-9, 2e-9}, {1e9, 1e9 + 1},
+                                       {-1e99, 1e99}, {99.99, 100}, {0, 61.5}};
     for (size_t i = 0; i < sizeof ranges / sizeof *ranges; i++) {
         double ticks[CHART_MAX_TICKS];
         const double low = ranges[i][0], high = ranges[i][1];
@@ -735,7 +760,8 @@ static void error_colors_are_even(void **state)
 static void large_pictures_shrink(void **state)
 {
     (void)state;
-    static const struct { int width, height, out_width, out_height; } cases[] = {{1280, 8, 1280, 8}, {1281, 8, 640, 4}, {4, 2570, 1, 856}, {2600, 1, 2600, 1}, {400, 300, 200, 150}};
+    static const struct { int width, height, out_width, out_height; } cases[] = {{1280, 8, 1280, 8}, {1281, 8, 640, 4}, {4, 2570, 1, 856},
+                                                                                 {2600, 1, 2600, 1}, {400, 300, 200, 150}};
     const size_t most = 100 * 1000;
     char path[VIEW_PATH_SIZE];
     in_folder(path, "render.png");

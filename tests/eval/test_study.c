@@ -14,7 +14,8 @@ static void lists_of_kernels(void **state)
     assert_int_equal(k[0], TRACE_TILE);
     assert_int_equal(bench_kernels_parse("embree,tile,single", k, 3), 3);
     assert_true(k[0] == TRACE_EMBREE && k[1] == TRACE_TILE && k[2] == TRACE_SINGLE);
-    static const char *const bad[] = {"", "tiles", "til", "tile,", ",tile", "tile,,embree", "tile,tile", "tile embree", "tile,single,embree,tile"};
+    static const char *const bad[] = {"", "tiles", "til", "tile,", ",tile", "tile,,embree", "tile,tile", "tile embree",
+                                      "tile,single,embree,tile"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         assert_int_equal(bench_kernels_parse(bad[i], k, 3), 0);
     for (int i = TRACE_TILE; i <= TRACE_EMBREE; i++) {
@@ -33,8 +34,10 @@ static void ways_in_turn(void **state)
     const cpu_isa before = cpu_best_isa();
     const gbt_camera camera = pinhole_camera(48, 32);
     const bench_splat splat = {&camera, &g, RASTER_PER_RAY};
-    bench_way ways[WAYS] = {{.kernel = TRACE_TILE, .isa = CPU_AVX512, .settings = s}, {.kernel = TRACE_EMBREE, .isa = CPU_AVX512, .settings = s},
-                            {.kernel = TRACE_TILE, .isa = CPU_PLAIN, .settings = s}, {.kernel = TRACE_TILE, .isa = CPU_AVX512, .settings = s, .tape_bytes_max = 1000},
+    bench_way ways[WAYS] = {{.kernel = TRACE_TILE, .isa = CPU_AVX512, .settings = s},
+                            {.kernel = TRACE_EMBREE, .isa = CPU_AVX512, .settings = s},
+                            {.kernel = TRACE_TILE, .isa = CPU_PLAIN, .settings = s},
+                            {.kernel = TRACE_TILE, .isa = CPU_AVX512, .settings = s, .tape_bytes_max = 1000},
                             {.kernel = TRACE_TILE, .isa = CPU_AVX512, .settings = s, .splat = &splat}};
     assert_ok(bench_measure(ways, WAYS, &g, &rays, 2, NULL));
     assert_int_equal(cpu_best_isa(), before);
@@ -43,7 +46,8 @@ static void ways_in_turn(void **state)
     assert_int_equal(ray_image_count(&want.rays), 6 * 4);
     for (int i = 0; i < WAYS; i++) {
         const bench_figures *f = &ways[i].figures;
-        assert_true((f->build_ms > 0 || ways[i].splat != NULL) && f->build_us >= 0 && f->forward_us > 0 && f->adjoint_us > 0 && f->forward_seconds > 0 && f->adjoint_seconds > 0);
+        assert_true((f->build_ms > 0 || ways[i].splat != NULL) && f->build_us >= 0 && f->forward_us > 0 && f->adjoint_us > 0 &&
+                    f->forward_seconds > 0 && f->adjoint_seconds > 0);
         assert_int_equal(f->counters.rays, 48 * 32);
         assert_true(f->counters.blended > 0 && (ways[i].splat != NULL || (f->tree_bytes > 0 && f->record_bytes == 300 * 64)));
         assert_true(bench_reference_compare(&want, &ways[i].rgb).psnr > 90);
@@ -65,7 +69,7 @@ static void ways_in_turn(void **state)
     ray_image_free(&rays);
 }
 
-/* ---- the chart ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- the chart ----------------------------------------------------------------------------------------------------------------------- */
 
 static char *draw(const scatter_point *points, size_t count, const scatter_level *levels, size_t level_count)
 {
@@ -120,7 +124,8 @@ static void words_cover_nothing(void **state)
     scatter_point points[COUNT];
     const scatter_level levels[] = {{50, "first level"}, {50.4, "second level"}};
     for (uint64_t i = 0; i < COUNT; i++) /* a heap of points around one place, and the named ones in it */
-        points[i] = (scatter_point){i < 3 ? 0 : 1 + (int)(i % 2), exp(0.3 * rng_normal(3, 0, i)), 50 + 4 * rng_normal(3, 1, i), i < 3 ? "named" : "0.0123"};
+        points[i] = (scatter_point){i < 3 ? 0 : 1 + (int)(i % 2), exp(0.3 * rng_normal(3, 0, i)), 50 + 4 * rng_normal(3, 1, i),
+                                    i < 3 ? "named" : "0.0123"};
     char *svg = draw(points, COUNT, levels, 2);
     double x[64], y[64], width[64];
     size_t count = 0, large = 0;

@@ -1,4 +1,5 @@
-/* tests/eval/test_study_paper.c -- the studies that train: statistics, the paper's numbers, runs made once, figures that are those of the runs. */
+/* tests/eval/test_study_paper.c -- the studies that train: statistics, the paper's numbers, runs made once, figures that are those of the
+   runs. */
 #include "train/run_support.h"
 
 #include "base/near.h"
@@ -12,7 +13,8 @@
 static void mean_and_spread(void **state)
 {
     (void)state;
-    const stat_sample s = stat_of((const double[]){1, NAN, 2, 6}, 4), one = stat_of((const double[]){5}, 1), none = stat_of((const double[]){NAN}, 1);
+    const stat_sample s = stat_of((const double[]){1, NAN, 2, 6}, 4), one = stat_of((const double[]){5}, 1),
+        none = stat_of((const double[]){NAN}, 1);
     assert_int_equal(s.count, 3);
     assert_near(s.mean, 3, 1e-15);
     assert_near(s.deviation, sqrt(7), 1e-15); /* (4 + 1 + 9) / 2 */
@@ -52,8 +54,10 @@ static double count_balls(size_t points, int depth)
 static void closed_form_of_balls(void **state)
 {
     (void)state;
-    const struct { double points; int depth; double balls; } known[] = {{54275, 18, 32768}, {32049, 18, 16384}, {80861, 18, 48093}, {80861, 10, 1024}, {80861, 12, 4096},
-                                                                        {0, 18, 0}, {1, 18, 1}, {2, 18, 1}, {3, 18, 2}, {3, 0, 1}, {1e6, 18, 262144}};
+    const struct { double points; int depth; double balls; } known[] = {{54275, 18, 32768}, {32049, 18, 16384}, {80861, 18, 48093},
+                                                                        {80861, 10, 1024}, {80861, 12, 4096},
+                                                                        {0, 18, 0}, {1, 18, 1}, {2, 18, 1}, {3, 18, 2}, {3, 0, 1},
+                                                                        {1e6, 18, 262144}};
     for (size_t i = 0; i < sizeof known / sizeof *known; i++)
         assert_near(paper_ball_count(known[i].points, known[i].depth), known[i].balls, 0);
     for (size_t points = 0; points < 700; points++)
@@ -65,7 +69,8 @@ static void closed_form_of_balls(void **state)
 static void constant_of_pairs(void **state)
 {
     (void)state;
-    static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n.01 0 0\n.1 0 0\n.12 0 0\n";
+    static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
+                              "z\nend_header\n0 0 0\n.01 0 0\n.1 0 0\n.12 0 0\n";
     const char *path = in_root("pairs.ply");
     assert_ok(file_write_atomic(path, ply, sizeof ply - 1, NULL));
     paper_scene look;
@@ -78,9 +83,12 @@ static void what_the_paper_says(void **state)
 {
     (void)state;
     const struct { paper_claim claim; double wanted, near, low, high; } cases[] = {
-        {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_INITIAL}, -37.1, 0.05, -42.6, -30.0}, {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_FINAL}, -10.0, 0.05, -12.0, -8.0},
-        {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_STORAGE}, -9.8, 0.05, -11.9, -7.9},   {{2, "", PAPER_GBSP, PAPER_VOXEL, PAPER_FINAL}, -12.0, 0.05, -22.7, -5.4},
-        {{2, "", PAPER_GBAI, PAPER_VOXEL, PAPER_PSNR}, 0.071, 0.002, -0.376, 0.576},  {{3, "", PAPER_GBSP, PAPER_VOXEL, PAPER_ARITHMETIC}, -15.9, 0.05, -29.6, -5.0},
+        {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_INITIAL}, -37.1, 0.05, -42.6, -30.0},
+        {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_FINAL}, -10.0, 0.05, -12.0, -8.0},
+        {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_STORAGE}, -9.8, 0.05, -11.9, -7.9},
+        {{2, "", PAPER_GBSP, PAPER_VOXEL, PAPER_FINAL}, -12.0, 0.05, -22.7, -5.4},
+        {{2, "", PAPER_GBAI, PAPER_VOXEL, PAPER_PSNR}, 0.071, 0.002, -0.376, 0.576},
+        {{3, "", PAPER_GBSP, PAPER_VOXEL, PAPER_ARITHMETIC}, -15.9, 0.05, -29.6, -5.0},
         {{4, "", PAPER_DEPTH_10, PAPER_GBSP, PAPER_FINAL}, 1.9, 0.05, 1.9, 1.9}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         double range[2];
@@ -218,7 +226,8 @@ static void check_csv(const char *folder)
         char name[64];
         int seed;
         double v[9];
-        assert_int_equal(sscanf(line + 1, "\"tiny\",%63[^,],%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", name, &seed, v, v + 1, v + 2, v + 3, v + 4, v + 5, v + 6, v + 7, v + 8), 11);
+        assert_int_equal(sscanf(line + 1, "\"tiny\",%63[^,],%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", name, &seed, v, v + 1, v + 2, v + 3,
+                                v + 4, v + 5, v + 6, v + 7, v + 8), 11);
         const char *run = in_root("%s/runs/tiny/%s/seed-%d", folder, name, seed);
         const char *const fields[] = {"points", "anchors_initial", "anchors_final", NULL, "model_bytes", "psnr", "ssim"};
         for (size_t i = 0; i < 7; i++)
@@ -258,15 +267,18 @@ static void check_json(const char *folder)
 {
     json_t *whole;
     assert_ok(json_read(in_root("%s/paper.json", folder), &whole, NULL));
-    const json_t *counts = row_of(whole, "tiny: initial anchors at D_max 18 against the closed form"), *change = row_of(whole, "table 1, tiny: balls in place of voxels: change of PSNR, dB");
+    const json_t *counts = row_of(whole, "tiny: initial anchors at D_max 18 against the closed form"),
+        *change = row_of(whole, "table 1, tiny: balls in place of voxels: change of PSNR, dB");
     assert_true(json_is_true(json_object_get(counts, "pass")));
     assert_near(json_number_value(json_object_get(counts, "limit")), 0.015, 0);
     assert_true(json_is_null(json_object_get(change, "limit")) && json_is_null(json_object_get(change, "pass")));
-    assert_near(json_number_value(json_object_get(change, "value")), mean_over_seeds(folder, "gbai-gbsp", "psnr") - mean_over_seeds(folder, "voxel", "psnr"), 1e-6);
+    assert_near(json_number_value(json_object_get(change, "value")),
+                mean_over_seeds(folder, "gbai-gbsp", "psnr") - mean_over_seeds(folder, "voxel", "psnr"), 1e-6);
     assert_near(json_number_value(json_object_get(change, "paper")), -0.071, 0.001);
     const json_t *first = json_array_get(json_object_get(whole, "figures"), 0);
     assert_string_equal(json_string_value(json_object_get(first, "variant")), "voxel");
-    assert_near(json_number_value(json_object_get(json_object_get(first, "final anchors"), "mean")), mean_over_seeds(folder, "voxel", "anchors_final"), 1e-9);
+    assert_near(json_number_value(json_object_get(json_object_get(first, "final anchors"), "mean")),
+                mean_over_seeds(folder, "voxel", "anchors_final"), 1e-9);
     json_decref(whole);
 }
 
@@ -274,7 +286,8 @@ static void check_page(const char *folder)
 {
     char *page = read_text(in_root("%s/paper.md", folder)), *svg = read_text(in_root("%s/paper.svg", folder)), cell[160];
     assert_true(count_of(page, "\n## ") == 2 && strstr(page, "\n## 1. ") != NULL && strstr(page, "\n## 2. ") != NULL);
-    snprintf(cell, sizeof cell, "| tiny | %.0f | GBAI | %.0f ± ", metric_of(in_root("%s/runs/tiny/gbai/seed-0", folder), "points"), mean_over_seeds(folder, "gbai", "anchors_initial"));
+    snprintf(cell, sizeof cell, "| tiny | %.0f | GBAI | %.0f ± ", metric_of(in_root("%s/runs/tiny/gbai/seed-0", folder), "points"),
+             mean_over_seeds(folder, "gbai", "anchors_initial"));
     assert_int_equal(count_of(page, cell), 1);
     assert_int_equal(count_of(page, "| balls in place of voxels | initial anchors, % |"), 1);
     assert_int_equal(count_of(page, "| -37.1 | -42.6 to -30.0 |"), 1);
@@ -325,17 +338,21 @@ static void runs_are_made_once(void **state)
     bytes csv = read_bytes(in_root("paper/paper.csv"));
     bytes metrics = read_bytes(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"));
     assert_ok(file_write_atomic(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"), metrics.data, metrics.count / 2, NULL)); /* damaged */
-    assert_int_equal(unlink(in_root("paper/runs/tiny/voxel-scaled/seed-0/study.json")), 0);                                       /* interrupted */
-    const gbt_paper_def def = small_paper(data, "1,2,4");                                                                        /* and a table more */
+    /* interrupted */
+    assert_int_equal(unlink(in_root("paper/runs/tiny/voxel-scaled/seed-0/study.json")), 0);
+    /* and a table more */
+    const gbt_paper_def def = small_paper(data, "1,2,4");
     paper_ok(&def, in_root("paper"));
     for (int v = 0; v < VARIANTS; v++)
         for (int seed = 0; seed < SEEDS; seed++) {
             const bool again = (v == 1 && seed == 1) || (v == 3 && seed == 0);
             assert_int_equal(is_newer(time_of(in_root("paper/runs/tiny/%s/seed-%d", variants[v], seed)), before[v][seed]), again);
         }
-    assert_false(file_exists(in_root("paper/runs/tiny/gbai-gbsp-depth-14"))); /* 150 points end at depth 7: the runs are those of D_max 18 */
+    assert_false(file_exists(in_root("paper/runs/tiny/gbai-gbsp-depth-14"))); /* 150 points end at depth 7: the runs are those of D_max
+                                                                                 18 */
     char *page = read_text(in_root("paper/paper.md"));
-    assert_int_equal(count_of(page, "| D_max 14 in place of 18 | final anchors, % | 0.0 ± 0.0 | **0.0 ± 0.0** | -6.0 |  | none at all |"), 1);
+    assert_int_equal(count_of(page, "| D_max 14 in place of 18 | final anchors, % | 0.0 ± 0.0 | **0.0 ± 0.0** | -6.0 |  | none at all |"),
+                     1);
     mem_free(page);
     mem_free(csv.data);
     mem_free(metrics.data);
@@ -397,7 +414,8 @@ static void quality_against_time(void **state)
     assert_ok(json_read(in_root("time/time.json"), &whole, NULL));
     const json_t *runs = json_object_get(whole, "runs");
     assert_int_equal(json_array_size(runs), time_variant_count);
-    assert_int_equal(json_array_size(json_object_get(whole, "rows")), time_variant_count); /* the seconds, and a change for all but the default */
+    /* the seconds, and a change for all but the default */
+    assert_int_equal(json_array_size(json_object_get(whole, "rows")), time_variant_count);
     struct timespec before[TIME_VARIANTS_MAX];
     char run[PATH_SIZE];
     for (size_t v = 0; v < time_variant_count; v++) {
@@ -425,7 +443,7 @@ static void quality_against_time(void **state)
     }
 }
 
-/* ---- anchors ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- anchors ------------------------------------------------------------------------------------------------------------------------- */
 
 static double figure_of(const json_t *run, const char *name)
 {
@@ -459,9 +477,11 @@ static void what_a_scene_needs(void **state)
     }
     /* More is asked of an anchor from 0.5 to 1 to 1.5 to 2.5. */
     assert_true(figure_of(json_array_get(runs, 6), "anchors_final") > figure_of(json_array_get(runs, 5), "anchors_final"));
-    assert_true(figure_of(json_array_get(runs, 2), "anchors_initial") <= 0.5 * figure_of(json_array_get(runs, ANCHORS_BALLS), "anchors_initial"));
+    assert_true(figure_of(json_array_get(runs, 2),
+                          "anchors_initial") <= 0.5 * figure_of(json_array_get(runs, ANCHORS_BALLS), "anchors_initial"));
     json_decref(whole);
-    char *page = read_text(in_root("anchors/anchors.md")), *svg = read_text(in_root("anchors/anchors.svg")), *csv = read_text(in_root("anchors/anchors.csv"));
+    char *page = read_text(in_root("anchors/anchors.md")), *svg = read_text(in_root("anchors/anchors.svg")),
+        *csv = read_text(in_root("anchors/anchors.csv"));
     assert_int_equal(count_of(page, "| random points |"), 1);
     assert_int_equal(count_of(csv, "\n"), 1 + 2 * anchors_variant_count);
     assert_null(strstr(svg, "nan"));

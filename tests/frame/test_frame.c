@@ -1,4 +1,5 @@
-/* tests/frame/test_frame.c -- frames of any shot: nothing that a ray reaches is left out, samples are averaged in order, same bits for all threads. */
+/* tests/frame/test_frame.c -- frames of any shot: nothing that a ray reaches is left out, samples are averaged in order, same bits for all
+   threads. */
 #include "anchor/fixture.h"
 #include "base/near.h"
 #include "base/parallel.h"
@@ -27,8 +28,9 @@ static void random_pose(uint64_t seed, uint64_t first, double distance, gbt_came
 /* A shot of each kind: lenses, open apertures, shutters, rays given anyhow. */
 static ray_shot random_shot(uint64_t seed, int kind, ray_image *given)
 {
-    static const gbt_camera_model models[KINDS] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_PINHOLE, GBT_CAMERA_FISHEYE, GBT_CAMERA_PINHOLE,
-                                                   GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_PINHOLE, GBT_CAMERA_EQUIRECTANGULAR, GBT_CAMERA_PINHOLE};
+    static const gbt_camera_model models[KINDS] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_PINHOLE, GBT_CAMERA_FISHEYE,
+                                                   GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_PINHOLE,
+                                                   GBT_CAMERA_EQUIRECTANGULAR, GBT_CAMERA_PINHOLE};
     const bool turn = models[kind] == GBT_CAMERA_EQUIRECTANGULAR;
     const double focal = kind == 3 ? 8 : uniform(seed, 0, 20, 60);
     gbt_camera camera = {.model = models[kind], .width = W, .height = H, .params = {turn ? W : focal, turn ? H : focal, 0.5 * W, 0.4 * H}};
@@ -50,7 +52,8 @@ static ray_shot random_shot(uint64_t seed, int kind, ray_image *given)
         for (size_t i = 0; i < W * H; i++) {
             double dir[3];
             for (size_t k = 0; k < 3; k++)
-                given->origin[3 * i + k] = (float)(camera.center[k] + 0.5 * rng_normal(seed, 20 + k, i)), dir[k] = camera.rotation[6 + k] + wide * rng_normal(seed, 30 + k, i);
+                given->origin[3 * i + k] = (float)(camera.center[k] + 0.5 * rng_normal(seed, 20 + k, i)),
+                    dir[k] = camera.rotation[6 + k] + wide * rng_normal(seed, 30 + k, i);
             dvec_normalize(dir);
             for (size_t k = 0; k < 3; k++)
                 given->dir[3 * i + k] = i % 50 == 7 ? 0 : (float)dir[k];
@@ -68,7 +71,8 @@ typedef struct world {
 
 static world make_world(uint64_t seed)
 {
-    world w = {.a = random_anchors(ANCHORS, OFFSETS, seed), .d = random_decoder(OFFSETS, false, seed + 1000), .s = trace_settings_default()};
+    world w = {.a = random_anchors(ANCHORS, OFFSETS, seed), .d = random_decoder(OFFSETS, false, seed + 1000),
+               .s = trace_settings_default()};
     for (size_t i = 0; i < ANCHORS; i++)
         for (size_t k = 0; k < 6; k++)
             w.a.scale_log[6 * i + k] = spread(seed, 200 + k, i, -4.0f, -2.0f);

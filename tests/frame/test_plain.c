@@ -110,7 +110,8 @@ static void nothing_visible_is_left_out(void **state)
 
 /* ---- adjoint ---------------------------------------------------------------------------------------------------------------------- */
 
-/* The tracer's adjoint has its own tests: here it is taken as it is, and the way from the cloud's parameters to its fields is differentiated in double. */
+/* The tracer's adjoint has its own tests: here it is taken as it is, and the way from the cloud's parameters to its fields is
+   differentiated in double. */
 static void adjoint_of_colors_and_shapes(void **state)
 {
     (void)state;
@@ -137,7 +138,8 @@ static void adjoint_of_colors_and_shapes(void **state)
             dvec_normalize(direction);
             float y[16];
             sh_basis((const float[3]){(float)direction[0], (float)direction[1], (float)direction[2]}, y);
-            const float *const field[3] = {f.gaussians.red, f.gaussians.green, f.gaussians.blue}, *const d_field[3] = {f.d_gaussians.red, f.d_gaussians.green, f.d_gaussians.blue};
+            const float *const field[3] = {f.gaussians.red, f.gaussians.green, f.gaussians.blue},
+                *const d_field[3] = {f.d_gaussians.red, f.d_gaussians.green, f.d_gaussians.blue};
             const float *const d_scale[3] = {f.d_gaussians.scale_x, f.d_gaussians.scale_y, f.d_gaussians.scale_z};
             seen += f.seen[i] > 0;
             for (size_t c = 0; c < 3; c++) {
@@ -147,7 +149,8 @@ static void adjoint_of_colors_and_shapes(void **state)
                 assert_near((double)field[c][i], fmax(color, 0), 1e-6);
                 cut += color < 0;
                 for (size_t k = 0; k < 16; k++)
-                    assert_near((double)d.sh[48 * i + 3 * k + c], color > 0 ? (double)y[k] * (double)d_field[c][i] : 0, 1e-5 * (1 + fabs((double)d_field[c][i])));
+                    assert_near((double)d.sh[48 * i + 3 * k + c], color > 0 ? (double)y[k] * (double)d_field[c][i] : 0,
+                                1e-5 * (1 + fabs((double)d_field[c][i])));
                 const double scale = exp((double)cloud.scale_log[3 * i + c]);
                 assert_near((double)d.scale_log[3 * i + c], scale * (double)d_scale[c][i], 1e-5 * (1 + fabs((double)d_scale[c][i])));
             }

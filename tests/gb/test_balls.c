@@ -464,8 +464,9 @@ static void limits_of_the_def_are_accepted(void **state)
     }
 }
 
-/* `peer`: an independent implementation in double (numpy) that leaves the sign of the axis to LAPACK and keeps every tied set whole, 281 and
-   248 of them. With our sign it would keep 539 and 481; we keep the 154 and 416 of these that span at most 4 v. Nothing else differs. */
+/* `peer`: an independent implementation in double (numpy) that leaves the sign of the axis to LAPACK and keeps every tied set whole, 281
+   and 248 of them. With our sign it would keep 539 and 481; we keep the 154 and 416 of these that span at most 4 v. Nothing else
+   differs. */
 static void garden_has_the_known_number_of_balls(void **state)
 {
     (void)state;

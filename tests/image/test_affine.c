@@ -132,7 +132,8 @@ static void poor_pictures_fit_too(void **state)
 {
     (void)state;
     static const struct { float from, to; int begin, end; float identity_error; } cases[] = {
-        {0, 0, 0, 8, 0}, {0.5f, 0.5f, 0, 8, 0}, {0.3f, 0.3f, 4, 4, 0}, {0, 0.4f, 0, 8, 0.41f}, {NAN, 0.5f, 0, 8, 0.51f}, {INFINITY, INFINITY, 0, 8, 0},
+        {0, 0, 0, 8, 0}, {0.5f, 0.5f, 0, 8, 0}, {0.3f, 0.3f, 4, 4, 0}, {0, 0.4f, 0, 8, 0.41f}, {NAN, 0.5f, 0, 8, 0.51f},
+        {INFINITY, INFINITY, 0, 8, 0},
         {1e-30f, 1e-30f, 0, 8, 0},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -159,7 +160,8 @@ static void halves(void **state)
         if (i % WIDTH >= WIDTH / 2)
             photo.pixels[3 * i + 1] = 5;
     assert_ok(affine_split(&render, &photo, NULL, &right_half, NULL));
-    assert_true(right_half.render.width == RIGHT && right_half.photo.width == RIGHT && right_half.render.height == HEIGHT && right_half.photo.height == HEIGHT);
+    assert_true(right_half.render.width == RIGHT && right_half.photo.width == RIGHT && right_half.render.height == HEIGHT &&
+                right_half.photo.height == HEIGHT);
     for (int y = 0; y < HEIGHT; y++)
         for (int x = 0; x < WIDTH; x++)
             for (int c = 0; c < 3; c++) {

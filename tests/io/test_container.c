@@ -177,7 +177,8 @@ typedef struct forged_case {
     const char *message;
 } forged_case;
 
-/* Row 0 is "floats", f32[2][3], at 64; row 1 "empty" at 192. Inside a row: name 0, type 64, dimensions 68, sizes 72, offset 104, bytes 112, crc 120. */
+/* Row 0 is "floats", f32[2][3], at 64; row 1 "empty" at 192. Inside a row: name 0, type 64, dimensions 68, sizes 72, offset 104, bytes 112,
+   crc 120. */
 static forged_case forged_cases[] = {
     {"newer version", 8, 4, 2, "memory@8: written by another version of gbtrace (wanted format 1, got 2)"},
     {"version 0", 8, 4, 0, "wanted format 1, got 0"},
@@ -195,7 +196,8 @@ static forged_case forged_cases[] = {
     {"5 dimensions", 64 + 68, 4, 5, "bad number of dimensions (wanted 1 to 4, got 5)"},
     {"shape larger than the bytes", 64 + 72, 8, 3, "section floats: its shape and its 24 bytes do not agree"},
     {"shape that overflows", 64 + 72, 8, UINT64_MAX / 2, "section floats: its shape and its 24 bytes do not agree"},
-    {"product that wraps to the right number", 64 + 72, 8, (UINT64_C(1) << 62) + 2, "section floats: its shape and its 24 bytes do not agree"},
+    {"product that wraps to the right number", 64 + 72, 8, (UINT64_C(1) << 62) + 2,
+     "section floats: its shape and its 24 bytes do not agree"},
     {"offset one alignment on", 64 + 104, 8, 64 + 8 * 128 + 64, "section floats: 24 bytes at 1152 are not where they should be"},
     {"offset 0", 64 + 104, 8, 0, "section floats: 24 bytes at 0 are not where they should be"},
     {"offset 2^64 - 1", 64 + 104, 8, UINT64_MAX, "section floats: 24 bytes at 18446744073709551615 are not where they should be"},
@@ -318,7 +320,11 @@ static void add_five_dims(container_writer *w) { container_add(w, "x", CONTAINER
 static void add_bad_type(container_writer *w) { container_add(w, "x", (container_dtype)9, 1, (size_t[]){1}, floats); }
 static void add_overflow(container_writer *w) { container_add(w, "x", CONTAINER_F32, 2, (size_t[]){SIZE_MAX / 2, 2}, floats); }
 static void add_nothing(container_writer *w) { container_add(w, "x", CONTAINER_F32, 1, (size_t[]){1}, NULL); }
-static void add_large_small(container_writer *w) { container_add_small(w, "x", CONTAINER_U8, 65, "0123456789012345678901234567890123456789012345678901234567890123456789"); }
+static void add_large_small(container_writer *w)
+{
+    container_add_small(w, "x", CONTAINER_U8, 65, "0123456789012345678901234567890123456789012345678901234567890123456789");
+}
+
 static void add_twice(container_writer *w)
 {
     container_add_text(w, "x", "1");

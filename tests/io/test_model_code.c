@@ -20,7 +20,8 @@ static void fill(float *values, size_t count, uint64_t stream, float scale)
 
 static void make_model(model *m, size_t count, int offset_count, bool has_distance)
 {
-    *m = (model){.anchors.offset_count = offset_count, .origin = {5, -4, 1}, .voxel_size = 0.02f, .extent = 3, .t_near = 0.01f, .data_folder = "nowhere", .config = "seed = 1\n"};
+    *m = (model){.anchors.offset_count = offset_count, .origin = {5, -4, 1}, .voxel_size = 0.02f, .extent = 3, .t_near = 0.01f,
+                 .data_folder = "nowhere", .config = "seed = 1\n"};
     assert_ok(anchors_resize(&m->anchors, count, NULL));
     fill(m->anchors.position, count * 3, 1, 5);
     fill(m->anchors.feature, count * ANCHOR_FEATURE_DIM, 2, 1);
@@ -68,7 +69,8 @@ static size_t find_anchor(const model *m, const model *small, size_t i, double c
             continue;
         double sum = 0;
         for (size_t k = 0; k < ANCHOR_FEATURE_DIM; k++)
-            sum += fabs((double)m->anchors.feature[j * ANCHOR_FEATURE_DIM + k] - (double)small->anchors.feature[i * ANCHOR_FEATURE_DIM + k]);
+            sum += fabs((double)m->anchors.feature[j * ANCHOR_FEATURE_DIM + k] -
+                        (double)small->anchors.feature[i * ANCHOR_FEATURE_DIM + k]);
         if (sum < least)
             least = sum, best = j;
     }
@@ -116,7 +118,8 @@ static void rounded_by_half_a_step(void **state)
         const size_t j = find_anchor(&m, &back, i, steps.position);
         assert_true(j != SIZE_MAX);
         const int d = row->with_doublings ? steps.doubling[j] : 0;
-        check_row(m.anchors.feature + j * ANCHOR_FEATURE_DIM, back.anchors.feature + i * ANCHOR_FEATURE_DIM, steps.feature, ANCHOR_FEATURE_DIM, d);
+        check_row(m.anchors.feature + j * ANCHOR_FEATURE_DIM, back.anchors.feature + i * ANCHOR_FEATURE_DIM, steps.feature,
+                  ANCHOR_FEATURE_DIM, d);
         check_row(m.anchors.offset + j * k3, back.anchors.offset + i * k3, steps.offset, k3, d);
         check_row(m.anchors.scale_log + j * 6, back.anchors.scale_log + i * 6, steps.scale_log, 6, d);
         if (row->has_distance && m.anchor_pixel[j] > 0)
@@ -165,11 +168,13 @@ static void odd_models(void **state)
         make_steps(&steps, 200, true);
         for (size_t i = 0; i < 600; i++) {
             float *p = &m.anchors.position[i];
-            *p = kind == 0 ? *p * 1e30f : kind == 1 ? *p * 1e-30f : kind == 2 ? 1.5f : kind == 3 ? (float)(i % 3) : kind == 4 && i == 7 ? 1e7f : *p;
+            *p = kind == 0 ? *p * 1e30f : kind == 1 ? *p * 1e-30f : kind == 2 ? 1.5f : kind == 3 ? (float)(i % 3) : kind == 4 &&
+                 i == 7 ? 1e7f : *p;
         }
         if (kind == 5) {
             memset(m.anchors.feature, 0, 200 * ANCHOR_FEATURE_DIM * sizeof(float));
-            m.anchors.offset[5] = 1e30f, m.anchors.scale_log[3] = -1e20f, m.decoder.params[2] = 1e9f, m.anchor_pixel[1] = 1e-45f, m.anchor_pixel[2] = 3e38f;
+            m.anchors.offset[5] = 1e30f, m.anchors.scale_log[3] = -1e20f, m.decoder.params[2] = 1e9f, m.anchor_pixel[1] = 1e-45f,
+                m.anchor_pixel[2] = 3e38f;
         }
         assert_ok(model_save_coded(test_path("small.gbt"), &m, &steps, NULL, NULL));
         assert_ok(model_load(test_path("small.gbt"), &back, NULL));
@@ -386,7 +391,8 @@ static void turned_features_decode_the_same(void **state)
     for (size_t c = 0; c < ANCHOR_FEATURE_DIM; c++) { /* uncorrelated, variances falling, mean 0; noise counts the same everywhere */
         double square = 0, product = 0, sum = 0;
         for (size_t i = 0; i < 600; i++) {
-            const double x = (double)m.anchors.feature[i * ANCHOR_FEATURE_DIM + c], y = (double)m.anchors.feature[i * ANCHOR_FEATURE_DIM + (c + 1) % ANCHOR_FEATURE_DIM];
+            const double x = (double)m.anchors.feature[i * ANCHOR_FEATURE_DIM + c],
+                y = (double)m.anchors.feature[i * ANCHOR_FEATURE_DIM + (c + 1) % ANCHOR_FEATURE_DIM];
             sum += x, square += x * x, product += x * y;
         }
         assert_true(fabs(sum) < 1e-3 * 600 && square <= last * 1.000001 && fabs(product) < 1e-4 * 600);
@@ -466,13 +472,16 @@ int main(void)
     enum { SHAPES = sizeof shape_cases / sizeof *shape_cases, SINGLE = 8 };
     static char names[2 * SHAPES][96];
     struct CMUnitTest tests[SINGLE + 2 * SHAPES] = {
-        cmocka_unit_test(odd_models), cmocka_unit_test(the_format_has_not_changed), cmocka_unit_test(damage), cmocka_unit_test(forged_shapes),
-        cmocka_unit_test(no_memory), cmocka_unit_test(turned_features_decode_the_same), cmocka_unit_test(steps_follow_quality), cmocka_unit_test(steps_of_anchors),
+        cmocka_unit_test(odd_models), cmocka_unit_test(the_format_has_not_changed), cmocka_unit_test(damage),
+            cmocka_unit_test(forged_shapes),
+        cmocka_unit_test(no_memory), cmocka_unit_test(turned_features_decode_the_same), cmocka_unit_test(steps_follow_quality),
+        cmocka_unit_test(steps_of_anchors),
     };
     size_t count = SINGLE;
     for (size_t i = 0; i < 2 * SHAPES; i++, count++) {
         snprintf(names[i], sizeof names[i], "%s: %s", i % 2 ? "lossless" : "rounded by half a step", shape_cases[i / 2].name);
-        tests[count] = (struct CMUnitTest){.name = names[i], .test_func = i % 2 ? lossless_keeps_bits_and_order : rounded_by_half_a_step, .initial_state = &shape_cases[i / 2]};
+        tests[count] = (struct CMUnitTest){.name = names[i], .test_func = i % 2 ? lossless_keeps_bits_and_order : rounded_by_half_a_step,
+                                           .initial_state = &shape_cases[i / 2]};
     }
     return cmocka_run_group_tests(tests, make_test_folder, remove_test_folder);
 }

@@ -172,7 +172,8 @@ static void integers_cost_their_entropy(void **state)
         double bits = 0;
         for (uint64_t i = 0; i < (uint64_t)count; i++) {
             const double t = spreads[k];
-            const double u = ((double)random_bits(50 + k, i) + 0.5) / 4294967296.0, v = ((double)random_bits(60 + k, i) + 0.5) / 4294967296.0;
+            const double u = ((double)random_bits(50 + k, i) + 0.5) / 4294967296.0,
+                v = ((double)random_bits(60 + k, i) + 0.5) / 4294967296.0;
             const int n = (int)floor(log(u) / log(t)) - (int)floor(log(v) / log(t)); /* the difference of two geometric numbers */
             coder_int(&w, (coder_int_model *const[CODER_INPUTS]){&m[0], &m[1], &m[2]}, &mixer, n);
             bits -= log2((1 - t) / (1 + t)) + abs(n) * log2(t);

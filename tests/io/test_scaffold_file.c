@@ -1,5 +1,5 @@
-/* tests/io/test_scaffold_file.c -- models of Scaffold-GS: written here by the description of the format, evaluated here in double by its equations, and
-   read and decoded by ours. */
+/* tests/io/test_scaffold_file.c -- models of Scaffold-GS: written here by the description of the format, evaluated here in double by its
+   equations, and read and decoded by ours. */
 #include "io_support.h"
 
 #include "anchor/decode.h"
@@ -60,7 +60,7 @@ static void draw_model(unsigned with_distance)
     }
 }
 
-/* ---- files ------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- files --------------------------------------------------------------------------------------------------------------------------- */
 
 static void save(sink *s, const char *name)
 {
@@ -128,8 +128,9 @@ static void write_network(size_t n)
                                 "\"0.bias\":{\"dtype\":\"F32\",\"shape\":[%zu],\"data_offsets\":[%zu,%zu]},"
                                 "\"2.weight\":{\"dtype\":\"F32\",\"shape\":[%zu,%zu],\"data_offsets\":[%zu,%zu]},"
                                 "\"2.bias\":{\"dtype\":\"F32\",\"shape\":[%zu],\"data_offsets\":[0,%zu]}}   ",
-                                l1->out, l1->in, sizes[0], sizes[0] + sizes[1], l1->out, sizes[0] + sizes[1], sizes[0] + sizes[1] + sizes[2], l2->out, l2->in,
-                                sizes[0] + sizes[1] + sizes[2], sizes[0] + sizes[1] + sizes[2] + sizes[3], l2->out, sizes[0]);
+                                l1->out, l1->in, sizes[0], sizes[0] + sizes[1], l1->out, sizes[0] + sizes[1],
+                                sizes[0] + sizes[1] + sizes[2], l2->out, l2->in, sizes[0] + sizes[1] + sizes[2],
+                                sizes[0] + sizes[1] + sizes[2] + sizes[3], l2->out, sizes[0]);
     sink s = {0};
     sink_put_uint(&s, (uint64_t)length, 8);
     sink_put_text(&s, header);
@@ -149,7 +150,7 @@ static void write_model(unsigned with_distance)
         write_network(n);
 }
 
-/* ---- the equations ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- the equations ------------------------------------------------------------------------------------------------------------------- */
 
 static double sigmoid(double x)
 {
@@ -172,7 +173,8 @@ static void evaluate(size_t n, const double *input, double *out)
     }
 }
 
-/* Gaussians of anchor `a` seen from `camera`: mean 3, scale 3, quaternion 4, opacity, colour 3; returns how many have an opacity above 0. */
+/* Gaussians of anchor `a` seen from `camera`: mean 3, scale 3, quaternion 4, opacity, colour 3; returns how many have an opacity above
+   0. */
 static size_t decode(size_t a, const double camera[3], double out[OFFSETS][14])
 {
     double input[FEATURES + 4], d[3], opacity[70], shape[70], color[70];
@@ -235,8 +237,8 @@ static void decodes_to_the_same_gaussians(void **state)
             const size_t kept = decode(a, camera, want);
             for (size_t i = 0; i < kept; i++, at++) {
                 assert_true(at < g.count);
-                const float got[14] = {g.mean_x[at], g.mean_y[at], g.mean_z[at], g.scale_x[at], g.scale_y[at], g.scale_z[at], g.quat_w[at], g.quat_x[at],
-                                       g.quat_y[at], g.quat_z[at], g.opacity[at], g.red[at], g.green[at], g.blue[at]};
+                const float got[14] = {g.mean_x[at], g.mean_y[at], g.mean_z[at], g.scale_x[at], g.scale_y[at], g.scale_z[at], g.quat_w[at],
+                                       g.quat_x[at], g.quat_y[at], g.quat_z[at], g.opacity[at], g.red[at], g.green[at], g.blue[at]};
                 for (size_t k = 0; k < 14; k++) {
                     const double value = (double)got[k] + (k < 3 ? m.origin[k] : 0);
                     if (!(fabs(value - want[i][k]) < 2e-5))
@@ -252,7 +254,7 @@ static void decodes_to_the_same_gaussians(void **state)
     }
 }
 
-/* ---- what is wrong ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- what is wrong ------------------------------------------------------------------------------------------------------------------- */
 
 static void refused(const char *says, gbt_status status)
 {
@@ -294,7 +296,8 @@ static void says_what_is_wrong(void **state)
     scaffold.second[2].bias[3] = (double)NAN;
     write_network(2);
     refused("array 2.bias: value 3 is not finite", GBT_ERR_FORMAT);
-    write_text("point_cloud.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n");
+    write_text("point_cloud.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+                                  "z\nend_header\n1 2 3\n");
     refused("no number f_anchor_feat_0 (wanted anchors of Scaffold-GS)", GBT_ERR_FORMAT);
 }
 

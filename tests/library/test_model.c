@@ -14,7 +14,8 @@ static float opacity[COUNT] = {1, 0.25f}, sh[3 * COUNT] = {1.7724539f, 1.7724539
 
 static gbt_gaussians two(void)
 {
-    return (gbt_gaussians){.count = COUNT, .sh_degree = 0, .mean = mean, .scale_log = scale_log, .quat = quat, .opacity = opacity, .sh = sh};
+    return (gbt_gaussians){.count = COUNT, .sh_degree = 0, .mean = mean, .scale_log = scale_log, .quat = quat, .opacity = opacity,
+                           .sh = sh};
 }
 
 static const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = W, .height = H, .params = {12, 12, 4.5, 3.5},
@@ -65,7 +66,8 @@ static void gaussians_that_are_refused(void **state)
         {{COUNT, 0, mean, bad_scale, quat, opacity, sh}, "scale_log of Gaussian 1 is 31"},
         {{COUNT, 0, mean, scale_log, bad_quat, opacity, sh}, "quat of Gaussian 1 has length 0"},
         {{COUNT, 0, mean, scale_log, quat, bad_opacity, sh}, "opacity of Gaussian 1 is 1.5"},
-        {{COUNT, 0, mean, scale_log, quat, opacity, bad_sh}, "sh of Gaussian 0 is inf"}, {{COUNT, 0, mean, scale_log, quat, NULL, sh}, "opacity is NULL"}};
+        {{COUNT, 0, mean, scale_log, quat, opacity, bad_sh}, "sh of Gaussian 0 is inf"},
+        {{COUNT, 0, mean, scale_log, quat, NULL, sh}, "opacity is NULL"}};
     gbt_model *kept = made();
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         gbt_error err = {0}, again = {0};
@@ -183,7 +185,8 @@ static void gradients_point_the_right_way(void **state)
     assert_ok(gbt_model_render(model, &camera, 1, &(gbt_picture){.rgb = rgb}, NULL));
     d_rgb[3 * (3 * W + 5)] = -1; /* right of the middle wants to be brighter */
     assert_ok(gbt_model_gradient(model, d_rgb, pose, &(gbt_gaussians_gradient){.mean = d_mean, .opacity = d_opacity}, NULL));
-    assert_true(d_mean[0] < -0.1f && pose[0] > 0.1 && pose[4] > 0.1); /* a step to the left, or a turn to the left, brings the ball to the right */
+    assert_true(d_mean[0] < -0.1f && pose[0] > 0.1 && pose[4] > 0.1); /* a step to the left, or a turn to the left, brings the ball to the
+                                                                         right */
     assert_true(fabs(pose[0] + (double)d_mean[0]) < 1e-4);
     assert_true(d_opacity[0] < 0 && d_opacity[1] == 0 && d_mean[3] == 0 && d_mean[5] == 0);
     gbt_model_close(model);

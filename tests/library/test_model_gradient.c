@@ -68,8 +68,8 @@ static const char *const class_names[5] = {"mean", "scale_log", "quat", "opacity
 
 static gbt_gaussians gaussians_of(const world *w)
 {
-    return (gbt_gaussians){.count = COUNT, .sh_degree = 3, .mean = w->arrays[0], .scale_log = w->arrays[1], .quat = w->arrays[2], .opacity = w->arrays[3],
-                           .sh = w->arrays[4]};
+    return (gbt_gaussians){.count = COUNT, .sh_degree = 3, .mean = w->arrays[0], .scale_log = w->arrays[1], .quat = w->arrays[2],
+                           .opacity = w->arrays[3], .sh = w->arrays[4]};
 }
 
 static void set_up(world *w, double footprint)
@@ -96,7 +96,8 @@ static void make_plain(world *w, double footprint)
         for (int c = 0; c < 5; c++)
             for (size_t k = 0; k < widths[c]; k++) {
                 const double normal = rng_normal(3, firsts[c] + k, i), uniform = (double)rng_uniform(4, 3, i);
-                const double value = c == 0 ? normal : c == 1 ? -1.6 + 0.5 * normal : c == 3 ? 0.15 + 0.8 * uniform : c == 4 ? 0.25 * normal : normal;
+                const double value = c == 0 ? normal : c == 1 ? -1.6 + 0.5 * normal : c == 3 ? 0.15 + 0.8 * uniform : c == 4 ? 0.25 * normal
+                                     : normal;
                 w->arrays[c][i * widths[c] + k] = (float)value;
                 w->exact.plain[i * PLAIN_FLOATS + firsts[c] + k] = (double)(float)value;
             }
@@ -203,8 +204,8 @@ static void pose_agrees_with_differences(void **state)
     if (!(picture < 3e-6))
         fail_msg("the pictures differ by %g", picture);
     if (!(sqrt(error / size) < 3e-5) || !(size > 1e-3))
-        fail_msg("got %g %g %g  %g %g %g, wanted %g %g %g  %g %g %g", got[0], got[1], got[2], got[3], got[4], got[5], wanted[0], wanted[1], wanted[2], wanted[3],
-                 wanted[4], wanted[5]);
+        fail_msg("got %g %g %g  %g %g %g, wanted %g %g %g  %g %g %g", got[0], got[1], got[2], got[3], got[4], got[5], wanted[0], wanted[1],
+                 wanted[2], wanted[3], wanted[4], wanted[5]);
     free_world(&w);
 }
 
@@ -242,7 +243,8 @@ static void gaussians_agree_with_differences(void **state)
             }
             const double wanted = (losses[0] - losses[1]) / (2 * motion_step);
             if (!(fabs(along - wanted) < 3e-5 * sqrt(size)) || !(size > 1e-6))
-                fail_msg("%s along direction %d: %g, not %g (gradient of size %g)", class_names[class], (int)attempt, along, wanted, sqrt(size));
+                fail_msg("%s along direction %d: %g, not %g (gradient of size %g)", class_names[class], (int)attempt, along, wanted,
+                         sqrt(size));
         }
     for (int k = 0; k < 5; k++)
         mem_free(got[k]);
@@ -307,7 +309,8 @@ int main(void)
     for (size_t i = 0; i < CASES; i++) {
         pose_case *c = &pose_cases[i];
         *c = (pose_case){.camera = &cameras[i % CAMERAS], .neural = i / CAMERAS % 2 == 1, .footprint = i / CAMERAS / 2 == 1 ? 0.3 : 0};
-        snprintf(c->name, sizeof c->name, "%s | %s | %s", c->camera->name, c->neural ? "networks" : "plain", c->footprint > 0 ? "0.3 px^2" : "thin");
+        snprintf(c->name, sizeof c->name, "%s | %s | %s", c->camera->name, c->neural ? "networks" : "plain",
+                 c->footprint > 0 ? "0.3 px^2" : "thin");
         tests[count++] = (struct CMUnitTest){.name = c->name, .test_func = pose_agrees_with_differences, .initial_state = c};
         if (!c->neural)
             tests[count++] = (struct CMUnitTest){.name = c->name, .test_func = gaussians_agree_with_differences, .initial_state = c};

@@ -50,7 +50,8 @@ static void run(bench *b, renderer which, bool back, bool tape)
         need(raster_backward(&b->raster, &b->d_rgb, &b->d, NULL, NULL, &err), &err);
     else {
         memset(&b->counters[which], 0, sizeof b->counters[which]);
-        need(raster_forward(&b->raster, s->gaussians, &s->camera.shot.camera, &settings, tape, &b->rgb[which], NULL, &b->counters[which], &err), &err);
+        need(raster_forward(&b->raster, s->gaussians, &s->camera.shot.camera, &settings, tape, &b->rgb[which], NULL, &b->counters[which],
+                            &err), &err);
     }
 }
 
@@ -73,10 +74,11 @@ static void measure(bench *b, renderer which, int repeats)
     const double pixels = (double)b->rgb[which].width * b->rgb[which].height;
     printf("%-8s", names[which]);
     for (int back = 0; back < 2; back++)
-        printf("  %s %8.2f ms %7.3f core-us/pixel", back ? "adjoint" : "forward", 1e3 * (double)middle(wall[back], repeats), 1e6 * (double)middle(core[back], repeats) / pixels);
+        printf("  %s %8.2f ms %7.3f core-us/pixel", back ? "adjoint" : "forward", 1e3 * (double)middle(wall[back], repeats),
+               1e6 * (double)middle(core[back], repeats) / pixels);
     const raster_counters *c = &b->counters[which];
-    printf("  drawn %llu, pairs %llu, tests %.1f, blended %.1f per pixel\n", (unsigned long long)c->drawn, (unsigned long long)c->pairs, (double)c->tests / pixels,
-           (double)c->blended / pixels);
+    printf("  drawn %llu, pairs %llu, tests %.1f, blended %.1f per pixel\n", (unsigned long long)c->drawn, (unsigned long long)c->pairs,
+           (double)c->tests / pixels, (double)c->blended / pixels);
 }
 
 int main(int argc, char **argv)

@@ -78,7 +78,8 @@ static void gradients_agree(void **state)
         image d_rgb = random_image(camera.width, camera.height, i);
         const size_t floats = 3 * raster_reference_pixels(&camera, 1);
         raster_reference reference;
-        double *d = mem_alloc(floats, sizeof *d, "test", NULL), *wanted = mem_calloc(GAUSSIANS_FIELD_COUNT * g.count, sizeof *wanted, "test", NULL);
+        double *d = mem_alloc(floats, sizeof *d, "test", NULL), *wanted = mem_calloc(GAUSSIANS_FIELD_COUNT * g.count, sizeof *wanted,
+                                                                                     "test", NULL);
         double d_background[3] = {0};
         for (size_t k = 0; k < floats; k++)
             d[k] = (double)d_rgb.pixels[k];
@@ -117,8 +118,8 @@ static void move_field(raster_reference *r, int f, size_t i, double h)
         r->fields[(size_t)k * r->count + i] /= sqrt(square);
 }
 
-/* The reference's own adjoint. No cuts that jump: alpha_min is tiny, the box does not cut, and few Gaussians, so that no pixel is opaque. Some are
-   clamped in J, and some are cut at alpha_max. */
+/* The reference's own adjoint. No cuts that jump: alpha_min is tiny, the box does not cut, and few Gaussians, so that no pixel is opaque.
+   Some are clamped in J, and some are cut at alpha_max. */
 static void reference_is_its_own_derivative(void **state)
 {
     (void)state;

@@ -107,10 +107,13 @@ static void agrees_with_the_tracer(void **state)
         drawn_free(&shown);
         traced wanted = trace_view(&g, &camera, &traced_settings, &d_rgb);
         drawn got = draw(&g, &camera, &s, &d_rgb);
-        const double error[] = {field_error(&got.d, &wanted.d, FIELD_MEAN, FIELD_SCALE), field_error(&got.d, &wanted.d, FIELD_SCALE, FIELD_QUAT),
-                                field_error(&got.d, &wanted.d, FIELD_QUAT, FIELD_OPACITY), field_error(&got.d, &wanted.d, FIELD_OPACITY, FIELD_COLOR),
+        const double error[] = {field_error(&got.d, &wanted.d, FIELD_MEAN, FIELD_SCALE),
+                                field_error(&got.d, &wanted.d, FIELD_SCALE, FIELD_QUAT),
+                                field_error(&got.d, &wanted.d, FIELD_QUAT, FIELD_OPACITY),
+                                field_error(&got.d, &wanted.d, FIELD_OPACITY, FIELD_COLOR),
                                 field_error(&got.d, &wanted.d, FIELD_COLOR, GAUSSIANS_FIELD_COUNT)};
-        print_message("  gradients: mean %.1e, scale %.1e, rotation %.1e, opacity %.1e, colour %.1e\n", error[0], error[1], error[2], error[3], error[4]);
+        print_message("  gradients: mean %.1e, scale %.1e, rotation %.1e, opacity %.1e, colour %.1e\n", error[0], error[1], error[2],
+                      error[3], error[4]);
         for (size_t k = 0; k < sizeof error / sizeof *error; k++)
             if (!(error[k] <= 1e-3))
                 fail_msg("%s: gradients of class %zu off by %g", clouds[i].name, k, error[k]);

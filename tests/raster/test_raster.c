@@ -123,8 +123,10 @@ typedef struct hidden_case {
 } hidden_case;
 
 static const hidden_case hidden_cases[] = {
-    {"in front", 0, 0, 10, {true, true}},           {"behind", 0, 0, -10, {false, false}},   {"at the near plane", 0, 0, 0.2f, {false, true}},
-    {"just beyond it", 0, 0, 0.21, {true, true}},   {"far to the side", 90, 0, 10, {false, false}}, {"around the eye", 0.02, 0.02, 0, {false, true}},
+    {"in front", 0, 0, 10, {true, true}},           {"behind", 0, 0, -10, {false, false}},
+    {"at the near plane", 0, 0, 0.2f, {false, true}},
+    {"just beyond it", 0, 0, 0.21, {true, true}},   {"far to the side", 90, 0, 10, {false, false}},
+    {"around the eye", 0.02, 0.02, 0, {false, true}},
     {"beside the eye, out of sight", 3, 0, 0, {false, false}},
 };
 
@@ -230,7 +232,8 @@ static void any_size(void **state)
                         /* the limits of J depend on the size of the image: not of a view as narrow as this one */
                         const float in_small = a.rgb.pixels[3 * (y * small.width + x) + c], in_large = b.rgb.pixels[3 * (y * 80 + x) + c];
                         if (form == 1 && in_small != in_large)
-                            fail_msg("%d x %d, pixel %d %d: %g and %g", small.width, small.height, x, y, (double)in_small, (double)in_large);
+                            fail_msg("%d x %d, pixel %d %d: %g and %g", small.width, small.height, x, y, (double)in_small,
+                                     (double)in_large);
                         assert_true(isfinite(in_small));
                     }
             drawn_free(&a), drawn_free(&b);

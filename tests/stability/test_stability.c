@@ -65,7 +65,7 @@ static void names_of_cases(void **state)
     mem_free(study);
 }
 
-/* ---- what a scene file may say ---------------------------------------------------------------------------------------------------------- */
+/* ---- what a scene file may say ------------------------------------------------------------------------------------------------------- */
 
 static stability open_text(stability_study *study, const char *json, gbt_error *err)
 {

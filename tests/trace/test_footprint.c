@@ -14,7 +14,8 @@ enum { NUMBERS = 11 };
 
 static gbt_camera camera_of(gbt_camera_model model)
 {
-    gbt_camera c = {.model = model, .width = 64, .height = 48, .params = {80, 80, 32, 24}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0.3, -0.2, -6}};
+    gbt_camera c = {.model = model, .width = 64, .height = 48, .params = {80, 80, 32, 24}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                    .center = {0.3, -0.2, -6}};
     if (model == GBT_CAMERA_EQUIRECTANGULAR)
         c.params[0] = 64, c.params[1] = 48;
     return c;
@@ -115,7 +116,8 @@ static double loss_of(const footprint_view *view, double pixel_min, footprint_ga
     return sum;
 }
 
-/* Against central differences, relative to the largest gradient. Through a normalised quaternion, so that the tangent is what is compared. */
+/* Against central differences, relative to the largest gradient. Through a normalised quaternion, so that the tangent is what is
+   compared. */
 static void test_adjoint(void **state)
 {
     (void)state;
@@ -146,7 +148,8 @@ static void test_mean_over_pixel(void **state)
 {
     (void)state;
     enum { SIDE = 12, SHIFTS = 24 };
-    gbt_camera c = {.model = GBT_CAMERA_PINHOLE, .width = SIDE, .height = SIDE, .params = {40, 40, 6, 6}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0, 0, -6}};
+    gbt_camera c = {.model = GBT_CAMERA_PINHOLE, .width = SIDE, .height = SIDE, .params = {40, 40, 6, 6},
+                    .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0, 0, -6}};
     gaussians g = random_gaussians(1, 0, 3), wide = {0};
     g.mean_x[0] = g.mean_y[0] = g.mean_z[0] = 0.02f;
     g.scale_x[0] = 0.03f, g.scale_y[0] = 0.25f, g.scale_z[0] = 0.06f, g.opacity[0] = 0.2f;
@@ -216,6 +219,7 @@ static void test_arrays(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_sizes),  cmocka_unit_test(test_energy),          cmocka_unit_test(test_limits),
-                                       cmocka_unit_test(test_adjoint), cmocka_unit_test(test_mean_over_pixel), cmocka_unit_test(test_arrays)};
+                                       cmocka_unit_test(test_adjoint), cmocka_unit_test(test_mean_over_pixel),
+                                       cmocka_unit_test(test_arrays)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

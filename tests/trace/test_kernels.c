@@ -1,4 +1,5 @@
-/* tests/trace/test_kernels.c -- every kernel against the double reference: picture, order, outputs beside colour, surfaces, radius, memory. */
+/* tests/trace/test_kernels.c -- every kernel against the double reference: picture, order, outputs beside colour, surfaces, radius,
+   memory. */
 #include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"
@@ -20,8 +21,10 @@ static gaussians cloud(size_t count, uint64_t seed, float spread, float size, fl
         for (uint64_t k = 0; k < 4; k++)
             q[k] = rng_normal(seed, k, i), square += q[k] * q[k];
         const float inverse = (float)(1 / sqrt(square));
-        g.quat_w[i] = (float)q[0] * inverse, g.quat_x[i] = (float)q[1] * inverse, g.quat_y[i] = (float)q[2] * inverse, g.quat_z[i] = (float)q[3] * inverse;
-        g.mean_x[i] = spread * (float)rng_normal(seed, 4, i), g.mean_y[i] = spread * (float)rng_normal(seed, 5, i), g.mean_z[i] = spread * (float)rng_normal(seed, 6, i);
+        g.quat_w[i] = (float)q[0] * inverse, g.quat_x[i] = (float)q[1] * inverse, g.quat_y[i] = (float)q[2] * inverse,
+            g.quat_z[i] = (float)q[3] * inverse;
+        g.mean_x[i] = spread * (float)rng_normal(seed, 4, i), g.mean_y[i] = spread * (float)rng_normal(seed, 5, i),
+            g.mean_z[i] = spread * (float)rng_normal(seed, 6, i);
         g.scale_x[i] = size * powf(4, rng_uniform(seed, 7, i) - 0.5f), g.scale_y[i] = size * powf(4, rng_uniform(seed, 8, i) - 0.5f);
         g.scale_z[i] = 0.2f * size; /* flat, as trained ones are */
         g.opacity[i] = opacity * rng_uniform(seed, 9, i);
@@ -40,7 +43,8 @@ static ray_image make_rays(bool spread)
         double d[3] = {((double)(i % WIDTH) - WIDTH / 2.0) * 0.02, ((double)(i / WIDTH) - HEIGHT / 2.0) * 0.02, 1};
         if (spread)
             for (size_t k = 0; k < 3; k++)
-                rays.origin[3 * i + k] = (float)(k == 2 ? -5 : 0.05 * rng_normal(77, k, i)), d[k] -= k == 2 ? 0 : (double)rays.origin[3 * i + k] / 5;
+                rays.origin[3 * i + k] = (float)(k == 2 ? -5 : 0.05 * rng_normal(77, k, i)),
+                    d[k] -= k == 2 ? 0 : (double)rays.origin[3 * i + k] / 5;
         dvec_normalize(d);
         for (size_t k = 0; k < 3; k++)
             rays.dir[3 * i + k] = (float)d[k];
@@ -90,7 +94,8 @@ typedef struct expected {
     bool fine;
 } expected;
 
-static expected expect_ray(const gaussians *g, const trace_settings *s, const ray_image *rays, size_t ray, reference_hit **hits, size_t *capacity)
+static expected expect_ray(const gaussians *g, const trace_settings *s, const ray_image *rays, size_t ray, reference_hit **hits,
+                           size_t *capacity)
 {
     expected e = {.transmittance = 1, .strongest = UINT32_MAX, .fine = true};
     double origin[3], dir[3], top = 0, second = 0, before = -1;
@@ -254,7 +259,7 @@ static void no_room_for_the_tape(void **state)
     gaussians_free(&g);
 }
 
-/* ---- order ----------------------------------------------------------------------------------------------------------------------------- */
+/* ---- order --------------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct brute_row {
     float t;
@@ -267,12 +272,14 @@ static int by_depth(const void *a, const void *b)
     return x->t != y->t ? (x->t < y->t ? -1 : 1) : x->row - y->row;
 }
 
-/* Rows that overlap little, much and wholly, with ties: on every ray, T in front of each hit is the product of the hits sorted before it. */
+/* Rows that overlap little, much and wholly, with ties: on every ray, T in front of each hit is the product of the hits sorted before
+   it. */
 static void rows_are_in_exact_order(void **state)
 {
     (void)state;
     enum { COUNT = 90 };
-    static _Alignas(64) float t[(COUNT + ROW_BLOCK) * 16], clear[(COUNT + ROW_BLOCK) * 16], before[(COUNT + 1) * 16], term[(COUNT + ROW_BLOCK) * 16];
+    static _Alignas(64) float t[(COUNT + ROW_BLOCK) * 16], clear[(COUNT + ROW_BLOCK) * 16], before[(COUNT + 1) * 16],
+        term[(COUNT + ROW_BLOCK) * 16];
     static _Alignas(64) float after[(COUNT + 1) * 16];
     static float near[COUNT + ROW_BLOCK], far_reached[COUNT], start[COUNT];
     static const float overlaps[] = {0, 0.5f, 3, 1000};
@@ -284,7 +291,8 @@ static void rows_are_in_exact_order(void **state)
             key[i] = INFINITY;
             for (uint64_t lane = 0; lane < 16; lane++) {
                 const bool hit = rng_uniform(round, 1, 16 * i + lane) < 0.7f || lane == i % 16;
-                raw[i][lane] = hit ? start[i] + floorf(8 * overlaps[round] * rng_uniform(round, 2, 16 * i + lane)) / 8 : INFINITY; /* many ties */
+                /* many ties */
+                raw[i][lane] = hit ? start[i] + floorf(8 * overlaps[round] * rng_uniform(round, 2, 16 * i + lane)) / 8 : INFINITY;
                 key[i] = fminf(key[i], raw[i][lane]);
             }
         }
@@ -296,7 +304,8 @@ static void rows_are_in_exact_order(void **state)
             float far = 0;
             for (int lane = 0; lane < 16; lane++) {
                 const float depth = raw[order[i]][lane];
-                t[16 * i + lane] = depth, clear[16 * i + lane] = isinf(depth) ? 1 : 0.3f + 0.6f * rng_uniform(round, 3, (uint64_t)(16 * i + lane));
+                t[16 * i + lane] = depth, clear[16 * i + lane] = isinf(depth) ? 1
+                                   : 0.3f + 0.6f * rng_uniform(round, 3, (uint64_t)(16 * i + lane));
                 term[16 * i + lane] = isinf(depth) ? 0 : rng_uniform(round, 4, (uint64_t)(16 * i + lane));
                 near[i] = fminf(near[i], depth), far = fmaxf(far, isinf(depth) ? 0 : depth);
             }

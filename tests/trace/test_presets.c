@@ -43,7 +43,7 @@ static void presets_by_name(void **state)
     assert_true(exact.transmittance_min < d.transmittance_min && d.transmittance_min < fast.transmittance_min);
 }
 
-/* ---- the bounds, on every ray ------------------------------------------------------------------------------------------------------------- */
+/* ---- the bounds, on every ray -------------------------------------------------------------------------------------------------------- */
 
 /* Hits of one ray in order; `hits` is used again and freed with mem_free(). */
 typedef struct ray_hits {
@@ -131,7 +131,8 @@ static void check_scene(const char *scene, const gaussians *g, const ray_image *
     const float background[3] = {0, 0.5f, 1};
     for (size_t i = 0; i < 3; i++) {
         const preset_figures f = check_preset(g, rays, names[i], background);
-        print_message("%-14s %-8s max error %.2e, bound %.2e, %2.0f %% of a ray's bound reached\n", scene, names[i], f.error, f.bound, 100 * f.of_bound);
+        print_message("%-14s %-8s max error %.2e, bound %.2e, %2.0f %% of a ray's bound reached\n", scene, names[i], f.error, f.bound,
+                      100 * f.of_bound);
         assert_true(i > 0 || f.error < 0.5 * half_step); /* exact: half of half an 8-bit step */
         assert_true(i == 0 || f.error > half_step);      /* and the others do leave something out */
     }
@@ -140,7 +141,8 @@ static void check_scene(const char *scene, const gaussians *g, const ray_image *
 static void random_scenes_stay_in_bounds(void **state)
 {
     (void)state;
-    const struct { const char *name; size_t count; float opacity_low; } scenes[] = {{"thin", 60, 0.02f}, {"thick", 1500, 0.05f}, {"opaque", 300, 0.95f}};
+    const struct { const char *name; size_t count; float opacity_low; } scenes[] = {{"thin", 60, 0.02f}, {"thick", 1500, 0.05f},
+                                                                                    {"opaque", 300, 0.95f}};
     ray_image rays = pinhole_rays(24, 20);
     for (size_t i = 0; i < 3; i++) {
         gaussians g = random_gaussians(scenes[i].count, scenes[i].opacity_low, 30 + i);
@@ -180,7 +182,7 @@ static void peer_scene_stays_in_bounds(void **state)
     gaussians_free(&g);
 }
 
-/* ---- the bounds are reached --------------------------------------------------------------------------------------------------------------- */
+/* ---- the bounds are reached ---------------------------------------------------------------------------------------------------------- */
 
 /* Red of the ray through the middle: discs of these opacities, one behind the other, of these colours, on black. */
 static double blend_discs(const trace_settings *s, size_t count, const float *opacity, const float *color)

@@ -247,7 +247,8 @@ static void thin_lens(void **state)
 static void samples_are_stratified(void **state)
 {
     (void)state;
-    gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = W, .height = H, .params = {30, 33, 18, 12}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = W, .height = H, .params = {30, 33, 18, 12},
+                         .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     ray_shot shot = ray_shot_of(&camera);
     shot.aperture_radius = 1, shot.focus_distance = 3, shot.samples = 64;
     ray_image rays = {0};

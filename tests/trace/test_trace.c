@@ -1,4 +1,5 @@
-/* tests/trace/test_trace.c -- the packet tracer and its adjoint against the double reference; threads, instruction sets, limits, failures. */
+/* tests/trace/test_trace.c -- the packet tracer and its adjoint against the double reference; threads, instruction sets, limits,
+   failures. */
 #include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"
@@ -129,7 +130,8 @@ static void field_list(const gaussians *g, const float *fields[GAUSSIANS_FIELD_C
 #undef X
 }
 
-/* Rays on which rounding may change the hits: alpha within 1e-6 of a cut, T within 1e-9 of the stop, depths closer than float32 can tell. */
+/* Rays on which rounding may change the hits: alpha within 1e-6 of a cut, T within 1e-9 of the stop, depths closer than float32 can
+   tell. */
 static bool is_in_band(const reference_scene *scene, const trace_settings *s, const reference_hit *hits, size_t count, double depth_band)
 {
     double T = 1, before = -1;
@@ -162,7 +164,8 @@ static figures compare(const gaussians *g, const trace_settings *s, const ray_im
     figures out = {.rays = ray_image_count(rays)};
     const size_t n = out.rays;
     double *rgb = mem_alloc(n, 3 * sizeof *rgb, "test", NULL), *T = mem_alloc(n, sizeof *T, "test", NULL);
-    double *d_rgb = mem_calloc(n, 3 * sizeof *d_rgb, "test", NULL), *d = mem_calloc(g->count, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL);
+    double *d_rgb = mem_calloc(n, 3 * sizeof *d_rgb, "test", NULL), *d = mem_calloc(g->count, GAUSSIANS_FIELD_COUNT * sizeof *d, "test",
+                                                                                    NULL);
     bool *band = mem_calloc(n, sizeof *band, "test", NULL);
     double d_background[3] = {0};
     image d_image = random_gradient(rays, seed);
@@ -227,7 +230,8 @@ static figures compare(const gaussians *g, const trace_settings *s, const ray_im
 static void print_figures(const char *name, const figures *f)
 {
     print_message("%-14s %5.1f hits, %3zu of %zu rays in the band, %llu packets spilled: %.1f dB, max %.1e, T %.1e; adjoint", name,
-                  (double)f->hits / (double)f->rays, f->band, f->rays, (unsigned long long)f->counters.spilled_packets, f->psnr, f->max_error, f->T_error);
+                  (double)f->hits / (double)f->rays, f->band, f->rays, (unsigned long long)f->counters.spilled_packets, f->psnr,
+                  f->max_error, f->T_error);
     for (int class = 0; class < CLASS_COUNT; class++)
         print_message(" %.1e", f->gradient[class]);
     print_message(" %.1e\n", f->background);
@@ -280,8 +284,8 @@ static void random_scenes(void **state)
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
         const figures f = compare(&g, &s, &rays, i, 1e-6);
-        /* At 1:100 and 1:1000 the thin axis is 1e-3 and 1e-4 of the distance: rounding of coordinates alone moves every hit by that much more
-           of a std-dev. */
+        /* At 1:100 and 1:1000 the thin axis is 1e-3 and 1e-4 of the distance: rounding of coordinates alone moves every hit by that much
+           more of a std-dev. */
         const float thin = rows[i].flatness;
         assert_figures(rows[i].name, &f, thin > 500 ? 5e-4 : thin > 50 ? 5e-5 : 1e-5);
         assert_true(f.hits > 0);
@@ -350,7 +354,8 @@ static void needles_one_by_one(void **state)
             gaussians_free(&g);
         }
         qsort(error, NEEDLES, sizeof *error, compare_doubles);
-        print_message("needles 1:%g: |alpha - reference| 95 %% %.1e, worst %.1e\n", ratios[k], error[NEEDLES * 95 / 100], error[NEEDLES - 1]);
+        print_message("needles 1:%g: |alpha - reference| 95 %% %.1e, worst %.1e\n", ratios[k], error[NEEDLES * 95 / 100],
+                      error[NEEDLES - 1]);
         if (ratios[k] <= 1e4) {
             assert_int_equal(seen, NEEDLES);
             assert_true(error[NEEDLES * 95 / 100] <= 1.0 / 255);
@@ -456,7 +461,8 @@ static void coincident_gaussians(void **state)
     for (size_t count = 150; count <= 800; count += 650) {
         gaussians g = some(count, 0.01f);
         for (size_t i = 0; i < count; i++)
-            g.red[i] = rng_uniform(8, 0, i), g.green[i] = i % 2 == 0, g.blue[i] = (float)i / (float)count, g.scale_y[i] = 2, g.scale_z[i] = 0.5f;
+            g.red[i] = rng_uniform(8, 0, i), g.green[i] = i % 2 == 0, g.blue[i] = (float)i / (float)count, g.scale_y[i] = 2,
+                g.scale_z[i] = 0.5f;
         const gbt_camera camera = camera_at((double[3]){1, 0.5, -6}, (double[3]){0, 0, 0}, 16, 12, 20);
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
@@ -688,7 +694,8 @@ static void wrong_sizes_are_refused(void **state)
     gaussians_free(&d);
 }
 
-static gbt_status run_once(const gaussians *g, const trace_settings *s, const ray_image *rays, image *rgb, const image *d_rgb, gbt_error *err)
+static gbt_status run_once(const gaussians *g, const trace_settings *s, const ray_image *rays, image *rgb, const image *d_rgb,
+                           gbt_error *err)
 {
     trace_scene scene = {0};
     gaussians d = {0};
@@ -749,7 +756,8 @@ static void peer_scene(void **state)
     assert_ok(gaussian_ply_load(path, &cloud, NULL));
     gaussians g = some(cloud.count, 0);
     for (size_t i = 0; i < cloud.count; i++) {
-        const float *m = cloud.mean + 3 * i, *l = cloud.scale_log + 3 * i, *q = cloud.quat + 4 * i, *sh = cloud.sh + i * GAUSSIAN_SH_COUNT * 3;
+        const float *m = cloud.mean + 3 * i, *l = cloud.scale_log + 3 * i, *q = cloud.quat + 4 * i,
+            *sh = cloud.sh + i * GAUSSIAN_SH_COUNT * 3;
         g.mean_x[i] = m[0], g.mean_y[i] = m[1], g.mean_z[i] = m[2];
         g.scale_x[i] = expf(l[0]), g.scale_y[i] = expf(l[1]), g.scale_z[i] = expf(l[2]);
         g.quat_w[i] = q[0], g.quat_x[i] = q[1], g.quat_y[i] = q[2], g.quat_z[i] = q[3], g.opacity[i] = cloud.opacity[i];

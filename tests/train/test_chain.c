@@ -102,7 +102,8 @@ static double image_term(const double *x, const float *y, double *d_x)
                 double a = 0, b = 0, aa = 0, bb = 0, ab = 0;
                 for (int pass = 0; pass < 2; pass++) {
                     const double va = aa - a * a, vb = bb - b * b, cov = ab - a * b;
-                    const double n1 = 2 * a * b + c1, n2 = 2 * cov + c2, d1 = a * a + b * b + c1, d2 = va + vb + c2, ssim = n1 * n2 / (d1 * d2);
+                    const double n1 = 2 * a * b + c1, n2 = 2 * cov + c2, d1 = a * a + b * b + c1, d2 = va + vb + c2,
+                        ssim = n1 * n2 / (d1 * d2);
                     if (pass == 1) {
                         loss += dssim_weight * (1 - ssim) / values;
                         if (d_x == NULL)
@@ -208,7 +209,8 @@ static void gradient_in_double_agrees_with_differences(void **state)
                 largest = fmax(largest, fabs(got[i]));
             for (uint64_t k = 0, drawn = 0; k < PARAMETERS && drawn < 5000; drawn++) {
                 const size_t i = (size_t)(rng_uniform(seed, 400 + (uint64_t)class, drawn) * (float)count) % count;
-                if (fabs(got[i]) < 0.05 * largest) /* elsewhere a difference is rounding; the whole gradient is compared along directions below */
+                if (fabs(got[i]) < 0.05 * largest) /* elsewhere a difference is rounding; the whole gradient is compared along directions
+                                                      below */
                     continue;
                 k++;
                 const double keep = value[i], h = 1e-5;
@@ -244,7 +246,8 @@ static void gradient_in_double_agrees_with_differences(void **state)
     print_message("%zu differences crossed a cut\n", crossed);
 }
 
-/* Along normally distributed directions of a whole class, so that parameters with small gradients count too: E[(d . (g - g'))^2] = |g - g'|^2. */
+/* Along normally distributed directions of a whole class, so that parameters with small gradients count too: E[(d . (g - g'))^2] = |g -
+   g'|^2. */
 static void no_parameter_is_forgotten(void **state)
 {
     (void)state;

@@ -22,7 +22,8 @@ static void frame_is_known(void **state)
     (void)state;
     event_records r = {0};
     event_add_version(&r);
-    /* Length 26: a double behind its key, step 0, the text of 13 bytes. CRC-32C of the eight bytes, rotated and masked, from the definition. */
+    /* Length 26: a double behind its key, step 0, the text of 13 bytes. CRC-32C of the eight bytes, rotated and masked, from the
+       definition. */
     const unsigned char length[8] = {26};
     uint32_t crc = UINT32_MAX;
     for (int i = 0; i < 8; i++) {
@@ -58,8 +59,10 @@ static void scalars_are_protobuf(void **state)
 static void pictures_are_protobuf(void **state)
 {
     (void)state;
-    static const unsigned char png[30] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R', 0, 0, 1, 0, 0, 0, 0, 7};
-    static const unsigned char wanted[] = {0x10, 5, 0x2a, 46, 0x0a, 44, 0x0a, 1, 'x', 0x22, 39, 0x08, 7, 0x10, 0x80, 0x02, 0x18, 3, 0x22, 30, 0x89, 'P', 'N', 'G'};
+    static const unsigned char png[30] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R', 0, 0, 1, 0, 0, 0, 0,
+                                          7};
+    static const unsigned char wanted[] = {0x10, 5, 0x2a, 46, 0x0a, 44, 0x0a, 1, 'x', 0x22, 39, 0x08, 7, 0x10, 0x80, 0x02, 0x18, 3, 0x22,
+                                           30, 0x89, 'P', 'N', 'G'};
     event_records r = {0};
     event_add_png(&r, 5, "x", png, 23);
     assert_int_equal(r.count, 0); /* too short for a size */

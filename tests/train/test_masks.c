@@ -1,4 +1,5 @@
-/* tests/train/test_masks.c -- what a mask or an alpha channel leaves out has no say in training and in scores; what is transparent is the background. */
+/* tests/train/test_masks.c -- what a mask or an alpha channel leaves out has no say in training and in scores; what is transparent is the
+   background. */
 #include "run_support.h"
 
 #include <jansson.h>
@@ -102,7 +103,8 @@ static void masked_pixels_have_no_say(void **state)
         assert_same_file(in_root("a%d/model.gbt", exposure), in_root("b%d/model.gbt", exposure));
         static const char *const names[] = {"psnr", "ssim", "flip"};
         for (int k = 0; k < 3; k++) {
-            const double a = json_real_value(json_object_get(metrics[0], names[k])), b = json_real_value(json_object_get(metrics[1], names[k]));
+            const double a = json_real_value(json_object_get(metrics[0], names[k])),
+                b = json_real_value(json_object_get(metrics[1], names[k]));
             assert_true(a > 0 && a == b);
         }
         assert_non_null(strstr(json_string_value(json_object_get(metrics[0], "scored")), "without masked pixels"));
@@ -141,7 +143,7 @@ static void a_black_mask_leaves_nothing(void **state)
     json_decref(metrics);
 }
 
-/* ---- alpha ------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- alpha --------------------------------------------------------------------------------------------------------------------------- */
 
 /* An alpha channel with the shape of the masks; beneath it the colour stays. */
 static void cut_out(image *photo, size_t view)

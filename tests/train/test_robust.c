@@ -160,7 +160,8 @@ static void wild_rates_and_photos_leave_no_nan(void **state)
     };
     for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
         gbt_train_def def = run_def();
-        def.iterations = runs[i].steps, def.learning_rate_factor = runs[i].factor, def.exposure = runs[i].exposure, def.compat = runs[i].compat;
+        def.iterations = runs[i].steps, def.learning_rate_factor = runs[i].factor, def.exposure = runs[i].exposure,
+            def.compat = runs[i].compat;
         def.distance = runs[i].distance;
         const char *run = in_root("%s", runs[i].name);
         train_ok(poisoned_scene(), run, &def);
@@ -201,7 +202,8 @@ static void pixels_that_are_not_numbers_are_marked(void **state)
         assert_ok(photos_get_sample(&p, POISONED_VIEW, &sample, &photo, &camera, &valid, &step, NULL));
         for (int y = 0; y < photo.height; y++)
             for (int x = 0; x < photo.width; x++)
-                assert_int_equal(valid[y * photo.width + x], 2 * x + sample.phase[0] != POISONED_X || 2 * y + sample.phase[1] != POISONED_Y);
+                assert_int_equal(valid[y * photo.width + x], 2 * x + sample.phase[0] != POISONED_X ||
+                                 2 * y + sample.phase[1] != POISONED_Y);
     }
     assert_ok(photos_get(&p, POISONED_VIEW, 1, &photo, NULL)); /* back to a level that was dropped */
     assert_non_null(photos_valid(&p, POISONED_VIEW));
@@ -500,14 +502,15 @@ static void opacities_are_raised(void **state)
     trainer_free(&t);
 }
 
-/* ---- poor points ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- poor points --------------------------------------------------------------------------------------------------------------------- */
 
 /* A copy of the tiny scene with only its first points, moved along the optical axes by `shift`. */
 static void points_that_tell_nothing_are_replaced(void **state)
 {
     (void)state;
     static const struct { const char *name; size_t keep; double shift; bool made; const char *says; } cases[] = {
-        {"few", 60, 0, false, "60 sparse points and "}, {"unseen", 150, 1e4, true, "none that are seen"}, {"all", 150, 0, false, "150 sparse points"}};
+        {"few", 60, 0, false, "60 sparse points and "}, {"unseen", 150, 1e4, true, "none that are seen"},
+        {"all", 150, 0, false, "150 sparse points"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         scene s;
         const scene_split split = {.kind = SCENE_SPLIT_NONE};

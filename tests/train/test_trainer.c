@@ -314,8 +314,8 @@ static void training_learns(void **state)
         last_loss += i >= 152 ? r.loss / 8 : 0;
     }
     assert_ok(trainer_held_out_psnr(&t, &after, NULL));
-    print_message("held out: %.2f -> %.2f dB, loss %.4f -> %.4f, anchors %zu -> %zu\n", before, after, first_loss, last_loss, t.anchors_initial,
-                  t.anchors.count);
+    print_message("held out: %.2f -> %.2f dB, loss %.4f -> %.4f, anchors %zu -> %zu\n", before, after, first_loss, last_loss,
+                  t.anchors_initial, t.anchors.count);
     assert_true(after > before + 4);
     assert_true(last_loss < 0.6 * first_loss);
     assert_true(changed);
@@ -433,8 +433,8 @@ static void write_transforms(const char *folder)
     assert_non_null(file);
     const gbt_camera *c = &s.views[0].camera;
     assert_int_equal(c->model, GBT_CAMERA_PINHOLE);
-    fprintf(file, "{\"w\": %d, \"h\": %d, \"fl_x\": %.17g, \"fl_y\": %.17g, \"cx\": %.17g, \"cy\": %.17g, \"frames\": [", c->width, c->height,
-            c->params[0], c->params[1], c->params[2], c->params[3]);
+    fprintf(file, "{\"w\": %d, \"h\": %d, \"fl_x\": %.17g, \"fl_y\": %.17g, \"cx\": %.17g, \"cy\": %.17g, \"frames\": [", c->width,
+            c->height, c->params[0], c->params[1], c->params[2], c->params[3]);
     for (size_t i = 0; i < s.view_count; i++) {
         const double *r = s.views[i].camera.rotation, *at = s.views[i].camera.center;
         fprintf(file, "%s{\"file_path\": \"images/%s\", \"transform_matrix\": [", i > 0 ? ", " : "", s.views[i].name);
@@ -723,10 +723,14 @@ static void pace_is_read(void **state)
     assert_int_equal(p.known, PACE_SEGMENTS);
     for (int i = 0; i < PACE_SEGMENTS; i++)
         assert_int_equal(p.steps[i], i + 1);
-    static const char *const bad[] = {"", "1", "1,2", "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20,21", "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,",
-                                      "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,x", "-1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
-                                      "1, 2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20", "1,,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
-                                      "1.5,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20", "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,99999999999999999999"};
+    static const char *const bad[] = {"", "1", "1,2", "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20,21",
+                                      "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,",
+                                      "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,x",
+                                      "-1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+                                      "1, 2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+                                      "1,,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+                                      "1.5,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+                                      "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,99999999999999999999"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         err = (gbt_error){0};
         if (pace_parse(bad[i], &p, &err) != GBT_ERR_ARGUMENT || strstr(err.text, "pace") == NULL)
@@ -793,7 +797,8 @@ static void config_comes_back(void **state)
         fail_msg("%s", err.text);
     config_text(&back, strings.data, again, sizeof again);
     assert_string_equal(text, again);
-    assert_true(back.voxel_size == def.voxel_size && back.budget_seconds == def.budget_seconds && back.seed == UINT64_MAX && !back.grow && back.compat);
+    assert_true(back.voxel_size == def.voxel_size && back.budget_seconds == def.budget_seconds && back.seed == UINT64_MAX && !back.grow &&
+                back.compat);
     assert_true(back.exposure && back.learning_rate_factor == 0.3);
 
     def = gbt_train_def_default();
@@ -810,7 +815,8 @@ static void config_comes_back(void **state)
     assert_string_equal(strings.data, folder);
 
     static const struct { const char *text, *says; } bad[] = {
-        {"seed = 1\nnonsense\n", "config:2"}, {"seed = x\n", "config:1"}, {"colour = 1\n", "colour"}, {"offsets = \n", "offsets"}, {"grow=1\n", "config:1"},
+        {"seed = 1\nnonsense\n", "config:2"}, {"seed = x\n", "config:1"}, {"colour = 1\n", "colour"}, {"offsets = \n", "offsets"},
+        {"grow=1\n", "config:1"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         err = (gbt_error){0};
@@ -822,7 +828,8 @@ static void config_comes_back(void **state)
         err = (gbt_error){0};
         back = gbt_train_def_default();
         trainer t = {0};
-        const bool refused = config_parse(wild[i], "config", &back, &strings, &err) != GBT_OK || trainer_open(&t, tiny, &back, &err) != GBT_OK;
+        const bool refused = config_parse(wild[i], "config", &back, &strings, &err) != GBT_OK ||
+                             trainer_open(&t, tiny, &back, &err) != GBT_OK;
         trainer_free(&t);
         assert_true(refused);
     }
@@ -860,9 +867,11 @@ static void samples_are_pixels_of_the_photo(void **state)
             for (int y = 0; y < got.height; y++)
                 for (int x = 0; x < got.width; x++, seen++) {
                     const int at[2] = {x * step + sample.phase[0], y * step + sample.phase[1]};
-                    assert_memory_equal(got.pixels + 3 * (y * got.width + x), full.pixels + 3 * (at[1] * full.width + at[0]), 3 * sizeof(float));
+                    assert_memory_equal(got.pixels + 3 * (y * got.width + x), full.pixels + 3 * (at[1] * full.width + at[0]),
+                                        3 * sizeof(float));
                     double a[3], b[3];
-                    assert_true(gbt_camera_unproject(&camera, x + 0.5, y + 0.5, a) && gbt_camera_unproject(&whole, at[0] + 0.5, at[1] + 0.5, b));
+                    assert_true(gbt_camera_unproject(&camera, x + 0.5, y + 0.5, a) &&
+                                gbt_camera_unproject(&whole, at[0] + 0.5, at[1] + 0.5, b));
                     for (int c = 0; c < 3; c++)
                         assert_true(fabs(a[c] - b[c]) < 1e-14);
                 }

@@ -87,7 +87,8 @@ static void all_words_arrive(void **state)
     request r;
     const char *const picture[] = {"camera", PINHOLE, "format", "float", "output", "normal", "preset", "fast", "sample", "7", NULL};
     assert_ok(request_parse("/render", word_in, (void *)picture, &r, NULL));
-    assert_true(r.kind == REQUEST_RENDER && r.view == -1 && r.format == REQUEST_FLOAT && r.renderer == FRAME_TRACE && r.output == 8 && r.sample == 7);
+    assert_true(r.kind == REQUEST_RENDER && r.view == -1 && r.format == REQUEST_FLOAT && r.renderer == FRAME_TRACE && r.output == 8 &&
+                r.sample == 7);
     assert_string_equal(r.preset, "fast");
     assert_true(r.camera.width == 64 && r.camera.height == 48 && r.camera.center[2] == 3);
     const char *const pick[] = {"view", "4", "width", "40", "height", "30", "x", "1.5", "y", "2", NULL};
@@ -102,8 +103,9 @@ static void hosts(void **state)
 {
     (void)state;
     static const char *const ours[] = {"127.0.0.1", "localhost", "127.0.0.1:8470", "LOCALHOST:1", "localhost:"};
-    static const char *const foreign[] = {"", ":8470", "evil.example", "127.0.0.1.evil.example", "localhost.evil.example:8470", "127.0.0.1:80.evil.example", "127.0.0.2",
-                                          "127.0.0.1@evil.example", "[::1]:8470", "0.0.0.0", " localhost", "localhost ", "127.0.0.1:1:2"};
+    static const char *const foreign[] = {"", ":8470", "evil.example", "127.0.0.1.evil.example", "localhost.evil.example:8470",
+                                          "127.0.0.1:80.evil.example", "127.0.0.2", "127.0.0.1@evil.example", "[::1]:8470", "0.0.0.0",
+                                          " localhost", "localhost ", "127.0.0.1:1:2"};
     for (size_t i = 0; i < sizeof ours / sizeof *ours; i++)
         if (!http_host_is_local(ours[i]))
             fail_msg("%s is ours", ours[i]);

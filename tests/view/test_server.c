@@ -149,7 +149,8 @@ static void the_log_is_read_on(void **state)
 {
     (void)state;
     static const struct { const char *path, *body, *about; } parts[] = {
-        {"/log", "a,b\n1,2\n", "{\"from\":0}"}, {"/log?from=4", "1,2\n", "{\"from\":4}"}, {"/log?from=8", "", "{\"from\":8}"}, {"/log?from=9", "a,b\n1,2\n", "{\"from\":0}"}};
+        {"/log", "a,b\n1,2\n", "{\"from\":0}"}, {"/log?from=4", "1,2\n", "{\"from\":4}"}, {"/log?from=8", "", "{\"from\":8}"},
+        {"/log?from=9", "a,b\n1,2\n", "{\"from\":0}"}};
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
         reply r = http_get(port, parts[i].path);
         assert_int_equal(r.code, 200);
@@ -217,7 +218,8 @@ static void the_newest_picture_wins(void **state)
         server_job *swap = job;
         job = other, other = swap;
     }
-    assert_true(server_request(job)->kind == REQUEST_RENDER && server_request(job)->view == 1 && server_request(other)->kind == REQUEST_PHOTO);
+    assert_true(server_request(job)->kind == REQUEST_RENDER && server_request(job)->view == 1 &&
+                server_request(other)->kind == REQUEST_PHOTO);
     /* While the first is drawn three more are asked for: the last one is what the page wants to see. */
     const int second = http_ask(port, "/render?view=2"), scene = http_ask(port, "/scene");
     settle(port);

@@ -1,4 +1,5 @@
-/* tests/view/test_view.c -- gbt_view() on a tiny run: the same pictures as gbt_render(), photos, points behind pixels, newer models, the end. */
+/* tests/view/test_view.c -- gbt_view() on a tiny run: the same pictures as gbt_render(), photos, points behind pixels, newer models, the
+   end. */
 #include "train/run_support.h"
 #include "view/http_client.h"
 
@@ -149,13 +150,14 @@ static void views_are_what_render_draws(void **state)
 static void cameras_are_what_render_draws(void **state)
 {
     (void)state;
-    static const char *const lenses[] = {"\"model\":\"pinhole\",\"fov_x_deg\":70", "\"model\":\"fisheye\",\"fov_x_deg\":200", "\"model\":\"orthographic\",\"view_width\":3",
-                                         "\"model\":\"equirectangular\""};
+    static const char *const lenses[] = {"\"model\":\"pinhole\",\"fov_x_deg\":70", "\"model\":\"fisheye\",\"fov_x_deg\":200",
+                                         "\"model\":\"orthographic\",\"view_width\":3", "\"model\":\"equirectangular\""};
     viewer v;
     const int port = open_viewer(&v, run_folder);
     for (size_t i = 0; i < sizeof lenses / sizeof *lenses; i++) {
         char text[512], path[600];
-        const int length = snprintf(text, sizeof text, "{\"origin\":[0.5,-2,1],\"target\":[0,0,0.2],\"up\":[0,0,1],\"width\":40,\"height\":20,%s}", lenses[i]);
+        const int length = snprintf(text, sizeof text,
+                                    "{\"origin\":[0.5,-2,1],\"target\":[0,0,0.2],\"up\":[0,0,1],\"width\":40,\"height\":20,%s}", lenses[i]);
         gbt_render_def def = gbt_render_def_default();
         def.camera = in_root("lens.json");
         assert_ok(file_write_atomic(def.camera, text, (size_t)length, NULL));
@@ -182,7 +184,8 @@ static void samples_are_other_points_of_the_pixels(void **state)
     (void)state;
     viewer v;
     const int port = open_viewer(&v, run_folder);
-    reply middle = get_ok(port, "/render?view=1&sample=0"), other = get_ok(port, "/render?view=1&sample=3"), again = get_ok(port, "/render?view=1&sample=3");
+    reply middle = get_ok(port, "/render?view=1&sample=0"), other = get_ok(port, "/render?view=1&sample=3"),
+        again = get_ok(port, "/render?view=1&sample=3");
     const double moved = mean_difference(&middle, &other);
     assert_true(moved > 0.01 && moved < 8);
     assert_true(mean_difference(&other, &again) == 0);
@@ -201,10 +204,13 @@ static void every_format_and_output(void **state)
 {
     (void)state;
     static const struct { const char *words, *starts; size_t bytes; } pictures[] = {
-        {"", NULL, 48 * 36 * 4}, {"&format=float", NULL, 48 * 36 * 12}, {"&format=jpeg&quality=50", "\xff\xd8\xff", 0}, {"&format=png", "\x89PNG", 0},
+        {"", NULL, 48 * 36 * 4}, {"&format=float", NULL, 48 * 36 * 12}, {"&format=jpeg&quality=50", "\xff\xd8\xff", 0},
+        {"&format=png", "\x89PNG", 0},
         {"&renderer=raster", NULL, 48 * 36 * 4}, {"&renderer=per-ray&sample=2", NULL, 48 * 36 * 4}, {"&preset=exact", NULL, 48 * 36 * 4},
-        {"&output=depth&format=float", NULL, 48 * 36 * 4}, {"&output=median-depth&format=float", NULL, 48 * 36 * 4}, {"&output=normal&format=float", NULL, 48 * 36 * 12},
-        {"&output=transmittance&format=float", NULL, 48 * 36 * 4}, {"&output=hits&format=float", NULL, 48 * 36 * 4}, {"&output=anchor&format=float", NULL, 48 * 36 * 4},
+        {"&output=depth&format=float", NULL, 48 * 36 * 4}, {"&output=median-depth&format=float", NULL, 48 * 36 * 4},
+        {"&output=normal&format=float", NULL, 48 * 36 * 12},
+        {"&output=transmittance&format=float", NULL, 48 * 36 * 4}, {"&output=hits&format=float", NULL, 48 * 36 * 4},
+        {"&output=anchor&format=float", NULL, 48 * 36 * 4},
         {"&width=20&height=15", NULL, 20 * 15 * 4}};
     viewer v;
     const int port = open_viewer(&v, run_folder);
@@ -212,7 +218,8 @@ static void every_format_and_output(void **state)
         char path[128];
         snprintf(path, sizeof path, "/render?view=2%s", pictures[i].words);
         reply r = get_ok(port, path);
-        if (pictures[i].bytes != 0 ? r.body_count != pictures[i].bytes : memcmp(r.body, pictures[i].starts, strlen(pictures[i].starts)) != 0)
+        if (pictures[i].bytes != 0 ? r.body_count != pictures[i].bytes : memcmp(r.body, pictures[i].starts,
+                                                                                strlen(pictures[i].starts)) != 0)
             fail_msg("%s: %zu bytes", path, r.body_count);
         free(r.text);
     }
@@ -234,7 +241,8 @@ static int smoothest(const float *depth)
     float least = 0.02f;
     for (int i = 48; i < 48 * 35; i++) {
         const float most = fmaxf(fmaxf(depth[i - 1], depth[i + 1]), fmaxf(depth[i - 48], depth[i + 48])), d = fmaxf(most, depth[i]);
-        const float low = fminf(fminf(depth[i - 1], depth[i + 1]), fminf(depth[i - 48], depth[i + 48])), step = (d - fminf(low, depth[i])) / d;
+        const float low = fminf(fminf(depth[i - 1], depth[i + 1]), fminf(depth[i - 48], depth[i + 48])),
+            step = (d - fminf(low, depth[i])) / d;
         if (depth[i] > 0 && step < least)
             best = i, least = step;
     }
@@ -264,7 +272,8 @@ static void points_lie_behind_their_pixels(void **state)
         square += d * d;
     }
     assert_true(fabs(sqrt(square) / number_of(found, "depth") - 1) < 1e-5);
-    assert_true(fabs(number_of(found, "depth") / (double)depth[at] - 1) < 0.02); /* Gaussians are as wide as pixels, and these differ by the lens */
+    assert_true(fabs(number_of(found, "depth") / (double)depth[at] - 1) < 0.02); /* Gaussians are as wide as pixels, and these differ by the
+                                                                                    lens */
     json_decref(there), json_decref(found);
     free(depths.text);
     close_viewer(&v, SIGINT);
@@ -369,8 +378,10 @@ static void what_cannot_be_shown(void **state)
 {
     (void)state;
     static const struct { const char *input, *data, *says; int port; gbt_status status; } rows[] = {
-        {"nowhere", NULL, "nowhere", 0, GBT_ERR_IO}, {"tiny", NULL, "model.gbt: not there", 0, GBT_ERR_IO}, {"tiny/images", NULL, "model.gbt", 0, GBT_ERR_IO},
-        {"run/config", NULL, "config", 0, GBT_ERR_FORMAT}, {"run", "nowhere", "nowhere", 0, GBT_ERR_IO}, {"run", NULL, "--port: 65536", 65536, GBT_ERR_ARGUMENT}};
+        {"nowhere", NULL, "nowhere", 0, GBT_ERR_IO}, {"tiny", NULL, "model.gbt: not there", 0, GBT_ERR_IO},
+        {"tiny/images", NULL, "model.gbt", 0, GBT_ERR_IO},
+        {"run/config", NULL, "config", 0, GBT_ERR_FORMAT}, {"run", "nowhere", "nowhere", 0, GBT_ERR_IO},
+        {"run", NULL, "--port: 65536", 65536, GBT_ERR_ARGUMENT}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         gbt_view_def def = gbt_view_def_default();
         gbt_error err = {0};

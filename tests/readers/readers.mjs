@@ -1,12 +1,15 @@
-// Gaussians written by gbtrace export, read by splat-transform and glTF-Transform: counts and every attribute. See test_readers.sh.
+// Gaussians written by gbtrace export, read by splat-transform, plyfile and glTF-Transform, and looked over by Khronos' validator: counts and every attribute.
+// Usage: readers.mjs PROGRAM PYTHON READ_PLY; see test_readers.sh.
 import {execFileSync} from "node:child_process";
 import fs from "node:fs";
 import os from "node:os";
 import path from "node:path";
 
+import validator from "gltf-validator";
+
 import {attributes, columns} from "./count.mjs";
 
-const program = process.argv[2], COUNT = 200;
+const [program, python, readPly] = process.argv.slice(2), COUNT = 200;
 const folder = fs.mkdtempSync(path.join(os.tmpdir(), "gbt_readers_"));
 let failures = 0, state = 1;
 
@@ -67,6 +70,16 @@ for (const file of files.slice(0, 3)) {
     for (const [name, most] of Object.entries(limit))
         check(`${ending}: ${name}`, worst[name], most);
 }
+
+// What splat-transform reads of a .ply, plyfile reads too: the same numbers in the same columns.
+const byName = JSON.parse(execFileSync(python, [readPly, files[0]], {maxBuffer: 1 << 28}));
+const plain = columns(files[0]);
+check("ply: columns that plyfile lacks", plain.names.filter((name) => !(name in byName)).length, 0);
+check("ply: plyfile against splat-transform", Math.max(...plain.names.flatMap((name) => Array.from(plain.column(name), (x, i) => Math.abs(x - byName[name][i])))), 0);
+
+const report = await validator.validateBytes(new Uint8Array(fs.readFileSync(files[3])));
+report.issues.messages.filter((m) => m.severity < 2).forEach((m) => console.log(`${m.pointer}: ${m.message}`));
+check("glb: errors and warnings of the validator", report.issues.numErrors + report.issues.numWarnings, 0);
 
 // glTF has y up: half a turn about z.
 const glb = await attributes(files[3]);

@@ -77,9 +77,12 @@ const plain = columns(files[0]);
 check("ply: columns that plyfile lacks", plain.names.filter((name) => !(name in byName)).length, 0);
 check("ply: plyfile against splat-transform", Math.max(...plain.names.flatMap((name) => Array.from(plain.column(name), (x, i) => Math.abs(x - byName[name][i])))), 0);
 
+// The validator is older than the extension: names that begin with the extension's are new to it, and nothing else may be.
 const report = await validator.validateBytes(new Uint8Array(fs.readFileSync(files[3])));
-report.issues.messages.filter((m) => m.severity < 2).forEach((m) => console.log(`${m.pointer}: ${m.message}`));
-check("glb: errors and warnings of the validator", report.issues.numErrors + report.issues.numWarnings, 0);
+const isNew = (m) => m.code === "MESH_PRIMITIVE_INVALID_ATTRIBUTE" && m.pointer.includes("/KHR_gaussian_splatting:");
+const said = report.issues.messages.filter((m) => m.severity < 2 && !isNew(m));
+said.forEach((m) => console.log(`${m.code} ${m.pointer}: ${m.message}`));
+check("glb: errors and warnings of the validator", said.length, 0);
 
 // glTF has y up: half a turn about z.
 const glb = await attributes(files[3]);

@@ -149,8 +149,8 @@ gbt_status anchors_json(const anchors_study *s, const char *folder, gbt_error *e
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         add_rows(s, scene, rows);
         for (size_t v = 0; v < anchors_variant_count; v++) {
-            json_t *run = json_pack("{s:o,s:s,s:s}", "scene", json_text(s->grid.names[scene]), "start", anchors_variants[v].name, "settings",
-                                    anchors_variants[v].settings);
+            json_t *run = json_pack("{s:o,s:s,s:s}", "scene", json_text(s->grid.names[scene]), "start", anchors_variants[v].name,
+                                    "settings", anchors_variants[v].settings);
             for (int f = 0; f < FIGURES; f++) {
                 const stat_sample stat = stat_over(s, scene, v, (figure)f);
                 json_object_set_new(run, figure_texts[f].name, stat_to_json(&stat));

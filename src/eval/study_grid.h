@@ -26,7 +26,8 @@ static inline study_figures *study_grid_at(const study_grid *g, size_t place, si
 }
 
 /** Make one run of a study in `folder`, or take it from there: its figures into `out`. */
-typedef gbt_status study_grid_run(const void *study, size_t scene, size_t variant, int seed, const char *folder, study_figures *out, gbt_error *err);
+typedef gbt_status study_grid_run(const void *study, size_t scene, size_t variant, int seed, const char *folder, study_figures *out,
+                                  gbt_error *err);
 
 /**
  * Make `folder` and all runs. Seeds are outermost: an interrupted study has whole comparisons of the first seeds.

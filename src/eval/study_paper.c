@@ -89,7 +89,8 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     }
     gbt_train_def def = gbt_train_def_default();
     def.compat = true, def.eval_split = "every=8", def.save_every_seconds = 0;
-    def.start_level = 0, def.splats_until = 0, def.footprint = 0; /* as compat has them: a new default must not make old runs look like others */
+    /* As compat has them: a new default must not make old runs look like others. */
+    def.start_level = 0, def.splats_until = 0, def.footprint = 0;
     def.iterations = s->def.iterations, def.downscale = s->def.downscale, def.renderer = s->def.renderer, def.seed = (uint64_t)seed;
     def.init = v->init, def.scale_prior = v->scale_prior, def.grow_until = v->grow_until, def.max_depth = v->max_depth;
     def.scale_factor = v->scaled ? s->scenes[scene].scale_constant : 1;

@@ -144,8 +144,8 @@ static void add_scene(const time_study *s, size_t scene, json_t *rows, json_t *r
 {
     char row[STUDY_NAME_SIZE + 160];
     const stat_sample reached = time_saved(s, scene);
-    snprintf(row, sizeof row, "%s: seconds of the default to the PSNR that the faithful protocol has after %g budgets", s->grid.names[scene],
-             time_variants[TIME_FAITHFUL].budgets);
+    snprintf(row, sizeof row, "%s: seconds of the default to the PSNR that the faithful protocol has after %g budgets",
+             s->grid.names[scene], time_variants[TIME_FAITHFUL].budgets);
     json_array_append_new(rows, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", s->def.budget_seconds, "value",
                                           stat_number(reached.mean), "pass", reached.mean <= s->def.budget_seconds));
     for (size_t v = 0; v < time_variant_count; v++) {

@@ -33,8 +33,8 @@ static int run(const command *self, int argc, char **argv)
     if (threads > 0)
         gbt_set_threads(threads);
     char data[4096], run_folder[4096], command_line[8400];
-    if (snprintf(data, sizeof data, "%s/scene", out) >= (int)sizeof data || snprintf(run_folder, sizeof run_folder, "%s/run",
-                                                                                     out) >= (int)sizeof run_folder)
+    if (snprintf(data, sizeof data, "%s/scene", out) >= (int)sizeof data ||
+        snprintf(run_folder, sizeof run_folder, "%s/run", out) >= (int)sizeof run_folder)
         return command_misused("--output: the path is too long");
     snprintf(command_line, sizeof command_line, "gbtrace train %s -o %s --budget %.0fs", data, run_folder, 60 * minutes);
     train.budget_seconds = 60 * minutes;

@@ -20,12 +20,10 @@ value_kind describe_value(const option *o)
     return VALUE_ANY;
 }
 
-void describe_choices(const option *o, char *out, size_t size)
+void describe_choices(FILE *out, const option *o)
 {
-    snprintf(out, size, "%s", o->choices);
-    for (char *c = out; *c != '\0'; c++)
-        if (*c == '|')
-            *c = ' ';
+    for (const char *c = o->choices; *c != '\0'; c++)
+        fputc(*c == '|' ? ' ' : *c, out);
 }
 
 void describe_escaped(FILE *out, const char *text, const char *special)

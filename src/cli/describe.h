@@ -18,8 +18,8 @@ typedef enum value_kind { VALUE_NONE, VALUE_ANY, VALUE_CHOICES, VALUE_FILE, VALU
 /** What may stand behind an option: nothing, something that cannot be guessed, one of its choices, a path, a folder. */
 value_kind describe_value(const option *o);
 
-/** "a|b" as "a b"; its length is kept. */
-void describe_choices(const option *o, char *out, size_t size);
+/** "a|b" as "a b". */
+void describe_choices(FILE *out, const option *o);
 
 /** `text` with a backslash before every byte of `special`. */
 void describe_escaped(FILE *out, const char *text, const char *special);

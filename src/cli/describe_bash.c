@@ -25,15 +25,17 @@ static void write_values(const command *self, const option *options, int option_
     FILE *out = context;
     for (int i = 0; i < option_count; i++) {
         const option *o = &options[i];
-        char words[512];
         const value_kind kind = describe_value(o);
         if (kind == VALUE_NONE)
             continue;
         write_pattern(out, self, o);
-        if (kind == VALUE_CHOICES)
-            describe_choices(o, words, sizeof words);
-        fprintf(out, kind == VALUE_CHOICES ? "words='%s' ;;\n" : "words= want=%s ;;\n",
-                kind == VALUE_CHOICES ? words : kind == VALUE_FILE ? "file" : kind == VALUE_FOLDER ? "folder" : "none");
+        if (kind == VALUE_CHOICES) {
+            fputs("words='", out);
+            describe_choices(out, o);
+            fputs("' ;;\n", out);
+        } else {
+            fprintf(out, "words= want=%s ;;\n", kind == VALUE_FILE ? "file" : kind == VALUE_FOLDER ? "folder" : "none");
+        }
     }
 }
 

@@ -18,13 +18,13 @@ static void write_rows(const command *self, const option *options, int option_co
         fprintf(out, "complete -c gbtrace -n '__fish_seen_subcommand_from %s' -l %s", self->name, o->name);
         if (o->short_name != 0)
             fprintf(out, " -s %c", o->short_name);
-        char words[512];
         switch (describe_value(o)) {
         case VALUE_NONE: break;
         case VALUE_ANY: fputs(" -x", out); break;
         case VALUE_CHOICES:
-            describe_choices(o, words, sizeof words);
-            fprintf(out, " -x -a '%s'", words);
+            fputs(" -x -a '", out);
+            describe_choices(out, o);
+            fputc('\'', out);
             break;
         case VALUE_FILE: fputs(" -r -F", out); break;
         case VALUE_FOLDER: fputs(" -x -a '(__fish_complete_directories)'", out); break;

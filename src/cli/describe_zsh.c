@@ -25,7 +25,6 @@ static void write_rows(const command *self, const option *options, int option_co
             fprintf(out, "'--%s[", o->name);
         write_note(out, o->help);
         fputc(']', out);
-        char words[512];
         const value_kind kind = describe_value(o);
         if (kind != VALUE_NONE) {
             fputc(':', out);
@@ -33,8 +32,9 @@ static void write_rows(const command *self, const option *options, int option_co
             fputc(':', out);
         }
         if (kind == VALUE_CHOICES) {
-            describe_choices(o, words, sizeof words);
-            fprintf(out, "(%s)", words);
+            fputc('(', out);
+            describe_choices(out, o);
+            fputc(')', out);
         } else if (kind == VALUE_FILE || kind == VALUE_FOLDER) {
             fputs(kind == VALUE_FILE ? "_files" : "_files -/", out);
         }

@@ -56,8 +56,8 @@ static void make_icosphere(icosphere *ico)
                 if (fmax(ab, fmax(bc, ca)) > 4.1) /* edges are 4 squared, the next distance is 10.5 */
                     continue;
                 const double *p = corner[a], *q = corner[b], *r = corner[c];
-                const double volume = p[0] * (q[1] * r[2] - q[2] * r[1]) + p[1] * (q[2] * r[0] -
-                                                                                   q[0] * r[2]) + p[2] * (q[0] * r[1] - q[1] * r[0]);
+                const double volume = p[0] * (q[1] * r[2] - q[2] * r[1]) + p[1] * (q[2] * r[0] - q[0] * r[2]) +
+                                      p[2] * (q[0] * r[1] - q[1] * r[0]);
                 const uint32_t x = a, y = volume > 0 ? b : c, z = volume > 0 ? c : b;
                 const uint32_t xy = middle_of(ico, middle, &count, x, y), yz = middle_of(ico, middle, &count, y, z),
                                zx = middle_of(ico, middle, &count, z, x);

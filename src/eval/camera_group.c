@@ -145,8 +145,8 @@ gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const floa
     memset(out, 0, sizeof *out);
     mean_center(cameras, count, middle);
     find_up(cameras, count, middle, out->up);
-    if (!nearest_to_axes(cameras, count, middle, out->focus) && !amid_points(cameras, count, middle, points, point_count, scratch,
-                                                                             out->focus))
+    if (!nearest_to_axes(cameras, count, middle, out->focus) &&
+        !amid_points(cameras, count, middle, points, point_count, scratch, out->focus))
         memset(out->focus, 0, sizeof out->focus);
     for (size_t i = 0; i < count; i++) {
         double way[3];

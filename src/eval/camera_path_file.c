@@ -123,9 +123,9 @@ static gbt_status take_matrix(const json_fields *r, const char *field, double ro
             return json_field_fail(r, field, "wanted 12 or 16 numbers, row after row, within 1e15");
         *(i % 4 == 3 ? &move[i / 4] : &rotation[3 * (i / 4) + i % 4]) = json_number_value(value);
     }
-    return dmat_is_rotation(rotation, rotation_tolerance) ? GBT_OK : json_field_fail(r, field,
-                                                                                     "not a rotation (wanted |R R' - I| <= 1e-3, and no "
-                                                                                     "reflection)");
+    return dmat_is_rotation(rotation, rotation_tolerance)
+               ? GBT_OK
+               : json_field_fail(r, field, "not a rotation (wanted |R R' - I| <= 1e-3, and no reflection)");
 }
 
 static gbt_status take_similarity(const json_fields *r, similarity *out)

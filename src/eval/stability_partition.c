@@ -70,8 +70,8 @@ static void explosion(stability *s)
     colony_adjust(s, &whole, SIZE_MAX, 0.001f);
     const size_t rows = c[0].a.count;
     const bool same = rows == c[1].a.count && memcmp(c[0].a.position, c[1].a.position, 3 * rows * sizeof(float)) == 0;
-    const bool best = s->status == GBT_OK && rows <= whole.a.count && memcmp(c[0].a.position, whole.a.position,
-                                                                             3 * rows * sizeof(float)) == 0;
+    const bool best = s->status == GBT_OK && rows <= whole.a.count &&
+                      memcmp(c[0].a.position, whole.a.position, 3 * rows * sizeof(float)) == 0;
     stability_check(s, "A14a", (double)rows - (double)cap, NAN,
                     "%zu anchors, all %zu Gaussians ask for more; without a cap there would be %zu.", count, 5 * count, whole.a.count);
     stability_check(s, "A14b", !same + !best, NAN, "With 1 and 2 threads; equal gradients go by level and cell.");

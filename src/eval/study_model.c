@@ -23,7 +23,7 @@ gbt_status study_model_camera(const char *path, const char *given, char *out, si
     const char *slash = strrchr(path, '/');
     if (given == NULL && slash == NULL)
         given = "camera.json";
-    const int length = given != NULL ? snprintf(out, size, "%s", given) : snprintf(out, size, "%.*s/camera.json", (int)(slash - path),
-                                                                                   path);
+    const int length = given != NULL ? snprintf(out, size, "%s", given)
+                                     : snprintf(out, size, "%.*s/camera.json", (int)(slash - path), path);
     return length < (int)size ? GBT_OK : base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
 }

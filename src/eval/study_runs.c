@@ -228,8 +228,9 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
     }
     log_info("%s", run);
     GBT_TRY(make_run(data, run, def, study_path, settings, err));
-    return read_run(study_path, metrics_path, settings, out) ? GBT_OK : base_fail(err, GBT_ERR_INTERNAL,
-                                                                                  "%.400s: the run cannot be read back", run);
+    return read_run(study_path, metrics_path, settings, out)
+               ? GBT_OK
+               : base_fail(err, GBT_ERR_INTERNAL, "%.400s: the run cannot be read back", run);
 }
 
 gbt_status study_runs_do_variant(const char *folder, const char *data, const char *data_name, const char *variant, const char *settings,

@@ -86,8 +86,8 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     f->view = footprint_view_of(&shot->camera);
     const bool splats = f->draw.renderer == FRAME_SPLAT;
     f->pixel_limited = f->draw.anchor_pixel != NULL && subject.cloud == NULL;
-    f->widened = f->draw.footprint > 0 && shot->given == NULL && !splats; /* nobody says how wide given rays are; splats are dilated
-                                                                             instead */
+    /* Nobody says how wide given rays are; splats are dilated instead. */
+    f->widened = f->draw.footprint > 0 && shot->given == NULL && !splats;
     /* where an opaque Gaussian falls to alpha_min */
     const visible_reach extent = {.sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)),
                                   .width = sqrtf(pixel_variance(f,

@@ -21,8 +21,8 @@ static inline uint16_t half_from_float(float x)
     const int drop = exponent < -14 ? -1 - exponent : 13;
     const uint32_t kept = mantissa >> drop, rest = mantissa & ((1u << drop) - 1), tie = 1u << (drop - 1);
     const uint32_t rounded = kept + (rest > tie || (rest == tie && (kept & 1)));
-    const uint32_t base = exponent < -14 ? 0 : (uint32_t)(exponent + 14) << 10; /* a mantissa that rounds up into the next power carries
-                                                                                   into it */
+    /* A mantissa that rounds up into the next power carries into it. */
+    const uint32_t base = exponent < -14 ? 0 : (uint32_t)(exponent + 14) << 10;
     return (uint16_t)(sign | (base + rounded));
 }
 

@@ -26,13 +26,18 @@ void parallel_set_threads(int threads)
     thread_count = threads < 1 ? 1 : threads > MAX_THREADS ? MAX_THREADS : threads;
 }
 
+static void find_threads(void)
+{
+    const machine m = machine_read("");
+    if (thread_count == 0)
+        parallel_set_threads(machine_threads(&m));
+}
+
 int parallel_threads(void)
 {
-    if (thread_count > 0)
-        return thread_count;
-    const machine m = machine_read("");
-    const int usable = machine_threads(&m);
-    return usable > MAX_THREADS ? MAX_THREADS : usable;
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, find_threads);
+    return thread_count;
 }
 
 static void *work(void *argument)

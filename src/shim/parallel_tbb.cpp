@@ -31,27 +31,18 @@ try {
     /* Without a limit TBB uses every processor: slower to share, never wrong. */
 }
 
+/* oneTBB counts processors and knows nothing of the quotas of containers. */
 extern "C" int parallel_threads(void)
 try {
-    if (thread_count > 0)
-        return thread_count;
-    static const int usable = [] {
-        const machine m = machine_read("");
-        return machine_threads(&m);
-    }();
-    return usable;
-} catch (...) {
-    return 1;
-}
-
-/* oneTBB counts processors and knows nothing of the quotas of containers. */
-static void limit_once()
-{
     static std::once_flag once;
     std::call_once(once, [] {
+        const machine m = machine_read("");
         if (thread_count == 0)
-            parallel_set_threads(parallel_threads());
+            parallel_set_threads(machine_threads(&m));
     });
+    return thread_count > 0 ? thread_count : 1;
+} catch (...) {
+    return 1;
 }
 
 /* The default floating-point environment as long as it lives. Embree switches its workers, which are ours too, to flush denormals to
@@ -70,7 +61,7 @@ class default_float_environment {
 
 extern "C" void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *context)
 try {
-    limit_once();
+    const int threads = parallel_threads();
     const size_t blocks = parallel_block_count(count, grain);
     const auto run = [=](size_t block) {
         const default_float_environment environment;
@@ -78,7 +69,7 @@ try {
         const size_t end = begin + grain < count ? begin + grain : count;
         body(block, begin, end, context);
     };
-    if (blocks <= 1 || thread_count == 1) {
+    if (blocks <= 1 || threads == 1) {
         for (size_t block = 0; block < blocks; block++)
             run(block);
         return;

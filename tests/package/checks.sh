@@ -1,4 +1,4 @@
-# tests/package/checks.sh -- one line per check, for the scripts beside it. Wants $work.
+# tests/package/checks.sh -- one line per check, for the scripts beside it and in tests/readers. check wants $work.
 passed=0
 failed=0
 

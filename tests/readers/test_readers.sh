@@ -7,11 +7,7 @@ source=$2
 env=$3/readers-env
 here=$source/tests/readers
 
-give_up() {
-    printf 'skipped: %s\n' "$*"
-    exit 77
-}
-
+. "$source/tests/package/checks.sh" # give_up
 command -v npm >/dev/null && command -v node >/dev/null || give_up "npm is not there (Debian: npm, nodejs)"
 if ! cmp -s "$here/package.json" "$env/complete"; then
     rm -rf "$env"

@@ -54,18 +54,25 @@ static void write_mask(const char *folder, const char *name, int width, int heig
     image_free(&mask);
 }
 
+/* The tiny scene in `folder` with an empty folder for masks, and open. */
+static scene open_maskable_scene(const char *folder)
+{
+    char masks[PATH_SIZE + 8];
+    scene s;
+    make_tiny_scene(folder);
+    snprintf(masks, sizeof masks, "%s/masks", folder);
+    assert_ok(file_make_folder(masks, NULL));
+    assert_ok(scene_load(folder, NULL, &s, NULL));
+    return s;
+}
+
 static const char *masked_scene(void)
 {
     const char *folder = in_root("masked");
     static bool done = false;
     if (done)
         return folder;
-    make_tiny_scene(folder);
-    char masks[PATH_SIZE + 8];
-    snprintf(masks, sizeof masks, "%s/masks", folder);
-    assert_ok(file_make_folder(masks, NULL));
-    scene s;
-    assert_ok(scene_load(folder, NULL, &s, NULL));
+    scene s = open_maskable_scene(folder);
     for (size_t i = 0; i < s.view_count; i++)
         write_mask(folder, s.views[i].name, s.views[i].camera.width, s.views[i].camera.height, i);
     scene_free(&s);
@@ -118,19 +125,14 @@ static void a_black_mask_leaves_nothing(void **state)
 {
     (void)state;
     const char *folder = in_root("black");
-    make_tiny_scene(folder);
-    char masks[PATH_SIZE + 8];
-    snprintf(masks, sizeof masks, "%s/masks", folder);
-    assert_ok(file_make_folder(masks, NULL));
-    scene s;
-    assert_ok(scene_load(folder, NULL, &s, NULL));
+    scene s = open_maskable_scene(folder);
     image black;
     assert_ok(image_alloc(&black, 48, 36, 1, NULL));
     memset(black.pixels, 0, 48 * 36 * sizeof *black.pixels);
     const size_t chosen[] = {0, 1}; /* the first is held out, the second trained on */
     for (int i = 0; i < 2; i++) {
         char path[2 * PATH_SIZE];
-        snprintf(path, sizeof path, "%s/%.60s.png", masks, s.views[chosen[i]].name);
+        snprintf(path, sizeof path, "%s/masks/%.60s.png", folder, s.views[chosen[i]].name);
         assert_ok(image_write(path, &black, NULL));
     }
     image_free(&black);

@@ -1,4 +1,4 @@
-"""PSNR, SSIM and FLIP of pairs of PNG files by gbtrace, scikit-image and flip-evaluator; see bench/versus_metrics."""
+"""PSNR, SSIM, FLIP and LPIPS of pairs of PNG files by gbtrace and by others; see bench/versus_metrics."""
 
 import json
 import pathlib
@@ -8,12 +8,61 @@ import tempfile
 
 import flip_evaluator
 import numpy
+import onnx
+import onnxruntime
+import safetensors.numpy
 from scipy import ndimage
 from skimage import io, metrics
 
 # Largest difference that counts as the same. Of FLIP, 7e-4 between black and white, where constants of colour are rounded; else 1e-5.
-LIMITS = {"psnr": 1e-6, "ssim_interior": 1e-6, "flip": 1e-3}
-NAMES = {"psnr": "PSNR, dB", "ssim_interior": "SSIM", "flip": "FLIP"}
+LIMITS = {"psnr": 1e-6, "ssim_interior": 1e-6, "flip": 1e-3, "lpips": 1e-5, "lpips_01": 1e-5}
+NAMES = {"psnr": "PSNR, dB", "ssim_interior": "SSIM", "flip": "FLIP", "lpips": "LPIPS", "lpips_01": "LPIPS of [0, 1]"}
+SMALLEST = 16  # pixels on a side that VGG16 takes
+
+# Channels of VGG16's convolutions; "M": maxima. Compared behind the last convolution before each "M", and at the end.
+VGG = [64, 64, "M", 128, 128, "M", 256, 256, 256, "M", 512, 512, 512, "M", 512, 512, 512]
+
+
+class Vgg:
+    """VGG16 with random weights: a graph for ONNX Runtime, and the file that gbtrace reads."""
+
+    def __init__(self, path):
+        random, state = numpy.random.default_rng(6), {}
+        nodes, outputs, value, channels, slice_number = [], [], "x", 3, 1
+        self.lin = []
+        module = 0
+        for index, width in enumerate(VGG):
+            if width == "M":
+                nodes.append(onnx.helper.make_node("MaxPool", [value], [f"p{index}"], kernel_shape=[2, 2], strides=[2, 2]))
+                value, module, slice_number = f"p{index}", module + 1, slice_number + 1
+                continue
+            name = f"net.slice{slice_number}.{module}"
+            state[f"{name}.weight"] = random.normal(0, (2 / (9 * channels)) ** 0.5, (width, channels, 3, 3)).astype(numpy.float32)
+            state[f"{name}.bias"] = random.uniform(-0.1, 0.1, width).astype(numpy.float32)
+            nodes.append(onnx.helper.make_node("Conv", [value, f"{name}.weight", f"{name}.bias"], [f"c{index}"], pads=[1, 1, 1, 1]))
+            nodes.append(onnx.helper.make_node("Relu", [f"c{index}"], [f"r{index}"]))
+            value, channels, module = f"r{index}", width, module + 2
+            if index + 1 == len(VGG) or VGG[index + 1] == "M":
+                self.lin.append(random.uniform(0, 1 / 5, width).astype(numpy.float32))
+                state[f"lin{len(self.lin) - 1}.model.1.weight"] = self.lin[-1].reshape(1, width, 1, 1)
+                outputs.append(onnx.helper.make_tensor_value_info(value, onnx.TensorProto.FLOAT, [1, width, None, None]))
+        safetensors.numpy.save_file(state, path)
+        picture = onnx.helper.make_tensor_value_info("x", onnx.TensorProto.FLOAT, [1, 3, None, None])
+        weights = [onnx.numpy_helper.from_array(array, name) for name, array in state.items() if name.startswith("net.")]
+        graph = onnx.helper.make_graph(nodes, "vgg", [picture], outputs, weights)
+        model = onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 13)], ir_version=8)
+        self.session = onnxruntime.InferenceSession(model.SerializeToString())
+        self.path = path
+
+    def features(self, picture, low):
+        shift, scale = numpy.array([-0.030, -0.088, -0.188]), numpy.array([0.458, 0.448, 0.450])
+        fed = (low + (1 - low) * picture - shift) / scale
+        found = self.session.run(None, {"x": fed.transpose(2, 0, 1)[None].astype(numpy.float32)})
+        return [f[0] / (numpy.sqrt((f[0].astype(numpy.float64) ** 2).sum(axis=0)) + 1e-10) for f in found]
+
+    def distance(self, a, b, low):
+        pairs = zip(self.features(a, low), self.features(b, low), self.lin)
+        return sum((weight[:, None, None] * (x - y) ** 2).sum(axis=0).mean() for x, y, weight in pairs)
 
 
 def picture(width, height, seed):
@@ -52,7 +101,7 @@ def write(path, values):
     io.imsave(path, (numpy.clip(values, 0, 1) * 255 + 0.5).astype(numpy.uint8), check_contrast=False)
 
 
-def theirs(path, reference):
+def theirs(path, reference, vgg):
     a, b = (io.imread(p)[..., :3].astype(numpy.float64) / 255 for p in (path, reference))
     mse = numpy.mean((a - b) ** 2)
     similarity = metrics.structural_similarity(
@@ -60,12 +109,15 @@ def theirs(path, reference):
     )
     flip = flip_evaluator.evaluate(b.astype(numpy.float32), a.astype(numpy.float32), "LDR", applyMagma=False)[1]
     psnr = 100.0 if mse <= 1e-10 else metrics.peak_signal_noise_ratio(b, a, data_range=1)
-    return {"psnr": float(psnr), "ssim_interior": float(similarity), "flip": float(flip)}
+    scores = {"psnr": float(psnr), "ssim_interior": float(similarity), "flip": float(flip)}
+    if min(a.shape[:2]) >= SMALLEST:
+        scores |= {"lpips": vgg.distance(a, b, -1), "lpips_01": vgg.distance(a, b, 0)}
+    return scores
 
 
-def ours(program, path, reference):
-    done = subprocess.run([program, "compare", "--json", path, reference], capture_output=True, text=True, check=True)
-    return json.loads(done.stdout)
+def ours(program, path, reference, network):
+    command = [program, "compare", "--json", path, reference] + (["--lpips", network] if network else [])
+    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
 
 def run_pairs(folder):
@@ -90,11 +142,13 @@ def main():
     count = 0
     print("| pair | " + " | ".join(f"{NAMES[m]}: gbtrace | other" for m in LIMITS) + " |\n|---" + "|--:" * 2 * len(LIMITS) + "|")
     with tempfile.TemporaryDirectory() as scratch:
+        vgg = Vgg(f"{scratch}/vgg.safetensors")
         for name, path, reference in all_pairs(folders, scratch):
-            mine, other = ours(program, path, reference), theirs(path, reference)
-            for m in LIMITS:
+            other = theirs(path, reference, vgg)
+            mine = ours(program, path, reference, vgg.path if "lpips" in other else None)
+            for m in other:
                 worst[m] = max(worst[m], abs(mine[m] - other[m]))
-            print(f"| {name} | " + " | ".join(f"{mine[m]:.6f} | {other[m]:.6f}" for m in LIMITS) + " |")
+            print(f"| {name} | " + " | ".join(f"{mine[m]:.6f} | {other[m]:.6f}" if m in other else " | " for m in LIMITS) + " |")
             count += 1
     print(f"\nLargest difference in {count} pairs: " + "; ".join(f"{NAMES[m]} {worst[m]:.1e} (limit {LIMITS[m]:g})" for m in LIMITS) + ".")
     print("SSIM is the mean over the windows that lie wholly inside the picture, as scikit-image takes it; gbtrace's own figure, which")

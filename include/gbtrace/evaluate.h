@@ -16,6 +16,7 @@ typedef struct gbt_evaluate_def {
     int report;       /* 1: also write RUN/report.html. Default 1 */
     const char *preset; /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is "default". Default NULL */
     int tensorboard;  /* 1: also write RUN/events.out.tfevents.1.eval: scores, up to eight renders and photos. Default 0 */
+    const char *lpips; /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such score. Default NULL */
 } gbt_evaluate_def;
 
 gbt_evaluate_def gbt_evaluate_def_default(void);
@@ -56,7 +57,19 @@ typedef struct gbt_comparison {
  */
 gbt_status gbt_compare_images(const char *path, const char *reference, gbt_comparison *out, gbt_error *err);
 
-/** The same for pictures in memory, [height][width][3], also rounded to 8 bit. GBT_OK, GBT_ERR_ARGUMENT (no pixels), GBT_ERR_NO_MEMORY. */
+/**
+ * LPIPS of two image files, as gbt_compare_images() reads them, for the network in a .safetensors file (docs/metrics.md).
+ *
+ * @param out [out] of colours in [-1, 1], as the network was trained; and in [0, 1], as the scores of 3DGS are made
+ * @return as gbt_compare_images(); GBT_ERR_ARGUMENT also when the pictures are too small for the network
+ */
+gbt_status gbt_compare_lpips(const char *path, const char *reference, const char *network, double out[2], gbt_error *err);
+
+/**
+ * gbt_compare_images() for pictures in memory, [height][width][3], also rounded to 8 bit.
+ *
+ * @return GBT_OK, GBT_ERR_ARGUMENT (no pixels), GBT_ERR_NO_MEMORY
+ */
 gbt_status gbt_compare_pictures(const float *picture, const float *reference, int width, int height, gbt_comparison *out, gbt_error *err);
 
 typedef enum gbt_split { GBT_SPLIT_TEST, GBT_SPLIT_TRAIN, GBT_SPLIT_ALL } gbt_split;

@@ -24,6 +24,7 @@ typedef struct gbt_paper_def {
     int seeds;               /* runs of each variant, seeds 0, 1, ...; [1, 10]. Default 3 */
     const char *renderer;    /* "raster" (default, as the paper), "trace" or "per-ray" */
     const char *tables;      /* which, as "1,3". Default "1,2,3,4" */
+    const char *lpips;       /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such column. Default NULL */
 } gbt_paper_def;
 
 gbt_paper_def gbt_paper_def_default(void);

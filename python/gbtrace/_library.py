@@ -71,7 +71,7 @@ class CComparison(c.Structure):
 
 class CEvaluateDef(c.Structure):
     _fields_ = [("data", c.c_char_p), ("json", c.c_char_p), ("renderer", c.c_char_p), ("downscale", c.c_double), ("report", c.c_int),
-                ("preset", c.c_char_p), ("tensorboard", c.c_int)]
+                ("preset", c.c_char_p), ("tensorboard", c.c_int), ("lpips", c.c_char_p)]
 
 
 class CExportDef(c.Structure):

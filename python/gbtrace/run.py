@@ -29,10 +29,10 @@ def train(data, run, **settings):
     return Model(run)
 
 
-def evaluate(run, data=None):
-    """Score the held-out views of a run; RUN/metrics.json and RUN/report.html have the figures."""
+def evaluate(run, data=None, lpips=None):
+    """Score the held-out views of a run; RUN/metrics.json and RUN/report.html have the figures. lpips: the file of a network (docs/metrics.md)."""
     settings = lib.library.gbt_evaluate_def_default()
-    settings.data = lib.encode(data)
+    settings.data, settings.lpips = lib.encode(data), lib.encode(lpips)
     lib.call("gbt_evaluate", lib.encode(run), c.byref(settings))
 
 

@@ -337,72 +337,87 @@ static size_t compact(anchors *a, adjust_stats *s, const adjust_def *def, const 
     return to;
 }
 
+/* Marks what goes by the rule; returns how many stay. */
+static size_t judge(const anchors *a, const adjust_stats *stats, const adjust_def *def, bool *pruned, size_t *most_opaque)
+{
+    size_t survivors = 0;
+    *most_opaque = 0;
+    for (size_t i = 0; i < a->count; i++) {
+        pruned[i] = is_pruned(stats, def, i);
+        survivors += !pruned[i];
+        if (stats->use_accum[i] * stats->visit_count[*most_opaque] > stats->use_accum[*most_opaque] * stats->visit_count[i])
+            *most_opaque = i;
+    }
+    return survivors;
+}
+
+/* The cap counts the room that pruning makes; it never removes an anchor by itself. */
+static void keep_largest(growth *g, size_t room)
+{
+    if (g->added_count <= room)
+        return;
+    qsort(g->added, g->added_count, sizeof *g->added, by_gradient);
+    g->added_count = room;
+    qsort(g->added, g->added_count, sizeof *g->added, by_level_and_cell);
+}
+
+/* Rows are zero but for what is set here. */
+static void append(anchors *a, const growth *g, size_t first, int64_t *source)
+{
+    for (size_t i = 0; i < g->added_count; i++) {
+        const fresh *f = &g->added[i];
+        const size_t row = first + i;
+        source[row] = -1;
+        memcpy(a->position + row * 3, f->position, sizeof f->position);
+        memcpy(a->feature + row * ANCHOR_FEATURE_DIM, g->feature + f->feature * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof(float));
+        for (size_t c = 0; c < 6; c++)
+            a->scale_log[row * 6 + c] = (float)log((double)f->cell_size);
+    }
+}
+
+/* With what was decided: the room is made first, then nothing can fail. */
+static gbt_status apply(anchors *a, adjust_stats *stats, const adjust_def *def, const growth *g, const bool *pruned, size_t survivors,
+                        adjust_result *out, gbt_error *err)
+{
+    const size_t before = a->count, after = survivors + g->added_count, widest = after > before ? after : before;
+    int64_t *source = mem_alloc(after, sizeof *source, "adjust", err);
+    gbt_status status = source == NULL ? GBT_ERR_NO_MEMORY : anchors_resize(a, widest, err);
+    if (status == GBT_OK)
+        status = adjust_stats_resize(stats, widest, a->offset_count, err);
+    a->count = before;
+    if (status != GBT_OK) {
+        mem_free(source);
+        return status;
+    }
+    a->count = stats->count = compact(a, stats, def, pruned, source);
+    (void)anchors_resize(a, after, NULL);
+    (void)adjust_stats_resize(stats, after, a->offset_count, NULL);
+    append(a, g, survivors, source);
+    for (size_t i = 0; i < after; i++)
+        for (size_t c = 3; c < 6; c++)
+            a->scale_log[i * 6 + c] = fminf(a->scale_log[i * 6 + c], def->shape_log_max);
+    *out = (adjust_result){.grown = g->added_count, .pruned = before - survivors, .count = after, .source = source};
+    return GBT_OK;
+}
+
 gbt_status anchors_adjust(anchors *a, adjust_stats *stats, const adjust_def *def, adjust_result *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
     GBT_TRY(check_arguments(a, stats, def, err));
-    gbt_status status = GBT_OK;
-    const size_t before = a->count;
     growth g = {.a = a, .stats = stats, .def = def};
-    int64_t *source = NULL;
-    bool *pruned = mem_calloc(before, sizeof *pruned, "adjust", err);
-    if (pruned == NULL)
-        return GBT_ERR_NO_MEMORY;
-    if (def->grow && before > 0) {
+    bool *pruned = mem_calloc(a->count, sizeof *pruned, "adjust", err);
+    gbt_status status = pruned == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    if (status == GBT_OK && def->grow)
         status = grow(&g, err);
-        if (status != GBT_OK)
-            goto done;
+    if (status == GBT_OK) {
+        size_t most_opaque, survivors = judge(a, stats, def, pruned, &most_opaque);
+        keep_largest(&g, def->max_anchors > survivors ? def->max_anchors - survivors : 0);
+        const bool keep_last = survivors + g.added_count == 0 && a->count > 0;
+        if (keep_last)
+            pruned[most_opaque] = false, survivors = 1;
+        status = apply(a, stats, def, &g, pruned, survivors, out, err);
+        out->kept_last = keep_last && status == GBT_OK;
     }
-
-    size_t survivors = 0, most_opaque = 0;
-    for (size_t i = 0; i < before; i++) {
-        pruned[i] = is_pruned(stats, def, i);
-        survivors += !pruned[i];
-        if (stats->use_accum[i] * stats->visit_count[most_opaque] > stats->use_accum[most_opaque] * stats->visit_count[i])
-            most_opaque = i;
-    }
-    /* The cap counts the room that pruning makes; it never removes an anchor by itself. */
-    const size_t room = def->max_anchors > survivors ? def->max_anchors - survivors : 0;
-    if (g.added_count > room) {
-        qsort(g.added, g.added_count, sizeof *g.added, by_gradient);
-        g.added_count = room;
-        qsort(g.added, g.added_count, sizeof *g.added, by_level_and_cell);
-    }
-    const bool kept_last = survivors + g.added_count == 0 && before > 0;
-    if (kept_last) {
-        pruned[most_opaque] = false;
-        survivors = 1;
-    }
-
-    const size_t after = survivors + g.added_count, widest = after > before ? after : before;
-    source = mem_alloc(after, sizeof *source, "adjust", err);
-    status = source == NULL ? GBT_ERR_NO_MEMORY : anchors_resize(a, widest, err);
-    if (status == GBT_OK)
-        status = adjust_stats_resize(stats, widest, a->offset_count, err);
-    a->count = before; /* the extra rows are only room; nothing below can fail */
-    if (status != GBT_OK)
-        goto done;
-
-    compact(a, stats, def, pruned, source);
-    a->count = stats->count = survivors;
-    (void)anchors_resize(a, after, NULL);
-    (void)adjust_stats_resize(stats, after, a->offset_count, NULL);
-    for (size_t i = 0; i < g.added_count; i++) {
-        const fresh *f = &g.added[i];
-        const size_t row = survivors + i;
-        source[row] = -1;
-        memcpy(a->position + row * 3, f->position, sizeof f->position);
-        memcpy(a->feature + row * ANCHOR_FEATURE_DIM, g.feature + f->feature * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof(float));
-        for (size_t c = 0; c < 6; c++)
-            a->scale_log[row * 6 + c] = (float)log((double)f->cell_size);
-    }
-    for (size_t i = 0; i < after; i++)
-        for (size_t c = 3; c < 6; c++)
-            a->scale_log[i * 6 + c] = fminf(a->scale_log[i * 6 + c], def->shape_log_max);
-    *out = (adjust_result){.grown = g.added_count, .pruned = before - survivors, .count = after, .source = source, .kept_last = kept_last};
-    source = NULL;
-done:
-    mem_free(source);
     mem_free(pruned);
     mem_free(g.added);
     mem_free(g.feature);

@@ -15,7 +15,9 @@ static void print_number(const char *name, double value, const char *end)
 static int run(const command *self, int argc, char **argv)
 {
     bool json = false;
+    const char *network = NULL;
     const option options[] = {
+        {.name = "lpips", .kind = OPTION_STRING, .value = &network, .value_name = "FILE", .help = LPIPS_HELP},
         {.name = "json", .kind = OPTION_FLAG, .value = &json, .help = "as JSON"},
     };
     operands named;
@@ -24,7 +26,10 @@ static int run(const command *self, int argc, char **argv)
         return code;
     gbt_error err = {0};
     gbt_comparison c;
-    const gbt_status status = gbt_compare_images(named.value[0], named.value[1], &c, &err);
+    double lpips[2];
+    gbt_status status = gbt_compare_images(named.value[0], named.value[1], &c, &err);
+    if (status == GBT_OK && network != NULL)
+        status = gbt_compare_lpips(named.value[0], named.value[1], network, lpips, &err);
     if (status != GBT_OK)
         return command_failed(status, &err);
     if (json) {
@@ -32,12 +37,20 @@ static int run(const command *self, int argc, char **argv)
         print_number("psnr", c.psnr, ", ");
         print_number("ssim", c.ssim, ", ");
         print_number("ssim_interior", c.ssim_interior, ", ");
+        if (network != NULL) {
+            print_number("lpips", lpips[0], ", ");
+            print_number("lpips_01", lpips[1], ", ");
+        }
         print_number("flip", c.flip, "}\n");
     } else {
-        printf("%d x %d: PSNR %.4f dB, SSIM %.6f (windows inside: %.6f), FLIP %.6f\n", c.width, c.height, c.psnr, c.ssim, c.ssim_interior,
+        printf("%d x %d: PSNR %.4f dB, SSIM %.6f (windows inside: %.6f), FLIP %.6f", c.width, c.height, c.psnr, c.ssim, c.ssim_interior,
                c.flip);
+        if (network != NULL)
+            printf(", LPIPS %.6f (colours in [0, 1]: %.6f)", lpips[0], lpips[1]);
+        putchar('\n');
     }
     return 0;
 }
 
-const command command_compare = {.name = "compare", .summary = "two pictures: PSNR, SSIM, FLIP", .usage = "IMAGE REFERENCE", .run = run};
+const command command_compare = {.name = "compare", .summary = "two pictures: PSNR, SSIM, FLIP, LPIPS", .usage = "IMAGE REFERENCE",
+                                 .run = run};

@@ -19,6 +19,7 @@ static int run(const command *self, int argc, char **argv)
          .help = "divide the photos' size by this; 0: as in training", .aliases = "r resolution"},
         {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast",
          .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
+        {.name = "lpips", .kind = OPTION_STRING, .value = &def.lpips, .value_name = "FILE", .help = LPIPS_HELP},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
          .help = "0: all processors, at most the container's share"},
     };
@@ -32,5 +33,5 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_evaluate(model.value[0], &def, &err), &err);
 }
 
-const command command_eval = {.name = "eval", .summary = "score the held-out views: PSNR, SSIM, FLIP; renders and report", .usage = "RUN",
-                              .run = run, .alias = "metrics"};
+const command command_eval = {.name = "eval", .summary = "score the held-out views: PSNR, SSIM, FLIP, LPIPS; renders and report",
+                              .usage = "RUN", .run = run, .alias = "metrics"};

@@ -90,6 +90,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "renderer", .kind = OPTION_CHOICE, .value = &paper->renderer, .choices = "raster|trace|per-ray",
          .help = "paper: what photos are compared with"},
         {.name = "tables", .kind = OPTION_STRING, .value = &paper->tables, .value_name = "1,3", .help = "paper: which of its four"},
+        {.name = "lpips", .kind = OPTION_STRING, .value = &paper->lpips, .value_name = "FILE", .help = "paper: " LPIPS_HELP},
         {.name = "budget", .kind = OPTION_DURATION, .value = &request.time.budget_seconds, .min = 1, .max = 1e6, .value_name = "TIME",
          .help = "time: of a run"},
         {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &downscale, .min = 1, .max = 64, .value_name = "F",

@@ -38,6 +38,8 @@ typedef struct option {
     bool required;
 } option;
 
+#define LPIPS_HELP "a network (.safetensors): LPIPS too (docs/metrics.md)"
+
 enum { OPTIONS_MAX = 64, OPTIONS_MAX_OPERANDS = 64, OPTIONS_COMMON = 4, OPTIONS_WANTED_SIZE = 256 };
 
 typedef struct operands {

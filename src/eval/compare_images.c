@@ -4,6 +4,7 @@
 
 #include "base/fail.h"
 #include "base/image.h"
+#include "eval/lpips.h"
 #include "gbtrace/evaluate.h"
 #include "image/metrics.h"
 
@@ -27,18 +28,41 @@ static gbt_status compare(const image *a, const image *b, gbt_comparison *out, g
     return metric_flip(a, b, &out->flip, NULL, err);
 }
 
+/* Freed by the caller, whatever happens. */
+static gbt_status read_pair(const char *path, const char *reference, image *a, image *b, gbt_error *err)
+{
+    GBT_TRY(read_colors(path, a, err));
+    GBT_TRY(read_colors(reference, b, err));
+    if (a->width != b->width || a->height != b->height)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted %d x %d as %s)", path, a->width, a->height, b->width,
+                         b->height, reference);
+    return GBT_OK;
+}
+
 gbt_status gbt_compare_images(const char *path, const char *reference, gbt_comparison *out, gbt_error *err)
 {
     image a = {0}, b = {0};
     *out = (gbt_comparison){0};
-    gbt_status status = read_colors(path, &a, err);
-    if (status == GBT_OK)
-        status = read_colors(reference, &b, err);
-    if (status == GBT_OK && (a.width != b.width || a.height != b.height))
-        status = base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted %d x %d as %s)", path, a.width, a.height, b.width, b.height,
-                           reference);
+    gbt_status status = read_pair(path, reference, &a, &b, err);
     if (status == GBT_OK)
         status = compare(&a, &b, out, err);
+    image_free(&a);
+    image_free(&b);
+    return status;
+}
+
+gbt_status gbt_compare_lpips(const char *path, const char *reference, const char *network, double out[2], gbt_error *err)
+{
+    image a = {0}, b = {0};
+    lpips *net = NULL;
+    lpips_scores scores = {0};
+    gbt_status status = read_pair(path, reference, &a, &b, err);
+    if (status == GBT_OK)
+        status = lpips_open(network, &net, err);
+    if (status == GBT_OK)
+        status = lpips_compare(net, &a, &b, NULL, 0, &scores, err);
+    out[0] = scores.lpips, out[1] = scores.lpips_01;
+    lpips_close(net);
     image_free(&a);
     image_free(&b);
     return status;

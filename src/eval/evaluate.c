@@ -21,6 +21,8 @@
 
 enum { EVENTS_VIEWS = 8 };
 
+#define PROTOCOL "8-bit images; SSIM 11x11 Gaussian, zero padding; FLIP 67 pixels per degree; means over held-out views"
+
 gbt_evaluate_def gbt_evaluate_def_default(void)
 {
     return (gbt_evaluate_def){.report = 1};
@@ -39,7 +41,7 @@ gbt_status view_score_paths(view_score *score, const char *folder, gbt_error *er
     return GBT_OK;
 }
 
-static gbt_status score_view(loaded_run *r, size_t index, const char *folder, view_score *score, gbt_error *err)
+static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, const char *folder, view_score *score, gbt_error *err)
 {
     const scene_view *view = &r->scene.views[index];
     const double start = clock_wall();
@@ -58,6 +60,8 @@ static gbt_status score_view(loaded_run *r, size_t index, const char *folder, vi
         status = image_score_photo(render, &photo, valid, r->def.exposure, &error_map, &scores, err);
     score->psnr = scores.psnr, score->ssim = scores.ssim, score->flip = scores.flip;
     score->masked = valid != NULL;
+    if (status == GBT_OK && net != NULL) /* of the half that is scored (image_score_photo()) */
+        status = lpips_compare(net, render, &photo, valid, r->def.exposure ? render->width / 2 : 0, &score->lpips, err);
     if (status == GBT_OK)
         status = view_score_paths(score, folder, err);
     const image *const pictures[] = {render, &photo, &error_map};
@@ -75,6 +79,12 @@ static json_t *number_or_null(double value)
     return isfinite(value) ? json_real(value) : json_null();
 }
 
+static void add_lpips(json_t *to, const lpips_scores *scores)
+{
+    json_object_set_new(to, "lpips", number_or_null(scores->lpips));
+    json_object_set_new(to, "lpips_01", number_or_null(scores->lpips_01));
+}
+
 static json_t *scores_to_json(const evaluation *e)
 {
     json_t *root = json_object(), *views = json_array();
@@ -82,14 +92,21 @@ static json_t *scores_to_json(const evaluation *e)
     json_object_set_new(root, "psnr", number_or_null(e->psnr));
     json_object_set_new(root, "ssim", number_or_null(e->ssim));
     json_object_set_new(root, "flip", number_or_null(e->flip));
+    if (e->lpips_network != NULL) {
+        add_lpips(root, &e->lpips);
+        json_object_set_new(root, "lpips_network", json_string(e->lpips_network));
+    }
     json_object_set_new(root, "protocol",
-                        json_string("8-bit images; SSIM 11x11 Gaussian, zero padding; FLIP 67 pixels per degree; means over held-out "
-                                    "views"));
+                        json_string(e->lpips_network == NULL ? PROTOCOL
+                                                             : PROTOCOL "; LPIPS 0.1 of colours in [-1, 1], lpips_01 in [0, 1]"));
     for (size_t i = 0; i < e->view_count; i++) {
         const view_score *v = &e->views[i];
-        json_array_append_new(views, json_pack("{s:s,s:o,s:o,s:o,s:f,s:I}", "name", v->name, "psnr", number_or_null(v->psnr), "ssim",
-                                               number_or_null(v->ssim), "flip", number_or_null(v->flip), "seconds", v->seconds, "gaussians",
-                                               (json_int_t)v->gaussians));
+        json_t *view = json_pack("{s:s,s:o,s:o,s:o,s:f,s:I}", "name", v->name, "psnr", number_or_null(v->psnr), "ssim",
+                                 number_or_null(v->ssim), "flip", number_or_null(v->flip), "seconds", v->seconds, "gaussians",
+                                 (json_int_t)v->gaussians);
+        if (e->lpips_network != NULL)
+            add_lpips(view, &v->lpips);
+        json_array_append_new(views, view);
     }
     json_object_set_new(root, "renderer", json_string(e->renderer));
     json_object_set_new(root, "downscale", json_real(e->downscale));
@@ -131,7 +148,7 @@ static gbt_status write_json(const json_t *root, const char *path, gbt_error *er
     return status;
 }
 
-static gbt_status score_run(loaded_run *r, const char *run, evaluation *e, gbt_error *err)
+static gbt_status score_run(loaded_run *r, const char *run, const lpips *net, evaluation *e, gbt_error *err)
 {
     char folder[4096];
     GBT_TRY(file_join(folder, sizeof folder, run, "renders/test", err));
@@ -147,7 +164,7 @@ static gbt_status score_run(loaded_run *r, const char *run, evaluation *e, gbt_e
         if (!r->scene.views[i].is_test)
             continue;
         view_score *v = &e->views[e->view_count];
-        GBT_TRY(score_view(r, i, folder, v, err));
+        GBT_TRY(score_view(r, i, net, folder, v, err));
         log_count("score", ++e->view_count, wanted, v->psnr);
         e->masked = e->masked || v->masked;
         e->gaussians_per_view += (double)v->gaussians;
@@ -155,8 +172,11 @@ static gbt_status score_run(loaded_run *r, const char *run, evaluation *e, gbt_e
             continue;
         scored++;
         e->psnr += v->psnr, e->ssim += v->ssim, e->flip += v->flip;
+        e->lpips.lpips += v->lpips.lpips, e->lpips.lpips_01 += v->lpips.lpips_01;
     }
     const double n = (double)scored; /* 0 / 0 = NaN here becomes null in JSON and "n/a" on the page */
+    e->lpips.lpips /= n, e->lpips.lpips_01 /= n;
+    e->lpips_network = net != NULL ? lpips_network(net) : NULL;
     e->psnr /= n, e->ssim /= n, e->flip /= n, e->gaussians_per_view /= (double)e->view_count;
     e->anchors = r->model.anchors.count, e->exposure = r->def.exposure;
     e->renderer = frame_renderer_name(r->frame.draw.renderer), e->downscale = r->photos.downscale;
@@ -204,22 +224,33 @@ static gbt_status write_events(const loaded_run *loaded, const char *run, const 
     return status;
 }
 
+static void log_scores(const evaluation *e)
+{
+    char more[64] = "";
+    if (e->lpips_network != NULL)
+        snprintf(more, sizeof more, ", LPIPS (%s) %.4f, in [0, 1] %.4f", e->lpips_network, e->lpips.lpips, e->lpips.lpips_01);
+    log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f%s", e->view_count, e->psnr, e->ssim, e->flip, more);
+}
+
 gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err)
 {
     if (!file_is_folder(run))
         return base_fail(err, GBT_ERR_IO, "%s: not a run folder (wanted what gbtrace train wrote)", run);
     evaluation e = {0};
     json_t *root = NULL;
+    lpips *net = NULL;
     loaded_run *r = mem_alloc(1, sizeof *r, "run", err);
     if (r == NULL)
         return GBT_ERR_NO_MEMORY;
     gbt_status status = loaded_run_open(run, def->data, def->downscale, r, err);
+    if (status == GBT_OK && def->lpips != NULL)
+        status = lpips_open(def->lpips, &net, err);
     if (status == GBT_OK)
         status = loaded_run_preset(def->preset, &r->settings, err);
     if (status == GBT_OK && def->renderer != NULL && !frame_renderer_named(def->renderer, &r->frame.draw.renderer))
         status = base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)", def->renderer);
     if (status == GBT_OK)
-        status = score_run(r, run, &e, err);
+        status = score_run(r, run, net, &e, err);
     if (status != GBT_OK)
         goto done;
     char path[4096];
@@ -239,8 +270,9 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
     if (status == GBT_OK && e.view_count == 0)
         log_info("no held-out views: scores are n/a");
     else if (status == GBT_OK)
-        log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f", e.view_count, e.psnr, e.ssim, e.flip);
+        log_scores(&e);
 done:
+    lpips_close(net);
     json_decref(root);
     mem_free(e.views);
     loaded_run_close(r);

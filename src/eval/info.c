@@ -114,7 +114,7 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
         const char *separator = "";
         for (int m = 0; m < GBT_CAMERA_MODEL_COUNT; m++)
             if (f->views_by_model[m] > 0) {
-                fprintf(out, "%s%zu %s", separator, f->views_by_model[m], gbt_camera_model_name((gbt_camera_model)m));
+                fprintf(out, "%s%s in %zu views", separator, gbt_camera_model_name((gbt_camera_model)m), f->views_by_model[m]);
                 separator = ", ";
             }
         fprintf(out, "\n  photos    %zu found, %zu unreadable", p->found, p->unreadable);

@@ -58,6 +58,11 @@ static void add_tiles(text *out, const evaluation *e, const json_t *metrics)
     open_tile(out, "FLIP (0 is best)");
     text_number(out, e->flip, 4);
     close_tile(out, "");
+    if (e->lpips_network != NULL) {
+        open_tile(out, strcmp(e->lpips_network, "vgg") == 0 ? "LPIPS, VGG" : "LPIPS, AlexNet");
+        text_number(out, e->lpips.lpips, 4);
+        close_tile(out, "");
+    }
     open_tile(out, "Training time");
     text_duration(out, metrics_number(metrics, "train_seconds"));
     close_tile(out, "");

@@ -23,7 +23,10 @@ static gbt_status read_scores(const char *run, const json_t *metrics, evaluation
     char folder[4096];
     const json_t *views = json_object_get(metrics, "views");
     *e = (evaluation){.psnr = metrics_number(metrics, "psnr"), .ssim = metrics_number(metrics, "ssim"),
-                      .flip = metrics_number(metrics, "flip"), .gaussians_per_view = metrics_number(metrics, "gaussians_per_view"),
+                      .flip = metrics_number(metrics, "flip"),
+                      .lpips = {metrics_number(metrics, "lpips"), metrics_number(metrics, "lpips_01")},
+                      .lpips_network = metrics_text(metrics, "lpips_network"),
+                      .gaussians_per_view = metrics_number(metrics, "gaussians_per_view"),
                       .anchors = count_or_zero(metrics_number(metrics, "anchors_final")),
                       .model_bytes = count_or_zero(metrics_number(metrics, "model_bytes"))};
     GBT_TRY(file_join(folder, sizeof folder, run, "renders/test", err));
@@ -38,6 +41,7 @@ static gbt_status read_scores(const char *run, const json_t *metrics, evaluation
             continue;
         snprintf(v->name, sizeof v->name, "%s", name);
         v->psnr = metrics_number(view, "psnr"), v->ssim = metrics_number(view, "ssim"), v->flip = metrics_number(view, "flip");
+        v->lpips = (lpips_scores){metrics_number(view, "lpips"), metrics_number(view, "lpips_01")};
         v->seconds = metrics_number(view, "seconds"), v->gaussians = count_or_zero(metrics_number(view, "gaussians"));
         GBT_TRY(view_score_paths(v, folder, err));
         e->view_count++;

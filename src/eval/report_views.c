@@ -172,6 +172,10 @@ static void add_row(text *out, const char *run, const evaluation *e, size_t inde
     text_add(out, "</td>");
     add_cell(out, v->flip, 4);
     text_add(out, "</td>");
+    if (e->lpips_network != NULL) {
+        add_cell(out, v->lpips.lpips, 4);
+        text_add(out, "</td>");
+    }
     add_cell(out, (double)v->gaussians, 0);
     text_add(out, "</td>");
     add_cell(out, v->seconds, 3);
@@ -192,9 +196,10 @@ static void add_table(text *out, const char *run, const evaluation *e, const siz
     text_format(out, "<details class=\"card\" open><summary>All %zu views as a table</summary><div class=\"scroll\"><table class=\"list "
                      "sortable\"><thead><tr>"
                      "<th data-sort=\"text\">View</th><th data-sort=\"number\">PSNR, dB</th><th data-sort=\"number\">SSIM</th><th "
-                     "data-sort=\"number\">FLIP</th>"
+                     "data-sort=\"number\">FLIP</th>%s"
                      "<th data-sort=\"number\">Gaussians</th><th data-sort=\"number\">Seconds</th><th>Whole "
-                     "pictures</th></tr></thead><tbody>", e->view_count);
+                     "pictures</th></tr></thead><tbody>",
+                e->view_count, e->lpips_network != NULL ? "<th data-sort=\"number\">LPIPS</th>" : "");
     for (size_t i = 0; i < e->view_count; i++)
         add_row(out, run, e, order[i], i, low, high);
     text_add(out, "</tbody></table></div></details>\n");

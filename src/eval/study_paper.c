@@ -96,7 +96,7 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     def.scale_factor = v->scaled ? s->scenes[scene].scale_constant : 1;
     def.command = "gbtrace study paper";
     GBT_TRY(study_runs_folder(folder, s->grid.names[scene], v->name, def.seed, run, sizeof run, err));
-    return study_runs_do(s->def.data[scene], run, &def, out, err);
+    return study_runs_do(s->def.data[scene], run, &def, s->def.lpips, out, err);
 }
 
 static gbt_status write_all(const paper_study *s, const char *folder, FILE *out, gbt_error *err)

@@ -76,6 +76,7 @@ typedef enum paper_figure {
     PAPER_MODEL,       /* model.gbt, MiB */
     PAPER_PSNR,
     PAPER_SSIM,
+    PAPER_LPIPS,       /* as the paper's: of colours in [0, 1]; NaN without a network */
     PAPER_ARITHMETIC,  /* of the networks for a view, 10^9 multiply-adds */
     PAPER_BLENDED,     /* hits that a ray blends */
     PAPER_FIGURES
@@ -91,6 +92,12 @@ typedef struct paper_figure_text {
 extern const paper_figure_text paper_figure_texts[PAPER_FIGURES];
 
 double paper_figure_of(const study_figures *run, paper_figure figure);
+
+/** False for LPIPS without its network: it is in no table then. */
+static inline bool paper_is_measured(const paper_study *s, paper_figure figure)
+{
+    return figure != PAPER_LPIPS || s->def.lpips != NULL;
+}
 
 /** Over the seeds of a variant on a scene. */
 stat_sample paper_stat(const paper_study *s, size_t scene, paper_variant_id variant, paper_figure figure);

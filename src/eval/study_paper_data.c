@@ -19,14 +19,17 @@ static void add_csv_run(const paper_study *s, size_t scene, paper_variant_id var
     stat_csv_text(out, s->grid.names[scene]);
     text_format(out, ",%s,%d,%.0f,%.0f,%.0f,%.6g,%.0f,%.9g,%.9g,", paper_variants[variant].name, seed, r->points, r->anchors_initial,
                 r->anchors_final, paper_figure_of(r, PAPER_STORAGE), r->model_bytes, r->psnr, r->ssim);
-    text_format(out, "%.6g,%.6g,%.6g,%.0f,%.6g\n", r->anchors_in_view, paper_figure_of(r, PAPER_ARITHMETIC), r->blended_per_ray,
+    text_format(out, "%.6g,%.6g,%.6g,%.0f,%.6g,", r->anchors_in_view, paper_figure_of(r, PAPER_ARITHMETIC), r->blended_per_ray,
                 r->iterations, r->train_seconds);
+    if (paper_is_measured(s, PAPER_LPIPS))
+        text_format(out, "%.9g", r->lpips_01);
+    text_add(out, "\n");
 }
 
 void paper_csv(const paper_study *s, text *out)
 {
     text_add(out, "scene,variant,seed,points,anchors_initial,anchors_final,storage_mib,model_bytes,psnr,ssim,"
-                  "anchors_in_view,giga_macs_per_view,blended_per_ray,iterations,train_seconds\n");
+                  "anchors_in_view,giga_macs_per_view,blended_per_ray,iterations,train_seconds,lpips_01\n");
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         for (int v = 0; v < PAPER_VARIANTS; v++)
             for (int seed = 0; seed < s->grid.seeds && s->has_variant[v]; seed++)
@@ -58,7 +61,7 @@ static void add_change_rows(const paper_study *s, json_t *rows)
 {
     for (size_t i = 0; i < paper_claim_count; i++) {
         const paper_claim *claim = &paper_claims[i];
-        if (!s->has_table[claim->table])
+        if (!s->has_table[claim->table] || !paper_is_measured(s, claim->figure))
             continue;
         for (size_t scene = 0; scene <= s->grid.scene_count; scene++) {
             char row[2 * STUDY_NAME_SIZE];
@@ -79,7 +82,8 @@ static json_t *variant_to_json(const paper_study *s, size_t scene, paper_variant
     json_t *root = json_pack("{s:o,s:s}", "scene", json_text(s->grid.names[scene]), "variant", paper_variants[variant].name);
     for (int f = 0; f < PAPER_FIGURES; f++) {
         const stat_sample stat = paper_stat(s, scene, variant, (paper_figure)f);
-        json_object_set_new(root, paper_figure_texts[f].name, stat_to_json(&stat));
+        if (paper_is_measured(s, (paper_figure)f))
+            json_object_set_new(root, paper_figure_texts[f].name, stat_to_json(&stat));
     }
     return root;
 }

@@ -10,6 +10,7 @@ const paper_figure_text paper_figure_texts[PAPER_FIGURES] = {
     [PAPER_MODEL] = {"model.gbt", "model.gbt, MiB", "model.gbt, %", 2, true, 1},
     [PAPER_PSNR] = {"PSNR", "PSNR, dB", "PSNR, dB", 2, false, 2},
     [PAPER_SSIM] = {"SSIM", "SSIM", "SSIM", 4, false, 4},
+    [PAPER_LPIPS] = {"LPIPS", "LPIPS", "LPIPS", 4, false, 4},
     [PAPER_ARITHMETIC] = {"arithmetic", "arithmetic of the networks per view, 10^9 multiply-adds", "arithmetic of the networks per view, %",
                           4, true, 1},
     [PAPER_BLENDED] = {"blended", "hits that a ray blends", "hits that a ray blends, %", 1, true, 1},
@@ -31,6 +32,8 @@ double paper_figure_of(const study_figures *run, paper_figure figure)
         return run->psnr;
     case PAPER_SSIM:
         return run->ssim;
+    case PAPER_LPIPS:
+        return run->lpips_01;
     case PAPER_ARITHMETIC:
         return 1e-9 * run->macs_per_anchor * run->anchors_in_view;
     case PAPER_BLENDED:
@@ -86,6 +89,7 @@ const paper_claim paper_claims[] = {
     {1, BALLS_FOR_VOXELS, PAPER_GBSP, PAPER_VOXEL, PAPER_STORAGE},
     {1, BALLS_FOR_VOXELS, PAPER_GBSP, PAPER_VOXEL, PAPER_PSNR},
     {1, BALLS_FOR_VOXELS, PAPER_GBSP, PAPER_VOXEL, PAPER_SSIM},
+    {1, BALLS_FOR_VOXELS, PAPER_GBSP, PAPER_VOXEL, PAPER_LPIPS},
 
     {2, GBAI_FOR_VOXELS, PAPER_GBAI, PAPER_VOXEL, PAPER_FINAL},
     {2, GBAI_FOR_VOXELS, PAPER_GBAI, PAPER_VOXEL, PAPER_PSNR},

@@ -9,8 +9,9 @@ static const char *const titles[PAPER_TABLES] = {"Voxels against balls", "What e
 
 /* ---- figures ---------------------------------------------------------------------------------------------------------------------- */
 
-static const paper_figure columns_compact[] = {PAPER_INITIAL, PAPER_FINAL, PAPER_STORAGE, PAPER_MODEL, PAPER_PSNR, PAPER_SSIM};
-static const paper_figure columns_growth[] = {PAPER_FINAL, PAPER_ARITHMETIC, PAPER_BLENDED, PAPER_PSNR, PAPER_SSIM};
+static const paper_figure columns_compact[] = {PAPER_INITIAL, PAPER_FINAL, PAPER_STORAGE, PAPER_MODEL, PAPER_PSNR, PAPER_SSIM,
+                                               PAPER_LPIPS};
+static const paper_figure columns_growth[] = {PAPER_FINAL, PAPER_ARITHMETIC, PAPER_BLENDED, PAPER_PSNR, PAPER_SSIM, PAPER_LPIPS};
 
 /* The whole runs are the last row of what varies. */
 static const char *row_name(int table, paper_variant_id variant)
@@ -23,7 +24,8 @@ static const char *row_name(int table, paper_variant_id variant)
 static void add_figures(const paper_study *s, int table, text *out)
 {
     const paper_figure *columns = table == 3 ? columns_growth : columns_compact;
-    const size_t column_count = table == 3 ? sizeof columns_growth / sizeof *columns : sizeof columns_compact / sizeof *columns;
+    size_t column_count = table == 3 ? sizeof columns_growth / sizeof *columns : sizeof columns_compact / sizeof *columns;
+    column_count -= !paper_is_measured(s, columns[column_count - 1]); /* the last is LPIPS */
     const paper_variant_id *variants;
     const size_t variant_count = paper_table_variants(table, &variants);
     text_add(out, "| scene | SfM points | start |");
@@ -121,7 +123,7 @@ static void add_changes(const paper_study *s, int table, text *out)
         text_add(out, "---|");
     text_add(out, "---|---|---|---|\n");
     for (size_t i = 0; i < paper_claim_count; i++)
-        if (paper_claims[i].table == table)
+        if (paper_claims[i].table == table && paper_is_measured(s, paper_claims[i].figure))
             add_change_row(s, &paper_claims[i], out);
 }
 

@@ -18,6 +18,7 @@
 #include "eval/json_out.h"
 #include "eval/loaded_run.h"
 #include "eval/study_runs_stat.h"
+#include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
 
 enum { PATH_SIZE = 4096, SETTINGS_SIZE = CONFIG_TEXT_SIZE + 1024 };
@@ -66,12 +67,12 @@ gbt_status study_runs_names(const char *const *data, size_t count, char names[][
 
 /* ---- what run it is ----------------------------------------------------------------------------------------------------------- */
 
-/* Everything that decides the figures: the settings as asked for, and when scores are taken in passing. */
+/* Everything that decides the figures: the settings as asked for, how small the file is made, and when scores are taken in passing. */
 static void settings_text(const char *data, const gbt_train_def *def, char *out, size_t size)
 {
     config_text(def, data, out, size);
     size_t used = strlen(out);
-    used += (size_t)snprintf(out + used, size - used, "eval-at =");
+    used += (size_t)snprintf(out + used, size - used, "quality = %g\neval-at =", gbt_compress_def_default().quality);
     for (int i = 0; i < def->eval_at_count && used < size; i++)
         used += (size_t)snprintf(out + used, size - used, " %.9g", def->eval_at_seconds[i]);
 }
@@ -106,6 +107,7 @@ static bool read_marks(const json_t *array, study_figures *f)
 
 static bool read_metrics(const json_t *m, study_figures *f)
 {
+    read_number(m, "lpips_01", &f->lpips_01);
     return read_score(m, "psnr", &f->psnr) && read_score(m, "ssim", &f->ssim) && read_number(m, "points", &f->points) &&
            read_number(m, "anchors_initial", &f->anchors_initial) && read_number(m, "anchors_final", &f->anchors_final) &&
            read_number(m, "model_bytes", &f->model_bytes) && read_number(m, "iterations", &f->iterations) &&
@@ -202,21 +204,31 @@ static gbt_status train(const char *data, const char *run, const gbt_train_def *
     return status == GBT_OK ? GBT_OK : base_fail(err, status, "%s", why.text);
 }
 
-static gbt_status make_run(const char *data, const char *run, const gbt_train_def *def, const char *study_path, const char *settings,
-                           gbt_error *err)
+static gbt_status score(const char *run, const char *lpips, gbt_error *err)
 {
     gbt_evaluate_def evaluate = gbt_evaluate_def_default();
-    evaluate.report = 0;
+    evaluate.report = 0, evaluate.lpips = lpips;
+    return gbt_evaluate(run, &evaluate, err);
+}
+
+static gbt_status make_run(const char *data, const char *run, const gbt_train_def *def, const char *lpips, const char *study_path,
+                           const char *settings, gbt_error *err)
+{
+    const gbt_compress_def compress = gbt_compress_def_default();
     study_figures measured;
+    char file[PATH_SIZE];
+    GBT_TRY(file_join(file, sizeof file, run, "model.gbt", err));
     unlink(study_path);
     GBT_TRY(train(data, run, def, err));
-    GBT_TRY(gbt_evaluate(run, &evaluate, err));
+    GBT_TRY(gbt_compress(run, &compress, file, NULL, err)); /* scored is the file that `gbtrace train` leaves */
+    GBT_TRY(score(run, lpips, err));
     GBT_TRY(measure(run, &measured, err));
     remove_checkpoints(run);
     return save_measured(study_path, settings, &measured, err);
 }
 
-gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def *def, study_figures *out, gbt_error *err)
+gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def *def, const char *lpips, study_figures *out,
+                         gbt_error *err)
 {
     char study_path[PATH_SIZE], metrics_path[PATH_SIZE], settings[SETTINGS_SIZE];
     GBT_TRY(file_join(study_path, sizeof study_path, run, "study.json", err));
@@ -224,10 +236,13 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
     settings_text(data, def, settings, sizeof settings);
     if (read_run(study_path, metrics_path, settings, out)) {
         log_info("%s: there already", run);
-        return GBT_OK;
+        if (lpips == NULL || isfinite(out->lpips_01))
+            return GBT_OK;
+        GBT_TRY(score(run, lpips, err));
+    } else {
+        log_info("%s", run);
+        GBT_TRY(make_run(data, run, def, lpips, study_path, settings, err));
     }
-    log_info("%s", run);
-    GBT_TRY(make_run(data, run, def, study_path, settings, err));
     return read_run(study_path, metrics_path, settings, out)
                ? GBT_OK
                : base_fail(err, GBT_ERR_INTERNAL, "%.400s: the run cannot be read back", run);
@@ -240,7 +255,7 @@ gbt_status study_runs_do_variant(const char *folder, const char *data, const cha
     config_strings strings;
     GBT_TRY(config_parse(settings, variant, &def, &strings, err));
     GBT_TRY(study_runs_folder(folder, data_name, variant, def.seed, run, sizeof run, err));
-    return study_runs_do(data, run, &def, out, err);
+    return study_runs_do(data, run, &def, NULL, out, err);
 }
 
 gbt_status study_texts_save(study_texts *texts, const char *folder, const char *name, FILE *out)

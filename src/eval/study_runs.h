@@ -13,6 +13,7 @@ enum { STUDY_SCENES_MAX = 16, STUDY_SEEDS_MAX = 10, STUDY_NAME_SIZE = 256, STUDY
 /** What a run says about itself. From metrics.json: scores are NaN without held-out views. */
 typedef struct study_figures {
     double psnr, ssim;
+    double lpips_01; /* NaN when it was scored without a network */
     double points, anchors_initial, anchors_final, model_bytes, iterations, train_seconds;
     size_t mark_count;
     struct { double seconds, psnr; } marks[STUDY_MARKS_MAX]; /* held-out PSNR in passing */
@@ -40,9 +41,11 @@ gbt_status study_runs_names(const char *const *data, size_t count, char names[][
  *
  * Finished is a run whose study.json, written last, is whole and tells the same settings, and whose metrics.json is whole.
  *
+ * @param lpips [in] optional (NULL): file of a network; a finished run that has no LPIPS yet is scored again, not trained
  * @return as gbt_train() and gbt_evaluate(); what was found of another run is lost only when this one starts
  */
-gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def *def, study_figures *out, gbt_error *err);
+gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def *def, const char *lpips, study_figures *out,
+                         gbt_error *err);
 
 /**
  * study_runs_do() of a variant: what `settings`, lines as in a run's `config`, change in `def`, in the variant's folder.

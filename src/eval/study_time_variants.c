@@ -13,6 +13,7 @@ const time_variant time_variants[] = {
     {"no growth", "grow = 0", 1},
     {"K = 10", "offsets = 10", 1},
     {"adaptive balls", "init = adaptive", 1},
+    {"adaptive balls, thrift 1.5", "init = adaptive\nthrift = 1.5", 1},
     {"voxels", "init = voxel", 1},
 };
 

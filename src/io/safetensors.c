@@ -31,25 +31,37 @@ static bool get_size(const json_t *list, size_t i, size_t *out)
     return true;
 }
 
+/* False unless there are one to four sizes, and none of the two that they become is beyond `room`. */
+static bool read_shape(const json_t *shape, size_t room, tensor *out)
+{
+    const size_t dimensions = json_array_size(shape);
+    out->rows = out->columns = 1;
+    for (size_t i = 0; i < dimensions; i++) {
+        size_t size, *to = i == 0 && dimensions > 1 ? &out->rows : &out->columns;
+        if (!get_size(shape, i, &size) || (double)*to * (double)size > (double)room)
+            return false;
+        *to *= size;
+    }
+    return dimensions >= 1 && dimensions <= 4;
+}
+
 /* Shape and place of an array; GBT_ERR_FORMAT unless both are right. */
 static gbt_status read_entry(const source_file *file, const json_t *entry, const char *name, size_t data_at, tensor *out, size_t *at,
                              gbt_error *err)
 {
     const json_t *shape = json_object_get(entry, "shape"), *offsets = json_object_get(entry, "data_offsets");
     const char *type = json_string_value(json_object_get(entry, "dtype"));
-    const size_t dimensions = json_array_size(shape), room = file->size - data_at;
+    const size_t room = file->size - data_at;
     if (!json_is_object(entry))
         return base_fail(err, GBT_ERR_FORMAT, "%s: no array %s", file->name, name);
     if (type == NULL || strcmp(type, "F32") != 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: array %s has the type %.20s (wanted F32)", file->name, name,
                          type != NULL ? type : "of no name");
     size_t end = 0;
-    out->rows = 1;
-    if ((dimensions != 1 && dimensions != 2) || (dimensions == 2 && !get_size(shape, 0, &out->rows)) ||
-        !get_size(shape, dimensions - 1, &out->columns))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: array %s has no usable shape (wanted one or two sizes)", file->name, name);
-    if (!get_size(offsets, 0, at) || !get_size(offsets, 1, &end) || *at > end || end > room || out->rows > room || out->columns > room ||
-        (end - *at) % sizeof(float) != 0 || (double)out->rows * (double)out->columns != (double)((end - *at) / sizeof(float)))
+    if (!read_shape(shape, room, out))
+        return base_fail(err, GBT_ERR_FORMAT, "%s: array %s has no usable shape (wanted one to four sizes)", file->name, name);
+    if (!get_size(offsets, 0, at) || !get_size(offsets, 1, &end) || *at > end || end > room || (end - *at) % sizeof(float) != 0 ||
+        (double)out->rows * (double)out->columns != (double)((end - *at) / sizeof(float)))
         return base_fail(err, GBT_ERR_FORMAT, "%s: array %s of %zu x %zu does not fit its data_offsets or the file", file->name, name,
                          out->rows, out->columns);
     *at += data_at;

@@ -4,7 +4,7 @@
 
 #include "data/bytes.h"
 
-/** Row-major [rows][columns]; a vector has one row. Start from {0}. */
+/** Row-major [rows][columns]: the first size of up to four, and the product of the others; a vector has one row. Start from {0}. */
 typedef struct tensor {
     size_t rows, columns;
     float *values; /* owned; all finite; free with mem_free() */
@@ -14,7 +14,7 @@ typedef struct tensor {
  * Read the array `name`.
  *
  * @param out [out] zeroed on failure
- * @return GBT_OK; GBT_ERR_FORMAT also when it is not there, not F32, not of one or two dimensions, or holds a value that is not finite;
+ * @return GBT_OK; GBT_ERR_FORMAT also when it is not there, not F32, not of one to four dimensions, or holds a value that is not finite;
  *         GBT_ERR_NO_MEMORY
  * Threads: any.
  */

@@ -396,6 +396,8 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     misuse 4 "empty: no model of Scaffold-GS (wanted point_cloud/iteration_N/point_cloud.ply or point_cloud.ply in it)" import empty -o imported
     misuse 2 "scene.obj: which format? (wanted .ply, .splat, .spz or .glb)" export run scene.obj
     misuse 2 "--sh-degree: bad value (wanted a whole number from 0 to 3, got 4)" export run scene.ply --sh-degree 4
+    misuse 4 "nothing: cannot open: No such file or directory" eval run --lpips nothing
+    misuse 4 "nothing: cannot open: No such file or directory" compare pictures-same/*.png pictures-same/*.png --lpips nothing
     misuse 2 "--quality: bad value (wanted a number from 20 to 90, got 10)" compress run -o small.gbt --quality 10
     misuse 2 '--outputs: "dept" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)' render run -o pictures --outputs hits,dept
 else

@@ -4,6 +4,7 @@
 
 #include "base/near.h"
 #include "eval/json_fields.h"
+#include "eval/lpips_network.h"
 #include "eval/study_paper.h"
 #include "eval/study_anchors.h"
 #include "eval/study_time.h"
@@ -324,6 +325,36 @@ static void the_papers_tables(void **state)
     mem_free(config);
 }
 
+/* After the_papers_tables(): runs that are there are scored again, not trained. */
+static void lpips_of_finished_runs(void **state)
+{
+    (void)state;
+    const char *data[] = {tiny};
+    gbt_paper_def def = small_paper(data, "1,2");
+    network alex = make_alex();
+    write_network(&alex, in_root("alex.safetensors"), NULL);
+    free_network(&alex);
+    char *before = read_text(in_root("paper/paper.csv")), *page;
+    assert_true(strstr(before, "seconds,lpips_01\n") != NULL && strstr(before, ",\n") != NULL);
+    const struct timespec made = time_of(in_root("paper/runs/tiny/voxel/seed-0"));
+    def.lpips = in_root("alex.safetensors");
+    paper_ok(&def, in_root("paper"));
+    const struct timespec now = time_of(in_root("paper/runs/tiny/voxel/seed-0"));
+    assert_true(!is_newer(now, made));
+    const double score = mean_over_seeds("paper", "voxel", "lpips_01");
+    assert_true(score > 0 && score < 10 && score != mean_over_seeds("paper", "voxel", "lpips"));
+    page = read_text(in_root("paper/paper.md"));
+    assert_int_equal(count_of(page, " SSIM | LPIPS |\n"), 2);
+    assert_int_equal(count_of(page, "| balls in place of voxels | LPIPS |"), 1);
+    assert_int_equal(count_of(page, "| +0.0048 | +0.0010 to +0.0090 |"), 1); /* the paper's own four */
+    mem_free(page);
+    def.lpips = NULL; /* no column, and the scores of before */
+    paper_ok(&def, in_root("paper"));
+    page = read_text(in_root("paper/paper.csv"));
+    assert_string_equal(page, before);
+    mem_free(before), mem_free(page);
+}
+
 /* After the_papers_tables(): what is there is taken, what is damaged, missing or of other settings is made again, to the same bits. */
 static void runs_are_made_once(void **state)
 {
@@ -493,11 +524,11 @@ static void what_a_scene_needs(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mean_and_spread),     cmocka_unit_test(figures_as_text),          cmocka_unit_test(closed_form_of_balls),
-        cmocka_unit_test(constant_of_pairs),   cmocka_unit_test(what_the_paper_says),      cmocka_unit_test(verdicts),
-        cmocka_unit_test(names_and_folders),   cmocka_unit_test(when_a_curve_comes_there), cmocka_unit_test(bad_requests),
-        cmocka_unit_test(the_papers_tables),   cmocka_unit_test(runs_are_made_once),       cmocka_unit_test(quality_against_time),
-        cmocka_unit_test(what_a_scene_needs),
+        cmocka_unit_test(mean_and_spread),      cmocka_unit_test(figures_as_text),          cmocka_unit_test(closed_form_of_balls),
+        cmocka_unit_test(constant_of_pairs),    cmocka_unit_test(what_the_paper_says),      cmocka_unit_test(verdicts),
+        cmocka_unit_test(names_and_folders),    cmocka_unit_test(when_a_curve_comes_there), cmocka_unit_test(bad_requests),
+        cmocka_unit_test(the_papers_tables),    cmocka_unit_test(lpips_of_finished_runs),   cmocka_unit_test(runs_are_made_once),
+        cmocka_unit_test(quality_against_time), cmocka_unit_test(what_a_scene_needs),
     };
     return cmocka_run_group_tests(tests, make_root, remove_root);
 }

@@ -14,6 +14,7 @@ typedef struct gbt_export_def {
     int refine_steps; /* steps that fit the plain Gaussians to the model's own pictures, >= 0. Default 300 */
     const char *data; /* data set with the training cameras; NULL: the one it was trained on. Default NULL */
     const char *json; /* also write the figures here; NULL: nowhere. Default NULL */
+    const char *lpips; /* .safetensors file of a network: a result folder gets LPIPS too (docs/metrics.md). Default NULL */
 } gbt_export_def;
 
 gbt_export_def gbt_export_def_default(void);

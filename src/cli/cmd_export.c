@@ -18,6 +18,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA",
          .help = "data set in place of the one it was trained on", .aliases = "s source-path"},
         {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the figures there"},
+        {.name = "lpips", .kind = OPTION_STRING, .value = &def.lpips, .value_name = "FILE", .help = "result folder: " LPIPS_HELP},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
          .help = "0: all processors, at most the container's share"},
     };

@@ -47,6 +47,8 @@ typedef struct exporting {
     frame frame;
     const char *folder;   /* the output that is a result folder, or NULL */
     image_scores *scores; /* [view_count], of what it gives back */
+    lpips *net;           /* for the folder, or NULL */
+    lpips_scores *lpips;  /* [view_count], with it */
 } exporting;
 
 /* ---- from a run to Gaussians --------------------------------------------------------------------------------------------------------- */
@@ -63,7 +65,8 @@ static gbt_status choose_views(exporting *e, gbt_error *err)
     const size_t wanted = count < VIEWS_MAX || (e->folder != NULL && e->held_out) ? count : VIEWS_MAX;
     e->views = mem_alloc(wanted + 1, sizeof *e->views, "views", err);
     e->scores = mem_calloc(wanted + 1, sizeof *e->scores, "scores", err);
-    if (e->views == NULL || e->scores == NULL)
+    e->lpips = mem_calloc(wanted + 1, sizeof *e->lpips, "scores", err);
+    if (e->views == NULL || e->scores == NULL || e->lpips == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0, seen = 0; i < s->view_count && e->view_count < wanted; i++)
         if (s->views[i].is_test == e->held_out && seen++ == e->view_count * count / wanted)
@@ -137,6 +140,8 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
         if (f->path != e->folder || !e->held_out)
             continue;
         GBT_TRY(image_score(shown, photo, valid, NULL, &e->scores[index], err));
+        if (e->net != NULL)
+            GBT_TRY(lpips_compare(e->net, shown, photo, valid, 0, &e->lpips[index], err));
         GBT_TRY(export_folder_picture(e->folder, &e->run, index, shown, photo, err));
     }
     return GBT_OK;
@@ -285,6 +290,8 @@ static void exporting_free(exporting *e)
         gaussian_cloud_free(&e->clouds[i]);
     mem_free(e->views);
     mem_free(e->scores);
+    mem_free(e->lpips);
+    lpips_close(e->net);
     frame_free(&e->frame);
     loaded_run_close(&e->run);
     mem_free(e);
@@ -302,13 +309,18 @@ gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *
     for (size_t i = 0; i < output_count; i++)
         if (export_folder_is(outputs[i]))
             e->folder = outputs[i];
-    gbt_status status = e->baked ? open_run(e, input, err) : GBT_OK;
+    gbt_status status = GBT_OK;
+    if (def->lpips != NULL)
+        status = e->folder != NULL ? lpips_open(def->lpips, &e->net, err)
+                                   : base_fail(err, GBT_ERR_ARGUMENT, "--lpips: is for result folders alone (wanted OUT/)");
+    if (status == GBT_OK && e->baked)
+        status = open_run(e, input, err);
     for (int flat = 0; flat < 2 && status == GBT_OK; flat++)
         status = write_kind(e, input, flat, outputs, output_count, report, err);
     if (status == GBT_OK && e->baked)
         status = compare(e, err);
     if (status == GBT_OK && e->folder != NULL && e->held_out)
-        status = export_folder_scores(e->folder, &e->run, e->scores, e->view_count, err);
+        status = export_folder_scores(e->folder, &e->run, e->scores, e->net != NULL ? e->lpips : NULL, e->view_count, err);
     if (status == GBT_OK)
         status = report_all(e, input, report, err);
     exporting_free(e);

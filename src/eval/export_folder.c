@@ -149,32 +149,57 @@ static json_t *number_or_null(double value)
     return isfinite(value) ? json_real(value) : json_null();
 }
 
-gbt_status export_folder_scores(const char *folder, const loaded_run *r, const image_scores *scores, size_t count, gbt_error *err)
+/* One measure over the pictures; what is not a number is null, and not in the mean. */
+typedef struct score_list {
+    const char *name;
+    json_t *values;
+    double sum;
+    size_t scored;
+} score_list;
+
+static void add_score(score_list *list, size_t index, double value)
 {
-    char path[PATH_SIZE], method[64];
-    json_t *psnr = json_object(), *ssim = json_object();
-    double sums[2] = {0, 0};
-    size_t scored = 0;
+    char picture[32];
+    snprintf(picture, sizeof picture, "%05zu.png", index);
+    json_object_set_new(list->values, picture, number_or_null(value));
+    if (isfinite(value))
+        list->sum += value, list->scored++;
+}
+
+static gbt_status save_under(const char *folder, const char *name, const char *method, json_t *values, gbt_error *err)
+{
+    char path[PATH_SIZE];
+    GBT_TRY(file_join(path, sizeof path, folder, name, err));
+    json_t *root = json_pack("{s:O}", method, values);
+    const gbt_status status = json_save(root, path, err);
+    json_decref(root);
+    return status;
+}
+
+gbt_status export_folder_scores(const char *folder, const loaded_run *r, const image_scores *scores, const lpips_scores *with_network,
+                                size_t count, gbt_error *err)
+{
+    char method[64];
+    score_list lists[] = {{.name = "SSIM", .values = json_object()}, {.name = "PSNR", .values = json_object()},
+                          {.name = "LPIPS", .values = json_object()}};
+    json_t *means = json_object(), *values = json_object();
     for (size_t i = 0; i < count; i++) {
-        char name[32];
-        snprintf(name, sizeof name, "%05zu.png", i);
-        json_object_set_new(psnr, name, number_or_null(scores[i].psnr));
-        json_object_set_new(ssim, name, number_or_null(scores[i].ssim));
-        if (isfinite(scores[i].psnr))
-            sums[0] += scores[i].psnr, sums[1] += scores[i].ssim, scored++;
+        add_score(&lists[0], i, scores[i].ssim);
+        add_score(&lists[1], i, scores[i].psnr);
+        if (with_network != NULL)
+            add_score(&lists[2], i, with_network[i].lpips_01);
+    }
+    for (int i = 0; i < (with_network != NULL ? 3 : 2); i++) {
+        json_object_set(values, lists[i].name, lists[i].values);
+        json_object_set_new(means, lists[i].name, number_or_null(lists[i].sum / (double)lists[i].scored));
     }
     snprintf(method, sizeof method, "ours_%llu", (unsigned long long)r->model.iterations);
-    json_t *means = json_pack("{s:{s:o,s:o}}", method, "SSIM", number_or_null(sums[1] / (double)scored), "PSNR",
-                              number_or_null(sums[0] / (double)scored));
-    json_t *values = json_pack("{s:{s:o,s:o}}", method, "SSIM", ssim, "PSNR", psnr);
-    gbt_status status = file_join(path, sizeof path, folder, "results.json", err);
+    gbt_status status = save_under(folder, "results.json", method, means, err);
     if (status == GBT_OK)
-        status = json_save(means, path, err);
-    if (status == GBT_OK)
-        status = file_join(path, sizeof path, folder, "per_view.json", err);
-    if (status == GBT_OK)
-        status = json_save(values, path, err);
-    json_decref(means);
+        status = save_under(folder, "per_view.json", method, values, err);
+    for (int i = 0; i < 3; i++)
+        json_decref(lists[i].values);
     json_decref(values);
+    json_decref(means);
     return status;
 }

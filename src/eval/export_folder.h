@@ -4,6 +4,7 @@
 #define GBT_EVAL_EXPORT_FOLDER_H
 
 #include "eval/loaded_run.h"
+#include "eval/lpips.h"
 #include "image/metrics.h"
 
 /** Whether an output is meant as a result folder: its name ends in a slash. */
@@ -23,7 +24,11 @@ gbt_status export_folder_write(const char *folder, const loaded_run *r, const ga
 gbt_status export_folder_picture(const char *folder, const loaded_run *r, size_t index, const image *render, const image *photo,
                                  gbt_error *err);
 
-/** results.json and per_view.json: means and values of the `count` pictures, PSNR and SSIM. */
-gbt_status export_folder_scores(const char *folder, const loaded_run *r, const image_scores *scores, size_t count, gbt_error *err);
+/**
+ * results.json and per_view.json: means and values of the `count` pictures: SSIM, PSNR, and LPIPS as 3DGS feeds it unless `with_network` is
+ * NULL.
+ */
+gbt_status export_folder_scores(const char *folder, const loaded_run *r, const image_scores *scores, const lpips_scores *with_network,
+                                size_t count, gbt_error *err);
 
 #endif

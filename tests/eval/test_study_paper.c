@@ -8,6 +8,7 @@
 #include "eval/study_paper.h"
 #include "eval/study_anchors.h"
 #include "eval/study_time.h"
+#include "gbtrace/export.h"
 
 /* ---- numbers ------------------------------------------------------------------------------------------------------------------ */
 
@@ -348,6 +349,24 @@ static void lpips_of_finished_runs(void **state)
     assert_int_equal(count_of(page, "| balls in place of voxels | LPIPS |"), 1);
     assert_int_equal(count_of(page, "| +0.0048 | +0.0010 to +0.0090 |"), 1); /* the paper's own four */
     mem_free(page);
+
+    /* A result folder of 3DGS has it too. */
+    gbt_export_def export = gbt_export_def_default();
+    const char *result[] = {in_root("result/")};
+    json_t *means, *values;
+    export.refine_steps = 0, export.lpips = def.lpips;
+    assert_ok(gbt_export(in_root("paper/runs/tiny/voxel/seed-0"), &export, result, 1, NULL, NULL));
+    assert_ok(json_read(in_root("result/results.json"), &means, NULL));
+    assert_ok(json_read(in_root("result/per_view.json"), &values, NULL));
+    const json_t *ours = json_object_get(means, "ours_40"), *each = json_object_get(json_object_get(values, "ours_40"), "LPIPS");
+    const double first = json_number_value(json_object_get(each, "00000.png")),
+        second = json_number_value(json_object_get(each, "00001.png"));
+    assert_true(json_object_size(each) == 2 && first > 0 && second > 0);
+    assert_near(json_number_value(json_object_get(ours, "LPIPS")), (first + second) / 2, 1e-9);
+    json_decref(means), json_decref(values);
+    const char *file[] = {in_root("scene.ply")};
+    assert_int_equal(gbt_export(in_root("paper/runs/tiny/voxel/seed-0"), &export, file, 1, NULL, NULL), GBT_ERR_ARGUMENT);
+
     def.lpips = NULL; /* no column, and the scores of before */
     paper_ok(&def, in_root("paper"));
     page = read_text(in_root("paper/paper.csv"));

@@ -15,7 +15,7 @@
 
 anchor_init_def anchor_init_def_default(void)
 {
-    return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .fraction = 0.25, .balls = balls_def_default(),
+    return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .balls = balls_def_default(),
                              .offset_count = 10, .fusion = 0.5f, .clip_min = 0.25f, .clip_max = 4.0f, .scale_factor = 1.0f,
                              .scale_max = INFINITY};
 }
@@ -35,8 +35,8 @@ static gbt_status check_def(const anchor_init_def *def, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "anchors: offset_count %d (wanted 1 to %d)", def->offset_count, ANCHOR_MAX_OFFSETS);
     if (!(def->balls.voxel_size > 0.0f && def->balls.voxel_size < HUGE_VALF))
         return base_fail(err, GBT_ERR_ARGUMENT, "anchors: voxel_size %g (wanted > 0)", (double)def->balls.voxel_size);
-    if (!(def->fraction > 0 && def->fraction <= 1))
-        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: fraction %g (wanted more than 0, up to 1)", def->fraction);
+    if (!(def->fraction >= 0 && def->fraction <= 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: fraction %g (wanted 0 to 1)", def->fraction);
     if (!(def->fusion >= 0.0f && def->fusion <= 1.0f))
         return base_fail(err, GBT_ERR_ARGUMENT, "anchors: fusion %g (wanted 0 to 1)", (double)def->fusion);
     if (!(def->clip_min >= 0.0f && def->clip_min <= def->clip_max))
@@ -137,11 +137,18 @@ static gbt_status choose_points(const float *position, size_t count, size_t want
     return GBT_OK;
 }
 
+static size_t count_wanted(double fraction, size_t points)
+{
+    static const size_t least = 4000;
+    const size_t wanted = (size_t)ceil((fraction > 0 ? fraction : 0.25) * (double)points);
+    return fraction > 0 || wanted >= least ? wanted : points < least ? points : least;
+}
+
 /* Where the anchors are, and the balls that they stand for, if any. */
 static gbt_status find_centers(const float *position, const float *color, size_t count, const anchor_init_def *def, balls *found,
                                float **centers, size_t *center_count, gbt_error *err)
 {
-    const size_t wanted = (size_t)ceil(def->fraction * (double)count);
+    const size_t wanted = count_wanted(def->fraction, count);
     if (def->kind == ANCHOR_INIT_VOXEL)
         return voxel_centers(position, count, def->balls.voxel_size, centers, center_count, err);
     if (def->kind == ANCHOR_INIT_RANDOM)

@@ -54,8 +54,8 @@ static gbt_status check_def(const gbt_train_def *d, gbt_error *err)
     anchor_init_kind unused_kind;
     if (!anchor_init_kind_named(d->init, &unused_kind))
         return base_fail(err, GBT_ERR_ARGUMENT, "--init: \"%.40s\" (wanted gb, adaptive, voxel or random)", d->init);
-    if (!(d->init_count > 0 && d->init_count <= 1))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--init-count: %g (wanted more than 0, up to 1)", d->init_count);
+    if (!(d->init_count >= 0 && d->init_count <= 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--init-count: %g (wanted 0 to 1)", d->init_count);
     if (strcmp(d->scale_prior, "gb") != 0 && strcmp(d->scale_prior, "nn") != 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "--scale-prior: \"%.40s\" (wanted gb or nn)", d->scale_prior);
     if (strcmp(d->distance, "auto") != 0 && strcmp(d->distance, "on") != 0 && strcmp(d->distance, "off") != 0)

@@ -181,6 +181,7 @@ static void init_counts(void **state)
     const char *data = write_grid("cloud.ply", 4, 1.0, 0.0);
     FILE *report = fopen("/dev/null", "w");
     gbt_init_def def = gbt_init_def_default();
+    def.init_count = 0.25;
     const struct { const char *init; int max_depth; float voxel_size; double anchors, voxels, balls; } rows[] = {
         /* cubes of 8 points: compact (eq 23) */
         {"gb", 0, 0.0f, 1, 64, 1}, {"gb", 1, 0.0f, 2, 64, 2}, {"gb", 2, 0.0f, 4, 64, 4}, {"gb", 18, 0.0f, 8, 64, 8},
@@ -241,7 +242,7 @@ static void init_refuses(void **state)
         bad[i] = good;
     bad[0].init = "ball", bad[1].scale_prior = NULL, bad[2].voxel_rule = "", bad[3].voxel_size = -1, bad[4].voxel_size = NAN,
         bad[5].max_depth = 65;
-    bad[6].init = NULL, bad[7].init_count = 0, bad[8].init_count = 1.5;
+    bad[6].init = NULL, bad[7].init_count = -0.1, bad[8].init_count = 1.5;
     for (int i = 0; i < BAD; i++) {
         gbt_error err = {0};
         assert_int_equal(gbt_init(data, &bad[i], in_folder("none.ply"), NULL, stdout, &err), GBT_ERR_ARGUMENT);

@@ -13,6 +13,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "eval/json_out.h"
 #include "eval/loaded_run.h"
 #include "eval/report.h"
 #include "gbtrace/evaluate.h"
@@ -74,24 +75,19 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
     return status;
 }
 
-static json_t *number_or_null(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
 static void add_lpips(json_t *to, const lpips_scores *scores)
 {
-    json_object_set_new(to, "lpips", number_or_null(scores->lpips));
-    json_object_set_new(to, "lpips_01", number_or_null(scores->lpips_01));
+    json_object_set_new(to, "lpips", json_number(scores->lpips));
+    json_object_set_new(to, "lpips_01", json_number(scores->lpips_01));
 }
 
 static json_t *scores_to_json(const evaluation *e)
 {
     json_t *root = json_object(), *views = json_array();
     json_object_set_new(root, "schema", json_integer(1));
-    json_object_set_new(root, "psnr", number_or_null(e->psnr));
-    json_object_set_new(root, "ssim", number_or_null(e->ssim));
-    json_object_set_new(root, "flip", number_or_null(e->flip));
+    json_object_set_new(root, "psnr", json_number(e->psnr));
+    json_object_set_new(root, "ssim", json_number(e->ssim));
+    json_object_set_new(root, "flip", json_number(e->flip));
     if (e->lpips_network != NULL) {
         add_lpips(root, &e->lpips);
         json_object_set_new(root, "lpips_network", json_string(e->lpips_network));
@@ -101,8 +97,8 @@ static json_t *scores_to_json(const evaluation *e)
                                                              : PROTOCOL "; LPIPS 0.1 of colours in [-1, 1], lpips_01 in [0, 1]"));
     for (size_t i = 0; i < e->view_count; i++) {
         const view_score *v = &e->views[i];
-        json_t *view = json_pack("{s:s,s:o,s:o,s:o,s:f,s:I}", "name", v->name, "psnr", number_or_null(v->psnr), "ssim",
-                                 number_or_null(v->ssim), "flip", number_or_null(v->flip), "seconds", v->seconds, "gaussians",
+        json_t *view = json_pack("{s:s,s:o,s:o,s:o,s:f,s:I}", "name", v->name, "psnr", json_number(v->psnr), "ssim",
+                                 json_number(v->ssim), "flip", json_number(v->flip), "seconds", v->seconds, "gaussians",
                                  (json_int_t)v->gaussians);
         if (e->lpips_network != NULL)
             add_lpips(view, &v->lpips);
@@ -117,7 +113,7 @@ static json_t *scores_to_json(const evaluation *e)
     json_object_set_new(root, "scored", json_string(scored));
     json_object_set_new(root, "views", views);
     json_object_set_new(root, "anchors_final", json_integer((json_int_t)e->anchors));
-    json_object_set_new(root, "gaussians_per_view", number_or_null(e->gaussians_per_view));
+    json_object_set_new(root, "gaussians_per_view", json_number(e->gaussians_per_view));
     json_object_set_new(root, "model_bytes", json_integer((json_int_t)e->model_bytes));
     return root;
 }

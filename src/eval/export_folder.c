@@ -144,11 +144,6 @@ gbt_status export_folder_picture(const char *folder, const loaded_run *r, size_t
     return write_picture(folder, r, "gt", index, photo, err);
 }
 
-static json_t *number_or_null(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
 /* One measure over the pictures; what is not a number is null, and not in the mean. */
 typedef struct score_list {
     const char *name;
@@ -161,7 +156,7 @@ static void add_score(score_list *list, size_t index, double value)
 {
     char picture[32];
     snprintf(picture, sizeof picture, "%05zu.png", index);
-    json_object_set_new(list->values, picture, number_or_null(value));
+    json_object_set_new(list->values, picture, json_number(value));
     if (isfinite(value))
         list->sum += value, list->scored++;
 }
@@ -191,7 +186,7 @@ gbt_status export_folder_scores(const char *folder, const loaded_run *r, const i
     }
     for (int i = 0; i < (with_network != NULL ? 3 : 2); i++) {
         json_object_set(values, lists[i].name, lists[i].values);
-        json_object_set_new(means, lists[i].name, number_or_null(lists[i].sum / (double)lists[i].scored));
+        json_object_set_new(means, lists[i].name, json_number(lists[i].sum / (double)lists[i].scored));
     }
     snprintf(method, sizeof method, "ours_%llu", (unsigned long long)r->model.iterations);
     gbt_status status = save_under(folder, "results.json", method, means, err);

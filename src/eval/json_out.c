@@ -1,6 +1,7 @@
 /* eval/json_out.c -- finished JSON to a stream or a file. */
 #include "eval/json_out.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -25,6 +26,11 @@ json_t *json_text(const char *text)
     value = json_string(plain);
     mem_free(plain);
     return value;
+}
+
+json_t *json_number(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
 }
 
 static char *dump(const json_t *value, gbt_error *err)

@@ -122,8 +122,8 @@ static void add_limited(json_t *rows, const char *scene, const char *start, cons
 {
     char row[STUDY_NAME_SIZE + 160];
     snprintf(row, sizeof row, "%s: %s: %s", scene, start, what);
-    json_array_append_new(rows, json_pack("{s:o,s:o,s:o,s:b}", "row", json_text(row), "limit", stat_number(limit), "value",
-                                          stat_number(value), "pass", isnan(limit) || value <= limit));
+    json_array_append_new(rows, json_pack("{s:o,s:o,s:o,s:b}", "row", json_text(row), "limit", json_number(limit), "value",
+                                          json_number(value), "pass", isnan(limit) || value <= limit));
 }
 
 static void add_rows(const anchors_study *s, size_t scene, json_t *rows)

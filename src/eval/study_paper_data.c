@@ -52,7 +52,7 @@ static void add_count_rows(const paper_study *s, size_t scene, json_t *rows)
         snprintf(row, sizeof row, "%s: initial anchors at D_max %d against the closed form", s->grid.names[scene],
                  paper_variants[v].max_depth);
         json_array_append_new(rows, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", ball_count_limit, "value",
-                                              stat_number(value), "pass", value <= ball_count_limit));
+                                              json_number(value), "pass", value <= ball_count_limit));
     }
 }
 
@@ -71,8 +71,8 @@ static void add_change_rows(const paper_study *s, json_t *rows)
             snprintf(row, sizeof row, "table %d, %s: %s: change of %s", claim->table, is_all ? "all" : s->grid.names[scene], claim->what,
                      paper_figure_texts[claim->figure].change_name);
             json_array_append_new(rows, json_pack("{s:o,s:n,s:o,s:n,s:o,s:o,s:s}", "row", json_text(row), "limit", "value",
-                                                  stat_number(ours.mean), "pass", "ours", stat_to_json(&ours), "paper",
-                                                  stat_number(published), "says", paper_verdict(&ours, claim)));
+                                                  json_number(ours.mean), "pass", "ours", stat_to_json(&ours), "paper",
+                                                  json_number(published), "says", paper_verdict(&ours, claim)));
         }
     }
 }

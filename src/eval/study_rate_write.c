@@ -1,6 +1,5 @@
 /* eval/study_rate_write.c -- the study "rate" as tables, as data, and as a chart. */
 #include <jansson.h>
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -78,11 +77,6 @@ static void add_csv(const rate_study *study, text *out)
     }
 }
 
-static json_t *number(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
 static json_t *model_to_json(const rate_model *m)
 {
     json_t *rows = json_array();
@@ -94,12 +88,12 @@ static json_t *model_to_json(const rate_model *m)
                                               "bytes_per_anchor", per_anchor(m, s->total), "positions", (json_int_t)s->positions,
                                               "features", (json_int_t)s->features, "offsets", (json_int_t)s->offsets, "scales",
                                               (json_int_t)s->scales, "pixels", (json_int_t)s->pixels, "steps", (json_int_t)s->steps,
-                                              "networks", (json_int_t)s->networks, "psnr", number(r->psnr), "ssim", number(r->ssim),
-                                              "psnr_loss", number(m->psnr - r->psnr), "encode_seconds", r->encode_seconds, "decode_seconds",
-                                              r->decode_seconds));
+                                              "networks", (json_int_t)s->networks, "psnr", json_number(r->psnr), "ssim",
+                                              json_number(r->ssim), "psnr_loss", json_number(m->psnr - r->psnr), "encode_seconds",
+                                              r->encode_seconds, "decode_seconds", r->decode_seconds));
     }
     return json_pack("{s:o,s:I,s:I,s:I,s:o,s:o,s:f,s:o}", "model", json_text(m->name), "anchors", (json_int_t)m->anchors, "plain_bytes",
-                     (json_int_t)m->plain_bytes, "views", (json_int_t)m->views, "psnr", number(m->psnr), "ssim", number(m->ssim),
+                     (json_int_t)m->plain_bytes, "views", (json_int_t)m->views, "psnr", json_number(m->psnr), "ssim", json_number(m->ssim),
                      "probe_seconds", m->probe_seconds, "settings", rows);
 }
 
@@ -107,7 +101,7 @@ static void add_check(json_t *checks, const rate_model *m, const char *what, dou
 {
     char row[400];
     snprintf(row, sizeof row, "%s: %s", m->name, what);
-    json_array_append_new(checks, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", limit, "value", number(value), "pass",
+    json_array_append_new(checks, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", limit, "value", json_number(value), "pass",
                                             value <= limit));
 }
 

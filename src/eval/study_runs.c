@@ -176,7 +176,7 @@ static gbt_status measure(const char *run, study_figures *f, gbt_error *err)
 static gbt_status save_measured(const char *path, const char *settings, const study_figures *f, gbt_error *err)
 {
     json_t *root = json_pack("{s:i,s:o,s:o,s:o,s:f,s:f}", "schema", 1, "settings", json_text(settings), "anchors_in_view",
-                             stat_number(f->anchors_in_view), "blended_per_ray", stat_number(f->blended_per_ray), "macs_per_anchor",
+                             json_number(f->anchors_in_view), "blended_per_ray", json_number(f->blended_per_ray), "macs_per_anchor",
                              f->macs_per_anchor, "network_bytes", f->network_bytes);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);

@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "eval/json_out.h"
+
 stat_sample stat_of(const double *values, size_t count)
 {
     stat_sample s = {.mean = NAN, .deviation = NAN};
@@ -62,12 +64,7 @@ void stat_csv_text(text *out, const char *outside)
     text_add(out, "\"");
 }
 
-json_t *stat_number(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
 json_t *stat_to_json(const stat_sample *s)
 {
-    return json_pack("{s:o,s:o,s:I}", "mean", stat_number(s->mean), "deviation", stat_number(s->deviation), "count", (json_int_t)s->count);
+    return json_pack("{s:o,s:o,s:I}", "mean", json_number(s->mean), "deviation", json_number(s->deviation), "count", (json_int_t)s->count);
 }

@@ -34,7 +34,4 @@ void stat_csv_text(text *out, const char *outside);
 /** {"mean", "deviation", "count"}; null for what is not finite. */
 json_t *stat_to_json(const stat_sample *s);
 
-/** The number, or null when it is not finite. */
-json_t *stat_number(double value);
-
 #endif

@@ -61,11 +61,6 @@ static size_t count_passes(const stability_study *study)
 
 /* ---- files ----------------------------------------------------------------------------------------------------------------------- */
 
-static json_t *figure(double value) /* JSON has no NaN */
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
 static json_t *chart_to_json(const stability_chart *chart)
 {
     json_t *all = json_array();
@@ -75,7 +70,7 @@ static json_t *chart_to_json(const stability_chart *chart)
             continue;
         json_t *x = json_array(), *y = json_array();
         for (size_t i = 0; i < line->count; i++)
-            json_array_append_new(x, figure(line->x[i])), json_array_append_new(y, figure(line->y[i]));
+            json_array_append_new(x, json_number(line->x[i])), json_array_append_new(y, json_number(line->y[i]));
         json_array_append_new(all, json_pack("{s:s,s:o,s:o}", "name", line->name, "x", x, "y", y));
     }
     return json_pack("{s:s,s:s,s:s,s:o}", "chart", chart->title, "x", chart->x_unit, "y", chart->y_unit, "series", all);
@@ -87,8 +82,9 @@ static gbt_status write_json(const stability_study *study, const char *path, gbt
     for (size_t i = 0; i < study->row_count; i++) {
         const stability_row *r = &study->rows[i];
         json_array_append_new(rows, json_pack("{s:s,s:s,s:s,s:o,s:o,s:b,s:b,s:o,s:s}", "row", r->id, "quantity", r->quantity, "is",
-                                              r->at_least ? "at least" : "at most", "limit", figure(r->limit), "value", figure(r->value),
-                                              "pass", r->pass, "open", r->open, "raster", figure(r->raster), "note", r->note));
+                                              r->at_least ? "at least" : "at most", "limit", json_number(r->limit), "value",
+                                              json_number(r->value), "pass", r->pass, "open", r->open, "raster",
+                                              json_number(r->raster), "note", r->note));
     }
     for (size_t i = 0; i < study->part_count; i++) {
         const stability_part *p = &study->parts[i];

@@ -147,7 +147,7 @@ static void add_scene(const time_study *s, size_t scene, json_t *rows, json_t *r
     snprintf(row, sizeof row, "%s: seconds of the default to the PSNR that the faithful protocol has after %g budgets",
              s->grid.names[scene], time_variants[TIME_FAITHFUL].budgets);
     json_array_append_new(rows, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", s->def.budget_seconds, "value",
-                                          stat_number(reached.mean), "pass", reached.mean <= s->def.budget_seconds));
+                                          json_number(reached.mean), "pass", reached.mean <= s->def.budget_seconds));
     for (size_t v = 0; v < time_variant_count; v++) {
         const stat_sample psnr = time_psnr(s, scene, v), change = time_change(s, scene, v);
         json_array_append_new(runs, json_pack("{s:o,s:s,s:s,s:f,s:o,s:o}", "scene", json_text(s->grid.names[scene]), "run",
@@ -156,7 +156,7 @@ static void add_scene(const time_study *s, size_t scene, json_t *rows, json_t *r
         if (v == TIME_DEFAULT)
             continue;
         snprintf(row, sizeof row, "%s: %s: change of PSNR from the default, dB", s->grid.names[scene], time_variants[v].name);
-        json_array_append_new(rows, json_pack("{s:o,s:n,s:o,s:n,s:o}", "row", json_text(row), "limit", "value", stat_number(change.mean),
+        json_array_append_new(rows, json_pack("{s:o,s:n,s:o,s:n,s:o}", "row", json_text(row), "limit", "value", json_number(change.mean),
                                               "pass", "ours", stat_to_json(&change)));
     }
 }

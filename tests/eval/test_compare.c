@@ -1,33 +1,8 @@
 /* tests/eval/test_compare.c -- two image files compared: the figures of the metrics themselves, alpha and formats, what is refused. */
-#include "test_support.h"
+#include "eval/picture_support.h"
 
-#include <unistd.h>
-
-#include "base/image.h"
-#include "base/rng.h"
 #include "gbtrace/evaluate.h"
 #include "image/metrics.h"
-
-static char folder[] = "/tmp/gbt_compare_XXXXXX";
-
-static const char *in_folder(const char *name)
-{
-    static char paths[4][128];
-    static int next = 0;
-    char *path = paths[next = (next + 1) % 4];
-    snprintf(path, sizeof paths[0], "%s/%s", folder, name);
-    return path;
-}
-
-/* Noise on an even grid of levels, so that a PNG keeps it. */
-static image noise(int width, int height, int channels, uint64_t seed)
-{
-    image im;
-    assert_ok(image_alloc(&im, width, height, channels, NULL));
-    for (int i = 0; i < width * height * channels; i++)
-        im.pixels[i] = floorf(rng_uniform(seed, 0, (uint64_t)i) * 255.0f) / 255.0f;
-    return im;
-}
 
 static void write_noise(const char *name, int width, int height, int channels, uint64_t seed)
 {

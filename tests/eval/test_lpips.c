@@ -1,25 +1,12 @@
 /* tests/eval/test_lpips.c -- LPIPS with networks of random weights against the plainest form of both, in double; what is cut off and
    masked; what is refused. */
-#include "test_support.h"
-
-#include <unistd.h>
+#include "eval/picture_support.h"
 
 #include "base/near.h"
 #include "base/parallel.h"
 #include "eval/lpips.h"
 #include "eval/lpips_network.h"
 #include "gbtrace/evaluate.h"
-
-static char folder[] = "/tmp/gbt_lpips_XXXXXX";
-
-static const char *in_folder(const char *name)
-{
-    static char paths[4][128];
-    static int next = 0;
-    char *path = paths[next = (next + 1) % 4];
-    snprintf(path, sizeof paths[0], "%s/%s", folder, name);
-    return path;
-}
 
 static lpips *open_network(const network *n, const char *name)
 {
@@ -112,21 +99,12 @@ static double plain_lpips(const network *n, const image *a, const image *b, doub
 
 /* ---- tests -------------------------------------------------------------------------------------------------------------------------- */
 
-static image noise(int width, int height, uint64_t seed)
-{
-    image im;
-    assert_ok(image_alloc(&im, width, height, 3, NULL));
-    for (int i = 0; i < width * height * 3; i++)
-        im.pixels[i] = floorf(rng_uniform(seed, 0, (uint64_t)i) * 255.0f) / 255.0f;
-    return im;
-}
-
 /* Odd sizes: maxima leave a row and a column out. */
 static void agrees(network whole, int width, int height)
 {
     const network *n = &whole;
     lpips *net = open_network(n, "net.safetensors");
-    image a = noise(width, height, 1), b = noise(width, height, 2);
+    image a = noise(width, height, 3, 1), b = noise(width, height, 3, 2);
     lpips_scores got, again;
     assert_ok(lpips_compare(net, &a, &b, NULL, 0, &got, NULL));
     assert_true(got.lpips > 0.01 && got.lpips_01 > 0.01 && fabs(got.lpips - got.lpips_01) > 1e-3);
@@ -163,8 +141,8 @@ static void halves_and_masks(void **state)
     enum { WIDTH = 64, HEIGHT = 33, HALF = 32 };
     network alex = make_alex();
     lpips *net = open_network(&alex, "alex.safetensors");
-    image a = noise(WIDTH, HEIGHT, 3), b = noise(WIDTH, HEIGHT, 4), right_a = noise(HALF, HEIGHT, 0), right_b = noise(HALF, HEIGHT, 0),
-          mended = noise(WIDTH, HEIGHT, 3);
+    image a = noise(WIDTH, HEIGHT, 3, 3), b = noise(WIDTH, HEIGHT, 3, 4), mended = noise(WIDTH, HEIGHT, 3, 3),
+          right_a = noise(HALF, HEIGHT, 3, 0), right_b = noise(HALF, HEIGHT, 3, 0);
     unsigned char valid[WIDTH * HEIGHT];
     for (int i = 0; i < WIDTH * HEIGHT; i++) {
         const int x = i % WIDTH, to = (i / WIDTH) * HALF + x - HALF;
@@ -195,7 +173,7 @@ static void files_compared(void **state)
     (void)state;
     network alex = make_alex();
     lpips *net = open_network(&alex, "alex.safetensors");
-    image a = noise(40, 34, 5), b = noise(40, 34, 6);
+    image a = noise(40, 34, 3, 5), b = noise(40, 34, 3, 6);
     lpips_scores wanted;
     double got[2];
     gbt_error err = {0};
@@ -228,7 +206,7 @@ static void refusals(void **state)
     lpips_scores scores;
     network alex = make_alex();
     lpips *net = open_network(&alex, "alex.safetensors");
-    image small = noise(30, 40, 1), least = noise(31, 31, 1), other = noise(31, 32, 1);
+    image small = noise(30, 40, 3, 1), least = noise(31, 31, 3, 1), other = noise(31, 32, 3, 1);
     assert_int_equal(lpips_compare(net, &small, &small, NULL, 0, &scores, &err), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "too small"));
     assert_ok(lpips_compare(net, &least, &least, NULL, 0, &scores, &err));

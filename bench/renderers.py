@@ -3,8 +3,9 @@
 #
 #     python3 bench/renderers.py DATA... -o DIR [--gbtrace build/release/gbtrace] [--iterations 1500] [--seeds 0,1,2] [--downscale 1]
 #
-# Three runs per scene and seed: traced, N iterations; splatted, N iterations; splatted for as long as the traced run took. A run that is
-# already in DIR is not repeated. Each model is scored as it was trained, and drawn by the other renderer too.
+# Four runs per scene and seed: traced, N iterations; splatted, N iterations; splatted for as long as the traced run took; and, for as long,
+# the default, which splats first and then traces. A run that is already in DIR is not repeated. Each model is scored as it was trained, and
+# drawn by the other renderer too.
 import argparse
 import json
 import os
@@ -30,11 +31,11 @@ def read(path):
         return json.load(text)
 
 
-def train(data, run, renderer, seed, *length):
+def train(data, run, seed, *settings):
     if not os.path.exists(os.path.join(run, "metrics.json")):
-        call("train", data, "-o", run, "--renderer", renderer, "--seed", str(seed), "--downscale", str(args.downscale), *length)
+        call("train", data, "-o", run, "--seed", str(seed), "--downscale", str(args.downscale), *settings)
     if not os.path.exists(os.path.join(run, "crossed.json")):
-        other = "raster" if renderer == "trace" else "trace"
+        other = "trace" if "raster" in settings else "raster"
         call("eval", run, "--renderer", other, "--json", os.path.join(run, "crossed.json"))
         call("eval", run)
     figures = read(os.path.join(run, "metrics.json"))
@@ -53,14 +54,17 @@ print("| scene | trained by | iterations | training, s | PSNR, dB | SSIM | drawn
 print("|---|---|---|---|---|---|---|---|")
 for data in args.data:
     scene = os.path.basename(os.path.normpath(data))
-    rows = {"rays": [], "splats, equal iterations": [], "splats, equal time": []}
+    rows = {"rays": [], "splats, equal iterations": [], "splats, equal time": [], "splats, then rays, equal time": []}
     for seed in seeds:
         place = os.path.join(args.output, f"{scene}-{seed}")
         os.makedirs(place, exist_ok=True)
-        traced = train(data, os.path.join(place, "traced"), "trace", seed, "--iterations", str(args.iterations))
+        length = ("--iterations", str(args.iterations))
+        traced = train(data, os.path.join(place, "traced"), seed, "--splats-until", "0", *length)
+        budget = ("--budget", f"{traced['train_seconds']:.0f}s")
         rows["rays"].append(traced)
-        rows["splats, equal iterations"].append(train(data, os.path.join(place, "splatted"), "raster", seed, "--iterations", str(args.iterations)))
-        rows["splats, equal time"].append(train(data, os.path.join(place, "splatted-time"), "raster", seed, "--budget", f"{traced['train_seconds']:.0f}s"))
+        rows["splats, equal iterations"].append(train(data, os.path.join(place, "splatted"), seed, "--renderer", "raster", *length))
+        rows["splats, equal time"].append(train(data, os.path.join(place, "splatted-time"), seed, "--renderer", "raster", *budget))
+        rows["splats, then rays, equal time"].append(train(data, os.path.join(place, "default-time"), seed, *budget))
     for name, runs in rows.items():
         print(f"| {scene} | {name} | {show([r['iterations'] for r in runs], 0)} | {show([r['train_seconds'] for r in runs], 0)} "
               f"| {show([r['psnr'] for r in runs], 2)} | {show([r['ssim'] for r in runs], 4)} | {show([r['crossed'] for r in runs], 2)} "

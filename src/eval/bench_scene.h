@@ -2,8 +2,8 @@
 #ifndef GBT_EVAL_BENCH_SCENE_H
 #define GBT_EVAL_BENCH_SCENE_H
 
-#include "eval/camera_file.h"
-#include "eval/loaded_run.h"
+#include "render/camera_file.h"
+#include "render/loaded_run.h"
 
 /** Start from {0}; free with bench_scene_close() after success or failure. Not to be copied. */
 typedef struct bench_scene {

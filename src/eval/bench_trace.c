@@ -5,10 +5,10 @@
 
 #include "base/fail.h"
 #include "base/parallel.h"
+#include "data/json_out.h"
 #include "eval/bench_passes.h"
 #include "eval/bench_reference.h"
 #include "eval/bench_scene.h"
-#include "eval/json_out.h"
 #include "gbtrace/bench.h"
 
 enum { KERNELS_MAX = 3 };

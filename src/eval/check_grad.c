@@ -15,10 +15,10 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/rng.h"
-#include "eval/loaded_run.h"
 #include "eval/rounding_band.h"
 #include "gbtrace/bench.h"
 #include "image/metrics.h"
+#include "render/loaded_run.h"
 #include "trace/reference.h"
 
 enum { CHECK_WIDTH = 48, CHECK_WIDTH_LARGE = 24, LARGE_COUNT = 50000, RAY_GRAIN = 16, ANCHOR_GRAIN = 256, DIRECTIONS = 3, ATTEMPTS = 24 };

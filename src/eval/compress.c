@@ -9,7 +9,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "eval/json_out.h"
+#include "data/json_out.h"
 #include "eval/run_sensitivity.h"
 
 gbt_compress_def gbt_compress_def_default(void)

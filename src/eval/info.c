@@ -12,9 +12,9 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "data/gaussian_file.h"
+#include "data/json_out.h"
 #include "data/scene.h"
 #include "eval/expect.h"
-#include "eval/json_out.h"
 #include "io/model_file.h"
 
 /* ---- data sets ---------------------------------------------------------------------------------------------------------------- */

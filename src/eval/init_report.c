@@ -13,11 +13,11 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "bvh/points.h"
+#include "data/json_out.h"
 #include "data/ply.h"
 #include "data/scene.h"
 #include "eval/ball_mesh.h"
 #include "eval/init_quality.h"
-#include "eval/json_out.h"
 
 enum { ANCHOR_SCALES = 6 };
 

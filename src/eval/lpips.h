@@ -6,13 +6,9 @@
 #define GBT_EVAL_LPIPS_H
 
 #include "base/image.h"
+#include "image/metrics.h"
 
 typedef struct lpips lpips; /* a network; const use from any thread */
-
-/** Two ways to feed it: with colours in [-1, 1], as it was trained; and in [0, 1], as the scores of 3DGS and its successors are made. */
-typedef struct lpips_scores {
-    double lpips, lpips_01;
-} lpips_scores;
 
 /**
  * Read a network: VGG16 or AlexNet, told apart by their first layer, with the weights of the five distances.

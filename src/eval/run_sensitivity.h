@@ -2,8 +2,8 @@
 #ifndef GBT_EVAL_RUN_SENSITIVITY_H
 #define GBT_EVAL_RUN_SENSITIVITY_H
 
-#include "eval/loaded_run.h"
 #include "io/model_steps.h"
+#include "render/loaded_run.h"
 
 /**
  * Sensitivities of the run's model (io/model_steps.h), from its training cameras alone: photos are not read.

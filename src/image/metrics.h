@@ -76,6 +76,11 @@ gbt_status image_score(const image *a, const image *photo, const unsigned char *
 gbt_status image_score_photo(image *render, image *photo, const unsigned char *valid, bool exposure, image *flip_map, image_scores *out,
                              gbt_error *err);
 
+/** LPIPS (eval/lpips.h): its network fed with colours in [-1, 1], as it was trained, and in [0, 1], as 3DGS and its successors do. */
+typedef struct lpips_scores {
+    double lpips, lpips_01;
+} lpips_scores;
+
 /** Scratch of image_loss(), reused from step to step. Start from {0}. */
 typedef struct loss_scratch {
     double *buffer;

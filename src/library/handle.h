@@ -2,8 +2,8 @@
 #ifndef GBT_LIBRARY_HANDLE_H
 #define GBT_LIBRARY_HANDLE_H
 
-#include "eval/loaded_run.h"
 #include "gbtrace/model.h"
+#include "render/loaded_run.h"
 
 struct gbt_model {
     loaded_run run;

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "eval/render_outputs.h"
+#include "render/render_outputs.h"
 #include "view/studio.h"
 
 /* One pixel, as wide as those of `camera`, that looks along its ray through `pixel`. False where the lens has no ray. */

@@ -7,7 +7,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "eval/render_outputs.h"
+#include "render/render_outputs.h"
 #include "view/studio.h"
 
 /* Milliseconds. */

@@ -5,8 +5,8 @@
 
 #include "base/fail.h"
 #include "data/number.h"
-#include "eval/camera_file.h"
-#include "eval/render_outputs.h"
+#include "render/camera_file.h"
+#include "render/render_outputs.h"
 
 typedef struct words {
     request_word *word;

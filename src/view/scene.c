@@ -6,7 +6,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "eval/json_out.h"
+#include "data/json_out.h"
 #include "view/studio.h"
 
 #define DEGREES (180 / 3.14159265358979323846)

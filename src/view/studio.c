@@ -11,7 +11,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "eval/json_out.h"
+#include "data/json_out.h"
 
 static bool is_same_file(const struct stat *a, const struct stat *b)
 {

@@ -4,7 +4,7 @@
 
 #include <sys/stat.h>
 
-#include "eval/loaded_run.h"
+#include "render/loaded_run.h"
 #include "view/answer.h"
 #include "view/request.h"
 

@@ -4,10 +4,10 @@
 
 #include "base/file.h"
 #include "base/memory.h"
+#include "data/json_out.h"
 #include "data/scene.h"
 #include "eval/ball_mesh.h"
 #include "eval/expect.h"
-#include "eval/json_out.h"
 #include "gbtrace/info.h"
 #include "gbtrace/init.h"
 #include "io/model_file.h"

@@ -6,9 +6,9 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "eval/report_text.h"
-#include "eval/stability_draw.h"
 #include "gbtrace/bench.h"
+#include "report/text.h"
+#include "stability/draw.h"
 
 static char folder[] = "/tmp/gbtrace-stability-XXXXXX";
 

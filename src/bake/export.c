@@ -1,0 +1,328 @@
+/* bake/export.c -- bake a run or read plain Gaussians, write them, and say what was lost. */
+#include "gbtrace/export.h"
+
+#include <math.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "bake/bake.h"
+#include "bake/export_folder.h"
+#include "bake/refine.h"
+#include "base/clock.h"
+#include "base/fail.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "data/gaussian_file.h"
+#include "data/json_out.h"
+#include "image/metrics.h"
+#include "render/loaded_run.h"
+
+enum { OUTPUTS_MAX = 8, VIEWS_MAX = 16 };
+
+gbt_export_def gbt_export_def_default(void)
+{
+    return (gbt_export_def){.sh_degree = 3, .refine_steps = 300};
+}
+
+/* One output, and what it gives back: PSNR in dB of 8-bit images, means over views. */
+typedef struct exported {
+    const char *path;
+    gaussian_cloud back;         /* of a file that we read */
+    const gaussian_cloud *shown; /* in the model's coordinates: `back`, or what was written, where floats stay floats */
+    double to_model, to_photo;
+    long long bytes;
+} exported;
+
+typedef struct exporting {
+    const gbt_export_def *def;
+    loaded_run run; /* with `baked` */
+    bool baked;
+    gaussian_cloud clouds[2]; /* with colours of the degree asked for, and with one colour */
+    exported files[OUTPUTS_MAX];
+    size_t file_count;
+    size_t unseen;
+    double origin[3], bake_seconds, refine_seconds, model_to_photo;
+    size_t view_count, *views; /* that are compared */
+    bool held_out;
+    frame frame;
+    const char *folder;   /* the output that is a result folder, or NULL */
+    image_scores *scores; /* [view_count], of what it gives back */
+    lpips *net;           /* for the folder, or NULL */
+    lpips_scores *lpips;  /* [view_count], with it */
+} exporting;
+
+/* ---- from a run to Gaussians --------------------------------------------------------------------------------------------------------- */
+
+/* Held-out views, at most VIEWS_MAX evenly chosen, but all for a result folder; training views when there are none. */
+static gbt_status choose_views(exporting *e, gbt_error *err)
+{
+    const scene *s = &e->run.scene;
+    size_t count = 0;
+    for (size_t i = 0; i < s->view_count; i++)
+        count += s->views[i].is_test;
+    e->held_out = count > 0;
+    count = e->held_out ? count : s->view_count;
+    const size_t wanted = count < VIEWS_MAX || (e->folder != NULL && e->held_out) ? count : VIEWS_MAX;
+    e->views = mem_alloc(wanted + 1, sizeof *e->views, "views", err);
+    e->scores = mem_calloc(wanted + 1, sizeof *e->scores, "scores", err);
+    e->lpips = mem_calloc(wanted + 1, sizeof *e->lpips, "scores", err);
+    if (e->views == NULL || e->scores == NULL || e->lpips == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0, seen = 0; i < s->view_count && e->view_count < wanted; i++)
+        if (s->views[i].is_test == e->held_out && seen++ == e->view_count * count / wanted)
+            e->views[e->view_count++] = i;
+    return GBT_OK;
+}
+
+static gbt_status training_cameras(const loaded_run *r, gbt_camera **out, size_t *count, gbt_error *err)
+{
+    *count = 0;
+    *out = mem_alloc(r->scene.view_count + 1, sizeof **out, "cameras", err);
+    if (*out == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < r->scene.view_count; i++)
+        if (!r->scene.views[i].is_test)
+            (*out)[(*count)++] = photos_camera(&r->photos, i, 0);
+    return GBT_OK;
+}
+
+static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
+{
+    loaded_run *r = &e->run;
+    GBT_TRY(loaded_run_open(run, e->def->data, 0, r, err));
+    GBT_TRY(choose_views(e, err));
+    memcpy(e->origin, r->model.origin, sizeof e->origin);
+    e->frame.draw.footprint = r->frame.draw.footprint;
+    return GBT_OK;
+}
+
+/* From the networks. */
+static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt_error *err)
+{
+    loaded_run *r = &e->run;
+    gbt_camera *cameras = NULL;
+    size_t count;
+    GBT_TRY(training_cameras(r, &cameras, &count, err));
+    bake_def bake = bake_def_default();
+    bake.sh_degree = sh_degree;
+    bake_result result = {0};
+    double clock = clock_wall();
+    gbt_status status = bake_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count, &r->settings, &bake, &result, err);
+    *out = result.cloud, e->unseen = result.unseen;
+    e->bake_seconds = clock_wall() - clock;
+    clock = clock_wall();
+    refine_def refine = refine_def_default();
+    refine.steps = e->def->refine_steps;
+    if (status == GBT_OK)
+        status = refine_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count, &r->settings, &refine, out, err);
+    e->refine_seconds = clock_wall() - clock;
+    mem_free(cameras);
+    return status;
+}
+
+/* ---- what is lost -------------------------------------------------------------------------------------------------------------------- */
+
+/* One view of the model and of every file. */
+static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *camera, image *photo, const unsigned char *valid,
+                               gbt_error *err)
+{
+    const double share = 1 / (double)e->view_count;
+    image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb;
+    image_quantize(photo);
+    image_quantize(neural);
+    e->model_to_photo += share * metric_psnr_valid(neural, photo, valid);
+    for (size_t i = 0; i < e->file_count; i++) {
+        exported *f = &e->files[i];
+        GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &e->run.settings, false, err));
+        image_quantize(shown);
+        f->to_model += share * metric_psnr(shown, neural);
+        f->to_photo += share * metric_psnr_valid(shown, photo, valid);
+        if (f->path != e->folder || !e->held_out)
+            continue;
+        GBT_TRY(image_score(shown, photo, valid, NULL, &e->scores[index], err));
+        if (e->net != NULL)
+            GBT_TRY(lpips_compare(e->net, shown, photo, valid, 0, &e->lpips[index], err));
+        GBT_TRY(export_folder_picture(e->folder, &e->run, index, shown, photo, err));
+    }
+    return GBT_OK;
+}
+
+/* Views outside, files inside: the model is drawn once. */
+static gbt_status compare(exporting *e, gbt_error *err)
+{
+    for (size_t i = 0; i < e->view_count; i++) {
+        const gbt_camera camera = photos_camera(&e->run.photos, e->views[i], 0);
+        image photo = {0};
+        unsigned char *valid = NULL;
+        GBT_TRY(loaded_run_render(&e->run, e->views[i], err));
+        gbt_status status = scene_read_photo_valid(&e->run.scene.views[e->views[i]], camera.width, camera.height, &photo, &valid, err);
+        if (status == GBT_OK)
+            status = compare_view(e, i, &camera, &photo, valid, err);
+        image_free(&photo);
+        mem_free(valid);
+        GBT_TRY(status);
+    }
+    return GBT_OK;
+}
+
+/* ---- entry --------------------------------------------------------------------------------------------------------------------------- */
+
+static gbt_status check(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, gbt_error *err)
+{
+    if (def->sh_degree < 0 || def->sh_degree > 3)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--sh-degree: %d (wanted 0 to 3)", def->sh_degree);
+    if (def->refine_steps < 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--refine: %d (wanted 0 or more)", def->refine_steps);
+    if (output_count < 1 || output_count > OUTPUTS_MAX)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu files to write (wanted 1 to %d)", input, output_count, (int)OUTPUTS_MAX);
+    size_t folders = 0;
+    for (size_t i = 0; i < output_count; i++) {
+        folders += export_folder_is(outputs[i]);
+        if (!export_folder_is(outputs[i]))
+            GBT_TRY(gaussian_file_check_writable(outputs[i], err));
+    }
+    if (folders > 1 || (folders == 1 && gaussian_file_readable(input)))
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a result folder is made once, of a run", input);
+    return GBT_OK;
+}
+
+static void say_source(const exporting *e, const gaussian_cloud *cloud, const char *input, FILE *report)
+{
+    fprintf(report, "%s: %zu Gaussians, colours of degree %d", input, cloud->count, cloud->sh_degree);
+    if (e->baked)
+        fprintf(report, "; %zu that no training camera sees are left out; baked in %.1f s, refined in %.1f s", e->unseen, e->bake_seconds,
+                e->refine_seconds);
+    else if (cloud->dropped > 0)
+        fprintf(report, "; %zu unusable rows dropped", cloud->dropped);
+    fprintf(report, "\n");
+}
+
+/* Write an output, and read back what it gives. */
+static gbt_status write_file(exporting *e, const char *path, const gaussian_cloud *cloud, gbt_error *err)
+{
+    exported *f = &e->files[e->file_count++];
+    *f = (exported){.path = path, .shown = cloud};
+    if (export_folder_is(path))
+        return export_folder_write(path, &e->run, cloud, &f->bytes, err);
+    GBT_TRY(gaussian_file_write(path, cloud, e->origin, err));
+    struct stat info = {0};
+    stat(path, &info);
+    f->bytes = (long long)info.st_size;
+    if (!e->baked || !gaussian_file_readable(path))
+        return GBT_OK;
+    GBT_TRY(gaussian_file_read(path, &f->back, err));
+    for (size_t i = 0; i < 3 * f->back.count; i++)
+        f->back.mean[i] = (float)((double)f->back.mean[i] - e->origin[i % 3]);
+    f->shown = &f->back;
+    return GBT_OK;
+}
+
+static json_t *file_to_json(const exporting *e, const exported *f)
+{
+    json_t *row = json_pack("{s:s,s:I,s:i}", "file", f->path, "bytes", (json_int_t)f->bytes, "sh_degree", f->shown->sh_degree);
+    if (e->baked && e->view_count > 0) {
+        json_object_set_new(row, "psnr_to_model", json_real(f->to_model));
+        json_object_set_new(row, "psnr_to_photos", json_real(f->to_photo));
+        json_object_set_new(row, "model_psnr_to_photos", json_real(e->model_to_photo));
+    }
+    return row;
+}
+
+static void say_file(const exporting *e, const exported *f, FILE *report)
+{
+    fprintf(report, "%s: %.2f MB", f->path, (double)f->bytes / 1e6);
+    if (e->baked && e->view_count > 0) {
+        fprintf(report, "; %zu %s views: %.2f dB to the model", e->view_count, e->held_out ? "held-out" : "training", f->to_model);
+        if (!e->run.def.exposure)
+            fprintf(report, ", %.2f dB to the photos (the model: %.2f)", f->to_photo, e->model_to_photo);
+    }
+    fprintf(report, "\n");
+}
+
+/* All files whose format keeps colours of this degree, or only `flat` ones. Where a format keeps one colour, that colour is fitted: the
+   first term of a longer series is not the best constant. */
+static gbt_status write_kind(exporting *e, const char *input, bool flat, const char *const *outputs, size_t output_count, FILE *report,
+                             gbt_error *err)
+{
+    bool any = false;
+    for (size_t i = 0; i < output_count; i++)
+        any = any || (gaussian_file_degree(outputs[i]) == 0) == flat;
+    if (!any)
+        return GBT_OK;
+    const int degree = flat ? 0 : e->def->sh_degree;
+    gaussian_cloud *cloud = &e->clouds[flat];
+    GBT_TRY(e->baked ? bake_run(e, degree, cloud, err) : gaussian_file_read(input, cloud, err));
+    if (cloud->sh_degree > degree)
+        cloud->sh_degree = degree;
+    if (report != NULL)
+        say_source(e, cloud, input, report);
+    for (size_t i = 0; i < output_count; i++)
+        if ((gaussian_file_degree(outputs[i]) == 0) == flat)
+            GBT_TRY(write_file(e, outputs[i], cloud, err));
+    return GBT_OK;
+}
+
+static gbt_status report_all(const exporting *e, const char *input, FILE *report, gbt_error *err)
+{
+    json_t *files = json_array();
+    for (size_t i = 0; i < e->file_count; i++) {
+        json_array_append_new(files, file_to_json(e, &e->files[i]));
+        if (report != NULL)
+            say_file(e, &e->files[i], report);
+    }
+    gbt_status status = GBT_OK;
+    if (e->def->json != NULL) {
+        const size_t count = e->file_count > 0 ? e->files[e->file_count - 1].shown->count : 0;
+        json_t *root = json_pack("{s:i,s:s,s:I,s:I,s:O}", "schema", 1, "input", input, "gaussians", (json_int_t)count, "unseen",
+                                 (json_int_t)e->unseen, "files", files);
+        status = json_save(root, e->def->json, err);
+        json_decref(root);
+    }
+    json_decref(files);
+    return status;
+}
+
+static void exporting_free(exporting *e)
+{
+    for (size_t i = 0; i < e->file_count; i++)
+        gaussian_cloud_free(&e->files[i].back);
+    for (int i = 0; i < 2; i++)
+        gaussian_cloud_free(&e->clouds[i]);
+    mem_free(e->views);
+    mem_free(e->scores);
+    mem_free(e->lpips);
+    lpips_close(e->net);
+    frame_free(&e->frame);
+    loaded_run_close(&e->run);
+    mem_free(e);
+}
+
+gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, FILE *report,
+                      gbt_error *err)
+{
+    GBT_TRY(check(input, def, outputs, output_count, err));
+    exporting *e = mem_calloc(1, sizeof *e, "export", err);
+    if (e == NULL)
+        return GBT_ERR_NO_MEMORY;
+    e->def = def;
+    e->baked = !gaussian_file_readable(input);
+    for (size_t i = 0; i < output_count; i++)
+        if (export_folder_is(outputs[i]))
+            e->folder = outputs[i];
+    gbt_status status = GBT_OK;
+    if (def->lpips != NULL)
+        status = e->folder != NULL ? lpips_open(def->lpips, &e->net, err)
+                                   : base_fail(err, GBT_ERR_ARGUMENT, "--lpips: is for result folders alone (wanted OUT/)");
+    if (status == GBT_OK && e->baked)
+        status = open_run(e, input, err);
+    for (int flat = 0; flat < 2 && status == GBT_OK; flat++)
+        status = write_kind(e, input, flat, outputs, output_count, report, err);
+    if (status == GBT_OK && e->baked)
+        status = compare(e, err);
+    if (status == GBT_OK && e->folder != NULL && e->held_out)
+        status = export_folder_scores(e->folder, &e->run, e->scores, e->net != NULL ? e->lpips : NULL, e->view_count, err);
+    if (status == GBT_OK)
+        status = report_all(e, input, report, err);
+    exporting_free(e);
+    return status;
+}

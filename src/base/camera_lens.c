@@ -1,0 +1,452 @@
+/* base/camera_lens.c -- the lens of all models as one pipeline: direction to pixel, pixel to direction.
+
+   direction --[kind: X/Z | theta | closed form]--> plane point --[radial N/D, tangential, prism]--> distorted --[f, c]--> pixel
+
+   A model is a row of parameters for that one pipeline (camera_lens_prepare), so the inversion is written once. The radial part
+   is only used up to the first radius where it stops increasing: beyond it the formula folds back into the image, and a point
+   there would be drawn on top of others. docs/cameras.md has the formulas. */
+#include "base/camera_lens.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/poly.h"
+
+#define PI 3.14159265358979323846
+
+/* A perspective ray flatter than this (1e-6 rad from the image plane) is outside every real image. */
+static const double perspective_radius_max = 1e6;
+
+/* Accepted reprojection error of an inversion: absolute part in pixels, and a relative one for points far outside the image. */
+static const double converged_px = 1e-10, converged_relative = 1e-14;
+
+/* Radial factor f(x) = N / D at x = squared radius, and df/dx. */
+static double radial_factor(const camera_lens *lens, double x, double *d_factor)
+{
+    double n = 0, dn = 0, d = 0, dd = 0;
+    for (int i = LENS_NUMERATOR - 1; i >= 0; i--)
+        dn = dn * x + n, n = n * x + lens->numerator[i];
+    for (int i = LENS_DENOMINATOR - 1; i >= 0; i--)
+        dd = dd * x + d, d = d * x + lens->denominator[i];
+    const double factor = n / d;
+    *d_factor = (dn - factor * dd) / d;
+    return factor;
+}
+
+enum { SLOPE_COUNT = LENS_NUMERATOR + LENS_DENOMINATOR - 1 };
+
+/* The distorted radius r f(r^2) has slope f + 2 x f' = (N D + 2 x (N' D - N D')) / D^2: find its first zero, and that of D. */
+static void find_monotone_range(camera_lens *lens, double radius_limit)
+{
+    double slope[SLOPE_COUNT] = {0};
+    for (int i = 0; i < LENS_NUMERATOR; i++)
+        for (int j = 0; j < LENS_DENOMINATOR; j++)
+            slope[i + j] += lens->numerator[i] * lens->denominator[j] * (1 + 2 * (i - j));
+    const double limit = radius_limit * radius_limit;
+    const double turn = poly_first_root(slope, SLOPE_COUNT - 1, limit);
+    const double pole = poly_first_root(lens->denominator, LENS_DENOMINATOR - 1, limit);
+    double d_factor;
+    if (pole < limit && pole <= turn) {
+        lens->radius_max = sqrt(pole);
+        lens->distorted_max = HUGE_VAL;
+    } else {
+        lens->radius_max = turn < limit ? sqrt(turn) : radius_limit;
+        lens->distorted_max = lens->radius_max * radial_factor(lens, lens->radius_max * lens->radius_max, &d_factor);
+    }
+}
+
+static void set_radial(camera_lens *lens, const double *first, int first_count, const double *second, int second_count)
+{
+    for (int i = 0; i < first_count; i++)
+        lens->numerator[1 + i] = first[i];
+    for (int i = 0; i < second_count; i++)
+        lens->numerator[1 + first_count + i] = second[i];
+}
+
+static bool any_nonzero(const double *values, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (values[i] != 0)
+            return true;
+    return false;
+}
+
+bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
+{
+    const int focal_count = camera_focal_count(camera->model), param_count = gbt_camera_param_count(camera->model);
+    if (focal_count == 0)
+        return false;
+    const double *p = camera->params;
+    for (int i = 0; i < param_count; i++)
+        if (!isfinite(p[i]))
+            return false;
+    memset(lens, 0, sizeof *lens);
+    lens->numerator[0] = lens->denominator[0] = 1;
+    lens->fx = p[0], lens->fy = p[focal_count - 1];
+    if (!(lens->fx > 0 && lens->fy > 0))
+        return false;
+    if (camera->model == GBT_CAMERA_EQUIRECTANGULAR) {
+        lens->kind = LENS_EQUIRECTANGULAR;
+        return true;
+    }
+    p += focal_count;
+    lens->cx = p[0], lens->cy = p[1];
+    const double *k = p + 2;
+    switch (camera->model) {
+    case GBT_CAMERA_ORTHOGRAPHIC:
+        lens->kind = LENS_ORTHOGRAPHIC;
+        return true;
+    case GBT_CAMERA_SIMPLE_PINHOLE:
+    case GBT_CAMERA_PINHOLE:
+        lens->kind = LENS_PERSPECTIVE;
+        break;
+    case GBT_CAMERA_SIMPLE_RADIAL:
+    case GBT_CAMERA_RADIAL:
+        lens->kind = LENS_PERSPECTIVE;
+        set_radial(lens, k, camera->model == GBT_CAMERA_RADIAL ? 2 : 1, NULL, 0);
+        break;
+    case GBT_CAMERA_OPENCV:
+        lens->kind = LENS_PERSPECTIVE;
+        set_radial(lens, k, 2, NULL, 0);
+        lens->tangent_y = k[2], lens->tangent_x = k[3];
+        break;
+    case GBT_CAMERA_FULL_OPENCV:
+        lens->kind = LENS_PERSPECTIVE;
+        set_radial(lens, k, 2, k + 4, 1);
+        lens->tangent_y = k[2], lens->tangent_x = k[3];
+        memcpy(lens->denominator + 1, k + 5, 3 * sizeof *k);
+        break;
+    case GBT_CAMERA_FOV:
+        /* Without distortion it is a pinhole, and then to the same bits. */
+        lens->kind = k[0] == 0 ? LENS_PERSPECTIVE : LENS_FOV;
+        lens->shape[0] = k[0];
+        return fabs(k[0]) < PI;
+    case GBT_CAMERA_SIMPLE_FISHEYE:
+    case GBT_CAMERA_FISHEYE:
+        lens->kind = LENS_FISHEYE;
+        break;
+    case GBT_CAMERA_SIMPLE_RADIAL_FISHEYE:
+    case GBT_CAMERA_RADIAL_FISHEYE:
+        lens->kind = LENS_FISHEYE;
+        set_radial(lens, k, camera->model == GBT_CAMERA_RADIAL_FISHEYE ? 2 : 1, NULL, 0);
+        break;
+    case GBT_CAMERA_OPENCV_FISHEYE:
+        lens->kind = LENS_FISHEYE;
+        set_radial(lens, k, 4, NULL, 0);
+        break;
+    case GBT_CAMERA_THIN_PRISM_FISHEYE:
+        lens->kind = LENS_FISHEYE;
+        set_radial(lens, k, 2, k + 4, 2);
+        lens->tangent_y = k[2], lens->tangent_x = k[3];
+        lens->prism[0] = k[6], lens->prism[2] = k[7];
+        break;
+    case GBT_CAMERA_RAD_TAN_THIN_PRISM_FISHEYE:
+        lens->kind = LENS_FISHEYE;
+        set_radial(lens, k, 6, NULL, 0);
+        lens->tangent_x = k[6], lens->tangent_y = k[7];
+        memcpy(lens->prism, k + 8, sizeof lens->prism);
+        lens->extra_last = true;
+        break;
+    case GBT_CAMERA_SIMPLE_DIVISION:
+    case GBT_CAMERA_DIVISION:
+        lens->kind = k[0] == 0 ? LENS_PERSPECTIVE : LENS_DIVISION;
+        lens->shape[0] = k[0];
+        return true;
+    case GBT_CAMERA_EUCM:
+        lens->kind = k[0] == 0 ? LENS_PERSPECTIVE : LENS_EUCM;
+        lens->shape[0] = k[0], lens->shape[1] = k[1];
+        return k[0] >= 0 && k[0] <= 1 && k[1] > 0;
+    default:
+        return false;
+    }
+    lens->radial = any_nonzero(lens->numerator + 1, LENS_NUMERATOR - 1) || any_nonzero(lens->denominator + 1, LENS_DENOMINATOR - 1);
+    lens->extra = lens->tangent_x != 0 || lens->tangent_y != 0 || any_nonzero(lens->prism, 4);
+    const double radius_limit = lens->kind == LENS_FISHEYE ? PI : perspective_radius_max;
+    if (lens->radial)
+        find_monotone_range(lens, radius_limit);
+    else
+        lens->radius_max = lens->distorted_max = lens->kind == LENS_FISHEYE || lens->extra ? radius_limit : HUGE_VAL;
+    return true;
+}
+
+/* Tangential and prism terms at (x, y), and I + their Jacobian (row-major), which is what is missing for the map p + extra(p). */
+static void extra_terms(const camera_lens *lens, double x, double y, double out[2], double jacobian[4])
+{
+    const double r2 = x * x + y * y, tx = lens->tangent_x, ty = lens->tangent_y, *s = lens->prism;
+    out[0] = tx * (r2 + 2 * x * x) + 2 * ty * x * y + (s[0] + s[1] * r2) * r2;
+    out[1] = ty * (r2 + 2 * y * y) + 2 * tx * x * y + (s[2] + s[3] * r2) * r2;
+    const double px = 2 * (s[0] + 2 * s[1] * r2), py = 2 * (s[2] + 2 * s[3] * r2);
+    jacobian[0] = 1 + 6 * tx * x + 2 * ty * y + px * x, jacobian[1] = 2 * tx * y + 2 * ty * x + px * y;
+    jacobian[2] = 2 * ty * x + 2 * tx * y + py * x, jacobian[3] = 1 + 6 * ty * y + 2 * tx * x + py * y;
+}
+
+/* One stage that mixes x and y: p f(|p|^2) + extra(p), with f = 1 when the radial part is a stage of its own. */
+static void mixed_stage(const camera_lens *lens, const double p[2], double out[2], double jacobian[4])
+{
+    double d_factor = 0, factor = 1;
+    if (!lens->extra_last)
+        factor = radial_factor(lens, p[0] * p[0] + p[1] * p[1], &d_factor);
+    extra_terms(lens, p[0], p[1], out, jacobian);
+    out[0] += p[0] * factor, out[1] += p[1] * factor;
+    jacobian[0] += factor - 1 + 2 * d_factor * p[0] * p[0], jacobian[1] += 2 * d_factor * p[0] * p[1];
+    jacobian[2] += 2 * d_factor * p[0] * p[1], jacobian[3] += factor - 1 + 2 * d_factor * p[1] * p[1];
+}
+
+/* Both eigenvalues have a positive real part: the map has not folded over. */
+static bool unfolded(const double j[4])
+{
+    return j[0] * j[3] - j[1] * j[2] > 0 && j[0] + j[3] > 0;
+}
+
+static bool distort(const camera_lens *lens, double p[2])
+{
+    double d_factor, jacobian[4], out[2];
+    const double r2 = p[0] * p[0] + p[1] * p[1];
+    if (!(sqrt(r2) <= lens->radius_max))
+        return false;
+    if (lens->radial && (!lens->extra || lens->extra_last)) {
+        const double factor = radial_factor(lens, r2, &d_factor);
+        p[0] *= factor, p[1] *= factor;
+    }
+    if (!lens->extra)
+        return true;
+    mixed_stage(lens, p, out, jacobian);
+    p[0] = out[0], p[1] = out[1];
+    return unfolded(jacobian);
+}
+
+/* Accepted distance between a wanted distorted point and the one reached, in units of the plane. */
+static double tolerance_of(const camera_lens *lens, double radius)
+{
+    return converged_px / fmax(lens->fx, lens->fy) + converged_relative * radius;
+}
+
+/* Solve r f(r^2) = wanted in [0, radius_max], where the left side increases: Newton, kept inside a shrinking bracket. */
+static bool invert_radius(const camera_lens *lens, double wanted, double *radius)
+{
+    if (!(wanted <= lens->distorted_max))
+        return false;
+    double lo = 0, hi = lens->radius_max, r = wanted < hi ? wanted : hi, residual = 0;
+    for (int i = 0; i < 200; i++) {
+        double d_factor;
+        const double factor = radial_factor(lens, r * r, &d_factor);
+        residual = r * factor - wanted;
+        const double step = residual / (factor + 2 * r * r * d_factor);
+        if (fabs(step) <= 2e-16 * r || residual == 0)
+            break;
+        if (residual > 0)
+            hi = r;
+        else
+            lo = r;
+        r = r - step > lo && r - step < hi ? r - step : 0.5 * (lo + hi);
+    }
+    *radius = r;
+    return fabs(residual) <= tolerance_of(lens, wanted);
+}
+
+static bool invert_radial(const camera_lens *lens, double p[2])
+{
+    const double wanted = hypot(p[0], p[1]);
+    double radius;
+    if (!invert_radius(lens, wanted, &radius))
+        return false;
+    if (wanted > 0)
+        p[0] *= radius / wanted, p[1] *= radius / wanted;
+    return true;
+}
+
+/* Newton on the 2x2 Jacobian from `p`, each step halved until it comes nearer; ends when rounding stops all progress. */
+static bool invert_mixed(const camera_lens *lens, const double wanted[2], double p[2])
+{
+    double out[2], j[4];
+    mixed_stage(lens, p, out, j);
+    double rx = out[0] - wanted[0], ry = out[1] - wanted[1];
+    for (int i = 0; i < 50 && (rx != 0 || ry != 0); i++) {
+        const double determinant = j[0] * j[3] - j[1] * j[2];
+        const double step_x = (j[3] * rx - j[1] * ry) / determinant, step_y = (j[0] * ry - j[2] * rx) / determinant;
+        bool nearer = false;
+        for (double part = 1; part > 1e-3 && !nearer; part *= 0.5) {
+            const double tried[2] = {p[0] - part * step_x, p[1] - part * step_y};
+            double tried_j[4];
+            mixed_stage(lens, tried, out, tried_j);
+            const double tx = out[0] - wanted[0], ty = out[1] - wanted[1];
+            nearer = tx * tx + ty * ty < rx * rx + ry * ry;
+            if (nearer)
+                p[0] = tried[0], p[1] = tried[1], rx = tx, ry = ty, memcpy(j, tried_j, sizeof j);
+        }
+        if (!nearer)
+            break;
+    }
+    return hypot(rx, ry) <= tolerance_of(lens, hypot(wanted[0], wanted[1])) && unfolded(j);
+}
+
+static bool undistort(const camera_lens *lens, double p[2])
+{
+    if (lens->extra) {
+        const double wanted[2] = {p[0], p[1]};
+        if (lens->radial && !lens->extra_last && !invert_radial(lens, p)) {
+            /* The extra terms may reach a little beyond the radial range: start inside it. */
+            const double scale = 0.9 * lens->radius_max / hypot(wanted[0], wanted[1]);
+            p[0] = wanted[0] * scale, p[1] = wanted[1] * scale;
+        }
+        if (!invert_mixed(lens, wanted, p))
+            return false;
+    }
+    if (lens->radial && (!lens->extra || lens->extra_last) && !invert_radial(lens, p))
+        return false;
+    return hypot(p[0], p[1]) <= lens->radius_max;
+}
+
+static bool unproject_fov(const camera_lens *lens, double p[2])
+{
+    const double omega = fabs(lens->shape[0]), wanted = hypot(p[0], p[1]);
+    if (!(wanted * omega < 0.5 * PI))
+        return false;
+    const double scale = wanted > 0 ? tan(wanted * omega) / (2 * tan(0.5 * omega) * wanted) : 1;
+    p[0] *= scale, p[1] *= scale;
+    return true;
+}
+
+/* Z from X = x, Y = y and alpha sqrt(beta (X^2 + Y^2) + Z^2) + (1 - alpha) Z = 1. */
+static bool unproject_eucm(const camera_lens *lens, const double p[2], double *z)
+{
+    const double alpha = lens->shape[0], b = lens->shape[1] * (p[0] * p[0] + p[1] * p[1]);
+    const double under = 1 - (2 * alpha - 1) * b;
+    if (!(under >= 0))
+        return false;
+    const double below = alpha * sqrt(under) + 1 - alpha;
+    *z = below > 0 ? (1 - alpha * alpha * b) / below : 0; /* 0 / 0 only for alpha = 1 on the rim, at 90 degrees */
+    return true;
+}
+
+bool camera_lens_unproject(const camera_lens *lens, double px, double py, double dir_cam[3])
+{
+    double dir[3], p[2];
+    if (lens->kind == LENS_EQUIRECTANGULAR) {
+        if (!(px >= 0 && px <= lens->fx && py >= 0 && py <= lens->fy))
+            return false;
+        const double longitude = (px / lens->fx - 0.5) * (2 * PI), down = (py / lens->fy - 0.5) * PI;
+        dir_cam[0] = cos(down) * sin(longitude), dir_cam[1] = sin(down), dir_cam[2] = cos(down) * cos(longitude);
+        return true;
+    }
+    p[0] = (px - lens->cx) / lens->fx, p[1] = (py - lens->cy) / lens->fy;
+    if (!(fabs(p[0]) < 1e100 && fabs(p[1]) < 1e100)) /* not a number, or its square is not */
+        return false;
+    double z = 1;
+    switch (lens->kind) {
+    case LENS_ORTHOGRAPHIC:
+        p[0] = p[1] = 0;
+        break;
+    case LENS_PERSPECTIVE:
+    case LENS_FISHEYE:
+        if ((lens->radial || lens->extra) && !undistort(lens, p))
+            return false;
+        break;
+    case LENS_FOV:
+        if (!unproject_fov(lens, p))
+            return false;
+        break;
+    case LENS_DIVISION: {
+        const double bend = lens->shape[0] * (p[0] * p[0] + p[1] * p[1]);
+        if (bend > 1) /* the same directions again, in reverse */
+            return false;
+        z = 1 + bend;
+        break;
+    }
+    case LENS_EUCM:
+        if (!unproject_eucm(lens, p, &z))
+            return false;
+        break;
+    case LENS_EQUIRECTANGULAR:
+        return false;
+    }
+    if (lens->kind == LENS_FISHEYE) {
+        const double theta = hypot(p[0], p[1]);
+        if (!(theta <= PI))
+            return false;
+        const double scale = theta > 0 ? sin(theta) / theta : 1;
+        dir[0] = p[0] * scale, dir[1] = p[1] * scale, dir[2] = cos(theta);
+    } else {
+        const double length = sqrt(p[0] * p[0] + p[1] * p[1] + z * z);
+        dir[0] = p[0] / length, dir[1] = p[1] / length, dir[2] = z / length;
+    }
+    memcpy(dir_cam, dir, sizeof dir);
+    return true;
+}
+
+void camera_lens_origin(const camera_lens *lens, double px, double py, double origin_cam[3])
+{
+    const bool plane = lens->kind == LENS_ORTHOGRAPHIC;
+    origin_cam[0] = plane ? (px - lens->cx) / lens->fx : 0;
+    origin_cam[1] = plane ? (py - lens->cy) / lens->fy : 0;
+    origin_cam[2] = 0;
+}
+
+/* (X, Y) times the returned scale is the distorted point; false where the lens does not see. */
+static bool project_closed(const camera_lens *lens, const double point[3], double *scale)
+{
+    const double x = point[0], y = point[1], z = point[2], rho2 = x * x + y * y;
+    if (lens->kind == LENS_DIVISION) {
+        const double k = lens->shape[0], under = z * z - 4 * rho2 * k;
+        if (!(under >= 0) || (z <= 0 && (k > 0 || rho2 == 0)))
+            return false;
+        /* Behind the camera the usual form cancels; the other root of the same quadratic does not. */
+        *scale = z > 0 ? 2 / (z + sqrt(under)) : (z - sqrt(under)) / (2 * rho2 * k);
+        return true;
+    }
+    const double alpha = lens->shape[0], rho = sqrt(lens->shape[1] * rho2 + z * z);
+    const double below = alpha * rho + (1 - alpha) * z;
+    *scale = 1 / below;
+    /* For alpha > 1/2 the image radius is largest where alpha z = -(1 - alpha) rho, and shrinks behind that. */
+    return below > 0 && (alpha <= 0.5 || alpha * z >= -(1 - alpha) * rho);
+}
+
+bool camera_lens_project(const camera_lens *lens, const double point_cam[3], double pixel[2])
+{
+    const double x = point_cam[0], y = point_cam[1], z = point_cam[2];
+    const double rho = hypot(x, y);
+    if (!(isfinite(rho) && isfinite(z)) || (rho == 0 && z == 0))
+        return false;
+    double p[2] = {0, 0}, scale;
+    switch (lens->kind) {
+    case LENS_EQUIRECTANGULAR:
+        pixel[0] = lens->fx * (atan2(x, z) / (2 * PI) + 0.5);
+        pixel[1] = lens->fy * (atan2(y, hypot(x, z)) / PI + 0.5);
+        return true;
+    case LENS_PERSPECTIVE:
+    case LENS_FOV:
+        if (!(z > 0))
+            return false;
+        p[0] = x / z, p[1] = y / z;
+        break;
+    case LENS_ORTHOGRAPHIC:
+        if (!(z > 0))
+            return false;
+        p[0] = x, p[1] = y;
+        break;
+    case LENS_FISHEYE:
+        if (rho == 0 && z < 0) /* exactly behind: every direction of the image border is equally right */
+            return false;
+        scale = rho > 0 ? atan2(rho, z) / rho : 0;
+        p[0] = x * scale, p[1] = y * scale;
+        break;
+    case LENS_DIVISION:
+    case LENS_EUCM:
+        if (!project_closed(lens, point_cam, &scale))
+            return false;
+        p[0] = x * scale, p[1] = y * scale;
+        break;
+    }
+    if (lens->kind == LENS_FOV) {
+        const double omega = lens->shape[0], r = hypot(p[0], p[1]);
+        scale = r > 0 ? atan(2 * r * tan(0.5 * omega)) / (r * omega) : 1;
+        p[0] *= scale, p[1] *= scale;
+    } else if ((lens->radial || lens->extra) && !distort(lens, p)) {
+        return false;
+    }
+    const double found_x = lens->fx * p[0] + lens->cx, found_y = lens->fy * p[1] + lens->cy;
+    if (!(isfinite(found_x) && isfinite(found_y)))
+        return false;
+    pixel[0] = found_x, pixel[1] = found_y;
+    return true;
+}

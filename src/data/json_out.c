@@ -1,0 +1,64 @@
+/* data/json_out.c -- finished JSON to a stream or a file. */
+#include "data/json_out.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/memory.h"
+
+/* 9 digits tell two floats apart, 12 keep a world origin to a micrometre in a city. */
+enum { JSON_STYLE = JSON_INDENT(2) | JSON_REAL_PRECISION(12) };
+
+json_t *json_text(const char *text)
+{
+    json_t *value = json_string(text);
+    if (value != NULL)
+        return value;
+    const size_t length = strlen(text);
+    char *plain = mem_alloc(length + 1, 1, "JSON text", NULL);
+    if (plain == NULL)
+        return NULL;
+    for (size_t i = 0; i <= length; i++)
+        plain[i] = (unsigned char)text[i] < 0x80 ? text[i] : '?';
+    value = json_string(plain);
+    mem_free(plain);
+    return value;
+}
+
+json_t *json_number(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
+static char *dump(const json_t *value, gbt_error *err)
+{
+    char *text = value != NULL ? json_dumps(value, JSON_STYLE) : NULL;
+    if (text == NULL)
+        base_fail(err, GBT_ERR_NO_MEMORY, "JSON: no memory");
+    return text;
+}
+
+gbt_status json_print(const json_t *value, FILE *out, gbt_error *err)
+{
+    char *text = dump(value, err);
+    if (text == NULL)
+        return GBT_ERR_NO_MEMORY;
+    fprintf(out, "%s\n", text);
+    free(text);
+    return GBT_OK;
+}
+
+gbt_status json_save(const json_t *value, const char *path, gbt_error *err)
+{
+    char *text = dump(value, err);
+    if (text == NULL)
+        return GBT_ERR_NO_MEMORY;
+    const size_t length = strlen(text);
+    text[length] = '\n'; /* in place of the final zero, which nobody reads any more */
+    const gbt_status status = file_write_atomic(path, text, length + 1, err);
+    free(text);
+    return status;
+}

@@ -1,9 +1,0 @@
-/* eval/report_style.h -- the style sheet and the script of the page: src/eval/report/page.css and page.js, embedded by
-   tools/embed.cmake. */
-#ifndef GBT_EVAL_REPORT_STYLE_H
-#define GBT_EVAL_REPORT_STYLE_H
-
-extern const char report_css[];
-extern const char report_script[]; /* moves the sliders and sorts; the page is whole without it */
-
-#endif

@@ -1,0 +1,84 @@
+/* eval/score_run.c -- score a run on its held-out views. */
+#include "eval/score_run.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <sys/stat.h>
+
+#include "base/clock.h"
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/log.h"
+#include "base/memory.h"
+
+static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, const char *folder, view_score *score, gbt_error *err)
+{
+    const scene_view *view = &r->scene.views[index];
+    const double start = clock_wall();
+    GBT_TRY(loaded_run_render(r, index, err));
+    score->seconds = clock_wall() - start;
+    score->gaussians = r->frame.gaussians.count;
+    snprintf(score->name, sizeof score->name, "%s", view->name);
+    image photo = {0}, error_map = {0};
+    image *render = &r->frame.rgb;
+    unsigned char *valid = NULL;
+    image_scores scores = {0};
+    gbt_status status = scene_read_photo_valid(view, render->width, render->height, &photo, &valid, err);
+    if (status == GBT_OK)
+        status = image_alloc(&error_map, render->width, render->height, 1, err);
+    if (status == GBT_OK)
+        status = image_score_photo(render, &photo, valid, r->def.exposure, &error_map, &scores, err);
+    score->psnr = scores.psnr, score->ssim = scores.ssim, score->flip = scores.flip;
+    score->masked = valid != NULL;
+    if (status == GBT_OK && net != NULL) /* of the half that is scored (image_score_photo()) */
+        status = lpips_compare(net, render, &photo, valid, r->def.exposure ? render->width / 2 : 0, &score->lpips, err);
+    if (status == GBT_OK)
+        status = view_score_paths(score, folder, err);
+    const image *const pictures[] = {render, &photo, &error_map};
+    const char *const paths[] = {score->render_path, score->photo_path, score->error_path};
+    for (int i = 0; i < 3 && status == GBT_OK; i++)
+        status = image_write(paths[i], pictures[i], err);
+    mem_free(valid);
+    image_free(&photo);
+    image_free(&error_map);
+    return status;
+}
+
+gbt_status score_run(loaded_run *r, const char *run, const lpips *net, evaluation *e, gbt_error *err)
+{
+    char folder[4096];
+    GBT_TRY(file_join(folder, sizeof folder, run, "renders/test", err));
+    GBT_TRY(file_make_folder(folder, err));
+    size_t scored = 0;
+    e->views = mem_calloc(r->scene.view_count + 1, sizeof *e->views, "view scores", err);
+    if (e->views == NULL)
+        return GBT_ERR_NO_MEMORY;
+    size_t wanted = 0;
+    for (size_t i = 0; i < r->scene.view_count; i++)
+        wanted += r->scene.views[i].is_test;
+    for (size_t i = 0; i < r->scene.view_count; i++) {
+        if (!r->scene.views[i].is_test)
+            continue;
+        view_score *v = &e->views[e->view_count];
+        GBT_TRY(score_view(r, i, net, folder, v, err));
+        log_count("score", ++e->view_count, wanted, v->psnr);
+        e->masked = e->masked || v->masked;
+        e->gaussians_per_view += (double)v->gaussians;
+        if (!isfinite(v->psnr)) /* every pixel is masked */
+            continue;
+        scored++;
+        e->psnr += v->psnr, e->ssim += v->ssim, e->flip += v->flip;
+        e->lpips.lpips += v->lpips.lpips, e->lpips.lpips_01 += v->lpips.lpips_01;
+    }
+    const double n = (double)scored; /* 0 / 0 = NaN here becomes null in JSON and "n/a" on the page */
+    e->lpips.lpips /= n, e->lpips.lpips_01 /= n;
+    e->lpips_network = net != NULL ? lpips_network(net) : NULL;
+    e->psnr /= n, e->ssim /= n, e->flip /= n, e->gaussians_per_view /= (double)e->view_count;
+    e->anchors = r->model.anchors.count, e->exposure = r->def.exposure;
+    e->renderer = frame_renderer_name(r->frame.draw.renderer), e->downscale = r->photos.downscale;
+    char model_path[4096];
+    struct stat info;
+    GBT_TRY(file_join(model_path, sizeof model_path, run, "model.gbt", err));
+    e->model_bytes = stat(model_path, &info) == 0 ? (size_t)info.st_size : 0;
+    return GBT_OK;
+}

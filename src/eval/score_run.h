@@ -1,0 +1,17 @@
+/* eval/score_run.h -- the held-out views of a run, rendered and compared with their photos. */
+#ifndef GBT_EVAL_SCORE_RUN_H
+#define GBT_EVAL_SCORE_RUN_H
+
+#include "eval/lpips.h"
+#include "render/loaded_run.h"
+#include "report/scores.h"
+
+/**
+ * Render and score every held-out view; renders, photos and FLIP maps go to RUN/renders/test.
+ *
+ * @param net [in] optional (NULL): LPIPS too
+ * @param e   [out] start from {0}; free e->views with mem_free() after success or failure; means are NaN without views
+ */
+gbt_status score_run(loaded_run *r, const char *run, const lpips *net, evaluation *e, gbt_error *err);
+
+#endif

@@ -1,0 +1,360 @@
+/* render/camera_path.c -- the cameras of a film, one a frame. */
+#include "render/camera_path.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/camera_pose.h"
+#include "base/compare.h"
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/vec.h"
+
+#define PI 3.14159265358979323846
+
+gbt_status camera_path_alloc(camera_path *out, size_t count, gbt_error *err)
+{
+    *out = (camera_path){.count = count};
+    if (count < 1 || count > CAMERA_PATH_FRAMES_MAX)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--frames: %zu (wanted 1 to %d)", count, (int)CAMERA_PATH_FRAMES_MAX);
+    out->shots = mem_calloc(count, sizeof *out->shots, "camera path", err);
+    return out->shots != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+}
+
+void camera_path_free(camera_path *path)
+{
+    mem_free(path->shots);
+    *path = (camera_path){0};
+}
+
+/* ---- around -------------------------------------------------------------------------------------------------------------------------- */
+
+/** Where a camera stands around the axis. */
+typedef struct station {
+    double angle, radius, height; /* radians in (-pi, pi], from the first camera */
+} station;
+
+typedef struct circle {
+    double focus[3], axis[3], across[2][3]; /* axis and across: right-handed, unit */
+    double start, arc;                      /* radians; an arc of 2 pi is all around */
+    station *stations;                      /* [count], by angle; owned */
+    size_t count;
+} circle;
+
+static int compare_angles(const void *a, const void *b)
+{
+    return compare_doubles(&((const station *)a)->angle, &((const station *)b)->angle);
+}
+
+static void make_axes(const double up[3], const double towards[3], circle *c)
+{
+    const double along = dvec_dot(towards, up);
+    memcpy(c->axis, up, sizeof c->axis);
+    for (int k = 0; k < 3; k++)
+        c->across[0][k] = towards[k] - along * up[k];
+    if (!(dvec_length(c->across[0]) > 1e-9 * dvec_length(towards))) { /* straight above: any direction will do */
+        const int least = fabs(up[0]) <= fabs(up[1]) && fabs(up[0]) <= fabs(up[2]) ? 0 : fabs(up[1]) <= fabs(up[2]) ? 1 : 2;
+        for (int k = 0; k < 3; k++)
+            c->across[0][k] = (k == least) - up[least] * up[k];
+    }
+    dvec_normalize(c->across[0]);
+    dvec_cross(c->axis, c->across[0], c->across[1]);
+}
+
+/** The arc that the stations cover: what the largest gap between neighbours leaves, without the outermost of many. */
+static void find_arc(circle *c)
+{
+    static const double gap_most = PI / 2, arc_least = 40 * PI / 180;
+    const size_t n = c->count, spare = n / 25;
+    size_t first = 0;
+    double gap = c->stations[0].angle + 2 * PI - c->stations[n - 1].angle;
+    for (size_t i = 1; i < n; i++)
+        if (c->stations[i].angle - c->stations[i - 1].angle > gap)
+            gap = c->stations[i].angle - c->stations[i - 1].angle, first = i;
+    c->start = 0, c->arc = 2 * PI; /* from the first camera, where the angle is 0 */
+    if (gap <= gap_most)
+        return;
+    const size_t low = first + spare, high = first + n - 1 - spare;
+    c->start = c->stations[low % n].angle + (low >= n ? 2 * PI : 0);
+    c->arc = c->stations[high % n].angle + (high >= n ? 2 * PI : 0) - c->start;
+    if (c->arc < arc_least)
+        c->start -= (arc_least - c->arc) / 2, c->arc = arc_least;
+}
+
+static gbt_status circle_make(const gbt_camera *cameras, size_t count, const camera_group *g, circle *c, gbt_error *err)
+{
+    *c = (circle){.count = count};
+    memcpy(c->focus, g->focus, sizeof c->focus);
+    c->stations = mem_alloc(count, sizeof *c->stations, "orbit", err);
+    if (c->stations == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < count; i++) {
+        double way[3];
+        for (int k = 0; k < 3; k++)
+            way[k] = cameras[i].center[k] - g->focus[k];
+        if (i == 0)
+            make_axes(g->up, way, c);
+        const double x = dvec_dot(way, c->across[0]), y = dvec_dot(way, c->across[1]);
+        /* from straight above there is no way around */
+        c->stations[i] = (station){atan2(y, x), fmax(hypot(x, y), 0.05 * g->distance), dvec_dot(way, g->up)};
+    }
+    qsort(c->stations, count, sizeof *c->stations, compare_angles);
+    find_arc(c);
+    return GBT_OK;
+}
+
+/** As far and as high as the cameras are at about that angle: means, weighed with a spread of 20 degrees. */
+static void circle_at(const circle *c, double angle, double out[3])
+{
+    static const double spread = 0.122; /* squared, radians */
+    double weight = 0, radius = 0, height = 0;
+    for (size_t i = 0; i < c->count; i++) {
+        const double w = exp((cos(angle - c->stations[i].angle) - 1) / spread);
+        weight += w, radius += w * c->stations[i].radius, height += w * c->stations[i].height;
+    }
+    radius /= weight, height /= weight;
+    for (int k = 0; k < 3; k++)
+        out[k] = c->focus[k] + height * c->axis[k] + radius * (cos(angle) * c->across[0][k] + sin(angle) * c->across[1][k]);
+}
+
+gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const camera_group *group, const gbt_camera *lens, size_t frames,
+                             camera_path *out, gbt_error *err)
+{
+    circle c;
+    GBT_TRY(camera_path_alloc(out, frames, err));
+    GBT_TRY(circle_make(cameras, count, group, &c, err));
+    gbt_status status = GBT_OK;
+    for (size_t i = 0; i < frames && status == GBT_OK; i++) {
+        const double turn = (double)i / (double)frames;
+        const double angle = c.arc < 2 * PI ? c.start + c.arc * 0.5 * (1 - cos(2 * PI * turn)) : c.start + c.arc * turn;
+        gbt_camera camera = *lens;
+        double at[3];
+        circle_at(&c, angle, at);
+        if (!gbt_camera_look_at(at, c.focus, c.axis, &camera))
+            status = base_fail(err, GBT_ERR_FORMAT,
+                               "--path orbit: the cameras say no way around (wanted them apart from what they look at)");
+        out->shots[i] = ray_shot_of(&camera);
+    }
+    mem_free(c.stations);
+    return status;
+}
+
+/* ---- through cameras ----------------------------------------------------------------------------------------------------------------- */
+
+enum { DIMENSIONS = 7, STEPS = 64 /* of a segment, to measure its length */ };
+
+typedef struct pose_curve {
+    const gbt_camera *keys;
+    size_t *key;                  /* [count]: index of the camera; equal neighbours are left out */
+    double (*point)[DIMENSIONS];  /* [count]: centre, 2 L q */
+    double (*slope)[DIMENSIONS];  /* [count]: by the knot's parameter */
+    double *gap;                  /* [count - 1]: from knot to knot */
+    size_t count;
+    double turn_length;
+} pose_curve;
+
+/** Quaternion of a rotation matrix: from the largest of its four components, which is at least 1/2. */
+static void matrix_to_quat(const double m[9], double q[4])
+{
+    const double square[4] = {1 + m[0] + m[4] + m[8], 1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8], 1 - m[0] - m[4] + m[8]}; /* 4 q_k^2 */
+    int big = 0;
+    for (int k = 1; k < 4; k++)
+        if (square[k] > square[big])
+            big = k;
+    const double s = sqrt(square[big]), t = 0.5 / s;
+    /* 4 w x ..; 4 xy, xz, yz */
+    const double odd[3] = {m[7] - m[5], m[2] - m[6], m[3] - m[1]}, even[3] = {m[1] + m[3], m[2] + m[6], m[5] + m[7]};
+    q[big] = 0.5 * s;
+    if (big == 0)
+        q[1] = t * odd[0], q[2] = t * odd[1], q[3] = t * odd[2];
+    else if (big == 1)
+        q[0] = t * odd[0], q[2] = t * even[0], q[3] = t * even[1];
+    else if (big == 2)
+        q[0] = t * odd[1], q[1] = t * even[0], q[3] = t * even[2];
+    else
+        q[0] = t * odd[2], q[1] = t * even[1], q[2] = t * even[2];
+}
+
+static double distance_of(const double *a, const double *b, int dimensions)
+{
+    double sum = 0;
+    for (int k = 0; k < dimensions; k++)
+        sum += (a[k] - b[k]) * (a[k] - b[k]);
+    return sqrt(sum);
+}
+
+/** The point of a camera; its quaternion on the side of `before` (NULL: any). */
+static void point_of(const gbt_camera *camera, double turn_length, const double *before, double out[DIMENSIONS])
+{
+    double q[4], dot = 0;
+    matrix_to_quat(camera->rotation, q);
+    for (int k = 0; k < 4 && before != NULL; k++)
+        dot += q[k] * before[3 + k];
+    for (int k = 0; k < 3; k++)
+        out[k] = camera->center[k];
+    for (int k = 0; k < 4; k++)
+        out[3 + k] = (dot < 0 ? -2 : 2) * turn_length * q[k];
+}
+
+/** Slopes of the non-uniform Catmull-Rom spline: those of the parabola through a knot and its neighbours; of the chord at the ends. */
+static void find_slopes(pose_curve *c)
+{
+    for (size_t i = 0; i < c->count; i++)
+        for (int k = 0; k < DIMENSIONS; k++) {
+            const double left = i > 0 ? (c->point[i][k] - c->point[i - 1][k]) / c->gap[i - 1] : 0;
+            const double right = i + 1 < c->count ? (c->point[i + 1][k] - c->point[i][k]) / c->gap[i] : left;
+            if (i == 0 || i + 1 == c->count)
+                c->slope[i][k] = i == 0 ? right : left;
+            else
+                c->slope[i][k] = (left * c->gap[i] + right * c->gap[i - 1]) / (c->gap[i - 1] + c->gap[i]);
+        }
+}
+
+static gbt_status curve_make(const gbt_camera *keys, size_t count, double turn_length, pose_curve *c, gbt_error *err)
+{
+    *c = (pose_curve){.keys = keys, .turn_length = turn_length};
+    c->key = mem_alloc(count, sizeof *c->key, "path", err);
+    c->point = mem_alloc(count, sizeof *c->point, "path", err);
+    c->slope = mem_alloc(count, sizeof *c->slope, "path", err);
+    c->gap = mem_alloc(count, sizeof *c->gap, "path", err);
+    if (c->key == NULL || c->point == NULL || c->slope == NULL || c->gap == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < count; i++) {
+        const size_t n = c->count;
+        point_of(&keys[i], turn_length, n > 0 ? c->point[n - 1] : NULL, c->point[n]);
+        const double way = n > 0 ? distance_of(c->point[n], c->point[n - 1], DIMENSIONS) : 1;
+        if (!(way > 1e-9 * turn_length))
+            continue;
+        if (n > 0)
+            c->gap[n - 1] = sqrt(way);
+        c->key[c->count++] = i;
+    }
+    find_slopes(c);
+    return GBT_OK;
+}
+
+static void curve_free(pose_curve *c)
+{
+    mem_free(c->key);
+    mem_free(c->point);
+    mem_free(c->slope);
+    mem_free(c->gap);
+}
+
+/** Centre and unit quaternion, times 2 L, at u in [0, 1] of a segment. */
+static void curve_at(const pose_curve *c, size_t segment, double u, double out[DIMENSIONS])
+{
+    if (c->count == 1) {
+        memcpy(out, c->point[0], DIMENSIONS * sizeof *out);
+        return;
+    }
+    const double v = 1 - u, h00 = v * v * (1 + 2 * u), h01 = u * u * (3 - 2 * u), h10 = u * v * v * c->gap[segment],
+        h11 = -u * u * v * c->gap[segment];
+    double length = 0;
+    for (int k = 0; k < DIMENSIONS; k++)
+        out[k] = h00 * c->point[segment][k] + h01 * c->point[segment + 1][k] + h10 * c->slope[segment][k] + h11 * c->slope[segment + 1][k];
+    for (int k = 3; k < DIMENSIONS; k++)
+        length += out[k] * out[k];
+    for (int k = 3; k < DIMENSIONS; k++)
+        out[k] *= 2 * c->turn_length / sqrt(length);
+}
+
+static void set_camera(const pose_curve *c, size_t segment, double u, gbt_camera *out)
+{
+    double at[DIMENSIONS], q[4];
+    const gbt_camera *from = &c->keys[c->key[segment]], *to = &c->keys[c->key[segment + (c->count > 1)]];
+    *out = *from;
+    for (int k = 0; k < GBT_CAMERA_MAX_PARAMS; k++)
+        out->params[k] = (1 - u) * from->params[k] + u * to->params[k];
+    curve_at(c, segment, u, at);
+    memcpy(out->center, at, sizeof out->center);
+    for (int k = 0; k < 4; k++)
+        q[k] = at[3 + k] / (2 * c->turn_length);
+    dquat_to_matrix(q, out->rotation);
+}
+
+/** Length from the start to step i of all segments, [segments * STEPS + 1]. */
+static void measure(const pose_curve *c, double *length)
+{
+    double before[DIMENSIONS], at[DIMENSIONS];
+    curve_at(c, 0, 0, before);
+    length[0] = 0;
+    for (size_t i = 1; i <= (c->count - 1) * STEPS; i++) {
+        curve_at(c, (i - 1) / STEPS, (double)((i - 1) % STEPS + 1) / STEPS, at);
+        length[i] = length[i - 1] + distance_of(before, at, DIMENSIONS);
+        memcpy(before, at, sizeof before);
+    }
+}
+
+static void place_frames(const pose_curve *c, const double *length, camera_path *out)
+{
+    const size_t steps = (c->count - 1) * STEPS;
+    size_t i = 0;
+    for (size_t frame = 0; frame < out->count; frame++) {
+        const double wanted = out->count > 1 ? length[steps] * (double)frame / (double)(out->count - 1) : 0;
+        while (i + 1 < steps && length[i + 1] < wanted)
+            i++;
+        const double step = steps > 0 ? length[i + 1] - length[i] : 0,
+            within = step > 0 ? fmin(fmax((wanted - length[i]) / step, 0), 1) : 0;
+        gbt_camera camera;
+        set_camera(c, i / STEPS, ((double)(i % STEPS) + within) / STEPS, &camera);
+        out->shots[frame] = ray_shot_of(&camera);
+    }
+}
+
+gbt_status camera_path_through(const gbt_camera *keys, size_t count, double turn_length, size_t frames, camera_path *out, gbt_error *err)
+{
+    pose_curve c = {0};
+    double *length = NULL;
+    GBT_TRY(camera_path_alloc(out, frames, err));
+    gbt_status status = curve_make(keys, count, turn_length, &c, err);
+    if (status == GBT_OK) {
+        length = mem_alloc((c.count - 1) * STEPS + 1, sizeof *length, "path", err);
+        status = length != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+    }
+    if (status == GBT_OK) {
+        measure(&c, length);
+        place_frames(&c, length, out);
+    }
+    mem_free(length);
+    curve_free(&c);
+    return status;
+}
+
+/** Centre, and 2 L q with either sign: the nearer counts. */
+static double way_between(const gbt_camera *a, const gbt_camera *b, double turn_length)
+{
+    double p[DIMENSIONS], q[DIMENSIONS];
+    point_of(a, turn_length, NULL, p);
+    point_of(b, turn_length, p, q);
+    return distance_of(p, q, DIMENSIONS);
+}
+
+gbt_status camera_path_order(gbt_camera *cameras, size_t count, double turn_length, gbt_error *err)
+{
+    gbt_camera *nearest = mem_alloc(count, sizeof *nearest, "path", err);
+    double as_they_are = 0, to_nearest = 0;
+    if (nearest == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 1; i < count; i++)
+        as_they_are += way_between(&cameras[i - 1], &cameras[i], turn_length);
+    memcpy(nearest, cameras, count * sizeof *nearest);
+    for (size_t i = 1; i < count; i++) {
+        size_t best = i;
+        double least = INFINITY;
+        for (size_t j = i; j < count; j++) {
+            const double way = way_between(&nearest[i - 1], &nearest[j], turn_length);
+            if (way < least)
+                least = way, best = j;
+        }
+        const gbt_camera next = nearest[best];
+        memmove(nearest + i + 1, nearest + i, (best - i) * sizeof *nearest); /* the others keep their order: ties go by name */
+        nearest[i] = next;
+        to_nearest += least;
+    }
+    if (to_nearest < as_they_are * 2 / 3)
+        memcpy(cameras, nearest, count * sizeof *cameras);
+    mem_free(nearest);
+    return GBT_OK;
+}

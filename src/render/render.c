@@ -1,0 +1,251 @@
+/* render/render.c -- the views of a split, the camera of a file, or a path, to image files or a film. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "gbtrace/evaluate.h"
+#include "render/camera_file.h"
+#include "render/insert_file.h"
+#include "render/loaded_run.h"
+#include "render/render_outputs.h"
+#include "render/render_path.h"
+#include "render/video.h"
+#include "trace/reference.h"
+
+gbt_render_def gbt_render_def_default(void)
+{
+    return (gbt_render_def){.split = GBT_SPLIT_TEST, .format = "png"};
+}
+
+/* Same Gaussians, same rays, in double: the picture that the tracer is measured against. */
+static gbt_status render_reference(loaded_run *r, const ray_shot *shot, gbt_error *err)
+{
+    frame *f = &r->frame;
+    const int samples = ray_shot_sample_count(shot);
+    const size_t pixels = ray_image_count(&f->rays);
+    double *rgb = mem_alloc(pixels, 3 * sizeof *rgb, "reference image", err);
+    double *sum = mem_calloc(pixels, 3 * sizeof *sum, "reference image", err);
+    gbt_status status = rgb == NULL || sum == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    for (int s = 0; s < samples && status == GBT_OK; s++) {
+        status = ray_image_from_shot(shot, s, &f->rays, err);
+        if (status == GBT_OK)
+            status = reference_forward(frame_drawn(f), &r->settings, &f->rays, rgb, NULL, NULL, err);
+        for (size_t i = 0; status == GBT_OK && i < 3 * pixels; i++)
+            sum[i] += rgb[i];
+    }
+    for (size_t i = 0; status == GBT_OK && i < 3 * pixels; i++)
+        f->rgb.pixels[i] = (float)(sum[i] / samples);
+    mem_free(rgb);
+    mem_free(sum);
+    return status;
+}
+
+/* What to render with: the run, and what is put into it. */
+typedef struct studio {
+    loaded_run run;
+    insert_scene insert;
+    unsigned outputs; /* render_outputs_parse() */
+    bool in_double;   /* by the reference */
+} studio;
+
+/* Into run.frame.rgb. */
+static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *def, gbt_error *err)
+{
+    loaded_run *r = &st->run;
+    const frame_guest guest = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
+    GBT_TRY(frame_render_guest(&r->frame, loaded_run_subject(r), shot, &r->settings, def->insert != NULL ? &guest : NULL, err));
+    return st->in_double ? render_reference(r, shot, err) : GBT_OK;
+}
+
+static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, const char *name, const gbt_render_def *def, gbt_error *err)
+{
+    char file[1100], path[4096];
+    loaded_run *r = &st->run;
+    GBT_TRY(draw(st, shot, def, err));
+    snprintf(file, sizeof file, "%s.%s", name, def->format);
+    GBT_TRY(file_join(path, sizeof path, out, file, err));
+    GBT_TRY(image_write(path, &r->frame.rgb, err));
+    return render_outputs_write(r, shot, st->outputs, out, name, err);
+}
+
+static bool is_wanted(const scene_view *view, gbt_split split)
+{
+    return split == GBT_SPLIT_ALL || view->is_test == (split == GBT_SPLIT_TEST);
+}
+
+static gbt_status render_views(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    loaded_run *r = &st->run;
+    size_t rendered = 0, wanted = 0;
+    for (size_t i = 0; i < r->scene.view_count; i++)
+        wanted += is_wanted(&r->scene.views[i], def->split);
+    for (size_t i = 0; i < r->scene.view_count; i++) {
+        const scene_view *view = &r->scene.views[i];
+        if (!is_wanted(view, def->split))
+            continue;
+        char name[1024];
+        loaded_run_view_name(view, name, sizeof name);
+        const gbt_camera camera = photos_camera(&r->photos, i, 0);
+        const ray_shot shot = ray_shot_of(&camera);
+        GBT_TRY(render_one(st, &shot, out, name, def, err));
+        log_count("render", ++rendered, wanted, (double)NAN);
+    }
+    if (rendered == 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no views in this split (of %zu)", r->scene.folder, r->scene.view_count);
+    log_info("%zu views rendered into %s", rendered, out);
+    return GBT_OK;
+}
+
+/* "folder/name.json" becomes "name". */
+static void camera_name(const char *path, char *out, size_t size)
+{
+    const char *slash = strrchr(path, '/');
+    snprintf(out, size, "%s", slash != NULL ? slash + 1 : path);
+    char *dot = strrchr(out, '.');
+    if (dot != NULL && dot != out)
+        *dot = '\0';
+}
+
+static gbt_status render_camera(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    camera_file file = {0};
+    char name[1024];
+    camera_name(def->camera, name, sizeof name);
+    gbt_status status = camera_file_read(def->camera, st->run.model.origin, &file, err);
+    if (status == GBT_OK)
+        status = render_one(st, &file.shot, out, name, def, err);
+    if (status == GBT_OK)
+        log_info("%s rendered into %s", name, out);
+    camera_file_free(&file);
+    return status;
+}
+
+static void say_progress(size_t done, size_t count, double start, double *said)
+{
+    const double now = clock_wall();
+    if (done < count && now - *said < 5)
+        return;
+    log_info("frame %zu of %zu, %.0f s left", done, count, (now - start) / (double)done * (double)(count - done));
+    *said = now;
+}
+
+static gbt_status render_frames(studio *st, const camera_path *path, video *film, const char *out, const gbt_render_def *def,
+                                gbt_error *err)
+{
+    const double start = clock_wall();
+    double said = start;
+    for (size_t i = 0; i < path->count; i++) {
+        char name[32];
+        snprintf(name, sizeof name, "frame_%05zu", i + 1);
+        if (film == NULL) {
+            GBT_TRY(render_one(st, &path->shots[i], out, name, def, err));
+        } else {
+            GBT_TRY(draw(st, &path->shots[i], def, err));
+            GBT_TRY(video_add(film, &st->run.frame.rgb, err));
+        }
+        say_progress(i + 1, path->count, start, &said);
+    }
+    return GBT_OK;
+}
+
+static gbt_status render_film(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    camera_path path;
+    video *film = NULL;
+    gbt_status status = render_path_make(&st->run, def, &path, err);
+    if (status == GBT_OK && video_named(out))
+        status = video_open(out, path.shots[0].camera.width, path.shots[0].camera.height, path.fps, &film, err);
+    if (status == GBT_OK)
+        status = render_frames(st, &path, film, out, def, err);
+    const gbt_status closed = video_close(film, status == GBT_OK, err);
+    if (status == GBT_OK)
+        status = closed;
+    if (status == GBT_OK)
+        log_info("%zu frames rendered into %s, %.2f s at %g frames per second", path.count, out, (double)path.count / path.fps, path.fps);
+    camera_path_free(&path);
+    return status;
+}
+
+static const char insert_is_traced[] = "--insert: meshes are traced (wanted --renderer trace)";
+
+/* What draws the model that is open. */
+static gbt_status choose_renderer(studio *st, const gbt_render_def *def, gbt_error *err)
+{
+    frame_renderer *renderer = &st->run.frame.draw.renderer;
+    st->in_double = def->renderer != NULL && strcmp(def->renderer, "reference") == 0;
+    if (st->in_double)
+        *renderer = FRAME_TRACE;
+    else if (def->renderer != NULL && !frame_renderer_named(def->renderer, renderer))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster, per-ray or reference)", def->renderer);
+    if (def->insert != NULL && *renderer != FRAME_TRACE)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
+    if (st->outputs != 0 && *renderer != FRAME_TRACE)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--outputs: these are traced (wanted --renderer trace)");
+    return GBT_OK;
+}
+
+static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    if (def->path == NULL && (def->frames != 0 || def->fps != 0 || def->width != 0 || def->height != 0))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--frames, --fps, --size: of a path (wanted --path)");
+    if (def->path == NULL)
+        return video_named(out) ? base_fail(err, GBT_ERR_ARGUMENT, "%s: a film wants --path", out) : GBT_OK;
+    if (def->camera != NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--path: not with --camera");
+    if (!render_path_wants_views(def->path) && def->downscale != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: not with a path file (wanted --size)");
+    if (def->frames < 0 || def->frames > CAMERA_PATH_FRAMES_MAX)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--frames: %d (wanted 1 to %d)", def->frames, (int)CAMERA_PATH_FRAMES_MAX);
+    if (!(def->fps >= 0 && def->fps <= 1000))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--fps: %g (wanted up to 1000)", def->fps);
+    if ((def->width != 0 || def->height != 0) && !(def->width > 0 && def->height > 0 && def->width <= 65500 && def->height <= 65500))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--size: %d x %d (wanted 1 to 65500 pixels)", def->width, def->height);
+    if (video_named(out) && def->outputs != NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--outputs: not with a film (wanted -o DIR)");
+    return GBT_OK;
+}
+
+static gbt_status check_def(const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    if (strcmp(def->format, "png") != 0 && strcmp(def->format, "exr") != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--format: \"%.40s\" (wanted png or exr)", def->format);
+    if (!(def->downscale == 0 || (def->downscale >= 1 && def->downscale <= 64)))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: %g (wanted 1 to 64)", def->downscale);
+    if (def->camera != NULL && def->downscale != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: not with --camera (the camera file says the size)");
+    if (def->insert != NULL && def->renderer != NULL && strcmp(def->renderer, "trace") != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
+    return check_path(out, def, err);
+}
+
+gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    GBT_TRY(check_def(out, def, err));
+    if (!video_named(out))
+        GBT_TRY(file_make_folder(out, err));
+    studio *st = mem_calloc(1, sizeof *st, "run", err);
+    if (st == NULL)
+        return GBT_ERR_NO_MEMORY;
+    const bool wants_views = def->path != NULL ? render_path_wants_views(def->path) : def->camera == NULL;
+    gbt_status status = render_outputs_parse(def->outputs, &st->outputs, err);
+    if (status == GBT_OK)
+        status = wants_views ? loaded_run_open(run, def->data, def->downscale, &st->run, err) : loaded_run_open_model(run, &st->run, err);
+    if (status == GBT_OK)
+        status = loaded_run_preset(def->preset, &st->run.settings, err);
+    if (status == GBT_OK)
+        status = choose_renderer(st, def, err);
+    if (status == GBT_OK && def->insert != NULL)
+        status = insert_file_read(def->insert, st->run.model.origin, &st->insert, err);
+    if (status == GBT_OK)
+        status = def->path != NULL ? render_film(st, out, def, err) : def->camera != NULL ? render_camera(st, out, def, err)
+                 : render_views(st, out, def, err);
+    insert_scene_free(&st->insert);
+    loaded_run_close(&st->run);
+    mem_free(st);
+    return status;
+}

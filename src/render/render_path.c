@@ -1,0 +1,103 @@
+/* render/render_path.c -- which cameras a film has. */
+#include "render/render_path.h"
+
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "render/camera_path_file.h"
+
+enum { FRAMES_ORBIT = 240, FRAMES_PER_CAMERA = 15, FRAMES_MOST = 900 };
+static const double fps_default = 30;
+
+bool render_path_wants_views(const char *path)
+{
+    return strcmp(path, "orbit") == 0 || strcmp(path, "interpolate") == 0;
+}
+
+/** The cameras that photos were trained on; all where every photo was held out. */
+static gbt_status take_cameras(const loaded_run *r, gbt_camera **out, size_t *count, gbt_error *err)
+{
+    *count = 0;
+    *out = mem_alloc(r->scene.view_count + 1, sizeof **out, "cameras", err);
+    if (*out == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (int held_out = 0; held_out < 2 && *count == 0; held_out++)
+        for (size_t i = 0; i < r->scene.view_count; i++)
+            if (r->scene.views[i].is_test == (held_out > 0))
+                (*out)[(*count)++] = photos_camera(&r->photos, i, 0);
+    return *count > 0 ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "--path: %s has no cameras (wanted a data set with photos, or a path file)",
+                                           r->scene.folder);
+}
+
+/** Sides of the pictures: as asked for, else those of the first photo, made even for films. */
+static gbt_camera choose_lens(const camera_group *group, const gbt_render_def *def)
+{
+    if (def->width > 0)
+        return camera_group_lens(group, def->width, def->height);
+    const int width = group->lens.width, height = group->lens.height;
+    return camera_group_lens(group, width > 1 ? width & ~1 : width, height > 1 ? height & ~1 : height);
+}
+
+static gbt_status make_from_views(const loaded_run *r, const gbt_render_def *def, camera_path *out, gbt_error *err)
+{
+    gbt_camera *cameras = NULL;
+    camera_group group;
+    size_t count;
+    gbt_status status = take_cameras(r, &cameras, &count, err);
+    if (status == GBT_OK)
+        status = camera_group_make(cameras, count, r->scene.points.position, r->scene.points.count, &group, err);
+    if (status != GBT_OK)
+        goto done;
+    const gbt_camera lens = choose_lens(&group, def);
+    if (strcmp(def->path, "orbit") == 0) {
+        status = camera_path_orbit(cameras, count, &group, &lens, def->frames > 0 ? (size_t)def->frames : FRAMES_ORBIT, out, err);
+        goto done;
+    }
+    status = camera_path_order(cameras, count, group.distance, err);
+    for (size_t i = 0; i < count; i++) {
+        gbt_camera key = lens;
+        memcpy(key.rotation, cameras[i].rotation, sizeof key.rotation);
+        memcpy(key.center, cameras[i].center, sizeof key.center);
+        cameras[i] = key;
+    }
+    const size_t most = count < FRAMES_MOST / FRAMES_PER_CAMERA ? count * FRAMES_PER_CAMERA : FRAMES_MOST;
+    if (status == GBT_OK)
+        status = camera_path_through(cameras, count, group.distance, def->frames > 0 ? (size_t)def->frames : most, out, err);
+done:
+    mem_free(cameras);
+    return status;
+}
+
+/** A file's cameras for pictures of another size: its shorter side sees as much as before. */
+static gbt_status resize(camera_path *path, const gbt_render_def *def, gbt_error *err)
+{
+    for (size_t i = 0; i < path->count; i++) {
+        ray_shot *shot = &path->shots[i];
+        camera_group group = {.lens = shot->camera};
+        if (shot->camera.model != GBT_CAMERA_PINHOLE)
+            return base_fail(err, GBT_ERR_ARGUMENT, "--size: not with a path of %s cameras (its file says the size)",
+                             gbt_camera_model_name(shot->camera.model));
+        const gbt_camera lens = camera_group_lens(&group, def->width, def->height);
+        shot->camera.width = lens.width, shot->camera.height = lens.height;
+        memcpy(shot->camera.params, lens.params, sizeof lens.params);
+    }
+    return GBT_OK;
+}
+
+gbt_status render_path_make(const loaded_run *r, const gbt_render_def *def, camera_path *out, gbt_error *err)
+{
+    *out = (camera_path){0};
+    if (render_path_wants_views(def->path)) {
+        GBT_TRY(make_from_views(r, def, out, err));
+    } else {
+        GBT_TRY(camera_path_file_read(def->path, r->model.origin, (size_t)def->frames, out, err));
+        if (def->width > 0)
+            GBT_TRY(resize(out, def, err));
+    }
+    if (def->fps > 0)
+        out->fps = def->fps;
+    else if (!(out->fps > 0))
+        out->fps = fps_default;
+    return GBT_OK;
+}

@@ -1,0 +1,199 @@
+/* render/video.c -- pictures to a film, by the program ffmpeg. */
+#include "render/video.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+
+enum { PATH_LIMIT = 4096, ARGUMENTS_MAX = 48 };
+
+/* What ffmpeg is told for each kind of file. -f: the temporary name does not say it. */
+static const struct { const char *ending, *options[16]; } kinds[] = {
+    {".mp4", {"-c:v", "libx264", "-preset", "medium", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"}},
+    {".webm", {"-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "28", "-row-mt", "1", "-pix_fmt", "yuv420p", "-f", "webm"}},
+    {".gif", {"-filter_complex", "[0:v]split[a][b];[a]palettegen[p];[b][p]paletteuse", "-loop", "0", "-f", "gif"}},
+};
+enum { KINDS = sizeof kinds / sizeof *kinds };
+
+struct video {
+    char path[PATH_LIMIT], part[PATH_LIMIT];
+    int width, height;
+    int pictures;       /* socket to ffmpeg; -1: closed */
+    FILE *complaints;   /* what ffmpeg says */
+    pid_t process;      /* 0: none */
+    unsigned char *row; /* one picture, [height][width][3] */
+};
+
+static int kind_of(const char *path)
+{
+    const size_t length = strlen(path);
+    for (int i = 0; i < KINDS; i++) {
+        const size_t end = strlen(kinds[i].ending);
+        if (length > end && strcmp(path + length - end, kinds[i].ending) == 0)
+            return i;
+    }
+    return KINDS;
+}
+
+bool video_named(const char *path)
+{
+    return kind_of(path) < KINDS;
+}
+
+/** posix_spawnp() with a socket as standard input. A pipe would raise SIGPIPE in the whole program when ffmpeg ends early. */
+static gbt_status start(video *v, char *const *arguments, gbt_error *err)
+{
+    int ends[2];
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+        return base_fail(err, GBT_ERR_IO, "%s: no socket: %s", v->path, strerror(errno));
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, ends[1], STDIN_FILENO);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+    posix_spawn_file_actions_adddup2(&actions, fileno(v->complaints), STDERR_FILENO);
+    extern char **environ;
+    const int code = posix_spawnp(&v->process, "ffmpeg", &actions, NULL, arguments, environ);
+    posix_spawn_file_actions_destroy(&actions);
+    close(ends[1]);
+    v->pictures = ends[0];
+    if (code == 0)
+        return GBT_OK;
+    v->process = 0;
+    if (code == ENOENT)
+        return base_fail(err, GBT_ERR_IO,
+                         "%s: a film wants the program ffmpeg, which is not there (install it, or give a folder for pictures)", v->path);
+    return base_fail(err, GBT_ERR_IO, "%s: ffmpeg does not start: %s", v->path, strerror(code));
+}
+
+static gbt_status prepare(video *v, const char *path, int width, int height, double fps, gbt_error *err)
+{
+    const int kind = kind_of(path);
+    const char *slash = strrchr(path, '/');
+    const int folder = slash != NULL ? (int)(slash - path) + 1 : 0;
+    if (kind == KINDS)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: not the name of a film (wanted .mp4, .webm or .gif)", path);
+    if (strcmp(kinds[kind].ending, ".gif") != 0 && (width % 2 != 0 || height % 2 != 0))
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted even numbers: films keep colours for 2 x 2 pixels)", path,
+                         width, height);
+    /* ./: a name that begins with a dash is no option. */
+    if (snprintf(v->path, sizeof v->path, "%s", path) >= (int)sizeof v->path ||
+        snprintf(v->part, sizeof v->part, "%s%.*s.%s.tmp", folder == 0 ? "./" : "", folder, path, path + folder) >= (int)sizeof v->part)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
+    v->width = width, v->height = height;
+    v->row = mem_alloc((size_t)width * (size_t)height, 3, "film", err);
+    v->complaints = tmpfile();
+    if (v->row == NULL)
+        return GBT_ERR_NO_MEMORY;
+    if (v->complaints == NULL)
+        return base_fail(err, GBT_ERR_IO, "%s: no temporary file: %s", path, strerror(errno));
+    char size[32], rate[32];
+    snprintf(size, sizeof size, "%dx%d", width, height);
+    snprintf(rate, sizeof rate, "%.6g", fps);
+    const char *head[] = {"ffmpeg", "-hide_banner", "-nostdin", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s",
+                          size, "-r", rate, "-i", "pipe:0", "-an"};
+    char *arguments[ARGUMENTS_MAX];
+    size_t count = 0;
+    for (size_t i = 0; i < sizeof head / sizeof *head; i++)
+        arguments[count++] = (char *)head[i];
+    for (size_t i = 0; kinds[kind].options[i] != NULL; i++)
+        arguments[count++] = (char *)kinds[kind].options[i];
+    arguments[count++] = v->part, arguments[count] = NULL;
+    return start(v, arguments, err);
+}
+
+gbt_status video_open(const char *path, int width, int height, double fps, video **out, gbt_error *err)
+{
+    *out = NULL;
+    video *v = mem_calloc(1, sizeof *v, "film", err);
+    if (v == NULL)
+        return GBT_ERR_NO_MEMORY;
+    v->pictures = -1;
+    const gbt_status status = prepare(v, path, width, height, fps, err);
+    if (status != GBT_OK) {
+        gbt_error ignored = {0};
+        video_close(v, false, &ignored);
+        return status;
+    }
+    *out = v;
+    return GBT_OK;
+}
+
+/** Close the socket and wait; the exit code, or 128 and the signal. */
+static int finish(video *v)
+{
+    int state = 0;
+    if (v->pictures >= 0)
+        close(v->pictures);
+    v->pictures = -1;
+    if (v->process == 0)
+        return 0;
+    while (waitpid(v->process, &state, 0) < 0)
+        if (errno != EINTR)
+            break;
+    v->process = 0;
+    return WIFEXITED(state) ? WEXITSTATUS(state) : 128 + (WIFSIGNALED(state) ? WTERMSIG(state) : 0);
+}
+
+static gbt_status failed(video *v, int code, gbt_error *err)
+{
+    char line[200], last[200] = "it said nothing";
+    rewind(v->complaints);
+    while (fgets(line, sizeof line, v->complaints) != NULL) {
+        line[strcspn(line, "\r\n")] = '\0';
+        if (line[0] != '\0')
+            memcpy(last, line, sizeof last);
+    }
+    return base_fail(err, GBT_ERR_IO, "%s: ffmpeg failed (code %d): %s", v->path, code, last);
+}
+
+gbt_status video_add(video *v, const image *picture, gbt_error *err)
+{
+    if (picture->width != v->width || picture->height != v->height || picture->channels != 3)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a picture of %d x %d (wanted %d x %d)", v->path, picture->width, picture->height,
+                         v->width, v->height);
+    const size_t count = 3 * (size_t)v->width * (size_t)v->height;
+    for (size_t i = 0; i < count; i++) {
+        const float value = picture->pixels[i];
+        v->row[i] = value > 0.0f ? (unsigned char)(fminf(value, 1.0f) * 255.0f + 0.5f) : 0; /* NaN is 0 */
+    }
+    for (size_t done = 0; done < count;) {
+        const ssize_t put = send(v->pictures, v->row + done, count - done, MSG_NOSIGNAL);
+        if (put < 0 && errno == EINTR)
+            continue;
+        if (put <= 0)
+            return failed(v, finish(v), err);
+        done += (size_t)put;
+    }
+    return GBT_OK;
+}
+
+gbt_status video_close(video *v, bool keep, gbt_error *err)
+{
+    if (v == NULL)
+        return GBT_OK;
+    if (!keep && v->process != 0)
+        kill(v->process, SIGKILL);
+    const int code = finish(v);
+    gbt_status status = GBT_OK;
+    if (keep && code != 0)
+        status = failed(v, code, err);
+    else if (keep && rename(v->part, v->path) != 0)
+        status = base_fail(err, GBT_ERR_IO, "%s: cannot replace: %s", v->path, strerror(errno));
+    if (!keep || status != GBT_OK)
+        unlink(v->part);
+    if (v->complaints != NULL)
+        fclose(v->complaints);
+    mem_free(v->row);
+    mem_free(v);
+    return status;
+}

@@ -1,0 +1,16 @@
+/* report/facts.h -- the tables of a run's page: counts, speed, machine, settings, and how to make the run again. */
+#ifndef GBT_REPORT_FACTS_H
+#define GBT_REPORT_FACTS_H
+
+#include <jansson.h>
+
+#include "report/scores.h"
+#include "report/text.h"
+
+/** Add the section "Facts". `settings`: "key = value" lines; NULL: not known. */
+void report_facts(text *out, const evaluation *e, const json_t *metrics, const char *settings);
+
+/** Add the section "Make it again". */
+void report_again(text *out, const char *run, const json_t *metrics);
+
+#endif

@@ -1,0 +1,22 @@
+/* report/metrics.h -- what metrics.json says, whatever it holds. */
+#ifndef GBT_REPORT_METRICS_H
+#define GBT_REPORT_METRICS_H
+
+#include <jansson.h>
+#include <math.h>
+
+/** NaN when it is absent or not a number. */
+static inline double metrics_number(const json_t *object, const char *key)
+{
+    const json_t *value = json_object_get(object, key);
+    return json_is_number(value) ? json_number_value(value) : (double)NAN;
+}
+
+/** NULL when it is absent, empty or not a text. */
+static inline const char *metrics_text(const json_t *object, const char *key)
+{
+    const char *value = json_string_value(json_object_get(object, key));
+    return value != NULL && value[0] != '\0' ? value : NULL;
+}
+
+#endif

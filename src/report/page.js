@@ -1,0 +1,37 @@
+// report/page.js -- moves the sliders, sorts the views and the table. The page is whole without it.
+document.querySelectorAll(".compare input").forEach(function (slider) {
+  function move() { slider.parentNode.style.setProperty("--at", slider.value + "%"); }
+  slider.addEventListener("input", move);
+  move();
+});
+
+function sortChildren(parent, value, sign) {
+  Array.from(parent.children).sort(function (a, b) {
+    const x = value(a), y = value(b), both = !isNaN(x - y);
+    return sign * (both ? x - y : x < y ? -1 : x > y) || a.dataset.place - b.dataset.place;
+  }).forEach(function (child) { parent.appendChild(child); });
+}
+
+const order = document.getElementById("order");
+if (order) {
+  order.parentNode.hidden = false;
+  order.addEventListener("change", function () {
+    const choice = order.value.split(" ");
+    sortChildren(document.querySelector(".views"), function (view) { return Number(view.dataset[choice[0]]); }, choice[1] === "up" ? 1 : -1);
+  });
+}
+
+document.querySelectorAll("table.sortable th[data-sort]").forEach(function (head) {
+  head.tabIndex = 0;
+  function sort() {
+    const up = head.getAttribute("aria-sort") !== "ascending", column = head.cellIndex;
+    head.parentNode.querySelectorAll("th").forEach(function (other) { other.removeAttribute("aria-sort"); });
+    head.setAttribute("aria-sort", up ? "ascending" : "descending");
+    sortChildren(head.closest("table").tBodies[0], function (row) {
+      const cell = row.cells[column];
+      return head.dataset.sort === "text" ? cell.textContent : Number(cell.dataset.value);
+    }, up ? 1 : -1);
+  }
+  head.addEventListener("click", sort);
+  head.addEventListener("keydown", function (event) { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); sort(); } });
+});

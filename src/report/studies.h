@@ -1,0 +1,17 @@
+/* report/studies.h -- charts that studies left, as a section of the page. */
+#ifndef GBT_REPORT_STUDIES_H
+#define GBT_REPORT_STUDIES_H
+
+#include <stdbool.h>
+
+#include "report/text.h"
+
+/**
+ * Add every SVG file of RUN, of RUN/studies and of the given folders, or those given by name; nothing when there is none.
+ *
+ * They go in as pictures: whatever they hold, nothing in them runs or is loaded. Files that cannot be read, or are larger than a megabyte,
+ * are left out with a warning.
+ */
+void report_studies(text *out, const char *run, const char *const *studies, size_t count);
+
+#endif

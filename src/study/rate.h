@@ -1,0 +1,38 @@
+/* study/rate.h -- the measurements of the study "rate": what a small model file costs in picture, and how they are written down. */
+#ifndef GBT_STUDY_RATE_H
+#define GBT_STUDY_RATE_H
+
+#include "io/model_file.h"
+#include "report/text.h"
+
+enum { RATE_MODELS_MAX = 6, RATE_ROWS_MAX = 12 };
+
+/** One file that was made of a model. */
+typedef struct rate_row {
+    double quality; /* dB; 0: lossless */
+    model_sizes sizes;
+    double psnr, ssim; /* of the model that the file gives back, mean over the held-out views; NaN without them */
+    double encode_seconds, decode_seconds;
+} rate_row;
+
+typedef struct rate_model {
+    char name[256];
+    size_t anchors, plain_bytes, views;
+    double psnr, ssim; /* of the model as it was trained */
+    double probe_seconds;
+    rate_row rows[RATE_ROWS_MAX];
+    size_t row_count;
+} rate_model;
+
+typedef struct rate_study {
+    rate_model models[RATE_MODELS_MAX];
+    size_t model_count;
+} rate_study;
+
+/** rate.csv, .json, .md and .svg into `folder`. */
+gbt_status rate_write(const rate_study *study, const char *folder, gbt_error *err);
+
+/** The tables as Markdown. */
+void rate_table(const rate_study *study, text *out);
+
+#endif

@@ -1,0 +1,22 @@
+/* study/time_variants.c -- the runs that the study "time" compares: THE table to edit. */
+#include "study/time.h"
+
+/* One row per run: its name, what differs from the default settings (keys as `gbtrace train` writes them to RUN/config, one a line), and
+   how many budgets it gets. The first two rows have their places; any others may come and go. A new meaning needs a new name: the name is
+   the folder of the runs. */
+const time_variant time_variants[] = {
+    {"default", "", 1},
+    {"faithful protocol", "compat = 1", 5},
+    {"all pixels from the start", "start-level = 0", 1},
+    {"rays from the start", "splats-until = 0", 1},
+    {"first scales x 1", "scale-factor = 1", 1},
+    {"no growth", "grow = 0", 1},
+    {"K = 10", "offsets = 10", 1},
+    {"adaptive balls", "init = adaptive", 1},
+    {"adaptive balls, thrift 1.5", "init = adaptive\nthrift = 1.5", 1},
+    {"voxels", "init = voxel", 1},
+};
+
+const size_t time_variant_count = sizeof time_variants / sizeof *time_variants;
+
+_Static_assert(sizeof time_variants / sizeof *time_variants <= TIME_VARIANTS_MAX, "every variant has a place");

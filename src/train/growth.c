@@ -1,0 +1,120 @@
+/* train/growth.c -- what anchors are good for, gathered step by step; and the rounds in which they grow and are pruned by it. */
+#include "train/growth.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/log.h"
+#include "base/memory.h"
+#include "train/gradient_check.h"
+
+static const float share_min = 2.5e-6f; /* of short runs: schedule_thrift() */
+enum { ADJUSTS_PER_RUN = 100, COMPAT_INTERVAL = 100 /* steps */, INTERVAL_MIN = 20 /* a judgement of fewer views is chance */ };
+
+/* What an anchor is good for is what pictures would miss without it: the share of them that its Gaussians cover, the mean over rays of T
+   alpha. Opacity, which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of all anchors. */
+static void gather_use(trainer *t)
+{
+    const frame *f = &t->frame;
+    const float rays = (float)ray_image_count(&f->rays);
+    float *use = t->stats.use_accum;
+    for (size_t v = 0; v < f->visible_count; v++) {
+        t->stats.visit_count[f->visible[v]] += 1;
+        if (t->def.compat)
+            use[f->visible[v]] += f->tape.opacity_sum[v];
+    }
+    for (size_t i = 0; !t->def.compat && i < f->gaussians.count; i++)
+        use[f->visible[f->tape.slot[i] / (uint32_t)t->anchors.offset_count]] += f->seen[i] / rays;
+}
+
+/* The norm of dL/d(projected mean in NDC), from the ray-traced gradient of the mean in camera axes (g): (z tan_x g.x, z tan_y g.y).
+   Counted for every Gaussian whose box may touch the image, hit or not: counting hits alone would grow what is mostly hidden. */
+void growth_gather(trainer *t)
+{
+    const frame *f = &t->frame;
+    const int k_count = t->anchors.offset_count;
+    adjust_stats *s = &t->stats;
+    gather_use(t);
+    float r[9], c[3];
+    for (int i = 0; i < 9; i++)
+        r[i] = (float)f->camera.rotation[i];
+    for (int i = 0; i < 3; i++)
+        c[i] = (float)f->camera.center[i];
+    const float tan_x = (float)f->half_fov_tan[0], tan_y = (float)f->half_fov_tan[1];
+    const gaussians *g = &f->gaussians, *dg = &f->d_gaussians;
+    for (size_t i = 0; i < g->count; i++) {
+        const float x = g->mean_x[i] - c[0], y = g->mean_y[i] - c[1], z = g->mean_z[i] - c[2];
+        const float cam_z = r[6] * x + r[7] * y + r[8] * z;
+        if (!(cam_z > t->settings.t_near))
+            continue;
+        const float cam_x = r[0] * x + r[1] * y + r[2] * z, cam_y = r[3] * x + r[4] * y + r[5] * z;
+        const float reach = 3 * fmaxf(g->scale_x[i], fmaxf(g->scale_y[i], g->scale_z[i]));
+        if (fabsf(cam_x) > tan_x * cam_z + reach || fabsf(cam_y) > tan_y * cam_z + reach)
+            continue;
+        const float gx = r[0] * dg->mean_x[i] + r[1] * dg->mean_y[i] + r[2] * dg->mean_z[i];
+        const float gy = r[3] * dg->mean_x[i] + r[4] * dg->mean_y[i] + r[5] * dg->mean_z[i];
+        const float sx = cam_z * tan_x * gx, sy = cam_z * tan_y * gy;
+        const uint32_t slot = f->tape.slot[i];
+        const size_t at = (size_t)f->visible[slot / (uint32_t)k_count] * (size_t)k_count + slot % (uint32_t)k_count;
+        s->grad_accum[at] += fminf(sqrtf(sx * sx + sy * sy), GRADIENT_LIMIT);
+        s->grad_count[at] += 1;
+    }
+}
+
+bool growth_is_due(const trainer *t, double progress, double next)
+{
+    if (!t->def.grow || progress < SCHEDULE_ADJUST_FROM || progress >= t->def.grow_until)
+        return false;
+    if (t->def.compat)
+        return (t->step + 1) % COMPAT_INTERVAL == 0;
+    return floor(progress * ADJUSTS_PER_RUN) != floor(next * ADJUSTS_PER_RUN);
+}
+
+/* Rows of `a` in the order of `source`; -1 gives zeros (new anchors have no momentum yet). */
+static gbt_status follow_rows(anchors *a, const adjust_result *result, gbt_error *err)
+{
+    anchors old = *a;
+    *a = (anchors){.offset_count = old.offset_count};
+    const gbt_status status = anchors_resize(a, result->count, err);
+    const size_t offset_floats = 3 * (size_t)old.offset_count;
+    for (size_t i = 0; status == GBT_OK && i < result->count; i++) {
+        if (result->source[i] < 0)
+            continue;
+        const size_t from = (size_t)result->source[i];
+        memcpy(a->feature + i * ANCHOR_FEATURE_DIM, old.feature + from * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof(float));
+        memcpy(a->offset + i * offset_floats, old.offset + from * offset_floats, offset_floats * sizeof(float));
+        memcpy(a->scale_log + i * 6, old.scale_log + from * 6, 6 * sizeof(float));
+    }
+    anchors_free(&old);
+    return status;
+}
+
+gbt_status growth_adjust(trainer *t, gbt_error *err)
+{
+    const uint64_t steps_since = t->def.compat ? COMPAT_INTERVAL : t->step + 1 - t->adjust_step;
+    adjust_def def = adjust_def_default();
+    def.voxel_size = t->voxel_size;
+    def.interval = (float)steps_since;
+    if (t->def.compat)
+        def.shape_log_max = 0.05f;
+    else {
+        const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
+        def.interval = fmaxf(def.interval, (float)INTERVAL_MIN);
+        def.grad_threshold *= thrift;
+        def.min_use = thrift * share_min;
+    }
+    def.max_anchors = t->def.max_anchors;
+    def.compat = t->def.compat;
+    def.seed = t->def.seed;
+    def.step = t->step;
+    adjust_result result = {0};
+    gbt_status status = anchors_adjust(&t->anchors, &t->stats, &def, &result, err);
+    anchors *followers[] = {&t->gradient, &t->moment1, &t->moment2};
+    for (int i = 0; i < 3 && status == GBT_OK; i++)
+        status = follow_rows(followers[i], &result, err);
+    mem_free(result.source);
+    if (result.kept_last)
+        log_warn("step %llu: every anchor had become transparent; the most opaque one stays", (unsigned long long)t->step);
+    t->adjust_step = t->step + 1;
+    return status;
+}

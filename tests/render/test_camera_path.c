@@ -1,0 +1,560 @@
+/* tests/render/test_camera_path.c -- films: ways around and through cameras, path files, and pictures to ffmpeg and back. */
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/camera_pose.h"
+#include "base/file.h"
+#include "base/memory.h"
+#include "base/near.h"
+#include "base/vec.h"
+#include "render/camera_path.h"
+#include "render/camera_path_file.h"
+#include "render/video.h"
+
+#define PI 3.14159265358979323846
+static char folder[] = "/tmp/gbt_path_XXXXXX", file_path[64], beside_path[96];
+static const double none[3] = {0, 0, 0};
+
+static int make_folder(void **state)
+{
+    (void)state;
+    if (mkdtemp(folder) == NULL)
+        return -1;
+    snprintf(file_path, sizeof file_path, "%s/path.json", folder);
+    snprintf(beside_path, sizeof beside_path, "%s/dataparser_transforms.json", folder);
+    return 0;
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    unlink(file_path);
+    unlink(beside_path);
+    return rmdir(folder);
+}
+
+/* ---- cameras ------------------------------------------------------------------------------------------------------------------------- */
+
+static gbt_camera looking(double x, double y, double z, const double target[3])
+{
+    const double up[3] = {0, -1, 0}, at[3] = {x, y, z};
+    gbt_camera c = {.model = GBT_CAMERA_PINHOLE, .width = 80, .height = 60, .params = {60, 60, 40, 30}};
+    assert_true(gbt_camera_look_at(at, target, up, &c));
+    return c;
+}
+
+/** On a circle of radius 4, 1.5 above (y is down) the target, from one angle to another in degrees. */
+static void ring(gbt_camera *out, size_t count, double from, double to, const double target[3])
+{
+    for (size_t i = 0; i < count; i++) {
+        const double angle = (from + (to - from) * (double)i / (double)(count > 1 ? count - 1 : 1)) * PI / 180;
+        out[i] = looking(target[0] + 4 * cos(angle), target[1] - 1.5, target[2] + 4 * sin(angle), target);
+    }
+}
+
+static double angle_between(const gbt_camera *a, const gbt_camera *b)
+{
+    double trace = 0;
+    for (int k = 0; k < 9; k++)
+        trace += a->rotation[k] * b->rotation[k];
+    return acos(fmin(fmax((trace - 1) / 2, -1), 1));
+}
+
+static double distance_between(const gbt_camera *a, const gbt_camera *b)
+{
+    const double way[3] = {b->center[0] - a->center[0], b->center[1] - a->center[1], b->center[2] - a->center[2]};
+    return dvec_length(way);
+}
+
+static void assert_rotation(const gbt_camera *c)
+{
+    double cross[3];
+    dvec_cross(c->rotation, c->rotation + 3, cross);
+    for (int k = 0; k < 3; k++) {
+        assert_near(dvec_length(c->rotation + 3 * k), 1, 1e-12);
+        assert_near(cross[k], c->rotation[6 + k], 1e-12);
+    }
+}
+
+static camera_group group_of(const gbt_camera *cameras, size_t count)
+{
+    camera_group g;
+    assert_ok(camera_group_make(cameras, count, NULL, 0, &g, &assert_ok_err_));
+    return g;
+}
+
+static void what_cameras_look_at(void **state)
+{
+    (void)state;
+    const double target[3] = {10, -3, 5};
+    gbt_camera cameras[12];
+    ring(cameras, 12, 0, 330, target);
+    camera_group g = group_of(cameras, 12);
+    for (int k = 0; k < 3; k++) {
+        assert_near(g.focus[k], target[k], 1e-9);
+        assert_near(g.up[k], k == 1 ? -1 : 0, 1e-9);
+    }
+    assert_near(g.distance, sqrt(16 + 2.25), 1e-9);
+    assert_near(g.lens.params[0], 60, 1e-9);
+    const gbt_camera wide = camera_group_lens(&g, 320, 120), tall = camera_group_lens(&g, 30, 400);
+    assert_near(wide.params[0], 120, 1e-9); /* the shorter side sees as much */
+    assert_near(tall.params[1], 30, 1e-9);
+    assert_near(tall.params[3], 200, 0);
+}
+
+/** All look along z: the axes never meet, the points say how deep. */
+static void parallel_cameras(void **state)
+{
+    (void)state;
+    gbt_camera cameras[5];
+    for (int i = 0; i < 5; i++) {
+        const double target[3] = {i, 0, 1};
+        cameras[i] = looking(i, 0, 0, target);
+    }
+    const float points[12] = {0, 0, 3, 1, 0, 7, 2, 0, 8, 0, 0, -50};
+    camera_group g;
+    assert_ok(camera_group_make(cameras, 5, points, 4, &g, &assert_ok_err_));
+    assert_near(g.focus[0], 2, 1e-9);
+    assert_near(g.focus[2], 7, 1e-6);
+    assert_ok(camera_group_make(cameras, 5, NULL, 0, &g, &assert_ok_err_)); /* nothing to go by: the local origin */
+    assert_near(g.focus[2], 0, 0);
+    assert_true(g.distance > 0);
+}
+
+/* ---- around -------------------------------------------------------------------------------------------------------------------------- */
+
+static void closed_orbit(void **state)
+{
+    (void)state;
+    const double target[3] = {1, 2, 3};
+    gbt_camera cameras[12];
+    ring(cameras, 12, 0, 330, target);
+    const camera_group g = group_of(cameras, 12);
+    camera_path path;
+    assert_ok(camera_path_orbit(cameras, 12, &g, &g.lens, 90, &path, &assert_ok_err_));
+    assert_int_equal(path.count, 90);
+    assert_near(distance_between(&path.shots[0].camera, &cameras[0]), 0, 1e-9);
+    const double step = 2 * (4 * sin(PI / 90));
+    for (size_t i = 0; i < 90; i++) {
+        const gbt_camera *c = &path.shots[i].camera;
+        assert_rotation(c);
+        assert_near(distance_between(c, &path.shots[(i + 1) % 90].camera), step, 1e-9); /* the last goes on to the first */
+        const double way[3] = {target[0] - c->center[0], target[1] - c->center[1], target[2] - c->center[2]};
+        assert_near(dvec_dot(way, c->rotation + 6), dvec_length(way), 1e-9);
+        assert_true(c->rotation[4] > 0); /* down stays down */
+    }
+    camera_path_free(&path);
+}
+
+/** Half a circle of cameras: the way stays on it, and comes back. */
+static void orbit_of_an_arc(void **state)
+{
+    (void)state;
+    gbt_camera cameras[19];
+    ring(cameras, 19, 30, 210, none);
+    const camera_group g = group_of(cameras, 19);
+    camera_path path;
+    assert_ok(camera_path_orbit(cameras, 19, &g, &g.lens, 100, &path, &assert_ok_err_));
+    double least = 1e9, most = -1e9;
+    for (size_t i = 0; i < 100; i++) {
+        const gbt_camera *c = &path.shots[i].camera;
+        double angle = atan2(c->center[2], c->center[0]) * 180 / PI;
+        if (angle < -90)
+            angle += 360;
+        least = fmin(least, angle), most = fmax(most, angle);
+        assert_near(distance_between(c, &path.shots[(100 - i) % 100].camera), 0, 1e-9); /* back as it came */
+    }
+    assert_near(least, 30, 1e-6);
+    assert_near(most, 210, 1e-6);
+    camera_path_free(&path);
+    const camera_group alone = group_of(cameras, 1); /* one camera: it looks at the origin, and sways */
+    assert_ok(camera_path_orbit(cameras, 1, &alone, &alone.lens, 7, &path, &assert_ok_err_));
+    for (size_t i = 0; i < 7; i++)
+        assert_rotation(&path.shots[i].camera);
+    camera_path_free(&path);
+}
+
+/** A ring that rises: the way follows it. */
+static void orbit_follows_the_cameras(void **state)
+{
+    (void)state;
+    gbt_camera cameras[72];
+    for (int i = 0; i < 72; i++) {
+        const double angle = i * PI / 36;
+        cameras[i] = looking(4 * cos(angle), -2 - cos(angle), 4 * sin(angle), none);
+    }
+    const camera_group g = {.up = {0, -1, 0}, .focus = {0, 0, 0}, .distance = 4, .lens = cameras[0]};
+    camera_path path;
+    assert_ok(camera_path_orbit(cameras, 72, &g, &g.lens, 36, &path, &assert_ok_err_));
+    for (int i = 0; i < 36; i++) {
+        const double *c = path.shots[i].camera.center;
+        assert_near(hypot(c[0], c[2]), 4, 1e-9);
+        assert_near(c[1], -2 - cos(atan2(c[2], c[0])), 0.1); /* smoothed over 20 degrees */
+    }
+    assert_true(path.shots[0].camera.center[1] < -2.9 && path.shots[18].camera.center[1] > -1.1);
+    camera_path_free(&path);
+}
+
+/* ---- through ------------------------------------------------------------------------------------------------------------------------- */
+
+enum { KEYS = 9, FRAMES = 2001 };
+
+static void through_all_keys(void **state)
+{
+    (void)state;
+    const double target[3] = {0, 0, 20};
+    gbt_camera keys[KEYS];
+    for (int i = 0; i < KEYS; i++) {
+        keys[i] = looking(3 * i + (i % 3), (i * 5) % 4, (i * i) % 7, target); /* uneven steps */
+        keys[i].params[0] = keys[i].params[1] = 60 + i;
+    }
+    const double turn_length = 5;
+    camera_path path;
+    assert_ok(camera_path_through(keys, KEYS, turn_length, FRAMES, &path, &assert_ok_err_));
+    double step[FRAMES], mean = 0;
+    for (int i = 0; i + 1 < FRAMES; i++) {
+        const gbt_camera *a = &path.shots[i].camera, *b = &path.shots[i + 1].camera;
+        assert_rotation(a);
+        step[i] = hypot(distance_between(a, b), turn_length * angle_between(a, b));
+        mean += step[i] / (FRAMES - 1);
+        if (i > 0) { /* no corners: the way turns little from step to step */
+            const gbt_camera *before = &path.shots[i - 1].camera;
+            const double came[3] = {a->center[0] - before->center[0], a->center[1] - before->center[1], a->center[2] - before->center[2]};
+            const double goes[3] = {b->center[0] - a->center[0], b->center[1] - a->center[1], b->center[2] - a->center[2]};
+            assert_true(dvec_dot(came, goes) > 0.98 * dvec_length(came) * dvec_length(goes));
+        }
+    }
+    for (int i = 0; i + 1 < FRAMES; i++)
+        assert_near(step[i], mean, 0.02 * mean);
+    assert_near(distance_between(&path.shots[0].camera, &keys[0]), 0, 1e-9);
+    assert_near(distance_between(&path.shots[FRAMES - 1].camera, &keys[KEYS - 1]), 0, 1e-6);
+    for (int k = 0; k < KEYS; k++) {
+        size_t nearest = 0;
+        for (size_t i = 1; i < FRAMES; i++)
+            if (distance_between(&path.shots[i].camera, &keys[k]) < distance_between(&path.shots[nearest].camera, &keys[k]))
+                nearest = i;
+        const gbt_camera *c = &path.shots[nearest].camera;
+        assert_true(hypot(distance_between(c, &keys[k]), turn_length * angle_between(c, &keys[k])) < 0.6 * mean + 1e-9);
+        assert_near(c->params[0], keys[k].params[0], 0.05);
+    }
+    camera_path_free(&path);
+}
+
+/** Two ways of writing the same turn, a turn on the spot, keys that repeat. */
+static void turning_on_the_spot(void **state)
+{
+    (void)state;
+    gbt_camera keys[8];
+    for (int i = 0; i < 8; i++) {
+        /* each twice; quaternions change their signs on the way */
+        const double angle = (i / 2) * 170 * PI / 180, target[3] = {sin(angle), 0, cos(angle)};
+        keys[i] = looking(0, 0, 0, target);
+    }
+    camera_path path;
+    assert_ok(camera_path_through(keys, 8, 1, 103, &path, &assert_ok_err_));
+    double whole = 0;
+    for (int i = 0; i + 1 < 103; i++) {
+        const double turn = angle_between(&path.shots[i].camera, &path.shots[i + 1].camera);
+        assert_near(turn, 3 * 170 * PI / 180 / 102, 0.25 * turn);
+        whole += turn;
+    }
+    assert_true(whole < 1.05 * 3 * 170 * PI / 180); /* the short way round, each time */
+    camera_path_free(&path);
+    assert_ok(camera_path_through(keys, 2, 1, 3, &path, &assert_ok_err_)); /* one and the same */
+    assert_memory_equal(path.shots[2].camera.center, keys[0].center, sizeof keys[0].center);
+    camera_path_free(&path);
+    assert_ok(camera_path_through(keys, 8, 1, 1, &path, &assert_ok_err_));
+    assert_near(angle_between(&path.shots[0].camera, &keys[0]), 0, 1e-7);
+    camera_path_free(&path);
+}
+
+static void order_to_go_through(void **state)
+{
+    (void)state;
+    static const int mixed[10] = {0, 7, 3, 9, 1, 5, 8, 2, 6, 4}; /* photos whose names say nothing */
+    gbt_camera keys[10], known[10];
+    ring(known, 10, 0, 90, none);
+    for (int i = 0; i < 10; i++)
+        keys[i] = known[mixed[i]];
+    assert_ok(camera_path_order(keys, 10, 1, &assert_ok_err_));
+    for (int i = 0; i < 10; i++)
+        assert_near(distance_between(&keys[i], &known[i]), 0, 0);
+    const gbt_camera swap = keys[4]; /* nearly in order: names win, though the nearest would be a little shorter */
+    keys[4] = keys[5], keys[5] = swap;
+    assert_ok(camera_path_order(keys, 10, 1, &assert_ok_err_));
+    assert_near(distance_between(&keys[4], &known[5]), 0, 0);
+}
+
+/* ---- files --------------------------------------------------------------------------------------------------------------------------- */
+
+static void write_text(const char *path, const char *text)
+{
+    assert_ok(file_write_atomic(path, text, strlen(text), &assert_ok_err_));
+}
+
+static camera_path read_good(const char *text, const double origin[3], size_t frames)
+{
+    camera_path path;
+    gbt_error err = {0};
+    write_text(file_path, text);
+    if (camera_path_file_read(file_path, origin, frames, &path, &err) != GBT_OK)
+        fail_msg("%s: %s", text, err.text);
+    return path;
+}
+
+#define COMMON "\"width\": 64, \"height\": 32, \"up\": [0, -1, 0], \"fov_x_deg\": 90"
+#define TWO "[{\"origin\": [0, 0, 0], \"target\": [0, 0, 5]}, {\"origin\": [4, 0, 0], \"target\": [4, 0, 5], \"fov_x_deg\": 60}]"
+
+static void our_file(void **state)
+{
+    (void)state;
+    const double shift[3] = {1, 2, 3};
+    camera_path p = read_good("{\"schema\": 1, \"fps\": 24, " COMMON ", \"cameras\": " TWO "}", shift, 0);
+    assert_int_equal(p.count, 2);
+    assert_near(p.fps, 24, 0);
+    assert_near(p.shots[1].camera.center[0], 3, 1e-12);
+    assert_near(p.shots[1].camera.center[2], -3, 1e-12);
+    assert_near(p.shots[0].camera.params[0], 32, 1e-12);
+    assert_near(p.shots[1].camera.params[0], 32 / tan(PI / 6), 1e-12); /* its own field of view over the common one */
+    camera_path_free(&p);
+    p = read_good("{\"frames\": 5, " COMMON ", \"cameras\": " TWO "}", none, 0);
+    assert_int_equal(p.count, 5);
+    for (int i = 0; i < 5; i++)
+        assert_near(p.shots[i].camera.center[0], i, 1e-6);
+    assert_near(p.shots[2].camera.params[0], (32 + 32 / tan(PI / 6)) / 2, 1e-6);
+    camera_path_free(&p);
+    p = read_good("{\"frames\": 5, " COMMON ", \"cameras\": " TWO "}", none, 3); /* the caller wins */
+    assert_int_equal(p.count, 3);
+    assert_near(p.fps, 0, 0);
+    camera_path_free(&p);
+    p = read_good("{" COMMON ", \"aperture\": 0.5, \"focus\": 3, \"cameras\": " TWO "}", none, 0); /* all that a camera file can do */
+    assert_near(p.shots[1].aperture_radius, 0.5, 0);
+    camera_path_free(&p);
+}
+
+#define NERF "\"render_width\": 80, \"render_height\": 60, \"fps\": 12, \"seconds\": 1"
+#define AT_123 "\"camera_to_world\": [1, 0, 0, 1,  0, 1, 0, 2,  0, 0, 1, 3,  0, 0, 0, 1]"
+
+static void nerfstudio_file(void **state)
+{
+    (void)state;
+    camera_path p = read_good("{\"keyframes\": [], \"camera_type\": \"perspective\", " NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90, "
+                              "\"aspect\": 1}]}", none, 0);
+    const gbt_camera *c = &p.shots[0].camera;
+    const double axes[9] = {1, 0, 0, 0, -1, 0, 0, 0, -1}; /* OpenGL's y up, z back: right x, down -y, forward -z */
+    for (int k = 0; k < 9; k++)
+        assert_near(c->rotation[k], axes[k], 1e-12);
+    assert_near(c->center[2], 3, 1e-12);
+    assert_near(c->params[0], 30, 1e-9); /* the field of view is vertical */
+    assert_int_equal(c->model, GBT_CAMERA_PINHOLE);
+    assert_near(p.fps, 12, 0);
+    camera_path_free(&p);
+    p = read_good("{\"camera_type\": \"fisheye\", " NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90}]}", none, 0);
+    assert_int_equal(p.shots[0].camera.model, GBT_CAMERA_FISHEYE);
+    assert_near(p.shots[0].camera.params[0], 30, 1e-9);
+    camera_path_free(&p);
+    p = read_good("{\"camera_type\": \"equirectangular\", \"render_width\": 80, \"render_height\": 40, \"seconds\": 2, \"camera_path\": "
+                  "[{" AT_123 "}, {" AT_123 "}]}", none, 0);
+    assert_int_equal(p.shots[1].camera.model, GBT_CAMERA_EQUIRECTANGULAR);
+    assert_near(p.fps, 1, 1e-12);
+    camera_path_free(&p);
+}
+
+/** The trainer's world is p' = 2 (R p + t), R a quarter turn about z, t = (1, 0, 0): (1, 2, 3) there is (1, 0.5, 1.5) here. */
+static void nerfstudio_world(void **state)
+{
+    (void)state;
+#define WORLD "\"transform\": [[0, -1, 0, 1], [1, 0, 0, 0], [0, 0, 1, 0]], \"scale\": 2"
+    const char *const path = "{" NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90}]}";
+    for (int beside = 0; beside < 2; beside++) {
+        if (beside)
+            write_text(beside_path, "{" WORLD "}");
+        camera_path p = read_good(beside ? path : "{" WORLD ", " NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90}]}", none, 0);
+        const gbt_camera *c = &p.shots[0].camera;
+        const double center[3] = {1, 0.5, 1.5}, right[3] = {0, -1, 0}, forward[3] = {0, 0, -1};
+        for (int k = 0; k < 3; k++) {
+            assert_near(c->center[k], center[k], 1e-12);
+            assert_near(c->rotation[k], right[k], 1e-12);
+            assert_near(c->rotation[6 + k], forward[k], 1e-12);
+        }
+        camera_path_free(&p);
+    }
+    unlink(beside_path);
+}
+
+static const struct bad_case { const char *text, *message; } bad_cases[] = {
+    {"", ":1: not JSON: "},
+    {"{}", ": not a camera path (wanted \"cameras\", or nerfstudio's \"camera_path\")"},
+    {"{\"cameras\": []}", ": cameras: wanted a list of 1 to 100000 cameras"},
+    {"{\"cameras\": {}}", ": cameras: wanted a list of 1 to 100000 cameras"},
+    {"{\"cameras\": [1]}", ": cameras[0]: wanted an object"},
+    {"{\"fps\": 0, " COMMON ", \"cameras\": " TWO "}", ": fps: wanted a number in (0, 1000]"},
+    {"{\"frames\": 0, " COMMON ", \"cameras\": " TWO "}", ": frames: wanted a whole number in [1, 100000]"},
+    {"{\"frames\": 2.5, " COMMON ", \"cameras\": " TWO "}", ": frames: wanted a whole number in [1, 100000]"},
+    {"{" COMMON ", \"cameras\": [{\"origin\": [0, 0, 0]}]}", ": cameras[0].target: missing (wanted 3 numbers)"},
+    {"{" COMMON ", \"fov\": 3, \"cameras\": " TWO "}", ": cameras[0].fov: unknown field"},
+    {"{" COMMON ", \"cameras\": [{\"rays\": \"x.exr\"}]}", ": cameras[0].rays: not in a path (wanted a camera)"},
+    {"{\"width\": 64, \"up\": [0, 1, 0], \"fov_x_deg\": 90, \"cameras\": [{\"origin\": [0, 0, 0], \"target\": [0, 0, 1], \"height\": 32},"
+     " {\"origin\": [0, 0, 0], \"target\": [0, 0, 1], \"height\": 16}]}", ": cameras[1]: 64 x 16 pixels (wanted 64 x 32, as the first)"},
+    {"{\"frames\": 9, " COMMON ", \"cameras\": [{\"origin\": [0, 0, 0], \"target\": [0, 0, 1]}, {\"origin\": [0, 0, 0], \"target\": [0, 0, "
+                               "1], \"model\": \"fisheye\"}]}",
+     ": cameras[1].model: not that of the first (wanted one lens on a way with \"frames\")"},
+    {"{\"frames\": 9, \"aperture\": 1, \"focus\": 2, " COMMON ", \"cameras\": " TWO "}",
+     ": cameras[0]: an aperture or a shutter (wanted none"},
+    {"{\"camera_path\": []}", ": camera_path: wanted a list of 1 to 100000 cameras"},
+    {"{\"camera_path\": [{}]}", ": render_width: missing (pixels)"},
+    {"{\"render_width\": 8, \"camera_path\": [{}]}", ": render_height: missing (pixels)"},
+    {"{\"render_width\": 0, \"render_height\": 8, \"camera_path\": [{}]}", ": render_width: wanted a whole number in [1, 65500]"},
+    {"{\"camera_type\": \"vr180\", " NERF ", \"camera_path\": [{}]}", ": camera_type: wanted one of perspective, fisheye, equirectangular"},
+    {"{" NERF ", \"camera_path\": [3]}", ": camera_path[0]: wanted an object"},
+    {"{" NERF ", \"camera_path\": [{}]}", ": camera_path[0].fov: missing (degrees from the top"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 180}]}", ": camera_path[0].fov: wanted a number in (0, 179.9]"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50}]}", ": camera_path[0].camera_to_world: wanted 12 or 16 numbers, row after row"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [1, 2, 3]}]}",
+     ": camera_path[0].camera_to_world: wanted 12 or 16 numbers, row after row"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [1,0,0,0,0,1,0,0,0,0,1,\"0\"]}]}",
+     ": camera_path[0].camera_to_world: wanted 12 or 16 numbers"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [[1,0,0,0],[0,1,0,0],5]}]}",
+     ": camera_path[0].camera_to_world: wanted 12 or 16 numbers"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [2,0,0,0,0,1,0,0,0,0,1,0]}]}",
+     ": camera_path[0].camera_to_world: not a rotation"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [-1,0,0,0,0,1,0,0,0,0,1,0]}]}",
+     ": camera_path[0].camera_to_world: not a rotation"},
+    {"{\"transform\": [], " NERF ", \"camera_path\": [{}]}", ": transform: wanted 12 or 16 numbers, row after row"},
+    {"{\"scale\": 0, \"transform\": [], " NERF ", \"camera_path\": [{}]}", ": scale: wanted a number in (0, 1e+15]"},
+};
+
+static void says_what_is_wrong(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof bad_cases / sizeof *bad_cases; i++) {
+        camera_path p;
+        gbt_error err = {0};
+        write_text(file_path, bad_cases[i].text);
+        const gbt_status status = camera_path_file_read(file_path, none, 0, &p, &err);
+        const size_t length = strlen(file_path);
+        if (status != GBT_ERR_FORMAT || strncmp(err.text, file_path, length) != 0 ||
+            strncmp(err.text + length, bad_cases[i].message, strlen(bad_cases[i].message)) != 0)
+            fail_msg("%s: %d: %s", bad_cases[i].text, (int)status, err.text);
+        camera_path_free(&p);
+    }
+    camera_path p;
+    gbt_error err = {0};
+    assert_int_equal(camera_path_file_read("/nowhere/p.json", none, 0, &p, &err), GBT_ERR_IO);
+    camera_path_free(&p);
+}
+
+/* ---- films --------------------------------------------------------------------------------------------------------------------------- */
+
+static void no_film_left(const char *path)
+{
+    char part[128];
+    assert_false(file_exists(path));
+    snprintf(part, sizeof part, "%s/.%s.tmp", folder, path + strlen(folder) + 1);
+    assert_false(file_exists(part));
+}
+
+static void film_without_ffmpeg(void **state)
+{
+    (void)state;
+    char path[96], search[4096];
+    video *v;
+    gbt_error err = {0};
+    snprintf(path, sizeof path, "%s/clip.mp4", folder);
+    snprintf(search, sizeof search, "%s", getenv("PATH") != NULL ? getenv("PATH") : "");
+    setenv("PATH", "/nowhere", 1);
+    const gbt_status status = video_open(path, 16, 16, 30, &v, &err);
+    setenv("PATH", search, 1);
+    assert_int_equal(status, GBT_ERR_IO);
+    assert_null(v);
+    assert_non_null(strstr(err.text, "a film wants the program ffmpeg, which is not there"));
+    no_film_left(path);
+    memset(&err, 0, sizeof err);
+    assert_int_equal(video_open(path, 15, 16, 30, &v, &err), GBT_ERR_ARGUMENT);
+    assert_non_null(strstr(err.text, "15 x 16 pixels (wanted even numbers"));
+    assert_true(video_named("a.webm") && video_named("b/a.gif") && !video_named(".mp4") && !video_named("mp4") && !video_named("a.mp4/"));
+}
+
+/** A program of that name which reads nothing, says something and fails. */
+static void film_that_fails(void **state)
+{
+    (void)state;
+    char path[96], program[96], search[4096];
+    video *v;
+    gbt_error err = {0};
+    image picture;
+    snprintf(path, sizeof path, "%s/clip.mp4", folder);
+    snprintf(program, sizeof program, "%s/ffmpeg", folder);
+    write_text(program, "#!/bin/sh\necho first >&2\necho no such encoder >&2\nexit 7\n");
+    assert_int_equal(chmod(program, 0755), 0);
+    snprintf(search, sizeof search, "%s", getenv("PATH") != NULL ? getenv("PATH") : "");
+    setenv("PATH", folder, 1);
+    const gbt_status opened = video_open(path, 256, 256, 30, &v, &err);
+    setenv("PATH", search, 1);
+    assert_int_equal(opened, GBT_OK);
+    assert_ok(image_alloc(&picture, 256, 256, 3, &assert_ok_err_));
+    memset(picture.pixels, 0, 256 * 256 * 3 * sizeof *picture.pixels);
+    gbt_status status = GBT_OK;
+    for (int i = 0; i < 100 && status == GBT_OK; i++) /* more than a socket holds */
+        status = video_add(v, &picture, &err);
+    assert_int_equal(status, GBT_ERR_IO);
+    assert_non_null(strstr(err.text, "clip.mp4: ffmpeg failed (code 7): no such encoder"));
+    gbt_error ignored = {0};
+    assert_int_equal(video_close(v, false, &ignored), GBT_OK);
+    no_film_left(path);
+    image_free(&picture);
+    unlink(program);
+}
+
+/** Grey that grows from frame to frame, and back from the file. */
+static void film_and_back(void **state)
+{
+    const char *const ending = *state;
+    enum { SIDE = 32, COUNT = 6 };
+    if (system("ffmpeg -version >/dev/null 2>&1") != 0) {
+        print_message("ffmpeg is not there: skipped\n");
+        skip();
+    }
+    char path[96], raw[96], command[512];
+    video *v;
+    image picture;
+    snprintf(path, sizeof path, "%s/clip.%s", folder, ending);
+    snprintf(raw, sizeof raw, "%s/frames.rgb", folder);
+    assert_ok(video_open(path, SIDE, SIDE, 10, &v, &assert_ok_err_));
+    assert_ok(image_alloc(&picture, SIDE, SIDE, 3, &assert_ok_err_));
+    for (int frame = 0; frame < COUNT; frame++) {
+        for (int i = 0; i < 3 * SIDE * SIDE; i++)
+            picture.pixels[i] = 0.1f + 0.15f * (float)frame;
+        assert_ok(video_add(v, &picture, &assert_ok_err_));
+    }
+    assert_false(file_exists(path)); /* not before it is whole */
+    assert_ok(video_close(v, true, &assert_ok_err_));
+    snprintf(command, sizeof command, "ffmpeg -nostdin -loglevel error -y -i %s -f rawvideo -pix_fmt rgb24 %s", path, raw);
+    assert_int_equal(system(command), 0);
+    unsigned char *bytes;
+    size_t count;
+    assert_ok(file_read(raw, &bytes, &count, &assert_ok_err_));
+    assert_int_equal(count, COUNT * 3 * SIDE * SIDE);
+    for (int frame = 0; frame < COUNT; frame++)
+        assert_near(bytes[(frame * SIDE + SIDE / 2) * SIDE * 3 + SIDE / 2 * 3], 255 * (0.1 + 0.15 * frame), 6);
+    mem_free(bytes);
+    image_free(&picture);
+    unlink(path);
+    unlink(raw);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_cameras_look_at), cmocka_unit_test(parallel_cameras), cmocka_unit_test(closed_orbit),
+            cmocka_unit_test(orbit_of_an_arc), cmocka_unit_test(orbit_follows_the_cameras),
+        cmocka_unit_test(through_all_keys), cmocka_unit_test(turning_on_the_spot), cmocka_unit_test(order_to_go_through),
+        cmocka_unit_test(our_file), cmocka_unit_test(nerfstudio_file), cmocka_unit_test(nerfstudio_world),
+        cmocka_unit_test(says_what_is_wrong), cmocka_unit_test(film_without_ffmpeg), cmocka_unit_test(film_that_fails),
+        {.name = "film and back: mp4", .test_func = film_and_back, .initial_state = "mp4"},
+        {.name = "film and back: webm", .test_func = film_and_back, .initial_state = "webm"},
+        {.name = "film and back: gif", .test_func = film_and_back, .initial_state = "gif"},
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

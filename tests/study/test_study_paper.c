@@ -1,0 +1,553 @@
+/* tests/study/test_study_paper.c -- the studies that train: statistics, the paper's numbers, runs made once, figures that are those of the
+   runs. */
+#include "train/run_support.h"
+
+#include "base/near.h"
+#include "data/json_fields.h"
+#include "eval/lpips_network.h"
+#include "study/paper.h"
+#include "study/anchors.h"
+#include "study/time.h"
+#include "gbtrace/export.h"
+
+/* ---- numbers ------------------------------------------------------------------------------------------------------------------ */
+
+static void mean_and_spread(void **state)
+{
+    (void)state;
+    const stat_sample s = stat_of((const double[]){1, NAN, 2, 6}, 4), one = stat_of((const double[]){5}, 1),
+        none = stat_of((const double[]){NAN}, 1);
+    assert_int_equal(s.count, 3);
+    assert_near(s.mean, 3, 1e-15);
+    assert_near(s.deviation, sqrt(7), 1e-15); /* (4 + 1 + 9) / 2 */
+    assert_near(stat_half_width(&s), 4.303 * sqrt(7 / 3.0), 1e-12);
+    assert_true(one.count == 1 && one.mean == 5 && isnan(one.deviation) && isnan(stat_half_width(&one)));
+    assert_true(none.count == 0 && isnan(none.mean));
+    assert_true(stat_is_apart(&s, 3 + 6.58) && !stat_is_apart(&s, 3 - 6.57) && !stat_is_apart(&one, 100) && !stat_is_apart(&none, 0));
+    const double ten[10] = {0, 1, 0, 1, 0, 1, 0, 1, 0, 1};
+    const stat_sample many = stat_of(ten, 10);
+    assert_near(stat_half_width(&many), 2.262 * sqrt(2.5 / 9) / sqrt(10), 1e-12);
+    const stat_sample same = stat_of((const double[]){2, 2}, 2);
+    assert_true(stat_is_apart(&same, 2.001) && !stat_is_apart(&same, 2));
+}
+
+static void figures_as_text(void **state)
+{
+    (void)state;
+    const struct { double values[3]; size_t count; int decimals; bool is_change; const char *wanted; } cases[] = {
+        {{1, 2, 3}, 3, 2, false, "2.00 ± 1.00"}, {{1, 2, 3}, 3, 1, true, "+2.0 ± 1.0"}, {{7}, 1, 0, false, "7"},
+        {{NAN}, 1, 1, true, "n/a"}, {{-0.04}, 1, 1, true, "0.0"}, {{-0.06}, 1, 1, true, "-0.1"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        text out = {0};
+        const stat_sample s = stat_of(cases[i].values, cases[i].count);
+        stat_add(&out, &s, cases[i].decimals, cases[i].is_change);
+        assert_int_equal(out.length, strlen(cases[i].wanted));
+        assert_memory_equal(out.bytes, cases[i].wanted, out.length);
+        text_free(&out);
+    }
+}
+
+/* Halves of halves, counted one by one. */
+static double count_balls(size_t points, int depth)
+{
+    return points <= 2 || depth == 0 ? points > 0 : count_balls(points / 2, depth - 1) + count_balls(points - points / 2, depth - 1);
+}
+
+static void closed_form_of_balls(void **state)
+{
+    (void)state;
+    const struct { double points; int depth; double balls; } known[] = {{54275, 18, 32768}, {32049, 18, 16384}, {80861, 18, 48093},
+                                                                        {80861, 10, 1024}, {80861, 12, 4096},
+                                                                        {0, 18, 0}, {1, 18, 1}, {2, 18, 1}, {3, 18, 2}, {3, 0, 1},
+                                                                        {1e6, 18, 262144}};
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        assert_near(paper_ball_count(known[i].points, known[i].depth), known[i].balls, 0);
+    for (size_t points = 0; points < 700; points++)
+        for (int depth = 0; depth < 12; depth++)
+            assert_near(paper_ball_count((double)points, depth), count_balls(points, depth), 0);
+}
+
+/* Two pairs of points: two small balls far apart, so that the spacing is all that counts: (1 + 1/4) / 2 of it. */
+static void constant_of_pairs(void **state)
+{
+    (void)state;
+    static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
+                              "z\nend_header\n0 0 0\n.01 0 0\n.1 0 0\n.12 0 0\n";
+    const char *path = in_root("pairs.ply");
+    assert_ok(file_write_atomic(path, ply, sizeof ply - 1, NULL));
+    paper_scene look;
+    assert_ok(paper_scene_look(path, &look, NULL));
+    assert_int_equal(look.tree_depth, 1);
+    assert_near(look.scale_constant, 0.625, 1e-6);
+}
+
+static void what_the_paper_says(void **state)
+{
+    (void)state;
+    const struct { paper_claim claim; double wanted, near, low, high; } cases[] = {
+        {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_INITIAL}, -37.1, 0.05, -42.6, -30.0},
+        {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_FINAL}, -10.0, 0.05, -12.0, -8.0},
+        {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_STORAGE}, -9.8, 0.05, -11.9, -7.9},
+        {{2, "", PAPER_GBSP, PAPER_VOXEL, PAPER_FINAL}, -12.0, 0.05, -22.7, -5.4},
+        {{2, "", PAPER_GBAI, PAPER_VOXEL, PAPER_PSNR}, 0.071, 0.002, -0.376, 0.576},
+        {{3, "", PAPER_GBSP, PAPER_VOXEL, PAPER_ARITHMETIC}, -15.9, 0.05, -29.6, -5.0},
+        {{4, "", PAPER_DEPTH_10, PAPER_GBSP, PAPER_FINAL}, 1.9, 0.05, 1.9, 1.9}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        double range[2];
+        assert_near(paper_published(&cases[i].claim), cases[i].wanted, cases[i].near);
+        assert_true(paper_published_range(&cases[i].claim, range));
+        assert_near(range[0], cases[i].low, 0.06);
+        assert_near(range[1], cases[i].high, 0.06);
+    }
+    double range[2];
+    assert_true(isnan(paper_published(&(paper_claim){2, "", PAPER_GBAI_SCALED, PAPER_GBAI, PAPER_FINAL})));
+    assert_false(paper_published_range(&(paper_claim){3, "", PAPER_GBSP, PAPER_VOXEL, PAPER_INITIAL}, range));
+}
+
+static void verdicts(void **state)
+{
+    (void)state;
+    const struct { double ours[3]; size_t count; double paper; const char *wanted; } cases[] = {
+        {{-9, -10, -11}, 3, -10, "agrees with the paper"},
+        {{-11.9, -12, -12}, 3, -10, "within the range of the paper's scenes"},
+        {{-12.1, -12.1, -12.1}, 3, -10, "the same way as the paper, and more"},
+        {{-3, -3.1, -3.2}, 3, -10, "the same way as the paper, but less"},
+        {{-20, -21, -22}, 3, -10, "the same way as the paper, and more"},
+        {{3, 3.1, 3.2}, 3, -10, "the other way than the paper"},
+        {{-3, 1, 2}, 3, -10, "not told apart from zero, but from the paper"},
+        {{-30, 1, 2}, 3, -10, "told apart neither from zero nor from the paper"},
+        {{-30, 1, 2}, 3, NAN, "not told apart from zero"},
+        {{-3, -3.1, -3.2}, 3, NAN, "lower, beyond the spread"},
+        {{3, 3.1, 3.2}, 3, NAN, "higher, beyond the spread"},
+        {{0, 0, 0}, 3, -10, "none at all"},
+        {{-10}, 1, -10, "one seed says nothing of the spread"},
+        {{NAN}, 1, -10, "not measured"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const stat_sample s = stat_of(cases[i].ours, cases[i].count);
+        assert_string_equal(paper_verdict_of(&s, cases[i].paper, (const double[]){-12, -8}), cases[i].wanted);
+    }
+}
+
+static void when_a_curve_comes_there(void **state)
+{
+    (void)state;
+    const study_figures run = {.mark_count = 2, .marks = {{1, 20}, {4, 22}}, .train_seconds = 16, .psnr = 24};
+    assert_near(time_to_reach(&run, 19), 1, 0);
+    assert_near(time_to_reach(&run, 21), 2, 1e-12); /* half way, over log seconds */
+    assert_near(time_to_reach(&run, 22), 4, 1e-12);
+    assert_near(time_to_reach(&run, 23), 8, 1e-12);
+    assert_near(time_to_reach(&run, 24), 16, 1e-12);
+    assert_true(isnan(time_to_reach(&run, 24.01)) && isnan(time_to_reach(&run, NAN)));
+    assert_near(time_to_reach(&(study_figures){.train_seconds = 5, .psnr = 9}, 9), 5, 0);
+}
+
+static void names_and_folders(void **state)
+{
+    (void)state;
+    char names[STUDY_SCENES_MAX][STUDY_NAME_SIZE], path[PATH_SIZE];
+    gbt_error err = {0};
+    make_tiny_scene(in_root("other/tiny"));
+    const char *same[] = {tiny, in_root("other/tiny")}, *missing[] = {in_root("nowhere")}, *dotted[] = {in_root("tiny/../other/./tiny/")};
+    assert_int_equal(study_runs_names(same, 2, names, &err), GBT_ERR_ARGUMENT);
+    assert_non_null(strstr(err.text, "two data sets are called tiny"));
+    assert_int_equal(study_runs_names(missing, 1, names, NULL), GBT_ERR_IO);
+    assert_int_equal(study_runs_names(same, 0, names, NULL), GBT_ERR_ARGUMENT);
+    assert_ok(study_runs_names(dotted, 1, names, NULL));
+    assert_string_equal(names[0], "tiny");
+    assert_ok(study_runs_folder("d", "a b/../c.1", "K = 10", 3, path, sizeof path, NULL));
+    assert_string_equal(path, "d/runs/a-b-..-c.1/K---10/seed-3");
+    assert_int_equal(study_runs_folder("d", "a", "b", 3, path, 10, NULL), GBT_ERR_ARGUMENT);
+}
+
+/* ---- whole studies ------------------------------------------------------------------------------------------------------------- */
+
+enum { SEEDS = 2 };
+
+static gbt_paper_def small_paper(const char *const *data, const char *tables)
+{
+    gbt_paper_def def = gbt_paper_def_default();
+    def.data = data, def.data_count = 1, def.iterations = 40, def.seeds = SEEDS, def.tables = tables;
+    return def;
+}
+
+static void paper_ok(const gbt_paper_def *def, const char *folder)
+{
+    gbt_error err = {0};
+    FILE *out = tmpfile();
+    if (gbt_study_paper(def, folder, out, &err) != GBT_OK)
+        fail_msg("%s", err.text);
+    fclose(out);
+}
+
+/* A file as a zero-terminated text; mem_free(). */
+static char *read_text(const char *path)
+{
+    return (char *)read_bytes(path).data;
+}
+
+static size_t count_of(const char *where, const char *what)
+{
+    size_t count = 0;
+    for (; (where = strstr(where, what)) != NULL; where++)
+        count++;
+    return count;
+}
+
+static double metric_of(const char *run, const char *field)
+{
+    json_t *whole;
+    char path[2 * PATH_SIZE];
+    snprintf(path, sizeof path, "%s/metrics.json", run);
+    assert_ok(json_read(path, &whole, NULL));
+    const double value = json_number_value(json_object_get(whole, field));
+    json_decref(whole);
+    return value;
+}
+
+static struct timespec time_of(const char *run)
+{
+    struct stat info;
+    char path[2 * PATH_SIZE];
+    snprintf(path, sizeof path, "%s/model.gbt", run);
+    if (stat(path, &info) != 0)
+        fail_msg("%s is not there", path);
+    return info.st_mtim;
+}
+
+static bool is_newer(struct timespec a, struct timespec b)
+{
+    return a.tv_sec > b.tv_sec || (a.tv_sec == b.tv_sec && a.tv_nsec > b.tv_nsec);
+}
+
+/* Every line of the CSV is what the run's own metrics.json says. */
+static void check_csv(const char *folder)
+{
+    char *csv = read_text(in_root("%s/paper.csv", folder)), *line = strchr(csv, '\n');
+    size_t lines = 0;
+    for (; line != NULL && line[1] != '\0'; line = strchr(line + 1, '\n'), lines++) {
+        char name[64];
+        int seed;
+        double v[9];
+        assert_int_equal(sscanf(line + 1, "\"tiny\",%63[^,],%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", name, &seed, v, v + 1, v + 2, v + 3,
+                                v + 4, v + 5, v + 6, v + 7, v + 8), 11);
+        const char *run = in_root("%s/runs/tiny/%s/seed-%d", folder, name, seed);
+        const char *const fields[] = {"points", "anchors_initial", "anchors_final", NULL, "model_bytes", "psnr", "ssim"};
+        for (size_t i = 0; i < 7; i++)
+            if (fields[i] != NULL)
+                assert_near(v[i], metric_of(run, fields[i]), 1e-6 * fabs(v[i]));
+        assert_near(v[3], (316 * v[2] + 4 * 7086) / 1048576, 1e-5 * v[3]);
+        assert_true(v[7] > 0 && v[7] <= v[2]);          /* in view: some of all */
+        assert_near(v[8], 6880e-9 * v[7], 1e-5 * v[8]); /* K = 10, no distance */
+    }
+    assert_int_equal(lines, 5 * SEEDS);
+    mem_free(csv);
+}
+
+static double mean_over_seeds(const char *folder, const char *variant, const char *field)
+{
+    double sum = 0;
+    for (int seed = 0; seed < SEEDS; seed++)
+        sum += metric_of(in_root("%s/runs/tiny/%s/seed-%d", folder, variant, seed), field) / SEEDS;
+    return sum;
+}
+
+static const json_t *row_of(const json_t *whole, const char *name)
+{
+    size_t i;
+    json_t *row;
+    json_array_foreach(json_object_get(whole, "rows"), i, row)
+    {
+        const char *is = json_string_value(json_object_get(row, "row"));
+        if (is != NULL && strcmp(is, name) == 0)
+            return row;
+    }
+    fail_msg("no row %s", name);
+    return NULL;
+}
+
+static void check_json(const char *folder)
+{
+    json_t *whole;
+    assert_ok(json_read(in_root("%s/paper.json", folder), &whole, NULL));
+    const json_t *counts = row_of(whole, "tiny: initial anchors at D_max 18 against the closed form"),
+        *change = row_of(whole, "table 1, tiny: balls in place of voxels: change of PSNR, dB");
+    assert_true(json_is_true(json_object_get(counts, "pass")));
+    assert_near(json_number_value(json_object_get(counts, "limit")), 0.015, 0);
+    assert_true(json_is_null(json_object_get(change, "limit")) && json_is_null(json_object_get(change, "pass")));
+    assert_near(json_number_value(json_object_get(change, "value")),
+                mean_over_seeds(folder, "gbai-gbsp", "psnr") - mean_over_seeds(folder, "voxel", "psnr"), 1e-6);
+    assert_near(json_number_value(json_object_get(change, "paper")), -0.071, 0.001);
+    const json_t *first = json_array_get(json_object_get(whole, "figures"), 0);
+    assert_string_equal(json_string_value(json_object_get(first, "variant")), "voxel");
+    assert_near(json_number_value(json_object_get(json_object_get(first, "final anchors"), "mean")),
+                mean_over_seeds(folder, "voxel", "anchors_final"), 1e-9);
+    json_decref(whole);
+}
+
+static void check_page(const char *folder)
+{
+    char *page = read_text(in_root("%s/paper.md", folder)), *svg = read_text(in_root("%s/paper.svg", folder)), cell[160];
+    assert_true(count_of(page, "\n## ") == 2 && strstr(page, "\n## 1. ") != NULL && strstr(page, "\n## 2. ") != NULL);
+    snprintf(cell, sizeof cell, "| tiny | %.0f | GBAI | %.0f ± ", metric_of(in_root("%s/runs/tiny/gbai/seed-0", folder), "points"),
+             mean_over_seeds(folder, "gbai", "anchors_initial"));
+    assert_int_equal(count_of(page, cell), 1);
+    assert_int_equal(count_of(page, "| balls in place of voxels | initial anchors, % |"), 1);
+    assert_int_equal(count_of(page, "| -37.1 | -42.6 to -30.0 |"), 1);
+    assert_int_equal(count_of(svg, "<circle class=\"seed"), 5 * SEEDS * 2);
+    assert_int_equal(count_of(svg, "<circle class=\"mark"), 5 * 2);
+    assert_true(strstr(svg, "nan") == NULL && strstr(page, "nan") == NULL);
+    mem_free(page);
+    mem_free(svg);
+}
+
+static void the_papers_tables(void **state)
+{
+    (void)state;
+    const char *data[] = {tiny};
+    const gbt_paper_def def = small_paper(data, "1,2");
+    paper_ok(&def, in_root("paper"));
+    check_csv("paper");
+    check_json("paper");
+    check_page("paper");
+    assert_false(file_exists(in_root("paper/runs/tiny/voxel/seed-0/checkpoints")));
+    assert_false(file_exists(in_root("paper/runs/tiny/gbai-gbsp-depth-10")));
+
+    /* The control has the constant that the study names. */
+    json_t *whole;
+    char wanted[64];
+    assert_ok(json_read(in_root("paper/paper.json"), &whole, NULL));
+    const double constant = json_number_value(json_object_get(json_array_get(json_object_get(whole, "scenes"), 0), "scale_constant"));
+    json_decref(whole);
+    assert_true(constant > 0.2 && constant < 1);
+    char *config = read_text(in_root("paper/runs/tiny/gbai-scaled/seed-1/config"));
+    const char *line = strstr(config, "scale-factor = ");
+    snprintf(wanted, sizeof wanted, "%.9g", constant);
+    assert_true(line != NULL && fabs(strtod(line + 15, NULL) - constant) < 1e-9 && strstr(config, "compat = 1") != NULL);
+    mem_free(config);
+}
+
+/* After the_papers_tables(): runs that are there are scored again, not trained. */
+static void lpips_of_finished_runs(void **state)
+{
+    (void)state;
+    const char *data[] = {tiny};
+    gbt_paper_def def = small_paper(data, "1,2");
+    network alex = make_alex();
+    write_network(&alex, in_root("alex.safetensors"), NULL);
+    free_network(&alex);
+    char *before = read_text(in_root("paper/paper.csv")), *page;
+    assert_true(strstr(before, "seconds,lpips_01\n") != NULL && strstr(before, ",\n") != NULL);
+    const struct timespec made = time_of(in_root("paper/runs/tiny/voxel/seed-0"));
+    def.lpips = in_root("alex.safetensors");
+    paper_ok(&def, in_root("paper"));
+    const struct timespec now = time_of(in_root("paper/runs/tiny/voxel/seed-0"));
+    assert_true(!is_newer(now, made));
+    const double score = mean_over_seeds("paper", "voxel", "lpips_01");
+    assert_true(score > 0 && score < 10 && score != mean_over_seeds("paper", "voxel", "lpips"));
+    page = read_text(in_root("paper/paper.md"));
+    assert_int_equal(count_of(page, " SSIM | LPIPS |\n"), 2);
+    assert_int_equal(count_of(page, "| balls in place of voxels | LPIPS |"), 1);
+    assert_int_equal(count_of(page, "| +0.0048 | +0.0010 to +0.0090 |"), 1); /* the paper's own four */
+    mem_free(page);
+
+    /* A result folder of 3DGS has it too. */
+    gbt_export_def export = gbt_export_def_default();
+    const char *result[] = {in_root("result/")};
+    json_t *means, *values;
+    export.refine_steps = 0, export.lpips = def.lpips;
+    assert_ok(gbt_export(in_root("paper/runs/tiny/voxel/seed-0"), &export, result, 1, NULL, NULL));
+    assert_ok(json_read(in_root("result/results.json"), &means, NULL));
+    assert_ok(json_read(in_root("result/per_view.json"), &values, NULL));
+    const json_t *ours = json_object_get(means, "ours_40"), *each = json_object_get(json_object_get(values, "ours_40"), "LPIPS");
+    const double first = json_number_value(json_object_get(each, "00000.png")),
+        second = json_number_value(json_object_get(each, "00001.png"));
+    assert_true(json_object_size(each) == 2 && first > 0 && second > 0);
+    assert_near(json_number_value(json_object_get(ours, "LPIPS")), (first + second) / 2, 1e-9);
+    json_decref(means), json_decref(values);
+    const char *file[] = {in_root("scene.ply")};
+    assert_int_equal(gbt_export(in_root("paper/runs/tiny/voxel/seed-0"), &export, file, 1, NULL, NULL), GBT_ERR_ARGUMENT);
+
+    def.lpips = NULL; /* no column, and the scores of before */
+    paper_ok(&def, in_root("paper"));
+    page = read_text(in_root("paper/paper.csv"));
+    assert_string_equal(page, before);
+    mem_free(before), mem_free(page);
+}
+
+/* After the_papers_tables(): what is there is taken, what is damaged, missing or of other settings is made again, to the same bits. */
+static void runs_are_made_once(void **state)
+{
+    (void)state;
+    static const char *const variants[] = {"voxel", "gbai", "gbai-gbsp", "voxel-scaled", "gbai-scaled"};
+    enum { VARIANTS = sizeof variants / sizeof *variants };
+    const char *data[] = {tiny};
+    struct timespec before[VARIANTS][SEEDS];
+    for (int v = 0; v < VARIANTS; v++)
+        for (int seed = 0; seed < SEEDS; seed++)
+            before[v][seed] = time_of(in_root("paper/runs/tiny/%s/seed-%d", variants[v], seed));
+    bytes csv = read_bytes(in_root("paper/paper.csv"));
+    bytes metrics = read_bytes(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"));
+    assert_ok(file_write_atomic(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"), metrics.data, metrics.count / 2, NULL)); /* damaged */
+    /* interrupted */
+    assert_int_equal(unlink(in_root("paper/runs/tiny/voxel-scaled/seed-0/study.json")), 0);
+    /* and a table more */
+    const gbt_paper_def def = small_paper(data, "1,2,4");
+    paper_ok(&def, in_root("paper"));
+    for (int v = 0; v < VARIANTS; v++)
+        for (int seed = 0; seed < SEEDS; seed++) {
+            const bool again = (v == 1 && seed == 1) || (v == 3 && seed == 0);
+            assert_int_equal(is_newer(time_of(in_root("paper/runs/tiny/%s/seed-%d", variants[v], seed)), before[v][seed]), again);
+        }
+    assert_false(file_exists(in_root("paper/runs/tiny/gbai-gbsp-depth-14"))); /* 150 points end at depth 7: the runs are those of D_max
+                                                                                 18 */
+    char *page = read_text(in_root("paper/paper.md"));
+    assert_int_equal(count_of(page, "| D_max 14 in place of 18 | final anchors, % | 0.0 ± 0.0 | **0.0 ± 0.0** | -6.0 |  | none at all |"),
+                     1);
+    mem_free(page);
+    mem_free(csv.data);
+    mem_free(metrics.data);
+
+    gbt_paper_def other = small_paper(data, "1"); /* other settings */
+    other.iterations++, other.seeds = 1;
+    paper_ok(&other, in_root("paper"));
+    assert_true(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-0")), before[0][0]));
+    assert_false(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-1")), before[0][1]));
+    assert_near(metric_of(in_root("paper/runs/tiny/voxel/seed-0"), "iterations"), 41, 0);
+}
+
+static void bad_requests(void **state)
+{
+    (void)state;
+    const char *data[] = {tiny};
+    static const char *const lists[] = {"", "0", "5", "1,1", "1,", ",1", "12", "1 2"};
+    for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
+        const gbt_paper_def def = small_paper(data, lists[i]);
+        assert_int_equal(gbt_study_paper(&def, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    }
+    gbt_paper_def paper = small_paper(data, "1");
+    paper.seeds = 0;
+    assert_int_equal(gbt_study_paper(&paper, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    paper.seeds = 1, paper.iterations = 19;
+    assert_int_equal(gbt_study_paper(&paper, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    gbt_time_def time = gbt_time_def_default();
+    time.data = data, time.data_count = 1, time.budget_seconds = 0;
+    assert_int_equal(gbt_study_time(&time, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    time.budget_seconds = 1, time.seeds = 11;
+    assert_int_equal(gbt_study_time(&time, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    gbt_anchors_def needs = gbt_anchors_def_default();
+    needs.data = data, needs.data_count = 1, needs.iterations = 19;
+    assert_int_equal(gbt_study_anchors(&needs, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    needs.iterations = 20, needs.seeds = 0;
+    assert_int_equal(gbt_study_anchors(&needs, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    assert_false(file_exists(in_root("bad")));
+}
+
+/* ---- quality against time --------------------------------------------------------------------------------------------------------- */
+
+static void time_ok(const char *const *data, const char *folder)
+{
+    gbt_error err = {0};
+    gbt_time_def def = gbt_time_def_default();
+    def.data = data, def.data_count = 1, def.budget_seconds = 0.1;
+    FILE *out = tmpfile();
+    if (gbt_study_time(&def, folder, out, &err) != GBT_OK)
+        fail_msg("%s", err.text);
+    fclose(out);
+}
+
+static void quality_against_time(void **state)
+{
+    (void)state;
+    const char *data[] = {tiny};
+    time_ok(data, in_root("time"));
+    json_t *whole;
+    assert_ok(json_read(in_root("time/time.json"), &whole, NULL));
+    const json_t *runs = json_object_get(whole, "runs");
+    assert_int_equal(json_array_size(runs), time_variant_count);
+    /* the seconds, and a change for all but the default */
+    assert_int_equal(json_array_size(json_object_get(whole, "rows")), time_variant_count);
+    struct timespec before[TIME_VARIANTS_MAX];
+    char run[PATH_SIZE];
+    for (size_t v = 0; v < time_variant_count; v++) {
+        const json_t *psnr = json_object_get(json_array_get(runs, v), "psnr");
+        assert_ok(study_runs_folder(in_root("time"), "tiny", time_variants[v].name, 0, run, sizeof run, NULL));
+        before[v] = time_of(run);
+        assert_near(json_number_value(json_object_get(psnr, "mean")), metric_of(run, "psnr"), 1e-6);
+        assert_true(metric_of(run, "train_seconds") >= 0.9 * time_variants[v].budgets * 0.1);
+    }
+    char *config = read_text(in_root("time/runs/tiny/faithful-protocol/seed-0/config"));
+    assert_non_null(strstr(config, "\ncompat = 1\n"));
+    mem_free(config);
+    json_decref(whole);
+
+    char *page = read_text(in_root("time/time.md")), *svg = read_text(in_root("time/time.svg"));
+    assert_int_equal(count_of(page, "| faithful protocol |"), 2);
+    assert_int_equal(count_of(page, "The faithful protocol ends at "), 1);
+    assert_true(count_of(svg, ">no growth<") <= 1 && count_of(svg, "no growth") >= 1 && strstr(svg, "nan") == NULL);
+    mem_free(svg);
+    mem_free(page);
+    time_ok(data, in_root("time"));
+    for (size_t v = 0; v < time_variant_count; v++) {
+        assert_ok(study_runs_folder(in_root("time"), "tiny", time_variants[v].name, 0, run, sizeof run, NULL));
+        assert_false(is_newer(time_of(run), before[v]));
+    }
+}
+
+/* ---- anchors ------------------------------------------------------------------------------------------------------------------------- */
+
+static double figure_of(const json_t *run, const char *name)
+{
+    return json_number_value(json_object_get(json_object_get(run, name), "mean"));
+}
+
+static void what_a_scene_needs(void **state)
+{
+    (void)state;
+    const char *data[] = {tiny};
+    gbt_anchors_def def = gbt_anchors_def_default();
+    def.data = data, def.data_count = 1, def.iterations = 40, def.seeds = 2;
+    gbt_error err = {0};
+    FILE *out = tmpfile();
+    if (gbt_study_anchors(&def, in_root("anchors"), out, &err) != GBT_OK)
+        fail_msg("%s", err.text);
+    fclose(out);
+    json_t *whole;
+    assert_ok(json_read(in_root("anchors/anchors.json"), &whole, NULL));
+    const json_t *runs = json_object_get(whole, "runs");
+    assert_int_equal(json_array_size(runs), anchors_variant_count);
+    for (size_t v = 0; v < anchors_variant_count; v++) {
+        char run[PATH_SIZE];
+        double psnr = 0, final = 0;
+        for (uint64_t seed = 0; seed < 2; seed++) {
+            assert_ok(study_runs_folder(in_root("anchors"), "tiny", anchors_variants[v].name, seed, run, sizeof run, NULL));
+            psnr += metric_of(run, "psnr") / 2, final += metric_of(run, "anchors_final") / 2;
+        }
+        assert_near(figure_of(json_array_get(runs, v), "psnr"), psnr, 1e-6);
+        assert_near(figure_of(json_array_get(runs, v), "anchors_final"), final, 1e-6);
+    }
+    /* More is asked of an anchor from 0.5 to 1 to 1.5 to 2.5. */
+    assert_true(figure_of(json_array_get(runs, 6), "anchors_final") > figure_of(json_array_get(runs, 5), "anchors_final"));
+    const double points = metric_of(in_root("anchors/runs/tiny/adaptive-balls/seed-0"), "points"); /* so few that all are taken */
+    assert_true(figure_of(json_array_get(runs, 2), "anchors_initial") == points && points < 4000);
+    json_decref(whole);
+    char *page = read_text(in_root("anchors/anchors.md")), *svg = read_text(in_root("anchors/anchors.svg")),
+        *csv = read_text(in_root("anchors/anchors.csv"));
+    assert_int_equal(count_of(page, "| random points |"), 1);
+    assert_int_equal(count_of(csv, "\n"), 1 + 2 * anchors_variant_count);
+    assert_null(strstr(svg, "nan"));
+    mem_free(csv);
+    mem_free(svg);
+    mem_free(page);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(mean_and_spread),      cmocka_unit_test(figures_as_text),          cmocka_unit_test(closed_form_of_balls),
+        cmocka_unit_test(constant_of_pairs),    cmocka_unit_test(what_the_paper_says),      cmocka_unit_test(verdicts),
+        cmocka_unit_test(names_and_folders),    cmocka_unit_test(when_a_curve_comes_there), cmocka_unit_test(bad_requests),
+        cmocka_unit_test(the_papers_tables),    cmocka_unit_test(lpips_of_finished_runs),   cmocka_unit_test(runs_are_made_once),
+        cmocka_unit_test(quality_against_time), cmocka_unit_test(what_a_scene_needs),
+    };
+    return cmocka_run_group_tests(tests, make_root, remove_root);
+}

@@ -10,6 +10,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/camera_model.h"
 #include "base/poly.h"
 
 #define PI 3.14159265358979323846

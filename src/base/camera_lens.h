@@ -33,9 +33,6 @@ typedef struct camera_lens {
     double distorted_max;                 /* the distorted radius there; HUGE_VAL at a pole */
 } camera_lens;
 
-/** How many focal lengths stand before the principal point of a model: 1 or 2; 0 for an unknown one. */
-int camera_focal_count(gbt_camera_model model);
-
 /**
  * Prepare a lens once for many pixels.
  *

@@ -1,6 +1,7 @@
 /* train/run.c -- a whole training run: the loop around the steps, its folder, its clock, its signals. */
 #include <math.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -27,7 +28,7 @@ void gbt_set_threads(int threads)
 
 /* ---- signals: the first one asks the loop to stop after its step, a second one ends the process ------------------------------------- */
 
-static volatile sig_atomic_t stop_signal = 0;
+static atomic_int stop_signal = 0; /* free of locks; the handler may run in another thread than the loop */
 
 static void on_signal(int number)
 {

@@ -2,6 +2,7 @@
 #include "gbtrace/view.h"
 
 #include <signal.h>
+#include <stdatomic.h>
 #include <unistd.h>
 
 #include "base/clock.h"
@@ -19,7 +20,7 @@ gbt_view_def gbt_view_def_default(void)
 
 /* ---- signals: the first one ends the loop, a second one the process -------------------------------------------------------------- */
 
-static volatile sig_atomic_t stop_signal = 0;
+static atomic_int stop_signal = 0; /* free of locks; the handler may run in another thread than the loop */
 static server *signalled = NULL; /* set before the handler is */
 
 static void on_signal(int number)
@@ -52,7 +53,8 @@ static void serve_until_signal(studio *s, server *http, const gbt_view_def *def)
 {
     struct sigaction action = {.sa_handler = on_signal}, old_int, old_term;
     sigemptyset(&action.sa_mask);
-    stop_signal = 0, signalled = http;
+    stop_signal = 0;
+    signalled = http;
     sigaction(SIGINT, &action, &old_int);
     sigaction(SIGTERM, &action, &old_term);
     if (def->ready != NULL)

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/camera_model.h"
 #include "base/fail.h"
 #include "base/memory.h"
 
@@ -107,20 +108,6 @@ gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_
     return GBT_OK;
 }
 
-static bool has_one_focal_length(gbt_camera_model model)
-{
-    switch (model) {
-    case GBT_CAMERA_SIMPLE_PINHOLE:
-    case GBT_CAMERA_SIMPLE_RADIAL:
-    case GBT_CAMERA_RADIAL:
-    case GBT_CAMERA_SIMPLE_RADIAL_FISHEYE:
-    case GBT_CAMERA_RADIAL_FISHEYE:
-    case GBT_CAMERA_SIMPLE_DIVISION:
-    case GBT_CAMERA_SIMPLE_FISHEYE: return true;
-    default: return false;
-    }
-}
-
 gbt_status raw_check_camera(const gbt_camera *camera, raw_place place, gbt_error *err)
 {
     const int sizes[2] = {camera->width, camera->height};
@@ -128,7 +115,7 @@ gbt_status raw_check_camera(const gbt_camera *camera, raw_place place, gbt_error
         if (sizes[k] < 1 || sizes[k] > RAW_IMAGE_LIMIT)
             return raw_fail(err, place, "image %s is out of range (wanted 1..%d, got %d)", k == 0 ? "width" : "height", RAW_IMAGE_LIMIT,
                             sizes[k]);
-    const int param_count = gbt_camera_param_count(camera->model), focal_count = has_one_focal_length(camera->model) ? 1 : 2;
+    const int param_count = gbt_camera_param_count(camera->model), focal_count = camera_focal_count(camera->model);
     for (int k = 0; k < param_count; k++)
         if (!(fabs(camera->params[k]) <= RAW_COORDINATE_LIMIT))
             return raw_fail(err, place, "parameter %d of camera model %s is not usable (got %g)", k, gbt_camera_model_name(camera->model),

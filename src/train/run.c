@@ -1,10 +1,7 @@
 /* train/run.c -- a whole training run: the loop around the steps, its folder, its clock, its signals. */
 #include <math.h>
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "base/clock.h"
 #include "base/fail.h"
@@ -12,6 +9,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/stop_signal.h"
 #include "io/model_file.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
@@ -24,36 +22,6 @@ enum { PATH_SIZE = 4096 };
 void gbt_set_threads(int threads)
 {
     parallel_set_threads(threads);
-}
-
-/* ---- signals: the first one asks the loop to stop after its step, a second one ends the process ------------------------------------- */
-
-static atomic_int stop_signal = 0; /* free of locks; the handler may run in another thread than the loop */
-
-static void on_signal(int number)
-{
-    if (stop_signal != 0)
-        _exit(128 + number);
-    stop_signal = number;
-}
-
-typedef struct signal_guard {
-    struct sigaction old_int, old_term;
-} signal_guard;
-
-static void signals_catch(signal_guard *guard)
-{
-    struct sigaction action = {.sa_handler = on_signal};
-    sigemptyset(&action.sa_mask);
-    stop_signal = 0;
-    sigaction(SIGINT, &action, &guard->old_int);
-    sigaction(SIGTERM, &action, &guard->old_term);
-}
-
-static void signals_release(const signal_guard *guard)
-{
-    sigaction(SIGINT, &guard->old_int, NULL);
-    sigaction(SIGTERM, &guard->old_term, NULL);
 }
 
 /* ---- the run's folder ---------------------------------------------------------------------------------------------------------------- */
@@ -214,7 +182,7 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
         t->seconds = clock_offset + clock_wall() - begin - paused;
         run_log_step(log, t, &report);
 
-        const bool stop = stop_signal != 0 || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
+        const bool stop = stop_signal_seen() || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
         const bool due = def->save_every_seconds > 0 && t->seconds - last_save >= def->save_every_seconds;
         const bool evaluate = next_eval < def->eval_at_count && t->seconds >= def->eval_at_seconds[next_eval];
         if (stop || due || (def->save_at_step > 0 && t->step == def->save_at_step)) {
@@ -287,10 +255,10 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
 {
     trainer *t = mem_calloc(1, sizeof *t, "trainer", err);
     config_strings *strings = mem_calloc(1, sizeof *strings, "settings", err);
-    signal_guard guard;
-    signals_catch(&guard);
+    stop_signal_guard guard;
+    stop_signal_catch(&guard, NULL, NULL);
     gbt_status status = t == NULL || strings == NULL ? GBT_ERR_NO_MEMORY : run_with_folder(t, data, run, def, strings, err);
-    signals_release(&guard);
+    stop_signal_release(&guard);
     if (t != NULL)
         trainer_free(t);
     mem_free(t);

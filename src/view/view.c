@@ -1,13 +1,10 @@
 /* view/view.c -- the page's server from start to Ctrl-C. */
 #include "gbtrace/view.h"
 
-#include <signal.h>
-#include <stdatomic.h>
-#include <unistd.h>
-
 #include "base/clock.h"
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/stop_signal.h"
 #include "view/server.h"
 #include "view/studio.h"
 
@@ -18,23 +15,15 @@ gbt_view_def gbt_view_def_default(void)
     return (gbt_view_def){.port = 8470};
 }
 
-/* ---- signals: the first one ends the loop, a second one the process -------------------------------------------------------------- */
-
-static atomic_int stop_signal = 0; /* free of locks; the handler may run in another thread than the loop */
-static server *signalled = NULL; /* set before the handler is */
-
-static void on_signal(int number)
+static void wake(void *http)
 {
-    if (stop_signal != 0)
-        _exit(128 + number);
-    stop_signal = number;
-    server_wake(signalled);
+    server_wake(http);
 }
 
 static void serve(studio *s, server *http)
 {
     double looked = clock_wall();
-    while (stop_signal == 0) {
+    while (!stop_signal_seen()) {
         server_job *job = server_next(http, look_every_seconds);
         if (job != NULL) {
             answer made = {0};
@@ -51,17 +40,12 @@ static void serve(studio *s, server *http)
 
 static void serve_until_signal(studio *s, server *http, const gbt_view_def *def)
 {
-    struct sigaction action = {.sa_handler = on_signal}, old_int, old_term;
-    sigemptyset(&action.sa_mask);
-    stop_signal = 0;
-    signalled = http;
-    sigaction(SIGINT, &action, &old_int);
-    sigaction(SIGTERM, &action, &old_term);
+    stop_signal_guard guard;
+    stop_signal_catch(&guard, wake, http);
     if (def->ready != NULL)
         def->ready(server_port(http), def->context);
     serve(s, http);
-    sigaction(SIGINT, &old_int, NULL);
-    sigaction(SIGTERM, &old_term, NULL);
+    stop_signal_release(&guard);
 }
 
 gbt_status gbt_view(const char *input, const gbt_view_def *def, gbt_error *err)

@@ -28,7 +28,7 @@ typedef struct gbt_train_def {
     const char *renderer;       /* what the photos are compared with: "trace" (default), "raster" (EWA splats; pinhole photos), or
                                    "per-ray" */
     double footprint;           /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays.
-                                   Default 0.1; 0 with compat; splats are dilated instead */
+                                   Default 0.1; 0 with compat, splats are dilated then */
     int start_level;            /* first steps look at 1 pixel in 4^start_level, at random places; all come last. [0, 4]. Default 2; 0 with
                                    compat */
     const char *eval_split;     /* "auto" (default: as the data set says, else every=8), "every=8", "none", "list=FILE" */
@@ -42,6 +42,8 @@ typedef struct gbt_train_def {
     bool grow;                  /* grow and prune anchors. Default true */
     double thrift;              /* anchors must bring so many times as much to be made and to be kept, [0.1, 10]. Not with compat. Default
                                    1 */
+    double last_thrift;         /* and so many times that to be kept in the last tenth of growing, when none are made any more, [1, 100]; 1:
+                                   as before. Not with compat. Default 4 */
     bool compat;                /* every quirk of the reference method (docs/training.md). Default false */
     bool exposure;              /* learn a colour matrix per photo, for photos whose exposure differs; held-out photos are then scored on
                                    their right half, with a matrix fitted to the left. Default false */

@@ -49,6 +49,12 @@ static float pixel_variance(const frame *f, float variance)
     return variance / (step * step);
 }
 
+/* By which splats are dilated, in pixels of the camera: what is as wide as the pixels already need not be. */
+static float dilation_of(const frame *f)
+{
+    return f->draw.renderer == FRAME_SPLAT && !f->widened ? pixel_variance(f, raster_settings_default().dilation) : 0;
+}
+
 /* Of every Gaussian of the last render; NULL: no limit. */
 static const float *pixel_min_of(const frame *f)
 {
@@ -84,15 +90,11 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     if (guest != NULL)
         bounds = view_bounds_none();
     f->view = footprint_view_of(&shot->camera);
-    const bool splats = f->draw.renderer == FRAME_SPLAT;
     f->pixel_limited = f->draw.anchor_pixel != NULL && subject.cloud == NULL;
-    /* Nobody says how wide given rays are; splats are dilated instead. */
-    f->widened = f->draw.footprint > 0 && shot->given == NULL && !splats;
+    f->widened = f->draw.footprint > 0 && shot->given == NULL; /* nobody says how wide given rays are */
     /* where an opaque Gaussian falls to alpha_min */
     const visible_reach extent = {.sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)),
-                                  .width = sqrtf(pixel_variance(f,
-                                                                splats ? raster_settings_default().dilation : f->widened ? f->draw.footprint
-                                                                : 0)),
+                                  .width = sqrtf(f->widened ? pixel_variance(f, f->draw.footprint) : dilation_of(f)),
                                   .pixel = (float)f->view.pixel,
                                   .parallel = f->view.kind == FOOTPRINT_PARALLEL,
                                   .pixel_min = f->pixel_limited ? f->draw.anchor_pixel : NULL};
@@ -132,7 +134,7 @@ raster_settings frame_splat_settings(const trace_settings *settings, raster_form
 static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape, gbt_error *err)
 {
     raster_settings s = frame_splat_settings(settings, f->draw.renderer == FRAME_SPLAT ? RASTER_EWA : RASTER_PER_RAY);
-    s.dilation = pixel_variance(f, s.dilation);
+    s.dilation = dilation_of(f);
     raster_counters counted = {0};
     GBT_TRY(raster_forward(&f->splats, frame_drawn(f), &f->camera, &s, keep_tape, &f->rgb, NULL, &counted, err));
     f->counters.rays = counted.pixels, f->counters.hits = f->counters.blended = counted.blended;

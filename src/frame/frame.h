@@ -29,7 +29,7 @@ raster_settings frame_splat_settings(const trace_settings *settings, raster_form
 /** How Gaussians become a picture. Set in the frame before rendering; {0}: traced, thin rays. */
 typedef struct frame_drawing {
     frame_renderer renderer;
-    float footprint;           /* variance of a pixel, px^2 (trace/footprint.h); 0: rays are thin */
+    float footprint;           /* variance of a pixel, px^2 (trace/footprint.h); 0: rays are thin, splats dilated as in the paper's base */
     int pixel_step;            /* the camera's pixels are every n-th of a picture, and as wide as that one's; 0 and 1: all */
     const float *anchor_pixel; /* optional (NULL), [anchors]: the smallest pixel an anchor was made for; borrowed */
 } frame_drawing;

@@ -15,12 +15,12 @@ void config_text(const gbt_train_def *d, const char *data, char *out, size_t siz
              "%s\niterations = %llu\n"
              "budget-seconds = %.17g\npace = %s\ndownscale = %.17g\nrenderer = %s\nfootprint = %.17g\nstart-level = %d\neval-split = "
              "%s\nalpha = %s\nseed = %llu\nmax-anchors = %zu\n"
-             "grow = %d\nthrift = %.17g\ncompat = %d\nexposure = %d\nsplats-until = %.17g\ngrow-until = %.17g\nscale-factor = "
-             "%.17g\nlearning-rate = %.17g\n",
+             "grow = %d\nthrift = %.17g\nlast-thrift = %.17g\ncompat = %d\nexposure = %d\nsplats-until = %.17g\n"
+             "grow-until = %.17g\nscale-factor = %.17g\nlearning-rate = %.17g\n",
              data, d->init, d->init_count, d->scale_prior, d->max_depth, (double)d->voxel_size, d->offsets, d->distance,
              (unsigned long long)d->iterations, d->budget_seconds, d->pace != NULL ? d->pace : "", d->downscale, d->renderer, d->footprint,
-             d->start_level, d->eval_split, d->alpha, (unsigned long long)d->seed, d->max_anchors, d->grow, d->thrift, d->compat,
-             d->exposure, d->splats_until, d->grow_until, d->scale_factor, d->learning_rate_factor);
+             d->start_level, d->eval_split, d->alpha, (unsigned long long)d->seed, d->max_anchors, d->grow, d->thrift,
+             d->last_thrift, d->compat, d->exposure, d->splats_until, d->grow_until, d->scale_factor, d->learning_rate_factor);
 }
 
 static void set_string(char *to, size_t size, const char *value, const char **field)
@@ -89,6 +89,8 @@ static bool set_key(const char *key, const char *value, gbt_train_def *d, config
         return d->grow = number != 0, true;
     if (strcmp(key, "thrift") == 0)
         return d->thrift = number, true;
+    if (strcmp(key, "last-thrift") == 0)
+        return d->last_thrift = number, true;
     if (strcmp(key, "compat") == 0)
         return d->compat = number != 0, true;
     if (strcmp(key, "exposure") == 0)

@@ -9,6 +9,7 @@
 #include "train/gradient_check.h"
 
 static const float share_min = 2.5e-6f; /* of short runs: schedule_thrift() */
+static const double last_rounds_from = 0.9; /* of growing */
 enum { ADJUSTS_PER_RUN = 100, COMPAT_INTERVAL = 100 /* steps */, INTERVAL_MIN = 20 /* a judgement of fewer views is chance */ };
 
 /* What an anchor is good for is what pictures would miss without it: the share of them that its Gaussians cover, the mean over rays of T
@@ -99,9 +100,11 @@ gbt_status growth_adjust(trainer *t, gbt_error *err)
         def.shape_log_max = 0.05f;
     else {
         const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
+        const bool last = t->def.last_thrift > 1 && pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
         def.interval = fmaxf(def.interval, (float)INTERVAL_MIN);
         def.grad_threshold *= thrift;
-        def.min_use = thrift * share_min;
+        def.min_use = thrift * share_min * (last ? (float)t->def.last_thrift : 1);
+        def.grow = !last;
     }
     def.max_anchors = t->def.max_anchors;
     def.compat = t->def.compat;

@@ -101,7 +101,7 @@ static gbt_status rewind_events(run_log *log, const char *path, uint64_t step, g
     if (kept == 0)
         event_add_version(r);
     if (step > 0)
-        event_add_start(r, step);
+        event_add_start(r, step + 1); /* what is kept ends with `step` */
     gbt_status status = file_write_atomic(path, bytes, kept, err);
     mem_free(bytes);
     if (status == GBT_OK && (log->events = fopen(path, "ab")) == NULL)

@@ -39,6 +39,7 @@ gbt_train_def gbt_train_def_default(void)
                            .max_anchors = 2000000,
                            .grow = true,
                            .thrift = 1,
+                           .last_thrift = 4,
                            .splats_until = 0.7,
                            .grow_until = 0.5,
                            .learning_rate_factor = 1,
@@ -87,6 +88,8 @@ static gbt_status check_def(const gbt_train_def *d, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "--scale-factor: %g (wanted 0.01 to 100, or 0)", d->scale_factor);
     if (!(d->thrift >= 0.1 && d->thrift <= 10))
         return base_fail(err, GBT_ERR_ARGUMENT, "--thrift: %g (wanted 0.1 to 10)", d->thrift);
+    if (!(d->last_thrift >= 1 && d->last_thrift <= 100))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--last-thrift: %g (wanted 1 to 100)", d->last_thrift);
     if (d->max_anchors < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "--max-anchors: 0 (wanted 1 or more)");
     return GBT_OK;

@@ -71,14 +71,16 @@ END
     "$python" read.py run 40 6 >out 2>&1
     report $? "TensorBoard reads scalars and pictures" "$(cat out)"
     # Stopped, its last record cut, and gone on: every step once, in order.
-    "$program" train -s made -o long --iterations 1500 --eval-split every=3 --tensorboard >out 2>&1 &
+    "$program" train -s made -o long --iterations 5000 --eval-split every=3 --tensorboard >out 2>&1 &
     pid=$!
     while [ "$(wc -l 2>/dev/null <long/log.csv || echo 0)" -lt 3 ] && kill -0 $pid 2>/dev/null; do sleep 0.2; done
     kill -INT $pid
     wait $pid
     [ $? = 130 ] && printf 'cut record' >>long/events.out.tfevents.0.train
-    "$program" train -s made -o long --resume --tensorboard >>out 2>&1 && "$python" read.py long 1500 6 >>out 2>&1
+    "$program" train -s made -o long --resume --tensorboard >>out 2>&1 && "$python" read.py long 5000 6 >>out 2>&1
     report $? "TensorBoard reads a run that was stopped and resumed" "$(cat out)"
+    "$program" train -s made -o long --resume --tensorboard >>out 2>&1 && "$python" read.py long 5000 6 >>out 2>&1
+    report $? "TensorBoard reads a run that was resumed at its end" "$(cat out)"
 else
     skip "TensorBoard" "the package tensorboard cannot be had here"
 fi

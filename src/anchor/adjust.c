@@ -55,7 +55,8 @@ adjust_def adjust_def_default(void)
 
 typedef struct cell {
     int64_t at[3];
-    float gradient;   /* largest of its candidates */
+    float mean[3];    /* of the candidate with the largest gradient */
+    float gradient;   /* that one's */
     size_t feature;   /* row of growth.feature */
     bool occupied;
 } cell;
@@ -133,7 +134,7 @@ static gbt_status grow_table(growth *g, gbt_error *err)
     return GBT_OK;
 }
 
-static gbt_status add_candidate(growth *g, const int64_t at[3], size_t parent, float gradient, gbt_error *err)
+static gbt_status add_candidate(growth *g, const int64_t at[3], const float mean[3], size_t parent, float gradient, gbt_error *err)
 {
     if ((g->cell_count + 1) * 2 > g->table_size)
         GBT_TRY(grow_table(g, err));
@@ -142,7 +143,10 @@ static gbt_status add_candidate(growth *g, const int64_t at[3], size_t parent, f
     if (g->table[slot] != 0) {
         cell *known = &g->cells[g->table[slot] - 1];
         float *best = g->feature + known->feature * ANCHOR_FEATURE_DIM;
-        known->gradient = fmaxf(known->gradient, gradient);
+        if (gradient > known->gradient) {
+            known->gradient = gradient;
+            memcpy(known->mean, mean, sizeof known->mean);
+        }
         for (int i = 0; i < ANCHOR_FEATURE_DIM; i++)
             best[i] = fmaxf(best[i], feature[i]);
         return GBT_OK;
@@ -154,7 +158,8 @@ static gbt_status add_candidate(growth *g, const int64_t at[3], size_t parent, f
                         "growth", err));
     g->feature = features;
     memcpy(g->feature + g->feature_count * ANCHOR_FEATURE_DIM, feature, ANCHOR_FEATURE_DIM * sizeof(float));
-    g->cells[g->cell_count] = (cell){.at = {at[0], at[1], at[2]}, .gradient = gradient, .feature = g->feature_count};
+    g->cells[g->cell_count] = (cell){.at = {at[0], at[1], at[2]}, .mean = {mean[0], mean[1], mean[2]}, .gradient = gradient,
+                                     .feature = g->feature_count};
     g->feature_count++;
     g->table[slot] = (uint32_t)++g->cell_count;
     return GBT_OK;
@@ -239,7 +244,7 @@ static gbt_status collect_candidates(growth *g, int level, float size, gbt_error
             for (size_t c = 0; c < 3; c++)
                 mean[c] = a->position[i * 3 + c] + a->offset[slot * 3 + c] * activation_exp(a->scale_log[i * 6 + c]);
             if (cell_of(mean, size, at))
-                GBT_TRY(add_candidate(g, at, i, gradient, err));
+                GBT_TRY(add_candidate(g, at, mean, i, gradient, err));
         }
     }
     return GBT_OK;
@@ -265,9 +270,11 @@ static gbt_status grow_level(growth *g, int level, gbt_error *err)
         void *added = g->added;
         GBT_TRY(mem_reserve(&added, &g->added_capacity, g->added_count, g->added_count + 1, sizeof *g->added, "growth", err));
         g->added = added;
-        g->added[g->added_count++] = (fresh){.position = {(float)c->at[0] * size, (float)c->at[1] * size, (float)c->at[2] * size},
-                                             .cell_size = size, .gradient = c->gradient, .level = level,
-                                             .at = {c->at[0], c->at[1], c->at[2]}, .feature = c->feature};
+        fresh *f = &g->added[g->added_count++];
+        *f = (fresh){.cell_size = size, .gradient = c->gradient, .level = level, .at = {c->at[0], c->at[1], c->at[2]},
+                     .feature = c->feature};
+        for (int k = 0; k < 3; k++) /* that Gaussian has found the surface; the middle of a cell is where the cell is */
+            f->position[k] = g->def->compat ? (float)c->at[k] * size : c->mean[k];
     }
     return GBT_OK;
 }

@@ -74,7 +74,7 @@ static void two_candidates_in_one_cell(void **state) /* T6 */
     assert_int_equal(sc.a.count, 3);
     assert_int_equal(sc.s.count, 3);
     assert_true(r.source[0] == 0 && r.source[1] == 1 && r.source[2] == -1);
-    assert_true(sc.a.position[6] == 16.0f && sc.a.position[7] == 0.0f && sc.a.position[8] == 0.0f);
+    assert_true(sc.a.position[6] == 17.0f && sc.a.position[7] == 0.0f && sc.a.position[8] == 0.0f);
     for (size_t c = 0; c < 6; c++)
         assert_true(fabs((double)sc.a.scale_log[12 + c] - log(16.0)) < 1e-6 && sc.a.offset[12 + c] == 0.0f);
     for (size_t i = 0; i < 32; i++)
@@ -127,7 +127,7 @@ static grow_case grow_cases[] = {
     {"gradient at the threshold", 2e-4f * 64 / 64, 64, 1, true},
     {"gradient below the threshold", 1.99e-4f, 64, 0, true},
     {"40 views are not enough", 1.0f, 40, 0, false},
-    {"41 views are", 1.0f, 41, 3, true}, /* one anchor per level */
+    {"41 views are", 1.0f, 41, 1, true},
     {"no view: 0 / 0", 0.0f, 0, 0, false},
     {"gradient is not a number", NAN, 50, 0, true},
 };
@@ -152,6 +152,7 @@ static void grows(void **state)
     free_scene(&sc, &r);
 }
 
+/* The reference puts anchors into the middle of cells, so one candidate may bring one per level; ours stand where it is. */
 static void levels_have_their_own_cells_and_thresholds(void **state)
 {
     (void)state;
@@ -161,13 +162,22 @@ static void levels_have_their_own_cells_and_thresholds(void **state)
         sc.a.offset[0] = 102.0f;
         set_gradient(&sc, 0, gradients[passes]);
         adjust_def def = adjust_def_default();
-        def.voxel_size = 1.0f;
+        def.voxel_size = 1.0f, def.compat = true;
         keep_all(&def, 1);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
         assert_int_equal(r.grown, passes + 1);
         for (size_t i = 0; i <= passes; i++)
             assert_true(sc.a.position[3 + 3 * i] == expected[passes][i]);
+        free_scene(&sc, &r);
+
+        sc = empty_scene(1, 1);
+        sc.a.offset[0] = 102.0f;
+        set_gradient(&sc, 0, gradients[passes]);
+        def.compat = false;
+        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        assert_int_equal(r.grown, 1);
+        assert_true(sc.a.position[3] == 102.0f);
         free_scene(&sc, &r);
     }
 }
@@ -185,7 +195,7 @@ static void a_silent_coarse_level_gates_only_in_compat_mode(void **state)
         keep_all(&def, 1);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
-        assert_int_equal(r.grown, compat == 1 ? 0 : 2);
+        assert_int_equal(r.grown, compat == 1 ? 0 : 1);
         free_scene(&sc, &r);
     }
 }
@@ -194,19 +204,19 @@ static void cells_finer_than_one_exist_only_outside_compat_mode(void **state)
 {
     (void)state; /* init_factor 4: cells 4, 1 and then 0 in the reference's integers, 0.25 in ours */
     for (int compat = 0; compat <= 1; compat++) {
-        scene sc = empty_scene(1, 1);
+        scene sc = empty_scene(2, 1);
         sc.a.offset[0] = 11.3f;
+        sc.a.position[3] = 11.0f; /* in its cells of 4 and 1, not in that of 0.25 */
         set_gradient(&sc, 0, 1.0f);
         adjust_def def = adjust_def_default();
         def.voxel_size = 1.0f, def.init_factor = 4;
         def.compat = compat == 1;
-        keep_all(&def, 1);
+        keep_all(&def, 2);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
-        assert_int_equal(r.grown, compat == 1 ? 2 : 3);
-        assert_true(sc.a.position[3] == 12.0f && sc.a.position[6] == 11.0f);
+        assert_int_equal(r.grown, compat == 1 ? 0 : 1);
         if (compat == 0)
-            assert_true(sc.a.position[9] == 11.25f);
+            assert_true(sc.a.position[6] == 11.3f && fabs((double)sc.a.scale_log[12] - log(0.25)) < 1e-6);
         free_scene(&sc, &r);
     }
 }
@@ -220,7 +230,7 @@ static void cells_round_half_to_even(void **state)
         sc.a.offset[0] = at[i];
         set_gradient(&sc, 0, 3e-4f);
         adjust_def def = adjust_def_default();
-        def.voxel_size = 1.0f;
+        def.voxel_size = 1.0f, def.compat = true;
         keep_all(&def, 1);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
@@ -342,7 +352,7 @@ static void a_cell_is_worth_its_best_candidate(void **state)
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
         assert_int_equal(r.count, 4);
-        assert_true(sc.a.position[9] == 32.0f);
+        assert_true(sc.a.position[9] == (order == 0 ? 33.0f : 32.0f));
         free_scene(&sc, &r);
     }
 }
@@ -350,15 +360,15 @@ static void a_cell_is_worth_its_best_candidate(void **state)
 /* ---- brute force ------------------------------------------------------------------------------------------------------------- */
 
 typedef struct brute_anchor {
-    double position[3], cell, feature[32];
+    double center[3], position[3], cell, feature[32], gradient;
 } brute_anchor;
 
 static int by_place(const void *a, const void *b)
 {
     const brute_anchor *x = a, *y = b;
     for (int c = 0; c < 3; c++)
-        if (x->position[c] < y->position[c] || x->position[c] > y->position[c])
-            return x->position[c] < y->position[c] ? -1 : 1;
+        if (x->center[c] < y->center[c] || x->center[c] > y->center[c])
+            return x->center[c] < y->center[c] ? -1 : 1;
     return 0;
 }
 
@@ -378,17 +388,18 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
                 continue;
             if (!survives(def, level, slot))
                 continue;
-            brute_anchor b = {.cell = cell};
+            brute_anchor b = {.cell = cell, .gradient = (double)(sc->s.grad_accum[slot] / sc->s.grad_count[slot])};
             for (size_t c = 0; c < 3; c++) {
                 const float mean = sc->a.position[i * 3 + c] + sc->a.offset[slot * 3 + c] * activation_exp(sc->a.scale_log[i * 6 + c]);
-                b.position[c] = rint((double)mean / cell) * cell;
+                b.center[c] = rint((double)mean / cell) * cell;
+                b.position[c] = def->compat ? b.center[c] : (double)mean;
             }
             bool taken = false;
             for (size_t j = 0; j < sc->a.count + begin; j++) {
                 bool same = true;
                 for (size_t c = 0; c < 3; c++) {
                     const double at = j < sc->a.count ? (double)sc->a.position[j * 3 + c] : added[j - sc->a.count].position[c];
-                    same = same && rint(at / cell) * cell == b.position[c];
+                    same = same && rint(at / cell) * cell == b.center[c];
                 }
                 taken = taken || same;
             }
@@ -401,6 +412,9 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
                 added[count++] = b;
                 for (int f = 0; f < 32; f++)
                     added[known].feature[f] = -HUGE_VAL;
+            } else if (b.gradient > added[known].gradient) {
+                added[known].gradient = b.gradient;
+                memcpy(added[known].position, b.position, sizeof b.position);
             }
             for (size_t f = 0; f < 32; f++)
                 added[known].feature[f] = fmax(added[known].feature[f], (double)sc->a.feature[i * 32 + f]);

@@ -51,10 +51,10 @@ typedef struct adjust_result {
 /**
  * Grow, then prune, as Scaffold-GS does; anchors and statistics are changed in place.
  *
- * New anchor: position = mean of the cell's candidate (a Gaussian) with the largest gradient, the first of equals; in compat mode the cell's
- * centre. Log-scales log(cell), offsets 0, feature = elementwise maximum over the parents of the cell's candidates. Cells use 64-bit keys; a
- * level whose cell is not > 0 is skipped. Never prunes the last anchor (the most opaque stays). Survivors keep their order; new anchors
- * follow by level, then cell (x, y, z).
+ * New anchor: position = mean of the cell's candidate (a Gaussian) with the largest gradient, the first of equals; in compat mode the
+ * cell's centre. Log-scales log(cell), offsets 0, feature = elementwise maximum over the parents of the cell's candidates. Cells use
+ * 64-bit keys; a level whose cell is not > 0 is skipped. Never prunes the last anchor (the most opaque stays). Survivors keep their order;
+ * new anchors follow by level, then cell (x, y, z).
  *
  * @param stats [in, out] rows must match `a`
  * @param out   [out] zeroed on failure

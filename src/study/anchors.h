@@ -6,11 +6,17 @@
 #include "study/grid.h"
 #include "study/runs_stat.h"
 
-enum { ANCHORS_VARIANTS_MAX = 12, ANCHORS_VOXELS = 0, ANCHORS_BALLS = 1 /* the two that others are compared with */ };
+enum {
+    ANCHORS_VARIANTS_MAX = 12,
+    ANCHORS_VOXELS = 0, /* the two that others are compared with */
+    ANCHORS_BALLS = 1,
+    ANCHORS_ADAPTIVE = 2
+};
 
 typedef struct anchors_variant {
     const char *name;     /* in tables; of its folder, what is no letter or digit as '-' */
     const char *settings; /* what differs from the default: lines as in a run's `config` */
+    int series;           /* of the chart */
 } anchors_variant;
 
 extern const anchors_variant anchors_variants[];

@@ -81,7 +81,7 @@ void anchors_tables(const anchors_study *s, text *out)
                      "every eighth photo held out.\n",
                 (unsigned long long)s->def.iterations, s->def.downscale, s->grid.seeds - 1);
     text_format(out, "Mean ± standard deviation over the seeds. Times smaller: model.gbt against %d bytes, as the paper counts, for each "
-                     "final anchor of the voxels.\n",
+                     "final anchor of the voxels. The voxels are those of the first row.\n",
                 (int)PAPER_BYTES_PER_ANCHOR);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         text_add(out, "\n## ");
@@ -137,8 +137,8 @@ static void add_rows(const anchors_study *s, size_t scene, json_t *rows)
         add_limited(rows, s->grid.names[scene], start, "PSNR against the voxels', dB",
                     change_over(s, scene, v, ANCHORS_VOXELS, PSNR, false).mean, NAN);
     }
-    add_limited(rows, s->grid.names[scene], anchors_variants[2].name, "initial anchors, % of the paper's balls",
-                change_over(s, scene, 2, ANCHORS_BALLS, INITIAL, true).mean, 50);
+    add_limited(rows, s->grid.names[scene], anchors_variants[ANCHORS_ADAPTIVE].name, "initial anchors, % of the paper's balls",
+                change_over(s, scene, ANCHORS_ADAPTIVE, ANCHORS_BALLS, INITIAL, true).mean, 50);
 }
 
 gbt_status anchors_json(const anchors_study *s, const char *folder, gbt_error *err)
@@ -178,7 +178,7 @@ static void draw_scene(const anchors_study *s, size_t scene, int top, text *out)
     for (size_t v = 0; v < anchors_variant_count; v++)
         for (int seed = 0; seed < s->grid.seeds; seed++) {
             const study_figures *run = anchors_run(s, scene, v, seed);
-            points[chart.point_count++] = (scatter_point){v < 4 ? 1 + (int)v : 3, run->anchors_final, run->psnr,
+            points[chart.point_count++] = (scatter_point){anchors_variants[v].series, run->anchors_final, run->psnr,
                                                           seed == 0 ? anchors_variants[v].name : ""};
         }
     scatter_draw(out, &chart, top);

@@ -11,10 +11,11 @@ const time_variant time_variants[] = {
     {"rays from the start", "splats-until = 0", 1},
     {"first scales x 1", "scale-factor = 1", 1},
     {"no growth", "grow = 0", 1},
+    {"last-thrift 1", "last-thrift = 1", 1},
     {"K = 10", "offsets = 10", 1},
     {"adaptive balls", "init = adaptive", 1},
-    {"adaptive balls, thrift 1.5", "init = adaptive\nthrift = 1.5", 1},
     {"voxels", "init = voxel", 1},
+    {"voxels, last-thrift 1", "init = voxel\nlast-thrift = 1", 1},
 };
 
 const size_t time_variant_count = sizeof time_variants / sizeof *time_variants;

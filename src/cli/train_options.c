@@ -57,7 +57,7 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
         {.name = "thrift", .kind = OPTION_DOUBLE, .value = &d->thrift, .min = 0.1, .max = 10, .value_name = "F",
          .help = "what an anchor must bring to be made and kept, times F: above 1 for smaller models, below for larger"},
         {.name = "last-thrift", .kind = OPTION_DOUBLE, .value = &d->last_thrift, .min = 1, .max = 100, .value_name = "F",
-         .help = "and to be kept in the last tenth of growing, times F; 1: as before"},
+         .help = "and that times F to be kept in the last tenth of growing, which makes none; 1: it is like the rest"},
         {.name = "splats-until", .kind = OPTION_DOUBLE, .value = &d->splats_until, .min = 0, .max = 1, .value_name = "F",
          .help = "splats, which are quicker, stand for rays up to this part of the run; 0: rays from the start"},
         {.name = "grow-until", .kind = OPTION_DOUBLE, .value = &d->grow_until, .min = 0, .max = 1, .value_name = "F",

@@ -1,15 +1,30 @@
-/* trace/footprint.c -- widen Gaussians by the footprint of a view's pixels, and back. */
+/* trace/footprint.c -- widen Gaussians by the footprint of a view's pixels, and back: eight Gaussians at a time, in double.
+
+   Nothing here branches on a lane: where a quantity does not exist, a divisor is replaced and its result not taken. */
 #include "trace/footprint.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 #include "base/camera_lens.h"
 #include "base/fail.h"
 #include "base/parallel.h"
-#include "base/vec.h"
 
-enum { WIDEN_BLOCK = 1024 };
+enum { LANES = 8, WIDEN_BLOCK = 1024 /* a multiple of LANES */ };
+
+typedef double d8 __attribute__((vector_size(LANES * sizeof(double))));
+typedef float f8 __attribute__((vector_size(LANES * sizeof(float))));
+typedef int64_t m8 __attribute__((vector_size(LANES * sizeof(int64_t)))); /* all bits or none, as comparisons give it */
+
+/* Inlined into a clone for each instruction set. No fused operations (the project compiles without contraction), so every clone gives
+   the same bits. ThreadSanitizer is not up yet when the loader picks a clone. */
+#define LANE_CODE static inline __attribute__((always_inline))
+#if defined(__SANITIZE_THREAD__)
+#define FASTEST_CLONE
+#else
+#define FASTEST_CLONE __attribute__((target_clones("avx512f", "avx2", "default")))
+#endif
 
 footprint_view footprint_view_of(const gbt_camera *camera)
 {
@@ -26,52 +41,94 @@ footprint_view footprint_view_of(const gbt_camera *camera)
     return view;
 }
 
-/* Towards a point: unit direction, and the distance. */
-static double look(const footprint_view *view, const double point[3], double dir[3])
+/* ---- lanes --------------------------------------------------------------------------------------------------------------------------- */
+
+LANE_CODE d8 d8_set(double a)
+{
+    return (d8){a, a, a, a, a, a, a, a};
+}
+
+LANE_CODE d8 d8_select(m8 where, d8 yes, d8 no)
+{
+    return (d8)((where & (m8)yes) | (~where & (m8)no));
+}
+
+LANE_CODE d8 d8_sqrt(d8 a)
+{
+    d8 root;
+    for (int lane = 0; lane < LANES; lane++)
+        root[lane] = sqrt(a[lane]);
+    return root;
+}
+
+/* a / b where b > 0, else 0. */
+LANE_CODE d8 d8_over(d8 a, d8 b)
+{
+    const m8 some = b > 0;
+    return d8_select(some, a, d8_set(0)) / d8_select(some, b, d8_set(1));
+}
+
+LANE_CODE d8 d8_dot(const d8 a[3], const d8 b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+typedef struct gaussian8 {
+    d8 mean[3], scale[3], quat[4], opacity;
+} gaussian8;
+
+/* ---- the pixel at a point ------------------------------------------------------------------------------------------------------------ */
+
+/* Towards points: unit directions, and the distances. */
+LANE_CODE d8 look(const footprint_view *view, const d8 point[3], d8 dir[3])
 {
     for (int k = 0; k < 3; k++)
         dir[k] = point[k] - view->center[k];
-    const double distance = dvec_length(dir);
-    dvec_normalize(dir);
+    const d8 distance = d8_sqrt(d8_dot(dir, dir));
+    for (int k = 0; k < 3; k++)
+        dir[k] = d8_over(dir[k], distance);
     return distance;
 }
 
 /* Pixel size at distance t in direction `dir`, and its gradient by the point. A perspective pixel at an angle theta from the axis has the
-   solid angle cos^3(theta) / f^2. */
-static double pixel_at(const footprint_view *view, double t, const double dir[3], double d_point[3])
+   solid angle cos^3(theta) / f^2, so p = f^-1 z^(3/2) t^(-1/2) with z = t cos(theta). */
+LANE_CODE d8 pixel_at(const footprint_view *view, d8 t, const d8 dir[3], d8 d_point[3])
 {
-    d_point[0] = d_point[1] = d_point[2] = 0;
-    if (view->kind == FOOTPRINT_PARALLEL)
-        return view->pixel;
+    const d8 pixel = d8_set(view->pixel), none = d8_set(0);
+    if (view->kind == FOOTPRINT_PARALLEL) {
+        d_point[0] = d_point[1] = d_point[2] = none;
+        return pixel;
+    }
     if (view->kind == FOOTPRINT_ANGULAR) {
         for (int k = 0; k < 3; k++)
-            d_point[k] = view->pixel * dir[k];
-        return view->pixel * t;
+            d_point[k] = pixel * dir[k];
+        return pixel * t;
     }
-    const double cosine = dvec_dot(dir, view->axis);
-    if (!(cosine > 0))
-        return 0;
-    const double root = sqrt(cosine);
-    for (int k = 0; k < 3; k++) /* p = f^-1 z^(3/2) t^(-1/2), z = t cos */
-        d_point[k] = view->pixel * (1.5 * root * view->axis[k] - 0.5 * root * cosine * dir[k]);
-    return view->pixel * t * cosine * root;
+    const d8 axis[3] = {d8_set(view->axis[0]), d8_set(view->axis[1]), d8_set(view->axis[2])}, cosine = d8_dot(dir, axis);
+    const d8 ahead = d8_select(cosine > 0, cosine, none), root = d8_sqrt(ahead);
+    for (int k = 0; k < 3; k++)
+        d_point[k] = pixel * (1.5 * root * axis[k] - 0.5 * root * ahead * dir[k]);
+    return pixel * t * ahead * root;
 }
 
 double footprint_pixel(const footprint_view *view, const double point[3])
 {
-    double dir[3], unused[3];
-    const double distance = look(view, point, dir);
-    return pixel_at(view, distance, dir, unused);
+    const d8 at[3] = {d8_set(point[0]), d8_set(point[1]), d8_set(point[2])};
+    d8 dir[3], unused[3];
+    const d8 distance = look(view, at, dir);
+    return pixel_at(view, distance, dir, unused)[0];
 }
 
+/* ---- widening ------------------------------------------------------------------------------------------------------------------------ */
+
 /* The squared area across a direction u (local axes) of an ellipsoid with squared half-axes e: det S^2 |S^-1 u|^2, without a division. */
-static double area_square(const double u[3], const double e[3])
+LANE_CODE d8 area_square(const d8 u[3], const d8 e[3])
 {
     return u[0] * u[0] * e[1] * e[2] + u[1] * u[1] * e[0] * e[2] + u[2] * u[2] * e[0] * e[1];
 }
 
 /* Its gradients, times `weight`, added. */
-static void area_square_adjoint(const double u[3], const double e[3], double weight, double d_e[3], double d_u[3])
+LANE_CODE void area_square_adjoint(const d8 u[3], const d8 e[3], d8 weight, d8 d_e[3], d8 d_u[3])
 {
     for (int i = 0; i < 3; i++) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
@@ -82,73 +139,120 @@ static void area_square_adjoint(const double u[3], const double e[3], double wei
 
 /* What forward and adjoint have in common. */
 typedef struct widening {
-    double rotation[9], dir[3], distance, u[3]; /* u: dir in local axes */
-    double w, d_w[3];                           /* added variance, and its gradient by the mean */
-    double e[3], wide[3];                       /* squared scales before and after */
-    double area, wide_area, kept;               /* kept: share of the opacity */
+    d8 axes[3][3], dir[3], distance, u[3]; /* axes: of the Gaussian, in the world; u: dir in them */
+    d8 w, d_w[3];                          /* added variance, and its gradient by the mean */
+    d8 e[3], wide[3];                      /* squared scales before and after */
+    d8 area, wide_area, kept;              /* kept: share of the opacity */
+    m8 narrows;                            /* the share is less than 1 */
 } widening;
 
-static widening prepare(const footprint_view *view, double variance, double pixel_min, const footprint_gaussian *g)
+/* Columns of the rotation matrix. */
+LANE_CODE void axes_of(const d8 q[4], d8 axes[3][3])
 {
-    widening x;
-    dquat_to_matrix(g->quat, x.rotation);
-    x.distance = look(view, g->mean, x.dir);
-    double d_pixel[3];
-    double pixel = pixel_at(view, x.distance, x.dir, d_pixel);
-    if (!(pixel >= pixel_min)) {
-        pixel = pixel_min;
-        memset(d_pixel, 0, sizeof d_pixel);
-    }
-    x.w = variance * pixel * pixel;
-    for (int k = 0; k < 3; k++) {
-        x.d_w[k] = 2 * variance * pixel * d_pixel[k];
-        x.e[k] = g->scale[k] * g->scale[k];
-        x.wide[k] = x.e[k] + x.w;
-    }
-    dmat_apply_transposed(x.rotation, view->kind == FOOTPRINT_PARALLEL ? view->axis : x.dir, x.u);
-    x.area = area_square(x.u, x.e), x.wide_area = area_square(x.u, x.wide);
-    x.kept = x.w > 0 && x.wide_area > 0 ? sqrt(x.area / x.wide_area) : 1;
-    return x;
+    const d8 w = q[0], x = q[1], y = q[2], z = q[3];
+    axes[0][0] = 1 - 2 * (y * y + z * z), axes[1][0] = 2 * (x * y - w * z), axes[2][0] = 2 * (x * z + w * y);
+    axes[0][1] = 2 * (x * y + w * z), axes[1][1] = 1 - 2 * (x * x + z * z), axes[2][1] = 2 * (y * z - w * x);
+    axes[0][2] = 2 * (x * z - w * y), axes[1][2] = 2 * (y * z + w * x), axes[2][2] = 1 - 2 * (x * x + y * y);
 }
 
-void footprint_widen(const footprint_view *view, double variance, double pixel_min, footprint_gaussian *g)
+LANE_CODE void prepare(const footprint_view *view, double variance, d8 pixel_min, const gaussian8 *g, widening *x)
 {
-    const widening x = prepare(view, variance, pixel_min, g);
+    axes_of(g->quat, x->axes);
+    x->distance = look(view, g->mean, x->dir);
+    d8 d_pixel[3];
+    const d8 there = pixel_at(view, x->distance, x->dir, d_pixel);
+    const m8 larger = there >= pixel_min;
+    const d8 pixel = d8_select(larger, there, pixel_min);
+    x->w = variance * pixel * pixel;
+    for (int k = 0; k < 3; k++) {
+        x->d_w[k] = d8_select(larger, 2 * variance * pixel * d_pixel[k], d8_set(0));
+        x->e[k] = g->scale[k] * g->scale[k];
+        x->wide[k] = x->e[k] + x->w;
+    }
+    const d8 axis[3] = {d8_set(view->axis[0]), d8_set(view->axis[1]), d8_set(view->axis[2])};
     for (int k = 0; k < 3; k++)
-        g->scale[k] = sqrt(x.wide[k]);
+        x->u[k] = d8_dot(x->axes[k], view->kind == FOOTPRINT_PARALLEL ? axis : x->dir);
+    x->area = area_square(x->u, x->e), x->wide_area = area_square(x->u, x->wide);
+    x->narrows = (x->w > 0) & (x->wide_area > 0);
+    x->kept = d8_select(x->narrows, d8_sqrt(d8_over(x->area, x->wide_area)), d8_set(1));
+}
+
+LANE_CODE void widen_lanes(const footprint_view *view, double variance, d8 pixel_min, gaussian8 *g)
+{
+    widening x;
+    prepare(view, variance, pixel_min, g, &x);
+    for (int k = 0; k < 3; k++)
+        g->scale[k] = d8_sqrt(x.wide[k]);
     g->opacity *= x.kept;
 }
 
-void footprint_adjoint(const footprint_view *view, double variance, double pixel_min, const footprint_gaussian *g, footprint_gaussian *d)
+LANE_CODE void adjoint_lanes(const footprint_view *view, double variance, d8 pixel_min, const gaussian8 *g, gaussian8 *d)
 {
-    const widening x = prepare(view, variance, pixel_min, g);
-    const bool narrows = x.area > 0 && x.wide_area > 0 && x.w > 0; /* an ellipsoid without area is never seen */
-    double d_e[3], d_u[3] = {0, 0, 0}, d_wide[3];
-    for (int k = 0; k < 3; k++)
-        d_wide[k] = x.wide[k] > 0 ? d->scale[k] / (2 * sqrt(x.wide[k])) : 0, d_e[k] = 0;
-    if (narrows) {
-        const double d_kept = g->opacity * d->opacity * x.kept / 2; /* d kept = kept / 2 (d area / area - d wide_area / wide_area) */
-        area_square_adjoint(x.u, x.e, d_kept / x.area, d_e, d_u);
-        area_square_adjoint(x.u, x.wide, -d_kept / x.wide_area, d_wide, d_u);
+    widening x;
+    prepare(view, variance, pixel_min, g, &x);
+    d8 d_e[3], d_u[3], d_wide[3];
+    for (int k = 0; k < 3; k++) {
+        d_e[k] = d_u[k] = d8_set(0);
+        d_wide[k] = d8_over(d->scale[k], 2 * d8_sqrt(x.wide[k]));
     }
+    /* d kept = kept / 2 (d area / area - d wide_area / wide_area); an ellipsoid without area is never seen */
+    const d8 d_kept = d8_select(x.narrows & (x.area > 0), g->opacity * d->opacity * x.kept / 2, d8_set(0));
+    area_square_adjoint(x.u, x.e, d8_over(d_kept, x.area), d_e, d_u);
+    area_square_adjoint(x.u, x.wide, -d8_over(d_kept, x.wide_area), d_wide, d_u);
     d->opacity *= x.kept;
-    const double d_w = d_wide[0] + d_wide[1] + d_wide[2];
-    double d_dir[3];
-    dmat_apply(x.rotation, d_u, d_dir);
-    const double along = dvec_dot(d_dir, x.dir);
-    const bool turns = view->kind != FOOTPRINT_PARALLEL && x.distance > 0;
+    const d8 d_w = d_wide[0] + d_wide[1] + d_wide[2];
+    d8 d_dir[3];
+    for (int k = 0; k < 3; k++)
+        d_dir[k] = x.axes[0][k] * d_u[0] + x.axes[1][k] * d_u[1] + x.axes[2][k] * d_u[2];
+    const d8 along = d8_dot(d_dir, x.dir);
     for (int k = 0; k < 3; k++) {
         d->scale[k] = 2 * g->scale[k] * (d_wide[k] + d_e[k]);
-        d->mean[k] += d_w * x.d_w[k] + (turns ? (d_dir[k] - along * x.dir[k]) / x.distance : 0);
+        d->mean[k] += d_w * x.d_w[k];
+        if (view->kind != FOOTPRINT_PARALLEL)
+            d->mean[k] += d8_over(d_dir[k] - along * x.dir[k], x.distance);
     }
     /* A turn by omega in local axes takes u to u - omega x u; dL/dq = 2 q (0, dL/domega). */
-    double omega[3];
-    dvec_cross(d_u, x.u, omega);
-    const double *q = g->quat;
+    const d8 *u = x.u, *q = g->quat;
+    const d8 omega[3] = {d_u[1] * u[2] - d_u[2] * u[1], d_u[2] * u[0] - d_u[0] * u[2], d_u[0] * u[1] - d_u[1] * u[0]};
     d->quat[0] += 2 * (-q[1] * omega[0] - q[2] * omega[1] - q[3] * omega[2]);
     d->quat[1] += 2 * (q[0] * omega[0] + q[2] * omega[2] - q[3] * omega[1]);
     d->quat[2] += 2 * (q[0] * omega[1] + q[3] * omega[0] - q[1] * omega[2]);
     d->quat[3] += 2 * (q[0] * omega[2] + q[1] * omega[1] - q[2] * omega[0]);
+}
+
+/* ---- one Gaussian -------------------------------------------------------------------------------------------------------------------- */
+
+static gaussian8 spread(const footprint_gaussian *g)
+{
+    gaussian8 out = {.opacity = d8_set(g->opacity)};
+    for (int k = 0; k < 3; k++)
+        out.mean[k] = d8_set(g->mean[k]), out.scale[k] = d8_set(g->scale[k]);
+    for (int k = 0; k < 4; k++)
+        out.quat[k] = d8_set(g->quat[k]);
+    return out;
+}
+
+static footprint_gaussian first(const gaussian8 *g)
+{
+    return (footprint_gaussian){.mean = {g->mean[0][0], g->mean[1][0], g->mean[2][0]},
+                                .scale = {g->scale[0][0], g->scale[1][0], g->scale[2][0]},
+                                .quat = {g->quat[0][0], g->quat[1][0], g->quat[2][0], g->quat[3][0]},
+                                .opacity = g->opacity[0]};
+}
+
+void footprint_widen(const footprint_view *view, double variance, double pixel_min, footprint_gaussian *g)
+{
+    gaussian8 lanes = spread(g);
+    widen_lanes(view, variance, d8_set(pixel_min), &lanes);
+    *g = first(&lanes);
+}
+
+void footprint_adjoint(const footprint_view *view, double variance, double pixel_min, const footprint_gaussian *g, footprint_gaussian *d)
+{
+    const gaussian8 lanes = spread(g);
+    gaussian8 back = spread(d);
+    adjoint_lanes(view, variance, d8_set(pixel_min), &lanes, &back);
+    *d = first(&back);
 }
 
 /* ---- arrays -------------------------------------------------------------------------------------------------------------------------- */
@@ -161,45 +265,77 @@ typedef struct widen_job {
     gaussians *out; /* widened, or gradients */
 } widen_job;
 
-static footprint_gaussian read_gaussian(const gaussians *g, size_t i)
+/* `count` values, at most LANES; the other lanes are 0. */
+LANE_CODE d8 load(const float *from, size_t count)
 {
-    return (footprint_gaussian){.mean = {(double)g->mean_x[i], (double)g->mean_y[i], (double)g->mean_z[i]},
-                                .scale = {(double)g->scale_x[i], (double)g->scale_y[i], (double)g->scale_z[i]},
-                                .quat = {(double)g->quat_w[i], (double)g->quat_x[i], (double)g->quat_y[i], (double)g->quat_z[i]},
-                                .opacity = (double)g->opacity[i]};
+    f8 lanes = {0};
+    if (count >= LANES)
+        memcpy(&lanes, from, sizeof lanes);
+    else
+        memcpy(&lanes, from, count * sizeof *from);
+    return __builtin_convertvector(lanes, d8);
 }
 
-static double pixel_min_of(const widen_job *job, size_t i)
+LANE_CODE void store(float *to, size_t count, d8 a)
 {
-    return job->pixel_min != NULL ? (double)job->pixel_min[i] : 0;
+    const f8 lanes = __builtin_convertvector(a, f8);
+    if (count >= LANES)
+        memcpy(to, &lanes, sizeof lanes);
+    else
+        memcpy(to, &lanes, count * sizeof *to);
 }
 
-static void widen_block(size_t block, size_t begin, size_t end, void *context)
+LANE_CODE gaussian8 load_gaussians(const gaussians *g, size_t i, size_t count)
+{
+    return (gaussian8){.mean = {load(g->mean_x + i, count), load(g->mean_y + i, count), load(g->mean_z + i, count)},
+                       .scale = {load(g->scale_x + i, count), load(g->scale_y + i, count), load(g->scale_z + i, count)},
+                       .quat = {load(g->quat_w + i, count), load(g->quat_x + i, count), load(g->quat_y + i, count),
+                                load(g->quat_z + i, count)},
+                       .opacity = load(g->opacity + i, count)};
+}
+
+LANE_CODE d8 load_pixel_min(const widen_job *job, size_t i, size_t count)
+{
+    return job->pixel_min != NULL ? load(job->pixel_min + i, count) : d8_set(0);
+}
+
+/* What widening replaces, and in the adjoint too. */
+LANE_CODE void store_scale_opacity(gaussians *out, size_t i, size_t count, const gaussian8 *g)
+{
+    store(out->scale_x + i, count, g->scale[0]);
+    store(out->scale_y + i, count, g->scale[1]);
+    store(out->scale_z + i, count, g->scale[2]);
+    store(out->opacity + i, count, g->opacity);
+}
+
+FASTEST_CLONE static void widen_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
     const widen_job *job = context;
-    for (size_t i = begin; i < end; i++) {
-        footprint_gaussian one = read_gaussian(job->g, i);
-        footprint_widen(job->view, job->variance, pixel_min_of(job, i), &one);
-        job->out->scale_x[i] = (float)one.scale[0], job->out->scale_y[i] = (float)one.scale[1], job->out->scale_z[i] = (float)one.scale[2];
-        job->out->opacity[i] = (float)one.opacity;
+    for (size_t i = begin; i < end; i += LANES) {
+        const size_t count = end - i;
+        gaussian8 g = load_gaussians(job->g, i, count);
+        widen_lanes(job->view, job->variance, load_pixel_min(job, i, count), &g);
+        store_scale_opacity(job->out, i, count, &g);
     }
 }
 
-static void adjoint_block(size_t block, size_t begin, size_t end, void *context)
+FASTEST_CLONE static void adjoint_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
     const widen_job *job = context;
-    gaussians *d = job->out;
-    for (size_t i = begin; i < end; i++) {
-        const footprint_gaussian one = read_gaussian(job->g, i);
-        footprint_gaussian back = read_gaussian(d, i);
-        footprint_adjoint(job->view, job->variance, pixel_min_of(job, i), &one, &back);
-        d->mean_x[i] = (float)back.mean[0], d->mean_y[i] = (float)back.mean[1], d->mean_z[i] = (float)back.mean[2];
-        d->scale_x[i] = (float)back.scale[0], d->scale_y[i] = (float)back.scale[1], d->scale_z[i] = (float)back.scale[2];
-        d->quat_w[i] = (float)back.quat[0], d->quat_x[i] = (float)back.quat[1], d->quat_y[i] = (float)back.quat[2],
-            d->quat_z[i] = (float)back.quat[3];
-        d->opacity[i] = (float)back.opacity;
+    for (size_t i = begin; i < end; i += LANES) {
+        const size_t count = end - i;
+        const gaussian8 g = load_gaussians(job->g, i, count);
+        gaussian8 d = load_gaussians(job->out, i, count);
+        adjoint_lanes(job->view, job->variance, load_pixel_min(job, i, count), &g, &d);
+        store_scale_opacity(job->out, i, count, &d);
+        float *mean[] = {job->out->mean_x, job->out->mean_y, job->out->mean_z};
+        float *quat[] = {job->out->quat_w, job->out->quat_x, job->out->quat_y, job->out->quat_z};
+        for (int k = 0; k < 3; k++)
+            store(mean[k] + i, count, d.mean[k]);
+        for (int k = 0; k < 4; k++)
+            store(quat[k] + i, count, d.quat[k]);
     }
 }
 

@@ -15,7 +15,7 @@ enum { GBT_TRAIN_MAX_EVALS = 16 };
 typedef struct gbt_train_def {
     const char *init;           /* "gb" (the paper's granular balls, default), "adaptive" (balls where the scene needs them), "voxel",
                                    "random" points */
-    double init_count;          /* anchors per point of adaptive and random, [0, 1]; 0: a quarter, 4,000 at least. Default 0 */
+    double init_count;          /* anchors per point of adaptive and random, [0, 1], at least one. Default 0.25 */
     const char *scale_prior;    /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use "nn" */
     int max_depth;              /* D_max of the balls, [0, 64]. Default 18 */
     float voxel_size;           /* v, scene units; 0: the median spacing of the points. Default 0 */

@@ -18,6 +18,7 @@
 #include "base/rng.h"
 
 enum { LEVEL_MAX = 8 /* streams per step of the random candidate drop */ };
+#define FIRST_PLACE (UINT64_C(1) << 32) /* candidates below are slots of Gaussians */
 
 /* ---- statistics -------------------------------------------------------------------------------------------------------------- */
 
@@ -55,8 +56,7 @@ adjust_def adjust_def_default(void)
 
 typedef struct cell {
     int64_t at[3];
-    float mean[3];    /* of the candidate with the largest gradient */
-    float gradient;   /* that one's */
+    float position[3], gradient; /* of the candidate with the largest gradient */
     size_t feature;   /* row of growth.feature */
     bool occupied;
 } cell;
@@ -134,7 +134,7 @@ static gbt_status grow_table(growth *g, gbt_error *err)
     return GBT_OK;
 }
 
-static gbt_status add_candidate(growth *g, const int64_t at[3], const float mean[3], size_t parent, float gradient, gbt_error *err)
+static gbt_status add_candidate(growth *g, const int64_t at[3], const float position[3], size_t parent, float gradient, gbt_error *err)
 {
     if ((g->cell_count + 1) * 2 > g->table_size)
         GBT_TRY(grow_table(g, err));
@@ -145,7 +145,7 @@ static gbt_status add_candidate(growth *g, const int64_t at[3], const float mean
         float *best = g->feature + known->feature * ANCHOR_FEATURE_DIM;
         if (gradient > known->gradient) {
             known->gradient = gradient;
-            memcpy(known->mean, mean, sizeof known->mean);
+            memcpy(known->position, position, sizeof known->position);
         }
         for (int i = 0; i < ANCHOR_FEATURE_DIM; i++)
             best[i] = fmaxf(best[i], feature[i]);
@@ -158,7 +158,7 @@ static gbt_status add_candidate(growth *g, const int64_t at[3], const float mean
                         "growth", err));
     g->feature = features;
     memcpy(g->feature + g->feature_count * ANCHOR_FEATURE_DIM, feature, ANCHOR_FEATURE_DIM * sizeof(float));
-    g->cells[g->cell_count] = (cell){.at = {at[0], at[1], at[2]}, .mean = {mean[0], mean[1], mean[2]}, .gradient = gradient,
+    g->cells[g->cell_count] = (cell){.at = {at[0], at[1], at[2]}, .position = {position[0], position[1], position[2]}, .gradient = gradient,
                                      .feature = g->feature_count};
     g->feature_count++;
     g->table[slot] = (uint32_t)++g->cell_count;
@@ -218,34 +218,60 @@ static float level_cell_size(const adjust_def *def, int level)
     return def->voxel_size * (float)(def->compat ? floor(factor) : factor); /* the reference divides integers: 4 / 16 is 0 */
 }
 
-static gbt_status collect_candidates(growth *g, int level, float size, gbt_error *err)
+/* Mean over the views that saw the Gaussian; -1 when they were too few. */
+static float mean_gradient(const growth *g, size_t slot)
 {
-    const anchors *a = g->a;
-    const adjust_def *def = g->def;
-    const size_t offsets = (size_t)a->offset_count;
-    const float drop = ldexpf(1.0f, -(level + 1));
+    const float count = g->stats->grad_count[slot];
+    return well_sampled(g->def, count) ? g->stats->grad_accum[slot] / count : -1;
+}
+
+static float level_threshold(const adjust_def *def, int level)
+{
     float threshold = def->grad_threshold;
     for (int i = 0; i < level; i++) /* integer division in the reference */
         threshold *= def->compat ? (float)(def->hierarchy_factor / 2) : (float)def->hierarchy_factor / 2.0f;
-    g->cell_count = 0;
-    if (g->table_size > 0)
-        memset(g->table, 0, g->table_size * sizeof *g->table);
-    for (size_t i = 0; i < a->count; i++) {
-        for (size_t k = 0; k < offsets; k++) {
-            const size_t slot = i * offsets + k;
-            const float count = g->stats->grad_count[slot];
-            if (!well_sampled(def, count))
-                continue;
-            const float gradient = g->stats->grad_accum[slot] / count;
-            if (!(gradient >= threshold) || !(rng_uniform(def->seed, def->step * LEVEL_MAX + (uint64_t)level, slot) > drop))
-                continue;
-            float mean[3];
-            int64_t at[3];
-            for (size_t c = 0; c < 3; c++)
-                mean[c] = a->position[i * 3 + c] + a->offset[slot * 3 + c] * activation_exp(a->scale_log[i * 6 + c]);
-            if (cell_of(mean, size, at))
-                GBT_TRY(add_candidate(g, at, mean, i, gradient, err));
-        }
+    return threshold;
+}
+
+/* Not lost to the random drop. */
+static bool is_drawn(const adjust_def *def, int level, uint64_t candidate)
+{
+    return rng_uniform(def->seed, def->step * LEVEL_MAX + (uint64_t)level, candidate) > ldexpf(1.0f, -(level + 1));
+}
+
+static gbt_status collect_gaussians(growth *g, int level, float size, gbt_error *err)
+{
+    const anchors *a = g->a;
+    const size_t offsets = (size_t)a->offset_count;
+    const float threshold = level_threshold(g->def, level);
+    for (size_t slot = 0; slot < a->count * offsets; slot++) {
+        const float gradient = mean_gradient(g, slot);
+        if (!(gradient >= threshold) || !is_drawn(g->def, level, slot))
+            continue;
+        const size_t i = slot / offsets;
+        float mean[3];
+        int64_t at[3];
+        for (size_t c = 0; c < 3; c++)
+            mean[c] = a->position[i * 3 + c] + a->offset[slot * 3 + c] * activation_exp(a->scale_log[i * 6 + c]);
+        if (cell_of(mean, size, at))
+            GBT_TRY(add_candidate(g, at, mean, i, gradient, err));
+    }
+    return GBT_OK;
+}
+
+static gbt_status collect_places(growth *g, int level, float size, gbt_error *err)
+{
+    const adjust_def *def = g->def;
+    const size_t offsets = (size_t)g->a->offset_count;
+    const float threshold = level_threshold(def, level);
+    for (size_t p = 0; p < def->place_count; p++) {
+        const size_t i = def->place_anchor[p];
+        float gradient = -1;
+        for (size_t k = 0; k < offsets; k++)
+            gradient = fmaxf(gradient, mean_gradient(g, i * offsets + k));
+        int64_t at[3];
+        if (gradient >= threshold && is_drawn(def, level, FIRST_PLACE | p) && cell_of(def->place + p * 3, size, at))
+            GBT_TRY(add_candidate(g, at, def->place + p * 3, i, gradient, err));
     }
     return GBT_OK;
 }
@@ -255,7 +281,11 @@ static gbt_status grow_level(growth *g, int level, gbt_error *err)
     const float size = level_cell_size(g->def, level);
     if (!(size > 0.0f && size < HUGE_VALF))
         return GBT_OK;
-    GBT_TRY(collect_candidates(g, level, size, err));
+    g->cell_count = 0;
+    if (g->table_size > 0)
+        memset(g->table, 0, g->table_size * sizeof *g->table);
+    GBT_TRY(collect_gaussians(g, level, size, err));
+    GBT_TRY(collect_places(g, level, size, err));
     if (g->cell_count == 0)
         return GBT_OK;
     for (size_t i = 0; i < g->a->count; i++)
@@ -273,8 +303,8 @@ static gbt_status grow_level(growth *g, int level, gbt_error *err)
         fresh *f = &g->added[g->added_count++];
         *f = (fresh){.cell_size = size, .gradient = c->gradient, .level = level, .at = {c->at[0], c->at[1], c->at[2]},
                      .feature = c->feature};
-        for (int k = 0; k < 3; k++) /* that Gaussian has found the surface; the middle of a cell is where the cell is */
-            f->position[k] = g->def->compat ? (float)c->at[k] * size : c->mean[k];
+        for (int k = 0; k < 3; k++) /* there is surface; the middle of a cell is where the cell is */
+            f->position[k] = g->def->compat ? (float)c->at[k] * size : c->position[k];
     }
     return GBT_OK;
 }
@@ -312,6 +342,10 @@ static gbt_status check_arguments(const anchors *a, const adjust_stats *stats, c
     if (def->level_count < 0 || def->level_count > LEVEL_MAX || def->init_factor < 1 || def->hierarchy_factor < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "adjust: %d levels, factors %d and %d (wanted 0 to %d, and both at least 1)",
                          def->level_count, def->init_factor, def->hierarchy_factor, LEVEL_MAX);
+    for (size_t p = 0; p < def->place_count; p++)
+        if (def->place_anchor[p] >= a->count)
+            return base_fail(err, GBT_ERR_ARGUMENT, "adjust: place %zu is anchor %u's (wanted below %zu)", p,
+                             (unsigned)def->place_anchor[p], a->count);
     if (!(def->grad_threshold >= 0.0f) || !(def->interval >= 0.0f) || !(def->success_threshold >= 0.0f) || isnan(def->shape_log_max))
         return base_fail(err, GBT_ERR_ARGUMENT, "adjust: threshold %g, interval %g, success %g (wanted all >= 0)",
                          (double)def->grad_threshold, (double)def->interval, (double)def->success_threshold);

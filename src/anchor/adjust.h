@@ -37,6 +37,9 @@ typedef struct adjust_def {
     uint64_t seed;             /* of the random candidate drop (in both modes): level j keeps 1 - 0.5^(j+1) of the candidates */
     uint64_t step;
     bool grow, prune;          /* both true by default */
+    size_t place_count;        /* places where surface is known to be, besides where Gaussians are; default 0 */
+    const float *place;        /* [place_count][3], finite; borrowed, as place_anchor */
+    const uint32_t *place_anchor; /* [place_count]: row of the anchor that speaks for the place, the nearest */
 } adjust_def;
 adjust_def adjust_def_default(void);
 
@@ -51,10 +54,11 @@ typedef struct adjust_result {
 /**
  * Grow, then prune, as Scaffold-GS does; anchors and statistics are changed in place.
  *
- * New anchor: position = mean of the cell's candidate (a Gaussian) with the largest gradient, the first of equals; in compat mode the
- * cell's centre. Log-scales log(cell), offsets 0, feature = elementwise maximum over the parents of the cell's candidates. Cells use
- * 64-bit keys; a level whose cell is not > 0 is skipped. Never prunes the last anchor (the most opaque stays). Survivors keep their order;
- * new anchors follow by level, then cell (x, y, z).
+ * Candidates are the means of Gaussians, and known places, which have the largest gradient of their anchor's Gaussians. New anchor:
+ * position = the cell's candidate with the largest gradient, the first of equals, Gaussians first; in compat mode the cell's centre.
+ * Log-scales log(cell), offsets 0, feature = elementwise maximum over the parents of the cell's candidates. Cells use 64-bit keys; a level
+ * whose cell is not > 0 is skipped. Never prunes the last anchor (the most opaque stays). Survivors keep their order; new anchors follow by
+ * level, then cell (x, y, z).
  *
  * @param stats [in, out] rows must match `a`
  * @param out   [out] zeroed on failure

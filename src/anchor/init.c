@@ -15,7 +15,7 @@
 
 anchor_init_def anchor_init_def_default(void)
 {
-    return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .balls = balls_def_default(),
+    return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .fraction = 0.25, .balls = balls_def_default(),
                              .offset_count = 10, .fusion = 0.5f, .clip_min = 0.25f, .clip_max = 4.0f, .scale_factor = 1.0f,
                              .scale_max = INFINITY};
 }
@@ -137,18 +137,11 @@ static gbt_status choose_points(const float *position, size_t count, size_t want
     return GBT_OK;
 }
 
-static size_t count_wanted(double fraction, size_t points)
-{
-    static const size_t least = 4000;
-    const size_t wanted = (size_t)ceil((fraction > 0 ? fraction : 0.25) * (double)points);
-    return fraction > 0 || wanted >= least ? wanted : points < least ? points : least;
-}
-
 /* Where the anchors are, and the balls that they stand for, if any. */
 static gbt_status find_centers(const float *position, const float *color, size_t count, const anchor_init_def *def, balls *found,
                                float **centers, size_t *center_count, gbt_error *err)
 {
-    const size_t wanted = count_wanted(def->fraction, count);
+    const size_t wanted = (size_t)ceil(def->fraction * (double)count);
     if (def->kind == ANCHOR_INIT_VOXEL)
         return voxel_centers(position, count, def->balls.voxel_size, centers, center_count, err);
     if (def->kind == ANCHOR_INIT_RANDOM)

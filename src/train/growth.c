@@ -4,8 +4,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/fail.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/parallel.h"
+#include "bvh/points.h"
 #include "train/gradient_check.h"
 
 static const float share_min = 2.5e-6f; /* of short runs: schedule_thrift() */
@@ -90,21 +93,59 @@ static gbt_status follow_rows(anchors *a, const adjust_result *result, gbt_error
     return status;
 }
 
+typedef struct nearest_job {
+    const point_tree *anchors;
+    const float *point;
+    uint32_t *nearest;
+} nearest_job;
+
+static void nearest_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const nearest_job *job = context;
+    for (size_t i = begin; i < end; i++) {
+        double square;
+        job->nearest[i] = 0;
+        point_tree_nearest(job->anchors, job->point + 3 * i, 1, SIZE_MAX, &job->nearest[i], &square);
+    }
+}
+
+/* The sparse points are known surface, and most have no anchor of their own: where the nearest one asks for more, they are places to grow.
+   Its Gaussians are not enough, for they are where it is. */
+static gbt_status grow_at_points(const trainer *t, adjust_def *def, uint32_t **nearest, gbt_error *err)
+{
+    const scene_points *points = &t->scene.points;
+    point_tree *tree;
+    GBT_TRY(point_tree_build(t->anchors.position, NULL, t->anchors.count, &tree, err));
+    *nearest = mem_alloc(points->count, sizeof **nearest, "growth", err);
+    if (*nearest != NULL) {
+        nearest_job job = {tree, points->position, *nearest};
+        parallel_blocks(points->count, 256, nearest_block, &job);
+        def->place = points->position, def->place_anchor = *nearest, def->place_count = points->count;
+    }
+    point_tree_free(tree);
+    return *nearest != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+}
+
 gbt_status growth_adjust(trainer *t, gbt_error *err)
 {
     const uint64_t steps_since = t->def.compat ? COMPAT_INTERVAL : t->step + 1 - t->adjust_step;
     adjust_def def = adjust_def_default();
+    uint32_t *nearest = NULL;
     def.voxel_size = t->voxel_size;
     def.interval = (float)steps_since;
     if (t->def.compat)
         def.shape_log_max = 0.05f;
     else {
+        const double progress = pace_progress(&t->pace, t->step);
         const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
-        const bool last = t->def.last_thrift > 1 && pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
+        const bool last = t->def.last_thrift > 1 && progress >= last_rounds_from * t->def.grow_until;
         def.interval = fmaxf(def.interval, (float)INTERVAL_MIN);
         def.grad_threshold *= thrift;
         def.min_use = thrift * share_min * (last ? (float)t->def.last_thrift : 1);
         def.grow = !last;
+        if (def.grow && progress < SCHEDULE_POINTS_UNTIL)
+            GBT_TRY(grow_at_points(t, &def, &nearest, err));
     }
     def.max_anchors = t->def.max_anchors;
     def.compat = t->def.compat;
@@ -115,6 +156,7 @@ gbt_status growth_adjust(trainer *t, gbt_error *err)
     anchors *followers[] = {&t->gradient, &t->moment1, &t->moment2};
     for (int i = 0; i < 3 && status == GBT_OK; i++)
         status = follow_rows(followers[i], &result, err);
+    mem_free(nearest);
     mem_free(result.source);
     if (result.kept_last)
         log_warn("step %llu: every anchor had become transparent; the most opaque one stays", (unsigned long long)t->step);

@@ -10,7 +10,8 @@ void growth_gather(trainer *t);
 /** Does the step from `progress` to `next` pass a multiple of 1/100 of the run (compat: 100 steps) between start and end of growth? */
 bool growth_is_due(const trainer *t, double progress, double next);
 
-/** Grow and prune: anchors, gradients and moments change together; new anchors have no momentum. GBT_OK, GBT_ERR_NO_MEMORY. */
+/** Grow and prune: anchors, gradients and moments change together; new anchors have no momentum. GBT_OK, GBT_ERR_NO_MEMORY,
+    GBT_ERR_INTERNAL (Embree). */
 gbt_status growth_adjust(trainer *t, gbt_error *err);
 
 #endif

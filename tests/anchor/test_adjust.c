@@ -382,17 +382,21 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
         const size_t begin = count;
         if (def->compat && level > 0 && count == 0)
             break;
-        for (size_t slot = 0; slot < sc->a.count * offsets; slot++) {
-            const size_t i = slot / offsets;
-            if (!(sc->s.grad_count[slot] > 40) || (double)(sc->s.grad_accum[slot] / sc->s.grad_count[slot]) < threshold)
+        const size_t slots = sc->a.count * offsets;
+        for (size_t n = 0; n < slots + def->place_count; n++) { /* Gaussians, then places */
+            const bool is_place = n >= slots;
+            const size_t p = n - slots, i = is_place ? def->place_anchor[p] : n / offsets;
+            brute_anchor b = {.cell = cell, .gradient = -1};
+            for (size_t slot = is_place ? i * offsets : n; slot < (is_place ? (i + 1) * offsets : n + 1); slot++)
+                if (sc->s.grad_count[slot] > 40)
+                    b.gradient = fmax(b.gradient, (double)(sc->s.grad_accum[slot] / sc->s.grad_count[slot]));
+            if (b.gradient < threshold || !survives(def, level, is_place ? ((uint64_t)1 << 32) + p : n))
                 continue;
-            if (!survives(def, level, slot))
-                continue;
-            brute_anchor b = {.cell = cell, .gradient = (double)(sc->s.grad_accum[slot] / sc->s.grad_count[slot])};
             for (size_t c = 0; c < 3; c++) {
-                const float mean = sc->a.position[i * 3 + c] + sc->a.offset[slot * 3 + c] * activation_exp(sc->a.scale_log[i * 6 + c]);
-                b.center[c] = rint((double)mean / cell) * cell;
-                b.position[c] = def->compat ? b.center[c] : (double)mean;
+                const float *anchor = &sc->a.position[i * 3 + c], *scale_log = &sc->a.scale_log[i * 6 + c];
+                const float at = is_place ? def->place[p * 3 + c] : *anchor + sc->a.offset[n * 3 + c] * activation_exp(*scale_log);
+                b.center[c] = rint((double)at / cell) * cell;
+                b.position[c] = def->compat ? b.center[c] : (double)at;
             }
             bool taken = false;
             for (size_t j = 0; j < sc->a.count + begin; j++) {
@@ -442,7 +446,7 @@ static scene random_scene(uint64_t seed, size_t count, int offset_count)
 static void adjust_agrees_with_brute_force(void **state)
 {
     (void)state;
-    size_t total_grown = 0, total_pruned = 0, total_gated = 0;
+    size_t at_places = 0, total_grown = 0, total_pruned = 0, total_gated = 0;
     for (uint64_t seed = 0; seed < 120; seed++) {
         const size_t count = 1 + (size_t)spread(seed, 60, 0, 0, 60);
         const int offset_count = 1 + (int)spread(seed, 61, 0, 0, 5);
@@ -450,7 +454,15 @@ static void adjust_agrees_with_brute_force(void **state)
         adjust_def def = adjust_def_default();
         def.voxel_size = seed % 3 == 0 ? 0.5f : seed % 3 == 1 ? 0.03125f : 0.00390625f;
         def.seed = seed, def.step = 100 * seed, def.compat = seed % 2 == 1;
-        brute_anchor *added = mem_calloc(3 * count * (size_t)offset_count, sizeof *added, "test", NULL);
+        float place[40][3];
+        uint32_t place_anchor[40];
+        def.place = place[0], def.place_anchor = place_anchor, def.place_count = (size_t)spread(seed, 62, 0, 0, 40);
+        for (size_t p = 0; p < def.place_count; p++) {
+            place_anchor[p] = (uint32_t)(rng_uniform(seed, 63, p) * (float)count);
+            for (size_t c = 0; c < 3; c++)
+                place[p][c] = spread(seed, 64 + c, p, -1, 1);
+        }
+        brute_anchor *added = mem_calloc(3 * (count * (size_t)offset_count + def.place_count), sizeof *added, "test", NULL);
         const size_t grown = brute_grow(&before, &def, added);
         total_gated += grown == 0;
         adjust_result r;
@@ -458,6 +470,9 @@ static void adjust_agrees_with_brute_force(void **state)
         if (r.grown != grown)
             fail_msg("seed %llu: %zu grown, not %zu", (unsigned long long)seed, r.grown, grown);
         total_grown += grown, total_pruned += r.pruned;
+        for (size_t g = 0; g < grown; g++)
+            for (size_t p = 0; p < def.place_count; p++)
+                at_places += added[g].position[0] == (double)place[p][0] && added[g].position[1] == (double)place[p][1];
         assert_true(r.count == sc.a.count && r.count == sc.s.count && r.count >= 1 && r.count == count - r.pruned + grown);
         size_t row = 0;
         const size_t k = (size_t)offset_count;
@@ -495,7 +510,7 @@ static void adjust_agrees_with_brute_force(void **state)
         free_scene(&before, NULL);
         free_scene(&sc, &r);
     }
-    assert_true(total_grown > 1000 && total_pruned > 100 && total_gated > 0);
+    assert_true(total_grown > 1000 && total_pruned > 100 && total_gated > 0 && at_places > 100);
 }
 
 static void the_cap_holds_for_random_scenes(void **state)

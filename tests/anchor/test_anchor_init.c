@@ -259,24 +259,6 @@ static void tiny_scales_have_a_floor(void **state)
     }
 }
 
-/* A quarter of the points, but 4,000 where there are so many. */
-static void as_many_as_they_need(void **state)
-{
-    (void)state;
-    static float position[20000 * 3];
-    random_cloud(position, 20000, 4);
-    const struct { size_t points, wanted; } rows[] = {{1, 1}, {3999, 3999}, {4001, 4000}, {15999, 4000}, {16001, 4001}, {20000, 5000}};
-    for (size_t r = 0; r < sizeof rows / sizeof *rows; r++)
-        for (int kind = ANCHOR_INIT_ADAPTIVE; kind <= ANCHOR_INIT_RANDOM; kind++) {
-            anchor_init_def def = def_with_voxel(0.001f);
-            def.kind = (anchor_init_kind)kind;
-            anchors a;
-            assert_ok(anchors_init(position, NULL, rows[r].points, &def, &a, NULL, NULL));
-            assert_int_equal(a.count, rows[r].wanted);
-            anchors_free(&a);
-        }
-}
-
 static void same_bits_for_all_threads(void **state)
 {
     (void)state;
@@ -368,8 +350,7 @@ int main(void)
     const struct CMUnitTest single[] = {
         cmocka_unit_test(anchors_stand_on_ball_centers), cmocka_unit_test(neighbour_scale),
         cmocka_unit_test(adaptive_anchors_stand_on_adaptive_balls), cmocka_unit_test(random_anchors_are_some_of_the_points),
-        cmocka_unit_test(kinds_have_names),
-        cmocka_unit_test(tiny_scales_have_a_floor), cmocka_unit_test(as_many_as_they_need), cmocka_unit_test(same_bits_for_all_threads),
+        cmocka_unit_test(kinds_have_names), cmocka_unit_test(tiny_scales_have_a_floor), cmocka_unit_test(same_bits_for_all_threads),
         cmocka_unit_test(wrong_arguments_are_refused), cmocka_unit_test(no_memory_is_an_error),
     };
     for (size_t i = 0; i < sizeof single / sizeof *single; i++)

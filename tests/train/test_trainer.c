@@ -358,6 +358,44 @@ static void growth_stops_at_max_anchors(void **state)
     trainer_free(&t);
 }
 
+static size_t anchors_at_points(const trainer *t)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < t->anchors.count; i++) {
+        size_t p = 0;
+        while (p < t->scene.points.count && memcmp(t->anchors.position + 3 * i, t->scene.points.position + 3 * p, 3 * sizeof(float)) != 0)
+            p++;
+        count += p < t->scene.points.count;
+    }
+    return count;
+}
+
+/* A start from a few balls leaves most points without an anchor; early growth comes back to them, later growth has Gaussians to go by. */
+static void growth_begins_at_the_points(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.init = "adaptive", def.init_count = 0.1, def.iterations = 320;
+    trainer t;
+    open_ok(&t, tiny, &def);
+    size_t at_points = anchors_at_points(&t);
+    assert_true(at_points < t.scene.points.count / 20);
+    const uint64_t until = (uint64_t)(SCHEDULE_POINTS_UNTIL * 320) + 2;
+    while (t.step < until) {
+        step_report r;
+        step_ok(&t, &r);
+    }
+    print_message("%zu of %zu anchors at points, %zu at the start\n", anchors_at_points(&t), t.anchors.count, at_points);
+    assert_true(anchors_at_points(&t) > at_points + 5);
+    at_points = anchors_at_points(&t);
+    while (t.step < 2 * until) {
+        step_report r;
+        step_ok(&t, &r);
+    }
+    assert_true(anchors_at_points(&t) <= at_points);
+    trainer_free(&t);
+}
+
 /* One adjust of the reference's kind, in whose step the anchors' Adam groups rest: what moves is the rows alone. Every second anchor is
    made transparent by its statistics, the first candidates are made to grow by theirs. Anchors never move, so a position names a row. */
 static void moments_follow_their_rows(void **state)
@@ -1027,6 +1065,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(training_learns),
         cmocka_unit_test(without_growing_the_anchors_stay),
         cmocka_unit_test(growth_stops_at_max_anchors),
+        cmocka_unit_test(growth_begins_at_the_points),
         cmocka_unit_test(moments_follow_their_rows),
         cmocka_unit_test(points_are_made_where_there_are_none),
         cmocka_unit_test(data_without_training_photos_is_refused),

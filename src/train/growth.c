@@ -127,30 +127,34 @@ static gbt_status grow_at_points(const trainer *t, adjust_def *def, uint32_t **n
     return *nearest != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
-gbt_status growth_adjust(trainer *t, gbt_error *err)
+static adjust_def rules_of(const trainer *t)
 {
-    const uint64_t steps_since = t->def.compat ? COMPAT_INTERVAL : t->step + 1 - t->adjust_step;
     adjust_def def = adjust_def_default();
-    uint32_t *nearest = NULL;
     def.voxel_size = t->voxel_size;
-    def.interval = (float)steps_since;
-    if (t->def.compat)
-        def.shape_log_max = 0.05f;
-    else {
-        const double progress = pace_progress(&t->pace, t->step);
-        const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
-        const bool last = t->def.last_thrift > 1 && progress >= last_rounds_from * t->def.grow_until;
-        def.interval = fmaxf(def.interval, (float)INTERVAL_MIN);
-        def.grad_threshold *= thrift;
-        def.min_use = thrift * share_min * (last ? (float)t->def.last_thrift : 1);
-        def.grow = !last;
-        if (def.grow && progress < SCHEDULE_POINTS_UNTIL)
-            GBT_TRY(grow_at_points(t, &def, &nearest, err));
-    }
     def.max_anchors = t->def.max_anchors;
     def.compat = t->def.compat;
     def.seed = t->def.seed;
     def.step = t->step;
+    if (t->def.compat) {
+        def.interval = COMPAT_INTERVAL;
+        def.shape_log_max = 0.05f;
+        return def;
+    }
+    const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
+    const bool last = t->def.last_thrift > 1 && pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
+    def.interval = fmaxf((float)(t->step + 1 - t->adjust_step), (float)INTERVAL_MIN);
+    def.grad_threshold *= thrift;
+    def.min_use = thrift * share_min * (last ? (float)t->def.last_thrift : 1);
+    def.grow = !last;
+    return def;
+}
+
+gbt_status growth_adjust(trainer *t, gbt_error *err)
+{
+    adjust_def def = rules_of(t);
+    uint32_t *nearest = NULL;
+    if (!def.compat && def.grow && pace_progress(&t->pace, t->step) < SCHEDULE_POINTS_UNTIL)
+        GBT_TRY(grow_at_points(t, &def, &nearest, err));
     adjust_result result = {0};
     gbt_status status = anchors_adjust(&t->anchors, &t->stats, &def, &result, err);
     anchors *followers[] = {&t->gradient, &t->moment1, &t->moment2};

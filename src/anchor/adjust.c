@@ -18,7 +18,6 @@
 #include "base/rng.h"
 
 enum { LEVEL_MAX = 8 /* streams per step of the random candidate drop */ };
-#define FIRST_PLACE (UINT64_C(1) << 32) /* candidates below are slots of Gaussians */
 
 /* ---- statistics -------------------------------------------------------------------------------------------------------------- */
 
@@ -64,7 +63,7 @@ typedef struct cell {
 /* New anchors of all levels so far. */
 typedef struct fresh {
     float position[3];
-    float cell_size;
+    float scale;
     float gradient;
     int level;
     int64_t at[3];
@@ -234,9 +233,9 @@ static float level_threshold(const adjust_def *def, int level)
 }
 
 /* Not lost to the random drop. */
-static bool is_drawn(const adjust_def *def, int level, uint64_t candidate)
+static bool is_drawn(const adjust_def *def, int level, uint64_t slot)
 {
-    return rng_uniform(def->seed, def->step * LEVEL_MAX + (uint64_t)level, candidate) > ldexpf(1.0f, -(level + 1));
+    return rng_uniform(def->seed, def->step * LEVEL_MAX + (uint64_t)level, slot) > ldexpf(1.0f, -(level + 1));
 }
 
 static gbt_status collect_gaussians(growth *g, int level, float size, gbt_error *err)
@@ -259,33 +258,35 @@ static gbt_status collect_gaussians(growth *g, int level, float size, gbt_error 
     return GBT_OK;
 }
 
-static gbt_status collect_places(growth *g, int level, float size, gbt_error *err)
+/* Asked for as at the finest level. */
+static gbt_status collect_places(growth *g, float size, gbt_error *err)
 {
     const adjust_def *def = g->def;
     const size_t offsets = (size_t)g->a->offset_count;
-    const float threshold = level_threshold(def, level);
+    const float threshold = level_threshold(def, def->level_count - 1);
     for (size_t p = 0; p < def->place_count; p++) {
         const size_t i = def->place_anchor[p];
         float gradient = -1;
         for (size_t k = 0; k < offsets; k++)
             gradient = fmaxf(gradient, mean_gradient(g, i * offsets + k));
         int64_t at[3];
-        if (gradient >= threshold && is_drawn(def, level, FIRST_PLACE | p) && cell_of(def->place + p * 3, size, at))
+        if (gradient >= threshold && cell_of(def->place + p * 3, size, at))
             GBT_TRY(add_candidate(g, at, def->place + p * 3, i, gradient, err));
     }
     return GBT_OK;
 }
 
+/* The level after the last is that of places: they stand closer than v where there is much to see, so their cells are finer. */
 static gbt_status grow_level(growth *g, int level, gbt_error *err)
 {
     const float size = level_cell_size(g->def, level);
+    const bool at_places = level == g->def->level_count;
     if (!(size > 0.0f && size < HUGE_VALF))
         return GBT_OK;
     g->cell_count = 0;
     if (g->table_size > 0)
         memset(g->table, 0, g->table_size * sizeof *g->table);
-    GBT_TRY(collect_gaussians(g, level, size, err));
-    GBT_TRY(collect_places(g, level, size, err));
+    GBT_TRY(at_places ? collect_places(g, size, err) : collect_gaussians(g, level, size, err));
     if (g->cell_count == 0)
         return GBT_OK;
     for (size_t i = 0; i < g->a->count; i++)
@@ -301,8 +302,8 @@ static gbt_status grow_level(growth *g, int level, gbt_error *err)
         GBT_TRY(mem_reserve(&added, &g->added_capacity, g->added_count, g->added_count + 1, sizeof *g->added, "growth", err));
         g->added = added;
         fresh *f = &g->added[g->added_count++];
-        *f = (fresh){.cell_size = size, .gradient = c->gradient, .level = level, .at = {c->at[0], c->at[1], c->at[2]},
-                     .feature = c->feature};
+        *f = (fresh){.scale = at_places ? level_cell_size(g->def, level - 1) : size, .gradient = c->gradient, .level = level,
+                     .at = {c->at[0], c->at[1], c->at[2]}, .feature = c->feature};
         for (int k = 0; k < 3; k++) /* there is surface; the middle of a cell is where the cell is */
             f->position[k] = g->def->compat ? (float)c->at[k] * size : c->position[k];
     }
@@ -311,7 +312,8 @@ static gbt_status grow_level(growth *g, int level, gbt_error *err)
 
 static gbt_status grow(growth *g, gbt_error *err)
 {
-    for (int level = 0; level < g->def->level_count; level++) {
+    const int levels = g->def->level_count + (g->def->place_count > 0);
+    for (int level = 0; level < levels; level++) {
         if (g->def->compat && level > 0 && g->added_count == 0)
             break;
         GBT_TRY(grow_level(g, level, err));
@@ -412,7 +414,7 @@ static void append(anchors *a, const growth *g, size_t first, int64_t *source)
         memcpy(a->position + row * 3, f->position, sizeof f->position);
         memcpy(a->feature + row * ANCHOR_FEATURE_DIM, g->feature + f->feature * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof(float));
         for (size_t c = 0; c < 6; c++)
-            a->scale_log[row * 6 + c] = (float)log((double)f->cell_size);
+            a->scale_log[row * 6 + c] = (float)log((double)f->scale);
     }
 }
 

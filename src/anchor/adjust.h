@@ -54,10 +54,11 @@ typedef struct adjust_result {
 /**
  * Grow, then prune, as Scaffold-GS does; anchors and statistics are changed in place.
  *
- * Candidates are the means of Gaussians, and known places, which have the largest gradient of their anchor's Gaussians. New anchor:
- * position = the cell's candidate with the largest gradient, the first of equals, Gaussians first; in compat mode the cell's centre.
- * Log-scales log(cell), offsets 0, feature = elementwise maximum over the parents of the cell's candidates. Cells use 64-bit keys; a level
- * whose cell is not > 0 is skipped. Never prunes the last anchor (the most opaque stays). Survivors keep their order; new anchors follow by
+ * Candidates are the means of Gaussians; then, in cells finer by one more level but asked for as at the last, the known places, each with
+ * the largest gradient of its anchor's Gaussians. New anchor: position = the cell's candidate with the largest gradient, the first of
+ * equals; in compat mode the cell's centre, and no places. Log-scales log(cell), of the last level's cell at places, offsets 0, feature =
+ * elementwise maximum over the parents of the cell's candidates. Cells use 64-bit keys; a level whose cell is not > 0 is skipped. Never
+ * prunes the last anchor (the most opaque stays). Survivors keep their order; new anchors follow by
  * level, then cell (x, y, z).
  *
  * @param stats [in, out] rows must match `a`

@@ -360,7 +360,7 @@ static void a_cell_is_worth_its_best_candidate(void **state)
 /* ---- brute force ------------------------------------------------------------------------------------------------------------- */
 
 typedef struct brute_anchor {
-    double center[3], position[3], cell, feature[32], gradient;
+    double center[3], position[3], scale, feature[32], gradient;
 } brute_anchor;
 
 static int by_place(const void *a, const void *b)
@@ -377,20 +377,21 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
 {
     const size_t offsets = (size_t)sc->a.offset_count;
     size_t count = 0;
-    for (int level = 0; level < 3; level++) {
-        const double cell = (double)def->voxel_size * (double[3]){16, 4, 1}[level], threshold = (double)def->grad_threshold * (1 << level);
+    for (int level = 0; level < (def->compat ? 3 : 4); level++) { /* Gaussians, then places */
+        const double cell = (double)def->voxel_size * (double[4]){16, 4, 1, 0.25}[level];
+        const double threshold = (double)def->grad_threshold * (double[4]){1, 2, 4, 4}[level];
         const size_t begin = count;
         if (def->compat && level > 0 && count == 0)
             break;
         const size_t slots = sc->a.count * offsets;
-        for (size_t n = 0; n < slots + def->place_count; n++) { /* Gaussians, then places */
-            const bool is_place = n >= slots;
+        const bool is_place = level == 3;
+        for (size_t n = is_place ? slots : 0; n < slots + (is_place ? def->place_count : 0); n++) {
             const size_t p = n - slots, i = is_place ? def->place_anchor[p] : n / offsets;
-            brute_anchor b = {.cell = cell, .gradient = -1};
+            brute_anchor b = {.scale = is_place ? 4 * cell : cell, .gradient = -1};
             for (size_t slot = is_place ? i * offsets : n; slot < (is_place ? (i + 1) * offsets : n + 1); slot++)
                 if (sc->s.grad_count[slot] > 40)
                     b.gradient = fmax(b.gradient, (double)(sc->s.grad_accum[slot] / sc->s.grad_count[slot]));
-            if (b.gradient < threshold || !survives(def, level, is_place ? ((uint64_t)1 << 32) + p : n))
+            if (b.gradient < threshold || !(is_place || survives(def, level, n)))
                 continue;
             for (size_t c = 0; c < 3; c++) {
                 const float *anchor = &sc->a.position[i * 3 + c], *scale_log = &sc->a.scale_log[i * 6 + c];
@@ -502,7 +503,7 @@ static void adjust_agrees_with_brute_force(void **state)
                 assert_true((double)sc.a.position[row * 3 + c] == added[i].position[c]);
             for (size_t f = 0; f < 32; f++)
                 assert_true((double)sc.a.feature[row * 32 + f] == added[i].feature[f]);
-            assert_true(fabs((double)sc.a.scale_log[row * 6 + 5] - log(added[i].cell)) < 1e-6);
+            assert_true(fabs((double)sc.a.scale_log[row * 6 + 5] - log(added[i].scale)) < 1e-6);
             for (size_t j = 0; j < k; j++)
                 assert_true(sc.s.grad_count[row * k + j] == 0 && sc.s.grad_accum[row * k + j] == 0);
         }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/camera_lens.h"
+#include "base/clones.h"
 #include "base/fail.h"
 #include "base/parallel.h"
 
@@ -17,14 +18,8 @@ typedef double d8 __attribute__((vector_size(LANES * sizeof(double))));
 typedef float f8 __attribute__((vector_size(LANES * sizeof(float))));
 typedef int64_t m8 __attribute__((vector_size(LANES * sizeof(int64_t)))); /* all bits or none, as comparisons give it */
 
-/* Inlined into a clone for each instruction set. No fused operations (the project compiles without contraction), so every clone gives
-   the same bits. ThreadSanitizer is not up yet when the loader picks a clone. */
+/* Inlined into every clone. */
 #define LANE_CODE static inline __attribute__((always_inline))
-#if defined(__SANITIZE_THREAD__)
-#define FASTEST_CLONE
-#else
-#define FASTEST_CLONE __attribute__((target_clones("avx512f", "avx2", "default")))
-#endif
 
 footprint_view footprint_view_of(const gbt_camera *camera)
 {

@@ -3,20 +3,14 @@
 
 #include <math.h>
 
+#include "base/clones.h"
+
 adam_rates adam_rates_at(double rate, uint64_t t)
 {
     return (adam_rates){.rate = (float)rate,
                         .correct_m = (float)(1 / (1 - pow(0.9, (double)t))),
                         .correct_v = (float)(1 / (1 - pow(0.999, (double)t)))};
 }
-
-/* No fused operations (the project compiles without contraction), so every clone gives the same bits. ThreadSanitizer is not up yet
-   when the loader picks a clone. */
-#if defined(__SANITIZE_THREAD__)
-#define FASTEST_CLONE
-#else
-#define FASTEST_CLONE __attribute__((target_clones("avx512f", "avx2", "default")))
-#endif
 
 FASTEST_CLONE void adam_step(float *restrict param, float *restrict gradient, float *restrict m, float *restrict v, size_t count,
                              adam_rates rates)

@@ -63,7 +63,7 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
         {.name = "grow-until", .kind = OPTION_DOUBLE, .value = &d->grow_until, .min = 0, .max = 1, .value_name = "F",
          .help = "anchors grow and are pruned up to this part of the run"},
         {.name = "scale-factor", .kind = OPTION_DOUBLE, .value = &d->scale_factor, .min = 0, .max = 100, .value_name = "F",
-         .help = "of the anchors' first scales; 0: 2 with the balls' prior, 1.2 with spacing, 1 with --compat"},
+         .help = "of the anchors' first scales; 0: 2 with the balls' prior, 0.7 with spacing, 1 with --compat"},
         {.name = "exposure", .kind = OPTION_FLAG, .value = &d->exposure,
          .help = "learn a colour matrix per photo, where exposure or white balance differ"},
         {.name = "learning-rate", .kind = OPTION_DOUBLE, .value = &d->learning_rate_factor, .min = 1e-3, .max = 1e3, .value_name = "F",

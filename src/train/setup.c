@@ -19,8 +19,9 @@ enum { STREAM_NETWORKS = 2, FEW_PLACES = 128 };
 /* Fewer Gaussians per anchor than in the paper's base: at equal time the models are better (docs/training.md). */
 enum { default_offsets = 2 };
 
-/* Gaussians that overlap from the start leave no holes to look through, and are found by gradients from farther away (docs/training.md). */
-static const double ball_scale_factor = 2, spacing_scale_factor = 1.2;
+/* Either way about the spacing of anchors. Smaller Gaussians leave holes to look through; larger ones, where a few anchors stand far apart,
+   cover what they cannot show, and stay large (docs/training.md). */
+static const double ball_scale_factor = 2, spacing_scale_factor = 0.7;
 
 gbt_train_def gbt_train_def_default(void)
 {
@@ -211,7 +212,7 @@ static gbt_status measure_distances(trainer *t, float *p5, float *median, float 
     return GBT_OK;
 }
 
-/* The first features carry the colour of the nearest point: the networks need not discover it anchor by anchor. The rest is small noise. */
+/* The first features carry the colour of the nearest point: the networks need not discover it anchor by anchor. The rest is 0. */
 static gbt_status start_features(trainer *t, gbt_error *err)
 {
     point_tree *tree = NULL;

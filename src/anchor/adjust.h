@@ -58,8 +58,7 @@ typedef struct adjust_result {
  * the largest gradient of its anchor's Gaussians. New anchor: position = the cell's candidate with the largest gradient, the first of
  * equals; in compat mode the cell's centre, and no places. Log-scales log(cell), of the last level's cell at places, offsets 0, feature =
  * elementwise maximum over the parents of the cell's candidates. Cells use 64-bit keys; a level whose cell is not > 0 is skipped. Never
- * prunes the last anchor (the most opaque stays). Survivors keep their order; new anchors follow by
- * level, then cell (x, y, z).
+ * prunes the last anchor (the most opaque stays). Survivors keep their order; new anchors follow by level, then cell (x, y, z).
  *
  * @param stats [in, out] rows must match `a`
  * @param out   [out] zeroed on failure

@@ -11,7 +11,8 @@ GBT_API_BEGIN
 typedef struct gbt_init_def {
     const char *init;        /* "gb" (granular balls, default), "adaptive" (balls where the scene needs them), "voxel", or "random"
                                 points */
-    double init_count;       /* anchors per point of adaptive and random, [0, 1], at least one. Default 0.25 */
+    double init_count;       /* anchors per point of adaptive and random, [0, 1], at least one; 0: half as many as the paper's balls.
+                                Default 0 */
     const char *scale_prior; /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use "nn" */
     int max_depth;           /* D_max of the balls, [0, 64]. Default 18 */
     float voxel_size;        /* v, scene units; 0: from the points by `voxel_rule`. Default 0 */

@@ -15,7 +15,8 @@ enum { GBT_TRAIN_MAX_EVALS = 16 };
 typedef struct gbt_train_def {
     const char *init;           /* "gb" (the paper's granular balls, default), "adaptive" (balls where the scene needs them), "voxel",
                                    "random" points */
-    double init_count;          /* anchors per point of adaptive and random, [0, 1], at least one. Default 0.25 */
+    double init_count;          /* anchors per point of adaptive and random, [0, 1], at least one; 0: half as many as the paper's balls.
+                                   Default 0 */
     const char *scale_prior;    /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use "nn" */
     int max_depth;              /* D_max of the balls, [0, 64]. Default 18 */
     float voxel_size;           /* v, scene units; 0: the median spacing of the points. Default 0 */
@@ -50,7 +51,7 @@ typedef struct gbt_train_def {
     double splats_until;        /* splats stand for rays until this part of the run, [0, 1]: their steps are quicker. Pinhole photos, the
                                    renderer "trace", not with compat. Default 0.7 */
     double grow_until;          /* anchors grow and are pruned until this fraction of the run, [0, 1]. Default 0.5 */
-    double scale_factor;        /* of the anchors' first scales, [0.01, 100]; 0: 2 with the balls' scale prior, 1.2 with spacing, 1 with
+    double scale_factor;        /* of the anchors' first scales, [0.01, 100]; 0: 2 with the balls' scale prior, 0.7 with spacing, 1 with
                                    compat. Default 0 */
     double learning_rate_factor; /* of all learning rates, [1e-3, 1e3]. Default 1 */
     double save_every_seconds;  /* wall time between checkpoints; 0: only at the end. Default 120 */

@@ -4,6 +4,8 @@
 
 #include "anchor/anchors.h"
 
+enum { ADJUST_MAX_LEVELS = 8 };
+
 /** Gathered every step between two adjusts. Row counts follow the anchors. Start from {0}. */
 typedef struct adjust_stats {
     size_t count, capacity;
@@ -21,7 +23,7 @@ void adjust_stats_free(adjust_stats *s);
 
 typedef struct adjust_def {
     float voxel_size;          /* v: cells are v * init_factor / hierarchy^level (an integer division in compat mode: 4 / 16 is 0) */
-    int level_count;           /* [0, 8], default 3 */
+    int level_count;           /* [0, ADJUST_MAX_LEVELS], default 3 */
     int init_factor;           /* default 16 */
     int hierarchy_factor;      /* default 4 */
     float grad_threshold;      /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */

@@ -15,7 +15,7 @@
 
 anchor_init_def anchor_init_def_default(void)
 {
-    return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .fraction = 0.25, .balls = balls_def_default(),
+    return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .fraction = 0, .balls = balls_def_default(),
                              .offset_count = 10, .fusion = 0.5f, .clip_min = 0.25f, .clip_max = 4.0f, .scale_factor = 1.0f,
                              .scale_max = INFINITY};
 }
@@ -137,17 +137,32 @@ static gbt_status choose_points(const float *position, size_t count, size_t want
     return GBT_OK;
 }
 
+/* How many anchors the kinds that can make any number are to make. */
+static gbt_status count_wanted(const float *position, const float *color, size_t count, const anchor_init_def *def, size_t *out,
+                               gbt_error *err)
+{
+    *out = (size_t)ceil(def->fraction * (double)count);
+    if (def->fraction > 0 || count == 0)
+        return GBT_OK;
+    balls paper;
+    GBT_TRY(balls_build(position, color, count, &def->balls, &paper, err));
+    *out = paper.count > 1 ? paper.count / 2 : 1;
+    balls_free(&paper);
+    return GBT_OK;
+}
+
 /* Where the anchors are, and the balls that they stand for, if any. */
 static gbt_status find_centers(const float *position, const float *color, size_t count, const anchor_init_def *def, balls *found,
                                float **centers, size_t *center_count, gbt_error *err)
 {
-    const size_t wanted = (size_t)ceil(def->fraction * (double)count);
     if (def->kind == ANCHOR_INIT_VOXEL)
         return voxel_centers(position, count, def->balls.voxel_size, centers, center_count, err);
-    if (def->kind == ANCHOR_INIT_RANDOM)
-        return *center_count = wanted, choose_points(position, count, wanted, centers, err);
     if (def->kind == ANCHOR_INIT_GB)
         return balls_build(position, color, count, &def->balls, found, err);
+    size_t wanted;
+    GBT_TRY(count_wanted(position, color, count, def, &wanted, err));
+    if (def->kind == ANCHOR_INIT_RANDOM)
+        return *center_count = wanted, choose_points(position, count, wanted, centers, err);
     adaptive_def adaptive = adaptive_def_default();
     adaptive.voxel_size = def->balls.voxel_size, adaptive.min_scale = def->balls.min_scale;
     adaptive.balls_max = wanted > 0 ? wanted : 1;

@@ -19,7 +19,8 @@ typedef enum anchor_scale_kind { ANCHOR_SCALE_GB, ANCHOR_SCALE_NN } anchor_scale
 typedef struct anchor_init_def {
     anchor_init_kind kind;        /* default ANCHOR_INIT_GB */
     anchor_scale_kind scale;      /* default ANCHOR_SCALE_GB, for ANCHOR_INIT_GB alone: the others always use ANCHOR_SCALE_NN */
-    double fraction;              /* anchors per point of ANCHOR_INIT_ADAPTIVE and _RANDOM, [0, 1], at least one. Default 0.25 */
+    double fraction;              /* anchors per point of ANCHOR_INIT_ADAPTIVE and _RANDOM, [0, 1], at least one; 0: half as many as
+                                     ANCHOR_INIT_GB makes. Default 0 */
     balls_def balls;              /* voxel_size must be set; also the voxel edge of ANCHOR_INIT_VOXEL */
     int offset_count;             /* K, default 10 */
     float fusion;                 /* alpha, eq 34: weight of the neighbour scale. Default 0.5 */

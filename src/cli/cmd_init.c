@@ -13,7 +13,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "init", .kind = OPTION_CHOICE, .value = &def.init, .choices = "gb|adaptive|voxel|random",
          .help = "granular balls; balls where the scene needs them; the voxel baseline; or random points"},
         {.name = "init-count", .kind = OPTION_DOUBLE, .value = &def.init_count, .min = 0, .max = 1, .value_name = "F",
-         .help = "anchors per point of adaptive and random"},
+         .help = "anchors per point of adaptive and random; 0: half as many as gb"},
         {.name = "scale-prior", .kind = OPTION_CHOICE, .value = &def.scale_prior, .choices = "gb|nn",
          .help = "first scale of --init gb: balls and spacing, or spacing alone, as the others have"},
         {.name = "max-depth", .kind = OPTION_INT, .value = &def.max_depth, .min = 0, .max = 64, .value_name = "D",

@@ -23,7 +23,7 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
         {.name = "init", .kind = OPTION_CHOICE, .value = &d->init, .choices = "gb|adaptive|voxel|random",
          .help = "anchors from the paper's balls, balls where the scene needs them, voxels, random points"},
         {.name = "init-count", .kind = OPTION_DOUBLE, .value = &d->init_count, .min = 0, .max = 1, .value_name = "F",
-         .help = "anchors per point of adaptive and random"},
+         .help = "anchors per point of adaptive and random; 0: half as many as gb"},
         {.name = "scale-prior", .kind = OPTION_CHOICE, .value = &d->scale_prior, .choices = "gb|nn",
          .help = "first scale of --init gb from balls and spacing, or from spacing alone, as the others have"},
         {.name = "max-depth", .kind = OPTION_INT, .value = &d->max_depth, .min = 0, .max = 64, .value_name = "D",

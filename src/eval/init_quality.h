@@ -17,7 +17,7 @@ typedef struct init_quality {
  * Measure the paper's balls, adaptive ones, and the finest voxels that are no more than the adaptive balls.
  *
  * @param points   [in] at least one
- * @param fraction [in] adaptive balls per point, as in anchor_init_def
+ * @param fraction [in] adaptive balls per point, 0: half of the paper's; as in anchor_init_def
  * @param out      [out] [INIT_QUALITY_ROWS]
  * @return GBT_OK, GBT_ERR_ARGUMENT (setting out of range), GBT_ERR_NO_MEMORY
  *

@@ -100,6 +100,17 @@ static void anchors_stand_on_ball_centers(void **state)
     }
 }
 
+static size_t half_of_the_papers(const float *position, const float *color, size_t count)
+{
+    const anchor_init_def def = def_with_voxel(0.05f);
+    balls paper;
+    assert_ok(balls_build(position, color, count, &def.balls, &paper, NULL));
+    const size_t half = paper.count / 2;
+    balls_free(&paper);
+    assert_true(half > 100);
+    return half;
+}
+
 static void adaptive_anchors_stand_on_adaptive_balls(void **state)
 {
     (void)state;
@@ -107,7 +118,8 @@ static void adaptive_anchors_stand_on_adaptive_balls(void **state)
     random_cloud(position, 900, 6);
     for (size_t i = 0; i < 900 * 3; i++)
         color[i] = spread(6, 1, i, 0.0f, 1.0f);
-    const struct { double fraction; size_t count; } rows[] = {{0.25, 225}, {0.3334, 301}, {1e-6, 1}, {1, 900}};
+    const struct { double fraction; size_t count; } rows[] = {
+        {0, half_of_the_papers(position, color, 900)}, {0.25, 225}, {0.3334, 301}, {1e-6, 1}, {1, 900}};
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
         anchor_init_def def = def_with_voxel(0.05f);
         def.kind = ANCHOR_INIT_ADAPTIVE, def.fraction = rows[r].fraction;
@@ -132,7 +144,8 @@ static void random_anchors_are_some_of_the_points(void **state)
     (void)state;
     static float position[1000 * 3];
     random_cloud(position, 1000, 7);
-    const struct { double fraction; size_t count; } rows[] = {{0.25, 250}, {0.0001, 1}, {0.9991, 1000}, {1, 1000}};
+    const struct { double fraction; size_t count; } rows[] = {
+        {0, half_of_the_papers(position, NULL, 1000)}, {0.25, 250}, {0.0001, 1}, {0.9991, 1000}, {1, 1000}};
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
         anchor_init_def def = def_with_voxel(0.05f);
         def.kind = ANCHOR_INIT_RANDOM, def.fraction = rows[r].fraction;

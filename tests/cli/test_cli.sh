@@ -168,7 +168,7 @@ prints "a name behind --" '^cloud.ply: data set (ply)$' info -- cloud.ply
 prints "init" '^anchors  *[1-9][0-9]* (granular balls)' init cloud.ply -o balls.ply --json balls.json
 prints "init keeps voxels beside it" '^voxel baseline  *64 anchors' init cloud.ply -o balls.ply
 prints "init with voxels" '^anchors  *64 (voxels), 1 points each$' init cloud.ply -o voxels.ply --init voxel
-prints "init with adaptive balls" '^anchors  *16 (adaptive balls), 4 points each$' init cloud.ply -o adaptive.ply --init adaptive
+prints "init with adaptive balls" '^anchors  *4 (adaptive balls), 16 points each$' init cloud.ply -o adaptive.ply --init adaptive
 prints "init with so many of them" '^anchors  *32 (adaptive balls), 2 points each$' init cloud.ply -o adaptive.ply --init adaptive --init-count 0.5
 prints "init, depth 0 is one ball" '^anchors  *1 (granular balls), 64 points each$' init cloud.ply -o one.ply --max-depth 0
 printf 'max-depth = 0\noutput = from_config.ply\n' >one.conf

@@ -181,6 +181,7 @@ static void init_counts(void **state)
     const char *data = write_grid("cloud.ply", 4, 1.0, 0.0);
     FILE *report = fopen("/dev/null", "w");
     gbt_init_def def = gbt_init_def_default();
+    def.init_count = 0.25;
     const struct { const char *init; int max_depth; float voxel_size; double anchors, voxels, balls; } rows[] = {
         /* cubes of 8 points: compact (eq 23) */
         {"gb", 0, 0.0f, 1, 64, 1}, {"gb", 1, 0.0f, 2, 64, 2}, {"gb", 2, 0.0f, 4, 64, 4}, {"gb", 18, 0.0f, 8, 64, 8},

@@ -1,0 +1,13 @@
+/* train/def.h -- the settings of training: ranges, and what 0 stands for. */
+#ifndef GBT_TRAIN_DEF_H
+#define GBT_TRAIN_DEF_H
+
+#include "gbtrace/train.h"
+
+/** GBT_OK, or GBT_ERR_ARGUMENT and the option that is out of its range. */
+gbt_status train_def_check(const gbt_train_def *d, gbt_error *err);
+
+/** Values for what 0 leaves to us, and for what `compat` decides. A second call changes nothing. */
+void train_def_settle(gbt_train_def *d);
+
+#endif

@@ -30,6 +30,9 @@ typedef struct gbt_train_def {
                                    "per-ray" */
     double footprint;           /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays.
                                    Default 0.1; 0 with compat, splats are dilated then */
+    double near;                /* nothing is seen nearer to a camera than this part of the depth at which its photo's first sparse points
+                                   are, of all training photos the least, [0, 1]; 0, or where points have no tracks: 2 % of the median
+                                   distance of anchors. Default 0.5; 0 with compat */
     int start_level;            /* first steps look at 1 pixel in 4^start_level, at random places; all come last. [0, 4]. Default 2; 0 with
                                    compat */
     const char *eval_split;     /* "auto" (default: as the data set says, else every=8), "every=8", "none", "list=FILE" */

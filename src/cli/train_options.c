@@ -40,6 +40,9 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
          .help = "ray traced; or splats in tiles, for comparison; or those tiles with the order of rays"},
         {.name = "footprint", .kind = OPTION_DOUBLE, .value = &d->footprint, .min = 0, .max = 4, .value_name = "V",
          .help = "rays as wide as pixels: their variance, px^2; 0: thin rays"},
+        {.name = "near", .kind = OPTION_DOUBLE, .value = &d->near, .min = 0, .max = 1, .value_name = "F",
+         .help = "nothing is seen nearer to a camera than F times what photos show nearest, by the tracks of their points; 0: 2 % of the "
+                 "median distance"},
         {.name = "start-level", .kind = OPTION_INT, .value = &d->start_level, .min = 0, .max = 4, .value_name = "L",
          .help = "first look at one pixel in 4^L, at random places"},
         {.name = "eval-split", .kind = OPTION_STRING, .value = &d->eval_split, .value_name = "SPLIT",

@@ -98,7 +98,7 @@ static gbt_status read_images(const source_file *file, const colmap_cameras *cam
     return GBT_OK;
 }
 
-static gbt_status read_points(const source_file *file, const uint32_t *image_ids, raw_scene *out, gbt_error *err)
+static gbt_status read_points(const source_file *file, const colmap_image_id *images, raw_scene *out, gbt_error *err)
 {
     cursor c = {.file = file};
     uint64_t count;
@@ -121,7 +121,7 @@ static gbt_status read_points(const source_file *file, const uint32_t *image_ids
             return raw_fail(err, track, "a track of %llu entries cannot be in the %zu bytes that follow", (unsigned long long)track_count,
                             cursor_left(&c));
         for (uint64_t k = 0; k < track_count; k++) {
-            out->tracks_missing += !colmap_has_id(image_ids, out->view_count, cursor_u32(&c));
+            GBT_TRY(colmap_add_sight(out, images, cursor_u32(&c), position, err));
             cursor_skip(&c, 4);
         }
         raw_add_point(out, position, color);
@@ -133,15 +133,15 @@ static gbt_status read_points(const source_file *file, const uint32_t *image_ids
 gbt_status colmap_bin_read(const colmap_files *files, raw_scene *out, gbt_error *err)
 {
     colmap_cameras cameras = {0};
-    uint32_t *image_ids = NULL;
+    colmap_image_id *images = NULL;
     gbt_status status = read_cameras(&files->cameras, &cameras, out, err);
     if (status == GBT_OK)
         status = read_images(&files->images, &cameras, out, err);
     if (status == GBT_OK)
-        status = colmap_image_ids(out, files->images.name, &image_ids, err);
+        status = colmap_images_sorted(out, files->images.name, &images, err);
     if (status == GBT_OK)
-        status = read_points(&files->points, image_ids, out, err);
-    mem_free(image_ids);
+        status = read_points(&files->points, images, out, err);
+    mem_free(images);
     colmap_cameras_free(&cameras);
     return status;
 }

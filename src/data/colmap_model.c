@@ -74,41 +74,44 @@ gbt_status colmap_add_image(raw_scene *raw, const colmap_cameras *cameras, uint3
     return GBT_OK;
 }
 
-static int by_id(const void *a, const void *b)
+static int by_image_id(const void *a, const void *b)
 {
-    const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    const uint32_t x = ((const colmap_image_id *)a)->id, y = ((const colmap_image_id *)b)->id;
     return (x > y) - (x < y);
 }
 
-gbt_status colmap_image_ids(const raw_scene *raw, const char *file, uint32_t **ids, gbt_error *err)
+gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_image_id **images, gbt_error *err)
 {
-    *ids = NULL;
-    uint32_t *sorted = mem_alloc(raw->view_count, sizeof *sorted, "image ids", err);
+    *images = NULL;
+    colmap_image_id *sorted = mem_alloc(raw->view_count, sizeof *sorted, "image ids", err);
     if (sorted == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < raw->view_count; i++)
-        sorted[i] = raw->views[i].id;
+        sorted[i] = (colmap_image_id){.id = raw->views[i].id, .view = (uint32_t)i};
     if (raw->view_count > 1)
-        qsort(sorted, raw->view_count, sizeof *sorted, by_id);
+        qsort(sorted, raw->view_count, sizeof *sorted, by_image_id);
     for (size_t i = 1; i < raw->view_count; i++)
-        if (sorted[i - 1] == sorted[i]) {
-            const uint32_t id = sorted[i];
+        if (sorted[i - 1].id == sorted[i].id) {
+            const uint32_t id = sorted[i].id;
             mem_free(sorted);
             return base_fail(err, GBT_ERR_FORMAT, "%s: duplicate image id %u", file, id);
         }
-    *ids = sorted;
+    *images = sorted;
     return GBT_OK;
 }
 
-bool colmap_has_id(const uint32_t *ids, size_t count, uint32_t id)
+gbt_status colmap_add_sight(raw_scene *raw, const colmap_image_id *images, uint32_t id, const double position[3], gbt_error *err)
 {
-    size_t low = 0, high = count;
+    size_t low = 0, high = raw->view_count;
     while (low < high) {
         const size_t middle = low + (high - low) / 2;
-        if (ids[middle] < id)
+        if (images[middle].id < id)
             low = middle + 1;
         else
             high = middle;
     }
-    return low < count && ids[low] == id;
+    if (low < raw->view_count && images[low].id == id)
+        return raw_add_sight(&raw->views[images[low].view], position, err);
+    raw->tracks_missing++;
+    return GBT_OK;
 }

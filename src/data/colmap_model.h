@@ -35,8 +35,15 @@ gbt_status colmap_add_image(raw_scene *raw, const colmap_cameras *cameras, uint3
                             const double translation[3], uint32_t camera_id, const char *name, size_t name_length, raw_place place,
                             gbt_error *err);
 
-/** Image ids sorted, for looking up tracks. Owned by the caller (mem_free()); an id that is there twice is an error. */
-gbt_status colmap_image_ids(const raw_scene *raw, const char *file, uint32_t **ids, gbt_error *err);
-bool colmap_has_id(const uint32_t *ids, size_t count, uint32_t id);
+typedef struct colmap_image_id {
+    uint32_t id;
+    uint32_t view; /* index into raw_scene.views */
+} colmap_image_id;
+
+/** One entry per view, sorted by id, for looking up tracks. Owned by the caller (mem_free()); an id that is there twice is an error. */
+gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_image_id **images, gbt_error *err);
+
+/** A track says that the point at `position` is in the photo of image `id`, which is looked up in colmap_images_sorted(). */
+gbt_status colmap_add_sight(raw_scene *raw, const colmap_image_id *images, uint32_t id, const double position[3], gbt_error *err);
 
 #endif

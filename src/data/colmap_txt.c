@@ -169,7 +169,7 @@ static gbt_status read_images(const source_file *file, const colmap_cameras *cam
     return GBT_OK;
 }
 
-static gbt_status read_point(text_lines *lines, const uint32_t *image_ids, raw_scene *out, gbt_error *err)
+static gbt_status read_point(text_lines *lines, const colmap_image_id *images, raw_scene *out, gbt_error *err)
 {
     uint64_t ignored;
     double position[3], error;
@@ -191,13 +191,13 @@ static gbt_status read_point(text_lines *lines, const uint32_t *image_ids, raw_s
         uint64_t image_id;
         GBT_TRY(take_uint(lines, "a track's image id", UINT32_MAX, &image_id, err));
         GBT_TRY(take_uint(lines, "a track's observation", UINT32_MAX, &ignored, err));
-        out->tracks_missing += !colmap_has_id(image_ids, out->view_count, (uint32_t)image_id);
+        GBT_TRY(colmap_add_sight(out, images, (uint32_t)image_id, position, err));
     }
     raw_add_point(out, position, color);
     return GBT_OK;
 }
 
-static gbt_status read_points(const source_file *file, const uint32_t *image_ids, raw_scene *out, gbt_error *err)
+static gbt_status read_points(const source_file *file, const colmap_image_id *images, raw_scene *out, gbt_error *err)
 {
     size_t count = 0;
     for (text_lines lines = lines_of(file); next_record(&lines);)
@@ -205,22 +205,22 @@ static gbt_status read_points(const source_file *file, const uint32_t *image_ids
     GBT_TRY(raw_reserve_points(out, count, err));
     out->has_color = true;
     for (text_lines lines = lines_of(file); next_record(&lines);)
-        GBT_TRY(read_point(&lines, image_ids, out, err));
+        GBT_TRY(read_point(&lines, images, out, err));
     return GBT_OK;
 }
 
 gbt_status colmap_txt_read(const colmap_files *files, raw_scene *out, gbt_error *err)
 {
     colmap_cameras cameras = {0};
-    uint32_t *image_ids = NULL;
+    colmap_image_id *images = NULL;
     gbt_status status = read_cameras(&files->cameras, &cameras, err);
     if (status == GBT_OK)
         status = read_images(&files->images, &cameras, out, err);
     if (status == GBT_OK)
-        status = colmap_image_ids(out, files->images.name, &image_ids, err);
+        status = colmap_images_sorted(out, files->images.name, &images, err);
     if (status == GBT_OK)
-        status = read_points(&files->points, image_ids, out, err);
-    mem_free(image_ids);
+        status = read_points(&files->points, images, out, err);
+    mem_free(images);
     colmap_cameras_free(&cameras);
     return status;
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/camera_model.h"
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 
@@ -30,6 +31,7 @@ void raw_view_free(raw_view *view)
     mem_free(view->name);
     mem_free(view->path);
     mem_free(view->mask_path);
+    mem_free(view->sight);
     memset(view, 0, sizeof *view);
 }
 
@@ -84,6 +86,27 @@ void raw_add_point(raw_scene *raw, const double position[3], const float color[3
     for (int k = 0; k < 3; k++)
         raw->color[3 * raw->point_count + k] = color[k] >= 0 ? fminf(color[k], 1) : 0; /* NaN becomes 0 */
     raw->point_count++;
+}
+
+gbt_status raw_add_sight(raw_view *view, const double position[3], gbt_error *err)
+{
+    double depth = 0;
+    for (int k = 0; k < 3; k++)
+        depth += view->camera.rotation[6 + k] * (position[k] - view->camera.center[k]);
+    if (!(depth > 0 && depth <= RAW_COORDINATE_LIMIT))
+        return GBT_OK;
+    GBT_TRY(mem_reserve((void **)&view->sight, &view->sight_capacity, view->sight_count, view->sight_count + 1, sizeof *view->sight,
+                        "depths", err));
+    view->sight[view->sight_count++] = (float)depth;
+    return GBT_OK;
+}
+
+double raw_nearest_sight(raw_view *view)
+{
+    if (view->sight_count == 0)
+        return 0;
+    qsort(view->sight, view->sight_count, sizeof *view->sight, compare_floats);
+    return (double)view->sight[(view->sight_count - 1) / 100];
 }
 
 gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_error *err)

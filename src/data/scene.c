@@ -273,7 +273,7 @@ static gbt_status recentre(raw_scene *raw, scene *out, gbt_error *err)
     for (size_t i = 0; i < raw->view_count; i++) {
         raw_view *view = &raw->views[i];
         out->views[i] = (scene_view){.name = view->name, .path = view->path, .mask_path = view->mask_path, .camera = view->camera,
-                                     .is_test = view->is_test, .rank = view->rank};
+                                     .is_test = view->is_test, .rank = view->rank, .nearest = raw_nearest_sight(view)};
         view->name = NULL, view->path = NULL, view->mask_path = NULL;
         for (int k = 0; k < 3; k++)
             out->views[i].camera.center[k] -= out->origin[k];

@@ -27,6 +27,7 @@ typedef struct scene_view {
     gbt_camera camera; /* pose in scene-local coordinates; width and height as the data set states them */
     bool is_test;      /* held out */
     size_t rank;       /* place in the sorted list of all views that the data set names, those without a photo too */
+    double nearest;    /* depth of the nearest sparse points in the photo, by their tracks (raw_nearest_sight()); 0: it has none */
 } scene_view;
 
 typedef struct scene_points {

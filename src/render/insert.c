@@ -20,6 +20,8 @@ enum { RAY_BLOCK = 512, BOUNCES_MAX = 4, LAMP_SEED = 1 };
 
 /* Points are rounded to a relative error of 2^-24; rays that leave a surface start some of these away from it. */
 static const float offset_share = 0x1p-18f;
+/* No photo was taken from there: they see what is nearer than anything before a camera. */
+static const float surface_near_share = 0.1f;
 
 /* ---- objects ------------------------------------------------------------------------------------------------------------------------- */
 
@@ -418,6 +420,7 @@ static gbt_status see_surfaces(sight *s, trace_scene *scene, gbt_error *err)
 
 static gbt_status see(sight *s, trace_scene *scene, gbt_error *err)
 {
+    const float near = scene->settings.t_near;
     const size_t count = ray_image_count(s->rays);
     GBT_TRY(allocate(s, err));
     parallel_blocks(count, RAY_BLOCK, find_surfaces, s);
@@ -427,7 +430,11 @@ static gbt_status see(sight *s, trace_scene *scene, gbt_error *err)
                           err));
     if (s->in->lamp != INSERT_NO_LAMP)
         parallel_blocks(count, RAY_BLOCK, shadow_gaussians, s);
-    GBT_TRY(see_surfaces(s, scene, err));
+    if (s->bounces == 0)
+        scene->settings.t_near *= surface_near_share;
+    const gbt_status status = see_surfaces(s, scene, err);
+    scene->settings.t_near = near;
+    GBT_TRY(status);
     parallel_blocks(count, RAY_BLOCK, add_background, s);
     return GBT_OK;
 }

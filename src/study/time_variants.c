@@ -12,6 +12,7 @@ const time_variant time_variants[] = {
     {"first scales x 1", "scale-factor = 1", 1},
     {"no growth", "grow = 0", 1},
     {"last-thrift 1", "last-thrift = 1", 1},
+    {"near 0", "near = 0", 1},
     {"K = 10", "offsets = 10", 1},
     {"adaptive balls", "init = adaptive", 1},
     {"voxels", "init = voxel", 1},

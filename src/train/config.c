@@ -13,13 +13,13 @@ void config_text(const gbt_train_def *d, const char *data, char *out, size_t siz
     snprintf(out, size,
              "data = %s\ninit = %s\ninit-count = %.17g\nscale-prior = %s\nmax-depth = %d\nvoxel-size = %.9g\noffsets = %d\ndistance = "
              "%s\niterations = %llu\n"
-             "budget-seconds = %.17g\npace = %s\ndownscale = %.17g\nrenderer = %s\nfootprint = %.17g\nstart-level = %d\neval-split = "
-             "%s\nalpha = %s\nseed = %llu\nmax-anchors = %zu\n"
+             "budget-seconds = %.17g\npace = %s\ndownscale = %.17g\nrenderer = %s\nfootprint = %.17g\nnear = %.17g\nstart-level = %d\n"
+             "eval-split = %s\nalpha = %s\nseed = %llu\nmax-anchors = %zu\n"
              "grow = %d\nthrift = %.17g\nlast-thrift = %.17g\ncompat = %d\nexposure = %d\nsplats-until = %.17g\n"
              "grow-until = %.17g\nscale-factor = %.17g\nlearning-rate = %.17g\n",
              data, d->init, d->init_count, d->scale_prior, d->max_depth, (double)d->voxel_size, d->offsets, d->distance,
              (unsigned long long)d->iterations, d->budget_seconds, d->pace != NULL ? d->pace : "", d->downscale, d->renderer, d->footprint,
-             d->start_level, d->eval_split, d->alpha, (unsigned long long)d->seed, d->max_anchors, d->grow, d->thrift,
+             d->near, d->start_level, d->eval_split, d->alpha, (unsigned long long)d->seed, d->max_anchors, d->grow, d->thrift,
              d->last_thrift, d->compat, d->exposure, d->splats_until, d->grow_until, d->scale_factor, d->learning_rate_factor);
 }
 
@@ -79,6 +79,8 @@ static bool set_key(const char *key, const char *value, gbt_train_def *d, config
         return d->downscale = number, true;
     if (strcmp(key, "footprint") == 0)
         return d->footprint = number, true;
+    if (strcmp(key, "near") == 0)
+        return d->near = number, true;
     if (strcmp(key, "start-level") == 0)
         return d->start_level = to_int(number), true;
     if (strcmp(key, "seed") == 0)

@@ -25,6 +25,7 @@ gbt_train_def gbt_train_def_default(void)
                            .downscale = 1,
                            .renderer = "trace",
                            .footprint = 0.1,
+                           .near = 0.5,
                            .start_level = 2,
                            .eval_split = "auto",
                            .alpha = "auto",
@@ -64,6 +65,8 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)", d->renderer);
     if (!(d->footprint >= 0 && d->footprint <= 4))
         return base_fail(err, GBT_ERR_ARGUMENT, "--footprint: %g (wanted 0 to 4)", d->footprint);
+    if (!(d->near >= 0 && d->near <= 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--near: %g (wanted 0 to 1)", d->near);
     if (d->start_level < 0 || d->start_level > 4)
         return base_fail(err, GBT_ERR_ARGUMENT, "--start-level: %d (wanted 0 to 4)", d->start_level);
     if (!(d->voxel_size >= 0 && d->voxel_size < 1e9f))
@@ -96,5 +99,5 @@ void train_def_settle(gbt_train_def *d)
         d->scale_factor = d->compat ? 1 : from_balls ? ball_scale_factor : spacing_scale_factor;
     }
     if (d->compat)
-        d->footprint = 0;
+        d->footprint = 0, d->near = 0;
 }

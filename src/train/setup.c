@@ -237,6 +237,20 @@ static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
                             &t->voxel_size, err);
 }
 
+/* Nothing can be nearer to a camera than this. Where a photo was taken there is room up to what it shows, also when the model puts a wall
+   in its way that only others show, from afar, and from its other side. `median` of the distances of anchors. */
+static float near_depth(const trainer *t, float median)
+{
+    const float least = 0.02f * median;
+    double nearest = INFINITY;
+    for (size_t v = 0; v < t->train_count; v++) {
+        const double of_view = t->scene.views[t->train_views[v]].nearest;
+        if (of_view > 0)
+            nearest = fmin(nearest, of_view);
+    }
+    return isfinite(nearest) ? fmaxf(least, (float)(t->def.near * nearest)) : least;
+}
+
 /* Networks with random weights, and what the anchors' distances say: their unit, t_near, the range of scales. */
 static gbt_status make_decoder(trainer *t, gbt_error *err)
 {
@@ -252,7 +266,7 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     t->decoder.distance_scale = def->compat ? 1.0f : 1 / median;
     t->decoder.distance_min = p5 * t->decoder.distance_scale, t->decoder.distance_max = p95 * t->decoder.distance_scale;
     t->settings = trace_settings_default();
-    t->settings.t_near = 0.02f * median;
+    t->settings.t_near = near_depth(t, median);
     const double size = fmax(t->extent, (double)median);
     t->scale_log_min = (float)log(1e-6 * size), t->scale_log_max = (float)log(100 * size);
     return GBT_OK;

@@ -98,8 +98,29 @@ static void good_model(void **state)
     assert_true(raw.position[3] == 2 && raw.position[4] == 2.25 && raw.position[5] == 2.5);
     assert_true(raw.has_color && raw.color[0] == 1.0f && raw.color[1] == 0.2f && raw.color[2] == 0.0f);
     assert_int_equal(raw.points_dropped + raw.tracks_missing + raw.trailing_bytes, 0);
+    /* The track of the first point, (1, 1.25, 1.5), names both images; the third row of that rotation is (0, 1, 0), the translation 3. */
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(raw.views[i].sight_count, 1);
+    assert_true(fabs(raw_nearest_sight(&raw.views[0]) - 4.25) < 1e-6);
     raw_free(&raw);
     free_seed(seed);
+}
+
+/* One point in a hundred may be wrong, and what is behind the camera or not a number is not in the photo. */
+static void nearest_in_a_photo(void **state)
+{
+    (void)state;
+    raw_view view = {.camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0, 0, 1}}};
+    assert_true(raw_nearest_sight(&view) == 0);
+    for (int i = 201; i >= 1; i--)
+        assert_int_equal(raw_add_sight(&view, (const double[3]){7, -7, 1 + i}, NULL), GBT_OK);
+    static const double out_of_sight[] = {1, -5, NAN, INFINITY, 1e13};
+    for (int i = 0; i < 5; i++)
+        assert_int_equal(raw_add_sight(&view, (const double[3]){0, 0, out_of_sight[i]}, NULL), GBT_OK);
+    assert_int_equal(view.sight_count, 201);
+    assert_true(raw_nearest_sight(&view) == 3);
+    raw_view_free(&view);
+    assert_true(raw_nearest_sight(&view) == 0);
 }
 
 /* The cursor itself, at its exact ends: one byte past them reads as 0 and is noticed, and nothing moves. */
@@ -659,6 +680,7 @@ int main(void)
     const struct CMUnitTest fixed[] = {
         cmocka_unit_test(cursor_ends),
         cmocka_unit_test(good_model),
+        cmocka_unit_test(nearest_in_a_photo),
         cmocka_unit_test(duplicate_cameras),
         cmocka_unit_test(name_length_limit),
         cmocka_unit_test(all_models),

@@ -419,6 +419,37 @@ static void scales_stay_in_their_range(void **state)
     trainer_free(&t);
 }
 
+/* ---- what stands before a camera ---------------------------------------------------------------------------------------------------- */
+
+/* Where a photo was taken there is room; the held-out ones say nothing, nor do points that no track names. */
+static void nothing_is_nearer_than_photos_show(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    trainer t;
+    def.near = 0;
+    open_ok(&t, tiny, &def);
+    const float least = t.settings.t_near;
+    double nearest = INFINITY;
+    for (size_t v = 0; v < t.scene.view_count; v++) {
+        assert_true(t.scene.views[v].nearest > 0);
+        if (!t.scene.views[v].is_test)
+            nearest = fmin(nearest, t.scene.views[v].nearest);
+    }
+    trainer_free(&t);
+    assert_true(least > 0 && nearest > (double)least);
+    for (int i = 1; i <= 2; i++) {
+        def.near = 0.5 * i;
+        open_ok(&t, tiny, &def);
+        assert_true(t.settings.t_near == fmaxf(least, (float)(def.near * nearest)) && t.settings.t_near > least);
+        trainer_free(&t);
+    }
+    def.compat = true;
+    open_ok(&t, tiny, &def);
+    assert_true(t.settings.t_near <= least);
+    trainer_free(&t);
+}
+
 /* ---- a scene that has lost all its Gaussians ---------------------------------------------------------------------------------------- */
 
 /* Opacities far below 0 have no gradient: without help the scene would stay empty for ever. */
@@ -633,6 +664,7 @@ int main(void)
         cmocka_unit_test(scales_stay_in_their_range),
         cmocka_unit_test(an_empty_scene_comes_back),
         cmocka_unit_test(no_offset_is_born_dead),
+        cmocka_unit_test(nothing_is_nearer_than_photos_show),
         cmocka_unit_test(opacities_are_raised),
         cmocka_unit_test(points_that_tell_nothing_are_replaced),
         cmocka_unit_test(wild_rates_and_photos_leave_no_nan),

@@ -159,15 +159,20 @@ static void elsewhere_nothing_changes(void **state)
     close_studio(&st, &in);
 }
 
-/* The camera at 0 looks into a mirror at z = 5: what is behind the camera is seen as from 10, looking back. */
+/* The camera at 0 looks into a mirror at z = 5: what is behind the camera is seen as from 10, looking back. There is no room before the
+   mirror, whatever there is before the camera. */
 static void mirrored_camera(void **state)
 {
     (void)state;
     for (uint64_t seed = 0; seed < 5; seed++) {
         insert_scene in = {.ambient = 1};
         studio st = open_studio(seed, -7, -1);
+        const float usual = st.settings.t_near;
         add_plane(&in, &mirror, 5, 99);
+        st.settings.t_near = seed % 2 == 0 ? usual : 20;
         shoot(&st, &in);
+        assert_true(st.scene.settings.t_near == st.settings.t_near);
+        st.settings.t_near = usual;
         double rgb[3 * W * H], left[W * H], seen = 0;
         st.rays.origin[2] = 10;
         for (size_t i = 0; i < W * H; i++)

@@ -120,7 +120,7 @@ static void ball_bounds(const struct RTCBoundsFunctionArguments *args)
 }
 
 gbt_status site_scene_build(const point_tree *tree, RTCBoundsFunction bounds, RTCIntersectFunctionN intersect, RTCScene *out,
-                              gbt_error *err)
+                            gbt_error *err)
 {
     RTCDevice device = bvh_device(err);
     if (device == NULL)
@@ -241,7 +241,7 @@ float site_search_radius(const point_tree *tree, double radius)
 }
 
 void sites_search(const point_tree *tree, RTCScene scene, const double query[3], double radius, RTCPointQueryFunction visit,
-                         void *search)
+                  void *search)
 {
     if (tree->site_count == 0)
         return;

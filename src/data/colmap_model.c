@@ -102,16 +102,10 @@ gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_i
 
 gbt_status colmap_add_sight(raw_scene *raw, const colmap_image_id *images, uint32_t id, const double position[3], gbt_error *err)
 {
-    size_t low = 0, high = raw->view_count;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (images[middle].id < id)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    if (low < raw->view_count && images[low].id == id)
-        return raw_add_sight(&raw->views[images[low].view], position, err);
+    const colmap_image_id key = {.id = id};
+    const colmap_image_id *found = raw->view_count > 0 ? bsearch(&key, images, raw->view_count, sizeof key, by_image_id) : NULL;
+    if (found != NULL)
+        return raw_add_sight(&raw->views[found->view], position, err);
     raw->tracks_missing++;
     return GBT_OK;
 }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "data/json_out.h"
@@ -31,12 +32,6 @@ static json_t *describe_view(const loaded_run *r, size_t i)
     return json_pack("{s:o,s:b,s:i,s:i,s:s,s:f,s:o}", "name", json_text(view->name), "test", view->is_test, "width", camera.width, "height",
                      camera.height, "lens", gbt_camera_model_name(camera.model), "fov_x_deg", 2 * DEGREES * atan(half_fov_tan[0]), "camera",
                      describe_pose(&camera, r->model.origin));
-}
-
-static int compare_floats(const void *a, const void *b)
-{
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
 }
 
 /* The middle half of what there is, in each direction: its centre, and the largest of its three sides. */

@@ -48,31 +48,44 @@ static gbt_status check_def(const anchor_init_def *def, gbt_error *err)
     return GBT_OK;
 }
 
-/* All six log-scales of an anchor. The cap wins over floor and factor. */
-static void set_scale(anchors *a, size_t i, double scale, double floor_scale, const anchor_init_def *def)
+static const double spacing_min = 3.1622776601683794e-4; /* sqrt(1e-7) */
+
+/* The cap wins over floor and factor. */
+static double first_scale(double scale, double floor_scale, double factor, double most)
 {
-    const float value = (float)log(fmin((double)def->scale_factor * fmax(scale, floor_scale), (double)def->scale_max));
-    for (size_t c = 0; c < 6; c++)
-        a->scale_log[i * 6 + c] = value;
+    return fmin(factor * fmax(scale, floor_scale), most);
 }
 
-/* The baseline: RMS distance to the 3 nearest anchors. A lone anchor has no spacing and takes the voxel size. */
-static gbt_status scale_from_spacing(anchors *a, const anchor_init_def *def, gbt_error *err)
+static void set_scale(anchors *a, size_t i, double scale)
+{
+    for (size_t c = 0; c < 6; c++)
+        a->scale_log[i * 6 + c] = (float)log(scale);
+}
+
+gbt_status anchor_scales_from_spacing(const float *position, size_t count, double factor, double most, float *out, gbt_error *err)
 {
     point_tree *tree = NULL;
-    GBT_TRY(point_tree_build(a->position, NULL, a->count, &tree, err));
-    gbt_status status = GBT_ERR_NO_MEMORY;
-    float *spacing = mem_alloc(a->count, sizeof *spacing, "anchors", err);
-    if (spacing == NULL)
-        goto done;
-    status = point_tree_spacing(tree, 3, spacing, err);
-    if (status != GBT_OK)
-        goto done;
-    for (size_t i = 0; i < a->count; i++)
-        set_scale(a, i, (double)(a->count > 1 ? spacing[i] : def->balls.voxel_size), sqrt(1e-7), def);
-done:
-    mem_free(spacing);
+    GBT_TRY(point_tree_build(position, NULL, count, &tree, err));
+    const gbt_status status = point_tree_spacing(tree, 3, out, err);
+    for (size_t i = 0; i < count && status == GBT_OK; i++)
+        out[i] = (float)first_scale((double)out[i], spacing_min, factor, most);
     point_tree_free(tree);
+    return status;
+}
+
+/* The baseline. A lone anchor has no spacing and takes the voxel size. */
+static gbt_status scale_from_spacing(anchors *a, const anchor_init_def *def, gbt_error *err)
+{
+    const double factor = (double)def->scale_factor, most = (double)def->scale_max;
+    if (a->count == 1)
+        return set_scale(a, 0, first_scale((double)def->balls.voxel_size, spacing_min, factor, most)), GBT_OK;
+    float *scale = mem_alloc(a->count, sizeof *scale, "anchors", err);
+    if (scale == NULL)
+        return GBT_ERR_NO_MEMORY;
+    const gbt_status status = anchor_scales_from_spacing(a->position, a->count, factor, most, scale, err);
+    for (size_t i = 0; i < a->count && status == GBT_OK; i++)
+        set_scale(a, i, (double)scale[i]);
+    mem_free(scale);
     return status;
 }
 
@@ -98,7 +111,8 @@ static void prior_block(size_t block, size_t begin, size_t end, void *context)
         const bool spaced = point_tree_nearest(job->tree, job->a->position + i * 3, 1, i, &index, &square) == 1 && square > 0;
         const double near = spaced ? sqrt(square) : radius; /* lone or coincident: the radius is all that is known */
         const double clipped = fmin(fmax(radius, (double)def->clip_min * near), (double)def->clip_max * near);
-        set_scale(job->a, i, (double)def->fusion * near + (1.0 - (double)def->fusion) * clipped, job->floor_scale, def);
+        const double fused = (double)def->fusion * near + (1.0 - (double)def->fusion) * clipped;
+        set_scale(job->a, i, first_scale(fused, job->floor_scale, (double)def->scale_factor, (double)def->scale_max));
     }
 }
 

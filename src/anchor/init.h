@@ -52,4 +52,15 @@ bool anchor_init_kind_named(const char *name, anchor_init_kind *out);
 gbt_status anchors_init(const float *position, const float *color, size_t count, const anchor_init_def *def, anchors *out, balls *out_balls,
                         gbt_error *err);
 
+/**
+ * First scales of anchors at these positions by ANCHOR_SCALE_NN; one that is alone has no spacing: 0, and so the floor.
+ *
+ * @param position [in]  [count][3], finite
+ * @param factor   [in]  > 0; `most` wins over it
+ * @param out      [out] [count], > 0
+ * @return GBT_OK, GBT_ERR_NO_MEMORY
+ * Cost: one tree and one query each.
+ */
+gbt_status anchor_scales_from_spacing(const float *position, size_t count, double factor, double most, float *out, gbt_error *err);
+
 #endif

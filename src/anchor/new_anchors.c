@@ -12,8 +12,8 @@
 
 typedef struct cell {
     int64_t at[3];
-    float position[3], gradient; /* of the candidate with the largest gradient */
-    size_t feature;              /* row of new_anchors.feature */
+    float position[3], scale, gradient; /* of the candidate with the largest gradient */
+    size_t feature;                     /* row of new_anchors.feature */
     bool occupied;
 } cell;
 
@@ -77,27 +77,36 @@ static gbt_status grow_table(growth *g, gbt_error *err)
     return GBT_OK;
 }
 
+typedef struct candidate {
+    float position[3], scale, gradient;
+    size_t parent; /* row of the anchors */
+} candidate;
+
 /* A cell keeps the place of its steepest candidate and the maxima of all parents' features. */
-static void merge_candidate(cell *known, float *best, const float position[3], const float *feature, float gradient)
+static void merge_candidate(cell *known, float *best, const candidate *c, const float *feature)
 {
-    if (gradient > known->gradient) {
-        known->gradient = gradient;
-        memcpy(known->position, position, sizeof known->position);
+    if (c->gradient > known->gradient) {
+        known->gradient = c->gradient, known->scale = c->scale;
+        memcpy(known->position, c->position, sizeof known->position);
     }
     for (int i = 0; i < ANCHOR_FEATURE_DIM; i++)
         best[i] = fmaxf(best[i], feature[i]);
 }
 
-static gbt_status add_candidate(growth *g, const int64_t at[3], const float position[3], size_t parent, float gradient, gbt_error *err)
+/* Into its cell of the level; what has no cell is left out. */
+static gbt_status add_candidate(growth *g, float size, const candidate *c, gbt_error *err)
 {
+    int64_t at[3];
+    if (!cell_of(c->position, size, at))
+        return GBT_OK;
     new_anchors *n = g->out;
     if ((g->cell_count + 1) * 2 > g->table_size)
         GBT_TRY(grow_table(g, err));
-    const float *feature = g->a->feature + parent * ANCHOR_FEATURE_DIM;
+    const float *feature = g->a->feature + c->parent * ANCHOR_FEATURE_DIM;
     const size_t slot = find_slot(g, at);
     if (g->table[slot] != 0) {
         cell *known = &g->cells[g->table[slot] - 1];
-        merge_candidate(known, n->feature + known->feature * ANCHOR_FEATURE_DIM, position, feature, gradient);
+        merge_candidate(known, n->feature + known->feature * ANCHOR_FEATURE_DIM, c, feature);
         return GBT_OK;
     }
     void *cells = g->cells, *features = n->feature;
@@ -107,8 +116,8 @@ static gbt_status add_candidate(growth *g, const int64_t at[3], const float posi
                         "growth", err));
     n->feature = features;
     memcpy(n->feature + n->feature_count * ANCHOR_FEATURE_DIM, feature, ANCHOR_FEATURE_DIM * sizeof(float));
-    g->cells[g->cell_count] = (cell){.at = {at[0], at[1], at[2]}, .position = {position[0], position[1], position[2]}, .gradient = gradient,
-                                     .feature = n->feature_count++};
+    g->cells[g->cell_count] = (cell){.at = {at[0], at[1], at[2]}, .position = {c->position[0], c->position[1], c->position[2]},
+                                     .scale = c->scale, .gradient = c->gradient, .feature = n->feature_count++};
     g->table[slot] = (uint32_t)++g->cell_count;
     return GBT_OK;
 }
@@ -190,42 +199,48 @@ static gbt_status collect_gaussians(growth *g, int level, float size, gbt_error 
         if (!(gradient >= threshold) || !is_drawn(g->def, level, slot))
             continue;
         const size_t i = slot / offsets;
-        float mean[3];
-        int64_t at[3];
+        candidate mean = {.scale = size, .gradient = gradient, .parent = i};
         for (size_t c = 0; c < 3; c++)
-            mean[c] = a->position[i * 3 + c] + a->offset[slot * 3 + c] * activation_exp(a->scale_log[i * 6 + c]);
-        if (cell_of(mean, size, at))
-            GBT_TRY(add_candidate(g, at, mean, i, gradient, err));
+            mean.position[c] = a->position[i * 3 + c] + a->offset[slot * 3 + c] * activation_exp(a->scale_log[i * 6 + c]);
+        GBT_TRY(add_candidate(g, size, &mean, err));
     }
     return GBT_OK;
 }
 
-/* Asked for as at the finest level. */
+/* Mean of the Gaussian of the anchor that asks for most, however few views saw it. */
+static float steepest_gradient(const growth *g, size_t anchor)
+{
+    const size_t offsets = (size_t)g->a->offset_count;
+    float steepest = 0;
+    for (size_t slot = anchor * offsets; slot < (anchor + 1) * offsets; slot++)
+        if (g->stats->grad_count[slot] > 0)
+            steepest = fmaxf(steepest, g->stats->grad_accum[slot] / g->stats->grad_count[slot]);
+    return steepest;
+}
+
+/* Asked for as at the coarsest level: a place is worth more than what Gaussians guess. */
 static gbt_status collect_places(growth *g, float size, gbt_error *err)
 {
     const adjust_def *def = g->def;
-    const size_t offsets = (size_t)g->a->offset_count;
-    const float threshold = level_threshold(def, def->level_count - 1);
     for (size_t p = 0; p < def->place_count; p++) {
-        const size_t i = def->place_anchor[p];
-        float gradient = -1;
-        for (size_t k = 0; k < offsets; k++)
-            gradient = fmaxf(gradient, mean_gradient(g, i * offsets + k));
-        int64_t at[3];
-        if (gradient >= threshold && cell_of(def->place + p * 3, size, at))
-            GBT_TRY(add_candidate(g, at, def->place + p * 3, i, gradient, err));
+        candidate known = {.scale = def->place_scale[p], .gradient = steepest_gradient(g, def->place_anchor[p]),
+                           .parent = def->place_anchor[p]};
+        memcpy(known.position, def->place + 3 * p, sizeof known.position);
+        if (known.gradient >= def->grad_threshold)
+            GBT_TRY(add_candidate(g, size, &known, err));
     }
     return GBT_OK;
 }
 
-static gbt_status add_new_anchor(growth *g, const cell *c, int level, float size, float scale, gbt_error *err)
+static gbt_status add_new_anchor(growth *g, const cell *c, int level, float size, gbt_error *err)
 {
     new_anchors *n = g->out;
     void *rows = n->rows;
     GBT_TRY(mem_reserve(&rows, &n->capacity, n->count, n->count + 1, sizeof *n->rows, "growth", err));
     n->rows = rows;
     new_anchor *f = &n->rows[n->count++];
-    *f = (new_anchor){.scale = scale, .gradient = c->gradient, .level = level, .at = {c->at[0], c->at[1], c->at[2]}, .feature = c->feature};
+    *f = (new_anchor){.scale = c->scale, .gradient = c->gradient, .level = level, .at = {c->at[0], c->at[1], c->at[2]},
+                      .feature = c->feature};
     for (int k = 0; k < 3; k++) /* there is surface; the middle of a cell is where the cell is */
         f->position[k] = g->def->compat ? (float)c->at[k] * size : c->position[k];
     return GBT_OK;
@@ -249,10 +264,9 @@ static gbt_status grow_level(growth *g, int level, gbt_error *err)
     for (size_t i = 0; i < g->out->count; i++)
         mark_occupied(g, g->out->rows[i].position, size);
     qsort(g->cells, g->cell_count, sizeof *g->cells, by_cell);
-    const float scale = at_places ? level_cell_size(g->def, level - 1) : size;
     for (size_t i = 0; i < g->cell_count; i++)
         if (!g->cells[i].occupied)
-            GBT_TRY(add_new_anchor(g, &g->cells[i], level, size, scale, err));
+            GBT_TRY(add_new_anchor(g, &g->cells[i], level, size, err));
     return GBT_OK;
 }
 

@@ -12,7 +12,7 @@ enum { default_offsets = 2 };
 
 /* Either way about the spacing of anchors. Smaller Gaussians leave holes that more anchors must fill; larger ones, where a few anchors
    stand far apart, cover what they cannot show, and stay large (docs/training.md). */
-static const double ball_scale_factor = 2, spacing_scale_factor = 0.7;
+static const double ball_scale_factor = 2;
 
 gbt_train_def gbt_train_def_default(void)
 {
@@ -96,7 +96,7 @@ void train_def_settle(gbt_train_def *d)
         d->offsets = d->compat ? 10 : default_offsets;
     if (d->scale_factor == 0) {
         const bool from_balls = strcmp(d->init, "gb") == 0 && strcmp(d->scale_prior, "gb") == 0;
-        d->scale_factor = d->compat ? 1 : from_balls ? ball_scale_factor : spacing_scale_factor;
+        d->scale_factor = d->compat ? 1 : from_balls ? ball_scale_factor : TRAIN_SPACING_SCALE;
     }
     if (d->compat)
         d->footprint = 0, d->near = 0;

@@ -4,6 +4,9 @@
 
 #include "gbtrace/train.h"
 
+/** First scales of anchors, in units of their spacing. */
+#define TRAIN_SPACING_SCALE 0.7
+
 /** GBT_OK, or GBT_ERR_ARGUMENT and the option that is out of its range. */
 gbt_status train_def_check(const gbt_train_def *d, gbt_error *err);
 

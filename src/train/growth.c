@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "bvh/points.h"
+#include "train/def.h"
 #include "train/gradient_check.h"
 
 static const float share_min = 2.5e-6f; /* of short runs: schedule_thrift() */
@@ -110,21 +111,23 @@ static void nearest_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* The sparse points are known surface, and most have no anchor of their own: where the nearest one asks for more, they are places to grow.
-   Its Gaussians are not enough, for they are where it is. */
-static gbt_status grow_at_points(const trainer *t, adjust_def *def, uint32_t **nearest, gbt_error *err)
+/* The sparse points are known surface, and a start from balls has left most of them out: in the first round, where the nearest anchor asks
+   for more, they are places to grow. Gaussians are not enough, for they are where anchors are. `nearest` and `scale` are the caller's. */
+static gbt_status grow_at_points(const trainer *t, adjust_def *def, uint32_t **nearest, float **scale, gbt_error *err)
 {
     const scene_points *points = &t->scene.points;
+    *nearest = mem_alloc(points->count, sizeof **nearest, "growth", err);
+    *scale = mem_alloc(points->count, sizeof **scale, "growth", err);
+    if (*nearest == NULL || *scale == NULL)
+        return GBT_ERR_NO_MEMORY;
+    GBT_TRY(anchor_scales_from_spacing(points->position, points->count, TRAIN_SPACING_SCALE, t->first_scale_max, *scale, err));
     point_tree *tree;
     GBT_TRY(point_tree_build(t->anchors.position, NULL, t->anchors.count, &tree, err));
-    *nearest = mem_alloc(points->count, sizeof **nearest, "growth", err);
-    if (*nearest != NULL) {
-        nearest_job job = {tree, points->position, *nearest};
-        parallel_blocks(points->count, 256, nearest_block, &job);
-        def->place = points->position, def->place_anchor = *nearest, def->place_count = points->count;
-    }
+    nearest_job job = {tree, points->position, *nearest};
+    parallel_blocks(points->count, 256, nearest_block, &job);
     point_tree_free(tree);
-    return *nearest != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+    def->place = points->position, def->place_scale = *scale, def->place_anchor = *nearest, def->place_count = points->count;
+    return GBT_OK;
 }
 
 static adjust_def rules_of(const trainer *t)
@@ -153,14 +156,18 @@ gbt_status growth_adjust(trainer *t, gbt_error *err)
 {
     adjust_def def = rules_of(t);
     uint32_t *nearest = NULL;
-    if (!def.compat && def.grow && pace_progress(&t->pace, t->step) < SCHEDULE_POINTS_UNTIL)
-        GBT_TRY(grow_at_points(t, &def, &nearest, err));
+    float *scale = NULL;
     adjust_result result = {0};
-    gbt_status status = anchors_adjust(&t->anchors, &t->stats, &def, &result, err);
+    gbt_status status = GBT_OK;
+    if (!def.compat && def.grow && t->adjust_step == 0)
+        status = grow_at_points(t, &def, &nearest, &scale, err);
+    if (status == GBT_OK)
+        status = anchors_adjust(&t->anchors, &t->stats, &def, &result, err);
     anchors *followers[] = {&t->gradient, &t->moment1, &t->moment2};
     for (int i = 0; i < 3 && status == GBT_OK; i++)
         status = follow_rows(followers[i], &result, err);
     mem_free(nearest);
+    mem_free(scale);
     mem_free(result.source);
     if (result.kept_last)
         log_warn("step %llu: every anchor had become transparent; the most opaque one stays", (unsigned long long)t->step);

@@ -171,9 +171,10 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
     def.balls.voxel_size = t->voxel_size;
     def.offset_count = t->def.offsets;
     def.scale_factor = (float)t->def.scale_factor;
-    /* An isolated point would start as a fog. Cameras that stand together say nothing of the size of what they see. */
+    /* Cameras that stand together say nothing of the size of what they see. */
     const double away = dvec_length(t->scene.views[t->train_views[0]].camera.center); /* from the middle of the points */
-    def.scale_max = t->def.compat ? INFINITY : (float)(0.1 * fmax(t->extent, 0.1 * away));
+    t->first_scale_max = t->def.compat ? (double)INFINITY : 0.1 * fmax(t->extent, 0.1 * away);
+    def.scale_max = (float)t->first_scale_max;
     const scene_points *points = &t->scene.points;
     GBT_TRY(anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def, &t->anchors, NULL, err));
     t->anchors_initial = t->anchors.count;

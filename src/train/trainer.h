@@ -38,7 +38,7 @@ typedef struct trainer {
 
     frame_renderer renderer; /* that the model is for */
     float voxel_size;
-    double extent;
+    double extent, first_scale_max; /* an isolated point would start as a fog */
     float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs, far inside what floats hold */
     trace_settings settings;
     size_t anchors_initial, points_used;

@@ -168,11 +168,10 @@ static float level_cell_size(const adjust_def *def, int level)
     return def->voxel_size * (float)(def->compat ? floor(factor) : factor); /* the reference divides integers: 4 / 16 is 0 */
 }
 
-/* Mean over the views that saw the Gaussian; -1 when they were too few. */
-static float mean_gradient(const growth *g, size_t slot)
+/* Mean over the views that saw the Gaussian; 0 when none did. */
+static float mean_gradient(const adjust_stats *stats, size_t slot)
 {
-    const float count = g->stats->grad_count[slot];
-    return adjust_well_sampled(g->def, count) ? g->stats->grad_accum[slot] / count : -1;
+    return stats->grad_count[slot] > 0 ? stats->grad_accum[slot] / stats->grad_count[slot] : 0;
 }
 
 static float level_threshold(const adjust_def *def, int level)
@@ -195,8 +194,8 @@ static gbt_status collect_gaussians(growth *g, int level, float size, gbt_error 
     const size_t offsets = (size_t)a->offset_count;
     const float threshold = level_threshold(g->def, level);
     for (size_t slot = 0; slot < a->count * offsets; slot++) {
-        const float gradient = mean_gradient(g, slot);
-        if (!(gradient >= threshold) || !is_drawn(g->def, level, slot))
+        const float gradient = mean_gradient(g->stats, slot);
+        if (!adjust_well_sampled(g->def, g->stats->grad_count[slot]) || !(gradient >= threshold) || !is_drawn(g->def, level, slot))
             continue;
         const size_t i = slot / offsets;
         candidate mean = {.scale = size, .gradient = gradient, .parent = i};
@@ -213,8 +212,7 @@ static float steepest_gradient(const growth *g, size_t anchor)
     const size_t offsets = (size_t)g->a->offset_count;
     float steepest = 0;
     for (size_t slot = anchor * offsets; slot < (anchor + 1) * offsets; slot++)
-        if (g->stats->grad_count[slot] > 0)
-            steepest = fmaxf(steepest, g->stats->grad_accum[slot] / g->stats->grad_count[slot]);
+        steepest = fmaxf(steepest, mean_gradient(g->stats, slot));
     return steepest;
 }
 

@@ -10,8 +10,7 @@
 /* Fewer Gaussians per anchor than in the paper's base: at equal time the models are better (docs/training.md). */
 enum { default_offsets = 2 };
 
-/* Either way about the spacing of anchors. Smaller Gaussians leave holes that more anchors must fill; larger ones, where a few anchors
-   stand far apart, cover what they cannot show, and stay large (docs/training.md). */
+/* Of the balls' scale prior, which is smaller than their spacing. */
 static const double ball_scale_factor = 2;
 
 gbt_train_def gbt_train_def_default(void)

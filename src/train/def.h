@@ -4,7 +4,8 @@
 
 #include "gbtrace/train.h"
 
-/** First scales of anchors, in units of their spacing. */
+/** First scales of anchors, in units of their spacing. Smaller Gaussians leave holes that more anchors must fill; larger ones, where a few
+    anchors stand far apart, cover what they cannot show, and stay large (docs/training.md). */
 #define TRAIN_SPACING_SCALE 0.7
 
 /** GBT_OK, or GBT_ERR_ARGUMENT and the option that is out of its range. */

@@ -41,7 +41,7 @@ typedef struct adjust_def {
     bool grow, prune;          /* both true by default */
     size_t place_count;        /* places where surface is known to be, besides where Gaussians are; default 0 */
     const float *place;        /* [place_count][3], finite; borrowed, as the next two */
-    const float *place_scale;  /* [place_count] > 0: first scale of an anchor there */
+    const float *place_scale;  /* [place_count] > 0: first scale of an anchor there; or NULL */
     const uint32_t *place_anchor; /* [place_count]: row of the anchor that speaks for the place, the nearest */
 } adjust_def;
 adjust_def adjust_def_default(void);
@@ -57,12 +57,12 @@ typedef struct adjust_result {
 /**
  * Grow, then prune, as Scaffold-GS does; anchors and statistics are changed in place.
  *
- * Candidates are the means of Gaussians; then, in cells finer by one more level but asked for as at the first, the known places, each with
- * the largest gradient of its anchor's Gaussians, however few views saw them. New anchor: position = the cell's candidate with the largest
- * gradient, the first of equals; in compat mode the cell's centre, and no places. Log-scales log(cell), at places log(place_scale), offsets
- * 0, feature = elementwise maximum over the parents of the cell's candidates. Cells use 64-bit keys; a level whose cell is not > 0 is
- * skipped. Never prunes the last anchor (the most opaque stays). Survivors keep their order; new anchors follow by level, then cell (x, y,
- * z).
+ * Candidates are the means of Gaussians; then, in cells finer by one more level, the known places, each with the largest gradient of its
+ * anchor's Gaussians. Places with a scale are asked for as at the first level, however few views saw those Gaussians; without, as Gaussians
+ * at the last level, and are as large. New anchor: position = the cell's candidate with the largest gradient, the first of equals; in
+ * compat mode the cell's centre, and no places. Log-scales log(cell), at places log(place_scale), offsets 0, feature = elementwise maximum
+ * over the parents of the cell's candidates. Cells use 64-bit keys; a level whose cell is not > 0 is skipped. Never prunes the last anchor
+ * (the most opaque stays). Survivors keep their order; new anchors follow by level, then cell (x, y, z).
  *
  * @param stats [in, out] rows must match `a`
  * @param out   [out] zeroed on failure

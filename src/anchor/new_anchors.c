@@ -206,25 +206,30 @@ static gbt_status collect_gaussians(growth *g, int level, float size, gbt_error 
     return GBT_OK;
 }
 
-/* Mean of the Gaussian of the anchor that asks for most, however few views saw it. */
-static float steepest_gradient(const growth *g, size_t anchor)
+/* Mean of the Gaussian of the anchor that asks for most; of those that enough views saw, or of all. Below 0 when there is none. */
+static float steepest_gradient(const growth *g, size_t anchor, bool well_sampled)
 {
     const size_t offsets = (size_t)g->a->offset_count;
-    float steepest = 0;
+    float steepest = -1;
     for (size_t slot = anchor * offsets; slot < (anchor + 1) * offsets; slot++)
-        steepest = fmaxf(steepest, mean_gradient(g->stats, slot));
+        if (!well_sampled || adjust_well_sampled(g->def, g->stats->grad_count[slot]))
+            steepest = fmaxf(steepest, mean_gradient(g->stats, slot));
     return steepest;
 }
 
-/* Asked for as at the coarsest level: a place is worth more than what Gaussians guess. */
+/* Known surface is worth more than what Gaussians guess: where it makes good for a start, the coarsest level's threshold will do. */
 static gbt_status collect_places(growth *g, float size, gbt_error *err)
 {
     const adjust_def *def = g->def;
+    const bool as_start = def->place_scale != NULL;
+    const int finest = def->level_count - 1;
+    const float threshold = level_threshold(def, as_start ? 0 : finest), finest_size = level_cell_size(def, finest);
     for (size_t p = 0; p < def->place_count; p++) {
-        candidate known = {.scale = def->place_scale[p], .gradient = steepest_gradient(g, def->place_anchor[p]),
-                           .parent = def->place_anchor[p]};
+        const size_t parent = def->place_anchor[p];
+        candidate known = {.scale = as_start ? def->place_scale[p] : finest_size, .parent = parent,
+                           .gradient = steepest_gradient(g, parent, !as_start)};
         memcpy(known.position, def->place + 3 * p, sizeof known.position);
-        if (known.gradient >= def->grad_threshold)
+        if (known.gradient >= threshold)
             GBT_TRY(add_candidate(g, size, &known, err));
     }
     return GBT_OK;

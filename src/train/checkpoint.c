@@ -74,6 +74,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     add_anchors(&w, "anchors", &t->anchors);
     add_anchors(&w, "moment1", &t->moment1);
     add_anchors(&w, "moment2", &t->moment2);
+    container_add(&w, "anchors.born", CONTAINER_U64, 1, &rows, t->born);
     container_add(&w, "networks", CONTAINER_F32, 1, &n, t->decoder.params);
     container_add(&w, "networks.moment1", CONTAINER_F32, 1, &n, t->params_m);
     container_add(&w, "networks.moment2", CONTAINER_F32, 1, &n, t->params_v);
@@ -110,6 +111,23 @@ static gbt_status read_exposures(const container *c, exposures *e, gbt_error *er
         GBT_TRY(copy_field(c, "exposure", fields[i].field, e->count, AFFINE_NUMBERS, 2, (const size_t[]){AFFINE_NUMBERS, 0}, fields[i].out,
                            err));
     return container_get(c, "exposure.visits", CONTAINER_U64, e->count, e->visits, err);
+}
+
+/* Older checkpoints have none. */
+static gbt_status read_births(trainer *t, const container *c, const char *path, gbt_error *err)
+{
+    const size_t rows = t->anchors.count;
+    mem_free(t->born);
+    t->born = mem_calloc(rows, sizeof *t->born, "anchors", err);
+    if (t->born == NULL)
+        return GBT_ERR_NO_MEMORY;
+    if (container_section_named(c, "anchors.born") != NULL)
+        GBT_TRY(container_get(c, "anchors.born", CONTAINER_U64, rows, t->born, err));
+    for (size_t i = 0; i < rows; i++)
+        if (t->born[i] > t->anchor_t)
+            return base_fail(err, GBT_ERR_FORMAT, "%s: anchor %zu was made in step %llu (wanted at most %llu)", path, i,
+                             (unsigned long long)t->born[i], (unsigned long long)t->anchor_t);
+    return GBT_OK;
 }
 
 static gbt_status read_state(trainer *t, const container *c, const char *path, gbt_error *err)
@@ -151,7 +169,7 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     t->step = counters[0], t->adjust_step = counters[1], t->anchor_t = counters[2], t->skipped_steps = counters[3];
     t->pace.known = (int)counters[4];
     t->anchors_initial = counters[7];
-    return GBT_OK;
+    return read_births(t, c, path, err);
 }
 
 gbt_status checkpoint_load(trainer *t, const char *path, gbt_error *err)

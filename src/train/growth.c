@@ -94,6 +94,19 @@ static gbt_status follow_rows(anchors *a, const adjust_result *result, gbt_error
     return status;
 }
 
+/* New rows come last, so the order by birth stays. The reference corrects all by the age of the run. */
+static gbt_status follow_births(trainer *t, const adjust_result *result, gbt_error *err)
+{
+    uint64_t *born = mem_alloc(result->count, sizeof *born, "growth", err);
+    if (born == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < result->count; i++)
+        born[i] = result->source[i] >= 0 ? t->born[result->source[i]] : t->def.compat ? 0 : t->anchor_t;
+    mem_free(t->born);
+    t->born = born;
+    return GBT_OK;
+}
+
 typedef struct nearest_job {
     const point_tree *anchors;
     const float *point;
@@ -111,16 +124,20 @@ static void nearest_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* The sparse points are known surface, and a start from balls has left most of them out: in the first round, where the nearest anchor asks
-   for more, they are places to grow. Gaussians are not enough, for they are where anchors are. `nearest` and `scale` are the caller's. */
+/* The sparse points are known surface, and a start from balls has left most of them out: where the nearest anchor asks for more, they are
+   places to grow. Gaussians are not enough, for they are where anchors are. In the first round they make good what the start lacks, as a
+   start would; after it they are asked for and sized as Gaussians are. `nearest` and `scale` are the caller's. */
 static gbt_status grow_at_points(const trainer *t, adjust_def *def, uint32_t **nearest, float **scale, gbt_error *err)
 {
     const scene_points *points = &t->scene.points;
+    const bool first = t->adjust_step == 0;
     *nearest = mem_alloc(points->count, sizeof **nearest, "growth", err);
-    *scale = mem_alloc(points->count, sizeof **scale, "growth", err);
-    if (*nearest == NULL || *scale == NULL)
+    if (first)
+        *scale = mem_alloc(points->count, sizeof **scale, "growth", err);
+    if (*nearest == NULL || (first && *scale == NULL))
         return GBT_ERR_NO_MEMORY;
-    GBT_TRY(anchor_scales_from_spacing(points->position, points->count, TRAIN_SPACING_SCALE, t->first_scale_max, *scale, err));
+    if (first)
+        GBT_TRY(anchor_scales_from_spacing(points->position, points->count, TRAIN_SPACING_SCALE, t->first_scale_max, *scale, err));
     point_tree *tree;
     GBT_TRY(point_tree_build(t->anchors.position, NULL, t->anchors.count, &tree, err));
     nearest_job job = {tree, points->position, *nearest};
@@ -159,13 +176,15 @@ gbt_status growth_adjust(trainer *t, gbt_error *err)
     float *scale = NULL;
     adjust_result result = {0};
     gbt_status status = GBT_OK;
-    if (!def.compat && def.grow && t->adjust_step == 0)
+    if (!def.compat && def.grow && pace_progress(&t->pace, t->step) < SCHEDULE_POINTS_UNTIL)
         status = grow_at_points(t, &def, &nearest, &scale, err);
     if (status == GBT_OK)
         status = anchors_adjust(&t->anchors, &t->stats, &def, &result, err);
     anchors *followers[] = {&t->gradient, &t->moment1, &t->moment2};
     for (int i = 0; i < 3 && status == GBT_OK; i++)
         status = follow_rows(followers[i], &result, err);
+    if (status == GBT_OK)
+        status = follow_births(t, &result, err);
     mem_free(nearest);
     mem_free(scale);
     mem_free(result.source);

@@ -86,5 +86,7 @@ learning_rates schedule_rates(double progress, bool compat, double extent, doubl
 /** Statistics are gathered from STATS_FROM on; anchors grow and are pruned from ADJUST_FROM on. */
 #define SCHEDULE_STATS_FROM (500.0 / 30000)
 #define SCHEDULE_ADJUST_FROM (1500.0 / 30000)
+/** Until then anchors grow at sparse points too: the start left most of them out (not with compat). */
+#define SCHEDULE_POINTS_UNTIL 0.15
 
 #endif

@@ -78,22 +78,37 @@ static frame_renderer renderer_of_step(const trainer *t, const gbt_camera *camer
 
 typedef struct adam_job {
     trainer *t;
-    adam_rates feature, offset, scale;
+    const learning_rates *rates;
 } adam_job;
+
+/* Of one age. By the age of the run, the first steps of a new anchor would be up to six times too long, for its second moments are young:
+   geometry, which begins where it belongs, would be flung from there. Features begin as others' and have far to go: they keep that. */
+static void step_rows(const adam_job *job, size_t begin, size_t end)
+{
+    anchors *p = &job->t->anchors, *g = &job->t->gradient, *m = &job->t->moment1, *v = &job->t->moment2;
+    const uint64_t run_age = job->t->anchor_t, age = run_age - job->t->born[begin];
+    const size_t rows = end - begin, feature = begin * ANCHOR_FEATURE_DIM, scale = begin * 6;
+    const size_t offset_floats = 3 * (size_t)p->offset_count, offset = begin * offset_floats;
+    adam_step(p->feature + feature, g->feature + feature, m->feature + feature, v->feature + feature, rows * ANCHOR_FEATURE_DIM,
+              adam_rates_at(job->rates->feature, run_age));
+    adam_step(p->offset + offset, g->offset + offset, m->offset + offset, v->offset + offset, rows * offset_floats,
+              adam_rates_at(job->rates->offset, age));
+    adam_step(p->scale_log + scale, g->scale_log + scale, m->scale_log + scale, v->scale_log + scale, rows * 6,
+              adam_rates_at(job->rates->scale, age));
+    for (size_t i = scale; i < 6 * end; i++)
+        p->scale_log[i] = fminf(fmaxf(p->scale_log[i], job->t->scale_log_min), job->t->scale_log_max);
+}
 
 static void adam_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
     const adam_job *job = context;
-    anchors *p = &job->t->anchors, *g = &job->t->gradient, *m = &job->t->moment1, *v = &job->t->moment2;
-    const size_t rows = end - begin, feature = begin * ANCHOR_FEATURE_DIM, scale = begin * 6;
-    const size_t offset_floats = 3 * (size_t)p->offset_count, offset = begin * offset_floats;
-    adam_step(p->feature + feature, g->feature + feature, m->feature + feature, v->feature + feature, rows * ANCHOR_FEATURE_DIM,
-              job->feature);
-    adam_step(p->offset + offset, g->offset + offset, m->offset + offset, v->offset + offset, rows * offset_floats, job->offset);
-    adam_step(p->scale_log + scale, g->scale_log + scale, m->scale_log + scale, v->scale_log + scale, rows * 6, job->scale);
-    for (size_t i = scale; i < 6 * end; i++)
-        p->scale_log[i] = fminf(fmaxf(p->scale_log[i], job->t->scale_log_min), job->t->scale_log_max);
+    const uint64_t *born = job->t->born;
+    for (size_t i = begin, next; i < end; i = next) {
+        for (next = i + 1; next < end && born[next] == born[i];)
+            next++;
+        step_rows(job, i, next);
+    }
 }
 
 static void step_networks(trainer *t, const learning_rates *rates)
@@ -110,10 +125,7 @@ static void step_networks(trainer *t, const learning_rates *rates)
 static void step_anchors(trainer *t, const learning_rates *rates)
 {
     t->anchor_t++;
-    adam_job job = {.t = t,
-                    .feature = adam_rates_at(rates->feature, t->anchor_t),
-                    .offset = adam_rates_at(rates->offset, t->anchor_t),
-                    .scale = adam_rates_at(rates->scale, t->anchor_t)};
+    adam_job job = {t, rates};
     parallel_blocks(t->anchors.count, ADAM_BLOCK, adam_block, &job);
 }
 
@@ -283,6 +295,7 @@ void trainer_free(trainer *t)
     anchors *all[] = {&t->anchors, &t->gradient, &t->moment1, &t->moment2};
     for (int i = 0; i < 4; i++)
         anchors_free(all[i]);
+    mem_free(t->born);
     decoder_free(&t->decoder);
     mem_free(t->d_params);
     mem_free(t->params_m);

@@ -31,6 +31,7 @@ typedef struct trainer {
 
     /* What learns, its gradient and its Adam moments: same shapes. */
     anchors anchors, gradient, moment1, moment2;
+    uint64_t *born; /* [anchors.count]: anchor_t when the anchor was made, ascending */
     decoder decoder;
     float *d_params, *params_m, *params_v;
     adjust_stats stats;

@@ -379,7 +379,8 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
     size_t count = 0;
     for (int level = 0; level < (def->compat ? 3 : 4); level++) { /* Gaussians, then places */
         const double cell = (double)def->voxel_size * (double[4]){16, 4, 1, 0.25}[level];
-        const double threshold = (double)def->grad_threshold * (double[4]){1, 2, 4, 1}[level];
+        const bool as_start = def->place_scale != NULL;
+        const double threshold = (double)def->grad_threshold * (double[4]){1, 2, 4, as_start ? 1 : 4}[level];
         const size_t begin = count;
         if (def->compat && level > 0 && count == 0)
             break;
@@ -387,9 +388,9 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
         const bool is_place = level == 3;
         for (size_t n = is_place ? slots : 0; n < slots + (is_place ? def->place_count : 0); n++) {
             const size_t p = n - slots, i = is_place ? def->place_anchor[p] : n / offsets;
-            brute_anchor b = {.scale = is_place ? (double)def->place_scale[p] : cell, .gradient = -1};
+            brute_anchor b = {.scale = !is_place ? cell : as_start ? (double)def->place_scale[p] : 4 * cell, .gradient = -1};
             for (size_t slot = is_place ? i * offsets : n; slot < (is_place ? (i + 1) * offsets : n + 1); slot++)
-                if (sc->s.grad_count[slot] > (is_place ? 0 : 40))
+                if (sc->s.grad_count[slot] > (is_place && as_start ? 0 : 40))
                     b.gradient = fmax(b.gradient, (double)(sc->s.grad_accum[slot] / sc->s.grad_count[slot]));
             if (b.gradient < threshold || !(is_place || survives(def, level, n)))
                 continue;
@@ -457,7 +458,7 @@ static void adjust_agrees_with_brute_force(void **state)
         def.seed = seed, def.step = 100 * seed, def.compat = seed % 2 == 1;
         float place[40][3], place_scale[40];
         uint32_t place_anchor[40];
-        def.place = place[0], def.place_scale = place_scale, def.place_anchor = place_anchor;
+        def.place = place[0], def.place_scale = seed % 4 < 2 ? place_scale : NULL, def.place_anchor = place_anchor;
         def.place_count = (size_t)spread(seed, 62, 0, 0, 40);
         for (size_t p = 0; p < def.place_count; p++) {
             place_anchor[p] = (uint32_t)(rng_uniform(seed, 63, p) * (float)count);

@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "data/photo.h"
 #include "io/model_file.h"
+#include "train/adam.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
 #include "train/seed_points.h"
@@ -370,7 +371,7 @@ static size_t anchors_at_points(const trainer *t)
     return count;
 }
 
-/* A start from a few balls leaves most points without an anchor; the first round comes back to them, later ones have Gaussians to go by. */
+/* A start from a few balls leaves most points without an anchor; early growth comes back to them, later growth has Gaussians to go by. */
 static void growth_begins_at_the_points(void **state)
 {
     (void)state;
@@ -380,18 +381,59 @@ static void growth_begins_at_the_points(void **state)
     open_ok(&t, tiny, &def);
     size_t at_points = anchors_at_points(&t);
     assert_true(at_points < t.scene.points.count / 20);
-    while (t.adjust_step == 0) {
+    const uint64_t until = (uint64_t)(SCHEDULE_POINTS_UNTIL * 320) + 2;
+    while (t.step < until) {
         step_report r;
         step_ok(&t, &r);
     }
     print_message("%zu of %zu anchors at points, %zu at the start\n", anchors_at_points(&t), t.anchors.count, at_points);
     assert_true(anchors_at_points(&t) > at_points + 5);
     at_points = anchors_at_points(&t);
-    for (uint64_t until = 4 * t.step; t.step < until;) {
+    while (t.step < 2 * until) {
         step_report r;
         step_ok(&t, &r);
     }
     assert_true(anchors_at_points(&t) <= at_points);
+    trainer_free(&t);
+}
+
+/* Adam's first step is one rate long, whatever the gradient. New rows that are corrected by the age of the run, as the reference does it and
+   ours for features alone, make one of 0.1 / sqrt(0.001) rates in a long run. */
+static void new_geometry_begins_at_its_own_pace(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.init = "adaptive", def.init_count = 0.1, def.iterations = 320;
+    trainer t;
+    open_ok(&t, tiny, &def);
+    step_report r;
+    while (t.adjust_step == 0 || t.born[t.anchors.count - 1] == 0)
+        step_ok(&t, &r);
+    const size_t n = t.anchors.count, k = (size_t)t.anchors.offset_count;
+    size_t old = 0;
+    while (t.born[old] == 0)
+        old++;
+    anchors before = {.offset_count = t.anchors.offset_count};
+    assert_ok(anchors_resize(&before, n, NULL));
+    memcpy(before.offset, t.anchors.offset, n * 3 * k * sizeof(float));
+    memcpy(before.scale_log, t.anchors.scale_log, n * 6 * sizeof(float));
+    memcpy(before.feature, t.anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float));
+    const learning_rates rates = schedule_rates(pace_progress(&t.pace, t.step), false, t.extent, t.def.learning_rate_factor);
+    step_ok(&t, &r);
+    assert_int_equal(t.anchors.count, n); /* no round: rows are where they were */
+    double offset = 0, scale = 0, feature = 0;
+    for (size_t i = old * 3 * k; i < n * 3 * k; i++)
+        offset = fmax(offset, fabs((double)t.anchors.offset[i] - (double)before.offset[i]));
+    for (size_t i = old * 6; i < n * 6; i++)
+        scale = fmax(scale, fabs((double)t.anchors.scale_log[i] - (double)before.scale_log[i]));
+    for (size_t i = old * ANCHOR_FEATURE_DIM; i < n * ANCHOR_FEATURE_DIM; i++)
+        feature = fmax(feature, fabs((double)t.anchors.feature[i] - (double)before.feature[i]));
+    const adam_rates by_run = adam_rates_at(rates.feature, t.anchor_t);
+    const double expected = rates.feature * 0.1 * (double)by_run.correct_m / sqrt(0.001 * (double)by_run.correct_v);
+    print_message("%zu new anchors; first steps of %.3f, %.3f and %.3f rates\n", n - old, offset / rates.offset, scale / rates.scale,
+                  feature / rates.feature);
+    assert_true(fabs(offset / rates.offset - 1) < 1e-3 && fabs(scale / rates.scale - 1) < 1e-3 && fabs(feature / expected - 1) < 1e-3);
+    anchors_free(&before);
     trainer_free(&t);
 }
 
@@ -1065,6 +1107,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(without_growing_the_anchors_stay),
         cmocka_unit_test(growth_stops_at_max_anchors),
         cmocka_unit_test(growth_begins_at_the_points),
+        cmocka_unit_test(new_geometry_begins_at_its_own_pace),
         cmocka_unit_test(moments_follow_their_rows),
         cmocka_unit_test(points_are_made_where_there_are_none),
         cmocka_unit_test(data_without_training_photos_is_refused),

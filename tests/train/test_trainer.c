@@ -371,17 +371,24 @@ static size_t anchors_at_points(const trainer *t)
     return count;
 }
 
+enum { FEW_BALLS_STEPS = 320 };
+
+static void open_from_few_balls(trainer *t)
+{
+    gbt_train_def def = run_def();
+    def.init = "adaptive", def.init_count = 0.1, def.iterations = FEW_BALLS_STEPS;
+    open_ok(t, tiny, &def);
+}
+
 /* A start from a few balls leaves most points without an anchor; early growth comes back to them, later growth has Gaussians to go by. */
 static void growth_begins_at_the_points(void **state)
 {
     (void)state;
-    gbt_train_def def = run_def();
-    def.init = "adaptive", def.init_count = 0.1, def.iterations = 320;
     trainer t;
-    open_ok(&t, tiny, &def);
+    open_from_few_balls(&t);
     size_t at_points = anchors_at_points(&t);
     assert_true(at_points < t.scene.points.count / 20);
-    const uint64_t until = (uint64_t)(SCHEDULE_POINTS_UNTIL * 320) + 2;
+    const uint64_t until = (uint64_t)(SCHEDULE_POINTS_UNTIL * FEW_BALLS_STEPS) + 2;
     while (t.step < until) {
         step_report r;
         step_ok(&t, &r);
@@ -402,10 +409,8 @@ static void growth_begins_at_the_points(void **state)
 static void new_geometry_begins_at_its_own_pace(void **state)
 {
     (void)state;
-    gbt_train_def def = run_def();
-    def.init = "adaptive", def.init_count = 0.1, def.iterations = 320;
     trainer t;
-    open_ok(&t, tiny, &def);
+    open_from_few_balls(&t);
     step_report r;
     while (t.adjust_step == 0 || t.born[t.anchors.count - 1] == 0)
         step_ok(&t, &r);

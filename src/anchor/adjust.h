@@ -39,6 +39,8 @@ typedef struct adjust_def {
     uint64_t seed;             /* of the random candidate drop (in both modes): level j keeps 1 - 0.5^(j+1) of the candidates */
     uint64_t step;
     bool grow, prune;          /* both true by default */
+    bool (*may_stand)(const void *context, const float position[3]); /* where Gaussians may have an anchor; NULL, the default: anywhere */
+    const void *may_stand_context; /* borrowed */
     size_t place_count;        /* places where surface is known to be, besides where Gaussians are; default 0 */
     const float *place;        /* [place_count][3], finite; borrowed, as the next two */
     const float *place_scale;  /* [place_count] > 0: first scale of an anchor there; or NULL */
@@ -61,8 +63,9 @@ typedef struct adjust_result {
  * anchor's Gaussians. Places with a scale are asked for as at the first level, however few views saw those Gaussians; without, as Gaussians
  * at the last level, and are as large. New anchor: position = the cell's candidate with the largest gradient, the first of equals; in
  * compat mode the cell's centre, and no places. Log-scales log(cell), at places log(place_scale), offsets 0, feature = elementwise maximum
- * over the parents of the cell's candidates. Cells use 64-bit keys; a level whose cell is not > 0 is skipped. Never prunes the last anchor
- * (the most opaque stays). Survivors keep their order; new anchors follow by level, then cell (x, y, z).
+ * over the parents of the cell's candidates; none where it may not stand, unless that is a place. Cells use 64-bit keys; a level whose cell
+ * is not > 0 is skipped. Never prunes the last anchor (the most opaque stays). Survivors keep their order; new anchors follow by level,
+ * then cell (x, y, z).
  *
  * @param stats [in, out] rows must match `a`
  * @param out   [out] zeroed on failure

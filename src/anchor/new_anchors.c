@@ -235,17 +235,22 @@ static gbt_status collect_places(growth *g, float size, gbt_error *err)
     return GBT_OK;
 }
 
+/* Unless it may not stand there. */
 static gbt_status add_new_anchor(growth *g, const cell *c, int level, float size, gbt_error *err)
 {
+    const adjust_def *def = g->def;
+    float position[3];
+    for (int k = 0; k < 3; k++) /* there is surface; the middle of a cell is where the cell is */
+        position[k] = def->compat ? (float)c->at[k] * size : c->position[k];
+    if (level < def->level_count && def->may_stand != NULL && !def->may_stand(def->may_stand_context, position))
+        return GBT_OK;
     new_anchors *n = g->out;
     void *rows = n->rows;
     GBT_TRY(mem_reserve(&rows, &n->capacity, n->count, n->count + 1, sizeof *n->rows, "growth", err));
     n->rows = rows;
     new_anchor *f = &n->rows[n->count++];
-    *f = (new_anchor){.scale = c->scale, .gradient = c->gradient, .level = level, .at = {c->at[0], c->at[1], c->at[2]},
-                      .feature = c->feature};
-    for (int k = 0; k < 3; k++) /* there is surface; the middle of a cell is where the cell is */
-        f->position[k] = g->def->compat ? (float)c->at[k] * size : c->position[k];
+    *f = (new_anchor){.position = {position[0], position[1], position[2]}, .scale = c->scale, .gradient = c->gradient, .level = level,
+                      .at = {c->at[0], c->at[1], c->at[2]}, .feature = c->feature};
     return GBT_OK;
 }
 

@@ -11,10 +11,12 @@
 #include "bvh/points.h"
 #include "train/def.h"
 #include "train/gradient_check.h"
+#include "train/sight.h"
 
 static const float share_min = 2.5e-6f; /* of short runs: schedule_thrift() */
 static const double last_rounds_from = 0.9; /* of growing */
 enum { ADJUSTS_PER_RUN = 100, COMPAT_INTERVAL = 100 /* steps */, INTERVAL_MIN = 20 /* a judgement of fewer views is chance */ };
+enum { VIEWS_MIN = 2 };
 
 /* What an anchor is good for is what pictures would miss without it: the share of them that its Gaussians cover, the mean over rays of T
    alpha. Opacity, which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of all anchors. */
@@ -147,6 +149,19 @@ static gbt_status grow_at_points(const trainer *t, adjust_def *def, uint32_t **n
     return GBT_OK;
 }
 
+/* One photo cannot tell how far off something is: what only it shows may stand anywhere along its rays, as a fog before other cameras. The
+   sparse points need no such leave, for other photos have told where they are. */
+static bool two_views_see(const void *context, const float position[3])
+{
+    const trainer *t = context;
+    size_t seen = 0;
+    for (size_t v = 0; v < t->train_count && seen < VIEWS_MIN; v++) {
+        double distance;
+        seen += camera_sees(&t->scene.views[t->train_views[v]].camera, position, &distance) && distance > (double)t->settings.t_near;
+    }
+    return seen == VIEWS_MIN;
+}
+
 static adjust_def rules_of(const trainer *t)
 {
     adjust_def def = adjust_def_default();
@@ -166,6 +181,8 @@ static adjust_def rules_of(const trainer *t)
     def.grad_threshold *= thrift;
     def.min_use = thrift * share_min * (last ? (float)t->def.last_thrift : 1);
     def.grow = !last;
+    if (t->train_count >= VIEWS_MIN)
+        def.may_stand = two_views_see, def.may_stand_context = t;
     return def;
 }
 

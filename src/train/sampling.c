@@ -4,8 +4,8 @@
 #include <math.h>
 
 #include "base/parallel.h"
-#include "base/vec.h"
 #include "trace/footprint.h"
+#include "train/sight.h"
 
 enum { ANCHOR_BLOCK = 1024 };
 
@@ -15,16 +15,6 @@ typedef struct sampling_job {
     size_t camera_count;
     float *out;
 } sampling_job;
-
-static bool is_in_picture(const gbt_camera *camera, const double point[3])
-{
-    double local[3], pixel[2];
-    for (int k = 0; k < 3; k++)
-        local[k] = point[k] - camera->center[k];
-    dmat_apply(camera->rotation, local, local);
-    return gbt_camera_project(camera, local, pixel) && pixel[0] >= 0 && pixel[0] <= camera->width && pixel[1] >= 0 &&
-           pixel[1] <= camera->height;
-}
 
 static void sampling_block(size_t block, size_t begin, size_t end, void *context)
 {
@@ -38,7 +28,7 @@ static void sampling_block(size_t block, size_t begin, size_t end, void *context
             const float *p = job->a->position + 3 * i;
             const double point[3] = {(double)p[0], (double)p[1], (double)p[2]};
             const float pixel = (float)footprint_pixel(&view, point);
-            if (pixel < job->out[i] && is_in_picture(&job->cameras[c], point))
+            if (pixel < job->out[i] && camera_sees(&job->cameras[c], p, NULL))
                 job->out[i] = pixel;
         }
     }

@@ -13,29 +13,17 @@
 #include "bvh/points.h"
 #include "train/def.h"
 #include "train/seed_points.h"
+#include "train/sight.h"
 #include "train/trainer.h"
 
 enum { STREAM_NETWORKS = 2, FEW_PLACES = 128 };
 
-/* Is a point in the picture? */
-static bool view_sees(const gbt_camera *camera, const float position[3], double *distance)
-{
-    double d[3], cam[3], pixel[2];
-    for (int k = 0; k < 3; k++)
-        d[k] = (double)position[k] - camera->center[k];
-    dmat_apply(camera->rotation, d, cam);
-    *distance = dvec_length(d);
-    return gbt_camera_project(camera, cam, pixel) && pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera->width &&
-           pixel[1] < camera->height;
-}
-
 /* Points that no training photo sees say nothing about what to render. */
 static bool any_point_is_seen(const trainer *t)
 {
-    double distance;
     for (size_t i = 0; i < t->scene.points.count; i++)
         for (size_t v = 0; v < t->train_count; v++)
-            if (view_sees(&t->scene.views[t->train_views[v]].camera, t->scene.points.position + 3 * i, &distance))
+            if (camera_sees(&t->scene.views[t->train_views[v]].camera, t->scene.points.position + 3 * i, NULL))
                 return true;
     return false;
 }
@@ -120,7 +108,7 @@ static gbt_status measure_distances(trainer *t, float *p5, float *median, float 
         const gbt_camera *camera = &t->scene.views[t->train_views[v]].camera;
         for (size_t i = 0; i < t->anchors.count; i += stride) {
             double distance;
-            if (view_sees(camera, t->anchors.position + 3 * i, &distance))
+            if (camera_sees(camera, t->anchors.position + 3 * i, &distance))
                 all[count++] = (float)distance;
         }
     }

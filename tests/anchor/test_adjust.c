@@ -372,6 +372,23 @@ static int by_place(const void *a, const void *b)
     return 0;
 }
 
+static bool right_of_the_middle(const void *context, const float position[3])
+{
+    (void)context;
+    return position[0] >= 0;
+}
+
+static size_t keep_standing(brute_anchor *added, size_t count, bool (*may_stand)(const void *, const float[3]))
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < count; i++) {
+        const float at[3] = {(float)added[i].position[0], (float)added[i].position[1], (float)added[i].position[2]};
+        if (may_stand == NULL || may_stand(NULL, at))
+            added[kept++] = added[i];
+    }
+    return kept;
+}
+
 /* New anchors as the text says it, with quadratic searches; voxel sizes are powers of two, so that cells are exact in both. */
 static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *added)
 {
@@ -425,6 +442,7 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
             for (size_t f = 0; f < 32; f++)
                 added[known].feature[f] = fmax(added[known].feature[f], (double)sc->a.feature[i * 32 + f]);
         }
+        count = begin + keep_standing(added + begin, count - begin, is_place ? NULL : def->may_stand);
         qsort(added + begin, count - begin, sizeof *added, by_place);
     }
     return count;
@@ -456,6 +474,7 @@ static void adjust_agrees_with_brute_force(void **state)
         adjust_def def = adjust_def_default();
         def.voxel_size = seed % 3 == 0 ? 0.5f : seed % 3 == 1 ? 0.03125f : 0.00390625f;
         def.seed = seed, def.step = 100 * seed, def.compat = seed % 2 == 1;
+        def.may_stand = seed % 5 == 0 ? right_of_the_middle : NULL;
         float place[40][3], place_scale[40];
         uint32_t place_anchor[40];
         def.place = place[0], def.place_scale = seed % 4 < 2 ? place_scale : NULL, def.place_anchor = place_anchor;

@@ -359,15 +359,19 @@ static void growth_stops_at_max_anchors(void **state)
     trainer_free(&t);
 }
 
+static bool is_at_point(const trainer *t, size_t anchor)
+{
+    size_t p = 0;
+    while (p < t->scene.points.count && memcmp(t->anchors.position + 3 * anchor, t->scene.points.position + 3 * p, 3 * sizeof(float)) != 0)
+        p++;
+    return p < t->scene.points.count;
+}
+
 static size_t anchors_at_points(const trainer *t)
 {
     size_t count = 0;
-    for (size_t i = 0; i < t->anchors.count; i++) {
-        size_t p = 0;
-        while (p < t->scene.points.count && memcmp(t->anchors.position + 3 * i, t->scene.points.position + 3 * p, 3 * sizeof(float)) != 0)
-            p++;
-        count += p < t->scene.points.count;
-    }
+    for (size_t i = 0; i < t->anchors.count; i++)
+        count += is_at_point(t, i);
     return count;
 }
 
@@ -402,6 +406,35 @@ static void growth_begins_at_the_points(void **state)
     }
     assert_true(anchors_at_points(&t) <= at_points);
     trainer_free(&t);
+}
+
+/* How many anchors have grown away from the points, when only two photos teach and the second looks away, or not. */
+static size_t grown_in_the_open(bool looks_away)
+{
+    trainer t;
+    open_from_few_balls(&t);
+    t.train_count = 2;
+    double *turn = t.scene.views[t.train_views[1]].camera.rotation;
+    for (int k = 0; looks_away && k < 3; k++)
+        turn[k] = -turn[k], turn[6 + k] = -turn[6 + k];
+    while (t.step < FEW_BALLS_STEPS / 4) {
+        step_report r;
+        step_ok(&t, &r);
+    }
+    size_t count = 0;
+    for (size_t i = 0; i < t.anchors.count; i++)
+        count += t.born[i] > 0 && !is_at_point(&t, i);
+    print_message("%zu of %zu anchors are new, and not at points\n", count, t.anchors.count);
+    trainer_free(&t);
+    return count;
+}
+
+/* One photo cannot tell how far off what grows is. */
+static void growth_asks_for_two_views(void **state)
+{
+    (void)state;
+    assert_int_equal(grown_in_the_open(true), 0);
+    assert_true(grown_in_the_open(false) > 20);
 }
 
 /* Adam's first step is one rate long, whatever the gradient. New rows that are corrected by the age of the run, as the reference does it and
@@ -1112,6 +1145,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(without_growing_the_anchors_stay),
         cmocka_unit_test(growth_stops_at_max_anchors),
         cmocka_unit_test(growth_begins_at_the_points),
+        cmocka_unit_test(growth_asks_for_two_views),
         cmocka_unit_test(new_geometry_begins_at_its_own_pace),
         cmocka_unit_test(moments_follow_their_rows),
         cmocka_unit_test(points_are_made_where_there_are_none),

@@ -63,9 +63,9 @@ typedef struct adjust_result {
  * anchor's Gaussians. Places with a scale are asked for as at the first level, however few views saw those Gaussians; without, as Gaussians
  * at the last level, and are as large. New anchor: position = the cell's candidate with the largest gradient, the first of equals; in
  * compat mode the cell's centre, and no places. Log-scales log(cell), at places log(place_scale), offsets 0, feature = elementwise maximum
- * over the parents of the cell's candidates; none where it may not stand, unless that is a place. Cells use 64-bit keys; a level whose cell
- * is not > 0 is skipped. Never prunes the last anchor (the most opaque stays). Survivors keep their order; new anchors follow by level,
- * then cell (x, y, z).
+ * over the parents of the cell's candidates. Where one may not stand none is made, unless that is a place. Cells use 64-bit keys; a level
+ * whose cell is not > 0 is skipped. Never prunes the last anchor (the most opaque stays). Survivors keep their order; new anchors follow by
+ * level, then cell (x, y, z).
  *
  * @param stats [in, out] rows must match `a`
  * @param out   [out] zeroed on failure

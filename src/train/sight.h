@@ -6,7 +6,7 @@
 
 #include "gbtrace/camera.h"
 
-/** @param distance [out] optional (NULL): from the camera centre, also of a point beside the picture. Cost: about 20 ns. */
+/** @param distance [out] optional (NULL): from the camera centre, also of a point beside the picture. Cost: one projection. */
 bool camera_sees(const gbt_camera *camera, const float position[3], double *distance);
 
 #endif

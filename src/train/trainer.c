@@ -79,6 +79,7 @@ static frame_renderer renderer_of_step(const trainer *t, const gbt_camera *camer
 typedef struct adam_job {
     trainer *t;
     const learning_rates *rates;
+    adam_rates feature; /* by the age of the run */
 } adam_job;
 
 /* Of one age. By the age of the run, the first steps of a new anchor would be up to six times too long, for its second moments are young:
@@ -86,11 +87,11 @@ typedef struct adam_job {
 static void step_rows(const adam_job *job, size_t begin, size_t end)
 {
     anchors *p = &job->t->anchors, *g = &job->t->gradient, *m = &job->t->moment1, *v = &job->t->moment2;
-    const uint64_t run_age = job->t->anchor_t, age = run_age - job->t->born[begin];
+    const uint64_t age = job->t->anchor_t - job->t->born[begin];
     const size_t rows = end - begin, feature = begin * ANCHOR_FEATURE_DIM, scale = begin * 6;
     const size_t offset_floats = 3 * (size_t)p->offset_count, offset = begin * offset_floats;
     adam_step(p->feature + feature, g->feature + feature, m->feature + feature, v->feature + feature, rows * ANCHOR_FEATURE_DIM,
-              adam_rates_at(job->rates->feature, run_age));
+              job->feature);
     adam_step(p->offset + offset, g->offset + offset, m->offset + offset, v->offset + offset, rows * offset_floats,
               adam_rates_at(job->rates->offset, age));
     adam_step(p->scale_log + scale, g->scale_log + scale, m->scale_log + scale, v->scale_log + scale, rows * 6,
@@ -125,7 +126,7 @@ static void step_networks(trainer *t, const learning_rates *rates)
 static void step_anchors(trainer *t, const learning_rates *rates)
 {
     t->anchor_t++;
-    adam_job job = {t, rates};
+    adam_job job = {t, rates, adam_rates_at(rates->feature, t->anchor_t)};
     parallel_blocks(t->anchors.count, ADAM_BLOCK, adam_block, &job);
 }
 

@@ -6,10 +6,10 @@
 #include "gbtrace/train.h"
 #include "gbtrace/view.h"
 
-static void print_address(int port, void *context)
+static void print_address(const char *url, void *context)
 {
     (void)context;
-    printf("http://127.0.0.1:%d\n", port);
+    puts(url);
     fflush(stdout);
     progress_say("open this in a browser; Ctrl-C ends");
 }
@@ -22,7 +22,9 @@ static int run(const command *self, int argc, char **argv)
     const option options[] = {
         {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN", .help = "the same as RUN"},
         {.name = "port", .short_name = 'p', .kind = OPTION_INT, .value = &def.port, .min = 0, .max = 65535, .value_name = "N",
-         .help = "on 127.0.0.1; 0: any free one"},
+         .help = "0: any free one"},
+        {.name = "host", .kind = OPTION_STRING, .value = &def.host, .value_name = "ADDRESS",
+         .help = "listen at this IPv4 address of the machine, 0.0.0.0: at all; others than 127.0.0.1 answer only with the token printed"},
         {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "photos of another data set",
          .aliases = "s source-path"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",

@@ -1,39 +1,61 @@
 /* view/http.c -- who may ask, and the headers of what is sent. */
 #include "view/http.h"
 
+#include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "base/memory.h"
 #include "view/page_files.h"
 
-bool http_host_is_local(const char *host)
+enum { COOKIE_NAME_SIZE = 24 };
+
+/* A browser sends a host's cookies to each of its ports: the name tells this server's from another's. */
+static void cookie_name(struct MHD_Connection *connection, char out[COOKIE_NAME_SIZE])
 {
-    static const char *const names[] = {"127.0.0.1", "localhost"};
-    if (host == NULL)
-        return false;
-    const size_t length = strcspn(host, ":");
-    if (host[length] == ':' && strspn(host + length + 1, "0123456789") != strlen(host + length + 1))
-        return false;
-    for (int i = 0; i < 2; i++)
-        if (strlen(names[i]) == length && strncasecmp(host, names[i], length) == 0)
-            return true;
-    return false;
+    struct MHD_Daemon *daemon = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_DAEMON)->daemon;
+    snprintf(out, COOKIE_NAME_SIZE, "gbtrace_%d", MHD_get_daemon_info(daemon, MHD_DAEMON_INFO_BIND_PORT)->port);
 }
 
-int http_refusal(struct MHD_Connection *connection, const char *path, const char *method, const char **why)
+static const char *token_in_query(struct MHD_Connection *connection)
+{
+    return MHD_lookup_connection_value(connection, MHD_GET_ARGUMENT_KIND, "token");
+}
+
+static bool has_token(struct MHD_Connection *connection, const guard *g)
+{
+    char name[COOKIE_NAME_SIZE];
+    cookie_name(connection, name);
+    return guard_knows_token(g, token_in_query(connection)) ||
+           guard_knows_token(g, MHD_lookup_connection_value(connection, MHD_COOKIE_KIND, name));
+}
+
+/* As far as the browser tells: none says Sec-Fetch-Site to a plain http address that is not its own machine's, and Origin goes with few
+   requests. There the cookie does it, which no other site's page makes a browser send. */
+static bool is_another_sites(struct MHD_Connection *connection, const char *path, const char *host)
+{
+    const char *site = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, "Sec-Fetch-Site");
+    const char *origin = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, MHD_HTTP_HEADER_ORIGIN);
+    const bool foreign = site != NULL && strcmp(site, "same-origin") != 0 && strcmp(site, "none") != 0;
+    return (foreign && strcmp(path, "/") != 0) ||
+           (origin != NULL && (strncmp(origin, "http://", 7) != 0 || strcasecmp(origin + 7, host) != 0));
+}
+
+int http_refusal(struct MHD_Connection *connection, const guard *g, const char *path, const char *method, const char **why)
 {
     const char *host = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, MHD_HTTP_HEADER_HOST);
-    const char *site = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, "Sec-Fetch-Site");
-    if (!http_host_is_local(host))
-        return *why = "error: Host: only 127.0.0.1 and localhost are answered\n", 403;
+    if (!guard_knows_host(g, host))
+        return *why = "error: Host: only the address that gbtrace view printed is answered\n", 403;
     if (strcmp(method, MHD_HTTP_METHOD_GET) != 0)
         return *why = "error: only GET is answered\n", 405;
-    if (site != NULL && strcmp(site, "same-origin") != 0 && strcmp(site, "none") != 0 && strcmp(path, "/") != 0)
+    if (!has_token(connection, g))
+        return *why = "error: no token, or not this server's: open the address that gbtrace view printed\n", 403;
+    if (is_another_sites(connection, path, host))
         return *why = "error: another site's page may not ask\n", 403;
     return 0;
 }
 
-enum MHD_Result http_send(struct MHD_Connection *connection, const answer *with, bool keeps)
+enum MHD_Result http_send(struct MHD_Connection *connection, const guard *g, const answer *with, bool keeps)
 {
     static const struct { const char *name, *value; } always[] = {
         {"Cache-Control", "no-store"},
@@ -55,6 +77,12 @@ enum MHD_Result http_send(struct MHD_Connection *connection, const answer *with,
     MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, with->type);
     if (with->about[0] != '\0')
         MHD_add_response_header(response, "X-Picture", with->about);
+    if (with->code == 200 && g->token[0] != '\0' && guard_knows_token(g, token_in_query(connection))) {
+        char name[COOKIE_NAME_SIZE], cookie[128];
+        cookie_name(connection, name);
+        snprintf(cookie, sizeof cookie, "%s=%s; Path=/; HttpOnly; SameSite=Strict", name, g->token);
+        MHD_add_response_header(response, MHD_HTTP_HEADER_SET_COOKIE, cookie);
+    }
     if (with->code == 405)
         MHD_add_response_header(response, MHD_HTTP_HEADER_ALLOW, MHD_HTTP_METHOD_GET);
     const enum MHD_Result sent = MHD_queue_response(connection, (unsigned)with->code, response);

@@ -6,15 +6,17 @@
 #include <stdbool.h>
 
 #include "view/answer.h"
-
-/** Whether a Host header means this machine: 127.0.0.1 or localhost, with any port or none (a tunnel may end at another). */
-bool http_host_is_local(const char *host);
+#include "view/guard.h"
 
 /** Why a request is refused before anybody looks at what it wants; 0: it is not. `why` is static. */
-int http_refusal(struct MHD_Connection *connection, const char *path, const char *method, const char **why);
+int http_refusal(struct MHD_Connection *connection, const guard *g, const char *path, const char *method, const char **why);
 
-/** Send; the bytes are freed when they have been sent, or `with->bytes` are static and stay when `keeps`. */
-enum MHD_Result http_send(struct MHD_Connection *connection, const answer *with, bool keeps);
+/**
+ * Send; the bytes are freed when they have been sent, or `with->bytes` are static and stay when `keeps`.
+ *
+ * A request that showed the token in its query gets it back as a cookie: the page's own requests need no more.
+ */
+enum MHD_Result http_send(struct MHD_Connection *connection, const guard *g, const answer *with, bool keeps);
 
 /** The page or one of its files; false when there is none of that name. */
 bool http_page(const char *path, answer *out);

@@ -27,6 +27,7 @@ struct server_job {
 
 struct server {
     struct MHD_Daemon *daemon;
+    guard guard;
     const char *log_path;
     sem_t wake; /* one post per job, and per server_wake() */
     pthread_mutex_t lock;
@@ -155,11 +156,11 @@ static void give_log(const server *s, struct MHD_Connection *connection, answer 
     snprintf(out->about, sizeof out->about, "{\"from\":%llu}", (unsigned long long)begin);
 }
 
-static enum MHD_Result refuse(struct MHD_Connection *connection, int code, const char *why)
+static enum MHD_Result refuse(const server *s, struct MHD_Connection *connection, int code, const char *why)
 {
     answer text = {0};
     answer_text(&text, code, text_plain, why);
-    return http_send(connection, &text, false);
+    return http_send(connection, &s->guard, &text, false);
 }
 
 /* Send what is here, or put the job into the queue and let the connection wait. */
@@ -168,18 +169,18 @@ static enum MHD_Result begin(server *s, server_job *job, const char *path)
     answer now = {0};
     gbt_error err = {0};
     if (http_page(path, &now))
-        return http_send(job->connection, &now, true);
+        return http_send(job->connection, &s->guard, &now, true);
     if (strcmp(path, "/status") == 0)
         give_status(s, &now);
     else if (strcmp(path, "/log") == 0)
         give_log(s, job->connection, &now);
     if (now.code != 0)
-        return http_send(job->connection, &now, false);
+        return http_send(job->connection, &s->guard, &now, false);
     const gbt_status status = request_parse(path, query_word, job->connection, &job->request, &err);
     if (status != GBT_OK) {
         answer_failure(&now, status, &err);
         now.code = status == GBT_ERR_IO ? 404 : now.code;
-        return http_send(job->connection, &now, false);
+        return http_send(job->connection, &s->guard, &now, false);
     }
     pthread_mutex_lock(&s->lock);
     const bool waits = put_in(s, job);
@@ -187,7 +188,7 @@ static enum MHD_Result begin(server *s, server_job *job, const char *path)
         MHD_suspend_connection(job->connection);
     pthread_mutex_unlock(&s->lock);
     if (!waits)
-        return refuse(job->connection, 503, "error: too many requests wait\n");
+        return refuse(s, job->connection, 503, "error: too many requests wait\n");
     sem_post(&s->wake);
     return MHD_YES;
 }
@@ -213,10 +214,10 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
     if (job->is_answered) {
         const answer with = job->answer;
         job->answer = (answer){0};
-        return http_send(connection, &with, false);
+        return http_send(connection, &s->guard, &with, false);
     }
-    const int refusal = http_refusal(connection, path, method, &why);
-    return refusal != 0 ? refuse(connection, refusal, why) : begin(s, job, path);
+    const int refusal = http_refusal(connection, &s->guard, path, method, &why);
+    return refusal != 0 ? refuse(s, connection, refusal, why) : begin(s, job, path);
 }
 
 static void on_done(void *context, struct MHD_Connection *connection, void **state, enum MHD_RequestTerminationCode how)
@@ -236,13 +237,14 @@ static void on_message(void *context, const char *format, va_list words)
 
 /* ---- start and stop -------------------------------------------------------------------------------------------------------------- */
 
-gbt_status server_start(int port, const char *log_path, server **out, gbt_error *err)
+gbt_status server_start(const guard *g, int port, const char *log_path, server **out, gbt_error *err)
 {
-    struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port), .sin_addr = {htonl(INADDR_LOOPBACK)}};
+    struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port), .sin_addr = g->address};
     server *s = mem_calloc(1, sizeof *s, "server", err);
     *out = s;
     if (s == NULL)
         return GBT_ERR_NO_MEMORY;
+    s->guard = *g;
     s->log_path = log_path;
     sem_init(&s->wake, 0, 0);
     pthread_mutex_init(&s->lock, NULL);
@@ -257,7 +259,7 @@ gbt_status server_start(int port, const char *log_path, server **out, gbt_error 
     const int why = errno;
     server_stop(s);
     *out = NULL;
-    return base_fail(err, GBT_ERR_IO, "127.0.0.1:%d: cannot listen: %s%s", port, why != 0 ? strerror(why) : "libmicrohttpd did not start",
+    return base_fail(err, GBT_ERR_IO, "%s:%d: cannot listen: %s%s", g->host, port, why != 0 ? strerror(why) : "libmicrohttpd did not start",
                      why == EADDRINUSE ? " (another --port, or 0 for any free one)" : "");
 }
 

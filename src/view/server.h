@@ -1,9 +1,10 @@
-/* view/server.h -- HTTP on loopback: the page and small texts at once, all else as jobs for one worker, the newest picture first to
+/* view/server.h -- HTTP: the page and small texts at once, all else as jobs for one worker, the newest picture first to
    last. */
 #ifndef GBT_VIEW_SERVER_H
 #define GBT_VIEW_SERVER_H
 
 #include "view/answer.h"
+#include "view/guard.h"
 #include "view/request.h"
 
 /** Fixed limits: connections at once, waiting jobs, bytes of a request's head, seconds that a silent connection stays. */
@@ -15,16 +16,17 @@ typedef struct server server;
 typedef struct server_job server_job;
 
 /**
- * Listen at 127.0.0.1.
+ * Listen where the guard says.
  *
- * Only GET is answered, only with a Host of 127.0.0.1 or localhost (so that no foreign name can be made to mean this server), and nothing
- * but the page itself to requests that a browser marks as another site's.
+ * Only GET is answered, only with a Host that the guard knows (so that no foreign name can be made to mean this server), only with the
+ * token where there is one, and nothing but the page itself to requests that a browser marks as another site's.
  *
+ * @param g        [in] copied
  * @param port     [in] 0: any free one
  * @param log_path [in] file that /log?from=BYTE gives the rest of; empty: none. Borrowed
- * @return GBT_OK, GBT_ERR_IO (the port is in use), GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_IO (the port is in use, the address is not this machine's), GBT_ERR_NO_MEMORY
  */
-gbt_status server_start(int port, const char *log_path, server **out, gbt_error *err);
+gbt_status server_start(const guard *g, int port, const char *log_path, server **out, gbt_error *err);
 int server_port(const server *s);
 
 /** Give up what waits (503), close, free. Every job that server_next() gave must have been answered. */

@@ -38,30 +38,34 @@ static void serve(studio *s, server *http)
     }
 }
 
-static void serve_until_signal(studio *s, server *http, const gbt_view_def *def)
+static void serve_until_signal(studio *s, server *http, const char *url, const gbt_view_def *def)
 {
-    stop_signal_guard guard;
-    stop_signal_catch(&guard, wake, http);
+    stop_signal_guard signals;
+    stop_signal_catch(&signals, wake, http);
     if (def->ready != NULL)
-        def->ready(server_port(http), def->context);
+        def->ready(url, def->context);
     serve(s, http);
-    stop_signal_release(&guard);
+    stop_signal_release(&signals);
 }
 
 gbt_status gbt_view(const char *input, const gbt_view_def *def, gbt_error *err)
 {
     server *http = NULL;
+    guard who;
+    char url[GUARD_URL_SIZE];
     if (def->port < 0 || def->port > 65535)
         return base_fail(err, GBT_ERR_ARGUMENT, "--port: %d (wanted 0 to 65535)", def->port);
+    GBT_TRY(guard_open(def->host, &who, err));
     studio *s = mem_calloc(1, sizeof *s, "scene", err);
     if (s == NULL)
         return GBT_ERR_NO_MEMORY;
     gbt_status status = studio_open(input, def->data, s, err);
     if (status == GBT_OK)
-        status = server_start(def->port, s->log_path, &http, err);
+        status = server_start(&who, def->port, s->log_path, &http, err);
     if (status == GBT_OK) {
         server_set_status(http, studio_status(s));
-        serve_until_signal(s, http, def);
+        guard_url(&who, server_port(http), url);
+        serve_until_signal(s, http, url, def);
         server_stop(http);
     }
     studio_close(s);

@@ -381,6 +381,14 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     kill -INT "$viewer"
     wait "$viewer" && grep -q '^http://127\.0\.0\.1:[1-9][0-9]*$' out && ! grep -q error err
     report $? "view says where, and Ctrl-C ends it with 0" "$(cat err out)"
+    rm out
+    "$program" view run --port 0 --host 0.0.0.0 >out 2>err &
+    viewer=$!
+    while kill -0 "$viewer" 2>/dev/null && [ ! -s out ]; do sleep 0.1; done
+    kill -INT "$viewer"
+    wait "$viewer" && grep -q '^http://[1-9][0-9.]*:[1-9][0-9]*/?token=[0-9a-f]\{32\}$' out && ! grep -q error err
+    report $? "view --host prints an address with a token" "$(cat err out)"
+    misuse 2 '--host: "example.org" (wanted an IPv4 address of this machine, or 0.0.0.0 for all that it has)' view run --host example.org
     misuse 4 "nowhere: not there (wanted a run, a model file or plain Gaussians)" view nowhere
     misuse 4 "made/model.gbt: not there (wanted a run, a model file or plain Gaussians)" view made
     misuse 2 "--port: bad value (wanted a whole number from 0 to 65535, got 65536)" view run --port 65536

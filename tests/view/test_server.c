@@ -5,6 +5,7 @@
 #include "view/server.h"
 
 static server *s;
+static guard here;
 static int port;
 static char log_path[] = "/tmp/gbt_view_log_XXXXXX";
 
@@ -13,7 +14,8 @@ static int start(void **state)
     (void)state;
     gbt_error err = {0};
     const int fd = mkstemp(log_path);
-    if (fd < 0 || write(fd, "a,b\n1,2\n", 8) != 8 || close(fd) != 0 || server_start(0, log_path, &s, &err) != GBT_OK)
+    if (fd < 0 || write(fd, "a,b\n1,2\n", 8) != 8 || close(fd) != 0 || guard_open(NULL, &here, &err) != GBT_OK ||
+        server_start(&here, 0, log_path, &s, &err) != GBT_OK)
         return -1;
     port = server_port(s);
     return 0;
@@ -45,6 +47,7 @@ static bad_case bad[] = {
     {"a name that begins like ours", GET("/") "Host: 127.0.0.1.evil.example\r\nConnection: close\r\n\r\n", 403, 0},
     {"another site's script", GET("/status") "Sec-Fetch-Site: cross-site\r\n" GOOD_HEAD, 403, 0},
     {"another port's script", GET("/render?view=0") "Sec-Fetch-Site: same-site\r\n" GOOD_HEAD, 403, 0},
+    {"another site's script, with its name", GET("/status") "Origin: https://evil.example\r\n" GOOD_HEAD, 403, 0},
     {"POST", "POST /render HTTP/1.1\r\nContent-Length: 4\r\n" GOOD_HEAD "view", 405, 0},
     {"PUT", "PUT /index.html HTTP/1.1\r\nContent-Length: 0\r\n" GOOD_HEAD, 405, 0},
     {"HEAD", "HEAD / HTTP/1.1\r\n" GOOD_HEAD, 405, 0},
@@ -280,7 +283,7 @@ static void the_end_answers_all(void **state)
 {
     (void)state;
     server *other;
-    assert_ok(server_start(0, "", &other, NULL));
+    assert_ok(server_start(&here, 0, "", &other, NULL));
     reply none = http_get(server_port(other), "/log");
     assert_int_equal(none.code, 404);
     free(none.text);
@@ -297,12 +300,86 @@ static void the_end_answers_all(void **state)
     free(r.text);
 }
 
+/* ---- with a token ------------------------------------------------------------------------------------------------------------------ */
+
+static reply get_with(int at, const char *path, const char *headers)
+{
+    char head[1024];
+    const int length = snprintf(head, sizeof head, "GET %s HTTP/1.1\r\n%sConnection: close\r\n\r\n", path, headers);
+    return http_raw(at, head, (size_t)length);
+}
+
+static void assert_code(int at, const char *path, const char *headers, int code)
+{
+    reply r = get_with(at, path, headers);
+    if (r.code != code)
+        fail_msg("%s %s: wanted %d, got %.300s", path, headers, code, r.text);
+    if (code == 403 && (r.body_count == 0 || strchr(r.body, '\n') != r.body + r.body_count - 1 || strncmp(r.body, "error: ", 7) != 0))
+        fail_msg("%s %s: wanted one line, got \"%s\"", path, headers, r.body);
+    if (code == 403 && strstr(r.text, "Set-Cookie") != NULL)
+        fail_msg("%s %s: a cookie for a stranger", path, headers);
+    free(r.text);
+}
+
+static void others_need_the_token(void **state)
+{
+    (void)state;
+    static const char *const paths[] = {"/", "/index.html", "/view.js", "/status", "/log", "/scene", "/render?view=0", "/nowhere"};
+    static const char host[] = "Host: 192.168.1.5:8470\r\n";
+    server *other;
+    guard g;
+    char path[256], headers[256], wanted[256];
+    assert_ok(guard_open("0.0.0.0", &g, NULL));
+    assert_ok(server_start(&g, 0, "", &other, NULL));
+    const int at = server_port(other);
+    for (size_t i = 0; i < sizeof paths / sizeof *paths; i++) {
+        assert_code(at, paths[i], host, 403);
+        assert_code(at, paths[i], "Host: 127.0.0.1\r\n", 403); /* from this machine too: its address is not whose request it is */
+    }
+    assert_code(at, "/status?token=", host, 403);
+    assert_code(at, "/status?token=00000000000000000000000000000000", host, 403);
+    snprintf(path, sizeof path, "/?token=%s", g.token);
+    reply r = get_with(at, path, host);
+    assert_int_equal(r.code, 200);
+    snprintf(wanted, sizeof wanted, "Set-Cookie: gbtrace_%d=%s; Path=/; HttpOnly; SameSite=Strict\r\n", at, g.token);
+    assert_has(&r, wanted);
+    assert_has(&r, "Referrer-Policy: no-referrer");
+    free(r.text);
+    snprintf(headers, sizeof headers, "%sCookie: a=b; gbtrace_%d=%s\r\n", host, at, g.token);
+    assert_code(at, "/", headers, 200);
+    assert_code(at, "/view.js", headers, 200);
+    assert_code(at, "/status", headers, 200);
+    /* with the token, but for a foreign name or another site */
+    snprintf(headers, sizeof headers, "Host: evil.example:8470\r\nCookie: gbtrace_%d=%s\r\n", at, g.token);
+    assert_code(at, "/status", headers, 403);
+    snprintf(headers, sizeof headers, "%sOrigin: http://192.168.1.5:80\r\nCookie: gbtrace_%d=%s\r\n", host, at, g.token);
+    assert_code(at, "/status", headers, 403);
+    snprintf(headers, sizeof headers, "%sOrigin: null\r\nCookie: gbtrace_%d=%s\r\n", host, at, g.token);
+    assert_code(at, "/status", headers, 403);
+    snprintf(headers, sizeof headers, "%sSec-Fetch-Site: same-site\r\nCookie: gbtrace_%d=%s\r\n", host, at, g.token);
+    assert_code(at, "/status", headers, 403);
+    snprintf(headers, sizeof headers, "%sOrigin: http://192.168.1.5:8470\r\nCookie: gbtrace_%d=%s\r\n", host, at, g.token);
+    assert_code(at, "/status", headers, 200);
+    server_stop(other);
+}
+
+static void an_address_of_another_machine(void **state)
+{
+    (void)state;
+    server *other;
+    guard g;
+    gbt_error err = {0};
+    assert_ok(guard_open("192.0.2.1", &g, NULL)); /* for documentation: nobody's */
+    assert_int_equal(server_start(&g, 0, "", &other, &err), GBT_ERR_IO);
+    assert_non_null(strstr(err.text, "192.0.2.1:0: cannot listen"));
+}
+
 static void a_port_belongs_to_one(void **state)
 {
     (void)state;
     server *other;
     gbt_error err = {0};
-    assert_int_equal(server_start(port, "", &other, &err), GBT_ERR_IO);
+    assert_int_equal(server_start(&here, port, "", &other, &err), GBT_ERR_IO);
     assert_non_null(strstr(err.text, "cannot listen"));
     assert_null(other);
 }
@@ -319,6 +396,8 @@ int main(void)
         cmocka_unit_test(the_queue_has_an_end),
         cmocka_unit_test(nobody_waits_for_an_answer_that_nobody_wants),
         cmocka_unit_test(the_end_answers_all),
+        cmocka_unit_test(others_need_the_token),
+        cmocka_unit_test(an_address_of_another_machine),
         cmocka_unit_test(a_port_belongs_to_one),
     };
     enum { REST = sizeof rest / sizeof *rest };

@@ -24,9 +24,10 @@ typedef struct viewer {
     gbt_error err;
 } viewer;
 
-static void tell(int port, void *context)
+static void tell(const char *url, void *context)
 {
     viewer *v = context;
+    const int port = atoi(strrchr(url, ':') + 1);
     if (write(v->ready[1], &port, sizeof port) != sizeof port)
         abort();
 }
@@ -377,15 +378,16 @@ static void plain_gaussians_are_shown(void **state)
 static void what_cannot_be_shown(void **state)
 {
     (void)state;
-    static const struct { const char *input, *data, *says; int port; gbt_status status; } rows[] = {
-        {"nowhere", NULL, "nowhere", 0, GBT_ERR_IO}, {"tiny", NULL, "model.gbt: not there", 0, GBT_ERR_IO},
-        {"tiny/images", NULL, "model.gbt", 0, GBT_ERR_IO},
-        {"run/config", NULL, "config", 0, GBT_ERR_FORMAT}, {"run", "nowhere", "nowhere", 0, GBT_ERR_IO},
-        {"run", NULL, "--port: 65536", 65536, GBT_ERR_ARGUMENT}};
+    static const struct { const char *input, *data, *says, *host; int port; gbt_status status; } rows[] = {
+        {"nowhere", NULL, "nowhere", NULL, 0, GBT_ERR_IO}, {"tiny", NULL, "model.gbt: not there", NULL, 0, GBT_ERR_IO},
+        {"tiny/images", NULL, "model.gbt", NULL, 0, GBT_ERR_IO},
+        {"run/config", NULL, "config", NULL, 0, GBT_ERR_FORMAT}, {"run", "nowhere", "nowhere", NULL, 0, GBT_ERR_IO},
+        {"run", NULL, "--port: 65536", NULL, 65536, GBT_ERR_ARGUMENT},
+        {"run", NULL, "--host: \"here\"", "here", 0, GBT_ERR_ARGUMENT}, {"run", NULL, "192.0.2.1:0: cannot listen", "192.0.2.1", 0, GBT_ERR_IO}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         gbt_view_def def = gbt_view_def_default();
         gbt_error err = {0};
-        def.port = rows[i].port, def.data = rows[i].data != NULL ? in_root("%s", rows[i].data) : NULL;
+        def.port = rows[i].port, def.host = rows[i].host, def.data = rows[i].data != NULL ? in_root("%s", rows[i].data) : NULL;
         const gbt_status status = gbt_view(in_root("%s", rows[i].input), &def, &err);
         if (status != rows[i].status || strstr(err.text, rows[i].says) == NULL)
             fail_msg("%s: wanted %d with \"%s\", got %d: %s", rows[i].input, (int)rows[i].status, rows[i].says, (int)status, err.text);

@@ -9,6 +9,8 @@ import { copyText, savePicture } from "./keep.js";
 const byId = id => document.getElementById(id);
 const chosen = name => document.querySelector(`input[name=${name}]:checked`).value;
 const words = new URLSearchParams(location.search);
+if (words.has("token")) // the server has made a cookie of it
+    history.replaceState(null, "", location.pathname);
 const camera = new Camera();
 const look = {
     scene: null, view: -1, middle: [0, 0, 0], photo: null, split: 0.5, // what there is, and beside what

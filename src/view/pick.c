@@ -33,8 +33,9 @@ static bool aim(const gbt_camera *camera, const double pixel[2], gbt_camera *out
 static gbt_status find_depth(studio *s, const gbt_camera *one, double *depth, gbt_error *err)
 {
     const ray_shot shot = ray_shot_of(one);
+    const request plain = {.renderer = FRAME_TRACE, .preset = "default"};
     render_output_images images = {0};
-    GBT_TRY(studio_prepare(s, one, FRAME_TRACE, "default", false, err));
+    GBT_TRY(studio_prepare(s, one, &plain, false, err));
     const gbt_status status = render_outputs_trace(s->run, &shot, 1u << OUTPUT_MEDIAN_DEPTH, &images, err);
     *depth = status == GBT_OK ? (double)images.of[OUTPUT_MEDIAN_DEPTH].pixels[0] : 0;
     render_output_images_free(&images);

@@ -122,7 +122,7 @@ gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error 
     shifted = sample_camera(&camera, what->sample);
     const bool traced = what->renderer == FRAME_TRACE, whole = !traced || (what->output == 0 && what->sample == 0);
     const double begin = clock_wall();
-    GBT_TRY(studio_prepare(s, traced ? &camera : &shifted, what->renderer, what->preset, whole, err));
+    GBT_TRY(studio_prepare(s, traced ? &camera : &shifted, what, whole, err));
     const double prepared = clock_wall(), before = 1000 * (prepared - begin);
     if (whole) {
         picture_times times = {.trace = fmin(1000 * f->times.trace, before)}; /* nothing, when it was drawn already */

@@ -77,6 +77,21 @@ static gbt_status take_camera(const words *w, request *out)
     return check_size(shot.camera.width, shot.camera.height, w->err);
 }
 
+/* Six hexadecimal digits. */
+static gbt_status take_background(const words *w, request *out)
+{
+    static const char digits[] = "0123456789abcdef";
+    const char *text = word_of(w, "background");
+    if (text == NULL)
+        return GBT_OK;
+    if (strlen(text) != 6 || strspn(text, digits) != 6)
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "background: \"%.40s\" (wanted six digits, red, green and blue, as 3366ff)", text);
+    for (int c = 0; c < 3; c++)
+        out->background[c] = (float)(16 * (strchr(digits, text[2 * c]) - digits) + (strchr(digits, text[2 * c + 1]) - digits)) / 255;
+    out->has_background = true;
+    return GBT_OK;
+}
+
 static gbt_status take_picture(const words *w, request *out)
 {
     static const char *const formats[] = {"raw", "jpeg", "png", "float"}, *const presets[] = {"exact", "default", "fast"};
@@ -90,6 +105,7 @@ static gbt_status take_picture(const words *w, request *out)
         return base_fail(w->err, GBT_ERR_ARGUMENT, "renderer: \"%.40s\" (wanted trace, raster or per-ray)", renderer);
     GBT_TRY(take_choice(w, "format", formats, 4, &format));
     GBT_TRY(take_choice(w, "preset", presets, 3, &preset));
+    GBT_TRY(take_background(w, out));
     GBT_TRY(take_whole(w, "quality", 1, 100, &out->quality));
     GBT_TRY(take_whole(w, "sample", 0, REQUEST_SAMPLE_MAX, &out->sample));
     out->format = (request_format)format, out->preset = presets[preset];

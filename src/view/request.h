@@ -31,6 +31,8 @@ typedef struct request {
     unsigned output;   /* one bit of render_outputs_parse(); 0: colour */
     frame_renderer renderer;
     const char *preset; /* "exact", "default" or "fast"; static */
+    bool has_background;
+    float background[3]; /* in place of the model's, [0, 1] */
     request_format format;
     int quality;      /* of JPEG */
     double pixel[2];  /* to pick */

@@ -53,6 +53,7 @@ static gbt_status reopen(studio *s, const struct stat *file, gbt_error *err)
     mem_free(s->run);
     s->run = fresh;
     s->trained = fresh->frame.draw.renderer;
+    memcpy(s->background, fresh->settings.background, sizeof s->background);
     s->loaded = *file;
     s->version++;
     s->last.known = false;
@@ -143,17 +144,19 @@ gbt_status studio_camera(const studio *s, const request *what, gbt_camera *out, 
     return GBT_OK;
 }
 
-gbt_status studio_prepare(studio *s, const gbt_camera *camera, frame_renderer renderer, const char *preset, bool draw, gbt_error *err)
+gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *what, bool draw, gbt_error *err)
 {
     loaded_run *r = s->run;
     studio_picture wanted;
     memset(&wanted, 0, sizeof wanted);
-    wanted.camera = *camera, wanted.renderer = renderer, wanted.preset = preset, wanted.known = true;
+    wanted.camera = *camera, wanted.renderer = what->renderer, wanted.preset = what->preset, wanted.known = true;
+    memcpy(wanted.background, what->has_background ? what->background : s->background, sizeof wanted.background);
     if (memcmp(&wanted, &s->last, sizeof wanted) == 0 && (s->drawn || !draw))
         return GBT_OK;
     memset(&s->last, 0, sizeof s->last);
-    r->frame.draw.renderer = renderer;
-    GBT_TRY(loaded_run_preset(preset, &r->settings, err));
+    r->frame.draw.renderer = what->renderer;
+    memcpy(r->settings.background, wanted.background, sizeof wanted.background);
+    GBT_TRY(loaded_run_preset(what->preset, &r->settings, err));
     GBT_TRY(draw ? frame_render(&r->frame, loaded_run_subject(r), camera, &r->settings, false, err)
                  : frame_prepare(&r->frame, loaded_run_subject(r), camera, &r->settings, err));
     s->last = wanted, s->drawn = draw;

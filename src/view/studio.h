@@ -13,6 +13,7 @@ typedef struct studio_picture {
     gbt_camera camera; /* scene-local, through the middle of the pixels */
     frame_renderer renderer;
     const char *preset;
+    float background[3];
     bool known;
 } studio_picture;
 
@@ -20,7 +21,8 @@ typedef struct studio {
     const char *input, *data; /* borrowed */
     char model_path[4096], log_path[4096]; /* log_path: empty when there is none */
     struct stat loaded;  /* of the model file that is open */
-    frame_renderer trained; /* what the model was trained to be drawn with */
+    frame_renderer trained; /* what the model was trained to be drawn with, and in front of */
+    float background[3];
     loaded_run *run;     /* NULL: nothing has been saved yet */
     unsigned version;    /* 1, 2, ... counts what was opened */
     char note[600];      /* for people: why there is no picture, or no photo; empty: all is well */
@@ -51,8 +53,8 @@ void studio_answer(studio *s, const request *what, answer *out);
 /** The camera of a request, scene-local. GBT_ERR_ARGUMENT for a view that is not there. */
 gbt_status studio_camera(const studio *s, const request *what, gbt_camera *out, gbt_error *err);
 
-/** Make the frame's tree that of `camera`, and with `draw` its picture too, unless they are. */
-gbt_status studio_prepare(studio *s, const gbt_camera *camera, frame_renderer renderer, const char *preset, bool draw, gbt_error *err);
+/** Make the frame's tree that of `camera`, drawn as `what` says, and with `draw` its picture too, unless they are. */
+gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *what, bool draw, gbt_error *err);
 
 gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error *err); /* picture.c */
 gbt_status studio_photo(studio *s, const request *what, answer *out, gbt_error *err);  /* picture.c */

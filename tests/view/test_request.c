@@ -28,6 +28,9 @@ static request_case cases[] = {
     {"view of a size", "/render", {"view", "3", "width", "40", "height", "30"}, NULL},
     {"everything", "/render", {"camera", PINHOLE, "format", "float", "output", "normal", "preset", "exact", "sample", "7"}, NULL},
     {"splats", "/render", {"camera", PINHOLE, "renderer", "per-ray", "format", "jpeg", "quality", "1", "output", "color"}, NULL},
+    {"background", "/render", {"view", "0", "background", "00ff7a"}, NULL},
+    {"background of a name", "/render", {"view", "0", "background", "white"}, "background: \"white\" (wanted six digits"},
+    {"background with a tail", "/render", {"view", "0", "background", "00ff7a0"}, "background: \"00ff7a0\""},
     {"pick", "/pick", {"camera", PINHOLE, "x", "63.5", "y", "0"}, NULL},
     {"photo", "/photo", {"view", "0", "format", "png"}, NULL},
     {"largest", "/render", {"view", "0", "width", "8192", "height", "1024"}, NULL},
@@ -90,12 +93,16 @@ static void all_words_arrive(void **state)
                 r.sample == 7);
     assert_string_equal(r.preset, "fast");
     assert_true(r.camera.width == 64 && r.camera.height == 48 && r.camera.center[2] == 3);
+    const char *const colored[] = {"view", "0", "background", "00ff33", NULL};
+    assert_ok(request_parse("/render", word_in, (void *)colored, &r, NULL));
+    assert_true(r.has_background && r.background[0] == 0 && r.background[1] == 1 && fabsf(r.background[2] - 0.2f) < 1e-6f);
     const char *const pick[] = {"view", "4", "width", "40", "height", "30", "x", "1.5", "y", "2", NULL};
     assert_ok(request_parse("/pick", word_in, (void *)pick, &r, NULL));
     assert_true(r.kind == REQUEST_PICK && r.view == 4 && r.width == 40 && r.height == 30 && r.pixel[0] == 1.5 && r.pixel[1] == 2);
     const char *const plain[] = {"view", "0", NULL};
     assert_ok(request_parse("/render", word_in, (void *)plain, &r, NULL));
-    assert_true(r.width == 0 && r.output == 0 && r.sample == 0 && r.format == REQUEST_RAW && strcmp(r.preset, "default") == 0);
+    assert_true(r.width == 0 && r.output == 0 && r.sample == 0 && r.format == REQUEST_RAW && !r.has_background &&
+                strcmp(r.preset, "default") == 0);
 }
 
 int main(void)

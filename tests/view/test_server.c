@@ -369,9 +369,9 @@ static void an_address_of_another_machine(void **state)
     server *other;
     guard g;
     gbt_error err = {0};
-    assert_ok(guard_open("192.0.2.1", &g, NULL)); /* for documentation: nobody's */
+    assert_ok(guard_open("203.0.113.77", &g, NULL)); /* for documentation: nobody's */
     assert_int_equal(server_start(&g, 0, "", &other, &err), GBT_ERR_IO);
-    assert_non_null(strstr(err.text, "192.0.2.1:0: cannot listen"));
+    assert_non_null(strstr(err.text, "203.0.113.77:0: cannot listen"));
 }
 
 static void a_port_belongs_to_one(void **state)

@@ -201,6 +201,34 @@ static void samples_are_other_points_of_the_pixels(void **state)
     close_viewer(&v, SIGINT);
 }
 
+/* A camera that looks away sees nothing else; the model's own comes back. */
+static void a_background_is_chosen(void **state)
+{
+    (void)state;
+    static const char away[] = "{\"origin\":[0,0,900],\"target\":[0,0,999],\"up\":[0,1,0],\"width\":8,\"height\":8,\"fov_x_deg\":30}";
+    static const char *const renderers[] = {"trace", "raster", "per-ray"};
+    viewer v;
+    const int port = open_viewer(&v, run_folder);
+    char path[400];
+    for (size_t i = 0; i < 3; i++) {
+        snprintf(path, sizeof path, "/render?renderer=%s&camera=%s", renderers[i], away);
+        reply before = get_ok(port, path);
+        reply r;
+        for (int sample = 0; sample < 2; sample++) {
+            snprintf(path, sizeof path, "/render?renderer=%s&background=336600&sample=%d&camera=%s", renderers[i], sample, away);
+            r = get_ok(port, path);
+            for (size_t k = 0; k < r.body_count; k++)
+                assert_int_equal((unsigned char)r.body[k], ((unsigned char[]){0x33, 0x66, 0, 255})[k % 4]);
+            free(r.text);
+        }
+        snprintf(path, sizeof path, "/render?renderer=%s&camera=%s", renderers[i], away);
+        r = get_ok(port, path);
+        assert_true(mean_difference(&before, &r) == 0);
+        free(before.text), free(r.text);
+    }
+    close_viewer(&v, SIGINT);
+}
+
 static void every_format_and_output(void **state)
 {
     (void)state;
@@ -383,7 +411,8 @@ static void what_cannot_be_shown(void **state)
         {"tiny/images", NULL, "model.gbt", NULL, 0, GBT_ERR_IO},
         {"run/config", NULL, "config", NULL, 0, GBT_ERR_FORMAT}, {"run", "nowhere", "nowhere", NULL, 0, GBT_ERR_IO},
         {"run", NULL, "--port: 65536", NULL, 65536, GBT_ERR_ARGUMENT},
-        {"run", NULL, "--host: \"here\"", "here", 0, GBT_ERR_ARGUMENT}, {"run", NULL, "192.0.2.1:0: cannot listen", "192.0.2.1", 0, GBT_ERR_IO}};
+        {"run", NULL, "--host: \"here\"", "here", 0, GBT_ERR_ARGUMENT},
+        {"run", NULL, "203.0.113.77:0: cannot listen", "203.0.113.77", 0, GBT_ERR_IO}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         gbt_view_def def = gbt_view_def_default();
         gbt_error err = {0};
@@ -418,6 +447,7 @@ int main(void)
         cmocka_unit_test(views_are_what_render_draws),
         cmocka_unit_test(cameras_are_what_render_draws),
         cmocka_unit_test(samples_are_other_points_of_the_pixels),
+        cmocka_unit_test(a_background_is_chosen),
         cmocka_unit_test(every_format_and_output),
         cmocka_unit_test(points_lie_behind_their_pixels),
         cmocka_unit_test(newer_models_are_shown),

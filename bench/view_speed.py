@@ -15,7 +15,7 @@ import time
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "tests", "view"))
 import browser  # noqa: E402
 
-STILL = "gbtrace.look.done && gbtrace.look.done.generation === gbtrace.pictures.generation && gbtrace.look.done.scale === 1"
+STILL = "gbtrace.look.done && gbtrace.look.done.generation === gbtrace.pictures.generation && gbtrace.look.done.still"
 PARTS = ("prepare", "trace", "encode", "transfer", "draw")
 
 
@@ -65,11 +65,11 @@ def main():
         page.wait(STILL)
         page.run("""(learn => gbtrace.pictures.learn = about => { window.seen.push(about); learn.call(gbtrace.pictures, about); })(gbtrace.pictures.learn)""")
         page.run("window.seen = []")
-        choose(page, "size", wanted.size)
         choose(page, "samples", "1")
         print("| pixels as | while moving | pictures/s | mean size | " + " | ".join(f"{p} ms" for p in PARTS) + " | core ms of the server |")
         print("|---" * (len(PARTS) + 5) + "|")
-        for transfer, moving in (("raw", "full"), ("jpeg", "full"), ("png", "full"), ("raw", "auto")):
+        for transfer, moving, size in (("raw", "full", wanted.size), ("jpeg", "full", wanted.size), ("png", "full", wanted.size), ("raw", "auto", "window")):
+            choose(page, "size", size)
             choose(page, "transfer", transfer)
             choose(page, "moving", moving)
             turn(page, 1)

@@ -1,4 +1,4 @@
-/* view/scene.c -- what there is to see, as JSON: counts, the scene's middle, the views and their cameras. */
+/* view/scene.c -- what there is to see, as JSON: counts, the scene's extent, the views and their cameras. */
 #include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
@@ -34,24 +34,53 @@ static json_t *describe_view(const loaded_run *r, size_t i)
                      describe_pose(&camera, r->model.origin));
 }
 
-/* The middle half of what there is, in each direction: its centre, and the largest of its three sides. */
-static gbt_status find_middle(const loaded_run *r, double center[3], double *size, gbt_error *err)
+typedef struct extent {
+    double center[3], size; /* of the middle half of what there is, in each direction; the largest of its three sides */
+    double up[3], floor;    /* up of the photos on the whole; how high what there is begins along it: all but 5 % is above */
+} extent;
+
+static void find_up(const loaded_run *r, double up[3])
 {
+    double sum[3] = {0, 0, 0};
+    for (size_t i = 0; i < r->scene.view_count; i++)
+        for (int k = 0; k < 3; k++)
+            sum[k] -= r->scene.views[i].camera.rotation[3 + k];
+    const double length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
+    for (int k = 0; k < 3; k++)
+        up[k] = length > 1e-3 ? sum[k] / length : k == 1 ? -1 : 0;
+}
+
+/* Coordinates of all positions along an axis, ascending. */
+static void sort_along(const float *position, size_t count, const double axis[3], float *sorted)
+{
+    for (size_t i = 0; i < count; i++)
+        sorted[i] = (float)(axis[0] * (double)position[3 * i] + axis[1] * (double)position[3 * i + 1] +
+                            axis[2] * (double)position[3 * i + 2]);
+    qsort(sorted, count, sizeof *sorted, compare_floats);
+}
+
+static gbt_status find_extent(const loaded_run *r, extent *out, gbt_error *err)
+{
+    static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     const bool plain = r->cloud.count > 0;
     const size_t count = plain ? r->cloud.count : r->model.anchors.count;
     const float *position = plain ? r->cloud.mean : r->model.anchors.position;
-    float *sorted = mem_alloc(count + 1, sizeof *sorted, "positions", err);
+    float *sorted = mem_calloc(count + 1, sizeof *sorted, "positions", err); /* one more: there may be none */
     if (sorted == NULL)
         return GBT_ERR_NO_MEMORY;
-    *size = 0;
+    const size_t last = count > 0 ? count - 1 : 0;
+    out->size = 0;
     for (int k = 0; k < 3; k++) {
-        for (size_t i = 0; i < count; i++)
-            sorted[i] = position[3 * i + (size_t)k];
-        qsort(sorted, count, sizeof *sorted, compare_floats);
-        const double low = count > 0 ? (double)sorted[count / 4] : 0, high = count > 0 ? (double)sorted[count - 1 - count / 4] : 0;
-        center[k] = 0.5 * (low + high) + r->model.origin[k];
-        *size = fmax(*size, high - low);
+        sort_along(position, count, axes[k], sorted);
+        const double low = (double)sorted[count / 4], high = (double)sorted[last - count / 4];
+        out->center[k] = 0.5 * (low + high) + r->model.origin[k];
+        out->size = fmax(out->size, high - low);
     }
+    find_up(r, out->up);
+    sort_along(position, count, out->up, sorted);
+    out->floor = (double)sorted[count / 20];
+    for (int k = 0; k < 3; k++)
+        out->floor += out->up[k] * r->model.origin[k];
     mem_free(sorted);
     return GBT_OK;
 }
@@ -59,15 +88,15 @@ static gbt_status find_middle(const loaded_run *r, double center[3], double *siz
 gbt_status studio_scene(const studio *s, answer *out, gbt_error *err)
 {
     const loaded_run *r = s->run;
-    double center[3], size;
-    GBT_TRY(find_middle(r, center, &size, err));
+    extent e;
+    GBT_TRY(find_extent(r, &e, err));
     json_t *views = json_array();
     for (size_t i = 0; i < r->scene.view_count; i++)
         json_array_append_new(views, describe_view(r, i));
-    json_t *root = json_pack("{s:i,s:o,s:i,s:b,s:I,s:I,s:s,s:[fff],s:f,s:o}", "schema", 1, "input", json_text(s->input), "version",
-                             (int)s->version, "plain", r->cloud.count > 0, "gaussians", (json_int_t)r->cloud.count, "anchors",
-                             (json_int_t)r->model.anchors.count, "renderer", frame_renderer_name(s->trained), "center", center[0],
-                             center[1], center[2], "size", size, "views", views);
+    json_t *root = json_pack("{s:i,s:o,s:i,s:b,s:I,s:I,s:s,s:[fff],s:f,s:[fff],s:f,s:o}", "schema", 1, "input", json_text(s->input),
+                             "version", (int)s->version, "plain", r->cloud.count > 0, "gaussians", (json_int_t)r->cloud.count, "anchors",
+                             (json_int_t)r->model.anchors.count, "renderer", frame_renderer_name(s->trained), "center", e.center[0],
+                             e.center[1], e.center[2], "size", e.size, "up", e.up[0], e.up[1], e.up[2], "floor", e.floor, "views", views);
     char *text = root != NULL ? json_dumps(root, JSON_COMPACT) : NULL;
     json_decref(root);
     if (text == NULL)

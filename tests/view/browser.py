@@ -22,15 +22,15 @@ class PageError(Exception):
 
 
 class Browser:
-    """One tab. Errors of the page (exceptions, refused resources, console.error) are kept in `errors`."""
+    """One tab. `phone`: touched, not clicked. Errors of the page (exceptions, refused resources, console.error) are kept in `errors`."""
 
-    def __init__(self, program, width, height, dark=False):
+    def __init__(self, program, width, height, dark=False, scale=1, phone=False):
         self.profile = tempfile.mkdtemp(prefix="gbt_browser_")
         low_read, self.to = os.pipe()
         self.come, low_write = os.pipe()
         to_read, to_write = [fcntl.fcntl(fd, fcntl.F_DUPFD, 10) for fd in (low_read, low_write)]
         arguments = [program, "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--mute-audio",
-                     "--disable-background-networking", "--disable-component-update", "--hide-scrollbars", f"--window-size={width},{height}",
+                     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-quic", "--hide-scrollbars", f"--window-size={width},{height}",
                      "--user-data-dir=" + self.profile, "about:blank"]
         # Chromium reads from descriptor 3 and writes to 4, whatever numbers the pipes have here.
         line = f'exec "$@" 3<&{to_read} 4>&{to_write} {to_read}<&- {to_write}>&-'
@@ -42,8 +42,12 @@ class Browser:
         self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log"):
             self.call(domain + ".enable")
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+        self.resize(width, height, scale, phone)
+        self.call("Emulation.setTouchEmulationEnabled", enabled=phone, maxTouchPoints=5 if phone else 1)
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
+
+    def resize(self, width, height, scale=1, phone=False):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=phone)
 
     def receive(self):
         while b"\0" not in self.rest:
@@ -111,8 +115,25 @@ class Browser:
             for kind in ("mousePressed", "mouseReleased"):
                 self.mouse(kind, x, y, button="left", clickCount=count)
 
+    def click(self, x, y):
+        for kind in ("mousePressed", "mouseReleased"):
+            self.mouse(kind, x, y, button="left", clickCount=1)
+
+    def fingers(self, starts, ends, steps=8):
+        """All of them at once, along straight lines."""
+        def points(share):
+            return [{"x": a[0] + (b[0] - a[0]) * share, "y": a[1] + (b[1] - a[1]) * share, "id": i} for i, (a, b) in enumerate(zip(starts, ends))]
+        self.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=points(0))
+        for i in range(1, steps + 1):
+            self.call("Input.dispatchTouchEvent", type="touchMove", touchPoints=points(i / steps))
+        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
     def key(self, kind, code, key):
         self.call("Input.dispatchKeyEvent", type=kind, code=code, key=key)
+
+    def press(self, code, key):
+        self.key("keyDown", code, key)
+        self.key("keyUp", code, key)
 
     def screenshot(self, path):
         with open(path, "wb") as file:

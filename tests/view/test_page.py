@@ -3,34 +3,15 @@ import base64
 import json
 import os
 import signal
-import subprocess
 import sys
-import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import browser  # noqa: E402
-
-SKIPPED = 77
-program = sys.argv[1]
-checks = {"passed": 0, "failed": 0}
-
-
-def check(name, fine, details=""):
-    checks["passed" if fine else "failed"] += 1
-    if not fine:
-        print(f"FAILED: {name}: {details}")
-
-
-def gbtrace(*arguments):
-    return subprocess.run([program, *arguments], check=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True).stdout
+from page_support import CAMERA, STILL, check, gbtrace, make_run, middle, opened, run_tests  # noqa: E402
 
 
 def check_same(name, a, b):
     psnr = json.loads(gbtrace("compare", "--json", a, b))["psnr"]
     check(name, psnr == 100, f"{psnr} dB")
-
-
-STILL = "gbtrace.look.done && gbtrace.look.done.generation === gbtrace.pictures.generation && gbtrace.look.done.scale === 1"
 
 
 def saved_picture(page, path):
@@ -42,27 +23,32 @@ def choose(page, name, value):
     page.run(f"document.querySelector('input[name={name}][value={value}]').click()")
 
 
-def middle(page):
-    return page.run("(() => { const b = document.getElementById('render').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()")
-
-
 def first_picture(page, work):
     page.wait("gbtrace.look.done.samples === 16 && document.getElementById('numbers').textContent.includes('16 rays/pixel')") # the line is written in the frame after
     check("views are listed", page.run("document.getElementById('view').options.length") == 9)
     page.run("document.getElementById('samples').value = '1'; gbtrace.changed()")
-    page.wait(STILL)
+    choose(page, "compare", "slider")
+    page.wait(f"{STILL} && gbtrace.look.done.samples === 1")
     view = page.run("gbtrace.look.scene.views[gbtrace.camera.view].name")
     gbtrace("render", work + "/run", "-o", work + "/drawn", "--split", "all")
     saved_picture(page, work + "/shown.png")
-    check_same("a photo's camera shows what render draws", work + "/shown.png", f"{work}/drawn/{view}")
+    check_same("beside its photo the picture is what render draws", work + "/shown.png", f"{work}/drawn/{view}")
+    choose(page, "compare", "off")
+    page.wait(STILL)
+    page.run("document.getElementById('size').value = '1'; gbtrace.changed()")
+    page.wait(STILL)
+    saved_picture(page, work + "/shown.png")
+    check_same("so it is alone, in that size", work + "/shown.png", f"{work}/drawn/{view}")
+    page.run("document.getElementById('size').value = 'window'; gbtrace.changed()")
+    page.wait(STILL)
 
 
 def moving(page, work):
-    before = page.run("JSON.stringify(gbtrace.camera.file(8, 8))")
+    before = page.run(CAMERA)
     x, y = middle(page)
     page.drag((x, y), (60, 20))
     page.wait(STILL)
-    after = page.run("JSON.stringify(gbtrace.camera.file(8, 8))")
+    after = page.run(CAMERA)
     check("a drag moves the camera", before != after and page.run("gbtrace.camera.view") == -1)
     distance = "Math.hypot(...gbtrace.camera.eye.map((v, i) => v - gbtrace.camera.pivot[i]))"
     far = page.run(distance)
@@ -94,6 +80,17 @@ def lenses_and_outputs(page):
         check("legend of " + output, page.run("document.getElementById('legend').hidden") == (output in ("normal", "anchor", "color")))
 
 
+def backgrounds(page):
+    """Behind everything, far from the scene."""
+    look_away = "gbtrace.camera.eye = [0, 0, 900]; gbtrace.camera.forward = [0, 0, 1]; gbtrace.camera.up = [0, 1, 0]; gbtrace.changed()"
+    page.run(look_away)
+    for color, value in (("ffffff", 255), ("808080", 128), ("000000", 0)):
+        page.run(f"(e => {{ e.value = '{color}'; e.dispatchEvent(new Event('change')); }})(document.getElementById('background'))")
+        page.wait(STILL)
+        shown = page.run("[...document.getElementById('render').getContext('2d').getImageData(9, 9, 1, 1).data]")
+        check("background " + color, shown == [value, value, value, 255], str(shown))
+
+
 def back_to_the_photo(page):
     page.key("keyDown", "KeyR", "r")
     page.key("keyUp", "KeyR", "r")
@@ -120,51 +117,69 @@ def comparing(page):
     page.wait(f"{STILL} && gbtrace.look.psnr > 10 && gbtrace.look.psnr < 60")
     choose(page, "compare", "slider")
     page.wait(STILL)
-    box = page.run("(() => { const b = document.getElementById('handle').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()")
-    page.drag(box, (40, 0))
+    page.drag(middle(page, "#handle"), (40, 0))
     check("the slider slides", page.run("gbtrace.look.split") > 0.5 and page.run("gbtrace.camera.view") >= 0)
     choose(page, "compare", "beside")
     page.wait(STILL)
     check("beside", not page.run("document.getElementById('photo-box').hidden"))
+    page.run("(e => { e.value = 'equirectangular'; e.dispatchEvent(new Event('change')); })(document.getElementById('model'))")
+    page.wait(STILL)
+    shapes = [page.run(f"(b => b.width / b.height)(document.getElementById('{name}').getBoundingClientRect())") for name in ("photo", "render")]
+    check("a panorama beside the photo: each in its shape", abs(shapes[0] - 4 / 3) < 0.02 and abs(shapes[1] - 2) < 0.02, str(shapes))
     choose(page, "compare", "off")
     before = page.run("gbtrace.look.view")
     page.run("document.getElementById('next').click()")
     page.wait(f"gbtrace.look.view === {before + 1} && gbtrace.look.photo && {STILL}")
 
 
-def main():
-    chromium = browser.find()
-    if chromium is None:
-        print("skipped: no Chromium")
-        return SKIPPED
-    with tempfile.TemporaryDirectory(prefix="gbt_page_") as work:
-        gbtrace("make-scene", "tabletop", "-o", work + "/scene", "--width", "96", "--height", "72", "--views", "9", "--samples", "1", "--points", "300")
-        gbtrace("train", work + "/scene", "-o", work + "/run", "--iterations", "60")
-        server = subprocess.Popen([program, "view", work + "/run", "--port", "0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        page = browser.Browser(chromium, 1200, 800)
-        try:
-            page.open(server.stdout.readline().strip())
-            first_picture(page, work)
-            moving(page, work)
-            lenses_and_outputs(page)
-            back_to_the_photo(page)
-            picking(page)
-            comparing(page)
-            check("the run's log is drawn", page.run("document.querySelectorAll('#chart polyline, #training-now').length > 0"))
-            server.send_signal(signal.SIGINT)
-            check("Ctrl-C ends with 0", server.wait() == 0, str(server.returncode))
-            page.wait("document.getElementById('message').textContent.includes('has ended')")
-            check("no errors in the page", all("ERR_CONNECTION_REFUSED" in e for e in page.errors), str(page.errors))
-        except browser.PageError as error:
-            check("the page", False, str(error))
-        finally:
-            page.close()
-            if server.poll() is None:
-                server.kill()
-            server.wait()
-    print(f"{checks['passed']} passed, {checks['failed']} failed")
-    return 1 if checks["failed"] else 0
+def plain_gaussians(work):
+    gbtrace("export", work + "/run", work + "/plain.ply", "--refine", "0")
+    with opened(work + "/plain.ply") as page:
+        page.run("document.getElementById('help').showModal()")
+        words = page.run("""[...document.querySelectorAll('body *')].filter(e => e.checkVisibility() && e.closest('option') === null)
+            .flatMap(e => [...e.childNodes].filter(n => n.nodeType === 3).map(n => n.data)).join(' ')""")
+        check("the page has words", "Gaussians" in words and "orbit" in words, words)
+        check("nothing is said of photos where there are none", "photo" not in words.lower(), words)
+        page.run("document.getElementById('help').close()")
+        before = page.run(CAMERA)
+        for code, key in (("KeyR", "r"), ("KeyC", "c"), ("BracketLeft", "["), ("BracketRight", "]")):
+            page.press(code, key)
+        check("keys of photos do nothing", page.run(CAMERA) == before and not page.run("document.getElementById('cameras').checked"))
+        page.press("KeyG", "g")
+        page.wait(f"{STILL} && document.getElementById('grid').checked")
+
+
+def from_another_device(work):
+    with opened(work + "/run", "--host", "0.0.0.0") as page:
+        check("the token is printed", "/?token=" in page.address, page.address)
+        check("it leaves the address bar", page.run("location.href") == page.address.partition("?")[0], page.run("location.href"))
+        check("no script can read it", page.run("document.cookie") == "")
+        page.open(page.address.partition("?")[0])
+        page.wait(STILL)
+        check("the browser keeps it", page.run("fetch('status').then(r => r.status)") == 200)
+        page.call("Network.clearBrowserCookies")
+        check("nobody is answered without", page.run("fetch('status').then(r => r.status)") == 403)
+        page.errors = []
+
+
+def tests(work):
+    make_run(work, 96, 72)
+    with opened(work + "/run") as page:
+        first_picture(page, work)
+        moving(page, work)
+        lenses_and_outputs(page)
+        backgrounds(page)
+        back_to_the_photo(page)
+        picking(page)
+        comparing(page)
+        check("the run's log is drawn", page.run("document.querySelectorAll('#chart polyline, #training-now').length > 0"))
+        check("no errors in the page", not page.errors, str(page.errors))
+        page.server.send_signal(signal.SIGINT)
+        check("Ctrl-C ends with 0", page.server.wait() == 0, str(page.server.returncode))
+        page.wait("document.getElementById('message').textContent.includes('has ended')")
+    plain_gaussians(work)
+    from_another_device(work)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_tests(tests))

@@ -14,28 +14,6 @@ function turned(v, axis, angle) {
     return add(add(mul(v, c), mul(cross(axis, v), s)), mul(axis, dot(axis, v) * (1 - c)));
 }
 
-// The point nearest to all lines eye + t forward: the sum of (1 - f f^T) (x - eye) is 0.
-export function meetingPoint(poses, fallback) {
-    const m = [0, 0, 0, 0, 0, 0, 0, 0, 0], b = [0, 0, 0];
-    for (const { eye, forward } of poses)
-        for (let i = 0; i < 3; i++)
-            for (let j = 0; j < 3; j++) {
-                const p = (i === j ? 1 : 0) - forward[i] * forward[j];
-                m[3 * i + j] += p;
-                b[i] += p * eye[j];
-            }
-    const rows = [m.slice(0, 3), m.slice(3, 6), m.slice(6, 9)];
-    const det = dot(rows[0], cross(rows[1], rows[2]));
-    if (!(Math.abs(det) > 1e-6 * poses.length ** 3))
-        return fallback; // they are parallel, or there is none
-    const columns = [0, 1, 2].map(k => rows.map(r => r[k]));
-    return [0, 1, 2].map(k => {
-        const c = columns.slice();
-        c[k] = b;
-        return dot(c[0], cross(c[1], c[2])) / det;
-    });
-}
-
 export class Camera {
     constructor() {
         this.eye = [0, 0, -1];
@@ -44,7 +22,8 @@ export class Camera {
         this.pivot = [0, 0, 0];      // orbits go around it
         this.level = [0, -1, 0];     // up of the whole scene: orbits turn about it
         this.model = "pinhole";
-        this.fov = 60;               // degrees from the left edge to the right
+        this.fov = 60;               // degrees from the left edge of the frame to the right: what every picture shows, and more beside it
+        this.aspect = 4 / 3;         // of the frame, width by height
         this.view = -1;              // >= 0: exactly the camera of this photo
     }
 
@@ -83,15 +62,30 @@ export class Camera {
 
     zoom(factor) { this.eye = add(this.pivot, mul(sub(this.eye, this.pivot), factor)); }
 
-    // What an orthographic picture spans: what a pinhole would see at the pivot.
-    viewWidth() { return 2 * this.distance() * Math.tan(Math.min(this.fov, 170) * Math.PI / 360); }
+    // The picture's width when it is as high as the frame, or as wide, so that the whole frame is in it.
+    wider(width, height) { return Math.max(1, width / height / this.aspect); }
+
+    fovOf(width, height) {
+        const wider = this.wider(width, height);
+        return this.model === "fisheye" ? Math.min(360, wider * this.fov) : 360 / Math.PI * Math.atan(wider * Math.tan(this.fov * Math.PI / 360));
+    }
+
+    // What a pinhole sees from left to right at the pivot: so much an orthographic picture spans.
+    viewWidth(width, height) { return this.wider(width, height) * 2 * this.distance() * Math.tan(Math.min(this.fov, 170) * Math.PI / 360); }
+
+    // From where it looks, but so that `radius` around the middle fills the frame.
+    fit({ middle, radius }) {
+        const spread = Math.tan(Math.min(this.fov, 120) * Math.PI / 360) * Math.min(1, 1 / this.aspect);
+        this.pivot = middle.slice();
+        this.eye = sub(middle, mul(this.forward, radius / spread));
+    }
 
     file(width, height) {
         const file = { origin: this.eye, target: add(this.eye, mul(this.forward, this.distance())), up: this.up, width, height, model: this.model };
         if (this.model === "orthographic")
-            file.view_width = this.viewWidth();
+            file.view_width = this.viewWidth(width, height);
         else if (this.model !== "equirectangular")
-            file.fov_x_deg = this.fov;
+            file.fov_x_deg = this.fovOf(width, height);
         return file;
     }
 }

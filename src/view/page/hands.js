@@ -4,12 +4,25 @@ const keysOf = {
     KeyW: [0, 0, 1], ArrowUp: [0, 0, 1], KeyS: [0, 0, -1], ArrowDown: [0, 0, -1], KeyA: [-1, 0, 0], ArrowLeft: [-1, 0, 0],
     KeyD: [1, 0, 0], ArrowRight: [1, 0, 0], KeyE: [0, 1, 0], KeyQ: [0, -1, 0],
 };
-const typing = target => target.closest("select, input, textarea, button") !== null;
+const clickPixels = 5;
 
-// `act`: orbit, around, shift (x, y: shares of the stage's smaller side), zoom(factor), fly(right, up, forward), pick(event), point(event), photo(by),
-// back(), split(share of the picture's width).
-export function listen(stage, act, handle, picture) {
+// A control that was reached by the keyboard keeps the keys that it understands itself; the others are the stage's.
+const isItsOwn = event => event.target.closest("select, dialog") !== null ||
+    event.target.matches("input[type=range], input[type=radio]") && event.code.startsWith("Arrow");
+
+// After a click, or a choice by the pointer, the keys are the stage's again.
+function giveBackFocus(controls, stage) {
+    let byPointer = false;
+    const back = () => setTimeout(() => stage.focus({ preventScroll: true })); // after a label has given it to its control
+    window.addEventListener("pointerdown", () => byPointer = true, true);
+    window.addEventListener("keydown", () => byPointer = false, true);
+    controls.addEventListener("click", event => byPointer && event.target.closest("select") === null && back());
+    controls.addEventListener("change", () => byPointer && back());
+}
+
+function listenToPointers(stage, act, handle, picture) {
     const down = new Map(); // pointers by id: last x and y
+    let travelled = 0;      // pixels since the first of them, of all
     const size = () => Math.max(1, Math.min(stage.clientWidth, stage.clientHeight));
 
     stage.addEventListener("pointerdown", event => {
@@ -17,6 +30,7 @@ export function listen(stage, act, handle, picture) {
             return;
         stage.focus({ preventScroll: true });
         stage.setPointerCapture(event.pointerId);
+        travelled = down.size === 0 ? 0 : Infinity; // two fingers are no click
         down.set(event.pointerId, [event.clientX, event.clientY]);
         stage.classList.add("dragging");
     });
@@ -24,7 +38,10 @@ export function listen(stage, act, handle, picture) {
         const last = down.get(event.pointerId);
         if (last === undefined)
             return act.point(event);
-        const x = (event.clientX - last[0]) / size(), y = (event.clientY - last[1]) / size();
+        const x = event.clientX - last[0], y = event.clientY - last[1];
+        travelled += Math.hypot(x, y);
+        if (travelled < clickPixels)
+            return;
         if (down.size === 2) {
             const other = [...down].find(([id]) => id !== event.pointerId)[1];
             const before = Math.hypot(last[0] - other[0], last[1] - other[1]), after = Math.hypot(event.clientX - other[0], event.clientY - other[1]);
@@ -35,12 +52,13 @@ export function listen(stage, act, handle, picture) {
         } else if (event.shiftKey || event.buttons & 6) {
             act.shift(x, y);
         } else {
-            act.orbit(x, y);
+            act.orbit(x / size(), y / size());
         }
         down.set(event.pointerId, [event.clientX, event.clientY]);
     });
     const up = event => {
-        down.delete(event.pointerId);
+        if (down.delete(event.pointerId) && down.size === 0 && travelled < clickPixels && event.type === "pointerup" && event.button === 0)
+            act.click(event);
         stage.classList.toggle("dragging", down.size > 0);
     };
     stage.addEventListener("pointerup", up);
@@ -66,23 +84,25 @@ export function listen(stage, act, handle, picture) {
         event.stopPropagation();
         act.split(Math.min(1, Math.max(0, Number(handle.getAttribute("aria-valuenow")) / 100 + by)));
     });
+}
 
+function listenToKeys(act) {
     const held = new Set();
     let fast = false, flying = false, before = 0;
     const fly = now => {
-        const seconds = Math.min(0.1, (now - before) / 1000), speed = (fast ? 3 : 0.8) * seconds;
+        const seconds = Math.min(0.1, (now - before) / 1000) * (fast ? 4 : 1);
         before = now;
         flying = held.size > 0;
         if (!flying)
             return;
         const way = [0, 0, 0];
         for (const code of held)
-            keysOf[code].forEach((v, i) => way[i] += v * speed);
+            keysOf[code].forEach((v, i) => way[i] += v * seconds);
         act.fly(...way);
         requestAnimationFrame(fly);
     };
     window.addEventListener("keydown", event => {
-        if (typing(event.target) || event.ctrlKey || event.metaKey || event.altKey)
+        if (isItsOwn(event) || event.ctrlKey || event.metaKey || event.altKey)
             return;
         fast = event.shiftKey;
         if (event.code in keysOf) {
@@ -93,10 +113,8 @@ export function listen(stage, act, handle, picture) {
                 before = performance.now();
                 requestAnimationFrame(fly);
             }
-        } else if (event.key === "[" || event.key === "]") {
-            act.photo(event.key === "[" ? -1 : 1);
-        } else if (event.code === "KeyR") {
-            act.back();
+        } else if (!event.repeat && act.keys[event.key.toLowerCase()] !== undefined) {
+            act.keys[event.key.toLowerCase()]();
         }
     });
     window.addEventListener("keyup", event => {
@@ -104,4 +122,12 @@ export function listen(stage, act, handle, picture) {
         fast = event.shiftKey;
     });
     window.addEventListener("blur", () => held.clear());
+}
+
+// `act`: orbit (x, y: shares of the stage's smaller side), around, shift (x, y: pixels), zoom(factor), fly(right, up, forward: seconds),
+// click(event), pick(event), point(event), split(share of the picture's width); keys: functions by the key.
+export function listen(stage, act, handle, picture, controls) {
+    listenToPointers(stage, act, handle, picture);
+    listenToKeys(act);
+    giveBackFocus(controls, stage);
 }

@@ -1,6 +1,6 @@
-// pictures.js -- one picture after the other: small while the camera moves, then whole, then more rays per pixel, averaged.
+// pictures.js -- one picture after the other: of fewer pixels while the camera moves, then whole, then more rays per pixel, averaged.
 
-const frameMs = 50, stillMs = 180, retryMs = 150;
+const frameMs = 70, wholeMs = 400, stillMs = 180, retryMs = 150, callMs = 5, leastSide = 240;
 
 // fetch() that waits: the server draws for one at a time, and lets an old picture go when a newer one is asked for.
 async function ask(query) {
@@ -25,13 +25,14 @@ async function ask(query) {
 }
 
 export class Pictures {
-    // wanted(): { query(width, height) -> URLSearchParams, output, width, height, samples, small } or null; show(picture): draws it.
+    // wanted(): { query(width, height) -> URLSearchParams, output, width, height, samples, small: while it moves, fewer pixels may come,
+    // bounded: when it stands too, where they cost too much, shot: kept for show() } or null; show(picture, done): draws it.
     constructor(wanted, show, fail) {
         Object.assign(this, { wanted, show, fail });
         this.generation = 0;  // counts what would make another picture
-        this.shown = null;    // { generation, output, scale, samples }
+        this.shown = null;    // { generation, output, shot, scale, still, samples }
         this.movedAt = -1e9;
-        this.cost = { fixed: 0, pixel: 0 }; // ms, and ms per pixel
+        this.cost = { fixed: 0, pixel: 0 }; // ms, and ms per pixel; 0: nothing is known yet
         this.recent = [];     // times of the last pictures
         this.wake = () => {};
         this.run();
@@ -44,12 +45,13 @@ export class Pictures {
         this.wake();
     }
 
-    scaleFor(want) {
-        const left = frameMs - this.cost.fixed;
-        if (!want.small || this.cost.pixel === 0)
-            return 1;
-        const scale = Math.sqrt(Math.max(left, 5) / (this.cost.pixel * want.width * want.height));
-        return Math.min(1, Math.max(0.25, Math.floor(8 * scale) / 8));
+    // How much smaller each side is so that a picture takes so long. When what pixels do not cost takes most of it, fewer help no more.
+    scaleFor(want, ms) {
+        if (this.cost.pixel === 0)
+            return 0.25;
+        const left = Math.max(ms - this.cost.fixed, 0.3 * this.cost.fixed, 10);
+        const scale = Math.sqrt(left / (this.cost.pixel * want.width * want.height));
+        return Math.min(1, Math.max(leastSide / Math.max(want.width, want.height), Math.floor(16 * scale) / 16));
     }
 
     // The next picture to ask for after `last`; null: nothing is missing now.
@@ -58,15 +60,20 @@ export class Pictures {
         if (want === null)
             return null;
         const fresh = last === null || last.generation !== this.generation;
-        const moving = performance.now() - this.movedAt < stillMs;
-        const scale = moving ? this.scaleFor(want) : 1;
-        const sample = fresh || last.scale < 1 ? 0 : last.samples;
+        const moving = performance.now() - this.movedAt < stillMs, begun = !fresh && last.still;
+        const still = !(want.small && (moving || this.cost.pixel === 0));
+        let scale = 1;
+        if (!still)
+            scale = this.scaleFor(want, frameMs);
+        else if (want.bounded)
+            scale = begun ? last.scale : this.scaleFor(want, wholeMs);
+        const sample = begun ? last.samples : 0;
         if (!fresh && (moving || last.failed || sample >= want.samples))
             return null;
         const width = Math.max(1, Math.round(want.width * scale)), height = Math.max(1, Math.round(want.height * scale));
         const query = want.query(width, height);
         query.set("sample", sample);
-        return { generation: this.generation, output: want.output, scale, samples: sample + 1, answer: ask(query) };
+        return { generation: this.generation, output: want.output, shot: want.shot, scale, still, samples: sample + 1, answer: ask(query) };
     }
 
     async run() {
@@ -82,8 +89,8 @@ export class Pictures {
             try {
                 const picture = await asked.answer, done = asked;
                 this.shown = done;
-                asked = this.next(done); // the server works while this is drawn
                 this.learn(picture.about);
+                asked = this.next(done); // the server works while this is drawn
                 const begin = performance.now();
                 await this.show(picture, done);
                 picture.about.draw_ms = performance.now() - begin;
@@ -97,9 +104,10 @@ export class Pictures {
 
     learn(about) {
         const follow = (old, now) => old === 0 ? now : 0.7 * old + 0.3 * now;
+        const call = Math.min(callMs, Math.max(0, about.transfer_ms)), bytes = Math.max(0, about.transfer_ms - callMs);
         if (about.prepare_ms > 0.5)
-            this.cost.fixed = follow(this.cost.fixed, about.prepare_ms);
-        this.cost.pixel = follow(this.cost.pixel, (about.trace_ms + about.encode_ms + Math.max(0, about.transfer_ms)) / (about.width * about.height));
+            this.cost.fixed = follow(this.cost.fixed, about.prepare_ms + call);
+        this.cost.pixel = follow(this.cost.pixel, (about.trace_ms + about.encode_ms + bytes) / (about.width * about.height));
         const now = performance.now();
         this.recent = this.recent.filter(t => now - t < 1000).concat(now);
     }

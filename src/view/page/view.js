@@ -1,8 +1,10 @@
 // view.js -- the page put together: controls to camera, camera to pictures, pictures to canvases.
-import { Camera, add, length, meetingPoint, mul, sub, unit } from "./camera.js";
+import { Camera, sub } from "./camera.js";
+import { Lines, roundBelow } from "./lines.js";
 import { difference, paintOutput, ramp, rangeOf } from "./paint.js";
 import { Pictures } from "./pictures.js";
 import { Training } from "./training.js";
+import { findSubject } from "./subject.js";
 import { listen } from "./hands.js";
 import { copyText, savePicture } from "./keep.js";
 
@@ -13,54 +15,67 @@ if (words.has("token")) // the server has made a cookie of it
     history.replaceState(null, "", location.pathname);
 const camera = new Camera();
 const look = {
-    scene: null, view: -1, middle: [0, 0, 0], photo: null, split: 0.5, // what there is, and beside what
+    scene: null, subject: null, view: -1, photo: null, split: 0.5, // what there is, and beside what
     done: null, about: null, first: null, sum: null, values: null, range: null, psnr: null, pointed: undefined, // what is shown
 };
 
 // ---- sizes ---------------------------------------------------------------------------------------------------------------------
 
-function baseSize() {
+const windowPixelsMax = 1 << 21, pixelsMax = 1 << 23, sideMax = 8192, gap = 12;
+
+function photoSize() {
     const view = look.scene.views[look.view];
-    return view ? [view.width, view.height] : [640, 480];
+    return [view.width, view.height];
 }
 
+// The stage, or the half of it beside the photo, in pixels of the screen.
+function roomSize() {
+    const { width, height } = byId("stage").getBoundingClientRect(), two = compareMode() === "beside";
+    return [two ? (width - gap) / 2 : width, height].map(n => Math.max(1, Math.floor(n * window.devicePixelRatio)));
+}
+
+// Beside its photo a picture has the photo's size, so that pixels can be compared. Alone it fills the window: in the photo's shape where it has the
+// photo's camera, else all of it.
 function pictureSize() {
-    const stage = byId("stage"), size = byId("size").value; // "window", "480x640" or a factor
-    let [width, height] = baseSize().map(n => n * size);
-    if (size === "window")
-        [width, height] = [stage.clientWidth, stage.clientHeight];
-    else if (size.includes("x"))
-        [width, height] = size.split("x").map(Number);
-    if (camera.model === "equirectangular")
-        height = Math.min(width, height), width = 2 * height;
-    const fit = Math.min(1, 8192 / Math.max(width, height), Math.sqrt((1 << 23) / (width * height)));
+    const size = look.view < 0 ? "window" : byId("size").value, fills = size === "window" && compareMode() === "off"; // or "480x640", or a factor
+    let [width, height] = fills ? roomSize() : size.includes("x") ? size.split("x").map(Number) : photoSize().map(n => n * (Number(size) || 1));
+    const shape = camera.model === "equirectangular" ? 2 : fills && camera.view >= 0 ? camera.aspect : width / height;
+    [width, height] = [Math.min(width, height * shape), Math.min(height, width / shape)];
+    const fit = Math.min(1, sideMax / Math.max(width, height), Math.sqrt((fills ? windowPixelsMax : pixelsMax) / (width * height)));
     return [Math.max(1, Math.floor(width * fit)), Math.max(1, Math.floor(height * fit))];
 }
 
 function fillSizes() {
-    const [width, height] = baseSize(), old = byId("size").value;
+    const [width, height] = photoSize(), old = byId("size").value;
     const options = [0.5, 1, 2].map(n => new Option(`${Math.floor(width * n)} × ${Math.floor(height * n)}`, n));
-    byId("size").replaceChildren(...options, new Option("window", "window"));
-    byId("size").value = old || (look.view < 0 || width * height > 600000 ? "window" : "1");
+    byId("size").replaceChildren(new Option("window", "window"), ...options);
+    byId("size").value = old || "window";
 }
 
-// The figures in the middle of the stage, as large as they fit.
+// A box of a picture's shape in the middle of a room, as large as it fits, in whole pixels of the screen.
+function putInto([room, high], begin, box, width, height) {
+    const fit = Math.min(room / width, high / height), w = Math.round(width * fit), h = Math.round(height * fit), scale = window.devicePixelRatio;
+    const place = { left: begin + Math.floor((room - w) / 2), top: Math.floor((high - h) / 2), width: w, height: h };
+    for (const name in place)
+        box.style[name] = `${place[name] / scale}px`;
+    return place;
+}
+
+// Of the picture that is shown, not of the one that will be.
 function layout() {
-    const stage = byId("stage"), mode = compareMode(), two = mode === "beside";
-    const [width, height] = pictureSize();
-    const room = two ? (stage.clientWidth - 12) / 2 : stage.clientWidth;
-    const scale = Math.min(room / width, stage.clientHeight / height), w = width * scale, h = height * scale;
-    const left = two ? (stage.clientWidth - 2 * w - 12) / 2 : (stage.clientWidth - w) / 2, top = (stage.clientHeight - h) / 2;
-    const put = (box, x) => Object.assign(box.style, { left: `${x}px`, top: `${top}px`, width: `${w}px`, height: `${h}px` });
-    put(byId("render-box"), two ? left + w + 12 : left);
-    put(byId("photo-box"), left);
+    const stage = byId("stage"), mode = compareMode(), two = mode === "beside", room = roomSize(), scale = window.devicePixelRatio;
+    const shot = look.done !== null ? look.done.shot : null, size = shot !== null ? [shot.width, shot.height] : pictureSize();
+    const place = putInto(room, two ? room[0] + Math.floor(gap * scale) : 0, byId("render-box"), ...size);
+    putInto(room, 0, byId("photo-box"), ...(look.view >= 0 ? photoSize() : size));
     stage.classList.toggle("two", two || mode === "slider");
     stage.classList.toggle("slider", mode === "slider");
     byId("photo-box").hidden = !(two || mode === "slider") || look.photo === null;
     byId("photo-box").style.clipPath = mode === "slider" ? `inset(0 ${100 * (1 - look.split)}% 0 0)` : "none";
-    byId("handle").hidden = mode !== "slider";
-    Object.assign(byId("handle").style, { left: `${left + w * look.split}px`, top: `${top}px`, height: `${h}px` });
-    byId("handle").setAttribute("aria-valuenow", Math.round(100 * look.split));
+    const handle = byId("handle"), at = { left: place.left + place.width * look.split, top: place.top, height: place.height };
+    handle.hidden = mode !== "slider";
+    for (const name in at)
+        handle.style[name] = `${at[name] / scale}px`;
+    handle.setAttribute("aria-valuenow", Math.round(100 * look.split));
 }
 
 // ---- what is asked for, what comes ------------------------------------------------------------------------------------------------
@@ -78,17 +93,20 @@ function cameraQuery(width, height) {
 function wanted() {
     if (look.scene === null)
         return null;
-    const [width, height] = pictureSize(), output = chosen("output"), color = output === "color";
+    const [width, height] = pictureSize(), output = chosen("output"), color = output === "color", alone = compareMode() === "off";
     const query = (w, h) => {
         const q = cameraQuery(w, h);
         q.set("preset", byId("preset").value);
         q.set("output", output);
         q.set("renderer", color ? byId("renderer").value : "trace");
         q.set("format", color ? byId("transfer").value : "float");
+        if (alone && byId("background").value !== "") // beside a photo: what was trained
+            q.set("background", byId("background").value);
         return q;
     };
     const samples = color && camera.model !== "equirectangular" && byId("live").hidden ? Number(byId("samples").value) : 1;
-    return { query, output, width, height, samples, small: byId("moving").value === "auto" };
+    const small = byId("moving").value === "auto", bounded = small && alone && (look.view < 0 || byId("size").value === "window");
+    return { query, output, width, height, samples, small, bounded, shot: camera.file(width, height) };
 }
 
 async function pixelsOf({ about, bytes, type }) {
@@ -136,6 +154,8 @@ async function show(picture, done) {
     }
     canvas.getContext("2d").putImageData(new ImageData(seen, about.width, about.height), 0, 0);
     look.about = about, look.done = done;
+    layout();
+    drawLines();
     byId("message").hidden = true;
     byId("legend").hidden = look.range === null;
     if (look.range !== null)
@@ -143,19 +163,29 @@ async function show(picture, done) {
     requestAnimationFrame(() => describe(about, done));
 }
 
+function drawLines() {
+    const { scene, subject, view } = look;
+    if (look.done !== null)
+        lines.draw(look.done.shot, { grid: byId("grid").checked, cameras: byId("cameras").checked }, { ...scene, subject, view });
+}
+
 function describe(about, done) {
     const parts = [`${about.width} × ${about.height}`];
     if (pictures.perSecond() >= 1 && performance.now() - pictures.movedAt < 1000)
         parts.push(`${pictures.perSecond().toFixed(0)} pictures/s`);
-    const ms = [about.total_ms, about.prepare_ms, about.trace_ms, about.encode_ms + about.transfer_ms, about.draw_ms].map(t => t.toFixed(0));
-    parts.push(`${ms[0]} ms (make ${ms[1]}, trace ${ms[2]}, send ${ms[3]}, draw ${ms[4]})`);
     if (done.samples > 1)
         parts.push(`${done.samples} rays/pixel`);
     if (look.psnr !== null)
         parts.push(`${look.psnr.toFixed(2)} dB`);
     if (look.pointed !== undefined)
         parts.push(look.pointed);
-    byId("numbers").textContent = parts.join(" · ");
+    if (byId("grid").checked)
+        parts.push(`grid of ${roundBelow(look.subject.radius / 2)}`);
+    const ms = [about.total_ms, about.prepare_ms, about.trace_ms, about.encode_ms + about.transfer_ms, about.draw_ms].map(t => t.toFixed(0));
+    const more = document.createElement("span");
+    more.className = "more"; // where there is room
+    more.textContent = ` · ${ms[0]} ms (make ${ms[1]}, trace ${ms[2]}, send ${ms[3]}, draw ${ms[4]})`;
+    byId("numbers").replaceChildren(parts.join(" · "), more);
 }
 
 function fail(error) {
@@ -163,17 +193,23 @@ function fail(error) {
     byId("message").hidden = false;
 }
 
-const pictures = new Pictures(wanted, show, fail);
+const pictures = new Pictures(wanted, show, fail), lines = new Lines(byId("lines"));
 
-function changed(moving = false) {
-    layout();
-    const left = look.view >= 0 && chosen("compare") !== "off" && compareMode() === "off";
-    byId("compare-note").textContent = left ? "The camera has left the photo: R goes back." : "";
+function showControls() {
+    const left = look.view >= 0 && chosen("compare") !== "off" && compareMode() === "off", fov = camera.fovOf(...pictureSize());
+    const compares = compareMode() !== "off" && byId("size").value === "window";
+    byId("compare-note").textContent = left ? "The camera has left the photo: R goes back." : compares ? "Of the photo's size, pixel for pixel." : "";
     byId("model").value = camera.view >= 0 ? "photo" : camera.model;
     byId("fov-row").hidden = camera.view >= 0 || camera.model === "equirectangular";
     byId("fov").max = camera.model === "fisheye" ? 360 : 150;
-    byId("fov").value = camera.fov;
-    byId("fov-shown").textContent = `${Math.round(camera.fov)}°`;
+    byId("fov").value = fov;
+    byId("fov-shown").textContent = `${Math.round(fov)}°`;
+    byId("speed-shown").textContent = `× ${Number((2 ** byId("speed").value).toPrecision(2))}`;
+}
+
+function changed(moving = false) {
+    layout();
+    showControls();
     pictures.change(moving);
 }
 
@@ -198,17 +234,21 @@ async function fetchPhoto(view) {
     look.photo = canvas;
 }
 
-// The lens of a camera file that comes nearest to one of a data set.
-const lensOf = name => name === "EQUIRECTANGULAR" ? "equirectangular" : name.includes("FISHEYE") ? "fisheye" : "pinhole";
+// The lens of a camera file that comes nearest to one of a data set. Its scale in the middle is the photo's: fov_x_deg is a pinhole's with it.
+function takeLens(view) {
+    const fisheye = view.lens.includes("FISHEYE"), radian = Math.PI / 180;
+    camera.model = view.lens === "EQUIRECTANGULAR" ? "equirectangular" : fisheye ? "fisheye" : "pinhole";
+    camera.fov = fisheye ? Math.min(360, 2 * Math.tan(view.fov_x_deg / 2 * radian) / radian) : view.fov_x_deg;
+    camera.aspect = view.width / view.height;
+}
 
 function goTo(index) {
     const view = look.scene.views[index];
     const other = look.view !== index;
     look.view = index;
-    camera.place(view.camera, look.middle);
+    camera.place(view.camera, look.subject.middle);
     camera.view = index;
-    camera.model = lensOf(view.lens);
-    camera.fov = view.fov_x_deg;
+    takeLens(view);
     byId("view").value = index;
     if (other) {
         look.photo = null;
@@ -228,20 +268,19 @@ function fillViews(scene) {
         return g;
     };
     byId("view").replaceChildren(...[group("held out", true), group("trained on", false)].filter(g => g.children.length > 0));
-    byId("photos-part").hidden = scene.views.length === 0;
+    for (const part of document.querySelectorAll(".of-photos"))
+        part.hidden = scene.views.length === 0;
 }
 
 // ---- the scene, first and again ----------------------------------------------------------------------------------------------------
 
-function firstLook(scene) {
-    const poses = scene.views.map(v => ({ eye: v.camera.origin, forward: unit(sub(v.camera.target, v.camera.origin)) }));
-    look.middle = meetingPoint(poses, scene.center);
-    const up = scene.views.reduce((s, v) => add(s, v.camera.up), [0, 0, 0]);
-    camera.level = length(up) > 1e-3 ? unit(up) : [0, -1, 0];
+function firstLook() {
+    const { scene, subject } = look;
+    camera.level = scene.up;
     if (scene.views.length > 0)
         return goTo(Math.max(0, scene.views.findIndex(v => v.test)));
-    fillSizes();
-    camera.place({ origin: sub(scene.center, mul([0, 0, 1], 2 * Math.max(scene.size, 1e-3))), target: scene.center, up: camera.level }, scene.center);
+    camera.place({ origin: sub(subject.middle, [0, 0, 1]), target: subject.middle, up: scene.up }, subject.middle);
+    camera.fit(subject);
     changed();
 }
 
@@ -252,6 +291,7 @@ async function statusChanged(status) {
         return fail(new Error(status.note));
     const scene = await (await fetch("scene")).json(), first = look.scene === null;
     look.scene = scene;
+    look.subject = findSubject(scene);
     byId("title").textContent = scene.input.replace(/\/+$/, "").split("/").pop() || scene.input;
     document.title = `${byId("title").textContent} – gbtrace`;
     byId("facts").textContent = scene.plain ? `${scene.gaussians.toLocaleString("en")} Gaussians` :
@@ -261,7 +301,7 @@ async function statusChanged(status) {
     fillViews(scene);
     if (first) {
         byId("renderer").value = scene.renderer;
-        firstLook(scene);
+        firstLook();
     } else {
         byId("view").value = look.view;
         changed();
@@ -298,7 +338,19 @@ async function pick(event) {
     requestAnimationFrame(() => ring.hidden = false);
 }
 
+// The photo whose camera is pointed at gets its name shown.
+function nameCamera(event) {
+    const view = look.scene.views[lines.cameraAt(event.clientX, event.clientY)], stage = byId("stage").getBoundingClientRect(), name = byId("name");
+    byId("stage").classList.toggle("over-camera", view !== undefined);
+    name.hidden = view === undefined;
+    name.textContent = view !== undefined ? view.name : "";
+    Object.assign(name.style, { left: `${event.clientX - stage.left}px`, top: `${event.clientY - stage.top}px` });
+}
+
 function pointAt(event) {
+    if (look.about === null)
+        return;
+    nameCamera(event);
     const at = pixelAt(event), v = look.values;
     look.pointed = undefined;
     if (at !== null && v !== null) {
@@ -306,8 +358,7 @@ function pointAt(event) {
         const some = Array.from(v.values.slice(i, i + v.channels), x => Number(x.toPrecision(4)));
         look.pointed = `${v.output === "anchor" ? byId("part-name").textContent.replace(/s$/, "") : v.output} ${some.join(" ")}`;
     }
-    if (look.about !== null)
-        describe(look.about, look.done);
+    describe(look.about, look.done);
 }
 
 // "folder/a.jpg" shown as depth is kept as "folder_a.depth.png".
@@ -320,17 +371,40 @@ const moved = () => {
     leave();
     changed(true);
 };
+
+// Of the scene, at the pivot, under a pixel of the page; and radians.
+const unitsPerPixel = () => camera.viewWidth(...pictureSize()) / byId("render").clientWidth;
+const radiansPerPixel = () => camera.fovOf(...pictureSize()) * Math.PI / 180 / byId("render").clientWidth;
+
+function fly(right, up, forward) { // half of the subject's radius in a second
+    const speed = 0.5 * look.subject.radius * 2 ** byId("speed").value;
+    camera.move(right * speed, up * speed, forward * speed);
+    moved();
+}
+
+function clickAt(event) {
+    const view = lines.cameraAt(event.clientX, event.clientY);
+    if (view >= 0)
+        goTo(view);
+}
+
+const toggle = id => () => byId(id).click();
+const keys = {
+    "[": () => step(-1), "]": () => step(1), r: () => look.view >= 0 && goTo(look.view), h: () => look.scene !== null && firstLook(),
+    f: () => { if (look.scene !== null) { camera.fit(look.subject); leave(); changed(); } },
+    g: toggle("grid"), c: () => look.view >= 0 && byId("cameras").click(), "?": () => byId("help").showModal(),
+};
 listen(byId("stage"), {
     orbit: (x, y) => { camera.orbit(-2 * Math.PI * x, -Math.PI * y, camera.pivot); moved(); },
-    around: (x, y) => { camera.orbit(camera.fov * Math.PI / 180 * x, camera.fov * Math.PI / 180 * y, camera.eye); moved(); },
-    shift: (x, y) => { camera.move(-x * camera.viewWidth(), y * camera.viewWidth(), 0); moved(); },
+    around: (x, y) => { camera.orbit(radiansPerPixel() * x, radiansPerPixel() * y, camera.eye); moved(); },
+    shift: (x, y) => { camera.move(-x * unitsPerPixel(), y * unitsPerPixel(), 0); moved(); },
     zoom: factor => { camera.zoom(factor); moved(); },
-    fly: (right, up, forward) => { const d = camera.distance(); camera.move(right * d, up * d, forward * d); moved(); },
-    pick, point: pointAt,
-    photo: step, back: () => look.view >= 0 ? goTo(look.view) : look.scene && firstLook(look.scene),
     split: share => { look.split = share; layout(); },
-}, byId("handle"), byId("render-box"));
+    fly, pick, click: clickAt, point: pointAt, keys,
+}, byId("handle"), byId("render-box"), document.querySelector("aside"));
 
+for (const [id, key] of [["home", "h"], ["fit", "f"], ["back", "r"], ["help-button", "?"]])
+    byId(id).addEventListener("click", keys[key]);
 byId("view").addEventListener("change", () => goTo(Number(byId("view").value)));
 byId("previous").addEventListener("click", () => step(-1));
 byId("next").addEventListener("click", () => step(1));
@@ -342,10 +416,17 @@ byId("model").addEventListener("change", () => {
     camera.fov = Math.min(camera.fov, camera.model === "fisheye" ? 360 : 150);
     changed();
 });
-byId("fov").addEventListener("input", () => { camera.fov = Number(byId("fov").value); moved(); });
-for (const id of ["compare", "output", "size", "renderer", "preset", "moving", "samples", "transfer"])
+byId("fov").addEventListener("input", () => {
+    const [width, height] = pictureSize();
+    camera.fov = Number(byId("fov").value), camera.aspect = width / height; // the frame is what the picture shows
+    moved();
+});
+for (const id of ["compare", "output", "size", "background", "renderer", "preset", "moving", "samples", "transfer"])
     byId(id).addEventListener("change", () => changed());
-new ResizeObserver(() => look.scene !== null && changed()).observe(byId("stage"));
+for (const id of ["grid", "cameras"])
+    byId(id).addEventListener("change", () => { drawLines(); describe(look.about, look.done); });
+byId("speed").addEventListener("input", showControls);
+new ResizeObserver(() => look.subject !== null && changed()).observe(byId("stage"));
 if (words.get("transfer") === "jpeg")
     byId("transfer").value = "jpeg";
 
@@ -353,4 +434,4 @@ const rampData = new ImageData(256, 1);
 ramp.forEach((c, i) => rampData.data.set([...c, 255], 4 * i));
 byId("ramp").getContext("2d").putImageData(rampData, 0, 0);
 const training = new Training(byId("training-part"), byId("training-now"), byId("chart"), byId("live"), status => statusChanged(status).catch(fail));
-window.gbtrace = { camera, look, pictures, training, changed }; // for the console, and for tests
+window.gbtrace = { camera, look, pictures, lines, training, changed }; // for the console, and for tests

@@ -27,7 +27,9 @@ endif()
 # One package: program, library, headers, documents. What it depends on is read from the binaries.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME gbtrace)
-set(CPACK_PACKAGE_CONTACT "gbtrace developers" CACHE STRING "who answers for the package: Name <mail>")
+if(NOT CPACK_PACKAGE_CONTACT MATCHES "@")
+  set(CPACK_PACKAGE_CONTACT "gbtrace developers <developers@gbtrace.invalid>" CACHE STRING "who answers for the package: Name <mail>" FORCE)
+endif()
 set(CPACK_PACKAGE_DESCRIPTION "gbtrace turns posed photos into scenes that can be seen from anywhere:
 granular balls become anchors, anchors decode into Gaussians, rays through
 a tree of their ellipsoids make the picture and carry gradients back.
@@ -38,6 +40,15 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+# Change log, copyright, and the place of zsh's completion, for a tree that goes into /usr.
+foreach(file changelog copyright install.cmake)
+  configure_file(cmake/debian/${file}.in ${CMAKE_BINARY_DIR}/debian/${file} @ONLY)
+endforeach()
+if(EXISTS ${CMAKE_SOURCE_DIR}/LICENSE)
+  configure_file(LICENSE ${CMAKE_BINARY_DIR}/debian/copyright COPYONLY)
+endif()
+execute_process(COMMAND gzip -9 -n -k -f ${CMAKE_BINARY_DIR}/debian/changelog COMMAND_ERROR_IS_FATAL ANY)
+install(SCRIPT ${CMAKE_BINARY_DIR}/debian/install.cmake)
 file(WRITE ${CMAKE_BINARY_DIR}/debian/triggers "activate-noawait ldconfig\n")
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/triggers)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)

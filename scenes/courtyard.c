@@ -348,6 +348,7 @@ static void build(world *w)
 
 const recipe recipe_courtyard = {
     .name = "courtyard",
+    .summary = "a town square: fountain, facades, trees, a fence, hills and sky",
     .about = "A town square under a low, warm sun. A stone fountain with rippled water and bronze balls that mirror a little stands "
              "on rings of setts, between lawns, flower beds, benches and street lamps. Painted and brick facades with windows, "
              "shutters, awnings and tiled roofs close three sides; the fourth is open over an iron fence to hills and a sky dome "

@@ -33,6 +33,14 @@ const char *const *gbt_make_scene_names(void)
     return names;
 }
 
+const char *gbt_make_scene_summary(const char *name)
+{
+    for (int i = 0; i < RECIPE_COUNT; i++)
+        if (strcmp(name, recipes[i]->name) == 0)
+            return recipes[i]->summary;
+    return NULL;
+}
+
 static gbt_status find_recipe(const char *name, const recipe **out, gbt_error *err)
 {
     char list[256] = "";

@@ -11,6 +11,7 @@ typedef struct recipe_ring {
 
 typedef struct recipe {
     const char *name;
+    const char *summary;     /* one line, for lists of scenes */
     const char *about;       /* one paragraph for SCENE.md */
     void (*build)(world *w); /* shapes, lamp and look; not finished */
     recipe_ring rings[2];

@@ -498,6 +498,7 @@ static void build(world *w)
 
 const recipe recipe_tabletop = {
     .name = "tabletop",
+    .summary = "a laid table in a furnished room: matt, glossy and thin things under a warm lamp",
     .about = "A wooden table in a furnished room. On a striped cloth: a matt globe on a brass foot, three letter blocks, a glazed "
              "ring and a glazed ball that mirror the room a little, a wire basket with fruit, a banded vase with leaves, books and a "
              "cup. The four walls (brick with pictures, wallpaper with a bookshelf, plaster with a window, painted boards) and the "

@@ -172,6 +172,7 @@ static void build(world *w)
 
 const recipe recipe_terrain = {
     .name = "terrain",
+    .summary = "a valley from the air: lake, village, woods and slopes",
     .about = "A valley seen from the air: meadows, rock and snow by slope and height, a lake with a sandy shore, a road, a village "
              "of gabled houses with a church, and patches of needle and leaf trees. A sphere of 70 units around the valley carries "
              "the sky and its clouds, so the sky has depth and sparse points too.",

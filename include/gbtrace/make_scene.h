@@ -26,6 +26,9 @@ gbt_make_scene_def gbt_make_scene_def_default(void);
 /** The scenes there are, the default first; NULL-terminated, static. */
 const char *const *gbt_make_scene_names(void);
 
+/** What a scene shows, in one line; static. NULL for any other name. */
+const char *gbt_make_scene_summary(const char *name);
+
 /**
  * Render a procedural scene and write it as a data set that any COLMAP reader takes.
  *

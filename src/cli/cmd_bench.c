@@ -5,10 +5,10 @@
 #include "gbtrace/bench.h"
 #include "gbtrace/train.h"
 
-static const char *const *workload_names(void)
+static const command_word *workloads(void)
 {
-    static const char *const names[] = {"trace", NULL};
-    return names;
+    static const command_word words[] = {{"trace", "forward and backward pass of the ray tracer"}, {NULL, NULL}};
+    return words;
 }
 
 static int run_bench(const command *self, int argc, char **argv)
@@ -32,6 +32,7 @@ static int run_bench(const command *self, int argc, char **argv)
         {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast",
          .help = "cut-offs by name (docs/accuracy.md); the options above win over it"},
         {.name = "kernel", .kind = OPTION_STRING, .value = &def.kernel, .value_name = "LIST",
+         .choices = "tile|single|embree", .list = true,
          .help = "tile, single or embree; tile,embree measures both in turn and compares them"},
         {.name = "memory", .kind = OPTION_SIZE, .value = &def.tape_bytes_max, .min = 0, .max = 0x1p60, .value_name = "BYTES",
          .help = "for the hits kept for the adjoint (100M); 0: no limit"},
@@ -54,7 +55,7 @@ static int run_bench(const command *self, int argc, char **argv)
 }
 
 const command command_bench = {.name = "bench", .summary = "time the tracer on given Gaussians",
-                               .usage = "trace --model FILE.ply --camera FILE.json", .run = run_bench, .words = workload_names};
+                               .usage = "trace --model FILE.ply --camera FILE.json", .run = run_bench, .words = workloads};
 
 static int run_check_grad(const command *self, int argc, char **argv)
 {

@@ -8,6 +8,17 @@
 #include "gbtrace/make_scene.h"
 #include "gbtrace/train.h"
 
+/** "tabletop|courtyard|..." */
+static const char *scene_choices(void)
+{
+    static char list[256];
+    const char *const *names = gbt_make_scene_names();
+    size_t used = 0;
+    for (int i = 0; names[i] != NULL && used < sizeof list; i++)
+        used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? "|" : "", names[i]);
+    return list;
+}
+
 static int run(const command *self, int argc, char **argv)
 {
     gbt_make_scene_def scene = gbt_make_scene_def_default();
@@ -20,8 +31,8 @@ static int run(const command *self, int argc, char **argv)
          .help = "folder for the scene and the run"},
         {.name = "minutes", .kind = OPTION_DOUBLE, .value = &minutes, .min = 0.05, .max = 600, .value_name = "M",
          .help = "time for training"},
-        {.name = "scene", .kind = OPTION_STRING, .value = &scene.name, .value_name = "NAME",
-         .help = "which procedural scene (see make-scene)"},
+        {.name = "scene", .kind = OPTION_CHOICE, .value = &scene.name, .choices = scene_choices(),
+         .help = "which procedural scene (gbtrace make-scene --help says what they show)"},
         {.name = "seed", .kind = OPTION_UINT64, .value = &train.seed, .value_name = "S", .help = "of everything that is random"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
          .help = "0: all processors, at most the container's share"},

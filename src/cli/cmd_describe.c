@@ -3,10 +3,11 @@
 
 #include "cli/describe.h"
 
-static const char *const forms[] = {"man", "bash", "zsh", "fish", NULL};
+static const command_word forms[] = {{"man", "the manual page, in roff"}, {"bash", "completion for bash"}, {"zsh", "completion for zsh"},
+                                     {"fish", "completion for fish"}, {NULL, NULL}};
 static void (*const writers[])(FILE *) = {describe_man, describe_bash, describe_zsh, describe_fish};
 
-static const char *const *form_names(void)
+static const command_word *form_words(void)
 {
     return forms;
 }
@@ -17,12 +18,12 @@ static int run(const command *self, int argc, char **argv)
     const int code = options_parse(self, NULL, 0, 1, 1, argc, argv, &form);
     if (code >= 0)
         return code;
-    for (int i = 0; forms[i] != NULL; i++)
-        if (strcmp(forms[i], form.value[0]) == 0)
+    for (int i = 0; forms[i].name != NULL; i++)
+        if (strcmp(forms[i].name, form.value[0]) == 0)
             writers[i](stdout);
     return 0;
 }
 
 const command command_describe = {
-    .name = "describe", .summary = "this command line as a manual page, or as completion for a shell", .usage = "man|bash|zsh|fish",
-        .run = run, .words = form_names};
+    .name = "describe", .summary = "print the manual page, or a completion script for a shell", .usage = "man|bash|zsh|fish",
+    .run = run, .words = form_words};

@@ -4,6 +4,17 @@
 #include "cli/options.h"
 #include "gbtrace/make_scene.h"
 
+enum { SCENES_MAX = 16 };
+
+static const command_word *scene_words(void)
+{
+    static command_word words[SCENES_MAX + 1];
+    const char *const *names = gbt_make_scene_names();
+    for (int i = 0; names[i] != NULL && i < SCENES_MAX; i++)
+        words[i] = (command_word){names[i], gbt_make_scene_summary(names[i])};
+    return words;
+}
+
 static int run(const command *self, int argc, char **argv)
 {
     gbt_make_scene_def def = gbt_make_scene_def_default();
@@ -38,6 +49,5 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_make_scene = {
-    .name = "make-scene", .summary = "procedural scene with known ground truth, as photos and a COLMAP model", .usage = "NAME -o DIR",
-        .run = run,
-    .words = gbt_make_scene_names};
+    .name = "make-scene", .summary = "a procedural scene with known geometry, written as photos and a COLMAP model", .usage = "NAME -o DIR",
+    .run = run, .words = scene_words};

@@ -54,14 +54,22 @@ static gbt_status run_anchors(const study_request *r, gbt_error *err)
 
 enum { STUDY_COUNT = 7 };
 
-static const char *const study_names[STUDY_COUNT + 1] = {"speed", "crosscheck", "rate", "stability", "paper", "time", "anchors", NULL};
+static const command_word study_words[STUDY_COUNT + 1] = {
+    {"speed", "time per ray against error, for every cut-off, of runs or .ply files"},
+    {"crosscheck", "tracer against rasterizer, and what makes them differ, of runs or .ply files"},
+    {"rate", "file size against picture quality, of runs"},
+    {"stability", "the scenes on which renderers of Gaussians are known to fail; takes no model"},
+    {"paper", "the paper's four tables, by training on data sets"},
+    {"time", "held-out PSNR against training time, by training on data sets"},
+    {"anchors", "held-out PSNR against the number of anchors, by training on data sets"},
+    {NULL, NULL}};
 static const struct { int models_min, models_max; gbt_status (*run)(const study_request *, gbt_error *); } studies[STUDY_COUNT] = {
     {1, 16, run_speed}, {1, 16, run_crosscheck}, {1, 6, run_rate}, {0, 0, run_stability}, {1, 16, run_paper}, {1, 16, run_time},
     {1, 16, run_anchors}};
 
-static const char *const *names_of_studies(void)
+static const command_word *words_of_studies(void)
 {
-    return study_names;
+    return study_words;
 }
 
 static int run(const command *self, int argc, char **argv)
@@ -83,13 +91,15 @@ static int run(const command *self, int argc, char **argv)
         {.name = "repeats", .kind = OPTION_INT, .value = &def->repeats, .min = 1, .max = 1000, .value_name = "N",
          .help = "speed: timed passes of each setting; the median counts"},
         {.name = "only", .kind = OPTION_STRING, .value = &request.stability.only, .value_name = "A1,A9",
+         .choices = "A1|A2|A3|A4|A5|A6|A7|A8|A9|A10|A11|A12|A13|A14|A15|A16|A17|A18", .list = true,
          .help = "stability: these cases; default: all"},
         {.name = "quick", .kind = OPTION_FLAG, .value = &quick, .help = "stability: the smaller sizes of its tests"},
         {.name = "iterations", .kind = OPTION_UINT64, .value = &iterations, .min = 0, .max = 1e9, .value_name = "N",
          .help = "paper, anchors: steps of every run; 0: 3000 and 1000"},
         {.name = "renderer", .kind = OPTION_CHOICE, .value = &paper->renderer, .choices = "raster|trace|per-ray",
          .help = "paper: what photos are compared with"},
-        {.name = "tables", .kind = OPTION_STRING, .value = &paper->tables, .value_name = "1,3", .help = "paper: which of its four"},
+        {.name = "tables", .kind = OPTION_STRING, .value = &paper->tables, .value_name = "1,3", .choices = "1|2|3|4", .list = true,
+         .help = "paper: which of its four tables"},
         {.name = "lpips", .kind = OPTION_STRING, .value = &paper->lpips, .value_name = "FILE", .help = "paper: " LPIPS_HELP},
         {.name = "budget", .kind = OPTION_DURATION, .value = &request.time.budget_seconds, .min = 1, .max = 1e6, .value_name = "TIME",
          .help = "time: of a run"},
@@ -105,12 +115,12 @@ static int run(const command *self, int argc, char **argv)
     if (code >= 0)
         return code;
     size_t which = 0;
-    while (strcmp(named.value[0], study_names[which]) != 0) /* options_parse() takes no others */
+    while (strcmp(named.value[0], study_words[which].name) != 0) /* options_parse() takes no others */
         which++;
     if (named.count - 1 < studies[which].models_min)
-        return command_misused("study %s: wanted a model, or data to train on", study_names[which]);
+        return command_misused("study %s: wanted a model, or data to train on", study_words[which].name);
     if (named.count - 1 > studies[which].models_max)
-        return command_misused("study %s: \"%.60s\" is one too many", study_names[which], named.value[1 + studies[which].models_max]);
+        return command_misused("study %s: \"%.60s\" is one too many", study_words[which].name, named.value[1 + studies[which].models_max]);
     if (threads > 0)
         gbt_set_threads(threads);
     request.stability.quick = quick;
@@ -125,9 +135,6 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(studies[which].run(&request, &err), &err);
 }
 
-const command command_study = {.name = "study",
-                               .summary = "speed against accuracy, tracer against rasterizer, size against picture, stability; the paper's "
-                                          "tables, quality against time and anchors: measure, draw the chart",
-                                              .usage = "speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR",
-                                              .run = run,
-                               .words = names_of_studies};
+const command command_study = {.name = "study", .summary = "measure and draw charts: speed, accuracy, size, stability, the paper's tables",
+                               .usage = "speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR", .run = run,
+                               .words = words_of_studies};

@@ -4,13 +4,18 @@
 
 #include "gbtrace/status.h"
 
+typedef struct command_word {
+    const char *name;
+    const char *help; /* one line, for --help and the manual page */
+} command_word;
+
 typedef struct command {
     const char *name;
     const char *summary; /* one line, for the list of commands */
     const char *usage;   /* operands and the options that it needs, for example "DATA -o FILE.ply" */
     int (*run)(const struct command *self, int argc, char **argv); /* arguments after the name; returns the exit code */
     const char *alias;                  /* a second name, or NULL */
-    const char *const *(*words)(void);  /* what the first operand may be, NULL-terminated; NULL: anything, such as a path */
+    const command_word *(*words)(void); /* what the first operand may be, up to a name of NULL; NULL: anything, such as a path */
 } command;
 
 /** One `error: ...` line on stderr for a failure (control characters become ?); returns the exit code that belongs to the status. */

@@ -11,6 +11,8 @@ value_kind describe_value(const option *o)
         return VALUE_CHOICES;
     if (o->kind != OPTION_STRING && o->kind != OPTION_OPERAND)
         return VALUE_ANY;
+    if (o->choices != NULL)
+        return o->list ? VALUE_LIST : strstr(o->value_name, "FILE") != NULL ? VALUE_CHOICES_OR_FILE : VALUE_CHOICES;
     if (strcmp(o->value_name, "DIR") == 0)
         return VALUE_FOLDER;
     static const char *const paths[] = {"FILE", "RUN", "DATA", "MODEL"};
@@ -34,9 +36,9 @@ void describe_escaped(FILE *out, const char *text, const char *special)
 
 void describe_words(FILE *out, const command *c)
 {
-    const char *const *words = c->words != NULL ? c->words() : NULL;
-    for (int i = 0; words != NULL && words[i] != NULL; i++)
-        fprintf(out, "%s%s", i > 0 ? " " : "", words[i]);
+    const command_word *words = c->words != NULL ? c->words() : NULL;
+    for (int i = 0; words != NULL && words[i].name != NULL; i++)
+        fprintf(out, "%s%s", i > 0 ? " " : "", words[i].name);
 }
 
 void describe_names(FILE *out, const option *o, const char *before, bool all)

@@ -13,9 +13,17 @@ void describe_fish(FILE *out);
 
 /* ---- for the files that make the above ------------------------------------------------------------------------------------------ */
 
-typedef enum value_kind { VALUE_NONE, VALUE_ANY, VALUE_CHOICES, VALUE_FILE, VALUE_FOLDER } value_kind;
+typedef enum value_kind {
+    VALUE_NONE,
+    VALUE_ANY,             /* cannot be guessed */
+    VALUE_CHOICES,         /* one of its choices */
+    VALUE_LIST,            /* some of its choices, with commas between */
+    VALUE_CHOICES_OR_FILE, /* one of its choices, or a path */
+    VALUE_FILE,
+    VALUE_FOLDER
+} value_kind;
 
-/** What may stand behind an option: nothing, something that cannot be guessed, one of its choices, a path, a folder. */
+/** What may stand behind an option. */
 value_kind describe_value(const option *o);
 
 /** "a|b" as "a b". */

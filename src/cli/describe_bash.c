@@ -29,13 +29,12 @@ static void write_values(const command *self, const option *options, int option_
         if (kind == VALUE_NONE)
             continue;
         write_pattern(out, self, o);
-        if (kind == VALUE_CHOICES) {
-            fputs("words='", out);
+        static const char *const wants[] = {[VALUE_ANY] = "none", [VALUE_CHOICES] = "none", [VALUE_LIST] = "list",
+                                            [VALUE_CHOICES_OR_FILE] = "file", [VALUE_FILE] = "file", [VALUE_FOLDER] = "folder"};
+        fputs("words='", out);
+        if (o->choices != NULL)
             describe_choices(out, o);
-            fputs("' ;;\n", out);
-        } else {
-            fprintf(out, "words= want=%s ;;\n", kind == VALUE_FILE ? "file" : kind == VALUE_FOLDER ? "folder" : "none");
-        }
+        fprintf(out, "' want=%s ;;\n", wants[kind]);
     }
 }
 
@@ -50,7 +49,7 @@ void describe_bash(FILE *out)
     fputs("# Completion of gbtrace for bash. Made by gbtrace describe bash.\n"
           "_gbtrace() {\n"
           "    local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]} options= words= "
-          "want=file\n"
+          "list= want=file\n"
           "    COMPREPLY=()\n"
           "    # bash parts a word at =: --name=VALUE comes as three.\n"
           "    [ \"$current\" = = ] && current=\n"
@@ -85,12 +84,17 @@ void describe_bash(FILE *out)
     fputs("    esac\n"
           "    if [[ $current = -* ]]; then\n"
           "        COMPREPLY=($(compgen -W \"$options\" -- \"$current\"))\n"
-          "    elif [ -n \"$words\" ]; then\n"
-          "        COMPREPLY=($(compgen -W \"$words\" -- \"$current\"))\n"
-          "    elif [ \"$want\" != none ]; then\n"
+          "        return\n"
+          "    fi\n"
+          "    if [ \"$want\" = list ]; then\n"
+          "        compopt -o nospace 2>/dev/null\n"
+          "        [[ $current = *,* ]] && list=${current%,*},\n"
+          "    fi\n"
+          "    COMPREPLY=($(compgen -P \"$list\" -W \"$words\" -- \"${current#\"$list\"}\"))\n"
+          "    if [ \"$want\" = file ] || [ \"$want\" = folder ]; then\n"
           "        compopt -o filenames 2>/dev/null\n"
           "        local IFS=$'\\n'\n"
-          "        COMPREPLY=($(compgen -A $([ \"$want\" = folder ] && echo directory || echo file) -- \"$current\"))\n"
+          "        COMPREPLY+=($(compgen -A $([ \"$want\" = folder ] && echo directory || echo file) -- \"$current\"))\n"
           "    fi\n"
           "}\n"
           "complete -F _gbtrace gbtrace\n", out);

@@ -26,6 +26,16 @@ static void write_rows(const command *self, const option *options, int option_co
             describe_choices(out, o);
             fputc('\'', out);
             break;
+        case VALUE_LIST:
+            fputs(" -x -a '(__fish_append , ", out);
+            describe_choices(out, o);
+            fputs(")'", out);
+            break;
+        case VALUE_CHOICES_OR_FILE:
+            fputs(" -r -F -a '", out);
+            describe_choices(out, o);
+            fputc('\'', out);
+            break;
         case VALUE_FILE: fputs(" -r -F", out); break;
         case VALUE_FOLDER: fputs(" -x -a '(__fish_complete_directories)'", out); break;
         }

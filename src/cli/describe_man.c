@@ -59,7 +59,7 @@ static const char head[] =
     ".B gbtrace help\n"
     ".RI [ COMMAND ]\n"
     ".br\n"
-    ".B gbtrace \\-\\-version\n"
+    ".BR \"gbtrace \\-\\-version\" \" (\" \\-V \", \" \\-v )\n"
     ".SH DESCRIPTION\n"
     "gbtrace trains neural Gaussian scenes from posed photos, renders them by ray tracing with Embree, scores, compresses and exports "
     "them.\n"
@@ -118,6 +118,12 @@ void describe_man(FILE *out)
         fputs(c->alias != NULL ? " (also " : "", out);
         write_text(out, c->alias != NULL ? c->alias : "");
         fputs(c->alias != NULL ? ").\n" : ".\n", out);
+        const command_word *words = c->words != NULL ? c->words() : NULL;
+        for (int w = 0; words != NULL && words[w].name != NULL; w++) {
+            fprintf(out, ".TP\n\\fB%s\\fR\n", words[w].name);
+            write_text(out, words[w].help);
+            fputc('\n', out);
+        }
         options_visit(c, write_rows, out);
     }
     fputs(tail, out);

@@ -31,13 +31,15 @@ static void write_rows(const command *self, const option *options, int option_co
             write_note(out, kind == VALUE_CHOICES ? o->name : o->value_name);
             fputc(':', out);
         }
-        if (kind == VALUE_CHOICES) {
-            fputc('(', out);
+        static const char *const before[] = {[VALUE_CHOICES] = "(", [VALUE_LIST] = "_values -s , value ",
+                                             [VALUE_CHOICES_OR_FILE] = " _alternative \"values\\:value\\:(", [VALUE_FILE] = "_files",
+                                             [VALUE_FOLDER] = "_files -/"};
+        static const char *const after[] = {[VALUE_CHOICES] = ")", [VALUE_CHOICES_OR_FILE] = ")\" \"files\\:file\\:_files\"",
+                                            [VALUE_FOLDER] = ""};
+        fputs(before[kind] != NULL ? before[kind] : "", out);
+        if (kind != VALUE_NONE && o->choices != NULL)
             describe_choices(out, o);
-            fputc(')', out);
-        } else if (kind == VALUE_FILE || kind == VALUE_FOLDER) {
-            fputs(kind == VALUE_FILE ? "_files" : "_files -/", out);
-        }
+        fputs(after[kind] != NULL ? after[kind] : "", out);
         fputc('\'', out);
     }
     if (self->words != NULL) {

@@ -14,7 +14,7 @@ static int print_help(void)
     puts("usage: gbtrace COMMAND [arguments]\n\nneural Gaussian scenes from photos, traced on the CPU\n\ncommands:");
     for (int i = 0; i < command_list_count; i++)
         printf("  %-12s%s\n", command_list[i]->name, command_list[i]->summary);
-    puts("\n`gbtrace COMMAND --help` lists the options of one; `gbtrace --version` prints the version.\n"
+    puts("\n`gbtrace COMMAND --help` lists the options of one; `gbtrace --version` (-V, -v) prints the version.\n"
          "Exit codes: 0 done, 2 usage, 3 bad input, 4 input or output failed, 5 out of memory or over a limit, 128+n stopped by signal n.");
     return 0;
 }
@@ -44,7 +44,7 @@ static int dispatch(int argc, char **argv)
     if (argc < 2)
         return command_misused("command missing (see gbtrace --help)");
     const char *verb = argv[1];
-    if (strcmp(verb, "--version") == 0) {
+    if (strcmp(verb, "--version") == 0 || strcmp(verb, "-V") == 0 || strcmp(verb, "-v") == 0) {
         printf("gbtrace %s\n", gbt_version());
         return 0;
     }

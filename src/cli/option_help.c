@@ -122,8 +122,12 @@ void options_notes(const option *o, char *out, size_t size)
 
 void options_print_help(const command *self, const option *options, int option_count)
 {
-    printf("usage: gbtrace %s %s%s[options]\n\n%s\n\noptions:\n", self->name, self->usage, self->usage[0] != '\0' ? " " : "",
-           self->summary);
+    printf("usage: gbtrace %s %s%s[options]\n\n%s\n\n", self->name, self->usage, self->usage[0] != '\0' ? " " : "", self->summary);
+    const command_word *words = self->words != NULL ? self->words() : NULL;
+    for (int i = 0; words != NULL && words[i].name != NULL; i++)
+        printf("%s  %-12s%s\n%s", i == 0 ? "the first argument is one of:\n" : "", words[i].name, words[i].help,
+               words[i + 1].name == NULL ? "\n" : "");
+    puts("options:");
     for (int i = 0; i < option_count; i++) {
         const option *o = &options[i];
         if (o->kind == OPTION_ELSEWHERE)

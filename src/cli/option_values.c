@@ -64,11 +64,27 @@ static bool read_uint64(const char *text, double min, double max, uint64_t *out)
     return errno == 0 && ((min == 0 && max == 0) || ((double)*out >= min && (double)*out <= max));
 }
 
-/** "90", "90s", "10m", "1h30m": parts from large to small, each unit once. */
+/* From large to small. */
+static const struct { const char *names; double seconds; } time_units[] = {
+    {" h hr hrs hour hours ", 3600}, {" m min mins minute minutes ", 60}, {" s sec secs second seconds ", 1}};
+
+enum { TIME_UNITS = sizeof time_units / sizeof *time_units, TIME_NAME_MAX = 8 };
+
+static int find_time_unit(const char *name, size_t length)
+{
+    char wanted[TIME_NAME_MAX + 3];
+    if (length > TIME_NAME_MAX)
+        return -1;
+    snprintf(wanted, sizeof wanted, " %.*s ", (int)length, name);
+    for (int i = 0; i < TIME_UNITS; i++)
+        if (strstr(time_units[i].names, wanted) != NULL)
+            return i;
+    return -1;
+}
+
+/** "90", "90s", "10m", "10min", "1h30m": parts from large to small, each unit once. */
 static bool read_duration(const char *text, double min, double max, double *out)
 {
-    static const char units[] = "hms";
-    static const double seconds[] = {3600, 60, 1};
     double sum = 0;
     int next = 0;
     if (text[0] == '\0' || text[0] == '-' || text[0] == '+')
@@ -77,15 +93,17 @@ static bool read_duration(const char *text, double min, double max, double *out)
         const size_t length = decimal_length(text);
         if (length == 0 || text[0] == '-' || text[0] == '+')
             return false;
-        const char unit = text[length];
-        if (unit == '\0' && next > 0) /* a bare number is seconds only when it stands alone */
+        size_t name_length = 0;
+        while (isalpha((unsigned char)text[length + name_length]))
+            name_length++;
+        if (text[length] == '\0' && next > 0) /* a bare number is seconds only when it stands alone */
             return false;
-        const char *place = unit == '\0' ? units + 2 : strchr(units, unit);
-        if (place == NULL || place - units < next)
+        const int unit = text[length] == '\0' ? TIME_UNITS - 1 : find_time_unit(text + length, name_length);
+        if (unit < next)
             return false;
-        sum += strtod(text, NULL) * seconds[place - units];
-        next = (int)(place - units) + 1;
-        text += length + (unit != '\0');
+        sum += strtod(text, NULL) * time_units[unit].seconds;
+        next = unit + 1;
+        text += length + name_length;
     }
     *out = sum;
     return isfinite(sum) && sum >= min && sum <= max;

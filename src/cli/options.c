@@ -174,16 +174,18 @@ static void put_first(operands *out, const char *value)
 
 static int check_words(const command *self, const char *typed)
 {
-    const char *const *words = self->words();
+    const command_word *words = self->words();
+    const char *names[TABLE_MAX];
     char list[512] = "";
     int count = 0;
-    for (size_t used = 0; words[count] != NULL; count++) {
-        if (strcmp(words[count], typed) == 0)
+    for (size_t used = 0; words[count].name != NULL && count < TABLE_MAX; count++) {
+        if (strcmp(words[count].name, typed) == 0)
             return GO_ON;
-        const char *join = count == 0 ? "" : words[count + 1] == NULL ? " or " : ", ";
-        used += (size_t)snprintf(list + used, used < sizeof list ? sizeof list - used : 0, "%s%s", join, words[count]);
+        const char *join = count == 0 ? "" : words[count + 1].name == NULL ? " or " : ", ";
+        used += (size_t)snprintf(list + used, used < sizeof list ? sizeof list - used : 0, "%s%s", join, words[count].name);
+        names[count] = words[count].name;
     }
-    const char *nearest = command_nearest(typed, words, count);
+    const char *nearest = command_nearest(typed, names, count);
     return command_misused("%s: \"%.60s\" (wanted %.400s%s%s%s)", self->name, typed, list, nearest != NULL ? "; did you mean " : "",
                            nearest != NULL ? nearest : "", nearest != NULL ? "?" : "");
 }

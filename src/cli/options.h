@@ -18,7 +18,7 @@ typedef enum option_kind {
     OPTION_DOUBLE,   /* double, [min, max], finite */
     OPTION_STRING,   /* const char *, not empty */
     OPTION_CHOICE,   /* const char *, one of `choices` */
-    OPTION_DURATION, /* double, seconds, [min, max]: 90, 90s, 10m, 1h, 1h30m */
+    OPTION_DURATION, /* double, seconds, [min, max]: 90, 90s, 10m, 10min, 1h, 1h30m */
     OPTION_SIZE,     /* size_t, bytes, [min, max]: 512M, 6G (powers of 1024) */
     OPTION_OPERAND,  /* the first operand by a name that other programs gave it; no `value` */
     OPTION_ELSEWHERE /* other programs have it, we do not: an error, for which `help` says what to use. In no list */
@@ -30,7 +30,8 @@ typedef struct option {
     option_kind kind;
     void *value;            /* of the kind's type; holds the default before, and the result after */
     double min, max;        /* inclusive */
-    const char *choices;    /* OPTION_CHOICE: "a|b|c" */
+    const char *choices;    /* OPTION_CHOICE: "a|b|c". OPTION_STRING: values that completion offers; others are taken too */
+    bool list;              /* OPTION_STRING: several of `choices` may stand with commas between */
     const char *value_name; /* for help and messages: "N", "FILE"; NULL for flags and choices */
     const char *help;
     const char *aliases;    /* more names with blanks between, as other programs call it; one letter goes with one dash */

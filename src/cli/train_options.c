@@ -45,7 +45,7 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
                  "median distance"},
         {.name = "start-level", .kind = OPTION_INT, .value = &d->start_level, .min = 0, .max = 4, .value_name = "L",
          .help = "first look at one pixel in 4^L, at random places"},
-        {.name = "eval-split", .kind = OPTION_STRING, .value = &d->eval_split, .value_name = "SPLIT",
+        {.name = "eval-split", .kind = OPTION_STRING, .value = &d->eval_split, .value_name = "SPLIT", .choices = "auto|every=8|none",
          .help = "held-out photos: auto (as the data set says, else every=8), every=N, none, list=FILE"},
         {.name = "eval", .kind = OPTION_STRING, .value = &d->eval_split, .fixed = "every=8", .help = "the same as --eval-split every=8"},
         {.name = "alpha", .kind = OPTION_CHOICE, .value = &d->alpha, .choices = "auto|black|white|mask",

@@ -41,6 +41,10 @@ prints "help wins over what is wrong" '^usage: gbtrace init' init --nonsense -h
 prints "needed options say so" '^  -o, --output FILE.ply  *.* (needed)$' init --help
 prints "choices" '--init gb|adaptive|voxel|random$' init --help
 prints "choices with their default" '--scale-prior gb|nn .*(default gb)' init --help
+prints "help of a verb with words: each with its line" '^  courtyard   a town square: ' make-scene --help
+prints "help of a study" '^  rate        file size against picture quality' study --help
+prints "version, short" '^gbtrace [0-9]*\.[0-9]*\.[0-9]*$' -V
+prints "version, short too" '^gbtrace [0-9]*\.[0-9]*\.[0-9]*$' -v
 prints "version" '^gbtrace [0-9][0-9]*\.[0-9][0-9]*\.[0-9][0-9]*$' --version
 
 # ---- verbs
@@ -132,6 +136,7 @@ unset GBTRACE_MAX_DEPTH GBTRACE_INIT_VOXEL_SIZE
 misuse 4 "nothing: no such file or folder" train -s nothing -m run -r 2 --eval --iterations 7000 --quiet
 misuse 4 "nothing: no such file or folder" train --source_path nothing --model_path run --resolution 2 --n_offsets 10 --voxel_size 0.01
 misuse 2 "--output: given twice" train -s nothing -m run --output run
+misuse 4 "nothing: no such file or folder" train nothing -o run --budget 10min
 misuse 2 "-r: bad value (wanted a number from 1 to 64, got 800)" train -s nothing -m run -r 800
 misuse 2 "--white_background: not here; what no Gaussian covers shows the mean colour of the points; leave it out" train -s d -m r --white_background
 misuse 2 "-i: not here; photos are found from the cameras; for smaller ones use --downscale F" train -s d -m r -i images_4

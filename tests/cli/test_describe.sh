@@ -64,6 +64,14 @@ if command -v bash >/dev/null; then
     complete_bash "only folders" '|' gbtrace render run -o ph
     complete_bash "an alias takes the same" 'a folder|' gbtrace demo --output a
     complete_bash "the value of an alias" 'photo.png|' gbtrace train -m ph
+    complete_bash "values of an option that takes a file too" 'orbit|' gbtrace render run --path or
+    complete_bash "and its files" 'photo.png|' gbtrace render run --path ph
+    complete_bash "the first of a list" 'depth|' gbtrace render run --outputs dep
+    complete_bash "the next of a list" 'hits,normal|' gbtrace render run --outputs hits,no
+    complete_bash "a list behind =" 'hits,normal|' gbtrace render run --outputs = hits,no
+    complete_bash "a list by its other name" 'depth|' gbtrace render run --aov dep
+    complete_bash "a scene for demo" 'tabletop|terrain|' gbtrace demo --scene t
+    complete_bash "how to split" 'auto|' gbtrace train data --eval-split a
     complete_bash "a number is not guessed" '|' gbtrace train data --seed ''
     complete_bash "what only tells what to use is not offered" '|' gbtrace train data --white
 else
@@ -86,10 +94,47 @@ if command -v zsh >/dev/null; then
 else
     skip "zsh reads its script" "zsh is not installed"
 fi
+if command -v zsh >/dev/null && command -v script >/dev/null; then
+    rm -f typed
+    cat >.zshrc <<'END'
+autoload -Uz compinit; compinit -u -d ./dump; . ./zsh
+gbtrace() { echo "typed: $*" >>typed }
+zle-line-init() { echo ready >>ready }
+zle -N zle-line-init
+END
+    keys() { # each line when zsh's editor waits for it: what comes earlier is not completed
+        lines=1
+        for line in 'gbtrace tra\t dat\t --init vo\t\n' 'gbtrace render run --path or\t\n' 'gbtrace render run --path ph\t\n' \
+            'gbtrace render run --outputs dep\t,nor\t\n' 'gbtrace make-scene tab\t\n' 'exit\n'; do
+            while [ "$(cat ready 2>/dev/null | wc -l)" -lt $lines ] && [ ! -e ended ]; do sleep 0.1; done
+            printf "$line"
+            lines=$((lines + 1))
+        done
+    }
+    keys | { ZDOTDIR=$work script -q -c 'zsh -d -i' /dev/null >out 2>&1; : >ended; }
+    [ "$(sed 's,data/,data,; s/ *$//' typed)" = 'typed: train data --init voxel
+typed: render run --path orbit
+typed: render run --path photo.png
+typed: render run --outputs depth,normal
+typed: make-scene tabletop' ]
+    report $? "zsh: keys on a terminal" "$(cat typed; tail -c 2000 out)"
+else
+    skip "zsh: keys on a terminal" "zsh or script is not installed"
+fi
 if command -v fish >/dev/null; then
     HOME=$work fish --no-config -c 'source ./fish; complete -C "gbtrace train --init "' >out 2>&1
     [ "$(cut -f 1 out | sort | tr '\n' ' ')" = "adaptive gb random voxel " ]
     report $? "fish offers choices" "$(cat out)"
+    # complete_fish NAME WANTED LINE: what is offered for the last word of the line
+    complete_fish() {
+        HOME=$work fish --no-config -c "source ./fish; complete -C '$3'" >out 2>&1
+        [ "$(cut -f 1 out | sort | tr '\n' ' ')" = "$2" ]
+        report $? "fish: $1" "$(cat out)"
+    }
+    complete_fish "values of an option that takes a file too" "orbit " "gbtrace render run --path orb"
+    complete_fish "and its files" "photo.png " "gbtrace render run --path pho"
+    complete_fish "the next of a list" "hits,normal " "gbtrace render run --outputs hits,no"
+    complete_fish "a procedural scene" "tabletop terrain " "gbtrace demo --scene t"
 else
     skip "fish offers choices" "fish is not installed"
 fi

@@ -13,6 +13,8 @@ check "install" cmake --install "$build" --prefix "$prefix"
 library=$(find "$prefix" -name 'libgbtrace.so' | head -n 1)
 folder=$(dirname "$library")
 
+check "completion for zsh, where /usr/local has it" test -s "$prefix/share/zsh/site-functions/_gbtrace"
+
 # Only gbt_ symbols, and every function that a header declares.
 nm -D --defined-only "$library" | awk '{ print $3 }' | LC_ALL=C sort >"$work/shown"
 sed -n 's/^[a-z][a-z_ *]*[ *]\(gbt_[a-z0-9_]*\)(.*/\1/p; s/^const char \*const \*\(gbt_[a-z_]*\)(.*/\1/p' "$prefix"/include/gbtrace/*.h | LC_ALL=C sort -u >"$work/declared"

@@ -443,8 +443,11 @@ static void names_are_the_scenes(void **state)
     for (; names[count] != NULL; count++) {
         def.name = names[count];
         assert_ok(gbt_make_scene(&def, under_root("named"), NULL));
+        const char *summary = gbt_make_scene_summary(names[count]);
+        assert_true(summary != NULL && strlen(summary) > 20 && strlen(summary) < 100 && strchr(summary, '\n') == NULL);
     }
     assert_int_equal(count, 3);
+    assert_null(gbt_make_scene_summary("none"));
 }
 
 static void no_memory_is_a_status(void **state)

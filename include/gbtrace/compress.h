@@ -25,7 +25,10 @@ gbt_compress_def gbt_compress_def_default(void);
  * the model alone, with a line on stderr: the file is then some 5 to 40 % larger at the same loss. What the file gives back is checked
  * before it is written.
  *
- * @param run [in] RUN (a folder with model.gbt) or a model file; also one that is already small
+ * A file that is already small is copied as it is, in a moment: always with `lossless`, else when it is quantised and `quality` is not below
+ * the default (a file does not say at which quality it was made). A copy onto itself is nothing to do.
+ *
+ * @param run [in] RUN (a folder with model.gbt) or a model file
  * @param out [in] written atomically; may be the model itself
  * @param report [in] open stream for the table of bytes; NULL: none
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY

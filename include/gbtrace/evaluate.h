@@ -10,7 +10,7 @@ GBT_API_BEGIN
 
 typedef struct gbt_evaluate_def {
     const char *data; /* data set folder; NULL: the one the model was trained on. Default NULL */
-    const char *json; /* also write the scores here; NULL: only RUN/metrics.json. Default NULL */
+    const char *json; /* also write the scores here; NULL: nowhere else. Default NULL */
     const char *renderer; /* "trace", "raster" or "per-ray"; NULL: as in training. Default NULL */
     double downscale; /* photos are divided by this, >= 1; 0: as in training. Default 0 */
     int report;       /* 1: also write RUN/report.html. Default 1 */
@@ -27,6 +27,9 @@ gbt_evaluate_def gbt_evaluate_def_default(void);
  *
  * Renders go to RUN/renders/test/NAME.png, the photos they are compared with to RUN/renders/test/NAME.photo.png; scores to
  * RUN/metrics.json; RUN/report.html shows all of it. Without held-out views the scores are null ("n/a"), never NaN.
+ *
+ * With other settings than the run's own (another renderer, size, preset or data set, unless the run's own data set is gone) nothing in RUN
+ * changes: the scores go to stderr, and to the file `json` when it is given.
  *
  * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */

@@ -29,10 +29,13 @@ def train(data, run, **settings):
     return Model(run)
 
 
-def evaluate(run, data=None, lpips=None):
-    """Score the held-out views of a run; RUN/metrics.json and RUN/report.html have the figures. lpips: the file of a network (docs/metrics.md)."""
+def evaluate(run, data=None, lpips=None, json=None):
+    """Score the held-out views of a run; RUN/metrics.json and RUN/report.html have the figures, and the file `json` too.
+
+    On another data set than the run's own, `json` alone. lpips: the file of a network (docs/metrics.md).
+    """
     settings = lib.library.gbt_evaluate_def_default()
-    settings.data, settings.lpips = lib.encode(data), lib.encode(lpips)
+    settings.data, settings.lpips, settings.json = lib.encode(data), lib.encode(lpips), lib.encode(json)
     lib.call("gbt_evaluate", lib.encode(run), c.byref(settings))
 
 

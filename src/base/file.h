@@ -23,6 +23,9 @@ gbt_status file_make_folder(const char *path, gbt_error *err);
 bool file_exists(const char *path);
 bool file_is_folder(const char *path);
 
+/** Whether both are there, and are one file or folder, whatever they are called. */
+bool file_is_same(const char *a, const char *b);
+
 /** The largest N of the entries PREFIXN of a folder, N in decimal digits: false when there is none. */
 bool file_largest_number(const char *folder, const char *prefix, unsigned long *out);
 

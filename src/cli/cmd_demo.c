@@ -62,9 +62,9 @@ static int run(const command *self, int argc, char **argv)
         status = finish_run(run_folder, false, false, &err);
     }
     if (status == GBT_OK)
-        printf("Open %s/report.html in a browser.\nYour own photos: gbtrace train DATA -o RUN --budget 10m   (DATA holds images/ and "
-               "sparse/0 from COLMAP)\n",
-               run_folder);
+        finish_run_say(run_folder);
+    if (status == GBT_OK && progress_for_people())
+        puts("Your own photos: gbtrace train PHOTOS -o RUN --budget 10m   (PHOTOS holds images/ and sparse/0 from COLMAP)");
     return command_failed(status, &err);
 }
 

@@ -12,7 +12,7 @@ static int run(const command *self, int argc, char **argv)
          .aliases = "model-paths"},
         {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA",
          .help = "data set in place of the one it was trained on", .aliases = "s source-path"},
-        {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the scores there too"},
+        {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the scores there too; the only file with other settings than the run's own"},
         {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray",
          .help = "what draws the model; default: what it was trained with"},
         {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",

@@ -29,6 +29,8 @@ static int run(const command *self, int argc, char **argv)
         status = gbt_train(data.value[0], output, &t.def, &err);
     if (status == GBT_OK)
         status = finish_run(output, lossless, t.def.tensorboard, &err);
+    if (status == GBT_OK)
+        finish_run_say(output);
     return command_failed(status, &err);
 }
 

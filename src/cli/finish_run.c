@@ -3,6 +3,7 @@
 
 #include <stdio.h>
 
+#include "cli/progress.h"
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
 
@@ -17,4 +18,10 @@ gbt_status finish_run(const char *run, bool lossless, bool tensorboard, gbt_erro
     gbt_evaluate_def score = gbt_evaluate_def_default();
     score.tensorboard = tensorboard;
     return status == GBT_OK ? gbt_evaluate(run, &score, err) : status;
+}
+
+void finish_run_say(const char *run)
+{
+    if (progress_for_people())
+        printf("Report: %s/report.html\nViewer: gbtrace view %s\n", run, run);
 }

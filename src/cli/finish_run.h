@@ -12,4 +12,7 @@
  */
 gbt_status finish_run(const char *run, bool lossless, bool tensorboard, gbt_error *err);
 
+/** Say on stdout where the report is and what shows the scene, to a person (progress_for_people()). */
+void finish_run_say(const char *run);
+
 #endif

@@ -75,6 +75,11 @@ void progress_say(const char *format, ...)
         fprintf(stderr, "%s\n", line);
 }
 
+bool progress_for_people(void)
+{
+    return !as_json && !silent;
+}
+
 void progress_error(const char *text)
 {
     if (as_json)

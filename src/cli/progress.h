@@ -2,6 +2,7 @@
 #ifndef GBT_CLI_PROGRESS_H
 #define GBT_CLI_PROGRESS_H
 
+#include <stdbool.h>
 #include <stdio.h>
 
 /** "auto", "json" or "none", for the rest of the program. With "json" everything on stderr is JSON from here on (docs/command-line.md). */
@@ -9,6 +10,9 @@ void progress_start(const char *mode, const char *command_name);
 
 /** A message of the program's own. */
 void progress_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+/** Whether a person is told what goes on: neither JSON nor silence was asked for. */
+bool progress_for_people(void);
 
 /** One line of an error. */
 void progress_error(const char *text);

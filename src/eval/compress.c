@@ -1,8 +1,8 @@
 /* eval/compress.c -- a trained model to a small file, and what its bytes are. */
 #include "gbtrace/compress.h"
 
+#include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "base/clock.h"
 #include "base/fail.h"
@@ -11,6 +11,7 @@
 #include "base/memory.h"
 #include "data/json_out.h"
 #include "eval/run_sensitivity.h"
+#include "io/model_code.h"
 
 gbt_compress_def gbt_compress_def_default(void)
 {
@@ -23,16 +24,15 @@ typedef struct compression {
     model_sizes after;
     double probe_seconds, encode_seconds, decode_seconds;
     const char *steps_from;
+    bool kept; /* the file was small already: copied */
 } compression;
 
-static size_t size_of_file(const char *run)
+/* The model file of RUN, or the file itself. */
+static gbt_status find_model(const char *run, char *path, size_t size, gbt_error *err)
 {
-    char path[4096];
-    gbt_error ignored = {0};
-    struct stat info;
-    if (file_is_folder(run) && file_join(path, sizeof path, run, "model.gbt", &ignored) == GBT_OK)
-        run = path;
-    return stat(run, &info) == 0 ? (size_t)info.st_size : 0;
+    if (file_is_folder(run))
+        return file_join(path, size, run, "model.gbt", err);
+    return snprintf(path, size, "%s", run) < (int)size ? GBT_OK : base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", run);
 }
 
 static gbt_status open_run(const char *run, const gbt_compress_def *def, loaded_run *r, bool *has_views, gbt_error *err)
@@ -80,6 +80,39 @@ static gbt_status code_run(loaded_run *r, bool has_views, const gbt_compress_def
     return status;
 }
 
+/* ---- a file that is small already ------------------------------------------------------------------------------------------------ */
+
+/**
+ * When `path` is a coded model from which coding it again would gain nothing, `out` becomes a copy of it.
+ *
+ * A coarse file does not say at which quality it was made; that is the default, unless somebody asked for another. So it is coded again only
+ * below the default.
+ */
+static gbt_status keep_small(const char *path, const gbt_compress_def *def, const char *out, compression *c, gbt_error *err)
+{
+    unsigned char *bytes = NULL;
+    container file = {0};
+    model m = {0};
+    gbt_error unreadable = {0}; /* is said by who reads it next */
+    if (file_read(path, &bytes, &c->before, &unreadable) != GBT_OK)
+        return GBT_OK;
+    gbt_status status = GBT_OK;
+    if (container_parse(bytes, c->before, path, &file, &unreadable) == GBT_OK && model_is_coded(&file) &&
+        (def->lossless || (model_is_coarse(&file) && def->quality >= gbt_compress_def_default().quality))) {
+        c->kept = true, c->steps_from = "already small";
+        status = model_from_container(&file, &m, err);
+        c->anchors = m.anchors.count;
+        if (status == GBT_OK)
+            status = model_sizes_read(&file, c->before, &c->after, err);
+        if (status == GBT_OK && !file_is_same(path, out))
+            status = file_write_atomic(out, bytes, c->before, err);
+    }
+    model_free(&m);
+    container_free(&file);
+    mem_free(bytes);
+    return status;
+}
+
 /* ---- report ------------------------------------------------------------------------------------------------------------------- */
 
 enum { PARTS = 8 };
@@ -111,6 +144,15 @@ static void print_report(const compression *c, const char *out, FILE *report)
             c->decode_seconds);
 }
 
+static void print_kept(const compression *c, const char *path, const char *out, bool lossless, FILE *report)
+{
+    const bool itself = file_is_same(path, out);
+    fprintf(report, "%s: already small: %zu anchors, %zu bytes, %.2f bytes per anchor; %s%s\n", path, c->anchors, c->before,
+            (double)c->before / (c->anchors > 0 ? (double)c->anchors : 1), itself ? "nothing to do" : out, itself ? "" : " is a copy");
+    if (!lossless)
+        fprintf(report, "  --quality below %g makes it smaller\n", gbt_compress_def_default().quality);
+}
+
 static gbt_status save_report(const compression *c, const gbt_compress_def *def, gbt_error *err)
 {
     part_row rows[PARTS];
@@ -123,7 +165,7 @@ static gbt_status save_report(const compression *c, const gbt_compress_def *def,
     json_t *root = json_pack("{s:i,s:I,s:I,s:I,s:f,s:s,s:o,s:o,s:f,s:f,s:f}", "schema", 1, "anchors", (json_int_t)c->anchors,
                              "bytes_before", (json_int_t)c->before, "bytes", (json_int_t)c->after.total, "bytes_per_anchor",
                              (double)c->after.total / count, "steps_from", c->steps_from, "quality",
-                             def->lossless ? json_null() : json_real(def->quality), "parts", parts, "probe_seconds", c->probe_seconds,
+                             def->lossless || c->kept ? json_null() : json_real(def->quality), "parts", parts, "probe_seconds", c->probe_seconds,
                              "encode_seconds", c->encode_seconds, "decode_seconds", c->decode_seconds);
     const gbt_status status = json_save(root, def->json, err);
     json_decref(root);
@@ -134,15 +176,21 @@ gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char
 {
     if (!def->lossless && !(def->quality >= 20 && def->quality <= 90))
         return base_fail(err, GBT_ERR_ARGUMENT, "quality: wanted 20 to 90 dB, got %g", def->quality);
-    compression c = {.before = size_of_file(run)};
+    compression c = {0};
+    char path[4096];
     bool has_views = false;
+    GBT_TRY(find_model(run, path, sizeof path, err));
     loaded_run *r = mem_calloc(1, sizeof *r, "run", err);
     if (r == NULL)
         return GBT_ERR_NO_MEMORY;
-    gbt_status status = open_run(run, def, r, &has_views, err);
-    if (status == GBT_OK)
+    gbt_status status = keep_small(path, def, out, &c, err);
+    if (status == GBT_OK && !c.kept)
+        status = open_run(run, def, r, &has_views, err);
+    if (status == GBT_OK && !c.kept)
         status = code_run(r, has_views, def, out, &c, err);
-    if (status == GBT_OK && report != NULL)
+    if (status == GBT_OK && report != NULL && c.kept)
+        print_kept(&c, path, out, def->lossless, report);
+    else if (status == GBT_OK && report != NULL)
         print_report(&c, out, report);
     if (status == GBT_OK && def->json != NULL)
         status = save_report(&c, def, err);

@@ -2,6 +2,7 @@
 #include "gbtrace/evaluate.h"
 
 #include <jansson.h>
+#include <string.h>
 
 #include "base/fail.h"
 #include "base/file.h"
@@ -28,23 +29,31 @@ static void log_scores(const evaluation *e)
         log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f%s", e->view_count, e->psnr, e->ssim, e->flip, more);
 }
 
-static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_run *r, gbt_error *err)
+/**
+ * @param own [out] whether the scores are those of the run's own settings: its renderer, size and cut-offs, and its data set, or one that
+ *            stands for it when it has none or its own is gone
+ */
+static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_run *r, bool *own, gbt_error *err)
 {
     GBT_TRY(loaded_run_open(run, def->data, def->downscale, r, err));
     GBT_TRY(loaded_run_preset(def->preset, &r->settings, err));
+    const frame_renderer trained = r->frame.draw.renderer;
     if (def->renderer != NULL && !frame_renderer_named(def->renderer, &r->frame.draw.renderer))
         return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)", def->renderer);
+    const char *data = r->model.data_folder;
+    *own = r->frame.draw.renderer == trained && (def->downscale <= 0 || def->downscale == r->def.downscale) &&
+           (def->preset == NULL || strcmp(def->preset, "default") == 0) &&
+           (def->data == NULL || data[0] == '\0' || !file_exists(data) || file_is_same(def->data, data));
     return GBT_OK;
 }
 
-static gbt_status write_all(const char *run, const gbt_evaluate_def *def, loaded_run *r, const evaluation *e, const json_t *metrics,
+/* What belongs to the run. */
+static gbt_status write_own(const char *run, const gbt_evaluate_def *def, loaded_run *r, const evaluation *e, const json_t *metrics,
                             gbt_error *err)
 {
     char path[4096];
     GBT_TRY(file_join(path, sizeof path, run, "metrics.json", err));
     GBT_TRY(json_save(metrics, path, err));
-    if (def->json != NULL)
-        GBT_TRY(json_save(metrics, def->json, err));
     if (def->report)
         GBT_TRY(report_write(run, e, metrics, &(report_more){.open = r}, err));
     return def->tensorboard ? score_files_events(e, r->model.iterations, run, err) : GBT_OK;
@@ -59,20 +68,30 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
     loaded_run *r = mem_calloc(1, sizeof *r, "run", err);
     if (r == NULL)
         return GBT_ERR_NO_MEMORY;
-    gbt_status status = open_run(run, def, r, err);
+    bool own = false;
+    gbt_status status = open_run(run, def, r, &own, err);
     if (status == GBT_OK && def->lpips != NULL)
         status = lpips_open(def->lpips, &net, err);
     if (status == GBT_OK)
-        status = score_run(r, run, net, &e, err);
+        status = score_run(r, run, own, net, &e, err);
     if (status == GBT_OK) {
         json_t *metrics = score_files_json(&e, run);
         if (def->preset != NULL)
             json_object_set_new(metrics, "preset", json_string(def->preset));
-        status = write_all(run, def, r, &e, metrics, err);
+        if (def->data != NULL)
+            json_object_set_new(metrics, "data", json_text(def->data));
+        if (own)
+            status = write_own(run, def, r, &e, metrics, err);
+        if (status == GBT_OK && def->json != NULL)
+            status = json_save(metrics, def->json, err);
         json_decref(metrics);
     }
     if (status == GBT_OK)
         log_scores(&e);
+    if (status == GBT_OK && !own && def->json != NULL)
+        log_info("other settings than the run's own: these scores are in %s; %s/metrics.json and report.html stay", def->json, run);
+    else if (status == GBT_OK && !own)
+        log_info("other settings than the run's own: %s/metrics.json and report.html stay; --json FILE keeps these scores", run);
     lpips_close(net);
     mem_free(e.views);
     loaded_run_close(r);

@@ -35,6 +35,7 @@ static gbt_status find_input(const char *input, result_folder *out, gbt_error *e
                              input);
         return GBT_OK;
     }
+    GBT_TRY(scaffold_file_check_name(input, err));
     return snprintf(out->ply, sizeof out->ply, "%s", input) < (int)sizeof out->ply
                ? GBT_OK
                : base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", input);

@@ -6,11 +6,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "anchor/init.h"
 #include "base/compare.h"
 #include "base/fail.h"
+#include "base/file.h"
 #include "base/memory.h"
 #include "bvh/points.h"
 #include "data/json_out.h"
@@ -36,12 +36,6 @@ static int choose(const char *what, const char *text, const char *a, const char 
         return 1;
     base_fail(err, GBT_ERR_ARGUMENT, "%s: wanted %s or %s, got %.80s", what, a, b, text != NULL ? text : "nothing");
     return -1;
-}
-
-static bool is_same_file(const char *a, const char *b)
-{
-    struct stat first, second;
-    return stat(a, &first) == 0 && stat(b, &second) == 0 && first.st_dev == second.st_dev && first.st_ino == second.st_ino;
 }
 
 /* ---- a row per anchor --------------------------------------------------------------------------------------------------------- */
@@ -263,9 +257,9 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
         return GBT_ERR_ARGUMENT;
     if (!(def->voxel_size >= 0.0f && isfinite(def->voxel_size)))
         return base_fail(err, GBT_ERR_ARGUMENT, "voxel size: wanted a finite number >= 0, got %g", (double)def->voxel_size);
-    if (is_same_file(data, out_ply) || (json_path != NULL && (is_same_file(data, json_path) || strcmp(out_ply, json_path) == 0)))
+    if (file_is_same(data, out_ply) || (json_path != NULL && (file_is_same(data, json_path) || strcmp(out_ply, json_path) == 0)))
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (the output must be another file)",
-                         is_same_file(data, out_ply) ? out_ply : json_path);
+                         file_is_same(data, out_ply) ? out_ply : json_path);
     scene s;
     anchors a = {0};
     balls b = {0};

@@ -11,6 +11,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 
+/* Pictures go into `folder`; NULL: none. */
 static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, const char *folder, view_score *score, gbt_error *err)
 {
     const scene_view *view = &r->scene.views[index];
@@ -32,11 +33,11 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
     score->masked = valid != NULL;
     if (status == GBT_OK && net != NULL) /* of the half that is scored (image_score_photo()) */
         status = lpips_compare(net, render, &photo, valid, r->def.exposure ? render->width / 2 : 0, &score->lpips, err);
-    if (status == GBT_OK)
+    if (status == GBT_OK && folder != NULL)
         status = view_score_paths(score, folder, err);
     const image *const pictures[] = {render, &photo, &error_map};
     const char *const paths[] = {score->render_path, score->photo_path, score->error_path};
-    for (int i = 0; i < 3 && status == GBT_OK; i++)
+    for (int i = 0; i < 3 && status == GBT_OK && folder != NULL; i++)
         status = image_write(paths[i], pictures[i], err);
     mem_free(valid);
     image_free(&photo);
@@ -44,11 +45,12 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
     return status;
 }
 
-gbt_status score_run(loaded_run *r, const char *run, const lpips *net, evaluation *e, gbt_error *err)
+gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips *net, evaluation *e, gbt_error *err)
 {
     char folder[4096];
     GBT_TRY(file_join(folder, sizeof folder, run, "renders/test", err));
-    GBT_TRY(file_make_folder(folder, err));
+    if (pictures)
+        GBT_TRY(file_make_folder(folder, err));
     size_t scored = 0;
     e->views = mem_calloc(r->scene.view_count + 1, sizeof *e->views, "view scores", err);
     if (e->views == NULL)
@@ -60,7 +62,7 @@ gbt_status score_run(loaded_run *r, const char *run, const lpips *net, evaluatio
         if (!r->scene.views[i].is_test)
             continue;
         view_score *v = &e->views[e->view_count];
-        GBT_TRY(score_view(r, i, net, folder, v, err));
+        GBT_TRY(score_view(r, i, net, pictures ? folder : NULL, v, err));
         log_count("score", ++e->view_count, wanted, v->psnr);
         e->masked = e->masked || v->masked;
         e->gaussians_per_view += (double)v->gaussians;

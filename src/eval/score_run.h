@@ -7,11 +7,12 @@
 #include "report/scores.h"
 
 /**
- * Render and score every held-out view; renders, photos and FLIP maps go to RUN/renders/test.
+ * Render and score every held-out view.
  *
+ * @param pictures [in] write renders, photos and FLIP maps into RUN/renders/test
  * @param net [in] optional (NULL): LPIPS too
  * @param e   [out] start from {0}; free e->views with mem_free() after success or failure; means are NaN without views
  */
-gbt_status score_run(loaded_run *r, const char *run, const lpips *net, evaluation *e, gbt_error *err);
+gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips *net, evaluation *e, gbt_error *err);
 
 #endif

@@ -140,6 +140,13 @@ bool model_is_coded(const container *c)
     return container_section_named(c, "coded.shape") != NULL;
 }
 
+bool model_is_coarse(const container *c)
+{
+    uint32_t shape[SHAPE_NUMBERS];
+    return model_is_coded(c) && container_get(c, "coded.shape", CONTAINER_U32, SHAPE_NUMBERS, shape, NULL) == GBT_OK &&
+           shape[SHAPE_FORM] == FORM_COARSE;
+}
+
 static gbt_status check_shape(const char *path, const uint32_t shape[SHAPE_NUMBERS], size_t bytes, gbt_error *err)
 {
     if (shape[SHAPE_FORM] != FORM_COARSE && shape[SHAPE_FORM] != FORM_LOSSLESS)

@@ -51,8 +51,9 @@ void model_add_coded(container_writer *w, const model_coded *coded);
 
 void model_coded_free(model_coded *coded);
 
-/** Are the anchors and networks in `c` coded? */
+/** Are the anchors and networks in `c` coded, and are they coarse? */
 bool model_is_coded(const container *c);
+bool model_is_coarse(const container *c);
 
 /** Anchors, pixels and networks' parameters of a coded model. GBT_ERR_FORMAT for anything that model_code() did not write; `out` is then to
     be freed. */

@@ -133,6 +133,26 @@ static gbt_status check_bytes(const char *path, const unsigned char *bytes, size
     return status;
 }
 
+static model_sizes sizes_of(const uint32_t part_bytes[CODE_PARTS], size_t total)
+{
+    return (model_sizes){.positions = part_bytes[CODE_POSITIONS],
+                         .features = part_bytes[CODE_FEATURES],
+                         .offsets = part_bytes[CODE_OFFSETS],
+                         .scales = part_bytes[CODE_SCALES],
+                         .pixels = part_bytes[CODE_PIXELS],
+                         .networks = part_bytes[CODE_NETWORKS],
+                         .steps = part_bytes[CODE_DOUBLINGS] + part_bytes[CODE_RULES],
+                         .total = total};
+}
+
+gbt_status model_sizes_read(const container *c, size_t total, model_sizes *out, gbt_error *err)
+{
+    uint32_t part_bytes[CODE_PARTS];
+    GBT_TRY(container_get(c, "coded.parts", CONTAINER_U32, CODE_PARTS, part_bytes, err));
+    *out = sizes_of(part_bytes, total);
+    return GBT_OK;
+}
+
 gbt_status model_save_coded(const char *path, const model *m, const model_steps *steps, model_sizes *sizes, gbt_error *err)
 {
     const char *called = path != NULL ? path : "coded model";
@@ -153,14 +173,7 @@ gbt_status model_save_coded(const char *path, const model *m, const model_steps 
     if (status == GBT_OK && path != NULL)
         status = file_write_atomic(path, bytes, byte_count, err);
     if (status == GBT_OK && sizes != NULL)
-        *sizes = (model_sizes){.positions = coded.part_bytes[CODE_POSITIONS],
-                               .features = coded.part_bytes[CODE_FEATURES],
-                               .offsets = coded.part_bytes[CODE_OFFSETS],
-                               .scales = coded.part_bytes[CODE_SCALES],
-                               .pixels = coded.part_bytes[CODE_PIXELS],
-                               .networks = coded.part_bytes[CODE_NETWORKS],
-                               .steps = coded.part_bytes[CODE_DOUBLINGS] + coded.part_bytes[CODE_RULES],
-                               .total = byte_count};
+        *sizes = sizes_of(coded.part_bytes, byte_count);
     container_writer_free(&w);
     model_coded_free(&coded);
     model_free(&back);

@@ -37,6 +37,9 @@ typedef struct model_sizes {
 
 struct model_steps;
 
+/** Of the coded model in a file of `total` bytes. GBT_ERR_FORMAT when it is none. */
+gbt_status model_sizes_read(const container *c, size_t total, model_sizes *out, gbt_error *err);
+
 /**
  * Save in one of the two small forms (docs/compression.md), then as model_save(). What the file gives back is compared with what it should
  * before anything is written.

@@ -155,18 +155,43 @@ static gbt_status parse_network(const source_file *file, size_t outputs, network
     return check_shape(file->name, "2.bias", &out->b2, 1, outputs, err);
 }
 
+#define BY_PYTHON "python3 -c \"import torch; from safetensors.torch import save_file; "
+
+/* For the shell, in the folder of the files. `checkpoint`: a file of all networks; NULL: each is in a file of its own. */
+static void conversion(const char *checkpoint, char *out, size_t size)
+{
+    if (checkpoint == NULL)
+        snprintf(out, size, BY_PYTHON "[save_file(torch.jit.load(n + '_mlp.pt', 'cpu').state_dict(), n + '_mlp.safetensors') for n in "
+                                      "('opacity', 'cov', 'color')]\"");
+    else
+        snprintf(out, size, BY_PYTHON "[save_file(v, k + '.safetensors') for k, v in torch.load('%.60s', 'cpu').items()]\"", checkpoint);
+}
+
+gbt_status scaffold_file_check_name(const char *path, gbt_error *err)
+{
+    const size_t length = strlen(path);
+    const bool one = length > 7 && strcmp(path + length - 7, "_mlp.pt") == 0;
+    if (!one && !(length > 3 && strcmp(path + length - 3, ".pt") == 0) && !(length > 4 && strcmp(path + length - 4, ".pth") == 0))
+        return GBT_OK;
+    const char *slash = strrchr(path, '/');
+    char command[320];
+    conversion(one ? NULL : slash != NULL ? slash + 1 : path, command, sizeof command);
+    return base_fail(err, GBT_ERR_FORMAT, "%.120s: files of PyTorch are not read; run this in its folder, then import the folder: %s", path,
+                     command);
+}
+
 static gbt_status load_network(const char *folder, const char *name, size_t outputs, network *out, gbt_error *err)
 {
-    char file_name[64], path[PATH_SIZE], pickle[PATH_SIZE];
+    char file_name[64], path[PATH_SIZE], pickle[PATH_SIZE], checkpoint[PATH_SIZE], command[320];
     snprintf(file_name, sizeof file_name, "%s_mlp.safetensors", name);
     GBT_TRY(file_join(path, sizeof path, folder, file_name, err));
     snprintf(file_name, sizeof file_name, "%s_mlp.pt", name);
     GBT_TRY(file_join(pickle, sizeof pickle, folder, file_name, err));
-    if (!file_exists(path) && file_exists(pickle))
-        return base_fail(err, GBT_ERR_IO,
-                         "%.150s: missing; make it there of the .pt: python3 -c \"import torch; from safetensors.torch import save_file; "
-                         "[save_file(torch.jit.load(n + '_mlp.pt', 'cpu').state_dict(), n + '_mlp.safetensors') for n in ('opacity', "
-                         "'cov', 'color')]\"", path);
+    GBT_TRY(file_join(checkpoint, sizeof checkpoint, folder, "checkpoints.pth", err));
+    if (!file_exists(path) && (file_exists(pickle) || file_exists(checkpoint))) {
+        conversion(file_exists(pickle) ? NULL : "checkpoints.pth", command, sizeof command);
+        return base_fail(err, GBT_ERR_IO, "%.150s: missing; run this in its folder: %s", path, command);
+    }
     source_file file = {.name = path};
     unsigned char *bytes;
     GBT_TRY(file_read(path, &bytes, &file.size, err));
@@ -192,10 +217,13 @@ static void copy_network(const network *from, size_t in, float *to)
 
 static gbt_status read_decoder(const char *folder, int offset_count, decoder *out, gbt_error *err)
 {
-    char bank[PATH_SIZE];
-    GBT_TRY(file_join(bank, sizeof bank, folder, "feature_bank_mlp.pt", err));
-    if (file_exists(bank))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: a feature bank is not supported", bank);
+    static const char *const banks[] = {"feature_bank_mlp.pt", "feature_bank_mlp.safetensors", "mlp_feature_bank.safetensors"};
+    for (size_t i = 0; i < sizeof banks / sizeof *banks; i++) {
+        char bank[PATH_SIZE];
+        GBT_TRY(file_join(bank, sizeof bank, folder, banks[i], err));
+        if (file_exists(bank))
+            return base_fail(err, GBT_ERR_FORMAT, "%s: a feature bank is not supported", bank);
+    }
     network networks[NETWORKS] = {0};
     bool has_distance = false;
     gbt_status status = GBT_OK;

@@ -18,4 +18,11 @@
  */
 gbt_status scaffold_file_read(const char *ply, model *out, size_t *dropped, gbt_error *err);
 
+/**
+ * GBT_ERR_FORMAT for a file of PyTorch (.pt, .pth), saying how to write its networks as .safetensors; GBT_OK for any other name.
+ *
+ * Scaffold-GS saves three TorchScript files NAME_mlp.pt, or one checkpoint, a dictionary of the three networks.
+ */
+gbt_status scaffold_file_check_name(const char *path, gbt_error *err);
+
 #endif

@@ -204,6 +204,9 @@ prints "info of a made scene" '^  photos    4 found, 0 unreadable, 32 x 24 pixel
 # ---- meshes among the Gaussians of a tiny run
 "$program" train made -o tiny --iterations 2 --eval-split none >out 2>err
 report $? "a tiny run" "$(cat err)"
+[ "$(tail -n 2 out)" = "Report: tiny/report.html
+Viewer: gbtrace view tiny" ]
+report $? "its last lines say what to look at" "$(cat out)"
 printf '{"origin": [0, -2, -3], "target": [0, 0, 0], "up": [0, -1, 0], "fov_x_deg": 50, "width": 24, "height": 16}' >c.json
 printf 'v -50 -50 -1\nv 50 -50 -1\nv 0 50 -1\nf 1 2 3\n' >wall.obj
 insert() { # objects and light
@@ -355,8 +358,27 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
         head -c 500 pictures/*.$name.exr 2>err | tr -c 'A-Za-z' ' ' | grep -q "channels chlist *[A-Za-z ]*$channels .*compression"
         report $? "channels of $name" "$(head -c 300 pictures/*.$name.exr | tr -c 'A-Za-z0-9' ' ')"
     done
-    "$program" eval run --preset fast >out 2>err && [ "$(grep -c '^  "preset": "fast"' run/metrics.json)" = 1 ]
-    report $? "eval says with which preset it scored" "$(cat err)"
+    find run -type f -exec cksum {} + | sort >before
+    for other in '--preset fast' '--renderer raster' '--downscale 2' "--data moved"; do
+        rm -rf moved && cp -r made moved
+        "$program" eval run $other >out 2>err && grep -q -F 'run/metrics.json and report.html stay; --json FILE keeps these scores' err &&
+            "$program" eval run $other --json other.json >out 2>err && grep -q 'these scores are in other.json; ' err &&
+            find run -type f -exec cksum {} + | sort | cmp -s - before
+        report $? "eval $other changes nothing in the run" "$(cat err; find run -newer before)"
+        if [ "$other" = '--preset fast' ]; then
+            [ "$(grep -c '^  "preset": "fast"' other.json)" = 1 ]
+            report $? "eval says with which preset it scored" "$(cat other.json)"
+        fi
+    done
+    sed -i 's/"psnr": [0-9.]*/"psnr": 1/' run/metrics.json
+    for same in '--preset default' '--renderer trace' '--downscale 1' '--data ./made'; do
+        cp run/metrics.json scores
+        "$program" eval run $same >out 2>err && ! cmp -s scores run/metrics.json && ! grep -q stay err
+        report $? "eval $same is the run's own setting" "$(cat err)"
+    done
+    mv made gone && "$program" eval run --data moved >out 2>err && [ "$(grep -c '^  "data": "moved"' run/metrics.json)" = 1 ]
+    report $? "a data set that moved stands for the run's own" "$(cat err)"
+    mv gone made
     "$program" compress run -o small.gbt --json small.json >out 2>err && "$program" compress small.gbt -o same.gbt --lossless >>out 2>>err &&
         [ "$(wc -c <small.gbt)" -lt "$(wc -c <run/model.gbt)" ] && grep -q '"steps_from": "training views"' small.json &&
         [ "$("$program" info small.gbt | grep anchors)" = "$("$program" info run/model.gbt | grep anchors)" ] &&
@@ -365,6 +387,19 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "a small model is read as a large one, and keeps every bit without loss" "$(cat err out)"
     "$program" train made -o run-small --iterations 3 >out 2>err && cmp -s small.gbt run-small/model.gbt
     report $? "train leaves the small model, unless it shall be lossless" "$(cat err out)"
+    rm -rf made.hidden && mv made made.hidden # a copy needs no data set
+    "$program" compress run-small -o copy.gbt --json copy.json >out 2>err && [ ! -s err ] && cmp -s copy.gbt small.gbt && grep -q '"steps_from": "already small"' copy.json &&
+        [ "$(head -n 1 out | sed 's/[0-9][0-9.]*/N/g')" = "run-small/model.gbt: already small: N anchors, N bytes, N bytes per anchor; copy.gbt is a copy" ] &&
+        [ "$(grep -A 99 parts copy.json | grep -B 99 -m 1 probe | sed '$d')" = "$(grep -A 99 parts small.json | grep -B 99 -m 1 probe | sed '$d')" ]
+    report $? "compress copies what is small already" "$(cat err out copy.json)"
+    mv made.hidden made
+    "$program" compress run-small -o run-small/model.gbt >out 2>err && grep -q '; nothing to do$' out && cmp -s small.gbt run-small/model.gbt
+    report $? "compress of a small model onto itself does nothing" "$(cat err out)"
+    "$program" compress run-small -o smaller.gbt --quality 40 >out 2>err && grep -q ' times smaller, .* (steps: training views)$' out && ! cmp -s smaller.gbt small.gbt
+    report $? "compress codes a small model again at a lower quality" "$(cat err out)"
+    "$program" compress run -o whole.gbt --lossless >out 2>err && "$program" compress whole.gbt -o copy.gbt --lossless >out 2>err && cmp -s whole.gbt copy.gbt &&
+        grep -q 'already small' out && "$program" compress whole.gbt -o quantised.gbt >out 2>err && [ "$(wc -c <quantised.gbt)" -lt "$(wc -c <whole.gbt)" ]
+    report $? "a lossless model is copied without loss only" "$(cat err out)"
     mv made moved && "$program" compress run -o alone.gbt >out 2>err && grep -q '(steps: the model alone)$' out && grep -q '^made is not there: ' err &&
         "$program" info alone.gbt >>out 2>>err
     report $? "a model without its data set becomes small too" "$(cat err out)"

@@ -85,6 +85,63 @@ else
     skip "TensorBoard" "the package tensorboard cannot be had here"
 fi
 
+# ---- files of PyTorch: the command that import names makes what import reads. Stand-ins for torch and safetensors, with the calls it makes.
+mkdir -p stubs/safetensors scaffold && : >stubs/safetensors/__init__.py
+cat >stubs/torch.py <<'END'
+import types
+
+def network(inputs, outputs):
+    return {"0.weight": (32, inputs), "0.bias": (32,), "2.weight": (outputs, 32), "2.bias": (outputs,)}
+
+networks = {"opacity_mlp": network(35, 2), "cov_mlp": network(35, 14), "color_mlp": network(35, 6)}
+
+def load(path, map_location):
+    open(path).close()
+    return networks
+
+def load_script(path, map_location):
+    open(path).close()
+    return types.SimpleNamespace(state_dict=lambda: networks[path[:-len(".pt")]])
+
+jit = types.SimpleNamespace(load=load_script)
+END
+cat >stubs/safetensors/torch.py <<'END'
+import json, math, struct
+
+def save_file(tensors, path):
+    at, header, values = 0, {}, []
+    for name, shape in tensors.items():
+        count = math.prod(shape)
+        header[name] = {"dtype": "F32", "shape": shape, "data_offsets": [at, at + 4 * count]}
+        values += [0.01 * (i % 7) for i in range(count)]
+        at += 4 * count
+    text = json.dumps(header).encode()
+    with open(path, "wb") as file:
+        file.write(struct.pack("<Q", len(text)) + text + struct.pack(f"<{len(values)}f", *values))
+END
+{
+    printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n'
+    awk 'BEGIN { for (i = 0; i < 6; i++) print "property float f_offset_" i
+        for (i = 0; i < 32; i++) print "property float f_anchor_feat_" i
+        for (i = 0; i < 6; i++) print "property float scale_" i
+        print "end_header"
+        for (n = 0; n < 3; n++) for (i = 0; i < 47; i++) printf "%g%s", i * 0.01 + n, i < 46 ? " " : "\n" }'
+} >scaffold/point_cloud.ply
+for file in opacity_mlp.pt checkpoints.pth; do
+    rm -rf imported scaffold/*.pt scaffold/*.pth scaffold/*.safetensors
+    : >scaffold/$file
+    [ $file = checkpoints.pth ] || : >scaffold/cov_mlp.pt >scaffold/color_mlp.pt
+    "$program" import scaffold/$file -o imported >out 2>err
+    [ $? = 3 ] && [ "$(wc -l <err)" = 1 ] && grep -q "^error: scaffold/$file: files of PyTorch are not read; run this in its folder, then import the folder: python3 -c \".*\"$" err
+    report $? "import of $file says how to convert it" "$(cat err)"
+    sed 's/.* folder: python3 -c/python3 -c/' err >command
+    "$program" import scaffold -o imported >out 2>err
+    [ $? = 4 ] && [ "$(sed 's/.* folder: python3 -c/python3 -c/' err)" = "$(cat command)" ]
+    report $? "so does import of its folder" "$(cat err)"
+    (cd scaffold && PYTHONPATH=../stubs sh ../command) >out 2>&1 && "$program" import scaffold -o imported >>out 2>&1 && grep -q '^scaffold/point_cloud.ply: 3 anchors with 2 Gaussians each' out
+    report $? "and the command for $file does" "$(cat command out)"
+done
+
 # ---- the doctor
 "$program" doctor >out 2>err
 code=$?

@@ -281,10 +281,16 @@ static void says_what_is_wrong(void **state)
     write_text("cov_mlp.pt", "");
     refused("torch.jit.load(n + '_mlp.pt', 'cpu')", GBT_ERR_IO);
     unlink(test_path("cov_mlp.pt"));
+    write_text("checkpoints.pth", "");
+    refused("torch.load('checkpoints.pth', 'cpu').items()]\"", GBT_ERR_IO);
+    unlink(test_path("checkpoints.pth"));
     write_network(1);
     write_text("feature_bank_mlp.pt", "");
     refused("a feature bank is not supported", GBT_ERR_FORMAT);
     unlink(test_path("feature_bank_mlp.pt"));
+    write_text("mlp_feature_bank.safetensors", "");
+    refused("mlp_feature_bank.safetensors: a feature bank is not supported", GBT_ERR_FORMAT);
+    unlink(test_path("mlp_feature_bank.safetensors"));
     scaffold.first[2].in = 36 + 32;
     scaffold.first[2].out = 16;
     write_network(2);

@@ -10,9 +10,9 @@
 GBT_API_BEGIN
 
 typedef struct gbt_bench_def {
-    const char *model;  /* plain 3DGS .ply, or a run; required */
-    const char *camera; /* camera file (docs/cameras.md; of an aperture the first sample); required for a .ply, else the first held-out
-                           view */
+    const char *model;  /* plain Gaussians (.ply, .splat, .spz), or a run; required */
+    const char *camera; /* camera file (docs/cameras.md; of an aperture the first sample); required for plain Gaussians, else the first
+                           held-out view */
     int repeats;        /* timed passes after one warm-up; the median is reported. Default 5 */
     int check;          /* 1: compare with the double reference on every 8th pixel in both directions. Default 0 */
     const char *json;   /* where to write the figures; NULL: nowhere */
@@ -38,10 +38,10 @@ gbt_bench_def gbt_bench_def_default(void);
 gbt_status gbt_bench_trace(const gbt_bench_def *def, FILE *out, gbt_error *err);
 
 typedef struct gbt_study_def {
-    const char *const *models; /* plain 3DGS .ply, or runs */
+    const char *const *models; /* plain Gaussians (.ply, .splat, .spz), or runs */
     size_t model_count;        /* 1 to 16 */
-    const char *camera;        /* camera file of every .ply; NULL: the camera.json beside each. Runs: their first held-out view. Default
-                                  NULL */
+    const char *camera;        /* camera file of all plain Gaussians; NULL: the camera.json beside each. Runs: their first held-out view.
+                                  Default NULL */
     int repeats;               /* timed passes of each setting after one warm-up; the median counts. Default 3 */
 } gbt_study_def;
 

@@ -17,10 +17,10 @@ static int run_bench(const command *self, int argc, char **argv)
     bool check = false;
     int threads = 0;
     const option options[] = {
-        {.name = "model", .kind = OPTION_STRING, .value = &def.model, .value_name = "FILE.ply|RUN",
-         .help = "plain 3DGS Gaussians, or a trained run", .required = true},
+        {.name = "model", .kind = OPTION_STRING, .value = &def.model, .value_name = "FILE|RUN",
+         .help = "plain Gaussians (.ply, .splat, .spz), or a trained run", .required = true},
         {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json",
-         .help = "a camera file (docs/cameras.md); needed for a .ply"},
+         .help = "a camera file (docs/cameras.md); needed for plain Gaussians; default: the run's first held-out view"},
         {.name = "alpha-min", .kind = OPTION_FLOAT, .value = &def.alpha_min, .min = 1e-6, .max = 0.999, .value_name = "A",
          .help = "smallest response that counts; default: the run's, else 1/255"},
         {.name = "alpha-max", .kind = OPTION_FLOAT, .value = &def.alpha_max, .min = 1e-6, .max = 0.999999, .value_name = "A",
@@ -55,7 +55,7 @@ static int run_bench(const command *self, int argc, char **argv)
 }
 
 const command command_bench = {.name = "bench", .summary = "time the tracer on given Gaussians",
-                               .usage = "trace --model FILE.ply --camera FILE.json", .run = run_bench, .words = workloads};
+                               .usage = "trace --model FILE|RUN [--camera FILE.json]", .run = run_bench, .words = workloads};
 
 static int run_check_grad(const command *self, int argc, char **argv)
 {

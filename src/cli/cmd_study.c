@@ -55,8 +55,8 @@ static gbt_status run_anchors(const study_request *r, gbt_error *err)
 enum { STUDY_COUNT = 7 };
 
 static const command_word study_words[STUDY_COUNT + 1] = {
-    {"speed", "time per ray against error, for every cut-off, of runs or .ply files"},
-    {"crosscheck", "tracer against rasterizer, and what makes them differ, of runs or .ply files"},
+    {"speed", "time per ray against error, for every cut-off, of runs or plain Gaussians"},
+    {"crosscheck", "tracer against rasterizer, and what makes them differ, of runs or plain Gaussians"},
     {"rate", "file size against picture quality, of runs"},
     {"stability", "the scenes on which renderers of Gaussians are known to fail; takes no model"},
     {"paper", "the paper's four tables, by training on data sets"},
@@ -87,7 +87,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &request.folder, .value_name = "DIR",
          .help = "folder for the tables and the chart", .required = true},
         {.name = "camera", .kind = OPTION_STRING, .value = &def->camera, .value_name = "FILE.json",
-         .help = "the camera of every .ply; default: camera.json beside it"},
+         .help = "speed, crosscheck: the camera of files of plain Gaussians; default: camera.json beside each"},
         {.name = "repeats", .kind = OPTION_INT, .value = &def->repeats, .min = 1, .max = 1000, .value_name = "N",
          .help = "speed: timed passes of each setting; the median counts"},
         {.name = "only", .kind = OPTION_STRING, .value = &request.stability.only, .value_name = "A1,A9",

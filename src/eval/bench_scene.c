@@ -5,7 +5,9 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/file.h"
 #include "base/memory.h"
+#include "data/gaussian_file.h"
 #include "data/gaussian_ply.h"
 
 /* Colour of a 3DGS Gaussian from its centre's direction: degree 0 only, so that the workload is tracing and nothing else. */
@@ -31,16 +33,19 @@ static gbt_status gaussians_from_ply(const char *path, gaussians *out, gbt_error
     return status;
 }
 
-bool bench_scene_is_ply(const char *path)
+static bool is_ply(const char *path)
 {
     const size_t length = strlen(path);
     return length > 4 && strcmp(path + length - 4, ".ply") == 0;
 }
 
+bool bench_scene_needs_camera(const char *path)
+{
+    return gaussian_file_readable(path) && !file_is_folder(path);
+}
+
 static gbt_status open_ply(const char *path, const char *camera, bench_scene *out, gbt_error *err)
 {
-    if (camera == NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--camera: missing (a .ply has no cameras)");
     GBT_TRY(gaussians_from_ply(path, &out->from_ply, err));
     out->gaussians = &out->from_ply;
     out->settings = trace_settings_default();
@@ -70,7 +75,9 @@ static gbt_status open_run(const char *path, const char *camera, bench_scene *ou
 
 gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *out, gbt_error *err)
 {
-    return bench_scene_is_ply(path) ? open_ply(path, camera, out, err) : open_run(path, camera, out, err);
+    if (camera == NULL && bench_scene_needs_camera(path))
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.300s: plain Gaussians know no cameras (wanted --camera FILE.json)", path);
+    return is_ply(path) ? open_ply(path, camera, out, err) : open_run(path, camera, out, err);
 }
 
 gbt_status bench_scene_decode(bench_scene *s, gbt_error *err)

@@ -18,9 +18,9 @@ typedef struct bench_scene {
 /**
  * Open a model and find its camera.
  *
- * @param path   [in] plain 3DGS .ply (colour: its degree 0), or a run
+ * @param path   [in] plain Gaussians (.ply: the colours of degree 0), or a run
  * @param camera [in] camera file, of an aperture the first sample; NULL: the run's first held-out view
- * @return GBT_OK, GBT_ERR_ARGUMENT (a .ply without a camera), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (plain Gaussians without a camera), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */
 gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *out, gbt_error *err);
 
@@ -29,7 +29,7 @@ gbt_status bench_scene_decode(bench_scene *s, gbt_error *err);
 
 void bench_scene_close(bench_scene *s);
 
-/** Whether a model is a .ply, by its name. */
-bool bench_scene_is_ply(const char *path);
+/** Whether a model is one file of plain Gaussians (.ply, .splat, .spz), which knows no camera. */
+bool bench_scene_needs_camera(const char *path);
 
 #endif

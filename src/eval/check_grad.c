@@ -438,7 +438,11 @@ gbt_status gbt_check_grad(const char *run, FILE *out, gbt_error *err)
     if (loaded == NULL)
         return GBT_ERR_NO_MEMORY;
     checker c = {.run = loaded, .frame = &loaded->frame, .out = out};
-    gbt_status status = loaded_run_open(run, NULL, 0, loaded, err);
+    gbt_status status = loaded_run_open_model(run, loaded, err);
+    if (status == GBT_OK)
+        status = loaded_run_need_anchors(loaded, run, err);
+    if (status == GBT_OK)
+        status = loaded_run_open_views(run, NULL, 0, loaded, err);
     if (status == GBT_OK)
         status = set_up(&c, err);
     if (status == GBT_OK)

@@ -298,14 +298,14 @@ static gbt_status measure_model(const gbt_study_def *def, size_t i, const char *
 {
     char camera[4096];
     bench_scene s = {0};
-    const bool is_ply = bench_scene_is_ply(def->models[i]);
+    const bool is_plain = bench_scene_needs_camera(def->models[i]);
     study_model_name(def->models[i], out->name, sizeof out->name);
-    if (is_ply)
+    if (is_plain)
         GBT_TRY(study_model_camera(def->models[i], def->camera, camera, sizeof camera, err));
-    gbt_status status = bench_scene_open(def->models[i], is_ply ? camera : NULL, &s, err);
-    if (status == GBT_OK && is_ply && s.camera.shot.given != NULL)
+    gbt_status status = bench_scene_open(def->models[i], is_plain ? camera : NULL, &s, err);
+    if (status == GBT_OK && is_plain && s.camera.shot.given != NULL)
         status = base_fail(err, GBT_ERR_ARGUMENT, "%.200s: given rays have no projection (wanted a camera)", camera);
-    if (status == GBT_OK && is_ply) {
+    if (status == GBT_OK && is_plain) {
         const ray_shot shot = s.camera.shot;
         status = measure_shot(&s, &shot, "camera", folder, out, err);
     } else if (status == GBT_OK)

@@ -104,7 +104,11 @@ static gbt_status measure_model(const char *run, const char *path, rate_model *o
     loaded_run *r = mem_calloc(1, sizeof *r, "run", err);
     if (r == NULL)
         return GBT_ERR_NO_MEMORY;
-    gbt_status status = loaded_run_open(run, NULL, 0, r, err);
+    gbt_status status = loaded_run_open_model(run, r, err);
+    if (status == GBT_OK)
+        status = loaded_run_need_anchors(r, run, err);
+    if (status == GBT_OK)
+        status = loaded_run_open_views(run, NULL, 0, r, err);
     if (status == GBT_OK)
         status = model_save(path, &r->model, err);
     if (status == GBT_OK) {

@@ -296,11 +296,11 @@ gbt_study_def gbt_study_def_default(void)
 static gbt_status measure_model(const gbt_study_def *def, size_t i, speed_model *out, gbt_error *err)
 {
     char camera[4096];
-    const bool is_ply = bench_scene_is_ply(def->models[i]);
+    const bool is_plain = bench_scene_needs_camera(def->models[i]);
     study_model_name(def->models[i], out->name, sizeof out->name);
-    if (is_ply)
+    if (is_plain)
         GBT_TRY(study_model_camera(def->models[i], def->camera, camera, sizeof camera, err));
-    return measure_path(def->models[i], is_ply ? camera : NULL, def->repeats, out, err);
+    return measure_path(def->models[i], is_plain ? camera : NULL, def->repeats, out, err);
 }
 
 gbt_status gbt_study_speed(const gbt_study_def *def, const char *folder, FILE *out, gbt_error *err)

@@ -320,7 +320,17 @@ prints "bench with a preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001, prox
 prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.001, proxy radius 2; medians of 1$' $bench --preset fast --alpha-min 0.05 --alpha-max 0.9 --proxy-radius 2
 misuse 2 '--kernel: "tile,tile" (wanted tile, single or embree, or some of them with commas between)' $bench --kernel tile,tile
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
-misuse 2 "--camera: missing (a .ply has no cameras)" bench trace --model gaussians.ply
+misuse 2 "gaussians.ply: plain Gaussians know no cameras (wanted --camera FILE.json)" bench trace --model gaussians.ply
+mkdir alone && cp gaussians.ply alone && "$program" export gaussians.ply alone/gaussians.splat >out 2>err
+for study in speed crosscheck; do
+    for file in alone/gaussians.ply alone/gaussians.splat; do
+        misuse 2 "$file: plain Gaussians know no cameras (wanted --camera FILE.json, or camera.json beside it)" study $study $file -o study
+    done
+done
+misuse 2 "gaussians.ply: plain Gaussians, no anchors (wanted a run or its model.gbt)" study rate gaussians.ply -o study
+misuse 2 "gaussians.ply: plain Gaussians, no anchors (wanted a run or its model.gbt)" check-grad gaussians.ply
+rm -rf study
+prints "bench of other plain Gaussians" '^forward, core-us/ray' bench trace --model alone/gaussians.splat --camera camera.json --repeats 1
 misuse 2 'study: "pace" (wanted speed, crosscheck, rate, stability, paper, time or anchors; did you mean rate?)' study pace gaussians.ply -o study
 misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study zzzzzz gaussians.ply -o study
 misuse 2 'bench: "tarce" (wanted trace; did you mean trace?)' bench tarce --model gaussians.ply
@@ -334,6 +344,8 @@ misuse 2 "study: two data sets are called made; their runs would share a folder"
 got=$?
 [ "$got" = 0 ] && [ "$(grep -c '^| preset | [a-z]* | [0-9.]* | [0-9.]* | [0-9.]* | [0-9.]* | [0-9]* | [0-9.]* | [0-9.e-]* | n/a |$' out)" = 3 ] && cmp -s out study/speed.md
 report $? "study prints its table" "  got $got: $(cat err out)"
+"$program" study crosscheck alone/gaussians.splat --camera camera.json -o study-splat >out 2>err && [ "$(grep -c '"pass": true' study-splat/crosscheck.json)" -ge 6 ]
+report $? "study of other plain Gaussians" "$(cat err out)"
 [ "$(grep -c '^"gaussians.ply",' study/speed.csv)" -ge 24 ] && [ "$(grep -c '"knob": ' study/speed.json)" -ge 21 ] &&
     [ "$(grep -c '<svg xmlns' study/speed.svg)" = 1 ] && [ "$(grep -o '>exact</text>' study/speed.html | wc -l)" = 1 ]
 report $? "study writes data and charts" "$(ls -l study)"

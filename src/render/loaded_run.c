@@ -59,6 +59,7 @@ static gbt_status open_cloud(const char *path, loaded_run *out, gbt_error *err)
 static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
 {
     char path[4096];
+    GBT_TRY(gaussian_file_check_readable(run, err));
     if (gaussian_file_readable(run))
         return open_cloud(run, out, err);
     if (file_is_folder(run))

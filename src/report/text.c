@@ -95,22 +95,20 @@ static size_t utf8_length(const unsigned char *s)
     return length;
 }
 
-void text_escaped(text *t, const char *outside)
+static void add_outside(text *t, const char *outside, bool markup)
 {
+    static const struct { char c; const char *escaped; } special[] = {
+        {'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}};
     if (outside == NULL)
         outside = "n/a";
     for (const unsigned char *s = (const unsigned char *)outside; *s != '\0';) {
         const size_t length = utf8_length(s);
-        if (*s == '&')
-            text_add(t, "&amp;");
-        else if (*s == '<')
-            text_add(t, "&lt;");
-        else if (*s == '>')
-            text_add(t, "&gt;");
-        else if (*s == '"')
-            text_add(t, "&quot;");
-        else if (*s == '\'')
-            text_add(t, "&#39;");
+        const char *escaped = !markup && *s == '|' ? "\\|" : NULL;
+        for (size_t i = 0; markup && i < sizeof special / sizeof *special; i++)
+            if (*s == (unsigned char)special[i].c)
+                escaped = special[i].escaped;
+        if (escaped != NULL)
+            text_add(t, escaped);
         else if (length == 0)
             text_add(t, "\xef\xbf\xbd");
         else if (*s < 0x20 || *s == 0x7f)
@@ -119,6 +117,16 @@ void text_escaped(text *t, const char *outside)
             add_bytes(t, (const char *)s, length);
         s += length > 0 ? length : 1;
     }
+}
+
+void text_escaped(text *t, const char *outside)
+{
+    add_outside(t, outside, true);
+}
+
+void text_plain(text *t, const char *outside)
+{
+    add_outside(t, outside, false);
 }
 
 void text_url(text *t, const char *name)

@@ -34,6 +34,10 @@ void text_format(text *t, const char *format, ...) __attribute__((format(printf,
  * NULL is "n/a".
  */
 void text_escaped(text *t, const char *outside);
+
+/** The same for tables in Markdown, which terminals show too: only | is escaped. */
+void text_plain(text *t, const char *outside);
+
 /** A file name as part of a link: what is not a letter, a digit or one of -._~/ becomes %XX. */
 void text_url(text *t, const char *name);
 

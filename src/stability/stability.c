@@ -29,7 +29,7 @@ void stability_table(const stability_study *study, text *out)
     text_add(out, "| row | what is measured | limit | gbtrace | within | rasterizer (3DGS) |\n|---|---|---|---|---|---|\n");
     for (size_t i = 0; i < study->row_count; i++) {
         const stability_row *row = &study->rows[i];
-        text_format(out, "| %s | %s | %s ", row->id, row->quantity, row->at_least ? "&ge;" : "&le;");
+        text_format(out, "| %s | %s | %s ", row->id, row->quantity, row->at_least ? ">=" : "<=");
         add_figure(out, row->limit);
         text_add(out, " | ");
         add_figure(out, row->value);

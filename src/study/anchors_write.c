@@ -85,7 +85,7 @@ void anchors_tables(const anchors_study *s, text *out)
                 (int)PAPER_BYTES_PER_ANCHOR);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         text_add(out, "\n## ");
-        text_escaped(out, s->grid.names[scene]);
+        text_plain(out, s->grid.names[scene]);
         text_add(out, "\n\n| start |");
         for (int f = 0; f < FIGURES; f++)
             text_format(out, " %s |", figure_texts[f].title);

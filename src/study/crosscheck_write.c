@@ -51,7 +51,7 @@ static void add_view_table(const cross_model *model, const cross_view *v, text *
     add_error_row(out, "EWA form", &v->splat, NULL);
     text_add(out, "\n| row | limit | value | pass |\n|---|---|---|---|\n");
     for (size_t i = 0; i < CROSS_CHECKS; i++)
-        text_format(out, "| %s | &ge; %g | %.5g | %s |\n", v->checks[i].row, v->checks[i].limit, v->checks[i].value,
+        text_format(out, "| %s | >= %g | %.5g | %s |\n", v->checks[i].row, v->checks[i].limit, v->checks[i].value,
                     passes(&v->checks[i]) ? "yes" : "**NO**");
 }
 

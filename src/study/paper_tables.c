@@ -38,7 +38,7 @@ static void add_figures(const paper_study *s, int table, text *out)
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         for (size_t v = 0; v < variant_count; v++) {
             text_add(out, "| ");
-            text_escaped(out, s->grid.names[scene]);
+            text_plain(out, s->grid.names[scene]);
             text_add(out, " | ");
             text_count(out, paper_run(s, scene, variants[v], 0)->points);
             text_format(out, " | %s |", row_name(table, variants[v]));
@@ -115,7 +115,7 @@ static void add_changes(const paper_study *s, int table, text *out)
     text_add(out, "\n| change | of |");
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         text_add(out, " ");
-        text_escaped(out, s->grid.names[scene]);
+        text_plain(out, s->grid.names[scene]);
         text_add(out, " |");
     }
     text_add(out, " all | the paper | its scenes | all against the paper |\n|---|---|");
@@ -135,7 +135,7 @@ static void add_scenes(const paper_study *s, text *out)
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         const paper_scene *p = &s->scenes[scene];
         text_add(out, "| ");
-        text_escaped(out, s->grid.names[scene]);
+        text_plain(out, s->grid.names[scene]);
         text_format(out, p->tree_depth < INT_MAX ? " | %d |" : " | n/a |", p->tree_depth);
         text_format(out, " %.3f |\n", p->scale_constant);
     }

@@ -98,7 +98,7 @@ void time_tables(const time_study *s, text *out)
                   "of half the budget has more than the mark at half. Each run but the first two leaves one choice of the default out.\n");
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         text_add(out, "\n## ");
-        text_escaped(out, s->grid.names[scene]);
+        text_plain(out, s->grid.names[scene]);
         text_add(out, "\n\n");
         add_curves(s, scene, out);
         add_variants(s, scene, out);

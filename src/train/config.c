@@ -1,6 +1,7 @@
 /* train/config.c -- the settings of a run to text and back. */
 #include "train/config.h"
 
+#include <float.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,19 +9,33 @@
 
 #include "base/fail.h"
 
+/* As many digits, at least 6, as read back as the same number: 0.7, not 0.69999999999999996. */
+static const char *shortest(double value, char *out, size_t size)
+{
+    for (int digits = 6; digits <= DBL_DECIMAL_DIG; digits++) {
+        snprintf(out, size, "%.*g", digits, value);
+        if (strtod(out, NULL) == value)
+            break;
+    }
+    return out;
+}
+
+#define SHORT(value) shortest(value, (char[32]){0}, 32)
+
 void config_text(const gbt_train_def *d, const char *data, char *out, size_t size)
 {
     snprintf(out, size,
-             "data = %s\ninit = %s\ninit-count = %.17g\nscale-prior = %s\nmax-depth = %d\nvoxel-size = %.9g\noffsets = %d\ndistance = "
+             "data = %s\ninit = %s\ninit-count = %s\nscale-prior = %s\nmax-depth = %d\nvoxel-size = %.9g\noffsets = %d\ndistance = "
              "%s\niterations = %llu\n"
-             "budget-seconds = %.17g\npace = %s\ndownscale = %.17g\nrenderer = %s\nfootprint = %.17g\nnear = %.17g\nstart-level = %d\n"
+             "budget-seconds = %s\npace = %s\ndownscale = %s\nrenderer = %s\nfootprint = %s\nnear = %s\nstart-level = %d\n"
              "eval-split = %s\nalpha = %s\nseed = %llu\nmax-anchors = %zu\n"
-             "grow = %d\nthrift = %.17g\nlast-thrift = %.17g\ncompat = %d\nexposure = %d\nsplats-until = %.17g\n"
-             "grow-until = %.17g\nscale-factor = %.17g\nlearning-rate = %.17g\n",
-             data, d->init, d->init_count, d->scale_prior, d->max_depth, (double)d->voxel_size, d->offsets, d->distance,
-             (unsigned long long)d->iterations, d->budget_seconds, d->pace != NULL ? d->pace : "", d->downscale, d->renderer, d->footprint,
-             d->near, d->start_level, d->eval_split, d->alpha, (unsigned long long)d->seed, d->max_anchors, d->grow, d->thrift,
-             d->last_thrift, d->compat, d->exposure, d->splats_until, d->grow_until, d->scale_factor, d->learning_rate_factor);
+             "grow = %d\nthrift = %s\nlast-thrift = %s\ncompat = %d\nexposure = %d\nsplats-until = %s\n"
+             "grow-until = %s\nscale-factor = %s\nlearning-rate = %s\n",
+             data, d->init, SHORT(d->init_count), d->scale_prior, d->max_depth, (double)d->voxel_size, d->offsets, d->distance,
+             (unsigned long long)d->iterations, SHORT(d->budget_seconds), d->pace != NULL ? d->pace : "", SHORT(d->downscale),
+             d->renderer, SHORT(d->footprint), SHORT(d->near), d->start_level, d->eval_split, d->alpha, (unsigned long long)d->seed,
+             d->max_anchors, d->grow, SHORT(d->thrift), SHORT(d->last_thrift), d->compat, d->exposure, SHORT(d->splats_until),
+             SHORT(d->grow_until), SHORT(d->scale_factor), SHORT(d->learning_rate_factor));
 }
 
 static void set_string(char *to, size_t size, const char *value, const char **field)

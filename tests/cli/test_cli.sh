@@ -353,7 +353,7 @@ report $? "study writes data and charts" "$(ls -l study)"
 got=$?
 [ "$got" = 0 ] && [ "$(grep -c '^| [a-z-]* | [0-9.]* | [0-9.e-]* | [0-9.]* | [0-9.e-]* |$' out)" = 5 ] && [ "$(grep -c '"pass": true' cross/crosscheck.json)" = 7 ] &&
     grep -q 'dilation' cross/crosscheck.md && grep -q '<svg xmlns' cross/crosscheck.svg && grep -q 'data:image/jpeg' cross/crosscheck.html &&
-    [ -s cross/crosscheck_gaussians.ply_camera.png ]
+    [ -s cross/crosscheck_gaussians.ply_camera.png ] && grep -q '^| .* | >= [0-9]* | .* | yes |$' out && ! grep -q '&' out cross/crosscheck.md
 report $? "study crosscheck: every row within its limit" "  got $got: $(cat err out)"
 
 # ---- what is rendered beside the picture
@@ -425,6 +425,14 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "export bakes a run into every format, and converts" "$(cat err out)"
     "$program" export plain.spz -o named.ply >out 2>err && cmp -s named.ply back.ply
     report $? "export takes -o too" "$(cat err out)"
+    for command in 'info plain.glb' 'view plain.glb' 'render plain.glb -o o' 'export plain.glb back.ply' 'compress plain.glb -o o.gbt'; do
+        misuse 2 "plain.glb: .glb is written for other programs, not read (wanted .ply, .splat, .spz, or a run)" $command
+    done
+    for file in plain.ply plain.splat plain.spz; do
+        prints "info of $file" "^$file: plain Gaussians$" info $file
+    done
+    "$program" info run >out 2>err && grep -q '^  config    splats-until = 0.7$' out && ! grep -q '[0-9]\{15\}' out
+    report $? "info writes numbers as people do" "$(cat out err)"
     misuse 2 "argument missing (usage: $("$program" export --help | sed -n 's/^usage: \(.*\) \[options\]$/\1/p'))" export run
     rm -f out # of the row before: an old one would be read as the address
     "$program" view run --port 0 >out 2>err &

@@ -660,6 +660,10 @@ static void escapes(void **state)
         assert_text(&t, cases[i].out);
         text_free(&t);
     }
+    text t = {0};
+    text_plain(&t, "a<b> & \"c\" | d\n\xff");
+    assert_text(&t, "a<b> & \"c\" \\| d \xef\xbf\xbd");
+    text_free(&t);
 }
 
 static void base64(void **state)

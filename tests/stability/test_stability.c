@@ -212,6 +212,8 @@ static void files_of_the_study(void **state)
         assert_true(count > 500);
         if (i < 3)
             assert_null(strstr((const char *)bytes, "nan"));
+        if (i == 1) /* terminals show it too */
+            assert_true(strstr((const char *)bytes, " | <= 0 | ") != NULL && strchr((const char *)bytes, '&') == NULL);
         mem_free(bytes);
         remove(path);
     }

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "bake/backdrop.h"
 #include "bake/bake.h"
 #include "bake/export_folder.h"
 #include "bake/refine.h"
@@ -21,7 +22,7 @@ enum { OUTPUTS_MAX = 8, VIEWS_MAX = 16 };
 
 gbt_export_def gbt_export_def_default(void)
 {
-    return (gbt_export_def){.sh_degree = 3, .refine_steps = 300};
+    return (gbt_export_def){.sh_degree = 3, .refine_steps = 300, .backdrop = true};
 }
 
 /* One output, and what it gives back: PSNR in dB of 8-bit images, means over views. */
@@ -36,7 +37,8 @@ typedef struct exported {
 typedef struct exporting {
     const gbt_export_def *def;
     loaded_run run; /* with `baked` */
-    bool baked;
+    bool baked, backdrop;
+    trace_settings viewer; /* how files are drawn: as other programs do, on black */
     gaussian_cloud clouds[2]; /* with colours of the degree asked for, and with one colour */
     exported files[OUTPUTS_MAX];
     size_t file_count;
@@ -93,6 +95,14 @@ static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
     GBT_TRY(choose_views(e, err));
     memcpy(e->origin, r->model.origin, sizeof e->origin);
     e->frame.draw.footprint = r->frame.draw.footprint;
+    /* Behind photos with an alpha channel is nothing, and what they are laid on is no part of the scene. */
+    e->viewer = r->settings;
+    float laid_on[3];
+    if (scene_background(&r->scene, laid_on))
+        return GBT_OK;
+    const float *behind = r->model.background;
+    e->backdrop = e->def->backdrop && (behind[0] > 0 || behind[1] > 0 || behind[2] > 0);
+    memset(e->viewer.background, 0, sizeof e->viewer.background);
     return GBT_OK;
 }
 
@@ -116,6 +126,8 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
     if (status == GBT_OK)
         status = refine_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count, &r->settings, &refine, out, err);
     e->refine_seconds = clock_wall() - clock;
+    if (status == GBT_OK && e->backdrop)
+        status = backdrop_add(out, cameras, count, r->model.background, err);
     mem_free(cameras);
     return status;
 }
@@ -133,7 +145,7 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
     e->model_to_photo += share * metric_psnr_valid(neural, photo, valid);
     for (size_t i = 0; i < e->file_count; i++) {
         exported *f = &e->files[i];
-        GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &e->run.settings, false, err));
+        GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &e->viewer, false, err));
         image_quantize(shown);
         f->to_model += share * metric_psnr(shown, neural);
         f->to_photo += share * metric_psnr_valid(shown, photo, valid);
@@ -190,7 +202,7 @@ static void say_source(const exporting *e, const gaussian_cloud *cloud, const ch
 {
     fprintf(report, "%s: %zu Gaussians, colours of degree %d", input, cloud->count, cloud->sh_degree);
     if (e->baked)
-        fprintf(report, "; %zu that no training camera sees are left out; baked in %.1f s, refined in %.1f s", e->unseen, e->bake_seconds,
+        fprintf(report, "; %s%zu that no training camera sees are left out; baked in %.1f s, refined in %.1f s", e->backdrop ? "1000 of them the background; " : "", e->unseen, e->bake_seconds,
                 e->refine_seconds);
     else if (cloud->dropped > 0)
         fprintf(report, "; %zu unusable rows dropped", cloud->dropped);
@@ -235,6 +247,7 @@ static void say_file(const exporting *e, const exported *f, FILE *report)
         fprintf(report, "; %zu %s views: %.2f dB to the model", e->view_count, e->held_out ? "held-out" : "training", f->to_model);
         if (!e->run.def.exposure)
             fprintf(report, ", %.2f dB to the photos (the model: %.2f)", f->to_photo, e->model_to_photo);
+        fprintf(report, ", drawn on %s", e->viewer.background[0] > 0 ? "white" : "black");
     }
     fprintf(report, "\n");
 }

@@ -38,9 +38,8 @@ static void put_path(const char *path, char *out, size_t size)
 static gbt_status write_settings(const char *folder, const loaded_run *r, int sh_degree, gbt_error *err)
 {
     char path[PATH_SIZE], source[PATH_SIZE], result[PATH_SIZE], text[3 * PATH_SIZE];
-    bool white = true;
-    for (int c = 0; c < 3; c++)
-        white = white && r->model.background[c] > 0.5f;
+    float laid_on[3] = {0};
+    const bool white = scene_background(&r->scene, laid_on) && laid_on[0] > 0; /* any other background is in the file, or black */
     put_path(r->scene.folder, source, sizeof source);
     put_path(folder, result, sizeof result);
     snprintf(text, sizeof text,

@@ -15,6 +15,8 @@ static int run(const command *self, int argc, char **argv)
          .help = "how colours depend on the direction: spherical harmonics up to this"},
         {.name = "refine", .kind = OPTION_INT, .value = &def.refine_steps, .min = 0, .max = 100000, .value_name = "N",
          .help = "steps that fit the Gaussians to the model's own pictures"},
+        {.name = "no-backdrop", .kind = OPTION_FLAG_OFF, .value = &def.backdrop,
+         .help = "leave out the sphere of Gaussians that is the model's background; viewers then draw black there"},
         {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA",
          .help = "data set in place of the one it was trained on", .aliases = "s source-path"},
         {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the figures there"},

@@ -1,5 +1,6 @@
 /* tests/bake/test_bake.c -- baked models against their networks. */
 #include "anchor/fixture.h"
+#include "bake/backdrop.h"
 #include "bake/bake.h"
 #include "bake/refine.h"
 #include "base/near.h"
@@ -136,6 +137,53 @@ static void same_bits_for_all_threads(void **state)
     gaussian_cloud_free(&first);
 }
 
+/* From any camera, in any direction, pictures on black are those on the background's colour, and what was there stays in front. */
+static void a_backdrop_stands_for_the_background(void **state)
+{
+    (void)state;
+    const float color[3] = {0.75f, 0.5f, 0.125f};
+    world w;
+    make_world(&w, false);
+    bake_result r;
+    bake_world(&w, 3, 0.3, &r);
+    const size_t before = r.cloud.count;
+    gaussian_cloud bare;
+    assert_ok(gaussian_cloud_alloc(&bare, before, NULL));
+    bare.sh_degree = r.cloud.sh_degree;
+    memcpy(bare.mean, r.cloud.mean, 3 * before * sizeof(float));
+    memcpy(bare.scale_log, r.cloud.scale_log, 3 * before * sizeof(float));
+    memcpy(bare.quat, r.cloud.quat, 4 * before * sizeof(float));
+    memcpy(bare.opacity, r.cloud.opacity, before * sizeof(float));
+    memcpy(bare.sh, r.cloud.sh, before * GAUSSIAN_SH_COUNT * 3 * sizeof(float));
+    assert_ok(backdrop_add(&r.cloud, w.cameras, CAMERAS, color, NULL));
+    assert_int_equal(r.cloud.count, before + BACKDROP_COUNT);
+    frame with = {0}, without = {0};
+    trace_settings on_color = w.s;
+    memcpy(on_color.background, color, sizeof color);
+    for (int i = 0; i < 24; i++) { /* the last twelve look away from the Gaussians, half of them upward */
+        gbt_camera camera = ring_camera(i % 12);
+        if (i >= 12) {
+            for (int k = 0; k < 3; k++)
+                camera.rotation[6 + k] = -camera.rotation[6 + k], camera.rotation[3 + k] = -camera.rotation[3 + k];
+            if (i % 2 == 0) /* a quarter turn about the picture's x axis */
+                for (int k = 0; k < 3; k++) {
+                    const double y = camera.rotation[3 + k], z = camera.rotation[6 + k];
+                    camera.rotation[3 + k] = z, camera.rotation[6 + k] = -y;
+                }
+        }
+        assert_ok(frame_render(&with, frame_plain(&r.cloud), &camera, &w.s, false, NULL));
+        assert_ok(frame_render(&without, frame_plain(&bare), &camera, &on_color, false, NULL));
+        for (size_t p = 0; p < 3 * (size_t)camera.width * (size_t)camera.height; p++)
+            if (!(fabsf(with.rgb.pixels[p] - without.rgb.pixels[p]) < 1.0f / 255))
+                fail_msg("camera %d, value %zu: %g, on the colour %g", i, p, (double)with.rgb.pixels[p], (double)without.rgb.pixels[p]);
+    }
+    frame_free(&with);
+    frame_free(&without);
+    gaussian_cloud_free(&bare);
+    gaussian_cloud_free(&r.cloud);
+    free_world(&w);
+}
+
 static void refusals(void **state)
 {
     (void)state;
@@ -160,6 +208,7 @@ int main(void)
         cmocka_unit_test(nothing_is_lost_without_directions),
         cmocka_unit_test(more_functions_and_steps_come_nearer),
         cmocka_unit_test(same_bits_for_all_threads),
+        cmocka_unit_test(a_backdrop_stands_for_the_background),
         cmocka_unit_test(refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -63,7 +63,14 @@ static inline m16 row_remains(const packet_rows *p, int row, float horizon)
     return m16_and(m16_and(f16_le(f16_set1(horizon), t), f16_lt(t, f16_set1(INFINITY))), p->alive);
 }
 
-/* Write the rows that are done to the tape, in order; keep the others. */
+static bool close_row(const packet_rows *p, int row, int packet, hit_tape *tape, kernel_counters *counters)
+{
+    counters->blended += (uint64_t)__builtin_popcount(p->blended[row]);
+    return tape == NULL || p->blended[row] == 0 || tape_add(tape, (tape_entry){p->id[row], p->blended[row], (uint16_t)packet});
+}
+
+/* Write the rows that are done to the tape, nearly in order; keep the others. A row of which nothing lies before the horizon is done, too,
+   when an earlier round blended a part of it and the rays of the rest have become opaque since. */
 static bool close_rows(packet_rows *p, int packet, float horizon, const round_rows *o, hit_tape *tape, kernel_counters *counters)
 {
     const bool all_done = !m16_any(p->alive);
@@ -71,17 +78,19 @@ static bool close_rows(packet_rows *p, int packet, float horizon, const round_ro
         const int row = o->row[i];
         if (!all_done && o->row_far[row] >= horizon && m16_any(row_remains(p, row, horizon)))
             continue;
-        counters->blended += (uint64_t)__builtin_popcount(p->blended[row]);
-        if (tape != NULL && p->blended[row] != 0 && !tape_add(tape, (tape_entry){p->id[row], p->blended[row], (uint16_t)packet}))
+        if (!close_row(p, row, packet, tape, counters))
             return false;
     }
     int kept = 0;
-    for (int i = 0; i < p->count && !all_done; i++) {
+    for (int i = 0; i < p->count; i++) {
         if (o->row_far[i] < horizon)
             continue;
         const m16 remains = row_remains(p, i, horizon);
-        if (!m16_any(remains))
+        if (!m16_any(remains)) {
+            if (o->row_near[i] >= horizon && !close_row(p, i, packet, tape, counters))
+                return false;
             continue;
+        }
         row_store(p->t, kept, f16_select(remains, row_load(p->t, i), f16_set1(INFINITY)));
         row_store(p->alpha, kept, f16_select(remains, row_load(p->alpha, i), f16_set1(0)));
         p->id[kept] = p->id[i], p->blended[kept++] = p->blended[i];

@@ -474,6 +474,42 @@ static void coincident_gaussians(void **state)
     }
 }
 
+/* A sheet across the depths, whose near part is blended rounds before its far part is reached, and a wall in front of the far part alone:
+   the rays of that part become opaque while the sheet waits for them. What was blended must still reach the adjoint. */
+static void sheets_that_end_behind_a_wall(void **state)
+{
+    (void)state;
+    enum { SHEETS = 5, WALLS = 3, COUNT = SHEETS + WALLS + 6000 };
+    gaussians g = some(COUNT, 0.03f);
+    for (size_t i = 0; i < COUNT; i++) { /* faint ones all along the rays, so that there are rounds */
+        const float depth = 1.5f + 25 * rng_uniform(90, 0, i);
+        g.mean_x[i] = depth * (rng_uniform(90, 1, i) - 0.5f), g.mean_y[i] = depth * (rng_uniform(90, 2, i) - 0.5f), g.mean_z[i] = depth;
+        g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 0.05f;
+        g.red[i] = rng_uniform(90, 3, i), g.green[i] = rng_uniform(90, 4, i), g.blue[i] = rng_uniform(90, 5, i);
+    }
+    for (size_t i = 0; i < SHEETS; i++) { /* from (-1.5, y, 4) to (7.5, y, 20) */
+        g.mean_x[i] = 3, g.mean_y[i] = 0, g.mean_z[i] = 12 + 0.3f * (float)i;
+        g.scale_x[i] = 0.1f, g.scale_y[i] = 5, g.scale_z[i] = 9;
+        g.quat_w[i] = 0.9673f, g.quat_x[i] = 0, g.quat_y[i] = 0.2537f, g.quat_z[i] = 0;
+        g.opacity[i] = 0.4f;
+    }
+    for (size_t i = SHEETS; i < SHEETS + WALLS; i++) { /* in front of the last column */
+        g.mean_x[i] = 3.5f, g.mean_y[i] = 0, g.mean_z[i] = 9 + 0.2f * (float)i;
+        g.scale_x[i] = 0.7f, g.scale_y[i] = 9, g.scale_z[i] = 0.05f;
+        g.opacity[i] = 2.5f; /* opaque beyond a std-dev */
+    }
+    gaussians_pad(&g);
+    const trace_settings s = with_background();
+    const gbt_camera camera = camera_at((double[3]){0, 0, 0}, (double[3]){0, 0, 1}, 4, 4, 50);
+    ray_image rays = {0};
+    assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+    const figures f = compare(&g, &s, &rays, 91, 1e-6);
+    assert_figures("behind a wall", &f, 2e-5);
+    assert_int_equal(f.counters.spilled_packets, 0);
+    ray_image_free(&rays);
+    gaussians_free(&g);
+}
+
 /* At alpha_max exactly the gradient is already 0, as the reference has it; one float below it is open. */
 static void the_cap_is_exact(void **state)
 {
@@ -784,6 +820,7 @@ int main(void)
         cmocka_unit_test(rays_that_do_not_run_together),
         cmocka_unit_test(one_hundred_thousand_hits),
         cmocka_unit_test(coincident_gaussians),
+        cmocka_unit_test(sheets_that_end_behind_a_wall),
         cmocka_unit_test(the_cap_is_exact),
         cmocka_unit_test(instruction_sets_and_threads_give_the_same_bits),
         cmocka_unit_test(rays_that_are_none),

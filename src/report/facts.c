@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "gbtrace/version.h"
 #include "report/metrics.h"
 #include "report/rows.h"
 
@@ -68,7 +69,9 @@ static void add_counts(text *out, const evaluation *e, const json_t *metrics)
     report_open_row(out, "Training time");
     text_duration(out, metrics_number(metrics, "train_seconds"));
     report_close_row(out);
-    report_number_row(out, "Photos divided by", metrics_number(metrics, "downscale"), 3, "");
+    const double downscale = metrics_number(metrics, "downscale");
+    if (downscale != 1)
+        report_number_row(out, "Photos made smaller by a factor of", downscale, 3, "");
     report_text_row(out, "Held-out split", metrics_text(metrics, "eval_split"));
     report_count_row(out, "Held-out views", (double)e->view_count);
     report_number_row(out, "Seed", metrics_number(metrics, "seed"), 0, "");
@@ -138,6 +141,6 @@ void report_again(text *out, const char *run, const json_t *metrics)
     text_add(out, "</pre>\n<p>Pictures here are JPEG for size; the scores were made from the PNG files in <code>renders/test</code>. Every "
                   "number is in "
                   "<code>metrics.json</code>, every curve in <code>log.csv</code>. This page is one file and loads "
-                  "nothing.</p>\n</footer>\n");
+                  "nothing.</p>\n<p>Made by gbtrace " GBT_VERSION ".</p>\n</footer>\n");
 }
 

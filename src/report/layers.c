@@ -235,7 +235,7 @@ void report_layers(text *out, loaded_run *r, const evaluation *e)
     if (out->status != GBT_OK || r->scene.view_count == 0 || !find_pinhole(&r->scene.views[view].camera, &camera))
         return;
     out->status = loaded_run_render(r, view, out->err);
-    text_add(out, "<h2>From points to a picture</h2>\n<p class=\"lead\">One view, ");
+    text_add(out, "<section id=\"layers\"><h2>From points to a picture</h2>\n<p class=\"lead\">One view, ");
     text_escaped(out, r->scene.views[view].name);
     text_add(out, r->scene.views[view].is_test ? ", which training never saw.</p>\n" : ".</p>\n");
     text_add(out, "<div class=\"layers\">\n");
@@ -247,5 +247,5 @@ void report_layers(text *out, loaded_run *r, const evaluation *e)
         close_figure(out, "The picture", (double)NAN, "the Gaussians, blended along every ray");
         add_photo(out, r, view);
     }
-    text_add(out, "</div>\n");
+    text_add(out, "</div>\n</section>\n");
 }

@@ -238,7 +238,7 @@ void report_maps(text *out, const loaded_run *r, const evaluation *e)
         held += r->scene.views[i].is_test;
     text_add(out, "<p class=\"lead\">Where the cameras stood, over what they saw. The ruler is in units of the data set; a held-out camera "
                   "leads to its picture.</p>\n"
-                  "<div class=\"grid2\">\n");
+                  "<div class=\"grid2 maps\">\n");
     out->status = make_maps(r, maps, out->err);
     for (int i = 0; i < 2 && out->status == GBT_OK; i++) {
         const map *m = &maps[i];

@@ -1,8 +1,19 @@
-// report/page.js -- moves the sliders, sorts the views and the table. The page is whole without it.
+// report/page.js -- moves the sliders, copies the commands, sorts the views and the table. The page is whole without it.
 document.querySelectorAll(".compare input").forEach(function (slider) {
   function move() { slider.parentNode.style.setProperty("--at", slider.value + "%"); }
   slider.addEventListener("input", move);
   move();
+});
+
+document.querySelectorAll("pre").forEach(function (box) {
+  if (!navigator.clipboard) return; // a page from a file has it, one from another host over plain HTTP has not
+  const command = box.textContent.replace(/^\$ /, ""), button = document.createElement("button");
+  button.type = "button";
+  button.textContent = "Copy";
+  button.addEventListener("click", function () {
+    navigator.clipboard.writeText(command).then(function () { button.textContent = "Copied"; });
+  });
+  box.appendChild(button);
 });
 
 function sortChildren(parent, value, sign) {

@@ -81,10 +81,10 @@ static void add_tiles(text *out, const evaluation *e, const json_t *metrics)
     text_add(out, "</dl>\n");
 }
 
-static void add_contents(text *out, bool has_scene, bool has_studies)
+static void add_contents(text *out, bool has_scene, bool has_layers, bool has_studies)
 {
     const struct { const char *id, *name; bool there; } parts[] = {
-        {"views", "Held-out views", true}, {"scene", "The scene", has_scene}, {"training", "Training", true}, {"time", "Time", true},
+        {"views", "Held-out views", true}, {"scene", "The scene", has_scene}, {"layers", "From points to a picture", has_layers}, {"training", "Training", true}, {"time", "Time", true},
         {"studies", "Studies", has_studies},
         {"facts", "Facts", true}, {"again", "Make it again", true}};
     text_add(out, "<nav>");
@@ -94,7 +94,7 @@ static void add_contents(text *out, bool has_scene, bool has_studies)
     text_add(out, "</nav>\n");
 }
 
-static void add_head(text *out, const char *run, const evaluation *e, const json_t *metrics, bool has_scene, bool has_studies)
+static void add_head(text *out, const char *run, const evaluation *e, const json_t *metrics, bool has_scene, bool has_layers, bool has_studies)
 {
     char name[256];
     const char *data = metrics_text(metrics, "data"), *command = metrics_text(metrics, "command");
@@ -113,7 +113,7 @@ static void add_head(text *out, const char *run, const evaluation *e, const json
                 splats ? "rendered by splats on the CPU" : "rendered by CPU ray tracing");
     text_escaped(out, data);
     text_format(out, " \xc2\xb7 %zu held-out view%s</p>\n", e->view_count, e->view_count == 1 ? "" : "s");
-    add_contents(out, has_scene, has_studies);
+    add_contents(out, has_scene, has_layers, has_studies);
     text_add(out, "</header>\n<main>\n");
     add_tiles(out, e, metrics);
     text_add(out, "<pre class=\"card\">");
@@ -127,13 +127,17 @@ gbt_status report_write(const char *run, const evaluation *e, const json_t *metr
 {
     char path[4096];
     GBT_TRY(file_join(path, sizeof path, run, "report.html", err));
-    text out = {.err = err}, studies = {.err = err};
+    text out = {.err = err}, place = {.err = err}, layers = {.err = err}, studies = {.err = err};
     loaded_run *open = more != NULL ? more->open : NULL;
     report_studies(&studies, run, more != NULL ? more->studies : NULL, more != NULL ? more->study_count : 0);
-    add_head(&out, run, e, metrics, open != NULL, studies.length > 0);
+    if (open != NULL) {
+        report_scene(&place, open, e);
+        report_layers(&layers, open, e);
+    }
+    add_head(&out, run, e, metrics, open != NULL, layers.length > 0, studies.length > 0);
     report_views(&out, run, e, metrics_text(metrics, "protocol"));
-    if (open != NULL)
-        report_scene(&out, open, e);
+    text_append(&out, &place);
+    text_append(&out, &layers);
     report_training(&out, run, e, metrics);
     text_append(&out, &studies);
     report_facts(&out, e, metrics, open != NULL ? open->model.config : NULL);

@@ -31,7 +31,7 @@ void report_number_row(text *out, const char *name, double value, int decimals, 
 {
     report_open_row(out, name);
     text_number(out, value, decimals);
-    text_format(out, "%s%s", isfinite(value) ? " " : "", isfinite(value) ? unit : "");
+    text_format(out, "%s%s", isfinite(value) && unit[0] != '\0' ? "\xc2\xa0" : "", isfinite(value) ? unit : "");
     report_close_row(out);
 }
 

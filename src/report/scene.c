@@ -5,6 +5,5 @@ void report_scene(text *out, loaded_run *r, const evaluation *e)
 {
     text_add(out, "<section id=\"scene\"><h2>The scene</h2>\n");
     report_maps(out, r, e);
-    report_layers(out, r, e);
     text_add(out, "</section>\n");
 }

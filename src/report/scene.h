@@ -6,16 +6,13 @@
 #include "render/loaded_run.h"
 #include "report/text.h"
 
-/**
- * Add the section: two maps, and one view as points, balls, anchors, Gaussians, render and photo. `r` with its data set; it renders that
- * view.
- */
+/** The section "The scene": the two maps. `r` with its data set. */
 void report_scene(text *out, loaded_run *r, const evaluation *e);
 
 /** The two maps: cameras from above and from the side, held-out ones marked, over points and anchors. */
 void report_maps(text *out, const loaded_run *r, const evaluation *e);
 
-/** One view, from points to the picture. */
+/** The section of one view as points, balls, anchors, Gaussians, render and photo, which it renders; nothing where no view is a pinhole's. */
 void report_layers(text *out, loaded_run *r, const evaluation *e);
 
 #endif

@@ -197,7 +197,7 @@ static void add_table(text *out, const char *run, const evaluation *e, const siz
                      "sortable\"><thead><tr>"
                      "<th data-sort=\"text\">View</th><th data-sort=\"number\">PSNR, dB</th><th data-sort=\"number\">SSIM</th><th "
                      "data-sort=\"number\">FLIP</th>%s"
-                     "<th data-sort=\"number\">Gaussians</th><th data-sort=\"number\">Seconds</th><th>Whole "
+                     "<th data-sort=\"number\">Gaussians</th><th data-sort=\"number\">Render, s</th><th>Whole "
                      "pictures</th></tr></thead><tbody>",
                 e->view_count, e->lpips_network != NULL ? "<th data-sort=\"number\">LPIPS</th>" : "");
     for (size_t i = 0; i < e->view_count; i++)

@@ -9,6 +9,7 @@
 #include "base/image.h"
 #include "base/memory.h"
 #include "base/rng.h"
+#include "gbtrace/version.h"
 #include "report/chart.h"
 #include "report/image.h"
 #include "report/log.h"
@@ -283,7 +284,7 @@ static void whole_page(void **state)
         {"5,182,216 bytes", 1}, {"2.52 GB", 1}, {"PIXELS", 9}, {"type=\"range\"", 3}, {"<svg ", 5}, {"<title>", 100},
         {"held-out 19.88 at 20.10 s", 1},
         {"held-out 24.25 at 61.50 s", 1}, {"240\xc3\x97" "180 px", 1}, {"avx2", 1}, {"every=8", 1}, {"900 sparse points", 1},
-        {"grow and prune", 1},
+        {"grow and prune", 1}, {">Render, s<", 1}, {"Made by gbtrace " GBT_VERSION, 1}, {"\xc2\xa0ms</td>", 1},
     };
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++)
         if (occurrences(page, wanted[i].text) < wanted[i].least)
@@ -293,6 +294,11 @@ static void whole_page(void **state)
     assert_null(strstr(page, "class=\"none\""));
     assert_true(strstr(page, "<h2>Held-out views") < strstr(page, "<h2>Training"));
     assert_true(strstr(page, "<h2>Training") < strstr(page, "<h2>Where the time goes"));
+    assert_int_equal(occurrences(page, "made smaller by a factor of"), 1);
+    free(page);
+    json_object_set_new(metrics, "downscale", json_real(1)); /* nothing is made smaller: no row about it */
+    page = write_report(&e, metrics);
+    assert_int_equal(occurrences(page, "made smaller by a factor of"), 0);
     free(page);
     json_decref(metrics);
     free(e.views);
@@ -419,6 +425,8 @@ static void scene_on_the_page(void **state)
         assert_int_equal(occurrences(page, "class=\"camera held\""), 2 * 2);
         assert_int_equal(occurrences(page, "href=\"#view-1\""), 2 + 1); /* both maps, and the table */
         assert_int_equal(occurrences(page, "href=\"PIXELS\""), 2);
+        assert_int_equal(occurrences(page, "href=\"#layers\""), cases[i].layers > 0);
+        assert_int_equal(occurrences(page, "<section id=\"layers\">"), cases[i].layers > 0);
         assert_int_equal(occurrences(page, "<th>seed</th><td>&lt;7&gt;</td>"), 1);
         free(page);
         close_run(r);

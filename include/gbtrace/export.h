@@ -12,7 +12,7 @@ GBT_API_BEGIN
 
 typedef struct gbt_export_def {
     int sh_degree;    /* of the colours' dependence on the direction, 0 to 3. Default 3 */
-    int refine_steps; /* steps that fit the plain Gaussians to the model's own pictures, >= 0. Default 300 */
+    int refine_steps; /* steps that fit the plain Gaussians to the model's own pictures, >= 0. Default 500 */
     bool backdrop;    /* add the model's background as a sphere of 1000 Gaussians around everything: files have no background, and viewers
                          draw on black. Not where photos have an alpha channel. Default true */
     const char *data; /* data set with the training cameras; NULL: the one it was trained on. Default NULL */

@@ -22,7 +22,7 @@ enum { OUTPUTS_MAX = 8, VIEWS_MAX = 16 };
 
 gbt_export_def gbt_export_def_default(void)
 {
-    return (gbt_export_def){.sh_degree = 3, .refine_steps = 300, .backdrop = true};
+    return (gbt_export_def){.sh_degree = 3, .refine_steps = 500, .backdrop = true};
 }
 
 /* One output, and what it gives back: PSNR in dB of 8-bit images, means over views. */

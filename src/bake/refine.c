@@ -15,7 +15,7 @@
 enum { BLOCK = 512, PIXEL_STEP = 2, STREAM = 1, REST = 3 * (GAUSSIAN_SH_COUNT - 1) };
 
 static const double dssim_weight = 0.2, rate_end = 0.1; /* rates fall to this share */
-static const struct { double opacity, scale, rotation, color, harmonics; } first_rates = {0.02, 0.003, 0.001, 0.0025, 0.000125};
+static const struct { double opacity, scale, rotation, color, harmonics; } first_rates = {0.04, 0.006, 0.002, 0.005, 0.0025};
 
 typedef struct refining {
     gaussian_cloud *cloud, gradient, moment1, moment2;
@@ -28,7 +28,7 @@ typedef struct refining {
 
 refine_def refine_def_default(void)
 {
-    return (refine_def){.steps = 300};
+    return (refine_def){.steps = 500};
 }
 
 static gbt_status open_state(refining *r, gaussian_cloud *cloud, gbt_error *err)

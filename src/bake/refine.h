@@ -5,7 +5,7 @@
 #include "frame/frame.h"
 
 typedef struct refine_def {
-    int steps;     /* >= 0. Default 300 */
+    int steps;     /* >= 0. Default 500 */
     uint64_t seed; /* of the order of views and pixels. Default 0 */
 } refine_def;
 refine_def refine_def_default(void);

@@ -104,7 +104,6 @@ def lines(page):
     page.run("gbtrace.camera.zoom(3); gbtrace.camera.view = -1; gbtrace.changed()")
     page.wait(STILL)
     check("all cameras are in view from afar", page.run("gbtrace.lines.eyes.length") == 9, str(page.run("gbtrace.lines.eyes")))
-    # Where the lines are is where the picture has the points: the middle of the subject is in the middle after F.
     eye = page.run("gbtrace.lines.eyes[4]")
     left, top, _, _ = box(page, "#lines")
     page.mouse("mouseMoved", left + eye["x"], top + eye["y"])
@@ -119,6 +118,15 @@ def lines(page):
         page.run(f"(e => {{ e.value = '{lens}'; e.dispatchEvent(new Event('change')); }})(document.getElementById('model'))")
         page.wait(STILL)
         check("lines for " + lens, drawn(page) > 100, str(drawn(page)))
+        off = page.run("""(async () => {
+            const { lensOf } = await import('./lines.js'), shot = gbtrace.look.done.shot, lens = lensOf(shot), far = [];
+            for (const [x, y] of [[0.4, 0.45], [0.5, 0.5], [0.55, 0.6]].map(p => [p[0] * shot.width, p[1] * shot.height])) {
+                const found = await (await fetch('pick?' + new URLSearchParams({ camera: JSON.stringify(shot), x, y }))).json();
+                if (found.hit)
+                    far.push(Math.hypot(...(lens.flat || lens.round)(lens.turn(found.point)).map((v, i) => v - [x, y][i])));
+            }
+            return far; })()""")
+        check("lines are where the picture has their points: " + lens, len(off) > 0 and max(off) < 0.05, str(off))
     page.press("KeyC", "c")
     check("and none again", drawn(page) == 0)
 
@@ -176,6 +184,13 @@ def fingers(work):
         picture = box(page, "#render")
         check("the status is below the picture", box(page, "#status")[1] >= top + height and picture[1] + picture[3] <= top + height + 0.5)
         check("the page is no wider than the phone", page.run("document.documentElement.scrollWidth") <= 390)
+        page.run("document.querySelector('input[value=beside]').click()")
+        page.wait(f"{STILL} && gbtrace.look.photo && !document.getElementById('photo-box').hidden")
+        photo, picture = box(page, "#photo"), box(page, "#render")
+        apart = photo[1] + photo[3] <= picture[1] and abs(photo[0] - picture[0]) < 1
+        check("beside is above where it is higher than wide", apart and picture[1] + picture[3] <= top + height + 0.5, f"{photo} {picture}")
+        page.run("document.querySelector('input[value=off]').click()")
+        page.wait(STILL)
         x, y = middle(page)
         before = page.run("gbtrace.camera.distance()")
         page.fingers([(x, y)], [(x + 60, y + 10)])

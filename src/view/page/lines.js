@@ -2,7 +2,7 @@
 import { add, cross, dot, length, mul, sub, unit } from "./camera.js";
 
 // Points of the scene to the picture of a camera file, in pixels: { z: how far in front, at: [x, y] }, or null where it is not seen.
-function lensOf(shot) {
+export function lensOf(shot) {
     const forward = unit(sub(shot.target, shot.origin)), right = unit(cross(forward, shot.up)), down = cross(forward, right);
     const { width, height } = shot, middle = [width / 2, height / 2], half = shot.fov_x_deg * Math.PI / 360;
     const turn = p => {

@@ -28,17 +28,20 @@ function photoSize() {
     return [view.width, view.height];
 }
 
-// The stage, or the half of it beside the photo, in pixels of the screen.
-function roomSize() {
-    const { width, height } = byId("stage").getBoundingClientRect(), two = compareMode() === "beside";
-    return [two ? (width - gap) / 2 : width, height].map(n => Math.max(1, Math.floor(n * window.devicePixelRatio)));
+// Where pictures go: the stage, or the photo's half of it and the render's, one above the other where it is higher
+// than wide. In pixels of the screen.
+function rooms() {
+    const { width, height } = byId("stage").getBoundingClientRect(), two = compareMode() === "beside", below = two && height > width;
+    const size = [two && !below ? (width - gap) / 2 : width, below ? (height - gap) / 2 : height];
+    const scaled = ([x, y]) => [x, y].map(n => Math.max(0, Math.floor(n * window.devicePixelRatio)));
+    return { size: scaled(size).map(n => Math.max(1, n)), render: scaled([two && !below ? size[0] + gap : 0, below ? size[1] + gap : 0]) };
 }
 
 // Beside its photo a picture has the photo's size, so that pixels can be compared. Alone it fills the window: in the photo's shape where it has the
 // photo's camera, else all of it.
 function pictureSize() {
     const size = look.view < 0 ? "window" : byId("size").value, fills = size === "window" && compareMode() === "off"; // or "480x640", or a factor
-    let [width, height] = fills ? roomSize() : size.includes("x") ? size.split("x").map(Number) : photoSize().map(n => n * (Number(size) || 1));
+    let [width, height] = fills ? rooms().size : size.includes("x") ? size.split("x").map(Number) : photoSize().map(n => n * (Number(size) || 1));
     const shape = camera.model === "equirectangular" ? 2 : fills && camera.view >= 0 ? camera.aspect : width / height;
     [width, height] = [Math.min(width, height * shape), Math.min(height, width / shape)];
     const fit = Math.min(1, sideMax / Math.max(width, height), Math.sqrt((fills ? windowPixelsMax : pixelsMax) / (width * height)));
@@ -53,9 +56,9 @@ function fillSizes() {
 }
 
 // A box of a picture's shape in the middle of a room, as large as it fits, in whole pixels of the screen.
-function putInto([room, high], begin, box, width, height) {
+function putInto([room, high], [x, y], box, width, height) {
     const fit = Math.min(room / width, high / height), w = Math.round(width * fit), h = Math.round(height * fit), scale = window.devicePixelRatio;
-    const place = { left: begin + Math.floor((room - w) / 2), top: Math.floor((high - h) / 2), width: w, height: h };
+    const place = { left: x + Math.floor((room - w) / 2), top: y + Math.floor((high - h) / 2), width: w, height: h };
     for (const name in place)
         box.style[name] = `${place[name] / scale}px`;
     return place;
@@ -63,10 +66,10 @@ function putInto([room, high], begin, box, width, height) {
 
 // Of the picture that is shown, not of the one that will be.
 function layout() {
-    const stage = byId("stage"), mode = compareMode(), two = mode === "beside", room = roomSize(), scale = window.devicePixelRatio;
+    const stage = byId("stage"), mode = compareMode(), two = mode === "beside", room = rooms(), scale = window.devicePixelRatio;
     const shot = look.done !== null ? look.done.shot : null, size = shot !== null ? [shot.width, shot.height] : pictureSize();
-    const place = putInto(room, two ? room[0] + Math.floor(gap * scale) : 0, byId("render-box"), ...size);
-    putInto(room, 0, byId("photo-box"), ...(look.view >= 0 ? photoSize() : size));
+    const place = putInto(room.size, room.render, byId("render-box"), ...size);
+    putInto(room.size, [0, 0], byId("photo-box"), ...(look.view >= 0 ? photoSize() : size));
     stage.classList.toggle("two", two || mode === "slider");
     stage.classList.toggle("slider", mode === "slider");
     byId("photo-box").hidden = !(two || mode === "slider") || look.photo === null;

@@ -116,9 +116,15 @@ FUNCTIONS = {
 def _load():
     """The library in GBTRACE_LIBRARY, else the one in this package, else the system's."""
     own = Path(__file__).with_name("libgbtrace.so")
-    library = c.CDLL(os.environ.get("GBTRACE_LIBRARY") or (str(own) if own.exists() else "libgbtrace.so.0.1"))
+    path = os.environ.get("GBTRACE_LIBRARY") or (str(own) if own.exists() else "libgbtrace.so.0.1")
+    try:
+        library = c.CDLL(path)
+    except OSError as error:
+        raise ImportError(f"libgbtrace: {error} (wanted the library of this package, or its path in GBTRACE_LIBRARY)") from None
     for name, (result, arguments) in FUNCTIONS.items():
-        function = getattr(library, name)
+        function = getattr(library, name, None)
+        if function is None:
+            raise ImportError(f"{path}: has no {name} (wanted the library of this package's version, got an older one or another library)")
         failing = result == "status"
         function.restype = c.c_int if failing else result
         function.argtypes = arguments + [c.POINTER(CError)] if failing else arguments
@@ -139,8 +145,20 @@ def call(name, *arguments):
 
 
 def encode(path):
-    """A path, or None, as C has it."""
-    return None if path is None else os.fsencode(path)
+    """A path as C has it."""
+    return os.fsencode(path)
+
+
+def optional(path):
+    """A path that may be None."""
+    return None if path is None else encode(path)
+
+
+def wanted(value, name, kind, hint=""):
+    """TypeError unless `value` is a `kind`."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{name}: {type(value).__name__} (wanted a gbtrace.{kind.__name__}{hint})")
+    return value
 
 
 def address(array, name, shape, writable=False):

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from gbtrace._library import ArgumentError, CCamera, library
+from gbtrace._library import ArgumentError, CCamera, library, wanted
 
 MODELS = {library.gbt_camera_model_name(i).decode(): i for i in list(range(18)) + [100]}
 
@@ -16,12 +16,14 @@ class Camera:
     `rotation` (3 x 3, world to camera), `center` and `params` are views of the camera's own memory: writing into them changes it.
     """
 
+    __slots__ = ("_c",)  # a misspelt name is an error
+
     def __init__(self, model="PINHOLE", width=0, height=0, params=(), rotation=None, center=(0, 0, 0)):
         if model not in MODELS:
             raise ValueError(f"model: {model!r} (wanted one of {', '.join(MODELS)})")
-        wanted = library.gbt_camera_param_count(MODELS[model])
-        if len(params) != wanted:
-            raise ValueError(f"params: {len(params)} (wanted {wanted} for {model})")
+        count = library.gbt_camera_param_count(MODELS[model])
+        if len(params) != count:
+            raise ValueError(f"params: {len(params)} (wanted {count} for {model})")
         self._c = CCamera(MODELS[model], width, height)
         self.params[:] = params
         self.rotation[:] = np.eye(3) if rotation is None else rotation
@@ -55,13 +57,25 @@ class Camera:
     def params(self):
         return np.ctypeslib.as_array(self._c.params)[:library.gbt_camera_param_count(self._c.model)]
 
+    @params.setter
+    def params(self, values):
+        self.params[:] = values
+
     @property
     def rotation(self):
         return np.ctypeslib.as_array(self._c.rotation).reshape(3, 3)
 
+    @rotation.setter
+    def rotation(self, values):
+        self.rotation[:] = values
+
     @property
     def center(self):
         return np.ctypeslib.as_array(self._c.center)
+
+    @center.setter
+    def center(self, values):
+        self.center[:] = values
 
     def looking_at(self, origin, target, up=(0, -1, 0)):
         """The same lens at `origin`, with `target` in the middle of its picture and `up` towards its top."""
@@ -80,6 +94,7 @@ class Camera:
 
     def distance(self, other):
         """How far apart two poses are: between the centres, and the angle in radians."""
+        wanted(other, "other", Camera)
         cosine = 0.5 * (np.trace(self.rotation @ other.rotation.T) - 1)
         return float(np.linalg.norm(self.center - other.center)), float(np.arccos(np.clip(cosine, -1, 1)))
 

@@ -66,6 +66,8 @@ class Model:
     Coordinates are those of the data set, or of the file or arrays.
     """
 
+    __slots__ = ("_handle", "_size", "__weakref__")  # a misspelt name is an error
+
     def __init__(self, path):
         self._handle = c.c_void_p()
         lib.call("gbt_model_open", lib.encode(path), c.byref(self._handle))
@@ -115,13 +117,14 @@ class Model:
 
     @settings.setter
     def settings(self, settings):
+        lib.wanted(settings, "settings", Settings, ", as model.settings._replace(footprint=0)")
         struct = lib.CModelSettings((c.c_float * 3)(*settings.background), *settings[1:])
         lib.call("gbt_model_set_settings", self._open(), c.byref(struct))
 
     def views(self, data=None):
         """The views of the data set it was trained on, or of the one in the folder `data`."""
         count, view = c.c_size_t(), lib.CModelView()
-        lib.call("gbt_model_open_views", self._open(), lib.encode(data), c.byref(count))
+        lib.call("gbt_model_open_views", self._open(), lib.optional(data), c.byref(count))
         views = []
         for i in range(count.value):
             lib.call("gbt_model_get_view", self._open(), i, c.byref(view))
@@ -134,6 +137,7 @@ class Model:
         `rgb`, `depth` and `transmittance` are float32 arrays that are written in place; without `rgb` a new one is made. `keep`:
         gradient() follows. Returns `rgb`.
         """
+        lib.wanted(camera, "camera", Camera, "; that of a View is its .camera")
         size = (camera.height, camera.width)
         if rgb is None:
             rgb = np.empty((*size, 3), np.float32)

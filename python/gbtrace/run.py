@@ -35,14 +35,14 @@ def evaluate(run, data=None, lpips=None, json=None):
     On another data set than the run's own, `json` alone. lpips: the file of a network (docs/metrics.md).
     """
     settings = lib.library.gbt_evaluate_def_default()
-    settings.data, settings.lpips, settings.json = lib.encode(data), lib.encode(lpips), lib.encode(json)
+    settings.data, settings.lpips, settings.json = lib.optional(data), lib.optional(lpips), lib.optional(json)
     lib.call("gbt_evaluate", lib.encode(run), c.byref(settings))
 
 
 def export(path, *outputs, sh_degree=3, refine_steps=300, data=None):
     """Write a trained model, or plain Gaussians, as plain Gaussians: .ply, .splat, .spz or .glb by the ending of each name."""
     settings = lib.library.gbt_export_def_default()
-    settings.sh_degree, settings.refine_steps, settings.data = sh_degree, refine_steps, lib.encode(data)
+    settings.sh_degree, settings.refine_steps, settings.data = sh_degree, refine_steps, lib.optional(data)
     names = (c.c_char_p * len(outputs))(*(lib.encode(name) for name in outputs))
     lib.call("gbt_export", lib.encode(path), c.byref(settings), names, len(outputs), None)
 

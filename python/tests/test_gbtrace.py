@@ -42,12 +42,36 @@ class Structs(unittest.TestCase):
         self.assertEqual(subprocess.run([str(program)], check=True, capture_output=True, text=True).stdout.split("\n")[:-1], got)
 
 
+class Library(unittest.TestCase):
+    def said(self, library):
+        """The last line of importing the package with another library."""
+        got = subprocess.run([sys.executable, "-c", "import gbtrace"], env={**os.environ, "GBTRACE_LIBRARY": library}, capture_output=True, text=True)
+        self.assertNotEqual(got.returncode, 0)
+        return got.stderr.strip().split("\n")[-1]
+
+    def test_an_older_library_is_said(self):
+        source, library = SCRATCH / "old.c", SCRATCH / "libold.so"
+        source.write_text('const char *gbt_version(void);\nconst char *gbt_version(void) { return "0.0.1"; }\n')
+        subprocess.run(["cc", "-shared", "-fPIC", str(source), "-o", str(library)], check=True)
+        self.assertRegex(self.said(str(library)), r"^ImportError: .*libold\.so: has no gbt_\w+ \(wanted the library of this package's version")
+
+    def test_no_library_is_said(self):
+        self.assertRegex(self.said("/nowhere/libgbtrace.so"), r"^ImportError: libgbtrace: /nowhere/libgbtrace\.so: .*GBTRACE_LIBRARY")
+
+
 class Cameras(unittest.TestCase):
     def test_arrays_are_views(self):
         camera = a_camera()
         camera.center[2] = -5
         self.assertEqual(camera.center.tolist(), camera._c.center[:])
         self.assertEqual((camera.model, camera.width, camera.height, camera.params.shape), ("PINHOLE", 40, 30, (4,)))
+
+    def test_parts_can_be_set(self):
+        camera = a_camera()
+        camera.center, camera.params, camera.rotation = (1, 2, 3), (30, 31, 20, 15), np.eye(3)[::-1]
+        self.assertEqual((camera._c.center[:], camera._c.params[:4], camera._c.rotation[2]), ([1, 2, 3], [30, 31, 20, 15], 1))
+        with self.assertRaisesRegex(AttributeError, "centre"):
+            camera.centre = (1, 2, 3)
 
     def test_moved_and_back(self):
         camera, motion = a_camera(), np.array([0.1, 0.2, 0.3, 0.1, -0.2, 0.05])
@@ -123,6 +147,21 @@ class Trained(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "closed"):
             self.model.render(camera)
 
+    def test_what_is_no_camera_or_path(self):
+        view = self.model.views()[0]
+        for wrong in (view, None, "camera.json", 0):
+            with self.assertRaisesRegex(TypeError, r"camera: \w+ \(wanted a gbtrace\.Camera; that of a View is its \.camera\)"):
+                self.model.render(wrong)
+        with self.assertRaisesRegex(TypeError, r"other: View \(wanted a gbtrace\.Camera"):
+            view.camera.distance(view)
+        with self.assertRaisesRegex(TypeError, r"settings: dict \(wanted a gbtrace\.Settings, as model\.settings\._replace"):
+            self.model.settings = {"footprint": 0}
+        with self.assertRaisesRegex(AttributeError, "setings"):
+            self.model.setings = self.model.settings
+        for wrong in (gbtrace.Model, gbtrace.evaluate, gbtrace.export):
+            with self.assertRaisesRegex(TypeError, "NoneType"):
+                wrong(None)
+
     def test_settings(self):
         camera = a_camera(8, 8).looking_at((0, 0, 1e4), (0, 0, 2e4))  # nothing there
         self.model.settings = self.model.settings._replace(background=(0.25, 0.5, 1))
@@ -189,6 +228,11 @@ class Plain(unittest.TestCase):
 
 
 class Runs(unittest.TestCase):
+    def test_evaluate_writes_where_it_is_told(self):
+        path = SCRATCH / "scores.json"
+        gbtrace.evaluate(MODEL, json=path)
+        self.assertEqual(path.read_bytes(), (Path(MODEL) / "metrics.json").read_bytes())
+
     def test_export_and_open_again(self):
         path = SCRATCH / "plain.ply"
         gbtrace.export(MODEL, path, refine_steps=0, sh_degree=1)

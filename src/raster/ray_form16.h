@@ -29,6 +29,8 @@ typedef struct block_rays {
 
 typedef struct ray_response {
     f16 t, v[3], raw;
+    f16 da, db, w[3]; /* of ray_splat */
+    m16 clipped;      /* at the near depth */
 } ray_response;
 
 static inline block_rays rays_of(const tile_job *job, int block)
@@ -59,25 +61,47 @@ static inline f16 dot_rays(const f16 a[3], const f16 b[3])
 
 static inline ray_response ray_respond(const ray_splat *g, float opacity, const block_rays *rays, float t_near)
 {
-    const f16 da = f16_sub(rays->a, f16_set1((float)(g->a0 - rays->middle[0]))),
-        db = f16_sub(rays->b, f16_set1((float)(g->b0 - rays->middle[1])));
-    ray_response r;
-    f16 w[3], y[3];
+    ray_response r = {.da = f16_sub(rays->a, f16_set1((float)(g->a0 - rays->middle[0]))),
+                      .db = f16_sub(rays->b, f16_set1((float)(g->b0 - rays->middle[1])))};
+    f16 y[3];
     for (int k = 0; k < 3; k++) {
-        const f16 p = f16_fma(f16_set1(g->wa[k]), da, f16_mul(f16_set1(g->wb[k]), db));
-        w[k] = f16_add(f16_set1(g->w0[k]), p);
+        const f16 p = f16_fma(f16_set1(g->wa[k]), r.da, f16_mul(f16_set1(g->wb[k]), r.db));
+        r.w[k] = f16_add(f16_set1(g->w0[k]), p);
         y[k] = f16_fma(f16_set1(g->depth_per_sigma), p, f16_set1(g->y0[k]));
     }
-    f16 step = f16_sub(f16_set1(0), f16_div(dot_rays(y, w), dot_rays(w, w)));
+    f16 step = f16_sub(f16_set1(0), f16_div(dot_rays(y, r.w), dot_rays(r.w, r.w)));
     const f16 near_step = f16_mul(f16_sub(rays->depth_near, f16_set1(g->depth)), f16_set1(g->sigma_inverse));
-    const m16 clipped = f16_le(step, near_step);
-    step = f16_select(clipped, near_step, step);
+    r.clipped = f16_le(step, near_step);
+    step = f16_select(r.clipped, near_step, step);
     for (int k = 0; k < 3; k++)
-        r.v[k] = f16_fma(step, w[k], y[k]);
-    r.t = f16_select(clipped, f16_set1(t_near), f16_mul(f16_fma(step, f16_set1(g->sigma), f16_set1(g->depth)), rays->length));
+        r.v[k] = f16_fma(step, r.w[k], y[k]);
+    r.t = f16_select(r.clipped, f16_set1(t_near), f16_mul(f16_fma(step, f16_set1(g->sigma), f16_set1(g->depth)), rays->length));
     const f16 exponent = f16_mul(f16_set1((float)-HALF_LOG2_E), dot_rays(r.v, r.v));
     r.raw = f16_mul(f16_set1(opacity), f16_exp2(f16_max(exponent, f16_set1(-120.0f))));
     return r;
+}
+
+/* v at an inner depth once more, for the adjoint: v = w x (y x w) / |w|^2 with y x w = m/sigma (da wa x w0 + db wb x w0), the rest
+   cancels exactly. On a flat Gaussian the v of ray_respond() is a small difference of large numbers along the thin axis. d2 does not feel
+   that, but the gradients of mean and rotation, which are divided by the thin axis, do. Not where y0 has a part in y. */
+static inline void refine_v(const ray_splat *g, ray_response *r)
+{
+    double a[3], b[3];
+    const double wa[3] = {(double)g->wa[0], (double)g->wa[1], (double)g->wa[2]}, wb[3] = {(double)g->wb[0], (double)g->wb[1], (double)g->wb[2]};
+    const double w0[3] = {(double)g->w0[0], (double)g->w0[1], (double)g->w0[2]};
+    if (g->depth == 0)
+        return;
+    dvec_cross(wa, w0, a);
+    dvec_cross(wb, w0, b);
+    f16 c[3];
+    for (int k = 0; k < 3; k++)
+        c[k] = f16_fma(f16_set1((float)a[k]), r->da, f16_mul(f16_set1((float)b[k]), r->db));
+    const f16 scale = f16_div(f16_set1(g->depth_per_sigma), dot_rays(r->w, r->w));
+    for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        const f16 v = f16_mul(scale, f16_sub(f16_mul(r->w[i], c[j]), f16_mul(r->w[j], c[i])));
+        r->v[k] = f16_select(r->clipped, r->v[k], v);
+    }
 }
 
 /* Which blocks does every entry of the tile reach. False when memory ran out. */
@@ -235,7 +259,8 @@ static inline void add_row(const tile_job *job, const ray_row *row, const block_
 {
     const tile_entry *entry = &job->entries[row->entry];
     const splat *s = &job->splats[entry->splat];
-    const ray_response r = ray_respond(&job->rays[entry->splat], s->opacity, rays, job->view->settings.near);
+    ray_response r = ray_respond(&job->rays[entry->splat], s->opacity, rays, job->view->settings.near);
+    refine_v(&job->rays[entry->splat], &r);
     const f16 zero = f16_set1(0), weight = f16_load(row->alpha), d_alpha = f16_load(row->t);
     const m16 moves = m16_and(f16_lt(r.raw, f16_set1(job->view->settings.alpha_max)), f16_lt(zero, weight));
     const f16 q = f16_select(moves, f16_mul(r.raw, d_alpha), zero);

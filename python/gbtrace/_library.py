@@ -75,7 +75,7 @@ class CEvaluateDef(c.Structure):
 
 
 class CExportDef(c.Structure):
-    _fields_ = [("sh_degree", c.c_int), ("refine_steps", c.c_int), ("data", c.c_char_p), ("json", c.c_char_p), ("lpips", c.c_char_p)]
+    _fields_ = [("sh_degree", c.c_int), ("refine_steps", c.c_int), ("backdrop", c.c_bool), ("data", c.c_char_p), ("json", c.c_char_p), ("lpips", c.c_char_p)]
 
 
 STRUCTS = {"gbt_error": CError, "gbt_camera": CCamera, "gbt_gaussians": CGaussians, "gbt_gaussians_gradient": CGaussiansGradient,

@@ -81,7 +81,10 @@ static int run(const command *self, int argc, char **argv)
     }
     def.split = strcmp(split, "train") == 0 ? GBT_SPLIT_TRAIN : strcmp(split, "all") == 0 ? GBT_SPLIT_ALL : GBT_SPLIT_TEST;
     gbt_error err = {0};
-    return command_failed(gbt_render(model.value[0], out, &def, &err), &err);
+    const gbt_status status = gbt_render(model.value[0], out, &def, &err);
+    if (status == GBT_OK)
+        printf("%s\n", out);
+    return command_failed(status, &err);
 }
 
 const command command_render = {.name = "render", .summary = "render the views of a scene, a camera of your own, or a film",

@@ -244,8 +244,9 @@ film() { # name, number of frames, folder, arguments...
     shift 3
     "$program" render tiny -o "$folder" "$@" >out 2>err
     got=$?
-    [ "$got" = 0 ] && [ "$(ls "$folder" | wc -l)" = "$wanted" ] && [ -s "$folder/frame_0000$wanted.png" ] && grep -q "^$wanted frames rendered into $folder, " err
-    report $? "$name" "  wanted 0 and $wanted frames, got $got: $(cat err) $(ls "$folder")"
+    [ "$got" = 0 ] && [ "$(ls "$folder" | wc -l)" = "$wanted" ] && [ -s "$folder/frame_0000$wanted.png" ] && grep -q "^$wanted frames rendered into $folder, " err &&
+        [ "$(cat out)" = "$folder" ]
+    report $? "$name" "  wanted 0 and $wanted frames, got $got: $(cat err out) $(ls "$folder")"
 }
 film "a film around the scene" 3 around --path orbit --frames 3 --threads 1
 film "a film on three threads" 3 around-3 --path orbit --frames 3 --threads 3
@@ -276,8 +277,9 @@ got=$?
 [ "$got" = 4 ] && [ "$(cat err)" = "error: film.mp4: a film wants the program ffmpeg, which is not there (install it, or give a folder for pictures)" ] && [ ! -e film.mp4 ]
 report $? "a film without ffmpeg" "  got $got: $(cat err)"
 if command -v ffmpeg >/dev/null; then
-    "$program" render tiny -o film.gif --path orbit --frames 2 >out 2>err && [ "$(head -c 4 film.gif)" = GIF8 ] && [ ! -e .film.gif.tmp ]
-    report $? "a film with ffmpeg" "$(cat err)"
+    "$program" render tiny -o film.gif --path orbit --frames 2 >out 2>err && [ "$(head -c 4 film.gif)" = GIF8 ] && [ ! -e .film.gif.tmp ] &&
+        [ "$(cat out)" = film.gif ]
+    report $? "a film with ffmpeg" "$(cat err out)"
 fi
 # ---- the page of a run, made again with the chart of a study
 cp tiny/report.html before.html

@@ -202,8 +202,8 @@ static void say_source(const exporting *e, const gaussian_cloud *cloud, const ch
 {
     fprintf(report, "%s: %zu Gaussians, colours of degree %d", input, cloud->count, cloud->sh_degree);
     if (e->baked)
-        fprintf(report, "; %s%zu that no training camera sees are left out; baked in %.1f s, refined in %.1f s", e->backdrop ? "1000 of them the background; " : "", e->unseen, e->bake_seconds,
-                e->refine_seconds);
+        fprintf(report, "; %s%zu that no training camera sees are left out; baked in %.1f s, refined in %.1f s",
+                e->backdrop ? "1000 of them the background; " : "", e->unseen, e->bake_seconds, e->refine_seconds);
     else if (cloud->dropped > 0)
         fprintf(report, "; %zu unusable rows dropped", cloud->dropped);
     fprintf(report, "\n");

@@ -87,7 +87,8 @@ static inline ray_response ray_respond(const ray_splat *g, float opacity, const 
 static inline void refine_v(const ray_splat *g, ray_response *r)
 {
     double a[3], b[3];
-    const double wa[3] = {(double)g->wa[0], (double)g->wa[1], (double)g->wa[2]}, wb[3] = {(double)g->wb[0], (double)g->wb[1], (double)g->wb[2]};
+    const double wa[3] = {(double)g->wa[0], (double)g->wa[1], (double)g->wa[2]};
+    const double wb[3] = {(double)g->wb[0], (double)g->wb[1], (double)g->wb[2]};
     const double w0[3] = {(double)g->w0[0], (double)g->w0[1], (double)g->w0[2]};
     if (g->depth == 0)
         return;

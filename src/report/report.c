@@ -84,7 +84,8 @@ static void add_tiles(text *out, const evaluation *e, const json_t *metrics)
 static void add_contents(text *out, bool has_scene, bool has_layers, bool has_studies)
 {
     const struct { const char *id, *name; bool there; } parts[] = {
-        {"views", "Held-out views", true}, {"scene", "The scene", has_scene}, {"layers", "From points to a picture", has_layers}, {"training", "Training", true}, {"time", "Time", true},
+        {"views", "Held-out views", true}, {"scene", "The scene", has_scene}, {"layers", "From points to a picture", has_layers},
+        {"training", "Training", true}, {"time", "Time", true},
         {"studies", "Studies", has_studies},
         {"facts", "Facts", true}, {"again", "Make it again", true}};
     text_add(out, "<nav>");
@@ -94,7 +95,8 @@ static void add_contents(text *out, bool has_scene, bool has_layers, bool has_st
     text_add(out, "</nav>\n");
 }
 
-static void add_head(text *out, const char *run, const evaluation *e, const json_t *metrics, bool has_scene, bool has_layers, bool has_studies)
+static void add_head(text *out, const char *run, const evaluation *e, const json_t *metrics, bool has_scene, bool has_layers,
+                     bool has_studies)
 {
     char name[256];
     const char *data = metrics_text(metrics, "data"), *command = metrics_text(metrics, "command");

@@ -62,6 +62,7 @@ typedef struct gbt_train_def {
     uint64_t stop_at_step;      /* stop, as a signal would, after this step; 0: never. Default 0 */
     bool tensorboard;           /* also write `run`/events.out.tfevents.0.train: scalars of log.csv. Default false */
     bool resume;                /* go on from the run's last checkpoint; everything else comes from there */
+    bool overwrite;             /* train anew in a folder that holds a run, which is lost. Default false */
     double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* held-out PSNR after so many seconds of training; the clock stops meanwhile */
     int eval_at_count;
     const char *command;        /* the command line, for the report. Default "" */
@@ -79,6 +80,9 @@ gbt_train_def gbt_train_def_default(void);
  *
  * A step whose loss or gradient is not finite changes nothing but a count; ten in a row end the run with GBT_ERR_FORMAT and one line that
  * names the photo or the parameter. Pixels of a float photo that are not finite count in no loss.
+ *
+ * A folder that holds model.gbt or a checkpoint is refused with GBT_ERR_ARGUMENT before anything is written, unless `resume` or `overwrite`
+ * is set.
  *
  * @return GBT_OK, or what failed; nothing already in `run` is damaged by a failure
  */

@@ -50,6 +50,7 @@ static int run(const command *self, int argc, char **argv)
     snprintf(command_line, sizeof command_line, "gbtrace train %s -o %s --budget %.0fs", data, run_folder, 60 * minutes);
     train.budget_seconds = 60 * minutes;
     train.command = command_line;
+    train.overwrite = true;
     gbt_error err = {0};
     progress_say("1/3 photographing the procedural scene \"%s\"", scene.name);
     gbt_status status = gbt_make_scene(&scene, data, &err);

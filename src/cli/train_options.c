@@ -77,6 +77,8 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
         {.name = "tensorboard", .kind = OPTION_FLAG, .value = &d->tensorboard,
          .help = "also write RUN/events.out.tfevents.* for TensorBoard"},
         {.name = "resume", .kind = OPTION_FLAG, .value = &d->resume, .help = "go on from the last checkpoint of RUN, with its settings"},
+        {.name = "overwrite", .kind = OPTION_FLAG, .value = &d->overwrite,
+         .help = "train anew in a folder that holds a run, which is lost"},
         {.name = "seed", .kind = OPTION_UINT64, .value = &d->seed, .value_name = "S", .help = "of everything that is random"},
         {.name = "memory", .kind = OPTION_SIZE, .value = &d->hit_bytes_max, .min = 0, .max = 0x1p60, .value_name = "BYTES",
          .help = "for the hits kept for the adjoint (100M); what goes beyond is traced again; 0: no limit; never changes the result"},

@@ -198,7 +198,9 @@ static void remove_checkpoints(const char *run)
 static gbt_status train(const char *data, const char *run, const gbt_train_def *def, gbt_error *err)
 {
     gbt_error why = {0};
-    const gbt_status status = gbt_train(data, run, def, &why);
+    gbt_train_def anew = *def;
+    anew.overwrite = true;
+    const gbt_status status = gbt_train(data, run, &anew, &why);
     if (status == GBT_ERR_INTERRUPTED)
         return base_fail(err, status, "%.400s: interrupted; the same command goes on with this run", run);
     return status == GBT_OK ? GBT_OK : base_fail(err, status, "%s", why.text);

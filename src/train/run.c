@@ -31,11 +31,10 @@ typedef struct run_paths {
         checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
 } run_paths;
 
-static gbt_status open_folder(const char *run, run_paths *p, gbt_error *err)
+static gbt_status open_folder(const char *run, bool may_hold_run, run_paths *p, gbt_error *err)
 {
     char checkpoints[PATH_SIZE];
     GBT_TRY(file_join(checkpoints, sizeof checkpoints, run, "checkpoints", err));
-    GBT_TRY(file_make_folder(checkpoints, err));
     GBT_TRY(file_join(p->model, sizeof p->model, run, "model.gbt", err));
     GBT_TRY(file_join(p->config, sizeof p->config, run, "config", err));
     GBT_TRY(file_join(p->log, sizeof p->log, run, "log.csv", err));
@@ -43,7 +42,11 @@ static gbt_status open_folder(const char *run, run_paths *p, gbt_error *err)
     GBT_TRY(file_join(p->json, sizeof p->json, run, "train.json", err));
     GBT_TRY(file_join(p->exposure, sizeof p->exposure, run, "exposure.json", err));
     GBT_TRY(file_join(p->checkpoint, sizeof p->checkpoint, checkpoints, "last.gbt", err));
-    return file_join(p->checkpoint_previous, sizeof p->checkpoint_previous, checkpoints, "last.gbt.prev", err);
+    GBT_TRY(file_join(p->checkpoint_previous, sizeof p->checkpoint_previous, checkpoints, "last.gbt.prev", err));
+    if (!may_hold_run && (file_exists(p->model) || file_exists(p->checkpoint) || file_exists(p->checkpoint_previous)))
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%.1000s: holds a run already (go on with it by --resume, name another folder, or lose it by --overwrite)", run);
+    return file_make_folder(checkpoints, err);
 }
 
 /* The smallest pixel of each anchor, from the training views; NULL without a footprint. */
@@ -227,7 +230,8 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
                                   gbt_error *err)
 {
     run_paths paths;
-    GBT_TRY(open_folder(run, &paths, err)); /* before any work: a run that cannot be written must not start */
+    /* Before any work: a run that cannot be written must not start. */
+    GBT_TRY(open_folder(run, def->resume || def->overwrite, &paths, err));
     const double begin = clock_wall();
     if (def->resume)
         GBT_TRY(resume(t, data, &paths, def, strings, err));

@@ -414,6 +414,12 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     "$program" compress run -o whole.gbt --lossless >out 2>err && "$program" compress whole.gbt -o copy.gbt --lossless >out 2>err && cmp -s whole.gbt copy.gbt &&
         grep -q 'already small' out && "$program" compress whole.gbt -o quantised.gbt >out 2>err && [ "$(wc -c <quantised.gbt)" -lt "$(wc -c <whole.gbt)" ]
     report $? "a lossless model is copied without loss only" "$(cat err out)"
+    "$program" train made -o run-small --iterations 4 >out 2>err
+    got=$?
+    [ "$got" = 2 ] && [ "$(grep -c '^error: run-small: .*--resume.*--overwrite' err)" = 1 ] && cmp -s small.gbt run-small/model.gbt
+    report $? "train leaves a run alone" "  got $got: $(cat err out)"
+    "$program" train made -o run-small --iterations 4 --overwrite >out 2>err && "$program" info run-small | grep -q 'trained   4 iterations'
+    report $? "train --overwrite trains anew" "$(cat err out; "$program" info run-small)"
     mv made moved && "$program" compress run -o alone.gbt >out 2>err && grep -q '(steps: the model alone)$' out && grep -q '^made is not there: ' err &&
         "$program" info alone.gbt >>out 2>>err
     report $? "a model without its data set becomes small too" "$(cat err out)"

@@ -638,6 +638,44 @@ static void data_without_training_photos_is_refused(void **state)
     assert_false(file_exists(in_root("none/model.gbt")));
 }
 
+static void a_run_is_overwritten_only_when_asked(void **state)
+{
+    (void)state;
+    static const char *const files[] = {"model.gbt", "config", "log.csv", "checkpoints/last.gbt"};
+    bytes before[4];
+    gbt_train_def def = run_def();
+    def.iterations = 3, def.stop_at_step = 2;
+    train_fails(tiny, in_root("kept"), &def, GBT_ERR_INTERRUPTED, "after step 2");
+    for (int i = 0; i < 4; i++)
+        before[i] = read_bytes(in_root("kept/%s", files[i]));
+    def.seed = 6, def.stop_at_step = 0;
+    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "kept: holds a run already");
+    for (int i = 0; i < 4; i++) {
+        bytes after = read_bytes(in_root("kept/%s", files[i]));
+        assert_int_equal(before[i].count, after.count);
+        assert_memory_equal(before[i].data, after.data, after.count);
+        mem_free(before[i].data);
+        mem_free(after.data);
+    }
+    /* The checkpoint alone can be resumed, the model alone is a finished run. */
+    assert_int_equal(rename(in_root("kept/model.gbt"), in_root("kept/aside")), 0);
+    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "--resume");
+    assert_int_equal(rename(in_root("kept/checkpoints/last.gbt"), in_root("kept/checkpoints/last.gbt.prev")), 0);
+    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "--overwrite");
+    assert_int_equal(unlink(in_root("kept/checkpoints/last.gbt.prev")), 0);
+    assert_int_equal(rename(in_root("kept/aside"), in_root("kept/model.gbt")), 0);
+    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "holds a run already");
+
+    train_ok(tiny, in_root("anew"), &def);
+    gbt_error err = {0};
+    def.overwrite = true;
+    train_ok(tiny, in_root("kept"), &def);
+    assert_same_file(in_root("anew/model.gbt"), in_root("kept/model.gbt"));
+    if (gbt_train_with(tiny, in_root("kept"), "iterations = 3\nseed = 6\noverwrite = 1\n", &err) != GBT_OK)
+        fail_msg("%s", err.text);
+    assert_same_file(in_root("anew/model.gbt"), in_root("kept/model.gbt"));
+}
+
 /* A run has read its photos when it starts; one that is resumed reads them again. */
 static void a_vanished_photo_is_named(void **state)
 {
@@ -1153,6 +1191,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(moments_follow_their_rows),
         cmocka_unit_test(points_are_made_where_there_are_none),
         cmocka_unit_test(data_without_training_photos_is_refused),
+        cmocka_unit_test(a_run_is_overwritten_only_when_asked),
         cmocka_unit_test(a_vanished_photo_is_named),
         cmocka_unit_test(a_full_disk_leaves_the_old_checkpoint),
         cmocka_unit_test(a_damaged_checkpoint_is_refused),

@@ -74,7 +74,8 @@ gbt_train_def gbt_train_def_default(void);
 /**
  * Train on the data set in `data`, write everything into the folder `run`.
  *
- * `run` gets model.gbt, log.csv, config, train.json and checkpoints/. What happens meanwhile goes where gbtrace/progress.h says. SIGINT and
+ * `run` gets model.gbt, log.csv, config, data_places, train.json and checkpoints/. What happens meanwhile goes where
+ * gbtrace/progress.h says. SIGINT and
  * SIGTERM stop after the current step: a checkpoint is saved and GBT_ERR_INTERRUPTED is returned. The same seed and length give the same
  * model.gbt, bit for bit, for any number of threads, interrupted and resumed or not.
  *

@@ -42,7 +42,7 @@ static gbt_status open_run(const char *run, const gbt_compress_def *def, loaded_
     GBT_TRY(loaded_run_need_anchors(r, run, err));
     if (def->lossless)
         return GBT_OK;
-    *has_views = def->data != NULL || file_exists(r->model.data_folder) || file_is_folder(r->model.data_folder);
+    *has_views = def->data != NULL || r->data.place[0] != '\0';
     if (!*has_views) {
         log_info("%s is not there: the steps come from the model alone (--data DIR says where the data set is)", r->model.data_folder);
         return GBT_OK;

@@ -7,6 +7,7 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/log.h"
 #include "data/cameras_json.h"
 #include "data/gaussian_file.h"
 #include "data/result_folder.h"
@@ -56,7 +57,7 @@ static gbt_status open_cloud(const char *path, loaded_run *out, gbt_error *err)
     return file_is_folder(path) ? describe_folder(path, out, err) : GBT_OK;
 }
 
-static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
+static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
 {
     char path[4096];
     GBT_TRY(gaussian_file_check_readable(run, err));
@@ -80,6 +81,13 @@ static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
     return GBT_OK;
 }
 
+static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
+{
+    GBT_TRY(read_model(run, out, err));
+    run_data_find(run, out->model.data_folder, &out->data);
+    return GBT_OK;
+}
+
 /* Another data set of the same place has another local origin. */
 static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
 {
@@ -95,7 +103,7 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
 {
     scene_split split;
     GBT_TRY(scene_split_parse(out->def.eval_split, &split, err));
-    const bool has_data = out->model.data_folder[0] != '\0' && file_exists(out->model.data_folder);
+    const bool has_data = out->data.place[0] != '\0';
     char cameras[4096];
     GBT_TRY(file_join(cameras, sizeof cameras, run, "cameras.json", err));
     if (data == NULL && out->cloud.count > 0 && !has_data && file_exists(cameras)) {
@@ -107,9 +115,10 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
                          "%.1000s: plain Gaussians know no cameras: name a camera or a data set (--camera or --data)", run);
     if (data == NULL && !has_data)
         return base_fail(err, GBT_ERR_IO,
-                         "%.1000s: the data set of %.1000s is not there; run the command in the folder where it was trained, or say where "
-                         "with --data", out->model.data_folder, run);
-    GBT_TRY(scene_load(data != NULL ? data : out->model.data_folder, &split, &out->scene, err));
+                         "%.300s: its data set is not there (tried %.1200s); say with --data where it is", run, out->data.tried);
+    if (data == NULL && out->data.moved)
+        log_info("%s: its data set is taken from %s, for both were moved", run, out->data.place);
+    GBT_TRY(scene_load(data != NULL ? data : out->data.place, &split, &out->scene, err));
     GBT_TRY(scene_set_alpha(&out->scene, out->def.alpha, err));
     return place_views(downscale, out, err);
 }

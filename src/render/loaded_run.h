@@ -8,12 +8,14 @@
 #include "train/config.h"
 #include "frame/frame.h"
 #include "train/photos.h"
+#include "train/run_data.h"
 
 typedef struct loaded_run {
     model model;
     gaussian_cloud cloud; /* of a file of plain Gaussians, local coordinates; then `model` has no anchors and is about the scene alone */
     gbt_train_def def; /* the settings it was trained with; strings point into `strings` */
     config_strings strings;
+    run_data data; /* where its data set is */
     scene scene; /* cameras and points in the model's local coordinates */
     photos photos;
     trace_settings settings;

@@ -13,6 +13,7 @@
 #include "io/model_file.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
+#include "train/run_data.h"
 #include "train/run_log.h"
 #include "train/sampling.h"
 #include "train/trainer.h"
@@ -243,6 +244,7 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
     char config[CONFIG_TEXT_SIZE];
     config_text(&t->def, t->scene.folder, config, sizeof config);
     GBT_TRY(file_write_atomic(paths.config, config, strlen(config), err));
+    GBT_TRY(run_data_save(run, t->scene.folder, err));
 
     run_log log;
     GBT_TRY(run_log_open(&log, t, paths.log, paths.events, err));

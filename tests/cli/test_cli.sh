@@ -420,6 +420,23 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "train leaves a run alone" "  got $got: $(cat err out)"
     "$program" train made -o run-small --iterations 4 --overwrite >out 2>err && "$program" info run-small | grep -q 'trained   4 iterations'
     report $? "train --overwrite trains anew" "$(cat err out; "$program" info run-small)"
+    mkdir elsewhere && (cd elsewhere && "$program" eval ../run-small) >out 2>err
+    report $? "eval from another folder" "$(cat err out)"
+    mkdir pair && cp -r made run-small pair && sed '2s#/made$#/gone#' run-small/data_places >pair/run-small/data_places &&
+        (cd elsewhere && "$program" eval ../pair/run-small) >out 2>err &&
+        grep -q '^\.\./pair/run-small: its data set is taken from \.\./pair/run-small/\.\./made, ' err
+    report $? "eval of a run that was moved with its data" "$(cat err out)"
+    rm pair/run-small/data_places && "$program" eval pair/run-small >out 2>err
+    report $? "eval of an older run, in the folder where it was trained" "$(cat err out)"
+    (cd elsewhere && "$program" eval ../pair/run-small) >out 2>err
+    got=$?
+    [ "$got" = 4 ] && [ "$(grep error err)" = "error: ../pair/run-small: its data set is not there (tried made); say with --data where it is" ]
+    report $? "eval names the place of a missing data set" "  got $got: $(cat err out)"
+    printf 'made\n/gone/made\n../gone\n' >pair/run-small/data_places
+    (cd elsewhere && "$program" eval ../pair/run-small) >out 2>err
+    got=$?
+    [ "$got" = 4 ] && grep -q '(tried /gone/made, \.\./pair/run-small/\.\./gone, made)' err
+    report $? "eval names all places of a missing data set" "  got $got: $(cat err out)"
     mv made moved && "$program" compress run -o alone.gbt >out 2>err && grep -q '(steps: the model alone)$' out && grep -q '^made is not there: ' err &&
         "$program" info alone.gbt >>out 2>>err
     report $? "a model without its data set becomes small too" "$(cat err out)"

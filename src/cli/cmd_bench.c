@@ -22,26 +22,27 @@ static int run_bench(const command *self, int argc, char **argv)
         {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json",
          .help = "a camera file (docs/cameras.md); needed for plain Gaussians; default: the run's first held-out view"},
         {.name = "alpha-min", .kind = OPTION_FLOAT, .value = &def.alpha_min, .min = 1e-6, .max = 0.999, .value_name = "A",
-         .help = "smallest response that counts; default: the run's, else 1/255"},
+         .help = "ignore hits with an alpha below this; 0: as the run, else 1/255"},
         {.name = "alpha-max", .kind = OPTION_FLOAT, .value = &def.alpha_max, .min = 1e-6, .max = 0.999999, .value_name = "A",
-         .help = "alpha is cut here; default: the run's, else 0.99"},
+         .help = "clamp alpha to this; 0: as the run, else 0.99"},
         {.name = "t-min", .kind = OPTION_FLOAT, .value = &def.t_min, .min = 1e-9, .max = 0.999, .value_name = "T",
-         .help = "stop below this transmittance; default: the run's, else 1e-4"},
+         .help = "stop a ray below this transmittance; 0: as the run, else 1e-4"},
         {.name = "proxy-radius", .kind = OPTION_FLOAT, .value = &def.proxy_radius, .min = 0, .max = 1e6, .value_name = "R",
-         .help = "a Gaussian ends at this many std-devs; 0: where its response falls to alpha-min"},
+         .help = "cut Gaussians off at this many standard deviations; 0: where alpha falls to --alpha-min"},
         {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast",
-         .help = "cut-offs by name (docs/accuracy.md); the options above win over it"},
+         .help = "cut-off preset (docs/accuracy.md); the options above override it"},
         {.name = "kernel", .kind = OPTION_STRING, .value = &def.kernel, .value_name = "LIST",
          .choices = "tile|single|embree", .list = true,
-         .help = "tile, single or embree; tile,embree measures both in turn and compares them"},
+         .help = "tile, single or embree; tile,embree measures both alternately and compares them"},
         {.name = "memory", .kind = OPTION_SIZE, .value = &def.tape_bytes_max, .min = 0, .max = 0x1p60, .value_name = "BYTES",
-         .help = "for the hits kept for the adjoint (100M); 0: no limit"},
+         .help = "memory for ray hits kept for the backward pass, such as 100M; 0: no limit"},
         {.name = "repeats", .kind = OPTION_INT, .value = &def.repeats, .min = 1, .max = 1000, .value_name = "N",
-         .help = "timed passes; the median counts"},
-        {.name = "check", .kind = OPTION_FLAG, .value = &check, .help = "compare with the double reference"},
-        {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", .help = "write the figures there"},
+         .help = "timed passes; the median is reported"},
+        {.name = "check", .kind = OPTION_FLAG, .value = &check, .help = "compare with the double-precision reference"},
+        {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE",
+         .help = "write the figures to this file"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
-         .help = "0: all processors, at most the container's share"},
+         .help = THREADS_HELP},
     };
     operands name;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &name);
@@ -54,7 +55,7 @@ static int run_bench(const command *self, int argc, char **argv)
     return command_failed(gbt_bench_trace(&def, stdout, &err), &err);
 }
 
-const command command_bench = {.name = "bench", .summary = "time the tracer on given Gaussians",
+const command command_bench = {.name = "bench", .summary = "benchmark the ray tracer on given Gaussians",
                                .usage = "trace --model FILE|RUN [--camera FILE.json]", .run = run_bench, .words = workloads};
 
 static int run_check_grad(const command *self, int argc, char **argv)
@@ -62,7 +63,7 @@ static int run_check_grad(const command *self, int argc, char **argv)
     int threads = 0;
     const option options[] = {
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
-         .help = "0: all processors, at most the container's share"},
+         .help = THREADS_HELP},
     };
     operands run;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &run);
@@ -74,5 +75,6 @@ static int run_check_grad(const command *self, int argc, char **argv)
     return command_failed(gbt_check_grad(run.value[0], stdout, &err), &err);
 }
 
-const command command_check_grad = {.name = "check-grad", .summary = "analytic gradients against double and differences, on a trained run",
+const command command_check_grad = {.name = "check-grad",
+    .summary = "check the gradients of a trained run against double precision and finite differences",
                                     .usage = "RUN", .run = run_check_grad};

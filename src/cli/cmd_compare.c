@@ -18,7 +18,7 @@ static int run(const command *self, int argc, char **argv)
     const char *network = NULL;
     const option options[] = {
         {.name = "lpips", .kind = OPTION_STRING, .value = &network, .value_name = "FILE", .help = LPIPS_HELP},
-        {.name = "json", .kind = OPTION_FLAG, .value = &json, .help = "as JSON"},
+        {.name = "json", .kind = OPTION_FLAG, .value = &json, .help = "print JSON"},
     };
     operands named;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 2, 2, argc, argv, &named);
@@ -52,5 +52,6 @@ static int run(const command *self, int argc, char **argv)
     return 0;
 }
 
-const command command_compare = {.name = "compare", .summary = "two pictures: PSNR, SSIM, FLIP, LPIPS", .usage = "IMAGE REFERENCE",
+const command command_compare = {.name = "compare",
+    .summary = "compare two pictures: PSNR, SSIM, FLIP, LPIPS", .usage = "IMAGE REFERENCE",
                                  .run = run};

@@ -30,12 +30,12 @@ static int run(const command *self, int argc, char **argv)
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR",
          .help = "folder for the scene and the run"},
         {.name = "minutes", .kind = OPTION_DOUBLE, .value = &minutes, .min = 0.05, .max = 600, .value_name = "M",
-         .help = "time for training"},
+         .help = "training time, minutes"},
         {.name = "scene", .kind = OPTION_CHOICE, .value = &scene.name, .choices = scene_choices(),
          .help = "which procedural scene (gbtrace make-scene --help says what they show)"},
-        {.name = "seed", .kind = OPTION_UINT64, .value = &train.seed, .value_name = "S", .help = "of everything that is random"},
+        {.name = "seed", .kind = OPTION_UINT64, .value = &train.seed, .value_name = "S", .help = "random seed"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
-         .help = "0: all processors, at most the container's share"},
+         .help = THREADS_HELP},
     };
     operands none;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 0, 0, argc, argv, &none);
@@ -69,5 +69,6 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(status, &err);
 }
 
-const command command_demo = {.name = "demo", .summary = "make a scene, train on it, score it, report, in one go",
+const command command_demo = {.name = "demo",
+    .summary = "make a procedural scene, train on it, score it and write the report",
                               .usage = "[--minutes M] [-o DIR]", .run = run};

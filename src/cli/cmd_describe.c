@@ -25,5 +25,6 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_describe = {
-    .name = "describe", .summary = "print the manual page, or a completion script for a shell", .usage = "man|bash|zsh|fish",
+    .name = "describe",
+    .summary = "print the manual page, or a completion script for a shell", .usage = "man|bash|zsh|fish",
     .run = run, .words = form_words};

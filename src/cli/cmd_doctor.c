@@ -1,4 +1,4 @@
-/* cli/cmd_doctor.c -- gbtrace doctor: is this build all right, on this machine? */
+/* cli/cmd_doctor.c -- gbtrace doctor: check the build and the machine. */
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -47,11 +47,11 @@ static void check_environment(gbt_diagnosis *d)
             options_visit(command_list[i], look_in, &s);
         known += s.found, unknown += !s.found;
         if (!s.found && unknown == 1)
-            snprintf(c->advice, sizeof c->advice, "no command has the option of %.*s: unset it, or mend the name",
+            snprintf(c->advice, sizeof c->advice, "no command has the option of %.*s: unset it, or correct its name",
                      (int)strcspn(s.name, "="), s.name);
     }
     c->level = unknown > 0 ? GBT_CHECK_WARN : GBT_CHECK_OK;
-    snprintf(c->found, sizeof c->found, "%d variables set options, %d are called so and set nothing", known, unknown);
+    snprintf(c->found, sizeof c->found, "%d variables set options, %d name no option", known, unknown);
 }
 
 /* ---- report ------------------------------------------------------------------------------------------------------------------------- */
@@ -84,7 +84,7 @@ static int run(const command *self, int argc, char **argv)
 {
     bool json = false;
     const option options[] = {
-        {.name = "json", .kind = OPTION_FLAG, .value = &json, .help = "as JSON"},
+        {.name = "json", .kind = OPTION_FLAG, .value = &json, .help = "print JSON"},
     };
     operands folder;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 0, 1, argc, argv, &folder);
@@ -106,5 +106,6 @@ static int run(const command *self, int argc, char **argv)
     return failed > 0;
 }
 
-const command command_doctor = {.name = "doctor", .summary = "is this build all right, on this machine, in this folder",
+const command command_doctor = {.name = "doctor",
+    .summary = "check build, machine and folder: version, processor, memory, libraries, tracer, gradients, speed",
                                 .usage = "[FOLDER]", .run = run};

@@ -8,21 +8,22 @@ static int run(const command *self, int argc, char **argv)
     gbt_evaluate_def def = gbt_evaluate_def_default();
     int threads = 0;
     const option options[] = {
-        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN", .help = "the same as RUN",
+        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN",
+         .help = "the same as RUN",
          .aliases = "model-paths"},
         {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA",
          .help = "data set in place of the one it was trained on", .aliases = "s source-path"},
         {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", 
          .help = "write the scores there too; the only file with other settings than the run's own"},
         {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray",
-         .help = "what draws the model; default: what it was trained with"},
+         .help = "renderer; default: the one it was trained with"},
         {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",
-         .help = "divide the photos' size by this; 0: as in training", .aliases = "r resolution"},
+         .help = "divide the photos' width and height by this; 0: as in training", .aliases = "r resolution"},
         {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast",
-         .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
+         .help = "cut-off preset (docs/accuracy.md); training uses default"},
         {.name = "lpips", .kind = OPTION_STRING, .value = &def.lpips, .value_name = "FILE", .help = LPIPS_HELP},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
-         .help = "0: all processors, at most the container's share"},
+         .help = THREADS_HELP},
     };
     operands model;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);
@@ -34,5 +35,6 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_evaluate(model.value[0], &def, &err), &err);
 }
 
-const command command_eval = {.name = "eval", .summary = "score the held-out views: PSNR, SSIM, FLIP, LPIPS; renders and report",
+const command command_eval = {.name = "eval",
+    .summary = "score the held-out views (PSNR, SSIM, FLIP, LPIPS) and update the report",
                               .usage = "RUN", .run = run, .alias = "metrics"};

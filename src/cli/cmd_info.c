@@ -16,4 +16,5 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_info(paths.value[0], json, stdout, &err), &err);
 }
 
-const command command_info = {.name = "info", .summary = "what is in a data set or a model", .usage = "PATH", .run = run};
+const command command_info = {.name = "info",
+    .summary = "show what a data set or a model contains", .usage = "PATH", .run = run};

@@ -11,19 +11,23 @@ static int run(const command *self, int argc, char **argv)
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "FILE.ply",
          .help = "where to write balls and anchors", .required = true},
         {.name = "init", .kind = OPTION_CHOICE, .value = &def.init, .choices = "gb|adaptive|voxel|random",
-         .help = "granular balls; balls where the scene needs them; the voxel baseline; or random points"},
+         .help = "initial anchors: the paper's granular balls, adaptive granular balls, the voxel baseline, or random "
+                 "points"},
         {.name = "init-count", .kind = OPTION_DOUBLE, .value = &def.init_count, .min = 0, .max = 1, .value_name = "F",
-         .help = "anchors per point of adaptive and random; 0: half as many as gb"},
+         .help = "adaptive and random: anchors per sparse point; 0: half as many anchors as gb gives"},
         {.name = "scale-prior", .kind = OPTION_CHOICE, .value = &def.scale_prior, .choices = "gb|nn",
-         .help = "first scale of --init gb: balls and spacing, or spacing alone, as the others have"},
+         .help = "initial scale with --init gb: from ball radius and point spacing, or from spacing alone, as with "
+                 "the other --init"},
         {.name = "max-depth", .kind = OPTION_INT, .value = &def.max_depth, .min = 0, .max = 64, .value_name = "D",
-         .help = "most splits of the cloud"},
+         .help = "maximum depth of the ball tree"},
         {.name = "voxel-size", .kind = OPTION_FLOAT, .value = &def.voxel_size, .min = 0, .max = 1e30, .value_name = "V",
-         .help = "base scale, scene units; 0: from the points"},
+         .help = "voxel size, scene units; 0: estimated from the points"},
         {.name = "voxel-rule", .kind = OPTION_CHOICE, .value = &def.voxel_rule, .choices = "median|squared",
-         .help = "how it comes from the points: their spacing, or the reference code's squares"},
-        {.name = "mesh", .kind = OPTION_FLAG, .value = &mesh, .help = "write a sphere per ball in place of a point"},
-        {.name = "json", .kind = OPTION_STRING, .value = &json, .value_name = "FILE", .help = "write the counts there"},
+         .help = "how it is estimated: median point spacing, or the squared spacing that the reference code uses"},
+        {.name = "mesh", .kind = OPTION_FLAG, .value = &mesh,
+         .help = "write each ball as a sphere mesh instead of a point"},
+        {.name = "json", .kind = OPTION_STRING, .value = &json, .value_name = "FILE",
+         .help = "write the counts to this file"},
     };
     operands data;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &data);
@@ -34,5 +38,6 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_init(data.value[0], &def, out, json, stdout, &err), &err);
 }
 
-const command command_init = {.name = "init", .summary = "granular balls and anchors of a data set, beside the voxel baseline",
+const command command_init = {.name = "init",
+    .summary = "compute granular balls and anchors of a data set, and compare them with the voxel baseline",
                               .usage = "DATA -o FILE.ply", .run = run};

@@ -24,42 +24,50 @@ static int run(const command *self, int argc, char **argv)
     int threads = 0;
     const option options[] = {
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR",
-         .help = "folder for the images; default: RUN/renders/SPLIT; with --path also a film: .mp4, .webm, .gif (by ffmpeg)"},
-        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN", .help = "the same as RUN"},
-        {.name = "split", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .help = "which views of the data set"},
+         .help = "folder for the images; default: RUN/renders/SPLIT; with --path also a film: .mp4, .webm, .gif (by "
+                 "ffmpeg)"},
+        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN",
+         .help = "the same as RUN"},
+        {.name = "split", .kind = OPTION_CHOICE, .value = &split, .choices = splits,
+         .help = "which views of the data set"},
         {.name = "skip-train", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .fixed = "test",
          .help = "the same as --split test"},
         {.name = "skip-test", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .fixed = "train",
          .help = "the same as --split train"},
         {.name = "iteration", .kind = OPTION_ELSEWHERE, .help = "a run keeps its last model alone"},
         {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json",
-         .help = "one picture of this camera (lens, aperture, rolling shutter, rays: docs/cameras.md), no views"},
+         .help = "render one picture from this camera file (lens, aperture, rolling shutter, rays: docs/cameras.md) "
+                 "instead of views"},
         {.name = "path", .kind = OPTION_STRING, .value = &def.path, .value_name = "orbit|interpolate|FILE.json",
          .choices = "orbit|interpolate",
-         .help = "a film: around what the photos show, through their cameras, or along those of a file (docs/video.md)"},
+         .help = "render a film: an orbit around the scene, through the photos' cameras, or along a path file "
+                 "(docs/video.md)"},
         {.name = "frames", .kind = OPTION_INT, .value = &def.frames, .min = 0, .max = 100000, .value_name = "N",
-         .help = "of the film; 0: 240 around, 15 for each photo, all of a file"},
+         .help = "number of frames; 0: 240 for an orbit, 15 per photo, or all of a path file"},
         {.name = "fps", .kind = OPTION_DOUBLE, .value = &def.fps, .min = 0, .max = 1000, .value_name = "F",
-         .help = "frames per second; 0: what a path file says, else 30"},
+         .help = "frames per second; 0: as the path file says, else 30"},
         {.name = "size", .kind = OPTION_STRING, .value = &size, .value_name = "WxH",
-         .help = "of the film, as 1280x720; default: that of the photos"},
+         .help = "size of the film, such as 1280x720; default: that of the photos"},
         {.name = "outputs", .kind = OPTION_STRING, .value = &def.outputs, .value_name = "LIST",
          .choices = "transmittance|depth|median-depth|normal|hits|anchor", .list = true,
-         .help = "EXR files beside the picture: transmittance,depth,median-depth,normal,hits,anchor or some of them (docs/formats.md)",
+         .help = "also write these as EXR: any of transmittance,depth,median-depth,normal,hits,anchor "
+                 "(docs/formats.md)",
          .aliases = "aov"},
         {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast",
-         .help = "cut-offs by name (docs/accuracy.md); as in training: default"},
+         .help = "cut-off preset (docs/accuracy.md); training uses default"},
         {.name = "insert", .kind = OPTION_STRING, .value = &def.insert, .value_name = "FILE.json",
-         .help = "put meshes into the scene: matt or mirrors, with shadows (docs/inserting.md)"},
+         .help = "insert meshes into the scene, matt or mirrors, with shadows (docs/inserting.md)"},
         {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA",
-         .help = "cameras of this data set; needed for plain Gaussians (.ply, .splat, .spz) without --camera", .aliases = "s source-path"},
+         .help = "cameras of this data set; needed for plain Gaussians (.ply, .splat, .spz) without --camera",
+         .aliases = "s source-path"},
         {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray|reference",
-         .help = "what draws the model; default: what it was trained with. The reference is in double, and slow"},
-        {.name = "format", .kind = OPTION_CHOICE, .value = &def.format, .choices = "png|exr", .help = "8-bit PNG, or float EXR"},
+         .help = "renderer; default: the one it was trained with. reference: double precision, slow"},
+        {.name = "format", .kind = OPTION_CHOICE, .value = &def.format, .choices = "png|exr",
+         .help = "8-bit PNG, or float EXR"},
         {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",
-         .help = "divide the photos' size by this; 0: as in training", .aliases = "r resolution"},
+         .help = "divide the photos' width and height by this; 0: as in training", .aliases = "r resolution"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
-         .help = "0: all processors, at most the container's share"},
+         .help = THREADS_HELP},
     };
     operands model;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);
@@ -87,5 +95,6 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(status, &err);
 }
 
-const command command_render = {.name = "render", .summary = "render the views of a scene, a camera of your own, or a film",
+const command command_render = {.name = "render",
+    .summary = "render the views of a scene, a camera of your own, or a film",
                                 .usage = "RUN|GAUSSIANS [-o DIR]", .run = run};

@@ -12,5 +12,6 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_report(given.value[0], given.value + 1, (size_t)given.count - 1, &err), &err);
 }
 
-const command command_report = {.name = "report", .summary = "make the page of a run again, with the charts of studies",
+const command command_report = {.name = "report",
+    .summary = "write the report of a run again, with the charts of studies",
                                 .usage = "RUN [STUDY...]", .run = run};

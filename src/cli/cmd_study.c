@@ -89,26 +89,27 @@ static int run(const command *self, int argc, char **argv)
         {.name = "camera", .kind = OPTION_STRING, .value = &def->camera, .value_name = "FILE.json",
          .help = "speed, crosscheck: the camera of files of plain Gaussians; default: camera.json beside each"},
         {.name = "repeats", .kind = OPTION_INT, .value = &def->repeats, .min = 1, .max = 1000, .value_name = "N",
-         .help = "speed: timed passes of each setting; the median counts"},
+         .help = "speed: timed passes of each setting; the median is reported"},
         {.name = "only", .kind = OPTION_STRING, .value = &request.stability.only, .value_name = "A1,A9",
          .choices = "A1|A2|A3|A4|A5|A6|A7|A8|A9|A10|A11|A12|A13|A14|A15|A16|A17|A18", .list = true,
-         .help = "stability: these cases; default: all"},
-        {.name = "quick", .kind = OPTION_FLAG, .value = &quick, .help = "stability: the smaller sizes of its tests"},
+         .help = "stability: only these cases; default: all"},
+        {.name = "quick", .kind = OPTION_FLAG, .value = &quick, .help = "stability: the smaller scenes of its tests"},
         {.name = "iterations", .kind = OPTION_UINT64, .value = &iterations, .min = 0, .max = 1e9, .value_name = "N",
-         .help = "paper, anchors: steps of every run; 0: 3000 and 1000"},
+         .help = "paper, anchors: iterations of each run; 0: 3000 and 1000"},
         {.name = "renderer", .kind = OPTION_CHOICE, .value = &paper->renderer, .choices = "raster|trace|per-ray",
-         .help = "paper: what photos are compared with"},
+         .help = "paper: renderer of the runs"},
         {.name = "tables", .kind = OPTION_STRING, .value = &paper->tables, .value_name = "1,3", .choices = "1|2|3|4", .list = true,
-         .help = "paper: which of its four tables"},
-        {.name = "lpips", .kind = OPTION_STRING, .value = &paper->lpips, .value_name = "FILE", .help = "paper: " LPIPS_HELP},
+         .help = "paper: only these of its four tables"},
+        {.name = "lpips", .kind = OPTION_STRING, .value = &paper->lpips, .value_name = "FILE",
+         .help = "paper: " LPIPS_HELP},
         {.name = "budget", .kind = OPTION_DURATION, .value = &request.time.budget_seconds, .min = 1, .max = 1e6, .value_name = "TIME",
-         .help = "time: of a run"},
+         .help = "time: training time of a run"},
         {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &downscale, .min = 1, .max = 64, .value_name = "F",
-         .help = "paper, time, anchors: divide the photos' size by this"},
+         .help = "paper, time, anchors: divide the photos' width and height by this"},
         {.name = "seeds", .kind = OPTION_INT, .value = &seeds, .min = 0, .max = 10, .value_name = "N",
          .help = "paper, time, anchors: runs of each variant; 0: 3, 1 and 3"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
-         .help = "0: all processors, at most the container's share"},
+         .help = THREADS_HELP},
     };
     operands named;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 17, argc, argv, &named);
@@ -135,6 +136,7 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(studies[which].run(&request, &err), &err);
 }
 
-const command command_study = {.name = "study", .summary = "measure and draw charts: speed, accuracy, size, stability, the paper's tables",
+const command command_study = {.name = "study",
+    .summary = "measure and draw charts: speed, accuracy, size, stability, the paper's tables",
                                .usage = "speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR", .run = run,
                                .words = words_of_studies};

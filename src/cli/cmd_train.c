@@ -12,10 +12,11 @@ static int run(const command *self, int argc, char **argv)
     const option own[] = {
         {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &output, .value_name = "RUN",
          .help = "folder for the model, scores and report", .aliases = "m model-path", .required = true},
-        {.name = "source-path", .short_name = 's', .kind = OPTION_OPERAND, .value_name = "DATA", .help = "the same as DATA",
+        {.name = "source-path", .short_name = 's', .kind = OPTION_OPERAND, .value_name = "DATA",
+         .help = "the same as DATA",
          .aliases = "data"},
         {.name = "lossless", .kind = OPTION_FLAG, .value = &lossless,
-         .help = "keep every bit of the model (see compress); the file is some seven times larger"},
+         .help = "store the model without loss (see compress); the file is about seven times larger"},
     };
     option options[OPTIONS_MAX];
     const int count = train_options_table(&t, own, sizeof own / sizeof *own, options);
@@ -34,5 +35,6 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(status, &err);
 }
 
-const command command_train = {.name = "train", .summary = "train on posed photos, score the held-out ones, write a report",
+const command command_train = {.name = "train",
+    .summary = "train on posed photos, score the held-out ones, write a report",
                                .usage = "DATA -o RUN", .run = run};

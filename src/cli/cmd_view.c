@@ -20,7 +20,8 @@ static int run(const command *self, int argc, char **argv)
     int threads = 0;
     def.ready = print_address;
     const option options[] = {
-        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN", .help = "the same as RUN"},
+        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN",
+         .help = "the same as RUN"},
         {.name = "port", .short_name = 'p', .kind = OPTION_INT, .value = &def.port, .min = 0, .max = 65535, .value_name = "N",
          .help = "0: any free one"},
         {.name = "host", .kind = OPTION_STRING, .value = &def.host, .value_name = "ADDRESS",
@@ -28,7 +29,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "photos of another data set",
          .aliases = "s source-path"},
         {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
-         .help = "0: all processors, at most the container's share"},
+         .help = THREADS_HELP},
     };
     operands input;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &input);
@@ -40,5 +41,6 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_view(input.value[0], &def, &err), &err);
 }
 
-const command command_view = {.name = "view", .summary = "look at a scene in the browser, beside its photos, while it trains too",
+const command command_view = {.name = "view",
+    .summary = "view a scene in the browser beside its photos, also during training",
                               .usage = "RUN|MODEL.gbt|SCENE.ply|.splat|.spz", .run = run};

@@ -11,7 +11,7 @@ enum { NAMES_MAX = 64 };
 
 static int print_help(void)
 {
-    puts("usage: gbtrace COMMAND [arguments]\n\nneural Gaussian scenes from photos, traced on the CPU\n\ncommands:");
+    puts("usage: gbtrace COMMAND [arguments]\n\nneural Gaussian scenes from photos, ray traced on the CPU\n\ncommands:");
     for (int i = 0; i < command_list_count; i++)
         printf("  %-12s%s\n", command_list[i]->name, command_list[i]->summary);
     puts("\n`gbtrace COMMAND --help` lists the options of one; `gbtrace --version` (-V, -v) prints the version.\n"

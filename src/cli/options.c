@@ -25,12 +25,12 @@ static void make_table(table *t, const option *options, int option_count)
 {
     const option common[OPTIONS_COMMON] = {
         {.name = "progress", .kind = OPTION_CHOICE, .value = &progress_mode, .choices = progress_modes,
-         .help = "what stderr tells meanwhile: lines for a person, JSON lines (docs/command-line.md), warnings alone"},
+         .help = "progress on stderr: text, JSON lines (docs/command-line.md), or warnings and errors only"},
         {.name = "quiet", .kind = OPTION_CHOICE, .value = &progress_mode, .choices = progress_modes, .fixed = "none",
          .help = "the same as --progress none"},
         {.name = "config", .kind = OPTION_STRING, .value = &config_path, .value_name = "FILE",
-         .help = "read name = value lines first; the environment and the command line win"},
-        {.name = "help", .short_name = 'h', .kind = OPTION_FLAG, .value = &help_wanted, .help = "print this"},
+         .help = "read options from a file of name = value lines; environment and command line override it"},
+        {.name = "help", .short_name = 'h', .kind = OPTION_FLAG, .value = &help_wanted, .help = "print this help"},
     };
     progress_mode = "auto", config_path = NULL, first_operand = NULL, help_wanted = false;
     if (option_count > 0)

@@ -39,7 +39,8 @@ typedef struct option {
     bool required;
 } option;
 
-#define LPIPS_HELP "a network (.safetensors): LPIPS too (docs/metrics.md)"
+#define LPIPS_HELP "network weights (.safetensors), to compute LPIPS too (docs/metrics.md)"
+#define THREADS_HELP "number of threads; 0: all processors, within the container's limit"
 
 enum { OPTIONS_MAX = 64, OPTIONS_MAX_OPERANDS = 64, OPTIONS_COMMON = 4, OPTIONS_WANTED_SIZE = 256 };
 

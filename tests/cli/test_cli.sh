@@ -32,11 +32,11 @@ prints() {
 }
 
 # ---- help and version
-prints "help" '^  info  *what is in' --help
+prints "help" '^  info  *show what' --help
 prints "help, short" '^usage: gbtrace COMMAND' -h
 prints "help, as a verb" '^usage: gbtrace COMMAND' help
 prints "help about a verb" '^usage: gbtrace init DATA -o FILE.ply \[options\]$' help init
-prints "help of a verb" '^      --max-depth D  *most splits of the cloud (default 18)$' init --help
+prints "help of a verb" '^      --max-depth D  *maximum depth of the ball tree (default 18)$' init --help
 prints "help wins over what is wrong" '^usage: gbtrace init' init --nonsense -h
 prints "needed options say so" '^  -o, --output FILE.ply  *.* (needed)$' init --help
 prints "choices" '--init gb|adaptive|voxel|random$' init --help
@@ -125,7 +125,7 @@ config 'config = other\n' '1: config: unknown option'
 config 'a\0b\n' ' not a configuration file (wanted name = value lines, at most 1 MiB)'
 
 # ---- the environment, between the configuration file and the command line
-prints "help with a variable" '--max-depth D  *most splits of the cloud (default 18)$' init --help
+prints "help with a variable" '--max-depth D  *maximum depth of the ball tree (default 18)$' init --help
 export GBTRACE_MAX_DEPTH=65
 misuse 2 "GBTRACE_MAX_DEPTH: bad value (wanted $depth, got 65)" init d -o p
 export GBTRACE_MAX_DEPTH=5 GBTRACE_INIT_VOXEL_SIZE=nan

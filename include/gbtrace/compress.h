@@ -25,8 +25,8 @@ gbt_compress_def gbt_compress_def_default(void);
  * the model alone, with a line on stderr: the file is then some 5 to 40 % larger at the same loss. What the file gives back is checked
  * before it is written.
  *
- * A file that is already small is copied as it is, in a moment: always with `lossless`, else when it is quantised and `quality` is not below
- * the default (a file does not say at which quality it was made). A copy onto itself is nothing to do.
+ * A file that is already small is copied as it is, in a moment: always with `lossless`, else when it is quantised and `quality` is not
+ * below the default (a file does not say at which quality it was made). A copy onto itself is nothing to do.
  *
  * @param run [in] RUN (a folder with model.gbt) or a model file
  * @param out [in] written atomically; may be the model itself

@@ -57,7 +57,8 @@ gbt_status gaussian_file_check_readable(const char *path, gbt_error *err)
     const int format = format_of(path);
     return format < 0 || formats[format].read != NULL || file_is_folder(path)
                ? GBT_OK
-               : base_fail(err, GBT_ERR_ARGUMENT, "%s: %s is written for other programs, not read (wanted .ply, .splat, .spz, or a run)", path,
+               : base_fail(err, GBT_ERR_ARGUMENT, 
+                           "%s: %s is written for other programs, not read (wanted .ply, .splat, .spz, or a run)", path,
                            formats[format].ending);
 }
 

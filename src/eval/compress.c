@@ -85,8 +85,8 @@ static gbt_status code_run(loaded_run *r, bool has_views, const gbt_compress_def
 /**
  * When `path` is a coded model from which coding it again would gain nothing, `out` becomes a copy of it.
  *
- * A coarse file does not say at which quality it was made; that is the default, unless somebody asked for another. So it is coded again only
- * below the default.
+ * A coarse file does not say at which quality it was made; that is the default, unless somebody asked for another. So it is coded
+ * again only below the default.
  */
 static gbt_status keep_small(const char *path, const gbt_compress_def *def, const char *out, compression *c, gbt_error *err)
 {
@@ -165,7 +165,8 @@ static gbt_status save_report(const compression *c, const gbt_compress_def *def,
     json_t *root = json_pack("{s:i,s:I,s:I,s:I,s:f,s:s,s:o,s:o,s:f,s:f,s:f}", "schema", 1, "anchors", (json_int_t)c->anchors,
                              "bytes_before", (json_int_t)c->before, "bytes", (json_int_t)c->after.total, "bytes_per_anchor",
                              (double)c->after.total / count, "steps_from", c->steps_from, "quality",
-                             def->lossless || c->kept ? json_null() : json_real(def->quality), "parts", parts, "probe_seconds", c->probe_seconds,
+                             def->lossless || c->kept ? json_null() : json_real(def->quality), "parts", parts,
+                             "probe_seconds", c->probe_seconds,
                              "encode_seconds", c->encode_seconds, "decode_seconds", c->decode_seconds);
     const gbt_status status = json_save(root, def->json, err);
     json_decref(root);

@@ -96,7 +96,7 @@ static const char tail[] =
     ".TP\n3\nbad input\n"
     ".TP\n4\ninput or output failed\n"
     ".TP\n5\nout of memory, or over a limit\n"
-    ".TP\n128+\\fIn\\fR\nstopped by signal\n.I n\nafter saving\n"
+    ".TP\n130\nstopped by SIGINT or SIGTERM, after saving; a second signal\n.I n\nends at once, with 128+\\fIn\\fR\n"
     ".SH EXAMPLES\n"
     ".nf\n"
     "gbtrace train PHOTOS \\-o RUN \\-\\-budget 10m\n"

@@ -15,7 +15,7 @@ static int print_help(void)
     for (int i = 0; i < command_list_count; i++)
         printf("  %-12s%s\n", command_list[i]->name, command_list[i]->summary);
     puts("\n`gbtrace COMMAND --help` lists the options of one; `gbtrace --version` (-V, -v) prints the version.\n"
-         "Exit codes: 0 done, 2 usage, 3 bad input, 4 input or output failed, 5 out of memory or over a limit, 128+n stopped by signal n.");
+         "Exit codes: 0 done, 2 usage, 3 bad input, 4 input or output failed, 5 out of memory or over a limit, 130 interrupted.");
     return 0;
 }
 

@@ -150,6 +150,8 @@ def sizes(page):
         page.wait(f"gbtrace.look.about.height >= {room[1]} - 1 || gbtrace.look.about.width >= {room[0]} - 1")
         photo = page.run("gbtrace.look.scene.views[gbtrace.look.view]")
         size = page.run("[gbtrace.look.about.width, gbtrace.look.about.height]")
+        begin = [v * scale for v in box(page, "#render")[:2]]
+        check(name + ": on the screen's own pixels", all(abs(v - round(v)) < 1e-3 for v in begin), str(begin))
         fits = size[0] <= room[0] and size[1] <= room[1]
         check(name + ": the photo's shape", fits and abs(size[0] / size[1] - photo["width"] / photo["height"]) < 0.01, f"{size} in {room}")
         page.run("gbtrace.camera.view = -1; gbtrace.changed()")

@@ -64,7 +64,7 @@ function putInto([room, high], [x, y], box, width, height) {
     return place;
 }
 
-// Of the picture that is shown, not of the one that will be.
+// For the picture that is shown now: the one that was asked for may have another shape.
 function layout() {
     const stage = byId("stage"), mode = compareMode(), two = mode === "beside", room = rooms(), scale = window.devicePixelRatio;
     const shot = look.done !== null ? look.done.shot : null, size = shot !== null ? [shot.width, shot.height] : pictureSize();

@@ -22,8 +22,9 @@ typedef struct gbt_train_def {
     float voxel_size;           /* v, scene units; 0: the median spacing of the points. Default 0 */
     int offsets;                /* K, Gaussians per anchor, [1, 16]; 0: 2, or 10 with compat. Default 0 */
     const char *distance;       /* distance input of the networks: "auto" (default), "on", "off" */
-    uint64_t iterations;        /* length of the run; 0: the budget decides. Default 0 */
-    double budget_seconds;      /* wall time for training; used when iterations is 0. Default 600 */
+    uint64_t iterations;        /* length of the run, with what was done before `resume`; 0: the budget decides. Default 0 */
+    double budget_seconds;      /* wall time for training, with what was spent before `resume`; used when iterations is 0. 0: 600, or with
+                                   `resume` as long as the run was to be. Default 0 */
     const char *pace;           /* "n1,...,n20": iterations in each twentieth of the schedule, as a budget run records them. Default NULL */
     double downscale;           /* photos are divided by this, >= 1. Default 1 */
     const char *renderer;       /* what the photos are compared with: "trace" (default), "raster" (EWA splats; pinhole photos), or
@@ -61,7 +62,8 @@ typedef struct gbt_train_def {
     uint64_t save_at_step;      /* one extra checkpoint right after this step; 0: none. Default 0 */
     uint64_t stop_at_step;      /* stop, as a signal would, after this step; 0: never. Default 0 */
     bool tensorboard;           /* also write `run`/events.out.tfevents.0.train: scalars of log.csv. Default false */
-    bool resume;                /* go on from the run's last checkpoint; everything else comes from there */
+    bool resume;                /* go on from the run's last checkpoint, with its settings. Other `iterations`, or another budget, give the
+                                   run another length: schedules go on where a run of that length would be. Default false */
     bool overwrite;             /* train anew in a folder that holds a run, which is lost. Default false */
     double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* held-out PSNR after so many seconds of training; the clock stops meanwhile */
     int eval_at_count;
@@ -81,6 +83,9 @@ gbt_train_def gbt_train_def_default(void);
  *
  * A step whose loss or gradient is not finite changes nothing but a count; ten in a row end the run with GBT_ERR_FORMAT and one line that
  * names the photo or the parameter. Pixels of a float photo that are not finite count in no loss.
+ *
+ * With `resume`, `data` may be NULL: the run knows its data. Settings that differ from the run's own are warned of and not taken. A run
+ * that has taken all its steps takes none; a length that it has passed is GBT_ERR_ARGUMENT, other data than the run's GBT_ERR_FORMAT.
  *
  * A folder that holds model.gbt or a checkpoint is refused with GBT_ERR_ARGUMENT before anything is written, unless `resume` or `overwrite`
  * is set.

@@ -21,13 +21,15 @@ static int run(const command *self, int argc, char **argv)
     option options[OPTIONS_MAX];
     const int count = train_options_table(&t, own, sizeof own / sizeof *own, options);
     operands data;
-    const int code = options_parse(self, options, count, 1, 1, argc, argv, &data);
+    const int code = options_parse(self, options, count, 0, 1, argc, argv, &data);
     if (code >= 0)
         return code;
+    if (data.count == 0 && !t.def.resume)
+        return command_misused("argument missing (usage: gbtrace %s %s)", self->name, self->usage);
     gbt_error err = {0};
     gbt_status status = train_options_finish(&t, "gbtrace train", argc, argv, &err);
     if (status == GBT_OK)
-        status = gbt_train(data.value[0], output, &t.def, &err);
+        status = gbt_train(data.count > 0 ? data.value[0] : NULL, output, &t.def, &err);
     if (status == GBT_OK)
         status = finish_run(output, lossless, t.def.tensorboard, &err);
     if (status == GBT_OK)

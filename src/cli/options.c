@@ -248,7 +248,7 @@ int options_parse(const command *self, const option *options, int option_count, 
         return code;
     if (first_operand != NULL)
         put_first(out, first_operand);
-    else if (configured_operand != NULL && out->count < min_operands)
+    else if (configured_operand != NULL && out->count < (min_operands > 0 ? min_operands : 1))
         put_first(out, configured_operand);
     for (int i = 0; i < t.count; i++)
         given[i] = given[i] || before[i];

@@ -14,8 +14,8 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
 {
     gbt_train_def *d = &t->def;
     const option shared[] = {
-        {.name = "budget", .kind = OPTION_DURATION, .value = &d->budget_seconds, .min = 1, .max = 1e7, .value_name = "TIME",
-         .help = "training time, such as 90s, 10min or 1h; the schedule is fitted to it", .aliases = "budget-seconds"},
+        {.name = "budget", .kind = OPTION_DURATION, .value = &d->budget_seconds, .min = 0, .max = 1e7, .value_name = "TIME",
+         .help = "training time in all, such as 90s, 10min or 1h; the schedule is fitted to it; 0: 10min", .aliases = "budget-seconds"},
         {.name = "iterations", .kind = OPTION_UINT64, .value = &d->iterations, .min = 0, .max = 1e9, .value_name = "N",
          .help = "number of iterations instead of a time budget; 0: the budget decides", .aliases = "max-steps "
                  "num-iters"},
@@ -85,7 +85,9 @@ int train_options_table(train_options *t, const option *own, int own_count, opti
          .help = "time between checkpoints; 0: only at the end"},
         {.name = "tensorboard", .kind = OPTION_FLAG, .value = &d->tensorboard,
          .help = "also write RUN/events.out.tfevents.* for TensorBoard"},
-        {.name = "resume", .kind = OPTION_FLAG, .value = &d->resume, .help = "go on from the last checkpoint of RUN, with its settings"},
+        {.name = "resume", .kind = OPTION_FLAG, .value = &d->resume, 
+         .help = "go on with RUN from its last checkpoint, with its settings and data; with another --iterations or "
+                 "--budget to that length in all, also when it was finished"},
         {.name = "overwrite", .kind = OPTION_FLAG, .value = &d->overwrite,
          .help = "train anew in a folder that holds a run, which is lost"},
         {.name = "seed", .kind = OPTION_UINT64, .value = &d->seed, .value_name = "S", .help = "of everything that is random"},

@@ -50,6 +50,21 @@ static gbt_status read_anchors(const container *c, const char *prefix, size_t ro
     return copy_field(c, prefix, "scale_log", rows, 6, 2, (const size_t[]){6, 0}, a->scale_log, err);
 }
 
+/* FNV-1a of what tells one data set from another: the names, sizes and centres of its views. */
+static uint64_t hash_of_views(const scene *s)
+{
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < s->view_count; i++) {
+        const scene_view *v = &s->views[i];
+        char text[512];
+        const int length = snprintf(text, sizeof text, "%.300s %d %d %.6g %.6g %.6g", v->name, v->camera.width, v->camera.height,
+                                    v->camera.center[0], v->camera.center[1], v->camera.center[2]);
+        for (int k = 0; k <= length; k++)
+            hash = (hash ^ (unsigned char)text[k]) * 0x100000001b3u;
+    }
+    return hash;
+}
+
 gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
 {
     char config[CONFIG_TEXT_SIZE];
@@ -63,6 +78,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     container_add(&w, "pace", CONTAINER_U64, 1, (const size_t[]){PACE_SEGMENTS}, t->pace.steps);
     container_add_small(&w, "in_row", CONTAINER_U64, 3, (const uint64_t[]){t->skipped_in_row, t->barren_in_row, t->revivals});
     container_add_small(&w, "seconds", CONTAINER_F64, 1, &t->seconds);
+    container_add_small(&w, "views", CONTAINER_U64, 1, (const uint64_t[]){hash_of_views(&t->scene)});
     const exposures *e = &t->exposures;
     const size_t exposure_dims[2] = {e->count, AFFINE_NUMBERS};
     if (e->count > 0) {
@@ -138,6 +154,12 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
         return base_fail(err, GBT_ERR_FORMAT, "%s: made from other data (wanted %zu views and %zu points, got %llu and %llu)%s%s", path,
                          t->scene.view_count, t->scene.points.count, (unsigned long long)counters[5], (unsigned long long)counters[6],
                          t->scene.photos_missing > 0 ? "; photos that are missing: " : "", t->scene.missing_names);
+    uint64_t views = hash_of_views(&t->scene);
+    if (container_section_named(c, "views") != NULL) /* older checkpoints have none */
+        GBT_TRY(container_get(c, "views", CONTAINER_U64, 1, &views, err));
+    if (views != hash_of_views(&t->scene))
+        return base_fail(err, GBT_ERR_FORMAT, "%s: made from other data (%.1000s has photos of other names, sizes or cameras)", path,
+                         t->scene.folder);
     if (counters[4] > PACE_SEGMENTS)
         return base_fail(err, GBT_ERR_FORMAT, "%s: pace of %llu parts (limit %d)", path, (unsigned long long)counters[4], PACE_SEGMENTS);
     size_t position[2] = {CONTAINER_ANY, 3};

@@ -118,6 +118,8 @@ static bool set_key(const char *key, const char *value, gbt_train_def *d, config
         return d->grow_until = number, true;
     if (strcmp(key, "scale-factor") == 0)
         return d->scale_factor = number, true;
+    if (strcmp(key, "resume") == 0)
+        return d->resume = number != 0, true;
     if (strcmp(key, "overwrite") == 0)
         return d->overwrite = number != 0, true;
     if (strcmp(key, "learning-rate") == 0)

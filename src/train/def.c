@@ -10,6 +10,8 @@
 /* Fewer Gaussians per anchor than in the paper's base: at equal time the models are better (docs/training.md). */
 enum { default_offsets = 2 };
 
+static const double default_budget_seconds = 600;
+
 /* Of the balls' scale prior, which is smaller than their spacing. */
 static const double ball_scale_factor = 2;
 
@@ -20,7 +22,6 @@ gbt_train_def gbt_train_def_default(void)
                            .scale_prior = "gb",
                            .max_depth = 18,
                            .distance = "auto",
-                           .budget_seconds = 600,
                            .downscale = 1,
                            .renderer = "trace",
                            .footprint = 0.1,
@@ -70,8 +71,10 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "--start-level: %d (wanted 0 to 4)", d->start_level);
     if (!(d->voxel_size >= 0 && d->voxel_size < 1e9f))
         return base_fail(err, GBT_ERR_ARGUMENT, "--voxel-size: %g (wanted 0 or more)", (double)d->voxel_size);
-    if (d->iterations == 0 && d->pace == NULL && !(d->budget_seconds > 0 && d->budget_seconds < 1e9))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--budget: %g s (wanted more than 0)", d->budget_seconds);
+    if (!(d->budget_seconds >= 0 && d->budget_seconds < 1e9))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--budget: %g s (wanted 0 or more)", d->budget_seconds);
+    if (d->resume && d->overwrite)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--resume goes on with a run, --overwrite loses it (wanted one of them)");
     if (!(d->learning_rate_factor >= 1e-3 && d->learning_rate_factor <= 1e3))
         return base_fail(err, GBT_ERR_ARGUMENT, "--learning-rate: %g (wanted 0.001 to 1000)", d->learning_rate_factor);
     if (!(d->splats_until >= 0 && d->splats_until <= 1))
@@ -91,6 +94,8 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err)
 
 void train_def_settle(gbt_train_def *d)
 {
+    if (d->budget_seconds == 0)
+        d->budget_seconds = default_budget_seconds;
     if (d->offsets == 0)
         d->offsets = d->compat ? 10 : default_offsets;
     if (d->scale_factor == 0) {

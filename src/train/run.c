@@ -13,6 +13,7 @@
 #include "io/model_file.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
+#include "train/resume.h"
 #include "train/run_data.h"
 #include "train/run_log.h"
 #include "train/sampling.h"
@@ -32,7 +33,7 @@ typedef struct run_paths {
         checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
 } run_paths;
 
-static gbt_status open_folder(const char *run, bool may_hold_run, run_paths *p, gbt_error *err)
+static gbt_status open_folder(const char *run, const gbt_train_def *def, run_paths *p, gbt_error *err)
 {
     char checkpoints[PATH_SIZE];
     GBT_TRY(file_join(checkpoints, sizeof checkpoints, run, "checkpoints", err));
@@ -44,7 +45,10 @@ static gbt_status open_folder(const char *run, bool may_hold_run, run_paths *p, 
     GBT_TRY(file_join(p->exposure, sizeof p->exposure, run, "exposure.json", err));
     GBT_TRY(file_join(p->checkpoint, sizeof p->checkpoint, checkpoints, "last.gbt", err));
     GBT_TRY(file_join(p->checkpoint_previous, sizeof p->checkpoint_previous, checkpoints, "last.gbt.prev", err));
-    if (!may_hold_run && (file_exists(p->model) || file_exists(p->checkpoint) || file_exists(p->checkpoint_previous)))
+    const bool has_checkpoint = file_exists(p->checkpoint) || file_exists(p->checkpoint_previous);
+    if (def->resume && !has_checkpoint)
+        return base_fail(err, GBT_ERR_IO, "%.1000s: holds no run to go on with (there is no %.1000s)", run, p->checkpoint);
+    if (!def->resume && !def->overwrite && (file_exists(p->model) || has_checkpoint))
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%.1000s: holds a run already (go on with it by --resume, name another folder, or lose it by --overwrite)", run);
     return file_make_folder(checkpoints, err);
@@ -205,37 +209,15 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
     }
 }
 
-static gbt_status resume(trainer *t, const char *data, const run_paths *paths, const gbt_train_def *def, config_strings *strings,
-                         gbt_error *err)
-{
-    const bool only_previous = !file_exists(paths->checkpoint) && file_exists(paths->checkpoint_previous);
-    const char *path = only_previous ? paths->checkpoint_previous : paths->checkpoint;
-    char text[CONFIG_TEXT_SIZE];
-    gbt_error first = {0};
-    gbt_status status = checkpoint_config(path, text, sizeof text, &first);
-    if (status != GBT_OK && path == paths->checkpoint && file_exists(paths->checkpoint_previous)) {
-        log_warn("%s; going on from %s", first.text, paths->checkpoint_previous);
-        path = paths->checkpoint_previous;
-        status = checkpoint_config(path, text, sizeof text, err);
-    } else if (status != GBT_OK) {
-        return base_fail(err, status, "%s", first.text);
-    }
-    GBT_TRY(status);
-    gbt_train_def saved = *def;
-    GBT_TRY(config_parse(text, path, &saved, strings, err));
-    GBT_TRY(trainer_open(t, data, &saved, err));
-    return checkpoint_load(t, path, err);
-}
-
 static gbt_status run_with_folder(trainer *t, const char *data, const char *run, const gbt_train_def *def, config_strings *strings,
                                   gbt_error *err)
 {
     run_paths paths;
     /* Before any work: a run that cannot be written must not start. */
-    GBT_TRY(open_folder(run, def->resume || def->overwrite, &paths, err));
+    GBT_TRY(open_folder(run, def, &paths, err));
     const double begin = clock_wall();
     if (def->resume)
-        GBT_TRY(resume(t, data, &paths, def, strings, err));
+        GBT_TRY(resume_open(t, data, run, paths.checkpoint, paths.checkpoint_previous, def, strings, err));
     else
         GBT_TRY(trainer_open(t, data, def, err));
     t->frame.scene.tape_bytes_max = def->hit_bytes_max;
@@ -251,7 +233,7 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
     gbt_status status = run_steps(t, &paths, &log, err);
     if (status == GBT_OK)
         status = save_all(t, &paths, err);
-    if (status == GBT_OK)
+    if (status == GBT_OK && (log.all.steps > 0 || !run_log_is_of_step(paths.json, t->step)))
         status = run_log_summary(&log, t, paths.json, err);
     run_log_close(&log);
     return status;

@@ -212,7 +212,8 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
 {
     if (log->row.steps > 0)
         write_row(log, t, log->last.width, log->last.height, (double)NAN);
-    tell_progress(log, t);
+    if (log->all.steps > 0)
+        tell_progress(log, t);
     const run_sums *s = &log->all;
     const double n = s->steps > 0 ? (double)s->steps : 1, ms = 1000 / n;
     json_t *root = json_object(), *stages = json_object(), *parts = json_array(), *evals = json_array();
@@ -264,6 +265,14 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     const gbt_status status = file_write_atomic(json_path, text, strlen(text), err);
     free(text);
     return status;
+}
+
+bool run_log_is_of_step(const char *json_path, uint64_t step)
+{
+    json_t *root = json_load_file(json_path, 0, NULL);
+    const bool same = root != NULL && (uint64_t)json_integer_value(json_object_get(root, "iterations")) == step;
+    json_decref(root);
+    return same;
 }
 
 void run_log_close(run_log *log)

@@ -33,6 +33,10 @@ void run_log_evaluation(run_log *log, const trainer *t, double psnr);
 
 /** train.json: counts, seconds by stage, pace, machine. */
 gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path, gbt_error *err);
+
+/** Whether train.json is there and was written after so many steps. */
+bool run_log_is_of_step(const char *json_path, uint64_t step);
+
 void run_log_close(run_log *log);
 
 #endif

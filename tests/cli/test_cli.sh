@@ -420,6 +420,13 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "train leaves a run alone" "  got $got: $(cat err out)"
     "$program" train made -o run-small --iterations 4 --overwrite >out 2>err && "$program" info run-small | grep -q 'trained   4 iterations'
     report $? "train --overwrite trains anew" "$(cat err out; "$program" info run-small)"
+    "$program" train -o run-small --resume --iterations 9 --thrift 2 >out 2>err && grep -q '^run-small: 4 steps done; training goes on to step 9' err &&
+        grep -q "^warning: a run is resumed with its own settings: thrift = 1, not 2" err && [ "$(grep -c '^warning' err)" = 1 ] &&
+        "$program" train -o run-small --resume >out 2>>err && grep -q '^run-small: all 9 steps are done' err && ! grep -q 0x0 err &&
+        "$program" info run-small | grep -q 'trained   9 iterations'
+    report $? "train --resume goes on without naming the data" "$(cat err out)"
+    misuse 2 "run-small: 8 iterations were asked for (wanted more than the 9 that it has done)" train -o run-small --resume --iterations 8
+    misuse 2 "argument missing (usage: gbtrace train DATA -o RUN)" train -o run-small
     mkdir elsewhere && (cd elsewhere && "$program" eval ../run-small) >out 2>err
     report $? "eval from another folder" "$(cat err out)"
     mkdir pair && cp -r made run-small pair && sed '2s#/made$#/gone#' run-small/data_places >pair/run-small/data_places &&

@@ -1,0 +1,192 @@
+/* tests/train/test_resume.c -- going on: a finished run to another length, the run's own data, what is refused. */
+#include "run_support.h"
+
+#include <jansson.h>
+
+#include "base/log.h"
+#include "base/parallel.h"
+#include "io/model_file.h"
+#include "train/config.h"
+
+static gbt_train_def resume_def(uint64_t iterations, double budget_seconds)
+{
+    gbt_train_def def = gbt_train_def_default();
+    def.resume = true;
+    def.save_every_seconds = 0;
+    def.iterations = iterations;
+    def.budget_seconds = budget_seconds;
+    return def;
+}
+
+static double number_of(const char *run, const char *name)
+{
+    char path[PATH_SIZE];
+    snprintf(path, sizeof path, "%s/train.json", run);
+    json_t *summary = json_load_file(path, 0, NULL);
+    assert_non_null(summary);
+    const double value = json_number_value(json_object_get(summary, name));
+    json_decref(summary);
+    return value;
+}
+
+/* The last row of log.csv. */
+static void last_row(const char *run, double *step, double *progress, double *loss)
+{
+    char path[PATH_SIZE];
+    snprintf(path, sizeof path, "%s/log.csv", run);
+    bytes log = read_bytes(path);
+    const char *end = (const char *)log.data + log.count - 1;
+    while (end > (const char *)log.data && end[-1] != '\n')
+        end--;
+    assert_int_equal(sscanf(end, "%lf,%*f,%lf,%*f,%*f,%lf", step, progress, loss), 3);
+    mem_free(log.data);
+}
+
+static void a_finished_run_goes_on(void **state)
+{
+    (void)state;
+    const int before = parallel_threads();
+    double step, progress, loss[2];
+    for (int i = 0; i < 2; i++) {
+        gbt_set_threads(i + 1);
+        const char *run = in_root("further%d", i);
+        const gbt_train_def def = run_def(), on = resume_def(2 * STEPS, 0);
+        train_ok(tiny, run, &def);
+        last_row(run, &step, &progress, &loss[0]);
+        assert_true(step == STEPS && progress == 1);
+        train_ok(tiny, run, &on);
+        last_row(run, &step, &progress, &loss[1]);
+        assert_true(step == 2 * STEPS && progress == 1);
+        assert_true(loss[1] > 0 && loss[1] < loss[0]);
+        assert_true(number_of(run, "iterations") == 2 * STEPS);
+    }
+    gbt_set_threads(before);
+    assert_same_file(in_root("further0/model.gbt"), in_root("further1/model.gbt"));
+    model m;
+    assert_ok(model_load(in_root("further0/model.gbt"), &m, NULL));
+    assert_int_equal(m.iterations, 2 * STEPS);
+    assert_non_null(strstr(m.config, "\niterations = 120\n"));
+    model_free(&m);
+}
+
+/* At the first step all lengths are alike: a run that was to be three times as long is from there on the straight one. */
+static void the_new_length_decides(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    train_ok(tiny, in_root("straight"), &def);
+    def.iterations = 3 * STEPS, def.stop_at_step = 1;
+    train_fails(tiny, in_root("stretched"), &def, GBT_ERR_INTERRUPTED, "after step 1");
+    const gbt_train_def on = resume_def(STEPS, 0);
+    train_ok(tiny, in_root("stretched"), &on);
+    assert_same_file(in_root("straight/model.gbt"), in_root("stretched/model.gbt"));
+}
+
+static void a_run_goes_on_for_a_time(void **state)
+{
+    (void)state;
+    const char *run = in_root("timed");
+    const gbt_train_def def = run_def();
+    train_ok(tiny, run, &def);
+    const double spent = number_of(run, "train_seconds");
+    for (int i = 1; i <= 2; i++) { /* from a number of steps, and from a budget */
+        const gbt_train_def on = resume_def(0, spent + 0.5 * i);
+        train_ok(tiny, run, &on);
+        assert_true(number_of(run, "train_seconds") >= spent + 0.5 * (i - 1));
+        const gbt_train_def shorter = resume_def(0, 1e-3);
+        train_fails(tiny, run, &shorter, GBT_ERR_ARGUMENT, "seconds of training were asked for");
+    }
+    assert_true(number_of(run, "iterations") > STEPS);
+    const gbt_train_def steps = resume_def((uint64_t)number_of(run, "iterations") + 5, 0); /* and back to a number of steps */
+    train_ok(tiny, run, &steps);
+    assert_true(number_of(run, "iterations") == (double)steps.iterations);
+}
+
+static void a_length_that_has_passed_is_refused(void **state)
+{
+    (void)state;
+    const char *run = in_root("passed");
+    const gbt_train_def def = run_def(), shorter = resume_def(STEPS - 1, 0);
+    train_ok(tiny, run, &def);
+    bytes model_bytes = read_bytes(in_root("passed/model.gbt")), config = read_bytes(in_root("passed/config"));
+    train_fails(tiny, run, &shorter, GBT_ERR_ARGUMENT, "wanted more than the 60 that it has done");
+    bytes model_after = read_bytes(in_root("passed/model.gbt")), config_after = read_bytes(in_root("passed/config"));
+    assert_int_equal(model_bytes.count, model_after.count);
+    assert_memory_equal(model_bytes.data, model_after.data, model_bytes.count);
+    assert_int_equal(config.count, config_after.count);
+    assert_memory_equal(config.data, config_after.data, config.count);
+    mem_free(model_bytes.data), mem_free(config.data), mem_free(model_after.data), mem_free(config_after.data);
+}
+
+/* What the run took to train is still told when it is resumed at its end. */
+static void nothing_left_changes_nothing(void **state)
+{
+    (void)state;
+    const char *run = in_root("whole");
+    const gbt_train_def def = run_def(), on = resume_def(0, 0), same = resume_def(STEPS, 0);
+    train_ok(tiny, run, &def);
+    bytes summary = read_bytes(in_root("whole/train.json")), log = read_bytes(in_root("whole/log.csv"));
+    train_ok(tiny, run, &on);
+    train_ok(tiny, run, &same);
+    bytes summary_after = read_bytes(in_root("whole/train.json")), log_after = read_bytes(in_root("whole/log.csv"));
+    assert_int_equal(summary.count, summary_after.count);
+    assert_memory_equal(summary.data, summary_after.data, summary.count);
+    assert_int_equal(log.count, log_after.count);
+    assert_memory_equal(log.data, log_after.data, log.count);
+    mem_free(summary.data), mem_free(log.data), mem_free(summary_after.data), mem_free(log_after.data);
+    /* A kill may come after the checkpoint and before the summary. */
+    assert_int_equal(remove(in_root("whole/train.json")), 0);
+    train_ok(tiny, run, &on);
+    assert_true(number_of(run, "iterations") == STEPS);
+}
+
+static void the_run_knows_its_data(void **state)
+{
+    (void)state;
+    char here[PATH_SIZE];
+    assert_non_null(getcwd(here, sizeof here));
+    gbt_train_def def = run_def();
+    train_ok(tiny, in_root("named"), &def);
+    def.stop_at_step = 5;
+    train_fails(tiny, in_root("own"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    assert_int_equal(chdir("/"), 0);
+    const gbt_train_def on = resume_def(0, 0);
+    train_ok(NULL, in_root("own"), &on);
+    assert_int_equal(chdir(here), 0);
+    assert_same_file(in_root("named/model.gbt"), in_root("own/model.gbt"));
+}
+
+static void other_data_are_refused(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def(), on = resume_def(0, 0);
+    def.stop_at_step = 5;
+    train_fails(tiny, in_root("first"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    /* As many photos and points, from other places. */
+    gbt_make_scene_def scene_def = gbt_make_scene_def_default();
+    scene_def.name = "terrain";
+    scene_def.width = 48, scene_def.height = 36, scene_def.view_count = VIEWS, scene_def.points = 150, scene_def.samples = 1;
+    gbt_error err = {0};
+    assert_ok(gbt_make_scene(&scene_def, in_root("elsewhere"), &err));
+    train_fails(in_root("elsewhere"), in_root("first"), &on, GBT_ERR_FORMAT, "other data");
+    train_ok(tiny, in_root("first"), &on);
+    train_fails(tiny, in_root("no run"), &on, GBT_ERR_IO, "holds no run to go on with");
+    assert_false(file_exists(in_root("no run")));
+    on.overwrite = true;
+    train_fails(tiny, in_root("first"), &on, GBT_ERR_ARGUMENT, "wanted one of them");
+}
+
+int main(void)
+{
+    log_set_quiet(1);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_finished_run_goes_on),
+        cmocka_unit_test(the_new_length_decides),
+        cmocka_unit_test(a_run_goes_on_for_a_time),
+        cmocka_unit_test(a_length_that_has_passed_is_refused),
+        cmocka_unit_test(nothing_left_changes_nothing),
+        cmocka_unit_test(the_run_knows_its_data),
+        cmocka_unit_test(other_data_are_refused),
+    };
+    return cmocka_run_group_tests_name("resume", tests, make_root, remove_root);
+}

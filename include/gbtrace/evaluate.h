@@ -95,6 +95,11 @@ typedef struct gbt_render_def {
     double fps;           /* frames per second, [0, 1000]; 0: what a path file says, else 30. Default 0 */
     int width, height;    /* of the film, both 0 or in [1, 65500]; the shorter side sees as much as in the photos. Default 0: as they, to
                              even numbers */
+    const char *look_at;  /* path "orbit": what it is around, "X,Y,Z" in the data set's coordinates. NULL: as the photos' cameras look.
+                             Default NULL */
+    double orbit_radius;  /* path "orbit": distance from the vertical axis through that point, [0, 1e9], scene units; 0: as the photos'
+                             cameras. Default 0 */
+    double orbit_height;  /* path "orbit": height above that point, scene units; NaN: as the photos' cameras. Default NaN */
 } gbt_render_def;
 
 gbt_render_def gbt_render_def_default(void);

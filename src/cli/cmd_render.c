@@ -42,6 +42,12 @@ static int run(const command *self, int argc, char **argv)
          .choices = "orbit|interpolate",
          .help = "render a film: an orbit around the scene, through the photos' cameras, or along a path file "
                  "(docs/video.md)"},
+        {.name = "look-at", .kind = OPTION_STRING, .value = &def.look_at, .value_name = "X,Y,Z",
+         .help = "orbit: the point to look at, in the data set's coordinates; default: where the photos' cameras look"},
+        {.name = "radius", .kind = OPTION_DOUBLE, .value = &def.orbit_radius, .min = 0, .max = 1e9, .value_name = "R",
+         .help = "orbit: its radius, scene units; 0: as far as the photos' cameras"},
+        {.name = "height", .kind = OPTION_DOUBLE, .value = &def.orbit_height, .min = -1e9, .max = 1e9, .value_name = "H",
+         .help = "orbit: height above the point that it looks at, scene units; default: as high as the photos' cameras"},
         {.name = "frames", .kind = OPTION_INT, .value = &def.frames, .min = 0, .max = 100000, .value_name = "N",
          .help = "number of frames; 0: 240 for an orbit, 15 per photo, or all of a path file"},
         {.name = "fps", .kind = OPTION_DOUBLE, .value = &def.fps, .min = 0, .max = 1000, .value_name = "F",

@@ -1,4 +1,5 @@
 /* cli/option_help.c -- what a row says for a person: its names, its value, its default; and the help that is made of them. */
+#include <math.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -88,7 +89,10 @@ static void add_default(const option *o, char *out, size_t size)
     case OPTION_INT: add(out, size, " (default %d)", *(const int *)o->value); return;
     case OPTION_UINT64: add(out, size, " (default %llu)", (unsigned long long)*(const uint64_t *)o->value); return;
     case OPTION_FLOAT: add(out, size, " (default %g)", (double)*(const float *)o->value); return;
-    case OPTION_DOUBLE: add(out, size, " (default %g)", *(const double *)o->value); return;
+    case OPTION_DOUBLE:
+        if (!isnan(*(const double *)o->value)) /* else its help says it */
+            add(out, size, " (default %g)", *(const double *)o->value);
+        return;
     case OPTION_DURATION: add_duration(out, size, *(const double *)o->value); return;
     case OPTION_SIZE: add_size(out, size, (double)*(const size_t *)o->value); return;
     case OPTION_STRING:

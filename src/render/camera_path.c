@@ -33,6 +33,7 @@ void camera_path_free(camera_path *path)
 /** Where a camera stands around the axis. */
 typedef struct station {
     double angle, radius, height; /* radians in (-pi, pi], from the first camera */
+    double aim[3];                /* from the focus to the nearest point that the camera looks at */
 } station;
 
 typedef struct circle {
@@ -97,29 +98,38 @@ static gbt_status circle_make(const gbt_camera *cameras, size_t count, const cam
             make_axes(g->up, way, c);
         const double x = dvec_dot(way, c->across[0]), y = dvec_dot(way, c->across[1]);
         /* from straight above there is no way around */
-        c->stations[i] = (station){atan2(y, x), fmax(hypot(x, y), 0.05 * g->distance), dvec_dot(way, g->up)};
+        station *s = &c->stations[i];
+        *s = (station){atan2(y, x), fmax(hypot(x, y), 0.05 * g->distance), dvec_dot(way, g->up), {0}};
+        const double *forward = cameras[i].rotation + 6, depth = -dvec_dot(way, forward);
+        for (int k = 0; k < 3 && depth > 0; k++)
+            s->aim[k] = way[k] + depth * forward[k];
     }
     qsort(c->stations, count, sizeof *c->stations, compare_angles);
     find_arc(c);
     return GBT_OK;
 }
 
-/** As far and as high as the cameras are at about that angle: means, weighed with a spread of 20 degrees. */
-static void circle_at(const circle *c, double angle, double out[3])
+/** As far and as high as the cameras are at about that angle, and where they look: means, weighed with a spread of 20 degrees. */
+static void circle_at(const circle *c, const orbit_shape *shape, double angle, double out[3], double target[3])
 {
     static const double spread = 0.122; /* squared, radians */
-    double weight = 0, radius = 0, height = 0;
+    double weight = 0, radius = 0, height = 0, aim[3] = {0};
     for (size_t i = 0; i < c->count; i++) {
         const double w = exp((cos(angle - c->stations[i].angle) - 1) / spread);
         weight += w, radius += w * c->stations[i].radius, height += w * c->stations[i].height;
+        for (int k = 0; k < 3; k++)
+            aim[k] += w * c->stations[i].aim[k];
     }
-    radius /= weight, height /= weight;
+    for (int k = 0; k < 3; k++)
+        target[k] = c->focus[k] + (shape->at_focus ? 0 : aim[k] / weight);
+    radius = shape->radius > 0 ? shape->radius : radius / weight;
+    height = isnan(shape->height) ? height / weight : shape->height;
     for (int k = 0; k < 3; k++)
         out[k] = c->focus[k] + height * c->axis[k] + radius * (cos(angle) * c->across[0][k] + sin(angle) * c->across[1][k]);
 }
 
-gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const camera_group *group, const gbt_camera *lens, size_t frames,
-                             camera_path *out, gbt_error *err)
+gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const camera_group *group, const gbt_camera *lens,
+                             const orbit_shape *shape, size_t frames, camera_path *out, gbt_error *err)
 {
     circle c;
     GBT_TRY(camera_path_alloc(out, frames, err));
@@ -129,15 +139,30 @@ gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const came
         const double turn = (double)i / (double)frames;
         const double angle = c.arc < 2 * PI ? c.start + c.arc * 0.5 * (1 - cos(2 * PI * turn)) : c.start + c.arc * turn;
         gbt_camera camera = *lens;
-        double at[3];
-        circle_at(&c, angle, at);
-        if (!gbt_camera_look_at(at, c.focus, c.axis, &camera))
+        double at[3], target[3];
+        circle_at(&c, shape, angle, at, target);
+        if (!gbt_camera_look_at(at, target, c.axis, &camera))
             status = base_fail(err, GBT_ERR_FORMAT,
                                "--path orbit: the cameras say no way around (wanted them apart from what they look at)");
         out->shots[i] = ray_shot_of(&camera);
     }
     mem_free(c.stations);
     return status;
+}
+
+gbt_status camera_path_show(camera_path *path, const shared_points *points, gbt_error *err)
+{
+    static const double zoom_most = 1.5;
+    double zoom = 1, *scratch = mem_alloc(points->count + 1, sizeof *scratch, "orbit", err);
+    if (scratch == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < path->count; i++)
+        zoom = fmax(zoom, shared_points_zoom(points, &path->shots[i].camera, scratch));
+    mem_free(scratch);
+    for (size_t i = 0; i < path->count; i++)
+        for (int k = 0; k < 2; k++)
+            path->shots[i].camera.params[k] /= fmin(zoom, zoom_most);
+    return GBT_OK;
 }
 
 /* ---- through cameras ----------------------------------------------------------------------------------------------------------------- */

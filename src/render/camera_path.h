@@ -3,6 +3,7 @@
 #define GBT_RENDER_CAMERA_PATH_H
 
 #include "render/camera_group.h"
+#include "render/shared_points.h"
 #include "trace/rays.h"
 
 enum { CAMERA_PATH_FRAMES_MAX = 100000 };
@@ -16,9 +17,15 @@ typedef struct camera_path {
 gbt_status camera_path_alloc(camera_path *out, size_t count, gbt_error *err); /* shots are not set */
 void camera_path_free(camera_path *path);                                       /* zeroes the struct */
 
+typedef struct orbit_shape {
+    double radius; /* from the axis; 0: as the cameras at about that angle */
+    double height; /* above the focus along `up`; NaN: as the cameras at about that angle */
+    bool at_focus; /* look at the focus; else as the cameras at about that angle */
+} orbit_shape;
+
 /**
- * Around the focus, looking at it, at even angles about the axis through it along `up`: as far from the axis and as high as the cameras are
- * at about that angle. Frame `count` would be frame 0.
+ * Around the focus at even angles about the axis through it along `up`: as far from the axis and as high as the cameras are at about that
+ * angle, looking where they look (the points of their axes nearest to the focus), or as `shape` says. Frame `count` would be frame 0.
  *
  * Where the cameras leave out more than a quarter of the circle nothing is known of what would be seen from there: the way then goes along
  * the arc that they cover (of many, all but the outermost 4 % at both ends; at least 40 degrees) and back, slowest where it turns.
@@ -28,8 +35,11 @@ void camera_path_free(camera_path *path);                                       
  * @param frames  [in] 1 to CAMERA_PATH_FRAMES_MAX
  * @param out     [out] free with camera_path_free()
  */
-gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const camera_group *group, const gbt_camera *lens, size_t frames,
-                             camera_path *out, gbt_error *err);
+gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const camera_group *group, const gbt_camera *lens,
+                             const orbit_shape *shape, size_t frames, camera_path *out, gbt_error *err);
+
+/** Widen the lens of all frames alike, to 1.5 times at most (tangents), until each shows the points (shared_points_zoom()). */
+gbt_status camera_path_show(camera_path *path, const shared_points *points, gbt_error *err);
 
 /**
  * Smoothly through all keys, from the first to the last.

@@ -19,7 +19,7 @@
 
 gbt_render_def gbt_render_def_default(void)
 {
-    return (gbt_render_def){.split = GBT_SPLIT_TEST, .format = "png"};
+    return (gbt_render_def){.split = GBT_SPLIT_TEST, .format = "png", .orbit_height = (double)NAN};
 }
 
 /* Same Gaussians, same rays, in double: the picture that the tracer is measured against. */
@@ -193,6 +193,11 @@ static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_err
 {
     if (def->path == NULL && (def->frames != 0 || def->fps != 0 || def->width != 0 || def->height != 0))
         return base_fail(err, GBT_ERR_ARGUMENT, "--frames, --fps, --size: of a path (wanted --path)");
+    const bool orbit = def->path != NULL && strcmp(def->path, "orbit") == 0;
+    if (!orbit && (def->look_at != NULL || def->orbit_radius != 0 || !isnan(def->orbit_height)))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--look-at, --radius, --height: of an orbit (wanted --path orbit)");
+    if (!(def->orbit_radius >= 0 && def->orbit_radius <= 1e9) || fabs(def->orbit_height) > 1e9)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--radius, --height: %g, %g (wanted up to 1e+09)", def->orbit_radius, def->orbit_height);
     if (def->path == NULL)
         return video_named(out) ? base_fail(err, GBT_ERR_ARGUMENT, "%s: a film wants --path", out) : GBT_OK;
     if (def->camera != NULL)

@@ -1,10 +1,12 @@
 /* render/render_path.c -- which cameras a film has. */
 #include "render/render_path.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "data/number.h"
 #include "render/camera_path_file.h"
 
 enum { FRAMES_ORBIT = 240, FRAMES_PER_CAMERA = 15, FRAMES_MOST = 900 };
@@ -39,21 +41,51 @@ static gbt_camera choose_lens(const camera_group *group, const gbt_render_def *d
     return camera_group_lens(group, width > 1 ? width & ~1 : width, height > 1 ? height & ~1 : height);
 }
 
+/** "X,Y,Z" of the data set to a place of the scene. */
+static gbt_status read_place(const char *text, const double origin[3], double out[3], gbt_error *err)
+{
+    const char *at = text;
+    for (int k = 0; k < 3; k++) {
+        const size_t length = strcspn(at, ",");
+        if (number_parse_double(at, length, &out[k]) != NUMBER_OK || !isfinite(out[k]) || (at[length] == ',') != (k < 2))
+            return base_fail(err, GBT_ERR_ARGUMENT, "--look-at: \"%.80s\" (wanted X,Y,Z, as in 0.5,-1,2)", text);
+        out[k] -= origin[k];
+        at += length + (k < 2);
+    }
+    return GBT_OK;
+}
+
+/** What is not asked for follows the cameras; then what most photos show is in every frame. */
+static gbt_status make_orbit(const loaded_run *r, const gbt_render_def *def, const gbt_camera *cameras, size_t count,
+                             const shared_points *shared, camera_group *group, camera_path *out, gbt_error *err)
+{
+    const orbit_shape shape = {.radius = def->orbit_radius, .height = def->orbit_height, .at_focus = def->look_at != NULL};
+    if (shape.at_focus)
+        GBT_TRY(read_place(def->look_at, r->model.origin, group->focus, err));
+    const gbt_camera lens = choose_lens(group, def);
+    GBT_TRY(camera_path_orbit(cameras, count, group, &lens, &shape, def->frames > 0 ? (size_t)def->frames : FRAMES_ORBIT, out, err));
+    const bool chosen = shape.at_focus || shape.radius > 0 || !isnan(shape.height);
+    return chosen ? GBT_OK : camera_path_show(out, shared, err);
+}
+
 static gbt_status make_from_views(const loaded_run *r, const gbt_render_def *def, camera_path *out, gbt_error *err)
 {
     gbt_camera *cameras = NULL;
     camera_group group;
+    shared_points shared = {0};
     size_t count;
     gbt_status status = take_cameras(r, &cameras, &count, err);
+    if (status == GBT_OK)
+        status = shared_points_find(cameras, count, r->scene.points.position, r->scene.points.count, &shared, err);
     if (status == GBT_OK)
         status = camera_group_make(cameras, count, r->scene.points.position, r->scene.points.count, &group, err);
     if (status != GBT_OK)
         goto done;
-    const gbt_camera lens = choose_lens(&group, def);
     if (strcmp(def->path, "orbit") == 0) {
-        status = camera_path_orbit(cameras, count, &group, &lens, def->frames > 0 ? (size_t)def->frames : FRAMES_ORBIT, out, err);
+        status = make_orbit(r, def, cameras, count, &shared, &group, out, err);
         goto done;
     }
+    const gbt_camera lens = choose_lens(&group, def);
     status = camera_path_order(cameras, count, group.distance, err);
     for (size_t i = 0; i < count; i++) {
         gbt_camera key = lens;
@@ -65,6 +97,7 @@ static gbt_status make_from_views(const loaded_run *r, const gbt_render_def *def
     if (status == GBT_OK)
         status = camera_path_through(cameras, count, group.distance, def->frames > 0 ? (size_t)def->frames : most, out, err);
 done:
+    shared_points_free(&shared);
     mem_free(cameras);
     return status;
 }

@@ -260,6 +260,16 @@ printf '{"frames": 5, "fps": 12, "up": [0, -1, 0], "fov_x_deg": 50, "width": 24,
 film "a film along a file" 5 along --path path.json
 cmp -s along/frame_00001.png plain/c.png
 report $? "its first frame is what that camera takes" "$(ls -l along plain)"
+film "a low, near orbit around a place" 3 low --path orbit --frames 3 --look-at 0,0.5,-1e-1 --radius 2 --height -0.5
+cmp -s low/frame_00001.png around/frame_00001.png
+[ $? = 1 ]
+report $? "it is another film" ""
+misuse 2 "--look-at, --radius, --height: of an orbit (wanted --path orbit)" render tiny -o o --path interpolate --height 1
+misuse 2 "--look-at, --radius, --height: of an orbit (wanted --path orbit)" render tiny -o o --radius 1
+for bad in 1,2 1,2,3,4 1,2,x 1,2,nan 1,,2 ,; do
+    misuse 2 "--look-at: \"$bad\" (wanted X,Y,Z, as in 0.5,-1,2)" render tiny -o o --path orbit --look-at "$bad"
+done
+misuse 2 "--radius: bad value (wanted a number from 0 to 1e+09, got -1)" render tiny -o o --path orbit --radius -1
 misuse 2 "--frames, --fps, --size: of a path (wanted --path)" render tiny -o o --frames 3
 misuse 2 "film.mp4: a film wants --path" render tiny -o film.mp4
 misuse 2 "--path: not with --camera" render tiny -o o --path orbit --camera c.json

@@ -11,10 +11,12 @@
 #include "render/camera_path.h"
 #include "render/camera_path_file.h"
 #include "render/video.h"
+#include "train/sight.h"
 
 #define PI 3.14159265358979323846
 static char folder[] = "/tmp/gbt_path_XXXXXX", file_path[64], beside_path[96];
 static const double none[3] = {0, 0, 0};
+static const orbit_shape as_cameras = {.radius = 0, .height = (double)NAN};
 
 static int make_folder(void **state)
 {
@@ -132,7 +134,7 @@ static void closed_orbit(void **state)
     ring(cameras, 12, 0, 330, target);
     const camera_group g = group_of(cameras, 12);
     camera_path path;
-    assert_ok(camera_path_orbit(cameras, 12, &g, &g.lens, 90, &path, &assert_ok_err_));
+    assert_ok(camera_path_orbit(cameras, 12, &g, &g.lens, &as_cameras, 90, &path, &assert_ok_err_));
     assert_int_equal(path.count, 90);
     assert_near(distance_between(&path.shots[0].camera, &cameras[0]), 0, 1e-9);
     const double step = 2 * (4 * sin(PI / 90));
@@ -155,7 +157,7 @@ static void orbit_of_an_arc(void **state)
     ring(cameras, 19, 30, 210, none);
     const camera_group g = group_of(cameras, 19);
     camera_path path;
-    assert_ok(camera_path_orbit(cameras, 19, &g, &g.lens, 100, &path, &assert_ok_err_));
+    assert_ok(camera_path_orbit(cameras, 19, &g, &g.lens, &as_cameras, 100, &path, &assert_ok_err_));
     double least = 1e9, most = -1e9;
     for (size_t i = 0; i < 100; i++) {
         const gbt_camera *c = &path.shots[i].camera;
@@ -169,7 +171,7 @@ static void orbit_of_an_arc(void **state)
     assert_near(most, 210, 1e-6);
     camera_path_free(&path);
     const camera_group alone = group_of(cameras, 1); /* one camera: it looks at the origin, and sways */
-    assert_ok(camera_path_orbit(cameras, 1, &alone, &alone.lens, 7, &path, &assert_ok_err_));
+    assert_ok(camera_path_orbit(cameras, 1, &alone, &alone.lens, &as_cameras, 7, &path, &assert_ok_err_));
     for (size_t i = 0; i < 7; i++)
         assert_rotation(&path.shots[i].camera);
     camera_path_free(&path);
@@ -186,7 +188,7 @@ static void orbit_follows_the_cameras(void **state)
     }
     const camera_group g = {.up = {0, -1, 0}, .focus = {0, 0, 0}, .distance = 4, .lens = cameras[0]};
     camera_path path;
-    assert_ok(camera_path_orbit(cameras, 72, &g, &g.lens, 36, &path, &assert_ok_err_));
+    assert_ok(camera_path_orbit(cameras, 72, &g, &g.lens, &as_cameras, 36, &path, &assert_ok_err_));
     for (int i = 0; i < 36; i++) {
         const double *c = path.shots[i].camera.center;
         assert_near(hypot(c[0], c[2]), 4, 1e-9);
@@ -194,6 +196,99 @@ static void orbit_follows_the_cameras(void **state)
     }
     assert_true(path.shots[0].camera.center[1] < -2.9 && path.shots[18].camera.center[1] > -1.1);
     camera_path_free(&path);
+}
+
+/** Given radius and height, at every angle. */
+static void orbit_of_a_shape(void **state)
+{
+    (void)state;
+    gbt_camera cameras[12];
+    ring(cameras, 12, 0, 330, none);
+    const camera_group g = group_of(cameras, 12);
+    const orbit_shape low = {.radius = 2.5, .height = -0.5};
+    camera_path path;
+    assert_ok(camera_path_orbit(cameras, 12, &g, &g.lens, &low, 40, &path, &assert_ok_err_));
+    for (size_t i = 0; i < 40; i++) {
+        const double *c = path.shots[i].camera.center;
+        assert_near(hypot(c[0], c[2]), 2.5, 1e-9);
+        assert_near(c[1], 0.5, 1e-9); /* y is down */
+    }
+    camera_path_free(&path);
+}
+
+/** A head before a wall: axes of view meet in the wall, and what sticks out left the picture at the ends of the arc. */
+static void orbit_shows_what_most_see(void **state)
+{
+    (void)state;
+    enum { HEAD = 300, WALL = 100, CAMERAS = 21 };
+    const double wall[3] = {0, 0, 0.6};
+    gbt_camera cameras[CAMERAS];
+    ring(cameras, CAMERAS, 210, 330, wall); /* z < 0.6 */
+    float points[3 * (HEAD + WALL + 50)];
+    for (size_t i = 0; i < HEAD; i++) /* a cylinder from the wall towards the cameras */
+        points[3 * i] = (float)(0.8 * cos(0.7 * (double)i)), points[3 * i + 1] = (float)(0.8 * sin(0.7 * (double)i)),
+        points[3 * i + 2] = (float)(0.6 - 1.8 * (double)i / HEAD);
+    for (size_t i = HEAD; i < HEAD + WALL; i++)
+        points[3 * i] = (float)(0.1 * (double)(i % 10) - 0.5), points[3 * i + 1] = (float)(0.01 * (double)i - 3.5), points[3 * i + 2] = 0.6f;
+    for (size_t i = HEAD + WALL; i < HEAD + WALL + 50; i++) /* far to the side: in few pictures */
+        points[3 * i] = 4 + 0.01f * (float)i, points[3 * i + 1] = 0, points[3 * i + 2] = 0.6f;
+    shared_points shared;
+    assert_ok(shared_points_find(cameras, CAMERAS, points, HEAD + WALL + 50, &shared, &assert_ok_err_));
+    assert_true(shared.count >= HEAD && shared.count <= HEAD + WALL);
+    camera_group g;
+    assert_ok(camera_group_make(cameras, CAMERAS, points, HEAD + WALL + 50, &g, &assert_ok_err_));
+    assert_near(g.focus[2], 0.6, 0.01);
+    camera_path path;
+    const gbt_camera lens = camera_group_lens(&g, 60, 80);
+    assert_ok(camera_path_orbit(cameras, CAMERAS, &g, &lens, &as_cameras, 24, &path, &assert_ok_err_));
+    const double before = path.shots[0].camera.params[0];
+    assert_ok(camera_path_show(&path, &shared, &assert_ok_err_));
+    assert_true(path.shots[0].camera.params[0] < 0.95 * before);
+    for (size_t i = 0; i < 24; i++) {
+        const gbt_camera *c = &path.shots[i].camera;
+        size_t outside = 0;
+        assert_near(c->params[0], path.shots[0].camera.params[0], 0); /* one lens for the film */
+        for (size_t k = 0; k < shared.count; k++)
+            outside += !camera_sees(c, shared.position + 3 * k, NULL);
+        assert_true(outside * 100 <= shared.count);
+    }
+    camera_path_free(&path);
+    shared_points_free(&shared);
+    /* Too few, and cameras that look apart: nothing is shared. */
+    assert_ok(shared_points_find(cameras, CAMERAS, points, 10, &shared, &assert_ok_err_));
+    assert_int_equal(shared.count, 0);
+    shared_points_free(&shared);
+    for (int i = 0; i < CAMERAS; i++) {
+        const double angle = 2 * PI * i / CAMERAS, target[3] = {cos(angle), 0, sin(angle)};
+        cameras[i] = looking(0, 0, 0, target);
+    }
+    for (size_t i = 0; i < HEAD; i++)
+        points[3 * i] = (float)(3 * cos(0.1 * (double)i)), points[3 * i + 2] = (float)(3 * sin(0.1 * (double)i));
+    assert_ok(shared_points_find(cameras, CAMERAS, points, HEAD, &shared, &assert_ok_err_));
+    assert_int_equal(shared.count, 0);
+    shared_points_free(&shared);
+}
+
+/** Photos that look up from everywhere make a film that does; a place that was asked for is in the middle. */
+static void orbit_looks_as_the_cameras(void **state)
+{
+    (void)state;
+    const double above[3] = {0, -2, 0};
+    gbt_camera cameras[24];
+    for (int i = 0; i < 24; i++)
+        cameras[i] = looking(4 * cos(i * PI / 12), -0.5, 4 * sin(i * PI / 12), above);
+    const camera_group g = {.up = {0, -1, 0}, .focus = {0, 0, 0}, .distance = 4, .lens = cameras[0]};
+    const orbit_shape there = {.height = (double)NAN, .at_focus = true};
+    camera_path paths[2];
+    assert_ok(camera_path_orbit(cameras, 24, &g, &g.lens, &as_cameras, 24, &paths[0], &assert_ok_err_));
+    assert_ok(camera_path_orbit(cameras, 24, &g, &g.lens, &there, 24, &paths[1], &assert_ok_err_));
+    for (int i = 0; i < 24; i++) {
+        const double *up = paths[0].shots[i].camera.rotation + 6, *level = paths[1].shots[i].camera.rotation + 6;
+        assert_near(up[1] / hypot(up[0], up[2]), -1.5 / 4, 0.05);
+        assert_near(level[1] / hypot(level[0], level[2]), 0.5 / 4, 1e-6);
+    }
+    for (int i = 0; i < 2; i++)
+        camera_path_free(&paths[i]);
 }
 
 /* ---- through ------------------------------------------------------------------------------------------------------------------------- */

@@ -105,7 +105,7 @@ gbt_status gbt_study_stability(const gbt_stability_def *def, const char *folder,
 /**
  * Compare analytic gradients with the double adjoint and with differences, on a trained run: tracer, decode and the whole chain.
  *
- * Prints one row per parameter class: relative L2 error and limit. GBT_ERR_INTERNAL when a limit is broken.
+ * Prints one row for each renderer and class of parameters: relative L2 error and limit. GBT_ERR_INTERNAL when a limit is broken.
  */
 gbt_status gbt_check_grad(const char *run, FILE *out, gbt_error *err);
 

@@ -1,9 +1,11 @@
-/* eval/check_grad.c -- gradients on the user's own scene: tracer and decode against their double twins, the whole chain against
-   differences.
+/* eval/check_grad.c -- gradients on the user's own scene: renderers and decode against the same in double, the whole chain against
+   differences. docs/gradients.md.
 
-   tracer   float adjoint of the image gradient      | reference_backward() on the same Gaussians
-   decode   float adjoint of the Gaussians' gradient | decode_ref_backward() on the same anchors
-   chain    float gradient of the training loss g    | d . g against central differences of the loss, all of it in double
+   tracer      float adjoint of the image gradient      | reference_backward() on the same Gaussians
+   rasterizer  the same                                 | raster_reference_backward()
+   per-ray     the same                                 | reference_backward()
+   decode      float adjoint of the Gaussians' gradient | decode_ref_backward() on the same anchors
+   chain       float gradient of the training loss g    | d . g against central differences of the loss, all of it in double; by the tracer
 
    For normally distributed directions d, E[(d . (g - g'))^2] = |g - g'|^2: a few directions estimate the relative L2 error of a class of
    parameters, whatever its size. */
@@ -18,16 +20,18 @@
 #include "eval/rounding_band.h"
 #include "gbtrace/bench.h"
 #include "image/metrics.h"
+#include "raster/raster_ref.h"
 #include "render/loaded_run.h"
 #include "trace/reference.h"
 
 enum { CHECK_WIDTH = 48, CHECK_WIDTH_LARGE = 24, LARGE_COUNT = 50000, RAY_GRAIN = 16, ANCHOR_GRAIN = 256, DIRECTIONS = 3, ATTEMPTS = 24 };
 
 /* What float32 leaves. A trained scene has Gaussians that are 1e-5 of their distance thin, where the rounding of coordinates alone is 1e-2
-   of a std-dev: the tracer's limit is five times that of the tests' random scenes. The chain's is wider again: its two sides do not decode
-   the same bits, so a hit in ten thousand falls on the other side of a cut. */
-static const double tracer_limit = 5e-5, decode_limit = 1e-5, chain_limit = 1e-3;
+   of a std-dev: the renderers' limit is five times that of the tests' random scenes. The chain's is wider again: its two sides do not
+   decode the same bits, so a hit in ten thousand falls on the other side of a cut. */
+static const double renderer_limit = 5e-5, decode_limit = 1e-5, chain_limit = 1e-3;
 
+static const double colour_limit = 1e-5;    /* between splats in float and in double that blend the same */
 static const double step = 1e-8;           /* of a difference, in standard deviations of the direction: few cuts are crossed */
 static const double smooth_limit = 1e-4;   /* the differences to both sides agree to this part of the gradient, or a cut was crossed */
 static const double gradient_floor = 1e-6; /* below it a difference of double losses is rounding */
@@ -36,9 +40,12 @@ static const double dssim_weight = 0.2, volume_weight = 0.01; /* the training lo
 typedef struct checker {
     loaded_run *run;
     frame *frame; /* of `run` */
+    size_t view;
     int width, height;
     size_t ray_count;
-    image photo, d_image, d_masked; /* d_masked: 0 on the rays of the band */
+    image photo, d_image, d_masked; /* d_masked: 0 on rays that are left out of a renderer's rows */
+    unsigned char *valid;           /* [rays], NULL: all count */
+    size_t valid_count;
     loss_scratch scratch;
     gaussians d_gaussians;
     float *weight; /* [Gaussians]: T alpha summed over rays */
@@ -58,7 +65,7 @@ typedef struct checker {
 static void print_row(checker *c, const char *stage, const char *class, double error, double limit)
 {
     const bool fine = error <= limit; /* false for NaN */
-    fprintf(c->out, "%-8s%-12s%12.2e%12.0e%s\n", stage, class, error, limit, fine ? "" : "  broken");
+    fprintf(c->out, "%-12s%-12s%12.1e%12.0e%s\n", stage, class, error, limit, fine ? "" : "  broken");
     c->broken += !fine;
 }
 
@@ -108,19 +115,23 @@ static gbt_status set_up(checker *c, gbt_error *err)
         view++;
     if (view == s->view_count)
         view = 0;
+    c->view = view;
     GBT_TRY(render_at(c, view, CHECK_WIDTH, err));
     if (c->frame->gaussians.count > LARGE_COUNT)
         GBT_TRY(render_at(c, view, CHECK_WIDTH_LARGE, err));
-    GBT_TRY(scene_read_photo(&s->views[view], c->width, c->height, &c->photo, err));
+    GBT_TRY(scene_read_photo_valid(&s->views[view], c->width, c->height, &c->photo, &c->valid, err));
+    for (size_t i = 0; i < c->ray_count; i++)
+        c->valid_count += c->valid == NULL || c->valid[i];
     GBT_TRY(allocate(c, err));
     image_loss_result loss;
-    GBT_TRY(image_loss(&c->frame->rgb, &c->photo, NULL, dssim_weight, &c->scratch, &c->d_image, &loss, err));
-    fprintf(c->out, "%s, %d x %d: %zu Gaussians of %zu visible anchors, loss %.6g\n", s->views[view].name, c->width, c->height,
+    GBT_TRY(image_loss(&c->frame->rgb, &c->photo, c->valid, dssim_weight, &c->scratch, &c->d_image, &loss, err));
+    fprintf(c->out, "%s, %d x %d pixels: %zu Gaussians of %zu visible anchors, loss %.6g\n", s->views[view].name, c->width, c->height,
             c->scene.count, c->frame->visible_count, loss.loss + volume_weight * frame_volume(c->frame));
+    fprintf(c->out, "%-12s%-12s%12s%12s\n", "stage", "class", "error", "limit");
     return GBT_OK;
 }
 
-/* ---- tracer -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- renderers ----------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct band_job {
     const checker *c;
@@ -139,26 +150,29 @@ static void band_block(size_t block, size_t begin, size_t end, void *context)
     band_scratch_free(&scratch);
 }
 
-static gbt_status mask_band(checker *c, size_t *left_out, gbt_error *err)
+/* Rays where rounding may change which Gaussians are blended, or their order. */
+static gbt_status find_band(checker *c, bool *in_band, gbt_error *err)
 {
     const size_t blocks = parallel_block_count(c->ray_count, RAY_GRAIN);
-    band_job job = {.c = c, .in_band = mem_calloc(c->ray_count, sizeof *job.in_band, "check band", err)};
-    job.status = mem_calloc(blocks, sizeof *job.status, "check band", err);
-    gbt_status status = job.in_band == NULL || job.status == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    band_job job = {.c = c, .in_band = in_band, .status = mem_calloc(blocks, sizeof *job.status, "check band", err)};
+    gbt_status status = job.status == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK)
         parallel_blocks(c->ray_count, RAY_GRAIN, band_block, &job);
     for (size_t block = 0; status == GBT_OK && block < blocks; block++)
         if (job.status[block] != GBT_OK)
             status = base_fail(err, job.status[block], "check-grad: no memory for the hits of a ray");
-    *left_out = 0;
-    for (size_t i = 0; status == GBT_OK && i < c->ray_count; i++) {
-        *left_out += job.in_band[i];
-        for (size_t k = 3 * i; k < 3 * i + 3; k++)
-            c->d_masked.pixels[k] = job.in_band[i] ? 0 : c->d_image.pixels[k];
-    }
-    mem_free(job.in_band);
     mem_free(job.status);
     return status;
+}
+
+/* The same for splats, whose definition in double shows no hits: pixels on which it draws another colour. */
+static gbt_status find_other_colours(checker *c, const raster_reference *splats, const raster_settings *settings, bool *in_band,
+                                     gbt_error *err)
+{
+    GBT_TRY(raster_reference_forward(splats, &c->frame->camera, settings, 1, c->rgb, err));
+    for (size_t i = 0; i < 3 * c->ray_count; i++)
+        in_band[i / 3] = in_band[i / 3] || !(fabs(c->rgb[i] - (double)c->frame->rgb.pixels[i]) <= colour_limit);
+    return GBT_OK;
 }
 
 /* Relative L2 error, summed up. */
@@ -184,44 +198,84 @@ static void fields_of(const gaussians *g, const float *fields[GAUSSIANS_FIELD_CO
 #undef X
 }
 
-static gbt_status check_tracer(checker *c, gbt_error *err)
+/* The adjoint in double of d_masked, by the renderer's definition. `wanted` [GAUSSIANS_FIELD_COUNT][count], zero before. */
+static gbt_status renderer_in_double(checker *c, const raster_reference *splats, const raster_settings *settings, const double *d_rgb,
+                                     double *wanted, double d_background[3], gbt_error *err)
+{
+    if (c->frame->draw.renderer == FRAME_SPLAT)
+        return raster_reference_backward(splats, &c->frame->camera, settings, d_rgb, wanted, d_background, err);
+    return reference_scene_backward(&c->scene, &c->run->settings, &c->frame->rays, d_rgb, NULL, wanted, d_background, err);
+}
+
+static void print_renderer(checker *c, const char *stage, const double *wanted, const float d_background[3],
+                           const double d_background_wanted[3])
 {
     static const char *const names[] = {"mean", "scale", "rotation", "opacity", "colour"};
     static const size_t first[] = {REFERENCE_mean_x, REFERENCE_scale_x, REFERENCE_quat_w, REFERENCE_opacity, REFERENCE_red,
                                    GAUSSIANS_FIELD_COUNT};
-    size_t left_out;
-    float d_background[3];
-    double d_background_wanted[3] = {0};
-    GBT_TRY(mask_band(c, &left_out, err));
-    GBT_TRY(trace_backward(&c->frame->scene, &c->frame->rays, &c->d_masked, &c->d_gaussians, c->weight, d_background, err));
+    const float *got[GAUSSIANS_FIELD_COUNT];
+    fields_of(&c->d_gaussians, got);
+    for (size_t class = 0; class < sizeof names / sizeof *names; class++) {
+        difference d = {0};
+        for (size_t f = first[class]; f < first[class + 1]; f++)
+            for (size_t i = 0; i < c->scene.count; i++)
+                difference_add(&d, (double)got[f][i], wanted[f * c->scene.count + i]);
+        print_row(c, stage, names[class], difference_relative(&d), renderer_limit);
+    }
+    difference d = {0};
+    for (int k = 0; k < 3; k++)
+        difference_add(&d, (double)d_background[k], d_background_wanted[k]);
+    print_row(c, stage, "background", difference_relative(&d), renderer_limit);
+}
+
+static gbt_status check_renderer(checker *c, frame_renderer renderer, const char *stage, gbt_error *err)
+{
+    frame *f = c->frame;
+    f->draw.renderer = renderer;
+    GBT_TRY(render_at(c, c->view, c->width, err));
+    /* As frame.c draws splats: dilated where they have no footprint. */
+    raster_settings settings = frame_splat_settings(&c->run->settings, RASTER_EWA);
+    settings.dilation = f->widened ? 0 : settings.dilation;
+    const raster_reference splats = {c->scene.count, c->scene.fields};
+    bool *in_band = mem_calloc(c->ray_count, sizeof *in_band, "check rays", err);
     double *d_rgb = mem_alloc(c->ray_count, 3 * sizeof *d_rgb, "check gradient", err);
     double *wanted = mem_calloc(c->scene.count, GAUSSIANS_FIELD_COUNT * sizeof *wanted, "check gradient", err);
-    gbt_status status = d_rgb == NULL || wanted == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
-    for (size_t i = 0; status == GBT_OK && i < 3 * c->ray_count; i++)
-        d_rgb[i] = (double)c->d_masked.pixels[i];
+    double d_background_wanted[3] = {0};
+    float d_background[3];
+    size_t left_out = 0;
+    gbt_status status = in_band == NULL || d_rgb == NULL || wanted == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK)
-        status = reference_scene_backward(&c->scene, &c->run->settings, &c->frame->rays, d_rgb, NULL, wanted, d_background_wanted, err);
-    if (status == GBT_OK) {
-        const float *got[GAUSSIANS_FIELD_COUNT];
-        fields_of(&c->d_gaussians, got);
-        fprintf(c->out, "%zu of %zu rays are left out of the tracer's rows: rounding may change their hits or the order\n", left_out,
-                c->ray_count);
-        fprintf(c->out, "%-8s%-12s%12s%12s\n", "stage", "class", "error", "limit");
-        for (size_t class = 0; class < sizeof names / sizeof *names; class++) {
-            difference d = {0};
-            for (size_t f = first[class]; f < first[class + 1]; f++)
-                for (size_t i = 0; i < c->scene.count; i++)
-                    difference_add(&d, (double)got[f][i], wanted[f * c->scene.count + i]);
-            print_row(c, "tracer", names[class], difference_relative(&d), tracer_limit);
-        }
-        difference d = {0};
-        for (int k = 0; k < 3; k++)
-            difference_add(&d, (double)d_background[k], d_background_wanted[k]);
-        print_row(c, "tracer", "background", difference_relative(&d), tracer_limit);
+        status = renderer == FRAME_SPLAT ? find_other_colours(c, &splats, &settings, in_band, err) : find_band(c, in_band, err);
+    for (size_t i = 0; status == GBT_OK && i < 3 * c->ray_count; i++) {
+        left_out += i % 3 == 0 && in_band[i / 3];
+        c->d_masked.pixels[i] = in_band[i / 3] ? 0 : c->d_image.pixels[i];
+        d_rgb[i] = (double)c->d_masked.pixels[i];
     }
+    if (status == GBT_OK)
+        status = renderer == FRAME_TRACE ? trace_backward(&f->scene, &f->rays, &c->d_masked, &c->d_gaussians, c->weight, d_background, err)
+                                         : raster_backward(&f->splats, &c->d_masked, &c->d_gaussians, c->weight, d_background, err);
+    if (status == GBT_OK)
+        status = renderer_in_double(c, &splats, &settings, d_rgb, wanted, d_background_wanted, err);
+    if (status == GBT_OK) {
+        print_renderer(c, stage, wanted, d_background, d_background_wanted);
+        fprintf(c->out, "%s: %zu of %zu rays are left out: rounding may change what they blend\n", stage, left_out, c->ray_count);
+        if (10 * left_out > 9 * c->ray_count)
+            status = base_fail(err, GBT_ERR_INTERNAL, "check-grad: too few rays are left for the %s's gradients", stage);
+    }
+    mem_free(in_band);
     mem_free(d_rgb);
     mem_free(wanted);
     return status;
+}
+
+/* The tracer last: the chain goes on with its weights. */
+static gbt_status check_renderers(checker *c, frame_renderer trained, gbt_error *err)
+{
+    if (raster_takes(&c->frame->camera))
+        GBT_TRY(check_renderer(c, FRAME_SPLAT, "rasterizer", err));
+    if (trained == FRAME_SPLAT_PER_RAY)
+        GBT_TRY(check_renderer(c, FRAME_SPLAT_PER_RAY, "per-ray", err));
+    return check_renderer(c, FRAME_TRACE, "tracer", err);
 }
 
 /* ---- decode and chain ---------------------------------------------------------------------------------------------------------------- */
@@ -258,6 +312,7 @@ static void list_classes(checker *c, parameter_class out[CLASS_COUNT])
 static gbt_status check_decode(checker *c, gbt_error *err)
 {
     frame *f = c->frame;
+    GBT_TRY(render_at(c, c->view, c->width, err)); /* a kept pass has one adjoint */
     GBT_TRY(frame_backward(f, &c->run->model.anchors, &c->run->model.decoder, &c->d_image, (float)volume_weight, &c->d_anchors, c->d_params,
                            err));
     const float *d_fields[GAUSSIANS_FIELD_COUNT];
@@ -281,26 +336,31 @@ static gbt_status check_decode(checker *c, gbt_error *err)
 static void loss_terms(const checker *c, double *terms)
 {
     enum { RADIUS = 5, TAPS = 2 * RADIUS + 1 };
-    const double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03, values = (double)(3 * c->ray_count);
+    const double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03, values = (double)(3 * c->valid_count);
     double taps[TAPS], total = 0;
     for (int k = 0; k < TAPS; k++)
         taps[k] = exp(-(k - RADIUS) * (k - RADIUS) / (2 * 1.5 * 1.5)), total += taps[k];
     for (int y = 0; y < c->height; y++)
         for (int x = 0; x < c->width; x++)
             for (int channel = 0; channel < 3; channel++) {
+                const size_t pixel = (size_t)y * (size_t)c->width + (size_t)x, out = 3 * pixel + (size_t)channel;
                 double a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+                terms[out] = 0;
+                if (c->valid != NULL && !c->valid[pixel])
+                    continue;
                 for (int dy = -RADIUS; dy <= RADIUS; dy++)
                     for (int dx = -RADIUS; dx <= RADIUS; dx++) {
                         if (x + dx < 0 || x + dx >= c->width || y + dy < 0 || y + dy >= c->height)
                             continue;
-                        const size_t at = 3 * ((size_t)(y + dy) * (size_t)c->width + (size_t)(x + dx)) + (size_t)channel;
+                        const size_t near = (size_t)(y + dy) * (size_t)c->width + (size_t)(x + dx), at = 3 * near + (size_t)channel;
+                        if (c->valid != NULL && !c->valid[near])
+                            continue;
                         const double tap = taps[dx + RADIUS] * taps[dy + RADIUS] / (total * total), p = c->rgb[at],
                             q = (double)c->photo.pixels[at];
                         a += tap * p, b += tap * q, aa += tap * p * p, bb += tap * q * q, ab += tap * p * q;
                     }
                 const double ssim = (2 * a * b + c1) * (2 * (ab - a * b) + c2) / ((a * a + b * b + c1) * (aa - a * a + bb - b * b + c2));
-                const size_t at = 3 * ((size_t)y * (size_t)c->width + (size_t)x) + (size_t)channel;
-                terms[at] = ((1 - dssim_weight) * fabs(c->rgb[at] - (double)c->photo.pixels[at]) + dssim_weight * (1 - ssim)) / values;
+                terms[out] = ((1 - dssim_weight) * fabs(c->rgb[out] - (double)c->photo.pixels[out]) + dssim_weight * (1 - ssim)) / values;
             }
 }
 
@@ -406,7 +466,8 @@ static gbt_status check_chain(checker *c, gbt_error *err)
             print_row(c, "chain", classes[class].name, error, chain_limit);
     }
     if (status == GBT_OK)
-        fprintf(c->out, "chain: %d random directions per class; %zu more crossed a cut and were drawn again\n", DIRECTIONS, crossed);
+        fprintf(c->out, "chain: %d random directions for each class; %zu more crossed a cut-off and were drawn again\n", DIRECTIONS,
+                crossed);
     reference_scene_free(&seen);
     mem_free(scratch);
     return status;
@@ -419,6 +480,7 @@ static void free_all(checker *c)
     image_free(&c->d_masked);
     loss_scratch_free(&c->scratch);
     gaussians_free(&c->d_gaussians);
+    mem_free(c->valid);
     mem_free(c->weight);
     anchors_free(&c->d_anchors);
     mem_free(c->d_params);
@@ -443,10 +505,12 @@ gbt_status gbt_check_grad(const char *run, FILE *out, gbt_error *err)
         status = loaded_run_need_anchors(loaded, run, err);
     if (status == GBT_OK)
         status = loaded_run_open_views(run, NULL, 0, loaded, err);
+    const frame_renderer trained = loaded->frame.draw.renderer;
+    loaded->frame.draw.renderer = FRAME_TRACE;
     if (status == GBT_OK)
         status = set_up(&c, err);
     if (status == GBT_OK)
-        status = check_tracer(&c, err);
+        status = check_renderers(&c, trained, err);
     if (status == GBT_OK)
         status = check_decode(&c, err);
     if (status == GBT_OK)

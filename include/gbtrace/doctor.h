@@ -1,4 +1,4 @@
-/* gbtrace/doctor.h -- is this build all right, on this machine? */
+/* gbtrace/doctor.h -- check that this build works on this machine. */
 #ifndef GBTRACE_DOCTOR_H
 #define GBTRACE_DOCTOR_H
 

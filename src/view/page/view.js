@@ -187,7 +187,7 @@ function describe(about, done) {
     const ms = [about.total_ms, about.prepare_ms, about.trace_ms, about.encode_ms + about.transfer_ms, about.draw_ms].map(t => t.toFixed(0));
     const more = document.createElement("span");
     more.className = "more"; // where there is room
-    more.textContent = ` · ${ms[0]} ms (make ${ms[1]}, trace ${ms[2]}, send ${ms[3]}, draw ${ms[4]})`;
+    more.textContent = ` · ${ms[0]} ms (prepare ${ms[1]}, trace ${ms[2]}, send ${ms[3]}, draw ${ms[4]})`;
     byId("numbers").replaceChildren(parts.join(" · "), more);
 }
 

@@ -1,0 +1,83 @@
+#!/usr/bin/env python3
+# figures -- the figures and screenshots of README.md, docs/results.md and docs/first-ten-minutes.md, made again from new runs.
+#
+#     python3 bench/figures.py PHOTOS -o DIR [--gbtrace build/release/gbtrace]
+#
+# PHOTOS holds the data sets plush, fox, castle and aerial. The demo and, for each data set, runs of 42 and 84 seconds go into DIR; a run that
+# is already there is not repeated. Then docs/figures.txt is written, a line for each figure: a page, a colon and what the page must say, as
+# the test `figures` checks; and the screenshots in docs/images, if bench/viewers has installed its browser packages. Pages are edited by
+# hand. About 13 minutes of two cores.
+import argparse
+import csv
+import json
+import os
+import subprocess
+
+parser = argparse.ArgumentParser()
+parser.add_argument("photos")
+parser.add_argument("-o", "--output", required=True)
+parser.add_argument("--gbtrace", default="build/release/gbtrace")
+args = parser.parse_args()
+top = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+titles = {"plush": "plush, a toy on a bed", "fox": "fox, a mounted head", "castle": "castle, a courtyard"}
+
+
+def make(run, *words):
+    """Runs are named from DIR, so that the report shows no path of this machine."""
+    path = os.path.join(args.output, run, "metrics.json")
+    if not os.path.exists(path):
+        subprocess.run([gbtrace, *words], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=args.output)
+    with open(path) as text:
+        return json.load(text)
+
+
+def blended_at_the_end(run):
+    """Blended per ray in the last tenth of training."""
+    with open(os.path.join(args.output, run, "log.csv")) as rows:
+        values = [float(row["blended_per_ray"]) for row in csv.DictReader(rows) if float(row["progress"]) > 0.9]
+    return sum(values) / len(values)
+
+
+def row_of_results(budget, m, run):
+    """A row of docs/results.md, from its column of budgets on."""
+    psnr = f"**{m['psnr']:.2f}**" if budget == 42 else f"{m['psnr']:.2f}"
+    return (f"{budget} s | {psnr} | {m['ssim']:.4f} | {m['iterations']:,} | {m['anchors_initial']:,}, {m['anchors_final']:,} | "
+            f"{blended_at_the_end(run):.0f} | {m['model_bytes'] / 1000:,.0f} kB |")
+
+
+def shot(url, size, out, click=""):
+    modules = os.path.join(top, "build/viewers-env")
+    if os.path.exists(os.path.join(modules, "complete")):
+        picture = os.path.join(top, "docs/images", out)
+        subprocess.run(["node", os.path.join(top, "bench/screenshot.cjs"), modules, url, size, picture, *([click] if click else [])], check=True)
+
+
+def shot_of_viewer(run, out):
+    viewer = subprocess.Popen([gbtrace, "view", run, "--port", "8479", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        subprocess.run(["sleep", "3"], check=True)
+        shot("http://127.0.0.1:8479/", "1100x760", out, "input[name=compare][value=slider]")
+    finally:
+        viewer.terminate()
+        viewer.wait()
+
+
+gbtrace = os.path.abspath(args.gbtrace)
+os.makedirs(args.output, exist_ok=True)
+lines = []
+m = make("demo/run", "demo")
+says = f"{m['psnr']:.1f} dB"
+lines.append(f"README.md: 2 minutes of training on two cores, {says} on photos that were held out")
+lines.append(f"docs/results.md: `gbtrace demo` (6,000 points, 320 x 240, 2 minutes, {m['iterations']:,} steps): {says}")
+for name in ("plush", "fox", "castle", "aerial"):
+    scores = {}
+    for budget in (42, 84):
+        run, data = f"{name}_{budget}", os.path.abspath(os.path.join(args.photos, name))
+        m = scores[budget] = make(run, "train", data, "-o", run, "--downscale", "1.33333", "--budget", f"{budget}s")
+        lines.append("docs/results.md: " + row_of_results(budget, m, run))
+    if name in titles:
+        lines.append(f"README.md: | {scores[42]['psnr']:.1f} | {scores[84]['psnr']:.1f} dB | {scores[84]['model_bytes'] / 1000:.0f} kB |")
+with open(os.path.join(top, "docs/figures.txt"), "w") as text:
+    text.write("\n".join(lines) + "\n")
+shot("file://" + os.path.abspath(os.path.join(args.output, "demo/run/report.html")), "1080x960", "report.png")
+shot_of_viewer(os.path.join(args.output, "fox_84"), "view.png")

@@ -1,0 +1,15 @@
+#!/bin/sh
+# tests/project/test_figures.sh -- pages say what docs/figures.txt (bench/figures.py) holds. Usage: test_figures.sh PROJECT
+set -u
+cd "$1" || exit 1
+. tests/cli/report.sh
+one_line() { tr '\n' ' ' <"$1" | tr -s ' '; }
+while IFS= read -r line; do
+    page=${line%%: *}
+    says=${line#*: }
+    one_line "$page" | grep -qF -- "$says"
+    report $? "$page: $says" "  wanted: $says"
+done <docs/figures.txt
+[ "$passed" -ge 10 ]
+report $? "there are figures" "  only $passed"
+finish

@@ -1,0 +1,111 @@
+#!/bin/sh
+# tests/golden/golden.sh -- the bits of models, pictures and exports, on every instruction set and number of threads.
+#
+# Usage: golden.sh PROGRAM RECORD THREADS [ISA]
+#
+# Makes small scenes, trains each kind of run on them, draws, exports, and hashes every file. RECORD holds the hashes as they were recorded,
+# under the name of the C library, image library and compiler whose arithmetic and files they have; elsewhere the comparison is skipped.
+# `golden.sh PROGRAM - THREADS ISA > RECORD` records. A change that should alter no result leaves RECORD as it is.
+set -u
+program=$1
+record=$2
+threads=$3
+isa=${4:-}
+[ "$record" = - ] || record=$(cd "$(dirname "$record")" && pwd)/$(basename "$record")
+. "$(dirname "$0")/../cli/report.sh"
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+GBTRACE_THREADS=$threads
+export GBTRACE_THREADS
+
+# ---- scenes. Embree's own arithmetic makes them, which differs between instruction sets: always the plainest.
+make() { GBT_ISA=plain "$program" make-scene "$@" --width 96 --height 72 --views 9 --points 500 --samples 2 --quiet >/dev/null || exit 1; }
+make tabletop -o plain
+make courtyard -o bent --distorted
+cp -r plain fisheye # the same photos, said to be from another lens
+{ head -c 12 plain/sparse/0/cameras.bin && printf '\5\0\0\0' && tail -c +17 plain/sparse/0/cameras.bin | head -c 48 && head -c 32 /dev/zero; } >fisheye/sparse/0/cameras.bin
+cp -r plain masked
+mkdir masked/masks
+for photo in plain/images/*.png; do cp plain/images/0003.png "masked/masks/${photo##*/}"; done
+mkdir pointless # cameras around, and no points
+cp -r plain/images pointless/
+{
+    printf '{"fl_x": 90, "fl_y": 90, "cx": 48, "cy": 36, "w": 96, "h": 72, "frames": ['
+    i=0
+    for c_s in '1 0' '0.70710678 0.70710678' '0 1' '-0.70710678 0.70710678' '-1 0' '-0.70710678 -0.70710678' '0 -1' '0.70710678 -0.70710678'; do
+        c=${c_s% *} s=${c_s#* }
+        [ $i = 0 ] || printf ','
+        # OpenGL axes: right (-s, c, 0), up (0, 0, 1), back (c, s, 0), at 3 times back
+        echo "$c $s $i" | awk '{printf "{\"file_path\": \"images/%04d.png\", \"transform_matrix\": [[%.9g,0,%.9g,%.9g],[%.9g,0,%.9g,%.9g],[0,1,0,0.5],[0,0,0,1]]}", $3, -$2, $1, 3*$1, $1, $2, 3*$2}'
+        i=$((i + 1))
+    done
+    printf ']}\n'
+} >pointless/transforms.json
+
+# ---- what is made of them
+[ -z "$isa" ] || export GBT_ISA="$isa"
+run() { # NAME DATA OPTIONS...
+    name=$1
+    data=$2
+    shift 2
+    "$program" train "$data" -o "$name" --iterations 40 --lossless --quiet "$@" >out 2>&1 || printf 'failed: %s: %s\n' "$name" "$(cat out)"
+    rm -rf "$name"/checkpoints "$name"/*.json "$name"/*.csv "$name"/report.html "$name"/data_places "$name"/config
+}
+draw() { "$program" render "$@" --quiet >out 2>&1 || printf 'failed: %s: %s\n' "$*" "$(cat out)"; }
+for init in gb adaptive voxel random; do run init-$init plain --init $init; done
+run nearest plain --scale-prior nn --offsets 4 --distance on
+run compat plain --compat
+run raster plain --renderer raster
+run per-ray plain --renderer per-ray
+run rays plain --splats-until 0 --footprint 0
+run exposure plain --exposure
+run masked-run masked
+run fisheye-run fisheye
+run bent-run bent
+run pointless-run pointless
+"$program" train plain -o goes-on --iterations 20 --quiet >/dev/null 2>&1
+"$program" train -o goes-on --resume --iterations 40 --lossless --quiet >out 2>&1 || cat out
+rm -rf goes-on/checkpoints goes-on/*.json goes-on/*.csv goes-on/report.html goes-on/data_places goes-on/config
+
+for renderer in trace raster per-ray reference; do draw init-gb -o drawn-$renderer --renderer $renderer --format exr; done
+for preset in fast exact; do draw init-gb -o drawn-$preset --preset $preset --format exr; done
+draw init-gb -o outputs --outputs transmittance,depth,median-depth,normal,hits,anchor --format exr
+draw init-gb -o orbit --path orbit --frames 3
+draw init-gb -o tour --path interpolate --frames 3
+camera='"origin": [0.3, -0.4, -2], "target": [0, 0, 0.5], "up": [0, -1, 0], "width": 64, "height": 48'
+printf '{"model": "equirectangular", %s}' "$camera" >panorama.json
+printf '{"fov_x_deg": 60, "aperture": 0.1, "focus": 2, "samples": 8, %s}' "$camera" >aperture.json
+printf '{"fov_x_deg": 60, "end": {"origin": [0.5, -0.4, -2]}, %s}' "$camera" >shutter.json
+printf 'v -0.3 -0.3 0\nv 0.3 -0.3 0\nv 0.3 0.3 0\nv -0.3 0.3 0\nf 1 2 3 4\n' >square.obj
+printf '{"light": {"position": [1, -2, -1], "radius": 0.2}, "objects": [{"mesh": "square.obj", "material": "mirror", "position": [0, -0.3, 0]}]}' >square.json
+for camera in panorama aperture shutter; do draw init-gb -o cameras --camera $camera.json --format exr; done
+draw init-gb -o cameras-insert --camera shutter.json --insert square.json --format exr
+mkdir exports
+"$program" export init-gb exports/a.ply exports/a.splat exports/a.spz exports/a.glb --refine 20 --quiet >out 2>&1 || cat out
+draw exports/a.ply -o drawn-ply --data plain --format exr
+"$program" compress init-gb -o exports/small.gbt --quality 40 --quiet >out 2>&1 || cat out
+for init in gb adaptive voxel; do "$program" init plain -o exports/$init.ply --init $init --quiet >out 2>&1 || cat out; done
+
+# ---- compare
+rm -rf plain bent fisheye masked pointless out
+for file in $(find . -name '*.exr'); do # they hold the time when they were written
+    LC_ALL=C sed -i 's/20[0-9][0-9]:[0-9][0-9]:[0-9][0-9] [0-9][0-9]:[0-9][0-9]:[0-9][0-9]/(the time)/' "$file"
+done
+find . -type f ! -name '*.json' ! -name '*.obj' | LC_ALL=C sort | xargs sha256sum | sed 's/ [ *]\.\// /' >"$work.now"
+platform="# $(getconf GNU_LIBC_VERSION), $("$program" doctor 2>/dev/null | sed -n 's/.*\(OpenImageIO [0-9.]*\).*/\1/p'), $(uname -m)"
+if [ "$record" = - ]; then
+    printf '%s\n' "$platform"
+    cat "$work.now"
+    rm "$work.now"
+    exit 0
+fi
+if [ "$(head -n 1 "$record")" != "$platform" ]; then
+    skip "recorded hashes" "recorded with $(head -n 1 "$record"), this is $platform"
+else
+    tail -n +2 "$record" | diff - "$work.now" >"$work.diff"
+    report $? "$(wc -l <"$work.now") files have the recorded bits (threads $threads ${isa:-best}): if a result was meant to change, record anew" "$(head -n 40 "$work.diff")"
+    rm -f "$work.diff"
+fi
+rm -f "$work.now"
+finish

@@ -1,15 +1,16 @@
 #!/bin/sh
 # tools/check_layers.sh -- holds every #include of the library to tools/layers.txt; prints each offence, exits 1 if there is one.
 #
-# Usage: check_layers.sh [TREE]. Needs sh, find and awk only. The rooms are src/ROOM/, and scenes/ at the top.
+# Usage: check_layers.sh [TREE]. Needs sh, find and awk only. The rooms are src/ROOM/ and lab/ROOM/, scenes/ at the top, and lab/lab.h.
 # Beside the table: only src/bvh/embree_api.h includes Embree; C++ is in src/shim only, and nobody includes shim/; cli sees
-# nothing but gbtrace/*.h and itself, public headers nothing but each other; an include with quotes is written "room/file.h" or "gbtrace/file.h".
+# nothing but gbtrace/*.h, lab/lab.h and itself, public headers nothing but each other; an include with quotes is written "room/file.h" or "gbtrace/file.h".
 set -u
 cd "${1:-$(dirname "$0")/..}" || exit 2
 [ -f tools/layers.txt ] || { echo "tools/layers.txt is not there" >&2; exit 2; }
 
 folders=src
 [ -d scenes ] && folders="$folders scenes"
+[ -d lab ] && folders="$folders lab"
 [ -d include ] && folders="$folders include"
 find -H $folders -type f \( -name '*.c' -o -name '*.h' -o -name '*.cpp' -o -name '*.hpp' -o -name '*.cc' -o -name '*.inc' \) | LC_ALL=C sort |
     awk '
@@ -43,7 +44,7 @@ BEGIN {
     file = $0
     where = file
     part_count = split(file, parts, "/")
-    room = parts[1] == "src" ? parts[2] : parts[1]
+    room = parts[1] == "src" || (parts[1] == "lab" && part_count > 2) ? parts[2] : parts[1]
     if (room == "include") # public headers see each other only
         known[room] = 1
     if (parts[1] == "src" && part_count < 3)

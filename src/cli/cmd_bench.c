@@ -2,8 +2,8 @@
 #include <stdio.h>
 
 #include "cli/options.h"
-#include "gbtrace/bench.h"
 #include "gbtrace/train.h"
+#include "lab/lab.h"
 
 static const command_word *workloads(void)
 {
@@ -13,7 +13,7 @@ static const command_word *workloads(void)
 
 static int run_bench(const command *self, int argc, char **argv)
 {
-    gbt_bench_def def = gbt_bench_def_default();
+    lab_bench_def def = lab_bench_def_default();
     bool check = false;
     int threads = 0;
     const option options[] = {
@@ -52,7 +52,7 @@ static int run_bench(const command *self, int argc, char **argv)
         gbt_set_threads(threads);
     def.check = check;
     gbt_error err = {0};
-    return command_failed(gbt_bench_trace(&def, stdout, &err), &err);
+    return command_failed(lab_bench_trace(&def, stdout, &err), &err);
 }
 
 const command command_bench = {.name = "bench", .summary = "benchmark the ray tracer on given Gaussians",
@@ -72,7 +72,7 @@ static int run_check_grad(const command *self, int argc, char **argv)
     if (threads > 0)
         gbt_set_threads(threads);
     gbt_error err = {0};
-    return command_failed(gbt_check_grad(run.value[0], stdout, &err), &err);
+    return command_failed(lab_check_grad(run.value[0], stdout, &err), &err);
 }
 
 const command command_check_grad = {.name = "check-grad",

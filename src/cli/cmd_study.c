@@ -3,53 +3,52 @@
 #include <string.h>
 
 #include "cli/options.h"
-#include "gbtrace/bench.h"
-#include "gbtrace/study.h"
 #include "gbtrace/train.h"
+#include "lab/lab.h"
 
 /* What the command line says, for all studies. */
 typedef struct study_request {
-    gbt_study_def def; /* of the studies of models */
-    gbt_stability_def stability;
-    gbt_paper_def paper;
-    gbt_time_def time;
-    gbt_anchors_def anchors;
+    lab_study_def def; /* of the studies of models */
+    lab_stability_def stability;
+    lab_paper_def paper;
+    lab_time_def time;
+    lab_anchors_def anchors;
     const char *folder;
 } study_request;
 
 static gbt_status run_speed(const study_request *r, gbt_error *err)
 {
-    return gbt_study_speed(&r->def, r->folder, stdout, err);
+    return lab_study_speed(&r->def, r->folder, stdout, err);
 }
 
 static gbt_status run_crosscheck(const study_request *r, gbt_error *err)
 {
-    return gbt_study_crosscheck(&r->def, r->folder, stdout, err);
+    return lab_study_crosscheck(&r->def, r->folder, stdout, err);
 }
 
 static gbt_status run_rate(const study_request *r, gbt_error *err)
 {
-    return gbt_study_rate(&r->def, r->folder, stdout, err);
+    return lab_study_rate(&r->def, r->folder, stdout, err);
 }
 
 static gbt_status run_stability(const study_request *r, gbt_error *err)
 {
-    return gbt_study_stability(&r->stability, r->folder, stdout, err);
+    return lab_study_stability(&r->stability, r->folder, stdout, err);
 }
 
 static gbt_status run_paper(const study_request *r, gbt_error *err)
 {
-    return gbt_study_paper(&r->paper, r->folder, stdout, err);
+    return lab_study_paper(&r->paper, r->folder, stdout, err);
 }
 
 static gbt_status run_time(const study_request *r, gbt_error *err)
 {
-    return gbt_study_time(&r->time, r->folder, stdout, err);
+    return lab_study_time(&r->time, r->folder, stdout, err);
 }
 
 static gbt_status run_anchors(const study_request *r, gbt_error *err)
 {
-    return gbt_study_anchors(&r->anchors, r->folder, stdout, err);
+    return lab_study_anchors(&r->anchors, r->folder, stdout, err);
 }
 
 enum { STUDY_COUNT = 7 };
@@ -74,12 +73,12 @@ static const command_word *words_of_studies(void)
 
 static int run(const command *self, int argc, char **argv)
 {
-    study_request request = {.def = gbt_study_def_default(), .stability = gbt_stability_def_default(), .paper = gbt_paper_def_default(),
-                             .time = gbt_time_def_default(), .anchors = gbt_anchors_def_default()};
+    study_request request = {.def = lab_study_def_default(), .stability = lab_stability_def_default(), .paper = lab_paper_def_default(),
+                             .time = lab_time_def_default(), .anchors = lab_anchors_def_default()};
     bool quick = false;
-    gbt_study_def *def = &request.def;
-    gbt_paper_def *paper = &request.paper;
-    gbt_anchors_def *anchors = &request.anchors;
+    lab_study_def *def = &request.def;
+    lab_paper_def *paper = &request.paper;
+    lab_anchors_def *anchors = &request.anchors;
     int threads = 0, seeds = 0;
     double downscale = 1;
     uint64_t iterations = 0;

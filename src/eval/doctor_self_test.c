@@ -7,7 +7,7 @@
 #include "base/memory.h"
 #include "base/rng.h"
 #include "eval/doctor.h"
-#include "eval/rounding_band.h"
+#include "trace/rounding_band.h"
 #include "trace/reference.h"
 #include "trace/trace.h"
 

@@ -6,7 +6,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "gbtrace/bench.h"
+#include "lab/lab.h"
 #include "report/text.h"
 #include "stability/draw.h"
 
@@ -195,12 +195,12 @@ static void files_of_the_study(void **state)
 {
     (void)state;
     static const char *const names[] = {"stability.json", "stability.md", "stability.svg", "stability_a1.png"};
-    gbt_stability_def def = gbt_stability_def_default();
+    lab_stability_def def = lab_stability_def_default();
     gbt_error err = {0};
     FILE *out = tmpfile();
     def.only = "A1,A3", def.quick = 1;
     assert_non_null(out);
-    assert_int_equal(gbt_study_stability(&def, folder, out, &err), GBT_OK);
+    assert_int_equal(lab_study_stability(&def, folder, out, &err), GBT_OK);
     assert_true(ftell(out) > 500);
     fclose(out);
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {

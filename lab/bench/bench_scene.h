@@ -1,0 +1,35 @@
+/* bench/bench_scene.h -- what benchmarks and studies trace: the Gaussians of a .ply or of a run, and the rays of one camera. */
+#ifndef GBT_EVAL_BENCH_SCENE_H
+#define GBT_EVAL_BENCH_SCENE_H
+
+#include "render/camera_file.h"
+#include "render/loaded_run.h"
+
+/** Start from {0}; free with bench_scene_close() after success or failure. Not to be copied. */
+typedef struct bench_scene {
+    const gaussians *gaussians; /* in `from_ply` or in `run`; after bench_scene_decode() */
+    trace_settings settings;    /* the model's own, or the caller's; read by bench_scene_decode() */
+    ray_image rays;
+    camera_file camera;
+    struct gaussians from_ply;
+    loaded_run *run; /* NULL for a .ply */
+} bench_scene;
+
+/**
+ * Open a model and find its camera.
+ *
+ * @param path   [in] plain Gaussians (.ply: the colours of degree 0), or a run
+ * @param camera [in] camera file, of an aperture the first sample; NULL: the run's first held-out view
+ * @return GBT_OK, GBT_ERR_ARGUMENT (plain Gaussians without a camera), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ */
+gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *out, gbt_error *err);
+
+/** The Gaussians (of a run: those that can be seen with s->settings) and the rays. */
+gbt_status bench_scene_decode(bench_scene *s, gbt_error *err);
+
+void bench_scene_close(bench_scene *s);
+
+/** Whether a model is one file of plain Gaussians (.ply, .splat, .spz), which knows no camera. */
+bool bench_scene_needs_camera(const char *path);
+
+#endif

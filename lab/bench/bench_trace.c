@@ -1,0 +1,206 @@
+/* bench/bench_trace.c -- time build, forward and adjoint on given Gaussians, with the error against the double reference beside it. */
+#include <jansson.h>
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/parallel.h"
+#include "bench/bench_passes.h"
+#include "bench/bench_reference.h"
+#include "bench/bench_scene.h"
+#include "data/json_out.h"
+#include "lab/lab.h"
+
+enum { KERNELS_MAX = 3 };
+
+lab_bench_def lab_bench_def_default(void)
+{
+    return (lab_bench_def){.repeats = 5, .kernel = "tile"};
+}
+
+/* What the caller has given in place of the model's own. */
+static gbt_status override_setting(const char *name, float given, float high, float *setting, gbt_error *err)
+{
+    if (isnan(given) || given == 0)
+        return GBT_OK;
+    if (!(given > 0 && given < high))
+        return base_fail(err, GBT_ERR_ARGUMENT, "bench: bad %s (wanted a number in (0, %g), got %g)", name, (double)high, (double)given);
+    *setting = given;
+    return GBT_OK;
+}
+
+static gbt_status override_settings(const lab_bench_def *def, trace_settings *settings, gbt_error *err)
+{
+    GBT_TRY(loaded_run_preset(def->preset, settings, err));
+    GBT_TRY(override_setting("alpha_min", def->alpha_min, 1, &settings->alpha_min, err));
+    GBT_TRY(override_setting("alpha_max", def->alpha_max, 1, &settings->alpha_max, err));
+    GBT_TRY(override_setting("t_min", def->t_min, 1, &settings->transmittance_min, err));
+    return override_setting("proxy_radius", def->proxy_radius, INFINITY, &settings->proxy_radius, err);
+}
+
+/* ---- figures: one table for the text and for the file -------------------------------------------------------------------------------- */
+
+typedef struct measured {
+    const lab_bench_def *def;
+    const bench_scene *scene;
+    bench_way ways[KERNELS_MAX];
+    bench_error error[KERNELS_MAX]; /* when checked */
+    size_t count, check_rays;
+} measured;
+
+enum { ROW_COUNT = 21 };
+typedef struct figure_row {
+    const char *label, *key; /* what people read; the name in the file */
+    double value;
+    int decimals;
+    bool is_cost; /* worth a ratio */
+} figure_row;
+
+static void list_figures(const measured *m, size_t way, figure_row rows[ROW_COUNT])
+{
+    const bench_figures *f = &m->ways[way].figures;
+    const kernel_counters *c = &f->counters;
+    const double n = (double)ray_image_count(&m->scene->rays), packets = n / PACKET_LANES;
+    const figure_row all[ROW_COUNT] = {
+        {"build, ms", "build_ms", f->build_ms, 2, true},
+        {"forward, ms", NULL, 1000 * f->forward_seconds, 2, true},
+        {"forward, core-us/ray", "forward_core_us_per_ray", f->forward_us, 3, true},
+        {"adjoint, ms", NULL, 1000 * f->adjoint_seconds, 2, true},
+        {"adjoint, core-us/ray", "adjoint_core_us_per_ray", f->adjoint_us, 3, true},
+        {NULL, "forward_seconds", f->forward_seconds, 0, false},
+        {NULL, "adjoint_seconds", f->adjoint_seconds, 0, false},
+        {"hits per ray", "hits_per_ray", (double)c->hits / n, 2, false},
+        {"blended per ray", "blended_per_ray", (double)c->blended / n, 2, false},
+        {"tests per ray", "tests_per_ray", (double)c->tests / n, 1, true},
+        {"nodes per ray", "nodes_per_ray", (double)c->nodes / n, 2, true},
+        {"candidates per packet", "candidates_per_packet", (double)c->candidates / packets, 1, true},
+        {"rows per packet", "rows_per_packet", (double)c->rows / packets, 1, true},
+        {"pairs of rows per packet", "row_pairs_per_packet", (double)c->pairs / packets, 1, true},
+        {"packets spilled", "spilled_packets", (double)c->spilled_packets, 0, false},
+        {"tape, MB", NULL, (double)c->tape_bytes * 1e-6, 2, true},
+        {"tree, MB", NULL, (double)f->tree_bytes * 1e-6, 2, true},
+        {"records, MB", NULL, (double)f->record_bytes * 1e-6, 2, true},
+        {NULL, "tape_bytes", (double)c->tape_bytes, 0, false},
+        {NULL, "tree_bytes", (double)f->tree_bytes, 0, false},
+        {NULL, "record_bytes", (double)f->record_bytes, 0, false},
+    };
+    memcpy(rows, all, sizeof all);
+}
+
+static void print_head(const measured *m, FILE *out)
+{
+    const bench_scene *s = m->scene;
+    const bench_way *first = &m->ways[0];
+    const bool embree = first->kernel == TRACE_EMBREE;
+    fprintf(out, "%s: %zu Gaussians (%zu can be seen), %d x %d rays, %d threads, %s\n", m->def->model, s->gaussians->count,
+            embree ? first->traced.embree.box_count : first->traced.tree.box_count, s->rays.width, s->rays.height, parallel_threads(),
+            cpu_isa_name(first->isa));
+    fprintf(out, "alpha_min %g, alpha_max %g, T_min %g, proxy radius %g; medians of %d\n\n", (double)s->settings.alpha_min,
+            (double)s->settings.alpha_max, (double)s->settings.transmittance_min, (double)s->settings.proxy_radius, m->def->repeats);
+}
+
+/* One column per kernel; of the second and third, how often the first's is in it. */
+static void print_figures(const measured *m, FILE *out)
+{
+    figure_row rows[KERNELS_MAX][ROW_COUNT];
+    print_head(m, out);
+    fprintf(out, "%-26s", "");
+    for (size_t k = 0; k < m->count; k++) {
+        list_figures(m, k, rows[k]);
+        fprintf(out, k == 0 ? "%10s" : "%10s         ", bench_kernel_name(m->ways[k].kernel));
+    }
+    fputs("\n", out);
+    for (int r = 0; r < ROW_COUNT; r++) {
+        if (rows[0][r].label == NULL)
+            continue;
+        fprintf(out, "%-26s", rows[0][r].label);
+        for (size_t k = 0; k < m->count; k++) {
+            const double first = rows[0][r].value, value = rows[k][r].value;
+            fprintf(out, "%10.*f", rows[k][r].decimals, value);
+            if (k > 0 && rows[k][r].is_cost && first > 0 && value > 0)
+                fprintf(out, " %7.2fx", value / first);
+            else if (k > 0)
+                fprintf(out, " %8s", "");
+        }
+        fputs("\n", out);
+    }
+    for (size_t k = 0; m->def->check && k < m->count; k++)
+        fprintf(out, "%s to the double reference (%zu rays): PSNR %.1f dB, max error %.3g\n", bench_kernel_name(m->ways[k].kernel),
+                m->check_rays, m->error[k].psnr, m->error[k].max);
+}
+
+static json_t *way_to_json(const measured *m, size_t way)
+{
+    figure_row rows[ROW_COUNT], first[ROW_COUNT];
+    list_figures(m, way, rows);
+    list_figures(m, 0, first);
+    json_t *out = json_pack("{s:s,s:s}", "kernel", bench_kernel_name(m->ways[way].kernel), "isa", cpu_isa_name(m->ways[way].isa));
+    for (int r = 0; r < ROW_COUNT; r++)
+        if (rows[r].key != NULL)
+            json_object_set_new(out, rows[r].key, json_real(rows[r].value));
+    if (m->def->check) {
+        json_object_set_new(out, "psnr_to_reference", json_real(m->error[way].psnr));
+        json_object_set_new(out, "max_error", json_real(m->error[way].max));
+    }
+    return out;
+}
+
+/* The first kernel's figures stand at the top, where programs have always found them. */
+static gbt_status save_figures(const measured *m, gbt_error *err)
+{
+    const trace_settings *s = &m->scene->settings;
+    json_t *root = json_pack("{s:i,s:o,s:I,s:I,s:i,s:f,s:f,s:f,s:o}", "schema", 2, "model", json_text(m->def->model), "rays",
+                             (json_int_t)ray_image_count(&m->scene->rays), "gaussians", (json_int_t)m->scene->gaussians->count, "threads",
+                             parallel_threads(), "alpha_min", (double)s->alpha_min, "alpha_max", (double)s->alpha_max, "transmittance_min",
+                             (double)s->transmittance_min, "proxy_radius",
+                             isfinite(s->proxy_radius) ? json_real((double)s->proxy_radius) : json_null());
+    json_t *kernels = json_array();
+    for (size_t k = 0; k < m->count; k++)
+        json_array_append_new(kernels, way_to_json(m, k));
+    json_object_update(root, json_array_get(kernels, 0));
+    json_object_set_new(root, "kernels", kernels);
+    const gbt_status status = json_save(root, m->def->json, err);
+    json_decref(root);
+    return status;
+}
+
+static gbt_status bench(measured *m, bench_scene *traced, bench_reference *want, FILE *out, gbt_error *err)
+{
+    const lab_bench_def *def = m->def;
+    GBT_TRY(bench_scene_open(def->model, def->camera, traced, err));
+    GBT_TRY(override_settings(def, &traced->settings, err));
+    GBT_TRY(bench_scene_decode(traced, err));
+    for (size_t k = 0; k < m->count; k++)
+        m->ways[k].isa = cpu_best_isa(), m->ways[k].settings = traced->settings, m->ways[k].tape_bytes_max = def->tape_bytes_max;
+    GBT_TRY(bench_measure(m->ways, m->count, traced->gaussians, &traced->rays, def->repeats, err));
+    if (def->check)
+        GBT_TRY(bench_reference_make(traced->gaussians, &traced->settings, &traced->rays, want, err));
+    for (size_t k = 0; def->check && k < m->count; k++)
+        m->error[k] = bench_reference_compare(want, &m->ways[k].rgb);
+    m->check_rays = ray_image_count(&want->rays);
+    print_figures(m, out);
+    return def->json != NULL ? save_figures(m, err) : GBT_OK;
+}
+
+gbt_status lab_bench_trace(const lab_bench_def *def, FILE *out, gbt_error *err)
+{
+    if (def->model == NULL || def->repeats < 1 || def->repeats > 1000)
+        return base_fail(err, GBT_ERR_ARGUMENT, "bench: wanted a model and 1 to 1000 repeats");
+    bench_scene traced = {0};
+    bench_reference want = {0};
+    measured m = {.def = def, .scene = &traced};
+    trace_kernel kernels[KERNELS_MAX];
+    const char *list = def->kernel != NULL ? def->kernel : "tile";
+    m.count = bench_kernels_parse(list, kernels, KERNELS_MAX);
+    if (m.count == 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--kernel: \"%.60s\" (wanted tile, single or embree, or some of them with commas between)",
+                         list);
+    for (size_t k = 0; k < m.count; k++)
+        m.ways[k].kernel = kernels[k];
+    const gbt_status status = bench(&m, &traced, &want, out, err);
+    for (size_t k = 0; k < m.count; k++)
+        bench_way_free(&m.ways[k]);
+    bench_reference_free(&want);
+    bench_scene_close(&traced);
+    return status;
+}

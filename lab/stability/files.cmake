@@ -1,0 +1,15 @@
+# gbt_stability_files(FILE.c): the scene files of lab/stability/cases/ as C, so that the installed program has them.
+function(gbt_stability_files out)
+  file(GLOB scenes CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/lab/stability/cases/*.json)
+  set(source "/* made by lab/stability/files.cmake from lab/stability/cases/ */\n#include <string.h>\n\n#include \"stability/stability.h\"\n\n"
+    "const char *stability_file(const char *name)\n{\n")
+  foreach(scene ${scenes})
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${scene})
+    get_filename_component(name ${scene} NAME_WE)
+    file(READ ${scene} bytes HEX)
+    string(REGEX REPLACE "([0-9a-f][0-9a-f])" "\\\\x\\1" bytes "${bytes}")
+    string(APPEND source "    if (strcmp(name, \"${name}\") == 0)\n        return \"${bytes}\";\n")
+  endforeach()
+  string(APPEND source "    return NULL;\n}\n")
+  file(CONFIGURE OUTPUT ${out} CONTENT "${source}" @ONLY)
+endfunction()

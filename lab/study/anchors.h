@@ -1,0 +1,40 @@
+/* study/anchors.h -- what the study "anchors" trains, what came out, and how it is written down. */
+#ifndef GBT_STUDY_ANCHORS_H
+#define GBT_STUDY_ANCHORS_H
+
+#include "lab/lab.h"
+#include "study/grid.h"
+#include "study/runs_stat.h"
+
+enum {
+    ANCHORS_VARIANTS_MAX = 12,
+    ANCHORS_VOXELS = 0, /* the two that others are compared with */
+    ANCHORS_BALLS = 1,
+    ANCHORS_ADAPTIVE = 2
+};
+
+typedef struct anchors_variant {
+    const char *name;     /* in tables; of its folder, what is no letter or digit as '-' */
+    const char *settings; /* what differs from the default: lines as in a run's `config` */
+    int series;           /* of the chart */
+} anchors_variant;
+
+extern const anchors_variant anchors_variants[];
+extern const size_t anchors_variant_count;
+
+typedef struct anchors_study {
+    lab_anchors_def def; /* borrowed */
+    study_grid grid;
+} anchors_study;
+
+static inline const study_figures *anchors_run(const anchors_study *s, size_t place, size_t variant, int seed)
+{
+    return study_grid_at(&s->grid, place, variant, seed);
+}
+
+void anchors_tables(const anchors_study *s, text *out); /* Markdown */
+void anchors_csv(const anchors_study *s, text *out);
+void anchors_charts(const anchors_study *s, text *out); /* SVG */
+gbt_status anchors_json(const anchors_study *s, const char *folder, gbt_error *err); /* anchors.json in the folder */
+
+#endif

@@ -1,0 +1,125 @@
+/* study/paper.c -- the study "paper": which runs its tables need, and making them. */
+#include "study/paper.h"
+
+#include <stdio.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+
+/* The paper's growth ends at half of its run, 15000 of 30000. */
+static const double full = 0.5, third = 1.0 / 3, sixth = 1.0 / 6;
+enum { D_MAX = 18, LEAST_ITERATIONS = 20 };
+
+/* Names are folders of runs: a change of a row's meaning needs another name. */
+const paper_variant paper_variants[PAPER_VARIANTS] = {
+    [PAPER_VOXEL] = {"voxel", "voxels", "voxel", "nn", false, full, D_MAX},
+    [PAPER_GBSP] = {"gbai-gbsp", "GBAI + GBSP", "gb", "gb", false, full, D_MAX},
+    [PAPER_GBAI] = {"gbai", "GBAI", "gb", "nn", false, full, D_MAX},
+    [PAPER_VOXEL_SCALED] = {"voxel-scaled", "voxels, scale x constant", "voxel", "nn", true, full, D_MAX},
+    [PAPER_GBAI_SCALED] = {"gbai-scaled", "GBAI, scale x constant", "gb", "nn", true, full, D_MAX},
+    [PAPER_VOXEL_SIXTH] = {"voxel-grow-sixth", "voxels, growth to 1/6", "voxel", "nn", false, sixth, D_MAX},
+    [PAPER_GBSP_SIXTH] = {"gbai-gbsp-grow-sixth", "GBAI + GBSP, growth to 1/6", "gb", "gb", false, sixth, D_MAX},
+    [PAPER_VOXEL_THIRD] = {"voxel-grow-third", "voxels, growth to 1/3", "voxel", "nn", false, third, D_MAX},
+    [PAPER_GBSP_THIRD] = {"gbai-gbsp-grow-third", "GBAI + GBSP, growth to 1/3", "gb", "gb", false, third, D_MAX},
+    [PAPER_DEPTH_10] = {"gbai-gbsp-depth-10", "D_max 10", "gb", "gb", false, full, 10},
+    [PAPER_DEPTH_12] = {"gbai-gbsp-depth-12", "D_max 12", "gb", "gb", false, full, 12},
+    [PAPER_DEPTH_14] = {"gbai-gbsp-depth-14", "D_max 14", "gb", "gb", false, full, 14},
+    [PAPER_DEPTH_16] = {"gbai-gbsp-depth-16", "D_max 16", "gb", "gb", false, full, 16},
+};
+
+size_t paper_table_variants(int table, const paper_variant_id **out)
+{
+    static const paper_variant_id
+        main_results[] = {PAPER_VOXEL, PAPER_GBSP},
+        ablation[] = {PAPER_VOXEL, PAPER_GBAI, PAPER_GBSP, PAPER_VOXEL_SCALED, PAPER_GBAI_SCALED},
+        growth[] = {PAPER_VOXEL_SIXTH, PAPER_GBSP_SIXTH, PAPER_VOXEL_THIRD, PAPER_GBSP_THIRD, PAPER_VOXEL, PAPER_GBSP},
+        depth[] = {PAPER_DEPTH_10, PAPER_DEPTH_12, PAPER_DEPTH_14, PAPER_DEPTH_16, PAPER_GBSP};
+    static const struct { const paper_variant_id *variants; size_t count; } all[PAPER_TABLES] = {
+        {main_results, sizeof main_results / sizeof *main_results}, {ablation, sizeof ablation / sizeof *ablation},
+        {growth, sizeof growth / sizeof *growth}, {depth, sizeof depth / sizeof *depth}};
+    *out = all[table - 1].variants;
+    return all[table - 1].count;
+}
+
+lab_paper_def lab_paper_def_default(void)
+{
+    return (lab_paper_def){.iterations = 3000, .downscale = 1, .seeds = 3, .renderer = "raster", .tables = "1,2,3,4"};
+}
+
+/* "1,3": digits of tables, each once, with commas between. */
+static gbt_status choose_tables(const char *list, bool has_table[PAPER_TABLES + 1], gbt_error *err)
+{
+    for (const char *at = list;; at += 2) {
+        const int table = *at - '0';
+        if (table < 1 || table > PAPER_TABLES || has_table[table] || (at[1] != ',' && at[1] != '\0'))
+            return base_fail(err, GBT_ERR_ARGUMENT, "--tables: \"%.40s\" (wanted some of 1,2,3,4)", list);
+        has_table[table] = true;
+        if (at[1] == '\0')
+            return GBT_OK;
+    }
+}
+
+static gbt_status plan(paper_study *s, const lab_paper_def *def, gbt_error *err)
+{
+    s->def = *def;
+    if (def->iterations < LEAST_ITERATIONS)
+        return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least %d)", (unsigned long long)def->iterations,
+                         (int)LEAST_ITERATIONS);
+    GBT_TRY(choose_tables(def->tables, s->has_table, err));
+    GBT_TRY(study_grid_open(&s->grid, def->data, def->data_count, PAPER_VARIANTS, def->seeds, err));
+    for (size_t i = 0; i < s->grid.scene_count; i++)
+        GBT_TRY(paper_scene_look(def->data[i], &s->scenes[i], err));
+    for (int table = 1; table <= PAPER_TABLES; table++) {
+        const paper_variant_id *variants;
+        const size_t count = paper_table_variants(table, &variants);
+        for (size_t i = 0; i < count && s->has_table[table]; i++)
+            s->has_variant[variants[i]] = true;
+    }
+    return GBT_OK;
+}
+
+static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder, study_figures *out, gbt_error *err)
+{
+    char run[4096];
+    const paper_study *s = study;
+    const paper_variant *v = &paper_variants[variant];
+    if (v->max_depth < D_MAX && v->max_depth >= s->scenes[scene].tree_depth) {
+        *out = *paper_run(s, scene, PAPER_GBSP, seed); /* the same balls, so the same run to the bit */
+        return GBT_OK;
+    }
+    gbt_train_def def = gbt_train_def_default();
+    def.compat = true, def.eval_split = "every=8", def.save_every_seconds = 0;
+    /* As compat has them: a new default must not make old runs look like others. */
+    def.start_level = 0, def.splats_until = 0, def.footprint = 0;
+    def.iterations = s->def.iterations, def.downscale = s->def.downscale, def.renderer = s->def.renderer, def.seed = (uint64_t)seed;
+    def.init = v->init, def.scale_prior = v->scale_prior, def.grow_until = v->grow_until, def.max_depth = v->max_depth;
+    def.scale_factor = v->scaled ? s->scenes[scene].scale_constant : 1;
+    def.command = "gbtrace study paper";
+    GBT_TRY(study_runs_folder(folder, s->grid.names[scene], v->name, def.seed, run, sizeof run, err));
+    return study_runs_do(s->def.data[scene], run, &def, s->def.lpips, out, err);
+}
+
+static gbt_status write_all(const paper_study *s, const char *folder, FILE *out, gbt_error *err)
+{
+    study_texts texts = {.csv.err = err, .page.err = err, .charts.err = err};
+    paper_csv(s, &texts.csv);
+    paper_tables(s, &texts.page);
+    paper_charts(s, &texts.charts);
+    GBT_TRY(study_texts_save(&texts, folder, "paper", out));
+    return paper_json(s, folder, err);
+}
+
+gbt_status lab_study_paper(const lab_paper_def *def, const char *folder, FILE *out, gbt_error *err)
+{
+    paper_study *s = mem_calloc(1, sizeof *s, "study", err);
+    if (s == NULL)
+        return GBT_ERR_NO_MEMORY;
+    gbt_status status = plan(s, def, err);
+    if (status == GBT_OK)
+        status = study_grid_fill(&s->grid, folder, s->has_variant, run_one, s, err);
+    if (status == GBT_OK)
+        status = write_all(s, folder, out, err);
+    study_grid_close(&s->grid);
+    mem_free(s);
+    return status;
+}

@@ -1,0 +1,327 @@
+/* study/speed.c -- measure what each setting costs and what it does to the picture. */
+#include "study/speed.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "bench/bench_scene.h"
+#include "lab/lab.h"
+#include "study/model.h"
+#include "trace/reference.h"
+
+/* ---- what is tried ------------------------------------------------------------------------------------------------------------------- */
+
+/* One step of one knob; the others stand as in the preset "default". */
+typedef struct speed_step {
+    speed_knob knob;
+    const char *value;
+    float number; /* of the knob; 0: the default itself */
+    int choice;   /* kernel or instruction set */
+} speed_step;
+
+/* Along each knob from exact to fast, through the default. */
+static const speed_step steps[] = {
+    {KNOB_PRESET, "exact", 0, 0},       {KNOB_PRESET, "default", 0, 0},      {KNOB_PRESET, "fast", 0, 0},
+    {KNOB_ALPHA, "1e-4", 1e-4f, 0},     {KNOB_ALPHA, "0.001", 1e-3f, 0},     {KNOB_ALPHA, "1/255", 0, 0},
+    {KNOB_ALPHA, "0.01", 0.01f, 0},
+    {KNOB_ALPHA, "0.02", 0.02f, 0},     {KNOB_ALPHA, "0.05", 0.05f, 0},      {KNOB_STOP, "1e-6", 1e-6f, 0},       {KNOB_STOP, "1e-4", 0, 0},
+    {KNOB_STOP, "0.001", 1e-3f, 0},     {KNOB_STOP, "0.01", 0.01f, 0},       {KNOB_STOP, "0.03", 0.03f, 0},
+    {KNOB_RADIUS, "inf", 0, 0},
+    {KNOB_RADIUS, "3", 3, 0},           {KNOB_RADIUS, "2.5", 2.5f, 0},       {KNOB_RADIUS, "2", 2, 0},
+    {KNOB_KERNEL, "embree", 0, TRACE_EMBREE},
+    {KNOB_KERNEL, "single", 0, TRACE_SINGLE}, {KNOB_KERNEL, "tile", 0, TRACE_TILE}, {KNOB_ISA, "plain", 0, CPU_PLAIN},
+    {KNOB_ISA, "avx2", 0, CPU_AVX2},
+    {KNOB_ISA, "avx512", 0, CPU_AVX512}, {KNOB_RENDERER, "rays", 0, -1},      {KNOB_RENDERER, "splats, per-ray order", 0, RASTER_PER_RAY},
+    {KNOB_RENDERER, "EWA splats", 0, RASTER_EWA},
+};
+
+const char *speed_knob_name(speed_knob knob)
+{
+    static const char *const names[KNOB_COUNT] = {"preset", "alpha_min", "T_min", "proxy radius", "kernel", "instruction set", "renderer"};
+    return names[knob];
+}
+
+static void list_rows(const trace_settings *own, speed_model *out)
+{
+    const cpu_isa best = cpu_best_isa();
+    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
+        const speed_step *s = &steps[i];
+        if (s->knob == KNOB_ISA && s->choice > (int)best)
+            continue;
+        speed_row *row = &out->rows[out->row_count++];
+        *row = (speed_row){.knob = s->knob, .value = s->value, .settings = *own, .kernel = TRACE_TILE, .isa = best};
+        trace_settings_preset(s->knob == KNOB_PRESET ? s->value : "default", &row->settings);
+        row->is_default = s->knob != KNOB_PRESET && s->number == 0;
+        switch (s->knob) {
+        case KNOB_ALPHA: row->settings.alpha_min = row->is_default ? row->settings.alpha_min : s->number; break;
+        case KNOB_STOP: row->settings.transmittance_min = row->is_default ? row->settings.transmittance_min : s->number; break;
+        case KNOB_RADIUS: row->settings.proxy_radius = row->is_default ? row->settings.proxy_radius : s->number; break;
+        case KNOB_KERNEL: row->kernel = (trace_kernel)s->choice, row->is_default = row->kernel == TRACE_TILE; break;
+        case KNOB_ISA: row->isa = (cpu_isa)s->choice, row->is_default = row->isa == best; break;
+        case KNOB_RENDERER: row->is_default = s->choice < 0, row->splats = s->choice >= 0,
+            row->form = row->splats ? (raster_form)s->choice : RASTER_EWA; break;
+        case KNOB_PRESET:
+        case KNOB_COUNT: break;
+        }
+    }
+}
+
+/* ---- ideas that were not built: only what they do to the picture --------------------------------------------------------------------- */
+
+enum { ORDER_STRIDE = 4 }; /* rays are slow in double, one by one: every 4th of the reference's */
+
+/* One order for the whole picture, as in 3DGS: by the depth of the mean along the mean direction of the rays. */
+typedef struct order_job {
+    const reference_scene *scene;
+    const trace_settings *settings;
+    const ray_image *rays;
+    double axis[3];
+    double *rgb;
+} order_job;
+
+typedef struct centre_hit {
+    double depth;
+    const reference_hit *hit;
+} centre_hit;
+
+static double field_of(const reference_scene *s, enum reference_field f, size_t i)
+{
+    return s->fields[(size_t)f * s->count + i];
+}
+
+static int by_centre(const void *a, const void *b)
+{
+    const centre_hit *p = a, *q = b;
+    if (p->depth != q->depth)
+        return p->depth < q->depth ? -1 : 1;
+    return p->hit->id < q->hit->id ? -1 : p->hit->id > q->hit->id;
+}
+
+static void blend_by_centre(const order_job *job, const reference_hit *hits, size_t count, centre_hit *order, double rgb[3])
+{
+    double T = 1;
+    for (size_t i = 0; i < count; i++) {
+        order[i] = (centre_hit){0, &hits[i]};
+        for (unsigned k = 0; k < 3; k++)
+            order[i].depth += job->axis[k] * field_of(job->scene, REFERENCE_mean_x + k, hits[i].id);
+    }
+    qsort(order, count, sizeof *order, by_centre);
+    rgb[0] = rgb[1] = rgb[2] = 0;
+    for (size_t i = 0; i < count; i++) {
+        const double alpha = order[i].hit->alpha, next = T * (1 - alpha);
+        if (next < (double)job->settings->transmittance_min)
+            break;
+        for (unsigned c = 0; c < 3; c++)
+            rgb[c] += T * alpha * field_of(job->scene, REFERENCE_red + c, order[i].hit->id);
+        T = next;
+    }
+    for (int c = 0; c < 3; c++)
+        rgb[c] += T * (double)job->settings->background[c];
+}
+
+static void order_block(size_t block, size_t begin, size_t end, void *context)
+{
+    order_job *job = context;
+    reference_hit *hits = NULL;
+    centre_hit *order = NULL;
+    size_t count, capacity = 0, order_capacity = 0;
+    gbt_status status = GBT_OK;
+    (void)block;
+    for (size_t i = begin; i < end && status == GBT_OK; i++) {
+        double origin[3], dir[3];
+        for (size_t k = 0; k < 3; k++)
+            origin[k] = (double)ray_image_origin(job->rays, i * ORDER_STRIDE)[k], dir[k] = (double)job->rays->dir[3 * i * ORDER_STRIDE + k];
+        status = reference_scene_ray_hits(job->scene, job->settings, origin, dir, &hits, &count, &capacity, NULL);
+        if (status == GBT_OK)
+            status = mem_reserve((void **)&order, &order_capacity, 0, count + 1, sizeof *order, "hits by centre", NULL);
+        if (status == GBT_OK)
+            blend_by_centre(job, hits, count, order, job->rgb + 3 * i);
+    }
+    mem_free(hits);
+    mem_free(order);
+    if (status != GBT_OK)
+        for (size_t i = 3 * begin; i < 3 * end; i++)
+            job->rgb[i] = NAN; /* seen by the caller */
+}
+
+static gbt_status order_by_centre(const gaussians *g, const trace_settings *settings, const bench_reference *want, bench_error *out,
+                                  gbt_error *err)
+{
+    reference_scene exact = {0};
+    const size_t all = ray_image_count(&want->rays), count = (all + ORDER_STRIDE - 1) / ORDER_STRIDE;
+    order_job job = {.scene = &exact, .settings = settings, .rays = &want->rays};
+    for (size_t i = 0; i < all; i++)
+        for (size_t k = 0; k < 3; k++)
+            job.axis[k] += (double)want->rays.dir[3 * i + k];
+    job.rgb = mem_alloc(count, 3 * sizeof *job.rgb, "picture by centre", err);
+    gbt_status status = job.rgb == NULL ? GBT_ERR_NO_MEMORY : reference_scene_make(g, &exact, err);
+    if (status == GBT_OK) {
+        parallel_blocks(count, 16, order_block, &job);
+        for (size_t i = 0; i < 3 * count && status == GBT_OK; i++)
+            if (isnan(job.rgb[i]))
+                status = base_fail(err, GBT_ERR_NO_MEMORY, "study: no memory for the hits by centre");
+    }
+    if (status == GBT_OK)
+        *out = bench_reference_compare_some(want, job.rgb, ORDER_STRIDE);
+    reference_scene_free(&exact);
+    mem_free(job.rgb);
+    return status;
+}
+
+/* To the nearest half-precision number, ties to even; what is too large becomes the largest. */
+static float round_to_half(float x)
+{
+    int exponent;
+    frexpf(x, &exponent);
+    const int low = exponent - 11 > -24 ? exponent - 11 : -24; /* the last bit */
+    return fminf(fmaxf(ldexpf(nearbyintf(ldexpf(x, -low)), low), -65504), 65504);
+}
+
+/* Records of half the size: every number rounded to a half, or all but the mean. */
+static gbt_status half_records(const bench_scene *s, const trace_settings *settings, bool keep_mean, const bench_reference *want,
+                               bench_error *out, gbt_error *err)
+{
+    trace_scene traced = {0};
+    image rgb = {0};
+    gbt_status status = image_alloc(&rgb, s->rays.width, s->rays.height, 3, err);
+    if (status == GBT_OK)
+        status = trace_build(&traced, s->gaussians, settings, ray_image_reach(&s->rays), err);
+    for (size_t i = 0; status == GBT_OK && i < s->gaussians->count * RECORD_FLOATS; i++) {
+        const size_t at = i % RECORD_FLOATS;
+        if (at < RECORD_COLOR + 3 && !(keep_mean && at >= RECORD_MEAN && at < RECORD_MEAN + 3))
+            traced.records[i] = round_to_half(traced.records[i]);
+    }
+    if (status == GBT_OK)
+        status = trace_forward(&traced, &s->rays, false, &(trace_outputs){.rgb = &rgb}, NULL, err);
+    if (status == GBT_OK)
+        *out = bench_reference_compare(want, &rgb);
+    trace_scene_free(&traced);
+    image_free(&rgb);
+    return status;
+}
+
+/* With the cut-offs of "exact", so that the error is the idea's own. */
+static gbt_status measure_ideas(const bench_scene *s, const trace_settings *settings, const bench_reference *want, speed_model *out,
+                                gbt_error *err)
+{
+    out->ideas[0] = (speed_idea){.name = "order by centre", .reason = "wrong order; would save the comparison of pairs of rows at most"};
+    out->ideas[1] = (speed_idea){.name = "half-precision records", .reason = "a record is read once per tile: little to save"};
+    out->ideas[2] = (speed_idea){.name = "half but for the mean", .reason = "38 bytes in place of 64: little to save"};
+    GBT_TRY(order_by_centre(s->gaussians, settings, want, &out->ideas[0].error, err));
+    GBT_TRY(half_records(s, settings, false, want, &out->ideas[1].error, err));
+    return half_records(s, settings, true, want, &out->ideas[2].error, err);
+}
+
+/* ---- one model ----------------------------------------------------------------------------------------------------------------------- */
+
+static void keep_figures(const bench_scene *s, const bench_way *way, const bench_reference *want, speed_row *row)
+{
+    const double rays = (double)ray_image_count(&s->rays);
+    row->photo_psnr = NAN;
+    row->picture_us = way->figures.build_us + way->figures.forward_us;
+    row->forward_us = way->figures.forward_us, row->both_us = row->forward_us + way->figures.adjoint_us;
+    row->blended = (double)way->figures.counters.blended / rays, row->pairs = (double)way->figures.counters.pairs / (rays / PACKET_LANES);
+    row->error = bench_reference_compare(want, &way->rgb);
+}
+
+/* The default once, however many knobs go through it. */
+static gbt_status measure_rows(const bench_scene *s, const bench_reference *want, int repeats, speed_model *out, gbt_error *err)
+{
+    const gaussians *thin = s->run != NULL ? &s->run->frame.gaussians : s->gaussians;
+    const bench_splat splats[] = {[RASTER_EWA] = {&s->camera.shot.camera, thin, RASTER_EWA},
+                                  [RASTER_PER_RAY] = {&s->camera.shot.camera, s->gaussians, RASTER_PER_RAY}};
+    bench_way *ways = mem_calloc(out->row_count, sizeof *ways, "ways", err);
+    if (ways == NULL)
+        return GBT_ERR_NO_MEMORY;
+    size_t count = 0, place[SPEED_WAYS_MAX];
+    for (size_t i = 0; i < out->row_count; i++) {
+        const speed_row *row = &out->rows[i];
+        place[i] = row->is_default ? 1 : count++; /* the second row is the preset "default" */
+        if (!row->is_default)
+            ways[place[i]] = (bench_way){.kernel = row->kernel, .isa = row->isa, .settings = row->settings,
+                                         .splat = row->splats ? &splats[row->form] : NULL};
+    }
+    const gbt_status status = bench_measure(ways, count, s->gaussians, &s->rays, repeats, err);
+    for (size_t i = 0; i < out->row_count && status == GBT_OK; i++)
+        keep_figures(s, &ways[place[i]], want, &out->rows[i]);
+    for (size_t i = 0; i < count; i++)
+        bench_way_free(&ways[i]);
+    mem_free(ways);
+    return status;
+}
+
+static gbt_status measure_scene(bench_scene *s, bench_reference *want, const char *path, const char *camera, int repeats, speed_model *out,
+                                gbt_error *err)
+{
+    GBT_TRY(bench_scene_open(path, camera, s, err));
+    trace_settings whole = s->settings;
+    list_rows(&whole, out);
+    whole.alpha_min = 1e-6f, whole.transmittance_min = 1e-9f, whole.proxy_radius = INFINITY;
+    s->settings = whole;
+    GBT_TRY(bench_scene_decode(s, err));
+    out->gaussians = s->gaussians->count, out->rays = ray_image_count(&s->rays);
+    log_info("%s: %zu Gaussians, %zu rays: the picture in double", out->name, out->gaussians, out->rays);
+    GBT_TRY(bench_reference_make(s->gaussians, &whole, &s->rays, want, err));
+    out->check_rays = ray_image_count(&want->rays);
+    GBT_TRY(measure_ideas(s, &out->rows[0].settings, want, out, err));
+    log_info("%s: timing %zu settings", out->name, out->row_count);
+    GBT_TRY(measure_rows(s, want, repeats, out, err));
+    return speed_measure_photos(s, out, err);
+}
+
+static gbt_status measure_path(const char *path, const char *camera, int repeats, speed_model *out, gbt_error *err)
+{
+    bench_scene s = {0};
+    bench_reference want = {0};
+    const gbt_status status = measure_scene(&s, &want, path, camera, repeats, out, err);
+    bench_reference_free(&want);
+    bench_scene_close(&s);
+    return status;
+}
+
+/* ---- all of them --------------------------------------------------------------------------------------------------------------------- */
+
+lab_study_def lab_study_def_default(void)
+{
+    return (lab_study_def){.repeats = 3};
+}
+
+static gbt_status measure_model(const lab_study_def *def, size_t i, speed_model *out, gbt_error *err)
+{
+    char camera[4096];
+    const bool is_plain = bench_scene_needs_camera(def->models[i]);
+    study_model_name(def->models[i], out->name, sizeof out->name);
+    if (is_plain)
+        GBT_TRY(study_model_camera(def->models[i], def->camera, camera, sizeof camera, err));
+    return measure_path(def->models[i], is_plain ? camera : NULL, def->repeats, out, err);
+}
+
+gbt_status lab_study_speed(const lab_study_def *def, const char *folder, FILE *out, gbt_error *err)
+{
+    if (def->models == NULL || def->model_count < 1 || def->model_count > SPEED_MODELS_MAX || def->repeats < 1 || def->repeats > 1000)
+        return base_fail(err, GBT_ERR_ARGUMENT, "study: wanted 1 to %d models and 1 to 1000 repeats", (int)SPEED_MODELS_MAX);
+    GBT_TRY(file_make_folder(folder, err));
+    speed_study *study = mem_calloc(1, sizeof *study, "study", err);
+    if (study == NULL)
+        return GBT_ERR_NO_MEMORY;
+    study->repeats = def->repeats, study->threads = parallel_threads(), study->model_count = def->model_count;
+    gbt_status status = GBT_OK;
+    for (size_t i = 0; i < def->model_count && status == GBT_OK; i++)
+        status = measure_model(def, i, &study->models[i], err);
+    if (status == GBT_OK)
+        status = speed_write(study, folder, err);
+    if (status == GBT_OK) {
+        text table = {.err = err};
+        speed_table(study, &table);
+        status = text_print(&table, out);
+    }
+    mem_free(study);
+    return status;
+}

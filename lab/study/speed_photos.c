@@ -1,0 +1,73 @@
+/* study/speed_photos.c -- how close each setting of the study "speed" comes to the photos that were held out. */
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "bench/bench_scene.h"
+#include "image/metrics.h"
+#include "study/speed.h"
+
+/* What one row makes of the view that `s` holds. */
+static gbt_status draw(const bench_scene *s, const speed_row *row, trace_scene *traced, raster_scene *splatted, image *rgb, gbt_error *err)
+{
+    if (!row->splats) {
+        GBT_TRY(trace_build(traced, s->gaussians, &row->settings, ray_image_reach(&s->rays), err));
+        return trace_forward(traced, &s->rays, false, &(trace_outputs){.rgb = rgb}, NULL, err);
+    }
+    const raster_settings settings = frame_splat_settings(&row->settings, row->form);
+    return raster_forward(splatted, row->form == RASTER_EWA ? &s->run->frame.gaussians : s->gaussians, &s->camera.shot.camera, &settings,
+                          false, rgb, NULL, NULL, err);
+}
+
+/* Other kernels and instruction sets give the picture of the default. */
+static bool is_own_picture(const speed_row *row)
+{
+    return !row->is_default && row->knob != KNOB_KERNEL && row->knob != KNOB_ISA;
+}
+
+static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_error *err)
+{
+    const gbt_camera camera = photos_camera(&s->run->photos, view, 0);
+    s->camera.shot = ray_shot_of(&camera);
+    GBT_TRY(bench_scene_decode(s, err));
+    image photo = {0}, rgb = {0};
+    trace_scene traced = {0};
+    raster_scene splatted = {0};
+    unsigned char *valid = NULL;
+    gbt_status status = scene_read_photo_valid(&s->run->scene.views[view], camera.width, camera.height, &photo, &valid, err);
+    if (status == GBT_OK)
+        status = image_alloc(&rgb, camera.width, camera.height, 3, err);
+    image_quantize(&photo);
+    for (size_t i = 0; i < out->row_count && status == GBT_OK; i++) {
+        if (!is_own_picture(&out->rows[i]))
+            continue;
+        status = draw(s, &out->rows[i], &traced, &splatted, &rgb, err);
+        image_quantize(&rgb);
+        out->rows[i].photo_psnr += metric_psnr_valid(&rgb, &photo, valid);
+    }
+    trace_scene_free(&traced);
+    raster_scene_free(&splatted);
+    image_free(&photo);
+    mem_free(valid);
+    image_free(&rgb);
+    return status;
+}
+
+gbt_status speed_measure_photos(bench_scene *s, speed_model *out, gbt_error *err)
+{
+    if (s->run == NULL || s->run->scene.view_count == 0)
+        return GBT_OK;
+    for (size_t i = 0; i < out->row_count; i++)
+        out->rows[i].photo_psnr = 0;
+    for (size_t view = 0; view < s->run->scene.view_count; view++) {
+        if (!s->run->scene.views[view].is_test)
+            continue;
+        GBT_TRY(score_view(s, view, out, err));
+        out->photo_count++;
+    }
+    for (size_t i = 0; i < out->row_count; i++) /* the second row is the preset "default" */
+        out->rows[i].photo_psnr = is_own_picture(&out->rows[i]) ? out->rows[i].photo_psnr / (double)out->photo_count
+                                  : out->rows[1].photo_psnr;
+    return GBT_OK;
+}

@@ -10,7 +10,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "bench/bench_scene.h"
+#include "benchmark/bench_scene.h"
 #include "lab/lab.h"
 #include "raster/raster.h"
 #include "raster/raster_ref.h"

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 
 #include "base/image.h"
-#include "bench/bench_reference.h"
+#include "benchmark/bench_reference.h"
 #include "report/text.h"
 
 enum { CROSS_MODELS_MAX = 16, CROSS_VIEWS_MAX = 4, CROSS_CHECKS = 7, CROSS_NAME_SIZE = 320 };

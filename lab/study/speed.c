@@ -11,7 +11,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "bench/bench_scene.h"
+#include "benchmark/bench_scene.h"
 #include "lab/lab.h"
 #include "study/model.h"
 #include "trace/reference.h"

@@ -2,8 +2,8 @@
 #ifndef GBT_STUDY_SPEED_H
 #define GBT_STUDY_SPEED_H
 
-#include "bench/bench_passes.h"
-#include "bench/bench_reference.h"
+#include "benchmark/bench_passes.h"
+#include "benchmark/bench_reference.h"
 #include "report/text.h"
 
 struct bench_scene;

@@ -4,7 +4,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "bench/bench_scene.h"
+#include "benchmark/bench_scene.h"
 #include "image/metrics.h"
 #include "study/speed.h"
 

@@ -1,4 +1,4 @@
-/* anchor/decode.h -- anchors + camera centre -> Gaussians, and back (Scaffold-GS eqs 13-15; docs/equations.md). */
+/* anchor/decode.h -- anchors + camera centre -> Gaussians, and back (Scaffold-GS eqs 13-15; docs/training.md). */
 #ifndef GBT_ANCHOR_DECODE_H
 #define GBT_ANCHOR_DECODE_H
 

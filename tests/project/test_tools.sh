@@ -20,8 +20,8 @@ check() { # name, wanted, got
 layers() {
     rm -rf "$work/tree"
     mkdir -p "$work/tree/tools" "$work/tree/src/base" "$work/tree/src/bvh" "$work/tree/src/cli" "$work/tree/src/shim" \
-        "$work/tree/scenes" "$work/tree/include/gbtrace" "$work/tree/src/odd"
-    printf '# rooms\nbase:\nshim: base\nbvh: base\nscenes: base\ncli:\n' >"$work/tree/tools/layers.txt"
+        "$work/tree/scenes" "$work/tree/include/gbtrace" "$work/tree/src/odd" "$work/tree/lab/odd"
+    printf '# rooms\nbase:\nshim: base\nbvh: base\nscenes: base\nlab:\ncli: lab\n' >"$work/tree/tools/layers.txt"
     printf '#include <embree3/rtcore.h>\n' >"$work/tree/src/bvh/embree_api.h"
     printf '%s\n' "$3" >"$work/tree/$2"
     got=$(sh "$source/tools/check_layers.sh" "$work/tree")
@@ -42,6 +42,8 @@ layers "C++ outside shim" src/base/a.cpp 'int x;' "1 src/base/a.cpp: C++ outside
 layers "C++ in shim" src/shim/a.cpp '#include "base/a.h"' "0 "
 layers "cli sees base" src/cli/a.c '#include "base/a.h"' "1 src/cli/a.c:1: cli may not include base/a.h"
 layers "scenes" scenes/a.c '#include "cli/a.h"' "1 scenes/a.c:1: scenes may not include cli/a.h"
+layers "a room that sees the laboratory" src/base/a.c '#include "lab/a.h"' "1 src/base/a.c:1: base may not include lab/a.h"
+layers "a room of the laboratory" lab/odd/a.c 'int x;' "1 lab/odd/a.c: room odd is not in tools/layers.txt"
 layers "a room without a row" src/odd/a.c 'int x;' "1 src/odd/a.c: room odd is not in tools/layers.txt"
 layers "a public header that shows a room" include/gbtrace/a.h '#include "base/a.h"' "1 include/gbtrace/a.h:1: include may not include base/a.h"
 layers "a row that names a row below" tools/layers.txt 'base: cli' "1 tools/layers.txt: base: cli does not stand above it

@@ -5,7 +5,7 @@
 
 #include "base/clock.h"
 #include "base/compare.h"
-#include "bench/bench_scene.h"
+#include "benchmark/bench_scene.h"
 #include "raster/raster.h"
 #include "trace/trace.h"
 

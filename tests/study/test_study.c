@@ -1,8 +1,8 @@
 /* tests/study/test_study.c -- lists of kernels, passes in turn, and a chart whose words cover nothing. */
 #include "base/memory.h"
 #include "base/near.h"
-#include "bench/bench_passes.h"
-#include "bench/bench_reference.h"
+#include "benchmark/bench_passes.h"
+#include "benchmark/bench_reference.h"
 #include "study/chart.h"
 #include "trace/random_scene.h"
 

@@ -1,4 +1,4 @@
-/* bench/check_grad.c -- gradients on the user's own scene: renderers and decode against the same in double, the whole chain against
+/* benchmark/check_grad.c -- gradients on the user's own scene: renderers and decode against the same in double, the whole chain against
    differences. docs/gradients.md.
 
    tracer      float adjoint of the image gradient      | reference_backward() on the same Gaussians

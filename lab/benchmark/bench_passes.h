@@ -1,4 +1,4 @@
-/* bench/bench_passes.h -- time passes over the same Gaussians and rays, traced or splatted in several ways in turn. */
+/* benchmark/bench_passes.h -- time passes over the same Gaussians and rays, traced or splatted in several ways in turn. */
 #ifndef GBT_EVAL_BENCH_PASSES_H
 #define GBT_EVAL_BENCH_PASSES_H
 

@@ -1,13 +1,13 @@
-/* bench/bench_trace.c -- time build, forward and adjoint on given Gaussians, with the error against the double reference beside it. */
+/* benchmark/bench_trace.c -- time build, forward and adjoint on given Gaussians, with the error against the double reference beside it. */
 #include <jansson.h>
 #include <math.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/parallel.h"
-#include "bench/bench_passes.h"
-#include "bench/bench_reference.h"
-#include "bench/bench_scene.h"
+#include "benchmark/bench_passes.h"
+#include "benchmark/bench_reference.h"
+#include "benchmark/bench_scene.h"
 #include "data/json_out.h"
 #include "lab/lab.h"
 

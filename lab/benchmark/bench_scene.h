@@ -1,4 +1,4 @@
-/* bench/bench_scene.h -- what benchmarks and studies trace: the Gaussians of a .ply or of a run, and the rays of one camera. */
+/* benchmark/bench_scene.h -- what benchmarks and studies trace: the Gaussians of a .ply or of a run, and the rays of one camera. */
 #ifndef GBT_EVAL_BENCH_SCENE_H
 #define GBT_EVAL_BENCH_SCENE_H
 

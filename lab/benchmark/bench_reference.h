@@ -1,4 +1,4 @@
-/* bench/bench_reference.h -- some pixels of a picture in double, and how far another picture is from them. */
+/* benchmark/bench_reference.h -- some pixels of a picture in double, and how far another picture is from them. */
 #ifndef GBT_EVAL_BENCH_REFERENCE_H
 #define GBT_EVAL_BENCH_REFERENCE_H
 

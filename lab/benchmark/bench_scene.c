@@ -1,5 +1,5 @@
-/* bench/bench_scene.c -- what benchmarks and studies trace: the Gaussians of a .ply or of a run, and the rays of one camera. */
-#include "bench/bench_scene.h"
+/* benchmark/bench_scene.c -- what benchmarks and studies trace: the Gaussians of a .ply or of a run, and the rays of one camera. */
+#include "benchmark/bench_scene.h"
 
 #include <math.h>
 #include <string.h>

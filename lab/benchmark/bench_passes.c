@@ -1,5 +1,5 @@
-/* bench/bench_passes.c -- time passes over the same Gaussians and rays, traced or splatted in several ways in turn. */
-#include "bench/bench_passes.h"
+/* benchmark/bench_passes.c -- time passes over the same Gaussians and rays, traced or splatted in several ways in turn. */
+#include "benchmark/bench_passes.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-/* bench/bench_reference.c -- some pixels of a picture in double, and how far another picture is from them. */
-#include "bench/bench_reference.h"
+/* benchmark/bench_reference.c -- some pixels of a picture in double, and how far another picture is from them. */
+#include "benchmark/bench_reference.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,0 +1,47 @@
+#!/bin/sh
+# tests/project/test_names.sh -- files, options and commands that pages and comments name are there. Usage: test_names.sh SOURCE PROGRAM
+set -u
+cd "$1" || exit 1
+program=$2
+. tests/cli/report.sh
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+sources="src lab include tests scenes examples tools cmake python bench"
+
+# Files: every path that begins with a folder of the project and ends like a file.
+grep -rnoE --include='*.md' --include='*.[ch]' --include='*.cpp' --include='*.sh' --include='*.cmake' --include='*.py' --include='CMakeLists.txt' \
+    '(^|[^A-Za-z0-9_./{}-])(docs|src|lab|tests|include|scenes|examples|tools|cmake|python|bench)/[A-Za-z0-9_/.-]*[A-Za-z0-9_]\.(md|c|h|cpp|json|svg|png|sh|py|txt|cmake|js|css|html|awk|cjs|mjs)\b' \
+    README.md docs $sources 2>/dev/null | awk -F: '{place = $1 ":" $2; name = $0; sub(/^[^:]*:[^:]*:/, "", name); sub(/^[^A-Za-z]*/, "", name); print place, name}' |
+    sort -u >"$work/files"
+while read -r place name; do
+    [ -e "$name" ] || [ -e "$name.in" ] || printf '%s: %s is not there\n' "$place" "$name"
+done <"$work/files" | grep -v '^tests/project/' >"$work/dangling"
+[ ! -s "$work/dangling" ] && [ "$(wc -l <"$work/files")" -ge 100 ]
+report $? "files that are named are there" "$(cat "$work/dangling")"
+
+# A file says in its first line which one it is.
+for file in $(find src lab include -name '*.[ch]' -o -name '*.cpp'); do
+    own=${file#src/} own=${own#include/}
+    case $(head -n 1 "$file") in "/* $own -- "* | "/* ${own#lab/} -- "*) ;; *) echo "$file: $(head -n 1 "$file")" ;; esac
+done >"$work/first"
+[ ! -s "$work/first" ]
+report $? "first lines name their files" "$(cat "$work/first")"
+
+# Commands and options: what stands on a page behind gbtrace COMMAND, up to a quote or the end of the line.
+"$program" describe man >"$work/man" 2>/dev/null
+"$program" --help | sed -n 's/^  \([a-z-]*\) .*/\1/p' >"$work/commands"
+grep -rhoE 'gbtrace [a-z-]+ [^`|)]*' README.md docs/*.md | sed 's/#.*//' >"$work/lines"
+awk '{print $2}' "$work/lines" | sort -u >"$work/named"
+: >"$work/unknown"
+sed 's/\\-/-/g' "$work/man" | grep -oE -- '--[a-z][a-z0-9-]*' | sort -u >"$work/options"
+grep -oE -- ' --[a-z][a-z_-]*' "$work/lines" | tr -d ' ' | tr _ - | sort -u | while read -r option; do
+    grep -qxF -- "$option" "$work/options" || echo "$option"
+done >"$work/unknown"
+[ ! -s "$work/unknown" ]
+report $? "options that pages name are there" "$(cat "$work/unknown")"
+grep -rhoE '^(    |.*`)(build/release/)?gbtrace [a-z-]+' README.md docs/*.md | sed 's/.*gbtrace //' | sort -u | while read -r word; do
+    grep -qxF -- "$word" "$work/commands" || case $word in describe | help | --help | --version) ;; *) echo "$word" ;; esac
+done >"$work/unknown"
+[ ! -s "$work/unknown" ]
+report $? "commands that pages name are there" "$(cat "$work/unknown")"
+finish

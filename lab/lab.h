@@ -1,4 +1,4 @@
-/* lab/lab.h -- what measures and does not make: benchmarks, studies, stability, the gradient check. For the program alone; not installed. */
+/* lab/lab.h -- what measures and does not make: benchmarks, studies, stability, the gradient check. For the program; not installed. */
 #ifndef LAB_LAB_H
 #define LAB_LAB_H
 
@@ -108,7 +108,7 @@ gbt_status lab_study_stability(const lab_stability_def *def, const char *folder,
  */
 gbt_status lab_check_grad(const char *run, FILE *out, gbt_error *err);
 
-/* ---- studies that train: from real runs on the user's own scenes ------------------------------------------------------------------------ */
+/* ---- studies that train: from real runs on the user's own scenes ------------------------------------------------------------------- */
 
 /* These studies train each variant with each seed into FOLDER/runs/SCENE/VARIANT/seed-S, where a scene is called as its folder. A run that
    is there, whole and of the same settings, is taken as it is; any other is made again. Models and scores stay, checkpoints do not. A row

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 # figures -- the figures and screenshots of README.md, docs/results.md and docs/first-ten-minutes.md, made again from new runs.
 #
 #     python3 bench/figures.py PHOTOS -o DIR [--gbtrace build/release/gbtrace]

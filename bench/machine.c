@@ -1,5 +1,7 @@
-/* bench/machine.c -- what one core of this machine can do: fused multiply-adds a second, bytes a second and latency at each level of
-   memory. The ceilings in docs/performance.md. Build and run: cc -O3 -march=native bench/machine.c -o build/machine && build/machine */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* bench/machine.c -- what one core of this machine can do: fused multiply-adds a second, bytes a second and
+   latency at each level of memory. The ceilings in docs/performance.md. Build and run: cc -O3 -march=native
+   bench/machine.c -o build/machine && build/machine */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,12 +17,15 @@ static double seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* CHAINS independent chains hide the latency of each. Returns 1e9 vector operations (16 floats, multiply and add) a second. */
+/* CHAINS independent chains hide the latency of each. Returns 1e9 vector operations (16 floats, multiply and
+   add) a second. */
 static double fma_rate(float *keep)
 {
     vec sum[CHAINS], factor, term;
-    for (int k = 0; k < LANES; k++)
-        factor[k] = 0.999f, term[k] = 0.001f;
+    for (int k = 0; k < LANES; k++) {
+        factor[k] = 0.999f;
+        term[k] = 0.001f;
+    }
     for (int i = 0; i < CHAINS; i++)
         sum[i] = term;
     const long rounds = 20000000;
@@ -38,7 +43,8 @@ static double fma_rate(float *keep)
 
 static void memory(size_t bytes, float *keep)
 {
-    const size_t floats = bytes / sizeof(float), lines = floats / LINE_FLOATS, times = ((size_t)1 << 29) / bytes + 1;
+    const size_t floats = bytes / sizeof(float), lines = floats / LINE_FLOATS,
+                 times = ((size_t)1 << 29) / bytes + 1;
     float *data = aligned_alloc(64, bytes);
     uint32_t *order = malloc(lines * sizeof *order);
     if (data == NULL || order == NULL)
@@ -61,7 +67,8 @@ static void memory(size_t bytes, float *keep)
         state = state * 1664525u + 1013904223u;
         const size_t j = (size_t)((uint64_t)state * i >> 32);
         const uint32_t swap = order[i];
-        order[i] = order[j], order[j] = swap;
+        order[i] = order[j];
+        order[j] = swap;
     }
     for (size_t i = 0; i < lines; i++)
         ring[(size_t)order[i] * LINE_FLOATS] = order[(i + 1) % lines] * LINE_FLOATS;

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """bench/mitsuba_scene.py -- one scene folder as arrays, in Mitsuba, and on single rays in double by Mitsuba's own equation."""
 import json
 import os

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 # renderers -- the same scenes trained by ray tracing and by splatting: held-out PSNR and time, at equal iterations and at equal time.
 #
 #     python3 bench/renderers.py DATA... -o DIR [--gbtrace build/release/gbtrace] [--iterations 1500] [--seeds 0,1,2] [--downscale 1]

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 # scaling -- the same hits per ray from 10 thousand to 1 million Gaussians: time of one core per ray, build, bytes.
 #
 #     python3 bench/scaling.py [--gbtrace build/release/gbtrace] [--sizes 1600,512] [--counts 10000,100000,1000000]      (needs numpy)

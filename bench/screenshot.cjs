@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // screenshot -- a page as a headless Chromium shows it: node bench/screenshot.cjs MODULES URL WIDTHxHEIGHT OUT.png [CLICK]
 // MODULES: the folder into which bench/viewers has put its packages; CLICK: a CSS selector of what is clicked first.
 const [modules, url, size, out, click] = process.argv.slice(2);

@@ -1,6 +1,7 @@
-/* bench/versus_blas.c -- the decoder's matrix products by our kernels and by OpenBLAS, in turns, one thread. Needs libopenblas-dev. Build
-   and run: cc -O3 -march=native -Isrc -Iinclude bench/versus_blas.c build/release/libgbtrace.a -lopenblas -lm -o build/versus_blas &&
-   build/versus_blas */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* bench/versus_blas.c -- the decoder's matrix products by our kernels and by OpenBLAS, in turns, one thread.
+   Needs libopenblas-dev. Build and run: cc -O3 -march=native -Isrc -Iinclude bench/versus_blas.c
+   build/release/libgbtrace.a -lopenblas -lm -o build/versus_blas && build/versus_blas */
 #include <cblas.h>
 #include <math.h>
 #include <stdio.h>
@@ -40,7 +41,8 @@ static void compare(const char *name, size_t m, size_t k, size_t n)
     float *a = numbers(m * k), *b = numbers(k * n), *ours = numbers(m * n), *theirs = numbers(m * n);
     if (a == NULL || b == NULL || ours == NULL || theirs == NULL)
         exit(EXIT_FAILURE);
-    const dense_product job = {.m = m, .n = n, .k = k, .a = a, .a_row = k, .a_step = 1, .b = b, .b_row = n, .c = ours, .c_row = n};
+    const dense_product job = {
+        .m = m, .n = n, .k = k, .a = a, .a_row = k, .a_step = 1, .b = b, .b_row = n, .c = ours, .c_row = n};
     double times[2][REPEATS], worst = 0;
     for (int r = 0; r < REPEATS; r++) {
         double start = seconds();
@@ -49,9 +51,11 @@ static void compare(const char *name, size_t m, size_t k, size_t n)
                 ours[i] = 0;
             dense_best()->product(&job);
         }
-        times[0][r] = seconds() - start, start = seconds();
+        times[0][r] = seconds() - start;
+        start = seconds();
         for (int pass = 0; pass < PASSES; pass++)
-            cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)m, (int)n, (int)k, 1, a, (int)k, b, (int)n, 0, theirs, (int)n);
+            cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)m, (int)n, (int)k, 1, a, (int)k, b,
+                        (int)n, 0, theirs, (int)n);
         times[1][r] = seconds() - start;
     }
     for (size_t i = 0; i < m * n; i++)
@@ -59,16 +63,20 @@ static void compare(const char *name, size_t m, size_t k, size_t n)
     for (int way = 0; way < 2; way++)
         qsort(times[way], REPEATS, sizeof(double), by_size);
     const double flops = 2e-9 * (double)(m * k * n) * PASSES;
-    printf("| %s | %zu x %zu x %zu | %.0f | %.0f | %.2f | %.1g |\n", name, m, k, n, flops / times[0][REPEATS / 2],
-           flops / times[1][REPEATS / 2], times[1][REPEATS / 2] / times[0][REPEATS / 2], worst);
-    free(a), free(b), free(ours), free(theirs);
+    printf("| %s | %zu x %zu x %zu | %.0f | %.0f | %.2f | %.1g |\n", name, m, k, n,
+           flops / times[0][REPEATS / 2], flops / times[1][REPEATS / 2],
+           times[1][REPEATS / 2] / times[0][REPEATS / 2], worst);
+    free(a);
+    free(b);
+    free(ours);
+    free(theirs);
 }
 
 int main(void)
 {
     openblas_set_num_threads(1);
-    printf("| product | rows x inputs x outputs | ours, GFLOP/s | OpenBLAS | ours faster by | largest difference "
-           "|\n|---|---|---|---|---|---|\n");
+    printf("| product | rows x inputs x outputs | ours, GFLOP/s | OpenBLAS | ours faster by | largest "
+           "difference |\n|---|---|---|---|---|---|\n");
     compare("hidden layer", ROWS, 36, 32);
     compare("scales and rotations, K = 2", ROWS, 32, 16);
     compare("the same, K = 10", ROWS, 32, 80);

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """PSNR, SSIM, FLIP and LPIPS of pairs of PNG files by gbtrace and by others; see bench/versus_metrics."""
 
 import json

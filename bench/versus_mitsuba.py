@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """bench/versus_mitsuba.py -- the measurement and the tables of bench/versus_mitsuba, which prepares the environment and calls this."""
 import argparse
 import json

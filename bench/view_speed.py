@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """bench/view_speed.py -- pictures a second of `gbtrace view` in headless Chromium while the scene is turned, and where the time goes.
 
 Milliseconds are wall time; the last column is processor time of the server, per picture.

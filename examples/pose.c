@@ -1,4 +1,6 @@
-/* examples/pose.c -- find where a photo was taken: a camera is moved away from a view and led back by the gradient of its picture.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* examples/pose.c -- find where a photo was taken: a camera is moved away from a view and led back by the
+   gradient of its picture.
    Usage: pose MODEL */
 #include <math.h>
 #include <stdio.h>
@@ -19,11 +21,13 @@ static double angle_between(const gbt_camera *a, const gbt_camera *b)
 
 static double distance_between(const gbt_camera *a, const gbt_camera *b)
 {
-    return sqrt(pow(a->center[0] - b->center[0], 2) + pow(a->center[1] - b->center[1], 2) + pow(a->center[2] - b->center[2], 2));
+    return sqrt(pow(a->center[0] - b->center[0], 2) + pow(a->center[1] - b->center[1], 2) +
+                pow(a->center[2] - b->center[2], 2));
 }
 
 /* One step of Adam, downhill by about `rate` in each of the six numbers. */
-static void adam_step(const double gradient[6], int step, double rate, double first[6], double second[6], gbt_camera *camera)
+static void adam_step(const double gradient[6], int step, double rate, double first[6], double second[6],
+                      gbt_camera *camera)
 {
     double motion[6];
     for (int k = 0; k < 6; k++) {
@@ -36,7 +40,8 @@ static void adam_step(const double gradient[6], int step, double rate, double fi
 }
 
 /* Lead `camera` to where its picture is `target`; `rgb` and `d_rgb` are room for one picture each. */
-static gbt_status find_pose(gbt_model *model, const float *target, float *rgb, float *d_rgb, gbt_camera *camera, gbt_error *err)
+static gbt_status find_pose(gbt_model *model, const float *target, float *rgb, float *d_rgb,
+                            gbt_camera *camera, gbt_error *err)
 {
     const size_t values = 3 * (size_t)camera->width * (size_t)camera->height;
     const gbt_picture picture = {.rgb = rgb};
@@ -70,10 +75,12 @@ static gbt_status run(gbt_model *model, gbt_error *err)
     status = target != NULL && rgb != NULL && d_rgb != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
     if (status == GBT_OK)
         status = gbt_model_render(model, &view.camera, 0, &(gbt_picture){.rgb = target}, err);
-    printf("before: %.4f units and %.3f degrees away\n", distance_between(&camera, &view.camera), angle_between(&camera, &view.camera));
+    printf("before: %.4f units and %.3f degrees away\n", distance_between(&camera, &view.camera),
+           angle_between(&camera, &view.camera));
     if (status == GBT_OK)
         status = find_pose(model, target, rgb, d_rgb, &camera, err);
-    printf("after:  %.4f units and %.3f degrees away\n", distance_between(&camera, &view.camera), angle_between(&camera, &view.camera));
+    printf("after:  %.4f units and %.3f degrees away\n", distance_between(&camera, &view.camera),
+           angle_between(&camera, &view.camera));
     free(target);
     free(rgb);
     free(d_rgb);

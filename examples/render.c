@@ -1,4 +1,6 @@
-/* examples/render.c -- render one view of a model to a picture that every image program opens (PPM). Usage: render MODEL OUT.ppm [VIEW] */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* examples/render.c -- render one view of a model to a picture that every image program opens (PPM). Usage:
+   render MODEL OUT.ppm [VIEW] */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -42,10 +44,13 @@ int main(int argc, char **argv)
             status = GBT_ERR_NO_MEMORY;
         if (status == GBT_OK)
             status = gbt_model_render(model, &view.camera, 0, &picture, &err);
-        if (status == GBT_OK && !write_ppm(argv[2], rgb, view.camera.width, view.camera.height))
-            status = GBT_ERR_IO, perror(argv[2]);
+        if (status == GBT_OK && !write_ppm(argv[2], rgb, view.camera.width, view.camera.height)) {
+            status = GBT_ERR_IO;
+            perror(argv[2]);
+        }
         if (status == GBT_OK)
-            printf("%s: %d x %d pixels of view %s, one of %zu\n", argv[2], view.camera.width, view.camera.height, view.name, count);
+            printf("%s: %d x %d pixels of view %s, one of %zu\n", argv[2], view.camera.width,
+                   view.camera.height, view.name, count);
         free(rgb);
     }
     if (err.text[0] != '\0')

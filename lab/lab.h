@@ -1,4 +1,6 @@
-/* lab/lab.h -- what measures and does not make: benchmarks, studies, stability, the gradient check. For the program; not installed. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* lab/lab.h -- what measures and does not make: benchmarks, studies, stability, the gradient check. For the
+   program; not installed. */
 #ifndef LAB_LAB_H
 #define LAB_LAB_H
 
@@ -10,27 +12,31 @@
 
 typedef struct lab_bench_def {
     const char *model;  /* plain Gaussians (.ply, .splat, .spz), or a run; required */
-    const char *camera; /* camera file (docs/cameras.md; of an aperture the first sample); required for plain Gaussians, else the first
-                           held-out view */
+    const char *camera; /* camera file (docs/cameras.md; of an aperture the first sample); required for plain
+                           Gaussians, else the first held-out view */
     int repeats;        /* timed passes after one warm-up; the median is reported. Default 5 */
-    int check;          /* 1: compare with the double reference on every 8th pixel in both directions. Default 0 */
-    const char *json;   /* where to write the figures; NULL: nowhere */
-    float alpha_min;    /* smallest response that counts, in (0, 1); 0 or NaN: that of the run, 1/255 for a .ply */
-    float alpha_max;    /* alpha is cut here, in (0, 1); 0 or NaN: that of the run, 0.99 for a .ply */
-    float t_min;        /* stop before transmittance falls below this, in (0, 1); 0 or NaN: that of the run, 1e-4 for a .ply */
-    float proxy_radius; /* a Gaussian ends at this many std-devs, > 0; 0 or NaN: where its response falls to alpha_min. Default 0 */
-    const char *preset; /* "exact", "default" or "fast" (docs/accuracy.md); the four numbers above win over it. NULL: as the model is.
-                           Default NULL */
-    const char *kernel; /* "tile" (default, and NULL), "single" or "embree"; or some of them, as "tile,embree": measured in turn and
-                           compared with the first */
-    size_t tape_bytes_max; /* memory for the hits that forward keeps for the adjoint; what goes beyond is traced again. 0, the default: no
-                              limit */
+    int check; /* 1: compare with the double reference on every 8th pixel in both directions. Default 0 */
+    const char *json; /* where to write the figures; NULL: nowhere */
+    float alpha_min;  /* smallest response that counts, in (0, 1); 0 or NaN: that of the run, 1/255 for a .ply
+                       */
+    float alpha_max;  /* alpha is cut here, in (0, 1); 0 or NaN: that of the run, 0.99 for a .ply */
+    float t_min; /* stop before transmittance falls below this, in (0, 1); 0 or NaN: that of the run, 1e-4 for
+                    a .ply */
+    float proxy_radius; /* a Gaussian ends at this many std-devs, > 0; 0 or NaN: where its response falls to
+                           alpha_min. Default 0 */
+    const char *preset; /* "exact", "default" or "fast" (docs/accuracy.md); the four numbers above win over
+                           it. NULL: as the model is. Default NULL */
+    const char *kernel; /* "tile" (default, and NULL), "single" or "embree"; or some of them, as
+                           "tile,embree": measured in turn and compared with the first */
+    size_t tape_bytes_max; /* memory for the hits that forward keeps for the adjoint; what goes beyond is
+                              traced again. 0, the default: no limit */
 } lab_bench_def;
 
 lab_bench_def lab_bench_def_default(void);
 
 /**
- * Time build, forward and adjoint; figures as text to `out` and as JSON. Times of one core per ray are process CPU time / rays.
+ * Time build, forward and adjoint; figures as text to `out` and as JSON. Times of one core per ray are
+ * process CPU time / rays.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */
@@ -39,19 +45,19 @@ gbt_status lab_bench_trace(const lab_bench_def *def, FILE *out, gbt_error *err);
 typedef struct lab_study_def {
     const char *const *models; /* plain Gaussians (.ply, .splat, .spz), or runs */
     size_t model_count;        /* 1 to 16 */
-    const char *camera;        /* camera file of all plain Gaussians; NULL: the camera.json beside each. Runs: their first held-out view.
-                                  Default NULL */
-    int repeats;               /* timed passes of each setting after one warm-up; the median counts. Default 3 */
+    const char *camera; /* camera file of all plain Gaussians; NULL: the camera.json beside each. Runs: their
+                           first held-out view. Default NULL */
+    int repeats;        /* timed passes of each setting after one warm-up; the median counts. Default 3 */
 } lab_study_def;
 
 lab_study_def lab_study_def_default(void);
 
 /**
- * Speed against accuracy: core-microseconds per ray and the error to the picture without any cut-off, for every setting that trades one
- * for the other (docs/accuracy.md).
+ * Speed against accuracy: core-microseconds per ray and the error to the picture without any cut-off, for
+ * every setting that trades one for the other (docs/accuracy.md).
  *
- * Writes speed.csv, speed.json, speed.md, speed.svg (the chart) and speed.html (chart and table, one file that loads nothing) into the
- * folder `folder`, and the table as Markdown to `out`.
+ * Writes speed.csv, speed.json, speed.md, speed.svg (the chart) and speed.html (chart and table, one file
+ * that loads nothing) into the folder `folder`, and the table as Markdown to `out`.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  * Cost: about a minute per model of 10,000 Gaussians and 512 x 512 rays.
@@ -59,24 +65,28 @@ lab_study_def lab_study_def_default(void);
 gbt_status lab_study_speed(const lab_study_def *def, const char *folder, FILE *out, gbt_error *err);
 
 /**
- * Tracer against rasterizer: how far each is from its double reference and they from each other, and the causes, one change at a time:
- * order, projection, dilation, cut-offs (docs/crosscheck.md).
+ * Tracer against rasterizer: how far each is from its double reference and they from each other, and the
+ * causes, one change at a time: order, projection, dilation, cut-offs (docs/crosscheck.md).
  *
- * `def` as for lab_study_speed(), without repeats; of a run up to four held-out views, spread over all. A camera with a lens is replaced
- * by its pinhole. Writes crosscheck.json, .md, .svg (chart), .html and one PNG of pictures per view into `folder`, the tables to `out`.
- * A row beyond its limit is no failure: it is told in the table.
+ * `def` as for lab_study_speed(), without repeats; of a run up to four held-out views, spread over all. A
+ * camera with a lens is replaced by its pinhole. Writes crosscheck.json, .md, .svg (chart), .html and one PNG
+ * of pictures per view into `folder`, the tables to `out`. A row beyond its limit is no failure: it is told
+ * in the table.
  *
- * @return GBT_OK, GBT_ERR_ARGUMENT (rays given in place of a camera too), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (rays given in place of a camera too), GBT_ERR_IO, GBT_ERR_FORMAT,
+ *         GBT_ERR_NO_MEMORY
  * Cost: about ten seconds per view of 10,000 Gaussians and 512 x 512 pixels.
  */
 gbt_status lab_study_crosscheck(const lab_study_def *def, const char *folder, FILE *out, gbt_error *err);
 
 /**
- * Size against picture: what trained models lose on their held-out views when their files are made small (gbtrace/compress.h).
+ * Size against picture: what trained models lose on their held-out views when their files are made small
+ * (gbtrace/compress.h).
  *
- * `def->models`: 1 to 6 runs whose data sets are there; the rest of `def` is not used. Each is coded at a ladder of qualities and without
- * loss, read back and scored by its own renderer at its own size. Writes rate.json, .csv, .md and .svg (chart) into `folder`, the tables to
- * `out`. A row beyond its limit is no failure: it is told in the table.
+ * `def->models`: 1 to 6 runs whose data sets are there; the rest of `def` is not used. Each is coded at a
+ * ladder of qualities and without loss, read back and scored by its own renderer at its own size. Writes
+ * rate.json, .csv, .md and .svg (chart) into `folder`, the tables to `out`. A row beyond its limit is no
+ * failure: it is told in the table.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  * Cost: gbt_compress() and eleven renders of the held-out views per model.
@@ -91,29 +101,34 @@ typedef struct lab_stability_def {
 lab_stability_def lab_stability_def_default(void);
 
 /**
- * Stability: scenes on which renderers are known to fail, each measured against a limit, beside the rasterizer (docs/stability.md).
+ * Stability: scenes on which renderers are known to fail, each measured against a limit, beside the
+ * rasterizer (docs/stability.md).
  *
- * Writes stability.json, stability.md, stability.svg (charts) and pictures into the folder `folder`, and the table to `out`. A row beyond
- * its limit is no failure: it is told in the table.
+ * Writes stability.json, stability.md, stability.svg (charts) and pictures into the folder `folder`, and the
+ * table to `out`. A row beyond its limit is no failure: it is told in the table.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT (an unknown case), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
- * Threads: one study at a time (it switches instruction sets and Embree's memory limit and back). Cost: about a minute of two cores.
+ * Threads: one study at a time (it switches instruction sets and Embree's memory limit and back). Cost: about
+ * a minute of two cores.
  */
 gbt_status lab_study_stability(const lab_stability_def *def, const char *folder, FILE *out, gbt_error *err);
 
 /**
- * Compare analytic gradients with the double adjoint and with differences, on a trained run: tracer, decode and the whole chain.
+ * Compare analytic gradients with the double adjoint and with differences, on a trained run: tracer, decode
+ * and the whole chain.
  *
- * Prints one row for each renderer and class of parameters: relative L2 error and limit. GBT_ERR_INTERNAL when a limit is broken.
+ * Prints one row for each renderer and class of parameters: relative L2 error and limit. GBT_ERR_INTERNAL
+ * when a limit is broken.
  */
 gbt_status lab_check_grad(const char *run, FILE *out, gbt_error *err);
 
-/* ---- studies that train: from real runs on the user's own scenes ------------------------------------------------------------------- */
+/* ---- studies that train: from real runs on the user's own scenes ---- */
 
-/* These studies train each variant with each seed into FOLDER/runs/SCENE/VARIANT/seed-S, where a scene is called as its folder. A run that
-   is there, whole and of the same settings, is taken as it is; any other is made again. Models and scores stay, checkpoints do not. A row
-   beyond its limit is no failure: it is told in the table. SIGINT and SIGTERM end the study after the current step with
-   GBT_ERR_INTERRUPTED; the same call goes on with the run that was interrupted, from its start. */
+/* These studies train each variant with each seed into FOLDER/runs/SCENE/VARIANT/seed-S, where a scene is
+   called as its folder. A run that is there, whole and of the same settings, is taken as it is; any other is
+   made again. Models and scores stay, checkpoints do not. A row beyond its limit is no failure: it is told in
+   the table. SIGINT and SIGTERM end the study after the current step with GBT_ERR_INTERRUPTED; the same call
+   goes on with the run that was interrupted, from its start. */
 
 typedef struct lab_paper_def {
     const char *const *data; /* data set folders, the last parts of their paths distinct */
@@ -123,14 +138,16 @@ typedef struct lab_paper_def {
     int seeds;               /* runs of each variant, seeds 0, 1, ...; [1, 10]. Default 3 */
     const char *renderer;    /* "raster" (default, as the paper), "trace" or "per-ray" */
     const char *tables;      /* which, as "1,3". Default "1,2,3,4" */
-    const char *lpips;       /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such column. Default NULL */
+    const char *lpips; /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such column.
+                          Default NULL */
 } lab_paper_def;
 
 lab_paper_def lab_paper_def_default(void);
 
 /**
- * The paper's four tables by its own protocol (`compat`): voxels against balls, what each part of the method does (with a constant in place
- * of the scale prior as control), growth stopped early, and the depth of the balls (docs/paper.md).
+ * The paper's four tables by its own protocol (`compat`): voxels against balls, what each part of the method
+ * does (with a constant in place of the scale prior as control), growth stopped early, and the depth of the
+ * balls (docs/paper.md).
  *
  * Writes paper.md, .csv (every run), .json and .svg into `folder`, and the tables as Markdown to `out`.
  *
@@ -150,10 +167,11 @@ typedef struct lab_time_def {
 lab_time_def lab_time_def_default(void);
 
 /**
- * Held-out PSNR against seconds: the default settings against the faithful protocol, which is given five budgets, and what each choice of
- * the default is worth, one left out at a time.
+ * Held-out PSNR against seconds: the default settings against the faithful protocol, which is given five
+ * budgets, and what each choice of the default is worth, one left out at a time.
  *
- * Writes time.md, .csv (every mark of every run), .json and .svg into `folder`, and the tables as Markdown to `out`.
+ * Writes time.md, .csv (every mark of every run), .json and .svg into `folder`, and the tables as Markdown to
+ * `out`.
  *
  * @return as lab_study_paper()
  * Cost: about fifteen budgets per scene and seed. Nothing else should run meanwhile.
@@ -171,9 +189,9 @@ typedef struct lab_anchors_def {
 lab_anchors_def lab_anchors_def_default(void);
 
 /**
- * What a scene needs: the default settings with anchors that start at voxels, at the paper's balls, at adaptive balls and at as many random
- * points, and with more or less asked of an anchor; anchors, bytes and hits per ray against held-out PSNR, all after the same number of
- * steps.
+ * What a scene needs: the default settings with anchors that start at voxels, at the paper's balls, at
+ * adaptive balls and at as many random points, and with more or less asked of an anchor; anchors, bytes and
+ * hits per ray against held-out PSNR, all after the same number of steps.
  *
  * Writes anchors.md, .csv (every run), .json and .svg into `folder`, and the tables as Markdown to `out`.
  *

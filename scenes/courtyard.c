@@ -1,4 +1,6 @@
-/* scenes/courtyard.c -- a town square under a low sun: fountain, facades, trees, a fence, hills and a sky dome. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* scenes/courtyard.c -- a town square under a low sun: fountain, facades, trees, a fence, hills and a sky
+   dome. */
 #include <math.h>
 #include <string.h>
 
@@ -6,15 +8,35 @@
 #include "scenes/texture.h"
 
 enum {
-    PAVING, GRASS, STONE, WATER, BRONZE, FACADE, PANE, DOOR, TRIM, ROOF, BARK, CROWN, HEDGE, IRON, LAMP_GLASS, BENCH,
-    AWNING, FLOWERS, HILLS, SKY
+    PAVING,
+    GRASS,
+    STONE,
+    WATER,
+    BRONZE,
+    FACADE,
+    PANE,
+    DOOR,
+    TRIM,
+    ROOF,
+    BARK,
+    CROWN,
+    HEDGE,
+    IRON,
+    LAMP_GLASS,
+    BENCH,
+    AWNING,
+    FLOWERS,
+    HILLS,
+    SKY
 };
 
 static const float dome_radius = 95;
 
 static void set(float out[3], float r, float g, float b)
 {
-    out[0] = r, out[1] = g, out[2] = b;
+    out[0] = r;
+    out[1] = g;
+    out[2] = b;
 }
 
 static void look_at_square(const surface *s, look *l)
@@ -31,14 +53,16 @@ static void look_at_square(const surface *s, look *l)
             const float ring = floorf(r / 0.55f), around = ring * 6 + 8;
             edge = texture_brick(angle / 6.2831853f * around, r / 0.55f, 1, 1, id);
             tone = texture_hash(id[0], ((id[1] % (int)around) + (int)around) % (int)around, 4);
-            texture_mix(albedo, (const float[3]){0.50f, 0.44f, 0.38f}, (const float[3]){0.70f, 0.62f, 0.52f}, tone);
+            texture_mix(albedo, (const float[3]){0.50f, 0.44f, 0.38f}, (const float[3]){0.70f, 0.62f, 0.52f},
+                        tone);
             if ((int)ring % 5 == 4)
                 set(albedo, 0.56f, 0.32f, 0.24f);
             edge *= 0.55f;
         } else {
             edge = texture_brick(p[0], p[1], 1.5f, 1.0f, id);
             tone = texture_hash(id[0], id[1], 5);
-            texture_mix(albedo, (const float[3]){0.54f, 0.52f, 0.48f}, (const float[3]){0.68f, 0.64f, 0.58f}, tone);
+            texture_mix(albedo, (const float[3]){0.54f, 0.52f, 0.48f}, (const float[3]){0.68f, 0.64f, 0.58f},
+                        tone);
         }
         texture_scale(albedo, 1 + 0.10f * texture_fbm(2 * p[0], 2 * p[1], 0, 3));
         if (edge < 0.03f)
@@ -57,21 +81,32 @@ static void look_at_square(const surface *s, look *l)
         break;
     case WATER: {
         const float ripple = 0.5f + 0.5f * sinf(9 * hypotf(p[0], p[1]) + 1.5f * texture_noise(p[0], p[1], 0));
-        texture_mix(albedo, (const float[3]){0.08f, 0.26f, 0.30f}, (const float[3]){0.16f, 0.38f, 0.40f}, ripple);
-        l->specular = 0.04f, l->shininess = 60, l->mirror = true, l->roughness = 0.015f;
+        texture_mix(albedo, (const float[3]){0.08f, 0.26f, 0.30f}, (const float[3]){0.16f, 0.38f, 0.40f},
+                    ripple);
+        l->specular = 0.04f;
+        l->shininess = 60;
+        l->mirror = true;
+        l->roughness = 0.015f;
         break;
     }
     case BRONZE:
         texture_mix(albedo, (const float[3]){0.34f, 0.22f, 0.10f}, (const float[3]){0.20f, 0.42f, 0.34f},
                     texture_step(-0.1f, 0.4f, texture_fbm(4 * p[0], 4 * p[1], 4 * p[2], 3)));
-        l->specular = 0.16f, l->shininess = 40, l->mirror = true, l->roughness = 0.05f;
+        l->specular = 0.16f;
+        l->shininess = 40;
+        l->mirror = true;
+        l->roughness = 0.05f;
         break;
     case FACADE: {
-        static const float paints[5][3] = {
-            {0.78f, 0.58f, 0.36f}, {0.68f, 0.36f, 0.26f}, {0.80f, 0.74f, 0.58f}, {0.54f, 0.62f, 0.62f}, {0.76f, 0.50f, 0.42f}};
+        static const float paints[5][3] = {{0.78f, 0.58f, 0.36f},
+                                           {0.68f, 0.36f, 0.26f},
+                                           {0.80f, 0.74f, 0.58f},
+                                           {0.54f, 0.62f, 0.62f},
+                                           {0.76f, 0.50f, 0.42f}};
         memcpy(albedo, paints[s->variant % 5], 3 * sizeof *albedo);
         if (s->variant % 5 == 1 || p[2] < 0.9f) {
-            const float edge = texture_brick(p[0] + p[1], p[2], p[2] < 0.9f ? 0.9f : 0.5f, p[2] < 0.9f ? 0.45f : 0.2f, id);
+            const float edge =
+                texture_brick(p[0] + p[1], p[2], p[2] < 0.9f ? 0.9f : 0.5f, p[2] < 0.9f ? 0.45f : 0.2f, id);
             if (p[2] < 0.9f)
                 set(albedo, 0.56f, 0.52f, 0.46f);
             texture_scale(albedo, edge < 0.025f ? 0.72f : 0.9f + 0.2f * texture_hash(id[0], id[1], 6));
@@ -82,12 +117,14 @@ static void look_at_square(const surface *s, look *l)
     case PANE: {
         /* Glazing bars, and curtains behind some of the panes. */
         const float curtain = texture_hash(s->variant, 3, 3);
-        texture_mix(albedo, (const float[3]){0.10f, 0.15f, 0.20f}, (const float[3]){0.30f, 0.40f, 0.48f}, texture_step(-0.7f, 0.9f, v));
+        texture_mix(albedo, (const float[3]){0.10f, 0.15f, 0.20f}, (const float[3]){0.30f, 0.40f, 0.48f},
+                    texture_step(-0.7f, 0.9f, v));
         if (curtain > 0.5f && fabsf(u) > 0.22f)
             set(albedo, 0.66f, 0.60f, 0.52f);
         if (fabsf(u) < 0.035f || fabsf(v - 0.25f) < 0.035f)
             set(albedo, 0.78f, 0.76f, 0.70f);
-        l->specular = 0.05f, l->shininess = 80;
+        l->specular = 0.05f;
+        l->shininess = 80;
         break;
     }
     case DOOR: {
@@ -115,7 +152,8 @@ static void look_at_square(const surface *s, look *l)
         break;
     case CROWN: {
         static const float deep[3][3] = {{0.10f, 0.22f, 0.06f}, {0.14f, 0.26f, 0.06f}, {0.26f, 0.22f, 0.05f}};
-        static const float bright[3][3] = {{0.30f, 0.46f, 0.12f}, {0.42f, 0.50f, 0.14f}, {0.66f, 0.48f, 0.12f}};
+        static const float bright[3][3] = {
+            {0.30f, 0.46f, 0.12f}, {0.42f, 0.50f, 0.14f}, {0.66f, 0.48f, 0.12f}};
         texture_mix(albedo, deep[s->variant % 3], bright[s->variant % 3],
                     texture_step(-0.5f, 0.5f, texture_fbm(3.2f * p[0], 3.2f * p[1], 3.2f * p[2], 3)));
         break;
@@ -126,11 +164,13 @@ static void look_at_square(const surface *s, look *l)
         break;
     case IRON:
         set(albedo, 0.10f, 0.12f, 0.12f);
-        l->specular = 0.06f, l->shininess = 25;
+        l->specular = 0.06f;
+        l->shininess = 25;
         break;
     case LAMP_GLASS:
         set(albedo, 0.90f, 0.84f, 0.66f);
-        l->specular = 0.05f, l->shininess = 60;
+        l->specular = 0.05f;
+        l->shininess = 60;
         break;
     case BENCH:
         set(albedo, 0.46f, 0.28f, 0.14f);
@@ -140,11 +180,13 @@ static void look_at_square(const surface *s, look *l)
         const float stripe = u / 0.5f - floorf(u / 0.5f);
         set(albedo, 0.84f, 0.80f, 0.72f);
         if (stripe < 0.5f)
-            set(albedo, s->variant % 2 == 0 ? 0.66f : 0.14f, s->variant % 2 == 0 ? 0.16f : 0.36f, s->variant % 2 == 0 ? 0.12f : 0.34f);
+            set(albedo, s->variant % 2 == 0 ? 0.66f : 0.14f, s->variant % 2 == 0 ? 0.16f : 0.36f,
+                s->variant % 2 == 0 ? 0.12f : 0.34f);
         break;
     }
     case FLOWERS: {
-        static const float petals[4][3] = {{0.80f, 0.20f, 0.18f}, {0.88f, 0.70f, 0.18f}, {0.80f, 0.76f, 0.80f}, {0.52f, 0.26f, 0.58f}};
+        static const float petals[4][3] = {
+            {0.80f, 0.20f, 0.18f}, {0.88f, 0.70f, 0.18f}, {0.80f, 0.76f, 0.80f}, {0.52f, 0.26f, 0.58f}};
         const float kind = texture_hash((int)floorf(3.2f * p[0]), (int)floorf(3.2f * p[1]), 2);
         set(albedo, 0.16f, 0.30f, 0.10f);
         if (texture_noise(5 * p[0], 5 * p[1], 5 * p[2]) > -0.05f)
@@ -152,7 +194,8 @@ static void look_at_square(const surface *s, look *l)
         break;
     }
     case HILLS: {
-        const float patch = texture_fbm(0.10f * p[0], 0.10f * p[1], 0, 4), far = texture_step(40, 95, hypotf(p[0], p[1]));
+        const float patch = texture_fbm(0.10f * p[0], 0.10f * p[1], 0, 4),
+                    far = texture_step(40, 95, hypotf(p[0], p[1]));
         texture_mix(albedo, (const float[3]){0.16f, 0.28f, 0.10f}, (const float[3]){0.56f, 0.50f, 0.24f},
                     texture_step(-0.25f, 0.35f, patch));
         /* Haze lightens what is far. */
@@ -162,8 +205,10 @@ static void look_at_square(const surface *s, look *l)
     default: { /* SKY */
         const float height = p[2] / dome_radius;
         float out[3];
-        texture_mix(out, (const float[3]){0.98f, 0.86f, 0.70f}, (const float[3]){0.34f, 0.56f, 0.92f}, texture_step(-0.10f, 0.55f, height));
-        const float cloud = texture_step(0.02f, 0.45f, texture_fbm(0.045f * p[0], 0.045f * p[1], 0.11f * p[2], 4));
+        texture_mix(out, (const float[3]){0.98f, 0.86f, 0.70f}, (const float[3]){0.34f, 0.56f, 0.92f},
+                    texture_step(-0.10f, 0.55f, height));
+        const float cloud =
+            texture_step(0.02f, 0.45f, texture_fbm(0.045f * p[0], 0.045f * p[1], 0.11f * p[2], 4));
         texture_mix(out, out, (const float[3]){1.05f, 1.0f, 0.95f}, 0.85f * cloud);
         for (int k = 0; k < 3; k++)
             l->emission[k] = 0.9f * out[k];
@@ -172,25 +217,29 @@ static void look_at_square(const surface *s, look *l)
     }
 }
 
-static void box(world *w, int material, int variant, float x, float y, float z, float half_x, float half_y, float half_z, float cell)
+static void box(world *w, int material, int variant, float x, float y, float z, float half_x, float half_y,
+                float half_z, float cell)
 {
-    world_box(w, material, variant, (const float[3]){x, y, z}, (const float[3]){half_x, half_y, half_z}, cell);
+    world_box(w, material, variant, (const float[3]){x, y, z}, (const float[3]){half_x, half_y, half_z},
+              cell);
 }
 
-static void tube(world *w, int material, float ax, float ay, float az, float bx, float by, float bz, float radius)
+static void tube(world *w, int material, float ax, float ay, float az, float bx, float by, float bz,
+                 float radius)
 {
     world_tube(w, material, 0, (const float[3]){ax, ay, az}, (const float[3]){bx, by, bz}, radius, 8);
 }
 
-/** A house front in the current frame: its wall stands at y = distance, from x0 to x1, and looks towards the square. */
+/** A house front in the current frame: its wall stands at y = distance, from x0 to x1, and looks towards the
+    square. */
 static void build_house(world *w, int number, float x0, float x1, float distance, int floors)
 {
     const float height = 1.2f + 2.6f * (float)floors, middle = 0.5f * (x0 + x1), half = 0.5f * (x1 - x0);
     box(w, FACADE, number, middle, distance + 3, 0.5f * height, half, 3, 0.5f * height, 0.8f);
     box(w, TRIM, 0, middle, distance - 0.1f, height - 0.15f, half + 0.08f, 0.22f, 0.15f, 0.8f);
     box(w, TRIM, 0, middle, distance - 0.03f, 3.35f, half, 0.08f, 0.10f, 0.8f);
-    world_sheet(w, ROOF, number, (const float[3]){x0 - 0.2f, distance - 0.45f, height}, (const float[3]){x1 - x0 + 0.4f, 0, 0},
-                (const float[3]){0, 3.45f, 2.1f}, 0.8f);
+    world_sheet(w, ROOF, number, (const float[3]){x0 - 0.2f, distance - 0.45f, height},
+                (const float[3]){x1 - x0 + 0.4f, 0, 0}, (const float[3]){0, 3.45f, 2.1f}, 0.8f);
     const int columns = (int)(2 * half / 1.9f);
     for (int column = 0; column < columns; column++) {
         const float x = x0 + (x1 - x0) * ((float)column + 0.5f) / (float)columns;
@@ -208,30 +257,33 @@ static void build_house(world *w, int number, float x0, float x1, float distance
             box(w, TRIM, 0, x, distance - 0.04f, z + 0.82f, 0.58f, 0.09f, 0.08f, 0.5f);
             for (int side = -1; side <= 1; side += 2)
                 box(w, level == 0 || number % 2 == 0 ? TRIM : DOOR, number,
-                    x + 0.54f * (float)side + (level > 0 && number % 2 != 0 ? 0.16f * (float)side : 0), distance - 0.04f, z,
-                    level > 0 && number % 2 != 0 ? 0.22f : 0.07f, 0.06f, 0.78f, 0.5f);
+                    x + 0.54f * (float)side + (level > 0 && number % 2 != 0 ? 0.16f * (float)side : 0),
+                    distance - 0.04f, z, level > 0 && number % 2 != 0 ? 0.22f : 0.07f, 0.06f, 0.78f, 0.5f);
         }
     }
     if (number % 2 == 0)
         for (int side = -1; side <= 1; side += 2) {
             const float x = middle + 0.5f * half * (float)side;
-            world_sheet(w, AWNING, number / 2, (const float[3]){x - 1.2f, distance - 1.3f, 2.75f}, (const float[3]){2.4f, 0, 0},
-                        (const float[3]){0, 1.25f, 0.55f}, 0.3f);
+            world_sheet(w, AWNING, number / 2, (const float[3]){x - 1.2f, distance - 1.3f, 2.75f},
+                        (const float[3]){2.4f, 0, 0}, (const float[3]){0, 1.25f, 0.55f}, 0.3f);
         }
 }
 
 static void build_tree(world *w, int number, float x, float y, float height)
 {
     world_place(w, x, y, 0, 0.9f * (float)number);
-    static const float bed[][2] = {{0.95f, 0.0f}, {0.95f, 0.18f}, {0.95f, 0.18f}, {0.82f, 0.18f}, {0.82f, 0.12f}, {0.0f, 0.14f}};
+    static const float bed[][2] = {{0.95f, 0.0f},  {0.95f, 0.18f}, {0.95f, 0.18f},
+                                   {0.82f, 0.18f}, {0.82f, 0.12f}, {0.0f, 0.14f}};
     world_revolve(w, number % 2 == 0 ? FLOWERS : STONE, 0, bed, sizeof bed / sizeof bed[0], 24);
     tube(w, BARK, 0, 0, 0, 0.05f, 0, 0.62f * height, 0.15f);
     for (int branch = 0; branch < 4; branch++) {
         const float angle = 1.6f * (float)branch + (float)number;
-        tube(w, BARK, 0.03f, 0, 0.45f * height, 0.8f * cosf(angle), 0.8f * sinf(angle), 0.68f * height, 0.07f);
+        tube(w, BARK, 0.03f, 0, 0.45f * height, 0.8f * cosf(angle), 0.8f * sinf(angle), 0.68f * height,
+             0.07f);
     }
     for (int i = 0; i < 7; i++) {
-        const float angle = 2.4f * (float)i + (float)number, out = i == 0 ? 0 : 0.26f * height * (0.6f + 0.3f * texture_hash(i, number, 1));
+        const float angle = 2.4f * (float)i + (float)number,
+                    out = i == 0 ? 0 : 0.26f * height * (0.6f + 0.3f * texture_hash(i, number, 1));
         const float z = height * (i == 0 ? 0.88f : 0.62f + 0.2f * texture_hash(i, number, 2));
         world_blob(w, CROWN, number, (const float[3]){out * cosf(angle), out * sinf(angle), z},
                    height * (0.19f + 0.05f * texture_hash(i, number, 3)), 0.85f, 0.35f, 3.0f, 30);
@@ -240,12 +292,14 @@ static void build_tree(world *w, int number, float x, float y, float height)
 
 static void build_fountain(world *w)
 {
-    static const float basin[][2] = {{2.5f, 0.0f},   {2.5f, 0.12f},  {2.5f, 0.12f},  {2.3f, 0.12f}, {2.3f, 0.12f},
-                                     {2.15f, 0.30f}, {2.15f, 0.55f}, {2.3f, 0.65f},  {2.3f, 0.65f}, {2.32f, 0.78f},
-                                     {2.32f, 0.78f}, {1.95f, 0.78f}, {1.95f, 0.78f}, {1.92f, 0.45f}};
+    static const float basin[][2] = {{2.5f, 0.0f},   {2.5f, 0.12f},  {2.5f, 0.12f},  {2.3f, 0.12f},
+                                     {2.3f, 0.12f},  {2.15f, 0.30f}, {2.15f, 0.55f}, {2.3f, 0.65f},
+                                     {2.3f, 0.65f},  {2.32f, 0.78f}, {2.32f, 0.78f}, {1.95f, 0.78f},
+                                     {1.95f, 0.78f}, {1.92f, 0.45f}};
     static const float water[][2] = {{1.93f, 0.62f}, {1.2f, 0.62f}, {0.0f, 0.62f}};
-    static const float column[][2] = {{0.55f, 0.45f}, {0.55f, 0.75f}, {0.55f, 0.75f}, {0.30f, 0.85f}, {0.22f, 1.1f},  {0.20f, 1.4f},
-                                      {0.26f, 1.55f}, {0.95f, 1.85f}, {1.05f, 1.98f}, {1.05f, 1.98f}, {0.95f, 1.98f}, {0.85f, 1.88f}};
+    static const float column[][2] = {{0.55f, 0.45f}, {0.55f, 0.75f}, {0.55f, 0.75f}, {0.30f, 0.85f},
+                                      {0.22f, 1.1f},  {0.20f, 1.4f},  {0.26f, 1.55f}, {0.95f, 1.85f},
+                                      {1.05f, 1.98f}, {1.05f, 1.98f}, {0.95f, 1.98f}, {0.85f, 1.88f}};
     static const float upper[][2] = {{0.93f, 1.94f}, {0.0f, 1.94f}};
     static const float post[][2] = {{0.22f, 1.85f}, {0.16f, 2.2f}, {0.14f, 2.5f}, {0.20f, 2.62f},
                                     {0.32f, 2.7f},  {0.32f, 2.7f}, {0.0f, 2.74f}};
@@ -259,7 +313,8 @@ static void build_fountain(world *w)
     world_torus(w, BRONZE, 0, (const float[3]){0, 0, 3.02f}, 0.46f, 0.045f, 40, 12);
     for (int i = 0; i < 8; i++) { /* bronze spheres on the rim */
         const float angle = 0.785398f * (float)i + 0.39f;
-        world_ball(w, BRONZE, 1, (const float[3]){2.14f * cosf(angle), 2.14f * sinf(angle), 0.93f}, 0.15f, 20);
+        world_ball(w, BRONZE, 1, (const float[3]){2.14f * cosf(angle), 2.14f * sinf(angle), 0.93f}, 0.15f,
+                   20);
     }
 }
 
@@ -282,7 +337,8 @@ static void build(world *w)
                       .sky_low = {0.9f, 0.85f, 0.8f},
                       .sky_high = {0.45f, 0.62f, 0.95f}};
     world_field(w, HILLS, 0, (const float[2]){-90, -90}, (const float[2]){90, 90}, 90, hill_height);
-    world_sheet(w, PAVING, 0, (const float[3]){-21, -21, 0}, (const float[3]){42, 0, 0}, (const float[3]){0, 42, 0}, 0.6f);
+    world_sheet(w, PAVING, 0, (const float[3]){-21, -21, 0}, (const float[3]){42, 0, 0},
+                (const float[3]){0, 42, 0}, 0.6f);
     world_ball(w, SKY, 0, (const float[3]){0, 0, 0}, dome_radius, 32);
 
     world_place(w, 0, 0, 0, 0);
@@ -306,9 +362,11 @@ static void build(world *w)
             world_ball(w, STONE, 0, (const float[3]){x + 5.5f * (float)end, -12.5f, 2.05f}, 0.30f, 20);
         }
         for (int i = 0; i <= 20; i++)
-            tube(w, IRON, x - 5.0f + 0.5f * (float)i, -12.5f, 0.6f, x - 5.0f + 0.5f * (float)i, -12.5f, 1.65f, 0.03f);
+            tube(w, IRON, x - 5.0f + 0.5f * (float)i, -12.5f, 0.6f, x - 5.0f + 0.5f * (float)i, -12.5f, 1.65f,
+                 0.03f);
         for (int rail = 0; rail < 2; rail++)
-            tube(w, IRON, x - 5.4f, -12.5f, 0.75f + 0.75f * (float)rail, x + 5.4f, -12.5f, 0.75f + 0.75f * (float)rail, 0.035f);
+            tube(w, IRON, x - 5.4f, -12.5f, 0.75f + 0.75f * (float)rail, x + 5.4f, -12.5f,
+                 0.75f + 0.75f * (float)rail, 0.035f);
     }
     build_tree(w, 0, -9.0f, 9.0f, 5.2f);
     build_tree(w, 1, 10.0f, 8.5f, 4.6f);
@@ -320,24 +378,29 @@ static void build(world *w)
     build_fountain(w);
     for (int quarter = 0; quarter < 4; quarter++) { /* lawns with hedges and flowers, benches and lamps */
         world_place(w, 0, 0, 0, 0.785398f + 1.570796f * (float)quarter);
-        static const float lawn[][2] = {{1.25f, 0.0f}, {1.25f, 0.07f}, {1.25f, 0.07f}, {0.7f, 0.09f}, {0.0f, 0.1f}};
+        static const float lawn[][2] = {
+            {1.25f, 0.0f}, {1.25f, 0.07f}, {1.25f, 0.07f}, {0.7f, 0.09f}, {0.0f, 0.1f}};
         const float turn_rad = 0.785398f + 1.570796f * (float)quarter, c = cosf(turn_rad), s = sinf(turn_rad);
         world_place(w, 4.7f * c, 4.7f * s, 0, turn_rad);
         world_revolve(w, GRASS, 0, lawn, sizeof lawn / sizeof lawn[0], 32);
         world_blob(w, HEDGE, quarter, (const float[3]){0, 0, 0.35f}, 0.55f, 0.9f, 0.18f, 4, 32);
         for (int i = 0; i < 6; i++)
-            world_blob(w, FLOWERS, i, (const float[3]){0.9f * cosf(1.047f * (float)i), 0.9f * sinf(1.047f * (float)i), 0.12f}, 0.22f, 0.7f,
-                       0.2f, 4, 14);
+            world_blob(
+                w, FLOWERS, i,
+                (const float[3]){0.9f * cosf(1.047f * (float)i), 0.9f * sinf(1.047f * (float)i), 0.12f},
+                0.22f, 0.7f, 0.2f, 4, 14);
         const float t = turn_rad - 0.785398f, bc = cosf(t), bs = sinf(t);
         world_place(w, 5.4f * bc, 5.4f * bs, 0, t - 1.570796f);
         for (int slat = 0; slat < 3; slat++) {
             box(w, BENCH, slat, 0, -0.16f + 0.16f * (float)slat, 0.46f, 0.85f, 0.065f, 0.025f, 0.3f);
-            box(w, BENCH, slat, 0, 0.24f + 0.02f * (float)slat, 0.58f + 0.16f * (float)slat, 0.85f, 0.02f, 0.06f, 0.3f);
+            box(w, BENCH, slat, 0, 0.24f + 0.02f * (float)slat, 0.58f + 0.16f * (float)slat, 0.85f, 0.02f,
+                0.06f, 0.3f);
         }
         for (int side = -1; side <= 1; side += 2)
             box(w, IRON, 0, 0.7f * (float)side, 0, 0.22f, 0.04f, 0.2f, 0.22f, 0.3f);
         world_place(w, 7.4f * cosf(t + 0.4f), 7.4f * sinf(t + 0.4f), 0, 0);
-        static const float foot[][2] = {{0.18f, 0.0f}, {0.16f, 0.3f}, {0.06f, 0.45f}, {0.045f, 2.6f}, {0.12f, 2.7f}, {0.0f, 2.72f}};
+        static const float foot[][2] = {{0.18f, 0.0f},  {0.16f, 0.3f}, {0.06f, 0.45f},
+                                        {0.045f, 2.6f}, {0.12f, 2.7f}, {0.0f, 2.72f}};
         static const float cap[][2] = {{0.22f, 3.08f}, {0.16f, 3.16f}, {0.03f, 3.26f}, {0.0f, 3.36f}};
         world_revolve(w, IRON, 0, foot, sizeof foot / sizeof foot[0], 16);
         world_ball(w, LAMP_GLASS, 0, (const float[3]){0, 0, 2.9f}, 0.20f, 20);
@@ -349,10 +412,11 @@ static void build(world *w)
 const recipe recipe_courtyard = {
     .name = "courtyard",
     .summary = "a town square: fountain, facades, trees, a fence, hills and sky",
-    .about = "A town square under a low, warm sun. A stone fountain with rippled water and bronze balls that mirror a little stands "
-             "on rings of setts, between lawns, flower beds, benches and street lamps. Painted and brick facades with windows, "
-             "shutters, awnings and tiled roofs close three sides; the fourth is open over an iron fence to hills and a sky dome "
-             "with clouds. The dome is a sphere of 95 units around the square, so the sky has depth and sparse points too.",
+    .about = "A town square under a low, warm sun. A stone fountain with rippled water and bronze balls that "
+             "mirror a little stands on rings of setts, between lawns, flower beds, benches and street "
+             "lamps. Painted and brick facades with windows, shutters, awnings and tiled roofs close three "
+             "sides; the fourth is open over an iron fence to hills and a sky dome with clouds. The dome is "
+             "a sphere of 95 units around the square, so the sky has depth and sparse points too.",
     .build = build,
     .rings = {{7.6f, 2.1f}, {9.4f, 3.8f}},
     .target = {0, 0, 1.55f},

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* scenes/make_scene.c -- a recipe and a def to a folder of photos, cameras and sparse points. */
 #include "gbtrace/make_scene.h"
 
@@ -18,12 +19,23 @@
 
 static const recipe *const recipes[] = {&recipe_tabletop, &recipe_courtyard, &recipe_terrain};
 
-enum { RECIPE_COUNT = sizeof recipes / sizeof recipes[0], NAME_SIZE = 16, PATH_SIZE = 4096, STREAM_CAMERA = 1 << 24 };
+enum {
+    RECIPE_COUNT = sizeof recipes / sizeof recipes[0],
+    NAME_SIZE = 16,
+    PATH_SIZE = 4096,
+    STREAM_CAMERA = 1 << 24
+};
 
 gbt_make_scene_def gbt_make_scene_def_default(void)
 {
-    return (gbt_make_scene_def){
-        .name = "tabletop", .width = 320, .height = 240, .view_count = 64, .points = 6000, .point_noise = 0.001, .samples = 16, .seed = 1};
+    return (gbt_make_scene_def){.name = "tabletop",
+                                .width = 320,
+                                .height = 240,
+                                .view_count = 64,
+                                .points = 6000,
+                                .point_noise = 0.001,
+                                .samples = 16,
+                                .seed = 1};
 }
 
 const char *const *gbt_make_scene_names(void)
@@ -52,13 +64,15 @@ static gbt_status find_recipe(const char *name, const recipe **out, gbt_error *e
         const size_t used = strlen(list);
         snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", recipes[i]->name);
     }
-    return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: unknown scene (wanted one of %s; got %.100s)", list, name != NULL ? name : "none");
+    return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: unknown scene (wanted one of %s; got %.100s)", list,
+                     name != NULL ? name : "none");
 }
 
 static gbt_status check_range(const char *what, int value, int low, int high, gbt_error *err)
 {
     if (value < low || value > high)
-        return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: bad %s (wanted %d to %d, got %d)", what, low, high, value);
+        return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: bad %s (wanted %d to %d, got %d)", what, low,
+                         high, value);
     return GBT_OK;
 }
 
@@ -72,25 +86,34 @@ static gbt_status check_def(const gbt_make_scene_def *def, gbt_error *err)
     GBT_TRY(check_range("depth switch", def->depth, 0, 1, err));
     GBT_TRY(check_range("distortion switch", def->distorted, 0, 1, err));
     if (!(def->point_noise >= 0 && def->point_noise <= 0.1))
-        return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: bad point noise (wanted 0 to 0.1, got %g)", def->point_noise);
+        return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: bad point noise (wanted 0 to 0.1, got %g)",
+                         def->point_noise);
     return GBT_OK;
 }
 
 /** View number `view` of `def`: on one of the rings, looking at the target, both moved a little. */
 static gbt_camera place_camera(const recipe *r, const gbt_make_scene_def *def, int view)
 {
-    gbt_camera camera = {.model = def->distorted ? GBT_CAMERA_OPENCV : GBT_CAMERA_PINHOLE, .width = def->width, .height = def->height};
+    gbt_camera camera = {.model = def->distorted ? GBT_CAMERA_OPENCV : GBT_CAMERA_PINHOLE,
+                         .width = def->width,
+                         .height = def->height};
     const double focal = (double)r->focal_widths * def->width;
-    const double params[8] = {focal, focal, 0.5 * def->width, 0.5 * def->height, -0.10, 0.03, 0.0008, -0.0006};
+    const double params[8] = {focal, focal, 0.5 * def->width, 0.5 * def->height,
+                              -0.10, 0.03,  0.0008,           -0.0006};
     memcpy(camera.params, params, (def->distorted ? 8 : 4) * sizeof *params);
-    /* Rings alternate, and skip once in eight views, so that a split that holds out every eighth view takes from both. */
+    /* Rings alternate, and skip once in eight views, so that a split that holds out every eighth view takes
+       from both. */
     const recipe_ring *ring = &r->rings[(view + view / 8) % 2];
     const double angle = 6.283185307179586 * view / def->view_count;
-    double eye[3] = {(double)ring->radius * cos(angle), (double)ring->radius * sin(angle), (double)ring->height}, forward[3];
+    double eye[3] = {(double)ring->radius * cos(angle), (double)ring->radius * sin(angle),
+                     (double)ring->height},
+           forward[3];
     for (int k = 0; k < 3; k++) {
         eye[k] += (double)r->jitter * rng_normal(def->seed, STREAM_CAMERA + (uint64_t)k, (uint64_t)view);
-        forward[k] = (double)r->target[k] + (double)r->jitter * rng_normal(def->seed, STREAM_CAMERA + 3 + (uint64_t)k, (uint64_t)view) -
-                     eye[k];
+        forward[k] =
+            (double)r->target[k] +
+            (double)r->jitter * rng_normal(def->seed, STREAM_CAMERA + 3 + (uint64_t)k, (uint64_t)view) -
+            eye[k];
     }
     const double up[3] = {0, 0, 1};
     double right[3], down[3];
@@ -161,33 +184,36 @@ static gbt_status make_folder(const char *folder, const char *name, gbt_error *e
     return file_make_folder(path, err);
 }
 
-static gbt_status write_about(const recipe *r, const gbt_make_scene_def *def, const char *folder, gbt_error *err)
+static gbt_status write_about(const recipe *r, const gbt_make_scene_def *def, const char *folder,
+                              gbt_error *err)
 {
     char path[PATH_SIZE], text[4096];
     GBT_TRY(file_join(path, sizeof path, folder, "SCENE.md", err));
-    const int length = snprintf(
-        text, sizeof text,
-        "# %s\n\n%s\n\n"
-        "Made by gbtrace; everything here is computed, nothing was photographed. The command that makes it again, bit for bit on the same "
-        "kind of machine:\n\n"
-        "    gbtrace make-scene %s -o DIR --width %d --height %d --views %d --points %d --point-noise %.9g --samples %d --seed %" PRIu64
-        "%s%s\n\n"
-        "- `images/`: %d photos of %d x %d pixels, display-referred colours.\n"
-        "- `sparse/0/`: cameras (%s, exact poses) and at most %d points in COLMAP's binary format. A point lies on a surface that at "
-        "least\n"
-        "  three views see, with noise of %.9g of its distance per axis; observations have 0.3 pixels of noise; 1 point in 100 is an "
-        "outlier.\n"
-        "%s",
-        r->name, r->about, r->name, def->width, def->height, def->view_count, def->points, def->point_noise, def->samples, def->seed,
-        def->depth ? " --depth" : "", def->distorted ? " --distorted" : "", def->view_count, def->width, def->height,
-        def->distorted ? "OPENCV with distortion" : "PINHOLE", def->points, def->point_noise,
-        def->depth ? "- `depth/`: float EXR, distance along the ray through each pixel's centre to the first surface, scene units; 0 where "
-                     "there is none.\n"
-                   : "");
+    const int length =
+        snprintf(text, sizeof text,
+                 "# %s\n\n%s\n\n"
+                 "Made by gbtrace; everything here is computed, nothing was photographed. The command that "
+                 "makes it again, bit for bit on the same kind of machine:\n\n"
+                 "    gbtrace make-scene %s -o DIR --width %d --height %d --views %d --points %d "
+                 "--point-noise %.9g --samples %d --seed %" PRIu64 "%s%s\n\n"
+                 "- `images/`: %d photos of %d x %d pixels, display-referred colours.\n"
+                 "- `sparse/0/`: cameras (%s, exact poses) and at most %d points in COLMAP's binary format. "
+                 "A point lies on a surface that at least\n"
+                 "  three views see, with noise of %.9g of its distance per axis; observations have 0.3 "
+                 "pixels of noise; 1 point in 100 is an outlier.\n"
+                 "%s",
+                 r->name, r->about, r->name, def->width, def->height, def->view_count, def->points,
+                 def->point_noise, def->samples, def->seed, def->depth ? " --depth" : "",
+                 def->distorted ? " --distorted" : "", def->view_count, def->width, def->height,
+                 def->distorted ? "OPENCV with distortion" : "PINHOLE", def->points, def->point_noise,
+                 def->depth ? "- `depth/`: float EXR, distance along the ray through each pixel's centre to "
+                              "the first surface, scene units; 0 where there is none.\n"
+                            : "");
     return file_write_atomic(path, text, (size_t)length, err);
 }
 
-static gbt_status write_scene(const world *w, const recipe *r, const gbt_make_scene_def *def, const char *folder, gbt_error *err)
+static gbt_status write_scene(const world *w, const recipe *r, const gbt_make_scene_def *def,
+                              const char *folder, gbt_error *err)
 {
     gbt_status status = GBT_ERR_NO_MEMORY;
     const size_t views = (size_t)def->view_count;
@@ -196,13 +222,15 @@ static gbt_status write_scene(const world *w, const recipe *r, const gbt_make_sc
     gbt_camera *cameras = mem_alloc(views, sizeof *cameras, "cameras", err);
     char(*names)[NAME_SIZE] = mem_alloc(views, sizeof *names, "view names", err);
     const char **name_list = mem_alloc(views, sizeof *name_list, "view names", err);
-    shoot job = {.w = w, .def = def, .cameras = cameras, .names = name_list, .folder = folder, .per_view = per_view};
+    shoot job = {
+        .w = w, .def = def, .cameras = cameras, .names = name_list, .folder = folder, .per_view = per_view};
     while (job.side * job.side < def->samples)
         job.side++;
     job.seeds = mem_calloc(views * per_view, sizeof *job.seeds, "sparse candidates", err);
     job.status = mem_calloc(views, sizeof *job.status, "view status", err);
     job.errors = mem_calloc(views, sizeof *job.errors, "view status", err);
-    if (cameras == NULL || names == NULL || name_list == NULL || job.seeds == NULL || job.status == NULL || job.errors == NULL)
+    if (cameras == NULL || names == NULL || name_list == NULL || job.seeds == NULL || job.status == NULL ||
+        job.errors == NULL)
         goto done;
     for (size_t v = 0; v < views; v++) {
         cameras[v] = place_camera(r, def, (int)v);
@@ -215,8 +243,8 @@ static gbt_status write_scene(const world *w, const recipe *r, const gbt_make_sc
         if (job.status[v] != GBT_OK)
             status = base_fail(err, job.status[v], "%s", job.errors[v].text);
     if (status == GBT_OK)
-        status = sparse_write(w, cameras, name_list, views, job.seeds, per_view, (size_t)def->points, def->point_noise, def->seed, folder,
-                              err);
+        status = sparse_write(w, cameras, name_list, views, job.seeds, per_view, (size_t)def->points,
+                              def->point_noise, def->seed, folder, err);
     if (status == GBT_OK)
         status = write_about(r, def, folder, err);
 done:
@@ -233,7 +261,8 @@ gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt
 {
     const recipe *r = NULL;
     if (def == NULL || folder == NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: no %s given", def == NULL ? "settings" : "folder");
+        return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: no %s given",
+                         def == NULL ? "settings" : "folder");
     GBT_TRY(find_recipe(def->name, &r, err));
     GBT_TRY(check_def(def, err));
     /* Before any work: an unwritable folder should fail at once. */

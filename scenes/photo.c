@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* scenes/photo.c -- stratified, adaptive sampling of a world. */
 #include "scenes/photo.h"
 
@@ -8,7 +9,8 @@
 #include "base/rng.h"
 #include "base/vec.h"
 
-/* Largest difference of displayed colour among the first samples that still counts as one colour: 15 of 255. */
+/* Largest difference of displayed colour among the first samples that still counts as one colour: 15 of
+   255. */
 static const float same_color = 0.06f;
 
 bool photo_ray(const gbt_camera *camera, double px, double py, float origin[3], float dir[3])
@@ -17,8 +19,10 @@ bool photo_ray(const gbt_camera *camera, double px, double py, float origin[3], 
     if (!gbt_camera_unproject(camera, px, py, in_camera))
         return false;
     dmat_apply_transposed(camera->rotation, in_camera, in_world);
-    for (int k = 0; k < 3; k++)
-        origin[k] = (float)camera->center[k], dir[k] = (float)in_world[k];
+    for (int k = 0; k < 3; k++) {
+        origin[k] = (float)camera->center[k];
+        dir[k] = (float)in_world[k];
+    }
     return true;
 }
 
@@ -30,16 +34,11 @@ typedef struct photo_job {
     image *out;
 } photo_job;
 
-/** Strata of the first pass: a quarter of all, one per row and column of every 4 x 4 block; all where there are too few to choose from. */
-static bool is_first_pass(int x, int y, int side)
-{
-    return side <= 2 || (x + 2 * y + y / 2) % 4 == 0;
-}
+/** Strata of the first pass: a quarter of all, one per row and column of every 4 x 4 block; all where there
+    are too few to choose from. */
+static bool is_first_pass(int x, int y, int side) { return side <= 2 || (x + 2 * y + y / 2) % 4 == 0; }
 
-static float fraction(float x)
-{
-    return x - floorf(x);
-}
+static float fraction(float x) { return x - floorf(x); }
 
 /** @return the material seen with its variant, -1 for the sky */
 static int sample(const photo_job *job, int column, int row, int x, int y, int number, float rgb[3])
@@ -58,9 +57,11 @@ static int sample(const photo_job *job, int column, int row, int x, int y, int n
         world_sky(job->w, dir, rgb);
         return -1;
     }
-    /* The lamp is sampled by an additive recurrence (R2), which is even for every number of samples. It is the same for every pixel:
-       a soft shadow then has faint steps but no grain, and all views agree about it. */
-    const float jitter[2] = {fraction(0.5f + 0.7548777f * (float)number), fraction(0.5f + 0.5698403f * (float)number)};
+    /* The lamp is sampled by an additive recurrence (R2), which is even for every number of samples. It is
+       the same for every pixel: a soft shadow then has faint steps but no grain, and all views agree about
+       it. */
+    const float jitter[2] = {fraction(0.5f + 0.7548777f * (float)number),
+                             fraction(0.5f + 0.5698403f * (float)number)};
     world_shade(job->w, &s, dir, jitter, rgb);
     return s.material * 65536 + s.variant;
 }
@@ -83,7 +84,8 @@ static void render_pixel(const photo_job *job, int column, int row)
                 is_even = is_even && seen == first_seen;
                 for (int k = 0; k < 3; k++) {
                     sum[k] += rgb[k];
-                    low[k] = fminf(low[k], rgb[k]), high[k] = fmaxf(high[k], rgb[k]);
+                    low[k] = fminf(low[k], rgb[k]);
+                    high[k] = fmaxf(high[k], rgb[k]);
                 }
                 number++;
             }
@@ -106,7 +108,8 @@ static void render_rows(size_t block, size_t begin, size_t end, void *context)
             render_pixel(job, column, (int)row);
 }
 
-void photo_render(const world *w, const gbt_camera *camera, int side, uint64_t seed, uint64_t view, image *out)
+void photo_render(const world *w, const gbt_camera *camera, int side, uint64_t seed, uint64_t view,
+                  image *out)
 {
     photo_job job = {w, camera, side, seed, view, out};
     parallel_blocks((size_t)camera->height, 4, render_rows, &job);
@@ -120,7 +123,8 @@ static void depth_rows(size_t block, size_t begin, size_t end, void *context)
         for (int column = 0; column < job->camera->width; column++) {
             float origin[3], dir[3], depth = 0;
             surface s;
-            if (photo_ray(job->camera, column + 0.5, (double)row + 0.5, origin, dir) && world_trace(job->w, origin, dir, &s))
+            if (photo_ray(job->camera, column + 0.5, (double)row + 0.5, origin, dir) &&
+                world_trace(job->w, origin, dir, &s))
                 depth = s.distance;
             job->out->pixels[row * (size_t)job->camera->width + (size_t)column] = depth;
         }

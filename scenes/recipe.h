@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* scenes/recipe.h -- what a scene file gives: geometry, colours, and where the cameras stand. */
 #ifndef GBT_SCENES_RECIPE_H
 #define GBT_SCENES_RECIPE_H

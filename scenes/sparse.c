@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* scenes/sparse.c -- chosen pixels -> surface points -> tracks -> COLMAP files. */
 #include "scenes/sparse.h"
 
@@ -31,7 +32,8 @@ void sparse_choose(const image *photo, uint64_t seed, uint64_t view, size_t want
         for (uint64_t attempt = 0; attempt < 3; attempt++) {
             uint32_t words[4];
             rng_philox(seed, STREAM_CHOICE + view, 3 * i + attempt, words);
-            const float px = (float)((double)words[0] * 0x1p-32 * photo->width), py = (float)((double)words[1] * 0x1p-32 * photo->height);
+            const float px = (float)((double)words[0] * 0x1p-32 * photo->width),
+                        py = (float)((double)words[1] * 0x1p-32 * photo->height);
             const int x = (int)px < photo->width - 1 ? (int)px : photo->width - 1,
                       y = (int)py < photo->height - 1 ? (int)py : photo->height - 1;
             float change = 0;
@@ -40,11 +42,15 @@ void sparse_choose(const image *photo, uint64_t seed, uint64_t view, size_t want
             for (int c = 0; c < 3; c++) {
                 const float *p = photo->pixels + c;
                 const size_t stride = (size_t)photo->width;
-                change += fabsf(p[3 * ((size_t)y * stride + (size_t)x1)] - p[3 * ((size_t)y * stride + (size_t)x0)]) +
-                          fabsf(p[3 * ((size_t)y1 * stride + (size_t)x)] - p[3 * ((size_t)y0 * stride + (size_t)x)]);
+                change += fabsf(p[3 * ((size_t)y * stride + (size_t)x1)] -
+                                p[3 * ((size_t)y * stride + (size_t)x0)]) +
+                          fabsf(p[3 * ((size_t)y1 * stride + (size_t)x)] -
+                                p[3 * ((size_t)y0 * stride + (size_t)x)]);
             }
-            if (change > best)
-                best = change, out[i] = (sparse_seed){px, py};
+            if (change > best) {
+                best = change;
+                out[i] = (sparse_seed){px, py};
+            }
         }
     }
 }
@@ -82,8 +88,10 @@ static bool sees(const search *q, size_t view, const double point[3], const floa
         return false;
     const double distance = dvec_length(to_point);
     float origin[3], dir[3];
-    for (int k = 0; k < 3; k++)
-        origin[k] = (float)camera->center[k], dir[k] = (float)(to_point[k] / distance);
+    for (int k = 0; k < 3; k++) {
+        origin[k] = (float)camera->center[k];
+        dir[k] = (float)(to_point[k] / distance);
+    }
     if (-(dir[0] * normal[0] + dir[1] * normal[1] + dir[2] * normal[2]) < least_cosine)
         return false;
     return !mesh_tree_blocked(q->w->tree, origin, dir, 0, (float)(distance * (1 - 1e-4)) - q->w->epsilon);
@@ -103,7 +111,8 @@ static void find_tracks(size_t block, size_t begin, size_t end, void *context)
         memset(seen, 0, q->view_count);
         float origin[3], rgb[3];
         surface s;
-        if (!photo_ray(q->cameras + view, (double)at->px, (double)at->py, origin, t->dir) || !world_trace(q->w, origin, t->dir, &s))
+        if (!photo_ray(q->cameras + view, (double)at->px, (double)at->py, origin, t->dir) ||
+            !world_trace(q->w, origin, t->dir, &s))
             continue;
         static const float lamp_center[2] = {0, 0};
         world_shade(q->w, &s, t->dir, lamp_center, rgb);
@@ -114,8 +123,10 @@ static void find_tracks(size_t block, size_t begin, size_t end, void *context)
         uint32_t count = 0;
         for (size_t v = 0; v < q->view_count; v++) {
             const bool is_found = v == view || (double)rng_uniform(q->seed, STREAM_TRACK + v, i) < keep_share;
-            if (is_found && sees(q, v, t->point, s.geometric))
-                seen[v] = 1, count++;
+            if (is_found && sees(q, v, t->point, s.geometric)) {
+                seen[v] = 1;
+                count++;
+            }
         }
         t->count = count >= MIN_TRACK && seen[view] != 0 ? count : 0;
     }
@@ -131,7 +142,8 @@ static void observe(const search *q, size_t candidate, size_t view, double pixel
     dmat_apply(camera->rotation, in_camera, in_camera);
     gbt_camera_project(camera, in_camera, pixel);
     for (int k = 0; k < 2; k++)
-        pixel[k] += observation_noise_px * rng_normal(q->seed, STREAM_NOISE + 2 * view + (uint64_t)k, candidate);
+        pixel[k] +=
+            observation_noise_px * rng_normal(q->seed, STREAM_NOISE + 2 * view + (uint64_t)k, candidate);
 }
 
 /** The position that is written: the true one with noise, or an outlier. */
@@ -148,7 +160,8 @@ static void disturb(const search *q, size_t candidate, size_t number, double poi
             nearest = fmin(nearest, dvec_length(to_point));
     }
     for (int k = 0; k < 3; k++)
-        out[k] = t->point[k] + point_noise * nearest * rng_normal(q->seed, STREAM_OUTLIER + 1 + (uint64_t)k, candidate);
+        out[k] = t->point[k] +
+                 point_noise * nearest * rng_normal(q->seed, STREAM_OUTLIER + 1 + (uint64_t)k, candidate);
     if (number % OUTLIER_EVERY != OUTLIER_EVERY - 1)
         return;
     const double part = 0.1 + 0.3 * (double)rng_uniform(q->seed, STREAM_OUTLIER, candidate);
@@ -207,10 +220,10 @@ static gbt_status collect(const search *q, size_t wanted, double point_noise, cl
         track *t = q->tracks + i;
         if (t->count == 0)
             continue;
-        GBT_TRY(mem_reserve((void **)&c->points, &c->point_capacity, c->point_count, c->point_count + 1, sizeof *c->points, "sparse points",
-                            err));
-        GBT_TRY(mem_reserve((void **)&c->track, &c->track_capacity, c->track_count, c->track_count + t->count, sizeof *c->track,
-                            "sparse tracks", err));
+        GBT_TRY(mem_reserve((void **)&c->points, &c->point_capacity, c->point_count, c->point_count + 1,
+                            sizeof *c->points, "sparse points", err));
+        GBT_TRY(mem_reserve((void **)&c->track, &c->track_capacity, c->track_count, c->track_count + t->count,
+                            sizeof *c->track, "sparse tracks", err));
         colmap_point *p = c->points + c->point_count;
         *p = (colmap_point){.track_count = t->count};
         memcpy(p->color, t->color, sizeof p->color);
@@ -220,14 +233,17 @@ static gbt_status collect(const search *q, size_t wanted, double point_noise, cl
         for (size_t v = 0; v < q->view_count; v++) {
             if (q->seen[i * q->view_count + v] == 0)
                 continue;
-            GBT_TRY(mem_reserve((void **)&c->observations[v], &c->observation_capacity[v], c->observation_count[v],
-                                c->observation_count[v] + 1, sizeof *c->observations[v], "sparse observations", err));
+            GBT_TRY(mem_reserve((void **)&c->observations[v], &c->observation_capacity[v],
+                                c->observation_count[v], c->observation_count[v] + 1,
+                                sizeof *c->observations[v], "sparse observations", err));
             colmap_observation *o = c->observations[v] + c->observation_count[v];
             double pixel[2];
             observe(q, i, v, pixel);
             *o = (colmap_observation){pixel[0], pixel[1], c->point_count};
-            c->track[c->track_count][0] = (uint32_t)v, c->track[c->track_count][1] = (uint32_t)c->observation_count[v];
-            c->observation_count[v]++, c->track_count++;
+            c->track[c->track_count][0] = (uint32_t)v;
+            c->track[c->track_count][1] = (uint32_t)c->observation_count[v];
+            c->observation_count[v]++;
+            c->track_count++;
         }
         c->point_count++;
     }
@@ -239,8 +255,9 @@ static gbt_status collect(const search *q, size_t wanted, double point_noise, cl
     return GBT_OK;
 }
 
-gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *const *names, size_t view_count, const sparse_seed *seeds,
-                        size_t per_view, size_t wanted, double point_noise, uint64_t seed, const char *folder, gbt_error *err)
+gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *const *names,
+                        size_t view_count, const sparse_seed *seeds, size_t per_view, size_t wanted,
+                        double point_noise, uint64_t seed, const char *folder, gbt_error *err)
 {
     gbt_status status = GBT_ERR_NO_MEMORY;
     cloud c = {0};
@@ -255,12 +272,14 @@ gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *c
     q.seen = mem_alloc(q.candidate_count, view_count, "sparse visibility", err);
     c.observations = mem_calloc(view_count, sizeof *c.observations, "sparse observations", err);
     c.observation_count = mem_calloc(view_count, sizeof *c.observation_count, "sparse observations", err);
-    c.observation_capacity = mem_calloc(view_count, sizeof *c.observation_capacity, "sparse observations", err);
+    c.observation_capacity =
+        mem_calloc(view_count, sizeof *c.observation_capacity, "sparse observations", err);
     c.images = mem_calloc(view_count, sizeof *c.images, "sparse images", err);
-    if (q.tracks == NULL || q.seen == NULL || c.observations == NULL || c.observation_count == NULL || c.observation_capacity == NULL ||
-        c.images == NULL)
+    if (q.tracks == NULL || q.seen == NULL || c.observations == NULL || c.observation_count == NULL ||
+        c.observation_capacity == NULL || c.images == NULL)
         goto done;
-    /* Rounds, because most scenes need only the first one or two: the others are for views that hardly overlap. */
+    /* Rounds, because most scenes need only the first one or two: the others are for views that hardly
+       overlap. */
     size_t usable = 0, looked_at = 0;
     while (usable < wanted && looked_at < q.candidate_count) {
         const size_t left = q.candidate_count - looked_at, round = left < wanted ? left : wanted;

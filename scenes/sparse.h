@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* scenes/sparse.h -- the sparse cloud that structure from motion would have found, from known surfaces. */
 #ifndef GBT_SCENES_SPARSE_H
 #define GBT_SCENES_SPARSE_H
@@ -28,7 +29,8 @@ void sparse_choose(const image *photo, uint64_t seed, uint64_t view, size_t want
  * @param seeds [view_count][per_view]
  * @param names [view_count]
  */
-gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *const *names, size_t view_count, const sparse_seed *seeds,
-                        size_t per_view, size_t wanted, double point_noise, uint64_t seed, const char *folder, gbt_error *err);
+gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *const *names,
+                        size_t view_count, const sparse_seed *seeds, size_t per_view, size_t wanted,
+                        double point_noise, uint64_t seed, const char *folder, gbt_error *err);
 
 #endif

@@ -1,4 +1,6 @@
-/* scenes/tabletop.c -- a laid table in a furnished room: matt, glossy, thin and lettered things under one warm lamp. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* scenes/tabletop.c -- a laid table in a furnished room: matt, glossy, thin and lettered things under one
+   warm lamp. */
 #include <math.h>
 #include <string.h>
 
@@ -6,21 +8,44 @@
 #include "scenes/texture.h"
 
 enum {
-    FLOOR, RUG, BRICK_WALL, PAPER_WALL, PLASTER_WALL, PANEL_WALL, WOOD, TABLE_TOP, PICTURE, WINDOW, BOOK, CLOTH, GLOBE,
-    BRASS, CERAMIC, LETTER_BLOCK, WIRE, FRUIT, VASE, LEAF, POT, WHITE_PAINT, CURTAIN, SOIL, CUP
+    FLOOR,
+    RUG,
+    BRICK_WALL,
+    PAPER_WALL,
+    PLASTER_WALL,
+    PANEL_WALL,
+    WOOD,
+    TABLE_TOP,
+    PICTURE,
+    WINDOW,
+    BOOK,
+    CLOTH,
+    GLOBE,
+    BRASS,
+    CERAMIC,
+    LETTER_BLOCK,
+    WIRE,
+    FRUIT,
+    VASE,
+    LEAF,
+    POT,
+    WHITE_PAINT,
+    CURTAIN,
+    SOIL,
+    CUP
 };
 
-static const float room = 2.7f, room_height = 2.7f, top = 0.76f; /* half the room's side; its height; the table's surface */
+static const float room = 2.7f, room_height = 2.7f,
+                   top = 0.76f; /* half the room's side; its height; the table's surface */
 
 static void set(float out[3], float r, float g, float b)
 {
-    out[0] = r, out[1] = g, out[2] = b;
+    out[0] = r;
+    out[1] = g;
+    out[2] = b;
 }
 
-static float between(float value, float low, float high)
-{
-    return value >= low && value < high;
-}
+static float between(float value, float low, float high) { return value >= low && value < high; }
 
 /** A hill landscape under a big sun, for u and v in [-1, 1]. */
 static void paint_picture(float u, float v, int variant, float out[3])
@@ -32,8 +57,9 @@ static void paint_picture(float u, float v, int variant, float out[3])
     if (hypotf(u - 0.35f, v - 0.35f) < 0.26f)
         set(out, 0.92f, 0.36f, 0.16f);
     for (int layer = 0; layer < 3; layer++) {
-        const float crest = 0.05f - 0.32f * (float)layer +
-                            0.22f * texture_noise(1.7f * u + 9.1f * (float)layer, 4.0f * (float)variant, 0.5f);
+        const float crest =
+            0.05f - 0.32f * (float)layer +
+            0.22f * texture_noise(1.7f * u + 9.1f * (float)layer, 4.0f * (float)variant, 0.5f);
         if (v < crest) {
             memcpy(out, hills[kind], 3 * sizeof *out);
             texture_scale(out, 1.35f - 0.4f * (float)layer);
@@ -50,7 +76,8 @@ static void look_at_room(const surface *s, look *l)
     case FLOOR: {
         const int i = (int)floorf(p[0] / 0.45f), j = (int)floorf(p[1] / 0.45f);
         const float in_x = p[0] / 0.45f - (float)i, in_y = p[1] / 0.45f - (float)j;
-        const float shade = 0.85f + 0.2f * texture_hash(i, j, 3) + 0.10f * texture_fbm(5 * p[0], 5 * p[1], 0, 2);
+        const float shade =
+            0.85f + 0.2f * texture_hash(i, j, 3) + 0.10f * texture_fbm(5 * p[0], 5 * p[1], 0, 2);
         if (((i + j) & 1) != 0)
             set(albedo, 0.62f, 0.30f, 0.18f);
         else
@@ -58,7 +85,8 @@ static void look_at_room(const surface *s, look *l)
         texture_scale(albedo, shade);
         if (fminf(fminf(in_x, 1 - in_x), fminf(in_y, 1 - in_y)) < 0.025f)
             set(albedo, 0.36f, 0.32f, 0.28f);
-        l->specular = 0.03f, l->shininess = 60;
+        l->specular = 0.03f;
+        l->shininess = 60;
         break;
     }
     case RUG: {
@@ -110,7 +138,8 @@ static void look_at_room(const surface *s, look *l)
         const int number = (int)floorf(u / 0.24f);
         const float ring = texture_wood(0.7f * p[2] + 7 * texture_hash(number, 0, 1), board * 0.4f + 0.3f,
                                         0.2f + 0.3f * texture_hash(number, 1, 1));
-        texture_mix(albedo, (const float[3]){0.34f, 0.42f, 0.50f}, (const float[3]){0.44f, 0.53f, 0.60f}, ring);
+        texture_mix(albedo, (const float[3]){0.34f, 0.42f, 0.50f}, (const float[3]){0.44f, 0.53f, 0.60f},
+                    ring);
         if (board < 0.05f)
             texture_scale(albedo, 0.45f);
         break;
@@ -118,15 +147,18 @@ static void look_at_room(const surface *s, look *l)
     case WOOD:
     case TABLE_TOP: {
         const float plank = floorf(p[1] / 0.18f), offset = texture_hash((int)plank, 5, s->material);
-        const float ring = texture_wood(1.1f * p[0] + 5 * offset, 1.6f * (p[1] - 0.18f * plank) + 0.25f + 0.2f * offset,
-                                        0.5f * p[2] + 0.3f * offset);
-        texture_mix(albedo, (const float[3]){0.33f, 0.18f, 0.09f}, (const float[3]){0.60f, 0.37f, 0.19f}, ring);
+        const float ring =
+            texture_wood(1.1f * p[0] + 5 * offset, 1.6f * (p[1] - 0.18f * plank) + 0.25f + 0.2f * offset,
+                         0.5f * p[2] + 0.3f * offset);
+        texture_mix(albedo, (const float[3]){0.33f, 0.18f, 0.09f}, (const float[3]){0.60f, 0.37f, 0.19f},
+                    ring);
         if (s->material == TABLE_TOP) {
             texture_scale(albedo, 0.85f + 0.3f * offset);
             if (p[1] / 0.18f - plank < 0.025f && s->normal[2] > 0.5f)
                 texture_scale(albedo, 0.5f);
         }
-        l->specular = 0.03f, l->shininess = 40;
+        l->specular = 0.03f;
+        l->shininess = 40;
         break;
     }
     case PICTURE:
@@ -135,7 +167,8 @@ static void look_at_room(const surface *s, look *l)
     case WINDOW: {
         /* A painted view; it gives light of its own, as daylight behind a pane would. */
         float out[3];
-        texture_mix(out, (const float[3]){0.95f, 0.90f, 0.80f}, (const float[3]){0.42f, 0.66f, 0.95f}, texture_step(-0.3f, 0.6f, v));
+        texture_mix(out, (const float[3]){0.95f, 0.90f, 0.80f}, (const float[3]){0.42f, 0.66f, 0.95f},
+                    texture_step(-0.3f, 0.6f, v));
         const float cloud = texture_step(0.05f, 0.5f, texture_fbm(2.2f * u, 3.6f * v, 1, 3));
         texture_mix(out, out, (const float[3]){1, 1, 1}, 0.8f * cloud);
         if (v < -0.28f + 0.10f * texture_noise(2.1f * u, 0, 7))
@@ -148,14 +181,17 @@ static void look_at_room(const surface *s, look *l)
         break;
     }
     case BOOK: {
-        const float hue = texture_hash(s->variant, 11, 0), tone = 0.7f + 0.5f * texture_hash(s->variant, 12, 0);
-        static const float covers[6][3] = {{0.55f, 0.13f, 0.11f}, {0.13f, 0.28f, 0.46f}, {0.16f, 0.38f, 0.22f},
-                                           {0.72f, 0.54f, 0.20f}, {0.40f, 0.20f, 0.38f}, {0.78f, 0.72f, 0.60f}};
+        const float hue = texture_hash(s->variant, 11, 0),
+                    tone = 0.7f + 0.5f * texture_hash(s->variant, 12, 0);
+        static const float covers[6][3] = {{0.55f, 0.13f, 0.11f}, {0.13f, 0.28f, 0.46f},
+                                           {0.16f, 0.38f, 0.22f}, {0.72f, 0.54f, 0.20f},
+                                           {0.40f, 0.20f, 0.38f}, {0.78f, 0.72f, 0.60f}};
         memcpy(albedo, covers[(int)(6 * hue) % 6], 3 * sizeof *albedo);
         texture_scale(albedo, tone);
         if (between(fabsf(v), 0.075f, 0.092f))
             set(albedo, 0.85f, 0.72f, 0.36f);
-        l->specular = 0.03f, l->shininess = 30;
+        l->specular = 0.03f;
+        l->shininess = 30;
         break;
     }
     case CLOTH: {
@@ -174,7 +210,8 @@ static void look_at_room(const surface *s, look *l)
     case GLOBE: {
         /* Continents in the globe's own turned frame; parallels every 30 degrees. */
         const float angle = 6.2831853f * u, height = -cosf(v / 0.17f);
-        const float ring = sqrtf(fmaxf(0, 1 - height * height)), x = ring * cosf(angle), y = ring * sinf(angle);
+        const float ring = sqrtf(fmaxf(0, 1 - height * height)), x = ring * cosf(angle),
+                    y = ring * sinf(angle);
         const float land = texture_fbm(1.7f * x + 3.1f, 1.7f * y + 1.4f, 1.7f * height + 5.2f, 4);
         if (land > -0.04f) {
             texture_mix(albedo, (const float[3]){0.36f, 0.52f, 0.20f}, (const float[3]){0.76f, 0.60f, 0.34f},
@@ -189,34 +226,46 @@ static void look_at_room(const surface *s, look *l)
     }
     case BRASS:
         set(albedo, 0.60f, 0.42f, 0.16f);
-        l->specular = 0.18f, l->shininess = 50;
+        l->specular = 0.18f;
+        l->shininess = 50;
         break;
     case CERAMIC: {
-        static const float glazes[3][3] = {{0.62f, 0.08f, 0.06f}, {0.06f, 0.22f, 0.48f}, {0.10f, 0.40f, 0.30f}};
+        static const float glazes[3][3] = {
+            {0.62f, 0.08f, 0.06f}, {0.06f, 0.22f, 0.48f}, {0.10f, 0.40f, 0.30f}};
         memcpy(albedo, glazes[s->variant % 3], 3 * sizeof *albedo);
         if (s->variant == 0 && ((int)floorf(24 * u) & 3) == 0)
             set(albedo, 0.82f, 0.70f, 0.44f);
-        l->specular = 0.05f, l->shininess = 90, l->mirror = true, l->roughness = 0.05f;
+        l->specular = 0.05f;
+        l->shininess = 90;
+        l->mirror = true;
+        l->roughness = 0.05f;
         break;
     }
     case LETTER_BLOCK: {
         /* Faces tell themselves apart by where they look; letters run round the block. */
         static const char letters[6] = {'G', 'B', 'T', 'A', 'R', '3'};
-        static const float inks[5][3] = {
-            {0.70f, 0.12f, 0.10f}, {0.10f, 0.28f, 0.58f}, {0.12f, 0.45f, 0.22f}, {0.82f, 0.50f, 0.10f}, {0.42f, 0.16f, 0.46f}};
+        static const float inks[5][3] = {{0.70f, 0.12f, 0.10f},
+                                         {0.10f, 0.28f, 0.58f},
+                                         {0.12f, 0.45f, 0.22f},
+                                         {0.82f, 0.50f, 0.10f},
+                                         {0.42f, 0.16f, 0.46f}};
         const float half = 0.075f, a = u / half, b = v / half;
-        const int side = s->normal[2] > 0.5f ? 4 : (int)floorf((atan2f(s->normal[1], s->normal[0]) + 6.6f) / 1.5708f) & 3;
+        const int side =
+            s->normal[2] > 0.5f ? 4 : (int)floorf((atan2f(s->normal[1], s->normal[0]) + 6.6f) / 1.5708f) & 3;
         const float *ink = inks[(s->variant + side) % 5];
         set(albedo, 0.86f, 0.76f, 0.56f);
         texture_scale(albedo, 1 + 0.08f * texture_noise(12 * p[0], 12 * p[1], 60 * p[2]));
-        if (fmaxf(fabsf(a), fabsf(b)) > 0.80f || texture_glyph(letters[(s->variant + side) % 6], (a + 0.5f), (b + 0.6f) / 1.2f))
+        if (fmaxf(fabsf(a), fabsf(b)) > 0.80f ||
+            texture_glyph(letters[(s->variant + side) % 6], (a + 0.5f), (b + 0.6f) / 1.2f))
             memcpy(albedo, ink, 3 * sizeof *albedo);
-        l->specular = 0.03f, l->shininess = 30;
+        l->specular = 0.03f;
+        l->shininess = 30;
         break;
     }
     case WIRE:
         set(albedo, 0.12f, 0.12f, 0.13f);
-        l->specular = 0.08f, l->shininess = 25;
+        l->specular = 0.08f;
+        l->shininess = 25;
         break;
     case FRUIT:
         if (s->variant % 2 == 0)
@@ -225,22 +274,27 @@ static void look_at_room(const surface *s, look *l)
         else
             texture_mix(albedo, (const float[3]){0.62f, 0.10f, 0.07f}, (const float[3]){0.70f, 0.62f, 0.16f},
                         texture_step(0.1f, 0.6f, texture_fbm(9 * p[0], 9 * p[1], 9 * p[2], 2)));
-        l->specular = 0.04f, l->shininess = 35;
+        l->specular = 0.04f;
+        l->shininess = 35;
         break;
     case VASE: {
-        const float band = v / 0.055f + 0.35f * sinf(6.2831853f * 8 * u) * (((int)(v / 0.11f) & 1) != 0 ? 1.0f : 0.0f);
+        const float band =
+            v / 0.055f + 0.35f * sinf(6.2831853f * 8 * u) * (((int)(v / 0.11f) & 1) != 0 ? 1.0f : 0.0f);
         set(albedo, 0.86f, 0.84f, 0.78f);
         if (((int)floorf(band) & 1) != 0)
             set(albedo, 0.12f, 0.24f, 0.46f);
-        l->specular = 0.05f, l->shininess = 70;
+        l->specular = 0.05f;
+        l->shininess = 70;
         break;
     }
     case LEAF: {
         const float tone = texture_hash(s->variant, 21, 0);
-        texture_mix(albedo, (const float[3]){0.14f, 0.34f, 0.10f}, (const float[3]){0.36f, 0.52f, 0.16f}, tone);
+        texture_mix(albedo, (const float[3]){0.14f, 0.34f, 0.10f}, (const float[3]){0.36f, 0.52f, 0.16f},
+                    tone);
         if (fabsf(u) < 0.06f)
             texture_scale(albedo, 1.5f);
-        l->specular = 0.03f, l->shininess = 20;
+        l->specular = 0.03f;
+        l->shininess = 20;
         break;
     }
     case POT:
@@ -254,7 +308,8 @@ static void look_at_room(const surface *s, look *l)
         break;
     case CURTAIN: {
         const float fold = sinf(38 * u);
-        texture_mix(albedo, (const float[3]){0.56f, 0.16f, 0.13f}, (const float[3]){0.78f, 0.30f, 0.20f}, 0.5f + 0.5f * fold);
+        texture_mix(albedo, (const float[3]){0.56f, 0.16f, 0.13f}, (const float[3]){0.78f, 0.30f, 0.20f},
+                    0.5f + 0.5f * fold);
         break;
     }
     case SOIL:
@@ -264,23 +319,28 @@ static void look_at_room(const surface *s, look *l)
         set(albedo, 0.84f, 0.82f, 0.76f);
         if (between(v, 0.125f, 0.15f) || between(v, 0.075f, 0.085f))
             set(albedo, 0.10f, 0.45f, 0.45f);
-        l->specular = 0.05f, l->shininess = 80;
+        l->specular = 0.05f;
+        l->shininess = 80;
         break;
     }
 }
 
-static void box(world *w, int material, int variant, float x, float y, float z, float half_x, float half_y, float half_z, float cell)
+static void box(world *w, int material, int variant, float x, float y, float z, float half_x, float half_y,
+                float half_z, float cell)
 {
-    world_box(w, material, variant, (const float[3]){x, y, z}, (const float[3]){half_x, half_y, half_z}, cell);
+    world_box(w, material, variant, (const float[3]){x, y, z}, (const float[3]){half_x, half_y, half_z},
+              cell);
 }
 
-static void tube(world *w, int material, float ax, float ay, float az, float bx, float by, float bz, float radius)
+static void tube(world *w, int material, float ax, float ay, float az, float bx, float by, float bz,
+                 float radius)
 {
     world_tube(w, material, 0, (const float[3]){ax, ay, az}, (const float[3]){bx, by, bz}, radius, 8);
 }
 
 /** A leaf: a strip of `width` that rises from the origin towards `angle` and bends over. */
-static void leaf(world *w, int variant, float x, float y, float z, float angle, float length, float width, float rise)
+static void leaf(world *w, int variant, float x, float y, float z, float angle, float length, float width,
+                 float rise)
 {
     enum { STEPS = 8 };
     const float c = cosf(angle), s = sinf(angle);
@@ -293,8 +353,9 @@ static void leaf(world *w, int variant, float x, float y, float z, float angle, 
         uint32_t row[3];
         for (int k = 0; k < 3; k++) {
             const float side = (float)(k - 1) * half, fold = k == 1 ? 0 : 0.25f * half;
-            row[k] = world_vertex(w, (const float[3]){x + out * c - side * s, y + out * s + side * c, z + up + fold}, normal,
-                                  (float)(k - 1) * 0.5f, t);
+            row[k] = world_vertex(
+                w, (const float[3]){x + out * c - side * s, y + out * s + side * c, z + up + fold}, normal,
+                (float)(k - 1) * 0.5f, t);
         }
         for (int k = 0; k < 2 && i > 0; k++) {
             world_triangle(w, LEAF, variant, last[k], row[k], row[k + 1]);
@@ -317,8 +378,8 @@ static void build_walls(world *w)
             for (int k = 0; k < 3; k++) {
                 const float x = -1.55f + 1.55f * (float)k, z = 1.45f + 0.1f * (float)(k % 2);
                 box(w, WOOD, 0, x, room - 0.02f, z, 0.41f, 0.02f, 0.32f, 0.15f);
-                world_sheet(w, PICTURE, k, (const float[3]){x - 0.36f, room - 0.041f, z - 0.27f}, (const float[3]){0.72f, 0, 0},
-                            (const float[3]){0, 0, 0.54f}, 0.15f);
+                world_sheet(w, PICTURE, k, (const float[3]){x - 0.36f, room - 0.041f, z - 0.27f},
+                            (const float[3]){0.72f, 0, 0}, (const float[3]){0, 0, 0.54f}, 0.15f);
             }
         if (walls[i] == PAPER_WALL)
             for (int shelf = 0; shelf < 3; shelf++) { /* books on three boards */
@@ -327,16 +388,18 @@ static void build_walls(world *w)
                 float x = -1.1f;
                 for (int book = 0; x < 1.2f; book++) {
                     const int number = 40 * shelf + book;
-                    const float half = 0.028f + 0.030f * texture_hash(number, 1, 9), high = 0.14f + 0.07f * texture_hash(number, 2, 9);
+                    const float half = 0.028f + 0.030f * texture_hash(number, 1, 9),
+                                high = 0.14f + 0.07f * texture_hash(number, 2, 9);
                     if (texture_hash(number, 3, 9) > 0.16f)
-                        box(w, BOOK, number, x + half, room - 0.13f, z + 0.02f + high, half - 0.002f, 0.11f, high, 0.12f);
+                        box(w, BOOK, number, x + half, room - 0.13f, z + 0.02f + high, half - 0.002f, 0.11f,
+                            high, 0.12f);
                     x += 2 * half;
                 }
             }
         if (walls[i] == PLASTER_WALL) {
             const float z = 1.40f;
-            world_sheet(w, WINDOW, 0, (const float[3]){-0.8f, room - 0.01f, z - 0.6f}, (const float[3]){1.6f, 0, 0},
-                        (const float[3]){0, 0, 1.2f}, 0.2f);
+            world_sheet(w, WINDOW, 0, (const float[3]){-0.8f, room - 0.01f, z - 0.6f},
+                        (const float[3]){1.6f, 0, 0}, (const float[3]){0, 0, 1.2f}, 0.2f);
             for (int k = -1; k <= 1; k++) {
                 box(w, WHITE_PAINT, 0, 0.8f * (float)k, room - 0.04f, z, 0.035f, 0.04f, 0.64f, 0.15f);
                 box(w, WHITE_PAINT, 0, 0, room - 0.04f, z + 0.6f * (float)k, 0.835f, 0.039f, 0.035f, 0.15f);
@@ -347,10 +410,11 @@ static void build_walls(world *w)
             tube(w, BRASS, -1.5f, room - 0.07f, z + 0.9f, 1.5f, room - 0.07f, z + 0.9f, 0.02f);
         }
         if (walls[i] == PANEL_WALL) {
-            box(w, WOOD, 0, -0.5f, room - 0.22f, 0.80f, 0.75f, 0.22f, 0.03f, 0.12f); /* a side table with pots */
+            box(w, WOOD, 0, -0.5f, room - 0.22f, 0.80f, 0.75f, 0.22f, 0.03f, 0.12f); /* a side table with pots
+                                                                                      */
             for (int leg = 0; leg < 4; leg++)
-                box(w, WOOD, 0, -0.5f + ((leg & 1) != 0 ? 0.68f : -0.68f), room - 0.22f + ((leg & 2) != 0 ? 0.16f : -0.16f), 0.385f, 0.03f,
-                    0.03f, 0.385f, 0.12f);
+                box(w, WOOD, 0, -0.5f + ((leg & 1) != 0 ? 0.68f : -0.68f),
+                    room - 0.22f + ((leg & 2) != 0 ? 0.16f : -0.16f), 0.385f, 0.03f, 0.03f, 0.385f, 0.12f);
             static const float jar[][2] = {{0.0f, 0.83f},  {0.09f, 0.83f},  {0.13f, 0.93f}, {0.12f, 1.03f},
                                            {0.06f, 1.12f}, {0.075f, 1.16f}, {0.05f, 1.16f}};
             for (int k = 0; k < 3; k++) {
@@ -361,8 +425,8 @@ static void build_walls(world *w)
             }
             world_place(w, 0, 0, 0, -1.57079633f * (float)i);
             box(w, WOOD, 0, 1.25f, room - 0.02f, 1.45f, 0.41f, 0.02f, 0.32f, 0.15f);
-            world_sheet(w, PICTURE, 4, (const float[3]){0.89f, room - 0.041f, 1.18f}, (const float[3]){0.72f, 0, 0},
-                        (const float[3]){0, 0, 0.54f}, 0.15f);
+            world_sheet(w, PICTURE, 4, (const float[3]){0.89f, room - 0.041f, 1.18f},
+                        (const float[3]){0.72f, 0, 0}, (const float[3]){0, 0, 0.54f}, 0.15f);
         }
     }
     world_place(w, 0, 0, 0, 0);
@@ -370,15 +434,17 @@ static void build_walls(world *w)
 
 static void build_plant(world *w, float x, float y)
 {
-    static const float pot[][2] = {{0.0f, 0.0f},   {0.14f, 0.0f},  {0.14f, 0.0f},  {0.20f, 0.34f}, {0.20f, 0.34f},
-                                   {0.22f, 0.34f}, {0.22f, 0.40f}, {0.22f, 0.40f}, {0.18f, 0.40f}, {0.17f, 0.34f}};
+    static const float pot[][2] = {{0.0f, 0.0f},   {0.14f, 0.0f},  {0.14f, 0.0f},  {0.20f, 0.34f},
+                                   {0.20f, 0.34f}, {0.22f, 0.34f}, {0.22f, 0.40f}, {0.22f, 0.40f},
+                                   {0.18f, 0.40f}, {0.17f, 0.34f}};
     static const float soil[][2] = {{0.175f, 0.36f}, {0.0f, 0.37f}};
     world_place(w, x, y, 0, 0);
     world_revolve(w, POT, 0, pot, sizeof pot / sizeof pot[0], 28);
     world_revolve(w, SOIL, 0, soil, 2, 28);
     for (int i = 0; i < 22; i++) {
         const float r = texture_hash(i, 31, 0), q = texture_hash(i, 32, 0);
-        leaf(w, i, 0, 0, 0.37f, 2.399963f * (float)i, 0.25f + 0.30f * r, 0.055f + 0.02f * q, 0.35f + 0.75f * q);
+        leaf(w, i, 0, 0, 0.37f, 2.399963f * (float)i, 0.25f + 0.30f * r, 0.055f + 0.02f * q,
+             0.35f + 0.75f * q);
     }
     world_place(w, 0, 0, 0, 0);
 }
@@ -392,16 +458,18 @@ static void build_table(world *w)
         box(w, WOOD, 2, x, y, 0.36f, 0.035f, 0.035f, 0.36f, 0.08f);
     }
     /* The cloth lies across the table and hangs over both long edges. */
-    world_sheet(w, CLOTH, 0, (const float[3]){-0.66f, -0.30f, top + 0.003f}, (const float[3]){1.32f, 0, 0}, (const float[3]){0, 0.60f, 0},
-                0.03f);
+    world_sheet(w, CLOTH, 0, (const float[3]){-0.66f, -0.30f, top + 0.003f}, (const float[3]){1.32f, 0, 0},
+                (const float[3]){0, 0.60f, 0}, 0.03f);
 
     world_place(w, -0.40f, 0.16f, top, 0.4f);
-    static const float foot[][2] = {{0.11f, 0.003f}, {0.11f, 0.02f}, {0.11f, 0.02f}, {0.03f, 0.045f}, {0.018f, 0.08f}, {0.018f, 0.09f}};
+    static const float foot[][2] = {{0.11f, 0.003f}, {0.11f, 0.02f},  {0.11f, 0.02f},
+                                    {0.03f, 0.045f}, {0.018f, 0.08f}, {0.018f, 0.09f}};
     world_revolve(w, BRASS, 0, foot, sizeof foot / sizeof foot[0], 28);
     world_ball(w, GLOBE, 0, (const float[3]){0, 0, 0.26f}, 0.17f, 48);
     for (int i = 0; i < 14; i++) { /* the half ring that holds the globe */
         const float a = -1.57f + 3.14159f * (float)i / 14, b = -1.57f + 3.14159f * (float)(i + 1) / 14;
-        tube(w, BRASS, 0.19f * cosf(a), 0, 0.26f + 0.19f * sinf(a), 0.19f * cosf(b), 0, 0.26f + 0.19f * sinf(b), 0.009f);
+        tube(w, BRASS, 0.19f * cosf(a), 0, 0.26f + 0.19f * sinf(a), 0.19f * cosf(b), 0,
+             0.26f + 0.19f * sinf(b), 0.009f);
     }
 
     world_place(w, 0.40f, 0.17f, top, 0.5f);
@@ -423,9 +491,10 @@ static void build_table(world *w)
         const float angle = 6.2831853f * (float)i / RIBS, next = 6.2831853f * (float)(i + 1) / RIBS;
         for (int k = 0; k < ARCS; k++) {
             const float a = (float)k / ARCS, b = (float)(k + 1) / ARCS;
-            const float ra = 0.08f + 0.085f * sinf(1.5708f * a), rb = 0.08f + 0.085f * sinf(1.5708f * b), za = 0.008f + 0.12f * a,
-                        zb = 0.008f + 0.12f * b;
-            tube(w, WIRE, ra * cosf(angle), ra * sinf(angle), za, rb * cosf(angle), rb * sinf(angle), zb, 0.0028f);
+            const float ra = 0.08f + 0.085f * sinf(1.5708f * a), rb = 0.08f + 0.085f * sinf(1.5708f * b),
+                        za = 0.008f + 0.12f * a, zb = 0.008f + 0.12f * b;
+            tube(w, WIRE, ra * cosf(angle), ra * sinf(angle), za, rb * cosf(angle), rb * sinf(angle), zb,
+                 0.0028f);
             if (k % 3 == 2)
                 tube(w, WIRE, rb * cosf(angle), rb * sinf(angle), zb, rb * cosf(next), rb * sinf(next), zb,
                      k == ARCS - 1 ? 0.006f : 0.0032f);
@@ -433,7 +502,8 @@ static void build_table(world *w)
     }
     for (int i = 0; i < 16; i++) {
         const float a = 3.14159f * (float)i / 16, b = 3.14159f * (float)(i + 1) / 16;
-        tube(w, WIRE, 0.165f * cosf(a), 0, 0.128f + 0.17f * sinf(a), 0.165f * cosf(b), 0, 0.128f + 0.17f * sinf(b), 0.005f);
+        tube(w, WIRE, 0.165f * cosf(a), 0, 0.128f + 0.17f * sinf(a), 0.165f * cosf(b), 0,
+             0.128f + 0.17f * sinf(b), 0.005f);
     }
     static const float fruit[5][4] = {{-0.055f, 0.04f, 0.062f, 0.055f},
                                       {0.06f, 0.035f, 0.06f, 0.052f},
@@ -444,8 +514,9 @@ static void build_table(world *w)
         world_ball(w, FRUIT, i, fruit[i], fruit[i][3], 24);
 
     world_place(w, 0.04f, 0.28f, top, 0);
-    static const float vase[][2] = {{0.0f, 0.003f}, {0.06f, 0.003f}, {0.06f, 0.003f}, {0.085f, 0.05f}, {0.10f, 0.11f},   {0.095f, 0.16f},
-                                    {0.07f, 0.21f}, {0.045f, 0.25f}, {0.04f, 0.28f},  {0.055f, 0.31f}, {0.048f, 0.312f}, {0.034f, 0.28f}};
+    static const float vase[][2] = {{0.0f, 0.003f}, {0.06f, 0.003f}, {0.06f, 0.003f},  {0.085f, 0.05f},
+                                    {0.10f, 0.11f}, {0.095f, 0.16f}, {0.07f, 0.21f},   {0.045f, 0.25f},
+                                    {0.04f, 0.28f}, {0.055f, 0.31f}, {0.048f, 0.312f}, {0.034f, 0.28f}};
     world_revolve(w, VASE, 0, vase, sizeof vase / sizeof vase[0], 40);
     for (int i = 0; i < 9; i++)
         leaf(w, 60 + i, 0, 0, 0.27f, 2.399963f * (float)i, 0.16f + 0.08f * texture_hash(i, 33, 0), 0.026f,
@@ -455,8 +526,9 @@ static void build_table(world *w)
     box(w, BOOK, 200, 0, 0, 0.023f, 0.13f, 0.095f, 0.019f, 0.05f);
     world_place(w, 0.02f, -0.10f, top, -0.1f);
     box(w, BOOK, 203, 0, 0, 0.057f, 0.115f, 0.085f, 0.015f, 0.05f);
-    static const float cup[][2] = {{0.0f, 0.074f},  {0.03f, 0.074f}, {0.03f, 0.074f}, {0.042f, 0.10f}, {0.046f, 0.15f},
-                                   {0.046f, 0.15f}, {0.041f, 0.15f}, {0.037f, 0.10f}, {0.0f, 0.085f}};
+    static const float cup[][2] = {{0.0f, 0.074f},  {0.03f, 0.074f}, {0.03f, 0.074f},
+                                   {0.042f, 0.10f}, {0.046f, 0.15f}, {0.046f, 0.15f},
+                                   {0.041f, 0.15f}, {0.037f, 0.10f}, {0.0f, 0.085f}};
     world_revolve(w, CUP, 0, cup, sizeof cup / sizeof cup[0], 32);
     world_place(w, 0, 0, 0, 0);
 }
@@ -467,7 +539,8 @@ static void build_chair(world *w, float x, float y, float turn_rad)
     box(w, WOOD, 3, 0, 0, 0.44f, 0.21f, 0.21f, 0.02f, 0.06f);
     for (int leg = 0; leg < 4; leg++) {
         const float side = (leg & 1) != 0 ? 0.19f : -0.19f, depth = (leg & 2) != 0 ? 0.19f : -0.19f;
-        box(w, WOOD, 3, side, depth, (leg & 2) != 0 ? 0.43f : 0.21f, 0.018f, 0.018f, (leg & 2) != 0 ? 0.43f : 0.21f, 0.08f);
+        box(w, WOOD, 3, side, depth, (leg & 2) != 0 ? 0.43f : 0.21f, 0.018f, 0.018f,
+            (leg & 2) != 0 ? 0.43f : 0.21f, 0.08f);
     }
     for (int slat = 0; slat < 3; slat++)
         box(w, WOOD, 3, 0, 0.19f, 0.58f + 0.11f * (float)slat, 0.18f, 0.010f, 0.028f, 0.06f);
@@ -484,7 +557,8 @@ static void build(world *w)
                       .exposure = 1.15f,
                       .sky_low = {0.34f, 0.38f, 0.44f},
                       .sky_high = {0.40f, 0.45f, 0.55f}};
-    world_sheet(w, FLOOR, 0, (const float[3]){-room, -room, 0}, (const float[3]){2 * room, 0, 0}, (const float[3]){0, 2 * room, 0}, 0.07f);
+    world_sheet(w, FLOOR, 0, (const float[3]){-room, -room, 0}, (const float[3]){2 * room, 0, 0},
+                (const float[3]){0, 2 * room, 0}, 0.07f);
     static const float rug[][2] = {{1.3f, 0.0f},   {1.3f, 0.012f}, {1.3f, 0.012f}, {1.0f, 0.012f},
                                    {0.7f, 0.012f}, {0.4f, 0.012f}, {0.0f, 0.012f}};
     world_revolve(w, RUG, 0, rug, sizeof rug / sizeof rug[0], 64);
@@ -499,11 +573,12 @@ static void build(world *w)
 const recipe recipe_tabletop = {
     .name = "tabletop",
     .summary = "a laid table in a furnished room: matt, glossy and thin things under a warm lamp",
-    .about = "A wooden table in a furnished room. On a striped cloth: a matt globe on a brass foot, three letter blocks, a glazed "
-             "ring and a glazed ball that mirror the room a little, a wire basket with fruit, a banded vase with leaves, books and a "
-             "cup. The four walls (brick with pictures, wallpaper with a bookshelf, plaster with a window, painted boards) and the "
-             "tiled floor with its rug fill the background of every photo. One warm lamp with a soft shadow, pale light from above, "
-             "and one bounce of indirect light.",
+    .about = "A wooden table in a furnished room. On a striped cloth: a matt globe on a brass foot, three "
+             "letter blocks, a glazed ring and a glazed ball that mirror the room a little, a wire basket "
+             "with fruit, a banded vase with leaves, books and a cup. The four walls (brick with pictures, "
+             "wallpaper with a bookshelf, plaster with a window, painted boards) and the tiled floor with "
+             "its rug fill the background of every photo. One warm lamp with a soft shadow, pale light from "
+             "above, and one bounce of indirect light.",
     .build = build,
     .rings = {{1.62f, 1.42f}, {1.40f, 1.85f}},
     .target = {0, 0, 0.82f},

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* scenes/texture.c -- procedural patterns. */
 #include "scenes/texture.h"
 
@@ -7,21 +8,24 @@
 float texture_hash(int x, int y, int z)
 {
     uint32_t h = (uint32_t)x * 0x8DA6B343u ^ (uint32_t)y * 0xD8163841u ^ (uint32_t)z * 0xCB1AB31Fu;
-    h ^= h >> 16, h *= 0x7FEB352Du, h ^= h >> 15, h *= 0x846CA68Bu, h ^= h >> 16;
+    h ^= h >> 16;
+    h *= 0x7FEB352Du;
+    h ^= h >> 15;
+    h *= 0x846CA68Bu;
+    h ^= h >> 16;
     return (float)(h >> 8) * 0x1p-24f;
 }
 
-static float lerp(float a, float b, float t)
-{
-    return a + t * (b - a);
-}
+static float lerp(float a, float b, float t) { return a + t * (b - a); }
 
 float texture_noise(float x, float y, float z)
 {
     const float fx = floorf(x), fy = floorf(y), fz = floorf(z);
     const int i = (int)fx, j = (int)fy, k = (int)fz;
     float u = x - fx, v = y - fy, w = z - fz;
-    u = u * u * (3 - 2 * u), v = v * v * (3 - 2 * v), w = w * w * (3 - 2 * w);
+    u = u * u * (3 - 2 * u);
+    v = v * v * (3 - 2 * v);
+    w = w * w * (3 - 2 * w);
     const float near = lerp(lerp(texture_hash(i, j, k), texture_hash(i + 1, j, k), u),
                             lerp(texture_hash(i, j + 1, k), texture_hash(i + 1, j + 1, k), u), v);
     const float far = lerp(lerp(texture_hash(i, j, k + 1), texture_hash(i + 1, j, k + 1), u),
@@ -36,7 +40,9 @@ float texture_fbm(float x, float y, float z, int octaves)
         sum += weight * texture_noise(x, y, z);
         total += weight;
         /* The shift keeps the lattices of the octaves from coinciding at the origin. */
-        x = 2 * x + 17.3f, y = 2 * y - 5.1f, z = 2 * z + 3.7f;
+        x = 2 * x + 17.3f;
+        y = 2 * y - 5.1f;
+        z = 2 * z + 3.7f;
         weight *= 0.5f;
     }
     return total > 0 ? sum / total : 0;
@@ -66,7 +72,8 @@ float texture_brick(float u, float v, float width, float height, int id[2])
     const float row = floorf(v / height);
     const float shifted = u / width + (((int)row & 1) != 0 ? 0.5f : 0.0f);
     const float column = floorf(shifted);
-    id[0] = (int)row, id[1] = (int)column;
+    id[0] = (int)row;
+    id[1] = (int)column;
     const float in_u = (shifted - column) * width, in_v = v - row * height;
     return fminf(fminf(in_u, width - in_u), fminf(in_v, height - in_v));
 }

@@ -1,4 +1,6 @@
-/* scenes/texture.h -- procedural patterns: noise, bricks, tiles, letters. Pure functions of their arguments. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* scenes/texture.h -- procedural patterns: noise, bricks, tiles, letters. Pure functions of their
+   arguments. */
 #ifndef GBT_SCENES_TEXTURE_H
 #define GBT_SCENES_TEXTURE_H
 
@@ -34,7 +36,8 @@ float texture_brick(float u, float v, float width, float height, int id[2]);
 /** Wood: growth rings around the x axis, disturbed by noise; [0, 1]. */
 float texture_wood(float x, float y, float z);
 
-/** Is (u, v) in [0, 1]^2, v up, on the stroke of a 5 x 7 capital letter or digit? Unknown characters are blank. */
+/** Is (u, v) in [0, 1]^2, v up, on the stroke of a 5 x 7 capital letter or digit? Unknown characters are
+    blank. */
 bool texture_glyph(char character, float u, float v);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* scenes/world.c -- rays into a world, its light and its colours. Shapes are in shapes.c. */
 #include "scenes/world.h"
 
@@ -10,16 +11,16 @@
 
 static const float pi = 3.14159265359f;
 
-static float dot(const float a[3], const float b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+static float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 static void normalize(float a[3])
 {
     const float length = sqrtf(dot(a, a));
-    if (length > 0)
-        a[0] /= length, a[1] /= length, a[2] /= length;
+    if (length > 0) {
+        a[0] /= length;
+        a[1] /= length;
+        a[2] /= length;
+    }
 }
 
 /** Two unit vectors that make a right-handed frame with the unit vector n. */
@@ -30,7 +31,9 @@ static void frame(const float n[3], float a[3], float b[3])
     for (int k = 0; k < 3; k++)
         a[k] = least[k] - along * n[k];
     normalize(a);
-    b[0] = n[1] * a[2] - n[2] * a[1], b[1] = n[2] * a[0] - n[0] * a[2], b[2] = n[0] * a[1] - n[1] * a[0];
+    b[0] = n[1] * a[2] - n[2] * a[1];
+    b[1] = n[2] * a[0] - n[0] * a[2];
+    b[2] = n[0] * a[1] - n[1] * a[0];
 }
 
 bool world_trace(const world *w, const float origin[3], const float dir[3], surface *out)
@@ -64,7 +67,8 @@ bool world_trace(const world *w, const float origin[3], const float dir[3], surf
     for (int k = 0; k < 3; k++)
         out->position[k] = origin[k] + hit.t * dir[k];
     out->distance = hit.t;
-    out->material = w->material[hit.triangle], out->variant = w->variant[hit.triangle];
+    out->material = w->material[hit.triangle];
+    out->variant = w->variant[hit.triangle];
     return true;
 }
 
@@ -80,7 +84,8 @@ static void sky_radiance(const world *w, const float dir[3], float out[3])
  *
  * @param to_lamp [out] unit direction to the point of the lamp that was tried
  */
-static bool lamp_light(const world *w, const surface *s, const float jitter[2], float to_lamp[3], float irradiance[3])
+static bool lamp_light(const world *w, const surface *s, const float jitter[2], float to_lamp[3],
+                       float irradiance[3])
 {
     const light *lamp = &w->lamp;
     const float angle = 2 * pi * jitter[0], r = lamp->radius * sqrtf(jitter[1]);
@@ -117,7 +122,8 @@ static bool lamp_light(const world *w, const surface *s, const float jitter[2], 
 }
 
 /** Radiance of a surface towards -dir; mirror rays are followed only where `depth` is 0. */
-static void radiance(const world *w, const surface *s, const float dir[3], const float jitter[2], int depth, float out[3])
+static void radiance(const world *w, const surface *s, const float dir[3], const float jitter[2], int depth,
+                     float out[3])
 {
     look l = {.shininess = 1};
     w->look(s, &l);
@@ -181,7 +187,8 @@ void world_sky(const world *w, const float dir[3], float rgb[3])
     display(w, rgb);
 }
 
-/* One bounce is gathered; light that bounced more often is taken as this part of what the sky would give without walls. */
+/* One bounce is gathered; light that bounced more often is taken as this part of what the sky would give
+   without walls. */
 static const float later_bounces = 0.14f;
 
 typedef struct bake {
@@ -213,8 +220,10 @@ static void bake_vertices(size_t block, size_t begin, size_t end, void *context)
         for (int k = 0; k < 3; k++)
             start[k] = w->position[3 * i + (size_t)k] + 4 * w->epsilon * n[k];
         for (int ray = 0; ray < job->rays; ray++) {
-            /* Cosine-distributed, so every ray weighs the same. The same set everywhere: no noise between neighbours. */
-            const float u = ((float)ray + 0.5f) / (float)job->rays, angle = 2 * pi * reversed_bits((uint32_t)ray);
+            /* Cosine-distributed, so every ray weighs the same. The same set everywhere: no noise between
+               neighbours. */
+            const float u = ((float)ray + 0.5f) / (float)job->rays,
+                        angle = 2 * pi * reversed_bits((uint32_t)ray);
             const float r = sqrtf(u), up = sqrtf(1 - u);
             float dir[3], seen[3] = {0}, to_lamp[3], direct[3] = {0};
             for (int k = 0; k < 3; k++)
@@ -231,7 +240,9 @@ static void bake_vertices(size_t block, size_t begin, size_t end, void *context)
                     lamp_light(w, &s, center, to_lamp, direct);
                 inside += s.is_back && l.emission[2] <= 0;
                 for (int k = 0; k < 3; k++)
-                    seen[k] = l.emission[k] + (s.is_back ? 0 : l.albedo[k] * (direct[k] + later_bounces * w->lamp.sky_high[k]));
+                    seen[k] =
+                        l.emission[k] +
+                        (s.is_back ? 0 : l.albedo[k] * (direct[k] + later_bounces * w->lamp.sky_high[k]));
             }
             for (int k = 0; k < 3; k++)
                 sum[k] += seen[k];
@@ -242,7 +253,8 @@ static void bake_vertices(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/** Give buried vertices the mean of their neighbours, from the rim inwards: triangles that are only partly covered then stay even. */
+/** Give buried vertices the mean of their neighbours, from the rim inwards: triangles that are only partly
+    covered then stay even. */
 static void spread_light(const bake *job, float *sum, uint32_t *count)
 {
     const world *w = job->w;
@@ -275,7 +287,8 @@ gbt_status world_finish(world *w, int rays)
 {
     if (w->status != GBT_OK)
         return w->status;
-    w->status = mesh_tree_build(w->position, w->vertex_count, w->triangle, w->triangle_count, &w->tree, w->err);
+    w->status =
+        mesh_tree_build(w->position, w->vertex_count, w->triangle, w->triangle_count, &w->tree, w->err);
     if (w->status != GBT_OK)
         return w->status;
     bake job = {.w = w, .rays = rays};

@@ -1,8 +1,10 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* scenes/world.h -- triangles with materials, the shapes they are made of, and the light that falls on them.
 
-   A scene file builds a world with the shape functions, names materials by its own numbers and answers `look` for a surface point.
-   World axes: z is up. The first failure sticks in world.status and makes every later call do nothing, so that a scene reads as a list
-   of shapes. */
+   A scene file builds a world with the shape functions, names materials by its own numbers and answers `look`
+   for a surface point.
+   World axes: z is up. The first failure sticks in world.status and makes every later call do nothing, so
+   that a scene reads as a list of shapes. */
 #ifndef GBT_SCENES_WORLD_H
 #define GBT_SCENES_WORLD_H
 
@@ -70,16 +72,20 @@ typedef struct world {
 /** The next shapes stand at (x, y, z), turned about z. */
 void world_place(world *w, float x, float y, float z, float turn_rad);
 
-/** Parallelogram corner + a*[0,1] + b*[0,1], facing a x b, in cells x_cells * y_cells; uv are lengths from its centre. */
-void world_sheet(world *w, int material, int variant, const float corner[3], const float a[3], const float b[3], float cell);
+/** Parallelogram corner + a*[0,1] + b*[0,1], facing a x b, in cells x_cells * y_cells; uv are lengths from
+    its centre. */
+void world_sheet(world *w, int material, int variant, const float corner[3], const float a[3],
+                 const float b[3], float cell);
 
-/** Box with sides parallel to the axes; each face is a sheet. `cell` is the largest edge of a triangle's square. */
+/** Box with sides parallel to the axes; each face is a sheet. `cell` is the largest edge of a triangle's
+    square. */
 void world_box(world *w, int material, int variant, const float center[3], const float half[3], float cell);
 
 /**
  * Surface of revolution about z.
  *
- * @param profile [count][2]: radius and height; outside is on the right when walking along it; a point given twice is a sharp edge
+ * @param profile [count][2]: radius and height; outside is on the right when walking along it; a point given
+ *                twice is a sharp edge
  *
  * uv: angle in turns, [0, 1], and length along the profile.
  */
@@ -88,25 +94,30 @@ void world_revolve(world *w, int material, int variant, const float profile[][2]
 /** Ball; uv: angle in turns and length along a meridian from the lowest point. */
 void world_ball(world *w, int material, int variant, const float center[3], float radius, int segments);
 
-/** Ball pushed in and out by noise: `amount` is a fraction of the radius, `detail` the number of bumps over a radius; `flat` scales z. */
-void world_blob(world *w, int material, int variant, const float center[3], float radius, float flat, float amount, float detail,
-                int segments);
+/** Ball pushed in and out by noise: `amount` is a fraction of the radius, `detail` the number of bumps over a
+    radius; `flat` scales z. */
+void world_blob(world *w, int material, int variant, const float center[3], float radius, float flat,
+                float amount, float detail, int segments);
 
 /** Torus about z. */
-void world_torus(world *w, int material, int variant, const float center[3], float ring_radius, float tube_radius, int segments, int sides);
+void world_torus(world *w, int material, int variant, const float center[3], float ring_radius,
+                 float tube_radius, int segments, int sides);
 
 /** Open tube from a to b; uv: angle in turns and length. */
-void world_tube(world *w, int material, int variant, const float a[3], const float b[3], float radius, int sides);
+void world_tube(world *w, int material, int variant, const float a[3], const float b[3], float radius,
+                int sides);
 
 /** Height field over [x0, x1] x [y0, y1]; uv are x and y. */
 typedef float height_fn(float x, float y);
-void world_field(world *w, int material, int variant, const float low[2], const float high[2], int cells, height_fn *height);
+void world_field(world *w, int material, int variant, const float low[2], const float high[2], int cells,
+                 height_fn *height);
 
 /** Single vertices and triangles, for the rest. */
 uint32_t world_vertex(world *w, const float position[3], const float normal[3], float u, float v);
 void world_triangle(world *w, int material, int variant, uint32_t a, uint32_t b, uint32_t c);
 
-/** Build the tree, then gather the indirect light of every vertex with `rays` rays (one bounce, plus a constant for the rest). */
+/** Build the tree, then gather the indirect light of every vertex with `rays` rays (one bounce, plus a
+    constant for the rest). */
 gbt_status world_finish(world *w, int rays);
 
 /** First surface along a ray. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/test_support.h -- cmocka in the order it wants, and the two things every test needs. */
 #ifndef GBT_TEST_SUPPORT_H
 #define GBT_TEST_SUPPORT_H
@@ -16,13 +17,13 @@
 #include "gbtrace/status.h"
 
 /** Fails with the library's own message. */
-#define assert_ok(expr)                                                                         \
-    do {                                                                                        \
-        gbt_error assert_ok_err_ = {0};                                                         \
-        (void)assert_ok_err_;                                                                   \
-        const gbt_status assert_ok_status_ = (expr);                                            \
-        if (assert_ok_status_ != GBT_OK)                                                        \
-            fail_msg("%s: status %d", #expr, (int)assert_ok_status_);                           \
+#define assert_ok(expr)                                                                                      \
+    do {                                                                                                     \
+        gbt_error assert_ok_err_ = {0};                                                                      \
+        (void)assert_ok_err_;                                                                                \
+        const gbt_status assert_ok_status_ = (expr);                                                         \
+        if (assert_ok_status_ != GBT_OK)                                                                     \
+            fail_msg("%s: status %d", #expr, (int)assert_ok_status_);                                        \
     } while (0)
 
 /** Path of a file of the shared real data, or NULL when it is not there: then print a message and skip(). */

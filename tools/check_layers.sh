@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tools/check_layers.sh -- holds every #include of the library to tools/layers.txt; prints each offence, exits 1 if there is one.
 #
 # Usage: check_layers.sh [TREE]. Needs sh, find and awk only. The rooms are src/ROOM/ and lab/ROOM/, scenes/ at the top, and lab/lab.h.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // How many Gaussians an exported file has, and of which degree their colours are, by readers that are not ours: splat-transform, glTF-Transform.
 import {execFileSync} from "node:child_process";
 import fs from "node:fs";

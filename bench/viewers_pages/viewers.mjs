@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // Read and draw exported files with other programs; see bench/viewers.
 import {execFileSync} from "node:child_process";
 import fs from "node:fs";

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Find where a photo was taken, by the gradient of its picture: pose.py MODEL"""
 import sys
 import gbtrace, numpy as np

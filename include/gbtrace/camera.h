@@ -1,7 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gbtrace/camera.h -- a posed camera: lens model, image size, pose.
 
-   Camera axes are COLMAP's: x right, y down, z forward. The image spans [0, width] x [0, height] and the centre of the top-left
-   pixel is (0.5, 0.5). Lens formulas: docs/cameras.md. */
+   Camera axes are COLMAP's: x right, y down, z forward. The image spans [0, width] x [0, height] and the
+   centre of the top-left pixel is (0.5, 0.5). Lens formulas: docs/cameras.md. */
 #ifndef GBTRACE_CAMERA_H
 #define GBTRACE_CAMERA_H
 
@@ -13,26 +14,27 @@ GBT_API_BEGIN
 
 /** COLMAP's numbers and parameter orders; behind them what COLMAP does not have. */
 typedef enum gbt_camera_model {
-    GBT_CAMERA_SIMPLE_PINHOLE = 0,             /* f cx cy */
-    GBT_CAMERA_PINHOLE = 1,                    /* fx fy cx cy */
-    GBT_CAMERA_SIMPLE_RADIAL = 2,              /* f cx cy k */
-    GBT_CAMERA_RADIAL = 3,                     /* f cx cy k1 k2 */
-    GBT_CAMERA_OPENCV = 4,                     /* fx fy cx cy k1 k2 p1 p2 */
-    GBT_CAMERA_OPENCV_FISHEYE = 5,             /* fx fy cx cy k1 k2 k3 k4 */
-    GBT_CAMERA_FULL_OPENCV = 6,                /* fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6 */
-    GBT_CAMERA_FOV = 7,                        /* fx fy cx cy omega */
-    GBT_CAMERA_SIMPLE_RADIAL_FISHEYE = 8,      /* f cx cy k */
-    GBT_CAMERA_RADIAL_FISHEYE = 9,             /* f cx cy k1 k2 */
-    GBT_CAMERA_THIN_PRISM_FISHEYE = 10,        /* fx fy cx cy k1 k2 p1 p2 k3 k4 sx1 sy1 */
+    GBT_CAMERA_SIMPLE_PINHOLE = 0,              /* f cx cy */
+    GBT_CAMERA_PINHOLE = 1,                     /* fx fy cx cy */
+    GBT_CAMERA_SIMPLE_RADIAL = 2,               /* f cx cy k */
+    GBT_CAMERA_RADIAL = 3,                      /* f cx cy k1 k2 */
+    GBT_CAMERA_OPENCV = 4,                      /* fx fy cx cy k1 k2 p1 p2 */
+    GBT_CAMERA_OPENCV_FISHEYE = 5,              /* fx fy cx cy k1 k2 k3 k4 */
+    GBT_CAMERA_FULL_OPENCV = 6,                 /* fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6 */
+    GBT_CAMERA_FOV = 7,                         /* fx fy cx cy omega */
+    GBT_CAMERA_SIMPLE_RADIAL_FISHEYE = 8,       /* f cx cy k */
+    GBT_CAMERA_RADIAL_FISHEYE = 9,              /* f cx cy k1 k2 */
+    GBT_CAMERA_THIN_PRISM_FISHEYE = 10,         /* fx fy cx cy k1 k2 p1 p2 k3 k4 sx1 sy1 */
     GBT_CAMERA_RAD_TAN_THIN_PRISM_FISHEYE = 11, /* fx fy cx cy k0..k5 p0 p1 s0..s3 */
-    GBT_CAMERA_SIMPLE_DIVISION = 12,           /* f cx cy k */
-    GBT_CAMERA_DIVISION = 13,                  /* fx fy cx cy k */
-    GBT_CAMERA_SIMPLE_FISHEYE = 14,            /* f cx cy */
-    GBT_CAMERA_FISHEYE = 15,                   /* fx fy cx cy */
-    GBT_CAMERA_EUCM = 16,                      /* fx fy cx cy alpha beta */
-    GBT_CAMERA_EQUIRECTANGULAR = 17,           /* w h */
-    GBT_CAMERA_MODEL_COUNT,                    /* of COLMAP's models: what a data set can hold */
-    GBT_CAMERA_ORTHOGRAPHIC = 100              /* sx sy cx cy, pixels per unit: parallel rays. COLMAP has no number for it */
+    GBT_CAMERA_SIMPLE_DIVISION = 12,            /* f cx cy k */
+    GBT_CAMERA_DIVISION = 13,                   /* fx fy cx cy k */
+    GBT_CAMERA_SIMPLE_FISHEYE = 14,             /* f cx cy */
+    GBT_CAMERA_FISHEYE = 15,                    /* fx fy cx cy */
+    GBT_CAMERA_EUCM = 16,                       /* fx fy cx cy alpha beta */
+    GBT_CAMERA_EQUIRECTANGULAR = 17,            /* w h */
+    GBT_CAMERA_MODEL_COUNT,                     /* of COLMAP's models: what a data set can hold */
+    GBT_CAMERA_ORTHOGRAPHIC = 100 /* sx sy cx cy, pixels per unit: parallel rays. COLMAP has no number for it
+                                   */
 } gbt_camera_model;
 
 enum { GBT_CAMERA_MAX_PARAMS = 16 };
@@ -45,7 +47,8 @@ typedef struct gbt_camera {
     double center[3];                     /* camera centre, world (scene-local) units */
 } gbt_camera;
 
-/** Number of parameters of a model, and its name (COLMAP's where it has one); 0 and NULL for an unknown model. */
+/** Number of parameters of a model, and its name (COLMAP's where it has one); 0 and NULL for an unknown
+    model. */
 int gbt_camera_param_count(gbt_camera_model model);
 const char *gbt_camera_model_name(gbt_camera_model model);
 
@@ -54,7 +57,8 @@ const char *gbt_camera_model_name(gbt_camera_model model);
  *
  * @param px, py   [in]  image point, pixels; a pixel (i, j) is sampled at (i + 0.5, j + 0.5)
  * @param dir_cam  [out] unit vector; untouched on failure
- * @return false where the lens model has no ray (outside its field of view, or the inversion does not converge)
+ * @return false where the lens model has no ray (outside its field of view, or the inversion does not
+ *         converge)
  *
  * Threads: any. Cost: closed form for models without distortion, else Newton in double with an iteration cap.
  */
@@ -69,22 +73,27 @@ bool gbt_camera_unproject(const gbt_camera *camera, double px, double py, double
  */
 bool gbt_camera_ray(const gbt_camera *camera, double px, double py, double origin[3], double dir[3]);
 
-/** Image point of a point in camera axes; false where the model does not see it. The formulas that gbt_camera_unproject() inverts. */
+/** Image point of a point in camera axes; false where the model does not see it. The formulas that
+    gbt_camera_unproject() inverts. */
 bool gbt_camera_project(const gbt_camera *camera, const double point_cam[3], double pixel[2]);
 
-/** The same camera for an image of another size: lengths in pixels are scaled per axis (single-f models need equal ratios within 1 px). */
+/** The same camera for an image of another size: lengths in pixels are scaled per axis (single-f models need
+    equal ratios within 1 px). */
 gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height);
 
 /**
- * The camera whose pixels are every `step`-th of this one's, in both directions, from pixel (x, y) on: ray (i, j) of `out` is ray
- * (x + step i, y + step j) of `camera`. Its size is floor(size / step), whatever x and y are in [0, step).
+ * The camera whose pixels are every `step`-th of this one's, in both directions, from pixel (x, y) on: ray
+ * (i, j) of `out` is ray (x + step i, y + step j) of `camera`. Its size is floor(size / step), whatever x and
+ * y are in [0, step).
  *
- * @return false for a model without a principal point (equirectangular), and where no pixel would be left; `out` is untouched then
+ * @return false for a model without a principal point (equirectangular), and where no pixel would be left;
+ *         `out` is untouched then
  */
 bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_camera *out);
 
 /**
- * The camera whose pixel (i, j) has its middle at the point (i + 0.5 + dx, j + 0.5 + dy) of this one's picture.
+ * The camera whose pixel (i, j) has its middle at the point (i + 0.5 + dx, j + 0.5 + dy) of this one's
+ * picture.
  *
  * @return false for a model without a principal point (equirectangular); `out` is untouched then
  */
@@ -93,22 +102,25 @@ bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_came
 /**
  * Set the pose of `camera`: at `origin`, `target` in the middle of the image, `up` towards its top.
  *
- * @return false, and nothing changed, when `target` is at `origin`, `up` is along the view (within 1e-9 rad), or a value is not finite
+ * @return false, and nothing changed, when `target` is at `origin`, `up` is along the view (within 1e-9 rad),
+ *         or a value is not finite
  */
-bool gbt_camera_look_at(const double origin[3], const double target[3], const double up[3], gbt_camera *camera);
+bool gbt_camera_look_at(const double origin[3], const double target[3], const double up[3],
+                        gbt_camera *camera);
 
 /**
- * The camera after a small motion of its own, and the motion for which pose gradients are taken (gbtrace/model.h).
+ * The camera after a small motion of its own, and the motion for which pose gradients are taken
+ * (gbtrace/model.h).
  *
- * @param motion [in] (v, omega): v moves the centre along the camera's axes (right, down, forward), scene units; omega turns the camera
- *                    about the same axes through its centre, right-handed, radians: center + R^T v and exp([omega]x)^T R for a rotation R,
- *                    [omega]x a = omega x a
+ * @param motion [in] (v, omega): v moves the centre along the camera's axes (right, down, forward), scene
+ *                    units; omega turns the camera about the same axes through its centre, right-handed,
+ *                    radians: center + R^T v and exp([omega]x)^T R for a rotation R, [omega]x a = omega x a
  */
 gbt_camera gbt_camera_moved(const gbt_camera *camera, const double motion[6]);
 
 /**
- * tan of half the horizontal and vertical field of view of the pinhole that best stands for this camera: width / (2 fx), height / (2 fy).
- * 0 for parallel rays.
+ * tan of half the horizontal and vertical field of view of the pinhole that best stands for this camera:
+ * width / (2 fx), height / (2 fy). 0 for parallel rays.
  */
 void gbt_camera_half_fov_tan(const gbt_camera *camera, double tan_half[2]);
 

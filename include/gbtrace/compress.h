@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gbtrace/compress.h -- make the file of a trained model small. */
 #ifndef GBTRACE_COMPRESS_H
 #define GBTRACE_COMPRESS_H
@@ -10,23 +11,27 @@
 GBT_API_BEGIN
 
 typedef struct gbt_compress_def {
-    double quality;   /* dB: what the pictures of the model may differ from before, as a PSNR; [20, 90]. Default 60 */
-    int lossless;     /* 1: every bit of the model is kept; `quality` is not used. Default 0 */
-    const char *data; /* data set whose training cameras tell what counts; NULL: the one it was trained on. Default NULL */
+    double quality; /* dB: what the pictures of the model may differ from before, as a PSNR; [20, 90]. Default
+                       60 */
+    int lossless;   /* 1: every bit of the model is kept; `quality` is not used. Default 0 */
+    const char *data; /* data set whose training cameras tell what counts; NULL: the one it was trained on.
+                         Default NULL */
     const char *json; /* also write the figures here; NULL: nowhere. Default NULL */
 } gbt_compress_def;
 
 gbt_compress_def gbt_compress_def_default(void);
 
 /**
- * Write a trained model in a small form that every command reads as it reads the large one (docs/compression.md).
+ * Write a trained model in a small form that every command reads as it reads the large one
+ * (docs/compression.md).
  *
- * Steps of quantisation come from adjoint passes through the training views (photos are not needed); when the data set is not there, from
- * the model alone, with a line on stderr: the file is then some 5 to 40 % larger at the same loss. What the file gives back is checked
- * before it is written.
+ * Steps of quantisation come from adjoint passes through the training views (photos are not needed); when the
+ * data set is not there, from the model alone, with a line on stderr: the file is then some 5 to 40 % larger
+ * at the same loss. What the file gives back is checked before it is written.
  *
- * A file that is already small is copied as it is, in a moment: always with `lossless`, else when it is quantised and `quality` is not
- * below the default (a file does not say at which quality it was made). A copy onto itself is nothing to do.
+ * A file that is already small is copied as it is, in a moment: always with `lossless`, else when it is
+ * quantised and `quality` is not below the default (a file does not say at which quality it was made). A copy
+ * onto itself is nothing to do.
  *
  * @param run [in] RUN (a folder with model.gbt) or a model file
  * @param out [in] written atomically; may be the model itself
@@ -35,7 +40,8 @@ gbt_compress_def gbt_compress_def_default(void);
  *
  * Threads: same bytes for every thread count. Cost: 64 views with their adjoint, and about 50 us per anchor.
  */
-gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report, gbt_error *err);
+gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report,
+                        gbt_error *err);
 
 GBT_API_END
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gbtrace/doctor.h -- check that this build works on this machine. */
 #ifndef GBTRACE_DOCTOR_H
 #define GBTRACE_DOCTOR_H
@@ -25,8 +26,8 @@ typedef struct gbt_diagnosis {
 } gbt_diagnosis;
 
 /**
- * Look at version, processor, threads, memory, libraries, locale, the folder to work in, and let the tracer and its adjoint draw a small
- * scene beside their double references.
+ * Look at version, processor, threads, memory, libraries, locale, the folder to work in, and let the tracer
+ * and its adjoint draw a small scene beside their double references.
  *
  * @param folder [in]  where runs shall be written: may we write there, is there room
  * @param out    [out] overwritten; whole even when a check fails

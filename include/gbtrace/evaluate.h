@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gbtrace/evaluate.h -- render a trained scene and score it against held-out photos. */
 #ifndef GBTRACE_EVALUATE_H
 #define GBTRACE_EVALUATE_H
@@ -9,35 +10,41 @@
 GBT_API_BEGIN
 
 typedef struct gbt_evaluate_def {
-    const char *data; /* data set folder; NULL: the one the model was trained on. Default NULL */
-    const char *json; /* also write the scores here; NULL: nowhere else. Default NULL */
+    const char *data;     /* data set folder; NULL: the one the model was trained on. Default NULL */
+    const char *json;     /* also write the scores here; NULL: nowhere else. Default NULL */
     const char *renderer; /* "trace", "raster" or "per-ray"; NULL: as in training. Default NULL */
-    double downscale; /* photos are divided by this, >= 1; 0: as in training. Default 0 */
-    int report;       /* 1: also write RUN/report.html. Default 1 */
-    const char *preset; /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is "default". Default NULL */
-    int tensorboard;  /* 1: also write RUN/events.out.tfevents.1.eval: scores, up to eight renders and photos. Default 0 */
-    const char *lpips; /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such score. Default NULL */
+    double downscale;     /* photos are divided by this, >= 1; 0: as in training. Default 0 */
+    int report;           /* 1: also write RUN/report.html. Default 1 */
+    const char *preset;   /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is
+                             "default". Default NULL */
+    int tensorboard; /* 1: also write RUN/events.out.tfevents.1.eval: scores, up to eight renders and photos.
+                        Default 0 */
+    const char *lpips; /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such score.
+                          Default NULL */
 } gbt_evaluate_def;
 
 gbt_evaluate_def gbt_evaluate_def_default(void);
 
 /**
- * Score the held-out views of a run: PSNR, SSIM and FLIP on 8-bit images, per view and mean. A run trained with `exposure` is scored on
- * the right half of each photo, after a 3 x 4 colour matrix that its left half gives; metrics.json says so in "scored".
+ * Score the held-out views of a run: PSNR, SSIM and FLIP on 8-bit images, per view and mean. A run trained
+ * with `exposure` is scored on the right half of each photo, after a 3 x 4 colour matrix that its left half
+ * gives; metrics.json says so in "scored".
  *
- * Renders go to RUN/renders/test/NAME.png, the photos they are compared with to RUN/renders/test/NAME.photo.png; scores to
- * RUN/metrics.json; RUN/report.html shows all of it. Without held-out views the scores are null ("n/a"), never NaN.
+ * Renders go to RUN/renders/test/NAME.png, the photos they are compared with to
+ * RUN/renders/test/NAME.photo.png; scores to RUN/metrics.json; RUN/report.html shows all of it. Without
+ * held-out views the scores are null ("n/a"), never NaN.
  *
- * With other settings than the run's own (another renderer, size, preset or data set, unless the run's own data set is gone) nothing in RUN
- * changes: the scores go to stderr, and to the file `json` when it is given.
+ * With other settings than the run's own (another renderer, size, preset or data set, unless the run's own
+ * data set is gone) nothing in RUN changes: the scores go to stderr, and to the file `json` when it is given.
  *
  * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */
 gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err);
 
 /**
- * Make RUN/report.html again from RUN/metrics.json, log.csv and renders/test: nothing is scored, one view is rendered. The charts (SVG) of
- * RUN, RUN/studies and `studies` go in too. Without the model or its data set, maps and pictures of the scene are left out, with a warning.
+ * Make RUN/report.html again from RUN/metrics.json, log.csv and renders/test: nothing is scored, one view is
+ * rendered. The charts (SVG) of RUN, RUN/studies and `studies` go in too. Without the model or its data set,
+ * maps and pictures of the scene are left out, with a warning.
  *
  * @param studies [in] [study_count] folders that gbtrace study wrote, or SVG files; NULL with 0
  * @return GBT_OK, GBT_ERR_IO (no metrics.json, no such study), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
@@ -54,62 +61,75 @@ typedef struct gbt_comparison {
 } gbt_comparison;
 
 /**
- * Compare two image files of one size (PNG, JPEG, EXR; alpha is left out), rounded to 8 bit; `reference` is the original.
+ * Compare two image files of one size (PNG, JPEG, EXR; alpha is left out), rounded to 8 bit; `reference` is
+ * the original.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT (sizes differ), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */
 gbt_status gbt_compare_images(const char *path, const char *reference, gbt_comparison *out, gbt_error *err);
 
 /**
- * LPIPS of two image files, as gbt_compare_images() reads them, for the network in a .safetensors file (docs/metrics.md).
+ * LPIPS of two image files, as gbt_compare_images() reads them, for the network in a .safetensors file
+ * (docs/metrics.md).
  *
- * @param out [out] of colours in [-1, 1], as the network was trained; and in [0, 1], as the scores of 3DGS are made
+ * @param out [out] of colours in [-1, 1], as the network was trained; and in [0, 1], as the scores of 3DGS
+ *                  are made
  * @return as gbt_compare_images(); GBT_ERR_ARGUMENT also when the pictures are too small for the network
  */
-gbt_status gbt_compare_lpips(const char *path, const char *reference, const char *network, double out[2], gbt_error *err);
+gbt_status gbt_compare_lpips(const char *path, const char *reference, const char *network, double out[2],
+                             gbt_error *err);
 
 /**
  * gbt_compare_images() for pictures in memory, [height][width][3], also rounded to 8 bit.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT (no pixels), GBT_ERR_NO_MEMORY
  */
-gbt_status gbt_compare_pictures(const float *picture, const float *reference, int width, int height, gbt_comparison *out, gbt_error *err);
+gbt_status gbt_compare_pictures(const float *picture, const float *reference, int width, int height,
+                                gbt_comparison *out, gbt_error *err);
 
 typedef enum gbt_split { GBT_SPLIT_TEST, GBT_SPLIT_TRAIN, GBT_SPLIT_ALL } gbt_split;
 
 typedef struct gbt_render_def {
     const char *data;     /* data set whose cameras are used; NULL: the model's. Default NULL */
     gbt_split split;      /* default GBT_SPLIT_TEST */
-    const char *renderer; /* "trace", "raster" (EWA splats; pinhole cameras), "per-ray" (the same tiles, response and order of rays), or
-                             "reference" (double, every Gaussian against every ray: slow). NULL: as in training. Default NULL */
+    const char *renderer; /* "trace", "raster" (EWA splats; pinhole cameras), "per-ray" (the same tiles,
+                             response and order of rays), or "reference" (double, every Gaussian against every
+                             ray: slow). NULL: as in training. Default NULL */
     const char *format;   /* "png" (default) or "exr" (32-bit float) */
     double downscale;     /* 0: as in training. Default 0 */
-    const char *camera;   /* camera file (docs/cameras.md): render that and no views; the data set is not needed. Default NULL */
-    const char *outputs;  /* also write these, as float EXR (docs/formats.md): "depth,normal". Always by the tracer, without meshes. Default
-                             NULL */
-    const char *preset;   /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is "default". Default NULL */
-    const char *insert;   /* meshes to put into the scene (docs/inserting.md); with the renderer "trace" only. Default NULL */
-    const char *path;     /* a film in place of views (docs/video.md): "orbit", "interpolate", or the name of a path file. Default NULL */
-    int frames;           /* of the film, [0, 100000]; 0: 240 around, 15 for each training camera (900 at most), as many as a file has.
-                             Default 0 */
-    double fps;           /* frames per second, [0, 1000]; 0: what a path file says, else 30. Default 0 */
-    int width, height;    /* of the film, both 0 or in [1, 65500]; the shorter side sees as much as in the photos. Default 0: as they, to
-                             even numbers */
-    const char *look_at;  /* path "orbit": what it is around, "X,Y,Z" in the data set's coordinates. NULL: as the photos' cameras look.
+    const char *camera;   /* camera file (docs/cameras.md): render that and no views; the data set is not
+                             needed. Default NULL */
+    const char *outputs;  /* also write these, as float EXR (docs/formats.md): "depth,normal". Always by the
+                             tracer, without meshes. Default NULL */
+    const char *preset;   /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is
+                             "default". Default NULL */
+    const char *insert;   /* meshes to put into the scene (docs/inserting.md); with the renderer "trace" only.
                              Default NULL */
-    double orbit_radius;  /* path "orbit": distance from the vertical axis through that point, [0, 1e9], scene units; 0: as the photos'
-                             cameras. Default 0 */
-    double orbit_height;  /* path "orbit": height above that point, scene units; NaN: as the photos' cameras. Default NaN */
+    const char *path; /* a film in place of views (docs/video.md): "orbit", "interpolate", or the name of a
+                         path file. Default NULL */
+    int frames; /* of the film, [0, 100000]; 0: 240 around, 15 for each training camera (900 at most), as many
+                   as a file has. Default 0 */
+    double fps; /* frames per second, [0, 1000]; 0: what a path file says, else 30. Default 0 */
+    int width, height;   /* of the film, both 0 or in [1, 65500]; the shorter side sees as much as in the
+                            photos. Default 0: as they, to even numbers */
+    const char *look_at; /* path "orbit": what it is around, "X,Y,Z" in the data set's coordinates. NULL: as
+                            the photos' cameras look. Default NULL */
+    double orbit_radius; /* path "orbit": distance from the vertical axis through that point, [0, 1e9], scene
+                            units; 0: as the photos' cameras. Default 0 */
+    double orbit_height; /* path "orbit": height above that point, scene units; NaN: as the photos' cameras.
+                            Default NaN */
 } gbt_render_def;
 
 gbt_render_def gbt_render_def_default(void);
 
 /**
- * Render the views of a split into the folder `out`, one file per view; or what a camera file says, as one file of its name; or a path, as
- * frame_00001.png and so on, or as one film when `out` ends in .mp4, .webm or .gif (by the program ffmpeg, which must be there).
+ * Render the views of a split into the folder `out`, one file per view; or what a camera file says, as one
+ * file of its name; or a path, as frame_00001.png and so on, or as one film when `out` ends in .mp4, .webm or
+ * .gif (by the program ffmpeg, which must be there).
  *
- * Camera models are traced as they are. `data`, `split` and `downscale` are about views: with a camera file the
- * first two are not used, and the last is refused. A path file needs no data set either. A film has its name when it is whole, not before.
+ * Camera models are traced as they are. `data`, `split` and `downscale` are about views: with a camera file
+ * the first two are not used, and the last is refused. A path file needs no data set either. A film has its
+ * name when it is whole, not before.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gbtrace/export.h -- trained scenes as files of plain Gaussians, for every viewer there is. */
 #ifndef GBTRACE_EXPORT_H
 #define GBTRACE_EXPORT_H
@@ -13,36 +14,42 @@ GBT_API_BEGIN
 typedef struct gbt_export_def {
     int sh_degree;    /* of the colours' dependence on the direction, 0 to 3. Default 3 */
     int refine_steps; /* steps that fit the plain Gaussians to the model's own pictures, >= 0. Default 500 */
-    bool backdrop;    /* add the model's background as a sphere of 1000 Gaussians around everything: files have no background, and viewers
-                         draw on black. Not where photos have an alpha channel. Default true */
-    const char *data; /* data set with the training cameras; NULL: the one it was trained on. Default NULL */
-    const char *json; /* also write the figures here; NULL: nowhere. Default NULL */
-    const char *lpips; /* .safetensors file of a network: a result folder gets LPIPS too (docs/metrics.md). Default NULL */
+    bool backdrop; /* add the model's background as a sphere of 1000 Gaussians around everything: files have
+                      no background, and viewers draw on black. Not where photos have an alpha channel.
+                      Default true */
+    const char *data;  /* data set with the training cameras; NULL: the one it was trained on. Default NULL */
+    const char *json;  /* also write the figures here; NULL: nowhere. Default NULL */
+    const char *lpips; /* .safetensors file of a network: a result folder gets LPIPS too (docs/metrics.md).
+                          Default NULL */
 } gbt_export_def;
 
 gbt_export_def gbt_export_def_default(void);
 
 /**
- * Write a scene as plain 3DGS Gaussians: .ply, .splat, .spz (version 3) or .glb (KHR_gaussian_splatting), by the ending of each name. World
- * coordinates and axes are those of the data set; .glb has glTF's (x and y change signs).
+ * Write a scene as plain 3DGS Gaussians: .ply, .splat, .spz (version 3) or .glb (KHR_gaussian_splatting), by
+ * the ending of each name. World coordinates and axes are those of the data set; .glb has glTF's (x and y
+ * change signs).
  *
- * A trained model is baked: networks become spherical harmonics (docs/exporting.md). What that loses is measured on the held-out views, for
- * each file as it reads back, and reported. A .ply, .splat, .spz or result folder of 3DGS is converted.
+ * A trained model is baked: networks become spherical harmonics (docs/exporting.md). What that loses is
+ * measured on the held-out views, for each file as it reads back, and reported. A .ply, .splat, .spz or
+ * result folder of 3DGS is converted.
  *
- * A name that ends in / is a folder: it gets what the reference implementation of 3DGS leaves, cfg_args, cameras.json, input.ply,
- * point_cloud/iteration_N/point_cloud.ply, and of the held-out views test/ours_N/, results.json and per_view.json. Runs alone can be
- * written so.
+ * A name that ends in / is a folder: it gets what the reference implementation of 3DGS leaves, cfg_args,
+ * cameras.json, input.ply, point_cloud/iteration_N/point_cloud.ply, and of the held-out views test/ours_N/,
+ * results.json and per_view.json. Runs alone can be written so.
  *
- * @param input  [in] RUN (a folder with model.gbt), a model file, a .ply, .splat or .spz, or a result folder of 3DGS
- * @param outputs [in] [output_count] file names, each written atomically; their endings are checked before any work
+ * @param input  [in] RUN (a folder with model.gbt), a model file, a .ply, .splat or .spz, or a result folder
+ *                    of 3DGS
+ * @param outputs [in] [output_count] file names, each written atomically; their endings are checked before
+ *                     any work
  * @param report [in] open stream; NULL: none
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *
- * Threads: same bytes for every thread count. Cost: one pass over the training cameras, the steps, and up to 16 held-out views (all of them
- * for a folder).
+ * Threads: same bytes for every thread count. Cost: one pass over the training cameras, the steps, and up to
+ * 16 held-out views (all of them for a folder).
  */
-gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, FILE *report,
-                      gbt_error *err);
+gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs,
+                      size_t output_count, FILE *report, gbt_error *err);
 
 GBT_API_END
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gbtrace/info.h -- what is in a data set or a model, for a person or as JSON. */
 #ifndef GBTRACE_INFO_H
 #define GBTRACE_INFO_H
@@ -11,9 +12,10 @@ GBT_API_BEGIN
 /**
  * Print what a path holds.
  *
- * A data set (folder or point cloud): cameras by lens model, photos and their sizes, sparse points, extent, split. A run
- * folder or model file: anchors, Gaussians per anchor, bytes, iterations, configuration. What training
- * would refuse is refused here, with the same words: photos that are missing are counted and named. Unreadable photos are only counted.
+ * A data set (folder or point cloud): cameras by lens model, photos and their sizes, sparse points, extent,
+ * split. A run folder or model file: anchors, Gaussians per anchor, bytes, iterations, configuration. What
+ * training would refuse is refused here, with the same words: photos that are missing are counted and named.
+ * Unreadable photos are only counted.
  *
  * @param path [in]  data set folder, point cloud (.ply), run folder or model.gbt
  * @param json [in]  not 0: one JSON object with "schema": 1 in place of lines for a person

@@ -1,4 +1,6 @@
-/* gbtrace/init.h -- where a scene starts from: granular balls and anchors of a sparse cloud, beside the voxel baseline. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* gbtrace/init.h -- where a scene starts from: granular balls and anchors of a sparse cloud, beside the voxel
+   baseline. */
 #ifndef GBTRACE_INIT_H
 #define GBTRACE_INIT_H
 
@@ -9,37 +11,42 @@
 GBT_API_BEGIN
 
 typedef struct gbt_init_def {
-    const char *init;        /* "gb" (granular balls, default), "adaptive" (balls where the scene needs them), "voxel", or "random"
-                                points */
-    double init_count;       /* anchors per point of adaptive and random, [0, 1], at least one; 0: half as many as the paper's balls.
-                                Default 0 */
-    const char *scale_prior; /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use "nn" */
+    const char *init;  /* "gb" (granular balls, default), "adaptive" (balls where the scene needs them),
+                          "voxel", or "random"  points */
+    double init_count; /* anchors per point of adaptive and random, [0, 1], at least one; 0: half as many as
+                          the paper's balls. Default 0 */
+    const char *scale_prior; /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use
+                                "nn" */
     int max_depth;           /* D_max of the balls, [0, 64]. Default 18 */
     float voxel_size;        /* v, scene units; 0: from the points by `voxel_rule`. Default 0 */
-    const char *voxel_rule;  /* "median" (spacing of the points, default) or "squared" (what the reference code computes) */
-    int mesh;                /* 1: an icosphere per ball in place of one vertex. Default 0 */
+    const char *voxel_rule; /* "median" (spacing of the points, default) or "squared" (what the reference code
+                               computes) */
+    int mesh;               /* 1: an icosphere per ball in place of one vertex. Default 0 */
 } gbt_init_def;
 
 gbt_init_def gbt_init_def_default(void);
 
 /**
- * Make balls and anchors from a data set's sparse points, write them as PLY, print their number beside the voxel baseline's, and how far
- * points are from the centres of the paper's balls, of adaptive ones, and of as many voxels.
+ * Make balls and anchors from a data set's sparse points, write them as PLY, print their number beside the
+ * voxel baseline's, and how far points are from the centres of the paper's balls, of adaptive ones, and of as
+ * many voxels.
  *
- * The PLY opens in any mesh viewer. Points: a vertex per anchor with x y z, radius, scale_0..scale_5 (std-devs, not logs), count (points in
- * its ball), depth, red green blue. Mesh: an icosphere of 42 vertices and 80 triangles per anchor with the ball's radius (the scale when
- * it has none) and colour. Coordinates are the data set's own.
+ * The PLY opens in any mesh viewer. Points: a vertex per anchor with x y z, radius, scale_0..scale_5
+ * (std-devs, not logs), count (points in its ball), depth, red green blue. Mesh: an icosphere of 42 vertices
+ * and 80 triangles per anchor with the ball's radius (the scale when it has none) and colour. Coordinates are
+ * the data set's own.
  *
  * @param data      [in]  data set folder or point cloud (.ply)
  * @param out_ply   [in]  written atomically
  * @param json_path [in]  the counts as JSON with "schema": 1; NULL: none
  * @param report    [in]  open stream for the lines for a person
- * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, output is an input), GBT_ERR_FORMAT (bad data, no points), GBT_ERR_IO,
- *         GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, output is an input), GBT_ERR_FORMAT (bad data, no
+ *         points), GBT_ERR_IO, GBT_ERR_NO_MEMORY
  *
  * Threads: same bytes for every thread count. Cost: O(n log n) for n points.
  */
-gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path, FILE *report, gbt_error *err);
+gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path,
+                    FILE *report, gbt_error *err);
 
 GBT_API_END
 #endif

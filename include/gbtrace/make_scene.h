@@ -1,4 +1,6 @@
-/* gbtrace/make_scene.h -- procedural scenes whose cameras, surfaces and depths are known exactly, written as a COLMAP data set. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* gbtrace/make_scene.h -- procedural scenes whose cameras, surfaces and depths are known exactly, written as
+   a COLMAP data set. */
 #ifndef GBTRACE_MAKE_SCENE_H
 #define GBTRACE_MAKE_SCENE_H
 
@@ -13,10 +15,11 @@ typedef struct gbt_make_scene_def {
     int width, height;  /* photo size, pixels, [8, 8192]. Default 320 x 240. */
     int view_count;     /* photos, [3, 9999]. Default 64. */
     int points;         /* sparse points wanted, [1, 10000000]. Default 6000. */
-    double point_noise; /* std-dev per axis of a sparse point, part of its distance to the nearest camera that saw it, [0, 0.1]. Default
-                           0.001. */
+    double point_noise; /* std-dev per axis of a sparse point, part of its distance to the nearest camera that
+                           saw it, [0, 0.1]. Default 0.001. */
     int samples;        /* rays per pixel at most, rounded up to a square number, [1, 1024]. Default 16. */
-    uint64_t seed;      /* of the camera jitter, the samples and the sparse cloud; the geometry is fixed. Default 1. */
+    uint64_t seed;      /* of the camera jitter, the samples and the sparse cloud; the geometry is fixed.
+                           Default 1. */
     int depth;          /* 1: also write exact depth, depth/NNNN.exr. Default 0. */
     int distorted;      /* 1: OPENCV cameras with moderate distortion, 0: PINHOLE. Default 0. */
 } gbt_make_scene_def;
@@ -32,26 +35,29 @@ const char *gbt_make_scene_summary(const char *name);
 /**
  * Render a procedural scene and write it as a data set that any COLMAP reader takes.
  *
- * Files: images/NNNN.png (8 bit, display-referred), sparse/0/{cameras,images,points3D}.bin, SCENE.md (what it shows and how it was
- * made) and, with def->depth, depth/NNNN.exr: one float channel, the distance along the ray through the pixel's centre from the
- * camera centre to the first surface, scene units (not z), 0 where nothing is hit. Existing files of these names are replaced,
- * others stay.
+ * Files: images/NNNN.png (8 bit, display-referred), sparse/0/{cameras,images,points3D}.bin, SCENE.md (what it
+ * shows and how it was made) and, with def->depth, depth/NNNN.exr: one float channel, the distance along the
+ * ray through the pixel's centre from the camera centre to the first surface, scene units (not z), 0 where
+ * nothing is hit. Existing files of these names are replaced, others stay.
  *
- * Every sparse point lies on a surface that at least three views really see, moved by Gaussian noise; its observations are the
- * projections of the true point with 0.3 px of noise. One point in a hundred is an outlier: it is moved along the ray of its first view.
- * Fewer points than asked come out when the views do not overlap enough.
+ * Every sparse point lies on a surface that at least three views really see, moved by Gaussian noise; its
+ * observations are the projections of the true point with 0.3 px of noise. One point in a hundred is an
+ * outlier: it is moved along the ray of its first view. Fewer points than asked come out when the views do
+ * not overlap enough.
  *
  * @param def    [in] copied
  * @param folder [in] created with its parents when missing
  * @param err    [out] optional
- * @return GBT_OK; GBT_ERR_ARGUMENT (value out of range, unknown name: the text lists the names); GBT_ERR_IO (cannot write);
- *         GBT_ERR_NO_MEMORY; GBT_ERR_INTERNAL (Embree failed). After a failure the folder may hold a part of the files.
+ * @return GBT_OK; GBT_ERR_ARGUMENT (value out of range, unknown name: the text lists the names); GBT_ERR_IO
+ *         (cannot write); GBT_ERR_NO_MEMORY; GBT_ERR_INTERNAL (Embree failed). After a failure the folder may
+ *         hold a part of the files.
  *
- * Threads: callable from any thread with distinct folders; the same bytes for every thread count (of EXR files: the same values, their
+ * Threads: callable from any thread with distinct folders; the same bytes for every thread count (of EXR
+ * files: the same values, their
  *          headers may hold the time).
- * Cost:    view_count * width * height * samples camera rays at most (a pixel whose first quarter of samples agree stops there), as
- *          many shadow rays; below 16 samples the baked light is
- *          rougher too. Memory: one image per thread, the scene (some tens of megabytes), and a byte per candidate point and view.
+ * Cost:    view_count * width * height * samples camera rays at most (a pixel whose first quarter of samples
+ * agree stops there), as many shadow rays; below 16 samples the baked light is rougher too. Memory: one image
+ * per thread, the scene (some tens of megabytes), and a byte per candidate point and view.
  */
 gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt_error *err);
 

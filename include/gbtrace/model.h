@@ -1,7 +1,10 @@
-/* gbtrace/model.h -- a scene in memory: open it, render it into your own arrays, take gradients back to the camera and to plain Gaussians.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* gbtrace/model.h -- a scene in memory: open it, render it into your own arrays, take gradients back to the
+   camera and to plain Gaussians.
 
-   Coordinates are those of the data set, or of the file or arrays that the Gaussians came from; cameras are posed in the same. Pictures are
-   always traced, also of models that were trained with the rasterizer. docs/library.md has a tour, examples/ whole programs. */
+   Coordinates are those of the data set, or of the file or arrays that the Gaussians came from; cameras are
+   posed in the same. Pictures are always traced, also of models that were trained with the rasterizer.
+   docs/library.md has a tour, examples/ whole programs. */
 #ifndef GBTRACE_MODEL_H
 #define GBTRACE_MODEL_H
 
@@ -17,24 +20,27 @@ GBT_API_BEGIN
 /**
  * A loaded scene and the memory of its last picture.
  *
- * Threads: one call at a time on each model; different models may be used from different threads at the same time. Inside, a call uses all
- * processors that gbt_set_threads() allows, and its results have the same bits for any number of them.
+ * Threads: one call at a time on each model; different models may be used from different threads at the same
+ * time. Inside, a call uses all processors that gbt_set_threads() allows, and its results have the same bits
+ * for any number of them.
  */
 typedef struct gbt_model gbt_model;
 
-/* ---- open and close ---------------------------------------------------------------------------------------------------------- */
+/* ---- open and close ---- */
 
 /**
  * Open a trained model or a file of plain Gaussians.
  *
- * @param path [in]  RUN (a folder with model.gbt), a model file, or a .ply, .splat or .spz of plain Gaussians. The data set is not needed
+ * @param path [in]  RUN (a folder with model.gbt), a model file, or a .ply, .splat or .spz of plain
+ *                   Gaussians. The data set is not needed
  * @param out  [out] free with gbt_model_close(); NULL on failure
  * @param err  [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */
 gbt_status gbt_model_open(const char *path, gbt_model **out, gbt_error *err);
 
-/** Plain Gaussians in the caller's arrays, as 3DGS has them. A colour is max(0, 0.5 + sum_k sh_k Y_k(d)), d from the camera to the mean. */
+/** Plain Gaussians in the caller's arrays, as 3DGS has them. A colour is max(0, 0.5 + sum_k sh_k Y_k(d)), d
+    from the camera to the mean. */
 typedef struct gbt_gaussians {
     size_t count;           /* >= 1 */
     int sh_degree;          /* 0 to 3 */
@@ -48,7 +54,8 @@ typedef struct gbt_gaussians {
 /**
  * A model of plain Gaussians.
  *
- * The arrays are copied. Quaternions are normalised; a scale below 1e-4 of its Gaussian's largest is raised to that.
+ * The arrays are copied. Quaternions are normalised; a scale below 1e-4 of its Gaussian's largest is raised
+ * to that.
  *
  * @param g   [in]  borrowed for the call; every value finite
  * @param out       [out] free with gbt_model_close(); NULL on failure
@@ -67,15 +74,15 @@ gbt_status gbt_model_set_gaussians(gbt_model *model, const gbt_gaussians *g, gbt
 /** NULL is fine. */
 void gbt_model_close(gbt_model *model);
 
-/* ---- ask --------------------------------------------------------------------------------------------------------------------- */
+/* ---- ask ---- */
 
 /** What a model is. */
 typedef struct gbt_model_info {
-    size_t gaussians;         /* plain ones: how many; of networks: at most so many are drawn */
-    size_t anchors;           /* 0: plain Gaussians */
-    int sh_degree;            /* 0 to 3; -1: networks make the colours */
-    uint64_t iterations;      /* of training; 0 where nobody knows */
-    double low[3], high[3];   /* box of all anchors, or means */
+    size_t gaussians;       /* plain ones: how many; of networks: at most so many are drawn */
+    size_t anchors;         /* 0: plain Gaussians */
+    int sh_degree;          /* 0 to 3; -1: networks make the colours */
+    uint64_t iterations;    /* of training; 0 where nobody knows */
+    double low[3], high[3]; /* box of all anchors, or means */
 } gbt_model_info;
 
 /** What it is. Cost: a pass over the anchors or Gaussians. */
@@ -83,23 +90,26 @@ gbt_model_info gbt_model_get_info(const gbt_model *model);
 
 /** How pictures are made. */
 typedef struct gbt_model_settings {
-    float background[3];     /* behind everything. Default as trained; black for plain Gaussians */
-    float footprint;         /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays. Default as trained; 0.1 for
-                                plain Gaussians */
-    float t_near;            /* nearest distance at which anything is seen, >= 0. Default as trained; 0.01 for plain Gaussians */
-    float alpha_min;         /* smallest response that counts, (0, 1). Default 1/255 */
-    float alpha_max;         /* responses are cut here, (0, 1). Default 0.99 */
+    float background[3]; /* behind everything. Default as trained; black for plain Gaussians */
+    float footprint; /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays. Default
+                        as trained; 0.1 for plain Gaussians */
+    float t_near;    /* nearest distance at which anything is seen, >= 0. Default as trained; 0.01 for plain
+                        Gaussians */
+    float alpha_min; /* smallest response that counts, (0, 1). Default 1/255 */
+    float alpha_max; /* responses are cut here, (0, 1). Default 0.99 */
     float transmittance_min; /* a ray ends before less than this is left, (0, 1). Default 1e-4 */
 } gbt_model_settings;
 
 gbt_model_settings gbt_model_get_settings(const gbt_model *model);
 
-/** Set them for all that follows. GBT_OK, or GBT_ERR_ARGUMENT for a value out of range: then nothing changes. */
+/** Set them for all that follows. GBT_OK, or GBT_ERR_ARGUMENT for a value out of range: then nothing
+    changes. */
 gbt_status gbt_model_set_settings(gbt_model *model, const gbt_model_settings *settings, gbt_error *err);
 
 /** One view of the data set that a model was trained on. */
 typedef struct gbt_model_view {
-    const char *name;  /* of the photo, as the data set has it; borrowed until the views are opened again, or the model closed */
+    const char *name;  /* of the photo, as the data set has it; borrowed until the views are opened again, or
+                          the model closed */
     int held_out;      /* 1: training did not see it */
     gbt_camera camera; /* at the size that training used */
 } gbt_model_view;
@@ -109,19 +119,21 @@ typedef struct gbt_model_view {
  *
  * @param data  [in]  data set folder; NULL: the one that the model names, seen from the present folder
  * @param count [out] how many views there are; 0 on failure
- * @return GBT_OK, GBT_ERR_ARGUMENT (plain Gaussians, and `data` is NULL), GBT_ERR_IO (it is not there), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (plain Gaussians, and `data` is NULL), GBT_ERR_IO (it is not there),
+ *         GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */
 gbt_status gbt_model_open_views(gbt_model *model, const char *data, size_t *count, gbt_error *err);
 
-/** View `index` of those that gbt_model_open_views() counted. GBT_OK, or GBT_ERR_ARGUMENT when there is none. */
+/** View `index` of those that gbt_model_open_views() counted. GBT_OK, or GBT_ERR_ARGUMENT when there is
+    none. */
 gbt_status gbt_model_get_view(const gbt_model *model, size_t index, gbt_model_view *out, gbt_error *err);
 
-/* ---- render ------------------------------------------------------------------------------------------------------------------ */
+/* ---- render ---- */
 
 /** Where a picture goes: the caller's arrays, row-major, written in place. NULL: not wanted. */
 typedef struct gbt_picture {
-    float *rgb;           /* [height][width][3], with the background; required */
-    float *depth;         /* [height][width], expected distance along the ray, of what is hit; 0 where nothing is */
+    float *rgb;   /* [height][width][3], with the background; required */
+    float *depth; /* [height][width], expected distance along the ray, of what is hit; 0 where nothing is */
     float *transmittance; /* [height][width], what is left for the background, [0, 1] */
 } gbt_picture;
 
@@ -132,11 +144,14 @@ typedef struct gbt_picture {
  * @param keep   [in]  1: gbt_model_gradient() follows. It costs about a byte per blended hit
  * @param out    [out] arrays for camera->width x camera->height pixels
  * @param err    [out] optional
- * @return GBT_OK, GBT_ERR_ARGUMENT (an unusable camera), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL; the arrays hold anything after a failure
+ * @return GBT_OK, GBT_ERR_ARGUMENT (an unusable camera), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL; the arrays hold
+ *         anything after a failure
  */
-gbt_status gbt_model_render(gbt_model *model, const gbt_camera *camera, int keep, const gbt_picture *out, gbt_error *err);
+gbt_status gbt_model_render(gbt_model *model, const gbt_camera *camera, int keep, const gbt_picture *out,
+                            gbt_error *err);
 
-/** Where gradients of plain Gaussians go: the caller's arrays, shapes as in gbt_gaussians, overwritten. NULL: not wanted. */
+/** Where gradients of plain Gaussians go: the caller's arrays, shapes as in gbt_gaussians, overwritten. NULL:
+    not wanted. */
 typedef struct gbt_gaussians_gradient {
     float *mean;      /* [count][3] */
     float *scale_log; /* [count][3] */
@@ -146,30 +161,34 @@ typedef struct gbt_gaussians_gradient {
 } gbt_gaussians_gradient;
 
 /**
- * Adjoint of the last gbt_model_render() with `keep`, once for each: from dL/d(rgb) to the pose of its camera, and to plain Gaussians.
+ * Adjoint of the last gbt_model_render() with `keep`, once for each: from dL/d(rgb) to the pose of its
+ * camera, and to plain Gaussians.
  *
- * The pose is differentiated by the motion (v, omega) of gbt_camera_moved() at 0: v moves the camera along its own axes (right, down,
- * forward), omega turns it about them, radians. With W the rotation from world to camera, c the camera's centre, e the eye for which
- * colours are made (c; of an orthographic camera the middle of its picture), mu_i, q_i the Gaussians' means and quaternions, and every
- * derivative by a mean or quaternion the one at fixed colours:
+ * The pose is differentiated by the motion (v, omega) of gbt_camera_moved() at 0: v moves the camera along
+ * its own axes (right, down, forward), omega turns it about them, radians. With W the rotation from world to
+ * camera, c the camera's centre, e the eye for which colours are made (c; of an orthographic camera the
+ * middle of its picture), mu_i, q_i the Gaussians' means and quaternions, and every derivative by a mean or
+ * quaternion the one at fixed colours:
  *
  *     dL/dv     = W (dL/de - sum_i dL/dmu_i)
  *     dL/domega = W ((e - c) x dL/de - sum_i [(mu_i - c) x dL/dmu_i + vec(dL/dq_i q_i*) / 2])
  *
- * because moving the camera is moving all Gaussians the other way, but for the eye: dL/de goes through the directions of the spherical
- * harmonics, or through the direction and distance that the networks are given. Pixels' footprints move with the camera and are in these
- * sums. It is the gradient of the picture between cuts: where a response crosses alpha_min, or a ray its end, a picture jumps a little, and
- * no gradient says so.
+ * because moving the camera is moving all Gaussians the other way, but for the eye: dL/de goes through the
+ * directions of the spherical harmonics, or through the direction and distance that the networks are given.
+ * Pixels' footprints move with the camera and are in these sums. It is the gradient of the picture between
+ * cuts: where a response crosses alpha_min, or a ray its end, a picture jumps a little, and no gradient says
+ * so.
  *
  * @param d_rgb       [in]  [height][width][3], finite
  * @param d_pose      [out] dL/d(v, omega); optional (NULL)
  * @param d_gaussians [out] optional (NULL); plain Gaussians only
  * @param err         [out] optional
- * @return GBT_OK, GBT_ERR_ARGUMENT (no kept render, d_rgb not finite, gradients of networks wanted), GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (no kept render, d_rgb not finite, gradients of networks wanted),
+ *         GBT_ERR_NO_MEMORY
  * Cost: about that of the render.
  */
-gbt_status gbt_model_gradient(gbt_model *model, const float *d_rgb, double d_pose[6], const gbt_gaussians_gradient *d_gaussians,
-                              gbt_error *err);
+gbt_status gbt_model_gradient(gbt_model *model, const float *d_rgb, double d_pose[6],
+                              const gbt_gaussians_gradient *d_gaussians, gbt_error *err);
 
 GBT_API_END
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gbtrace/progress.h -- what a long call says while it runs. */
 #ifndef GBTRACE_PROGRESS_H
 #define GBTRACE_PROGRESS_H
@@ -19,11 +20,11 @@ typedef struct gbt_event {
     gbt_event_kind kind;
     const char *text; /* one line for a person, without newline; borrowed for the call */
     /* Of GBT_EVENT_PROGRESS alone. What is not known is NaN, or 0 where it counts. */
-    const char *stage;     /* "train", "render", "score", "bake", "refine", "study" */
-    uint64_t done, total;  /* steps, views or runs of the stage; total 0: time decides */
-    double fraction;       /* of the stage, [0, 1] */
+    const char *stage;    /* "train", "render", "score", "bake", "refine", "study" */
+    uint64_t done, total; /* steps, views or runs of the stage; total 0: time decides */
+    double fraction;      /* of the stage, [0, 1] */
     double seconds, seconds_left;
-    double psnr;           /* dB: of training photos in the mean of late, of the view just scored */
+    double psnr; /* dB: of training photos in the mean of late, of the view just scored */
     double loss;
     size_t anchors, gaussians; /* of the model; of the last view */
 } gbt_event;
@@ -31,8 +32,8 @@ typedef struct gbt_event {
 typedef void (*gbt_listener)(const gbt_event *event, void *context);
 
 /**
- * Who is told of events, for the whole process. Without a listener (NULL) they are lines on stderr: one line that is written over, on a
- * terminal; elsewhere progress every ten seconds.
+ * Who is told of events, for the whole process. Without a listener (NULL) they are lines on stderr: one line
+ * that is written over, on a terminal; elsewhere progress every ten seconds.
  *
  * The listener is called by one thread at a time, and must not call the library.
  * Threads: not while another call runs.

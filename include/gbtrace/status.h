@@ -1,7 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gbtrace/status.h -- how every entry of the library reports failure.
 
-   A status says what kind of failure it was; an error adds one line for a person. Nothing in the library exits; what it
-   tells meanwhile goes to whoever gbtrace/progress.h names. */
+   A status says what kind of failure it was; an error adds one line for a person. Nothing in the library
+   exits; what it tells meanwhile goes to whoever gbtrace/progress.h names. */
 #ifndef GBTRACE_STATUS_H
 #define GBTRACE_STATUS_H
 
@@ -19,13 +20,15 @@ typedef enum gbt_status {
     GBT_ERR_INTERNAL     /* a library below us failed in a way that no input explains */
 } gbt_status;
 
-/** The first failure wins: an error that already holds a text is not overwritten. Start from `gbt_error err = {0};`. */
+/** The first failure wins: an error that already holds a text is not overwritten. Start from `gbt_error err =
+    {0};`. */
 typedef struct gbt_error {
     gbt_status status;
     char text[512]; /* one line, no newline: "FILE[:LINE|@OFFSET]: what was wrong (wanted, got)" */
 } gbt_error;
 
-/** The exit code that a program should end with for a status: 0, 2, 3, 4, 5; 1 for GBT_ERR_INTERNAL, 130 for GBT_ERR_INTERRUPTED. */
+/** The exit code that a program should end with for a status: 0, 2, 3, 4, 5; 1 for GBT_ERR_INTERNAL, 130 for
+    GBT_ERR_INTERRUPTED. */
 int gbt_status_exit_code(gbt_status status);
 
 GBT_API_END

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gbtrace/version.h -- which gbtrace this is. The build reads its number here. */
 #ifndef GBTRACE_VERSION_H
 #define GBTRACE_VERSION_H
@@ -5,8 +6,9 @@
 #include "gbtrace/api.h"
 
 /**
- * The version of these headers. While the first number is 0, another second number means that programs must be compiled again; after that,
- * another first one. The name of the shared library (soname) says the same: libgbtrace.so.0.1.
+ * The version of these headers. While the first number is 0, another second number means that programs must
+ * be compiled again; after that, another first one. The name of the shared library (soname) says the same:
+ * libgbtrace.so.0.1.
  */
 #define GBT_VERSION "0.1.0"
 

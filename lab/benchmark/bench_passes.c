@@ -1,4 +1,6 @@
-/* benchmark/bench_passes.c -- time passes over the same Gaussians and rays, traced or splatted in several ways in turn. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* benchmark/bench_passes.c -- time passes over the same Gaussians and rays, traced or splatted in several
+   ways in turn. */
 #include "benchmark/bench_passes.h"
 
 #include <stdlib.h>
@@ -11,14 +13,20 @@
 #include "bvh/device.h"
 #include "frame/frame.h"
 
-enum { SAMPLE_BUILD, SAMPLE_FORWARD, SAMPLE_ADJOINT, SAMPLE_FORWARD_CPU, SAMPLE_ADJOINT_CPU, SAMPLE_BUILD_CPU, SAMPLE_COUNT };
+enum {
+    SAMPLE_BUILD,
+    SAMPLE_FORWARD,
+    SAMPLE_ADJOINT,
+    SAMPLE_FORWARD_CPU,
+    SAMPLE_ADJOINT_CPU,
+    SAMPLE_BUILD_CPU,
+    SAMPLE_COUNT
+};
 
-static const char *const kernel_names[] = {[TRACE_TILE] = "tile", [TRACE_SINGLE] = "single", [TRACE_EMBREE] = "embree"};
+static const char *const kernel_names[] = {
+    [TRACE_TILE] = "tile", [TRACE_SINGLE] = "single", [TRACE_EMBREE] = "embree"};
 
-const char *bench_kernel_name(trace_kernel kernel)
-{
-    return kernel_names[kernel];
-}
+const char *bench_kernel_name(trace_kernel kernel) { return kernel_names[kernel]; }
 
 size_t bench_kernels_parse(const char *list, trace_kernel *out, size_t capacity)
 {
@@ -65,18 +73,22 @@ static gbt_status build(passes *p, bench_way *w, gbt_error *err)
 static gbt_status forward(passes *p, bench_way *w, gbt_error *err)
 {
     if (w->splat == NULL)
-        return trace_forward(&w->traced, p->rays, true, &(trace_outputs){.rgb = &w->rgb}, &w->figures.counters, err);
+        return trace_forward(&w->traced, p->rays, true, &(trace_outputs){.rgb = &w->rgb},
+                             &w->figures.counters, err);
     const raster_settings s = frame_splat_settings(&w->settings, w->splat->form);
     raster_counters counted = {0};
-    GBT_TRY(raster_forward(&w->splatted, w->splat->g, w->splat->camera, &s, true, &w->rgb, NULL, &counted, err));
-    w->figures.counters.rays = counted.pixels, w->figures.counters.blended = counted.blended;
+    GBT_TRY(
+        raster_forward(&w->splatted, w->splat->g, w->splat->camera, &s, true, &w->rgb, NULL, &counted, err));
+    w->figures.counters.rays = counted.pixels;
+    w->figures.counters.blended = counted.blended;
     return GBT_OK;
 }
 
 static gbt_status backward(passes *p, bench_way *w, gbt_error *err)
 {
-    return w->splat != NULL ? raster_backward(&w->splatted, &p->d_rgb, &p->d_gaussians, NULL, NULL, err)
-                            : trace_backward(&w->traced, p->rays, &p->d_rgb, &p->d_gaussians, NULL, NULL, err);
+    return w->splat != NULL
+               ? raster_backward(&w->splatted, &p->d_rgb, &p->d_gaussians, NULL, NULL, err)
+               : trace_backward(&w->traced, p->rays, &p->d_rgb, &p->d_gaussians, NULL, NULL, err);
 }
 
 /* Build, forward, adjoint; `sample` counts from 0, and -1 is not kept. */
@@ -92,7 +104,8 @@ static gbt_status pass(passes *p, bench_way *w, int sample, gbt_error *err)
     GBT_TRY(backward(p, w, err));
     const double t3 = clock_wall(), c3 = clock_process();
     if (sample < 0) { /* the first build: what Embree holds for it is new */
-        w->figures.tree_bytes = w->kernel == TRACE_EMBREE ? bvh_memory_bytes() - embree_bytes : w->traced.tree.bytes;
+        w->figures.tree_bytes =
+            w->kernel == TRACE_EMBREE ? bvh_memory_bytes() - embree_bytes : w->traced.tree.bytes;
         w->figures.record_bytes = p->g->count * RECORD_FLOATS * sizeof(float);
         return GBT_OK;
     }
@@ -110,7 +123,8 @@ static gbt_status prepare(passes *p, bench_way *ways, size_t count, gbt_error *e
         p->d_rgb.pixels[i] = 3 / (float)values;
     for (size_t i = 0; i < count; i++) {
         bench_way *w = &ways[i];
-        w->traced.kernel = w->kernel, w->traced.tape_bytes_max = w->tape_bytes_max;
+        w->traced.kernel = w->kernel;
+        w->traced.tape_bytes_max = w->tape_bytes_max;
         GBT_TRY(image_alloc(&w->rgb, p->rays->width, p->rays->height, 3, err));
         w->samples = mem_alloc((size_t)p->repeats, SAMPLE_COUNT * sizeof *w->samples, "timings", err);
         if (w->samples == NULL)
@@ -126,12 +140,15 @@ static void find_medians(const passes *p, bench_way *w)
         at[i] = median(w->samples + i * p->repeats, p->repeats);
     const double rays = (double)ray_image_count(p->rays);
     w->figures.build_ms = 1000 * at[SAMPLE_BUILD];
-    w->figures.forward_seconds = at[SAMPLE_FORWARD], w->figures.adjoint_seconds = at[SAMPLE_ADJOINT];
-    w->figures.forward_us = 1e6 * at[SAMPLE_FORWARD_CPU] / rays, w->figures.adjoint_us = 1e6 * at[SAMPLE_ADJOINT_CPU] / rays;
+    w->figures.forward_seconds = at[SAMPLE_FORWARD];
+    w->figures.adjoint_seconds = at[SAMPLE_ADJOINT];
+    w->figures.forward_us = 1e6 * at[SAMPLE_FORWARD_CPU] / rays;
+    w->figures.adjoint_us = 1e6 * at[SAMPLE_ADJOINT_CPU] / rays;
     w->figures.build_us = 1e6 * at[SAMPLE_BUILD_CPU] / rays;
 }
 
-gbt_status bench_measure(bench_way *ways, size_t count, const gaussians *g, const ray_image *rays, int repeats, gbt_error *err)
+gbt_status bench_measure(bench_way *ways, size_t count, const gaussians *g, const ray_image *rays,
+                         int repeats, gbt_error *err)
 {
     passes p = {.g = g, .rays = rays, .reach = ray_image_reach(rays), .repeats = repeats};
     const cpu_isa best = cpu_best_isa();

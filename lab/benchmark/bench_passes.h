@@ -1,4 +1,6 @@
-/* benchmark/bench_passes.h -- time passes over the same Gaussians and rays, traced or splatted in several ways in turn. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* benchmark/bench_passes.h -- time passes over the same Gaussians and rays, traced or splatted in several
+   ways in turn. */
 #ifndef GBT_EVAL_BENCH_PASSES_H
 #define GBT_EVAL_BENCH_PASSES_H
 
@@ -8,9 +10,9 @@
 
 typedef struct bench_figures {
     double build_ms, forward_seconds, adjoint_seconds; /* wall time, medians */
-    double build_us, forward_us, adjoint_us;                    /* core-microseconds per ray: processor time of all threads / rays,
-                                                                   medians */
-    kernel_counters counters;                          /* of one forward pass */
+    double build_us, forward_us, adjoint_us; /* core-microseconds per ray: processor time of all threads /
+                                                rays, medians */
+    kernel_counters counters;                /* of one forward pass */
     size_t tree_bytes, record_bytes;
 } bench_figures;
 
@@ -21,33 +23,39 @@ typedef struct bench_splat {
     raster_form form;
 } bench_splat;
 
-/** One way of making the picture. Start from the fields of the first line, the rest 0; free with bench_way_free(). */
+/** One way of making the picture. Start from the fields of the first line, the rest 0; free with
+    bench_way_free(). */
 typedef struct bench_way {
-    trace_kernel kernel; cpu_isa isa; trace_settings settings; size_t tape_bytes_max;
+    trace_kernel kernel;
+    cpu_isa isa;
+    trace_settings settings;
+    size_t tape_bytes_max;
     const bench_splat *splat; /* NULL: traced */
     bench_figures figures;
     image rgb;          /* of the last pass */
     trace_scene traced; /* as built for it */
     raster_scene splatted;
-    double *samples;    /* internal */
+    double *samples; /* internal */
 } bench_way;
 
 /**
- * Time every way: build, forward, adjoint; one pass of each after the other, `repeats` times over, so that all of them see the machine in
- * the same state. A first round is not counted: it warms caches and memory up.
+ * Time every way: build, forward, adjoint; one pass of each after the other, `repeats` times over, so that
+ * all of them see the machine in the same state. A first round is not counted: it warms caches and memory up.
  *
  * @param g, rays [in] borrowed until bench_way_free()
- * @return GBT_OK, GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
- * One at a time per process: the instruction set is set for all of it while a way is timed, and set back at the end.
+ * @return GBT_OK, GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL One at a time per process: the instruction set is set
+ *         for all of it while a way is timed, and set back at the end.
  */
-gbt_status bench_measure(bench_way *ways, size_t count, const gaussians *g, const ray_image *rays, int repeats, gbt_error *err);
+gbt_status bench_measure(bench_way *ways, size_t count, const gaussians *g, const ray_image *rays,
+                         int repeats, gbt_error *err);
 
 void bench_way_free(bench_way *way);
 
 /** "tile", "single" or "embree". */
 const char *bench_kernel_name(trace_kernel kernel);
 
-/** A list of kernels, "tile,embree", of at most `capacity`; 0 when there is another word in it, or one twice. */
+/** A list of kernels, "tile,embree", of at most `capacity`; 0 when there is another word in it, or one
+    twice. */
 size_t bench_kernels_parse(const char *list, trace_kernel *out, size_t capacity);
 
 #endif

@@ -1,4 +1,6 @@
-/* benchmark/bench_reference.c -- some pixels of a picture in double, and how far another picture is from them. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* benchmark/bench_reference.c -- some pixels of a picture in double, and how far another picture is from
+   them. */
 #include "benchmark/bench_reference.h"
 
 #include <math.h>
@@ -16,12 +18,12 @@ static size_t pixel_of(const ray_image *few, int width, size_t i)
     return i / (size_t)few->width * CHECK_STRIDE * (size_t)width + i % (size_t)few->width * CHECK_STRIDE;
 }
 
-gbt_status bench_reference_make(const gaussians *g, const trace_settings *settings, const ray_image *rays, bench_reference *out,
-                                gbt_error *err)
+gbt_status bench_reference_make(const gaussians *g, const trace_settings *settings, const ray_image *rays,
+                                bench_reference *out, gbt_error *err)
 {
     ray_image *few = &out->rays;
-    GBT_TRY(ray_image_reserve(few, (rays->width + CHECK_STRIDE - 1) / CHECK_STRIDE, (rays->height + CHECK_STRIDE - 1) / CHECK_STRIDE, false,
-                              err));
+    GBT_TRY(ray_image_reserve(few, (rays->width + CHECK_STRIDE - 1) / CHECK_STRIDE,
+                              (rays->height + CHECK_STRIDE - 1) / CHECK_STRIDE, false, err));
     const size_t count = ray_image_count(few);
     for (size_t i = 0; i < count; i++) {
         const size_t from = pixel_of(few, rays->width, i);
@@ -30,19 +32,24 @@ gbt_status bench_reference_make(const gaussians *g, const trace_settings *settin
     }
     mem_free(out->rgb);
     out->rgb = mem_alloc(count, 3 * sizeof *out->rgb, "check image", err);
-    return out->rgb == NULL ? GBT_ERR_NO_MEMORY : reference_forward(g, settings, few, out->rgb, NULL, NULL, err);
+    return out->rgb == NULL ? GBT_ERR_NO_MEMORY
+                            : reference_forward(g, settings, few, out->rgb, NULL, NULL, err);
 }
 
-gbt_status bench_reference_leave_band(const gaussians *g, const trace_settings *settings, bench_reference *reference, gbt_error *err)
+gbt_status bench_reference_leave_band(const gaussians *g, const trace_settings *settings,
+                                      bench_reference *reference, gbt_error *err)
 {
     const ray_image *rays = &reference->rays;
     reference_scene exact = {0};
     band_scratch scratch = {0};
     mem_free(reference->left_out);
-    reference->left_out = mem_calloc(ray_image_count(rays), sizeof *reference->left_out, "rounding band", err);
-    gbt_status status = reference->left_out == NULL ? GBT_ERR_NO_MEMORY : reference_scene_make(g, &exact, err);
+    reference->left_out =
+        mem_calloc(ray_image_count(rays), sizeof *reference->left_out, "rounding band", err);
+    gbt_status status =
+        reference->left_out == NULL ? GBT_ERR_NO_MEMORY : reference_scene_make(g, &exact, err);
     for (size_t i = 0; i < ray_image_count(rays) && status == GBT_OK; i++)
-        status = rounding_band_find(&exact, settings, ray_image_origin(rays, i), rays->dir + 3 * i, &scratch, &reference->left_out[i]);
+        status = rounding_band_find(&exact, settings, ray_image_origin(rays, i), rays->dir + 3 * i, &scratch,
+                                    &reference->left_out[i]);
     band_scratch_free(&scratch);
     reference_scene_free(&exact);
     return status;
@@ -65,7 +72,8 @@ static void add_error(bench_error *sum, double error)
 
 bench_error bench_error_of(double square_sum, double max, size_t values)
 {
-    return (bench_error){.psnr = square_sum > 0 ? fmin(-10 * log10(square_sum / (double)values), 200) : 200, .max = max};
+    return (bench_error){.psnr = square_sum > 0 ? fmin(-10 * log10(square_sum / (double)values), 200) : 200,
+                         .max = max};
 }
 
 bench_error bench_reference_compare(const bench_reference *reference, const image *rgb)
@@ -75,7 +83,8 @@ bench_error bench_reference_compare(const bench_reference *reference, const imag
     size_t values = 0;
     for (size_t i = 0; i < count; i++)
         for (size_t c = 0; c < 3 && (reference->left_out == NULL || !reference->left_out[i]); c++, values++)
-            add_error(&sum, (double)rgb->pixels[3 * pixel_of(&reference->rays, rgb->width, i) + c] - reference->rgb[3 * i + c]);
+            add_error(&sum, (double)rgb->pixels[3 * pixel_of(&reference->rays, rgb->width, i) + c] -
+                                reference->rgb[3 * i + c]);
     return bench_error_of(sum.psnr, sum.max, values);
 }
 

@@ -1,4 +1,6 @@
-/* benchmark/bench_reference.h -- some pixels of a picture in double, and how far another picture is from them. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* benchmark/bench_reference.h -- some pixels of a picture in double, and how far another picture is from
+   them. */
 #ifndef GBT_EVAL_BENCH_REFERENCE_H
 #define GBT_EVAL_BENCH_REFERENCE_H
 
@@ -14,11 +16,13 @@ typedef struct bench_reference {
     bool *left_out; /* optional (NULL), [rays]: what does not count in bench_reference_compare() */
 } bench_reference;
 
-gbt_status bench_reference_make(const gaussians *g, const trace_settings *settings, const ray_image *rays, bench_reference *out,
-                                gbt_error *err);
+gbt_status bench_reference_make(const gaussians *g, const trace_settings *settings, const ray_image *rays,
+                                bench_reference *out, gbt_error *err);
 
-/** Leave out the rays of the rounding band (trace/rounding_band.h), on which a picture in float32 may be right in another way. */
-gbt_status bench_reference_leave_band(const gaussians *g, const trace_settings *settings, bench_reference *reference, gbt_error *err);
+/** Leave out the rays of the rounding band (trace/rounding_band.h), on which a picture in float32 may be
+    right in another way. */
+gbt_status bench_reference_leave_band(const gaussians *g, const trace_settings *settings,
+                                      bench_reference *reference, gbt_error *err);
 
 void bench_reference_free(bench_reference *reference);
 

@@ -1,4 +1,6 @@
-/* benchmark/bench_scene.c -- what benchmarks and studies trace: the Gaussians of a .ply or of a run, and the rays of one camera. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* benchmark/bench_scene.c -- what benchmarks and studies trace: the Gaussians of a .ply or of a run, and the
+   rays of one camera. */
 #include "benchmark/bench_scene.h"
 
 #include <math.h>
@@ -10,22 +12,26 @@
 #include "data/gaussian_file.h"
 #include "data/gaussian_ply.h"
 
-/* Colour of a 3DGS Gaussian from its centre's direction: degree 0 only, so that the workload is tracing and nothing else. */
+/* Colour of a 3DGS Gaussian from its centre's direction: degree 0 only, so that the workload is tracing and
+   nothing else. */
 static gbt_status gaussians_from_ply(const char *path, gaussians *out, gbt_error *err)
 {
     gaussian_cloud cloud;
     GBT_TRY(gaussian_ply_load(path, &cloud, err));
     const gbt_status status = gaussians_resize(out, cloud.count, err);
     for (size_t i = 0; status == GBT_OK && i < cloud.count; i++) {
-        out->mean_x[i] = cloud.mean[3 * i], out->mean_y[i] = cloud.mean[3 * i + 1], out->mean_z[i] = cloud.mean[3 * i + 2];
+        out->mean_x[i] = cloud.mean[3 * i];
+        out->mean_y[i] = cloud.mean[3 * i + 1];
+        out->mean_z[i] = cloud.mean[3 * i + 2];
         out->scale_x[i] = expf(cloud.scale_log[3 * i]), out->scale_y[i] = expf(cloud.scale_log[3 * i + 1]),
-            out->scale_z[i] = expf(cloud.scale_log[3 * i + 2]);
-        out->quat_w[i] = cloud.quat[4 * i], out->quat_x[i] = cloud.quat[4 * i + 1], out->quat_y[i] = cloud.quat[4 * i + 2],
-            out->quat_z[i] = cloud.quat[4 * i + 3];
+        out->scale_z[i] = expf(cloud.scale_log[3 * i + 2]);
+        out->quat_w[i] = cloud.quat[4 * i], out->quat_x[i] = cloud.quat[4 * i + 1],
+        out->quat_y[i] = cloud.quat[4 * i + 2], out->quat_z[i] = cloud.quat[4 * i + 3];
         out->opacity[i] = cloud.opacity[i];
         const float *sh = cloud.sh + i * GAUSSIAN_SH_COUNT * 3;
-        out->red[i] = fmaxf(0, 0.5f + 0.28209479f * sh[0]), out->green[i] = fmaxf(0, 0.5f + 0.28209479f * sh[1]),
-            out->blue[i] = fmaxf(0, 0.5f + 0.28209479f * sh[2]);
+        out->red[i] = fmaxf(0, 0.5f + 0.28209479f * sh[0]),
+        out->green[i] = fmaxf(0, 0.5f + 0.28209479f * sh[1]),
+        out->blue[i] = fmaxf(0, 0.5f + 0.28209479f * sh[2]);
     }
     if (status == GBT_OK)
         gaussians_pad(out);
@@ -76,14 +82,16 @@ static gbt_status open_run(const char *path, const char *camera, bench_scene *ou
 gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *out, gbt_error *err)
 {
     if (camera == NULL && bench_scene_needs_camera(path))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%.300s: plain Gaussians know no cameras (wanted --camera FILE.json)", path);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%.300s: plain Gaussians know no cameras (wanted --camera FILE.json)", path);
     return is_ply(path) ? open_ply(path, camera, out, err) : open_run(path, camera, out, err);
 }
 
 gbt_status bench_scene_decode(bench_scene *s, gbt_error *err)
 {
     if (s->run != NULL) {
-        GBT_TRY(frame_render_shot(&s->run->frame, loaded_run_subject(s->run), &s->camera.shot, &s->settings, err));
+        GBT_TRY(frame_render_shot(&s->run->frame, loaded_run_subject(s->run), &s->camera.shot, &s->settings,
+                                  err));
         s->gaussians = frame_drawn(&s->run->frame);
     }
     return ray_image_from_shot(&s->camera.shot, 0, &s->rays, err);

@@ -1,4 +1,6 @@
-/* benchmark/bench_scene.h -- what benchmarks and studies trace: the Gaussians of a .ply or of a run, and the rays of one camera. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* benchmark/bench_scene.h -- what benchmarks and studies trace: the Gaussians of a .ply or of a run, and the
+   rays of one camera. */
 #ifndef GBT_EVAL_BENCH_SCENE_H
 #define GBT_EVAL_BENCH_SCENE_H
 
@@ -20,7 +22,8 @@ typedef struct bench_scene {
  *
  * @param path   [in] plain Gaussians (.ply: the colours of degree 0), or a run
  * @param camera [in] camera file, of an aperture the first sample; NULL: the run's first held-out view
- * @return GBT_OK, GBT_ERR_ARGUMENT (plain Gaussians without a camera), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (plain Gaussians without a camera), GBT_ERR_IO, GBT_ERR_FORMAT,
+ *         GBT_ERR_NO_MEMORY
  */
 gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *out, gbt_error *err);
 

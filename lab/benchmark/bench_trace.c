@@ -1,4 +1,6 @@
-/* benchmark/bench_trace.c -- time build, forward and adjoint on given Gaussians, with the error against the double reference beside it. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* benchmark/bench_trace.c -- time build, forward and adjoint on given Gaussians, with the error against the
+   double reference beside it. */
 #include <jansson.h>
 #include <math.h>
 #include <string.h>
@@ -13,10 +15,7 @@
 
 enum { KERNELS_MAX = 3 };
 
-lab_bench_def lab_bench_def_default(void)
-{
-    return (lab_bench_def){.repeats = 5, .kernel = "tile"};
-}
+lab_bench_def lab_bench_def_default(void) { return (lab_bench_def){.repeats = 5, .kernel = "tile"}; }
 
 /* What the caller has given in place of the model's own. */
 static gbt_status override_setting(const char *name, float given, float high, float *setting, gbt_error *err)
@@ -24,7 +23,8 @@ static gbt_status override_setting(const char *name, float given, float high, fl
     if (isnan(given) || given == 0)
         return GBT_OK;
     if (!(given > 0 && given < high))
-        return base_fail(err, GBT_ERR_ARGUMENT, "bench: bad %s (wanted a number in (0, %g), got %g)", name, (double)high, (double)given);
+        return base_fail(err, GBT_ERR_ARGUMENT, "bench: bad %s (wanted a number in (0, %g), got %g)", name,
+                         (double)high, (double)given);
     *setting = given;
     return GBT_OK;
 }
@@ -38,7 +38,7 @@ static gbt_status override_settings(const lab_bench_def *def, trace_settings *se
     return override_setting("proxy_radius", def->proxy_radius, INFINITY, &settings->proxy_radius, err);
 }
 
-/* ---- figures: one table for the text and for the file -------------------------------------------------------------------------------- */
+/* ---- figures: one table for the text and for the file ---- */
 
 typedef struct measured {
     const lab_bench_def *def;
@@ -92,11 +92,12 @@ static void print_head(const measured *m, FILE *out)
     const bench_scene *s = m->scene;
     const bench_way *first = &m->ways[0];
     const bool embree = first->kernel == TRACE_EMBREE;
-    fprintf(out, "%s: %zu Gaussians (%zu can be seen), %d x %d rays, %d threads, %s\n", m->def->model, s->gaussians->count,
-            embree ? first->traced.embree.box_count : first->traced.tree.box_count, s->rays.width, s->rays.height, parallel_threads(),
-            cpu_isa_name(first->isa));
-    fprintf(out, "alpha_min %g, alpha_max %g, T_min %g, proxy radius %g; medians of %d\n\n", (double)s->settings.alpha_min,
-            (double)s->settings.alpha_max, (double)s->settings.transmittance_min, (double)s->settings.proxy_radius, m->def->repeats);
+    fprintf(out, "%s: %zu Gaussians (%zu can be seen), %d x %d rays, %d threads, %s\n", m->def->model,
+            s->gaussians->count, embree ? first->traced.embree.box_count : first->traced.tree.box_count,
+            s->rays.width, s->rays.height, parallel_threads(), cpu_isa_name(first->isa));
+    fprintf(out, "alpha_min %g, alpha_max %g, T_min %g, proxy radius %g; medians of %d\n\n",
+            (double)s->settings.alpha_min, (double)s->settings.alpha_max,
+            (double)s->settings.transmittance_min, (double)s->settings.proxy_radius, m->def->repeats);
 }
 
 /* One column per kernel; of the second and third, how often the first's is in it. */
@@ -125,8 +126,8 @@ static void print_figures(const measured *m, FILE *out)
         fputs("\n", out);
     }
     for (size_t k = 0; m->def->check && k < m->count; k++)
-        fprintf(out, "%s to the double reference (%zu rays): PSNR %.1f dB, max error %.3g\n", bench_kernel_name(m->ways[k].kernel),
-                m->check_rays, m->error[k].psnr, m->error[k].max);
+        fprintf(out, "%s to the double reference (%zu rays): PSNR %.1f dB, max error %.3g\n",
+                bench_kernel_name(m->ways[k].kernel), m->check_rays, m->error[k].psnr, m->error[k].max);
 }
 
 static json_t *way_to_json(const measured *m, size_t way)
@@ -134,7 +135,8 @@ static json_t *way_to_json(const measured *m, size_t way)
     figure_row rows[ROW_COUNT], first[ROW_COUNT];
     list_figures(m, way, rows);
     list_figures(m, 0, first);
-    json_t *out = json_pack("{s:s,s:s}", "kernel", bench_kernel_name(m->ways[way].kernel), "isa", cpu_isa_name(m->ways[way].isa));
+    json_t *out = json_pack("{s:s,s:s}", "kernel", bench_kernel_name(m->ways[way].kernel), "isa",
+                            cpu_isa_name(m->ways[way].isa));
     for (int r = 0; r < ROW_COUNT; r++)
         if (rows[r].key != NULL)
             json_object_set_new(out, rows[r].key, json_real(rows[r].value));
@@ -149,11 +151,12 @@ static json_t *way_to_json(const measured *m, size_t way)
 static gbt_status save_figures(const measured *m, gbt_error *err)
 {
     const trace_settings *s = &m->scene->settings;
-    json_t *root = json_pack("{s:i,s:o,s:I,s:I,s:i,s:f,s:f,s:f,s:o}", "schema", 2, "model", json_text(m->def->model), "rays",
-                             (json_int_t)ray_image_count(&m->scene->rays), "gaussians", (json_int_t)m->scene->gaussians->count, "threads",
-                             parallel_threads(), "alpha_min", (double)s->alpha_min, "alpha_max", (double)s->alpha_max, "transmittance_min",
-                             (double)s->transmittance_min, "proxy_radius",
-                             isfinite(s->proxy_radius) ? json_real((double)s->proxy_radius) : json_null());
+    json_t *root = json_pack(
+        "{s:i,s:o,s:I,s:I,s:i,s:f,s:f,s:f,s:o}", "schema", 2, "model", json_text(m->def->model), "rays",
+        (json_int_t)ray_image_count(&m->scene->rays), "gaussians", (json_int_t)m->scene->gaussians->count,
+        "threads", parallel_threads(), "alpha_min", (double)s->alpha_min, "alpha_max", (double)s->alpha_max,
+        "transmittance_min", (double)s->transmittance_min, "proxy_radius",
+        isfinite(s->proxy_radius) ? json_real((double)s->proxy_radius) : json_null());
     json_t *kernels = json_array();
     for (size_t k = 0; k < m->count; k++)
         json_array_append_new(kernels, way_to_json(m, k));
@@ -170,8 +173,11 @@ static gbt_status bench(measured *m, bench_scene *traced, bench_reference *want,
     GBT_TRY(bench_scene_open(def->model, def->camera, traced, err));
     GBT_TRY(override_settings(def, &traced->settings, err));
     GBT_TRY(bench_scene_decode(traced, err));
-    for (size_t k = 0; k < m->count; k++)
-        m->ways[k].isa = cpu_best_isa(), m->ways[k].settings = traced->settings, m->ways[k].tape_bytes_max = def->tape_bytes_max;
+    for (size_t k = 0; k < m->count; k++) {
+        m->ways[k].isa = cpu_best_isa();
+        m->ways[k].settings = traced->settings;
+        m->ways[k].tape_bytes_max = def->tape_bytes_max;
+    }
     GBT_TRY(bench_measure(m->ways, m->count, traced->gaussians, &traced->rays, def->repeats, err));
     if (def->check)
         GBT_TRY(bench_reference_make(traced->gaussians, &traced->settings, &traced->rays, want, err));
@@ -193,8 +199,9 @@ gbt_status lab_bench_trace(const lab_bench_def *def, FILE *out, gbt_error *err)
     const char *list = def->kernel != NULL ? def->kernel : "tile";
     m.count = bench_kernels_parse(list, kernels, KERNELS_MAX);
     if (m.count == 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--kernel: \"%.60s\" (wanted tile, single or embree, or some of them with commas between)",
-                         list);
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "--kernel: \"%.60s\" (wanted tile, single or embree, or some of them with commas between)", list);
     for (size_t k = 0; k < m.count; k++)
         m.ways[k].kernel = kernels[k];
     const gbt_status status = bench(&m, &traced, &want, out, err);

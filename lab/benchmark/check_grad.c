@@ -1,14 +1,16 @@
-/* benchmark/check_grad.c -- gradients on the user's own scene: renderers and decode against the same in double, the whole chain against
-   differences. docs/gradients.md.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* benchmark/check_grad.c -- gradients on the user's own scene: renderers and decode against the same in
+   double, the whole chain against differences. docs/gradients.md.
 
    tracer      float adjoint of the image gradient      | reference_backward() on the same Gaussians
    rasterizer  the same                                 | raster_reference_backward()
    per-ray     the same                                 | reference_backward()
    decode      float adjoint of the Gaussians' gradient | decode_ref_backward() on the same anchors
-   chain       float gradient of the training loss g    | d . g against central differences of the loss, all of it in double; by the tracer
+   chain       float gradient of the training loss g    | d . g against central differences of the loss,
+                                                        | all of it in double; by the tracer
 
-   For normally distributed directions d, E[(d . (g - g'))^2] = |g - g'|^2: a few directions estimate the relative L2 error of a class of
-   parameters, whatever its size. */
+   For normally distributed directions d, E[(d . (g - g'))^2] = |g - g'|^2: a few directions estimate the
+   relative L2 error of a class of parameters, whatever its size. */
 #include <math.h>
 #include <string.h>
 
@@ -24,16 +26,27 @@
 #include "trace/reference.h"
 #include "trace/rounding_band.h"
 
-enum { CHECK_WIDTH = 48, CHECK_WIDTH_LARGE = 24, LARGE_COUNT = 50000, RAY_GRAIN = 16, ANCHOR_GRAIN = 256, DIRECTIONS = 3, ATTEMPTS = 24 };
+enum {
+    CHECK_WIDTH = 48,
+    CHECK_WIDTH_LARGE = 24,
+    LARGE_COUNT = 50000,
+    RAY_GRAIN = 16,
+    ANCHOR_GRAIN = 256,
+    DIRECTIONS = 3,
+    ATTEMPTS = 24
+};
 
-/* What float32 leaves. A trained scene has Gaussians that are 1e-5 of their distance thin, where the rounding of coordinates alone is 1e-2
-   of a std-dev: the renderers' limit is five times that of the tests' random scenes. The chain's is wider again: its two sides do not
-   decode the same bits, so a hit in ten thousand falls on the other side of a cut. */
+/* What float32 leaves. A trained scene has Gaussians that are 1e-5 of their distance thin, where the rounding
+   of coordinates alone is 1e-2 of a std-dev: the renderers' limit is five times that of the tests' random
+   scenes. The chain's is wider again: its two sides do not decode the same bits, so a hit in ten thousand
+   falls on the other side of a cut. */
 static const double renderer_limit = 5e-5, decode_limit = 1e-5, chain_limit = 1e-3;
 
-static const double colour_limit = 1e-5;    /* between splats in float and in double that blend the same */
-static const double step = 1e-8;           /* of a difference, in standard deviations of the direction: few cuts are crossed */
-static const double smooth_limit = 1e-4;   /* the differences to both sides agree to this part of the gradient, or a cut was crossed */
+static const double colour_limit = 1e-5; /* between splats in float and in double that blend the same */
+static const double step =
+    1e-8; /* of a difference, in standard deviations of the direction: few cuts are crossed */
+static const double smooth_limit =
+    1e-4; /* the differences to both sides agree to this part of the gradient, or a cut was crossed */
 static const double gradient_floor = 1e-6; /* below it a difference of double losses is rounding */
 static const double dssim_weight = 0.2, volume_weight = 0.01; /* the training loss */
 
@@ -69,7 +82,7 @@ static void print_row(checker *c, const char *stage, const char *class, double e
     c->broken += !fine;
 }
 
-/* ---- set up -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- set up ---- */
 
 static gbt_status render_at(checker *c, size_t view, int width, gbt_error *err)
 {
@@ -80,7 +93,8 @@ static gbt_status render_at(checker *c, size_t view, int width, gbt_error *err)
     const gbt_camera camera = gbt_camera_resized(&full, c->width, c->height);
     for (int k = 0; k < 3; k++)
         c->camera[k] = (double)(float)camera.center[k];
-    return frame_render(c->frame, frame_neural(&c->run->model.anchors, &c->run->model.decoder), &camera, &c->run->settings, true, err);
+    return frame_render(c->frame, frame_neural(&c->run->model.anchors, &c->run->model.decoder), &camera,
+                        &c->run->settings, true, err);
 }
 
 static gbt_status allocate(checker *c, gbt_error *err)
@@ -98,7 +112,8 @@ static gbt_status allocate(checker *c, gbt_error *err)
     c->slots = mem_calloc(slot_count, DECODE_REF_FIELDS * sizeof *c->slots, "check slots", err);
     c->d_slots = mem_calloc(slot_count, DECODE_REF_FIELDS * sizeof *c->d_slots, "check slots", err);
     c->rgb = mem_calloc(c->ray_count, 3 * sizeof *c->rgb, "check image", err);
-    bool fine = c->weight != NULL && c->d_params != NULL && c->slots != NULL && c->d_slots != NULL && c->rgb != NULL;
+    bool fine =
+        c->weight != NULL && c->d_params != NULL && c->slots != NULL && c->d_slots != NULL && c->rgb != NULL;
     for (int i = 0; i < 3; i++) {
         c->terms[i] = mem_calloc(c->ray_count, 3 * sizeof *c->terms[i], "check loss", err);
         fine = fine && c->terms[i] != NULL;
@@ -106,7 +121,8 @@ static gbt_status allocate(checker *c, gbt_error *err)
     return fine ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
-/* The first held-out view (the first one, when none is held out), small: the reference asks every Gaussian about every ray. */
+/* The first held-out view (the first one, when none is held out), small: the reference asks every Gaussian
+   about every ray. */
 static gbt_status set_up(checker *c, gbt_error *err)
 {
     const scene *s = &c->run->scene;
@@ -124,14 +140,16 @@ static gbt_status set_up(checker *c, gbt_error *err)
         c->valid_count += c->valid == NULL || c->valid[i];
     GBT_TRY(allocate(c, err));
     image_loss_result loss;
-    GBT_TRY(image_loss(&c->frame->rgb, &c->photo, c->valid, dssim_weight, &c->scratch, &c->d_image, &loss, err));
-    fprintf(c->out, "%s, %d x %d pixels: %zu Gaussians of %zu visible anchors, loss %.6g\n", s->views[view].name, c->width, c->height,
-            c->scene.count, c->frame->visible_count, loss.loss + volume_weight * frame_volume(c->frame));
+    GBT_TRY(
+        image_loss(&c->frame->rgb, &c->photo, c->valid, dssim_weight, &c->scratch, &c->d_image, &loss, err));
+    fprintf(c->out, "%s, %d x %d pixels: %zu Gaussians of %zu visible anchors, loss %.6g\n",
+            s->views[view].name, c->width, c->height, c->scene.count, c->frame->visible_count,
+            loss.loss + volume_weight * frame_volume(c->frame));
     fprintf(c->out, "%-12s%-12s%12s%12s\n", "stage", "class", "error", "limit");
     return GBT_OK;
 }
 
-/* ---- renderers ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- renderers ---- */
 
 typedef struct band_job {
     const checker *c;
@@ -145,8 +163,9 @@ static void band_block(size_t block, size_t begin, size_t end, void *context)
     const ray_image *rays = &job->c->frame->rays;
     band_scratch scratch = {0};
     for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++)
-        job->status[block] = rounding_band_find(&job->c->scene, &job->c->run->settings, ray_image_origin(rays, i), rays->dir + 3 * i,
-                                                &scratch, &job->in_band[i]);
+        job->status[block] =
+            rounding_band_find(&job->c->scene, &job->c->run->settings, ray_image_origin(rays, i),
+                               rays->dir + 3 * i, &scratch, &job->in_band[i]);
     band_scratch_free(&scratch);
 }
 
@@ -154,7 +173,8 @@ static void band_block(size_t block, size_t begin, size_t end, void *context)
 static gbt_status find_band(checker *c, bool *in_band, gbt_error *err)
 {
     const size_t blocks = parallel_block_count(c->ray_count, RAY_GRAIN);
-    band_job job = {.c = c, .in_band = in_band, .status = mem_calloc(blocks, sizeof *job.status, "check band", err)};
+    band_job job = {
+        .c = c, .in_band = in_band, .status = mem_calloc(blocks, sizeof *job.status, "check band", err)};
     gbt_status status = job.status == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK)
         parallel_blocks(c->ray_count, RAY_GRAIN, band_block, &job);
@@ -166,12 +186,13 @@ static gbt_status find_band(checker *c, bool *in_band, gbt_error *err)
 }
 
 /* The same for splats, whose definition in double shows no hits: pixels on which it draws another colour. */
-static gbt_status find_other_colours(checker *c, const raster_reference *splats, const raster_settings *settings, bool *in_band,
-                                     gbt_error *err)
+static gbt_status find_other_colours(checker *c, const raster_reference *splats,
+                                     const raster_settings *settings, bool *in_band, gbt_error *err)
 {
     GBT_TRY(raster_reference_forward(splats, &c->frame->camera, settings, 1, c->rgb, err));
     for (size_t i = 0; i < 3 * c->ray_count; i++)
-        in_band[i / 3] = in_band[i / 3] || !(fabs(c->rgb[i] - (double)c->frame->rgb.pixels[i]) <= colour_limit);
+        in_band[i / 3] =
+            in_band[i / 3] || !(fabs(c->rgb[i] - (double)c->frame->rgb.pixels[i]) <= colour_limit);
     return GBT_OK;
 }
 
@@ -182,7 +203,8 @@ typedef struct difference {
 
 static void difference_add(difference *d, double got, double wanted)
 {
-    d->square += (got - wanted) * (got - wanted), d->wanted_square += wanted * wanted;
+    d->square += (got - wanted) * (got - wanted);
+    d->wanted_square += wanted * wanted;
 }
 
 static double difference_relative(const difference *d)
@@ -198,24 +220,28 @@ static void fields_of(const gaussians *g, const float *fields[GAUSSIANS_FIELD_CO
 #undef X
 }
 
-/* The adjoint in double of d_masked, by the renderer's definition. `wanted` [GAUSSIANS_FIELD_COUNT][count], zero before. */
-static gbt_status renderer_in_double(checker *c, const raster_reference *splats, const raster_settings *settings, const double *d_rgb,
-                                     double *wanted, double d_background[3], gbt_error *err)
+/* The adjoint in double of d_masked, by the renderer's definition. `wanted` [GAUSSIANS_FIELD_COUNT][count],
+   zero before. */
+static gbt_status renderer_in_double(checker *c, const raster_reference *splats,
+                                     const raster_settings *settings, const double *d_rgb, double *wanted,
+                                     double d_background[3], gbt_error *err)
 {
     if (c->frame->draw.renderer == FRAME_SPLAT)
-        return raster_reference_backward(splats, &c->frame->camera, settings, d_rgb, wanted, d_background, err);
-    return reference_scene_backward(&c->scene, &c->run->settings, &c->frame->rays, d_rgb, NULL, wanted, d_background, err);
+        return raster_reference_backward(splats, &c->frame->camera, settings, d_rgb, wanted, d_background,
+                                         err);
+    return reference_scene_backward(&c->scene, &c->run->settings, &c->frame->rays, d_rgb, NULL, wanted,
+                                    d_background, err);
 }
 
 static void print_renderer(checker *c, const char *stage, const double *wanted, const float d_background[3],
                            const double d_background_wanted[3])
 {
     static const char *const names[] = {"mean", "scale", "rotation", "opacity", "colour"};
-    static const size_t first[] = {REFERENCE_mean_x, REFERENCE_scale_x, REFERENCE_quat_w, REFERENCE_opacity, REFERENCE_red,
-                                   GAUSSIANS_FIELD_COUNT};
+    static const size_t first[] = {REFERENCE_mean_x,  REFERENCE_scale_x, REFERENCE_quat_w,
+                                   REFERENCE_opacity, REFERENCE_red,     GAUSSIANS_FIELD_COUNT};
     const float *got[GAUSSIANS_FIELD_COUNT];
     fields_of(&c->d_gaussians, got);
-    for (size_t class = 0; class < sizeof names / sizeof *names; class++) {
+    for (size_t class = 0; class < sizeof names / sizeof *names; class ++) {
         difference d = {0};
         for (size_t f = first[class]; f < first[class + 1]; f++)
             for (size_t i = 0; i < c->scene.count; i++)
@@ -239,28 +265,34 @@ static gbt_status check_renderer(checker *c, frame_renderer renderer, const char
     const raster_reference splats = {c->scene.count, c->scene.fields};
     bool *in_band = mem_calloc(c->ray_count, sizeof *in_band, "check rays", err);
     double *d_rgb = mem_alloc(c->ray_count, 3 * sizeof *d_rgb, "check gradient", err);
-    double *wanted = mem_calloc(c->scene.count, GAUSSIANS_FIELD_COUNT * sizeof *wanted, "check gradient", err);
+    double *wanted =
+        mem_calloc(c->scene.count, GAUSSIANS_FIELD_COUNT * sizeof *wanted, "check gradient", err);
     double d_background_wanted[3] = {0};
     float d_background[3];
     size_t left_out = 0;
     gbt_status status = in_band == NULL || d_rgb == NULL || wanted == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK)
-        status = renderer == FRAME_SPLAT ? find_other_colours(c, &splats, &settings, in_band, err) : find_band(c, in_band, err);
+        status = renderer == FRAME_SPLAT ? find_other_colours(c, &splats, &settings, in_band, err)
+                                         : find_band(c, in_band, err);
     for (size_t i = 0; status == GBT_OK && i < 3 * c->ray_count; i++) {
         left_out += i % 3 == 0 && in_band[i / 3];
         c->d_masked.pixels[i] = in_band[i / 3] ? 0 : c->d_image.pixels[i];
         d_rgb[i] = (double)c->d_masked.pixels[i];
     }
     if (status == GBT_OK)
-        status = renderer == FRAME_TRACE ? trace_backward(&f->scene, &f->rays, &c->d_masked, &c->d_gaussians, c->weight, d_background, err)
-                                         : raster_backward(&f->splats, &c->d_masked, &c->d_gaussians, c->weight, d_background, err);
+        status = renderer == FRAME_TRACE ? trace_backward(&f->scene, &f->rays, &c->d_masked, &c->d_gaussians,
+                                                          c->weight, d_background, err)
+                                         : raster_backward(&f->splats, &c->d_masked, &c->d_gaussians,
+                                                           c->weight, d_background, err);
     if (status == GBT_OK)
         status = renderer_in_double(c, &splats, &settings, d_rgb, wanted, d_background_wanted, err);
     if (status == GBT_OK) {
         print_renderer(c, stage, wanted, d_background, d_background_wanted);
-        fprintf(c->out, "%s: %zu of %zu rays are left out: rounding may change what they blend\n", stage, left_out, c->ray_count);
+        fprintf(c->out, "%s: %zu of %zu rays are left out: rounding may change what they blend\n", stage,
+                left_out, c->ray_count);
         if (10 * left_out > 9 * c->ray_count)
-            status = base_fail(err, GBT_ERR_INTERNAL, "check-grad: too few rays are left for the %s's gradients", stage);
+            status = base_fail(err, GBT_ERR_INTERNAL,
+                               "check-grad: too few rays are left for the %s's gradients", stage);
     }
     mem_free(in_band);
     mem_free(d_rgb);
@@ -278,7 +310,7 @@ static gbt_status check_renderers(checker *c, frame_renderer trained, gbt_error 
     return check_renderer(c, FRAME_TRACE, "tracer", err);
 }
 
-/* ---- decode and chain ---------------------------------------------------------------------------------------------------------------- */
+/* ---- decode and chain ---- */
 
 /* A class of parameters in the three forms in which it appears here. */
 typedef struct parameter_class {
@@ -295,35 +327,39 @@ static void list_classes(checker *c, parameter_class out[CLASS_COUNT])
 {
     static const char *const networks[] = {"opacity mlp", "shape mlp", "colour mlp"};
     const size_t n = c->parameters.count;
-    out[0] = (parameter_class){"feature", c->parameters.feature, c->d_parameters.feature, c->d_anchors.feature, n * ANCHOR_FEATURE_DIM};
+    out[0] = (parameter_class){"feature", c->parameters.feature, c->d_parameters.feature,
+                               c->d_anchors.feature, n * ANCHOR_FEATURE_DIM};
     out[1] = (parameter_class){"offset", c->parameters.offset, c->d_parameters.offset, c->d_anchors.offset,
                                n * 3 * (size_t)c->parameters.offset_count};
-    out[2] = (parameter_class){"scale", c->parameters.scale_log, c->d_parameters.scale_log, c->d_anchors.scale_log, n * 6};
+    out[2] = (parameter_class){"scale", c->parameters.scale_log, c->d_parameters.scale_log,
+                               c->d_anchors.scale_log, n * 6};
     decoder_part parts[3];
     decoder_parts(&c->run->model.decoder, parts);
     for (int i = 0; i < 3; i++) {
         const size_t b = parts[i].begin;
-        out[3 + i] = (parameter_class){networks[i], c->parameters.params + b, c->d_parameters.params + b, c->d_params + b,
-                                       parts[i].end - b};
+        out[3 + i] = (parameter_class){networks[i], c->parameters.params + b, c->d_parameters.params + b,
+                                       c->d_params + b, parts[i].end - b};
     }
 }
 
-/* frame_backward() on the whole image; then the same gradients of the Gaussians through the decoder in double. */
+/* frame_backward() on the whole image; then the same gradients of the Gaussians through the decoder in
+   double. */
 static gbt_status check_decode(checker *c, gbt_error *err)
 {
     frame *f = c->frame;
     GBT_TRY(render_at(c, c->view, c->width, err)); /* a kept pass has one adjoint */
-    GBT_TRY(frame_backward(f, &c->run->model.anchors, &c->run->model.decoder, &c->d_image, (float)volume_weight, &c->d_anchors, c->d_params,
-                           err));
+    GBT_TRY(frame_backward(f, &c->run->model.anchors, &c->run->model.decoder, &c->d_image,
+                           (float)volume_weight, &c->d_anchors, c->d_params, err));
     const float *d_fields[GAUSSIANS_FIELD_COUNT];
     fields_of(&f->d_gaussians, d_fields);
     for (size_t i = 0; i < f->gaussians.count; i++)
         for (size_t k = 0; k < GAUSSIANS_FIELD_COUNT; k++)
             c->d_slots[f->tape.slot[i] * (size_t)DECODE_REF_FIELDS + k] = (double)d_fields[k][i];
-    decode_ref_backward(&c->parameters, c->camera, f->visible, f->visible_count, c->d_slots, &c->d_parameters);
+    decode_ref_backward(&c->parameters, c->camera, f->visible, f->visible_count, c->d_slots,
+                        &c->d_parameters);
     parameter_class classes[CLASS_COUNT];
     list_classes(c, classes);
-    for (int class = 0; class < CLASS_COUNT; class++) {
+    for (int class = 0; class < CLASS_COUNT; class ++) {
         difference d = {0};
         for (size_t i = 0; i < classes[class].count; i++)
             difference_add(&d, (double)classes[class].got[i], classes[class].wanted[i]);
@@ -332,18 +368,22 @@ static gbt_status check_decode(checker *c, gbt_error *err)
     return GBT_OK;
 }
 
-/* (1 - w) mean|x - y| + w (1 - SSIM), from the definition (image/metrics.h), in double: the terms of its mean. */
+/* (1 - w) mean|x - y| + w (1 - SSIM), from the definition (image/metrics.h), in double: the terms of its
+   mean. */
 static void loss_terms(const checker *c, double *terms)
 {
     enum { RADIUS = 5, TAPS = 2 * RADIUS + 1 };
     const double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03, values = (double)(3 * c->valid_count);
     double taps[TAPS], total = 0;
-    for (int k = 0; k < TAPS; k++)
-        taps[k] = exp(-(k - RADIUS) * (k - RADIUS) / (2 * 1.5 * 1.5)), total += taps[k];
+    for (int k = 0; k < TAPS; k++) {
+        taps[k] = exp(-(k - RADIUS) * (k - RADIUS) / (2 * 1.5 * 1.5));
+        total += taps[k];
+    }
     for (int y = 0; y < c->height; y++)
         for (int x = 0; x < c->width; x++)
             for (int channel = 0; channel < 3; channel++) {
-                const size_t pixel = (size_t)y * (size_t)c->width + (size_t)x, out = 3 * pixel + (size_t)channel;
+                const size_t pixel = (size_t)y * (size_t)c->width + (size_t)x,
+                             out = 3 * pixel + (size_t)channel;
                 double a = 0, b = 0, aa = 0, bb = 0, ab = 0;
                 terms[out] = 0;
                 if (c->valid != NULL && !c->valid[pixel])
@@ -352,15 +392,23 @@ static void loss_terms(const checker *c, double *terms)
                     for (int dx = -RADIUS; dx <= RADIUS; dx++) {
                         if (x + dx < 0 || x + dx >= c->width || y + dy < 0 || y + dy >= c->height)
                             continue;
-                        const size_t near = (size_t)(y + dy) * (size_t)c->width + (size_t)(x + dx), at = 3 * near + (size_t)channel;
+                        const size_t near = (size_t)(y + dy) * (size_t)c->width + (size_t)(x + dx),
+                                     at = 3 * near + (size_t)channel;
                         if (c->valid != NULL && !c->valid[near])
                             continue;
-                        const double tap = taps[dx + RADIUS] * taps[dy + RADIUS] / (total * total), p = c->rgb[at],
-                            q = (double)c->photo.pixels[at];
-                        a += tap * p, b += tap * q, aa += tap * p * p, bb += tap * q * q, ab += tap * p * q;
+                        const double tap = taps[dx + RADIUS] * taps[dy + RADIUS] / (total * total),
+                                     p = c->rgb[at], q = (double)c->photo.pixels[at];
+                        a += tap * p;
+                        b += tap * q;
+                        aa += tap * p * p;
+                        bb += tap * q * q;
+                        ab += tap * p * q;
                     }
-                const double ssim = (2 * a * b + c1) * (2 * (ab - a * b) + c2) / ((a * a + b * b + c1) * (aa - a * a + bb - b * b + c2));
-                terms[out] = ((1 - dssim_weight) * fabs(c->rgb[out] - (double)c->photo.pixels[out]) + dssim_weight * (1 - ssim)) / values;
+                const double ssim = (2 * a * b + c1) * (2 * (ab - a * b) + c2) /
+                                    ((a * a + b * b + c1) * (aa - a * a + bb - b * b + c2));
+                terms[out] = ((1 - dssim_weight) * fabs(c->rgb[out] - (double)c->photo.pixels[out]) +
+                              dssim_weight * (1 - ssim)) /
+                             values;
             }
 }
 
@@ -372,8 +420,8 @@ static void decode_block(size_t block, size_t begin, size_t end, void *context)
                        c->slots + begin * (size_t)c->parameters.offset_count * DECODE_REF_FIELDS);
 }
 
-/* The training loss of c->parameters, in double from end to end. Gaussians that no ray blended are not traced: they are not in the
-   image. */
+/* The training loss of c->parameters, in double from end to end. Gaussians that no ray blended are not
+   traced: they are not in the image. */
 static gbt_status chain_loss(checker *c, reference_scene *seen, int which, gbt_error *err)
 {
     const frame *f = c->frame;
@@ -396,9 +444,10 @@ static gbt_status chain_loss(checker *c, reference_scene *seen, int which, gbt_e
     return GBT_OK;
 }
 
-/* Differences of the loss along `direction` to both sides, per length. Summed pixel by pixel, so that no large sums are subtracted. */
-static gbt_status differences_along(checker *c, const parameter_class *class, const double *direction, double *keep, reference_scene *seen,
-                                    double out[2], gbt_error *err)
+/* Differences of the loss along `direction` to both sides, per length. Summed pixel by pixel, so that no
+   large sums are subtracted. */
+static gbt_status differences_along(checker *c, const parameter_class *class, const double *direction,
+                                    double *keep, reference_scene *seen, double out[2], gbt_error *err)
 {
     gbt_status status = GBT_OK;
     memcpy(keep, class->value, class->count * sizeof *keep);
@@ -408,16 +457,20 @@ static gbt_status differences_along(checker *c, const parameter_class *class, co
         status = chain_loss(c, seen, side, err);
     }
     memcpy(class->value, keep, class->count * sizeof *keep);
-    out[0] = c->volume[0] - c->volume[1], out[1] = c->volume[2] - c->volume[0];
-    for (size_t i = 0; i < 3 * c->ray_count; i++)
-        out[0] += c->terms[0][i] - c->terms[1][i], out[1] += c->terms[2][i] - c->terms[0][i];
-    out[0] /= step, out[1] /= step;
+    out[0] = c->volume[0] - c->volume[1];
+    out[1] = c->volume[2] - c->volume[0];
+    for (size_t i = 0; i < 3 * c->ray_count; i++) {
+        out[0] += c->terms[0][i] - c->terms[1][i];
+        out[1] += c->terms[2][i] - c->terms[0][i];
+    }
+    out[0] /= step;
+    out[1] /= step;
     return status;
 }
 
 /* `scratch` holds two arrays of the class's size. `error` is NaN when too few directions crossed no cut. */
-static gbt_status check_class(checker *c, const parameter_class *class, uint64_t stream, double *scratch, reference_scene *seen,
-                              size_t *crossed, double *error, gbt_error *err)
+static gbt_status check_class(checker *c, const parameter_class *class, uint64_t stream, double *scratch,
+                              reference_scene *seen, size_t *crossed, double *error, gbt_error *err)
 {
     double *const direction = scratch, *const keep = scratch + class->count;
     double length = 0, square = 0;
@@ -449,7 +502,7 @@ static gbt_status check_chain(checker *c, gbt_error *err)
     parameter_class classes[CLASS_COUNT];
     list_classes(c, classes);
     size_t largest = 0, crossed = 0;
-    for (int class = 0; class < CLASS_COUNT; class++)
+    for (int class = 0; class < CLASS_COUNT; class ++)
         largest = classes[class].count > largest ? classes[class].count : largest;
     reference_scene seen = {0};
     for (size_t i = 0; i < c->scene.count; i++)
@@ -459,15 +512,17 @@ static gbt_status check_chain(checker *c, gbt_error *err)
     gbt_status status = seen.fields == NULL || scratch == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK)
         status = chain_loss(c, &seen, 0, err);
-    for (int class = 0; class < CLASS_COUNT && status == GBT_OK; class++) {
+    for (int class = 0; class < CLASS_COUNT && status == GBT_OK; class ++) {
         double error;
-        status = check_class(c, &classes[class], (uint64_t)class, scratch, &seen, &crossed, &error, err);
+        status = check_class(c, &classes[class], (uint64_t) class, scratch, &seen, &crossed, &error, err);
         if (status == GBT_OK)
             print_row(c, "chain", classes[class].name, error, chain_limit);
     }
     if (status == GBT_OK)
-        fprintf(c->out, "chain: %d random directions for each class; %zu more crossed a cut-off and were drawn again\n", DIRECTIONS,
-                crossed);
+        fprintf(
+            c->out,
+            "chain: %d random directions for each class; %zu more crossed a cut-off and were drawn again\n",
+            DIRECTIONS, crossed);
     reference_scene_free(&seen);
     mem_free(scratch);
     return status;
@@ -516,7 +571,8 @@ gbt_status lab_check_grad(const char *run, FILE *out, gbt_error *err)
     if (status == GBT_OK)
         status = check_chain(&c, err);
     if (status == GBT_OK && c.broken > 0)
-        status = base_fail(err, GBT_ERR_INTERNAL, "%s: %zu gradient errors are above their limits", run, c.broken);
+        status =
+            base_fail(err, GBT_ERR_INTERNAL, "%s: %zu gradient errors are above their limits", run, c.broken);
     free_all(&c);
     loaded_run_close(loaded);
     mem_free(loaded);

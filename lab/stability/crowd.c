@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* stability/crowd.c -- a scene where much overlaps, and the rays of it on which a last bit may show. */
 #include "stability/crowd.h"
 
@@ -33,7 +34,8 @@ void stability_crowd(stability *s, gaussians *g)
     gaussians_free(&two);
 }
 
-size_t stability_find_edges(stability *s, const gaussians *g, const float *dirs, size_t ray_count, bool *on_edge)
+size_t stability_find_edges(stability *s, const gaussians *g, const float *dirs, size_t ray_count,
+                            bool *on_edge)
 {
     trace_settings settings = trace_settings_default();
     const double alpha_min = (double)settings.alpha_min, stop = (double)settings.transmittance_min;
@@ -43,9 +45,11 @@ size_t stability_find_edges(stability *s, const gaussians *g, const float *dirs,
     settings.alpha_min *= 0.99999f; /* those just below count here too */
     stability_ok(s, reference_scene_make(g, &exact, s->err));
     for (size_t i = 0; i < ray_count && s->status == GBT_OK; i++) {
-        const double origin[3] = {0, 0, 0}, dir[3] = {(double)dirs[3 * i], (double)dirs[3 * i + 1], (double)dirs[3 * i + 2]};
+        const double origin[3] = {0, 0, 0},
+                     dir[3] = {(double)dirs[3 * i], (double)dirs[3 * i + 1], (double)dirs[3 * i + 2]};
         double T = 1;
-        stability_ok(s, reference_scene_ray_hits(&exact, &settings, origin, dir, &hits, &count, &capacity, s->err));
+        stability_ok(
+            s, reference_scene_ray_hits(&exact, &settings, origin, dir, &hits, &count, &capacity, s->err));
         on_edge[i] = false;
         for (size_t h = 0; h < count && T >= 0.9 * stop && s->status == GBT_OK; h++) {
             T *= 1 - hits[h].alpha;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* stability/draw.c -- pictures for the cases of the study "stability". */
 #include "stability/draw.h"
 
@@ -9,7 +10,7 @@
 #include "base/vec.h"
 #include "trace/reference.h"
 
-/* ---- pictures -------------------------------------------------------------------------------------------------------------------- */
+/* ---- pictures ---- */
 
 static void fit(stability *s, drawing *d, int width, int height)
 {
@@ -19,11 +20,12 @@ static void fit(stability *s, drawing *d, int width, int height)
         stability_ok(s, image_alloc(&d->rgb, width, height, 3, s->err));
     }
     if (s->status == GBT_OK)
-        stability_ok(s,
-                     mem_reserve((void **)&d->transmittance, &d->transmittance_capacity, 0, count, sizeof(float), "transmittance", s->err));
+        stability_ok(s, mem_reserve((void **)&d->transmittance, &d->transmittance_capacity, 0, count,
+                                    sizeof(float), "transmittance", s->err));
 }
 
-void draw_traced(stability *s, drawing *d, const gaussians *g, const trace_settings *settings, const ray_image *rays)
+void draw_traced(stability *s, drawing *d, const gaussians *g, const trace_settings *settings,
+                 const ray_image *rays)
 {
     if (s->status != GBT_OK)
         return;
@@ -31,17 +33,20 @@ void draw_traced(stability *s, drawing *d, const gaussians *g, const trace_setti
     if (s->status == GBT_OK)
         stability_ok(s, trace_build(&d->traced, g, settings, ray_image_reach(rays), s->err));
     if (s->status == GBT_OK)
-        stability_ok(s, trace_forward(&d->traced, rays, false, &(trace_outputs){.rgb = &d->rgb, .transmittance = d->transmittance}, NULL,
-                                      s->err));
+        stability_ok(s, trace_forward(&d->traced, rays, false,
+                                      &(trace_outputs){.rgb = &d->rgb, .transmittance = d->transmittance},
+                                      NULL, s->err));
 }
 
-void draw_splatted(stability *s, drawing *d, const gaussians *g, const raster_settings *settings, const gbt_camera *camera)
+void draw_splatted(stability *s, drawing *d, const gaussians *g, const raster_settings *settings,
+                   const gbt_camera *camera)
 {
     if (s->status != GBT_OK)
         return;
     fit(s, d, camera->width, camera->height);
     if (s->status == GBT_OK)
-        stability_ok(s, raster_forward(&d->splatted, g, camera, settings, false, &d->rgb, d->transmittance, NULL, s->err));
+        stability_ok(s, raster_forward(&d->splatted, g, camera, settings, false, &d->rgb, d->transmittance,
+                                       NULL, s->err));
 }
 
 void drawing_free(drawing *d)
@@ -50,32 +55,40 @@ void drawing_free(drawing *d)
     raster_scene_free(&d->splatted);
     image_free(&d->rgb);
     mem_free(d->transmittance);
-    d->transmittance = NULL, d->transmittance_capacity = 0;
+    d->transmittance = NULL;
+    d->transmittance_capacity = 0;
 }
 
-void draw_camera(stability *s, drawing *d, const gaussians *g, const trace_settings *settings, const gbt_camera *camera, ray_image *rays)
+void draw_camera(stability *s, drawing *d, const gaussians *g, const trace_settings *settings,
+                 const gbt_camera *camera, ray_image *rays)
 {
     if (s->status == GBT_OK && stability_ok(s, ray_image_from_camera(camera, rays, s->err)))
         draw_traced(s, d, g, settings, rays);
 }
 
-double *draw_exact(stability *s, const gaussians *g, const trace_settings *settings, const ray_image *rays, double *transmittance)
+double *draw_exact(stability *s, const gaussians *g, const trace_settings *settings, const ray_image *rays,
+                   double *transmittance)
 {
     if (s->status != GBT_OK)
         return NULL;
     double *rgb = mem_alloc(ray_image_count(rays), 3 * sizeof *rgb, "picture in double", s->err);
-    if (stability_ok(s, rgb == NULL ? GBT_ERR_NO_MEMORY : reference_forward(g, settings, rays, rgb, transmittance, NULL, s->err)))
+    if (stability_ok(s, rgb == NULL ? GBT_ERR_NO_MEMORY
+                                    : reference_forward(g, settings, rays, rgb, transmittance, NULL, s->err)))
         return rgb;
     mem_free(rgb);
     return NULL;
 }
 
-/* ---- cameras and rays ------------------------------------------------------------------------------------------------------------ */
+/* ---- cameras and rays ---- */
 
 gbt_camera draw_pinhole(int width, int height, double focal, const double center[3])
 {
-    return (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = width, .height = height, .params = {focal, focal, 0.5 * width, 0.5 * height},
-                        .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {center[0], center[1], center[2]}};
+    return (gbt_camera){.model = GBT_CAMERA_PINHOLE,
+                        .width = width,
+                        .height = height,
+                        .params = {focal, focal, 0.5 * width, 0.5 * height},
+                        .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                        .center = {center[0], center[1], center[2]}};
 }
 
 void draw_turned(double yaw, double pitch, double rotation[9])
@@ -95,11 +108,13 @@ void draw_ray(ray_image *rays, size_t i, const double origin[3], const double di
 {
     double unit[3] = {dir[0], dir[1], dir[2]};
     dvec_normalize(unit);
-    for (size_t k = 0; k < 3; k++)
-        rays->origin[3 * i + k] = (float)origin[k], rays->dir[3 * i + k] = (float)unit[k];
+    for (size_t k = 0; k < 3; k++) {
+        rays->origin[3 * i + k] = (float)origin[k];
+        rays->dir[3 * i + k] = (float)unit[k];
+    }
 }
 
-/* ---- Gaussians ------------------------------------------------------------------------------------------------------------------- */
+/* ---- Gaussians ---- */
 
 void draw_some(stability *s, gaussians *g, size_t count)
 {
@@ -111,23 +126,34 @@ void draw_some(stability *s, gaussians *g, size_t count)
         draw_set(g, i, zero, one, NULL, 1, grey);
 }
 
-void draw_set(gaussians *g, size_t i, const double mean[3], const double scale[3], const double quat[4], double opacity,
-              const double color[3])
+void draw_set(gaussians *g, size_t i, const double mean[3], const double scale[3], const double quat[4],
+              double opacity, const double color[3])
 {
     static const double none[4] = {1, 0, 0, 0};
     const double *q = quat != NULL ? quat : none;
-    g->mean_x[i] = (float)mean[0], g->mean_y[i] = (float)mean[1], g->mean_z[i] = (float)mean[2];
-    g->scale_x[i] = (float)scale[0], g->scale_y[i] = (float)scale[1], g->scale_z[i] = (float)scale[2];
-    g->quat_w[i] = (float)q[0], g->quat_x[i] = (float)q[1], g->quat_y[i] = (float)q[2], g->quat_z[i] = (float)q[3];
+    g->mean_x[i] = (float)mean[0];
+    g->mean_y[i] = (float)mean[1];
+    g->mean_z[i] = (float)mean[2];
+    g->scale_x[i] = (float)scale[0];
+    g->scale_y[i] = (float)scale[1];
+    g->scale_z[i] = (float)scale[2];
+    g->quat_w[i] = (float)q[0];
+    g->quat_x[i] = (float)q[1];
+    g->quat_y[i] = (float)q[2];
+    g->quat_z[i] = (float)q[3];
     g->opacity[i] = (float)opacity;
-    g->red[i] = (float)color[0], g->green[i] = (float)color[1], g->blue[i] = (float)color[2];
+    g->red[i] = (float)color[0];
+    g->green[i] = (float)color[1];
+    g->blue[i] = (float)color[2];
 }
 
 static void draw_normals(uint64_t seed, uint64_t stream, uint64_t i, int count, double *out)
 {
     double square = 0;
-    for (int k = 0; k < count; k++)
-        out[k] = rng_normal(seed, stream + (uint64_t)k, i), square += out[k] * out[k];
+    for (int k = 0; k < count; k++) {
+        out[k] = rng_normal(seed, stream + (uint64_t)k, i);
+        square += out[k] * out[k];
+    }
     for (int k = 0; k < count; k++)
         out[k] /= sqrt(square);
 }
@@ -142,7 +168,7 @@ void draw_random_direction(uint64_t seed, uint64_t stream, uint64_t i, double di
     draw_normals(seed, stream, i, 3, dir);
 }
 
-/* ---- comparing ------------------------------------------------------------------------------------------------------------------- */
+/* ---- comparing ---- */
 
 /* NaN when one of the two is. */
 static double larger(double most, double difference)

@@ -1,4 +1,6 @@
-/* stability/draw.h -- pictures for the cases of the study "stability": by the tracer, by the rasterizer, in double. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stability/draw.h -- pictures for the cases of the study "stability": by the tracer, by the rasterizer, in
+   double. */
 #ifndef GBT_STABILITY_DRAW_H
 #define GBT_STABILITY_DRAW_H
 
@@ -17,15 +19,19 @@ typedef struct drawing {
     size_t transmittance_capacity;
 } drawing;
 
-void draw_traced(stability *s, drawing *d, const gaussians *g, const trace_settings *settings, const ray_image *rays);
-void draw_splatted(stability *s, drawing *d, const gaussians *g, const raster_settings *settings, const gbt_camera *camera);
+void draw_traced(stability *s, drawing *d, const gaussians *g, const trace_settings *settings,
+                 const ray_image *rays);
+void draw_splatted(stability *s, drawing *d, const gaussians *g, const raster_settings *settings,
+                   const gbt_camera *camera);
 void drawing_free(drawing *d);
 
 /** Both pictures of a camera; `rays` is scratch. */
-void draw_camera(stability *s, drawing *d, const gaussians *g, const trace_settings *settings, const gbt_camera *camera, ray_image *rays);
+void draw_camera(stability *s, drawing *d, const gaussians *g, const trace_settings *settings,
+                 const gbt_camera *camera, ray_image *rays);
 
 /** The picture in double: [rays][3], free with mem_free(); NULL after a failure. */
-double *draw_exact(stability *s, const gaussians *g, const trace_settings *settings, const ray_image *rays, double *transmittance);
+double *draw_exact(stability *s, const gaussians *g, const trace_settings *settings, const ray_image *rays,
+                   double *transmittance);
 
 /** A pinhole at `center` that looks along z, y down, its middle in the middle. */
 gbt_camera draw_pinhole(int width, int height, double focal, const double center[3]);
@@ -40,8 +46,8 @@ void draw_ray(ray_image *rays, size_t i, const double origin[3], const double di
 void draw_some(stability *s, gaussians *g, size_t count);
 
 /** Set Gaussian i. quat NULL: not turned. */
-void draw_set(gaussians *g, size_t i, const double mean[3], const double scale[3], const double quat[4], double opacity,
-              const double color[3]);
+void draw_set(gaussians *g, size_t i, const double mean[3], const double scale[3], const double quat[4],
+              double opacity, const double color[3]);
 
 /** A random unit quaternion and a random unit vector. */
 void draw_random_turn(uint64_t seed, uint64_t stream, uint64_t i, double quat[4]);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* stability/embree.c -- case A16 of the study "stability": what Embree cannot take, refuses, or loses. */
 #include <math.h>
 #include <stdint.h>
@@ -44,10 +45,13 @@ static void bad_boxes(stability *s)
         trace_scene scene = {.kernel = kernels[k]};
         if (stability_ok(s, trace_build(&scene, &g, &settings, 10, s->err)))
             off += (size_t)llabs((long long)boxes_of(&scene) - (1000 - BAD)) +
-                   (size_t)llabs((long long)(kernels[k] == TRACE_EMBREE ? scene.embree.rejected_count : scene.tree.rejected_count) - BAD);
+                   (size_t)llabs((long long)(kernels[k] == TRACE_EMBREE ? scene.embree.rejected_count
+                                                                        : scene.tree.rejected_count) -
+                                 BAD);
         trace_scene_free(&scene);
     }
-    stability_check(s, "A16a", (double)off, NAN, "%d bad boxes among 1,000; Embree itself drops them and reports no error.", (int)BAD);
+    stability_check(s, "A16a", (double)off, NAN,
+                    "%d bad boxes among 1,000; Embree itself drops them and reports no error.", (int)BAD);
     gaussians_free(&g);
 }
 
@@ -58,7 +62,9 @@ static void bad_rays(stability *s)
     enum { COUNT = 6 * sizeof values / sizeof *values + 1 };
     static const double here[3] = {0, 0, -20}, ahead[3] = {0, 0, 1};
     trace_settings settings = trace_settings_default();
-    settings.background[0] = 0.25f, settings.background[1] = 0.5f, settings.background[2] = 0.75f;
+    settings.background[0] = 0.25f;
+    settings.background[1] = 0.5f;
+    settings.background[2] = 0.75f;
     gaussians g = {0};
     ray_image rays = {0};
     size_t off = 0;
@@ -73,8 +79,10 @@ static void bad_rays(stability *s)
     }
     for (int k = 0; k < KERNELS && s->status == GBT_OK; k++) {
         drawing d = {.traced.kernel = kernels[k]};
-        if (stability_ok(s, trace_build(&d.traced, &g, &settings, 20, s->err)) && stability_ok(s, image_alloc(&d.rgb, COUNT, 1, 3, s->err)))
-            stability_ok(s, trace_forward(&d.traced, &rays, false, &(trace_outputs){.rgb = &d.rgb}, NULL, s->err));
+        if (stability_ok(s, trace_build(&d.traced, &g, &settings, 20, s->err)) &&
+            stability_ok(s, image_alloc(&d.rgb, COUNT, 1, 3, s->err)))
+            stability_ok(
+                s, trace_forward(&d.traced, &rays, false, &(trace_outputs){.rgb = &d.rgb}, NULL, s->err));
         for (size_t i = 0; i < 3 * COUNT && s->status == GBT_OK; i++)
             off += d.rgb.pixels[i] != settings.background[i % 3];
         drawing_free(&d);
@@ -84,7 +92,8 @@ static void bad_rays(stability *s)
     gaussians_free(&g);
 }
 
-/* Embree's memory refused at ever more bytes: each build is an error or whole, never half, and can be repeated. */
+/* Embree's memory refused at ever more bytes: each build is an error or whole, never half, and can be
+   repeated. */
 static void refusals(stability *s)
 {
     const trace_settings settings = trace_settings_default();
@@ -92,7 +101,8 @@ static void refusals(stability *s)
     size_t wrong = 0, refused = 0, tries = 0;
     fill(s, 5000, &g);
     const bool tree_too = stability_number(s, "refuse_trees") != 0;
-    for (int k = tree_too ? 0 : 2; k < KERNELS && s->status == GBT_OK; k += 2) /* TRACE_SINGLE has the tile's tree */
+    for (int k = tree_too ? 0 : 2; k < KERNELS && s->status == GBT_OK; k += 2) /* TRACE_SINGLE has the tile's
+                                                                                  tree */
         for (size_t allowed = 0; allowed < 2000000 && s->status == GBT_OK; allowed += 100000, tries++) {
             trace_scene scene = {.kernel = kernels[k]};
             gbt_error why = {0};
@@ -100,11 +110,13 @@ static void refusals(stability *s)
             const gbt_status status = trace_build(&scene, &g, &settings, 10, &why);
             bvh_limit_memory(SIZE_MAX);
             refused += status == GBT_ERR_NO_MEMORY;
-            wrong += status == GBT_OK ? boxes_of(&scene) != g.count : status != GBT_ERR_NO_MEMORY || why.text[0] == '\0';
+            wrong += status == GBT_OK ? boxes_of(&scene) != g.count
+                                      : status != GBT_ERR_NO_MEMORY || why.text[0] == '\0';
             wrong += trace_build(&scene, &g, &settings, 10, NULL) != GBT_OK || boxes_of(&scene) != g.count;
             trace_scene_free(&scene);
         }
-    stability_check(s, "A16c", (double)wrong, NAN, "%zu of %zu builds refused; a build after each is whole.", refused, tries);
+    stability_check(s, "A16c", (double)wrong, NAN, "%zu of %zu builds refused; a build after each is whole.",
+                    refused, tries);
     gaussians_free(&g);
 }
 
@@ -153,7 +165,8 @@ static void far_boxes(stability *s)
             draw_set(&g, i, mean, scale, NULL, 1, white);
             draw_ray(&rays, i, origin, dir);
         }
-        double *T = mem_alloc(RAYS, sizeof *T, "transmittance", s->err), *exact = T == NULL ? NULL : draw_exact(s, &g, &settings, &rays, T);
+        double *T = mem_alloc(RAYS, sizeof *T, "transmittance", s->err),
+               *exact = T == NULL ? NULL : draw_exact(s, &g, &settings, &rays, T);
         stability_ok(s, T == NULL ? GBT_ERR_NO_MEMORY : GBT_OK);
         for (int k = 0; k < KERNELS && s->status == GBT_OK; k++) {
             drawing d = {.traced.kernel = kernels[k]};
@@ -166,10 +179,10 @@ static void far_boxes(stability *s)
         mem_free(T);
         mem_free(exact);
     }
-    stability_check(
-        s, "A16e", (double)lost, NAN,
-        "%zu rays at spheres of 5 mm at 100 km to 50 cm at 10,000 km, three kernels. Unpadded boxes lose 1 to 72 %% of such hits.",
-        rays_traced);
+    stability_check(s, "A16e", (double)lost, NAN,
+                    "%zu rays at spheres of 5 mm at 100 km to 50 cm at 10,000 km, three kernels. Unpadded "
+                    "boxes lose 1 to 72 %% of such hits.",
+                    rays_traced);
     gaussians_free(&g);
     ray_image_free(&rays);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* stability/gradient.c -- the tracer's gradient against differences in double. */
 #include "stability/gradient.h"
 
@@ -47,7 +48,8 @@ static void make_tangent(const reference_scene *scene, size_t i, double d[GAUSSI
         d[REFERENCE_quat_w + k] -= along * scene->fields[(REFERENCE_quat_w + k) * scene->count + i];
 }
 
-static void trace_gradient(stability *s, const gaussians *g, const trace_settings *settings, const ray_image *rays, gaussians *d_gaussians)
+static void trace_gradient(stability *s, const gaussians *g, const trace_settings *settings,
+                           const ray_image *rays, gaussians *d_gaussians)
 {
     trace_scene traced = {0};
     image rgb = {0}, ones = {0};
@@ -55,7 +57,8 @@ static void trace_gradient(stability *s, const gaussians *g, const trace_setting
     stability_ok(s, image_alloc(&ones, rays->width, rays->height, 3, s->err));
     for (size_t i = 0; i < 3 * ray_image_count(rays) && s->status == GBT_OK; i++)
         ones.pixels[i] = 1;
-    if (s->status == GBT_OK && stability_ok(s, trace_build(&traced, g, settings, ray_image_reach(rays), s->err)) &&
+    if (s->status == GBT_OK &&
+        stability_ok(s, trace_build(&traced, g, settings, ray_image_reach(rays), s->err)) &&
         stability_ok(s, trace_forward(&traced, rays, true, &(trace_outputs){.rgb = &rgb}, NULL, s->err)))
         stability_ok(s, trace_backward(&traced, rays, &ones, d_gaussians, NULL, NULL, s->err));
     trace_scene_free(&traced);
@@ -63,8 +66,8 @@ static void trace_gradient(stability *s, const gaussians *g, const trace_setting
     image_free(&ones);
 }
 
-gradient_error draw_gradient_error(stability *s, const gaussians *g, const trace_settings *settings, const ray_image *rays,
-                                   gaussians *d_gaussians)
+gradient_error draw_gradient_error(stability *s, const gaussians *g, const trace_settings *settings,
+                                   const ray_image *rays, gaussians *d_gaussians)
 {
     differences d = {.settings = settings, .rays = rays};
     double off = 0, all = 0;
@@ -80,8 +83,8 @@ gradient_error draw_gradient_error(stability *s, const gaussians *g, const trace
             want[f] = difference_by(s, &d, f, i);
         make_tangent(&d.scene, i, want);
         size_t f = 0;
-#define X(name, pad, meaning)                                                                    \
-    off += ((double)d_gaussians->name[i] - want[f]) * ((double)d_gaussians->name[i] - want[f]);  \
+#define X(name, pad, meaning)                                                                                \
+    off += ((double)d_gaussians->name[i] - want[f]) * ((double)d_gaussians->name[i] - want[f]);              \
     all += want[f] * want[f], f++;
         GAUSSIANS_FIELDS(X)
 #undef X

@@ -1,4 +1,6 @@
-/* stability/lens.c -- cases of the study "stability" about cameras: wide angles, and rows that are read one after the other. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stability/lens.c -- cases of the study "stability" about cameras: wide angles, and rows that are read one
+   after the other. */
 #include <math.h>
 #include <string.h>
 
@@ -9,14 +11,15 @@
 
 static const double degree = 0.017453292519943295;
 
-/* ---- A10: wide angles ------------------------------------------------------------------------------------------------------------ */
+/* ---- A10: wide angles ---- */
 
 /* Cut-offs so low that a ray within rounding of one shows nothing of it. */
 static trace_settings without_edges(const stability *s)
 {
     trace_settings settings = trace_settings_default();
     (void)s;
-    settings.alpha_min = 1e-6f, settings.transmittance_min = 1e-7f;
+    settings.alpha_min = 1e-6f;
+    settings.transmittance_min = 1e-7f;
     return settings;
 }
 
@@ -39,10 +42,12 @@ static void all_around(stability *s, size_t count, gaussians *g)
 /* Turn a camera to face `number` of a cube. */
 static void face_cube(gbt_camera *camera, int number)
 {
-    draw_turned(number < 4 ? number * 90 * degree : 0, number < 4 ? 0 : (number == 4 ? 90 : -90) * degree, camera->rotation);
+    draw_turned(number < 4 ? number * 90 * degree : 0, number < 4 ? 0 : (number == 4 ? 90 : -90) * degree,
+                camera->rotation);
 }
 
-/* The rays of a pinhole's pixels as another camera has them: where that camera sees the direction, it is asked for its ray. */
+/* The rays of a pinhole's pixels as another camera has them: where that camera sees the direction, it is
+   asked for its ray. */
 static size_t rays_of_other(const ray_image *face, const gbt_camera *other, double angle_max, ray_image *out)
 {
     size_t seen = 0;
@@ -60,7 +65,8 @@ static size_t rays_of_other(const ray_image *face, const gbt_camera *other, doub
     return seen;
 }
 
-static double compare_faces(stability *s, const gaussians *g, const gbt_camera *other, double angle_max, size_t *seen)
+static double compare_faces(stability *s, const gaussians *g, const gbt_camera *other, double angle_max,
+                            size_t *seen)
 {
     static const double here[3] = {0, 0, 0};
     const int size = (int)stability_number(s, "face");
@@ -91,7 +97,8 @@ static double compare_faces(stability *s, const gaussians *g, const gbt_camera *
 }
 
 /* One round Gaussian off the axis: largest error of alpha over a picture around it, by both renderers. */
-static void off_axis(stability *s, double distance, double angle, drawing *ours, drawing *theirs, double error[2])
+static void off_axis(stability *s, double distance, double angle, drawing *ours, drawing *theirs,
+                     double error[2])
 {
     enum { WIDTH = 512, HEIGHT = 384 };
     static const double here[3] = {0, 0, 0}, white[3] = {1, 1, 1};
@@ -100,7 +107,10 @@ static void off_axis(stability *s, double distance, double angle, drawing *ours,
     const double focal = stability_number(s, "focal");
     const trace_settings settings = without_edges(s);
     raster_settings splat = raster_settings_default();
-    splat.alpha_min = settings.alpha_min, splat.dilation = 0, splat.exact_cut = true; /* what is left is the projection */
+    /* what is left is the projection */
+    splat.alpha_min = settings.alpha_min;
+    splat.dilation = 0;
+    splat.exact_cut = true;
     gbt_camera camera = draw_pinhole(WIDTH, HEIGHT, focal, here);
     gaussians g = {0};
     ray_image rays = {0};
@@ -122,11 +132,13 @@ static void off_axis(stability *s, double distance, double angle, drawing *ours,
 static void off_axis_curves(stability *s)
 {
     double angles[16], distances[4], worst[2] = {0, 0};
-    const size_t angle_count = stability_list(s, "angles_deg", 16, angles), distance_count = stability_list(s, "distances", 4, distances);
+    const size_t angle_count = stability_list(s, "angles_deg", 16, angles),
+                 distance_count = stability_list(s, "distances", 4, distances);
     drawing ours = {0}, theirs = {0};
-    stability_chart *chart =
-        stability_new_chart(s, "Wide angles", "Error of one round Gaussian's alpha. Splatting projects it as if the lens were flat there.",
-                            "angle from the axis, degrees", "largest error of alpha");
+    stability_chart *chart = stability_new_chart(
+        s, "Wide angles",
+        "Error of one round Gaussian's alpha. Splatting projects it as if the lens were flat there.",
+        "angle from the axis, degrees", "largest error of alpha");
     chart->series[1].name = "rasterizer, 3 m away", chart->series[2].name = "rasterizer, 1 m away";
     for (size_t d = 0; d < distance_count; d++)
         for (size_t a = 0; a < angle_count && s->status == GBT_OK; a++) {
@@ -139,7 +151,8 @@ static void off_axis_curves(stability *s)
             stability_point(chart, d == 0 ? 1 : 2, angles[a], error[1]);
         }
     stability_check(s, "A10c", worst[0], worst[1],
-                    "Size 0.3 at 3 and 1 m, to %g degrees. The rasterizer without its 0.3 px^2 and its cut at 3 std-devs.",
+                    "Size 0.3 at 3 and 1 m, to %g degrees. The rasterizer without its 0.3 px^2 and its cut "
+                    "at 3 std-devs.",
                     angle_count > 0 ? angles[angle_count - 1] : 0);
     drawing_free(&ours);
     drawing_free(&theirs);
@@ -147,7 +160,8 @@ static void off_axis_curves(stability *s)
 
 gbt_status stability_a10(stability *s)
 {
-    gbt_camera panorama = {.model = GBT_CAMERA_EQUIRECTANGULAR, .width = 512, .height = 256, .params = {512, 256}};
+    gbt_camera panorama = {
+        .model = GBT_CAMERA_EQUIRECTANGULAR, .width = 512, .height = 256, .params = {512, 256}};
     gbt_camera fisheye = {.model = GBT_CAMERA_FISHEYE,
                           .width = 400,
                           .height = 400,
@@ -166,7 +180,7 @@ gbt_status stability_a10(stability *s)
     return s->status;
 }
 
-/* ---- A11: rows read one after the other ------------------------------------------------------------------------------------------ */
+/* ---- A11: rows read one after the other ---- */
 
 /* Where the post stands in row y: the mean column, weighted by what it shows. */
 static double post_in_row(const image *rgb, int y)
@@ -174,7 +188,8 @@ static double post_in_row(const image *rgb, int y)
     double sum = 0, weighted = 0;
     for (int x = 0; x < rgb->width; x++) {
         const double value = (double)rgb->pixels[3 * ((size_t)y * (size_t)rgb->width + (size_t)x)];
-        sum += value, weighted += value * (x + 0.5);
+        sum += value;
+        weighted += value * (x + 0.5);
     }
     return weighted / sum; /* NaN, which fails, where it is not seen */
 }
@@ -197,8 +212,8 @@ gbt_status stability_a11(stability *s)
 {
     enum { WIDTH = 160, HEIGHT = 480 };
     static const double here[3] = {0, 0, 0};
-    const double speed = stability_number(s, "speed"), readout = stability_number(s, "readout"), focal = stability_number(s, "focal"),
-                 depth = stability_number(s, "depth");
+    const double speed = stability_number(s, "speed"), readout = stability_number(s, "readout"),
+                 focal = stability_number(s, "focal"), depth = stability_number(s, "depth");
     const double x0 = 120, skew = focal * speed * readout / depth;
     const trace_settings settings = trace_settings_default();
     const raster_settings splat = raster_settings_default();
@@ -210,8 +225,9 @@ gbt_status stability_a11(stability *s)
     camera.params[2] = x0;
     stability_gaussians(s, &g);
     stability_chart *chart =
-        stability_new_chart(s, "Rolling shutter", "Column of an upright post while the camera moves at 10 m/s: analytic 120 to 60.", "row",
-                            "column, px");
+        stability_new_chart(s, "Rolling shutter",
+                            "Column of an upright post while the camera moves at 10 m/s: analytic 120 to 60.",
+                            "row", "column, px");
     ray_shot shot = ray_shot_of(&camera);
     shot.shutter = RAY_SHUTTER_ROWS;
     if (s->status == GBT_OK && stability_ok(s, ray_image_from_shot(&shot, 0, &rays, s->err)))
@@ -219,14 +235,17 @@ gbt_status stability_a11(stability *s)
     draw_camera(s, &ours, &g, &settings, &camera, &rays);
     for (size_t i = 0; i < 3 * WIDTH * HEIGHT && s->status == GBT_OK; i++)
         changed += memcmp(&ours.rgb.pixels[i], &still.rgb.pixels[i], sizeof(float)) != 0;
-    const double apart = s->status == GBT_OK ? draw_difference(ours.rgb.pixels, still.rgb.pixels, 3 * WIDTH * HEIGHT) : 0;
+    const double apart =
+        s->status == GBT_OK ? draw_difference(ours.rgb.pixels, still.rgb.pixels, 3 * WIDTH * HEIGHT) : 0;
     shot.end.center[0] += speed * readout;
     if (s->status == GBT_OK && stability_ok(s, ray_image_from_shot(&shot, 0, &rays, s->err)))
         draw_traced(s, &ours, &g, &settings, &rays);
     draw_splatted(s, &theirs, &g, &splat, &camera);
     if (s->status == GBT_OK) {
-        const double off = post_error(&ours.rgb, x0, skew, chart, 0), splat_off = post_error(&theirs.rgb, x0, skew, chart, 1);
-        stability_check(s, "A11a", off, splat_off, "Skew %.0f px from top to bottom. The rasterizer has one pose per picture.", skew);
+        const double off = post_error(&ours.rgb, x0, skew, chart, 0),
+                     splat_off = post_error(&theirs.rgb, x0, skew, chart, 1);
+        stability_check(s, "A11a", off, splat_off,
+                        "Skew %.0f px from top to bottom. The rasterizer has one pose per picture.", skew);
         stability_check(s, "A11b", (double)changed, NAN, "Largest difference %.2g.", apart);
     }
     drawing_free(&ours);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* stability/model.c -- 3DGS files made in memory and read back. */
 #include "stability/model.h"
 
@@ -7,8 +8,9 @@
 
 static void put_model(sink *out, const float (*rows)[MODEL_COLUMNS], size_t count)
 {
-    static const char *const names[MODEL_COLUMNS] = {"x",       "y",       "z",       "f_dc_0", "f_dc_1", "f_dc_2", "opacity",
-                                                     "scale_0", "scale_1", "scale_2", "rot_0",  "rot_1",  "rot_2",  "rot_3"};
+    static const char *const names[MODEL_COLUMNS] = {"x",      "y",       "z",       "f_dc_0",  "f_dc_1",
+                                                     "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2",
+                                                     "rot_0",  "rot_1",   "rot_2",   "rot_3"};
     char line[96];
     snprintf(line, sizeof line, "ply\nformat binary_little_endian 1.0\nelement vertex %zu\n", count);
     sink_put_text(out, line);
@@ -22,7 +24,8 @@ static void put_model(sink *out, const float (*rows)[MODEL_COLUMNS], size_t coun
             sink_put_f32(out, rows[i][k]);
 }
 
-gbt_status stability_read_model(stability *s, const float (*rows)[MODEL_COLUMNS], size_t count, gaussian_cloud *out)
+gbt_status stability_read_model(stability *s, const float (*rows)[MODEL_COLUMNS], size_t count,
+                                gaussian_cloud *out)
 {
     sink bytes = {0};
     gbt_error err = {0};
@@ -44,6 +47,7 @@ gbt_status stability_read_model(stability *s, const float (*rows)[MODEL_COLUMNS]
 size_t stability_bad_in_model(const gaussian_cloud *cloud)
 {
     const size_t n = cloud->count;
-    return draw_count_bad(cloud->mean, 3 * n) + draw_count_bad(cloud->scale_log, 3 * n) + draw_count_bad(cloud->quat, 4 * n) +
-           draw_count_bad(cloud->opacity, n) + draw_count_bad(cloud->sh, 3 * GAUSSIAN_SH_COUNT * n);
+    return draw_count_bad(cloud->mean, 3 * n) + draw_count_bad(cloud->scale_log, 3 * n) +
+           draw_count_bad(cloud->quat, 4 * n) + draw_count_bad(cloud->opacity, n) +
+           draw_count_bad(cloud->sh, 3 * GAUSSIAN_SH_COUNT * n);
 }

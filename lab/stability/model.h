@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* stability/model.h -- 3DGS files made in memory and read back, for the cases of the study "stability". */
 #ifndef GBT_STABILITY_MODEL_H
 #define GBT_STABILITY_MODEL_H
@@ -12,7 +13,8 @@ enum { MODEL_COLUMNS = 14 }; /* x y z, f_dc 0 to 2, opacity (logit), scale (log)
  *
  * @return what the reader returns; GBT_ERR_FORMAT (nothing usable is left) is not a failure of the case
  */
-gbt_status stability_read_model(stability *s, const float (*rows)[MODEL_COLUMNS], size_t count, gaussian_cloud *out);
+gbt_status stability_read_model(stability *s, const float (*rows)[MODEL_COLUMNS], size_t count,
+                                gaussian_cloud *out);
 
 /** How many values of a cloud are not finite. */
 size_t stability_bad_in_model(const gaussian_cloud *cloud);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* stability/order.c -- cases of the study "stability" about order: ties, and very many hits. */
 #include <math.h>
 #include <string.h>
@@ -7,12 +8,13 @@
 #include "base/rng.h"
 #include "stability/crowd.h"
 
-/* ---- A4: Gaussians in one place -------------------------------------------------------------------------------------------------- */
+/* ---- A4: Gaussians in one place ---- */
 
 /* What a stack of n copies lets through and shows, with the same cut-offs. */
 static void stack_exact(double alpha, size_t n, double stop, double *T, double *red, double *blue)
 {
-    *T = 1, *red = *blue = 0;
+    *T = 1;
+    *red = *blue = 0;
     for (size_t i = 0; i < n && *T * (1 - alpha) >= stop; i++) {
         *(2 * i < n ? red : blue) += *T * alpha;
         *T *= 1 - alpha;
@@ -23,13 +25,15 @@ typedef struct stack_errors {
     double absolute, relative, color, build_seconds;
 } stack_errors;
 
-static void compare_stack(const drawing *d, size_t pixel, double alpha, size_t n, double stop, stack_errors *out)
+static void compare_stack(const drawing *d, size_t pixel, double alpha, size_t n, double stop,
+                          stack_errors *out)
 {
     double T, red, blue;
     stack_exact(alpha, n, stop, &T, &red, &blue);
     const float *rgb = d->rgb.pixels + 3 * pixel;
     const double off = fabs((double)d->transmittance[pixel] - T);
-    out->absolute = fmax(out->absolute, off), out->relative = fmax(out->relative, off / T);
+    out->absolute = fmax(out->absolute, off);
+    out->relative = fmax(out->relative, off / T);
     out->color = fmax(out->color, fmax(fabs((double)rgb[0] - red), fabs((double)rgb[2] - blue)));
 }
 
@@ -79,9 +83,11 @@ static void stacks(stability *s)
     }
     const double most = sizes > 0 ? counts[sizes - 1] : 0;
     stability_check(s, "A4a", e.absolute, r.absolute,
-                    "1 to %.0f copies (the rasterizer: to %.0f), against 0.99^n up to where T falls to 1e-4.", most, raster_most);
+                    "1 to %.0f copies (the rasterizer: to %.0f), against 0.99^n up to where T falls to 1e-4.",
+                    most, raster_most);
     stability_check(s, "A4b", e.relative, r.relative, "%s", "");
-    stability_check(s, "A4c", e.color, r.color, "The first half is red and the second blue: equal depths go by index.");
+    stability_check(s, "A4c", e.color, r.color,
+                    "The first half is red and the second blue: equal depths go by index.");
     stability_check(s, "A4e", e.build_seconds, NAN, "%.0f copies.", most);
     drawing_free(&ours);
     drawing_free(&theirs);
@@ -103,7 +109,8 @@ static void shuffle(stability *s, const gaussians *g, gaussians *out)
     }
 }
 
-/* Two pictures of the same Gaussians: values whose bits differ, and by how much at most; but for rays on edges. */
+/* Two pictures of the same Gaussians: values whose bits differ, and by how much at most; but for rays on
+   edges. */
 static size_t bits_changed(const stability *s, const drawing d[2], const bool *on_edge, double *most)
 {
     const size_t values = 3 * (size_t)d[0].rgb.width * (size_t)d[0].rgb.height;
@@ -126,7 +133,8 @@ static void stored_anyhow(stability *s)
     const raster_settings splat = raster_settings_default();
     const gbt_camera camera = draw_pinhole(WIDTH, HEIGHT, 80, here);
     gaussians g = {0}, other = {0};
-    drawing single[2] = {{.traced.kernel = TRACE_SINGLE}, {.traced.kernel = TRACE_SINGLE}}, tiles[2] = {0}, splats[2] = {0};
+    drawing single[2] = {{.traced.kernel = TRACE_SINGLE}, {.traced.kernel = TRACE_SINGLE}}, tiles[2] = {0},
+            splats[2] = {0};
     ray_image rays = {0};
     double most, tile_most, splat_most;
     bool on_edge[WIDTH * HEIGHT];
@@ -142,12 +150,15 @@ static void stored_anyhow(stability *s)
     }
     if (s->status == GBT_OK)
         edges = stability_find_edges(s, &g, rays.dir, WIDTH * HEIGHT, on_edge);
-    const size_t changed = bits_changed(s, single, on_edge, &most), tile_changed = bits_changed(s, tiles, on_edge, &tile_most);
+    const size_t changed = bits_changed(s, single, on_edge, &most),
+                 tile_changed = bits_changed(s, tiles, on_edge, &tile_most);
     const size_t splat_changed = bits_changed(s, splats, on_edge, &splat_most);
     stability_check(s, "A4d", (double)changed, (double)splat_changed,
-                    "%zu Gaussians. Equal depths go by place in the array: %zu of %d rays within rounding of a tie or a cut are left out.",
+                    "%zu Gaussians. Equal depths go by place in the array: %zu of %d rays within rounding of "
+                    "a tie or a cut are left out.",
                     g.count, edges, WIDTH * HEIGHT);
-    stability_check(s, "A4f", tile_most, splat_most, "The last bit of %zu of %d values: a tile multiplies in the order of its rows.",
+    stability_check(s, "A4f", tile_most, splat_most,
+                    "The last bit of %zu of %d values: a tile multiplies in the order of its rows.",
                     tile_changed, 3 * WIDTH * HEIGHT);
     for (int i = 0; i < 2; i++) {
         drawing_free(&single[i]);
@@ -166,7 +177,7 @@ gbt_status stability_a4(stability *s)
     return s->status;
 }
 
-/* ---- A6: very many hits ---------------------------------------------------------------------------------------------------------- */
+/* ---- A6: very many hits ---- */
 
 static void concentric(stability *s, size_t count, double opacity, gaussians *g)
 {
@@ -174,13 +185,15 @@ static void concentric(stability *s, size_t count, double opacity, gaussians *g)
     draw_some(s, g, count);
     for (size_t i = 0; i < count && s->status == GBT_OK; i++) {
         const double share = (double)i / (double)count;
-        const double mean[3] = {0, 0, 4 + 2 * (double)rng_uniform(6, 0, i)}, color[3] = {share, 1 - share, 0.5};
+        const double mean[3] = {0, 0, 4 + 2 * (double)rng_uniform(6, 0, i)},
+                     color[3] = {share, 1 - share, 0.5};
         draw_set(g, i, mean, scale, NULL, opacity, color);
     }
 }
 
 /* Processor seconds of one picture, the least of five. */
-static double time_picture(stability *s, drawing *d, const gaussians *g, const trace_settings *settings, const ray_image *rays)
+static double time_picture(stability *s, drawing *d, const gaussians *g, const trace_settings *settings,
+                           const ray_image *rays)
 {
     double least = INFINITY;
     for (int i = 0; i < 5; i++) {
@@ -196,7 +209,8 @@ gbt_status stability_a6(stability *s)
     static const double here[3] = {0, 0, 0};
     static const trace_kernel kernels[] = {TRACE_TILE, TRACE_SINGLE, TRACE_EMBREE};
     const size_t count = (size_t)stability_number(s, "gaussians");
-    const gbt_camera camera = draw_pinhole(8, 8, 60, here); /* slopes below 0.085: every ray is well inside every Gaussian */
+    const gbt_camera camera =
+        draw_pinhole(8, 8, 60, here); /* slopes below 0.085: every ray is well inside every Gaussian */
     trace_settings settings = trace_settings_default();
     gaussians g = {0};
     ray_image rays = {0};
@@ -221,7 +235,9 @@ gbt_status stability_a6(stability *s)
     stability_check(s, "A6c", large / small / (10 * log2((double)count) / log2((double)count / 10)), NAN,
                     "Processor time of build and picture, the least of five.");
 
-    settings.background[0] = 0.25f, settings.background[1] = 0.5f, settings.background[2] = 0.75f;
+    settings.background[0] = 0.25f;
+    settings.background[1] = 0.5f;
+    settings.background[2] = 0.75f;
     concentric(s, (size_t)stability_number(s, "unseen"), stability_number(s, "unseen_opacity"), &g);
     draw_traced(s, &d, &g, &settings, &rays);
     double shown = 0;

@@ -1,4 +1,6 @@
-/* stability/partition.c -- cases of the study "stability" about what sorts and measures: growth, balls, SSIM. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stability/partition.c -- cases of the study "stability" about what sorts and measures: growth, balls,
+   SSIM. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +15,7 @@
 #include "image/metrics.h"
 #include "frame/frame.h"
 
-/* ---- A14: growth explodes, or all anchors go ----------------------------------------------------------------------------------------- */
+/* ---- A14: growth explodes, or all anchors go ---- */
 
 typedef struct colony {
     anchors a;
@@ -41,23 +43,29 @@ static void colony_make(stability *s, colony *c, size_t count, double at, float 
             c->a.position[3 * i + k] = (float)(at + 2 * (double)rng_uniform(14, k, i));
         for (size_t k = 0; k < 15; k++)
             c->a.offset[15 * i + k] = rng_uniform(14, 10 + k, i);
-        for (size_t k = 0; k < 5; k++)
-            c->stats.grad_count[5 * i + k] = 100, c->stats.grad_accum[5 * i + k] = 100;
-        c->stats.visit_count[i] = 100, c->stats.use_accum[i] = 100 * opacity * (1 + rng_uniform(14, 30, i));
+        for (size_t k = 0; k < 5; k++) {
+            c->stats.grad_count[5 * i + k] = 100;
+            c->stats.grad_accum[5 * i + k] = 100;
+        }
+        c->stats.visit_count[i] = 100;
+        c->stats.use_accum[i] = 100 * opacity * (1 + rng_uniform(14, 30, i));
     }
 }
 
 static void colony_adjust(stability *s, colony *c, size_t cap, float voxel)
 {
     adjust_def def = adjust_def_default();
-    def.grad_threshold = 0, def.voxel_size = voxel, def.max_anchors = cap;
+    def.grad_threshold = 0;
+    def.voxel_size = voxel;
+    def.max_anchors = cap;
     if (s->status == GBT_OK)
         stability_ok(s, anchors_adjust(&c->a, &c->stats, &def, &c->result, s->err));
 }
 
 static void explosion(stability *s)
 {
-    const size_t count = (size_t)stability_number(s, "anchors"), cap = (size_t)stability_number(s, "max_anchors");
+    const size_t count = (size_t)stability_number(s, "anchors"),
+                 cap = (size_t)stability_number(s, "max_anchors");
     const int before = parallel_threads();
     colony c[2] = {0}, whole = {0};
     for (int i = 0; i < 2; i++) {
@@ -69,12 +77,15 @@ static void explosion(stability *s)
     colony_make(s, &whole, count, 0, 1);
     colony_adjust(s, &whole, SIZE_MAX, 0.001f);
     const size_t rows = c[0].a.count;
-    const bool same = rows == c[1].a.count && memcmp(c[0].a.position, c[1].a.position, 3 * rows * sizeof(float)) == 0;
+    const bool same =
+        rows == c[1].a.count && memcmp(c[0].a.position, c[1].a.position, 3 * rows * sizeof(float)) == 0;
     const bool best = s->status == GBT_OK && rows <= whole.a.count &&
                       memcmp(c[0].a.position, whole.a.position, 3 * rows * sizeof(float)) == 0;
     stability_check(s, "A14a", (double)rows - (double)cap, NAN,
-                    "%zu anchors, all %zu Gaussians ask for more; without a cap there would be %zu.", count, 5 * count, whole.a.count);
-    stability_check(s, "A14b", !same + !best, NAN, "With 1 and 2 threads; equal gradients go by level and cell.");
+                    "%zu anchors, all %zu Gaussians ask for more; without a cap there would be %zu.", count,
+                    5 * count, whole.a.count);
+    stability_check(s, "A14b", !same + !best, NAN,
+                    "With 1 and 2 threads; equal gradients go by level and cell.");
     colony_free(&c[0]);
     colony_free(&c[1]);
     colony_free(&whole);
@@ -89,7 +100,9 @@ static void nobody_left(stability *s)
     decoder d = {0};
     frame f = {0};
     trace_settings settings = trace_settings_default();
-    settings.background[0] = 0.25f, settings.background[1] = 0.5f, settings.background[2] = 0.75f;
+    settings.background[0] = 0.25f;
+    settings.background[1] = 0.5f;
+    settings.background[2] = 0.75f;
     double off = NAN;
     if (s->status == GBT_OK && stability_ok(s, decoder_init(&d, 5, false, 1, s->err)) &&
         stability_ok(s, frame_render(&f, frame_neural(&none, &d), &camera, &settings, false, s->err))) {
@@ -127,14 +140,17 @@ gbt_status stability_a14(stability *s)
     return s->status;
 }
 
-/* ---- A15: balls ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- A15: balls ---- */
 
 typedef void cloud_shape(size_t i, size_t n, double out[3]);
 
 static void same_place(size_t i, size_t n, double out[3])
 {
-    (void)i, (void)n;
-    out[0] = 1, out[1] = 2, out[2] = 3;
+    (void)i;
+    (void)n;
+    out[0] = 1;
+    out[1] = 2;
+    out[2] = 3;
 }
 
 static void on_a_line(size_t i, size_t n, double out[3])
@@ -146,7 +162,9 @@ static void on_a_line(size_t i, size_t n, double out[3])
 static void on_a_plane(size_t i, size_t n, double out[3])
 {
     (void)n;
-    out[0] = (double)rng_uniform(15, 0, i), out[1] = (double)rng_uniform(15, 1, i), out[2] = 0.5;
+    out[0] = (double)rng_uniform(15, 0, i);
+    out[1] = (double)rng_uniform(15, 1, i);
+    out[2] = 0.5;
 }
 
 static void octahedron(size_t i, size_t n, double out[3])
@@ -177,11 +195,16 @@ static void far_away(size_t i, size_t n, double out[3])
         out[k] = 4.5e6 + 100 * out[k];
 }
 
-static const struct { const char *name; cloud_shape *shape; size_t count; } clouds[] = {
-    {"one", in_a_cube, 1},         {"two", in_a_cube, 2},         {"identical", same_place, 1000},  {"a line", on_a_line, 1000},
-    {"a plane", on_a_plane, 1000}, {"octahedron", octahedron, 6}, {"octahedra", octahedron, 600},
-    {"an outlier at 1e6", one_outlier, 1000},
-    {"at 4.5e6", far_away, 1000},  {"a cube", in_a_cube, 1000},
+static const struct {
+    const char *name;
+    cloud_shape *shape;
+    size_t count;
+} clouds[] = {
+    {"one", in_a_cube, 1},           {"two", in_a_cube, 2},
+    {"identical", same_place, 1000}, {"a line", on_a_line, 1000},
+    {"a plane", on_a_plane, 1000},   {"octahedron", octahedron, 6},
+    {"octahedra", octahedron, 600},  {"an outlier at 1e6", one_outlier, 1000},
+    {"at 4.5e6", far_away, 1000},    {"a cube", in_a_cube, 1000},
 };
 
 static size_t permuted(size_t i, size_t n)
@@ -192,7 +215,8 @@ static size_t permuted(size_t i, size_t n)
 static gbt_status build_cloud(stability *s, cloud_shape *shape, size_t n, bool permute, balls *out)
 {
     balls_def def = balls_def_default();
-    def.voxel_size = 0.01f, def.max_depth = 64;
+    def.voxel_size = 0.01f;
+    def.max_depth = 64;
     float *position = mem_alloc(3 * n, sizeof *position, "points", s->err);
     if (position == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -268,8 +292,10 @@ gbt_status stability_a15(stability *s)
             if (stability_ok(s, build_cloud(s, clouds[i].shape, n, k == 2, &b[k])))
                 wrong += count_wrong(&b[k], n, seen);
         }
-        if (s->status == GBT_OK)
-            threads_differ += !same_balls(&b[0], &b[1]), order_differs += !same_balls(&b[0], &b[2]);
+        if (s->status == GBT_OK) {
+            threads_differ += !same_balls(&b[0], &b[1]);
+            order_differs += !same_balls(&b[0], &b[2]);
+        }
         for (int k = 0; k < 3; k++)
             balls_free(&b[k]);
     }
@@ -281,17 +307,18 @@ gbt_status stability_a15(stability *s)
         stability_ok(s, build_cloud(s, same_place, large, false, &many));
     const double seconds = clock_wall() - start;
     stability_check(s, "A15a", (double)wrong, NAN,
-                    "One, two, identical, in a line, in a plane, an octahedron, an outlier at 1e6, coordinates of 4.5e6, a cube.");
+                    "One, two, identical, in a line, in a plane, an octahedron, an outlier at 1e6, "
+                    "coordinates of 4.5e6, a cube.");
     stability_check(s, "A15b", (double)threads_differ, NAN, "%s", "");
     stability_check(s, "A15c", (double)order_differs, NAN,
-                    "Centres and radii, bit for bit. Of a hundred octahedra, whose three variances tie, the same balls come in another "
-                    "order.");
+                    "Centres and radii, bit for bit. Of a hundred octahedra, whose three variances tie, the "
+                    "same balls come in another order.");
     stability_check(s, "A15d", seconds, NAN, "%zu points, %zu ball.", large, many.count);
     balls_free(&many);
     return s->status;
 }
 
-/* ---- A17: SSIM ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- A17: SSIM ---- */
 
 /* By definition, in two passes in long double; windows see 0 beyond the border. */
 static double ssim_exact(const image *a, const image *b)
@@ -310,16 +337,18 @@ static double ssim_exact(const image *a, const image *b)
                             const bool inside = x + u >= 0 && x + u < width && y + v >= 0 && y + v < height;
                             const int at = inside ? 3 * ((y + v) * width + x + u) + c : 0;
                             const long double w = taps[u + 5] * taps[v + 5] / (all * all);
-                            const long double p = inside ? (long double)a->pixels[at] : 0, q = inside ? (long double)b->pixels[at] : 0;
-                            if (pass == 0)
-                                mean[0] += w * p, mean[1] += w * q;
-                            else
-                                var[0] += w * (p - mean[0]) * (p - mean[0]), var[1] += w * (q - mean[1]) * (q - mean[1]),
+                            const long double p = inside ? (long double)a->pixels[at] : 0,
+                                              q = inside ? (long double)b->pixels[at] : 0;
+                            if (pass == 0) {
+                                mean[0] += w * p;
+                                mean[1] += w * q;
+                            } else
+                                var[0] += w * (p - mean[0]) * (p - mean[0]),
+                                    var[1] += w * (q - mean[1]) * (q - mean[1]),
                                     cov += w * (p - mean[0]) * (q - mean[1]);
                         }
-                sum += (2 * mean[0] * mean[1] + 1e-4L) * (2 * cov +
-                                                          9e-4L) / ((mean[0] * mean[0] + mean[1] * mean[1] +
-                                                                     1e-4L) * (var[0] + var[1] + 9e-4L));
+                sum += (2 * mean[0] * mean[1] + 1e-4L) * (2 * cov + 9e-4L) /
+                       ((mean[0] * mean[0] + mean[1] * mean[1] + 1e-4L) * (var[0] + var[1] + 9e-4L));
             }
     return (double)(sum / (3 * width * height));
 }
@@ -329,7 +358,8 @@ typedef struct similarity {
     size_t bad;                  /* gradients that are not finite */
 } similarity;
 
-static void compare_pictures(stability *s, int width, int height, float low, float high, float shift, similarity *out)
+static void compare_pictures(stability *s, int width, int height, float low, float high, float shift,
+                             similarity *out)
 {
     image a = {0}, b = {0}, d = {0};
     loss_scratch scratch = {0};
@@ -337,8 +367,10 @@ static void compare_pictures(stability *s, int width, int height, float low, flo
     stability_ok(s, image_alloc(&a, width, height, 3, s->err));
     stability_ok(s, image_alloc(&b, width, height, 3, s->err));
     stability_ok(s, image_alloc(&d, width, height, 3, s->err));
-    for (size_t i = 0; s->status == GBT_OK && i < 3 * (size_t)width * (size_t)height; i++)
-        a.pixels[i] = low + (high - low) * rng_uniform(17, 0, i), b.pixels[i] = a.pixels[i] + shift * rng_uniform(17, 1, i);
+    for (size_t i = 0; s->status == GBT_OK && i < 3 * (size_t)width * (size_t)height; i++) {
+        a.pixels[i] = low + (high - low) * rng_uniform(17, 0, i);
+        b.pixels[i] = a.pixels[i] + shift * rng_uniform(17, 1, i);
+    }
     if (s->status == GBT_OK && stability_ok(s, image_loss(&a, &b, NULL, 0.2, &scratch, &d, &loss, s->err))) {
         const double got = metric_ssim(&a, &b);
         out->equal = fmax(out->equal, fmax(fabs(1 - metric_ssim(&a, &a)), fabs(1 - metric_ssim(&b, &b))));
@@ -355,8 +387,8 @@ static void compare_pictures(stability *s, int width, int height, float low, flo
 gbt_status stability_a17(stability *s)
 {
     static const int sizes[][2] = {{1, 1}, {1, 11}, {10, 10}, {11, 11}, {31, 29}};
-    static const float ranges[][3] = {{0, 0, 0}, {0.6f, 0.6f, 1e-7f}, {1, 1, 0}, {100, 100, 0}, {255, 255, 1e-4f}, {0, 1, 0.1f},
-                                      {0, 255, 20}, {0, 1, -2}};
+    static const float ranges[][3] = {{0, 0, 0},         {0.6f, 0.6f, 1e-7f}, {1, 1, 0},    {100, 100, 0},
+                                      {255, 255, 1e-4f}, {0, 1, 0.1f},        {0, 255, 20}, {0, 1, -2}};
     similarity all = {.beyond = -INFINITY};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
         for (size_t k = 0; k < sizeof ranges / sizeof *ranges && s->status == GBT_OK; k++)
@@ -368,11 +400,14 @@ gbt_status stability_a17(stability *s)
         nan.pixels[600] = NAN;
         with_nan = metric_ssim(&nan, &nan);
     }
-    stability_check(s, "A17a", all.equal, NAN, "Constants of 0, 0.6, 1, 100 and 255, noise up to 255; 1 x 1 to 31 x 29 pixels.");
-    stability_check(s, "A17b", all.error, NAN, "Two passes in long double, every pixel, zeros beyond the border; below 11 pixels too.");
+    stability_check(s, "A17a", all.equal, NAN,
+                    "Constants of 0, 0.6, 1, 100 and 255, noise up to 255; 1 x 1 to 31 x 29 pixels.");
+    stability_check(s, "A17b", all.error, NAN,
+                    "Two passes in long double, every pixel, zeros beyond the border; below 11 pixels too.");
     stability_check(s, "A17c", all.beyond, NAN, "%s", "");
     stability_check(s, "A17d", (double)all.bad, NAN, "%s", "");
-    stability_check(s, "A17e", !isnan(with_nan), NAN, "A picture with a NaN has no SSIM; training leaves such pixels of photos out.");
+    stability_check(s, "A17e", !isnan(with_nan), NAN,
+                    "A picture with a NaN has no SSIM; training leaves such pixels of photos out.");
     image_free(&nan);
     return s->status;
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* stability/practice.c -- data sets of known Gaussians on disk, and runs on them. */
 #include "stability/practice.h"
 
@@ -14,13 +15,15 @@
 
 static const double degree = 0.017453292519943295;
 
-/* ---- the scene ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- the scene ---- */
 
 /* Evenly spread (Fibonacci), coloured in smooth bands: something to learn from every side. */
 static void put_gaussian(practice *p, size_t i, size_t count)
 {
-    const double z = 1 - (2 * (double)i + 1) / (double)count, turn = 2.399963229728653 * (double)i, r = sqrt(1 - z * z);
-    const double mean[3] = {r * cos(turn), z, r * sin(turn)}, size = 1.2 / sqrt((double)count), scale[3] = {size, size, size};
+    const double z = 1 - (2 * (double)i + 1) / (double)count, turn = 2.399963229728653 * (double)i,
+                 r = sqrt(1 - z * z);
+    const double mean[3] = {r * cos(turn), z, r * sin(turn)}, size = 1.2 / sqrt((double)count),
+                 scale[3] = {size, size, size};
     double color[3];
     for (int c = 0; c < 3; c++) {
         color[c] = 0.45 + 0.35 * sin(3 * mean[c] + 4 * mean[(c + 1) % 3]);
@@ -33,7 +36,9 @@ static void put_gaussian(practice *p, size_t i, size_t count)
 trace_settings practice_settings(void)
 {
     trace_settings settings = trace_settings_default();
-    settings.background[0] = 0.35f, settings.background[1] = 0.5f, settings.background[2] = 0.7f;
+    settings.background[0] = 0.35f;
+    settings.background[1] = 0.5f;
+    settings.background[2] = 0.7f;
     return settings;
 }
 
@@ -48,7 +53,8 @@ gbt_camera practice_camera(const practice *p, double azimuth_deg, double elevati
     return camera;
 }
 
-practice *practice_make(stability *s, size_t gaussian_count, size_t view_count, double radius, double arc_deg, int width, int height)
+practice *practice_make(stability *s, size_t gaussian_count, size_t view_count, double radius, double arc_deg,
+                        int width, int height)
 {
     practice *p = mem_calloc(1, sizeof *p, "practice scene", s->err);
     if (p == NULL || gaussian_count > PRACTICE_POINTS_MAX || view_count > PRACTICE_VIEWS_MAX) {
@@ -59,12 +65,14 @@ practice *practice_make(stability *s, size_t gaussian_count, size_t view_count, 
     draw_some(s, &p->truth, gaussian_count);
     for (size_t i = 0; i < gaussian_count && s->status == GBT_OK; i++)
         put_gaussian(p, i, gaussian_count);
-    p->point_count = gaussian_count, p->view_count = view_count;
+    p->point_count = gaussian_count;
+    p->view_count = view_count;
     static const double here[3] = {0, 0, 0};
     p->camera[0] = draw_pinhole(width, height, 1.3 * width, here);
     for (size_t i = view_count; i-- > 0;) {
         const double steps = arc_deg >= 360 ? (double)view_count : fmax((double)view_count - 1, 1);
-        p->camera[i] = practice_camera(p, arc_deg * ((double)i / steps - (arc_deg >= 360 ? 0 : 0.5)), 0, radius);
+        p->camera[i] =
+            practice_camera(p, arc_deg * ((double)i / steps - (arc_deg >= 360 ? 0 : 0.5)), 0, radius);
         p->gain[i] = 1;
     }
     return p;
@@ -77,7 +85,7 @@ void practice_free(practice *p)
     mem_free(p);
 }
 
-/* ---- on disk ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- on disk ---- */
 
 static void write_photo(stability *s, const practice *p, size_t i, drawing *d, ray_image *rays)
 {
@@ -137,7 +145,9 @@ void practice_write(stability *s, practice *p, const char *name)
 
 static int remove_one(const char *path, const struct stat *info, int kind, struct FTW *walk)
 {
-    (void)info, (void)kind, (void)walk;
+    (void)info;
+    (void)kind;
+    (void)walk;
     return remove(path);
 }
 
@@ -147,9 +157,10 @@ void practice_remove(practice *p)
         nftw(p->folder, remove_one, 8, FTW_DEPTH | FTW_PHYS);
 }
 
-/* ---- runs ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- runs ---- */
 
-gbt_status practice_open(stability *s, const practice *p, const gbt_train_def *def, trainer *t, gbt_error *why)
+gbt_status practice_open(stability *s, const practice *p, const gbt_train_def *def, trainer *t,
+                         gbt_error *why)
 {
     memset(t, 0, sizeof *t);
     return s->status != GBT_OK ? s->status : trainer_open(t, p->folder, def, why);
@@ -167,9 +178,12 @@ gbt_status practice_steps(trainer *t, gbt_error *why)
 size_t practice_count_bad(const trainer *t)
 {
     const anchors *a = &t->anchors;
-    return draw_count_bad(a->position, a->count * 3) + draw_count_bad(a->feature, a->count * ANCHOR_FEATURE_DIM) +
-           draw_count_bad(a->offset, a->count * 3 * (size_t)a->offset_count) + draw_count_bad(a->scale_log, a->count * 6) +
-           draw_count_bad(t->decoder.params, t->decoder.param_count) + draw_count_bad(t->params_m, t->decoder.param_count) +
+    return draw_count_bad(a->position, a->count * 3) +
+           draw_count_bad(a->feature, a->count * ANCHOR_FEATURE_DIM) +
+           draw_count_bad(a->offset, a->count * 3 * (size_t)a->offset_count) +
+           draw_count_bad(a->scale_log, a->count * 6) +
+           draw_count_bad(t->decoder.params, t->decoder.param_count) +
+           draw_count_bad(t->params_m, t->decoder.param_count) +
            draw_count_bad(t->params_v, t->decoder.param_count);
 }
 
@@ -194,7 +208,8 @@ static gbt_status look_at(trainer *t, practice_result *out, gbt_error *why)
     mean_of_photos(t, mean, &status, why);
     for (size_t i = 0; i < t->train_count && status == GBT_OK; i++) {
         const gbt_camera camera = photos_camera(&t->photos, t->train_views[i], 0);
-        status = frame_render(&t->frame, frame_neural(&t->anchors, &t->decoder), &camera, &t->settings, false, why);
+        status = frame_render(&t->frame, frame_neural(&t->anchors, &t->decoder), &camera, &t->settings, false,
+                              why);
         if (status == GBT_OK)
             status = photos_get(&t->photos, t->train_views[i], 0, &t->photo, why);
         if (status != GBT_OK)
@@ -212,7 +227,8 @@ static gbt_status look_at(trainer *t, practice_result *out, gbt_error *why)
     return status;
 }
 
-gbt_status practice_run(stability *s, const practice *p, const gbt_train_def *def, practice_result *out, gbt_error *why)
+gbt_status practice_run(stability *s, const practice *p, const gbt_train_def *def, practice_result *out,
+                        gbt_error *why)
 {
     memset(out, 0, sizeof *out);
     trainer *t = mem_calloc(1, sizeof *t, "trainer", why);
@@ -223,7 +239,8 @@ gbt_status practice_run(stability *s, const practice *p, const gbt_train_def *de
         status = practice_steps(t, why);
     if (status == GBT_OK)
         status = look_at(t, out, why);
-    out->bad += practice_count_bad(t), out->skipped = t->skipped_steps;
+    out->bad += practice_count_bad(t);
+    out->skipped = t->skipped_steps;
     trainer_free(t);
     mem_free(t);
     return status;

@@ -1,5 +1,6 @@
-/* stability/practice.h -- small data sets made of known Gaussians, and training runs on them, for the cases of the study
-   "stability". */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stability/practice.h -- small data sets made of known Gaussians, and training runs on them, for the cases
+   of the study "stability". */
 #ifndef GBT_STABILITY_PRACTICE_H
 #define GBT_STABILITY_PRACTICE_H
 
@@ -8,7 +9,8 @@
 
 enum { PRACTICE_VIEWS_MAX = 64, PRACTICE_POINTS_MAX = 4096, PRACTICE_PATH_SIZE = 1024 };
 
-/** A sphere of small Gaussians in front of cameras; everything may be changed before it is written. Free with practice_free(). */
+/** A sphere of small Gaussians in front of cameras; everything may be changed before it is written. Free with
+    practice_free(). */
 typedef struct practice {
     gaussians truth;
     size_t view_count, point_count;
@@ -20,11 +22,13 @@ typedef struct practice {
 } practice;
 
 /**
- * `gaussian_count` Gaussians on the unit sphere (they are the points too), and cameras at `radius` from its middle.
+ * `gaussian_count` Gaussians on the unit sphere (they are the points too), and cameras at `radius` from its
+ * middle.
  *
  * @param arc_deg [in] cameras stand on an arc of so many degrees in the plane y = 0, 360: on a ring
  */
-practice *practice_make(stability *s, size_t gaussian_count, size_t view_count, double radius, double arc_deg, int width, int height);
+practice *practice_make(stability *s, size_t gaussian_count, size_t view_count, double radius, double arc_deg,
+                        int width, int height);
 void practice_free(practice *p);
 
 /** How the photos are rendered: the default, in front of an even sky. */
@@ -38,7 +42,8 @@ void practice_write(stability *s, practice *p, const char *name);
 void practice_remove(practice *p);
 
 /** Open a trainer on the folder. Its failure is not the case's: it is returned, and says why in `why`. */
-gbt_status practice_open(stability *s, const practice *p, const gbt_train_def *def, trainer *t, gbt_error *why);
+gbt_status practice_open(stability *s, const practice *p, const gbt_train_def *def, trainer *t,
+                         gbt_error *why);
 
 /** What a run came to. */
 typedef struct practice_result {
@@ -48,8 +53,10 @@ typedef struct practice_result {
     uint64_t skipped;
 } practice_result;
 
-/** Open, take all steps of def->iterations, look at the result. Returns what the run says; the case goes on. */
-gbt_status practice_run(stability *s, const practice *p, const gbt_train_def *def, practice_result *out, gbt_error *why);
+/** Open, take all steps of def->iterations, look at the result. Returns what the run says; the case goes
+    on. */
+gbt_status practice_run(stability *s, const practice *p, const gbt_train_def *def, practice_result *out,
+                        gbt_error *why);
 
 /** Take the steps of an opened trainer up to def.iterations. */
 gbt_status practice_steps(trainer *t, gbt_error *why);

@@ -1,4 +1,6 @@
-/* stability/scene.c -- the scene files of the study "stability", and what its cases read from them and report. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stability/scene.c -- the scene files of the study "stability", and what its cases read from them and
+   report. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -17,7 +19,7 @@ bool stability_ok(stability *s, gbt_status status)
     return s->status == GBT_OK;
 }
 
-/* ---- reading --------------------------------------------------------------------------------------------------------------------- */
+/* ---- reading ---- */
 
 static void scene_fail(stability *s, const char *field, const char *what)
 {
@@ -70,10 +72,19 @@ static gbt_status read_gaussian(const json_fields *r, gaussians *out, size_t i)
         return json_field_fail(r, "quat", "wanted 4 numbers");
     for (size_t k = 0; k < 4 && turn != NULL; k++)
         quat[k] = json_number_value(json_array_get(turn, k));
-    out->mean_x[i] = (float)mean[0], out->mean_y[i] = (float)mean[1], out->mean_z[i] = (float)mean[2];
-    out->scale_x[i] = (float)scale[0], out->scale_y[i] = (float)scale[1], out->scale_z[i] = (float)scale[2];
-    out->quat_w[i] = (float)quat[0], out->quat_x[i] = (float)quat[1], out->quat_y[i] = (float)quat[2], out->quat_z[i] = (float)quat[3];
-    out->red[i] = (float)color[0], out->green[i] = (float)color[1], out->blue[i] = (float)color[2];
+    out->mean_x[i] = (float)mean[0];
+    out->mean_y[i] = (float)mean[1];
+    out->mean_z[i] = (float)mean[2];
+    out->scale_x[i] = (float)scale[0];
+    out->scale_y[i] = (float)scale[1];
+    out->scale_z[i] = (float)scale[2];
+    out->quat_w[i] = (float)quat[0];
+    out->quat_x[i] = (float)quat[1];
+    out->quat_y[i] = (float)quat[2];
+    out->quat_z[i] = (float)quat[3];
+    out->red[i] = (float)color[0];
+    out->green[i] = (float)color[1];
+    out->blue[i] = (float)color[2];
     out->opacity[i] = (float)opacity;
     return GBT_OK;
 }
@@ -97,7 +108,7 @@ void stability_gaussians(stability *s, gaussians *out)
         gaussians_pad(out);
 }
 
-/* ---- reporting ------------------------------------------------------------------------------------------------------------------- */
+/* ---- reporting ---- */
 
 static const json_t *find_check(const stability *s, const char *row)
 {
@@ -114,7 +125,8 @@ void stability_check(stability *s, const char *row, double value, double raster,
 {
     if (s->status != GBT_OK)
         return;
-    const json_t *check = find_check(s, row), *most = json_object_get(check, "at_most"), *least = json_object_get(check, "at_least");
+    const json_t *check = find_check(s, row), *most = json_object_get(check, "at_most"),
+                 *least = json_object_get(check, "at_least");
     const char *quantity = json_string_value(json_object_get(check, "quantity"));
     stability_study *study = s->study;
     if (quantity == NULL || json_is_number(most) == json_is_number(least)) {
@@ -126,7 +138,8 @@ void stability_check(stability *s, const char *row, double value, double raster,
         return;
     }
     stability_row *r = &study->rows[study->row_count++];
-    *r = (stability_row){.part = (int)study->part_count - 1, .at_least = least != NULL, .value = value, .raster = raster};
+    *r = (stability_row){
+        .part = (int)study->part_count - 1, .at_least = least != NULL, .value = value, .raster = raster};
     r->open = json_is_true(json_object_get(check, "open"));
     r->timed = json_is_true(json_object_get(check, "timed"));
     r->limit = json_number_value(r->at_least ? least : most);
@@ -139,7 +152,8 @@ void stability_check(stability *s, const char *row, double value, double raster,
     va_end(list);
 }
 
-stability_chart *stability_new_chart(stability *s, const char *title, const char *note, const char *x_unit, const char *y_unit)
+stability_chart *stability_new_chart(stability *s, const char *title, const char *note, const char *x_unit,
+                                     const char *y_unit)
 {
     stability_study *study = s->study;
     if (study->chart_count < STABILITY_CHARTS_MAX)
@@ -154,8 +168,10 @@ stability_chart *stability_new_chart(stability *s, const char *title, const char
 void stability_point(stability_chart *chart, int series, double x, double y)
 {
     stability_series *line = &chart->series[series];
-    if (line->count < STABILITY_POINTS)
-        line->x[line->count] = x, line->y[line->count++] = y;
+    if (line->count < STABILITY_POINTS) {
+        line->x[line->count] = x;
+        line->y[line->count++] = y;
+    }
 }
 
 void stability_picture(stability *s, const char *name, const image *picture)
@@ -166,7 +182,7 @@ void stability_picture(stability *s, const char *name, const image *picture)
         stability_ok(s, image_write(path, picture, s->err));
 }
 
-/* ---- cases ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- cases ---- */
 
 typedef struct stability_case {
     const char *id, *file;
@@ -184,7 +200,8 @@ enum { CASE_COUNT = sizeof cases / sizeof *cases };
 static bool is_listed(const char *list, const char *name)
 {
     const size_t length = strlen(name);
-    for (const char *at = list; at != NULL && *at != '\0'; at = strchr(at, ',') == NULL ? NULL : strchr(at, ',') + 1)
+    for (const char *at = list; at != NULL && *at != '\0';
+         at = strchr(at, ',') == NULL ? NULL : strchr(at, ',') + 1)
         if (strncmp(at, name, length) == 0 && (at[length] == ',' || at[length] == '\0'))
             return true;
     return false;
@@ -199,8 +216,10 @@ static gbt_status check_list(const char *only, gbt_error *err)
         found += is_listed(only, cases[i].id);
     if (only == NULL || found == wanted)
         return GBT_OK;
-    return base_fail(err, GBT_ERR_ARGUMENT,
-                     "study stability: \"%.60s\" is not a list of different cases (wanted some of A1 to A18, as A1,A9)", only);
+    return base_fail(
+        err, GBT_ERR_ARGUMENT,
+        "study stability: \"%.60s\" is not a list of different cases (wanted some of A1 to A18, as A1,A9)",
+        only);
 }
 
 static gbt_status read_text(stability *s, const char *field, char *out, size_t size)
@@ -240,14 +259,16 @@ static gbt_status measure_case(const stability_case *c, stability *s)
     }
     if (s->status == GBT_OK)
         stability_ok(s, c->run(s));
-    if (s->status == GBT_OK && s->study->row_count - first != json_array_size(json_object_get(s->scene, "checks")))
+    if (s->status == GBT_OK &&
+        s->study->row_count - first != json_array_size(json_object_get(s->scene, "checks")))
         scene_fail(s, "checks", "a check was not measured, or measured twice");
     part->seconds = clock_wall() - start;
     json_decref(s->scene);
     return s->status;
 }
 
-gbt_status stability_measure(const char *only, bool quick, const char *folder, stability_study *study, gbt_error *err)
+gbt_status stability_measure(const char *only, bool quick, const char *folder, stability_study *study,
+                             gbt_error *err)
 {
     stability s = {.study = study, .folder = folder, .err = err};
     GBT_TRY(check_list(only, err));

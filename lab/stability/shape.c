@@ -1,4 +1,6 @@
-/* stability/shape.c -- cases of the study "stability" about shape and place: needles, a camera inside, far from the origin. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stability/shape.c -- cases of the study "stability" about shape and place: needles, a camera inside, far
+   from the origin. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,7 +22,7 @@ static double alpha_at(const stability *s, const drawing *d, size_t pixel)
     return s->status == GBT_OK ? 1 - (double)d->transmittance[pixel] : 0;
 }
 
-/* ---- A2: needles and pancakes ---------------------------------------------------------------------------------------------------- */
+/* ---- A2: needles and pancakes ---- */
 
 enum { NEEDLE_SIZE = 17, NEEDLE_MIDDLE = NEEDLE_SIZE * NEEDLE_SIZE / 2, NEEDLES_MAX = 1024 };
 
@@ -40,8 +42,10 @@ static void place_needle(needles *n, size_t i, const double scale[3], double opa
     draw_random_turn(2, 0, i, quat);
     draw_random_direction(2, 4, i, local);
     dquat_to_matrix(quat, turn);
-    for (uint64_t k = 0; k < 3; k++)
-        mean[k] = 2 * rng_normal(2, 10 + k, i) + (k == 2 ? 6 : 0), local[k] *= scale[k];
+    for (uint64_t k = 0; k < 3; k++) {
+        mean[k] = 2 * rng_normal(2, 10 + k, i) + (k == 2 ? 6 : 0);
+        local[k] *= scale[k];
+    }
     draw_set(&n->g, 0, mean, scale, quat, opacity, white);
     dmat_apply(turn, local, through);
     for (int k = 0; k < 3; k++)
@@ -83,7 +87,8 @@ static void measure_ratio(stability *s, needles *n, bool pancake, double r, size
         place_needle(n, i, scale, opacity, through);
         measure_needle(s, n, i, opacity, through);
     }
-    error[0] = percentile_95(n->error, count), error[1] = percentile_95(n->raster_error, count);
+    error[0] = percentile_95(n->error, count);
+    error[1] = percentile_95(n->raster_error, count);
 }
 
 /* A file of needles: what the reader makes of their ratio. */
@@ -94,13 +99,15 @@ static void load_needles(stability *s, double r)
     gaussian_cloud cloud = {0};
     double largest = 0;
     for (size_t i = 0; i < ROWS; i++) {
-        const float row[MODEL_COLUMNS] = {(float)i, 0, 0, 0.1f, 0.2f, 0.3f, 1, 0, -logf((float)r), -logf((float)r), 1, 0, 0, 0};
+        const float row[MODEL_COLUMNS] = {(float)i,        0, 0, 0.1f, 0.2f, 0.3f, 1, 0, -logf((float)r),
+                                          -logf((float)r), 1, 0, 0,    0};
         memcpy(rows[i], row, sizeof row);
     }
     stability_ok(s, stability_read_model(s, rows, ROWS, &cloud));
     for (size_t i = 0; i < cloud.count; i++)
         largest = fmax(largest, exp((double)cloud.scale_log[3 * i] - (double)cloud.scale_log[3 * i + 1]));
-    stability_check(s, "A2d", largest, NAN, "%zu of %d rows of ratio %g clamped, and counted.", cloud.scales_clamped, ROWS, r);
+    stability_check(s, "A2d", largest, NAN, "%zu of %d rows of ratio %g clamped, and counted.",
+                    cloud.scales_clamped, ROWS, r);
     gaussian_cloud_free(&cloud);
 }
 
@@ -120,7 +127,8 @@ static void build_needles(stability *s, double r)
     }
     if (s->status == GBT_OK)
         stability_ok(s, trace_build(&traced, &g, &settings, 10, s->err));
-    stability_check(s, "A2e", (double)(g.count - traced.tree.box_count), NAN, "%zu needles of ratio %g.", g.count, r);
+    stability_check(s, "A2e", (double)(g.count - traced.tree.box_count), NAN, "%zu needles of ratio %g.",
+                    g.count, r);
     trace_scene_free(&traced);
     gaussians_free(&g);
 }
@@ -128,16 +136,17 @@ static void build_needles(stability *s, double r)
 gbt_status stability_a2(stability *s)
 {
     double ratios[16], worst[2][2] = {{0, 0}, {0, 0}};
-    const size_t ratio_count = stability_list(s, "ratios", 16, ratios), count = (size_t)fmin(stability_number(s, "needles"), NEEDLES_MAX);
+    const size_t ratio_count = stability_list(s, "ratios", 16, ratios),
+                 count = (size_t)fmin(stability_number(s, "needles"), NEEDLES_MAX);
     const double promised = stability_number(s, "promised_ratio");
     needles *n = mem_calloc(1, sizeof *n, "needles", s->err);
     if (n == NULL || count < 1)
         return n == NULL ? GBT_ERR_NO_MEMORY : GBT_ERR_FORMAT;
     draw_some(s, &n->g, 1);
     draw_rays(s, &n->rays, 1, 1);
-    stability_chart *chart =
-        stability_new_chart(s, "Needles", "Error of alpha, of 95 in 100 needles. Loaded files are clamped at a ratio of 10,000.",
-                            "length over thickness", "error of alpha");
+    stability_chart *chart = stability_new_chart(
+        s, "Needles", "Error of alpha, of 95 in 100 needles. Loaded files are clamped at a ratio of 10,000.",
+        "length over thickness", "error of alpha");
     chart->log_x = chart->log_y = true;
     for (size_t i = 0; i < ratio_count && s->status == GBT_OK; i++)
         for (int pancake = 0; pancake < 2; pancake++) {
@@ -150,12 +159,14 @@ gbt_status stability_a2(stability *s)
                     stability_point(chart, r, ratios[i], fmax(error[r], 1e-7));
             }
         }
-    stability_check(s, "A2a", worst[0][0], worst[0][1], "Ratios to %g, against double on the same float32 numbers.", promised);
+    stability_check(s, "A2a", worst[0][0], worst[0][1],
+                    "Ratios to %g, against double on the same float32 numbers.", promised);
     stability_check(s, "A2b", worst[1][0], worst[1][1], "%s", "");
     double unused[2];
     for (int pancake = 0; pancake < 2; pancake++)
         measure_ratio(s, n, pancake, INFINITY, count, unused);
-    stability_check(s, "A2c", (double)n->bad, NAN, "Ratios to %g, and an axis of length 0, which is not seen.",
+    stability_check(s, "A2c", (double)n->bad, NAN,
+                    "Ratios to %g, and an axis of length 0, which is not seen.",
                     ratio_count > 0 ? ratios[ratio_count - 1] : 0);
     drawing_free(&n->ours);
     drawing_free(&n->theirs);
@@ -167,10 +178,11 @@ gbt_status stability_a2(stability *s)
     return s->status;
 }
 
-/* ---- A3: the camera inside a Gaussian -------------------------------------------------------------------------------------------- */
+/* ---- A3: the camera inside a Gaussian ---- */
 
 /* alpha on the way of a camera from z = -1 to 1, looking along z, `count` steps. */
-static void walk_through(stability *s, drawing *d, const gaussians *g, const trace_settings *settings, size_t count, double *alpha)
+static void walk_through(stability *s, drawing *d, const gaussians *g, const trace_settings *settings,
+                         size_t count, double *alpha)
 {
     ray_image rays = {0};
     const double ahead[3] = {0, 0, 1};
@@ -195,7 +207,8 @@ static double largest_step(const double *values, size_t count)
 }
 
 /* The rasterizer's walk, in coarser steps: its largest step. */
-static double splat_through(stability *s, drawing *d, const gaussians *g, size_t count, stability_chart *chart)
+static double splat_through(stability *s, drawing *d, const gaussians *g, size_t count,
+                            stability_chart *chart)
 {
     enum { SIZE = 17 };
     const raster_settings splat = raster_settings_default();
@@ -249,7 +262,8 @@ static double gradient_on_both_sides(stability *s, const gaussians *g, const tra
 
 gbt_status stability_a3(stability *s)
 {
-    const size_t steps = (size_t)stability_number(s, "steps"), coarse = (size_t)stability_number(s, "raster_steps");
+    const size_t steps = (size_t)stability_number(s, "steps"),
+                 coarse = (size_t)stability_number(s, "raster_steps");
     trace_settings settings = trace_settings_default();
     settings.t_near = (float)stability_number(s, "t_near");
     const cpu_isa best = cpu_best_isa();
@@ -260,17 +274,20 @@ gbt_status stability_a3(stability *s)
     if (alpha == NULL)
         return GBT_ERR_NO_MEMORY;
     stability_gaussians(s, &g);
-    stability_chart *chart =
-        stability_new_chart(s, "Through a Gaussian", "What covers the middle of the picture while the camera goes through a Gaussian at 0.",
-                            "z of the camera, std-devs", "alpha");
+    stability_chart *chart = stability_new_chart(
+        s, "Through a Gaussian",
+        "What covers the middle of the picture while the camera goes through a Gaussian at 0.",
+        "z of the camera, std-devs", "alpha");
     walk_through(s, &d, &g, &settings, steps, alpha);
     for (size_t i = 0; i <= 200 && steps >= 200; i++)
         stability_point(chart, 0, 0.01 * (double)i - 1, alpha[i * steps / 200]);
     const double jump = splat_through(s, &d, &g, coarse, chart);
-    stability_check(s, "A3a", largest_step(alpha, steps), jump, "%zu steps, t_near %g (the rasterizer: %zu steps).", steps,
-                    (double)settings.t_near, coarse);
+    stability_check(s, "A3a", largest_step(alpha, steps), jump,
+                    "%zu steps, t_near %g (the rasterizer: %zu steps).", steps, (double)settings.t_near,
+                    coarse);
     stability_check(s, "A3b", known_poses(s, &d, &g, &settings), NAN,
-                    "0.9 in front and at the centre, 0.9 exp(-1/8) = 0.7942 half a std-dev behind it and on rays across.");
+                    "0.9 in front and at the centre, 0.9 exp(-1/8) = 0.7942 half a std-dev behind it and on "
+                    "rays across.");
     for (cpu_isa isa = CPU_PLAIN; isa < best; isa++, isas++) {
         cpu_limit_isa(isa);
         walk_through(s, &d, &g, &settings, steps, other);
@@ -279,14 +296,15 @@ gbt_status stability_a3(stability *s)
     }
     cpu_limit_isa(best);
     stability_check(s, "A3c", (double)changed, NAN, "%zu instruction sets.", isas);
-    stability_check(s, "A3d", gradient_on_both_sides(s, &g, &settings), NAN, "Against differences in double, all fields.");
+    stability_check(s, "A3d", gradient_on_both_sides(s, &g, &settings), NAN,
+                    "Against differences in double, all fields.");
     mem_free(alpha);
     drawing_free(&d);
     gaussians_free(&g);
     return s->status;
 }
 
-/* ---- A5: far from the origin ----------------------------------------------------------------------------------------------------- */
+/* ---- A5: far from the origin ---- */
 
 typedef struct far_scene {
     gaussians local, moved; /* where the scene is at home; as float32 has it elsewhere */
@@ -313,7 +331,8 @@ static void furnish(stability *s, far_scene *f)
     }
 }
 
-/* The float32 means of the scene, written into the world at `offset` in double, loaded as a data set, and back at the loader's origin. */
+/* The float32 means of the scene, written into the world at `offset` in double, loaded as a data set, and
+   back at the loader's origin. */
 static void load_far(stability *s, far_scene *f, double offset, double origin[3])
 {
     char path[4096];
@@ -321,7 +340,8 @@ static void load_far(stability *s, far_scene *f, double offset, double origin[3]
     sink file = {.err = s->err};
     scene loaded = {0};
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
-    if (s->status != GBT_OK || !stability_ok(s, file_join(path, sizeof path, s->folder, "stability_far_away.ply", s->err)))
+    if (s->status != GBT_OK ||
+        !stability_ok(s, file_join(path, sizeof path, s->folder, "stability_far_away.ply", s->err)))
         return;
     snprintf(line, sizeof line, "ply\nformat binary_little_endian 1.0\nelement vertex %zu\n", f->local.count);
     sink_put_text(&file, line);
@@ -337,7 +357,8 @@ static void load_far(stability *s, far_scene *f, double offset, double origin[3]
     sink_free(&file);
     remove(path);
     for (size_t i = 0; i < f->local.count && s->status == GBT_OK; i++)
-        f->moved.mean_x[i] = loaded.points.position[3 * i], f->moved.mean_y[i] = loaded.points.position[3 * i + 1],
+        f->moved.mean_x[i] = loaded.points.position[3 * i],
+        f->moved.mean_y[i] = loaded.points.position[3 * i + 1],
         f->moved.mean_z[i] = loaded.points.position[3 * i + 2];
     memcpy(origin, loaded.origin, sizeof loaded.origin);
     scene_free(&loaded);
@@ -366,9 +387,10 @@ gbt_status stability_a5(stability *s)
     draw_some(s, &f.moved, f.local.count);
     if (s->status == GBT_OK && stability_ok(s, ray_image_from_camera(&f.camera, &f.rays, s->err)))
         f.exact = draw_exact(s, &f.local, &settings, &f.rays, NULL);
-    stability_chart *chart = stability_new_chart(s, "Far from the origin",
-                                                 "The same scene, moved. Coordinates in float32 fall apart; ours keep a double origin.",
-                                                 "distance from the origin, m", "PSNR, dB");
+    stability_chart *chart = stability_new_chart(
+        s, "Far from the origin",
+        "The same scene, moved. Coordinates in float32 fall apart; ours keep a double origin.",
+        "distance from the origin, m", "PSNR, dB");
     chart->log_x = true;
     chart->series[1].name = "float32 world coordinates";
     for (size_t i = 0; i < count && s->status == GBT_OK; i++) {
@@ -378,7 +400,8 @@ gbt_status stability_a5(stability *s)
         GAUSSIANS_FIELDS(X)
 #undef X
         for (size_t k = 0; k < f.local.count; k++)
-            f.moved.mean_x[k] = (float)((double)f.local.mean_x[k] + D), f.moved.mean_y[k] = (float)((double)f.local.mean_y[k] + D),
+            f.moved.mean_x[k] = (float)((double)f.local.mean_x[k] + D),
+            f.moved.mean_y[k] = (float)((double)f.local.mean_y[k] + D),
             f.moved.mean_z[k] = (float)((double)f.local.mean_z[k] + D);
         naive_at_limit = psnr_at(s, &f, away);
         naive_least = fmin(naive_least, naive_at_limit);
@@ -390,9 +413,10 @@ gbt_status stability_a5(stability *s)
         least = fmin(least, psnr);
         stability_point(chart, 0, fmax(D, 1), psnr);
     }
-    stability_check(s, "A5a", least, naive_least,
-                    "Offsets to %g m, loaded as a data set. Right: the tracer itself on float32 world coordinates.",
-                    count > 0 ? offsets[count - 1] : 0);
+    stability_check(
+        s, "A5a", least, naive_least,
+        "Offsets to %g m, loaded as a data set. Right: the tracer itself on float32 world coordinates.",
+        count > 0 ? offsets[count - 1] : 0);
     mem_free(f.exact);
     drawing_free(&f.d);
     ray_image_free(&f.rays);

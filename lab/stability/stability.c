@@ -1,4 +1,6 @@
-/* stability/stability.c -- the study "stability" from its options to its files: measured, written, printed. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stability/stability.c -- the study "stability" from its options to its files: measured, written,
+   printed. */
 #include "stability/stability.h"
 
 #include <math.h>
@@ -11,7 +13,7 @@
 #include "lab/lab.h"
 #include "report/text.h"
 
-/* ---- table ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- table ---- */
 
 /* Counts as they are, the rest with three digits. */
 static void add_figure(text *out, double value)
@@ -26,7 +28,8 @@ static void add_figure(text *out, double value)
 
 void stability_table(const stability_study *study, text *out)
 {
-    text_add(out, "| row | what is measured | limit | gbtrace | within | rasterizer (3DGS) |\n|---|---|---|---|---|---|\n");
+    text_add(out, "| row | what is measured | limit | gbtrace | within | rasterizer (3DGS) "
+                  "|\n|---|---|---|---|---|---|\n");
     for (size_t i = 0; i < study->row_count; i++) {
         const stability_row *row = &study->rows[i];
         text_format(out, "| %s | %s | %s ", row->id, row->quantity, row->at_least ? ">=" : "<=");
@@ -44,7 +47,8 @@ static void add_parts(const stability_study *study, text *out)
 {
     for (size_t p = 0; p < study->part_count; p++) {
         const stability_part *part = &study->parts[p];
-        text_format(out, "\n### %s %s\n\nElsewhere: %s\n\nHere: %s\n\n", part->id, part->title, part->elsewhere, part->ours);
+        text_format(out, "\n### %s %s\n\nElsewhere: %s\n\nHere: %s\n\n", part->id, part->title,
+                    part->elsewhere, part->ours);
         for (size_t i = 0; i < study->row_count; i++)
             if (study->rows[i].part == (int)p && study->rows[i].note[0] != '\0')
                 text_format(out, "- %s: %s\n", study->rows[i].id, study->rows[i].note);
@@ -59,7 +63,7 @@ static size_t count_passes(const stability_study *study)
     return passes;
 }
 
-/* ---- files ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- files ---- */
 
 static json_t *chart_to_json(const stability_chart *chart)
 {
@@ -69,11 +73,14 @@ static json_t *chart_to_json(const stability_chart *chart)
         if (line->name == NULL || line->count == 0)
             continue;
         json_t *x = json_array(), *y = json_array();
-        for (size_t i = 0; i < line->count; i++)
-            json_array_append_new(x, json_number(line->x[i])), json_array_append_new(y, json_number(line->y[i]));
+        for (size_t i = 0; i < line->count; i++) {
+            json_array_append_new(x, json_number(line->x[i]));
+            json_array_append_new(y, json_number(line->y[i]));
+        }
         json_array_append_new(all, json_pack("{s:s,s:o,s:o}", "name", line->name, "x", x, "y", y));
     }
-    return json_pack("{s:s,s:s,s:s,s:o}", "chart", chart->title, "x", chart->x_unit, "y", chart->y_unit, "series", all);
+    return json_pack("{s:s,s:s,s:s,s:o}", "chart", chart->title, "x", chart->x_unit, "y", chart->y_unit,
+                     "series", all);
 }
 
 static gbt_status write_json(const stability_study *study, const char *path, gbt_error *err)
@@ -81,20 +88,22 @@ static gbt_status write_json(const stability_study *study, const char *path, gbt
     json_t *rows = json_array(), *parts = json_array(), *charts = json_array();
     for (size_t i = 0; i < study->row_count; i++) {
         const stability_row *r = &study->rows[i];
-        json_array_append_new(rows, json_pack("{s:s,s:s,s:s,s:o,s:o,s:b,s:b,s:o,s:s}", "row", r->id, "quantity", r->quantity, "is",
-                                              r->at_least ? "at least" : "at most", "limit", json_number(r->limit), "value",
-                                              json_number(r->value), "pass", r->pass, "open", r->open, "raster",
-                                              json_number(r->raster), "note", r->note));
+        json_array_append_new(
+            rows, json_pack("{s:s,s:s,s:s,s:o,s:o,s:b,s:b,s:o,s:s}", "row", r->id, "quantity", r->quantity,
+                            "is", r->at_least ? "at least" : "at most", "limit", json_number(r->limit),
+                            "value", json_number(r->value), "pass", r->pass, "open", r->open, "raster",
+                            json_number(r->raster), "note", r->note));
     }
     for (size_t i = 0; i < study->part_count; i++) {
         const stability_part *p = &study->parts[i];
-        json_array_append_new(parts, json_pack("{s:s,s:s,s:s,s:s,s:f}", "case", p->id, "title", p->title, "elsewhere", p->elsewhere, "here",
-                                               p->ours, "seconds", p->seconds));
+        json_array_append_new(parts,
+                              json_pack("{s:s,s:s,s:s,s:s,s:f}", "case", p->id, "title", p->title,
+                                        "elsewhere", p->elsewhere, "here", p->ours, "seconds", p->seconds));
     }
     for (size_t i = 0; i < study->chart_count; i++)
         json_array_append_new(charts, chart_to_json(&study->charts[i]));
-    json_t *root = json_pack("{s:i,s:s,s:b,s:o,s:o,s:o}", "schema", 1, "study", "stability", "quick", study->quick, "rows", rows, "cases",
-                             parts, "charts", charts);
+    json_t *root = json_pack("{s:i,s:s,s:b,s:o,s:o,s:o}", "schema", 1, "study", "stability", "quick",
+                             study->quick, "rows", rows, "cases", parts, "charts", charts);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);
     return status;
@@ -106,7 +115,8 @@ gbt_status stability_write(const stability_study *study, const char *folder, gbt
     GBT_TRY(file_join(path, sizeof path, folder, "stability.json", err));
     GBT_TRY(write_json(study, path, err));
     text page = {.err = err}, charts = {.err = err};
-    text_format(&page, "# Stability: %zu of %zu rows within their limits\n\n", count_passes(study), study->row_count);
+    text_format(&page, "# Stability: %zu of %zu rows within their limits\n\n", count_passes(study),
+                study->row_count);
     stability_table(study, &page);
     add_parts(study, &page);
     GBT_TRY(text_save(&page, folder, "stability.md"));
@@ -114,12 +124,9 @@ gbt_status stability_write(const stability_study *study, const char *folder, gbt
     return text_save(&charts, folder, "stability.svg");
 }
 
-/* ---- the study ------------------------------------------------------------------------------------------------------------------- */
+/* ---- the study ---- */
 
-lab_stability_def lab_stability_def_default(void)
-{
-    return (lab_stability_def){.only = NULL, .quick = 0};
-}
+lab_stability_def lab_stability_def_default(void) { return (lab_stability_def){.only = NULL, .quick = 0}; }
 
 gbt_status lab_study_stability(const lab_stability_def *def, const char *folder, FILE *out, gbt_error *err)
 {

@@ -1,8 +1,12 @@
-/* stability/stability.h -- the study "stability": scenes on which renderers are known to fail, what each is measured by, and the results.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stability/stability.h -- the study "stability": scenes on which renderers are known to fail, what each is
+   measured by, and the results.
 
-   A case is a scene file (lab/stability/cases/<name>.json: Gaussians, numbers, checks with their limits) and a function that measures.
-   To add one: a line in STABILITY_CASES, the file, and the function `gbt_status stability_<tag>(stability *s)` in a stability_*.c.
-   The files are compiled into the library, so that the installed program has them. */
+   A case is a scene file (lab/stability/cases/<name>.json: Gaussians, numbers, checks with their limits) and
+   a function that measures.
+   To add one: a line in STABILITY_CASES, the file, and the function `gbt_status stability_<tag>(stability
+   *s)` in a stability_*.c. The files are compiled into the library, so that the installed program has
+   them. */
 #ifndef GBT_STABILITY_STABILITY_H
 #define GBT_STABILITY_STABILITY_H
 
@@ -14,39 +18,45 @@
 
 struct text; /* report/text.h */
 
-#define STABILITY_CASES(X) /* X(tag, case, scene file without .json) */ \
-    X(a1, "A1", "a01_turning")                                          \
-    X(a2, "A2", "a02_needles")                                          \
-    X(a3, "A3", "a03_inside")                                           \
-    X(a4, "A4", "a04_coincident")                                       \
-    X(a5, "A5", "a05_far_away")                                         \
-    X(a6, "A6", "a06_many_hits")                                        \
-    X(a7, "A7", "a07_saturation")                                       \
-    X(a8, "A8", "a08_bad_values")                                       \
-    X(a9, "A9", "a09_zoom")                                             \
-    X(a10, "A10", "a10_wide_angle")                                     \
-    X(a11, "A11", "a11_rolling_shutter")                                \
-    X(a12, "A12", "a12_extrapolation")                                  \
-    X(a13, "A13", "a13_poor_points")                                    \
-    X(a14, "A14", "a14_growth")                                         \
-    X(a15, "A15", "a15_balls")                                          \
-    X(a16, "A16", "a16_embree")                                         \
-    X(a17, "A17", "a17_ssim")                                           \
+#define STABILITY_CASES(X) /* X(tag, case, scene file without .json) */                                      \
+    X(a1, "A1", "a01_turning")                                                                               \
+    X(a2, "A2", "a02_needles")                                                                               \
+    X(a3, "A3", "a03_inside")                                                                                \
+    X(a4, "A4", "a04_coincident")                                                                            \
+    X(a5, "A5", "a05_far_away")                                                                              \
+    X(a6, "A6", "a06_many_hits")                                                                             \
+    X(a7, "A7", "a07_saturation")                                                                            \
+    X(a8, "A8", "a08_bad_values")                                                                            \
+    X(a9, "A9", "a09_zoom")                                                                                  \
+    X(a10, "A10", "a10_wide_angle")                                                                          \
+    X(a11, "A11", "a11_rolling_shutter")                                                                     \
+    X(a12, "A12", "a12_extrapolation")                                                                       \
+    X(a13, "A13", "a13_poor_points")                                                                         \
+    X(a14, "A14", "a14_growth")                                                                              \
+    X(a15, "A15", "a15_balls")                                                                               \
+    X(a16, "A16", "a16_embree")                                                                              \
+    X(a17, "A17", "a17_ssim")                                                                                \
     X(a18, "A18", "a18_same_bits")
 
-enum { STABILITY_ROWS_MAX = 128, STABILITY_CASES_MAX = 32, STABILITY_CHARTS_MAX = 16, STABILITY_SERIES = 4, STABILITY_POINTS = 1024 };
+enum {
+    STABILITY_ROWS_MAX = 128,
+    STABILITY_CASES_MAX = 32,
+    STABILITY_CHARTS_MAX = 16,
+    STABILITY_SERIES = 4,
+    STABILITY_POINTS = 1024
+};
 
 /** A measured number and its limit. */
 typedef struct stability_row {
-    char id[8];          /* "A1a" */
-    int part;            /* index into stability_study.parts */
+    char id[8]; /* "A1a" */
+    int part;   /* index into stability_study.parts */
     char quantity[160];
     bool at_least;       /* the limit is a lower one */
     double limit, value; /* finite limit; a value that is not finite fails */
     double raster;       /* the same quantity of the rasterizer; NaN: not measured, or it has none */
     bool pass;
-    bool open;           /* the scene file says that the limit is not kept yet */
-    bool timed;          /* the value is a time: the study judges it, tests do not, since machines are shared */
+    bool open;  /* the scene file says that the limit is not kept yet */
+    bool timed; /* the value is a time: the study judges it, tests do not, since machines are shared */
     char note[400];
 } stability_row;
 
@@ -77,7 +87,8 @@ typedef struct stability_study {
     bool quick; /* smaller sizes where a scene file gives them */
 } stability_study;
 
-/** A case while it is measured. After a failure every call below is a no-op that gives 0, and `status` says why. */
+/** A case while it is measured. After a failure every call below is a no-op that gives 0, and `status` says
+    why. */
 typedef struct stability {
     stability_study *study;
     json_t *scene;
@@ -87,16 +98,17 @@ typedef struct stability {
     gbt_error *err;
 } stability;
 
-/* ---- for cases ------------------------------------------------------------------------------------------------------------------- */
+/* ---- for cases ---- */
 
-/** The number `name` of the scene file's object "numbers"; of its object "quick", if it is there, in a quick study. */
+/** The number `name` of the scene file's object "numbers"; of its object "quick", if it is there, in a quick
+    study. */
 double stability_number(stability *s, const char *name);
 
 /** A list of numbers from the same places; returns how many (1 to `most`). */
 size_t stability_list(stability *s, const char *name, size_t most, double *out);
 
-/** The Gaussians of the scene file ("gaussians": mean, scale, quat w x y z = 1 0 0 0, opacity, color), padded.
-    Free with gaussians_free(). */
+/** The Gaussians of the scene file ("gaussians": mean, scale, quat w x y z = 1 0 0 0, opacity, color),
+    padded. Free with gaussians_free(). */
 void stability_gaussians(stability *s, gaussians *out);
 
 /**
@@ -109,27 +121,31 @@ void stability_gaussians(stability *s, gaussians *out);
 void stability_check(stability *s, const char *row, double value, double raster, const char *note, ...)
     __attribute__((format(printf, 5, 6)));
 
-/** A chart to fill with stability_point(); never NULL (a spare one when there are too many). All texts are literals. */
-stability_chart *stability_new_chart(stability *s, const char *title, const char *note, const char *x_unit, const char *y_unit);
+/** A chart to fill with stability_point(); never NULL (a spare one when there are too many). All texts are
+    literals. */
+stability_chart *stability_new_chart(stability *s, const char *title, const char *note, const char *x_unit,
+                                     const char *y_unit);
 
 /** Add a point to a series; those beyond STABILITY_POINTS are dropped. */
 void stability_point(stability_chart *chart, int series, double x, double y);
 
-/** Keep the first failure. Returns whether all is well so far: `if (!stability_ok(s, call(..., s->err))) ...`. */
+/** Keep the first failure. Returns whether all is well so far: `if (!stability_ok(s, call(..., s->err)))
+    ...`. */
 bool stability_ok(stability *s, gbt_status status);
 
 /** Write a picture into the study's folder as "stability_<name>.png". */
 void stability_picture(stability *s, const char *name, const image *picture);
 
-/* ---- for the study --------------------------------------------------------------------------------------------------------------- */
+/* ---- for the study ---- */
 
 /**
  * Measure the cases named in `only` ("A1,A9"; NULL: all) into `study`.
  *
- * @return GBT_OK also when rows fail their limits; GBT_ERR_ARGUMENT for an unknown case; GBT_ERR_FORMAT for a scene file that is not as it
- *         should be; GBT_ERR_IO, GBT_ERR_NO_MEMORY
+ * @return GBT_OK also when rows fail their limits; GBT_ERR_ARGUMENT for an unknown case; GBT_ERR_FORMAT for a
+ *         scene file that is not as it should be; GBT_ERR_IO, GBT_ERR_NO_MEMORY
  */
-gbt_status stability_measure(const char *only, bool quick, const char *folder, stability_study *study, gbt_error *err);
+gbt_status stability_measure(const char *only, bool quick, const char *folder, stability_study *study,
+                             gbt_error *err);
 
 /** stability.json, .md and .svg into `folder`. */
 gbt_status stability_write(const stability_study *study, const char *folder, gbt_error *err);

@@ -1,5 +1,6 @@
-/* stability/training.c -- cases of the study "stability" about training: views far from the photos, poor sparse points, the same
-   bits. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stability/training.c -- cases of the study "stability" about training: views far from the photos, poor
+   sparse points, the same bits. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -17,7 +18,8 @@ static gbt_train_def practice_def(stability *s)
 {
     gbt_train_def def = gbt_train_def_default();
     def.iterations = (uint64_t)stability_number(s, "steps");
-    def.eval_split = "none", def.seed = 1;
+    def.eval_split = "none";
+    def.seed = 1;
     return def;
 }
 
@@ -29,7 +31,7 @@ static bool must(stability *s, gbt_status status, const gbt_error *why)
     return stability_ok(s, status);
 }
 
-/* ---- A12: views far from the photos -------------------------------------------------------------------------------------------------- */
+/* ---- A12: views far from the photos ---- */
 
 typedef struct far_views {
     practice *p;
@@ -41,7 +43,8 @@ typedef struct far_views {
     double out_of_range;
 } far_views;
 
-/* The largest factor by which a distance that the networks saw is outside [min / 2, 2 max]; 0 when none is. */
+/* The largest factor by which a distance that the networks saw is outside [min / 2, 2 max]; 0 when none
+   is. */
 static double beyond_range(const far_views *f)
 {
     const decoder *d = &f->t.decoder;
@@ -62,7 +65,8 @@ static double share_outside(const far_views *f, const double center[3])
         double mean[3] = {0, 0, 0}, from[PRACTICE_VIEWS_MAX][3], here[3], widest = 1;
         for (size_t v = 0; v < f->p->view_count; v++) {
             for (size_t k = 0; k < 3; k++)
-                from[v][k] = f->p->camera[v].center[k] - f->t.scene.origin[k] - (double)a->position[3 * i + k];
+                from[v][k] =
+                    f->p->camera[v].center[k] - f->t.scene.origin[k] - (double)a->position[3 * i + k];
             dvec_normalize(from[v]);
             for (int k = 0; k < 3; k++)
                 mean[k] += from[v][k];
@@ -84,19 +88,23 @@ static bool render_model(stability *s, far_views *f, const gbt_camera *camera)
     for (int k = 0; k < 3; k++)
         local.center[k] -= f->t.scene.origin[k];
     return s->status == GBT_OK &&
-           stability_ok(s, frame_render(&f->t.frame, frame_neural(&f->t.anchors, &f->t.decoder), &local, &f->t.settings, false, s->err));
+           stability_ok(s, frame_render(&f->t.frame, frame_neural(&f->t.anchors, &f->t.decoder), &local,
+                                        &f->t.settings, false, s->err));
 }
 
 /* PSNR to the truth of the model minus that of the Gaussians it makes for the nearest photo. */
-static double loss_to_baked(stability *s, far_views *f, double azimuth, double elevation, double radius, double own_radius, double *outside)
+static double loss_to_baked(stability *s, far_views *f, double azimuth, double elevation, double radius,
+                            double own_radius, double *outside)
 {
-    const gbt_camera near = practice_camera(f->p, azimuth, 0, own_radius), far = practice_camera(f->p, azimuth, elevation, radius);
+    const gbt_camera near = practice_camera(f->p, azimuth, 0, own_radius),
+                     far = practice_camera(f->p, azimuth, elevation, radius);
     if (!render_model(s, f, &near))
         return NAN;
-    if (!stability_ok(s, gaussians_copy(&f->t.frame.gaussians, &f->fixed, s->err)) || !render_model(s, f, &far))
+    if (!stability_ok(s, gaussians_copy(&f->t.frame.gaussians, &f->fixed, s->err)) ||
+        !render_model(s, f, &far))
         return NAN;
-    f->bad += draw_count_bad(f->t.frame.rgb.pixels,
-                             3 * (size_t)far.width * (size_t)far.height) + draw_count_bad_fields(&f->t.frame.gaussians);
+    f->bad += draw_count_bad(f->t.frame.rgb.pixels, 3 * (size_t)far.width * (size_t)far.height) +
+              draw_count_bad_fields(&f->t.frame.gaussians);
     f->out_of_range = fmax(f->out_of_range, beyond_range(f));
     gbt_camera local = far;
     for (int k = 0; k < 3; k++)
@@ -107,18 +115,24 @@ static double loss_to_baked(stability *s, far_views *f, double azimuth, double e
     const trace_settings settings = practice_settings();
     if (s->status == GBT_OK && stability_ok(s, ray_image_from_camera(&far, &f->rays, s->err)))
         draw_traced(s, &f->truth, &f->p->truth, &settings, &f->rays);
-    return s->status == GBT_OK ? metric_psnr(&f->baked.rgb, &f->truth.rgb) - metric_psnr(&f->t.frame.rgb, &f->truth.rgb) : (double)NAN;
+    return s->status == GBT_OK
+               ? metric_psnr(&f->baked.rgb, &f->truth.rgb) - metric_psnr(&f->t.frame.rgb, &f->truth.rgb)
+               : (double)NAN;
 }
 
 static void look_from_everywhere(stability *s, far_views *f)
 {
-    double radii[16], elevations[8], lost[2] = {-INFINITY, -INFINITY}, elsewhere = -INFINITY, outside = 0, outside_most = 0;
-    const size_t radius_count = stability_list(s, "radii", 16, radii), elevation_count = stability_list(s, "elevations", 8, elevations);
-    const double own = stability_number(s, "radius"), near = stability_number(s, "judged_near"), far = stability_number(s, "judged_far");
+    double radii[16], elevations[8], lost[2] = {-INFINITY, -INFINITY}, elsewhere = -INFINITY, outside = 0,
+                                     outside_most = 0;
+    const size_t radius_count = stability_list(s, "radii", 16, radii),
+                 elevation_count = stability_list(s, "elevations", 8, elevations);
+    const double own = stability_number(s, "radius"), near = stability_number(s, "judged_near"),
+                 far = stability_number(s, "judged_far");
     for (size_t i = 0; i < radius_count; i++)
         for (size_t k = 0; k < elevation_count && s->status == GBT_OK; k++) {
             const double loss = loss_to_baked(s, f, 40, elevations[k], radii[i], own, &outside);
-            const bool is_near = fabs(radii[i] - near) < 1e-9, is_far = fabs(radii[i] - far) < 1e-9, level = fabs(elevations[k]) < 1e-9;
+            const bool is_near = fabs(radii[i] - near) < 1e-9, is_far = fabs(radii[i] - far) < 1e-9,
+                       level = fabs(elevations[k]) < 1e-9;
             if ((is_near || is_far) && level)
                 lost[is_far] = loss;
             else if (is_near || is_far)
@@ -130,16 +144,20 @@ static void look_from_everywhere(stability *s, far_views *f)
     for (size_t k = 0; k < 3 && s->status == GBT_OK; k++)
         on.center[k] = (double)f->t.anchors.position[k] + f->t.scene.origin[k];
     if (render_model(s, f, &on))
-        f->bad += draw_count_bad(f->t.frame.rgb.pixels,
-                                 3 * (size_t)on.width * (size_t)on.height) + draw_count_bad_fields(&f->t.frame.gaussians);
-    stability_check(s, "A12a", (double)f->bad, NAN, "%zu places, one of them on an anchor, %.3g units from the origin.",
+        f->bad += draw_count_bad(f->t.frame.rgb.pixels, 3 * (size_t)on.width * (size_t)on.height) +
+                  draw_count_bad_fields(&f->t.frame.gaussians);
+    stability_check(s, "A12a", (double)f->bad, NAN,
+                    "%zu places, one of them on an anchor, %.3g units from the origin.",
                     radius_count * elevation_count + 1, own);
     stability_check(s, "A12b", f->out_of_range, NAN, "As a factor beyond the range; 0: none.");
     stability_check(s, "A12c", lost[0], NAN,
-                    "Level with the photos. From 45 and 90 degrees above, where no photo was taken: up to %.1f dB, both near and far.",
+                    "Level with the photos. From 45 and 90 degrees above, where no photo was taken: up to "
+                    "%.1f dB, both near and far.",
                     elsewhere);
-    stability_check(s, "A12d", lost[1], NAN,
-                    "Up to %.0f %% of the anchors are seen from outside the cone of directions that the photos cover.", 100 * outside_most);
+    stability_check(
+        s, "A12d", lost[1], NAN,
+        "Up to %.0f %% of the anchors are seen from outside the cone of directions that the photos cover.",
+        100 * outside_most);
 }
 
 gbt_status stability_a12(stability *s)
@@ -149,14 +167,17 @@ gbt_status stability_a12(stability *s)
         return GBT_ERR_NO_MEMORY;
     const double radius = stability_number(s, "radius"), spread = stability_number(s, "radius_spread");
     const int size = (int)stability_number(s, "size");
-    f->p = practice_make(s, (size_t)stability_number(s, "anchors"), (size_t)stability_number(s, "views"), radius, 360, size, size);
+    f->p = practice_make(s, (size_t)stability_number(s, "anchors"), (size_t)stability_number(s, "views"),
+                         radius, 360, size, size);
     for (size_t i = 0; f->p != NULL && i < f->p->view_count; i++)
-        f->p->camera[i] = practice_camera(f->p, 360.0 * (double)i / (double)f->p->view_count, 0, radius + spread * sin(2.4 * (double)i));
+        f->p->camera[i] = practice_camera(f->p, 360.0 * (double)i / (double)f->p->view_count, 0,
+                                          radius + spread * sin(2.4 * (double)i));
     practice_write(s, f->p, "a12");
     gbt_train_def def = practice_def(s);
     def.distance = "on";
     gbt_error why = {0};
-    if (s->status == GBT_OK && must(s, practice_open(s, f->p, &def, &f->t, &why), &why) && must(s, practice_steps(&f->t, &why), &why))
+    if (s->status == GBT_OK && must(s, practice_open(s, f->p, &def, &f->t, &why), &why) &&
+        must(s, practice_steps(&f->t, &why), &why))
         look_from_everywhere(s, f);
     practice_remove(f->p);
     practice_free(f->p);
@@ -169,12 +190,9 @@ gbt_status stability_a12(stability *s)
     return s->status;
 }
 
-/* ---- A13: poor sparse points and photos ---------------------------------------------------------------------------------------------- */
+/* ---- A13: poor sparse points and photos ---- */
 
-static void first_points(practice *p, size_t count)
-{
-    p->point_count = count;
-}
+static void first_points(practice *p, size_t count) { p->point_count = count; }
 
 static void p0_none(practice *p) { first_points(p, 0); }
 static void p1_one(practice *p) { first_points(p, 1); }
@@ -183,8 +201,11 @@ static void p2_two(practice *p) { first_points(p, 2); }
 static void p3_collinear(practice *p)
 {
     first_points(p, 100);
-    for (size_t i = 0; i < 100; i++)
-        p->point[i][0] = 0.02 * (double)i - 1, p->point[i][1] = 0.5 * p->point[i][0], p->point[i][2] = -0.25 * p->point[i][0];
+    for (size_t i = 0; i < 100; i++) {
+        p->point[i][0] = 0.02 * (double)i - 1;
+        p->point[i][1] = 0.5 * p->point[i][0];
+        p->point[i][2] = -0.25 * p->point[i][0];
+    }
 }
 
 static void p4_coplanar(practice *p)
@@ -196,8 +217,11 @@ static void p4_coplanar(practice *p)
 
 static void p5_identical(practice *p)
 {
-    for (size_t i = 0; i < p->point_count; i++)
-        p->point[i][0] = 0.25, p->point[i][1] = 0.5, p->point[i][2] = -0.75;
+    for (size_t i = 0; i < p->point_count; i++) {
+        p->point[i][0] = 0.25;
+        p->point[i][1] = 0.5;
+        p->point[i][2] = -0.75;
+    }
 }
 
 static void p6_one_nan(practice *p) { p->point[p->point_count - 1][1] = NAN; }
@@ -247,18 +271,20 @@ typedef struct poor_case {
 } poor_case;
 
 static const poor_case poor_cases[] = {
-    {"A13P0", p0_none, true, false},      {"A13P1", p1_one, false, false},       {"A13P2", p2_two, false, false},
-    {"A13P3", p3_collinear, false, false}, {"A13P4", p4_coplanar, false, false},  {"A13P5", p5_identical, false, false},
-    {"A13P6", p6_one_nan, false, false},  {"A13P6n", p6_all_nan, true, false},   {"A13P7", p7_outliers, false, false},
-    {"A13P8", p8_behind, true, false},    {"A13P9", p9_one_photo, false, false}, {"A13P10", p10_grey, false, true},
-    {"A13P12", p12_one_black, false, false}, {"A13P13", p13_same_pose, false, false}, {"A13P14", p14_sizes, false, false},
-    {"A13P15", p15_no_color, false, false},
+    {"A13P0", p0_none, true, false},         {"A13P1", p1_one, false, false},
+    {"A13P2", p2_two, false, false},         {"A13P3", p3_collinear, false, false},
+    {"A13P4", p4_coplanar, false, false},    {"A13P5", p5_identical, false, false},
+    {"A13P6", p6_one_nan, false, false},     {"A13P6n", p6_all_nan, true, false},
+    {"A13P7", p7_outliers, false, false},    {"A13P8", p8_behind, true, false},
+    {"A13P9", p9_one_photo, false, false},   {"A13P10", p10_grey, false, true},
+    {"A13P12", p12_one_black, false, false}, {"A13P13", p13_same_pose, false, false},
+    {"A13P14", p14_sizes, false, false},     {"A13P15", p15_no_color, false, false},
 };
 
 static practice *poor_scene(stability *s, size_t views, double arc_deg)
 {
-    return practice_make(s, (size_t)stability_number(s, "points"), views, stability_number(s, "radius"), arc_deg,
-                         (int)stability_number(s, "width"), (int)stability_number(s, "height"));
+    return practice_make(s, (size_t)stability_number(s, "points"), views, stability_number(s, "radius"),
+                         arc_deg, (int)stability_number(s, "width"), (int)stability_number(s, "height"));
 }
 
 static void try_poor(stability *s, const poor_case *c, size_t *bad)
@@ -273,9 +299,11 @@ static void try_poor(stability *s, const poor_case *c, size_t *bad)
     const gbt_status status = s->status == GBT_OK ? practice_run(s, p, &def, &r, &why) : GBT_OK;
     *bad += r.bad;
     if (status != GBT_OK)
-        stability_check(s, c->row, c->may_refuse && why.text[0] != '\0' ? 0 : NAN, NAN, "Refused: %.250s", why.text);
+        stability_check(s, c->row, c->may_refuse && why.text[0] != '\0' ? 0 : NAN, NAN, "Refused: %.250s",
+                        why.text);
     else
-        stability_check(s, c->row, c->absolute ? r.psnr : r.psnr - r.constant, NAN, "%.1f dB; one colour: %.1f dB.", r.psnr, r.constant);
+        stability_check(s, c->row, c->absolute ? r.psnr : r.psnr - r.constant, NAN,
+                        "%.1f dB; one colour: %.1f dB.", r.psnr, r.constant);
     practice_remove(p);
     practice_free(p);
 }
@@ -283,14 +311,16 @@ static void try_poor(stability *s, const poor_case *c, size_t *bad)
 static double held_out(stability *s, const practice *p, bool exposure)
 {
     gbt_train_def def = practice_def(s);
-    def.eval_split = "every=4", def.exposure = exposure;
+    def.eval_split = "every=4";
+    def.exposure = exposure;
     def.iterations = (uint64_t)stability_number(s, "exposure_steps");
     double psnr = NAN;
     gbt_error why = {0};
     trainer *t = mem_calloc(1, sizeof *t, "trainer", s->err);
     if (t == NULL)
         stability_ok(s, GBT_ERR_NO_MEMORY);
-    else if (s->status == GBT_OK && must(s, practice_open(s, p, &def, t, &why), &why) && must(s, practice_steps(t, &why), &why))
+    else if (s->status == GBT_OK && must(s, practice_open(s, p, &def, t, &why), &why) &&
+             must(s, practice_steps(t, &why), &why))
         must(s, trainer_held_out_psnr(t, &psnr, &why), &why);
     if (t != NULL)
         trainer_free(t);
@@ -307,8 +337,9 @@ static void exposures_differ(stability *s)
     practice_write(s, p, "a13p11");
     const double without = held_out(s, p, false), with = held_out(s, p, true);
     stability_check(s, "A13P11", with - without, NAN,
-                    "Held-out photos: %.1f dB without --exposure, %.1f dB with it (right halves, a matrix fitted to the left).", without,
-                    with);
+                    "Held-out photos: %.1f dB without --exposure, %.1f dB with it (right halves, a matrix "
+                    "fitted to the left).",
+                    without, with);
     practice_remove(p);
     practice_free(p);
 }
@@ -324,7 +355,7 @@ gbt_status stability_a13(stability *s)
     return s->status;
 }
 
-/* ---- A18: the same bits -------------------------------------------------------------------------------------------------------------- */
+/* ---- A18: the same bits ---- */
 
 static uint64_t add_hash(uint64_t hash, const void *bytes, size_t count)
 {
@@ -341,12 +372,14 @@ static uint64_t hash_of_run(stability *s, const practice *p, const gbt_train_def
     trainer *t = mem_calloc(1, sizeof *t, "trainer", s->err);
     if (t == NULL)
         stability_ok(s, GBT_ERR_NO_MEMORY);
-    else if (s->status == GBT_OK && must(s, practice_open(s, p, def, t, &why), &why) && must(s, practice_steps(t, &why), &why)) {
+    else if (s->status == GBT_OK && must(s, practice_open(s, p, def, t, &why), &why) &&
+             must(s, practice_steps(t, &why), &why)) {
         const anchors *sets[] = {&t->anchors, &t->moment1, &t->moment2};
         for (int i = 0; i < 3; i++) {
             hash = add_hash(hash, sets[i]->position, sets[i]->count * 3 * sizeof(float));
             hash = add_hash(hash, sets[i]->feature, sets[i]->count * ANCHOR_FEATURE_DIM * sizeof(float));
-            hash = add_hash(hash, sets[i]->offset, sets[i]->count * 3 * (size_t)sets[i]->offset_count * sizeof(float));
+            hash = add_hash(hash, sets[i]->offset,
+                            sets[i]->count * 3 * (size_t)sets[i]->offset_count * sizeof(float));
             hash = add_hash(hash, sets[i]->scale_log, sets[i]->count * 6 * sizeof(float));
         }
         const float *networks[] = {t->decoder.params, t->params_m, t->params_v};
@@ -366,7 +399,8 @@ gbt_status stability_a18(stability *s)
     const size_t thread_count = stability_list(s, "threads", 8, threads);
     const int repeats = (int)stability_number(s, "repeats"), threads_before = parallel_threads();
     const cpu_isa isa_before = cpu_best_isa();
-    practice *p = practice_make(s, 500, 9, 4, 360, (int)stability_number(s, "width"), (int)stability_number(s, "height"));
+    practice *p = practice_make(s, 500, 9, 4, 360, (int)stability_number(s, "width"),
+                                (int)stability_number(s, "height"));
     practice_write(s, p, "a18");
     const gbt_train_def def = practice_def(s);
     size_t by_threads = 0, by_isa = 0;
@@ -382,10 +416,12 @@ gbt_status stability_a18(stability *s)
         by_isa += hash_of_run(s, p, &def) != first;
     }
     cpu_limit_isa(isa_before);
-    stability_check(s, "A18a", (double)by_threads, NAN,
-                    "%zu numbers of threads, %d times each, %llu steps; anchors, networks and moments: %016llx.", thread_count, repeats,
-                    (unsigned long long)def.iterations, (unsigned long long)first);
-    stability_check(s, "A18b", (double)by_isa, NAN, "Up to %s, which this machine has.", cpu_isa_name(isa_before));
+    stability_check(
+        s, "A18a", (double)by_threads, NAN,
+        "%zu numbers of threads, %d times each, %llu steps; anchors, networks and moments: %016llx.",
+        thread_count, repeats, (unsigned long long)def.iterations, (unsigned long long)first);
+    stability_check(s, "A18b", (double)by_isa, NAN, "Up to %s, which this machine has.",
+                    cpu_isa_name(isa_before));
     practice_remove(p);
     practice_free(p);
     return s->status;

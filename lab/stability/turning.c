@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* stability/turning.c -- case A1 of the study "stability": what changes when only the camera turns. */
 #include <math.h>
 #include <stdlib.h>
@@ -17,13 +18,15 @@ typedef struct placed_ray {
 static int by_place(const void *a, const void *b)
 {
     const placed_ray *p = a, *q = b;
-    return p->place != q->place ? (p->place > q->place) - (p->place < q->place) : (p->id > q->id) - (p->id < q->id);
+    return p->place != q->place ? (p->place > q->place) - (p->place < q->place)
+                                : (p->id > q->id) - (p->id < q->id);
 }
 
 /* The order in which the tiles of a panorama of this pose would take the rays. */
 static void place_rays(const float *dirs, size_t count, double yaw, double pitch, placed_ray *out)
 {
-    gbt_camera camera = {.model = GBT_CAMERA_EQUIRECTANGULAR, .width = 2048, .height = 1024, .params = {2048, 1024}};
+    gbt_camera camera = {
+        .model = GBT_CAMERA_EQUIRECTANGULAR, .width = 2048, .height = 1024, .params = {2048, 1024}};
     double rotation[9];
     draw_turned(yaw, pitch, rotation);
     for (size_t i = 0; i < count; i++) {
@@ -46,11 +49,12 @@ typedef struct turning {
 } turning;
 
 /* Colours of the rays as tiles of one pose, put back into their own order. */
-static void trace_pose(stability *s, const turning *t, drawing *d, const gaussians *g, ray_image *rays, double yaw, double pitch,
-                       float *out)
+static void trace_pose(stability *s, const turning *t, drawing *d, const gaussians *g, ray_image *rays,
+                       double yaw, double pitch, float *out)
 {
     const trace_settings settings = trace_settings_default();
-    if (s->status != GBT_OK || !stability_ok(s, ray_image_reserve(rays, 16, (int)(t->count / 16), true, s->err)))
+    if (s->status != GBT_OK ||
+        !stability_ok(s, ray_image_reserve(rays, 16, (int)(t->count / 16), true, s->err)))
         return;
     place_rays(t->dirs, t->count, yaw, pitch, t->order);
     rays->origin[0] = rays->origin[1] = rays->origin[2] = 0;
@@ -61,7 +65,8 @@ static void trace_pose(stability *s, const turning *t, drawing *d, const gaussia
         memcpy(out + 3 * t->order[i].id, d->rgb.pixels + 3 * i, 3 * sizeof(float));
 }
 
-static void compare_poses(stability *s, const turning *t, const gaussians *g, trace_kernel kernel, double *changed, double *most)
+static void compare_poses(stability *s, const turning *t, const gaussians *g, trace_kernel kernel,
+                          double *changed, double *most)
 {
     const int poses = (int)stability_number(s, "poses");
     drawing d = {.traced.kernel = kernel};
@@ -91,18 +96,24 @@ static void same_rays(stability *s)
     if (t.dirs == NULL || t.order == NULL || t.on_edge == NULL)
         stability_ok(s, GBT_ERR_NO_MEMORY);
     if (s->status == GBT_OK) {
-        t.first = t.dirs + 3 * t.count, t.turned = t.first + 3 * t.count;
+        t.first = t.dirs + 3 * t.count;
+        t.turned = t.first + 3 * t.count;
         for (size_t i = 0; i < t.count; i++) {
-            const float x = 0.8f * rng_uniform(7, 0, i) - 0.4f, y = 0.8f * rng_uniform(7, 1, i) - 0.4f, z = 1 / sqrtf(1 + x * x + y * y);
-            t.dirs[3 * i] = x * z, t.dirs[3 * i + 1] = y * z, t.dirs[3 * i + 2] = z;
+            const float x = 0.8f * rng_uniform(7, 0, i) - 0.4f, y = 0.8f * rng_uniform(7, 1, i) - 0.4f,
+                        z = 1 / sqrtf(1 + x * x + y * y);
+            t.dirs[3 * i] = x * z;
+            t.dirs[3 * i + 1] = y * z;
+            t.dirs[3 * i + 2] = z;
         }
         const size_t edges = stability_find_edges(s, &g, t.dirs, t.count, t.on_edge);
         compare_poses(s, &t, &g, TRACE_SINGLE, &changed, &unused);
-        stability_check(s, "A1a", changed, NAN, "The same ray gives the same bits, whichever rays are traced beside it.");
+        stability_check(s, "A1a", changed, NAN,
+                        "The same ray gives the same bits, whichever rays are traced beside it.");
         compare_poses(s, &t, &g, TRACE_TILE, &changed, &most);
-        stability_check(
-            s, "A1b", most, NAN,
-            "Tiles measure from axes of their own, so the last bits differ. Left out: %zu rays within rounding of a tie or a cut.", edges);
+        stability_check(s, "A1b", most, NAN,
+                        "Tiles measure from axes of their own, so the last bits differ. Left out: %zu rays "
+                        "within rounding of a tie or a cut.",
+                        edges);
     }
     mem_free(t.dirs);
     mem_free(t.order);
@@ -115,14 +126,16 @@ static bool look_up(const image *rgb, const gbt_camera *camera, const double dir
 {
     double cam[3], pixel[2];
     for (int k = 0; k < 3; k++)
-        cam[k] = camera->rotation[3 * k] * dir[0] + camera->rotation[3 * k + 1] * dir[1] + camera->rotation[3 * k + 2] * dir[2];
+        cam[k] = camera->rotation[3 * k] * dir[0] + camera->rotation[3 * k + 1] * dir[1] +
+                 camera->rotation[3 * k + 2] * dir[2];
     if (!gbt_camera_project(camera, cam, pixel))
         return false;
     const double x = pixel[0] - 0.5, y = pixel[1] - 0.5;
     const int column = (int)floor(x), row = (int)floor(y);
     if (column < 0 || row < 0 || column + 1 >= rgb->width || row + 1 >= rgb->height)
         return false;
-    const float *p = rgb->pixels + 3 * ((size_t)row * (size_t)rgb->width + (size_t)column), *q = p + 3 * (size_t)rgb->width;
+    const float *p = rgb->pixels + 3 * ((size_t)row * (size_t)rgb->width + (size_t)column),
+                *q = p + 3 * (size_t)rgb->width;
     for (int c = 0; c < 3; c++) {
         const double above = (double)p[c] + (x - column) * ((double)p[3 + c] - (double)p[c]),
                      below = (double)q[c] + (x - column) * ((double)q[3 + c] - (double)q[c]);
@@ -135,11 +148,12 @@ enum { LOOK_ACROSS = 41, LOOK_DOWN = 25, LOOK_COUNT = LOOK_ACROSS * LOOK_DOWN };
 
 static void look_direction(int i, double dir[3]) /* within 16 and 10 degrees: in sight from every pose */
 {
-    dir[0] = tan(0.8 * (i % LOOK_ACROSS - LOOK_ACROSS / 2) * degree), dir[1] = tan(0.8 * (i / LOOK_ACROSS - LOOK_DOWN / 2) * degree),
-    dir[2] = 1;
+    dir[0] = tan(0.8 * (i % LOOK_ACROSS - LOOK_ACROSS / 2) * degree),
+    dir[1] = tan(0.8 * (i / LOOK_ACROSS - LOOK_DOWN / 2) * degree), dir[2] = 1;
 }
 
-/* Directions within a pixel of a place where the exact picture itself has an edge: moving pixels across it is no popping. */
+/* Directions within a pixel of a place where the exact picture itself has an edge: moving pixels across it is
+   no popping. */
 static size_t find_still(stability *s, const gaussians *g, double pixel, bool still[LOOK_COUNT])
 {
     static const double here[3] = {0, 0, 0}, around[5][2] = {{0, 0}, {-1, 0}, {1, 0}, {0, -1}, {0, 1}};
@@ -150,7 +164,8 @@ static size_t find_still(stability *s, const gaussians *g, double pixel, bool st
     for (int i = 0; i < 5 * LOOK_COUNT && s->status == GBT_OK; i++) {
         double dir[3];
         look_direction(i / 5, dir);
-        dir[0] += 1.5 * pixel * around[i % 5][0], dir[1] += 1.5 * pixel * around[i % 5][1];
+        dir[0] += 1.5 * pixel * around[i % 5][0];
+        dir[1] += 1.5 * pixel * around[i % 5][1];
         draw_ray(&rays, (size_t)i, here, dir);
     }
     double *exact = draw_exact(s, g, &settings, &rays, NULL);
@@ -191,7 +206,8 @@ static void look_around(onlooker *o, const gbt_camera *camera, const bool still[
 }
 
 /* Two small pictures, a hair's turn apart, by each renderer: the tracer's above. */
-static void turning_picture(stability *s, const gaussians *g, drawing *d, const gbt_camera *camera, double step)
+static void turning_picture(stability *s, const gaussians *g, drawing *d, const gbt_camera *camera,
+                            double step)
 {
     enum { WIDTH = 240, HEIGHT = 160, GAP = 4, SHEET = 2 * WIDTH + GAP };
     image sheet = {0};
@@ -209,7 +225,8 @@ static void turning_picture(stability *s, const gaussians *g, drawing *d, const 
         else
             draw_splatted(s, d, g, &splat, &large);
         for (size_t y = 0; y < HEIGHT && s->status == GBT_OK; y++)
-            memcpy(sheet.pixels + 3 * (((size_t)(i / 2) * (HEIGHT + GAP) + y) * SHEET + (size_t)(i % 2) * (WIDTH + GAP)),
+            memcpy(sheet.pixels +
+                       3 * (((size_t)(i / 2) * (HEIGHT + GAP) + y) * SHEET + (size_t)(i % 2) * (WIDTH + GAP)),
                    d->rgb.pixels + 3 * y * WIDTH, 3 * WIDTH * sizeof(float));
     }
     stability_picture(s, "a1", &sheet);
@@ -220,10 +237,11 @@ static void turning_picture(stability *s, const gaussians *g, drawing *d, const 
 static void turn_slowly(stability *s)
 {
     static const double here[3] = {0, 0, 0};
-    const double step = stability_number(s, "step_deg"), range = stability_number(s, "range_deg"), curve = stability_number(s, "curve_deg");
+    const double step = stability_number(s, "step_deg"), range = stability_number(s, "range_deg"),
+                 curve = stability_number(s, "curve_deg");
     const int half = (int)lround(0.5 * range / fmax(step, 1e-6));
-    gbt_camera camera =
-        draw_pinhole((int)stability_number(s, "width"), (int)stability_number(s, "height"), stability_number(s, "focal"), here);
+    gbt_camera camera = draw_pinhole((int)stability_number(s, "width"), (int)stability_number(s, "height"),
+                                     stability_number(s, "focal"), here);
     gaussians g = {0};
     ray_image rays = {0};
     onlooker *ours = mem_calloc(2, sizeof *ours, "directions", s->err), *theirs = ours + 1;
@@ -238,9 +256,9 @@ static void turn_slowly(stability *s)
     const raster_settings splat = raster_settings_default();
     bool still[LOOK_COUNT];
     const size_t still_count = find_still(s, &g, 1 / stability_number(s, "focal"), still);
-    stability_chart *chart =
-        stability_new_chart(s, "Turning the camera", "Red in one fixed direction. Only the camera turns; it should stay the same.",
-                            "yaw, degrees", "red");
+    stability_chart *chart = stability_new_chart(
+        s, "Turning the camera",
+        "Red in one fixed direction. Only the camera turns; it should stay the same.", "yaw, degrees", "red");
     for (int i = -half; i <= half && s->status == GBT_OK; i++) {
         double aside[3];
         draw_turned(i * step * degree, 0, camera.rotation);
@@ -253,8 +271,9 @@ static void turn_slowly(stability *s)
         }
     }
     stability_check(s, "A1c", ours->jump, theirs->jump,
-                    "%zu of %d directions; the others look at the edge itself. By t* the order of two crossing Gaussians still changes "
-                    "along a curve in the scene: it stays where it is when the camera turns, and moves when the camera moves.",
+                    "%zu of %d directions; the others look at the edge itself. By t* the order of two "
+                    "crossing Gaussians still changes along a curve in the scene: it stays where it is when "
+                    "the camera turns, and moves when the camera moves.",
                     still_count, (int)LOOK_COUNT);
     turning_picture(s, &g, &ours->d, &camera, step);
     drawing_free(&ours->d);

@@ -1,4 +1,6 @@
-/* stability/values.c -- cases of the study "stability" about values: saturated stacks and their gradients, numbers that are none. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stability/values.c -- cases of the study "stability" about values: saturated stacks and their gradients,
+   numbers that are none. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,7 +10,7 @@
 #include "stability/gradient.h"
 #include "stability/model.h"
 
-/* ---- A7: saturation -------------------------------------------------------------------------------------------------------------- */
+/* ---- A7: saturation ---- */
 
 /* A white Gaussian and n - 1 grey ones behind it, half a unit apart. */
 static void in_a_row(stability *s, size_t n, double opacity, gaussians *g)
@@ -16,7 +18,8 @@ static void in_a_row(stability *s, size_t n, double opacity, gaussians *g)
     const double scale[3] = {0.2, 0.2, 0.2};
     draw_some(s, g, n);
     for (size_t i = 0; i < n && s->status == GBT_OK; i++) {
-        const double mean[3] = {0, 0, 2 + 0.5 * (double)i}, grey = i == 0 ? 1 : 0.2, color[3] = {grey, grey, grey};
+        const double mean[3] = {0, 0, 2 + 0.5 * (double)i}, grey = i == 0 ? 1 : 0.2,
+                     color[3] = {grey, grey, grey};
         draw_set(g, i, mean, scale, NULL, opacity, color);
     }
 }
@@ -25,8 +28,8 @@ static void in_a_row(stability *s, size_t n, double opacity, gaussians *g)
 static double shape_gradient(const gaussians *d)
 {
     double most = 0;
-#define X(name, pad, meaning)                                             \
-    for (size_t i = 0; i < d->count && d->name != d->red && d->name != d->green && d->name != d->blue; i++) \
+#define X(name, pad, meaning)                                                                                \
+    for (size_t i = 0; i < d->count && d->name != d->red && d->name != d->green && d->name != d->blue; i++)  \
         most = fmax(most, fabs((double)d->name[i]));
     GAUSSIANS_FIELDS(X)
 #undef X
@@ -38,7 +41,8 @@ typedef struct saturation {
     size_t bad, stacks;
 } saturation;
 
-static void measure_stack(stability *s, double opacity, size_t n, double slope, const trace_settings *settings, saturation *out)
+static void measure_stack(stability *s, double opacity, size_t n, double slope,
+                          const trace_settings *settings, saturation *out)
 {
     static const double here[3] = {0, 0, 0};
     const double dir[3] = {slope, 0, 1};
@@ -49,7 +53,8 @@ static void measure_stack(stability *s, double opacity, size_t n, double slope, 
     if (s->status == GBT_OK) {
         draw_ray(&rays, 0, here, dir);
         const gradient_error e = draw_gradient_error(s, &g, settings, &rays, &d);
-        out->bad += e.bad, out->stacks++;
+        out->bad += e.bad;
+        out->stacks++;
         if (slope == 0 && opacity > (double)settings->alpha_max) /* every response is cut */
             out->inside = fmax(out->inside, s->status == GBT_OK ? shape_gradient(&d) : 0);
         out->relative = fmax(out->relative, e.relative);
@@ -62,8 +67,10 @@ static void measure_stack(stability *s, double opacity, size_t n, double slope, 
 gbt_status stability_a7(stability *s)
 {
     double opacities[8], slopes[8], stops[4];
-    const size_t opacity_count = stability_list(s, "opacities", 8, opacities), slope_count = stability_list(s, "slopes", 8, slopes);
-    const size_t stop_count = stability_list(s, "stops", 4, stops), most = (size_t)stability_number(s, "most");
+    const size_t opacity_count = stability_list(s, "opacities", 8, opacities),
+                 slope_count = stability_list(s, "slopes", 8, slopes);
+    const size_t stop_count = stability_list(s, "stops", 4, stops),
+                 most = (size_t)stability_number(s, "most");
     trace_settings settings = trace_settings_default();
     saturation out = {0};
     for (size_t stop = 0; stop < stop_count; stop++)
@@ -71,19 +78,24 @@ gbt_status stability_a7(stability *s)
             for (size_t k = 0; k < slope_count; k++)
                 for (size_t n = 1; n <= most && s->status == GBT_OK; n++) {
                     settings.transmittance_min = (float)stops[stop];
-                    if (slopes[k] != 0 || (float)opacities[o] != settings.alpha_max) /* on the edge of the cut there is no derivative */
+                    if (slopes[k] != 0 || (float)opacities[o] != settings.alpha_max) /* on the edge of the cut
+                                                                                        there is no derivative
+                                                                                      */
                         measure_stack(s, opacities[o], n, slopes[k], &settings, &out);
                 }
-    stability_check(s, "A7a", out.relative, NAN, "%zu stacks of 1 to %zu, T_min %g and %g.", out.stacks, most, stops[0],
-                    stops[stop_count > 0 ? stop_count - 1 : 0]);
-    stability_check(s, "A7b", out.inside, NAN, "Where alpha is cut at 0.99 the derivative is 0; dividing it out unmasked would give 0.8.");
+    stability_check(s, "A7a", out.relative, NAN, "%zu stacks of 1 to %zu, T_min %g and %g.", out.stacks, most,
+                    stops[0], stops[stop_count > 0 ? stop_count - 1 : 0]);
+    stability_check(
+        s, "A7b", out.inside, NAN,
+        "Where alpha is cut at 0.99 the derivative is 0; dividing it out unmasked would give 0.8.");
     stability_check(s, "A7c", (double)out.bad, NAN, "%s", "");
     return s->status;
 }
 
-/* ---- A8: values that are none ---------------------------------------------------------------------------------------------------- */
+/* ---- A8: values that are none ---- */
 
-static const float bad_values[] = {0.0f, -0.0f, NAN, INFINITY, -INFINITY, 1e-45f, 1e38f, -1e38f, 100.0f, -1000.0f};
+static const float bad_values[] = {0.0f,   -0.0f, NAN,    INFINITY, -INFINITY,
+                                   1e-45f, 1e38f, -1e38f, 100.0f,   -1000.0f};
 enum { BAD_VALUES = sizeof bad_values / sizeof *bad_values, BAD_SIZE = 24 };
 
 static void scatter(stability *s, size_t count, gaussians *g)
@@ -124,7 +136,8 @@ static void try_poison(stability *s, poisoning *p, const gaussians *g, const cha
     const size_t values = 3 * ray_image_count(&p->rays);
     gaussians *d = &p->d_gaussians;
     if (s->status != GBT_OK || !stability_ok(s, trace_build(&p->traced, g, &settings, 0, s->err)) ||
-        !stability_ok(s, trace_forward(&p->traced, &p->rays, true, &(trace_outputs){.rgb = &p->rgb}, NULL, s->err)))
+        !stability_ok(
+            s, trace_forward(&p->traced, &p->rays, true, &(trace_outputs){.rgb = &p->rgb}, NULL, s->err)))
         return;
     p->tries++;
     p->bad_pixels += draw_count_bad(p->rgb.pixels, values);
@@ -135,7 +148,8 @@ static void try_poison(stability *s, poisoning *p, const gaussians *g, const cha
         p->overflows += bad;
     else
         p->bad_gradients += bad;
-    if (stability_ok(s, raster_forward(&p->splatted, g, &p->camera, &splat, false, &p->rgb, NULL, NULL, s->err)))
+    if (stability_ok(s,
+                     raster_forward(&p->splatted, g, &p->camera, &splat, false, &p->rgb, NULL, NULL, s->err)))
         p->bad_splatted += draw_count_bad(p->rgb.pixels, values);
 }
 
@@ -153,18 +167,19 @@ static void poison_arrays(stability *s, size_t count)
         p.d_rgb.pixels[i] = 1;
     for (size_t v = 0; v < BAD_VALUES && s->status == GBT_OK; v++) {
         float kept;
-#define X(name, pad, meaning)                              \
-    kept = g.name[5], g.name[5] = bad_values[v];           \
-    try_poison(s, &p, &g, #name, bad_values[v]);           \
+#define X(name, pad, meaning)                                                                                \
+    kept = g.name[5], g.name[5] = bad_values[v];                                                             \
+    try_poison(s, &p, &g, #name, bad_values[v]);                                                             \
     g.name[5] = kept;
         GAUSSIANS_FIELDS(X)
 #undef X
     }
     stability_check(s, "A8a", (double)p.bad_pixels, (double)p.bad_splatted,
                     "%zu pictures of %zu Gaussians, one of them poisoned in one field.", p.tries, count);
-    stability_check(s, "A8b", (double)p.bad_gradients, NAN,
-                    "%zu gradients. Not counted: %zu infinities where a colour is 1e38, whose gradient no float holds.", p.tries,
-                    p.overflows);
+    stability_check(
+        s, "A8b", (double)p.bad_gradients, NAN,
+        "%zu gradients. Not counted: %zu infinities where a colour is 1e38, whose gradient no float holds.",
+        p.tries, p.overflows);
     trace_scene_free(&p.traced);
     raster_scene_free(&p.splatted);
     image_free(&p.rgb);
@@ -182,7 +197,8 @@ static void poison_files(stability *s, size_t count)
     size_t bad = 0, miscounted = 0, dropped = 0, repaired = 0, tries = 0;
     count = count < ROWS_MAX ? count : ROWS_MAX;
     for (size_t i = 0; i < count; i++) {
-        const float row[MODEL_COLUMNS] = {(float)i, 1, 5, 0.1f, 0.2f, 0.3f, 1, -1, -2, -3, 1, 0.1f, 0.2f, 0.3f};
+        const float row[MODEL_COLUMNS] = {(float)i, 1,  5,  0.1f, 0.2f, 0.3f, 1,
+                                          -1,       -2, -3, 1,    0.1f, 0.2f, 0.3f};
         memcpy(rows[i], row, sizeof row);
     }
     for (size_t column = 0; column < MODEL_COLUMNS; column++)
@@ -192,11 +208,15 @@ static void poison_files(stability *s, size_t count)
             rows[5][column] = bad_values[v];
             const bool loaded = stability_read_model(s, rows, count, &cloud) == GBT_OK;
             rows[5][column] = kept;
-            tries++, miscounted += !loaded || cloud.count + cloud.dropped != count;
-            bad += stability_bad_in_model(&cloud), dropped += cloud.dropped, repaired += cloud.identity_rotations + cloud.scales_clamped;
+            tries++;
+            miscounted += !loaded || cloud.count + cloud.dropped != count;
+            bad += stability_bad_in_model(&cloud);
+            dropped += cloud.dropped;
+            repaired += cloud.identity_rotations + cloud.scales_clamped;
             gaussian_cloud_free(&cloud);
         }
-    stability_check(s, "A8c", (double)bad, NAN, "%zu files: %zu rows dropped, %zu repaired.", tries, dropped, repaired);
+    stability_check(s, "A8c", (double)bad, NAN, "%zu files: %zu rows dropped, %zu repaired.", tries, dropped,
+                    repaired);
     stability_check(s, "A8d", (double)miscounted, NAN, "%s", "");
 }
 

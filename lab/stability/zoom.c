@@ -1,4 +1,6 @@
-/* stability/zoom.c -- case A9 of the study "stability": Gaussians that are smaller than a pixel, and larger. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stability/zoom.c -- case A9 of the study "stability": Gaussians that are smaller than a pixel, and
+   larger. */
 #include <math.h>
 #include <string.h>
 
@@ -8,7 +10,8 @@
 
 /* Ways to draw the same grid. */
 typedef enum zoom_way { ZOOM_FOOTPRINT, ZOOM_SPLAT, ZOOM_POINT, ZOOM_EXACT, ZOOM_WAYS } zoom_way;
-static const char *const way_names[ZOOM_WAYS] = {"gbtrace, footprint", "rasterizer (3DGS)", "gbtrace, no filter", NULL};
+static const char *const way_names[ZOOM_WAYS] = {"gbtrace, footprint", "rasterizer (3DGS)",
+                                                 "gbtrace, no filter", NULL};
 
 typedef struct zoom {
     gaussians grid, widened;
@@ -23,7 +26,8 @@ static void lay_grid(stability *s, double spacing, gaussians *g)
 {
     static const double white[3] = {1, 1, 1};
     const size_t across = (size_t)stability_number(s, "across");
-    const double size = stability_number(s, "scale"), scale[3] = {size, size, size}, opacity = stability_number(s, "opacity");
+    const double size = stability_number(s, "scale"), scale[3] = {size, size, size},
+                 opacity = stability_number(s, "opacity");
     draw_some(s, g, across * across);
     for (size_t i = 0; s->status == GBT_OK && i < g->count; i++) {
         const double mean[3] = {spacing * ((double)(i % across) - (double)(across / 2)),
@@ -44,13 +48,15 @@ static void average_blocks(const image *rgb, int samples, double *out)
 }
 
 /* Red of the grid at distance z by one way, [size][size]; the picture moved by (dx, dy) pixels. */
-static void draw_grid(stability *s, zoom *z, zoom_way way, double distance, int size, double dx, double dy, double *out)
+static void draw_grid(stability *s, zoom *z, zoom_way way, double distance, int size, double dx, double dy,
+                      double *out)
 {
     const double center[3] = {0, 0, -distance}, focal = stability_number(s, "focal");
     const raster_settings splat = raster_settings_default();
     const int samples = way == ZOOM_EXACT ? z->samples : 1;
     gbt_camera camera = draw_pinhole(size, size, focal, center);
-    camera.params[2] += dx, camera.params[3] += dy;
+    camera.params[2] += dx;
+    camera.params[3] += dy;
     camera = gbt_camera_resized(&camera, size * samples, size * samples);
     if (way == ZOOM_FOOTPRINT) {
         const footprint_view view = footprint_view_of(&camera);
@@ -60,7 +66,8 @@ static void draw_grid(stability *s, zoom *z, zoom_way way, double distance, int 
     if (way == ZOOM_SPLAT)
         draw_splatted(s, &z->d, &z->grid, &splat, &camera);
     else
-        draw_camera(s, &z->d, way == ZOOM_FOOTPRINT ? &z->widened : &z->grid, &z->settings, &camera, &z->rays);
+        draw_camera(s, &z->d, way == ZOOM_FOOTPRINT ? &z->widened : &z->grid, &z->settings, &camera,
+                    &z->rays);
     if (s->status == GBT_OK)
         average_blocks(&z->d.rgb, samples, out);
 }
@@ -98,7 +105,8 @@ static void compare_brightness(stability *s, zoom *z, stability_chart *chart, do
 
 enum { SHIFTS = 16 };
 
-/* Std-dev of a pixel over 16 shifts by parts of a pixel, RMS over the pixels. Where dots are closer than pixels, it should be even. */
+/* Std-dev of a pixel over 16 shifts by parts of a pixel, RMS over the pixels. Where dots are closer than
+   pixels, it should be even. */
 static double flicker_of(stability *s, zoom *z, zoom_way way, double distance, int size, double *scratch)
 {
     const size_t pixels = (size_t)size * (size_t)size;
@@ -106,8 +114,10 @@ static double flicker_of(stability *s, zoom *z, zoom_way way, double distance, i
     memset(scratch, 0, 2 * pixels * sizeof *scratch);
     for (int shift = 0; shift < SHIFTS && s->status == GBT_OK; shift++) {
         draw_grid(s, z, way, distance, size, 0.25 * (shift % 4), 0.25 * (shift / 4), picture);
-        for (size_t i = 0; i < pixels && s->status == GBT_OK; i++)
-            first[i] += picture[i], second[i] += picture[i] * picture[i];
+        for (size_t i = 0; i < pixels && s->status == GBT_OK; i++) {
+            first[i] += picture[i];
+            second[i] += picture[i] * picture[i];
+        }
     }
     for (size_t i = 0; i < pixels; i++)
         sum += fmax(second[i] / SHIFTS - first[i] * first[i] / (SHIFTS * SHIFTS), 0);
@@ -135,10 +145,10 @@ gbt_status stability_a9(stability *s)
               .samples = (int)stability_number(s, "samples")};
     trace_settings_preset("exact", &z.settings);
     lay_grid(s, stability_number(s, "spacing"), &z.grid);
-    stability_chart *chart =
-        stability_new_chart(s, "Zooming out",
-                            "Brightness of a grid of dots of 2 cm, over its true brightness. It should be 1 at any distance.",
-                            "distance, m", "brightness / true");
+    stability_chart *chart = stability_new_chart(
+        s, "Zooming out",
+        "Brightness of a grid of dots of 2 cm, over its true brightness. It should be 1 at any distance.",
+        "distance, m", "brightness / true");
     chart->log_x = chart->log_y = true;
     for (int way = 0; way < ZOOM_EXACT; way++)
         chart->series[way].name = way_names[way];
@@ -150,10 +160,11 @@ gbt_status stability_a9(stability *s)
     lay_grid(s, stability_number(s, "dense_spacing"), &z.grid);
     compare_brightness(s, &z, NULL, dense);
     stability_check(s, "A9a", bright[ZOOM_FOOTPRINT], bright[ZOOM_SPLAT],
-                    "Preset \"exact\", %.2g px^2. Without the filter %.2g. With alpha_min 1/255 %.2g: the cut takes faint dots whole. "
-                    "Dots 0.1 m apart: %.2g, since blended dots hide each other.",
+                    "Preset \"exact\", %.2g px^2. Without the filter %.2g. With alpha_min 1/255 %.2g: the "
+                    "cut takes faint dots whole. Dots 0.1 m apart: %.2g, since blended dots hide each other.",
                     (double)z.variance, bright[ZOOM_POINT], usual[ZOOM_FOOTPRINT], dense[ZOOM_FOOTPRINT]);
-    stability_check(s, "A9b", flicker[ZOOM_FOOTPRINT], flicker[ZOOM_SPLAT], "Without the filter %.2g.", flicker[ZOOM_POINT]);
+    stability_check(s, "A9b", flicker[ZOOM_FOOTPRINT], flicker[ZOOM_SPLAT], "Without the filter %.2g.",
+                    flicker[ZOOM_POINT]);
     drawing_free(&z.d);
     ray_image_free(&z.rays);
     gaussians_free(&z.grid);

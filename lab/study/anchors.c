@@ -1,11 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/anchors.c -- the study "anchors": its variants, and making their runs. */
 #include "study/anchors.h"
 
 #include "base/fail.h"
 #include "base/memory.h"
 
-/* THE table to edit: name, settings, series of the chart. The first three have their places. A new meaning needs a new name: the name is
-   the folder of the runs. */
+/* THE table to edit: name, settings, series of the chart. The first three have their places. A new meaning
+   needs a new name: the name is the folder of the runs. */
 const anchors_variant anchors_variants[] = {
     {"voxels, last-thrift 1", "init = voxel\nlast-thrift = 1", 1},
     {"the paper's balls", "", 2},
@@ -19,21 +20,27 @@ const anchors_variant anchors_variants[] = {
 
 const size_t anchors_variant_count = sizeof anchors_variants / sizeof *anchors_variants;
 
-_Static_assert(sizeof anchors_variants / sizeof *anchors_variants <= ANCHORS_VARIANTS_MAX, "every variant has a place");
+_Static_assert(sizeof anchors_variants / sizeof *anchors_variants <= ANCHORS_VARIANTS_MAX,
+               "every variant has a place");
 
 lab_anchors_def lab_anchors_def_default(void)
 {
     return (lab_anchors_def){.iterations = 1000, .downscale = 1, .seeds = 3};
 }
 
-static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder, study_figures *out, gbt_error *err)
+static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder,
+                          study_figures *out, gbt_error *err)
 {
     const anchors_study *s = study;
     const anchors_variant *v = &anchors_variants[variant];
     gbt_train_def def = gbt_train_def_default();
-    def.iterations = s->def.iterations, def.downscale = s->def.downscale, def.seed = (uint64_t)seed;
-    def.save_every_seconds = 0, def.command = "gbtrace study anchors";
-    return study_runs_do_variant(folder, s->def.data[scene], s->grid.names[scene], v->name, v->settings, def, out, err);
+    def.iterations = s->def.iterations;
+    def.downscale = s->def.downscale;
+    def.seed = (uint64_t)seed;
+    def.save_every_seconds = 0;
+    def.command = "gbtrace study anchors";
+    return study_runs_do_variant(folder, s->def.data[scene], s->grid.names[scene], v->name, v->settings, def,
+                                 out, err);
 }
 
 static gbt_status write_all(const anchors_study *s, const char *folder, FILE *out, gbt_error *err)
@@ -50,7 +57,8 @@ static gbt_status open_study(anchors_study *s, const lab_anchors_def *def, gbt_e
 {
     s->def = *def;
     if (def->iterations < 20)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least 20)", (unsigned long long)def->iterations);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least 20)",
+                         (unsigned long long)def->iterations);
     return study_grid_open(&s->grid, def->data, def->data_count, anchors_variant_count, def->seeds, err);
 }
 

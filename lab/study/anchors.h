@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/anchors.h -- what the study "anchors" trains, what came out, and how it is written down. */
 #ifndef GBT_STUDY_ANCHORS_H
 #define GBT_STUDY_ANCHORS_H
@@ -34,7 +35,8 @@ static inline const study_figures *anchors_run(const anchors_study *s, size_t pl
 
 void anchors_tables(const anchors_study *s, text *out); /* Markdown */
 void anchors_csv(const anchors_study *s, text *out);
-void anchors_charts(const anchors_study *s, text *out); /* SVG */
-gbt_status anchors_json(const anchors_study *s, const char *folder, gbt_error *err); /* anchors.json in the folder */
+void anchors_charts(const anchors_study *s, text *out);                              /* SVG */
+gbt_status anchors_json(const anchors_study *s, const char *folder, gbt_error *err); /* anchors.json in the
+                                                                                        folder */
 
 #endif

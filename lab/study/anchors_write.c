@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/anchors_write.c -- the study "anchors" as tables, as data, and as charts. */
 #include <math.h>
 #include <stdio.h>
@@ -10,17 +11,24 @@
 
 enum { PAPER_BYTES_PER_ANCHOR = 316 }; /* 79 floats, as the paper counts */
 
-/* ---- figures ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- figures ---- */
 
 typedef enum figure { INITIAL, FINAL, BYTES, BLENDED, PSNR, SSIM, FIGURES } figure;
 
-static const struct { const char *name, *title; int decimals; } figure_texts[FIGURES] = {
-    {"anchors_initial", "initial anchors", 0}, {"anchors_final", "final anchors", 0}, {"model_bytes", "model.gbt, bytes", 0},
-    {"blended_per_ray", "blended per ray", 1}, {"psnr", "PSNR, dB", 2},               {"ssim", "SSIM", 4}};
+static const struct {
+    const char *name, *title;
+    int decimals;
+} figure_texts[FIGURES] = {{"anchors_initial", "initial anchors", 0},
+                           {"anchors_final", "final anchors", 0},
+                           {"model_bytes", "model.gbt, bytes", 0},
+                           {"blended_per_ray", "blended per ray", 1},
+                           {"psnr", "PSNR, dB", 2},
+                           {"ssim", "SSIM", 4}};
 
 static double value_of(const study_figures *run, figure which)
 {
-    const double values[FIGURES] = {run->anchors_initial, run->anchors_final, run->model_bytes, run->blended_per_ray, run->psnr, run->ssim};
+    const double values[FIGURES] = {run->anchors_initial, run->anchors_final, run->model_bytes,
+                                    run->blended_per_ray, run->psnr,          run->ssim};
     return values[which];
 }
 
@@ -33,12 +41,13 @@ static stat_sample stat_over(const anchors_study *s, size_t scene, size_t varian
 }
 
 /* Against another variant of the same seed: a difference, or per cent of the other. */
-static stat_sample change_over(const anchors_study *s, size_t scene, size_t variant, size_t base, figure which, bool relative)
+static stat_sample change_over(const anchors_study *s, size_t scene, size_t variant, size_t base,
+                               figure which, bool relative)
 {
     double values[STUDY_SEEDS_MAX];
     for (int seed = 0; seed < s->grid.seeds; seed++) {
         const double here = value_of(anchors_run(s, scene, variant, seed), which),
-            there = value_of(anchors_run(s, scene, base, seed), which);
+                     there = value_of(anchors_run(s, scene, base, seed), which);
         values[seed] = relative ? 100 * here / there : here - there;
     }
     return stat_of(values, (size_t)s->grid.seeds);
@@ -47,10 +56,11 @@ static stat_sample change_over(const anchors_study *s, size_t scene, size_t vari
 /* How many times smaller than the voxels' anchors at the paper's bytes. */
 static double times_smaller(const anchors_study *s, size_t scene, size_t variant)
 {
-    return PAPER_BYTES_PER_ANCHOR * stat_over(s, scene, ANCHORS_VOXELS, FINAL).mean / stat_over(s, scene, variant, BYTES).mean;
+    return PAPER_BYTES_PER_ANCHOR * stat_over(s, scene, ANCHORS_VOXELS, FINAL).mean /
+           stat_over(s, scene, variant, BYTES).mean;
 }
 
-/* ---- Markdown --------------------------------------------------------------------------------------------------------------------- */
+/* ---- Markdown ---- */
 
 static void add_row(const anchors_study *s, size_t scene, size_t v, text *out)
 {
@@ -62,7 +72,7 @@ static void add_row(const anchors_study *s, size_t scene, size_t v, text *out)
         text_add(out, " |");
     }
     const stat_sample initial = change_over(s, scene, v, ANCHORS_BALLS, INITIAL, true),
-        final = change_over(s, scene, v, ANCHORS_VOXELS, FINAL, true);
+                      final = change_over(s, scene, v, ANCHORS_VOXELS, FINAL, true);
     const stat_sample psnr = change_over(s, scene, v, ANCHORS_VOXELS, PSNR, false);
     text_add(out, " ");
     stat_add(out, &initial, 0, false);
@@ -77,11 +87,13 @@ static void add_row(const anchors_study *s, size_t scene, size_t v, text *out)
 
 void anchors_tables(const anchors_study *s, text *out)
 {
-    text_format(out, "# Anchors against held-out PSNR\n\n%llu iterations of the default settings, photos divided by %g, seeds 0 to %d, "
-                     "every eighth photo held out.\n",
+    text_format(out,
+                "# Anchors against held-out PSNR\n\n%llu iterations of the default settings, photos divided "
+                "by %g, seeds 0 to %d, every eighth photo held out.\n",
                 (unsigned long long)s->def.iterations, s->def.downscale, s->grid.seeds - 1);
-    text_format(out, "Mean ± standard deviation over the seeds. Times smaller: model.gbt against %d bytes, as the paper counts, for each "
-                     "final anchor of the voxels. The voxels are those of the first row.\n",
+    text_format(out,
+                "Mean ± standard deviation over the seeds. Times smaller: model.gbt against %d bytes, as the "
+                "paper counts, for each final anchor of the voxels. The voxels are those of the first row.\n",
                 (int)PAPER_BYTES_PER_ANCHOR);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         text_add(out, "\n## ");
@@ -89,7 +101,8 @@ void anchors_tables(const anchors_study *s, text *out)
         text_add(out, "\n\n| start |");
         for (int f = 0; f < FIGURES; f++)
             text_format(out, " %s |", figure_texts[f].title);
-        text_add(out, " initial, % of the paper's balls | final, % of the voxels | PSNR against the voxels, dB | times smaller |\n|---|");
+        text_add(out, " initial, % of the paper's balls | final, % of the voxels | PSNR against the voxels, "
+                      "dB | times smaller |\n|---|");
         for (int f = 0; f < FIGURES + 4; f++)
             text_add(out, "---|");
         text_add(out, "\n");
@@ -98,7 +111,7 @@ void anchors_tables(const anchors_study *s, text *out)
     }
 }
 
-/* ---- CSV, JSON -------------------------------------------------------------------------------------------------------------------- */
+/* ---- CSV, JSON ---- */
 
 void anchors_csv(const anchors_study *s, text *out)
 {
@@ -118,12 +131,14 @@ void anchors_csv(const anchors_study *s, text *out)
             }
 }
 
-static void add_limited(json_t *rows, const char *scene, const char *start, const char *what, double value, double limit)
+static void add_limited(json_t *rows, const char *scene, const char *start, const char *what, double value,
+                        double limit)
 {
     char row[STUDY_NAME_SIZE + 160];
     snprintf(row, sizeof row, "%s: %s: %s", scene, start, what);
-    json_array_append_new(rows, json_pack("{s:o,s:o,s:o,s:b}", "row", json_text(row), "limit", json_number(limit), "value",
-                                          json_number(value), "pass", isnan(limit) || value <= limit));
+    json_array_append_new(rows,
+                          json_pack("{s:o,s:o,s:o,s:b}", "row", json_text(row), "limit", json_number(limit),
+                                    "value", json_number(value), "pass", isnan(limit) || value <= limit));
 }
 
 static void add_rows(const anchors_study *s, size_t scene, json_t *rows)
@@ -137,7 +152,8 @@ static void add_rows(const anchors_study *s, size_t scene, json_t *rows)
         add_limited(rows, s->grid.names[scene], start, "PSNR against the voxels', dB",
                     change_over(s, scene, v, ANCHORS_VOXELS, PSNR, false).mean, NAN);
     }
-    add_limited(rows, s->grid.names[scene], anchors_variants[ANCHORS_ADAPTIVE].name, "initial anchors, % of the paper's balls",
+    add_limited(rows, s->grid.names[scene], anchors_variants[ANCHORS_ADAPTIVE].name,
+                "initial anchors, % of the paper's balls",
                 change_over(s, scene, ANCHORS_ADAPTIVE, ANCHORS_BALLS, INITIAL, true).mean, 50);
 }
 
@@ -149,8 +165,8 @@ gbt_status anchors_json(const anchors_study *s, const char *folder, gbt_error *e
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         add_rows(s, scene, rows);
         for (size_t v = 0; v < anchors_variant_count; v++) {
-            json_t *run = json_pack("{s:o,s:s,s:s}", "scene", json_text(s->grid.names[scene]), "start", anchors_variants[v].name,
-                                    "settings", anchors_variants[v].settings);
+            json_t *run = json_pack("{s:o,s:s,s:s}", "scene", json_text(s->grid.names[scene]), "start",
+                                    anchors_variants[v].name, "settings", anchors_variants[v].settings);
             for (int f = 0; f < FIGURES; f++) {
                 const stat_sample stat = stat_over(s, scene, v, (figure)f);
                 json_object_set_new(run, figure_texts[f].name, stat_to_json(&stat));
@@ -158,28 +174,35 @@ gbt_status anchors_json(const anchors_study *s, const char *folder, gbt_error *e
             json_array_append_new(runs, run);
         }
     }
-    json_t *root = json_pack("{s:i,s:s,s:I,s:f,s:i,s:o,s:o}", "schema", 1, "study", "anchors", "iterations", (json_int_t)s->def.iterations,
-                             "downscale", s->def.downscale, "seeds", s->grid.seeds, "rows", rows, "runs", runs);
+    json_t *root = json_pack("{s:i,s:s,s:I,s:f,s:i,s:o,s:o}", "schema", 1, "study", "anchors", "iterations",
+                             (json_int_t)s->def.iterations, "downscale", s->def.downscale, "seeds",
+                             s->grid.seeds, "rows", rows, "runs", runs);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);
     return status;
 }
 
-/* ---- charts ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- charts ---- */
 
 static void draw_scene(const anchors_study *s, size_t scene, int top, text *out)
 {
     scatter_point points[ANCHORS_VARIANTS_MAX * STUDY_SEEDS_MAX];
     char title[STUDY_NAME_SIZE + 40];
     snprintf(title, sizeof title, "%s: held-out PSNR against final anchors", s->grid.names[scene]);
-    scatter_chart chart = {.title = title, .note = "a mark per seed", .x_unit = "final anchors (log)", .y_unit = "held-out PSNR, dB",
-                           .apart = ~0u, .points = points, .series = {NULL, "voxels", "the paper's balls", "adaptive balls",
-                                                                      "random points"}};
+    scatter_chart chart = {
+        .title = title,
+        .note = "a mark per seed",
+        .x_unit = "final anchors (log)",
+        .y_unit = "held-out PSNR, dB",
+        .apart = ~0u,
+        .points = points,
+        .series = {NULL, "voxels", "the paper's balls", "adaptive balls", "random points"}};
     for (size_t v = 0; v < anchors_variant_count; v++)
         for (int seed = 0; seed < s->grid.seeds; seed++) {
             const study_figures *run = anchors_run(s, scene, v, seed);
-            points[chart.point_count++] = (scatter_point){anchors_variants[v].series, run->anchors_final, run->psnr,
-                                                          seed == 0 ? anchors_variants[v].name : ""};
+            points[chart.point_count++] =
+                (scatter_point){anchors_variants[v].series, run->anchors_final, run->psnr,
+                                seed == 0 ? anchors_variants[v].name : ""};
         }
     scatter_draw(out, &chart, top);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/chart.c -- a scatter chart as SVG. Labels go where they cover neither a mark nor each other. */
 #include "study/chart.h"
 
@@ -9,26 +10,28 @@
 enum { LEFT = 58, RIGHT = 738, TOP = 84, BOTTOM = 450, BOXES_MAX = 256 };
 
 const char scatter_css[] =
-    ".scatter{--k0:#1b1c1e;--k1:#0b62c4;--k2:#d9480f;--k3:#2b8a3e;--k4:#7b3fc4;--k5:#b0246e;--k6:#0a7f8c;--page:#fff;"
-    "--text:#1b1c1e;--dim:#62666d;--rule:#e8e8e5}\n"
-    "@media(prefers-color-scheme:dark){.scatter{--k0:#f2f2f0;--k1:#6cb0ff;--k2:#ff9a5c;--k3:#6fd08c;--k4:#c19bff;--k5:#ff8cc2;"
-    "--k6:#5fd3e0;--page:#1c1e22;--text:#e8e8e6;"
-    "--dim:#9ba0a8;--rule:#2e3136}}\n"
+    ".scatter{--k0:#1b1c1e;--k1:#0b62c4;--k2:#d9480f;--k3:#2b8a3e;--k4:#7b3fc4;--k5:#b0246e;--k6:#0a7f8c;--"
+    "page:#fff;--text:#1b1c1e;--dim:#62666d;--rule:#e8e8e5}\n"
+    "@media(prefers-color-scheme:dark){.scatter{--k0:#f2f2f0;--k1:#6cb0ff;--k2:#ff9a5c;--k3:#6fd08c;--k4:#"
+    "c19bff;--k5:#ff8cc2;--k6:#5fd3e0;--page:#1c1e22;--text:#e8e8e6;--dim:#9ba0a8;--rule:#2e3136}}\n"
     ".scatter .paper{fill:var(--page)}\n"
     ".scatter text{font:12px system-ui,-apple-system,\"Segoe UI\",Roboto,Arial,sans-serif;fill:var(--dim)}\n"
     ".scatter .title{font-size:15px;font-weight:600;fill:var(--text)}\n"
     ".scatter .tick-y{text-anchor:end}.scatter .tick-x{text-anchor:middle}\n"
     ".scatter .rule{stroke:var(--rule);stroke-width:1}.scatter .axis{stroke:var(--dim);stroke-width:1}\n"
-    ".scatter .s0{--k:var(--k0)}.scatter .s1{--k:var(--k1)}.scatter .s2{--k:var(--k2)}.scatter .s3{--k:var(--k3)}.scatter "
-    ".s4{--k:var(--k4)}.scatter .s5{--k:var(--k5)}.scatter .s6{--k:var(--k6)}\n"
+    ".scatter .s0{--k:var(--k0)}.scatter .s1{--k:var(--k1)}.scatter .s2{--k:var(--k2)}.scatter "
+    ".s3{--k:var(--k3)}.scatter .s4{--k:var(--k4)}.scatter .s5{--k:var(--k5)}.scatter .s6{--k:var(--k6)}\n"
     ".scatter .join{fill:none;stroke:var(--k);stroke-width:1.5;opacity:.45}\n"
     ".scatter .mark{fill:var(--k);stroke:var(--page);stroke-width:1.5}\n"
-    ".scatter .label,.scatter .level-label{font-size:11px;paint-order:stroke;stroke:var(--page);stroke-width:3px;stroke-linejoin:round}\n"
+    ".scatter .label,.scatter "
+    ".level-label{font-size:11px;paint-order:stroke;stroke:var(--page);stroke-width:3px;stroke-linejoin:"
+    "round}\n"
     ".scatter .label{fill:var(--k)}.scatter .label.s0{font-size:14px;font-weight:700}\n"
     ".scatter .key{font-size:12px;fill:var(--text)}\n"
-    ".scatter .level{stroke:var(--dim);stroke-width:1;stroke-dasharray:5 4}.scatter .level-label{font-style:italic}\n";
+    ".scatter .level{stroke:var(--dim);stroke-width:1;stroke-dasharray:5 4}.scatter "
+    ".level-label{font-style:italic}\n";
 
-/* ---- room ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- room ---- */
 
 typedef struct box {
     double x0, y0, x1, y1;
@@ -73,42 +76,51 @@ static double text_width(const char *label, bool large)
 }
 
 /* The first free place around a mark of the given radius: right, left, above, below, then the corners. */
-static bool find_room(plane *p, double x, double y, double radius, const char *label, bool large, double *at_x, double *at_y)
+static bool find_room(plane *p, double x, double y, double radius, const char *label, bool large,
+                      double *at_x, double *at_y)
 {
     static const int sides[8][2] = {{1, 0}, {-1, 0}, {0, -1}, {0, 1}, {1, -1}, {-1, -1}, {1, 1}, {-1, 1}};
     const double width = text_width(label, large), height = large ? 15 : 12, gap = radius + 3;
     for (int i = 0; i < 8; i++) {
         const double middle = y + sides[i][1] * (gap + height / 2);
-        const double start = sides[i][0] > 0 ? x + (sides[i][1] == 0 ? gap : 2) : sides[i][0] < 0 ? x - width - (sides[i][1] == 0 ? gap : 2)
-                             : x - width / 2;
+        const double start = sides[i][0] > 0   ? x + (sides[i][1] == 0 ? gap : 2)
+                             : sides[i][0] < 0 ? x - width - (sides[i][1] == 0 ? gap : 2)
+                                               : x - width / 2;
         const box b = {start - 1, middle - height / 2, start + width + 1, middle + height / 2};
         if (!is_free(p, b))
             continue;
         take(p, b);
-        *at_x = start, *at_y = middle + (large ? 5 : 4);
+        *at_x = start;
+        *at_y = middle + (large ? 5 : 4);
         return true;
     }
     return false;
 }
 
-/* ---- drawing ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- drawing ---- */
 
 static bool can_show(const scatter_point *point)
 {
-    return isfinite(point->x) && isfinite(point->y) && point->x > 0 && point->x < 1e30 && fabs(point->y) < 1e30;
+    return isfinite(point->x) && isfinite(point->y) && point->x > 0 && point->x < 1e30 &&
+           fabs(point->y) < 1e30;
 }
 
 static bool find_range(const scatter_chart *c, plane *p)
 {
-    p->x_low = p->y_low = INFINITY, p->x_high = p->y_high = -INFINITY;
+    p->x_low = p->y_low = INFINITY;
+    p->x_high = p->y_high = -INFINITY;
     for (size_t i = 0; i < c->point_count; i++)
         if (can_show(&c->points[i])) {
-            p->x_low = fmin(p->x_low, c->points[i].x), p->x_high = fmax(p->x_high, c->points[i].x);
-            p->y_low = fmin(p->y_low, c->points[i].y), p->y_high = fmax(p->y_high, c->points[i].y);
+            p->x_low = fmin(p->x_low, c->points[i].x);
+            p->x_high = fmax(p->x_high, c->points[i].x);
+            p->y_low = fmin(p->y_low, c->points[i].y);
+            p->y_high = fmax(p->y_high, c->points[i].y);
         }
     for (size_t i = 0; i < c->level_count; i++)
-        if (isfinite(c->levels[i].y))
-            p->y_low = fmin(p->y_low, c->levels[i].y), p->y_high = fmax(p->y_high, c->levels[i].y);
+        if (isfinite(c->levels[i].y)) {
+            p->y_low = fmin(p->y_low, c->levels[i].y);
+            p->y_high = fmax(p->y_high, c->levels[i].y);
+        }
     return p->x_low <= p->x_high;
 }
 
@@ -116,19 +128,27 @@ static void draw_axes(text *out, const scatter_chart *c, plane *p)
 {
     double ticks[CHART_MAX_TICKS];
     int count = chart_ticks(p->y_low, p->y_high, 6, ticks);
-    p->y_low = ticks[0], p->y_high = ticks[count - 1];
+    p->y_low = ticks[0];
+    p->y_high = ticks[count - 1];
     for (int i = 0; i < count; i++)
-        text_format(out, "<line class=\"rule\" x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/><text class=\"tick-y\" x=\"%d\" "
-                         "y=\"%.1f\">%g</text>", LEFT,
-                    place_y(p, ticks[i]), RIGHT, place_y(p, ticks[i]), LEFT - 8, place_y(p, ticks[i]) + 4, ticks[i]);
+        text_format(out,
+                    "<line class=\"rule\" x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/><text "
+                    "class=\"tick-y\" x=\"%d\" y=\"%.1f\">%g</text>",
+                    LEFT, place_y(p, ticks[i]), RIGHT, place_y(p, ticks[i]), LEFT - 8,
+                    place_y(p, ticks[i]) + 4, ticks[i]);
     count = chart_log_ticks(p->x_low, p->x_high, ticks);
-    p->x_low = ticks[0], p->x_high = ticks[count - 1];
+    p->x_low = ticks[0];
+    p->x_high = ticks[count - 1];
     for (int i = 0; i < count; i++)
-        text_format(out, "<line class=\"rule\" x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text class=\"tick-x\" x=\"%.1f\" "
-                         "y=\"%d\">%g</text>",
-                    place_x(p, ticks[i]), TOP, place_x(p, ticks[i]), BOTTOM, place_x(p, ticks[i]), BOTTOM + 18, ticks[i]);
-    text_format(out, "<line class=\"axis\" x1=\"%d\" y1=\"%d\" x2=\"%d\" y2=\"%d\"/><text class=\"tick-x\" x=\"%d\" y=\"%d\">", LEFT,
-                BOTTOM, RIGHT, BOTTOM, (LEFT + RIGHT) / 2, BOTTOM + 40);
+        text_format(out,
+                    "<line class=\"rule\" x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text "
+                    "class=\"tick-x\" x=\"%.1f\" y=\"%d\">%g</text>",
+                    place_x(p, ticks[i]), TOP, place_x(p, ticks[i]), BOTTOM, place_x(p, ticks[i]),
+                    BOTTOM + 18, ticks[i]);
+    text_format(out,
+                "<line class=\"axis\" x1=\"%d\" y1=\"%d\" x2=\"%d\" y2=\"%d\"/><text class=\"tick-x\" "
+                "x=\"%d\" y=\"%d\">",
+                LEFT, BOTTOM, RIGHT, BOTTOM, (LEFT + RIGHT) / 2, BOTTOM + 40);
     text_escaped(out, c->x_unit);
     text_format(out, "</text><text x=\"%d\" y=\"%d\">", 10, TOP - 14);
     text_escaped(out, c->y_unit);
@@ -167,7 +187,8 @@ static void draw_joins(text *out, const scatter_chart *c, const plane *p)
         text_format(out, "<path class=\"join s%d\" d=\"", s);
         for (size_t i = 0; i < c->point_count; i++)
             if (c->points[i].series == s && can_show(&c->points[i])) {
-                text_format(out, "%s%.1f %.1f", open ? "L" : "M", place_x(p, c->points[i].x), place_y(p, c->points[i].y));
+                text_format(out, "%s%.1f %.1f", open ? "L" : "M", place_x(p, c->points[i].x),
+                            place_y(p, c->points[i].y));
                 open = true;
             }
         text_add(out, open ? "\"/>" : "M0 0\"/>");
@@ -182,7 +203,8 @@ static void draw_mark(text *out, const scatter_chart *c, const plane *p, const s
     text_escaped(out, c->series[point->series]);
     text_add(out, " ");
     text_escaped(out, point->label);
-    text_format(out, ": %.3g at %.1f</title>%s", point->x, point->y, point->series == 0 ? "</path>" : "</circle>");
+    text_format(out, ": %.3g at %.1f</title>%s", point->x, point->y,
+                point->series == 0 ? "</path>" : "</circle>");
 }
 
 static void draw_labels(text *out, const scatter_chart *c, plane *p, bool large)
@@ -192,7 +214,8 @@ static void draw_labels(text *out, const scatter_chart *c, plane *p, bool large)
         double x, y;
         if ((point->series == 0) != large || !can_show(point) || point->label[0] == '\0')
             continue;
-        if (!find_room(p, place_x(p, point->x), place_y(p, point->y), large ? 9 : 5, point->label, large, &x, &y))
+        if (!find_room(p, place_x(p, point->x), place_y(p, point->y), large ? 9 : 5, point->label, large, &x,
+                       &y))
             continue;
         text_format(out, "<text class=\"label s%d\" x=\"%.1f\" y=\"%.1f\">", point->series, x, y);
         text_escaped(out, point->label);
@@ -207,7 +230,8 @@ static void draw_levels(text *out, const scatter_chart *c, plane *p)
         if (!isfinite(c->levels[i].y))
             continue;
         const double y = place_y(p, c->levels[i].y), width = text_width(c->levels[i].label, false);
-        text_format(out, "<line class=\"level\" x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/>", LEFT, y, RIGHT, y);
+        text_format(out, "<line class=\"level\" x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/>", LEFT, y,
+                    RIGHT, y);
         bool done = false;
         for (double x = RIGHT - width - 4; x > LEFT && !done; x -= 20)
             for (int side = 0; side < 2 && !done; side++) {
@@ -226,12 +250,15 @@ static void draw_levels(text *out, const scatter_chart *c, plane *p)
 
 void scatter_begin(text *out, const char *label, const char *css, int height)
 {
-    text_format(out, "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"scatter\" viewBox=\"0 0 %d %d\" width=\"%d\" role=\"img\"",
+    text_format(out,
+                "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"scatter\" viewBox=\"0 0 %d %d\" "
+                "width=\"%d\" role=\"img\"",
                 SCATTER_WIDTH, height, SCATTER_WIDTH);
     text_format(out, " aria-label=\"%s\"><style>", label);
     text_add(out, scatter_css);
     text_add(out, css);
-    text_format(out, "</style><rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH, height);
+    text_format(out, "</style><rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH,
+                height);
 }
 
 void scatter_draw(text *out, const scatter_chart *c, int top)
@@ -250,7 +277,8 @@ void scatter_draw(text *out, const scatter_chart *c, int top)
     draw_axes(out, c, &p);
     for (size_t i = 0; i < c->point_count; i++)
         if (can_show(&c->points[i])) {
-            const double x = place_x(&p, c->points[i].x), y = place_y(&p, c->points[i].y), r = c->points[i].series == 0 ? 8 : 5;
+            const double x = place_x(&p, c->points[i].x), y = place_y(&p, c->points[i].y),
+                         r = c->points[i].series == 0 ? 8 : 5;
             take(&p, (box){x - r, y - r, x + r, y + r});
         }
     draw_joins(out, c, &p);

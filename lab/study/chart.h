@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/chart.h -- a scatter chart as SVG: what each setting costs against what it gives. */
 #ifndef GBT_STUDY_CHART_H
 #define GBT_STUDY_CHART_H
@@ -25,7 +26,8 @@ typedef struct scatter_level {
 typedef struct scatter_chart {
     const char *title, *note, *x_unit, *y_unit; /* escaped here */
     const char *series[SCATTER_SERIES_MAX];     /* names for the legend; NULL: not used */
-    unsigned apart;                             /* bit per series whose points stand alone; those of the others are joined in their order */
+    unsigned apart; /* bit per series whose points stand alone; those of the others are joined in their order
+                     */
     const scatter_point *points;
     size_t point_count;
     const scatter_level *levels;
@@ -36,14 +38,14 @@ typedef struct scatter_chart {
 extern const char scatter_css[];
 
 /**
- * A file of charts begins: SVG of SCATTER_WIDTH x `height` with their rules and its paper; what ends it is "</svg>". `css`: further rules,
- * or "".
+ * A file of charts begins: SVG of SCATTER_WIDTH x `height` with their rules and its paper; what ends it is
+ * "</svg>". `css`: further rules, or "".
  */
 void scatter_begin(text *out, const char *label, const char *css, int height);
 
 /**
- * The chart as an SVG group, SCATTER_WIDTH x SCATTER_HEIGHT, its upper left corner at (0, top). Log x from the points; y from points and
- * levels.
+ * The chart as an SVG group, SCATTER_WIDTH x SCATTER_HEIGHT, its upper left corner at (0, top). Log x from
+ * the points; y from points and levels.
  */
 void scatter_draw(text *out, const scatter_chart *chart, int top);
 

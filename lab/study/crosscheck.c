@@ -1,5 +1,6 @@
-/* study/crosscheck.c -- measure how far the tracer, the rasterizer and their double references are apart, and what takes one to the
-   other. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/crosscheck.c -- measure how far the tracer, the rasterizer and their double references are apart, and
+   what takes one to the other. */
 #include "study/crosscheck.h"
 
 #include <math.h>
@@ -38,7 +39,7 @@ const char *cross_step_text(cross_step step)
     return texts[step];
 }
 
-/* ---- pictures ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- pictures ---- */
 
 static raster_settings settings_of_step(const trace_settings *s, cross_step step)
 {
@@ -56,7 +57,8 @@ static const gaussians *gaussians_of_step(const bench_scene *s, cross_step step)
     return s->run != NULL && step >= CROSS_DILATION ? &s->run->frame.gaussians : s->gaussians;
 }
 
-static gbt_status trace_picture(const bench_scene *s, const trace_settings *settings, image *out, gbt_error *err)
+static gbt_status trace_picture(const bench_scene *s, const trace_settings *settings, image *out,
+                                gbt_error *err)
 {
     trace_scene traced = {0};
     gbt_status status = trace_build(&traced, s->gaussians, settings, ray_image_reach(&s->rays), err);
@@ -66,11 +68,13 @@ static gbt_status trace_picture(const bench_scene *s, const trace_settings *sett
     return status;
 }
 
-static gbt_status splat_picture(const bench_scene *s, const trace_settings *settings, cross_step step, image *out, gbt_error *err)
+static gbt_status splat_picture(const bench_scene *s, const trace_settings *settings, cross_step step,
+                                image *out, gbt_error *err)
 {
     raster_scene drawn = {0};
     const raster_settings r = settings_of_step(settings, step);
-    const gbt_status status = raster_forward(&drawn, gaussians_of_step(s, step), &s->camera.shot.camera, &r, false, out, NULL, NULL, err);
+    const gbt_status status = raster_forward(&drawn, gaussians_of_step(s, step), &s->camera.shot.camera, &r,
+                                             false, out, NULL, NULL, err);
     raster_scene_free(&drawn);
     return status;
 }
@@ -81,15 +85,18 @@ static bench_error compare(const image *a, const image *b)
     double sum = 0, max = 0;
     for (size_t i = 0; i < count; i++) {
         const double off = fabs((double)a->pixels[i] - (double)b->pixels[i]);
-        sum += off * off, max = fmax(max, off);
+        sum += off * off;
+        max = fmax(max, off);
     }
     return bench_error_of(sum, max, count);
 }
 
-/* Per-ray form against tracer, both in float32. Pixels that differ by more than 1e-5 are looked at in double: on those of the rounding band
-   either may be right, and they are left out; `kept` is the share of the others. */
-static gbt_status compare_outside_band(const bench_scene *s, const trace_settings *settings, const image *traced, const image *splatted,
-                                       double *psnr, double *kept, gbt_error *err)
+/* Per-ray form against tracer, both in float32. Pixels that differ by more than 1e-5 are looked at in double:
+   on those of the rounding band either may be right, and they are left out; `kept` is the share of the
+   others. */
+static gbt_status compare_outside_band(const bench_scene *s, const trace_settings *settings,
+                                       const image *traced, const image *splatted, double *psnr, double *kept,
+                                       gbt_error *err)
 {
     const size_t pixels = ray_image_count(&s->rays);
     size_t left_out = 0;
@@ -101,35 +108,43 @@ static gbt_status compare_outside_band(const bench_scene *s, const trace_setting
         double square = 0, max = 0;
         for (size_t k = 3 * i; k < 3 * i + 3; k++) {
             const double off = fabs((double)traced->pixels[k] - (double)splatted->pixels[k]);
-            square += off * off, max = fmax(max, off);
+            square += off * off;
+            max = fmax(max, off);
         }
         bool in_band = false;
         if (max > 1e-5)
-            status = rounding_band_find(&exact, settings, ray_image_origin(&s->rays, i), s->rays.dir + 3 * i, &scratch, &in_band);
-        left_out += in_band, sum += in_band ? 0 : square;
+            status = rounding_band_find(&exact, settings, ray_image_origin(&s->rays, i), s->rays.dir + 3 * i,
+                                        &scratch, &in_band);
+        left_out += in_band;
+        sum += in_band ? 0 : square;
     }
     band_scratch_free(&scratch);
     reference_scene_free(&exact);
-    *psnr = bench_error_of(sum, 0, 3 * (pixels - left_out)).psnr, *kept = (double)(pixels - left_out) / (double)pixels;
+    *psnr = bench_error_of(sum, 0, 3 * (pixels - left_out)).psnr;
+    *kept = (double)(pixels - left_out) / (double)pixels;
     return status;
 }
 
-/* ---- references ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- references ---- */
 
 typedef struct references {
     bench_reference rays, splats; /* splats borrows the rays, of which only the size counts */
 } references;
 
 /* Of the rays, and of the splats of `step`, which has EWA projection. */
-static gbt_status make_references(const bench_scene *s, const trace_settings *settings, cross_step step, references *out, gbt_error *err)
+static gbt_status make_references(const bench_scene *s, const trace_settings *settings, cross_step step,
+                                  references *out, gbt_error *err)
 {
     const raster_settings r = settings_of_step(settings, step);
     const gbt_camera *camera = &s->camera.shot.camera;
     raster_reference exact = {0};
     GBT_TRY(bench_reference_make(s->gaussians, settings, &s->rays, &out->rays, err));
     out->splats.rays = out->rays.rays;
-    out->splats.rgb = mem_alloc(raster_reference_pixels(camera, REFERENCE_STEP), 3 * sizeof *out->splats.rgb, "splats in double", err);
-    gbt_status status = out->splats.rgb == NULL ? GBT_ERR_NO_MEMORY : raster_reference_make(gaussians_of_step(s, step), &exact, err);
+    out->splats.rgb = mem_alloc(raster_reference_pixels(camera, REFERENCE_STEP), 3 * sizeof *out->splats.rgb,
+                                "splats in double", err);
+    gbt_status status = out->splats.rgb == NULL
+                            ? GBT_ERR_NO_MEMORY
+                            : raster_reference_make(gaussians_of_step(s, step), &exact, err);
     if (status == GBT_OK)
         status = raster_reference_forward(&exact, camera, &r, REFERENCE_STEP, out->splats.rgb, err);
     mem_free(exact.fields);
@@ -143,7 +158,8 @@ static void references_free(references *r)
 }
 
 /* The three renderers with their own cut-offs against double. */
-static gbt_status compare_own(const bench_scene *s, const image *traced, const image pictures[CROSS_STEPS], cross_view *out, gbt_error *err)
+static gbt_status compare_own(const bench_scene *s, const image *traced, const image pictures[CROSS_STEPS],
+                              cross_view *out, gbt_error *err)
 {
     references want = {0};
     const gbt_status status = make_references(s, &s->settings, CROSS_CUTS, &want, err);
@@ -156,7 +172,8 @@ static gbt_status compare_own(const bench_scene *s, const image *traced, const i
     return status;
 }
 
-/* The same with the cut-offs of the preset "exact", so that a response that rounds to the other side of a cut does not show. */
+/* The same with the cut-offs of the preset "exact", so that a response that rounds to the other side of a cut
+   does not show. */
 static gbt_status compare_exact(const bench_scene *s, image scratch[3], cross_view *out, gbt_error *err)
 {
     references want = {0};
@@ -175,7 +192,8 @@ static gbt_status compare_exact(const bench_scene *s, image scratch[3], cross_vi
     if (status == GBT_OK)
         status = compare_outside_band(s, &settings, &scratch[0], &scratch[1], &psnr, &kept, err);
     if (status == GBT_OK) {
-        cross_check *c = out->checks + 2; /* splats a thousand pixels long lose digits in float32, hence the last limit */
+        cross_check *c =
+            out->checks + 2; /* splats a thousand pixels long lose digits in float32, hence the last limit */
         c[0] = (cross_check){"preset exact: per-ray form to tracer outside the rounding band, dB", 100, psnr};
         c[1] = (cross_check){"preset exact: share of pixels outside that band", 0.999, kept};
         c[2] = (cross_check){"preset exact: tracer to double reference outside that band, dB", 100,
@@ -189,7 +207,7 @@ static gbt_status compare_exact(const bench_scene *s, image scratch[3], cross_vi
     return status;
 }
 
-/* ---- one view ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- one view ---- */
 
 /* Letters, digits, '.' and '-' stay. */
 static void name_sheet(const char *of, const char *view, char out[CROSS_NAME_SIZE])
@@ -197,14 +215,16 @@ static void name_sheet(const char *of, const char *view, char out[CROSS_NAME_SIZ
     char name[CROSS_NAME_SIZE];
     snprintf(name, sizeof name, "crosscheck_%.120s_%.120s.png", of, view);
     for (char *c = name; *c != '\0'; c++)
-        if (!((*c >= 'a' && *c <= 'z') || (*c >= 'A' && *c <= 'Z') || (*c >= '0' && *c <= '9') || *c == '.' || *c == '-'))
+        if (!((*c >= 'a' && *c <= 'z') || (*c >= 'A' && *c <= 'Z') || (*c >= '0' && *c <= '9') || *c == '.' ||
+              *c == '-'))
             *c = '_';
     memcpy(out, name, sizeof name);
 }
 
 /* With `pictures` and `traced` of the size of the camera. */
-static gbt_status measure_pictures(const bench_scene *s, const char *folder, image *traced, image pictures[CROSS_STEPS], image scratch[3],
-                                   cross_view *out, gbt_error *err)
+static gbt_status measure_pictures(const bench_scene *s, const char *folder, image *traced,
+                                   image pictures[CROSS_STEPS], image scratch[3], cross_view *out,
+                                   gbt_error *err)
 {
     char path[4096];
     double psnr, kept;
@@ -215,7 +235,8 @@ static gbt_status measure_pictures(const bench_scene *s, const char *folder, ima
         out->total[step] = compare(&pictures[step], traced);
     }
     GBT_TRY(compare_outside_band(s, &s->settings, traced, &pictures[CROSS_TILES], &psnr, &kept, err));
-    out->checks[0] = (cross_check){"own cut-offs: per-ray form to tracer outside the rounding band, dB", 100, psnr};
+    out->checks[0] =
+        (cross_check){"own cut-offs: per-ray form to tracer outside the rounding band, dB", 100, psnr};
     out->checks[1] = (cross_check){"own cut-offs: share of pixels outside that band", 0.999, kept};
     GBT_TRY(compare_own(s, traced, pictures, out, err));
     GBT_TRY(compare_exact(s, scratch, out, err));
@@ -227,7 +248,8 @@ static gbt_status measure_view(bench_scene *s, const char *folder, cross_view *o
 {
     image images[1 + CROSS_STEPS + 3] = {0};
     gbt_status status = bench_scene_decode(s, err);
-    out->width = s->rays.width, out->height = s->rays.height;
+    out->width = s->rays.width;
+    out->height = s->rays.height;
     for (size_t i = 0; i < sizeof images / sizeof *images && status == GBT_OK; i++)
         status = image_alloc(&images[i], out->width, out->height, 3, err);
     if (status == GBT_OK) {
@@ -240,7 +262,8 @@ static gbt_status measure_view(bench_scene *s, const char *folder, cross_view *o
     return status;
 }
 
-/* The shot as a pinhole takes it: the same pose, size and field of view, no aperture, no rolling shutter. False when it is one already. */
+/* The shot as a pinhole takes it: the same pose, size and field of view, no aperture, no rolling shutter.
+   False when it is one already. */
 static bool make_pinhole(ray_shot *shot)
 {
     const gbt_camera from = shot->camera;
@@ -254,15 +277,17 @@ static bool make_pinhole(ray_shot *shot)
     memset(shot->camera.params, 0, sizeof shot->camera.params);
     for (int k = 0; k < 2; k++) {
         const double side = k == 0 ? from.width : from.height;
-        shot->camera.params[k] = 0.5 * side / half[k], shot->camera.params[2 + k] = 0.5 * side;
+        shot->camera.params[k] = 0.5 * side / half[k];
+        shot->camera.params[2 + k] = 0.5 * side;
     }
     shot->end = shot->camera;
     return true;
 }
 
-/* ---- one model ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- one model ---- */
 
-static gbt_status measure_shot(bench_scene *s, const ray_shot *shot, const char *view, const char *folder, cross_model *out, gbt_error *err)
+static gbt_status measure_shot(bench_scene *s, const ray_shot *shot, const char *view, const char *folder,
+                               cross_model *out, gbt_error *err)
 {
     cross_view *v = &out->views[out->view_count++];
     s->camera.shot = *shot;
@@ -279,7 +304,8 @@ static gbt_status measure_run(bench_scene *s, const char *folder, cross_model *o
     size_t held_out = 0, seen = 0;
     for (size_t i = 0; i < run->scene.view_count; i++)
         held_out += run->scene.views[i].is_test;
-    const size_t all = held_out > 0 ? held_out : run->scene.view_count, wanted = all < CROSS_VIEWS_MAX ? all : CROSS_VIEWS_MAX;
+    const size_t all = held_out > 0 ? held_out : run->scene.view_count,
+                 wanted = all < CROSS_VIEWS_MAX ? all : CROSS_VIEWS_MAX;
     for (size_t i = 0; i < run->scene.view_count && out->view_count < wanted; i++) {
         char name[200];
         if (held_out > 0 && !run->scene.views[i].is_test)
@@ -294,7 +320,8 @@ static gbt_status measure_run(bench_scene *s, const char *folder, cross_model *o
     return GBT_OK;
 }
 
-static gbt_status measure_model(const lab_study_def *def, size_t i, const char *folder, cross_model *out, gbt_error *err)
+static gbt_status measure_model(const lab_study_def *def, size_t i, const char *folder, cross_model *out,
+                                gbt_error *err)
 {
     char camera[4096];
     bench_scene s = {0};
@@ -304,7 +331,8 @@ static gbt_status measure_model(const lab_study_def *def, size_t i, const char *
         GBT_TRY(study_model_camera(def->models[i], def->camera, camera, sizeof camera, err));
     gbt_status status = bench_scene_open(def->models[i], is_plain ? camera : NULL, &s, err);
     if (status == GBT_OK && is_plain && s.camera.shot.given != NULL)
-        status = base_fail(err, GBT_ERR_ARGUMENT, "%.200s: given rays have no projection (wanted a camera)", camera);
+        status = base_fail(err, GBT_ERR_ARGUMENT, "%.200s: given rays have no projection (wanted a camera)",
+                           camera);
     if (status == GBT_OK && is_plain) {
         const ray_shot shot = s.camera.shot;
         status = measure_shot(&s, &shot, "camera", folder, out, err);

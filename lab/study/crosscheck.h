@@ -1,4 +1,6 @@
-/* study/crosscheck.h -- the measurements of the study "tracer against rasterizer", and how they are written down. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/crosscheck.h -- the measurements of the study "tracer against rasterizer", and how they are written
+   down. */
 #ifndef GBT_STUDY_CROSSCHECK_H
 #define GBT_STUDY_CROSSCHECK_H
 
@@ -11,7 +13,14 @@
 enum { CROSS_MODELS_MAX = 16, CROSS_VIEWS_MAX = 4, CROSS_CHECKS = 7, CROSS_NAME_SIZE = 320 };
 
 /** From the tracer to the splats of 3DGS, one change at a time; each keeps the changes before it. */
-typedef enum cross_step { CROSS_TILES, CROSS_ORDER, CROSS_PROJECTION, CROSS_DILATION, CROSS_CUTS, CROSS_STEPS } cross_step;
+typedef enum cross_step {
+    CROSS_TILES,
+    CROSS_ORDER,
+    CROSS_PROJECTION,
+    CROSS_DILATION,
+    CROSS_CUTS,
+    CROSS_STEPS
+} cross_step;
 
 /** What is held to a limit. */
 typedef struct cross_check {
@@ -23,9 +32,9 @@ typedef struct cross_view {
     char name[256], sheet[CROSS_NAME_SIZE]; /* of the view; file name of its pictures */
     int width, height;
     size_t gaussians;
-    bool stand_in;              /* the camera has a lens that splats cannot have: its pinhole was taken */
+    bool stand_in; /* the camera has a lens that splats cannot have: its pinhole was taken */
     bench_error step[CROSS_STEPS], total[CROSS_STEPS]; /* to the picture before; to the tracer's */
-    bench_error traced, per_ray, splat;                /* to the double references, with the model's own cut-offs */
+    bench_error traced, per_ray, splat; /* to the double references, with the model's own cut-offs */
     cross_check checks[CROSS_CHECKS];
 } cross_view;
 
@@ -48,13 +57,15 @@ const char *cross_step_text(cross_step step);
 enum { CROSS_AMPLIFIED = 8, CROSS_AMPLIFIED_TILES = 1000 };
 
 /**
- * One PNG of eight pictures, four across: tracer, splats, their difference, that of the tiles; order, projection, dilation, cut-offs.
+ * One PNG of eight pictures, four across: tracer, splats, their difference, that of the tiles; order,
+ * projection, dilation, cut-offs.
  *
  * @param traced   [in] the tracer's picture
  * @param pictures [in] after each step
  * @return GBT_OK, GBT_ERR_NO_MEMORY, GBT_ERR_IO
  */
-gbt_status cross_write_sheet(const image *traced, const image pictures[CROSS_STEPS], const char *path, gbt_error *err);
+gbt_status cross_write_sheet(const image *traced, const image pictures[CROSS_STEPS], const char *path,
+                             gbt_error *err);
 
 /** crosscheck.json, .md, .svg and .html into `folder`. */
 gbt_status cross_write(const cross_study *study, const char *folder, gbt_error *err);

@@ -1,4 +1,6 @@
-/* study/crosscheck_sheet.c -- the pictures of one view on one sheet, differences in the colours of the report. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/crosscheck_sheet.c -- the pictures of one view on one sheet, differences in the colours of the
+   report. */
 #include <math.h>
 
 #include "base/fail.h"
@@ -37,16 +39,21 @@ static void draw_panel(const panel *p, int factor, int left, int top, image *she
             float *to = sheet->pixels + 3 * ((size_t)(top + y) * (size_t)sheet->width + (size_t)(left + x));
             for (int i = 0; i < factor * factor; i++) {
                 float rgb[3];
-                panel_color(p, (size_t)(y * factor + i / factor) * (size_t)p->shown->width + (size_t)(x * factor + i % factor), rgb);
+                panel_color(p,
+                            (size_t)(y * factor + i / factor) * (size_t)p->shown->width +
+                                (size_t)(x * factor + i % factor),
+                            rgb);
                 for (int c = 0; c < 3; c++)
                     to[c] = (i == 0 ? 0 : to[c]) + rgb[c] / (float)(factor * factor);
             }
         }
 }
 
-gbt_status cross_write_sheet(const image *traced, const image pictures[CROSS_STEPS], const char *path, gbt_error *err)
+gbt_status cross_write_sheet(const image *traced, const image pictures[CROSS_STEPS], const char *path,
+                             gbt_error *err)
 {
-    const image *tiles = &pictures[CROSS_TILES], *order = &pictures[CROSS_ORDER], *flat = &pictures[CROSS_PROJECTION];
+    const image *tiles = &pictures[CROSS_TILES], *order = &pictures[CROSS_ORDER],
+                *flat = &pictures[CROSS_PROJECTION];
     const image *wide = &pictures[CROSS_DILATION], *splat = &pictures[CROSS_CUTS];
     const panel panels[PANELS_ACROSS * PANELS_DOWN] = {
         {traced, NULL, 0},
@@ -64,11 +71,13 @@ gbt_status cross_write_sheet(const image *traced, const image pictures[CROSS_STE
         factor = 1;
     const int width = traced->width / factor, height = traced->height / factor;
     image sheet;
-    GBT_TRY(image_alloc(&sheet, PANELS_ACROSS * (width + PANEL_GAP) - PANEL_GAP, PANELS_DOWN * (height + PANEL_GAP) - PANEL_GAP, 3, err));
+    GBT_TRY(image_alloc(&sheet, PANELS_ACROSS * (width + PANEL_GAP) - PANEL_GAP,
+                        PANELS_DOWN * (height + PANEL_GAP) - PANEL_GAP, 3, err));
     for (size_t i = 0; i < 3 * (size_t)sheet.width * (size_t)sheet.height; i++)
         sheet.pixels[i] = 1;
     for (int i = 0; i < PANELS_ACROSS * PANELS_DOWN; i++)
-        draw_panel(&panels[i], factor, i % PANELS_ACROSS * (width + PANEL_GAP), i / PANELS_ACROSS * (height + PANEL_GAP), &sheet);
+        draw_panel(&panels[i], factor, i % PANELS_ACROSS * (width + PANEL_GAP),
+                   i / PANELS_ACROSS * (height + PANEL_GAP), &sheet);
     const gbt_status status = image_write(path, &sheet, err);
     image_free(&sheet);
     return status;

@@ -1,4 +1,6 @@
-/* study/crosscheck_write.c -- the study "tracer against rasterizer" as tables, as data, as a chart and as a page. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/crosscheck_write.c -- the study "tracer against rasterizer" as tables, as data, as a chart and as a
+   page. */
 #include <jansson.h>
 #include <math.h>
 #include <stdint.h>
@@ -13,10 +15,7 @@
 
 enum { BAR_HEIGHT = 16, BAR_GAP = 6, HEAD = 62, VIEW_GAP = 26, LABEL_WIDTH = 96, BARS_RIGHT = 700 };
 
-static bool passes(const cross_check *c)
-{
-    return c->value >= c->limit;
-}
+static bool passes(const cross_check *c) { return c->value >= c->limit; }
 
 static size_t count_failures(const cross_study *study)
 {
@@ -28,7 +27,7 @@ static size_t count_failures(const cross_study *study)
     return failures;
 }
 
-/* ---- tables -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- tables ---- */
 
 static void add_error_row(text *out, const char *name, const bench_error *a, const bench_error *b)
 {
@@ -40,9 +39,12 @@ static void add_error_row(text *out, const char *name, const bench_error *a, con
 
 static void add_view_table(const cross_model *model, const cross_view *v, text *out)
 {
-    text_format(out, "**%s, %s**: %zu Gaussians, %d x %d pixels%s\n\n", model->name, v->name, v->gaussians, v->width, v->height,
+    text_format(out, "**%s, %s**: %zu Gaussians, %d x %d pixels%s\n\n", model->name, v->name, v->gaussians,
+                v->width, v->height,
                 v->stand_in ? "; the camera's lens is left out: splats are projected" : "");
-    text_add(out, "| change | dB to the step before | largest | dB to the tracer | largest |\n|---|---|---|---|---|\n");
+    text_add(
+        out,
+        "| change | dB to the step before | largest | dB to the tracer | largest |\n|---|---|---|---|---|\n");
     for (cross_step step = 0; step < CROSS_STEPS; step++)
         add_error_row(out, cross_step_name(step), &v->step[step], &v->total[step]);
     text_add(out, "\n| own cut-offs, against double | dB | largest |\n|---|---|---|\n");
@@ -51,8 +53,8 @@ static void add_view_table(const cross_model *model, const cross_view *v, text *
     add_error_row(out, "EWA form", &v->splat, NULL);
     text_add(out, "\n| row | limit | value | pass |\n|---|---|---|---|\n");
     for (size_t i = 0; i < CROSS_CHECKS; i++)
-        text_format(out, "| %s | >= %g | %.5g | %s |\n", v->checks[i].row, v->checks[i].limit, v->checks[i].value,
-                    passes(&v->checks[i]) ? "yes" : "**NO**");
+        text_format(out, "| %s | >= %g | %.5g | %s |\n", v->checks[i].row, v->checks[i].limit,
+                    v->checks[i].value, passes(&v->checks[i]) ? "yes" : "**NO**");
 }
 
 void cross_table(const cross_study *study, text *out)
@@ -67,16 +69,18 @@ void cross_table(const cross_study *study, text *out)
 
 static void add_markdown(const cross_study *study, text *out)
 {
-    text_format(out, "# Tracer against rasterizer\n\nFrom the tracer's picture to that of 3D Gaussian splatting, one change at a time; "
-                     "each keeps those before it. Rows beyond "
-                     "their limit: %zu.\n\n", count_failures(study));
+    text_format(out,
+                "# Tracer against rasterizer\n\nFrom the tracer's picture to that of 3D Gaussian splatting, "
+                "one change at a time; each keeps those before it. Rows beyond their limit: %zu.\n\n",
+                count_failures(study));
     for (cross_step step = 0; step < CROSS_STEPS; step++)
         text_format(out, "- **%s**: %s\n", cross_step_name(step), cross_step_text(step));
-    text_format(out, "\nPictures of each view, from the upper left: tracer, splats, their difference x %d, that of the tiles x %d; order, "
-                     "projection, dilation and cut-offs, each x %d. "
-                     "Differences are the largest of the three channels, dark to light for 0 to 1. Against double: every 8th pixel in both "
-                     "directions.\n\n",
-                (int)CROSS_AMPLIFIED, (int)CROSS_AMPLIFIED_TILES, (int)CROSS_AMPLIFIED);
+    text_format(
+        out,
+        "\nPictures of each view, from the upper left: tracer, splats, their difference x %d, that of the "
+        "tiles x %d; order, projection, dilation and cut-offs, each x %d. Differences are the largest of the "
+        "three channels, dark to light for 0 to 1. Against double: every 8th pixel in both directions.\n\n",
+        (int)CROSS_AMPLIFIED, (int)CROSS_AMPLIFIED_TILES, (int)CROSS_AMPLIFIED);
     cross_table(study, out);
     text_add(out, "\n");
     for (size_t m = 0; m < study->model_count; m++)
@@ -93,16 +97,20 @@ static json_t *view_to_json(const cross_view *v)
 {
     json_t *rows = json_array(), *chain = json_array();
     for (size_t i = 0; i < CROSS_CHECKS; i++)
-        json_array_append_new(rows, json_pack("{s:s,s:f,s:o,s:b}", "row", v->checks[i].row, "limit", v->checks[i].limit, "value",
-                                              isfinite(v->checks[i].value) ? json_real(v->checks[i].value) : json_null(), "pass",
-                                              passes(&v->checks[i])));
+        json_array_append_new(
+            rows,
+            json_pack("{s:s,s:f,s:o,s:b}", "row", v->checks[i].row, "limit", v->checks[i].limit, "value",
+                      isfinite(v->checks[i].value) ? json_real(v->checks[i].value) : json_null(), "pass",
+                      passes(&v->checks[i])));
     for (cross_step step = 0; step < CROSS_STEPS; step++)
-        json_array_append_new(chain, json_pack("{s:s,s:s,s:o,s:o}", "change", cross_step_name(step), "what", cross_step_text(step),
-                                               "to_step_before", error_to_json(&v->step[step]), "to_tracer",
+        json_array_append_new(chain, json_pack("{s:s,s:s,s:o,s:o}", "change", cross_step_name(step), "what",
+                                               cross_step_text(step), "to_step_before",
+                                               error_to_json(&v->step[step]), "to_tracer",
                                                error_to_json(&v->total[step])));
-    return json_pack("{s:o,s:i,s:i,s:I,s:b,s:o,s:o,s:{s:o,s:o,s:o},s:o}", "view", json_text(v->name), "width", v->width, "height",
-                     v->height, "gaussians", (json_int_t)v->gaussians, "pinhole_stand_in", v->stand_in, "chain", chain, "rows", rows,
-                     "to_double", "tracer", error_to_json(&v->traced), "per_ray", error_to_json(&v->per_ray), "ewa",
+    return json_pack("{s:o,s:i,s:i,s:I,s:b,s:o,s:o,s:{s:o,s:o,s:o},s:o}", "view", json_text(v->name), "width",
+                     v->width, "height", v->height, "gaussians", (json_int_t)v->gaussians, "pinhole_stand_in",
+                     v->stand_in, "chain", chain, "rows", rows, "to_double", "tracer",
+                     error_to_json(&v->traced), "per_ray", error_to_json(&v->per_ray), "ewa",
                      error_to_json(&v->splat), "pictures", json_text(v->sheet));
 }
 
@@ -115,21 +123,20 @@ static gbt_status write_json(const cross_study *study, const char *folder, gbt_e
         json_t *views = json_array();
         for (size_t v = 0; v < study->models[m].view_count; v++)
             json_array_append_new(views, view_to_json(&study->models[m].views[v]));
-        json_array_append_new(models, json_pack("{s:o,s:o}", "model", json_text(study->models[m].name), "views", views));
+        json_array_append_new(
+            models, json_pack("{s:o,s:o}", "model", json_text(study->models[m].name), "views", views));
     }
-    json_t *root = json_pack("{s:i,s:s,s:i,s:i,s:o}", "schema", 1, "study", "crosscheck", "amplified", (int)CROSS_AMPLIFIED,
-                             "amplified_tiles", (int)CROSS_AMPLIFIED_TILES, "models", models);
+    json_t *root =
+        json_pack("{s:i,s:s,s:i,s:i,s:o}", "schema", 1, "study", "crosscheck", "amplified",
+                  (int)CROSS_AMPLIFIED, "amplified_tiles", (int)CROSS_AMPLIFIED_TILES, "models", models);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);
     return status;
 }
 
-/* ---- chart --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- chart ---- */
 
-static int view_height(void)
-{
-    return CROSS_STEPS * (BAR_HEIGHT + BAR_GAP) + VIEW_GAP;
-}
+static int view_height(void) { return CROSS_STEPS * (BAR_HEIGHT + BAR_GAP) + VIEW_GAP; }
 
 /* The longer, the closer: from 10 to 120 dB. */
 static double bar_end(double psnr)
@@ -147,11 +154,13 @@ static void draw_bars(const cross_model *model, const cross_view *v, int top, te
     for (int i = 0; i < CROSS_STEPS; i++) {
         const int y = top + VIEW_GAP - 4 + i * (BAR_HEIGHT + BAR_GAP);
         const double end = bar_end(v->step[i].psnr), total = bar_end(v->total[i].psnr);
-        text_format(out, "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%s</text>", LABEL_WIDTH - 8, y + 12, cross_step_name((cross_step)i));
-        text_format(out, "<rect class=\"s1 bar\" x=\"%d\" y=\"%d\" width=\"%.1f\" height=\"%d\"/>", LABEL_WIDTH, y, end - LABEL_WIDTH,
-                    BAR_HEIGHT);
+        text_format(out, "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%s</text>", LABEL_WIDTH - 8, y + 12,
+                    cross_step_name((cross_step)i));
+        text_format(out, "<rect class=\"s1 bar\" x=\"%d\" y=\"%d\" width=\"%.1f\" height=\"%d\"/>",
+                    LABEL_WIDTH, y, end - LABEL_WIDTH, BAR_HEIGHT);
         text_format(out, "<path class=\"s2 total\" d=\"M%.1f %dv%d\"/>", total, y - 2, BAR_HEIGHT + 4);
-        text_format(out, "<text x=\"%.1f\" y=\"%d\">%.1f</text>", fmax(end, total) + 6, y + 12, v->step[i].psnr);
+        text_format(out, "<text x=\"%.1f\" y=\"%d\">%.1f</text>", fmax(end, total) + 6, y + 12,
+                    v->step[i].psnr);
     }
 }
 
@@ -160,28 +169,31 @@ static void add_svg(const cross_study *study, bool alone, text *out)
     int height = HEAD, top = HEAD;
     for (size_t m = 0; m < study->model_count; m++)
         height += (int)study->models[m].view_count * view_height();
-    text_format(out, "<svg %sclass=\"scatter\" viewBox=\"0 0 %d %d\"%s role=\"img\" aria-label=\"from tracer to splats\">",
-                alone ? "xmlns=\"http://www.w3.org/2000/svg\" " : "", SCATTER_WIDTH, height, alone ? " width=\"760\"" : "");
+    text_format(
+        out,
+        "<svg %sclass=\"scatter\" viewBox=\"0 0 %d %d\"%s role=\"img\" aria-label=\"from tracer to splats\">",
+        alone ? "xmlns=\"http://www.w3.org/2000/svg\" " : "", SCATTER_WIDTH, height,
+        alone ? " width=\"760\"" : "");
     if (alone) {
         text_add(out, "<style>");
         text_add(out, scatter_css);
-        text_add(out, ".scatter .bar{fill:var(--k);opacity:.55}.scatter .total{stroke:var(--k);stroke-width:2.5}</style>");
-        text_format(out, "<rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH, height);
+        text_add(out, ".scatter .bar{fill:var(--k);opacity:.55}.scatter "
+                      ".total{stroke:var(--k);stroke-width:2.5}</style>");
+        text_format(out, "<rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH,
+                    height);
     }
     text_add(out, "<text class=\"title\" x=\"8\" y=\"22\">From tracer to splats, one change at a time</text>"
-                  "<text x=\"8\" y=\"42\">PSNR in dB, longer is closer: the bar to the step before, the mark to the tracer</text>");
+                  "<text x=\"8\" y=\"42\">PSNR in dB, longer is closer: the bar to the step before, the mark "
+                  "to the tracer</text>");
     for (size_t m = 0; m < study->model_count; m++)
         for (size_t v = 0; v < study->models[m].view_count; v++, top += view_height())
             draw_bars(&study->models[m], &study->models[m].views[v], top, out);
     text_add(out, "</svg>\n");
 }
 
-static void add_picture(const cross_study *study, text *out)
-{
-    add_svg(study, true, out);
-}
+static void add_picture(const cross_study *study, text *out) { add_svg(study, true, out); }
 
-/* ---- page ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- page ---- */
 
 static void add_page_view(const cross_model *model, const cross_view *v, const char *folder, text *out)
 {
@@ -191,17 +203,19 @@ static void add_page_view(const cross_model *model, const cross_view *v, const c
     text_escaped(out, model->name);
     text_add(out, "</b>, ");
     text_escaped(out, v->name);
-    text_format(out, ": %zu Gaussians%s</figcaption>", v->gaussians, v->stand_in ? "; without the camera's lens" : "");
+    text_format(out, ": %zu Gaussians%s</figcaption>", v->gaussians,
+                v->stand_in ? "; without the camera's lens" : "");
     if (file_join(path, sizeof path, folder, v->sheet, out->err) == GBT_OK) {
         text_add(out, "<img style=\"width:100%;height:auto\" alt=\"tracer, splats and differences\" src=\"");
         report_picture(out, path, PICTURE_COLOR, SIZE_MAX, &width, &height);
         text_add(out, "\">");
     }
     text_add(out, "<div class=\"scroll\"><table "
-                  "class=\"list\"><thead><tr><th>row</th><th>limit</th><th>value</th><th>pass</th></tr></thead><tbody>");
+                  "class=\"list\"><thead><tr><th>row</th><th>limit</th><th>value</th><th>pass</th></tr></"
+                  "thead><tbody>");
     for (size_t i = 0; i < CROSS_CHECKS; i++)
-        text_format(out, "<tr><th>%s</th><td>&ge; %g</td><td>%.5g</td><td>%s</td></tr>", v->checks[i].row, v->checks[i].limit,
-                    v->checks[i].value, passes(&v->checks[i]) ? "yes" : "<b>no</b>");
+        text_format(out, "<tr><th>%s</th><td>&ge; %g</td><td>%.5g</td><td>%s</td></tr>", v->checks[i].row,
+                    v->checks[i].limit, v->checks[i].value, passes(&v->checks[i]) ? "yes" : "<b>no</b>");
     text_add(out, "</tbody></table></div></figure>\n");
 }
 
@@ -212,26 +226,28 @@ static void add_page(const cross_study *study, const char *folder, text *out)
                   "<title>Tracer against rasterizer</title>\n<style>\n");
     text_add(out, report_css);
     text_add(out, scatter_css);
-    text_add(out, ".scatter .bar{fill:var(--k);opacity:.55}.scatter .total{stroke:var(--k);stroke-width:2.5}.panel{margin:1rem 0 "
-                  ".5rem;padding:.6rem .9rem}\n"
-                  "</style></head>\n<body>\n<header><h1>Tracer against rasterizer</h1><p class=\"lead\">From the tracer's picture to that "
-                  "of 3D Gaussian splatting, one change "
-                  "at a time; each keeps those before it.</p></header>\n<main>\n<ul>");
+    text_add(out, ".scatter .bar{fill:var(--k);opacity:.55}.scatter "
+                  ".total{stroke:var(--k);stroke-width:2.5}.panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n"
+                  "</style></head>\n<body>\n<header><h1>Tracer against rasterizer</h1><p class=\"lead\">From "
+                  "the tracer's picture to that of 3D Gaussian splatting, one change at a time; each keeps "
+                  "those before it.</p></header>\n<main>\n<ul>");
     for (cross_step step = 0; step < CROSS_STEPS; step++)
         text_format(out, "<li><b>%s</b>: %s</li>", cross_step_name(step), cross_step_text(step));
     text_add(out, "</ul>\n<figure class=\"card panel\">");
     add_svg(study, false, out);
-    text_format(out, "</figure>\n<p>Pictures, from the upper left: tracer, splats, their difference &times; %d, that of the tiles &times; "
-                     "%d; order, projection, dilation and cut-offs, "
-                     "each &times; %d.</p>\n", (int)CROSS_AMPLIFIED, (int)CROSS_AMPLIFIED_TILES, (int)CROSS_AMPLIFIED);
+    text_format(
+        out,
+        "</figure>\n<p>Pictures, from the upper left: tracer, splats, their difference &times; %d, that of "
+        "the tiles &times; %d; order, projection, dilation and cut-offs, each &times; %d.</p>\n",
+        (int)CROSS_AMPLIFIED, (int)CROSS_AMPLIFIED_TILES, (int)CROSS_AMPLIFIED);
     for (size_t m = 0; m < study->model_count; m++)
         for (size_t v = 0; v < study->models[m].view_count; v++)
             add_page_view(&study->models[m], &study->models[m].views[v], folder, out);
-    text_add(out, "</main>\n<footer><p>The two share the cameras and the Gaussians, and no code that draws. This page is one file and "
-                  "loads nothing.</p></footer>\n</body></html>\n");
+    text_add(out, "</main>\n<footer><p>The two share the cameras and the Gaussians, and no code that draws. "
+                  "This page is one file and loads nothing.</p></footer>\n</body></html>\n");
 }
 
-/* ---- files --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- files ---- */
 
 gbt_status cross_write(const cross_study *study, const char *folder, gbt_error *err)
 {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/grid.c -- scenes x variants x seeds: making all runs of a study. */
 #include "study/grid.h"
 
@@ -8,13 +9,15 @@
 #include "base/log.h"
 #include "base/memory.h"
 
-gbt_status study_grid_open(study_grid *g, const char *const *data, size_t data_count, size_t variant_count, int seeds, gbt_error *err)
+gbt_status study_grid_open(study_grid *g, const char *const *data, size_t data_count, size_t variant_count,
+                           int seeds, gbt_error *err)
 {
     *g = (study_grid){.scene_count = data_count, .variant_count = variant_count, .seeds = seeds};
     if (seeds < 1 || seeds > STUDY_SEEDS_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "--seeds: %d (wanted 1 to %d)", seeds, (int)STUDY_SEEDS_MAX);
     GBT_TRY(study_runs_names(data, data_count, g->names, err));
-    g->figures = mem_calloc(data_count * variant_count * (size_t)seeds, sizeof *g->figures, "figures of runs", err);
+    g->figures =
+        mem_calloc(data_count * variant_count * (size_t)seeds, sizeof *g->figures, "figures of runs", err);
     return g->figures != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
@@ -28,13 +31,18 @@ void study_grid_close(study_grid *g)
 static void tell(size_t number, size_t count)
 {
     char line[64];
-    gbt_event e = {.text = line, .stage = "study", .done = number - 1, .total = count, .fraction = (double)(number - 1) / (double)count};
+    gbt_event e = {.text = line,
+                   .stage = "study",
+                   .done = number - 1,
+                   .total = count,
+                   .fraction = (double)(number - 1) / (double)count};
     e.seconds = e.seconds_left = e.psnr = e.loss = (double)NAN;
     snprintf(line, sizeof line, "run %zu of %zu", number, count);
     log_progress(&e);
 }
 
-gbt_status study_grid_fill(study_grid *g, const char *folder, const bool *wanted, study_grid_run *run, const void *study, gbt_error *err)
+gbt_status study_grid_fill(study_grid *g, const char *folder, const bool *wanted, study_grid_run *run,
+                           const void *study, gbt_error *err)
 {
     size_t variants = 0, done = 0;
     for (size_t v = 0; v < g->variant_count; v++)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/grid.h -- scenes x variants x seeds: the runs that a study makes, and what they said. */
 #ifndef GBT_STUDY_GRID_H
 #define GBT_STUDY_GRID_H
@@ -17,7 +18,8 @@ typedef struct study_grid {
  * @param data [in] paths of data sets; their names are taken (study_runs_names())
  * @return GBT_OK, GBT_ERR_ARGUMENT (seeds or data out of range), GBT_ERR_IO, GBT_ERR_NO_MEMORY
  */
-gbt_status study_grid_open(study_grid *g, const char *const *data, size_t data_count, size_t variant_count, int seeds, gbt_error *err);
+gbt_status study_grid_open(study_grid *g, const char *const *data, size_t data_count, size_t variant_count,
+                           int seeds, gbt_error *err);
 void study_grid_close(study_grid *g);
 
 static inline study_figures *study_grid_at(const study_grid *g, size_t place, size_t variant, int seed)
@@ -26,15 +28,17 @@ static inline study_figures *study_grid_at(const study_grid *g, size_t place, si
 }
 
 /** Make one run of a study in `folder`, or take it from there: its figures into `out`. */
-typedef gbt_status study_grid_run(const void *study, size_t scene, size_t variant, int seed, const char *folder, study_figures *out,
-                                  gbt_error *err);
+typedef gbt_status study_grid_run(const void *study, size_t scene, size_t variant, int seed,
+                                  const char *folder, study_figures *out, gbt_error *err);
 
 /**
- * Make `folder` and all runs. Seeds are outermost: an interrupted study has whole comparisons of the first seeds.
+ * Make `folder` and all runs. Seeds are outermost: an interrupted study has whole comparisons of the first
+ * seeds.
  *
  * @param wanted [in] [variant_count], false: not made, its figures stay zero; NULL: all
  * @return as `run`, which fails first; GBT_ERR_IO
  */
-gbt_status study_grid_fill(study_grid *g, const char *folder, const bool *wanted, study_grid_run *run, const void *study, gbt_error *err);
+gbt_status study_grid_fill(study_grid *g, const char *folder, const bool *wanted, study_grid_run *run,
+                           const void *study, gbt_error *err);
 
 #endif

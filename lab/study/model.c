@@ -1,4 +1,6 @@
-/* study/model.c -- the models that a study is given: what they are called, and where the camera of plain Gaussians is. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/model.c -- the models that a study is given: what they are called, and where the camera of plain
+   Gaussians is. */
 #include "study/model.h"
 
 #include <stdio.h>
@@ -23,12 +25,14 @@ gbt_status study_model_camera(const char *path, const char *given, char *out, si
 {
     const char *slash = strrchr(path, '/');
     const int length = given != NULL ? snprintf(out, size, "%s", given)
-                                     : snprintf(out, size, "%.*scamera.json", slash == NULL ? 0 : (int)(slash - path) + 1, path);
+                                     : snprintf(out, size, "%.*scamera.json",
+                                                slash == NULL ? 0 : (int)(slash - path) + 1, path);
     if (length >= (int)size)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
     if (given == NULL && !file_exists(out))
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%.300s: plain Gaussians know no cameras (wanted --camera FILE.json, or camera.json beside it)",
-                         path);
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "%.300s: plain Gaussians know no cameras (wanted --camera FILE.json, or camera.json beside it)",
+            path);
     return GBT_OK;
 }

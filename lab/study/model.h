@@ -1,4 +1,6 @@
-/* study/model.h -- the models that a study is given: what they are called, and where the camera of plain Gaussians is. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/model.h -- the models that a study is given: what they are called, and where the camera of plain
+   Gaussians is. */
 #ifndef GBT_STUDY_MODEL_H
 #define GBT_STUDY_MODEL_H
 
@@ -6,11 +8,12 @@
 
 #include "gbtrace/status.h"
 
-/** "a/b/scene.ply" and "a/b/run1/" have names "b/scene.ply" and "b/run1": short, and different for models of one layout. Cut to `size`. */
+/** "a/b/scene.ply" and "a/b/run1/" have names "b/scene.ply" and "b/run1": short, and different for models of
+    one layout. Cut to `size`. */
 void study_model_name(const char *path, char *out, size_t size);
 
-/** The camera of a file of plain Gaussians: what the caller says (not NULL), else camera.json beside it. GBT_OK or GBT_ERR_ARGUMENT
-    (there is none, or its path is longer than `size`). */
+/** The camera of a file of plain Gaussians: what the caller says (not NULL), else camera.json beside it.
+    GBT_OK or GBT_ERR_ARGUMENT (there is none, or its path is longer than `size`). */
 gbt_status study_model_camera(const char *path, const char *given, char *out, size_t size, gbt_error *err);
 
 #endif

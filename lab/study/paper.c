@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/paper.c -- the study "paper": which runs its tables need, and making them. */
 #include "study/paper.h"
 
@@ -18,9 +19,11 @@ const paper_variant paper_variants[PAPER_VARIANTS] = {
     [PAPER_VOXEL_SCALED] = {"voxel-scaled", "voxels, scale x constant", "voxel", "nn", true, full, D_MAX},
     [PAPER_GBAI_SCALED] = {"gbai-scaled", "GBAI, scale x constant", "gb", "nn", true, full, D_MAX},
     [PAPER_VOXEL_SIXTH] = {"voxel-grow-sixth", "voxels, growth to 1/6", "voxel", "nn", false, sixth, D_MAX},
-    [PAPER_GBSP_SIXTH] = {"gbai-gbsp-grow-sixth", "GBAI + GBSP, growth to 1/6", "gb", "gb", false, sixth, D_MAX},
+    [PAPER_GBSP_SIXTH] = {"gbai-gbsp-grow-sixth", "GBAI + GBSP, growth to 1/6", "gb", "gb", false, sixth,
+                          D_MAX},
     [PAPER_VOXEL_THIRD] = {"voxel-grow-third", "voxels, growth to 1/3", "voxel", "nn", false, third, D_MAX},
-    [PAPER_GBSP_THIRD] = {"gbai-gbsp-grow-third", "GBAI + GBSP, growth to 1/3", "gb", "gb", false, third, D_MAX},
+    [PAPER_GBSP_THIRD] = {"gbai-gbsp-grow-third", "GBAI + GBSP, growth to 1/3", "gb", "gb", false, third,
+                          D_MAX},
     [PAPER_DEPTH_10] = {"gbai-gbsp-depth-10", "D_max 10", "gb", "gb", false, full, 10},
     [PAPER_DEPTH_12] = {"gbai-gbsp-depth-12", "D_max 12", "gb", "gb", false, full, 12},
     [PAPER_DEPTH_14] = {"gbai-gbsp-depth-14", "D_max 14", "gb", "gb", false, full, 14},
@@ -29,21 +32,28 @@ const paper_variant paper_variants[PAPER_VARIANTS] = {
 
 size_t paper_table_variants(int table, const paper_variant_id **out)
 {
-    static const paper_variant_id
-        main_results[] = {PAPER_VOXEL, PAPER_GBSP},
-        ablation[] = {PAPER_VOXEL, PAPER_GBAI, PAPER_GBSP, PAPER_VOXEL_SCALED, PAPER_GBAI_SCALED},
-        growth[] = {PAPER_VOXEL_SIXTH, PAPER_GBSP_SIXTH, PAPER_VOXEL_THIRD, PAPER_GBSP_THIRD, PAPER_VOXEL, PAPER_GBSP},
-        depth[] = {PAPER_DEPTH_10, PAPER_DEPTH_12, PAPER_DEPTH_14, PAPER_DEPTH_16, PAPER_GBSP};
-    static const struct { const paper_variant_id *variants; size_t count; } all[PAPER_TABLES] = {
-        {main_results, sizeof main_results / sizeof *main_results}, {ablation, sizeof ablation / sizeof *ablation},
-        {growth, sizeof growth / sizeof *growth}, {depth, sizeof depth / sizeof *depth}};
+    static const paper_variant_id main_results[] = {PAPER_VOXEL, PAPER_GBSP},
+                                  ablation[] = {PAPER_VOXEL, PAPER_GBAI, PAPER_GBSP, PAPER_VOXEL_SCALED,
+                                                PAPER_GBAI_SCALED},
+                                  growth[] = {PAPER_VOXEL_SIXTH, PAPER_GBSP_SIXTH, PAPER_VOXEL_THIRD,
+                                              PAPER_GBSP_THIRD,  PAPER_VOXEL,      PAPER_GBSP},
+                                  depth[] = {PAPER_DEPTH_10, PAPER_DEPTH_12, PAPER_DEPTH_14, PAPER_DEPTH_16,
+                                             PAPER_GBSP};
+    static const struct {
+        const paper_variant_id *variants;
+        size_t count;
+    } all[PAPER_TABLES] = {{main_results, sizeof main_results / sizeof *main_results},
+                           {ablation, sizeof ablation / sizeof *ablation},
+                           {growth, sizeof growth / sizeof *growth},
+                           {depth, sizeof depth / sizeof *depth}};
     *out = all[table - 1].variants;
     return all[table - 1].count;
 }
 
 lab_paper_def lab_paper_def_default(void)
 {
-    return (lab_paper_def){.iterations = 3000, .downscale = 1, .seeds = 3, .renderer = "raster", .tables = "1,2,3,4"};
+    return (lab_paper_def){
+        .iterations = 3000, .downscale = 1, .seeds = 3, .renderer = "raster", .tables = "1,2,3,4"};
 }
 
 /* "1,3": digits of tables, each once, with commas between. */
@@ -63,8 +73,8 @@ static gbt_status plan(paper_study *s, const lab_paper_def *def, gbt_error *err)
 {
     s->def = *def;
     if (def->iterations < LEAST_ITERATIONS)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least %d)", (unsigned long long)def->iterations,
-                         (int)LEAST_ITERATIONS);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least %d)",
+                         (unsigned long long)def->iterations, (int)LEAST_ITERATIONS);
     GBT_TRY(choose_tables(def->tables, s->has_table, err));
     GBT_TRY(study_grid_open(&s->grid, def->data, def->data_count, PAPER_VARIANTS, def->seeds, err));
     for (size_t i = 0; i < s->grid.scene_count; i++)
@@ -78,7 +88,8 @@ static gbt_status plan(paper_study *s, const lab_paper_def *def, gbt_error *err)
     return GBT_OK;
 }
 
-static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder, study_figures *out, gbt_error *err)
+static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder,
+                          study_figures *out, gbt_error *err)
 {
     char run[4096];
     const paper_study *s = study;
@@ -88,11 +99,21 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
         return GBT_OK;
     }
     gbt_train_def def = gbt_train_def_default();
-    def.compat = true, def.eval_split = "every=8", def.save_every_seconds = 0;
+    def.compat = true;
+    def.eval_split = "every=8";
+    def.save_every_seconds = 0;
     /* As compat has them: a new default must not make old runs look like others. */
-    def.start_level = 0, def.splats_until = 0, def.footprint = 0;
-    def.iterations = s->def.iterations, def.downscale = s->def.downscale, def.renderer = s->def.renderer, def.seed = (uint64_t)seed;
-    def.init = v->init, def.scale_prior = v->scale_prior, def.grow_until = v->grow_until, def.max_depth = v->max_depth;
+    def.start_level = 0;
+    def.splats_until = 0;
+    def.footprint = 0;
+    def.iterations = s->def.iterations;
+    def.downscale = s->def.downscale;
+    def.renderer = s->def.renderer;
+    def.seed = (uint64_t)seed;
+    def.init = v->init;
+    def.scale_prior = v->scale_prior;
+    def.grow_until = v->grow_until;
+    def.max_depth = v->max_depth;
     def.scale_factor = v->scaled ? s->scenes[scene].scale_constant : 1;
     def.command = "gbtrace study paper";
     GBT_TRY(study_runs_folder(folder, s->grid.names[scene], v->name, def.seed, run, sizeof run, err));

@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/paper.h -- what the study "paper" trains, what came out, and how it is written down.
 
-   scenes x variants x seeds --> figures --> tables, changes from one variant to another (ours beside the paper's) --> md, csv, json, svg */
+   scenes x variants x seeds --> figures
+        --> tables, changes from one variant to another (ours beside the paper's) --> md, csv, json, svg */
 #ifndef GBT_STUDY_PAPER_H
 #define GBT_STUDY_PAPER_H
 
@@ -10,7 +12,7 @@
 
 enum { PAPER_TABLES = 4, PAPER_ALL = STUDY_SCENES_MAX /* in place of a scene: the mean over all */ };
 
-/* ---- what is trained ------------------------------------------------------------------------------------------------------------ */
+/* ---- what is trained ---- */
 
 typedef enum paper_variant_id {
     PAPER_VOXEL,
@@ -45,17 +47,19 @@ size_t paper_table_variants(int table, const paper_variant_id **out);
 
 typedef struct paper_scene {
     int tree_depth;        /* of the balls without a limit: larger limits change nothing */
-    double scale_constant; /* the first scales of GBSP over those from spacing alone, of the same balls: geometric mean */
+    double scale_constant; /* the first scales of GBSP over those from spacing alone, of the same balls:
+                              geometric mean */
 } paper_scene;
 
 /** The constant and the depth, from the sparse points; without points 0.625 and no limit to the depth. */
 gbt_status paper_scene_look(const char *data, paper_scene *out, gbt_error *err);
 
-/** How many balls `points` points without ties give: every set of more than two is halved, down to `max_depth`. */
+/** How many balls `points` points without ties give: every set of more than two is halved, down to
+    `max_depth`. */
 double paper_ball_count(double points, int max_depth);
 
 typedef struct paper_study {
-    lab_paper_def def; /* strings borrowed */
+    lab_paper_def def;                /* strings borrowed */
     bool has_table[PAPER_TABLES + 1]; /* by number */
     bool has_variant[PAPER_VARIANTS];
     paper_scene scenes[STUDY_SCENES_MAX];
@@ -67,23 +71,24 @@ static inline study_figures *paper_run(const paper_study *s, size_t place, paper
     return study_grid_at(&s->grid, place, (size_t)variant, seed);
 }
 
-/* ---- figures and changes -------------------------------------------------------------------------------------------------------- */
+/* ---- figures and changes ---- */
 
 typedef enum paper_figure {
     PAPER_INITIAL,
     PAPER_FINAL,
-    PAPER_STORAGE,     /* the paper's accounting: 316 bytes per anchor and the networks, MiB */
-    PAPER_MODEL,       /* model.gbt, MiB */
+    PAPER_STORAGE, /* the paper's accounting: 316 bytes per anchor and the networks, MiB */
+    PAPER_MODEL,   /* model.gbt, MiB */
     PAPER_PSNR,
     PAPER_SSIM,
-    PAPER_LPIPS,       /* as the paper's: of colours in [0, 1]; NaN without a network */
-    PAPER_ARITHMETIC,  /* of the networks for a view, 10^9 multiply-adds */
-    PAPER_BLENDED,     /* hits that a ray blends */
+    PAPER_LPIPS,      /* as the paper's: of colours in [0, 1]; NaN without a network */
+    PAPER_ARITHMETIC, /* of the networks for a view, 10^9 multiply-adds */
+    PAPER_BLENDED,    /* hits that a ray blends */
     PAPER_FIGURES
 } paper_figure;
 
 typedef struct paper_figure_text {
-    const char *name, *value_name, *change_name; /* as data; of a value and of a change in tables, with their units */
+    const char *name, *value_name,
+        *change_name; /* as data; of a value and of a change in tables, with their units */
     int decimals;
     bool is_relative; /* changes are in per cent; else differences */
     int change_decimals;
@@ -103,9 +108,11 @@ static inline bool paper_is_measured(const paper_study *s, paper_figure figure)
 stat_sample paper_stat(const paper_study *s, size_t scene, paper_variant_id variant, paper_figure figure);
 
 /**
- * Over the seeds: the change from `base` to `variant` at the same seed, per cent or a difference; of PAPER_ALL the mean over the scenes.
+ * Over the seeds: the change from `base` to `variant` at the same seed, per cent or a difference; of
+ * PAPER_ALL the mean over the scenes.
  */
-stat_sample paper_change(const paper_study *s, size_t scene, paper_variant_id variant, paper_variant_id base, paper_figure figure);
+stat_sample paper_change(const paper_study *s, size_t scene, paper_variant_id variant, paper_variant_id base,
+                         paper_figure figure);
 
 /** A change that is looked at. */
 typedef struct paper_claim {
@@ -118,23 +125,26 @@ typedef struct paper_claim {
 extern const paper_claim paper_claims[];
 extern const size_t paper_claim_count;
 
-/** The same change in the paper's table: of the sums over its scenes, or the mean of differences; NaN when it has no such rows. */
+/** The same change in the paper's table: of the sums over its scenes, or the mean of differences; NaN when it
+    has no such rows. */
 double paper_published(const paper_claim *claim);
 
 /** The smallest and the largest of it over the paper's scenes; false when it has no such rows. */
 bool paper_published_range(const paper_claim *claim, double range[2]);
 
-/* ---- out ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- out ---- */
 
 /** What a change says beside the paper's: "agrees with the paper", ... */
 const char *paper_verdict(const stat_sample *ours, const paper_claim *claim);
 
-/** The same, of its numbers; `range`: from the smallest to the largest of the paper's scenes. `published` is NaN without one. */
+/** The same, of its numbers; `range`: from the smallest to the largest of the paper's scenes. `published` is
+    NaN without one. */
 const char *paper_verdict_of(const stat_sample *ours, double published, const double range[2]);
 
 void paper_tables(const paper_study *s, text *out); /* Markdown */
 void paper_csv(const paper_study *s, text *out);
-void paper_charts(const paper_study *s, text *out); /* SVG */
-gbt_status paper_json(const paper_study *s, const char *folder, gbt_error *err); /* paper.json in the folder */
+void paper_charts(const paper_study *s, text *out);                              /* SVG */
+gbt_status paper_json(const paper_study *s, const char *folder, gbt_error *err); /* paper.json in the folder
+                                                                                  */
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/paper_data.c -- the study "paper" as data: every run in CSV; rows, changes and runs in JSON. */
 #include <math.h>
 #include <stdio.h>
@@ -11,16 +12,17 @@
 /* The balls of real points against the closed form: ties and stopped sets move it. */
 static const double ball_count_limit = 0.015;
 
-/* ---- CSV -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- CSV ---- */
 
 static void add_csv_run(const paper_study *s, size_t scene, paper_variant_id variant, int seed, text *out)
 {
     const study_figures *r = paper_run(s, scene, variant, seed);
     stat_csv_text(out, s->grid.names[scene]);
-    text_format(out, ",%s,%d,%.0f,%.0f,%.0f,%.6g,%.0f,%.9g,%.9g,", paper_variants[variant].name, seed, r->points, r->anchors_initial,
-                r->anchors_final, paper_figure_of(r, PAPER_STORAGE), r->model_bytes, r->psnr, r->ssim);
-    text_format(out, "%.6g,%.6g,%.6g,%.0f,%.6g,", r->anchors_in_view, paper_figure_of(r, PAPER_ARITHMETIC), r->blended_per_ray,
-                r->iterations, r->train_seconds);
+    text_format(out, ",%s,%d,%.0f,%.0f,%.0f,%.6g,%.0f,%.9g,%.9g,", paper_variants[variant].name, seed,
+                r->points, r->anchors_initial, r->anchors_final, paper_figure_of(r, PAPER_STORAGE),
+                r->model_bytes, r->psnr, r->ssim);
+    text_format(out, "%.6g,%.6g,%.6g,%.0f,%.6g,", r->anchors_in_view, paper_figure_of(r, PAPER_ARITHMETIC),
+                r->blended_per_ray, r->iterations, r->train_seconds);
     if (paper_is_measured(s, PAPER_LPIPS))
         text_format(out, "%.9g", r->lpips_01);
     text_add(out, "\n");
@@ -36,7 +38,7 @@ void paper_csv(const paper_study *s, text *out)
                 add_csv_run(s, scene, (paper_variant_id)v, seed, out);
 }
 
-/* ---- JSON ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- JSON ---- */
 
 /* How far the balls of a scene are from the closed form, for each depth that was trained. */
 static void add_count_rows(const paper_study *s, size_t scene, json_t *rows)
@@ -48,11 +50,13 @@ static void add_count_rows(const paper_study *s, size_t scene, json_t *rows)
             continue;
         char row[STUDY_NAME_SIZE + 80];
         const study_figures *run = paper_run(s, scene, (paper_variant_id)v, 0);
-        const double wanted = paper_ball_count(run->points, paper_variants[v].max_depth), value = fabs(run->anchors_initial / wanted - 1);
-        snprintf(row, sizeof row, "%s: initial anchors at D_max %d against the closed form", s->grid.names[scene],
-                 paper_variants[v].max_depth);
-        json_array_append_new(rows, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", ball_count_limit, "value",
-                                              json_number(value), "pass", value <= ball_count_limit));
+        const double wanted = paper_ball_count(run->points, paper_variants[v].max_depth),
+                     value = fabs(run->anchors_initial / wanted - 1);
+        snprintf(row, sizeof row, "%s: initial anchors at D_max %d against the closed form",
+                 s->grid.names[scene], paper_variants[v].max_depth);
+        json_array_append_new(rows,
+                              json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", ball_count_limit,
+                                        "value", json_number(value), "pass", value <= ball_count_limit));
     }
 }
 
@@ -66,20 +70,24 @@ static void add_change_rows(const paper_study *s, json_t *rows)
         for (size_t scene = 0; scene <= s->grid.scene_count; scene++) {
             char row[2 * STUDY_NAME_SIZE];
             const bool is_all = scene == s->grid.scene_count;
-            const stat_sample ours = paper_change(s, is_all ? PAPER_ALL : scene, claim->variant, claim->base, claim->figure);
+            const stat_sample ours =
+                paper_change(s, is_all ? PAPER_ALL : scene, claim->variant, claim->base, claim->figure);
             const double published = paper_published(claim);
-            snprintf(row, sizeof row, "table %d, %s: %s: change of %s", claim->table, is_all ? "all" : s->grid.names[scene], claim->what,
+            snprintf(row, sizeof row, "table %d, %s: %s: change of %s", claim->table,
+                     is_all ? "all" : s->grid.names[scene], claim->what,
                      paper_figure_texts[claim->figure].change_name);
-            json_array_append_new(rows, json_pack("{s:o,s:n,s:o,s:n,s:o,s:o,s:s}", "row", json_text(row), "limit", "value",
-                                                  json_number(ours.mean), "pass", "ours", stat_to_json(&ours), "paper",
-                                                  json_number(published), "says", paper_verdict(&ours, claim)));
+            json_array_append_new(rows, json_pack("{s:o,s:n,s:o,s:n,s:o,s:o,s:s}", "row", json_text(row),
+                                                  "limit", "value", json_number(ours.mean), "pass", "ours",
+                                                  stat_to_json(&ours), "paper", json_number(published),
+                                                  "says", paper_verdict(&ours, claim)));
         }
     }
 }
 
 static json_t *variant_to_json(const paper_study *s, size_t scene, paper_variant_id variant)
 {
-    json_t *root = json_pack("{s:o,s:s}", "scene", json_text(s->grid.names[scene]), "variant", paper_variants[variant].name);
+    json_t *root = json_pack("{s:o,s:s}", "scene", json_text(s->grid.names[scene]), "variant",
+                             paper_variants[variant].name);
     for (int f = 0; f < PAPER_FIGURES; f++) {
         const stat_sample stat = paper_stat(s, scene, variant, (paper_figure)f);
         if (paper_is_measured(s, (paper_figure)f))
@@ -95,16 +103,17 @@ gbt_status paper_json(const paper_study *s, const char *folder, gbt_error *err)
     json_t *rows = json_array(), *figures = json_array(), *scenes = json_array();
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         add_count_rows(s, scene, rows);
-        json_array_append_new(scenes, json_pack("{s:o,s:f}", "scene", json_text(s->grid.names[scene]), "scale_constant",
-                                                s->scenes[scene].scale_constant));
+        json_array_append_new(scenes, json_pack("{s:o,s:f}", "scene", json_text(s->grid.names[scene]),
+                                                "scale_constant", s->scenes[scene].scale_constant));
         for (int v = 0; v < PAPER_VARIANTS; v++)
             if (s->has_variant[v])
                 json_array_append_new(figures, variant_to_json(s, scene, (paper_variant_id)v));
     }
     add_change_rows(s, rows);
-    json_t *root = json_pack("{s:i,s:s,s:I,s:f,s:s,s:i,s:o,s:o,s:o}", "schema", 1, "study", "paper", "iterations",
-                             (json_int_t)s->def.iterations, "downscale", s->def.downscale, "renderer", s->def.renderer, "seeds",
-                             s->grid.seeds, "rows", rows, "scenes", scenes, "figures", figures);
+    json_t *root =
+        json_pack("{s:i,s:s,s:I,s:f,s:s,s:i,s:o,s:o,s:o}", "schema", 1, "study", "paper", "iterations",
+                  (json_int_t)s->def.iterations, "downscale", s->def.downscale, "renderer", s->def.renderer,
+                  "seeds", s->grid.seeds, "rows", rows, "scenes", scenes, "figures", figures);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);
     return status;

@@ -1,4 +1,6 @@
-/* study/paper_figures.c -- the figures of runs, their means and spreads, and the changes from one variant to another. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/paper_figures.c -- the figures of runs, their means and spreads, and the changes from one variant to
+   another. */
 #include <math.h>
 
 #include "study/paper.h"
@@ -11,8 +13,8 @@ const paper_figure_text paper_figure_texts[PAPER_FIGURES] = {
     [PAPER_PSNR] = {"PSNR", "PSNR, dB", "PSNR, dB", 2, false, 2},
     [PAPER_SSIM] = {"SSIM", "SSIM", "SSIM", 4, false, 4},
     [PAPER_LPIPS] = {"LPIPS", "LPIPS", "LPIPS", 4, false, 4},
-    [PAPER_ARITHMETIC] = {"arithmetic", "arithmetic of the networks per view, 10^9 multiply-adds", "arithmetic of the networks per view, %",
-                          4, true, 1},
+    [PAPER_ARITHMETIC] = {"arithmetic", "arithmetic of the networks per view, 10^9 multiply-adds",
+                          "arithmetic of the networks per view, %", 4, true, 1},
     [PAPER_BLENDED] = {"blended", "hits that a ray blends", "hits that a ray blends, %", 1, true, 1},
 };
 
@@ -51,14 +53,16 @@ stat_sample paper_stat(const paper_study *s, size_t scene, paper_variant_id vari
     return stat_of(values, (size_t)s->grid.seeds);
 }
 
-static double change_of(const paper_study *s, size_t scene, paper_variant_id variant, paper_variant_id base, paper_figure figure, int seed)
+static double change_of(const paper_study *s, size_t scene, paper_variant_id variant, paper_variant_id base,
+                        paper_figure figure, int seed)
 {
     const double from = paper_figure_of(paper_run(s, scene, base, seed), figure),
-        to = paper_figure_of(paper_run(s, scene, variant, seed), figure);
+                 to = paper_figure_of(paper_run(s, scene, variant, seed), figure);
     return paper_figure_texts[figure].is_relative ? 100 * (to / from - 1) : to - from;
 }
 
-stat_sample paper_change(const paper_study *s, size_t scene, paper_variant_id variant, paper_variant_id base, paper_figure figure)
+stat_sample paper_change(const paper_study *s, size_t scene, paper_variant_id variant, paper_variant_id base,
+                         paper_figure figure)
 {
     double values[STUDY_SEEDS_MAX];
     for (int seed = 0; seed < s->grid.seeds; seed++) {
@@ -72,7 +76,7 @@ stat_sample paper_change(const paper_study *s, size_t scene, paper_variant_id va
     return stat_of(values, (size_t)s->grid.seeds);
 }
 
-/* ---- the changes that are looked at ----------------------------------------------------------------------------------------------- */
+/* ---- the changes that are looked at ---- */
 
 #define BALLS_FOR_VOXELS "balls in place of voxels"
 #define GBAI_FOR_VOXELS "GBAI in place of voxels"

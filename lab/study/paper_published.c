@@ -1,4 +1,6 @@
-/* study/paper_published.c -- the paper's own numbers (3DGBGS, tables 1 to 4), and the changes between their rows. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/paper_published.c -- the paper's own numbers (3DGBGS, tables 1 to 4), and the changes between their
+   rows. */
 #include <math.h>
 #include <string.h>
 
@@ -96,8 +98,10 @@ static bool next_pair(const paper_claim *claim, size_t *at, double *from, double
         if (base->table != claim->table || base->variant != claim->base)
             continue;
         for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
-            if (rows[i].table == claim->table && rows[i].variant == claim->variant && strcmp(rows[i].scene, base->scene) == 0) {
-                *from = value_of(base, claim->figure), *to = value_of(&rows[i], claim->figure);
+            if (rows[i].table == claim->table && rows[i].variant == claim->variant &&
+                strcmp(rows[i].scene, base->scene) == 0) {
+                *from = value_of(base, claim->figure);
+                *to = value_of(&rows[i], claim->figure);
                 ++*at;
                 return isfinite(*from) && isfinite(*to);
             }
@@ -108,18 +112,23 @@ static bool next_pair(const paper_claim *claim, size_t *at, double *from, double
 double paper_published(const paper_claim *claim)
 {
     double from, to, from_sum = 0, to_sum = 0, pairs = 0;
-    for (size_t at = 0; next_pair(claim, &at, &from, &to);)
-        from_sum += from, to_sum += to, pairs++;
+    for (size_t at = 0; next_pair(claim, &at, &from, &to);) {
+        from_sum += from;
+        to_sum += to;
+        pairs++;
+    }
     return pairs > 0 ? change(claim, from_sum / pairs, to_sum / pairs) : (double)NAN;
 }
 
 bool paper_published_range(const paper_claim *claim, double range[2])
 {
     double from, to;
-    range[0] = INFINITY, range[1] = -INFINITY;
+    range[0] = INFINITY;
+    range[1] = -INFINITY;
     for (size_t at = 0; next_pair(claim, &at, &from, &to);) {
         const double one = change(claim, from, to);
-        range[0] = fmin(range[0], one), range[1] = fmax(range[1], one);
+        range[0] = fmin(range[0], one);
+        range[1] = fmax(range[1], one);
     }
     return range[0] <= range[1];
 }

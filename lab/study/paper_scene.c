@@ -1,4 +1,6 @@
-/* study/paper_scene.c -- what a scene's points say before any training: how deep the balls go, and the constant that GBSP comes to. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/paper_scene.c -- what a scene's points say before any training: how deep the balls go, and the
+   constant that GBSP comes to. */
 #include <limits.h>
 #include <math.h>
 
@@ -21,19 +23,25 @@ double paper_ball_count(double points, int max_depth)
             done += larger, larger = 0;
         const double half = floor(n / 2), odd = n - 2 * half;
         /* n gives n/2 twice, or n/2 and n/2 + 1; n + 1 gives the same, or n/2 + 1 twice. */
-        const double small = odd == 0 ? 2 * sets + larger : sets, large = odd == 0 ? larger : sets + 2 * larger;
-        n = half, sets = small, larger = large;
+        const double small = odd == 0 ? 2 * sets + larger : sets,
+                     large = odd == 0 ? larger : sets + 2 * larger;
+        n = half;
+        sets = small;
+        larger = large;
     }
     return points < 1 ? 0 : done + sets + larger;
 }
 
 /* As training with `compat` makes them. */
-static gbt_status make_anchors(const scene_points *points, anchor_scale_kind scale, anchors *out, balls *out_balls, gbt_error *err)
+static gbt_status make_anchors(const scene_points *points, anchor_scale_kind scale, anchors *out,
+                               balls *out_balls, gbt_error *err)
 {
     anchor_init_def def = anchor_init_def_default();
     def.scale = scale;
-    GBT_TRY(balls_voxel_size(points->position, points->count, VOXEL_COMPAT_SQUARED, &def.balls.voxel_size, err));
-    return anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def, out, out_balls, err);
+    GBT_TRY(
+        balls_voxel_size(points->position, points->count, VOXEL_COMPAT_SQUARED, &def.balls.voxel_size, err));
+    return anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def, out,
+                        out_balls, err);
 }
 
 static gbt_status look_at_points(const scene_points *points, paper_scene *out, gbt_error *err)
@@ -61,7 +69,8 @@ static gbt_status look_at_points(const scene_points *points, paper_scene *out, g
 gbt_status paper_scene_look(const char *data, paper_scene *out, gbt_error *err)
 {
     scene s;
-    out->tree_depth = INT_MAX, out->scale_constant = constant_of_singletons;
+    out->tree_depth = INT_MAX;
+    out->scale_constant = constant_of_singletons;
     GBT_TRY(scene_load(data, NULL, &s, err));
     const gbt_status status = s.points.count > 0 ? look_at_points(&s.points, out, err) : GBT_OK;
     scene_free(&s);

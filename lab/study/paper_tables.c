@@ -1,17 +1,21 @@
-/* study/paper_tables.c -- the study "paper" in Markdown: our tables, the changes beside the paper's, and in words what they say. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/paper_tables.c -- the study "paper" in Markdown: our tables, the changes beside the paper's, and in
+   words what they say. */
 #include <limits.h>
 #include <math.h>
 
 #include "study/paper.h"
 
-static const char *const titles[PAPER_TABLES] = {"Voxels against balls", "What each part does, and what a constant does",
+static const char *const titles[PAPER_TABLES] = {"Voxels against balls",
+                                                 "What each part does, and what a constant does",
                                                  "Growth stopped early", "Depth of the balls"};
 
-/* ---- figures ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- figures ---- */
 
-static const paper_figure columns_compact[] = {PAPER_INITIAL, PAPER_FINAL, PAPER_STORAGE, PAPER_MODEL, PAPER_PSNR, PAPER_SSIM,
-                                               PAPER_LPIPS};
-static const paper_figure columns_growth[] = {PAPER_FINAL, PAPER_ARITHMETIC, PAPER_BLENDED, PAPER_PSNR, PAPER_SSIM, PAPER_LPIPS};
+static const paper_figure columns_compact[] = {PAPER_INITIAL, PAPER_FINAL, PAPER_STORAGE, PAPER_MODEL,
+                                               PAPER_PSNR,    PAPER_SSIM,  PAPER_LPIPS};
+static const paper_figure columns_growth[] = {PAPER_FINAL, PAPER_ARITHMETIC, PAPER_BLENDED,
+                                              PAPER_PSNR,  PAPER_SSIM,       PAPER_LPIPS};
 
 /* The whole runs are the last row of what varies. */
 static const char *row_name(int table, paper_variant_id variant)
@@ -24,7 +28,8 @@ static const char *row_name(int table, paper_variant_id variant)
 static void add_figures(const paper_study *s, int table, text *out)
 {
     const paper_figure *columns = table == 3 ? columns_growth : columns_compact;
-    size_t column_count = table == 3 ? sizeof columns_growth / sizeof *columns : sizeof columns_compact / sizeof *columns;
+    size_t column_count =
+        table == 3 ? sizeof columns_growth / sizeof *columns : sizeof columns_compact / sizeof *columns;
     column_count -= !paper_is_measured(s, columns[column_count - 1]); /* the last is LPIPS */
     const paper_variant_id *variants;
     const size_t variant_count = paper_table_variants(table, &variants);
@@ -52,7 +57,7 @@ static void add_figures(const paper_study *s, int table, text *out)
         }
 }
 
-/* ---- changes ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- changes ---- */
 
 const char *paper_verdict_of(const stat_sample *ours, double published, const double range[2])
 {
@@ -65,7 +70,7 @@ const char *paper_verdict_of(const stat_sample *ours, double published, const do
         return "one seed says nothing of the spread";
     if (!stat_is_apart(ours, 0) && has_paper)
         return stat_is_apart(ours, published) ? "not told apart from zero, but from the paper"
-               : "told apart neither from zero nor from the paper";
+                                              : "told apart neither from zero nor from the paper";
     if (!stat_is_apart(ours, 0))
         return "not told apart from zero";
     if (!has_paper)
@@ -76,7 +81,8 @@ const char *paper_verdict_of(const stat_sample *ours, double published, const do
         return "agrees with the paper";
     if (ours->mean >= range[0] && ours->mean <= range[1])
         return "within the range of the paper's scenes";
-    return fabs(ours->mean) < fabs(published) ? "the same way as the paper, but less" : "the same way as the paper, and more";
+    return fabs(ours->mean) < fabs(published) ? "the same way as the paper, but less"
+                                              : "the same way as the paper, and more";
 }
 
 const char *paper_verdict(const stat_sample *ours, const paper_claim *claim)
@@ -106,7 +112,8 @@ static void add_change_row(const paper_study *s, const paper_claim *claim, text 
         stat_add_change(out, published, figure->change_decimals);
     text_add(out, " | ");
     if (paper_published_range(claim, range) && range[0] < range[1])
-        text_format(out, "%+.*f to %+.*f", figure->change_decimals, range[0], figure->change_decimals, range[1]);
+        text_format(out, "%+.*f to %+.*f", figure->change_decimals, range[0], figure->change_decimals,
+                    range[1]);
     text_format(out, " | %s |\n", paper_verdict(&all, claim));
 }
 
@@ -127,11 +134,12 @@ static void add_changes(const paper_study *s, int table, text *out)
             add_change_row(s, &paper_claims[i], out);
 }
 
-/* ---- the page --------------------------------------------------------------------------------------------------------------------- */
+/* ---- the page ---- */
 
 static void add_scenes(const paper_study *s, text *out)
 {
-    text_add(out, "| scene | depth of the balls without a limit | constant in place of GBSP |\n|---|---|---|\n");
+    text_add(out,
+             "| scene | depth of the balls without a limit | constant in place of GBSP |\n|---|---|---|\n");
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         const paper_scene *p = &s->scenes[scene];
         text_add(out, "| ");
@@ -143,13 +151,14 @@ static void add_scenes(const paper_study *s, text *out)
 
 void paper_tables(const paper_study *s, text *out)
 {
-    text_format(out, "# The paper's tables, from our runs\n\n%llu iterations of the faithful protocol (`--compat`), photos divided by %g, "
-                     "%s, ",
+    text_format(out,
+                "# The paper's tables, from our runs\n\n%llu iterations of the faithful protocol "
+                "(`--compat`), photos divided by %g, %s, ",
                 (unsigned long long)s->def.iterations, s->def.downscale, s->def.renderer);
     text_format(out, "seeds 0 to %d; every eighth photo held out.\n", s->grid.seeds - 1);
-    text_add(out, "Mean ± standard deviation over the seeds. Changes compare runs of the same seed; \"all\" is the mean over the scenes. "
-                  "Told apart: "
-                  "outside the 95 % interval of the mean (Student's t over the seeds). The paper gives single runs on other scenes.\n\n");
+    text_add(out, "Mean ± standard deviation over the seeds. Changes compare runs of the same seed; \"all\" "
+                  "is the mean over the scenes. Told apart: outside the 95 % interval of the mean (Student's "
+                  "t over the seeds). The paper gives single runs on other scenes.\n\n");
     add_scenes(s, out);
     for (int table = 1; table <= PAPER_TABLES; table++) {
         if (!s->has_table[table])

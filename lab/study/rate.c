@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/rate.c -- code a model at a ladder of qualities, read it back, score it on the held-out views. */
 #include "study/rate.h"
 
@@ -18,7 +19,7 @@ static const double ladder[] = {48, 50, 52, 54, 55, 56, 58, 60, 65, 0};
 
 _Static_assert(sizeof ladder / sizeof *ladder <= RATE_ROWS_MAX, "every quality has a row");
 
-/* ---- scores ------------------------------------------------------------------------------------------------------------------- */
+/* ---- scores ---- */
 
 static gbt_status score_view(loaded_run *r, size_t view, image_scores *sum, gbt_error *err)
 {
@@ -26,10 +27,12 @@ static gbt_status score_view(loaded_run *r, size_t view, image_scores *sum, gbt_
     image photo = {0};
     unsigned char *valid = NULL;
     image_scores scores = {0};
-    gbt_status status = scene_read_photo_valid(&r->scene.views[view], r->frame.rgb.width, r->frame.rgb.height, &photo, &valid, err);
+    gbt_status status = scene_read_photo_valid(&r->scene.views[view], r->frame.rgb.width, r->frame.rgb.height,
+                                               &photo, &valid, err);
     if (status == GBT_OK)
         status = image_score_photo(&r->frame.rgb, &photo, valid, r->def.exposure, NULL, &scores, err);
-    sum->psnr += scores.psnr, sum->ssim += scores.ssim;
+    sum->psnr += scores.psnr;
+    sum->ssim += scores.ssim;
     image_free(&photo);
     mem_free(valid);
     return status;
@@ -45,13 +48,15 @@ static gbt_status score_model(loaded_run *r, size_t *views, double *psnr, double
             GBT_TRY(score_view(r, view, &sum, err));
             ++*views;
         }
-    *psnr = sum.psnr / (double)*views, *ssim = sum.ssim / (double)*views;
+    *psnr = sum.psnr / (double)*views;
+    *ssim = sum.ssim / (double)*views;
     return GBT_OK;
 }
 
-/* ---- one model ---------------------------------------------------------------------------------------------------------------- */
+/* ---- one model ---- */
 
-static gbt_status measure_row(loaded_run *r, const model_sensitivity *s, double quality, const char *path, rate_row *row, gbt_error *err)
+static gbt_status measure_row(loaded_run *r, const model_sensitivity *s, double quality, const char *path,
+                              rate_row *row, gbt_error *err)
 {
     model_steps steps = {0};
     model back = {0};
@@ -63,15 +68,18 @@ static gbt_status measure_row(loaded_run *r, const model_sensitivity *s, double 
     const double coded = clock_wall();
     if (status == GBT_OK)
         status = model_load(path, &back, err);
-    row->encode_seconds = coded - start, row->decode_seconds = clock_wall() - coded;
+    row->encode_seconds = coded - start;
+    row->decode_seconds = clock_wall() - coded;
     model_steps_free(&steps);
     if (status != GBT_OK)
         return status;
     const model whole = r->model;
     size_t views;
-    r->model = back, r->frame.draw.anchor_pixel = back.anchor_pixel;
+    r->model = back;
+    r->frame.draw.anchor_pixel = back.anchor_pixel;
     status = score_model(r, &views, &row->psnr, &row->ssim, err);
-    r->model = whole, r->frame.draw.anchor_pixel = whole.anchor_pixel;
+    r->model = whole;
+    r->frame.draw.anchor_pixel = whole.anchor_pixel;
     model_free(&back);
     return status;
 }
@@ -91,7 +99,8 @@ static gbt_status measure_run(loaded_run *r, const char *path, rate_model *out, 
         rate_row *row = &out->rows[out->row_count];
         status = measure_row(r, &s, ladder[i], path, row, err);
         if (status == GBT_OK)
-            log_info("%s: %g dB: %zu bytes, PSNR %.3f dB (%.3f before)", out->name, row->quality, row->sizes.total, row->psnr, out->psnr);
+            log_info("%s: %g dB: %zu bytes, PSNR %.3f dB (%.3f before)", out->name, row->quality,
+                     row->sizes.total, row->psnr, out->psnr);
         out->row_count += status == GBT_OK;
     }
     model_sensitivity_free(&s);
@@ -135,7 +144,8 @@ gbt_status lab_study_rate(const lab_study_def *def, const char *folder, FILE *ou
         return GBT_ERR_NO_MEMORY;
     gbt_status status = GBT_OK;
     for (; study->model_count < def->model_count && status == GBT_OK; study->model_count++)
-        status = measure_model(def->models[study->model_count], path, &study->models[study->model_count], err);
+        status =
+            measure_model(def->models[study->model_count], path, &study->models[study->model_count], err);
     unlink(path); /* the file that every row was written to */
     if (status == GBT_OK)
         status = rate_write(study, folder, err);

@@ -1,4 +1,6 @@
-/* study/rate.h -- the measurements of the study "rate": what a small model file costs in picture, and how they are written down. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/rate.h -- the measurements of the study "rate": what a small model file costs in picture, and how
+   they are written down. */
 #ifndef GBT_STUDY_RATE_H
 #define GBT_STUDY_RATE_H
 
@@ -11,7 +13,8 @@ enum { RATE_MODELS_MAX = 6, RATE_ROWS_MAX = 12 };
 typedef struct rate_row {
     double quality; /* dB; 0: lossless */
     model_sizes sizes;
-    double psnr, ssim; /* of the model that the file gives back, mean over the held-out views; NaN without them */
+    double psnr,
+        ssim; /* of the model that the file gives back, mean over the held-out views; NaN without them */
     double encode_seconds, decode_seconds;
 } rate_row;
 

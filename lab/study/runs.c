@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/runs.c -- one training run of a study: made, or taken from an earlier call; its figures read back.
 
    study.json says what run this is and holds what is measured here; it is removed first and written last. */
@@ -23,7 +24,7 @@
 
 enum { PATH_SIZE = 4096, SETTINGS_SIZE = CONFIG_TEXT_SIZE + 1024 };
 
-/* ---- names -------------------------------------------------------------------------------------------------------------------- */
+/* ---- names ---- */
 
 static void make_slug(const char *name, char *out, size_t size)
 {
@@ -33,18 +34,20 @@ static void make_slug(const char *name, char *out, size_t size)
     out[i] = '\0';
 }
 
-gbt_status study_runs_folder(const char *folder, const char *data_name, const char *variant, uint64_t seed, char *out, size_t size,
-                             gbt_error *err)
+gbt_status study_runs_folder(const char *folder, const char *data_name, const char *variant, uint64_t seed,
+                             char *out, size_t size, gbt_error *err)
 {
     char place[STUDY_NAME_SIZE], what[STUDY_NAME_SIZE];
     make_slug(data_name, place, sizeof place);
     make_slug(variant, what, sizeof what);
-    if (snprintf(out, size, "%s/runs/%s/%s/seed-%llu", folder, place, what, (unsigned long long)seed) >= (int)size)
+    if (snprintf(out, size, "%s/runs/%s/%s/seed-%llu", folder, place, what, (unsigned long long)seed) >=
+        (int)size)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", folder);
     return GBT_OK;
 }
 
-gbt_status study_runs_names(const char *const *data, size_t count, char names[][STUDY_NAME_SIZE], gbt_error *err)
+gbt_status study_runs_names(const char *const *data, size_t count, char names[][STUDY_NAME_SIZE],
+                            gbt_error *err)
 {
     if (data == NULL || count < 1 || count > STUDY_SCENES_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "study: wanted 1 to %d data sets", (int)STUDY_SCENES_MAX);
@@ -59,25 +62,29 @@ gbt_status study_runs_names(const char *const *data, size_t count, char names[][
         for (size_t j = 0; j < i; j++) {
             make_slug(names[j], other, sizeof other);
             if (strcmp(slug, other) == 0)
-                return base_fail(err, GBT_ERR_ARGUMENT, "study: two data sets are called %.200s; their runs would share a folder", slug);
+                return base_fail(err, GBT_ERR_ARGUMENT,
+                                 "study: two data sets are called %.200s; their runs would share a folder",
+                                 slug);
         }
     }
     return GBT_OK;
 }
 
-/* ---- what run it is ----------------------------------------------------------------------------------------------------------- */
+/* ---- what run it is ---- */
 
-/* Everything that decides the figures: the settings as asked for, how small the file is made, and when scores are taken in passing. */
+/* Everything that decides the figures: the settings as asked for, how small the file is made, and when scores
+   are taken in passing. */
 static void settings_text(const char *data, const gbt_train_def *def, char *out, size_t size)
 {
     config_text(def, data, out, size);
     size_t used = strlen(out);
-    used += (size_t)snprintf(out + used, size - used, "quality = %g\neval-at =", gbt_compress_def_default().quality);
+    used += (size_t)snprintf(out + used, size - used,
+                             "quality = %g\neval-at =", gbt_compress_def_default().quality);
     for (int i = 0; i < def->eval_at_count && used < size; i++)
         used += (size_t)snprintf(out + used, size - used, " %.9g", def->eval_at_seconds[i]);
 }
 
-/* ---- read back ---------------------------------------------------------------------------------------------------------------- */
+/* ---- read back ---- */
 
 static bool read_number(const json_t *object, const char *field, double *out)
 {
@@ -99,7 +106,8 @@ static bool read_marks(const json_t *array, study_figures *f)
     f->mark_count = json_array_size(array);
     for (size_t i = 0; i < f->mark_count; i++) {
         const json_t *mark = json_array_get(array, i);
-        if (!read_number(mark, "seconds", &f->marks[i].seconds) || !read_number(mark, "psnr", &f->marks[i].psnr))
+        if (!read_number(mark, "seconds", &f->marks[i].seconds) ||
+            !read_number(mark, "psnr", &f->marks[i].psnr))
             return false;
     }
     return true;
@@ -108,34 +116,41 @@ static bool read_marks(const json_t *array, study_figures *f)
 static bool read_metrics(const json_t *m, study_figures *f)
 {
     read_number(m, "lpips_01", &f->lpips_01);
-    return read_score(m, "psnr", &f->psnr) && read_score(m, "ssim", &f->ssim) && read_number(m, "points", &f->points) &&
-           read_number(m, "anchors_initial", &f->anchors_initial) && read_number(m, "anchors_final", &f->anchors_final) &&
+    return read_score(m, "psnr", &f->psnr) && read_score(m, "ssim", &f->ssim) &&
+           read_number(m, "points", &f->points) && read_number(m, "anchors_initial", &f->anchors_initial) &&
+           read_number(m, "anchors_final", &f->anchors_final) &&
            read_number(m, "model_bytes", &f->model_bytes) && read_number(m, "iterations", &f->iterations) &&
-           read_number(m, "train_seconds", &f->train_seconds) && read_marks(json_object_get(m, "held_out"), f);
+           read_number(m, "train_seconds", &f->train_seconds) &&
+           read_marks(json_object_get(m, "held_out"), f);
 }
 
 static bool read_measured(const json_t *s, study_figures *f)
 {
-    return read_score(s, "anchors_in_view", &f->anchors_in_view) && read_score(s, "blended_per_ray", &f->blended_per_ray) &&
-           read_number(s, "macs_per_anchor", &f->macs_per_anchor) && read_number(s, "network_bytes", &f->network_bytes);
+    return read_score(s, "anchors_in_view", &f->anchors_in_view) &&
+           read_score(s, "blended_per_ray", &f->blended_per_ray) &&
+           read_number(s, "macs_per_anchor", &f->macs_per_anchor) &&
+           read_number(s, "network_bytes", &f->network_bytes);
 }
 
 /* True when the run is whole and of these settings. What is damaged or missing is simply not finished. */
-static bool read_run(const char *study_path, const char *metrics_path, const char *settings, study_figures *out)
+static bool read_run(const char *study_path, const char *metrics_path, const char *settings,
+                     study_figures *out)
 {
     json_t *study = NULL, *metrics = NULL;
     gbt_error ignored = {0};
-    bool fine = json_read(study_path, &study, &ignored) == GBT_OK && json_read(metrics_path, &metrics, &ignored) == GBT_OK;
+    bool fine = json_read(study_path, &study, &ignored) == GBT_OK &&
+                json_read(metrics_path, &metrics, &ignored) == GBT_OK;
     if (fine) {
         const char *theirs = json_string_value(json_object_get(study, "settings"));
-        fine = theirs != NULL && strcmp(theirs, settings) == 0 && read_measured(study, out) && read_metrics(metrics, out);
+        fine = theirs != NULL && strcmp(theirs, settings) == 0 && read_measured(study, out) &&
+               read_metrics(metrics, out);
     }
     json_decref(study);
     json_decref(metrics);
     return fine;
 }
 
-/* ---- measured here ------------------------------------------------------------------------------------------------------------ */
+/* ---- measured here ---- */
 
 static double network_macs(const decoder *d)
 {
@@ -151,10 +166,13 @@ static gbt_status measure_views(loaded_run *r, study_figures *f, gbt_error *err)
         if (!r->scene.views[view].is_test)
             continue;
         GBT_TRY(loaded_run_render(r, view, err));
-        views++, visible += (double)r->frame.visible_count;
-        blended += (double)r->frame.counters.blended, rays += (double)r->frame.counters.rays;
+        views++;
+        visible += (double)r->frame.visible_count;
+        blended += (double)r->frame.counters.blended;
+        rays += (double)r->frame.counters.rays;
     }
-    f->anchors_in_view = visible / views, f->blended_per_ray = blended / rays; /* 0 / 0 = NaN without held-out views */
+    f->anchors_in_view = visible / views;
+    f->blended_per_ray = blended / rays; /* 0 / 0 = NaN without held-out views */
     return GBT_OK;
 }
 
@@ -173,17 +191,19 @@ static gbt_status measure(const char *run, study_figures *f, gbt_error *err)
     return status;
 }
 
-static gbt_status save_measured(const char *path, const char *settings, const study_figures *f, gbt_error *err)
+static gbt_status save_measured(const char *path, const char *settings, const study_figures *f,
+                                gbt_error *err)
 {
-    json_t *root = json_pack("{s:i,s:o,s:o,s:o,s:f,s:f}", "schema", 1, "settings", json_text(settings), "anchors_in_view",
-                             json_number(f->anchors_in_view), "blended_per_ray", json_number(f->blended_per_ray), "macs_per_anchor",
-                             f->macs_per_anchor, "network_bytes", f->network_bytes);
+    json_t *root = json_pack("{s:i,s:o,s:o,s:o,s:f,s:f}", "schema", 1, "settings", json_text(settings),
+                             "anchors_in_view", json_number(f->anchors_in_view), "blended_per_ray",
+                             json_number(f->blended_per_ray), "macs_per_anchor", f->macs_per_anchor,
+                             "network_bytes", f->network_bytes);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);
     return status;
 }
 
-/* ---- the run ------------------------------------------------------------------------------------------------------------------ */
+/* ---- the run ---- */
 
 static void remove_checkpoints(const char *run)
 {
@@ -209,12 +229,13 @@ static gbt_status train(const char *data, const char *run, const gbt_train_def *
 static gbt_status score(const char *run, const char *lpips, gbt_error *err)
 {
     gbt_evaluate_def evaluate = gbt_evaluate_def_default();
-    evaluate.report = 0, evaluate.lpips = lpips;
+    evaluate.report = 0;
+    evaluate.lpips = lpips;
     return gbt_evaluate(run, &evaluate, err);
 }
 
-static gbt_status make_run(const char *data, const char *run, const gbt_train_def *def, const char *lpips, const char *study_path,
-                           const char *settings, gbt_error *err)
+static gbt_status make_run(const char *data, const char *run, const gbt_train_def *def, const char *lpips,
+                           const char *study_path, const char *settings, gbt_error *err)
 {
     const gbt_compress_def compress = gbt_compress_def_default();
     study_figures measured;
@@ -222,15 +243,16 @@ static gbt_status make_run(const char *data, const char *run, const gbt_train_de
     GBT_TRY(file_join(file, sizeof file, run, "model.gbt", err));
     unlink(study_path);
     GBT_TRY(train(data, run, def, err));
-    GBT_TRY(gbt_compress(run, &compress, file, NULL, err)); /* scored is the file that `gbtrace train` leaves */
+    GBT_TRY(gbt_compress(run, &compress, file, NULL, err)); /* scored is the file that `gbtrace train` leaves
+                                                             */
     GBT_TRY(score(run, lpips, err));
     GBT_TRY(measure(run, &measured, err));
     remove_checkpoints(run);
     return save_measured(study_path, settings, &measured, err);
 }
 
-gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def *def, const char *lpips, study_figures *out,
-                         gbt_error *err)
+gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def *def, const char *lpips,
+                         study_figures *out, gbt_error *err)
 {
     char study_path[PATH_SIZE], metrics_path[PATH_SIZE], settings[SETTINGS_SIZE];
     GBT_TRY(file_join(study_path, sizeof study_path, run, "study.json", err));
@@ -250,8 +272,9 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
                : base_fail(err, GBT_ERR_INTERNAL, "%.400s: the run cannot be read back", run);
 }
 
-gbt_status study_runs_do_variant(const char *folder, const char *data, const char *data_name, const char *variant, const char *settings,
-                                 gbt_train_def def, study_figures *out, gbt_error *err)
+gbt_status study_runs_do_variant(const char *folder, const char *data, const char *data_name,
+                                 const char *variant, const char *settings, gbt_train_def def,
+                                 study_figures *out, gbt_error *err)
 {
     char run[PATH_SIZE];
     config_strings strings;
@@ -262,7 +285,10 @@ gbt_status study_runs_do_variant(const char *folder, const char *data, const cha
 
 gbt_status study_texts_save(study_texts *texts, const char *folder, const char *name, FILE *out)
 {
-    const struct { const char *suffix; text *body; } files[] = {{"csv", &texts->csv}, {"svg", &texts->charts}, {"md", &texts->page}};
+    const struct {
+        const char *suffix;
+        text *body;
+    } files[] = {{"csv", &texts->csv}, {"svg", &texts->charts}, {"md", &texts->page}};
     gbt_status status = GBT_OK;
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         char file[STUDY_NAME_SIZE];

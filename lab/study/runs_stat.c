@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/runs_stat.c -- mean and spread of figures over runs, and what so few runs can tell. */
 #include "study/runs_stat.h"
 
@@ -10,8 +11,10 @@ stat_sample stat_of(const double *values, size_t count)
     stat_sample s = {.mean = NAN, .deviation = NAN};
     double sum = 0, squares = 0;
     for (size_t i = 0; i < count; i++)
-        if (isfinite(values[i]))
-            sum += values[i], s.count++;
+        if (isfinite(values[i])) {
+            sum += values[i];
+            s.count++;
+        }
     if (s.count == 0)
         return s;
     s.mean = sum / (double)s.count;
@@ -25,7 +28,8 @@ stat_sample stat_of(const double *values, size_t count)
 
 double stat_half_width(const stat_sample *s)
 {
-    static const double t95[] = {12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262}; /* 1 to 9 degrees of freedom */
+    static const double t95[] = {12.706, 4.303, 3.182, 2.776, 2.571,
+                                 2.447,  2.365, 2.306, 2.262}; /* 1 to 9 degrees of freedom */
     const size_t most = sizeof t95 / sizeof *t95;
     if (s->count < 2)
         return NAN;
@@ -34,7 +38,8 @@ double stat_half_width(const stat_sample *s)
 
 bool stat_is_apart(const stat_sample *s, double value)
 {
-    return fabs(s->mean - value) > stat_half_width(s) + 1e-12 * fabs(value); /* false when the width is NaN; sums of equal numbers round */
+    return fabs(s->mean - value) > stat_half_width(s) + 1e-12 * fabs(value); /* false when the width is NaN;
+                                                                                sums of equal numbers round */
 }
 
 void stat_add_change(text *out, double value, int decimals)
@@ -66,5 +71,6 @@ void stat_csv_text(text *out, const char *outside)
 
 json_t *stat_to_json(const stat_sample *s)
 {
-    return json_pack("{s:o,s:o,s:I}", "mean", json_number(s->mean), "deviation", json_number(s->deviation), "count", (json_int_t)s->count);
+    return json_pack("{s:o,s:o,s:I}", "mean", json_number(s->mean), "deviation", json_number(s->deviation),
+                     "count", (json_int_t)s->count);
 }

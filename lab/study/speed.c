@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/speed.c -- measure what each setting costs and what it does to the picture. */
 #include "study/speed.h"
 
@@ -16,7 +17,7 @@
 #include "study/model.h"
 #include "trace/reference.h"
 
-/* ---- what is tried ------------------------------------------------------------------------------------------------------------------- */
+/* ---- what is tried ---- */
 
 /* One step of one knob; the others stand as in the preset "default". */
 typedef struct speed_step {
@@ -28,23 +29,39 @@ typedef struct speed_step {
 
 /* Along each knob from exact to fast, through the default. */
 static const speed_step steps[] = {
-    {KNOB_PRESET, "exact", 0, 0},       {KNOB_PRESET, "default", 0, 0},      {KNOB_PRESET, "fast", 0, 0},
-    {KNOB_ALPHA, "1e-4", 1e-4f, 0},     {KNOB_ALPHA, "0.001", 1e-3f, 0},     {KNOB_ALPHA, "1/255", 0, 0},
+    {KNOB_PRESET, "exact", 0, 0},
+    {KNOB_PRESET, "default", 0, 0},
+    {KNOB_PRESET, "fast", 0, 0},
+    {KNOB_ALPHA, "1e-4", 1e-4f, 0},
+    {KNOB_ALPHA, "0.001", 1e-3f, 0},
+    {KNOB_ALPHA, "1/255", 0, 0},
     {KNOB_ALPHA, "0.01", 0.01f, 0},
-    {KNOB_ALPHA, "0.02", 0.02f, 0},     {KNOB_ALPHA, "0.05", 0.05f, 0},      {KNOB_STOP, "1e-6", 1e-6f, 0},       {KNOB_STOP, "1e-4", 0, 0},
-    {KNOB_STOP, "0.001", 1e-3f, 0},     {KNOB_STOP, "0.01", 0.01f, 0},       {KNOB_STOP, "0.03", 0.03f, 0},
+    {KNOB_ALPHA, "0.02", 0.02f, 0},
+    {KNOB_ALPHA, "0.05", 0.05f, 0},
+    {KNOB_STOP, "1e-6", 1e-6f, 0},
+    {KNOB_STOP, "1e-4", 0, 0},
+    {KNOB_STOP, "0.001", 1e-3f, 0},
+    {KNOB_STOP, "0.01", 0.01f, 0},
+    {KNOB_STOP, "0.03", 0.03f, 0},
     {KNOB_RADIUS, "inf", 0, 0},
-    {KNOB_RADIUS, "3", 3, 0},           {KNOB_RADIUS, "2.5", 2.5f, 0},       {KNOB_RADIUS, "2", 2, 0},
+    {KNOB_RADIUS, "3", 3, 0},
+    {KNOB_RADIUS, "2.5", 2.5f, 0},
+    {KNOB_RADIUS, "2", 2, 0},
     {KNOB_KERNEL, "embree", 0, TRACE_EMBREE},
-    {KNOB_KERNEL, "single", 0, TRACE_SINGLE}, {KNOB_KERNEL, "tile", 0, TRACE_TILE}, {KNOB_ISA, "plain", 0, CPU_PLAIN},
+    {KNOB_KERNEL, "single", 0, TRACE_SINGLE},
+    {KNOB_KERNEL, "tile", 0, TRACE_TILE},
+    {KNOB_ISA, "plain", 0, CPU_PLAIN},
     {KNOB_ISA, "avx2", 0, CPU_AVX2},
-    {KNOB_ISA, "avx512", 0, CPU_AVX512}, {KNOB_RENDERER, "rays", 0, -1},      {KNOB_RENDERER, "splats, per-ray order", 0, RASTER_PER_RAY},
+    {KNOB_ISA, "avx512", 0, CPU_AVX512},
+    {KNOB_RENDERER, "rays", 0, -1},
+    {KNOB_RENDERER, "splats, per-ray order", 0, RASTER_PER_RAY},
     {KNOB_RENDERER, "EWA splats", 0, RASTER_EWA},
 };
 
 const char *speed_knob_name(speed_knob knob)
 {
-    static const char *const names[KNOB_COUNT] = {"preset", "alpha_min", "T_min", "proxy radius", "kernel", "instruction set", "renderer"};
+    static const char *const names[KNOB_COUNT] = {"preset", "alpha_min",       "T_min",   "proxy radius",
+                                                  "kernel", "instruction set", "renderer"};
     return names[knob];
 }
 
@@ -56,28 +73,43 @@ static void list_rows(const trace_settings *own, speed_model *out)
         if (s->knob == KNOB_ISA && s->choice > (int)best)
             continue;
         speed_row *row = &out->rows[out->row_count++];
-        *row = (speed_row){.knob = s->knob, .value = s->value, .settings = *own, .kernel = TRACE_TILE, .isa = best};
+        *row = (speed_row){
+            .knob = s->knob, .value = s->value, .settings = *own, .kernel = TRACE_TILE, .isa = best};
         trace_settings_preset(s->knob == KNOB_PRESET ? s->value : "default", &row->settings);
         row->is_default = s->knob != KNOB_PRESET && s->number == 0;
         switch (s->knob) {
-        case KNOB_ALPHA: row->settings.alpha_min = row->is_default ? row->settings.alpha_min : s->number; break;
-        case KNOB_STOP: row->settings.transmittance_min = row->is_default ? row->settings.transmittance_min : s->number; break;
-        case KNOB_RADIUS: row->settings.proxy_radius = row->is_default ? row->settings.proxy_radius : s->number; break;
-        case KNOB_KERNEL: row->kernel = (trace_kernel)s->choice, row->is_default = row->kernel == TRACE_TILE; break;
-        case KNOB_ISA: row->isa = (cpu_isa)s->choice, row->is_default = row->isa == best; break;
-        case KNOB_RENDERER: row->is_default = s->choice < 0, row->splats = s->choice >= 0,
-            row->form = row->splats ? (raster_form)s->choice : RASTER_EWA; break;
+        case KNOB_ALPHA:
+            row->settings.alpha_min = row->is_default ? row->settings.alpha_min : s->number;
+            break;
+        case KNOB_STOP:
+            row->settings.transmittance_min = row->is_default ? row->settings.transmittance_min : s->number;
+            break;
+        case KNOB_RADIUS:
+            row->settings.proxy_radius = row->is_default ? row->settings.proxy_radius : s->number;
+            break;
+        case KNOB_KERNEL:
+            row->kernel = (trace_kernel)s->choice, row->is_default = row->kernel == TRACE_TILE;
+            break;
+        case KNOB_ISA:
+            row->isa = (cpu_isa)s->choice, row->is_default = row->isa == best;
+            break;
+        case KNOB_RENDERER:
+            row->is_default = s->choice < 0, row->splats = s->choice >= 0,
+            row->form = row->splats ? (raster_form)s->choice : RASTER_EWA;
+            break;
         case KNOB_PRESET:
-        case KNOB_COUNT: break;
+        case KNOB_COUNT:
+            break;
         }
     }
 }
 
-/* ---- ideas that were not built: only what they do to the picture --------------------------------------------------------------------- */
+/* ---- ideas that were not built: only what they do to the picture ---- */
 
 enum { ORDER_STRIDE = 4 }; /* rays are slow in double, one by one: every 4th of the reference's */
 
-/* One order for the whole picture, as in 3DGS: by the depth of the mean along the mean direction of the rays. */
+/* One order for the whole picture, as in 3DGS: by the depth of the mean along the mean direction of the
+   rays. */
 typedef struct order_job {
     const reference_scene *scene;
     const trace_settings *settings;
@@ -104,7 +136,8 @@ static int by_centre(const void *a, const void *b)
     return p->hit->id < q->hit->id ? -1 : p->hit->id > q->hit->id;
 }
 
-static void blend_by_centre(const order_job *job, const reference_hit *hits, size_t count, centre_hit *order, double rgb[3])
+static void blend_by_centre(const order_job *job, const reference_hit *hits, size_t count, centre_hit *order,
+                            double rgb[3])
 {
     double T = 1;
     for (size_t i = 0; i < count; i++) {
@@ -136,11 +169,15 @@ static void order_block(size_t block, size_t begin, size_t end, void *context)
     (void)block;
     for (size_t i = begin; i < end && status == GBT_OK; i++) {
         double origin[3], dir[3];
-        for (size_t k = 0; k < 3; k++)
-            origin[k] = (double)ray_image_origin(job->rays, i * ORDER_STRIDE)[k], dir[k] = (double)job->rays->dir[3 * i * ORDER_STRIDE + k];
-        status = reference_scene_ray_hits(job->scene, job->settings, origin, dir, &hits, &count, &capacity, NULL);
+        for (size_t k = 0; k < 3; k++) {
+            origin[k] = (double)ray_image_origin(job->rays, i * ORDER_STRIDE)[k];
+            dir[k] = (double)job->rays->dir[3 * i * ORDER_STRIDE + k];
+        }
+        status =
+            reference_scene_ray_hits(job->scene, job->settings, origin, dir, &hits, &count, &capacity, NULL);
         if (status == GBT_OK)
-            status = mem_reserve((void **)&order, &order_capacity, 0, count + 1, sizeof *order, "hits by centre", NULL);
+            status = mem_reserve((void **)&order, &order_capacity, 0, count + 1, sizeof *order,
+                                 "hits by centre", NULL);
         if (status == GBT_OK)
             blend_by_centre(job, hits, count, order, job->rgb + 3 * i);
     }
@@ -151,8 +188,8 @@ static void order_block(size_t block, size_t begin, size_t end, void *context)
             job->rgb[i] = NAN; /* seen by the caller */
 }
 
-static gbt_status order_by_centre(const gaussians *g, const trace_settings *settings, const bench_reference *want, bench_error *out,
-                                  gbt_error *err)
+static gbt_status order_by_centre(const gaussians *g, const trace_settings *settings,
+                                  const bench_reference *want, bench_error *out, gbt_error *err)
 {
     reference_scene exact = {0};
     const size_t all = ray_image_count(&want->rays), count = (all + ORDER_STRIDE - 1) / ORDER_STRIDE;
@@ -185,8 +222,8 @@ static float round_to_half(float x)
 }
 
 /* Records of half the size: every number rounded to a half, or all but the mean. */
-static gbt_status half_records(const bench_scene *s, const trace_settings *settings, bool keep_mean, const bench_reference *want,
-                               bench_error *out, gbt_error *err)
+static gbt_status half_records(const bench_scene *s, const trace_settings *settings, bool keep_mean,
+                               const bench_reference *want, bench_error *out, gbt_error *err)
 {
     trace_scene traced = {0};
     image rgb = {0};
@@ -208,31 +245,38 @@ static gbt_status half_records(const bench_scene *s, const trace_settings *setti
 }
 
 /* With the cut-offs of "exact", so that the error is the idea's own. */
-static gbt_status measure_ideas(const bench_scene *s, const trace_settings *settings, const bench_reference *want, speed_model *out,
-                                gbt_error *err)
+static gbt_status measure_ideas(const bench_scene *s, const trace_settings *settings,
+                                const bench_reference *want, speed_model *out, gbt_error *err)
 {
-    out->ideas[0] = (speed_idea){.name = "order by centre", .reason = "wrong order; would save the comparison of pairs of rows at most"};
-    out->ideas[1] = (speed_idea){.name = "half-precision records", .reason = "a record is read once per tile: little to save"};
-    out->ideas[2] = (speed_idea){.name = "half but for the mean", .reason = "38 bytes in place of 64: little to save"};
+    out->ideas[0] = (speed_idea){.name = "order by centre",
+                                 .reason = "wrong order; would save the comparison of pairs of rows at most"};
+    out->ideas[1] = (speed_idea){.name = "half-precision records",
+                                 .reason = "a record is read once per tile: little to save"};
+    out->ideas[2] =
+        (speed_idea){.name = "half but for the mean", .reason = "38 bytes in place of 64: little to save"};
     GBT_TRY(order_by_centre(s->gaussians, settings, want, &out->ideas[0].error, err));
     GBT_TRY(half_records(s, settings, false, want, &out->ideas[1].error, err));
     return half_records(s, settings, true, want, &out->ideas[2].error, err);
 }
 
-/* ---- one model ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- one model ---- */
 
-static void keep_figures(const bench_scene *s, const bench_way *way, const bench_reference *want, speed_row *row)
+static void keep_figures(const bench_scene *s, const bench_way *way, const bench_reference *want,
+                         speed_row *row)
 {
     const double rays = (double)ray_image_count(&s->rays);
     row->photo_psnr = NAN;
     row->picture_us = way->figures.build_us + way->figures.forward_us;
-    row->forward_us = way->figures.forward_us, row->both_us = row->forward_us + way->figures.adjoint_us;
-    row->blended = (double)way->figures.counters.blended / rays, row->pairs = (double)way->figures.counters.pairs / (rays / PACKET_LANES);
+    row->forward_us = way->figures.forward_us;
+    row->both_us = row->forward_us + way->figures.adjoint_us;
+    row->blended = (double)way->figures.counters.blended / rays;
+    row->pairs = (double)way->figures.counters.pairs / (rays / PACKET_LANES);
     row->error = bench_reference_compare(want, &way->rgb);
 }
 
 /* The default once, however many knobs go through it. */
-static gbt_status measure_rows(const bench_scene *s, const bench_reference *want, int repeats, speed_model *out, gbt_error *err)
+static gbt_status measure_rows(const bench_scene *s, const bench_reference *want, int repeats,
+                               speed_model *out, gbt_error *err)
 {
     const gaussians *thin = s->run != NULL ? &s->run->frame.gaussians : s->gaussians;
     const bench_splat splats[] = {[RASTER_EWA] = {&s->camera.shot.camera, thin, RASTER_EWA},
@@ -245,7 +289,9 @@ static gbt_status measure_rows(const bench_scene *s, const bench_reference *want
         const speed_row *row = &out->rows[i];
         place[i] = row->is_default ? 1 : count++; /* the second row is the preset "default" */
         if (!row->is_default)
-            ways[place[i]] = (bench_way){.kernel = row->kernel, .isa = row->isa, .settings = row->settings,
+            ways[place[i]] = (bench_way){.kernel = row->kernel,
+                                         .isa = row->isa,
+                                         .settings = row->settings,
                                          .splat = row->splats ? &splats[row->form] : NULL};
     }
     const gbt_status status = bench_measure(ways, count, s->gaussians, &s->rays, repeats, err);
@@ -257,16 +303,19 @@ static gbt_status measure_rows(const bench_scene *s, const bench_reference *want
     return status;
 }
 
-static gbt_status measure_scene(bench_scene *s, bench_reference *want, const char *path, const char *camera, int repeats, speed_model *out,
-                                gbt_error *err)
+static gbt_status measure_scene(bench_scene *s, bench_reference *want, const char *path, const char *camera,
+                                int repeats, speed_model *out, gbt_error *err)
 {
     GBT_TRY(bench_scene_open(path, camera, s, err));
     trace_settings whole = s->settings;
     list_rows(&whole, out);
-    whole.alpha_min = 1e-6f, whole.transmittance_min = 1e-9f, whole.proxy_radius = INFINITY;
+    whole.alpha_min = 1e-6f;
+    whole.transmittance_min = 1e-9f;
+    whole.proxy_radius = INFINITY;
     s->settings = whole;
     GBT_TRY(bench_scene_decode(s, err));
-    out->gaussians = s->gaussians->count, out->rays = ray_image_count(&s->rays);
+    out->gaussians = s->gaussians->count;
+    out->rays = ray_image_count(&s->rays);
     log_info("%s: %zu Gaussians, %zu rays: the picture in double", out->name, out->gaussians, out->rays);
     GBT_TRY(bench_reference_make(s->gaussians, &whole, &s->rays, want, err));
     out->check_rays = ray_image_count(&want->rays);
@@ -276,7 +325,8 @@ static gbt_status measure_scene(bench_scene *s, bench_reference *want, const cha
     return speed_measure_photos(s, out, err);
 }
 
-static gbt_status measure_path(const char *path, const char *camera, int repeats, speed_model *out, gbt_error *err)
+static gbt_status measure_path(const char *path, const char *camera, int repeats, speed_model *out,
+                               gbt_error *err)
 {
     bench_scene s = {0};
     bench_reference want = {0};
@@ -286,12 +336,9 @@ static gbt_status measure_path(const char *path, const char *camera, int repeats
     return status;
 }
 
-/* ---- all of them --------------------------------------------------------------------------------------------------------------------- */
+/* ---- all of them ---- */
 
-lab_study_def lab_study_def_default(void)
-{
-    return (lab_study_def){.repeats = 3};
-}
+lab_study_def lab_study_def_default(void) { return (lab_study_def){.repeats = 3}; }
 
 static gbt_status measure_model(const lab_study_def *def, size_t i, speed_model *out, gbt_error *err)
 {
@@ -305,13 +352,17 @@ static gbt_status measure_model(const lab_study_def *def, size_t i, speed_model 
 
 gbt_status lab_study_speed(const lab_study_def *def, const char *folder, FILE *out, gbt_error *err)
 {
-    if (def->models == NULL || def->model_count < 1 || def->model_count > SPEED_MODELS_MAX || def->repeats < 1 || def->repeats > 1000)
-        return base_fail(err, GBT_ERR_ARGUMENT, "study: wanted 1 to %d models and 1 to 1000 repeats", (int)SPEED_MODELS_MAX);
+    if (def->models == NULL || def->model_count < 1 || def->model_count > SPEED_MODELS_MAX ||
+        def->repeats < 1 || def->repeats > 1000)
+        return base_fail(err, GBT_ERR_ARGUMENT, "study: wanted 1 to %d models and 1 to 1000 repeats",
+                         (int)SPEED_MODELS_MAX);
     GBT_TRY(file_make_folder(folder, err));
     speed_study *study = mem_calloc(1, sizeof *study, "study", err);
     if (study == NULL)
         return GBT_ERR_NO_MEMORY;
-    study->repeats = def->repeats, study->threads = parallel_threads(), study->model_count = def->model_count;
+    study->repeats = def->repeats;
+    study->threads = parallel_threads();
+    study->model_count = def->model_count;
     gbt_status status = GBT_OK;
     for (size_t i = 0; i < def->model_count && status == GBT_OK; i++)
         status = measure_model(def, i, &study->models[i], err);

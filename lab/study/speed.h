@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/speed.h -- the measurements of the study "speed against accuracy", and how they are written down. */
 #ifndef GBT_STUDY_SPEED_H
 #define GBT_STUDY_SPEED_H
@@ -10,7 +11,16 @@ struct bench_scene;
 
 enum { SPEED_WAYS_MAX = 28, SPEED_ERRORS = 3, SPEED_MODELS_MAX = 16 };
 
-typedef enum speed_knob { KNOB_PRESET, KNOB_ALPHA, KNOB_STOP, KNOB_RADIUS, KNOB_KERNEL, KNOB_ISA, KNOB_RENDERER, KNOB_COUNT } speed_knob;
+typedef enum speed_knob {
+    KNOB_PRESET,
+    KNOB_ALPHA,
+    KNOB_STOP,
+    KNOB_RADIUS,
+    KNOB_KERNEL,
+    KNOB_ISA,
+    KNOB_RENDERER,
+    KNOB_COUNT
+} speed_knob;
 
 /** A setting that was measured. */
 typedef struct speed_row {
@@ -20,16 +30,17 @@ typedef struct speed_row {
     trace_settings settings;
     trace_kernel kernel;
     cpu_isa isa;
-    bool splats;            /* in place of rays, in this form */
+    bool splats; /* in place of rays, in this form */
     raster_form form;
-    double picture_us;      /* core-microseconds per pixel: tree and forward */
+    double picture_us;          /* core-microseconds per pixel: tree and forward */
     double forward_us, both_us; /* forward; forward and adjoint */
-    double photo_psnr;      /* mean over the held-out photos of a run; NaN without them */
+    double photo_psnr;          /* mean over the held-out photos of a run; NaN without them */
     double blended, pairs;      /* per ray; pairs of rows per packet */
     bench_error error;          /* to the picture without cut-offs */
 } speed_row;
 
-/** A change of the program that was not built: what it would do to the picture, and why its speed was not worth it. */
+/** A change of the program that was not built: what it would do to the picture, and why its speed was not
+    worth it. */
 typedef struct speed_idea {
     const char *name, *reason;
     bench_error error; /* with the cut-offs of "exact": nearly all of it is the idea's own */
@@ -52,7 +63,8 @@ typedef struct speed_study {
 
 const char *speed_knob_name(speed_knob knob);
 
-/** PSNR of every row to the held-out photos of `s`, which is decoded anew; row->photo_psnr and photo_count. Nothing for a .ply. */
+/** PSNR of every row to the held-out photos of `s`, which is decoded anew; row->photo_psnr and photo_count.
+    Nothing for a .ply. */
 gbt_status speed_measure_photos(struct bench_scene *s, speed_model *out, gbt_error *err);
 
 /** speed.csv, .json, .md, .svg and .html into `folder`. */

@@ -1,4 +1,6 @@
-/* study/speed_photos.c -- how close each setting of the study "speed" comes to the photos that were held out. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* study/speed_photos.c -- how close each setting of the study "speed" comes to the photos that were held
+   out. */
 #include <math.h>
 #include <string.h>
 
@@ -9,15 +11,16 @@
 #include "study/speed.h"
 
 /* What one row makes of the view that `s` holds. */
-static gbt_status draw(const bench_scene *s, const speed_row *row, trace_scene *traced, raster_scene *splatted, image *rgb, gbt_error *err)
+static gbt_status draw(const bench_scene *s, const speed_row *row, trace_scene *traced,
+                       raster_scene *splatted, image *rgb, gbt_error *err)
 {
     if (!row->splats) {
         GBT_TRY(trace_build(traced, s->gaussians, &row->settings, ray_image_reach(&s->rays), err));
         return trace_forward(traced, &s->rays, false, &(trace_outputs){.rgb = rgb}, NULL, err);
     }
     const raster_settings settings = frame_splat_settings(&row->settings, row->form);
-    return raster_forward(splatted, row->form == RASTER_EWA ? &s->run->frame.gaussians : s->gaussians, &s->camera.shot.camera, &settings,
-                          false, rgb, NULL, NULL, err);
+    return raster_forward(splatted, row->form == RASTER_EWA ? &s->run->frame.gaussians : s->gaussians,
+                          &s->camera.shot.camera, &settings, false, rgb, NULL, NULL, err);
 }
 
 /* Other kernels and instruction sets give the picture of the default. */
@@ -35,7 +38,8 @@ static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_
     trace_scene traced = {0};
     raster_scene splatted = {0};
     unsigned char *valid = NULL;
-    gbt_status status = scene_read_photo_valid(&s->run->scene.views[view], camera.width, camera.height, &photo, &valid, err);
+    gbt_status status =
+        scene_read_photo_valid(&s->run->scene.views[view], camera.width, camera.height, &photo, &valid, err);
     if (status == GBT_OK)
         status = image_alloc(&rgb, camera.width, camera.height, 3, err);
     image_quantize(&photo);
@@ -67,7 +71,8 @@ gbt_status speed_measure_photos(bench_scene *s, speed_model *out, gbt_error *err
         out->photo_count++;
     }
     for (size_t i = 0; i < out->row_count; i++) /* the second row is the preset "default" */
-        out->rows[i].photo_psnr = is_own_picture(&out->rows[i]) ? out->rows[i].photo_psnr / (double)out->photo_count
-                                  : out->rows[1].photo_psnr;
+        out->rows[i].photo_psnr = is_own_picture(&out->rows[i])
+                                      ? out->rows[i].photo_psnr / (double)out->photo_count
+                                      : out->rows[1].photo_psnr;
     return GBT_OK;
 }

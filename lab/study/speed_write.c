@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/speed_write.c -- the study "speed against accuracy" as a table, as data, and as a chart. */
 #include <jansson.h>
 #include <math.h>
@@ -17,7 +18,7 @@ static const char x_unit[] = "core-microseconds per pixel: tree and picture (log
 static const char y_unit[] = "PSNR to the picture without cut-offs, dB";
 static const char y_photo_unit[] = "PSNR to the held-out photos, mean, dB";
 
-/* ---- tables -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- tables ---- */
 
 static void add_error(text *out, const bench_error *e, const char *between)
 {
@@ -30,22 +31,25 @@ void speed_table(const speed_study *study, text *out)
 {
     for (size_t m = 0; m < study->model_count; m++) {
         const speed_model *model = &study->models[m];
-        text_format(out, "%s**%s**: %zu Gaussians, %zu rays, %zu of them checked; %d threads, medians of %d\n\n", m > 0 ? "\n" : "",
-                    model->name, model->gaussians, model->rays, model->check_rays, study->threads, study->repeats);
-        text_add(out, "| knob | value | tree and forward, core-us/ray | forward | with adjoint | blended per ray | pairs per packet | "
-                      "PSNR, dB | max error | to photos, dB |\n"
+        text_format(out,
+                    "%s**%s**: %zu Gaussians, %zu rays, %zu of them checked; %d threads, medians of %d\n\n",
+                    m > 0 ? "\n" : "", model->name, model->gaussians, model->rays, model->check_rays,
+                    study->threads, study->repeats);
+        text_add(out, "| knob | value | tree and forward, core-us/ray | forward | with adjoint | blended per "
+                      "ray | pairs per packet | PSNR, dB | max error | to photos, dB |\n"
                       "|---|---|---|---|---|---|---|---|---|---|\n");
         for (size_t i = 0; i < model->row_count; i++) {
             const speed_row *row = &model->rows[i];
-            text_format(out, "| %s | %s | %.3f | %.3f | %.3f | %.1f | %.0f | ", speed_knob_name(row->knob), row->value, row->picture_us,
-                        row->forward_us, row->both_us, row->blended, row->pairs);
+            text_format(out, "| %s | %s | %.3f | %.3f | %.3f | %.1f | %.0f | ", speed_knob_name(row->knob),
+                        row->value, row->picture_us, row->forward_us, row->both_us, row->blended, row->pairs);
             add_error(out, &row->error, " | ");
             text_add(out, " | ");
             text_number(out, row->photo_psnr, 2);
             text_add(out, " |\n");
         }
         for (size_t i = 0; i < SPEED_ERRORS; i++) {
-            text_format(out, "| not built | %s | error only | %s | | | | ", model->ideas[i].name, model->ideas[i].reason);
+            text_format(out, "| not built | %s | error only | %s | | | | ", model->ideas[i].name,
+                        model->ideas[i].reason);
             add_error(out, &model->ideas[i].error, " | ");
             text_add(out, " | |\n");
         }
@@ -62,23 +66,25 @@ static void add_csv_text(text *out, const char *value)
 
 static void add_csv(const speed_study *study, text *out)
 {
-    text_add(out, "model,knob,value,kernel,isa,alpha_min,t_min,proxy_radius,tree_forward_core_us_per_ray,forward_core_us_per_ray,"
-                  "forward_adjoint_core_us_per_ray,blended_per_ray,"
-                  "row_pairs_per_packet,psnr,max_error,photo_psnr\n");
+    text_add(out, "model,knob,value,kernel,isa,alpha_min,t_min,proxy_radius,tree_forward_core_us_per_ray,"
+                  "forward_core_us_per_ray,forward_adjoint_core_us_per_ray,blended_per_ray,row_pairs_per_"
+                  "packet,psnr,max_error,photo_psnr\n");
     for (size_t m = 0; m < study->model_count; m++) {
         const speed_model *model = &study->models[m];
         for (size_t i = 0; i < model->row_count; i++) {
             const speed_row *r = &model->rows[i];
             add_csv_text(out, model->name);
-            text_format(out, ",%s,\"%s\",%s,%s,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", speed_knob_name(r->knob),
-                        r->value, r->splats ? "" : bench_kernel_name(r->kernel), cpu_isa_name(r->isa), (double)r->settings.alpha_min,
-                        (double)r->settings.transmittance_min, (double)r->settings.proxy_radius, r->picture_us, r->forward_us, r->both_us,
-                        r->blended, r->pairs, r->error.psnr, r->error.max, r->photo_psnr);
+            text_format(out, ",%s,\"%s\",%s,%s,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n",
+                        speed_knob_name(r->knob), r->value, r->splats ? "" : bench_kernel_name(r->kernel),
+                        cpu_isa_name(r->isa), (double)r->settings.alpha_min,
+                        (double)r->settings.transmittance_min, (double)r->settings.proxy_radius,
+                        r->picture_us, r->forward_us, r->both_us, r->blended, r->pairs, r->error.psnr,
+                        r->error.max, r->photo_psnr);
         }
         for (size_t i = 0; i < SPEED_ERRORS; i++) {
             add_csv_text(out, model->name);
-            text_format(out, ",not built,%s,,,,,,,,,,,%.6g,%.6g,\n", model->ideas[i].name, model->ideas[i].error.psnr,
-                        model->ideas[i].error.max);
+            text_format(out, ",not built,%s,,,,,,,,,,,%.6g,%.6g,\n", model->ideas[i].name,
+                        model->ideas[i].error.psnr, model->ideas[i].error.max);
         }
     }
 }
@@ -86,29 +92,33 @@ static void add_csv(const speed_study *study, text *out)
 static json_t *model_to_json(const speed_model *model)
 {
     json_t *rows = json_array(), *ideas = json_array();
-    const double promised = 0.5 / 255, kept = model->rows[0].error.max; /* of the preset "exact", which comes first */
+    const double promised = 0.5 / 255,
+                 kept = model->rows[0].error.max; /* of the preset "exact", which comes first */
     for (size_t i = 0; i < model->row_count; i++) {
         const speed_row *r = &model->rows[i];
-        json_array_append_new(rows, json_pack("{s:s,s:s,s:s,s:s,s:f,s:f,s:o,s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:o}", "knob",
-                                              speed_knob_name(r->knob), "value", r->value, "kernel",
-                                              r->splats ? "" : bench_kernel_name(r->kernel), "isa", cpu_isa_name(r->isa), "alpha_min",
-                                              (double)r->settings.alpha_min, "transmittance_min", (double)r->settings.transmittance_min,
-                                              "proxy_radius", isfinite(r->settings.proxy_radius)
-                                              ? json_real((double)r->settings.proxy_radius) : json_null(), "tree_forward_core_us_per_ray",
-                                                  r->picture_us, "forward_core_us_per_ray", r->forward_us,
-                                                  "forward_adjoint_core_us_per_ray", r->both_us, "blended_per_ray", r->blended,
-                                                  "row_pairs_per_packet", r->pairs, "psnr", r->error.psnr, "max_error", r->error.max,
-                                                  "photo_psnr",
-                                              isfinite(r->photo_psnr) ? json_real(r->photo_psnr) : json_null()));
+        json_array_append_new(
+            rows,
+            json_pack("{s:s,s:s,s:s,s:s,s:f,s:f,s:o,s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:o}", "knob",
+                      speed_knob_name(r->knob), "value", r->value, "kernel",
+                      r->splats ? "" : bench_kernel_name(r->kernel), "isa", cpu_isa_name(r->isa), "alpha_min",
+                      (double)r->settings.alpha_min, "transmittance_min",
+                      (double)r->settings.transmittance_min, "proxy_radius",
+                      isfinite(r->settings.proxy_radius) ? json_real((double)r->settings.proxy_radius)
+                                                         : json_null(),
+                      "tree_forward_core_us_per_ray", r->picture_us, "forward_core_us_per_ray", r->forward_us,
+                      "forward_adjoint_core_us_per_ray", r->both_us, "blended_per_ray", r->blended,
+                      "row_pairs_per_packet", r->pairs, "psnr", r->error.psnr, "max_error", r->error.max,
+                      "photo_psnr", isfinite(r->photo_psnr) ? json_real(r->photo_psnr) : json_null()));
     }
     for (size_t i = 0; i < SPEED_ERRORS; i++)
-        json_array_append_new(ideas, json_pack("{s:s,s:s,s:f,s:f}", "name", model->ideas[i].name, "reason", model->ideas[i].reason, "psnr",
-                                               model->ideas[i].error.psnr, "max_error", model->ideas[i].error.max));
-    json_t *check = json_pack("{s:s,s:f,s:f,s:b}", "row", "exact: largest error", "limit", promised, "value", kept, "pass",
-                              kept <= promised);
-    return json_pack("{s:o,s:I,s:I,s:I,s:o,s:o,s:[o]}", "model", json_text(model->name), "gaussians", (json_int_t)model->gaussians, "rays",
-                     (json_int_t)model->rays, "check_rays", (json_int_t)model->check_rays, "settings", rows, "not_built", ideas, "checks",
-                     check);
+        json_array_append_new(ideas, json_pack("{s:s,s:s,s:f,s:f}", "name", model->ideas[i].name, "reason",
+                                               model->ideas[i].reason, "psnr", model->ideas[i].error.psnr,
+                                               "max_error", model->ideas[i].error.max));
+    json_t *check = json_pack("{s:s,s:f,s:f,s:b}", "row", "exact: largest error", "limit", promised, "value",
+                              kept, "pass", kept <= promised);
+    return json_pack("{s:o,s:I,s:I,s:I,s:o,s:o,s:[o]}", "model", json_text(model->name), "gaussians",
+                     (json_int_t)model->gaussians, "rays", (json_int_t)model->rays, "check_rays",
+                     (json_int_t)model->check_rays, "settings", rows, "not_built", ideas, "checks", check);
 }
 
 static gbt_status write_json(const speed_study *study, const char *path, gbt_error *err)
@@ -116,20 +126,17 @@ static gbt_status write_json(const speed_study *study, const char *path, gbt_err
     json_t *models = json_array();
     for (size_t m = 0; m < study->model_count; m++)
         json_array_append_new(models, model_to_json(&study->models[m]));
-    json_t *root = json_pack("{s:i,s:s,s:i,s:i,s:o}", "schema", 1, "study", "speed", "repeats", study->repeats, "threads", study->threads,
-                             "models", models);
+    json_t *root = json_pack("{s:i,s:s,s:i,s:i,s:o}", "schema", 1, "study", "speed", "repeats",
+                             study->repeats, "threads", study->threads, "models", models);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);
     return status;
 }
 
-/* ---- chart --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- chart ---- */
 
 /* Panels of a model: to the picture without cut-offs; of a run also to the photos. */
-static size_t panel_count(const speed_model *model)
-{
-    return model->photo_count > 0 ? 2 : 1;
-}
+static size_t panel_count(const speed_model *model) { return model->photo_count > 0 ? 2 : 1; }
 
 static void draw_panel(const speed_study *study, size_t m, bool photos, int top, text *out)
 {
@@ -140,16 +147,23 @@ static void draw_panel(const speed_study *study, size_t m, bool photos, int top,
     if (photos)
         snprintf(note, sizeof note, "%zu held-out photos", model->photo_count);
     else
-        snprintf(note, sizeof note, "%zu Gaussians, %zu rays, %d threads, %s", model->gaussians, model->rays, study->threads,
-                 cpu_isa_name(cpu_best_isa()));
-    scatter_chart chart = {.title = model->name, .note = note, .x_unit = x_unit, .y_unit = photos ? y_photo_unit : y_unit, .points = points,
-                           .point_count = model->row_count, .levels = levels, .level_count = photos ? 0 : SPEED_ERRORS,
+        snprintf(note, sizeof note, "%zu Gaussians, %zu rays, %d threads, %s", model->gaussians, model->rays,
+                 study->threads, cpu_isa_name(cpu_best_isa()));
+    scatter_chart chart = {.title = model->name,
+                           .note = note,
+                           .x_unit = x_unit,
+                           .y_unit = photos ? y_photo_unit : y_unit,
+                           .points = points,
+                           .point_count = model->row_count,
+                           .levels = levels,
+                           .level_count = photos ? 0 : SPEED_ERRORS,
                            .apart = 1u << KNOB_KERNEL | 1u << KNOB_ISA | 1u << KNOB_RENDERER};
     for (int k = 0; k < KNOB_COUNT; k++)
         chart.series[k] = speed_knob_name((speed_knob)k);
     for (size_t i = 0; i < model->row_count; i++) {
         const speed_row *r = &model->rows[i];
-        points[i] = (scatter_point){(int)r->knob, r->picture_us, photos ? r->photo_psnr : r->error.psnr, r->is_default ? "" : r->value};
+        points[i] = (scatter_point){(int)r->knob, r->picture_us, photos ? r->photo_psnr : r->error.psnr,
+                                    r->is_default ? "" : r->value};
     }
     for (size_t i = 0; i < SPEED_ERRORS; i++)
         levels[i] = (scatter_level){model->ideas[i].error.psnr, model->ideas[i].name};
@@ -162,39 +176,45 @@ static void add_svg(const speed_study *study, size_t first, size_t count, bool a
     for (size_t i = 0; i < count; i++)
         panels += panel_count(&study->models[first + i]);
     const int height = (int)panels * (SCATTER_HEIGHT + PANEL_GAP) - PANEL_GAP;
-    text_format(out, "<svg %sclass=\"scatter\" viewBox=\"0 0 %d %d\"%s role=\"img\" aria-label=\"speed against accuracy\">",
-                alone ? "xmlns=\"http://www.w3.org/2000/svg\" " : "", SCATTER_WIDTH, height, alone ? " width=\"760\"" : "");
+    text_format(out,
+                "<svg %sclass=\"scatter\" viewBox=\"0 0 %d %d\"%s role=\"img\" aria-label=\"speed against "
+                "accuracy\">",
+                alone ? "xmlns=\"http://www.w3.org/2000/svg\" " : "", SCATTER_WIDTH, height,
+                alone ? " width=\"760\"" : "");
     if (alone) {
         text_add(out, "<style>");
         text_add(out, scatter_css);
         text_add(out, "</style>");
-        text_format(out, "<rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH, height);
+        text_format(out, "<rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH,
+                    height);
     }
     int top = 0;
     for (size_t i = 0; i < count; i++)
-        for (size_t panel = 0; panel < panel_count(&study->models[first + i]); panel++, top += SCATTER_HEIGHT + PANEL_GAP)
+        for (size_t panel = 0; panel < panel_count(&study->models[first + i]);
+             panel++, top += SCATTER_HEIGHT + PANEL_GAP)
             draw_panel(study, first + i, panel == 1, top, out);
     text_add(out, "</svg>\n");
 }
 
 static void add_page_table(const speed_model *model, text *out)
 {
-    text_add(out, "<details class=\"card\"><summary>The figures</summary><div class=\"scroll\"><table "
-                  "class=\"list\"><thead><tr><th>knob</th><th>value</th>"
-                  "<th>tree and forward, core-\xc2\xb5s/ray</th><th>forward</th><th>with adjoint</th><th>blended per ray</th><th>PSNR, "
-                  "dB</th><th>max error</th><th>to photos, dB</th></tr></thead><tbody>");
+    text_add(out,
+             "<details class=\"card\"><summary>The figures</summary><div class=\"scroll\"><table "
+             "class=\"list\"><thead><tr><th>knob</th><th>value</th>"
+             "<th>tree and forward, core-\xc2\xb5s/ray</th><th>forward</th><th>with adjoint</th><th>blended "
+             "per ray</th><th>PSNR, dB</th><th>max error</th><th>to photos, dB</th></tr></thead><tbody>");
     for (size_t i = 0; i < model->row_count; i++) {
         const speed_row *r = &model->rows[i];
-        text_format(out, "<tr><th>%s</th><td>%s</td><td>%.3f</td><td>%.3f</td><td>%.3f</td><td>%.1f</td><td>", speed_knob_name(r->knob),
-                    r->value, r->picture_us, r->forward_us, r->both_us, r->blended);
+        text_format(out, "<tr><th>%s</th><td>%s</td><td>%.3f</td><td>%.3f</td><td>%.3f</td><td>%.1f</td><td>",
+                    speed_knob_name(r->knob), r->value, r->picture_us, r->forward_us, r->both_us, r->blended);
         add_error(out, &r->error, "</td><td>");
         text_add(out, "</td><td>");
         text_number(out, r->photo_psnr, 2);
         text_add(out, "</td></tr>");
     }
     for (size_t i = 0; i < SPEED_ERRORS; i++) {
-        text_format(out, "<tr><th>not built: %s</th><td></td><td colspan=\"4\">error only: %s</td><td>", model->ideas[i].name,
-                    model->ideas[i].reason);
+        text_format(out, "<tr><th>not built: %s</th><td></td><td colspan=\"4\">error only: %s</td><td>",
+                    model->ideas[i].name, model->ideas[i].reason);
         add_error(out, &model->ideas[i].error, "</td><td>");
         text_add(out, "</td><td></td></tr>");
     }
@@ -208,12 +228,12 @@ static void add_page(const speed_study *study, text *out)
                   "<title>Speed against accuracy</title>\n<style>\n");
     text_add(out, report_css);
     text_add(out, scatter_css);
-    text_add(out, ".panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n</style></head>\n<body>\n<header><h1>Speed against accuracy</h1>"
-                  "<p class=\"lead\">What each setting of the tracer costs, and how far its picture is from the one without any cut-off, "
-                  "traced in double. Up and left is "
-                  "better. Each line moves one knob away from the preset <b>default</b>; dashed heights are ideas that were not built, of "
-                  "which only the error was "
-                  "measured.</p></header>\n<main>\n");
+    text_add(out,
+             ".panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n</style></head>\n<body>\n<header><h1>Speed "
+             "against accuracy</h1><p class=\"lead\">What each setting of the tracer costs, and how far its "
+             "picture is from the one without any cut-off, traced in double. Up and left is better. Each "
+             "line moves one knob away from the preset <b>default</b>; dashed heights are ideas that were "
+             "not built, of which only the error was measured.</p></header>\n<main>\n");
     for (size_t m = 0; m < study->model_count; m++) {
         text_add(out, "<figure class=\"card panel\">");
         add_svg(study, m, 1, false, out);
@@ -222,20 +242,20 @@ static void add_page(const speed_study *study, text *out)
     }
     text_add(out, "</main>\n<footer><p>Processor time of all threads per ray, median of ");
     text_format(out, "%d", study->repeats);
-    text_add(out, " passes taken in turn. What the settings mean, and what their errors are bounded by: <code>docs/accuracy.md</code>. "
-                  "This page is one file and loads "
+    text_add(out, " passes taken in turn. What the settings mean, and what their errors are bounded by: "
+                  "<code>docs/accuracy.md</code>. This page is one file and loads "
                   "nothing.</p></footer>\n</body></html>\n");
 }
 
-/* ---- files --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- files ---- */
 
 static void add_picture(const speed_study *study, text *out)
 {
     add_svg(study, 0, study->model_count, true, out);
 }
 
-static gbt_status write_text(const speed_study *study, const char *folder, const char *name, void (*add)(const speed_study *, text *),
-                             gbt_error *err)
+static gbt_status write_text(const speed_study *study, const char *folder, const char *name,
+                             void (*add)(const speed_study *, text *), gbt_error *err)
 {
     text out = {.err = err};
     add(study, &out);

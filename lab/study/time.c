@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/time.c -- the study "time": make its runs, and read curves. */
 #include "study/time.h"
 
@@ -12,7 +13,7 @@ lab_time_def lab_time_def_default(void)
     return (lab_time_def){.budget_seconds = 84, .downscale = 1, .seeds = 1};
 }
 
-/* ---- curves ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- curves ---- */
 
 stat_sample time_psnr(const time_study *s, size_t scene, size_t variant)
 {
@@ -48,12 +49,14 @@ double time_to_reach(const study_figures *run, double psnr)
     double last_seconds = NAN, last_psnr = NAN;
     for (size_t i = 0; i <= run->mark_count; i++) {
         const bool is_end = i == run->mark_count;
-        const double seconds = is_end ? run->train_seconds : run->marks[i].seconds, here = is_end ? run->psnr : run->marks[i].psnr;
+        const double seconds = is_end ? run->train_seconds : run->marks[i].seconds,
+                     here = is_end ? run->psnr : run->marks[i].psnr;
         if (here >= psnr) {
             const double share = i > 0 && here > last_psnr ? (psnr - last_psnr) / (here - last_psnr) : 1;
             return i > 0 && last_seconds > 0 ? last_seconds * pow(seconds / last_seconds, share) : seconds;
         }
-        last_seconds = seconds, last_psnr = here;
+        last_seconds = seconds;
+        last_psnr = here;
     }
     return NAN;
 }
@@ -62,25 +65,31 @@ stat_sample time_saved(const time_study *s, size_t scene)
 {
     double values[STUDY_SEEDS_MAX];
     for (int seed = 0; seed < s->grid.seeds; seed++) {
-        values[seed] = time_to_reach(time_run(s, scene, TIME_DEFAULT, seed), time_run(s, scene, TIME_FAITHFUL, seed)->psnr);
+        values[seed] = time_to_reach(time_run(s, scene, TIME_DEFAULT, seed),
+                                     time_run(s, scene, TIME_FAITHFUL, seed)->psnr);
         if (!isfinite(values[seed]))
             return stat_of(NULL, 0); /* a mean without the slow ones would flatter */
     }
     return stat_of(values, (size_t)s->grid.seeds);
 }
 
-/* ---- runs ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- runs ---- */
 
-static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder, study_figures *out, gbt_error *err)
+static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder,
+                          study_figures *out, gbt_error *err)
 {
     const time_study *s = study;
     const time_variant *v = &time_variants[variant];
     gbt_train_def def = gbt_train_def_default();
-    def.downscale = s->def.downscale, def.seed = (uint64_t)seed, def.save_every_seconds = 0, def.command = "gbtrace study time";
+    def.downscale = s->def.downscale;
+    def.seed = (uint64_t)seed;
+    def.save_every_seconds = 0;
+    def.command = "gbtrace study time";
     def.budget_seconds = v->budgets * s->def.budget_seconds;
     for (int i = 0; i < TIME_MARKS; i++)
         def.eval_at_seconds[def.eval_at_count++] = def.budget_seconds * (i + 1) / (TIME_MARKS + 1);
-    return study_runs_do_variant(folder, s->def.data[scene], s->grid.names[scene], v->name, v->settings, def, out, err);
+    return study_runs_do_variant(folder, s->def.data[scene], s->grid.names[scene], v->name, v->settings, def,
+                                 out, err);
 }
 
 static gbt_status write_all(const time_study *s, const char *folder, FILE *out, gbt_error *err)
@@ -97,7 +106,8 @@ static gbt_status open_study(time_study *s, const lab_time_def *def, gbt_error *
 {
     s->def = *def;
     if (!(def->budget_seconds > 0 && def->budget_seconds <= 1e6))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--budget: %g s (wanted more than 0, up to 1e6)", def->budget_seconds);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--budget: %g s (wanted more than 0, up to 1e6)",
+                         def->budget_seconds);
     return study_grid_open(&s->grid, def->data, def->data_count, time_variant_count, def->seeds, err);
 }
 

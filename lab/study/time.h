@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/time.h -- what the study "time" trains, what came out, and how it is written down. */
 #ifndef GBT_STUDY_TIME_H
 #define GBT_STUDY_TIME_H
@@ -6,7 +7,12 @@
 #include "study/grid.h"
 #include "study/runs_stat.h"
 
-enum { TIME_VARIANTS_MAX = 16, TIME_DEFAULT = 0, TIME_FAITHFUL = 1, TIME_MARKS = 9 /* in passing, at tenths of a run's budget */ };
+enum {
+    TIME_VARIANTS_MAX = 16,
+    TIME_DEFAULT = 0,
+    TIME_FAITHFUL = 1,
+    TIME_MARKS = 9 /* in passing, at tenths of a run's budget */
+};
 
 typedef struct time_variant {
     const char *name;     /* in tables; of its folder, what is no letter or digit as '-' */
@@ -33,22 +39,25 @@ stat_sample time_psnr(const time_study *s, size_t scene, size_t variant);
 stat_sample time_change(const time_study *s, size_t scene, size_t variant);
 
 /**
- * Mark `mark` of a curve over the seeds; mark TIME_MARKS is the end. False when a run has no such mark (a step may pass several at once).
+ * Mark `mark` of a curve over the seeds; mark TIME_MARKS is the end. False when a run has no such mark (a
+ * step may pass several at once).
  */
 bool time_mark(const time_study *s, size_t scene, size_t variant, size_t mark, double *seconds, double *psnr);
 
 /**
- * When a run first shows `psnr` or more: straight between its marks and its end, over log seconds; NaN when it never does, or there is no
- * score. Before the first mark nothing is known: a run that is there already is said to reach it at that mark.
+ * When a run first shows `psnr` or more: straight between its marks and its end, over log seconds; NaN when
+ * it never does, or there is no score. Before the first mark nothing is known: a run that is there already is
+ * said to reach it at that mark.
  */
 double time_to_reach(const study_figures *run, double psnr);
 
-/** Seconds of the default to what the faithful protocol has in the end, by seed; NaN when a seed does not come there. */
+/** Seconds of the default to what the faithful protocol has in the end, by seed; NaN when a seed does not
+    come there. */
 stat_sample time_saved(const time_study *s, size_t scene);
 
 void time_tables(const time_study *s, text *out); /* Markdown */
 void time_csv(const time_study *s, text *out);
-void time_charts(const time_study *s, text *out); /* SVG */
+void time_charts(const time_study *s, text *out);                              /* SVG */
 gbt_status time_json(const time_study *s, const char *folder, gbt_error *err); /* time.json in the folder */
 
 #endif

@@ -1,9 +1,10 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/time_variants.c -- the runs that the study "time" compares: THE table to edit. */
 #include "study/time.h"
 
-/* One row per run: its name, what differs from the default settings (keys as `gbtrace train` writes them to RUN/config, one a line), and
-   how many budgets it gets. The first two rows have their places; any others may come and go. A new meaning needs a new name: the name is
-   the folder of the runs. */
+/* One row per run: its name, what differs from the default settings (keys as `gbtrace train` writes them to
+   RUN/config, one a line), and how many budgets it gets. The first two rows have their places; any others may
+   come and go. A new meaning needs a new name: the name is the folder of the runs. */
 const time_variant time_variants[] = {
     {"default", "", 1},
     {"faithful protocol", "compat = 1", 5},
@@ -21,4 +22,5 @@ const time_variant time_variants[] = {
 
 const size_t time_variant_count = sizeof time_variants / sizeof *time_variants;
 
-_Static_assert(sizeof time_variants / sizeof *time_variants <= TIME_VARIANTS_MAX, "every variant has a place");
+_Static_assert(sizeof time_variants / sizeof *time_variants <= TIME_VARIANTS_MAX,
+               "every variant has a place");

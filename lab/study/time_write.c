@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* study/time_write.c -- the study "time" as tables, as data, and as charts. */
 #include <math.h>
 #include <stdio.h>
@@ -9,7 +10,7 @@
 #include "study/chart.h"
 #include "study/time.h"
 
-/* ---- Markdown --------------------------------------------------------------------------------------------------------------------- */
+/* ---- Markdown ---- */
 
 static void add_curves(const time_study *s, size_t scene, text *out)
 {
@@ -32,7 +33,8 @@ static void add_curves(const time_study *s, size_t scene, text *out)
     text_add(out, "\n");
 }
 
-static double mean_of(const time_study *s, size_t scene, size_t variant, double (*figure)(const study_figures *))
+static double mean_of(const time_study *s, size_t scene, size_t variant,
+                      double (*figure)(const study_figures *))
 {
     double sum = 0;
     for (int seed = 0; seed < s->grid.seeds; seed++)
@@ -40,24 +42,16 @@ static double mean_of(const time_study *s, size_t scene, size_t variant, double 
     return sum / s->grid.seeds;
 }
 
-static double iterations_of(const study_figures *run)
-{
-    return run->iterations;
-}
+static double iterations_of(const study_figures *run) { return run->iterations; }
 
-static double anchors_of(const study_figures *run)
-{
-    return run->anchors_final;
-}
+static double anchors_of(const study_figures *run) { return run->anchors_final; }
 
-static double seconds_of(const study_figures *run)
-{
-    return run->train_seconds;
-}
+static double seconds_of(const study_figures *run) { return run->train_seconds; }
 
 static void add_variants(const time_study *s, size_t scene, text *out)
 {
-    text_add(out, "\n| run | seconds | iterations | anchors | PSNR, dB | change from the default, dB |\n|---|---|---|---|---|---|\n");
+    text_add(out, "\n| run | seconds | iterations | anchors | PSNR, dB | change from the default, dB "
+                  "|\n|---|---|---|---|---|---|\n");
     for (size_t v = 0; v < time_variant_count; v++) {
         const stat_sample psnr = time_psnr(s, scene, v), change = time_change(s, scene, v);
         text_format(out, "| %s | %.3g | ", time_variants[v].name, mean_of(s, scene, v, seconds_of));
@@ -82,20 +76,24 @@ static void add_words(const time_study *s, size_t scene, text *out)
     if (isfinite(reached.mean)) {
         text_add(out, "The default has that after ");
         stat_add(out, &reached, 1, false);
-        text_format(out, " s, %.1f times as soon.\n", mean_of(s, scene, TIME_FAITHFUL, seconds_of) / reached.mean);
+        text_format(out, " s, %.1f times as soon.\n",
+                    mean_of(s, scene, TIME_FAITHFUL, seconds_of) / reached.mean);
     } else {
-        text_format(out, "The default does not reach that in its %.3g s.\n", mean_of(s, scene, TIME_DEFAULT, seconds_of));
+        text_format(out, "The default does not reach that in its %.3g s.\n",
+                    mean_of(s, scene, TIME_DEFAULT, seconds_of));
     }
 }
 
 void time_tables(const time_study *s, text *out)
 {
-    text_format(out, "# Held-out PSNR against seconds\n\nA budget is %.4g s; the faithful protocol has %g of them. Photos divided by %g, ",
+    text_format(out,
+                "# Held-out PSNR against seconds\n\nA budget is %.4g s; the faithful protocol has %g of "
+                "them. Photos divided by %g, ",
                 s->def.budget_seconds, time_variants[TIME_FAITHFUL].budgets, s->def.downscale);
     text_format(out, "seeds 0 to %d, every eighth photo held out.\n", s->grid.seeds - 1);
-    text_add(out, "Mean ± standard deviation over the seeds. Marks are taken in passing, while the clock stops: schedules end with the "
-                  "budget, so a run "
-                  "of half the budget has more than the mark at half. Each run but the first two leaves one choice of the default out.\n");
+    text_add(out, "Mean ± standard deviation over the seeds. Marks are taken in passing, while the clock "
+                  "stops: schedules end with the budget, so a run of half the budget has more than the mark "
+                  "at half. Each run but the first two leaves one choice of the default out.\n");
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         text_add(out, "\n## ");
         text_plain(out, s->grid.names[scene]);
@@ -106,14 +104,15 @@ void time_tables(const time_study *s, text *out)
     }
 }
 
-/* ---- CSV, JSON -------------------------------------------------------------------------------------------------------------------- */
+/* ---- CSV, JSON ---- */
 
-static void add_csv_row(const time_study *s, size_t scene, size_t variant, int seed, double seconds, double psnr, bool is_end, text *out)
+static void add_csv_row(const time_study *s, size_t scene, size_t variant, int seed, double seconds,
+                        double psnr, bool is_end, text *out)
 {
     const study_figures *run = time_run(s, scene, variant, seed);
     stat_csv_text(out, s->grid.names[scene]);
-    text_format(out, ",\"%s\",%d,%d,%.6g,%.9g,%.0f,%.0f\n", time_variants[variant].name, seed, is_end, seconds, psnr, run->iterations,
-                run->anchors_final);
+    text_format(out, ",\"%s\",%d,%d,%.6g,%.9g,%.0f,%.0f\n", time_variants[variant].name, seed, is_end,
+                seconds, psnr, run->iterations, run->anchors_final);
 }
 
 void time_csv(const time_study *s, text *out)
@@ -144,20 +143,26 @@ static void add_scene(const time_study *s, size_t scene, json_t *rows, json_t *r
 {
     char row[STUDY_NAME_SIZE + 160];
     const stat_sample reached = time_saved(s, scene);
-    snprintf(row, sizeof row, "%s: seconds of the default to the PSNR that the faithful protocol has after %g budgets",
+    snprintf(row, sizeof row,
+             "%s: seconds of the default to the PSNR that the faithful protocol has after %g budgets",
              s->grid.names[scene], time_variants[TIME_FAITHFUL].budgets);
-    json_array_append_new(rows, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit", s->def.budget_seconds, "value",
-                                          json_number(reached.mean), "pass", reached.mean <= s->def.budget_seconds));
+    json_array_append_new(rows, json_pack("{s:o,s:f,s:o,s:b}", "row", json_text(row), "limit",
+                                          s->def.budget_seconds, "value", json_number(reached.mean), "pass",
+                                          reached.mean <= s->def.budget_seconds));
     for (size_t v = 0; v < time_variant_count; v++) {
         const stat_sample psnr = time_psnr(s, scene, v), change = time_change(s, scene, v);
-        json_array_append_new(runs, json_pack("{s:o,s:s,s:s,s:f,s:o,s:o}", "scene", json_text(s->grid.names[scene]), "run",
-                                              time_variants[v].name, "settings", time_variants[v].settings, "budgets",
-                                              time_variants[v].budgets, "psnr", stat_to_json(&psnr), "marks", curve_to_json(s, scene, v)));
+        json_array_append_new(runs,
+                              json_pack("{s:o,s:s,s:s,s:f,s:o,s:o}", "scene", json_text(s->grid.names[scene]),
+                                        "run", time_variants[v].name, "settings", time_variants[v].settings,
+                                        "budgets", time_variants[v].budgets, "psnr", stat_to_json(&psnr),
+                                        "marks", curve_to_json(s, scene, v)));
         if (v == TIME_DEFAULT)
             continue;
-        snprintf(row, sizeof row, "%s: %s: change of PSNR from the default, dB", s->grid.names[scene], time_variants[v].name);
-        json_array_append_new(rows, json_pack("{s:o,s:n,s:o,s:n,s:o}", "row", json_text(row), "limit", "value", json_number(change.mean),
-                                              "pass", "ours", stat_to_json(&change)));
+        snprintf(row, sizeof row, "%s: %s: change of PSNR from the default, dB", s->grid.names[scene],
+                 time_variants[v].name);
+        json_array_append_new(rows,
+                              json_pack("{s:o,s:n,s:o,s:n,s:o}", "row", json_text(row), "limit", "value",
+                                        json_number(change.mean), "pass", "ours", stat_to_json(&change)));
     }
 }
 
@@ -168,14 +173,15 @@ gbt_status time_json(const time_study *s, const char *folder, gbt_error *err)
     json_t *rows = json_array(), *runs = json_array();
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         add_scene(s, scene, rows, runs);
-    json_t *root = json_pack("{s:i,s:s,s:f,s:f,s:i,s:o,s:o}", "schema", 1, "study", "time", "budget_seconds", s->def.budget_seconds,
-                             "downscale", s->def.downscale, "seeds", s->grid.seeds, "rows", rows, "runs", runs);
+    json_t *root = json_pack("{s:i,s:s,s:f,s:f,s:i,s:o,s:o}", "schema", 1, "study", "time", "budget_seconds",
+                             s->def.budget_seconds, "downscale", s->def.downscale, "seeds", s->grid.seeds,
+                             "rows", rows, "runs", runs);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);
     return status;
 }
 
-/* ---- charts ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- charts ---- */
 
 /* Two curves, the ends of all others, and the height that the faithful protocol comes to. */
 static void draw_scene(const time_study *s, size_t scene, int top, text *out)
@@ -184,12 +190,20 @@ static void draw_scene(const time_study *s, size_t scene, int top, text *out)
     char title[STUDY_NAME_SIZE + 40];
     const scatter_level level = {time_psnr(s, scene, TIME_FAITHFUL).mean, "the faithful protocol in the end"};
     snprintf(title, sizeof title, "%s: held-out PSNR against seconds", s->grid.names[scene]);
-    scatter_chart chart = {.title = title, .note = "marks in passing; one choice left out: its end", .x_unit = "seconds of training (log)",
-                           .y_unit = "held-out PSNR, dB", .apart = 1u << 3, .points = points, .levels = &level, .level_count = 1,
-                           .series = {NULL, time_variants[TIME_DEFAULT].name, time_variants[TIME_FAITHFUL].name, "one choice left out"}};
+    scatter_chart chart = {.title = title,
+                           .note = "marks in passing; one choice left out: its end",
+                           .x_unit = "seconds of training (log)",
+                           .y_unit = "held-out PSNR, dB",
+                           .apart = 1u << 3,
+                           .points = points,
+                           .levels = &level,
+                           .level_count = 1,
+                           .series = {NULL, time_variants[TIME_DEFAULT].name,
+                                      time_variants[TIME_FAITHFUL].name, "one choice left out"}};
     for (size_t v = 0; v < time_variant_count; v++)
         for (size_t mark = v <= TIME_FAITHFUL ? 0 : TIME_MARKS; mark <= TIME_MARKS; mark++) {
-            scatter_point p = {v <= TIME_FAITHFUL ? 1 + (int)v : 3, 0, 0, v <= TIME_FAITHFUL ? "" : time_variants[v].name};
+            scatter_point p = {v <= TIME_FAITHFUL ? 1 + (int)v : 3, 0, 0,
+                               v <= TIME_FAITHFUL ? "" : time_variants[v].name};
             if (time_mark(s, scene, v, mark, &p.x, &p.y))
                 points[chart.point_count++] = p;
         }

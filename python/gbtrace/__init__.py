@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """gbtrace: neural Gaussian scenes by ray tracing, on the CPU.
 
     model = gbtrace.Model("RUN")

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """libgbtrace as ctypes sees it: structs, functions, statuses to exceptions. Fields are as in include/gbtrace/*.h; tests hold them to it."""
 
 import ctypes as c

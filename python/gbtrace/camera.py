@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A posed camera: lens model, image size, pose."""
 
 import ctypes as c

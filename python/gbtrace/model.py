@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A scene in memory: open it, render it into arrays, take gradients back."""
 
 import ctypes as c

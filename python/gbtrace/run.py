@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What takes whole folders: training, scoring, exporting, comparing."""
 
 import ctypes as c

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The Python package on a small model: GBT_MODEL is a run, GBT_INCLUDE the headers, GBT_SCRATCH a folder to write into."""
 import ctypes
 import os

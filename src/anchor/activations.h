@@ -1,13 +1,17 @@
-/* anchor/activations.h -- exp, tanh and sigmoid in single precision: the same bits on every instruction set, and loops over them vectorise.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/activations.h -- exp, tanh and sigmoid in single precision: the same bits on every instruction set,
+   and loops over them vectorise.
 
-   Only additions, products, one division and fused multiply-adds in a fixed order, so nothing here depends on the libm of the machine. */
+   Only additions, products, one division and fused multiply-adds in a fixed order, so nothing here depends on
+   the libm of the machine. */
 #ifndef GBT_ANCHOR_ACTIVATIONS_H
 #define GBT_ANCHOR_ACTIVATIONS_H
 
 #include <stdint.h>
 #include <string.h>
 
-/* Arguments of exp() and sigmoid() are cut here: exp(-30) sigmoid(-30) is still a normal float, so that a scale is never 0. */
+/* Arguments of exp() and sigmoid() are cut here: exp(-30) sigmoid(-30) is still a normal float, so that a
+   scale is never 0. */
 #define ACTIVATION_LIMIT 30.0f
 
 /** x in [low, high]; a NaN becomes `low`. */
@@ -53,7 +57,8 @@ static inline float activation_exp(float x)
 static inline float activation_sigmoid(float x)
 {
     float power;
-    const float tail = activation_exp_parts(-activation_clamp(x, -ACTIVATION_LIMIT, ACTIVATION_LIMIT), &power);
+    const float tail =
+        activation_exp_parts(-activation_clamp(x, -ACTIVATION_LIMIT, ACTIVATION_LIMIT), &power);
     return 1.0f / (1.0f + __builtin_fmaf(power, tail, power));
 }
 

@@ -1,10 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/adjust.c -- where the scene needs more anchors, and which ones it can do without.
 
    statistics --> new anchors (new_anchors.c) ----+
         |                                         +--> survivors, then new rows
         +--> judged and transparent --> pruned ---+
 
-   Everything is decided and allocated before the first row moves, so a failure leaves anchors and statistics as they were. */
+   Everything is decided and allocated before the first row moves, so a failure leaves anchors and statistics
+   as they were. */
 #include "anchor/adjust.h"
 
 #include <math.h>
@@ -15,12 +17,14 @@
 #include "base/fail.h"
 #include "base/memory.h"
 
-/* ---- statistics -------------------------------------------------------------------------------------------------------------- */
+/* ---- statistics ---- */
 
 gbt_status adjust_stats_resize(adjust_stats *s, size_t count, int offset_count, gbt_error *err)
 {
-    if (offset_count < 1 || offset_count > ANCHOR_MAX_OFFSETS || (s->count > 0 && offset_count != s->offset_count))
-        return base_fail(err, GBT_ERR_ARGUMENT, "statistics: offset_count %d (wanted 1 to %d, constant)", offset_count, ANCHOR_MAX_OFFSETS);
+    if (offset_count < 1 || offset_count > ANCHOR_MAX_OFFSETS ||
+        (s->count > 0 && offset_count != s->offset_count))
+        return base_fail(err, GBT_ERR_ARGUMENT, "statistics: offset_count %d (wanted 1 to %d, constant)",
+                         offset_count, ANCHOR_MAX_OFFSETS);
     const size_t widths[ROWS_FIELDS] = {1, 1, (size_t)offset_count, (size_t)offset_count};
     float **const fields[ROWS_FIELDS] = {&s->use_accum, &s->visit_count, &s->grad_accum, &s->grad_count};
     if (offset_count != s->offset_count)
@@ -42,12 +46,24 @@ void adjust_stats_free(adjust_stats *s)
 
 adjust_def adjust_def_default(void)
 {
-    return (adjust_def){.voxel_size = 0.0f, .level_count = 3, .init_factor = 16, .hierarchy_factor = 4, .grad_threshold = 2e-4f,
-                        .min_use = 0.005f, .interval = 100.0f, .success_threshold = 0.8f, .shape_log_max = INFINITY,
-                        .max_anchors = SIZE_MAX, .compat = false, .seed = 0, .step = 0, .grow = true, .prune = true};
+    return (adjust_def){.voxel_size = 0.0f,
+                        .level_count = 3,
+                        .init_factor = 16,
+                        .hierarchy_factor = 4,
+                        .grad_threshold = 2e-4f,
+                        .min_use = 0.005f,
+                        .interval = 100.0f,
+                        .success_threshold = 0.8f,
+                        .shape_log_max = INFINITY,
+                        .max_anchors = SIZE_MAX,
+                        .compat = false,
+                        .seed = 0,
+                        .step = 0,
+                        .grow = true,
+                        .prune = true};
 }
 
-/* ---- adjusting --------------------------------------------------------------------------------------------------------------- */
+/* ---- adjusting ---- */
 
 static bool judged(const adjust_def *def, float visit_count)
 {
@@ -56,26 +72,33 @@ static bool judged(const adjust_def *def, float visit_count)
 
 static bool is_pruned(const adjust_stats *stats, const adjust_def *def, size_t i)
 {
-    return def->prune && judged(def, stats->visit_count[i]) && stats->use_accum[i] < def->min_use * stats->visit_count[i];
+    return def->prune && judged(def, stats->visit_count[i]) &&
+           stats->use_accum[i] < def->min_use * stats->visit_count[i];
 }
 
-static gbt_status check_arguments(const anchors *a, const adjust_stats *stats, const adjust_def *def, gbt_error *err)
+static gbt_status check_arguments(const anchors *a, const adjust_stats *stats, const adjust_def *def,
+                                  gbt_error *err)
 {
     if (stats->count != a->count || (a->count > 0 && stats->offset_count != a->offset_count))
-        return base_fail(err, GBT_ERR_ARGUMENT, "adjust: statistics of %zu anchors with %d offsets (wanted %zu, %d)", stats->count,
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "adjust: statistics of %zu anchors with %d offsets (wanted %zu, %d)", stats->count,
                          stats->offset_count, a->count, a->offset_count);
     if (a->count > UINT32_MAX / ANCHOR_MAX_OFFSETS)
         return base_fail(err, GBT_ERR_NO_MEMORY, "adjust: %zu anchors (wanted at most %u)", a->count,
                          (unsigned)(UINT32_MAX / ANCHOR_MAX_OFFSETS));
-    if (def->level_count < 0 || def->level_count > ADJUST_MAX_LEVELS || def->init_factor < 1 || def->hierarchy_factor < 1)
-        return base_fail(err, GBT_ERR_ARGUMENT, "adjust: %d levels, factors %d and %d (wanted 0 to %d, and both at least 1)",
+    if (def->level_count < 0 || def->level_count > ADJUST_MAX_LEVELS || def->init_factor < 1 ||
+        def->hierarchy_factor < 1)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "adjust: %d levels, factors %d and %d (wanted 0 to %d, and both at least 1)",
                          def->level_count, def->init_factor, def->hierarchy_factor, ADJUST_MAX_LEVELS);
     for (size_t p = 0; p < def->place_count; p++)
         if (def->place_anchor[p] >= a->count)
             return base_fail(err, GBT_ERR_ARGUMENT, "adjust: place %zu is anchor %u's (wanted below %zu)", p,
                              (unsigned)def->place_anchor[p], a->count);
-    if (!(def->grad_threshold >= 0.0f) || !(def->interval >= 0.0f) || !(def->success_threshold >= 0.0f) || isnan(def->shape_log_max))
-        return base_fail(err, GBT_ERR_ARGUMENT, "adjust: threshold %g, interval %g, success %g (wanted all >= 0)",
+    if (!(def->grad_threshold >= 0.0f) || !(def->interval >= 0.0f) || !(def->success_threshold >= 0.0f) ||
+        isnan(def->shape_log_max))
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "adjust: threshold %g, interval %g, success %g (wanted all >= 0)",
                          (double)def->grad_threshold, (double)def->interval, (double)def->success_threshold);
     return GBT_OK;
 }
@@ -90,7 +113,8 @@ static size_t compact(anchors *a, adjust_stats *s, const adjust_def *def, const 
             continue;
         source[to] = (int64_t)i;
         memmove(a->position + to * 3, a->position + i * 3, 3 * sizeof(float));
-        memmove(a->feature + to * ANCHOR_FEATURE_DIM, a->feature + i * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof(float));
+        memmove(a->feature + to * ANCHOR_FEATURE_DIM, a->feature + i * ANCHOR_FEATURE_DIM,
+                ANCHOR_FEATURE_DIM * sizeof(float));
         memmove(a->offset + to * offsets * 3, a->offset + i * offsets * 3, offsets * 3 * sizeof(float));
         memmove(a->scale_log + to * 6, a->scale_log + i * 6, 6 * sizeof(float));
         const bool used = def->prune && judged(def, s->visit_count[i]);
@@ -107,14 +131,16 @@ static size_t compact(anchors *a, adjust_stats *s, const adjust_def *def, const 
 }
 
 /* Marks what goes by the rule; returns how many stay. */
-static size_t judge(const anchors *a, const adjust_stats *stats, const adjust_def *def, bool *pruned, size_t *most_opaque)
+static size_t judge(const anchors *a, const adjust_stats *stats, const adjust_def *def, bool *pruned,
+                    size_t *most_opaque)
 {
     size_t survivors = 0;
     *most_opaque = 0;
     for (size_t i = 0; i < a->count; i++) {
         pruned[i] = is_pruned(stats, def, i);
         survivors += !pruned[i];
-        if (stats->use_accum[i] * stats->visit_count[*most_opaque] > stats->use_accum[*most_opaque] * stats->visit_count[i])
+        if (stats->use_accum[i] * stats->visit_count[*most_opaque] >
+            stats->use_accum[*most_opaque] * stats->visit_count[i])
             *most_opaque = i;
     }
     return survivors;
@@ -128,15 +154,16 @@ static void append(anchors *a, const new_anchors *n, size_t first, int64_t *sour
         const size_t row = first + i;
         source[row] = -1;
         memcpy(a->position + row * 3, f->position, sizeof f->position);
-        memcpy(a->feature + row * ANCHOR_FEATURE_DIM, n->feature + f->feature * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof(float));
+        memcpy(a->feature + row * ANCHOR_FEATURE_DIM, n->feature + f->feature * ANCHOR_FEATURE_DIM,
+               ANCHOR_FEATURE_DIM * sizeof(float));
         for (size_t c = 0; c < 6; c++)
             a->scale_log[row * 6 + c] = (float)log((double)f->scale);
     }
 }
 
 /* With what was decided: the room is made first, then nothing can fail. */
-static gbt_status apply(anchors *a, adjust_stats *stats, const adjust_def *def, const new_anchors *n, const bool *pruned, size_t survivors,
-                        adjust_result *out, gbt_error *err)
+static gbt_status apply(anchors *a, adjust_stats *stats, const adjust_def *def, const new_anchors *n,
+                        const bool *pruned, size_t survivors, adjust_result *out, gbt_error *err)
 {
     const size_t before = a->count, after = survivors + n->count, widest = after > before ? after : before;
     int64_t *source = mem_alloc(after, sizeof *source, "adjust", err);
@@ -159,7 +186,8 @@ static gbt_status apply(anchors *a, adjust_stats *stats, const adjust_def *def, 
     return GBT_OK;
 }
 
-gbt_status anchors_adjust(anchors *a, adjust_stats *stats, const adjust_def *def, adjust_result *out, gbt_error *err)
+gbt_status anchors_adjust(anchors *a, adjust_stats *stats, const adjust_def *def, adjust_result *out,
+                          gbt_error *err)
 {
     memset(out, 0, sizeof *out);
     GBT_TRY(check_arguments(a, stats, def, err));
@@ -173,8 +201,10 @@ gbt_status anchors_adjust(anchors *a, adjust_stats *stats, const adjust_def *def
         /* The cap counts the room that pruning makes; it never removes an anchor by itself. */
         new_anchors_keep_largest(&added, def->max_anchors > survivors ? def->max_anchors - survivors : 0);
         const bool keep_last = survivors + added.count == 0 && a->count > 0;
-        if (keep_last)
-            pruned[most_opaque] = false, survivors = 1;
+        if (keep_last) {
+            pruned[most_opaque] = false;
+            survivors = 1;
+        }
         status = apply(a, stats, def, &added, pruned, survivors, out, err);
         out->kept_last = keep_last && status == GBT_OK;
     }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/adjust.h -- growing and pruning anchors (Scaffold-GS; docs/training.md). */
 #ifndef GBT_ANCHOR_ADJUST_H
 #define GBT_ANCHOR_ADJUST_H
@@ -10,68 +11,81 @@ enum { ADJUST_MAX_LEVELS = 8 };
 typedef struct adjust_stats {
     size_t count, capacity;
     int offset_count;
-    float *use_accum;      /* [count] sum over views of what the anchor was good for: decoded opacities, or shares of the picture (mean over
-                              rays of T alpha) */
-    float *visit_count;    /* [count] views in which the anchor was visible */
-    float *grad_accum;     /* [count][K] sum of screen-space gradient norms */
-    float *grad_count;     /* [count][K] views in which the Gaussian was geometrically visible */
+    float *use_accum; /* [count] sum over views of what the anchor was good for: decoded opacities, or shares
+                         of the picture (mean over rays of T alpha) */
+    float *visit_count; /* [count] views in which the anchor was visible */
+    float *grad_accum;  /* [count][K] sum of screen-space gradient norms */
+    float *grad_count;  /* [count][K] views in which the Gaussian was geometrically visible */
 } adjust_stats;
 
-/** Keeps the first min(old, new) rows; new rows are zero. offset_count is fixed while there are rows. On failure nothing changes. */
+/** Keeps the first min(old, new) rows; new rows are zero. offset_count is fixed while there are rows. On
+    failure nothing changes. */
 gbt_status adjust_stats_resize(adjust_stats *s, size_t count, int offset_count, gbt_error *err);
 void adjust_stats_free(adjust_stats *s);
 
 typedef struct adjust_def {
-    float voxel_size;          /* v: cells are v * init_factor / hierarchy^level (an integer division in compat mode: 4 / 16 is 0) */
-    int level_count;           /* [0, ADJUST_MAX_LEVELS], default 3 */
-    int init_factor;           /* default 16 */
-    int hierarchy_factor;      /* default 4 */
-    float grad_threshold;      /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */
-    float min_use;             /* anchors with less in the mean over their views are pruned, in units of use_accum. Default 0.005, an
-                                  opacity */
-    float interval;            /* I: steps between adjusts, default 100 */
-    float success_threshold;   /* default 0.8: a Gaussian counts when grad_count > interval * success * 0.5; an anchor is judged when
-                                  visit_count > interval * success. What was judged starts again from 0 */
-    float shape_log_max;       /* scale_log[3..5] are clamped to this at every adjust: 0.05 in compat mode, infinity else */
-    size_t max_anchors;        /* hard cap on the rows after the adjust; pruning makes room first, the cap prunes nothing. When it bites,
-                                  the cells with the largest gradient of all levels win, ties by level, then cell. Default SIZE_MAX */
-    bool compat;               /* every quirk of the reference: a coarse level that adds nothing gates the finer ones; integer cells */
-    uint64_t seed;             /* of the random candidate drop (in both modes): level j keeps 1 - 0.5^(j+1) of the candidates */
+    float voxel_size; /* v: cells are v * init_factor / hierarchy^level (an integer division in compat mode: 4
+                         / 16 is 0) */
+    int level_count;  /* [0, ADJUST_MAX_LEVELS], default 3 */
+    int init_factor;  /* default 16 */
+    int hierarchy_factor; /* default 4 */
+    float grad_threshold; /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */
+    float min_use;        /* anchors with less in the mean over their views are pruned, in units of use_accum.
+                             Default 0.005, an opacity */
+    float interval;       /* I: steps between adjusts, default 100 */
+    float success_threshold; /* default 0.8: a Gaussian counts when grad_count > interval * success * 0.5; an
+                                anchor is judged when visit_count > interval * success. What was judged starts
+                                again from 0 */
+    float shape_log_max; /* scale_log[3..5] are clamped to this at every adjust: 0.05 in compat mode, infinity
+                            else */
+    size_t max_anchors;  /* hard cap on the rows after the adjust; pruning makes room first, the cap prunes
+                            nothing. When it bites, the cells with the largest gradient of all levels win,
+                            ties by level, then cell. Default SIZE_MAX */
+    bool compat;   /* every quirk of the reference: a coarse level that adds nothing gates the finer ones;
+                      integer cells */
+    uint64_t seed; /* of the random candidate drop (in both modes): level j keeps 1 - 0.5^(j+1) of the
+                      candidates */
     uint64_t step;
-    bool grow, prune;          /* both true by default */
-    bool (*may_stand)(const void *context, const float position[3]); /* where Gaussians may have an anchor; NULL, the default: anywhere */
-    const void *may_stand_context; /* borrowed */
-    size_t place_count;        /* places where surface is known to be, besides where Gaussians are; default 0 */
-    const float *place;        /* [place_count][3], finite; borrowed, as the next two */
-    const float *place_scale;  /* [place_count] > 0: first scale of an anchor there; or NULL */
-    const uint32_t *place_anchor; /* [place_count]: row of the anchor that speaks for the place, the nearest */
+    bool grow, prune;                                                /* both true by default */
+    bool (*may_stand)(const void *context, const float position[3]); /* where Gaussians may have an anchor;
+                                                                        NULL, the default: anywhere */
+    const void *may_stand_context;                                   /* borrowed */
+    size_t place_count; /* places where surface is known to be, besides where Gaussians are; default 0 */
+    const float *place; /* [place_count][3], finite; borrowed, as the next two */
+    const float *place_scale;     /* [place_count] > 0: first scale of an anchor there; or NULL */
+    const uint32_t *place_anchor; /* [place_count]: row of the anchor that speaks for the place, the nearest
+                                   */
 } adjust_def;
 adjust_def adjust_def_default(void);
 
 /** What happened, and where every surviving or new row came from. */
 typedef struct adjust_result {
     size_t grown, pruned;
-    bool kept_last;        /* all would have gone: the most opaque was kept against the rule */
-    size_t count;          /* rows after */
-    int64_t *source;       /* [count]: row before, or -1 for a new anchor (its Adam moments start at 0); owned, mem_free() */
+    bool kept_last;  /* all would have gone: the most opaque was kept against the rule */
+    size_t count;    /* rows after */
+    int64_t *source; /* [count]: row before, or -1 for a new anchor (its Adam moments start at 0); owned,
+                        mem_free() */
 } adjust_result;
 
 /**
  * Grow, then prune, as Scaffold-GS does; anchors and statistics are changed in place.
  *
- * Candidates are the means of Gaussians; then, in cells finer by one more level, the known places, each with the largest gradient of its
- * anchor's Gaussians. Places with a scale are asked for as at the first level, however few views saw those Gaussians; without, as Gaussians
- * at the last level, and are as large. New anchor: position = the cell's candidate with the largest gradient, the first of equals; in
- * compat mode the cell's centre, and no places. Log-scales log(cell), at places log(place_scale), offsets 0, feature = elementwise maximum
- * over the parents of the cell's candidates. Where one may not stand none is made, unless that is a place. Cells use 64-bit keys; a level
- * whose cell is not > 0 is skipped. Never prunes the last anchor (the most opaque stays). Survivors keep their order; new anchors follow by
- * level, then cell (x, y, z).
+ * Candidates are the means of Gaussians; then, in cells finer by one more level, the known places, each with
+ * the largest gradient of its anchor's Gaussians. Places with a scale are asked for as at the first level,
+ * however few views saw those Gaussians; without, as Gaussians at the last level, and are as large. New
+ * anchor: position = the cell's candidate with the largest gradient, the first of equals; in compat mode the
+ * cell's centre, and no places. Log-scales log(cell), at places log(place_scale), offsets 0, feature =
+ * elementwise maximum over the parents of the cell's candidates. Where one may not stand none is made, unless
+ * that is a place. Cells use 64-bit keys; a level whose cell is not > 0 is skipped. Never prunes the last
+ * anchor (the most opaque stays). Survivors keep their order; new anchors follow by level, then cell (x, y,
+ * z).
  *
  * @param stats [in, out] rows must match `a`
  * @param out   [out] zeroed on failure
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_NO_MEMORY: then anchors and statistics are as they were
  * Deterministic. Cost: O(N K) and one hash set per level.
  */
-gbt_status anchors_adjust(anchors *a, adjust_stats *stats, const adjust_def *def, adjust_result *out, gbt_error *err);
+gbt_status anchors_adjust(anchors *a, adjust_stats *stats, const adjust_def *def, adjust_result *out,
+                          gbt_error *err);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/anchors.c -- memory of anchors and decoders, and how a decoder starts. */
 #include "anchor/anchors.h"
 
@@ -14,7 +15,8 @@ enum { SCALES = 6 };
 gbt_status anchors_resize(anchors *a, size_t count, gbt_error *err)
 {
     if (a->offset_count < 1 || a->offset_count > ANCHOR_MAX_OFFSETS)
-        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: offset_count %d (wanted 1 to %d)", a->offset_count, ANCHOR_MAX_OFFSETS);
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: offset_count %d (wanted 1 to %d)", a->offset_count,
+                         ANCHOR_MAX_OFFSETS);
     const size_t widths[ROWS_FIELDS] = {3, ANCHOR_FEATURE_DIM, (size_t)a->offset_count * 3, SCALES};
     float **const fields[ROWS_FIELDS] = {&a->position, &a->feature, &a->offset, &a->scale_log};
     GBT_TRY(rows_resize(fields, widths, &a->capacity, a->count, count, "anchors", err));
@@ -31,7 +33,7 @@ void anchors_free(anchors *a)
     memset(a, 0, sizeof *a);
 }
 
-/* ---- networks ---------------------------------------------------------------------------------------------------------------- */
+/* ---- networks ---- */
 
 static const int outputs_per_offset[3] = {1, 7, 3};
 
@@ -41,16 +43,14 @@ static size_t part_size(int part, size_t offset_count, size_t input_count)
     return ANCHOR_HIDDEN_DIM * (input_count + 1) + out * (ANCHOR_HIDDEN_DIM + 1);
 }
 
-static size_t input_dim(bool has_distance)
-{
-    return ANCHOR_FEATURE_DIM + 3 + (has_distance ? 1 : 0);
-}
+static size_t input_dim(bool has_distance) { return ANCHOR_FEATURE_DIM + 3 + (has_distance ? 1 : 0); }
 
 gbt_status decoder_init(decoder *d, int offset_count, bool has_distance, uint64_t seed, gbt_error *err)
 {
     memset(d, 0, sizeof *d);
     if (offset_count < 1 || offset_count > ANCHOR_MAX_OFFSETS)
-        return base_fail(err, GBT_ERR_ARGUMENT, "decoder: offset_count %d (wanted 1 to %d)", offset_count, ANCHOR_MAX_OFFSETS);
+        return base_fail(err, GBT_ERR_ARGUMENT, "decoder: offset_count %d (wanted 1 to %d)", offset_count,
+                         ANCHOR_MAX_OFFSETS);
     const size_t in = input_dim(has_distance);
     size_t param_count = 0;
     for (int part = 0; part < 3; part++)
@@ -58,8 +58,13 @@ gbt_status decoder_init(decoder *d, int offset_count, bool has_distance, uint64_
     float *params = mem_alloc(param_count, sizeof *params, "decoder", err);
     if (params == NULL)
         return GBT_ERR_NO_MEMORY;
-    *d = (decoder){.offset_count = offset_count, .has_distance = has_distance, .distance_scale = 1.0f, .distance_min = 0.0f,
-                   .distance_max = INFINITY, .param_count = param_count, .params = params};
+    *d = (decoder){.offset_count = offset_count,
+                   .has_distance = has_distance,
+                   .distance_scale = 1.0f,
+                   .distance_min = 0.0f,
+                   .distance_max = INFINITY,
+                   .param_count = param_count,
+                   .params = params};
     decoder_part parts[3];
     decoder_parts(d, parts);
     for (int part = 0; part < 3; part++) {

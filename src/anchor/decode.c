@@ -1,9 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/decode.c -- anchors + camera centre -> Gaussians.
 
-   visible rows --> input --> hidden --> opacity --count per chunk--> prefix sum --> shape, colour of the kept --> packed arrays
+   visible rows --> input --> hidden --> opacity --count per chunk--> prefix sum
+        --> shape, colour of the kept --> packed arrays
                             (kept for the adjoint)
 
-   Two passes over the same chunks: the first decides which Gaussians exist, the second computes the rest of those straight into place. */
+   Two passes over the same chunks: the first decides which Gaussians exist, the second computes the rest of
+   those straight into place. */
 #include "anchor/decode.h"
 
 #include <math.h>
@@ -27,17 +30,12 @@ typedef struct forward_job {
     decode_tape *tape;
 } forward_job;
 
-static size_t min_size(size_t a, size_t b)
-{
-    return a < b ? a : b;
-}
+static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 
-static size_t round_up(size_t count, size_t multiple)
-{
-    return (count + multiple - 1) / multiple * multiple;
-}
+static size_t round_up(size_t count, size_t multiple) { return (count + multiple - 1) / multiple * multiple; }
 
-/* In double: exact differences for any finite input, no overflow of the squares, the same bits on every machine. */
+/* In double: exact differences for any finite input, no overflow of the squares, the same bits on every
+   machine. */
 static void view_inputs(const forward_job *job, const float *position, float out[4])
 {
     double offset[3], square = 0;
@@ -50,11 +48,14 @@ static void view_inputs(const forward_job *job, const float *position, float out
         for (int c = 0; c < 3; c++)
             out[c] = (float)(offset[c] / distance);
     } else {
-        out[0] = 0.0f, out[1] = 0.0f, out[2] = 1.0f;
+        out[0] = 0.0f;
+        out[1] = 0.0f;
+        out[2] = 1.0f;
     }
     out[3] = 0.0f;
     if (job->d->has_distance) {
-        const double low = 0.5 * (double)job->d->distance_min, high = fmin(2.0 * (double)job->d->distance_max, 1e18);
+        const double low = 0.5 * (double)job->d->distance_min,
+                     high = fmin(2.0 * (double)job->d->distance_max, 1e18);
         out[3] = (float)fmin(fmax(distance * (double)job->d->distance_scale, low), high);
     }
 }
@@ -73,12 +74,29 @@ static void decide_rows(const forward_job *job, size_t begin, size_t end)
         view_inputs(job, job->a->position + anchor * 3, row + ANCHOR_FEATURE_DIM);
         row[INPUT_ONE] = 1.0f;
     }
-    job->kernels->product(&(dense_product){.m = tiled, .n = HIDDEN_STRIDE, .k = INPUT_COUNT, .a = input, .a_row = INPUT_STRIDE, .a_step = 1,
-                                           .b = job->weights.input_hidden, .b_row = HIDDEN_STRIDE, .bias = job->weights.hidden_bias,
-                                           .relu = true, .c = hidden, .c_row = HIDDEN_STRIDE});
-    job->kernels->product(&(dense_product){.m = tiled, .n = ALPHA_STRIDE, .k = ANCHOR_HIDDEN_DIM, .a = hidden, .a_row = HIDDEN_STRIDE,
-                                           .a_step = 1, .b = job->weights.hidden_out[0], .b_row = ALPHA_STRIDE,
-                                           .bias = job->weights.out_bias[0], .c = alpha, .c_row = ALPHA_STRIDE});
+    job->kernels->product(&(dense_product){.m = tiled,
+                                           .n = HIDDEN_STRIDE,
+                                           .k = INPUT_COUNT,
+                                           .a = input,
+                                           .a_row = INPUT_STRIDE,
+                                           .a_step = 1,
+                                           .b = job->weights.input_hidden,
+                                           .b_row = HIDDEN_STRIDE,
+                                           .bias = job->weights.hidden_bias,
+                                           .relu = true,
+                                           .c = hidden,
+                                           .c_row = HIDDEN_STRIDE});
+    job->kernels->product(&(dense_product){.m = tiled,
+                                           .n = ALPHA_STRIDE,
+                                           .k = ANCHOR_HIDDEN_DIM,
+                                           .a = hidden,
+                                           .a_row = HIDDEN_STRIDE,
+                                           .a_step = 1,
+                                           .b = job->weights.hidden_out[0],
+                                           .b_row = ALPHA_STRIDE,
+                                           .bias = job->weights.out_bias[0],
+                                           .c = alpha,
+                                           .c_row = ALPHA_STRIDE});
     job->kernels->tanh(alpha, rows * ALPHA_STRIDE);
     size_t kept = 0;
     for (size_t r = 0; r < rows; r++) {
@@ -101,12 +119,13 @@ static void decide_block(size_t block, size_t begin, size_t end, void *context)
 }
 
 /* Logits of the kept Gaussians into their places in the tape, and what needs no activation into `out`. */
-static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, const float *shape, const float *color, const float *extent,
-                          uint16_t *row_of)
+static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, const float *shape,
+                          const float *color, const float *extent, uint16_t *row_of)
 {
     decode_tape *tape = job->tape;
     gaussians *out = job->out;
-    const size_t offsets = job->layout.offset_count, first = tape->first[begin / DECODE_CHUNK], stride = tape->output_stride;
+    const size_t offsets = job->layout.offset_count, first = tape->first[begin / DECODE_CHUNK],
+                 stride = tape->output_stride;
     const size_t shape_stride = job->layout.out_stride[1], color_stride = job->layout.out_stride[2];
     float *kept = tape->output;
     size_t g = first;
@@ -117,16 +136,21 @@ static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, con
         for (size_t k = 0; k < offsets; k++) {
             if (!(alpha[k] > job->opacity_min))
                 continue;
-            const float *s = shape + r * shape_stride + k * SHAPE_OUTPUTS, *c = color + r * color_stride + k * COLOR_OUTPUTS;
+            const float *s = shape + r * shape_stride + k * SHAPE_OUTPUTS,
+                        *c = color + r * color_stride + k * COLOR_OUTPUTS;
             kept[KEPT_ALPHA * stride + g] = alpha[k];
-            for (int i = 0; i < SHAPE_OUTPUTS; i++) /* KEPT_QUAT follows KEPT_SIGMOID as the network's outputs do */
+            for (int i = 0; i < SHAPE_OUTPUTS; i++) /* KEPT_QUAT follows KEPT_SIGMOID as the network's outputs
+                                                       do */
                 kept[(size_t)(KEPT_SIGMOID + i) * stride + g] = s[i];
             for (int i = 0; i < COLOR_OUTPUTS; i++)
                 kept[(size_t)(KEPT_COLOR + i) * stride + g] = c[i];
             out->opacity[g] = alpha[k];
-            out->mean_x[g] = activation_clamp(x[0] + offset[k * 3 + 0] * e[0], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
-            out->mean_y[g] = activation_clamp(x[1] + offset[k * 3 + 1] * e[1], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
-            out->mean_z[g] = activation_clamp(x[2] + offset[k * 3 + 2] * e[2], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
+            out->mean_x[g] =
+                activation_clamp(x[0] + offset[k * 3 + 0] * e[0], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
+            out->mean_y[g] =
+                activation_clamp(x[1] + offset[k * 3 + 1] * e[1], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
+            out->mean_z[g] =
+                activation_clamp(x[2] + offset[k * 3 + 2] * e[2], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
             tape->slot[g] = (uint32_t)((begin + r) * offsets + k);
             row_of[g - first] = (uint16_t)r;
             g++;
@@ -135,17 +159,16 @@ static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, con
     return g - first;
 }
 
-static float larger(float a, float b)
-{
-    return a > b ? a : b;
-}
+static float larger(float a, float b) { return a > b ? a : b; }
 
 static void hold_ratio(float *const scale[3], size_t count)
 {
     float *restrict x = scale[0], *restrict y = scale[1], *restrict z = scale[2];
     for (size_t i = 0; i < count; i++) {
         const float least = DECODE_SCALE_RATIO * larger(x[i], larger(y[i], z[i]));
-        x[i] = larger(x[i], least), y[i] = larger(y[i], least), z[i] = larger(z[i], least);
+        x[i] = larger(x[i], least);
+        y[i] = larger(y[i], least);
+        z[i] = larger(z[i], least);
     }
 }
 
@@ -153,15 +176,24 @@ static void emit_rows(const forward_job *job, size_t begin, size_t end)
 {
     decode_tape *tape = job->tape;
     const size_t rows = end - begin, tiled = round_up(rows, DECODE_TILE);
-    _Alignas(64) float shape[DECODE_CHUNK * SHAPE_STRIDE_MAX], color[DECODE_CHUNK * COLOR_STRIDE_MAX], extent[DECODE_CHUNK * 6];
+    _Alignas(64) float shape[DECODE_CHUNK * SHAPE_STRIDE_MAX], color[DECODE_CHUNK * COLOR_STRIDE_MAX],
+        extent[DECODE_CHUNK * 6];
     uint16_t row_of[CHUNK_SLOTS];
     float *const logits[2] = {shape, color};
     for (int head = 1; head <= 2; head++) {
         const size_t stride = job->layout.out_stride[head];
-        job->kernels->product(&(dense_product){.m = tiled, .n = stride, .k = ANCHOR_HIDDEN_DIM,
-                                               .a = tape->hidden + begin * HIDDEN_STRIDE + head * ANCHOR_HIDDEN_DIM, .a_row = HIDDEN_STRIDE,
-                                               .a_step = 1, .b = job->weights.hidden_out[head], .b_row = stride,
-                                               .bias = job->weights.out_bias[head], .c = logits[head - 1], .c_row = stride});
+        job->kernels->product(
+            &(dense_product){.m = tiled,
+                             .n = stride,
+                             .k = ANCHOR_HIDDEN_DIM,
+                             .a = tape->hidden + begin * HIDDEN_STRIDE + head * ANCHOR_HIDDEN_DIM,
+                             .a_row = HIDDEN_STRIDE,
+                             .a_step = 1,
+                             .b = job->weights.hidden_out[head],
+                             .b_row = stride,
+                             .bias = job->weights.out_bias[head],
+                             .c = logits[head - 1],
+                             .c_row = stride});
     }
     for (size_t r = 0; r < rows; r++)
         memcpy(extent + r * 6, job->a->scale_log + (size_t)tape->visible[begin + r] * 6, 6 * sizeof *extent);
@@ -174,8 +206,9 @@ static void emit_rows(const forward_job *job, size_t begin, size_t end)
         job->kernels->sigmoid(kept + (size_t)(KEPT_SIGMOID + i) * stride, n);
         job->kernels->sigmoid(kept + (size_t)(KEPT_COLOR + i) * stride, n);
     }
-    job->kernels->normalize(kept + (KEPT_QUAT + 0) * stride, kept + (KEPT_QUAT + 1) * stride, kept + (KEPT_QUAT + 2) * stride,
-                            kept + (KEPT_QUAT + 3) * stride, kept + KEPT_INVERSE_LENGTH * stride, n);
+    job->kernels->normalize(kept + (KEPT_QUAT + 0) * stride, kept + (KEPT_QUAT + 1) * stride,
+                            kept + (KEPT_QUAT + 2) * stride, kept + (KEPT_QUAT + 3) * stride,
+                            kept + KEPT_INVERSE_LENGTH * stride, n);
 
     gaussians *out = job->out;
     float *const scale[3] = {out->scale_x + first, out->scale_y + first, out->scale_z + first};
@@ -183,8 +216,10 @@ static void emit_rows(const forward_job *job, size_t begin, size_t end)
         for (int c = 0; c < 3; c++)
             scale[c][i] = extent[row_of[i] * 6 + 3 + c] * kept[(size_t)(KEPT_SIGMOID + c) * stride + i];
     hold_ratio(scale, n);
-    float *const copied[7] = {out->quat_w, out->quat_x, out->quat_y, out->quat_z, out->red, out->green, out->blue};
-    const int field[7] = {KEPT_QUAT, KEPT_QUAT + 1, KEPT_QUAT + 2, KEPT_QUAT + 3, KEPT_COLOR, KEPT_COLOR + 1, KEPT_COLOR + 2};
+    float *const copied[7] = {out->quat_w, out->quat_x, out->quat_y, out->quat_z,
+                              out->red,    out->green,  out->blue};
+    const int field[7] = {KEPT_QUAT,  KEPT_QUAT + 1,  KEPT_QUAT + 2, KEPT_QUAT + 3,
+                          KEPT_COLOR, KEPT_COLOR + 1, KEPT_COLOR + 2};
     for (int i = 0; i < 7; i++)
         memcpy(copied[i] + first, kept + (size_t)field[i] * stride, n * sizeof(float));
 }
@@ -200,15 +235,18 @@ static gbt_status reserve_rows(decode_tape *tape, size_t visible_count, gbt_erro
 {
     const size_t rows = round_up(visible_count, DECODE_TILE);
     void *first = tape->first;
-    gbt_status status = mem_reserve(&first, &tape->first_capacity, 0, parallel_block_count(visible_count, DECODE_CHUNK) + 1,
-                                    sizeof(size_t), "decode tape", err);
+    gbt_status status =
+        mem_reserve(&first, &tape->first_capacity, 0, parallel_block_count(visible_count, DECODE_CHUNK) + 1,
+                    sizeof(size_t), "decode tape", err);
     if (status != GBT_OK)
         return status;
     tape->first = first;
     if (rows <= tape->capacity && tape->input != NULL)
         return GBT_OK;
-    const size_t capacity = round_up(rows + rows / 4, DECODE_TILE), width = INPUT_STRIDE + HIDDEN_STRIDE + ALPHA_STRIDE + 1;
-    float *block = mem_alloc(capacity, width * sizeof *block, "decode tape", err); /* one owner (input), four arrays */
+    const size_t capacity = round_up(rows + rows / 4, DECODE_TILE),
+                 width = INPUT_STRIDE + HIDDEN_STRIDE + ALPHA_STRIDE + 1;
+    float *block =
+        mem_alloc(capacity, width * sizeof *block, "decode tape", err); /* one owner (input), four arrays */
     if (block == NULL)
         return GBT_ERR_NO_MEMORY;
     mem_free(tape->input);
@@ -234,32 +272,46 @@ static gbt_status reserve_kept(decode_tape *tape, size_t count, gbt_error *err)
     }
     mem_free(tape->slot);
     mem_free(tape->output);
-    tape->slot = slot, tape->output = output;
+    tape->slot = slot;
+    tape->output = output;
     tape->slot_capacity = tape->output_stride = capacity;
     return GBT_OK;
 }
 
-static gbt_status check_arguments(const anchors *a, const decoder *d, const uint32_t *visible, size_t visible_count, gbt_error *err)
+static gbt_status check_arguments(const anchors *a, const decoder *d, const uint32_t *visible,
+                                  size_t visible_count, gbt_error *err)
 {
     if (d->offset_count < 1 || d->offset_count > ANCHOR_MAX_OFFSETS || a->offset_count != d->offset_count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "decode: anchors have %d offsets, the decoder %d (wanted equal, 1 to %d)", a->offset_count,
-                         d->offset_count, ANCHOR_MAX_OFFSETS);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "decode: anchors have %d offsets, the decoder %d (wanted equal, 1 to %d)",
+                         a->offset_count, d->offset_count, ANCHOR_MAX_OFFSETS);
     if (visible_count > UINT32_MAX / ANCHOR_MAX_OFFSETS)
-        return base_fail(err, GBT_ERR_ARGUMENT, "decode: %zu visible anchors (wanted at most %u)", visible_count,
-                         (unsigned)(UINT32_MAX / ANCHOR_MAX_OFFSETS));
+        return base_fail(err, GBT_ERR_ARGUMENT, "decode: %zu visible anchors (wanted at most %u)",
+                         visible_count, (unsigned)(UINT32_MAX / ANCHOR_MAX_OFFSETS));
     for (size_t i = 0; i < visible_count; i++)
         if (visible[i] >= a->count || (i > 0 && visible[i] <= visible[i - 1]))
-            return base_fail(err, GBT_ERR_ARGUMENT, "decode: visible[%zu] is %u (wanted ascending, below %zu)", i, visible[i], a->count);
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "decode: visible[%zu] is %u (wanted ascending, below %zu)", i, visible[i],
+                             a->count);
     return GBT_OK;
 }
 
-gbt_status decode_forward(const anchors *a, const decoder *d, const float camera_center[3], const uint32_t *visible, size_t visible_count,
-                          float opacity_min, gaussians *out, decode_tape *tape, gbt_error *err)
+gbt_status decode_forward(const anchors *a, const decoder *d, const float camera_center[3],
+                          const uint32_t *visible, size_t visible_count, float opacity_min, gaussians *out,
+                          decode_tape *tape, gbt_error *err)
 {
-    tape->visible_count = 0, tape->kept_count = 0;
+    tape->visible_count = 0;
+    tape->kept_count = 0;
     GBT_TRY(check_arguments(a, d, visible, visible_count, err));
-    forward_job job = {.a = a, .d = d, .kernels = dense_best(), .layout = decode_layout_of(d), .opacity_min = opacity_min, .out = out,
-                       .tape = tape, .camera = {(double)camera_center[0], (double)camera_center[1], (double)camera_center[2]}};
+    forward_job job = {
+        .a = a,
+        .d = d,
+        .kernels = dense_best(),
+        .layout = decode_layout_of(d),
+        .opacity_min = opacity_min,
+        .out = out,
+        .tape = tape,
+        .camera = {(double)camera_center[0], (double)camera_center[1], (double)camera_center[2]}};
     GBT_TRY(decode_pack_weights(d, &job.layout, tape, &job.weights, err));
     GBT_TRY(reserve_rows(tape, visible_count, err));
     tape->visible = visible;
@@ -277,7 +329,8 @@ gbt_status decode_forward(const anchors *a, const decoder *d, const float camera
     GBT_TRY(gaussians_resize(out, kept, err));
     parallel_blocks(visible_count, DECODE_GRAIN, emit_block, &job);
     gaussians_pad(out);
-    tape->visible_count = visible_count, tape->kept_count = kept;
+    tape->visible_count = visible_count;
+    tape->kept_count = kept;
     return GBT_OK;
 }
 

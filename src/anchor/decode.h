@@ -1,78 +1,91 @@
-/* anchor/decode.h -- anchors + camera centre -> Gaussians, and back (Scaffold-GS eqs 13-15; docs/training.md). */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/decode.h -- anchors + camera centre -> Gaussians, and back (Scaffold-GS eqs 13-15;
+   docs/training.md). */
 #ifndef GBT_ANCHOR_DECODE_H
 #define GBT_ANCHOR_DECODE_H
 
 #include "anchor/anchors.h"
 #include "base/gaussians.h"
 
-/** What a forward decode keeps for its adjoint, and scratch. Start from {0}; reused from view to view; free with decode_tape_free(). */
+/** What a forward decode keeps for its adjoint, and scratch. Start from {0}; reused from view to view; free
+    with decode_tape_free(). */
 typedef struct decode_tape {
     size_t visible_count, capacity;
-    const uint32_t *visible;  /* borrowed from decode_forward() until decode_backward() returns */
-    float *input;             /* internal, kept for the adjoint: network inputs, hidden layers, opacities (one row per visible anchor) */
+    const uint32_t *visible; /* borrowed from decode_forward() until decode_backward() returns */
+    float *input; /* internal, kept for the adjoint: network inputs, hidden layers, opacities (one row per
+                     visible anchor) */
     float *hidden;
     float *alpha;
-    float *output;            /* internal: activations of the kept Gaussians, one array per field of `output_stride` floats */
+    float *output; /* internal: activations of the kept Gaussians, one array per field of `output_stride`
+                      floats */
     size_t output_stride;
     size_t kept_count;
-    size_t *first;            /* internal: first kept Gaussian of each chunk of rows */
+    size_t *first; /* internal: first kept Gaussian of each chunk of rows */
     size_t first_capacity;
-    float *weights;           /* internal: the networks as the kernels read them */
+    float *weights; /* internal: the networks as the kernels read them */
     size_t weight_capacity;
-    size_t block_capacity;    /* floats */
-    float *block_grad;        /* internal: one decoder gradient per block, summed in block order */
-    uint32_t *slot;           /* [gaussian count]: visible row * K + offset, ascending: which slot each Gaussian came from */
+    size_t block_capacity; /* floats */
+    float *block_grad;     /* internal: one decoder gradient per block, summed in block order */
+    uint32_t *slot; /* [gaussian count]: visible row * K + offset, ascending: which slot each Gaussian came
+                       from */
     size_t slot_capacity;
-    float *opacity_sum;       /* [visible_count]: sum over offsets of max(alpha, 0), for pruning (sec. 5.1) */
+    float *opacity_sum; /* [visible_count]: sum over offsets of max(alpha, 0), for pruning (sec. 5.1) */
 } decode_tape;
 
 /**
  * Decode the visible anchors for one camera centre.
  *
- * Input of the networks: feature, unit direction from the camera to the anchor ((0, 0, 1) for a camera on the anchor), distance if the
- * decoder has it. Gaussian k of anchor i: opacity = alpha = tanh(.), mean = x + offset exp(l[0..2]), scale = exp(l[3..5]) sigmoid(c[0..2]),
- * quaternion = c[3..6] normalised, colour = sigmoid(.). Log-scales and logits are cut to [-30, 30], where their gradient ends too. A
- * scale below 1e-4 of the Gaussian's largest is raised to that: its gradient is then the largest one's.
- * It is kept iff its alpha > `opacity_min` (0 = the reference's rule); kept ones are packed in (visible row, offset) order.
+ * Input of the networks: feature, unit direction from the camera to the anchor ((0, 0, 1) for a camera on the
+ * anchor), distance if the decoder has it. Gaussian k of anchor i: opacity = alpha = tanh(.), mean = x +
+ * offset exp(l[0..2]), scale = exp(l[3..5]) sigmoid(c[0..2]), quaternion = c[3..6] normalised, colour =
+ * sigmoid(.). Log-scales and logits are cut to [-30, 30], where their gradient ends too. A scale below 1e-4
+ * of the Gaussian's largest is raised to that: its gradient is then the largest one's. It is kept iff its
+ * alpha > `opacity_min` (0 = the reference's rule); kept ones are packed in (visible row, offset) order.
  *
  * @param visible [in] [visible_count] anchor indices, ascending; borrowed until decode_backward()
  * @param out     [out] resized and padded; out->count kept Gaussians; all finite for finite parameters
- * @return GBT_OK, GBT_ERR_ARGUMENT (K of anchors and decoder differ, `visible` not ascending or out of range), GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (K of anchors and decoder differ, `visible` not ascending or out of
+ *         range), GBT_ERR_NO_MEMORY
  * Threads: same bits for every thread count. Cost: 6880 multiply-adds per visible anchor (K = 10).
  */
-gbt_status decode_forward(const anchors *a, const decoder *d, const float camera_center[3], const uint32_t *visible, size_t visible_count,
-                          float opacity_min, gaussians *out, decode_tape *tape, gbt_error *err);
+gbt_status decode_forward(const anchors *a, const decoder *d, const float camera_center[3],
+                          const uint32_t *visible, size_t visible_count, float opacity_min, gaussians *out,
+                          decode_tape *tape, gbt_error *err);
 
 /**
  * Adjoint of the last decode_forward() on `tape`: adds dL/dparameter.
  *
- * @param d_gaussians [in]  gradients in the order of the forward's `out`; quat_* is dL/d(unit quaternion), any component along q is ignored
+ * @param d_gaussians [in]  gradients in the order of the forward's `out`; quat_* is dL/d(unit quaternion),
+ *                          any component along q is ignored
  * @param d_anchors   [out] same shape as `a` (position unused); added to, rows of `visible` only
  * @param d_params    [out] [d->param_count], added to
- * @return GBT_OK, GBT_ERR_ARGUMENT (shapes differ from the forward's), GBT_ERR_NO_MEMORY: then nothing was added
+ * @return GBT_OK, GBT_ERR_ARGUMENT (shapes differ from the forward's), GBT_ERR_NO_MEMORY: then nothing was
+ *         added
  * Threads: same bits for every thread count (per-block sums in block order).
  */
-gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape, const gaussians *d_gaussians, anchors *d_anchors,
-                           float *d_params, gbt_error *err);
+gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape,
+                           const gaussians *d_gaussians, anchors *d_anchors, float *d_params, gbt_error *err);
 
 /**
- * The camera's part of the adjoint: dL/d(camera_center), for Gaussians that stay where they are. Their shapes, opacities and colours follow
- * the direction u = (x - c) / r and the distance r of each anchor x: du/dc = -(1 - u u^T) / r, dr/dc = -u; nothing follows a distance that
- * was cut.
+ * The camera's part of the adjoint: dL/d(camera_center), for Gaussians that stay where they are. Their
+ * shapes, opacities and colours follow the direction u = (x - c) / r and the distance r of each anchor x:
+ * du/dc = -(1 - u u^T) / r, dr/dc = -u; nothing follows a distance that was cut.
  *
  * @param camera_center [in]  of the last decode_forward() on `tape`
  * @param d_camera      [out] overwritten
  * @return GBT_OK, GBT_ERR_ARGUMENT (shapes differ from the forward's), GBT_ERR_NO_MEMORY
  * Threads: same bits for every thread count. Cost: about half of decode_backward().
  */
-gbt_status decode_backward_camera(const anchors *a, const decoder *d, const float camera_center[3], decode_tape *tape,
-                                  const gaussians *d_gaussians, double d_camera[3], gbt_error *err);
+gbt_status decode_backward_camera(const anchors *a, const decoder *d, const float camera_center[3],
+                                  decode_tape *tape, const gaussians *d_gaussians, double d_camera[3],
+                                  gbt_error *err);
 
 /**
- * Shift output biases of the opacity network: each offset whose mean opacity over the anchors of the last decode_forward() is below
- * `least` comes to a mean of about `opacity`; the others stay.
+ * Shift output biases of the opacity network: each offset whose mean opacity over the anchors of the last
+ * decode_forward() is below `least` comes to a mean of about `opacity`; the others stay.
  *
- * A Gaussian below opacity 0 is not made and has no gradient: when all have fallen there, nothing else brings them back.
+ * A Gaussian below opacity 0 is not made and has no gradient: when all have fallen there, nothing else brings
+ * them back.
  * @param opacity [in] (-1, 1)
  */
 void decode_raise_opacity(const decode_tape *tape, float least, float opacity, decoder *d);

@@ -1,7 +1,9 @@
-/* anchor/decode_backward.c -- dL/dGaussians -> dL/danchors and dL/dnetworks, or dL/dcamera: the adjoint of decode.c, over the same chunks.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/decode_backward.c -- dL/dGaussians -> dL/danchors and dL/dnetworks, or dL/dcamera: the adjoint of
+   decode.c, over the same chunks.
 
-   Rows of the anchors' gradient belong to one chunk each. The networks' gradient, or the camera's, is one record per block, added in block
-   order. */
+   Rows of the anchors' gradient belong to one chunk each. The networks' gradient, or the camera's, is one
+   record per block, added in block order. */
 #include "anchor/decode.h"
 
 #include <math.h>
@@ -29,9 +31,9 @@ typedef struct backward_job {
     const gaussians *d_gaussians;
     anchors *d_anchors; /* with d_params; NULL: the camera's gradient alone is wanted */
     float *d_params;
-    const decoder *d;           /* for the camera's gradient: */
+    const decoder *d; /* for the camera's gradient: */
     double camera[3];
-    double *d_camera;           /* [block_count][3] */
+    double *d_camera; /* [block_count][3] */
     size_t block_count;
     size_t out_first[HEAD_COUNT], out_stride; /* columns of one row of logit gradients */
 } backward_job;
@@ -50,7 +52,8 @@ static record_layout record_layout_of(const decode_layout *layout)
     return record;
 }
 
-/* A scale that was raised to DECODE_SCALE_RATIO of the largest moves with that one alone. `scale` is before the raising. */
+/* A scale that was raised to DECODE_SCALE_RATIO of the largest moves with that one alone. `scale` is before
+   the raising. */
 static void pass_held_scales(const float scale[3], float d_scale[3])
 {
     const int large = scale[1] > scale[0] ? (scale[2] > scale[1] ? 2 : 1) : scale[2] > scale[0] ? 2 : 0;
@@ -61,12 +64,15 @@ static void pass_held_scales(const float scale[3], float d_scale[3])
         }
 }
 
-/* Through the activations: logit gradients into `d_out`, offsets and log-scales straight into the anchors' gradient. */
-static void activations_backward(const backward_job *job, size_t begin, size_t rows, const float *extent, float *d_out)
+/* Through the activations: logit gradients into `d_out`, offsets and log-scales straight into the anchors'
+   gradient. */
+static void activations_backward(const backward_job *job, size_t begin, size_t rows, const float *extent,
+                                 float *d_out)
 {
     const decode_tape *tape = job->tape;
     const gaussians *d = job->d_gaussians;
-    const size_t offsets = job->layout.offset_count, stride = tape->output_stride, chunk = begin / DECODE_CHUNK;
+    const size_t offsets = job->layout.offset_count, stride = tape->output_stride,
+                 chunk = begin / DECODE_CHUNK;
     const float *kept = tape->output;
     size_t g = tape->first[chunk];
     const size_t last = tape->first[chunk + 1];
@@ -86,7 +92,8 @@ static void activations_backward(const backward_job *job, size_t begin, size_t r
             float d_scale[3] = {d->scale_x[g], d->scale_y[g], d->scale_z[g]}, scale[3];
             const float d_color[3] = {d->red[g], d->green[g], d->blue[g]};
             const float d_quat[4] = {d->quat_w[g], d->quat_x[g], d->quat_y[g], d->quat_z[g]};
-            float *d_shape = row + job->out_first[1] + k * SHAPE_OUTPUTS, *d_logit = row + job->out_first[2] + k * COLOR_OUTPUTS;
+            float *d_shape = row + job->out_first[1] + k * SHAPE_OUTPUTS,
+                  *d_logit = row + job->out_first[2] + k * COLOR_OUTPUTS;
             for (int c = 0; c < 3; c++) {
                 const float shift = offset[k * 3 + (size_t)c] * e[c];
                 if (fabsf(x[c] + shift) < DECODE_MEAN_LIMIT) {
@@ -123,19 +130,28 @@ static void activations_backward(const backward_job *job, size_t begin, size_t r
 }
 
 /* Logit gradients back through the second layer and the ReLU. */
-static void hidden_backward(const backward_job *job, size_t begin, size_t tiled, const float *d_out, float *d_hidden)
+static void hidden_backward(const backward_job *job, size_t begin, size_t tiled, const float *d_out,
+                            float *d_hidden)
 {
     const float *hidden = job->tape->hidden + begin * HIDDEN_STRIDE;
     for (int head = 0; head < HEAD_COUNT; head++)
-        job->kernels->product(&(dense_product){.m = tiled, .n = ANCHOR_HIDDEN_DIM, .k = job->layout.out_count[head],
-                                               .a = d_out + job->out_first[head], .a_row = job->out_stride, .a_step = 1,
-                                               .b = job->weights.out_hidden[head], .b_row = ANCHOR_HIDDEN_DIM, .bias = zeros,
-                                               .c = d_hidden + head * ANCHOR_HIDDEN_DIM, .c_row = HIDDEN_STRIDE});
+        job->kernels->product(&(dense_product){.m = tiled,
+                                               .n = ANCHOR_HIDDEN_DIM,
+                                               .k = job->layout.out_count[head],
+                                               .a = d_out + job->out_first[head],
+                                               .a_row = job->out_stride,
+                                               .a_step = 1,
+                                               .b = job->weights.out_hidden[head],
+                                               .b_row = ANCHOR_HIDDEN_DIM,
+                                               .bias = zeros,
+                                               .c = d_hidden + head * ANCHOR_HIDDEN_DIM,
+                                               .c_row = HIDDEN_STRIDE});
     for (size_t i = 0; i < tiled * HIDDEN_STRIDE; i++)
         d_hidden[i] = hidden[i] > 0.0f ? d_hidden[i] : 0.0f;
 }
 
-/* dL/dcamera of one row from the gradient of its direction and distance: moving the camera is moving every anchor the other way. */
+/* dL/dcamera of one row from the gradient of its direction and distance: moving the camera is moving every
+   anchor the other way. */
 static void view_backward(const backward_job *job, size_t row, const float *d_hidden, double d_camera[3])
 {
     double d_input[4] = {0}, offset[3], square = 0, along = 0;
@@ -161,28 +177,53 @@ static void view_backward(const backward_job *job, size_t row, const float *d_hi
 }
 
 /* Logit gradients back through the two layers of the three networks. */
-static void layers_backward(const backward_job *job, size_t begin, size_t rows, const float *d_out, float *record)
+static void layers_backward(const backward_job *job, size_t begin, size_t rows, const float *d_out,
+                            float *record)
 {
     const dense_kernels *kernels = job->kernels;
     const size_t tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
-    const float *hidden = job->tape->hidden + begin * HIDDEN_STRIDE, *input = job->tape->input + begin * INPUT_STRIDE;
+    const float *hidden = job->tape->hidden + begin * HIDDEN_STRIDE,
+                *input = job->tape->input + begin * INPUT_STRIDE;
     _Alignas(64) float d_hidden[DECODE_CHUNK * HIDDEN_STRIDE], d_feature[DECODE_CHUNK * ANCHOR_FEATURE_DIM];
     hidden_backward(job, begin, tiled, d_out, d_hidden);
     for (int head = 0; head < HEAD_COUNT; head++) {
         const float *d_logit = d_out + job->out_first[head];
-        kernels->product(&(dense_product){.m = job->layout.out_count[head], .n = ANCHOR_HIDDEN_DIM, .k = rows, .a = d_logit, .a_row = 1,
-                                          .a_step = job->out_stride, .b = hidden + head * ANCHOR_HIDDEN_DIM, .b_row = HIDDEN_STRIDE,
-                                          .c = record + job->record.weight_first[head], .c_row = ANCHOR_HIDDEN_DIM});
+        kernels->product(&(dense_product){.m = job->layout.out_count[head],
+                                          .n = ANCHOR_HIDDEN_DIM,
+                                          .k = rows,
+                                          .a = d_logit,
+                                          .a_row = 1,
+                                          .a_step = job->out_stride,
+                                          .b = hidden + head * ANCHOR_HIDDEN_DIM,
+                                          .b_row = HIDDEN_STRIDE,
+                                          .c = record + job->record.weight_first[head],
+                                          .c_row = ANCHOR_HIDDEN_DIM});
         float *d_bias = record + job->record.bias_first[head];
         for (size_t r = 0; r < rows; r++)
             for (size_t o = 0; o < job->layout.out_stride[head]; o++)
                 d_bias[o] += d_logit[r * job->out_stride + o];
     }
-    kernels->product(&(dense_product){.m = HIDDEN_STRIDE, .n = INPUT_STRIDE, .k = rows, .a = d_hidden, .a_row = 1, .a_step = HIDDEN_STRIDE,
-                                      .b = input, .b_row = INPUT_STRIDE, .c = record, .c_row = INPUT_STRIDE});
-    kernels->product(&(dense_product){.m = tiled, .n = ANCHOR_FEATURE_DIM, .k = HIDDEN_STRIDE, .a = d_hidden, .a_row = HIDDEN_STRIDE,
-                                      .a_step = 1, .b = job->weights.hidden_input, .b_row = ANCHOR_FEATURE_DIM, .bias = zeros,
-                                      .c = d_feature, .c_row = ANCHOR_FEATURE_DIM});
+    kernels->product(&(dense_product){.m = HIDDEN_STRIDE,
+                                      .n = INPUT_STRIDE,
+                                      .k = rows,
+                                      .a = d_hidden,
+                                      .a_row = 1,
+                                      .a_step = HIDDEN_STRIDE,
+                                      .b = input,
+                                      .b_row = INPUT_STRIDE,
+                                      .c = record,
+                                      .c_row = INPUT_STRIDE});
+    kernels->product(&(dense_product){.m = tiled,
+                                      .n = ANCHOR_FEATURE_DIM,
+                                      .k = HIDDEN_STRIDE,
+                                      .a = d_hidden,
+                                      .a_row = HIDDEN_STRIDE,
+                                      .a_step = 1,
+                                      .b = job->weights.hidden_input,
+                                      .b_row = ANCHOR_FEATURE_DIM,
+                                      .bias = zeros,
+                                      .c = d_feature,
+                                      .c_row = ANCHOR_FEATURE_DIM});
     for (size_t r = 0; r < rows; r++) {
         float *target = job->d_anchors->feature + (size_t)job->tape->visible[begin + r] * ANCHOR_FEATURE_DIM;
         for (int i = 0; i < ANCHOR_FEATURE_DIM; i++)
@@ -190,13 +231,15 @@ static void layers_backward(const backward_job *job, size_t begin, size_t rows, 
     }
 }
 
-static void chunk_backward(const backward_job *job, size_t begin, size_t rows, float *record, double *d_camera)
+static void chunk_backward(const backward_job *job, size_t begin, size_t rows, float *record,
+                           double *d_camera)
 {
     _Alignas(64) float d_out[DECODE_CHUNK * OUT_STRIDE_MAX], extent[DECODE_CHUNK * 6];
     const size_t tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
     memset(d_out, 0, tiled * job->out_stride * sizeof *d_out);
     for (size_t r = 0; r < rows; r++)
-        memcpy(extent + r * 6, job->a->scale_log + (size_t)job->tape->visible[begin + r] * 6, 6 * sizeof *extent);
+        memcpy(extent + r * 6, job->a->scale_log + (size_t)job->tape->visible[begin + r] * 6,
+               6 * sizeof *extent);
     job->kernels->exp(extent, rows * 6);
     activations_backward(job, begin, rows, extent, d_out);
     if (job->d_anchors != NULL) {
@@ -263,16 +306,21 @@ static void reduce_rows(size_t block, size_t begin, size_t end, void *context)
 }
 
 /* What both adjoints begin with; after it tape->kept_count may be 0, and nothing is left to do. */
-static gbt_status open_job(const anchors *a, const decoder *d, decode_tape *tape, const gaussians *d_gaussians, backward_job *job,
-                           gbt_error *err)
+static gbt_status open_job(const anchors *a, const decoder *d, decode_tape *tape,
+                           const gaussians *d_gaussians, backward_job *job, gbt_error *err)
 {
     if (a->offset_count != d->offset_count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: anchors have %d offsets, the decoder %d", a->offset_count,
-                         d->offset_count);
+        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: anchors have %d offsets, the decoder %d",
+                         a->offset_count, d->offset_count);
     if (d_gaussians->count != tape->kept_count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: gradient of %zu Gaussians (wanted %zu)", d_gaussians->count,
-                         tape->kept_count);
-    *job = (backward_job){.a = a, .d = d, .kernels = dense_best(), .layout = decode_layout_of(d), .tape = tape, .d_gaussians = d_gaussians,
+        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: gradient of %zu Gaussians (wanted %zu)",
+                         d_gaussians->count, tape->kept_count);
+    *job = (backward_job){.a = a,
+                          .d = d,
+                          .kernels = dense_best(),
+                          .layout = decode_layout_of(d),
+                          .tape = tape,
+                          .d_gaussians = d_gaussians,
                           .block_count = parallel_block_count(tape->visible_count, DECODE_GRAIN)};
     for (int head = 0; head < HEAD_COUNT; head++) {
         job->out_first[head] = job->out_stride;
@@ -281,31 +329,35 @@ static gbt_status open_job(const anchors *a, const decoder *d, decode_tape *tape
     return decode_pack_weights(d, &job->layout, tape, &job->weights, err);
 }
 
-gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape, const gaussians *d_gaussians, anchors *d_anchors,
-                           float *d_params, gbt_error *err)
+gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape,
+                           const gaussians *d_gaussians, anchors *d_anchors, float *d_params, gbt_error *err)
 {
     backward_job job;
     if (d_anchors->offset_count != a->offset_count || d_anchors->count != a->count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "decode adjoint: gradient of %zu anchors with %d offsets (wanted %zu, %d)",
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "decode adjoint: gradient of %zu anchors with %d offsets (wanted %zu, %d)",
                          d_anchors->count, d_anchors->offset_count, a->count, a->offset_count);
     GBT_TRY(open_job(a, d, tape, d_gaussians, &job, err));
     if (tape->kept_count == 0)
         return GBT_OK;
-    job.d_anchors = d_anchors, job.d_params = d_params;
+    job.d_anchors = d_anchors;
+    job.d_params = d_params;
     job.record = record_layout_of(&job.layout);
     size_t row_count = HIDDEN_STRIDE;
     for (int head = 0; head < HEAD_COUNT; head++)
         row_count += job.layout.out_count[head];
     void *records = tape->block_grad;
-    GBT_TRY(mem_reserve(&records, &tape->block_capacity, 0, job.block_count * job.record.size, sizeof(float), "decode adjoint", err));
+    GBT_TRY(mem_reserve(&records, &tape->block_capacity, 0, job.block_count * job.record.size, sizeof(float),
+                        "decode adjoint", err));
     tape->block_grad = records;
     parallel_blocks(tape->visible_count, DECODE_GRAIN, backward_block, &job);
     parallel_blocks(row_count, 8, reduce_rows, &job);
     return GBT_OK;
 }
 
-gbt_status decode_backward_camera(const anchors *a, const decoder *d, const float camera_center[3], decode_tape *tape,
-                                  const gaussians *d_gaussians, double d_camera[3], gbt_error *err)
+gbt_status decode_backward_camera(const anchors *a, const decoder *d, const float camera_center[3],
+                                  decode_tape *tape, const gaussians *d_gaussians, double d_camera[3],
+                                  gbt_error *err)
 {
     backward_job job;
     d_camera[0] = d_camera[1] = d_camera[2] = 0;

@@ -1,7 +1,10 @@
-/* anchor/decode_layout.h -- how decode.c and decode_backward.c lay out rows, heads and packed networks in memory.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/decode_layout.h -- how decode.c and decode_backward.c lay out rows, heads and packed networks in
+   memory.
 
-   One row per visible anchor. The visible anchors are cut into chunks of DECODE_CHUNK rows, whose scratch stays in the second-level cache;
-   a parallel block is DECODE_GRAIN rows. Both are multiples of the register tile, so only the very last chunk has rows to pad. */
+   One row per visible anchor. The visible anchors are cut into chunks of DECODE_CHUNK rows, whose scratch
+   stays in the second-level cache; a parallel block is DECODE_GRAIN rows. Both are multiples of the register
+   tile, so only the very last chunk has rows to pad. */
 #ifndef GBT_ANCHOR_DECODE_LAYOUT_H
 #define GBT_ANCHOR_DECODE_LAYOUT_H
 
@@ -13,8 +16,9 @@ enum {
     DECODE_CHUNK = 120,
     DECODE_GRAIN = 240,
     DECODE_TILE = 10,
-    INPUT_COUNT = ANCHOR_FEATURE_DIM + 4, /* feature, direction, distance; the distance is 0 when the networks do not have it */
-    INPUT_ONE = INPUT_COUNT,              /* a column of ones: it turns the bias gradient into one more weight gradient */
+    INPUT_COUNT = ANCHOR_FEATURE_DIM + 4, /* feature, direction, distance; the distance is 0 when the networks
+                                             do not have it */
+    INPUT_ONE = INPUT_COUNT, /* a column of ones: it turns the bias gradient into one more weight gradient */
     INPUT_STRIDE = 48,
     HEAD_COUNT = 3, /* opacity, shape, colour */
     HIDDEN_STRIDE = HEAD_COUNT * ANCHOR_HIDDEN_DIM,
@@ -39,7 +43,8 @@ enum {
 /** Means beyond this are cut, so that a wild offset cannot become an infinity. */
 #define DECODE_MEAN_LIMIT 1e18f
 
-/* A std-dev is at least this part of the Gaussian's largest: thinner needles and sheets are beyond what float32 can evaluate. */
+/* A std-dev is at least this part of the Gaussian's largest: thinner needles and sheets are beyond what
+   float32 can evaluate. */
 #define DECODE_SCALE_RATIO 1e-4f
 
 typedef struct decode_layout {
@@ -53,16 +58,17 @@ decode_layout decode_layout_of(const decoder *d);
 
 /** The networks as the kernels read them; every array points into one block. */
 typedef struct decode_weights {
-    float *input_hidden;              /* [INPUT_COUNT][HIDDEN_STRIDE] */
-    float *hidden_bias;               /* [HIDDEN_STRIDE] */
-    float *hidden_input;              /* [HIDDEN_STRIDE][ANCHOR_FEATURE_DIM] */
-    float *hidden_out[HEAD_COUNT];    /* [ANCHOR_HIDDEN_DIM][out_stride] */
-    float *out_bias[HEAD_COUNT];      /* [out_stride] */
-    float *out_hidden[HEAD_COUNT];    /* [out_count][ANCHOR_HIDDEN_DIM] */
+    float *input_hidden;           /* [INPUT_COUNT][HIDDEN_STRIDE] */
+    float *hidden_bias;            /* [HIDDEN_STRIDE] */
+    float *hidden_input;           /* [HIDDEN_STRIDE][ANCHOR_FEATURE_DIM] */
+    float *hidden_out[HEAD_COUNT]; /* [ANCHOR_HIDDEN_DIM][out_stride] */
+    float *out_bias[HEAD_COUNT];   /* [out_stride] */
+    float *out_hidden[HEAD_COUNT]; /* [out_count][ANCHOR_HIDDEN_DIM] */
 } decode_weights;
 
 /** Pack the networks into tape->weights (grown as needed). */
-gbt_status decode_pack_weights(const decoder *d, const decode_layout *layout, decode_tape *tape, decode_weights *out, gbt_error *err);
+gbt_status decode_pack_weights(const decoder *d, const decode_layout *layout, decode_tape *tape,
+                               decode_weights *out, gbt_error *err);
 
 /** The gradient of a log-scale that the adjoint found, or 0 where the forward pass cut it. */
 static inline float decode_cut_gradient(float scale_log, float gradient)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/decode_raise.c -- bring Gaussians back to where gradients reach them. */
 #include "anchor/decode.h"
 

@@ -1,4 +1,6 @@
-/* anchor/decode_ref.c -- the decoder in double, written from the equations (Scaffold-GS eqs 13-15) without any regard for speed. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/decode_ref.c -- the decoder in double, written from the equations (Scaffold-GS eqs 13-15) without
+   any regard for speed. */
 #include "anchor/decode_ref.h"
 
 #include <math.h>
@@ -6,7 +8,12 @@
 
 #include "base/memory.h"
 
-enum { FEATURE = ANCHOR_FEATURE_DIM, HIDDEN = ANCHOR_HIDDEN_DIM, INPUT_MAX = FEATURE + 4, OUT_MAX = 11 * ANCHOR_MAX_OFFSETS };
+enum {
+    FEATURE = ANCHOR_FEATURE_DIM,
+    HIDDEN = ANCHOR_HIDDEN_DIM,
+    INPUT_MAX = FEATURE + 4,
+    OUT_MAX = 11 * ANCHOR_MAX_OFFSETS
+};
 
 static const double limit = 30.0; /* of the arguments of exp and sigmoid, as in activations.h */
 
@@ -17,10 +24,7 @@ typedef struct activations {
     double out[OUT_MAX]; /* logits: K, 7K, 3K */
 } activations;
 
-static size_t input_count(const decode_ref *r)
-{
-    return FEATURE + 3 + (r->has_distance ? 1 : 0);
-}
+static size_t input_count(const decode_ref *r) { return FEATURE + 3 + (r->has_distance ? 1 : 0); }
 
 static size_t out_count(const decode_ref *r, int head)
 {
@@ -37,7 +41,8 @@ static gbt_status allocate(decode_ref *out, gbt_error *err)
     out->params = mem_calloc(out->param_count, sizeof(double), "decode reference", err);
     for (int f = 0; f < 4; f++)
         *fields[f] = mem_calloc(out->count * widths[f], sizeof(double), "decode reference", err);
-    if (out->params != NULL && out->position != NULL && out->feature != NULL && out->offset != NULL && out->scale_log != NULL)
+    if (out->params != NULL && out->position != NULL && out->feature != NULL && out->offset != NULL &&
+        out->scale_log != NULL)
         return GBT_OK;
     decode_ref_free(out);
     return GBT_ERR_NO_MEMORY;
@@ -51,8 +56,12 @@ static void widen(double *to, const float *from, size_t count)
 
 gbt_status decode_ref_load(decode_ref *out, const anchors *a, const decoder *d, gbt_error *err)
 {
-    *out = (decode_ref){.count = a->count, .param_count = d->param_count, .offset_count = a->offset_count, .has_distance = d->has_distance,
-                        .distance_scale = (double)d->distance_scale, .distance_min = (double)d->distance_min,
+    *out = (decode_ref){.count = a->count,
+                        .param_count = d->param_count,
+                        .offset_count = a->offset_count,
+                        .has_distance = d->has_distance,
+                        .distance_scale = (double)d->distance_scale,
+                        .distance_min = (double)d->distance_min,
                         .distance_max = (double)d->distance_max};
     const gbt_status status = allocate(out, err);
     if (status != GBT_OK)
@@ -81,15 +90,9 @@ void decode_ref_free(decode_ref *r)
     memset(r, 0, sizeof *r);
 }
 
-static double cut(double x)
-{
-    return fmin(fmax(x, -limit), limit);
-}
+static double cut(double x) { return fmin(fmax(x, -limit), limit); }
 
-static double slope(double x) /* of cut() */
-{
-    return x >= -limit && x <= limit ? 1.0 : 0.0;
-}
+static double slope(double x) /* of cut() */ { return x >= -limit && x <= limit ? 1.0 : 0.0; }
 
 static const double scale_ratio = (double)1e-4f; /* the least scale, as part of the largest */
 
@@ -98,10 +101,7 @@ static size_t largest_of(const double scale[3])
     return scale[1] > scale[0] ? (scale[2] > scale[1] ? 2 : 1) : scale[2] > scale[0] ? 2 : 0;
 }
 
-static double sigmoid(double x)
-{
-    return 1.0 / (1.0 + exp(-cut(x)));
-}
+static double sigmoid(double x) { return 1.0 / (1.0 + exp(-cut(x))); }
 
 static void run_networks(const decode_ref *r, const double camera[3], size_t anchor, activations *act)
 {
@@ -116,12 +116,14 @@ static void run_networks(const decode_ref *r, const double camera[3], size_t anc
     for (int c = 0; c < 3; c++)
         act->input[FEATURE + c] = distance > 0 ? view[c] / distance : c == 2;
     if (r->has_distance)
-        act->input[FEATURE + 3] = fmin(fmax(distance * r->distance_scale, r->distance_min / 2), r->distance_max * 2);
+        act->input[FEATURE + 3] =
+            fmin(fmax(distance * r->distance_scale, r->distance_min / 2), r->distance_max * 2);
 
     const double *p = r->params;
     double *out = act->out;
     for (int head = 0; head < 3; head++) {
-        const double *w1 = p, *b1 = w1 + HIDDEN * in, *w2 = b1 + HIDDEN, *b2 = w2 + out_count(r, head) * HIDDEN;
+        const double *w1 = p, *b1 = w1 + HIDDEN * in, *w2 = b1 + HIDDEN,
+                     *b2 = w2 + out_count(r, head) * HIDDEN;
         for (size_t h = 0; h < HIDDEN; h++) {
             double sum = b1[h];
             for (size_t i = 0; i < in; i++)
@@ -150,7 +152,8 @@ static double unit_quaternion(const double raw[4], double q[4])
     return inverse;
 }
 
-void decode_ref_forward(const decode_ref *r, const double camera_center[3], const uint32_t *visible, size_t visible_count, double *out)
+void decode_ref_forward(const decode_ref *r, const double camera_center[3], const uint32_t *visible,
+                        size_t visible_count, double *out)
 {
     const size_t offsets = (size_t)r->offset_count;
     activations act;
@@ -161,7 +164,8 @@ void decode_ref_forward(const decode_ref *r, const double camera_center[3], cons
             double *g = out + (v * offsets + k) * DECODE_REF_FIELDS;
             const double *shape = act.out + offsets + k * 7, *color = act.out + offsets * 8 + k * 3;
             for (size_t c = 0; c < 3; c++) {
-                g[c] = r->position[i * 3 + c] + r->offset[(i * offsets + k) * 3 + c] * exp(cut(r->scale_log[i * 6 + c]));
+                g[c] = r->position[i * 3 + c] +
+                       r->offset[(i * offsets + k) * 3 + c] * exp(cut(r->scale_log[i * 6 + c]));
                 g[3 + c] = exp(cut(r->scale_log[i * 6 + 3 + c])) * sigmoid(shape[c]);
                 g[11 + c] = sigmoid(color[c]);
             }
@@ -175,7 +179,8 @@ void decode_ref_forward(const decode_ref *r, const double camera_center[3], cons
 }
 
 /* Logit gradients of one anchor back through its three networks. */
-static void networks_backward(const decode_ref *r, size_t anchor, const activations *act, const double *d_logit, decode_ref *grad)
+static void networks_backward(const decode_ref *r, size_t anchor, const activations *act,
+                              const double *d_logit, decode_ref *grad)
 {
     const size_t in = input_count(r);
     size_t first = 0;
@@ -203,8 +208,8 @@ static void networks_backward(const decode_ref *r, size_t anchor, const activati
     }
 }
 
-void decode_ref_backward(const decode_ref *r, const double camera_center[3], const uint32_t *visible, size_t visible_count,
-                         const double *d_out, decode_ref *grad)
+void decode_ref_backward(const decode_ref *r, const double camera_center[3], const uint32_t *visible,
+                         size_t visible_count, const double *d_out, decode_ref *grad)
 {
     const size_t offsets = (size_t)r->offset_count;
     activations act;
@@ -215,19 +220,23 @@ void decode_ref_backward(const decode_ref *r, const double camera_center[3], con
         for (size_t k = 0; k < offsets; k++) {
             const double *d = d_out + (v * offsets + k) * DECODE_REF_FIELDS;
             const double *shape = act.out + offsets + k * 7, *color = act.out + offsets * 8 + k * 3;
-            double *d_shape = d_logit + offsets + k * 7, *d_color = d_logit + offsets * 8 + k * 3, q[4], along = 0;
+            double *d_shape = d_logit + offsets + k * 7, *d_color = d_logit + offsets * 8 + k * 3, q[4],
+                   along = 0;
             double raw[3], d_scale[3] = {d[3], d[4], d[5]};
             for (size_t c = 0; c < 3; c++)
                 raw[c] = exp(cut(r->scale_log[i * 6 + 3 + c])) * sigmoid(shape[c]);
             const size_t large = largest_of(raw);
             for (size_t c = 0; c < 3; c++)
-                if (raw[c] < scale_ratio * raw[large])
-                    d_scale[large] += scale_ratio * d_scale[c], d_scale[c] = 0;
+                if (raw[c] < scale_ratio * raw[large]) {
+                    d_scale[large] += scale_ratio * d_scale[c];
+                    d_scale[c] = 0;
+                }
             for (size_t c = 0; c < 3; c++) {
                 const double log_mean = r->scale_log[i * 6 + c], log_scale = r->scale_log[i * 6 + 3 + c];
                 const double e = exp(cut(log_mean)), s = sigmoid(shape[c]), scaled = d_scale[c] * raw[c];
                 grad->offset[(i * offsets + k) * 3 + c] += d[c] * e;
-                grad->scale_log[i * 6 + c] += d[c] * r->offset[(i * offsets + k) * 3 + c] * e * slope(log_mean);
+                grad->scale_log[i * 6 + c] +=
+                    d[c] * r->offset[(i * offsets + k) * 3 + c] * e * slope(log_mean);
                 grad->scale_log[i * 6 + 3 + c] += scaled * slope(log_scale);
                 d_shape[c] = scaled * (1 - s);
                 const double value = sigmoid(color[c]);

@@ -1,10 +1,13 @@
-/* anchor/decode_ref.h -- the decoder and its adjoint once more, in double and plain loops: what decode.c is tested against. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/decode_ref.h -- the decoder and its adjoint once more, in double and plain loops: what decode.c is
+   tested against. */
 #ifndef GBT_ANCHOR_DECODE_REF_H
 #define GBT_ANCHOR_DECODE_REF_H
 
 #include "anchor/anchors.h"
 
-/** Parameters, or their gradient, in double; shapes as in anchors and decoder. Owned; free with decode_ref_free(). */
+/** Parameters, or their gradient, in double; shapes as in anchors and decoder. Owned; free with
+    decode_ref_free(). */
 typedef struct decode_ref {
     size_t count, param_count;
     int offset_count;
@@ -29,10 +32,12 @@ enum { DECODE_REF_FIELDS = 14 };
  * @param out [out] [visible_count * K][14]; opacity is alpha, also where it is negative
  * Threads: any.
  */
-void decode_ref_forward(const decode_ref *r, const double camera_center[3], const uint32_t *visible, size_t visible_count, double *out);
+void decode_ref_forward(const decode_ref *r, const double camera_center[3], const uint32_t *visible,
+                        size_t visible_count, double *out);
 
-/** Adjoint: adds dL/dparameter to `grad` for dL/dslot `d_out` ([visible_count * K][14], 0 for slots that were not kept). */
-void decode_ref_backward(const decode_ref *r, const double camera_center[3], const uint32_t *visible, size_t visible_count,
-                         const double *d_out, decode_ref *grad);
+/** Adjoint: adds dL/dparameter to `grad` for dL/dslot `d_out` ([visible_count * K][14], 0 for slots that were
+    not kept). */
+void decode_ref_backward(const decode_ref *r, const double camera_center[3], const uint32_t *visible,
+                         size_t visible_count, const double *d_out, decode_ref *grad);
 
 #endif

@@ -1,6 +1,9 @@
-/* anchor/dense.h -- the arithmetic of the decoder that is worth vector instructions: one matrix product and the activations.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/dense.h -- the arithmetic of the decoder that is worth vector instructions: one matrix product and
+   the activations.
 
-   Three implementations (plain C, AVX2, AVX-512) give the same bits: every sum is a chain of fused multiply-adds in the order of k. */
+   Three implementations (plain C, AVX2, AVX-512) give the same bits: every sum is a chain of fused
+   multiply-adds in the order of k. */
 #ifndef GBT_ANCHOR_DENSE_H
 #define GBT_ANCHOR_DENSE_H
 
@@ -9,7 +12,8 @@
 
 enum { DENSE_COLUMNS = 16 /* n is a multiple of it */ };
 
-/** c[i * c_row + j] = start + sum over t of a[i * a_row + t * a_step] * b[t * b_row + j]; start is bias[j], or c itself for bias NULL. */
+/** c[i * c_row + j] = start + sum over t of a[i * a_row + t * a_step] * b[t * b_row + j]; start is bias[j],
+    or c itself for bias NULL. */
 typedef struct dense_product {
     size_t m, n, k;
     const float *a;
@@ -27,7 +31,8 @@ typedef struct dense_kernels {
     void (*exp)(float *x, size_t count); /* these four work in place; see activations.h */
     void (*tanh)(float *x, size_t count);
     void (*sigmoid)(float *x, size_t count);
-    /** Quaternions to length 1, and one over the old length. Lengths below 1e-12 give (1, 0, 0, 0) and 0. Components are cut to +-1e18. */
+    /** Quaternions to length 1, and one over the old length. Lengths below 1e-12 give (1, 0, 0, 0) and 0.
+        Components are cut to +-1e18. */
     void (*normalize)(float *w, float *x, float *y, float *z, float *inverse_length, size_t count);
 } dense_kernels;
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/dense_avx2.c -- the decoder's arithmetic for AVX2 with FMA. */
 #include <immintrin.h>
 
@@ -13,4 +14,5 @@ typedef __m256 vec;
 #define vec_max _mm256_max_ps
 #include "anchor/dense_tiles.inc.h"
 
-const dense_kernels dense_kernels_avx2 = {dense_multiply, dense_exp, dense_tanh, dense_sigmoid, dense_normalize};
+const dense_kernels dense_kernels_avx2 = {dense_multiply, dense_exp, dense_tanh, dense_sigmoid,
+                                          dense_normalize};

@@ -1,9 +1,13 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/dense_avx512.c -- the decoder's arithmetic for AVX-512. */
 #include <immintrin.h>
 
 #include "anchor/dense_elementwise.inc.h"
 
-enum { LANES = 16, TILE_ROWS = 10 /* 20 of 32 registers hold sums; 10 divides every head of the default K = 10 */ };
+enum {
+    LANES = 16,
+    TILE_ROWS = 10 /* 20 of 32 registers hold sums; 10 divides every head of the default K = 10 */
+};
 typedef __m512 vec;
 #define vec_load _mm512_loadu_ps
 #define vec_store _mm512_storeu_ps
@@ -13,4 +17,5 @@ typedef __m512 vec;
 #define vec_max _mm512_max_ps
 #include "anchor/dense_tiles.inc.h"
 
-const dense_kernels dense_kernels_avx512 = {dense_multiply, dense_exp, dense_tanh, dense_sigmoid, dense_normalize};
+const dense_kernels dense_kernels_avx512 = {dense_multiply, dense_exp, dense_tanh, dense_sigmoid,
+                                            dense_normalize};

@@ -1,4 +1,6 @@
-/* anchor/dense_elementwise.inc.h -- loops over activations.h; compiled once per instruction set, the compiler vectorises them. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/dense_elementwise.inc.h -- loops over activations.h; compiled once per instruction set, the compiler
+   vectorises them. */
 #include <math.h>
 
 #include "anchor/activations.h"
@@ -22,8 +24,8 @@ static void dense_sigmoid(float *restrict x, size_t count)
         x[i] = activation_sigmoid(x[i]);
 }
 
-static void dense_normalize(float *restrict w, float *restrict x, float *restrict y, float *restrict z, float *restrict inverse_length,
-                            size_t count)
+static void dense_normalize(float *restrict w, float *restrict x, float *restrict y, float *restrict z,
+                            float *restrict inverse_length, size_t count)
 {
     const float limit = 1e18f; /* four squares of it are still finite */
     for (size_t i = 0; i < count; i++) {

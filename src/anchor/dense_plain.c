@@ -1,4 +1,6 @@
-/* anchor/dense_plain.c -- the decoder's arithmetic in plain C: the definition, and the choice between the implementations. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/dense_plain.c -- the decoder's arithmetic in plain C: the definition, and the choice between the
+   implementations. */
 #include "anchor/dense_elementwise.inc.h"
 #include "base/cpu.h"
 
@@ -15,7 +17,8 @@ static void dense_multiply(const dense_product *job)
     }
 }
 
-const dense_kernels dense_kernels_plain = {dense_multiply, dense_exp, dense_tanh, dense_sigmoid, dense_normalize};
+const dense_kernels dense_kernels_plain = {dense_multiply, dense_exp, dense_tanh, dense_sigmoid,
+                                           dense_normalize};
 
 const dense_kernels *dense_best(void)
 {

@@ -1,12 +1,14 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/dense_tiles.inc.h -- the matrix product as register tiles; the including file says what a vector is.
 
-   Needs: vec, LANES, TILE_ROWS (rows of c held in registers, times two vectors), vec_load, vec_store, vec_set1, vec_zero, vec_fma and
-   vec_max. */
+   Needs: vec, LANES, TILE_ROWS (rows of c held in registers, times two vectors), vec_load, vec_store,
+   vec_set1, vec_zero, vec_fma and vec_max. */
 #include "anchor/dense.h"
 
-/* `rows` and `vectors` are constants at every call, so the loops over them unroll and `sum` lives in registers. */
-static inline __attribute__((always_inline)) void tile(const int rows, const int vectors, const dense_product *job, size_t row,
-                                                       size_t column)
+/* `rows` and `vectors` are constants at every call, so the loops over them unroll and `sum` lives in
+   registers. */
+static inline __attribute__((always_inline)) void tile(const int rows, const int vectors,
+                                                       const dense_product *job, size_t row, size_t column)
 {
     const size_t a_row = job->a_row, a_step = job->a_step, b_row = job->b_row;
     vec sum[TILE_ROWS][2];
@@ -15,9 +17,11 @@ static inline __attribute__((always_inline)) void tile(const int rows, const int
     for (int i = 0; i < rows; i++)
 #pragma GCC unroll 2
         for (int j = 0; j < vectors; j++)
-            sum[i][j] = job->bias != NULL ? vec_load(job->bias + column + j * LANES) : vec_load(c + (size_t)i * job->c_row + j * LANES);
+            sum[i][j] = job->bias != NULL ? vec_load(job->bias + column + j * LANES)
+                                          : vec_load(c + (size_t)i * job->c_row + j * LANES);
 
-    /* One pointer for three rows: x86 addresses reach base, base + stride and base + 2 stride, so ten rows cost four registers. */
+    /* One pointer for three rows: x86 addresses reach base, base + stride and base + 2 stride, so ten rows
+       cost four registers. */
     const float *a[(TILE_ROWS + 2) / 3];
 #pragma GCC unroll 16
     for (int i = 0; i < (rows + 2) / 3; i++)
@@ -51,7 +55,8 @@ static inline __attribute__((always_inline)) void tile(const int rows, const int
         }
 }
 
-static inline __attribute__((always_inline)) void tile_row(const int rows, const dense_product *job, size_t row)
+static inline __attribute__((always_inline)) void tile_row(const int rows, const dense_product *job,
+                                                           size_t row)
 {
     size_t column = 0;
     for (; column + 2 * LANES <= job->n; column += 2 * LANES)

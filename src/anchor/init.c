@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/init.c -- anchors from balls, voxels or points, and their first scale.
 
-   points --> balls (GBAI, eq 28), voxels (eq 12) or some points --> centres --> spacing (+ ball radius: GBSP, eqs 29-34) --> log-scales */
+   points --> balls (GBAI, eq 28), voxels (eq 12) or some points --> centres
+        --> spacing (+ ball radius: GBSP, eqs 29-34) --> log-scales */
 #include "anchor/init.h"
 
 #include <math.h>
@@ -15,8 +17,15 @@
 
 anchor_init_def anchor_init_def_default(void)
 {
-    return (anchor_init_def){.kind = ANCHOR_INIT_GB, .scale = ANCHOR_SCALE_GB, .fraction = 0, .balls = balls_def_default(),
-                             .offset_count = 10, .fusion = 0.5f, .clip_min = 0.25f, .clip_max = 4.0f, .scale_factor = 1.0f,
+    return (anchor_init_def){.kind = ANCHOR_INIT_GB,
+                             .scale = ANCHOR_SCALE_GB,
+                             .fraction = 0,
+                             .balls = balls_def_default(),
+                             .offset_count = 10,
+                             .fusion = 0.5f,
+                             .clip_min = 0.25f,
+                             .clip_max = 4.0f,
+                             .scale_factor = 1.0f,
                              .scale_max = INFINITY};
 }
 
@@ -24,27 +33,31 @@ bool anchor_init_kind_named(const char *name, anchor_init_kind *out)
 {
     static const char *const names[] = {"gb", "voxel", "adaptive", "random"}; /* in the order of the enum */
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (strcmp(name, names[i]) == 0)
-            return *out = (anchor_init_kind)i, true;
+        if (strcmp(name, names[i]) == 0) {
+            *out = (anchor_init_kind)i;
+            return true;
+        }
     return false;
 }
 
 static gbt_status check_def(const anchor_init_def *def, gbt_error *err)
 {
     if (def->offset_count < 1 || def->offset_count > ANCHOR_MAX_OFFSETS)
-        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: offset_count %d (wanted 1 to %d)", def->offset_count, ANCHOR_MAX_OFFSETS);
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: offset_count %d (wanted 1 to %d)",
+                         def->offset_count, ANCHOR_MAX_OFFSETS);
     if (!(def->balls.voxel_size > 0.0f && def->balls.voxel_size < HUGE_VALF))
-        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: voxel_size %g (wanted > 0)", (double)def->balls.voxel_size);
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: voxel_size %g (wanted > 0)",
+                         (double)def->balls.voxel_size);
     if (!(def->fraction >= 0 && def->fraction <= 1))
         return base_fail(err, GBT_ERR_ARGUMENT, "anchors: fraction %g (wanted 0 to 1)", def->fraction);
     if (!(def->fusion >= 0.0f && def->fusion <= 1.0f))
         return base_fail(err, GBT_ERR_ARGUMENT, "anchors: fusion %g (wanted 0 to 1)", (double)def->fusion);
     if (!(def->clip_min >= 0.0f && def->clip_min <= def->clip_max))
-        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: clip %g to %g (wanted 0 <= min <= max)", (double)def->clip_min,
-                         (double)def->clip_max);
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: clip %g to %g (wanted 0 <= min <= max)",
+                         (double)def->clip_min, (double)def->clip_max);
     if (!(def->scale_max > 0.0f && def->scale_factor > 0.0f && def->scale_factor < HUGE_VALF))
-        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: scale_max %g, scale_factor %g (wanted > 0)", (double)def->scale_max,
-                         (double)def->scale_factor);
+        return base_fail(err, GBT_ERR_ARGUMENT, "anchors: scale_max %g, scale_factor %g (wanted > 0)",
+                         (double)def->scale_max, (double)def->scale_factor);
     return GBT_OK;
 }
 
@@ -62,7 +75,8 @@ static void set_scale(anchors *a, size_t i, double scale)
         a->scale_log[i * 6 + c] = (float)log(scale);
 }
 
-gbt_status anchor_scales_from_spacing(const float *position, size_t count, double factor, double most, float *out, gbt_error *err)
+gbt_status anchor_scales_from_spacing(const float *position, size_t count, double factor, double most,
+                                      float *out, gbt_error *err)
 {
     point_tree *tree = NULL;
     GBT_TRY(point_tree_build(position, NULL, count, &tree, err));
@@ -77,8 +91,10 @@ gbt_status anchor_scales_from_spacing(const float *position, size_t count, doubl
 static gbt_status scale_from_spacing(anchors *a, const anchor_init_def *def, gbt_error *err)
 {
     const double factor = (double)def->scale_factor, most = (double)def->scale_max;
-    if (a->count == 1)
-        return set_scale(a, 0, first_scale((double)def->balls.voxel_size, spacing_min, factor, most)), GBT_OK;
+    if (a->count == 1) {
+        set_scale(a, 0, first_scale((double)def->balls.voxel_size, spacing_min, factor, most));
+        return GBT_OK;
+    }
     float *scale = mem_alloc(a->count, sizeof *scale, "anchors", err);
     if (scale == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -89,7 +105,7 @@ static gbt_status scale_from_spacing(anchors *a, const anchor_init_def *def, gbt
     return status;
 }
 
-/* ---- GBSP -------------------------------------------------------------------------------------------------------------------- */
+/* ---- GBSP ---- */
 
 typedef struct prior_job {
     anchors *a;
@@ -108,27 +124,34 @@ static void prior_block(size_t block, size_t begin, size_t end, void *context)
         const double radius = (double)job->radius[i];
         uint32_t index;
         double square;
-        const bool spaced = point_tree_nearest(job->tree, job->a->position + i * 3, 1, i, &index, &square) == 1 && square > 0;
-        const double near = spaced ? sqrt(square) : radius; /* lone or coincident: the radius is all that is known */
+        const bool spaced =
+            point_tree_nearest(job->tree, job->a->position + i * 3, 1, i, &index, &square) == 1 && square > 0;
+        const double near =
+            spaced ? sqrt(square) : radius; /* lone or coincident: the radius is all that is known */
         const double clipped = fmin(fmax(radius, (double)def->clip_min * near), (double)def->clip_max * near);
         const double fused = (double)def->fusion * near + (1.0 - (double)def->fusion) * clipped;
-        set_scale(job->a, i, first_scale(fused, job->floor_scale, (double)def->scale_factor, (double)def->scale_max));
+        set_scale(job->a, i,
+                  first_scale(fused, job->floor_scale, (double)def->scale_factor, (double)def->scale_max));
     }
 }
 
-static gbt_status scale_from_balls(anchors *a, const float *radius, const anchor_init_def *def, gbt_error *err)
+static gbt_status scale_from_balls(anchors *a, const float *radius, const anchor_init_def *def,
+                                   gbt_error *err)
 {
     point_tree *tree = NULL;
     GBT_TRY(point_tree_build(a->position, NULL, a->count, &tree, err));
     /* eps of eq 34 is s_min of eq 21: no scale is finer than the finest ball. */
-    prior_job job = {.a = a, .def = def, .radius = radius, .tree = tree,
+    prior_job job = {.a = a,
+                     .def = def,
+                     .radius = radius,
+                     .tree = tree,
                      .floor_scale = fmax((double)def->balls.min_scale * (double)def->balls.voxel_size, 1e-6)};
     parallel_blocks(a->count, 1024, prior_block, &job);
     point_tree_free(tree);
     return GBT_OK;
 }
 
-/* ---- entry ------------------------------------------------------------------------------------------------------------------- */
+/* ---- entry ---- */
 
 static gbt_status place(anchors *a, const float *center, size_t count, gbt_error *err)
 {
@@ -138,7 +161,8 @@ static gbt_status place(anchors *a, const float *center, size_t count, gbt_error
 }
 
 /* `wanted` of the points, each set of so many with equal chances, in their order. */
-static gbt_status choose_points(const float *position, size_t count, size_t wanted, float **out, gbt_error *err)
+static gbt_status choose_points(const float *position, size_t count, size_t wanted, float **out,
+                                gbt_error *err)
 {
     GBT_TRY(cloud_check("random anchors", position, NULL, count, err));
     *out = mem_alloc(wanted, 3 * sizeof **out, "anchors", err);
@@ -152,8 +176,8 @@ static gbt_status choose_points(const float *position, size_t count, size_t want
 }
 
 /* How many anchors the kinds that can make any number are to make. */
-static gbt_status count_wanted(const float *position, const float *color, size_t count, const anchor_init_def *def, size_t *out,
-                               gbt_error *err)
+static gbt_status count_wanted(const float *position, const float *color, size_t count,
+                               const anchor_init_def *def, size_t *out, gbt_error *err)
 {
     *out = (size_t)ceil(def->fraction * (double)count);
     if (def->fraction > 0 || count == 0)
@@ -166,8 +190,9 @@ static gbt_status count_wanted(const float *position, const float *color, size_t
 }
 
 /* Where the anchors are, and the balls that they stand for, if any. */
-static gbt_status find_centers(const float *position, const float *color, size_t count, const anchor_init_def *def, balls *found,
-                               float **centers, size_t *center_count, gbt_error *err)
+static gbt_status find_centers(const float *position, const float *color, size_t count,
+                               const anchor_init_def *def, balls *found, float **centers,
+                               size_t *center_count, gbt_error *err)
 {
     if (def->kind == ANCHOR_INIT_VOXEL)
         return voxel_centers(position, count, def->balls.voxel_size, centers, center_count, err);
@@ -175,16 +200,19 @@ static gbt_status find_centers(const float *position, const float *color, size_t
         return balls_build(position, color, count, &def->balls, found, err);
     size_t wanted;
     GBT_TRY(count_wanted(position, color, count, def, &wanted, err));
-    if (def->kind == ANCHOR_INIT_RANDOM)
-        return *center_count = wanted, choose_points(position, count, wanted, centers, err);
+    if (def->kind == ANCHOR_INIT_RANDOM) {
+        *center_count = wanted;
+        return choose_points(position, count, wanted, centers, err);
+    }
     adaptive_def adaptive = adaptive_def_default();
-    adaptive.voxel_size = def->balls.voxel_size, adaptive.min_scale = def->balls.min_scale;
+    adaptive.voxel_size = def->balls.voxel_size;
+    adaptive.min_scale = def->balls.min_scale;
     adaptive.balls_max = wanted > 0 ? wanted : 1;
     return balls_adapt(position, color, count, &adaptive, found, err);
 }
 
-gbt_status anchors_init(const float *position, const float *color, size_t count, const anchor_init_def *def, anchors *out, balls *out_balls,
-                        gbt_error *err)
+gbt_status anchors_init(const float *position, const float *color, size_t count, const anchor_init_def *def,
+                        anchors *out, balls *out_balls, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
     if (out_balls != NULL)
@@ -196,10 +224,12 @@ gbt_status anchors_init(const float *position, const float *color, size_t count,
     size_t center_count = 0;
     gbt_status status = find_centers(position, color, count, def, &found, &centers, &center_count, err);
     if (status == GBT_OK)
-        status = centers != NULL ? place(&a, centers, center_count, err) : place(&a, found.center, found.count, err);
+        status = centers != NULL ? place(&a, centers, center_count, err)
+                                 : place(&a, found.center, found.count, err);
     if (status == GBT_OK && a.count > 0)
-        status = def->kind == ANCHOR_INIT_GB && def->scale == ANCHOR_SCALE_GB ? scale_from_balls(&a, found.radius, def, err)
-                                                                              : scale_from_spacing(&a, def, err);
+        status = def->kind == ANCHOR_INIT_GB && def->scale == ANCHOR_SCALE_GB
+                     ? scale_from_balls(&a, found.radius, def, err)
+                     : scale_from_spacing(&a, def, err);
     mem_free(centers);
     if (status != GBT_OK) {
         anchors_free(&a);

@@ -1,4 +1,6 @@
-/* anchor/new_anchors.c -- candidates of a level, gathered in the cells of a hash set; cells that hold no anchor yet get one. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/new_anchors.c -- candidates of a level, gathered in the cells of a hash set; cells that hold no
+   anchor yet get one. */
 #include "anchor/new_anchors.h"
 
 #include <math.h>
@@ -70,7 +72,8 @@ static gbt_status grow_table(growth *g, gbt_error *err)
     const size_t size = g->table_size < 1024 ? 1024 : g->table_size * 2;
     void *table = g->table;
     GBT_TRY(mem_reserve(&table, &g->table_capacity, 0, size, sizeof *g->table, "growth", err));
-    g->table = table, g->table_size = size;
+    g->table = table;
+    g->table_size = size;
     memset(g->table, 0, size * sizeof *g->table);
     for (size_t i = 0; i < g->cell_count; i++)
         g->table[find_slot(g, g->cells[i].at)] = (uint32_t)(i + 1);
@@ -86,7 +89,8 @@ typedef struct candidate {
 static void merge_candidate(cell *known, float *best, const candidate *c, const float *feature)
 {
     if (c->gradient > known->gradient) {
-        known->gradient = c->gradient, known->scale = c->scale;
+        known->gradient = c->gradient;
+        known->scale = c->scale;
         memcpy(known->position, c->position, sizeof known->position);
     }
     for (int i = 0; i < ANCHOR_FEATURE_DIM; i++)
@@ -110,14 +114,18 @@ static gbt_status add_candidate(growth *g, float size, const candidate *c, gbt_e
         return GBT_OK;
     }
     void *cells = g->cells, *features = n->feature;
-    GBT_TRY(mem_reserve(&cells, &g->cell_capacity, g->cell_count, g->cell_count + 1, sizeof *g->cells, "growth", err));
-    g->cells = cells;
-    GBT_TRY(mem_reserve(&features, &n->feature_capacity, n->feature_count, n->feature_count + 1, ANCHOR_FEATURE_DIM * sizeof(float),
+    GBT_TRY(mem_reserve(&cells, &g->cell_capacity, g->cell_count, g->cell_count + 1, sizeof *g->cells,
                         "growth", err));
+    g->cells = cells;
+    GBT_TRY(mem_reserve(&features, &n->feature_capacity, n->feature_count, n->feature_count + 1,
+                        ANCHOR_FEATURE_DIM * sizeof(float), "growth", err));
     n->feature = features;
     memcpy(n->feature + n->feature_count * ANCHOR_FEATURE_DIM, feature, ANCHOR_FEATURE_DIM * sizeof(float));
-    g->cells[g->cell_count] = (cell){.at = {at[0], at[1], at[2]}, .position = {c->position[0], c->position[1], c->position[2]},
-                                     .scale = c->scale, .gradient = c->gradient, .feature = n->feature_count++};
+    g->cells[g->cell_count] = (cell){.at = {at[0], at[1], at[2]},
+                                     .position = {c->position[0], c->position[1], c->position[2]},
+                                     .scale = c->scale,
+                                     .gradient = c->gradient,
+                                     .feature = n->feature_count++};
     g->table[slot] = (uint32_t)++g->cell_count;
     return GBT_OK;
 }
@@ -165,7 +173,8 @@ static float level_cell_size(const adjust_def *def, int level)
     for (int i = 0; i < level; i++)
         divisor *= def->hierarchy_factor;
     const double factor = def->init_factor / divisor;
-    return def->voxel_size * (float)(def->compat ? floor(factor) : factor); /* the reference divides integers: 4 / 16 is 0 */
+    return def->voxel_size *
+           (float)(def->compat ? floor(factor) : factor); /* the reference divides integers: 4 / 16 is 0 */
 }
 
 /* Mean over the views that saw the Gaussian; 0 when none did. */
@@ -185,7 +194,8 @@ static float level_threshold(const adjust_def *def, int level)
 /* Not lost to the random drop. */
 static bool is_drawn(const adjust_def *def, int level, uint64_t slot)
 {
-    return rng_uniform(def->seed, def->step * ADJUST_MAX_LEVELS + (uint64_t)level, slot) > ldexpf(1.0f, -(level + 1));
+    return rng_uniform(def->seed, def->step * ADJUST_MAX_LEVELS + (uint64_t)level, slot) >
+           ldexpf(1.0f, -(level + 1));
 }
 
 static gbt_status collect_gaussians(growth *g, int level, float size, gbt_error *err)
@@ -195,18 +205,21 @@ static gbt_status collect_gaussians(growth *g, int level, float size, gbt_error 
     const float threshold = level_threshold(g->def, level);
     for (size_t slot = 0; slot < a->count * offsets; slot++) {
         const float gradient = mean_gradient(g->stats, slot);
-        if (!adjust_well_sampled(g->def, g->stats->grad_count[slot]) || !(gradient >= threshold) || !is_drawn(g->def, level, slot))
+        if (!adjust_well_sampled(g->def, g->stats->grad_count[slot]) || !(gradient >= threshold) ||
+            !is_drawn(g->def, level, slot))
             continue;
         const size_t i = slot / offsets;
         candidate mean = {.scale = size, .gradient = gradient, .parent = i};
         for (size_t c = 0; c < 3; c++)
-            mean.position[c] = a->position[i * 3 + c] + a->offset[slot * 3 + c] * activation_exp(a->scale_log[i * 6 + c]);
+            mean.position[c] =
+                a->position[i * 3 + c] + a->offset[slot * 3 + c] * activation_exp(a->scale_log[i * 6 + c]);
         GBT_TRY(add_candidate(g, size, &mean, err));
     }
     return GBT_OK;
 }
 
-/* Mean of the Gaussian of the anchor that asks for most; of those that enough views saw, or of all. Below 0 when there is none. */
+/* Mean of the Gaussian of the anchor that asks for most; of those that enough views saw, or of all. Below 0
+   when there is none. */
 static float steepest_gradient(const growth *g, size_t anchor, bool well_sampled)
 {
     const size_t offsets = (size_t)g->a->offset_count;
@@ -217,16 +230,19 @@ static float steepest_gradient(const growth *g, size_t anchor, bool well_sampled
     return steepest;
 }
 
-/* Known surface is worth more than what Gaussians guess: where it makes good for a start, the coarsest level's threshold will do. */
+/* Known surface is worth more than what Gaussians guess: where it makes good for a start, the coarsest
+   level's threshold will do. */
 static gbt_status collect_places(growth *g, float size, gbt_error *err)
 {
     const adjust_def *def = g->def;
     const bool as_start = def->place_scale != NULL;
     const int finest = def->level_count - 1;
-    const float threshold = level_threshold(def, as_start ? 0 : finest), finest_size = level_cell_size(def, finest);
+    const float threshold = level_threshold(def, as_start ? 0 : finest),
+                finest_size = level_cell_size(def, finest);
     for (size_t p = 0; p < def->place_count; p++) {
         const size_t parent = def->place_anchor[p];
-        candidate known = {.scale = as_start ? def->place_scale[p] : finest_size, .parent = parent,
+        candidate known = {.scale = as_start ? def->place_scale[p] : finest_size,
+                           .parent = parent,
                            .gradient = steepest_gradient(g, parent, !as_start)};
         memcpy(known.position, def->place + 3 * p, sizeof known.position);
         if (known.gradient >= threshold)
@@ -242,19 +258,25 @@ static gbt_status add_new_anchor(growth *g, const cell *c, int level, float size
     float position[3];
     for (int k = 0; k < 3; k++) /* there is surface; the middle of a cell is where the cell is */
         position[k] = def->compat ? (float)c->at[k] * size : c->position[k];
-    if (level < def->level_count && def->may_stand != NULL && !def->may_stand(def->may_stand_context, position))
+    if (level < def->level_count && def->may_stand != NULL &&
+        !def->may_stand(def->may_stand_context, position))
         return GBT_OK;
     new_anchors *n = g->out;
     void *rows = n->rows;
     GBT_TRY(mem_reserve(&rows, &n->capacity, n->count, n->count + 1, sizeof *n->rows, "growth", err));
     n->rows = rows;
     new_anchor *f = &n->rows[n->count++];
-    *f = (new_anchor){.position = {position[0], position[1], position[2]}, .scale = c->scale, .gradient = c->gradient, .level = level,
-                      .at = {c->at[0], c->at[1], c->at[2]}, .feature = c->feature};
+    *f = (new_anchor){.position = {position[0], position[1], position[2]},
+                      .scale = c->scale,
+                      .gradient = c->gradient,
+                      .level = level,
+                      .at = {c->at[0], c->at[1], c->at[2]},
+                      .feature = c->feature};
     return GBT_OK;
 }
 
-/* The level after the last is that of places: they stand closer than v where there is much to see, so their cells are finer. */
+/* The level after the last is that of places: they stand closer than v where there is much to see, so their
+   cells are finer. */
 static gbt_status grow_level(growth *g, int level, gbt_error *err)
 {
     const float size = level_cell_size(g->def, level);
@@ -278,7 +300,8 @@ static gbt_status grow_level(growth *g, int level, gbt_error *err)
     return GBT_OK;
 }
 
-gbt_status new_anchors_find(const anchors *a, const adjust_stats *stats, const adjust_def *def, new_anchors *out, gbt_error *err)
+gbt_status new_anchors_find(const anchors *a, const adjust_stats *stats, const adjust_def *def,
+                            new_anchors *out, gbt_error *err)
 {
     growth g = {.a = a, .stats = stats, .def = def, .out = out};
     const int levels = def->level_count + (def->place_count > 0);

@@ -1,4 +1,6 @@
-/* anchor/new_anchors.h -- where growing would put anchors, and what they begin with; nothing of the model changes here. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/new_anchors.h -- where growing would put anchors, and what they begin with; nothing of the model
+   changes here. */
 #ifndef GBT_ANCHOR_NEW_ANCHORS_H
 #define GBT_ANCHOR_NEW_ANCHORS_H
 
@@ -17,8 +19,8 @@ typedef struct new_anchor {
 typedef struct new_anchors {
     new_anchor *rows;
     size_t count, capacity;
-    float *feature; /* [feature_count][ANCHOR_FEATURE_DIM]: maxima over the parents of a cell's candidates; cells that hold an
-                       anchor already have rows too */
+    float *feature; /* [feature_count][ANCHOR_FEATURE_DIM]: maxima over the parents of a cell's candidates;
+                       cells that hold an anchor already have rows too */
     size_t feature_count, feature_capacity;
 } new_anchors;
 
@@ -35,7 +37,8 @@ static inline bool adjust_well_sampled(const adjust_def *def, float grad_count)
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Deterministic. Cost: O(N K) and one hash set per level.
  */
-gbt_status new_anchors_find(const anchors *a, const adjust_stats *stats, const adjust_def *def, new_anchors *out, gbt_error *err);
+gbt_status new_anchors_find(const anchors *a, const adjust_stats *stats, const adjust_def *def,
+                            new_anchors *out, gbt_error *err);
 
 /** At most `room` stay: those with the largest gradients, ties by level, then cell. */
 void new_anchors_keep_largest(new_anchors *n, size_t room);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/rows.c -- memory of the arrays that have one row per anchor. */
 #include "anchor/rows.h"
 
@@ -5,8 +6,8 @@
 
 #include "base/memory.h"
 
-gbt_status rows_resize(float **const fields[ROWS_FIELDS], const size_t widths[ROWS_FIELDS], size_t *capacity, size_t used, size_t count,
-                       const char *what, gbt_error *err)
+gbt_status rows_resize(float **const fields[ROWS_FIELDS], const size_t widths[ROWS_FIELDS], size_t *capacity,
+                       size_t used, size_t count, const char *what, gbt_error *err)
 {
     const size_t kept = count < used ? count : used;
     if (count > *capacity || *fields[0] == NULL) {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/rows.h -- float arrays that have one row per anchor and grow together. */
 #ifndef GBT_ANCHOR_ROWS_H
 #define GBT_ANCHOR_ROWS_H
@@ -16,7 +17,7 @@ enum { ROWS_FIELDS = 4 };
  * @param capacity [in,out] rows allocated; grows by half at least
  * @return GBT_OK or GBT_ERR_NO_MEMORY: then nothing has changed
  */
-gbt_status rows_resize(float **const fields[ROWS_FIELDS], const size_t widths[ROWS_FIELDS], size_t *capacity, size_t used, size_t count,
-                       const char *what, gbt_error *err);
+gbt_status rows_resize(float **const fields[ROWS_FIELDS], const size_t widths[ROWS_FIELDS], size_t *capacity,
+                       size_t used, size_t count, const char *what, gbt_error *err);
 
 #endif

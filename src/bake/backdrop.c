@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bake/backdrop.c -- a sphere of Gaussians of the background's colour around everything. */
 #include "bake/backdrop.h"
 
@@ -6,29 +7,33 @@
 
 #include "base/fail.h"
 
-/* On a sphere of radius 1 the Gaussians are sqrt(4 pi / BACKDROP_COUNT) = 0.112 apart. At this standard deviation they overlap so far that
-   nothing shines through between them. */
+/* On a sphere of radius 1 the Gaussians are sqrt(4 pi / BACKDROP_COUNT) = 0.112 apart. At this standard
+   deviation they overlap so far that nothing shines through between them. */
 static const double deviation = 0.135;
 static const float opacity = 0.99f;
 
 static double distance(const double a[3], const double b[3])
 {
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
+                (a[2] - b[2]) * (a[2] - b[2]));
 }
 
-static double radius_around(const gaussian_cloud *cloud, const gbt_camera *cameras, size_t count, const double middle[3])
+static double radius_around(const gaussian_cloud *cloud, const gbt_camera *cameras, size_t count,
+                            const double middle[3])
 {
     double radius = 0;
     for (size_t i = 0; i < cloud->count; i++) {
         const float *m = cloud->mean + 3 * i;
-        radius = fmax(radius, 2 * distance(middle, (const double[3]){(double)m[0], (double)m[1], (double)m[2]}));
+        radius =
+            fmax(radius, 2 * distance(middle, (const double[3]){(double)m[0], (double)m[1], (double)m[2]}));
     }
     for (size_t i = 0; i < count; i++)
         radius = fmax(radius, 4 * distance(middle, cameras[i].center));
     return fmax(radius, 1e-6);
 }
 
-gbt_status backdrop_add(gaussian_cloud *cloud, const gbt_camera *cameras, size_t count, const float color[3], gbt_error *err)
+gbt_status backdrop_add(gaussian_cloud *cloud, const gbt_camera *cameras, size_t count, const float color[3],
+                        gbt_error *err)
 {
     const size_t n = cloud->count, sh_width = GAUSSIAN_SH_COUNT * 3;
     double middle[3] = {0};
@@ -44,7 +49,8 @@ gbt_status backdrop_add(gaussian_cloud *cloud, const gbt_camera *cameras, size_t
     memcpy(all.sh, cloud->sh, n * sh_width * sizeof *all.sh);
     for (size_t i = 0; i < BACKDROP_COUNT; i++) { /* evenly over the sphere: a Fibonacci spiral */
         const size_t to = n + i;
-        const double z = 1 - (2 * (double)i + 1) / BACKDROP_COUNT, across = sqrt(1 - z * z), turn = (double)i * 2.399963229728653;
+        const double z = 1 - (2 * (double)i + 1) / BACKDROP_COUNT, across = sqrt(1 - z * z),
+                     turn = (double)i * 2.399963229728653;
         const double direction[3] = {across * cos(turn), across * sin(turn), z};
         float *sh = memset(all.sh + to * sh_width, 0, sh_width * sizeof *all.sh);
         for (int k = 0; k < 3; k++) {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bake/bake.c -- means over the cameras that see a Gaussian.
 
    cameras --> decode, trace, weights --> sums per Gaussian --+
@@ -21,13 +22,13 @@ static const double ridge = 1e-4; /* of the mean of the diagonal: keeps directio
 
 /* What is known of one Gaussian so far. */
 typedef struct sums {
-    double weight;             /* of the views in which it was made: w */
-    double opaque;             /* w / opacity */
-    double covariance[6];      /* w (xx xy xz yy yz zz) */
-    double normal[PAIRS];      /* w y_k y_l, l <= k */
-    double color[TERMS][3];    /* w y_k (c - 0.5) */
+    double weight;          /* of the views in which it was made: w */
+    double opaque;          /* w / opacity */
+    double covariance[6];   /* w (xx xy xz yy yz zz) */
+    double normal[PAIRS];   /* w y_k y_l, l <= k */
+    double color[TERMS][3]; /* w y_k (c - 0.5) */
     float mean[3];
-    uint32_t kept;             /* views in which it was made */
+    uint32_t kept; /* views in which it was made */
 } sums;
 
 typedef struct baking {
@@ -37,10 +38,7 @@ typedef struct baking {
     uint32_t *visible; /* [anchor] views in which it was decoded */
 } baking;
 
-bake_def bake_def_default(void)
-{
-    return (bake_def){.sh_degree = 3, .prior = 0.3};
-}
+bake_def bake_def_default(void) { return (bake_def){.sh_degree = 3, .prior = 0.3}; }
 
 static void add_color(const baking *b, sums *s, const float direction[3], const float color[3], double weight)
 {
@@ -56,13 +54,15 @@ static void add_color(const baking *b, sums *s, const float direction[3], const 
 
 static void add_covariance(sums *s, const gaussians *g, size_t i, double weight)
 {
-    const float q[4] = {g->quat_w[i], g->quat_x[i], g->quat_y[i], g->quat_z[i]}, scale[3] = {g->scale_x[i], g->scale_y[i], g->scale_z[i]};
+    const float q[4] = {g->quat_w[i], g->quat_x[i], g->quat_y[i], g->quat_z[i]},
+                scale[3] = {g->scale_x[i], g->scale_y[i], g->scale_z[i]};
     float r[9];
     quat_to_matrix(q, r);
     for (int row = 0, at = 0; row < 3; row++)
         for (int column = row; column < 3; column++, at++)
             for (int k = 0; k < 3; k++)
-                s->covariance[at] += weight * (double)r[3 * row + k] * (double)r[3 * column + k] * (double)scale[k] * (double)scale[k];
+                s->covariance[at] += weight * (double)r[3 * row + k] * (double)r[3 * column + k] *
+                                     (double)scale[k] * (double)scale[k];
 }
 
 static void direction_to(const double eye[3], const float mean[3], float out[3])
@@ -76,7 +76,8 @@ static void direction_to(const double eye[3], const float mean[3], float out[3])
 }
 
 /* One camera: what it makes of each Gaussian, and how much of that it sees. */
-static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_camera *camera, const trace_settings *settings, gbt_error *err)
+static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_camera *camera,
+                           const trace_settings *settings, gbt_error *err)
 {
     gbt_camera sparse = *camera;
     f->draw.pixel_step = gbt_camera_every(camera, PIXEL_STEP, 0, 0, &sparse) ? PIXEL_STEP : 1;
@@ -91,7 +92,9 @@ static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_came
         sums *s = &b->sums[f->visible[row] * k_count + k];
         const double weight = (double)f->seen[i];
         s->kept++;
-        s->mean[0] = g->mean_x[i], s->mean[1] = g->mean_y[i], s->mean[2] = g->mean_z[i];
+        s->mean[0] = g->mean_x[i];
+        s->mean[1] = g->mean_y[i];
+        s->mean[2] = g->mean_z[i];
         if (!(weight > 0))
             continue;
         float direction[3];
@@ -108,15 +111,19 @@ static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_came
 static void spread_direction(int i, double out[3])
 {
     const double z = 1 - (2 * i + 1.0) / DIRECTIONS, r = sqrt(1 - z * z), turn = i * 2.399963229728653;
-    out[0] = r * cos(turn), out[1] = r * sin(turn), out[2] = z;
+    out[0] = r * cos(turn);
+    out[1] = r * sin(turn);
+    out[2] = z;
 }
 
-/* All Gaussians from so far away that one direction leads to all; the networks are told a distance of the middle of those trained. */
+/* All Gaussians from so far away that one direction leads to all; the networks are told a distance of the
+   middle of those trained. */
 static gbt_status add_directions(baking *b, frame *f, const decoder *trained, double prior, gbt_error *err)
 {
     decoder d = *trained;
     const float middle = 0.5f * (trained->distance_min + fminf(trained->distance_max, 1e30f));
-    d.distance_min = 2 * middle, d.distance_max = 0.5f * middle; /* distances are cut to [min / 2, 2 max] */
+    d.distance_min = 2 * middle;
+    d.distance_max = 0.5f * middle; /* distances are cut to [min / 2, 2 max] */
     float size = 1;
     for (size_t i = 0; i < 3 * b->a->count; i++)
         size = fmaxf(size, fabsf(b->a->position[i]));
@@ -130,12 +137,14 @@ static gbt_status add_directions(baking *b, frame *f, const decoder *trained, do
         double toward[3];
         spread_direction(n, toward);
         const float direction[3] = {(float)toward[0], (float)toward[1], (float)toward[2]};
-        const float far[3] = {-1e4f * size * direction[0], -1e4f * size * direction[1], -1e4f * size * direction[2]};
+        const float far[3] = {-1e4f * size * direction[0], -1e4f * size * direction[1],
+                              -1e4f * size * direction[2]};
         status = decode_forward(b->a, &d, far, all, b->a->count, 0, &f->gaussians, &f->tape, err);
         for (size_t i = 0; i < f->gaussians.count && status == GBT_OK; i++) {
             sums *s = &b->sums[f->tape.slot[i]]; /* every anchor is in its own row */
             if (s->weight > 0)
-                add_color(b, s, direction, (const float[3]){f->gaussians.red[i], f->gaussians.green[i], f->gaussians.blue[i]},
+                add_color(b, s, direction,
+                          (const float[3]){f->gaussians.red[i], f->gaussians.green[i], f->gaussians.blue[i]},
                           prior * s->weight / DIRECTIONS);
         }
     }
@@ -180,20 +189,26 @@ static void solve_shape(const sums *s, float scale_log[3], float quat[4])
     const double *c = s->covariance;
     double m[9] = {c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5]}, v[9];
     symmetric_eigen(m, v, 3, 1e-15);
-    const double det = v[0] * (v[4] * v[8] - v[5] * v[7]) - v[1] * (v[3] * v[8] - v[5] * v[6]) + v[2] * (v[3] * v[7] - v[4] * v[6]);
+    const double det = v[0] * (v[4] * v[8] - v[5] * v[7]) - v[1] * (v[3] * v[8] - v[5] * v[6]) +
+                       v[2] * (v[3] * v[7] - v[4] * v[6]);
     for (int k = 0; k < 3 && det < 0; k++)
         v[3 * k + 2] = -v[3 * k + 2];
     double largest = fmax(m[0], fmax(m[4], m[8]));
     largest = largest > 0 ? largest : s->weight;
     for (int k = 0; k < 3; k++)
-        scale_log[k] = (float)(0.5 * log(fmax(m[4 * k], largest / (GAUSSIAN_SCALE_RATIO * GAUSSIAN_SCALE_RATIO)) / s->weight));
+        scale_log[k] =
+            (float)(0.5 *
+                    log(fmax(m[4 * k], largest / (GAUSSIAN_SCALE_RATIO * GAUSSIAN_SCALE_RATIO)) / s->weight));
     /* The largest of the four is found first, from the diagonal: nothing is divided by something small. */
-    const double four[4] = {1 + v[0] + v[4] + v[8], 1 + v[0] - v[4] - v[8], 1 - v[0] + v[4] - v[8], 1 - v[0] - v[4] + v[8]};
+    const double four[4] = {1 + v[0] + v[4] + v[8], 1 + v[0] - v[4] - v[8], 1 - v[0] + v[4] - v[8],
+                            1 - v[0] - v[4] + v[8]};
     int big = 0;
     for (int k = 1; k < 4; k++)
         big = four[k] > four[big] ? k : big;
-    const double wx = v[7] - v[5], wy = v[2] - v[6], wz = v[3] - v[1], xy = v[3] + v[1], xz = v[2] + v[6], yz = v[7] + v[5];
-    const double rows[4][4] = {{four[0], wx, wy, wz}, {wx, four[1], xy, xz}, {wy, xy, four[2], yz}, {wz, xz, yz, four[3]}};
+    const double wx = v[7] - v[5], wy = v[2] - v[6], wz = v[3] - v[1], xy = v[3] + v[1], xz = v[2] + v[6],
+                 yz = v[7] + v[5];
+    const double rows[4][4] = {
+        {four[0], wx, wy, wz}, {wx, four[1], xy, xz}, {wy, xy, four[2], yz}, {wz, xz, yz, four[3]}};
     double norm = 0;
     for (int k = 0; k < 4; k++)
         norm += rows[big][k] * rows[big][k];
@@ -201,8 +216,8 @@ static void solve_shape(const sums *s, float scale_log[3], float quat[4])
         quat[k] = (float)(rows[big][k] / sqrt(norm));
 }
 
-/* Over the views in which the anchor was decoded: where the Gaussian was not made its opacity was 0, and it would have been as large as
-   elsewhere. */
+/* Over the views in which the anchor was decoded: where the Gaussian was not made its opacity was 0, and it
+   would have been as large as elsewhere. */
 static float opacity_of(const sums *s, uint32_t visible)
 {
     const double missed = visible > s->kept && s->kept > 0 ? (double)(visible - s->kept) / s->kept : 0;
@@ -237,12 +252,14 @@ static gbt_status solve(const baking *b, int sh_degree, bake_result *out, gbt_er
     return GBT_OK;
 }
 
-gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_camera *cameras, size_t camera_count,
-                      const trace_settings *settings, const bake_def *def, bake_result *out, gbt_error *err)
+gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_camera *cameras,
+                      size_t camera_count, const trace_settings *settings, const bake_def *def,
+                      bake_result *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
     if (def->sh_degree < 0 || def->sh_degree > 3 || !(def->prior >= 0 && def->prior <= 1))
-        return base_fail(err, GBT_ERR_ARGUMENT, "bake: degree %d, prior %g (wanted 0 to 3, 0 to 1)", def->sh_degree, def->prior);
+        return base_fail(err, GBT_ERR_ARGUMENT, "bake: degree %d, prior %g (wanted 0 to 3, 0 to 1)",
+                         def->sh_degree, def->prior);
     baking b = {.a = a, .functions = sh_count(def->sh_degree)};
     b.sums = mem_calloc(a->count * (size_t)a->offset_count, sizeof *b.sums, "Gaussians to bake", err);
     b.visible = mem_calloc(a->count, sizeof *b.visible, "anchors to bake", err);

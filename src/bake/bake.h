@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bake/bake.h -- an anchor model as plain Gaussians, which every viewer draws without its networks. */
 #ifndef GBT_BAKE_BAKE_H
 #define GBT_BAKE_BAKE_H
@@ -7,8 +8,8 @@
 
 typedef struct bake_def {
     int sh_degree; /* of the colours, [0, 3]. Default 3 */
-    double prior;  /* [0, 1]: weight of directions that no camera had, against those that some had. Without it colours there explode.
-                      Default 0.3 */
+    double prior;  /* [0, 1]: weight of directions that no camera had, against those that some had. Without it
+                      colours there explode. Default 0.3 */
 } bake_def;
 bake_def bake_def_default(void);
 
@@ -18,18 +19,20 @@ typedef struct bake_result {
 } bake_result;
 
 /**
- * One plain Gaussian for each neural one that some camera sees. Its place is exact: in these models it does not depend on the view. What
- * does is averaged over the cameras, each with the weight that the Gaussian has in its picture (sum of T alpha over every second ray):
- * opacity as a mean over what would be seen if it were opaque, shape as the mean of covariances, colour as the least-squares fit of
- * spherical harmonics, to which 64 directions spread over the sphere are added with the weight `prior`.
+ * One plain Gaussian for each neural one that some camera sees. Its place is exact: in these models it does
+ * not depend on the view. What does is averaged over the cameras, each with the weight that the Gaussian has
+ * in its picture (sum of T alpha over every second ray): opacity as a mean over what would be seen if it were
+ * opaque, shape as the mean of covariances, colour as the least-squares fit of spherical harmonics, to which
+ * 64 directions spread over the sphere are added with the weight `prior`.
  *
  * @param f       [in,out] any frame; its drawing is kept, but for the renderer: weights are traced
  * @param cameras [in] those of the training photos
  * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, no Gaussian is seen), GBT_ERR_NO_MEMORY
- * Threads: uses all; same bits for every thread count. Memory: 1.5 kB per neural Gaussian. Cost: a forward and an adjoint pass of a quarter
- * of the pixels per camera.
+ * Threads: uses all; same bits for every thread count. Memory: 1.5 kB per neural Gaussian. Cost: a forward
+ * and an adjoint pass of a quarter of the pixels per camera.
  */
-gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_camera *cameras, size_t camera_count,
-                      const trace_settings *settings, const bake_def *def, bake_result *out, gbt_error *err);
+gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_camera *cameras,
+                      size_t camera_count, const trace_settings *settings, const bake_def *def,
+                      bake_result *out, gbt_error *err);
 
 #endif

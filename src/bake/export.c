@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bake/export.c -- bake a run or read plain Gaussians, write them, and say what was lost. */
 #include "gbtrace/export.h"
 
@@ -29,7 +30,8 @@ gbt_export_def gbt_export_def_default(void)
 typedef struct exported {
     const char *path;
     gaussian_cloud back;         /* of a file that we read */
-    const gaussian_cloud *shown; /* in the model's coordinates: `back`, or what was written, where floats stay floats */
+    const gaussian_cloud *shown; /* in the model's coordinates: `back`, or what was written, where floats stay
+                                    floats */
     double to_model, to_photo;
     long long bytes;
 } exported;
@@ -38,7 +40,7 @@ typedef struct exporting {
     const gbt_export_def *def;
     loaded_run run; /* with `baked` */
     bool baked, backdrop;
-    trace_settings viewer; /* how files are drawn: as other programs do, on black */
+    trace_settings viewer;    /* how files are drawn: as other programs do, on black */
     gaussian_cloud clouds[2]; /* with colours of the degree asked for, and with one colour */
     exported files[OUTPUTS_MAX];
     size_t file_count;
@@ -53,9 +55,10 @@ typedef struct exporting {
     lpips_scores *lpips;  /* [view_count], with it */
 } exporting;
 
-/* ---- from a run to Gaussians --------------------------------------------------------------------------------------------------------- */
+/* ---- from a run to Gaussians ---- */
 
-/* Held-out views, at most VIEWS_MAX evenly chosen, but all for a result folder; training views when there are none. */
+/* Held-out views, at most VIEWS_MAX evenly chosen, but all for a result folder; training views when there are
+   none. */
 static gbt_status choose_views(exporting *e, gbt_error *err)
 {
     const scene *s = &e->run.scene;
@@ -117,14 +120,17 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
     bake.sh_degree = sh_degree;
     bake_result result = {0};
     double clock = clock_wall();
-    gbt_status status = bake_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count, &r->settings, &bake, &result, err);
-    *out = result.cloud, e->unseen = result.unseen;
+    gbt_status status = bake_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count,
+                                   &r->settings, &bake, &result, err);
+    *out = result.cloud;
+    e->unseen = result.unseen;
     e->bake_seconds = clock_wall() - clock;
     clock = clock_wall();
     refine_def refine = refine_def_default();
     refine.steps = e->def->refine_steps;
     if (status == GBT_OK)
-        status = refine_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count, &r->settings, &refine, out, err);
+        status = refine_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count, &r->settings,
+                              &refine, out, err);
     e->refine_seconds = clock_wall() - clock;
     if (status == GBT_OK && e->backdrop)
         status = backdrop_add(out, cameras, count, r->model.background, err);
@@ -132,11 +138,11 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
     return status;
 }
 
-/* ---- what is lost -------------------------------------------------------------------------------------------------------------------- */
+/* ---- what is lost ---- */
 
 /* One view of the model and of every file. */
-static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *camera, image *photo, const unsigned char *valid,
-                               gbt_error *err)
+static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *camera, image *photo,
+                               const unsigned char *valid, gbt_error *err)
 {
     const double share = 1 / (double)e->view_count;
     image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb;
@@ -167,7 +173,8 @@ static gbt_status compare(exporting *e, gbt_error *err)
         image photo = {0};
         unsigned char *valid = NULL;
         GBT_TRY(loaded_run_render(&e->run, e->views[i], err));
-        gbt_status status = scene_read_photo_valid(&e->run.scene.views[e->views[i]], camera.width, camera.height, &photo, &valid, err);
+        gbt_status status = scene_read_photo_valid(&e->run.scene.views[e->views[i]], camera.width,
+                                                   camera.height, &photo, &valid, err);
         if (status == GBT_OK)
             status = compare_view(e, i, &camera, &photo, valid, err);
         image_free(&photo);
@@ -177,16 +184,18 @@ static gbt_status compare(exporting *e, gbt_error *err)
     return GBT_OK;
 }
 
-/* ---- entry --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- entry ---- */
 
-static gbt_status check(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, gbt_error *err)
+static gbt_status check(const char *input, const gbt_export_def *def, const char *const *outputs,
+                        size_t output_count, gbt_error *err)
 {
     if (def->sh_degree < 0 || def->sh_degree > 3)
         return base_fail(err, GBT_ERR_ARGUMENT, "--sh-degree: %d (wanted 0 to 3)", def->sh_degree);
     if (def->refine_steps < 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "--refine: %d (wanted 0 or more)", def->refine_steps);
     if (output_count < 1 || output_count > OUTPUTS_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu files to write (wanted 1 to %d)", input, output_count, (int)OUTPUTS_MAX);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu files to write (wanted 1 to %d)", input,
+                         output_count, (int)OUTPUTS_MAX);
     size_t folders = 0;
     for (size_t i = 0; i < output_count; i++) {
         folders += export_folder_is(outputs[i]);
@@ -202,8 +211,10 @@ static void say_source(const exporting *e, const gaussian_cloud *cloud, const ch
 {
     fprintf(report, "%s: %zu Gaussians, colours of degree %d", input, cloud->count, cloud->sh_degree);
     if (e->baked)
-        fprintf(report, "; %s%zu that no training camera sees are left out; baked in %.1f s, refined in %.1f s",
-                e->backdrop ? "1000 of them the background; " : "", e->unseen, e->bake_seconds, e->refine_seconds);
+        fprintf(report,
+                "; %s%zu that no training camera sees are left out; baked in %.1f s, refined in %.1f s",
+                e->backdrop ? "1000 of them the background; " : "", e->unseen, e->bake_seconds,
+                e->refine_seconds);
     else if (cloud->dropped > 0)
         fprintf(report, "; %zu unusable rows dropped", cloud->dropped);
     fprintf(report, "\n");
@@ -231,7 +242,8 @@ static gbt_status write_file(exporting *e, const char *path, const gaussian_clou
 
 static json_t *file_to_json(const exporting *e, const exported *f)
 {
-    json_t *row = json_pack("{s:s,s:I,s:i}", "file", f->path, "bytes", (json_int_t)f->bytes, "sh_degree", f->shown->sh_degree);
+    json_t *row = json_pack("{s:s,s:I,s:i}", "file", f->path, "bytes", (json_int_t)f->bytes, "sh_degree",
+                            f->shown->sh_degree);
     if (e->baked && e->view_count > 0) {
         json_object_set_new(row, "psnr_to_model", json_real(f->to_model));
         json_object_set_new(row, "psnr_to_photos", json_real(f->to_photo));
@@ -244,7 +256,8 @@ static void say_file(const exporting *e, const exported *f, FILE *report)
 {
     fprintf(report, "%s: %.2f MB", f->path, (double)f->bytes / 1e6);
     if (e->baked && e->view_count > 0) {
-        fprintf(report, "; %zu %s views: %.2f dB to the model", e->view_count, e->held_out ? "held-out" : "training", f->to_model);
+        fprintf(report, "; %zu %s views: %.2f dB to the model", e->view_count,
+                e->held_out ? "held-out" : "training", f->to_model);
         if (!e->run.def.exposure)
             fprintf(report, ", %.2f dB to the photos (the model: %.2f)", f->to_photo, e->model_to_photo);
         fprintf(report, ", drawn on %s", e->viewer.background[0] > 0 ? "white" : "black");
@@ -252,10 +265,10 @@ static void say_file(const exporting *e, const exported *f, FILE *report)
     fprintf(report, "\n");
 }
 
-/* All files whose format keeps colours of this degree, or only `flat` ones. Where a format keeps one colour, that colour is fitted: the
-   first term of a longer series is not the best constant. */
-static gbt_status write_kind(exporting *e, const char *input, bool flat, const char *const *outputs, size_t output_count, FILE *report,
-                             gbt_error *err)
+/* All files whose format keeps colours of this degree, or only `flat` ones. Where a format keeps one colour,
+   that colour is fitted: the first term of a longer series is not the best constant. */
+static gbt_status write_kind(exporting *e, const char *input, bool flat, const char *const *outputs,
+                             size_t output_count, FILE *report, gbt_error *err)
 {
     bool any = false;
     for (size_t i = 0; i < output_count; i++)
@@ -286,8 +299,8 @@ static gbt_status report_all(const exporting *e, const char *input, FILE *report
     gbt_status status = GBT_OK;
     if (e->def->json != NULL) {
         const size_t count = e->file_count > 0 ? e->files[e->file_count - 1].shown->count : 0;
-        json_t *root = json_pack("{s:i,s:s,s:I,s:I,s:O}", "schema", 1, "input", input, "gaussians", (json_int_t)count, "unseen",
-                                 (json_int_t)e->unseen, "files", files);
+        json_t *root = json_pack("{s:i,s:s,s:I,s:I,s:O}", "schema", 1, "input", input, "gaussians",
+                                 (json_int_t)count, "unseen", (json_int_t)e->unseen, "files", files);
         status = json_save(root, e->def->json, err);
         json_decref(root);
     }
@@ -310,8 +323,8 @@ static void exporting_free(exporting *e)
     mem_free(e);
 }
 
-gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs, size_t output_count, FILE *report,
-                      gbt_error *err)
+gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs,
+                      size_t output_count, FILE *report, gbt_error *err)
 {
     GBT_TRY(check(input, def, outputs, output_count, err));
     exporting *e = mem_calloc(1, sizeof *e, "export", err);
@@ -324,8 +337,9 @@ gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *
             e->folder = outputs[i];
     gbt_status status = GBT_OK;
     if (def->lpips != NULL)
-        status = e->folder != NULL ? lpips_open(def->lpips, &e->net, err)
-                                   : base_fail(err, GBT_ERR_ARGUMENT, "--lpips: is for result folders alone (wanted OUT/)");
+        status = e->folder != NULL
+                     ? lpips_open(def->lpips, &e->net, err)
+                     : base_fail(err, GBT_ERR_ARGUMENT, "--lpips: is for result folders alone (wanted OUT/)");
     if (status == GBT_OK && e->baked)
         status = open_run(e, input, err);
     for (int flat = 0; flat < 2 && status == GBT_OK; flat++)
@@ -333,7 +347,8 @@ gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *
     if (status == GBT_OK && e->baked)
         status = compare(e, err);
     if (status == GBT_OK && e->folder != NULL && e->held_out)
-        status = export_folder_scores(e->folder, &e->run, e->scores, e->net != NULL ? e->lpips : NULL, e->view_count, err);
+        status = export_folder_scores(e->folder, &e->run, e->scores, e->net != NULL ? e->lpips : NULL,
+                                      e->view_count, err);
     if (status == GBT_OK)
         status = report_all(e, input, report, err);
     exporting_free(e);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bake/export_folder.c -- the files of a 3DGS result folder, as its tools read them. */
 #include "bake/export_folder.h"
 
@@ -22,9 +23,10 @@ bool export_folder_is(const char *path)
     return length > 0 && path[length - 1] == '/';
 }
 
-/* ---- what the run was ---------------------------------------------------------------------------------------------------------------- */
+/* ---- what the run was ---- */
 
-/* The text of Python's Namespace(...), which the tools evaluate: a quote or a backslash in a path is not for them. */
+/* The text of Python's Namespace(...), which the tools evaluate: a quote or a backslash in a path is not for
+   them. */
 static void put_path(const char *path, char *out, size_t size)
 {
     char full[PATH_SIZE];
@@ -39,12 +41,13 @@ static gbt_status write_settings(const char *folder, const loaded_run *r, int sh
 {
     char path[PATH_SIZE], source[PATH_SIZE], result[PATH_SIZE], text[3 * PATH_SIZE];
     float laid_on[3] = {0};
-    const bool white = scene_background(&r->scene, laid_on) && laid_on[0] > 0; /* any other background is in the file, or black */
+    const bool white = scene_background(&r->scene, laid_on) &&
+                       laid_on[0] > 0; /* any other background is in the file, or black */
     put_path(r->scene.folder, source, sizeof source);
     put_path(folder, result, sizeof result);
     snprintf(text, sizeof text,
-             "Namespace(sh_degree=%d, source_path='%s', model_path='%s', images='images', resolution=-1, white_background=%s, "
-             "data_device='cpu', eval=True)",
+             "Namespace(sh_degree=%d, source_path='%s', model_path='%s', images='images', resolution=-1, "
+             "white_background=%s, data_device='cpu', eval=True)",
              sh_degree, source, result, white ? "True" : "False");
     GBT_TRY(file_join(path, sizeof path, folder, "cfg_args", err));
     return file_write_atomic(path, text, strlen(text), err);
@@ -64,9 +67,10 @@ static json_t *camera_to_json(const loaded_run *r, size_t view, size_t id)
     for (int k = 0; k < 3; k++)
         at[k] = c.center[k] + r->model.origin[k];
     const double *w = c.rotation;
-    return json_pack("{s:i,s:o,s:i,s:i,s:[f,f,f],s:[[f,f,f],[f,f,f],[f,f,f]],s:f,s:f}", "id", (int)id, "img_name", json_text(name), "width",
-                     c.width, "height", c.height, "position", at[0], at[1], at[2], "rotation", w[0], w[3], w[6], w[1], w[4], w[7], w[2],
-                     w[5], w[8], "fy", tan_half[1] > 0 ? c.height / (2 * tan_half[1]) : 0.0, "fx",
+    return json_pack("{s:i,s:o,s:i,s:i,s:[f,f,f],s:[[f,f,f],[f,f,f],[f,f,f]],s:f,s:f}", "id", (int)id,
+                     "img_name", json_text(name), "width", c.width, "height", c.height, "position", at[0],
+                     at[1], at[2], "rotation", w[0], w[3], w[6], w[1], w[4], w[7], w[2], w[5], w[8], "fy",
+                     tan_half[1] > 0 ? c.height / (2 * tan_half[1]) : 0.0, "fx",
                      tan_half[0] > 0 ? c.width / (2 * tan_half[0]) : 0.0);
 }
 
@@ -93,14 +97,19 @@ static gbt_status write_points(const char *folder, const loaded_run *r, gbt_erro
     if (zeros == NULL)
         return GBT_ERR_NO_MEMORY;
     const ply_extra normals[] = {{"nx", zeros, 1}, {"ny", zeros, 1}, {"nz", zeros, 1}};
-    ply_cloud cloud = {.vertex_count = p->count, .position = p->position, .color = p->color, .extra_count = 3, .extras = normals};
+    ply_cloud cloud = {.vertex_count = p->count,
+                       .position = p->position,
+                       .color = p->color,
+                       .extra_count = 3,
+                       .extras = normals};
     memcpy(cloud.origin, r->model.origin, sizeof cloud.origin);
     const gbt_status status = ply_write(path, &cloud, err);
     mem_free(zeros);
     return status;
 }
 
-static gbt_status write_cloud(const char *folder, const loaded_run *r, const gaussian_cloud *cloud, long long *bytes, gbt_error *err)
+static gbt_status write_cloud(const char *folder, const loaded_run *r, const gaussian_cloud *cloud,
+                              long long *bytes, gbt_error *err)
 {
     char place[PATH_SIZE], path[PATH_SIZE], name[64];
     snprintf(name, sizeof name, "point_cloud/iteration_%llu", (unsigned long long)r->model.iterations);
@@ -114,7 +123,8 @@ static gbt_status write_cloud(const char *folder, const loaded_run *r, const gau
     return GBT_OK;
 }
 
-gbt_status export_folder_write(const char *folder, const loaded_run *r, const gaussian_cloud *cloud, long long *bytes, gbt_error *err)
+gbt_status export_folder_write(const char *folder, const loaded_run *r, const gaussian_cloud *cloud,
+                               long long *bytes, gbt_error *err)
 {
     GBT_TRY(write_cloud(folder, r, cloud, bytes, err));
     GBT_TRY(write_cameras(folder, r, err));
@@ -122,10 +132,10 @@ gbt_status export_folder_write(const char *folder, const loaded_run *r, const ga
     return write_settings(folder, r, cloud->sh_degree, err);
 }
 
-/* ---- how it looks -------------------------------------------------------------------------------------------------------------------- */
+/* ---- how it looks ---- */
 
-static gbt_status write_picture(const char *folder, const loaded_run *r, const char *kind, size_t index, const image *picture,
-                                gbt_error *err)
+static gbt_status write_picture(const char *folder, const loaded_run *r, const char *kind, size_t index,
+                                const image *picture, gbt_error *err)
 {
     char place[PATH_SIZE], path[PATH_SIZE], name[96];
     snprintf(name, sizeof name, "test/ours_%llu/%s", (unsigned long long)r->model.iterations, kind);
@@ -136,8 +146,8 @@ static gbt_status write_picture(const char *folder, const loaded_run *r, const c
     return image_write(path, picture, err);
 }
 
-gbt_status export_folder_picture(const char *folder, const loaded_run *r, size_t index, const image *render, const image *photo,
-                                 gbt_error *err)
+gbt_status export_folder_picture(const char *folder, const loaded_run *r, size_t index, const image *render,
+                                 const image *photo, gbt_error *err)
 {
     GBT_TRY(write_picture(folder, r, "renders", index, render, err));
     return write_picture(folder, r, "gt", index, photo, err);
@@ -156,11 +166,14 @@ static void add_score(score_list *list, size_t index, double value)
     char picture[32];
     snprintf(picture, sizeof picture, "%05zu.png", index);
     json_object_set_new(list->values, picture, json_number(value));
-    if (isfinite(value))
-        list->sum += value, list->scored++;
+    if (isfinite(value)) {
+        list->sum += value;
+        list->scored++;
+    }
 }
 
-static gbt_status save_under(const char *folder, const char *name, const char *method, json_t *values, gbt_error *err)
+static gbt_status save_under(const char *folder, const char *name, const char *method, json_t *values,
+                             gbt_error *err)
 {
     char path[PATH_SIZE];
     GBT_TRY(file_join(path, sizeof path, folder, name, err));
@@ -170,11 +183,12 @@ static gbt_status save_under(const char *folder, const char *name, const char *m
     return status;
 }
 
-gbt_status export_folder_scores(const char *folder, const loaded_run *r, const image_scores *scores, const lpips_scores *with_network,
-                                size_t count, gbt_error *err)
+gbt_status export_folder_scores(const char *folder, const loaded_run *r, const image_scores *scores,
+                                const lpips_scores *with_network, size_t count, gbt_error *err)
 {
     char method[64];
-    score_list lists[] = {{.name = "SSIM", .values = json_object()}, {.name = "PSNR", .values = json_object()},
+    score_list lists[] = {{.name = "SSIM", .values = json_object()},
+                          {.name = "PSNR", .values = json_object()},
                           {.name = "LPIPS", .values = json_object()}};
     json_t *means = json_object(), *values = json_object();
     for (size_t i = 0; i < count; i++) {

@@ -1,5 +1,6 @@
-/* bake/export_folder.h -- the folder that the reference implementation of 3DGS leaves behind, so that what was made for its results works
-   on ours. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* bake/export_folder.h -- the folder that the reference implementation of 3DGS leaves behind, so that what
+   was made for its results works on ours. */
 #ifndef GBT_BAKE_EXPORT_FOLDER_H
 #define GBT_BAKE_EXPORT_FOLDER_H
 
@@ -18,17 +19,18 @@ bool export_folder_is(const char *path);
  * @param cloud [in]  in the model's coordinates
  * @param bytes [out] of point_cloud.ply
  */
-gbt_status export_folder_write(const char *folder, const loaded_run *r, const gaussian_cloud *cloud, long long *bytes, gbt_error *err);
+gbt_status export_folder_write(const char *folder, const loaded_run *r, const gaussian_cloud *cloud,
+                               long long *bytes, gbt_error *err);
 
 /** test/ours_N/renders/INDEX.png and test/ours_N/gt/INDEX.png, five digits. */
-gbt_status export_folder_picture(const char *folder, const loaded_run *r, size_t index, const image *render, const image *photo,
-                                 gbt_error *err);
+gbt_status export_folder_picture(const char *folder, const loaded_run *r, size_t index, const image *render,
+                                 const image *photo, gbt_error *err);
 
 /**
- * results.json and per_view.json: means and values of the `count` pictures: SSIM, PSNR, and LPIPS as 3DGS feeds it unless `with_network` is
- * NULL.
+ * results.json and per_view.json: means and values of the `count` pictures: SSIM, PSNR, and LPIPS as 3DGS
+ * feeds it unless `with_network` is NULL.
  */
-gbt_status export_folder_scores(const char *folder, const loaded_run *r, const image_scores *scores, const lpips_scores *with_network,
-                                size_t count, gbt_error *err);
+gbt_status export_folder_scores(const char *folder, const loaded_run *r, const image_scores *scores,
+                                const lpips_scores *with_network, size_t count, gbt_error *err);
 
 #endif

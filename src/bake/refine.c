@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bake/refine.c -- one step: both pictures, the loss between them, back, Adam. */
 #include "bake/refine.h"
 
@@ -15,7 +16,9 @@
 enum { BLOCK = 512, PIXEL_STEP = 2, STREAM = 1, REST = 3 * (GAUSSIAN_SH_COUNT - 1) };
 
 static const double dssim_weight = 0.2, rate_end = 0.1; /* rates fall to this share */
-static const struct { double opacity, scale, rotation, color, harmonics; } first_rates = {0.04, 0.006, 0.002, 0.005, 0.0025};
+static const struct {
+    double opacity, scale, rotation, color, harmonics;
+} first_rates = {0.04, 0.006, 0.002, 0.005, 0.0025};
 
 typedef struct refining {
     gaussian_cloud *cloud, gradient, moment1, moment2;
@@ -26,10 +29,7 @@ typedef struct refining {
     adam_rates opacity, scale, rotation, color, harmonics;
 } refining;
 
-refine_def refine_def_default(void)
-{
-    return (refine_def){.steps = 500};
-}
+refine_def refine_def_default(void) { return (refine_def){.steps = 500}; }
 
 static gbt_status open_state(refining *r, gaussian_cloud *cloud, gbt_error *err)
 {
@@ -74,8 +74,10 @@ static void step_block(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end; i++)
         g->opacity[i] *= p->opacity[i] * (1 - p->opacity[i]); /* of the logit */
     adam_step(r->logit + begin, g->opacity + begin, m->opacity + begin, v->opacity + begin, n, r->opacity);
-    adam_step(p->scale_log + 3 * begin, g->scale_log + 3 * begin, m->scale_log + 3 * begin, v->scale_log + 3 * begin, 3 * n, r->scale);
-    adam_step(p->quat + 4 * begin, g->quat + 4 * begin, m->quat + 4 * begin, v->quat + 4 * begin, 4 * n, r->rotation);
+    adam_step(p->scale_log + 3 * begin, g->scale_log + 3 * begin, m->scale_log + 3 * begin,
+              v->scale_log + 3 * begin, 3 * n, r->scale);
+    adam_step(p->quat + 4 * begin, g->quat + 4 * begin, m->quat + 4 * begin, v->quat + 4 * begin, 4 * n,
+              r->rotation);
     for (size_t i = begin; i < end; i++) {
         const size_t at = i * sh_width;
         adam_step(p->sh + at, g->sh + at, m->sh + at, v->sh + at, 3, r->color);
@@ -100,27 +102,32 @@ static void set_rates(refining *r, int step, int steps)
     r->harmonics = adam_rates_at(fall * first_rates.harmonics, t);
 }
 
-static gbt_status refine_step(refining *r, frame *teacher, const anchors *a, const decoder *d, const gbt_camera *camera,
-                              const trace_settings *settings, const uint32_t words[4], gbt_error *err)
+static gbt_status refine_step(refining *r, frame *teacher, const anchors *a, const decoder *d,
+                              const gbt_camera *camera, const trace_settings *settings,
+                              const uint32_t words[4], gbt_error *err)
 {
     gbt_camera sparse = *camera;
-    const bool some = gbt_camera_every(camera, PIXEL_STEP, (int)(words[1] % PIXEL_STEP), (int)(words[2] % PIXEL_STEP), &sparse);
+    const bool some = gbt_camera_every(camera, PIXEL_STEP, (int)(words[1] % PIXEL_STEP),
+                                       (int)(words[2] % PIXEL_STEP), &sparse);
     teacher->draw.pixel_step = r->frame.draw.pixel_step = some ? PIXEL_STEP : 1;
     GBT_TRY(frame_render(teacher, frame_neural(a, d), &sparse, settings, false, err));
     GBT_TRY(frame_render(&r->frame, frame_plain(r->cloud), &sparse, settings, true, err));
     GBT_TRY(image_fit(&r->d_image, sparse.width, sparse.height, 3, err));
     image_loss_result loss;
-    GBT_TRY(image_loss(&r->frame.rgb, &teacher->rgb, NULL, dssim_weight, &r->scratch, &r->d_image, &loss, err));
+    GBT_TRY(
+        image_loss(&r->frame.rgb, &teacher->rgb, NULL, dssim_weight, &r->scratch, &r->d_image, &loss, err));
     GBT_TRY(frame_backward_plain(&r->frame, r->cloud, &r->d_image, &r->gradient, err));
     parallel_blocks(r->cloud->count, BLOCK, step_block, r);
     return GBT_OK;
 }
 
-gbt_status refine_cloud(frame *teacher, const anchors *a, const decoder *d, const gbt_camera *cameras, size_t camera_count,
-                        const trace_settings *settings, const refine_def *def, gaussian_cloud *cloud, gbt_error *err)
+gbt_status refine_cloud(frame *teacher, const anchors *a, const decoder *d, const gbt_camera *cameras,
+                        size_t camera_count, const trace_settings *settings, const refine_def *def,
+                        gaussian_cloud *cloud, gbt_error *err)
 {
     if (def->steps < 0 || camera_count == 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "refine: %d steps, %zu cameras (wanted 0 or more, 1 or more)", def->steps, camera_count);
+        return base_fail(err, GBT_ERR_ARGUMENT, "refine: %d steps, %zu cameras (wanted 0 or more, 1 or more)",
+                         def->steps, camera_count);
     refining r = {.frame.draw.footprint = teacher->draw.footprint};
     gbt_status status = open_state(&r, cloud, err);
     const int pixel_step = teacher->draw.pixel_step;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/camera.c -- a camera's rays and pixels; the same camera at other sizes. */
 #include "base/camera_lens.h"
 #include "base/camera_model.h"
@@ -38,25 +39,33 @@ gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height)
     if (focal_count == 0 || width <= 0 || height <= 0 || camera->width <= 0 || camera->height <= 0)
         return out;
     const double by_x = (double)width / camera->width, by_y = (double)height / camera->height;
-    out.width = width, out.height = height;
+    out.width = width;
+    out.height = height;
     if (focal_count == 1) {
         /* Rounding a size to whole pixels makes the two ratios differ a little; the mean halves the error. */
-        out.params[0] *= 0.5 * (by_x + by_y), out.params[1] *= by_x, out.params[2] *= by_y;
+        out.params[0] *= 0.5 * (by_x + by_y);
+        out.params[1] *= by_x;
+        out.params[2] *= by_y;
         return out;
     }
-    out.params[0] *= by_x, out.params[1] *= by_y;
-    if (gbt_camera_param_count(camera->model) > 2)
-        out.params[2] *= by_x, out.params[3] *= by_y;
+    out.params[0] *= by_x;
+    out.params[1] *= by_y;
+    if (gbt_camera_param_count(camera->model) > 2) {
+        out.params[2] *= by_x;
+        out.params[3] *= by_y;
+    }
     return out;
 }
 
 bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_camera *out)
 {
     const int focal_count = camera_focal_count(camera->model);
-    if (gbt_camera_param_count(camera->model) < 3 || step < 1 || camera->width < step || camera->height < step)
+    if (gbt_camera_param_count(camera->model) < 3 || step < 1 || camera->width < step ||
+        camera->height < step)
         return false;
     *out = *camera;
-    out->width = camera->width / step, out->height = camera->height / step;
+    out->width = camera->width / step;
+    out->height = camera->height / step;
     /* The middle of pixel i of `out`, i + 0.5, is the middle of pixel x + step i of `camera`. */
     for (int i = 0; i < focal_count; i++)
         out->params[i] /= step;
@@ -70,7 +79,8 @@ bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_came
     if (!gbt_camera_every(camera, 1, 0, 0, out))
         return false;
     const int focal_count = camera_focal_count(camera->model);
-    out->params[focal_count] -= dx, out->params[focal_count + 1] -= dy;
+    out->params[focal_count] -= dx;
+    out->params[focal_count + 1] -= dy;
     return true;
 }
 

@@ -1,10 +1,13 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/camera_lens.c -- the lens of all models as one pipeline: direction to pixel, pixel to direction.
 
-   direction --[kind: X/Z | theta | closed form]--> plane point --[radial N/D, tangential, prism]--> distorted --[f, c]--> pixel
+   direction --[kind: X/Z | theta | closed form]--> plane point
+        --[radial N/D, tangential, prism]--> distorted --[f, c]--> pixel
 
-   A model is a row of parameters for that one pipeline (camera_lens_prepare), so the inversion is written once. The radial part
-   is only used up to the first radius where it stops increasing: beyond it the formula folds back into the image, and a point
-   there would be drawn on top of others. docs/cameras.md has the formulas. */
+   A model is a row of parameters for that one pipeline (camera_lens_prepare), so the inversion is written
+   once. The radial part is only used up to the first radius where it stops increasing: beyond it the formula
+   folds back into the image, and a point there would be drawn on top of others. docs/cameras.md has the
+   formulas. */
 #include "base/camera_lens.h"
 
 #include <math.h>
@@ -18,17 +21,22 @@
 /* A perspective ray flatter than this (1e-6 rad from the image plane) is outside every real image. */
 static const double perspective_radius_max = 1e6;
 
-/* Accepted reprojection error of an inversion: absolute part in pixels, and a relative one for points far outside the image. */
+/* Accepted reprojection error of an inversion: absolute part in pixels, and a relative one for points far
+   outside the image. */
 static const double converged_px = 1e-10, converged_relative = 1e-14;
 
 /* Radial factor f(x) = N / D at x = squared radius, and df/dx. */
 static double radial_factor(const camera_lens *lens, double x, double *d_factor)
 {
     double n = 0, dn = 0, d = 0, dd = 0;
-    for (int i = LENS_NUMERATOR - 1; i >= 0; i--)
-        dn = dn * x + n, n = n * x + lens->numerator[i];
-    for (int i = LENS_DENOMINATOR - 1; i >= 0; i--)
-        dd = dd * x + d, d = d * x + lens->denominator[i];
+    for (int i = LENS_NUMERATOR - 1; i >= 0; i--) {
+        dn = dn * x + n;
+        n = n * x + lens->numerator[i];
+    }
+    for (int i = LENS_DENOMINATOR - 1; i >= 0; i--) {
+        dd = dd * x + d;
+        d = d * x + lens->denominator[i];
+    }
     const double factor = n / d;
     *d_factor = (dn - factor * dd) / d;
     return factor;
@@ -36,7 +44,8 @@ static double radial_factor(const camera_lens *lens, double x, double *d_factor)
 
 enum { SLOPE_COUNT = LENS_NUMERATOR + LENS_DENOMINATOR - 1 };
 
-/* The distorted radius r f(r^2) has slope f + 2 x f' = (N D + 2 x (N' D - N D')) / D^2: find its first zero, and that of D. */
+/* The distorted radius r f(r^2) has slope f + 2 x f' = (N D + 2 x (N' D - N D')) / D^2: find its first zero,
+   and that of D. */
 static void find_monotone_range(camera_lens *lens, double radius_limit)
 {
     double slope[SLOPE_COUNT] = {0};
@@ -52,11 +61,13 @@ static void find_monotone_range(camera_lens *lens, double radius_limit)
         lens->distorted_max = HUGE_VAL;
     } else {
         lens->radius_max = turn < limit ? sqrt(turn) : radius_limit;
-        lens->distorted_max = lens->radius_max * radial_factor(lens, lens->radius_max * lens->radius_max, &d_factor);
+        lens->distorted_max =
+            lens->radius_max * radial_factor(lens, lens->radius_max * lens->radius_max, &d_factor);
     }
 }
 
-static void set_radial(camera_lens *lens, const double *first, int first_count, const double *second, int second_count)
+static void set_radial(camera_lens *lens, const double *first, int first_count, const double *second,
+                       int second_count)
 {
     for (int i = 0; i < first_count; i++)
         lens->numerator[1 + i] = first[i];
@@ -74,7 +85,8 @@ static bool any_nonzero(const double *values, int count)
 
 bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
 {
-    const int focal_count = camera_focal_count(camera->model), param_count = gbt_camera_param_count(camera->model);
+    const int focal_count = camera_focal_count(camera->model),
+              param_count = gbt_camera_param_count(camera->model);
     if (focal_count == 0)
         return false;
     const double *p = camera->params;
@@ -83,7 +95,8 @@ bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
             return false;
     memset(lens, 0, sizeof *lens);
     lens->numerator[0] = lens->denominator[0] = 1;
-    lens->fx = p[0], lens->fy = p[focal_count - 1];
+    lens->fx = p[0];
+    lens->fy = p[focal_count - 1];
     if (!(lens->fx > 0 && lens->fy > 0))
         return false;
     if (camera->model == GBT_CAMERA_EQUIRECTANGULAR) {
@@ -91,7 +104,8 @@ bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
         return true;
     }
     p += focal_count;
-    lens->cx = p[0], lens->cy = p[1];
+    lens->cx = p[0];
+    lens->cy = p[1];
     const double *k = p + 2;
     switch (camera->model) {
     case GBT_CAMERA_ORTHOGRAPHIC:
@@ -109,12 +123,14 @@ bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
     case GBT_CAMERA_OPENCV:
         lens->kind = LENS_PERSPECTIVE;
         set_radial(lens, k, 2, NULL, 0);
-        lens->tangent_y = k[2], lens->tangent_x = k[3];
+        lens->tangent_y = k[2];
+        lens->tangent_x = k[3];
         break;
     case GBT_CAMERA_FULL_OPENCV:
         lens->kind = LENS_PERSPECTIVE;
         set_radial(lens, k, 2, k + 4, 1);
-        lens->tangent_y = k[2], lens->tangent_x = k[3];
+        lens->tangent_y = k[2];
+        lens->tangent_x = k[3];
         memcpy(lens->denominator + 1, k + 5, 3 * sizeof *k);
         break;
     case GBT_CAMERA_FOV:
@@ -138,13 +154,16 @@ bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
     case GBT_CAMERA_THIN_PRISM_FISHEYE:
         lens->kind = LENS_FISHEYE;
         set_radial(lens, k, 2, k + 4, 2);
-        lens->tangent_y = k[2], lens->tangent_x = k[3];
-        lens->prism[0] = k[6], lens->prism[2] = k[7];
+        lens->tangent_y = k[2];
+        lens->tangent_x = k[3];
+        lens->prism[0] = k[6];
+        lens->prism[2] = k[7];
         break;
     case GBT_CAMERA_RAD_TAN_THIN_PRISM_FISHEYE:
         lens->kind = LENS_FISHEYE;
         set_radial(lens, k, 6, NULL, 0);
-        lens->tangent_x = k[6], lens->tangent_y = k[7];
+        lens->tangent_x = k[6];
+        lens->tangent_y = k[7];
         memcpy(lens->prism, k + 8, sizeof lens->prism);
         lens->extra_last = true;
         break;
@@ -155,49 +174,56 @@ bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
         return true;
     case GBT_CAMERA_EUCM:
         lens->kind = k[0] == 0 ? LENS_PERSPECTIVE : LENS_EUCM;
-        lens->shape[0] = k[0], lens->shape[1] = k[1];
+        lens->shape[0] = k[0];
+        lens->shape[1] = k[1];
         return k[0] >= 0 && k[0] <= 1 && k[1] > 0;
     default:
         return false;
     }
-    lens->radial = any_nonzero(lens->numerator + 1, LENS_NUMERATOR - 1) || any_nonzero(lens->denominator + 1, LENS_DENOMINATOR - 1);
+    lens->radial = any_nonzero(lens->numerator + 1, LENS_NUMERATOR - 1) ||
+                   any_nonzero(lens->denominator + 1, LENS_DENOMINATOR - 1);
     lens->extra = lens->tangent_x != 0 || lens->tangent_y != 0 || any_nonzero(lens->prism, 4);
     const double radius_limit = lens->kind == LENS_FISHEYE ? PI : perspective_radius_max;
     if (lens->radial)
         find_monotone_range(lens, radius_limit);
     else
-        lens->radius_max = lens->distorted_max = lens->kind == LENS_FISHEYE || lens->extra ? radius_limit : HUGE_VAL;
+        lens->radius_max = lens->distorted_max =
+            lens->kind == LENS_FISHEYE || lens->extra ? radius_limit : HUGE_VAL;
     return true;
 }
 
-/* Tangential and prism terms at (x, y), and I + their Jacobian (row-major), which is what is missing for the map p + extra(p). */
+/* Tangential and prism terms at (x, y), and I + their Jacobian (row-major), which is what is missing for the
+   map p + extra(p). */
 static void extra_terms(const camera_lens *lens, double x, double y, double out[2], double jacobian[4])
 {
     const double r2 = x * x + y * y, tx = lens->tangent_x, ty = lens->tangent_y, *s = lens->prism;
     out[0] = tx * (r2 + 2 * x * x) + 2 * ty * x * y + (s[0] + s[1] * r2) * r2;
     out[1] = ty * (r2 + 2 * y * y) + 2 * tx * x * y + (s[2] + s[3] * r2) * r2;
     const double px = 2 * (s[0] + 2 * s[1] * r2), py = 2 * (s[2] + 2 * s[3] * r2);
-    jacobian[0] = 1 + 6 * tx * x + 2 * ty * y + px * x, jacobian[1] = 2 * tx * y + 2 * ty * x + px * y;
-    jacobian[2] = 2 * ty * x + 2 * tx * y + py * x, jacobian[3] = 1 + 6 * ty * y + 2 * tx * x + py * y;
+    jacobian[0] = 1 + 6 * tx * x + 2 * ty * y + px * x;
+    jacobian[1] = 2 * tx * y + 2 * ty * x + px * y;
+    jacobian[2] = 2 * ty * x + 2 * tx * y + py * x;
+    jacobian[3] = 1 + 6 * ty * y + 2 * tx * x + py * y;
 }
 
-/* One stage that mixes x and y: p f(|p|^2) + extra(p), with f = 1 when the radial part is a stage of its own. */
+/* One stage that mixes x and y: p f(|p|^2) + extra(p), with f = 1 when the radial part is a stage of its
+   own. */
 static void mixed_stage(const camera_lens *lens, const double p[2], double out[2], double jacobian[4])
 {
     double d_factor = 0, factor = 1;
     if (!lens->extra_last)
         factor = radial_factor(lens, p[0] * p[0] + p[1] * p[1], &d_factor);
     extra_terms(lens, p[0], p[1], out, jacobian);
-    out[0] += p[0] * factor, out[1] += p[1] * factor;
-    jacobian[0] += factor - 1 + 2 * d_factor * p[0] * p[0], jacobian[1] += 2 * d_factor * p[0] * p[1];
-    jacobian[2] += 2 * d_factor * p[0] * p[1], jacobian[3] += factor - 1 + 2 * d_factor * p[1] * p[1];
+    out[0] += p[0] * factor;
+    out[1] += p[1] * factor;
+    jacobian[0] += factor - 1 + 2 * d_factor * p[0] * p[0];
+    jacobian[1] += 2 * d_factor * p[0] * p[1];
+    jacobian[2] += 2 * d_factor * p[0] * p[1];
+    jacobian[3] += factor - 1 + 2 * d_factor * p[1] * p[1];
 }
 
 /* Both eigenvalues have a positive real part: the map has not folded over. */
-static bool unfolded(const double j[4])
-{
-    return j[0] * j[3] - j[1] * j[2] > 0 && j[0] + j[3] > 0;
-}
+static bool unfolded(const double j[4]) { return j[0] * j[3] - j[1] * j[2] > 0 && j[0] + j[3] > 0; }
 
 static bool distort(const camera_lens *lens, double p[2])
 {
@@ -207,12 +233,14 @@ static bool distort(const camera_lens *lens, double p[2])
         return false;
     if (lens->radial && (!lens->extra || lens->extra_last)) {
         const double factor = radial_factor(lens, r2, &d_factor);
-        p[0] *= factor, p[1] *= factor;
+        p[0] *= factor;
+        p[1] *= factor;
     }
     if (!lens->extra)
         return true;
     mixed_stage(lens, p, out, jacobian);
-    p[0] = out[0], p[1] = out[1];
+    p[0] = out[0];
+    p[1] = out[1];
     return unfolded(jacobian);
 }
 
@@ -222,7 +250,8 @@ static double tolerance_of(const camera_lens *lens, double radius)
     return converged_px / fmax(lens->fx, lens->fy) + converged_relative * radius;
 }
 
-/* Solve r f(r^2) = wanted in [0, radius_max], where the left side increases: Newton, kept inside a shrinking bracket. */
+/* Solve r f(r^2) = wanted in [0, radius_max], where the left side increases: Newton, kept inside a shrinking
+   bracket. */
 static bool invert_radius(const camera_lens *lens, double wanted, double *radius)
 {
     if (!(wanted <= lens->distorted_max))
@@ -251,12 +280,15 @@ static bool invert_radial(const camera_lens *lens, double p[2])
     double radius;
     if (!invert_radius(lens, wanted, &radius))
         return false;
-    if (wanted > 0)
-        p[0] *= radius / wanted, p[1] *= radius / wanted;
+    if (wanted > 0) {
+        p[0] *= radius / wanted;
+        p[1] *= radius / wanted;
+    }
     return true;
 }
 
-/* Newton on the 2x2 Jacobian from `p`, each step halved until it comes nearer; ends when rounding stops all progress. */
+/* Newton on the 2x2 Jacobian from `p`, each step halved until it comes nearer; ends when rounding stops all
+   progress. */
 static bool invert_mixed(const camera_lens *lens, const double wanted[2], double p[2])
 {
     double out[2], j[4];
@@ -264,7 +296,8 @@ static bool invert_mixed(const camera_lens *lens, const double wanted[2], double
     double rx = out[0] - wanted[0], ry = out[1] - wanted[1];
     for (int i = 0; i < 50 && (rx != 0 || ry != 0); i++) {
         const double determinant = j[0] * j[3] - j[1] * j[2];
-        const double step_x = (j[3] * rx - j[1] * ry) / determinant, step_y = (j[0] * ry - j[2] * rx) / determinant;
+        const double step_x = (j[3] * rx - j[1] * ry) / determinant,
+                     step_y = (j[0] * ry - j[2] * rx) / determinant;
         bool nearer = false;
         for (double part = 1; part > 1e-3 && !nearer; part *= 0.5) {
             const double tried[2] = {p[0] - part * step_x, p[1] - part * step_y};
@@ -272,8 +305,13 @@ static bool invert_mixed(const camera_lens *lens, const double wanted[2], double
             mixed_stage(lens, tried, out, tried_j);
             const double tx = out[0] - wanted[0], ty = out[1] - wanted[1];
             nearer = tx * tx + ty * ty < rx * rx + ry * ry;
-            if (nearer)
-                p[0] = tried[0], p[1] = tried[1], rx = tx, ry = ty, memcpy(j, tried_j, sizeof j);
+            if (nearer) {
+                p[0] = tried[0];
+                p[1] = tried[1];
+                rx = tx;
+                ry = ty;
+                memcpy(j, tried_j, sizeof j);
+            }
         }
         if (!nearer)
             break;
@@ -288,7 +326,8 @@ static bool undistort(const camera_lens *lens, double p[2])
         if (lens->radial && !lens->extra_last && !invert_radial(lens, p)) {
             /* The extra terms may reach a little beyond the radial range: start inside it. */
             const double scale = 0.9 * lens->radius_max / hypot(wanted[0], wanted[1]);
-            p[0] = wanted[0] * scale, p[1] = wanted[1] * scale;
+            p[0] = wanted[0] * scale;
+            p[1] = wanted[1] * scale;
         }
         if (!invert_mixed(lens, wanted, p))
             return false;
@@ -304,7 +343,8 @@ static bool unproject_fov(const camera_lens *lens, double p[2])
     if (!(wanted * omega < 0.5 * PI))
         return false;
     const double scale = wanted > 0 ? tan(wanted * omega) / (2 * tan(0.5 * omega) * wanted) : 1;
-    p[0] *= scale, p[1] *= scale;
+    p[0] *= scale;
+    p[1] *= scale;
     return true;
 }
 
@@ -316,7 +356,8 @@ static bool unproject_eucm(const camera_lens *lens, const double p[2], double *z
     if (!(under >= 0))
         return false;
     const double below = alpha * sqrt(under) + 1 - alpha;
-    *z = below > 0 ? (1 - alpha * alpha * b) / below : 0; /* 0 / 0 only for alpha = 1 on the rim, at 90 degrees */
+    *z = below > 0 ? (1 - alpha * alpha * b) / below
+                   : 0; /* 0 / 0 only for alpha = 1 on the rim, at 90 degrees */
     return true;
 }
 
@@ -327,10 +368,13 @@ bool camera_lens_unproject(const camera_lens *lens, double px, double py, double
         if (!(px >= 0 && px <= lens->fx && py >= 0 && py <= lens->fy))
             return false;
         const double longitude = (px / lens->fx - 0.5) * (2 * PI), down = (py / lens->fy - 0.5) * PI;
-        dir_cam[0] = cos(down) * sin(longitude), dir_cam[1] = sin(down), dir_cam[2] = cos(down) * cos(longitude);
+        dir_cam[0] = cos(down) * sin(longitude);
+        dir_cam[1] = sin(down);
+        dir_cam[2] = cos(down) * cos(longitude);
         return true;
     }
-    p[0] = (px - lens->cx) / lens->fx, p[1] = (py - lens->cy) / lens->fy;
+    p[0] = (px - lens->cx) / lens->fx;
+    p[1] = (py - lens->cy) / lens->fy;
     if (!(fabs(p[0]) < 1e100 && fabs(p[1]) < 1e100)) /* not a number, or its square is not */
         return false;
     double z = 1;
@@ -366,10 +410,14 @@ bool camera_lens_unproject(const camera_lens *lens, double px, double py, double
         if (!(theta <= PI))
             return false;
         const double scale = theta > 0 ? sin(theta) / theta : 1;
-        dir[0] = p[0] * scale, dir[1] = p[1] * scale, dir[2] = cos(theta);
+        dir[0] = p[0] * scale;
+        dir[1] = p[1] * scale;
+        dir[2] = cos(theta);
     } else {
         const double length = sqrt(p[0] * p[0] + p[1] * p[1] + z * z);
-        dir[0] = p[0] / length, dir[1] = p[1] / length, dir[2] = z / length;
+        dir[0] = p[0] / length;
+        dir[1] = p[1] / length;
+        dir[2] = z / length;
     }
     memcpy(dir_cam, dir, sizeof dir);
     return true;
@@ -398,7 +446,8 @@ static bool project_closed(const camera_lens *lens, const double point[3], doubl
     const double alpha = lens->shape[0], rho = sqrt(lens->shape[1] * rho2 + z * z);
     const double below = alpha * rho + (1 - alpha) * z;
     *scale = 1 / below;
-    /* For alpha > 1/2 the image radius is largest where alpha z = -(1 - alpha) rho, and shrinks behind that. */
+    /* For alpha > 1/2 the image radius is largest where alpha z = -(1 - alpha) rho, and shrinks behind
+       that. */
     return below > 0 && (alpha <= 0.5 || alpha * z >= -(1 - alpha) * rho);
 }
 
@@ -418,36 +467,42 @@ bool camera_lens_project(const camera_lens *lens, const double point_cam[3], dou
     case LENS_FOV:
         if (!(z > 0))
             return false;
-        p[0] = x / z, p[1] = y / z;
+        p[0] = x / z;
+        p[1] = y / z;
         break;
     case LENS_ORTHOGRAPHIC:
         if (!(z > 0))
             return false;
-        p[0] = x, p[1] = y;
+        p[0] = x;
+        p[1] = y;
         break;
     case LENS_FISHEYE:
         if (rho == 0 && z < 0) /* exactly behind: every direction of the image border is equally right */
             return false;
         scale = rho > 0 ? atan2(rho, z) / rho : 0;
-        p[0] = x * scale, p[1] = y * scale;
+        p[0] = x * scale;
+        p[1] = y * scale;
         break;
     case LENS_DIVISION:
     case LENS_EUCM:
         if (!project_closed(lens, point_cam, &scale))
             return false;
-        p[0] = x * scale, p[1] = y * scale;
+        p[0] = x * scale;
+        p[1] = y * scale;
         break;
     }
     if (lens->kind == LENS_FOV) {
         const double omega = lens->shape[0], r = hypot(p[0], p[1]);
         scale = r > 0 ? atan(2 * r * tan(0.5 * omega)) / (r * omega) : 1;
-        p[0] *= scale, p[1] *= scale;
+        p[0] *= scale;
+        p[1] *= scale;
     } else if ((lens->radial || lens->extra) && !distort(lens, p)) {
         return false;
     }
     const double found_x = lens->fx * p[0] + lens->cx, found_y = lens->fy * p[1] + lens->cy;
     if (!(isfinite(found_x) && isfinite(found_y)))
         return false;
-    pixel[0] = found_x, pixel[1] = found_y;
+    pixel[0] = found_x;
+    pixel[1] = found_y;
     return true;
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/camera_lens.h -- a camera's lens in the form that is quick to evaluate for many pixels. */
 #ifndef GBT_BASE_CAMERA_LENS_H
 #define GBT_BASE_CAMERA_LENS_H
@@ -22,32 +23,34 @@ enum { LENS_NUMERATOR = 7, LENS_DENOMINATOR = 4 };
 typedef struct camera_lens {
     lens_kind kind;
     double fx, fy, cx, cy;
-    double shape[2];                      /* FOV: omega; division: k; EUCM: alpha, beta */
-    bool radial, extra;                   /* is there a radial factor; are there tangential or prism terms */
-    bool extra_last;                      /* extra terms are taken at the radially distorted point, not at the undistorted one */
-    double numerator[LENS_NUMERATOR];     /* radial factor N(x) / D(x), x = squared radius, constant term 1 */
+    double shape[2];    /* FOV: omega; division: k; EUCM: alpha, beta */
+    bool radial, extra; /* is there a radial factor; are there tangential or prism terms */
+    bool extra_last; /* extra terms are taken at the radially distorted point, not at the undistorted one */
+    double numerator[LENS_NUMERATOR]; /* radial factor N(x) / D(x), x = squared radius, constant term 1 */
     double denominator[LENS_DENOMINATOR];
-    double tangent_x, tangent_y;          /* x += tx (r2 + 2 x x) + 2 ty x y; y += ty (r2 + 2 y y) + 2 tx x y */
-    double prism[4];                      /* x += s0 r2 + s1 r4; y += s2 r2 + s3 r4 */
-    double radius_max;                    /* undistorted radius up to which the radial part is increasing */
-    double distorted_max;                 /* the distorted radius there; HUGE_VAL at a pole */
+    double tangent_x, tangent_y; /* x += tx (r2 + 2 x x) + 2 ty x y; y += ty (r2 + 2 y y) + 2 tx x y */
+    double prism[4];             /* x += s0 r2 + s1 r4; y += s2 r2 + s3 r4 */
+    double radius_max;           /* undistorted radius up to which the radial part is increasing */
+    double distorted_max;        /* the distorted radius there; HUGE_VAL at a pole */
 } camera_lens;
 
 /**
  * Prepare a lens once for many pixels.
  *
- * @return false for an unknown model, a value that is not finite, a focal length that is not > 0, or shape parameters outside the
- *         model's domain. Such a camera sees nothing.
+ * @return false for an unknown model, a value that is not finite, a focal length that is not > 0, or shape
+ *         parameters outside the model's domain. Such a camera sees nothing.
  * Threads: any. Cost: about a microsecond, some more for the six-coefficient models.
  */
 bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens);
 
 /**
- * Where the ray through an image point starts, in camera axes: the centre (0, 0, 0), or a point of the plane Z = 0 of an orthographic lens.
+ * Where the ray through an image point starts, in camera axes: the centre (0, 0, 0), or a point of the plane
+ * Z = 0 of an orthographic lens.
  */
 void camera_lens_origin(const camera_lens *lens, double px, double py, double origin_cam[3]);
 
-/** Do all rays of the lens have Z > 0, whatever its parameters? Such a lens has a plane in focus; others have a sphere. */
+/** Do all rays of the lens have Z > 0, whatever its parameters? Such a lens has a plane in focus; others have
+    a sphere. */
 static inline bool camera_lens_looks_forward(const camera_lens *lens)
 {
     return lens->kind == LENS_PERSPECTIVE || lens->kind == LENS_FOV || lens->kind == LENS_ORTHOGRAPHIC;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/camera_model.c -- the 18 COLMAP camera models and the orthographic one: names and parameters. */
 #include "base/camera_model.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/camera_model.h -- what the parameters of a camera model are, beside what gbtrace/camera.h tells. */
 #ifndef GBT_BASE_CAMERA_MODEL_H
 #define GBT_BASE_CAMERA_MODEL_H

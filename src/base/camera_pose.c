@@ -1,4 +1,6 @@
-/* base/camera_pose.c -- where a camera stands: from what it looks at, after a small motion, and on the way between two poses. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/camera_pose.c -- where a camera stands: from what it looks at, after a small motion, and on the way
+   between two poses. */
 #include "base/camera_pose.h"
 
 #include <math.h>
@@ -14,7 +16,8 @@ static bool is_finite(const double *values, int count)
     return true;
 }
 
-bool gbt_camera_look_at(const double origin[3], const double target[3], const double up[3], gbt_camera *camera)
+bool gbt_camera_look_at(const double origin[3], const double target[3], const double up[3],
+                        gbt_camera *camera)
 {
     double forward[3], right[3], down[3], upward[3];
     for (int i = 0; i < 3; i++)
@@ -27,7 +30,9 @@ bool gbt_camera_look_at(const double origin[3], const double target[3], const do
     dvec_normalize(right);
     dvec_cross(forward, right, down);
     for (int i = 0; i < 3; i++) {
-        camera->rotation[i] = right[i], camera->rotation[3 + i] = down[i], camera->rotation[6 + i] = forward[i];
+        camera->rotation[i] = right[i];
+        camera->rotation[3 + i] = down[i];
+        camera->rotation[6 + i] = forward[i];
         camera->center[i] = origin[i];
     }
     return true;
@@ -49,8 +54,9 @@ static bool is_rotation(const double m[9])
     return off < 1e-6; /* false for NaN */
 }
 
-/* Axis and angle in [0, pi]. The antisymmetric part is 2 sin(angle) axis, the trace 1 + 2 cos(angle); near pi the former vanishes,
-   and the axis is the longest column of R + R^T - (trace - 1) I = 2 (1 - cos(angle)) axis axis^T. */
+/* Axis and angle in [0, pi]. The antisymmetric part is 2 sin(angle) axis, the trace 1 + 2 cos(angle); near pi
+   the former vanishes, and the axis is the longest column of R + R^T - (trace - 1) I = 2 (1 - cos(angle))
+   axis axis^T. */
 static double axis_angle(const double r[9], double axis[3])
 {
     const double odd[3] = {r[7] - r[5], r[2] - r[6], r[3] - r[1]}, trace = r[0] + r[4] + r[8];
@@ -77,15 +83,18 @@ static double axis_angle(const double r[9], double axis[3])
 bool camera_motion_prepare(const gbt_camera *start, const gbt_camera *end, camera_motion *out)
 {
     double back[9], turn[9];
-    if (!is_rotation(start->rotation) || !is_rotation(end->rotation) || !is_finite(start->center, 3) || !is_finite(end->center, 3))
+    if (!is_rotation(start->rotation) || !is_rotation(end->rotation) || !is_finite(start->center, 3) ||
+        !is_finite(end->center, 3))
         return false;
     for (int i = 0; i < 9; i++)
         back[i] = start->rotation[3 * (i % 3) + i / 3];
     multiply(end->rotation, back, turn);
     out->angle = axis_angle(turn, out->axis);
     memcpy(out->start_rotation, start->rotation, sizeof out->start_rotation);
-    for (int i = 0; i < 3; i++)
-        out->start_center[i] = start->center[i], out->way[i] = end->center[i] - start->center[i];
+    for (int i = 0; i < 3; i++) {
+        out->start_center[i] = start->center[i];
+        out->way[i] = end->center[i] - start->center[i];
+    }
     return true;
 }
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/camera_pose.h -- where a camera stands on the way between two poses. */
 #ifndef GBT_BASE_CAMERA_POSE_H
 #define GBT_BASE_CAMERA_POSE_H
@@ -6,9 +7,11 @@
 
 #include "gbtrace/camera.h"
 
-/** A camera on its way from one pose to another: turning about one axis at one rate (slerp), moving along a line. */
+/** A camera on its way from one pose to another: turning about one axis at one rate (slerp), moving along a
+    line. */
 typedef struct camera_motion {
-    double start_rotation[9], axis[3], angle; /* the turn, in the axes of the starting camera; angle in [0, pi] radians */
+    double start_rotation[9], axis[3],
+        angle; /* the turn, in the axes of the starting camera; angle in [0, pi] radians */
     double start_center[3], way[3];
 } camera_motion;
 

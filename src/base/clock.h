@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/clock.h -- wall time and processor time in seconds. */
 #ifndef GBT_BASE_CLOCK_H
 #define GBT_BASE_CLOCK_H
@@ -12,15 +13,9 @@ static inline double clock_seconds_of(clockid_t clock)
 }
 
 /** Wall time since some fixed moment; never runs backwards. */
-static inline double clock_wall(void)
-{
-    return clock_seconds_of(CLOCK_MONOTONIC);
-}
+static inline double clock_wall(void) { return clock_seconds_of(CLOCK_MONOTONIC); }
 
 /** Processor time of all threads of this process. */
-static inline double clock_process(void)
-{
-    return clock_seconds_of(CLOCK_PROCESS_CPUTIME_ID);
-}
+static inline double clock_process(void) { return clock_seconds_of(CLOCK_PROCESS_CPUTIME_ID); }
 
 #endif

@@ -1,9 +1,10 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/clones.h -- one function in plain C, compiled for several instruction sets; the loader picks. */
 #ifndef GBT_BASE_CLONES_H
 #define GBT_BASE_CLONES_H
 
-/** Before a function. The project compiles without contraction (no fused operations), so every clone gives the same bits. None under
-    ThreadSanitizer, which is not up yet when the loader picks. */
+/** Before a function. The project compiles without contraction (no fused operations), so every clone gives
+    the same bits. None under ThreadSanitizer, which is not up yet when the loader picks. */
 #if defined(__SANITIZE_THREAD__)
 #define FASTEST_CLONE
 #else

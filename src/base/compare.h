@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/compare.h -- orders for qsort(). */
 #ifndef GBT_BASE_COMPARE_H
 #define GBT_BASE_COMPARE_H

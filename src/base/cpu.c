@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/cpu.c -- choose the instruction set of the kernels at run time. */
 #include "base/cpu.h"
 
@@ -39,10 +40,7 @@ void cpu_limit_isa(cpu_isa isa)
     chosen = (int)(isa < best ? isa : best);
 }
 
-const char *cpu_isa_name(cpu_isa isa)
-{
-    return names[isa];
-}
+const char *cpu_isa_name(cpu_isa isa) { return names[isa]; }
 
 void cpu_processor_name(char *out, size_t size)
 {

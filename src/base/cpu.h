@@ -1,4 +1,6 @@
-/* base/cpu.h -- which vector instructions the kernels use: the widest this processor has, or what GBT_ISA says. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/cpu.h -- which vector instructions the kernels use: the widest this processor has, or what GBT_ISA
+   says. */
 #ifndef GBT_BASE_CPU_H
 #define GBT_BASE_CPU_H
 
@@ -6,7 +8,8 @@
 
 typedef enum cpu_isa { CPU_PLAIN = 0, CPU_AVX2 = 1, CPU_AVX512 = 2 } cpu_isa;
 
-/** Chosen once per process: the smaller of what the processor has and the environment variable GBT_ISA (plain, avx2, avx512). */
+/** Chosen once per process: the smaller of what the processor has and the environment variable GBT_ISA
+    (plain, avx2, avx512). */
 cpu_isa cpu_best_isa(void);
 
 /** Test only: pretend the processor has no more than `isa`. Never raises above what it has. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/fail.c -- write and forward gbt_status. */
 #include "base/fail.h"
 
@@ -23,13 +24,20 @@ gbt_status base_fail(gbt_error *err, gbt_status status, const char *format, ...)
 int gbt_status_exit_code(gbt_status status)
 {
     switch (status) {
-    case GBT_OK: return 0;
-    case GBT_ERR_ARGUMENT: return 2;
-    case GBT_ERR_FORMAT: return 3;
-    case GBT_ERR_IO: return 4;
-    case GBT_ERR_NO_MEMORY: return 5;
-    case GBT_ERR_INTERRUPTED: return 130;
-    case GBT_ERR_INTERNAL: return 1;
+    case GBT_OK:
+        return 0;
+    case GBT_ERR_ARGUMENT:
+        return 2;
+    case GBT_ERR_FORMAT:
+        return 3;
+    case GBT_ERR_IO:
+        return 4;
+    case GBT_ERR_NO_MEMORY:
+        return 5;
+    case GBT_ERR_INTERRUPTED:
+        return 130;
+    case GBT_ERR_INTERNAL:
+        return 1;
     }
     return 1;
 }

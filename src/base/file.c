@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/file.c -- whole files to bytes and back. */
 #include "base/file.h"
 
@@ -18,8 +19,10 @@ enum { PATH_LIMIT = 4096 };
 
 gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count, gbt_error *err)
 {
-    *bytes = NULL, *byte_count = 0;
-    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* a FIFO without a writer must not hang us */
+    *bytes = NULL;
+    *byte_count = 0;
+    const int fd =
+        open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* a FIFO without a writer must not hang us */
     if (fd < 0)
         return base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", path, strerror(errno));
     gbt_status status = GBT_OK;
@@ -41,13 +44,15 @@ gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count
         if (got < 0 && errno == EINTR)
             continue;
         if (got <= 0) {
-            status = base_fail(err, GBT_ERR_IO, "%s@%zu: read failed: %s", path, have, got < 0 ? strerror(errno) : "file became shorter");
+            status = base_fail(err, GBT_ERR_IO, "%s@%zu: read failed: %s", path, have,
+                               got < 0 ? strerror(errno) : "file became shorter");
             goto done;
         }
         have += (size_t)got;
     }
     buffer[size] = 0;
-    *bytes = buffer, *byte_count = size;
+    *bytes = buffer;
+    *byte_count = size;
     buffer = NULL;
 done:
     mem_free(buffer);
@@ -55,7 +60,8 @@ done:
     return status;
 }
 
-static gbt_status write_all(int fd, const unsigned char *bytes, size_t byte_count, const char *path, gbt_error *err)
+static gbt_status write_all(int fd, const unsigned char *bytes, size_t byte_count, const char *path,
+                            gbt_error *err)
 {
     size_t done = 0;
     while (done < byte_count) {
@@ -63,7 +69,8 @@ static gbt_status write_all(int fd, const unsigned char *bytes, size_t byte_coun
         if (put < 0 && errno == EINTR)
             continue;
         if (put <= 0)
-            return base_fail(err, GBT_ERR_IO, "%s: write failed: %s", path, strerror(put < 0 ? errno : ENOSPC));
+            return base_fail(err, GBT_ERR_IO, "%s: write failed: %s", path,
+                             strerror(put < 0 ? errno : ENOSPC));
         done += (size_t)put;
     }
     if (fsync(fd) != 0)
@@ -91,7 +98,8 @@ gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_co
     char temporary[PATH_LIMIT];
     const char *slash = strrchr(path, '/');
     const int folder_length = slash == NULL ? 0 : (int)(slash - path) + 1;
-    if (snprintf(temporary, sizeof temporary, "%.*s.%s.tmp", folder_length, path, path + folder_length) >= (int)sizeof temporary)
+    if (snprintf(temporary, sizeof temporary, "%.*s.%s.tmp", folder_length, path, path + folder_length) >=
+        (int)sizeof temporary)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
     const int fd = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (fd < 0)
@@ -117,7 +125,8 @@ gbt_status file_make_folder(const char *path, gbt_error *err)
     for (size_t i = 1;; i++) {
         if (path[i] != '/' && path[i] != '\0')
             continue;
-        memcpy(part, path, i), part[i] = '\0';
+        memcpy(part, path, i);
+        part[i] = '\0';
         if (mkdir(part, 0777) != 0 && errno != EEXIST)
             return base_fail(err, GBT_ERR_IO, "%s: cannot create folder: %s", part, strerror(errno));
         if (path[i] == '\0')
@@ -143,7 +152,8 @@ bool file_is_folder(const char *path)
 bool file_is_same(const char *a, const char *b)
 {
     struct stat first, second;
-    return stat(a, &first) == 0 && stat(b, &second) == 0 && first.st_dev == second.st_dev && first.st_ino == second.st_ino;
+    return stat(a, &first) == 0 && stat(b, &second) == 0 && first.st_dev == second.st_dev &&
+           first.st_ino == second.st_ino;
 }
 
 bool file_largest_number(const char *folder, const char *prefix, unsigned long *out)

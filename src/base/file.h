@@ -1,4 +1,6 @@
-/* base/file.h -- whole files to bytes and back; the only place that opens files by itself (images go through base/image.h). */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/file.h -- whole files to bytes and back; the only place that opens files by itself (images go through
+   base/image.h). */
 #ifndef GBT_BASE_FILE_H
 #define GBT_BASE_FILE_H
 
@@ -7,13 +9,15 @@
 
 #include "gbtrace/status.h"
 
-/** Read a regular file whole. `*bytes` has one extra zero byte at the end (not counted). Free with mem_free(). */
+/** Read a regular file whole. `*bytes` has one extra zero byte at the end (not counted). Free with
+    mem_free(). */
 gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count, gbt_error *err);
 
 /**
  * Replace a file atomically: temporary name in the same folder, write, fsync, rename, fsync of the folder.
  *
- * After any failure, kill or full disk the old file is whole and no temporary file is left by a failure that we see.
+ * After any failure, kill or full disk the old file is whole and no temporary file is left by a failure that
+ * we see.
  */
 gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err);
 

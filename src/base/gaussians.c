@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/gaussians.c -- the padded arrays of Gaussians. */
 #include "base/gaussians.h"
 
@@ -14,7 +15,8 @@ static size_t padded(size_t count)
 gbt_status gaussians_resize(gaussians *g, size_t count, gbt_error *err)
 {
     if (padded(count) > g->capacity || g->mean_x == NULL) {
-        /* One block for all fields: one owner, one free. Grown by an eighth, because the count wanders from view to view. */
+        /* One block for all fields: one owner, one free. Grown by an eighth, because the count wanders from
+           view to view. */
         const size_t capacity = padded(count + count / 8 + 1);
         float *block = mem_alloc(capacity, GAUSSIANS_FIELD_COUNT * sizeof *block, "gaussians", err);
         if (block == NULL)
@@ -48,8 +50,8 @@ void gaussians_zero(gaussians *g)
 gbt_status gaussians_copy(const gaussians *g, gaussians *out, gbt_error *err)
 {
     GBT_TRY(gaussians_resize(out, g->count, err));
-#define X(name, pad, meaning) \
-    if (g->count > 0)         \
+#define X(name, pad, meaning)                                                                                \
+    if (g->count > 0)                                                                                        \
         memcpy(out->name, g->name, g->count * sizeof *g->name);
     GAUSSIANS_FIELDS(X)
 #undef X

@@ -1,7 +1,10 @@
-/* base/gaussians.h -- the arrays of Gaussians that a decode writes and every renderer reads, and their gradients.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/gaussians.h -- the arrays of Gaussians that a decode writes and every renderer reads, and their
+   gradients.
 
-   One float array per field, 64-byte aligned, padded to GAUSSIANS_LANES with Gaussians of opacity 0, so that kernels run whole
-   vectors and the padding adds exactly nothing. The same struct with the same fields holds the gradient dL/dfield. */
+   One float array per field, 64-byte aligned, padded to GAUSSIANS_LANES with Gaussians of opacity 0, so that
+   kernels run whole vectors and the padding adds exactly nothing. The same struct with the same fields holds
+   the gradient dL/dfield. */
 #ifndef GBT_BASE_GAUSSIANS_H
 #define GBT_BASE_GAUSSIANS_H
 
@@ -11,20 +14,20 @@
 
 enum { GAUSSIANS_LANES = 16, GAUSSIANS_FIELD_COUNT = 14 };
 
-#define GAUSSIANS_FIELDS(X) /* X(name, pad value, meaning) */                    \
-    X(mean_x, 0.0f, "centre, scene-local units")                                 \
-    X(mean_y, 0.0f, "")                                                          \
-    X(mean_z, 0.0f, "")                                                          \
-    X(scale_x, 1.0f, "std-dev along the local axes, > 0 (linear, not log)")      \
-    X(scale_y, 1.0f, "")                                                         \
-    X(scale_z, 1.0f, "")                                                         \
-    X(quat_w, 1.0f, "unit quaternion, local to world; its gradient is tangent")  \
-    X(quat_x, 0.0f, "")                                                          \
-    X(quat_y, 0.0f, "")                                                          \
-    X(quat_z, 0.0f, "")                                                          \
-    X(opacity, 0.0f, "[0, 1]")                                                   \
-    X(red, 0.0f, "colour, as it is blended")                                     \
-    X(green, 0.0f, "")                                                           \
+#define GAUSSIANS_FIELDS(X) /* X(name, pad value, meaning) */                                                \
+    X(mean_x, 0.0f, "centre, scene-local units")                                                             \
+    X(mean_y, 0.0f, "")                                                                                      \
+    X(mean_z, 0.0f, "")                                                                                      \
+    X(scale_x, 1.0f, "std-dev along the local axes, > 0 (linear, not log)")                                  \
+    X(scale_y, 1.0f, "")                                                                                     \
+    X(scale_z, 1.0f, "")                                                                                     \
+    X(quat_w, 1.0f, "unit quaternion, local to world; its gradient is tangent")                              \
+    X(quat_x, 0.0f, "")                                                                                      \
+    X(quat_y, 0.0f, "")                                                                                      \
+    X(quat_z, 0.0f, "")                                                                                      \
+    X(opacity, 0.0f, "[0, 1]")                                                                               \
+    X(red, 0.0f, "colour, as it is blended")                                                                 \
+    X(green, 0.0f, "")                                                                                       \
     X(blue, 0.0f, "")
 
 typedef struct gaussians {
@@ -35,7 +38,8 @@ typedef struct gaussians {
 #undef X
 } gaussians;
 
-/** Make room for `count` Gaussians and set count; contents of all fields are then undefined. Start from `gaussians g = {0};`. */
+/** Make room for `count` Gaussians and set count; contents of all fields are then undefined. Start from
+    `gaussians g = {0};`. */
 gbt_status gaussians_resize(gaussians *g, size_t count, gbt_error *err);
 
 /** Write the pad values into [count, count rounded up to GAUSSIANS_LANES). Call after filling the fields. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/image.c -- pixels in memory. */
 #include "base/image.h"
 
@@ -10,11 +11,15 @@ gbt_status image_alloc(image *out, int width, int height, int channels, gbt_erro
 {
     memset(out, 0, sizeof *out);
     if (width < 1 || height < 1 || channels < 1)
-        return base_fail(err, GBT_ERR_ARGUMENT, "image: size %d x %d x %d (wanted all >= 1)", width, height, channels);
-    out->pixels = mem_alloc((size_t)width * (size_t)height, (size_t)channels * sizeof *out->pixels, "image", err);
+        return base_fail(err, GBT_ERR_ARGUMENT, "image: size %d x %d x %d (wanted all >= 1)", width, height,
+                         channels);
+    out->pixels =
+        mem_alloc((size_t)width * (size_t)height, (size_t)channels * sizeof *out->pixels, "image", err);
     if (out->pixels == NULL)
         return GBT_ERR_NO_MEMORY;
-    out->width = width, out->height = height, out->channels = channels;
+    out->width = width;
+    out->height = height;
+    out->channels = channels;
     return GBT_OK;
 }
 

@@ -1,4 +1,6 @@
-/* base/image.h -- pixels in memory, and the file formats behind them (implemented in shim/ on OpenImageIO). */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/image.h -- pixels in memory, and the file formats behind them (implemented in shim/ on
+   OpenImageIO). */
 #ifndef GBT_BASE_IMAGE_H
 #define GBT_BASE_IMAGE_H
 
@@ -10,7 +12,8 @@
 extern "C" {
 #endif
 
-/** Row-major, interleaved float pixels, [height][width][channels]. Colours are display-referred in [0, 1] as stored in 8-bit photos. */
+/** Row-major, interleaved float pixels, [height][width][channels]. Colours are display-referred in [0, 1] as
+    stored in 8-bit photos. */
 typedef struct image {
     int width, height, channels;
     float *pixels; /* owned; free with image_free() */
@@ -28,9 +31,10 @@ gbt_status image_probe(const char *path, int *width, int *height, int *channels,
 /**
  * Read a PNG, JPEG or EXR file.
  *
- * 8- and 16-bit integers become [0, 1]; grey becomes RGB; alpha is kept as a fourth channel. The format is taken from the file's
- * magic, not its name. Orientation tags are not applied (COLMAP's choice). Truncated files, deep or multi-part EXR, and images of
- * more than 2^28 samples are refused. Float values that are not finite become 0, with one warning.
+ * 8- and 16-bit integers become [0, 1]; grey becomes RGB; alpha is kept as a fourth channel. The format is
+ * taken from the file's magic, not its name. Orientation tags are not applied (COLMAP's choice). Truncated
+ * files, deep or multi-part EXR, and images of more than 2^28 samples are refused. Float values that are not
+ * finite become 0, with one warning.
  *
  * @param out [out] 3 or 4 channels; free with image_free(); zeroed on failure
  * @return GBT_OK, GBT_ERR_IO (cannot open), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
@@ -41,7 +45,8 @@ gbt_status image_read(const char *path, image *out, gbt_error *err);
 /**
  * image_read(), and where it replaced values that are not finite by 0.
  *
- * @param valid [out] NULL when every value is finite, else [height][width]: 0 for pixels with a value that is not; free with mem_free()
+ * @param valid [out] NULL when every value is finite, else [height][width]: 0 for pixels with a value that is
+ *                    not; free with mem_free()
  */
 gbt_status image_read_valid(const char *path, image *out, unsigned char **valid, gbt_error *err);
 
@@ -52,7 +57,8 @@ typedef struct image_names {
 } image_names;
 
 /**
- * Read every channel of a 32-bit float EXR as it is: values that are not finite too, nothing scaled or multiplied.
+ * Read every channel of a 32-bit float EXR as it is: values that are not finite too, nothing scaled or
+ * multiplied.
  *
  * Channels come in OpenImageIO's order: R, G, B, A first, the rest as in the file.
  *
@@ -64,8 +70,8 @@ typedef struct image_names {
 gbt_status image_read_raw(const char *path, image *out, image_names *names, gbt_error *err);
 
 /**
- * Write atomically (temporary name in the same folder, then rename). PNG: 8 bit, floor(clamp(x) * 255 + 0.5). EXR: 32-bit float. By
- * extension.
+ * Write atomically (temporary name in the same folder, then rename). PNG: 8 bit, floor(clamp(x) * 255 + 0.5).
+ * EXR: 32-bit float. By extension.
  */
 gbt_status image_write(const char *path, const image *im, gbt_error *err);
 
@@ -73,7 +79,8 @@ gbt_status image_write(const char *path, const image *im, gbt_error *err);
 gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte_count, gbt_error *err);
 
 /** The same as JPEG at the given quality, [1, 100]. */
-gbt_status image_encode_jpeg(const image *im, int quality, unsigned char **bytes, size_t *byte_count, gbt_error *err);
+gbt_status image_encode_jpeg(const image *im, int quality, unsigned char **bytes, size_t *byte_count,
+                             gbt_error *err);
 
 /** Name and version of the library behind these, as it runs: "OpenImageIO 2.4.7". Static. */
 const char *image_library(void);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/log.c -- events to the listener, or to stderr. */
 #include "base/log.h"
 
@@ -24,7 +25,8 @@ static bool line_is_open; /* progress stands at the end of the terminal, without
 
 void gbt_listen(gbt_listener to, void *context)
 {
-    listener = to, listener_context = context;
+    listener = to;
+    listener_context = context;
 }
 
 /* Where a line can be written over. */
@@ -45,9 +47,11 @@ static void print_event(const gbt_event *e)
 {
     const bool over = e->kind == GBT_EVENT_PROGRESS && on_terminal();
     if (over)
-        fprintf(stderr, "\r%.*s\033[K", terminal_width(), e->text); /* to the end of the line: the one before may have been longer */
+        fprintf(stderr, "\r%.*s\033[K", terminal_width(), e->text); /* to the end of the line: the one before
+                                                                       may have been longer */
     else
-        fprintf(stderr, "%s%s%s\n", line_is_open ? "\n" : "", e->kind == GBT_EVENT_WARNING ? "warning: " : "", e->text);
+        fprintf(stderr, "%s%s%s\n", line_is_open ? "\n" : "", e->kind == GBT_EVENT_WARNING ? "warning: " : "",
+                e->text);
     line_is_open = over && e->fraction < 1;
     if (over && !line_is_open)
         fputc('\n', stderr);
@@ -92,7 +96,8 @@ void log_info(const char *format, ...)
 bool log_progress_due(void)
 {
     static double last = -1;
-    const double now = clock_wall(), interval = listener != NULL || on_terminal() ? often_seconds : line_seconds;
+    const double now = clock_wall(),
+                 interval = listener != NULL || on_terminal() ? often_seconds : line_seconds;
     if (last >= 0 && now - last < interval)
         return false;
     const bool due = last >= 0;
@@ -111,26 +116,31 @@ void log_progress(const gbt_event *event)
 
 void log_count(const char *stage, uint64_t done, uint64_t total, double psnr)
 {
-    static struct { const char *stage; uint64_t done; double start; } current;
-    if (current.stage == NULL || strcmp(current.stage, stage) != 0 || done <= current.done)
-        current.stage = stage, current.start = clock_wall();
+    static struct {
+        const char *stage;
+        uint64_t done;
+        double start;
+    } current;
+    if (current.stage == NULL || strcmp(current.stage, stage) != 0 || done <= current.done) {
+        current.stage = stage;
+        current.start = clock_wall();
+    }
     current.done = done;
     /* A person is told in other words when a stage ends. */
     if (!log_progress_due() && !(done == total && (listener != NULL || line_is_open)))
         return;
     char line[LINE_SIZE];
-    gbt_event e = {.text = line, .stage = stage, .done = done, .total = total, .psnr = psnr, .loss = (double)NAN};
+    gbt_event e = {
+        .text = line, .stage = stage, .done = done, .total = total, .psnr = psnr, .loss = (double)NAN};
     e.fraction = total > 0 ? (double)done / (double)total : 0;
     e.seconds = clock_wall() - current.start;
     e.seconds_left = done > 0 ? e.seconds * (double)(total - done) / (double)done : (double)NAN;
-    const int used = snprintf(line, sizeof line, "%s: %llu of %llu", stage, (unsigned long long)done, (unsigned long long)total);
+    const int used = snprintf(line, sizeof line, "%s: %llu of %llu", stage, (unsigned long long)done,
+                              (unsigned long long)total);
     if (isfinite(e.seconds_left))
         snprintf(line + used, sizeof line - (size_t)used, "  %.0f:%02.0f left", floor(e.seconds_left / 60),
                  floor(fmod(e.seconds_left, 60)));
     log_progress(&e);
 }
 
-void log_set_quiet(int quiet)
-{
-    is_quiet = quiet;
-}
+void log_set_quiet(int quiet) { is_quiet = quiet; }

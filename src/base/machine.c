@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/machine.c -- /proc and control groups to the few numbers that matter here. */
 #include "base/machine.h"
 
@@ -14,7 +15,8 @@
 enum { PATH_SIZE = 4096, LINE_SIZE = 1024 };
 
 /* The first line of root/folder/name that starts with `key`; its rest, without the newline. */
-static bool read_line(const char *root, const char *folder, const char *name, const char *key, char out[LINE_SIZE])
+static bool read_line(const char *root, const char *folder, const char *name, const char *key,
+                      char out[LINE_SIZE])
 {
     char path[PATH_SIZE], line[LINE_SIZE];
     if (snprintf(path, sizeof path, "%s%s/%s", root, folder, name) >= (int)sizeof path)
@@ -32,10 +34,7 @@ static bool read_line(const char *root, const char *folder, const char *name, co
     return found;
 }
 
-static size_t smaller(size_t a, size_t b)
-{
-    return a < b ? a : b;
-}
+static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 
 /* "name : value kB" */
 static size_t read_kilobytes(const char *root, const char *key)
@@ -48,7 +47,8 @@ static size_t read_kilobytes(const char *root, const char *key)
 static double quota_of(const char *text)
 {
     double quota, period;
-    return sscanf(text, "%lf %lf", &quota, &period) == 2 && quota > 0 && period > 0 ? quota / period : (double)INFINITY;
+    return sscanf(text, "%lf %lf", &quota, &period) == 2 && quota > 0 && period > 0 ? quota / period
+                                                                                    : (double)INFINITY;
 }
 
 static void limit_memory(machine *m, const char *text)
@@ -66,12 +66,14 @@ static void read_groups(machine *m, const char *root, const char *mount, char *g
         const bool fits = snprintf(folder, sizeof folder, "%s%s", mount, group) < (int)sizeof folder;
         if (fits && read_line(root, folder, "cpu.max", "", line))
             m->processors_quota = fmin(m->processors_quota, quota_of(line));
-        if (fits && read_line(root, folder, "cpu.cfs_quota_us", "", line) && read_line(root, folder, "cpu.cfs_period_us", "", period)) {
+        if (fits && read_line(root, folder, "cpu.cfs_quota_us", "", line) &&
+            read_line(root, folder, "cpu.cfs_period_us", "", period)) {
             char both[2 * LINE_SIZE + 1];
             snprintf(both, sizeof both, "%s %s", line, period);
             m->processors_quota = fmin(m->processors_quota, quota_of(both));
         }
-        if (fits && (read_line(root, folder, "memory.max", "", line) || read_line(root, folder, "memory.limit_in_bytes", "", line)))
+        if (fits && (read_line(root, folder, "memory.max", "", line) ||
+                     read_line(root, folder, "memory.limit_in_bytes", "", line)))
             limit_memory(m, line);
         char *slash = strrchr(group, '/');
         if (slash == NULL)
@@ -89,15 +91,18 @@ static void read_all_groups(machine *m, const char *root)
     FILE *file = fopen(path, "r");
     while (file != NULL && fgets(line, sizeof line, file) != NULL) {
         line[strcspn(line, "\n")] = '\0';
-        char *controllers = strchr(line, ':'), *group = controllers != NULL ? strchr(controllers + 1, ':') : NULL;
+        char *controllers = strchr(line, ':'),
+             *group = controllers != NULL ? strchr(controllers + 1, ':') : NULL;
         if (group == NULL)
             continue;
         *group++ = '\0';
         controllers++;
         char mount[LINE_SIZE + 32] = "/sys/fs/cgroup";
         if (controllers[0] != '\0')
-            snprintf(mount, sizeof mount, "/sys/fs/cgroup/%s", strncmp(controllers, "cpu,", 4) == 0 ? "cpu" : controllers);
-        if (controllers[0] == '\0' || strncmp(controllers, "cpu", 3) == 0 || strcmp(controllers, "memory") == 0)
+            snprintf(mount, sizeof mount, "/sys/fs/cgroup/%s",
+                     strncmp(controllers, "cpu,", 4) == 0 ? "cpu" : controllers);
+        if (controllers[0] == '\0' || strncmp(controllers, "cpu", 3) == 0 ||
+            strcmp(controllers, "memory") == 0)
             read_groups(m, root, mount, group);
     }
     if (file != NULL)
@@ -116,7 +121,8 @@ machine machine_read(const char *root)
     }
     const long online = sysconf(_SC_NPROCESSORS_ONLN);
     m.processors = online > 0 ? (int)online : 1;
-    m.processors_allowed = sched_getaffinity(0, sizeof allowed, &allowed) == 0 ? CPU_COUNT(&allowed) : m.processors;
+    m.processors_allowed =
+        sched_getaffinity(0, sizeof allowed, &allowed) == 0 ? CPU_COUNT(&allowed) : m.processors;
     m.memory_bytes = read_kilobytes(root, "MemTotal:");
     m.memory_free_bytes = read_kilobytes(root, "MemAvailable:");
     read_all_groups(&m, root);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/memory.c -- checked, aligned allocation with a failure switch. */
 #include "base/memory.h"
 
@@ -22,26 +23,26 @@ static int must_fail(void)
     return atomic_fetch_sub(&fail_countdown, 1) == 0;
 }
 
-void mem_fail_after(long n)
-{
-    atomic_store(&fail_countdown, n < 0 ? -1 : n);
-}
+void mem_fail_after(long n) { atomic_store(&fail_countdown, n < 0 ? -1 : n); }
 
 void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err)
 {
     size_t bytes;
     if (__builtin_mul_overflow(count, size, &bytes) || bytes > PTRDIFF_MAX - LARGE_PAGE) {
-        base_fail(err, GBT_ERR_NO_MEMORY, "%s: %zu elements of %zu bytes are more than memory can hold", what, count, size);
+        base_fail(err, GBT_ERR_NO_MEMORY, "%s: %zu elements of %zu bytes are more than memory can hold", what,
+                  count, size);
         return NULL;
     }
     bytes = (bytes + MEM_ALIGN - 1) / MEM_ALIGN * MEM_ALIGN;
     if (bytes == 0)
         bytes = MEM_ALIGN;
-    /* Large arrays ask for large pages: a tree is walked in no order, and misses of the address cache cost as much as misses of the
-       data. */
+    /* Large arrays ask for large pages: a tree is walked in no order, and misses of the address cache cost as
+       much as misses of the data. */
     const bool large = bytes >= 4 * LARGE_PAGE;
-    void *pointer = must_fail() ? NULL : aligned_alloc(large ? LARGE_PAGE : MEM_ALIGN,
-                                                       large ? (bytes + LARGE_PAGE - 1) / LARGE_PAGE * LARGE_PAGE : bytes);
+    void *pointer = must_fail()
+                        ? NULL
+                        : aligned_alloc(large ? LARGE_PAGE : MEM_ALIGN,
+                                        large ? (bytes + LARGE_PAGE - 1) / LARGE_PAGE * LARGE_PAGE : bytes);
     if (pointer != NULL && large)
         madvise(pointer, bytes, MADV_HUGEPAGE); /* a wish */
     if (pointer == NULL)
@@ -57,7 +58,8 @@ void *mem_calloc(size_t count, size_t size, const char *what, gbt_error *err)
     return pointer;
 }
 
-gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count, size_t size, const char *what, gbt_error *err)
+gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count, size_t size,
+                       const char *what, gbt_error *err)
 {
     if (count <= *capacity && *array != NULL)
         return GBT_OK;
@@ -75,7 +77,8 @@ gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count
     return GBT_OK;
 }
 
-gbt_status mem_trim(void **array, size_t *capacity, size_t used, size_t size, const char *what, gbt_error *err)
+gbt_status mem_trim(void **array, size_t *capacity, size_t used, size_t size, const char *what,
+                    gbt_error *err)
 {
     if (used == *capacity)
         return GBT_OK;
@@ -85,14 +88,12 @@ gbt_status mem_trim(void **array, size_t *capacity, size_t used, size_t size, co
     if (used > 0)
         memcpy(exact, *array, used * size);
     mem_free(*array);
-    *array = exact, *capacity = used;
+    *array = exact;
+    *capacity = used;
     return GBT_OK;
 }
 
-void mem_free(void *pointer)
-{
-    free(pointer);
-}
+void mem_free(void *pointer) { free(pointer); }
 
 size_t mem_peak_bytes(void)
 {

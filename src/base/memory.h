@@ -1,4 +1,6 @@
-/* base/memory.h -- the only allocator: checked sizes, 64-byte alignment, a failure switch for tests, a count of bytes in use.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/memory.h -- the only allocator: checked sizes, 64-byte alignment, a failure switch for tests, a count
+   of bytes in use.
 
    Every array of the library is owned by the object that allocated it here and is freed with mem_free(). */
 #ifndef GBT_BASE_MEMORY_H
@@ -11,8 +13,8 @@
 enum { MEM_ALIGN = 64 };
 
 /**
- * `count * size` bytes, uninitialised, 64-byte aligned; NULL with a message naming `what` on overflow or exhaustion. count 0 gives a valid
- * pointer.
+ * `count * size` bytes, uninitialised, 64-byte aligned; NULL with a message naming `what` on overflow or
+ * exhaustion. count 0 gives a valid pointer.
  */
 void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err);
 
@@ -22,12 +24,16 @@ void *mem_calloc(size_t count, size_t size, const char *what, gbt_error *err);
 /**
  * Make `*array` hold at least `count` elements, keeping the first `used`.
  *
- * `*capacity` grows by half at least, so that repeated calls cost O(1) per element. On failure nothing changes.
+ * `*capacity` grows by half at least, so that repeated calls cost O(1) per element. On failure nothing
+ * changes.
  */
-gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count, size_t size, const char *what, gbt_error *err);
+gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count, size_t size,
+                       const char *what, gbt_error *err);
 
-/** Cut `*array` to the `used` elements that it holds: what grew by half must not be kept by the hundred. On failure nothing changes. */
-gbt_status mem_trim(void **array, size_t *capacity, size_t used, size_t size, const char *what, gbt_error *err);
+/** Cut `*array` to the `used` elements that it holds: what grew by half must not be kept by the hundred. On
+    failure nothing changes. */
+gbt_status mem_trim(void **array, size_t *capacity, size_t used, size_t size, const char *what,
+                    gbt_error *err);
 
 void mem_free(void *pointer); /* NULL is fine */
 

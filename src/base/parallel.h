@@ -1,4 +1,6 @@
-/* base/parallel.h -- the only way to use threads. Implemented in shim/ (oneTBB, or pthreads for the tsan preset). */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/parallel.h -- the only way to use threads. Implemented in shim/ (oneTBB, or pthreads for the tsan
+   preset). */
 #ifndef GBT_BASE_PARALLEL_H
 #define GBT_BASE_PARALLEL_H
 
@@ -12,19 +14,18 @@ extern "C" {
 typedef void parallel_body(size_t block, size_t begin, size_t end, void *context);
 
 /**
- * Call `body` once per block of `grain` elements (the last may be shorter), on as many threads as parallel_set_threads() allows.
+ * Call `body` once per block of `grain` elements (the last may be shorter), on as many threads as
+ * parallel_set_threads() allows.
  *
- * The cut depends on `count` and `grain` only, so results that are kept per block and combined in block order have the same bits
- * for 1 thread and for 64. Index results with `block`, never with a thread id. Bodies run in the default
- * floating-point environment (denormals are kept). Returns when all blocks are done. May be nested.
+ * The cut depends on `count` and `grain` only, so results that are kept per block and combined in block order
+ * have the same bits for 1 thread and for 64. Index results with `block`, never with a thread id. Bodies run
+ * in the default floating-point environment (denormals are kept). Returns when all blocks are done. May be
+ * nested.
  */
 void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *context);
 
 /** Number of blocks that parallel_blocks() makes. */
-static inline size_t parallel_block_count(size_t count, size_t grain)
-{
-    return (count + grain - 1) / grain;
-}
+static inline size_t parallel_block_count(size_t count, size_t grain) { return (count + grain - 1) / grain; }
 
 void parallel_set_threads(int threads); /* >= 1; process-wide */
 int parallel_threads(void);             /* the number set, else machine_threads() of this machine */

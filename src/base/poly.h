@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/poly.h -- places where a small real polynomial changes sign on the positive axis. */
 #ifndef GBT_BASE_POLY_H
 #define GBT_BASE_POLY_H
@@ -30,7 +31,8 @@ static inline int poly_quadratic_roots(const double c[3], double upper, double r
         found[found_count++] = q / c[2];
     if (found_count == 2 && found[0] > found[1]) {
         const double swap = found[0];
-        found[0] = found[1], found[1] = swap;
+        found[0] = found[1];
+        found[1] = swap;
     }
     for (int i = 0; i < found_count; i++)
         if (found[i] > 0 && found[i] < upper)
@@ -38,7 +40,8 @@ static inline int poly_quadratic_roots(const double c[3], double upper, double r
     return kept;
 }
 
-/** Where a polynomial of degree < POLY_LIMIT changes sign in (0, upper), ascending: at most once between two turning points. */
+/** Where a polynomial of degree < POLY_LIMIT changes sign in (0, upper), ascending: at most once between two
+    turning points. */
 static inline int poly_roots(const double *c, int degree, double upper, double roots[POLY_LIMIT])
 {
     while (degree > 0 && c[degree] == 0)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/stop_signal.c -- one flag, set by a handler. */
 #include "base/stop_signal.h"
 
@@ -23,7 +24,8 @@ void stop_signal_catch(stop_signal_guard *guard, void (*wake)(void *context), vo
     struct sigaction action = {.sa_handler = on_signal};
     sigemptyset(&action.sa_mask);
     seen = 0;
-    wake_loop = wake, wake_context = context;
+    wake_loop = wake;
+    wake_context = context;
     sigaction(SIGINT, &action, &guard->old_int);
     sigaction(SIGTERM, &action, &guard->old_term);
 }
@@ -34,7 +36,4 @@ void stop_signal_release(const stop_signal_guard *guard)
     sigaction(SIGTERM, &guard->old_term, NULL);
 }
 
-bool stop_signal_seen(void)
-{
-    return seen != 0;
-}
+bool stop_signal_seen(void) { return seen != 0; }

@@ -1,4 +1,6 @@
-/* base/stop_signal.h -- SIGINT and SIGTERM while a loop runs: the first one asks it to stop, a second one ends the process. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/stop_signal.h -- SIGINT and SIGTERM while a loop runs: the first one asks it to stop, a second one
+   ends the process. */
 #ifndef GBT_BASE_STOP_SIGNAL_H
 #define GBT_BASE_STOP_SIGNAL_H
 
@@ -12,7 +14,8 @@ typedef struct stop_signal_guard {
 /**
  * Catch both signals until stop_signal_release(), one loop of the process at a time.
  *
- * @param wake [in] optional (NULL): called with `context` in the handler at the first signal, in any thread; async-signal-safe
+ * @param wake [in] optional (NULL): called with `context` in the handler at the first signal, in any thread;
+ *                  async-signal-safe
  */
 void stop_signal_catch(stop_signal_guard *guard, void (*wake)(void *context), void *context);
 void stop_signal_release(const stop_signal_guard *guard); /* who handled them before does again */

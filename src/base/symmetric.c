@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/symmetric.c -- Jacobi's rotations, Cholesky's factor. */
 #include "base/symmetric.h"
 
@@ -12,11 +13,13 @@ static void rotate(double *a, double *v, int n, int p, int q)
     const double apq = a[p * n + q];
     if (apq == 0)
         return;
-    /* theta may overflow to infinity when a[p][q] is tiny: t is then 0 and the rotation is the identity, as it should be. */
+    /* theta may overflow to infinity when a[p][q] is tiny: t is then 0 and the rotation is the identity, as
+       it should be. */
     const double theta = (a[q * n + q] - a[p * n + p]) / (2 * apq);
     const double t = copysign(1.0, theta) / (fabs(theta) + sqrt(theta * theta + 1));
     const double c = 1 / sqrt(t * t + 1), s = t * c;
-    a[p * n + p] -= t * apq, a[q * n + q] += t * apq;
+    a[p * n + p] -= t * apq;
+    a[q * n + q] += t * apq;
     a[p * n + q] = a[q * n + p] = 0;
     for (int r = 0; r < n; r++) {
         if (r != p && r != q) {

@@ -1,13 +1,17 @@
-/* base/symmetric.h -- eigenvectors and Cholesky factor of small symmetric matrices, n x n, row-major, in double. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/symmetric.h -- eigenvectors and Cholesky factor of small symmetric matrices, n x n, row-major, in
+   double. */
 #ifndef GBT_BASE_SYMMETRIC_H
 #define GBT_BASE_SYMMETRIC_H
 
 /**
- * Eigenvalues and eigenvectors by Jacobi's method: plain loops in a fixed order, the same bits on every machine.
+ * Eigenvalues and eigenvectors by Jacobi's method: plain loops in a fixed order, the same bits on every
+ * machine.
  *
  * @param a      [in, out] [n][n] symmetric, finite; leaves the eigenvalues on its diagonal, in no order
  * @param v      [out] [n][n] unit eigenvectors in its columns
- * @param small  [in] done when the off-diagonal halves sum to at most this share of the largest |a|; about 1e-15 to 1e-18
+ * @param small  [in] done when the off-diagonal halves sum to at most this share of the largest |a|; about
+ *                    1e-15 to 1e-18
  * Cost: O(n^3) per sweep, 4 to 10 sweeps.
  */
 void symmetric_eigen(double *a, double *v, int n, double small);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* base/vec.h -- small vectors, quaternions and 3x3 matrices: inline, no allocation.
 
    Matrices are row-major. Quaternions are (w, x, y, z), Hamilton, and turn local axes into world axes. */
@@ -15,20 +16,22 @@ static inline double dvec_dot(const double a[3], const double b[3])
 static inline void dvec_cross(const double a[3], const double b[3], double out[3])
 {
     const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
-    out[0] = x, out[1] = y, out[2] = z;
+    out[0] = x;
+    out[1] = y;
+    out[2] = z;
 }
 
-static inline double dvec_length(const double a[3])
-{
-    return sqrt(dvec_dot(a, a));
-}
+static inline double dvec_length(const double a[3]) { return sqrt(dvec_dot(a, a)); }
 
 /** a scaled to length 1; a zero vector stays zero. */
 static inline void dvec_normalize(double a[3])
 {
     const double length = dvec_length(a);
-    if (length > 0)
-        a[0] /= length, a[1] /= length, a[2] /= length;
+    if (length > 0) {
+        a[0] /= length;
+        a[1] /= length;
+        a[2] /= length;
+    }
 }
 
 /** out = m a. `out` may be `a`. */
@@ -37,7 +40,9 @@ static inline void dmat_apply(const double m[9], const double a[3], double out[3
     const double x = m[0] * a[0] + m[1] * a[1] + m[2] * a[2];
     const double y = m[3] * a[0] + m[4] * a[1] + m[5] * a[2];
     const double z = m[6] * a[0] + m[7] * a[1] + m[8] * a[2];
-    out[0] = x, out[1] = y, out[2] = z;
+    out[0] = x;
+    out[1] = y;
+    out[2] = z;
 }
 
 /** |m m^T - 1| is nowhere above the tolerance, and m does not reflect. */
@@ -57,25 +62,39 @@ static inline void dmat_apply_transposed(const double m[9], const double a[3], d
     const double x = m[0] * a[0] + m[3] * a[1] + m[6] * a[2];
     const double y = m[1] * a[0] + m[4] * a[1] + m[7] * a[2];
     const double z = m[2] * a[0] + m[5] * a[1] + m[8] * a[2];
-    out[0] = x, out[1] = y, out[2] = z;
+    out[0] = x;
+    out[1] = y;
+    out[2] = z;
 }
 
 /** Rotation matrix of a unit quaternion. */
 static inline void dquat_to_matrix(const double q[4], double m[9])
 {
     const double w = q[0], x = q[1], y = q[2], z = q[3];
-    m[0] = 1 - 2 * (y * y + z * z), m[1] = 2 * (x * y - w * z), m[2] = 2 * (x * z + w * y);
-    m[3] = 2 * (x * y + w * z), m[4] = 1 - 2 * (x * x + z * z), m[5] = 2 * (y * z - w * x);
-    m[6] = 2 * (x * z - w * y), m[7] = 2 * (y * z + w * x), m[8] = 1 - 2 * (x * x + y * y);
+    m[0] = 1 - 2 * (y * y + z * z);
+    m[1] = 2 * (x * y - w * z);
+    m[2] = 2 * (x * z + w * y);
+    m[3] = 2 * (x * y + w * z);
+    m[4] = 1 - 2 * (x * x + z * z);
+    m[5] = 2 * (y * z - w * x);
+    m[6] = 2 * (x * z - w * y);
+    m[7] = 2 * (y * z + w * x);
+    m[8] = 1 - 2 * (x * x + y * y);
 }
 
 /** The same in single precision. */
 static inline void quat_to_matrix(const float q[4], float m[9])
 {
     const float w = q[0], x = q[1], y = q[2], z = q[3];
-    m[0] = 1 - 2 * (y * y + z * z), m[1] = 2 * (x * y - w * z), m[2] = 2 * (x * z + w * y);
-    m[3] = 2 * (x * y + w * z), m[4] = 1 - 2 * (x * x + z * z), m[5] = 2 * (y * z - w * x);
-    m[6] = 2 * (x * z - w * y), m[7] = 2 * (y * z + w * x), m[8] = 1 - 2 * (x * x + y * y);
+    m[0] = 1 - 2 * (y * y + z * z);
+    m[1] = 2 * (x * y - w * z);
+    m[2] = 2 * (x * z + w * y);
+    m[3] = 2 * (x * y + w * z);
+    m[4] = 1 - 2 * (x * x + z * z);
+    m[5] = 2 * (y * z - w * x);
+    m[6] = 2 * (x * z - w * y);
+    m[7] = 2 * (y * z + w * x);
+    m[8] = 1 - 2 * (x * x + y * y);
 }
 
 #endif

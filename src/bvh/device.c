@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bvh/device.c -- the one Embree device of the process: made once, errors in words, memory counted. */
 #include "bvh/device.h"
 
@@ -24,13 +25,14 @@ static _Thread_local char complaint[256];
 
 static void remember_complaint(void *user, enum RTCError code, const char *text)
 {
-    (void)user, (void)code;
+    (void)user;
+    (void)code;
     if (complaint[0] == '\0')
         snprintf(complaint, sizeof complaint, "%s", text != NULL ? text : "");
 }
 
-/* Embree asks before it allocates, or tells right after (post); what it frees comes as negative bytes. What was refused before it was
-   allocated is never reported as freed. */
+/* Embree asks before it allocates, or tells right after (post); what it frees comes as negative bytes. What
+   was refused before it was allocated is never reported as freed. */
 static bool watch_memory(void *user, ssize_t bytes, bool post)
 {
     (void)user;
@@ -44,11 +46,15 @@ static bool watch_memory(void *user, ssize_t bytes, bool post)
 
 static const char *configuration(void)
 {
-    /* GBT_ISA holds the kernels of others too: a run that must not use wide vectors does not get them from here. */
+    /* GBT_ISA holds the kernels of others too: a run that must not use wide vectors does not get them from
+       here. */
     switch (cpu_best_isa()) {
-    case CPU_PLAIN: return "max_isa=sse4.2";
-    case CPU_AVX2: return "max_isa=avx2";
-    case CPU_AVX512: break;
+    case CPU_PLAIN:
+        return "max_isa=sse4.2";
+    case CPU_AVX2:
+        return "max_isa=avx2";
+    case CPU_AVX512:
+        break;
     }
     return NULL;
 }
@@ -63,7 +69,8 @@ static void make_device(void)
     }
     rtcSetDeviceErrorFunction(device, remember_complaint, NULL);
     rtcSetDeviceMemoryMonitorFunction(device, watch_memory, NULL);
-    snprintf(version, sizeof version, "%d.%d.%d", (int)rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION_MAJOR),
+    snprintf(version, sizeof version, "%d.%d.%d",
+             (int)rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION_MAJOR),
              (int)rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION_MINOR),
              (int)rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION_PATCH));
 }
@@ -71,13 +78,20 @@ static void make_device(void)
 static const char *error_name(enum RTCError code)
 {
     switch (code) {
-    case RTC_ERROR_NONE: return "no reason given";
-    case RTC_ERROR_INVALID_ARGUMENT: return "invalid argument";
-    case RTC_ERROR_INVALID_OPERATION: return "invalid operation";
-    case RTC_ERROR_OUT_OF_MEMORY: return "out of memory";
-    case RTC_ERROR_UNSUPPORTED_CPU: return "this processor is not supported";
-    case RTC_ERROR_CANCELLED: return "cancelled";
-    default: return "unknown error";
+    case RTC_ERROR_NONE:
+        return "no reason given";
+    case RTC_ERROR_INVALID_ARGUMENT:
+        return "invalid argument";
+    case RTC_ERROR_INVALID_OPERATION:
+        return "invalid operation";
+    case RTC_ERROR_OUT_OF_MEMORY:
+        return "out of memory";
+    case RTC_ERROR_UNSUPPORTED_CPU:
+        return "this processor is not supported";
+    case RTC_ERROR_CANCELLED:
+        return "cancelled";
+    default:
+        return "unknown error";
     }
 }
 

@@ -1,6 +1,9 @@
-/* bvh/device.h -- the one Embree device of the process, its errors and its memory, and what every caller must check before Embree.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* bvh/device.h -- the one Embree device of the process, its errors and its memory, and what every caller must
+   check before Embree.
 
-   No Embree type appears here, so that rooms above can report the version or set a limit without seeing Embree. */
+   No Embree type appears here, so that rooms above can report the version or set a limit without seeing
+   Embree. */
 #ifndef GBT_BVH_DEVICE_H
 #define GBT_BVH_DEVICE_H
 
@@ -13,11 +16,13 @@
 /**
  * The process-wide Embree device (an RTCDevice), made at the first call and kept until the process ends.
  *
- * It uses the instruction sets of cpu_best_isa() at most. Embree's builders run on oneTBB, so parallel_set_threads() limits them too,
- * whenever it is called; with GBT_PTHREADS they use every processor. Embree runs its builders, and the callbacks in them, in a
- * floating-point mode that takes numbers below 1.2e-38 for 0.
+ * It uses the instruction sets of cpu_best_isa() at most. Embree's builders run on oneTBB, so
+ * parallel_set_threads() limits them too, whenever it is called; with GBT_PTHREADS they use every processor.
+ * Embree runs its builders, and the callbacks in them, in a floating-point mode that takes numbers below
+ * 1.2e-38 for 0.
  *
- * @return NULL with GBT_ERR_NO_MEMORY or GBT_ERR_INTERNAL in `err` when Embree cannot start; it is not tried again
+ * @return NULL with GBT_ERR_NO_MEMORY or GBT_ERR_INTERNAL in `err` when Embree cannot start; it is not tried
+ *         again
  * Threads: any.
  */
 void *bvh_device(gbt_error *err);
@@ -25,7 +30,8 @@ void *bvh_device(gbt_error *err);
 /**
  * GBT_OK, or what Embree has complained about on this thread since the last call, in Embree's words.
  *
- * Call after every build: Embree's own calls report nothing. GBT_ERR_NO_MEMORY for exhaustion, else GBT_ERR_INTERNAL.
+ * Call after every build: Embree's own calls report nothing. GBT_ERR_NO_MEMORY for exhaustion, else
+ * GBT_ERR_INTERNAL.
  */
 gbt_status bvh_check(const char *what, gbt_error *err);
 
@@ -36,16 +42,20 @@ const char *bvh_embree_version(void);
 size_t bvh_memory_bytes(void);
 
 /**
- * Refuse builds that would take Embree's memory above `bytes` (SIZE_MAX, the default: no limit): they fail with GBT_ERR_NO_MEMORY.
+ * Refuse builds that would take Embree's memory above `bytes` (SIZE_MAX, the default: no limit): they fail
+ * with GBT_ERR_NO_MEMORY.
  *
- * A refusal is safe where a real exhaustion inside Embree is not (it ends the process). A build needs about 100 bytes per primitive.
+ * A refusal is safe where a real exhaustion inside Embree is not (it ends the process). A build needs about
+ * 100 bytes per primitive.
  */
 void bvh_limit_memory(size_t bytes);
 
-/** Largest |coordinate| that goes to Embree. It drops boxes beyond 1.844e18 without a word, and aborts on such rays. */
+/** Largest |coordinate| that goes to Embree. It drops boxes beyond 1.844e18 without a word, and aborts on
+    such rays. */
 static const float bvh_coordinate_limit = 1e18f;
 
-/** Whether a ray may go to Embree: finite, within the limit, 0 <= t_min <= t_max (t_max may be infinite), a direction. */
+/** Whether a ray may go to Embree: finite, within the limit, 0 <= t_min <= t_max (t_max may be infinite), a
+    direction. */
 static inline bool bvh_ray_ok(const float origin[3], const float dir[3], float t_min, float t_max)
 {
     bool some = false;
@@ -58,8 +68,9 @@ static inline bool bvh_ray_ok(const float origin[3], const float dir[3], float t
 }
 
 /**
- * The exponent of a power of two: a direction divided by it, which is exact, can go to Embree, which replaces components below 1e-18 by
- * others; t is multiplied by it. 0 for directions of usual length, and for those that are not finite.
+ * The exponent of a power of two: a direction divided by it, which is exact, can go to Embree, which replaces
+ * components below 1e-18 by others; t is multiplied by it. 0 for directions of usual length, and for those
+ * that are not finite.
  */
 static inline int bvh_ray_exponent(const float dir[3])
 {
@@ -71,14 +82,13 @@ static inline int bvh_ray_exponent(const float dir[3])
 }
 
 /**
- * How far the faces of a box must move out so that Embree's float32 slab test misses no ray, beside one nextafterf().
+ * How far the faces of a box must move out so that Embree's float32 slab test misses no ray, beside one
+ * nextafterf().
  *
- * Embree tests boxes of user geometry without any margin, whatever RTC_SCENE_FLAG_ROBUST says. A quarter of this removed every miss of
- * 1.03 M rays at five scales. `reach`: largest |coordinate| of the boxes and of the ray origins.
+ * Embree tests boxes of user geometry without any margin, whatever RTC_SCENE_FLAG_ROBUST says. A quarter of
+ * this removed every miss of 1.03 M rays at five scales. `reach`: largest |coordinate| of the boxes and of
+ * the ray origins.
  */
-static inline float bvh_box_pad(float reach)
-{
-    return 0x1p-22f * reach;
-}
+static inline float bvh_box_pad(float reach) { return 0x1p-22f * reach; }
 
 #endif

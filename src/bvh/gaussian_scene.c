@@ -1,6 +1,9 @@
-/* bvh/gaussian_scene.c -- boxes of Gaussians as Embree's user geometry, and packets of sixteen rays that collect what they cross.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* bvh/gaussian_scene.c -- boxes of Gaussians as Embree's user geometry, and packets of sixteen rays that
+   collect what they cross.
 
-   gaussians --> proxy_boxes --> rtcCommitScene        rays --> rtcIntersect16 --> callback per box: slab test --> visit() */
+   gaussians --> proxy_boxes --> rtcCommitScene
+   rays --> rtcIntersect16 --> callback per box: slab test --> visit() */
 #include "bvh/gaussian_scene.h"
 
 #include <math.h>
@@ -37,13 +40,18 @@ static void box_bounds(const struct RTCBoundsFunctionArguments *args)
     content *c = args->geometryUserPtr;
     embree_receive(c);
     const struct RTCBuildPrimitive *box = &c->boxes.box[args->primID];
-    *args->bounds_o = (struct RTCBounds){.lower_x = box->lower_x, .lower_y = box->lower_y, .lower_z = box->lower_z,
-                                         .upper_x = box->upper_x, .upper_y = box->upper_y, .upper_z = box->upper_z};
+    *args->bounds_o = (struct RTCBounds){.lower_x = box->lower_x,
+                                         .lower_y = box->lower_y,
+                                         .lower_z = box->lower_z,
+                                         .upper_x = box->upper_x,
+                                         .upper_y = box->upper_y,
+                                         .upper_z = box->upper_z};
 }
 
 /* Interval of t in which each ray is between two planes, cut with what is there. */
-static inline __attribute__((always_inline)) void cut_interval(float lower, float upper, const float *origin, const float *inverse,
-                                                               float *enter, float *leave)
+static inline __attribute__((always_inline)) void cut_interval(float lower, float upper, const float *origin,
+                                                               const float *inverse, float *enter,
+                                                               float *leave)
 {
     for (int i = 0; i < SCENE_LANES; i++) {
         const float a = (lower - origin[i]) * inverse[i], b = (upper - origin[i]) * inverse[i];
@@ -53,22 +61,23 @@ static inline __attribute__((always_inline)) void cut_interval(float lower, floa
     }
 }
 
-/* Embree's coherent traversal follows the hull of the packet and calls every box that this meets crossed by all rays, and a scene of one
-   box is called crossed unseen: which rays cross it is found here, with the same bits for every instruction set. */
-#define CROSSING_VARIANT(isa, attribute)                                                                                                   \
-    attribute static unsigned crossing_lanes_##isa(const packet *p, const struct RTCBuildPrimitive *box)                                   \
-    {                                                                                                                                      \
-        const struct RTCRay16 *ray = &p->rays->ray;                                                                                        \
-        float enter[SCENE_LANES], leave[SCENE_LANES];                                                                                      \
-        memcpy(enter, ray->tnear, sizeof enter);                                                                                           \
-        memcpy(leave, ray->tfar, sizeof leave);                                                                                            \
-        cut_interval(box->lower_x, box->upper_x, ray->org_x, p->inverse[0], enter, leave);                                                 \
-        cut_interval(box->lower_y, box->upper_y, ray->org_y, p->inverse[1], enter, leave);                                                 \
-        cut_interval(box->lower_z, box->upper_z, ray->org_z, p->inverse[2], enter, leave);                                                 \
-        unsigned lanes = 0;                                                                                                                \
-        for (unsigned i = 0; i < SCENE_LANES; i++) /* both ends are rounded three times */                                                 \
-            lanes |= (unsigned)(enter[i] <= leave[i] * (1 + 0x1p-21f)) << i;                                                               \
-        return lanes;                                                                                                                      \
+/* Embree's coherent traversal follows the hull of the packet and calls every box that this meets crossed by
+   all rays, and a scene of one box is called crossed unseen: which rays cross it is found here, with the same
+   bits for every instruction set. */
+#define CROSSING_VARIANT(isa, attribute)                                                                     \
+    attribute static unsigned crossing_lanes_##isa(const packet *p, const struct RTCBuildPrimitive *box)     \
+    {                                                                                                        \
+        const struct RTCRay16 *ray = &p->rays->ray;                                                          \
+        float enter[SCENE_LANES], leave[SCENE_LANES];                                                        \
+        memcpy(enter, ray->tnear, sizeof enter);                                                             \
+        memcpy(leave, ray->tfar, sizeof leave);                                                              \
+        cut_interval(box->lower_x, box->upper_x, ray->org_x, p->inverse[0], enter, leave);                   \
+        cut_interval(box->lower_y, box->upper_y, ray->org_y, p->inverse[1], enter, leave);                   \
+        cut_interval(box->lower_z, box->upper_z, ray->org_z, p->inverse[2], enter, leave);                   \
+        unsigned lanes = 0;                                                                                  \
+        for (unsigned i = 0; i < SCENE_LANES; i++) /* both ends are rounded three times */                   \
+            lanes |= (unsigned)(enter[i] <= leave[i] * (1 + 0x1p-21f)) << i;                                 \
+        return lanes;                                                                                        \
     }
 CROSSING_VARIANT(plain, )
 #if defined(__x86_64__)
@@ -103,7 +112,8 @@ static void release(content *c)
         rtcReleaseGeometry(c->geometry);
     if (c->scene != NULL)
         rtcReleaseScene(c->scene);
-    c->geometry = NULL, c->scene = NULL;
+    c->geometry = NULL;
+    c->scene = NULL;
 }
 
 static gbt_status commit(content *c, RTCDevice device, gbt_error *err)
@@ -126,7 +136,8 @@ static gbt_status commit(content *c, RTCDevice device, gbt_error *err)
     return bvh_check("bvh", err);
 }
 
-gbt_status gaussian_scene_build(const gaussians *g, float alpha_min, float radius, float reach, gaussian_scene *scene, gbt_error *err)
+gbt_status gaussian_scene_build(const gaussians *g, float alpha_min, float radius, float reach,
+                                gaussian_scene *scene, gbt_error *err)
 {
     scene->box_count = scene->rejected_count = 0;
     scene->coordinate_max = 0;
@@ -156,27 +167,36 @@ gbt_status gaussian_scene_build(const gaussians *g, float alpha_min, float radiu
 }
 
 /* One ray into its lane, in a form that Embree takes. False when there is none: the ray crosses nothing. */
-static bool set_lane(packet *p, struct RTCRay16 *ray, unsigned i, const float origin[3], const float dir[3], float t_near, float t_far)
+static bool set_lane(packet *p, struct RTCRay16 *ray, unsigned i, const float origin[3], const float dir[3],
+                     float t_near, float t_far)
 {
     const int exponent = bvh_ray_exponent(dir);
     float scaled[3] = {dir[0], dir[1], dir[2]};
     if (exponent != 0) {
         for (int axis = 0; axis < 3; axis++)
             scaled[axis] = ldexpf(dir[axis], -exponent);
-        t_near = ldexpf(t_near, exponent), t_far = ldexpf(t_far, exponent);
+        t_near = ldexpf(t_near, exponent);
+        t_far = ldexpf(t_far, exponent);
     }
     if (!bvh_ray_ok(origin, scaled, t_near, t_far))
         return false;
-    ray->org_x[i] = origin[0], ray->org_y[i] = origin[1], ray->org_z[i] = origin[2];
-    ray->dir_x[i] = scaled[0], ray->dir_y[i] = scaled[1], ray->dir_z[i] = scaled[2];
-    ray->tnear[i] = t_near, ray->tfar[i] = t_far;
+    ray->org_x[i] = origin[0];
+    ray->org_y[i] = origin[1];
+    ray->org_z[i] = origin[2];
+    ray->dir_x[i] = scaled[0];
+    ray->dir_y[i] = scaled[1];
+    ray->dir_z[i] = scaled[2];
+    ray->tnear[i] = t_near;
+    ray->tfar[i] = t_far;
     for (int axis = 0; axis < 3; axis++) /* Embree takes smaller components for these */
-        p->inverse[axis][i] = 1 / (fabsf(scaled[axis]) < 1e-18f ? copysignf(1e-18f, scaled[axis]) : scaled[axis]);
+        p->inverse[axis][i] =
+            1 / (fabsf(scaled[axis]) < 1e-18f ? copysignf(1e-18f, scaled[axis]) : scaled[axis]);
     return true;
 }
 
-void gaussian_scene_visit(const gaussian_scene *scene, const float origin[3][SCENE_LANES], const float dir[3][SCENE_LANES], float t_near,
-                          float t_far, unsigned active, gaussian_visit_fn *visit, void *user)
+void gaussian_scene_visit(const gaussian_scene *scene, const float origin[3][SCENE_LANES],
+                          const float dir[3][SCENE_LANES], float t_near, float t_far, unsigned active,
+                          gaussian_visit_fn *visit, void *user)
 {
     if (scene->box_count == 0)
         return;
@@ -184,12 +204,19 @@ void gaussian_scene_visit(const gaussian_scene *scene, const float origin[3][SCE
     struct RTCRayHit16 rays;
     _Alignas(64) int valid[SCENE_LANES] = {0};
     static unsigned (*const variants[])(const packet *, const struct RTCBuildPrimitive *) = {
-        [CPU_PLAIN] = crossing_lanes_plain, [CPU_AVX2] = crossing_lanes_avx2, [CPU_AVX512] = crossing_lanes_avx512};
-    packet p = {.box = c->boxes.box, .rays = &rays, .crossing_lanes = variants[cpu_best_isa()], .visit = visit, .user = user};
+        [CPU_PLAIN] = crossing_lanes_plain,
+        [CPU_AVX2] = crossing_lanes_avx2,
+        [CPU_AVX512] = crossing_lanes_avx512};
+    packet p = {.box = c->boxes.box,
+                .rays = &rays,
+                .crossing_lanes = variants[cpu_best_isa()],
+                .visit = visit,
+                .user = user};
     bool some = false;
     memset(&rays, 0, sizeof rays); /* lanes that are not traced are read by the box test too */
     for (unsigned i = 0; i < SCENE_LANES; i++) {
-        const float x[3] = {origin[0][i], origin[1][i], origin[2][i]}, w[3] = {dir[0][i], dir[1][i], dir[2][i]};
+        const float x[3] = {origin[0][i], origin[1][i], origin[2][i]},
+                    w[3] = {dir[0][i], dir[1][i], dir[2][i]};
         rays.ray.mask[i] = ~0u;
         rays.ray.id[i] = i;
         rays.hit.geomID[i] = rays.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bvh/gaussian_tree.c -- Embree's builder over the boxes of Gaussians, its nodes laid out for our kernels. */
 #include "bvh/gaussian_tree.h"
 
@@ -15,7 +16,8 @@
 
 enum { LEAF_BLOCK = 256 };
 
-/* What Embree builds: binary, because its wider builders make as many children as they can and leave leaves almost empty. */
+/* What Embree builds: binary, because its wider builders make as many children as they can and leave leaves
+   almost empty. */
 typedef struct binary_node {
     struct RTCBounds bounds[2];
     uint64_t child[2]; /* address of a binary_node, or that of leaf_members + 1 */
@@ -65,7 +67,9 @@ static void set_ellipsoid(const builder *b, uint32_t id, tree_leaf *leaf, size_t
         const float *x = m + 3 * pair[k][0], *y = m + 3 * pair[k][1];
         leaf->spread[k][slot] = square * (x[0] * y[0] + x[1] * y[1] + x[2] * y[2]);
     }
-    leaf->mean[0][slot] = g->mean_x[id], leaf->mean[1][slot] = g->mean_y[id], leaf->mean[2][slot] = g->mean_z[id];
+    leaf->mean[0][slot] = g->mean_x[id];
+    leaf->mean[1][slot] = g->mean_y[id];
+    leaf->mean[2][slot] = g->mean_z[id];
     leaf->id[slot] = id;
 }
 
@@ -114,7 +118,8 @@ static void set_bounds(void *pointer, const struct RTCBounds **bounds, unsigned 
     embree_publish(user);
 }
 
-static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuildPrimitive *primitives, size_t count, void *user)
+static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuildPrimitive *primitives,
+                         size_t count, void *user)
 {
     builder *b = user;
     embree_receive(b);
@@ -132,7 +137,7 @@ static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuil
     return (char *)leaf + 1;
 }
 
-/* ---- binary nodes --> nodes of 16 ---------------------------------------------------------------------------------------------------- */
+/* ---- binary nodes --> nodes of 16 ---- */
 
 static float half_area(const struct RTCBounds *b)
 {
@@ -146,7 +151,8 @@ static uint64_t place_leaf(builder *b, uint64_t child)
     return (uint64_t)(uintptr_t)&b->leaves[b->filled_count++] + 1;
 }
 
-/* The wide node for a binary one: its largest child is opened until there are 16. Depth first, so that neighbours lie side by side. */
+/* The wide node for a binary one: its largest child is opened until there are 16. Depth first, so that
+   neighbours lie side by side. */
 static tree_node *widen(builder *b, const binary_node *root)
 {
     struct RTCBounds bounds[TREE_WIDTH];
@@ -158,22 +164,30 @@ static tree_node *widen(builder *b, const binary_node *root)
         int largest = -1;
         float area = -1;
         for (int i = 0; i < count; i++)
-            if ((child[i] & 1) == 0 && half_area(&bounds[i]) > area)
-                largest = i, area = half_area(&bounds[i]);
+            if ((child[i] & 1) == 0 && half_area(&bounds[i]) > area) {
+                largest = i;
+                area = half_area(&bounds[i]);
+            }
         if (largest < 0)
             break;
         const binary_node *opened = (const binary_node *)(uintptr_t)child[largest];
-        bounds[largest] = opened->bounds[0], child[largest] = opened->child[0];
-        bounds[count] = opened->bounds[1], child[count++] = opened->child[1];
+        bounds[largest] = opened->bounds[0];
+        child[largest] = opened->child[0];
+        bounds[count] = opened->bounds[1];
+        child[count++] = opened->child[1];
     }
     tree_node *node = &b->nodes[b->node_count++];
     node_clear(node);
     for (int i = 0; i < count; i++) {
-        node->lower_x[i] = bounds[i].lower_x, node->upper_x[i] = bounds[i].upper_x;
-        node->lower_y[i] = bounds[i].lower_y, node->upper_y[i] = bounds[i].upper_y;
-        node->lower_z[i] = bounds[i].lower_z, node->upper_z[i] = bounds[i].upper_z;
-        node->child[i] = (child[i] & 1) != 0 ? place_leaf(b, child[i])
-                                             : (uint64_t)(uintptr_t)widen(b, (const binary_node *)(uintptr_t)child[i]);
+        node->lower_x[i] = bounds[i].lower_x;
+        node->upper_x[i] = bounds[i].upper_x;
+        node->lower_y[i] = bounds[i].lower_y;
+        node->upper_y[i] = bounds[i].upper_y;
+        node->lower_z[i] = bounds[i].lower_z;
+        node->upper_z[i] = bounds[i].upper_z;
+        node->child[i] = (child[i] & 1) != 0
+                             ? place_leaf(b, child[i])
+                             : (uint64_t)(uintptr_t)widen(b, (const binary_node *)(uintptr_t)child[i]);
     }
     return node;
 }
@@ -211,20 +225,27 @@ static gbt_status run_builder(builder *b, void *device, gbt_error *err)
     arguments.setNodeBounds = set_bounds;
     arguments.createLeaf = create_leaf;
     arguments.userPtr = b;
-    atomic_store(&b->binary_count, 0), atomic_store(&b->leaf_count, 0), atomic_store(&b->refused, false);
+    atomic_store(&b->binary_count, 0);
+    atomic_store(&b->leaf_count, 0);
+    atomic_store(&b->refused, false);
     embree_publish(b);
     void *root = rtcBuildBVH(&arguments);
     embree_receive(b);
     const gbt_status complaint = bvh_check("tree", err);
     if (b->refused || complaint != GBT_OK)
-        return base_fail(err, GBT_ERR_NO_MEMORY, "bvh: no memory for a tree over %zu Gaussians", b->boxes.count);
+        return base_fail(err, GBT_ERR_NO_MEMORY, "bvh: no memory for a tree over %zu Gaussians",
+                         b->boxes.count);
     if (root == NULL)
-        return base_fail(err, GBT_ERR_INTERNAL, "bvh: Embree could not build a tree over %zu Gaussians (error %d)", b->boxes.count,
+        return base_fail(err, GBT_ERR_INTERNAL,
+                         "bvh: Embree could not build a tree over %zu Gaussians (error %d)", b->boxes.count,
                          (int)rtcGetDeviceError(device));
     b->node_count = 0;
-    GBT_TRY(mem_reserve((void **)&b->nodes, &b->node_capacity, 0, b->binary_count + 1, sizeof *b->nodes, "bvh nodes", err));
-    GBT_TRY(mem_reserve((void **)&b->leaves, &b->leaf_capacity, 0, b->leaf_count, sizeof *b->leaves, "bvh leaves", err));
-    GBT_TRY(mem_reserve((void **)&b->members, &b->member_capacity, 0, b->leaf_count, sizeof *b->members, "bvh leaves", err));
+    GBT_TRY(mem_reserve((void **)&b->nodes, &b->node_capacity, 0, b->binary_count + 1, sizeof *b->nodes,
+                        "bvh nodes", err));
+    GBT_TRY(mem_reserve((void **)&b->leaves, &b->leaf_capacity, 0, b->leaf_count, sizeof *b->leaves,
+                        "bvh leaves", err));
+    GBT_TRY(mem_reserve((void **)&b->members, &b->member_capacity, 0, b->leaf_count, sizeof *b->members,
+                        "bvh leaves", err));
     b->filled_count = 0;
     if (b->binary_count > 0)
         widen(b, root);
@@ -234,9 +255,11 @@ static gbt_status run_builder(builder *b, void *device, gbt_error *err)
     return GBT_OK;
 }
 
-gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float radius, float reach, gaussian_tree *tree, gbt_error *err)
+gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float radius, float reach,
+                               gaussian_tree *tree, gbt_error *err)
 {
-    tree->root = NULL, tree->leaves = NULL;
+    tree->root = NULL;
+    tree->leaves = NULL;
     tree->box_count = tree->rejected_count = tree->node_count = tree->leaf_count = tree->bytes = 0;
     tree->coordinate_max = 0;
     if (g->count == 0)
@@ -254,12 +277,16 @@ gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float radius
     tree->box_count = b->boxes.count;
     tree->rejected_count = b->boxes.rejected_count;
     tree->coordinate_max = b->boxes.coordinate_max;
-    b->g = g, b->alpha_min = alpha_min, b->radius = radius;
+    b->g = g;
+    b->alpha_min = alpha_min;
+    b->radius = radius;
     if (tree->box_count == 0)
         return GBT_OK;
     GBT_TRY(run_builder(b, device, err));
-    tree->root = b->nodes, tree->leaves = b->leaves;
-    tree->node_count = b->node_count, tree->leaf_count = b->leaf_count;
+    tree->root = b->nodes;
+    tree->leaves = b->leaves;
+    tree->node_count = b->node_count;
+    tree->leaf_count = b->leaf_count;
     tree->bytes = tree->node_count * sizeof(tree_node) + tree->leaf_count * sizeof(tree_leaf);
     return GBT_OK;
 }

@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bvh/mesh.c -- rays against a triangle mesh.
 
-   vertices, triangles --> [check, copy into Embree's buffers] --> commit --> rtcIntersect1 finds hits, a filter settles them in double
+   vertices, triangles --> [check, copy into Embree's buffers] --> commit
+        --> rtcIntersect1 finds hits, a filter settles them in double
 
    Embree keeps the only copy of the mesh: distances and normals are taken from its buffers. */
 #include "bvh/mesh.h"
@@ -34,19 +36,24 @@ static void corner_differences(const mesh_tree *tree, uint32_t triangle, double 
     const uint32_t *corner = tree->triangles + 3 * (size_t)triangle;
     const float *a = tree->vertices + 3 * (size_t)corner[0], *b = tree->vertices + 3 * (size_t)corner[1],
                 *c = tree->vertices + 3 * (size_t)corner[2];
-    for (int i = 0; i < 3; i++)
-        ab[i] = (double)b[i] - (double)a[i], ac[i] = (double)c[i] - (double)a[i];
+    for (int i = 0; i < 3; i++) {
+        ab[i] = (double)b[i] - (double)a[i];
+        ac[i] = (double)c[i] - (double)a[i];
+    }
 }
 
-/* Where the line through the ray meets the plane of a triangle: t, and the weights u, v of its second and third corner. Embree's own
-   t depends on the instruction set in the last bits; this does not. False when they are parallel or the triangle has no area. */
+/* Where the line through the ray meets the plane of a triangle: t, and the weights u, v of its second and
+   third corner. Embree's own t depends on the instruction set in the last bits; this does not. False when
+   they are parallel or the triangle has no area. */
 static bool meet(const search *s, uint32_t triangle, double *t, double *u, double *v)
 {
     const float *a = s->tree->vertices + 3 * (size_t)s->tree->triangles[3 * (size_t)triangle];
     double ab[3], ac[3], normal[3], from_a[3], dir[3], across[3];
     corner_differences(s->tree, triangle, ab, ac);
-    for (int i = 0; i < 3; i++)
-        from_a[i] = (double)s->origin[i] - (double)a[i], dir[i] = (double)s->dir[i];
+    for (int i = 0; i < 3; i++) {
+        from_a[i] = (double)s->origin[i] - (double)a[i];
+        dir[i] = (double)s->dir[i];
+    }
     dvec_cross(ab, ac, normal);
     dvec_cross(from_a, dir, across);
     const double det = dvec_dot(dir, normal);
@@ -56,7 +63,8 @@ static bool meet(const search *s, uint32_t triangle, double *t, double *u, doubl
     return isfinite(*t) && isfinite(*u) && isfinite(*v);
 }
 
-/* A hit that Embree offers, decided by the exact t: recorded when it is in the range and better than the best so far. */
+/* A hit that Embree offers, decided by the exact t: recorded when it is in the range and better than the best
+   so far. */
 static bool take(const struct RTCFilterFunctionNArguments *args)
 {
     search *s = (search *)args->context;
@@ -66,7 +74,8 @@ static bool take(const struct RTCFilterFunctionNArguments *args)
     if (!meet(s, triangle, &t_exact, &u, &v) || fabs(t_exact) > (double)FLT_MAX)
         return false;
     const float t = (float)t_exact;
-    if (!(t > s->t_min && t <= s->t_max && (t < s->best.t || (t == s->best.t && triangle < s->best.triangle))))
+    if (!(t > s->t_min && t <= s->t_max &&
+          (t < s->best.t || (t == s->best.t && triangle < s->best.triangle))))
         return false;
     /* Embree's test has no gaps along edges, so the hit may be outside by a rounding. */
     u = fmin(fmax(u, 0), 1);
@@ -75,41 +84,48 @@ static bool take(const struct RTCFilterFunctionNArguments *args)
     return true;
 }
 
-/* For both kinds of query. Embree keeps the last hit that is not refused and offers only nearer or equal ones after it: without a
-   choice by number, equal ones would be settled by the shape of the tree. */
+/* For both kinds of query. Embree keeps the last hit that is not refused and offers only nearer or equal ones
+   after it: without a choice by number, equal ones would be settled by the shape of the tree. */
 static void filter(const struct RTCFilterFunctionNArguments *args)
 {
     if (!take(args))
         args->valid[0] = 0;
 }
 
-static gbt_status check_mesh(const float *vertices, size_t vertex_count, const uint32_t *triangles, size_t triangle_count, gbt_error *err)
+static gbt_status check_mesh(const float *vertices, size_t vertex_count, const uint32_t *triangles,
+                             size_t triangle_count, gbt_error *err)
 {
     if (vertex_count >= UINT32_MAX || triangle_count >= UINT32_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "mesh: %zu vertices and %zu triangles (wanted fewer than 2^32 - 1 of each)", vertex_count,
-                         triangle_count);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "mesh: %zu vertices and %zu triangles (wanted fewer than 2^32 - 1 of each)",
+                         vertex_count, triangle_count);
     for (size_t i = 0; i < 3 * vertex_count; i++)
         if (!(fabsf(vertices[i]) <= MESH_COORDINATE_LIMIT))
-            return base_fail(err, GBT_ERR_ARGUMENT, "mesh: vertex %zu: bad coordinate (wanted |x| <= %g, got %g)", i / 3,
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "mesh: vertex %zu: bad coordinate (wanted |x| <= %g, got %g)", i / 3,
                              (double)MESH_COORDINATE_LIMIT, (double)vertices[i]);
     for (size_t i = 0; i < 3 * triangle_count; i++)
         if (triangles[i] >= vertex_count)
-            return base_fail(err, GBT_ERR_ARGUMENT, "mesh: triangle %zu: bad vertex number (wanted < %zu, got %u)", i / 3, vertex_count,
-                             triangles[i]);
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "mesh: triangle %zu: bad vertex number (wanted < %zu, got %u)", i / 3,
+                             vertex_count, triangles[i]);
     return GBT_OK;
 }
 
-static gbt_status fill_scene(mesh_tree *tree, RTCDevice device, const float *vertices, size_t vertex_count, const uint32_t *triangles,
-                             size_t triangle_count, gbt_error *err)
+static gbt_status fill_scene(mesh_tree *tree, RTCDevice device, const float *vertices, size_t vertex_count,
+                             const uint32_t *triangles, size_t triangle_count, gbt_error *err)
 {
     tree->scene = rtcNewScene(device);
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     gbt_status status = bvh_check("mesh", err);
     if (status != GBT_OK)
         goto done;
-    /* Embree wants 16 readable bytes at every vertex, which buffers of its own have and the caller's may not. */
-    float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof *vertex, vertex_count);
-    uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof *index, triangle_count);
+    /* Embree wants 16 readable bytes at every vertex, which buffers of its own have and the caller's may
+       not. */
+    float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                            3 * sizeof *vertex, vertex_count);
+    uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                              3 * sizeof *index, triangle_count);
     status = bvh_check("mesh", err);
     if (status != GBT_OK)
         goto done;
@@ -132,8 +148,8 @@ done:
     return status;
 }
 
-gbt_status mesh_tree_build(const float *vertices, size_t vertex_count, const uint32_t *triangles, size_t triangle_count, mesh_tree **out,
-                           gbt_error *err)
+gbt_status mesh_tree_build(const float *vertices, size_t vertex_count, const uint32_t *triangles,
+                           size_t triangle_count, mesh_tree **out, gbt_error *err)
 {
     *out = NULL;
     GBT_TRY(check_mesh(vertices, vertex_count, triangles, triangle_count, err));
@@ -142,8 +158,9 @@ gbt_status mesh_tree_build(const float *vertices, size_t vertex_count, const uin
         return GBT_ERR_NO_MEMORY;
     if (vertex_count > 0 && triangle_count > 0) {
         RTCDevice device = bvh_device(err);
-        const gbt_status status = device != NULL ? fill_scene(tree, device, vertices, vertex_count, triangles, triangle_count, err)
-                                                 : bvh_check("mesh", err);
+        const gbt_status status =
+            device != NULL ? fill_scene(tree, device, vertices, vertex_count, triangles, triangle_count, err)
+                           : bvh_check("mesh", err);
         if (status != GBT_OK) {
             mesh_tree_free(tree);
             return status;
@@ -153,10 +170,11 @@ gbt_status mesh_tree_build(const float *vertices, size_t vertex_count, const uin
     return GBT_OK;
 }
 
-/* False when the ray cannot be traced. Embree gets a range a little wider than asked, since the filter decides in double; and a direction
-   of unusual length scaled by a power of two, which is exact, because it replaces components below 1e-18 by others. */
-static bool prepare(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min, float t_max, search *s,
-                    struct RTCRay *ray)
+/* False when the ray cannot be traced. Embree gets a range a little wider than asked, since the filter
+   decides in double; and a direction of unusual length scaled by a power of two, which is exact, because it
+   replaces components below 1e-18 by others. */
+static bool prepare(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min,
+                    float t_max, search *s, struct RTCRay *ray)
 {
     if (tree->scene == NULL || !(t_min >= 0 && t_min <= t_max))
         return false;
@@ -168,15 +186,27 @@ static bool prepare(const mesh_tree *tree, const float origin[3], const float di
             return false;
     if (!bvh_ray_ok(origin, scaled, 0, t_end))
         return false;
-    *ray = (struct RTCRay){.org_x = origin[0], .org_y = origin[1], .org_z = origin[2], .tnear = 0,
-                           .dir_x = scaled[0], .dir_y = scaled[1], .dir_z = scaled[2], .tfar = t_end, .mask = ~0u};
+    *ray = (struct RTCRay){.org_x = origin[0],
+                           .org_y = origin[1],
+                           .org_z = origin[2],
+                           .tnear = 0,
+                           .dir_x = scaled[0],
+                           .dir_y = scaled[1],
+                           .dir_z = scaled[2],
+                           .tfar = t_end,
+                           .mask = ~0u};
     embree_context_init(&s->context);
-    s->tree = tree, s->origin = origin, s->dir = dir, s->t_min = t_min, s->t_max = t_max;
+    s->tree = tree;
+    s->origin = origin;
+    s->dir = dir;
+    s->t_min = t_min;
+    s->t_max = t_max;
     s->best = (mesh_hit){.t = INFINITY, .triangle = UINT32_MAX};
     return true;
 }
 
-bool mesh_tree_trace(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min, float t_max, mesh_hit *hit)
+bool mesh_tree_trace(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min,
+                     float t_max, mesh_hit *hit)
 {
     search s;
     struct RTCRayHit rayhit = {.hit = {.geomID = RTC_INVALID_GEOMETRY_ID, .primID = RTC_INVALID_GEOMETRY_ID}};
@@ -195,7 +225,8 @@ bool mesh_tree_trace(const mesh_tree *tree, const float origin[3], const float d
     return true;
 }
 
-bool mesh_tree_blocked(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min, float t_max)
+bool mesh_tree_blocked(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min,
+                       float t_max)
 {
     search s;
     struct RTCRay ray;

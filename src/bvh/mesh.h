@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bvh/mesh.h -- rays against a triangle mesh, on Embree's watertight kernels. */
 #ifndef GBT_BVH_MESH_H
 #define GBT_BVH_MESH_H
@@ -10,7 +11,8 @@
 
 typedef struct mesh_tree mesh_tree; /* immutable once built; rays may be traced from any thread */
 
-/** Vertices and ray origins lie in [-1e12, 1e12]: products of three coordinates must stay finite in float32. */
+/** Vertices and ray origins lie in [-1e12, 1e12]: products of three coordinates must stay finite in
+    float32. */
 #define MESH_COORDINATE_LIMIT 1e12f
 
 /**
@@ -26,31 +28,36 @@ typedef struct mesh_tree mesh_tree; /* immutable once built; rays may be traced 
  * Either count may be 0: no ray then hits anything.
  * Threads: any; builds on all threads inside. Cost: O(n log n); about 100 bytes per triangle.
  */
-gbt_status mesh_tree_build(const float *vertices, size_t vertex_count, const uint32_t *triangles, size_t triangle_count, mesh_tree **out,
-                           gbt_error *err);
+gbt_status mesh_tree_build(const float *vertices, size_t vertex_count, const uint32_t *triangles,
+                           size_t triangle_count, mesh_tree **out, gbt_error *err);
 
 typedef struct mesh_hit {
-    float t;           /* in lengths of dir: the point is origin + t dir */
-    float u, v;        /* the point is (1 - u - v) a + u b + v c for the triangle (a, b, c) */
-    float normal[3];   /* geometric, unit: along (b - a) x (c - a), whichever side the ray came from */
+    float t;         /* in lengths of dir: the point is origin + t dir */
+    float u, v;      /* the point is (1 - u - v) a + u b + v c for the triangle (a, b, c) */
+    float normal[3]; /* geometric, unit: along (b - a) x (c - a), whichever side the ray came from */
     uint32_t triangle;
 } mesh_hit;
 
 /**
- * The nearest hit with t_min < t <= t_max, from either side; among hits of equal float32 t the lowest triangle number.
+ * The nearest hit with t_min < t <= t_max, from either side; among hits of equal float32 t the lowest
+ * triangle number.
  *
- * t, u, v and the normal are computed in double and rounded, so they have the same bits for every instruction set; only where two
- * different triangles are hit within float32 rounding of each other (a shared edge) may the set decide which of them is reported.
+ * t, u, v and the normal are computed in double and rounded, so they have the same bits for every instruction
+ * set; only where two different triangles are hit within float32 rounding of each other (a shared edge) may
+ * the set decide which of them is reported.
  *
  * @param dir [in] any length but 0; need not be unit
  * @param hit [out] untouched when there is none
- * @return false for no hit, and for a ray that cannot be traced: not finite, origin out of range, zero dir, t_min < 0, t_min > t_max.
- *         t_max may be infinite.
+ * @return false for no hit, and for a ray that cannot be traced: not finite, origin out of range, zero dir,
+ *         t_min < 0, t_min > t_max. t_max may be infinite.
  */
-bool mesh_tree_trace(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min, float t_max, mesh_hit *hit);
+bool mesh_tree_trace(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min,
+                     float t_max, mesh_hit *hit);
 
-/** Whether there is any hit with t_min < t <= t_max: what a shadow ray asks. False for a ray that cannot be traced. */
-bool mesh_tree_blocked(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min, float t_max);
+/** Whether there is any hit with t_min < t <= t_max: what a shadow ray asks. False for a ray that cannot be
+    traced. */
+bool mesh_tree_blocked(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min,
+                       float t_max);
 
 void mesh_tree_free(mesh_tree *tree); /* NULL is fine */
 

@@ -1,4 +1,6 @@
-/* bvh/point_tree.c -- sites of equal positions, Embree trees over them, and the search that all point queries share. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* bvh/point_tree.c -- sites of equal positions, Embree trees over them, and the search that all point queries
+   share. */
 #include "bvh/point_tree.h"
 
 #include "base/fail.h"
@@ -40,8 +42,8 @@ static gbt_status group_points(point_tree *tree, const float *position, gbt_erro
     tree->member = mem_alloc(count, sizeof *tree->member, "points.member", err);
     if (tree->radius != NULL)
         tree->site_radius = mem_calloc(count, sizeof *tree->site_radius, "points.site_radius", err);
-    if (slot == NULL || site_of == NULL || tree->site == NULL || tree->first == NULL || tree->member == NULL ||
-        (tree->radius != NULL && tree->site_radius == NULL))
+    if (slot == NULL || site_of == NULL || tree->site == NULL || tree->first == NULL ||
+        tree->member == NULL || (tree->radius != NULL && tree->site_radius == NULL))
         goto done;
 
     for (size_t i = 0; i < count; i++) {
@@ -61,7 +63,8 @@ static gbt_status group_points(point_tree *tree, const float *position, gbt_erro
     }
     for (size_t s = 0; s < tree->site_count; s++)
         tree->first[s + 1] += tree->first[s];
-    /* first[s] walks to the end of its list while the list is filled, and is then the start of the next: moved back by one below. */
+    /* first[s] walks to the end of its list while the list is filled, and is then the start of the next:
+       moved back by one below. */
     for (size_t i = 0; i < count; i++)
         tree->member[tree->first[site_of[i]]++] = (uint32_t)i;
     for (size_t s = tree->site_count; s > 0; s--)
@@ -95,9 +98,12 @@ static float round_down(double x)
 
 void site_write_bounds(struct RTCBounds *out, const double lower[3], const double upper[3], double pad)
 {
-    out->lower_x = round_down(lower[0] - pad), out->upper_x = round_up(upper[0] + pad);
-    out->lower_y = round_down(lower[1] - pad), out->upper_y = round_up(upper[1] + pad);
-    out->lower_z = round_down(lower[2] - pad), out->upper_z = round_up(upper[2] + pad);
+    out->lower_x = round_down(lower[0] - pad);
+    out->upper_x = round_up(upper[0] + pad);
+    out->lower_y = round_down(lower[1] - pad);
+    out->upper_y = round_up(upper[1] + pad);
+    out->lower_z = round_down(lower[2] - pad);
+    out->upper_z = round_up(upper[2] + pad);
 }
 
 static void center_bounds(const struct RTCBoundsFunctionArguments *args)
@@ -119,8 +125,8 @@ static void ball_bounds(const struct RTCBoundsFunctionArguments *args)
     site_write_bounds(args->bounds_o, lower, upper, 0);
 }
 
-gbt_status site_scene_build(const point_tree *tree, RTCBoundsFunction bounds, RTCIntersectFunctionN intersect, RTCScene *out,
-                            gbt_error *err)
+gbt_status site_scene_build(const point_tree *tree, RTCBoundsFunction bounds, RTCIntersectFunctionN intersect,
+                            RTCScene *out, gbt_error *err)
 {
     RTCDevice device = bvh_device(err);
     if (device == NULL)
@@ -154,14 +160,17 @@ gbt_status site_scene_build(const point_tree *tree, RTCBoundsFunction bounds, RT
 static gbt_status check_points(const float *position, const float *radius, size_t count, gbt_error *err)
 {
     if (count >= UINT32_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "points: too many (wanted fewer than 2^32 - 1, got %zu)", count);
+        return base_fail(err, GBT_ERR_ARGUMENT, "points: too many (wanted fewer than 2^32 - 1, got %zu)",
+                         count);
     for (size_t i = 0; i < count; i++) {
         for (int j = 0; j < 3; j++)
             if (!isfinite(position[3 * i + j]))
-                return base_fail(err, GBT_ERR_ARGUMENT, "points: point %zu: bad coordinate (wanted a finite number, got %g)", i,
+                return base_fail(err, GBT_ERR_ARGUMENT,
+                                 "points: point %zu: bad coordinate (wanted a finite number, got %g)", i,
                                  (double)position[3 * i + j]);
         if (radius != NULL && !(radius[i] >= 0 && isfinite(radius[i])))
-            return base_fail(err, GBT_ERR_ARGUMENT, "points: point %zu: bad radius (wanted a finite number >= 0, got %g)", i,
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "points: point %zu: bad radius (wanted a finite number >= 0, got %g)", i,
                              (double)radius[i]);
     }
     return GBT_OK;
@@ -177,8 +186,10 @@ static void measure(point_tree *tree)
     int exponent = 0;
     frexp(largest > 0 ? largest : largest_radius, &exponent);
     tree->scale = ldexp(1, -exponent);
-    for (int j = 0; j < 3; j++)
-        tree->lower[j] = INFINITY, tree->upper[j] = -INFINITY;
+    for (int j = 0; j < 3; j++) {
+        tree->lower[j] = INFINITY;
+        tree->upper[j] = -INFINITY;
+    }
     tree->reach = 0.5;
     for (size_t s = 0; s < tree->site_count; s++) {
         double lower[3], upper[3];
@@ -191,7 +202,8 @@ static void measure(point_tree *tree)
     }
 }
 
-gbt_status point_tree_build(const float *position, const float *radius, size_t count, point_tree **out, gbt_error *err)
+gbt_status point_tree_build(const float *position, const float *radius, size_t count, point_tree **out,
+                            gbt_error *err)
 {
     *out = NULL;
     GBT_TRY(check_points(position, radius, count, err));
@@ -240,8 +252,8 @@ float site_search_radius(const point_tree *tree, double radius)
     return scaled < 1e18 ? (float)scaled : INFINITY;
 }
 
-void sites_search(const point_tree *tree, RTCScene scene, const double query[3], double radius, RTCPointQueryFunction visit,
-                  void *search)
+void sites_search(const point_tree *tree, RTCScene scene, const double query[3], double radius,
+                  RTCPointQueryFunction visit, void *search)
 {
     if (tree->site_count == 0)
         return;
@@ -249,10 +261,13 @@ void sites_search(const point_tree *tree, RTCScene scene, const double query[3],
     struct RTCPointQuery point = {.radius = site_search_radius(tree, radius)};
     if (fmax(fabs(x), fmax(fabs(y), fabs(z))) > scaled_limit) {
         for (size_t s = 0; s < tree->site_count; s++)
-            visit(&(struct RTCPointQueryFunctionArguments){.query = &point, .userPtr = search, .primID = (unsigned)s});
+            visit(&(struct RTCPointQueryFunctionArguments){
+                .query = &point, .userPtr = search, .primID = (unsigned)s});
         return;
     }
-    point.x = (float)x, point.y = (float)y, point.z = (float)z;
+    point.x = (float)x;
+    point.y = (float)y;
+    point.z = (float)z;
     struct RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
     rtcPointQuery(scene, &point, &context, visit, search);

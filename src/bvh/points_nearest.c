@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bvh/points_nearest.c -- the nearest centres, and how far they are apart. */
 #include <fenv.h>
 
@@ -26,7 +27,9 @@ static bool insert_nearest(nearest_search *s, uint32_t index, double d2)
         s->found++;
     }
     size_t at = s->found - 1;
-    for (; at > 0 && (d2 < s->distance_squared[at - 1] || (d2 == s->distance_squared[at - 1] && index < s->index[at - 1])); at--) {
+    for (; at > 0 && (d2 < s->distance_squared[at - 1] ||
+                      (d2 == s->distance_squared[at - 1] && index < s->index[at - 1]));
+         at--) {
         s->distance_squared[at] = s->distance_squared[at - 1];
         s->index[at] = s->index[at - 1];
     }
@@ -51,19 +54,26 @@ static bool visit_nearest(struct RTCPointQueryFunctionArguments *args)
     const float radius = site_search_radius(tree, sqrt(s->distance_squared[s->k - 1]));
     if (!(radius < args->query->radius))
         return false;
-    args->query->radius = radius; /* sites at exactly the k-th distance stay inside: they may have a lower index */
+    args->query->radius =
+        radius; /* sites at exactly the k-th distance stay inside: they may have a lower index */
     return true;
 }
 
-static size_t find_nearest(const point_tree *tree, const double query[3], size_t k, size_t skip, uint32_t *index, double *distance_squared)
+static size_t find_nearest(const point_tree *tree, const double query[3], size_t k, size_t skip,
+                           uint32_t *index, double *distance_squared)
 {
-    nearest_search search = {.tree = tree, .query = {query[0], query[1], query[2]}, .k = k, .skip = skip, .index = index,
+    nearest_search search = {.tree = tree,
+                             .query = {query[0], query[1], query[2]},
+                             .k = k,
+                             .skip = skip,
+                             .index = index,
                              .distance_squared = distance_squared};
     sites_search(tree, tree->centers, query, INFINITY, visit_nearest, &search);
     return search.found;
 }
 
-size_t point_tree_nearest(const point_tree *tree, const float query[3], size_t k, size_t skip, uint32_t *index, double *distance_squared)
+size_t point_tree_nearest(const point_tree *tree, const float query[3], size_t k, size_t skip,
+                          uint32_t *index, double *distance_squared)
 {
     if (k == 0 || !finite3(query))
         return 0;
@@ -86,7 +96,8 @@ static void space_sites(size_t block, size_t begin, size_t end, void *context)
     const point_tree *tree = job->tree;
     uint32_t index[MAX_NEIGHBOURS + 1];
     double d2[MAX_NEIGHBOURS + 1];
-    /* Threads of oneTBB may have inherited Embree's mode that flushes small numbers to 0: then the bits would depend on the thread. */
+    /* Threads of oneTBB may have inherited Embree's mode that flushes small numbers to 0: then the bits would
+       depend on the thread. */
     fenv_t before;
     fegetenv(&before);
     fesetenv(FE_DFL_ENV);
@@ -110,7 +121,8 @@ static void space_sites(size_t block, size_t begin, size_t end, void *context)
 gbt_status point_tree_spacing(const point_tree *tree, size_t k, float *spacing, gbt_error *err)
 {
     if (k < 1 || k > MAX_NEIGHBOURS)
-        return base_fail(err, GBT_ERR_ARGUMENT, "points: bad number of neighbours (wanted 1..%d, got %zu)", (int)MAX_NEIGHBOURS, k);
+        return base_fail(err, GBT_ERR_ARGUMENT, "points: bad number of neighbours (wanted 1..%d, got %zu)",
+                         (int)MAX_NEIGHBOURS, k);
     spacing_job job = {.tree = tree, .k = k, .spacing = spacing};
     parallel_blocks(tree->site_count, SPACING_GRAIN, space_sites, &job);
     return GBT_OK;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* bvh/proxy.c -- the padded tight box of every Gaussian that can be seen. */
 #include "bvh/proxy.h"
 
@@ -26,20 +27,23 @@ typedef struct box_job {
 } box_job;
 
 /* Tight half extents of the proxy: k * sqrt(sum_i (R_ji s_i)^2). False when the Gaussian cannot be seen. */
-static bool proxy_box(const gaussians *g, size_t i, float alpha_min, float radius, float center[3], float half[3], bool *rejected)
+static bool proxy_box(const gaussians *g, size_t i, float alpha_min, float radius, float center[3],
+                      float half[3], bool *rejected)
 {
     *rejected = false;
     const float opacity = g->opacity[i];
     const float q[4] = {g->quat_w[i], g->quat_x[i], g->quat_y[i], g->quat_z[i]};
     const float s[3] = {g->scale_x[i], g->scale_y[i], g->scale_z[i]};
-    center[0] = g->mean_x[i], center[1] = g->mean_y[i], center[2] = g->mean_z[i];
+    center[0] = g->mean_x[i];
+    center[1] = g->mean_y[i];
+    center[2] = g->mean_z[i];
     if (opacity <= alpha_min)
         return false;
     const float k = fminf(sqrtf(2 * logf(opacity / alpha_min)), radius);
     float m[9];
     quat_to_matrix(q, m);
-    bool fine = isfinite(opacity) && s[0] > 0 && s[1] > 0 && s[2] > 0 && isfinite(g->red[i]) && isfinite(g->green[i]) &&
-                isfinite(g->blue[i]);
+    bool fine = isfinite(opacity) && s[0] > 0 && s[1] > 0 && s[2] > 0 && isfinite(g->red[i]) &&
+                isfinite(g->green[i]) && isfinite(g->blue[i]);
     for (int j = 0; j < 3; j++) {
         const float a = m[3 * j] * s[0], b = m[3 * j + 1] * s[1], c = m[3 * j + 2] * s[2];
         half[j] = k * sqrtf(a * a + b * b + c * c);
@@ -68,11 +72,15 @@ static void box_block(size_t block, size_t begin, size_t end, void *context)
             kept++;
             continue;
         }
-        /* 1e-5 of the half extent covers the rounding of k and of the rotation; the pad covers that of the coordinates. */
+        /* 1e-5 of the half extent covers the rounding of k and of the rotation; the pad covers that of the
+           coordinates. */
         struct RTCBuildPrimitive *p = &out[kept++];
-        p->lower_x = center[0] - half[0] * 1.00001f - job->pad, p->upper_x = center[0] + half[0] * 1.00001f + job->pad;
-        p->lower_y = center[1] - half[1] * 1.00001f - job->pad, p->upper_y = center[1] + half[1] * 1.00001f + job->pad;
-        p->lower_z = center[2] - half[2] * 1.00001f - job->pad, p->upper_z = center[2] + half[2] * 1.00001f + job->pad;
+        p->lower_x = center[0] - half[0] * 1.00001f - job->pad;
+        p->upper_x = center[0] + half[0] * 1.00001f + job->pad;
+        p->lower_y = center[1] - half[1] * 1.00001f - job->pad;
+        p->upper_y = center[1] + half[1] * 1.00001f + job->pad;
+        p->lower_z = center[2] - half[2] * 1.00001f - job->pad;
+        p->upper_z = center[2] + half[2] * 1.00001f + job->pad;
         p->geomID = 0;
         p->primID = (unsigned)i;
     }
@@ -83,7 +91,8 @@ static void box_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float radius, float reach, proxy_boxes *boxes, gbt_error *err)
+gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float radius, float reach,
+                            proxy_boxes *boxes, gbt_error *err)
 {
     boxes->count = boxes->rejected_count = 0;
     boxes->coordinate_max = 0;
@@ -95,7 +104,11 @@ gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float radius, f
     uint32_t *scratch = mem_alloc(blocks, 3 * sizeof *scratch, "bvh blocks", err);
     if (scratch == NULL)
         return GBT_ERR_NO_MEMORY;
-    box_job job = {.g = g, .alpha_min = alpha_min, .radius = radius, .block_kept = scratch, .block_rejected = scratch + blocks,
+    box_job job = {.g = g,
+                   .alpha_min = alpha_min,
+                   .radius = radius,
+                   .block_kept = scratch,
+                   .block_rejected = scratch + blocks,
                    .block_max = (float *)(scratch + 2 * blocks)};
     parallel_blocks(g->count, BLOCK, box_block, &job);
     size_t count = 0;
@@ -108,7 +121,8 @@ gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float radius, f
     }
     gbt_status status = GBT_OK;
     if (count > 0)
-        status = mem_reserve((void **)&boxes->box, &boxes->capacity, 0, count + count / 4 + 2, sizeof *boxes->box, "bvh boxes", err);
+        status = mem_reserve((void **)&boxes->box, &boxes->capacity, 0, count + count / 4 + 2,
+                             sizeof *boxes->box, "bvh boxes", err);
     if (status == GBT_OK && count > 0) {
         job.pad = bvh_box_pad(fmaxf(boxes->coordinate_max, reach));
         job.out = boxes->box;

@@ -1,7 +1,10 @@
-/* bvh/proxy.h -- padded boxes around the ellipsoids that Gaussians can be seen in: what every tree over Gaussians is built from.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* bvh/proxy.h -- padded boxes around the ellipsoids that Gaussians can be seen in: what every tree over
+   Gaussians is built from.
 
-   The proxy of Gaussian i is the ellipsoid at radius sqrt(2 ln(opacity / alpha_min)) std-devs: exactly the set where its response
-   reaches alpha_min; or at a fixed radius, when that is smaller. Its tight box is padded so that float32 traversal misses nothing. */
+   The proxy of Gaussian i is the ellipsoid at radius sqrt(2 ln(opacity / alpha_min)) std-devs: exactly the
+   set where its response reaches alpha_min; or at a fixed radius, when that is smaller. Its tight box is
+   padded so that float32 traversal misses nothing. */
 #ifndef GBT_BVH_PROXY_H
 #define GBT_BVH_PROXY_H
 
@@ -11,7 +14,8 @@
 #include "bvh/embree_api.h"
 
 typedef struct proxy_boxes {
-    struct RTCBuildPrimitive *box; /* [count], by increasing primID, which is the index of the Gaussian; geomID is 0 */
+    struct RTCBuildPrimitive *box; /* [count], by increasing primID, which is the index of the Gaussian;
+                                      geomID is 0 */
     size_t count;                  /* Gaussians with opacity <= alpha_min or non-finite fields have no box */
     size_t rejected_count;         /* of these, the non-finite or out-of-range ones */
     size_t capacity;               /* a quarter more than count at least: Embree's builders want room */
@@ -29,7 +33,8 @@ typedef struct proxy_boxes {
  *
  * Threads: uses all; the same boxes for every thread count. Cost: O(n); 40 bytes per Gaussian.
  */
-gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float radius, float reach, proxy_boxes *boxes, gbt_error *err);
+gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float radius, float reach,
+                            proxy_boxes *boxes, gbt_error *err);
 void proxy_boxes_free(proxy_boxes *boxes); /* back to {0} */
 
 #endif

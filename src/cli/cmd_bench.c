@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_bench.c -- gbtrace bench trace, and gbtrace check-grad. */
 #include <stdio.h>
 
@@ -7,7 +8,8 @@
 
 static const command_word *workloads(void)
 {
-    static const command_word words[] = {{"trace", "forward and backward pass of the ray tracer"}, {NULL, NULL}};
+    static const command_word words[] = {{"trace", "forward and backward pass of the ray tracer"},
+                                         {NULL, NULL}};
     return words;
 }
 
@@ -17,31 +19,87 @@ static int run_bench(const command *self, int argc, char **argv)
     bool check = false;
     int threads = 0;
     const option options[] = {
-        {.name = "model", .kind = OPTION_STRING, .value = &def.model, .value_name = "FILE|RUN",
-         .help = "plain Gaussians (.ply, .splat, .spz), or a trained run", .required = true},
-        {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json",
-         .help = "a camera file (docs/cameras.md); needed for plain Gaussians; default: the run's first held-out view"},
-        {.name = "alpha-min", .kind = OPTION_FLOAT, .value = &def.alpha_min, .min = 1e-6, .max = 0.999, .value_name = "A",
+        {.name = "model",
+         .kind = OPTION_STRING,
+         .value = &def.model,
+         .value_name = "FILE|RUN",
+         .help = "plain Gaussians (.ply, .splat, .spz), or a trained run",
+         .required = true},
+        {.name = "camera",
+         .kind = OPTION_STRING,
+         .value = &def.camera,
+         .value_name = "FILE.json",
+         .help = "a camera file (docs/cameras.md); needed for plain Gaussians; default: the run's first "
+                 "held-out view"},
+        {.name = "alpha-min",
+         .kind = OPTION_FLOAT,
+         .value = &def.alpha_min,
+         .min = 1e-6,
+         .max = 0.999,
+         .value_name = "A",
          .help = "ignore hits with an alpha below this; 0: as the run, else 1/255"},
-        {.name = "alpha-max", .kind = OPTION_FLOAT, .value = &def.alpha_max, .min = 1e-6, .max = 0.999999, .value_name = "A",
+        {.name = "alpha-max",
+         .kind = OPTION_FLOAT,
+         .value = &def.alpha_max,
+         .min = 1e-6,
+         .max = 0.999999,
+         .value_name = "A",
          .help = "clamp alpha to this; 0: as the run, else 0.99"},
-        {.name = "t-min", .kind = OPTION_FLOAT, .value = &def.t_min, .min = 1e-9, .max = 0.999, .value_name = "T",
+        {.name = "t-min",
+         .kind = OPTION_FLOAT,
+         .value = &def.t_min,
+         .min = 1e-9,
+         .max = 0.999,
+         .value_name = "T",
          .help = "stop a ray below this transmittance; 0: as the run, else 1e-4"},
-        {.name = "proxy-radius", .kind = OPTION_FLOAT, .value = &def.proxy_radius, .min = 0, .max = 1e6, .value_name = "R",
+        {.name = "proxy-radius",
+         .kind = OPTION_FLOAT,
+         .value = &def.proxy_radius,
+         .min = 0,
+         .max = 1e6,
+         .value_name = "R",
          .help = "cut Gaussians off at this many standard deviations; 0: where alpha falls to --alpha-min"},
-        {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast",
+        {.name = "preset",
+         .kind = OPTION_CHOICE,
+         .value = &def.preset,
+         .choices = "exact|default|fast",
          .help = "cut-off preset (docs/accuracy.md); the options above override it"},
-        {.name = "kernel", .kind = OPTION_STRING, .value = &def.kernel, .value_name = "LIST",
-         .choices = "tile|single|embree", .list = true,
+        {.name = "kernel",
+         .kind = OPTION_STRING,
+         .value = &def.kernel,
+         .value_name = "LIST",
+         .choices = "tile|single|embree",
+         .list = true,
          .help = "tile, single or embree; tile,embree measures both alternately and compares them"},
-        {.name = "memory", .kind = OPTION_SIZE, .value = &def.tape_bytes_max, .min = 0, .max = 0x1p60, .value_name = "BYTES",
+        {.name = "memory",
+         .kind = OPTION_SIZE,
+         .value = &def.tape_bytes_max,
+         .min = 0,
+         .max = 0x1p60,
+         .value_name = "BYTES",
          .help = "memory for ray hits kept for the backward pass, such as 100M; 0: no limit"},
-        {.name = "repeats", .kind = OPTION_INT, .value = &def.repeats, .min = 1, .max = 1000, .value_name = "N",
+        {.name = "repeats",
+         .kind = OPTION_INT,
+         .value = &def.repeats,
+         .min = 1,
+         .max = 1000,
+         .value_name = "N",
          .help = "timed passes; the median is reported"},
-        {.name = "check", .kind = OPTION_FLAG, .value = &check, .help = "compare with the double-precision reference"},
-        {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE",
+        {.name = "check",
+         .kind = OPTION_FLAG,
+         .value = &check,
+         .help = "compare with the double-precision reference"},
+        {.name = "json",
+         .kind = OPTION_STRING,
+         .value = &def.json,
+         .value_name = "FILE",
          .help = "write the figures to this file"},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+        {.name = "threads",
+         .kind = OPTION_INT,
+         .value = &threads,
+         .min = 0,
+         .max = 1024,
+         .value_name = "T",
          .help = THREADS_HELP},
     };
     operands name;
@@ -55,14 +113,22 @@ static int run_bench(const command *self, int argc, char **argv)
     return command_failed(lab_bench_trace(&def, stdout, &err), &err);
 }
 
-const command command_bench = {.name = "bench", .summary = "benchmark the ray tracer on given Gaussians",
-                               .usage = "trace --model FILE|RUN [--camera FILE.json]", .run = run_bench, .words = workloads};
+const command command_bench = {.name = "bench",
+                               .summary = "benchmark the ray tracer on given Gaussians",
+                               .usage = "trace --model FILE|RUN [--camera FILE.json]",
+                               .run = run_bench,
+                               .words = workloads};
 
 static int run_check_grad(const command *self, int argc, char **argv)
 {
     int threads = 0;
     const option options[] = {
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+        {.name = "threads",
+         .kind = OPTION_INT,
+         .value = &threads,
+         .min = 0,
+         .max = 1024,
+         .value_name = "T",
          .help = THREADS_HELP},
     };
     operands run;
@@ -75,6 +141,8 @@ static int run_check_grad(const command *self, int argc, char **argv)
     return command_failed(lab_check_grad(run.value[0], stdout, &err), &err);
 }
 
-const command command_check_grad = {.name = "check-grad",
+const command command_check_grad = {
+    .name = "check-grad",
     .summary = "check the gradients of a trained run against double precision and finite differences",
-                                    .usage = "RUN", .run = run_check_grad};
+    .usage = "RUN",
+    .run = run_check_grad};

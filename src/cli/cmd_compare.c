@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_compare.c -- gbtrace compare. */
 #include <stdio.h>
 
@@ -43,8 +44,8 @@ static int run(const command *self, int argc, char **argv)
         }
         print_number("flip", c.flip, "}\n");
     } else {
-        printf("%d x %d: PSNR %.4f dB, SSIM %.6f (windows inside: %.6f), FLIP %.6f", c.width, c.height, c.psnr, c.ssim, c.ssim_interior,
-               c.flip);
+        printf("%d x %d: PSNR %.4f dB, SSIM %.6f (windows inside: %.6f), FLIP %.6f", c.width, c.height,
+               c.psnr, c.ssim, c.ssim_interior, c.flip);
         if (network != NULL)
             printf(", LPIPS %.6f (colours in [0, 1]: %.6f)", lpips[0], lpips[1]);
         putchar('\n');
@@ -53,5 +54,6 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_compare = {.name = "compare",
-    .summary = "compare two pictures: PSNR, SSIM, FLIP, LPIPS", .usage = "IMAGE REFERENCE",
+                                 .summary = "compare two pictures: PSNR, SSIM, FLIP, LPIPS",
+                                 .usage = "IMAGE REFERENCE",
                                  .run = run};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_compress.c -- gbtrace compress. */
 #include "cli/options.h"
 #include "gbtrace/compress.h"
@@ -10,16 +11,39 @@ static int run(const command *self, int argc, char **argv)
     bool lossless = false;
     int threads = 0;
     const option options[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "FILE.gbt",
-         .help = "where to write the small model", .required = true},
-        {.name = "quality", .short_name = 'q', .kind = OPTION_DOUBLE, .value = &def.quality, .min = 20, .max = 90, .value_name = "DB",
+        {.name = "output",
+         .short_name = 'o',
+         .kind = OPTION_STRING,
+         .value = &out,
+         .value_name = "FILE.gbt",
+         .help = "where to write the small model",
+         .required = true},
+        {.name = "quality",
+         .short_name = 'q',
+         .kind = OPTION_DOUBLE,
+         .value = &def.quality,
+         .min = 20,
+         .max = 90,
+         .value_name = "DB",
          .help = "PSNR between renders of the small and of the original model; higher makes a larger file"},
         {.name = "lossless", .kind = OPTION_FLAG, .value = &lossless, .help = "store the model without loss"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA",
-         .help = "use the cameras of this data set instead of the one it was trained on", .aliases = "s source-path"},
-        {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE",
+        {.name = "data",
+         .kind = OPTION_STRING,
+         .value = &def.data,
+         .value_name = "DATA",
+         .help = "use the cameras of this data set instead of the one it was trained on",
+         .aliases = "s source-path"},
+        {.name = "json",
+         .kind = OPTION_STRING,
+         .value = &def.json,
+         .value_name = "FILE",
          .help = "write the figures to this file"},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+        {.name = "threads",
+         .kind = OPTION_INT,
+         .value = &threads,
+         .min = 0,
+         .max = 1024,
+         .value_name = "T",
          .help = THREADS_HELP},
     };
     operands model;
@@ -34,5 +58,7 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_compress = {.name = "compress",
-    .summary = "write a trained model as a small file, which every command can read",
-                                  .usage = "RUN|MODEL.gbt -o FILE.gbt", .run = run};
+                                  .summary =
+                                      "write a trained model as a small file, which every command can read",
+                                  .usage = "RUN|MODEL.gbt -o FILE.gbt",
+                                  .run = run};

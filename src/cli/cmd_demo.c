@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_demo.c -- gbtrace demo: make a scene, train on it, score it, report. */
 #include <stdio.h>
 #include <string.h>
@@ -27,14 +28,35 @@ static int run(const command *self, int argc, char **argv)
     double minutes = 2;
     int threads = 0;
     const option options[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR",
+        {.name = "output",
+         .short_name = 'o',
+         .kind = OPTION_STRING,
+         .value = &out,
+         .value_name = "DIR",
          .help = "folder for the scene and the run"},
-        {.name = "minutes", .kind = OPTION_DOUBLE, .value = &minutes, .min = 0.05, .max = 600, .value_name = "M",
+        {.name = "minutes",
+         .kind = OPTION_DOUBLE,
+         .value = &minutes,
+         .min = 0.05,
+         .max = 600,
+         .value_name = "M",
          .help = "training time, minutes"},
-        {.name = "scene", .kind = OPTION_CHOICE, .value = &scene.name, .choices = scene_choices(),
+        {.name = "scene",
+         .kind = OPTION_CHOICE,
+         .value = &scene.name,
+         .choices = scene_choices(),
          .help = "which procedural scene (gbtrace make-scene --help says what they show)"},
-        {.name = "seed", .kind = OPTION_UINT64, .value = &train.seed, .value_name = "S", .help = "random seed"},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+        {.name = "seed",
+         .kind = OPTION_UINT64,
+         .value = &train.seed,
+         .value_name = "S",
+         .help = "random seed"},
+        {.name = "threads",
+         .kind = OPTION_INT,
+         .value = &threads,
+         .min = 0,
+         .max = 1024,
+         .value_name = "T",
          .help = THREADS_HELP},
     };
     operands none;
@@ -47,7 +69,8 @@ static int run(const command *self, int argc, char **argv)
     if (snprintf(data, sizeof data, "%s/scene", out) >= (int)sizeof data ||
         snprintf(run_folder, sizeof run_folder, "%s/run", out) >= (int)sizeof run_folder)
         return command_misused("--output: the path is too long");
-    snprintf(command_line, sizeof command_line, "gbtrace train %s -o %s --budget %.0fs", data, run_folder, 60 * minutes);
+    snprintf(command_line, sizeof command_line, "gbtrace train %s -o %s --budget %.0fs", data, run_folder,
+             60 * minutes);
     train.budget_seconds = 60 * minutes;
     train.command = command_line;
     train.overwrite = true;
@@ -65,10 +88,13 @@ static int run(const command *self, int argc, char **argv)
     if (status == GBT_OK)
         finish_run_say(run_folder);
     if (status == GBT_OK && progress_for_people())
-        puts("Your own photos: gbtrace train PHOTOS -o RUN --budget 10m   (PHOTOS holds images/ and sparse/0 from COLMAP)");
+        puts("Your own photos: gbtrace train PHOTOS -o RUN --budget 10m   (PHOTOS holds images/ and sparse/0 "
+             "from COLMAP)");
     return command_failed(status, &err);
 }
 
 const command command_demo = {.name = "demo",
-    .summary = "make a procedural scene, train on it, score it and write the report",
-                              .usage = "[--minutes M] [-o DIR]", .run = run};
+                              .summary =
+                                  "make a procedural scene, train on it, score it and write the report",
+                              .usage = "[--minutes M] [-o DIR]",
+                              .run = run};

@@ -1,16 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_describe.c -- gbtrace describe: the manual page, the completion scripts. */
 #include <string.h>
 
 #include "cli/describe.h"
 
-static const command_word forms[] = {{"man", "the manual page, in roff"}, {"bash", "completion for bash"}, {"zsh", "completion for zsh"},
-                                     {"fish", "completion for fish"}, {NULL, NULL}};
+static const command_word forms[] = {{"man", "the manual page, in roff"},
+                                     {"bash", "completion for bash"},
+                                     {"zsh", "completion for zsh"},
+                                     {"fish", "completion for fish"},
+                                     {NULL, NULL}};
 static void (*const writers[])(FILE *) = {describe_man, describe_bash, describe_zsh, describe_fish};
 
-static const command_word *form_words(void)
-{
-    return forms;
-}
+static const command_word *form_words(void) { return forms; }
 
 static int run(const command *self, int argc, char **argv)
 {
@@ -24,7 +25,8 @@ static int run(const command *self, int argc, char **argv)
     return 0;
 }
 
-const command command_describe = {
-    .name = "describe",
-    .summary = "print the manual page, or a completion script for a shell", .usage = "man|bash|zsh|fish",
-    .run = run, .words = form_words};
+const command command_describe = {.name = "describe",
+                                  .summary = "print the manual page, or a completion script for a shell",
+                                  .usage = "man|bash|zsh|fish",
+                                  .run = run,
+                                  .words = form_words};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_doctor.c -- gbtrace doctor: check the build and the machine. */
 #include <stdio.h>
 #include <string.h>
@@ -10,7 +11,7 @@
 
 static const char *const level_names[] = {"ok", "warn", "fail"};
 
-/* ---- variables that nobody reads --------------------------------------------------------------------------------------------------- */
+/* ---- variables that nobody reads ---- */
 
 typedef struct search {
     const char *name; /* up to its = */
@@ -45,16 +46,18 @@ static void check_environment(gbt_diagnosis *d)
             continue;
         for (int i = 0; i < command_list_count && !s.found; i++)
             options_visit(command_list[i], look_in, &s);
-        known += s.found, unknown += !s.found;
+        known += s.found;
+        unknown += !s.found;
         if (!s.found && unknown == 1)
-            snprintf(c->advice, sizeof c->advice, "no command has the option of %.*s: unset it, or correct its name",
+            snprintf(c->advice, sizeof c->advice,
+                     "no command has the option of %.*s: unset it, or correct its name",
                      (int)strcspn(s.name, "="), s.name);
     }
     c->level = unknown > 0 ? GBT_CHECK_WARN : GBT_CHECK_OK;
     snprintf(c->found, sizeof c->found, "%d variables set options, %d name no option", known, unknown);
 }
 
-/* ---- report ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- report ---- */
 
 static void print_lines(const gbt_diagnosis *d)
 {
@@ -71,7 +74,8 @@ static void print_json(const gbt_diagnosis *d, int failed)
     printf("{\"schema\": 1, \"version\": \"%s\", \"failed\": %d, \"checks\": [", gbt_version(), failed);
     for (int i = 0; i < d->count; i++) {
         const gbt_check *c = &d->checks[i];
-        printf("%s\n  {\"name\": \"%s\", \"level\": \"%s\", \"found\": ", i > 0 ? "," : "", c->name, level_names[c->level]);
+        printf("%s\n  {\"name\": \"%s\", \"level\": \"%s\", \"found\": ", i > 0 ? "," : "", c->name,
+               level_names[c->level]);
         json_write_text(stdout, c->found);
         fputs(", \"advice\": ", stdout);
         json_write_text(stdout, c->advice);
@@ -87,7 +91,8 @@ static int run(const command *self, int argc, char **argv)
         {.name = "json", .kind = OPTION_FLAG, .value = &json, .help = "print JSON"},
     };
     operands folder;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 0, 1, argc, argv, &folder);
+    const int code =
+        options_parse(self, options, sizeof options / sizeof *options, 0, 1, argc, argv, &folder);
     if (code >= 0)
         return code;
     static gbt_diagnosis d; /* 16 kB */
@@ -106,6 +111,9 @@ static int run(const command *self, int argc, char **argv)
     return failed > 0;
 }
 
-const command command_doctor = {.name = "doctor",
-    .summary = "check build, machine and folder: version, processor, memory, libraries, tracer, gradients, speed",
-                                .usage = "[FOLDER]", .run = run};
+const command command_doctor = {
+    .name = "doctor",
+    .summary =
+        "check build, machine and folder: version, processor, memory, libraries, tracer, gradients, speed",
+    .usage = "[FOLDER]",
+    .run = run};

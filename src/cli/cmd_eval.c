@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_eval.c -- gbtrace eval. */
 #include "cli/options.h"
 #include "gbtrace/evaluate.h"
@@ -8,21 +9,53 @@ static int run(const command *self, int argc, char **argv)
     gbt_evaluate_def def = gbt_evaluate_def_default();
     int threads = 0;
     const option options[] = {
-        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN",
+        {.name = "model-path",
+         .short_name = 'm',
+         .kind = OPTION_OPERAND,
+         .value_name = "RUN",
          .help = "the same as RUN",
          .aliases = "model-paths"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA",
-         .help = "data set in place of the one it was trained on", .aliases = "s source-path"},
-        {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE", 
+        {.name = "data",
+         .kind = OPTION_STRING,
+         .value = &def.data,
+         .value_name = "DATA",
+         .help = "data set in place of the one it was trained on",
+         .aliases = "s source-path"},
+        {.name = "json",
+         .kind = OPTION_STRING,
+         .value = &def.json,
+         .value_name = "FILE",
          .help = "write the scores there too; the only file with other settings than the run's own"},
-        {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray",
+        {.name = "renderer",
+         .kind = OPTION_CHOICE,
+         .value = &def.renderer,
+         .choices = "trace|raster|per-ray",
          .help = "renderer; default: the one it was trained with"},
-        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",
-         .help = "divide the photos' width and height by this; 0: as in training", .aliases = "r resolution"},
-        {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast",
+        {.name = "downscale",
+         .short_name = 'd',
+         .kind = OPTION_DOUBLE,
+         .value = &def.downscale,
+         .min = 0,
+         .max = 64,
+         .value_name = "F",
+         .help = "divide the photos' width and height by this; 0: as in training",
+         .aliases = "r resolution"},
+        {.name = "preset",
+         .kind = OPTION_CHOICE,
+         .value = &def.preset,
+         .choices = "exact|default|fast",
          .help = "cut-off preset (docs/accuracy.md); training uses default"},
-        {.name = "lpips", .kind = OPTION_STRING, .value = &def.lpips, .value_name = "FILE", .help = LPIPS_HELP},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+        {.name = "lpips",
+         .kind = OPTION_STRING,
+         .value = &def.lpips,
+         .value_name = "FILE",
+         .help = LPIPS_HELP},
+        {.name = "threads",
+         .kind = OPTION_INT,
+         .value = &threads,
+         .min = 0,
+         .max = 1024,
+         .value_name = "T",
          .help = THREADS_HELP},
     };
     operands model;
@@ -36,5 +69,8 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_eval = {.name = "eval",
-    .summary = "score the held-out views (PSNR, SSIM, FLIP, LPIPS) and update the report",
-                              .usage = "RUN", .run = run, .alias = "metrics"};
+                              .summary =
+                                  "score the held-out views (PSNR, SSIM, FLIP, LPIPS) and update the report",
+                              .usage = "RUN",
+                              .run = run,
+                              .alias = "metrics"};

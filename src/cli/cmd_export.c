@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_export.c -- gbtrace export. */
 #include "cli/options.h"
 #include "gbtrace/export.h"
@@ -9,21 +10,53 @@ static int run(const command *self, int argc, char **argv)
     int threads = 0;
     const char *output = NULL;
     const option options[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &output, .value_name = "FILE",
+        {.name = "output",
+         .short_name = 'o',
+         .kind = OPTION_STRING,
+         .value = &output,
+         .value_name = "FILE",
          .help = "one more output file"},
-        {.name = "sh-degree", .kind = OPTION_INT, .value = &def.sh_degree, .min = 0, .max = 3, .value_name = "N",
+        {.name = "sh-degree",
+         .kind = OPTION_INT,
+         .value = &def.sh_degree,
+         .min = 0,
+         .max = 3,
+         .value_name = "N",
          .help = "degree of the spherical harmonics of the colours"},
-        {.name = "refine", .kind = OPTION_INT, .value = &def.refine_steps, .min = 0, .max = 100000, .value_name = "N",
+        {.name = "refine",
+         .kind = OPTION_INT,
+         .value = &def.refine_steps,
+         .min = 0,
+         .max = 100000,
+         .value_name = "N",
          .help = "steps that fit the Gaussians to the model's own pictures"},
-        {.name = "no-backdrop", .kind = OPTION_FLAG_OFF, .value = &def.backdrop,
-         .help = "leave out the sphere of Gaussians that is the model's background; viewers then draw black there"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA",
-         .help = "use the cameras of this data set instead of the one it was trained on", .aliases = "s source-path"},
-        {.name = "json", .kind = OPTION_STRING, .value = &def.json, .value_name = "FILE",
+        {.name = "no-backdrop",
+         .kind = OPTION_FLAG_OFF,
+         .value = &def.backdrop,
+         .help = "leave out the sphere of Gaussians that is the model's background; viewers then draw black "
+                 "there"},
+        {.name = "data",
+         .kind = OPTION_STRING,
+         .value = &def.data,
+         .value_name = "DATA",
+         .help = "use the cameras of this data set instead of the one it was trained on",
+         .aliases = "s source-path"},
+        {.name = "json",
+         .kind = OPTION_STRING,
+         .value = &def.json,
+         .value_name = "FILE",
          .help = "write the figures to this file"},
-        {.name = "lpips", .kind = OPTION_STRING, .value = &def.lpips, .value_name = "FILE",
+        {.name = "lpips",
+         .kind = OPTION_STRING,
+         .value = &def.lpips,
+         .value_name = "FILE",
          .help = "result folder: " LPIPS_HELP},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+        {.name = "threads",
+         .kind = OPTION_INT,
+         .value = &threads,
+         .min = 0,
+         .max = 1024,
+         .value_name = "T",
          .help = THREADS_HELP},
     };
     operands files;
@@ -37,10 +70,14 @@ static int run(const command *self, int argc, char **argv)
     if (threads > 0)
         gbt_set_threads(threads);
     gbt_error err = {0};
-    return command_failed(gbt_export(files.value[0], &def, files.value + 1, (size_t)files.count - 1, stdout, &err), &err);
+    return command_failed(
+        gbt_export(files.value[0], &def, files.value + 1, (size_t)files.count - 1, stdout, &err), &err);
 }
 
-const command command_export = {.name = "export",
+const command command_export = {
+    .name = "export",
 
-    .summary = "export a scene as plain Gaussians (.ply, .splat, .spz, .glb), or convert .ply, .splat and .spz",
-                                .usage = "RUN|MODEL.gbt|SCENE.ply|.splat|.spz OUT.ply|.splat|.spz|.glb...", .run = run};
+    .summary =
+        "export a scene as plain Gaussians (.ply, .splat, .spz, .glb), or convert .ply, .splat and .spz",
+    .usage = "RUN|MODEL.gbt|SCENE.ply|.splat|.spz OUT.ply|.splat|.spz|.glb...",
+    .run = run};

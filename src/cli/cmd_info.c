@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_info.c -- gbtrace info. */
 #include "cli/options.h"
 #include "gbtrace/info.h"
@@ -16,5 +17,5 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_info(paths.value[0], json, stdout, &err), &err);
 }
 
-const command command_info = {.name = "info",
-    .summary = "show what a data set or a model contains", .usage = "PATH", .run = run};
+const command command_info = {
+    .name = "info", .summary = "show what a data set or a model contains", .usage = "PATH", .run = run};

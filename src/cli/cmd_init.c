@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_init.c -- gbtrace init. */
 #include "cli/options.h"
 #include "gbtrace/init.h"
@@ -8,25 +9,60 @@ static int run(const command *self, int argc, char **argv)
     const char *out = NULL, *json = NULL;
     bool mesh = false;
     const option options[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "FILE.ply",
-         .help = "where to write balls and anchors", .required = true},
-        {.name = "init", .kind = OPTION_CHOICE, .value = &def.init, .choices = "gb|adaptive|voxel|random",
-         .help = "initial anchors: the paper's granular balls, adaptive granular balls, the voxel baseline, or random "
-                 "points"},
-        {.name = "init-count", .kind = OPTION_DOUBLE, .value = &def.init_count, .min = 0, .max = 1, .value_name = "F",
+        {.name = "output",
+         .short_name = 'o',
+         .kind = OPTION_STRING,
+         .value = &out,
+         .value_name = "FILE.ply",
+         .help = "where to write balls and anchors",
+         .required = true},
+        {.name = "init",
+         .kind = OPTION_CHOICE,
+         .value = &def.init,
+         .choices = "gb|adaptive|voxel|random",
+         .help = "initial anchors: the paper's granular balls, adaptive granular balls, the voxel baseline, "
+                 "or random points"},
+        {.name = "init-count",
+         .kind = OPTION_DOUBLE,
+         .value = &def.init_count,
+         .min = 0,
+         .max = 1,
+         .value_name = "F",
          .help = "adaptive and random: anchors per sparse point; 0: half as many anchors as gb gives"},
-        {.name = "scale-prior", .kind = OPTION_CHOICE, .value = &def.scale_prior, .choices = "gb|nn",
-         .help = "initial scale with --init gb: from ball radius and point spacing, or from spacing alone, as with "
-                 "the other --init"},
-        {.name = "max-depth", .kind = OPTION_INT, .value = &def.max_depth, .min = 0, .max = 64, .value_name = "D",
+        {.name = "scale-prior",
+         .kind = OPTION_CHOICE,
+         .value = &def.scale_prior,
+         .choices = "gb|nn",
+         .help = "initial scale with --init gb: from ball radius and point spacing, or from spacing alone, "
+                 "as with the other --init"},
+        {.name = "max-depth",
+         .kind = OPTION_INT,
+         .value = &def.max_depth,
+         .min = 0,
+         .max = 64,
+         .value_name = "D",
          .help = "maximum depth of the ball tree"},
-        {.name = "voxel-size", .kind = OPTION_FLOAT, .value = &def.voxel_size, .min = 0, .max = 1e30, .value_name = "V",
+        {.name = "voxel-size",
+         .kind = OPTION_FLOAT,
+         .value = &def.voxel_size,
+         .min = 0,
+         .max = 1e30,
+         .value_name = "V",
          .help = "voxel size, scene units; 0: estimated from the points"},
-        {.name = "voxel-rule", .kind = OPTION_CHOICE, .value = &def.voxel_rule, .choices = "median|squared",
-         .help = "how it is estimated: median point spacing, or the squared spacing that the reference code uses"},
-        {.name = "mesh", .kind = OPTION_FLAG, .value = &mesh,
+        {.name = "voxel-rule",
+         .kind = OPTION_CHOICE,
+         .value = &def.voxel_rule,
+         .choices = "median|squared",
+         .help = "how it is estimated: median point spacing, or the squared spacing that the reference code "
+                 "uses"},
+        {.name = "mesh",
+         .kind = OPTION_FLAG,
+         .value = &mesh,
          .help = "write each ball as a sphere mesh instead of a point"},
-        {.name = "json", .kind = OPTION_STRING, .value = &json, .value_name = "FILE",
+        {.name = "json",
+         .kind = OPTION_STRING,
+         .value = &json,
+         .value_name = "FILE",
          .help = "write the counts to this file"},
     };
     operands data;
@@ -38,6 +74,8 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(gbt_init(data.value[0], &def, out, json, stdout, &err), &err);
 }
 
-const command command_init = {.name = "init",
+const command command_init = {
+    .name = "init",
     .summary = "compute granular balls and anchors of a data set, and compare them with the voxel baseline",
-                              .usage = "DATA -o FILE.ply", .run = run};
+    .usage = "DATA -o FILE.ply",
+    .run = run};

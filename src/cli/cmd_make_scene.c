@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_make_scene.c -- gbtrace make-scene. */
 #include <stdio.h>
 
@@ -21,29 +22,69 @@ static int run(const command *self, int argc, char **argv)
     const char *out = NULL;
     bool depth = false, distorted = false;
     const option options[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR",
-         .help = "where to write the data set", .required = true},
-        {.name = "width", .kind = OPTION_INT, .value = &def.width, .min = 8, .max = 8192, .value_name = "N",
+        {.name = "output",
+         .short_name = 'o',
+         .kind = OPTION_STRING,
+         .value = &out,
+         .value_name = "DIR",
+         .help = "where to write the data set",
+         .required = true},
+        {.name = "width",
+         .kind = OPTION_INT,
+         .value = &def.width,
+         .min = 8,
+         .max = 8192,
+         .value_name = "N",
          .help = "photo width, pixels"},
-        {.name = "height", .kind = OPTION_INT, .value = &def.height, .min = 8, .max = 8192, .value_name = "N",
+        {.name = "height",
+         .kind = OPTION_INT,
+         .value = &def.height,
+         .min = 8,
+         .max = 8192,
+         .value_name = "N",
          .help = "photo height, pixels"},
-        {.name = "views", .kind = OPTION_INT, .value = &def.view_count, .min = 3, .max = 9999, .value_name = "N",
+        {.name = "views",
+         .kind = OPTION_INT,
+         .value = &def.view_count,
+         .min = 3,
+         .max = 9999,
+         .value_name = "N",
          .help = "number of photos"},
-        {.name = "points", .kind = OPTION_INT, .value = &def.points, .min = 1, .max = 10000000, .value_name = "N",
+        {.name = "points",
+         .kind = OPTION_INT,
+         .value = &def.points,
+         .min = 1,
+         .max = 10000000,
+         .value_name = "N",
          .help = "number of sparse points"},
-        {.name = "point-noise", .kind = OPTION_DOUBLE, .value = &def.point_noise, .min = 0, .max = 0.1, .value_name = "X",
+        {.name = "point-noise",
+         .kind = OPTION_DOUBLE,
+         .value = &def.point_noise,
+         .min = 0,
+         .max = 0.1,
+         .value_name = "X",
          .help = "standard deviation of a sparse point, as a fraction of its distance"},
-        {.name = "samples", .kind = OPTION_INT, .value = &def.samples, .min = 1, .max = 1024, .value_name = "N",
+        {.name = "samples",
+         .kind = OPTION_INT,
+         .value = &def.samples,
+         .min = 1,
+         .max = 1024,
+         .value_name = "N",
          .help = "rays per pixel at most"},
         {.name = "seed", .kind = OPTION_UINT64, .value = &def.seed, .value_name = "S", .help = "random seed"},
         {.name = "depth", .kind = OPTION_FLAG, .value = &depth, .help = "also write exact depth images"},
-        {.name = "distorted", .kind = OPTION_FLAG, .value = &distorted, .help = "cameras with lens distortion"},
+        {.name = "distorted",
+         .kind = OPTION_FLAG,
+         .value = &distorted,
+         .help = "cameras with lens distortion"},
     };
     operands name;
     const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &name);
     if (code >= 0)
         return code;
-    def.name = name.value[0], def.depth = depth, def.distorted = distorted;
+    def.name = name.value[0];
+    def.depth = depth;
+    def.distorted = distorted;
     gbt_error err = {0};
     const gbt_status status = gbt_make_scene(&def, out, &err);
     if (status == GBT_OK)
@@ -53,5 +94,7 @@ static int run(const command *self, int argc, char **argv)
 
 const command command_make_scene = {
     .name = "make-scene",
-    .summary = "a procedural scene with known geometry, written as photos and a COLMAP model", .usage = "NAME -o DIR",
-    .run = run, .words = scene_words};
+    .summary = "a procedural scene with known geometry, written as photos and a COLMAP model",
+    .usage = "NAME -o DIR",
+    .run = run,
+    .words = scene_words};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_render.c -- gbtrace render. */
 #include <stdio.h>
 #include <string.h>
@@ -13,8 +14,9 @@ static const char splits[] = "test|train|all";
 static bool read_size(const char *text, int *width, int *height)
 {
     int used = 0;
-    return strspn(text, "0123456789x") == strlen(text) && sscanf(text, "%5dx%5d%n", width, height, &used) == 2 && text[used] == '\0' &&
-           *width > 0 && *height > 0;
+    return strspn(text, "0123456789x") == strlen(text) &&
+           sscanf(text, "%5dx%5d%n", width, height, &used) == 2 && text[used] == '\0' && *width > 0 &&
+           *height > 0;
 }
 
 static int run(const command *self, int argc, char **argv)
@@ -23,56 +25,139 @@ static int run(const command *self, int argc, char **argv)
     const char *out = NULL, *split = "test", *size = NULL;
     int threads = 0;
     const option options[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &out, .value_name = "DIR",
-         .help = "folder for the images; default: RUN/renders/SPLIT; with --path also a film: .mp4, .webm, .gif (by "
-                 "ffmpeg)"},
-        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN",
+        {.name = "output",
+         .short_name = 'o',
+         .kind = OPTION_STRING,
+         .value = &out,
+         .value_name = "DIR",
+         .help = "folder for the images; default: RUN/renders/SPLIT; with --path also a film: .mp4, .webm, "
+                 ".gif (by ffmpeg)"},
+        {.name = "model-path",
+         .short_name = 'm',
+         .kind = OPTION_OPERAND,
+         .value_name = "RUN",
          .help = "the same as RUN"},
-        {.name = "split", .kind = OPTION_CHOICE, .value = &split, .choices = splits,
+        {.name = "split",
+         .kind = OPTION_CHOICE,
+         .value = &split,
+         .choices = splits,
          .help = "which views of the data set"},
-        {.name = "skip-train", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .fixed = "test",
+        {.name = "skip-train",
+         .kind = OPTION_CHOICE,
+         .value = &split,
+         .choices = splits,
+         .fixed = "test",
          .help = "the same as --split test"},
-        {.name = "skip-test", .kind = OPTION_CHOICE, .value = &split, .choices = splits, .fixed = "train",
+        {.name = "skip-test",
+         .kind = OPTION_CHOICE,
+         .value = &split,
+         .choices = splits,
+         .fixed = "train",
          .help = "the same as --split train"},
         {.name = "iteration", .kind = OPTION_ELSEWHERE, .help = "a run keeps its last model alone"},
-        {.name = "camera", .kind = OPTION_STRING, .value = &def.camera, .value_name = "FILE.json",
-         .help = "render one picture from this camera file (lens, aperture, rolling shutter, rays: docs/cameras.md) "
-                 "instead of views"},
-        {.name = "path", .kind = OPTION_STRING, .value = &def.path, .value_name = "orbit|interpolate|FILE.json",
+        {.name = "camera",
+         .kind = OPTION_STRING,
+         .value = &def.camera,
+         .value_name = "FILE.json",
+         .help = "render one picture from this camera file (lens, aperture, rolling shutter, rays: "
+                 "docs/cameras.md) instead of views"},
+        {.name = "path",
+         .kind = OPTION_STRING,
+         .value = &def.path,
+         .value_name = "orbit|interpolate|FILE.json",
          .choices = "orbit|interpolate",
-         .help = "render a film: an orbit around the scene, through the photos' cameras, or along a path file "
-                 "(docs/video.md)"},
-        {.name = "look-at", .kind = OPTION_STRING, .value = &def.look_at, .value_name = "X,Y,Z",
-         .help = "orbit: the point to look at, in the data set's coordinates; default: where the photos' cameras look"},
-        {.name = "radius", .kind = OPTION_DOUBLE, .value = &def.orbit_radius, .min = 0, .max = 1e9, .value_name = "R",
+         .help = "render a film: an orbit around the scene, through the photos' cameras, or along a path "
+                 "file (docs/video.md)"},
+        {.name = "look-at",
+         .kind = OPTION_STRING,
+         .value = &def.look_at,
+         .value_name = "X,Y,Z",
+         .help = "orbit: the point to look at, in the data set's coordinates; default: where the photos' "
+                 "cameras look"},
+        {.name = "radius",
+         .kind = OPTION_DOUBLE,
+         .value = &def.orbit_radius,
+         .min = 0,
+         .max = 1e9,
+         .value_name = "R",
          .help = "orbit: its radius, scene units; 0: as far as the photos' cameras"},
-        {.name = "height", .kind = OPTION_DOUBLE, .value = &def.orbit_height, .min = -1e9, .max = 1e9, .value_name = "H",
-         .help = "orbit: height above the point that it looks at, scene units; default: as high as the photos' cameras"},
-        {.name = "frames", .kind = OPTION_INT, .value = &def.frames, .min = 0, .max = 100000, .value_name = "N",
+        {.name = "height",
+         .kind = OPTION_DOUBLE,
+         .value = &def.orbit_height,
+         .min = -1e9,
+         .max = 1e9,
+         .value_name = "H",
+         .help = "orbit: height above the point that it looks at, scene units; default: as high as the "
+                 "photos' cameras"},
+        {.name = "frames",
+         .kind = OPTION_INT,
+         .value = &def.frames,
+         .min = 0,
+         .max = 100000,
+         .value_name = "N",
          .help = "number of frames; 0: 240 for an orbit, 15 per photo, or all of a path file"},
-        {.name = "fps", .kind = OPTION_DOUBLE, .value = &def.fps, .min = 0, .max = 1000, .value_name = "F",
+        {.name = "fps",
+         .kind = OPTION_DOUBLE,
+         .value = &def.fps,
+         .min = 0,
+         .max = 1000,
+         .value_name = "F",
          .help = "frames per second; 0: as the path file says, else 30"},
-        {.name = "size", .kind = OPTION_STRING, .value = &size, .value_name = "WxH",
+        {.name = "size",
+         .kind = OPTION_STRING,
+         .value = &size,
+         .value_name = "WxH",
          .help = "size of the film, such as 1280x720; default: that of the photos"},
-        {.name = "outputs", .kind = OPTION_STRING, .value = &def.outputs, .value_name = "LIST",
-         .choices = "transmittance|depth|median-depth|normal|hits|anchor", .list = true,
+        {.name = "outputs",
+         .kind = OPTION_STRING,
+         .value = &def.outputs,
+         .value_name = "LIST",
+         .choices = "transmittance|depth|median-depth|normal|hits|anchor",
+         .list = true,
          .help = "also write these as EXR: any of transmittance,depth,median-depth,normal,hits,anchor "
                  "(docs/formats.md)",
          .aliases = "aov"},
-        {.name = "preset", .kind = OPTION_CHOICE, .value = &def.preset, .choices = "exact|default|fast",
+        {.name = "preset",
+         .kind = OPTION_CHOICE,
+         .value = &def.preset,
+         .choices = "exact|default|fast",
          .help = "cut-off preset (docs/accuracy.md); training uses default"},
-        {.name = "insert", .kind = OPTION_STRING, .value = &def.insert, .value_name = "FILE.json",
+        {.name = "insert",
+         .kind = OPTION_STRING,
+         .value = &def.insert,
+         .value_name = "FILE.json",
          .help = "insert meshes into the scene, matt or mirrors, with shadows (docs/inserting.md)"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA",
+        {.name = "data",
+         .kind = OPTION_STRING,
+         .value = &def.data,
+         .value_name = "DATA",
          .help = "cameras of this data set; needed for plain Gaussians (.ply, .splat, .spz) without --camera",
          .aliases = "s source-path"},
-        {.name = "renderer", .kind = OPTION_CHOICE, .value = &def.renderer, .choices = "trace|raster|per-ray|reference",
+        {.name = "renderer",
+         .kind = OPTION_CHOICE,
+         .value = &def.renderer,
+         .choices = "trace|raster|per-ray|reference",
          .help = "renderer; default: the one it was trained with. reference: double precision, slow"},
-        {.name = "format", .kind = OPTION_CHOICE, .value = &def.format, .choices = "png|exr",
+        {.name = "format",
+         .kind = OPTION_CHOICE,
+         .value = &def.format,
+         .choices = "png|exr",
          .help = "8-bit PNG, or float EXR"},
-        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &def.downscale, .min = 0, .max = 64, .value_name = "F",
-         .help = "divide the photos' width and height by this; 0: as in training", .aliases = "r resolution"},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+        {.name = "downscale",
+         .short_name = 'd',
+         .kind = OPTION_DOUBLE,
+         .value = &def.downscale,
+         .min = 0,
+         .max = 64,
+         .value_name = "F",
+         .help = "divide the photos' width and height by this; 0: as in training",
+         .aliases = "r resolution"},
+        {.name = "threads",
+         .kind = OPTION_INT,
+         .value = &threads,
+         .min = 0,
+         .max = 1024,
+         .value_name = "T",
          .help = THREADS_HELP},
     };
     operands model;
@@ -93,7 +178,9 @@ static int run(const command *self, int argc, char **argv)
             return command_misused("%.60s...: the path is too long", model.value[0]);
         out = folder;
     }
-    def.split = strcmp(split, "train") == 0 ? GBT_SPLIT_TRAIN : strcmp(split, "all") == 0 ? GBT_SPLIT_ALL : GBT_SPLIT_TEST;
+    def.split = strcmp(split, "train") == 0 ? GBT_SPLIT_TRAIN
+                : strcmp(split, "all") == 0 ? GBT_SPLIT_ALL
+                                            : GBT_SPLIT_TEST;
     gbt_error err = {0};
     const gbt_status status = gbt_render(model.value[0], out, &def, &err);
     if (status == GBT_OK)
@@ -102,5 +189,6 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_render = {.name = "render",
-    .summary = "render the views of a scene, a camera of your own, or a film",
-                                .usage = "RUN|GAUSSIANS [-o DIR]", .run = run};
+                                .summary = "render the views of a scene, a camera of your own, or a film",
+                                .usage = "RUN|GAUSSIANS [-o DIR]",
+                                .run = run};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_report.c -- gbtrace report. */
 #include "cli/options.h"
 #include "gbtrace/evaluate.h"
@@ -13,5 +14,6 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_report = {.name = "report",
-    .summary = "write the report of a run again, with the charts of studies",
-                                .usage = "RUN [STUDY...]", .run = run};
+                                .summary = "write the report of a run again, with the charts of studies",
+                                .usage = "RUN [STUDY...]",
+                                .run = run};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_study.c -- gbtrace study: measurements that a chart is made of. */
 #include <stdio.h>
 #include <string.h>
@@ -62,19 +63,22 @@ static const command_word study_words[STUDY_COUNT + 1] = {
     {"time", "held-out PSNR against training time, by training on data sets"},
     {"anchors", "held-out PSNR against the number of anchors, by training on data sets"},
     {NULL, NULL}};
-static const struct { int models_min, models_max; gbt_status (*run)(const study_request *, gbt_error *); } studies[STUDY_COUNT] = {
-    {1, 16, run_speed}, {1, 16, run_crosscheck}, {1, 6, run_rate}, {0, 0, run_stability}, {1, 16, run_paper}, {1, 16, run_time},
-    {1, 16, run_anchors}};
+static const struct {
+    int models_min, models_max;
+    gbt_status (*run)(const study_request *, gbt_error *);
+} studies[STUDY_COUNT] = {{1, 16, run_speed},    {1, 16, run_crosscheck}, {1, 6, run_rate},
+                          {0, 0, run_stability}, {1, 16, run_paper},      {1, 16, run_time},
+                          {1, 16, run_anchors}};
 
-static const command_word *words_of_studies(void)
-{
-    return study_words;
-}
+static const command_word *words_of_studies(void) { return study_words; }
 
 static int run(const command *self, int argc, char **argv)
 {
-    study_request request = {.def = lab_study_def_default(), .stability = lab_stability_def_default(), .paper = lab_paper_def_default(),
-                             .time = lab_time_def_default(), .anchors = lab_anchors_def_default()};
+    study_request request = {.def = lab_study_def_default(),
+                             .stability = lab_stability_def_default(),
+                             .paper = lab_paper_def_default(),
+                             .time = lab_time_def_default(),
+                             .anchors = lab_anchors_def_default()};
     bool quick = false;
     lab_study_def *def = &request.def;
     lab_paper_def *paper = &request.paper;
@@ -83,35 +87,94 @@ static int run(const command *self, int argc, char **argv)
     double downscale = 1;
     uint64_t iterations = 0;
     const option options[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &request.folder, .value_name = "DIR",
-         .help = "folder for the tables and the chart", .required = true},
-        {.name = "camera", .kind = OPTION_STRING, .value = &def->camera, .value_name = "FILE.json",
-         .help = "speed, crosscheck: the camera of files of plain Gaussians; default: camera.json beside each"},
-        {.name = "repeats", .kind = OPTION_INT, .value = &def->repeats, .min = 1, .max = 1000, .value_name = "N",
+        {.name = "output",
+         .short_name = 'o',
+         .kind = OPTION_STRING,
+         .value = &request.folder,
+         .value_name = "DIR",
+         .help = "folder for the tables and the chart",
+         .required = true},
+        {.name = "camera",
+         .kind = OPTION_STRING,
+         .value = &def->camera,
+         .value_name = "FILE.json",
+         .help =
+             "speed, crosscheck: the camera of files of plain Gaussians; default: camera.json beside each"},
+        {.name = "repeats",
+         .kind = OPTION_INT,
+         .value = &def->repeats,
+         .min = 1,
+         .max = 1000,
+         .value_name = "N",
          .help = "speed: timed passes of each setting; the median is reported"},
-        {.name = "only", .kind = OPTION_STRING, .value = &request.stability.only, .value_name = "A1,A9",
-         .choices = "A1|A2|A3|A4|A5|A6|A7|A8|A9|A10|A11|A12|A13|A14|A15|A16|A17|A18", .list = true,
+        {.name = "only",
+         .kind = OPTION_STRING,
+         .value = &request.stability.only,
+         .value_name = "A1,A9",
+         .choices = "A1|A2|A3|A4|A5|A6|A7|A8|A9|A10|A11|A12|A13|A14|A15|A16|A17|A18",
+         .list = true,
          .help = "stability: only these cases; default: all"},
-        {.name = "quick", .kind = OPTION_FLAG, .value = &quick, .help = "stability: the smaller scenes of its tests"},
-        {.name = "iterations", .kind = OPTION_UINT64, .value = &iterations, .min = 0, .max = 1e9, .value_name = "N",
+        {.name = "quick",
+         .kind = OPTION_FLAG,
+         .value = &quick,
+         .help = "stability: the smaller scenes of its tests"},
+        {.name = "iterations",
+         .kind = OPTION_UINT64,
+         .value = &iterations,
+         .min = 0,
+         .max = 1e9,
+         .value_name = "N",
          .help = "paper, anchors: iterations of each run; 0: 3000 and 1000"},
-        {.name = "renderer", .kind = OPTION_CHOICE, .value = &paper->renderer, .choices = "raster|trace|per-ray",
+        {.name = "renderer",
+         .kind = OPTION_CHOICE,
+         .value = &paper->renderer,
+         .choices = "raster|trace|per-ray",
          .help = "paper: renderer of the runs"},
-        {.name = "tables", .kind = OPTION_STRING, .value = &paper->tables, .value_name = "1,3", .choices = "1|2|3|4", .list = true,
+        {.name = "tables",
+         .kind = OPTION_STRING,
+         .value = &paper->tables,
+         .value_name = "1,3",
+         .choices = "1|2|3|4",
+         .list = true,
          .help = "paper: only these of its four tables"},
-        {.name = "lpips", .kind = OPTION_STRING, .value = &paper->lpips, .value_name = "FILE",
+        {.name = "lpips",
+         .kind = OPTION_STRING,
+         .value = &paper->lpips,
+         .value_name = "FILE",
          .help = "paper: " LPIPS_HELP},
-        {.name = "budget", .kind = OPTION_DURATION, .value = &request.time.budget_seconds, .min = 1, .max = 1e6, .value_name = "TIME",
+        {.name = "budget",
+         .kind = OPTION_DURATION,
+         .value = &request.time.budget_seconds,
+         .min = 1,
+         .max = 1e6,
+         .value_name = "TIME",
          .help = "time: training time of a run"},
-        {.name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = &downscale, .min = 1, .max = 64, .value_name = "F",
+        {.name = "downscale",
+         .short_name = 'd',
+         .kind = OPTION_DOUBLE,
+         .value = &downscale,
+         .min = 1,
+         .max = 64,
+         .value_name = "F",
          .help = "paper, time, anchors: divide the photos' width and height by this"},
-        {.name = "seeds", .kind = OPTION_INT, .value = &seeds, .min = 0, .max = 10, .value_name = "N",
+        {.name = "seeds",
+         .kind = OPTION_INT,
+         .value = &seeds,
+         .min = 0,
+         .max = 10,
+         .value_name = "N",
          .help = "paper, time, anchors: runs of each variant; 0: 3, 1 and 3"},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+        {.name = "threads",
+         .kind = OPTION_INT,
+         .value = &threads,
+         .min = 0,
+         .max = 1024,
+         .value_name = "T",
          .help = THREADS_HELP},
     };
     operands named;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 17, argc, argv, &named);
+    const int code =
+        options_parse(self, options, sizeof options / sizeof *options, 1, 17, argc, argv, &named);
     if (code >= 0)
         return code;
     size_t which = 0;
@@ -120,12 +183,14 @@ static int run(const command *self, int argc, char **argv)
     if (named.count - 1 < studies[which].models_min)
         return command_misused("study %s: wanted a model, or data to train on", study_words[which].name);
     if (named.count - 1 > studies[which].models_max)
-        return command_misused("study %s: \"%.60s\" is one too many", study_words[which].name, named.value[1 + studies[which].models_max]);
+        return command_misused("study %s: \"%.60s\" is one too many", study_words[which].name,
+                               named.value[1 + studies[which].models_max]);
     if (threads > 0)
         gbt_set_threads(threads);
     request.stability.quick = quick;
     def->models = paper->data = request.time.data = anchors->data = named.value + 1;
-    def->model_count = paper->data_count = request.time.data_count = anchors->data_count = (size_t)named.count - 1;
+    def->model_count = paper->data_count = request.time.data_count = anchors->data_count =
+        (size_t)named.count - 1;
     paper->downscale = request.time.downscale = anchors->downscale = downscale;
     if (seeds > 0)
         paper->seeds = request.time.seeds = anchors->seeds = seeds;
@@ -135,7 +200,9 @@ static int run(const command *self, int argc, char **argv)
     return command_failed(studies[which].run(&request, &err), &err);
 }
 
-const command command_study = {.name = "study",
+const command command_study = {
+    .name = "study",
     .summary = "measure and draw charts: speed, accuracy, size, stability, the paper's tables",
-                               .usage = "speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR", .run = run,
-                               .words = words_of_studies};
+    .usage = "speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR",
+    .run = run,
+    .words = words_of_studies};

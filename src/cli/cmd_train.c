@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_train.c -- gbtrace train. */
 #include "cli/finish_run.h"
 #include "cli/options.h"
@@ -10,12 +11,23 @@ static int run(const command *self, int argc, char **argv)
     const char *output = NULL;
     bool lossless = false;
     const option own[] = {
-        {.name = "output", .short_name = 'o', .kind = OPTION_STRING, .value = &output, .value_name = "RUN",
-         .help = "folder for the model, scores and report", .aliases = "m model-path", .required = true},
-        {.name = "source-path", .short_name = 's', .kind = OPTION_OPERAND, .value_name = "DATA",
+        {.name = "output",
+         .short_name = 'o',
+         .kind = OPTION_STRING,
+         .value = &output,
+         .value_name = "RUN",
+         .help = "folder for the model, scores and report",
+         .aliases = "m model-path",
+         .required = true},
+        {.name = "source-path",
+         .short_name = 's',
+         .kind = OPTION_OPERAND,
+         .value_name = "DATA",
          .help = "the same as DATA",
          .aliases = "data"},
-        {.name = "lossless", .kind = OPTION_FLAG, .value = &lossless,
+        {.name = "lossless",
+         .kind = OPTION_FLAG,
+         .value = &lossless,
          .help = "store the model without loss (see compress); the file is about seven times larger"},
     };
     option options[OPTIONS_MAX];
@@ -38,5 +50,6 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_train = {.name = "train",
-    .summary = "train on posed photos, score the held-out ones, write a report",
-                               .usage = "DATA -o RUN", .run = run};
+                               .summary = "train on posed photos, score the held-out ones, write a report",
+                               .usage = "DATA -o RUN",
+                               .run = run};

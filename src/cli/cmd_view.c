@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_view.c -- gbtrace view. */
 #include <stdio.h>
 
@@ -20,15 +21,37 @@ static int run(const command *self, int argc, char **argv)
     int threads = 0;
     def.ready = print_address;
     const option options[] = {
-        {.name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN",
+        {.name = "model-path",
+         .short_name = 'm',
+         .kind = OPTION_OPERAND,
+         .value_name = "RUN",
          .help = "the same as RUN"},
-        {.name = "port", .short_name = 'p', .kind = OPTION_INT, .value = &def.port, .min = 0, .max = 65535, .value_name = "N",
+        {.name = "port",
+         .short_name = 'p',
+         .kind = OPTION_INT,
+         .value = &def.port,
+         .min = 0,
+         .max = 65535,
+         .value_name = "N",
          .help = "0: any free one"},
-        {.name = "host", .kind = OPTION_STRING, .value = &def.host, .value_name = "ADDRESS",
-         .help = "listen at this IPv4 address of the machine, 0.0.0.0: at all; others than 127.0.0.1 answer only with the token printed"},
-        {.name = "data", .kind = OPTION_STRING, .value = &def.data, .value_name = "DATA", .help = "photos of another data set",
+        {.name = "host",
+         .kind = OPTION_STRING,
+         .value = &def.host,
+         .value_name = "ADDRESS",
+         .help = "listen at this IPv4 address of the machine, 0.0.0.0: at all; others than 127.0.0.1 answer "
+                 "only with the token printed"},
+        {.name = "data",
+         .kind = OPTION_STRING,
+         .value = &def.data,
+         .value_name = "DATA",
+         .help = "photos of another data set",
          .aliases = "s source-path"},
-        {.name = "threads", .kind = OPTION_INT, .value = &threads, .min = 0, .max = 1024, .value_name = "T",
+        {.name = "threads",
+         .kind = OPTION_INT,
+         .value = &threads,
+         .min = 0,
+         .max = 1024,
+         .value_name = "T",
          .help = THREADS_HELP},
     };
     operands input;
@@ -42,5 +65,7 @@ static int run(const command *self, int argc, char **argv)
 }
 
 const command command_view = {.name = "view",
-    .summary = "view a scene in the browser beside its photos, also during training",
-                              .usage = "RUN|MODEL.gbt|SCENE.ply|.splat|.spz", .run = run};
+                              .summary =
+                                  "view a scene in the browser beside its photos, also during training",
+                              .usage = "RUN|MODEL.gbt|SCENE.ply|.splat|.spz",
+                              .run = run};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/command.h -- what a subcommand is, and how it ends. */
 #ifndef GBT_CLI_COMMAND_H
 #define GBT_CLI_COMMAND_H
@@ -13,12 +14,15 @@ typedef struct command {
     const char *name;
     const char *summary; /* one line, for the list of commands */
     const char *usage;   /* operands and the options that it needs, for example "DATA -o FILE.ply" */
-    int (*run)(const struct command *self, int argc, char **argv); /* arguments after the name; returns the exit code */
-    const char *alias;                  /* a second name, or NULL */
-    const command_word *(*words)(void); /* what the first operand may be, up to a name of NULL; NULL: anything, such as a path */
+    int (*run)(const struct command *self, int argc, char **argv); /* arguments after the name; returns the
+                                                                      exit code */
+    const char *alias;                                             /* a second name, or NULL */
+    const command_word *(*words)(void); /* what the first operand may be, up to a name of NULL; NULL:
+                                           anything, such as a path */
 } command;
 
-/** One `error: ...` line on stderr for a failure (control characters become ?); returns the exit code that belongs to the status. */
+/** One `error: ...` line on stderr for a failure (control characters become ?); returns the exit code that
+    belongs to the status. */
 int command_failed(gbt_status status, const gbt_error *err);
 
 /** The same for the caller's own text: usage, exit code 2. */
@@ -28,9 +32,9 @@ int command_misused(const char *format, ...) __attribute__((format(printf, 1, 2)
 const char *command_nearest(const char *typed, const char *const *names, int count);
 
 /* One line per subcommand; command_list.c lists them. */
-extern const command command_demo, command_info, command_init, command_train, command_eval, command_render, command_report,
-    command_make_scene, command_bench, command_check_grad, command_study, command_compare, command_compress, command_export, command_import,
-    command_view, command_doctor, command_describe;
+extern const command command_demo, command_info, command_init, command_train, command_eval, command_render,
+    command_report, command_make_scene, command_bench, command_check_grad, command_study, command_compare,
+    command_compress, command_export, command_import, command_view, command_doctor, command_describe;
 
 /** All of them, in the order of the help. */
 extern const command *const command_list[];

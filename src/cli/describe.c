@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/describe.c -- what the forms of the command line have in common. */
 #include "cli/describe.h"
 
@@ -12,7 +13,9 @@ value_kind describe_value(const option *o)
     if (o->kind != OPTION_STRING && o->kind != OPTION_OPERAND)
         return VALUE_ANY;
     if (o->choices != NULL)
-        return o->list ? VALUE_LIST : strstr(o->value_name, "FILE") != NULL ? VALUE_CHOICES_OR_FILE : VALUE_CHOICES;
+        return o->list                                 ? VALUE_LIST
+               : strstr(o->value_name, "FILE") != NULL ? VALUE_CHOICES_OR_FILE
+                                                       : VALUE_CHOICES;
     if (strcmp(o->value_name, "DIR") == 0)
         return VALUE_FOLDER;
     static const char *const paths[] = {"FILE", "RUN", "DATA", "MODEL"};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/describe.h -- the command line in other forms, all from the tables that parse it. */
 #ifndef GBT_CLI_DESCRIBE_H
 #define GBT_CLI_DESCRIBE_H
@@ -11,7 +12,7 @@ void describe_bash(FILE *out);
 void describe_zsh(FILE *out);
 void describe_fish(FILE *out);
 
-/* ---- for the files that make the above ------------------------------------------------------------------------------------------ */
+/* ---- for the files that make the above ---- */
 
 typedef enum value_kind {
     VALUE_NONE,

@@ -1,10 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/describe_bash.c -- completion for bash. */
 #include "cli/describe.h"
 
 static void write_names(const command *self, const option *options, int option_count, void *context)
 {
     FILE *out = context;
-    fprintf(out, "    %s%s%s) options='", self->name, self->alias != NULL ? "|" : "", self->alias != NULL ? self->alias : "");
+    fprintf(out, "    %s%s%s) options='", self->name, self->alias != NULL ? "|" : "",
+            self->alias != NULL ? self->alias : "");
     for (int i = 0; i < option_count; i++)
         if (options[i].kind != OPTION_ELSEWHERE)
             describe_names(out, &options[i], " ", false);
@@ -29,8 +31,9 @@ static void write_values(const command *self, const option *options, int option_
         if (kind == VALUE_NONE)
             continue;
         write_pattern(out, self, o);
-        static const char *const wants[] = {[VALUE_ANY] = "none", [VALUE_CHOICES] = "none", [VALUE_LIST] = "list",
-                                            [VALUE_CHOICES_OR_FILE] = "file", [VALUE_FILE] = "file", [VALUE_FOLDER] = "folder"};
+        static const char *const wants[] = {[VALUE_ANY] = "none",  [VALUE_CHOICES] = "none",
+                                            [VALUE_LIST] = "list", [VALUE_CHOICES_OR_FILE] = "file",
+                                            [VALUE_FILE] = "file", [VALUE_FOLDER] = "folder"};
         fputs("words='", out);
         if (o->choices != NULL)
             describe_choices(out, o);
@@ -48,27 +51,30 @@ void describe_bash(FILE *out)
 {
     fputs("# Completion of gbtrace for bash. Made by gbtrace describe bash.\n"
           "_gbtrace() {\n"
-          "    local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]} options= words= "
-          "list= want=file\n"
+          "    local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} "
+          "command=${COMP_WORDS[1]} options= words= list= want=file\n"
           "    COMPREPLY=()\n"
           "    # bash parts a word at =: --name=VALUE comes as three.\n"
           "    [ \"$current\" = = ] && current=\n"
           "    [ \"$before\" = = ] && before=${COMP_WORDS[COMP_CWORD-2]}\n"
           "    if [ \"$COMP_CWORD\" = 1 ]; then\n"
-          "        COMPREPLY=($(compgen -W 'help --help --version ", out);
+          "        COMPREPLY=($(compgen -W 'help --help --version ",
+          out);
     write_command_words(out);
     fputs("' -- \"$current\"))\n"
           "        return\n"
           "    fi\n"
           "    case $command in\n"
-          "    help) words='", out);
+          "    help) words='",
+          out);
     write_command_words(out);
     fputs("' want=none ;;\n", out);
     for (int i = 0; i < command_list_count; i++)
         options_visit(command_list[i], write_names, out);
     fputs("    esac\n"
           "    if [ \"$COMP_CWORD\" = 2 ]; then\n"
-          "        case $command in\n", out);
+          "        case $command in\n",
+          out);
     for (int i = 0; i < command_list_count; i++) {
         if (command_list[i]->words == NULL)
             continue;
@@ -78,7 +84,8 @@ void describe_bash(FILE *out)
     }
     fputs("        esac\n"
           "    fi\n"
-          "    case $command:$before in\n", out);
+          "    case $command:$before in\n",
+          out);
     for (int i = 0; i < command_list_count; i++)
         options_visit(command_list[i], write_values, out);
     fputs("    esac\n"
@@ -94,8 +101,10 @@ void describe_bash(FILE *out)
           "    if [ \"$want\" = file ] || [ \"$want\" = folder ]; then\n"
           "        compopt -o filenames 2>/dev/null\n"
           "        local IFS=$'\\n'\n"
-          "        COMPREPLY+=($(compgen -A $([ \"$want\" = folder ] && echo directory || echo file) -- \"$current\"))\n"
+          "        COMPREPLY+=($(compgen -A $([ \"$want\" = folder ] && echo directory || echo file) -- "
+          "\"$current\"))\n"
           "    fi\n"
           "}\n"
-          "complete -F _gbtrace gbtrace\n", out);
+          "complete -F _gbtrace gbtrace\n",
+          out);
 }

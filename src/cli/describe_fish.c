@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/describe_fish.c -- completion for fish. */
 #include "cli/describe.h"
 
@@ -19,8 +20,11 @@ static void write_rows(const command *self, const option *options, int option_co
         if (o->short_name != 0)
             fprintf(out, " -s %c", o->short_name);
         switch (describe_value(o)) {
-        case VALUE_NONE: break;
-        case VALUE_ANY: fputs(" -x", out); break;
+        case VALUE_NONE:
+            break;
+        case VALUE_ANY:
+            fputs(" -x", out);
+            break;
         case VALUE_CHOICES:
             fputs(" -x -a '", out);
             describe_choices(out, o);
@@ -36,14 +40,21 @@ static void write_rows(const command *self, const option *options, int option_co
             describe_choices(out, o);
             fputc('\'', out);
             break;
-        case VALUE_FILE: fputs(" -r -F", out); break;
-        case VALUE_FOLDER: fputs(" -x -a '(__fish_complete_directories)'", out); break;
+        case VALUE_FILE:
+            fputs(" -r -F", out);
+            break;
+        case VALUE_FOLDER:
+            fputs(" -x -a '(__fish_complete_directories)'", out);
+            break;
         }
         write_note(out, o->help);
     }
     if (self->words == NULL)
         return;
-    fprintf(out, "complete -c gbtrace -n '__fish_seen_subcommand_from %s; and test (count (commandline -opc)) -eq 2' -f -a '", self->name);
+    fprintf(out,
+            "complete -c gbtrace -n '__fish_seen_subcommand_from %s; and test (count (commandline -opc)) -eq "
+            "2' -f -a '",
+            self->name);
     describe_words(out, self);
     fputs("'\n", out);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/describe_man.c -- the manual page. */
 #include "cli/describe.h"
 #include "gbtrace/version.h"
@@ -9,13 +10,26 @@ static void write_text(FILE *out, const char *text)
         fputs("\\&", out);
     for (; *text != '\0'; text++)
         switch (*text) {
-        case '\\': fputs("\\e", out); break;
-        case '-': fputs("\\-", out); break;
-        case '\'': fputs("\\(aq", out); break;
-        case '`': fputs("\\(ga", out); break;
-        case '^': fputs("\\(ha", out); break;
-        case '~': fputs("\\(ti", out); break;
-        default: fputc(*text, out);
+        case '\\':
+            fputs("\\e", out);
+            break;
+        case '-':
+            fputs("\\-", out);
+            break;
+        case '\'':
+            fputs("\\(aq", out);
+            break;
+        case '`':
+            fputs("\\(ga", out);
+            break;
+        case '^':
+            fputs("\\(ha", out);
+            break;
+        case '~':
+            fputs("\\(ti", out);
+            break;
+        default:
+            fputc(*text, out);
         }
 }
 
@@ -61,8 +75,8 @@ static const char head[] =
     ".br\n"
     ".BR \"gbtrace \\-\\-version\" \" (\" \\-V \", \" \\-v )\n"
     ".SH DESCRIPTION\n"
-    "gbtrace trains neural Gaussian scenes from posed photos, renders them by ray tracing with Embree, scores, compresses and exports "
-    "them.\n"
+    "gbtrace trains neural Gaussian scenes from posed photos, renders them by ray tracing with Embree, "
+    "scores, compresses and exports them.\n"
     "Results go to standard output, progress and errors to standard error.\n"
     ".PP\n"
     "Every option can also be given by its other names, and with underscores for dashes.\n"
@@ -86,9 +100,11 @@ static const char tail[] =
     ".TP\n\\fBGBTRACE_\\fICOMMAND\\fB_\\fIOPTION\\fR\n"
     "The same for one command; it overrides the general one:\n.BR GBTRACE_TRAIN_BUDGET=10m .\n"
     ".PP\n"
-    "The environment overrides\n.BR \\-\\-config ,\nthe command line overrides both. Empty variables are ignored.\n"
+    "The environment overrides\n.BR \\-\\-config ,\nthe command line overrides both. Empty variables are "
+    "ignored.\n"
     ".TP\n\\fBGBT_ISA\\fR\n"
-    "Highest instruction set that the kernels use:\n.BR plain ,\n.B avx2\nor\n.BR avx512 .\nThe results are the same.\n"
+    "Highest instruction set that the kernels use:\n.BR plain ,\n.B avx2\nor\n.BR avx512 .\nThe results are "
+    "the same.\n"
     ".SH EXIT STATUS\n"
     ".TP\n0\ndone\n"
     ".TP\n1\na check failed (doctor, check\\-grad), or an internal error\n"
@@ -96,7 +112,8 @@ static const char tail[] =
     ".TP\n3\nbad input\n"
     ".TP\n4\ninput or output failed\n"
     ".TP\n5\nout of memory, or over a limit\n"
-    ".TP\n130\nstopped by SIGINT or SIGTERM, after saving; a second signal\n.I n\nends at once, with 128+\\fIn\\fR\n"
+    ".TP\n130\nstopped by SIGINT or SIGTERM, after saving; a second signal\n.I n\nends at once, with "
+    "128+\\fIn\\fR\n"
     ".SH EXAMPLES\n"
     ".nf\n"
     "gbtrace train PHOTOS \\-o RUN \\-\\-budget 10m\n"
@@ -106,7 +123,9 @@ static const char tail[] =
 
 void describe_man(FILE *out)
 {
-    fprintf(out, ".\\\" Made by gbtrace describe man.\n.TH GBTRACE 1 \"\" \"gbtrace %s\" \"User Commands\"\n%s", gbt_version(), head);
+    fprintf(out,
+            ".\\\" Made by gbtrace describe man.\n.TH GBTRACE 1 \"\" \"gbtrace %s\" \"User Commands\"\n%s",
+            gbt_version(), head);
     for (int i = 0; i < command_list_count; i++) {
         const command *c = command_list[i];
         fputs(".SS gbtrace ", out);

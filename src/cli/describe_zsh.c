@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/describe_zsh.c -- completion for zsh. */
 #include "cli/describe.h"
 
@@ -13,7 +14,8 @@ static void write_note(FILE *out, const char *text)
 static void write_rows(const command *self, const option *options, int option_count, void *context)
 {
     FILE *out = context;
-    fprintf(out, "  %s%s%s)\n    _arguments -S", self->name, self->alias != NULL ? "|" : "", self->alias != NULL ? self->alias : "");
+    fprintf(out, "  %s%s%s)\n    _arguments -S", self->name, self->alias != NULL ? "|" : "",
+            self->alias != NULL ? self->alias : "");
     for (int i = 0; i < option_count; i++) {
         const option *o = &options[i];
         if (o->kind == OPTION_ELSEWHERE)
@@ -31,10 +33,13 @@ static void write_rows(const command *self, const option *options, int option_co
             write_note(out, kind == VALUE_CHOICES ? o->name : o->value_name);
             fputc(':', out);
         }
-        static const char *const before[] = {[VALUE_CHOICES] = "(", [VALUE_LIST] = "_values -s , value ",
-                                             [VALUE_CHOICES_OR_FILE] = " _alternative \"values\\:value\\:(", [VALUE_FILE] = "_files",
+        static const char *const before[] = {[VALUE_CHOICES] = "(",
+                                             [VALUE_LIST] = "_values -s , value ",
+                                             [VALUE_CHOICES_OR_FILE] = " _alternative \"values\\:value\\:(",
+                                             [VALUE_FILE] = "_files",
                                              [VALUE_FOLDER] = "_files -/"};
-        static const char *const after[] = {[VALUE_CHOICES] = ")", [VALUE_CHOICES_OR_FILE] = ")\" \"files\\:file\\:_files\"",
+        static const char *const after[] = {[VALUE_CHOICES] = ")",
+                                            [VALUE_CHOICES_OR_FILE] = ")\" \"files\\:file\\:_files\"",
                                             [VALUE_FOLDER] = ""};
         fputs(before[kind] != NULL ? before[kind] : "", out);
         if (kind != VALUE_NONE && o->choices != NULL)
@@ -57,7 +62,8 @@ void describe_zsh(FILE *out)
           "_gbtrace() {\n"
           "  local -a commands\n"
           "  commands=(\n"
-          "    'help:the commands, or the options of one'\n", out);
+          "    'help:the commands, or the options of one'\n",
+          out);
     for (int i = 0; i < command_list_count; i++) {
         fprintf(out, "    '%s:", command_list[i]->name);
         write_note(out, command_list[i]->summary);
@@ -72,11 +78,13 @@ void describe_zsh(FILE *out)
           "  shift words\n"
           "  (( CURRENT-- ))\n"
           "  case $command in\n"
-          "  help) _describe command commands ;;\n", out);
+          "  help) _describe command commands ;;\n",
+          out);
     for (int i = 0; i < command_list_count; i++)
         options_visit(command_list[i], write_rows, out);
     fputs("  esac\n"
           "}\n"
           "# Read as a function of completion, or by source.\n"
-          "if [ \"$funcstack[1]\" = _gbtrace ]; then _gbtrace \"$@\"; else compdef _gbtrace gbtrace; fi\n", out);
+          "if [ \"$funcstack[1]\" = _gbtrace ]; then _gbtrace \"$@\"; else compdef _gbtrace gbtrace; fi\n",
+          out);
 }

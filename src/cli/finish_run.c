@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/finish_run.c -- a small model, scores, a report. */
 #include "cli/finish_run.h"
 

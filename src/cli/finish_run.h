@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/finish_run.h -- what follows training, for every command that trains. */
 #ifndef GBT_CLI_FINISH_RUN_H
 #define GBT_CLI_FINISH_RUN_H
@@ -7,8 +8,8 @@
 #include "gbtrace/status.h"
 
 /**
- * Make RUN/model.gbt small, unless `lossless`; then score the held-out views with what it gives back, and write the report; with
- * `tensorboard`, scores and pictures for it too.
+ * Make RUN/model.gbt small, unless `lossless`; then score the held-out views with what it gives back, and
+ * write the report; with `tensorboard`, scores and pictures for it too.
  */
 gbt_status finish_run(const char *run, bool lossless, bool tensorboard, gbt_error *err);
 

@@ -1,18 +1,24 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/json_write.c -- a text and a number as JSON. */
 #include <math.h>
 #include <stddef.h>
 
 #include "cli/progress.h"
 
-/** Bytes of the UTF-8 character at `s`, 1 to 4; 0 when there is none (a stray byte, too long a form, a surrogate). */
+/** Bytes of the UTF-8 character at `s`, 1 to 4; 0 when there is none (a stray byte, too long a form, a
+    surrogate). */
 static int character_length(const unsigned char *s)
 {
-    const int length = s[0] < 0x80 ? 1 : s[0] >= 0xc2 && s[0] < 0xe0 ? 2 : s[0] >= 0xe0 && s[0] < 0xf0 ? 3 : s[0] >= 0xf0 &&
-                       s[0] < 0xf5 ? 4 : 0;
+    const int length = s[0] < 0x80                   ? 1
+                       : s[0] >= 0xc2 && s[0] < 0xe0 ? 2
+                       : s[0] >= 0xe0 && s[0] < 0xf0 ? 3
+                       : s[0] >= 0xf0 && s[0] < 0xf5 ? 4
+                                                     : 0;
     for (int i = 1; i < length; i++)
         if ((s[i] & 0xc0) != 0x80)
             return 0;
-    if ((s[0] == 0xe0 && s[1] < 0xa0) || (s[0] == 0xed && s[1] >= 0xa0) || (s[0] == 0xf0 && s[1] < 0x90) || (s[0] == 0xf4 && s[1] >= 0x90))
+    if ((s[0] == 0xe0 && s[1] < 0xa0) || (s[0] == 0xed && s[1] >= 0xa0) || (s[0] == 0xf0 && s[1] < 0x90) ||
+        (s[0] == 0xf4 && s[1] >= 0x90))
         return 0;
     return length;
 }

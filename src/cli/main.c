@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/main.c -- find the subcommand and run it. */
 #include <errno.h>
 #include <stdio.h>
@@ -11,18 +12,22 @@ enum { NAMES_MAX = 64 };
 
 static int print_help(void)
 {
-    puts("usage: gbtrace COMMAND [arguments]\n\nneural Gaussian scenes from photos, ray traced on the CPU\n\ncommands:");
+    puts("usage: gbtrace COMMAND [arguments]\n\nneural Gaussian scenes from photos, ray traced on the "
+         "CPU\n\ncommands:");
     for (int i = 0; i < command_list_count; i++)
         printf("  %-12s%s\n", command_list[i]->name, command_list[i]->summary);
-    puts("\n`gbtrace COMMAND --help` lists the options of one; `gbtrace --version` (-V, -v) prints the version.\n"
-         "Exit codes: 0 done, 2 usage, 3 bad input, 4 input or output failed, 5 out of memory or over a limit, 130 interrupted.");
+    puts("\n`gbtrace COMMAND --help` lists the options of one; `gbtrace --version` (-V, -v) prints the "
+         "version.\n"
+         "Exit codes: 0 done, 2 usage, 3 bad input, 4 input or output failed, 5 out of memory or over a "
+         "limit, 130 interrupted.");
     return 0;
 }
 
 static const command *find(const char *name)
 {
     for (int i = 0; i < command_list_count; i++)
-        if (strcmp(command_list[i]->name, name) == 0 || (command_list[i]->alias != NULL && strcmp(command_list[i]->alias, name) == 0))
+        if (strcmp(command_list[i]->name, name) == 0 ||
+            (command_list[i]->alias != NULL && strcmp(command_list[i]->alias, name) == 0))
             return command_list[i];
     return NULL;
 }

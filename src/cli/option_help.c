@@ -1,4 +1,6 @@
-/* cli/option_help.c -- what a row says for a person: its names, its value, its default; and the help that is made of them. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* cli/option_help.c -- what a row says for a person: its names, its value, its default; and the help that is
+   made of them. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -9,7 +11,8 @@
 
 bool options_takes_value(const option *o)
 {
-    return o->kind != OPTION_FLAG && o->kind != OPTION_FLAG_OFF && o->kind != OPTION_ELSEWHERE && o->fixed == NULL;
+    return o->kind != OPTION_FLAG && o->kind != OPTION_FLAG_OFF && o->kind != OPTION_ELSEWHERE &&
+           o->fixed == NULL;
 }
 
 const char *options_value_name(const option *o)
@@ -49,7 +52,7 @@ int options_find(const option *options, int option_count, const char *name, size
     return -1;
 }
 
-/* ---- notes -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- notes ---- */
 
 static void add(char *out, size_t size, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
@@ -73,8 +76,10 @@ static void add_duration(char *out, size_t size, double seconds)
 static void add_size(char *out, size_t size, double bytes)
 {
     int unit = 0;
-    while (unit < 4 && bytes >= 1024)
-        bytes /= 1024, unit++;
+    while (unit < 4 && bytes >= 1024) {
+        bytes /= 1024;
+        unit++;
+    }
     if (bytes > 0 && bytes <= 0x1p30) /* 0: no default; beyond: no limit */
         add(out, size, " (default %g%.*s)", bytes, unit > 0, unit > 0 ? &"KMGT"[unit - 1] : "");
 }
@@ -85,16 +90,27 @@ static void add_default(const option *o, char *out, size_t size)
     case OPTION_FLAG:
     case OPTION_FLAG_OFF:
     case OPTION_OPERAND:
-    case OPTION_ELSEWHERE: return;
-    case OPTION_INT: add(out, size, " (default %d)", *(const int *)o->value); return;
-    case OPTION_UINT64: add(out, size, " (default %llu)", (unsigned long long)*(const uint64_t *)o->value); return;
-    case OPTION_FLOAT: add(out, size, " (default %g)", (double)*(const float *)o->value); return;
+    case OPTION_ELSEWHERE:
+        return;
+    case OPTION_INT:
+        add(out, size, " (default %d)", *(const int *)o->value);
+        return;
+    case OPTION_UINT64:
+        add(out, size, " (default %llu)", (unsigned long long)*(const uint64_t *)o->value);
+        return;
+    case OPTION_FLOAT:
+        add(out, size, " (default %g)", (double)*(const float *)o->value);
+        return;
     case OPTION_DOUBLE:
         if (!isnan(*(const double *)o->value)) /* else its help says it */
             add(out, size, " (default %g)", *(const double *)o->value);
         return;
-    case OPTION_DURATION: add_duration(out, size, *(const double *)o->value); return;
-    case OPTION_SIZE: add_size(out, size, (double)*(const size_t *)o->value); return;
+    case OPTION_DURATION:
+        add_duration(out, size, *(const double *)o->value);
+        return;
+    case OPTION_SIZE:
+        add_size(out, size, (double)*(const size_t *)o->value);
+        return;
     case OPTION_STRING:
     case OPTION_CHOICE: {
         const char *text = *(const char *const *)o->value;
@@ -122,15 +138,16 @@ void options_notes(const option *o, char *out, size_t size)
     }
 }
 
-/* ---- help --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- help ---- */
 
 void options_print_help(const command *self, const option *options, int option_count)
 {
-    printf("usage: gbtrace %s %s%s[options]\n\n%s\n\n", self->name, self->usage, self->usage[0] != '\0' ? " " : "", self->summary);
+    printf("usage: gbtrace %s %s%s[options]\n\n%s\n\n", self->name, self->usage,
+           self->usage[0] != '\0' ? " " : "", self->summary);
     const command_word *words = self->words != NULL ? self->words() : NULL;
     for (int i = 0; words != NULL && words[i].name != NULL; i++)
-        printf("%s  %-12s%s\n%s", i == 0 ? "the first argument is one of:\n" : "", words[i].name, words[i].help,
-               words[i + 1].name == NULL ? "\n" : "");
+        printf("%s  %-12s%s\n%s", i == 0 ? "the first argument is one of:\n" : "", words[i].name,
+               words[i].help, words[i + 1].name == NULL ? "\n" : "");
     puts("options:");
     for (int i = 0; i < option_count; i++) {
         const option *o = &options[i];
@@ -140,7 +157,8 @@ void options_print_help(const command *self, const option *options, int option_c
         const char *value_name = options_value_name(o);
         if (o->short_name != 0)
             snprintf(short_text, sizeof short_text, "-%c, ", o->short_name);
-        const int used = snprintf(left, sizeof left, "  %s--%s%s%s", short_text, o->name, value_name[0] != '\0' ? " " : "", value_name);
+        const int used = snprintf(left, sizeof left, "  %s--%s%s%s", short_text, o->name,
+                                  value_name[0] != '\0' ? " " : "", value_name);
         options_notes(o, notes, sizeof notes);
         printf(used > 30 ? "%s\n%32s" : "%-32s%s", left, "");
         printf("%s%s\n", o->help, notes);

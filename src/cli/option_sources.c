@@ -1,4 +1,6 @@
-/* cli/option_sources.c -- options from where they stand for longer than one command line: a configuration file, the environment. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* cli/option_sources.c -- options from where they stand for longer than one command line: a configuration
+   file, the environment. */
 #include <ctype.h>
 #include <errno.h>
 #include <stdio.h>
@@ -11,12 +13,9 @@
 enum { GO_ON = -1, CONFIG_LIMIT = 1 << 20 };
 
 /* Rows without a value of their own are spellings of other rows, for command lines. */
-static bool may_stand_here(const option *o)
-{
-    return o->kind != OPTION_ELSEWHERE && o->fixed == NULL;
-}
+static bool may_stand_here(const option *o) { return o->kind != OPTION_ELSEWHERE && o->fixed == NULL; }
 
-/* ---- the configuration file ---------------------------------------------------------------------------------------------------- */
+/* ---- the configuration file ---- */
 
 static int config_failed(gbt_status status, const char *path, int line, const char *what, const char *detail)
 {
@@ -46,7 +45,8 @@ static int read_config_file(const char *path, char **text)
     if (failed)
         return config_failed(GBT_ERR_IO, path, 0, "read failed", "");
     if (length == sizeof buffer || memchr(buffer, 0, length) != NULL)
-        return config_failed(GBT_ERR_FORMAT, path, 0, "not a configuration file (wanted name = value lines, at most 1 MiB)", "");
+        return config_failed(GBT_ERR_FORMAT, path, 0,
+                             "not a configuration file (wanted name = value lines, at most 1 MiB)", "");
     buffer[length] = '\0';
     *text = buffer;
     return GO_ON;
@@ -80,7 +80,8 @@ int options_read_config(const char *path, const option *options, int option_coun
         if (value == NULL)
             return config_failed(GBT_ERR_FORMAT, path, line, ": not a name = value line", name);
         *value++ = '\0';
-        name = trim(name), value = trim(value);
+        name = trim(name);
+        value = trim(value);
         const int i = strlen(name) > 1 ? options_find(options, option_count, name, strlen(name)) : -1;
         if (i < 0 || !may_stand_here(&options[i]))
             return config_failed(GBT_ERR_FORMAT, path, line, ": unknown option", name);
@@ -98,7 +99,7 @@ int options_read_config(const char *path, const option *options, int option_coun
     return GO_ON;
 }
 
-/* ---- the environment ------------------------------------------------------------------------------------------------------------- */
+/* ---- the environment ---- */
 
 bool options_in_environment(const option *o)
 {
@@ -107,7 +108,8 @@ bool options_in_environment(const option *o)
 
 void options_variable(const char *command_name, const char *option_name, char *out, size_t size)
 {
-    snprintf(out, size, "GBTRACE_%s%s%s", command_name != NULL ? command_name : "", command_name != NULL ? "_" : "", option_name);
+    snprintf(out, size, "GBTRACE_%s%s%s", command_name != NULL ? command_name : "",
+             command_name != NULL ? "_" : "", option_name);
     for (char *c = out; *c != '\0'; c++)
         *c = *c == '-' ? '_' : (char)toupper((unsigned char)*c);
 }

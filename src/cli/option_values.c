@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/option_values.c -- the text of one option to its value: strict, without locale, within its range. */
 #include <ctype.h>
 #include <errno.h>
@@ -11,7 +12,8 @@
 
 enum { CHOICES_MAX = 16 };
 
-/** Length of [+-]digits[.digits][e[+-]digits] at the start of `text`; 0 if there is none. No hex, nan, inf or blanks. */
+/** Length of [+-]digits[.digits][e[+-]digits] at the start of `text`; 0 if there is none. No hex, nan, inf or
+    blanks. */
 static size_t decimal_length(const char *text)
 {
     size_t i = text[0] == '+' || text[0] == '-' ? 1 : 0, digits = 0;
@@ -65,7 +67,10 @@ static bool read_uint64(const char *text, double min, double max, uint64_t *out)
 }
 
 /* From large to small. */
-static const struct { const char *names; double seconds; } time_units[] = {
+static const struct {
+    const char *names;
+    double seconds;
+} time_units[] = {
     {" h hr hrs hour hours ", 3600}, {" m min mins minute minutes ", 60}, {" s sec secs second seconds ", 1}};
 
 enum { TIME_UNITS = sizeof time_units / sizeof *time_units, TIME_NAME_MAX = 8 };
@@ -133,7 +138,8 @@ static bool is_choice(const char *choices, const char *text)
     const size_t length = strcspn(text, "|"); /* several choices are not one */
     if (text[length] != '\0')
         return false;
-    for (const char *part = choices; part != NULL; part = strchr(part, '|') != NULL ? strchr(part, '|') + 1 : NULL)
+    for (const char *part = choices; part != NULL;
+         part = strchr(part, '|') != NULL ? strchr(part, '|') + 1 : NULL)
         if (length > 0 && strncmp(part, text, length) == 0 && (part[length] == '|' || part[length] == '\0'))
             return true;
     return false;
@@ -202,7 +208,8 @@ bool options_read_value(const option *o, const char *text, char *wanted, size_t 
         ok = read_size(text, o->min, o->max, o->value);
         snprintf(wanted, wanted_size, "a size like 512M or 6G, from %.0f to %.0f bytes", o->min, o->max);
         break;
-    case OPTION_ELSEWHERE: break;
+    case OPTION_ELSEWHERE:
+        break;
     }
     return ok;
 }
@@ -215,10 +222,12 @@ void options_bad_value(const option *o, const char *wanted, const char *text, ch
     if (o->kind == OPTION_CHOICE) {
         snprintf(list, sizeof list, "%s", o->choices);
         char *rest = NULL;
-        for (char *name = strtok_r(list, "|", &rest); name != NULL && count < CHOICES_MAX; name = strtok_r(NULL, "|", &rest))
+        for (char *name = strtok_r(list, "|", &rest); name != NULL && count < CHOICES_MAX;
+             name = strtok_r(NULL, "|", &rest))
             names[count++] = name;
         nearest = command_nearest(text, names, count);
     }
     snprintf(out, size, "bad value (wanted %s, got %.80s%s%s%s)", wanted, text[0] != '\0' ? text : "nothing",
-             nearest != NULL ? "; did you mean " : "", nearest != NULL ? nearest : "", nearest != NULL ? "?" : "");
+             nearest != NULL ? "; did you mean " : "", nearest != NULL ? nearest : "",
+             nearest != NULL ? "?" : "");
 }

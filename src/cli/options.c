@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/options.c -- the command line to the places that a table of options names. */
 #include "cli/options.h"
 
@@ -10,7 +11,7 @@
 
 enum { GO_ON = -1, TABLE_MAX = OPTIONS_MAX + OPTIONS_COMMON };
 
-/* ---- the table: a command's own rows, then those that every command has ------------------------------------------------------------ */
+/* ---- the table: a command's own rows, then those that every command has ---- */
 
 static const char progress_modes[] = "auto|json|none";
 static const char *progress_mode, *config_path, *first_operand;
@@ -24,19 +25,37 @@ typedef struct table {
 static void make_table(table *t, const option *options, int option_count)
 {
     const option common[OPTIONS_COMMON] = {
-        {.name = "progress", .kind = OPTION_CHOICE, .value = &progress_mode, .choices = progress_modes,
+        {.name = "progress",
+         .kind = OPTION_CHOICE,
+         .value = &progress_mode,
+         .choices = progress_modes,
          .help = "progress on stderr: text, JSON lines (docs/command-line.md), or warnings and errors only"},
-        {.name = "quiet", .kind = OPTION_CHOICE, .value = &progress_mode, .choices = progress_modes, .fixed = "none",
+        {.name = "quiet",
+         .kind = OPTION_CHOICE,
+         .value = &progress_mode,
+         .choices = progress_modes,
+         .fixed = "none",
          .help = "the same as --progress none"},
-        {.name = "config", .kind = OPTION_STRING, .value = &config_path, .value_name = "FILE",
+        {.name = "config",
+         .kind = OPTION_STRING,
+         .value = &config_path,
+         .value_name = "FILE",
          .help = "read options from a file of name = value lines; environment and command line override it"},
-        {.name = "help", .short_name = 'h', .kind = OPTION_FLAG, .value = &help_wanted, .help = "print this help"},
+        {.name = "help",
+         .short_name = 'h',
+         .kind = OPTION_FLAG,
+         .value = &help_wanted,
+         .help = "print this help"},
     };
-    progress_mode = "auto", config_path = NULL, first_operand = NULL, help_wanted = false;
+    progress_mode = "auto";
+    config_path = NULL;
+    first_operand = NULL;
+    help_wanted = false;
     if (option_count > 0)
         memcpy(t->rows, options, (size_t)option_count * sizeof *options);
     memcpy(t->rows + option_count, common, sizeof common);
-    t->own = option_count, t->count = option_count + OPTIONS_COMMON;
+    t->own = option_count;
+    t->count = option_count + OPTIONS_COMMON;
     for (int i = 0; i < option_count; i++)
         if (t->rows[i].kind == OPTION_OPERAND)
             t->rows[i].value = &first_operand;
@@ -47,12 +66,13 @@ static void *visitor_context;
 
 void options_visit(const command *c, options_visitor *visit, void *context)
 {
-    visitor = visit, visitor_context = context;
+    visitor = visit;
+    visitor_context = context;
     c->run(c, 0, (char *[]){NULL});
     visitor = NULL;
 }
 
-/* ---- arguments ------------------------------------------------------------------------------------------------------------------- */
+/* ---- arguments ---- */
 
 static int unknown_option(const char *typed, const table *t)
 {
@@ -62,7 +82,8 @@ static int unknown_option(const char *typed, const table *t)
         if (t->rows[i].kind != OPTION_ELSEWHERE)
             names[count++] = t->rows[i].name;
     char name[64];
-    snprintf(name, sizeof name, "%.*s", (int)strcspn(typed + strspn(typed, "-"), "="), typed + strspn(typed, "-"));
+    snprintf(name, sizeof name, "%.*s", (int)strcspn(typed + strspn(typed, "-"), "="),
+             typed + strspn(typed, "-"));
     const char *nearest = command_nearest(name, names, count);
     if (nearest != NULL)
         return command_misused("%.100s: unknown option (did you mean --%s?)", typed, nearest);
@@ -92,7 +113,8 @@ static int take_apart(char *text, const table *t, argument *out)
     return GO_ON;
 }
 
-/** The value of an argument: behind =, or the next argument, which it then takes. Two dashes do not start a value: one was forgotten. */
+/** The value of an argument: behind =, or the next argument, which it then takes. Two dashes do not start a
+    value: one was forgotten. */
 static const char *take_value(const argument *a, int argc, char **argv, int *i)
 {
     if (a->value != NULL)
@@ -127,7 +149,8 @@ static int apply(const argument *a, const option *o, int argc, char **argv, int 
 /**
  * Go through the arguments once.
  *
- * @param common [in]  true: apply the common options alone, which the rest is read by; false: apply everything
+ * @param common [in]  true: apply the common options alone, which the rest is read by; false: apply
+ *                     everything
  * @param given  [out] [t->count]
  */
 static int walk(const table *t, bool common, int argc, char **argv, bool *given, operands *out)
@@ -155,14 +178,15 @@ static int walk(const table *t, bool common, int argc, char **argv, bool *given,
                 return applied;
         } else if (!common) {
             if (out->count == OPTIONS_MAX_OPERANDS)
-                return command_misused("%.100s: one argument too many (at most %d)", argv[i], OPTIONS_MAX_OPERANDS);
+                return command_misused("%.100s: one argument too many (at most %d)", argv[i],
+                                       OPTIONS_MAX_OPERANDS);
             out->value[out->count++] = argv[i];
         }
     }
     return GO_ON;
 }
 
-/* ---- is everything there ----------------------------------------------------------------------------------------------------------- */
+/* ---- is everything there ---- */
 
 static void put_first(operands *out, const char *value)
 {
@@ -182,30 +206,36 @@ static int check_words(const command *self, const char *typed)
         if (strcmp(words[count].name, typed) == 0)
             return GO_ON;
         const char *join = count == 0 ? "" : words[count + 1].name == NULL ? " or " : ", ";
-        used += (size_t)snprintf(list + used, used < sizeof list ? sizeof list - used : 0, "%s%s", join, words[count].name);
+        used += (size_t)snprintf(list + used, used < sizeof list ? sizeof list - used : 0, "%s%s", join,
+                                 words[count].name);
         names[count] = words[count].name;
     }
     const char *nearest = command_nearest(typed, names, count);
-    return command_misused("%s: \"%.60s\" (wanted %.400s%s%s%s)", self->name, typed, list, nearest != NULL ? "; did you mean " : "",
-                           nearest != NULL ? nearest : "", nearest != NULL ? "?" : "");
+    return command_misused("%s: \"%.60s\" (wanted %.400s%s%s%s)", self->name, typed, list,
+                           nearest != NULL ? "; did you mean " : "", nearest != NULL ? nearest : "",
+                           nearest != NULL ? "?" : "");
 }
 
-static int check_complete(const command *self, const table *t, const bool *given, int min_operands, int max_operands, const operands *out)
+static int check_complete(const command *self, const table *t, const bool *given, int min_operands,
+                          int max_operands, const operands *out)
 {
     for (int i = 0; i < out->count; i++)
         if (out->value[i][0] == '\0')
-            return command_misused("argument %d is empty (usage: gbtrace %s %s)", i + 1, self->name, self->usage);
+            return command_misused("argument %d is empty (usage: gbtrace %s %s)", i + 1, self->name,
+                                   self->usage);
     if (out->count < min_operands)
         return command_misused("argument missing (usage: gbtrace %s %s)", self->name, self->usage);
     if (out->count > max_operands)
-        return command_misused("%.100s: one argument too many (usage: gbtrace %s %s)", out->value[max_operands], self->name, self->usage);
+        return command_misused("%.100s: one argument too many (usage: gbtrace %s %s)",
+                               out->value[max_operands], self->name, self->usage);
     for (int i = 0; i < t->own; i++)
         if (t->rows[i].required && !given[i])
-            return command_misused("--%s is missing (usage: gbtrace %s %s)", t->rows[i].name, self->name, self->usage);
+            return command_misused("--%s is missing (usage: gbtrace %s %s)", t->rows[i].name, self->name,
+                                   self->usage);
     return self->words != NULL && out->count > 0 ? check_words(self, out->value[0]) : GO_ON;
 }
 
-/* ---- entry ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- entry ---- */
 
 static bool wants_help(int argc, char **argv)
 {
@@ -215,8 +245,8 @@ static bool wants_help(int argc, char **argv)
     return false;
 }
 
-int options_parse(const command *self, const option *options, int option_count, int min_operands, int max_operands, int argc, char **argv,
-                  operands *out)
+int options_parse(const command *self, const option *options, int option_count, int min_operands,
+                  int max_operands, int argc, char **argv, operands *out)
 {
     table t;
     bool given[TABLE_MAX] = {false}, before[TABLE_MAX] = {false};

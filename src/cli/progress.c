@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/progress.c -- events as JSON lines, or fewer of them. */
 #include "cli/progress.h"
 
@@ -14,8 +15,14 @@ static char last_error[1024];
 
 static void print_progress(const gbt_event *e)
 {
-    const struct { const char *name; double value; } numbers[] = {
-        {"fraction", e->fraction}, {"seconds", e->seconds}, {"seconds_left", e->seconds_left}, {"psnr", e->psnr}, {"loss", e->loss}};
+    const struct {
+        const char *name;
+        double value;
+    } numbers[] = {{"fraction", e->fraction},
+                   {"seconds", e->seconds},
+                   {"seconds_left", e->seconds_left},
+                   {"psnr", e->psnr},
+                   {"loss", e->loss}};
     fputs("{\"event\": \"progress\", \"stage\": ", stderr);
     json_write_text(stderr, e->stage);
     fprintf(stderr, ", \"done\": %llu, \"total\": ", (unsigned long long)e->done);
@@ -51,7 +58,8 @@ static void hear(const gbt_event *e, void *context)
 
 void progress_start(const char *mode, const char *command_name)
 {
-    as_json = strcmp(mode, "json") == 0, silent = strcmp(mode, "none") == 0;
+    as_json = strcmp(mode, "json") == 0;
+    silent = strcmp(mode, "none") == 0;
     if (as_json) {
         setvbuf(stderr, NULL, _IOLBF, BUFSIZ); /* a line at a time: readers see whole objects */
         fputs("{\"event\": \"start\", \"schema\": 1, \"command\": ", stderr);
@@ -75,10 +83,7 @@ void progress_say(const char *format, ...)
         fprintf(stderr, "%s\n", line);
 }
 
-bool progress_for_people(void)
-{
-    return !as_json && !silent;
-}
+bool progress_for_people(void) { return !as_json && !silent; }
 
 void progress_error(const char *text)
 {

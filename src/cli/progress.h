@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/progress.h -- stderr as lines for a person, or as one JSON object a line for a program. */
 #ifndef GBT_CLI_PROGRESS_H
 #define GBT_CLI_PROGRESS_H
@@ -5,7 +6,8 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/** "auto", "json" or "none", for the rest of the program. With "json" everything on stderr is JSON from here on (docs/command-line.md). */
+/** "auto", "json" or "none", for the rest of the program. With "json" everything on stderr is JSON from here
+    on (docs/command-line.md). */
 void progress_start(const char *mode, const char *command_name);
 
 /** A message of the program's own. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/report.c -- the one line of an error, and the guess at what a mistyped name should have been. */
 #include <stdarg.h>
 #include <stdio.h>
@@ -37,12 +38,10 @@ int command_misused(const char *format, ...)
 
 enum { NAME_LIMIT = 40 };
 
-static int smaller(int a, int b)
-{
-    return a < b ? a : b;
-}
+static int smaller(int a, int b) { return a < b ? a : b; }
 
-/** Insertions, deletions, replacements and swaps of neighbours that make `b` of `a`; both shorter than NAME_LIMIT. */
+/** Insertions, deletions, replacements and swaps of neighbours that make `b` of `a`; both shorter than
+    NAME_LIMIT. */
 static int edit_distance(const char *a, const char *b)
 {
     const int m = (int)strlen(a), n = (int)strlen(b);
@@ -53,7 +52,8 @@ static int edit_distance(const char *a, const char *b)
         d[0][j] = j;
     for (int i = 1; i <= m; i++)
         for (int j = 1; j <= n; j++) {
-            d[i][j] = smaller(smaller(d[i - 1][j], d[i][j - 1]) + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1]));
+            d[i][j] =
+                smaller(smaller(d[i - 1][j], d[i][j - 1]) + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1]));
             if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
                 d[i][j] = smaller(d[i][j], d[i - 2][j - 2] + 1);
         }
@@ -71,8 +71,10 @@ const char *command_nearest(const char *typed, const char *const *names, int cou
         if (strlen(names[i]) >= NAME_LIMIT)
             continue;
         const int distance = edit_distance(typed, names[i]);
-        if (distance < best && distance < (int)strlen(names[i]))
-            best = distance, nearest = names[i];
+        if (distance < best && distance < (int)strlen(names[i])) {
+            best = distance;
+            nearest = names[i];
+        }
     }
     return nearest;
 }

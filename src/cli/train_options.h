@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* cli/train_options.h -- the options of a training run, shared by train and demo. */
 #ifndef GBT_CLI_TRAIN_OPTIONS_H
 #define GBT_CLI_TRAIN_OPTIONS_H
@@ -18,6 +19,7 @@ void train_options_init(train_options *t);
 int train_options_table(train_options *t, const option *own, int own_count, option *out);
 
 /** After parsing: threads, evaluation times, the command line for the report. */
-gbt_status train_options_finish(train_options *t, const char *command_name, int argc, char **argv, gbt_error *err);
+gbt_status train_options_finish(train_options *t, const char *command_name, int argc, char **argv,
+                                gbt_error *err);
 
 #endif

@@ -1,7 +1,10 @@
-/* data/bytes.h -- the bounded cursor that every binary reader stands on, and the growing buffer of every writer.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/bytes.h -- the bounded cursor that every binary reader stands on, and the growing buffer of every
+   writer.
 
-   No read leaves [0, size): a read past the end gives 0 and sets `short_read`. Readers ask cursor_need() before each record, so that
-   the message names the record, and check counts with cursor_count_fits() before they allocate. Byte order is spelled out by shifts. */
+   No read leaves [0, size): a read past the end gives 0 and sets `short_read`. Readers ask cursor_need()
+   before each record, so that the message names the record, and check counts with cursor_count_fits() before
+   they allocate. Byte order is spelled out by shifts. */
 #ifndef GBT_DATA_BYTES_H
 #define GBT_DATA_BYTES_H
 
@@ -26,18 +29,15 @@ typedef struct cursor {
     bool short_read;
 } cursor;
 
-static inline size_t cursor_left(const cursor *c)
-{
-    return c->file->size - c->at;
-}
+static inline size_t cursor_left(const cursor *c) { return c->file->size - c->at; }
 
 /** Fails with the place and both sizes when fewer than `byte_count` bytes are left. */
 static inline gbt_status cursor_need(const cursor *c, size_t byte_count, const char *what, gbt_error *err)
 {
     if (cursor_left(c) >= byte_count)
         return GBT_OK;
-    return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: file ends inside %s (wanted %zu more bytes, got %zu)", c->file->name, c->at, what,
-                     byte_count, cursor_left(c));
+    return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: file ends inside %s (wanted %zu more bytes, got %zu)",
+                     c->file->name, c->at, what, byte_count, cursor_left(c));
 }
 
 /** True when `count` records of at least `record_bytes` (> 0) can still follow. */
@@ -68,15 +68,9 @@ static inline uint64_t cursor_uint(cursor *c, size_t byte_count)
     return value;
 }
 
-static inline uint32_t cursor_u32(cursor *c)
-{
-    return (uint32_t)cursor_uint(c, 4);
-}
+static inline uint32_t cursor_u32(cursor *c) { return (uint32_t)cursor_uint(c, 4); }
 
-static inline uint64_t cursor_u64(cursor *c)
-{
-    return cursor_uint(c, 8);
-}
+static inline uint64_t cursor_u64(cursor *c) { return cursor_uint(c, 8); }
 
 static inline float cursor_f32(cursor *c)
 {
@@ -107,7 +101,8 @@ static inline void sink_put(sink *s, const void *bytes, size_t byte_count)
     if (s->status != GBT_OK)
         return;
     void *grown = s->bytes;
-    s->status = mem_reserve(&grown, &s->capacity, s->size, s->size + byte_count, 1, "file to be written", s->err);
+    s->status =
+        mem_reserve(&grown, &s->capacity, s->size, s->size + byte_count, 1, "file to be written", s->err);
     s->bytes = grown;
     if (s->status != GBT_OK || byte_count == 0)
         return;
@@ -144,10 +139,7 @@ static inline void sink_put_level(sink *s, double value)
     sink_put_uint(s, value >= 255 ? 255 : value > 0 ? (uint64_t)(value + 0.5) : 0, 1);
 }
 
-static inline void sink_put_text(sink *s, const char *text)
-{
-    sink_put(s, text, strlen(text));
-}
+static inline void sink_put_text(sink *s, const char *text) { sink_put(s, text, strlen(text)); }
 
 static inline void sink_free(sink *s)
 {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/cameras_json.c -- [{id, img_name, width, height, position[3], rotation[3][3], fy, fx}] to views. */
 #include "data/cameras_json.h"
 
@@ -20,26 +21,35 @@ static bool get_number(const json_t *value, double *out)
 
 static gbt_status read_camera(const json_t *entry, raw_place place, gbt_camera *out, gbt_error *err)
 {
-    const json_t *position = json_object_get(entry, "position"), *rotation = json_object_get(entry, "rotation");
+    const json_t *position = json_object_get(entry, "position"),
+                 *rotation = json_object_get(entry, "rotation");
     double width = 0, height = 0, fx = 0, fy = 0;
-    bool fine = get_number(json_object_get(entry, "width"), &width) && get_number(json_object_get(entry, "height"), &height) &&
-                get_number(json_object_get(entry, "fx"), &fx) && get_number(json_object_get(entry, "fy"), &fy) &&
-                json_array_size(position) == 3 && json_array_size(rotation) == 3;
+    bool fine = get_number(json_object_get(entry, "width"), &width) &&
+                get_number(json_object_get(entry, "height"), &height) &&
+                get_number(json_object_get(entry, "fx"), &fx) &&
+                get_number(json_object_get(entry, "fy"), &fy) && json_array_size(position) == 3 &&
+                json_array_size(rotation) == 3;
     for (size_t i = 0; i < 3 && fine; i++) {
         const json_t *row = json_array_get(rotation, i);
         fine = json_array_size(row) == 3 && get_number(json_array_get(position, i), &out->center[i]);
         for (size_t k = 0; k < 3 && fine; k++)
-            fine = get_number(json_array_get(row, k), &out->rotation[3 * k + i]); /* its columns are our rows */
+            fine =
+                get_number(json_array_get(row, k), &out->rotation[3 * k + i]); /* its columns are our rows */
     }
     if (!fine)
-        return raw_fail(err, place, "not a camera (wanted width, height, fx, fy, position [3] and rotation [3][3])");
+        return raw_fail(err, place,
+                        "not a camera (wanted width, height, fx, fy, position [3] and rotation [3][3])");
     if (!dmat_is_rotation(out->rotation, 1e-3))
         return raw_fail(err, place, "rotation is not one (wanted orthonormal within 1e-3, no reflection)");
     if (!(width >= 1 && width <= RAW_IMAGE_LIMIT && height >= 1 && height <= RAW_IMAGE_LIMIT))
         return raw_fail(err, place, "%g x %g pixels (wanted 1 to %d)", width, height, (int)RAW_IMAGE_LIMIT);
     out->model = GBT_CAMERA_PINHOLE;
-    out->width = (int)width, out->height = (int)height;
-    out->params[0] = fx, out->params[1] = fy, out->params[2] = 0.5 * out->width, out->params[3] = 0.5 * out->height;
+    out->width = (int)width;
+    out->height = (int)height;
+    out->params[0] = fx;
+    out->params[1] = fy;
+    out->params[2] = 0.5 * out->width;
+    out->params[3] = 0.5 * out->height;
     return raw_check_camera(out, place, err);
 }
 

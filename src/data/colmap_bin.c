@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/colmap_bin.c -- COLMAP's cameras.bin, images.bin and points3D.bin from bytes. */
 #include "data/colmap_bin.h"
 
@@ -11,16 +12,15 @@ enum {
     CAMERA_LEAST_BYTES = 40, /* the shortest models have two parameters */
 };
 
-static raw_place place_of(const cursor *c)
-{
-    return (raw_place){c->file->name, '@', c->at};
-}
+static raw_place place_of(const cursor *c) { return (raw_place){c->file->name, '@', c->at}; }
 
 /* The count at the start of each file, checked against the bytes that follow it before anybody allocates. */
-static gbt_status take_count(cursor *c, size_t record_bytes, const char *what, uint64_t *count, gbt_error *err)
+static gbt_status take_count(cursor *c, size_t record_bytes, const char *what, uint64_t *count,
+                             gbt_error *err)
 {
     if (c->file->size == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@0: file is empty (wanted a count of %s)", c->file->name, what);
+        return base_fail(err, GBT_ERR_FORMAT, "%s@0: file is empty (wanted a count of %s)", c->file->name,
+                         what);
     GBT_TRY(cursor_need(c, 8, "the count", err));
     const raw_place place = place_of(c);
     *count = cursor_u64(c);
@@ -35,10 +35,12 @@ static gbt_status take_count(cursor *c, size_t record_bytes, const char *what, u
         return raw_fail(err, place, "file looks like text (wanted COLMAP's binary form)");
     if (cursor_count_fits(c, __builtin_bswap64(*count), record_bytes))
         return raw_fail(err, place, "count of %s is in big-endian order (wanted little-endian)", what);
-    return raw_fail(err, place, "%llu %s cannot be in the %zu bytes that follow", (unsigned long long)*count, what, cursor_left(c));
+    return raw_fail(err, place, "%llu %s cannot be in the %zu bytes that follow", (unsigned long long)*count,
+                    what, cursor_left(c));
 }
 
-static gbt_status read_cameras(const source_file *file, colmap_cameras *cameras, raw_scene *out, gbt_error *err)
+static gbt_status read_cameras(const source_file *file, colmap_cameras *cameras, raw_scene *out,
+                               gbt_error *err)
 {
     cursor c = {.file = file};
     uint64_t count;
@@ -49,10 +51,12 @@ static gbt_status read_cameras(const source_file *file, colmap_cameras *cameras,
         const uint32_t id = cursor_u32(&c), model = cursor_u32(&c);
         const uint64_t width = cursor_u64(&c), height = cursor_u64(&c);
         if (model >= GBT_CAMERA_MODEL_COUNT)
-            return raw_fail(err, place, "unknown camera model id %d (wanted 0..%d)", (int)model, GBT_CAMERA_MODEL_COUNT - 1);
+            return raw_fail(err, place, "unknown camera model id %d (wanted 0..%d)", (int)model,
+                            GBT_CAMERA_MODEL_COUNT - 1);
         if (width < 1 || width > RAW_IMAGE_LIMIT || height < 1 || height > RAW_IMAGE_LIMIT)
-            return raw_fail(err, place, "image width or height is out of range (wanted 1..%d, got %llu x %llu)", RAW_IMAGE_LIMIT,
-                            (unsigned long long)width, (unsigned long long)height);
+            return raw_fail(err, place,
+                            "image width or height is out of range (wanted 1..%d, got %llu x %llu)",
+                            RAW_IMAGE_LIMIT, (unsigned long long)width, (unsigned long long)height);
         gbt_camera camera = {.model = (gbt_camera_model)model, .width = (int)width, .height = (int)height};
         const int param_count = gbt_camera_param_count(camera.model);
         GBT_TRY(cursor_need(&c, (size_t)param_count * 8, "the camera's parameters", err));
@@ -64,7 +68,8 @@ static gbt_status read_cameras(const source_file *file, colmap_cameras *cameras,
     return colmap_cameras_sort(cameras, file->name, err);
 }
 
-static gbt_status read_images(const source_file *file, const colmap_cameras *cameras, raw_scene *out, gbt_error *err)
+static gbt_status read_images(const source_file *file, const colmap_cameras *cameras, raw_scene *out,
+                              gbt_error *err)
 {
     cursor c = {.file = file};
     uint64_t count;
@@ -85,7 +90,8 @@ static gbt_status read_images(const source_file *file, const colmap_cameras *cam
             return raw_fail(err, place_of(&c), "image name does not end before the file does");
         const size_t name_length = (size_t)(zero - name);
         cursor_skip(&c, name_length + 1);
-        GBT_TRY(colmap_add_image(out, cameras, id, quaternion, translation, camera_id, name, name_length, place, err));
+        GBT_TRY(colmap_add_image(out, cameras, id, quaternion, translation, camera_id, name, name_length,
+                                 place, err));
         GBT_TRY(cursor_need(&c, 8, "the count of observations", err));
         const raw_place observations = place_of(&c);
         const uint64_t observation_count = cursor_u64(&c);
@@ -98,7 +104,8 @@ static gbt_status read_images(const source_file *file, const colmap_cameras *cam
     return GBT_OK;
 }
 
-static gbt_status read_points(const source_file *file, const colmap_image_id *images, raw_scene *out, gbt_error *err)
+static gbt_status read_points(const source_file *file, const colmap_image_id *images, raw_scene *out,
+                              gbt_error *err)
 {
     cursor c = {.file = file};
     uint64_t count;
@@ -118,8 +125,8 @@ static gbt_status read_points(const source_file *file, const colmap_image_id *im
         const raw_place track = place_of(&c);
         const uint64_t track_count = cursor_u64(&c);
         if (!cursor_count_fits(&c, track_count, TRACK_ENTRY_BYTES))
-            return raw_fail(err, track, "a track of %llu entries cannot be in the %zu bytes that follow", (unsigned long long)track_count,
-                            cursor_left(&c));
+            return raw_fail(err, track, "a track of %llu entries cannot be in the %zu bytes that follow",
+                            (unsigned long long)track_count, cursor_left(&c));
         for (uint64_t k = 0; k < track_count; k++) {
             GBT_TRY(colmap_add_sight(out, images, cursor_u32(&c), position, err));
             cursor_skip(&c, 4);

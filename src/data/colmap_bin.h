@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/colmap_bin.h -- COLMAP's cameras.bin, images.bin and points3D.bin from bytes. */
 #ifndef GBT_DATA_COLMAP_BIN_H
 #define GBT_DATA_COLMAP_BIN_H
@@ -9,7 +10,8 @@
  *
  * @param out [in,out] zeroed by the caller; free with raw_free(), also after a failure
  * @return GBT_OK, GBT_ERR_FORMAT with the offset, GBT_ERR_NO_MEMORY
- * Threads: any. Cost: one pass; memory is bounded by a small multiple of the bytes given, whatever the counts in them say.
+ * Threads: any. Cost: one pass; memory is bounded by a small multiple of the bytes given, whatever the counts
+ * in them say.
  */
 gbt_status colmap_bin_read(const colmap_files *files, raw_scene *out, gbt_error *err);
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/colmap_model.c -- what COLMAP's binary and text readers share. */
 #include "data/colmap_model.h"
 
@@ -6,12 +7,13 @@
 
 #include "base/vec.h"
 
-gbt_status colmap_cameras_add(colmap_cameras *cameras, uint32_t id, const gbt_camera *camera, raw_place place, gbt_error *err)
+gbt_status colmap_cameras_add(colmap_cameras *cameras, uint32_t id, const gbt_camera *camera, raw_place place,
+                              gbt_error *err)
 {
     GBT_TRY(raw_check_camera(camera, place, err));
     void *items = cameras->items;
-    const gbt_status status =
-        mem_reserve(&items, &cameras->capacity, cameras->count, cameras->count + 1, sizeof *cameras->items, "cameras", err);
+    const gbt_status status = mem_reserve(&items, &cameras->capacity, cameras->count, cameras->count + 1,
+                                          sizeof *cameras->items, "cameras", err);
     cameras->items = items;
     GBT_TRY(status);
     cameras->items[cameras->count++] = (colmap_camera){.id = id, .camera = *camera};
@@ -40,9 +42,9 @@ void colmap_cameras_free(colmap_cameras *cameras)
     *cameras = (colmap_cameras){0};
 }
 
-gbt_status colmap_add_image(raw_scene *raw, const colmap_cameras *cameras, uint32_t id, const double quaternion[4],
-                            const double translation[3], uint32_t camera_id, const char *name, size_t name_length, raw_place place,
-                            gbt_error *err)
+gbt_status colmap_add_image(raw_scene *raw, const colmap_cameras *cameras, uint32_t id,
+                            const double quaternion[4], const double translation[3], uint32_t camera_id,
+                            const char *name, size_t name_length, raw_place place, gbt_error *err)
 {
     GBT_TRY(raw_check_name(name, name_length, place, err));
     const double *q = quaternion;
@@ -51,7 +53,8 @@ gbt_status colmap_add_image(raw_scene *raw, const colmap_cameras *cameras, uint3
         return raw_fail(err, place, "quaternion is not of unit length (wanted 1 within 1e-3, got %g)", norm);
     for (int k = 0; k < 3; k++)
         if (!(fabs(translation[k]) <= RAW_COORDINATE_LIMIT))
-            return raw_fail(err, place, "translation is not usable (wanted at most %g, got %g)", RAW_COORDINATE_LIMIT, translation[k]);
+            return raw_fail(err, place, "translation is not usable (wanted at most %g, got %g)",
+                            RAW_COORDINATE_LIMIT, translation[k]);
     const colmap_camera key = {.id = camera_id};
     const colmap_camera *found =
         cameras->count > 0 ? bsearch(&key, cameras->items, cameras->count, sizeof key, by_camera_id) : NULL;
@@ -69,7 +72,8 @@ gbt_status colmap_add_image(raw_scene *raw, const colmap_cameras *cameras, uint3
     dquat_to_matrix(unit, view->camera.rotation);
     dmat_apply_transposed(view->camera.rotation, translation, view->camera.center);
     for (int k = 0; k < 3; k++)
-        view->camera.center[k] = 0 - view->camera.center[k]; /* 0 - 0 is +0, so that no pose carries a negative zero */
+        view->camera.center[k] =
+            0 - view->camera.center[k]; /* 0 - 0 is +0, so that no pose carries a negative zero */
     raw->view_count++;
     return GBT_OK;
 }
@@ -80,7 +84,8 @@ static int by_image_id(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_image_id **images, gbt_error *err)
+gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_image_id **images,
+                                gbt_error *err)
 {
     *images = NULL;
     colmap_image_id *sorted = mem_alloc(raw->view_count, sizeof *sorted, "image ids", err);
@@ -100,10 +105,12 @@ gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_i
     return GBT_OK;
 }
 
-gbt_status colmap_add_sight(raw_scene *raw, const colmap_image_id *images, uint32_t id, const double position[3], gbt_error *err)
+gbt_status colmap_add_sight(raw_scene *raw, const colmap_image_id *images, uint32_t id,
+                            const double position[3], gbt_error *err)
 {
     const colmap_image_id key = {.id = id};
-    const colmap_image_id *found = raw->view_count > 0 ? bsearch(&key, images, raw->view_count, sizeof key, by_image_id) : NULL;
+    const colmap_image_id *found =
+        raw->view_count > 0 ? bsearch(&key, images, raw->view_count, sizeof key, by_image_id) : NULL;
     if (found != NULL)
         return raw_add_sight(&raw->views[found->view], position, err);
     raw->tracks_missing++;

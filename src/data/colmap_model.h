@@ -1,4 +1,6 @@
-/* data/colmap_model.h -- what COLMAP's binary and text readers share: cameras by id, poses, and the finish that ties images to cameras. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/colmap_model.h -- what COLMAP's binary and text readers share: cameras by id, poses, and the finish
+   that ties images to cameras. */
 #ifndef GBT_DATA_COLMAP_MODEL_H
 #define GBT_DATA_COLMAP_MODEL_H
 
@@ -20,7 +22,8 @@ typedef struct colmap_cameras {
     colmap_camera *items; /* sorted by id after colmap_cameras_sort(); owned */
 } colmap_cameras;
 
-gbt_status colmap_cameras_add(colmap_cameras *cameras, uint32_t id, const gbt_camera *camera, raw_place place, gbt_error *err);
+gbt_status colmap_cameras_add(colmap_cameras *cameras, uint32_t id, const gbt_camera *camera, raw_place place,
+                              gbt_error *err);
 
 /** Sort by id; a camera id that is there twice is an error. */
 gbt_status colmap_cameras_sort(colmap_cameras *cameras, const char *file, gbt_error *err);
@@ -31,19 +34,23 @@ void colmap_cameras_free(colmap_cameras *cameras);
  *
  * `quaternion` (w, x, y, z) and `translation` take world to camera: x_cam = R x + t, so the centre is -R^T t.
  */
-gbt_status colmap_add_image(raw_scene *raw, const colmap_cameras *cameras, uint32_t id, const double quaternion[4],
-                            const double translation[3], uint32_t camera_id, const char *name, size_t name_length, raw_place place,
-                            gbt_error *err);
+gbt_status colmap_add_image(raw_scene *raw, const colmap_cameras *cameras, uint32_t id,
+                            const double quaternion[4], const double translation[3], uint32_t camera_id,
+                            const char *name, size_t name_length, raw_place place, gbt_error *err);
 
 typedef struct colmap_image_id {
     uint32_t id;
     uint32_t view; /* index into raw_scene.views */
 } colmap_image_id;
 
-/** One entry per view, sorted by id, for looking up tracks. Owned by the caller (mem_free()); an id that is there twice is an error. */
-gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_image_id **images, gbt_error *err);
+/** One entry per view, sorted by id, for looking up tracks. Owned by the caller (mem_free()); an id that is
+    there twice is an error. */
+gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_image_id **images,
+                                gbt_error *err);
 
-/** A track says that the point at `position` is in the photo of image `id`, which is looked up in colmap_images_sorted(). */
-gbt_status colmap_add_sight(raw_scene *raw, const colmap_image_id *images, uint32_t id, const double position[3], gbt_error *err);
+/** A track says that the point at `position` is in the photo of image `id`, which is looked up in
+    colmap_images_sorted(). */
+gbt_status colmap_add_sight(raw_scene *raw, const colmap_image_id *images, uint32_t id,
+                            const double position[3], gbt_error *err);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/colmap_txt.c -- COLMAP's cameras.txt, images.txt and points3D.txt from bytes. */
 #include "data/colmap_txt.h"
 
@@ -49,15 +50,17 @@ static bool next_record(text_lines *lines)
     return false;
 }
 
-static gbt_status bad_number(const text_lines *lines, number_result result, const char *what, const char *token, size_t length,
-                             gbt_error *err)
+static gbt_status bad_number(const text_lines *lines, number_result result, const char *what,
+                             const char *token, size_t length, gbt_error *err)
 {
     const int shown = length < 60 ? (int)length : 60;
-    return raw_fail(err, place_of(lines), result == NUMBER_RANGE ? "%s is out of range: %.*s" : "%s is not a number: %.*s", what, shown,
-                    token);
+    return raw_fail(err, place_of(lines),
+                    result == NUMBER_RANGE ? "%s is out of range: %.*s" : "%s is not a number: %.*s", what,
+                    shown, token);
 }
 
-static gbt_status take_token(text_lines *lines, const char *what, const char **token, size_t *length, gbt_error *err)
+static gbt_status take_token(text_lines *lines, const char *what, const char **token, size_t *length,
+                             gbt_error *err)
 {
     if (number_next_token(&lines->at, lines->end, token, length))
         return GBT_OK;
@@ -73,7 +76,8 @@ static gbt_status take_double(text_lines *lines, const char *what, double *out, 
     return result == NUMBER_OK ? GBT_OK : bad_number(lines, result, what, token, length, err);
 }
 
-static gbt_status take_uint(text_lines *lines, const char *what, uint64_t limit, uint64_t *out, gbt_error *err)
+static gbt_status take_uint(text_lines *lines, const char *what, uint64_t limit, uint64_t *out,
+                            gbt_error *err)
 {
     const char *token;
     size_t length;
@@ -90,7 +94,8 @@ static gbt_status check_line_ends(text_lines *lines, const char *what, gbt_error
     size_t length;
     if (!number_next_token(&lines->at, lines->end, &token, &length))
         return GBT_OK;
-    return raw_fail(err, place_of(lines), "%s has too many fields, from %.*s", what, length < 60 ? (int)length : 60, token);
+    return raw_fail(err, place_of(lines), "%s has too many fields, from %.*s", what,
+                    length < 60 ? (int)length : 60, token);
 }
 
 static gbt_status take_model(text_lines *lines, gbt_camera_model *model, gbt_error *err)
@@ -105,7 +110,8 @@ static gbt_status take_model(text_lines *lines, gbt_camera_model *model, gbt_err
             return GBT_OK;
         }
     }
-    return raw_fail(err, place_of(lines), "unknown camera model: %.*s", length < 60 ? (int)length : 60, token);
+    return raw_fail(err, place_of(lines), "unknown camera model: %.*s", length < 60 ? (int)length : 60,
+                    token);
 }
 
 static gbt_status read_cameras(const source_file *file, colmap_cameras *cameras, gbt_error *err)
@@ -118,7 +124,8 @@ static gbt_status read_cameras(const source_file *file, colmap_cameras *cameras,
         GBT_TRY(take_model(&lines, &camera.model, err));
         GBT_TRY(take_uint(&lines, "the image width", INT32_MAX, &width, err));
         GBT_TRY(take_uint(&lines, "the image height", INT32_MAX, &height, err));
-        camera.width = (int)width, camera.height = (int)height;
+        camera.width = (int)width;
+        camera.height = (int)height;
         for (int k = 0; k < gbt_camera_param_count(camera.model); k++)
             GBT_TRY(take_double(&lines, "a camera parameter", &camera.params[k], err));
         GBT_TRY(check_line_ends(&lines, "camera", err));
@@ -127,7 +134,8 @@ static gbt_status read_cameras(const source_file *file, colmap_cameras *cameras,
     return colmap_cameras_sort(cameras, file->name, err);
 }
 
-/* The second line of an image: X Y POINT3D_ID triples, possibly none. Checked, because a shifted line shows up here, and not kept. */
+/* The second line of an image: X Y POINT3D_ID triples, possibly none. Checked, because a shifted line shows
+   up here, and not kept. */
 static gbt_status check_observations(text_lines *lines, gbt_error *err)
 {
     const char *token;
@@ -139,11 +147,13 @@ static gbt_status check_observations(text_lines *lines, gbt_error *err)
             return bad_number(lines, result, "an observation", token, length, err);
     }
     if (count % 3 != 0)
-        return raw_fail(err, place_of(lines), "observations are not triples (wanted a multiple of 3 fields, got %zu)", count);
+        return raw_fail(err, place_of(lines),
+                        "observations are not triples (wanted a multiple of 3 fields, got %zu)", count);
     return GBT_OK;
 }
 
-static gbt_status read_images(const source_file *file, const colmap_cameras *cameras, raw_scene *out, gbt_error *err)
+static gbt_status read_images(const source_file *file, const colmap_cameras *cameras, raw_scene *out,
+                              gbt_error *err)
 {
     text_lines lines = lines_of(file);
     while (next_record(&lines)) {
@@ -161,8 +171,8 @@ static gbt_status read_images(const source_file *file, const colmap_cameras *cam
         GBT_TRY(take_token(&lines, "the image name", &name, &first_length, err));
         while (end > name && (end[-1] == ' ' || end[-1] == '\t' || end[-1] == '\r'))
             end--;
-        GBT_TRY(colmap_add_image(out, cameras, (uint32_t)id, quaternion, translation, (uint32_t)camera_id, name, (size_t)(end - name),
-                                 place_of(&lines), err));
+        GBT_TRY(colmap_add_image(out, cameras, (uint32_t)id, quaternion, translation, (uint32_t)camera_id,
+                                 name, (size_t)(end - name), place_of(&lines), err));
         if (next_line(&lines))
             GBT_TRY(check_observations(&lines, err));
     }
@@ -183,7 +193,7 @@ static gbt_status read_point(text_lines *lines, const colmap_image_id *images, r
         color[k] = (float)level / 255;
     }
     GBT_TRY(take_double(lines, "the error", &error, err));
-    for (const char *token; ;) {
+    for (const char *token;;) {
         size_t length;
         const char *ahead = lines->at;
         if (!number_next_token(&ahead, lines->end, &token, &length))
@@ -197,7 +207,8 @@ static gbt_status read_point(text_lines *lines, const colmap_image_id *images, r
     return GBT_OK;
 }
 
-static gbt_status read_points(const source_file *file, const colmap_image_id *images, raw_scene *out, gbt_error *err)
+static gbt_status read_points(const source_file *file, const colmap_image_id *images, raw_scene *out,
+                              gbt_error *err)
 {
     size_t count = 0;
     for (text_lines lines = lines_of(file); next_record(&lines);)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/colmap_write.c -- COLMAP models from structs: binary, or text. */
 #include "data/colmap_write.h"
 
@@ -34,12 +35,15 @@ static gbt_status check_image(const model *m, size_t i, gbt_error *err)
     gbt_error why = {0};
     const raw_place place = {"COLMAP image", '@', i};
     if (gbt_camera_param_count(im->camera.model) == 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "COLMAP image %zu: unknown camera model %d", i, (int)im->camera.model);
-    if (raw_check_name(im->name, strlen(im->name), place, &why) != GBT_OK || raw_check_camera(&im->camera, place, &why) != GBT_OK)
+        return base_fail(err, GBT_ERR_ARGUMENT, "COLMAP image %zu: unknown camera model %d", i,
+                         (int)im->camera.model);
+    if (raw_check_name(im->name, strlen(im->name), place, &why) != GBT_OK ||
+        raw_check_camera(&im->camera, place, &why) != GBT_OK)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", why.text);
     for (size_t k = 0; k < im->observation_count; k++)
         if (im->observations[k].point != COLMAP_NO_POINT && im->observations[k].point >= m->point_count)
-            return base_fail(err, GBT_ERR_ARGUMENT, "COLMAP image %zu: observation %zu has point %llu (wanted fewer than %zu)", i, k,
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "COLMAP image %zu: observation %zu has point %llu (wanted fewer than %zu)", i, k,
                              (unsigned long long)im->observations[k].point, m->point_count);
     return GBT_OK;
 }
@@ -64,13 +68,15 @@ static gbt_status prepare(model *m, gbt_error *err)
         for (size_t k = 0; k < m->points[i].track_count; k++) {
             const uint32_t *entry = m->points[i].track + 2 * k;
             if (entry[0] >= m->image_count || entry[1] >= m->images[entry[0]].observation_count)
-                return base_fail(err, GBT_ERR_ARGUMENT, "COLMAP point %zu: track entry %zu is image %u, observation %u: not there",
+                return base_fail(err, GBT_ERR_ARGUMENT,
+                                 "COLMAP point %zu: track entry %zu is image %u, observation %u: not there",
                                  i, k, entry[0], entry[1]);
         }
     return GBT_OK;
 }
 
-/* Is image `i` the first that uses its camera? Ids are given in order, so it is when no id before it is as large. */
+/* Is image `i` the first that uses its camera? Ids are given in order, so it is when no id before it is as
+   large. */
 static bool is_first_use(const model *m, size_t i, uint32_t *seen)
 {
     const bool first = m->camera_ids[i] > *seen;
@@ -87,21 +93,31 @@ static size_t camera_count(const model *m)
     return seen;
 }
 
-/* Unit quaternion w x y z, w >= 0, and translation -R c. The largest of the four is found first, so nothing small is divided by. */
+/* Unit quaternion w x y z, w >= 0, and translation -R c. The largest of the four is found first, so nothing
+   small is divided by. */
 static void pose_of(const gbt_camera *camera, double q[4], double t[3])
 {
     const double *m = camera->rotation;
-    const double squares[4] = {1 + m[0] + m[4] + m[8], 1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8], 1 - m[0] - m[4] + m[8]};
+    const double squares[4] = {1 + m[0] + m[4] + m[8], 1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8],
+                               1 - m[0] - m[4] + m[8]};
     int largest = 0;
     for (int i = 1; i < 4; i++)
         if (squares[i] > squares[largest])
             largest = i;
     const double twice = sqrt(squares[largest]), f = 0.5 / twice;
     switch (largest) {
-    case 0: q[0] = 0.5 * twice, q[1] = (m[7] - m[5]) * f, q[2] = (m[2] - m[6]) * f, q[3] = (m[3] - m[1]) * f; break;
-    case 1: q[0] = (m[7] - m[5]) * f, q[1] = 0.5 * twice, q[2] = (m[1] + m[3]) * f, q[3] = (m[2] + m[6]) * f; break;
-    case 2: q[0] = (m[2] - m[6]) * f, q[1] = (m[1] + m[3]) * f, q[2] = 0.5 * twice, q[3] = (m[5] + m[7]) * f; break;
-    default: q[0] = (m[3] - m[1]) * f, q[1] = (m[2] + m[6]) * f, q[2] = (m[5] + m[7]) * f, q[3] = 0.5 * twice; break;
+    case 0:
+        q[0] = 0.5 * twice, q[1] = (m[7] - m[5]) * f, q[2] = (m[2] - m[6]) * f, q[3] = (m[3] - m[1]) * f;
+        break;
+    case 1:
+        q[0] = (m[7] - m[5]) * f, q[1] = 0.5 * twice, q[2] = (m[1] + m[3]) * f, q[3] = (m[2] + m[6]) * f;
+        break;
+    case 2:
+        q[0] = (m[2] - m[6]) * f, q[1] = (m[1] + m[3]) * f, q[2] = 0.5 * twice, q[3] = (m[5] + m[7]) * f;
+        break;
+    default:
+        q[0] = (m[3] - m[1]) * f, q[1] = (m[2] + m[6]) * f, q[2] = (m[5] + m[7]) * f, q[3] = 0.5 * twice;
+        break;
     }
     if (q[0] < 0)
         for (int i = 0; i < 4; i++)
@@ -260,7 +276,8 @@ static void put_points_text(sink *s, const model *m)
 
 typedef void put_file(sink *s, const model *m);
 
-static gbt_status write_model(const char *folder, model *m, const char *const names[3], put_file *const writers[3], gbt_error *err)
+static gbt_status write_model(const char *folder, model *m, const char *const names[3],
+                              put_file *const writers[3], gbt_error *err)
 {
     gbt_status status = prepare(m, err);
     if (status == GBT_OK)
@@ -280,16 +297,16 @@ static gbt_status write_model(const char *folder, model *m, const char *const na
     return status;
 }
 
-gbt_status colmap_write(const char *folder, const colmap_image *images, size_t image_count, const colmap_point *points, size_t point_count,
-                        gbt_error *err)
+gbt_status colmap_write(const char *folder, const colmap_image *images, size_t image_count,
+                        const colmap_point *points, size_t point_count, gbt_error *err)
 {
     model m = {.images = images, .image_count = image_count, .points = points, .point_count = point_count};
     return write_model(folder, &m, (const char *const[3]){"cameras.bin", "images.bin", "points3D.bin"},
                        (put_file *const[3]){put_cameras, put_images, put_points}, err);
 }
 
-gbt_status colmap_write_text(const char *folder, const colmap_image *images, size_t image_count, const colmap_point *points,
-                             size_t point_count, gbt_error *err)
+gbt_status colmap_write_text(const char *folder, const colmap_image *images, size_t image_count,
+                             const colmap_point *points, size_t point_count, gbt_error *err)
 {
     model m = {.images = images, .image_count = image_count, .points = points, .point_count = point_count};
     return write_model(folder, &m, (const char *const[3]){"cameras.txt", "images.txt", "points3D.txt"},

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/colmap_write.h -- COLMAP models from structs: binary, or text. */
 #ifndef GBT_DATA_COLMAP_WRITE_H
 #define GBT_DATA_COLMAP_WRITE_H
@@ -11,7 +12,7 @@
 typedef struct colmap_point {
     double position[3]; /* world */
     unsigned char color[3];
-    double error;          /* reprojection error, pixels; -1 when unknown */
+    double error; /* reprojection error, pixels; -1 when unknown */
     uint32_t track_count;
     const uint32_t *track; /* [track_count][2]: image index (from 0), observation index within that image */
 } colmap_point;
@@ -32,17 +33,19 @@ typedef struct colmap_image {
 } colmap_image;
 
 /**
- * Write folder/cameras.bin, images.bin and points3D.bin; the folder is made when it is not there. Everything is borrowed.
+ * Write folder/cameras.bin, images.bin and points3D.bin; the folder is made when it is not there. Everything
+ * is borrowed.
  *
  * Ids are indices plus one; images with the same model, size and parameters share one camera id.
  *
  * @return GBT_OK; GBT_ERR_ARGUMENT for a bad name, camera or index; else as file_write_atomic()
  */
-gbt_status colmap_write(const char *folder, const colmap_image *images, size_t image_count, const colmap_point *points, size_t point_count,
-                        gbt_error *err);
+gbt_status colmap_write(const char *folder, const colmap_image *images, size_t image_count,
+                        const colmap_point *points, size_t point_count, gbt_error *err);
 
-/** The same as cameras.txt, images.txt and points3D.txt; doubles are written so that they read back bit for bit. */
-gbt_status colmap_write_text(const char *folder, const colmap_image *images, size_t image_count, const colmap_point *points,
-                             size_t point_count, gbt_error *err);
+/** The same as cameras.txt, images.txt and points3D.txt; doubles are written so that they read back bit for
+    bit. */
+gbt_status colmap_write_text(const char *folder, const colmap_image *images, size_t image_count,
+                             const colmap_point *points, size_t point_count, gbt_error *err);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/gaussian_cloud.c -- memory of plain Gaussians. */
 #include "data/gaussian_cloud.h"
 
@@ -14,7 +15,8 @@ gbt_status gaussian_cloud_alloc(gaussian_cloud *cloud, size_t count, gbt_error *
     cloud->quat = mem_alloc(count, 4 * sizeof(float), "Gaussian rotations", err);
     cloud->opacity = mem_alloc(count, sizeof(float), "Gaussian opacities", err);
     cloud->sh = mem_alloc(count, GAUSSIAN_SH_COUNT * 3 * sizeof(float), "Gaussian colours", err);
-    if (cloud->mean != NULL && cloud->scale_log != NULL && cloud->quat != NULL && cloud->opacity != NULL && cloud->sh != NULL)
+    if (cloud->mean != NULL && cloud->scale_log != NULL && cloud->quat != NULL && cloud->opacity != NULL &&
+        cloud->sh != NULL)
         return GBT_OK;
     gaussian_cloud_free(cloud);
     return GBT_ERR_NO_MEMORY;
@@ -32,7 +34,8 @@ void gaussian_cloud_free(gaussian_cloud *cloud)
 
 bool gaussian_limit_scales(float scale_log[3])
 {
-    const float least = fmaxf(scale_log[0], fmaxf(scale_log[1], scale_log[2])) - (float)log(GAUSSIAN_SCALE_RATIO);
+    const float least =
+        fmaxf(scale_log[0], fmaxf(scale_log[1], scale_log[2])) - (float)log(GAUSSIAN_SCALE_RATIO);
     bool changed = false;
     for (int k = 0; k < 3; k++) {
         changed = changed || scale_log[k] < least;

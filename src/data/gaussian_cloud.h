@@ -1,4 +1,6 @@
-/* data/gaussian_cloud.h -- plain 3DGS Gaussians, as files hold them: colour is a function of the direction, in spherical harmonics. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/gaussian_cloud.h -- plain 3DGS Gaussians, as files hold them: colour is a function of the direction,
+   in spherical harmonics. */
 #ifndef GBT_DATA_GAUSSIAN_CLOUD_H
 #define GBT_DATA_GAUSSIAN_CLOUD_H
 
@@ -15,11 +17,13 @@ enum { GAUSSIAN_SH_COUNT = 16 };
 /** Largest ratio of two scales of one Gaussian: canonical-space float arithmetic keeps 1/255 up to it. */
 #define GAUSSIAN_SCALE_RATIO 1e4
 
-/** Log-scales stay within +-GAUSSIAN_SCALE_LOG_LIMIT, so that scales, their inverses and the squares of both are floats. */
+/** Log-scales stay within +-GAUSSIAN_SCALE_LOG_LIMIT, so that scales, their inverses and the squares of both
+    are floats. */
 #define GAUSSIAN_SCALE_LOG_LIMIT 30
 
 /**
- * Checked and normalised. colour = max(0, 0.5 + sum sh_k Y_k(d)), d: unit, from the camera to the Gaussian (frame/sh.h). Start from {0}.
+ * Checked and normalised. colour = max(0, 0.5 + sum sh_k Y_k(d)), d: unit, from the camera to the Gaussian
+ * (frame/sh.h). Start from {0}.
  */
 typedef struct gaussian_cloud {
     size_t count;
@@ -29,7 +33,7 @@ typedef struct gaussian_cloud {
     float *opacity;   /* [count], [0, 1] */
     float *sh;        /* [count][GAUSSIAN_SH_COUNT][3], coefficient-major; those above sh_degree are 0 */
     int sh_degree;    /* 0..3 */
-    size_t dropped;            /* rows with a value that is not usable */
+    size_t dropped;   /* rows with a value that is not usable */
     size_t identity_rotations; /* zero quaternions, read as no rotation */
     size_t scales_clamped;     /* rows with a scale raised to 1e-4 of their largest */
 } gaussian_cloud;
@@ -38,7 +42,8 @@ typedef struct gaussian_cloud {
 gbt_status gaussian_cloud_alloc(gaussian_cloud *cloud, size_t count, gbt_error *err);
 void gaussian_cloud_free(gaussian_cloud *cloud);
 
-/** Raise the scales of one Gaussian to GAUSSIAN_SCALE_RATIO below their largest; true when that changed one. */
+/** Raise the scales of one Gaussian to GAUSSIAN_SCALE_RATIO below their largest; true when that changed
+    one. */
 bool gaussian_limit_scales(float scale_log[3]);
 
 #endif

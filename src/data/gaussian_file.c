@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/gaussian_file.c -- formats by the ending of a name. */
 #include "data/gaussian_file.h"
 
@@ -15,7 +16,8 @@ static const struct {
     const char *ending;
     int degree; /* of the colours it keeps */
     gbt_status (*read)(const source_file *file, gaussian_cloud *out, gbt_error *err); /* NULL: cannot */
-    gbt_status (*write)(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err);
+    gbt_status (*write)(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                        gbt_error *err);
 } formats[] = {
     {".ply", 3, gaussian_ply_read, gaussian_ply_write},
     {".splat", 0, splat_file_read, splat_file_write},
@@ -57,9 +59,10 @@ gbt_status gaussian_file_check_readable(const char *path, gbt_error *err)
     const int format = format_of(path);
     return format < 0 || formats[format].read != NULL || file_is_folder(path)
                ? GBT_OK
-               : base_fail(err, GBT_ERR_ARGUMENT, 
-                           "%s: %s is written for other programs, not read (wanted .ply, .splat, .spz, or a run)", path,
-                           formats[format].ending);
+               : base_fail(
+                     err, GBT_ERR_ARGUMENT,
+                     "%s: %s is written for other programs, not read (wanted .ply, .splat, .spz, or a run)",
+                     path, formats[format].ending);
 }
 
 bool gaussian_file_has_gaussians(const char *given)
@@ -84,8 +87,9 @@ gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error 
     result_folder folder;
     const char *path = find_file(given, &folder);
     if (path == NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: cannot be read as Gaussians (wanted .ply, .splat, .spz or a 3DGS result folder)",
-                         given);
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "%s: cannot be read as Gaussians (wanted .ply, .splat, .spz or a 3DGS result folder)", given);
     source_file file = {.name = path};
     unsigned char *bytes;
     GBT_TRY(file_read(path, &bytes, &file.size, err));
@@ -97,7 +101,9 @@ gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error 
 
 gbt_status gaussian_file_check_writable(const char *path, gbt_error *err)
 {
-    return format_of(path) >= 0 ? GBT_OK : base_fail(err, GBT_ERR_ARGUMENT, "%s: which format? (wanted .ply, .splat, .spz or .glb)", path);
+    return format_of(path) >= 0 ? GBT_OK
+                                : base_fail(err, GBT_ERR_ARGUMENT,
+                                            "%s: which format? (wanted .ply, .splat, .spz or .glb)", path);
 }
 
 int gaussian_file_degree(const char *path)
@@ -106,7 +112,8 @@ int gaussian_file_degree(const char *path)
     return format >= 0 ? formats[format].degree : 3;
 }
 
-gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)
+gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                               gbt_error *err)
 {
     GBT_TRY(gaussian_file_check_writable(path, err));
     return formats[format_of(path)].write(path, cloud, origin, err);

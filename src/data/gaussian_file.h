@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/gaussian_file.h -- plain Gaussians in whatever file people have: the format follows from the name. */
 #ifndef GBT_DATA_GAUSSIAN_FILE_H
 #define GBT_DATA_GAUSSIAN_FILE_H
@@ -6,17 +7,19 @@
 
 #include "data/gaussian_cloud.h"
 
-/** Whether gaussian_file_read() takes it: a name that ends in .ply, .splat or .spz, or a result folder of 3DGS (data/result_folder.h). */
+/** Whether gaussian_file_read() takes it: a name that ends in .ply, .splat or .spz, or a result folder of
+    3DGS (data/result_folder.h). */
 bool gaussian_file_readable(const char *path);
 
-/** gaussian_file_readable(), and a .ply is not a cloud of points or of another program's anchors: its header is looked at. */
+/** gaussian_file_readable(), and a .ply is not a cloud of points or of another program's anchors: its header
+    is looked at. */
 bool gaussian_file_has_gaussians(const char *path);
 
 /** GBT_ERR_ARGUMENT for a format that is written, and not read: .glb. GBT_OK for any other name. */
 gbt_status gaussian_file_check_readable(const char *path, gbt_error *err);
 
-/** Read a .ply, .splat or .spz, or the newest .ply of a result folder. GBT_ERR_ARGUMENT for anything else; else as its reader. Free with
-    gaussian_cloud_free(). */
+/** Read a .ply, .splat or .spz, or the newest .ply of a result folder. GBT_ERR_ARGUMENT for anything else;
+    else as its reader. Free with gaussian_cloud_free(). */
 gbt_status gaussian_file_read(const char *path, gaussian_cloud *out, gbt_error *err);
 
 /** GBT_ERR_ARGUMENT unless the name ends in .ply, .splat, .spz or .glb: before any work is done. */
@@ -26,6 +29,7 @@ gbt_status gaussian_file_check_writable(const char *path, gbt_error *err);
 int gaussian_file_degree(const char *path);
 
 /** Write one of these, atomically; `origin` is added to every mean in double. As its writer. */
-gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err);
+gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                               gbt_error *err);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/gaussian_ply.c -- plain 3DGS models from bytes. */
 #include "data/gaussian_ply.h"
 
@@ -7,7 +8,15 @@
 #include "base/file.h"
 #include "data/ply.h"
 
-enum { COLUMN_MEAN = 0, COLUMN_OPACITY = 3, COLUMN_SCALE = 4, COLUMN_ROT = 7, COLUMN_DC = 11, COLUMN_REST = 14, FIXED_COLUMNS = 14 };
+enum {
+    COLUMN_MEAN = 0,
+    COLUMN_OPACITY = 3,
+    COLUMN_SCALE = 4,
+    COLUMN_ROT = 7,
+    COLUMN_DC = 11,
+    COLUMN_REST = 14,
+    FIXED_COLUMNS = 14
+};
 
 #define VALUE_LIMIT 1e18 /* squares of anything below are floats */
 
@@ -16,10 +25,7 @@ typedef struct gaussian_rows {
     size_t rest_count; /* f_rest properties: 0, 9, 24 or 45 */
 } gaussian_rows;
 
-static double limited_log(double scale_log)
-{
-    return fmax(scale_log, -GAUSSIAN_SCALE_LOG_LIMIT);
-}
+static double limited_log(double scale_log) { return fmax(scale_log, -GAUSSIAN_SCALE_LOG_LIMIT); }
 
 /* False when the row is not usable. */
 static bool convert_row(const gaussian_rows *rows, const double *values, size_t i)
@@ -74,20 +80,26 @@ static void add_row(void *context, const double *values)
 }
 
 /* Property indices of the columns; says what is missing. */
-static gbt_status find_columns(const source_file *file, const ply_header *header, int vertex, int *columns, size_t *rest_count,
-                               gbt_error *err)
+static gbt_status find_columns(const source_file *file, const ply_header *header, int vertex, int *columns,
+                               size_t *rest_count, gbt_error *err)
 {
-    static const char *const names[FIXED_COLUMNS] = {"x",       "y",     "z",     "opacity", "scale_0", "scale_1", "scale_2",
-                                                     "rot_0",   "rot_1", "rot_2", "rot_3",   "f_dc_0",  "f_dc_1",  "f_dc_2"};
+    static const char *const names[FIXED_COLUMNS] = {"x",       "y",       "z",      "opacity", "scale_0",
+                                                     "scale_1", "scale_2", "rot_0",  "rot_1",   "rot_2",
+                                                     "rot_3",   "f_dc_0",  "f_dc_1", "f_dc_2"};
     const ply_element *e = &header->elements[vertex];
     if (ply_find_property(header, vertex, "f_anchor_feat_0") >= 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: holds anchors of a neural model, not Gaussians (see gbtrace import)", file->name);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: holds anchors of a neural model, not Gaussians (see gbtrace import)",
+                         file->name);
     if (ply_find_property(header, vertex, "f_dc_0") < 0 && ply_find_property(header, vertex, "opacity") < 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: is a point cloud, not a Gaussian model (no property f_dc_0 nor opacity)", file->name);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: is a point cloud, not a Gaussian model (no property f_dc_0 nor opacity)",
+                         file->name);
     for (int k = 0; k < FIXED_COLUMNS; k++) {
         columns[k] = ply_find_property(header, vertex, names[k]);
         if (columns[k] < 0)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: element vertex has no property %s", file->name, names[k]);
+            return base_fail(err, GBT_ERR_FORMAT, "%s: element vertex has no property %s", file->name,
+                             names[k]);
     }
     size_t rest = 0;
     for (; FIXED_COLUMNS + rest < PLY_MAX_COLUMNS; rest++) {
@@ -98,10 +110,13 @@ static gbt_status find_columns(const source_file *file, const ply_header *header
             break;
     }
     if (rest != 0 && rest != 9 && rest != 24 && rest != 45)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: wrong number of f_rest properties (wanted 0, 9, 24 or 45, got %zu)", file->name, rest);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: wrong number of f_rest properties (wanted 0, 9, 24 or 45, got %zu)", file->name,
+                         rest);
     for (size_t k = 0; k < FIXED_COLUMNS + rest; k++)
         if (header->properties[e->first_property + (size_t)columns[k]].is_list)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: property %zu of the Gaussians is a list", file->name, k);
+            return base_fail(err, GBT_ERR_FORMAT, "%s: property %zu of the Gaussians is a list", file->name,
+                             k);
     *rest_count = rest;
     return GBT_OK;
 }
@@ -120,15 +135,18 @@ gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_e
     /* A column takes at least a byte, so this bounds the memory by a small multiple of the file. */
     const uint64_t row_count = header.elements[vertex].count, least_bytes = FIXED_COLUMNS + rows.rest_count;
     if (row_count > (file->size - header.data_at) / least_bytes)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu Gaussians cannot be in the %zu bytes that follow", file->name, header.data_at,
-                         (unsigned long long)row_count, file->size - header.data_at);
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu Gaussians cannot be in the %zu bytes that follow",
+                         file->name, header.data_at, (unsigned long long)row_count,
+                         file->size - header.data_at);
     gbt_status status = gaussian_cloud_alloc(out, (size_t)row_count, err);
     out->count = 0; /* of rows that are usable */
     out->sh_degree = rows.rest_count == 45 ? 3 : rows.rest_count == 24 ? 2 : rows.rest_count == 9 ? 1 : 0;
     if (status == GBT_OK)
-        status = ply_read_rows(file, &header, vertex, columns, FIXED_COLUMNS + rows.rest_count, add_row, &rows, err);
+        status = ply_read_rows(file, &header, vertex, columns, FIXED_COLUMNS + rows.rest_count, add_row,
+                               &rows, err);
     if (status == GBT_OK && out->count == 0)
-        status = base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu rows dropped)", file->name, out->dropped);
+        status = base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu rows dropped)", file->name,
+                           out->dropped);
     if (status != GBT_OK)
         gaussian_cloud_free(out);
     return status;
@@ -140,7 +158,8 @@ bool gaussian_ply_has_gaussians(const source_file *file)
     if (ply_read_header(file, &header, NULL) != GBT_OK)
         return false;
     const int vertex = ply_find_element(&header, "vertex");
-    return vertex >= 0 && ply_find_property(&header, vertex, "f_dc_0") >= 0 && ply_find_property(&header, vertex, "rot_0") >= 0;
+    return vertex >= 0 && ply_find_property(&header, vertex, "f_dc_0") >= 0 &&
+           ply_find_property(&header, vertex, "rot_0") >= 0;
 }
 
 gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *err)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/gaussian_ply.h -- plain 3DGS models (.ply with f_dc, f_rest, opacity, scale and rot) from bytes. */
 #ifndef GBT_DATA_GAUSSIAN_PLY_H
 #define GBT_DATA_GAUSSIAN_PLY_H
@@ -8,8 +9,9 @@
 /**
  * Read a 3DGS .ply: any property order and types, extra properties ignored, ASCII or binary.
  *
- * colour = max(0, 0.5 + sum sh_k Y_k). A row is dropped when a value is NaN or infinite; but an opacity logit of +-inf is 1 or 0 and a
- * log-scale of -inf is a flat axis, both as exporters write them. A log-scale above GAUSSIAN_SCALE_LOG_LIMIT also drops the row.
+ * colour = max(0, 0.5 + sum sh_k Y_k). A row is dropped when a value is NaN or infinite; but an opacity logit
+ * of +-inf is 1 or 0 and a log-scale of -inf is a flat axis, both as exporters write them. A log-scale above
+ * GAUSSIAN_SCALE_LOG_LIMIT also drops the row.
  *
  * @param out [out] free with gaussian_cloud_free(); zeroed on failure
  * @return GBT_OK; GBT_ERR_FORMAT also when no Gaussian remains; GBT_ERR_NO_MEMORY
@@ -24,10 +26,12 @@ gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *e
 bool gaussian_ply_has_gaussians(const source_file *file);
 
 /**
- * Write one as the reference implementation does: binary, normals of 0, f_rest channel-major, opacity as a logit, scales as logs.
+ * Write one as the reference implementation does: binary, normals of 0, f_rest channel-major, opacity as a
+ * logit, scales as logs.
  *
  * @param origin [in] added to every mean in double
  */
-gbt_status gaussian_ply_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err);
+gbt_status gaussian_ply_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                              gbt_error *err);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/gaussian_ply_write.c -- plain 3DGS models as the .ply that every viewer reads. */
 #include <math.h>
 #include <stdio.h>
@@ -21,14 +22,16 @@ static void put_properties(sink *s, const char *stem, size_t count)
     }
 }
 
-gbt_status gaussian_ply_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)
+gbt_status gaussian_ply_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                              gbt_error *err)
 {
     const size_t functions = (size_t)((cloud->sh_degree + 1) * (cloud->sh_degree + 1));
     sink s = {.err = err};
     char line[128];
     snprintf(line, sizeof line, "ply\nformat binary_little_endian 1.0\nelement vertex %zu\n", cloud->count);
     sink_put_text(&s, line);
-    sink_put_text(&s, "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\n");
+    sink_put_text(&s, "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty "
+                      "float ny\nproperty float nz\n");
     put_properties(&s, "f_dc_", 3);
     put_properties(&s, "f_rest_", 3 * (functions - 1));
     sink_put_text(&s, "property float opacity\n");

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/glb_file.c -- glTF's JSON chunk and its binary chunk: one array after the other, each an accessor. */
 #include "data/glb_file.h"
 
@@ -9,7 +10,14 @@
 #include "base/file.h"
 #include "data/bytes.h"
 
-enum { GLB_MAGIC = 0x46546C67, CHUNK_JSON = 0x4E4F534A, CHUNK_BIN = 0x004E4942, TYPE_UBYTE = 5121, TYPE_FLOAT = 5126, MODE_POINTS = 0 };
+enum {
+    GLB_MAGIC = 0x46546C67,
+    CHUNK_JSON = 0x4E4F534A,
+    CHUNK_BIN = 0x004E4942,
+    TYPE_UBYTE = 5121,
+    TYPE_FLOAT = 5126,
+    MODE_POINTS = 0
+};
 
 typedef struct glb {
     sink data; /* the binary chunk */
@@ -20,10 +28,10 @@ typedef struct glb {
 /* What was put into the binary chunk since `from` is an attribute. */
 static json_t *add_attribute(glb *g, const char *name, const char *type, int component, size_t from)
 {
-    json_t *accessor = json_pack("{s:i,s:i,s:I,s:s}", "bufferView", (int)json_array_size(g->views), "componentType", component, "count",
-                                 (json_int_t)g->count, "type", type);
-    json_array_append_new(g->views, json_pack("{s:i,s:I,s:I}", "buffer", 0, "byteOffset", (json_int_t)from, "byteLength",
-                                              (json_int_t)(g->data.size - from)));
+    json_t *accessor = json_pack("{s:i,s:i,s:I,s:s}", "bufferView", (int)json_array_size(g->views),
+                                 "componentType", component, "count", (json_int_t)g->count, "type", type);
+    json_array_append_new(g->views, json_pack("{s:i,s:I,s:I}", "buffer", 0, "byteOffset", (json_int_t)from,
+                                              "byteLength", (json_int_t)(g->data.size - from)));
     json_object_set_new(g->attributes, name, json_integer((json_int_t)json_array_size(g->accessors)));
     json_array_append_new(g->accessors, accessor);
     return accessor;
@@ -36,11 +44,13 @@ static void put_positions(glb *g, const gaussian_cloud *cloud, const double orig
     for (size_t i = 0; i < 3 * cloud->count; i++) {
         const double world = (double)cloud->mean[i] + origin[i % 3];
         const float turned = (float)(i % 3 < 2 ? -world : world);
-        low[i % 3] = fmin(low[i % 3], (double)turned), high[i % 3] = fmax(high[i % 3], (double)turned);
+        low[i % 3] = fmin(low[i % 3], (double)turned);
+        high[i % 3] = fmax(high[i % 3], (double)turned);
         sink_put_f32(&g->data, turned);
     }
     json_t *accessor = add_attribute(g, "POSITION", "VEC3", TYPE_FLOAT, from);
-    json_object_set_new(accessor, "min", json_pack("[f,f,f]", low[0], low[1], low[2])); /* glTF wants them, exactly */
+    json_object_set_new(accessor, "min", json_pack("[f,f,f]", low[0], low[1], low[2])); /* glTF wants them,
+                                                                                           exactly */
     json_object_set_new(accessor, "max", json_pack("[f,f,f]", high[0], high[1], high[2]));
 }
 
@@ -99,21 +109,25 @@ static void put_harmonics(glb *g, const gaussian_cloud *cloud)
 
 static json_t *document(const glb *g)
 {
-    json_t *primitive = json_pack("{s:i,s:O,s:{s:{s:s,s:s,s:s,s:s}}}", "mode", (int)MODE_POINTS, "attributes", g->attributes, "extensions",
-                                  "KHR_gaussian_splatting", "kernel", "ellipse", "colorSpace", "srgb_rec709_display", "sortingMethod",
-                                  "cameraDistance", "projection", "perspective");
-    return json_pack("{s:{s:s,s:s},s:[s],s:[{s:I}],s:O,s:O,s:[{s:[o]}],s:[{s:i}],s:[{s:[i]}],s:i}", "asset", "version", "2.0", "generator",
-                     "gbtrace", "extensionsUsed", "KHR_gaussian_splatting", "buffers", "byteLength", (json_int_t)g->data.size,
-                     "bufferViews", g->views, "accessors", g->accessors, "meshes", "primitives", primitive, "nodes", "mesh", 0, "scenes",
-                     "nodes", 0, "scene", 0);
+    json_t *primitive =
+        json_pack("{s:i,s:O,s:{s:{s:s,s:s,s:s,s:s}}}", "mode", (int)MODE_POINTS, "attributes", g->attributes,
+                  "extensions", "KHR_gaussian_splatting", "kernel", "ellipse", "colorSpace",
+                  "srgb_rec709_display", "sortingMethod", "cameraDistance", "projection", "perspective");
+    return json_pack("{s:{s:s,s:s},s:[s],s:[{s:I}],s:O,s:O,s:[{s:[o]}],s:[{s:i}],s:[{s:[i]}],s:i}", "asset",
+                     "version", "2.0", "generator", "gbtrace", "extensionsUsed", "KHR_gaussian_splatting",
+                     "buffers", "byteLength", (json_int_t)g->data.size, "bufferViews", g->views, "accessors",
+                     g->accessors, "meshes", "primitives", primitive, "nodes", "mesh", 0, "scenes", "nodes",
+                     0, "scene", 0);
 }
 
 static gbt_status write_chunks(const char *path, const glb *g, const char *json, gbt_error *err)
 {
-    const size_t json_size = strlen(json), json_padded = (json_size + 3) / 4 * 4, data_padded = (g->data.size + 3) / 4 * 4;
+    const size_t json_size = strlen(json), json_padded = (json_size + 3) / 4 * 4,
+                 data_padded = (g->data.size + 3) / 4 * 4;
     const size_t total = 12 + 8 + json_padded + 8 + data_padded;
     if (total > UINT32_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu bytes are too many for a .glb file (limit 4 GiB)", path, total);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu bytes are too many for a .glb file (limit 4 GiB)",
+                         path, total);
     sink s = {.err = err};
     const uint32_t head[5] = {GLB_MAGIC, 2, (uint32_t)total, (uint32_t)json_padded, CHUNK_JSON};
     for (int i = 0; i < 5; i++)
@@ -133,17 +147,24 @@ static gbt_status write_chunks(const char *path, const glb *g, const char *json,
     return status;
 }
 
-gbt_status glb_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)
+gbt_status glb_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                          gbt_error *err)
 {
-    glb g = {.data.err = err, .attributes = json_object(), .accessors = json_array(), .views = json_array(), .count = cloud->count};
+    glb g = {.data.err = err,
+             .attributes = json_object(),
+             .accessors = json_array(),
+             .views = json_array(),
+             .count = cloud->count};
     put_positions(&g, cloud, origin);
     put_shape(&g, cloud);
     put_harmonics(&g, cloud);
     gbt_status status = g.data.status;
     if (status == GBT_OK) {
         json_t *root = document(&g);
-        char *json = root == NULL ? NULL : json_dumps(root, JSON_COMPACT | JSON_SORT_KEYS | JSON_REAL_PRECISION(17));
-        status = json == NULL ? base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path) : write_chunks(path, &g, json, err);
+        char *json =
+            root == NULL ? NULL : json_dumps(root, JSON_COMPACT | JSON_SORT_KEYS | JSON_REAL_PRECISION(17));
+        status = json == NULL ? base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path)
+                              : write_chunks(path, &g, json, err);
         free(json);
         json_decref(root);
     }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/json_fields.c -- the fields of a JSON file, checked one by one. */
 #include "data/json_fields.h"
 
@@ -49,9 +50,10 @@ gbt_status json_field_names(const json_fields *r, const char *names)
     {
         char padded[64];
         const int length = snprintf(padded, sizeof padded, " %s ", key);
-        if (length >= (int)sizeof padded || length < 3 || strchr(key, ' ') != NULL || strstr(names, padded) == NULL)
-            return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%.60s: unknown field (wanted one of%.*s)", r->path, r->prefix, key,
-                             (int)strlen(names) - 1, names);
+        if (length >= (int)sizeof padded || length < 3 || strchr(key, ' ') != NULL ||
+            strstr(names, padded) == NULL)
+            return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%.60s: unknown field (wanted one of%.*s)",
+                             r->path, r->prefix, key, (int)strlen(names) - 1, names);
     }
     return GBT_OK;
 }
@@ -72,15 +74,16 @@ gbt_status json_field_vector(const json_fields *r, const char *field, bool neede
     return GBT_OK;
 }
 
-gbt_status json_field_number(const json_fields *r, const char *field, double low, bool closed, double high, double *out)
+gbt_status json_field_number(const json_fields *r, const char *field, double low, bool closed, double high,
+                             double *out)
 {
     const json_t *value = json_object_get(r->object, field);
     if (value == NULL)
         return GBT_OK;
     const double number = json_number_value(value);
     if (!json_is_number(value) || !(closed ? number >= low : number > low) || !(number <= high))
-        return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: wanted a number in %c%g, %g]", r->path, r->prefix, field, closed ? '[' : '(',
-                         low, high);
+        return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: wanted a number in %c%g, %g]", r->path, r->prefix,
+                         field, closed ? '[' : '(', low, high);
     *out = number;
     return GBT_OK;
 }
@@ -92,12 +95,14 @@ gbt_status json_field_whole(const json_fields *r, const char *field, int low, in
         return GBT_OK;
     const json_int_t number = json_integer_value(value);
     if (!json_is_integer(value) || number < low || number > high)
-        return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: wanted a whole number in [%d, %d]", r->path, r->prefix, field, low, high);
+        return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: wanted a whole number in [%d, %d]", r->path,
+                         r->prefix, field, low, high);
     *out = (int)number;
     return GBT_OK;
 }
 
-gbt_status json_field_choice(const json_fields *r, const char *field, const char *const *choices, int count, int *out)
+gbt_status json_field_choice(const json_fields *r, const char *field, const char *const *choices, int count,
+                             int *out)
 {
     const json_t *value = json_object_get(r->object, field);
     char list[160] = "";
@@ -115,8 +120,9 @@ gbt_status json_field_choice(const json_fields *r, const char *field, const char
 
 gbt_status json_field_needed(const json_fields *r, const char *field, const char *why)
 {
-    return json_field_given(r, field) ? GBT_OK : base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: missing (%s)", r->path, r->prefix, field,
-                                                           why);
+    return json_field_given(r, field)
+               ? GBT_OK
+               : base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: missing (%s)", r->path, r->prefix, field, why);
 }
 
 gbt_status json_field_bool(const json_fields *r, const char *field, bool *out)
@@ -129,11 +135,13 @@ gbt_status json_field_bool(const json_fields *r, const char *field, bool *out)
     return GBT_OK;
 }
 
-gbt_status json_field_file(const json_fields *r, const char *field, const char *what, char out[JSON_PATH_SIZE])
+gbt_status json_field_file(const json_fields *r, const char *field, const char *what,
+                           char out[JSON_PATH_SIZE])
 {
     const char *name = json_string_value(json_object_get(r->object, field)), *slash = strrchr(r->path, '/');
     if (name == NULL || name[0] == '\0')
-        return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: wanted the name of %s", r->path, r->prefix, field, what);
+        return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s%s: wanted the name of %s", r->path, r->prefix, field,
+                         what);
     const int folder_length = slash == NULL || name[0] == '/' ? 0 : (int)(slash - r->path) + 1;
     if (snprintf(out, JSON_PATH_SIZE, "%.*s%s", folder_length, r->path, name) >= JSON_PATH_SIZE)
         return json_field_fail(r, field, "name is too long");

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/json_out.c -- finished JSON to a stream or a file. */
 #include "data/json_out.h"
 
@@ -28,10 +29,7 @@ json_t *json_text(const char *text)
     return value;
 }
 
-json_t *json_number(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
+json_t *json_number(double value) { return isfinite(value) ? json_real(value) : json_null(); }
 
 static char *dump(const json_t *value, gbt_error *err)
 {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/json_out.h -- finished JSON to a stream or a file; texts from outside made safe for it. */
 #ifndef GBT_DATA_JSON_OUT_H
 #define GBT_DATA_JSON_OUT_H
@@ -13,7 +14,8 @@ json_t *json_text(const char *text);
 /** A JSON number; null for what JSON has no number for: NaN, infinities. */
 json_t *json_number(double value);
 
-/** Indented, keys in the order they were set, one newline at the end. NULL, as failed json_pack() gives, is GBT_ERR_NO_MEMORY. */
+/** Indented, keys in the order they were set, one newline at the end. NULL, as failed json_pack() gives, is
+    GBT_ERR_NO_MEMORY. */
 gbt_status json_print(const json_t *value, FILE *out, gbt_error *err);
 gbt_status json_save(const json_t *value, const char *path, gbt_error *err); /* atomically */
 

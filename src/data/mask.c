@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/mask.c -- masks and alpha channels to marks of pixels. */
 #include "data/mask.h"
 
@@ -21,7 +22,8 @@ static void combine(unsigned char *marks, size_t count, unsigned char **valid)
 }
 
 /* 1 where `channel` has at least `least`. */
-static gbt_status mark_pixels(const image *im, size_t channel, float least, unsigned char **out, gbt_error *err)
+static gbt_status mark_pixels(const image *im, size_t channel, float least, unsigned char **out,
+                              gbt_error *err)
 {
     const size_t count = (size_t)im->width * (size_t)im->height, channels = (size_t)im->channels;
     *out = mem_alloc(count, 1, "valid pixels", err);
@@ -46,8 +48,10 @@ static gbt_status read_marks(const char *path, const image *photo, unsigned char
     GBT_TRY(image_read(path, &mask, err));
     gbt_status status = GBT_OK;
     if (!photo_same_aspect(mask.width, mask.height, photo->width, photo->height))
-        status = base_fail(err, GBT_ERR_FORMAT, "%s: mask does not have the photo's aspect (wanted %d x %d or a multiple, got %d x %d)",
-                           path, photo->width, photo->height, mask.width, mask.height);
+        status =
+            base_fail(err, GBT_ERR_FORMAT,
+                      "%s: mask does not have the photo's aspect (wanted %d x %d or a multiple, got %d x %d)",
+                      path, photo->width, photo->height, mask.width, mask.height);
     if (status == GBT_OK)
         status = mark_pixels(&mask, 0, half_of_largest(&mask), out, err);
     if (status == GBT_OK && (mask.width != photo->width || mask.height != photo->height)) {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/mesh_file.c -- triangle meshes from OBJ and PLY bytes. */
 #include "data/mesh_file.h"
 
@@ -15,15 +16,16 @@ static gbt_status add_vertex(mesh_data *out, const double position[3], raw_place
         return raw_fail(err, place, "too many vertices (at most %u)", UINT32_MAX - 1);
     for (int k = 0; k < 3; k++)
         if (!(fabs(position[k]) <= RAW_COORDINATE_LIMIT))
-            return raw_fail(err, place, "vertex %zu: bad coordinate (wanted |x| <= %g, got %g)", out->vertex_count, RAW_COORDINATE_LIMIT,
-                            position[k]);
-    GBT_TRY(mem_reserve((void **)&out->position, &out->vertex_capacity, out->vertex_count, out->vertex_count + 1, 3 * sizeof *out->position,
-                        "mesh", err));
+            return raw_fail(err, place, "vertex %zu: bad coordinate (wanted |x| <= %g, got %g)",
+                            out->vertex_count, RAW_COORDINATE_LIMIT, position[k]);
+    GBT_TRY(mem_reserve((void **)&out->position, &out->vertex_capacity, out->vertex_count,
+                        out->vertex_count + 1, 3 * sizeof *out->position, "mesh", err));
     memcpy(out->position + 3 * out->vertex_count++, position, 3 * sizeof *position);
     return GBT_OK;
 }
 
-/* A polygon while its corners come in: from the third on, each makes a triangle with the first and the one before. */
+/* A polygon while its corners come in: from the third on, each makes a triangle with the first and the one
+   before. */
 typedef struct fan {
     size_t count;
     uint32_t first, last;
@@ -36,32 +38,37 @@ static gbt_status add_corner(mesh_data *out, fan *f, uint32_t corner, raw_place 
     if (f->count++ >= 2) {
         if (out->triangle_count >= UINT32_MAX - 1)
             return raw_fail(err, place, "too many triangles (at most %u)", UINT32_MAX - 1);
-        GBT_TRY(mem_reserve((void **)&out->triangles, &out->triangle_capacity, out->triangle_count, out->triangle_count + 1,
-                            3 * sizeof *out->triangles, "mesh", err));
+        GBT_TRY(mem_reserve((void **)&out->triangles, &out->triangle_capacity, out->triangle_count,
+                            out->triangle_count + 1, 3 * sizeof *out->triangles, "mesh", err));
         uint32_t *triangle = out->triangles + 3 * out->triangle_count++;
-        triangle[0] = f->first, triangle[1] = f->last, triangle[2] = corner;
+        triangle[0] = f->first;
+        triangle[1] = f->last;
+        triangle[2] = corner;
     }
     f->last = corner;
     return GBT_OK;
 }
 
-/* ---- OBJ ----------------------------------------------------------------------------------------------------------------------------- */
+/* ---- OBJ ---- */
 
-static gbt_status take_vertex(mesh_data *out, const char *at, const char *end, raw_place place, gbt_error *err)
+static gbt_status take_vertex(mesh_data *out, const char *at, const char *end, raw_place place,
+                              gbt_error *err)
 {
     const char *token;
     size_t length, count = 0;
     double position[3];
     for (; count < 3 && number_next_token(&at, end, &token, &length); count++)
         if (number_parse_double(token, length, &position[count]) != NUMBER_OK)
-            return raw_fail(err, place, "not a coordinate: %.*s", length < TOKEN_SHOWN ? (int)length : TOKEN_SHOWN, token);
+            return raw_fail(err, place, "not a coordinate: %.*s",
+                            length < TOKEN_SHOWN ? (int)length : TOKEN_SHOWN, token);
     if (count < 3)
         return raw_fail(err, place, "vertex of %zu coordinates (wanted 3)", count);
     return add_vertex(out, position, place, err);
 }
 
 /* "7", "-1/2", "3//4": the number before the first slash, as an index from 0. */
-static gbt_status parse_corner(const mesh_data *mesh, const char *token, size_t length, raw_place place, uint32_t *out, gbt_error *err)
+static gbt_status parse_corner(const mesh_data *mesh, const char *token, size_t length, raw_place place,
+                               uint32_t *out, gbt_error *err)
 {
     const char *slash = memchr(token, '/', length);
     const bool back = token[0] == '-';
@@ -72,7 +79,8 @@ static gbt_status parse_corner(const mesh_data *mesh, const char *token, size_t 
     if (result == NUMBER_BAD)
         return raw_fail(err, place, "not a corner of a face: %.*s", shown, token);
     if (result == NUMBER_RANGE || number == 0 || number > mesh->vertex_count)
-        return raw_fail(err, place, "no such vertex: %.*s (there are %zu so far)", shown, token, mesh->vertex_count);
+        return raw_fail(err, place, "no such vertex: %.*s (there are %zu so far)", shown, token,
+                        mesh->vertex_count);
     *out = (uint32_t)(back ? mesh->vertex_count - number : number - 1);
     return GBT_OK;
 }
@@ -92,8 +100,10 @@ static gbt_status take_face(mesh_data *out, const char *at, const char *end, raw
 
 static bool is_passed_over(const char *word, size_t length)
 {
-    static const char *const words[] = {"vt", "vn", "vp", "g", "o", "s", "mg", "l", "p", "usemtl", "mtllib", "usemap", "maplib", "bevel",
-                                        "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj"};
+    static const char *const words[] = {"vt",       "vn",     "vp",         "g",        "o",
+                                        "s",        "mg",     "l",          "p",        "usemtl",
+                                        "mtllib",   "usemap", "maplib",     "bevel",    "c_interp",
+                                        "d_interp", "lod",    "shadow_obj", "trace_obj"};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (strlen(words[i]) == length && memcmp(words[i], word, length) == 0)
             return true;
@@ -106,7 +116,8 @@ static gbt_status parse_obj(const source_file *file, mesh_data *out, gbt_error *
     size_t length;
     raw_place place = {file->name, ':', 0};
     while (at < end) {
-        const char *newline = memchr(at, '\n', (size_t)(end - at)), *line = at, *line_end = newline != NULL ? newline : end;
+        const char *newline = memchr(at, '\n', (size_t)(end - at)), *line = at,
+                   *line_end = newline != NULL ? newline : end;
         at = newline != NULL ? newline + 1 : end;
         place.at++;
         if (!number_next_token(&line, line_end, &word, &length) || is_passed_over(word, length))
@@ -116,12 +127,13 @@ static gbt_status parse_obj(const source_file *file, mesh_data *out, gbt_error *
         else if (length == 1 && word[0] == 'f')
             GBT_TRY(take_face(out, line, line_end, place, err));
         else
-            return raw_fail(err, place, "not a line of an OBJ mesh: %.*s", length < TOKEN_SHOWN ? (int)length : TOKEN_SHOWN, word);
+            return raw_fail(err, place, "not a line of an OBJ mesh: %.*s",
+                            length < TOKEN_SHOWN ? (int)length : TOKEN_SHOWN, word);
     }
     return GBT_OK;
 }
 
-/* ---- PLY ----------------------------------------------------------------------------------------------------------------------------- */
+/* ---- PLY ---- */
 
 typedef struct ply_mesh {
     mesh_data *out;
@@ -146,7 +158,8 @@ static gbt_status add_ply_face(void *context, const double *items, size_t count,
         return raw_fail(err, m->place, "face %zu of %zu corners (wanted 3 or more)", face, count);
     for (size_t i = 0; i < count; i++) {
         if (!(items[i] >= 0 && items[i] < (double)m->out->vertex_count && items[i] == floor(items[i])))
-            return raw_fail(err, m->place, "face %zu: no such vertex: %g (there are %zu)", face, items[i], m->out->vertex_count);
+            return raw_fail(err, m->place, "face %zu: no such vertex: %g (there are %zu)", face, items[i],
+                            m->out->vertex_count);
         GBT_TRY(add_corner(m->out, &f, (uint32_t)items[i], m->place, err));
     }
     return GBT_OK;
@@ -159,12 +172,15 @@ static gbt_status parse_ply(const source_file *file, mesh_data *out, gbt_error *
     GBT_TRY(ply_read_header(file, &header, err));
     const int vertex = ply_find_element(&header, "vertex"), face = ply_find_element(&header, "face");
     if (vertex < 0 || face < 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no element %s in the header", file->name, vertex < 0 ? "vertex" : "face");
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no element %s in the header", file->name,
+                         vertex < 0 ? "vertex" : "face");
     int columns[3], list = ply_find_property(&header, face, "vertex_indices");
     for (int k = 0; k < 3; k++) {
         columns[k] = ply_find_property(&header, vertex, names[k]);
-        if (columns[k] < 0 || header.properties[header.elements[vertex].first_property + (size_t)columns[k]].is_list)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: element vertex has no property %s", file->name, names[k]);
+        if (columns[k] < 0 ||
+            header.properties[header.elements[vertex].first_property + (size_t)columns[k]].is_list)
+            return base_fail(err, GBT_ERR_FORMAT, "%s: element vertex has no property %s", file->name,
+                             names[k]);
     }
     list = list < 0 ? ply_find_property(&header, face, "vertex_index") : list;
     if (list < 0 || !header.properties[header.elements[face].first_property + (size_t)list].is_list)
@@ -180,7 +196,8 @@ gbt_status mesh_file_parse(const source_file *file, mesh_data *out, gbt_error *e
     const bool is_ply = file->size >= 3 && memcmp(file->bytes, "ply", 3) == 0;
     GBT_TRY(is_ply ? parse_ply(file, out, err) : parse_obj(file, out, err));
     if (out->triangle_count == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no triangles in it (wanted an OBJ or PLY mesh)", file->name);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no triangles in it (wanted an OBJ or PLY mesh)",
+                         file->name);
     return GBT_OK;
 }
 

@@ -1,4 +1,6 @@
-/* data/mesh_file.h -- triangle meshes from Wavefront OBJ and PLY files: positions and triangles, nothing else. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/mesh_file.h -- triangle meshes from Wavefront OBJ and PLY files: positions and triangles, nothing
+   else. */
 #ifndef GBT_DATA_MESH_FILE_H
 #define GBT_DATA_MESH_FILE_H
 
@@ -11,11 +13,13 @@ typedef struct mesh_data {
 } mesh_data;
 
 /**
- * Read a mesh file: PLY if it begins with "ply", else OBJ. Polygons become fans of triangles around their first corner.
+ * Read a mesh file: PLY if it begins with "ply", else OBJ. Polygons become fans of triangles around their
+ * first corner.
  *
- * OBJ: `v` (what follows the first three numbers is not used) and `f` (corners as 1, 1/2, 1//3 or 1/2/3; negative numbers count back from
- * the last vertex so far); texture coordinates, normals, groups, materials, lines and points are passed over; curves and surfaces, and
- * anything else, are an error. PLY: x y z of element vertex, and the list vertex_indices or vertex_index of element face.
+ * OBJ: `v` (what follows the first three numbers is not used) and `f` (corners as 1, 1/2, 1//3 or 1/2/3;
+ * negative numbers count back from the last vertex so far); texture coordinates, normals, groups, materials,
+ * lines and points are passed over; curves and surfaces, and anything else, are an error. PLY: x y z of
+ * element vertex, and the list vertex_indices or vertex_index of element face.
  *
  * @param out [out] free with mesh_data_free() after success or failure; at least one triangle
  * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT ("FILE:LINE: what was wrong"), GBT_ERR_NO_MEMORY

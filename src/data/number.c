@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/number.c -- numbers from and to text, the same in every locale. */
 #include "data/number.h"
 
@@ -10,15 +11,9 @@
 
 enum { TOKEN_LIMIT = 1024 }; /* the exact value of any double has fewer digits than this */
 
-static bool is_blank(char c)
-{
-    return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
-}
+static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
 
-static bool is_digit(char c)
-{
-    return c >= '0' && c <= '9';
-}
+static bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 bool number_next_token(const char **at, const char *end, const char **token, size_t *length)
 {
@@ -35,16 +30,19 @@ bool number_next_token(const char **at, const char *end, const char **token, siz
 
 static number_result parse_named(const char *text, size_t length, bool negative, double *out)
 {
-    if ((length == 3 && strncasecmp(text, "inf", 3) == 0) || (length == 8 && strncasecmp(text, "infinity", 8) == 0))
+    if ((length == 3 && strncasecmp(text, "inf", 3) == 0) ||
+        (length == 8 && strncasecmp(text, "infinity", 8) == 0))
         *out = negative ? -(double)INFINITY : (double)INFINITY;
-    else if (length >= 3 && strncasecmp(text, "nan", 3) == 0 && (length == 3 || (text[3] == '(' && text[length - 1] == ')')))
+    else if (length >= 3 && strncasecmp(text, "nan", 3) == 0 &&
+             (length == 3 || (text[3] == '(' && text[length - 1] == ')')))
         *out = (double)NAN;
     else
         return NUMBER_BAD;
     return NUMBER_OK;
 }
 
-/* The slow way, for long or extreme numbers; the grammar is already checked, the C locale makes the point a point. */
+/* The slow way, for long or extreme numbers; the grammar is already checked, the C locale makes the point a
+   point. */
 static number_result parse_exactly(const char *text, size_t length, double *out)
 {
     char copy[TOKEN_LIMIT + 1];
@@ -107,7 +105,8 @@ number_result number_parse_double(const char *text, size_t length, double *out)
         return NUMBER_BAD;
     /* Both factors are exact doubles, so one rounding gives the correctly rounded quotient or product. */
     if (used_digits <= 19 && mantissa <= (UINT64_C(1) << 53) && exponent >= -22 && exponent <= 22) {
-        const double value = exponent < 0 ? (double)mantissa / powers[-exponent] : (double)mantissa * powers[exponent];
+        const double value =
+            exponent < 0 ? (double)mantissa / powers[-exponent] : (double)mantissa * powers[exponent];
         *out = negative ? -value : value;
         return NUMBER_OK;
     }
@@ -137,7 +136,8 @@ void number_format_double(double value, char out[NUMBER_TEXT_SIZE])
     for (int digits = 15; digits <= 17; digits++) {
         char text[NUMBER_TEXT_SIZE];
         snprintf(text, sizeof text, "%.*g", digits, value);
-        /* The host may have set a locale: whatever its decimal separator is (one byte or several), it becomes one '.'. */
+        /* The host may have set a locale: whatever its decimal separator is (one byte or several), it becomes
+           one '.'. */
         size_t used = 0;
         bool in_separator = false;
         for (const char *c = text; *c != '\0'; c++) {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/number.h -- numbers from and to text, the same in every locale. */
 #ifndef GBT_DATA_NUMBER_H
 #define GBT_DATA_NUMBER_H
@@ -14,8 +15,9 @@ bool number_next_token(const char **at, const char *end, const char **token, siz
 /**
  * A whole token as a double, correctly rounded.
  *
- * Decimal digits with an optional point and exponent; also nan, nan(...), inf and infinity with a sign, as C libraries print them.
- * NUMBER_RANGE when the value overflows (1e999). Hexadecimal, a decimal comma and anything behind the number are NUMBER_BAD.
+ * Decimal digits with an optional point and exponent; also nan, nan(...), inf and infinity with a sign, as C
+ * libraries print them. NUMBER_RANGE when the value overflows (1e999). Hexadecimal, a decimal comma and
+ * anything behind the number are NUMBER_BAD.
  */
 number_result number_parse_double(const char *text, size_t length, double *out);
 

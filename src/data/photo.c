@@ -1,4 +1,6 @@
-/* data/photo.c -- a photo as training wants it: three channels, alpha on a colour, area-averaged to the size asked for. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/photo.c -- a photo as training wants it: three channels, alpha on a colour, area-averaged to the size
+   asked for. */
 #include "data/photo.h"
 
 #include <math.h>
@@ -8,8 +10,8 @@
 #include "base/memory.h"
 #include "data/mask.h"
 
-/* The input pixels under output pixel i of `out_count`, and how much of each. Edges are integers in units of 1 / out_count input pixels, so
-   that weights are exact and sum to in_count exactly. */
+/* The input pixels under output pixel i of `out_count`, and how much of each. Edges are integers in units of
+   1 / out_count input pixels, so that weights are exact and sum to in_count exactly. */
 typedef struct box {
     uint64_t begin, end; /* input pixels [begin / out_count, ...) while pixel * out_count < end */
     uint64_t out_count;
@@ -17,7 +19,8 @@ typedef struct box {
 
 static box box_of(size_t i, size_t in_count, size_t out_count)
 {
-    return (box){.begin = (uint64_t)i * in_count, .end = (uint64_t)i * in_count + in_count, .out_count = out_count};
+    return (box){
+        .begin = (uint64_t)i * in_count, .end = (uint64_t)i * in_count + in_count, .out_count = out_count};
 }
 
 static double box_weight(const box *b, uint64_t pixel)
@@ -44,7 +47,8 @@ static void narrow_row(const float *in, size_t in_count, size_t channels, float 
 }
 
 /* Row i of the output from rows of `values` numbers; `sum` is scratch. */
-static void lower_row(const float *in, size_t in_count, size_t values, double *sum, float *out, size_t i, size_t out_count)
+static void lower_row(const float *in, size_t in_count, size_t values, double *sum, float *out, size_t i,
+                      size_t out_count)
 {
     const box b = box_of(i, in_count, out_count);
     memset(sum, 0, values * sizeof *sum);
@@ -61,16 +65,19 @@ static void lower_row(const float *in, size_t in_count, size_t values, double *s
 gbt_status photo_resize(const image *in, int width, int height, image *out, gbt_error *err)
 {
     image narrow = {0};
-    const size_t channels = (size_t)in->channels, in_width = (size_t)in->width, in_height = (size_t)in->height;
+    const size_t channels = (size_t)in->channels, in_width = (size_t)in->width,
+                 in_height = (size_t)in->height;
     const size_t values = (size_t)width * channels;
     memset(out, 0, sizeof *out);
     double *sum = mem_alloc(values, sizeof *sum, "photo", err);
-    gbt_status status = sum == NULL ? GBT_ERR_NO_MEMORY : image_alloc(&narrow, width, in->height, in->channels, err);
+    gbt_status status =
+        sum == NULL ? GBT_ERR_NO_MEMORY : image_alloc(&narrow, width, in->height, in->channels, err);
     if (status == GBT_OK)
         status = image_alloc(out, width, height, in->channels, err);
     if (status == GBT_OK) {
         for (size_t y = 0; y < in_height; y++)
-            narrow_row(in->pixels + y * in_width * channels, in_width, channels, narrow.pixels + y * values, (size_t)width);
+            narrow_row(in->pixels + y * in_width * channels, in_width, channels, narrow.pixels + y * values,
+                       (size_t)width);
         for (size_t y = 0; y < (size_t)height; y++)
             lower_row(narrow.pixels, in_height, values, sum, out->pixels + y * values, y, (size_t)height);
     }
@@ -79,8 +86,8 @@ gbt_status photo_resize(const image *in, int width, int height, image *out, gbt_
     return status;
 }
 
-gbt_status photo_resize_valid(const unsigned char *in, int in_width, int in_height, int width, int height, unsigned char **out,
-                              gbt_error *err)
+gbt_status photo_resize_valid(const unsigned char *in, int in_width, int in_height, int width, int height,
+                              unsigned char **out, gbt_error *err)
 {
     image bad = {0}, resized = {0};
     *out = NULL;
@@ -127,21 +134,26 @@ static gbt_status to_rgb(const image *in, scene_alpha kind, image *out, gbt_erro
 /* Read a photo and look at its shape; `valid` is optional. */
 static gbt_status read_stored(const scene_view *view, image *stored, unsigned char **valid, gbt_error *err)
 {
-    GBT_TRY(valid != NULL ? image_read_valid(view->path, stored, valid, err) : image_read(view->path, stored, err));
+    GBT_TRY(valid != NULL ? image_read_valid(view->path, stored, valid, err)
+                          : image_read(view->path, stored, err));
     if (photo_same_aspect(stored->width, stored->height, view->camera.width, view->camera.height))
         return valid != NULL ? mask_apply(view, stored, valid, err) : GBT_OK;
-    return base_fail(err, GBT_ERR_FORMAT, "%s: photo does not have the camera's aspect (wanted %d x %d or a multiple, got %d x %d)",
-                     view->path, view->camera.width, view->camera.height, stored->width, stored->height);
+    return base_fail(
+        err, GBT_ERR_FORMAT,
+        "%s: photo does not have the camera's aspect (wanted %d x %d or a multiple, got %d x %d)", view->path,
+        view->camera.width, view->camera.height, stored->width, stored->height);
 }
 
-static gbt_status read_photo(const scene_view *view, int width, int height, image *out, unsigned char **valid, gbt_error *err)
+static gbt_status read_photo(const scene_view *view, int width, int height, image *out, unsigned char **valid,
+                             gbt_error *err)
 {
     image stored = {0}, rgb = {0};
     memset(out, 0, sizeof *out);
     if (view->path == NULL)
         return base_fail(err, GBT_ERR_IO, "%s: a camera without a photo", view->name);
     if (width < 1 || height < 1)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: photo wanted at %d x %d (wanted both >= 1)", view->path, width, height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: photo wanted at %d x %d (wanted both >= 1)", view->path,
+                         width, height);
     gbt_status status = read_stored(view, &stored, valid, err);
     if (status == GBT_OK)
         status = to_rgb(&stored, view->alpha, &rgb, err);
@@ -168,7 +180,8 @@ gbt_status scene_read_photo(const scene_view *view, int width, int height, image
     return read_photo(view, width, height, out, NULL, err);
 }
 
-gbt_status scene_read_photo_valid(const scene_view *view, int width, int height, image *out, unsigned char **valid, gbt_error *err)
+gbt_status scene_read_photo_valid(const scene_view *view, int width, int height, image *out,
+                                  unsigned char **valid, gbt_error *err)
 {
     *valid = NULL;
     const gbt_status status = read_photo(view, width, height, out, valid, err);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/ply.c -- the rows of a PLY file, and point clouds made of them. */
 #include "data/ply.h"
 
@@ -16,9 +17,12 @@ static double take_binary(cursor *c, ply_type type, ply_format format)
     if (format == PLY_BIG_ENDIAN)
         bits = __builtin_bswap64(bits) >> (64 - 8 * type_bytes[type]);
     switch (type) {
-    case PLY_INT8: return (double)(int8_t)bits;
-    case PLY_INT16: return (double)(int16_t)bits;
-    case PLY_INT32: return (double)(int32_t)bits;
+    case PLY_INT8:
+        return (double)(int8_t)bits;
+    case PLY_INT16:
+        return (double)(int16_t)bits;
+    case PLY_INT32:
+        return (double)(int32_t)bits;
     case PLY_FLOAT: {
         const uint32_t low = (uint32_t)bits;
         float value;
@@ -30,7 +34,8 @@ static double take_binary(cursor *c, ply_type type, ply_format format)
         memcpy(&value, &bits, sizeof value);
         return value;
     }
-    default: return (double)bits;
+    default:
+        return (double)bits;
     }
 }
 
@@ -47,18 +52,21 @@ static size_t least_row_bytes(const ply_header *header, const ply_element *e)
     return bytes;
 }
 
-static gbt_status check_count(const source_file *file, const cursor *c, const ply_header *header, const ply_element *e, gbt_error *err)
+static gbt_status check_count(const source_file *file, const cursor *c, const ply_header *header,
+                              const ply_element *e, gbt_error *err)
 {
     if (e->count == 0)
         return GBT_OK;
     const int shown = e->name_length < 60 ? (int)e->name_length : 60;
     if (e->property_count == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: element %.*s has rows but no properties", file->name, shown, e->name);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: element %.*s has rows but no properties", file->name,
+                         shown, e->name);
     /* The newline of the last ASCII row may be missing, so one byte is granted there. */
     const size_t row_bytes = least_row_bytes(header, e), grant = header->format == PLY_ASCII ? 1 : 0;
     if (e->count > (cursor_left(c) + grant) / row_bytes)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu rows of element %.*s cannot be in the %zu bytes that follow", file->name, c->at,
-                         (unsigned long long)e->count, shown, e->name, cursor_left(c));
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s@%zu: %llu rows of element %.*s cannot be in the %zu bytes that follow",
+                         file->name, c->at, (unsigned long long)e->count, shown, e->name, cursor_left(c));
     return GBT_OK;
 }
 
@@ -71,15 +79,16 @@ typedef struct kept_list {
 
 static gbt_status keep_item(kept_list *list, double value, gbt_error *err)
 {
-    GBT_TRY(mem_reserve((void **)&list->items, &list->capacity, list->count, list->count + 1, sizeof *list->items, "list of a PLY row",
-                        err));
+    GBT_TRY(mem_reserve((void **)&list->items, &list->capacity, list->count, list->count + 1,
+                        sizeof *list->items, "list of a PLY row", err));
     list->items[list->count++] = value;
     return GBT_OK;
 }
 
-/* One binary row; `values` gets every scalar property of the element, `list` one of the lists; the others are skipped. */
-static gbt_status take_binary_row(cursor *c, const ply_header *header, const ply_element *e, double *values, kept_list *list,
-                                  gbt_error *err)
+/* One binary row; `values` gets every scalar property of the element, `list` one of the lists; the others are
+   skipped. */
+static gbt_status take_binary_row(cursor *c, const ply_header *header, const ply_element *e, double *values,
+                                  kept_list *list, gbt_error *err)
 {
     const size_t start = c->at;
     for (size_t i = 0; i < e->property_count && !c->short_read; i++) {
@@ -97,12 +106,13 @@ static gbt_status take_binary_row(cursor *c, const ply_header *header, const ply
             GBT_TRY(keep_item(list, take_binary(c, p->type, header->format), err));
     }
     if (c->short_read)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: file ends inside a row of element %.*s", c->file->name, start,
-                         e->name_length < 60 ? (int)e->name_length : 60, e->name);
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: file ends inside a row of element %.*s", c->file->name,
+                         start, e->name_length < 60 ? (int)e->name_length : 60, e->name);
     return GBT_OK;
 }
 
-static gbt_status take_ascii_value(const char **at, const char *end, raw_place place, double *out, gbt_error *err)
+static gbt_status take_ascii_value(const char **at, const char *end, raw_place place, double *out,
+                                   gbt_error *err)
 {
     const char *token;
     size_t length;
@@ -111,21 +121,22 @@ static gbt_status take_ascii_value(const char **at, const char *end, raw_place p
     const number_result result = number_parse_double(token, length, out);
     if (result == NUMBER_OK)
         return GBT_OK;
-    return raw_fail(err, place, result == NUMBER_RANGE ? "value is out of range: %.*s" : "value is not a number: %.*s",
+    return raw_fail(err, place,
+                    result == NUMBER_RANGE ? "value is out of range: %.*s" : "value is not a number: %.*s",
                     length < 60 ? (int)length : 60, token);
 }
 
 /* One ASCII row on a line of its own; blank lines before it are skipped. */
-static gbt_status take_ascii_row(cursor *c, size_t *line, const ply_header *header, const ply_element *e, double *values, kept_list *list,
-                                 gbt_error *err)
+static gbt_status take_ascii_row(cursor *c, size_t *line, const ply_header *header, const ply_element *e,
+                                 double *values, kept_list *list, gbt_error *err)
 {
     const char *at = NULL, *end = NULL, *ahead = NULL, *token = NULL;
     size_t length = 0;
     raw_place place = {0};
     do {
         if (cursor_left(c) == 0)
-            return base_fail(err, GBT_ERR_FORMAT, "%s:%zu: file ends before the last row of element %.*s", c->file->name, *line,
-                             e->name_length < 60 ? (int)e->name_length : 60, e->name);
+            return base_fail(err, GBT_ERR_FORMAT, "%s:%zu: file ends before the last row of element %.*s",
+                             c->file->name, *line, e->name_length < 60 ? (int)e->name_length : 60, e->name);
         at = (const char *)c->file->bytes + c->at;
         const char *newline = memchr(at, '\n', cursor_left(c));
         end = newline != NULL ? newline : at + cursor_left(c);
@@ -151,15 +162,16 @@ static gbt_status take_ascii_row(cursor *c, size_t *line, const ply_header *head
         }
     }
     if (number_next_token(&at, end, &token, &length))
-        return raw_fail(err, place, "row has too many values, from %.*s", length < 60 ? (int)length : 60, token);
+        return raw_fail(err, place, "row has too many values, from %.*s", length < 60 ? (int)length : 60,
+                        token);
     return GBT_OK;
 }
 
 /* What becomes of each row of the wanted element. */
 typedef gbt_status use_row(void *context, const double *values, const kept_list *list, gbt_error *err);
 
-static gbt_status read_rows(const source_file *file, const ply_header *header, int element, kept_list *list, use_row *use, void *context,
-                            gbt_error *err)
+static gbt_status read_rows(const source_file *file, const ply_header *header, int element, kept_list *list,
+                            use_row *use, void *context, gbt_error *err)
 {
     cursor c = {.file = file, .at = header->data_at};
     size_t line = header->line_count;
@@ -190,7 +202,8 @@ typedef struct column_rows {
 
 static gbt_status use_columns(void *context, const double *values, const kept_list *list, gbt_error *err)
 {
-    (void)list, (void)err;
+    (void)list;
+    (void)err;
     const column_rows *rows = context;
     double wanted[PLY_MAX_COLUMNS];
     for (size_t j = 0; j < rows->column_count; j++)
@@ -199,8 +212,8 @@ static gbt_status use_columns(void *context, const double *values, const kept_li
     return GBT_OK;
 }
 
-gbt_status ply_read_rows(const source_file *file, const ply_header *header, int element, const int *columns, size_t column_count,
-                         ply_row *row, void *context, gbt_error *err)
+gbt_status ply_read_rows(const source_file *file, const ply_header *header, int element, const int *columns,
+                         size_t column_count, ply_row *row, void *context, gbt_error *err)
 {
     column_rows rows = {columns, column_count, row, context};
     return read_rows(file, header, element, &(kept_list){.property = -1}, use_columns, &rows, err);
@@ -218,11 +231,12 @@ static gbt_status use_list(void *context, const double *values, const kept_list 
     return rows->take(rows->context, list->items, list->count, err);
 }
 
-gbt_status ply_read_lists(const source_file *file, const ply_header *header, int element, int property, ply_list *take, void *context,
-                          gbt_error *err)
+gbt_status ply_read_lists(const source_file *file, const ply_header *header, int element, int property,
+                          ply_list *take, void *context, gbt_error *err)
 {
     kept_list list = {.property = property};
-    const gbt_status status = read_rows(file, header, element, &list, use_list, &(list_rows){take, context}, err);
+    const gbt_status status =
+        read_rows(file, header, element, &list, use_list, &(list_rows){take, context}, err);
     mem_free(list.items);
     return status;
 }
@@ -244,7 +258,8 @@ static void add_point_row(void *context, const double *values)
 
 gbt_status ply_read_points(const source_file *file, raw_scene *out, gbt_error *err)
 {
-    static const char *const names[9] = {"x", "y", "z", "red", "green", "blue", "diffuse_red", "diffuse_green", "diffuse_blue"};
+    static const char *const names[9] = {
+        "x", "y", "z", "red", "green", "blue", "diffuse_red", "diffuse_green", "diffuse_blue"};
     ply_header header;
     GBT_TRY(ply_read_header(file, &header, err));
     const int vertex = ply_find_element(&header, "vertex");
@@ -257,10 +272,12 @@ gbt_status ply_read_points(const source_file *file, raw_scene *out, gbt_error *e
         columns[k] = ply_find_property(&header, vertex, names[k]);
         if (columns[k] < 0 && k >= 3)
             columns[k] = ply_find_property(&header, vertex, names[k + 3]);
-        const ply_property *p = columns[k] < 0 ? NULL : &header.properties[e->first_property + (size_t)columns[k]];
+        const ply_property *p =
+            columns[k] < 0 ? NULL : &header.properties[e->first_property + (size_t)columns[k]];
         const bool usable = p != NULL && !p->is_list;
         if (!usable && k < 3)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: element vertex has no property %s", file->name, names[k]);
+            return base_fail(err, GBT_ERR_FORMAT, "%s: element vertex has no property %s", file->name,
+                             names[k]);
         if (k >= 3) {
             rows.has_color = rows.has_color && usable;
             const bool is_whole = usable && p->type != PLY_FLOAT && p->type != PLY_DOUBLE;
@@ -270,10 +287,11 @@ gbt_status ply_read_points(const source_file *file, raw_scene *out, gbt_error *e
     cursor c = {.file = file, .at = header.data_at};
     if (vertex == 0)
         GBT_TRY(check_count(file, &c, &header, e, err));
-    /* Behind other elements the exact place is not known yet; the whole rest still bounds the count: x, y and z take a byte each. */
+    /* Behind other elements the exact place is not known yet; the whole rest still bounds the count: x, y and
+       z take a byte each. */
     if (e->count > cursor_left(&c) / 3)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: %llu vertices cannot be in %zu bytes", file->name, (unsigned long long)e->count,
-                         file->size);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %llu vertices cannot be in %zu bytes", file->name,
+                         (unsigned long long)e->count, file->size);
     GBT_TRY(raw_reserve_points(out, (size_t)e->count, err));
     out->has_color = rows.has_color;
     return ply_read_rows(file, &header, vertex, columns, rows.has_color ? 6 : 3, add_point_row, &rows, err);

@@ -1,4 +1,6 @@
-/* data/ply.h -- PLY files: any element as rows of doubles, point clouds, and a writer for clouds and meshes. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/ply.h -- PLY files: any element as rows of doubles, point clouds, and a writer for clouds and
+   meshes. */
 #ifndef GBT_DATA_PLY_H
 #define GBT_DATA_PLY_H
 
@@ -7,7 +9,17 @@
 
 typedef enum ply_format { PLY_ASCII, PLY_LITTLE_ENDIAN, PLY_BIG_ENDIAN } ply_format;
 
-typedef enum ply_type { PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT, PLY_DOUBLE, PLY_TYPE_COUNT } ply_type;
+typedef enum ply_type {
+    PLY_INT8,
+    PLY_UINT8,
+    PLY_INT16,
+    PLY_UINT16,
+    PLY_INT32,
+    PLY_UINT32,
+    PLY_FLOAT,
+    PLY_DOUBLE,
+    PLY_TYPE_COUNT
+} ply_type;
 
 typedef struct ply_property {
     const char *name; /* not zero-terminated; borrowed from the file */
@@ -50,21 +62,24 @@ enum { PLY_MAX_COLUMNS = 128 };
 /**
  * Call `row` for each row of an element.
  *
- * @param columns  [in] property indices within the element, none of them a list; lists and other properties are skipped
- * @return GBT_OK or GBT_ERR_FORMAT with the line or offset, possibly after some rows. Counts are checked against the bytes left
- *         before the first row.
+ * @param columns  [in] property indices within the element, none of them a list; lists and other properties
+ *                      are skipped
+ * @return GBT_OK or GBT_ERR_FORMAT with the line or offset, possibly after some rows. Counts are checked
+ *         against the bytes left before the first row.
  */
-gbt_status ply_read_rows(const source_file *file, const ply_header *header, int element, const int *columns, size_t column_count,
-                         ply_row *row, void *context, gbt_error *err);
+gbt_status ply_read_rows(const source_file *file, const ply_header *header, int element, const int *columns,
+                         size_t column_count, ply_row *row, void *context, gbt_error *err);
 
 /** One list of a row, integers as they are; `items` is borrowed for the call. A failure ends the reading. */
 typedef gbt_status ply_list(void *context, const double *items, size_t count, gbt_error *err);
 
-/** Call `take` with the list `property` (index within the element) of each row; else as ply_read_rows(). Also GBT_ERR_NO_MEMORY. */
-gbt_status ply_read_lists(const source_file *file, const ply_header *header, int element, int property, ply_list *take, void *context,
-                          gbt_error *err);
+/** Call `take` with the list `property` (index within the element) of each row; else as ply_read_rows(). Also
+    GBT_ERR_NO_MEMORY. */
+gbt_status ply_read_lists(const source_file *file, const ply_header *header, int element, int property,
+                          ply_list *take, void *context, gbt_error *err);
 
-/** x y z of element "vertex", with red green blue when there; the rest is skipped. `out` zeroed by the caller; free with raw_free(). */
+/** x y z of element "vertex", with red green blue when there; the rest is skipped. `out` zeroed by the
+    caller; free with raw_free(). */
 gbt_status ply_read_points(const source_file *file, raw_scene *out, gbt_error *err);
 
 /** A per-vertex float property to be written: values[i * stride]. Borrowed. */
@@ -87,7 +102,8 @@ typedef struct ply_cloud {
     const char *comment;   /* one line; NULL: none */
 } ply_cloud;
 
-/** Write a binary little-endian PLY atomically. GBT_ERR_ARGUMENT for a bad name, comment or vertex index; else as file_write_atomic(). */
+/** Write a binary little-endian PLY atomically. GBT_ERR_ARGUMENT for a bad name, comment or vertex index;
+    else as file_write_atomic(). */
 gbt_status ply_write(const char *path, const ply_cloud *cloud, gbt_error *err);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/ply_header.c -- the header of a PLY file. */
 #include <stdlib.h>
 
@@ -24,10 +25,7 @@ static bool next_word(header_line *line, word *out)
     return number_next_token(&line->at, line->end, &out->text, &out->length);
 }
 
-static int shown(word w)
-{
-    return w.length < 60 ? (int)w.length : 60;
-}
+static int shown(word w) { return w.length < 60 ? (int)w.length : 60; }
 
 static gbt_status take_word(header_line *line, const char *what, word *out, gbt_error *err)
 {
@@ -37,8 +35,9 @@ static gbt_status take_word(header_line *line, const char *what, word *out, gbt_
 static gbt_status take_type(header_line *line, ply_type *type, gbt_error *err)
 {
     static const char *const names[PLY_TYPE_COUNT][2] = {
-        [PLY_INT8] = {"char", "int8"},     [PLY_UINT8] = {"uchar", "uint8"}, [PLY_INT16] = {"short", "int16"},
-        [PLY_UINT16] = {"ushort", "uint16"}, [PLY_INT32] = {"int", "int32"},   [PLY_UINT32] = {"uint", "uint32"},
+        [PLY_INT8] = {"char", "int8"},      [PLY_UINT8] = {"uchar", "uint8"},
+        [PLY_INT16] = {"short", "int16"},   [PLY_UINT16] = {"ushort", "uint16"},
+        [PLY_INT32] = {"int", "int32"},     [PLY_UINT32] = {"uint", "uint32"},
         [PLY_FLOAT] = {"float", "float32"}, [PLY_DOUBLE] = {"double", "float64"},
     };
     word w;
@@ -65,7 +64,8 @@ static gbt_status read_format(header_line *line, ply_header *out, gbt_error *err
     else
         return raw_fail(err, line->place, "unknown format: %.*s", shown(format), format.text);
     if (!word_is(version, "1.0"))
-        return raw_fail(err, line->place, "unknown version (wanted 1.0, got %.*s)", shown(version), version.text);
+        return raw_fail(err, line->place, "unknown version (wanted 1.0, got %.*s)", shown(version),
+                        version.text);
     return GBT_OK;
 }
 
@@ -77,12 +77,15 @@ static gbt_status read_element(header_line *line, ply_header *out, gbt_error *er
     if (out->element_count == PLY_MAX_ELEMENTS)
         return raw_fail(err, line->place, "too many elements (wanted at most %d)", PLY_MAX_ELEMENTS);
     for (size_t i = 0; i < out->element_count; i++)
-        if (out->elements[i].name_length == name.length && memcmp(out->elements[i].name, name.text, name.length) == 0)
+        if (out->elements[i].name_length == name.length &&
+            memcmp(out->elements[i].name, name.text, name.length) == 0)
             return raw_fail(err, line->place, "duplicate element: %.*s", shown(name), name.text);
     ply_element *element = &out->elements[out->element_count++];
-    *element = (ply_element){.name = name.text, .name_length = name.length, .first_property = out->property_count};
+    *element =
+        (ply_element){.name = name.text, .name_length = name.length, .first_property = out->property_count};
     if (number_parse_u64(count.text, count.length, &element->count) != NUMBER_OK)
-        return raw_fail(err, line->place, "bad count of element %.*s: %.*s", shown(name), name.text, shown(count), count.text);
+        return raw_fail(err, line->place, "bad count of element %.*s: %.*s", shown(name), name.text,
+                        shown(count), count.text);
     return GBT_OK;
 }
 
@@ -107,9 +110,11 @@ static gbt_status read_property(header_line *line, ply_header *out, gbt_error *e
     }
     GBT_TRY(take_type(line, &property.type, err));
     GBT_TRY(take_word(line, "the property's name", &w, err));
-    property.name = w.text, property.name_length = w.length;
+    property.name = w.text;
+    property.name_length = w.length;
     for (size_t i = element->first_property; i < out->property_count; i++)
-        if (out->properties[i].name_length == w.length && memcmp(out->properties[i].name, w.text, w.length) == 0)
+        if (out->properties[i].name_length == w.length &&
+            memcmp(out->properties[i].name, w.text, w.length) == 0)
             return raw_fail(err, line->place, "duplicate property: %.*s", shown(w), w.text);
     out->properties[out->property_count++] = property;
     element->property_count++;
@@ -132,7 +137,8 @@ gbt_status ply_read_header(const source_file *file, ply_header *out, gbt_error *
                 return raw_fail(err, line.place, "not a PLY file (wanted the line \"ply\")");
         }
         if (newline == NULL)
-            return raw_fail(err, line.place, "header does not end (wanted end_header within %d bytes)", PLY_MAX_HEADER_BYTES);
+            return raw_fail(err, line.place, "header does not end (wanted end_header within %d bytes)",
+                            PLY_MAX_HEADER_BYTES);
         at = (size_t)(newline - text) + 1;
         word keyword;
         if (out->line_count == 1 || !next_word(&line, &keyword))

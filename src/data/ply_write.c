@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/ply_write.c -- point clouds and triangle meshes as binary little-endian PLY. */
 #include <stdio.h>
 
@@ -19,11 +20,12 @@ static gbt_status check_cloud(const char *path, const ply_cloud *cloud, gbt_erro
             return base_fail(err, GBT_ERR_ARGUMENT, "%s: PLY comment is not one line", path);
     for (size_t i = 0; i < cloud->extra_count; i++)
         if (!is_word(cloud->extras[i].name) || strlen(cloud->extras[i].name) > 64)
-            return base_fail(err, GBT_ERR_ARGUMENT, "%s: bad PLY property name: %.64s", path, cloud->extras[i].name);
+            return base_fail(err, GBT_ERR_ARGUMENT, "%s: bad PLY property name: %.64s", path,
+                             cloud->extras[i].name);
     for (size_t i = 0; i < 3 * cloud->face_count; i++)
         if (cloud->faces[i] >= cloud->vertex_count || cloud->faces[i] > INT32_MAX)
-            return base_fail(err, GBT_ERR_ARGUMENT, "%s: face %zu has vertex %u (wanted fewer than %zu)", path, i / 3, cloud->faces[i],
-                             cloud->vertex_count);
+            return base_fail(err, GBT_ERR_ARGUMENT, "%s: face %zu has vertex %u (wanted fewer than %zu)",
+                             path, i / 3, cloud->faces[i], cloud->vertex_count);
     return GBT_OK;
 }
 
@@ -46,7 +48,8 @@ static void put_header(sink *s, const ply_cloud *cloud)
     if (cloud->color != NULL)
         sink_put_text(s, "property uchar red\nproperty uchar green\nproperty uchar blue\n");
     if (cloud->face_count > 0) {
-        snprintf(line, sizeof line, "element face %zu\nproperty list uchar int vertex_indices\n", cloud->face_count);
+        snprintf(line, sizeof line, "element face %zu\nproperty list uchar int vertex_indices\n",
+                 cloud->face_count);
         sink_put_text(s, line);
     }
     sink_put_text(s, "end_header\n");

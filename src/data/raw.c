@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/raw.c -- the container that readers fill, and the checks that every source shares. */
 #include "data/raw.h"
 
@@ -58,8 +59,8 @@ char *raw_copy_text(const char *text, size_t length, gbt_error *err)
 raw_view *raw_next_view(raw_scene *raw, gbt_error *err)
 {
     void *views = raw->views;
-    const gbt_status status =
-        mem_reserve(&views, &raw->view_capacity, raw->view_count, raw->view_count + 1, sizeof *raw->views, "views", err);
+    const gbt_status status = mem_reserve(&views, &raw->view_capacity, raw->view_count, raw->view_count + 1,
+                                          sizeof *raw->views, "views", err);
     raw->views = views;
     if (status != GBT_OK)
         return NULL;
@@ -95,8 +96,8 @@ gbt_status raw_add_sight(raw_view *view, const double position[3], gbt_error *er
         depth += view->camera.rotation[6 + k] * (position[k] - view->camera.center[k]);
     if (!(depth > 0 && depth <= RAW_COORDINATE_LIMIT))
         return GBT_OK;
-    GBT_TRY(mem_reserve((void **)&view->sight, &view->sight_capacity, view->sight_count, view->sight_count + 1, sizeof *view->sight,
-                        "depths", err));
+    GBT_TRY(mem_reserve((void **)&view->sight, &view->sight_capacity, view->sight_count,
+                        view->sight_count + 1, sizeof *view->sight, "depths", err));
     view->sight[view->sight_count++] = (float)depth;
     return GBT_OK;
 }
@@ -114,10 +115,12 @@ gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_
     if (length == 0)
         return raw_fail(err, place, "image name is empty");
     if (length > RAW_NAME_LIMIT)
-        return raw_fail(err, place, "image name is too long (wanted at most %d bytes, got %zu)", RAW_NAME_LIMIT, length);
+        return raw_fail(err, place, "image name is too long (wanted at most %d bytes, got %zu)",
+                        RAW_NAME_LIMIT, length);
     const int shown = length < 100 ? (int)length : 100;
     if (name[0] == '/')
-        return raw_fail(err, place, "image name is absolute (wanted a path inside the data set, got %.*s)", shown, name);
+        return raw_fail(err, place, "image name is absolute (wanted a path inside the data set, got %.*s)",
+                        shown, name);
     size_t part = 0;
     for (size_t i = 0; i <= length; i++) {
         if (i < length && ((unsigned char)name[i] < 0x20 || name[i] == 0x7f))
@@ -136,17 +139,18 @@ gbt_status raw_check_camera(const gbt_camera *camera, raw_place place, gbt_error
     const int sizes[2] = {camera->width, camera->height};
     for (int k = 0; k < 2; k++)
         if (sizes[k] < 1 || sizes[k] > RAW_IMAGE_LIMIT)
-            return raw_fail(err, place, "image %s is out of range (wanted 1..%d, got %d)", k == 0 ? "width" : "height", RAW_IMAGE_LIMIT,
-                            sizes[k]);
-    const int param_count = gbt_camera_param_count(camera->model), focal_count = camera_focal_count(camera->model);
+            return raw_fail(err, place, "image %s is out of range (wanted 1..%d, got %d)",
+                            k == 0 ? "width" : "height", RAW_IMAGE_LIMIT, sizes[k]);
+    const int param_count = gbt_camera_param_count(camera->model),
+              focal_count = camera_focal_count(camera->model);
     for (int k = 0; k < param_count; k++)
         if (!(fabs(camera->params[k]) <= RAW_COORDINATE_LIMIT))
-            return raw_fail(err, place, "parameter %d of camera model %s is not usable (got %g)", k, gbt_camera_model_name(camera->model),
-                            camera->params[k]);
+            return raw_fail(err, place, "parameter %d of camera model %s is not usable (got %g)", k,
+                            gbt_camera_model_name(camera->model), camera->params[k]);
     for (int k = 0; k < focal_count; k++)
         if (camera->params[k] <= 0)
-            return raw_fail(err, place, "focal length of camera model %s is not positive (got %g)", gbt_camera_model_name(camera->model),
-                            camera->params[k]);
+            return raw_fail(err, place, "focal length of camera model %s is not positive (got %g)",
+                            gbt_camera_model_name(camera->model), camera->params[k]);
     return GBT_OK;
 }
 
@@ -155,7 +159,8 @@ void raw_count_missing(raw_scene *raw, const char *name)
     enum { SHOWN = 3 };
     const size_t used = strlen(raw->missing_names);
     if (raw->photos_missing < SHOWN)
-        snprintf(raw->missing_names + used, sizeof raw->missing_names - used, "%s%.60s", used > 0 ? ", " : "", name);
+        snprintf(raw->missing_names + used, sizeof raw->missing_names - used, "%s%.60s", used > 0 ? ", " : "",
+                 name);
     else if (raw->photos_missing == SHOWN)
         snprintf(raw->missing_names + used, sizeof raw->missing_names - used, ", ...");
     raw->photos_missing++;
@@ -174,6 +179,7 @@ gbt_status raw_sort_views(raw_scene *raw, const char *file, gbt_error *err)
         raw->views[i].rank = i;
     for (size_t i = 1; i < raw->view_count; i++)
         if (strcmp(raw->views[i - 1].name, raw->views[i].name) == 0)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: duplicate image name: %.200s", file, raw->views[i].name);
+            return base_fail(err, GBT_ERR_FORMAT, "%s: duplicate image name: %.200s", file,
+                             raw->views[i].name);
     return GBT_OK;
 }

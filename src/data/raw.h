@@ -1,5 +1,6 @@
-/* data/raw.h -- what a reader fills: views and points in the data set's own world, in double, before recentring; and the checks that
-   every source shares. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/raw.h -- what a reader fills: views and points in the data set's own world, in double, before
+   recentring; and the checks that every source shares. */
 #ifndef GBT_DATA_RAW_H
 #define GBT_DATA_RAW_H
 
@@ -18,7 +19,8 @@ typedef struct raw_view {
     gbt_camera camera; /* pose in world coordinates */
     uint32_t id;       /* COLMAP's image id, 0 elsewhere */
     size_t rank;       /* place in the sorted list, set by raw_sort_views(); stays when others are left out */
-    float *sight;      /* [sight_count] depth of each sparse point that, by its track, is in the photo; > 0; owned */
+    float *sight; /* [sight_count] depth of each sparse point that, by its track, is in the photo; > 0; owned
+                   */
     size_t sight_count, sight_capacity;
 } raw_view;
 
@@ -35,24 +37,28 @@ typedef struct raw_scene {
     size_t photos_missing;     /* views left out because their photo is not there */
     char missing_names[256];   /* the first of them, ended by "..." when there are more */
     bool has_split;            /* the data set says which views are held out */
-    size_t angles_disagreeing; /* transforms.json cameras whose camera_angle_x contradicts fl_x (which wins) */
+    size_t angles_disagreeing; /* transforms.json cameras whose camera_angle_x contradicts fl_x (which wins)
+                                */
 } raw_scene;
 
-/** Larger coordinates mean nothing: a double keeps no tenth of a millimetre there, and float squares of them overflow. */
+/** Larger coordinates mean nothing: a double keeps no tenth of a millimetre there, and float squares of them
+    overflow. */
 #define RAW_COORDINATE_LIMIT 1e12
 
 enum { RAW_IMAGE_LIMIT = 65500, RAW_NAME_LIMIT = 4096 };
 
 enum { RAW_MARK_FILE = 0, RAW_MARK_FRAME = '#' };
 
-/** Where a message points: "FILE@OFFSET" (mark '@'), "FILE:LINE" (mark ':'), "FILE: frame N" (RAW_MARK_FRAME) or "FILE" (RAW_MARK_FILE). */
+/** Where a message points: "FILE@OFFSET" (mark '@'), "FILE:LINE" (mark ':'), "FILE: frame N" (RAW_MARK_FRAME)
+    or "FILE" (RAW_MARK_FILE). */
 typedef struct raw_place {
     const char *file;
     char mark;
     size_t at;
 } raw_place;
 
-gbt_status raw_fail(gbt_error *err, raw_place place, const char *format, ...) __attribute__((format(printf, 3, 4)));
+gbt_status raw_fail(gbt_error *err, raw_place place, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
 
 void raw_view_free(raw_view *view); /* zeroes the struct */
 void raw_free(raw_scene *raw);
@@ -69,10 +75,12 @@ gbt_status raw_reserve_points(raw_scene *raw, size_t count, gbt_error *err);
 /** Append a point, or count it as dropped when a coordinate is not usable. There must be room. */
 void raw_add_point(raw_scene *raw, const double position[3], const float color[3]);
 
-/** A point at `position` is in the view's photo; one behind its camera, or not usable, is not. The pose must be known. */
+/** A point at `position` is in the view's photo; one behind its camera, or not usable, is not. The pose must
+    be known. */
 gbt_status raw_add_sight(raw_view *view, const double position[3], gbt_error *err);
 
-/** How near the points in its photo come: the first percentile of their depths, for some are wrong. 0 without any. Sorts them. */
+/** How near the points in its photo come: the first percentile of their depths, for some are wrong. 0 without
+    any. Sorts them. */
 double raw_nearest_sight(raw_view *view);
 
 /** A relative path of 1..RAW_NAME_LIMIT bytes without control characters and without a ".." part. */
@@ -84,7 +92,8 @@ gbt_status raw_check_camera(const gbt_camera *camera, raw_place place, gbt_error
 /** Count a view whose photo is not there, and remember its name among the first. */
 void raw_count_missing(raw_scene *raw, const char *name);
 
-/** Two views of one name cannot be told apart later. Sorts the views by the bytes of their names, and ranks them. */
+/** Two views of one name cannot be told apart later. Sorts the views by the bytes of their names, and ranks
+    them. */
 gbt_status raw_sort_views(raw_scene *raw, const char *file, gbt_error *err);
 
 #endif

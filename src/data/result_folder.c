@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/result_folder.c -- find the newest iteration, read the settings that matter. */
 #include "data/result_folder.h"
 
@@ -42,6 +43,7 @@ gbt_status result_folder_find(const char *folder, result_folder *out, bool *foun
     snprintf(name, sizeof name, "iteration_%lu/point_cloud.ply", out->iteration);
     GBT_TRY(file_join(out->ply, sizeof out->ply, clouds, name, err));
     GBT_TRY(file_join(clouds, sizeof clouds, folder, "model.gbt", err));
-    *found = file_exists(out->ply) && !file_exists(clouds); /* a run of ours may have such a folder beside its model */
+    *found = file_exists(out->ply) &&
+             !file_exists(clouds); /* a run of ours may have such a folder beside its model */
     return *found ? read_settings(folder, out, err) : GBT_OK;
 }

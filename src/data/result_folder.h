@@ -1,5 +1,6 @@
-/* data/result_folder.h -- the folder that the reference implementation of 3DGS leaves, and its descendants: where the Gaussians are, and
-   what it was made of. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/result_folder.h -- the folder that the reference implementation of 3DGS leaves, and its descendants:
+   where the Gaussians are, and what it was made of. */
 #ifndef GBT_DATA_RESULT_FOLDER_H
 #define GBT_DATA_RESULT_FOLDER_H
 
@@ -18,8 +19,8 @@ typedef struct result_folder {
 } result_folder;
 
 /**
- * Look into `folder`. `*found` is false when it has no point_cloud/iteration_N/point_cloud.ply, or is a run of ours (model.gbt).
- * GBT_ERR_ARGUMENT when a path is too long.
+ * Look into `folder`. `*found` is false when it has no point_cloud/iteration_N/point_cloud.ply, or is a run
+ * of ours (model.gbt). GBT_ERR_ARGUMENT when a path is too long.
  */
 gbt_status result_folder_find(const char *folder, result_folder *out, bool *found, gbt_error *err);
 

@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/scene.c -- from a path to a scene: find the files, read them, recentre, split.
 
-   path --> [which source?] --> reader --> raw_scene (double, world) --> [photos there?] --> [origin] --> scene (local) --> [split] */
+   path --> [which source?] --> reader --> raw_scene (double, world) --> [photos there?] --> [origin]
+        --> scene (local) --> [split] */
 #include "data/scene.h"
 
 #include <math.h>
@@ -85,13 +87,15 @@ static gbt_status load_colmap(const char *model, const char *ending, raw_scene *
         snprintf(name, sizeof name, "%s.%s", names[i], ending);
         status = file_join(paths[i], sizeof paths[i], model, name, err);
         if (status == GBT_OK && !file_exists(paths[i]))
-            status = base_fail(err, GBT_ERR_IO, "%s: missing (wanted cameras, images and points3D together)", paths[i]);
+            status = base_fail(err, GBT_ERR_IO, "%s: missing (wanted cameras, images and points3D together)",
+                               paths[i]);
         if (status == GBT_OK)
             status = load_file(paths[i], &loaded[i], &owned[i], err);
     }
     const colmap_files files = {.cameras = loaded[0], .images = loaded[1], .points = loaded[2]};
     if (status == GBT_OK)
-        status = strcmp(ending, "bin") == 0 ? colmap_bin_read(&files, raw, err) : colmap_txt_read(&files, raw, err);
+        status = strcmp(ending, "bin") == 0 ? colmap_bin_read(&files, raw, err)
+                                            : colmap_txt_read(&files, raw, err);
     if (status == GBT_OK && raw->view_count == 0)
         status = base_fail(err, GBT_ERR_FORMAT, "%s: no registered image in the model", paths[1]);
     if (status == GBT_OK)
@@ -173,7 +177,8 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
         *source = "ply";
         GBT_TRY(load_points(path, raw, err));
         if (raw->point_count == 0)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable point (%zu dropped)", path, raw->points_dropped);
+            return base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable point (%zu dropped)", path,
+                             raw->points_dropped);
         return GBT_OK;
     }
     if (!file_is_folder(path) && ends_with(path, ".json")) {
@@ -181,11 +186,13 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
         const char *slash = strrchr(path, '/');
         if (slash != NULL && (size_t)(slash - path) >= sizeof place)
             return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
-        snprintf(place, sizeof place, "%.*s", slash == NULL ? 1 : (int)(slash - path) + (slash == path), slash == NULL ? "." : path);
+        snprintf(place, sizeof place, "%.*s", slash == NULL ? 1 : (int)(slash - path) + (slash == path),
+                 slash == NULL ? "." : path);
         return load_transforms(path, place, raw, err);
     }
     if (!file_is_folder(path))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: not a data set (wanted a folder, a .ply or a transforms.json)", path);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: not a data set (wanted a folder, a .ply or a transforms.json)", path);
     GBT_TRY(find_colmap(path, place, &ending, err));
     if (place[0] != '\0') {
         *source = strcmp(ending, "bin") == 0 ? "colmap-bin" : "colmap-txt";
@@ -200,7 +207,9 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
     GBT_TRY(file_join(place, sizeof place, path, "transforms_train.json", err));
     if (!file_exists(place))
         return base_fail(err, GBT_ERR_FORMAT,
-                         "%s: not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json in it)", path);
+                         "%s: not a data set (wanted sparse/0/cameras.bin, transforms.json or "
+                         "transforms_train.json in it)",
+                         path);
     *source = "blender";
     return load_blender(place, path, raw, err);
 }
@@ -212,7 +221,8 @@ static uint64_t ordered_bits(double value)
     return bits >> 63 ? ~bits : bits | UINT64_C(1) << 63;
 }
 
-/* The lower median of values[0], values[stride], ...: radix selection, 8 passes whatever the data, no copy. */
+/* The lower median of values[0], values[stride], ...: radix selection, 8 passes whatever the data, no
+   copy. */
 static double median(const double *values, size_t stride, size_t count)
 {
     size_t rank = (count - 1) / 2;
@@ -267,14 +277,22 @@ static gbt_status recentre(raw_scene *raw, scene *out, gbt_error *err)
     out->points.color = raw->color;
     raw->color = NULL;
     if (out->points.color == NULL)
-        out->points.color = mem_alloc(0, sizeof(float), "point colours", err); /* a scene always has its arrays, empty or not */
+        out->points.color = mem_alloc(0, sizeof(float), "point colours", err); /* a scene always has its
+                                                                                  arrays, empty or not */
     if (out->points.color == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < raw->view_count; i++) {
         raw_view *view = &raw->views[i];
-        out->views[i] = (scene_view){.name = view->name, .path = view->path, .mask_path = view->mask_path, .camera = view->camera,
-                                     .is_test = view->is_test, .rank = view->rank, .nearest = raw_nearest_sight(view)};
-        view->name = NULL, view->path = NULL, view->mask_path = NULL;
+        out->views[i] = (scene_view){.name = view->name,
+                                     .path = view->path,
+                                     .mask_path = view->mask_path,
+                                     .camera = view->camera,
+                                     .is_test = view->is_test,
+                                     .rank = view->rank,
+                                     .nearest = raw_nearest_sight(view)};
+        view->name = NULL;
+        view->path = NULL;
+        view->mask_path = NULL;
         for (int k = 0; k < 3; k++)
             out->views[i].camera.center[k] -= out->origin[k];
     }
@@ -295,15 +313,17 @@ static void warn_about(const char *path, const raw_scene *raw, const scene *s)
     if (raw->trailing_bytes > 0)
         log_warn("%s: %zu bytes behind the last record were ignored", path, raw->trailing_bytes);
     if (raw->photos_missing > 0)
-        log_warn("%s: left out %zu views whose photo is missing, %zu remain%s%s", path, raw->photos_missing, raw->view_count,
-                 raw->missing_names[0] != '\0' ? ": " : "", raw->missing_names);
+        log_warn("%s: left out %zu views whose photo is missing, %zu remain%s%s", path, raw->photos_missing,
+                 raw->view_count, raw->missing_names[0] != '\0' ? ": " : "", raw->missing_names);
     size_t masks = 0;
     for (size_t i = 0; i < s->view_count; i++)
         masks += s->views[i].mask_path != NULL;
     if (masks > 0 && masks < s->view_count)
-        log_warn("%s: %zu of %zu photos have no mask, and count whole", path, s->view_count - masks, s->view_count);
+        log_warn("%s: %zu of %zu photos have no mask, and count whole", path, s->view_count - masks,
+                 s->view_count);
     if (raw->angles_disagreeing > 0)
-        log_warn("%s: camera_angle_x contradicts fl_x in %zu frames, fl_x is used", path, raw->angles_disagreeing);
+        log_warn("%s: camera_angle_x contradicts fl_x in %zu frames, fl_x is used", path,
+                 raw->angles_disagreeing);
     if (raw->view_count == 1)
         log_warn("%s: only one view", path);
 }
@@ -320,7 +340,8 @@ gbt_status scene_load(const char *path, const scene_split *split, scene *out, gb
     if (status == GBT_OK) {
         snprintf(out->source, sizeof out->source, "%s", source);
         out->folder = raw_copy_text(path, strlen(path), err);
-        status = out->folder != NULL ? split_apply(split != NULL ? split : &usual, out, err) : GBT_ERR_NO_MEMORY;
+        status =
+            out->folder != NULL ? split_apply(split != NULL ? split : &usual, out, err) : GBT_ERR_NO_MEMORY;
     }
     if (status == GBT_OK)
         warn_about(path, &raw, out);
@@ -359,5 +380,6 @@ double scene_camera_extent(const scene *s)
             const double *c = s->views[i].camera.center;
             farthest = fmax(farthest, hypot(hypot(c[0] - mean[0], c[1] - mean[1]), c[2] - mean[2]));
         }
-    return fmax(1.1 * farthest, 1e-3); /* one camera, or all at one place, must not freeze the learning rate at 0 */
+    return fmax(1.1 * farthest, 1e-3); /* one camera, or all at one place, must not freeze the learning rate
+                                          at 0 */
 }

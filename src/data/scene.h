@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/scene.h -- what a data set says: cameras, photos, sparse points; recentred in double.
 
-   Readers take bytes and fill a `scene`; scene_load() finds the files of a folder, reads them, recentres and splits. */
+   Readers take bytes and fill a `scene`; scene_load() finds the files of a folder, reads them, recentres and
+   splits. */
 #ifndef GBT_DATA_SCENE_H
 #define GBT_DATA_SCENE_H
 
@@ -22,12 +24,15 @@ typedef enum scene_alpha {
 typedef struct scene_view {
     char *name;        /* image name as the data set gives it, may hold sub-folders; owned */
     char *path;        /* where the pixels are; owned. NULL: there are none (data/cameras_json.h) */
-    char *mask_path;   /* a picture whose dark pixels say which ones of the photo mean nothing; NULL: none; owned */
+    char *mask_path;   /* a picture whose dark pixels say which ones of the photo mean nothing; NULL: none;
+                          owned */
     scene_alpha alpha; /* see scene_set_alpha() */
     gbt_camera camera; /* pose in scene-local coordinates; width and height as the data set states them */
     bool is_test;      /* held out */
-    size_t rank;       /* place in the sorted list of all views that the data set names, those without a photo too */
-    double nearest;    /* depth of the nearest sparse points in the photo, by their tracks (raw_nearest_sight()); 0: it has none */
+    size_t rank; /* place in the sorted list of all views that the data set names, those without a photo too
+                  */
+    double nearest; /* depth of the nearest sparse points in the photo, by their tracks (raw_nearest_sight());
+                       0: it has none */
 } scene_view;
 
 typedef struct scene_points {
@@ -44,14 +49,14 @@ typedef struct scene {
     size_t view_count;
     scene_view *views; /* sorted by name (bytes) */
     scene_points points;
-    size_t points_dropped; /* non-finite ones */
-    size_t photos_missing; /* views left out because their photo is not there */
+    size_t points_dropped;   /* non-finite ones */
+    size_t photos_missing;   /* views left out because their photo is not there */
     char missing_names[256]; /* of the first of them */
-    bool has_split;        /* the data set itself says which views are held out */
+    bool has_split;          /* the data set itself says which views are held out */
 } scene;
 
 typedef enum scene_split_kind {
-    SCENE_SPLIT_AUTO,  /* as the data set says, else every 8th */
+    SCENE_SPLIT_AUTO, /* as the data set says, else every 8th */
     SCENE_SPLIT_EVERY,
     SCENE_SPLIT_NONE,
     SCENE_SPLIT_LIST
@@ -59,8 +64,8 @@ typedef enum scene_split_kind {
 
 typedef struct scene_split {
     scene_split_kind kind;
-    int every;             /* SCENE_SPLIT_EVERY: views 0, every, 2 every, ... of the sorted list are held out, a missing photo does not
-                              shift them; >= 2. Default 8 */
+    int every; /* SCENE_SPLIT_EVERY: views 0, every, 2 every, ... of the sorted list are held out, a missing
+                  photo does not shift them; >= 2. Default 8 */
     const char *list_path; /* SCENE_SPLIT_LIST: text file, one image name per line */
 } scene_split;
 
@@ -70,10 +75,11 @@ gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err)
 /**
  * Load a data set folder, or a .ply point cloud.
  *
- * A folder is COLMAP (sparse/0, sparse or the folder itself; binary preferred; images/ and perhaps masks/ beside it), or holds a
- * transforms.json, or a transforms_train.json with its own held-out views in transforms_test.json (or _val).
- * Views without a photo are left out, counted and named in a warning; all of them: GBT_ERR_IO. Photos are not read here (scene_read_photo).
- * The origin is the median of the points (of the camera centres without points), so outliers cannot move it.
+ * A folder is COLMAP (sparse/0, sparse or the folder itself; binary preferred; images/ and perhaps masks/
+ * beside it), or holds a transforms.json, or a transforms_train.json with its own held-out views in
+ * transforms_test.json (or _val). Views without a photo are left out, counted and named in a warning; all of
+ * them: GBT_ERR_IO. Photos are not read here (scene_read_photo). The origin is the median of the points (of
+ * the camera centres without points), so outliers cannot move it.
  *
  * @param split [in] NULL: SCENE_SPLIT_AUTO
  * @param out [out] free with scene_free(); zeroed on failure
@@ -83,36 +89,40 @@ gbt_status scene_load(const char *path, const scene_split *split, scene *out, gb
 void scene_free(scene *s);
 
 /**
- * Say what the transparent part of photos is: "black", "white", "mask" or "auto", which is white for Blender's synthetic scenes, as
- * everybody scores them, else black, which is also what scene_load() leaves.
+ * Say what the transparent part of photos is: "black", "white", "mask" or "auto", which is white for
+ * Blender's synthetic scenes, as everybody scores them, else black, which is also what scene_load() leaves.
  *
  * @return GBT_OK or GBT_ERR_ARGUMENT ("--alpha: ...")
  */
 gbt_status scene_set_alpha(scene *s, const char *name, gbt_error *err);
 
 /**
- * What is behind everything, when a training photo has an alpha channel and lies on a colour: true, and the colour. Cost: opens every
- * training photo.
+ * What is behind everything, when a training photo has an alpha channel and lies on a colour: true, and the
+ * colour. Cost: opens every training photo.
  */
 bool scene_background(const scene *s, float color[3]);
 
 /**
- * Read one photo as 3-channel float, resized to `width` x `height` by exact area averaging (camera resized alike: gbt_camera_resized()).
+ * Read one photo as 3-channel float, resized to `width` x `height` by exact area averaging (camera resized
+ * alike: gbt_camera_resized()).
  *
- * The photo may differ from the camera's stated size if the aspect agrees within 1 px; it is then resampled in one step. Alpha is
- * treated as view->alpha says. Values that are not finite are 0.
+ * The photo may differ from the camera's stated size if the aspect agrees within 1 px; it is then resampled
+ * in one step. Alpha is treated as view->alpha says. Values that are not finite are 0.
  */
 gbt_status scene_read_photo(const scene_view *view, int width, int height, image *out, gbt_error *err);
 
 /**
  * scene_read_photo(), and which pixels mean something.
  *
- * @param valid [out] NULL when all do, else [height][width]: 0 where a value that is not finite, or a pixel that the mask or the alpha
- *                    channel (SCENE_ALPHA_MASK) leaves out, had a part in it; free with mem_free()
+ * @param valid [out] NULL when all do, else [height][width]: 0 where a value that is not finite, or a pixel
+ *                    that the mask or the alpha channel (SCENE_ALPHA_MASK) leaves out, had a part in it; free
+ *                    with mem_free()
  */
-gbt_status scene_read_photo_valid(const scene_view *view, int width, int height, image *out, unsigned char **valid, gbt_error *err);
+gbt_status scene_read_photo_valid(const scene_view *view, int width, int height, image *out,
+                                  unsigned char **valid, gbt_error *err);
 
-/** Half the diagonal-like extent of the training cameras: 1.1 * max |c - mean c| (spatial_lr_scale); at least a small positive number. */
+/** Half the diagonal-like extent of the training cameras: 1.1 * max |c - mean c| (spatial_lr_scale); at least
+    a small positive number. */
 double scene_camera_extent(const scene *s);
 
 #endif

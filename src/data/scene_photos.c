@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/scene_photos.c -- photos and masks by their names, and what their transparent parts are. */
 #include "data/scene_photos.h"
 
@@ -11,10 +12,7 @@
 
 enum { PATH_SIZE = RAW_NAME_LIMIT + 4096 };
 
-static bool is_file(const char *path)
-{
-    return file_exists(path) && !file_is_folder(path);
-}
+static bool is_file(const char *path) { return file_exists(path) && !file_is_folder(path); }
 
 /* A copy of folder/name in `out` when that is a file; else `out` stays. */
 static gbt_status take_file(const char *folder, const char *name, char **out, gbt_error *err)
@@ -41,7 +39,8 @@ static gbt_status find_mask(const char *masks, raw_view *view, gbt_error *err)
     return take_file(masks, name, &view->mask_path, err);
 }
 
-static gbt_status find_files(const char *folder, const char *images, const char *masks, raw_view *view, gbt_error *err)
+static gbt_status find_files(const char *folder, const char *images, const char *masks, raw_view *view,
+                             gbt_error *err)
 {
     GBT_TRY(take_file(images, view->name, &view->path, err));
     if (view->path == NULL)
@@ -68,24 +67,29 @@ gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
     }
     GBT_TRY(status);
     if (kept == 0)
-        return base_fail(err, GBT_ERR_IO, "%s: all %zu photos are missing: %s", images, raw->view_count, raw->missing_names);
+        return base_fail(err, GBT_ERR_IO, "%s: all %zu photos are missing: %s", images, raw->view_count,
+                         raw->missing_names);
     for (size_t i = kept; i < raw->view_count; i++)
         raw_view_free(&raw->views[i]);
     raw->view_count = kept;
     return GBT_OK;
 }
 
-/* ---- what is transparent ------------------------------------------------------------------------------------------------------------- */
+/* ---- what is transparent ---- */
 
 gbt_status scene_set_alpha(scene *s, const char *name, gbt_error *err)
 {
-    static const char *const names[] = {[SCENE_ALPHA_BLACK] = "black", [SCENE_ALPHA_WHITE] = "white", [SCENE_ALPHA_MASK] = "mask"};
-    int alpha = strcmp(name, "auto") == 0 ? (strcmp(s->source, "blender") == 0 ? SCENE_ALPHA_WHITE : SCENE_ALPHA_BLACK) : -1;
+    static const char *const names[] = {
+        [SCENE_ALPHA_BLACK] = "black", [SCENE_ALPHA_WHITE] = "white", [SCENE_ALPHA_MASK] = "mask"};
+    int alpha = strcmp(name, "auto") == 0
+                    ? (strcmp(s->source, "blender") == 0 ? SCENE_ALPHA_WHITE : SCENE_ALPHA_BLACK)
+                    : -1;
     for (int i = 0; i < 3; i++)
         if (strcmp(name, names[i]) == 0)
             alpha = i;
     if (alpha < 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--alpha: \"%.40s\" (wanted auto, black, white or mask)", name);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--alpha: \"%.40s\" (wanted auto, black, white or mask)",
+                         name);
     for (size_t i = 0; i < s->view_count; i++)
         s->views[i].alpha = (scene_alpha)alpha;
     return GBT_OK;
@@ -96,8 +100,8 @@ bool scene_background(const scene *s, float color[3])
     for (size_t i = 0; i < s->view_count; i++) {
         const scene_view *view = &s->views[i];
         int width, height, channels;
-        if (view->is_test || view->alpha == SCENE_ALPHA_MASK || image_probe(view->path, &width, &height, &channels, NULL) != GBT_OK ||
-            channels != 4)
+        if (view->is_test || view->alpha == SCENE_ALPHA_MASK ||
+            image_probe(view->path, &width, &height, &channels, NULL) != GBT_OK || channels != 4)
             continue;
         for (int c = 0; c < 3; c++)
             color[c] = view->alpha == SCENE_ALPHA_WHITE;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/scene_photos.h -- where the photos and masks of a COLMAP model are. */
 #ifndef GBT_DATA_SCENE_PHOTOS_H
 #define GBT_DATA_SCENE_PHOTOS_H
@@ -5,10 +6,13 @@
 #include "data/raw.h"
 
 /**
- * The photo of each view: `folder`/images/NAME, else `folder`/NAME. Views without one are taken out of `raw` and counted.
+ * The photo of each view: `folder`/images/NAME, else `folder`/NAME. Views without one are taken out of `raw`
+ * and counted.
  *
- * When there is a folder `folder`/masks, the mask of a view is masks/NAME.png, else masks/NAME, else masks/NAME with the ending .png.
- * @return GBT_OK; GBT_ERR_IO when no view has a photo; GBT_ERR_ARGUMENT (a path is too long), GBT_ERR_NO_MEMORY
+ * When there is a folder `folder`/masks, the mask of a view is masks/NAME.png, else masks/NAME, else
+ * masks/NAME with the ending .png.
+ * @return GBT_OK; GBT_ERR_IO when no view has a photo; GBT_ERR_ARGUMENT (a path is too long),
+ *         GBT_ERR_NO_MEMORY
  */
 gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err);
 

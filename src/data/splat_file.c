@@ -1,4 +1,6 @@
-/* data/splat_file.c -- rows of { f32 x y z; f32 scale[3]; u8 r g b a; u8 quaternion w x y z as 128 + 128 q }. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/splat_file.c -- rows of { f32 x y z; f32 scale[3]; u8 r g b a; u8 quaternion w x y z as 128 + 128 q
+   }. */
 #include "data/splat_file.h"
 
 #include <math.h>
@@ -50,8 +52,8 @@ gbt_status splat_file_read(const source_file *file, gaussian_cloud *out, gbt_err
 {
     memset(out, 0, sizeof *out);
     if (file->size == 0 || file->size % ROW_BYTES != 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no .splat file (wanted a multiple of %d bytes, got %zu)", file->name, (int)ROW_BYTES,
-                         file->size);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no .splat file (wanted a multiple of %d bytes, got %zu)",
+                         file->name, (int)ROW_BYTES, file->size);
     const size_t rows = file->size / ROW_BYTES;
     GBT_TRY(gaussian_cloud_alloc(out, rows, err));
     out->count = 0;
@@ -65,7 +67,8 @@ gbt_status splat_file_read(const source_file *file, gaussian_cloud *out, gbt_err
     if (out->count > 0)
         return GBT_OK;
     gaussian_cloud_free(out);
-    return base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu rows dropped)", file->name, rows);
+    return base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu rows dropped)", file->name,
+                     rows);
 }
 
 typedef struct ranked {
@@ -94,14 +97,16 @@ static void put_row(sink *s, const gaussian_cloud *cloud, size_t i, const double
         sink_put_level(s, 128 + 128 * (double)cloud->quat[4 * i + k]);
 }
 
-gbt_status splat_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)
+gbt_status splat_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                            gbt_error *err)
 {
     ranked *order = mem_alloc(cloud->count, sizeof *order, "order of splats", err);
     if (order == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < cloud->count; i++) {
         const float *l = cloud->scale_log + 3 * i;
-        order[i] = (ranked){.weight = l[0] + l[1] + l[2] + logf(fmaxf(cloud->opacity[i], 1e-9f)), .row = (uint32_t)i};
+        order[i] = (ranked){.weight = l[0] + l[1] + l[2] + logf(fmaxf(cloud->opacity[i], 1e-9f)),
+                            .row = (uint32_t)i};
     }
     qsort(order, cloud->count, sizeof *order, by_weight);
     sink s = {.err = err};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/split.c -- which views are held out. */
 #include "data/split.h"
 
@@ -21,11 +22,13 @@ gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err)
     } else if (strncmp(text, "list=", 5) == 0 && text[5] != '\0') {
         out->kind = SCENE_SPLIT_LIST;
         out->list_path = text + 5;
-    } else if (strncmp(text, "every=", 6) == 0 && number_parse_u64(text + 6, strlen(text + 6), &every) == NUMBER_OK && every >= 2 &&
+    } else if (strncmp(text, "every=", 6) == 0 &&
+               number_parse_u64(text + 6, strlen(text + 6), &every) == NUMBER_OK && every >= 2 &&
                every <= INT_MAX) {
         out->every = (int)every;
     } else {
-        return base_fail(err, GBT_ERR_ARGUMENT, "split: wanted auto, every=N with N >= 2, none or list=FILE, got %.200s", text);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "split: wanted auto, every=N with N >= 2, none or list=FILE, got %.200s", text);
     }
     return GBT_OK;
 }
@@ -48,9 +51,12 @@ static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *pa
             end--;
         *end = '\0'; /* file_read() leaves a spare byte behind the last line */
         if (*at != '\0') {
-            scene_view *view = s->view_count > 0 ? bsearch(at, s->views, s->view_count, sizeof *s->views, name_against_view) : NULL;
+            scene_view *view = s->view_count > 0
+                                   ? bsearch(at, s->views, s->view_count, sizeof *s->views, name_against_view)
+                                   : NULL;
             if (view == NULL)
-                return base_fail(err, GBT_ERR_FORMAT, "%s:%zu: no image of the data set has this name: %.200s", path, line, at);
+                return base_fail(err, GBT_ERR_FORMAT,
+                                 "%s:%zu: no image of the data set has this name: %.200s", path, line, at);
             view->is_test = true;
         }
         at = next;
@@ -74,7 +80,8 @@ gbt_status split_apply(const scene_split *split, scene *s, gbt_error *err)
         if (!s->has_split)
             mark_every(s, SCENE_SPLIT_DEFAULT_EVERY);
         break;
-    case SCENE_SPLIT_NONE: break;
+    case SCENE_SPLIT_NONE:
+        break;
     case SCENE_SPLIT_EVERY:
         if (split->every < 2)
             return base_fail(err, GBT_ERR_ARGUMENT, "split: wanted every >= 2, got %d", split->every);
@@ -94,6 +101,7 @@ gbt_status split_apply(const scene_split *split, scene *s, gbt_error *err)
     for (size_t i = 0; i < s->view_count; i++)
         test_count += s->views[i].is_test;
     if (test_count > 0 && test_count == s->view_count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "split: all %zu views are held out, none is left to train on", test_count);
+        return base_fail(err, GBT_ERR_ARGUMENT, "split: all %zu views are held out, none is left to train on",
+                         test_count);
     return GBT_OK;
 }

@@ -1,5 +1,6 @@
-/* data/spz_file.c -- header { "NGSP", version, count, degree, fractional bits, flags, 0 }, then streams of positions, opacities, colours,
-   scales, rotations and spherical harmonics; all of it gzipped. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/spz_file.c -- header { "NGSP", version, count, degree, fractional bits, flags, 0 }, then streams of
+   positions, opacities, colours, scales, rotations and spherical harmonics; all of it gzipped. */
 #include "data/spz_file.h"
 
 #include <math.h>
@@ -7,7 +8,12 @@
 
 #include "base/file.h"
 
-enum { MAGIC = 0x5053474e, HEADER_BYTES = 16, FRACTION_BITS_MAX = 16, COORDINATE_MAX = 8388607 /* 24 bits with a sign */ };
+enum {
+    MAGIC = 0x5053474e,
+    HEADER_BYTES = 16,
+    FRACTION_BITS_MAX = 16,
+    COORDINATE_MAX = 8388607 /* 24 bits with a sign */
+};
 
 static const double color_step = 0.15; /* of f_dc, in units of 255 levels */
 
@@ -19,29 +25,31 @@ typedef struct layout {
 
 static layout layout_of(unsigned version, int degree)
 {
-    layout l = {.rotation = version == 2 ? 3 : 4, .harmonics = 3 * ((size_t)((degree + 1) * (degree + 1)) - 1)};
+    layout l = {.rotation = version == 2 ? 3 : 4,
+                .harmonics = 3 * ((size_t)((degree + 1) * (degree + 1)) - 1)};
     l.row = 9 + 1 + 3 + 3 + l.rotation + l.harmonics;
     return l;
 }
 
-/* ---- writing ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- writing ---- */
 
-static gbt_status find_fraction(const gaussian_cloud *cloud, const double origin[3], const char *path, int *bits, gbt_error *err)
+static gbt_status find_fraction(const gaussian_cloud *cloud, const double origin[3], const char *path,
+                                int *bits, gbt_error *err)
 {
     double largest = 0;
     for (size_t i = 0; i < 3 * cloud->count; i++)
         largest = fmax(largest, fabs((double)cloud->mean[i] + origin[i % 3]));
     if (!(largest <= COORDINATE_MAX))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a coordinate of %g does not fit a .spz file (limit %d)", path, largest,
-                         (int)COORDINATE_MAX);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a coordinate of %g does not fit a .spz file (limit %d)",
+                         path, largest, (int)COORDINATE_MAX);
     *bits = 0;
     while (*bits < FRACTION_BITS_MAX && largest * exp2(*bits + 1) <= COORDINATE_MAX)
         ++*bits;
     return GBT_OK;
 }
 
-/* The largest of four components is left out, with the sign that makes it positive: 2 bits say which, then sign and 9 bits for each
-   other. */
+/* The largest of four components is left out, with the sign that makes it positive: 2 bits say which, then
+   sign and 9 bits for each other. */
 static uint32_t pack_rotation(const float wxyz[4])
 {
     const float q[4] = {wxyz[1], wxyz[2], wxyz[3], wxyz[0]};
@@ -65,7 +73,10 @@ static unsigned harmonic_byte(float value, size_t coefficient)
 {
     const int step = coefficient <= 3 ? 8 : 16;
     const double level = nearbyint(128 * (double)value) + 128;
-    const int whole = level > 255 ? 255 : level > 0 ? (int)level : 0, rounded = (whole + step / 2) / step * step;
+    const int whole = level > 255 ? 255
+                      : level > 0 ? (int)level
+                                  : 0,
+              rounded = (whole + step / 2) / step * step;
     return (unsigned)(rounded > 255 ? 255 : rounded);
 }
 
@@ -73,7 +84,8 @@ static void put_streams(sink *s, const gaussian_cloud *cloud, const double origi
 {
     const size_t n = cloud->count, functions = (size_t)((cloud->sh_degree + 1) * (cloud->sh_degree + 1));
     for (size_t i = 0; i < 3 * n; i++)
-        sink_put_uint(s, (uint64_t)(int64_t)llrint(((double)cloud->mean[i] + origin[i % 3]) * exp2(fraction)), 3);
+        sink_put_uint(s, (uint64_t)(int64_t)llrint(((double)cloud->mean[i] + origin[i % 3]) * exp2(fraction)),
+                      3);
     for (size_t i = 0; i < n; i++)
         sink_put_level(s, 255 * (double)cloud->opacity[i]);
     for (size_t i = 0; i < n; i++)
@@ -100,16 +112,19 @@ static gbt_status zip_and_write(const char *path, const sink *plain, gbt_error *
     unsigned char *zipped = mem_alloc(room, 1, "zipped splats", err);
     gbt_status status = zipped == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK) {
-        z.next_out = zipped, z.avail_out = (uInt)room;
-        status = deflate(&z, Z_FINISH) == Z_STREAM_END ? file_write_atomic(path, zipped, z.total_out, err)
-                                                       : base_fail(err, GBT_ERR_INTERNAL, "%s: cannot be zipped", path);
+        z.next_out = zipped;
+        z.avail_out = (uInt)room;
+        status = deflate(&z, Z_FINISH) == Z_STREAM_END
+                     ? file_write_atomic(path, zipped, z.total_out, err)
+                     : base_fail(err, GBT_ERR_INTERNAL, "%s: cannot be zipped", path);
     }
     deflateEnd(&z);
     mem_free(zipped);
     return status;
 }
 
-gbt_status spz_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)
+gbt_status spz_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                          gbt_error *err)
 {
     int fraction = 0;
     GBT_TRY(find_fraction(cloud, origin, path, &fraction, err));
@@ -130,21 +145,24 @@ gbt_status spz_file_write(const char *path, const gaussian_cloud *cloud, const d
     return status;
 }
 
-/* ---- reading ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- reading ---- */
 
 /* Inflate exactly `size` bytes more into `out`. */
 static gbt_status unzip(z_stream *z, const char *name, unsigned char *out, size_t size, gbt_error *err)
 {
     while (size > 0) {
         const uInt part = size < (1u << 30) ? (uInt)size : 1u << 30;
-        z->next_out = out, z->avail_out = part;
+        z->next_out = out;
+        z->avail_out = part;
         const int code = inflate(z, Z_NO_FLUSH);
         const size_t got = part - z->avail_out;
-        out += got, size -= got;
+        out += got;
+        size -= got;
         if (code == Z_MEM_ERROR)
             return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", name);
         if ((code != Z_OK && code != Z_STREAM_END) || (got == 0) || (code == Z_STREAM_END && size > 0))
-            return base_fail(err, GBT_ERR_FORMAT, "%s: its gzip stream is damaged or ends %zu bytes early", name, size);
+            return base_fail(err, GBT_ERR_FORMAT, "%s: its gzip stream is damaged or ends %zu bytes early",
+                             name, size);
     }
     return GBT_OK;
 }
@@ -157,7 +175,8 @@ static void unpack_rotation(const unsigned char *bytes, unsigned version, float 
         for (int k = 0; k < 3; k++)
             q[k] = (float)bytes[k] / 127.5f - 1;
     else {
-        const uint32_t bits = (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
+        const uint32_t bits = (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 |
+                              (uint32_t)bytes[3] << 24;
         missing = (int)(bits >> 30);
         for (int k = 3, shift = 0; k >= 0; k--) {
             if (k == missing)
@@ -180,11 +199,12 @@ static void unpack(const unsigned char *at, unsigned version, int degree, int fr
 {
     const size_t n = out->count;
     const layout l = layout_of(version, degree);
-    const unsigned char *alpha = at + 9 * n, *color = alpha + n, *scale = color + 3 * n, *rotation = scale + 3 * n,
-        *harmonics = rotation + l.rotation * n;
+    const unsigned char *alpha = at + 9 * n, *color = alpha + n, *scale = color + 3 * n,
+                        *rotation = scale + 3 * n, *harmonics = rotation + l.rotation * n;
     out->sh_degree = degree;
     for (size_t i = 0; i < 3 * n; i++) {
-        const uint32_t bits = (uint32_t)at[3 * i] | (uint32_t)at[3 * i + 1] << 8 | (uint32_t)at[3 * i + 2] << 16;
+        const uint32_t bits =
+            (uint32_t)at[3 * i] | (uint32_t)at[3 * i + 1] << 8 | (uint32_t)at[3 * i + 2] << 16;
         out->mean[i] = (float)(((double)bits - (bits & 0x800000 ? 0x1p24 : 0)) * exp2(-fraction));
         out->scale_log[i] = (float)scale[i] / 16 - 10;
     }
@@ -210,13 +230,17 @@ static gbt_status read_zipped(z_stream *z, const source_file *file, gaussian_clo
     const uint32_t magic = cursor_u32(&c), version = cursor_u32(&c), count = cursor_u32(&c);
     const int degree = header[12], fraction = header[13];
     if (magic != MAGIC || (version != 2 && version != 3))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: .spz version %u (wanted 2 or 3)", file->name, magic == MAGIC ? version : 0u);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: .spz version %u (wanted 2 or 3)", file->name,
+                         magic == MAGIC ? version : 0u);
     if (degree > 3 || fraction > 24 || count == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: %u Gaussians, degree %d, %d fractional bits (wanted 1 or more, 0 to 3, 0 to 24)",
-                         file->name, count, degree, fraction);
+        return base_fail(
+            err, GBT_ERR_FORMAT,
+            "%s: %u Gaussians, degree %d, %d fractional bits (wanted 1 or more, 0 to 3, 0 to 24)", file->name,
+            count, degree, fraction);
     const size_t row = layout_of(version, degree).row;
     if ((double)count * (double)row > 1032.0 * (double)file->size) /* gzip makes nothing smaller than that */
-        return base_fail(err, GBT_ERR_FORMAT, "%s: %u Gaussians cannot be in %zu bytes", file->name, count, file->size);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %u Gaussians cannot be in %zu bytes", file->name, count,
+                         file->size);
     unsigned char *streams = mem_alloc(count, row, "splats", err);
     gbt_status status = streams == NULL ? GBT_ERR_NO_MEMORY : unzip(z, file->name, streams, count * row, err);
     if (status == GBT_OK)
@@ -231,9 +255,11 @@ gbt_status spz_file_read(const source_file *file, gaussian_cloud *out, gbt_error
 {
     memset(out, 0, sizeof *out);
     if (file->size >= 4 && memcmp(file->bytes, "NGSP", 4) == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: .spz version 4 (wanted 2 or 3, which are gzipped)", file->name);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: .spz version 4 (wanted 2 or 3, which are gzipped)",
+                         file->name);
     if (file->size < 18 || file->bytes[0] != 0x1f || file->bytes[1] != 0x8b || file->size > UINT32_MAX / 2)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no .spz file (it does not begin as gzip does)", file->name);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no .spz file (it does not begin as gzip does)",
+                         file->name);
     unsigned char *copy = mem_alloc(file->size, 1, "splats", err); /* zlib's pointer is not const */
     if (copy == NULL)
         return GBT_ERR_NO_MEMORY;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* data/transforms.c -- transforms.json from bytes. */
 #include "data/transforms.h"
 
@@ -51,13 +52,15 @@ static gbt_status find_size(const scope *s, const char *key, int *out, bool *fou
     if (!*found)
         return GBT_OK;
     if (!(value >= 1 && value <= RAW_IMAGE_LIMIT && value == floor(value)))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: %s: out of range (wanted a whole number in 1..%d, got %g)", s->file->name,
-                         s->frame_index, key, RAW_IMAGE_LIMIT, value);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: frame %zu: %s: out of range (wanted a whole number in 1..%d, got %g)",
+                         s->file->name, s->frame_index, key, RAW_IMAGE_LIMIT, value);
     *out = (int)value;
     return GBT_OK;
 }
 
-/* camera_angle_x or _y, radians, else x_fov or y_fov, degrees, to a focal length in pixels; 0 when neither is there. */
+/* camera_angle_x or _y, radians, else x_fov or y_fov, degrees, to a focal length in pixels; 0 when neither is
+   there. */
 static gbt_status focal_from_angle(const scope *s, char axis, int size, double *focal, gbt_error *err)
 {
     double angle = 0;
@@ -74,7 +77,8 @@ static gbt_status focal_from_angle(const scope *s, char axis, int size, double *
     if (!found)
         return GBT_OK;
     if (!(angle > 0 && angle < 3.14159265358979))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: %s: out of range (wanted 0..pi radians, got %g)", s->file->name,
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: frame %zu: %s: out of range (wanted 0..pi radians, got %g)", s->file->name,
                          s->frame_index, key, angle);
     *focal = 0.5 * size / tan(0.5 * angle);
     return GBT_OK;
@@ -88,8 +92,9 @@ static gbt_status find_family(const scope *s, lens_family *family, bool *is_open
         const char *name;
         lens_family family;
     } known[] = {
-        {"SIMPLE_PINHOLE", LENS_PERSPECTIVE}, {"PINHOLE", LENS_PERSPECTIVE},        {"SIMPLE_RADIAL", LENS_PERSPECTIVE},
-        {"RADIAL", LENS_PERSPECTIVE},         {"OPENCV", LENS_PERSPECTIVE},         {"FULL_OPENCV", LENS_PERSPECTIVE},
+        {"SIMPLE_PINHOLE", LENS_PERSPECTIVE}, {"PINHOLE", LENS_PERSPECTIVE},
+        {"SIMPLE_RADIAL", LENS_PERSPECTIVE},  {"RADIAL", LENS_PERSPECTIVE},
+        {"OPENCV", LENS_PERSPECTIVE},         {"FULL_OPENCV", LENS_PERSPECTIVE},
         {"OPENCV_FISHEYE", LENS_FISHEYE},     {"EQUIRECTANGULAR", LENS_EQUIRECTANGULAR},
     };
     *is_opencv = false;
@@ -109,7 +114,8 @@ static gbt_status find_family(const scope *s, lens_family *family, bool *is_open
             *is_opencv = strcmp(name, "OPENCV") == 0;
             return GBT_OK;
         }
-    return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: camera_model is not supported: %.60s", s->file->name, s->frame_index, name);
+    return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: camera_model is not supported: %.60s",
+                     s->file->name, s->frame_index, name);
 }
 
 enum { K1, K2, K3, K4, P1, P2, LENS_COUNT };
@@ -136,7 +142,8 @@ static gbt_status find_distortion(const scope *s, double lens[LENS_COUNT], bool 
 }
 
 /* The focal lengths: fl_x and fl_y, else the angles; a missing y follows x. */
-static gbt_status find_focal(const scope *s, const gbt_camera *camera, double focal[2], raw_scene *out, gbt_error *err)
+static gbt_status find_focal(const scope *s, const gbt_camera *camera, double focal[2], raw_scene *out,
+                             gbt_error *err)
 {
     bool has_x, has_y;
     double from_angle[2];
@@ -155,7 +162,8 @@ static gbt_status find_focal(const scope *s, const gbt_camera *camera, double fo
     return GBT_OK;
 }
 
-static gbt_status read_camera(const scope *s, const char *photo, gbt_camera *camera, raw_scene *out, gbt_error *err)
+static gbt_status read_camera(const scope *s, const char *photo, gbt_camera *camera, raw_scene *out,
+                              gbt_error *err)
 {
     bool has_width, has_height, has_cx, has_cy, is_opencv, any;
     lens_family family = LENS_PERSPECTIVE;
@@ -173,7 +181,8 @@ static gbt_status read_camera(const scope *s, const char *photo, gbt_camera *cam
     const raw_place place = {s->file->name, RAW_MARK_FRAME, s->frame_index};
     if (family == LENS_EQUIRECTANGULAR) {
         camera->model = GBT_CAMERA_EQUIRECTANGULAR;
-        p[0] = camera->width, p[1] = camera->height;
+        p[0] = camera->width;
+        p[1] = camera->height;
         return raw_check_camera(camera, place, err);
     }
     GBT_TRY(find_focal(s, camera, focal, out, err));
@@ -181,7 +190,10 @@ static gbt_status read_camera(const scope *s, const char *photo, gbt_camera *cam
     GBT_TRY(find_number(s, "cx", &cx, &has_cx, err));
     GBT_TRY(find_number(s, "cy", &cy, &has_cy, err));
     GBT_TRY(find_distortion(s, lens, &any, err));
-    p[0] = focal[0], p[1] = focal[1], p[2] = cx, p[3] = cy;
+    p[0] = focal[0];
+    p[1] = focal[1];
+    p[2] = cx;
+    p[3] = cy;
     if (family == LENS_FISHEYE) {
         if (lens[P1] != 0 || lens[P2] != 0)
             return scope_fail(s, err, "a fisheye with tangential distortion is not supported", "p1, p2");
@@ -193,7 +205,10 @@ static gbt_status read_camera(const scope *s, const char *photo, gbt_camera *cam
         if (lens[K4] != 0)
             return scope_fail(s, err, "not supported for a lens that is not a fisheye", "k4");
         camera->model = lens[K3] != 0 ? GBT_CAMERA_FULL_OPENCV : GBT_CAMERA_OPENCV;
-        p[4] = lens[K1], p[5] = lens[K2], p[6] = lens[P1], p[7] = lens[P2];
+        p[4] = lens[K1];
+        p[5] = lens[K2];
+        p[6] = lens[P1];
+        p[7] = lens[P2];
         if (lens[K3] != 0)
             p[8] = lens[K3];
     }
@@ -262,9 +277,12 @@ static gbt_status read_pose(const scope *s, gbt_camera *camera, gbt_error *err)
             worst = fmax(worst, fabs(dot - (i == k)));
         }
     if (!(worst <= 1e-3))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: transform_matrix is not a rotation (wanted |R'R - I| <= 1e-3, got %g)",
-                         s->file->name, s->frame_index, worst);
-    const double x[3] = {m[0][0], m[1][0], m[2][0]}, y[3] = {m[0][1], m[1][1], m[2][1]}, z[3] = {m[0][2], m[1][2], m[2][2]};
+        return base_fail(
+            err, GBT_ERR_FORMAT,
+            "%s: frame %zu: transform_matrix is not a rotation (wanted |R'R - I| <= 1e-3, got %g)",
+            s->file->name, s->frame_index, worst);
+    const double x[3] = {m[0][0], m[1][0], m[2][0]}, y[3] = {m[0][1], m[1][1], m[2][1]},
+                 z[3] = {m[0][2], m[1][2], m[2][2]};
     double cross[3];
     dvec_cross(x, y, cross);
     if (dvec_dot(cross, z) < 0)
@@ -272,7 +290,8 @@ static gbt_status read_pose(const scope *s, gbt_camera *camera, gbt_error *err)
     orthonormalize(rotation);
     for (int i = 0; i < 3; i++) {
         camera->center[i] = m[i][3];
-        /* Rows of world-to-camera are columns of camera-to-world; y and z change sign between OpenGL's axes and ours. */
+        /* Rows of world-to-camera are columns of camera-to-world; y and z change sign between OpenGL's axes
+           and ours. */
         camera->rotation[0 + i] = rotation[3 * i];
         camera->rotation[3 + i] = -rotation[3 * i + 1];
         camera->rotation[6 + i] = -rotation[3 * i + 2];
@@ -290,7 +309,8 @@ static const char *plain_name(const json_t *text)
 }
 
 /* The photo of a frame: the name as it is, then with .png and .jpg. False when none is there. */
-static gbt_status find_photo(const char *folder, const char *name, char path[PATH_SIZE], bool *found, gbt_error *err)
+static gbt_status find_photo(const char *folder, const char *name, char path[PATH_SIZE], bool *found,
+                             gbt_error *err)
 {
     static const char *const endings[] = {"", ".png", ".jpg"};
     *found = false;
@@ -313,10 +333,12 @@ static gbt_status find_mask(const scope *s, const char *folder, char **out, gbt_
         return scope_fail(s, err, "wanted a string", "mask_path");
     const char *name = json_string_value(value);
     char path[PATH_SIZE];
-    GBT_TRY(raw_check_name(name, strlen(name), (raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, err));
+    GBT_TRY(
+        raw_check_name(name, strlen(name), (raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, err));
     GBT_TRY(file_join(path, sizeof path, folder, name, err));
     if (!file_exists(path) || file_is_folder(path))
-        return base_fail(err, GBT_ERR_IO, "%s: frame %zu: mask is missing: %.200s", s->file->name, s->frame_index, path);
+        return base_fail(err, GBT_ERR_IO, "%s: frame %zu: mask is missing: %.200s", s->file->name,
+                         s->frame_index, path);
     *out = raw_copy_text(path, strlen(path), err);
     return *out != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
@@ -327,7 +349,8 @@ static gbt_status read_frame(const scope *s, const char *folder, raw_scene *out,
     if (!json_is_string(value))
         return scope_fail(s, err, "wanted a string", "file_path");
     const char *name = plain_name(value);
-    GBT_TRY(raw_check_name(name, strlen(name), (raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, err));
+    GBT_TRY(
+        raw_check_name(name, strlen(name), (raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, err));
     char path[PATH_SIZE];
     bool found;
     gbt_camera camera = {0};
@@ -345,7 +368,9 @@ static gbt_status read_frame(const scope *s, const char *folder, raw_scene *out,
         mem_free(mask);
         return GBT_ERR_NO_MEMORY;
     }
-    *view = (raw_view){.name = raw_copy_text(name, strlen(name), err), .path = raw_copy_text(path, strlen(path), err), .mask_path = mask,
+    *view = (raw_view){.name = raw_copy_text(name, strlen(name), err),
+                       .path = raw_copy_text(path, strlen(path), err),
+                       .mask_path = mask,
                        .camera = camera};
     out->view_count++;
     return view->name != NULL && view->path != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
@@ -358,11 +383,14 @@ static gbt_status read_split(const source_file *file, const json_t *root, raw_sc
     if (list == NULL)
         return GBT_OK;
     json_t *names = json_object();
-    gbt_status status = json_is_array(list) ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "%s: train_filenames: wanted a list", file->name);
+    gbt_status status = json_is_array(list) ? GBT_OK
+                                            : base_fail(err, GBT_ERR_FORMAT,
+                                                        "%s: train_filenames: wanted a list", file->name);
     for (size_t i = 0; i < json_array_size(list) && status == GBT_OK; i++) {
         const json_t *name = json_array_get(list, i);
         if (!json_is_string(name))
-            status = base_fail(err, GBT_ERR_FORMAT, "%s: train_filenames: entry %zu is not a string", file->name, i);
+            status = base_fail(err, GBT_ERR_FORMAT, "%s: train_filenames: entry %zu is not a string",
+                               file->name, i);
         else if (json_object_set_new(names, plain_name(name), json_true()) != 0)
             status = base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for the names", file->name);
     }
@@ -373,8 +401,8 @@ static gbt_status read_split(const source_file *file, const json_t *root, raw_sc
     return status;
 }
 
-static gbt_status read_root(const source_file *file, const json_t *root, const char *folder, raw_scene *out, char **points_name,
-                            gbt_error *err)
+static gbt_status read_root(const source_file *file, const json_t *root, const char *folder, raw_scene *out,
+                            char **points_name, gbt_error *err)
 {
     const json_t *frames = json_object_get(root, "frames");
     if (frames == NULL)
@@ -389,7 +417,8 @@ static gbt_status read_root(const source_file *file, const json_t *root, const c
     }
     if (out->view_count == 0) {
         const char *first = json_string_value(json_object_get(json_array_get(frames, 0), "file_path"));
-        return base_fail(err, GBT_ERR_IO, "%s: none of the %zu photos exists, the first is %.200s", file->name, out->photos_missing, first);
+        return base_fail(err, GBT_ERR_IO, "%s: none of the %zu photos exists, the first is %.200s",
+                         file->name, out->photos_missing, first);
     }
     GBT_TRY(read_split(file, root, out, err));
     const json_t *points = json_object_get(root, "ply_file_path");
@@ -403,7 +432,8 @@ static gbt_status read_root(const source_file *file, const json_t *root, const c
     return *points_name != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
-gbt_status transforms_read(const source_file *file, const char *folder, raw_scene *out, char **points_name, gbt_error *err)
+gbt_status transforms_read(const source_file *file, const char *folder, raw_scene *out, char **points_name,
+                           gbt_error *err)
 {
     *points_name = NULL;
     if (file->size == 0)
@@ -413,7 +443,8 @@ gbt_status transforms_read(const source_file *file, const char *folder, raw_scen
     if (root == NULL) {
         if (json_error_code(&fault) == json_error_out_of_memory)
             return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for the JSON", file->name);
-        return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not usable JSON: %s", file->name, fault.line, fault.text);
+        return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not usable JSON: %s", file->name, fault.line,
+                         fault.text);
     }
     gbt_status status;
     if (json_is_object(root))

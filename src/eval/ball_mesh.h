@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* eval/ball_mesh.h -- balls as triangles: one icosphere each, for mesh viewers. */
 #ifndef GBT_EVAL_BALL_MESH_H
 #define GBT_EVAL_BALL_MESH_H
@@ -24,7 +25,8 @@ typedef struct ball_mesh {
  * @param out           [out] free with ball_mesh_free(); zeroed on failure
  * @return GBT_OK, GBT_ERR_NO_MEMORY (also when the vertices do not fit 32-bit indices)
  */
-gbt_status ball_mesh_build(const float *center, const float *radius, const float *color, size_t count, ball_mesh *out, gbt_error *err);
+gbt_status ball_mesh_build(const float *center, const float *radius, const float *color, size_t count,
+                           ball_mesh *out, gbt_error *err);
 void ball_mesh_free(ball_mesh *mesh);
 
 #endif

@@ -1,4 +1,6 @@
-/* eval/compare_images.c -- two pictures, how far apart: what bench/versus_metrics holds against other programs. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* eval/compare_images.c -- two pictures, how far apart: what bench/versus_metrics holds against other
+   programs. */
 #include <math.h>
 #include <string.h>
 
@@ -24,7 +26,8 @@ static gbt_status read_colors(const char *path, image *out, gbt_error *err)
 /* Of two quantized images. */
 static gbt_status compare(const image *a, const image *b, gbt_comparison *out, gbt_error *err)
 {
-    *out = (gbt_comparison){a->width, a->height, metric_psnr(a, b), metric_ssim(a, b), metric_ssim_interior(a, b), 0};
+    *out = (gbt_comparison){
+        a->width, a->height, metric_psnr(a, b), metric_ssim(a, b), metric_ssim_interior(a, b), 0};
     return metric_flip(a, b, &out->flip, NULL, err);
 }
 
@@ -34,8 +37,8 @@ static gbt_status read_pair(const char *path, const char *reference, image *a, i
     GBT_TRY(read_colors(path, a, err));
     GBT_TRY(read_colors(reference, b, err));
     if (a->width != b->width || a->height != b->height)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted %d x %d as %s)", path, a->width, a->height, b->width,
-                         b->height, reference);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted %d x %d as %s)", path, a->width,
+                         a->height, b->width, b->height, reference);
     return GBT_OK;
 }
 
@@ -51,7 +54,8 @@ gbt_status gbt_compare_images(const char *path, const char *reference, gbt_compa
     return status;
 }
 
-gbt_status gbt_compare_lpips(const char *path, const char *reference, const char *network, double out[2], gbt_error *err)
+gbt_status gbt_compare_lpips(const char *path, const char *reference, const char *network, double out[2],
+                             gbt_error *err)
 {
     image a = {0}, b = {0};
     lpips *net = NULL;
@@ -61,14 +65,16 @@ gbt_status gbt_compare_lpips(const char *path, const char *reference, const char
         status = lpips_open(network, &net, err);
     if (status == GBT_OK)
         status = lpips_compare(net, &a, &b, NULL, 0, &scores, err);
-    out[0] = scores.lpips, out[1] = scores.lpips_01;
+    out[0] = scores.lpips;
+    out[1] = scores.lpips_01;
     lpips_close(net);
     image_free(&a);
     image_free(&b);
     return status;
 }
 
-gbt_status gbt_compare_pictures(const float *picture, const float *reference, int width, int height, gbt_comparison *out, gbt_error *err)
+gbt_status gbt_compare_pictures(const float *picture, const float *reference, int width, int height,
+                                gbt_comparison *out, gbt_error *err)
 {
     const float *const from[2] = {picture, reference};
     image copies[2] = {{0}, {0}};

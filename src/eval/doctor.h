@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* eval/doctor.h -- how the doctor's checks write their lines. */
 #ifndef GBT_EVAL_DOCTOR_H
 #define GBT_EVAL_DOCTOR_H
@@ -7,7 +8,8 @@
 /** The next line, with level ok. The caller writes its texts. */
 gbt_check *doctor_line(gbt_diagnosis *d, const char *name);
 
-/** Tracer and adjoint against the double references on a procedural cloud; and how many rays go through a larger one in a second. */
+/** Tracer and adjoint against the double references on a procedural cloud; and how many rays go through a
+    larger one in a second. */
 gbt_status doctor_self_test(gbt_diagnosis *d, gbt_error *err);
 
 #endif

@@ -1,4 +1,6 @@
-/* eval/doctor_self_test.c -- a small cloud traced, and its gradients, beside the double references; a larger one against the clock. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* eval/doctor_self_test.c -- a small cloud traced, and its gradients, beside the double references; a larger
+   one against the clock. */
 #include <math.h>
 #include <stdio.h>
 
@@ -11,10 +13,19 @@
 #include "trace/reference.h"
 #include "trace/trace.h"
 
-enum { SMALL = 1500, LARGE = 30000, SMALL_WIDTH = 64, SMALL_HEIGHT = 48, LARGE_SIDE = 256, PASSES = 3, STREAM_PLACE = 1,
-      STREAM_GRADIENT = 2 };
+enum {
+    SMALL = 1500,
+    LARGE = 30000,
+    SMALL_WIDTH = 64,
+    SMALL_HEIGHT = 48,
+    LARGE_SIDE = 256,
+    PASSES = 3,
+    STREAM_PLACE = 1,
+    STREAM_GRADIENT = 2
+};
 
-/* A float picture differs by rounding of its sums alone, where no cut-off is near; the tests hold random scenes to the same. */
+/* A float picture differs by rounding of its sums alone, where no cut-off is near; the tests hold random
+   scenes to the same. */
 static const double picture_limit = 1e-4, gradient_limit = 5e-5;
 
 typedef struct patient {
@@ -35,12 +46,18 @@ static gbt_status make_cloud(gaussians *g, size_t count, double size, gbt_error 
         double p[3], q[4], length = 0;
         for (unsigned k = 0; k < 3; k++)
             p[k] = 0.5 * rng_normal(STREAM_PLACE, i, k);
-        for (unsigned k = 0; k < 4; k++)
-            q[k] = rng_normal(STREAM_PLACE, i, 3 + k), length += q[k] * q[k];
+        for (unsigned k = 0; k < 4; k++) {
+            q[k] = rng_normal(STREAM_PLACE, i, 3 + k);
+            length += q[k] * q[k];
+        }
         length = sqrt(length);
-        g->mean_x[i] = (float)p[0], g->mean_y[i] = (float)p[1], g->mean_z[i] = (float)p[2];
-        g->quat_w[i] = (float)(q[0] / length), g->quat_x[i] = (float)(q[1] / length);
-        g->quat_y[i] = (float)(q[2] / length), g->quat_z[i] = (float)(q[3] / length);
+        g->mean_x[i] = (float)p[0];
+        g->mean_y[i] = (float)p[1];
+        g->mean_z[i] = (float)p[2];
+        g->quat_w[i] = (float)(q[0] / length);
+        g->quat_x[i] = (float)(q[1] / length);
+        g->quat_y[i] = (float)(q[2] / length);
+        g->quat_z[i] = (float)(q[3] / length);
         g->scale_x[i] = (float)(size * exp(0.3 * rng_normal(STREAM_PLACE, i, 7)));
         g->scale_y[i] = (float)(size * exp(0.3 * rng_normal(STREAM_PLACE, i, 8)));
         g->scale_z[i] = (float)(0.3 * size);
@@ -55,8 +72,12 @@ static gbt_status make_cloud(gaussians *g, size_t count, double size, gbt_error 
 
 static gbt_status set_up(patient *p, size_t count, double size, int width, int height, gbt_error *err)
 {
-    const gbt_camera camera = {.model = GBT_CAMERA_SIMPLE_PINHOLE, .width = width, .height = height,
-                               .params = {width, 0.5 * width, 0.5 * height}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0, 0, -3}};
+    const gbt_camera camera = {.model = GBT_CAMERA_SIMPLE_PINHOLE,
+                               .width = width,
+                               .height = height,
+                               .params = {width, 0.5 * width, 0.5 * height},
+                               .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                               .center = {0, 0, -3}};
     p->settings = trace_settings_default();
     GBT_TRY(make_cloud(&p->g, count, size, err));
     GBT_TRY(ray_image_from_camera(&camera, &p->rays, err));
@@ -70,22 +91,26 @@ static gbt_status find_band(patient *p, const reference_scene *exact, size_t *le
     gbt_status status = GBT_OK;
     *left_out = 0;
     for (size_t i = 0; i < ray_image_count(&p->rays) && status == GBT_OK; i++) {
-        status = rounding_band_find(exact, &p->settings, ray_image_origin(&p->rays, i), p->rays.dir + 3 * i, &scratch, &p->in_band[i]);
+        status = rounding_band_find(exact, &p->settings, ray_image_origin(&p->rays, i), p->rays.dir + 3 * i,
+                                    &scratch, &p->in_band[i]);
         *left_out += p->in_band[i];
     }
     band_scratch_free(&scratch);
     return status == GBT_OK ? GBT_OK : base_fail(err, status, "self test: no memory");
 }
 
-static void write_result(gbt_diagnosis *d, const char *name, const char *what, double error, double limit, size_t rays, size_t left_out)
+static void write_result(gbt_diagnosis *d, const char *name, const char *what, double error, double limit,
+                         size_t rays, size_t left_out)
 {
     gbt_check *c = doctor_line(d, name);
-    snprintf(c->found, sizeof c->found,
-             "%d Gaussians, %zu rays (%zu at a cut-off left out): %s %.1e from the double reference (limit %.0e)", (int)SMALL, rays,
-             left_out, what, error, limit);
+    snprintf(
+        c->found, sizeof c->found,
+        "%d Gaussians, %zu rays (%zu at a cut-off left out): %s %.1e from the double reference (limit %.0e)",
+        (int)SMALL, rays, left_out, what, error, limit);
     if (!(error <= limit)) {
         c->level = GBT_CHECK_FAIL;
-        snprintf(c->advice, sizeof c->advice, "do not use this build; try GBT_ISA=avx2 or GBT_ISA=plain, and report it");
+        snprintf(c->advice, sizeof c->advice,
+                 "do not use this build; try GBT_ISA=avx2 or GBT_ISA=plain, and report it");
     }
 }
 
@@ -107,7 +132,8 @@ static gbt_status compare_pictures(patient *p, const reference_scene *exact, gbt
     return GBT_OK;
 }
 
-static gbt_status compare_gradients(patient *p, const reference_scene *exact, gbt_diagnosis *d, gbt_error *err)
+static gbt_status compare_gradients(patient *p, const reference_scene *exact, gbt_diagnosis *d,
+                                    gbt_error *err)
 {
     const size_t rays = ray_image_count(&p->rays);
     size_t left_out = 0;
@@ -118,7 +144,8 @@ static gbt_status compare_gradients(patient *p, const reference_scene *exact, gb
         left_out += i % 3 == 0 && p->in_band[i / 3];
     }
     GBT_TRY(trace_backward(&p->scene, &p->rays, &p->d_rgb, &p->d_gaussians, NULL, NULL, err));
-    GBT_TRY(reference_scene_backward(exact, &p->settings, &p->rays, p->d_exact, NULL, p->d_wanted, background, err));
+    GBT_TRY(reference_scene_backward(exact, &p->settings, &p->rays, p->d_exact, NULL, p->d_wanted, background,
+                                     err));
     const float *const fields[] = {
 #define X(name, pad, meaning) p->d_gaussians.name,
         GAUSSIANS_FIELDS(X)
@@ -127,9 +154,11 @@ static gbt_status compare_gradients(patient *p, const reference_scene *exact, gb
     for (size_t f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
         for (size_t i = 0; i < p->g.count; i++) {
             const double wanted = p->d_wanted[f * p->g.count + i], error = (double)fields[f][i] - wanted;
-            square += error * error, wanted_square += wanted * wanted;
+            square += error * error;
+            wanted_square += wanted * wanted;
         }
-    write_result(d, "gradients", "relative error", sqrt(square / wanted_square), gradient_limit, rays, left_out);
+    write_result(d, "gradients", "relative error", sqrt(square / wanted_square), gradient_limit, rays,
+                 left_out);
     return GBT_OK;
 }
 

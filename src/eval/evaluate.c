@@ -1,4 +1,6 @@
-/* eval/evaluate.c -- score a run on its held-out views and write what is known of it: metrics.json, the page, events. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* eval/evaluate.c -- score a run on its held-out views and write what is known of it: metrics.json, the page,
+   events. */
 #include "gbtrace/evaluate.h"
 
 #include <jansson.h>
@@ -13,33 +15,34 @@
 #include "eval/score_run.h"
 #include "report/report.h"
 
-gbt_evaluate_def gbt_evaluate_def_default(void)
-{
-    return (gbt_evaluate_def){.report = 1};
-}
+gbt_evaluate_def gbt_evaluate_def_default(void) { return (gbt_evaluate_def){.report = 1}; }
 
 static void log_scores(const evaluation *e)
 {
     char more[64] = "";
     if (e->lpips_network != NULL)
-        snprintf(more, sizeof more, ", LPIPS (%s) %.4f, in [0, 1] %.4f", e->lpips_network, e->lpips.lpips, e->lpips.lpips_01);
+        snprintf(more, sizeof more, ", LPIPS (%s) %.4f, in [0, 1] %.4f", e->lpips_network, e->lpips.lpips,
+                 e->lpips.lpips_01);
     if (e->view_count == 0)
         log_info("no held-out views: scores are n/a");
     else
-        log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f%s", e->view_count, e->psnr, e->ssim, e->flip, more);
+        log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f%s", e->view_count, e->psnr, e->ssim,
+                 e->flip, more);
 }
 
 /**
- * @param own [out] whether the scores are those of the run's own settings: its renderer, size and cut-offs, and its data set, or one that
- *            stands for it when it has none or its own is gone
+ * @param own [out] whether the scores are those of the run's own settings: its renderer, size and cut-offs,
+ *                  and its data set, or one that stands for it when it has none or its own is gone
  */
-static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_run *r, bool *own, gbt_error *err)
+static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_run *r, bool *own,
+                           gbt_error *err)
 {
     GBT_TRY(loaded_run_open(run, def->data, def->downscale, r, err));
     GBT_TRY(loaded_run_preset(def->preset, &r->settings, err));
     const frame_renderer trained = r->frame.draw.renderer;
     if (def->renderer != NULL && !frame_renderer_named(def->renderer, &r->frame.draw.renderer))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)", def->renderer);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)",
+                         def->renderer);
     const char *data = r->model.data_folder;
     *own = r->frame.draw.renderer == trained && (def->downscale <= 0 || def->downscale == r->def.downscale) &&
            (def->preset == NULL || strcmp(def->preset, "default") == 0) &&
@@ -48,8 +51,8 @@ static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_
 }
 
 /* What belongs to the run. */
-static gbt_status write_own(const char *run, const gbt_evaluate_def *def, loaded_run *r, const evaluation *e, const json_t *metrics,
-                            gbt_error *err)
+static gbt_status write_own(const char *run, const gbt_evaluate_def *def, loaded_run *r, const evaluation *e,
+                            const json_t *metrics, gbt_error *err)
 {
     char path[4096];
     GBT_TRY(file_join(path, sizeof path, run, "metrics.json", err));
@@ -89,9 +92,13 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
     if (status == GBT_OK)
         log_scores(&e);
     if (status == GBT_OK && !own && def->json != NULL)
-        log_info("other settings than the run's own: these scores are in %s; %s/metrics.json and report.html stay", def->json, run);
+        log_info(
+            "other settings than the run's own: these scores are in %s; %s/metrics.json and report.html stay",
+            def->json, run);
     else if (status == GBT_OK && !own)
-        log_info("other settings than the run's own: %s/metrics.json and report.html stay; --json FILE keeps these scores", run);
+        log_info("other settings than the run's own: %s/metrics.json and report.html stay; --json FILE keeps "
+                 "these scores",
+                 run);
     lpips_close(net);
     mem_free(e.views);
     loaded_run_close(r);

@@ -1,4 +1,6 @@
-/* eval/expect.h -- what training on a data set will ask of the machine: memory and time, from constants that were measured. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* eval/expect.h -- what training on a data set will ask of the machine: memory and time, from constants that
+   were measured. */
 #ifndef GBT_EVAL_EXPECT_H
 #define GBT_EVAL_EXPECT_H
 
@@ -15,8 +17,8 @@ typedef struct expectation {
 } expectation;
 
 /**
- * Of a run with the default settings and photos divided by `downscale`. Good within a factor of 1.5 on scenes like those it was measured
- * on.
+ * Of a run with the default settings and photos divided by `downscale`. Good within a factor of 1.5 on scenes
+ * like those it was measured on.
  */
 expectation expect_training(const scene *s, double downscale, int threads);
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* eval/import.c -- a trained Scaffold-GS model as a run. */
 #include "gbtrace/import.h"
 
@@ -16,10 +17,7 @@
 /* Where the reference implementation stops seeing, along the view axis. */
 static const float reference_near = 0.2f;
 
-gbt_import_def gbt_import_def_default(void)
-{
-    return (gbt_import_def){.renderer = "raster"};
-}
+gbt_import_def gbt_import_def_default(void) { return (gbt_import_def){.renderer = "raster"}; }
 
 static gbt_status find_input(const char *input, result_folder *out, gbt_error *err)
 {
@@ -31,7 +29,8 @@ static gbt_status find_input(const char *input, result_folder *out, gbt_error *e
         GBT_TRY(file_join(out->ply, sizeof out->ply, input, "point_cloud.ply", err));
         if (!file_exists(out->ply))
             return base_fail(err, GBT_ERR_IO,
-                             "%s: no model of Scaffold-GS (wanted point_cloud/iteration_N/point_cloud.ply or point_cloud.ply in it)",
+                             "%s: no model of Scaffold-GS (wanted point_cloud/iteration_N/point_cloud.ply or "
+                             "point_cloud.ply in it)",
                              input);
         return GBT_OK;
     }
@@ -51,7 +50,9 @@ static gbt_status describe(model *m, const result_folder *from, const gbt_import
     if (snprintf(m->data_folder, sizeof m->data_folder, "%s", data) >= (int)sizeof m->data_folder)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", data);
     gbt_train_def train = gbt_train_def_default();
-    train.renderer = def->renderer, train.footprint = 0, train.compat = true;
+    train.renderer = def->renderer;
+    train.footprint = 0;
+    train.compat = true;
     train.offsets = m->anchors.offset_count;
     train.alpha = from->white_background ? "white" : "black";
     config_text(&train, m->data_folder, m->config, sizeof m->config);
@@ -70,11 +71,13 @@ static gbt_status write_run(const model *m, const char *run, gbt_error *err)
     return model_save(path, m, err);
 }
 
-gbt_status gbt_import(const char *input, const gbt_import_def *def, const char *run, FILE *report, gbt_error *err)
+gbt_status gbt_import(const char *input, const gbt_import_def *def, const char *run, FILE *report,
+                      gbt_error *err)
 {
     frame_renderer unused;
     if (!frame_renderer_named(def->renderer, &unused))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)", def->renderer);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)",
+                         def->renderer);
     result_folder *from = mem_calloc(1, sizeof *from, "import", err);
     model *m = mem_calloc(1, sizeof *m, "import", err);
     size_t dropped = 0;
@@ -86,9 +89,11 @@ gbt_status gbt_import(const char *input, const gbt_import_def *def, const char *
     if (status == GBT_OK)
         status = write_run(m, run, err);
     if (status == GBT_OK && report != NULL)
-        fprintf(report, "%s: %zu anchors with %d Gaussians each at most, %zu unusable ones dropped; networks %s the distance; written to "
-                        "%s\n", from->ply,
-                m->anchors.count, m->anchors.offset_count, dropped, m->decoder.has_distance ? "with" : "without", run);
+        fprintf(report,
+                "%s: %zu anchors with %d Gaussians each at most, %zu unusable ones dropped; networks %s the "
+                "distance; written to %s\n",
+                from->ply, m->anchors.count, m->anchors.offset_count, dropped,
+                m->decoder.has_distance ? "with" : "without", run);
     if (m != NULL)
         model_free(m);
     mem_free(m);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* eval/info.c -- what a data set or a model holds, for a person or as JSON. */
 #include "gbtrace/info.h"
 
@@ -17,7 +18,7 @@
 #include "eval/expect.h"
 #include "io/model_file.h"
 
-/* ---- data sets ---------------------------------------------------------------------------------------------------------------- */
+/* ---- data sets ---- */
 
 typedef struct photo_counts {
     size_t found, unreadable, other_size; /* other_size: readable, but not the camera's size */
@@ -48,9 +49,11 @@ static photo_counts count_photos(const scene *s)
 }
 
 /**
- * The box that leaves out 5 % of the points on each side of each axis, world coordinates: a few outliers must not be the size of a scene.
+ * The box that leaves out 5 % of the points on each side of each axis, world coordinates: a few outliers must
+ * not be the size of a scene.
  */
-static gbt_status find_box(const float *position, size_t count, const double origin[3], double low[3], double high[3], gbt_error *err)
+static gbt_status find_box(const float *position, size_t count, const double origin[3], double low[3],
+                           double high[3], gbt_error *err)
 {
     float *axis = mem_alloc(count, sizeof *axis, "points", err);
     if (axis == NULL)
@@ -75,10 +78,7 @@ typedef struct dataset_facts {
 } dataset_facts;
 
 /* Which views are held out when nobody says otherwise. */
-static const char *split_name(const scene *s)
-{
-    return s->has_split ? "own" : "every=8";
-}
+static const char *split_name(const scene *s) { return s->has_split ? "own" : "every=8"; }
 
 static json_t *dataset_to_json(const char *path, const dataset_facts *f)
 {
@@ -86,20 +86,24 @@ static json_t *dataset_to_json(const char *path, const dataset_facts *f)
     json_t *cameras = json_object();
     for (int m = 0; m < GBT_CAMERA_MODEL_COUNT; m++)
         if (f->views_by_model[m] > 0)
-            json_object_set_new(cameras, gbt_camera_model_name((gbt_camera_model)m), json_integer((json_int_t)f->views_by_model[m]));
+            json_object_set_new(cameras, gbt_camera_model_name((gbt_camera_model)m),
+                                json_integer((json_int_t)f->views_by_model[m]));
     json_t *box = s->points.count == 0 ? json_null()
-                                       : json_pack("[[f,f,f],[f,f,f]]", f->low[0], f->low[1], f->low[2], f->high[0], f->high[1],
-                                                   f->high[2]);
-    return json_pack("{s:i,s:s,s:o,s:s,s:I,s:o,s:{s:I,s:I,s:I,s:I,s:I,s:I,s:[i,i],s:[i,i]},s:I,s:I,s:s,s:I,s:b,s:I,s:[f,f,f],s:o,s:f,s:o}",
-                     "schema", 1, "kind", "dataset", "path", json_text(path), "source", s->source, "views", (json_int_t)s->view_count,
-                     "cameras", cameras, "photos", "found", (json_int_t)f->photos.found, "missing", (json_int_t)s->photos_missing,
-                     "unreadable", (json_int_t)f->photos.unreadable, "other_size", (json_int_t)f->photos.other_size, "with_alpha",
-                     (json_int_t)f->photos.with_alpha, "with_mask", (json_int_t)f->photos.with_mask, "min_size", f->photos.min_width,
-                     f->photos.min_height, "max_size", f->photos.max_width, f->photos.max_height,
-                     "train_views", (json_int_t)(s->view_count - f->test_views), "test_views", (json_int_t)f->test_views, "split",
-                     split_name(s), "points", (json_int_t)s->points.count, "points_have_color", (int)s->points.has_color, "points_dropped",
-                     (json_int_t)s->points_dropped, "origin", s->origin[0], s->origin[1], s->origin[2], "point_box", box, "camera_extent",
-                     f->extent, "expect", expect_to_json(&f->expect));
+                                       : json_pack("[[f,f,f],[f,f,f]]", f->low[0], f->low[1], f->low[2],
+                                                   f->high[0], f->high[1], f->high[2]);
+    return json_pack(
+        "{s:i,s:s,s:o,s:s,s:I,s:o,s:{s:I,s:I,s:I,s:I,s:I,s:I,s:[i,i],s:[i,i]},s:I,s:I,s:s,s:I,s:b,s:I,s:[f,f,"
+        "f],s:o,s:f,s:o}",
+        "schema", 1, "kind", "dataset", "path", json_text(path), "source", s->source, "views",
+        (json_int_t)s->view_count, "cameras", cameras, "photos", "found", (json_int_t)f->photos.found,
+        "missing", (json_int_t)s->photos_missing, "unreadable", (json_int_t)f->photos.unreadable,
+        "other_size", (json_int_t)f->photos.other_size, "with_alpha", (json_int_t)f->photos.with_alpha,
+        "with_mask", (json_int_t)f->photos.with_mask, "min_size", f->photos.min_width, f->photos.min_height,
+        "max_size", f->photos.max_width, f->photos.max_height, "train_views",
+        (json_int_t)(s->view_count - f->test_views), "test_views", (json_int_t)f->test_views, "split",
+        split_name(s), "points", (json_int_t)s->points.count, "points_have_color", (int)s->points.has_color,
+        "points_dropped", (json_int_t)s->points_dropped, "origin", s->origin[0], s->origin[1], s->origin[2],
+        "point_box", box, "camera_extent", f->extent, "expect", expect_to_json(&f->expect));
 }
 
 static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
@@ -107,14 +111,15 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
     const scene *s = f->s;
     const photo_counts *p = &f->photos;
     fprintf(out, "%s: data set (%s)\n", path, s->source);
-    fprintf(out, "  views     %zu: %zu to train, %zu held out (%s)\n", s->view_count, s->view_count - f->test_views, f->test_views,
-            s->has_split ? "by the data set" : "every 8th");
+    fprintf(out, "  views     %zu: %zu to train, %zu held out (%s)\n", s->view_count,
+            s->view_count - f->test_views, f->test_views, s->has_split ? "by the data set" : "every 8th");
     if (s->view_count > 0) {
         fprintf(out, "  cameras   ");
         const char *separator = "";
         for (int m = 0; m < GBT_CAMERA_MODEL_COUNT; m++)
             if (f->views_by_model[m] > 0) {
-                fprintf(out, "%s%s in %zu views", separator, gbt_camera_model_name((gbt_camera_model)m), f->views_by_model[m]);
+                fprintf(out, "%s%s in %zu views", separator, gbt_camera_model_name((gbt_camera_model)m),
+                        f->views_by_model[m]);
                 separator = ", ";
             }
         fprintf(out, "\n  photos    %zu found, %zu unreadable", p->found, p->unreadable);
@@ -123,19 +128,22 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
         if (p->found > 0 && p->min_width == p->max_width && p->min_height == p->max_height)
             fprintf(out, ", %d x %d pixels", p->max_width, p->max_height);
         else if (p->found > 0)
-            fprintf(out, ", %d x %d to %d x %d pixels", p->min_width, p->min_height, p->max_width, p->max_height);
+            fprintf(out, ", %d x %d to %d x %d pixels", p->min_width, p->min_height, p->max_width,
+                    p->max_height);
         if (p->other_size > 0)
             fprintf(out, ", %zu not of their camera's size", p->other_size);
         if (p->with_alpha + p->with_mask > 0)
-            fprintf(out, "\n  masks     %zu photos have a mask, %zu an alpha channel (on %s; --alpha)", p->with_mask, p->with_alpha,
-                    strcmp(s->source, "blender") == 0 ? "white" : "black");
+            fprintf(out, "\n  masks     %zu photos have a mask, %zu an alpha channel (on %s; --alpha)",
+                    p->with_mask, p->with_alpha, strcmp(s->source, "blender") == 0 ? "white" : "black");
         fprintf(out, "\n  extent    %g (of the training cameras)\n", f->extent);
     }
-    fprintf(out, "  points    %zu%s", s->points.count, s->points.count > 0 && !s->points.has_color ? ", without colour" : "");
+    fprintf(out, "  points    %zu%s", s->points.count,
+            s->points.count > 0 && !s->points.has_color ? ", without colour" : "");
     if (s->points_dropped > 0)
         fprintf(out, ", %zu unusable ones dropped", s->points_dropped);
     if (s->points.count > 0)
-        fprintf(out, ", 90 %% within %g x %g x %g", f->high[0] - f->low[0], f->high[1] - f->low[1], f->high[2] - f->low[2]);
+        fprintf(out, ", 90 %% within %g x %g x %g", f->high[0] - f->low[0], f->high[1] - f->low[1],
+                f->high[2] - f->low[2]);
     fprintf(out, "\n  origin    %.9g %.9g %.9g\n", s->origin[0], s->origin[1], s->origin[2]);
     if (s->view_count > 0)
         expect_print(&f->expect, out);
@@ -145,7 +153,8 @@ static gbt_status info_of_dataset(const char *path, int json, FILE *out, gbt_err
 {
     scene s;
     GBT_TRY(scene_load(path, NULL, &s, err));
-    dataset_facts facts = {.s = &s, .photos = count_photos(&s), .extent = s.view_count > 0 ? scene_camera_extent(&s) : 0};
+    dataset_facts facts = {
+        .s = &s, .photos = count_photos(&s), .extent = s.view_count > 0 ? scene_camera_extent(&s) : 0};
     for (size_t i = 0; i < s.view_count; i++) {
         facts.views_by_model[s.views[i].camera.model]++;
         facts.test_views += s.views[i].is_test;
@@ -162,7 +171,7 @@ static gbt_status info_of_dataset(const char *path, int json, FILE *out, gbt_err
     return status;
 }
 
-/* ---- plain Gaussians ------------------------------------------------------------------------------------------------------------- */
+/* ---- plain Gaussians ---- */
 
 static gbt_status info_of_gaussians(const char *path, int json, FILE *out, gbt_error *err)
 {
@@ -172,23 +181,26 @@ static gbt_status info_of_gaussians(const char *path, int json, FILE *out, gbt_e
     GBT_TRY(gaussian_file_read(path, &cloud, err));
     gbt_status status = find_box(cloud.mean, cloud.count, world, low, high, err);
     if (status == GBT_OK && json) {
-        json_t *value = json_pack("{s:i,s:s,s:o,s:I,s:i,s:I,s:[[f,f,f],[f,f,f]]}", "schema", 1, "kind", "gaussians", "path",
-                                  json_text(path), "gaussians", (json_int_t)cloud.count, "sh_degree", cloud.sh_degree, "dropped",
-                                  (json_int_t)cloud.dropped, "box", low[0], low[1], low[2], high[0], high[1], high[2]);
+        json_t *value = json_pack("{s:i,s:s,s:o,s:I,s:i,s:I,s:[[f,f,f],[f,f,f]]}", "schema", 1, "kind",
+                                  "gaussians", "path", json_text(path), "gaussians", (json_int_t)cloud.count,
+                                  "sh_degree", cloud.sh_degree, "dropped", (json_int_t)cloud.dropped, "box",
+                                  low[0], low[1], low[2], high[0], high[1], high[2]);
         status = json_print(value, out, err);
         json_decref(value);
     } else if (status == GBT_OK) {
-        fprintf(out, "%s: plain Gaussians\n  gaussians %zu, colours of degree %d", path, cloud.count, cloud.sh_degree);
+        fprintf(out, "%s: plain Gaussians\n  gaussians %zu, colours of degree %d", path, cloud.count,
+                cloud.sh_degree);
         if (cloud.dropped > 0)
             fprintf(out, ", %zu unusable rows dropped", cloud.dropped);
-        fprintf(out, "\n  box       90 %% within %g x %g x %g around %g %g %g\n", high[0] - low[0], high[1] - low[1], high[2] - low[2],
-                0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]));
+        fprintf(out, "\n  box       90 %% within %g x %g x %g around %g %g %g\n", high[0] - low[0],
+                high[1] - low[1], high[2] - low[2], 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]),
+                0.5 * (low[2] + high[2]));
     }
     gaussian_cloud_free(&cloud);
     return status;
 }
 
-/* ---- models ------------------------------------------------------------------------------------------------------------------- */
+/* ---- models ---- */
 
 static gbt_status info_of_model(const char *path, int json, FILE *out, gbt_error *err)
 {
@@ -207,24 +219,28 @@ static gbt_status info_of_model(const char *path, int json, FILE *out, gbt_error
         return status;
     const anchors *a = &m.anchors;
     if (json) {
-        json_t *value = json_pack("{s:i,s:s,s:o,s:I,s:i,s:b,s:I,s:I,s:I,s:o,s:o,s:f,s:f,s:f,s:[f,f,f],s:[f,f,f]}", "schema", 1, "kind",
-                                  "model", "path", json_text(path), "anchors", (json_int_t)a->count, "offsets", a->offset_count,
-                                  "has_distance", (int)m.decoder.has_distance, "decoder_parameters", (json_int_t)m.decoder.param_count,
-                                  "iterations", (json_int_t)m.iterations, "bytes", (json_int_t)byte_count, "data", json_text(m.data_folder),
-                                  "config", json_text(m.config), "voxel_size", (double)m.voxel_size, "camera_extent", (double)m.extent,
-                                  "t_near", (double)m.t_near, "background", (double)m.background[0], (double)m.background[1],
-                                  (double)m.background[2], "origin", m.origin[0], m.origin[1], m.origin[2]);
+        json_t *value = json_pack(
+            "{s:i,s:s,s:o,s:I,s:i,s:b,s:I,s:I,s:I,s:o,s:o,s:f,s:f,s:f,s:[f,f,f],s:[f,f,f]}", "schema", 1,
+            "kind", "model", "path", json_text(path), "anchors", (json_int_t)a->count, "offsets",
+            a->offset_count, "has_distance", (int)m.decoder.has_distance, "decoder_parameters",
+            (json_int_t)m.decoder.param_count, "iterations", (json_int_t)m.iterations, "bytes",
+            (json_int_t)byte_count, "data", json_text(m.data_folder), "config", json_text(m.config),
+            "voxel_size", (double)m.voxel_size, "camera_extent", (double)m.extent, "t_near", (double)m.t_near,
+            "background", (double)m.background[0], (double)m.background[1], (double)m.background[2], "origin",
+            m.origin[0], m.origin[1], m.origin[2]);
         status = json_print(value, out, err);
         json_decref(value);
     } else {
         fprintf(out, "%s: model\n", path);
         fprintf(out, "  anchors   %zu, with %d Gaussians each at most\n", a->count, a->offset_count);
-        fprintf(out, "  decoder   %zu parameters, %s distance input\n", m.decoder.param_count, m.decoder.has_distance ? "with" : "without");
+        fprintf(out, "  decoder   %zu parameters, %s distance input\n", m.decoder.param_count,
+                m.decoder.has_distance ? "with" : "without");
         fprintf(out, "  trained   %llu iterations on %s\n", (unsigned long long)m.iterations,
                 m.data_folder[0] != '\0' ? m.data_folder : "unnamed data");
         fprintf(out, "  size      %zu bytes\n", byte_count);
-        fprintf(out, "  scene     voxel size %g, extent %g, near %g, origin %.9g %.9g %.9g\n", (double)m.voxel_size, (double)m.extent,
-                (double)m.t_near, m.origin[0], m.origin[1], m.origin[2]);
+        fprintf(out, "  scene     voxel size %g, extent %g, near %g, origin %.9g %.9g %.9g\n",
+                (double)m.voxel_size, (double)m.extent, (double)m.t_near, m.origin[0], m.origin[1],
+                m.origin[2]);
         for (const char *line = m.config; *line != '\0';) {
             const size_t length = strcspn(line, "\n");
             fprintf(out, "  config    %.*s\n", (int)length, line);

@@ -1,4 +1,6 @@
-/* eval/init_quality.c -- how well so many centres stand for a cloud: the paper's balls, adaptive ones and voxels side by side. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* eval/init_quality.c -- how well so many centres stand for a cloud: the paper's balls, adaptive ones and
+   voxels side by side. */
 #include "eval/init_quality.h"
 
 #include <math.h>
@@ -10,8 +12,8 @@
 #include "bvh/points.h"
 
 /* Of each point: its centre in nearest[i], its squared distance added up. */
-static gbt_status find_nearest(const scene_points *points, const float *center, size_t count, uint32_t *nearest, double *squares,
-                               gbt_error *err)
+static gbt_status find_nearest(const scene_points *points, const float *center, size_t count,
+                               uint32_t *nearest, double *squares, gbt_error *err)
 {
     point_tree *tree;
     GBT_TRY(point_tree_build(center, NULL, count, &tree, err));
@@ -25,8 +27,10 @@ static gbt_status find_nearest(const scene_points *points, const float *center, 
     return GBT_OK;
 }
 
-/* Squares of the differences to the mean colour of the points that share a centre, added up over points and channels. */
-static double color_squares(const scene_points *points, const uint32_t *nearest, double *mean, size_t *members)
+/* Squares of the differences to the mean colour of the points that share a centre, added up over points and
+   channels. */
+static double color_squares(const scene_points *points, const uint32_t *nearest, double *mean,
+                            size_t *members)
 {
     double squares = 0;
     for (size_t i = 0; i < points->count; i++) { /* Welford's update: no second pass, no lost digits */
@@ -41,7 +45,8 @@ static double color_squares(const scene_points *points, const uint32_t *nearest,
     return squares;
 }
 
-static gbt_status measure(const scene_points *points, const float *center, size_t count, init_quality *out, gbt_error *err)
+static gbt_status measure(const scene_points *points, const float *center, size_t count, init_quality *out,
+                          gbt_error *err)
 {
     double squares = 0, *mean = mem_calloc(count, 3 * sizeof *mean, "anchor colours", err);
     uint32_t *nearest = mem_alloc(points->count, sizeof *nearest, "nearest anchors", err);
@@ -52,7 +57,9 @@ static gbt_status measure(const scene_points *points, const float *center, size_
     if (status == GBT_OK) {
         out->anchors = count;
         out->distance = sqrt(squares / (double)points->count);
-        out->color = points->has_color ? sqrt(color_squares(points, nearest, mean, members) / (3.0 * (double)points->count)) : 0.0;
+        out->color = points->has_color
+                         ? sqrt(color_squares(points, nearest, mean, members) / (3.0 * (double)points->count))
+                         : 0.0;
     }
     mem_free(mean);
     mem_free(nearest);
@@ -61,13 +68,16 @@ static gbt_status measure(const scene_points *points, const float *center, size_
 }
 
 /* The finest voxels that are no more than `most`: by bisection of the logarithm of their edge. */
-static gbt_status finest_voxels(const scene_points *points, float voxel_size, size_t most, float **center, size_t *count, gbt_error *err)
+static gbt_status finest_voxels(const scene_points *points, float voxel_size, size_t most, float **center,
+                                size_t *count, gbt_error *err)
 {
     float low = voxel_size, high = voxel_size;
     GBT_TRY(voxel_centers(points->position, points->count, high, center, count, err));
-    while (*count > most && high < 1e30f) { /* even one voxel may be more when points lie on both sides of all edges: eight then */
+    while (*count > most && high < 1e30f) { /* even one voxel may be more when points lie on both sides of all
+                                               edges: eight then */
         mem_free(*center);
-        low = high, high *= 2;
+        low = high;
+        high *= 2;
         GBT_TRY(voxel_centers(points->position, points->count, high, center, count, err));
     }
     for (int i = 0; i < 16 && low < high; i++) {
@@ -82,18 +92,24 @@ static gbt_status finest_voxels(const scene_points *points, float voxel_size, si
         }
         high = edge;
         mem_free(*center);
-        *center = finer, *count = finer_count;
+        *center = finer;
+        *count = finer_count;
     }
     return GBT_OK;
 }
 
-gbt_status init_quality_measure(const scene_points *points, float voxel_size, int max_depth, double fraction, init_quality *out,
-                                gbt_error *err)
+gbt_status init_quality_measure(const scene_points *points, float voxel_size, int max_depth, double fraction,
+                                init_quality *out, gbt_error *err)
 {
     const float *color = points->has_color ? points->color : NULL;
     anchor_init_def def = anchor_init_def_default();
-    def.balls.voxel_size = voxel_size, def.balls.max_depth = max_depth, def.fraction = fraction;
-    static const struct { const char *name; anchor_init_kind kind; } rows[] = {{"gb", ANCHOR_INIT_GB}, {"adaptive", ANCHOR_INIT_ADAPTIVE}};
+    def.balls.voxel_size = voxel_size;
+    def.balls.max_depth = max_depth;
+    def.fraction = fraction;
+    static const struct {
+        const char *name;
+        anchor_init_kind kind;
+    } rows[] = {{"gb", ANCHOR_INIT_GB}, {"adaptive", ANCHOR_INIT_ADAPTIVE}};
     for (int i = 0; i < 2; i++) {
         anchors a;
         def.kind = rows[i].kind;

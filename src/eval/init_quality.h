@@ -1,4 +1,6 @@
-/* eval/init_quality.h -- how well so many centres stand for a cloud: the paper's balls, adaptive ones and voxels side by side. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* eval/init_quality.h -- how well so many centres stand for a cloud: the paper's balls, adaptive ones and
+   voxels side by side. */
 #ifndef GBT_EVAL_INIT_QUALITY_H
 #define GBT_EVAL_INIT_QUALITY_H
 
@@ -7,10 +9,11 @@
 enum { INIT_QUALITY_ROWS = 3 };
 
 typedef struct init_quality {
-    const char *name;       /* "gb", "adaptive", "voxel" */
+    const char *name; /* "gb", "adaptive", "voxel" */
     size_t anchors;
     double distance; /* root mean square from a point to its nearest centre, scene units */
-    double color;    /* root mean square from its colour to the mean of those that share the centre, per channel */
+    double color; /* root mean square from its colour to the mean of those that share the centre, per channel
+                   */
 } init_quality;
 
 /**
@@ -21,9 +24,10 @@ typedef struct init_quality {
  * @param out      [out] [INIT_QUALITY_ROWS]
  * @return GBT_OK, GBT_ERR_ARGUMENT (setting out of range), GBT_ERR_NO_MEMORY
  *
- * Threads: same bits for every thread count. Cost: the partitions, some forty voxel grids, a nearest-centre query per point and row.
+ * Threads: same bits for every thread count. Cost: the partitions, some forty voxel grids, a nearest-centre
+ * query per point and row.
  */
-gbt_status init_quality_measure(const scene_points *points, float voxel_size, int max_depth, double fraction, init_quality *out,
-                                gbt_error *err);
+gbt_status init_quality_measure(const scene_points *points, float voxel_size, int max_depth, double fraction,
+                                init_quality *out, gbt_error *err);
 
 #endif

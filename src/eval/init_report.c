@@ -1,6 +1,9 @@
-/* eval/init_report.c -- anchors of a cloud as a PLY that people can look at, and their number beside the voxel baseline's.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* eval/init_report.c -- anchors of a cloud as a PLY that people can look at, and their number beside the
+   voxel baseline's.
 
-   scene --> voxel size --> anchors (+ balls) --> [one row per anchor: radius, scales, count, depth, colour] --> PLY, lines, JSON */
+   scene --> voxel size --> anchors (+ balls)
+        --> [one row per anchor: radius, scales, count, depth, colour] --> PLY, lines, JSON */
 #include "gbtrace/init.h"
 
 #include <math.h>
@@ -23,8 +26,12 @@ enum { ANCHOR_SCALES = 6 };
 
 gbt_init_def gbt_init_def_default(void)
 {
-    return (gbt_init_def){.init = "gb", .init_count = anchor_init_def_default().fraction, .scale_prior = "gb",
-                          .max_depth = balls_def_default().max_depth, .voxel_size = 0.0f, .voxel_rule = "median"};
+    return (gbt_init_def){.init = "gb",
+                          .init_count = anchor_init_def_default().fraction,
+                          .scale_prior = "gb",
+                          .max_depth = balls_def_default().max_depth,
+                          .voxel_size = 0.0f,
+                          .voxel_rule = "median"};
 }
 
 /** Index of `text` among `a`, `b`; -1 with a message. */
@@ -34,11 +41,12 @@ static int choose(const char *what, const char *text, const char *a, const char 
         return 0;
     if (text != NULL && strcmp(text, b) == 0)
         return 1;
-    base_fail(err, GBT_ERR_ARGUMENT, "%s: wanted %s or %s, got %.80s", what, a, b, text != NULL ? text : "nothing");
+    base_fail(err, GBT_ERR_ARGUMENT, "%s: wanted %s or %s, got %.80s", what, a, b,
+              text != NULL ? text : "nothing");
     return -1;
 }
 
-/* ---- a row per anchor --------------------------------------------------------------------------------------------------------- */
+/* ---- a row per anchor ---- */
 
 typedef struct anchor_rows {
     float *radius, *count, *depth; /* [anchors] */
@@ -62,7 +70,9 @@ static gbt_status rows_alloc(anchor_rows *r, size_t count, gbt_error *err)
     r->depth = mem_calloc(count, sizeof *r->depth, "anchor rows", err);
     r->color = mem_calloc(count, 3 * sizeof *r->color, "anchor rows", err);
     r->scale = mem_calloc(count, ANCHOR_SCALES * sizeof *r->scale, "anchor rows", err);
-    return r->radius != NULL && r->count != NULL && r->depth != NULL && r->color != NULL && r->scale != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+    return r->radius != NULL && r->count != NULL && r->depth != NULL && r->color != NULL && r->scale != NULL
+               ? GBT_OK
+               : GBT_ERR_NO_MEMORY;
 }
 
 static void rows_from_balls(anchor_rows *r, const balls *b, bool has_color)
@@ -77,7 +87,8 @@ static void rows_from_balls(anchor_rows *r, const balls *b, bool has_color)
 }
 
 /** Voxels keep no members: a point belongs to the nearest centre. */
-static gbt_status rows_from_nearest(anchor_rows *r, const anchors *a, const scene_points *points, gbt_error *err)
+static gbt_status rows_from_nearest(anchor_rows *r, const anchors *a, const scene_points *points,
+                                    gbt_error *err)
 {
     point_tree *tree;
     GBT_TRY(point_tree_build(a->position, NULL, a->count, &tree, err));
@@ -88,7 +99,8 @@ static gbt_status rows_from_nearest(anchor_rows *r, const anchors *a, const scen
             continue;
         r->count[nearest] += 1.0f;
         for (size_t k = 0; k < 3; k++) /* a running mean, so that a crowded cell loses no digits */
-            r->color[3 * nearest + k] += (points->color[3 * i + k] - r->color[3 * nearest + k]) / r->count[nearest];
+            r->color[3 * nearest + k] +=
+                (points->color[3 * i + k] - r->color[3 * nearest + k]) / r->count[nearest];
     }
     point_tree_free(tree);
     for (size_t j = 0; j < a->count; j++)
@@ -96,35 +108,52 @@ static gbt_status rows_from_nearest(anchor_rows *r, const anchors *a, const scen
     return GBT_OK;
 }
 
-/* ---- out ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- out ---- */
 
-static gbt_status write_points(const char *path, const scene *s, const anchors *a, const anchor_rows *r, gbt_error *err)
+static gbt_status write_points(const char *path, const scene *s, const anchors *a, const anchor_rows *r,
+                               gbt_error *err)
 {
     const ply_extra extras[] = {
-        {"radius", r->radius, 1}, {"scale_0", r->scale, ANCHOR_SCALES}, {"scale_1", r->scale + 1, ANCHOR_SCALES},
+        {"radius", r->radius, 1},
+        {"scale_0", r->scale, ANCHOR_SCALES},
+        {"scale_1", r->scale + 1, ANCHOR_SCALES},
         {"scale_2", r->scale + 2, ANCHOR_SCALES},
-        {"scale_3", r->scale + 3, ANCHOR_SCALES}, {"scale_4", r->scale + 4, ANCHOR_SCALES}, {"scale_5", r->scale + 5, ANCHOR_SCALES},
-        {"count", r->count, 1}, {"depth", r->depth, 1},
+        {"scale_3", r->scale + 3, ANCHOR_SCALES},
+        {"scale_4", r->scale + 4, ANCHOR_SCALES},
+        {"scale_5", r->scale + 5, ANCHOR_SCALES},
+        {"count", r->count, 1},
+        {"depth", r->depth, 1},
     };
-    ply_cloud cloud = {.vertex_count = a->count, .position = a->position, .extra_count = sizeof extras / sizeof *extras, .extras = extras,
-                       .color = r->color, .comment = "gbtrace init: one vertex per anchor"};
+    ply_cloud cloud = {.vertex_count = a->count,
+                       .position = a->position,
+                       .extra_count = sizeof extras / sizeof *extras,
+                       .extras = extras,
+                       .color = r->color,
+                       .comment = "gbtrace init: one vertex per anchor"};
     memcpy(cloud.origin, s->origin, sizeof cloud.origin);
     return ply_write(path, &cloud, err);
 }
 
-static gbt_status write_mesh(const char *path, const scene *s, const anchors *a, const anchor_rows *r, gbt_error *err)
+static gbt_status write_mesh(const char *path, const scene *s, const anchors *a, const anchor_rows *r,
+                             gbt_error *err)
 {
     ball_mesh mesh;
     GBT_TRY(ball_mesh_build(a->position, r->radius, r->color, a->count, &mesh, err));
-    ply_cloud cloud = {.vertex_count = mesh.vertex_count, .position = mesh.position, .color = mesh.color, .face_count = mesh.face_count,
-                       .faces = mesh.faces, .comment = "gbtrace init: one sphere per anchor"};
+    ply_cloud cloud = {.vertex_count = mesh.vertex_count,
+                       .position = mesh.position,
+                       .color = mesh.color,
+                       .face_count = mesh.face_count,
+                       .faces = mesh.faces,
+                       .comment = "gbtrace init: one sphere per anchor"};
     memcpy(cloud.origin, s->origin, sizeof cloud.origin);
     const gbt_status status = ply_write(path, &cloud, err);
     ball_mesh_free(&mesh);
     return status;
 }
 
-typedef struct spread { double min, median, mean, max; } spread;
+typedef struct spread {
+    double min, median, mean, max;
+} spread;
 
 /** `values` with a stride; scratch is [count]. */
 static spread spread_of(const float *values, size_t stride, size_t count, float *scratch)
@@ -137,7 +166,9 @@ static spread spread_of(const float *values, size_t stride, size_t count, float 
         s.mean += (double)scratch[i] / (double)count;
     }
     qsort(scratch, count, sizeof *scratch, compare_floats);
-    s.min = (double)scratch[0], s.median = (double)scratch[(count - 1) / 2], s.max = (double)scratch[count - 1];
+    s.min = (double)scratch[0];
+    s.median = (double)scratch[(count - 1) / 2];
+    s.max = (double)scratch[count - 1];
     return s;
 }
 
@@ -159,19 +190,21 @@ static json_t *qualities_to_json(const init_quality *rows)
 {
     json_t *list = json_array();
     for (int i = 0; i < INIT_QUALITY_ROWS; i++)
-        json_array_append_new(list, json_pack("{s:s,s:I,s:f,s:f}", "init", rows[i].name, "anchors", (json_int_t)rows[i].anchors,
-                                              "distance_rms", rows[i].distance, "color_rms", rows[i].color));
+        json_array_append_new(list, json_pack("{s:s,s:I,s:f,s:f}", "init", rows[i].name, "anchors",
+                                              (json_int_t)rows[i].anchors, "distance_rms", rows[i].distance,
+                                              "color_rms", rows[i].color));
     return list;
 }
 
 static gbt_status save_json(const char *path, const char *data, const init_facts *f, gbt_error *err)
 {
-    json_t *value = json_pack("{s:i,s:o,s:s,s:s,s:s,s:f,s:I,s:I,s:I,s:o,s:o,s:o,s:o,s:o}", "schema", 1, "data", json_text(data), "init",
-                              f->kind, "scale_prior", f->scale_prior, "voxel_rule", f->voxel_rule, "voxel_size", (double)f->voxel_size,
-                              "points", (json_int_t)f->points, "anchors", (json_int_t)f->anchors, "voxel_anchors",
-                              (json_int_t)f->voxel_anchors, "radius", spread_to_json(&f->radius), "scale", spread_to_json(&f->scale),
-                              "points_per_anchor", spread_to_json(&f->count), "depth", spread_to_json(&f->depth), "quality",
-                              qualities_to_json(f->quality));
+    json_t *value = json_pack("{s:i,s:o,s:s,s:s,s:s,s:f,s:I,s:I,s:I,s:o,s:o,s:o,s:o,s:o}", "schema", 1,
+                              "data", json_text(data), "init", f->kind, "scale_prior", f->scale_prior,
+                              "voxel_rule", f->voxel_rule, "voxel_size", (double)f->voxel_size, "points",
+                              (json_int_t)f->points, "anchors", (json_int_t)f->anchors, "voxel_anchors",
+                              (json_int_t)f->voxel_anchors, "radius", spread_to_json(&f->radius), "scale",
+                              spread_to_json(&f->scale), "points_per_anchor", spread_to_json(&f->count),
+                              "depth", spread_to_json(&f->depth), "quality", qualities_to_json(f->quality));
     const gbt_status status = json_save(value, path, err);
     json_decref(value);
     return status;
@@ -184,8 +217,10 @@ static void print_spread(FILE *out, const char *name, const spread *s)
 
 static const char *what_they_are(const char *kind)
 {
-    return strcmp(kind, "gb") == 0 ? "granular balls" : strcmp(kind, "adaptive") == 0 ? "adaptive balls" : strcmp(kind, "voxel") == 0
-           ? "voxels" : "random points";
+    return strcmp(kind, "gb") == 0         ? "granular balls"
+           : strcmp(kind, "adaptive") == 0 ? "adaptive balls"
+           : strcmp(kind, "voxel") == 0    ? "voxels"
+                                           : "random points";
 }
 
 static void print_facts(FILE *out, const init_facts *f)
@@ -207,8 +242,9 @@ static void print_facts(FILE *out, const init_facts *f)
 }
 
 /** Everything after the anchors are made. */
-static gbt_status report_anchors(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path, FILE *report,
-                                 const scene *s, const anchors *a, const balls *b, init_facts *facts, gbt_error *err)
+static gbt_status report_anchors(const char *data, const gbt_init_def *def, const char *out_ply,
+                                 const char *json_path, FILE *report, const scene *s, const anchors *a,
+                                 const balls *b, init_facts *facts, gbt_error *err)
 {
     anchor_rows rows = {0};
     float *scratch = NULL;
@@ -245,19 +281,22 @@ done:
     return status;
 }
 
-gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path, FILE *report, gbt_error *err)
+gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path,
+                    FILE *report, gbt_error *err)
 {
     anchor_init_def how = anchor_init_def_default();
     if (def->init == NULL || !anchor_init_kind_named(def->init, &how.kind))
         return base_fail(err, GBT_ERR_ARGUMENT, "init: wanted gb, adaptive, voxel or random, got %.80s",
                          def->init != NULL ? def->init : "nothing");
     const int scale = choose("scale prior", def->scale_prior, "gb", "nn", err),
-        rule = choose("voxel rule", def->voxel_rule, "median", "squared", err);
+              rule = choose("voxel rule", def->voxel_rule, "median", "squared", err);
     if (scale < 0 || rule < 0)
         return GBT_ERR_ARGUMENT;
     if (!(def->voxel_size >= 0.0f && isfinite(def->voxel_size)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "voxel size: wanted a finite number >= 0, got %g", (double)def->voxel_size);
-    if (file_is_same(data, out_ply) || (json_path != NULL && (file_is_same(data, json_path) || strcmp(out_ply, json_path) == 0)))
+        return base_fail(err, GBT_ERR_ARGUMENT, "voxel size: wanted a finite number >= 0, got %g",
+                         (double)def->voxel_size);
+    if (file_is_same(data, out_ply) ||
+        (json_path != NULL && (file_is_same(data, json_path) || strcmp(out_ply, json_path) == 0)))
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (the output must be another file)",
                          file_is_same(data, out_ply) ? out_ply : json_path);
     scene s;
@@ -266,26 +305,34 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
     float *centers = NULL;
     GBT_TRY(scene_load(data, NULL, &s, err));
     const scene_points *points = &s.points;
-    init_facts facts = {.kind = def->init, .points = points->count,
-                        .voxel_rule = def->voxel_size > 0.0f ? "given" : def->voxel_rule, .voxel_size = def->voxel_size};
+    init_facts facts = {.kind = def->init,
+                        .points = points->count,
+                        .voxel_rule = def->voxel_size > 0.0f ? "given" : def->voxel_rule,
+                        .voxel_size = def->voxel_size};
     gbt_status status = GBT_OK;
     if (points->count == 0)
         status = base_fail(err, GBT_ERR_FORMAT, "%s: no sparse points to start from", data);
     if (status == GBT_OK && !(facts.voxel_size > 0.0f))
-        status = balls_voxel_size(points->position, points->count, rule == 0 ? VOXEL_MEDIAN_SPACING : VOXEL_COMPAT_SQUARED,
-                                  &facts.voxel_size, err);
+        status =
+            balls_voxel_size(points->position, points->count,
+                             rule == 0 ? VOXEL_MEDIAN_SPACING : VOXEL_COMPAT_SQUARED, &facts.voxel_size, err);
     if (status == GBT_OK) {
         how.fraction = def->init_count;
         how.scale = scale == 0 ? ANCHOR_SCALE_GB : ANCHOR_SCALE_NN;
-        how.balls.voxel_size = facts.voxel_size, how.balls.max_depth = def->max_depth;
-        status = anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &how, &a, &b, err);
+        how.balls.voxel_size = facts.voxel_size;
+        how.balls.max_depth = def->max_depth;
+        status = anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &how,
+                              &a, &b, err);
     }
     if (status == GBT_OK)
-        status = voxel_centers(points->position, points->count, facts.voxel_size, &centers, &facts.voxel_anchors, err);
+        status = voxel_centers(points->position, points->count, facts.voxel_size, &centers,
+                               &facts.voxel_anchors, err);
     if (status == GBT_OK) {
-        facts.anchors = a.count, facts.has_balls = b.count > 0;
+        facts.anchors = a.count;
+        facts.has_balls = b.count > 0;
         facts.scale_prior = how.kind == ANCHOR_INIT_GB && scale == 0 ? "gb" : "nn";
-        status = init_quality_measure(points, facts.voxel_size, def->max_depth, def->init_count, facts.quality, err);
+        status = init_quality_measure(points, facts.voxel_size, def->max_depth, def->init_count,
+                                      facts.quality, err);
     }
     if (status == GBT_OK)
         status = report_anchors(data, def, out_ply, json_path, report, &s, &a, &b, &facts, err);

@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* eval/lpips.c -- the networks of LPIPS, their weights out of a file, and the distance.
 
-   picture --> (x - shift) / scale --> [maxima] convolution + ReLU, again and again --> distance of two pictures at five layers */
+   picture --> (x - shift) / scale --> [maxima] convolution + ReLU, again and again
+        --> distance of two pictures at five layers */
 #include "eval/lpips.h"
 
 #include <math.h>
@@ -31,17 +33,28 @@ typedef struct architecture {
 
 /* As torchvision numbers them, sliced as the package `lpips` does. */
 static const architecture architectures[] = {
-    {"vgg", 13, {{"net.slice1.0", 64, 3, 1, 1, 0, false}, {"net.slice1.2", 64, 3, 1, 1, 0, true},
-                 {"net.slice2.5", 128, 3, 1, 1, 2, false}, {"net.slice2.7", 128, 3, 1, 1, 0, true},
-                 {"net.slice3.10", 256, 3, 1, 1, 2, false}, {"net.slice3.12", 256, 3, 1, 1, 0, false},
-                 {"net.slice3.14", 256, 3, 1, 1, 0, true},
-                 {"net.slice4.17", 512, 3, 1, 1, 2, false}, {"net.slice4.19", 512, 3, 1, 1, 0, false},
-                 {"net.slice4.21", 512, 3, 1, 1, 0, true},
-                 {"net.slice5.24", 512, 3, 1, 1, 2, false}, {"net.slice5.26", 512, 3, 1, 1, 0, false},
-                 {"net.slice5.28", 512, 3, 1, 1, 0, true}}},
-    {"alex", 5, {{"net.slice1.0", 64, 11, 4, 2, 0, true}, {"net.slice2.3", 192, 5, 1, 2, 3, true},
-                 {"net.slice3.6", 384, 3, 1, 1, 3, true}, {"net.slice4.8", 256, 3, 1, 1, 0, true},
-                 {"net.slice5.10", 256, 3, 1, 1, 0, true}}},
+    {"vgg",
+     13,
+     {{"net.slice1.0", 64, 3, 1, 1, 0, false},
+      {"net.slice1.2", 64, 3, 1, 1, 0, true},
+      {"net.slice2.5", 128, 3, 1, 1, 2, false},
+      {"net.slice2.7", 128, 3, 1, 1, 0, true},
+      {"net.slice3.10", 256, 3, 1, 1, 2, false},
+      {"net.slice3.12", 256, 3, 1, 1, 0, false},
+      {"net.slice3.14", 256, 3, 1, 1, 0, true},
+      {"net.slice4.17", 512, 3, 1, 1, 2, false},
+      {"net.slice4.19", 512, 3, 1, 1, 0, false},
+      {"net.slice4.21", 512, 3, 1, 1, 0, true},
+      {"net.slice5.24", 512, 3, 1, 1, 2, false},
+      {"net.slice5.26", 512, 3, 1, 1, 0, false},
+      {"net.slice5.28", 512, 3, 1, 1, 0, true}}},
+    {"alex",
+     5,
+     {{"net.slice1.0", 64, 11, 4, 2, 0, true},
+      {"net.slice2.3", 192, 5, 1, 2, 3, true},
+      {"net.slice3.6", 384, 3, 1, 1, 3, true},
+      {"net.slice4.8", 256, 3, 1, 1, 0, true},
+      {"net.slice5.10", 256, 3, 1, 1, 0, true}}},
 };
 enum { ARCHITECTURES = sizeof architectures / sizeof *architectures };
 
@@ -51,17 +64,17 @@ struct lpips {
     tensor taps[TAPS]; /* [1][channels] weights of squared differences */
 };
 
-/* ---- the file ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- the file ---- */
 
-static gbt_status read_array(const source_file *file, const char *layer_name, const char *suffix, size_t rows, size_t columns, tensor *out,
-                             gbt_error *err)
+static gbt_status read_array(const source_file *file, const char *layer_name, const char *suffix, size_t rows,
+                             size_t columns, tensor *out, gbt_error *err)
 {
     char name[64];
     snprintf(name, sizeof name, "%s.%s", layer_name, suffix);
     GBT_TRY(safetensors_read(file, name, out, err));
     if (out->rows != rows || out->columns != columns)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: array %s has %zu x %zu numbers (wanted %zu x %zu)", file->name, name, out->rows,
-                         out->columns, rows, columns);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: array %s has %zu x %zu numbers (wanted %zu x %zu)",
+                         file->name, name, out->rows, out->columns, rows, columns);
     return GBT_OK;
 }
 
@@ -79,11 +92,14 @@ static gbt_status turn_weights(const tensor *from, convolution *c, gbt_error *er
     return GBT_OK;
 }
 
-static gbt_status read_layer(const source_file *file, const layer *is, int in, convolution *out, gbt_error *err)
+static gbt_status read_layer(const source_file *file, const layer *is, int in, convolution *out,
+                             gbt_error *err)
 {
-    *out = (convolution){.in = in, .out = is->out, .kernel = is->kernel, .stride = is->stride, .pad = is->pad};
+    *out =
+        (convolution){.in = in, .out = is->out, .kernel = is->kernel, .stride = is->stride, .pad = is->pad};
     tensor weights = {0}, bias = {0};
-    gbt_status status = read_array(file, is->name, "weight", (size_t)is->out, (size_t)(in * is->kernel * is->kernel), &weights, err);
+    gbt_status status = read_array(file, is->name, "weight", (size_t)is->out,
+                                   (size_t)(in * is->kernel * is->kernel), &weights, err);
     if (status == GBT_OK)
         status = read_array(file, is->name, "bias", 1, (size_t)is->out, &bias, err);
     out->bias = bias.values; /* moved */
@@ -101,11 +117,14 @@ static gbt_status find_architecture(const source_file *file, const architecture 
     mem_free(first.values);
     for (size_t i = 0; i < ARCHITECTURES; i++) {
         const layer *l = architectures[i].layers;
-        if (first.rows == (size_t)l->out && first.columns == (size_t)(3 * l->kernel * l->kernel))
-            return *out = &architectures[i], GBT_OK;
+        if (first.rows == (size_t)l->out && first.columns == (size_t)(3 * l->kernel * l->kernel)) {
+            *out = &architectures[i];
+            return GBT_OK;
+        }
     }
-    return base_fail(err, GBT_ERR_FORMAT, "%s: neither VGG16 nor AlexNet: the first layer has %zu x %zu weights", file->name, first.rows,
-                     first.columns);
+    return base_fail(err, GBT_ERR_FORMAT,
+                     "%s: neither VGG16 nor AlexNet: the first layer has %zu x %zu weights", file->name,
+                     first.rows, first.columns);
 }
 
 static gbt_status read_network(const source_file *file, lpips *net, gbt_error *err)
@@ -135,8 +154,10 @@ gbt_status lpips_open(const char *path, lpips **out, gbt_error *err)
     lpips *net = mem_calloc(1, sizeof *net, "network", err);
     const gbt_status status = net == NULL ? GBT_ERR_NO_MEMORY : read_network(&file, net, err);
     mem_free(bytes);
-    if (status != GBT_OK)
-        return lpips_close(net), status;
+    if (status != GBT_OK) {
+        lpips_close(net);
+        return status;
+    }
     *out = net;
     return GBT_OK;
 }
@@ -150,12 +171,9 @@ void lpips_close(lpips *net)
     mem_free(net);
 }
 
-const char *lpips_network(const lpips *net)
-{
-    return net->is->name;
-}
+const char *lpips_network(const lpips *net) { return net->is->name; }
 
-/* ---- the distance ------------------------------------------------------------------------------------------------------------------- */
+/* ---- the distance ---- */
 
 typedef struct distance_job {
     const feature_plane *of; /* [PICTURES] */
@@ -179,7 +197,8 @@ static void distance_rows(size_t block, size_t begin, size_t end, void *context)
     for (size_t y = begin; y < end; y++) {
         job->row[y] = 0;
         for (int x = 0; x < job->of[0].width; x++) {
-            const float *a = feature_plane_at(&job->of[0], x, (int)y), *b = feature_plane_at(&job->of[1], x, (int)y);
+            const float *a = feature_plane_at(&job->of[0], x, (int)y),
+                        *b = feature_plane_at(&job->of[1], x, (int)y);
             const double to_unit_a = 1 / length_of(a, channels), to_unit_b = 1 / length_of(b, channels);
             for (int c = 0; c < channels; c++) {
                 const double difference = (double)a[c] * to_unit_a - (double)b[c] * to_unit_b;
@@ -190,7 +209,8 @@ static void distance_rows(size_t block, size_t begin, size_t end, void *context)
 }
 
 /* Added to `sum`: the mean over the pixels. */
-static gbt_status add_distance(const feature_plane of[PICTURES], const tensor *weight, double *sum, gbt_error *err)
+static gbt_status add_distance(const feature_plane of[PICTURES], const tensor *weight, double *sum,
+                               gbt_error *err)
 {
     const size_t height = (size_t)of[0].height;
     distance_job job = {of, weight->values, mem_alloc(height, sizeof *job.row, "distances", err)};
@@ -212,7 +232,8 @@ typedef struct seen {
     int first_column;
 } seen;
 
-/* What the network sees of it: colours to [low, 1], then the mean and the spread of what it was trained on. */
+/* What the network sees of it: colours to [low, 1], then the mean and the spread of what it was trained
+   on. */
 static gbt_status feed(const seen *s, float low, int pad, feature_plane *out, gbt_error *err)
 {
     static const float shift[3] = {-0.030f, -0.088f, -0.188f}, scale[3] = {0.458f, 0.448f, 0.450f};
@@ -221,7 +242,8 @@ static gbt_status feed(const seen *s, float low, int pad, feature_plane *out, gb
     for (int y = 0; y < out->height; y++)
         for (int x = 0; x < out->width; x++) {
             const size_t pixel = (size_t)y * width + (size_t)(s->first_column + x);
-            const float *from = (s->valid == NULL || s->valid[pixel] ? s->picture : s->photo)->pixels + 3 * pixel;
+            const float *from =
+                (s->valid == NULL || s->valid[pixel] ? s->picture : s->photo)->pixels + 3 * pixel;
             float *to = feature_plane_at(out, x, y);
             for (int c = 0; c < 3; c++)
                 to[c] = (low + (1 - low) * from[c] - shift[c]) / scale[c];
@@ -244,7 +266,8 @@ static gbt_status advance(const layer *l, const convolution *c, int pad, feature
     return status;
 }
 
-static gbt_status compare_fed(const lpips *net, const seen pictures[PICTURES], float low, double *sum, gbt_error *err)
+static gbt_status compare_fed(const lpips *net, const seen pictures[PICTURES], float low, double *sum,
+                              gbt_error *err)
 {
     feature_plane plane[PICTURES] = {{0}};
     gbt_status status = GBT_OK;
@@ -264,14 +287,17 @@ static gbt_status compare_fed(const lpips *net, const seen pictures[PICTURES], f
     return status;
 }
 
-gbt_status lpips_compare(const lpips *net, const image *render, const image *photo, const unsigned char *valid, int first_column,
-                         lpips_scores *out, gbt_error *err)
+gbt_status lpips_compare(const lpips *net, const image *render, const image *photo,
+                         const unsigned char *valid, int first_column, lpips_scores *out, gbt_error *err)
 {
-    const seen pictures[PICTURES] = {{render, photo, valid, first_column}, {photo, photo, valid, first_column}};
+    const seen pictures[PICTURES] = {{render, photo, valid, first_column},
+                                     {photo, photo, valid, first_column}};
     *out = (lpips_scores){0};
-    if (render->width != photo->width || render->height != photo->height || render->channels != 3 || photo->channels != 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "LPIPS: %d x %d x %d and %d x %d x %d (wanted equal sizes, 3 channels)", render->width,
-                         render->height, render->channels, photo->width, photo->height, photo->channels);
+    if (render->width != photo->width || render->height != photo->height || render->channels != 3 ||
+        photo->channels != 3)
+        return base_fail(
+            err, GBT_ERR_ARGUMENT, "LPIPS: %d x %d x %d and %d x %d x %d (wanted equal sizes, 3 channels)",
+            render->width, render->height, render->channels, photo->width, photo->height, photo->channels);
     GBT_TRY(compare_fed(net, pictures, -1, &out->lpips, err));
     return compare_fed(net, pictures, 0, &out->lpips_01, err);
 }

@@ -1,5 +1,7 @@
-/* eval/lpips_layers.c -- a convolution is one matrix product per row of the picture and row of the kernel: with the channels of a pixel
-   side by side, what a row of the kernel covers is one run of numbers, and the next pixel's run begins `stride` pixels later. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* eval/lpips_layers.c -- a convolution is one matrix product per row of the picture and row of the kernel:
+   with the channels of a pixel side by side, what a row of the kernel covers is one run of numbers, and the
+   next pixel's run begins `stride` pixels later. */
 #include "eval/lpips_layers.h"
 
 #include <math.h>
@@ -10,14 +12,17 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 
-gbt_status feature_plane_make(int width, int height, int channels, int pad, feature_plane *out, gbt_error *err)
+gbt_status feature_plane_make(int width, int height, int channels, int pad, feature_plane *out,
+                              gbt_error *err)
 {
     *out = (feature_plane){.width = width, .height = height, .channels = channels, .pad = pad};
     if (width < 1 || height < 1)
-        return base_fail(err, GBT_ERR_ARGUMENT, "LPIPS: the picture is too small for the network (a layer would have %d x %d pixels)",
-                         width < 0 ? 0 : width, height < 0 ? 0 : height);
-    out->values = mem_calloc((size_t)(width + 2 * pad) * (size_t)(height + 2 * pad), (size_t)channels * sizeof *out->values, "features",
-                             err);
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "LPIPS: the picture is too small for the network (a layer would have %d x %d pixels)",
+            width < 0 ? 0 : width, height < 0 ? 0 : height);
+    out->values = mem_calloc((size_t)(width + 2 * pad) * (size_t)(height + 2 * pad),
+                             (size_t)channels * sizeof *out->values, "features", err);
     return out->values != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
@@ -35,10 +40,7 @@ void convolution_free(convolution *c)
 }
 
 /* Pixels of a side that a window of `size` meets, `stride` apart. */
-static int steps_of(int side, int size, int stride)
-{
-    return side < size ? 0 : (side - size) / stride + 1;
-}
+static int steps_of(int side, int size, int stride) { return side < size ? 0 : (side - size) / stride + 1; }
 
 typedef struct convolve_job {
     const convolution *c;
@@ -55,20 +57,28 @@ static void convolve_rows(size_t block, size_t begin, size_t end, void *context)
     for (size_t y = begin; y < end; y++)
         for (int k = 0; k < c->kernel; k++) {
             const dense_product product = {
-                .m = (size_t)job->out->width, .n = (size_t)c->out, .k = run,
-                .a = feature_plane_at(job->in, -c->pad, (int)y * c->stride + k - c->pad), .a_row = (size_t)c->stride * in, .a_step = 1,
-                .b = c->weights + (size_t)k * run * (size_t)c->out, .b_row = (size_t)c->out,
+                .m = (size_t)job->out->width,
+                .n = (size_t)c->out,
+                .k = run,
+                .a = feature_plane_at(job->in, -c->pad, (int)y * c->stride + k - c->pad),
+                .a_row = (size_t)c->stride * in,
+                .a_step = 1,
+                .b = c->weights + (size_t)k * run * (size_t)c->out,
+                .b_row = (size_t)c->out,
                 .bias = k == 0 ? c->bias : NULL, /* the other rows add to it */
                 .relu = k == c->kernel - 1,
-                .c = feature_plane_at(job->out, 0, (int)y), .c_row = (size_t)c->out};
+                .c = feature_plane_at(job->out, 0, (int)y),
+                .c_row = (size_t)c->out};
             job->kernels->product(&product);
         }
 }
 
-gbt_status convolve(const convolution *c, const feature_plane *in, int pad, feature_plane *out, gbt_error *err)
+gbt_status convolve(const convolution *c, const feature_plane *in, int pad, feature_plane *out,
+                    gbt_error *err)
 {
     GBT_TRY(feature_plane_make(steps_of(in->width + 2 * c->pad, c->kernel, c->stride),
-                               steps_of(in->height + 2 * c->pad, c->kernel, c->stride), c->out, pad, out, err));
+                               steps_of(in->height + 2 * c->pad, c->kernel, c->stride), c->out, pad, out,
+                               err));
     convolve_job job = {c, in, out, dense_best()};
     parallel_blocks((size_t)out->height, 1, convolve_rows, &job);
     return GBT_OK;
@@ -98,7 +108,8 @@ static void pool_rows(size_t block, size_t begin, size_t end, void *context)
 
 gbt_status pool_max(const feature_plane *in, int size, int pad, feature_plane *out, gbt_error *err)
 {
-    GBT_TRY(feature_plane_make(steps_of(in->width, size, 2), steps_of(in->height, size, 2), in->channels, pad, out, err));
+    GBT_TRY(feature_plane_make(steps_of(in->width, size, 2), steps_of(in->height, size, 2), in->channels, pad,
+                               out, err));
     pool_job job = {in, out, size};
     parallel_blocks((size_t)out->height, 1, pool_rows, &job);
     return GBT_OK;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* eval/run_sensitivity.c -- adjoint passes of random signs through the training views. */
 #include "eval/run_sensitivity.h"
 

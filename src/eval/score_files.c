@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* eval/score_files.c -- scores as JSON and as events of TensorBoard. */
 #include "eval/score_files.h"
 
@@ -11,7 +12,8 @@
 
 enum { EVENTS_VIEWS = 8 };
 
-#define PROTOCOL "8-bit images; SSIM 11x11 Gaussian, zero padding; FLIP 67 pixels per degree; means over held-out views"
+#define PROTOCOL                                                                                             \
+    "8-bit images; SSIM 11x11 Gaussian, zero padding; FLIP 67 pixels per degree; means over held-out views"
 
 static void add_lpips(json_t *to, const lpips_scores *scores)
 {
@@ -32,12 +34,13 @@ static json_t *from_scores(const evaluation *e)
     }
     json_object_set_new(root, "protocol",
                         json_string(e->lpips_network == NULL ? PROTOCOL
-                                                             : PROTOCOL "; LPIPS 0.1 of colours in [-1, 1], lpips_01 in [0, 1]"));
+                                                             : PROTOCOL
+                                        "; LPIPS 0.1 of colours in [-1, 1], lpips_01 in [0, 1]"));
     for (size_t i = 0; i < e->view_count; i++) {
         const view_score *v = &e->views[i];
-        json_t *view = json_pack("{s:s,s:o,s:o,s:o,s:f,s:I}", "name", v->name, "psnr", json_number(v->psnr), "ssim",
-                                 json_number(v->ssim), "flip", json_number(v->flip), "seconds", v->seconds, "gaussians",
-                                 (json_int_t)v->gaussians);
+        json_t *view = json_pack("{s:s,s:o,s:o,s:o,s:f,s:I}", "name", v->name, "psnr", json_number(v->psnr),
+                                 "ssim", json_number(v->ssim), "flip", json_number(v->flip), "seconds",
+                                 v->seconds, "gaussians", (json_int_t)v->gaussians);
         if (e->lpips_network != NULL)
             add_lpips(view, &v->lpips);
         json_array_append_new(views, view);
@@ -46,7 +49,8 @@ static json_t *from_scores(const evaluation *e)
     json_object_set_new(root, "downscale", json_real(e->downscale));
     json_object_set_new(root, "exposure", json_boolean(e->exposure));
     char scored[128];
-    snprintf(scored, sizeof scored, "%s%s", e->exposure ? "right half, with a colour matrix fitted to the left half" : "whole image",
+    snprintf(scored, sizeof scored, "%s%s",
+             e->exposure ? "right half, with a colour matrix fitted to the left half" : "whole image",
              e->masked ? ", without masked pixels" : "");
     json_object_set_new(root, "scored", json_string(scored));
     json_object_set_new(root, "views", views);
@@ -63,7 +67,8 @@ static void add_training(json_t *root, const char *run)
     gbt_error ignored = {0};
     unsigned char *bytes = NULL;
     size_t count;
-    if (file_join(path, sizeof path, run, "train.json", &ignored) != GBT_OK || file_read(path, &bytes, &count, &ignored) != GBT_OK)
+    if (file_join(path, sizeof path, run, "train.json", &ignored) != GBT_OK ||
+        file_read(path, &bytes, &count, &ignored) != GBT_OK)
         return;
     json_t *training = json_loadb((const char *)bytes, count, 0, NULL);
     if (json_is_object(training))
@@ -80,7 +85,8 @@ json_t *score_files_json(const evaluation *e, const char *run)
     return root;
 }
 
-static gbt_status add_picture(event_records *r, uint64_t step, const char *group, const char *name, const char *path, gbt_error *err)
+static gbt_status add_picture(event_records *r, uint64_t step, const char *group, const char *name,
+                              const char *path, gbt_error *err)
 {
     char tag[VIEW_PATH_SIZE];
     unsigned char *bytes = NULL;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* eval/score_run.c -- score a run on its held-out views. */
 #include "eval/score_run.h"
 
@@ -12,7 +13,8 @@
 #include "base/memory.h"
 
 /* Pictures go into `folder`; NULL: none. */
-static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, const char *folder, view_score *score, gbt_error *err)
+static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, const char *folder,
+                             view_score *score, gbt_error *err)
 {
     const scene_view *view = &r->scene.views[index];
     const double start = clock_wall();
@@ -29,10 +31,13 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
         status = image_alloc(&error_map, render->width, render->height, 1, err);
     if (status == GBT_OK)
         status = image_score_photo(render, &photo, valid, r->def.exposure, &error_map, &scores, err);
-    score->psnr = scores.psnr, score->ssim = scores.ssim, score->flip = scores.flip;
+    score->psnr = scores.psnr;
+    score->ssim = scores.ssim;
+    score->flip = scores.flip;
     score->masked = valid != NULL;
     if (status == GBT_OK && net != NULL) /* of the half that is scored (image_score_photo()) */
-        status = lpips_compare(net, render, &photo, valid, r->def.exposure ? render->width / 2 : 0, &score->lpips, err);
+        status = lpips_compare(net, render, &photo, valid, r->def.exposure ? render->width / 2 : 0,
+                               &score->lpips, err);
     if (status == GBT_OK && folder != NULL)
         status = view_score_paths(score, folder, err);
     const image *const pictures[] = {render, &photo, &error_map};
@@ -45,7 +50,8 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
     return status;
 }
 
-gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips *net, evaluation *e, gbt_error *err)
+gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips *net, evaluation *e,
+                     gbt_error *err)
 {
     char folder[4096];
     GBT_TRY(file_join(folder, sizeof folder, run, "renders/test", err));
@@ -69,15 +75,24 @@ gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips 
         if (!isfinite(v->psnr)) /* every pixel is masked */
             continue;
         scored++;
-        e->psnr += v->psnr, e->ssim += v->ssim, e->flip += v->flip;
-        e->lpips.lpips += v->lpips.lpips, e->lpips.lpips_01 += v->lpips.lpips_01;
+        e->psnr += v->psnr;
+        e->ssim += v->ssim;
+        e->flip += v->flip;
+        e->lpips.lpips += v->lpips.lpips;
+        e->lpips.lpips_01 += v->lpips.lpips_01;
     }
     const double n = (double)scored; /* 0 / 0 = NaN here becomes null in JSON and "n/a" on the page */
-    e->lpips.lpips /= n, e->lpips.lpips_01 /= n;
+    e->lpips.lpips /= n;
+    e->lpips.lpips_01 /= n;
     e->lpips_network = net != NULL ? lpips_network(net) : NULL;
-    e->psnr /= n, e->ssim /= n, e->flip /= n, e->gaussians_per_view /= (double)e->view_count;
-    e->anchors = r->model.anchors.count, e->exposure = r->def.exposure;
-    e->renderer = frame_renderer_name(r->frame.draw.renderer), e->downscale = r->photos.downscale;
+    e->psnr /= n;
+    e->ssim /= n;
+    e->flip /= n;
+    e->gaussians_per_view /= (double)e->view_count;
+    e->anchors = r->model.anchors.count;
+    e->exposure = r->def.exposure;
+    e->renderer = frame_renderer_name(r->frame.draw.renderer);
+    e->downscale = r->photos.downscale;
     char model_path[4096];
     struct stat info;
     GBT_TRY(file_join(model_path, sizeof model_path, run, "model.gbt", err));

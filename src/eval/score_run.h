@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* eval/score_run.h -- the held-out views of a run, rendered and compared with their photos. */
 #ifndef GBT_EVAL_SCORE_RUN_H
 #define GBT_EVAL_SCORE_RUN_H
@@ -11,8 +12,10 @@
  *
  * @param pictures [in] write renders, photos and FLIP maps into RUN/renders/test
  * @param net [in] optional (NULL): LPIPS too
- * @param e   [out] start from {0}; free e->views with mem_free() after success or failure; means are NaN without views
+ * @param e   [out] start from {0}; free e->views with mem_free() after success or failure; means are NaN
+ *                  without views
  */
-gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips *net, evaluation *e, gbt_error *err);
+gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips *net, evaluation *e,
+                     gbt_error *err);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* frame/frame.c -- one view of a model: rays, what is visible, its Gaussians, tree, trace; and back. */
 #include "frame/frame.h"
 
@@ -10,18 +11,18 @@
 #include "frame/plain.h"
 #include "frame/visible.h"
 
-static const char *const renderer_names[] = {[FRAME_TRACE] = "trace", [FRAME_SPLAT] = "raster", [FRAME_SPLAT_PER_RAY] = "per-ray"};
+static const char *const renderer_names[] = {
+    [FRAME_TRACE] = "trace", [FRAME_SPLAT] = "raster", [FRAME_SPLAT_PER_RAY] = "per-ray"};
 
-const char *frame_renderer_name(frame_renderer renderer)
-{
-    return renderer_names[renderer];
-}
+const char *frame_renderer_name(frame_renderer renderer) { return renderer_names[renderer]; }
 
 bool frame_renderer_named(const char *name, frame_renderer *out)
 {
     for (int i = 0; i < (int)(sizeof renderer_names / sizeof *renderer_names); i++)
-        if (strcmp(name, renderer_names[i]) == 0)
-            return *out = (frame_renderer)i, true;
+        if (strcmp(name, renderer_names[i]) == 0) {
+            *out = (frame_renderer)i;
+            return true;
+        }
     return false;
 }
 
@@ -32,7 +33,7 @@ static double lap(double *since)
     return passed;
 }
 
-/* ---- render and back ----------------------------------------------------------------------------------------------------------------- */
+/* ---- render and back ---- */
 
 static gbt_status fit_picture(image *rgb, int width, int height, gbt_error *err)
 {
@@ -52,30 +53,30 @@ static float pixel_variance(const frame *f, float variance)
 /* By which splats are dilated, in pixels of the camera: what is as wide as the pixels already need not be. */
 static float dilation_of(const frame *f)
 {
-    return f->draw.renderer == FRAME_SPLAT && !f->widened ? pixel_variance(f, raster_settings_default().dilation) : 0;
+    return f->draw.renderer == FRAME_SPLAT && !f->widened
+               ? pixel_variance(f, raster_settings_default().dilation)
+               : 0;
 }
 
 /* Of every Gaussian of the last render; NULL: no limit. */
-static const float *pixel_min_of(const frame *f)
-{
-    return f->pixel_limited ? f->pixel_min : NULL;
-}
+static const float *pixel_min_of(const frame *f) { return f->pixel_limited ? f->pixel_min : NULL; }
 
 /* f->gaussians as wide as the view's pixels make them. */
 static gbt_status widen(frame *f, frame_subject subject, gbt_error *err)
 {
     if (f->pixel_limited) {
-        GBT_TRY(mem_reserve((void **)&f->pixel_min, &f->pixel_min_capacity, 0, f->gaussians.count + 1, sizeof *f->pixel_min, "pixel sizes",
-                            err));
+        GBT_TRY(mem_reserve((void **)&f->pixel_min, &f->pixel_min_capacity, 0, f->gaussians.count + 1,
+                            sizeof *f->pixel_min, "pixel sizes", err));
         for (size_t i = 0; i < f->gaussians.count; i++)
             f->pixel_min[i] = f->draw.anchor_pixel[frame_part(f, subject, i)];
     }
-    return footprint_forward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians, &f->wide, err);
+    return footprint_forward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians,
+                             &f->wide, err);
 }
 
 /* Everything up to the tree, and f->rays through the middle of the aperture. `guest` is optional. */
-static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, const frame_guest *guest,
-                          gbt_error *err)
+static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
+                          const trace_settings *settings, const frame_guest *guest, gbt_error *err)
 {
     double clock = clock_wall();
     ray_shot middle = *shot;
@@ -93,19 +94,21 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     f->pixel_limited = f->draw.anchor_pixel != NULL && subject.cloud == NULL;
     f->widened = f->draw.footprint > 0 && shot->given == NULL; /* nobody says how wide given rays are */
     /* where an opaque Gaussian falls to alpha_min */
-    const visible_reach extent = {.sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)),
-                                  .width = sqrtf(f->widened ? pixel_variance(f, f->draw.footprint) : dilation_of(f)),
-                                  .pixel = (float)f->view.pixel,
-                                  .parallel = f->view.kind == FOOTPRINT_PARALLEL,
-                                  .pixel_min = f->pixel_limited ? f->draw.anchor_pixel : NULL};
-    GBT_TRY(visible_find(subject, &bounds, &extent, &f->visible, &f->visible_count, &f->visible_capacity, err));
+    const visible_reach extent = {
+        .sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)),
+        .width = sqrtf(f->widened ? pixel_variance(f, f->draw.footprint) : dilation_of(f)),
+        .pixel = (float)f->view.pixel,
+        .parallel = f->view.kind == FOOTPRINT_PARALLEL,
+        .pixel_min = f->pixel_limited ? f->draw.anchor_pixel : NULL};
+    GBT_TRY(
+        visible_find(subject, &bounds, &extent, &f->visible, &f->visible_count, &f->visible_capacity, err));
     f->times.visible = lap(&clock);
     /* A Gaussian below alpha_min is never blended and so has no gradient: it need not be made. */
     if (subject.cloud != NULL)
         GBT_TRY(plain_forward(subject.cloud, f->eye, f->visible, f->visible_count, &f->gaussians, err));
     else
-        GBT_TRY(decode_forward(subject.anchors, subject.decoder, f->eye, f->visible, f->visible_count, settings->alpha_min, &f->gaussians,
-                               &f->tape, err));
+        GBT_TRY(decode_forward(subject.anchors, subject.decoder, f->eye, f->visible, f->visible_count,
+                               settings->alpha_min, &f->gaussians, &f->tape, err));
     if (f->widened)
         GBT_TRY(widen(f, subject, err));
     f->times.decode = lap(&clock);
@@ -125,7 +128,9 @@ raster_settings frame_splat_settings(const trace_settings *settings, raster_form
 {
     raster_settings s = raster_settings_default();
     s.form = form;
-    s.alpha_min = settings->alpha_min, s.alpha_max = settings->alpha_max, s.transmittance_min = settings->transmittance_min;
+    s.alpha_min = settings->alpha_min;
+    s.alpha_max = settings->alpha_max;
+    s.transmittance_min = settings->transmittance_min;
     s.near = settings->t_near;
     memcpy(s.background, settings->background, sizeof s.background);
     return s;
@@ -133,28 +138,33 @@ raster_settings frame_splat_settings(const trace_settings *settings, raster_form
 
 static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape, gbt_error *err)
 {
-    raster_settings s = frame_splat_settings(settings, f->draw.renderer == FRAME_SPLAT ? RASTER_EWA : RASTER_PER_RAY);
+    raster_settings s =
+        frame_splat_settings(settings, f->draw.renderer == FRAME_SPLAT ? RASTER_EWA : RASTER_PER_RAY);
     s.dilation = dilation_of(f);
     raster_counters counted = {0};
-    GBT_TRY(raster_forward(&f->splats, frame_drawn(f), &f->camera, &s, keep_tape, &f->rgb, NULL, &counted, err));
-    f->counters.rays = counted.pixels, f->counters.hits = f->counters.blended = counted.blended;
+    GBT_TRY(
+        raster_forward(&f->splats, frame_drawn(f), &f->camera, &s, keep_tape, &f->rgb, NULL, &counted, err));
+    f->counters.rays = counted.pixels;
+    f->counters.hits = f->counters.blended = counted.blended;
     return GBT_OK;
 }
 
-gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, gbt_error *err)
+gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *camera,
+                         const trace_settings *settings, gbt_error *err)
 {
     const ray_shot shot = ray_shot_of(camera);
     return prepare(f, subject, &shot, settings, NULL, err);
 }
 
-gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
-                        gbt_error *err)
+gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera,
+                        const trace_settings *settings, bool keep_tape, gbt_error *err)
 {
     const ray_shot shot = ray_shot_of(camera);
     GBT_TRY(prepare(f, subject, &shot, settings, NULL, err));
     double clock = clock_wall();
     if (f->draw.renderer == FRAME_TRACE)
-        GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
+        GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters,
+                              err));
     else
         GBT_TRY(splat(f, settings, keep_tape, err));
     f->times.trace = lap(&clock);
@@ -162,7 +172,8 @@ gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camer
 }
 
 /* Trace every sample and add them up, in order, in double. */
-static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_guest *guest, double *sum, gbt_error *err)
+static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_guest *guest, double *sum,
+                                gbt_error *err)
 {
     const size_t values = 3 * ray_image_count(&f->rays);
     const int samples = ray_shot_sample_count(shot);
@@ -174,7 +185,8 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_gues
         if (guest != NULL)
             GBT_TRY(guest->trace(guest->context, &f->scene, &f->rays, &f->rgb, err));
         else
-            GBT_TRY(trace_forward(&f->scene, &f->rays, false, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
+            GBT_TRY(trace_forward(&f->scene, &f->rays, false, &(trace_outputs){.rgb = &f->rgb}, &f->counters,
+                                  err));
         f->times.trace += lap(&clock);
         for (size_t i = 0; i < values; i++)
             sum[i] += (double)f->rgb.pixels[i];
@@ -184,14 +196,16 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_gues
     return GBT_OK;
 }
 
-gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings,
-                              const frame_guest *guest, gbt_error *err)
+gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot,
+                              const trace_settings *settings, const frame_guest *guest, gbt_error *err)
 {
     GBT_TRY(ray_shot_check(shot, err));
     if (f->draw.renderer != FRAME_TRACE) {
-        if (guest != NULL || shot->given != NULL || shot->aperture_radius > 0 || shot->shutter != RAY_SHUTTER_GLOBAL)
+        if (guest != NULL || shot->given != NULL || shot->aperture_radius > 0 ||
+            shot->shutter != RAY_SHUTTER_GLOBAL)
             return base_fail(err, GBT_ERR_ARGUMENT,
-                             "the rasterizer draws what a pinhole camera sees that stands still, and no more; trace this picture");
+                             "the rasterizer draws what a pinhole camera sees that stands still, and no "
+                             "more; trace this picture");
         return frame_render(f, subject, &shot->camera, settings, false, err);
     }
     GBT_TRY(prepare(f, subject, shot, settings, guest, err));
@@ -202,7 +216,8 @@ gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *s
     return status;
 }
 
-gbt_status frame_render_shot(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, gbt_error *err)
+gbt_status frame_render_shot(frame *f, frame_subject subject, const ray_shot *shot,
+                             const trace_settings *settings, gbt_error *err)
 {
     return frame_render_guest(f, subject, shot, settings, NULL, err);
 }
@@ -213,7 +228,8 @@ void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_CO
     if (!f->widened)
         return;
     memcpy(&g, field, sizeof g);
-    footprint_widen(&f->view, (double)pixel_variance(f, f->draw.footprint), f->pixel_limited ? (double)f->pixel_min[i] : 0, &g);
+    footprint_widen(&f->view, (double)pixel_variance(f, f->draw.footprint),
+                    f->pixel_limited ? (double)f->pixel_min[i] : 0, &g);
     memcpy(field, &g, sizeof g);
 }
 
@@ -229,19 +245,21 @@ double frame_volume(const frame *f)
 gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err)
 {
     double clock = clock_wall();
-    GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen, "weights", err));
+    GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen,
+                        "weights", err));
     if (f->draw.renderer == FRAME_TRACE)
         GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, f->seen, NULL, err));
     else
         GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, f->seen, NULL, err));
     if (f->widened)
-        footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians, &f->d_gaussians);
+        footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians,
+                           &f->d_gaussians);
     f->times.adjoint = lap(&clock);
     return GBT_OK;
 }
 
-gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image, float volume_weight, anchors *d_anchors,
-                          float *d_params, gbt_error *err)
+gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image,
+                          float volume_weight, anchors *d_anchors, float *d_params, gbt_error *err)
 {
     GBT_TRY(frame_backward_gaussians(f, d_image, err));
     double clock = clock_wall();
@@ -257,7 +275,8 @@ gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const im
     return GBT_OK;
 }
 
-gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const image *d_image, gaussian_cloud *d_cloud, gbt_error *err)
+gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const image *d_image,
+                                gaussian_cloud *d_cloud, gbt_error *err)
 {
     GBT_TRY(frame_backward_gaussians(f, d_image, err));
     plain_backward(cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, d_cloud);

@@ -1,5 +1,6 @@
-/* frame/frame.h -- one view of a model, start to end: what is visible, its Gaussians, tree, trace; and back. Training and evaluation share
-   it. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* frame/frame.h -- one view of a model, start to end: what is visible, its Gaussians, tree, trace; and back.
+   Training and evaluation share it. */
 #ifndef GBT_FRAME_FRAME_H
 #define GBT_FRAME_FRAME_H
 
@@ -23,15 +24,19 @@ typedef enum frame_renderer {
 bool frame_renderer_named(const char *name, frame_renderer *out);
 const char *frame_renderer_name(frame_renderer renderer);
 
-/** The rasterizer's settings for what the tracer's say: alphas, T, near, background. The rest is its default. */
+/** The rasterizer's settings for what the tracer's say: alphas, T, near, background. The rest is its
+    default. */
 raster_settings frame_splat_settings(const trace_settings *settings, raster_form form);
 
 /** How Gaussians become a picture. Set in the frame before rendering; {0}: traced, thin rays. */
 typedef struct frame_drawing {
     frame_renderer renderer;
-    float footprint;           /* variance of a pixel, px^2 (trace/footprint.h); 0: rays are thin, splats dilated as in the paper's base */
-    int pixel_step;            /* the camera's pixels are every n-th of a picture, and as wide as that one's; 0 and 1: all */
-    const float *anchor_pixel; /* optional (NULL), [anchors]: the smallest pixel an anchor was made for; borrowed */
+    float footprint; /* variance of a pixel, px^2 (trace/footprint.h); 0: rays are thin, splats dilated as in
+                        the paper's base */
+    int pixel_step;  /* the camera's pixels are every n-th of a picture, and as wide as that one's; 0 and 1:
+                        all */
+    const float *anchor_pixel; /* optional (NULL), [anchors]: the smallest pixel an anchor was made for;
+                                  borrowed */
 } frame_drawing;
 
 /** Everything one view needs, reused from view to view. Start from {0}; free with frame_free(). */
@@ -63,33 +68,39 @@ typedef struct frame {
 /**
  * Render `camera` (any model) into f->rgb.
  *
- * An anchor or plain Gaussian is visible when the ball around it that holds all its proxies meets a region that holds all rays, so nothing
- * that could be seen is left out: planes along the sides of the picture for cameras that look forward, else a cone around their mean
- * direction, thickened by the distance between their origins. Networks and spherical harmonics see it from the camera centre.
+ * An anchor or plain Gaussian is visible when the ball around it that holds all its proxies meets a region
+ * that holds all rays, so nothing that could be seen is left out: planes along the sides of the picture for
+ * cameras that look forward, else a cone around their mean direction, thickened by the distance between their
+ * origins. Networks and spherical harmonics see it from the camera centre.
  *
  * @param keep_tape [in] true when frame_backward(), frame_backward_plain() or frame_weigh() follows
  * Threads: one frame per thread; parallel inside; same bits for every thread count.
  */
-gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, bool keep_tape,
-                        gbt_error *err);
+gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera,
+                        const trace_settings *settings, bool keep_tape, gbt_error *err);
 
-/** frame_render() up to the picture: f->scene is built, for other passes over it (FRAME_TRACE). f->rgb has its size and no meaning. */
-gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *camera, const trace_settings *settings, gbt_error *err);
+/** frame_render() up to the picture: f->scene is built, for other passes over it (FRAME_TRACE). f->rgb has
+    its size and no meaning. */
+gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *camera,
+                         const trace_settings *settings, gbt_error *err);
 
 /**
  * Render a shot (trace/rays.h) into f->rgb: the mean over its samples, added up in their order in double.
  *
- * Anchors are decoded (harmonics summed) once, for one point: the mean of the origins of the rays through the middle of the aperture. That
- * is the camera centre, the middle of the way of a rolling shutter, the middle of an orthographic picture (a point far behind it, where
- * parallel rays would meet, is farther than any the networks were trained for: measured, it spoils the picture). f->rays are left those of
- * the last sample. There is no adjoint.
+ * Anchors are decoded (harmonics summed) once, for one point: the mean of the origins of the rays through the
+ * middle of the aperture. That is the camera centre, the middle of the way of a rolling shutter, the middle
+ * of an orthographic picture (a point far behind it, where parallel rays would meet, is farther than any the
+ * networks were trained for: measured, it spoils the picture). f->rays are left those of the last sample.
+ * There is no adjoint.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT (ray_shot_check()), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
  * Threads: as frame_render(). Cost: decoding and building once, rays and tracing for every sample.
  */
-gbt_status frame_render_shot(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings, gbt_error *err);
+gbt_status frame_render_shot(frame *f, frame_subject subject, const ray_shot *shot,
+                             const trace_settings *settings, gbt_error *err);
 
-/** What traces the rays of a shot in place of trace_forward(), and sends rays of its own where the picture does not look. */
+/** What traces the rays of a shot in place of trace_forward(), and sends rays of its own where the picture
+    does not look. */
 typedef struct frame_guest {
     /* rgb has the size of rays */
     gbt_status (*trace)(void *context, trace_scene *scene, const ray_image *rays, image *rgb, gbt_error *err);
@@ -97,20 +108,25 @@ typedef struct frame_guest {
     float reach; /* largest |coordinate| of an origin of its own rays */
 } frame_guest;
 
-/** frame_render_shot() with a guest: everything is made, seen from the camera or not, all from the one point. */
-gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot, const trace_settings *settings,
-                              const frame_guest *guest, gbt_error *err);
+/** frame_render_shot() with a guest: everything is made, seen from the camera or not, all from the one
+    point. */
+gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot,
+                              const trace_settings *settings, const frame_guest *guest, gbt_error *err);
 
 /**
- * Adjoint of the last frame_render(keep_tape) of anchors: d_image -> d_anchors (rows of f->visible, added) and d_params (added).
+ * Adjoint of the last frame_render(keep_tape) of anchors: d_image -> d_anchors (rows of f->visible, added)
+ * and d_params (added).
  *
- * @param volume_weight [in] adds the gradient of volume_weight * mean(scale_x scale_y scale_z) over the frame's Gaussians
+ * @param volume_weight [in] adds the gradient of volume_weight * mean(scale_x scale_y scale_z) over the
+ *                           frame's Gaussians
  */
-gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image, float volume_weight, anchors *d_anchors,
-                          float *d_params, gbt_error *err);
+gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image,
+                          float volume_weight, anchors *d_anchors, float *d_params, gbt_error *err);
 
-/** Adjoint of the last frame_render(keep_tape) of a cloud. `d_cloud`: as many Gaussians as it has; see plain_backward(). */
-gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const image *d_image, gaussian_cloud *d_cloud, gbt_error *err);
+/** Adjoint of the last frame_render(keep_tape) of a cloud. `d_cloud`: as many Gaussians as it has; see
+    plain_backward(). */
+gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const image *d_image,
+                                gaussian_cloud *d_cloud, gbt_error *err);
 
 /** The part that both have in common: d_image -> f->d_gaussians and f->seen. */
 gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err);
@@ -125,12 +141,10 @@ static inline uint32_t frame_part(const frame *f, frame_subject subject, size_t 
 }
 
 /** The Gaussians that were traced. */
-static inline const gaussians *frame_drawn(const frame *f)
-{
-    return f->widened ? &f->wide : &f->gaussians;
-}
+static inline const gaussians *frame_drawn(const frame *f) { return f->widened ? &f->wide : &f->gaussians; }
 
-/** What widening did to Gaussian `i` of the last render, in double: for checks. `field`: in the order of GAUSSIANS_FIELDS. */
+/** What widening did to Gaussian `i` of the last render, in double: for checks. `field`: in the order of
+    GAUSSIANS_FIELDS. */
 void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_COUNT]);
 
 /** Mean volume term of the last render's Gaussians: mean(scale_x scale_y scale_z), 0 without Gaussians. */

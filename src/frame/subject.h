@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* frame/subject.h -- what a frame shows: the neural Gaussians of anchors, or plain ones. */
 #ifndef GBT_FRAME_SUBJECT_H
 #define GBT_FRAME_SUBJECT_H
@@ -5,7 +6,8 @@
 #include "anchor/decode.h"
 #include "data/gaussian_cloud.h"
 
-/** One of the two: anchors with their networks, or a cloud. Borrowed. Its parts, anchors or Gaussians, are what may be visible or not. */
+/** One of the two: anchors with their networks, or a cloud. Borrowed. Its parts, anchors or Gaussians, are
+    what may be visible or not. */
 typedef struct frame_subject {
     const anchors *anchors;
     const decoder *decoder;

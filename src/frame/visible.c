@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* frame/visible.c -- bounds on all rays of a view, and what they may reach. */
 #include "frame/visible.h"
 
@@ -27,21 +28,18 @@ typedef struct block_bounds {
 static bool ray_at(const ray_image *rays, size_t i, const double center[3], double start[3], double dir[3])
 {
     const float *o = ray_image_origin(rays, i), *d = rays->dir + 3 * i;
-    for (int k = 0; k < 3; k++)
-        start[k] = (double)o[k] - center[k], dir[k] = (double)d[k];
+    for (int k = 0; k < 3; k++) {
+        start[k] = (double)o[k] - center[k];
+        dir[k] = (double)d[k];
+    }
     return d[0] != 0 || d[1] != 0 || d[2] != 0;
 }
 
-/* The smaller or larger of two, and the second when the first is not a number; fmin() would be a call for every ray. */
-static inline double least(double a, double b)
-{
-    return a < b ? a : b;
-}
+/* The smaller or larger of two, and the second when the first is not a number; fmin() would be a call for
+   every ray. */
+static inline double least(double a, double b) { return a < b ? a : b; }
 
-static inline double most(double a, double b)
-{
-    return a > b ? a : b;
-}
+static inline double most(double a, double b) { return a > b ? a : b; }
 
 static void bound_directions(size_t block, size_t begin, size_t end, void *context)
 {
@@ -58,8 +56,10 @@ static void bound_directions(size_t block, size_t begin, size_t end, void *conte
         out.origin_square = most(dvec_dot(start, start), out.origin_square);
         if (turned[2] > 0.05) {
             const double x = turned[0] / turned[2], y = turned[1] / turned[2];
-            out.low[0] = least(x, out.low[0]), out.high[0] = most(x, out.high[0]);
-            out.low[1] = least(y, out.low[1]), out.high[1] = most(y, out.high[1]);
+            out.low[0] = least(x, out.low[0]);
+            out.high[0] = most(x, out.high[0]);
+            out.low[1] = least(y, out.low[1]);
+            out.high[1] = most(y, out.high[1]);
         }
     }
     job->blocks[block] = out;
@@ -73,7 +73,8 @@ static void bound_offsets(size_t block, size_t begin, size_t end, void *context)
         double start[3], dir[3];
         if (ray_at(job->rays, i, job->center, start, dir))
             for (int p = 0; p < VIEW_PLANES; p++)
-                job->blocks[block].offset[p] = most(dvec_dot(job->normal[p], start), job->blocks[block].offset[p]);
+                job->blocks[block].offset[p] =
+                    most(dvec_dot(job->normal[p], start), job->blocks[block].offset[p]);
     }
 }
 
@@ -90,10 +91,13 @@ static block_bounds join(const block_bounds *blocks, size_t count)
     block_bounds all = no_bounds();
     for (size_t i = 0; i < count; i++) {
         const block_bounds *b = &blocks[i];
-        all.cos_min = fmin(all.cos_min, b->cos_min), all.depth_min = fmin(all.depth_min, b->depth_min);
+        all.cos_min = fmin(all.cos_min, b->cos_min);
+        all.depth_min = fmin(all.depth_min, b->depth_min);
         all.origin_square = fmax(all.origin_square, b->origin_square);
-        for (int k = 0; k < 2; k++)
-            all.low[k] = fmin(all.low[k], b->low[k]), all.high[k] = fmax(all.high[k], b->high[k]);
+        for (int k = 0; k < 2; k++) {
+            all.low[k] = fmin(all.low[k], b->low[k]);
+            all.high[k] = fmax(all.high[k], b->high[k]);
+        }
         for (int p = 0; p < VIEW_PLANES; p++)
             all.offset[p] = fmax(all.offset[p], b->offset[p]);
     }
@@ -117,7 +121,8 @@ static void find_axes(const ray_shot *shot, const double axis[3], double axes[9]
     gbt_camera look = shot->camera;
     const double here[3] = {0, 0, 0}, up[3] = {fabs(axis[0]) < 0.6, fabs(axis[0]) >= 0.6, 0};
     if (shot->given != NULL)
-        gbt_camera_look_at(here, axis, up, &look); /* fails for a zero axis: then no ray looks forward in any axes */
+        gbt_camera_look_at(here, axis, up, &look); /* fails for a zero axis: then no ray looks forward in any
+                                                      axes */
     memcpy(axes, look.rotation, sizeof look.rotation);
 }
 
@@ -147,7 +152,8 @@ static void find_normals(bounds_job *job, const block_bounds *all, double spread
 {
     for (int k = 0; k < 2; k++)
         for (int sign = 0; sign < 2; sign++) {
-            const double slope = sign == 0 ? (all->high[k] + spread) * (1 + 1e-3) + 1e-3 : (all->low[k] - spread) * (1 + 1e-3) - 1e-3;
+            const double slope = sign == 0 ? (all->high[k] + spread) * (1 + 1e-3) + 1e-3
+                                           : (all->low[k] - spread) * (1 + 1e-3) - 1e-3;
             double n[3] = {0, 0, 0};
             n[k] = sign == 0 ? 1 : -1;
             n[2] = sign == 0 ? -slope : slope;
@@ -158,27 +164,30 @@ static void find_normals(bounds_job *job, const block_bounds *all, double spread
         job->normal[4][k] = -job->axis[k];
 }
 
-/* Is the image of a slope under another point of the aperture known? With a plane in focus every ray of a pixel is divided by the same
-   depth, in the axes of the pose that took it. */
+/* Is the image of a slope under another point of the aperture known? With a plane in focus every ray of a
+   pixel is divided by the same depth, in the axes of the pose that took it. */
 static bool slopes_are_known(const ray_shot *shot, double aperture)
 {
     camera_lens lens;
-    return aperture <= 0 || (shot->shutter == RAY_SHUTTER_GLOBAL && camera_lens_prepare(&shot->camera, &lens) &&
-                             camera_lens_looks_forward(&lens));
+    return aperture <= 0 || (shot->shutter == RAY_SHUTTER_GLOBAL &&
+                             camera_lens_prepare(&shot->camera, &lens) && camera_lens_looks_forward(&lens));
 }
 
-/* `rays` are those through the middle of the aperture. Another point of it shifts an origin by at most its radius R, and with the focus
-   at F a slope by at most R / F and a direction by at most asin(R / F). */
+/* `rays` are those through the middle of the aperture. Another point of it shifts an origin by at most its
+   radius R, and with the focus at F a slope by at most R / F and a direction by at most asin(R / F). */
 gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bounds *out, gbt_error *err)
 {
     bounds_job job = {.rays = rays};
-    const double aperture = shot->given == NULL ? shot->aperture_radius : 0, spread = aperture > 0 ? aperture / shot->focus_distance : 0;
+    const double aperture = shot->given == NULL ? shot->aperture_radius : 0,
+                 spread = aperture > 0 ? aperture / shot->focus_distance : 0;
     const size_t rows = (size_t)rays->height, count = parallel_block_count(rows, ROW_GRAIN);
     find_axis(rays, job.axis);
     find_axes(shot, job.axis, job.axes);
     find_center(rays, out->center);
-    for (int k = 0; k < 3; k++)
-        job.center[k] = (double)out->center[k], out->axis[k] = (float)job.axis[k];
+    for (int k = 0; k < 3; k++) {
+        job.center[k] = (double)out->center[k];
+        out->axis[k] = (float)job.axis[k];
+    }
     job.blocks = mem_alloc(count, sizeof *job.blocks, "view bounds", err);
     if (job.blocks == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -188,8 +197,10 @@ gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bo
     block_bounds all = join(job.blocks, count);
     const double widest = fmin(1, fmax(-1, all.cos_min)), sine = sqrt(1 - widest * widest);
     const double cos_spread = sqrt(fmax(0, 1 - spread * spread));
-    const bool all_around = spread >= 1 || sine * cos_spread + widest * spread < 0; /* angles beyond 180 degrees */
-    const double cos_wide = all_around ? -1 : widest * cos_spread - sine * spread, cos_min = fmax(cos_wide - 2e-3, -1);
+    const bool all_around =
+        spread >= 1 || sine * cos_spread + widest * spread < 0; /* angles beyond 180 degrees */
+    const double cos_wide = all_around ? -1 : widest * cos_spread - sine * spread,
+                 cos_min = fmax(cos_wide - 2e-3, -1);
     out->cos_angle = (float)cos_min;
     out->sin_angle = (float)sqrt(fmax(0, 1 - cos_min * cos_min));
     out->plane_count = all.depth_min > 0.05 && slopes_are_known(shot, aperture) ? cos_wide > 0 ? 5 : 4 : 0;
@@ -228,7 +239,8 @@ static part_ball anchor_ball(const anchors *a, size_t i)
         const float x = o[0] * ex, y = o[1] * ey, z = o[2] * ez;
         far_square = fmaxf(far_square, x * x + y * y + z * z);
     }
-    return (part_ball){a->position + 3 * i, sqrtf(far_square), expf(fminf(fmaxf(l[3], fmaxf(l[4], l[5])), 30.0f))};
+    return (part_ball){a->position + 3 * i, sqrtf(far_square),
+                       expf(fminf(fmaxf(l[3], fmaxf(l[4], l[5])), 30.0f))};
 }
 
 static part_ball plain_ball(const gaussian_cloud *cloud, size_t i)
@@ -243,7 +255,9 @@ static float reach_of(const part_ball *part, const visible_reach *reach, float p
     if (reach->width <= 0)
         return part->farthest + reach->sigmas * part->scale;
     const float d[3] = {part->center[0] - eye[0], part->center[1] - eye[1], part->center[2] - eye[2]};
-    const float pixel = reach->pixel * (reach->parallel ? 1 : sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) + part->farthest);
+    const float pixel =
+        reach->pixel *
+        (reach->parallel ? 1 : sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) + part->farthest);
     return part->farthest + reach->sigmas * (part->scale + reach->width * fmaxf(pixel, pixel_min));
 }
 
@@ -255,16 +269,20 @@ static bool is_visible(const view_bounds *b, const float position[3], float reac
             return false; /* and a place that is not a number */
     if (b->plane_count > 0)
         return true;
-    /* A ray from elsewhere reaches the ball only if one from the centre reaches a ball that is larger by its distance. */
+    /* A ray from elsewhere reaches the ball only if one from the centre reaches a ball that is larger by its
+       distance. */
     reach += b->origin_radius;
     const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     if (square <= reach * reach)
         return true;
-    /* Cone of half angle A, ball seen under half angle B: they meet when the angle between axis and centre is at most A + B. */
-    const float length = sqrtf(square), along = (b->axis[0] * d[0] + b->axis[1] * d[1] + b->axis[2] * d[2]) / length;
+    /* Cone of half angle A, ball seen under half angle B: they meet when the angle between axis and centre is
+       at most A + B. */
+    const float length = sqrtf(square),
+                along = (b->axis[0] * d[0] + b->axis[1] * d[1] + b->axis[2] * d[2]) / length;
     const float sin_ball = reach / length, cos_ball = sqrtf(1 - sin_ball * sin_ball);
     const float cos_sum = b->cos_angle * cos_ball - b->sin_angle * sin_ball;
-    return b->sin_angle * cos_ball + b->cos_angle * sin_ball < 0 || along >= cos_sum; /* A + B beyond 180 degrees sees everything */
+    return b->sin_angle * cos_ball + b->cos_angle * sin_ball < 0 ||
+           along >= cos_sum; /* A + B beyond 180 degrees sees everything */
 }
 
 typedef struct visible_job {
@@ -280,7 +298,8 @@ static void visible_block(size_t block, size_t begin, size_t end, void *context)
     const visible_job *job = context;
     uint32_t kept = 0;
     for (size_t i = begin; i < end; i++) {
-        const part_ball part = job->subject.cloud != NULL ? plain_ball(job->subject.cloud, i) : anchor_ball(job->subject.anchors, i);
+        const part_ball part = job->subject.cloud != NULL ? plain_ball(job->subject.cloud, i)
+                                                          : anchor_ball(job->subject.anchors, i);
         const float pixel_min = job->reach->pixel_min != NULL ? job->reach->pixel_min[i] : 0;
         if (is_visible(job->bounds, part.center, reach_of(&part, job->reach, pixel_min, job->bounds->center)))
             job->out[begin + kept++] = (uint32_t)i;
@@ -288,11 +307,12 @@ static void visible_block(size_t block, size_t begin, size_t end, void *context)
     job->out_count[block] = kept;
 }
 
-gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach, uint32_t **visible, size_t *count,
-                        size_t *capacity, gbt_error *err)
+gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach,
+                        uint32_t **visible, size_t *count, size_t *capacity, gbt_error *err)
 {
     const size_t parts = frame_subject_count(subject), blocks = parallel_block_count(parts, PART_BLOCK);
-    GBT_TRY(mem_reserve((void **)visible, capacity, 0, parts + blocks + 1, sizeof **visible, "visible parts", err));
+    GBT_TRY(mem_reserve((void **)visible, capacity, 0, parts + blocks + 1, sizeof **visible, "visible parts",
+                        err));
     uint32_t *list = *visible;
     visible_job job = {subject, bounds, reach, list, list + parts};
     parallel_blocks(parts, PART_BLOCK, visible_block, &job);

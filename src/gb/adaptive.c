@@ -1,10 +1,13 @@
-/* gb/adaptive.c -- granular balls where the scene needs them: the partition that is cut best first, to a given number of balls.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* gb/adaptive.c -- granular balls where the scene needs them: the partition that is cut best first, to a
+   given number of balls.
 
-   points --> [joint moments: nats, axis] --> [2-means along the axis] --> saving of the cut --> heap --best--> the two parts, the same way
-                                                                                             \--enough--> balls
+   points --> [joint moments: nats, axis] --> [2-means along the axis] --> saving of the cut --> heap
+   heap --best--> the two parts, the same way
+        \--enough--> balls
 
-   A waiting set is stored with its cut already made (in place: the array stays in the order of the tree), so opening it only shares out
-   its span. Statistics live in joint.c, the balls are written by fill.c. */
+   A waiting set is stored with its cut already made (in place: the array stays in the order of the tree), so
+   opening it only shares out its span. Statistics live in joint.c, the balls are written by fill.c. */
 #include "gb/adaptive.h"
 
 #include <math.h>
@@ -18,21 +21,21 @@
 
 enum { MEANS_ROUNDS = 16 }; /* of 2-means; it settles in about five */
 
-adaptive_def adaptive_def_default(void)
-{
-    return (adaptive_def){.color_unit = 0.1f, .min_scale = 0.25f};
-}
+adaptive_def adaptive_def_default(void) { return (adaptive_def){.color_unit = 0.1f, .min_scale = 0.25f}; }
 
 static gbt_status check_def(const adaptive_def *def, gbt_error *err)
 {
     if (!(def->voxel_size > 0.0f) || !isfinite(def->voxel_size))
-        return base_fail(err, GBT_ERR_ARGUMENT, "adaptive balls: bad voxel_size (wanted > 0, got %g)", (double)def->voxel_size);
+        return base_fail(err, GBT_ERR_ARGUMENT, "adaptive balls: bad voxel_size (wanted > 0, got %g)",
+                         (double)def->voxel_size);
     if (!(def->color_unit > 0.0f) || !isfinite(def->color_unit))
-        return base_fail(err, GBT_ERR_ARGUMENT, "adaptive balls: bad color_unit (wanted > 0, got %g)", (double)def->color_unit);
+        return base_fail(err, GBT_ERR_ARGUMENT, "adaptive balls: bad color_unit (wanted > 0, got %g)",
+                         (double)def->color_unit);
     if (def->balls_max < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "adaptive balls: bad balls_max (wanted >= 1, got 0)");
     if (!(def->min_scale >= 0.0f) || !isfinite(def->min_scale))
-        return base_fail(err, GBT_ERR_ARGUMENT, "adaptive balls: bad min_scale (wanted >= 0, got %g)", (double)def->min_scale);
+        return base_fail(err, GBT_ERR_ARGUMENT, "adaptive balls: bad min_scale (wanted >= 0, got %g)",
+                         (double)def->min_scale);
     return GBT_OK;
 }
 
@@ -51,7 +54,7 @@ typedef struct cutter {
     double *keys;        /* [n], places along the axis of the set in hand */
 } cutter;
 
-/* ---- a cut -------------------------------------------------------------------------------------------------------------------- */
+/* ---- a cut ---- */
 
 /* Where 2-means along the axis cuts `keys`, which have mean 0: keys up to there go left. */
 static double two_means(const double *keys, size_t count)
@@ -83,8 +86,10 @@ static size_t move_left(cloud_point *points, double *keys, size_t count, double 
         if (keys[i] <= bound) {
             const cloud_point point = points[i];
             const double key = keys[i];
-            points[i] = points[left], keys[i] = keys[left];
-            points[left] = point, keys[left++] = key;
+            points[i] = points[left];
+            keys[i] = keys[left];
+            points[left] = point;
+            keys[left++] = key;
         }
     return left;
 }
@@ -120,11 +125,12 @@ static waiting prepare(const cutter *c, size_t begin, size_t count, int depth)
     if (left == 0 || left == count)
         return w;
     w.left = (uint32_t)left;
-    w.saving = fmax(0.0, joint_nats(&m, count) - nats_of(c, points, left) - nats_of(c, points + left, count - left));
+    w.saving =
+        fmax(0.0, joint_nats(&m, count) - nats_of(c, points, left) - nats_of(c, points + left, count - left));
     return w;
 }
 
-/* ---- best first --------------------------------------------------------------------------------------------------------------- */
+/* ---- best first ---- */
 
 static bool goes_before(const waiting *a, const waiting *b)
 {
@@ -169,7 +175,8 @@ static size_t cut_best_first(const cutter *c, waiting *heap, size_t point_count,
     return count;
 }
 
-gbt_status balls_adapt(const float *position, const float *color, size_t count, const adaptive_def *def, balls *out, gbt_error *err)
+gbt_status balls_adapt(const float *position, const float *color, size_t count, const adaptive_def *def,
+                       balls *out, gbt_error *err)
 {
     *out = (balls){0};
     GBT_TRY(check_def(def, err));

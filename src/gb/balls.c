@@ -1,11 +1,13 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gb/balls.c -- the recursive granular-ball partition (3DGBGS sec. IV-A).
 
    points --> [moments: mean, r; sigma_a] --stop?--> mark a ball where the set begins
                    |
-                   +--> [principal axis, median] --> left, right (in place: the array stays in depth-first order)
+                   +--> [principal axis, median] --> left, right (in place, in depth-first order)
 
-   The top of the tree is grown level by level, its sub-trees then one per block; marks and places depend on the points only, so the
-   number of threads changes nothing. Statistics live in moments.c, the cut in split.c, the balls are written by fill.c. */
+   The top of the tree is grown level by level, its sub-trees then one per block; marks and places depend on
+   the points only, so the number of threads changes nothing. Statistics live in moments.c, the cut in
+   split.c, the balls are written by fill.c. */
 #include "gb/balls.h"
 
 #include <math.h>
@@ -21,9 +23,10 @@
 #include "gb/split.h"
 
 enum {
-    SUBTREES = 64,           /* the top is grown until there are this many sets to share out ... */
-    SUBTREE_POINTS = 4096,   /* ... or no set is larger than this */
-    KEPT_SPACINGS = 4        /* the scale prior takes a radius beyond 4 spacings for 4 spacings: a wider tied set is not left whole */
+    SUBTREES = 64,         /* the top is grown until there are this many sets to share out ... */
+    SUBTREE_POINTS = 4096, /* ... or no set is larger than this */
+    KEPT_SPACINGS = 4 /* the scale prior takes a radius beyond 4 spacings for 4 spacings: a wider tied set is
+                         not left whole */
 };
 
 balls_def balls_def_default(void)
@@ -39,17 +42,23 @@ balls_def balls_def_default(void)
 static gbt_status check_def(const balls_def *def, gbt_error *err)
 {
     if (!(def->voxel_size > 0.0f) || !isfinite(def->voxel_size))
-        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad voxel_size (wanted > 0, got %g)", (double)def->voxel_size);
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad voxel_size (wanted > 0, got %g)",
+                         (double)def->voxel_size);
     if (!(def->radius_factor > 0.0f) || !isfinite(def->radius_factor))
-        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad radius_factor (wanted > 0, got %g)", (double)def->radius_factor);
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad radius_factor (wanted > 0, got %g)",
+                         (double)def->radius_factor);
     if (!(def->color_std_max >= 0.0f && def->color_std_max <= 1.0f))
-        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad color_std_max (wanted 0 to 1, got %g)", (double)def->color_std_max);
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad color_std_max (wanted 0 to 1, got %g)",
+                         (double)def->color_std_max);
     if (def->min_points < 1)
-        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad min_points (wanted >= 1, got %d)", def->min_points);
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad min_points (wanted >= 1, got %d)",
+                         def->min_points);
     if (def->max_depth < 0 || def->max_depth > BALL_DEPTH_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad max_depth (wanted 0 to %d, got %d)", BALL_DEPTH_MAX, def->max_depth);
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad max_depth (wanted 0 to %d, got %d)",
+                         BALL_DEPTH_MAX, def->max_depth);
     if (!(def->min_scale >= 0.0f) || !isfinite(def->min_scale))
-        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad min_scale (wanted >= 0, got %g)", (double)def->min_scale);
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad min_scale (wanted >= 0, got %g)",
+                         (double)def->min_scale);
     return GBT_OK;
 }
 
@@ -86,7 +95,8 @@ static size_t try_split(const partition *p, const span *s)
         if (p->color == NULL || moments_color_std(points, s->count, p->color, mean) <= p->color_std_max)
             return 0;
     }
-    /* {a, b, b}: the paper keeps what its cut leaves on one side. Followed where that is harmless: one point too many, and not wide. */
+    /* {a, b, b}: the paper keeps what its cut leaves on one side. Followed where that is harmless: one point
+       too many, and not wide. */
     const bool keep_tied = s->count == p->min_points + 1 && radius <= p->radius_tied;
     return split_at_median(points, p->keys + s->begin, s->count, &m, keep_tied);
 }
@@ -131,14 +141,16 @@ typedef struct frontier {
 
 static void split_open(size_t block, size_t begin, size_t end, void *context)
 {
-    (void)begin, (void)end;
+    (void)begin;
+    (void)end;
     frontier *f = context;
     f->left[block] = f->open[block].count > f->split_above ? try_split(f->partition, &f->open[block]) : 0;
 }
 
 static void grow_open(size_t block, size_t begin, size_t end, void *context)
 {
-    (void)begin, (void)end;
+    (void)begin;
+    (void)end;
     const frontier *f = context;
     grow_subtree(f->partition, f->open[block]);
 }
@@ -170,7 +182,8 @@ static void grow(const partition *p, size_t count)
     parallel_blocks(f.count, 1, grow_open, &f);
 }
 
-gbt_status balls_build(const float *position, const float *color, size_t count, const balls_def *def, balls *out, gbt_error *err)
+gbt_status balls_build(const float *position, const float *color, size_t count, const balls_def *def,
+                       balls *out, gbt_error *err)
 {
     *out = (balls){0};
     GBT_TRY(check_def(def, err));

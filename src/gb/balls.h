@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gb/balls.h -- granular balls: the recursive PCA-median partition of a sparse cloud (3DGBGS sec. IV-A). */
 #ifndef GBT_GB_BALLS_H
 #define GBT_GB_BALLS_H
@@ -8,7 +9,8 @@
 #include "gbtrace/status.h"
 
 typedef struct balls_def {
-    float voxel_size;    /* v, eqs 21 and 23: base spatial scale, scene units, > 0. No default: see balls_voxel_size(). */
+    float voxel_size;    /* v, eqs 21 and 23: base spatial scale, scene units, > 0. No default: see
+                            balls_voxel_size(). */
     float radius_factor; /* eta, eq 23: a set is compact when r <= eta v; > 0. Default 1.25 */
     float color_std_max; /* tau_a, eq 23: largest mean channel std-dev of an even set, [0, 1]. Default 0.02 */
     int min_points;      /* N_min, eq 23: sets this small are not split; >= 1. Default 2 */
@@ -18,57 +20,66 @@ typedef struct balls_def {
 
 balls_def balls_def_default(void); /* the paper's settings; voxel_size is 0 and must be set */
 
-/** One ball per element; the general form (Omega, x, Sigma, rho) of granular-ball computing plus colour. All owned by the struct. */
+/** One ball per element; the general form (Omega, x, Sigma, rho) of granular-ball computing plus colour. All
+    owned by the struct. */
 typedef struct balls {
     size_t count, point_count;
-    uint32_t *first;    /* [count + 1]: ball j holds points member[first[j] .. first[j+1]) (Omega) */
-    uint32_t *member;   /* [point_count]: input indices, each once; ascending inside a ball */
-    float *center;      /* [count][3]: mean (x, eq 19) */
-    float *radius;      /* [count]: max(RMS distance, s_min) (rho, eqs 20, 21) */
-    float *covariance;  /* [count][6]: xx xy xz yy yz zz, population (Sigma) */
-    float *color;       /* [count][3]: mean colour */
-    float *color_std;   /* [count]: mean over channels of the population std-dev (eq 22) */
-    int *depth;         /* [count]: depth of the leaf */
+    uint32_t *first;   /* [count + 1]: ball j holds points member[first[j] .. first[j+1]) (Omega) */
+    uint32_t *member;  /* [point_count]: input indices, each once; ascending inside a ball */
+    float *center;     /* [count][3]: mean (x, eq 19) */
+    float *radius;     /* [count]: max(RMS distance, s_min) (rho, eqs 20, 21) */
+    float *covariance; /* [count][6]: xx xy xz yy yz zz, population (Sigma) */
+    float *color;      /* [count][3]: mean colour */
+    float *color_std;  /* [count]: mean over channels of the population std-dev (eq 22) */
+    int *depth;        /* [count]: depth of the leaf */
 } balls;
 
 /**
- * Partition a cloud into balls. Every point lands in exactly one ball (eq 17); balls are emitted depth first, left child first.
+ * Partition a cloud into balls. Every point lands in exactly one ball (eq 17); balls are emitted depth first,
+ * left child first.
  *
  * @param position [in] [count][3], finite
  * @param color    [in] [count][3] in [0, 1], or NULL: colour then never stops or forces a split (sigma_a = 0)
- * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, non-finite point, colour outside [0, 1]: says which), GBT_ERR_NO_MEMORY;
- *         on failure *out is zeroed
+ * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, non-finite point, colour outside [0, 1]: says which),
+ *         GBT_ERR_NO_MEMORY; on failure *out is zeroed
  *
- * 0 points give 0 balls. Points that no axis can separate are one ball; a set whose median is its maximum is split below the median,
- * but kept whole when it has min_points + 1 points and a radius of at most 4 voxel_size. Values beyond float (coordinates near its maximum)
- * saturate. Every reading of an ambiguity of the paper: docs/balls.md.
+ * 0 points give 0 balls. Points that no axis can separate are one ball; a set whose median is its maximum is
+ * split below the median, but kept whole when it has min_points + 1 points and a radius of at most 4
+ * voxel_size. Values beyond float (coordinates near its maximum) saturate. Every reading of an ambiguity of
+ * the paper: docs/balls.md.
  * Threads: same bits for every thread count. Cost: O(n log n) time, 25 n bytes of scratch.
  */
-gbt_status balls_build(const float *position, const float *color, size_t count, const balls_def *def, balls *out, gbt_error *err);
+gbt_status balls_build(const float *position, const float *color, size_t count, const balls_def *def,
+                       balls *out, gbt_error *err);
 void balls_free(balls *b);
 
 typedef enum voxel_rule {
-    VOXEL_MEDIAN_SPACING, /* lower median of the distance to the nearest neighbour: what the paper's text says */
-    VOXEL_COMPAT_SQUARED  /* lower median of the mean of the 3 squared neighbour distances: what the reference code computes */
+    VOXEL_MEDIAN_SPACING, /* lower median of the distance to the nearest neighbour: what the paper's text says
+                           */
+    VOXEL_COMPAT_SQUARED  /* lower median of the mean of the 3 squared neighbour distances: what the reference
+                             code computes */
 } voxel_rule;
 
 /**
  * Base spatial scale of a cloud (v), > 0 and finite for >= 2 distinct points, else 1.
  *
- * When the plain median is 0 (duplicates): the median over the points whose value is > 0; when there are none, over the distinct points.
- * Fewer than 4 points have fewer than 3 neighbours to average.
+ * When the plain median is 0 (duplicates): the median over the points whose value is > 0; when there are
+ * none, over the distinct points. Fewer than 4 points have fewer than 3 neighbours to average.
  * @return GBT_OK, GBT_ERR_ARGUMENT (non-finite point: says which), GBT_ERR_NO_MEMORY; *out is 1 on failure
  * Threads: same bits for every thread count. Cost: one nearest-neighbour query per point.
  */
 gbt_status balls_voxel_size(const float *position, size_t count, voxel_rule rule, float *out, gbt_error *err);
 
 /**
- * Scaffold-GS's baseline (eq 12): distinct cells round(p / v) (half to even, in float32), times v, sorted by x, y, z cell.
+ * Scaffold-GS's baseline (eq 12): distinct cells round(p / v) (half to even, in float32), times v, sorted by
+ * x, y, z cell.
  *
  * @param centers [out] [*out_count][3], free with mem_free(); NULL on failure
- * @return GBT_OK, GBT_ERR_ARGUMENT (voxel_size, non-finite point, or a cell out of the range of float: says which), GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (voxel_size, non-finite point, or a cell out of the range of float: says
+ *         which), GBT_ERR_NO_MEMORY
  * Cost: O(n log n) time, one thread.
  */
-gbt_status voxel_centers(const float *position, size_t count, float voxel_size, float **centers, size_t *out_count, gbt_error *err);
+gbt_status voxel_centers(const float *position, size_t count, float voxel_size, float **centers,
+                         size_t *out_count, gbt_error *err);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gb/cloud.h -- what every entry of this room asks of a cloud. */
 #ifndef GBT_GB_CLOUD_H
 #define GBT_GB_CLOUD_H
@@ -12,6 +13,7 @@
  * @param color [in] may be NULL
  * @return GBT_OK, or GBT_ERR_ARGUMENT with a message that begins with `who` and names the first bad point
  */
-gbt_status cloud_check(const char *who, const float *position, const float *color, size_t count, gbt_error *err);
+gbt_status cloud_check(const char *who, const float *position, const float *color, size_t count,
+                       gbt_error *err);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gb/fill.c -- from a reordered cloud and the places where balls begin to their members and statistics. */
 #include "gb/fill.h"
 
@@ -36,10 +37,7 @@ static void sort_by_index(cloud_point *points, size_t count)
 }
 
 /* Coordinates near FLT_MAX have variances that no float holds. */
-static float to_float(double x)
-{
-    return (float)fmin(fmax(x, (double)-FLT_MAX), (double)FLT_MAX);
-}
+static float to_float(double x) { return (float)fmin(fmax(x, (double)-FLT_MAX), (double)FLT_MAX); }
 
 typedef struct fill_job {
     cloud_point *points;
@@ -93,8 +91,8 @@ static gbt_status alloc_balls(balls *out, size_t count, size_t point_count, gbt_
     return GBT_OK;
 }
 
-gbt_status balls_fill(cloud_point *points, const uint8_t *leaf_depth, size_t count, const float *color, double radius_floor, balls *out,
-                      gbt_error *err)
+gbt_status balls_fill(cloud_point *points, const uint8_t *leaf_depth, size_t count, const float *color,
+                      double radius_floor, balls *out, gbt_error *err)
 {
     size_t ball_count = 0, ball = 0;
     for (size_t i = 0; i < count; i++)

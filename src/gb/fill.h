@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gb/fill.h -- from a reordered cloud and the places where balls begin to their members and statistics. */
 #ifndef GBT_GB_FILL_H
 #define GBT_GB_FILL_H
@@ -20,7 +21,7 @@ enum { BALL_DEPTH_MAX = 64 };
  *
  * Threads: same bits for every thread count.
  */
-gbt_status balls_fill(cloud_point *points, const uint8_t *leaf_depth, size_t count, const float *color, double radius_floor, balls *out,
-                      gbt_error *err);
+gbt_status balls_fill(cloud_point *points, const uint8_t *leaf_depth, size_t count, const float *color,
+                      double radius_floor, balls *out, gbt_error *err);
 
 #endif

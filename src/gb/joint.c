@@ -1,4 +1,6 @@
-/* gb/joint.c -- position and colour of a set of points as one vector of six: moments, principal axis, length of its description. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* gb/joint.c -- position and colour of a set of points as one vector of six: moments, principal axis, length
+   of its description. */
 #include "gb/joint.h"
 
 #include <math.h>
@@ -10,7 +12,9 @@ void joint_of(const joint_space *space, const cloud_point *point, double y[JOINT
 {
     for (int k = 0; k < 3; k++) {
         y[k] = (double)point->position[k] / space->position_unit;
-        y[3 + k] = space->color != NULL ? (double)space->color[3 * (size_t)point->index + (size_t)k] / space->color_unit : 0.0;
+        y[3 + k] = space->color != NULL
+                       ? (double)space->color[3 * (size_t)point->index + (size_t)k] / space->color_unit
+                       : 0.0;
     }
 }
 
@@ -64,7 +68,8 @@ double joint_nats(const joint_moments *m, size_t count)
     memcpy(widened, m->covariance, sizeof widened);
     for (int k = 0; k < JOINT_DIM; k++)
         widened[k][k] += 1.0;
-    symmetric_cholesky(&widened[0][0], &l[0][0], JOINT_DIM, 1.0); /* I + C is at least I; sets of one line lose that to rounding */
+    symmetric_cholesky(&widened[0][0], &l[0][0], JOINT_DIM, 1.0); /* I + C is at least I; sets of one line
+                                                                     lose that to rounding */
     for (int k = 0; k < JOINT_DIM; k++)
         sum += log(l[k][k]);
     return (double)count * sum;

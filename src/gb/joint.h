@@ -1,4 +1,6 @@
-/* gb/joint.h -- position and colour of a set of points as one vector of six: moments, principal axis, length of its description. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* gb/joint.h -- position and colour of a set of points as one vector of six: moments, principal axis, length
+   of its description. */
 #ifndef GBT_GB_JOINT_H
 #define GBT_GB_JOINT_H
 
@@ -29,14 +31,16 @@ void joint_of(const joint_space *space, const cloud_point *point, double y[JOINT
 void joint_compute(const joint_space *space, const cloud_point *points, size_t count, joint_moments *out);
 
 /**
- * Unit eigenvector of the largest eigenvalue; of equal ones the first axis that they turned from. Its largest component is positive,
- * components equal to 1e-9 count as tied, the first decides. The first unit vector for a zero covariance.
+ * Unit eigenvector of the largest eigenvalue; of equal ones the first axis that they turned from. Its largest
+ * component is positive, components equal to 1e-9 count as tied, the first decides. The first unit vector for
+ * a zero covariance.
  */
 void joint_axis(const joint_moments *m, double axis[JOINT_DIM]);
 
 /**
- * n / 2 ln det(I + C): what it takes, in nats, to write down n points of covariance C relative to their ball, to one unit in each
- * coordinate, when they are normally distributed. 0 for equal points; never more after a cut of the set (the determinant is log-concave).
+ * n / 2 ln det(I + C): what it takes, in nats, to write down n points of covariance C relative to their ball,
+ * to one unit in each coordinate, when they are normally distributed. 0 for equal points; never more after a
+ * cut of the set (the determinant is log-concave).
  */
 double joint_nats(const joint_moments *m, size_t count);
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gb/moments.c -- mean, covariance, radius and colour spread of a set of points, in double. */
 #include "gb/moments.h"
 
@@ -5,7 +6,8 @@
 
 #include "base/parallel.h"
 
-/* A set is cut into at most MAX_BLOCKS blocks of at least BLOCK_POINTS points: partial sums fit on the stack, small sets are one block. */
+/* A set is cut into at most MAX_BLOCKS blocks of at least BLOCK_POINTS points: partial sums fit on the stack,
+   small sets are one block. */
 enum { MAX_BLOCKS = 64, BLOCK_POINTS = 8192 };
 
 typedef struct block_sums {
@@ -21,10 +23,14 @@ static void sum_offsets(size_t block, size_t begin, size_t end, void *context)
     double x = 0, y = 0, z = 0;
     for (size_t i = begin; i < end; i++) {
         const float *p = sums->points[i].position;
-        x += (double)p[0] - ox, y += (double)p[1] - oy, z += (double)p[2] - oz;
+        x += (double)p[0] - ox;
+        y += (double)p[1] - oy;
+        z += (double)p[2] - oz;
     }
     double *sum = sums->sum[block];
-    sum[0] = x, sum[1] = y, sum[2] = z;
+    sum[0] = x;
+    sum[1] = y;
+    sum[2] = z;
 }
 
 static void sum_products(size_t block, size_t begin, size_t end, void *context)
@@ -35,10 +41,20 @@ static void sum_products(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end; i++) {
         const float *p = sums->points[i].position;
         const double x = (double)p[0] - ox, y = (double)p[1] - oy, z = (double)p[2] - oz;
-        xx += x * x, xy += x * y, xz += x * z, yy += y * y, yz += y * z, zz += z * z;
+        xx += x * x;
+        xy += x * y;
+        xz += x * z;
+        yy += y * y;
+        yz += y * z;
+        zz += z * z;
     }
     double *sum = sums->sum[block];
-    sum[0] = xx, sum[1] = xy, sum[2] = xz, sum[3] = yy, sum[4] = yz, sum[5] = zz;
+    sum[0] = xx;
+    sum[1] = xy;
+    sum[2] = xz;
+    sum[3] = yy;
+    sum[4] = yz;
+    sum[5] = zz;
 }
 
 /* Adds the blocks in block order into total[0 .. terms). */
@@ -62,7 +78,8 @@ void moments_compute(const cloud_point *points, size_t count, moments *out)
 {
     block_sums sums;
     sums.points = points;
-    const double first[3] = {(double)points[0].position[0], (double)points[0].position[1], (double)points[0].position[2]};
+    const double first[3] = {(double)points[0].position[0], (double)points[0].position[1],
+                             (double)points[0].position[2]};
     double total[6];
     sums.about = first;
     run_blocks(&sums, count, sum_offsets, 3, total);
@@ -93,5 +110,7 @@ double moments_color_std(const cloud_point *points, size_t count, const float *c
             const double d = (double)color[3 * (size_t)points[i].index + c] - mean[c];
             square[c] += d * d;
         }
-    return (sqrt(square[0] / (double)count) + sqrt(square[1] / (double)count) + sqrt(square[2] / (double)count)) / 3;
+    return (sqrt(square[0] / (double)count) + sqrt(square[1] / (double)count) +
+            sqrt(square[2] / (double)count)) /
+           3;
 }

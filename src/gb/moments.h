@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gb/moments.h -- mean, covariance, radius and colour spread of a set of points, in double. */
 #ifndef GBT_GB_MOMENTS_H
 #define GBT_GB_MOMENTS_H
@@ -17,10 +18,12 @@ typedef struct moments {
 } moments;
 
 /**
- * Two passes about the first point, then about the mean: exact 0 for equal points, no cancellation far from the origin.
+ * Two passes about the first point, then about the mean: exact 0 for equal points, no cancellation far from
+ * the origin.
  *
  * @param count [in] >= 1
- * Threads: any; large sets are summed in blocks whose cut depends on `count` only, so the bits do not depend on the number of threads.
+ * Threads: any; large sets are summed in blocks whose cut depends on `count` only, so the bits do not depend
+ * on the number of threads.
  */
 void moments_compute(const cloud_point *points, size_t count, moments *out);
 

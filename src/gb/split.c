@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* gb/split.c -- cut a set of points in two at the median of its principal axis (3DGBGS eqs 24-27). */
 #include "gb/split.h"
 
@@ -26,7 +27,8 @@ void split_axes(const double covariance[6], double axes[3][3])
     for (int i = 1; i < 3; i++)
         for (int j = i; j > 0 && a[order[j]][order[j]] > a[order[j - 1]][order[j - 1]]; j--) {
             const int keep = order[j];
-            order[j] = order[j - 1], order[j - 1] = keep;
+            order[j] = order[j - 1];
+            order[j - 1] = keep;
         }
     for (int i = 0; i < 3; i++) {
         double *axis = axes[i];
@@ -36,8 +38,11 @@ void split_axes(const double covariance[6], double axes[3][3])
         int decides = 0;
         while (fabs(axis[decides]) < tied)
             decides++;
-        if (axis[decides] < 0)
-            axis[0] = -axis[0], axis[1] = -axis[1], axis[2] = -axis[2];
+        if (axis[decides] < 0) {
+            axis[0] = -axis[0];
+            axis[1] = -axis[1];
+            axis[2] = -axis[2];
+        }
     }
 }
 
@@ -64,7 +69,8 @@ double split_select(double *keys, size_t count, size_t rank)
     const ptrdiff_t wanted = (ptrdiff_t)rank;
     int rounds = 0;
     while (high - low > 12) {
-        /* Good pivots halve the range. An input made to defeat them is sorted instead, so the worst case is O(n log n). */
+        /* Good pivots halve the range. An input made to defeat them is sorted instead, so the worst case is
+           O(n log n). */
         if (++rounds > 96) {
             qsort(keys + low, (size_t)(high - low + 1), sizeof *keys, compare_doubles);
             return keys[wanted];
@@ -108,7 +114,8 @@ typedef struct projection {
 /* z of eq 25. Evaluated twice per point, with the same bits: no contraction, fixed order. */
 static inline double project(const projection *p, const cloud_point *point)
 {
-    return ((double)point->position[0] - p->mean[0]) * p->axis[0] + ((double)point->position[1] - p->mean[1]) * p->axis[1] +
+    return ((double)point->position[0] - p->mean[0]) * p->axis[0] +
+           ((double)point->position[1] - p->mean[1]) * p->axis[1] +
            ((double)point->position[2] - p->mean[2]) * p->axis[2];
 }
 
@@ -148,7 +155,8 @@ size_t split_at_median(cloud_point *points, double *keys, size_t count, const mo
     double axes[3][3];
     split_axes(m->covariance, axes);
     for (int k = 0; k < 3; k++) {
-        projection p = {points, keys, {m->mean[0], m->mean[1], m->mean[2]}, {axes[k][0], axes[k][1], axes[k][2]}};
+        projection p = {
+            points, keys, {m->mean[0], m->mean[1], m->mean[2]}, {axes[k][0], axes[k][1], axes[k][2]}};
         if (count <= KEY_BLOCK)
             fill_keys(0, 0, count, &p);
         else

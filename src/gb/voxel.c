@@ -1,4 +1,6 @@
-/* gb/voxel.c -- the base spatial scale of a cloud, and Scaffold-GS's voxel centres, the baseline of the balls. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* gb/voxel.c -- the base spatial scale of a cloud, and Scaffold-GS's voxel centres, the baseline of the
+   balls. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -57,7 +59,8 @@ static void measure_spacing(size_t block, size_t begin, size_t end, void *contex
         const size_t found = point_tree_nearest(job->tree, job->position + 3 * i, wanted, i, index, squared);
         for (size_t k = 0; k < found; k++)
             sum += squared[k];
-        /* At least one neighbour: there are 2 points. Fewer than 4 points have fewer than 3 neighbours to average. */
+        /* At least one neighbour: there are 2 points. Fewer than 4 points have fewer than 3 neighbours to
+           average. */
         job->value[i] = job->rule == VOXEL_COMPAT_SQUARED ? sum / (double)found : sqrt(sum);
     }
 }
@@ -74,7 +77,8 @@ static gbt_status measure(const float *position, size_t count, voxel_rule rule, 
     return GBT_OK;
 }
 
-/* Lower median: rank (n - 1) / 2. The reference code takes the k-th smallest, k = floor(n / 2) from 1: one rank lower when n is odd. */
+/* Lower median: rank (n - 1) / 2. The reference code takes the k-th smallest, k = floor(n / 2) from 1: one
+   rank lower when n is odd. */
 static double median_of(double *values, size_t count, voxel_rule rule)
 {
     size_t rank = (count - 1) / 2;
@@ -113,7 +117,8 @@ gbt_status balls_voxel_size(const float *position, size_t count, voxel_rule rule
         const size_t positive = keep_positive(value, count);
         median = positive > 0 ? median_of(value, positive, rule) : 0;
     }
-    if (median <= 0) { /* every point has copies enough to be its neighbours: measure between the distinct points */
+    if (median <= 0) { /* every point has copies enough to be its neighbours: measure between the distinct
+                          points */
         if ((rows = mem_alloc(count, sizeof *rows, "voxel size.rows", err)) == NULL) {
             status = GBT_ERR_NO_MEMORY;
             goto done;
@@ -134,24 +139,29 @@ done:
     return status;
 }
 
-gbt_status voxel_centers(const float *position, size_t count, float voxel_size, float **centers, size_t *out_count, gbt_error *err)
+gbt_status voxel_centers(const float *position, size_t count, float voxel_size, float **centers,
+                         size_t *out_count, gbt_error *err)
 {
     *centers = NULL;
     *out_count = 0;
     if (!(voxel_size > 0.0f) || !isfinite(voxel_size))
-        return base_fail(err, GBT_ERR_ARGUMENT, "voxel centers: bad voxel_size (wanted > 0, got %g)", (double)voxel_size);
+        return base_fail(err, GBT_ERR_ARGUMENT, "voxel centers: bad voxel_size (wanted > 0, got %g)",
+                         (double)voxel_size);
     GBT_TRY(cloud_check("voxel centers", position, NULL, count, err));
     row *cells = mem_alloc(count, sizeof *cells, "voxel centers.cells", err);
     if (cells == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < count; i++)
         for (int k = 0; k < 3; k++) {
-            /* Cells stay floats, as in the reference: no integer overflow, and far cells merge as far floats do. */
+            /* Cells stay floats, as in the reference: no integer overflow, and far cells merge as far floats
+               do. */
             const float cell = rintf(position[3 * i + k] / voxel_size);
             if (!isfinite(cell * voxel_size)) {
                 mem_free(cells);
-                return base_fail(err, GBT_ERR_ARGUMENT, "voxel centers: point %zu is out of range (got coordinate %g in cells of %g)", i,
-                                 (double)position[3 * i + k], (double)voxel_size);
+                return base_fail(
+                    err, GBT_ERR_ARGUMENT,
+                    "voxel centers: point %zu is out of range (got coordinate %g in cells of %g)", i,
+                    (double)position[3 * i + k], (double)voxel_size);
             }
             cells[i].x[k] = cell + 0.0f; /* -0 becomes 0 */
         }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* image/affine.c -- colour matrices: apply, adjoint, least squares. */
 #include "image/affine.h"
 
@@ -23,10 +24,7 @@ typedef struct affine_job {
     double sums[BLOCKS_MAX][AFFINE_NUMBERS];
 } affine_job;
 
-static size_t pixel_count(const image *im)
-{
-    return (size_t)im->width * (size_t)im->height;
-}
+static size_t pixel_count(const image *im) { return (size_t)im->width * (size_t)im->height; }
 
 /* At most BLOCKS_MAX blocks, by the size alone. */
 static size_t block_grain(size_t pixels)
@@ -83,7 +81,7 @@ void affine_backward(const float m[AFFINE_NUMBERS], const image *in, image *d, d
             d_m[k] += job.sums[b][k];
 }
 
-/* ---- least squares ------------------------------------------------------------------------------------------------------------ */
+/* ---- least squares ---- */
 
 /* a x = b for a symmetric positive definite 4 x 4 and three right sides, by a = l l^T in place. */
 static void solve(double a[INPUTS][INPUTS], double b[OUTPUTS][INPUTS])
@@ -109,12 +107,10 @@ static void solve(double a[INPUTS][INPUTS], double b[OUTPUTS][INPUTS])
     }
 }
 
-static double finite_or_0(float value)
-{
-    return isfinite(value) ? (double)value : 0;
-}
+static double finite_or_0(float value) { return isfinite(value) ? (double)value : 0; }
 
-void affine_fit(const image *from, const image *to, const unsigned char *valid, int begin, int end, float m[AFFINE_NUMBERS])
+void affine_fit(const image *from, const image *to, const unsigned char *valid, int begin, int end,
+                float m[AFFINE_NUMBERS])
 {
     const double ridge = 1e-6;
     double a[INPUTS][INPUTS] = {{0}}, b[OUTPUTS][INPUTS] = {{0}};
@@ -144,7 +140,7 @@ void affine_fit(const image *from, const image *to, const unsigned char *valid, 
             m[4 * r + i] = (float)b[r][i];
 }
 
-/* ---- left and right ------------------------------------------------------------------------------------------------------------- */
+/* ---- left and right ---- */
 
 /* The last `kept` bytes of each of `rows` rows. */
 static void copy_right(const void *in, size_t row, size_t kept, int rows, void *out)
@@ -153,12 +149,16 @@ static void copy_right(const void *in, size_t row, size_t kept, int rows, void *
         memcpy((char *)out + y * kept, (const char *)in + y * row + (row - kept), kept);
 }
 
-gbt_status affine_split(image *render, const image *photo, const unsigned char *valid, affine_half *out, gbt_error *err)
+gbt_status affine_split(image *render, const image *photo, const unsigned char *valid, affine_half *out,
+                        gbt_error *err)
 {
     memset(out, 0, sizeof *out);
-    if (render->channels != 3 || photo->channels != 3 || render->width != photo->width || render->height != photo->height)
-        return base_fail(err, GBT_ERR_ARGUMENT, "exposure: images of %d x %d x %d and %d x %d x %d (wanted equal, 3 channels)",
-                         render->width, render->height, render->channels, photo->width, photo->height, photo->channels);
+    if (render->channels != 3 || photo->channels != 3 || render->width != photo->width ||
+        render->height != photo->height)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "exposure: images of %d x %d x %d and %d x %d x %d (wanted equal, 3 channels)",
+                         render->width, render->height, render->channels, photo->width, photo->height,
+                         photo->channels);
     const int left = render->width / 2, right = render->width - left;
     gbt_status status = image_alloc(&out->render, right, render->height, 3, err);
     if (status == GBT_OK)

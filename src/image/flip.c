@@ -1,10 +1,13 @@
-/* image/flip.c -- LDR-FLIP: how visible the difference of two images is when one flips between them (Andersson et al. 2020).
+/* SPDX-License-Identifier: Apache-2.0 */
+/* image/flip.c -- LDR-FLIP: how visible the difference of two images is when one flips between them
+   (Andersson et al. 2020).
 
-   sRGB --> YCxCz --+--> [contrast sensitivity filters] --> L*a*b*, Hunt --> HyAB --> colour difference c in [0, 1]
-                    +--> [edge and point detectors on Y] ------------------------> feature difference f in [0, 1]
-                                                                                   error = c^(1 - f)
+   sRGB --> YCxCz --+--> [contrast sensitivity filters] --> L*a*b*, Hunt --> HyAB --> colour difference c
+                    +--> [edge and point detectors on Y] -------------------------> feature difference f
+                                                     c, f in [0, 1]                 error = c^(1 - f)
 
-   Every 2-D filter of the paper is a sum of products of 1-D filters, so each is a column pass and a row pass. Borders repeat. */
+   Every 2-D filter of the paper is a sum of products of 1-D filters, so each is a column pass and a row pass.
+   Borders repeat. */
 #include "image/metrics.h"
 
 #include <math.h>
@@ -95,7 +98,8 @@ static void hunt_lab(const flip_filters *f, const double rgb[3], double lab[3])
 {
     double xyz[3];
     apply(rgb_to_xyz, rgb, xyz);
-    const double x = lab_curve(xyz[0] / f->white[0]), y = lab_curve(xyz[1] / f->white[1]), z = lab_curve(xyz[2] / f->white[2]);
+    const double x = lab_curve(xyz[0] / f->white[0]), y = lab_curve(xyz[1] / f->white[1]),
+                 z = lab_curve(xyz[2] / f->white[2]);
     lab[0] = 116 * y - 16;
     lab[1] = 0.01 * lab[0] * 500 * (x - y);
     lab[2] = 0.01 * lab[0] * 200 * (y - z);
@@ -153,7 +157,8 @@ static void make_filters(flip_filters *f)
         f->blue_yellow_weight[i] = amplitude[i] * sqrt(pi / b[i]) * sum * sum; /* of the 2-D filter */
     }
     const double total = f->blue_yellow_weight[0] + f->blue_yellow_weight[1];
-    f->blue_yellow_weight[0] /= total, f->blue_yellow_weight[1] /= total;
+    f->blue_yellow_weight[0] /= total;
+    f->blue_yellow_weight[1] /= total;
 
     const double feature_degrees = 0.082, sigma = 0.5 * feature_degrees * pixels_per_degree;
     const int radius = (int)ceil(3 * sigma);
@@ -161,7 +166,8 @@ static void make_filters(flip_filters *f)
     double sum = 0;
     for (int k = -radius; k <= radius; k++) {
         const double g = exp(-k * k / (2 * sigma * sigma));
-        f->gauss.taps[k + radius] = g, sum += g;
+        f->gauss.taps[k + radius] = g;
+        sum += g;
         f->edge.taps[k + radius] = -k * g;
         f->point.taps[k + radius] = (k * k / (sigma * sigma) - 1) * g;
     }
@@ -199,7 +205,8 @@ static void opponent_rows(size_t block, size_t begin, size_t end, void *context)
 }
 
 /* Column pass into a row that has RADIUS_MAX values of margin on both sides, filled by repeating its ends. */
-static void filter_columns(const flip_job *job, const float *plane, size_t row, const filter *f, double *restrict out)
+static void filter_columns(const flip_job *job, const float *plane, size_t row, const filter *f,
+                           double *restrict out)
 {
     memset(out, 0, job->width * sizeof *out);
     for (int k = -f->radius; k <= f->radius; k++) {
@@ -209,8 +216,10 @@ static void filter_columns(const flip_job *job, const float *plane, size_t row, 
         for (size_t i = 0; i < job->width; i++)
             out[i] += tap * (double)in[i];
     }
-    for (int k = 1; k <= RADIUS_MAX; k++)
-        out[-k] = out[0], out[job->width - 1 + (size_t)k] = out[job->width - 1];
+    for (int k = 1; k <= RADIUS_MAX; k++) {
+        out[-k] = out[0];
+        out[job->width - 1 + (size_t)k] = out[job->width - 1];
+    }
 }
 
 static double filter_row(const double *in, const filter *f)
@@ -222,7 +231,8 @@ static double filter_row(const double *in, const filter *f)
 }
 
 /* L, a, b, edge and point strength of one row of one image. */
-static void appearance(const flip_job *job, int source, size_t row, double *const columns[COLUMN_FILTERS], double *const out[5])
+static void appearance(const flip_job *job, int source, size_t row, double *const columns[COLUMN_FILTERS],
+                       double *const out[5])
 {
     const flip_filters *f = job->filters;
     const size_t plane = job->width * job->height;
@@ -237,15 +247,20 @@ static void appearance(const flip_job *job, int source, size_t row, double *cons
     for (size_t i = 0; i < job->width; i++) {
         const double luminance = (filter_row(columns[0] + i, &f->luminance) + 16) / 116;
         const double red_green = filter_row(columns[1] + i, &f->red_green) / 500;
-        const double blue_yellow = (f->blue_yellow_weight[0] * filter_row(columns[2] + i, &f->blue_yellow[0]) +
-                                    f->blue_yellow_weight[1] * filter_row(columns[3] + i, &f->blue_yellow[1])) / 200;
-        const double xyz[3] = {(luminance + red_green) * f->white[0], luminance * f->white[1], (luminance - blue_yellow) * f->white[2]};
+        const double blue_yellow =
+            (f->blue_yellow_weight[0] * filter_row(columns[2] + i, &f->blue_yellow[0]) +
+             f->blue_yellow_weight[1] * filter_row(columns[3] + i, &f->blue_yellow[1])) /
+            200;
+        const double xyz[3] = {(luminance + red_green) * f->white[0], luminance * f->white[1],
+                               (luminance - blue_yellow) * f->white[2]};
         double rgb[3], lab[3];
         apply(f->xyz_to_rgb, xyz, rgb);
         for (int c = 0; c < 3; c++)
             rgb[c] = rgb[c] < 0 ? 0 : rgb[c] > 1 ? 1 : rgb[c];
         hunt_lab(f, rgb, lab);
-        out[0][i] = lab[0], out[1][i] = lab[1], out[2][i] = lab[2];
+        out[0][i] = lab[0];
+        out[1][i] = lab[1];
+        out[2][i] = lab[2];
         /* The detectors work on Y scaled to [0, 1]; their taps sum to 0, so only the factor matters. */
         out[3][i] = hypot(filter_row(columns[4] + i, &f->edge), filter_row(columns[5] + i, &f->gauss)) / 116;
         out[4][i] = hypot(filter_row(columns[4] + i, &f->point), filter_row(columns[6] + i, &f->gauss)) / 116;
@@ -259,16 +274,20 @@ static void error_rows(size_t block, size_t begin, size_t end, void *context)
     double *columns[COLUMN_FILTERS], *seen[2][5];
     for (size_t r = 0; r < COLUMN_FILTERS; r++)
         columns[r] = rows + r * job->padded;
-    for (size_t r = 0; r < 5; r++)
-        seen[0][r] = rows + (COLUMN_FILTERS + r) * job->padded, seen[1][r] = rows + (COLUMN_FILTERS + 5 + r) * job->padded;
+    for (size_t r = 0; r < 5; r++) {
+        seen[0][r] = rows + (COLUMN_FILTERS + r) * job->padded;
+        seen[1][r] = rows + (COLUMN_FILTERS + 5 + r) * job->padded;
+    }
     for (size_t row = begin; row < end; row++) {
         appearance(job, 0, row, columns, seen[0]);
         appearance(job, 1, row, columns, seen[1]);
         double sum = 0;
         for (size_t i = 0; i < job->width; i++) {
-            const double a[3] = {seen[0][0][i], seen[0][1][i], seen[0][2][i]}, b[3] = {seen[1][0][i], seen[1][1][i], seen[1][2][i]};
+            const double a[3] = {seen[0][0][i], seen[0][1][i], seen[0][2][i]},
+                         b[3] = {seen[1][0][i], seen[1][1][i], seen[1][2][i]};
             const double color = redistribute(job->filters, color_distance(a, b));
-            const double feature = fmax(fabs(seen[0][3][i] - seen[1][3][i]), fabs(seen[0][4][i] - seen[1][4][i]));
+            const double feature =
+                fmax(fabs(seen[0][3][i] - seen[1][3][i]), fabs(seen[0][4][i] - seen[1][4][i]));
             const double error = pow(color, 1 - fmin(1, sqrt(feature / sqrt(2)))); /* qf = 0.5 */
             sum += error;
             if (job->map != NULL)
@@ -281,12 +300,15 @@ static void error_rows(size_t block, size_t begin, size_t end, void *context)
 gbt_status metric_flip(const image *a, const image *reference, double *mean, image *error_map, gbt_error *err)
 {
     *mean = 0;
-    if (a->channels != 3 || reference->channels != 3 || a->width != reference->width || a->height != reference->height)
-        return base_fail(err, GBT_ERR_ARGUMENT, "FLIP: images of %d x %d x %d and %d x %d x %d (wanted equal, 3 channels)", a->width,
+    if (a->channels != 3 || reference->channels != 3 || a->width != reference->width ||
+        a->height != reference->height)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "FLIP: images of %d x %d x %d and %d x %d x %d (wanted equal, 3 channels)", a->width,
                          a->height, a->channels, reference->width, reference->height, reference->channels);
-    if (error_map != NULL && (error_map->channels != 1 || error_map->width != a->width || error_map->height != a->height))
-        return base_fail(err, GBT_ERR_ARGUMENT, "FLIP: error map of %d x %d x %d (wanted %d x %d x 1)", error_map->width, error_map->height,
-                         error_map->channels, a->width, a->height);
+    if (error_map != NULL &&
+        (error_map->channels != 1 || error_map->width != a->width || error_map->height != a->height))
+        return base_fail(err, GBT_ERR_ARGUMENT, "FLIP: error map of %d x %d x %d (wanted %d x %d x 1)",
+                         error_map->width, error_map->height, error_map->channels, a->width, a->height);
     flip_filters filters;
     make_filters(&filters);
     const size_t width = (size_t)a->width, height = (size_t)a->height, padded = width + 2 * RADIUS_MAX;

@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* image/loss.c -- L1 + DSSIM of a rendered image and its gradient, once per training step.
 
-   x, y --> [column pass] --> [row pass, SSIM map, partials] --> [row pass] --> full-size partials --> [column pass] --> dL/dx
+   x, y --> [column pass] --> [row pass, SSIM map, partials] --> [row pass] --> full-size partials
+        --> [column pass] --> dL/dx
             \_______________ a row at a time, in cache _______________/
 
    With p the partial of the map by mu_x (total), q by var_x, r by cov, and G the window:
@@ -15,7 +17,12 @@
 #include "base/parallel.h"
 #include "image/window.h"
 
-enum { ROWS_PER_BLOCK = 16, CHANNELS = 3, MARGIN = WINDOW_RADIUS * CHANNELS, BLOCK_ROWS = WINDOW_MOMENTS + WINDOW_PARTIALS + 2 };
+enum {
+    ROWS_PER_BLOCK = 16,
+    CHANNELS = 3,
+    MARGIN = WINDOW_RADIUS * CHANNELS,
+    BLOCK_ROWS = WINDOW_MOMENTS + WINDOW_PARTIALS + 2
+};
 
 typedef struct loss_job {
     const window_kernels *kernels;
@@ -24,11 +31,11 @@ typedef struct loss_job {
     const float *source_x, *source_y;
     const unsigned char *valid;
     float *d_x;
-    float *zeros;               /* one row */
-    double *double_zeros;       /* one row */
-    double *partials;           /* [WINDOW_PARTIALS][height][count], after the row pass */
-    double *rows;               /* per block: BLOCK_ROWS padded rows */
-    double *ssim, *l1, *mse;    /* sums, one per row */
+    float *zeros;            /* one row */
+    double *double_zeros;    /* one row */
+    double *partials;        /* [WINDOW_PARTIALS][height][count], after the row pass */
+    double *rows;            /* per block: BLOCK_ROWS padded rows */
+    double *ssim, *l1, *mse; /* sums, one per row */
     double l1_scale, ssim_scale;
     size_t count, padded, width, height;
 } loss_job;
@@ -85,7 +92,8 @@ static void map_rows(size_t block, size_t begin, size_t end, void *context)
 static void gradient_rows(size_t block, size_t begin, size_t end, void *context)
 {
     const loss_job *job = context;
-    double *const absolute = job->rows + block * BLOCK_ROWS * job->padded, *const square = absolute + job->padded;
+    double *const absolute = job->rows + block * BLOCK_ROWS * job->padded, *const square =
+                                                                               absolute + job->padded;
     for (size_t row = begin; row < end; row++) {
         const double *partials[WINDOW_PARTIALS][WINDOW_TAPS];
         for (size_t m = 0; m < WINDOW_PARTIALS; m++)
@@ -93,11 +101,13 @@ static void gradient_rows(size_t block, size_t begin, size_t end, void *context)
                 const size_t shifted = row + k;
                 const bool is_inside = shifted >= WINDOW_RADIUS && shifted - WINDOW_RADIUS < job->height;
                 partials[m][k] =
-                    is_inside ? job->partials + (m * job->height + shifted - WINDOW_RADIUS) * job->count : job->double_zeros;
+                    is_inside ? job->partials + (m * job->height + shifted - WINDOW_RADIUS) * job->count
+                              : job->double_zeros;
             }
         float *d_x = job->d_x + row * job->count;
-        job->kernels->gradient((const double *const(*)[WINDOW_TAPS])partials, job->x + row * job->count, job->y + row * job->count,
-                               job->count, job->l1_scale, job->ssim_scale, d_x, absolute, square);
+        job->kernels->gradient((const double *const(*)[WINDOW_TAPS])partials, job->x + row * job->count,
+                               job->y + row * job->count, job->count, job->l1_scale, job->ssim_scale, d_x,
+                               absolute, square);
         job->l1[row] = window_sum(absolute, job->count);
         job->mse[row] = window_sum(square, job->count);
         for (size_t i = 0; job->valid != NULL && i < job->width; i++)
@@ -116,13 +126,15 @@ static size_t lay_out(loss_job *job, double *buffer)
 {
     size_t used = 0;
     const size_t sizes[] = {
-        job->count,                                                                                   /* zeros, as float */
-        job->count,                                                                                   /* double_zeros */
-        WINDOW_PARTIALS * job->height * job->count,                                                   /* partials */
-        parallel_block_count(job->height, ROWS_PER_BLOCK) * BLOCK_ROWS * job->padded,                 /* rows */
-        job->height, job->height, job->height,                                                        /* ssim, l1, mse */
-        job->valid != NULL ? (job->height * job->count + 1) / 2 : 0,                                  /* masked_x, as float */
-        job->valid != NULL ? (job->height * job->count + 1) / 2 : 0,                                  /* masked_y, as float */
+        job->count,                                                                   /* zeros, as float */
+        job->count,                                                                   /* double_zeros */
+        WINDOW_PARTIALS * job->height * job->count,                                   /* partials */
+        parallel_block_count(job->height, ROWS_PER_BLOCK) * BLOCK_ROWS * job->padded, /* rows */
+        job->height,
+        job->height,
+        job->height,                                                 /* ssim, l1, mse */
+        job->valid != NULL ? (job->height * job->count + 1) / 2 : 0, /* masked_x, as float */
+        job->valid != NULL ? (job->height * job->count + 1) / 2 : 0, /* masked_y, as float */
     };
     double *parts[sizeof sizes / sizeof *sizes] = {0};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
@@ -130,18 +142,28 @@ static size_t lay_out(loss_job *job, double *buffer)
             parts[i] = buffer + used;
         used += (sizes[i] + 7) / 8 * 8;
     }
-    job->zeros = (float *)parts[0], job->double_zeros = parts[1], job->partials = parts[2], job->rows = parts[3];
-    job->ssim = parts[4], job->l1 = parts[5], job->mse = parts[6], job->masked_x = (float *)parts[7], job->masked_y = (float *)parts[8];
+    job->zeros = (float *)parts[0];
+    job->double_zeros = parts[1];
+    job->partials = parts[2];
+    job->rows = parts[3];
+    job->ssim = parts[4];
+    job->l1 = parts[5];
+    job->mse = parts[6];
+    job->masked_x = (float *)parts[7];
+    job->masked_y = (float *)parts[8];
     return used;
 }
 
-gbt_status image_loss(const image *x, const image *y, const unsigned char *valid, double dssim_weight, loss_scratch *scratch, image *d_x,
-                      image_loss_result *out, gbt_error *err)
+gbt_status image_loss(const image *x, const image *y, const unsigned char *valid, double dssim_weight,
+                      loss_scratch *scratch, image *d_x, image_loss_result *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
     if (x->channels != CHANNELS || !is_size_equal(x, y) || !is_size_equal(x, d_x))
-        return base_fail(err, GBT_ERR_ARGUMENT, "loss: images of %d x %d x %d, %d x %d x %d and %d x %d x %d (wanted equal, 3 channels)",
-                         x->width, x->height, x->channels, y->width, y->height, y->channels, d_x->width, d_x->height, d_x->channels);
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "loss: images of %d x %d x %d, %d x %d x %d and %d x %d x %d (wanted equal, 3 channels)",
+            x->width, x->height, x->channels, y->width, y->height, y->channels, d_x->width, d_x->height,
+            d_x->channels);
     if (!(dssim_weight >= 0 && dssim_weight <= 1))
         return base_fail(err, GBT_ERR_ARGUMENT, "loss: DSSIM weight %g (wanted 0 to 1)", dssim_weight);
     loss_job job = {.kernels = window_kernels_best(),
@@ -154,7 +176,8 @@ gbt_status image_loss(const image *x, const image *y, const unsigned char *valid
                     .count = CHANNELS * (size_t)x->width,
                     .padded = (CHANNELS * (size_t)x->width + 2 * MARGIN + 7) / 8 * 8};
     const size_t wanted = lay_out(&job, NULL);
-    GBT_TRY(mem_reserve((void **)&scratch->buffer, &scratch->capacity, 0, wanted, sizeof *scratch->buffer, "loss scratch", err));
+    GBT_TRY(mem_reserve((void **)&scratch->buffer, &scratch->capacity, 0, wanted, sizeof *scratch->buffer,
+                        "loss scratch", err));
     lay_out(&job, scratch->buffer);
     memset(job.zeros, 0, job.count * sizeof *job.zeros);
     memset(job.double_zeros, 0, job.count * sizeof *job.double_zeros);
@@ -171,13 +194,16 @@ gbt_status image_loss(const image *x, const image *y, const unsigned char *valid
         out->ssim = 1;
         return GBT_OK;
     }
-    job.x = x->pixels, job.y = y->pixels;
+    job.x = x->pixels;
+    job.y = y->pixels;
     if (valid != NULL) {
         parallel_blocks(job.height, ROWS_PER_BLOCK, mask_rows, &job);
-        job.x = job.masked_x, job.y = job.masked_y;
+        job.x = job.masked_x;
+        job.y = job.masked_y;
     }
     const double values = (double)(CHANNELS * pixels);
-    job.l1_scale = (1 - dssim_weight) / values, job.ssim_scale = -dssim_weight / values;
+    job.l1_scale = (1 - dssim_weight) / values;
+    job.ssim_scale = -dssim_weight / values;
     parallel_blocks(job.height, ROWS_PER_BLOCK, map_rows, &job);
     parallel_blocks(job.height, ROWS_PER_BLOCK, gradient_rows, &job);
     out->l1 = window_sum(job.l1, job.height) / values;

@@ -1,4 +1,6 @@
-/* image/metrics.h -- how far an image is from a photo: PSNR, SSIM, FLIP; and the training loss with its gradient. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* image/metrics.h -- how far an image is from a photo: PSNR, SSIM, FLIP; and the training loss with its
+   gradient. */
 #ifndef GBT_IMAGE_METRICS_H
 #define GBT_IMAGE_METRICS_H
 
@@ -9,7 +11,8 @@
 #define METRIC_PSNR_MAX 100.0 /* dB, stated for images that are equal or nearly so */
 
 /**
- * Peak signal to noise ratio, dB: 20 log10(1 / sqrt(mse)) over all values, in double, at most METRIC_PSNR_MAX.
+ * Peak signal to noise ratio, dB: 20 log10(1 / sqrt(mse)) over all values, in double, at most
+ * METRIC_PSNR_MAX.
  *
  * @param a, b  equal width, height and channels (any number), values in [0, 1]
  * @return NaN when the sizes differ or a value is NaN
@@ -23,10 +26,11 @@ double metric_psnr_valid(const image *a, const image *b, const unsigned char *va
 /**
  * Mean SSIM over all pixels and channels, in double.
  *
- * 11 x 11 Gaussian of sigma 1.5, zero padding, window not renormalised at borders, C1 = 0.01^2, C2 = 0.03^2, variances E[x^2] - mu^2.
- * Identical images give exactly 1. The products of floats are exact in double, so the variances are good to 1e-15 of E[x^2] (a
- * float32 form needs two passes: in one it gives 1.00003 for constant images, -0.3 for constant 255). Images smaller than the window
- * are as good as any: what is beyond the border is 0 in both.
+ * 11 x 11 Gaussian of sigma 1.5, zero padding, window not renormalised at borders, C1 = 0.01^2, C2 = 0.03^2,
+ * variances E[x^2] - mu^2. Identical images give exactly 1. The products of floats are exact in double, so
+ * the variances are good to 1e-15 of E[x^2] (a float32 form needs two passes: in one it gives 1.00003 for
+ * constant images, -0.3 for constant 255). Images smaller than the window are as good as any: what is beyond
+ * the border is 0 in both.
  *
  * @param a, b  equal width, height (from 1 x 1) and channels (any number)
  * @return (-1, 1]; NaN when the sizes differ, a value is not finite, or memory is short
@@ -34,11 +38,13 @@ double metric_psnr_valid(const image *a, const image *b, const unsigned char *va
  */
 double metric_ssim(const image *a, const image *b);
 
-/** The same mean over the pixels whose window lies wholly inside, which is free of any choice about borders; NaN below 11 x 11 pixels. */
+/** The same mean over the pixels whose window lies wholly inside, which is free of any choice about borders;
+    NaN below 11 x 11 pixels. */
 double metric_ssim_interior(const image *a, const image *b);
 
 /**
- * Mean LDR-FLIP (Andersson et al. 2020) at 67.02 pixels per degree (0.7 m from a screen of 3840 pixels in 0.7 m).
+ * Mean LDR-FLIP (Andersson et al. 2020) at 67.02 pixels per degree (0.7 m from a screen of 3840 pixels in 0.7
+ * m).
  *
  * @param a, reference  3 channels, equal size; sRGB values, clamped to [0, 1], NaN as 0
  * @param mean          [out] [0, 1], 0 for identical images
@@ -46,7 +52,8 @@ double metric_ssim_interior(const image *a, const image *b);
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_NO_MEMORY
  * Threads: any; the same bits for every thread count. Cost: 24 bytes of scratch per pixel.
  */
-gbt_status metric_flip(const image *a, const image *reference, double *mean, image *error_map, gbt_error *err);
+gbt_status metric_flip(const image *a, const image *reference, double *mean, image *error_map,
+                       gbt_error *err);
 
 /** Round to 8 bit as the PNG writer does, in place: floor(clamp(x) * 255 + 0.5) / 255; NaN becomes 0. */
 void image_quantize(image *im);
@@ -57,26 +64,28 @@ typedef struct image_scores {
 } image_scores;
 
 /**
- * PSNR, SSIM and FLIP of the pixels where `valid` (NULL: all). The others are 0 in both images for the windows and filters, and count in no
- * mean.
+ * PSNR, SSIM and FLIP of the pixels where `valid` (NULL: all). The others are 0 in both images for the
+ * windows and filters, and count in no mean.
  *
  * @param a, photo  3 channels, equal size; round them first (image_quantize()), as everybody scores pictures
  * @param flip_map  [out] optional: 1 channel, of their size, allocated by the caller; 0 where not valid
  * @return GBT_OK, GBT_ERR_ARGUMENT (sizes), GBT_ERR_NO_MEMORY
  */
-gbt_status image_score(const image *a, const image *photo, const unsigned char *valid, image *flip_map, image_scores *out, gbt_error *err);
+gbt_status image_score(const image *a, const image *photo, const unsigned char *valid, image *flip_map,
+                       image_scores *out, gbt_error *err);
 
 /**
- * image_score() as every command scores a render against its photo: both are rounded to 8 bit; with `exposure` the right halves count,
- * after affine_split().
+ * image_score() as every command scores a render against its photo: both are rounded to 8 bit; with
+ * `exposure` the right halves count, after affine_split().
  *
  * @param render, photo [in,out] rounded; the render through the matrix of affine_split()
  * @param flip_map      [out] optional, as for image_score(); always of the whole pictures
  */
-gbt_status image_score_photo(image *render, image *photo, const unsigned char *valid, bool exposure, image *flip_map, image_scores *out,
-                             gbt_error *err);
+gbt_status image_score_photo(image *render, image *photo, const unsigned char *valid, bool exposure,
+                             image *flip_map, image_scores *out, gbt_error *err);
 
-/** LPIPS (eval/lpips.h): its network fed with colours in [-1, 1], as it was trained, and in [0, 1], as 3DGS and its successors do. */
+/** LPIPS (eval/lpips.h): its network fed with colours in [-1, 1], as it was trained, and in [0, 1], as 3DGS
+    and its successors do. */
 typedef struct lpips_scores {
     double lpips, lpips_01;
 } lpips_scores;
@@ -96,9 +105,10 @@ typedef struct image_loss_result {
 /**
  * L = (1 - w) mean|x - y| + w (1 - SSIM(x, y)) and dL/dx, over the pixels where `valid` (NULL: all).
  *
- * SSIM is that of metric_ssim(). Pixels that are not valid are 0 in both images for its windows, count in no mean, and have
- * gradient 0. No valid pixel: loss 0, ssim 1, gradient 0. At x = y the gradient of |x - y| is taken as 0.
- * Values that are not finite are not an error: they make `out->loss` NaN or infinite, so test that before using d_x.
+ * SSIM is that of metric_ssim(). Pixels that are not valid are 0 in both images for its windows, count in no
+ * mean, and have gradient 0. No valid pixel: loss 0, ssim 1, gradient 0. At x = y the gradient of |x - y| is
+ * taken as 0. Values that are not finite are not an error: they make `out->loss` NaN or infinite, so test
+ * that before using d_x.
  *
  * @param x             [in]  render, unclamped, 3 channels
  * @param y             [in]  photo, the size of x
@@ -107,11 +117,11 @@ typedef struct image_loss_result {
  * @param scratch       [in,out] grows to 9 doubles per pixel, and 3 more with `valid`
  * @param d_x           [out] the size of x, allocated by the caller, overwritten
  * @return GBT_OK, GBT_ERR_ARGUMENT (sizes, weight), GBT_ERR_NO_MEMORY
- * Threads: any with distinct `scratch`; the same bits for every thread count and instruction set. All sums are in double, only
- * d_x is rounded to float.
+ * Threads: any with distinct `scratch`; the same bits for every thread count and instruction set. All sums
+ * are in double, only d_x is rounded to float.
  * Cost: O(pixels); about 11 ms of one core for 480 x 359 with AVX-512, 12 ms with AVX2, 26 ms without.
  */
-gbt_status image_loss(const image *x, const image *y, const unsigned char *valid, double dssim_weight, loss_scratch *scratch, image *d_x,
-                      image_loss_result *out, gbt_error *err);
+gbt_status image_loss(const image *x, const image *y, const unsigned char *valid, double dssim_weight,
+                      loss_scratch *scratch, image *d_x, image_loss_result *out, gbt_error *err);
 
 #endif

@@ -1,13 +1,11 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* image/psnr.c -- PSNR of what is compared everywhere: images rounded to 8 bit or not, values in [0, 1]. */
 #include "image/metrics.h"
 
 #include <math.h>
 #include <stdbool.h>
 
-double metric_psnr(const image *a, const image *b)
-{
-    return metric_psnr_valid(a, b, NULL);
-}
+double metric_psnr(const image *a, const image *b) { return metric_psnr_valid(a, b, NULL); }
 
 double metric_psnr_valid(const image *a, const image *b, const unsigned char *valid)
 {
@@ -29,7 +27,8 @@ double metric_psnr_valid(const image *a, const image *b, const unsigned char *va
         }
         sum += row_sum;
     }
-    const double mse = sum / ((double)a->height * (double)row_values - (double)(left_out * channels)); /* 0 / 0 is NaN */
+    const double mse =
+        sum / ((double)a->height * (double)row_values - (double)(left_out * channels)); /* 0 / 0 is NaN */
     const double psnr = -10 * log10(mse);
     return psnr > METRIC_PSNR_MAX ? METRIC_PSNR_MAX : psnr; /* written so that NaN stays NaN */
 }

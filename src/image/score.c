@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* image/score.c -- a picture against a photo: all three measures, over the pixels that mean something. */
 #include "image/metrics.h"
 
@@ -18,7 +19,8 @@ static gbt_status copy_masked(const image *in, const unsigned char *valid, image
     return GBT_OK;
 }
 
-/* The mean of the map where it is valid; elsewhere it becomes 0, since what a filter carries there is nobody's error. */
+/* The mean of the map where it is valid; elsewhere it becomes 0, since what a filter carries there is
+   nobody's error. */
 static double masked_mean(image *map, const unsigned char *valid)
 {
     double sum = 0;
@@ -32,8 +34,8 @@ static double masked_mean(image *map, const unsigned char *valid)
     return sum / (double)count;
 }
 
-static gbt_status score_masked(const image *a, const image *photo, const unsigned char *valid, image *flip_map, image_scores *out,
-                               gbt_error *err)
+static gbt_status score_masked(const image *a, const image *photo, const unsigned char *valid,
+                               image *flip_map, image_scores *out, gbt_error *err)
 {
     image seen[2] = {{0}}, map = {0}, gradient = {0};
     loss_scratch scratch = {0};
@@ -44,7 +46,8 @@ static gbt_status score_masked(const image *a, const image *photo, const unsigne
     if (status == GBT_OK)
         status = image_alloc(&gradient, a->width, a->height, 3, err);
     if (status == GBT_OK)
-        status = image_loss(a, photo, valid, 1, &scratch, &gradient, &loss, err); /* it knows how to leave pixels out of SSIM's windows */
+        status = image_loss(a, photo, valid, 1, &scratch, &gradient, &loss,
+                            err); /* it knows how to leave pixels out of SSIM's windows */
     if (status == GBT_OK && flip_map == NULL)
         status = image_alloc(&map, a->width, a->height, 1, err);
     image *const used = flip_map != NULL ? flip_map : &map;
@@ -62,7 +65,8 @@ static gbt_status score_masked(const image *a, const image *photo, const unsigne
     return status;
 }
 
-gbt_status image_score(const image *a, const image *photo, const unsigned char *valid, image *flip_map, image_scores *out, gbt_error *err)
+gbt_status image_score(const image *a, const image *photo, const unsigned char *valid, image *flip_map,
+                       image_scores *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
     if (valid != NULL)
@@ -72,8 +76,8 @@ gbt_status image_score(const image *a, const image *photo, const unsigned char *
     return metric_flip(a, photo, &out->flip, flip_map, err);
 }
 
-gbt_status image_score_photo(image *render, image *photo, const unsigned char *valid, bool exposure, image *flip_map, image_scores *out,
-                             gbt_error *err)
+gbt_status image_score_photo(image *render, image *photo, const unsigned char *valid, bool exposure,
+                             image *flip_map, image_scores *out, gbt_error *err)
 {
     image_scores whole;
     if (exposure) {
@@ -87,5 +91,7 @@ gbt_status image_score_photo(image *render, image *photo, const unsigned char *v
     }
     image_quantize(render);
     image_quantize(photo);
-    return exposure && flip_map == NULL ? GBT_OK : image_score(render, photo, valid, flip_map, exposure ? &whole : out, err);
+    return exposure && flip_map == NULL
+               ? GBT_OK
+               : image_score(render, photo, valid, flip_map, exposure ? &whole : out, err);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* image/ssim.c -- mean SSIM of two images (Wang et al. 2004, with the borders of Scaffold-GS and 3DGS). */
 #include "image/metrics.h"
 
@@ -24,7 +25,9 @@ static void ssim_rows(size_t block, size_t begin, size_t end, void *context)
 {
     const ssim_job *job = context;
     const size_t step = (size_t)job->x->channels, margin = WINDOW_RADIUS * step;
-    double *const rows = job->rows + block * (WINDOW_MOMENTS + 1) * job->padded, *const map = rows + WINDOW_MOMENTS * job->padded;
+    double *const rows = job->rows + block * (WINDOW_MOMENTS + 1) * job->padded, *const map =
+                                                                                     rows + WINDOW_MOMENTS *
+                                                                                                job->padded;
     memset(rows, 0, WINDOW_MOMENTS * job->padded * sizeof *rows);
     double *moments[WINDOW_MOMENTS];
     for (size_t m = 0; m < WINDOW_MOMENTS; m++)
@@ -42,8 +45,8 @@ static void ssim_rows(size_t block, size_t begin, size_t end, void *context)
 /* Mean over the pixels that are at least `border` from all four sides. */
 static double mean_ssim(const image *a, const image *b, size_t border)
 {
-    if (a->width != b->width || a->height != b->height || a->channels != b->channels || 2 * border >= (size_t)a->width ||
-        2 * border >= (size_t)a->height)
+    if (a->width != b->width || a->height != b->height || a->channels != b->channels ||
+        2 * border >= (size_t)a->width || 2 * border >= (size_t)a->height)
         return (double)NAN;
     const size_t count = (size_t)a->width * (size_t)a->channels, height = (size_t)a->height;
     const size_t padded = count + 2 * WINDOW_RADIUS * (size_t)a->channels;
@@ -52,21 +55,17 @@ static double mean_ssim(const image *a, const image *b, size_t border)
     double *rows = mem_alloc(row_doubles + height, sizeof *rows, "SSIM rows", NULL);
     float *zeros = mem_calloc(count, sizeof *zeros, "SSIM rows", NULL);
     if (rows != NULL && zeros != NULL) {
-        ssim_job job = {window_kernels_best(), a, b, zeros, rows, rows + row_doubles, count, padded, border * (size_t)a->channels};
+        ssim_job job = {window_kernels_best(),       a, b, zeros, rows, rows + row_doubles, count, padded,
+                        border * (size_t)a->channels};
         parallel_blocks(height, ROWS_PER_BLOCK, ssim_rows, &job);
-        ssim = window_sum(job.sums + border, height - 2 * border) / ((double)(count - 2 * job.skip) * (double)(height - 2 * border));
+        ssim = window_sum(job.sums + border, height - 2 * border) /
+               ((double)(count - 2 * job.skip) * (double)(height - 2 * border));
     }
     mem_free(rows);
     mem_free(zeros);
     return ssim;
 }
 
-double metric_ssim(const image *a, const image *b)
-{
-    return mean_ssim(a, b, 0);
-}
+double metric_ssim(const image *a, const image *b) { return mean_ssim(a, b, 0); }
 
-double metric_ssim_interior(const image *a, const image *b)
-{
-    return mean_ssim(a, b, WINDOW_RADIUS);
-}
+double metric_ssim_interior(const image *a, const image *b) { return mean_ssim(a, b, WINDOW_RADIUS); }

@@ -1,10 +1,14 @@
-/* image/window.h -- the inner loops of SSIM and of its adjoint: one image row at a time, in double, for each instruction set.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* image/window.h -- the inner loops of SSIM and of its adjoint: one image row at a time, in double, for each
+   instruction set.
 
-   The window is the 11 x 11 Gaussian of sigma 1.5 with zero padding, not renormalised at borders, applied as a column pass and a row
-   pass. Rows are [width][channels] as in `image`, so a row pass steps by `channels` and treats all channels at once. Doubles are
-   needed: E[x^2] - mu^2 against C2 = 9e-4 in float32 is wrong by 1e-4 of the gradient in even parts of a photo.
+   The window is the 11 x 11 Gaussian of sigma 1.5 with zero padding, not renormalised at borders, applied as
+   a column pass and a row pass. Rows are [width][channels] as in `image`, so a row pass steps by `channels`
+   and treats all channels at once. Doubles are needed: E[x^2] - mu^2 against C2 = 9e-4 in float32 is wrong by
+   1e-4 of the gradient in even parts of a photo.
 
-   Every variant does the same operations in the same order without fused multiply-add, so all give the same bits. */
+   Every variant does the same operations in the same order without fused multiply-add, so all give the same
+   bits. */
 #ifndef GBT_IMAGE_WINDOW_H
 #define GBT_IMAGE_WINDOW_H
 
@@ -13,10 +17,13 @@
 enum { WINDOW_RADIUS = 5, WINDOW_TAPS = 2 * WINDOW_RADIUS + 1, WINDOW_MOMENTS = 5, WINDOW_PARTIALS = 3 };
 
 typedef struct window_kernels {
-    /** Column pass of x, y, x^2, y^2, x y over 11 rows of `count` values; rows outside the image are rows of zeros. */
-    void (*moments)(const float *const x[WINDOW_TAPS], const float *const y[WINDOW_TAPS], size_t count, double *const out[WINDOW_MOMENTS]);
+    /** Column pass of x, y, x^2, y^2, x y over 11 rows of `count` values; rows outside the image are rows of
+        zeros. */
+    void (*moments)(const float *const x[WINDOW_TAPS], const float *const y[WINDOW_TAPS], size_t count,
+                    double *const out[WINDOW_MOMENTS]);
 
-    /** Row pass of the five, then the SSIM map. Each input is readable for 5 `step` zeros before and after its `count` values. */
+    /** Row pass of the five, then the SSIM map. Each input is readable for 5 `step` zeros before and after
+        its `count` values. */
     void (*map)(const double *const in[WINDOW_MOMENTS], size_t count, size_t step, double *map);
 
     /** The same, and the partials that the adjoint filters: dS/dmu_x (total), dS/dvar_x, dS/dcov. */
@@ -24,21 +31,24 @@ typedef struct window_kernels {
                          double *const partials[WINDOW_PARTIALS]);
 
     /** Row pass of the partials; inputs are padded like those of map(). */
-    void (*filter)(const double *const in[WINDOW_PARTIALS], size_t count, size_t step, double *const out[WINDOW_PARTIALS]);
+    void (*filter)(const double *const in[WINDOW_PARTIALS], size_t count, size_t step,
+                   double *const out[WINDOW_PARTIALS]);
 
     /**
-     * Column pass of the partials and the gradient of one row: d_x = l1 sign(x - y) + ssim (G*p0 + 2 x G*p1 + y G*p2).
-     * `absolute` and `square` receive |x - y| and (x - y)^2.
+     * Column pass of the partials and the gradient of one row: d_x = l1 sign(x - y) + ssim (G*p0 + 2 x G*p1 +
+     * y G*p2). `absolute` and `square` receive |x - y| and (x - y)^2.
      */
-    void (*gradient)(const double *const partials[WINDOW_PARTIALS][WINDOW_TAPS], const float *x, const float *y, size_t count, double l1,
-                     double ssim, float *d_x, double *absolute, double *square);
+    void (*gradient)(const double *const partials[WINDOW_PARTIALS][WINDOW_TAPS], const float *x,
+                     const float *y, size_t count, double l1, double ssim, float *d_x, double *absolute,
+                     double *square);
 } window_kernels;
 
 /** The widest set that cpu_best_isa() allows. */
 const window_kernels *window_kernels_best(void);
 
 /** Pointers to the 11 rows around `row`, `count` values each; `zeros` stands for those outside the image. */
-void window_rows(const float *pixels, size_t count, size_t height, size_t row, const float *zeros, const float *rows[WINDOW_TAPS]);
+void window_rows(const float *pixels, size_t count, size_t height, size_t row, const float *zeros,
+                 const float *rows[WINDOW_TAPS]);
 
 /** Sum in a fixed order of eight interleaved parts: the same bits for every instruction set. */
 double window_sum(const double *values, size_t count);

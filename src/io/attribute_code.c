@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/attribute_code.c -- attributes to bits and back. */
 #include "io/attribute_code.h"
 
@@ -18,7 +19,9 @@ gbt_status attribute_table_make(attribute_table *t, size_t rows, int columns, gb
     t->doubling = mem_calloc(rows, sizeof *t->doubling, "quantised attributes", err);
     t->near = mem_calloc(rows, sizeof *t->near, "neighbours", err);
     t->rule = mem_calloc((size_t)columns, sizeof *t->rule, "prediction rules", err);
-    return t->value == NULL || t->rest == NULL || t->doubling == NULL || t->near == NULL || t->rule == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    return t->value == NULL || t->rest == NULL || t->doubling == NULL || t->near == NULL || t->rule == NULL
+               ? GBT_ERR_NO_MEMORY
+               : GBT_OK;
 }
 
 void attribute_table_free(attribute_table *t)
@@ -31,7 +34,7 @@ void attribute_table_free(attribute_table *t)
     *t = (attribute_table){0};
 }
 
-/* ---- neighbours --------------------------------------------------------------------------------------------------------------- */
+/* ---- neighbours ---- */
 
 void attribute_find_near(attribute_table *t, const uint64_t *codes)
 {
@@ -50,9 +53,12 @@ void attribute_find_near(attribute_table *t, const uint64_t *codes)
             if (apart >= best[ATTRIBUTE_NEAR - 1])
                 continue;
             int place = ATTRIBUTE_NEAR - 1;
-            for (; place > 0 && apart < best[place - 1]; place--)
-                best[place] = best[place - 1], t->near[i][place] = t->near[i][place - 1];
-            best[place] = apart, t->near[i][place] = (uint32_t)(i - back);
+            for (; place > 0 && apart < best[place - 1]; place--) {
+                best[place] = best[place - 1];
+                t->near[i][place] = t->near[i][place - 1];
+            }
+            best[place] = apart;
+            t->near[i][place] = (uint32_t)(i - back);
         }
         for (int k = 1; k < ATTRIBUTE_NEAR; k++) /* the first rows have fewer */
             if (best[k] == UINT64_MAX)
@@ -62,7 +68,7 @@ void attribute_find_near(attribute_table *t, const uint64_t *codes)
     }
 }
 
-/* ---- one value ---------------------------------------------------------------------------------------------------------------- */
+/* ---- one value ---- */
 
 /* Shifts of negative numbers to the right round down, with every compiler that builds this. */
 static int64_t expect(const attribute_table *t, size_t row, size_t column)
@@ -89,7 +95,7 @@ static size_t bucket(uint64_t x)
     return b < BUCKETS ? b : BUCKETS - 1;
 }
 
-/* ---- contexts ----------------------------------------------------------------------------------------------------------------- */
+/* ---- contexts ---- */
 
 typedef struct column_models {
     coder_int_model by_step[ATTRIBUTE_DOUBLINGS];
@@ -104,7 +110,8 @@ typedef struct attribute_models {
 
 static attribute_models *make_models(int columns, gbt_error *err)
 {
-    attribute_models *m = mem_alloc(1, sizeof *m + (size_t)columns * sizeof *m->column, "attribute contexts", err);
+    attribute_models *m =
+        mem_alloc(1, sizeof *m + (size_t)columns * sizeof *m->column, "attribute contexts", err);
     if (m == NULL)
         return NULL;
     coder_ints_start(&m->by_row[0][0], BUCKETS * ATTRIBUTE_DOUBLINGS);
@@ -145,7 +152,8 @@ gbt_status attribute_code_columns(range_coder *c, attribute_table *t, int begin,
             for (int k = 0; k < RECENT; k++)
                 sum += recent[k];
             const size_t near = bucket_near(t, row, (size_t)column);
-            coder_int_model *const models[CODER_INPUTS] = {&own->by_step[d], &own->by_near[near], &m->by_row[bucket(sum)][d]};
+            coder_int_model *const models[CODER_INPUTS] = {&own->by_step[d], &own->by_near[near],
+                                                           &m->by_row[bucket(sum)][d]};
             const int32_t left = coder_int(c, models, &own->mixer, t->value[at] / (1 << d) - base);
             const int64_t value = ((int64_t)base + left) * (1 << d);
             good = value >= -ATTRIBUTE_MAX && value <= ATTRIBUTE_MAX;
@@ -158,7 +166,7 @@ gbt_status attribute_code_columns(range_coder *c, attribute_table *t, int begin,
     return good ? GBT_OK : GBT_ERR_FORMAT;
 }
 
-/* ---- side information --------------------------------------------------------------------------------------------------------- */
+/* ---- side information ---- */
 
 void attribute_code_doublings(range_coder *c, attribute_table *t)
 {
@@ -174,7 +182,9 @@ void attribute_code_doublings(range_coder *c, attribute_table *t)
 void attribute_code_rules(range_coder *c, attribute_table *t)
 {
     coder_int_model bias, near, other;
-    coder_ints_start(&bias, 1), coder_ints_start(&near, 1), coder_ints_start(&other, 1);
+    coder_ints_start(&bias, 1);
+    coder_ints_start(&near, 1);
+    coder_ints_start(&other, 1);
     for (int column = 0; column < t->columns; column++) {
         attribute_rule *rule = &t->rule[column];
         rule->bias = coder_int_alone(c, &bias, rule->bias);

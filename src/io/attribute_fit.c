@@ -1,4 +1,6 @@
-/* io/attribute_fit.c -- the rules that predict attributes: ridge regression of every column on what is known before it. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* io/attribute_fit.c -- the rules that predict attributes: ridge regression of every column on what is known
+   before it. */
 #include <math.h>
 
 #include "base/memory.h"
@@ -40,7 +42,8 @@ static int32_t rounded(double x)
 /* Inputs: one, column of the neighbours, columns before. */
 static void fit_column(attribute_table *t, size_t column, fit *f)
 {
-    const size_t columns = (size_t)t->columns, n = 1 + ATTRIBUTE_NEAR + column, stride = 1 + t->rows / ROWS_MAX;
+    const size_t columns = (size_t)t->columns, n = 1 + ATTRIBUTE_NEAR + column,
+                 stride = 1 + t->rows / ROWS_MAX;
     for (size_t i = 0; i < n; i++) {
         f->right[i] = 0;
         for (size_t j = 0; j <= i; j++)

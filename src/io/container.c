@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/container.c -- named, typed, checksummed arrays to bytes and back.
 
    [header 64][table 128 x count][section 0][zeros][section 1]...   every part starts on a multiple of 64 */
@@ -52,11 +53,14 @@ static size_t dtype_size(container_dtype dtype)
 {
     switch (dtype) {
     case CONTAINER_F32:
-    case CONTAINER_U32: return 4;
+    case CONTAINER_U32:
+        return 4;
     case CONTAINER_F64:
     case CONTAINER_U64:
-    case CONTAINER_I64: return 8;
-    case CONTAINER_U8: return 1;
+    case CONTAINER_I64:
+        return 8;
+    case CONTAINER_U8:
+        return 1;
     }
     return 0;
 }
@@ -64,17 +68,24 @@ static size_t dtype_size(container_dtype dtype)
 static const char *dtype_name(container_dtype dtype)
 {
     switch (dtype) {
-    case CONTAINER_F32: return "f32";
-    case CONTAINER_U32: return "u32";
-    case CONTAINER_F64: return "f64";
-    case CONTAINER_U64: return "u64";
-    case CONTAINER_I64: return "i64";
-    case CONTAINER_U8: return "u8";
+    case CONTAINER_F32:
+        return "f32";
+    case CONTAINER_U32:
+        return "u32";
+    case CONTAINER_F64:
+        return "f64";
+    case CONTAINER_U64:
+        return "u64";
+    case CONTAINER_I64:
+        return "i64";
+    case CONTAINER_U8:
+        return "u8";
     }
     return "?";
 }
 
-/** Size in bytes of a shape; false if it overflows. Zero sizes do not excuse an overflow of the others: no honest file has that. */
+/** Size in bytes of a shape; false if it overflows. Zero sizes do not excuse an overflow of the others: no
+    honest file has that. */
 static bool shape_bytes(container_dtype dtype, int dim_count, const size_t *dims, size_t *out)
 {
     size_t bytes = dtype_size(dtype);
@@ -98,27 +109,28 @@ static bool align_up(size_t offset, size_t *out)
     return true;
 }
 
-static const void *section_data(const container_section *s)
-{
-    return s->data != NULL ? s->data : s->small;
-}
+static const void *section_data(const container_section *s) { return s->data != NULL ? s->data : s->small; }
 
-/* ---- writing ------------------------------------------------------------------------------------------------------------------ */
+/* ---- writing ---- */
 
-static container_section *add_section(container_writer *w, const char *name, container_dtype dtype, int dim_count, const size_t *dims)
+static container_section *add_section(container_writer *w, const char *name, container_dtype dtype,
+                                      int dim_count, const size_t *dims)
 {
     gbt_error *failure = &w->failure;
     if (failure->status != GBT_OK)
         return NULL;
     size_t byte_count = 0;
     if (name[0] == '\0' || strlen(name) >= CONTAINER_NAME_SIZE)
-        base_fail(failure, GBT_ERR_ARGUMENT, "section name \"%.80s\": wanted 1 to %d bytes", name, CONTAINER_NAME_SIZE - 1);
+        base_fail(failure, GBT_ERR_ARGUMENT, "section name \"%.80s\": wanted 1 to %d bytes", name,
+                  CONTAINER_NAME_SIZE - 1);
     else if (dtype_size(dtype) == 0 || dim_count < 1 || dim_count > CONTAINER_MAX_DIMS)
-        base_fail(failure, GBT_ERR_ARGUMENT, "section %s: type %d with %d dimensions cannot be saved", name, (int)dtype, dim_count);
+        base_fail(failure, GBT_ERR_ARGUMENT, "section %s: type %d with %d dimensions cannot be saved", name,
+                  (int)dtype, dim_count);
     else if (!shape_bytes(dtype, dim_count, dims, &byte_count))
         base_fail(failure, GBT_ERR_ARGUMENT, "section %s: its size overflows", name);
     else if (w->count == CONTAINER_MAX_SECTIONS)
-        base_fail(failure, GBT_ERR_ARGUMENT, "section %s: more than %d sections", name, CONTAINER_MAX_SECTIONS);
+        base_fail(failure, GBT_ERR_ARGUMENT, "section %s: more than %d sections", name,
+                  CONTAINER_MAX_SECTIONS);
     if (failure->status != GBT_OK)
         return NULL;
     for (size_t i = 0; i < w->count; i++)
@@ -126,18 +138,21 @@ static container_section *add_section(container_writer *w, const char *name, con
             base_fail(failure, GBT_ERR_ARGUMENT, "section %s: added twice", name);
             return NULL;
         }
-    if (mem_reserve((void **)&w->sections, &w->capacity, w->count, w->count + 1, sizeof *w->sections, "container sections",
-                    failure) != GBT_OK)
+    if (mem_reserve((void **)&w->sections, &w->capacity, w->count, w->count + 1, sizeof *w->sections,
+                    "container sections", failure) != GBT_OK)
         return NULL;
     container_section *s = &w->sections[w->count++];
     memset(s, 0, sizeof *s);
     memcpy(s->name, name, strlen(name));
-    s->dtype = dtype, s->dim_count = dim_count, s->byte_count = byte_count;
+    s->dtype = dtype;
+    s->dim_count = dim_count;
+    s->byte_count = byte_count;
     memcpy(s->dims, dims, (size_t)dim_count * sizeof *dims);
     return s;
 }
 
-void container_add(container_writer *w, const char *name, container_dtype dtype, int dim_count, const size_t *dims, const void *data)
+void container_add(container_writer *w, const char *name, container_dtype dtype, int dim_count,
+                   const size_t *dims, const void *data)
 {
     container_section *s = add_section(w, name, dtype, dim_count, dims);
     if (s == NULL)
@@ -147,14 +162,15 @@ void container_add(container_writer *w, const char *name, container_dtype dtype,
     s->data = data;
 }
 
-void container_add_small(container_writer *w, const char *name, container_dtype dtype, size_t count, const void *data)
+void container_add_small(container_writer *w, const char *name, container_dtype dtype, size_t count,
+                         const void *data)
 {
     container_section *s = add_section(w, name, dtype, 1, &count);
     if (s == NULL)
         return;
     if (s->byte_count > CONTAINER_SMALL_BYTES) {
-        base_fail(&w->failure, GBT_ERR_ARGUMENT, "section %s: %zu bytes are not small (at most %d)", name, s->byte_count,
-                  CONTAINER_SMALL_BYTES);
+        base_fail(&w->failure, GBT_ERR_ARGUMENT, "section %s: %zu bytes are not small (at most %d)", name,
+                  s->byte_count, CONTAINER_SMALL_BYTES);
         return;
     }
     memcpy(s->small, data, s->byte_count);
@@ -166,16 +182,19 @@ void container_add_text(container_writer *w, const char *name, const char *text)
     container_add(w, name, CONTAINER_U8, 1, &length, text);
 }
 
-gbt_status container_encode(const container_writer *w, unsigned char **bytes, size_t *byte_count, gbt_error *err)
+gbt_status container_encode(const container_writer *w, unsigned char **bytes, size_t *byte_count,
+                            gbt_error *err)
 {
-    *bytes = NULL, *byte_count = 0;
+    *bytes = NULL;
+    *byte_count = 0;
     if (w->failure.status != GBT_OK)
         return base_fail(err, w->failure.status, "%s", w->failure.text);
     const size_t table_bytes = w->count * sizeof(table_row);
     size_t total = sizeof(header) + table_bytes;
     for (size_t i = 0; i < w->count; i++)
         if (!align_up(total, &total) || __builtin_add_overflow(total, w->sections[i].byte_count, &total))
-            return base_fail(err, GBT_ERR_NO_MEMORY, "section %s: the file is larger than memory can hold", w->sections[i].name);
+            return base_fail(err, GBT_ERR_NO_MEMORY, "section %s: the file is larger than memory can hold",
+                             w->sections[i].name);
     unsigned char *file = mem_calloc(total, 1, "file image", err); /* zeros: the gaps */
     if (file == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -186,10 +205,12 @@ gbt_status container_encode(const container_writer *w, unsigned char **bytes, si
         table_row *row = &rows[i];
         align_up(offset, &offset);
         memcpy(row->name, s->name, sizeof row->name);
-        row->dtype = (uint32_t)s->dtype, row->dim_count = (uint32_t)s->dim_count;
+        row->dtype = (uint32_t)s->dtype;
+        row->dim_count = (uint32_t)s->dim_count;
         for (int d = 0; d < s->dim_count; d++)
             row->dims[d] = s->dims[d];
-        row->offset = offset, row->byte_count = s->byte_count;
+        row->offset = offset;
+        row->byte_count = s->byte_count;
         if (s->byte_count > 0)
             memcpy(file + offset, section_data(s), s->byte_count);
         row->crc = checksum(file + offset, s->byte_count);
@@ -197,10 +218,13 @@ gbt_status container_encode(const container_writer *w, unsigned char **bytes, si
     }
     header *h = (header *)(void *)file;
     memcpy(h->magic, magic, sizeof magic);
-    h->version = VERSION, h->section_count = (uint32_t)w->count, h->file_bytes = total;
+    h->version = VERSION;
+    h->section_count = (uint32_t)w->count;
+    h->file_bytes = total;
     h->table_crc = checksum(rows, table_bytes);
     h->crc = checksum(h, sizeof *h - sizeof h->crc);
-    *bytes = file, *byte_count = total;
+    *bytes = file;
+    *byte_count = total;
     return GBT_OK;
 }
 
@@ -222,32 +246,38 @@ void container_writer_free(container_writer *w)
     *w = (container_writer){0};
 }
 
-/* ---- reading ------------------------------------------------------------------------------------------------------------------ */
+/* ---- reading ---- */
 
-static gbt_status check_header(const unsigned char *bytes, size_t byte_count, const char *path, header *h, gbt_error *err)
+static gbt_status check_header(const unsigned char *bytes, size_t byte_count, const char *path, header *h,
+                               gbt_error *err)
 {
     if (byte_count < sizeof *h)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: too short for a gbtrace file (wanted at least %zu bytes, got %zu)", path, sizeof *h,
-                         byte_count);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: too short for a gbtrace file (wanted at least %zu bytes, got %zu)", path,
+                         sizeof *h, byte_count);
     memcpy(h, bytes, sizeof *h);
     if (memcmp(h->magic, magic, sizeof magic) != 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s@0: not a gbtrace file (wanted \"GBTMODEL\")", path);
     if (h->crc != checksum(h, sizeof *h - sizeof h->crc))
         return base_fail(err, GBT_ERR_FORMAT, "%s@0: the header is damaged (checksum)", path);
     if (h->version != VERSION)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@8: written by another version of gbtrace (wanted format %d, got %u)", path, VERSION,
-                         h->version);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s@8: written by another version of gbtrace (wanted format %d, got %u)", path,
+                         VERSION, h->version);
     if (h->file_bytes != byte_count)
         return base_fail(err, GBT_ERR_FORMAT, "%s: the file is %s (wanted %llu bytes, got %zu)", path,
-                         byte_count < h->file_bytes ? "cut short" : "too long", (unsigned long long)h->file_bytes, byte_count);
-    if (h->section_count > CONTAINER_MAX_SECTIONS || h->section_count > (byte_count - sizeof *h) / sizeof(table_row))
-        return base_fail(err, GBT_ERR_FORMAT, "%s@12: %u sections cannot be in %zu bytes", path, h->section_count, byte_count);
+                         byte_count < h->file_bytes ? "cut short" : "too long",
+                         (unsigned long long)h->file_bytes, byte_count);
+    if (h->section_count > CONTAINER_MAX_SECTIONS ||
+        h->section_count > (byte_count - sizeof *h) / sizeof(table_row))
+        return base_fail(err, GBT_ERR_FORMAT, "%s@12: %u sections cannot be in %zu bytes", path,
+                         h->section_count, byte_count);
     return GBT_OK;
 }
 
 /** Row `i` of the table to a section; `*end` is where the parts before it end and is moved on. */
-static gbt_status check_row(const unsigned char *bytes, size_t byte_count, const char *path, size_t i, size_t *end, container_section *s,
-                            gbt_error *err)
+static gbt_status check_row(const unsigned char *bytes, size_t byte_count, const char *path, size_t i,
+                            size_t *end, container_section *s, gbt_error *err)
 {
     const size_t place = sizeof(header) + i * sizeof(table_row);
     table_row row;
@@ -256,32 +286,38 @@ static gbt_status check_row(const unsigned char *bytes, size_t byte_count, const
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %zu has no proper name", path, place, i);
     s->dtype = (container_dtype)row.dtype;
     if (row.dtype > CONTAINER_U8 || dtype_size(s->dtype) == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s: unknown type %u", path, place, row.name, row.dtype);
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s: unknown type %u", path, place, row.name,
+                         row.dtype);
     if (row.dim_count < 1 || row.dim_count > CONTAINER_MAX_DIMS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s: bad number of dimensions (wanted 1 to %d, got %u)", path, place,
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s@%zu: section %s: bad number of dimensions (wanted 1 to %d, got %u)", path, place,
                          row.name, CONTAINER_MAX_DIMS, row.dim_count);
     s->dim_count = (int)row.dim_count;
     for (int d = 0; d < s->dim_count; d++)
         s->dims[d] = row.dims[d];
     if (!shape_bytes(s->dtype, s->dim_count, s->dims, &s->byte_count) || s->byte_count != row.byte_count)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s: its shape and its %llu bytes do not agree", path, place, row.name,
-                         (unsigned long long)row.byte_count);
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s: its shape and its %llu bytes do not agree",
+                         path, place, row.name, (unsigned long long)row.byte_count);
     size_t begin;
-    if (!align_up(*end, &begin) || row.offset != begin || begin > byte_count || row.byte_count > byte_count - begin)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s: %llu bytes at %llu are not where they should be", path, place, row.name,
-                         (unsigned long long)row.byte_count, (unsigned long long)row.offset);
+    if (!align_up(*end, &begin) || row.offset != begin || begin > byte_count ||
+        row.byte_count > byte_count - begin)
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s@%zu: section %s: %llu bytes at %llu are not where they should be", path, place,
+                         row.name, (unsigned long long)row.byte_count, (unsigned long long)row.offset);
     for (size_t gap = *end; gap < begin; gap++)
         if (bytes[gap] != 0)
             return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: not zero between two sections", path, gap);
     s->data = bytes + begin;
     if (row.crc != checksum(s->data, s->byte_count))
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s is damaged (checksum)", path, begin, row.name);
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s is damaged (checksum)", path, begin,
+                         row.name);
     memcpy(s->name, row.name, sizeof s->name);
     *end = begin + s->byte_count;
     return GBT_OK;
 }
 
-gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const char *path, container *out, gbt_error *err)
+gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const char *path, container *out,
+                           gbt_error *err)
 {
     *out = (container){0};
     if ((uintptr_t)bytes % 8 != 0)
@@ -290,7 +326,8 @@ gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const 
     GBT_TRY(check_header(bytes, byte_count, path, &h, err));
     const size_t table_bytes = h.section_count * sizeof(table_row);
     if (h.table_crc != checksum(bytes + sizeof h, table_bytes))
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: the table of sections is damaged (checksum)", path, sizeof h);
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: the table of sections is damaged (checksum)", path,
+                         sizeof h);
     container_section *sections = mem_calloc(h.section_count, sizeof *sections, "container sections", err);
     if (sections == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -300,15 +337,19 @@ gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const 
         status = check_row(bytes, byte_count, path, i, &end, &sections[i], err);
         for (size_t j = 0; j < i && status == GBT_OK; j++)
             if (strcmp(sections[j].name, sections[i].name) == 0)
-                status = base_fail(err, GBT_ERR_FORMAT, "%s: section %s is there twice", path, sections[i].name);
+                status =
+                    base_fail(err, GBT_ERR_FORMAT, "%s: section %s is there twice", path, sections[i].name);
     }
     if (status == GBT_OK && end != byte_count)
-        status = base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %zu bytes belong to no section", path, end, byte_count - end);
+        status = base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %zu bytes belong to no section", path, end,
+                           byte_count - end);
     if (status != GBT_OK) {
         mem_free(sections);
         return status;
     }
-    out->count = h.section_count, out->sections = sections, out->path = path;
+    out->count = h.section_count;
+    out->sections = sections;
+    out->path = path;
     return GBT_OK;
 }
 
@@ -339,12 +380,12 @@ static void describe(container_dtype dtype, int dim_count, const size_t *dims, c
 {
     size_t used = (size_t)snprintf(out, size, "%s", dtype_name(dtype));
     for (int i = 0; i < dim_count && used < size; i++)
-        used += (size_t)(dims[i] == CONTAINER_ANY ? snprintf(out + used, size - used,
-                                                             "[*]") : snprintf(out + used, size - used, "[%zu]", dims[i]));
+        used += (size_t)(dims[i] == CONTAINER_ANY ? snprintf(out + used, size - used, "[*]")
+                                                  : snprintf(out + used, size - used, "[%zu]", dims[i]));
 }
 
-gbt_status container_find(const container *c, const char *name, container_dtype dtype, int dim_count, size_t *dims, const void **data,
-                          gbt_error *err)
+gbt_status container_find(const container *c, const char *name, container_dtype dtype, int dim_count,
+                          size_t *dims, const void **data, gbt_error *err)
 {
     *data = NULL;
     const container_section *s = container_section_named(c, name);
@@ -358,14 +399,16 @@ gbt_status container_find(const container *c, const char *name, container_dtype 
     if (!same) {
         char got[128];
         describe(s->dtype, s->dim_count, s->dims, got, sizeof got);
-        return base_fail(err, GBT_ERR_FORMAT, "%s: section %s has another shape (wanted %s, got %s)", c->path, name, wanted, got);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: section %s has another shape (wanted %s, got %s)", c->path,
+                         name, wanted, got);
     }
     memcpy(dims, s->dims, (size_t)dim_count * sizeof *dims);
     *data = section_data(s);
     return GBT_OK;
 }
 
-gbt_status container_get(const container *c, const char *name, container_dtype dtype, size_t count, void *out, gbt_error *err)
+gbt_status container_get(const container *c, const char *name, container_dtype dtype, size_t count, void *out,
+                         gbt_error *err)
 {
     const void *data;
     GBT_TRY(container_find(c, name, dtype, 1, &count, &data, err));
@@ -379,8 +422,9 @@ gbt_status container_get_text(const container *c, const char *name, char *out, s
     const void *data;
     GBT_TRY(container_find(c, name, CONTAINER_U8, 1, &length, &data, err));
     if (length >= size)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: section %s: the text is too long (wanted at most %zu bytes, got %zu)", c->path, name,
-                         size - 1, length);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: section %s: the text is too long (wanted at most %zu bytes, got %zu)", c->path,
+                         name, size - 1, length);
     if (memchr(data, 0, length) != NULL)
         return base_fail(err, GBT_ERR_FORMAT, "%s: section %s: a zero byte in a text", c->path, name);
     memcpy(out, data, length);

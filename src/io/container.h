@@ -1,8 +1,10 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/container.h -- one file format for everything that we save: named, typed, checksummed arrays.
 
-   Layout (little endian; docs/formats.md): a 64-byte header, a table of 128 bytes per section, then the sections, each on a multiple
-   of 64 bytes, in table order, zeros between. The layout follows from the table alone and every byte is under a checksum or must be
-   zero, so any changed byte, cut or appended file is found. */
+   Layout (little endian; docs/formats.md): a 64-byte header, a table of 128 bytes per section, then the
+   sections, each on a multiple of 64 bytes, in table order, zeros between. The layout follows from the table
+   alone and every byte is under a checksum or must be zero, so any changed byte, cut or appended file is
+   found. */
 #ifndef GBT_IO_CONTAINER_H
 #define GBT_IO_CONTAINER_H
 
@@ -11,7 +13,12 @@
 
 #include "gbtrace/status.h"
 
-enum { CONTAINER_NAME_SIZE = 64, CONTAINER_MAX_DIMS = 4, CONTAINER_SMALL_BYTES = 64, CONTAINER_MAX_SECTIONS = 4096 };
+enum {
+    CONTAINER_NAME_SIZE = 64,
+    CONTAINER_MAX_DIMS = 4,
+    CONTAINER_SMALL_BYTES = 64,
+    CONTAINER_MAX_SECTIONS = 4096
+};
 
 /** In a wanted shape: any size will do. */
 #define CONTAINER_ANY SIZE_MAX
@@ -32,13 +39,14 @@ typedef struct container_section {
     int dim_count; /* [1, CONTAINER_MAX_DIMS] */
     size_t dims[CONTAINER_MAX_DIMS];
     size_t byte_count;
-    const void *data;                       /* NULL: the bytes are in `small` */
+    const void *data; /* NULL: the bytes are in `small` */
     unsigned char small[CONTAINER_SMALL_BYTES];
 } container_section;
 
-/* ---- writing ------------------------------------------------------------------------------------------------------------------ */
+/* ---- writing ---- */
 
-/** Collects sections. Start from `container_writer w = {0};`; the first failure is kept and comes out of container_save(). */
+/** Collects sections. Start from `container_writer w = {0};`; the first failure is kept and comes out of
+    container_save(). */
 typedef struct container_writer {
     size_t count, capacity;
     container_section *sections;
@@ -53,23 +61,27 @@ typedef struct container_writer {
  * @param dims      [in] sizes, row-major; a size of 0 is fine
  * @param data      [in] borrowed until container_save() or container_encode() returns
  */
-void container_add(container_writer *w, const char *name, container_dtype dtype, int dim_count, const size_t *dims, const void *data);
+void container_add(container_writer *w, const char *name, container_dtype dtype, int dim_count,
+                   const size_t *dims, const void *data);
 
 /** Add up to CONTAINER_SMALL_BYTES bytes as a vector; they are copied, so temporaries will do. */
-void container_add_small(container_writer *w, const char *name, container_dtype dtype, size_t count, const void *data);
+void container_add_small(container_writer *w, const char *name, container_dtype dtype, size_t count,
+                         const void *data);
 
 /** Add a string without its final zero as a vector of CONTAINER_U8; borrowed like container_add(). */
 void container_add_text(container_writer *w, const char *name, const char *text);
 
 /** The file in memory; free `*bytes` with mem_free(). Cost: one copy of everything. */
-gbt_status container_encode(const container_writer *w, unsigned char **bytes, size_t *byte_count, gbt_error *err);
+gbt_status container_encode(const container_writer *w, unsigned char **bytes, size_t *byte_count,
+                            gbt_error *err);
 
-/** Write the file atomically (file_write_atomic()). GBT_ERR_ARGUMENT for a bad container_add(), else what memory and disk say. */
+/** Write the file atomically (file_write_atomic()). GBT_ERR_ARGUMENT for a bad container_add(), else what
+    memory and disk say. */
 gbt_status container_save(const container_writer *w, const char *path, gbt_error *err);
 
 void container_writer_free(container_writer *w);
 
-/* ---- reading ------------------------------------------------------------------------------------------------------------------ */
+/* ---- reading ---- */
 
 typedef struct container {
     size_t count;
@@ -85,11 +97,14 @@ typedef struct container {
  * @param path  [in]  what messages call it; borrowed until container_free()
  * @param out   [out] zeroed on failure
  * @return GBT_OK, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_ARGUMENT (alignment)
- * Cost: one pass over the bytes; allocates 216 bytes a section, never more than the file's own table has room for.
+ * Cost: one pass over the bytes; allocates 216 bytes a section, never more than the file's own table has room
+ * for.
  */
-gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const char *path, container *out, gbt_error *err);
+gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const char *path, container *out,
+                           gbt_error *err);
 
-/** Read and check a file. GBT_ERR_IO if it cannot be read, else as container_parse(). `path` is borrowed until container_free(). */
+/** Read and check a file. GBT_ERR_IO if it cannot be read, else as container_parse(). `path` is borrowed
+    until container_free(). */
 gbt_status container_load(const char *path, container *out, gbt_error *err);
 
 /** NULL if there is no such section. */
@@ -102,11 +117,12 @@ const container_section *container_section_named(const container *c, const char 
  * @param data [out]    borrowed until container_free(); aligned for its type; NULL on failure
  * @return GBT_OK or GBT_ERR_FORMAT with file, section, wanted and got
  */
-gbt_status container_find(const container *c, const char *name, container_dtype dtype, int dim_count, size_t *dims, const void **data,
-                          gbt_error *err);
+gbt_status container_find(const container *c, const char *name, container_dtype dtype, int dim_count,
+                          size_t *dims, const void **data, gbt_error *err);
 
 /** Copy a vector of exactly `count` values out. */
-gbt_status container_get(const container *c, const char *name, container_dtype dtype, size_t count, void *out, gbt_error *err);
+gbt_status container_get(const container *c, const char *name, container_dtype dtype, size_t count, void *out,
+                         gbt_error *err);
 
 /** Copy a string out and end it with zero; refused if it does not fit or holds a zero. */
 gbt_status container_get_text(const container *c, const char *name, char *out, size_t size, gbt_error *err);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/float_code.c -- floats to bits and back, losslessly. */
 #include "io/float_code.h"
 

@@ -1,4 +1,6 @@
-/* io/float_code.h -- floats kept bit for bit: the upper half of each in contexts, the lower, which is noise, as it is. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* io/float_code.h -- floats kept bit for bit: the upper half of each in contexts, the lower, which is noise,
+   as it is. */
 #ifndef GBT_IO_FLOAT_CODE_H
 #define GBT_IO_FLOAT_CODE_H
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/half.h -- numbers of 16 bits (IEEE binary16), by integers alone. */
 #ifndef GBT_IO_HALF_H
 #define GBT_IO_HALF_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/model_code.c -- the small forms of a model: parts of bytes, and the sections around them. */
 #include "io/model_code.h"
 
@@ -14,12 +15,14 @@ enum { SHAPE_FORM, SHAPE_COUNT, SHAPE_OFFSETS, SHAPE_PIXELS, SHAPE_LEVELS, SHAPE
 enum { FORM_COARSE = 1, FORM_LOSSLESS = 2 };
 /* Places in coded.steps: the corner of the cube, the side of a cell, then the columns of the table. */
 enum { STEPS_ORIGIN, STEPS_CELL = 3, STEPS_COLUMNS };
-/* More anchors than this in so few bytes are a forgery, and are not allocated. A real one takes bytes, not half a bit. */
+/* More anchors than this in so few bytes are a forgery, and are not allocated. A real one takes bytes, not
+   half a bit. */
 enum { ANCHORS_ANYWAY = 65536, ANCHORS_PER_BYTE = 16 };
 
-_Static_assert(SHAPE_NUMBERS == sizeof((model_coded){0}.shape) / sizeof(uint32_t), "the shape has its places");
+_Static_assert(SHAPE_NUMBERS == sizeof((model_coded){0}.shape) / sizeof(uint32_t),
+               "the shape has its places");
 
-/* ---- parts of bytes ----------------------------------------------------------------------------------------------------------- */
+/* ---- parts of bytes ---- */
 
 /* Adds what a coder has written as the next part. */
 static gbt_status add_part(model_coded *out, size_t *size, int part, range_coder *c, gbt_error *err)
@@ -31,7 +34,8 @@ static gbt_status add_part(model_coded *out, size_t *size, int part, range_coder
     GBT_TRY(mem_reserve((void **)&out->bytes, &capacity, *size, *size + c->size, 1, "coded bytes", err));
     if (c->size > 0)
         memcpy(out->bytes + *size, c->bytes, c->size);
-    *size += c->size, out->part_bytes[part] = (uint32_t)c->size;
+    *size += c->size;
+    out->part_bytes[part] = (uint32_t)c->size;
     return GBT_OK;
 }
 
@@ -53,10 +57,11 @@ static gbt_status write_parts(const model_parts *parts, model_coded *out, gbt_er
     return status;
 }
 
-static gbt_status read_parts(const model_parts *parts, const char *path, const unsigned char *bytes, const uint32_t part_bytes[CODE_PARTS],
-                             gbt_error *err)
+static gbt_status read_parts(const model_parts *parts, const char *path, const unsigned char *bytes,
+                             const uint32_t part_bytes[CODE_PARTS], gbt_error *err)
 {
-    static const char *const names[CODE_PARTS] = {"positions", "doublings", "rules", "scales", "offsets", "features", "pixels", "networks"};
+    static const char *const names[CODE_PARTS] = {"positions", "doublings", "rules",  "scales",
+                                                  "offsets",   "features",  "pixels", "networks"};
     range_coder *c = mem_alloc(1, sizeof *c, "coder", err);
     if (c == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -65,14 +70,15 @@ static gbt_status read_parts(const model_parts *parts, const char *path, const u
         coder_read_start(c, bytes, part_bytes[part]);
         status = model_parts_code(parts, (code_part)part, c, err);
         if (status == GBT_ERR_FORMAT || (status == GBT_OK && !coder_read_whole(c)))
-            status = base_fail(err, GBT_ERR_FORMAT, "%s: section coded.bytes: the part \"%s\" is not what its model codes to", path,
-                               names[part]);
+            status = base_fail(err, GBT_ERR_FORMAT,
+                               "%s: section coded.bytes: the part \"%s\" is not what its model codes to",
+                               path, names[part]);
     }
     mem_free(c);
     return status;
 }
 
-/* ---- writing ------------------------------------------------------------------------------------------------------------------ */
+/* ---- writing ---- */
 
 static gbt_status keep_steps(const model_parts *parts, model_coded *out, gbt_error *err)
 {
@@ -93,12 +99,15 @@ gbt_status model_code(const model *m, const model_steps *steps, model_coded *out
     *back = (model){0};
     if (a->count > UINT32_MAX / ANCHOR_MAX_OFFSETS)
         return base_fail(err, GBT_ERR_ARGUMENT, "too many anchors to code (%zu)", a->count);
-    const uint32_t shape[] = {[SHAPE_FORM] = steps != NULL ? FORM_COARSE : FORM_LOSSLESS, [SHAPE_COUNT] = (uint32_t)a->count,
-                              [SHAPE_OFFSETS] = (uint32_t)a->offset_count, [SHAPE_PIXELS] = m->anchor_pixel != NULL, [SHAPE_LEVELS] = 0};
+    const uint32_t shape[] = {[SHAPE_FORM] = steps != NULL ? FORM_COARSE : FORM_LOSSLESS,
+                              [SHAPE_COUNT] = (uint32_t)a->count,
+                              [SHAPE_OFFSETS] = (uint32_t)a->offset_count,
+                              [SHAPE_PIXELS] = m->anchor_pixel != NULL,
+                              [SHAPE_LEVELS] = 0};
     memcpy(out->shape, shape, sizeof shape);
     model_parts parts = {0};
-    gbt_status status = model_parts_make(&parts, a->count, a->offset_count, m->anchor_pixel != NULL, m->decoder.has_distance, steps != NULL,
-                                         err);
+    gbt_status status = model_parts_make(&parts, a->count, a->offset_count, m->anchor_pixel != NULL,
+                                         m->decoder.has_distance, steps != NULL, err);
     if (status == GBT_OK)
         status = model_parts_fill(&parts, m, steps, err);
     out->shape[SHAPE_LEVELS] = (uint32_t)parts.grid.levels;
@@ -133,33 +142,37 @@ void model_coded_free(model_coded *coded)
     *coded = (model_coded){0};
 }
 
-/* ---- reading ------------------------------------------------------------------------------------------------------------------ */
+/* ---- reading ---- */
 
-bool model_is_coded(const container *c)
-{
-    return container_section_named(c, "coded.shape") != NULL;
-}
+bool model_is_coded(const container *c) { return container_section_named(c, "coded.shape") != NULL; }
 
 bool model_is_coarse(const container *c)
 {
     uint32_t shape[SHAPE_NUMBERS];
-    return model_is_coded(c) && container_get(c, "coded.shape", CONTAINER_U32, SHAPE_NUMBERS, shape, NULL) == GBT_OK &&
+    return model_is_coded(c) &&
+           container_get(c, "coded.shape", CONTAINER_U32, SHAPE_NUMBERS, shape, NULL) == GBT_OK &&
            shape[SHAPE_FORM] == FORM_COARSE;
 }
 
-static gbt_status check_shape(const char *path, const uint32_t shape[SHAPE_NUMBERS], size_t bytes, gbt_error *err)
+static gbt_status check_shape(const char *path, const uint32_t shape[SHAPE_NUMBERS], size_t bytes,
+                              gbt_error *err)
 {
     if (shape[SHAPE_FORM] != FORM_COARSE && shape[SHAPE_FORM] != FORM_LOSSLESS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: section coded.shape: coded by another version of gbtrace (wanted form 1 or 2, got %u)",
-                         path, shape[SHAPE_FORM]);
+        return base_fail(
+            err, GBT_ERR_FORMAT,
+            "%s: section coded.shape: coded by another version of gbtrace (wanted form 1 or 2, got %u)", path,
+            shape[SHAPE_FORM]);
     if (shape[SHAPE_OFFSETS] < 1 || shape[SHAPE_OFFSETS] > ANCHOR_MAX_OFFSETS || shape[SHAPE_PIXELS] > 1 ||
         shape[SHAPE_LEVELS] > POSITION_LEVELS_MAX)
         return base_fail(err, GBT_ERR_FORMAT,
-                         "%s: section coded.shape: %u offsets per anchor, pixel sizes %u, %u levels (wanted 1 to %d, 0 or 1, 0 to %d)",
-                         path, shape[SHAPE_OFFSETS], shape[SHAPE_PIXELS], shape[SHAPE_LEVELS], ANCHOR_MAX_OFFSETS, POSITION_LEVELS_MAX);
-    if (shape[SHAPE_COUNT] > ANCHORS_ANYWAY && (shape[SHAPE_COUNT] - ANCHORS_ANYWAY) / ANCHORS_PER_BYTE > bytes)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: section coded.shape: %u anchors cannot be in %zu bytes", path, shape[SHAPE_COUNT],
-                         bytes);
+                         "%s: section coded.shape: %u offsets per anchor, pixel sizes %u, %u levels (wanted "
+                         "1 to %d, 0 or 1, 0 to %d)",
+                         path, shape[SHAPE_OFFSETS], shape[SHAPE_PIXELS], shape[SHAPE_LEVELS],
+                         ANCHOR_MAX_OFFSETS, POSITION_LEVELS_MAX);
+    if (shape[SHAPE_COUNT] > ANCHORS_ANYWAY &&
+        (shape[SHAPE_COUNT] - ANCHORS_ANYWAY) / ANCHORS_PER_BYTE > bytes)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: section coded.shape: %u anchors cannot be in %zu bytes",
+                         path, shape[SHAPE_COUNT], bytes);
     return GBT_OK;
 }
 
@@ -172,7 +185,8 @@ static gbt_status read_steps(const container *c, model_parts *parts, gbt_error *
     const float *steps = data;
     for (size_t i = 0; i < count; i++)
         if (!isfinite(steps[i]) || (i >= STEPS_CELL && !(steps[i] > 0)))
-            return base_fail(err, GBT_ERR_FORMAT, "%s: section coded.steps: value %zu is not a step", c->path, i);
+            return base_fail(err, GBT_ERR_FORMAT, "%s: section coded.steps: value %zu is not a step", c->path,
+                             i);
     memcpy(parts->grid.origin, steps + STEPS_ORIGIN, sizeof parts->grid.origin);
     parts->grid.cell = steps[STEPS_CELL];
     memcpy(parts->step, steps + STEPS_COLUMNS, columns * sizeof *steps);
@@ -185,8 +199,10 @@ static gbt_status read_sizes(const container *c, uint32_t part_bytes[CODE_PARTS]
     GBT_TRY(container_get(c, "coded.parts", CONTAINER_U32, CODE_PARTS, part_bytes, err));
     for (int part = 0; part < CODE_PARTS; part++)
         sum += part_bytes[part];
-    return sum == size ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "%s: section coded.parts: the parts do not add up to %zu bytes", c->path,
-                                            size);
+    return sum == size
+               ? GBT_OK
+               : base_fail(err, GBT_ERR_FORMAT,
+                           "%s: section coded.parts: the parts do not add up to %zu bytes", c->path, size);
 }
 
 gbt_status model_decode(const container *c, bool has_distance, model *out, gbt_error *err)
@@ -200,8 +216,8 @@ gbt_status model_decode(const container *c, bool has_distance, model *out, gbt_e
     GBT_TRY(read_sizes(c, part_bytes, size, err));
     const bool coarse = shape[SHAPE_FORM] == FORM_COARSE;
     model_parts parts = {0};
-    gbt_status status = model_parts_make(&parts, shape[SHAPE_COUNT], (int)shape[SHAPE_OFFSETS], shape[SHAPE_PIXELS] == 1, has_distance,
-                                         coarse, err);
+    gbt_status status = model_parts_make(&parts, shape[SHAPE_COUNT], (int)shape[SHAPE_OFFSETS],
+                                         shape[SHAPE_PIXELS] == 1, has_distance, coarse, err);
     parts.grid.levels = (int)shape[SHAPE_LEVELS];
     if (status == GBT_OK && coarse)
         status = read_steps(c, &parts, err);

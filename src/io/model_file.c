@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/model_file.c -- the scene model to sections and back, with every value checked on the way in. */
 #include "io/model_file.h"
 
@@ -22,7 +23,8 @@ static void add_scene(container_writer *w, const model *m)
                         (float[DECODER_NUMBERS]){d->distance_scale, d->distance_min, d->distance_max});
     container_add_small(w, "scene.origin", CONTAINER_F64, 3, m->origin);
     container_add_small(w, "scene.numbers", CONTAINER_F32, SCENE_NUMBERS,
-                        (float[SCENE_NUMBERS]){m->voxel_size, m->extent, m->t_near, m->background[0], m->background[1], m->background[2]});
+                        (float[SCENE_NUMBERS]){m->voxel_size, m->extent, m->t_near, m->background[0],
+                                               m->background[1], m->background[2]});
     container_add_text(w, "scene.data_folder", m->data_folder);
     container_add_text(w, "train.config", m->config);
     container_add_small(w, "train.iterations", CONTAINER_U64, 1, &m->iterations);
@@ -33,16 +35,19 @@ void model_add(container_writer *w, const model *m)
     const anchors *a = &m->anchors;
     const size_t k = (size_t)a->offset_count;
     container_add(w, "anchor.position", CONTAINER_F32, 2, (size_t[]){a->count, 3}, a->position);
-    container_add(w, "anchor.feature", CONTAINER_F32, 2, (size_t[]){a->count, ANCHOR_FEATURE_DIM}, a->feature);
+    container_add(w, "anchor.feature", CONTAINER_F32, 2, (size_t[]){a->count, ANCHOR_FEATURE_DIM},
+                  a->feature);
     container_add(w, "anchor.offset", CONTAINER_F32, 3, (size_t[]){a->count, k, 3}, a->offset);
     container_add(w, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){a->count, 6}, a->scale_log);
     if (m->anchor_pixel != NULL)
         container_add(w, "anchor.pixel", CONTAINER_F32, 1, (size_t[]){a->count}, m->anchor_pixel);
-    container_add(w, "decoder.params", CONTAINER_F32, 1, (size_t[]){m->decoder.param_count}, m->decoder.params);
+    container_add(w, "decoder.params", CONTAINER_F32, 1, (size_t[]){m->decoder.param_count},
+                  m->decoder.params);
     add_scene(w, m);
 }
 
-static gbt_status check_finite(const char *path, const char *section, const float *values, size_t count, gbt_status failure, gbt_error *err)
+static gbt_status check_finite(const char *path, const char *section, const float *values, size_t count,
+                               gbt_status failure, gbt_error *err)
 {
     for (size_t i = 0; i < count; i++)
         if (!isfinite(values[i]))
@@ -56,24 +61,35 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
     const anchors *a = &m->anchors;
     const decoder *d = &m->decoder;
     if (a->offset_count < 1 || a->offset_count > ANCHOR_MAX_OFFSETS)
-        return base_fail(err, failure, "%s: section anchor.offset: bad number of offsets per anchor (wanted 1 to %d, got %d)", path,
-                         ANCHOR_MAX_OFFSETS, a->offset_count);
+        return base_fail(
+            err, failure,
+            "%s: section anchor.offset: bad number of offsets per anchor (wanted 1 to %d, got %d)", path,
+            ANCHOR_MAX_OFFSETS, a->offset_count);
     if (a->count > UINT32_MAX / ANCHOR_MAX_OFFSETS) /* Gaussians have 32-bit ids */
-        return base_fail(err, failure, "%s: section anchor.position: too many anchors (wanted at most %u, got %zu)", path,
+        return base_fail(err, failure,
+                         "%s: section anchor.position: too many anchors (wanted at most %u, got %zu)", path,
                          UINT32_MAX / ANCHOR_MAX_OFFSETS, a->count);
     decoder_part parts[3];
     decoder_parts(d, parts);
     if (d->offset_count != a->offset_count || d->param_count != parts[2].end)
-        return base_fail(err, failure, "%s: section decoder.params does not fit %d offsets per anchor (wanted %zu values, got %zu)", path,
-                         a->offset_count, parts[2].end, d->param_count);
-    const struct { const char *section; const float *values; size_t count; } arrays[] = {
+        return base_fail(
+            err, failure,
+            "%s: section decoder.params does not fit %d offsets per anchor (wanted %zu values, got %zu)",
+            path, a->offset_count, parts[2].end, d->param_count);
+    const struct {
+        const char *section;
+        const float *values;
+        size_t count;
+    } arrays[] = {
         {"anchor.position", a->position, a->count * 3},
         {"anchor.feature", a->feature, a->count * ANCHOR_FEATURE_DIM},
         {"anchor.offset", a->offset, a->count * (size_t)a->offset_count * 3},
         {"anchor.scale_log", a->scale_log, a->count * 6},
         {"anchor.pixel", m->anchor_pixel, m->anchor_pixel != NULL ? a->count : 0},
         {"decoder.params", d->params, d->param_count},
-        {"scene.numbers", &m->voxel_size, 1}, {"scene.numbers", &m->extent, 1}, {"scene.numbers", &m->t_near, 1},
+        {"scene.numbers", &m->voxel_size, 1},
+        {"scene.numbers", &m->extent, 1},
+        {"scene.numbers", &m->t_near, 1},
         {"scene.numbers", m->background, 3},
         {"decoder.numbers", &d->distance_scale, 1},
     };
@@ -83,10 +99,12 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
         if (m->anchor_pixel[i] < 0)
             return base_fail(err, failure, "%s: section anchor.pixel: value %zu is negative", path, i);
     if (isnan(d->distance_min) || isnan(d->distance_max)) /* infinite: not limited */
-        return base_fail(err, failure, "%s: section decoder.numbers: the trained range of distances is not a number", path);
+        return base_fail(err, failure,
+                         "%s: section decoder.numbers: the trained range of distances is not a number", path);
     if (m->voxel_size < 0 || m->extent < 0 || m->t_near < 0)
-        return base_fail(err, failure, "%s: section scene.numbers: a length is negative (voxel %g, extent %g, near %g)", path,
-                         (double)m->voxel_size, (double)m->extent, (double)m->t_near);
+        return base_fail(err, failure,
+                         "%s: section scene.numbers: a length is negative (voxel %g, extent %g, near %g)",
+                         path, (double)m->voxel_size, (double)m->extent, (double)m->t_near);
     for (int i = 0; i < 3; i++)
         if (!isfinite(m->origin[i]))
             return base_fail(err, failure, "%s: section scene.origin: value %d is not finite", path, i);
@@ -107,27 +125,31 @@ gbt_status model_save(const char *path, const model *m, gbt_error *err)
 static bool same_parts(const model *a, const model *b)
 {
     const size_t n = a->anchors.count, k = (size_t)a->anchors.offset_count;
-    if (b->anchors.count != n || b->anchors.offset_count != a->anchors.offset_count || a->decoder.param_count != b->decoder.param_count ||
+    if (b->anchors.count != n || b->anchors.offset_count != a->anchors.offset_count ||
+        a->decoder.param_count != b->decoder.param_count ||
         (a->anchor_pixel == NULL) != (b->anchor_pixel == NULL))
         return false;
     if (memcmp(a->decoder.params, b->decoder.params, a->decoder.param_count * sizeof(float)) != 0)
         return false;
-    return n == 0 || (memcmp(a->anchors.position, b->anchors.position, n * 3 * sizeof(float)) == 0 &&
-                      memcmp(a->anchors.feature, b->anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float)) == 0 &&
-                      memcmp(a->anchors.offset, b->anchors.offset, n * k * 3 * sizeof(float)) == 0 &&
-                      memcmp(a->anchors.scale_log, b->anchors.scale_log, n * 6 * sizeof(float)) == 0 &&
-                      (a->anchor_pixel == NULL || memcmp(a->anchor_pixel, b->anchor_pixel, n * sizeof(float)) == 0));
+    return n == 0 ||
+           (memcmp(a->anchors.position, b->anchors.position, n * 3 * sizeof(float)) == 0 &&
+            memcmp(a->anchors.feature, b->anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float)) == 0 &&
+            memcmp(a->anchors.offset, b->anchors.offset, n * k * 3 * sizeof(float)) == 0 &&
+            memcmp(a->anchors.scale_log, b->anchors.scale_log, n * 6 * sizeof(float)) == 0 &&
+            (a->anchor_pixel == NULL || memcmp(a->anchor_pixel, b->anchor_pixel, n * sizeof(float)) == 0));
 }
 
 /* Read what is about to be written: a model that cannot come back is not saved. */
-static gbt_status check_bytes(const char *path, const unsigned char *bytes, size_t byte_count, const model *wanted, gbt_error *err)
+static gbt_status check_bytes(const char *path, const unsigned char *bytes, size_t byte_count,
+                              const model *wanted, gbt_error *err)
 {
     container c;
     model back = {0};
     GBT_TRY(container_parse(bytes, byte_count, path, &c, err));
     gbt_status status = model_from_container(&c, &back, err);
     if (status == GBT_OK && !same_parts(wanted, &back))
-        status = base_fail(err, GBT_ERR_INTERNAL, "%s: the coded model does not come back as it was meant", path);
+        status =
+            base_fail(err, GBT_ERR_INTERNAL, "%s: the coded model does not come back as it was meant", path);
     model_free(&back);
     container_free(&c);
     return status;
@@ -153,7 +175,8 @@ gbt_status model_sizes_read(const container *c, size_t total, model_sizes *out, 
     return GBT_OK;
 }
 
-gbt_status model_save_coded(const char *path, const model *m, const model_steps *steps, model_sizes *sizes, gbt_error *err)
+gbt_status model_save_coded(const char *path, const model *m, const model_steps *steps, model_sizes *sizes,
+                            gbt_error *err)
 {
     const char *called = path != NULL ? path : "coded model";
     GBT_TRY(check_model(called, m, GBT_ERR_ARGUMENT, err));
@@ -188,14 +211,19 @@ static gbt_status read_anchors(const container *c, anchors *a, gbt_error *err)
     size_t shape[3] = {count, 3};
     GBT_TRY(container_find(c, "anchor.position", CONTAINER_F32, 2, shape, &position, err));
     count = shape[0];
-    GBT_TRY(container_find(c, "anchor.feature", CONTAINER_F32, 2, (size_t[]){count, ANCHOR_FEATURE_DIM}, &feature, err));
-    shape[0] = count, shape[1] = k, shape[2] = 3;
+    GBT_TRY(container_find(c, "anchor.feature", CONTAINER_F32, 2, (size_t[]){count, ANCHOR_FEATURE_DIM},
+                           &feature, err));
+    shape[0] = count;
+    shape[1] = k;
+    shape[2] = 3;
     GBT_TRY(container_find(c, "anchor.offset", CONTAINER_F32, 3, shape, &offset, err));
     k = shape[1];
     GBT_TRY(container_find(c, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){count, 6}, &scale_log, err));
     if (k < 1 || k > ANCHOR_MAX_OFFSETS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: section anchor.offset: bad number of offsets per anchor (wanted 1 to %d, got %zu)",
-                         c->path, ANCHOR_MAX_OFFSETS, k);
+        return base_fail(
+            err, GBT_ERR_FORMAT,
+            "%s: section anchor.offset: bad number of offsets per anchor (wanted 1 to %d, got %zu)", c->path,
+            ANCHOR_MAX_OFFSETS, k);
     a->offset_count = (int)k;
     GBT_TRY(anchors_resize(a, count, err));
     if (count > 0) {
@@ -229,10 +257,12 @@ static gbt_status read_decoder_inputs(const container *c, decoder *d, gbt_error 
     GBT_TRY(container_get(c, "decoder.has_distance", CONTAINER_U8, 1, &has_distance, err));
     GBT_TRY(container_get(c, "decoder.numbers", CONTAINER_F32, DECODER_NUMBERS, numbers, err));
     if (has_distance > 1)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: section decoder.has_distance: wanted 0 or 1, got %d", c->path, has_distance);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: section decoder.has_distance: wanted 0 or 1, got %d",
+                         c->path, has_distance);
     d->has_distance = has_distance == 1;
     d->distance_scale = numbers[DECODER_DISTANCE_SCALE];
-    d->distance_min = numbers[DECODER_DISTANCE_MIN], d->distance_max = numbers[DECODER_DISTANCE_MAX];
+    d->distance_min = numbers[DECODER_DISTANCE_MIN];
+    d->distance_max = numbers[DECODER_DISTANCE_MAX];
     return GBT_OK;
 }
 
@@ -246,7 +276,8 @@ static gbt_status read_params(const container *c, int offset_count, decoder *d, 
         return GBT_ERR_NO_MEMORY;
     if (param_count > 0)
         memcpy(d->params, params, param_count * sizeof *d->params);
-    d->param_count = param_count, d->offset_count = offset_count;
+    d->param_count = param_count;
+    d->offset_count = offset_count;
     return GBT_OK;
 }
 
@@ -269,7 +300,9 @@ static gbt_status read_scene(const container *c, model *m, gbt_error *err)
     float numbers[SCENE_NUMBERS];
     GBT_TRY(container_get(c, "scene.origin", CONTAINER_F64, 3, m->origin, err));
     GBT_TRY(container_get(c, "scene.numbers", CONTAINER_F32, SCENE_NUMBERS, numbers, err));
-    m->voxel_size = numbers[SCENE_VOXEL_SIZE], m->extent = numbers[SCENE_EXTENT], m->t_near = numbers[SCENE_T_NEAR];
+    m->voxel_size = numbers[SCENE_VOXEL_SIZE];
+    m->extent = numbers[SCENE_EXTENT];
+    m->t_near = numbers[SCENE_T_NEAR];
     memcpy(m->background, numbers + SCENE_BACKGROUND, sizeof m->background);
     GBT_TRY(container_get_text(c, "scene.data_folder", m->data_folder, sizeof m->data_folder, err));
     GBT_TRY(container_get_text(c, "train.config", m->config, sizeof m->config, err));

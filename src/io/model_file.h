@@ -1,4 +1,6 @@
-/* io/model_file.h -- the scene model in a file: anchors, decoder, and what a render needs to know about the scene. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* io/model_file.h -- the scene model in a file: anchors, decoder, and what a render needs to know about the
+   scene. */
 #ifndef GBT_IO_MODEL_FILE_H
 #define GBT_IO_MODEL_FILE_H
 
@@ -12,20 +14,21 @@ enum { MODEL_FOLDER_SIZE = 1024, MODEL_CONFIG_SIZE = 4096 };
 
 typedef struct model {
     anchors anchors;
-    float *anchor_pixel;   /* optional (NULL), [anchors.count]: smallest pixel with which training saw an anchor, scene units, >= 0; 0: none
-                              did */
-    decoder decoder;       /* decoder.offset_count equals anchors.offset_count */
-    double origin[3];      /* world = local + origin */
-    float voxel_size;      /* v, scene units, >= 0 */
-    float extent;          /* of the training cameras, scene units, >= 0 */
+    float *anchor_pixel; /* optional (NULL), [anchors.count]: smallest pixel with which training saw an
+                            anchor, scene units, >= 0; 0: none did */
+    decoder decoder;     /* decoder.offset_count equals anchors.offset_count */
+    double origin[3];    /* world = local + origin */
+    float voxel_size;    /* v, scene units, >= 0 */
+    float extent;        /* of the training cameras, scene units, >= 0 */
     float background[3];
-    float t_near;          /* scene units, >= 0 */
+    float t_near;                        /* scene units, >= 0 */
     char data_folder[MODEL_FOLDER_SIZE]; /* the data set it was trained on */
     char config[MODEL_CONFIG_SIZE];      /* key = value lines: how it was trained */
     uint64_t iterations;
 } model;
 
-/** Save atomically: after any failure the old file is whole. GBT_ERR_ARGUMENT if the model is not one that model_load() would take. */
+/** Save atomically: after any failure the old file is whole. GBT_ERR_ARGUMENT if the model is not one that
+    model_load() would take. */
 gbt_status model_save(const char *path, const model *m, gbt_error *err);
 
 /** Bytes of a coded model by what they hold. */
@@ -41,26 +44,29 @@ struct model_steps;
 gbt_status model_sizes_read(const container *c, size_t total, model_sizes *out, gbt_error *err);
 
 /**
- * Save in one of the two small forms (docs/compression.md), then as model_save(). What the file gives back is compared with what it should
- * before anything is written.
+ * Save in one of the two small forms (docs/compression.md), then as model_save(). What the file gives back is
+ * compared with what it should before anything is written.
  *
  * @param path  [in]  NULL: write nothing, only measure
- * @param steps [in]  of this model (io/model_steps.h): anchors are put in order of their positions, values are rounded. NULL: lossless, all
- *                    bits and the order are kept
+ * @param steps [in]  of this model (io/model_steps.h): anchors are put in order of their positions, values
+ *                    are rounded. NULL: lossless, all bits and the order are kept
  * @param sizes [out] optional (NULL)
  * @return also GBT_ERR_ARGUMENT for values that no steps can hold, GBT_ERR_INTERNAL when the comparison fails
  */
-gbt_status model_save_coded(const char *path, const model *m, const struct model_steps *steps, model_sizes *sizes, gbt_error *err);
+gbt_status model_save_coded(const char *path, const model *m, const struct model_steps *steps,
+                            model_sizes *sizes, gbt_error *err);
 
 /**
  * Load and check, whichever form it has: every byte by checksum, shapes, ranges, all values finite.
  *
  * @param out [out] free with model_free(); zeroed on failure
- * @return GBT_OK, GBT_ERR_IO (cannot read), GBT_ERR_FORMAT (damaged, or not a model: says which section), GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_IO (cannot read), GBT_ERR_FORMAT (damaged, or not a model: says which section),
+ *         GBT_ERR_NO_MEMORY
  */
 gbt_status model_load(const char *path, model *out, gbt_error *err);
 
-/** The model's sections, for a file that holds more than a model. `m` is borrowed until the writer has saved. */
+/** The model's sections, for a file that holds more than a model. `m` is borrowed until the writer has
+    saved. */
 void model_add(container_writer *w, const model *m);
 
 /** The model in a file that holds more; as model_load(). */

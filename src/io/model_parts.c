@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/model_parts.c -- floats to numbers of steps, numbers to coders, and back. */
 #include "io/model_parts.h"
 
@@ -10,16 +11,20 @@
 #include "io/float_code.h"
 #include "io/half.h"
 
-enum { COLUMN_OFFSET = 6, PIXEL_NONE = INT32_MIN, PIXEL_LEAST = -126 * 8, PIXEL_MOST = 127 * 8, INDEX_MAX = 1 << 20 };
+enum {
+    COLUMN_OFFSET = 6,
+    PIXEL_NONE = INT32_MIN,
+    PIXEL_LEAST = -126 * 8,
+    PIXEL_MOST = 127 * 8,
+    INDEX_MAX = 1 << 20
+};
 
-_Static_assert(COLUMN_OFFSET + 3 * ANCHOR_MAX_OFFSETS + ANCHOR_FEATURE_DIM <= ATTRIBUTE_COLUMNS_MAX, "every channel has a column");
+_Static_assert(COLUMN_OFFSET + 3 * ANCHOR_MAX_OFFSETS + ANCHOR_FEATURE_DIM <= ATTRIBUTE_COLUMNS_MAX,
+               "every channel has a column");
 
-static int feature_column(const model_parts *p)
-{
-    return COLUMN_OFFSET + 3 * p->offset_count;
-}
+static int feature_column(const model_parts *p) { return COLUMN_OFFSET + 3 * p->offset_count; }
 
-/* ---- room --------------------------------------------------------------------------------------------------------------------- */
+/* ---- room ---- */
 
 static gbt_status make_coarse(model_parts *p, bool has_pixel, gbt_error *err)
 {
@@ -31,11 +36,15 @@ static gbt_status make_coarse(model_parts *p, bool has_pixel, gbt_error *err)
     return p->cell == NULL || p->half == NULL || (has_pixel && p->pixel == NULL) ? GBT_ERR_NO_MEMORY : GBT_OK;
 }
 
-gbt_status model_parts_make(model_parts *p, size_t count, int offset_count, bool has_pixel, bool has_distance, bool coarse, gbt_error *err)
+gbt_status model_parts_make(model_parts *p, size_t count, int offset_count, bool has_pixel, bool has_distance,
+                            bool coarse, gbt_error *err)
 {
     decoder_part networks[3];
     decoder_parts(&(decoder){.offset_count = offset_count, .has_distance = has_distance}, networks);
-    *p = (model_parts){.coarse = coarse, .count = count, .offset_count = offset_count, .has_distance = has_distance,
+    *p = (model_parts){.coarse = coarse,
+                       .count = count,
+                       .offset_count = offset_count,
+                       .has_distance = has_distance,
                        .param_count = networks[2].end};
     if (coarse)
         return make_coarse(p, has_pixel, err);
@@ -59,7 +68,7 @@ void model_parts_free(model_parts *p)
     *p = (model_parts){0};
 }
 
-/* ---- floats to numbers -------------------------------------------------------------------------------------------------------- */
+/* ---- floats to numbers ---- */
 
 typedef struct placed {
     uint64_t cell;
@@ -74,7 +83,8 @@ static int by_cell(const void *a, const void *b)
     return x->anchor < y->anchor ? -1 : x->anchor > y->anchor;
 }
 
-static gbt_status sort_anchors(model_parts *p, const model *m, double cell_wanted, placed **order, gbt_error *err)
+static gbt_status sort_anchors(model_parts *p, const model *m, double cell_wanted, placed **order,
+                               gbt_error *err)
 {
     p->grid = position_grid_over(m->anchors.position, p->count, cell_wanted);
     *order = mem_alloc(p->count, sizeof **order, "order of anchors", err);
@@ -89,7 +99,8 @@ static gbt_status sort_anchors(model_parts *p, const model *m, double cell_wante
 }
 
 /* Columns [first, first + width) from rows of floats. */
-static void fill_columns(model_parts *p, const placed *order, const float *values, int first, int width, const float *steps)
+static void fill_columns(model_parts *p, const placed *order, const float *values, int first, int width,
+                         const float *steps)
 {
     for (int c = 0; c < width; c++) {
         double largest = 0;
@@ -99,8 +110,10 @@ static void fill_columns(model_parts *p, const placed *order, const float *value
         p->step[first + c] = step;
         for (size_t i = 0; i < p->count; i++) {
             const int d = p->table.doubling[i];
-            const double index = (double)values[order[i].anchor * (size_t)width + (size_t)c] / ((double)step * (1 << d));
-            p->table.value[i * (size_t)p->table.columns + (size_t)(first + c)] = (int32_t)lrint(index) * (1 << d);
+            const double index =
+                (double)values[order[i].anchor * (size_t)width + (size_t)c] / ((double)step * (1 << d));
+            p->table.value[i * (size_t)p->table.columns + (size_t)(first + c)] =
+                (int32_t)lrint(index) * (1 << d);
         }
     }
 }
@@ -117,7 +130,8 @@ static gbt_status fill_coarse(model_parts *p, const model *m, const model_steps 
     const anchors *a = &m->anchors;
     placed *order;
     if (steps->doubling != NULL && steps->count != p->count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "steps of another model (wanted %zu anchors, got %zu)", p->count, steps->count);
+        return base_fail(err, GBT_ERR_ARGUMENT, "steps of another model (wanted %zu anchors, got %zu)",
+                         p->count, steps->count);
     GBT_TRY(sort_anchors(p, m, steps->position, &order, err));
     for (size_t i = 0; i < p->count; i++) {
         if (steps->doubling != NULL)
@@ -152,7 +166,8 @@ static void copy_anchors(anchors *to, const anchors *from)
 gbt_status model_parts_fill(model_parts *p, const model *m, const model_steps *steps, gbt_error *err)
 {
     if (m->decoder.param_count != p->param_count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "the networks do not fit %d offsets per anchor", p->offset_count);
+        return base_fail(err, GBT_ERR_ARGUMENT, "the networks do not fit %d offsets per anchor",
+                         p->offset_count);
     if (p->coarse)
         return fill_coarse(p, m, steps, err);
     copy_anchors(&p->anchors, &m->anchors);
@@ -162,14 +177,15 @@ gbt_status model_parts_fill(model_parts *p, const model *m, const model_steps *s
     return GBT_OK;
 }
 
-/* ---- numbers to coders -------------------------------------------------------------------------------------------------------- */
+/* ---- numbers to coders ---- */
 
 static gbt_status code_pixels(const model_parts *p, range_coder *c)
 {
     coder_bit_model none;
     coder_int_model left;
     int32_t last = 0;
-    coder_bits_start(&none, 1), coder_ints_start(&left, 1);
+    coder_bits_start(&none, 1);
+    coder_ints_start(&left, 1);
     for (size_t i = 0; p->pixel != NULL && i < p->count; i++) {
         if (coder_adaptive(c, &none, p->pixel[i] == PIXEL_NONE)) {
             p->pixel[i] = PIXEL_NONE;
@@ -205,14 +221,25 @@ static gbt_status code_coarse(const model_parts *p, code_part part, range_coder 
         if (status == GBT_OK && c->reading)
             attribute_find_near(&table, p->cell);
         return status;
-    case CODE_DOUBLINGS: attribute_code_doublings(c, &table); return GBT_OK;
-    case CODE_RULES: attribute_code_rules(c, &table); return GBT_OK;
-    case CODE_SCALES: return attribute_code_columns(c, &table, 0, offsets, err);
-    case CODE_OFFSETS: return attribute_code_columns(c, &table, offsets, features, err);
-    case CODE_FEATURES: return attribute_code_columns(c, &table, features, end, err);
-    case CODE_PIXELS: return code_pixels(p, c);
-    case CODE_NETWORKS: code_networks(p, c); return GBT_OK;
-    case CODE_PARTS: break;
+    case CODE_DOUBLINGS:
+        attribute_code_doublings(c, &table);
+        return GBT_OK;
+    case CODE_RULES:
+        attribute_code_rules(c, &table);
+        return GBT_OK;
+    case CODE_SCALES:
+        return attribute_code_columns(c, &table, 0, offsets, err);
+    case CODE_OFFSETS:
+        return attribute_code_columns(c, &table, offsets, features, err);
+    case CODE_FEATURES:
+        return attribute_code_columns(c, &table, features, end, err);
+    case CODE_PIXELS:
+        return code_pixels(p, c);
+    case CODE_NETWORKS:
+        code_networks(p, c);
+        return GBT_OK;
+    case CODE_PARTS:
+        break;
     }
     return GBT_OK;
 }
@@ -222,15 +249,22 @@ static gbt_status code_lossless(const model_parts *p, code_part part, range_code
     const anchors *a = &p->anchors;
     const size_t k3 = 3 * (size_t)p->offset_count;
     switch (part) {
-    case CODE_POSITIONS: return floats_code(c, a->position, p->count, 3, err);
-    case CODE_SCALES: return floats_code(c, a->scale_log, p->count, 6, err);
-    case CODE_OFFSETS: return floats_code(c, a->offset, p->count, k3, err);
-    case CODE_FEATURES: return floats_code(c, a->feature, p->count, ANCHOR_FEATURE_DIM, err);
-    case CODE_PIXELS: return floats_code(c, p->anchor_pixel, p->anchor_pixel != NULL ? p->count : 0, 1, err);
-    case CODE_NETWORKS: return floats_code(c, p->params, p->param_count, 1, err);
+    case CODE_POSITIONS:
+        return floats_code(c, a->position, p->count, 3, err);
+    case CODE_SCALES:
+        return floats_code(c, a->scale_log, p->count, 6, err);
+    case CODE_OFFSETS:
+        return floats_code(c, a->offset, p->count, k3, err);
+    case CODE_FEATURES:
+        return floats_code(c, a->feature, p->count, ANCHOR_FEATURE_DIM, err);
+    case CODE_PIXELS:
+        return floats_code(c, p->anchor_pixel, p->anchor_pixel != NULL ? p->count : 0, 1, err);
+    case CODE_NETWORKS:
+        return floats_code(c, p->params, p->param_count, 1, err);
     case CODE_DOUBLINGS:
     case CODE_RULES:
-    case CODE_PARTS: break;
+    case CODE_PARTS:
+        break;
     }
     return GBT_OK;
 }
@@ -240,21 +274,24 @@ gbt_status model_parts_code(const model_parts *p, code_part part, range_coder *c
     return p->coarse ? code_coarse(p, part, c, err) : code_lossless(p, part, c, err);
 }
 
-/* ---- numbers to floats -------------------------------------------------------------------------------------------------------- */
+/* ---- numbers to floats ---- */
 
 static float pixel_size(int32_t number)
 {
     static const float eighths[8] = {0x1p+0f,        0x1.172b84p+0f, 0x1.306fep+0f,  0x1.4bfdaep+0f,
                                      0x1.6a09e6p+0f, 0x1.8ace54p+0f, 0x1.ae89fap+0f, 0x1.d5818ep+0f};
-    return number == PIXEL_NONE ? 0.0f : ldexpf(eighths[(number - PIXEL_LEAST) % 8], (number - PIXEL_LEAST) / 8 + PIXEL_LEAST / 8);
+    return number == PIXEL_NONE
+               ? 0.0f
+               : ldexpf(eighths[(number - PIXEL_LEAST) % 8], (number - PIXEL_LEAST) / 8 + PIXEL_LEAST / 8);
 }
 
 static void spread_columns(const model_parts *p, int first, int width, float *out)
 {
     for (size_t i = 0; i < p->count; i++)
         for (int c = 0; c < width; c++)
-            out[i * (size_t)width + (size_t)c] = (float)p->table.value[i * (size_t)p->table.columns +
-                                                                       (size_t)(first + c)] * p->step[first + c];
+            out[i * (size_t)width + (size_t)c] =
+                (float)p->table.value[i * (size_t)p->table.columns + (size_t)(first + c)] *
+                p->step[first + c];
 }
 
 gbt_status model_parts_to_model(const model_parts *p, model *out, gbt_error *err)
@@ -266,7 +303,9 @@ gbt_status model_parts_to_model(const model_parts *p, model *out, gbt_error *err
     out->anchor_pixel = has_pixel ? mem_alloc(p->count, sizeof *out->anchor_pixel, "pixel sizes", err) : NULL;
     if (out->decoder.params == NULL || (has_pixel && out->anchor_pixel == NULL))
         return GBT_ERR_NO_MEMORY;
-    out->decoder.param_count = p->param_count, out->decoder.offset_count = p->offset_count, out->decoder.has_distance = p->has_distance;
+    out->decoder.param_count = p->param_count;
+    out->decoder.offset_count = p->offset_count;
+    out->decoder.has_distance = p->has_distance;
     if (!p->coarse) {
         copy_anchors(&out->anchors, &p->anchors);
         copy_floats(out->decoder.params, p->params, p->param_count);

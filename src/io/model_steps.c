@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/model_steps.c -- sensitivities to steps; features turned into their best basis. */
 #include "io/model_steps.h"
 
@@ -11,14 +12,16 @@
 
 enum { DIM = ANCHOR_FEATURE_DIM, GUESS_VIEWS = 16, DOUBLINGS_MAX = 2 };
 
-/* Of what Gaussians could cover this part is in front and in the picture: measured against views, on three scenes (docs/compression.md). */
+/* Of what Gaussians could cover this part is in front and in the picture: measured against views, on three
+   scenes (docs/compression.md). */
 #define HIDDEN 30.0
 
-/* ---- sums --------------------------------------------------------------------------------------------------------------------- */
+/* ---- sums ---- */
 
 gbt_status model_sensitivity_start(model_sensitivity *s, size_t count, gbt_error *err)
 {
-    *s = (model_sensitivity){.count = count, .anchor = mem_calloc(count, sizeof *s->anchor, "sensitivities", err)};
+    *s = (model_sensitivity){.count = count,
+                             .anchor = mem_calloc(count, sizeof *s->anchor, "sensitivities", err)};
     return s->anchor != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
@@ -35,7 +38,8 @@ void model_sensitivity_add(model_sensitivity *s, const anchors *a, const anchors
     const size_t k3 = (size_t)a->offset_count * 3;
     s->values += values;
     for (size_t i = 0; i < s->count; i++) {
-        const float *f = gradient->feature + i * DIM, *offset = gradient->offset + i * k3, *scale = gradient->scale_log + i * 6;
+        const float *f = gradient->feature + i * DIM, *offset = gradient->offset + i * k3,
+                    *scale = gradient->scale_log + i * 6;
         const double all = sum_squares(f, DIM) + sum_squares(offset, k3) + sum_squares(scale, 6);
         if (!(all > 0) || !isfinite(all))
             continue;
@@ -84,7 +88,7 @@ void model_sensitivity_free(model_sensitivity *s)
     *s = (model_sensitivity){0};
 }
 
-/* ---- a guess without views ---------------------------------------------------------------------------------------------------- */
+/* ---- a guess without views ---- */
 
 /* Around an anchor, as far from it as training cameras were from what they saw. */
 static void guess_camera(const model *m, uint64_t view, float camera[3])
@@ -98,21 +102,25 @@ static void guess_camera(const model *m, uint64_t view, float camera[3])
         length += way[k] * way[k];
     }
     for (int k = 0; k < 3; k++)
-        camera[k] = m->anchors.position[3 * at + (size_t)k] + distance * (float)(way[k] / sqrt(length + 1e-30));
+        camera[k] =
+            m->anchors.position[3 * at + (size_t)k] + distance * (float)(way[k] / sqrt(length + 1e-30));
 }
 
-/* What a sign on every pixel that a Gaussian covers alone would give: its area (of the two longer axes) under the root, times how far its
-   colour, its opacity, its outline change. Returns that area times opacity. */
+/* What a sign on every pixel that a Gaussian covers alone would give: its area (of the two longer axes) under
+   the root, times how far its colour, its opacity, its outline change. Returns that area times opacity. */
 static double guess_gradient(const gaussians *g, size_t i, uint64_t view, gaussians *out)
 {
     const float x = g->scale_x[i], y = g->scale_y[i], z = g->scale_z[i];
-    const float most = fmaxf(x, fmaxf(y, z)), least = fminf(x, fminf(y, z)), middle = fmaxf(fminf(x, y), fminf(fmaxf(x, y), z));
+    const float most = fmaxf(x, fmaxf(y, z)), least = fminf(x, fminf(y, z)),
+                middle = fmaxf(fminf(x, y), fminf(fmaxf(x, y), z));
     const float opacity = fmaxf(g->opacity[i], 0), root = sqrtf(most * middle), seen = root * opacity,
-        turn = 0.5f * seen * logf(most / least);
+                turn = 0.5f * seen * logf(most / least);
     const float half = 0.5f * seen, move = half / middle;
-    float *const fields[] = {out->opacity, out->red,     out->green,   out->blue,   out->mean_x, out->mean_y, out->mean_z,
-                             out->scale_x, out->scale_y, out->scale_z, out->quat_w, out->quat_x, out->quat_y, out->quat_z};
-    const float size[] = {root, seen, seen, seen, move, move, move, half / x, half / y, half / z, turn, turn, turn, turn};
+    float *const fields[] = {out->opacity, out->red,    out->green,   out->blue,    out->mean_x,
+                             out->mean_y,  out->mean_z, out->scale_x, out->scale_y, out->scale_z,
+                             out->quat_w,  out->quat_x, out->quat_y,  out->quat_z};
+    const float size[] = {root,     seen,     seen,     seen, move, move, move,
+                          half / x, half / y, half / z, turn, turn, turn, turn};
     for (size_t f = 0; f < sizeof fields / sizeof *fields; f++)
         fields[f][i] = rng_uniform(2 + view, f, i) < 0.5f ? -size[f] : size[f];
     return (double)(seen * root);
@@ -172,7 +180,7 @@ gbt_status model_sensitivity_guess(const model *m, model_sensitivity *s, gbt_err
     return status;
 }
 
-/* ---- steps -------------------------------------------------------------------------------------------------------------------- */
+/* ---- steps ---- */
 
 /* Within limits; the upper one where nothing counts. */
 static double step_of(double noise, double sensitivity, double least, double most)
@@ -197,14 +205,16 @@ static gbt_status find_doublings(const model_sensitivity *s, model_steps *out, g
     return GBT_OK;
 }
 
-gbt_status model_steps_at(const model *m, const model_sensitivity *s, double quality, model_steps *out, gbt_error *err)
+gbt_status model_steps_at(const model *m, const model_sensitivity *s, double quality, model_steps *out,
+                          gbt_error *err)
 {
     const anchors *a = &m->anchors;
     const size_t k3 = (size_t)a->offset_count * 3, channels = DIM + k3 + 6;
     if (!(quality > 0 && quality < 200))
         return base_fail(err, GBT_ERR_ARGUMENT, "quality: wanted 0 to 200 dB, got %g", quality);
     if (s->count != a->count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "sensitivities of another model (wanted %zu anchors, got %zu)", a->count, s->count);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "sensitivities of another model (wanted %zu anchors, got %zu)", a->count, s->count);
     /* Uniform noise of one step has the variance 1/12. */
     const double noise = sqrt(12 * pow(10, -quality / 10) / ((double)channels * fmax((double)a->count, 1)));
     double largest = 0, side = 0;
@@ -213,7 +223,8 @@ gbt_status model_steps_at(const model *m, const model_sensitivity *s, double qua
     for (size_t i = 0; i < a->count * 3; i++)
         side = fmax(side, fabs((double)a->position[i] - (double)a->position[i % 3]));
     for (size_t c = 0; c < DIM; c++)
-        out->feature[c] = (float)step_of(noise, s->feature[c][c], fmax(largest, 1e-20) / 65536, fmax(largest, 1e-20));
+        out->feature[c] =
+            (float)step_of(noise, s->feature[c][c], fmax(largest, 1e-20) / 65536, fmax(largest, 1e-20));
     for (size_t c = 0; c < k3; c++)
         out->offset[c] = (float)step_of(noise, s->offset[c], 1.0 / 4096, 0.25);
     for (size_t c = 0; c < 6; c++)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/model_turn.c -- the features of a model in the basis that codes best, and its networks to fit. */
 #include <math.h>
 #include <string.h>
@@ -11,7 +12,8 @@ enum { DIM = ANCHOR_FEATURE_DIM };
 
 typedef double square[DIM][DIM];
 
-/* Eigenvectors of a symmetric matrix as the columns of u, largest eigenvalue first. m is left with the eigenvalues. */
+/* Eigenvectors of a symmetric matrix as the columns of u, largest eigenvalue first. m is left with the
+   eigenvalues. */
 static void eigenvectors(square m, square u)
 {
     symmetric_eigen(&m[0][0], &u[0][0], DIM, 1e-14);
@@ -20,10 +22,12 @@ static void eigenvectors(square m, square u)
         for (size_t j = i + 1; j < DIM; j++)
             best = m[j][j] > m[best][best] ? j : best;
         const double value = m[i][i];
-        m[i][i] = m[best][best], m[best][best] = value;
+        m[i][i] = m[best][best];
+        m[best][best] = value;
         for (size_t k = 0; k < DIM; k++) {
             const double x = u[k][i];
-            u[k][i] = u[k][best], u[k][best] = x;
+            u[k][i] = u[k][best];
+            u[k][best] = x;
         }
     }
 }
@@ -38,7 +42,8 @@ static void find_covariance(const anchors *a, double mean[DIM], square covarianc
     for (size_t i = 0; i < a->count; i++)
         for (size_t c = 0; c < DIM; c++)
             for (size_t d = 0; d < DIM; d++)
-                covariance[c][d] += ((double)a->feature[i * DIM + c] - mean[c]) * ((double)a->feature[i * DIM + d] - mean[d]) / n;
+                covariance[c][d] += ((double)a->feature[i * DIM + c] - mean[c]) *
+                                    ((double)a->feature[i * DIM + d] - mean[d]) / n;
 }
 
 /* forth = U^T L^T, back = L^-T U, where L L^T = S / m and U diagonalises L^T C L. */
@@ -88,7 +93,8 @@ static void turn_networks(decoder *d, const double mean[DIM], const square back)
     const size_t inputs = DIM + 3 + (d->has_distance ? 1 : 0);
     for (int head = 0; head < 3; head++)
         for (size_t h = 0; h < ANCHOR_HIDDEN_DIM; h++) {
-            float *w = d->params + parts[head].begin + h * inputs, *bias = d->params + parts[head].begin + ANCHOR_HIDDEN_DIM * inputs + h;
+            float *w = d->params + parts[head].begin + h * inputs,
+                  *bias = d->params + parts[head].begin + ANCHOR_HIDDEN_DIM * inputs + h;
             double turned[DIM] = {0}, sum = (double)*bias;
             for (size_t c = 0; c < DIM; c++) {
                 sum += (double)w[c] * mean[c];
@@ -103,7 +109,10 @@ static void turn_networks(decoder *d, const double mean[DIM], const square back)
 
 gbt_status model_turn_features(model *m, model_sensitivity *s, gbt_error *err)
 {
-    struct { square covariance, forth, back; double mean[DIM]; } *t = mem_alloc(1, sizeof *t, "basis of features", err);
+    struct {
+        square covariance, forth, back;
+        double mean[DIM];
+    } *t = mem_alloc(1, sizeof *t, "basis of features", err);
     if (t == NULL)
         return GBT_ERR_NO_MEMORY;
     find_covariance(&m->anchors, t->mean, t->covariance);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/position_code.c -- cells of positions as an octree, level by level. */
 #include "io/position_code.h"
 
@@ -6,7 +7,7 @@
 
 #include "base/memory.h"
 
-/* ---- cells -------------------------------------------------------------------------------------------------------------------- */
+/* ---- cells ---- */
 
 /* Two zeros between any two of 21 bits, and back. */
 static uint64_t spread(uint64_t x)
@@ -54,8 +55,8 @@ position_grid position_grid_over(const float *position, size_t count, double cel
         side = fmax(side, (double)high[k] - (double)grid.origin[k]);
     while (grid.levels < POSITION_LEVELS_MAX && side > cell_wanted * ldexp(1, grid.levels))
         grid.levels++;
-    const double least = side / ldexp(1, grid.levels) * (1 + 1e-6); /* else the wanted size itself: the box is not cut finer than asked
-                                                                       for */
+    const double least = side / ldexp(1, grid.levels) * (1 + 1e-6); /* else the wanted size itself: the box is
+                                                                       not cut finer than asked for */
     grid.cell = (float)fmin(fmax(fmax(least, cell_wanted), 1e-37), 1e38);
     return grid;
 }
@@ -82,7 +83,7 @@ void position_middle(const position_grid *grid, uint64_t code, float position[3]
     }
 }
 
-/* ---- octree ------------------------------------------------------------------------------------------------------------------- */
+/* ---- octree ---- */
 
 enum { SIDES = 8, SET_MAX = 4, TREE_NODES = 256 };
 
@@ -139,22 +140,24 @@ static unsigned code_children(range_coder *c, tree_models *m, int level, unsigne
         for (unsigned k = 0; k < 3; k++)
             touching |= (sides >> (2 * k + (o >> k & 1)) & 1) << k;
         const unsigned near_count = set < SET_MAX ? set : SET_MAX - 1;
-        coder_bit_model *const models[CODER_INPUTS] = {&m->by_level[level][near_count][__builtin_popcount(touching)],
-                                                       &m->by_set[path][side_count / 2],
-                                                       &m->by_sides[touching][o][near_count]};
+        coder_bit_model *const models[CODER_INPUTS] = {
+            &m->by_level[level][near_count][__builtin_popcount(touching)], &m->by_set[path][side_count / 2],
+            &m->by_sides[touching][o][near_count]};
         int bit = children >> o & 1;
         if (o == 7 && set == 0)
             bit = 1; /* a node has a child */
         else
             bit = coder_mixed(c, models, &m->mixer[level][o], bit);
-        out |= (unsigned)bit << o, path = path << 1 | (unsigned)bit, set += (unsigned)bit;
+        out |= (unsigned)bit << o;
+        path = path << 1 | (unsigned)bit;
+        set += (unsigned)bit;
     }
     return out;
 }
 
 /* The children of all nodes of one level. `codes`: the points, when writing. */
-static gbt_status code_level(range_coder *c, tree_models *m, int level, int levels, const node_list *nodes, const uint64_t *codes,
-                             size_t count, node_list *next)
+static gbt_status code_level(range_coder *c, tree_models *m, int level, int levels, const node_list *nodes,
+                             const uint64_t *codes, size_t count, node_list *next)
 {
     const int shift = 3 * (levels - level - 1);
     size_t point = 0;
@@ -176,7 +179,8 @@ static gbt_status code_level(range_coder *c, tree_models *m, int level, int leve
 }
 
 /* How many points each cell holds. */
-static gbt_status code_counts(range_coder *c, tree_models *m, const node_list *cells, uint64_t *codes, size_t count)
+static gbt_status code_counts(range_coder *c, tree_models *m, const node_list *cells, uint64_t *codes,
+                              size_t count)
 {
     size_t point = 0;
     for (size_t i = 0; i < cells->count; i++) {
@@ -213,7 +217,8 @@ gbt_status positions_code(range_coder *c, int levels, uint64_t *codes, size_t co
         for (int level = 0; level < levels && status == GBT_OK; level++) {
             status = code_level(c, m, level, levels, &nodes, codes, count, &next);
             const node_list done = nodes;
-            nodes = next, next = done;
+            nodes = next;
+            next = done;
         }
         if (status == GBT_OK)
             status = code_counts(c, m, &nodes, codes, count);

@@ -1,4 +1,6 @@
-/* io/position_code.h -- anchor positions as cells of a cube, in Morton order, and these cells as an octree. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* io/position_code.h -- anchor positions as cells of a cube, in Morton order, and these cells as an
+   octree. */
 #ifndef GBT_IO_POSITION_CODE_H
 #define GBT_IO_POSITION_CODE_H
 
@@ -10,7 +12,8 @@
 
 enum { POSITION_LEVELS_MAX = 21 };
 
-/** Cell (i, j, k) has its middle at origin + (i + 1/2, j + 1/2, k + 1/2) cell; 2^levels cells along each side. */
+/** Cell (i, j, k) has its middle at origin + (i + 1/2, j + 1/2, k + 1/2) cell; 2^levels cells along each
+    side. */
 typedef struct position_grid {
     float origin[3], cell;
     int levels; /* [0, POSITION_LEVELS_MAX] */

@@ -1,4 +1,6 @@
-/* io/range_coder.c -- the range coder: bytes with carries, bits with adaptive probabilities, integers as bits. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* io/range_coder.c -- the range coder: bytes with carries, bits with adaptive probabilities, integers as
+   bits. */
 #include "io/range_coder.h"
 
 #include <string.h>
@@ -8,30 +10,33 @@
 
 enum {
     RENORM = 1 << 24,
-    P_LEAST = 64,           /* of 65536: a sure bit costs 0.0014 bits, so that a byte is never more than some thousand of them */
-    SEEN_MAX = 250,         /* then the last bits count for more than the first */
-    STRETCH_MAX = 2047,     /* 8.0 */
+    P_LEAST = 64,   /* of 65536: a sure bit costs 0.0014 bits, so that a byte is never more than some thousand
+                       of them */
+    SEEN_MAX = 250, /* then the last bits count for more than the first */
+    STRETCH_MAX = 2047, /* 8.0 */
     LEARN_SHIFT = 14,
-    BEYOND_MAX = 8,         /* 4 read ahead, 4 that the end of writing left out */
+    BEYOND_MAX = 8, /* 4 read ahead, 4 that the end of writing left out */
     BIN_SIGN = 0,
-    BIN_CLASS = 1,          /* 1 .. 31: is the number in a higher class */
+    BIN_CLASS = 1, /* 1 .. 31: is the number in a higher class */
     CLASS_MAX = 30,
     BIN_MANTISSA = BIN_CLASS + CLASS_MAX,
-    MANTISSA_CLASSES = 13,  /* classes 1 to 13 have contexts for their upper bits */
+    MANTISSA_CLASSES = 13, /* classes 1 to 13 have contexts for their upper bits */
     MANTISSA_BITS = 3
 };
 
-/* ---- bytes -------------------------------------------------------------------------------------------------------------------- */
+/* ---- bytes ---- */
 
 static void put_byte(range_coder *c, uint8_t byte)
 {
     if (c->status == GBT_OK && c->size == c->capacity)
-        c->status = mem_reserve((void **)&c->bytes, &c->capacity, c->size, c->size + 4096, 1, "coded bytes", NULL);
+        c->status =
+            mem_reserve((void **)&c->bytes, &c->capacity, c->size, c->size + 4096, 1, "coded bytes", NULL);
     if (c->status == GBT_OK)
         c->bytes[c->size++] = byte;
 }
 
-/* Move the highest byte of `low` out. It waits while a carry could still reach it: through bytes of 255 behind it. */
+/* Move the highest byte of `low` out. It waits while a carry could still reach it: through bytes of 255
+   behind it. */
 static void shift_low(range_coder *c)
 {
     if (c->low < UINT64_C(0xFF000000) || c->low > UINT64_C(0xFFFFFFFF)) {
@@ -52,13 +57,15 @@ static uint8_t next_byte(range_coder *c)
     return 0;
 }
 
-/* ---- probabilities ------------------------------------------------------------------------------------------------------------ */
+/* ---- probabilities ---- */
 
 /* 65536 / (1 + e^-x), x in 1/256, from its values at steps of 1/2. */
 static int squash(int x)
 {
-    static const int32_t at[33] = {22, 36, 60, 98, 162, 267, 439, 720, 1179, 1921, 3108, 4971, 7812, 11955, 17625, 24743, 32768, 40793,
-                                   47911, 53581, 57724, 60565, 62428, 63615, 64357, 64816, 65097, 65269, 65374, 65438, 65476, 65500, 65514};
+    static const int32_t at[33] = {22,    36,    60,    98,    162,   267,   439,   720,   1179,
+                                   1921,  3108,  4971,  7812,  11955, 17625, 24743, 32768, 40793,
+                                   47911, 53581, 57724, 60565, 62428, 63615, 64357, 64816, 65097,
+                                   65269, 65374, 65438, 65476, 65500, 65514};
     x = x < -STRETCH_MAX ? -STRETCH_MAX : x > STRETCH_MAX ? STRETCH_MAX : x;
     const int i = (x + 2048) >> 7, f = (x + 2048) & 127;
     return (int)((at[i] * (128 - f) + at[i + 1] * f) >> 7);
@@ -107,20 +114,23 @@ void coder_mixers_start(coder_mixer *mixers, size_t count)
             mixers[i].weight[k] = 65536 * 2 / 5;
 }
 
-/* ---- start and end ------------------------------------------------------------------------------------------------------------ */
+/* ---- start and end ---- */
 
 void coder_write_start(range_coder *c)
 {
     memset(c, 0, sizeof *c);
-    c->range = UINT32_MAX, c->held_count = 1;
+    c->range = UINT32_MAX;
+    c->held_count = 1;
     fill_stretch(c->stretch);
 }
 
 void coder_read_start(range_coder *c, const unsigned char *bytes, size_t size)
 {
     memset(c, 0, sizeof *c);
-    c->reading = true, c->range = UINT32_MAX;
-    c->bytes = (unsigned char *)(uintptr_t)bytes, c->size = size; /* only read */
+    c->reading = true;
+    c->range = UINT32_MAX;
+    c->bytes = (unsigned char *)(uintptr_t)bytes;
+    c->size = size; /* only read */
     fill_stretch(c->stretch);
     for (int i = 0; i < 4; i++)
         c->code = c->code << 8 | next_byte(c);
@@ -128,7 +138,8 @@ void coder_read_start(range_coder *c, const unsigned char *bytes, size_t size)
 
 gbt_status coder_write_end(range_coder *c, gbt_error *err)
 {
-    c->low = (c->low + RENORM - 1) & ~(uint64_t)(RENORM - 1); /* in [low, low + range), and ends in three bytes of zero */
+    c->low = (c->low + RENORM - 1) &
+             ~(uint64_t)(RENORM - 1); /* in [low, low + range), and ends in three bytes of zero */
     for (int i = 0; i < 5; i++)
         shift_low(c);
     if (c->status != GBT_OK)
@@ -140,10 +151,7 @@ gbt_status coder_write_end(range_coder *c, gbt_error *err)
     return GBT_OK;
 }
 
-bool coder_read_whole(const range_coder *c)
-{
-    return c->at == c->size && c->beyond <= BEYOND_MAX;
-}
+bool coder_read_whole(const range_coder *c) { return c->at == c->size && c->beyond <= BEYOND_MAX; }
 
 void coder_free(range_coder *c)
 {
@@ -152,7 +160,7 @@ void coder_free(range_coder *c)
     memset(c, 0, sizeof *c);
 }
 
-/* ---- bits --------------------------------------------------------------------------------------------------------------------- */
+/* ---- bits ---- */
 
 int coder_bit(range_coder *c, uint32_t p, int bit)
 {
@@ -220,7 +228,7 @@ uint32_t coder_tree(range_coder *c, coder_bit_model *tree, int count, uint32_t v
     return node - (1u << count);
 }
 
-/* ---- integers ----------------------------------------------------------------------------------------------------------------- */
+/* ---- integers ---- */
 
 typedef struct int_contexts {
     coder_int_model *const *models;
@@ -244,7 +252,7 @@ static int32_t code_int(range_coder *c, const int_contexts *x, int32_t value)
     const int own = 31 - __builtin_clz(magnitude);
     int class = 0;
     while (class < CLASS_MAX && int_bit(c, x, (size_t)(BIN_CLASS + class), class < own))
-        class++;
+        class ++;
     if (class == 0)
         return 0;
     uint32_t out = 1;
@@ -252,14 +260,17 @@ static int32_t code_int(range_coder *c, const int_contexts *x, int32_t value)
     for (int k = 0; k < MANTISSA_BITS && left > 0 && class <= MANTISSA_CLASSES; k++) {
         left--;
         const size_t node = out - 1; /* 0; 1, 2; 3 .. 6 */
-        out = out << 1 | (uint32_t)int_bit(c, x, (size_t)BIN_MANTISSA + (size_t)(class - 1) * 7 + node, (int)(magnitude >> left & 1));
+        out = out << 1 | (uint32_t)int_bit(c, x, (size_t)BIN_MANTISSA + (size_t)(class - 1) * 7 + node,
+                                           (int)(magnitude >> left & 1));
     }
-    out = (uint32_t)((uint64_t)out << left) | coder_plain(c, left, left > 0 ? magnitude & ((1u << left) - 1) : 0);
+    out = (uint32_t)((uint64_t)out << left) |
+          coder_plain(c, left, left > 0 ? magnitude & ((1u << left) - 1) : 0);
     const int32_t size = out - 1 > CODER_INT_MAX ? CODER_INT_MAX : (int32_t)(out - 1);
     return int_bit(c, x, BIN_SIGN, value < 0) ? -size : size;
 }
 
-int32_t coder_int(range_coder *c, coder_int_model *const models[CODER_INPUTS], coder_int_mixer *mixer, int32_t value)
+int32_t coder_int(range_coder *c, coder_int_model *const models[CODER_INPUTS], coder_int_mixer *mixer,
+                  int32_t value)
 {
     return code_int(c, &(int_contexts){models, mixer}, value);
 }

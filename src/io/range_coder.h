@@ -1,7 +1,9 @@
-/* io/range_coder.h -- adaptive binary range coder with mixed contexts; one set of calls writes and reads, so that both stay in step.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* io/range_coder.h -- adaptive binary range coder with mixed contexts; one set of calls writes and reads, so
+   that both stay in step.
 
-   Integers only: the same bits on every machine. A coder that reads takes zeros behind the end of its bytes and remembers that it did;
-   every call ends after a bounded number of steps whatever the bytes are. */
+   Integers only: the same bits on every machine. A coder that reads takes zeros behind the end of its bytes
+   and remembers that it did; every call ends after a bounded number of steps whatever the bytes are. */
 #ifndef GBT_IO_RANGE_CODER_H
 #define GBT_IO_RANGE_CODER_H
 
@@ -18,14 +20,14 @@ typedef struct range_coder {
     uint32_t range;
     /* writing */
     uint64_t low;
-    uint8_t held;          /* the last byte, which a carry may still change */
-    uint64_t held_count;   /* it and the bytes of 255 behind it */
-    unsigned char *bytes;  /* owned when writing, borrowed when reading */
+    uint8_t held;         /* the last byte, which a carry may still change */
+    uint64_t held_count;  /* it and the bytes of 255 behind it */
+    unsigned char *bytes; /* owned when writing, borrowed when reading */
     size_t size, capacity;
-    gbt_status status;     /* of writing: out of memory */
+    gbt_status status; /* of writing: out of memory */
     /* reading */
     uint32_t code;
-    size_t at, beyond;     /* bytes taken, and zeros taken behind the end */
+    size_t at, beyond;                   /* bytes taken, and zeros taken behind the end */
     int16_t stretch[CODER_STRETCH_SIZE]; /* ln(p / (1 - p)) in 1/256 by p in 1/4096 */
 } range_coder;
 
@@ -58,7 +60,8 @@ void coder_write_start(range_coder *c);
 /** `bytes` are borrowed until the coder is no longer used. */
 void coder_read_start(range_coder *c, const unsigned char *bytes, size_t size);
 
-/** End writing: c->bytes, c->size are the result (free with coder_free()). GBT_ERR_NO_MEMORY if any byte found no room. */
+/** End writing: c->bytes, c->size are the result (free with coder_free()). GBT_ERR_NO_MEMORY if any byte
+    found no room. */
 gbt_status coder_write_end(range_coder *c, gbt_error *err);
 
 /** Has reading used exactly the bytes that were there? */
@@ -66,7 +69,8 @@ bool coder_read_whole(const range_coder *c);
 
 void coder_free(range_coder *c);
 
-/** One bit of which 1 has probability p / 65536, 0 < p < 65536. Returns the bit: the given one, or the one read. */
+/** One bit of which 1 has probability p / 65536, 0 < p < 65536. Returns the bit: the given one, or the one
+    read. */
 int coder_bit(range_coder *c, uint32_t p, int bit);
 
 /** One bit in one context. */
@@ -82,12 +86,14 @@ uint32_t coder_plain(range_coder *c, int count, uint32_t value);
 uint32_t coder_tree(range_coder *c, coder_bit_model *tree, int count, uint32_t value);
 
 /**
- * An integer in CODER_INPUTS contexts, mixed: is it zero, its sign, the place of its highest bit, the bits below.
+ * An integer in CODER_INPUTS contexts, mixed: is it zero, its sign, the place of its highest bit, the bits
+ * below.
  *
  * @param models [in,out] [CODER_INPUTS], none twice
  * @param value  [in] |value| <= CODER_INT_MAX; not used when reading
  */
-int32_t coder_int(range_coder *c, coder_int_model *const models[CODER_INPUTS], coder_int_mixer *mixer, int32_t value);
+int32_t coder_int(range_coder *c, coder_int_model *const models[CODER_INPUTS], coder_int_mixer *mixer,
+                  int32_t value);
 
 /** An integer in one context. */
 int32_t coder_int_alone(range_coder *c, coder_int_model *model, int32_t value);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/safetensors.c -- the header of a .safetensors file, and the array it points to. */
 #include "io/safetensors.h"
 
@@ -12,10 +13,12 @@ static gbt_status read_header(const source_file *file, json_t **root, size_t *da
     GBT_TRY(cursor_need(&c, LENGTH_BYTES, "the header's length", err));
     const uint64_t length = cursor_u64(&c);
     if (length > HEADER_LIMIT || length > cursor_left(&c))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no .safetensors file (its header would have %llu bytes, %zu follow)", file->name,
-                         (unsigned long long)length, cursor_left(&c));
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: no .safetensors file (its header would have %llu bytes, %zu follow)",
+                         file->name, (unsigned long long)length, cursor_left(&c));
     json_error_t fault;
-    *root = json_loadb((const char *)file->bytes + LENGTH_BYTES, (size_t)length, JSON_REJECT_DUPLICATES, &fault);
+    *root =
+        json_loadb((const char *)file->bytes + LENGTH_BYTES, (size_t)length, JSON_REJECT_DUPLICATES, &fault);
     if (*root == NULL)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no .safetensors file: header: %s", file->name, fault.text);
     *data_at = LENGTH_BYTES + (size_t)length;
@@ -46,8 +49,8 @@ static bool read_shape(const json_t *shape, size_t room, tensor *out)
 }
 
 /* Shape and place of an array; GBT_ERR_FORMAT unless both are right. */
-static gbt_status read_entry(const source_file *file, const json_t *entry, const char *name, size_t data_at, tensor *out, size_t *at,
-                             gbt_error *err)
+static gbt_status read_entry(const source_file *file, const json_t *entry, const char *name, size_t data_at,
+                             tensor *out, size_t *at, gbt_error *err)
 {
     const json_t *shape = json_object_get(entry, "shape"), *offsets = json_object_get(entry, "data_offsets");
     const char *type = json_string_value(json_object_get(entry, "dtype"));
@@ -55,20 +58,24 @@ static gbt_status read_entry(const source_file *file, const json_t *entry, const
     if (!json_is_object(entry))
         return base_fail(err, GBT_ERR_FORMAT, "%s: no array %s", file->name, name);
     if (type == NULL || strcmp(type, "F32") != 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: array %s has the type %.20s (wanted F32)", file->name, name,
-                         type != NULL ? type : "of no name");
+        return base_fail(err, GBT_ERR_FORMAT, "%s: array %s has the type %.20s (wanted F32)", file->name,
+                         name, type != NULL ? type : "of no name");
     size_t end = 0;
     if (!read_shape(shape, room, out))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: array %s has no usable shape (wanted one to four sizes)", file->name, name);
-    if (!get_size(offsets, 0, at) || !get_size(offsets, 1, &end) || *at > end || end > room || (end - *at) % sizeof(float) != 0 ||
+        return base_fail(err, GBT_ERR_FORMAT, "%s: array %s has no usable shape (wanted one to four sizes)",
+                         file->name, name);
+    if (!get_size(offsets, 0, at) || !get_size(offsets, 1, &end) || *at > end || end > room ||
+        (end - *at) % sizeof(float) != 0 ||
         (double)out->rows * (double)out->columns != (double)((end - *at) / sizeof(float)))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: array %s of %zu x %zu does not fit its data_offsets or the file", file->name, name,
-                         out->rows, out->columns);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: array %s of %zu x %zu does not fit its data_offsets or the file", file->name,
+                         name, out->rows, out->columns);
     *at += data_at;
     return GBT_OK;
 }
 
-static gbt_status read_values(const source_file *file, const char *name, size_t at, tensor *out, gbt_error *err)
+static gbt_status read_values(const source_file *file, const char *name, size_t at, tensor *out,
+                              gbt_error *err)
 {
     const size_t count = out->rows * out->columns;
     out->values = mem_alloc(count, sizeof *out->values, "tensor", err);
@@ -78,7 +85,8 @@ static gbt_status read_values(const source_file *file, const char *name, size_t 
     for (size_t i = 0; i < count; i++) {
         out->values[i] = cursor_f32(&c);
         if (!isfinite(out->values[i]))
-            return base_fail(err, GBT_ERR_FORMAT, "%s: array %s: value %zu is not finite", file->name, name, i);
+            return base_fail(err, GBT_ERR_FORMAT, "%s: array %s: value %zu is not finite", file->name, name,
+                             i);
     }
     return GBT_OK;
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* io/scaffold_file.c -- Scaffold-GS's arrays put where ours are. */
 #include "io/scaffold_file.h"
 
@@ -15,10 +16,11 @@
 
 enum { PATH_SIZE = 4096, DIMENSIONS = 3, SCALES = 6, NETWORKS = 3, VIEW_INPUTS = ANCHOR_FEATURE_DIM + 3 };
 
-static const char *const network_names[NETWORKS] = {"opacity", "cov", "color"}; /* in the order of decoder_parts() */
+static const char *const network_names[NETWORKS] = {"opacity", "cov", "color"}; /* in the order of
+                                                                                   decoder_parts() */
 static const size_t outputs_per_offset[NETWORKS] = {1, 7, 3};
 
-/* ---- anchors ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- anchors ---- */
 
 typedef struct anchor_rows {
     anchors *out;
@@ -48,8 +50,8 @@ static void add_row(void *context, const double *values)
 }
 
 /* Adds the columns STEM0, STEM1, ... up to `count`, or as many as there are when `count` is 0. */
-static gbt_status find_columns(const source_file *file, const ply_header *header, int vertex, const char *stem, size_t count, int *columns,
-                               size_t *used, gbt_error *err)
+static gbt_status find_columns(const source_file *file, const ply_header *header, int vertex,
+                               const char *stem, size_t count, int *columns, size_t *used, gbt_error *err)
 {
     for (size_t i = 0; (count == 0 || i < count) && *used < PLY_MAX_COLUMNS; i++) {
         char name[32];
@@ -57,8 +59,11 @@ static gbt_status find_columns(const source_file *file, const ply_header *header
         const int column = ply_find_property(header, vertex, name);
         if (column < 0 && count == 0)
             break;
-        if (column < 0 || header->properties[header->elements[vertex].first_property + (size_t)column].is_list)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: element vertex has no number %s (wanted anchors of Scaffold-GS)", file->name, name);
+        if (column < 0 ||
+            header->properties[header->elements[vertex].first_property + (size_t)column].is_list)
+            return base_fail(err, GBT_ERR_FORMAT,
+                             "%s: element vertex has no number %s (wanted anchors of Scaffold-GS)",
+                             file->name, name);
         columns[(*used)++] = column;
     }
     return GBT_OK;
@@ -76,27 +81,30 @@ static gbt_status read_anchors(const source_file *file, anchors *out, size_t *dr
     static const char *const axes[] = {"x", "y", "z"};
     for (int i = 0; i < DIMENSIONS; i++)
         if ((columns[used++] = ply_find_property(&header, vertex, axes[i])) < 0)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: element vertex has no property %s", file->name, axes[i]);
+            return base_fail(err, GBT_ERR_FORMAT, "%s: element vertex has no property %s", file->name,
+                             axes[i]);
     GBT_TRY(find_columns(file, &header, vertex, "f_anchor_feat_", ANCHOR_FEATURE_DIM, columns, &used, err));
     GBT_TRY(find_columns(file, &header, vertex, "scale_", SCALES, columns, &used, err));
     const size_t fixed = used;
     GBT_TRY(find_columns(file, &header, vertex, "f_offset_", 0, columns, &used, err));
     const size_t offsets = used - fixed;
     if (offsets == 0 || offsets % DIMENSIONS != 0 || offsets / DIMENSIONS > ANCHOR_MAX_OFFSETS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: %zu properties f_offset_ (wanted 3 for each of 1 to %d offsets)", file->name, offsets,
-                         (int)ANCHOR_MAX_OFFSETS);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: %zu properties f_offset_ (wanted 3 for each of 1 to %d offsets)", file->name,
+                         offsets, (int)ANCHOR_MAX_OFFSETS);
     out->offset_count = (int)(offsets / DIMENSIONS);
     const uint64_t count = header.elements[vertex].count;
     if (count > (file->size - header.data_at) / used) /* a column takes at least a byte */
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu anchors cannot be in the %zu bytes that follow", file->name, header.data_at,
-                         (unsigned long long)count, file->size - header.data_at);
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu anchors cannot be in the %zu bytes that follow",
+                         file->name, header.data_at, (unsigned long long)count, file->size - header.data_at);
     GBT_TRY(anchors_resize(out, (size_t)count, err));
     anchor_rows rows = {.out = out, .column_count = used};
     out->count = 0; /* of rows that are usable */
     GBT_TRY(ply_read_rows(file, &header, vertex, columns, used, add_row, &rows, err));
     *dropped = rows.dropped;
-    return out->count > 0 ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable anchor (%zu rows dropped)", file->name,
-                                               rows.dropped);
+    return out->count > 0 ? GBT_OK
+                          : base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable anchor (%zu rows dropped)",
+                                      file->name, rows.dropped);
 }
 
 /* Positions relative to their median, so that floats keep what they have. */
@@ -117,7 +125,7 @@ static gbt_status recentre(anchors *a, double origin[DIMENSIONS], gbt_error *err
     return GBT_OK;
 }
 
-/* ---- networks ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- networks ---- */
 
 /* Two layers, as the file has them. */
 typedef struct network {
@@ -131,23 +139,28 @@ static void network_free(network *n)
         mem_free(all[i]->values);
 }
 
-static gbt_status check_shape(const char *path, const char *name, const tensor *t, size_t rows, size_t columns, gbt_error *err)
+static gbt_status check_shape(const char *path, const char *name, const tensor *t, size_t rows,
+                              size_t columns, gbt_error *err)
 {
     return t->rows == rows && t->columns == columns
                ? GBT_OK
-               : base_fail(err, GBT_ERR_FORMAT, "%s: array %s is %zu x %zu (wanted %zu x %zu)", path, name, t->rows, t->columns, rows,
-                           columns);
+               : base_fail(err, GBT_ERR_FORMAT, "%s: array %s is %zu x %zu (wanted %zu x %zu)", path, name,
+                           t->rows, t->columns, rows, columns);
 }
 
 static gbt_status parse_network(const source_file *file, size_t outputs, network *out, gbt_error *err)
 {
-    const struct { const char *name; tensor *place; } parts[] = {{"0.weight", &out->w1}, {"0.bias", &out->b1}, {"2.weight", &out->w2},
-                                                                 {"2.bias", &out->b2}};
+    const struct {
+        const char *name;
+        tensor *place;
+    } parts[] = {{"0.weight", &out->w1}, {"0.bias", &out->b1}, {"2.weight", &out->w2}, {"2.bias", &out->b2}};
     for (int i = 0; i < 4; i++)
         GBT_TRY(safetensors_read(file, parts[i].name, parts[i].place, err));
     if (out->w1.columns > VIEW_INPUTS + 1)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: 0.weight takes %zu inputs (wanted %d or %d: an appearance embedding is not supported)",
-                         file->name, out->w1.columns, (int)VIEW_INPUTS, VIEW_INPUTS + 1);
+        return base_fail(
+            err, GBT_ERR_FORMAT,
+            "%s: 0.weight takes %zu inputs (wanted %d or %d: an appearance embedding is not supported)",
+            file->name, out->w1.columns, (int)VIEW_INPUTS, VIEW_INPUTS + 1);
     const size_t in = out->w1.columns == VIEW_INPUTS + 1 ? VIEW_INPUTS + 1 : VIEW_INPUTS;
     GBT_TRY(check_shape(file->name, "0.weight", &out->w1, ANCHOR_HIDDEN_DIM, in, err));
     GBT_TRY(check_shape(file->name, "0.bias", &out->b1, 1, ANCHOR_HIDDEN_DIM, err));
@@ -157,30 +170,39 @@ static gbt_status parse_network(const source_file *file, size_t outputs, network
 
 #define BY_PYTHON "python3 -c \"import torch; from safetensors.torch import save_file; "
 
-/* For the shell, in the folder of the files. `checkpoint`: a file of all networks; NULL: each is in a file of its own. */
+/* For the shell, in the folder of the files. `checkpoint`: a file of all networks; NULL: each is in a file of
+   its own. */
 static void conversion(const char *checkpoint, char *out, size_t size)
 {
     if (checkpoint == NULL)
-        snprintf(out, size, BY_PYTHON "[save_file(torch.jit.load(n + '_mlp.pt', 'cpu').state_dict(), n + '_mlp.safetensors') for n in "
-                                      "('opacity', 'cov', 'color')]\"");
+        snprintf(out, size,
+                 BY_PYTHON "[save_file(torch.jit.load(n + '_mlp.pt', 'cpu').state_dict(), n + "
+                           "'_mlp.safetensors') for n in ('opacity', 'cov', 'color')]\"");
     else
-        snprintf(out, size, BY_PYTHON "[save_file(v, k + '.safetensors') for k, v in torch.load('%.60s', 'cpu').items()]\"", checkpoint);
+        snprintf(out, size,
+                 BY_PYTHON
+                 "[save_file(v, k + '.safetensors') for k, v in torch.load('%.60s', 'cpu').items()]\"",
+                 checkpoint);
 }
 
 gbt_status scaffold_file_check_name(const char *path, gbt_error *err)
 {
     const size_t length = strlen(path);
     const bool one = length > 7 && strcmp(path + length - 7, "_mlp.pt") == 0;
-    if (!one && !(length > 3 && strcmp(path + length - 3, ".pt") == 0) && !(length > 4 && strcmp(path + length - 4, ".pth") == 0))
+    if (!one && !(length > 3 && strcmp(path + length - 3, ".pt") == 0) &&
+        !(length > 4 && strcmp(path + length - 4, ".pth") == 0))
         return GBT_OK;
     const char *slash = strrchr(path, '/');
     char command[320];
     conversion(one ? NULL : slash != NULL ? slash + 1 : path, command, sizeof command);
-    return base_fail(err, GBT_ERR_FORMAT, "%.120s: files of PyTorch are not read; run this in its folder, then import the folder: %s", path,
-                     command);
+    return base_fail(
+        err, GBT_ERR_FORMAT,
+        "%.120s: files of PyTorch are not read; run this in its folder, then import the folder: %s", path,
+        command);
 }
 
-static gbt_status load_network(const char *folder, const char *name, size_t outputs, network *out, gbt_error *err)
+static gbt_status load_network(const char *folder, const char *name, size_t outputs, network *out,
+                               gbt_error *err)
 {
     char file_name[64], path[PATH_SIZE], pickle[PATH_SIZE], checkpoint[PATH_SIZE], command[320];
     snprintf(file_name, sizeof file_name, "%s_mlp.safetensors", name);
@@ -217,7 +239,8 @@ static void copy_network(const network *from, size_t in, float *to)
 
 static gbt_status read_decoder(const char *folder, int offset_count, decoder *out, gbt_error *err)
 {
-    static const char *const banks[] = {"feature_bank_mlp.pt", "feature_bank_mlp.safetensors", "mlp_feature_bank.safetensors"};
+    static const char *const banks[] = {"feature_bank_mlp.pt", "feature_bank_mlp.safetensors",
+                                        "mlp_feature_bank.safetensors"};
     for (size_t i = 0; i < sizeof banks / sizeof *banks; i++) {
         char bank[PATH_SIZE];
         GBT_TRY(file_join(bank, sizeof bank, folder, banks[i], err));
@@ -228,7 +251,8 @@ static gbt_status read_decoder(const char *folder, int offset_count, decoder *ou
     bool has_distance = false;
     gbt_status status = GBT_OK;
     for (int i = 0; i < NETWORKS && status == GBT_OK; i++) {
-        status = load_network(folder, network_names[i], outputs_per_offset[i] * (size_t)offset_count, &networks[i], err);
+        status = load_network(folder, network_names[i], outputs_per_offset[i] * (size_t)offset_count,
+                              &networks[i], err);
         has_distance = has_distance || networks[i].w1.columns == VIEW_INPUTS + 1;
     }
     if (status == GBT_OK)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* library/handle.h -- what is behind a gbt_model. */
 #ifndef GBT_LIBRARY_HANDLE_H
 #define GBT_LIBRARY_HANDLE_H
@@ -8,8 +9,8 @@
 struct gbt_model {
     loaded_run run;
     bool views_open;
-    float *quat_length; /* [run.cloud.count] of the quaternions that the caller gave; NULL: all 1 */
-    bool kept;          /* the last render can be differentiated */
+    float *quat_length;      /* [run.cloud.count] of the quaternions that the caller gave; NULL: all 1 */
+    bool kept;               /* the last render can be differentiated */
     gaussian_cloud gradient; /* room for that of run.cloud; its mean is not used */
     float *d_mean;           /* [run.cloud.count][3] */
 };

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* library/open.c -- models from files and arrays, and what can be asked of them. */
 #include <float.h>
 #include <math.h>
@@ -42,7 +43,7 @@ void gbt_model_close(gbt_model *m)
     mem_free(m);
 }
 
-/* ---- Gaussians of the caller ------------------------------------------------------------------------------------------------- */
+/* ---- Gaussians of the caller ---- */
 
 static const float below_one = 1 - FLT_EPSILON;
 
@@ -61,8 +62,10 @@ static gbt_status check(const gbt_gaussians *g, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: sh_degree %d (wanted 0 to 3)", g->sh_degree);
     const size_t functions = (size_t)((g->sh_degree + 1) * (g->sh_degree + 1));
     const float far = 1e17f, large = 1e18f, log_limit = GAUSSIAN_SCALE_LOG_LIMIT;
-    const value_range ranges[] = {{"mean", g->mean, 3, -far, far}, {"scale_log", g->scale_log, 3, -log_limit, log_limit},
-                                  {"quat", g->quat, 4, -large, large}, {"opacity", g->opacity, 1, 0, 1},
+    const value_range ranges[] = {{"mean", g->mean, 3, -far, far},
+                                  {"scale_log", g->scale_log, 3, -log_limit, log_limit},
+                                  {"quat", g->quat, 4, -large, large},
+                                  {"opacity", g->opacity, 1, 0, 1},
                                   {"sh", g->sh, 3 * functions, -large, large}};
     for (size_t k = 0; k < sizeof ranges / sizeof *ranges; k++) {
         const value_range *r = &ranges[k];
@@ -70,8 +73,9 @@ static gbt_status check(const gbt_gaussians *g, gbt_error *err)
             return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: %s is NULL", r->name);
         for (size_t i = 0; i < g->count * r->width; i++)
             if (!(r->values[i] >= r->low && r->values[i] <= r->high))
-                return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: %s of Gaussian %zu is %g (wanted %g to %g)", r->name, i / r->width,
-                                 (double)r->values[i], (double)r->low, (double)r->high);
+                return base_fail(err, GBT_ERR_ARGUMENT,
+                                 "gaussians: %s of Gaussian %zu is %g (wanted %g to %g)", r->name,
+                                 i / r->width, (double)r->values[i], (double)r->low, (double)r->high);
     }
     return GBT_OK;
 }
@@ -92,7 +96,8 @@ static gbt_status copy(const gbt_gaussians *g, gaussian_cloud *cloud, float *qua
             square += (double)q[k] * (double)q[k];
         const double length = sqrt(square);
         if (!(length >= 1e-18))
-            return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: quat of Gaussian %zu has length %g (wanted > 0)", i, length);
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "gaussians: quat of Gaussian %zu has length %g (wanted > 0)", i, length);
         quat_length[i] = (float)length;
         for (size_t k = 0; k < 4; k++)
             cloud->quat[4 * i + k] = (float)((double)q[k] / length);
@@ -105,7 +110,8 @@ static gbt_status copy(const gbt_gaussians *g, gaussian_cloud *cloud, float *qua
 gbt_status gbt_model_set_gaussians(gbt_model *m, const gbt_gaussians *g, gbt_error *err)
 {
     if (m->run.cloud.count == 0 && m->run.model.anchors.count > 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "model: networks make its Gaussians (wanted a model of plain ones)");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "model: networks make its Gaussians (wanted a model of plain ones)");
     GBT_TRY(check(g, err));
     gaussian_cloud cloud = {0};
     GBT_TRY(gaussian_cloud_alloc(&cloud, g->count, err));
@@ -132,7 +138,7 @@ gbt_status gbt_model_from_gaussians(const gbt_gaussians *g, gbt_model **out, gbt
     return opened(m, gbt_model_set_gaussians(m, g, err), out);
 }
 
-/* ---- questions --------------------------------------------------------------------------------------------------------------- */
+/* ---- questions ---- */
 
 gbt_model_info gbt_model_get_info(const gbt_model *m)
 {
@@ -141,13 +147,18 @@ gbt_model_info gbt_model_get_info(const gbt_model *m)
     const bool plain = r->cloud.count > 0;
     const size_t count = plain ? r->cloud.count : a->count;
     const float *position = plain ? r->cloud.mean : a->position;
-    gbt_model_info info = {.gaussians = plain ? count : count * (size_t)a->offset_count, .anchors = plain ? 0 : count,
-                           .sh_degree = plain ? r->cloud.sh_degree : -1, .iterations = r->model.iterations};
-    for (int k = 0; k < 3 && count > 0; k++)
-        info.low[k] = HUGE_VAL, info.high[k] = -HUGE_VAL;
+    gbt_model_info info = {.gaussians = plain ? count : count * (size_t)a->offset_count,
+                           .anchors = plain ? 0 : count,
+                           .sh_degree = plain ? r->cloud.sh_degree : -1,
+                           .iterations = r->model.iterations};
+    for (int k = 0; k < 3 && count > 0; k++) {
+        info.low[k] = HUGE_VAL;
+        info.high[k] = -HUGE_VAL;
+    }
     for (size_t i = 0; i < 3 * count; i++) {
         const double world = (double)position[i] + r->model.origin[i % 3];
-        info.low[i % 3] = fmin(info.low[i % 3], world), info.high[i % 3] = fmax(info.high[i % 3], world);
+        info.low[i % 3] = fmin(info.low[i % 3], world);
+        info.high[i % 3] = fmax(info.high[i % 3], world);
     }
     return info;
 }
@@ -168,17 +179,23 @@ gbt_status gbt_model_set_settings(gbt_model *m, const gbt_model_settings *settin
     const gbt_model_settings *g = settings;
     for (int k = 0; k < 3; k++)
         if (!isfinite(g->background[k]))
-            return base_fail(err, GBT_ERR_ARGUMENT, "settings: background %g (wanted finite)", (double)g->background[k]);
-    const value_range ranges[] = {{"footprint", &g->footprint, 1, 0, 4}, {"t_near", &g->t_near, 1, 0, 1e17f},
-                                  {"alpha_min", &g->alpha_min, 1, FLT_MIN, below_one}, {"alpha_max", &g->alpha_max, 1, FLT_MIN, below_one},
+            return base_fail(err, GBT_ERR_ARGUMENT, "settings: background %g (wanted finite)",
+                             (double)g->background[k]);
+    const value_range ranges[] = {{"footprint", &g->footprint, 1, 0, 4},
+                                  {"t_near", &g->t_near, 1, 0, 1e17f},
+                                  {"alpha_min", &g->alpha_min, 1, FLT_MIN, below_one},
+                                  {"alpha_max", &g->alpha_max, 1, FLT_MIN, below_one},
                                   {"transmittance_min", &g->transmittance_min, 1, FLT_MIN, below_one}};
     for (size_t k = 0; k < sizeof ranges / sizeof *ranges; k++)
         if (!(*ranges[k].values >= ranges[k].low && *ranges[k].values <= ranges[k].high))
-            return base_fail(err, GBT_ERR_ARGUMENT, "settings: %s %g (wanted %g to %g)", ranges[k].name, (double)*ranges[k].values,
-                             (double)ranges[k].low, (double)ranges[k].high);
+            return base_fail(err, GBT_ERR_ARGUMENT, "settings: %s %g (wanted %g to %g)", ranges[k].name,
+                             (double)*ranges[k].values, (double)ranges[k].low, (double)ranges[k].high);
     trace_settings *s = &m->run.settings;
     memcpy(s->background, g->background, sizeof s->background);
-    s->t_near = g->t_near, s->alpha_min = g->alpha_min, s->alpha_max = g->alpha_max, s->transmittance_min = g->transmittance_min;
+    s->t_near = g->t_near;
+    s->alpha_min = g->alpha_min;
+    s->alpha_max = g->alpha_max;
+    s->transmittance_min = g->transmittance_min;
     m->run.frame.draw.footprint = g->footprint;
     m->kept = false;
     return GBT_OK;
@@ -197,9 +214,11 @@ gbt_status gbt_model_get_view(const gbt_model *m, size_t index, gbt_model_view *
 {
     const loaded_run *r = &m->run;
     if (r->photos.source == NULL || index >= r->scene.view_count)
-        return base_fail(err, GBT_ERR_ARGUMENT, "view %zu: there are %zu open", index, r->photos.source == NULL ? 0 : r->scene.view_count);
+        return base_fail(err, GBT_ERR_ARGUMENT, "view %zu: there are %zu open", index,
+                         r->photos.source == NULL ? 0 : r->scene.view_count);
     const scene_view *view = &r->scene.views[index];
-    *out = (gbt_model_view){.name = view->name, .held_out = view->is_test, .camera = photos_camera(&r->photos, index, 0)};
+    *out = (gbt_model_view){
+        .name = view->name, .held_out = view->is_test, .camera = photos_camera(&r->photos, index, 0)};
     for (int k = 0; k < 3; k++)
         out->camera.center[k] += r->model.origin[k];
     return GBT_OK;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* library/render.c -- pictures into the caller's arrays, and gradients out of them. */
 #include <math.h>
 #include <string.h>
@@ -9,7 +10,8 @@
 #include "library/handle.h"
 #include "trace/pose_gradient.h"
 
-gbt_status gbt_model_render(gbt_model *m, const gbt_camera *camera, int keep, const gbt_picture *out, gbt_error *err)
+gbt_status gbt_model_render(gbt_model *m, const gbt_camera *camera, int keep, const gbt_picture *out,
+                            gbt_error *err)
 {
     loaded_run *r = &m->run;
     frame *f = &r->frame;
@@ -56,7 +58,8 @@ static gbt_status plain_gradient(gbt_model *m, const gbt_gaussians_gradient *out
     GBT_TRY(reserve_gradient(m, err));
     double d_eye[3];
     plain_backward(cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, g);
-    GBT_TRY(plain_backward_view(cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, m->d_mean, d_eye, err));
+    GBT_TRY(plain_backward_view(cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians,
+                                m->d_mean, d_eye, err));
     for (size_t i = 0; i < n && m->quat_length != NULL; i++)
         for (size_t k = 0; k < 4; k++)
             g->quat[4 * i + k] /= m->quat_length[i];
@@ -75,26 +78,34 @@ static gbt_status camera_gradient(gbt_model *m, double d_pose[6], gbt_error *err
     frame *f = &r->frame;
     double d_eye[3];
     if (r->cloud.count > 0)
-        GBT_TRY(plain_backward_view(&r->cloud, f->eye, f->visible, f->visible_count, &f->gaussians, &f->d_gaussians, NULL, d_eye, err));
+        GBT_TRY(plain_backward_view(&r->cloud, f->eye, f->visible, f->visible_count, &f->gaussians,
+                                    &f->d_gaussians, NULL, d_eye, err));
     else
-        GBT_TRY(decode_backward_camera(&r->model.anchors, &r->model.decoder, f->eye, &f->tape, &f->d_gaussians, d_eye, err));
+        GBT_TRY(decode_backward_camera(&r->model.anchors, &r->model.decoder, f->eye, &f->tape,
+                                       &f->d_gaussians, d_eye, err));
     const double eye[3] = {(double)f->eye[0], (double)f->eye[1], (double)f->eye[2]};
     return pose_gradient(&f->gaussians, &f->d_gaussians, &f->camera, eye, d_eye, d_pose, err);
 }
 
-gbt_status gbt_model_gradient(gbt_model *m, const float *d_rgb, double d_pose[6], const gbt_gaussians_gradient *d_gaussians, gbt_error *err)
+gbt_status gbt_model_gradient(gbt_model *m, const float *d_rgb, double d_pose[6],
+                              const gbt_gaussians_gradient *d_gaussians, gbt_error *err)
 {
     frame *f = &m->run.frame;
     if (!m->kept)
-        return base_fail(err, GBT_ERR_ARGUMENT, "gradient: no render is kept (wanted gbt_model_render() with keep before each)");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "gradient: no render is kept (wanted gbt_model_render() with keep before each)");
     if (d_gaussians != NULL && m->run.cloud.count == 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "gradient: networks make this model's Gaussians (wanted a model of plain ones)");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "gradient: networks make this model's Gaussians (wanted a model of plain ones)");
     const size_t values = 3 * ray_image_count(&f->rays);
     for (size_t i = 0; i < values; i++)
         if (!isfinite(d_rgb[i]))
-            return base_fail(err, GBT_ERR_ARGUMENT, "gradient: value %zu of d_rgb is %g (wanted finite)", i, (double)d_rgb[i]);
+            return base_fail(err, GBT_ERR_ARGUMENT, "gradient: value %zu of d_rgb is %g (wanted finite)", i,
+                             (double)d_rgb[i]);
     m->kept = false;
-    const image d_image = {.width = f->rays.width, .height = f->rays.height, .channels = 3, .pixels = (float *)d_rgb}; /* only read */
+    const image d_image = {
+        .width = f->rays.width, .height = f->rays.height, .channels = 3, .pixels = (float *)d_rgb}; /* only
+                                                                                                       read */
     GBT_TRY(frame_backward_gaussians(f, &d_image, err));
     if (d_pose != NULL)
         GBT_TRY(camera_gradient(m, d_pose, err));

@@ -1,8 +1,10 @@
-/* raster/ewa16.h -- the EWA form: a tile's splats blended in the order of its list, and the adjoint. Included by kernel.inc.h.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* raster/ewa16.h -- the EWA form: a tile's splats blended in the order of its list, and the adjoint. Included
+   by kernel.inc.h.
 
-   Forward takes a chunk of the list at a time: which blocks does each splat reach, then block by block, with the pixels in registers.
-   The adjoint goes back to front, splat by splat, so that the sums of a splat over the tile's blocks stay in registers; T is
-   found again by division from what was left at the end. */
+   Forward takes a chunk of the list at a time: which blocks does each splat reach, then block by block, with
+   the pixels in registers. The adjoint goes back to front, splat by splat, so that the sums of a splat over
+   the tile's blocks stay in registers; T is found again by division from what was left at the end. */
 #ifndef GBT_RASTER_EWA16_H
 #define GBT_RASTER_EWA16_H
 
@@ -12,25 +14,30 @@ enum { CHUNK = 128 };
 
 /* Sixteen pixels of a block and one splat. */
 typedef struct ewa_response {
-    f16 u, v, raw; /* raw: alpha before its cut */
+    vfloat16 u, v, raw; /* raw: alpha before its cut */
 } ewa_response;
 
 static inline ewa_response ewa_respond(const splat *s, float x, float y, int block)
 {
     ewa_response r;
-    const float block_x = x - (float)(block % BLOCKS_ACROSS * BLOCK_PIXELS), block_y = y - (float)(block / BLOCKS_ACROSS * BLOCK_PIXELS);
-    const f16 dx = f16_sub(f16_set1(block_x), f16_load(lane_column)), dy = f16_sub(f16_set1(block_y), f16_load(lane_row));
-    r.u = f16_fma(f16_set1(s->chol[0]), dx, f16_mul(f16_set1(s->chol[1]), dy));
-    r.v = f16_mul(f16_set1(s->chol[2]), dy);
-    const f16 square = f16_fma(r.u, r.u, f16_mul(r.v, r.v));
-    r.raw = f16_mul(f16_set1(s->opacity), f16_exp2(f16_max(f16_sub(f16_set1(0), square), f16_set1(-120.0f))));
+    const float block_x = x - (float)(block % BLOCKS_ACROSS * BLOCK_PIXELS),
+                block_y = y - (float)(block / BLOCKS_ACROSS * BLOCK_PIXELS);
+    const vfloat16 dx = vfloat16_sub(vfloat16_set1(block_x), vfloat16_load(lane_column)),
+                   dy = vfloat16_sub(vfloat16_set1(block_y), vfloat16_load(lane_row));
+    r.u = vfloat16_fma(vfloat16_set1(s->chol[0]), dx, vfloat16_mul(vfloat16_set1(s->chol[1]), dy));
+    r.v = vfloat16_mul(vfloat16_set1(s->chol[2]), dy);
+    const vfloat16 square = vfloat16_fma(r.u, r.u, vfloat16_mul(r.v, r.v));
+    r.raw = vfloat16_mul(
+        vfloat16_set1(s->opacity),
+        vfloat16_exp2(vfloat16_max(vfloat16_sub(vfloat16_set1(0), square), vfloat16_set1(-120.0f))));
     return r;
 }
 
 /* Centre of a splat, from the tile's first pixel. */
 static inline void splat_in_tile(const tile_job *job, const splat *s, float out[2])
 {
-    out[0] = (float)(s->center[0] - job->x0), out[1] = (float)(s->center[1] - job->y0);
+    out[0] = (float)(s->center[0] - job->x0);
+    out[1] = (float)(s->center[1] - job->y0);
 }
 
 /* Bit per pixel of a block that lies in the image. */
@@ -40,12 +47,13 @@ static inline unsigned pixels_inside(const tile_job *job, int block)
     const int rows = job->view->height - job->y0 - block / BLOCKS_ACROSS * BLOCK_PIXELS;
     if (columns <= 0 || rows <= 0)
         return 0;
-    return (0xFu >> (columns < 4 ? 4 - columns : 0)) * 0x1111u & (rows < 4 ? 0xFFFFu >> (16 - 4 * rows) : 0xFFFFu);
+    return (0xFu >> (columns < 4 ? 4 - columns : 0)) * 0x1111u &
+           (rows < 4 ? 0xFFFFu >> (16 - 4 * rows) : 0xFFFFu);
 }
 
 typedef struct ewa_block {
-    f16 rgb[3], transmittance, stop;
-    m16 alive;
+    vfloat16 rgb[3], transmittance, stop;
+    vmask16 alive;
 } ewa_block;
 
 typedef struct ewa_chunk {
@@ -55,54 +63,62 @@ typedef struct ewa_chunk {
     int count[TILE_BLOCKS];
 } ewa_chunk;
 
-static inline void blend_block(tile_job *job, const ewa_chunk *chunk, size_t first, int block, ewa_block *state)
+static inline void blend_block(tile_job *job, const ewa_chunk *chunk, size_t first, int block,
+                               ewa_block *state)
 {
     ewa_block b = *state; /* a copy, which can stay in registers */
     uint16_t *const blocks = job->blocks;
     const raster_settings *settings = &job->view->settings;
-    const f16 alpha_min = f16_set1(settings->alpha_min), alpha_max = f16_set1(settings->alpha_max),
-        stop_at = f16_set1(settings->transmittance_min);
-    const f16 zero = f16_set1(0);
+    const vfloat16 alpha_min = vfloat16_set1(settings->alpha_min),
+                   alpha_max = vfloat16_set1(settings->alpha_max),
+                   stop_at = vfloat16_set1(settings->transmittance_min);
+    const vfloat16 zero = vfloat16_set1(0);
     uint64_t blended = 0;
     int i = 0;
     for (; i < chunk->count[block]; i++) {
         const int e = chunk->list[block][i];
         const splat *s = chunk->splats[e];
         const ewa_response r = ewa_respond(s, chunk->at[e][0], chunk->at[e][1], block);
-        m16 hit = m16_and(f16_le(alpha_min, r.raw), b.alive);
-        if (!m16_any(hit))
+        vmask16 hit = vmask16_and(vfloat16_le(alpha_min, r.raw), b.alive);
+        if (!vmask16_any(hit))
             continue;
-        f16 alpha = f16_select(hit, f16_min(r.raw, alpha_max), zero), next = f16_fnma(b.transmittance, alpha, b.transmittance);
-        const m16 stop = m16_and(f16_lt(next, stop_at), hit);
-        if (m16_any(stop)) {
-            hit = m16_andnot(stop, hit);
-            b.alive = m16_andnot(stop, b.alive);
-            b.stop = f16_select(stop, f16_set1((float)(first + (size_t)e)), b.stop);
-            alpha = f16_select(hit, alpha, zero), next = f16_select(stop, b.transmittance, next);
+        vfloat16 alpha = vfloat16_select(hit, vfloat16_min(r.raw, alpha_max), zero),
+                 next = vfloat16_fnma(b.transmittance, alpha, b.transmittance);
+        const vmask16 stop = vmask16_and(vfloat16_lt(next, stop_at), hit);
+        if (vmask16_any(stop)) {
+            hit = vmask16_andnot(stop, hit);
+            b.alive = vmask16_andnot(stop, b.alive);
+            b.stop = vfloat16_select(stop, vfloat16_set1((float)(first + (size_t)e)), b.stop);
+            alpha = vfloat16_select(hit, alpha, zero);
+            next = vfloat16_select(stop, b.transmittance, next);
         }
-        const f16 weight = f16_mul(b.transmittance, alpha);
+        const vfloat16 weight = vfloat16_mul(b.transmittance, alpha);
         for (int c = 0; c < 3; c++)
-            b.rgb[c] = f16_fma(weight, f16_set1(s->color[c]), b.rgb[c]);
+            b.rgb[c] = vfloat16_fma(weight, vfloat16_set1(s->color[c]), b.rgb[c]);
         b.transmittance = next;
-        blended += (uint64_t)__builtin_popcount(m16_bits(hit));
-        if (blocks != NULL && m16_any(hit))
+        blended += (uint64_t)__builtin_popcount(vmask16_bits(hit));
+        if (blocks != NULL && vmask16_any(hit))
             blocks[first + (size_t)e] |= (uint16_t)(1u << block);
-        if (m16_any(stop) && !m16_any(b.alive))
+        if (vmask16_any(stop) && !vmask16_any(b.alive))
             break;
     }
     *state = b;
-    job->counts.blended += blended, job->counts.tests += (uint64_t)i * PIXEL_LANES;
+    job->counts.blended += blended;
+    job->counts.tests += (uint64_t)i * PIXEL_LANES;
 }
 
 /* Which blocks do the splats of a chunk reach, of those that are not done. */
-static inline void take_chunk(const tile_job *job, size_t first, size_t count, unsigned open, ewa_chunk *chunk)
+static inline void take_chunk(const tile_job *job, size_t first, size_t count, unsigned open,
+                              ewa_chunk *chunk)
 {
     memset(chunk->count, 0, sizeof chunk->count);
     for (size_t e = 0; e < count; e++) {
         const splat *s = chunk->splats[e] = &job->splats[job->entries[first + e].splat];
-        __builtin_prefetch(&job->splats[job->entries[first + e + 8 < job->count ? first + e + 8 : first].splat]);
+        __builtin_prefetch(
+            &job->splats[job->entries[first + e + 8 < job->count ? first + e + 8 : first].splat]);
         splat_in_tile(job, s, chunk->at[e]);
-        for (unsigned bits = reached_squares(s, chunk->at[e][0], chunk->at[e][1], BLOCK_PIXELS) & open; bits != 0; bits &= bits - 1) {
+        for (unsigned bits = reached_squares(s, chunk->at[e][0], chunk->at[e][1], BLOCK_PIXELS) & open;
+             bits != 0; bits &= bits - 1) {
             const int block = __builtin_ctz(bits);
             chunk->list[block][chunk->count[block]++] = (uint8_t)e;
         }
@@ -116,11 +132,12 @@ static bool forward_ewa(tile_job *job, ray_scratch *scratch)
     ewa_chunk chunk;
     unsigned open = 0;
     for (int block = 0; block < TILE_BLOCKS; block++) {
-        const f16 zero = f16_set1(0);
+        const vfloat16 zero = vfloat16_set1(0);
         const unsigned inside = pixels_inside(job, block);
         /* Pixels outside the image have stopped before the first entry. */
-        const f16 stop = f16_select(m16_from_bits(inside), f16_set1(INFINITY), f16_set1(-1));
-        state[block] = (ewa_block){{zero, zero, zero}, f16_set1(1), stop, m16_from_bits(inside)};
+        const vfloat16 stop =
+            vfloat16_select(vmask16_from_bits(inside), vfloat16_set1(INFINITY), vfloat16_set1(-1));
+        state[block] = (ewa_block){{zero, zero, zero}, vfloat16_set1(1), stop, vmask16_from_bits(inside)};
         open |= (unsigned)(inside != 0) << block;
     }
     size_t first = 0;
@@ -132,16 +149,19 @@ static bool forward_ewa(tile_job *job, ray_scratch *scratch)
         for (unsigned bits = open; bits != 0; bits &= bits - 1) {
             const int block = __builtin_ctz(bits);
             blend_block(job, &chunk, first, block, &state[block]);
-            open &= ~((unsigned)!m16_any(state[block].alive) << block);
+            open &= ~((unsigned)!vmask16_any(state[block].alive) << block);
         }
     }
     for (int block = 0; block < TILE_BLOCKS; block++) {
         const ewa_block *b = &state[block];
         for (int c = 0; c < 3; c++)
-            f16_store(job->pixels->rgb[block][c], f16_fma(b->transmittance, f16_set1(job->view->settings.background[c]), b->rgb[c]));
-        f16_store(job->pixels->transmittance[block], b->transmittance);
+            vfloat16_store(
+                job->pixels->rgb[block][c],
+                vfloat16_fma(b->transmittance, vfloat16_set1(job->view->settings.background[c]), b->rgb[c]));
+        vfloat16_store(job->pixels->transmittance[block], b->transmittance);
         if (job->tape != NULL)
-            f16_store(job->tape->transmittance[block], b->transmittance), f16_store(job->tape->stop[block], b->stop);
+            vfloat16_store(job->tape->transmittance[block], b->transmittance),
+                vfloat16_store(job->tape->stop[block], b->stop);
     }
     if (job->tape != NULL)
         job->tape->used = first < job->count ? first : job->count;
@@ -150,42 +170,48 @@ static bool forward_ewa(tile_job *job, ray_scratch *scratch)
 
 /* Pixels of a block on the way back. */
 typedef struct ewa_return {
-    f16 transmittance; /* behind the present splat */
-    f16 behind;        /* what stands behind it, over that, times dL/d(rgb) */
-    f16 d_rgb[3], stop;
+    vfloat16 transmittance; /* behind the present splat */
+    vfloat16 behind;        /* what stands behind it, over that, times dL/d(rgb) */
+    vfloat16 d_rgb[3], stop;
 } ewa_return;
 
-static inline void return_through(const tile_job *job, const splat *s, const float at[2], int block, f16 number, ewa_return *b,
-                                  f16 sum[EWA_SUMS])
+static inline void return_through(const tile_job *job, const splat *s, const float at[2], int block,
+                                  vfloat16 number, ewa_return *b, vfloat16 sum[EWA_SUMS])
 {
     const raster_settings *settings = &job->view->settings;
-    const f16 alpha_max = f16_set1(settings->alpha_max), zero = f16_set1(0);
+    const vfloat16 alpha_max = vfloat16_set1(settings->alpha_max), zero = vfloat16_set1(0);
     const ewa_response r = ewa_respond(s, at[0], at[1], block);
-    const m16 hit = m16_and(f16_le(f16_set1(settings->alpha_min), r.raw), f16_lt(number, b->stop));
-    const f16 alpha = f16_select(hit, f16_min(r.raw, alpha_max), zero);
-    f16 color = f16_mul(f16_set1(s->color[0]), b->d_rgb[0]);
+    const vmask16 hit =
+        vmask16_and(vfloat16_le(vfloat16_set1(settings->alpha_min), r.raw), vfloat16_lt(number, b->stop));
+    const vfloat16 alpha = vfloat16_select(hit, vfloat16_min(r.raw, alpha_max), zero);
+    vfloat16 color = vfloat16_mul(vfloat16_set1(s->color[0]), b->d_rgb[0]);
     for (int c = 1; c < 3; c++)
-        color = f16_fma(f16_set1(s->color[c]), b->d_rgb[c], color);
-    const f16 difference = f16_sub(color, b->behind);
-    b->transmittance = f16_div(b->transmittance, f16_sub(f16_set1(1), alpha));
-    b->behind = f16_fma(alpha, difference, b->behind);
-    const f16 weight = f16_mul(b->transmittance, alpha);
-    const f16 q = f16_select(f16_lt(r.raw, alpha_max), f16_mul(weight, difference), zero), qu = f16_mul(q, r.u), qv = f16_mul(q, r.v);
-    sum[0] = f16_add(sum[0], q), sum[1] = f16_add(sum[1], qu), sum[2] = f16_add(sum[2], qv);
-    sum[3] = f16_fma(qu, r.u, sum[3]), sum[4] = f16_fma(qu, r.v, sum[4]), sum[5] = f16_fma(qv, r.v, sum[5]);
+        color = vfloat16_fma(vfloat16_set1(s->color[c]), b->d_rgb[c], color);
+    const vfloat16 difference = vfloat16_sub(color, b->behind);
+    b->transmittance = vfloat16_div(b->transmittance, vfloat16_sub(vfloat16_set1(1), alpha));
+    b->behind = vfloat16_fma(alpha, difference, b->behind);
+    const vfloat16 weight = vfloat16_mul(b->transmittance, alpha);
+    const vfloat16 q = vfloat16_select(vfloat16_lt(r.raw, alpha_max), vfloat16_mul(weight, difference), zero),
+                   qu = vfloat16_mul(q, r.u), qv = vfloat16_mul(q, r.v);
+    sum[0] = vfloat16_add(sum[0], q);
+    sum[1] = vfloat16_add(sum[1], qu);
+    sum[2] = vfloat16_add(sum[2], qv);
+    sum[3] = vfloat16_fma(qu, r.u, sum[3]);
+    sum[4] = vfloat16_fma(qu, r.v, sum[4]);
+    sum[5] = vfloat16_fma(qv, r.v, sum[5]);
     for (int c = 0; c < 3; c++)
-        sum[EWA_COLOR + c] = f16_fma(weight, b->d_rgb[c], sum[EWA_COLOR + c]);
-    sum[EWA_WEIGHT] = f16_add(sum[EWA_WEIGHT], weight);
+        sum[EWA_COLOR + c] = vfloat16_fma(weight, b->d_rgb[c], sum[EWA_COLOR + c]);
+    sum[EWA_WEIGHT] = vfloat16_add(sum[EWA_WEIGHT], weight);
 }
 
 /* Each of `count` rows, summed over its lanes. */
-static inline void store_sums(const f16 *sum, int count, float *out)
+static inline void store_sums(const vfloat16 *sum, int count, float *out)
 {
     _Alignas(64) float total[16];
-    f16 rows[16];
+    vfloat16 rows[16];
     for (int k = 0; k < 16; k++)
-        rows[k] = k < count ? sum[k] : f16_set1(0);
-    f16_store(total, f16_sum_rows(rows));
+        rows[k] = k < count ? sum[k] : vfloat16_set1(0);
+    vfloat16_store(total, vfloat16_sum_rows(rows));
     memcpy(out, total, (size_t)count * sizeof *out);
 }
 
@@ -193,15 +219,18 @@ static bool backward_ewa(tile_job *job, ray_scratch *scratch)
 {
     (void)scratch;
     ewa_return state[TILE_BLOCKS];
-    f16 background[3] = {f16_set1(0), f16_set1(0), f16_set1(0)};
+    vfloat16 background[3] = {vfloat16_set1(0), vfloat16_set1(0), vfloat16_set1(0)};
     float sums[3];
     for (int block = 0; block < TILE_BLOCKS; block++) {
         ewa_return *b = &state[block];
-        b->transmittance = f16_load(job->tape->transmittance[block]), b->stop = f16_load(job->tape->stop[block]), b->behind = f16_set1(0);
+        b->transmittance = vfloat16_load(job->tape->transmittance[block]);
+        b->stop = vfloat16_load(job->tape->stop[block]);
+        b->behind = vfloat16_set1(0);
         for (int c = 0; c < 3; c++) {
-            b->d_rgb[c] = f16_load(job->pixels->rgb[block][c]);
-            b->behind = f16_fma(b->d_rgb[c], f16_set1(job->view->settings.background[c]), b->behind);
-            background[c] = f16_fma(b->transmittance, b->d_rgb[c], background[c]);
+            b->d_rgb[c] = vfloat16_load(job->pixels->rgb[block][c]);
+            b->behind =
+                vfloat16_fma(b->d_rgb[c], vfloat16_set1(job->view->settings.background[c]), b->behind);
+            background[c] = vfloat16_fma(b->transmittance, b->d_rgb[c], background[c]);
         }
     }
     store_sums(background, 3, sums);
@@ -217,13 +246,13 @@ static bool backward_ewa(tile_job *job, ray_scratch *scratch)
             memset(record, 0, EWA_SUMS * sizeof *record);
             continue;
         }
-        f16 sum[EWA_SUMS];
+        vfloat16 sum[EWA_SUMS];
         for (int k = 0; k < EWA_SUMS; k++)
-            sum[k] = f16_set1(0);
+            sum[k] = vfloat16_set1(0);
         splat_in_tile(job, s, at);
         for (; bits != 0; bits &= bits - 1) {
             const int block = __builtin_ctz(bits);
-            return_through(job, s, at, block, f16_set1((float)e), &state[block], sum);
+            return_through(job, s, at, block, vfloat16_set1((float)e), &state[block], sum);
         }
         store_sums(sum, EWA_SUMS, record);
     }

@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* raster/order.c -- a radix sort by depth, and a counting sort into tiles that keeps its order.
 
-   depths --> radix sort --> blocks of splats: tiles reached, a histogram per block --> place of each block in each tile --> lists */
+   depths --> radix sort --> blocks of splats: tiles reached, a histogram per block
+        --> place of each block in each tile --> lists */
 #include "raster/order.h"
 
 #include <stdatomic.h>
@@ -9,8 +11,15 @@
 #include "base/fail.h"
 #include "base/parallel.h"
 
-enum { RADIX_BITS = 11, RADIX = 1 << RADIX_BITS, RADIX_PASSES = 3, SORT_BLOCKS = 16, PAIR_BLOCKS = 64, BLOCK_LEAST = 2048,
-      TILE_ENTRIES = 1 << 24 };
+enum {
+    RADIX_BITS = 11,
+    RADIX = 1 << RADIX_BITS,
+    RADIX_PASSES = 3,
+    SORT_BLOCKS = 16,
+    PAIR_BLOCKS = 64,
+    BLOCK_LEAST = 2048,
+    TILE_ENTRIES = 1 << 24
+};
 
 /* Elements per block, so that there are no more than `blocks`. */
 static size_t grain_of(size_t count, size_t blocks)
@@ -19,7 +28,7 @@ static size_t grain_of(size_t count, size_t blocks)
     return grain > BLOCK_LEAST ? grain : BLOCK_LEAST;
 }
 
-/* ---- sort ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- sort ---- */
 
 typedef struct radix_job {
     const splat *splats;
@@ -81,8 +90,8 @@ static void counts_to_places(uint32_t (*place)[RADIX], size_t blocks)
 static gbt_status number_splats(tile_lists *lists, const size_t *drawn, size_t count, gbt_error *err)
 {
     const size_t blocks = parallel_block_count(count, SPLAT_GRAIN);
-    GBT_TRY(mem_reserve((void **)&lists->key_first, &lists->key_first_capacity, 0, blocks + 1, sizeof *lists->key_first, "depth order",
-                        err));
+    GBT_TRY(mem_reserve((void **)&lists->key_first, &lists->key_first_capacity, 0, blocks + 1,
+                        sizeof *lists->key_first, "depth order", err));
     lists->splat_count = 0;
     for (size_t i = 0; i < blocks; i++) {
         lists->key_first[i] = lists->splat_count;
@@ -95,14 +104,20 @@ static gbt_status number_splats(tile_lists *lists, const size_t *drawn, size_t c
 static gbt_status sort_by_depth(tile_lists *lists, const splat *splats, size_t gaussian_count, gbt_error *err)
 {
     const size_t count = lists->splat_count, grain = grain_of(count, SORT_BLOCKS);
-    GBT_TRY(mem_reserve((void **)&lists->keys, &lists->key_capacity, 0, count, sizeof *lists->keys, "depth order", err));
-    GBT_TRY(mem_reserve((void **)&lists->spare, &lists->spare_capacity, 0, count, sizeof *lists->spare, "depth order", err));
-    GBT_TRY(mem_reserve((void **)&lists->histogram, &lists->histogram_capacity, 0, (size_t)SORT_BLOCKS * RADIX, sizeof *lists->histogram,
+    GBT_TRY(mem_reserve((void **)&lists->keys, &lists->key_capacity, 0, count, sizeof *lists->keys,
                         "depth order", err));
-    radix_job job = {.splats = splats, .key_first = lists->key_first, .to = lists->keys, .place = (uint32_t (*)[RADIX])lists->histogram};
+    GBT_TRY(mem_reserve((void **)&lists->spare, &lists->spare_capacity, 0, count, sizeof *lists->spare,
+                        "depth order", err));
+    GBT_TRY(mem_reserve((void **)&lists->histogram, &lists->histogram_capacity, 0,
+                        (size_t)SORT_BLOCKS * RADIX, sizeof *lists->histogram, "depth order", err));
+    radix_job job = {.splats = splats,
+                     .key_first = lists->key_first,
+                     .to = lists->keys,
+                     .place = (uint32_t(*)[RADIX])lists->histogram};
     parallel_blocks(gaussian_count, SPLAT_GRAIN, write_keys, &job);
     for (int pass = 0; pass < RADIX_PASSES; pass++) {
-        job.from = pass % 2 == 0 ? lists->keys : lists->spare, job.to = pass % 2 == 0 ? lists->spare : lists->keys;
+        job.from = pass % 2 == 0 ? lists->keys : lists->spare;
+        job.to = pass % 2 == 0 ? lists->spare : lists->keys;
         job.shift = 32 + pass * RADIX_BITS;
         parallel_blocks(count, grain, count_digits, &job);
         counts_to_places(job.place, parallel_block_count(count, grain));
@@ -110,12 +125,14 @@ static gbt_status sort_by_depth(tile_lists *lists, const splat *splats, size_t g
     }
     uint64_t *const sorted = lists->spare; /* an odd number of passes */
     const size_t sorted_capacity = lists->spare_capacity;
-    lists->spare = lists->keys, lists->spare_capacity = lists->key_capacity;
-    lists->keys = sorted, lists->key_capacity = sorted_capacity;
+    lists->spare = lists->keys;
+    lists->spare_capacity = lists->key_capacity;
+    lists->keys = sorted;
+    lists->key_capacity = sorted_capacity;
     return GBT_OK;
 }
 
-/* ---- tiles ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- tiles ---- */
 
 typedef struct pair_job {
     tile_lists *lists;
@@ -143,15 +160,16 @@ static void find_pairs(size_t block, size_t begin, size_t end, void *context)
         if (i + 4 < end)
             __builtin_prefetch(splat_at(job, i + 4));
         const size_t area = (size_t)(s->box[1] - s->box[0]) * (size_t)(s->box[3] - s->box[2]);
-        if (mem_reserve((void **)&out->tiles, &out->capacity, out->count, out->count + area, sizeof *out->tiles, "raster pairs",
-                        NULL) != GBT_OK) {
+        if (mem_reserve((void **)&out->tiles, &out->capacity, out->count, out->count + area,
+                        sizeof *out->tiles, "raster pairs", NULL) != GBT_OK) {
             atomic_store(&job->failed, true);
             return;
         }
         const size_t count = job->kernel->reach(job->view, s, out->tiles + out->count);
         for (size_t k = 0; k < count; k++)
             histogram[out->tiles[out->count + k]]++;
-        job->lists->ranges[s - job->splats] = (pair_range){.place = (uint32_t)out->count, .count = (uint32_t)count};
+        job->lists->ranges[s - job->splats] =
+            (pair_range){.place = (uint32_t)out->count, .count = (uint32_t)count};
         out->count += count;
     }
 }
@@ -183,10 +201,12 @@ static gbt_status place_blocks(const pair_job *job, size_t block_count, gbt_erro
             first[tile + 1] += lists->histogram[block * job->tile_count + tile];
     }
     if (total > UINT32_MAX)
-        return base_fail(err, GBT_ERR_NO_MEMORY, "raster: %llu pairs of Gaussian and tile (limit 2^32)", (unsigned long long)total);
+        return base_fail(err, GBT_ERR_NO_MEMORY, "raster: %llu pairs of Gaussian and tile (limit 2^32)",
+                         (unsigned long long)total);
     for (size_t tile = 0; tile < job->tile_count; tile++) {
         if (first[tile + 1] > TILE_ENTRIES)
-            return base_fail(err, GBT_ERR_NO_MEMORY, "raster: %zu Gaussians in one tile (limit 2^24)", first[tile + 1]);
+            return base_fail(err, GBT_ERR_NO_MEMORY, "raster: %zu Gaussians in one tile (limit 2^24)",
+                             first[tile + 1]);
         first[tile + 1] += first[tile];
     }
     size_t *next = first; /* moved on block by block, and moved back by the total at the end */
@@ -197,7 +217,8 @@ static gbt_status place_blocks(const pair_job *job, size_t block_count, gbt_erro
             *place = (uint32_t)next[tile];
             next[tile] += count;
         }
-    memmove(first + 1, first, job->tile_count * sizeof *first); /* each now stands where the next one begins */
+    memmove(first + 1, first, job->tile_count * sizeof *first); /* each now stands where the next one begins
+                                                                 */
     first[0] = 0;
     lists->pair_count = (size_t)total;
     return GBT_OK;
@@ -220,33 +241,38 @@ static gbt_status reserve_blocks(tile_lists *lists, size_t count, gbt_error *err
     const size_t old = lists->block_capacity;
     if (count <= old)
         return GBT_OK;
-    GBT_TRY(mem_reserve((void **)&lists->blocks, &lists->block_capacity, old, count, sizeof *lists->blocks, "raster blocks", err));
+    GBT_TRY(mem_reserve((void **)&lists->blocks, &lists->block_capacity, old, count, sizeof *lists->blocks,
+                        "raster blocks", err));
     memset(lists->blocks + old, 0, (lists->block_capacity - old) * sizeof *lists->blocks);
     return GBT_OK;
 }
 
-gbt_status tile_lists_make(tile_lists *lists, const raster_kernel *kernel, const raster_view *view, const splat *splats,
-                           const size_t *drawn, size_t count, gbt_error *err)
+gbt_status tile_lists_make(tile_lists *lists, const raster_kernel *kernel, const raster_view *view,
+                           const splat *splats, const size_t *drawn, size_t count, gbt_error *err)
 {
     GBT_TRY(number_splats(lists, drawn, count, err));
     GBT_TRY(sort_by_depth(lists, splats, count, err));
-    const size_t grain = grain_of(lists->splat_count, PAIR_BLOCKS), block_count = parallel_block_count(lists->splat_count, grain);
+    const size_t grain = grain_of(lists->splat_count, PAIR_BLOCKS),
+                 block_count = parallel_block_count(lists->splat_count, grain);
     pair_job job = {.lists = lists, .kernel = kernel, .view = view, .splats = splats};
     job.tile_count = (size_t)view->tiles_across * (size_t)view->tiles_down;
     atomic_init(&job.failed, false);
     GBT_TRY(reserve_blocks(lists, block_count, err));
-    GBT_TRY(mem_reserve((void **)&lists->histogram, &lists->histogram_capacity, 0, block_count * job.tile_count, sizeof *lists->histogram,
-                        "raster tiles", err));
-    GBT_TRY(mem_reserve((void **)&lists->first, &lists->first_capacity, 0, job.tile_count + 1, sizeof *lists->first, "raster tiles", err));
-    GBT_TRY(mem_reserve((void **)&lists->ranges, &lists->range_capacity, 0, count, sizeof *lists->ranges, "raster pairs", err));
+    GBT_TRY(mem_reserve((void **)&lists->histogram, &lists->histogram_capacity, 0,
+                        block_count * job.tile_count, sizeof *lists->histogram, "raster tiles", err));
+    GBT_TRY(mem_reserve((void **)&lists->first, &lists->first_capacity, 0, job.tile_count + 1,
+                        sizeof *lists->first, "raster tiles", err));
+    GBT_TRY(mem_reserve((void **)&lists->ranges, &lists->range_capacity, 0, count, sizeof *lists->ranges,
+                        "raster pairs", err));
     parallel_blocks(lists->splat_count, grain, find_pairs, &job);
     if (atomic_load(&job.failed))
-        return base_fail(err, GBT_ERR_NO_MEMORY, "raster: no memory for the pairs of %zu Gaussians and %zu tiles", lists->splat_count,
+        return base_fail(err, GBT_ERR_NO_MEMORY,
+                         "raster: no memory for the pairs of %zu Gaussians and %zu tiles", lists->splat_count,
                          job.tile_count);
     GBT_TRY(place_blocks(&job, block_count, err));
     number_pairs(lists, count);
-    GBT_TRY(mem_reserve((void **)&lists->entries, &lists->entry_capacity, 0, lists->pair_count, sizeof *lists->entries, "raster pairs",
-                        err));
+    GBT_TRY(mem_reserve((void **)&lists->entries, &lists->entry_capacity, 0, lists->pair_count,
+                        sizeof *lists->entries, "raster pairs", err));
     parallel_blocks(lists->splat_count, grain, place_pairs, &job);
     return GBT_OK;
 }
@@ -255,8 +281,8 @@ void tile_lists_free(tile_lists *lists)
 {
     for (size_t i = 0; i < lists->block_capacity; i++)
         mem_free(lists->blocks[i].tiles);
-    void *const owned[] = {lists->entries, lists->first, lists->ranges, lists->key_first, lists->keys, lists->spare, lists->blocks,
-                           lists->histogram};
+    void *const owned[] = {lists->entries, lists->first, lists->ranges, lists->key_first,
+                           lists->keys,    lists->spare, lists->blocks, lists->histogram};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         mem_free(owned[i]);
     memset(lists, 0, sizeof *lists);

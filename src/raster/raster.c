@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* raster/raster.c -- a view of Gaussians, forward and back.
 
-   Gaussians --> splats (project16.h) --> lists of the tiles (order.c) --> tiles (ewa16.h, ray_form16.h) --> pixels
+   Gaussians --> splats (project16.h) --> lists of the tiles (order.c) --> tiles (ewa16.h, ray_form16.h)
+        --> pixels
    d_image --> tiles --> one record per splat and tile --> gradients.c */
 #include "raster/raster.h"
 
@@ -25,22 +27,29 @@ struct raster_state {
     float *records;
     tile_counts *counts;
     float (*d_background)[3];
-    size_t splat_capacity, ray_capacity, drawn_capacity, tape_capacity, blocks_capacity, record_capacity, count_capacity,
-        background_capacity;
+    size_t splat_capacity, ray_capacity, drawn_capacity, tape_capacity, blocks_capacity, record_capacity,
+        count_capacity, background_capacity;
     bool tape_kept;
 };
 
 raster_settings raster_settings_default(void)
 {
-    return (raster_settings){.alpha_min = 1.0f / 255.0f, .alpha_max = 0.99f, .transmittance_min = 1e-4f, .near = 0.2f, .dilation = 0.3f};
+    return (raster_settings){.alpha_min = 1.0f / 255.0f,
+                             .alpha_max = 0.99f,
+                             .transmittance_min = 1e-4f,
+                             .near = 0.2f,
+                             .dilation = 0.3f};
 }
 
 static const raster_kernel *kernel_for(cpu_isa isa)
 {
     switch (isa) {
-    case CPU_AVX512: return &raster_kernel_avx512;
-    case CPU_AVX2: return &raster_kernel_avx2;
-    case CPU_PLAIN: break;
+    case CPU_AVX512:
+        return &raster_kernel_avx512;
+    case CPU_AVX2:
+        return &raster_kernel_avx2;
+    case CPU_PLAIN:
+        break;
     }
     return &raster_kernel_plain;
 }
@@ -50,21 +59,23 @@ static size_t tile_count_of(const raster_view *view)
     return (size_t)view->tiles_across * (size_t)view->tiles_down;
 }
 
-/* ---- the view --------------------------------------------------------------------------------------------------------------------- */
+/* ---- the view ---- */
 
 static gbt_status check_settings(const raster_settings *s, gbt_error *err)
 {
     /* The smallest alpha and T: 2^-120 of an opacity is nothing, and T is found again by division. */
-    const bool fine = (s->form == RASTER_EWA || s->form == RASTER_PER_RAY) && s->alpha_min >= 1e-30f && s->alpha_min < 1 &&
-                      s->alpha_max > 0 && s->alpha_max < 1 && s->transmittance_min >= 1e-30f && s->transmittance_min < 1 && s->near >= 0 &&
+    const bool fine = (s->form == RASTER_EWA || s->form == RASTER_PER_RAY) && s->alpha_min >= 1e-30f &&
+                      s->alpha_min < 1 && s->alpha_max > 0 && s->alpha_max < 1 &&
+                      s->transmittance_min >= 1e-30f && s->transmittance_min < 1 && s->near >= 0 &&
                       isfinite(s->near) && s->dilation >= 0 && s->dilation < 1e6f &&
                       isfinite(s->background[0] + s->background[1] + s->background[2]);
     if (fine)
         return GBT_OK;
     return base_fail(err, GBT_ERR_ARGUMENT,
-                     "raster: alpha in [%g, %g], T down to %g, near %g, dilation %g (wanted alpha and T in [1e-30, 1), "
-                                            "near and dilation >= 0)",
-                     (double)s->alpha_min, (double)s->alpha_max, (double)s->transmittance_min, (double)s->near, (double)s->dilation);
+                     "raster: alpha in [%g, %g], T down to %g, near %g, dilation %g (wanted alpha and T in "
+                     "[1e-30, 1), near and dilation >= 0)",
+                     (double)s->alpha_min, (double)s->alpha_max, (double)s->transmittance_min,
+                     (double)s->near, (double)s->dilation);
 }
 
 bool raster_takes(const gbt_camera *camera)
@@ -72,29 +83,37 @@ bool raster_takes(const gbt_camera *camera)
     return camera->model == GBT_CAMERA_PINHOLE || camera->model == GBT_CAMERA_SIMPLE_PINHOLE;
 }
 
-static gbt_status make_view(const gbt_camera *camera, const raster_settings *settings, raster_view *out, gbt_error *err)
+static gbt_status make_view(const gbt_camera *camera, const raster_settings *settings, raster_view *out,
+                            gbt_error *err)
 {
     const bool one_focal = camera->model == GBT_CAMERA_SIMPLE_PINHOLE;
     if (!raster_takes(camera))
-        return base_fail(err, GBT_ERR_ARGUMENT, "raster: camera model %d (wanted SIMPLE_PINHOLE or PINHOLE: splats are projected)",
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "raster: camera model %d (wanted SIMPLE_PINHOLE or PINHOLE: splats are projected)",
                          (int)camera->model);
     GBT_TRY(check_settings(settings, err));
     const double *p = camera->params;
     *out = (raster_view){.settings = *settings, .width = camera->width, .height = camera->height};
-    out->fx = p[0], out->fy = one_focal ? p[0] : p[1], out->cx = p[one_focal ? 1 : 2] - 0.5, out->cy = p[one_focal ? 2 : 3] - 0.5;
+    out->fx = p[0];
+    out->fy = one_focal ? p[0] : p[1];
+    out->cx = p[one_focal ? 1 : 2] - 0.5;
+    out->cy = p[one_focal ? 2 : 3] - 0.5;
     double sum = out->cx + out->cy;
     for (int i = 0; i < 9; i++)
         sum += out->rotation[i] = camera->rotation[i];
     for (int i = 0; i < 3; i++)
         sum += out->center[i] = (double)(float)camera->center[i];
     const int side_limit = TILE_LIMIT * TILE_PIXELS;
-    if (!isfinite(sum) || !(out->fx > 0 && out->fx < 1e12) || !(out->fy > 0 && out->fy < 1e12) || out->width < 1 || out->height < 1 ||
-        out->width > side_limit || out->height > side_limit)
-        return base_fail(err, GBT_ERR_ARGUMENT, "raster: a camera of %d x %d pixels, focal lengths %g and %g (wanted 1 to %d pixels, "
-                                                "lengths > 0, a finite pose)",
+    if (!isfinite(sum) || !(out->fx > 0 && out->fx < 1e12) || !(out->fy > 0 && out->fy < 1e12) ||
+        out->width < 1 || out->height < 1 || out->width > side_limit || out->height > side_limit)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "raster: a camera of %d x %d pixels, focal lengths %g and %g (wanted 1 to %d "
+                         "pixels, lengths > 0, a finite pose)",
                          out->width, out->height, out->fx, out->fy, side_limit);
-    out->limit[0] = 1.3 * 0.5 * out->width / out->fx, out->limit[1] = 1.3 * 0.5 * out->height / out->fy;
-    out->tiles_across = (out->width + TILE_PIXELS - 1) / TILE_PIXELS, out->tiles_down = (out->height + TILE_PIXELS - 1) / TILE_PIXELS;
+    out->limit[0] = 1.3 * 0.5 * out->width / out->fx;
+    out->limit[1] = 1.3 * 0.5 * out->height / out->fy;
+    out->tiles_across = (out->width + TILE_PIXELS - 1) / TILE_PIXELS;
+    out->tiles_down = (out->height + TILE_PIXELS - 1) / TILE_PIXELS;
     return GBT_OK;
 }
 
@@ -102,7 +121,8 @@ static void project_block(size_t block, size_t begin, size_t end, void *context)
 {
     struct raster_state *state = context;
     ray_splat *rays = state->view.settings.form == RASTER_EWA ? NULL : state->rays + begin;
-    state->drawn[block] = state->kernel->project(&state->view, state->source, begin, end, state->splats + begin, rays);
+    state->drawn[block] =
+        state->kernel->project(&state->view, state->source, begin, end, state->splats + begin, rays);
 }
 
 static gbt_status project_all(struct raster_state *state, gbt_error *err)
@@ -110,16 +130,19 @@ static gbt_status project_all(struct raster_state *state, gbt_error *err)
     const size_t count = state->source->count;
     if (count > UINT32_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "raster: %zu Gaussians (wanted at most 2^32 - 1)", count);
-    GBT_TRY(mem_reserve((void **)&state->splats, &state->splat_capacity, 0, count, sizeof *state->splats, "splats", err));
-    GBT_TRY(mem_reserve((void **)&state->drawn, &state->drawn_capacity, 0, parallel_block_count(count, SPLAT_GRAIN), sizeof *state->drawn,
+    GBT_TRY(mem_reserve((void **)&state->splats, &state->splat_capacity, 0, count, sizeof *state->splats,
                         "splats", err));
+    GBT_TRY(mem_reserve((void **)&state->drawn, &state->drawn_capacity, 0,
+                        parallel_block_count(count, SPLAT_GRAIN), sizeof *state->drawn, "splats", err));
     if (state->view.settings.form == RASTER_PER_RAY)
-        GBT_TRY(mem_reserve((void **)&state->rays, &state->ray_capacity, 0, count, sizeof *state->rays, "splats", err));
+        GBT_TRY(mem_reserve((void **)&state->rays, &state->ray_capacity, 0, count, sizeof *state->rays,
+                            "splats", err));
     parallel_blocks(count, SPLAT_GRAIN, project_block, state);
-    return tile_lists_make(&state->lists, state->kernel, &state->view, state->splats, state->drawn, count, err);
+    return tile_lists_make(&state->lists, state->kernel, &state->view, state->splats, state->drawn, count,
+                           err);
 }
 
-/* ---- passes over the tiles -------------------------------------------------------------------------------------------------------- */
+/* ---- passes over the tiles ---- */
 
 typedef struct pass {
     struct raster_state *state;
@@ -170,7 +193,8 @@ static bool backward_tile(const pass *p, tile_job *job, ray_scratch *scratch)
 
 static void run_tile(size_t index, size_t begin, size_t end, void *context)
 {
-    (void)begin, (void)end;
+    (void)begin;
+    (void)end;
     pass *p = context;
     struct raster_state *state = p->state;
     const size_t first = state->lists.first[index], across = (size_t)state->view.tiles_across;
@@ -180,10 +204,18 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     if (atomic_load_explicit(&p->failed, memory_order_relaxed))
         return;
     memset(state->d_background[index], 0, sizeof *state->d_background);
-    tile_job job = {.view = &state->view, .splats = state->splats, .rays = state->rays, .entries = state->lists.entries + first,
-                    .count = state->lists.first[index + 1] - first, .x0 = (int)(index % across) * TILE_PIXELS,
-                    .y0 = (int)(index / across) * TILE_PIXELS, .pixels = &pixels, .tape = tape ? &state->tapes[index] : NULL,
-                    .blocks = tape ? state->blocks + first : NULL, .records = state->records, .d_background = state->d_background[index]};
+    tile_job job = {.view = &state->view,
+                    .splats = state->splats,
+                    .rays = state->rays,
+                    .entries = state->lists.entries + first,
+                    .count = state->lists.first[index + 1] - first,
+                    .x0 = (int)(index % across) * TILE_PIXELS,
+                    .y0 = (int)(index / across) * TILE_PIXELS,
+                    .pixels = &pixels,
+                    .tape = tape ? &state->tapes[index] : NULL,
+                    .blocks = tape ? state->blocks + first : NULL,
+                    .records = state->records,
+                    .d_background = state->d_background[index]};
     if (!(p->d_rgb == NULL ? forward_tile(p, &job, &scratch) : backward_tile(p, &job, &scratch)))
         atomic_store(&p->failed, true);
     state->counts[index] = job.counts;
@@ -196,32 +228,38 @@ static gbt_status run_pass(pass *p, gbt_error *err)
 {
     struct raster_state *state = p->state;
     const size_t count = tile_count_of(&state->view);
-    GBT_TRY(mem_reserve((void **)&state->counts, &state->count_capacity, 0, count, sizeof *state->counts, "raster tiles", err));
-    GBT_TRY(mem_reserve((void **)&state->d_background, &state->background_capacity, 0, count, sizeof *state->d_background, "raster tiles",
-                        err));
+    GBT_TRY(mem_reserve((void **)&state->counts, &state->count_capacity, 0, count, sizeof *state->counts,
+                        "raster tiles", err));
+    GBT_TRY(mem_reserve((void **)&state->d_background, &state->background_capacity, 0, count,
+                        sizeof *state->d_background, "raster tiles", err));
     atomic_init(&p->failed, false);
     parallel_blocks(count, 1, run_tile, p);
     if (atomic_load(&p->failed))
-        return base_fail(err, GBT_ERR_NO_MEMORY, "raster: no memory for the hits of a %d x %d image", state->view.width,
-                         state->view.height);
+        return base_fail(err, GBT_ERR_NO_MEMORY, "raster: no memory for the hits of a %d x %d image",
+                         state->view.width, state->view.height);
     return GBT_OK;
 }
 
 static void add_counters(const struct raster_state *state, raster_counters *counters)
 {
     counters->pixels += (uint64_t)state->view.width * (uint64_t)state->view.height;
-    counters->drawn += state->lists.splat_count, counters->pairs += state->lists.pair_count;
-    for (size_t i = 0; i < tile_count_of(&state->view); i++)
-        counters->tests += state->counts[i].tests, counters->blended += state->counts[i].blended;
+    counters->drawn += state->lists.splat_count;
+    counters->pairs += state->lists.pair_count;
+    for (size_t i = 0; i < tile_count_of(&state->view); i++) {
+        counters->tests += state->counts[i].tests;
+        counters->blended += state->counts[i].blended;
+    }
 }
 
-gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera, const raster_settings *settings,
-                          bool keep_tape, image *rgb, float *transmittance, raster_counters *counters, gbt_error *err)
+gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera,
+                          const raster_settings *settings, bool keep_tape, image *rgb, float *transmittance,
+                          raster_counters *counters, gbt_error *err)
 {
     if (rgb->width != camera->width || rgb->height != camera->height || rgb->channels != 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "raster: image is %d x %d x %d (wanted %d x %d x 3)", rgb->width, rgb->height,
-                         rgb->channels, camera->width, camera->height);
-    if (scene->state == NULL && (scene->state = mem_calloc(1, sizeof *scene->state, "rasterizer", err)) == NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT, "raster: image is %d x %d x %d (wanted %d x %d x 3)",
+                         rgb->width, rgb->height, rgb->channels, camera->width, camera->height);
+    if (scene->state == NULL &&
+        (scene->state = mem_calloc(1, sizeof *scene->state, "rasterizer", err)) == NULL)
         return GBT_ERR_NO_MEMORY;
     struct raster_state *state = scene->state;
     state->tape_kept = false;
@@ -230,10 +268,10 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
     state->source = g;
     GBT_TRY(project_all(state, err));
     if (keep_tape) {
-        GBT_TRY(mem_reserve((void **)&state->tapes, &state->tape_capacity, 0, tile_count_of(&state->view), sizeof *state->tapes,
-                            "raster tape", err));
-        GBT_TRY(mem_reserve((void **)&state->blocks, &state->blocks_capacity, 0, state->lists.pair_count, sizeof *state->blocks,
-                            "raster tape", err));
+        GBT_TRY(mem_reserve((void **)&state->tapes, &state->tape_capacity, 0, tile_count_of(&state->view),
+                            sizeof *state->tapes, "raster tape", err));
+        GBT_TRY(mem_reserve((void **)&state->blocks, &state->blocks_capacity, 0, state->lists.pair_count,
+                            sizeof *state->blocks, "raster tape", err));
     }
     pass p = {.state = state, .keep_tape = keep_tape, .rgb = rgb, .transmittance = transmittance};
     GBT_TRY(run_pass(&p, err));
@@ -243,18 +281,19 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
     return GBT_OK;
 }
 
-gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight, float d_background[3],
-                           gbt_error *err)
+gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight,
+                           float d_background[3], gbt_error *err)
 {
     struct raster_state *state = scene->state;
     if (state == NULL || !state->tape_kept)
         return base_fail(err, GBT_ERR_ARGUMENT, "raster: adjoint without a forward pass that kept its tape");
     const raster_view *view = &state->view;
     if (d_rgb->width != view->width || d_rgb->height != view->height || d_rgb->channels != 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "raster: gradient is %d x %d x %d (wanted %d x %d x 3)", d_rgb->width, d_rgb->height,
-                         d_rgb->channels, view->width, view->height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "raster: gradient is %d x %d x %d (wanted %d x %d x 3)",
+                         d_rgb->width, d_rgb->height, d_rgb->channels, view->width, view->height);
     const size_t floats = state->lists.pair_count * raster_sum_count(view->settings.form);
-    GBT_TRY(mem_reserve((void **)&state->records, &state->record_capacity, 0, floats, sizeof *state->records, "raster gradients", err));
+    GBT_TRY(mem_reserve((void **)&state->records, &state->record_capacity, 0, floats, sizeof *state->records,
+                        "raster gradients", err));
     pass p = {.state = state, .d_rgb = d_rgb};
     GBT_TRY(run_pass(&p, err));
     for (int c = 0; c < 3 && d_background != NULL; c++) {
@@ -262,7 +301,8 @@ gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d
         for (size_t i = 0; i < tile_count_of(view); i++)
             d_background[c] += state->d_background[i][c];
     }
-    return raster_gradients(view, state->source, state->splats, state->drawn, &state->lists, state->records, d_gaussians, weight, err);
+    return raster_gradients(view, state->source, state->splats, state->drawn, &state->lists, state->records,
+                            d_gaussians, weight, err);
 }
 
 void raster_scene_free(raster_scene *scene)
@@ -271,8 +311,8 @@ void raster_scene_free(raster_scene *scene)
     if (state == NULL)
         return;
     tile_lists_free(&state->lists);
-    void *const owned[] = {state->splats, state->rays, state->drawn, state->tapes, state->blocks, state->records, state->counts,
-                           state->d_background};
+    void *const owned[] = {state->splats, state->rays,    state->drawn,  state->tapes,
+                           state->blocks, state->records, state->counts, state->d_background};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         mem_free(owned[i]);
     mem_free(state);

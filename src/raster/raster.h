@@ -1,9 +1,12 @@
-/* raster/raster.h -- splatting: the same Gaussians drawn tile by tile, as the cross-check and the counterpart of the tracer.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* raster/raster.h -- splatting: the same Gaussians drawn tile by tile, as the cross-check and the counterpart
+   of the tracer.
 
-   Two forms. RASTER_EWA has the conventions of 3D Gaussian splatting: each Gaussian becomes a 2D Gaussian by the affine projection at
-   its centre, dilated by 0.3 px^2, and all pixels blend in the order of the centres' depths. RASTER_PER_RAY keeps the tiles but takes
-   response and order from the ray of each pixel, as docs/tracing.md defines them: what is left between the two is the projection and
-   the order. Shares with the tracer the cameras and the Gaussian arrays, nothing else. */
+   Two forms. RASTER_EWA has the conventions of 3D Gaussian splatting: each Gaussian becomes a 2D Gaussian by
+   the affine projection at its centre, dilated by 0.3 px^2, and all pixels blend in the order of the centres'
+   depths. RASTER_PER_RAY keeps the tiles but takes response and order from the ray of each pixel, as
+   docs/tracing.md defines them: what is left between the two is the projection and the order. Shares with the
+   tracer the cameras and the Gaussian arrays, nothing else. */
 #ifndef GBT_RASTER_RASTER_H
 #define GBT_RASTER_RASTER_H
 
@@ -24,17 +27,19 @@ typedef struct raster_settings {
     float alpha_min;         /* a hit counts when alpha >= this; > 0. Default 1/255 */
     float alpha_max;         /* alpha is cut here, (0, 1). Default 0.99 */
     float transmittance_min; /* stop before the hit that would bring T below this. Default 1e-4 */
-    float near;              /* EWA: centres at this depth z or nearer are not drawn, default 0.2; per ray: the tracer's t_near */
-    float dilation;          /* EWA: variance added to the projection, px^2. Default 0.3 */
-    bool exact_cut;          /* EWA: draw to where alpha falls to alpha_min, not to 3 std-devs. Default false */
-    bool order_by_center;    /* per ray: blend in the order of the centres' depths, as EWA does. Default false */
-    float background[3];     /* default 0 */
+    float near; /* EWA: centres at this depth z or nearer are not drawn, default 0.2; per ray: the tracer's
+                   t_near */
+    float dilation;       /* EWA: variance added to the projection, px^2. Default 0.3 */
+    bool exact_cut;       /* EWA: draw to where alpha falls to alpha_min, not to 3 std-devs. Default false */
+    bool order_by_center; /* per ray: blend in the order of the centres' depths, as EWA does. Default false */
+    float background[3];  /* default 0 */
 } raster_settings;
 
 raster_settings raster_settings_default(void);
 
 typedef struct raster_counters {
-    uint64_t pixels, drawn, pairs, tests, blended; /* Gaussians drawn; pairs of Gaussian and tile; of Gaussian and pixel; those blended */
+    uint64_t pixels, drawn, pairs, tests,
+        blended; /* Gaussians drawn; pairs of Gaussian and tile; of Gaussian and pixel; those blended */
 } raster_counters;
 
 /** The last view and the memory of passes, reused from view to view. Start from {0}. */
@@ -48,36 +53,40 @@ bool raster_takes(const gbt_camera *camera);
 /**
  * Draw `g` as `camera` sees it.
  *
- * @param g             [in]  borrowed until the last pass over this view; padded (gaussians_pad). Those with non-finite fields are not
- *                            drawn
+ * @param g             [in]  borrowed until the last pass over this view; padded (gaussians_pad). Those with
+ *         non-finite fields are not drawn
  * @param camera        [in]  PINHOLE or SIMPLE_PINHOLE
  * @param keep_tape     [in]  true when raster_backward() will follow
  * @param rgb           [out] 3 channels, size of the camera, allocated by the caller; with the background
  * @param transmittance [out] optional (NULL), [height * width]
  * @param counters      [in,out] optional, added to
- * @return GBT_OK, GBT_ERR_ARGUMENT (a camera with another lens, settings out of range, size of rgb), GBT_ERR_NO_MEMORY (2^32 pairs of
- *         Gaussian and tile, 2^24 Gaussians in one tile, too)
- * Threads: uses all; same bits for every thread count and instruction set. Formulas, and what differs from other rasterizers:
- * docs/crosscheck.md. Memory: about 92 bytes per Gaussian (per ray: 172), 12 per pair; for the adjoint 42 (58) more per pair and 8 per
- * pixel.
+ * @return GBT_OK, GBT_ERR_ARGUMENT (a camera with another lens, settings out of range, size of rgb),
+ *         GBT_ERR_NO_MEMORY (2^32 pairs of Gaussian and tile, 2^24 Gaussians in one tile, too)
+ * Threads: uses all; same bits for every thread count and instruction set. Formulas, and what differs from
+ * other rasterizers: docs/crosscheck.md. Memory: about 92 bytes per Gaussian (per ray: 172), 12 per pair; for
+ * the adjoint 42 (58) more per pair and 8 per pixel.
  */
-gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera, const raster_settings *settings,
-                          bool keep_tape, image *rgb, float *transmittance, raster_counters *counters, gbt_error *err);
+gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera,
+                          const raster_settings *settings, bool keep_tape, image *rgb, float *transmittance,
+                          raster_counters *counters, gbt_error *err);
 
 /**
  * Adjoint of the last raster_forward(keep_tape); the tape is kept, so it may be called again.
  *
- * The gradient is that of the formulas: exactly 0 where alpha is cut at alpha_max, and where x / z is kept at its limit in the Jacobian.
- * Per ray the depth of the response is a constant of the derivative (envelope theorem, trace/reference.h).
+ * The gradient is that of the formulas: exactly 0 where alpha is cut at alpha_max, and where x / z is kept at
+ * its limit in the Jacobian. Per ray the depth of the response is a constant of the derivative (envelope
+ * theorem, trace/reference.h).
  *
  * @param d_rgb        [in]  dL/d(rgb)
- * @param d_gaussians  [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion tangent)
- * @param weight       [out] optional (NULL), [count]: sum over pixels of T alpha, how much each Gaussian was seen
+ * @param d_gaussians  [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion
+ *                           tangent)
+ * @param weight       [out] optional (NULL), [count]: sum over pixels of T alpha, how much each Gaussian was
+ *                           seen
  * @param d_background [out] optional (NULL), [3], overwritten
  * Threads: uses all; same bits for every thread count.
  */
-gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight, float d_background[3],
-                           gbt_error *err);
+gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight,
+                           float d_background[3], gbt_error *err);
 
 void raster_scene_free(raster_scene *scene);
 

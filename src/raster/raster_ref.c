@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* raster/raster_ref.c -- splatting in double and without any cleverness. The equations are in the header. */
 #include "raster/raster_ref.h"
 
@@ -19,7 +20,7 @@ typedef struct lens {
 
 typedef struct flat {
     double t[3], point[2], kept[2], j[2][3], jw[2][3], sigma[3][3], conic[3]; /* conic: xx, xy, yy of C^-1 */
-    int box[4];                                                               /* pixels: first and end across, first and end down */
+    int box[4]; /* pixels: first and end across, first and end down */
     size_t id;
 } flat;
 
@@ -32,7 +33,8 @@ static gbt_status read_lens(const gbt_camera *camera, lens *out, gbt_error *err)
 {
     const bool one = camera->model == GBT_CAMERA_SIMPLE_PINHOLE;
     if (!one && camera->model != GBT_CAMERA_PINHOLE)
-        return base_fail(err, GBT_ERR_ARGUMENT, "raster: camera model %d (wanted a pinhole)", (int)camera->model);
+        return base_fail(err, GBT_ERR_ARGUMENT, "raster: camera model %d (wanted a pinhole)",
+                         (int)camera->model);
     const int side[2] = {camera->width, camera->height};
     for (int k = 0; k < 2; k++) {
         out->focal[k] = camera->params[one ? 0 : k];
@@ -59,7 +61,8 @@ static void rotation_of(const raster_reference *scene, size_t i, double q[4], do
     dquat_to_matrix(q, r);
 }
 
-static bool flatten(const raster_reference *scene, const gbt_camera *camera, const lens *l, const raster_settings *s, size_t i, flat *f)
+static bool flatten(const raster_reference *scene, const gbt_camera *camera, const lens *l,
+                    const raster_settings *s, size_t i, flat *f)
 {
     double q[4], r[9], offset[3];
     if (!usable(scene, i) || field(scene, OPACITY, i) < (double)s->alpha_min)
@@ -74,7 +77,8 @@ static bool flatten(const raster_reference *scene, const gbt_camera *camera, con
     for (int a = 0; a < 2; a++) {
         const double ratio = f->t[a] / f->t[2];
         f->kept[a] = fmax(-l->limit[a], fmin(l->limit[a], ratio));
-        f->j[a][a] = l->focal[a] / f->t[2], f->j[a][2] = -l->focal[a] * f->kept[a] / f->t[2];
+        f->j[a][a] = l->focal[a] / f->t[2];
+        f->j[a][2] = -l->focal[a] * f->kept[a] / f->t[2];
         f->point[a] = l->focal[a] * ratio + l->principal[a];
         dmat_apply_transposed(camera->rotation, f->j[a], f->jw[a]);
     }
@@ -95,12 +99,16 @@ static bool flatten(const raster_reference *scene, const gbt_camera *camera, con
     const double det = c[0][0] * c[1][1] - c[0][1] * c[0][1], middle = 0.5 * (c[0][0] + c[1][1]);
     if (!(det > 0))
         return false;
-    f->conic[0] = c[1][1] / det, f->conic[1] = -c[0][1] / det, f->conic[2] = c[0][0] / det;
-    const double radius = s->exact_cut ? HUGE_VAL : ceil(3 * sqrt(middle + sqrt(fmax(0.1, middle * middle - det))));
+    f->conic[0] = c[1][1] / det;
+    f->conic[1] = -c[0][1] / det;
+    f->conic[2] = c[0][0] / det;
+    const double radius =
+        s->exact_cut ? HUGE_VAL : ceil(3 * sqrt(middle + sqrt(fmax(0.1, middle * middle - det))));
     const int side[2] = {camera->width, camera->height};
     for (int a = 0; a < 2; a++) {
         f->box[2 * a] = TILE * (int)fmax(0, fmin(1e7, (f->point[a] - radius) / TILE));
-        f->box[2 * a + 1] = (int)fmin(side[a], TILE * (double)(int)fmax(0, fmin(1e7, (f->point[a] + radius + TILE - 1) / TILE)));
+        f->box[2 * a + 1] = (int)fmin(
+            side[a], TILE * (double)(int)fmax(0, fmin(1e7, (f->point[a] + radius + TILE - 1) / TILE)));
     }
     f->id = i;
     return true;
@@ -115,8 +123,8 @@ static int by_depth_then_id(const void *a, const void *b)
     return p->id < q->id ? -1 : p->id > q->id;
 }
 
-static gbt_status flatten_all(const raster_reference *scene, const gbt_camera *camera, const raster_settings *s, lens *l, flat **out,
-                              size_t *count, gbt_error *err)
+static gbt_status flatten_all(const raster_reference *scene, const gbt_camera *camera,
+                              const raster_settings *s, lens *l, flat **out, size_t *count, gbt_error *err)
 {
     GBT_TRY(read_lens(camera, l, err));
     *count = 0;
@@ -144,14 +152,15 @@ static double response(const raster_reference *scene, const raster_settings *s, 
 }
 
 /* Front to back. Returns how many Gaussians of the list were passed. */
-static size_t blend(const raster_reference *scene, const raster_settings *s, const flat *all, size_t count, int x, int y, double rgb[3],
-                    double *T)
+static size_t blend(const raster_reference *scene, const raster_settings *s, const flat *all, size_t count,
+                    int x, int y, double rgb[3], double *T)
 {
     size_t i = 0;
     *T = 1;
     rgb[0] = rgb[1] = rgb[2] = 0;
     for (; i < count; i++) {
-        const double alpha = fmin((double)s->alpha_max, response(scene, s, &all[i], x, y)), next = *T * (1 - alpha);
+        const double alpha = fmin((double)s->alpha_max, response(scene, s, &all[i], x, y)),
+                     next = *T * (1 - alpha);
         if (alpha > 0 && next < (double)s->transmittance_min)
             break;
         for (int c = 0; c < 3; c++)
@@ -183,11 +192,12 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-gbt_status raster_reference_forward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings, int step,
-                                    double *rgb, gbt_error *err)
+gbt_status raster_reference_forward(const raster_reference *scene, const gbt_camera *camera,
+                                    const raster_settings *settings, int step, double *rgb, gbt_error *err)
 {
     lens l;
-    forward_job job = {.scene = scene, .s = settings, .across = (camera->width + step - 1) / step, .step = step, .rgb = rgb};
+    forward_job job = {
+        .scene = scene, .s = settings, .across = (camera->width + step - 1) / step, .step = step, .rgb = rgb};
     flat *all = NULL;
     const gbt_status status = flatten_all(scene, camera, settings, &l, &all, &job.count, err);
     job.all = all;
@@ -198,17 +208,19 @@ gbt_status raster_reference_forward(const raster_reference *scene, const gbt_cam
 }
 
 /* Chain from dL/dp of one Gaussian on one pixel to its fields, matrix by matrix. */
-static void respond_backward(const raster_reference *scene, const gbt_camera *camera, const lens *l, const flat *f, int x, int y,
-                             double d_p, double *d)
+static void respond_backward(const raster_reference *scene, const gbt_camera *camera, const lens *l,
+                             const flat *f, int x, int y, double d_p, double *d)
 {
     const size_t n = scene->count, i = f->id;
     const double delta[2] = {f->point[0] - x, f->point[1] - y};
-    const double k[2] = {f->conic[0] * delta[0] + f->conic[1] * delta[1], f->conic[1] * delta[0] + f->conic[2] * delta[1]};
+    const double k[2] = {f->conic[0] * delta[0] + f->conic[1] * delta[1],
+                         f->conic[1] * delta[0] + f->conic[2] * delta[1]};
     double d_t[3] = {0}, d_sigma[3][3], world[3], q[4], r[9];
     /* dp/dC = (C^-1 delta)(C^-1 delta)^T / 2; C = (J W) Sigma (J W)^T */
     for (int a = 0; a < 3; a++)
         for (int b = 0; b < 3; b++)
-            d_sigma[a][b] = 0.5 * d_p * (k[0] * f->jw[0][a] + k[1] * f->jw[1][a]) * (k[0] * f->jw[0][b] + k[1] * f->jw[1][b]);
+            d_sigma[a][b] = 0.5 * d_p * (k[0] * f->jw[0][a] + k[1] * f->jw[1][a]) *
+                            (k[0] * f->jw[0][b] + k[1] * f->jw[1][b]);
     for (int a = 0; a < 2; a++) {
         double d_jw[3] = {0}, d_j[3];
         for (int m = 0; m < 3; m++)
@@ -217,7 +229,8 @@ static void respond_backward(const raster_reference *scene, const gbt_camera *ca
                     d_jw[m] += d_p * k[a] * k[b] * f->jw[b][o] * f->sigma[o][m];
         dmat_apply(camera->rotation, d_jw, d_j);
         const double z = f->t[2], ratio = f->t[a] / z, focal = l->focal[a], d_point = -d_p * k[a];
-        const double d_kept = f->kept[a] == ratio ? -focal / z * d_j[2] : 0, d_ratio = d_kept + focal * d_point;
+        const double d_kept = f->kept[a] == ratio ? -focal / z * d_j[2] : 0,
+                     d_ratio = d_kept + focal * d_point;
         d_t[a] += d_ratio / z;
         d_t[2] += -d_ratio * ratio / z - focal / (z * z) * d_j[a] + focal * f->kept[a] / (z * z) * d_j[2];
     }
@@ -229,8 +242,10 @@ static void respond_backward(const raster_reference *scene, const gbt_camera *ca
         double along = 0;
         for (int a = 0; a < 3; a++) {
             d_r[3 * a + c] = 0;
-            for (int b = 0; b < 3; b++)
-                d_r[3 * a + c] += 2 * d_sigma[a][b] * r[3 * b + c] * s * s, along += r[3 * a + c] * d_sigma[a][b] * r[3 * b + c];
+            for (int b = 0; b < 3; b++) {
+                d_r[3 * a + c] += 2 * d_sigma[a][b] * r[3 * b + c] * s * s;
+                along += r[3 * a + c] * d_sigma[a][b] * r[3 * b + c];
+            }
         }
         d[(size_t)(MEAN + c) * n + i] += world[c];
         d[(size_t)(SCALE + c) * n + i] += 2 * s * along;
@@ -238,21 +253,27 @@ static void respond_backward(const raster_reference *scene, const gbt_camera *ca
     /* Derivatives of the rotation matrix's entries, then what is not tangent to the unit sphere taken off. */
     const double w = q[0], u = q[1], v = q[2], t = q[3];
     double d_q[4] = {2 * (-t * d_r[1] + v * d_r[2] + t * d_r[3] - u * d_r[5] - v * d_r[6] + u * d_r[7]),
-                     2 * (v * d_r[1] + t * d_r[2] + v * d_r[3] - 2 * u * d_r[4] - w * d_r[5] + t * d_r[6] + w * d_r[7] - 2 * u * d_r[8]),
-                     2 * (-2 * v * d_r[0] + u * d_r[1] + w * d_r[2] + u * d_r[3] + t * d_r[5] - w * d_r[6] + t * d_r[7] - 2 * v * d_r[8]),
-                     2 * (-2 * t * d_r[0] - w * d_r[1] + u * d_r[2] + w * d_r[3] - 2 * t * d_r[4] + v * d_r[5] + u * d_r[6] + v * d_r[7])};
+                     2 * (v * d_r[1] + t * d_r[2] + v * d_r[3] - 2 * u * d_r[4] - w * d_r[5] + t * d_r[6] +
+                          w * d_r[7] - 2 * u * d_r[8]),
+                     2 * (-2 * v * d_r[0] + u * d_r[1] + w * d_r[2] + u * d_r[3] + t * d_r[5] - w * d_r[6] +
+                          t * d_r[7] - 2 * v * d_r[8]),
+                     2 * (-2 * t * d_r[0] - w * d_r[1] + u * d_r[2] + w * d_r[3] - 2 * t * d_r[4] +
+                          v * d_r[5] + u * d_r[6] + v * d_r[7])};
     const double off = d_q[0] * w + d_q[1] * u + d_q[2] * v + d_q[3] * t;
     for (int c = 0; c < 4; c++)
         d[(size_t)(QUAT + c) * n + i] += d_q[c] - off * q[c];
 }
 
-static void pixel_backward(const raster_reference *scene, const gbt_camera *camera, const lens *l, const raster_settings *s,
-                           const flat *all, size_t count, int x, int y, const double d_rgb[3], double *d_fields, double d_background[3])
+static void pixel_backward(const raster_reference *scene, const gbt_camera *camera, const lens *l,
+                           const raster_settings *s, const flat *all, size_t count, int x, int y,
+                           const double d_rgb[3], double *d_fields, double d_background[3])
 {
     double rgb[3], T, behind[3];
     const size_t n = scene->count, passed = blend(scene, s, all, count, x, y, rgb, &T);
-    for (int c = 0; c < 3; c++)
-        behind[c] = (double)s->background[c], d_background[c] += T * d_rgb[c];
+    for (int c = 0; c < 3; c++) {
+        behind[c] = (double)s->background[c];
+        d_background[c] += T * d_rgb[c];
+    }
     for (size_t i = passed; i-- > 0;) {
         const double raw = response(scene, s, &all[i], x, y), alpha = fmin((double)s->alpha_max, raw);
         if (raw == 0)
@@ -272,8 +293,9 @@ static void pixel_backward(const raster_reference *scene, const gbt_camera *came
     }
 }
 
-gbt_status raster_reference_backward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings,
-                                     const double *d_rgb, double *d_fields, double d_background[3], gbt_error *err)
+gbt_status raster_reference_backward(const raster_reference *scene, const gbt_camera *camera,
+                                     const raster_settings *settings, const double *d_rgb, double *d_fields,
+                                     double d_background[3], gbt_error *err)
 {
     lens l;
     flat *all = NULL;
@@ -281,8 +303,9 @@ gbt_status raster_reference_backward(const raster_reference *scene, const gbt_ca
     const gbt_status status = flatten_all(scene, camera, settings, &l, &all, &count, err);
     for (int y = 0; y < camera->height && status == GBT_OK; y++)
         for (int x = 0; x < camera->width; x++)
-            pixel_backward(scene, camera, &l, settings, all, count, x, y, d_rgb + 3 * ((size_t)y * (size_t)camera->width + (size_t)x),
-                           d_fields, d_background);
+            pixel_backward(scene, camera, &l, settings, all, count, x, y,
+                           d_rgb + 3 * ((size_t)y * (size_t)camera->width + (size_t)x), d_fields,
+                           d_background);
     mem_free(all);
     return status;
 }
@@ -290,11 +313,12 @@ gbt_status raster_reference_backward(const raster_reference *scene, const gbt_ca
 gbt_status raster_reference_make(const gaussians *g, raster_reference *out, gbt_error *err)
 {
     *out = (raster_reference){.count = g->count};
-    double *to = out->fields = mem_alloc(g->count, GAUSSIANS_FIELD_COUNT * sizeof *to, "raster reference", err);
+    double *to = out->fields =
+        mem_alloc(g->count, GAUSSIANS_FIELD_COUNT * sizeof *to, "raster reference", err);
     if (to == NULL)
         return GBT_ERR_NO_MEMORY;
-#define X(name, pad, meaning)             \
-    for (size_t i = 0; i < g->count; i++) \
+#define X(name, pad, meaning)                                                                                \
+    for (size_t i = 0; i < g->count; i++)                                                                    \
         *to++ = (double)g->name[i];
     GAUSSIANS_FIELDS(X)
 #undef X

@@ -1,20 +1,27 @@
-/* raster/raster_ref.h -- the EWA form in double, every Gaussian against every pixel, and its adjoint: what raster.h is tested against.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* raster/raster_ref.h -- the EWA form in double, every Gaussian against every pixel, and its adjoint: what
+   raster.h is tested against.
 
-   Per Gaussian with mean mu, Sigma = R S^2 R^T, opacity o, and a camera (rotation W, centre c, focal lengths, principal point):
+   Per Gaussian with mean mu, Sigma = R S^2 R^T, opacity o, and a camera (rotation W, centre c, focal lengths,
+   principal point):
 
        t = W (mu - c), drawn when t_z > near      centre = (fx t_x / t_z + cx, fy t_y / t_z + cy)
-       J = [fx / t_z, 0, -fx kx / t_z; 0, fy / t_z, -fy ky / t_z], kx = t_x / t_z kept within 1.3 width / (2 fx), ky likewise
-       C = J W Sigma W^T J^T + dilation I      p = -1/2 d^T C^-1 d, d = centre - pixel      alpha = min(alpha_max, o exp(p))
+       J = [fx / t_z, 0, -fx kx / t_z; 0, fy / t_z, -fy ky / t_z]
+       kx = t_x / t_z kept within 1.3 width / (2 fx), ky likewise
+       C = J W Sigma W^T J^T + dilation I      p = -1/2 d^T C^-1 d, d = centre - pixel
+       alpha = min(alpha_max, o exp(p))
 
-   drawn in the tiles of 16 x 16 pixels that centre +- ceil(3 sqrt(largest eigenvalue of C)) touches (or everywhere: exact_cut), where
-   alpha >= alpha_min. Blended in the order of (t_z, index), stopped before T < transmittance_min; the background last. */
+   drawn in the tiles of 16 x 16 pixels that centre +- ceil(3 sqrt(largest eigenvalue of C)) touches (or
+   everywhere: exact_cut), where alpha >= alpha_min. Blended in the order of (t_z, index), stopped before T <
+   transmittance_min; the background last. */
 #ifndef GBT_RASTER_RASTER_REF_H
 #define GBT_RASTER_RASTER_REF_H
 
 #include "raster/raster.h"
 
 /**
- * Gaussians in double, so that differences can move them by less than a float can hold: [GAUSSIANS_FIELD_COUNT][count], fields in order.
+ * Gaussians in double, so that differences can move them by less than a float can hold:
+ * [GAUSSIANS_FIELD_COUNT][count], fields in order.
  */
 typedef struct raster_reference {
     size_t count;
@@ -30,14 +37,16 @@ gbt_status raster_reference_make(const gaussians *g, raster_reference *out, gbt_
  * @param settings      [in]  of form RASTER_EWA
  * @param rgb           [out] [pixels][3], row by row, with the background; raster_reference_pixels() of them
  * @return GBT_OK, GBT_ERR_ARGUMENT (a camera with another lens), GBT_ERR_NO_MEMORY
- * Threads: parallel over pixels; same bits for every thread count. Cost: about 5 ns for each pair of pixel and Gaussian.
+ * Threads: parallel over pixels; same bits for every thread count. Cost: about 5 ns for each pair of pixel
+ * and Gaussian.
  */
-gbt_status raster_reference_forward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings, int step,
-                                    double *rgb, gbt_error *err);
+gbt_status raster_reference_forward(const raster_reference *scene, const gbt_camera *camera,
+                                    const raster_settings *settings, int step, double *rgb, gbt_error *err);
 
 /** Adjoint with step 1: adds dL/dfield (scales linear, quaternion tangent) and dL/dbackground. One thread. */
-gbt_status raster_reference_backward(const raster_reference *scene, const gbt_camera *camera, const raster_settings *settings,
-                                     const double *d_rgb, double *d_fields, double d_background[3], gbt_error *err);
+gbt_status raster_reference_backward(const raster_reference *scene, const gbt_camera *camera,
+                                     const raster_settings *settings, const double *d_rgb, double *d_fields,
+                                     double d_background[3], gbt_error *err);
 
 /** Pixels that raster_reference_forward() computes. */
 static inline size_t raster_reference_pixels(const gbt_camera *camera, int step)

@@ -1,7 +1,9 @@
-/* raster/ray_form16.h -- the per-ray form: response and order of docs/tracing.md on the lists of the tiles, and the adjoint.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* raster/ray_form16.h -- the per-ray form: response and order of docs/tracing.md on the lists of the tiles,
+   and the adjoint.
 
-   For the cross-check, not for speed: block by block all hits are gathered, sorted ray by ray, and blended. The adjoint does
-   the same again, so it needs no tape. Included by kernel.inc.h. */
+   For the cross-check, not for speed: block by block all hits are gathered, sorted ray by ray, and blended.
+   The adjoint does the same again, so it needs no tape. Included by kernel.inc.h. */
 #ifndef GBT_RASTER_RAY_FORM16_H
 #define GBT_RASTER_RAY_FORM16_H
 
@@ -10,80 +12,95 @@
 #include "base/vec.h"
 #include "raster/ewa16.h"
 
-/* A splat that at least one ray of the block hits. Gathered: t and alpha (0: no hit). Blended for the adjoint: dL/dalpha and T alpha. */
+/* A splat that at least one ray of the block hits. Gathered: t and alpha (0: no hit). Blended for the
+   adjoint: dL/dalpha and T alpha. */
 typedef struct ray_row {
     _Alignas(64) float t[PIXEL_LANES], alpha[PIXEL_LANES];
     uint32_t entry;
 } ray_row;
 
 typedef struct ray_hit {
-    uint64_t key; /* bits of t, then the index: depths are positive, so their bits are in the order of their values */
+    uint64_t key; /* bits of t, then the index: depths are positive, so their bits are in the order of their
+                     values */
     uint32_t row;
 } ray_hit;
 
-/* Rays (a, b, 1) in camera axes; a and b from those of the middle of the block, so that differences to a mean keep their digits. */
+/* Rays (a, b, 1) in camera axes; a and b from those of the middle of the block, so that differences to a mean
+   keep their digits. */
 typedef struct block_rays {
     double middle[2];
-    f16 a, b, length, depth_near;
+    vfloat16 a, b, length, depth_near;
 } block_rays;
 
 typedef struct ray_response {
-    f16 t, v[3], raw;
-    f16 da, db, w[3]; /* of ray_splat */
-    m16 clipped;      /* at the near depth */
+    vfloat16 t, v[3], raw;
+    vfloat16 da, db, w[3]; /* of ray_splat */
+    vmask16 clipped;       /* at the near depth */
 } ray_response;
 
 static inline block_rays rays_of(const tile_job *job, int block)
 {
     const raster_view *view = job->view;
-    const int x0 = job->x0 + block % BLOCKS_ACROSS * BLOCK_PIXELS, y0 = job->y0 + block / BLOCKS_ACROSS * BLOCK_PIXELS;
+    const int x0 = job->x0 + block % BLOCKS_ACROSS * BLOCK_PIXELS,
+              y0 = job->y0 + block / BLOCKS_ACROSS * BLOCK_PIXELS;
     _Alignas(64) float a[PIXEL_LANES], b[PIXEL_LANES], length[PIXEL_LANES];
     block_rays r = {.middle = {(x0 + 1.5 - view->cx) / view->fx, (y0 + 1.5 - view->cy) / view->fy}};
     for (int i = 0; i < PIXEL_LANES; i++) {
-        double dir[3] = {(x0 + i % BLOCK_PIXELS - view->cx) / view->fx, (y0 + i / BLOCK_PIXELS - view->cy) / view->fy, 1};
+        double dir[3] = {(x0 + i % BLOCK_PIXELS - view->cx) / view->fx,
+                         (y0 + i / BLOCK_PIXELS - view->cy) / view->fy, 1};
         length[i] = (float)dvec_length(dir);
         dvec_normalize(dir);
         dmat_apply_transposed(view->rotation, dir, dir);
         for (int k = 0; k < 3; k++)
             dir[k] = (double)(float)dir[k]; /* the ray that the tracer is given */
         dmat_apply(view->rotation, dir, dir);
-        a[i] = (float)(dir[0] / dir[2] - r.middle[0]), b[i] = (float)(dir[1] / dir[2] - r.middle[1]);
+        a[i] = (float)(dir[0] / dir[2] - r.middle[0]);
+        b[i] = (float)(dir[1] / dir[2] - r.middle[1]);
     }
-    r.a = f16_load(a), r.b = f16_load(b), r.length = f16_load(length);
-    r.depth_near = f16_div(f16_set1(view->settings.near), r.length);
+    r.a = vfloat16_load(a);
+    r.b = vfloat16_load(b);
+    r.length = vfloat16_load(length);
+    r.depth_near = vfloat16_div(vfloat16_set1(view->settings.near), r.length);
     return r;
 }
 
-static inline f16 dot_rays(const f16 a[3], const f16 b[3])
+static inline vfloat16 dot_rays(const vfloat16 a[3], const vfloat16 b[3])
 {
-    return f16_fma(a[0], b[0], f16_fma(a[1], b[1], f16_mul(a[2], b[2])));
+    return vfloat16_fma(a[0], b[0], vfloat16_fma(a[1], b[1], vfloat16_mul(a[2], b[2])));
 }
 
-static inline ray_response ray_respond(const ray_splat *g, float opacity, const block_rays *rays, float t_near)
+static inline ray_response ray_respond(const ray_splat *g, float opacity, const block_rays *rays,
+                                       float t_near)
 {
-    ray_response r = {.da = f16_sub(rays->a, f16_set1((float)(g->a0 - rays->middle[0]))),
-                      .db = f16_sub(rays->b, f16_set1((float)(g->b0 - rays->middle[1])))};
-    f16 y[3];
+    ray_response r = {.da = vfloat16_sub(rays->a, vfloat16_set1((float)(g->a0 - rays->middle[0]))),
+                      .db = vfloat16_sub(rays->b, vfloat16_set1((float)(g->b0 - rays->middle[1])))};
+    vfloat16 y[3];
     for (int k = 0; k < 3; k++) {
-        const f16 p = f16_fma(f16_set1(g->wa[k]), r.da, f16_mul(f16_set1(g->wb[k]), r.db));
-        r.w[k] = f16_add(f16_set1(g->w0[k]), p);
-        y[k] = f16_fma(f16_set1(g->depth_per_sigma), p, f16_set1(g->y0[k]));
+        const vfloat16 p =
+            vfloat16_fma(vfloat16_set1(g->wa[k]), r.da, vfloat16_mul(vfloat16_set1(g->wb[k]), r.db));
+        r.w[k] = vfloat16_add(vfloat16_set1(g->w0[k]), p);
+        y[k] = vfloat16_fma(vfloat16_set1(g->depth_per_sigma), p, vfloat16_set1(g->y0[k]));
     }
-    f16 step = f16_sub(f16_set1(0), f16_div(dot_rays(y, r.w), dot_rays(r.w, r.w)));
-    const f16 near_step = f16_mul(f16_sub(rays->depth_near, f16_set1(g->depth)), f16_set1(g->sigma_inverse));
-    r.clipped = f16_le(step, near_step);
-    step = f16_select(r.clipped, near_step, step);
+    vfloat16 step = vfloat16_sub(vfloat16_set1(0), vfloat16_div(dot_rays(y, r.w), dot_rays(r.w, r.w)));
+    const vfloat16 near_step = vfloat16_mul(vfloat16_sub(rays->depth_near, vfloat16_set1(g->depth)),
+                                            vfloat16_set1(g->sigma_inverse));
+    r.clipped = vfloat16_le(step, near_step);
+    step = vfloat16_select(r.clipped, near_step, step);
     for (int k = 0; k < 3; k++)
-        r.v[k] = f16_fma(step, r.w[k], y[k]);
-    r.t = f16_select(r.clipped, f16_set1(t_near), f16_mul(f16_fma(step, f16_set1(g->sigma), f16_set1(g->depth)), rays->length));
-    const f16 exponent = f16_mul(f16_set1((float)-HALF_LOG2_E), dot_rays(r.v, r.v));
-    r.raw = f16_mul(f16_set1(opacity), f16_exp2(f16_max(exponent, f16_set1(-120.0f))));
+        r.v[k] = vfloat16_fma(step, r.w[k], y[k]);
+    r.t = vfloat16_select(
+        r.clipped, vfloat16_set1(t_near),
+        vfloat16_mul(vfloat16_fma(step, vfloat16_set1(g->sigma), vfloat16_set1(g->depth)), rays->length));
+    const vfloat16 exponent = vfloat16_mul(vfloat16_set1((float)-HALF_LOG2_E), dot_rays(r.v, r.v));
+    r.raw =
+        vfloat16_mul(vfloat16_set1(opacity), vfloat16_exp2(vfloat16_max(exponent, vfloat16_set1(-120.0f))));
     return r;
 }
 
-/* v at an inner depth once more, for the adjoint: v = w x (y x w) / |w|^2 with y x w = m/sigma (da wa x w0 + db wb x w0), the rest
-   cancels exactly. On a flat Gaussian the v of ray_respond() is a small difference of large numbers along the thin axis. d2 does not feel
-   that, but the gradients of mean and rotation, which are divided by the thin axis, do. Not where y0 has a part in y. */
+/* v at an inner depth once more, for the adjoint: v = w x (y x w) / |w|^2 with y x w = m/sigma (da wa x w0 +
+   db wb x w0), the rest cancels exactly. On a flat Gaussian the v of ray_respond() is a small difference of
+   large numbers along the thin axis. d2 does not feel that, but the gradients of mean and rotation, which are
+   divided by the thin axis, do. Not where y0 has a part in y. */
 static inline void refine_v(const ray_splat *g, ray_response *r)
 {
     double a[3], b[3];
@@ -94,22 +111,24 @@ static inline void refine_v(const ray_splat *g, ray_response *r)
         return;
     dvec_cross(wa, w0, a);
     dvec_cross(wb, w0, b);
-    f16 c[3];
+    vfloat16 c[3];
     for (int k = 0; k < 3; k++)
-        c[k] = f16_fma(f16_set1((float)a[k]), r->da, f16_mul(f16_set1((float)b[k]), r->db));
-    const f16 scale = f16_div(f16_set1(g->depth_per_sigma), dot_rays(r->w, r->w));
+        c[k] =
+            vfloat16_fma(vfloat16_set1((float)a[k]), r->da, vfloat16_mul(vfloat16_set1((float)b[k]), r->db));
+    const vfloat16 scale = vfloat16_div(vfloat16_set1(g->depth_per_sigma), dot_rays(r->w, r->w));
     for (int k = 0; k < 3; k++) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
-        const f16 v = f16_mul(scale, f16_sub(f16_mul(r->w[i], c[j]), f16_mul(r->w[j], c[i])));
-        r->v[k] = f16_select(r->clipped, r->v[k], v);
+        const vfloat16 v =
+            vfloat16_mul(scale, vfloat16_sub(vfloat16_mul(r->w[i], c[j]), vfloat16_mul(r->w[j], c[i])));
+        r->v[k] = vfloat16_select(r->clipped, r->v[k], v);
     }
 }
 
 /* Which blocks does every entry of the tile reach. False when memory ran out. */
 static inline bool find_reached(const tile_job *job, ray_scratch *scratch)
 {
-    if (mem_reserve((void **)&scratch->reached, &scratch->reached_capacity, 0, job->count, sizeof *scratch->reached, "entries of a tile",
-                    NULL) != GBT_OK)
+    if (mem_reserve((void **)&scratch->reached, &scratch->reached_capacity, 0, job->count,
+                    sizeof *scratch->reached, "entries of a tile", NULL) != GBT_OK)
         return false;
     for (size_t e = 0; e < job->count; e++) {
         const splat *s = &job->splats[job->entries[e].splat];
@@ -121,28 +140,34 @@ static inline bool find_reached(const tile_job *job, ray_scratch *scratch)
 }
 
 /* All hits of a block. False when memory ran out. */
-static inline bool gather_rows(tile_job *job, int block, const block_rays *rays, ray_scratch *scratch, size_t *count)
+static inline bool gather_rows(tile_job *job, int block, const block_rays *rays, ray_scratch *scratch,
+                               size_t *count)
 {
     const raster_settings *settings = &job->view->settings;
-    const m16 inside = m16_from_bits(pixels_inside(job, block));
+    const vmask16 inside = vmask16_from_bits(pixels_inside(job, block));
     *count = 0;
     for (size_t e = 0; e < job->count; e++) {
         const splat *s = &job->splats[job->entries[e].splat];
         if ((scratch->reached[e] >> block & 1) == 0)
             continue;
-        const ray_response r = ray_respond(&job->rays[job->entries[e].splat], s->opacity, rays, settings->near);
-        const m16 hit = m16_and(f16_le(f16_set1(settings->alpha_min), r.raw), inside);
+        const ray_response r =
+            ray_respond(&job->rays[job->entries[e].splat], s->opacity, rays, settings->near);
+        const vmask16 hit = vmask16_and(vfloat16_le(vfloat16_set1(settings->alpha_min), r.raw), inside);
         job->counts.tests += PIXEL_LANES;
-        if (!m16_any(hit))
+        if (!vmask16_any(hit))
             continue;
-        if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, *count, *count + 1, sizeof(ray_row), "rows of a block",
-                        NULL) != GBT_OK)
+        if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, *count, *count + 1, sizeof(ray_row),
+                        "rows of a block", NULL) != GBT_OK)
             return false;
         ray_row *row = &scratch->rows[(*count)++];
-        f16_store(row->t, r.t), f16_store(row->alpha, f16_select(hit, f16_min(r.raw, f16_set1(settings->alpha_max)), f16_set1(0)));
+        vfloat16_store(row->t, r.t),
+            vfloat16_store(row->alpha,
+                           vfloat16_select(hit, vfloat16_min(r.raw, vfloat16_set1(settings->alpha_max)),
+                                           vfloat16_set1(0)));
         row->entry = (uint32_t)e;
     }
-    return mem_reserve((void **)&scratch->hits, &scratch->hit_capacity, 0, *count, sizeof(ray_hit), "hits of a ray", NULL) == GBT_OK;
+    return mem_reserve((void **)&scratch->hits, &scratch->hit_capacity, 0, *count, sizeof(ray_hit),
+                       "hits of a ray", NULL) == GBT_OK;
 }
 
 static int compare_hits(const void *a, const void *b)
@@ -179,7 +204,8 @@ static inline size_t hits_of_ray(const tile_job *job, const ray_scratch *scratch
         uint32_t bits = row->entry;
         if (!job->view->settings.order_by_center)
             memcpy(&bits, &row->t[lane], sizeof bits);
-        scratch->hits[count++] = (ray_hit){(uint64_t)bits << 32 | job->splats[job->entries[row->entry].splat].id, (uint32_t)i};
+        scratch->hits[count++] =
+            (ray_hit){(uint64_t)bits << 32 | job->splats[job->entries[row->entry].splat].id, (uint32_t)i};
     }
     sort_ray(scratch->hits, count);
     return count;
@@ -191,7 +217,8 @@ static inline const float *row_color(const tile_job *job, const ray_scratch *scr
 }
 
 /* Front to back. Returns how many hits were blended. */
-static inline size_t blend_ray(const tile_job *job, const ray_scratch *scratch, size_t count, int lane, float rgb[3], float *transmittance)
+static inline size_t blend_ray(const tile_job *job, const ray_scratch *scratch, size_t count, int lane,
+                               float rgb[3], float *transmittance)
 {
     size_t i = 0;
     float T = 1;
@@ -231,10 +258,12 @@ static bool forward_rays(tile_job *job, ray_scratch *scratch)
 }
 
 /* Back to front; t and alpha of the ray's rows become dL/dalpha and T alpha, 0 where nothing was blended. */
-static inline void return_ray(tile_job *job, ray_scratch *scratch, size_t row_count, int lane, const float d_rgb[3])
+static inline void return_ray(tile_job *job, ray_scratch *scratch, size_t row_count, int lane,
+                              const float d_rgb[3])
 {
     float rgb[3], T, behind = 0;
-    const size_t count = hits_of_ray(job, scratch, row_count, lane), blended = blend_ray(job, scratch, count, lane, rgb, &T);
+    const size_t count = hits_of_ray(job, scratch, row_count, lane),
+                 blended = blend_ray(job, scratch, count, lane, rgb, &T);
     for (int c = 0; c < 3; c++) {
         behind = fmaf(d_rgb[c], job->view->settings.background[c], behind);
         job->d_background[c] += T * d_rgb[c];
@@ -251,31 +280,37 @@ static inline void return_ray(tile_job *job, ray_scratch *scratch, size_t row_co
         const float difference = color[0] * d_rgb[0] + color[1] * d_rgb[1] + color[2] * d_rgb[2] - behind;
         T /= 1 - alpha;
         behind = fmaf(alpha, difference, behind);
-        row->t[lane] = T * difference, row->alpha[lane] = T * alpha;
+        row->t[lane] = T * difference;
+        row->alpha[lane] = T * alpha;
     }
 }
 
 /* What the rays of a block add to the record of one splat. */
-static inline void add_row(const tile_job *job, const ray_row *row, const block_rays *rays, const f16 d_rgb[3])
+static inline void add_row(const tile_job *job, const ray_row *row, const block_rays *rays,
+                           const vfloat16 d_rgb[3])
 {
     const tile_entry *entry = &job->entries[row->entry];
     const splat *s = &job->splats[entry->splat];
     ray_response r = ray_respond(&job->rays[entry->splat], s->opacity, rays, job->view->settings.near);
     refine_v(&job->rays[entry->splat], &r);
-    const f16 zero = f16_set1(0), weight = f16_load(row->alpha), d_alpha = f16_load(row->t);
-    const m16 moves = m16_and(f16_lt(r.raw, f16_set1(job->view->settings.alpha_max)), f16_lt(zero, weight));
-    const f16 q = f16_select(moves, f16_mul(r.raw, d_alpha), zero);
-    f16 v[3], sum[RAY_SUMS];
+    const vfloat16 zero = vfloat16_set1(0), weight = vfloat16_load(row->alpha),
+                   d_alpha = vfloat16_load(row->t);
+    const vmask16 moves = vmask16_and(vfloat16_lt(r.raw, vfloat16_set1(job->view->settings.alpha_max)),
+                                      vfloat16_lt(zero, weight));
+    const vfloat16 q = vfloat16_select(moves, vfloat16_mul(r.raw, d_alpha), zero);
+    vfloat16 v[3], sum[RAY_SUMS];
     for (int k = 0; k < 3; k++)
-        v[k] = f16_select(moves, r.v[k], zero); /* what is not hit may be anything */
+        v[k] = vfloat16_select(moves, r.v[k], zero); /* what is not hit may be anything */
     sum[0] = q;
     for (int k = 0; k < 3; k++) {
-        sum[1 + k] = f16_mul(q, v[k]);
-        sum[4 + k] = f16_mul(sum[1 + k], v[k]);
-        sum[RAY_COLOR + k] = f16_mul(weight, d_rgb[k]);
+        sum[1 + k] = vfloat16_mul(q, v[k]);
+        sum[4 + k] = vfloat16_mul(sum[1 + k], v[k]);
+        sum[RAY_COLOR + k] = vfloat16_mul(weight, d_rgb[k]);
     }
     sum[RAY_WEIGHT] = weight;
-    sum[7] = f16_mul(sum[2], v[2]), sum[8] = f16_mul(sum[3], v[0]), sum[9] = f16_mul(sum[1], v[1]);
+    sum[7] = vfloat16_mul(sum[2], v[2]);
+    sum[8] = vfloat16_mul(sum[3], v[0]);
+    sum[9] = vfloat16_mul(sum[1], v[1]);
     float total[RAY_SUMS], *record = job->records + (size_t)entry->pair * RAY_SUMS;
     store_sums(sum, RAY_SUMS, total);
     for (int k = 0; k < RAY_SUMS; k++)
@@ -291,18 +326,20 @@ static bool backward_rays(tile_job *job, ray_scratch *scratch)
     for (int block = 0; block < TILE_BLOCKS; block++) {
         const block_rays rays = rays_of(job, block);
         const unsigned inside = pixels_inside(job, block);
-        f16 d_rgb[3];
+        vfloat16 d_rgb[3];
         size_t row_count;
         if (!gather_rows(job, block, &rays, scratch, &row_count))
             return false;
         for (int c = 0; c < 3; c++)
-            d_rgb[c] = f16_load(job->pixels->rgb[block][c]);
+            d_rgb[c] = vfloat16_load(job->pixels->rgb[block][c]);
         for (int lane = 0; lane < PIXEL_LANES; lane++) {
-            const float d[3] = {job->pixels->rgb[block][0][lane], job->pixels->rgb[block][1][lane], job->pixels->rgb[block][2][lane]};
+            const float d[3] = {job->pixels->rgb[block][0][lane], job->pixels->rgb[block][1][lane],
+                                job->pixels->rgb[block][2][lane]};
             if (inside >> lane & 1)
                 return_ray(job, scratch, row_count, lane, d);
         }
-        /* Lanes outside the image have no hits: their alpha is 0 in all rows, so that their t is not read as a gradient. */
+        /* Lanes outside the image have no hits: their alpha is 0 in all rows, so that their t is not read as
+           a gradient. */
         for (size_t i = 0; i < row_count; i++)
             add_row(job, &scratch->rows[i], &rays, d_rgb);
     }

@@ -1,5 +1,6 @@
-/* raster/reach16.h -- which of sixteen squares of pixels a splat's ellipse reaches: tiles of the image, blocks of a tile.
-   Included by kernel.inc.h. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* raster/reach16.h -- which of sixteen squares of pixels a splat's ellipse reaches: tiles of the image,
+   blocks of a tile. Included by kernel.inc.h. */
 #ifndef GBT_RASTER_REACH16_H
 #define GBT_RASTER_REACH16_H
 
@@ -10,31 +11,38 @@
 static const _Alignas(64) float lane_column[16] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
 static const _Alignas(64) float lane_row[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
 
-static inline f16 clamp16(f16 a, f16 low, f16 high)
+static inline vfloat16 clamp16(vfloat16 a, vfloat16 low, vfloat16 high)
 {
-    return f16_min(f16_max(a, low), high);
+    return vfloat16_min(vfloat16_max(a, low), high);
 }
 
 /* u^2 + v^2 at (dx, dy). */
-static inline f16 ellipse_square(const float chol[3], f16 dx, f16 dy)
+static inline vfloat16 ellipse_square(const float chol[3], vfloat16 dx, vfloat16 dy)
 {
-    const f16 u = f16_fma(f16_set1(chol[0]), dx, f16_mul(f16_set1(chol[1]), dy)), v = f16_mul(f16_set1(chol[2]), dy);
-    return f16_fma(u, u, f16_mul(v, v));
+    const vfloat16 u = vfloat16_fma(vfloat16_set1(chol[0]), dx, vfloat16_mul(vfloat16_set1(chol[1]), dy)),
+                   v = vfloat16_mul(vfloat16_set1(chol[2]), dy);
+    return vfloat16_fma(u, u, vfloat16_mul(v, v));
 }
 
-/* Does the ellipse about (x, y) reach squares of `side` pixels, 4 x 4 of them from the origin? The form is convex: seen from a square, its
-   smallest value is at the centre, or on the edge that is nearest to it across or down. */
+/* Does the ellipse about (x, y) reach squares of `side` pixels, 4 x 4 of them from the origin? The form is
+   convex: seen from a square, its smallest value is at the centre, or on the edge that is nearest to it
+   across or down. */
 static inline unsigned reached_squares(const splat *s, float x, float y, float side)
 {
-    const f16 zero = f16_set1(0), last = f16_set1(side - 1);
-    const f16 right = f16_fnma(f16_load(lane_column), f16_set1(side), f16_set1(x)), left = f16_sub(right, last);
-    const f16 bottom = f16_fnma(f16_load(lane_row), f16_set1(side), f16_set1(y)), top = f16_sub(bottom, last);
-    const f16 near_x = clamp16(zero, left, right), near_y = clamp16(zero, top, bottom);
+    const vfloat16 zero = vfloat16_set1(0), last = vfloat16_set1(side - 1);
+    const vfloat16 right = vfloat16_fnma(vfloat16_load(lane_column), vfloat16_set1(side), vfloat16_set1(x)),
+                   left = vfloat16_sub(right, last);
+    const vfloat16 bottom = vfloat16_fnma(vfloat16_load(lane_row), vfloat16_set1(side), vfloat16_set1(y)),
+                   top = vfloat16_sub(bottom, last);
+    const vfloat16 near_x = clamp16(zero, left, right), near_y = clamp16(zero, top, bottom);
     const float yy = s->chol[1] * s->chol[1] + s->chol[2] * s->chol[2];
-    const float across = s->chol[0] > 0 ? -s->chol[1] / s->chol[0] : 0, down = yy > 0 ? -s->chol[0] * s->chol[1] / yy : 0;
-    const f16 on_row = ellipse_square(s->chol, clamp16(f16_mul(f16_set1(across), near_y), left, right), near_y);
-    const f16 on_column = ellipse_square(s->chol, near_x, clamp16(f16_mul(f16_set1(down), near_x), top, bottom));
-    return m16_bits(f16_le(f16_min(on_row, on_column), f16_set1(s->reach)));
+    const float across = s->chol[0] > 0 ? -s->chol[1] / s->chol[0] : 0,
+                down = yy > 0 ? -s->chol[0] * s->chol[1] / yy : 0;
+    const vfloat16 on_row =
+        ellipse_square(s->chol, clamp16(vfloat16_mul(vfloat16_set1(across), near_y), left, right), near_y);
+    const vfloat16 on_column =
+        ellipse_square(s->chol, near_x, clamp16(vfloat16_mul(vfloat16_set1(down), near_x), top, bottom));
+    return vmask16_bits(vfloat16_le(vfloat16_min(on_row, on_column), vfloat16_set1(s->reach)));
 }
 
 static size_t reach(const raster_view *view, const splat *s, uint32_t *tiles)
@@ -49,8 +57,9 @@ static size_t reach(const raster_view *view, const splat *s, uint32_t *tiles)
         for (int x = x0; x < x1; x += 4) {
             const int columns = x1 - x < 4 ? x1 - x : 4, rows = y1 - y < 4 ? y1 - y : 4;
             const unsigned inside = (0xFu >> (4 - columns)) * 0x1111u & 0xFFFFu >> (16 - 4 * rows);
-            unsigned bits = reached_squares(s, (float)(s->center[0] - x * TILE_PIXELS), (float)(s->center[1] - y * TILE_PIXELS),
-                                            TILE_PIXELS) & inside;
+            unsigned bits = reached_squares(s, (float)(s->center[0] - x * TILE_PIXELS),
+                                            (float)(s->center[1] - y * TILE_PIXELS), TILE_PIXELS) &
+                            inside;
             for (; bits != 0; bits &= bits - 1) {
                 const int i = __builtin_ctz(bits);
                 tiles[count++] = (uint32_t)((y + i / 4) * view->tiles_across + x + i % 4);

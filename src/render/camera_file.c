@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/camera_file.c -- a camera file: one picture to take, in JSON. */
 #include "render/camera_file.h"
 
@@ -10,11 +11,18 @@
 enum { SAMPLES_MAX = 65536 };
 #define PI 3.14159265358979323846
 
-typedef enum file_model { FILE_PINHOLE, FILE_ORTHOGRAPHIC, FILE_EQUIRECTANGULAR, FILE_FISHEYE, FILE_MODEL_COUNT } file_model;
+typedef enum file_model {
+    FILE_PINHOLE,
+    FILE_ORTHOGRAPHIC,
+    FILE_EQUIRECTANGULAR,
+    FILE_FISHEYE,
+    FILE_MODEL_COUNT
+} file_model;
 
 static gbt_status take_lens(const json_fields *r, gbt_camera *camera)
 {
-    static const char *const names[FILE_MODEL_COUNT] = {"pinhole", "orthographic", "equirectangular", "fisheye"};
+    static const char *const names[FILE_MODEL_COUNT] = {"pinhole", "orthographic", "equirectangular",
+                                                        "fisheye"};
     int model;
     double fov_deg = 0, view_width = 0;
     GBT_TRY(json_field_choice(r, "model", names, FILE_MODEL_COUNT, &model));
@@ -28,21 +36,28 @@ static gbt_status take_lens(const json_fields *r, gbt_camera *camera)
     else if (json_field_given(r, "fov_x_deg"))
         return json_field_fail(r, "fov_x_deg", "this model has none (wanted it with pinhole or fisheye)");
     if (model == FILE_ORTHOGRAPHIC)
-        GBT_TRY(json_field_needed(r, "view_width", "units of the data set from the left edge of the picture to the right"));
+        GBT_TRY(json_field_needed(r, "view_width",
+                                  "units of the data set from the left edge of the picture to the right"));
     else if (json_field_given(r, "view_width"))
         return json_field_fail(r, "view_width", "this model has none (wanted it with orthographic)");
     GBT_TRY(json_field_number(r, "fov_x_deg", 0, false, model == FILE_FISHEYE ? 360 : 179.9, &fov_deg));
     GBT_TRY(json_field_number(r, "view_width", 0, false, JSON_VALUE_MAX, &view_width));
-    const double half_width = 0.5 * camera->width, half_height = 0.5 * camera->height, half_fov = fov_deg * PI / 360;
-    const double scale = model == FILE_PINHOLE ? half_width / tan(half_fov) : model == FILE_FISHEYE ? half_width / half_fov
-                         : camera->width / view_width;
-    static const gbt_camera_model models[FILE_MODEL_COUNT] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_EQUIRECTANGULAR,
-                                                              GBT_CAMERA_FISHEYE};
+    const double half_width = 0.5 * camera->width, half_height = 0.5 * camera->height,
+                 half_fov = fov_deg * PI / 360;
+    const double scale = model == FILE_PINHOLE   ? half_width / tan(half_fov)
+                         : model == FILE_FISHEYE ? half_width / half_fov
+                                                 : camera->width / view_width;
+    static const gbt_camera_model models[FILE_MODEL_COUNT] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC,
+                                                              GBT_CAMERA_EQUIRECTANGULAR, GBT_CAMERA_FISHEYE};
     camera->model = models[model];
-    if (model == FILE_EQUIRECTANGULAR)
-        camera->params[0] = camera->width, camera->params[1] = camera->height;
-    else
-        camera->params[0] = camera->params[1] = scale, camera->params[2] = half_width, camera->params[3] = half_height;
+    if (model == FILE_EQUIRECTANGULAR) {
+        camera->params[0] = camera->width;
+        camera->params[1] = camera->height;
+    } else {
+        camera->params[0] = camera->params[1] = scale;
+        camera->params[2] = half_width;
+        camera->params[3] = half_height;
+    }
     return GBT_OK;
 }
 
@@ -51,22 +66,26 @@ typedef struct stand {
     double origin[3], target[3], up[3];
 } stand;
 
-static gbt_status take_pose(const json_fields *r, bool needed, const double origin[3], stand *at, gbt_camera *camera)
+static gbt_status take_pose(const json_fields *r, bool needed, const double origin[3], stand *at,
+                            gbt_camera *camera)
 {
     GBT_TRY(json_field_vector(r, "origin", needed, at->origin));
     GBT_TRY(json_field_vector(r, "target", needed, at->target));
     GBT_TRY(json_field_vector(r, "up", needed, at->up));
     double local[3], target[3];
-    for (int i = 0; i < 3; i++)
-        local[i] = at->origin[i] - origin[i], target[i] = at->target[i] - origin[i];
+    for (int i = 0; i < 3; i++) {
+        local[i] = at->origin[i] - origin[i];
+        target[i] = at->target[i] - origin[i];
+    }
     if (gbt_camera_look_at(local, target, at->up, camera))
         return GBT_OK;
     const bool same = memcmp(at->origin, at->target, sizeof at->origin) == 0;
     return same ? json_field_fail(r, "target", "is the origin (wanted another point)")
-           : json_field_fail(r, "up", "is 0, or along the view");
+                : json_field_fail(r, "up", "is 0, or along the view");
 }
 
-static gbt_status take_shutter(const json_fields *r, const double origin[3], const stand *start, ray_shot *shot)
+static gbt_status take_shutter(const json_fields *r, const double origin[3], const stand *start,
+                               ray_shot *shot)
 {
     static const char *const directions[] = {"rows", "columns"};
     int direction;
@@ -74,8 +93,9 @@ static gbt_status take_shutter(const json_fields *r, const double origin[3], con
     const json_t *end = json_object_get(r->object, "end");
     shot->end = shot->camera;
     if (end == NULL)
-        return json_field_given(r, "shutter") ? json_field_fail(r, "end", "missing (a shutter wants the pose at the end of its way)")
-               : GBT_OK;
+        return json_field_given(r, "shutter")
+                   ? json_field_fail(r, "end", "missing (a shutter wants the pose at the end of its way)")
+                   : GBT_OK;
     if (!json_is_object(end))
         return json_field_fail(r, "end", "wanted an object with origin, target or up");
     const json_fields inner = {r->path, "end.", end, r->err};
@@ -117,8 +137,8 @@ gbt_status camera_file_take(const json_fields *r, const double origin[3], camera
     out->shot = ray_shot_of(&camera);
     if (json_field_given(r, "rays"))
         return take_rays(r, origin, out);
-    GBT_TRY(json_field_names(r, " origin target up model width height fov_x_deg view_width aperture focus samples seed end shutter rays "
-                                "near_clip far_clip "));
+    GBT_TRY(json_field_names(r, " origin target up model width height fov_x_deg view_width aperture focus "
+                                "samples seed end shutter rays near_clip far_clip "));
     stand start = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     GBT_TRY(take_lens(r, &camera));
     GBT_TRY(take_pose(r, true, origin, &start, &camera));
@@ -142,14 +162,16 @@ gbt_status camera_file_read(const char *path, const double origin[3], camera_fil
     return status;
 }
 
-gbt_status camera_text_read(const char *text, const char *name, const double origin[3], ray_shot *out, gbt_error *err)
+gbt_status camera_text_read(const char *text, const char *name, const double origin[3], ray_shot *out,
+                            gbt_error *err)
 {
     json_t *root;
     camera_file taken = {0};
     GBT_TRY(json_read_text(text, strlen(text), name, &root, err));
     const json_fields r = {name, "", root, err};
-    const gbt_status status = json_field_given(&r, "rays") ? json_field_fail(&r, "rays", "only a camera file can name them")
-                                                            : camera_file_take(&r, origin, &taken);
+    const gbt_status status = json_field_given(&r, "rays")
+                                  ? json_field_fail(&r, "rays", "only a camera file can name them")
+                                  : camera_file_take(&r, origin, &taken);
     json_decref(root);
     *out = taken.shot;
     return status;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/camera_file.h -- a camera file: one picture to take, in JSON. */
 #ifndef GBT_RENDER_CAMERA_FILE_H
 #define GBT_RENDER_CAMERA_FILE_H
@@ -11,16 +12,20 @@ typedef struct camera_file {
 } camera_file;
 
 /**
- * Read a camera file. Fields, units and defaults: docs/cameras.md. Every field is checked, and a field of another name is an error.
+ * Read a camera file. Fields, units and defaults: docs/cameras.md. Every field is checked, and a field of
+ * another name is an error.
  *
- * @param origin [in]  the scene's local origin: subtracted, in double, from what the file says in the data set's own coordinates
+ * @param origin [in]  the scene's local origin: subtracted, in double, from what the file says in the data
+ *                     set's own coordinates
  * @param out    [out] free with camera_file_free() after success or failure
  * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT ("FILE: field: what was wrong"), GBT_ERR_NO_MEMORY
  */
 gbt_status camera_file_read(const char *path, const double origin[3], camera_file *out, gbt_error *err);
 
-/** The same from a text, which cannot name an image of rays: what it says is the shot. `name` stands for the file in messages. */
-gbt_status camera_text_read(const char *text, const char *name, const double origin[3], ray_shot *out, gbt_error *err);
+/** The same from a text, which cannot name an image of rays: what it says is the shot. `name` stands for the
+    file in messages. */
+gbt_status camera_text_read(const char *text, const char *name, const double origin[3], ray_shot *out,
+                            gbt_error *err);
 
 void camera_file_free(camera_file *file); /* zeroes the struct */
 

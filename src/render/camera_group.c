@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/camera_group.c -- what a set of cameras has in common. */
 #include "render/camera_group.h"
 
@@ -10,7 +11,8 @@
 #include "base/symmetric.h"
 #include "base/vec.h"
 
-/* Cameras are taken to lie in a plane when their spread across it is below this share of the next larger, and it faces up. */
+/* Cameras are taken to lie in a plane when their spread across it is below this share of the next larger, and
+   it faces up. */
 static const double flat_share = 0.2, flat_cosine = 0.7;
 static const double tan_widest = 2; /* of a lens that no pinhole stands for, 127 degrees */
 
@@ -50,7 +52,8 @@ static void find_up(const gbt_camera *cameras, size_t count, const double middle
     dvec_normalize(up);
     for (size_t i = 0; i < count; i++)
         for (int k = 0; k < 9; k++)
-            spread[k] += (cameras[i].center[k / 3] - middle[k / 3]) * (cameras[i].center[k % 3] - middle[k % 3]);
+            spread[k] +=
+                (cameras[i].center[k / 3] - middle[k / 3]) * (cameras[i].center[k % 3] - middle[k % 3]);
     symmetric_eigen(spread, axes, 3, 1e-15);
     int low = 0;
     for (int k = 1; k < 3; k++)
@@ -96,8 +99,8 @@ static bool nearest_to_axes(const gbt_camera *cameras, size_t count, const doubl
 }
 
 /** Along the mean direction of view, as deep as the points in front; false without such. */
-static bool amid_points(const gbt_camera *cameras, size_t count, const double middle[3], const float *points, size_t point_count,
-                        double *depth, double out[3])
+static bool amid_points(const gbt_camera *cameras, size_t count, const double middle[3], const float *points,
+                        size_t point_count, double *depth, double out[3])
 {
     double forward[3];
     size_t found = 0;
@@ -132,14 +135,18 @@ static void find_lens(const gbt_camera *cameras, size_t count, double *scratch, 
     const double tan_short = known > 0 ? median(scratch, known) : 0.5;
     const int width = cameras[0].width, height = cameras[0].height;
     const double focal = 0.5 * (width < height ? width : height) / tan_short;
-    *out = (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = width, .height = height, .params = {focal, focal, 0.5 * width, 0.5 * height},
+    *out = (gbt_camera){.model = GBT_CAMERA_PINHOLE,
+                        .width = width,
+                        .height = height,
+                        .params = {focal, focal, 0.5 * width, 0.5 * height},
                         .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 }
 
-gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const float *points, size_t point_count, camera_group *out,
-                             gbt_error *err)
+gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const float *points, size_t point_count,
+                             camera_group *out, gbt_error *err)
 {
-    double middle[3], *scratch = mem_alloc(count > point_count ? count : point_count, sizeof *scratch, "cameras", err);
+    double middle[3],
+        *scratch = mem_alloc(count > point_count ? count : point_count, sizeof *scratch, "cameras", err);
     if (scratch == NULL)
         return GBT_ERR_NO_MEMORY;
     memset(out, 0, sizeof *out);
@@ -165,9 +172,12 @@ gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const floa
 gbt_camera camera_group_lens(const camera_group *group, int width, int height)
 {
     gbt_camera out = group->lens;
-    const int shorter = width < height ? width : height, before = out.width < out.height ? out.width : out.height;
+    const int shorter = width < height ? width : height,
+              before = out.width < out.height ? out.width : out.height;
     out.params[0] = out.params[1] = group->lens.params[0] * shorter / before;
-    out.width = width, out.height = height;
-    out.params[2] = 0.5 * width, out.params[3] = 0.5 * height;
+    out.width = width;
+    out.height = height;
+    out.params[2] = 0.5 * width;
+    out.params[3] = 0.5 * height;
     return out;
 }

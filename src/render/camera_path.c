@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/camera_path.c -- the cameras of a film, one a frame. */
 #include "render/camera_path.h"
 
@@ -17,7 +18,8 @@ gbt_status camera_path_alloc(camera_path *out, size_t count, gbt_error *err)
 {
     *out = (camera_path){.count = count};
     if (count < 1 || count > CAMERA_PATH_FRAMES_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--frames: %zu (wanted 1 to %d)", count, (int)CAMERA_PATH_FRAMES_MAX);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--frames: %zu (wanted 1 to %d)", count,
+                         (int)CAMERA_PATH_FRAMES_MAX);
     out->shots = mem_calloc(count, sizeof *out->shots, "camera path", err);
     return out->shots != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
@@ -28,7 +30,7 @@ void camera_path_free(camera_path *path)
     *path = (camera_path){0};
 }
 
-/* ---- around -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- around ---- */
 
 /** Where a camera stands around the axis. */
 typedef struct station {
@@ -54,8 +56,11 @@ static void make_axes(const double up[3], const double towards[3], circle *c)
     memcpy(c->axis, up, sizeof c->axis);
     for (int k = 0; k < 3; k++)
         c->across[0][k] = towards[k] - along * up[k];
-    if (!(dvec_length(c->across[0]) > 1e-9 * dvec_length(towards))) { /* straight above: any direction will do */
-        const int least = fabs(up[0]) <= fabs(up[1]) && fabs(up[0]) <= fabs(up[2]) ? 0 : fabs(up[1]) <= fabs(up[2]) ? 1 : 2;
+    if (!(dvec_length(c->across[0]) > 1e-9 * dvec_length(towards))) { /* straight above: any direction will do
+                                                                       */
+        const int least = fabs(up[0]) <= fabs(up[1]) && fabs(up[0]) <= fabs(up[2]) ? 0
+                          : fabs(up[1]) <= fabs(up[2])                             ? 1
+                                                                                   : 2;
         for (int k = 0; k < 3; k++)
             c->across[0][k] = (k == least) - up[least] * up[k];
     }
@@ -63,7 +68,8 @@ static void make_axes(const double up[3], const double towards[3], circle *c)
     dvec_cross(c->axis, c->across[0], c->across[1]);
 }
 
-/** The arc that the stations cover: what the largest gap between neighbours leaves, without the outermost of many. */
+/** The arc that the stations cover: what the largest gap between neighbours leaves, without the outermost of
+    many. */
 static void find_arc(circle *c)
 {
     static const double gap_most = PI / 2, arc_least = 40 * PI / 180;
@@ -71,19 +77,25 @@ static void find_arc(circle *c)
     size_t first = 0;
     double gap = c->stations[0].angle + 2 * PI - c->stations[n - 1].angle;
     for (size_t i = 1; i < n; i++)
-        if (c->stations[i].angle - c->stations[i - 1].angle > gap)
-            gap = c->stations[i].angle - c->stations[i - 1].angle, first = i;
-    c->start = 0, c->arc = 2 * PI; /* from the first camera, where the angle is 0 */
+        if (c->stations[i].angle - c->stations[i - 1].angle > gap) {
+            gap = c->stations[i].angle - c->stations[i - 1].angle;
+            first = i;
+        }
+    c->start = 0;
+    c->arc = 2 * PI; /* from the first camera, where the angle is 0 */
     if (gap <= gap_most)
         return;
     const size_t low = first + spare, high = first + n - 1 - spare;
     c->start = c->stations[low % n].angle + (low >= n ? 2 * PI : 0);
     c->arc = c->stations[high % n].angle + (high >= n ? 2 * PI : 0) - c->start;
-    if (c->arc < arc_least)
-        c->start -= (arc_least - c->arc) / 2, c->arc = arc_least;
+    if (c->arc < arc_least) {
+        c->start -= (arc_least - c->arc) / 2;
+        c->arc = arc_least;
+    }
 }
 
-static gbt_status circle_make(const gbt_camera *cameras, size_t count, const camera_group *g, circle *c, gbt_error *err)
+static gbt_status circle_make(const gbt_camera *cameras, size_t count, const camera_group *g, circle *c,
+                              gbt_error *err)
 {
     *c = (circle){.count = count};
     memcpy(c->focus, g->focus, sizeof c->focus);
@@ -109,14 +121,18 @@ static gbt_status circle_make(const gbt_camera *cameras, size_t count, const cam
     return GBT_OK;
 }
 
-/** As far and as high as the cameras are at about that angle, and where they look: means, weighed with a spread of 20 degrees. */
-static void circle_at(const circle *c, const orbit_shape *shape, double angle, double out[3], double target[3])
+/** As far and as high as the cameras are at about that angle, and where they look: means, weighed with a
+    spread of 20 degrees. */
+static void circle_at(const circle *c, const orbit_shape *shape, double angle, double out[3],
+                      double target[3])
 {
     static const double spread = 0.122; /* squared, radians */
     double weight = 0, radius = 0, height = 0, aim[3] = {0};
     for (size_t i = 0; i < c->count; i++) {
         const double w = exp((cos(angle - c->stations[i].angle) - 1) / spread);
-        weight += w, radius += w * c->stations[i].radius, height += w * c->stations[i].height;
+        weight += w;
+        radius += w * c->stations[i].radius;
+        height += w * c->stations[i].height;
         for (int k = 0; k < 3; k++)
             aim[k] += w * c->stations[i].aim[k];
     }
@@ -125,11 +141,13 @@ static void circle_at(const circle *c, const orbit_shape *shape, double angle, d
     radius = shape->radius > 0 ? shape->radius : radius / weight;
     height = isnan(shape->height) ? height / weight : shape->height;
     for (int k = 0; k < 3; k++)
-        out[k] = c->focus[k] + height * c->axis[k] + radius * (cos(angle) * c->across[0][k] + sin(angle) * c->across[1][k]);
+        out[k] = c->focus[k] + height * c->axis[k] +
+                 radius * (cos(angle) * c->across[0][k] + sin(angle) * c->across[1][k]);
 }
 
-gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const camera_group *group, const gbt_camera *lens,
-                             const orbit_shape *shape, size_t frames, camera_path *out, gbt_error *err)
+gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const camera_group *group,
+                             const gbt_camera *lens, const orbit_shape *shape, size_t frames,
+                             camera_path *out, gbt_error *err)
 {
     circle c;
     GBT_TRY(camera_path_alloc(out, frames, err));
@@ -137,13 +155,15 @@ gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const came
     gbt_status status = GBT_OK;
     for (size_t i = 0; i < frames && status == GBT_OK; i++) {
         const double turn = (double)i / (double)frames;
-        const double angle = c.arc < 2 * PI ? c.start + c.arc * 0.5 * (1 - cos(2 * PI * turn)) : c.start + c.arc * turn;
+        const double angle =
+            c.arc < 2 * PI ? c.start + c.arc * 0.5 * (1 - cos(2 * PI * turn)) : c.start + c.arc * turn;
         gbt_camera camera = *lens;
         double at[3], target[3];
         circle_at(&c, shape, angle, at, target);
         if (!gbt_camera_look_at(at, target, c.axis, &camera))
-            status = base_fail(err, GBT_ERR_FORMAT,
-                               "--path orbit: the cameras say no way around (wanted them apart from what they look at)");
+            status = base_fail(
+                err, GBT_ERR_FORMAT,
+                "--path orbit: the cameras say no way around (wanted them apart from what they look at)");
         out->shots[i] = ray_shot_of(&camera);
     }
     mem_free(c.stations);
@@ -165,16 +185,16 @@ gbt_status camera_path_show(camera_path *path, const shared_points *points, gbt_
     return GBT_OK;
 }
 
-/* ---- through cameras ----------------------------------------------------------------------------------------------------------------- */
+/* ---- through cameras ---- */
 
 enum { DIMENSIONS = 7, STEPS = 64 /* of a segment, to measure its length */ };
 
 typedef struct pose_curve {
     const gbt_camera *keys;
-    size_t *key;                  /* [count]: index of the camera; equal neighbours are left out */
-    double (*point)[DIMENSIONS];  /* [count]: centre, 2 L q */
-    double (*slope)[DIMENSIONS];  /* [count]: by the knot's parameter */
-    double *gap;                  /* [count - 1]: from knot to knot */
+    size_t *key;                 /* [count]: index of the camera; equal neighbours are left out */
+    double (*point)[DIMENSIONS]; /* [count]: centre, 2 L q */
+    double (*slope)[DIMENSIONS]; /* [count]: by the knot's parameter */
+    double *gap;                 /* [count - 1]: from knot to knot */
     size_t count;
     double turn_length;
 } pose_curve;
@@ -182,23 +202,34 @@ typedef struct pose_curve {
 /** Quaternion of a rotation matrix: from the largest of its four components, which is at least 1/2. */
 static void matrix_to_quat(const double m[9], double q[4])
 {
-    const double square[4] = {1 + m[0] + m[4] + m[8], 1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8], 1 - m[0] - m[4] + m[8]}; /* 4 q_k^2 */
+    const double square[4] = {1 + m[0] + m[4] + m[8], 1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8],
+                              1 - m[0] - m[4] + m[8]}; /* 4 q_k^2 */
     int big = 0;
     for (int k = 1; k < 4; k++)
         if (square[k] > square[big])
             big = k;
     const double s = sqrt(square[big]), t = 0.5 / s;
     /* 4 w x ..; 4 xy, xz, yz */
-    const double odd[3] = {m[7] - m[5], m[2] - m[6], m[3] - m[1]}, even[3] = {m[1] + m[3], m[2] + m[6], m[5] + m[7]};
+    const double odd[3] = {m[7] - m[5], m[2] - m[6], m[3] - m[1]},
+                 even[3] = {m[1] + m[3], m[2] + m[6], m[5] + m[7]};
     q[big] = 0.5 * s;
-    if (big == 0)
-        q[1] = t * odd[0], q[2] = t * odd[1], q[3] = t * odd[2];
-    else if (big == 1)
-        q[0] = t * odd[0], q[2] = t * even[0], q[3] = t * even[1];
-    else if (big == 2)
-        q[0] = t * odd[1], q[1] = t * even[0], q[3] = t * even[2];
-    else
-        q[0] = t * odd[2], q[1] = t * even[1], q[2] = t * even[2];
+    if (big == 0) {
+        q[1] = t * odd[0];
+        q[2] = t * odd[1];
+        q[3] = t * odd[2];
+    } else if (big == 1) {
+        q[0] = t * odd[0];
+        q[2] = t * even[0];
+        q[3] = t * even[1];
+    } else if (big == 2) {
+        q[0] = t * odd[1];
+        q[1] = t * even[0];
+        q[3] = t * even[2];
+    } else {
+        q[0] = t * odd[2];
+        q[1] = t * even[1];
+        q[2] = t * even[2];
+    }
 }
 
 static double distance_of(const double *a, const double *b, int dimensions)
@@ -210,7 +241,8 @@ static double distance_of(const double *a, const double *b, int dimensions)
 }
 
 /** The point of a camera; its quaternion on the side of `before` (NULL: any). */
-static void point_of(const gbt_camera *camera, double turn_length, const double *before, double out[DIMENSIONS])
+static void point_of(const gbt_camera *camera, double turn_length, const double *before,
+                     double out[DIMENSIONS])
 {
     double q[4], dot = 0;
     matrix_to_quat(camera->rotation, q);
@@ -222,7 +254,8 @@ static void point_of(const gbt_camera *camera, double turn_length, const double 
         out[3 + k] = (dot < 0 ? -2 : 2) * turn_length * q[k];
 }
 
-/** Slopes of the non-uniform Catmull-Rom spline: those of the parabola through a knot and its neighbours; of the chord at the ends. */
+/** Slopes of the non-uniform Catmull-Rom spline: those of the parabola through a knot and its neighbours; of
+    the chord at the ends. */
 static void find_slopes(pose_curve *c)
 {
     for (size_t i = 0; i < c->count; i++)
@@ -236,7 +269,8 @@ static void find_slopes(pose_curve *c)
         }
 }
 
-static gbt_status curve_make(const gbt_camera *keys, size_t count, double turn_length, pose_curve *c, gbt_error *err)
+static gbt_status curve_make(const gbt_camera *keys, size_t count, double turn_length, pose_curve *c,
+                             gbt_error *err)
 {
     *c = (pose_curve){.keys = keys, .turn_length = turn_length};
     c->key = mem_alloc(count, sizeof *c->key, "path", err);
@@ -274,11 +308,12 @@ static void curve_at(const pose_curve *c, size_t segment, double u, double out[D
         memcpy(out, c->point[0], DIMENSIONS * sizeof *out);
         return;
     }
-    const double v = 1 - u, h00 = v * v * (1 + 2 * u), h01 = u * u * (3 - 2 * u), h10 = u * v * v * c->gap[segment],
-        h11 = -u * u * v * c->gap[segment];
+    const double v = 1 - u, h00 = v * v * (1 + 2 * u), h01 = u * u * (3 - 2 * u),
+                 h10 = u * v * v * c->gap[segment], h11 = -u * u * v * c->gap[segment];
     double length = 0;
     for (int k = 0; k < DIMENSIONS; k++)
-        out[k] = h00 * c->point[segment][k] + h01 * c->point[segment + 1][k] + h10 * c->slope[segment][k] + h11 * c->slope[segment + 1][k];
+        out[k] = h00 * c->point[segment][k] + h01 * c->point[segment + 1][k] + h10 * c->slope[segment][k] +
+                 h11 * c->slope[segment + 1][k];
     for (int k = 3; k < DIMENSIONS; k++)
         length += out[k] * out[k];
     for (int k = 3; k < DIMENSIONS; k++)
@@ -321,14 +356,15 @@ static void place_frames(const pose_curve *c, const double *length, camera_path 
         while (i + 1 < steps && length[i + 1] < wanted)
             i++;
         const double step = steps > 0 ? length[i + 1] - length[i] : 0,
-            within = step > 0 ? fmin(fmax((wanted - length[i]) / step, 0), 1) : 0;
+                     within = step > 0 ? fmin(fmax((wanted - length[i]) / step, 0), 1) : 0;
         gbt_camera camera;
         set_camera(c, i / STEPS, ((double)(i % STEPS) + within) / STEPS, &camera);
         out->shots[frame] = ray_shot_of(&camera);
     }
 }
 
-gbt_status camera_path_through(const gbt_camera *keys, size_t count, double turn_length, size_t frames, camera_path *out, gbt_error *err)
+gbt_status camera_path_through(const gbt_camera *keys, size_t count, double turn_length, size_t frames,
+                               camera_path *out, gbt_error *err)
 {
     pose_curve c = {0};
     double *length = NULL;
@@ -370,11 +406,14 @@ gbt_status camera_path_order(gbt_camera *cameras, size_t count, double turn_leng
         double least = INFINITY;
         for (size_t j = i; j < count; j++) {
             const double way = way_between(&nearest[i - 1], &nearest[j], turn_length);
-            if (way < least)
-                least = way, best = j;
+            if (way < least) {
+                least = way;
+                best = j;
+            }
         }
         const gbt_camera next = nearest[best];
-        memmove(nearest + i + 1, nearest + i, (best - i) * sizeof *nearest); /* the others keep their order: ties go by name */
+        memmove(nearest + i + 1, nearest + i, (best - i) * sizeof *nearest); /* the others keep their order:
+                                                                                ties go by name */
         nearest[i] = next;
         to_nearest += least;
     }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/camera_path_file.c -- a camera path from a file: ours, or the one that nerfstudio's viewer saves. */
 #include "render/camera_path_file.h"
 
@@ -15,13 +16,15 @@
 #define PI 3.14159265358979323846
 static const double rotation_tolerance = 1e-3, fps_most = 1000;
 
-/* ---- both ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- both ---- */
 
 /** Element i of the list called `field`, as an object to take fields from. */
-static gbt_status element_of(const json_fields *root, const char *field, size_t i, char prefix[64], json_fields *out)
+static gbt_status element_of(const json_fields *root, const char *field, size_t i, char prefix[64],
+                             json_fields *out)
 {
     snprintf(prefix, 64, "%s[%zu].", field, i);
-    *out = (json_fields){root->path, prefix, json_array_get(json_object_get(root->object, field), i), root->err};
+    *out =
+        (json_fields){root->path, prefix, json_array_get(json_object_get(root->object, field), i), root->err};
     if (!json_is_object(out->object))
         return base_fail(root->err, GBT_ERR_FORMAT, "%s: %s[%zu]: wanted an object", root->path, field, i);
     return GBT_OK;
@@ -32,15 +35,16 @@ static gbt_status count_of(const json_fields *root, const char *field, size_t *c
     const json_t *list = json_object_get(root->object, field);
     *count = json_array_size(list);
     if (!json_is_array(list) || *count < 1 || *count > CAMERA_PATH_FRAMES_MAX)
-        return base_fail(root->err, GBT_ERR_FORMAT, "%s: %s: wanted a list of 1 to %d cameras", root->path, field,
-                         (int)CAMERA_PATH_FRAMES_MAX);
+        return base_fail(root->err, GBT_ERR_FORMAT, "%s: %s: wanted a list of 1 to %d cameras", root->path,
+                         field, (int)CAMERA_PATH_FRAMES_MAX);
     return GBT_OK;
 }
 
-/* ---- ours ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- ours ---- */
 
 /** A camera of the list: its own fields over those that stand beside the list for all. */
-static gbt_status take_camera(const json_fields *root, const json_t *common, size_t i, const double origin[3], ray_shot *shot)
+static gbt_status take_camera(const json_fields *root, const json_t *common, size_t i, const double origin[3],
+                              ray_shot *shot)
 {
     char prefix[64];
     json_fields own;
@@ -71,16 +75,21 @@ static gbt_status check_alike(const json_fields *root, const camera_path *path, 
     for (size_t i = 1; i < path->count; i++) {
         const gbt_camera *camera = &path->shots[i].camera;
         if (camera->width != first->width || camera->height != first->height)
-            return base_fail(root->err, GBT_ERR_FORMAT, "%s: cameras[%zu]: %d x %d pixels (wanted %d x %d, as the first)", root->path, i,
+            return base_fail(root->err, GBT_ERR_FORMAT,
+                             "%s: cameras[%zu]: %d x %d pixels (wanted %d x %d, as the first)", root->path, i,
                              camera->width, camera->height, first->width, first->height);
         if (same_lens && camera->model != first->model)
-            return base_fail(root->err, GBT_ERR_FORMAT,
-                             "%s: cameras[%zu].model: not that of the first (wanted one lens on a way with \"frames\")", root->path, i);
+            return base_fail(
+                root->err, GBT_ERR_FORMAT,
+                "%s: cameras[%zu].model: not that of the first (wanted one lens on a way with \"frames\")",
+                root->path, i);
     }
     for (size_t i = 0; i < path->count && same_lens; i++)
         if (is_moving(&path->shots[i]))
-            return base_fail(root->err, GBT_ERR_FORMAT, "%s: cameras[%zu]: an aperture or a shutter (wanted none on a way with \"frames\")",
-                             root->path, i);
+            return base_fail(
+                root->err, GBT_ERR_FORMAT,
+                "%s: cameras[%zu]: an aperture or a shutter (wanted none on a way with \"frames\")",
+                root->path, i);
     return GBT_OK;
 }
 
@@ -95,21 +104,23 @@ static gbt_status take_cameras(const json_fields *root, const double origin[3], 
     static const char *const not_common[] = {"cameras", "fps", "frames", "schema"};
     for (size_t i = 0; i < sizeof not_common / sizeof *not_common; i++)
         json_object_del(common, not_common[i]);
-    gbt_status status = common != NULL ? GBT_OK : base_fail(root->err, GBT_ERR_NO_MEMORY, "%s: no memory", root->path);
+    gbt_status status =
+        common != NULL ? GBT_OK : base_fail(root->err, GBT_ERR_NO_MEMORY, "%s: no memory", root->path);
     for (size_t i = 0; i < count && status == GBT_OK; i++)
         status = take_camera(root, common, i, origin, &out->shots[i]);
     json_decref(common);
     return status;
 }
 
-/* ---- nerfstudio ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- nerfstudio ---- */
 
 /* Its trainer turns, moves and scales the world: p' = scale (rotation p + move). */
 typedef struct similarity {
     double rotation[9], move[3], scale;
 } similarity;
 
-/** Rows of 4 numbers, as lists or one after the other: `rows` 3 x 4 of them into a rotation and what follows it. */
+/** Rows of 4 numbers, as lists or one after the other: `rows` 3 x 4 of them into a rotation and what follows
+    it. */
 static gbt_status take_matrix(const json_fields *r, const char *field, double rotation[9], double move[3])
 {
     const json_t *list = json_object_get(r->object, field);
@@ -118,7 +129,8 @@ static gbt_status take_matrix(const json_fields *r, const char *field, double ro
     if (!json_is_array(list) || (nested ? count != 3 && count != 4 : count != 12 && count != 16))
         return json_field_fail(r, field, "wanted 12 or 16 numbers, row after row");
     for (size_t i = 0; i < 12; i++) {
-        const json_t *row = nested ? json_array_get(list, i / 4) : list, *value = json_array_get(row, nested ? i % 4 : i);
+        const json_t *row = nested ? json_array_get(list, i / 4) : list,
+                     *value = json_array_get(row, nested ? i % 4 : i);
         if (!json_is_number(value) || !(fabs(json_number_value(value)) <= JSON_VALUE_MAX))
             return json_field_fail(r, field, "wanted 12 or 16 numbers, row after row, within 1e15");
         *(i % 4 == 3 ? &move[i / 4] : &rotation[3 * (i / 4) + i % 4]) = json_number_value(value);
@@ -135,7 +147,8 @@ static gbt_status take_similarity(const json_fields *r, similarity *out)
     return json_field_given(r, "transform") ? take_matrix(r, "transform", out->rotation, out->move) : GBT_OK;
 }
 
-/** From the path file itself, else from the file that nerfstudio's trainer leaves, beside it; else the world is as it was. */
+/** From the path file itself, else from the file that nerfstudio's trainer leaves, beside it; else the world
+    is as it was. */
 static gbt_status find_similarity(const json_fields *root, similarity *out)
 {
     static const char name[] = "dataparser_transforms.json";
@@ -143,7 +156,8 @@ static gbt_status find_similarity(const json_fields *root, similarity *out)
     json_t *beside;
     const char *slash = strrchr(root->path, '/');
     const int folder = slash != NULL ? (int)(slash - root->path) + 1 : 0;
-    if (json_field_given(root, "transform") || snprintf(path, sizeof path, "%.*s%s", folder, root->path, name) >= (int)sizeof path ||
+    if (json_field_given(root, "transform") ||
+        snprintf(path, sizeof path, "%.*s%s", folder, root->path, name) >= (int)sizeof path ||
         !file_exists(path))
         return take_similarity(root, out);
     GBT_TRY(json_read(path, &beside, root->err));
@@ -154,17 +168,22 @@ static gbt_status find_similarity(const json_fields *root, similarity *out)
 }
 
 /** Camera to world in OpenGL's axes (x right, y up, z back) to a pose in the data set's world. */
-static gbt_status take_pose(const json_fields *r, const similarity *s, const double origin[3], gbt_camera *camera)
+static gbt_status take_pose(const json_fields *r, const similarity *s, const double origin[3],
+                            gbt_camera *camera)
 {
     static const double zero[3] = {0, 0, 0};
     double m[9], at[3], up[3], forward[3];
     GBT_TRY(take_matrix(r, "camera_to_world", m, at));
-    for (int k = 0; k < 3; k++)
-        up[k] = m[3 * k + 1], forward[k] = -m[3 * k + 2], at[k] = at[k] / s->scale - s->move[k];
+    for (int k = 0; k < 3; k++) {
+        up[k] = m[3 * k + 1];
+        forward[k] = -m[3 * k + 2];
+        at[k] = at[k] / s->scale - s->move[k];
+    }
     dmat_apply_transposed(s->rotation, up, up);
     dmat_apply_transposed(s->rotation, forward, forward);
     dmat_apply_transposed(s->rotation, at, at);
-    gbt_camera_look_at(zero, forward, up, camera); /* makes it orthonormal; cannot fail for what is nearly a rotation */
+    gbt_camera_look_at(zero, forward, up, camera); /* makes it orthonormal; cannot fail for what is nearly a
+                                                      rotation */
     for (int k = 0; k < 3; k++)
         camera->center[k] = at[k] - origin[k];
     return GBT_OK;
@@ -175,17 +194,20 @@ enum { TYPE_PERSPECTIVE, TYPE_FISHEYE, TYPE_EQUIRECTANGULAR };
 static gbt_status take_lens(const json_fields *r, int type, gbt_camera *camera)
 {
     double fov_deg = 0;
-    static const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_FISHEYE, GBT_CAMERA_EQUIRECTANGULAR};
+    static const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_FISHEYE,
+                                              GBT_CAMERA_EQUIRECTANGULAR};
     camera->model = models[type];
     if (type == TYPE_EQUIRECTANGULAR) {
-        camera->params[0] = camera->width, camera->params[1] = camera->height;
+        camera->params[0] = camera->width;
+        camera->params[1] = camera->height;
         return GBT_OK;
     }
     GBT_TRY(json_field_needed(r, "fov", "degrees from the top of the picture to the bottom"));
     GBT_TRY(json_field_number(r, "fov", 0, false, 179.9, &fov_deg));
     /* a fisheye too: that is how its renderer reads it */
     camera->params[0] = camera->params[1] = 0.5 * camera->height / tan(fov_deg * PI / 360);
-    camera->params[2] = 0.5 * camera->width, camera->params[3] = 0.5 * camera->height;
+    camera->params[2] = 0.5 * camera->width;
+    camera->params[3] = 0.5 * camera->height;
     return GBT_OK;
 }
 
@@ -220,7 +242,7 @@ static gbt_status take_nerfstudio(const json_fields *root, const double origin[3
     return GBT_OK;
 }
 
-/* ---- entry --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- entry ---- */
 
 /** Cameras of the file become those of a smooth way through them. */
 static gbt_status smooth(const json_fields *root, size_t frames, camera_path *path)
@@ -245,7 +267,8 @@ static gbt_status smooth(const json_fields *root, size_t frames, camera_path *pa
     return status;
 }
 
-gbt_status camera_path_file_read(const char *path, const double origin[3], size_t frames, camera_path *out, gbt_error *err)
+gbt_status camera_path_file_read(const char *path, const double origin[3], size_t frames, camera_path *out,
+                                 gbt_error *err)
 {
     json_t *root;
     int wanted = (int)frames;
@@ -258,7 +281,9 @@ gbt_status camera_path_file_read(const char *path, const double origin[3], size_
     else if (json_field_given(&r, "cameras"))
         status = take_cameras(&r, origin, &wanted, out);
     else
-        status = base_fail(err, GBT_ERR_FORMAT, "%s: not a camera path (wanted \"cameras\", or nerfstudio's \"camera_path\")", path);
+        status =
+            base_fail(err, GBT_ERR_FORMAT,
+                      "%s: not a camera path (wanted \"cameras\", or nerfstudio's \"camera_path\")", path);
     if (status == GBT_OK)
         status = smooth(&r, frames > 0 ? frames : (size_t)wanted, out);
     json_decref(root);

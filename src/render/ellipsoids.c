@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/ellipsoids.c -- solid ellipsoids as a shaded picture. */
 #include "render/ellipsoids.h"
 
@@ -9,7 +10,10 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 
-enum { FINE = 2 /* rays per pixel, in each direction */, BAND = 16 /* rows of rays that are drawn together */ };
+enum {
+    FINE = 2 /* rays per pixel, in each direction */,
+    BAND = 16 /* rows of rays that are drawn together */
+};
 
 /** One ellipsoid as its rays meet it: to_unit takes world differences to the unit sphere. */
 typedef struct solid {
@@ -47,22 +51,28 @@ static bool find_box(const gbt_camera *c, const double center[3], double radius,
         double p[2];
         project(c, at[0] + (corner & 1 ? radius : -radius), at[1] + (corner & 2 ? radius : -radius),
                 at[2] + (corner & 4 ? radius : -radius), p);
-        for (int k = 0; k < 2; k++)
-            low[k] = fmin(low[k], p[k]), high[k] = fmax(high[k], p[k]);
+        for (int k = 0; k < 2; k++) {
+            low[k] = fmin(low[k], p[k]);
+            high[k] = fmax(high[k], p[k]);
+        }
     }
-    out->left = (int)fmax(floor(low[0]), 0), out->right = (int)fmin(ceil(high[0]), d->width);
-    out->top = (int)fmax(floor(low[1]), 0), out->bottom = (int)fmin(ceil(high[1]), d->height);
+    out->left = (int)fmax(floor(low[0]), 0);
+    out->right = (int)fmin(ceil(high[0]), d->width);
+    out->top = (int)fmax(floor(low[1]), 0);
+    out->bottom = (int)fmin(ceil(high[1]), d->height);
     return out->left < out->right && out->top < out->bottom;
 }
 
 static bool make_solid(const ellipsoids *set, size_t i, const drawing *d, solid *out)
 {
     const gbt_camera *c = d->camera;
-    const double center[3] = {(double)set->center[3 * i], (double)set->center[3 * i + 1], (double)set->center[3 * i + 2]};
+    const double center[3] = {(double)set->center[3 * i], (double)set->center[3 * i + 1],
+                              (double)set->center[3 * i + 2]};
     double way[3], axes[3], radius = 0;
     for (int k = 0; k < 3; k++)
         way[k] = center[k] - c->center[k];
-    const double pixel = (c->model == GBT_CAMERA_PINHOLE ? fmax(dvec_dot(way, c->rotation + 6), 0) : 1) / c->params[0];
+    const double pixel =
+        (c->model == GBT_CAMERA_PINHOLE ? fmax(dvec_dot(way, c->rotation + 6), 0) : 1) / c->params[0];
     for (int k = 0; k < 3; k++) {
         axes[k] = fmax((double)set->axes[3 * i + (size_t)k], (double)set->least_pixels * pixel);
         radius = fmax(radius, axes[k]);
@@ -76,9 +86,12 @@ static bool make_solid(const ellipsoids *set, size_t i, const drawing *d, solid 
         quat_to_matrix(set->quat + 4 * i, turn);
     for (int row = 0; row < 3; row++)
         for (int k = 0; k < 3; k++)
-            out->to_unit[3 * row + k] = turn[3 * k + row] / (float)fmax(axes[row], 1e-3 * radius); /* a flat one is still a solid */
-    for (int k = 0; k < 3; k++)
-        out->center[k] = (float)center[k], out->color[k] = set->color[3 * i + (size_t)k];
+            out->to_unit[3 * row + k] =
+                turn[3 * k + row] / (float)fmax(axes[row], 1e-3 * radius); /* a flat one is still a solid */
+    for (int k = 0; k < 3; k++) {
+        out->center[k] = (float)center[k];
+        out->color[k] = set->color[3 * i + (size_t)k];
+    }
     return true;
 }
 
@@ -88,15 +101,14 @@ static void apply(const float m[9], const float a[3], float out[3])
         out[row] = m[3 * row] * a[0] + m[3 * row + 1] * a[1] + m[3 * row + 2] * a[2];
 }
 
-static float dot(const float a[3], const float b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+static float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/** The ray of place (x, y), from the camera's plane; its direction is not unit for a pinhole, but the same scale for all that it meets. */
+/** The ray of place (x, y), from the camera's plane; its direction is not unit for a pinhole, but the same
+    scale for all that it meets. */
 static void make_ray(const gbt_camera *c, int x, int y, float origin[3], float dir[3])
 {
-    const double u = ((x + 0.5) / FINE - c->params[2]) / c->params[0], v = ((y + 0.5) / FINE - c->params[3]) / c->params[1];
+    const double u = ((x + 0.5) / FINE - c->params[2]) / c->params[0],
+                 v = ((y + 0.5) / FINE - c->params[3]) / c->params[1];
     const bool pinhole = c->model == GBT_CAMERA_PINHOLE;
     for (int k = 0; k < 3; k++) {
         const double across = u * c->rotation[k] + v * c->rotation[3 + k];
@@ -105,7 +117,8 @@ static void make_ray(const gbt_camera *c, int x, int y, float origin[3], float d
     }
 }
 
-/** Brightness of a surface: that of a lamp beside the camera, darker at the rim, so that neighbours of one colour stay apart. */
+/** Brightness of a surface: that of a lamp beside the camera, darker at the rim, so that neighbours of one
+    colour stay apart. */
 static float shade(const solid *s, const float hit[3], const float dir[3])
 {
     float normal[3];
@@ -177,10 +190,11 @@ static void blend(const drawing *d, image *out)
 
 gbt_status ellipsoids_draw(const ellipsoids *set, const gbt_camera *camera, image *out, gbt_error *err)
 {
-    if ((camera->model != GBT_CAMERA_PINHOLE && camera->model != GBT_CAMERA_ORTHOGRAPHIC) || out->channels != 4 ||
-        out->width != camera->width || out->height != camera->height)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "ellipsoids: wanted a pinhole or orthographic camera, and a picture of its size with 4 channels");
+    if ((camera->model != GBT_CAMERA_PINHOLE && camera->model != GBT_CAMERA_ORTHOGRAPHIC) ||
+        out->channels != 4 || out->width != camera->width || out->height != camera->height)
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "ellipsoids: wanted a pinhole or orthographic camera, and a picture of its size with 4 channels");
     drawing d = {.camera = camera, .width = FINE * out->width, .height = FINE * out->height};
     const size_t rays = (size_t)d.width * (size_t)d.height;
     solid *solids = mem_alloc(set->count, sizeof *solids, "ellipsoids", err);

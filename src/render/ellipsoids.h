@@ -1,4 +1,6 @@
-/* render/ellipsoids.h -- solid ellipsoids as a shaded picture: points, balls, anchors and Gaussians for people to look at. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* render/ellipsoids.h -- solid ellipsoids as a shaded picture: points, balls, anchors and Gaussians for
+   people to look at. */
 #ifndef GBT_RENDER_ELLIPSOIDS_H
 #define GBT_RENDER_ELLIPSOIDS_H
 
@@ -20,13 +22,14 @@ typedef struct ellipsoids {
 } ellipsoids;
 
 /**
- * Draw them over what `out` holds: for each quarter of a pixel the nearest along its ray, brighter where it faces the camera.
+ * Draw them over what `out` holds: for each quarter of a pixel the nearest along its ray, brighter where it
+ * faces the camera.
  *
  * What lies around the camera's plane is left out too: it would hide everything.
  *
  * @param camera [in]     GBT_CAMERA_PINHOLE or GBT_CAMERA_ORTHOGRAPHIC; others give GBT_ERR_ARGUMENT
- * @param out    [in,out] 4 channels of the camera's size: colour and how much of the pixel is covered; start from zeros. Several calls: the
- *                        later in front
+ * @param out    [in,out] 4 channels of the camera's size: colour and how much of the pixel is covered; start
+ *                        from zeros. Several calls: the later in front
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_NO_MEMORY
  * Threads: same bits for every thread count. Cost: each ellipsoid's pixels, four rays each.
  */

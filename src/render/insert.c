@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/insert.c -- rays among Gaussians and the surfaces of meshes.
 
-   rays --> [nearest surface] --> Gaussians in front of it --> darkened where a surface keeps the lamp from them
+   rays --> [nearest surface] --> Gaussians in front of it
+        --> darkened where a surface keeps the lamp from them
                   |
                   +--> matt: a ray to the lamp, through surfaces and Gaussians
                   +--> mirror: the reflected ray, seen the same way; behind BOUNCES_MAX mirrors one is matt */
@@ -18,12 +20,13 @@ enum { RAY_BLOCK = 512, BOUNCES_MAX = 4, LAMP_SEED = 1 };
 
 #define NO_OBJECT UINT32_MAX
 
-/* Points are rounded to a relative error of 2^-24; rays that leave a surface start some of these away from it. */
+/* Points are rounded to a relative error of 2^-24; rays that leave a surface start some of these away from
+   it. */
 static const float offset_share = 0x1p-18f;
 /* No photo was taken from there: they see what is nearer than anything before a camera. */
 static const float surface_near_share = 0.1f;
 
-/* ---- objects ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- objects ---- */
 
 static void add_normals(insert_scene *in, size_t first)
 {
@@ -32,7 +35,8 @@ static void add_normals(insert_scene *in, size_t first)
         double ab[3], ac[3], normal[3];
         for (size_t k = 0; k < 3; k++) {
             const double a = (double)in->vertices[3 * (size_t)corner[0] + k];
-            ab[k] = (double)in->vertices[3 * (size_t)corner[1] + k] - a, ac[k] = (double)in->vertices[3 * (size_t)corner[2] + k] - a;
+            ab[k] = (double)in->vertices[3 * (size_t)corner[1] + k] - a;
+            ac[k] = (double)in->vertices[3 * (size_t)corner[2] + k] - a;
         }
         dvec_cross(ab, ac, normal);
         for (size_t c = 0; c < 3; c++)
@@ -41,31 +45,34 @@ static void add_normals(insert_scene *in, size_t first)
     }
 }
 
-gbt_status insert_add(insert_scene *in, const insert_object *object, const float *vertices, size_t vertex_count, const uint32_t *triangles,
-                      size_t triangle_count, gbt_error *err)
+gbt_status insert_add(insert_scene *in, const insert_object *object, const float *vertices,
+                      size_t vertex_count, const uint32_t *triangles, size_t triangle_count, gbt_error *err)
 {
     const size_t vertex_first = in->vertex_count, triangle_first = in->triangle_count;
     if (vertex_first + vertex_count >= UINT32_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "mesh: %zu vertices (wanted fewer than 2^32 - 1)", vertex_first + vertex_count);
-    GBT_TRY(mem_reserve((void **)&in->objects, &in->object_capacity, in->object_count, in->object_count + 1, sizeof *in->objects, "objects",
-                        err));
-    GBT_TRY(mem_reserve((void **)&in->normals, &in->normal_capacity, vertex_first, vertex_first + vertex_count, 3 * sizeof *in->normals,
-                        "mesh", err));
-    GBT_TRY(mem_reserve((void **)&in->vertices, &in->vertex_capacity, vertex_first, vertex_first + vertex_count, 3 * sizeof *in->vertices,
-                        "mesh", err));
-    GBT_TRY(mem_reserve((void **)&in->triangles, &in->triangle_capacity, triangle_first, triangle_first + triangle_count,
-                        3 * sizeof *in->triangles, "mesh", err));
+        return base_fail(err, GBT_ERR_ARGUMENT, "mesh: %zu vertices (wanted fewer than 2^32 - 1)",
+                         vertex_first + vertex_count);
+    GBT_TRY(mem_reserve((void **)&in->objects, &in->object_capacity, in->object_count, in->object_count + 1,
+                        sizeof *in->objects, "objects", err));
+    GBT_TRY(mem_reserve((void **)&in->normals, &in->normal_capacity, vertex_first,
+                        vertex_first + vertex_count, 3 * sizeof *in->normals, "mesh", err));
+    GBT_TRY(mem_reserve((void **)&in->vertices, &in->vertex_capacity, vertex_first,
+                        vertex_first + vertex_count, 3 * sizeof *in->vertices, "mesh", err));
+    GBT_TRY(mem_reserve((void **)&in->triangles, &in->triangle_capacity, triangle_first,
+                        triangle_first + triangle_count, 3 * sizeof *in->triangles, "mesh", err));
     for (size_t i = 0; i < 3 * vertex_count; i++) {
         in->vertices[3 * vertex_first + i] = vertices[i];
         in->normals[3 * vertex_first + i] = 0;
     }
     for (size_t i = 0; i < 3 * triangle_count; i++) {
         if (triangles[i] >= vertex_count)
-            return base_fail(err, GBT_ERR_ARGUMENT, "mesh: triangle %zu: bad vertex number (wanted < %zu, got %u)", i / 3, vertex_count,
-                             triangles[i]);
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "mesh: triangle %zu: bad vertex number (wanted < %zu, got %u)", i / 3,
+                             vertex_count, triangles[i]);
         in->triangles[3 * triangle_first + i] = (uint32_t)vertex_first + triangles[i];
     }
-    in->vertex_count += vertex_count, in->triangle_count += triangle_count;
+    in->vertex_count += vertex_count;
+    in->triangle_count += triangle_count;
     insert_object *added = &in->objects[in->object_count++];
     *added = *object;
     added->triangle_end = in->triangle_count;
@@ -94,12 +101,12 @@ void insert_scene_free(insert_scene *in)
     memset(in, 0, sizeof *in);
 }
 
-/* ---- what one ray meets -------------------------------------------------------------------------------------------------------------- */
+/* ---- what one ray meets ---- */
 
 /* Normals are unit and on the side that the ray came from. */
 typedef struct surface {
-    uint32_t object;         /* or NO_OBJECT */
-    float point[3];          /* a little above the surface */
+    uint32_t object;          /* or NO_OBJECT */
+    float point[3];           /* a little above the surface */
     float flat[3], normal[3]; /* of the triangle; for shading */
 } surface;
 
@@ -127,27 +134,33 @@ static void describe(const insert_scene *in, const mesh_hit *hit, const float di
     if (!in->objects[out->object].smooth || !(dvec_dot(normal, flat) > 0))
         memcpy(normal, flat, sizeof normal);
     dvec_normalize(normal);
-    const float side = dir[0] * hit->normal[0] + dir[1] * hit->normal[1] + dir[2] * hit->normal[2] > 0 ? -1 : 1;
+    const float side =
+        dir[0] * hit->normal[0] + dir[1] * hit->normal[1] + dir[2] * hit->normal[2] > 0 ? -1 : 1;
     const double largest = fmax(fabs(point[0]), fmax(fabs(point[1]), fabs(point[2])));
     const double offset = fmax((double)in->offset_min, largest * (double)offset_share);
     for (int k = 0; k < 3; k++) {
-        out->flat[k] = side * hit->normal[k], out->normal[k] = side * (float)normal[k];
+        out->flat[k] = side * hit->normal[k];
+        out->normal[k] = side * (float)normal[k];
         out->point[k] = (float)(point[k] + offset * (double)out->flat[k]);
     }
 }
 
 static int lamp_samples(const insert_scene *in)
 {
-    return in->lamp == INSERT_NO_LAMP ? 0 : in->lamp == INSERT_LAMP_POINT && in->lamp_radius > 0 ? INSERT_LAMP_SAMPLES : 1;
+    return in->lamp == INSERT_NO_LAMP                             ? 0
+           : in->lamp == INSERT_LAMP_POINT && in->lamp_radius > 0 ? INSERT_LAMP_SAMPLES
+                                                                  : 1;
 }
 
-/* Point `sample` of the disc that the lamp is seen as: a sunflower's spiral, turned by another angle for each ray. */
-static void move_over_lamp(const insert_scene *in, int sample, size_t ray, const double dir[3], double to_lamp[3])
+/* Point `sample` of the disc that the lamp is seen as: a sunflower's spiral, turned by another angle for each
+   ray. */
+static void move_over_lamp(const insert_scene *in, int sample, size_t ray, const double dir[3],
+                           double to_lamp[3])
 {
     const double golden = 2.399963229728653, turn = 6.283185307179586;
     const double angle = golden * sample + turn * (double)rng_uniform(LAMP_SEED, 0, ray);
     const double radius = in->lamp_radius * sqrt((sample + 0.5) / INSERT_LAMP_SAMPLES),
-        any[3] = {fabs(dir[0]) < 0.6, fabs(dir[0]) >= 0.6, 0};
+                 any[3] = {fabs(dir[0]) < 0.6, fabs(dir[0]) >= 0.6, 0};
     double right[3], up[3];
     dvec_cross(any, dir, right);
     dvec_normalize(right);
@@ -156,8 +169,10 @@ static void move_over_lamp(const insert_scene *in, int sample, size_t ray, const
         to_lamp[k] += radius * (cos(angle) * right[k] + sin(angle) * up[k]);
 }
 
-/* From a point to sample `sample` of the lamp: unit direction, and how far it is. False for a point in the lamp itself. */
-static bool towards_lamp(const insert_scene *in, const float point[3], int sample, size_t ray, float dir[3], float *far)
+/* From a point to sample `sample` of the lamp: unit direction, and how far it is. False for a point in the
+   lamp itself. */
+static bool towards_lamp(const insert_scene *in, const float point[3], int sample, size_t ray, float dir[3],
+                         float *far)
 {
     double d[3], length = INFINITY;
     memcpy(d, in->lamp_at, sizeof d);
@@ -180,22 +195,26 @@ static bool towards_lamp(const insert_scene *in, const float point[3], int sampl
 static void reflect(const surface *s, const float dir[3], float out[3])
 {
     double d[3], flat[3], r[3], normal[3];
-    for (int k = 0; k < 3; k++)
-        d[k] = (double)dir[k], flat[k] = (double)s->flat[k], normal[k] = (double)s->normal[k];
+    for (int k = 0; k < 3; k++) {
+        d[k] = (double)dir[k];
+        flat[k] = (double)s->flat[k];
+        normal[k] = (double)s->normal[k];
+    }
     for (int attempt = 0; attempt < 2; attempt++) {
         const double along = 2 * dvec_dot(d, normal);
         for (int k = 0; k < 3; k++)
             r[k] = d[k] - along * normal[k];
         if (dvec_dot(r, flat) > 0)
             break;
-        memcpy(normal, flat, sizeof normal); /* an interpolated normal may send the ray into the surface; the triangle's own does not */
+        memcpy(normal, flat, sizeof normal); /* an interpolated normal may send the ray into the surface; the
+                                                triangle's own does not */
     }
     dvec_normalize(r);
     for (int k = 0; k < 3; k++)
         out[k] = (float)r[k];
 }
 
-/* ---- one picture of rays ------------------------------------------------------------------------------------------------------------- */
+/* ---- one picture of rays ---- */
 
 /* Arrays have a value per ray. */
 typedef struct sight {
@@ -208,7 +227,8 @@ typedef struct sight {
     float background[3];
     ray_image next; /* to the lamp, or mirrored; a zero direction where there is none */
     int sample;     /* of the lamp */
-    float *lamp_transmittance, *lamp_light; /* of this sample; cosine times transmittance, summed over the samples so far */
+    float *lamp_transmittance,
+        *lamp_light; /* of this sample; cosine times transmittance, summed over the samples so far */
     image next_rgb;
 } sight;
 
@@ -228,8 +248,8 @@ static void find_surfaces(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* Gaussians carry the light of the day they were photographed in; what a surface takes of it is taken here, for the whole ray at once, at
-   the mean depth of what it meets. */
+/* Gaussians carry the light of the day they were photographed in; what a surface takes of it is taken here,
+   for the whole ray at once, at the mean depth of what it meets. */
 static void shadow_gaussians(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
@@ -241,7 +261,8 @@ static void shadow_gaussians(size_t block, size_t begin, size_t end, void *conte
         for (size_t k = 0; k < 3; k++)
             point[k] = ray_image_origin(s->rays, i)[k] + s->depth[i] * s->rays->dir[3 * i + k];
         for (int sample = 0; sample < samples && s->depth[i] > 0; sample++)
-            blocked += towards_lamp(s->in, point, sample, i, dir, &far) && mesh_tree_blocked(s->in->tree, point, dir, 0, far);
+            blocked += towards_lamp(s->in, point, sample, i, dir, &far) &&
+                       mesh_tree_blocked(s->in->tree, point, dir, 0, far);
         const float light = 1 - (1 - s->in->ambient) * (float)blocked / (float)samples;
         for (size_t k = 0; k < 3; k++)
             s->rgb->pixels[3 * i + k] *= light;
@@ -250,7 +271,8 @@ static void shadow_gaussians(size_t block, size_t begin, size_t end, void *conte
 
 static bool is_mirror(const sight *s, size_t i)
 {
-    return s->surface[i].object != NO_OBJECT && s->bounces < BOUNCES_MAX && s->in->objects[s->surface[i].object].material == INSERT_MIRROR;
+    return s->surface[i].object != NO_OBJECT && s->bounces < BOUNCES_MAX &&
+           s->in->objects[s->surface[i].object].material == INSERT_MIRROR;
 }
 
 static bool is_matt(const sight *s, size_t i)
@@ -278,7 +300,8 @@ static void mirror_rays(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* The ray to sample s->sample of the lamp, for each matt surface that the lamp is in front of, with no surface between them. */
+/* The ray to sample s->sample of the lamp, for each matt surface that the lamp is in front of, with no
+   surface between them. */
 static void lamp_rays(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
@@ -333,7 +356,8 @@ static void add_matt(size_t block, size_t begin, size_t end, void *context)
             continue;
         const float *color = s->in->objects[s->surface[i].object].color;
         const int samples = lamp_samples(s->in);
-        const float light = s->in->ambient + (samples > 0 ? (1 - s->in->ambient) * s->lamp_light[i] / (float)samples : 0);
+        const float light =
+            s->in->ambient + (samples > 0 ? (1 - s->in->ambient) * s->lamp_light[i] / (float)samples : 0);
         add_light(s, i, (const float[3]){color[0] * light, color[1] * light, color[2] * light});
     }
 }
@@ -398,8 +422,10 @@ static gbt_status see_surfaces(sight *s, trace_scene *scene, gbt_error *err)
 {
     const size_t count = ray_image_count(s->rays);
     size_t matt_count = 0, mirror_count = 0;
-    for (size_t i = 0; i < count; i++)
-        matt_count += is_matt(s, i), mirror_count += is_mirror(s, i);
+    for (size_t i = 0; i < count; i++) {
+        matt_count += is_matt(s, i);
+        mirror_count += is_mirror(s, i);
+    }
     if (matt_count + mirror_count > 0)
         GBT_TRY(allocate_next(s, err));
     if (mirror_count > 0) {
@@ -409,8 +435,9 @@ static gbt_status see_surfaces(sight *s, trace_scene *scene, gbt_error *err)
     }
     for (s->sample = 0; matt_count > 0 && s->sample < lamp_samples(s->in); s->sample++) {
         parallel_blocks(count, RAY_BLOCK, lamp_rays, s);
-        GBT_TRY(trace_forward(scene, &s->next, false, &(trace_outputs){.rgb = &s->next_rgb, .transmittance = s->lamp_transmittance}, NULL,
-                              err));
+        GBT_TRY(trace_forward(scene, &s->next, false,
+                              &(trace_outputs){.rgb = &s->next_rgb, .transmittance = s->lamp_transmittance},
+                              NULL, err));
         parallel_blocks(count, RAY_BLOCK, add_lamp, s);
     }
     if (matt_count > 0)
@@ -426,8 +453,9 @@ static gbt_status see(sight *s, trace_scene *scene, gbt_error *err)
     parallel_blocks(count, RAY_BLOCK, find_surfaces, s);
     ray_image ended = *s->rays; /* the same rays; only their ends are ours */
     ended.far = s->far;
-    GBT_TRY(trace_forward(scene, &ended, false, &(trace_outputs){.rgb = s->rgb, .transmittance = s->transmittance, .depth = s->depth}, NULL,
-                          err));
+    GBT_TRY(trace_forward(
+        scene, &ended, false,
+        &(trace_outputs){.rgb = s->rgb, .transmittance = s->transmittance, .depth = s->depth}, NULL, err));
     if (s->in->lamp != INSERT_NO_LAMP)
         parallel_blocks(count, RAY_BLOCK, shadow_gaussians, s);
     if (s->bounces == 0)

@@ -1,4 +1,6 @@
-/* render/insert.h -- meshes that stand among the Gaussians: what a ray sees then. docs/inserting.md is the definition. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* render/insert.h -- meshes that stand among the Gaussians: what a ray sees then. docs/inserting.md is the
+   definition. */
 #ifndef GBT_RENDER_INSERT_H
 #define GBT_RENDER_INSERT_H
 
@@ -18,12 +20,13 @@ typedef enum insert_lamp { INSERT_NO_LAMP, INSERT_LAMP_POINT, INSERT_LAMP_DISTAN
 
 enum { INSERT_LAMP_SAMPLES = 32 }; /* points on a lamp that has a radius */
 
-/** Start from {0}; fill the light, insert_add() the objects, insert_finish(); free with insert_scene_free(). Lengths: scene-local units. */
+/** Start from {0}; fill the light, insert_add() the objects, insert_finish(); free with insert_scene_free().
+    Lengths: scene-local units. */
 typedef struct insert_scene {
     insert_lamp lamp;
-    double lamp_at[3]; /* where the middle of the lamp is; for a distant one the unit vector towards it */
+    double lamp_at[3];  /* where the middle of the lamp is; for a distant one the unit vector towards it */
     double lamp_radius; /* of a point lamp: a ball, whose shadows have soft edges; >= 0 */
-    float ambient;     /* light that everything gets, [0, 1]; the lamp adds 1 - ambient where it is seen */
+    float ambient;      /* light that everything gets, [0, 1]; the lamp adds 1 - ambient where it is seen */
     size_t object_count, object_capacity;
     insert_object *objects;
     size_t vertex_count, vertex_capacity, normal_capacity, triangle_count, triangle_capacity;
@@ -41,8 +44,8 @@ typedef struct insert_scene {
  * @param vertices  [in] [vertex_count][3], |x| <= MESH_COORDINATE_LIMIT; copied
  * @param triangles [in] [triangle_count][3], each < vertex_count; copied
  */
-gbt_status insert_add(insert_scene *in, const insert_object *object, const float *vertices, size_t vertex_count, const uint32_t *triangles,
-                      size_t triangle_count, gbt_error *err);
+gbt_status insert_add(insert_scene *in, const insert_object *object, const float *vertices,
+                      size_t vertex_count, const uint32_t *triangles, size_t triangle_count, gbt_error *err);
 
 /** Build the tree over all objects: no more can be added. As mesh_tree_build(). */
 gbt_status insert_finish(insert_scene *in, gbt_error *err);
@@ -55,8 +58,8 @@ gbt_status insert_finish(insert_scene *in, gbt_error *err);
  * @param rgb     [out]    allocated, 3 channels, size of the rays
  * @return as trace_forward()
  * Threads: uses all; same bits for every thread count.
- * Cost: the rays; a ray to the lamp for each that ends on a matt surface, INSERT_LAMP_SAMPLES of them for a lamp with a radius; and as much
- * again for those that end on a mirror.
+ * Cost: the rays; a ray to the lamp for each that ends on a matt surface, INSERT_LAMP_SAMPLES of them for a
+ * lamp with a radius; and as much again for those that end on a mirror.
  */
 gbt_status insert_trace(void *context, trace_scene *scene, const ray_image *rays, image *rgb, gbt_error *err);
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/insert_file.c -- an insert file: meshes to put into a scene, in JSON. */
 #include "render/insert_file.h"
 
@@ -57,11 +58,13 @@ static gbt_status take_placement(const json_fields *r, const double origin[3], p
     GBT_TRY(json_field_vector(r, "axis", false, axis));
     GBT_TRY(json_field_number(r, "angle_deg", -360, true, 360, &angle_deg));
     if (json_field_given(r, "axis") != json_field_given(r, "angle_deg"))
-        return json_field_fail(r, json_field_given(r, "axis") ? "angle_deg" : "axis", "missing (a turn has both)");
+        return json_field_fail(r, json_field_given(r, "axis") ? "angle_deg" : "axis",
+                               "missing (a turn has both)");
     dvec_normalize(axis);
     if (json_field_given(r, "axis") && !(dvec_length(axis) > 0.5))
         return json_field_fail(r, "axis", "is 0 (wanted a direction)");
-    const double half = angle_deg * PI / 360, q[4] = {cos(half), sin(half) * axis[0], sin(half) * axis[1], sin(half) * axis[2]};
+    const double half = angle_deg * PI / 360,
+                 q[4] = {cos(half), sin(half) * axis[0], sin(half) * axis[1], sin(half) * axis[2]};
     dquat_to_matrix(q, out->turn);
     for (int k = 0; k < 3; k++)
         out->position[k] -= origin[k];
@@ -85,8 +88,8 @@ static gbt_status take_look(const json_fields *r, insert_object *out)
     return GBT_OK;
 }
 
-static gbt_status add_placed(const json_fields *r, const insert_object *object, const placement *place, const mesh_data *mesh,
-                             insert_scene *out)
+static gbt_status add_placed(const json_fields *r, const insert_object *object, const placement *place,
+                             const mesh_data *mesh, insert_scene *out)
 {
     float *vertices = mem_alloc(mesh->vertex_count, 3 * sizeof *vertices, "mesh", r->err);
     gbt_status status = vertices == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
@@ -97,12 +100,13 @@ static gbt_status add_placed(const json_fields *r, const insert_object *object, 
             x[k] = place->scale * x[k] + place->position[k];
             vertices[3 * i + k] = (float)x[k];
             if (!(fabsf(vertices[3 * i + k]) <= MESH_COORDINATE_LIMIT))
-                status = base_fail(r->err, GBT_ERR_FORMAT, "%s: %smesh: vertex %zu lies beyond %g", r->path, r->prefix, i,
-                                   (double)MESH_COORDINATE_LIMIT);
+                status = base_fail(r->err, GBT_ERR_FORMAT, "%s: %smesh: vertex %zu lies beyond %g", r->path,
+                                   r->prefix, i, (double)MESH_COORDINATE_LIMIT);
         }
     }
     if (status == GBT_OK)
-        status = insert_add(out, object, vertices, mesh->vertex_count, mesh->triangles, mesh->triangle_count, r->err);
+        status = insert_add(out, object, vertices, mesh->vertex_count, mesh->triangles, mesh->triangle_count,
+                            r->err);
     mem_free(vertices);
     return status;
 }
@@ -131,7 +135,8 @@ static gbt_status take_all(const json_fields *all, const double origin[3], inser
     GBT_TRY(take_lamp(all, origin, out));
     const size_t count = json_array_size(objects); /* 0 for what is no array */
     if (count == 0 || count > OBJECTS_MAX)
-        return base_fail(all->err, GBT_ERR_FORMAT, "%s: objects: wanted a list of 1 to %d objects", all->path, OBJECTS_MAX);
+        return base_fail(all->err, GBT_ERR_FORMAT, "%s: objects: wanted a list of 1 to %d objects", all->path,
+                         OBJECTS_MAX);
     for (size_t i = 0; i < count; i++) {
         char prefix[32];
         const json_fields r = {all->path, prefix, json_array_get(objects, i), all->err};

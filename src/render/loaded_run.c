@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/loaded_run.c -- open a trained run for rendering. */
 #include "render/loaded_run.h"
 
@@ -18,7 +19,8 @@ static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *
     result_folder folder;
     bool found;
     GBT_TRY(result_folder_find(path, &folder, &found, err));
-    snprintf(out->model.data_folder, sizeof out->model.data_folder, "%.*s", (int)sizeof out->model.data_folder - 1, folder.source);
+    snprintf(out->model.data_folder, sizeof out->model.data_folder, "%.*s",
+             (int)sizeof out->model.data_folder - 1, folder.source);
     out->model.iterations = folder.iteration;
     out->def.alpha = folder.white_background ? "white" : "black";
     for (int c = 0; c < 3; c++)
@@ -40,8 +42,10 @@ void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud)
     memset(cloud, 0, sizeof *cloud);
     gaussian_cloud *c = &r->cloud;
     double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-    for (size_t i = 0; i < 3 * c->count; i++)
-        low[i % 3] = fmin(low[i % 3], (double)c->mean[i]), high[i % 3] = fmax(high[i % 3], (double)c->mean[i]);
+    for (size_t i = 0; i < 3 * c->count; i++) {
+        low[i % 3] = fmin(low[i % 3], (double)c->mean[i]);
+        high[i % 3] = fmax(high[i % 3], (double)c->mean[i]);
+    }
     for (int k = 0; k < 3; k++)
         r->model.origin[k] = 0.5 * (low[k] + high[k]);
     for (size_t i = 0; i < 3 * c->count; i++)
@@ -72,7 +76,8 @@ static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
     out->def.footprint = 0; /* of models that do not say */
     GBT_TRY(config_parse(out->model.config, path, &out->def, &out->strings, err));
     if (!frame_renderer_named(out->def.renderer, &out->frame.draw.renderer))
-        return base_fail(err, GBT_ERR_FORMAT, "%.1000s: section train.config: unknown renderer \"%.40s\"", path, out->def.renderer);
+        return base_fail(err, GBT_ERR_FORMAT, "%.1000s: section train.config: unknown renderer \"%.40s\"",
+                         path, out->def.renderer);
     out->frame.draw.footprint = (float)out->def.footprint;
     out->frame.draw.anchor_pixel = out->model.anchor_pixel;
     out->settings = trace_settings_default();
@@ -99,7 +104,8 @@ static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
     return photos_open(&out->photos, &out->scene, downscale > 0 ? downscale : out->def.downscale, err);
 }
 
-gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)
+gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out,
+                                 gbt_error *err)
 {
     scene_split split;
     GBT_TRY(scene_split_parse(out->def.eval_split, &split, err));
@@ -111,11 +117,14 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
         return place_views(downscale, out, err);
     }
     if (data == NULL && out->cloud.count > 0 && !has_data)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%.1000s: plain Gaussians know no cameras: name a camera or a data set (--camera or --data)", run);
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "%.1000s: plain Gaussians know no cameras: name a camera or a data set (--camera or --data)",
+            run);
     if (data == NULL && !has_data)
         return base_fail(err, GBT_ERR_IO,
-                         "%.300s: its data set is not there (tried %.1200s); say with --data where it is", run, out->data.tried);
+                         "%.300s: its data set is not there (tried %.1200s); say with --data where it is",
+                         run, out->data.tried);
     if (data == NULL && out->data.moved)
         log_info("%s: its data set is taken from %s, for both were moved", run, out->data.place);
     GBT_TRY(scene_load(data != NULL ? data : out->data.place, &split, &out->scene, err));
@@ -123,7 +132,8 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     return place_views(downscale, out, err);
 }
 
-gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err)
+gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out,
+                           gbt_error *err)
 {
     memset(out, 0, sizeof *out);
     GBT_TRY(open_model(run, out, err));
@@ -153,8 +163,10 @@ void loaded_run_close(loaded_run *r)
 
 gbt_status loaded_run_need_anchors(const loaded_run *r, const char *run, gbt_error *err)
 {
-    return r->cloud.count == 0 ? GBT_OK : base_fail(err, GBT_ERR_ARGUMENT,
-                                                    "%.1000s: plain Gaussians, no anchors (wanted a run or its model.gbt)", run);
+    return r->cloud.count == 0
+               ? GBT_OK
+               : base_fail(err, GBT_ERR_ARGUMENT,
+                           "%.1000s: plain Gaussians, no anchors (wanted a run or its model.gbt)", run);
 }
 
 frame_subject loaded_run_subject(const loaded_run *r)

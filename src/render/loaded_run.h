@@ -1,4 +1,6 @@
-/* render/loaded_run.h -- a trained run opened for rendering: its model, its settings, the views of its data set. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* render/loaded_run.h -- a trained run opened for rendering: its model, its settings, the views of its data
+   set. */
 #ifndef GBT_RENDER_LOADED_RUN_H
 #define GBT_RENDER_LOADED_RUN_H
 
@@ -12,25 +14,27 @@
 
 typedef struct loaded_run {
     model model;
-    gaussian_cloud cloud; /* of a file of plain Gaussians, local coordinates; then `model` has no anchors and is about the scene alone */
-    gbt_train_def def; /* the settings it was trained with; strings point into `strings` */
+    gaussian_cloud cloud; /* of a file of plain Gaussians, local coordinates; then `model` has no anchors and
+                             is about the scene alone */
+    gbt_train_def def;    /* the settings it was trained with; strings point into `strings` */
     config_strings strings;
     run_data data; /* where its data set is */
-    scene scene; /* cameras and points in the model's local coordinates */
+    scene scene;   /* cameras and points in the model's local coordinates */
     photos photos;
     trace_settings settings;
     frame frame;
 } loaded_run;
 
 /**
- * Open RUN: a folder with model.gbt, a model file, or plain Gaussians (.ply, .splat, .spz), which know no data set. A result folder of 3DGS
- * may: the one that its cfg_args names, else its cameras.json.
+ * Open RUN: a folder with model.gbt, a model file, or plain Gaussians (.ply, .splat, .spz), which know no
+ * data set. A result folder of 3DGS may: the one that its cfg_args names, else its cameras.json.
  *
  * @param data      [in] data set folder; NULL: the one it was trained on
  * @param downscale [in] 0: as in training
  * @param out       [out] start from {0}; free with loaded_run_close() after success or failure
  */
-gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err);
+gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out,
+                           gbt_error *err);
 
 /** GBT_ERR_ARGUMENT when it holds plain Gaussians, `run` is their file, and anchors are wanted. */
 gbt_status loaded_run_need_anchors(const loaded_run *r, const char *run, gbt_error *err);
@@ -42,7 +46,8 @@ frame_subject loaded_run_subject(const loaded_run *r);
 gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *err);
 
 /** The other half of loaded_run_open(), for a run that has no views open: `run` is what messages call it. */
-gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out, gbt_error *err);
+gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out,
+                                 gbt_error *err);
 
 /** Back to no views, whether there were any or not. */
 void loaded_run_close_views(loaded_run *r);
@@ -50,7 +55,8 @@ void loaded_run_close_views(loaded_run *r);
 /** Draw as plain Gaussians are drawn: on black, as every viewer does. */
 void loaded_run_draw_plain(loaded_run *r);
 
-/** Let `r` show these plain Gaussians, given in world coordinates, around the middle of their bounds, where floats are fine. `cloud` is
+/** Let `r` show these plain Gaussians, given in world coordinates, around the middle of their bounds, where
+    floats are fine. `cloud` is
  * taken
     over, and is {0} then. */
 void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud);
@@ -60,7 +66,8 @@ void loaded_run_close(loaded_run *r);
 /** Render a view into r->frame.rgb, at the run's resolution. */
 gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err);
 
-/** Settings by the name of a preset (trace/settings.h); NULL changes nothing. GBT_OK or GBT_ERR_ARGUMENT ("--preset: ..."). */
+/** Settings by the name of a preset (trace/settings.h); NULL changes nothing. GBT_OK or GBT_ERR_ARGUMENT
+    ("--preset: ..."). */
 gbt_status loaded_run_preset(const char *name, trace_settings *settings, gbt_error *err);
 
 /** "folder/a/b.jpg" becomes "a_b": a file name for what belongs to a view. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/render.c -- the views of a split, the camera of a file, or a path, to image files or a film. */
 #include <math.h>
 #include <stdio.h>
@@ -58,11 +59,13 @@ static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *d
 {
     loaded_run *r = &st->run;
     const frame_guest guest = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
-    GBT_TRY(frame_render_guest(&r->frame, loaded_run_subject(r), shot, &r->settings, def->insert != NULL ? &guest : NULL, err));
+    GBT_TRY(frame_render_guest(&r->frame, loaded_run_subject(r), shot, &r->settings,
+                               def->insert != NULL ? &guest : NULL, err));
     return st->in_double ? render_reference(r, shot, err) : GBT_OK;
 }
 
-static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, const char *name, const gbt_render_def *def, gbt_error *err)
+static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, const char *name,
+                             const gbt_render_def *def, gbt_error *err)
 {
     char file[1100], path[4096];
     loaded_run *r = &st->run;
@@ -96,7 +99,8 @@ static gbt_status render_views(studio *st, const char *out, const gbt_render_def
         log_count("render", ++rendered, wanted, (double)NAN);
     }
     if (rendered == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no views in this split (of %zu)", r->scene.folder, r->scene.view_count);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no views in this split (of %zu)", r->scene.folder,
+                         r->scene.view_count);
     log_info("%zu views rendered into %s", rendered, out);
     return GBT_OK;
 }
@@ -130,12 +134,13 @@ static void say_progress(size_t done, size_t count, double start, double *said)
     const double now = clock_wall();
     if (done < count && now - *said < 5)
         return;
-    log_info("frame %zu of %zu, %.0f s left", done, count, (now - start) / (double)done * (double)(count - done));
+    log_info("frame %zu of %zu, %.0f s left", done, count,
+             (now - start) / (double)done * (double)(count - done));
     *said = now;
 }
 
-static gbt_status render_frames(studio *st, const camera_path *path, video *film, const char *out, const gbt_render_def *def,
-                                gbt_error *err)
+static gbt_status render_frames(studio *st, const camera_path *path, video *film, const char *out,
+                                const gbt_render_def *def, gbt_error *err)
 {
     const double start = clock_wall();
     double said = start;
@@ -159,14 +164,16 @@ static gbt_status render_film(studio *st, const char *out, const gbt_render_def 
     video *film = NULL;
     gbt_status status = render_path_make(&st->run, def, &path, err);
     if (status == GBT_OK && video_named(out))
-        status = video_open(out, path.shots[0].camera.width, path.shots[0].camera.height, path.fps, &film, err);
+        status =
+            video_open(out, path.shots[0].camera.width, path.shots[0].camera.height, path.fps, &film, err);
     if (status == GBT_OK)
         status = render_frames(st, &path, film, out, def, err);
     const gbt_status closed = video_close(film, status == GBT_OK, err);
     if (status == GBT_OK)
         status = closed;
     if (status == GBT_OK)
-        log_info("%zu frames rendered into %s, %.2f s at %g frames per second", path.count, out, (double)path.count / path.fps, path.fps);
+        log_info("%zu frames rendered into %s, %.2f s at %g frames per second", path.count, out,
+                 (double)path.count / path.fps, path.fps);
     camera_path_free(&path);
     return status;
 }
@@ -181,7 +188,8 @@ static gbt_status choose_renderer(studio *st, const gbt_render_def *def, gbt_err
     if (st->in_double)
         *renderer = FRAME_TRACE;
     else if (def->renderer != NULL && !frame_renderer_named(def->renderer, renderer))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster, per-ray or reference)", def->renderer);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "--renderer: \"%.40s\" (wanted trace, raster, per-ray or reference)", def->renderer);
     if (def->insert != NULL && *renderer != FRAME_TRACE)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
     if (st->outputs != 0 && *renderer != FRAME_TRACE)
@@ -195,9 +203,11 @@ static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_err
         return base_fail(err, GBT_ERR_ARGUMENT, "--frames, --fps, --size: of a path (wanted --path)");
     const bool orbit = def->path != NULL && strcmp(def->path, "orbit") == 0;
     if (!orbit && (def->look_at != NULL || def->orbit_radius != 0 || !isnan(def->orbit_height)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--look-at, --radius, --height: of an orbit (wanted --path orbit)");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "--look-at, --radius, --height: of an orbit (wanted --path orbit)");
     if (!(def->orbit_radius >= 0 && def->orbit_radius <= 1e9) || fabs(def->orbit_height) > 1e9)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--radius, --height: %g, %g (wanted up to 1e+09)", def->orbit_radius, def->orbit_height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--radius, --height: %g, %g (wanted up to 1e+09)",
+                         def->orbit_radius, def->orbit_height);
     if (def->path == NULL)
         return video_named(out) ? base_fail(err, GBT_ERR_ARGUMENT, "%s: a film wants --path", out) : GBT_OK;
     if (def->camera != NULL)
@@ -205,11 +215,14 @@ static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_err
     if (!render_path_wants_views(def->path) && def->downscale != 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: not with a path file (wanted --size)");
     if (def->frames < 0 || def->frames > CAMERA_PATH_FRAMES_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--frames: %d (wanted 1 to %d)", def->frames, (int)CAMERA_PATH_FRAMES_MAX);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--frames: %d (wanted 1 to %d)", def->frames,
+                         (int)CAMERA_PATH_FRAMES_MAX);
     if (!(def->fps >= 0 && def->fps <= 1000))
         return base_fail(err, GBT_ERR_ARGUMENT, "--fps: %g (wanted up to 1000)", def->fps);
-    if ((def->width != 0 || def->height != 0) && !(def->width > 0 && def->height > 0 && def->width <= 65500 && def->height <= 65500))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--size: %d x %d (wanted 1 to 65500 pixels)", def->width, def->height);
+    if ((def->width != 0 || def->height != 0) &&
+        !(def->width > 0 && def->height > 0 && def->width <= 65500 && def->height <= 65500))
+        return base_fail(err, GBT_ERR_ARGUMENT, "--size: %d x %d (wanted 1 to 65500 pixels)", def->width,
+                         def->height);
     if (video_named(out) && def->outputs != NULL)
         return base_fail(err, GBT_ERR_ARGUMENT, "--outputs: not with a film (wanted -o DIR)");
     return GBT_OK;
@@ -222,7 +235,8 @@ static gbt_status check_def(const char *out, const gbt_render_def *def, gbt_erro
     if (!(def->downscale == 0 || (def->downscale >= 1 && def->downscale <= 64)))
         return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: %g (wanted 1 to 64)", def->downscale);
     if (def->camera != NULL && def->downscale != 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: not with --camera (the camera file says the size)");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "--downscale: not with --camera (the camera file says the size)");
     if (def->insert != NULL && def->renderer != NULL && strcmp(def->renderer, "trace") != 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
     return check_path(out, def, err);
@@ -239,7 +253,8 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
     const bool wants_views = def->path != NULL ? render_path_wants_views(def->path) : def->camera == NULL;
     gbt_status status = render_outputs_parse(def->outputs, &st->outputs, err);
     if (status == GBT_OK)
-        status = wants_views ? loaded_run_open(run, def->data, def->downscale, &st->run, err) : loaded_run_open_model(run, &st->run, err);
+        status = wants_views ? loaded_run_open(run, def->data, def->downscale, &st->run, err)
+                             : loaded_run_open_model(run, &st->run, err);
     if (status == GBT_OK)
         status = loaded_run_preset(def->preset, &st->run.settings, err);
     if (status == GBT_OK)
@@ -247,8 +262,9 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
     if (status == GBT_OK && def->insert != NULL)
         status = insert_file_read(def->insert, st->run.model.origin, &st->insert, err);
     if (status == GBT_OK)
-        status = def->path != NULL ? render_film(st, out, def, err) : def->camera != NULL ? render_camera(st, out, def, err)
-                 : render_views(st, out, def, err);
+        status = def->path != NULL     ? render_film(st, out, def, err)
+                 : def->camera != NULL ? render_camera(st, out, def, err)
+                                       : render_views(st, out, def, err);
     insert_scene_free(&st->insert);
     loaded_run_close(&st->run);
     mem_free(st);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/render_outputs.c -- what a picture shows beside colour, to float EXR files. */
 #include "render/render_outputs.h"
 
@@ -8,8 +9,11 @@
 #include "base/file.h"
 #include "base/memory.h"
 
-static const struct { const char *name; int channels; } outputs[OUTPUT_COUNT] = {
-    {"transmittance", 1}, {"depth", 1}, {"median-depth", 1}, {"normal", 3}, {"hits", 1}, {"anchor", 1}};
+static const struct {
+    const char *name;
+    int channels;
+} outputs[OUTPUT_COUNT] = {{"transmittance", 1}, {"depth", 1}, {"median-depth", 1},
+                           {"normal", 3},        {"hits", 1},  {"anchor", 1}};
 
 gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *err)
 {
@@ -17,11 +21,13 @@ gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *e
     for (const char *word = list; word != NULL;) {
         const size_t length = strcspn(word, ",");
         int i = 0;
-        while (i < OUTPUT_COUNT && (strlen(outputs[i].name) != length || strncmp(word, outputs[i].name, length) != 0))
+        while (i < OUTPUT_COUNT &&
+               (strlen(outputs[i].name) != length || strncmp(word, outputs[i].name, length) != 0))
             i++;
         if (i == OUTPUT_COUNT)
             return base_fail(err, GBT_ERR_ARGUMENT,
-                             "--outputs: \"%.*s\" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)",
+                             "--outputs: \"%.*s\" (wanted transmittance, depth, median-depth, normal, hits "
+                             "or anchor, with commas between)",
                              length < 40 ? (int)length : 40, word);
         *wanted |= 1u << i;
         word = word[length] == ',' ? word + length + 1 : NULL;
@@ -29,15 +35,19 @@ gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *e
     return GBT_OK;
 }
 
-/* The anchor that each ray's strongest Gaussian was decoded from, or the plain Gaussian; -1 where there is none. */
+/* The anchor that each ray's strongest Gaussian was decoded from, or the plain Gaussian; -1 where there is
+   none. */
 static void name_anchors(const loaded_run *r, const uint32_t *strongest, image *out)
 {
     const frame *f = &r->frame;
     for (size_t i = 0; i < (size_t)out->width * (size_t)out->height; i++)
-        out->pixels[i] = strongest[i] < f->gaussians.count ? (float)frame_part(f, loaded_run_subject(r), strongest[i]) : -1;
+        out->pixels[i] = strongest[i] < f->gaussians.count
+                             ? (float)frame_part(f, loaded_run_subject(r), strongest[i])
+                             : -1;
 }
 
-static gbt_status write_one(const image *pixels, render_output which, const char *folder, const char *name, gbt_error *err)
+static gbt_status write_one(const image *pixels, render_output which, const char *folder, const char *name,
+                            gbt_error *err)
 {
     char file[1200], path[4096];
     snprintf(file, sizeof file, "%s.%s.exr", name, outputs[which].name);
@@ -55,7 +65,8 @@ void render_output_images_free(render_output_images *o)
     memset(o, 0, sizeof *o);
 }
 
-gbt_status render_outputs_trace(loaded_run *r, const ray_shot *shot, unsigned wanted, render_output_images *o, gbt_error *err)
+gbt_status render_outputs_trace(loaded_run *r, const ray_shot *shot, unsigned wanted, render_output_images *o,
+                                gbt_error *err)
 {
     ray_shot middle = *shot;
     middle.aperture_radius = 0;
@@ -69,16 +80,21 @@ gbt_status render_outputs_trace(loaded_run *r, const ray_shot *shot, unsigned wa
         if (o->strongest == NULL)
             return GBT_ERR_NO_MEMORY;
     }
-    const trace_outputs out = {.rgb = &o->rgb, .transmittance = o->of[OUTPUT_TRANSMITTANCE].pixels, .depth = o->of[OUTPUT_DEPTH].pixels,
-                               .median_depth = o->of[OUTPUT_MEDIAN_DEPTH].pixels, .normal = o->of[OUTPUT_NORMAL].pixels,
-                               .hit_count = o->of[OUTPUT_HITS].pixels, .strongest = o->strongest};
+    const trace_outputs out = {.rgb = &o->rgb,
+                               .transmittance = o->of[OUTPUT_TRANSMITTANCE].pixels,
+                               .depth = o->of[OUTPUT_DEPTH].pixels,
+                               .median_depth = o->of[OUTPUT_MEDIAN_DEPTH].pixels,
+                               .normal = o->of[OUTPUT_NORMAL].pixels,
+                               .hit_count = o->of[OUTPUT_HITS].pixels,
+                               .strongest = o->strongest};
     GBT_TRY(trace_forward(&r->frame.scene, &o->rays, false, &out, NULL, err));
     if (o->strongest != NULL)
         name_anchors(r, o->strongest, &o->of[OUTPUT_ANCHOR]);
     return GBT_OK;
 }
 
-gbt_status render_outputs_write(loaded_run *r, const ray_shot *shot, unsigned wanted, const char *folder, const char *name, gbt_error *err)
+gbt_status render_outputs_write(loaded_run *r, const ray_shot *shot, unsigned wanted, const char *folder,
+                                const char *name, gbt_error *err)
 {
     if (wanted == 0)
         return GBT_OK;

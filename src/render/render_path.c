@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/render_path.c -- which cameras a film has. */
 #include "render/render_path.h"
 
@@ -28,8 +29,10 @@ static gbt_status take_cameras(const loaded_run *r, gbt_camera **out, size_t *co
         for (size_t i = 0; i < r->scene.view_count; i++)
             if (r->scene.views[i].is_test == (held_out > 0))
                 (*out)[(*count)++] = photos_camera(&r->photos, i, 0);
-    return *count > 0 ? GBT_OK : base_fail(err, GBT_ERR_FORMAT, "--path: %s has no cameras (wanted a data set with photos, or a path file)",
-                                           r->scene.folder);
+    return *count > 0 ? GBT_OK
+                      : base_fail(err, GBT_ERR_FORMAT,
+                                  "--path: %s has no cameras (wanted a data set with photos, or a path file)",
+                                  r->scene.folder);
 }
 
 /** Sides of the pictures: as asked for, else those of the first photo, made even for films. */
@@ -47,8 +50,10 @@ static gbt_status read_place(const char *text, const double origin[3], double ou
     const char *at = text;
     for (int k = 0; k < 3; k++) {
         const size_t length = strcspn(at, ",");
-        if (number_parse_double(at, length, &out[k]) != NUMBER_OK || !isfinite(out[k]) || (at[length] == ',') != (k < 2))
-            return base_fail(err, GBT_ERR_ARGUMENT, "--look-at: \"%.80s\" (wanted X,Y,Z, as in 0.5,-1,2)", text);
+        if (number_parse_double(at, length, &out[k]) != NUMBER_OK || !isfinite(out[k]) ||
+            (at[length] == ',') != (k < 2))
+            return base_fail(err, GBT_ERR_ARGUMENT, "--look-at: \"%.80s\" (wanted X,Y,Z, as in 0.5,-1,2)",
+                             text);
         out[k] -= origin[k];
         at += length + (k < 2);
     }
@@ -56,19 +61,23 @@ static gbt_status read_place(const char *text, const double origin[3], double ou
 }
 
 /** What is not asked for follows the cameras; then what most photos show is in every frame. */
-static gbt_status make_orbit(const loaded_run *r, const gbt_render_def *def, const gbt_camera *cameras, size_t count,
-                             const shared_points *shared, camera_group *group, camera_path *out, gbt_error *err)
+static gbt_status make_orbit(const loaded_run *r, const gbt_render_def *def, const gbt_camera *cameras,
+                             size_t count, const shared_points *shared, camera_group *group, camera_path *out,
+                             gbt_error *err)
 {
-    const orbit_shape shape = {.radius = def->orbit_radius, .height = def->orbit_height, .at_focus = def->look_at != NULL};
+    const orbit_shape shape = {
+        .radius = def->orbit_radius, .height = def->orbit_height, .at_focus = def->look_at != NULL};
     if (shape.at_focus)
         GBT_TRY(read_place(def->look_at, r->model.origin, group->focus, err));
     const gbt_camera lens = choose_lens(group, def);
-    GBT_TRY(camera_path_orbit(cameras, count, group, &lens, &shape, def->frames > 0 ? (size_t)def->frames : FRAMES_ORBIT, out, err));
+    GBT_TRY(camera_path_orbit(cameras, count, group, &lens, &shape,
+                              def->frames > 0 ? (size_t)def->frames : FRAMES_ORBIT, out, err));
     const bool chosen = shape.at_focus || shape.radius > 0 || !isnan(shape.height);
     return chosen ? GBT_OK : camera_path_show(out, shared, err);
 }
 
-static gbt_status make_from_views(const loaded_run *r, const gbt_render_def *def, camera_path *out, gbt_error *err)
+static gbt_status make_from_views(const loaded_run *r, const gbt_render_def *def, camera_path *out,
+                                  gbt_error *err)
 {
     gbt_camera *cameras = NULL;
     camera_group group;
@@ -76,9 +85,11 @@ static gbt_status make_from_views(const loaded_run *r, const gbt_render_def *def
     size_t count;
     gbt_status status = take_cameras(r, &cameras, &count, err);
     if (status == GBT_OK)
-        status = shared_points_find(cameras, count, r->scene.points.position, r->scene.points.count, &shared, err);
+        status =
+            shared_points_find(cameras, count, r->scene.points.position, r->scene.points.count, &shared, err);
     if (status == GBT_OK)
-        status = camera_group_make(cameras, count, r->scene.points.position, r->scene.points.count, &group, err);
+        status =
+            camera_group_make(cameras, count, r->scene.points.position, r->scene.points.count, &group, err);
     if (status != GBT_OK)
         goto done;
     if (strcmp(def->path, "orbit") == 0) {
@@ -95,7 +106,8 @@ static gbt_status make_from_views(const loaded_run *r, const gbt_render_def *def
     }
     const size_t most = count < FRAMES_MOST / FRAMES_PER_CAMERA ? count * FRAMES_PER_CAMERA : FRAMES_MOST;
     if (status == GBT_OK)
-        status = camera_path_through(cameras, count, group.distance, def->frames > 0 ? (size_t)def->frames : most, out, err);
+        status = camera_path_through(cameras, count, group.distance,
+                                     def->frames > 0 ? (size_t)def->frames : most, out, err);
 done:
     shared_points_free(&shared);
     mem_free(cameras);
@@ -109,10 +121,12 @@ static gbt_status resize(camera_path *path, const gbt_render_def *def, gbt_error
         ray_shot *shot = &path->shots[i];
         camera_group group = {.lens = shot->camera};
         if (shot->camera.model != GBT_CAMERA_PINHOLE)
-            return base_fail(err, GBT_ERR_ARGUMENT, "--size: not with a path of %s cameras (its file says the size)",
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "--size: not with a path of %s cameras (its file says the size)",
                              gbt_camera_model_name(shot->camera.model));
         const gbt_camera lens = camera_group_lens(&group, def->width, def->height);
-        shot->camera.width = lens.width, shot->camera.height = lens.height;
+        shot->camera.width = lens.width;
+        shot->camera.height = lens.height;
         memcpy(shot->camera.params, lens.params, sizeof lens.params);
     }
     return GBT_OK;

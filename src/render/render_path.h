@@ -1,4 +1,6 @@
-/* render/render_path.h -- which cameras a film has: around the scene, through the photos' cameras, or those of a file. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* render/render_path.h -- which cameras a film has: around the scene, through the photos' cameras, or those
+   of a file. */
 #ifndef GBT_RENDER_RENDER_PATH_H
 #define GBT_RENDER_RENDER_PATH_H
 
@@ -12,7 +14,8 @@ bool render_path_wants_views(const char *path);
 /**
  * The cameras of def->path ("orbit", "interpolate", or a file), with fps set.
  *
- * @param r   [in]  with views, for a path that wants them; trained ones count, held-out ones only where there are no others
+ * @param r   [in]  with views, for a path that wants them; trained ones count, held-out ones only where there
+ *                  are no others
  * @param out [out] free with camera_path_free() after success or failure
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/shared_points.c -- what all photos show. */
 #include "render/shared_points.h"
 
@@ -33,12 +34,13 @@ static void count_block(size_t block, size_t begin, size_t end, void *context)
             job->seen_by[i] += camera_sees(&job->cameras[c], job->points + 3 * i * job->stride, NULL);
 }
 
-gbt_status shared_points_find(const gbt_camera *cameras, size_t count, const float *points, size_t point_count, shared_points *out,
-                              gbt_error *err)
+gbt_status shared_points_find(const gbt_camera *cameras, size_t count, const float *points,
+                              size_t point_count, shared_points *out, gbt_error *err)
 {
     *out = (shared_points){0};
     const size_t stride = point_count / ASKED_MOST + 1, asked = point_count / stride;
-    sight_job job = {cameras, count, points, stride, mem_calloc(asked + 1, sizeof *job.seen_by, "shared points", err)};
+    sight_job job = {cameras, count, points, stride,
+                     mem_calloc(asked + 1, sizeof *job.seen_by, "shared points", err)};
     out->position = mem_alloc(asked + 1, 3 * sizeof *out->position, "shared points", err);
     if (job.seen_by == NULL || out->position == NULL) {
         mem_free(job.seen_by);
@@ -74,7 +76,8 @@ double shared_points_zoom(const shared_points *shared, const gbt_camera *camera,
             way[k] = (double)shared->position[3 * i + (size_t)k] - camera->center[k];
         for (int k = 0; k < 3; k++)
             at[k] = r[3 * k] * way[0] + r[3 * k + 1] * way[1] + r[3 * k + 2] * way[2];
-        const double x = fabs(at[0]) * p[0] / (0.5 * camera->width), y = fabs(at[1]) * p[1] / (0.5 * camera->height);
+        const double x = fabs(at[0]) * p[0] / (0.5 * camera->width),
+                     y = fabs(at[1]) * p[1] / (0.5 * camera->height);
         if (at[2] > 0)
             scratch[before++] = fmax(x, y) / at[2];
     }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/video.c -- pictures to a film, by the program ffmpeg. */
 #include "render/video.h"
 
@@ -18,10 +19,16 @@
 enum { PATH_LIMIT = 4096, ARGUMENTS_MAX = 48 };
 
 /* What ffmpeg is told for each kind of file. -f: the temporary name does not say it. */
-static const struct { const char *ending, *options[16]; } kinds[] = {
-    {".mp4", {"-c:v", "libx264", "-preset", "medium", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"}},
-    {".webm", {"-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "28", "-row-mt", "1", "-pix_fmt", "yuv420p", "-f", "webm"}},
-    {".gif", {"-filter_complex", "[0:v]split[a][b];[a]palettegen[p];[b][p]paletteuse", "-loop", "0", "-f", "gif"}},
+static const struct {
+    const char *ending, *options[16];
+} kinds[] = {
+    {".mp4",
+     {"-c:v", "libx264", "-preset", "medium", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart",
+      "-f", "mp4"}},
+    {".webm",
+     {"-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "28", "-row-mt", "1", "-pix_fmt", "yuv420p", "-f", "webm"}},
+    {".gif",
+     {"-filter_complex", "[0:v]split[a][b];[a]palettegen[p];[b][p]paletteuse", "-loop", "0", "-f", "gif"}},
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
@@ -45,12 +52,10 @@ static int kind_of(const char *path)
     return KINDS;
 }
 
-bool video_named(const char *path)
-{
-    return kind_of(path) < KINDS;
-}
+bool video_named(const char *path) { return kind_of(path) < KINDS; }
 
-/** posix_spawnp() with a socket as standard input. A pipe would raise SIGPIPE in the whole program when ffmpeg ends early. */
+/** posix_spawnp() with a socket as standard input. A pipe would raise SIGPIPE in the whole program when
+    ffmpeg ends early. */
 static gbt_status start(video *v, char *const *arguments, gbt_error *err)
 {
     int ends[2];
@@ -71,7 +76,9 @@ static gbt_status start(video *v, char *const *arguments, gbt_error *err)
     v->process = 0;
     if (code == ENOENT)
         return base_fail(err, GBT_ERR_IO,
-                         "%s: a film wants the program ffmpeg, which is not there (install it, or give a folder for pictures)", v->path);
+                         "%s: a film wants the program ffmpeg, which is not there (install it, or give a "
+                         "folder for pictures)",
+                         v->path);
     return base_fail(err, GBT_ERR_IO, "%s: ffmpeg does not start: %s", v->path, strerror(code));
 }
 
@@ -81,15 +88,19 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
     const char *slash = strrchr(path, '/');
     const int folder = slash != NULL ? (int)(slash - path) + 1 : 0;
     if (kind == KINDS)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: not the name of a film (wanted .mp4, .webm or .gif)", path);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: not the name of a film (wanted .mp4, .webm or .gif)",
+                         path);
     if (strcmp(kinds[kind].ending, ".gif") != 0 && (width % 2 != 0 || height % 2 != 0))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted even numbers: films keep colours for 2 x 2 pixels)", path,
-                         width, height);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%s: %d x %d pixels (wanted even numbers: films keep colours for 2 x 2 pixels)",
+                         path, width, height);
     /* ./: a name that begins with a dash is no option. */
     if (snprintf(v->path, sizeof v->path, "%s", path) >= (int)sizeof v->path ||
-        snprintf(v->part, sizeof v->part, "%s%.*s.%s.tmp", folder == 0 ? "./" : "", folder, path, path + folder) >= (int)sizeof v->part)
+        snprintf(v->part, sizeof v->part, "%s%.*s.%s.tmp", folder == 0 ? "./" : "", folder, path,
+                 path + folder) >= (int)sizeof v->part)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
-    v->width = width, v->height = height;
+    v->width = width;
+    v->height = height;
     v->row = mem_alloc((size_t)width * (size_t)height, 3, "film", err);
     v->complaints = tmpfile();
     if (v->row == NULL)
@@ -99,15 +110,17 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
     char size[32], rate[32];
     snprintf(size, sizeof size, "%dx%d", width, height);
     snprintf(rate, sizeof rate, "%.6g", fps);
-    const char *head[] = {"ffmpeg", "-hide_banner", "-nostdin", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s",
-                          size, "-r", rate, "-i", "pipe:0", "-an"};
+    const char *head[] = {"ffmpeg", "-hide_banner", "-nostdin", "-loglevel", "error", "-y",
+                          "-f",     "rawvideo",     "-pix_fmt", "rgb24",     "-s",    size,
+                          "-r",     rate,           "-i",       "pipe:0",    "-an"};
     char *arguments[ARGUMENTS_MAX];
     size_t count = 0;
     for (size_t i = 0; i < sizeof head / sizeof *head; i++)
         arguments[count++] = (char *)head[i];
     for (size_t i = 0; kinds[kind].options[i] != NULL; i++)
         arguments[count++] = (char *)kinds[kind].options[i];
-    arguments[count++] = v->part, arguments[count] = NULL;
+    arguments[count++] = v->part;
+    arguments[count] = NULL;
     return start(v, arguments, err);
 }
 
@@ -159,8 +172,8 @@ static gbt_status failed(video *v, int code, gbt_error *err)
 gbt_status video_add(video *v, const image *picture, gbt_error *err)
 {
     if (picture->width != v->width || picture->height != v->height || picture->channels != 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a picture of %d x %d (wanted %d x %d)", v->path, picture->width, picture->height,
-                         v->width, v->height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a picture of %d x %d (wanted %d x %d)", v->path,
+                         picture->width, picture->height, v->width, v->height);
     const size_t count = 3 * (size_t)v->width * (size_t)v->height;
     for (size_t i = 0; i < count; i++) {
         const float value = picture->pixels[i];

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* render/video.h -- pictures to a film, by the program ffmpeg. */
 #ifndef GBT_RENDER_VIDEO_H
 #define GBT_RENDER_VIDEO_H
@@ -21,11 +22,13 @@ typedef struct video video;
  */
 gbt_status video_open(const char *path, int width, int height, double fps, video **out, gbt_error *err);
 
-/** One more picture, of that size and 3 channels, rounded to 8 bit. GBT_ERR_IO: ffmpeg's own last line says why. */
+/** One more picture, of that size and 3 channels, rounded to 8 bit. GBT_ERR_IO: ffmpeg's own last line says
+    why. */
 gbt_status video_add(video *v, const image *picture, gbt_error *err);
 
 /**
- * Wait for ffmpeg; with `keep` the film gets its name when all went well, otherwise nothing is left of it. `v` is gone then. NULL is fine.
+ * Wait for ffmpeg; with `keep` the film gets its name when all went well, otherwise nothing is left of it.
+ * `v` is gone then. NULL is fine.
  */
 gbt_status video_close(video *v, bool keep, gbt_error *err);
 

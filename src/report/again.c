@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/again.c -- make the page of a run again, from what the run left. */
 #include <jansson.h>
 #include <stdio.h>
@@ -12,17 +13,15 @@
 #include "report/metrics.h"
 #include "report/report.h"
 
-static size_t count_or_zero(double value)
-{
-    return value >= 1 && value < 1e15 ? (size_t)value : 0;
-}
+static size_t count_or_zero(double value) { return value >= 1 && value < 1e15 ? (size_t)value : 0; }
 
 /** Scores as metrics.json has them, with the pictures that scoring left. */
 static gbt_status read_scores(const char *run, const json_t *metrics, evaluation *e, gbt_error *err)
 {
     char folder[4096];
     const json_t *views = json_object_get(metrics, "views");
-    *e = (evaluation){.psnr = metrics_number(metrics, "psnr"), .ssim = metrics_number(metrics, "ssim"),
+    *e = (evaluation){.psnr = metrics_number(metrics, "psnr"),
+                      .ssim = metrics_number(metrics, "ssim"),
                       .flip = metrics_number(metrics, "flip"),
                       .lpips = {metrics_number(metrics, "lpips"), metrics_number(metrics, "lpips_01")},
                       .lpips_network = metrics_text(metrics, "lpips_network"),
@@ -40,9 +39,12 @@ static gbt_status read_scores(const char *run, const json_t *metrics, evaluation
         if (name == NULL)
             continue;
         snprintf(v->name, sizeof v->name, "%s", name);
-        v->psnr = metrics_number(view, "psnr"), v->ssim = metrics_number(view, "ssim"), v->flip = metrics_number(view, "flip");
+        v->psnr = metrics_number(view, "psnr");
+        v->ssim = metrics_number(view, "ssim");
+        v->flip = metrics_number(view, "flip");
         v->lpips = (lpips_scores){metrics_number(view, "lpips"), metrics_number(view, "lpips_01")};
-        v->seconds = metrics_number(view, "seconds"), v->gaussians = count_or_zero(metrics_number(view, "gaussians"));
+        v->seconds = metrics_number(view, "seconds");
+        v->gaussians = count_or_zero(metrics_number(view, "gaussians"));
         GBT_TRY(view_score_paths(v, folder, err));
         e->view_count++;
     }
@@ -57,7 +59,8 @@ gbt_status gbt_report(const char *run, const char *const *studies, size_t study_
     gbt_error why = {0};
     for (size_t i = 0; i < study_count; i++)
         if (!file_exists(studies[i]))
-            return base_fail(err, GBT_ERR_IO, "%s: no such file or folder (wanted what gbtrace study wrote)", studies[i]);
+            return base_fail(err, GBT_ERR_IO, "%s: no such file or folder (wanted what gbtrace study wrote)",
+                             studies[i]);
     GBT_TRY(file_join(path, sizeof path, run, "metrics.json", err));
     GBT_TRY(json_read(path, &metrics, err));
     loaded_run *r = mem_calloc(1, sizeof *r, "run", err);
@@ -66,8 +69,11 @@ gbt_status gbt_report(const char *run, const char *const *studies, size_t study_
         const gbt_status opened = loaded_run_open(run, NULL, 0, r, &why);
         if (opened != GBT_OK)
             log_warn("no maps and layers: %s", why.text);
-        status = report_write(run, &e, metrics, &(report_more){.open = opened == GBT_OK ? r : NULL, .studies = studies,
-                                                               .study_count = study_count}, err);
+        status = report_write(run, &e, metrics,
+                              &(report_more){.open = opened == GBT_OK ? r : NULL,
+                                             .studies = studies,
+                                             .study_count = study_count},
+                              err);
     }
     if (status == GBT_OK)
         log_info("%s/report.html: %zu held-out views", run, e.view_count);

@@ -1,9 +1,11 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/bars.c -- what a whole is made of, as inline SVG: bars, and layers over time. */
 #include <math.h>
 
 #include "report/axes.h"
 
-void chart_bars(text *out, const char *title, const char *unit, const chart_bar *bars, size_t count, double whole)
+void chart_bars(text *out, const char *title, const char *unit, const chart_bar *bars, size_t count,
+                double whole)
 {
     enum { BAR_LEFT = 140, BAR_RIGHT = 352, ROW = 24, BAR = 15 };
     double longest = 0, sum = 0;
@@ -38,8 +40,10 @@ void chart_bars(text *out, const char *title, const char *unit, const chart_bar 
             continue;
         }
         const double width = fmax((BAR_RIGHT - BAR_LEFT) * (bars[i].value / longest), 1);
-        text_format(out, "<rect x=\"%d\" y=\"%zu\" width=\"%.1f\" height=\"%d\" rx=\"2\"/><text x=\"%.1f\" y=\"%zu\">", BAR_LEFT, top,
-                    width, BAR, BAR_LEFT + width + 6, base);
+        text_format(
+            out,
+            "<rect x=\"%d\" y=\"%zu\" width=\"%.1f\" height=\"%d\" rx=\"2\"/><text x=\"%.1f\" y=\"%zu\">",
+            BAR_LEFT, top, width, BAR, BAR_LEFT + width + 6, base);
         text_number(out, bars[i].value, bars[i].value < 9.995 ? 2 : bars[i].value < 99.95 ? 1 : 0);
         text_add(out, " ");
         text_escaped(out, unit);
@@ -48,7 +52,7 @@ void chart_bars(text *out, const char *title, const char *unit, const chart_bar 
     text_add(out, "</svg></figure>\n");
 }
 
-/* ---- layers ------------------------------------------------------------------------------------------------------------------- */
+/* ---- layers ---- */
 
 enum { STEPS = 60, LAYERS_MAX = 16 };
 
@@ -71,7 +75,8 @@ static void average(const double *x, size_t count, const chart_layer *layers, si
                 known = known && chart_is_amount(layers[k].y[i]);
             for (size_t k = 0; k < s->layer_count && known; k++)
                 sum[k] += layers[k].y[i];
-            sum_x += known ? x[i] : 0, rows += known;
+            sum_x += known ? x[i] : 0;
+            rows += known;
         }
         if (rows == 0)
             continue;
@@ -82,11 +87,13 @@ static void average(const double *x, size_t count, const chart_layer *layers, si
     }
 }
 
-static void draw_layer(text *out, const stack *s, size_t layer, const chart_axes *a, const char *name, int color)
+static void draw_layer(text *out, const stack *s, size_t layer, const chart_axes *a, const char *name,
+                       int color)
 {
     text_format(out, "<path class=\"area s%d\" d=\"", color);
     for (size_t i = 0; i < s->count; i++)
-        text_format(out, "%s%.1f %.1f", i == 0 ? "M" : "L", chart_place_x(a, s->x[i]), chart_place_y(a, s->top[layer + 1][i]));
+        text_format(out, "%s%.1f %.1f", i == 0 ? "M" : "L", chart_place_x(a, s->x[i]),
+                    chart_place_y(a, s->top[layer + 1][i]));
     for (size_t i = s->count; i-- > 0;)
         text_format(out, "L%.1f %.1f", chart_place_x(a, s->x[i]), chart_place_y(a, s->top[layer][i]));
     text_add(out, "Z\"><title>");
@@ -94,14 +101,19 @@ static void draw_layer(text *out, const stack *s, size_t layer, const chart_axes
     text_add(out, "</title></path>");
 }
 
-void chart_stack(text *out, const char *title, const char *x_unit, const char *y_unit, const double *x, size_t count,
-                 const chart_layer *layers, size_t layer_count)
+void chart_stack(text *out, const char *title, const char *x_unit, const char *y_unit, const double *x,
+                 size_t count, const chart_layer *layers, size_t layer_count)
 {
     stack s;
     chart_axes a;
     average(x, count, layers, layer_count, &s);
     const chart_series whole = {.x = s.x, .y = s.top[s.layer_count], .count = s.count, .style = CHART_LINE};
-    const line_chart frame = {.title = title, .x_unit = x_unit, .y_unit = y_unit, .from_zero = true, .series = &whole, .series_count = 1};
+    const line_chart frame = {.title = title,
+                              .x_unit = x_unit,
+                              .y_unit = y_unit,
+                              .from_zero = true,
+                              .series = &whole,
+                              .series_count = 1};
     text_add(out, "<figure class=\"chart card\"><figcaption><h3>");
     text_escaped(out, title);
     text_add(out, "</h3>");
@@ -115,7 +127,8 @@ void chart_stack(text *out, const char *title, const char *x_unit, const char *y
         text_escaped(out, layers[k].name);
         text_add(out, "</span>");
     }
-    text_format(out, "</p></figcaption><svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"", CHART_WIDTH, CHART_HEIGHT);
+    text_format(out, "</p></figcaption><svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"", CHART_WIDTH,
+                CHART_HEIGHT);
     text_escaped(out, title);
     text_add(out, "\">");
     chart_draw_axes(out, &frame, &a);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/chart.c -- line charts as inline SVG. */
 #include <math.h>
 #include <stdio.h>
@@ -16,7 +17,8 @@ static void draw_marks(text *out, const line_chart *c, const chart_axes *a)
             continue;
         const double x = chart_place_x(a, c->marks[i].x), width = 6.0 * (double)strlen(c->marks[i].label);
         if (x > CHART_LEFT + 1)
-            text_format(out, "<line x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/>", x, CHART_TOP, x, CHART_BOTTOM);
+            text_format(out, "<line x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/>", x, CHART_TOP, x,
+                        CHART_BOTTOM);
         if (x < free_from || x + width > CHART_RIGHT)
             continue;
         text_format(out, "<text x=\"%.1f\" y=\"%d\">", x + 4, CHART_BOTTOM - 6);
@@ -31,14 +33,19 @@ static void draw_line(text *out, const line_chart *c, const chart_series *line, 
 {
     const size_t per_point = (line->count + PATH_POINTS - 1) / PATH_POINTS;
     bool is_open = false;
-    text_format(out, "<path class=\"%s c%d\" d=\"", line->style == CHART_FAINT ? "faint" : "line", line->color & 3);
+    text_format(out, "<path class=\"%s c%d\" d=\"", line->style == CHART_FAINT ? "faint" : "line",
+                line->color & 3);
     for (size_t i = 0; i < line->count; i += per_point) {
         double x = 0, y = 0, n = 0;
         for (size_t j = i; j < line->count && j < i + per_point; j++)
-            if (chart_can_show(c, line->x[j], line->y[j]))
-                x += line->x[j], y += line->y[j], n++;
+            if (chart_can_show(c, line->x[j], line->y[j])) {
+                x += line->x[j];
+                y += line->y[j];
+                n++;
+            }
         if (n > 0)
-            text_format(out, "%s%.1f %.1f", is_open ? "L" : "M", chart_place_x(a, x / n), chart_place_y(a, y / n));
+            text_format(out, "%s%.1f %.1f", is_open ? "L" : "M", chart_place_x(a, x / n),
+                        chart_place_y(a, y / n));
         is_open = is_open || n > 0; /* a gap (a score between two rows) is bridged */
     }
     text_add(out, "\"/>");
@@ -57,8 +64,8 @@ static void draw_dots(text *out, const line_chart *c, const chart_series *line, 
     for (size_t i = 0; i < line->count; i++) {
         if (!chart_can_show(c, line->x[i], line->y[i]))
             continue;
-        text_format(out, "<circle class=\"dot c%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"4\"><title>", line->color & 3, chart_place_x(a, line->x[i]),
-                    chart_place_y(a, line->y[i]));
+        text_format(out, "<circle class=\"dot c%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"4\"><title>", line->color & 3,
+                    chart_place_x(a, line->x[i]), chart_place_y(a, line->y[i]));
         text_escaped(out, line->name != NULL ? line->name : "");
         text_add(out, " ");
         add_value(out, c, line->y[i]);
@@ -81,7 +88,8 @@ static void add_readout(text *out, const line_chart *c, double x)
             continue;
         size_t nearest = line->count;
         for (size_t i = 0; i < line->count; i++)
-            if (chart_can_show(c, line->x[i], line->y[i]) && (nearest == line->count || fabs(line->x[i] - x) < fabs(line->x[nearest] - x)))
+            if (chart_can_show(c, line->x[i], line->y[i]) &&
+                (nearest == line->count || fabs(line->x[i] - x) < fabs(line->x[nearest] - x)))
                 nearest = i;
         if (nearest == line->count)
             continue;
@@ -92,17 +100,20 @@ static void add_readout(text *out, const line_chart *c, double x)
     }
 }
 
-/** Invisible columns over the plot; the one under the pointer shows a guide and the values there (a tap does it on a phone). */
+/** Invisible columns over the plot; the one under the pointer shows a guide and the values there (a tap does
+    it on a phone). */
 static void draw_strips(text *out, const line_chart *c, const chart_axes *a)
 {
     const double width = (double)(CHART_RIGHT - CHART_LEFT) / STRIPS;
     for (int i = 0; i < STRIPS; i++) {
-        const double left = CHART_LEFT + i * width, middle = left + width / 2, x = a->x_low + (a->x_high - a->x_low) * (i + 0.5) / STRIPS;
-        text_format(out, "<g class=\"tip\"><rect x=\"%.1f\" y=\"%d\" width=\"%.1f\" height=\"%d\"><title>", left, CHART_TOP, width,
-                    CHART_BOTTOM - CHART_TOP);
+        const double left = CHART_LEFT + i * width, middle = left + width / 2,
+                     x = a->x_low + (a->x_high - a->x_low) * (i + 0.5) / STRIPS;
+        text_format(out, "<g class=\"tip\"><rect x=\"%.1f\" y=\"%d\" width=\"%.1f\" height=\"%d\"><title>",
+                    left, CHART_TOP, width, CHART_BOTTOM - CHART_TOP);
         add_readout(out, c, x);
-        text_format(out, "</title></rect><line x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text x=\"%d\" y=\"%d\">", middle, CHART_TOP,
-                    middle, CHART_BOTTOM, CHART_RIGHT, CHART_TOP - 12);
+        text_format(
+            out, "</title></rect><line x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text x=\"%d\" y=\"%d\">",
+            middle, CHART_TOP, middle, CHART_BOTTOM, CHART_RIGHT, CHART_TOP - 12);
         add_readout(out, c, x);
         text_add(out, "</text></g>");
     }
@@ -115,7 +126,10 @@ static void draw_legend(text *out, const line_chart *c)
         const chart_series *line = &c->series[s];
         if (line->name == NULL || line->count == 0)
             continue;
-        text_format(out, "<span class=\"key %s c%d\">", line->style == CHART_DOTS ? "dots" : line->style == CHART_FAINT ? "faint" : "line",
+        text_format(out, "<span class=\"key %s c%d\">",
+                    line->style == CHART_DOTS    ? "dots"
+                    : line->style == CHART_FAINT ? "faint"
+                                                 : "line",
                     line->color & 3);
         text_escaped(out, line->name);
         text_add(out, "</span>");
@@ -134,14 +148,16 @@ void chart_lines(text *out, const line_chart *c)
         return;
     }
     draw_legend(out, c);
-    text_format(out, "</figcaption><svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"", CHART_WIDTH, CHART_HEIGHT);
+    text_format(out, "</figcaption><svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"", CHART_WIDTH,
+                CHART_HEIGHT);
     text_escaped(out, c->title);
     text_add(out, " over training time\">");
     chart_draw_axes(out, c, &a);
     draw_marks(out, c, &a);
     for (int pass = 0; pass < 2; pass++) /* what is faint lies below */
         for (size_t s = 0; s < c->series_count; s++)
-            if (c->series[s].count > 0 && (pass == 0 ? c->series[s].style == CHART_FAINT : c->series[s].style == CHART_LINE))
+            if (c->series[s].count > 0 &&
+                (pass == 0 ? c->series[s].style == CHART_FAINT : c->series[s].style == CHART_LINE))
                 draw_line(out, c, &c->series[s], &a);
     draw_strips(out, c, &a);
     for (size_t s = 0; s < c->series_count; s++)

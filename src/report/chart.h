@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/chart.h -- line and bar charts as inline SVG. Colours and fonts come from the page's style sheet. */
 #ifndef GBT_REPORT_CHART_H
 #define GBT_REPORT_CHART_H
@@ -18,8 +19,8 @@ typedef enum chart_style {
 typedef struct chart_series {
     const char *name; /* NULL: not in the legend */
     const double *x, *y;
-    size_t count;     /* x rises; what is not finite is left out */
-    int color;        /* 0 to 3: style sheet classes c0 to c3 */
+    size_t count; /* x rises; what is not finite is left out */
+    int color;    /* 0 to 3: style sheet classes c0 to c3 */
     chart_style style;
 } chart_series;
 
@@ -31,9 +32,9 @@ typedef struct chart_mark {
 
 typedef struct line_chart {
     const char *title, *x_unit, *y_unit;
-    const char *note;     /* below the title; NULL: none */
+    const char *note; /* below the title; NULL: none */
     bool log_y, from_zero;
-    int y_decimals;       /* of the values read out; -1: counts with separators */
+    int y_decimals; /* of the values read out; -1: counts with separators */
     const chart_series *series;
     size_t series_count;
     const chart_mark *marks;
@@ -53,18 +54,23 @@ typedef struct chart_layer {
     int color;        /* as chart_bar's */
 } chart_layer;
 
-/** A <figure>. Without a finite value it says so. Long series are averaged down to about one point per pixel. */
+/** A <figure>. Without a finite value it says so. Long series are averaged down to about one point per
+    pixel. */
 void chart_lines(text *out, const line_chart *chart);
 
-/** Horizontal bars in the order given, each with its value and its share of `whole` (of the sum when that is not above 0). */
-void chart_bars(text *out, const char *title, const char *unit, const chart_bar *bars, size_t count, double whole);
+/** Horizontal bars in the order given, each with its value and its share of `whole` (of the sum when that is
+    not above 0). */
+void chart_bars(text *out, const char *title, const char *unit, const chart_bar *bars, size_t count,
+                double whole);
 
-/** Layers on top of each other over training time, at most 16, the first at the bottom; rows with an unknown layer are left out. */
-void chart_stack(text *out, const char *title, const char *x_unit, const char *y_unit, const double *x, size_t count,
-                 const chart_layer *layers, size_t layer_count);
+/** Layers on top of each other over training time, at most 16, the first at the bottom; rows with an unknown
+    layer are left out. */
+void chart_stack(text *out, const char *title, const char *x_unit, const char *y_unit, const double *x,
+                 size_t count, const chart_layer *layers, size_t layer_count);
 
 /**
- * Round numbers (1, 2 or 5 times a power of ten apart) that reach from at or below `low` to at or above `high`, about `wanted` of them.
+ * Round numbers (1, 2 or 5 times a power of ten apart) that reach from at or below `low` to at or above
+ * `high`, about `wanted` of them.
  *
  * @param low, high [in] finite, low <= high; equal: a step around them
  * @param ticks     [out] [CHART_MAX_TICKS], rising
@@ -72,7 +78,8 @@ void chart_stack(text *out, const char *title, const char *x_unit, const char *y
  */
 int chart_ticks(double low, double high, int wanted, double *ticks);
 
-/** The same for a logarithmic axis: 1, 2 and 5 times powers of ten; powers alone when there are many. 0 < low <= high. */
+/** The same for a logarithmic axis: 1, 2 and 5 times powers of ten; powers alone when there are many. 0 < low
+    <= high. */
 int chart_log_ticks(double low, double high, double *ticks);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/facts.c -- the tables of a run's page. */
 #include "report/facts.h"
 
@@ -18,7 +19,8 @@ static double mean_seconds(const evaluation *e)
 static void add_speed(text *out, const evaluation *e, const json_t *metrics)
 {
     text_add(out, "<div class=\"box card\"><h3>Speed</h3><table class=\"facts\"><tbody>\n");
-    report_number_row(out, "One training step", metrics_number(json_object_get(metrics, "stage_ms_per_step"), "all"), 1, "ms");
+    report_number_row(out, "One training step",
+                      metrics_number(json_object_get(metrics, "stage_ms_per_step"), "all"), 1, "ms");
     report_number_row(out, "Rays in training", metrics_number(metrics, "rays_per_second") * 1e-6, 3,
                       "million per second, forward and adjoint");
     report_number_row(out, "Gaussians met per ray", metrics_number(metrics, "hits_per_ray"), 1, "");
@@ -48,7 +50,8 @@ static bool add_pace(text *out, const json_t *metrics)
         if (!json_is_integer(json_array_get(pace, i)))
             return false;
     for (size_t i = 0; i < count; i++)
-        text_format(out, "%s%" JSON_INTEGER_FORMAT, i > 0 ? "," : "", json_integer_value(json_array_get(pace, i)));
+        text_format(out, "%s%" JSON_INTEGER_FORMAT, i > 0 ? "," : "",
+                    json_integer_value(json_array_get(pace, i)));
     return count > 0;
 }
 
@@ -61,10 +64,14 @@ static void add_counts(text *out, const evaluation *e, const json_t *metrics)
     report_count_row(out, "Points", metrics_number(metrics, "points"));
     report_count_row(out, "Anchors at the start", metrics_number(metrics, "anchors_initial"));
     report_count_row(out, "Anchors at the end", (double)e->anchors);
-    report_count_row(out, "Gaussians per view", isfinite(e->gaussians_per_view) ? e->gaussians_per_view : seen);
+    report_count_row(out, "Gaussians per view",
+                     isfinite(e->gaussians_per_view) ? e->gaussians_per_view : seen);
     report_bytes_row(out, "Model file", bytes);
-    report_number_row(out, "Bytes per anchor", e->anchors > 0 ? bytes / (double)e->anchors : (double)NAN, 1, "");
-    text_add(out, "</tbody></table></div>\n<div class=\"box card\"><h3>The run</h3><table class=\"facts\"><tbody>\n");
+    report_number_row(out, "Bytes per anchor", e->anchors > 0 ? bytes / (double)e->anchors : (double)NAN, 1,
+                      "");
+    text_add(
+        out,
+        "</tbody></table></div>\n<div class=\"box card\"><h3>The run</h3><table class=\"facts\"><tbody>\n");
     report_count_row(out, "Iterations", metrics_number(metrics, "iterations"));
     report_open_row(out, "Training time");
     text_duration(out, metrics_number(metrics, "train_seconds"));
@@ -119,9 +126,9 @@ void report_facts(text *out, const evaluation *e, const json_t *metrics, const c
 void report_again(text *out, const char *run, const json_t *metrics)
 {
     const char *command = metrics_text(metrics, "command");
-    text_add(out, "</main>\n<footer id=\"again\">\n<h2>Make it again</h2>\n<p>A time budget decides only how many steps there are. With "
-                  "the pace that this run recorded, the "
-                  "same photos give the same model, bit for bit, on any number of threads:</p>\n<pre class=\"card\">");
+    text_add(out, "</main>\n<footer id=\"again\">\n<h2>Make it again</h2>\n<p>A time budget decides only how "
+                  "many steps there are. With the pace that this run recorded, the same photos give the same "
+                  "model, bit for bit, on any number of threads:</p>\n<pre class=\"card\">");
     if (command != NULL) {
         text_escaped(out, command);
     } else {
@@ -135,12 +142,13 @@ void report_again(text *out, const char *run, const json_t *metrics)
         if (!add_pace(out, metrics))
             out->length = out->status == GBT_OK ? before : out->length;
     }
-    text_add(out, "</pre>\n<p>The scores, the pictures and this page, from the model (<code>gbtrace report</code> makes the page "
-                  "alone):</p>\n<pre class=\"card\">gbtrace eval ");
+    text_add(out, "</pre>\n<p>The scores, the pictures and this page, from the model (<code>gbtrace "
+                  "report</code> makes the page alone):</p>\n<pre class=\"card\">gbtrace eval ");
     text_escaped(out, run);
-    text_add(out, "</pre>\n<p>Pictures here are JPEG for size; the scores were made from the PNG files in <code>renders/test</code>. Every "
-                  "number is in "
-                  "<code>metrics.json</code>, every curve in <code>log.csv</code>. This page is one file and loads "
-                  "nothing.</p>\n<p>Made by gbtrace " GBT_VERSION ".</p>\n</footer>\n");
+    text_add(
+        out,
+        "</pre>\n<p>Pictures here are JPEG for size; the scores were made from the PNG files in "
+        "<code>renders/test</code>. Every number is in <code>metrics.json</code>, every curve in "
+        "<code>log.csv</code>. This page is one file and loads nothing.</p>\n<p>Made by gbtrace " GBT_VERSION
+        ".</p>\n</footer>\n");
 }
-

@@ -1,4 +1,6 @@
-/* report/facts.h -- the tables of a run's page: counts, speed, machine, settings, and how to make the run again. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* report/facts.h -- the tables of a run's page: counts, speed, machine, settings, and how to make the run
+   again. */
 #ifndef GBT_REPORT_FACTS_H
 #define GBT_REPORT_FACTS_H
 

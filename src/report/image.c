@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/image.c -- pictures inside the page: files to base64 JPEG, errors to colours. */
 #include "report/image.h"
 
@@ -14,7 +15,8 @@ enum { LONGEST_SIDE = 1280, JPEG_QUALITY = 84, COLORS = 256 };
 static void oklab_to_linear(double lightness, double chroma, double hue, double rgb[3])
 {
     const double a = chroma * cos(hue), b = chroma * sin(hue);
-    const double l = pow(lightness + 0.3963377774 * a + 0.2158037573 * b, 3), m = pow(lightness - 0.1055613458 * a - 0.0638541728 * b, 3),
+    const double l = pow(lightness + 0.3963377774 * a + 0.2158037573 * b, 3),
+                 m = pow(lightness - 0.1055613458 * a - 0.0638541728 * b, 3),
                  s = pow(lightness - 0.0894841775 * a - 1.2914855480 * b, 3);
     rgb[0] = 4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s;
     rgb[1] = -1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s;
@@ -32,7 +34,8 @@ static bool is_in_gamut(const double rgb[3])
 void error_color(double error, float rgb[3])
 {
     /* degrees: violet, red, yellow */
-    static const double lightness_low = 0.09, lightness_high = 0.97, hue_low = 288, hue_high = 465, chroma_most = 0.19;
+    static const double lightness_low = 0.09, lightness_high = 0.97, hue_low = 288, hue_high = 465,
+                        chroma_most = 0.19;
     const double t = error > 0 ? fmin(error, 1) : 0; /* NaN is 0 */
     const double lightness = lightness_low + (lightness_high - lightness_low) * t;
     const double hue = (hue_low + (hue_high - hue_low) * t) * (3.14159265358979323846 / 180);
@@ -63,7 +66,8 @@ static void shrink(const image *from, int factor, picture_kind kind, image *to)
             for (int v = 0; v < factor; v++)
                 for (int u = 0; u < factor; u++) {
                     const float *pixel = from->pixels + ((size_t)(y * factor + v) * (size_t)from->width +
-                                                         (size_t)(x * factor + u)) * channels;
+                                                         (size_t)(x * factor + u)) *
+                                                            channels;
                     for (size_t k = 0; k < 3; k++)
                         sum[k] += weight * pixel[k < channels ? k : 0];
                 }
@@ -92,8 +96,8 @@ static void add_uri(text *out, const char *type, unsigned char *bytes, size_t co
 }
 
 /** The JPEG of a picture, averaged down; its size in *small. */
-static gbt_status make_jpeg(const image *full, picture_kind kind, size_t most, image *small, unsigned char **bytes, size_t *count,
-                            gbt_error *err)
+static gbt_status make_jpeg(const image *full, picture_kind kind, size_t most, image *small,
+                            unsigned char **bytes, size_t *count, gbt_error *err)
 {
     const int factor = shrink_factor(full->width, full->height, most);
     GBT_TRY(image_alloc(small, full->width / factor, full->height / factor, 3, err));
@@ -101,7 +105,8 @@ static gbt_status make_jpeg(const image *full, picture_kind kind, size_t most, i
     return image_encode_jpeg(small, JPEG_QUALITY, bytes, count, err);
 }
 
-gbt_status report_picture(text *out, const char *path, picture_kind kind, size_t most, int *width, int *height)
+gbt_status report_picture(text *out, const char *path, picture_kind kind, size_t most, int *width,
+                          int *height)
 {
     *width = *height = 0;
     image full = {0}, small = {0};
@@ -115,7 +120,8 @@ gbt_status report_picture(text *out, const char *path, picture_kind kind, size_t
         status = make_jpeg(&full, kind, most, &small, &jpeg, &jpeg_bytes, &why);
     if (status == GBT_OK) {
         add_uri(out, "jpeg", jpeg, jpeg_bytes);
-        *width = small.width, *height = small.height;
+        *width = small.width;
+        *height = small.height;
     } else if (status == GBT_ERR_NO_MEMORY) {
         out->status = base_fail(out->err, status, "%s", why.text);
     }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/layers.c -- one view, from points to the picture: what the model is made of. */
 #include <math.h>
 #include <stdlib.h>
@@ -27,7 +28,9 @@ static gbt_status solids_alloc(solids *s, size_t count, gbt_error *err)
     s->center = mem_calloc(count, 13 * sizeof *s->center, "solids", err);
     if (s->center == NULL)
         return GBT_ERR_NO_MEMORY;
-    s->axes = s->center + 3 * count, s->quat = s->axes + 3 * count, s->color = s->quat + 4 * count;
+    s->axes = s->center + 3 * count;
+    s->quat = s->axes + 3 * count;
+    s->color = s->quat + 4 * count;
     for (size_t i = 0; i < count; i++)
         s->quat[4 * i] = 1;
     return GBT_OK;
@@ -35,11 +38,14 @@ static gbt_status solids_alloc(solids *s, size_t count, gbt_error *err)
 
 static void set_sphere(solids *s, size_t i, const float center[3], float radius, const float color[3])
 {
-    for (size_t k = 0; k < 3; k++)
-        s->center[3 * i + k] = center[k], s->axes[3 * i + k] = radius, s->color[3 * i + k] = color[k];
+    for (size_t k = 0; k < 3; k++) {
+        s->center[3 * i + k] = center[k];
+        s->axes[3 * i + k] = radius;
+        s->color[3 * i + k] = color[k];
+    }
 }
 
-/* ---- the four layers that are solids ------------------------------------------------------------------------------------------------- */
+/* ---- the four layers that are solids ---- */
 
 static gbt_status make_points(const loaded_run *r, solids *s, gbt_error *err)
 {
@@ -59,7 +65,9 @@ static gbt_status make_balls(const loaded_run *r, solids *s, gbt_error *err)
     balls b = {0};
     if (!anchor_init_kind_named(r->def.init, &how.kind) || !(r->model.voxel_size > 0))
         return GBT_OK;
-    how.fraction = r->def.init_count, how.balls.voxel_size = r->model.voxel_size, how.balls.max_depth = r->def.max_depth;
+    how.fraction = r->def.init_count;
+    how.balls.voxel_size = r->model.voxel_size;
+    how.balls.max_depth = r->def.max_depth;
     GBT_TRY(anchors_init(p->position, p->has_color ? p->color : NULL, p->count, &how, &made, &b, err));
     const float grey[3] = {0.6f, 0.6f, 0.6f};
     const gbt_status status = solids_alloc(s, b.count, err);
@@ -70,7 +78,8 @@ static gbt_status make_balls(const loaded_run *r, solids *s, gbt_error *err)
     return status;
 }
 
-/** All anchors; those that the view decoded in the mean colour of their Gaussians, weighed by opacity, the others grey. */
+/** All anchors; those that the view decoded in the mean colour of their Gaussians, weighed by opacity, the
+    others grey. */
 static gbt_status make_anchors(const loaded_run *r, solids *s, gbt_error *err)
 {
     const anchors *a = &r->model.anchors;
@@ -108,18 +117,21 @@ static gbt_status make_gaussians(const loaded_run *r, solids *s, gbt_error *err)
     for (size_t i = 0; i < g->count; i++) {
         if (g->opacity[i] < opacity_least)
             continue;
-        const float center[3] = {g->mean_x[i], g->mean_y[i], g->mean_z[i]}, color[3] = {g->red[i], g->green[i], g->blue[i]};
+        const float center[3] = {g->mean_x[i], g->mean_y[i], g->mean_z[i]},
+                    color[3] = {g->red[i], g->green[i], g->blue[i]};
         set_sphere(s, kept, center, 0, color);
-        s->axes[3 * kept] = g->scale_x[i], s->axes[3 * kept + 1] = g->scale_y[i], s->axes[3 * kept + 2] = g->scale_z[i];
-        s->quat[4 * kept] = g->quat_w[i], s->quat[4 * kept + 1] = g->quat_x[i], s->quat[4 * kept + 2] = g->quat_y[i],
-            s->quat[4 * kept + 3] = g->quat_z[i];
+        s->axes[3 * kept] = g->scale_x[i];
+        s->axes[3 * kept + 1] = g->scale_y[i];
+        s->axes[3 * kept + 2] = g->scale_z[i];
+        s->quat[4 * kept] = g->quat_w[i], s->quat[4 * kept + 1] = g->quat_x[i],
+                    s->quat[4 * kept + 2] = g->quat_y[i], s->quat[4 * kept + 3] = g->quat_z[i];
         kept++;
     }
     s->count = kept;
     return GBT_OK;
 }
 
-/* ---- the section --------------------------------------------------------------------------------------------------------------------- */
+/* ---- the section ---- */
 
 typedef struct layer {
     const char *name, *text;
@@ -151,8 +163,13 @@ static void add_solids(text *out, const loaded_run *r, const gbt_camera *camera,
         out->status = image_alloc(&picture, camera->width, camera->height, 4, out->err);
     if (out->status == GBT_OK && s.count > 0) {
         const size_t pixels = (size_t)camera->width * (size_t)camera->height;
-        const ellipsoids set = {.count = s.count, .center = s.center, .axes = s.axes, .quat = s.quat, .color = s.color,
-                                .least_pixels = l->least_pixels, .most_pixels = l->most_pixels};
+        const ellipsoids set = {.count = s.count,
+                                .center = s.center,
+                                .axes = s.axes,
+                                .quat = s.quat,
+                                .color = s.color,
+                                .least_pixels = l->least_pixels,
+                                .most_pixels = l->most_pixels};
         for (size_t i = 0; i < 4 * pixels; i++)
             picture.pixels[i] = i % 4 < 3 ? stage_color[i % 4] : 1.0f;
         out->status = ellipsoids_draw(&set, camera, &picture, out->err);
@@ -170,7 +187,8 @@ static int compare_scores(const void *a, const void *b)
     return (x->psnr > y->psnr) - (x->psnr < y->psnr);
 }
 
-/** The held-out view in the middle by PSNR: neither the best nor the worst of what there is; the first view when none was held out. */
+/** The held-out view in the middle by PSNR: neither the best nor the worst of what there is; the first view
+    when none was held out. */
 static size_t choose_view(const loaded_run *r, const evaluation *e)
 {
     gbt_error ignored = {0};
@@ -188,7 +206,8 @@ static size_t choose_view(const loaded_run *r, const evaluation *e)
     return chosen;
 }
 
-/** The pinhole nearest to a lens, for solids: at least as fine as they need. False for a lens that has none. */
+/** The pinhole nearest to a lens, for solids: at least as fine as they need. False for a lens that has
+    none. */
 static bool find_pinhole(const gbt_camera *lens, gbt_camera *out)
 {
     double tan_half[2];
@@ -198,10 +217,13 @@ static bool find_pinhole(const gbt_camera *lens, gbt_camera *out)
     const double scale = (double)SIDE_MAX / (lens->width > lens->height ? lens->width : lens->height);
     *out = *lens;
     out->model = GBT_CAMERA_PINHOLE;
-    out->width = (int)fmax(round(scale * lens->width), 1), out->height = (int)fmax(round(scale * lens->height), 1);
+    out->width = (int)fmax(round(scale * lens->width), 1);
+    out->height = (int)fmax(round(scale * lens->height), 1);
     memset(out->params, 0, sizeof out->params);
-    out->params[0] = 0.5 * out->width / tan_half[0], out->params[1] = 0.5 * out->height / tan_half[1];
-    out->params[2] = 0.5 * out->width, out->params[3] = 0.5 * out->height;
+    out->params[0] = 0.5 * out->width / tan_half[0];
+    out->params[1] = 0.5 * out->height / tan_half[1];
+    out->params[2] = 0.5 * out->width;
+    out->params[3] = 0.5 * out->height;
     return true;
 }
 
@@ -210,7 +232,8 @@ static void add_photo(text *out, const loaded_run *r, size_t view)
     const image *render = &r->frame.rgb;
     image photo = {0};
     gbt_error why = {0};
-    const gbt_status status = scene_read_photo(&r->scene.views[view], render->width, render->height, &photo, &why);
+    const gbt_status status =
+        scene_read_photo(&r->scene.views[view], render->width, render->height, &photo, &why);
     if (status == GBT_OK) {
         open_figure(out, "The photo");
         report_image_jpeg(out, &photo);
@@ -225,14 +248,18 @@ void report_layers(text *out, loaded_run *r, const evaluation *e)
 {
     static const layer layers[] = {
         {"Points", "that the photos' matching gave", make_points, 1.6f, 0},
-        {"Granular balls", "of these points, by their radii and mean colours; the huge ones of lone points are not drawn", make_balls, 1.6f,
-         SIDE_MAX / 16},
-        {"Anchors", "after training, each in the mean colour of its Gaussians; grey: not seen from here", make_anchors, 1.6f, 0},
-        {"Gaussians", "that the anchors decode to for this view, at one standard deviation", make_gaussians, 0.7f, 0},
+        {"Granular balls",
+         "of these points, by their radii and mean colours; the huge ones of lone points are not drawn",
+         make_balls, 1.6f, SIDE_MAX / 16},
+        {"Anchors", "after training, each in the mean colour of its Gaussians; grey: not seen from here",
+         make_anchors, 1.6f, 0},
+        {"Gaussians", "that the anchors decode to for this view, at one standard deviation", make_gaussians,
+         0.7f, 0},
     };
     const size_t view = r->scene.view_count > 0 ? choose_view(r, e) : 0;
     gbt_camera camera;
-    if (out->status != GBT_OK || r->scene.view_count == 0 || !find_pinhole(&r->scene.views[view].camera, &camera))
+    if (out->status != GBT_OK || r->scene.view_count == 0 ||
+        !find_pinhole(&r->scene.views[view].camera, &camera))
         return;
     out->status = loaded_run_render(r, view, out->err);
     text_add(out, "<section id=\"layers\"><h2>From points to a picture</h2>\n<p class=\"lead\">One view, ");

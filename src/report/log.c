@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/log.c -- log.csv of a run as arrays. */
 #include "report/log.h"
 
@@ -13,9 +14,10 @@
 enum { FIELD_LIMIT = 128 };
 
 static const char *const column_names[LOG_COLUMNS] = {
-    "step", "seconds", "width", "height", "loss", "train_psnr", "anchors", "gaussians", "rays_per_second", "blended_per_ray",
-        "memory_bytes", "photo_ms", "rays_ms", "visible_ms",
-    "decode_ms", "build_ms", "trace_ms", "loss_ms", "adjoint_ms", "decode_adjoint_ms", "optimizer_ms", "adjust_ms"};
+    "step",       "seconds",           "width",           "height",          "loss",         "train_psnr",
+    "anchors",    "gaussians",         "rays_per_second", "blended_per_ray", "memory_bytes", "photo_ms",
+    "rays_ms",    "visible_ms",        "decode_ms",       "build_ms",        "trace_ms",     "loss_ms",
+    "adjoint_ms", "decode_adjoint_ms", "optimizer_ms",    "adjust_ms"};
 
 /** Cut a line at its commas, in place. More fields than FIELD_LIMIT are not looked at. */
 static size_t split_fields(char *line, char **fields)
@@ -26,13 +28,15 @@ static size_t split_fields(char *line, char **fields)
     return count;
 }
 
-/** The line at *at, its end replaced by a zero; NULL when no whole line is left (the last one of a killed run is torn). */
+/** The line at *at, its end replaced by a zero; NULL when no whole line is left (the last one of a killed run
+    is torn). */
 static char *next_line(char **at)
 {
     char *line = *at, *end = strchr(line, '\n');
     if (end == NULL)
         return NULL;
-    *end = '\0', *at = end + 1;
+    *end = '\0';
+    *at = end + 1;
     if (end > line && end[-1] == '\r')
         end[-1] = '\0';
     return line;
@@ -47,7 +51,8 @@ static double parse_field(const char *field)
 
 static void add_row(training_log *log, const double row[LOG_COLUMNS])
 {
-    while (log->count > 0 && log->column[LOG_STEP][log->count - 1] > row[LOG_STEP]) /* resumed from an earlier step */
+    while (log->count > 0 && log->column[LOG_STEP][log->count - 1] > row[LOG_STEP]) /* resumed from an earlier
+                                                                                       step */
         log->count--;
     if (log->count > 0 && log->column[LOG_SECONDS][log->count - 1] > row[LOG_SECONDS])
         return;
@@ -75,7 +80,8 @@ static void read_rows(char *at, training_log *log)
         double row[LOG_COLUMNS];
         for (int i = 0; i < LOG_COLUMNS; i++)
             row[i] = place[i] < field_count ? parse_field(fields[place[i]]) : (double)NAN;
-        /* A held-out score right after a row has no steps of its own: its means are zeros, not measurements. */
+        /* A held-out score right after a row has no steps of its own: its means are zeros, not
+           measurements. */
         if (row[LOG_RAYS_PER_SECOND] <= 0)
             for (int i = LOG_LOSS; i < LOG_COLUMNS; i++)
                 if (i != LOG_ANCHORS && i != LOG_MEMORY)
@@ -123,11 +129,15 @@ void training_log_smooth(const training_log *log, log_column column, double reac
     double sum = 0;
     for (size_t i = 0; i < log->count; i++) {
         for (; end < log->count && seconds[end] <= seconds[i] + reach_seconds; end++)
-            if (isfinite(value[end]))
-                sum += value[end], finite_count++;
+            if (isfinite(value[end])) {
+                sum += value[end];
+                finite_count++;
+            }
         for (; seconds[first] < seconds[i] - reach_seconds; first++)
-            if (isfinite(value[first]))
-                sum -= value[first], finite_count--;
+            if (isfinite(value[first])) {
+                sum -= value[first];
+                finite_count--;
+            }
         out[i] = finite_count > 0 ? sum / (double)finite_count : (double)NAN;
     }
 }

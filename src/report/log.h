@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/log.h -- log.csv of a run as arrays. */
 #ifndef GBT_REPORT_LOG_H
 #define GBT_REPORT_LOG_H
@@ -34,12 +35,13 @@ typedef enum log_column {
 
 typedef struct training_log {
     size_t count;
-    double *column[LOG_COLUMNS]; /* [count]; NaN: absent. Owned as one block, column[0]. Steps and seconds never fall. */
+    double *column[LOG_COLUMNS]; /* [count]; NaN: absent. Owned as one block, column[0]. Steps and seconds
+                                    never fall. */
 } training_log;
 
 /**
- * Columns are found by their names in the first line. A line without its end, with too few fields or without a time is left out. Where a
- * resumed run went back, what it repeated replaces the first try.
+ * Columns are found by their names in the first line. A line without its end, with too few fields or without
+ * a time is left out. Where a resumed run went back, what it repeated replaces the first try.
  *
  * @param out [out] free with training_log_free(); no rows when there is no such file
  * @return GBT_OK, GBT_ERR_NO_MEMORY

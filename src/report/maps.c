@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/maps.c -- cameras from above and from the side, over points and anchors. */
 #include <math.h>
 #include <stdlib.h>
@@ -14,7 +15,15 @@
 #include "report/scene.h"
 
 /* Sizes in the chart's units; the picture behind it has DENSE pixels in each. */
-enum { MAP_WIDTH = 460, MAP_HEIGHT_MAX = 420, MAP_HEIGHT_MIN = 120, DENSE = 2, RULER = 24, CAMERAS_MAX = 400, DUST_MAX = 20000 };
+enum {
+    MAP_WIDTH = 460,
+    MAP_HEIGHT_MAX = 420,
+    MAP_HEIGHT_MIN = 120,
+    DENSE = 2,
+    RULER = 24,
+    CAMERAS_MAX = 400,
+    DUST_MAX = 20000
+};
 
 /** One way to look at the scene along parallel rays. */
 typedef struct map {
@@ -35,16 +44,21 @@ static gbt_status find_range(const loaded_run *r, const double axis[3], double r
         along[i] = (float)(axis[0] * (double)p->position[3 * i] + axis[1] * (double)p->position[3 * i + 1] +
                            axis[2] * (double)p->position[3 * i + 2]);
     qsort(along, p->count, sizeof *along, compare_floats);
-    range[0] = INFINITY, range[1] = -INFINITY;
-    if (p->count > 0)
-        range[0] = (double)along[p->count * 3 / 100], range[1] = (double)along[p->count - 1 - p->count * 3 / 100];
+    range[0] = INFINITY;
+    range[1] = -INFINITY;
+    if (p->count > 0) {
+        range[0] = (double)along[p->count * 3 / 100];
+        range[1] = (double)along[p->count - 1 - p->count * 3 / 100];
+    }
     mem_free(along);
     for (size_t i = 0; i < r->scene.view_count; i++) {
         const double at = dvec_dot(r->scene.views[i].camera.center, axis);
-        range[0] = fmin(range[0], at), range[1] = fmax(range[1], at);
+        range[0] = fmin(range[0], at);
+        range[1] = fmax(range[1], at);
     }
     const double margin = 0.06 * (range[1] - range[0]) + 1e-9;
-    range[0] -= margin, range[1] += margin;
+    range[0] -= margin;
+    range[1] += margin;
     return GBT_OK;
 }
 
@@ -52,19 +66,26 @@ static gbt_status find_range(const loaded_run *r, const double axis[3], double r
 static void find_right(const loaded_run *r, const double up[3], double right[3])
 {
     double e1[3], e2[3], mean[2] = {0}, xx = 0, xy = 0, yy = 0;
-    const int least = fabs(up[0]) <= fabs(up[1]) && fabs(up[0]) <= fabs(up[2]) ? 0 : fabs(up[1]) <= fabs(up[2]) ? 1 : 2;
+    const int least = fabs(up[0]) <= fabs(up[1]) && fabs(up[0]) <= fabs(up[2]) ? 0
+                      : fabs(up[1]) <= fabs(up[2])                             ? 1
+                                                                               : 2;
     for (int k = 0; k < 3; k++)
         e1[k] = (k == least) - up[least] * up[k];
     dvec_normalize(e1);
     dvec_cross(up, e1, e2);
     const double n = (double)r->scene.view_count;
     for (size_t i = 0; i < r->scene.view_count; i++) {
-        const double *center = r->scene.views[i].camera.center, x = dvec_dot(center, e1), y = dvec_dot(center, e2);
-        mean[0] += x / n, mean[1] += y / n;
+        const double *center = r->scene.views[i].camera.center, x = dvec_dot(center, e1),
+                     y = dvec_dot(center, e2);
+        mean[0] += x / n;
+        mean[1] += y / n;
     }
     for (size_t i = 0; i < r->scene.view_count; i++) {
-        const double *center = r->scene.views[i].camera.center, x = dvec_dot(center, e1) - mean[0], y = dvec_dot(center, e2) - mean[1];
-        xx += x * x, xy += x * y, yy += y * y;
+        const double *center = r->scene.views[i].camera.center, x = dvec_dot(center, e1) - mean[0],
+                     y = dvec_dot(center, e2) - mean[1];
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
     }
     const double angle = 0.5 * atan2(2 * xy, xx - yy);
     for (int k = 0; k < 3; k++)
@@ -80,7 +101,8 @@ static gbt_status make_maps(const loaded_run *r, map maps[2], gbt_error *err)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < r->scene.view_count; i++)
         cameras[i] = r->scene.views[i].camera;
-    gbt_status status = camera_group_make(cameras, r->scene.view_count, r->scene.points.position, r->scene.points.count, &group, err);
+    gbt_status status = camera_group_make(cameras, r->scene.view_count, r->scene.points.position,
+                                          r->scene.points.count, &group, err);
     mem_free(cameras);
     if (status != GBT_OK)
         return status;
@@ -89,28 +111,30 @@ static gbt_status make_maps(const loaded_run *r, map maps[2], gbt_error *err)
     GBT_TRY(find_range(r, right, range[0], err));
     GBT_TRY(find_range(r, away, range[1], err));
     GBT_TRY(find_range(r, group.up, range[2], err));
-    const double width = range[0][1] - range[0][0], depth = range[1][1] - range[1][0], height = range[2][1] - range[2][0];
+    const double width = range[0][1] - range[0][0], depth = range[1][1] - range[1][0],
+                 height = range[2][1] - range[2][0];
     const double scale = fmin(MAP_WIDTH / width, MAP_HEIGHT_MAX / fmax(depth, height));
     for (int i = 0; i < 2; i++) {
         map *m = &maps[i];
-        *m = i == 0 ? (map){.title = "From above", .name = "above",
-                            .scale = scale} : (map){.title = "From the side", .name = "side", .scale = scale};
+        *m = i == 0 ? (map){.title = "From above", .name = "above", .scale = scale}
+                    : (map){.title = "From the side", .name = "side", .scale = scale};
         for (int k = 0; k < 3; k++) {
             m->right[k] = right[k];
             m->down[k] = i == 0 ? -away[k] : -group.up[k];
-            m->middle[k] = 0.5 * ((range[0][0] + range[0][1]) * right[k] + (range[1][0] + range[1][1]) * away[k] +
-                                  (range[2][0] + range[2][1]) * group.up[k]);
+            m->middle[k] =
+                0.5 * ((range[0][0] + range[0][1]) * right[k] + (range[1][0] + range[1][1]) * away[k] +
+                       (range[2][0] + range[2][1]) * group.up[k]);
         }
         m->height = (int)fmax(ceil(scale * (i == 0 ? depth : height)), MAP_HEIGHT_MIN);
     }
     return GBT_OK;
 }
 
-/* ---- dust ---------------------------------------------------------------------------------------------------------------------------- */
+/* ---- dust ---- */
 
 /** Up to DUST_MAX of them, evenly chosen; color NULL: grey. */
-static gbt_status draw_dust(const float *position, const float *color, size_t count, float pixels, const gbt_camera *camera, image *picture,
-                            gbt_error *err)
+static gbt_status draw_dust(const float *position, const float *color, size_t count, float pixels,
+                            const gbt_camera *camera, image *picture, gbt_error *err)
 {
     const size_t step = (count + DUST_MAX - 1) / DUST_MAX, kept = count > 0 ? (count + step - 1) / step : 0;
     float *block = mem_calloc(kept, 9 * sizeof *block, "map", err);
@@ -122,7 +146,8 @@ static gbt_status draw_dust(const float *position, const float *color, size_t co
             center[3 * i + k] = position[3 * i * step + k];
             shown[3 * i + k] = color != NULL ? color[3 * i * step + k] : 0.55f;
         }
-    const ellipsoids dust = {.count = kept, .center = center, .axes = axes, .color = shown, .least_pixels = pixels};
+    const ellipsoids dust = {
+        .count = kept, .center = center, .axes = axes, .color = shown, .least_pixels = pixels};
     const gbt_status status = ellipsoids_draw(&dust, camera, picture, err);
     mem_free(block);
     return status;
@@ -130,22 +155,29 @@ static gbt_status draw_dust(const float *position, const float *color, size_t co
 
 static void add_dust(text *out, const loaded_run *r, const map *m)
 {
-    gbt_camera camera = {.model = GBT_CAMERA_ORTHOGRAPHIC, .width = DENSE * MAP_WIDTH, .height = DENSE * m->height,
-                         .params = {DENSE * m->scale, DENSE * m->scale, 0.5 * DENSE * MAP_WIDTH, 0.5 * DENSE * m->height}};
+    gbt_camera camera = {
+        .model = GBT_CAMERA_ORTHOGRAPHIC,
+        .width = DENSE * MAP_WIDTH,
+        .height = DENSE * m->height,
+        .params = {DENSE * m->scale, DENSE * m->scale, 0.5 * DENSE * MAP_WIDTH, 0.5 * DENSE * m->height}};
     double forward[3];
     dvec_cross(m->right, m->down, forward);
     for (int k = 0; k < 3; k++) {
-        camera.rotation[k] = m->right[k], camera.rotation[3 + k] = m->down[k], camera.rotation[6 + k] = forward[k];
+        camera.rotation[k] = m->right[k];
+        camera.rotation[3 + k] = m->down[k];
+        camera.rotation[6 + k] = forward[k];
         camera.center[k] = m->middle[k] - 4 * MAP_WIDTH / m->scale * forward[k];
     }
     image picture = {0};
     gbt_status status = image_alloc(&picture, camera.width, camera.height, 4, out->err);
     if (status == GBT_OK) {
         memset(picture.pixels, 0, 4 * (size_t)camera.width * (size_t)camera.height * sizeof *picture.pixels);
-        status = draw_dust(r->model.anchors.position, NULL, r->model.anchors.count, 0.9f, &camera, &picture, out->err);
+        status = draw_dust(r->model.anchors.position, NULL, r->model.anchors.count, 0.9f, &camera, &picture,
+                           out->err);
     }
     if (status == GBT_OK && r->scene.points.has_color)
-        status = draw_dust(r->scene.points.position, r->scene.points.color, r->scene.points.count, 1.3f, &camera, &picture, out->err);
+        status = draw_dust(r->scene.points.position, r->scene.points.color, r->scene.points.count, 1.3f,
+                           &camera, &picture, out->err);
     if (status == GBT_OK) {
         text_format(out, "<image width=\"%d\" height=\"%d\" href=\"", (int)MAP_WIDTH, m->height);
         report_image_png(out, &picture);
@@ -156,14 +188,15 @@ static void add_dust(text *out, const loaded_run *r, const map *m)
     image_free(&picture);
 }
 
-/* ---- cameras ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- cameras ---- */
 
 static void place(const map *m, const double at[3], double out[2])
 {
     double way[3];
     for (int k = 0; k < 3; k++)
         way[k] = at[k] - m->middle[k];
-    out[0] = 0.5 * MAP_WIDTH + m->scale * dvec_dot(way, m->right), out[1] = 0.5 * m->height + m->scale * dvec_dot(way, m->down);
+    out[0] = 0.5 * MAP_WIDTH + m->scale * dvec_dot(way, m->right);
+    out[1] = 0.5 * m->height + m->scale * dvec_dot(way, m->down);
 }
 
 /** A pyramid from the centre along the view, as wide as the lens sees. */
@@ -177,12 +210,14 @@ static void add_camera(text *out, const map *m, const gbt_camera *c, bool is_hel
     for (int i = 0; i < 4; i++) {
         double at[3];
         for (int k = 0; k < 3; k++)
-            at[k] = c->center[k] + length * (c->rotation[6 + k] + sides[i][0] * fmin(tan_half[0], 1.5) * c->rotation[k] +
-                                             sides[i][1] * fmin(tan_half[1], 1.5) * c->rotation[3 + k]);
+            at[k] = c->center[k] +
+                    length * (c->rotation[6 + k] + sides[i][0] * fmin(tan_half[0], 1.5) * c->rotation[k] +
+                              sides[i][1] * fmin(tan_half[1], 1.5) * c->rotation[3 + k]);
         place(m, at, corner[i]);
     }
-    text_format(out, "<path class=\"camera%s\" d=\"M%.1f %.1fL%.1f %.1fL%.1f %.1fL%.1f %.1fZ", is_held ? " held" : "", corner[0][0],
-                corner[0][1], corner[1][0], corner[1][1], corner[2][0], corner[2][1], corner[3][0], corner[3][1]);
+    text_format(out, "<path class=\"camera%s\" d=\"M%.1f %.1fL%.1f %.1fL%.1f %.1fL%.1f %.1fZ",
+                is_held ? " held" : "", corner[0][0], corner[0][1], corner[1][0], corner[1][1], corner[2][0],
+                corner[2][1], corner[3][0], corner[3][1]);
     for (int i = 0; i < 4; i++)
         text_format(out, "M%.1f %.1fL%.1f %.1f", apex[0], apex[1], corner[i][0], corner[i][1]);
     text_add(out, "\">");
@@ -224,8 +259,8 @@ static void add_ruler(text *out, const map *m)
     double ticks[CHART_MAX_TICKS];
     chart_ticks(0, MAP_WIDTH / m->scale, 5, ticks);
     const double length = ticks[1] * m->scale;
-    text_format(out, "<path class=\"ruler\" d=\"M8 %dv6h%.1fv-6\"/><text x=\"%.1f\" y=\"%d\">%g</text>", m->height + 8, length, 16 + length,
-                m->height + 16, ticks[1]);
+    text_format(out, "<path class=\"ruler\" d=\"M8 %dv6h%.1fv-6\"/><text x=\"%.1f\" y=\"%d\">%g</text>",
+                m->height + 8, length, 16 + length, m->height + 16, ticks[1]);
 }
 
 void report_maps(text *out, const loaded_run *r, const evaluation *e)
@@ -236,19 +271,23 @@ void report_maps(text *out, const loaded_run *r, const evaluation *e)
         return;
     for (size_t i = 0; i < r->scene.view_count; i++)
         held += r->scene.views[i].is_test;
-    text_add(out, "<p class=\"lead\">Where the cameras stood, over what they saw. The ruler is in units of the data set; a held-out camera "
-                  "leads to its picture.</p>\n"
+    text_add(out, "<p class=\"lead\">Where the cameras stood, over what they saw. The ruler is in units of "
+                  "the data set; a held-out camera leads to its picture.</p>\n"
                   "<div class=\"grid2 maps\">\n");
     out->status = make_maps(r, maps, out->err);
     for (int i = 0; i < 2 && out->status == GBT_OK; i++) {
         const map *m = &maps[i];
-        text_format(out, "<figure class=\"chart map card\"><figcaption><h3>%s</h3><p class=\"legend\"><span class=\"key block train\">",
+        text_format(out,
+                    "<figure class=\"chart map card\"><figcaption><h3>%s</h3><p class=\"legend\"><span "
+                    "class=\"key block train\">",
                     m->title);
         text_count(out, (double)(r->scene.view_count - held));
         text_add(out, " trained on</span><span class=\"key block held\">");
         text_count(out, (double)held);
-        text_add(out, " held out</span><span class=\"key dots dust\">anchors, points in their colours</span></p></figcaption>");
-        text_format(out, "<svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"Cameras, %s\">", (int)MAP_WIDTH, m->height + RULER, m->name);
+        text_add(out, " held out</span><span class=\"key dots dust\">anchors, points in their "
+                      "colours</span></p></figcaption>");
+        text_format(out, "<svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"Cameras, %s\">",
+                    (int)MAP_WIDTH, m->height + RULER, m->name);
         add_dust(out, r, m);
         add_cameras(out, m, r, e);
         add_ruler(out, m);

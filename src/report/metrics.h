@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/metrics.h -- what metrics.json says, whatever it holds. */
 #ifndef GBT_REPORT_METRICS_H
 #define GBT_REPORT_METRICS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // report/page.js -- moves the sliders, copies the commands, sorts the views and the table. The page is whole without it.
 document.querySelectorAll(".compare input").forEach(function (slider) {
   function move() { slider.parentNode.style.setProperty("--at", slider.value + "%"); }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/report.c -- the page of a run, from top to bottom.
 
    evaluation (scores, PNG files) --+
@@ -40,7 +41,8 @@ static void open_tile(text *out, const char *name)
 
 static void close_tile(text *out, const char *unit)
 {
-    text_format(out, "%s%s%s</dd></div>\n", unit[0] != '\0' ? " <small>" : "", unit, unit[0] != '\0' ? "</small>" : "");
+    text_format(out, "%s%s%s</dd></div>\n", unit[0] != '\0' ? " <small>" : "", unit,
+                unit[0] != '\0' ? "</small>" : "");
 }
 
 static void add_tiles(text *out, const evaluation *e, const json_t *metrics)
@@ -70,7 +72,8 @@ static void add_tiles(text *out, const evaluation *e, const json_t *metrics)
     text_count(out, (double)e->anchors);
     close_tile(out, "");
     open_tile(out, "Gaussians per view");
-    text_count(out, isfinite(e->gaussians_per_view) ? e->gaussians_per_view : metrics_number(metrics, "gaussians_per_view"));
+    text_count(out, isfinite(e->gaussians_per_view) ? e->gaussians_per_view
+                                                    : metrics_number(metrics, "gaussians_per_view"));
     close_tile(out, "");
     open_tile(out, "Model file");
     text_bytes(out, e->model_bytes > 0 ? (double)e->model_bytes : (double)NAN);
@@ -83,11 +86,17 @@ static void add_tiles(text *out, const evaluation *e, const json_t *metrics)
 
 static void add_contents(text *out, bool has_scene, bool has_layers, bool has_studies)
 {
-    const struct { const char *id, *name; bool there; } parts[] = {
-        {"views", "Held-out views", true}, {"scene", "The scene", has_scene}, {"layers", "From points to a picture", has_layers},
-        {"training", "Training", true}, {"time", "Time", true},
-        {"studies", "Studies", has_studies},
-        {"facts", "Facts", true}, {"again", "Make it again", true}};
+    const struct {
+        const char *id, *name;
+        bool there;
+    } parts[] = {{"views", "Held-out views", true},
+                 {"scene", "The scene", has_scene},
+                 {"layers", "From points to a picture", has_layers},
+                 {"training", "Training", true},
+                 {"time", "Time", true},
+                 {"studies", "Studies", has_studies},
+                 {"facts", "Facts", true},
+                 {"again", "Make it again", true}};
     text_add(out, "<nav>");
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
         if (parts[i].there)
@@ -95,14 +104,14 @@ static void add_contents(text *out, bool has_scene, bool has_layers, bool has_st
     text_add(out, "</nav>\n");
 }
 
-static void add_head(text *out, const char *run, const evaluation *e, const json_t *metrics, bool has_scene, bool has_layers,
-                     bool has_studies)
+static void add_head(text *out, const char *run, const evaluation *e, const json_t *metrics, bool has_scene,
+                     bool has_layers, bool has_studies)
 {
     char name[256];
     const char *data = metrics_text(metrics, "data"), *command = metrics_text(metrics, "command");
     base_name(data != NULL ? data : run, name, sizeof name);
-    text_add(out, "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
-                  "content=\"width=device-width, initial-scale=1\">\n"
+    text_add(out, "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta "
+                  "name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
                   "<title>");
     text_escaped(out, name);
     text_add(out, " \xc2\xb7 gbtrace</title>\n<style>\n");
@@ -125,7 +134,8 @@ static void add_head(text *out, const char *run, const evaluation *e, const json
     text_add(out, "</pre>\n");
 }
 
-gbt_status report_write(const char *run, const evaluation *e, const json_t *metrics, const report_more *more, gbt_error *err)
+gbt_status report_write(const char *run, const evaluation *e, const json_t *metrics, const report_more *more,
+                        gbt_error *err)
 {
     char path[4096];
     GBT_TRY(file_join(path, sizeof path, run, "report.html", err));

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/report.h -- RUN/report.html: one file, no network. */
 #ifndef GBT_REPORT_REPORT_H
 #define GBT_REPORT_REPORT_H
@@ -10,8 +11,10 @@
 
 /** What a page can show beside the scores. */
 typedef struct report_more {
-    loaded_run *open;           /* the run with its data set: maps and pictures of the scene are drawn from it. NULL: none */
-    const char *const *studies; /* [study_count] folders of studies, or SVG files, beside RUN and RUN/studies */
+    loaded_run *open; /* the run with its data set: maps and pictures of the scene are drawn from it. NULL:
+                         none */
+    const char *const *studies; /* [study_count] folders of studies, or SVG files, beside RUN and RUN/studies
+                                 */
     size_t study_count;
 } report_more;
 
@@ -21,6 +24,7 @@ typedef struct report_more {
  * @param metrics [in] the object that metrics.json was written from
  * @param more    [in] optional (NULL); more->open renders a view
  */
-gbt_status report_write(const char *run, const evaluation *e, const json_t *metrics, const report_more *more, gbt_error *err);
+gbt_status report_write(const char *run, const evaluation *e, const json_t *metrics, const report_more *more,
+                        gbt_error *err);
 
 #endif

@@ -1,17 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/rows.c -- rows of the tables of facts: a name and a value. */
 #include "report/rows.h"
 
 #include <math.h>
 
-void report_open_row(text *out, const char *name)
-{
-    text_format(out, "<tr><th>%s</th><td>", name);
-}
+void report_open_row(text *out, const char *name) { text_format(out, "<tr><th>%s</th><td>", name); }
 
-void report_close_row(text *out)
-{
-    text_add(out, "</td></tr>\n");
-}
+void report_close_row(text *out) { text_add(out, "</td></tr>\n"); }
 
 void report_text_row(text *out, const char *name, const char *value)
 {
@@ -31,7 +26,8 @@ void report_number_row(text *out, const char *name, double value, int decimals, 
 {
     report_open_row(out, name);
     text_number(out, value, decimals);
-    text_format(out, "%s%s", isfinite(value) && unit[0] != '\0' ? "\xc2\xa0" : "", isfinite(value) ? unit : "");
+    text_format(out, "%s%s", isfinite(value) && unit[0] != '\0' ? "\xc2\xa0" : "",
+                isfinite(value) ? unit : "");
     report_close_row(out);
 }
 

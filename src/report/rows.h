@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/rows.h -- rows of the tables of facts: a name and a value. */
 #ifndef GBT_REPORT_ROWS_H
 #define GBT_REPORT_ROWS_H

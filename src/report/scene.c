@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/scene.c -- the place that a run is of, as a section of the page. */
 #include "report/scene.h"
 

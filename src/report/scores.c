@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/scores.c -- where the pictures of a scored view are. */
 #include "report/scores.h"
 
@@ -11,7 +12,10 @@ gbt_status view_score_paths(view_score *score, const char *folder, gbt_error *er
 {
     char name[1024], file[1100];
     loaded_run_file_name(score->name, name, sizeof name);
-    const struct { const char *suffix; char *path; } outputs[] = {
+    const struct {
+        const char *suffix;
+        char *path;
+    } outputs[] = {
         {".png", score->render_path}, {".photo.png", score->photo_path}, {".flip.png", score->error_path}};
     for (int i = 0; i < 3; i++) {
         snprintf(file, sizeof file, "%s%s", name, outputs[i].suffix);

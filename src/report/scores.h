@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/scores.h -- the scores of a run, as the page shows them. */
 #ifndef GBT_REPORT_SCORES_H
 #define GBT_REPORT_SCORES_H
@@ -13,10 +14,11 @@ enum { VIEW_PATH_SIZE = 4096 };
 typedef struct view_score {
     char name[1024];
     double psnr, ssim, flip, seconds; /* seconds: decode, tree and trace of this view */
-    lpips_scores lpips; /* with a network */
+    lpips_scores lpips;               /* with a network */
     size_t gaussians;
     bool masked; /* some pixels of the photo do not count */
-    char render_path[VIEW_PATH_SIZE], photo_path[VIEW_PATH_SIZE], error_path[VIEW_PATH_SIZE]; /* PNG files; the last is FLIP, 1 channel */
+    char render_path[VIEW_PATH_SIZE], photo_path[VIEW_PATH_SIZE],
+        error_path[VIEW_PATH_SIZE]; /* PNG files; the last is FLIP, 1 channel */
 } view_score;
 
 /** Means are NaN without held-out views. */
@@ -29,11 +31,12 @@ typedef struct evaluation {
     size_t anchors, model_bytes;
     const char *renderer; /* what drew the views: "trace", "raster", "per-ray" */
     double downscale;     /* the photos were divided by this */
-    bool masked;   /* some view is */
-    bool exposure; /* scored on the right halves of the photos (image/affine.h) */
+    bool masked;          /* some view is */
+    bool exposure;        /* scored on the right halves of the photos (image/affine.h) */
 } evaluation;
 
-/** Where the pictures of score->name are: FOLDER/NAME.png, .photo.png, .flip.png. GBT_ERR_ARGUMENT when a path is too long. */
+/** Where the pictures of score->name are: FOLDER/NAME.png, .photo.png, .flip.png. GBT_ERR_ARGUMENT when a
+    path is too long. */
 gbt_status view_score_paths(view_score *score, const char *folder, gbt_error *err);
 
 #endif

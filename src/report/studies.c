@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/studies.c -- charts that studies left, as a section of the page. */
 #include "report/studies.h"
 
@@ -12,10 +13,11 @@
 enum { CHART_BYTES_MAX = 1000000, CHARTS_MAX = 16, PATH_LIMIT = 4096 };
 
 /* The studies of this program, by the names of their files. */
-static const struct { const char *name, *title; } known[] = {
-    {"speed", "Speed against accuracy"}, {"crosscheck", "Tracer against rasterizer"}, {"rate", "Bytes against quality"},
-    {"stability", "Where renderers fail"},
-    {"paper", "The paper's tables"}, {"time", "Quality against time"}};
+static const struct {
+    const char *name, *title;
+} known[] = {{"speed", "Speed against accuracy"}, {"crosscheck", "Tracer against rasterizer"},
+             {"rate", "Bytes against quality"},   {"stability", "Where renderers fail"},
+             {"paper", "The paper's tables"},     {"time", "Quality against time"}};
 
 static bool is_chart(const char *name)
 {
@@ -62,10 +64,7 @@ static void add_chart(text *out, const char *path, int *count)
     mem_free(bytes);
 }
 
-static int only_charts(const struct dirent *entry)
-{
-    return is_chart(entry->d_name);
-}
+static int only_charts(const struct dirent *entry) { return is_chart(entry->d_name); }
 
 /** Charts of a folder by name, so that the page does not depend on the order in which the disk lists them. */
 static void add_folder(text *out, const char *folder, int *count)

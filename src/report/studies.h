@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/studies.h -- charts that studies left, as a section of the page. */
 #ifndef GBT_REPORT_STUDIES_H
 #define GBT_REPORT_STUDIES_H
@@ -7,10 +8,11 @@
 #include "report/text.h"
 
 /**
- * Add every SVG file of RUN, of RUN/studies and of the given folders, or those given by name; nothing when there is none.
+ * Add every SVG file of RUN, of RUN/studies and of the given folders, or those given by name; nothing when
+ * there is none.
  *
- * They go in as pictures: whatever they hold, nothing in them runs or is loaded. Files that cannot be read, or are larger than a megabyte,
- * are left out with a warning.
+ * They go in as pictures: whatever they hold, nothing in them runs or is loaded. Files that cannot be read,
+ * or are larger than a megabyte, are left out with a warning.
  */
 void report_studies(text *out, const char *run, const char *const *studies, size_t count);
 

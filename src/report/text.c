@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/text.c -- a growing text for pages: escaping, base64, numbers as people read them. */
 #include "report/text.h"
 
@@ -14,7 +15,8 @@
 void text_free(text *t)
 {
     mem_free(t->bytes);
-    t->bytes = NULL, t->length = t->capacity = 0;
+    t->bytes = NULL;
+    t->length = t->capacity = 0;
 }
 
 gbt_status text_print(text *t, FILE *out)
@@ -40,7 +42,8 @@ gbt_status text_save(text *t, const char *folder, const char *name)
 static bool make_room(text *t, size_t count)
 {
     if (t->status == GBT_OK && count > t->capacity - t->length)
-        t->status = mem_reserve((void **)&t->bytes, &t->capacity, t->length, t->length + count, 1, "report", t->err);
+        t->status =
+            mem_reserve((void **)&t->bytes, &t->capacity, t->length, t->length + count, 1, "report", t->err);
     return t->status == GBT_OK;
 }
 
@@ -52,10 +55,7 @@ static void add_bytes(text *t, const char *bytes, size_t count)
     t->length += count;
 }
 
-void text_add(text *t, const char *markup)
-{
-    add_bytes(t, markup, strlen(markup));
-}
+void text_add(text *t, const char *markup) { add_bytes(t, markup, strlen(markup)); }
 
 void text_append(text *t, text *other)
 {
@@ -79,14 +79,22 @@ void text_format(text *t, const char *format, ...)
     va_end(again);
 }
 
-/** Bytes of the well-formed UTF-8 character at `s` (RFC 3629: shortest form, no surrogates, at most U+10FFFF); 0: not one. */
+/** Bytes of the well-formed UTF-8 character at `s` (RFC 3629: shortest form, no surrogates, at most
+    U+10FFFF); 0: not one. */
 static size_t utf8_length(const unsigned char *s)
 {
     if (s[0] < 0x80)
         return 1;
-    const size_t length = s[0] >= 0xc2 && s[0] <= 0xdf ? 2 : s[0] >= 0xe0 && s[0] <= 0xef ? 3 : s[0] >= 0xf0 && s[0] <= 0xf4 ? 4 : 0;
-    const unsigned char lowest = s[0] == 0xe0 ? 0xa0 : s[0] == 0xf0 ? 0x90 : 0x80,
-        highest = s[0] == 0xed ? 0x9f : s[0] == 0xf4 ? 0x8f : 0xbf;
+    const size_t length = s[0] >= 0xc2 && s[0] <= 0xdf   ? 2
+                          : s[0] >= 0xe0 && s[0] <= 0xef ? 3
+                          : s[0] >= 0xf0 && s[0] <= 0xf4 ? 4
+                                                         : 0;
+    const unsigned char lowest = s[0] == 0xe0   ? 0xa0
+                                 : s[0] == 0xf0 ? 0x90
+                                                : 0x80,
+                        highest = s[0] == 0xed   ? 0x9f
+                                  : s[0] == 0xf4 ? 0x8f
+                                                 : 0xbf;
     if (length == 0 || s[1] < lowest || s[1] > highest)
         return 0;
     for (size_t i = 2; i < length; i++)
@@ -97,8 +105,10 @@ static size_t utf8_length(const unsigned char *s)
 
 static void add_outside(text *t, const char *outside, bool markup)
 {
-    static const struct { char c; const char *escaped; } special[] = {
-        {'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}};
+    static const struct {
+        char c;
+        const char *escaped;
+    } special[] = {{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}};
     if (outside == NULL)
         outside = "n/a";
     for (const unsigned char *s = (const unsigned char *)outside; *s != '\0';) {
@@ -119,20 +129,15 @@ static void add_outside(text *t, const char *outside, bool markup)
     }
 }
 
-void text_escaped(text *t, const char *outside)
-{
-    add_outside(t, outside, true);
-}
+void text_escaped(text *t, const char *outside) { add_outside(t, outside, true); }
 
-void text_plain(text *t, const char *outside)
-{
-    add_outside(t, outside, false);
-}
+void text_plain(text *t, const char *outside) { add_outside(t, outside, false); }
 
 void text_url(text *t, const char *name)
 {
     for (const unsigned char *s = (const unsigned char *)name; *s != '\0'; s++) {
-        const bool plain = (*s >= 'a' && *s <= 'z') || (*s >= 'A' && *s <= 'Z') || (*s >= '0' && *s <= '9') || strchr("-._~/", *s) != NULL;
+        const bool plain = (*s >= 'a' && *s <= 'z') || (*s >= 'A' && *s <= 'Z') || (*s >= '0' && *s <= '9') ||
+                           strchr("-._~/", *s) != NULL;
         text_format(t, plain ? "%c" : "%%%02X", *s);
     }
 }
@@ -145,7 +150,8 @@ void text_base64(text *t, const unsigned char *bytes, size_t count)
     char *out = t->bytes + t->length;
     for (size_t i = 0; i < count; i += 3) {
         const size_t have = count - i;
-        const unsigned a = bytes[i], b = have > 1 ? bytes[i + 1] : 0, c = have > 2 ? bytes[i + 2] : 0, group = a << 16 | b << 8 | c;
+        const unsigned a = bytes[i], b = have > 1 ? bytes[i + 1] : 0, c = have > 2 ? bytes[i + 2] : 0,
+                       group = a << 16 | b << 8 | c;
         *out++ = digits[group >> 18];
         *out++ = digits[group >> 12 & 63];
         *out++ = have > 1 ? digits[group >> 6 & 63] : '=';
@@ -189,8 +195,10 @@ void text_bytes(text *t, double value)
         return;
     }
     int unit = 0;
-    while (value >= 999.5 && unit < 4)
-        value /= 1000, unit++;
+    while (value >= 999.5 && unit < 4) {
+        value /= 1000;
+        unit++;
+    }
     text_format(t, "%.*f %s", unit == 0 ? 0 : value < 9.995 ? 2 : value < 99.95 ? 1 : 0, value, units[unit]);
 }
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/text.h -- a growing text for pages: escaping, base64, numbers as people read them. */
 #ifndef GBT_REPORT_TEXT_H
 #define GBT_REPORT_TEXT_H
@@ -8,8 +9,8 @@
 #include "gbtrace/status.h"
 
 /**
- * Start from {.err = err}; free with text_free(). After a failed allocation every call is a no-op and `status` says why, so that a page
- * is written straight through and checked once at the end.
+ * Start from {.err = err}; free with text_free(). After a failed allocation every call is a no-op and
+ * `status` says why, so that a page is written straight through and checked once at the end.
  */
 typedef struct text {
     char *bytes; /* not terminated */
@@ -30,8 +31,8 @@ void text_add(text *t, const char *markup); /* as it is: only what this program 
 void text_format(text *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /**
- * Anything from outside, for content and quoted attributes: markup characters escaped, control bytes become ?, what is not UTF-8 U+FFFD.
- * NULL is "n/a".
+ * Anything from outside, for content and quoted attributes: markup characters escaped, control bytes become
+ * ?, what is not UTF-8 U+FFFD. NULL is "n/a".
  */
 void text_escaped(text *t, const char *outside);
 

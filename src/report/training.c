@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/training.c -- how training went: curves over time, and where its time went. */
 #include "report/training.h"
 
@@ -12,13 +13,18 @@
 #include "report/log.h"
 #include "report/metrics.h"
 
-/* ---- curves ------------------------------------------------------------------------------------------------------------------- */
+/* ---- curves ---- */
 
-typedef struct time_unit { const char *name; double seconds; } time_unit;
+typedef struct time_unit {
+    const char *name;
+    double seconds;
+} time_unit;
 
 static time_unit choose_time_unit(double longest)
 {
-    return longest > 3 * 3600 ? (time_unit){"h", 3600} : longest > 180 ? (time_unit){"min", 60} : (time_unit){"s", 1};
+    return longest > 3 * 3600 ? (time_unit){"h", 3600}
+           : longest > 180    ? (time_unit){"min", 60}
+                              : (time_unit){"s", 1};
 }
 
 enum { HELD_OUT_LIMIT = 256, MARK_LIMIT = 16 };
@@ -26,7 +32,8 @@ enum { HELD_OUT_LIMIT = 256, MARK_LIMIT = 16 };
 typedef struct curves {
     training_log log;
     time_unit unit;
-    double *block, *time, *loss, *psnr, *rays, *gaussians, *blended, *megabytes; /* block owns the others, [log.count] each */
+    double *block, *time, *loss, *psnr, *rays, *gaussians, *blended,
+        *megabytes; /* block owns the others, [log.count] each */
     double held_out_time[HELD_OUT_LIMIT], held_out_psnr[HELD_OUT_LIMIT];
     size_t held_out_count;
     chart_mark marks[MARK_LIMIT];
@@ -35,8 +42,10 @@ typedef struct curves {
 
 static void add_held_out(curves *c, double seconds, double psnr)
 {
-    if (c->held_out_count < HELD_OUT_LIMIT && isfinite(seconds) && isfinite(psnr))
-        c->held_out_time[c->held_out_count] = seconds / c->unit.seconds, c->held_out_psnr[c->held_out_count++] = psnr;
+    if (c->held_out_count < HELD_OUT_LIMIT && isfinite(seconds) && isfinite(psnr)) {
+        c->held_out_time[c->held_out_count] = seconds / c->unit.seconds;
+        c->held_out_psnr[c->held_out_count++] = psnr;
+    }
 }
 
 /** Where coarse to fine went on to the next resolution. */
@@ -47,20 +56,23 @@ static void find_marks(curves *c)
         const double w = c->log.column[LOG_WIDTH][i], h = c->log.column[LOG_HEIGHT][i];
         if (!(w >= 1 && h >= 1 && w < 1e6 && h < 1e6))
             continue;
-        /* Photos of a set differ by a pixel or two, and a held-out score is at full size; only a step up to stay is a step of the
-           schedule. */
-        const bool stays = i + 1 == c->log.count ||
-                           c->log.column[LOG_WIDTH][i + 1] * c->log.column[LOG_HEIGHT][i + 1] > 1.5 * width * height;
+        /* Photos of a set differ by a pixel or two, and a held-out score is at full size; only a step up to
+           stay is a step of the schedule. */
+        const bool stays =
+            i + 1 == c->log.count ||
+            c->log.column[LOG_WIDTH][i + 1] * c->log.column[LOG_HEIGHT][i + 1] > 1.5 * width * height;
         if (w * h > 1.5 * width * height && stays) {
             chart_mark *mark = &c->marks[c->mark_count++];
             mark->x = c->mark_count == 1 ? 0 : c->time[i];
             snprintf(mark->label, sizeof mark->label, "%.0f\xc3\x97%.0f px", w, h);
-            width = w, height = h;
+            width = w;
+            height = h;
         }
     }
 }
 
-static gbt_status curves_make(curves *c, const char *run, const evaluation *e, const json_t *metrics, gbt_error *err)
+static gbt_status curves_make(curves *c, const char *run, const evaluation *e, const json_t *metrics,
+                              gbt_error *err)
 {
     char path[4096];
     GBT_TRY(file_join(path, sizeof path, run, "log.csv", err));
@@ -79,8 +91,8 @@ static gbt_status curves_make(curves *c, const char *run, const evaluation *e, c
     c->block = mem_alloc(n + 1, 7 * sizeof *c->block, "curves", err);
     if (c->block == NULL)
         return GBT_ERR_NO_MEMORY;
-    c->time = c->block, c->loss = c->time + n, c->psnr = c->loss + n, c->rays = c->psnr + n, c->gaussians = c->rays + n,
-    c->blended = c->gaussians + n, c->megabytes = c->blended + n;
+    c->time = c->block, c->loss = c->time + n, c->psnr = c->loss + n, c->rays = c->psnr + n,
+    c->gaussians = c->rays + n, c->blended = c->gaussians + n, c->megabytes = c->blended + n;
     if (n == 0)
         return GBT_OK;
     const double reach = 0.015 * longest; /* on each side: a few seconds of a short run */
@@ -89,8 +101,10 @@ static gbt_status curves_make(curves *c, const char *run, const evaluation *e, c
     training_log_smooth(&c->log, LOG_RAYS_PER_SECOND, reach, c->rays);
     training_log_smooth(&c->log, LOG_GAUSSIANS, reach, c->gaussians);
     training_log_smooth(&c->log, LOG_BLENDED, reach, c->blended);
-    for (size_t j = 0; j < n; j++)
-        c->megabytes[j] = c->log.column[LOG_MEMORY][j] * 1e-6, c->time[j] = c->log.column[LOG_SECONDS][j] / c->unit.seconds;
+    for (size_t j = 0; j < n; j++) {
+        c->megabytes[j] = c->log.column[LOG_MEMORY][j] * 1e-6;
+        c->time[j] = c->log.column[LOG_SECONDS][j] / c->unit.seconds;
+    }
     find_marks(c);
     return GBT_OK;
 }
@@ -107,9 +121,10 @@ static void add_curves(text *out, const curves *c)
     double *const *column = c->log.column;
     const chart_series loss[] = {{NULL, c->time, column[LOG_LOSS], n, 0, CHART_FAINT},
                                  {"loss, smoothed", c->time, c->loss, n, 0, CHART_LINE}};
-    const chart_series psnr[] = {{NULL, c->time, column[LOG_TRAIN_PSNR], n, 0, CHART_FAINT},
-                                 {"training, smoothed", c->time, c->psnr, n, 0, CHART_LINE},
-                                 {"held-out", c->held_out_time, c->held_out_psnr, c->held_out_count, 1, CHART_DOTS}};
+    const chart_series psnr[] = {
+        {NULL, c->time, column[LOG_TRAIN_PSNR], n, 0, CHART_FAINT},
+        {"training, smoothed", c->time, c->psnr, n, 0, CHART_LINE},
+        {"held-out", c->held_out_time, c->held_out_psnr, c->held_out_count, 1, CHART_DOTS}};
     const chart_series counts[] = {{NULL, c->time, column[LOG_GAUSSIANS], n, 1, CHART_FAINT},
                                    {"Gaussians per view, smoothed", c->time, c->gaussians, n, 1, CHART_LINE},
                                    {"anchors", c->time, column[LOG_ANCHORS], n, 0, CHART_LINE}};
@@ -119,40 +134,75 @@ static void add_curves(text *out, const curves *c)
                                     {"blended, smoothed", c->time, c->blended, n, 3, CHART_LINE}};
     const chart_series memory[] = {{"resident memory", c->time, c->megabytes, n, 0, CHART_LINE}};
     const line_chart charts[] = {
-        {.title = "Loss", .y_unit = "log scale", .log_y = true, .y_decimals = 4, .series = loss, .series_count = 2},
-        {.title = "PSNR", .y_unit = "dB", .y_decimals = 2, .series = psnr, .series_count = 3,
+        {.title = "Loss",
+         .y_unit = "log scale",
+         .log_y = true,
+         .y_decimals = 4,
+         .series = loss,
+         .series_count = 2},
+        {.title = "PSNR",
+         .y_unit = "dB",
+         .y_decimals = 2,
+         .series = psnr,
+         .series_count = 3,
          .note = "Training photos are scored at the resolution of the moment, held-out views at full size."},
-        {.title = "Anchors and Gaussians", .y_unit = "count", .from_zero = true, .y_decimals = -1, .series = counts, .series_count = 3},
-        {.title = "Rays per second", .y_unit = "rays/s, forward and adjoint", .from_zero = true, .y_decimals = -1, .series = rays,
+        {.title = "Anchors and Gaussians",
+         .y_unit = "count",
+         .from_zero = true,
+         .y_decimals = -1,
+         .series = counts,
+         .series_count = 3},
+        {.title = "Rays per second",
+         .y_unit = "rays/s, forward and adjoint",
+         .from_zero = true,
+         .y_decimals = -1,
+         .series = rays,
          .series_count = 2},
-        {.title = "Gaussians per ray", .y_unit = "blended on a ray", .from_zero = true, .y_decimals = 1, .series = blended,
+        {.title = "Gaussians per ray",
+         .y_unit = "blended on a ray",
+         .from_zero = true,
+         .y_decimals = 1,
+         .series = blended,
          .series_count = 2},
-        {.title = "Memory", .y_unit = "MB, highest so far", .from_zero = true, .y_decimals = 0, .series = memory, .series_count = 1},
+        {.title = "Memory",
+         .y_unit = "MB, highest so far",
+         .from_zero = true,
+         .y_decimals = 0,
+         .series = memory,
+         .series_count = 1},
     };
     text_add(out, "<section id=\"training\"><h2>Training</h2>\n");
     if (c->mark_count > 1)
-        text_add(out, "<p class=\"lead\">Training goes from coarse to fine; dashed lines are where the pictures became larger.</p>\n");
+        text_add(out, "<p class=\"lead\">Training goes from coarse to fine; dashed lines are where the "
+                      "pictures became larger.</p>\n");
     text_add(out, "<div class=\"grid2\">\n");
     for (size_t i = 0; i < sizeof charts / sizeof *charts; i++) {
         line_chart chart = charts[i];
-        chart.x_unit = c->unit.name, chart.marks = c->marks, chart.mark_count = c->mark_count > 1 ? c->mark_count : 0;
+        chart.x_unit = c->unit.name, chart.marks = c->marks,
+        chart.mark_count = c->mark_count > 1 ? c->mark_count : 0;
         chart_lines(out, &chart);
     }
     text_add(out, "</div></section>\n");
 }
 
-/* ---- where the time went ------------------------------------------------------------------------------------------------------ */
+/* ---- where the time went ---- */
 
 static void add_stage_layers(text *out, const curves *c)
 {
     /* Stages of one kind are one layer: more than these cannot be told apart. */
-    static const struct { const char *name; log_column first, last; int color; } kinds[] = {
-        {"photo and rays", LOG_PHOTO_MS, LOG_RAYS_MS, 0}, {"anchors, decode", LOG_VISIBLE_MS, LOG_DECODE_MS, 1},
-        {"build tree", LOG_BUILD_MS, LOG_BUILD_MS, 2},
-        {"draw", LOG_TRACE_MS, LOG_TRACE_MS, 3}, {"loss", LOG_LOSS_MS, LOG_LOSS_MS, 4},
-        {"draw, adjoint", LOG_ADJOINT_MS, LOG_ADJOINT_MS, 5},
-        {"decode, adjoint", LOG_DECODE_ADJOINT_MS, LOG_DECODE_ADJOINT_MS, 6}, {"optimizer", LOG_OPTIMIZER_MS, LOG_OPTIMIZER_MS, 7},
-        {"grow and prune", LOG_ADJUST_MS, LOG_ADJUST_MS, 8}};
+    static const struct {
+        const char *name;
+        log_column first, last;
+        int color;
+    } kinds[] = {{"photo and rays", LOG_PHOTO_MS, LOG_RAYS_MS, 0},
+                 {"anchors, decode", LOG_VISIBLE_MS, LOG_DECODE_MS, 1},
+                 {"build tree", LOG_BUILD_MS, LOG_BUILD_MS, 2},
+                 {"draw", LOG_TRACE_MS, LOG_TRACE_MS, 3},
+                 {"loss", LOG_LOSS_MS, LOG_LOSS_MS, 4},
+                 {"draw, adjoint", LOG_ADJOINT_MS, LOG_ADJOINT_MS, 5},
+                 {"decode, adjoint", LOG_DECODE_ADJOINT_MS, LOG_DECODE_ADJOINT_MS, 6},
+                 {"optimizer", LOG_OPTIMIZER_MS, LOG_OPTIMIZER_MS, 7},
+                 {"grow and prune", LOG_ADJUST_MS, LOG_ADJUST_MS, 8}};
     enum { KINDS = sizeof kinds / sizeof *kinds };
     const size_t n = c->log.count;
     chart_layer layers[KINDS];
@@ -171,12 +221,22 @@ static void add_stage_layers(text *out, const curves *c)
     mem_free(sum);
 }
 
-/* Stages of a step as train.json names them, in the order in which they happen; those of one colour are one layer. */
-static const struct { const char *key, *name; int color; } stages[] = {
-    {"photo", "photo", 0}, {"rays", "camera rays", 0}, {"visible", "anchors in view", 1},
-    {"decode", "decode networks", 1}, {"build", "build tree", 2}, {"trace", "draw", 3},
-    {"loss", "loss", 4}, {"adjoint", "draw, adjoint", 5}, {"decode_adjoint", "decode, adjoint", 6},
-    {"optimizer", "optimizer", 7}, {"adjust", "grow and prune", 8}};
+/* Stages of a step as train.json names them, in the order in which they happen; those of one colour are one
+   layer. */
+static const struct {
+    const char *key, *name;
+    int color;
+} stages[] = {{"photo", "photo", 0},
+              {"rays", "camera rays", 0},
+              {"visible", "anchors in view", 1},
+              {"decode", "decode networks", 1},
+              {"build", "build tree", 2},
+              {"trace", "draw", 3},
+              {"loss", "loss", 4},
+              {"adjoint", "draw, adjoint", 5},
+              {"decode_adjoint", "decode, adjoint", 6},
+              {"optimizer", "optimizer", 7},
+              {"adjust", "grow and prune", 8}};
 enum { STAGES = sizeof stages / sizeof *stages };
 
 static void add_stages(text *out, const curves *c, const json_t *metrics)
@@ -187,7 +247,8 @@ static void add_stages(text *out, const curves *c, const json_t *metrics)
     double rest = whole;
     size_t count = 0;
     for (; count < STAGES; count++) {
-        bars[count] = (chart_bar){stages[count].name, metrics_number(all, stages[count].key), stages[count].color};
+        bars[count] =
+            (chart_bar){stages[count].name, metrics_number(all, stages[count].key), stages[count].color};
         rest -= isfinite(bars[count].value) ? bars[count].value : 0;
     }
     if (rest > 0)
@@ -198,7 +259,7 @@ static void add_stages(text *out, const curves *c, const json_t *metrics)
     text_add(out, "</div></section>\n");
 }
 
-/* ---- entry -------------------------------------------------------------------------------------------------------------------- */
+/* ---- entry ---- */
 
 void report_training(text *out, const char *run, const evaluation *e, const json_t *metrics)
 {

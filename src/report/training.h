@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* report/training.h -- how training went: curves over time, and where its time went. */
 #ifndef GBT_REPORT_TRAINING_H
 #define GBT_REPORT_TRAINING_H

@@ -1,4 +1,6 @@
-/* report/views.c -- the held-out views of the page: photo against render, where they differ, and their scores. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* report/views.c -- the held-out views of the page: photo against render, where they differ, and their
+   scores. */
 #include "report/views.h"
 
 #include <math.h>
@@ -8,15 +10,20 @@
 #include "base/memory.h"
 #include "report/image.h"
 
-/* What keeps a page to a few megabytes: three pictures a view take about 0.4 bytes for each of its pixels. The whole ones are beside it. */
+/* What keeps a page to a few megabytes: three pictures a view take about 0.4 bytes for each of its pixels.
+   The whole ones are beside it. */
 enum { PICTURES_MAX_PIXELS = 5600000, PICTURE_MAX_PIXELS = 1000000 };
 
-typedef struct ranked { double psnr; size_t index; } ranked;
+typedef struct ranked {
+    double psnr;
+    size_t index;
+} ranked;
 
 static int compare_psnr(const void *a, const void *b)
 {
     const ranked *x = a, *y = b;
-    const double p = isnan(x->psnr) ? (double)INFINITY : x->psnr, q = isnan(y->psnr) ? (double)INFINITY : y->psnr;
+    const double p = isnan(x->psnr) ? (double)INFINITY : x->psnr,
+                 q = isnan(y->psnr) ? (double)INFINITY : y->psnr;
     if (p != q)
         return p < q ? -1 : 1;
     return x->index < y->index ? -1 : x->index > y->index;
@@ -59,8 +66,8 @@ static void add_psnr(text *out, double psnr)
 }
 
 /** An <img>, or a line that says that there is none. */
-static void add_picture(text *out, const char *class_name, const char *what, const view_score *v, const char *path, picture_kind kind,
-                        size_t most)
+static void add_picture(text *out, const char *class_name, const char *what, const view_score *v,
+                        const char *path, picture_kind kind, size_t most)
 {
     int width, height;
     report_picture_size(path, &width, &height);
@@ -104,7 +111,8 @@ static void add_view(text *out, const evaluation *e, size_t index, size_t place,
     add_key(out, "psnr", v->psnr, 1e6);
     add_key(out, "ssim", v->ssim, 1e6);
     add_key(out, "flip", v->flip, -1);
-    text_format(out, " style=\"--ratio:%.4f\"><figcaption><h3>", width > 0 && height > 0 ? (double)width / (double)height : 1.5);
+    text_format(out, " style=\"--ratio:%.4f\"><figcaption><h3>",
+                width > 0 && height > 0 ? (double)width / (double)height : 1.5);
     text_escaped(out, v->name);
     text_add(out, "</h3>");
     add_score(out, "PSNR", v->psnr, 2, " dB");
@@ -114,8 +122,8 @@ static void add_view(text *out, const evaluation *e, size_t index, size_t place,
     add_picture(out, "render", "Render", v, v->render_path, PICTURE_COLOR, most);
     add_picture(out, "photo", "Photo", v, v->photo_path, PICTURE_COLOR, most);
     text_add(out, "<span class=\"tag l\">photo</span><span class=\"tag r\">render</span>"
-                  "<input type=\"range\" min=\"0\" max=\"100\" step=\"0.5\" value=\"50\" aria-label=\"How much of the photo to show over "
-                  "the render of ");
+                  "<input type=\"range\" min=\"0\" max=\"100\" step=\"0.5\" value=\"50\" aria-label=\"How "
+                  "much of the photo to show over the render of ");
     text_escaped(out, v->name);
     text_add(out, "\"><span class=\"handle\"></span></div><div class=\"error\">");
     add_picture(out, "map", "FLIP error map", v, v->error_path, PICTURE_ERROR, most);
@@ -129,8 +137,8 @@ static void add_color_scale(text *out)
     for (int i = 0; i <= STOPS; i++) {
         float rgb[3];
         error_color((double)i / STOPS, rgb);
-        text_format(out, ",#%02x%02x%02x", (unsigned)(rgb[0] * 255.0f + 0.5f), (unsigned)(rgb[1] * 255.0f + 0.5f),
-                    (unsigned)(rgb[2] * 255.0f + 0.5f));
+        text_format(out, ",#%02x%02x%02x", (unsigned)(rgb[0] * 255.0f + 0.5f),
+                    (unsigned)(rgb[1] * 255.0f + 0.5f), (unsigned)(rgb[2] * 255.0f + 0.5f));
     }
     text_add(out, ")\"></i> 1 (different at first sight)</span>");
 }
@@ -159,7 +167,8 @@ static void add_cell(text *out, double value, int decimals)
         text_number(out, value, decimals);
 }
 
-static void add_row(text *out, const char *run, const evaluation *e, size_t index, size_t place, double low, double high)
+static void add_row(text *out, const char *run, const evaluation *e, size_t index, size_t place, double low,
+                    double high)
 {
     const view_score *v = &e->views[index];
     text_format(out, "<tr data-place=\"%zu\"><th><a href=\"#view-%zu\">", place, index);
@@ -190,16 +199,19 @@ static void add_table(text *out, const char *run, const evaluation *e, const siz
 {
     double low = INFINITY, high = -INFINITY;
     for (size_t i = 0; i < e->view_count; i++)
-        if (isfinite(e->views[i].psnr))
-            low = fmin(low, e->views[i].psnr), high = fmax(high, e->views[i].psnr);
+        if (isfinite(e->views[i].psnr)) {
+            low = fmin(low, e->views[i].psnr);
+            high = fmax(high, e->views[i].psnr);
+        }
     low = floor(low - 1); /* so that the worst has a bar too */
-    text_format(out, "<details class=\"card\" open><summary>All %zu views as a table</summary><div class=\"scroll\"><table class=\"list "
-                     "sortable\"><thead><tr>"
-                     "<th data-sort=\"text\">View</th><th data-sort=\"number\">PSNR, dB</th><th data-sort=\"number\">SSIM</th><th "
-                     "data-sort=\"number\">FLIP</th>%s"
-                     "<th data-sort=\"number\">Gaussians</th><th data-sort=\"number\">Render, s</th><th>Whole "
-                     "pictures</th></tr></thead><tbody>",
-                e->view_count, e->lpips_network != NULL ? "<th data-sort=\"number\">LPIPS</th>" : "");
+    text_format(
+        out,
+        "<details class=\"card\" open><summary>All %zu views as a table</summary><div "
+        "class=\"scroll\"><table class=\"list sortable\"><thead><tr><th data-sort=\"text\">View</th><th "
+        "data-sort=\"number\">PSNR, dB</th><th data-sort=\"number\">SSIM</th><th "
+        "data-sort=\"number\">FLIP</th>%s<th data-sort=\"number\">Gaussians</th><th "
+        "data-sort=\"number\">Render, s</th><th>Whole pictures</th></tr></thead><tbody>",
+        e->view_count, e->lpips_network != NULL ? "<th data-sort=\"number\">LPIPS</th>" : "");
     for (size_t i = 0; i < e->view_count; i++)
         add_row(out, run, e, order[i], i, low, high);
     text_add(out, "</tbody></table></div></details>\n");
@@ -222,9 +234,9 @@ void report_views(text *out, const char *run, const evaluation *e, const char *p
     text_add(out, "<section id=\"views\"><h2>Held-out views</h2>\n");
     size_t shown[REPORT_MAX_VIEWS], *order = NULL;
     if (e->view_count == 0) {
-        text_add(out, "<p class=\"none\">n/a: every photo was trained on, none was held out. Train with <code>--eval-split every=8</code> "
-                      "to see how the scene "
-                      "looks from where no photo was shown.</p></section>\n");
+        text_add(out, "<p class=\"none\">n/a: every photo was trained on, none was held out. Train with "
+                      "<code>--eval-split every=8</code> to see how the scene looks from where no photo was "
+                      "shown.</p></section>\n");
         return;
     }
     order = mem_alloc(e->view_count, sizeof *order, "views", out->err);
@@ -233,18 +245,21 @@ void report_views(text *out, const char *run, const evaluation *e, const char *p
         return;
     }
     const size_t count = report_choose_views(e, shown, order);
-    text_add(out, "<p class=\"lead\">Training never saw these photos. Drag over a picture, or use the arrow keys, to go from the render to "
-                  "the photo.");
+    text_add(out, "<p class=\"lead\">Training never saw these photos. Drag over a picture, or use the arrow "
+                  "keys, to go from the render to the photo.");
     if (count < e->view_count)
-        text_format(out, " Shown are %d of %zu views: the %d worst, %d from the middle and the %d best by PSNR.", REPORT_MAX_VIEWS,
-                    e->view_count, REPORT_MAX_VIEWS / 3, REPORT_MAX_VIEWS / 3, REPORT_MAX_VIEWS / 3);
-    text_add(out, "</p>\n<div class=\"bar-top\"><label hidden>Order <select id=\"order\"><option value=\"psnr up\">worst PSNR "
-                  "first</option>"
-                  "<option value=\"psnr down\">best PSNR first</option><option value=\"ssim up\">worst SSIM first</option>"
-                  "<option value=\"flip down\">worst FLIP first</option></select></label>");
+        text_format(out,
+                    " Shown are %d of %zu views: the %d worst, %d from the middle and the %d best by PSNR.",
+                    REPORT_MAX_VIEWS, e->view_count, REPORT_MAX_VIEWS / 3, REPORT_MAX_VIEWS / 3,
+                    REPORT_MAX_VIEWS / 3);
+    text_add(out, "</p>\n<div class=\"bar-top\"><label hidden>Order <select id=\"order\"><option "
+                  "value=\"psnr up\">worst PSNR first</option><option value=\"psnr down\">best PSNR "
+                  "first</option><option value=\"ssim up\">worst SSIM first</option><option value=\"flip "
+                  "down\">worst FLIP first</option></select></label>");
     add_color_scale(out);
     text_format(out, "</div>\n<div class=\"views%s\">\n", are_tall(e, shown, count) ? " tall" : "");
-    const size_t most = count > PICTURES_MAX_PIXELS / PICTURE_MAX_PIXELS ? PICTURES_MAX_PIXELS / count : PICTURE_MAX_PIXELS;
+    const size_t most =
+        count > PICTURES_MAX_PIXELS / PICTURE_MAX_PIXELS ? PICTURES_MAX_PIXELS / count : PICTURE_MAX_PIXELS;
     for (size_t i = 0; i < count && out->status == GBT_OK; i++)
         add_view(out, e, shown[i], i, most);
     text_add(out, "</div>\n");

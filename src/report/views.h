@@ -1,4 +1,6 @@
-/* report/views.h -- the held-out views of the page: photo against render, where they differ, and their scores. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* report/views.h -- the held-out views of the page: photo against render, where they differ, and their
+   scores. */
 #ifndef GBT_REPORT_VIEWS_H
 #define GBT_REPORT_VIEWS_H
 
@@ -8,8 +10,8 @@
 enum { REPORT_MAX_VIEWS = 24 }; /* of more, a third each: worst, middle, best */
 
 /**
- * Add the section, worst PSNR first. Pictures below the folder `run` get links. `protocol`: how scores are made, one sentence; NULL:
- * nothing is said.
+ * Add the section, worst PSNR first. Pictures below the folder `run` get links. `protocol`: how scores are
+ * made, one sentence; NULL: nothing is said.
  */
 void report_views(text *out, const char *run, const evaluation *e, const char *protocol);
 

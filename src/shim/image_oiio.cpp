@@ -1,9 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* shim/image_oiio.cpp -- base/image.h on OpenImageIO: bytes to pixels and back, every exception stopped here.
 
-   file --> bytes --> [magic: png, jpeg, openexr] --> that one plugin, from memory --> native samples --> float in [0, 1]
+   file --> bytes --> [magic: png, jpeg, openexr] --> that one plugin, from memory --> native samples
+        --> float in [0, 1]
 
-   The plugin is chosen from the first bytes, so a file cannot reach one of OpenImageIO's other 20 parsers by its name. A PNG is
-   cut down to its pixel chunks first: libpng prints on stderr about damaged and odd chunks, and OpenImageIO cannot stop it. */
+   The plugin is chosen from the first bytes, so a file cannot reach one of OpenImageIO's other 20 parsers by
+   its name. A PNG is cut down to its pixel chunks first: libpng prints on stderr about damaged and odd
+   chunks, and OpenImageIO cannot stop it. */
 #include "base/image.h"
 
 #include <cmath>
@@ -41,7 +44,8 @@ struct bytes_owner {
     ~bytes_owner() { mem_free(bytes); }
 };
 
-/* Members are destroyed in reverse order, so the reader goes before the proxy and the bytes that it borrows. */
+/* Members are destroyed in reverse order, so the reader goes before the proxy and the bytes that it
+   borrows. */
 struct opened_image {
     bytes_owner file;
     std::unique_ptr<OIIO::Filesystem::IOMemReader> proxy;
@@ -71,7 +75,8 @@ std::string first_line(const std::string &text)
     return line.empty() ? std::string("no reason given") : line;
 }
 
-/* OpenImageIO reports some failures on the object and some globally; both must be emptied or the next call inherits them. */
+/* OpenImageIO reports some failures on the object and some globally; both must be emptied or the next call
+   inherits them. */
 std::string reason_of(const OIIO::ImageInput *input)
 {
     const std::string global = OIIO::has_error() ? OIIO::geterror() : std::string();
@@ -106,26 +111,31 @@ uint32_t png_crc(const unsigned char *bytes, size_t count)
     return crc ^ 0xFFFFFFFFu;
 }
 
-/* Check every chunk and keep, in place, the ones that carry pixels; profiles, gamma and texts would not be applied anyway. */
+/* Check every chunk and keep, in place, the ones that carry pixels; profiles, gamma and texts would not be
+   applied anyway. */
 gbt_status png_reduce(const char *path, unsigned char *bytes, size_t *count, gbt_error *err)
 {
     static const char kept[][5] = {"IHDR", "PLTE", "tRNS", "IDAT", "IEND"};
     size_t read = magic_bytes, write = magic_bytes;
     for (bool ended = false; !ended;) {
         if (*count - read < 12)
-            return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: PNG is truncated (wanted a chunk of 12 bytes or more, got %zu)", path, read,
-                             *count - read);
+            return base_fail(err, GBT_ERR_FORMAT,
+                             "%s@%zu: PNG is truncated (wanted a chunk of 12 bytes or more, got %zu)", path,
+                             read, *count - read);
         const size_t length = big_endian(bytes + read);
         if (length > *count - read - 12)
-            return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: PNG is truncated (wanted a chunk of %zu bytes, got %zu)", path, read, length,
-                             *count - read - 12);
+            return base_fail(err, GBT_ERR_FORMAT,
+                             "%s@%zu: PNG is truncated (wanted a chunk of %zu bytes, got %zu)", path, read,
+                             length, *count - read - 12);
         const unsigned char *type = bytes + read + 4;
         const uint32_t wanted = big_endian(type + 4 + length), got = png_crc(type, length + 4);
         if (wanted != got)
-            return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: PNG chunk is damaged (wanted checksum %08x, got %08x)", path, read,
+            return base_fail(err, GBT_ERR_FORMAT,
+                             "%s@%zu: PNG chunk is damaged (wanted checksum %08x, got %08x)", path, read,
                              (unsigned)wanted, (unsigned)got);
         if (read == magic_bytes && (std::memcmp(type, "IHDR", 4) != 0 || length != 13))
-            return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: PNG does not start with an IHDR chunk of 13 bytes", path, read);
+            return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: PNG does not start with an IHDR chunk of 13 bytes",
+                             path, read);
         ended = std::memcmp(type, "IEND", 4) == 0;
         bool keep = false;
         for (const char *name : kept)
@@ -145,9 +155,10 @@ gbt_status png_check_header(const char *path, const unsigned char *bytes, gbt_er
 {
     const unsigned char *header = bytes + magic_bytes + 8;
     const int64_t width = big_endian(header), height = big_endian(header + 4);
-    if (width < 1 || height < 1 || width > max_samples || height > max_samples || width * height > max_samples)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: image of %u x %u pixels (wanted 1 x 1 to 2^28 samples)", path, (unsigned)width,
-                         (unsigned)height);
+    if (width < 1 || height < 1 || width > max_samples || height > max_samples ||
+        width * height > max_samples)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: image of %u x %u pixels (wanted 1 x 1 to 2^28 samples)",
+                         path, (unsigned)width, (unsigned)height);
     return GBT_OK;
 }
 
@@ -157,19 +168,25 @@ gbt_status check_spec(const char *path, const char *plugin, opened_image *o, gbt
     if (spec.deep)
         return base_fail(err, GBT_ERR_FORMAT, "%s: deep EXR is not supported (wanted one flat part)", path);
     if (std::strcmp(plugin, "openexr") == 0 && spec.get_int_attribute("oiio:subimages", 1) > 1)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: multi-part EXR is not supported (wanted one part, got %d)", path,
-                         spec.get_int_attribute("oiio:subimages", 1));
+        return base_fail(err, GBT_ERR_FORMAT, "%s: multi-part EXR is not supported (wanted one part, got %d)",
+                         path, spec.get_int_attribute("oiio:subimages", 1));
     if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.nchannels < 1)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: image of %d x %d x %d pixels and %d channels (wanted at least 1 x 1 x 1 and 1)", path,
-                         spec.width, spec.height, spec.depth, spec.nchannels);
-    /* Every product stays below 2^62 because each factor is a positive int and the first two are checked before the third. */
-    const int64_t pixels = int64_t(spec.width) * spec.height, tile = int64_t(spec.tile_width) * spec.tile_height;
-    if (pixels > max_samples || pixels * spec.nchannels > max_samples || tile > max_samples || tile * spec.nchannels > max_samples)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: image of %d x %d pixels and %d channels (wanted at most 2^28 samples)", path, spec.width,
-                         spec.height, spec.nchannels);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: image of %d x %d x %d pixels and %d channels (wanted at least 1 x 1 x 1 and 1)",
+                         path, spec.width, spec.height, spec.depth, spec.nchannels);
+    /* Every product stays below 2^62 because each factor is a positive int and the first two are checked
+       before the third. */
+    const int64_t pixels = int64_t(spec.width) * spec.height,
+                  tile = int64_t(spec.tile_width) * spec.tile_height;
+    if (pixels > max_samples || pixels * spec.nchannels > max_samples || tile > max_samples ||
+        tile * spec.nchannels > max_samples)
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: image of %d x %d pixels and %d channels (wanted at most 2^28 samples)", path,
+                         spec.width, spec.height, spec.nchannels);
     o->is_grey = spec.nchannels == 1 || (spec.nchannels == 2 && spec.alpha_channel == 1);
     if (!o->is_grey && spec.nchannels == 2)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: image has channels \"%s\" and \"%s\" (wanted grey, RGB or RGBA)", path,
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: image has channels \"%s\" and \"%s\" (wanted grey, RGB or RGBA)", path,
                          spec.channel_name(0).c_str(), spec.channel_name(1).c_str());
     /* An EXR may go on with depth, normals and the like: they come after RGB and are left. */
     o->stored_channels = o->is_grey ? spec.nchannels : spec.nchannels > 3 && spec.alpha_channel == 3 ? 4 : 3;
@@ -207,21 +224,25 @@ gbt_status open_image(const char *path, bool whole, opened_image *o, gbt_error *
     }
     o->input = OIIO::ImageInput::create(plugin);
     if (!o->input)
-        return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO has no %s reader: %s", path, plugin, reason_of(nullptr).c_str());
+        return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO has no %s reader: %s", path, plugin,
+                         reason_of(nullptr).c_str());
     OIIO::ImageSpec config, spec;
     config.attribute("oiio:UnassociatedAlpha", 1); /* colours as stored, not multiplied by alpha */
     if (whole) {
         o->proxy = std::make_unique<OIIO::Filesystem::IOMemReader>(o->file.bytes, o->file.count);
         if (!o->input->set_ioproxy(o->proxy.get()))
-            return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO's %s reader cannot read from memory", path, plugin);
+            return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO's %s reader cannot read from memory",
+                             path, plugin);
     }
     if (!o->input->open(path, spec, config))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: cannot be read as %s: %s", path, plugin, reason_of(o->input.get()).c_str());
+        return base_fail(err, GBT_ERR_FORMAT, "%s: cannot be read as %s: %s", path, plugin,
+                         reason_of(o->input.get()).c_str());
     return check_spec(path, plugin, o, err);
 }
 
-/* Division, not multiplication by a rounded 1/255, so that a stored level is the float nearest to level/255. */
-template<typename level> std::vector<float> level_table()
+/* Division, not multiplication by a rounded 1/255, so that a stored level is the float nearest to
+   level/255. */
+template <typename level> std::vector<float> level_table()
 {
     const size_t count = size_t(level(-1)) + 1;
     std::vector<float> table(count);
@@ -231,7 +252,7 @@ template<typename level> std::vector<float> level_table()
 }
 
 /* Grey becomes three equal channels. */
-template<typename sample, typename convert>
+template <typename sample, typename convert>
 void expand(const sample *in, const opened_image &o, size_t pixels, float *out, convert to_float)
 {
     const size_t stored = size_t(o.stored_channels), wanted = size_t(o.channels());
@@ -247,15 +268,17 @@ void expand(const sample *in, const opened_image &o, size_t pixels, float *out, 
     }
 }
 
-template<typename sample, typename convert>
-gbt_status read_samples(const char *path, opened_image *o, OIIO::TypeDesc type, image *out, convert to_float, gbt_error *err)
+template <typename sample, typename convert>
+gbt_status read_samples(const char *path, opened_image *o, OIIO::TypeDesc type, image *out, convert to_float,
+                        gbt_error *err)
 {
     const size_t pixels = size_t(out->width) * size_t(out->height);
     std::vector<sample> samples(pixels * size_t(o->stored_channels));
     const bool done = o->input->read_image(0, 0, 0, o->stored_channels, type, samples.data());
     /* A truncated JPEG is "read" with grey in the missing part; only the error text tells. */
     if (!done || o->input->has_error())
-        return base_fail(err, GBT_ERR_FORMAT, "%s: damaged or truncated: %s", path, reason_of(o->input.get()).c_str());
+        return base_fail(err, GBT_ERR_FORMAT, "%s: damaged or truncated: %s", path,
+                         reason_of(o->input.get()).c_str());
     expand(samples.data(), *o, pixels, out->pixels, to_float);
     return GBT_OK;
 }
@@ -280,7 +303,8 @@ gbt_status drop_not_finite(const char *path, image *out, unsigned char **valid, 
         bad++;
     }
     if (bad > 0)
-        log_warn("%s: %zu values that are not finite %s", path, bad, valid != nullptr ? "count in no loss" : "were read as 0");
+        log_warn("%s: %zu values that are not finite %s", path, bad,
+                 valid != nullptr ? "count in no loss" : "were read as 0");
     return GBT_OK;
 }
 
@@ -293,15 +317,19 @@ gbt_status read_pixels(const char *path, opened_image *o, image *out, unsigned c
     switch (spec.format.basetype) {
     case OIIO::TypeDesc::UINT8: {
         static const std::vector<float> table = level_table<uint8_t>();
-        return read_samples<uint8_t>(path, o, OIIO::TypeUInt8, out, [](uint8_t v) { return table[v]; }, err);
+        return read_samples<uint8_t>(
+            path, o, OIIO::TypeUInt8, out, [](uint8_t v) { return table[v]; }, err);
     }
     case OIIO::TypeDesc::UINT16: {
         static const std::vector<float> table = level_table<uint16_t>();
-        return read_samples<uint16_t>(path, o, OIIO::TypeUInt16, out, [](uint16_t v) { return table[v]; }, err);
+        return read_samples<uint16_t>(
+            path, o, OIIO::TypeUInt16, out, [](uint16_t v) { return table[v]; }, err);
     }
-    default: break;
+    default:
+        break;
     }
-    status = read_samples<float>(path, o, OIIO::TypeFloat, out, [](float v) { return v; }, err);
+    status = read_samples<float>(
+        path, o, OIIO::TypeFloat, out, [](float v) { return v; }, err);
     return status == GBT_OK ? drop_not_finite(path, out, valid, err) : status;
 }
 
@@ -312,15 +340,19 @@ gbt_status read_raw(const char *path, opened_image *o, image *out, image_names *
     for (const OIIO::TypeDesc &type : spec.channelformats)
         is_float = is_float && type == OIIO::TypeFloat;
     if (!is_float || std::strcmp(o->input->format_name(), "openexr") != 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: %s with samples of type %s (wanted an EXR of 32-bit floats)", path,
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: %s with samples of type %s (wanted an EXR of 32-bit floats)", path,
                          o->input->format_name(), spec.format.c_str());
     if (spec.nchannels > IMAGE_RAW_CHANNELS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: %d channels (wanted at most %d)", path, spec.nchannels, int(IMAGE_RAW_CHANNELS));
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %d channels (wanted at most %d)", path, spec.nchannels,
+                         int(IMAGE_RAW_CHANNELS));
     for (int c = 0; c < spec.nchannels; c++)
         std::snprintf(names->name[c], sizeof names->name[c], "%s", spec.channel_name(c).c_str());
     gbt_status status = image_alloc(out, spec.width, spec.height, spec.nchannels, err);
-    if (status == GBT_OK && (!o->input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeFloat, out->pixels) || o->input->has_error()))
-        status = base_fail(err, GBT_ERR_FORMAT, "%s: damaged or truncated: %s", path, reason_of(o->input.get()).c_str());
+    if (status == GBT_OK && (!o->input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeFloat, out->pixels) ||
+                             o->input->has_error()))
+        status = base_fail(err, GBT_ERR_FORMAT, "%s: damaged or truncated: %s", path,
+                           reason_of(o->input.get()).c_str());
     return status;
 }
 
@@ -333,22 +365,29 @@ uint8_t to_byte(float value)
 
 gbt_status check_source(const image *im, gbt_error *err)
 {
-    if (im == nullptr || im->pixels == nullptr || im->width < 1 || im->height < 1 || im->channels < 1 || im->channels > 4)
-        return base_fail(err, GBT_ERR_ARGUMENT, "image: nothing that can be encoded (wanted pixels of 1 to 4 channels)");
-    if (int64_t(im->width) * im->height > max_samples || int64_t(im->width) * im->height * im->channels > max_samples)
-        return base_fail(err, GBT_ERR_ARGUMENT, "image: %d x %d x %d (wanted at most 2^28 samples)", im->width, im->height, im->channels);
+    if (im == nullptr || im->pixels == nullptr || im->width < 1 || im->height < 1 || im->channels < 1 ||
+        im->channels > 4)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "image: nothing that can be encoded (wanted pixels of 1 to 4 channels)");
+    if (int64_t(im->width) * im->height > max_samples ||
+        int64_t(im->width) * im->height * im->channels > max_samples)
+        return base_fail(err, GBT_ERR_ARGUMENT, "image: %d x %d x %d (wanted at most 2^28 samples)",
+                         im->width, im->height, im->channels);
     return GBT_OK;
 }
 
-gbt_status encode(const char *plugin, const char *name, const OIIO::ImageSpec &spec, const void *samples, std::vector<unsigned char> *bytes,
-                  gbt_error *err)
+gbt_status encode(const char *plugin, const char *name, const OIIO::ImageSpec &spec, const void *samples,
+                  std::vector<unsigned char> *bytes, gbt_error *err)
 {
     OIIO::Filesystem::IOVecOutput proxy(*bytes);
     const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin);
     if (!output)
-        return base_fail(err, GBT_ERR_INTERNAL, "image: OpenImageIO has no %s writer: %s", plugin, first_line(OIIO::geterror()).c_str());
-    if (!output->set_ioproxy(&proxy) || !output->open(name, spec) || !output->write_image(spec.format, samples) || !output->close())
-        return base_fail(err, GBT_ERR_INTERNAL, "image: %s writer failed: %s", plugin, first_line(output->geterror()).c_str());
+        return base_fail(err, GBT_ERR_INTERNAL, "image: OpenImageIO has no %s writer: %s", plugin,
+                         first_line(OIIO::geterror()).c_str());
+    if (!output->set_ioproxy(&proxy) || !output->open(name, spec) ||
+        !output->write_image(spec.format, samples) || !output->close())
+        return base_fail(err, GBT_ERR_INTERNAL, "image: %s writer failed: %s", plugin,
+                         first_line(output->geterror()).c_str());
     return GBT_OK;
 }
 
@@ -388,7 +427,8 @@ gbt_status encode_jpeg(const image *im, int quality, std::vector<unsigned char> 
     return encode("jpeg", "image.jpg", spec, samples.data(), bytes, err);
 }
 
-gbt_status hand_over(const std::vector<unsigned char> &from, unsigned char **bytes, size_t *byte_count, gbt_error *err)
+gbt_status hand_over(const std::vector<unsigned char> &from, unsigned char **bytes, size_t *byte_count,
+                     gbt_error *err)
 {
     *bytes = static_cast<unsigned char *>(mem_alloc(from.size(), 1, "encoded image", err));
     if (*bytes == nullptr)
@@ -411,7 +451,7 @@ try {
 }
 
 /* `read` makes `out` of the opened file. */
-template<typename reader> gbt_status read_file(const char *path, image *out, gbt_error *err, reader read)
+template <typename reader> gbt_status read_file(const char *path, image *out, gbt_error *err, reader read)
 try {
     std::memset(out, 0, sizeof *out);
     opened_image o;
@@ -435,7 +475,9 @@ try {
     const gbt_status status = open_image(path, false, &o, err);
     if (status != GBT_OK)
         return status;
-    *width = o.input->spec().width, *height = o.input->spec().height, *channels = o.channels();
+    *width = o.input->spec().width;
+    *height = o.input->spec().height;
+    *channels = o.channels();
     return GBT_OK;
 } catch (...) {
     return caught(path, GBT_ERR_FORMAT, err);
@@ -443,13 +485,15 @@ try {
 
 extern "C" gbt_status image_read(const char *path, image *out, gbt_error *err)
 {
-    return read_file(path, out, err, [=](opened_image *o) { return read_pixels(path, o, out, nullptr, err); });
+    return read_file(path, out, err,
+                     [=](opened_image *o) { return read_pixels(path, o, out, nullptr, err); });
 }
 
 extern "C" gbt_status image_read_valid(const char *path, image *out, unsigned char **valid, gbt_error *err)
 {
     *valid = nullptr;
-    const gbt_status status = read_file(path, out, err, [=](opened_image *o) { return read_pixels(path, o, out, valid, err); });
+    const gbt_status status =
+        read_file(path, out, err, [=](opened_image *o) { return read_pixels(path, o, out, valid, err); });
     if (status != GBT_OK) {
         mem_free(*valid);
         *valid = nullptr;
@@ -473,15 +517,18 @@ try {
     else if (OIIO::Strutil::iends_with(path, ".exr"))
         status = encode_exr(im, &bytes, err);
     else
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: cannot write this kind of file (wanted .png or .exr)", path);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: cannot write this kind of file (wanted .png or .exr)",
+                         path);
     return status != GBT_OK ? status : file_write_atomic(path, bytes.data(), bytes.size(), err);
 } catch (...) {
     return caught(path, GBT_ERR_INTERNAL, err);
 }
 
-extern "C" gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte_count, gbt_error *err)
+extern "C" gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte_count,
+                                       gbt_error *err)
 try {
-    *bytes = nullptr, *byte_count = 0;
+    *bytes = nullptr;
+    *byte_count = 0;
     gbt_status status = check_source(im, err);
     std::vector<unsigned char> encoded;
     if (status == GBT_OK)
@@ -491,9 +538,11 @@ try {
     return caught("image", GBT_ERR_INTERNAL, err);
 }
 
-extern "C" gbt_status image_encode_jpeg(const image *im, int quality, unsigned char **bytes, size_t *byte_count, gbt_error *err)
+extern "C" gbt_status image_encode_jpeg(const image *im, int quality, unsigned char **bytes,
+                                        size_t *byte_count, gbt_error *err)
 try {
-    *bytes = nullptr, *byte_count = 0;
+    *bytes = nullptr;
+    *byte_count = 0;
     gbt_status status = check_source(im, err);
     if (status == GBT_OK && (quality < 1 || quality > 100))
         status = base_fail(err, GBT_ERR_ARGUMENT, "image: JPEG quality %d (wanted 1 to 100)", quality);
@@ -509,6 +558,7 @@ extern "C" const char *image_library(void)
 {
     static char text[40];
     const unsigned version = OIIO::openimageio_version();
-    std::snprintf(text, sizeof text, "OpenImageIO %u.%u.%u", version / 10000, version / 100 % 100, version % 100);
+    std::snprintf(text, sizeof text, "OpenImageIO %u.%u.%u", version / 10000, version / 100 % 100,
+                  version % 100);
     return text;
 }

@@ -1,4 +1,6 @@
-/* shim/parallel_pthread.c -- base/parallel.h on plain threads, for the tsan preset: ThreadSanitizer sees every lock of it.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* shim/parallel_pthread.c -- base/parallel.h on plain threads, for the tsan preset: ThreadSanitizer sees
+   every lock of it.
 
    Nested calls run on the calling thread. */
 #include "base/parallel.h"
@@ -62,7 +64,11 @@ static void *work(void *argument)
 
 void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *context)
 {
-    job j = {.count = count, .grain = grain, .blocks = parallel_block_count(count, grain), .body = body, .context = context};
+    job j = {.count = count,
+             .grain = grain,
+             .blocks = parallel_block_count(count, grain),
+             .body = body,
+             .context = context};
     atomic_init(&j.next, 0);
     pthread_t threads[MAX_THREADS];
     int started = 0;
@@ -75,7 +81,4 @@ void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *cont
         pthread_join(threads[i], NULL);
 }
 
-const char *parallel_library(void)
-{
-    return "pthreads";
-}
+const char *parallel_library(void) { return "pthreads"; }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* shim/parallel_tbb.cpp -- base/parallel.h on oneTBB. */
 #include "base/parallel.h"
 
@@ -25,7 +26,8 @@ try {
     if (threads < 1)
         threads = 1;
     limit.reset();
-    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
+    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                  static_cast<size_t>(threads));
     thread_count = threads;
 } catch (...) {
     /* Without a limit TBB uses every processor: slower to share, never wrong. */
@@ -45,8 +47,8 @@ try {
     return 1;
 }
 
-/* The default floating-point environment as long as it lives. Embree switches its workers, which are ours too, to flush denormals to
-   zero: without this the bits would depend on the thread. */
+/* The default floating-point environment as long as it lives. Embree switches its workers, which are ours
+   too, to flush denormals to zero: without this the bits would depend on the thread. */
 class default_float_environment {
     std::fenv_t saved;
 
@@ -74,14 +76,16 @@ try {
             run(block);
         return;
     }
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, blocks, 1),
-                      [&](const tbb::blocked_range<size_t> &range) {
-                          for (size_t block = range.begin(); block != range.end(); block++)
-                              run(block);
-                      },
-                      tbb::simple_partitioner());
+    tbb::parallel_for(
+        tbb::blocked_range<size_t>(0, blocks, 1),
+        [&](const tbb::blocked_range<size_t> &range) {
+            for (size_t block = range.begin(); block != range.end(); block++)
+                run(block);
+        },
+        tbb::simple_partitioner());
 } catch (...) {
-    /* The bodies are C and cannot throw, so only TBB's own start-up can fail, and then there is no way to go on. */
+    /* The bodies are C and cannot throw, so only TBB's own start-up can fail, and then there is no way to go
+       on. */
     std::fputs("error: threads: oneTBB could not start\n", stderr);
     std::abort();
 }

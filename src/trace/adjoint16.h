@@ -1,5 +1,7 @@
-/* trace/adjoint16.h -- the adjoint of a tile: evaluate what was blended again, follow T to the back and the colour to the front, and add
-   every Gaussian's sums to its record. Included by tile_kernel.inc.h. docs/tracing.md has the formulas. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/adjoint16.h -- the adjoint of a tile: evaluate what was blended again, follow T to the back and the
+   colour to the front, and add every Gaussian's sums to its record. Included by tile_kernel.inc.h.
+   docs/tracing.md has the formulas. */
 #ifndef GBT_TRACE_ADJOINT16_H
 #define GBT_TRACE_ADJOINT16_H
 
@@ -10,49 +12,54 @@
 #include "trace/view16.h"
 
 /* What one hit, or the sixteen of a row, add to a Gaussian's record. */
-static inline void gradient_terms(f16 d_alpha, f16 raw, f16 weight, const f16 v_in[3], f16 opacity, f16 alpha_max, const f16 d_rgb[3],
-                                  f16 terms[16])
+static inline void gradient_terms(vfloat16 d_alpha, vfloat16 raw, vfloat16 weight, const vfloat16 v_in[3],
+                                  vfloat16 opacity, vfloat16 alpha_max, const vfloat16 d_rgb[3],
+                                  vfloat16 terms[16])
 {
     /* alpha = min(alpha_max, opacity G): from the cap on nothing but the colour has a gradient. */
-    const f16 zero = f16_set1(0), d_raw = f16_select(f16_lt(raw, alpha_max), d_alpha, zero);
-    const m16 blended = f16_lt(zero, weight);
-    f16 v[3]; /* on rays that did not hit, v may be more than a float holds, and 0 times that is no 0 */
+    const vfloat16 zero = vfloat16_set1(0),
+                   d_raw = vfloat16_select(vfloat16_lt(raw, alpha_max), d_alpha, zero);
+    const vmask16 blended = vfloat16_lt(zero, weight);
+    vfloat16 v[3]; /* on rays that did not hit, v may be more than a float holds, and 0 times that is no 0 */
     for (int k = 0; k < 3; k++)
-        v[k] = f16_select(blended, v_in[k], zero);
-    const f16 d_d2 = f16_mul(f16_set1(-0.5f), f16_mul(raw, d_raw));
-    f16 g[3];
-    for (int k = 0; k < 3; k++)
-        terms[GRADIENT_V + k] = g[k] = f16_mul(d_d2, v[k]), terms[GRADIENT_VV + k] = f16_mul(g[k], v[k]);
-    terms[GRADIENT_VV + 3] = f16_mul(g[1], v[2]), terms[GRADIENT_VV + 4] = f16_mul(g[2], v[0]),
-        terms[GRADIENT_VV + 5] = f16_mul(g[0], v[1]);
-    terms[GRADIENT_OPACITY] = f16_div(f16_mul(raw, d_raw), opacity);
+        v[k] = vfloat16_select(blended, v_in[k], zero);
+    const vfloat16 d_d2 = vfloat16_mul(vfloat16_set1(-0.5f), vfloat16_mul(raw, d_raw));
+    vfloat16 g[3];
+    for (int k = 0; k < 3; k++) {
+        terms[GRADIENT_V + k] = g[k] = vfloat16_mul(d_d2, v[k]);
+        terms[GRADIENT_VV + k] = vfloat16_mul(g[k], v[k]);
+    }
+    terms[GRADIENT_VV + 3] = vfloat16_mul(g[1], v[2]), terms[GRADIENT_VV + 4] = vfloat16_mul(g[2], v[0]),
+                        terms[GRADIENT_VV + 5] = vfloat16_mul(g[0], v[1]);
+    terms[GRADIENT_OPACITY] = vfloat16_div(vfloat16_mul(raw, d_raw), opacity);
     for (int c = 0; c < 3; c++)
-        terms[GRADIENT_COLOR + c] = f16_mul(weight, d_rgb[c]);
+        terms[GRADIENT_COLOR + c] = vfloat16_mul(weight, d_rgb[c]);
     terms[GRADIENT_WEIGHT] = weight;
     terms[14] = terms[15] = zero;
 }
 
 /* terms[k] lane i, i < count and 16, is added to sum k of the record of entry i. */
-static bool add_turned(const tape_entry *entry, int count, const f16 terms[16], gradient_list *out)
+static bool add_turned(const tape_entry *entry, int count, const vfloat16 terms[16], gradient_list *out)
 {
     _Alignas(64) float field[16][16], sums[16];
     const float *rows[16];
-    f16 of_entry[16];
+    vfloat16 of_entry[16];
     for (int k = 0; k < 16; k++)
-        f16_store(field[k], terms[k]), rows[k] = field[k];
-    f16_load_turned(rows, of_entry);
+        vfloat16_store(field[k], terms[k]), rows[k] = field[k];
+    vfloat16_load_turned(rows, of_entry);
     for (int i = 0; i < 16 && i < count; i++) {
         gradient_record *g = gradient_list_find(out, entry[i].id);
         if (g == NULL)
             return false;
-        f16_store(sums, of_entry[i]);
+        vfloat16_store(sums, of_entry[i]);
         for (int k = 0; k < GRADIENT_FLOATS; k++)
             g->sum[k] += sums[k];
     }
     return true;
 }
 
-/* Rows of the adjoint, PACKET_LANES floats each: as evaluated, then in order. Groups: the rows' Gaussians, sixteen by sixteen. */
+/* Rows of the adjoint, PACKET_LANES floats each: as evaluated, then in order. Groups: the rows' Gaussians,
+   sixteen by sixteen. */
 enum { FIELD_T, FIELD_CLEAR, FIELD_RAW, FIELD_V, FIELD_COLOR = FIELD_V + 3, FIELD_WEIGHT, FIELD_COUNT };
 
 typedef struct adjoint_group {
@@ -73,26 +80,27 @@ typedef struct adjoint_rows {
 static bool reserve_rows(int count, kernel_scratch *scratch, adjoint_rows *out)
 {
     const size_t n = ((size_t)count + 16 + ROW_BLOCK) & ~(size_t)15, wide = n * PACKET_LANES,
-        groups = n / 16 * (sizeof(adjoint_group) / sizeof(float));
-    if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, (FIELD_COUNT + 5) * wide + 5 * n + groups, sizeof(float),
-                    "adjoint rows", NULL) !=
-        GBT_OK)
+                 groups = n / 16 * (sizeof(adjoint_group) / sizeof(float));
+    if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0,
+                    (FIELD_COUNT + 5) * wide + 5 * n + groups, sizeof(float), "adjoint rows", NULL) != GBT_OK)
         return false;
     float *at = scratch->rows;
-    out->group = (adjoint_group *)(void *)at, at += groups;
+    out->group = (adjoint_group *)(void *)at;
+    at += groups;
     for (int f = 0; f < FIELD_COUNT; f++, at += wide)
         out->field[f] = at;
     out->term = at, out->after = at + wide, out->sorted.t = at + 2 * wide, out->sorted.clear = at + 3 * wide,
-        out->sorted.before = at + 4 * wide;
+    out->sorted.before = at + 4 * wide;
     at += 5 * wide;
-    out->sorted.near = at, out->sorted.far_reached = at + n, out->row_near = at + 2 * n, out->row_far = at + 3 * n,
-        out->row = (uint32_t *)(void *)(at + 4 * n);
+    out->sorted.near = at, out->sorted.far_reached = at + n, out->row_near = at + 2 * n,
+    out->row_far = at + 3 * n, out->row = (uint32_t *)(void *)(at + 4 * n);
     out->sorted.count = count;
     return true;
 }
 
 /* Those of entries first .. first + 15; the last one is repeated behind the end. */
-static inline gaussian_lanes entry_gaussians(const kernel_scene *scene, const tape_entry *entry, int first, int count, f16 *color)
+static inline gaussian_lanes entry_gaussians(const kernel_scene *scene, const tape_entry *entry, int first,
+                                             int count, vfloat16 *color)
 {
     uint32_t id[16];
     for (int i = 0; i < 16; i++)
@@ -101,30 +109,34 @@ static inline gaussian_lanes entry_gaussians(const kernel_scene *scene, const ta
 }
 
 /* The Gaussians of all rows as seen from the tile's common origin. */
-static void view_rows(const kernel_scene *scene, const tile_beam *beam, const tape_entry *entry, adjoint_rows *o)
+static void view_rows(const kernel_scene *scene, const tile_beam *beam, const tape_entry *entry,
+                      adjoint_rows *o)
 {
     for (int first = 0; first < o->sorted.count; first += 16) {
         adjoint_group *group = &o->group[first / 16];
         view_axes axes;
         const gaussian_lanes g = entry_gaussians(scene, entry, first, o->sorted.count, NULL);
-        const m16 sound = view_gaussians_from(scene, &g, beam, &group->view, &axes);
+        const vmask16 sound = view_gaussians_from(scene, &g, beam, &group->view, &axes);
         /* Beside the camera the slopes of the mean run away. */
-        const f16 wide = f16_set1(8), a = f16_load(group->view.field[VIEW_A]), b = f16_load(group->view.field[VIEW_B]);
-        const m16 ahead = m16_and(f16_lt(f16_set1(scene->settings.t_near), f16_load(group->view.field[VIEW_DEPTH])),
-                                  f16_lt(f16_fma(a, a, f16_mul(b, b)), wide));
-        group->in_view = m16_bits(m16_and(sound, ahead));
+        const vfloat16 wide = vfloat16_set1(8), a = vfloat16_load(group->view.field[VIEW_A]),
+                       b = vfloat16_load(group->view.field[VIEW_B]);
+        const vmask16 ahead = vmask16_and(
+            vfloat16_lt(vfloat16_set1(scene->settings.t_near), vfloat16_load(group->view.field[VIEW_DEPTH])),
+            vfloat16_lt(vfloat16_fma(a, a, vfloat16_mul(b, b)), wide));
+        group->in_view = vmask16_bits(vmask16_and(sound, ahead));
         for (int k = 0; k < 9; k++)
-            f16_store(group->axes[k], axes.e[k / 3][k % 3]);
-        f16_store(group->distance, axes.distance);
+            vfloat16_store(group->axes[k], axes.e[k / 3][k % 3]);
+        vfloat16_store(group->distance, axes.distance);
     }
 }
 
 /* Evaluate the rows again; `beam` is NULL when there is no common origin. */
-static void replay_rows(const kernel_scene *scene, const packet_rays *rays, const tile_beam *beam, const tape_entry *entry,
-                        const f16 d_rgb[3], adjoint_rows *o)
+static void replay_rows(const kernel_scene *scene, const packet_rays *rays, const tile_beam *beam,
+                        const tape_entry *entry, const vfloat16 d_rgb[3], adjoint_rows *o)
 {
-    const f16 t_near = f16_set1(scene->settings.t_near), alpha_max = f16_set1(scene->settings.alpha_max);
-    const f16 infinite = f16_set1(INFINITY), one = f16_set1(1), zero = f16_set1(0);
+    const vfloat16 t_near = vfloat16_set1(scene->settings.t_near),
+                   alpha_max = vfloat16_set1(scene->settings.alpha_max);
+    const vfloat16 infinite = vfloat16_set1(INFINITY), one = vfloat16_set1(1), zero = vfloat16_set1(0);
     view_rays seen;
     if (beam != NULL) {
         seen = see_rays(rays, beam);
@@ -132,16 +144,21 @@ static void replay_rows(const kernel_scene *scene, const packet_rays *rays, cons
     }
     for (int i = 0; i < o->sorted.count; i++) {
         const float *record = scene->records + (size_t)entry[i].id * RECORD_FLOATS;
-        const m16 blended = m16_from_bits(entry[i].lanes);
+        const vmask16 blended = vmask16_from_bits(entry[i].lanes);
         adjoint_group *group = &o->group[i / 16];
-        f16 t, raw, v[3];
+        vfloat16 t, raw, v[3];
         bool done = false;
         if (beam != NULL && (group->in_view >> i % 16 & 1) != 0) {
             const view_response r = view_respond(&group->view, i % 16, &seen);
-            const f16 stretch = f16_mul(f16_set1(group->distance[i % 16]), r.inverse), along = f16_mul(stretch, r.w1);
-            t = r.t, raw = view_alpha(&group->view, i % 16, r.exponent);
-            v[0] = f16_sub(zero, f16_mul(stretch, r.y)), v[1] = f16_mul(along, r.w2), v[2] = f16_mul(along, r.w3);
-            done = !m16_any(m16_and(blended, f16_le(t, t_near))); /* cut at the near depth: not for this form */
+            const vfloat16 stretch = vfloat16_mul(vfloat16_set1(group->distance[i % 16]), r.inverse),
+                           along = vfloat16_mul(stretch, r.w1);
+            t = r.t;
+            raw = view_alpha(&group->view, i % 16, r.exponent);
+            v[0] = vfloat16_sub(zero, vfloat16_mul(stretch, r.y));
+            v[1] = vfloat16_mul(along, r.w2);
+            v[2] = vfloat16_mul(along, r.w3);
+            done = !vmask16_any(vmask16_and(blended, vfloat16_le(t, t_near))); /* cut at the near depth: not
+                                                                                  for this form */
         }
         if (!done) {
             ray_lanes ray;
@@ -149,13 +166,15 @@ static void replay_rows(const kernel_scene *scene, const packet_rays *rays, cons
             const gaussian_lanes g = spread_gaussian(record);
             response r = respond(&g, &ray, t_near);
             refine_point(&g, &ray, t_near, &r);
-            t = r.t, raw = response_alpha(&g, r.d2);
+            t = r.t;
+            raw = response_alpha(&g, r.d2);
             memcpy(v, r.v, sizeof v);
             for (int k = 0; k < 9; k++)
                 group->axes[k][i % 16] = k % 4 == 0;
         }
-        row_store(o->field[FIELD_T], i, f16_select(blended, t, infinite));
-        row_store(o->field[FIELD_CLEAR], i, f16_select(blended, f16_sub(one, f16_min(raw, alpha_max)), one));
+        row_store(o->field[FIELD_T], i, vfloat16_select(blended, t, infinite));
+        row_store(o->field[FIELD_CLEAR], i,
+                  vfloat16_select(blended, vfloat16_sub(one, vfloat16_min(raw, alpha_max)), one));
         row_store(o->field[FIELD_RAW], i, raw);
         for (int k = 0; k < 3; k++)
             row_store(o->field[FIELD_V + k], i, v[k]);
@@ -165,112 +184,129 @@ static void replay_rows(const kernel_scene *scene, const packet_rays *rays, cons
 }
 
 /* By (nearest depth, index); the tape is nearly in that order. */
-static f16 sort_rows(const tape_entry *entry, adjoint_rows *o)
+static vfloat16 sort_rows(const tape_entry *entry, adjoint_rows *o)
 {
     sorted_rows *s = &o->sorted;
     for (int i = 0; i < s->count; i++) {
         int j = i;
         for (; j > 0; j--) {
             const uint32_t other = o->row[j - 1];
-            if (o->row_near[i] > o->row_near[other] || (o->row_near[i] == o->row_near[other] && entry[i].id > entry[other].id))
+            if (o->row_near[i] > o->row_near[other] ||
+                (o->row_near[i] == o->row_near[other] && entry[i].id > entry[other].id))
                 break;
             o->row[j] = other;
         }
         o->row[j] = (uint32_t)i;
     }
-    f16 product = f16_set1(1);
+    vfloat16 product = vfloat16_set1(1);
     float reached = 0;
     for (int i = 0; i < s->count; i++) {
         const int row = (int)o->row[i];
-        place_row(s, i, row_load(o->field[FIELD_T], row), row_load(o->field[FIELD_CLEAR], row), o->row_near[row], o->row_far[row], &product,
-                  &reached);
+        place_row(s, i, row_load(o->field[FIELD_T], row), row_load(o->field[FIELD_CLEAR], row),
+                  o->row_near[row], o->row_far[row], &product, &reached);
     }
     end_rows(s);
     return product;
 }
 
-/* Turn the sums of sixteen rows from the axes in which they were made into each Gaussian's own, and add them to its record. */
+/* Turn the sums of sixteen rows from the axes in which they were made into each Gaussian's own, and add them
+   to its record. */
 static bool add_rows(const tape_entry *entry, const adjoint_rows *o, int first, gradient_list *out)
 {
     const adjoint_group *group = &o->group[first / 16];
     const float *rows[16];
-    f16 sum[16], turned[16], e[3][3], half[3][3];
+    vfloat16 sum[16], turned[16], e[3][3], half[3][3];
     for (int i = 0; i < 16; i++)
-        rows[i] = o->field[FIELD_RAW] + (size_t)(first + (first + i < o->sorted.count ? i : 0)) * PACKET_LANES;
-    f16_load_turned(rows, sum);
+        rows[i] =
+            o->field[FIELD_RAW] + (size_t)(first + (first + i < o->sorted.count ? i : 0)) * PACKET_LANES;
+    vfloat16_load_turned(rows, sum);
     for (int k = 0; k < 9; k++)
-        e[k / 3][k % 3] = f16_load(group->axes[k]);
-    const f16 *vv = sum + GRADIENT_VV; /* xx yy zz yz zx xy */
+        e[k / 3][k % 3] = vfloat16_load(group->axes[k]);
+    const vfloat16 *vv = sum + GRADIENT_VV; /* xx yy zz yz zx xy */
     static const int at[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
     for (int k = 0; k < 3; k++)
         for (int j = 0; j < 3; j++)
-            half[k][j] = f16_fma(vv[at[k][2]], e[2][j], f16_fma(vv[at[k][1]], e[1][j], f16_mul(vv[at[k][0]], e[0][j])));
+            half[k][j] =
+                vfloat16_fma(vv[at[k][2]], e[2][j],
+                             vfloat16_fma(vv[at[k][1]], e[1][j], vfloat16_mul(vv[at[k][0]], e[0][j])));
     for (int i = 0; i < 3; i++)
         for (int j = i; j < 3; j++)
-            turned[GRADIENT_VV + at[i][j]] = f16_fma(e[2][i], half[2][j], f16_fma(e[1][i], half[1][j], f16_mul(e[0][i], half[0][j])));
+            turned[GRADIENT_VV + at[i][j]] = vfloat16_fma(
+                e[2][i], half[2][j], vfloat16_fma(e[1][i], half[1][j], vfloat16_mul(e[0][i], half[0][j])));
     for (int i = 0; i < 3; i++)
-        turned[GRADIENT_V + i] = f16_fma(e[2][i], sum[2], f16_fma(e[1][i], sum[1], f16_mul(e[0][i], sum[0])));
+        turned[GRADIENT_V + i] =
+            vfloat16_fma(e[2][i], sum[2], vfloat16_fma(e[1][i], sum[1], vfloat16_mul(e[0][i], sum[0])));
     for (int k = GRADIENT_OPACITY; k < 16; k++)
         turned[k] = sum[k];
     return add_turned(entry + first, o->sorted.count - first, turned, out);
 }
 
 /*   dL/dalpha_i = T_i c_i.g - (sum of w_j c_j.g behind i, with the background) / (1 - alpha_i)   */
-static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, const tile_beam *beam, const float d_rgb_in[3][PACKET_LANES],
-                           const tape_entry *entry, int count, gradient_list *out, float d_background[3], kernel_scratch *scratch)
+static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, const tile_beam *beam,
+                           const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
+                           gradient_list *out, float d_background[3], kernel_scratch *scratch)
 {
     adjoint_rows o;
     if (!reserve_rows(count, scratch, &o))
         return false;
-    const f16 alpha_max = f16_set1(scene->settings.alpha_max), infinite = f16_set1(INFINITY), zero = f16_set1(0);
-    f16 d_rgb[3];
+    const vfloat16 alpha_max = vfloat16_set1(scene->settings.alpha_max), infinite = vfloat16_set1(INFINITY),
+                   zero = vfloat16_set1(0);
+    vfloat16 d_rgb[3];
     for (int c = 0; c < 3; c++)
-        d_rgb[c] = f16_load(d_rgb_in[c]);
+        d_rgb[c] = vfloat16_load(d_rgb_in[c]);
     replay_rows(scene, rays, beam, entry, d_rgb, &o);
-    const f16 transmittance = sort_rows(entry, &o);
+    const vfloat16 transmittance = sort_rows(entry, &o);
     row_window window = {0};
     for (int first = 0; first < count; first += ROW_BLOCK) {
-        f16 T[ROW_BLOCK];
+        vfloat16 T[ROW_BLOCK];
         move_window(&o.sorted, first, &window);
         window_transmittance(&o.sorted, first, &window, T);
         for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
             const int row = (int)o.row[first + k];
-            const m16 blended = f16_lt(row_load(o.sorted.t, first + k), infinite);
-            const f16 weight = f16_mul(T[k], f16_select(blended, f16_min(row_load(o.field[FIELD_RAW], row), alpha_max), zero));
-            const f16 color = row_load(o.field[FIELD_COLOR], row);
+            const vmask16 blended = vfloat16_lt(row_load(o.sorted.t, first + k), infinite);
+            const vfloat16 weight = vfloat16_mul(
+                T[k],
+                vfloat16_select(blended, vfloat16_min(row_load(o.field[FIELD_RAW], row), alpha_max), zero));
+            const vfloat16 color = row_load(o.field[FIELD_COLOR], row);
             row_store(o.field[FIELD_WEIGHT], row, weight);
-            row_store(o.field[FIELD_COLOR], row, f16_mul(T[k], color));
-            row_store(o.term, first + k, f16_mul(weight, color));
+            row_store(o.field[FIELD_COLOR], row, vfloat16_mul(T[k], color));
+            row_store(o.term, first + k, vfloat16_mul(weight, color));
         }
     }
     for (int i = count; i < count + ROW_BLOCK; i++)
         row_store(o.term, i, zero);
-    f16 behind = f16_mul(dot_lanes(scene->settings.background, d_rgb), transmittance);
+    vfloat16 behind = vfloat16_mul(dot_lanes(scene->settings.background, d_rgb), transmittance);
     row_store(o.after, count, behind);
     for (int i = count; i-- > 0;)
-        row_store(o.after, i, behind = f16_add(behind, row_load(o.term, i)));
+        row_store(o.after, i, behind = vfloat16_add(behind, row_load(o.term, i)));
     window = (row_window){0};
     for (int first = 0; first < count; first += ROW_BLOCK) {
-        f16 sum[ROW_BLOCK];
+        vfloat16 sum[ROW_BLOCK];
         move_window(&o.sorted, first, &window);
         window_behind(&o.sorted, first, &window, o.term, o.after, sum);
         for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
             const int row = (int)o.row[first + k];
-            const m16 blended = f16_lt(row_load(o.sorted.t, first + k), infinite);
-            const f16 d_alpha = f16_select(blended, f16_sub(row_load(o.field[FIELD_COLOR], row),
-                                                            f16_div(sum[k], row_load(o.sorted.clear, first + k))), zero);
-            const f16 v[3] = {row_load(o.field[FIELD_V], row), row_load(o.field[FIELD_V + 1], row), row_load(o.field[FIELD_V + 2], row)};
-            f16 terms[16];
-            gradient_terms(d_alpha, row_load(o.field[FIELD_RAW], row), row_load(o.field[FIELD_WEIGHT], row), v,
-                           f16_set1(scene->records[(size_t)entry[row].id * RECORD_FLOATS + RECORD_OPACITY]), alpha_max, d_rgb, terms);
-            row_store(o.field[FIELD_RAW], row, f16_sum_rows(terms)); /* its place is free now */
+            const vmask16 blended = vfloat16_lt(row_load(o.sorted.t, first + k), infinite);
+            const vfloat16 d_alpha =
+                vfloat16_select(blended,
+                                vfloat16_sub(row_load(o.field[FIELD_COLOR], row),
+                                             vfloat16_div(sum[k], row_load(o.sorted.clear, first + k))),
+                                zero);
+            const vfloat16 v[3] = {row_load(o.field[FIELD_V], row), row_load(o.field[FIELD_V + 1], row),
+                                   row_load(o.field[FIELD_V + 2], row)};
+            vfloat16 terms[16];
+            gradient_terms(
+                d_alpha, row_load(o.field[FIELD_RAW], row), row_load(o.field[FIELD_WEIGHT], row), v,
+                vfloat16_set1(scene->records[(size_t)entry[row].id * RECORD_FLOATS + RECORD_OPACITY]),
+                alpha_max, d_rgb, terms);
+            row_store(o.field[FIELD_RAW], row, vfloat16_sum_rows(terms)); /* its place is free now */
         }
     }
     for (int first = 0; first < count; first += 16)
         if (!add_rows(entry, &o, first, out))
             return false;
     _Alignas(64) float t[PACKET_LANES];
-    f16_store(t, transmittance);
+    vfloat16_store(t, transmittance);
     for (int c = 0; c < 3; c++)
         for (int lane = 0; lane < PACKET_LANES; lane++)
             if (rays->active >> lane & 1)
@@ -279,33 +315,37 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
 }
 
 /* The hits of one ray, in order: no windows, and no division. */
-static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int lane, const float d_rgb_in[3][PACKET_LANES],
-                        const tape_entry *entry, int count, gradient_list *out, float d_background[3], kernel_scratch *scratch)
+static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int lane,
+                        const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
+                        gradient_list *out, float d_background[3], kernel_scratch *scratch)
 {
     enum { RAW, V, COLOR = V + 3, OPACITY, T, D_ALPHA, FIELDS };
     const size_t n = ((size_t)count + 15) & ~(size_t)15;
-    if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, FIELDS * n, sizeof(float), "adjoint of a ray", NULL) != GBT_OK)
+    if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, FIELDS * n, sizeof(float),
+                    "adjoint of a ray", NULL) != GBT_OK)
         return false;
     float *field[FIELDS];
     for (int f = 0; f < FIELDS; f++)
         field[f] = scratch->rows + (size_t)f * n;
-    const f16 t_near = f16_set1(scene->settings.t_near), alpha_max = f16_set1(scene->settings.alpha_max);
+    const vfloat16 t_near = vfloat16_set1(scene->settings.t_near),
+                   alpha_max = vfloat16_set1(scene->settings.alpha_max);
     ray_lanes ray;
-    f16 d_rgb[3];
+    vfloat16 d_rgb[3];
     for (int k = 0; k < 3; k++) {
-        ray.origin[k] = f16_set1(rays->origin[k][lane]), ray.dir[k] = f16_set1(rays->dir[k][lane]);
-        d_rgb[k] = f16_set1(d_rgb_in[k][lane]);
+        ray.origin[k] = vfloat16_set1(rays->origin[k][lane]);
+        ray.dir[k] = vfloat16_set1(rays->dir[k][lane]);
+        d_rgb[k] = vfloat16_set1(d_rgb_in[k][lane]);
     }
     for (int first = 0; first < count; first += 16) {
-        f16 color[3];
+        vfloat16 color[3];
         const gaussian_lanes g = entry_gaussians(scene, entry, first, count, color);
         response r = respond(&g, &ray, t_near);
         refine_point(&g, &ray, t_near, &r);
-        f16_store(field[RAW] + first, response_alpha(&g, r.d2));
+        vfloat16_store(field[RAW] + first, response_alpha(&g, r.d2));
         for (int k = 0; k < 3; k++)
-            f16_store(field[V + k] + first, r.v[k]);
-        f16_store(field[COLOR] + first, dot16(color, d_rgb));
-        f16_store(field[OPACITY] + first, g.opacity);
+            vfloat16_store(field[V + k] + first, r.v[k]);
+        vfloat16_store(field[COLOR] + first, dot16(color, d_rgb));
+        vfloat16_store(field[OPACITY] + first, g.opacity);
     }
     float transmittance = 1;
     for (int i = 0; i < count; i++) {
@@ -323,19 +363,22 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
         behind = fmaf(smaller(field[RAW][i], scene->settings.alpha_max), difference, behind);
     }
     for (int first = 0; first < count; first += 16) {
-        f16 v[3], terms[16];
+        vfloat16 v[3], terms[16];
         for (int k = 0; k < 3; k++)
-            v[k] = f16_load(field[V + k] + first);
-        const f16 raw = f16_load(field[RAW] + first), weight = f16_mul(f16_load(field[T] + first), f16_min(raw, alpha_max));
-        gradient_terms(f16_load(field[D_ALPHA] + first), raw, weight, v, f16_load(field[OPACITY] + first), alpha_max, d_rgb, terms);
+            v[k] = vfloat16_load(field[V + k] + first);
+        const vfloat16 raw = vfloat16_load(field[RAW] + first),
+                       weight = vfloat16_mul(vfloat16_load(field[T] + first), vfloat16_min(raw, alpha_max));
+        gradient_terms(vfloat16_load(field[D_ALPHA] + first), raw, weight, v,
+                       vfloat16_load(field[OPACITY] + first), alpha_max, d_rgb, terms);
         if (!add_turned(entry + first, count - first, terms, out))
             return false;
     }
     return true;
 }
 
-static bool backward(const kernel_scene *scene, const tile_rays *tile, float d_rgb[TILE_PACKETS][3][PACKET_LANES], const tape_entry *entry,
-                     gradient_list *out, float d_background[3], kernel_scratch *scratch)
+static bool backward(const kernel_scene *scene, const tile_rays *tile,
+                     float d_rgb[TILE_PACKETS][3][PACKET_LANES], const tape_entry *entry, gradient_list *out,
+                     float d_background[3], kernel_scratch *scratch)
 {
     const packet_rays *rays = tile->packet;
     size_t count = 0, of_packet[TILE_PACKETS] = {0};
@@ -345,7 +388,8 @@ static bool backward(const kernel_scene *scene, const tile_rays *tile, float d_r
             singles |= 1u << (entry[count].packet & ~TAPE_SINGLE);
         else
             of_packet[entry[count].packet]++;
-    if (mem_reserve(&scratch->hits, &scratch->hit_bytes, 0, count * sizeof(tape_entry), 1, "adjoint entries", NULL) != GBT_OK)
+    if (mem_reserve(&scratch->hits, &scratch->hit_bytes, 0, count * sizeof(tape_entry), 1, "adjoint entries",
+                    NULL) != GBT_OK)
         return false;
     tape_entry *sorted = scratch->hits, *at[TILE_PACKETS];
     for (int p = 0; p < TILE_PACKETS; p++)
@@ -358,12 +402,14 @@ static bool backward(const kernel_scene *scene, const tile_rays *tile, float d_r
     const tape_entry *next = entry, *end = entry + count;
     for (int p = 0; p < TILE_PACKETS; p++) {
         if ((singles >> p & 1) == 0) {
-            if (rays[p].active != 0 && !packet_adjoint(scene, &rays[p], seen ? &beam : NULL, d_rgb[p], at[p] - of_packet[p],
-                                                       (int)of_packet[p], out, d_background, scratch))
+            if (rays[p].active != 0 &&
+                !packet_adjoint(scene, &rays[p], seen ? &beam : NULL, d_rgb[p], at[p] - of_packet[p],
+                                (int)of_packet[p], out, d_background, scratch))
                 return false;
             continue;
         }
-        /* Rows that the packet blended before it was given up are not its own any more. The rays' entries come in order. */
+        /* Rows that the packet blended before it was given up are not its own any more. The rays' entries
+           come in order. */
         for (unsigned bits = rays[p].active; bits != 0; bits &= bits - 1) {
             const int lane = __builtin_ctz(bits);
             while (next < end && (next->packet & TAPE_SINGLE) == 0)
@@ -371,7 +417,8 @@ static bool backward(const kernel_scene *scene, const tile_rays *tile, float d_r
             const tape_entry *first = next;
             while (next < end && next->packet == (p | TAPE_SINGLE) && next->lanes == lane)
                 next++;
-            if (!ray_adjoint(scene, &rays[p], lane, d_rgb[p], first, (int)(next - first), out, d_background, scratch))
+            if (!ray_adjoint(scene, &rays[p], lane, d_rgb[p], first, (int)(next - first), out, d_background,
+                             scratch))
                 return false;
         }
     }

@@ -1,5 +1,6 @@
-/* trace/embree16.h -- packets under Embree's own traversal: every box that is crossed, evaluated, then sorted ray by ray. The baseline
-   that the tile kernel is measured against. Included by tile_kernel.inc.h. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/embree16.h -- packets under Embree's own traversal: every box that is crossed, evaluated, then sorted
+   ray by ray. The baseline that the tile kernel is measured against. Included by tile_kernel.inc.h. */
 #ifndef GBT_TRACE_EMBREE16_H
 #define GBT_TRACE_EMBREE16_H
 
@@ -11,7 +12,7 @@ _Static_assert((int)SCENE_LANES == (int)PACKET_LANES, "a packet is what Embree t
 typedef struct embree_visit {
     const kernel_scene *scene;
     const ray_lanes *ray;
-    f16 far;
+    vfloat16 far;
     kernel_scratch *scratch;
     kernel_counters *counters;
     size_t count;
@@ -22,30 +23,34 @@ static void visit_gaussian(uint32_t id, unsigned lanes, void *user)
 {
     embree_visit *v = user;
     const gaussian_lanes g = spread_gaussian(v->scene->records + (size_t)id * RECORD_FLOATS);
-    const response r = respond(&g, v->ray, f16_set1(v->scene->settings.t_near));
-    const f16 raw = response_alpha(&g, r.d2);
-    const m16 hit = m16_and(f16_le(alpha_threshold(v->scene, g.opacity), raw), f16_lt(r.t, v->far));
+    const response r = respond(&g, v->ray, vfloat16_set1(v->scene->settings.t_near));
+    const vfloat16 raw = response_alpha(&g, r.d2);
+    const vmask16 hit =
+        vmask16_and(vfloat16_le(alpha_threshold(v->scene, g.opacity), raw), vfloat16_lt(r.t, v->far));
     _Alignas(64) float t[PACKET_LANES], alpha[PACKET_LANES];
-    f16_store(t, r.t), f16_store(alpha, f16_min(raw, f16_set1(v->scene->settings.alpha_max)));
+    vfloat16_store(t, r.t),
+        vfloat16_store(alpha, vfloat16_min(raw, vfloat16_set1(v->scene->settings.alpha_max)));
     v->counters->tests += (uint64_t)__builtin_popcount(lanes);
     kernel_scratch *s = v->scratch;
-    if (v->failed || mem_reserve((void **)&s->lane_hits, &s->lane_hit_capacity, v->count, v->count + PACKET_LANES, sizeof *s->lane_hits,
-                                 "hits of a packet", NULL) != GBT_OK) {
+    if (v->failed ||
+        mem_reserve((void **)&s->lane_hits, &s->lane_hit_capacity, v->count, v->count + PACKET_LANES,
+                    sizeof *s->lane_hits, "hits of a packet", NULL) != GBT_OK) {
         v->failed = true;
         return;
     }
-    for (unsigned bits = m16_bits(hit) & lanes; bits != 0; bits &= bits - 1) {
+    for (unsigned bits = vmask16_bits(hit) & lanes; bits != 0; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
         s->lane_hits[v->count++] = (struct lane_hit){make_hit(t[lane], alpha[lane], id), (uint32_t)lane};
         v->counters->hits++;
     }
 }
 
-/* The hits, those of lane 0 first; end[lane]: where those of a lane end. In the place of scratch->rows. NULL without memory. */
+/* The hits, those of lane 0 first; end[lane]: where those of a lane end. In the place of scratch->rows. NULL
+   without memory. */
 static ray_hit *by_lane(kernel_scratch *s, size_t count, size_t end[PACKET_LANES])
 {
-    if (mem_reserve((void **)&s->rows, &s->row_capacity, 0, count * (sizeof(ray_hit) / sizeof(float)), sizeof(float), "hits of a packet",
-                    NULL) != GBT_OK)
+    if (mem_reserve((void **)&s->rows, &s->row_capacity, 0, count * (sizeof(ray_hit) / sizeof(float)),
+                    sizeof(float), "hits of a packet", NULL) != GBT_OK)
         return NULL;
     ray_hit *out = (ray_hit *)(void *)s->rows;
     for (size_t i = 0; i < count; i++)
@@ -53,21 +58,28 @@ static ray_hit *by_lane(kernel_scratch *s, size_t count, size_t end[PACKET_LANES
     size_t at = 0;
     for (int lane = 0; lane < PACKET_LANES; lane++) {
         const size_t n = end[lane];
-        end[lane] = at, at += n;
+        end[lane] = at;
+        at += n;
     }
     for (size_t i = 0; i < count; i++)
         out[end[s->lane_hits[i].lane]++] = s->lane_hits[i].hit;
     return out;
 }
 
-static bool embree_packet(const kernel_scene *scene, const packet_rays *rays, unsigned packet, packet_output *out, hit_tape *tape,
-                          kernel_scratch *scratch, kernel_counters *counters)
+static bool embree_packet(const kernel_scene *scene, const packet_rays *rays, unsigned packet,
+                          packet_output *out, hit_tape *tape, kernel_scratch *scratch,
+                          kernel_counters *counters)
 {
     ray_lanes ray;
     load_rays(rays, &ray);
-    embree_visit v = {.scene = scene, .ray = &ray, .far = f16_load(rays->far), .scratch = scratch, .counters = counters};
+    embree_visit v = {.scene = scene,
+                      .ray = &ray,
+                      .far = vfloat16_load(rays->far),
+                      .scratch = scratch,
+                      .counters = counters};
     if (scene->embree != NULL)
-        gaussian_scene_visit(scene->embree, rays->origin, rays->dir, scene->settings.t_near, INFINITY, rays->active, visit_gaussian, &v);
+        gaussian_scene_visit(scene->embree, rays->origin, rays->dir, scene->settings.t_near, INFINITY,
+                             rays->active, visit_gaussian, &v);
     if (v.failed)
         return false;
     size_t end[PACKET_LANES] = {0};

@@ -1,6 +1,9 @@
-/* trace/footprint.c -- widen Gaussians by the footprint of a view's pixels, and back: eight Gaussians at a time, in double.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/footprint.c -- widen Gaussians by the footprint of a view's pixels, and back: eight Gaussians at a
+   time, in double.
 
-   Nothing here branches on a lane: where a quantity does not exist, a divisor is replaced and its result not taken. */
+   Nothing here branches on a lane: where a quantity does not exist, a divisor is replaced and its result not
+   taken. */
 #include "trace/footprint.h"
 
 #include <math.h>
@@ -16,7 +19,8 @@ enum { LANES = 8, WIDEN_BLOCK = 1024 /* a multiple of LANES */ };
 
 typedef double d8 __attribute__((vector_size(LANES * sizeof(double))));
 typedef float f8 __attribute__((vector_size(LANES * sizeof(float))));
-typedef int64_t m8 __attribute__((vector_size(LANES * sizeof(int64_t)))); /* all bits or none, as comparisons give it */
+typedef int64_t m8
+    __attribute__((vector_size(LANES * sizeof(int64_t)))); /* all bits or none, as comparisons give it */
 
 /* Inlined into every clone. */
 #define LANE_CODE static inline __attribute__((always_inline))
@@ -25,8 +29,10 @@ footprint_view footprint_view_of(const gbt_camera *camera)
 {
     footprint_view view = {.kind = FOOTPRINT_ANGULAR};
     camera_lens lens;
-    for (int k = 0; k < 3; k++)
-        view.center[k] = camera->center[k], view.axis[k] = camera->rotation[6 + k];
+    for (int k = 0; k < 3; k++) {
+        view.center[k] = camera->center[k];
+        view.axis[k] = camera->rotation[6 + k];
+    }
     if (!camera_lens_prepare(camera, &lens))
         return view;
     if (camera_lens_looks_forward(&lens))
@@ -36,17 +42,11 @@ footprint_view footprint_view_of(const gbt_camera *camera)
     return view;
 }
 
-/* ---- lanes --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- lanes ---- */
 
-LANE_CODE d8 d8_set(double a)
-{
-    return (d8){a, a, a, a, a, a, a, a};
-}
+LANE_CODE d8 d8_set(double a) { return (d8){a, a, a, a, a, a, a, a}; }
 
-LANE_CODE d8 d8_select(m8 where, d8 yes, d8 no)
-{
-    return (d8)((where & (m8)yes) | (~where & (m8)no));
-}
+LANE_CODE d8 d8_select(m8 where, d8 yes, d8 no) { return (d8)((where & (m8)yes) | (~where & (m8)no)); }
 
 LANE_CODE d8 d8_sqrt(d8 a)
 {
@@ -63,16 +63,13 @@ LANE_CODE d8 d8_over(d8 a, d8 b)
     return d8_select(some, a, d8_set(0)) / d8_select(some, b, d8_set(1));
 }
 
-LANE_CODE d8 d8_dot(const d8 a[3], const d8 b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+LANE_CODE d8 d8_dot(const d8 a[3], const d8 b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 typedef struct gaussian8 {
     d8 mean[3], scale[3], quat[4], opacity;
 } gaussian8;
 
-/* ---- the pixel at a point ------------------------------------------------------------------------------------------------------------ */
+/* ---- the pixel at a point ---- */
 
 /* Towards points: unit directions, and the distances. */
 LANE_CODE d8 look(const footprint_view *view, const d8 point[3], d8 dir[3])
@@ -85,8 +82,9 @@ LANE_CODE d8 look(const footprint_view *view, const d8 point[3], d8 dir[3])
     return distance;
 }
 
-/* Pixel size at distance t in direction `dir`, and its gradient by the point. A perspective pixel at an angle theta from the axis has the
-   solid angle cos^3(theta) / f^2, so p = f^-1 z^(3/2) t^(-1/2) with z = t cos(theta). */
+/* Pixel size at distance t in direction `dir`, and its gradient by the point. A perspective pixel at an angle
+   theta from the axis has the solid angle cos^3(theta) / f^2, so p = f^-1 z^(3/2) t^(-1/2) with z = t
+   cos(theta). */
 LANE_CODE d8 pixel_at(const footprint_view *view, d8 t, const d8 dir[3], d8 d_point[3])
 {
     const d8 pixel = d8_set(view->pixel), none = d8_set(0);
@@ -99,7 +97,8 @@ LANE_CODE d8 pixel_at(const footprint_view *view, d8 t, const d8 dir[3], d8 d_po
             d_point[k] = pixel * dir[k];
         return pixel * t;
     }
-    const d8 axis[3] = {d8_set(view->axis[0]), d8_set(view->axis[1]), d8_set(view->axis[2])}, cosine = d8_dot(dir, axis);
+    const d8 axis[3] = {d8_set(view->axis[0]), d8_set(view->axis[1]), d8_set(view->axis[2])},
+             cosine = d8_dot(dir, axis);
     const d8 ahead = d8_select(cosine > 0, cosine, none), root = d8_sqrt(ahead);
     for (int k = 0; k < 3; k++)
         d_point[k] = pixel * (1.5 * root * axis[k] - 0.5 * root * ahead * dir[k]);
@@ -114,9 +113,10 @@ double footprint_pixel(const footprint_view *view, const double point[3])
     return pixel_at(view, distance, dir, unused)[0];
 }
 
-/* ---- widening ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- widening ---- */
 
-/* The squared area across a direction u (local axes) of an ellipsoid with squared half-axes e: det S^2 |S^-1 u|^2, without a division. */
+/* The squared area across a direction u (local axes) of an ellipsoid with squared half-axes e: det S^2 |S^-1
+   u|^2, without a division. */
 LANE_CODE d8 area_square(const d8 u[3], const d8 e[3])
 {
     return u[0] * u[0] * e[1] * e[2] + u[1] * u[1] * e[0] * e[2] + u[2] * u[2] * e[0] * e[1];
@@ -145,12 +145,19 @@ typedef struct widening {
 LANE_CODE void axes_of(const d8 q[4], d8 axes[3][3])
 {
     const d8 w = q[0], x = q[1], y = q[2], z = q[3];
-    axes[0][0] = 1 - 2 * (y * y + z * z), axes[1][0] = 2 * (x * y - w * z), axes[2][0] = 2 * (x * z + w * y);
-    axes[0][1] = 2 * (x * y + w * z), axes[1][1] = 1 - 2 * (x * x + z * z), axes[2][1] = 2 * (y * z - w * x);
-    axes[0][2] = 2 * (x * z - w * y), axes[1][2] = 2 * (y * z + w * x), axes[2][2] = 1 - 2 * (x * x + y * y);
+    axes[0][0] = 1 - 2 * (y * y + z * z);
+    axes[1][0] = 2 * (x * y - w * z);
+    axes[2][0] = 2 * (x * z + w * y);
+    axes[0][1] = 2 * (x * y + w * z);
+    axes[1][1] = 1 - 2 * (x * x + z * z);
+    axes[2][1] = 2 * (y * z - w * x);
+    axes[0][2] = 2 * (x * z - w * y);
+    axes[1][2] = 2 * (y * z + w * x);
+    axes[2][2] = 1 - 2 * (x * x + y * y);
 }
 
-LANE_CODE void prepare(const footprint_view *view, double variance, d8 pixel_min, const gaussian8 *g, widening *x)
+LANE_CODE void prepare(const footprint_view *view, double variance, d8 pixel_min, const gaussian8 *g,
+                       widening *x)
 {
     axes_of(g->quat, x->axes);
     x->distance = look(view, g->mean, x->dir);
@@ -167,7 +174,8 @@ LANE_CODE void prepare(const footprint_view *view, double variance, d8 pixel_min
     const d8 axis[3] = {d8_set(view->axis[0]), d8_set(view->axis[1]), d8_set(view->axis[2])};
     for (int k = 0; k < 3; k++)
         x->u[k] = d8_dot(x->axes[k], view->kind == FOOTPRINT_PARALLEL ? axis : x->dir);
-    x->area = area_square(x->u, x->e), x->wide_area = area_square(x->u, x->wide);
+    x->area = area_square(x->u, x->e);
+    x->wide_area = area_square(x->u, x->wide);
     x->narrows = (x->w > 0) & (x->wide_area > 0);
     x->kept = d8_select(x->narrows, d8_sqrt(d8_over(x->area, x->wide_area)), d8_set(1));
 }
@@ -181,7 +189,8 @@ LANE_CODE void widen_lanes(const footprint_view *view, double variance, d8 pixel
     g->opacity *= x.kept;
 }
 
-LANE_CODE void adjoint_lanes(const footprint_view *view, double variance, d8 pixel_min, const gaussian8 *g, gaussian8 *d)
+LANE_CODE void adjoint_lanes(const footprint_view *view, double variance, d8 pixel_min, const gaussian8 *g,
+                             gaussian8 *d)
 {
     widening x;
     prepare(view, variance, pixel_min, g, &x);
@@ -208,20 +217,23 @@ LANE_CODE void adjoint_lanes(const footprint_view *view, double variance, d8 pix
     }
     /* A turn by omega in local axes takes u to u - omega x u; dL/dq = 2 q (0, dL/domega). */
     const d8 *u = x.u, *q = g->quat;
-    const d8 omega[3] = {d_u[1] * u[2] - d_u[2] * u[1], d_u[2] * u[0] - d_u[0] * u[2], d_u[0] * u[1] - d_u[1] * u[0]};
+    const d8 omega[3] = {d_u[1] * u[2] - d_u[2] * u[1], d_u[2] * u[0] - d_u[0] * u[2],
+                         d_u[0] * u[1] - d_u[1] * u[0]};
     d->quat[0] += 2 * (-q[1] * omega[0] - q[2] * omega[1] - q[3] * omega[2]);
     d->quat[1] += 2 * (q[0] * omega[0] + q[2] * omega[2] - q[3] * omega[1]);
     d->quat[2] += 2 * (q[0] * omega[1] + q[3] * omega[0] - q[1] * omega[2]);
     d->quat[3] += 2 * (q[0] * omega[2] + q[1] * omega[1] - q[2] * omega[0]);
 }
 
-/* ---- one Gaussian -------------------------------------------------------------------------------------------------------------------- */
+/* ---- one Gaussian ---- */
 
 static gaussian8 spread(const footprint_gaussian *g)
 {
     gaussian8 out = {.opacity = d8_set(g->opacity)};
-    for (int k = 0; k < 3; k++)
-        out.mean[k] = d8_set(g->mean[k]), out.scale[k] = d8_set(g->scale[k]);
+    for (int k = 0; k < 3; k++) {
+        out.mean[k] = d8_set(g->mean[k]);
+        out.scale[k] = d8_set(g->scale[k]);
+    }
     for (int k = 0; k < 4; k++)
         out.quat[k] = d8_set(g->quat[k]);
     return out;
@@ -242,7 +254,8 @@ void footprint_widen(const footprint_view *view, double variance, double pixel_m
     *g = first(&lanes);
 }
 
-void footprint_adjoint(const footprint_view *view, double variance, double pixel_min, const footprint_gaussian *g, footprint_gaussian *d)
+void footprint_adjoint(const footprint_view *view, double variance, double pixel_min,
+                       const footprint_gaussian *g, footprint_gaussian *d)
 {
     const gaussian8 lanes = spread(g);
     gaussian8 back = spread(d);
@@ -250,7 +263,7 @@ void footprint_adjoint(const footprint_view *view, double variance, double pixel
     *d = first(&back);
 }
 
-/* ---- arrays -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- arrays ---- */
 
 typedef struct widen_job {
     const footprint_view *view;
@@ -282,11 +295,12 @@ LANE_CODE void store(float *to, size_t count, d8 a)
 
 LANE_CODE gaussian8 load_gaussians(const gaussians *g, size_t i, size_t count)
 {
-    return (gaussian8){.mean = {load(g->mean_x + i, count), load(g->mean_y + i, count), load(g->mean_z + i, count)},
-                       .scale = {load(g->scale_x + i, count), load(g->scale_y + i, count), load(g->scale_z + i, count)},
-                       .quat = {load(g->quat_w + i, count), load(g->quat_x + i, count), load(g->quat_y + i, count),
-                                load(g->quat_z + i, count)},
-                       .opacity = load(g->opacity + i, count)};
+    return (gaussian8){
+        .mean = {load(g->mean_x + i, count), load(g->mean_y + i, count), load(g->mean_z + i, count)},
+        .scale = {load(g->scale_x + i, count), load(g->scale_y + i, count), load(g->scale_z + i, count)},
+        .quat = {load(g->quat_w + i, count), load(g->quat_x + i, count), load(g->quat_y + i, count),
+                 load(g->quat_z + i, count)},
+        .opacity = load(g->opacity + i, count)};
 }
 
 LANE_CODE d8 load_pixel_min(const widen_job *job, size_t i, size_t count)
@@ -334,8 +348,8 @@ FASTEST_CLONE static void adjoint_block(size_t block, size_t begin, size_t end, 
     }
 }
 
-gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min, const gaussians *g, gaussians *out,
-                             gbt_error *err)
+gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min,
+                             const gaussians *g, gaussians *out, gbt_error *err)
 {
     GBT_TRY(gaussians_copy(g, out, err));
     widen_job job = {view, (double)variance, pixel_min, g, out};
@@ -343,7 +357,8 @@ gbt_status footprint_forward(const footprint_view *view, float variance, const f
     return GBT_OK;
 }
 
-void footprint_backward(const footprint_view *view, float variance, const float *pixel_min, const gaussians *g, gaussians *d)
+void footprint_backward(const footprint_view *view, float variance, const float *pixel_min,
+                        const gaussians *g, gaussians *d)
 {
     widen_job job = {view, (double)variance, pixel_min, g, d};
     parallel_blocks(g->count, WIDEN_BLOCK, adjoint_block, &job);

@@ -1,10 +1,14 @@
-/* trace/footprint.h -- rays with a width: each Gaussian as the pixels of one view can resolve it, and the adjoint of that.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/footprint.h -- rays with a width: each Gaussian as the pixels of one view can resolve it, and the
+   adjoint of that.
 
-   A pixel sees not a line but a narrow cone, whose cross-section at the Gaussian has the variance w = v p^2: p is the size of a pixel
-   there, v its variance in squared pixels. What a ray sees of a Gaussian at its nearest point is the Gaussian's marginal across the
-   ray; its mean over the cone is that marginal with w added to its covariance, and adding w to the marginal of every ray is adding w
-   to the 3D covariance. So a cone costs nothing while tracing: the rotation stays, s_i'^2 = s_i^2 + w. What a Gaussian covers,
-   opacity times area across the ray, is kept: o' = o sqrt(a / a') with a = det S^2 |S^-1 R^T d|^2, d from the camera to the centre. */
+   A pixel sees not a line but a narrow cone, whose cross-section at the Gaussian has the variance w = v p^2:
+   p is the size of a pixel there, v its variance in squared pixels. What a ray sees of a Gaussian at its
+   nearest point is the Gaussian's marginal across the ray; its mean over the cone is that marginal with w
+   added to its covariance, and adding w to the marginal of every ray is adding w to the 3D covariance. So a
+   cone costs nothing while tracing: the rotation stays, s_i'^2 = s_i^2 + w. What a Gaussian covers, opacity
+   times area across the ray, is kept: o' = o sqrt(a / a') with a = det S^2 |S^-1 R^T d|^2, d from the camera
+   to the centre. */
 #ifndef GBT_TRACE_FOOTPRINT_H
 #define GBT_TRACE_FOOTPRINT_H
 
@@ -16,14 +20,16 @@
 typedef struct footprint_view {
     enum footprint_kind { FOOTPRINT_PERSPECTIVE, FOOTPRINT_ANGULAR, FOOTPRINT_PARALLEL } kind;
     double center[3], axis[3]; /* of the camera; axis: forward, unit */
-    double pixel;              /* size of a pixel at distance 1: on the axis (perspective), everywhere (angular); at any distance
-                                  (parallel) */
+    double pixel; /* size of a pixel at distance 1: on the axis (perspective), everywhere (angular); at any
+                     distance (parallel) */
 } footprint_view;
 
-/** Distorted lenses are taken as the lens without distortion. A camera that sees nothing has pixels of size 0. */
+/** Distorted lenses are taken as the lens without distortion. A camera that sees nothing has pixels of size
+    0. */
 footprint_view footprint_view_of(const gbt_camera *camera);
 
-/** Size of a pixel at a point, scene units: the square root of the area that its cone cuts there. 0 behind a perspective camera. */
+/** Size of a pixel at a point, scene units: the square root of the area that its cone cuts there. 0 behind a
+    perspective camera. */
 double footprint_pixel(const footprint_view *view, const double point[3]);
 
 /** One Gaussian, in double; the quaternion is taken as unit. */
@@ -35,21 +41,24 @@ typedef struct footprint_gaussian {
 void footprint_widen(const footprint_view *view, double variance, double pixel_min, footprint_gaussian *g);
 
 /** `d`: dL/d(widened) in, dL/d(g) out. The quaternion's is tangent. `g` is the Gaussian as it was before. */
-void footprint_adjoint(const footprint_view *view, double variance, double pixel_min, const footprint_gaussian *g, footprint_gaussian *d);
+void footprint_adjoint(const footprint_view *view, double variance, double pixel_min,
+                       const footprint_gaussian *g, footprint_gaussian *d);
 
 /**
  * Widen every Gaussian of a view.
  *
  * @param variance  [in]  v, px^2, >= 0
- * @param pixel_min [in]  optional (NULL), [g->count]: the smallest pixel that the Gaussian was made for; closer views show no more of it
+ * @param pixel_min [in]  optional (NULL), [g->count]: the smallest pixel that the Gaussian was made for;
+ *                        closer views show no more of it
  * @param out       [out] resized like `g`, padded; must not be `g`
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count. Cost: about 10 ns per Gaussian.
  */
-gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min, const gaussians *g, gaussians *out,
-                             gbt_error *err);
+gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min,
+                             const gaussians *g, gaussians *out, gbt_error *err);
 
 /** Adjoint of footprint_forward(): `d` holds dL/d(out), and then dL/d(g). Colours keep their gradient. */
-void footprint_backward(const footprint_view *view, float variance, const float *pixel_min, const gaussians *g, gaussians *d);
+void footprint_backward(const footprint_view *view, float variance, const float *pixel_min,
+                        const gaussians *g, gaussians *d);
 
 #endif

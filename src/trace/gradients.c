@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* trace/gradients.c -- one record per Gaussian and block; their sum, in the order of the blocks. */
 #include "trace/gradients.h"
 
@@ -27,7 +28,8 @@ static bool grow_slots(gradient_list *list)
         slots[at] = (uint32_t)i + 1;
     }
     mem_free(list->slots);
-    list->slots = slots, list->slot_count = wanted;
+    list->slots = slots;
+    list->slot_count = wanted;
     return true;
 }
 
@@ -41,8 +43,8 @@ gradient_record *gradient_list_find(gradient_list *list, uint32_t id)
         if (record->id == id)
             return record;
     }
-    if (mem_reserve((void **)&list->records, &list->capacity, list->count, list->count + 1, sizeof *list->records, "gradient records",
-                    NULL) != GBT_OK)
+    if (mem_reserve((void **)&list->records, &list->capacity, list->count, list->count + 1,
+                    sizeof *list->records, "gradient records", NULL) != GBT_OK)
         return NULL;
     list->slots[at] = (uint32_t)++list->count;
     gradient_record *record = &list->records[list->count - 1];
@@ -54,8 +56,10 @@ gradient_record *gradient_list_find(gradient_list *list, uint32_t id)
 gbt_status gradient_list_close(gradient_list *list)
 {
     mem_free(list->slots);
-    list->slots = NULL, list->slot_count = 0;
-    return mem_trim((void **)&list->records, &list->capacity, list->count, sizeof *list->records, "gradient records", NULL);
+    list->slots = NULL;
+    list->slot_count = 0;
+    return mem_trim((void **)&list->records, &list->capacity, list->count, sizeof *list->records,
+                    "gradient records", NULL);
 }
 
 void gradient_list_free(gradient_list *list)
@@ -105,14 +109,17 @@ static void reduce_block(size_t block, size_t begin, size_t end, void *context)
         out->quat_y[i] = seen ? 2 * (qw * wy + qz * wx - qx * wz) : 0;
         out->quat_z[i] = seen ? 2 * (qw * wz + qx * wy - qy * wx) : 0;
         out->opacity[i] = sum[GRADIENT_OPACITY];
-        out->red[i] = sum[GRADIENT_COLOR], out->green[i] = sum[GRADIENT_COLOR + 1], out->blue[i] = sum[GRADIENT_COLOR + 2];
+        out->red[i] = sum[GRADIENT_COLOR];
+        out->green[i] = sum[GRADIENT_COLOR + 1];
+        out->blue[i] = sum[GRADIENT_COLOR + 2];
         if (job->weight != NULL)
             job->weight[i] = sum[GRADIENT_WEIGHT];
     }
 }
 
-gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *lists, size_t list_count, const gaussians *g,
-                            const float *records, gaussians *out, float *weight, gbt_error *err)
+gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *lists, size_t list_count,
+                            const gaussians *g, const float *records, gaussians *out, float *weight,
+                            gbt_error *err)
 {
     size_t total = 0;
     for (size_t i = 0; i < list_count; i++)
@@ -121,8 +128,10 @@ gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *l
         return base_fail(err, GBT_ERR_NO_MEMORY, "trace: %zu gradient records (limit 2^32)", total);
     GBT_TRY(gaussians_resize(out, g->count, err));
     gaussians_zero(out);
-    GBT_TRY(mem_reserve((void **)&order->record, &order->record_capacity, 0, total + 1, sizeof *order->record, "record order", err));
-    GBT_TRY(mem_reserve((void **)&order->first, &order->first_capacity, 0, g->count + 2, sizeof *order->first, "record ranges", err));
+    GBT_TRY(mem_reserve((void **)&order->record, &order->record_capacity, 0, total + 1, sizeof *order->record,
+                        "record order", err));
+    GBT_TRY(mem_reserve((void **)&order->first, &order->first_capacity, 0, g->count + 2, sizeof *order->first,
+                        "record ranges", err));
     /* Counting sort, stable: first[id + 1] counts, then becomes the place of the next record of id. */
     uint32_t *first = order->first;
     memset(first, 0, (g->count + 2) * sizeof *first);
@@ -136,7 +145,8 @@ gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *l
             const gradient_record *record = &lists[i]->records[k];
             order->record[first[record->id + 1]++] = record;
         }
-    reduction job = {.g = g, .records = records, .record = order->record, .first = first, .out = out, .weight = weight};
+    reduction job = {
+        .g = g, .records = records, .record = order->record, .first = first, .out = out, .weight = weight};
     parallel_blocks(g->count, RECORD_BLOCK, reduce_block, &job);
     return GBT_OK;
 }

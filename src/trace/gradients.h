@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* trace/gradients.h -- the gradient records that blocks of tiles leave, and their sum over the image. */
 #ifndef GBT_TRACE_GRADIENTS_H
 #define GBT_TRACE_GRADIENTS_H
@@ -14,15 +15,16 @@ void gradient_list_free(gradient_list *list); /* back to {0} */
 typedef struct gradient_order {
     const gradient_record **record; /* all records, ordered by Gaussian, then by list */
     size_t record_capacity;
-    uint32_t *first;                /* where each Gaussian's begin */
+    uint32_t *first; /* where each Gaussian's begin */
     size_t first_capacity;
 } gradient_order;
 
 /**
  * Sum the records of all lists in the order of the lists, and turn the sums into gradients of the fields.
  *
- * Envelope theorem: at the nearest point d(d2)/dt = 0 (or t is fixed at t_near), so t needs no derivative. With v the canonical point:
- * d(d2)/dmean = -2 (S^-1 R^T)^T v, d(d2)/dlog s_i = -2 v_i^2, d(d2)/domega = 2 (S^-1 v) x (S v).
+ * Envelope theorem: at the nearest point d(d2)/dt = 0 (or t is fixed at t_near), so t needs no derivative.
+ * With v the canonical point: d(d2)/dmean = -2 (S^-1 R^T)^T v, d(d2)/dlog s_i = -2 v_i^2, d(d2)/domega = 2
+ * (S^-1 v) x (S v).
  *
  * @param lists   [in]  [list_count]
  * @param records [in]  of the Gaussians (kernel.h)
@@ -31,8 +33,9 @@ typedef struct gradient_order {
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count.
  */
-gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *lists, size_t list_count, const gaussians *g,
-                            const float *records, gaussians *out, float *weight, gbt_error *err);
+gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *lists, size_t list_count,
+                            const gaussians *g, const float *records, gaussians *out, float *weight,
+                            gbt_error *err);
 
 void gradient_order_free(gradient_order *order); /* back to {0} */
 

@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* trace/kernel.h -- the contract between trace.c and the tile kernels.
 
-   A kernel traces one tile of neighbouring packets of 16 rays. It is written once (tile_kernel.inc.h) and compiled per instruction set. */
+   A kernel traces one tile of neighbouring packets of 16 rays. It is written once (tile_kernel.inc.h) and
+   compiled per instruction set. */
 #ifndef GBT_TRACE_KERNEL_H
 #define GBT_TRACE_KERNEL_H
 
@@ -24,11 +26,11 @@ enum {
 enum { RECORD_MATRIX = 0, RECORD_MEAN = 9, RECORD_OPACITY = 12, RECORD_COLOR = 13 };
 
 typedef struct kernel_scene {
-    const tree_node *root; /* NULL: nothing to hit */
+    const tree_node *root;               /* NULL: nothing to hit */
     const struct gaussian_scene *embree; /* for forward_embree only */
-    const float *records;  /* [count][RECORD_FLOATS], 64-byte aligned */
-    float coordinate_max;  /* of boxes and ray origins */
-    bool extra;            /* all of packet_output is wanted, not only colour and transmittance */
+    const float *records;                /* [count][RECORD_FLOATS], 64-byte aligned */
+    float coordinate_max;                /* of boxes and ray origins */
+    bool extra; /* all of packet_output is wanted, not only colour and transmittance */
     trace_settings settings;
     float radius_response; /* exp(-proxy_radius^2 / 2) */
 } kernel_scene;
@@ -44,7 +46,8 @@ typedef struct packet_output {
     _Alignas(64) float rgb[3][PACKET_LANES]; /* with the background */
     _Alignas(64) float transmittance[PACKET_LANES];
     /* with kernel_scene.extra; see trace_outputs */
-    _Alignas(64) float weighted_depth[PACKET_LANES], median_depth[PACKET_LANES], normal[3][PACKET_LANES], hit_count[PACKET_LANES];
+    _Alignas(64) float weighted_depth[PACKET_LANES],
+        median_depth[PACKET_LANES], normal[3][PACKET_LANES], hit_count[PACKET_LANES];
     _Alignas(64) uint32_t strongest[PACKET_LANES];
 } packet_output;
 
@@ -52,7 +55,8 @@ typedef struct packet_output {
 enum { TAPE_SINGLE = 0x4000, TAPE_END = 0x8000 };
 typedef struct tape_entry {
     uint32_t id;
-    uint16_t lanes;  /* bit per ray that blended it; with TAPE_SINGLE: the one ray's number, and entries of a ray are in blending order */
+    uint16_t lanes;  /* bit per ray that blended it; with TAPE_SINGLE: the one ray's number, and entries of a
+                        ray are in blending order */
     uint16_t packet; /* number in the tile, or flags */
 } tape_entry;
 
@@ -71,17 +75,26 @@ static inline void hit_tape_free(hit_tape *tape)
 static inline bool tape_add(hit_tape *tape, tape_entry entry)
 {
     if (tape->count == tape->capacity &&
-        mem_reserve((void **)&tape->entries, &tape->capacity, tape->count, tape->capacity + tape->capacity / 2 + 512, sizeof entry,
-                    "hit tape", NULL) != GBT_OK)
+        mem_reserve((void **)&tape->entries, &tape->capacity, tape->count,
+                    tape->capacity + tape->capacity / 2 + 512, sizeof entry, "hit tape", NULL) != GBT_OK)
         return false;
     tape->entries[tape->count++] = entry;
     return true;
 }
 
-/* What one tile adds to the gradient of one Gaussian. The sums are of one hit's v (canonical point), g = dL/d(d2), and so on. */
-enum { GRADIENT_V = 0, GRADIENT_VV = 3, GRADIENT_OPACITY = 9, GRADIENT_COLOR = 10, GRADIENT_WEIGHT = 13, GRADIENT_FLOATS = 15 };
+/* What one tile adds to the gradient of one Gaussian. The sums are of one hit's v (canonical point), g =
+   dL/d(d2), and so on. */
+enum {
+    GRADIENT_V = 0,
+    GRADIENT_VV = 3,
+    GRADIENT_OPACITY = 9,
+    GRADIENT_COLOR = 10,
+    GRADIENT_WEIGHT = 13,
+    GRADIENT_FLOATS = 15
+};
 typedef struct gradient_record {
-    float sum[GRADIENT_FLOATS]; /* V: sum g v; VV: sum g (v v^T), xx yy zz yz zx xy; OPACITY, COLOR: dL/d; WEIGHT: sum T alpha */
+    float sum[GRADIENT_FLOATS]; /* V: sum g v; VV: sum g (v v^T), xx yy zz yz zx xy; OPACITY, COLOR: dL/d;
+                                   WEIGHT: sum T alpha */
     uint32_t id;
 } gradient_record;
 
@@ -89,7 +102,8 @@ typedef struct gradient_record {
 typedef struct gradient_list {
     gradient_record *records;
     size_t count, capacity;
-    uint32_t *slots; /* hash table: record number + 1, 0 is free; slot_count is a power of two, at least twice `count` */
+    uint32_t *slots; /* hash table: record number + 1, 0 is free; slot_count is a power of two, at least twice
+                        `count` */
     size_t slot_count;
 } gradient_list;
 
@@ -117,7 +131,7 @@ typedef struct kernel_scratch {
     struct lane_hit {
         ray_hit hit;
         uint32_t lane;
-    } *lane_hits;
+    } * lane_hits;
     size_t lane_hit_capacity;
 } kernel_scratch;
 
@@ -128,20 +142,24 @@ typedef struct tile_rays {
 } tile_rays;
 
 /** Trace a tile. `tape` is NULL when no adjoint will follow. False when memory ran out. */
-typedef bool tile_forward_fn(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape,
-                             kernel_scratch *scratch, kernel_counters *counters);
+typedef bool tile_forward_fn(const kernel_scene *scene, const tile_rays *rays,
+                             packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch,
+                             kernel_counters *counters);
 
 /**
- * Adjoint of a tile: replay the hits that forward left on the tape, add to the record of every Gaussian that was blended.
+ * Adjoint of a tile: replay the hits that forward left on the tape, add to the record of every Gaussian that
+ * was blended.
  *
  * @param d_rgb        [in]  dL/d(rgb)
  * @param d_background [out] [3], added to
  */
-typedef bool tile_backward_fn(const kernel_scene *scene, const tile_rays *rays, float d_rgb[TILE_PACKETS][3][PACKET_LANES],
-                              const tape_entry *tape, gradient_list *out, float d_background[3], kernel_scratch *scratch);
+typedef bool tile_backward_fn(const kernel_scene *scene, const tile_rays *rays,
+                              float d_rgb[TILE_PACKETS][3][PACKET_LANES], const tape_entry *tape,
+                              gradient_list *out, float d_background[3], kernel_scratch *scratch);
 
 typedef struct tile_kernel {
-    tile_forward_fn *forward, *forward_single, *forward_embree; /* in tiles; ray by ray; by Embree's traversal */
+    tile_forward_fn *forward, *forward_single,
+        *forward_embree; /* in tiles; ray by ray; by Embree's traversal */
     tile_backward_fn *backward;
 } tile_kernel;
 

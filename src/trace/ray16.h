@@ -1,5 +1,6 @@
-/* trace/ray16.h -- one ray through the tree, sixteen Gaussians at a time: for rays that do not run together, and for packets whose
-   hits do not fit. No limit but memory. Included by tile_kernel.inc.h. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/ray16.h -- one ray through the tree, sixteen Gaussians at a time: for rays that do not run together,
+   and for packets whose hits do not fit. No limit but memory. Included by tile_kernel.inc.h. */
 #ifndef GBT_TRACE_RAY16_H
 #define GBT_TRACE_RAY16_H
 
@@ -39,13 +40,15 @@ static void sort_hits(ray_hit *hits, ray_hit *spare, size_t n)
     ray_hit *from = hits, *to = spare;
     for (size_t run = SHORT_RUN; run < n; run *= 2) {
         for (size_t first = 0; first < n; first += 2 * run) {
-            const size_t middle = first + run < n ? first + run : n, end = first + 2 * run < n ? first + 2 * run : n;
+            const size_t middle = first + run < n ? first + run : n,
+                         end = first + 2 * run < n ? first + 2 * run : n;
             size_t a = first, b = middle;
             for (size_t i = first; i < end; i++)
                 to[i] = b == end || (a < middle && from[a].key <= from[b].key) ? from[a++] : from[b++];
         }
         ray_hit *swap = from;
-        from = to, to = swap;
+        from = to;
+        to = swap;
     }
     if (from != hits)
         memcpy(hits, from, n * sizeof *hits);
@@ -59,15 +62,20 @@ typedef struct ray_state {
     float dir[3];
     uint32_t waiting[2 * TREE_WIDTH]; /* Gaussians that may be hit */
     int waiting_count;                /* at most TREE_WIDTH - 1 between two leaves */
-    ray_hit *hits; /* in scratch; as many spare ones follow */
+    ray_hit *hits;                    /* in scratch; as many spare ones follow */
     size_t count, capacity;
 } ray_state;
 
 static ray_state start_ray(const packet_rays *rays, int lane, const kernel_scratch *scratch)
 {
-    return (ray_state){.transmittance = 1, .far = rays->far[lane], .median = INFINITY, .top_id = UINT32_MAX, .alive = true,
+    return (ray_state){.transmittance = 1,
+                       .far = rays->far[lane],
+                       .median = INFINITY,
+                       .top_id = UINT32_MAX,
+                       .alive = true,
                        .dir = {rays->dir[0][lane], rays->dir[1][lane], rays->dir[2][lane]},
-                       .hits = scratch->hits, .capacity = scratch->hit_bytes / sizeof(ray_hit) / 2};
+                       .hits = scratch->hits,
+                       .capacity = scratch->hit_bytes / sizeof(ray_hit) / 2};
 }
 
 static void finish_ray(const ray_state *r, const kernel_scene *scene, int lane, packet_output *out)
@@ -77,16 +85,16 @@ static void finish_ray(const ray_state *r, const kernel_scene *scene, int lane, 
         out->normal[k][lane] = r->normal[k];
     }
     out->transmittance[lane] = r->transmittance;
-    out->weighted_depth[lane] = r->depth, out->median_depth[lane] = r->median, out->hit_count[lane] = (float)r->blended,
-        out->strongest[lane] = r->top_id;
+    out->weighted_depth[lane] = r->depth, out->median_depth[lane] = r->median,
+    out->hit_count[lane] = (float)r->blended, out->strongest[lane] = r->top_id;
 }
 
 static bool reserve_hits(ray_state *r, size_t more, kernel_scratch *scratch)
 {
     if (r->count + more > r->capacity) {
         const size_t wanted = r->count + more + r->capacity;
-        if (mem_reserve(&scratch->hits, &scratch->hit_bytes, r->count * sizeof *r->hits, 2 * wanted * sizeof *r->hits, 1, "hits of a ray",
-                        NULL) != GBT_OK)
+        if (mem_reserve(&scratch->hits, &scratch->hit_bytes, r->count * sizeof *r->hits,
+                        2 * wanted * sizeof *r->hits, 1, "hits of a ray", NULL) != GBT_OK)
             return false;
         r->capacity = wanted;
     }
@@ -106,13 +114,15 @@ static void note_hit(ray_state *r, const float *record, uint32_t id, float weigh
     if (next < 0.5f)
         r->median = smaller(r->median, t);
     r->blended++;
-    if (weight > r->top_weight)
-        r->top_weight = weight, r->top_id = id;
+    if (weight > r->top_weight) {
+        r->top_weight = weight;
+        r->top_id = id;
+    }
 }
 
 /* Blend all hits nearer than `horizon`; keep the rest. */
-static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, unsigned packet, int lane, hit_tape *tape,
-                       kernel_counters *counters)
+static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, unsigned packet, int lane,
+                       hit_tape *tape, kernel_counters *counters)
 {
     sort_hits(r->hits, r->hits + r->capacity, r->count);
     size_t done = 0;
@@ -131,7 +141,8 @@ static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, u
             note_hit(r, color - RECORD_COLOR, id, weight, next, hit_depth(h));
         r->transmittance = next;
         counters->blended++;
-        if (tape != NULL && !tape_add(tape, (tape_entry){id, (uint16_t)lane, (uint16_t)(packet | TAPE_SINGLE)}))
+        if (tape != NULL &&
+            !tape_add(tape, (tape_entry){id, (uint16_t)lane, (uint16_t)(packet | TAPE_SINGLE)}))
             return false;
     }
     memmove(r->hits, r->hits + done, (r->count - done) * sizeof *r->hits);
@@ -140,22 +151,24 @@ static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, u
 }
 
 /* Evaluate `count` of the waiting Gaussians, at most sixteen, from the end. */
-static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes *ray, int count, kernel_scratch *scratch,
-                        kernel_counters *counters)
+static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes *ray, int count,
+                        kernel_scratch *scratch, kernel_counters *counters)
 {
-    f16 color[3];
+    vfloat16 color[3];
     uint32_t id[TREE_WIDTH];
     for (int i = 0; i < TREE_WIDTH; i++)
         id[i] = r->waiting[r->waiting_count - 1 - (i < count ? i : 0)];
     const gaussian_lanes g = load_gaussians(scene, id, color);
-    const response at = respond(&g, ray, f16_set1(scene->settings.t_near));
-    const f16 raw = response_alpha(&g, at.d2);
-    const m16 hit = m16_and(f16_le(alpha_threshold(scene, g.opacity), raw), f16_lt(at.t, f16_set1(r->far)));
+    const response at = respond(&g, ray, vfloat16_set1(scene->settings.t_near));
+    const vfloat16 raw = response_alpha(&g, at.d2);
+    const vmask16 hit = vmask16_and(vfloat16_le(alpha_threshold(scene, g.opacity), raw),
+                                    vfloat16_lt(at.t, vfloat16_set1(r->far)));
     _Alignas(64) float t[TREE_WIDTH], alpha[TREE_WIDTH];
-    f16_store(t, at.t), f16_store(alpha, f16_min(raw, f16_set1(scene->settings.alpha_max)));
+    vfloat16_store(t, at.t),
+        vfloat16_store(alpha, vfloat16_min(raw, vfloat16_set1(scene->settings.alpha_max)));
     if (!reserve_hits(r, TREE_WIDTH, scratch))
         return false;
-    for (unsigned bits = m16_bits(hit) & (0xFFFFu >> (TREE_WIDTH - count)); bits != 0; bits &= bits - 1) {
+    for (unsigned bits = vmask16_bits(hit) & (0xFFFFu >> (TREE_WIDTH - count)); bits != 0; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
         r->hits[r->count++] = make_hit(t[i], alpha[i], id[i]);
         counters->hits++;
@@ -165,8 +178,9 @@ static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes
     return true;
 }
 
-static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam *beam, const ray_lanes *ray, unsigned packet, int lane,
-                       hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
+static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam *beam, const ray_lanes *ray,
+                       unsigned packet, int lane, hit_tape *tape, kernel_scratch *scratch,
+                       kernel_counters *counters)
 {
     int heap_count = 0;
     size_t round = RAY_ROUND;
@@ -176,7 +190,8 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam 
         if (leaf != NULL) {
             ellipsoids16 e;
             turn_ellipsoids(leaf, beam, &e);
-            for (unsigned bits = test_ellipsoids(&beam->whole, &e) & (0xFFFFu >> (TREE_WIDTH - leaf->count)); bits != 0; bits &= bits - 1) {
+            for (unsigned bits = test_ellipsoids(&beam->whole, &e) & (0xFFFFu >> (TREE_WIDTH - leaf->count));
+                 bits != 0; bits &= bits - 1) {
                 const uint32_t id = leaf->id[__builtin_ctz(bits)];
                 __builtin_prefetch(scene->records + (size_t)id * RECORD_FLOATS);
                 r->waiting[r->waiting_count++] = id;
@@ -187,16 +202,20 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam 
         } else {
             const tree_node *node = (const tree_node *)(uintptr_t)child;
             _Alignas(64) float entry[TREE_WIDTH];
-            if (mem_reserve((void **)&scratch->heap, &scratch->heap_capacity, (size_t)heap_count, (size_t)heap_count + TREE_WIDTH,
-                            sizeof *scratch->heap, "nodes of a ray", NULL) != GBT_OK)
+            if (mem_reserve((void **)&scratch->heap, &scratch->heap_capacity, (size_t)heap_count,
+                            (size_t)heap_count + TREE_WIDTH, sizeof *scratch->heap, "nodes of a ray",
+                            NULL) != GBT_OK)
                 return false;
-            for (unsigned bits = test_children(beam, node, scene->settings.t_near, entry); bits != 0; bits &= bits - 1)
-                heap_push(scratch->heap, &heap_count, entry[__builtin_ctz(bits)], node->child[__builtin_ctz(bits)]);
+            for (unsigned bits = test_children(beam, node, scene->settings.t_near, entry); bits != 0;
+                 bits &= bits - 1)
+                heap_push(scratch->heap, &heap_count, entry[__builtin_ctz(bits)],
+                          node->child[__builtin_ctz(bits)]);
         }
         if (r->count >= round || heap_count == 0) {
             if (r->waiting_count > 0 && !hit_waiting(r, scene, ray, r->waiting_count, scratch, counters))
                 return false;
-            if (r->count > 0 && !blend_hits(r, scene, heap_count > 0 ? scratch->heap[0].t : INFINITY, packet, lane, tape, counters))
+            if (r->count > 0 && !blend_hits(r, scene, heap_count > 0 ? scratch->heap[0].t : INFINITY, packet,
+                                            lane, tape, counters))
                 return false;
             if (!r->alive || heap_count == 0)
                 return true;
@@ -206,8 +225,8 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam 
     }
 }
 
-static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, unsigned packet, int lane, packet_output *out, hit_tape *tape,
-                      kernel_scratch *scratch, kernel_counters *counters)
+static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, unsigned packet, int lane,
+                      packet_output *out, hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
 {
     packet_rays alone[TILE_PACKETS];
     ray_state r = start_ray(rays, lane, scratch);
@@ -216,10 +235,13 @@ static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, unsign
     for (int p = 0; p < TILE_PACKETS; p++)
         alone[p].active = p == 0;
     for (int axis = 0; axis < 3; axis++)
-        for (int i = 0; i < PACKET_LANES; i++)
-            alone[0].origin[axis][i] = rays->origin[axis][lane], alone[0].dir[axis][i] = rays->dir[axis][lane];
+        for (int i = 0; i < PACKET_LANES; i++) {
+            alone[0].origin[axis][i] = rays->origin[axis][lane];
+            alone[0].dir[axis][i] = rays->dir[axis][lane];
+        }
     load_rays(&alone[0], &ray);
-    if (scene->root != NULL && make_beam(alone, scene, &beam) && !gather_ray(&r, scene, &beam, &ray, packet, lane, tape, scratch, counters))
+    if (scene->root != NULL && make_beam(alone, scene, &beam) &&
+        !gather_ray(&r, scene, &beam, &ray, packet, lane, tape, scratch, counters))
         return false;
     finish_ray(&r, scene, lane, out);
     return true;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* trace/rays.c -- the rays through the pixel centres of a camera.
 
    pixel --[lens]--> start and direction in camera axes --[aperture]--> --[pose of the row or column]--> world
@@ -41,7 +42,7 @@ typedef struct ray_job {
     double *camera_dir;     /* other lenses only */
     const pose *poses;      /* [1], or one for each row or column */
     aperture_cell cell;
-    float *origin;          /* NULL: one for all */
+    float *origin; /* NULL: one for all */
     float *dir;
 } ray_job;
 
@@ -50,7 +51,8 @@ static void pinhole_row(const ray_job *job, const double *r, int row, float *dir
     const double v = (row + 0.5 - job->lens.cy) / job->lens.fy;
     const int width = job->shot->camera.width;
     /* Transposed rotation times (u, v, 1): only u changes along a row. */
-    const double base_x = v * r[3] + r[6], base_y = v * r[4] + r[7], base_z = v * r[5] + r[8], base_length2 = v * v + 1;
+    const double base_x = v * r[3] + r[6], base_y = v * r[4] + r[7], base_z = v * r[5] + r[8],
+                 base_length2 = v * v + 1;
     for (int i = 0; i < width; i++) {
         const double u = job->column_u[i], scale = 1 / sqrt(u * u + base_length2);
         dir[3 * i] = (float)((u * r[0] + base_x) * scale);
@@ -80,7 +82,9 @@ static void unproject_row(const ray_job *job, int row, double *camera_dir)
 
 static void round3(const double from[3], float to[3])
 {
-    to[0] = (float)from[0], to[1] = (float)from[1], to[2] = (float)from[2];
+    to[0] = (float)from[0];
+    to[1] = (float)from[1];
+    to[2] = (float)from[2];
 }
 
 static void turn_row(const ray_job *job, const double *rotation, const double *camera_dir, float *dir)
@@ -109,14 +113,16 @@ static void span_disc(const double d[3], double across[3], double along[3])
     dvec_cross(d, across, along);
 }
 
-/* Move a ray of camera axes to its place on the aperture; the point it has in focus stays. `dir` need not be a unit vector before. */
+/* Move a ray of camera axes to its place on the aperture; the point it has in focus stays. `dir` need not be
+   a unit vector before. */
 static void open_aperture(const ray_job *job, uint64_t pixel, double start[3], double dir[3])
 {
     uint32_t words[4];
     rng_philox(job->shot->seed, job->sample, pixel, words);
-    const double radius = job->shot->aperture_radius * sqrt(job->cell.area_low + job->cell.area_span * (words[0] * 0x1p-32));
-    const double angle = 2 * PI * (job->cell.turn_low + job->cell.turn_span * (words[1] * 0x1p-32)), a = radius * cos(angle),
-        b = radius * sin(angle);
+    const double radius =
+        job->shot->aperture_radius * sqrt(job->cell.area_low + job->cell.area_span * (words[0] * 0x1p-32));
+    const double angle = 2 * PI * (job->cell.turn_low + job->cell.turn_span * (words[1] * 0x1p-32)),
+                 a = radius * cos(angle), b = radius * sin(angle);
     const double focus = job->shot->focus_distance;
     double across[3] = {1, 0, 0}, along[3] = {0, 1, 0}, reach = focus;
     if (camera_lens_looks_forward(&job->lens))
@@ -125,7 +131,8 @@ static void open_aperture(const ray_job *job, uint64_t pixel, double start[3], d
         span_disc(dir, across, along);
     for (int k = 0; k < 3; k++) {
         const double shift = a * across[k] + b * along[k];
-        dir[k] = dir[k] * reach - shift, start[k] += shift;
+        dir[k] = dir[k] * reach - shift;
+        start[k] += shift;
     }
     dvec_normalize(dir);
 }
@@ -139,13 +146,17 @@ static void any_row(const ray_job *job, int row, float *origin, float *dir)
     const bool opens = shot->aperture_radius > 0;
     for (int i = 0; i < width; i++, origin += 3, dir += 3) {
         const size_t pixel = (size_t)row * (size_t)width + (size_t)i;
-        const pose *at = job->poses + (shot->shutter == RAY_SHUTTER_ROWS ? row : shot->shutter == RAY_SHUTTER_COLUMNS ? i : 0);
+        const pose *at = job->poses + (shot->shutter == RAY_SHUTTER_ROWS      ? row
+                                       : shot->shutter == RAY_SHUTTER_COLUMNS ? i
+                                                                              : 0);
         double start[3] = {0, 0, 0}, d[3] = {0, 0, 1};
-        if (job->lens.kind == LENS_ORTHOGRAPHIC)
-            start[0] = job->column_u[i], start[1] = v;
-        else if (job->pinhole)
-            d[0] = job->column_u[i], d[1] = v;
-        else
+        if (job->lens.kind == LENS_ORTHOGRAPHIC) {
+            start[0] = job->column_u[i];
+            start[1] = v;
+        } else if (job->pinhole) {
+            d[0] = job->column_u[i];
+            d[1] = v;
+        } else
             memcpy(d, job->camera_dir + 3 * pixel, sizeof d);
         if (d[0] != 0 || d[1] != 0 || d[2] != 0) {
             if (opens)
@@ -155,8 +166,10 @@ static void any_row(const ray_job *job, int row, float *origin, float *dir)
         }
         dmat_apply_transposed(at->rotation, start, start);
         dmat_apply_transposed(at->rotation, d, d);
-        for (int k = 0; k < 3; k++)
-            origin[k] = (float)(at->center[k] + start[k]), dir[k] = (float)d[k];
+        for (int k = 0; k < 3; k++) {
+            origin[k] = (float)(at->center[k] + start[k]);
+            dir[k] = (float)d[k];
+        }
     }
 }
 
@@ -197,7 +210,8 @@ static void make_rows(size_t block, size_t begin, size_t end, void *context)
 
 static bool same_lens(const gbt_camera *a, const gbt_camera *b)
 {
-    return a->model == b->model && a->width == b->width && a->height == b->height && memcmp(a->params, b->params, sizeof a->params) == 0;
+    return a->model == b->model && a->width == b->width && a->height == b->height &&
+           memcmp(a->params, b->params, sizeof a->params) == 0;
 }
 
 static bool pose_is_finite(const gbt_camera *camera)
@@ -219,24 +233,30 @@ static double origin_bound(const ray_shot *shot, const camera_lens *lens)
         camera_lens_origin(lens, i % 2 * shot->camera.width, i / 2 * shot->camera.height, corner);
         far = fmax(far, dvec_length(corner));
     }
-    return far + shot->aperture_radius + fmax(dvec_length(shot->camera.center), dvec_length(shot->end.center));
+    return far + shot->aperture_radius +
+           fmax(dvec_length(shot->camera.center), dvec_length(shot->end.center));
 }
 
 static gbt_status check_shot(const ray_shot *shot, camera_lens *lens, gbt_error *err)
 {
     const gbt_camera *camera = &shot->camera;
     if (camera->width < 1 || camera->height < 1)
-        return base_fail(err, GBT_ERR_ARGUMENT, "camera: size %d x %d (wanted both >= 1)", camera->width, camera->height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: size %d x %d (wanted both >= 1)", camera->width,
+                         camera->height);
     if (!camera_lens_prepare(camera, lens))
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "camera: model %d has unusable parameters (wanted a known model, finite values, focal length > 0)",
+                         "camera: model %d has unusable parameters (wanted a known model, finite values, "
+                         "focal length > 0)",
                          (int)camera->model);
     if (!pose_is_finite(camera) || !pose_is_finite(&shot->end))
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: the pose is not finite");
     if (!(shot->aperture_radius >= 0 && isfinite(shot->aperture_radius)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "camera: aperture radius %g (wanted >= 0)", shot->aperture_radius);
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: aperture radius %g (wanted >= 0)",
+                         shot->aperture_radius);
     if (shot->aperture_radius > 0 && !(shot->focus_distance > 0 && isfinite(shot->focus_distance)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "camera: focus distance %g (wanted > 0, as there is an aperture)", shot->focus_distance);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "camera: focus distance %g (wanted > 0, as there is an aperture)",
+                         shot->focus_distance);
     if (ray_shot_sample_count(shot) < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: %d samples (wanted >= 1)", shot->samples);
     if (!(origin_bound(shot, lens) < origin_max))
@@ -252,7 +272,8 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err)
 
 gbt_status ray_image_reserve(ray_image *out, int width, int height, bool common_origin, gbt_error *err)
 {
-    if (out->dir != NULL && out->common_origin == common_origin && out->width == width && out->height == height)
+    if (out->dir != NULL && out->common_origin == common_origin && out->width == width &&
+        out->height == height)
         return GBT_OK;
     ray_image_free(out);
     const size_t count = (size_t)width * (size_t)height;
@@ -262,7 +283,9 @@ gbt_status ray_image_reserve(ray_image *out, int width, int height, bool common_
         ray_image_free(out);
         return GBT_ERR_NO_MEMORY;
     }
-    out->width = width, out->height = height, out->common_origin = common_origin;
+    out->width = width;
+    out->height = height;
+    out->common_origin = common_origin;
     return GBT_OK;
 }
 
@@ -299,7 +322,8 @@ static gbt_status make_poses(const ray_shot *shot, pose **out, gbt_error *err)
     const int count = still ? 1 : shot->shutter == RAY_SHUTTER_ROWS ? camera->height : camera->width;
     camera_motion motion;
     if (!still && !camera_motion_prepare(camera, &shot->end, &motion))
-        return base_fail(err, GBT_ERR_ARGUMENT, "camera: a rolling shutter wants two poses whose rotations are rotations");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "camera: a rolling shutter wants two poses whose rotations are rotations");
     pose *poses = mem_alloc((size_t)count, sizeof *poses, "poses", err);
     if (poses == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -311,8 +335,9 @@ static gbt_status make_poses(const ray_shot *shot, pose **out, gbt_error *err)
     return GBT_OK;
 }
 
-/* The disc as m rings around each other, cut into `count` cells of the same area, about as long as wide (m^2 pi = count): ring j ends
-   with cell count ((j + 1) / m)^2. All pixels take a sample in the same cell, so that neighbouring rays stay close. */
+/* The disc as m rings around each other, cut into `count` cells of the same area, about as long as wide (m^2
+   pi = count): ring j ends with cell count ((j + 1) / m)^2. All pixels take a sample in the same cell, so
+   that neighbouring rays stay close. */
 static aperture_cell find_cell(int sample, int count)
 {
     const int rings = (int)fmax(1, floor(sqrt(count / PI) + 0.5));
@@ -334,7 +359,8 @@ static gbt_status copy_given(const ray_image *given, ray_image *out, gbt_error *
     return GBT_OK;
 }
 
-/* A rolling shutter between two equal poses is none: all rays start at one point, which is quicker to trace. */
+/* A rolling shutter between two equal poses is none: all rays start at one point, which is quicker to
+   trace. */
 static bool stands_still(const ray_shot *shot)
 {
     return memcmp(shot->camera.rotation, shot->end.rotation, sizeof shot->end.rotation) == 0 &&
@@ -349,7 +375,8 @@ static gbt_status make_rays(const ray_shot *given, int sample, ray_image *out, g
     ray_job job = {.shot = shot, .sample = (uint64_t)sample};
     GBT_TRY(check_shot(given, &job.lens, err));
     if (sample < 0 || sample >= ray_shot_sample_count(shot))
-        return base_fail(err, GBT_ERR_ARGUMENT, "camera: sample %d of %d", sample, ray_shot_sample_count(shot));
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: sample %d of %d", sample,
+                         ray_shot_sample_count(shot));
     job.cell = find_cell(sample, ray_shot_sample_count(shot));
     const bool flat = job.lens.kind == LENS_ORTHOGRAPHIC;
     const bool common_origin = !flat && shot->shutter == RAY_SHUTTER_GLOBAL && !(shot->aperture_radius > 0);
@@ -363,7 +390,10 @@ static gbt_status make_rays(const ray_shot *given, int sample, ray_image *out, g
     if (column_u != NULL) {
         if (common_origin)
             round3(shot->camera.center, out->origin);
-        job.poses = poses, job.column_u = column_u, job.origin = common_origin ? NULL : out->origin, job.dir = out->dir;
+        job.poses = poses;
+        job.column_u = column_u;
+        job.origin = common_origin ? NULL : out->origin;
+        job.dir = out->dir;
         parallel_blocks((size_t)shot->camera.height, ROW_GRAIN, make_rows, &job);
     }
     mem_free(poses);
@@ -373,7 +403,8 @@ static gbt_status make_rays(const ray_shot *given, int sample, ray_image *out, g
 
 gbt_status ray_image_from_shot(const ray_shot *shot, int sample, ray_image *out, gbt_error *err)
 {
-    const gbt_status status = shot->given != NULL ? copy_given(shot->given, out, err) : make_rays(shot, sample, out, err);
+    const gbt_status status =
+        shot->given != NULL ? copy_given(shot->given, out, err) : make_rays(shot, sample, out, err);
     if (status != GBT_OK)
         ray_image_free(out);
     return status;

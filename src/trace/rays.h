@@ -1,4 +1,6 @@
-/* trace/rays.h -- the rays of one view: of a camera standing still, moving while it is read out, with an open aperture; or given. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/rays.h -- the rays of one view: of a camera standing still, moving while it is read out, with an open
+   aperture; or given. */
 #ifndef GBT_TRACE_RAYS_H
 #define GBT_TRACE_RAYS_H
 
@@ -12,10 +14,12 @@
 /** Row-major. A ray with a zero direction is invalid: it sees the background, and its transmittance is 1. */
 typedef struct ray_image {
     int width, height;
-    float *origin;      /* [3] when shared by all rays (common_origin), else [height * width][3]; scene-local units; owned */
-    float *dir;         /* [height * width][3], unit (to float rounding) or zero; owned */
+    float *origin; /* [3] when shared by all rays (common_origin), else [height * width][3]; scene-local
+                      units; owned */
+    float *dir;    /* [height * width][3], unit (to float rounding) or zero; owned */
     bool common_origin;
-    float *far;         /* [height * width] or NULL: nothing at this distance or behind it is seen (a surface stands there); owned */
+    float *far; /* [height * width] or NULL: nothing at this distance or behind it is seen (a surface stands
+                   there); owned */
     /* Kept by ray_image_from_shot() for the next pose of the same lens; NULL for a pinhole. */
     double *camera_dir; /* [height * width][3] in camera axes; owned */
     gbt_camera camera;  /* whose lens camera_dir is */
@@ -29,12 +33,14 @@ typedef enum ray_shutter {
 
 /** How one picture is taken. Start from ray_shot_of(). Lengths in scene-local units. */
 typedef struct ray_shot {
-    gbt_camera camera;      /* lens, size, and the pose (of the first row or column, when the shutter rolls) */
-    ray_shutter shutter;    /* default RAY_SHUTTER_GLOBAL */
-    gbt_camera end;         /* pose of the last row or column; the rest is not used */
+    gbt_camera camera;   /* lens, size, and the pose (of the first row or column, when the shutter rolls) */
+    ray_shutter shutter; /* default RAY_SHUTTER_GLOBAL */
+    gbt_camera end;      /* pose of the last row or column; the rest is not used */
     double aperture_radius; /* >= 0; 0, the default, is a pinhole */
-    double focus_distance;  /* > 0 when there is an aperture: depth of the plane in focus, or its radius where it is a sphere */
-    int samples;            /* per pixel, over the aperture; >= 1. Default 64; without an aperture one is enough, and is all there is */
+    double focus_distance;  /* > 0 when there is an aperture: depth of the plane in focus, or its radius where
+                               it is a sphere */
+    int samples; /* per pixel, over the aperture; >= 1. Default 64; without an aperture one is enough, and is
+                    all there is */
     uint64_t seed;          /* of the points on the aperture. Default 0 */
     const ray_image *given; /* borrowed: these rays, in place of all above. Default NULL */
 } ray_shot;
@@ -56,18 +62,23 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err);
 /**
  * The rays of sample `sample` of a shot through the pixel centres, in world axes.
  *
- * Everything is computed in double and rounded once. A pixel where the lens has no ray gets a zero direction. Formulas: docs/cameras.md.
- * - Line i of n (row or column) of a rolling shutter is taken at the time i / (n - 1) of the way from `camera` to `end`.
- * - The aperture is cut into N cells of the same area; sample s of N leaves it at a point of cell s, drawn evenly for (seed, s, pixel).
+ * Everything is computed in double and rounded once. A pixel where the lens has no ray gets a zero direction.
+ * Formulas: docs/cameras.md.
+ * - Line i of n (row or column) of a rolling shutter is taken at the time i / (n - 1) of the way from
+ * `camera` to `end`.
+ * - The aperture is cut into N cells of the same area; sample s of N leaves it at a point of cell s, drawn
+ * evenly for (seed, s, pixel).
  *   It goes through the point that the ray through the middle of the aperture has in focus.
  *
  * @param sample [in] 0 .. ray_shot_sample_count() - 1
- * @param out    [in,out] start from {0}, free with ray_image_free(); its arrays are used again when the size is the same; empty on failure
- * @return GBT_OK, GBT_ERR_ARGUMENT (a size < 1, a camera that sees nothing, a pose that is not finite or not a rotation, rays that start
- *         beyond 1e17, an aperture without a focus), GBT_ERR_NO_MEMORY
+ * @param out    [in,out] start from {0}, free with ray_image_free(); its arrays are used again when the size
+ *                        is the same; empty on failure
+ * @return GBT_OK, GBT_ERR_ARGUMENT (a size < 1, a camera that sees nothing, a pose that is not finite or not
+ *         a rotation, rays that start beyond 1e17, an aperture without a focus), GBT_ERR_NO_MEMORY
  * Threads: runs in parallel over rows; same bits for every thread count.
- * Cost: 0.4 to 1 ms of one core per 10^5 rays of a pinhole or orthographic camera, also when it moves by rows; 2 ms by columns; 7 ms with
- * an aperture; a distorted lens 20 to 60 ms more when it is not the lens of the call before.
+ * Cost: 0.4 to 1 ms of one core per 10^5 rays of a pinhole or orthographic camera, also when it moves by
+ * rows; 2 ms by columns; 7 ms with an aperture; a distorted lens 20 to 60 ms more when it is not the lens of
+ * the call before.
  */
 gbt_status ray_image_from_shot(const ray_shot *shot, int sample, ray_image *out, gbt_error *err);
 

@@ -1,4 +1,6 @@
-/* trace/reference.c -- what one ray sees, in double and without any cleverness. The equations are in the header. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/reference.c -- what one ray sees, in double and without any cleverness. The equations are in the
+   header. */
 #include "trace/reference.h"
 
 #include <math.h>
@@ -46,13 +48,15 @@ static prepared prepare(const reference_scene *scene, const trace_settings *s, s
         for (int k = 0; k < 3; k++)
             p.canon[3 * axis + k] = r[3 * k + axis] / field(scene, REFERENCE_scale_x + (unsigned)axis, i);
     }
-    p.d2_max = is_usable(scene, i) ? fmin(2 * log(p.opacity / (double)s->alpha_min) + 1e-6, pow((double)s->proxy_radius, 2)) : -HUGE_VAL;
+    p.d2_max = is_usable(scene, i)
+                   ? fmin(2 * log(p.opacity / (double)s->alpha_min) + 1e-6, pow((double)s->proxy_radius, 2))
+                   : -HUGE_VAL;
     return p;
 }
 
 /* The response of one Gaussian; v = x' + t_c w'. NaN anywhere makes the last comparison false. */
-static bool respond(const prepared *p, const trace_settings *s, const double origin[3], const double dir[3], reference_hit *hit,
-                    double v[3])
+static bool respond(const prepared *p, const trace_settings *s, const double origin[3], const double dir[3],
+                    reference_hit *hit, double v[3])
 {
     const double offset[3] = {origin[0] - p->mean[0], origin[1] - p->mean[1], origin[2] - p->mean[2]};
     double x[3], w[3];
@@ -85,8 +89,9 @@ typedef struct hit_list {
     size_t count, capacity;
 } hit_list;
 
-static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s, const double origin[3], const double dir[3],
-                         double far, hit_list *list, gbt_error *err)
+static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s,
+                         const double origin[3], const double dir[3], double far, hit_list *list,
+                         gbt_error *err)
 {
     list->count = 0;
     if (dir[0] == 0 && dir[1] == 0 && dir[2] == 0)
@@ -96,7 +101,8 @@ static gbt_status gather(const prepared *all, size_t all_count, const trace_sett
         double v[3];
         if (!respond(&all[i], s, origin, dir, &hit, v) || !(hit.t < far))
             continue;
-        GBT_TRY(mem_reserve((void **)&list->hits, &list->capacity, list->count, list->count + 1, sizeof hit, "reference hits", err));
+        GBT_TRY(mem_reserve((void **)&list->hits, &list->capacity, list->count, list->count + 1, sizeof hit,
+                            "reference hits", err));
         list->hits[list->count++] = hit;
     }
     if (list->count > 1)
@@ -105,7 +111,8 @@ static gbt_status gather(const prepared *all, size_t all_count, const trace_sett
 }
 
 /* Front to back; returns how many hits were added. */
-static size_t blend(const reference_scene *scene, const trace_settings *s, const hit_list *list, double rgb[3], double *transmittance)
+static size_t blend(const reference_scene *scene, const trace_settings *s, const hit_list *list,
+                    double rgb[3], double *transmittance)
 {
     double T = 1;
     size_t n = 0;
@@ -125,7 +132,8 @@ static size_t blend(const reference_scene *scene, const trace_settings *s, const
     return n;
 }
 
-static gbt_status prepare_all(const reference_scene *scene, const trace_settings *s, prepared **out, gbt_error *err)
+static gbt_status prepare_all(const reference_scene *scene, const trace_settings *s, prepared **out,
+                              gbt_error *err)
 {
     *out = mem_alloc(scene->count, sizeof **out, "reference scene", err);
     if (*out == NULL)
@@ -137,8 +145,10 @@ static gbt_status prepare_all(const reference_scene *scene, const trace_settings
 
 static void ray_of(const ray_image *rays, size_t i, double origin[3], double dir[3])
 {
-    for (int k = 0; k < 3; k++)
-        origin[k] = (double)ray_image_origin(rays, i)[k], dir[k] = (double)rays->dir[3 * i + (size_t)k];
+    for (int k = 0; k < 3; k++) {
+        origin[k] = (double)ray_image_origin(rays, i)[k];
+        dir[k] = (double)rays->dir[3 * i + (size_t)k];
+    }
 }
 
 static double far_of(const ray_image *rays, size_t i)
@@ -163,7 +173,8 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++) {
         double origin[3], dir[3], transmittance;
         ray_of(job->rays, i, origin, dir);
-        job->status[block] = gather(job->all, job->scene->count, job->s, origin, dir, far_of(job->rays, i), &list, NULL);
+        job->status[block] =
+            gather(job->all, job->scene->count, job->s, origin, dir, far_of(job->rays, i), &list, NULL);
         const size_t n = blend(job->scene, job->s, &list, job->rgb + 3 * i, &transmittance);
         if (job->transmittance != NULL)
             job->transmittance[i] = transmittance;
@@ -173,8 +184,9 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
     mem_free(list.hits);
 }
 
-gbt_status reference_scene_forward(const reference_scene *scene, const trace_settings *s, const ray_image *rays, double *rgb,
-                                   double *transmittance, uint32_t *blended, gbt_error *err)
+gbt_status reference_scene_forward(const reference_scene *scene, const trace_settings *s,
+                                   const ray_image *rays, double *rgb, double *transmittance,
+                                   uint32_t *blended, gbt_error *err)
 {
     const size_t ray_count = ray_image_count(rays), block_count = parallel_block_count(ray_count, RAY_GRAIN);
     prepared *all = NULL;
@@ -185,7 +197,9 @@ gbt_status reference_scene_forward(const reference_scene *scene, const trace_set
         parallel_blocks(ray_count, RAY_GRAIN, forward_block, &job);
         for (size_t block = 0; block < block_count && status == GBT_OK; block++)
             if (block_status[block] != GBT_OK)
-                status = base_fail(err, block_status[block], "reference: no memory for the hits of rays from %zu on", block * RAY_GRAIN);
+                status =
+                    base_fail(err, block_status[block],
+                              "reference: no memory for the hits of rays from %zu on", block * RAY_GRAIN);
     }
     mem_free(all);
     mem_free(block_status);
@@ -193,8 +207,9 @@ gbt_status reference_scene_forward(const reference_scene *scene, const trace_set
 }
 
 /* Chain from dL/dalpha of one hit to the fields of its Gaussian. */
-static void respond_backward(const reference_scene *scene, const prepared *p, const trace_settings *s, const double origin[3],
-                             const double dir[3], size_t id, double d_alpha, double *d_gaussians)
+static void respond_backward(const reference_scene *scene, const prepared *p, const trace_settings *s,
+                             const double origin[3], const double dir[3], size_t id, double d_alpha,
+                             double *d_gaussians)
 {
     reference_hit hit;
     double v[3], q[4], scale[3];
@@ -227,15 +242,19 @@ static void respond_backward(const reference_scene *scene, const prepared *p, co
     d[REFERENCE_quat_z * n] += q[0] * a2 + q[1] * a1 - q[2] * a0;
 }
 
-/* Back to front: `behind` is the colour and `open` the transmittance of everything behind a hit, so nothing is divided by 1 - alpha. */
-static void ray_backward(const reference_scene *scene, const prepared *all, const trace_settings *s, const double origin[3],
-                         const double dir[3], const hit_list *list, const double d_rgb[3], double d_transmittance, double *d_gaussians,
+/* Back to front: `behind` is the colour and `open` the transmittance of everything behind a hit, so nothing
+   is divided by 1 - alpha. */
+static void ray_backward(const reference_scene *scene, const prepared *all, const trace_settings *s,
+                         const double origin[3], const double dir[3], const hit_list *list,
+                         const double d_rgb[3], double d_transmittance, double *d_gaussians,
                          double d_background[3])
 {
     double rgb[3], T, behind[3], open = 1;
     const size_t blended = blend(scene, s, list, rgb, &T);
-    for (int c = 0; c < 3; c++)
-        behind[c] = (double)s->background[c], d_background[c] += T * d_rgb[c];
+    for (int c = 0; c < 3; c++) {
+        behind[c] = (double)s->background[c];
+        d_background[c] += T * d_rgb[c];
+    }
     for (size_t i = blended; i-- > 0;) {
         const reference_hit *hit = &list->hits[i];
         double in_front = 1;
@@ -253,8 +272,9 @@ static void ray_backward(const reference_scene *scene, const prepared *all, cons
     }
 }
 
-gbt_status reference_scene_backward(const reference_scene *scene, const trace_settings *s, const ray_image *rays, const double *d_rgb,
-                                    const double *d_transmittance, double *d_gaussians, double d_background[3], gbt_error *err)
+gbt_status reference_scene_backward(const reference_scene *scene, const trace_settings *s,
+                                    const ray_image *rays, const double *d_rgb, const double *d_transmittance,
+                                    double *d_gaussians, double d_background[3], gbt_error *err)
 {
     prepared *all = NULL;
     hit_list list = {0};
@@ -264,16 +284,17 @@ gbt_status reference_scene_backward(const reference_scene *scene, const trace_se
         ray_of(rays, i, origin, dir);
         status = gather(all, scene->count, s, origin, dir, far_of(rays, i), &list, err);
         if (status == GBT_OK)
-            ray_backward(scene, all, s, origin, dir, &list, d_rgb + 3 * i, d_transmittance != NULL ? d_transmittance[i] : 0, d_gaussians,
-                         d_background);
+            ray_backward(scene, all, s, origin, dir, &list, d_rgb + 3 * i,
+                         d_transmittance != NULL ? d_transmittance[i] : 0, d_gaussians, d_background);
     }
     mem_free(list.hits);
     mem_free(all);
     return status;
 }
 
-gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_settings *s, const double origin[3], const double dir[3],
-                                    reference_hit **hits, size_t *count, size_t *capacity, gbt_error *err)
+gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_settings *s,
+                                    const double origin[3], const double dir[3], reference_hit **hits,
+                                    size_t *count, size_t *capacity, gbt_error *err)
 {
     hit_list list = {*hits, 0, *capacity};
     prepared *all = NULL;
@@ -281,7 +302,9 @@ gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_se
     if (status == GBT_OK)
         status = gather(all, scene->count, s, origin, dir, HUGE_VAL, &list, err);
     mem_free(all);
-    *hits = list.hits, *capacity = list.capacity, *count = status == GBT_OK ? list.count : 0;
+    *hits = list.hits;
+    *capacity = list.capacity;
+    *count = status == GBT_OK ? list.count : 0;
     return status;
 }
 
@@ -289,14 +312,15 @@ gbt_status reference_scene_make(const gaussians *g, reference_scene *out, gbt_er
 {
     memset(out, 0, sizeof *out);
     if (g->count > UINT32_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "reference: %zu Gaussians (wanted at most 2^32 - 1)", g->count);
+        return base_fail(err, GBT_ERR_ARGUMENT, "reference: %zu Gaussians (wanted at most 2^32 - 1)",
+                         g->count);
     out->fields = mem_alloc(g->count, GAUSSIANS_FIELD_COUNT * sizeof *out->fields, "reference scene", err);
     if (out->fields == NULL)
         return GBT_ERR_NO_MEMORY;
     out->count = g->count;
     double *to = out->fields;
-#define X(name, pad, meaning)             \
-    for (size_t i = 0; i < g->count; i++) \
+#define X(name, pad, meaning)                                                                                \
+    for (size_t i = 0; i < g->count; i++)                                                                    \
         *to++ = (double)g->name[i];
     GAUSSIANS_FIELDS(X)
 #undef X
@@ -310,29 +334,32 @@ void reference_scene_free(reference_scene *scene)
 }
 
 /* Copy `g` as `scene`, run `call` on it. */
-#define ON_COPY(call)                                         \
-    reference_scene scene;                                    \
-    gbt_status status = reference_scene_make(g, &scene, err); \
-    if (status == GBT_OK)                                     \
-        status = call;                                        \
-    reference_scene_free(&scene);                             \
+#define ON_COPY(call)                                                                                        \
+    reference_scene scene;                                                                                   \
+    gbt_status status = reference_scene_make(g, &scene, err);                                                \
+    if (status == GBT_OK)                                                                                    \
+        status = call;                                                                                       \
+    reference_scene_free(&scene);                                                                            \
     return status
 
-gbt_status reference_ray_hits(const gaussians *g, const trace_settings *s, const double origin[3], const double dir[3],
-                              reference_hit **hits, size_t *count, size_t *capacity, gbt_error *err)
+gbt_status reference_ray_hits(const gaussians *g, const trace_settings *s, const double origin[3],
+                              const double dir[3], reference_hit **hits, size_t *count, size_t *capacity,
+                              gbt_error *err)
 {
     *count = 0;
     ON_COPY(reference_scene_ray_hits(&scene, s, origin, dir, hits, count, capacity, err));
 }
 
-gbt_status reference_forward(const gaussians *g, const trace_settings *s, const ray_image *rays, double *rgb, double *transmittance,
-                             uint32_t *blended, gbt_error *err)
+gbt_status reference_forward(const gaussians *g, const trace_settings *s, const ray_image *rays, double *rgb,
+                             double *transmittance, uint32_t *blended, gbt_error *err)
 {
     ON_COPY(reference_scene_forward(&scene, s, rays, rgb, transmittance, blended, err));
 }
 
-gbt_status reference_backward(const gaussians *g, const trace_settings *s, const ray_image *rays, const double *d_rgb,
-                              const double *d_transmittance, double *d_gaussians, double d_background[3], gbt_error *err)
+gbt_status reference_backward(const gaussians *g, const trace_settings *s, const ray_image *rays,
+                              const double *d_rgb, const double *d_transmittance, double *d_gaussians,
+                              double d_background[3], gbt_error *err)
 {
-    ON_COPY(reference_scene_backward(&scene, s, rays, d_rgb, d_transmittance, d_gaussians, d_background, err));
+    ON_COPY(
+        reference_scene_backward(&scene, s, rays, d_rgb, d_transmittance, d_gaussians, d_background, err));
 }

@@ -1,8 +1,11 @@
-/* trace/reference.h -- the definition of what one ray sees, in double, every Gaussian against every ray; and its adjoint.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/reference.h -- the definition of what one ray sees, in double, every Gaussian against every ray; and
+   its adjoint.
 
-   x' = S^-1 R^T (x - mu), w' = S^-1 R^T w, t* = -(x'.w') / (w'.w'), t_c = max(t*, t_near), d2 = |x' + t_c w'|^2,
-   alpha = min(alpha_max, o exp(-d2 / 2)), kept if alpha >= alpha_min; ordered by (t_c, id); blended front to back; stopped before
-   the hit that would make T < transmittance_min; background last. The fast renderers are tested against this one. */
+   x' = S^-1 R^T (x - mu), w' = S^-1 R^T w, t* = -(x'.w') / (w'.w'), t_c = max(t*, t_near), d2 = |x' + t_c
+   w'|^2, alpha = min(alpha_max, o exp(-d2 / 2)), kept if alpha >= alpha_min; ordered by (t_c, id); blended
+   front to back; stopped before the hit that would make T < transmittance_min; background last. The fast
+   renderers are tested against this one. */
 #ifndef GBT_TRACE_REFERENCE_H
 #define GBT_TRACE_REFERENCE_H
 
@@ -39,16 +42,19 @@ void reference_scene_free(reference_scene *scene); /* zeroes the struct */
 /**
  * All hits of one ray with alpha >= alpha_min, sorted by (t, id).
  *
- * @param hits, capacity [in,out] array that grows by mem_reserve(); start from NULL and 0, free with mem_free()
+ * @param hits, capacity [in,out] array that grows by mem_reserve(); start from NULL and 0, free with
+ *              mem_free()
  * @param count          [out]    number of hits; 0 for a zero direction
  * Gaussians with values that are not finite, or scales that are not positive, are never hit.
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: any, with distinct `hits`. Cost: about 10 ns per Gaussian, plus making a scene in the first form.
  */
-gbt_status reference_ray_hits(const gaussians *g, const trace_settings *s, const double origin[3], const double dir[3],
-                              reference_hit **hits, size_t *count, size_t *capacity, gbt_error *err);
-gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_settings *s, const double origin[3], const double dir[3],
-                                    reference_hit **hits, size_t *count, size_t *capacity, gbt_error *err);
+gbt_status reference_ray_hits(const gaussians *g, const trace_settings *s, const double origin[3],
+                              const double dir[3], reference_hit **hits, size_t *count, size_t *capacity,
+                              gbt_error *err);
+gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_settings *s,
+                                    const double origin[3], const double dir[3], reference_hit **hits,
+                                    size_t *count, size_t *capacity, gbt_error *err);
 
 /**
  * Colour and transmittance of every ray.
@@ -57,18 +63,21 @@ gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_se
  * @param transmittance [out] [rays], remaining T in front of the background; optional (NULL)
  * @param blended       [out] [rays], number of hits that were added; optional (NULL)
  * @return GBT_OK, GBT_ERR_ARGUMENT (too many Gaussians) or GBT_ERR_NO_MEMORY
- * Threads: parallel over rays; same bits for every thread count. Cost: about 10 ns for each pair of ray and Gaussian.
+ * Threads: parallel over rays; same bits for every thread count. Cost: about 10 ns for each pair of ray and
+ * Gaussian.
  */
-gbt_status reference_forward(const gaussians *g, const trace_settings *s, const ray_image *rays, double *rgb, double *transmittance,
-                             uint32_t *blended, gbt_error *err);
-gbt_status reference_scene_forward(const reference_scene *scene, const trace_settings *s, const ray_image *rays, double *rgb,
-                                   double *transmittance, uint32_t *blended, gbt_error *err);
+gbt_status reference_forward(const gaussians *g, const trace_settings *s, const ray_image *rays, double *rgb,
+                             double *transmittance, uint32_t *blended, gbt_error *err);
+gbt_status reference_scene_forward(const reference_scene *scene, const trace_settings *s,
+                                   const ray_image *rays, double *rgb, double *transmittance,
+                                   uint32_t *blended, gbt_error *err);
 
 /**
  * Adjoint of reference_forward(): adds dL/dfield into `d_gaussians` and dL/dbackground into `d_background`.
  *
- * t_c is held fixed: exact at an inner t* (there d2 is at its minimum along the ray) and at t_near (a constant). The gradient is 0
- * where alpha is cut at alpha_max. Scales are linear. The quaternion is taken as unit, and its gradient is tangent to it.
+ * t_c is held fixed: exact at an inner t* (there d2 is at its minimum along the ray) and at t_near (a
+ * constant). The gradient is 0 where alpha is cut at alpha_max. Scales are linear. The quaternion is taken as
+ * unit, and its gradient is tangent to it.
  *
  * @param d_rgb           [in]     [rays][3] dL/drgb
  * @param d_transmittance [in]     [rays] dL/dT; NULL = 0
@@ -77,9 +86,11 @@ gbt_status reference_scene_forward(const reference_scene *scene, const trace_set
  * @return as reference_forward(); after a failure the gradients are incomplete
  * Threads: one; sums are in ray order.
  */
-gbt_status reference_backward(const gaussians *g, const trace_settings *s, const ray_image *rays, const double *d_rgb,
-                              const double *d_transmittance, double *d_gaussians, double d_background[3], gbt_error *err);
-gbt_status reference_scene_backward(const reference_scene *scene, const trace_settings *s, const ray_image *rays, const double *d_rgb,
-                                    const double *d_transmittance, double *d_gaussians, double d_background[3], gbt_error *err);
+gbt_status reference_backward(const gaussians *g, const trace_settings *s, const ray_image *rays,
+                              const double *d_rgb, const double *d_transmittance, double *d_gaussians,
+                              double d_background[3], gbt_error *err);
+gbt_status reference_scene_backward(const reference_scene *scene, const trace_settings *s,
+                                    const ray_image *rays, const double *d_rgb, const double *d_transmittance,
+                                    double *d_gaussians, double d_background[3], gbt_error *err);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* trace/rounding_band.c -- rays on which float32 and double may decide differently. */
 #include "trace/rounding_band.h"
 
@@ -10,9 +11,11 @@
 static const double alpha_band = 1e-6, transmittance_band = 1e-5, depth_band = 2e-6;
 
 /* `hits` go a little below alpha_min. */
-static bool is_in_band(const reference_scene *scene, const trace_settings *s, const reference_hit *hits, size_t count)
+static bool is_in_band(const reference_scene *scene, const trace_settings *s, const reference_hit *hits,
+                       size_t count)
 {
-    const double alpha_min = (double)s->alpha_min, alpha_max = (double)s->alpha_max, stop = (double)s->transmittance_min;
+    const double alpha_min = (double)s->alpha_min, alpha_max = (double)s->alpha_max,
+                 stop = (double)s->transmittance_min;
     double T = 1, before = -1;
     for (size_t i = 0; i < count; i++) {
         const reference_hit *h = &hits[i];
@@ -34,16 +37,19 @@ static bool is_in_band(const reference_scene *scene, const trace_settings *s, co
     return false;
 }
 
-gbt_status rounding_band_find(const reference_scene *scene, const trace_settings *settings, const float origin[3], const float dir[3],
-                              band_scratch *scratch, bool *in_band)
+gbt_status rounding_band_find(const reference_scene *scene, const trace_settings *settings,
+                              const float origin[3], const float dir[3], band_scratch *scratch, bool *in_band)
 {
     trace_settings loose = *settings;
     size_t count;
     double from[3], along[3];
     loose.alpha_min = fmaxf(loose.alpha_min - 2 * (float)alpha_band, 0);
-    for (int k = 0; k < 3; k++)
-        from[k] = (double)origin[k], along[k] = (double)dir[k];
-    GBT_TRY(reference_scene_ray_hits(scene, &loose, from, along, &scratch->hits, &count, &scratch->capacity, NULL));
+    for (int k = 0; k < 3; k++) {
+        from[k] = (double)origin[k];
+        along[k] = (double)dir[k];
+    }
+    GBT_TRY(reference_scene_ray_hits(scene, &loose, from, along, &scratch->hits, &count, &scratch->capacity,
+                                     NULL));
     *in_band = is_in_band(scene, settings, scratch->hits, count);
     return GBT_OK;
 }

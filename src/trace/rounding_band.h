@@ -1,4 +1,6 @@
-/* trace/rounding_band.h -- rays on which float32 and double may decide differently: at a cut-off, or between equal depths. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/rounding_band.h -- rays on which float32 and double may decide differently: at a cut-off, or between
+   equal depths. */
 #ifndef GBT_EVAL_ROUNDING_BAND_H
 #define GBT_EVAL_ROUNDING_BAND_H
 
@@ -15,15 +17,16 @@ typedef struct band_scratch {
 /**
  * May rounding change which hits a ray blends, or their order?
  *
- * So it is when an alpha is within 1e-6 of alpha_min or alpha_max, a transmittance within 1e-5 of T_min (relative), or two neighbours'
- * depths within 2e-6 (relative).
+ * So it is when an alpha is within 1e-6 of alpha_min or alpha_max, a transmittance within 1e-5 of T_min
+ * (relative), or two neighbours' depths within 2e-6 (relative).
  *
  * @param origin, dir [in] as traced: rounded to float
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: any, with distinct `scratch`. Cost: that of reference_scene_ray_hits().
  */
-gbt_status rounding_band_find(const reference_scene *scene, const trace_settings *settings, const float origin[3], const float dir[3],
-                              band_scratch *scratch, bool *in_band);
+gbt_status rounding_band_find(const reference_scene *scene, const trace_settings *settings,
+                              const float origin[3], const float dir[3], band_scratch *scratch,
+                              bool *in_band);
 
 void band_scratch_free(band_scratch *scratch);
 

@@ -1,14 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* trace/rows16.h -- rows: hits of one Gaussian on the sixteen rays of a packet; put in order and blended.
 
-   Nothing is sorted per ray. Rows are put in the order of their nearest depth; then, on every ray, the transmittance in front of a hit is
-   the product over the rows that end before this row begins (one running product for all of them) times the product over the few rows whose
-   depths overlap with it, compared one by one:
+   Nothing is sorted per ray. Rows are put in the order of their nearest depth; then, on every ray, the
+   transmittance in front of a hit is the product over the rows that end before this row begins (one running
+   product for all of them) times the product over the few rows whose depths overlap with it, compared one by
+   one:
 
        T_i = T Q[first_i] prod { 1 - alpha_j : first_i <= j < last_i, t_j before t_i }
 
-   Exact order by t_c at the price of one comparison and one masked multiplication per overlapping pair, without keys, gathers or scatters.
-   Equal depths: the row order decides, which is the order of indices for Gaussians that are tied on all rays and for depths cut at t_near.
-   Included by kernels after simd16.h. */
+   Exact order by t_c at the price of one comparison and one masked multiplication per overlapping pair,
+   without keys, gathers or scatters.
+   Equal depths: the row order decides, which is the order of indices for Gaussians that are tied on all rays
+   and for depths cut at t_near. Included by kernels after simd16.h. */
 #ifndef GBT_TRACE_ROWS16_H
 #define GBT_TRACE_ROWS16_H
 
@@ -18,23 +21,24 @@ enum { ROW_CAPACITY = 512, ROW_BLOCK = 4 /* rows whose windows are walked togeth
 
 /* What a ray shows beside its colour. */
 typedef struct packet_extra {
-    f16 depth, median, normal[3], count, top_weight;
+    vfloat16 depth, median, normal[3], count, top_weight;
     _Alignas(64) uint32_t top_id[PACKET_LANES];
 } packet_extra;
 
 typedef struct packet_rows {
-    _Alignas(64) float t[ROW_CAPACITY * PACKET_LANES];     /* infinity where the ray has no hit left in this row */
+    _Alignas(64) float t[ROW_CAPACITY * PACKET_LANES]; /* infinity where the ray has no hit left in this row
+                                                        */
     _Alignas(64) float alpha[ROW_CAPACITY * PACKET_LANES]; /* 0 there */
     uint32_t id[ROW_CAPACITY];
     uint16_t blended[ROW_CAPACITY]; /* rays that have blended the row */
     int count;
-    m16 alive;
-    f16 transmittance, rgb[3], far;
+    vmask16 alive;
+    vfloat16 transmittance, rgb[3], far;
     packet_extra extra;
 } packet_rows;
 
-/* Rows in the order of their nearest depth, whole vectors of PACKET_LANES; ROW_BLOCK more rows follow the last, so that blocks are
-   whole. */
+/* Rows in the order of their nearest depth, whole vectors of PACKET_LANES; ROW_BLOCK more rows follow the
+   last, so that blocks are whole. */
 typedef struct sorted_rows {
     float *t, *clear;          /* depth, infinity where there is no hit; 1 - alpha, 1 there */
     float *before;             /* Q: transmittance in front of row i if all rows before it were in front */
@@ -42,56 +46,61 @@ typedef struct sorted_rows {
     int count;
 } sorted_rows;
 
-/* The range of rows that a block's depths overlap with. Moves along the rows from block to block; start from {0}. */
+/* The range of rows that a block's depths overlap with. Moves along the rows from block to block; start from
+   {0}. */
 typedef struct row_window {
     int low, high;
 } row_window;
 
-static inline f16 row_load(const float *rows, int i)
+static inline vfloat16 row_load(const float *rows, int i)
 {
-    return f16_load(rows + (size_t)i * PACKET_LANES);
+    return vfloat16_load(rows + (size_t)i * PACKET_LANES);
 }
 
-static inline void row_store(float *rows, int i, f16 a)
+static inline void row_store(float *rows, int i, vfloat16 a)
 {
-    f16_store(rows + (size_t)i * PACKET_LANES, a);
+    vfloat16_store(rows + (size_t)i * PACKET_LANES, a);
 }
 
-/* Nearest and farthest hit of each of `count` rows (room for whole sixteens), 0 for the farthest of none; returned is the nearest of
-   all. */
+/* Nearest and farthest hit of each of `count` rows (room for whole sixteens), 0 for the farthest of none;
+   returned is the nearest of all. */
 static inline float row_depths(const float *t, int count, float *near, float *far)
 {
-    const f16 infinite = f16_set1(INFINITY);
-    f16 nearest = infinite;
+    const vfloat16 infinite = vfloat16_set1(INFINITY);
+    vfloat16 nearest = infinite;
     for (int first = 0; first < count; first += 16) {
-        f16 low[16], high[16];
+        vfloat16 low[16], high[16];
         for (int i = 0; i < 16; i++) {
             low[i] = first + i < count ? row_load(t, first + i) : infinite;
-            high[i] = f16_select(f16_lt(low[i], infinite), low[i], f16_set1(0));
+            high[i] = vfloat16_select(vfloat16_lt(low[i], infinite), low[i], vfloat16_set1(0));
         }
-        const f16 near_rows = f16_min_rows(low);
-        nearest = f16_min(nearest, near_rows);
-        f16_store(near + first, near_rows);
-        f16_store(far + first, f16_max_rows(high));
+        const vfloat16 near_rows = vfloat16_min_rows(low);
+        nearest = vfloat16_min(nearest, near_rows);
+        vfloat16_store(near + first, near_rows);
+        vfloat16_store(far + first, vfloat16_max_rows(high));
     }
-    return f16_lowest(nearest);
+    return vfloat16_lowest(nearest);
 }
 
-/* Row `i` of the order, after row i - 1. `product` and `reached` run along: transmittance in front of it, farthest depth so far. */
-static inline void place_row(sorted_rows *o, int i, f16 t, f16 clear, float near, float far, f16 *product, float *reached)
+/* Row `i` of the order, after row i - 1. `product` and `reached` run along: transmittance in front of it,
+   farthest depth so far. */
+static inline void place_row(sorted_rows *o, int i, vfloat16 t, vfloat16 clear, float near, float far,
+                             vfloat16 *product, float *reached)
 {
     row_store(o->t, i, t);
     row_store(o->clear, i, clear);
     row_store(o->before, i, *product);
-    *product = f16_mul(*product, clear);
+    *product = vfloat16_mul(*product, clear);
     *reached = larger(*reached, far);
-    o->near[i] = near, o->far_reached[i] = *reached;
+    o->near[i] = near;
+    o->far_reached[i] = *reached;
 }
 
 static inline void end_rows(sorted_rows *o)
 {
     for (int i = o->count; i < o->count + ROW_BLOCK; i++) {
-        row_store(o->t, i, f16_set1(INFINITY)), row_store(o->clear, i, f16_set1(1));
+        row_store(o->t, i, vfloat16_set1(INFINITY));
+        row_store(o->clear, i, vfloat16_set1(1));
         o->near[i] = INFINITY;
     }
 }
@@ -108,59 +117,67 @@ static inline void move_window(const sorted_rows *o, int first, row_window *w)
 }
 
 /* Transmittance in front of the hits of rows first .. first + ROW_BLOCK - 1. */
-static inline void window_transmittance(const sorted_rows *o, int first, const row_window *w, f16 T[ROW_BLOCK])
+static inline void window_transmittance(const sorted_rows *o, int first, const row_window *w,
+                                        vfloat16 T[ROW_BLOCK])
 {
-    f16 t[ROW_BLOCK];
-    for (int k = 0; k < ROW_BLOCK; k++)
-        T[k] = row_load(o->before, w->low), t[k] = row_load(o->t, first + k);
+    vfloat16 t[ROW_BLOCK];
+    for (int k = 0; k < ROW_BLOCK; k++) {
+        T[k] = row_load(o->before, w->low);
+        t[k] = row_load(o->t, first + k);
+    }
     for (int j = w->low; j < first; j++) {
-        const f16 tj = row_load(o->t, j), clear = row_load(o->clear, j);
+        const vfloat16 tj = row_load(o->t, j), clear = row_load(o->clear, j);
         for (int k = 0; k < ROW_BLOCK; k++)
-            T[k] = f16_mul_where(f16_le(tj, t[k]), T[k], clear);
+            T[k] = vfloat16_mul_where(vfloat16_le(tj, t[k]), T[k], clear);
     }
     for (int j = 0; j < ROW_BLOCK; j++) {
-        const f16 clear = row_load(o->clear, first + j);
+        const vfloat16 clear = row_load(o->clear, first + j);
         for (int k = 0; k < ROW_BLOCK; k++)
             if (j != k)
-                T[k] = f16_mul_where(j < k ? f16_le(t[j], t[k]) : f16_lt(t[j], t[k]), T[k], clear);
+                T[k] = vfloat16_mul_where(j < k ? vfloat16_le(t[j], t[k]) : vfloat16_lt(t[j], t[k]), T[k],
+                                          clear);
     }
     for (int j = first + ROW_BLOCK; j < w->high; j++) {
-        const f16 tj = row_load(o->t, j), clear = row_load(o->clear, j);
+        const vfloat16 tj = row_load(o->t, j), clear = row_load(o->clear, j);
         for (int k = 0; k < ROW_BLOCK; k++)
-            T[k] = f16_mul_where(f16_lt(tj, t[k]), T[k], clear);
+            T[k] = vfloat16_mul_where(vfloat16_lt(tj, t[k]), T[k], clear);
     }
 }
 
-/* Sum of `term` over the hits behind those of rows first .. first + ROW_BLOCK - 1; after[i] is the sum over rows i and on, and what is
-   behind them. */
-static inline void window_behind(const sorted_rows *o, int first, const row_window *w, const float *term, const float *after,
-                                 f16 sum[ROW_BLOCK])
+/* Sum of `term` over the hits behind those of rows first .. first + ROW_BLOCK - 1; after[i] is the sum over
+   rows i and on, and what is behind them. */
+static inline void window_behind(const sorted_rows *o, int first, const row_window *w, const float *term,
+                                 const float *after, vfloat16 sum[ROW_BLOCK])
 {
-    f16 t[ROW_BLOCK];
-    for (int k = 0; k < ROW_BLOCK; k++)
-        sum[k] = row_load(after, w->high), t[k] = row_load(o->t, first + k);
+    vfloat16 t[ROW_BLOCK];
+    for (int k = 0; k < ROW_BLOCK; k++) {
+        sum[k] = row_load(after, w->high);
+        t[k] = row_load(o->t, first + k);
+    }
     for (int j = w->low; j < first; j++) {
-        const f16 tj = row_load(o->t, j), add = row_load(term, j);
+        const vfloat16 tj = row_load(o->t, j), add = row_load(term, j);
         for (int k = 0; k < ROW_BLOCK; k++)
-            sum[k] = f16_add_where(f16_lt(t[k], tj), sum[k], add);
+            sum[k] = vfloat16_add_where(vfloat16_lt(t[k], tj), sum[k], add);
     }
     for (int j = 0; j < ROW_BLOCK; j++) {
-        const f16 add = row_load(term, first + j);
+        const vfloat16 add = row_load(term, first + j);
         for (int k = 0; k < ROW_BLOCK; k++)
             if (j != k)
-                sum[k] = f16_add_where(j < k ? f16_lt(t[k], t[j]) : f16_le(t[k], t[j]), sum[k], add);
+                sum[k] = vfloat16_add_where(j < k ? vfloat16_lt(t[k], t[j]) : vfloat16_le(t[k], t[j]), sum[k],
+                                            add);
     }
     for (int j = first + ROW_BLOCK; j < w->high; j++) {
-        const f16 tj = row_load(o->t, j), add = row_load(term, j);
+        const vfloat16 tj = row_load(o->t, j), add = row_load(term, j);
         for (int k = 0; k < ROW_BLOCK; k++)
-            sum[k] = f16_add_where(f16_le(t[k], tj), sum[k], add);
+            sum[k] = vfloat16_add_where(vfloat16_le(t[k], tj), sum[k], add);
     }
 }
 
-/* ---- forward: the rows of one round -------------------------------------------------------------------------------------------------- */
+/* ---- forward: the rows of one round ---- */
 
 typedef struct round_rows {
-    _Alignas(64) float t[(ROW_CAPACITY + ROW_BLOCK) * PACKET_LANES], clear[(ROW_CAPACITY + ROW_BLOCK) * PACKET_LANES];
+    _Alignas(64) float t[(ROW_CAPACITY + ROW_BLOCK) * PACKET_LANES],
+        clear[(ROW_CAPACITY + ROW_BLOCK) * PACKET_LANES];
     _Alignas(64) float before[ROW_CAPACITY * PACKET_LANES];
     _Alignas(64) float row_near[ROW_CAPACITY], row_far[ROW_CAPACITY]; /* in the packet's own order of rows */
     _Alignas(64) float key[ROW_CAPACITY];
@@ -174,8 +191,8 @@ static inline bool row_before(const packet_rows *p, const round_rows *o, int a, 
     return o->row_near[a] < o->row_near[b] || (o->row_near[a] == o->row_near[b] && p->id[a] < p->id[b]);
 }
 
-/* order[place] = number of the key that comes there: as many keys are smaller. Room for 16 more keys is overwritten. True when some keys
-   are equal; they are in the order of their numbers then. */
+/* order[place] = number of the key that comes there: as many keys are smaller. Room for 16 more keys is
+   overwritten. True when some keys are equal; they are in the order of their numbers then. */
 static inline bool rank_keys(float *key, int n, uint16_t *order)
 {
     const int blocks = (n + 15) / 16;
@@ -184,10 +201,11 @@ static inline bool rank_keys(float *key, int n, uint16_t *order)
         key[i] = INFINITY;
     memset(order, 0xFF, (size_t)n * sizeof *order);
     for (int i = 0; i < n; i++) {
-        const f16 mine = f16_set1(key[i]);
+        const vfloat16 mine = vfloat16_set1(key[i]);
         unsigned place = 0;
         for (int b = 0; b < blocks; b++)
-            place += (unsigned)__builtin_popcount(m16_bits(f16_lt(f16_load(key + 16 * b), mine)));
+            place +=
+                (unsigned)__builtin_popcount(vmask16_bits(vfloat16_lt(vfloat16_load(key + 16 * b), mine)));
         for (; order[place] != 0xFFFF; place++)
             tied = true;
         order[place] = (uint16_t)i;
@@ -195,13 +213,15 @@ static inline bool rank_keys(float *key, int n, uint16_t *order)
     return tied;
 }
 
-/* The rows that begin before `horizon`, by (nearest depth, index): the place of a row is the number of rows before it. */
+/* The rows that begin before `horizon`, by (nearest depth, index): the place of a row is the number of rows
+   before it. */
 static inline void order_rows(const packet_rows *p, float horizon, round_rows *o)
 {
     int n = 0;
     uint16_t rows[ROW_CAPACITY];
     for (int i = 0; i < p->count; i++) {
-        rows[n] = (uint16_t)i, o->key[n] = o->row_near[i];
+        rows[n] = (uint16_t)i;
+        o->key[n] = o->row_near[i];
         n += o->row_near[i] < horizon;
     }
     o->sorted = (sorted_rows){o->t, o->clear, o->before, o->near, o->far_reached, n};
@@ -221,16 +241,16 @@ static inline void order_rows(const packet_rows *p, float horizon, round_rows *o
 /* Copies in order, running product, running far depth. Hits at or behind the horizon are left out. */
 static inline void arrange_rows(const packet_rows *p, float horizon, round_rows *o)
 {
-    const f16 limit = f16_set1(horizon), infinite = f16_set1(INFINITY), one = f16_set1(1);
-    f16 product = p->transmittance;
+    const vfloat16 limit = vfloat16_set1(horizon), infinite = vfloat16_set1(INFINITY), one = vfloat16_set1(1);
+    vfloat16 product = p->transmittance;
     float reached = 0;
     for (int i = 0; i < o->sorted.count; i++) {
         const int row = o->row[i];
-        const f16 t = row_load(p->t, row);
-        const m16 now = f16_lt(t, limit);
-        const f16 clear = f16_select(now, f16_sub(one, row_load(p->alpha, row)), one);
-        place_row(&o->sorted, i, f16_select(now, t, infinite), clear, o->row_near[row], smaller(o->row_far[row], horizon), &product,
-                  &reached);
+        const vfloat16 t = row_load(p->t, row);
+        const vmask16 now = vfloat16_lt(t, limit);
+        const vfloat16 clear = vfloat16_select(now, vfloat16_sub(one, row_load(p->alpha, row)), one);
+        place_row(&o->sorted, i, vfloat16_select(now, t, infinite), clear, o->row_near[row],
+                  smaller(o->row_far[row], horizon), &product, &reached);
     }
     end_rows(&o->sorted);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* trace/settings.h -- the numbers in the definition of what one ray sees. */
 #ifndef GBT_TRACE_SETTINGS_H
 #define GBT_TRACE_SETTINGS_H
@@ -7,33 +8,42 @@
 #include <string.h>
 
 typedef struct trace_settings {
-    float alpha_min;         /* a hit counts when alpha >= this; > 0. Default 1/255 */
-    float alpha_max;         /* alpha is cut here; the gradient through the cut is exactly 0. (0, 1). Default 0.99 */
+    float alpha_min; /* a hit counts when alpha >= this; > 0. Default 1/255 */
+    float alpha_max; /* alpha is cut here; the gradient through the cut is exactly 0. (0, 1). Default 0.99 */
     float transmittance_min; /* stop before the hit that would bring T below this. Default 1e-4 */
-    float proxy_radius;      /* a hit counts within this many std-devs; > 0. Default: infinite, alpha_min alone decides */
-    float t_near;            /* nearest depth of a response, scene-local units, >= 0. Default 0.01 */
-    float background[3];     /* blended last, with the remaining T. Default 0 */
+    float proxy_radius;  /* a hit counts within this many std-devs; > 0. Default: infinite, alpha_min alone
+                            decides */
+    float t_near;        /* nearest depth of a response, scene-local units, >= 0. Default 0.01 */
+    float background[3]; /* blended last, with the remaining T. Default 0 */
 } trace_settings;
 
 static inline trace_settings trace_settings_default(void)
 {
-    return (trace_settings){.alpha_min = 1.0f / 255.0f, .alpha_max = 0.99f, .transmittance_min = 1e-4f, .proxy_radius = INFINITY,
+    return (trace_settings){.alpha_min = 1.0f / 255.0f,
+                            .alpha_max = 0.99f,
+                            .transmittance_min = 1e-4f,
+                            .proxy_radius = INFINITY,
                             .t_near = 0.01f};
 }
 
 /**
- * Set how much is left out of a picture, by name: "exact", "default" or "fast"; bounds on what that changes: docs/accuracy.md.
+ * Set how much is left out of a picture, by name: "exact", "default" or "fast"; bounds on what that changes:
+ * docs/accuracy.md.
  *
- * Sets alpha_min, transmittance_min and proxy_radius. The rest is what the model was trained with, and stays. False, and nothing is set,
- * for another name.
+ * Sets alpha_min, transmittance_min and proxy_radius. The rest is what the model was trained with, and stays.
+ * False, and nothing is set, for another name.
  */
 static inline bool trace_settings_preset(const char *name, trace_settings *out)
 {
-    static const struct { const char *name; float alpha_min, transmittance_min; } presets[] = {
-        {"exact", 1e-5f, 1e-6f}, {"default", 1.0f / 255.0f, 1e-4f}, {"fast", 0.02f, 1e-3f}};
+    static const struct {
+        const char *name;
+        float alpha_min, transmittance_min;
+    } presets[] = {{"exact", 1e-5f, 1e-6f}, {"default", 1.0f / 255.0f, 1e-4f}, {"fast", 0.02f, 1e-3f}};
     for (size_t i = 0; i < sizeof presets / sizeof *presets; i++)
         if (strcmp(name, presets[i].name) == 0) {
-            out->alpha_min = presets[i].alpha_min, out->transmittance_min = presets[i].transmittance_min, out->proxy_radius = INFINITY;
+            out->alpha_min = presets[i].alpha_min;
+            out->transmittance_min = presets[i].transmittance_min;
+            out->proxy_radius = INFINITY;
             return true;
         }
     return false;

@@ -1,13 +1,17 @@
-/* trace/tile_kernel.inc.h -- a tile of neighbouring packets through the tree: gather, cull, evaluate, blend. Compiled once per instruction
-   set.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/tile_kernel.inc.h -- a tile of neighbouring packets through the tree: gather, cull, evaluate, blend.
+   Compiled once per instruction set.
 
-     heap of nodes by a lower bound of t --> nearest --> inner node: its children that meet the tile, back to the heap
-                                                     --> leaf: its ellipsoids that reach into the tile become candidates, which wait
-                                                               until nothing nearer can still come
-     candidates --> every packet evaluates those that reach into its beam, one row each --> blends the rows before the horizon (rows16.h)
+     heap of nodes by a lower bound of t --> nearest
+         --> inner node: its children that meet the tile, back to the heap
+         --> leaf: its ellipsoids that reach into the tile become candidates, which wait until nothing
+                   nearer can still come
+     candidates --> every packet evaluates those that reach into its beam, one row each
+                --> blends the rows before the horizon (rows16.h)
 
-   The horizon is the nearest bound of what is left in the heap or waiting: nothing can still come before it. A packet stops when all of
-   its rays are opaque; one that needs more rows than there are goes ray by ray (ray16.h).
+   The horizon is the nearest bound of what is left in the heap or waiting: nothing can still come before it.
+   A packet stops when all of its rays are opaque; one that needs more rows than there are goes ray by ray
+   (ray16.h).
 
    Wanted before inclusion: KERNEL_NAME, the name of the exported tile_kernel. */
 
@@ -28,55 +32,63 @@ enum {
     HEAP_CAPACITY = 1024
 };
 
-/* ---- a packet ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- a packet ---- */
 
 static void start_packet(packet_rows *p, const packet_rays *rays)
 {
-    const f16 zero = f16_set1(0);
-    p->extra = (packet_extra){zero, f16_set1(INFINITY), {zero, zero, zero}, zero, zero, {0}};
+    const vfloat16 zero = vfloat16_set1(0);
+    p->extra = (packet_extra){zero, vfloat16_set1(INFINITY), {zero, zero, zero}, zero, zero, {0}};
     memset(p->extra.top_id, 0xFF, sizeof p->extra.top_id);
-    p->far = f16_load(rays->far);
+    p->far = vfloat16_load(rays->far);
     p->count = 0;
-    p->transmittance = f16_set1(1);
+    p->transmittance = vfloat16_set1(1);
     for (int c = 0; c < 3; c++)
-        p->rgb[c] = f16_set1(0);
-    p->alive = m16_from_bits(rays->active);
+        p->rgb[c] = vfloat16_set1(0);
+    p->alive = vmask16_from_bits(rays->active);
 }
 
-static inline void append_row(packet_rows *p, uint32_t id, f16 t, f16 raw, f16 threshold, const trace_settings *settings,
-                              kernel_counters *counters)
+static inline void append_row(packet_rows *p, uint32_t id, vfloat16 t, vfloat16 raw, vfloat16 threshold,
+                              const trace_settings *settings, kernel_counters *counters)
 {
-    const m16 hit = m16_and(m16_and(f16_le(threshold, raw), f16_lt(t, p->far)), p->alive);
-    row_store(p->t, p->count, f16_select(hit, t, f16_set1(INFINITY)));
-    row_store(p->alpha, p->count, f16_select(hit, f16_min(raw, f16_set1(settings->alpha_max)), f16_set1(0)));
+    const vmask16 hit =
+        vmask16_and(vmask16_and(vfloat16_le(threshold, raw), vfloat16_lt(t, p->far)), p->alive);
+    row_store(p->t, p->count, vfloat16_select(hit, t, vfloat16_set1(INFINITY)));
+    row_store(p->alpha, p->count,
+              vfloat16_select(hit, vfloat16_min(raw, vfloat16_set1(settings->alpha_max)), vfloat16_set1(0)));
     p->id[p->count] = id;
     p->blended[p->count] = 0;
-    const unsigned bits = m16_bits(hit);
+    const unsigned bits = vmask16_bits(hit);
     p->count += bits != 0;
-    counters->tests += PACKET_LANES, counters->hits += (uint64_t)__builtin_popcount(bits);
+    counters->tests += PACKET_LANES;
+    counters->hits += (uint64_t)__builtin_popcount(bits);
 }
 
 /* Hits at or behind the horizon, on rays that are still alive. */
-static inline m16 row_remains(const packet_rows *p, int row, float horizon)
+static inline vmask16 row_remains(const packet_rows *p, int row, float horizon)
 {
-    const f16 t = row_load(p->t, row);
-    return m16_and(m16_and(f16_le(f16_set1(horizon), t), f16_lt(t, f16_set1(INFINITY))), p->alive);
+    const vfloat16 t = row_load(p->t, row);
+    return vmask16_and(
+        vmask16_and(vfloat16_le(vfloat16_set1(horizon), t), vfloat16_lt(t, vfloat16_set1(INFINITY))),
+        p->alive);
 }
 
 static bool close_row(const packet_rows *p, int row, int packet, hit_tape *tape, kernel_counters *counters)
 {
     counters->blended += (uint64_t)__builtin_popcount(p->blended[row]);
-    return tape == NULL || p->blended[row] == 0 || tape_add(tape, (tape_entry){p->id[row], p->blended[row], (uint16_t)packet});
+    return tape == NULL || p->blended[row] == 0 ||
+           tape_add(tape, (tape_entry){p->id[row], p->blended[row], (uint16_t)packet});
 }
 
-/* Write the rows that are done to the tape, nearly in order; keep the others. A row of which nothing lies before the horizon is done, too,
-   when an earlier round blended a part of it and the rays of the rest have become opaque since. */
-static bool close_rows(packet_rows *p, int packet, float horizon, const round_rows *o, hit_tape *tape, kernel_counters *counters)
+/* Write the rows that are done to the tape, nearly in order; keep the others. A row of which nothing lies
+   before the horizon is done, too, when an earlier round blended a part of it and the rays of the rest have
+   become opaque since. */
+static bool close_rows(packet_rows *p, int packet, float horizon, const round_rows *o, hit_tape *tape,
+                       kernel_counters *counters)
 {
-    const bool all_done = !m16_any(p->alive);
+    const bool all_done = !vmask16_any(p->alive);
     for (int i = 0; i < o->sorted.count; i++) {
         const int row = o->row[i];
-        if (!all_done && o->row_far[row] >= horizon && m16_any(row_remains(p, row, horizon)))
+        if (!all_done && o->row_far[row] >= horizon && vmask16_any(row_remains(p, row, horizon)))
             continue;
         if (!close_row(p, row, packet, tape, counters))
             return false;
@@ -85,43 +97,49 @@ static bool close_rows(packet_rows *p, int packet, float horizon, const round_ro
     for (int i = 0; i < p->count; i++) {
         if (o->row_far[i] < horizon)
             continue;
-        const m16 remains = row_remains(p, i, horizon);
-        if (!m16_any(remains)) {
+        const vmask16 remains = row_remains(p, i, horizon);
+        if (!vmask16_any(remains)) {
             if (o->row_near[i] >= horizon && !close_row(p, i, packet, tape, counters))
                 return false;
             continue;
         }
-        row_store(p->t, kept, f16_select(remains, row_load(p->t, i), f16_set1(INFINITY)));
-        row_store(p->alpha, kept, f16_select(remains, row_load(p->alpha, i), f16_set1(0)));
-        p->id[kept] = p->id[i], p->blended[kept++] = p->blended[i];
+        row_store(p->t, kept, vfloat16_select(remains, row_load(p->t, i), vfloat16_set1(INFINITY)));
+        row_store(p->alpha, kept, vfloat16_select(remains, row_load(p->alpha, i), vfloat16_set1(0)));
+        p->id[kept] = p->id[i];
+        p->blended[kept++] = p->blended[i];
     }
     p->count = kept;
     return true;
 }
 
 /* What a blended row adds to the outputs beside colour. */
-static void note_row(packet_rows *p, const packet_rays *rays, const float *record, uint32_t id, m16 blend, f16 weight, f16 next, f16 t)
+static void note_row(packet_rows *p, const packet_rays *rays, const float *record, uint32_t id, vmask16 blend,
+                     vfloat16 weight, vfloat16 next, vfloat16 t)
 {
     packet_extra *e = &p->extra;
-    const f16 zero = f16_set1(0);
+    const vfloat16 zero = vfloat16_set1(0);
     float normal[3];
     shortest_axis(record, normal);
-    const f16 dir[3] = {f16_load(rays->dir[0]), f16_load(rays->dir[1]), f16_load(rays->dir[2])};
-    const f16 toward = f16_select(f16_lt(dot_lanes(normal, dir), zero), weight, f16_sub(zero, weight)); /* normals look at the camera */
+    const vfloat16 dir[3] = {vfloat16_load(rays->dir[0]), vfloat16_load(rays->dir[1]),
+                             vfloat16_load(rays->dir[2])};
+    const vfloat16 toward = vfloat16_select(vfloat16_lt(dot_lanes(normal, dir), zero), weight,
+                                            vfloat16_sub(zero, weight)); /* normals look at the camera */
     for (int k = 0; k < 3; k++)
-        e->normal[k] = f16_fma(toward, f16_set1(normal[k]), e->normal[k]);
-    e->depth = f16_fma(weight, f16_select(blend, t, zero), e->depth);
-    e->median = f16_min(e->median, f16_select(m16_and(blend, f16_lt(next, f16_set1(0.5f))), t, f16_set1(INFINITY)));
-    e->count = f16_add_where(blend, e->count, f16_set1(1));
-    const m16 top = f16_lt(e->top_weight, weight);
-    e->top_weight = f16_max(e->top_weight, weight);
-    for (unsigned bits = m16_bits(top); bits != 0; bits &= bits - 1)
+        e->normal[k] = vfloat16_fma(toward, vfloat16_set1(normal[k]), e->normal[k]);
+    e->depth = vfloat16_fma(weight, vfloat16_select(blend, t, zero), e->depth);
+    e->median =
+        vfloat16_min(e->median, vfloat16_select(vmask16_and(blend, vfloat16_lt(next, vfloat16_set1(0.5f))), t,
+                                                vfloat16_set1(INFINITY)));
+    e->count = vfloat16_add_where(blend, e->count, vfloat16_set1(1));
+    const vmask16 top = vfloat16_lt(e->top_weight, weight);
+    e->top_weight = vfloat16_max(e->top_weight, weight);
+    for (unsigned bits = vmask16_bits(top); bits != 0; bits &= bits - 1)
         e->top_id[__builtin_ctz(bits)] = id;
 }
 
 /* Blend all hits nearer than `horizon`; keep the rest. */
-static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, const packet_rays *rays, float horizon, hit_tape *tape,
-                       round_rows *o, kernel_counters *counters)
+static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, const packet_rays *rays,
+                       float horizon, hit_tape *tape, round_rows *o, kernel_counters *counters)
 {
     if (p->count == 0 || row_depths(p->t, p->count, o->row_near, o->row_far) >= horizon)
         return true;
@@ -129,39 +147,43 @@ static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, co
     arrange_rows(p, horizon, o);
     const int count = o->sorted.count;
     counters->rows += (uint64_t)count;
-    const f16 infinite = f16_set1(INFINITY), zero = f16_set1(0), stop_at = f16_set1(scene->settings.transmittance_min);
-    f16 lowest = p->transmittance;
-    m16 stopped = m16_from_bits(0);
+    const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0),
+                   stop_at = vfloat16_set1(scene->settings.transmittance_min);
+    vfloat16 lowest = p->transmittance;
+    vmask16 stopped = vmask16_from_bits(0);
     row_window window = {0};
     for (int first = 0; first < count; first += ROW_BLOCK) {
-        f16 T[ROW_BLOCK];
+        vfloat16 T[ROW_BLOCK];
         move_window(&o->sorted, first, &window);
         window_transmittance(&o->sorted, first, &window, T);
         counters->pairs += (uint64_t)((window.high - window.low) * ROW_BLOCK);
         for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
             const int row = o->row[first + k];
-            const f16 next = f16_mul(T[k], row_load(o->clear, first + k));
-            const m16 hit = m16_and(f16_lt(row_load(o->t, first + k), infinite), p->alive);
-            const m16 stop = m16_and(hit, f16_lt(next, stop_at)), blend = m16_andnot(stop, hit);
-            const f16 weight = f16_select(blend, f16_mul(T[k], row_load(p->alpha, row)), zero);
-            stopped = m16_or(stopped, stop);
-            lowest = f16_min(lowest, f16_select(blend, next, infinite));
+            const vfloat16 next = vfloat16_mul(T[k], row_load(o->clear, first + k));
+            const vmask16 hit = vmask16_and(vfloat16_lt(row_load(o->t, first + k), infinite), p->alive);
+            const vmask16 stop = vmask16_and(hit, vfloat16_lt(next, stop_at)),
+                          blend = vmask16_andnot(stop, hit);
+            const vfloat16 weight = vfloat16_select(blend, vfloat16_mul(T[k], row_load(p->alpha, row)), zero);
+            stopped = vmask16_or(stopped, stop);
+            lowest = vfloat16_min(lowest, vfloat16_select(blend, next, infinite));
             const float *color = scene->records + (size_t)p->id[row] * RECORD_FLOATS + RECORD_COLOR;
             for (int c = 0; c < 3; c++)
-                p->rgb[c] = f16_fma(weight, f16_set1(color[c]), p->rgb[c]);
+                p->rgb[c] = vfloat16_fma(weight, vfloat16_set1(color[c]), p->rgb[c]);
             if (scene->extra)
-                note_row(p, rays, color - RECORD_COLOR, p->id[row], blend, weight, next, row_load(o->t, first + k));
-            p->blended[row] = (uint16_t)(p->blended[row] | m16_bits(blend));
+                note_row(p, rays, color - RECORD_COLOR, p->id[row], blend, weight, next,
+                         row_load(o->t, first + k));
+            p->blended[row] = (uint16_t)(p->blended[row] | vmask16_bits(blend));
         }
     }
     p->transmittance = lowest;
-    p->alive = m16_andnot(stopped, p->alive);
+    p->alive = vmask16_andnot(stopped, p->alive);
     return close_rows(p, packet, horizon, o, tape, counters);
 }
 
-/* ---- forward ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- forward ---- */
 
-/* A Gaussian that reaches into the tile. It waits until nothing nearer than its nearest point can still come. */
+/* A Gaussian that reaches into the tile. It waits until nothing nearer than its nearest point can still
+   come. */
 typedef struct candidate {
     float nearest, bound[8];
     uint32_t id;
@@ -188,11 +210,13 @@ typedef struct tile_state {
     int heap_count;
 } tile_state;
 
-static inline m16 slopes_meet(const packet_beam *b, const f16 slope[4])
+static inline vmask16 slopes_meet(const packet_beam *b, const vfloat16 slope[4])
 {
-    const m16 u = m16_and(f16_le(slope[0], f16_set1(b->slope[1])), f16_le(f16_set1(b->slope[0]), slope[1]));
-    const m16 v = m16_and(f16_le(slope[2], f16_set1(b->slope[3])), f16_le(f16_set1(b->slope[2]), slope[3]));
-    return m16_and(u, v);
+    const vmask16 u = vmask16_and(vfloat16_le(slope[0], vfloat16_set1(b->slope[1])),
+                                  vfloat16_le(vfloat16_set1(b->slope[0]), slope[1]));
+    const vmask16 v = vmask16_and(vfloat16_le(slope[2], vfloat16_set1(b->slope[3])),
+                                  vfloat16_le(vfloat16_set1(b->slope[2]), slope[3]));
+    return vmask16_and(u, v);
 }
 
 /* The Gaussians of a leaf that reach into the tile become candidates. */
@@ -202,35 +226,40 @@ static inline void take_leaf(tile_state *s, const kernel_scene *scene, const tre
     ellipsoids16 e;
     _Alignas(64) float bound[8][16], nearest[16];
     turn_ellipsoids(leaf, &s->beam, &e);
-    f16_store(nearest, ellipsoid_nearest(&e, &s->beam, scene->settings.t_near));
+    vfloat16_store(nearest, ellipsoid_nearest(&e, &s->beam, scene->settings.t_near));
     unsigned inside, front = 0;
     if (s->common_origin) {
-        f16 slope[4];
-        front = m16_bits(ellipsoid_slopes(&e, 1.001f * scene->settings.t_near, 0x1p-20f * scene->coordinate_max, slope)) & filled;
-        inside = m16_bits(slopes_meet(&s->beam.whole, slope)) & front;
+        vfloat16 slope[4];
+        front = vmask16_bits(ellipsoid_slopes(&e, 1.001f * scene->settings.t_near,
+                                              0x1p-20f * scene->coordinate_max, slope)) &
+                filled;
+        inside = vmask16_bits(slopes_meet(&s->beam.whole, slope)) & front;
         if (front != filled)
             inside |= test_ellipsoids(&s->beam.whole, &e) & filled & ~front;
-        const m16 known = m16_from_bits(front);
+        const vmask16 known = vmask16_from_bits(front);
         for (int k = 0; k < 4; k++)
-            f16_store(bound[k], f16_select(known, slope[k], f16_set1(k % 2 == 0 ? -INFINITY : INFINITY)));
+            vfloat16_store(
+                bound[k], vfloat16_select(known, slope[k], vfloat16_set1(k % 2 == 0 ? -INFINITY : INFINITY)));
     } else {
         inside = test_ellipsoids(&s->beam.whole, &e) & filled;
-        const f16 *field = (const f16 *)&e;
+        const vfloat16 *field = (const vfloat16 *)&e;
         for (int k = 0; k < 8; k++)
-            f16_store(bound[k], field[k]);
+            vfloat16_store(bound[k], field[k]);
     }
     for (; inside != 0; inside &= inside - 1) {
         const int i = __builtin_ctz(inside);
         candidate *c = &s->waiting[s->waiting_count++];
         __builtin_prefetch(scene->records + (size_t)leaf->id[i] * RECORD_FLOATS);
-        c->nearest = nearest[i], c->id = leaf->id[i], c->in_front = (front >> i & 1) != 0;
+        c->nearest = nearest[i];
+        c->id = leaf->id[i];
+        c->in_front = (front >> i & 1) != 0;
         for (int k = 0; k < 8; k++)
             c->bound[k] = bound[k][i];
     }
 }
 
-/* Move candidates that may lie before the horizon (any, when there is no room to wait) from the waiting to those that are taken, nearest
-   first. */
+/* Move candidates that may lie before the horizon (any, when there is no room to wait) from the waiting to
+   those that are taken, nearest first. */
 static void pick_candidates(tile_state *s, float horizon)
 {
     int waiting = 0, i = 0, n = 0;
@@ -238,9 +267,11 @@ static void pick_candidates(tile_state *s, float horizon)
     candidate copy[CHUNK_CAPACITY];
     uint16_t order[CHUNK_CAPACITY];
     for (; i < s->waiting_count && n < CHUNK_CAPACITY; i++)
-        if (crowded || s->waiting[i].nearest <= horizon)
-            copy[n] = s->waiting[i], s->nearest[n] = copy[n].nearest, n++;
-        else
+        if (crowded || s->waiting[i].nearest <= horizon) {
+            copy[n] = s->waiting[i];
+            s->nearest[n] = copy[n].nearest;
+            n++;
+        } else
             s->waiting[waiting++] = s->waiting[i];
     memmove(s->waiting + waiting, s->waiting + i, (size_t)(s->waiting_count - i) * sizeof *s->waiting);
     s->waiting_count += waiting - i;
@@ -260,46 +291,47 @@ static void pick_candidates(tile_state *s, float horizon)
 /* Which of sixteen candidates reach into a packet's beam. */
 static inline unsigned packet_candidates(const tile_state *s, int packet, int first)
 {
-    f16 bound[8];
+    vfloat16 bound[8];
     for (int k = 0; k < (s->common_origin ? 4 : 8); k++)
-        bound[k] = f16_load(s->bound[k] + first);
+        bound[k] = vfloat16_load(s->bound[k] + first);
     const unsigned filled = s->count - first >= 16 ? 0xFFFFu : 0xFFFFu >> (16 - (s->count - first));
     if (s->common_origin)
-        return m16_bits(slopes_meet(&s->beam.packet[packet], bound)) & filled;
+        return vmask16_bits(slopes_meet(&s->beam.packet[packet], bound)) & filled;
     return test_ellipsoids(&s->beam.packet[packet], (const ellipsoids16 *)bound) & filled;
 }
 
-static inline void evaluate(tile_state *s, const kernel_scene *scene, const packet_rays *rays, int packet, int number,
-                            kernel_counters *counters)
+static inline void evaluate(tile_state *s, const kernel_scene *scene, const packet_rays *rays, int packet,
+                            int number, kernel_counters *counters)
 {
     const uint32_t id = s->id[number];
     packet_rows *rows = &s->packet[packet];
     if (s->in_front[number / 16] >> number % 16 & 1) {
         const view_gaussians *view = &s->view[number / 16];
         const view_response r = view_respond(view, number % 16, &s->view_rays[packet]);
-        append_row(rows, id, r.t, view_alpha(view, number % 16, r.exponent), f16_set1(view->field[VIEW_THRESHOLD][number % 16]),
-                   &scene->settings, counters);
+        append_row(rows, id, r.t, view_alpha(view, number % 16, r.exponent),
+                   vfloat16_set1(view->field[VIEW_THRESHOLD][number % 16]), &scene->settings, counters);
         return;
     }
     const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
     ray_lanes ray;
     load_rays(rays, &ray);
-    const response r = respond(&g, &ray, f16_set1(scene->settings.t_near));
-    append_row(rows, id, r.t, response_alpha(&g, r.d2), alpha_threshold(scene, g.opacity), &scene->settings, counters);
+    const response r = respond(&g, &ray, vfloat16_set1(scene->settings.t_near));
+    append_row(rows, id, r.t, response_alpha(&g, r.d2), alpha_threshold(scene, g.opacity), &scene->settings,
+               counters);
 }
 
-/* Every live packet evaluates the candidates that reach into its beam and blends what lies before `horizon`. A packet whose rows do not fit
-   is given up here. */
-static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays *rays, float horizon, hit_tape *tape,
-                       kernel_counters *counters)
+/* Every live packet evaluates the candidates that reach into its beam and blends what lies before `horizon`.
+   A packet whose rows do not fit is given up here. */
+static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays *rays, float horizon,
+                       hit_tape *tape, kernel_counters *counters)
 {
     for (int first = 0; s->common_origin && first < s->count; first += 16) {
         uint32_t id[16];
         for (int i = 0; i < 16; i++)
             id[i] = s->id[first + i < s->count ? first + i : first];
         const gaussian_lanes g = load_gaussians(scene, id, NULL);
-        const m16 sound = view_gaussians_from(scene, &g, &s->beam, &s->view[first / 16], NULL);
-        s->in_front[first / 16] &= (uint16_t)m16_bits(sound);
+        const vmask16 sound = view_gaussians_from(scene, &g, &s->beam, &s->view[first / 16], NULL);
+        s->in_front[first / 16] &= (uint16_t)vmask16_bits(sound);
     }
     for (unsigned packets = s->alive_packets; packets != 0; packets &= packets - 1) {
         const int p = __builtin_ctz(packets);
@@ -307,20 +339,21 @@ static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays
         int first = 0;
         for (; first < s->count; first += 16) {
             /* No room for sixteen more: blend what the candidates that are left cannot come before. */
-            if (rows->count > ROW_CAPACITY - 16 && !blend_rows(rows, p, scene, &rays->packet[p], smaller(horizon, s->nearest[first]), tape,
-                                                               &s->order, counters))
+            if (rows->count > ROW_CAPACITY - 16 &&
+                !blend_rows(rows, p, scene, &rays->packet[p], smaller(horizon, s->nearest[first]), tape,
+                            &s->order, counters))
                 return false;
-            if (rows->count > ROW_CAPACITY - 16 || !m16_any(rows->alive))
+            if (rows->count > ROW_CAPACITY - 16 || !vmask16_any(rows->alive))
                 break;
             for (unsigned bits = packet_candidates(s, p, first); bits != 0; bits &= bits - 1)
                 evaluate(s, scene, &rays->packet[p], p, first + __builtin_ctz(bits), counters);
         }
-        const bool no_room = first < s->count && m16_any(rows->alive);
+        const bool no_room = first < s->count && vmask16_any(rows->alive);
         if (no_room)
             s->spilled_packets |= 1u << p;
         else if (!blend_rows(rows, p, scene, &rays->packet[p], horizon, tape, &s->order, counters))
             return false;
-        if (no_room || !m16_any(rows->alive))
+        if (no_room || !vmask16_any(rows->alive))
             s->alive_packets &= ~(1u << p);
     }
     counters->candidates += (uint64_t)s->count;
@@ -336,7 +369,8 @@ static inline void prefetch_child(uint64_t child)
         __builtin_prefetch(at + line);
 }
 
-static bool gather_tile(tile_state *s, const kernel_scene *scene, const tile_rays *rays, hit_tape *tape, kernel_counters *counters)
+static bool gather_tile(tile_state *s, const kernel_scene *scene, const tile_rays *rays, hit_tape *tape,
+                        kernel_counters *counters)
 {
     int new_count = 0;
     s->heap_count = s->waiting_count = 0;
@@ -351,8 +385,10 @@ static bool gather_tile(tile_state *s, const kernel_scene *scene, const tile_ray
             if (leaf == NULL) {
                 const tree_node *node = (const tree_node *)(uintptr_t)child;
                 _Alignas(64) float entry[TREE_WIDTH];
-                for (unsigned bits = test_children(&s->beam, node, scene->settings.t_near, entry); bits != 0; bits &= bits - 1)
-                    heap_push(s->heap, &s->heap_count, entry[__builtin_ctz(bits)], node->child[__builtin_ctz(bits)]);
+                for (unsigned bits = test_children(&s->beam, node, scene->settings.t_near, entry); bits != 0;
+                     bits &= bits - 1)
+                    heap_push(s->heap, &s->heap_count, entry[__builtin_ctz(bits)],
+                              node->child[__builtin_ctz(bits)]);
             } else {
                 const int before = s->waiting_count;
                 take_leaf(s, scene, leaf);
@@ -381,30 +417,35 @@ static bool gather_tile(tile_state *s, const kernel_scene *scene, const tile_ray
 
 /* The packets that are done in `done`; the others are traced ray by ray. */
 static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const tile_state *s, unsigned done,
-                        packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
+                        packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch,
+                        kernel_counters *counters)
 {
     for (int p = 0; p < TILE_PACKETS; p++) {
         if (done >> p & 1) {
             for (int c = 0; c < 3; c++)
-                f16_store(out[p].rgb[c], f16_fma(s->packet[p].transmittance, f16_set1(scene->settings.background[c]), s->packet[p].rgb[c]));
-            f16_store(out[p].transmittance, s->packet[p].transmittance);
+                vfloat16_store(out[p].rgb[c], vfloat16_fma(s->packet[p].transmittance,
+                                                           vfloat16_set1(scene->settings.background[c]),
+                                                           s->packet[p].rgb[c]));
+            vfloat16_store(out[p].transmittance, s->packet[p].transmittance);
             const packet_extra *e = &s->packet[p].extra;
-            f16_store(out[p].weighted_depth, e->depth), f16_store(out[p].median_depth, e->median), f16_store(out[p].hit_count, e->count);
+            vfloat16_store(out[p].weighted_depth, e->depth), vfloat16_store(out[p].median_depth, e->median),
+                vfloat16_store(out[p].hit_count, e->count);
             for (int k = 0; k < 3; k++)
-                f16_store(out[p].normal[k], e->normal[k]);
+                vfloat16_store(out[p].normal[k], e->normal[k]);
             memcpy(out[p].strongest, e->top_id, sizeof e->top_id);
             continue;
         }
         counters->spilled_packets += rays->packet[p].active != 0;
         for (unsigned bits = rays->packet[p].active; bits != 0; bits &= bits - 1)
-            if (!trace_ray(scene, &rays->packet[p], (unsigned)p, __builtin_ctz(bits), &out[p], tape, scratch, counters))
+            if (!trace_ray(scene, &rays->packet[p], (unsigned)p, __builtin_ctz(bits), &out[p], tape, scratch,
+                           counters))
                 return false;
     }
     return tape == NULL || tape_add(tape, (tape_entry){0, 0, TAPE_END});
 }
 
-static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape,
-                    kernel_scratch *scratch, kernel_counters *counters)
+static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS],
+                    hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
 {
     tile_state s;
     unsigned packets = 0;
@@ -415,7 +456,8 @@ static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_out
             start_packet(&s.packet[p], &rays->packet[p]);
             counters->rays += (uint64_t)__builtin_popcount(rays->packet[p].active);
         }
-    s.alive_packets = packets, s.spilled_packets = 0;
+    s.alive_packets = packets;
+    s.spilled_packets = 0;
     if (scene->root != NULL && packets != 0) {
         if (make_beam(rays->packet, scene, &s.beam)) {
             for (int p = 0; p < TILE_PACKETS && s.common_origin; p++)
@@ -430,8 +472,8 @@ static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_out
     return finish_tile(scene, rays, &s, packets & ~s.spilled_packets, out, tape, scratch, counters);
 }
 
-static bool forward_single(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape,
-                           kernel_scratch *scratch, kernel_counters *counters)
+static bool forward_single(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS],
+                           hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
 {
     for (unsigned p = 0; p < TILE_PACKETS; p++)
         for (unsigned bits = rays->packet[p].active; bits != 0; bits &= bits - 1, counters->rays++)
@@ -440,12 +482,13 @@ static bool forward_single(const kernel_scene *scene, const tile_rays *rays, pac
     return tape == NULL || tape_add(tape, (tape_entry){0, 0, TAPE_END});
 }
 
-static bool forward_embree(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS], hit_tape *tape,
-                           kernel_scratch *scratch, kernel_counters *counters)
+static bool forward_embree(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS],
+                           hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
 {
     for (unsigned p = 0; p < TILE_PACKETS; p++) {
         counters->rays += (uint64_t)__builtin_popcount(rays->packet[p].active);
-        if (rays->packet[p].active != 0 && !embree_packet(scene, &rays->packet[p], p, &out[p], tape, scratch, counters))
+        if (rays->packet[p].active != 0 &&
+            !embree_packet(scene, &rays->packet[p], p, &out[p], tape, scratch, counters))
             return false;
     }
     return tape == NULL || tape_add(tape, (tape_entry){0, 0, TAPE_END});

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* trace/trace.c -- tiles over an image, forward and back.
 
    image --> tiles of 16 x 16 pixels (one task each) --> packets of 4 x 4 --> kernel --> pixels, tape
@@ -26,14 +27,17 @@ typedef struct trace_tile {
 static const tile_kernel *kernel_for(cpu_isa isa)
 {
     switch (isa) {
-    case CPU_AVX512: return &tile_kernel_avx512;
-    case CPU_AVX2: return &tile_kernel_avx2;
-    case CPU_PLAIN: break;
+    case CPU_AVX512:
+        return &tile_kernel_avx512;
+    case CPU_AVX2:
+        return &tile_kernel_avx2;
+    case CPU_PLAIN:
+        break;
     }
     return &tile_kernel_plain;
 }
 
-/* ---- build ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- build ---- */
 
 static void write_records(size_t block, size_t begin, size_t end, void *context)
 {
@@ -42,30 +46,37 @@ static void write_records(size_t block, size_t begin, size_t end, void *context)
     const gaussians *g = scene->source;
     for (size_t i = begin; i < end; i++) {
         float *record = scene->records + i * RECORD_FLOATS;
-        const double q[4] = {(double)g->quat_w[i], (double)g->quat_x[i], (double)g->quat_y[i], (double)g->quat_z[i]};
+        const double q[4] = {(double)g->quat_w[i], (double)g->quat_x[i], (double)g->quat_y[i],
+                             (double)g->quat_z[i]};
         const double scale[3] = {(double)g->scale_x[i], (double)g->scale_y[i], (double)g->scale_z[i]};
         double m[9];
         dquat_to_matrix(q, m);
         for (int row = 0; row < 3; row++) /* S^-1 R^T: row i is axis i of the ellipsoid over its length */
             for (int column = 0; column < 3; column++)
                 record[RECORD_MATRIX + 3 * row + column] = (float)(m[3 * column + row] / scale[row]);
-        record[RECORD_MEAN] = g->mean_x[i], record[RECORD_MEAN + 1] = g->mean_y[i], record[RECORD_MEAN + 2] = g->mean_z[i];
+        record[RECORD_MEAN] = g->mean_x[i];
+        record[RECORD_MEAN + 1] = g->mean_y[i];
+        record[RECORD_MEAN + 2] = g->mean_z[i];
         record[RECORD_OPACITY] = g->opacity[i];
-        record[RECORD_COLOR] = g->red[i], record[RECORD_COLOR + 1] = g->green[i], record[RECORD_COLOR + 2] = g->blue[i];
+        record[RECORD_COLOR] = g->red[i];
+        record[RECORD_COLOR + 1] = g->green[i];
+        record[RECORD_COLOR + 2] = g->blue[i];
     }
 }
 
-gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_settings *settings, float reach, gbt_error *err)
+gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_settings *settings, float reach,
+                       gbt_error *err)
 {
     scene->source = g;
     scene->settings = *settings;
     scene->reach = reach;
     scene->tape_width = scene->tape_height = 0;
-    GBT_TRY(mem_reserve((void **)&scene->records, &scene->record_capacity, 0, g->count + 1, RECORD_FLOATS * sizeof(float),
-                        "gaussian records", err));
+    GBT_TRY(mem_reserve((void **)&scene->records, &scene->record_capacity, 0, g->count + 1,
+                        RECORD_FLOATS * sizeof(float), "gaussian records", err));
     parallel_blocks(g->count, RECORD_BLOCK, write_records, scene);
     if (scene->kernel == TRACE_EMBREE)
-        return gaussian_scene_build(g, settings->alpha_min, settings->proxy_radius, reach, &scene->embree, err);
+        return gaussian_scene_build(g, settings->alpha_min, settings->proxy_radius, reach, &scene->embree,
+                                    err);
     return gaussian_tree_build(g, settings->alpha_min, settings->proxy_radius, reach, &scene->tree, err);
 }
 
@@ -77,10 +88,11 @@ static kernel_scene scene_for_kernel(const trace_scene *scene)
                           .records = scene->records,
                           .coordinate_max = fmaxf(scene->tree.coordinate_max, scene->reach),
                           .settings = scene->settings,
-                          .radius_response = expf(-0.5f * scene->settings.proxy_radius * scene->settings.proxy_radius)};
+                          .radius_response =
+                              expf(-0.5f * scene->settings.proxy_radius * scene->settings.proxy_radius)};
 }
 
-/* ---- passes over the image ----------------------------------------------------------------------------------------------------------- */
+/* ---- passes over the image ---- */
 
 typedef struct pass {
     trace_scene *scene;
@@ -118,11 +130,14 @@ static void load_tile(const ray_image *rays, int x0, int y0, tile_rays *out)
                 continue;
             const float *d = rays->dir + 3 * at, *o = ray_image_origin(rays, at);
             const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            /* Written so that NaN fails: a ray that is not a unit vector from a sensible place sees the background. */
+            /* Written so that NaN fails: a ray that is not a unit vector from a sensible place sees the
+               background. */
             if (!(square > 0.99f && square < 1.01f) || !(fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f))
                 continue;
-            for (int axis = 0; axis < 3; axis++)
-                p->dir[axis][lane] = d[axis], p->origin[axis][lane] = o[axis];
+            for (int axis = 0; axis < 3; axis++) {
+                p->dir[axis][lane] = d[axis];
+                p->origin[axis][lane] = o[axis];
+            }
             p->far[lane] = rays->far == NULL ? INFINITY : rays->far[at];
             p->active |= 1u << lane;
         }
@@ -132,8 +147,10 @@ static void load_tile(const ray_image *rays, int x0, int y0, tile_rays *out)
         for (int lane = 0; lane < PACKET_LANES; lane++) {
             if (p->active >> lane & 1)
                 continue;
-            for (int axis = 0; axis < 3; axis++)
-                p->dir[axis][lane] = p->dir[axis][first], p->origin[axis][lane] = p->origin[axis][first];
+            for (int axis = 0; axis < 3; axis++) {
+                p->dir[axis][lane] = p->dir[axis][first];
+                p->origin[axis][lane] = p->origin[axis][first];
+            }
             p->far[lane] = p->far[first];
         }
     }
@@ -161,7 +178,8 @@ static void store_pixel(const pass *p, size_t at, const packet_output *o, int la
         out->strongest[at] = o == NULL ? UINT32_MAX : o->strongest[lane];
 }
 
-static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x0, int y0, kernel_scratch *scratch)
+static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x0, int y0,
+                         kernel_scratch *scratch)
 {
     packet_output out[TILE_PACKETS];
     if (!p->forward(&p->view, rays, out, p->keep_tape ? &tile->tape : NULL, scratch, &tile->counters))
@@ -173,16 +191,18 @@ static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x
                 store_pixel(p, at, rays->packet[packet].active >> lane & 1 ? &out[packet] : NULL, lane);
         }
     const size_t bytes = tile->tape.count * sizeof *tile->tape.entries;
-    tile->tape_dropped = p->keep_tape && atomic_fetch_add(&p->tape_bytes, bytes) + bytes > p->scene->tape_bytes_max &&
+    tile->tape_dropped = p->keep_tape &&
+                         atomic_fetch_add(&p->tape_bytes, bytes) + bytes > p->scene->tape_bytes_max &&
                          p->scene->tape_bytes_max > 0;
     if (!tile->tape_dropped)
-        return mem_trim((void **)&tile->tape.entries, &tile->tape.capacity, tile->tape.count, sizeof *tile->tape.entries, "hit tape",
-                        NULL) == GBT_OK;
+        return mem_trim((void **)&tile->tape.entries, &tile->tape.capacity, tile->tape.count,
+                        sizeof *tile->tape.entries, "hit tape", NULL) == GBT_OK;
     hit_tape_free(&tile->tape);
     return true;
 }
 
-static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x0, int y0, kernel_scratch *scratch)
+static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x0, int y0,
+                          kernel_scratch *scratch)
 {
     _Alignas(64) float d_rgb[TILE_PACKETS][3][PACKET_LANES] = {0};
     for (int packet = 0; packet < TILE_PACKETS; packet++)
@@ -200,19 +220,22 @@ static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int 
     packet_output again[TILE_PACKETS];
     kernel_counters counters = {0};
     bool fine = !tile->tape_dropped || p->forward(&p->view, rays, again, &tile->tape, scratch, &counters);
-    fine = fine && p->kernel->backward(&p->view, rays, d_rgb, tile->tape.entries, &tile->gradients, tile->d_background, scratch);
+    fine = fine && p->kernel->backward(&p->view, rays, d_rgb, tile->tape.entries, &tile->gradients,
+                                       tile->d_background, scratch);
     hit_tape_free(&tile->tape);
     return fine && gradient_list_close(&tile->gradients) == GBT_OK;
 }
 
 static void run_tile(size_t index, size_t begin, size_t end, void *context)
 {
-    (void)begin, (void)end;
+    (void)begin;
+    (void)end;
     pass *p = context;
     trace_tile *tile = &p->scene->tiles[index];
     kernel_scratch scratch = {0};
     tile_rays rays;
-    const int x0 = (int)(index % (size_t)p->tiles_across) * TILE_PIXELS, y0 = (int)(index / (size_t)p->tiles_across) * TILE_PIXELS;
+    const int x0 = (int)(index % (size_t)p->tiles_across) * TILE_PIXELS,
+              y0 = (int)(index / (size_t)p->tiles_across) * TILE_PIXELS;
     if (atomic_load_explicit(&p->failed, memory_order_relaxed))
         return;
     gradient_list_free(&tile->gradients);
@@ -222,7 +245,8 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
         memset(&tile->counters, 0, sizeof tile->counters);
     }
     load_tile(p->rays, x0, y0, &rays);
-    const bool fine = p->d_rgb == NULL ? forward_tile(p, tile, &rays, x0, y0, &scratch) : backward_tile(p, tile, &rays, x0, y0, &scratch);
+    const bool fine = p->d_rgb == NULL ? forward_tile(p, tile, &rays, x0, y0, &scratch)
+                                       : backward_tile(p, tile, &rays, x0, y0, &scratch);
     if (!fine)
         atomic_store(&p->failed, true);
     mem_free(scratch.rows);
@@ -235,54 +259,68 @@ static gbt_status run_pass(pass *p, gbt_error *err)
 {
     trace_scene *scene = p->scene;
     p->tiles_across = (p->rays->width + TILE_PIXELS - 1) / TILE_PIXELS;
-    const size_t count = (size_t)p->tiles_across * (size_t)((p->rays->height + TILE_PIXELS - 1) / TILE_PIXELS);
+    const size_t count =
+        (size_t)p->tiles_across * (size_t)((p->rays->height + TILE_PIXELS - 1) / TILE_PIXELS);
     if (count > scene->tile_capacity) {
         const size_t old = scene->tile_capacity;
-        GBT_TRY(mem_reserve((void **)&scene->tiles, &scene->tile_capacity, old, count, sizeof *scene->tiles, "trace tiles", err));
+        GBT_TRY(mem_reserve((void **)&scene->tiles, &scene->tile_capacity, old, count, sizeof *scene->tiles,
+                            "trace tiles", err));
         memset(scene->tiles + old, 0, (scene->tile_capacity - old) * sizeof *scene->tiles);
     }
     scene->tile_count = count;
     p->kernel = kernel_for(cpu_best_isa());
-    p->forward = scene->kernel == TRACE_EMBREE ? p->kernel->forward_embree : scene->kernel == TRACE_SINGLE ? p->kernel->forward_single
-                 : p->kernel->forward;
+    p->forward = scene->kernel == TRACE_EMBREE   ? p->kernel->forward_embree
+                 : scene->kernel == TRACE_SINGLE ? p->kernel->forward_single
+                                                 : p->kernel->forward;
     atomic_init(&p->tape_bytes, 0);
     atomic_init(&p->failed, false);
     parallel_blocks(count, 1, run_tile, p);
     if (atomic_load(&p->failed))
-        return base_fail(err, GBT_ERR_NO_MEMORY, "trace: no memory for the hits of a %d x %d image", p->rays->width, p->rays->height);
+        return base_fail(err, GBT_ERR_NO_MEMORY, "trace: no memory for the hits of a %d x %d image",
+                         p->rays->width, p->rays->height);
     return GBT_OK;
 }
 
-gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out, kernel_counters *counters,
-                         gbt_error *err)
+gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out,
+                         kernel_counters *counters, gbt_error *err)
 {
     const image *rgb = out->rgb;
     if (rgb->width != rays->width || rgb->height != rays->height || rgb->channels != 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "trace: image is %d x %d x %d (wanted %d x %d x 3)", rgb->width, rgb->height, rgb->channels,
-                         rays->width, rays->height);
-    pass p = {.scene = scene, .view = scene_for_kernel(scene), .rays = rays, .keep_tape = keep_tape, .out = *out};
-    p.view.extra = out->depth != NULL || out->median_depth != NULL || out->normal != NULL || out->hit_count != NULL ||
-                   out->strongest != NULL;
+        return base_fail(err, GBT_ERR_ARGUMENT, "trace: image is %d x %d x %d (wanted %d x %d x 3)",
+                         rgb->width, rgb->height, rgb->channels, rays->width, rays->height);
+    pass p = {
+        .scene = scene, .view = scene_for_kernel(scene), .rays = rays, .keep_tape = keep_tape, .out = *out};
+    p.view.extra = out->depth != NULL || out->median_depth != NULL || out->normal != NULL ||
+                   out->hit_count != NULL || out->strongest != NULL;
     scene->tape_width = scene->tape_height = 0;
     GBT_TRY(run_pass(&p, err));
-    if (keep_tape)
-        scene->tape_width = rays->width, scene->tape_height = rays->height;
+    if (keep_tape) {
+        scene->tape_width = rays->width;
+        scene->tape_height = rays->height;
+    }
     for (size_t i = 0; counters != NULL && i < scene->tile_count; i++) {
         const kernel_counters *c = &scene->tiles[i].counters;
-        counters->rays += c->rays, counters->nodes += c->nodes, counters->candidates += c->candidates, counters->tests += c->tests;
-        counters->hits += c->hits, counters->blended += c->blended, counters->rows += c->rows, counters->pairs += c->pairs;
+        counters->rays += c->rays;
+        counters->nodes += c->nodes;
+        counters->candidates += c->candidates;
+        counters->tests += c->tests;
+        counters->hits += c->hits;
+        counters->blended += c->blended;
+        counters->rows += c->rows;
+        counters->pairs += c->pairs;
         counters->spilled_packets += c->spilled_packets;
         counters->tape_bytes += scene->tiles[i].tape.count * sizeof(tape_entry);
     }
     return GBT_OK;
 }
 
-gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb, gaussians *d_gaussians, float *weight,
-                          float d_background[3], gbt_error *err)
+gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb,
+                          gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err)
 {
-    if (scene->tape_width != rays->width || scene->tape_height != rays->height || d_rgb->width != rays->width ||
-        d_rgb->height != rays->height)
-        return base_fail(err, GBT_ERR_ARGUMENT, "trace: adjoint of %d x %d rays, but the kept forward pass has %d x %d", rays->width,
+    if (scene->tape_width != rays->width || scene->tape_height != rays->height ||
+        d_rgb->width != rays->width || d_rgb->height != rays->height)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "trace: adjoint of %d x %d rays, but the kept forward pass has %d x %d", rays->width,
                          rays->height, scene->tape_width, scene->tape_height);
     pass p = {.scene = scene, .view = scene_for_kernel(scene), .rays = rays, .d_rgb = d_rgb};
     scene->tape_width = scene->tape_height = 0; /* each tile lets go of its tape */
@@ -292,8 +330,8 @@ gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < scene->tile_count; i++)
         lists[i] = &scene->tiles[i].gradients;
-    const gbt_status status = gradients_reduce(&scene->order, lists, scene->tile_count, scene->source, scene->records, d_gaussians, weight,
-                                               err);
+    const gbt_status status = gradients_reduce(&scene->order, lists, scene->tile_count, scene->source,
+                                               scene->records, d_gaussians, weight, err);
     mem_free(lists);
     for (size_t i = 0; i < scene->tile_count; i++)
         gradient_list_free(&scene->tiles[i].gradients);

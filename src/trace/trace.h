@@ -1,7 +1,8 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* trace/trace.h -- ray tracing of Gaussians: build, forward, adjoint.
 
-   What one ray sees is defined in docs/tracing.md; reference.h is that definition in double, and this is the same in float32, sixteen
-   rays at a time, over a tree (bvh/gaussian_tree.h). */
+   What one ray sees is defined in docs/tracing.md; reference.h is that definition in double, and this is the
+   same in float32, sixteen rays at a time, over a tree (bvh/gaussian_tree.h). */
 #ifndef GBT_TRACE_TRACE_H
 #define GBT_TRACE_TRACE_H
 
@@ -21,32 +22,36 @@ typedef enum trace_kernel {
     TRACE_EMBREE  /* packets of 16 under Embree's own traversal: the baseline of every benchmark */
 } trace_kernel;
 
-/** One view's Gaussians, ready to be traced; and the memory of passes over them, reused from view to view. Start from {0}. */
+/** One view's Gaussians, ready to be traced; and the memory of passes over them, reused from view to view.
+    Start from {0}. */
 typedef struct trace_scene {
     trace_kernel kernel;     /* set before trace_build(); default TRACE_TILE */
-    size_t tape_bytes_max;   /* tiles whose hits would go beyond this are traced again by trace_backward(), to the same bits; 0: no limit */
+    size_t tape_bytes_max;   /* tiles whose hits would go beyond this are traced again by trace_backward(), to
+                                the same bits; 0: no limit */
     const gaussians *source; /* borrowed from trace_build() */
     gaussian_tree tree;
     gaussian_scene embree; /* in place of the tree, for TRACE_EMBREE */
     trace_settings settings;
     float *records;
     size_t record_capacity;
-    float reach; /* largest |coordinate| of the ray origins announced to trace_build() */
+    float reach;              /* largest |coordinate| of the ray origins announced to trace_build() */
     struct trace_tile *tiles; /* internal: tape and gradient records of each tile */
     size_t tile_count, tile_capacity;
     int tape_width, tape_height; /* rays of the forward pass that the tape holds; 0: none */
     gradient_order order;        /* internal */
 } trace_scene;
 
-/** What trace_forward() writes; arrays of one value per ray unless said otherwise. All but `rgb` are optional (NULL). */
+/** What trace_forward() writes; arrays of one value per ray unless said otherwise. All but `rgb` are optional
+    (NULL). */
 typedef struct trace_outputs {
     image *rgb;           /* 3 channels, size of the rays, allocated by the caller; with the background */
     float *transmittance; /* what is left for the background, in [0, 1] */
     float *depth;         /* expected t_c: sum of T alpha t_c / (1 - transmittance); 0 where nothing is hit */
     float *median_depth;  /* t_c of the hit that takes T below 1/2; 0 where none does */
-    float *normal;        /* [3] sum of T alpha n; n: the shortest axis, unit, world, turned towards the ray's origin */
-    float *hit_count;     /* hits that were blended */
-    uint32_t *strongest;  /* Gaussian of the largest T alpha; UINT32_MAX where there is none */
+    float *normal; /* [3] sum of T alpha n; n: the shortest axis, unit, world, turned towards the ray's origin
+                    */
+    float *hit_count;    /* hits that were blended */
+    uint32_t *strongest; /* Gaussian of the largest T alpha; UINT32_MAX where there is none */
 } trace_outputs;
 
 /**
@@ -54,34 +59,38 @@ typedef struct trace_outputs {
  *
  * @param g        [in] borrowed until the last pass over this build; padded (gaussians_pad)
  * @param reach    [in] largest |coordinate| of any ray origin that will be traced
- * @return GBT_OK, GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
- * Gaussians with non-finite fields are not seen (scene->tree.rejected_count). Cost: 10-20 ms per 100,000 on two cores.
+ * @return GBT_OK, GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL Gaussians with non-finite fields are not seen
+ *         (scene->tree.rejected_count). Cost: 10-20 ms per 100,000 on two cores.
  */
-gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_settings *settings, float reach, gbt_error *err);
+gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_settings *settings, float reach,
+                       gbt_error *err);
 
 /**
  * Trace rays.
  *
- * @param keep_tape [in]  true when trace_backward() will follow: keeps about one byte per blended hit (trace_scene.tape_bytes_max)
+ * @param keep_tape [in]  true when trace_backward() will follow: keeps about one byte per blended hit
+ *                        (trace_scene.tape_bytes_max)
  * @param out       [out] colour costs what tracing costs; each other output a few per cent more
  * @param counters  [in,out] optional, added to
  * @return GBT_OK, GBT_ERR_ARGUMENT (size of out->rgb), GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count.
  */
-gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out, kernel_counters *counters,
-                         gbt_error *err);
+gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out,
+                         kernel_counters *counters, gbt_error *err);
 
 /**
  * Adjoint of the last trace_forward(keep_tape) on `scene`, with the same rays. Once: the tape is given back.
  *
  * @param d_rgb        [in]  dL/d(rgb), size of `rays`
- * @param d_gaussians  [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion tangent)
- * @param weight       [out] optional (NULL), [count]: sum over rays of T alpha, how much each Gaussian was seen
+ * @param d_gaussians  [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion
+ *                           tangent)
+ * @param weight       [out] optional (NULL), [count]: sum over rays of T alpha, how much each Gaussian was
+ *                           seen
  * @param d_background [out] optional (NULL), [3], overwritten
  * Threads: uses all; same bits for every thread count (sums run in the order of packets and blocks).
  */
-gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb, gaussians *d_gaussians, float *weight,
-                          float d_background[3], gbt_error *err);
+gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb,
+                          gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err);
 
 void trace_scene_free(trace_scene *scene);
 

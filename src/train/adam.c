@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/adam.c -- Adam on flat arrays. */
 #include "train/adam.h"
 
@@ -12,8 +13,8 @@ adam_rates adam_rates_at(double rate, uint64_t t)
                         .correct_v = (float)(1 / (1 - pow(0.999, (double)t)))};
 }
 
-FASTEST_CLONE void adam_step(float *restrict param, float *restrict gradient, float *restrict m, float *restrict v, size_t count,
-                             adam_rates rates)
+FASTEST_CLONE void adam_step(float *restrict param, float *restrict gradient, float *restrict m,
+                             float *restrict v, size_t count, adam_rates rates)
 {
     for (size_t i = 0; i < count; i++) {
         const float g = gradient[i];

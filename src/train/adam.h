@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/adam.h -- Adam on flat arrays (Kingma & Ba 2015), no weight decay. */
 #ifndef GBT_TRAIN_ADAM_H
 #define GBT_TRAIN_ADAM_H
@@ -6,9 +7,9 @@
 #include <stdint.h>
 
 typedef struct adam_rates {
-    float rate;       /* learning rate */
-    float correct_m;  /* 1 / (1 - beta1^t) */
-    float correct_v;  /* 1 / (1 - beta2^t) */
+    float rate;      /* learning rate */
+    float correct_m; /* 1 / (1 - beta1^t) */
+    float correct_v; /* 1 / (1 - beta2^t) */
 } adam_rates;
 
 /** Bias corrections for step t >= 1. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/checkpoint.c -- the trainer's state to and from one file. */
 #include "train/checkpoint.h"
 
@@ -13,7 +14,8 @@
 
 enum { NAME_SIZE = 64 };
 
-static void add_field(container_writer *w, const char *prefix, const char *field, int dim_count, const size_t *dims, const float *data)
+static void add_field(container_writer *w, const char *prefix, const char *field, int dim_count,
+                      const size_t *dims, const float *data)
 {
     char name[NAME_SIZE];
     snprintf(name, sizeof name, "%s.%s", prefix, field);
@@ -28,8 +30,8 @@ static void add_anchors(container_writer *w, const char *prefix, const anchors *
     add_field(w, prefix, "scale_log", 2, (const size_t[]){a->count, 6}, a->scale_log);
 }
 
-static gbt_status copy_field(const container *c, const char *prefix, const char *field, size_t rows, size_t row_floats, int dim_count,
-                             const size_t *tail, float *out, gbt_error *err)
+static gbt_status copy_field(const container *c, const char *prefix, const char *field, size_t rows,
+                             size_t row_floats, int dim_count, const size_t *tail, float *out, gbt_error *err)
 {
     char name[NAME_SIZE];
     snprintf(name, sizeof name, "%s.%s", prefix, field);
@@ -40,12 +42,14 @@ static gbt_status copy_field(const container *c, const char *prefix, const char 
     return GBT_OK;
 }
 
-static gbt_status read_anchors(const container *c, const char *prefix, size_t rows, anchors *a, gbt_error *err)
+static gbt_status read_anchors(const container *c, const char *prefix, size_t rows, anchors *a,
+                               gbt_error *err)
 {
     const size_t k = (size_t)a->offset_count;
     GBT_TRY(anchors_resize(a, rows, err));
     GBT_TRY(copy_field(c, prefix, "position", rows, 3, 2, (const size_t[]){3, 0}, a->position, err));
-    GBT_TRY(copy_field(c, prefix, "feature", rows, ANCHOR_FEATURE_DIM, 2, (const size_t[]){ANCHOR_FEATURE_DIM, 0}, a->feature, err));
+    GBT_TRY(copy_field(c, prefix, "feature", rows, ANCHOR_FEATURE_DIM, 2,
+                       (const size_t[]){ANCHOR_FEATURE_DIM, 0}, a->feature, err));
     GBT_TRY(copy_field(c, prefix, "offset", rows, 3 * k, 3, (const size_t[]){k, 3}, a->offset, err));
     return copy_field(c, prefix, "scale_log", rows, 6, 2, (const size_t[]){6, 0}, a->scale_log, err);
 }
@@ -57,8 +61,9 @@ static uint64_t hash_of_views(const scene *s)
     for (size_t i = 0; i < s->view_count; i++) {
         const scene_view *v = &s->views[i];
         char text[512];
-        const int length = snprintf(text, sizeof text, "%.300s %d %d %.6g %.6g %.6g", v->name, v->camera.width, v->camera.height,
-                                    v->camera.center[0], v->camera.center[1], v->camera.center[2]);
+        const int length =
+            snprintf(text, sizeof text, "%.300s %d %d %.6g %.6g %.6g", v->name, v->camera.width,
+                     v->camera.height, v->camera.center[0], v->camera.center[1], v->camera.center[2]);
         for (int k = 0; k <= length; k++)
             hash = (hash ^ (unsigned char)text[k]) * 0x100000001b3u;
     }
@@ -70,13 +75,20 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     char config[CONFIG_TEXT_SIZE];
     config_text(&t->def, t->scene.folder, config, sizeof config);
     const size_t n = t->decoder.param_count, rows = t->stats.count, k = (size_t)t->stats.offset_count;
-    const uint64_t counters[] = {t->step, t->adjust_step, t->anchor_t, t->skipped_steps, (uint64_t)t->pace.known, t->scene.view_count,
-                                 t->scene.points.count, t->anchors_initial};
+    const uint64_t counters[] = {t->step,
+                                 t->adjust_step,
+                                 t->anchor_t,
+                                 t->skipped_steps,
+                                 (uint64_t)t->pace.known,
+                                 t->scene.view_count,
+                                 t->scene.points.count,
+                                 t->anchors_initial};
     container_writer w = {0};
     container_add_text(&w, "config", config);
     container_add_small(&w, "counters", CONTAINER_U64, sizeof counters / sizeof *counters, counters);
     container_add(&w, "pace", CONTAINER_U64, 1, (const size_t[]){PACE_SEGMENTS}, t->pace.steps);
-    container_add_small(&w, "in_row", CONTAINER_U64, 3, (const uint64_t[]){t->skipped_in_row, t->barren_in_row, t->revivals});
+    container_add_small(&w, "in_row", CONTAINER_U64, 3,
+                        (const uint64_t[]){t->skipped_in_row, t->barren_in_row, t->revivals});
     container_add_small(&w, "seconds", CONTAINER_F64, 1, &t->seconds);
     container_add_small(&w, "views", CONTAINER_U64, 1, (const uint64_t[]){hash_of_views(&t->scene)});
     const exposures *e = &t->exposures;
@@ -103,7 +115,8 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     if (snprintf(previous, sizeof previous, "%s.prev", path) < (int)sizeof previous && file_exists(path)) {
         if (rename(path, previous) != 0) {
             container_writer_free(&w);
-            return base_fail(err, GBT_ERR_IO, "%s: cannot keep the previous checkpoint: %s", path, strerror(errno));
+            return base_fail(err, GBT_ERR_IO, "%s: cannot keep the previous checkpoint: %s", path,
+                             strerror(errno));
         }
     }
     const gbt_status status = container_save(&w, path, err);
@@ -122,10 +135,13 @@ gbt_status checkpoint_config(const char *path, char *out, size_t size, gbt_error
 
 static gbt_status read_exposures(const container *c, exposures *e, gbt_error *err)
 {
-    const struct { const char *field; float *out; } fields[] = {{"matrix", e->matrix}, {"moment1", e->moment1}, {"moment2", e->moment2}};
+    const struct {
+        const char *field;
+        float *out;
+    } fields[] = {{"matrix", e->matrix}, {"moment1", e->moment1}, {"moment2", e->moment2}};
     for (int i = 0; i < 3; i++)
-        GBT_TRY(copy_field(c, "exposure", fields[i].field, e->count, AFFINE_NUMBERS, 2, (const size_t[]){AFFINE_NUMBERS, 0}, fields[i].out,
-                           err));
+        GBT_TRY(copy_field(c, "exposure", fields[i].field, e->count, AFFINE_NUMBERS, 2,
+                           (const size_t[]){AFFINE_NUMBERS, 0}, fields[i].out, err));
     return container_get(c, "exposure.visits", CONTAINER_U64, e->count, e->visits, err);
 }
 
@@ -141,7 +157,8 @@ static gbt_status read_births(trainer *t, const container *c, const char *path, 
         GBT_TRY(container_get(c, "anchors.born", CONTAINER_U64, rows, t->born, err));
     for (size_t i = 0; i < rows; i++)
         if (t->born[i] > t->anchor_t)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: anchor %zu was made in step %llu (wanted at most %llu)", path, i,
+            return base_fail(err, GBT_ERR_FORMAT,
+                             "%s: anchor %zu was made in step %llu (wanted at most %llu)", path, i,
                              (unsigned long long)t->born[i], (unsigned long long)t->anchor_t);
     return GBT_OK;
 }
@@ -151,17 +168,22 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     uint64_t counters[8];
     GBT_TRY(container_get(c, "counters", CONTAINER_U64, 8, counters, err));
     if (counters[5] != t->scene.view_count || counters[6] != t->scene.points.count)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: made from other data (wanted %zu views and %zu points, got %llu and %llu)%s%s", path,
-                         t->scene.view_count, t->scene.points.count, (unsigned long long)counters[5], (unsigned long long)counters[6],
-                         t->scene.photos_missing > 0 ? "; photos that are missing: " : "", t->scene.missing_names);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: made from other data (wanted %zu views and %zu points, got %llu and %llu)%s%s",
+                         path, t->scene.view_count, t->scene.points.count, (unsigned long long)counters[5],
+                         (unsigned long long)counters[6],
+                         t->scene.photos_missing > 0 ? "; photos that are missing: " : "",
+                         t->scene.missing_names);
     uint64_t views = hash_of_views(&t->scene);
     if (container_section_named(c, "views") != NULL) /* older checkpoints have none */
         GBT_TRY(container_get(c, "views", CONTAINER_U64, 1, &views, err));
     if (views != hash_of_views(&t->scene))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: made from other data (%.1000s has photos of other names, sizes or cameras)", path,
-                         t->scene.folder);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: made from other data (%.1000s has photos of other names, sizes or cameras)",
+                         path, t->scene.folder);
     if (counters[4] > PACE_SEGMENTS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: pace of %llu parts (limit %d)", path, (unsigned long long)counters[4], PACE_SEGMENTS);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: pace of %llu parts (limit %d)", path,
+                         (unsigned long long)counters[4], PACE_SEGMENTS);
     size_t position[2] = {CONTAINER_ANY, 3};
     const void *data;
     GBT_TRY(container_find(c, "anchors.position", CONTAINER_F32, 2, position, &data, err));
@@ -187,8 +209,13 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     uint64_t in_row[3] = {0, 0, 0};
     if (container_section_named(c, "in_row") != NULL) /* older checkpoints have none */
         GBT_TRY(container_get(c, "in_row", CONTAINER_U64, 3, in_row, err));
-    t->skipped_in_row = in_row[0], t->barren_in_row = in_row[1], t->revivals = in_row[2];
-    t->step = counters[0], t->adjust_step = counters[1], t->anchor_t = counters[2], t->skipped_steps = counters[3];
+    t->skipped_in_row = in_row[0];
+    t->barren_in_row = in_row[1];
+    t->revivals = in_row[2];
+    t->step = counters[0];
+    t->adjust_step = counters[1];
+    t->anchor_t = counters[2];
+    t->skipped_steps = counters[3];
     t->pace.known = (int)counters[4];
     t->anchors_initial = counters[7];
     return read_births(t, c, path, err);

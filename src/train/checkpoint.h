@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/checkpoint.h -- everything a run needs to go on to the same bits. */
 #ifndef GBT_TRAIN_CHECKPOINT_H
 #define GBT_TRAIN_CHECKPOINT_H

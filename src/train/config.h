@@ -1,4 +1,6 @@
-/* train/config.h -- the settings of a run as text: what is saved with every run, and what --resume reads back. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/config.h -- the settings of a run as text: what is saved with every run, and what --resume reads
+   back. */
 #ifndef GBT_TRAIN_CONFIG_H
 #define GBT_TRAIN_CONFIG_H
 
@@ -6,16 +8,18 @@
 
 enum { CONFIG_TEXT_SIZE = 4096, CONFIG_STRING_SIZE = 1024 };
 
-/** "key = value" lines for everything that decides the result (not threads, not when checkpoints are made), and the data folder. */
+/** "key = value" lines for everything that decides the result (not threads, not when checkpoints are made),
+    and the data folder. */
 void config_text(const gbt_train_def *def, const char *data, char *out, size_t size);
 
 /** Where config_parse() keeps the strings that the def points to. */
 typedef struct config_strings {
-    char init[32], alpha[32], renderer[32], scale_prior[32], distance[32], pace[CONFIG_STRING_SIZE], eval_split[CONFIG_STRING_SIZE],
-        data[CONFIG_STRING_SIZE];
+    char init[32], alpha[32], renderer[32], scale_prior[32], distance[32], pace[CONFIG_STRING_SIZE],
+        eval_split[CONFIG_STRING_SIZE], data[CONFIG_STRING_SIZE];
 } config_strings;
 
 /** Read such text over `def` (other fields stay). GBT_ERR_FORMAT with file and line for anything else. */
-gbt_status config_parse(const char *text, const char *path, gbt_train_def *def, config_strings *strings, gbt_error *err);
+gbt_status config_parse(const char *text, const char *path, gbt_train_def *def, config_strings *strings,
+                        gbt_error *err);
 
 #endif

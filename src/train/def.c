@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/def.c -- the settings of training: defaults, ranges, and what 0 stands for. */
 #include "train/def.h"
 
@@ -7,7 +8,8 @@
 #include "base/fail.h"
 #include "frame/frame.h"
 
-/* Fewer Gaussians per anchor than in the paper's base: at equal time the models are better (docs/training.md). */
+/* Fewer Gaussians per anchor than in the paper's base: at equal time the models are better
+   (docs/training.md). */
 enum { default_offsets = 2 };
 
 static const double default_budget_seconds = 600;
@@ -47,22 +49,26 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "train: the def was not made by gbt_train_def_default()");
     anchor_init_kind unused_kind;
     if (!anchor_init_kind_named(d->init, &unused_kind))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--init: \"%.40s\" (wanted gb, adaptive, voxel or random)", d->init);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--init: \"%.40s\" (wanted gb, adaptive, voxel or random)",
+                         d->init);
     if (!(d->init_count >= 0 && d->init_count <= 1))
         return base_fail(err, GBT_ERR_ARGUMENT, "--init-count: %g (wanted 0 to 1)", d->init_count);
     if (strcmp(d->scale_prior, "gb") != 0 && strcmp(d->scale_prior, "nn") != 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "--scale-prior: \"%.40s\" (wanted gb or nn)", d->scale_prior);
     if (strcmp(d->distance, "auto") != 0 && strcmp(d->distance, "on") != 0 && strcmp(d->distance, "off") != 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--distance: \"%.40s\" (wanted auto, on or off)", d->distance);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--distance: \"%.40s\" (wanted auto, on or off)",
+                         d->distance);
     if (d->max_depth < 0 || d->max_depth > 64)
         return base_fail(err, GBT_ERR_ARGUMENT, "--max-depth: %d (wanted 0 to 64)", d->max_depth);
     if (d->offsets < 0 || d->offsets > ANCHOR_MAX_OFFSETS)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--offsets: %d (wanted 0 to %d)", d->offsets, ANCHOR_MAX_OFFSETS);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--offsets: %d (wanted 0 to %d)", d->offsets,
+                         ANCHOR_MAX_OFFSETS);
     if (!(d->downscale >= 1 && d->downscale <= 64))
         return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: %g (wanted 1 to 64)", d->downscale);
     frame_renderer unused;
     if (!frame_renderer_named(d->renderer, &unused))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)", d->renderer);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)",
+                         d->renderer);
     if (!(d->footprint >= 0 && d->footprint <= 4))
         return base_fail(err, GBT_ERR_ARGUMENT, "--footprint: %g (wanted 0 to 4)", d->footprint);
     if (!(d->near >= 0 && d->near <= 1))
@@ -74,15 +80,18 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err)
     if (!(d->budget_seconds >= 0 && d->budget_seconds < 1e9))
         return base_fail(err, GBT_ERR_ARGUMENT, "--budget: %g s (wanted 0 or more)", d->budget_seconds);
     if (d->resume && d->overwrite)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--resume goes on with a run, --overwrite loses it (wanted one of them)");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "--resume goes on with a run, --overwrite loses it (wanted one of them)");
     if (!(d->learning_rate_factor >= 1e-3 && d->learning_rate_factor <= 1e3))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--learning-rate: %g (wanted 0.001 to 1000)", d->learning_rate_factor);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--learning-rate: %g (wanted 0.001 to 1000)",
+                         d->learning_rate_factor);
     if (!(d->splats_until >= 0 && d->splats_until <= 1))
         return base_fail(err, GBT_ERR_ARGUMENT, "--splats-until: %g (wanted 0 to 1)", d->splats_until);
     if (!(d->grow_until >= 0 && d->grow_until <= 1))
         return base_fail(err, GBT_ERR_ARGUMENT, "--grow-until: %g (wanted 0 to 1)", d->grow_until);
     if (!(d->scale_factor == 0 || (d->scale_factor >= 0.01 && d->scale_factor <= 100)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--scale-factor: %g (wanted 0.01 to 100, or 0)", d->scale_factor);
+        return base_fail(err, GBT_ERR_ARGUMENT, "--scale-factor: %g (wanted 0.01 to 100, or 0)",
+                         d->scale_factor);
     if (!(d->thrift >= 0.1 && d->thrift <= 10))
         return base_fail(err, GBT_ERR_ARGUMENT, "--thrift: %g (wanted 0.1 to 10)", d->thrift);
     if (!(d->last_thrift >= 1 && d->last_thrift <= 100))
@@ -102,6 +111,8 @@ void train_def_settle(gbt_train_def *d)
         const bool from_balls = strcmp(d->init, "gb") == 0 && strcmp(d->scale_prior, "gb") == 0;
         d->scale_factor = d->compat ? 1 : from_balls ? ball_scale_factor : TRAIN_SPACING_SCALE;
     }
-    if (d->compat)
-        d->footprint = 0, d->near = 0;
+    if (d->compat) {
+        d->footprint = 0;
+        d->near = 0;
+    }
 }

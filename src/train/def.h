@@ -1,11 +1,13 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/def.h -- the settings of training: ranges, and what 0 stands for. */
 #ifndef GBT_TRAIN_DEF_H
 #define GBT_TRAIN_DEF_H
 
 #include "gbtrace/train.h"
 
-/** First scales of anchors, in units of their spacing. Smaller Gaussians leave holes that more anchors must fill; larger ones, where a few
-    anchors stand far apart, cover what they cannot show, and stay large (docs/training.md). */
+/** First scales of anchors, in units of their spacing. Smaller Gaussians leave holes that more anchors must
+    fill; larger ones, where a few anchors stand far apart, cover what they cannot show, and stay large
+    (docs/training.md). */
 #define TRAIN_SPACING_SCALE 0.7
 
 /** GBT_OK, or GBT_ERR_ARGUMENT and the option that is out of its range. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/event_records.c -- protobuf messages of TensorBoard, framed and summed up. */
 #include "train/event_records.h"
 
@@ -7,7 +8,12 @@
 
 #include "base/memory.h"
 
-enum { FRAME_HEAD = 12, FRAME_TAIL = 4, STEP_AT = 9, PNG_HEADER = 24 }; /* the step comes behind the wall time: a byte and a double */
+enum {
+    FRAME_HEAD = 12,
+    FRAME_TAIL = 4,
+    STEP_AT = 9,
+    PNG_HEADER = 24
+}; /* the step comes behind the wall time: a byte and a double */
 
 /* Of protobuf: how a field is written. */
 enum { WIRE_VARINT = 0, WIRE_DOUBLE = 1, WIRE_BYTES = 2, WIRE_FLOAT = 5 };
@@ -27,7 +33,8 @@ static uint32_t masked_crc(const unsigned char *bytes, size_t count)
 static void put(event_records *r, const void *bytes, size_t count)
 {
     if (r->status == GBT_OK)
-        r->status = mem_reserve((void **)&r->bytes, &r->capacity, r->count, r->count + count, 1, "TensorBoard events", NULL);
+        r->status = mem_reserve((void **)&r->bytes, &r->capacity, r->count, r->count + count, 1,
+                                "TensorBoard events", NULL);
     if (r->status != GBT_OK || count == 0)
         return;
     memcpy(r->bytes + r->count, bytes, count);
@@ -44,10 +51,7 @@ static void put_varint(event_records *r, uint64_t value)
     put(r, bytes, count);
 }
 
-static void put_key(event_records *r, unsigned field, unsigned wire)
-{
-    put_varint(r, field << 3 | wire);
-}
+static void put_key(event_records *r, unsigned field, unsigned wire) { put_varint(r, field << 3 | wire); }
 
 static void put_bytes(event_records *r, unsigned field, const void *bytes, size_t count)
 {
@@ -65,7 +69,8 @@ static void put_message(event_records *r, unsigned field, event_records *inner)
     inner->count = 0;
 }
 
-/* The bytes of the machine are the bytes of the file: every processor that Debian has Embree for is little-endian. */
+/* The bytes of the machine are the bytes of the file: every processor that Debian has Embree for is
+   little-endian. */
 static void begin_event(event_records *event, uint64_t step)
 {
     struct timespec now;
@@ -82,7 +87,8 @@ static void end_event(event_records *r, event_records *event)
 {
     const uint64_t length = event->count;
     const size_t before = r->count;
-    const uint32_t length_crc = masked_crc((const unsigned char *)&length, sizeof length), crc = masked_crc(event->bytes, event->count);
+    const uint32_t length_crc = masked_crc((const unsigned char *)&length, sizeof length),
+                   crc = masked_crc(event->bytes, event->count);
     if (event->status != GBT_OK)
         r->status = event->status;
     put(r, &length, sizeof length);
@@ -142,7 +148,8 @@ void event_add_png(event_records *r, uint64_t step, const char *tag, const unsig
     if (size < PNG_HEADER || memcmp(png + 12, "IHDR", 4) != 0)
         return;
     event_records event = {0}, summary = {0}, value = {0}, picture = {0};
-    const uint64_t numbers[] = {read_png_number(png + 20), read_png_number(png + 16), 3}; /* height, width, colours */
+    const uint64_t numbers[] = {read_png_number(png + 20), read_png_number(png + 16), 3}; /* height, width,
+                                                                                             colours */
     begin_event(&event, step);
     for (unsigned i = 0; i < 3; i++) {
         put_key(&picture, i + 1, WIRE_VARINT);
@@ -182,7 +189,8 @@ size_t event_records_until(const unsigned char *bytes, size_t count, uint64_t st
         memcpy(&length, bytes + at, sizeof length);
         memcpy(&length_crc, bytes + at + sizeof length, sizeof length_crc);
         const unsigned char *event = bytes + at + FRAME_HEAD;
-        if (masked_crc(bytes + at, sizeof length) != length_crc || length > count - at - FRAME_HEAD - FRAME_TAIL)
+        if (masked_crc(bytes + at, sizeof length) != length_crc ||
+            length > count - at - FRAME_HEAD - FRAME_TAIL)
             break;
         memcpy(&crc, event + length, sizeof crc);
         if (masked_crc(event, length) != crc || !read_step(event, length, &event_step) || event_step > step)

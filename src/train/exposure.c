@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/exposure.c -- the photos' colour matrices and their optimizer. */
 #include "train/exposure.h"
 
@@ -55,7 +56,8 @@ void exposures_step(exposures *e, size_t index, const double gradient[AFFINE_NUM
     float g[AFFINE_NUMBERS];
     for (int k = 0; k < AFFINE_NUMBERS; k++)
         g[k] = (float)gradient[k];
-    adam_step(e->matrix + first, g, e->moment1 + first, e->moment2 + first, AFFINE_NUMBERS, adam_rates_at(rate, ++e->visits[index]));
+    adam_step(e->matrix + first, g, e->moment1 + first, e->moment2 + first, AFFINE_NUMBERS,
+              adam_rates_at(rate, ++e->visits[index]));
     center(e);
 }
 
@@ -69,7 +71,8 @@ gbt_status exposures_write(const exposures *e, const char *const *names, const c
 {
     json_t *root = json_object(), *photos = json_array();
     json_object_set_new(root, "schema", json_integer(1));
-    json_object_set_new(root, "meaning", json_string("photo = matrix (3 x 4, rows) * (red, green, blue, 1) of the scene"));
+    json_object_set_new(root, "meaning",
+                        json_string("photo = matrix (3 x 4, rows) * (red, green, blue, 1) of the scene"));
     for (size_t i = 0; i < e->count; i++) {
         json_t *numbers = json_array(), *photo = json_object();
         for (size_t k = 0; k < AFFINE_NUMBERS; k++)

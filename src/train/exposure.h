@@ -1,7 +1,9 @@
-/* train/exposure.h -- a colour matrix per training photo, learned beside the scene: exposure and white balance that differ.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/exposure.h -- a colour matrix per training photo, learned beside the scene: exposure and white
+   balance that differ.
 
-   The scene and the matrices can be traded against each other (a darker scene under brighter matrices), so their mean over the photos is
-   held at the identity: the scene has the photos' mean exposure. */
+   The scene and the matrices can be traded against each other (a darker scene under brighter matrices), so
+   their mean over the photos is held at the identity: the scene has the photos' mean exposure. */
 #ifndef GBT_TRAIN_EXPOSURE_H
 #define GBT_TRAIN_EXPOSURE_H
 
@@ -11,9 +13,9 @@
 
 /** Start from {0}; free with exposures_free(). */
 typedef struct exposures {
-    size_t count;                       /* training photos; 0: exposure is not learned */
-    float *matrix, *moment1, *moment2;  /* [count][AFFINE_NUMBERS] */
-    uint64_t *visits;                   /* [count] Adam steps of each */
+    size_t count;                      /* training photos; 0: exposure is not learned */
+    float *matrix, *moment1, *moment2; /* [count][AFFINE_NUMBERS] */
+    uint64_t *visits;                  /* [count] Adam steps of each */
 } exposures;
 
 /** `count` identities. */
@@ -24,7 +26,8 @@ void exposures_free(exposures *e);
 void exposures_step(exposures *e, size_t index, const double gradient[AFFINE_NUMBERS], double rate);
 
 /**
- * The learning rate: a photo is seen 1 / (count * step) times in a run, and must come from the identity to an exposure two stops away.
+ * The learning rate: a photo is seen 1 / (count * step) times in a run, and must come from the identity to an
+ * exposure two stops away.
  *
  * @param progress [in] [0, 1]
  * @param step     [in] progress that one step makes

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/gradient_check.c -- look for gradients that would spoil the parameters for good. */
 #include "train/gradient_check.h"
 
@@ -64,7 +65,8 @@ static void name_row(const row_job *job, size_t count, char *where, size_t size)
 {
     for (int k = 0; k < FIELD_COUNT; k++)
         for (size_t i = 0; i < count; i++) {
-            const size_t width = job->fields[k].width, at = first_bad(job->fields[k].values + job->rows[i] * width, width);
+            const size_t width = job->fields[k].width,
+                         at = first_bad(job->fields[k].values + job->rows[i] * width, width);
             if (at < width) {
                 snprintf(where, size, "%s of anchor %u, value %zu", job->fields[k].name, job->rows[i], at);
                 return;
@@ -86,7 +88,8 @@ bool gradient_is_bad(const trainer *t, const double exposure[AFFINE_NUMBERS], ch
     decoder_part parts[3];
     decoder_parts(&t->decoder, parts);
     for (int i = 0; i < 3; i++) {
-        const size_t count = parts[i].end - parts[i].begin, at = first_bad(t->d_params + parts[i].begin, count);
+        const size_t count = parts[i].end - parts[i].begin,
+                     at = first_bad(t->d_params + parts[i].begin, count);
         if (at < count) {
             snprintf(where, size, "%s network, value %zu", networks[i], at);
             return true;

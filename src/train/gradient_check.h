@@ -1,18 +1,22 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/gradient_check.h -- may a gradient go into the optimizer? */
 #ifndef GBT_TRAIN_GRADIENT_CHECK_H
 #define GBT_TRAIN_GRADIENT_CHECK_H
 
 #include "train/trainer.h"
 
-/** Beyond this a gradient is as bad as one that is not a number: Adam's moments square it, and the square must stay finite. */
+/** Beyond this a gradient is as bad as one that is not a number: Adam's moments square it, and the square
+    must stay finite. */
 #define GRADIENT_LIMIT 1e18f
 
 /**
- * Look at every gradient of the last frame_backward(): rows of the visible anchors, networks, and the photo's exposure.
+ * Look at every gradient of the last frame_backward(): rows of the visible anchors, networks, and the photo's
+ * exposure.
  *
  * @param exposure [in]  [12] gradient of the photo's colour matrix, NULL without
- * @param where    [out] "feature of anchor 17, value 3", "shape network, value 200": the first bad one, in the order feature, offset,
- *                       scale, opacity, shape and colour network, exposure; untouched when all are good
+ * @param where    [out] "feature of anchor 17, value 3", "shape network, value 200": the first bad one, in
+ *                       the order feature, offset, scale, opacity, shape and colour network, exposure;
+ *                       untouched when all are good
  * @return true when one of them is NaN or larger than GRADIENT_LIMIT
  * Threads: parallel inside. Cost: one read of these rows.
  */

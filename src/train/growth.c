@@ -1,4 +1,6 @@
-/* train/growth.c -- what anchors are good for, gathered step by step; and the rounds in which they grow and are pruned by it. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/growth.c -- what anchors are good for, gathered step by step; and the rounds in which they grow and
+   are pruned by it. */
 #include "train/growth.h"
 
 #include <math.h>
@@ -13,13 +15,18 @@
 #include "train/gradient_check.h"
 #include "train/sight.h"
 
-static const float share_min = 2.5e-6f; /* of short runs: schedule_thrift() */
+static const float share_min = 2.5e-6f;     /* of short runs: schedule_thrift() */
 static const double last_rounds_from = 0.9; /* of growing */
-enum { ADJUSTS_PER_RUN = 100, COMPAT_INTERVAL = 100 /* steps */, INTERVAL_MIN = 20 /* a judgement of fewer views is chance */ };
+enum {
+    ADJUSTS_PER_RUN = 100,
+    COMPAT_INTERVAL = 100 /* steps */,
+    INTERVAL_MIN = 20 /* a judgement of fewer views is chance */
+};
 enum { VIEWS_MIN = 2 };
 
-/* What an anchor is good for is what pictures would miss without it: the share of them that its Gaussians cover, the mean over rays of T
-   alpha. Opacity, which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of all anchors. */
+/* What an anchor is good for is what pictures would miss without it: the share of them that its Gaussians
+   cover, the mean over rays of T alpha. Opacity, which the reference takes, says nothing of Gaussians that
+   are hidden or tiny: a third of all anchors. */
 static void gather_use(trainer *t)
 {
     const frame *f = &t->frame;
@@ -34,8 +41,9 @@ static void gather_use(trainer *t)
         use[f->visible[f->tape.slot[i] / (uint32_t)t->anchors.offset_count]] += f->seen[i] / rays;
 }
 
-/* The norm of dL/d(projected mean in NDC), from the ray-traced gradient of the mean in camera axes (g): (z tan_x g.x, z tan_y g.y).
-   Counted for every Gaussian whose box may touch the image, hit or not: counting hits alone would grow what is mostly hidden. */
+/* The norm of dL/d(projected mean in NDC), from the ray-traced gradient of the mean in camera axes (g): (z
+   tan_x g.x, z tan_y g.y). Counted for every Gaussian whose box may touch the image, hit or not: counting
+   hits alone would grow what is mostly hidden. */
 void growth_gather(trainer *t)
 {
     const frame *f = &t->frame;
@@ -62,7 +70,8 @@ void growth_gather(trainer *t)
         const float gy = r[3] * dg->mean_x[i] + r[4] * dg->mean_y[i] + r[5] * dg->mean_z[i];
         const float sx = cam_z * tan_x * gx, sy = cam_z * tan_y * gy;
         const uint32_t slot = f->tape.slot[i];
-        const size_t at = (size_t)f->visible[slot / (uint32_t)k_count] * (size_t)k_count + slot % (uint32_t)k_count;
+        const size_t at =
+            (size_t)f->visible[slot / (uint32_t)k_count] * (size_t)k_count + slot % (uint32_t)k_count;
         s->grad_accum[at] += fminf(sqrtf(sx * sx + sy * sy), GRADIENT_LIMIT);
         s->grad_count[at] += 1;
     }
@@ -88,8 +97,10 @@ static gbt_status follow_rows(anchors *a, const adjust_result *result, gbt_error
         if (result->source[i] < 0)
             continue;
         const size_t from = (size_t)result->source[i];
-        memcpy(a->feature + i * ANCHOR_FEATURE_DIM, old.feature + from * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof(float));
-        memcpy(a->offset + i * offset_floats, old.offset + from * offset_floats, offset_floats * sizeof(float));
+        memcpy(a->feature + i * ANCHOR_FEATURE_DIM, old.feature + from * ANCHOR_FEATURE_DIM,
+               ANCHOR_FEATURE_DIM * sizeof(float));
+        memcpy(a->offset + i * offset_floats, old.offset + from * offset_floats,
+               offset_floats * sizeof(float));
         memcpy(a->scale_log + i * 6, old.scale_log + from * 6, 6 * sizeof(float));
     }
     anchors_free(&old);
@@ -126,10 +137,12 @@ static void nearest_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* The sparse points are known surface, and a start from balls has left most of them out: where the nearest anchor asks for more, they are
-   places to grow. Gaussians are not enough, for they are where anchors are. In the first round they make good what the start lacks, as a
-   start would; after it they are asked for and sized as Gaussians are. `nearest` and `scale` are the caller's. */
-static gbt_status grow_at_points(const trainer *t, adjust_def *def, uint32_t **nearest, float **scale, gbt_error *err)
+/* The sparse points are known surface, and a start from balls has left most of them out: where the nearest
+   anchor asks for more, they are places to grow. Gaussians are not enough, for they are where anchors are. In
+   the first round they make good what the start lacks, as a start would; after it they are asked for and
+   sized as Gaussians are. `nearest` and `scale` are the caller's. */
+static gbt_status grow_at_points(const trainer *t, adjust_def *def, uint32_t **nearest, float **scale,
+                                 gbt_error *err)
 {
     const scene_points *points = &t->scene.points;
     const bool first = t->adjust_step == 0;
@@ -139,25 +152,31 @@ static gbt_status grow_at_points(const trainer *t, adjust_def *def, uint32_t **n
     if (*nearest == NULL || (first && *scale == NULL))
         return GBT_ERR_NO_MEMORY;
     if (first)
-        GBT_TRY(anchor_scales_from_spacing(points->position, points->count, TRAIN_SPACING_SCALE, t->first_scale_max, *scale, err));
+        GBT_TRY(anchor_scales_from_spacing(points->position, points->count, TRAIN_SPACING_SCALE,
+                                           t->first_scale_max, *scale, err));
     point_tree *tree;
     GBT_TRY(point_tree_build(t->anchors.position, NULL, t->anchors.count, &tree, err));
     nearest_job job = {tree, points->position, *nearest};
     parallel_blocks(points->count, 256, nearest_block, &job);
     point_tree_free(tree);
-    def->place = points->position, def->place_scale = *scale, def->place_anchor = *nearest, def->place_count = points->count;
+    def->place = points->position;
+    def->place_scale = *scale;
+    def->place_anchor = *nearest;
+    def->place_count = points->count;
     return GBT_OK;
 }
 
-/* One photo cannot tell how far off something is: what only it shows may stand anywhere along its rays, as a fog before other cameras. The
-   sparse points need no such leave, for other photos have told where they are. */
+/* One photo cannot tell how far off something is: what only it shows may stand anywhere along its rays, as a
+   fog before other cameras. The sparse points need no such leave, for other photos have told where they
+   are. */
 static bool two_views_see(const void *context, const float position[3])
 {
     const trainer *t = context;
     size_t seen = 0;
     for (size_t v = 0; v < t->train_count && seen < VIEWS_MIN; v++) {
         double distance;
-        seen += camera_sees(&t->scene.views[t->train_views[v]].camera, position, &distance) && distance > (double)t->settings.t_near;
+        seen += camera_sees(&t->scene.views[t->train_views[v]].camera, position, &distance) &&
+                distance > (double)t->settings.t_near;
     }
     return seen == VIEWS_MIN;
 }
@@ -176,13 +195,16 @@ static adjust_def rules_of(const trainer *t)
         return def;
     }
     const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
-    const bool last = t->def.last_thrift > 1 && pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
+    const bool last =
+        t->def.last_thrift > 1 && pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
     def.interval = fmaxf((float)(t->step + 1 - t->adjust_step), (float)INTERVAL_MIN);
     def.grad_threshold *= thrift;
     def.min_use = thrift * share_min * (last ? (float)t->def.last_thrift : 1);
     def.grow = !last;
-    if (t->train_count >= VIEWS_MIN)
-        def.may_stand = two_views_see, def.may_stand_context = t;
+    if (t->train_count >= VIEWS_MIN) {
+        def.may_stand = two_views_see;
+        def.may_stand_context = t;
+    }
     return def;
 }
 
@@ -206,7 +228,8 @@ gbt_status growth_adjust(trainer *t, gbt_error *err)
     mem_free(scale);
     mem_free(result.source);
     if (result.kept_last)
-        log_warn("step %llu: every anchor had become transparent; the most opaque one stays", (unsigned long long)t->step);
+        log_warn("step %llu: every anchor had become transparent; the most opaque one stays",
+                 (unsigned long long)t->step);
     t->adjust_step = t->step + 1;
     return status;
 }

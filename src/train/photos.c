@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/photos.c -- training photos, cached as bytes: at full size, and at the level in use. */
 #include "train/photos.h"
 
@@ -16,7 +17,9 @@ gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_err
     p->pixels = mem_calloc(source->view_count, sizeof *p->pixels, "photo cache", err);
     p->full_valid = mem_calloc(source->view_count, sizeof *p->full_valid, "photo cache", err);
     p->valid = mem_calloc(source->view_count, sizeof *p->valid, "photo cache", err);
-    return p->full == NULL || p->pixels == NULL || p->full_valid == NULL || p->valid == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    return p->full == NULL || p->pixels == NULL || p->full_valid == NULL || p->valid == NULL
+               ? GBT_ERR_NO_MEMORY
+               : GBT_OK;
 }
 
 static void drop_all(unsigned char **pixels, size_t count)
@@ -42,7 +45,8 @@ gbt_camera photos_camera(const photos *p, size_t view, int level)
 {
     const gbt_camera *stated = &p->source->views[view].camera;
     const double divide = p->downscale * exp2(level);
-    const int width = (int)fmax(1, floor(stated->width / divide + 0.5)), height = (int)fmax(1, floor(stated->height / divide + 0.5));
+    const int width = (int)fmax(1, floor(stated->width / divide + 0.5)),
+              height = (int)fmax(1, floor(stated->height / divide + 0.5));
     return gbt_camera_resized(stated, width, height);
 }
 
@@ -71,7 +75,8 @@ static gbt_status read_full(photos *p, size_t view, gbt_error *err)
         return GBT_OK;
     const gbt_camera camera = photos_camera(p, view, 0);
     image photo;
-    GBT_TRY(scene_read_photo_valid(&p->source->views[view], camera.width, camera.height, &photo, &p->full_valid[view], err));
+    GBT_TRY(scene_read_photo_valid(&p->source->views[view], camera.width, camera.height, &photo,
+                                   &p->full_valid[view], err));
     const gbt_status status = to_bytes(&photo, &p->full[view], err);
     image_free(&photo);
     if (status != GBT_OK) {
@@ -97,7 +102,9 @@ static void load_one(size_t block, size_t begin, size_t end, void *context)
 
 gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *err)
 {
-    load_job job = {.photos = p, .views = views, .status = mem_calloc(count, sizeof *job.status, "photos", err),
+    load_job job = {.photos = p,
+                    .views = views,
+                    .status = mem_calloc(count, sizeof *job.status, "photos", err),
                     .error = mem_calloc(count, sizeof *job.error, "photos", err)};
     gbt_status status = job.status == NULL || job.error == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK)
@@ -125,7 +132,8 @@ static gbt_status resize_valid(photos *p, size_t view, const gbt_camera *camera,
     if (p->full_valid[view] == NULL || p->valid[view] != NULL)
         return GBT_OK;
     const gbt_camera full = photos_camera(p, view, 0);
-    return photo_resize_valid(p->full_valid[view], full.width, full.height, camera->width, camera->height, &p->valid[view], err);
+    return photo_resize_valid(p->full_valid[view], full.width, full.height, camera->width, camera->height,
+                              &p->valid[view], err);
 }
 
 const unsigned char *photos_valid(const photos *p, size_t view)
@@ -162,28 +170,30 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *
 }
 
 /* The marks of every `stride`-th pixel from `phase` on, if the photo has any. */
-static gbt_status pick_valid(photos *p, size_t view, int full_width, const photo_sample *sample, int width, int height,
-                             const unsigned char **valid, gbt_error *err)
+static gbt_status pick_valid(photos *p, size_t view, int full_width, const photo_sample *sample, int width,
+                             int height, const unsigned char **valid, gbt_error *err)
 {
     const unsigned char *full = p->full_valid[view];
     *valid = NULL;
     if (full == NULL)
         return GBT_OK;
     const size_t w = (size_t)width, h = (size_t)height, step = (size_t)1 << sample->level;
-    GBT_TRY(mem_reserve((void **)&p->sample_valid, &p->sample_valid_capacity, 0, w * h, 1, "valid pixels", err));
+    GBT_TRY(
+        mem_reserve((void **)&p->sample_valid, &p->sample_valid_capacity, 0, w * h, 1, "valid pixels", err));
     for (size_t y = 0; y < h; y++)
         for (size_t x = 0; x < w; x++)
-            p->sample_valid[y * w + x] = full[(y * step + (size_t)sample->phase[1]) * (size_t)full_width + x * step +
-                                              (size_t)sample->phase[0]];
+            p->sample_valid[y * w + x] = full[(y * step + (size_t)sample->phase[1]) * (size_t)full_width +
+                                              x * step + (size_t)sample->phase[0]];
     *valid = p->sample_valid;
     return GBT_OK;
 }
 
-gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out, gbt_camera *camera,
-                             const unsigned char **valid, int *step, gbt_error *err)
+gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out,
+                             gbt_camera *camera, const unsigned char **valid, int *step, gbt_error *err)
 {
     const gbt_camera full = photos_camera(p, view, 0);
-    if (sample->level == 0 || !gbt_camera_every(&full, 1 << sample->level, sample->phase[0], sample->phase[1], camera)) {
+    if (sample->level == 0 ||
+        !gbt_camera_every(&full, 1 << sample->level, sample->phase[0], sample->phase[1], camera)) {
         *camera = photos_camera(p, view, sample->level);
         *step = 1;
         GBT_TRY(photos_get(p, view, sample->level, out, err));
@@ -195,7 +205,8 @@ gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample,
     GBT_TRY(image_fit(out, camera->width, camera->height, 3, err));
     const size_t stride = 3 * (size_t)*step, row = 3 * (size_t)full.width;
     for (size_t y = 0; y < (size_t)camera->height; y++) {
-        const unsigned char *from = p->full[view] + (y * (size_t)*step + (size_t)sample->phase[1]) * row + 3 * (size_t)sample->phase[0];
+        const unsigned char *from = p->full[view] + (y * (size_t)*step + (size_t)sample->phase[1]) * row +
+                                    3 * (size_t)sample->phase[0];
         float *to = out->pixels + 3 * y * (size_t)camera->width;
         for (size_t x = 0; x < (size_t)camera->width; x++)
             for (size_t c = 0; c < 3; c++)

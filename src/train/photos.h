@@ -1,4 +1,6 @@
-/* train/photos.h -- the training photos, read once and kept as 8 bit; whole, smaller, or every n-th pixel of them. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/photos.h -- the training photos, read once and kept as 8 bit; whole, smaller, or every n-th pixel of
+   them. */
 #ifndef GBT_TRAIN_PHOTOS_H
 #define GBT_TRAIN_PHOTOS_H
 
@@ -10,12 +12,14 @@ typedef struct photos {
     int level;
     unsigned char **full;   /* [view_count] at level 0, NULL until asked for */
     unsigned char **pixels; /* [view_count] at `level` > 0, made from `full` */
-    unsigned char **full_valid, **valid; /* [view_count] marks of the same pixels; NULL for a photo whose values are all finite */
-    unsigned char *sample_valid;         /* of the last photos_get_sample(), when it picked pixels */
+    unsigned char **full_valid,
+        **valid; /* [view_count] marks of the same pixels; NULL for a photo whose values are all finite */
+    unsigned char *sample_valid; /* of the last photos_get_sample(), when it picked pixels */
     size_t sample_valid_capacity;
 } photos;
 
-/** Which pixels of a photo a training step looks at: every 2^level-th in both directions, from pixel `phase` on. {0}: all. */
+/** Which pixels of a photo a training step looks at: every 2^level-th in both directions, from pixel `phase`
+    on. {0}: all. */
 typedef struct photo_sample {
     int level;    /* >= 0 */
     int phase[2]; /* x, y, [0, 2^level) */
@@ -24,28 +28,33 @@ typedef struct photo_sample {
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err);
 void photos_close(photos *p);
 
-/** Read the photos of `views` now, on all threads; else each is read when first asked for. The first failure in their order is reported. */
+/** Read the photos of `views` now, on all threads; else each is read when first asked for. The first failure
+    in their order is reported. */
 gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *err);
 
 /** Camera of a view at a level: its size is round(stated / downscale / 2^level), at least 1. */
 gbt_camera photos_camera(const photos *p, size_t view, int level);
 
-/** A photo as float at a level; asking for another level drops what is kept. `out` is resized as needed (start from {0}). */
+/** A photo as float at a level; asking for another level drops what is kept. `out` is resized as needed
+    (start from {0}). */
 gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *err);
 
 /**
- * Pixels picked from a photo, not averaged, and the camera whose pixels they are: its rays are those of the photo at full size through the
- * middle of these pixels.
+ * Pixels picked from a photo, not averaged, and the camera whose pixels they are: its rays are those of the
+ * photo at full size through the middle of these pixels.
  *
- * Where the lens model has no principal point to shift (equirectangular), photo and camera are those of the level instead.
+ * Where the lens model has no principal point to shift (equirectangular), photo and camera are those of the
+ * level instead.
  * @param camera [out] may be smaller than the photo / 2^level by a pixel: the same size for every phase
  * @param valid  [out] as photos_valid(), of these pixels; borrowed until the next call
- * @param step   [out] how many of the photo's pixels lie from one pixel of `camera` to the next: 2^level, or 1 for a smaller photo
+ * @param step   [out] how many of the photo's pixels lie from one pixel of `camera` to the next: 2^level, or
+ *                     1 for a smaller photo
  */
-gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out, gbt_camera *camera,
-                             const unsigned char **valid, int *step, gbt_error *err);
+gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out,
+                             gbt_camera *camera, const unsigned char **valid, int *step, gbt_error *err);
 
-/** Which pixels of the photo that photos_get() gave last for this view mean something: 0 where a value was not finite; NULL: all. */
+/** Which pixels of the photo that photos_get() gave last for this view mean something: 0 where a value was
+    not finite; NULL: all. */
 const unsigned char *photos_valid(const photos *p, size_t view);
 
 #endif

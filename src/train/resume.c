@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/resume.c -- go on with a run. */
 #include "train/resume.h"
 
@@ -13,8 +14,8 @@
 #include "train/run_data.h"
 
 /* The checkpoint to go on from, and the settings in it. */
-static gbt_status find_checkpoint(const char *latest, const char *previous, const char **path, char config[CONFIG_TEXT_SIZE],
-                                  gbt_error *err)
+static gbt_status find_checkpoint(const char *latest, const char *previous, const char **path,
+                                  char config[CONFIG_TEXT_SIZE], gbt_error *err)
 {
     *path = !file_exists(latest) && file_exists(previous) ? previous : latest;
     gbt_error first = {0};
@@ -35,7 +36,8 @@ static const char *line_end(const char *line)
     return end != NULL ? end : line + strlen(line);
 }
 
-/* Settings that were asked for, which is what differs from the default, and that the run does not have. `saved` is settled, too. */
+/* Settings that were asked for, which is what differs from the default, and that the run does not have.
+   `saved` is settled, too. */
 static void warn_of_differences(const gbt_train_def *asked, const gbt_train_def *saved)
 {
     static const char *const length[] = {"iterations", "budget-seconds"};
@@ -54,30 +56,34 @@ static void warn_of_differences(const gbt_train_def *asked, const gbt_train_def 
             skip = skip || (strlen(length[i]) == name && strncmp(lines[0], length[i], name) == 0);
         const bool asked_for = sizes[0] != sizes[1] || memcmp(lines[0], lines[1], sizes[0]) != 0;
         if (!skip && asked_for && (sizes[0] != sizes[2] || memcmp(lines[0], lines[2], sizes[0]) != 0))
-            log_warn("a run is resumed with its own settings: %.*s, not %.*s", (int)sizes[2], lines[2], (int)(sizes[0] - name - 3),
-                     lines[0] + name + 3);
+            log_warn("a run is resumed with its own settings: %.*s, not %.*s", (int)sizes[2], lines[2],
+                     (int)(sizes[0] - name - 3), lines[0] + name + 3);
         for (int i = 0; i < 3; i++)
             lines[i] += sizes[i] + (lines[i][sizes[i]] == '\n');
     }
 }
 
-static gbt_status open_data(trainer *t, const char *data, const char *run, const gbt_train_def *def, const char *named, gbt_error *err)
+static gbt_status open_data(trainer *t, const char *data, const char *run, const gbt_train_def *def,
+                            const char *named, gbt_error *err)
 {
     run_data own;
     if (data == NULL) {
         run_data_find(run, named, &own);
         if (own.place[0] == '\0')
-            return base_fail(err, GBT_ERR_IO, "%.1000s: its data set is at none of %.2000s (name the folder where it is now)", run,
-                             own.tried);
+            return base_fail(err, GBT_ERR_IO,
+                             "%.1000s: its data set is at none of %.2000s (name the folder where it is now)",
+                             run, own.tried);
         data = file_is_same(named, own.place) ? named : own.place;
     }
     return trainer_open(t, data, def, err);
 }
 
-/* The schedule of a budget of which t->seconds are spent: these were its first parts, the others are found as the run goes on. */
+/* The schedule of a budget of which t->seconds are spent: these were its first parts, the others are found as
+   the run goes on. */
 static pace pace_of_time_spent(const trainer *t, double budget_seconds)
 {
-    const int parts = (int)fmin(fmax(round(PACE_SEGMENTS * t->seconds / budget_seconds), 1), PACE_SEGMENTS - 1);
+    const int parts =
+        (int)fmin(fmax(round(PACE_SEGMENTS * t->seconds / budget_seconds), 1), PACE_SEGMENTS - 1);
     pace p = {.known = t->step > 0 ? parts : 0};
     for (int i = 0; i < p.known; i++)
         p.steps[i] = ((uint64_t)i + 1) * t->step / (uint64_t)parts - (uint64_t)i * t->step / (uint64_t)parts;
@@ -90,31 +96,40 @@ static gbt_status change_length(trainer *t, const char *run, const gbt_train_def
     const bool by_time = own->iterations == 0 && own->pace == NULL;
     if (asked->iterations > 0 && asked->iterations != own->iterations) {
         if (asked->iterations <= t->step)
-            return base_fail(err, GBT_ERR_ARGUMENT, "%.1000s: %llu iterations were asked for (wanted more than the %llu that it has done)",
-                             run, (unsigned long long)asked->iterations, (unsigned long long)t->step);
+            return base_fail(
+                err, GBT_ERR_ARGUMENT,
+                "%.1000s: %llu iterations were asked for (wanted more than the %llu that it has done)", run,
+                (unsigned long long)asked->iterations, (unsigned long long)t->step);
         own->iterations = asked->iterations;
         own->pace = NULL;
         t->pace = pace_of_iterations(own->iterations);
-        log_info("%s: %llu steps done; training goes on to step %llu, with the schedules of a run of that length", run,
-                 (unsigned long long)t->step, (unsigned long long)own->iterations);
-    } else if (asked->iterations == 0 && asked->budget_seconds > 0 && !(by_time && asked->budget_seconds == own->budget_seconds)) {
+        log_info(
+            "%s: %llu steps done; training goes on to step %llu, with the schedules of a run of that length",
+            run, (unsigned long long)t->step, (unsigned long long)own->iterations);
+    } else if (asked->iterations == 0 && asked->budget_seconds > 0 &&
+               !(by_time && asked->budget_seconds == own->budget_seconds)) {
         if (asked->budget_seconds <= t->seconds)
-            return base_fail(err, GBT_ERR_ARGUMENT, "%.1000s: %g seconds of training were asked for (wanted more than the %.1f it had)",
-                             run, asked->budget_seconds, t->seconds);
+            return base_fail(
+                err, GBT_ERR_ARGUMENT,
+                "%.1000s: %g seconds of training were asked for (wanted more than the %.1f it had)", run,
+                asked->budget_seconds, t->seconds);
         own->iterations = 0;
         own->budget_seconds = asked->budget_seconds;
         own->pace = NULL;
         t->pace = pace_of_time_spent(t, own->budget_seconds);
-        log_info("%s: %.1f s of training done; it goes on to %g s, with the schedules of a run of that length", run, t->seconds,
-                 own->budget_seconds);
+        log_info(
+            "%s: %.1f s of training done; it goes on to %g s, with the schedules of a run of that length",
+            run, t->seconds, own->budget_seconds);
     } else if (t->pace.known == PACE_SEGMENTS && t->step >= pace_total(&t->pace)) {
-        log_info("%s: all %llu steps are done; with more iterations, or more time, training goes on", run, (unsigned long long)t->step);
+        log_info("%s: all %llu steps are done; with more iterations, or more time, training goes on", run,
+                 (unsigned long long)t->step);
     }
     return GBT_OK;
 }
 
-gbt_status resume_open(trainer *t, const char *data, const char *run, const char *latest, const char *previous, const gbt_train_def *def,
-                       config_strings *strings, gbt_error *err)
+gbt_status resume_open(trainer *t, const char *data, const char *run, const char *latest,
+                       const char *previous, const gbt_train_def *def, config_strings *strings,
+                       gbt_error *err)
 {
     char config[CONFIG_TEXT_SIZE];
     const char *path;

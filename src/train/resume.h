@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/resume.h -- go on with a run: its settings and data, its state, another length. */
 #ifndef GBT_TRAIN_RESUME_H
 #define GBT_TRAIN_RESUME_H
@@ -8,18 +9,19 @@
 /**
  * Make of `t` what it was when the run's last checkpoint was made.
  *
- * Settings come from the checkpoint; what `def` asks for beside is warned of. Only the length may change: `def->iterations`, else
- * `def->budget_seconds`, where it is neither 0 nor the run's own. The schedule then goes on where a run of that length would be after as
- * many steps, or after as much time.
+ * Settings come from the checkpoint; what `def` asks for beside is warned of. Only the length may change:
+ * `def->iterations`, else `def->budget_seconds`, where it is neither 0 nor the run's own. The schedule then
+ * goes on where a run of that length would be after as many steps, or after as much time.
  *
  * @param data     [in] the data set; NULL: where the run has it
  * @param latest   [in] the checkpoint; where it is missing or damaged, `previous`
  * @param def      [in] as gbt_train() was given it; says where threads, memory and checkpoints are concerned
  * @param strings  [out] keeps strings of t->def, for as long as `t` lives
- * @return GBT_OK; GBT_ERR_ARGUMENT: a length that the run has passed already; GBT_ERR_IO: no data, no checkpoint; GBT_ERR_FORMAT: a damaged
- *         checkpoint, other data
+ * @return GBT_OK; GBT_ERR_ARGUMENT: a length that the run has passed already; GBT_ERR_IO: no data, no
+ *         checkpoint; GBT_ERR_FORMAT: a damaged checkpoint, other data
  */
-gbt_status resume_open(trainer *t, const char *data, const char *run, const char *latest, const char *previous, const gbt_train_def *def,
-                       config_strings *strings, gbt_error *err);
+gbt_status resume_open(trainer *t, const char *data, const char *run, const char *latest,
+                       const char *previous, const gbt_train_def *def, config_strings *strings,
+                       gbt_error *err);
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/run.c -- a whole training run: the loop around the steps, its folder, its clock, its signals. */
 #include <math.h>
 #include <stdio.h>
@@ -21,16 +22,13 @@
 
 enum { PATH_SIZE = 4096 };
 
-void gbt_set_threads(int threads)
-{
-    parallel_set_threads(threads);
-}
+void gbt_set_threads(int threads) { parallel_set_threads(threads); }
 
-/* ---- the run's folder ---------------------------------------------------------------------------------------------------------------- */
+/* ---- the run's folder ---- */
 
 typedef struct run_paths {
-    char model[PATH_SIZE], config[PATH_SIZE], log[PATH_SIZE], events[PATH_SIZE], json[PATH_SIZE], exposure[PATH_SIZE],
-        checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
+    char model[PATH_SIZE], config[PATH_SIZE], log[PATH_SIZE], events[PATH_SIZE], json[PATH_SIZE],
+        exposure[PATH_SIZE], checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
 } run_paths;
 
 static gbt_status open_folder(const char *run, const gbt_train_def *def, run_paths *p, gbt_error *err)
@@ -44,13 +42,17 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, run_pat
     GBT_TRY(file_join(p->json, sizeof p->json, run, "train.json", err));
     GBT_TRY(file_join(p->exposure, sizeof p->exposure, run, "exposure.json", err));
     GBT_TRY(file_join(p->checkpoint, sizeof p->checkpoint, checkpoints, "last.gbt", err));
-    GBT_TRY(file_join(p->checkpoint_previous, sizeof p->checkpoint_previous, checkpoints, "last.gbt.prev", err));
+    GBT_TRY(
+        file_join(p->checkpoint_previous, sizeof p->checkpoint_previous, checkpoints, "last.gbt.prev", err));
     const bool has_checkpoint = file_exists(p->checkpoint) || file_exists(p->checkpoint_previous);
     if (def->resume && !has_checkpoint)
-        return base_fail(err, GBT_ERR_IO, "%.1000s: holds no run to go on with (there is no %.1000s)", run, p->checkpoint);
+        return base_fail(err, GBT_ERR_IO, "%.1000s: holds no run to go on with (there is no %.1000s)", run,
+                         p->checkpoint);
     if (!def->resume && !def->overwrite && (file_exists(p->model) || has_checkpoint))
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%.1000s: holds a run already (go on with it by --resume, name another folder, or lose it by --overwrite)", run);
+                         "%.1000s: holds a run already (go on with it by --resume, name another folder, or "
+                         "lose it by --overwrite)",
+                         run);
     return file_make_folder(checkpoints, err);
 }
 
@@ -80,8 +82,10 @@ static gbt_status save_model(const trainer *t, const char *path, gbt_error *err)
                .extent = (float)t->extent,
                .t_near = t->settings.t_near,
                .iterations = t->step};
-    for (int i = 0; i < 3; i++)
-        m.origin[i] = t->scene.origin[i], m.background[i] = t->settings.background[i];
+    for (int i = 0; i < 3; i++) {
+        m.origin[i] = t->scene.origin[i];
+        m.background[i] = t->settings.background[i];
+    }
     snprintf(m.data_folder, sizeof m.data_folder, "%s", t->scene.folder);
     /* A run on a budget is told by its pace, so that a repetition by --pace writes the same file. */
     gbt_train_def def = t->def;
@@ -111,7 +115,7 @@ static gbt_status save_exposures(const trainer *t, const char *path, gbt_error *
     return status;
 }
 
-/* ---- the time budget ----------------------------------------------------------------------------------------------------------------- */
+/* ---- the time budget ---- */
 
 /* How long a step takes: so much by itself and so much per pixel, followed as the run changes. */
 typedef struct speed {
@@ -130,7 +134,8 @@ static void speed_follow(speed *s, const step_report *r, const frame_times *f)
     s->known = true;
 }
 
-/* Give the next part of the schedule its share of the time that is left. Resolutions may change inside the part. */
+/* Give the next part of the schedule its share of the time that is left. Resolutions may change inside the
+   part. */
 static void pace_extend(trainer *t, const speed *s)
 {
     const int part = t->pace.known;
@@ -138,16 +143,18 @@ static void pace_extend(trainer *t, const speed *s)
     double per_step = 0;
     for (int i = 0; i < 8; i++) {
         const double progress = (part + (i + 0.5) / 8) / PACE_SEGMENTS;
-        const gbt_camera camera = photos_camera(&t->photos, t->train_views[0], trainer_level(t, t->train_views[0], progress));
+        const gbt_camera camera =
+            photos_camera(&t->photos, t->train_views[0], trainer_level(t, t->train_views[0], progress));
         per_step += (s->fixed_seconds + s->pixel_seconds * camera.width * camera.height) / 8;
     }
-    /* Before anything has been measured: a few steps, and the rest of the first part's time goes to the next. */
+    /* Before anything has been measured: a few steps, and the rest of the first part's time goes to the
+       next. */
     const double steps = s->known && per_step > 0 ? seconds / per_step : 20;
     t->pace.steps[part] = (uint64_t)fmin(fmax(steps, 1), 1e7);
     t->pace.known++;
 }
 
-/* ---- the loop ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- the loop ---- */
 
 static gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *err)
 {
@@ -197,7 +204,8 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
             GBT_TRY(save_all(t, paths, err));
             last_save = t->seconds;
             if (stop)
-                return base_fail(err, GBT_ERR_INTERRUPTED, "stopped after step %llu; saved in %s (go on with --resume)",
+                return base_fail(err, GBT_ERR_INTERRUPTED,
+                                 "stopped after step %llu; saved in %s (go on with --resume)",
                                  (unsigned long long)t->step, paths->checkpoint);
         }
         if (evaluate) {
@@ -209,8 +217,8 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
     }
 }
 
-static gbt_status run_with_folder(trainer *t, const char *data, const char *run, const gbt_train_def *def, config_strings *strings,
-                                  gbt_error *err)
+static gbt_status run_with_folder(trainer *t, const char *data, const char *run, const gbt_train_def *def,
+                                  config_strings *strings, gbt_error *err)
 {
     run_paths paths;
     /* Before any work: a run that cannot be written must not start. */
@@ -245,7 +253,8 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
     config_strings *strings = mem_calloc(1, sizeof *strings, "settings", err);
     stop_signal_guard guard;
     stop_signal_catch(&guard, NULL, NULL);
-    gbt_status status = t == NULL || strings == NULL ? GBT_ERR_NO_MEMORY : run_with_folder(t, data, run, def, strings, err);
+    gbt_status status =
+        t == NULL || strings == NULL ? GBT_ERR_NO_MEMORY : run_with_folder(t, data, run, def, strings, err);
     stop_signal_release(&guard);
     if (t != NULL)
         trainer_free(t);

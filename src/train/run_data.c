@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/run_data.c -- where the data set of a run is. */
 #include "train/run_data.h"
 
@@ -27,7 +28,8 @@ static bool relative_path(const char *from, const char *to, char *out, size_t si
         if (*c == '/' && c[1] != '\0')
             used += (size_t)snprintf(out + used, used < size ? size - used : 0, "../");
     const char *rest = to + same + (to[same] == '/');
-    return used < size && snprintf(out + used, size - used, "%s", used == 0 && *rest == '\0' ? "." : rest) < (int)(size - used);
+    return used < size && snprintf(out + used, size - used, "%s", used == 0 && *rest == '\0' ? "." : rest) <
+                              (int)(size - used);
 }
 
 gbt_status run_data_save(const char *run, const char *data, gbt_error *err)
@@ -36,10 +38,12 @@ gbt_status run_data_save(const char *run, const char *data, gbt_error *err)
     GBT_TRY(file_join(path, sizeof path, run, places_name, err));
     char *run_place = realpath(run, NULL), *data_place = realpath(data, NULL);
     gbt_status status = GBT_OK;
-    if (run_place != NULL && data_place != NULL && relative_path(run_place, data_place, relative, sizeof relative)) {
+    if (run_place != NULL && data_place != NULL &&
+        relative_path(run_place, data_place, relative, sizeof relative)) {
         const int length = snprintf(text, sizeof text, "%s\n%s\n%s\n", data, data_place, relative);
-        status = length < (int)sizeof text ? file_write_atomic(path, text, (size_t)length, err)
-                                           : base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", data);
+        status = length < (int)sizeof text
+                     ? file_write_atomic(path, text, (size_t)length, err)
+                     : base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", data);
     }
     free(run_place);
     free(data_place);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/run_log.c -- the progress line, log.csv and train.json. */
 #include "train/run_log.h"
 
@@ -17,36 +18,38 @@
 static const double row_every_seconds = 1;
 
 /* One row: its column in log.csv, its tag for TensorBoard ("": not there), how it is printed, its value. */
-#define ROW_COLUMNS(X)                                                                          \
-    X("step", "", "%.0f", (double)t->step)                                                      \
-    X("seconds", "run/seconds", "%.3f", t->seconds)                                             \
-    X("progress", "run/progress", "%.5f", pace_progress(&t->pace, t->step))                     \
-    X("width", "run/width", "%.0f", (double)width)                                              \
-    X("height", "run/height", "%.0f", (double)height)                                           \
-    X("loss", "loss/all", "%.6f", s->loss / n)                                                  \
-    X("l1", "loss/l1", "%.6f", s->l1 / n)                                                       \
-    X("ssim", "train/ssim", "%.6f", s->ssim / n)                                                \
-    X("train_psnr", "train/psnr", "%.4f", s->psnr / n)                                          \
-    X("test_psnr", "held_out/psnr", "%.4f", test_psnr)                                          \
-    X("anchors", "scene/anchors", "%.0f", (double)t->anchors.count)                             \
-    X("gaussians", "scene/gaussians", "%.0f", s->gaussians / n)                                 \
-    X("visible_anchors", "scene/visible_anchors", "%.0f", s->visible / n)                       \
-    X("blended_per_ray", "scene/blended_per_ray", "%.2f", s->blended / fmax(s->rays, 1))        \
-    X("rays_per_second", "run/rays_per_second", "%.0f", s->rays / fmax(s->seconds, 1e-9))       \
-    X("photo_ms", "ms/photo", "%.3f", s->photo * ms)                                            \
-    X("rays_ms", "ms/rays", "%.3f", s->rays_seconds * ms)                                       \
-    X("visible_ms", "ms/visible", "%.3f", s->visible_seconds * ms)                              \
-    X("decode_ms", "ms/decode", "%.3f", s->decode * ms)                                         \
-    X("build_ms", "ms/build", "%.3f", s->build * ms)                                            \
-    X("trace_ms", "ms/trace", "%.3f", s->trace * ms)                                            \
-    X("loss_ms", "ms/loss", "%.3f", s->loss_seconds * ms)                                       \
-    X("adjoint_ms", "ms/adjoint", "%.3f", s->adjoint * ms)                                      \
-    X("decode_adjoint_ms", "ms/decode_adjoint", "%.3f", s->decode_adjoint * ms)                 \
-    X("optimizer_ms", "ms/optimizer", "%.3f", s->optimizer * ms)                                \
-    X("adjust_ms", "ms/adjust", "%.3f", s->adjust * ms)                                         \
+#define ROW_COLUMNS(X)                                                                                       \
+    X("step", "", "%.0f", (double)t->step)                                                                   \
+    X("seconds", "run/seconds", "%.3f", t->seconds)                                                          \
+    X("progress", "run/progress", "%.5f", pace_progress(&t->pace, t->step))                                  \
+    X("width", "run/width", "%.0f", (double)width)                                                           \
+    X("height", "run/height", "%.0f", (double)height)                                                        \
+    X("loss", "loss/all", "%.6f", s->loss / n)                                                               \
+    X("l1", "loss/l1", "%.6f", s->l1 / n)                                                                    \
+    X("ssim", "train/ssim", "%.6f", s->ssim / n)                                                             \
+    X("train_psnr", "train/psnr", "%.4f", s->psnr / n)                                                       \
+    X("test_psnr", "held_out/psnr", "%.4f", test_psnr)                                                       \
+    X("anchors", "scene/anchors", "%.0f", (double)t->anchors.count)                                          \
+    X("gaussians", "scene/gaussians", "%.0f", s->gaussians / n)                                              \
+    X("visible_anchors", "scene/visible_anchors", "%.0f", s->visible / n)                                    \
+    X("blended_per_ray", "scene/blended_per_ray", "%.2f", s->blended / fmax(s->rays, 1))                     \
+    X("rays_per_second", "run/rays_per_second", "%.0f", s->rays / fmax(s->seconds, 1e-9))                    \
+    X("photo_ms", "ms/photo", "%.3f", s->photo *ms)                                                          \
+    X("rays_ms", "ms/rays", "%.3f", s->rays_seconds *ms)                                                     \
+    X("visible_ms", "ms/visible", "%.3f", s->visible_seconds *ms)                                            \
+    X("decode_ms", "ms/decode", "%.3f", s->decode *ms)                                                       \
+    X("build_ms", "ms/build", "%.3f", s->build *ms)                                                          \
+    X("trace_ms", "ms/trace", "%.3f", s->trace *ms)                                                          \
+    X("loss_ms", "ms/loss", "%.3f", s->loss_seconds *ms)                                                     \
+    X("adjoint_ms", "ms/adjoint", "%.3f", s->adjoint *ms)                                                    \
+    X("decode_adjoint_ms", "ms/decode_adjoint", "%.3f", s->decode_adjoint *ms)                               \
+    X("optimizer_ms", "ms/optimizer", "%.3f", s->optimizer *ms)                                              \
+    X("adjust_ms", "ms/adjust", "%.3f", s->adjust *ms)                                                       \
     X("memory_bytes", "run/memory_bytes", "%.0f", (double)mem_peak_bytes())
 
-static const struct { const char *name, *tag, *format; } columns[] = {
+static const struct {
+    const char *name, *tag, *format;
+} columns[] = {
 #define X(name, tag, format, value) {name, tag, format},
     ROW_COLUMNS(X)
 #undef X
@@ -58,11 +61,13 @@ static size_t header_text(char *out, size_t size)
 {
     size_t used = 0;
     for (int i = 0; i < COLUMN_COUNT; i++)
-        used += (size_t)snprintf(out + used, size - used, "%s%c", columns[i].name, i + 1 < COLUMN_COUNT ? ',' : '\n');
+        used += (size_t)snprintf(out + used, size - used, "%s%c", columns[i].name,
+                                 i + 1 < COLUMN_COUNT ? ',' : '\n');
     return used;
 }
 
-/* Start the file, or go back to where the checkpoint was made: rows of steps that will be taken again, or that a kill cut short, go. */
+/* Start the file, or go back to where the checkpoint was made: rows of steps that will be taken again, or
+   that a kill cut short, go. */
 static gbt_status rewind_rows(const char *csv_path, uint64_t step, gbt_error *err)
 {
     char header[1024];
@@ -73,11 +78,12 @@ static gbt_status rewind_rows(const char *csv_path, uint64_t step, gbt_error *er
         GBT_TRY(file_read(csv_path, &bytes, &size, err));
     if (size >= header_size && memcmp(bytes, header, header_size) == 0)
         kept = header_size;
-    for (const unsigned char *end; kept > 0 && (end = memchr(bytes + kept, '\n', size - kept)) != NULL; kept = (size_t)(end - bytes) + 1)
+    for (const unsigned char *end; kept > 0 && (end = memchr(bytes + kept, '\n', size - kept)) != NULL;
+         kept = (size_t)(end - bytes) + 1)
         if (strtoull((const char *)bytes + kept, NULL, 10) > step)
             break;
-    const gbt_status status = kept > 0 ? file_write_atomic(csv_path, bytes, kept,
-                                                           err) : file_write_atomic(csv_path, header, header_size, err);
+    const gbt_status status = kept > 0 ? file_write_atomic(csv_path, bytes, kept, err)
+                                       : file_write_atomic(csv_path, header, header_size, err);
     mem_free(bytes);
     return status;
 }
@@ -111,7 +117,8 @@ static gbt_status rewind_events(run_log *log, const char *path, uint64_t step, g
     return status;
 }
 
-gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, const char *events_path, gbt_error *err)
+gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, const char *events_path,
+                        gbt_error *err)
 {
     memset(log, 0, sizeof *log);
     log->last_row_seconds = t->seconds;
@@ -121,9 +128,11 @@ gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, co
     log->csv = fopen(csv_path, "a");
     if (log->csv == NULL)
         return base_fail(err, GBT_ERR_IO, "%s: cannot write", csv_path);
-    log_info("%s: %zu photos to train on, %zu held out; %s -> %zu anchors x %d (voxel size %.4g, extent %.4g, distance input %s)",
-             t->scene.folder, t->train_count, t->test_count, t->start_text, t->anchors.count, t->anchors.offset_count,
-             (double)t->voxel_size, t->extent, t->decoder.has_distance ? "on" : "off");
+    log_info("%s: %zu photos to train on, %zu held out; %s -> %zu anchors x %d (voxel size %.4g, extent "
+             "%.4g, distance input %s)",
+             t->scene.folder, t->train_count, t->test_count, t->start_text, t->anchors.count,
+             t->anchors.offset_count, (double)t->voxel_size, t->extent,
+             t->decoder.has_distance ? "on" : "off");
     return GBT_OK;
 }
 
@@ -131,13 +140,27 @@ static void add_step(run_sums *s, const trainer *t, const step_report *r)
 {
     const frame *f = &t->frame;
     s->steps++;
-    s->loss += r->loss, s->l1 += r->l1, s->ssim += r->ssim, s->psnr += r->psnr;
-    s->gaussians += (double)r->gaussians, s->visible += (double)r->visible;
-    s->rays += (double)f->counters.rays, s->hits += (double)f->counters.hits, s->blended += (double)f->counters.blended;
-    s->seconds += r->total_seconds, s->photo += r->photo_seconds, s->loss_seconds += r->loss_seconds;
-    s->optimizer += r->optimizer_seconds, s->adjust += r->adjust_seconds;
-    s->rays_seconds += f->times.rays, s->visible_seconds += f->times.visible, s->decode += f->times.decode, s->build += f->times.build;
-    s->trace += f->times.trace, s->adjoint += f->times.adjoint, s->decode_adjoint += f->times.decode_adjoint;
+    s->loss += r->loss;
+    s->l1 += r->l1;
+    s->ssim += r->ssim;
+    s->psnr += r->psnr;
+    s->gaussians += (double)r->gaussians;
+    s->visible += (double)r->visible;
+    s->rays += (double)f->counters.rays;
+    s->hits += (double)f->counters.hits;
+    s->blended += (double)f->counters.blended;
+    s->seconds += r->total_seconds;
+    s->photo += r->photo_seconds;
+    s->loss_seconds += r->loss_seconds;
+    s->optimizer += r->optimizer_seconds;
+    s->adjust += r->adjust_seconds;
+    s->rays_seconds += f->times.rays;
+    s->visible_seconds += f->times.visible;
+    s->decode += f->times.decode;
+    s->build += f->times.build;
+    s->trace += f->times.trace;
+    s->adjoint += f->times.adjoint;
+    s->decode_adjoint += f->times.decode_adjoint;
 }
 
 static void write_row(run_log *log, const trainer *t, int width, int height, double test_psnr)
@@ -170,18 +193,27 @@ static void write_row(run_log *log, const trainer *t, int width, int height, dou
 static void tell_progress(const run_log *log, const trainer *t)
 {
     const step_report *r = &log->last;
-    const double progress = pace_progress(&t->pace, t->step), left = progress > 0 ? t->seconds * (1 - progress) / progress : 0;
+    const double progress = pace_progress(&t->pace, t->step),
+                 left = progress > 0 ? t->seconds * (1 - progress) / progress : 0;
     const run_sums *s = log->row.steps > 0 ? &log->row : &log->all;
     char line[512];
-    gbt_event e = {.text = line, .stage = "train", .done = t->step, .total = t->def.iterations, .fraction = progress,
+    gbt_event e = {.text = line,
+                   .stage = "train",
+                   .done = t->step,
+                   .total = t->def.iterations,
+                   .fraction = progress,
                    .seconds = t->seconds};
     e.seconds_left = t->pace.known < PACE_SEGMENTS ? fmax(0, t->def.budget_seconds - t->seconds) : left;
-    e.psnr = log->psnr_smooth, e.loss = r->loss, e.anchors = t->anchors.count, e.gaussians = r->gaussians;
-    snprintf(line, sizeof line, "step %llu  %3.0f %%  %dx%d  loss %.4f  psnr %.2f  anchors %zu  gaussians %zu  %.2f Mrays/s  %zu MB  "
-                                "%.0f:%02.0f left",
-             (unsigned long long)t->step, 100 * progress, r->width, r->height, r->loss, log->psnr_smooth, t->anchors.count, r->gaussians,
-             s->rays / fmax(s->seconds, 1e-9) * 1e-6, mem_peak_bytes() / 1000000, floor(e.seconds_left / 60),
-             floor(fmod(e.seconds_left, 60)));
+    e.psnr = log->psnr_smooth;
+    e.loss = r->loss;
+    e.anchors = t->anchors.count;
+    e.gaussians = r->gaussians;
+    snprintf(line, sizeof line,
+             "step %llu  %3.0f %%  %dx%d  loss %.4f  psnr %.2f  anchors %zu  gaussians %zu  %.2f Mrays/s  "
+             "%zu MB  %.0f:%02.0f left",
+             (unsigned long long)t->step, 100 * progress, r->width, r->height, r->loss, log->psnr_smooth,
+             t->anchors.count, r->gaussians, s->rays / fmax(s->seconds, 1e-9) * 1e-6,
+             mem_peak_bytes() / 1000000, floor(e.seconds_left / 60), floor(fmod(e.seconds_left, 60)));
     log_progress(&e);
 }
 
@@ -205,7 +237,8 @@ void run_log_evaluation(run_log *log, const trainer *t, double psnr)
         log->evaluated_psnr[log->evaluated_count++] = psnr;
     }
     write_row(log, t, t->frame.rgb.width, t->frame.rgb.height, psnr);
-    log_info("held-out PSNR after %.1f s (step %llu): %.3f dB", t->seconds, (unsigned long long)t->step, psnr);
+    log_info("held-out PSNR after %.1f s (step %llu): %.3f dB", t->seconds, (unsigned long long)t->step,
+             psnr);
 }
 
 gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path, gbt_error *err)
@@ -217,18 +250,22 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     const run_sums *s = &log->all;
     const double n = s->steps > 0 ? (double)s->steps : 1, ms = 1000 / n;
     json_t *root = json_object(), *stages = json_object(), *parts = json_array(), *evals = json_array();
-    const struct { const char *name; double value; } stage[] = {
-        {"photo", s->photo}, {"rays", s->rays_seconds}, {"visible", s->visible_seconds}, {"decode", s->decode}, {"build", s->build},
-        {"trace", s->trace},
-        {"loss", s->loss_seconds}, {"adjoint", s->adjoint}, {"decode_adjoint", s->decode_adjoint}, {"optimizer", s->optimizer},
-        {"adjust", s->adjust}, {"all", s->seconds}};
+    const struct {
+        const char *name;
+        double value;
+    } stage[] = {
+        {"photo", s->photo},         {"rays", s->rays_seconds}, {"visible", s->visible_seconds},
+        {"decode", s->decode},       {"build", s->build},       {"trace", s->trace},
+        {"loss", s->loss_seconds},   {"adjoint", s->adjoint},   {"decode_adjoint", s->decode_adjoint},
+        {"optimizer", s->optimizer}, {"adjust", s->adjust},     {"all", s->seconds}};
     for (size_t i = 0; i < sizeof stage / sizeof *stage; i++)
         json_object_set_new(stages, stage[i].name, json_real(stage[i].value * ms));
     for (int i = 0; i < t->pace.known; i++)
         json_array_append_new(parts, json_integer((json_int_t)t->pace.steps[i]));
     for (int i = 0; i < log->evaluated_count; i++)
-        json_array_append_new(evals, json_pack("{s:f,s:I,s:f}", "seconds", log->evaluated_seconds[i], "step",
-                                               (json_int_t)log->evaluated_step[i], "psnr", log->evaluated_psnr[i]));
+        json_array_append_new(evals,
+                              json_pack("{s:f,s:I,s:f}", "seconds", log->evaluated_seconds[i], "step",
+                                        (json_int_t)log->evaluated_step[i], "psnr", log->evaluated_psnr[i]));
     json_object_set_new(root, "schema", json_integer(1));
     json_object_set_new(root, "command", json_string(t->def.command));
     json_object_set_new(root, "data", json_string(t->scene.folder));
@@ -270,7 +307,8 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
 bool run_log_is_of_step(const char *json_path, uint64_t step)
 {
     json_t *root = json_load_file(json_path, 0, NULL);
-    const bool same = root != NULL && (uint64_t)json_integer_value(json_object_get(root, "iterations")) == step;
+    const bool same =
+        root != NULL && (uint64_t)json_integer_value(json_object_get(root, "iterations")) == step;
     json_decref(root);
     return same;
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/run_log.h -- what a run says about itself: progress, log.csv, TensorBoard events, train.json. */
 #ifndef GBT_TRAIN_RUN_LOG_H
 #define GBT_TRAIN_RUN_LOG_H
@@ -11,7 +12,8 @@
 typedef struct run_sums {
     uint64_t steps;
     double loss, l1, ssim, psnr, gaussians, visible, rays, hits, blended;
-    double seconds, photo, rays_seconds, visible_seconds, decode, build, trace, loss_seconds, adjoint, decode_adjoint, optimizer, adjust;
+    double seconds, photo, rays_seconds, visible_seconds, decode, build, trace, loss_seconds, adjoint,
+        decode_adjoint, optimizer, adjust;
 } run_sums;
 
 typedef struct run_log {
@@ -26,8 +28,10 @@ typedef struct run_log {
     int evaluated_count;
 } run_log;
 
-/** Open log.csv, and the events if t->def.tensorboard (going on with both after --resume), and say what the run starts from. */
-gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, const char *events_path, gbt_error *err);
+/** Open log.csv, and the events if t->def.tensorboard (going on with both after --resume), and say what the
+    run starts from. */
+gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, const char *events_path,
+                        gbt_error *err);
 void run_log_step(run_log *log, const trainer *t, const step_report *report);
 void run_log_evaluation(run_log *log, const trainer *t, double psnr);
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/sampling.c -- smallest pixel per anchor. */
 #include "train/sampling.h"
 

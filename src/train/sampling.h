@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/sampling.h -- how finely the training views sampled each anchor. */
 #ifndef GBT_TRAIN_SAMPLING_H
 #define GBT_TRAIN_SAMPLING_H
@@ -6,7 +7,8 @@
 #include "gbtrace/camera.h"
 
 /**
- * The smallest pixel with which any of the cameras sees each anchor: finer than that nothing is known about it.
+ * The smallest pixel with which any of the cameras sees each anchor: finer than that nothing is known about
+ * it.
  *
  * @param cameras [in]  [camera_count], at the size at which their photos were compared
  * @param out     [out] [a->count] scene-local units (trace/footprint.h); 0 for anchors that no camera sees

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/schedule.c -- progress, resolution, learning rates. */
 #include "train/schedule.h"
 
@@ -24,8 +25,9 @@ gbt_status pace_parse(const char *text, pace *out, gbt_error *err)
         const unsigned long long n = strtoull(at, &end, 10);
         const char wanted = i + 1 < PACE_SEGMENTS ? ',' : '\0';
         if (end == at || *at < '0' || *at > '9' || *end != wanted || n > 1000000000ull)
-            return base_fail(err, GBT_ERR_ARGUMENT, "pace: entry %d of \"%.60s\" (wanted %d counts, separated by commas)", i + 1, text,
-                             PACE_SEGMENTS);
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "pace: entry %d of \"%.60s\" (wanted %d counts, separated by commas)", i + 1,
+                             text, PACE_SEGMENTS);
         out->steps[i] = n;
         at = end + 1;
     }
@@ -36,7 +38,8 @@ void pace_text(const pace *p, char out[PACE_TEXT_SIZE])
 {
     size_t used = 0;
     for (int i = 0; i < PACE_SEGMENTS; i++)
-        used += (size_t)snprintf(out + used, PACE_TEXT_SIZE - used, "%s%llu", i > 0 ? "," : "", (unsigned long long)p->steps[i]);
+        used += (size_t)snprintf(out + used, PACE_TEXT_SIZE - used, "%s%llu", i > 0 ? "," : "",
+                                 (unsigned long long)p->steps[i]);
 }
 
 uint64_t pace_total(const pace *p)
@@ -78,10 +81,7 @@ double pace_expected(const pace *p, uint64_t step)
     return (double)sum * PACE_SEGMENTS / parts;
 }
 
-float schedule_thrift(double steps)
-{
-    return (float)fmin(fmax(sqrt(1000 / fmax(steps, 1)), 0.25), 1);
-}
+float schedule_thrift(double steps) { return (float)fmin(fmax(sqrt(1000 / fmax(steps, 1)), 0.25), 1); }
 
 double schedule_level_start(int level, int start_level)
 {

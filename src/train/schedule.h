@@ -1,8 +1,11 @@
-/* train/schedule.h -- where a run stands (progress in [0, 1)) and what follows from it: resolution, learning rates, growth.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/schedule.h -- where a run stands (progress in [0, 1)) and what follows from it: resolution, learning
+   rates, growth.
 
-   Everything is a fraction of the run, so a short run is a whole run. A run is cut into PACE_SEGMENTS equal parts; the pace says how many
-   iterations each part has. With a fixed number of iterations they are equal; with a time budget each part is given its number when it
-   starts, from the speed measured so far, and the numbers are recorded: with them anyone repeats the run to the bit. */
+   Everything is a fraction of the run, so a short run is a whole run. A run is cut into PACE_SEGMENTS equal
+   parts; the pace says how many iterations each part has. With a fixed number of iterations they are equal;
+   with a time budget each part is given its number when it starts, from the speed measured so far, and the
+   numbers are recorded: with them anyone repeats the run to the bit. */
 #ifndef GBT_TRAIN_SCHEDULE_H
 #define GBT_TRAIN_SCHEDULE_H
 
@@ -15,7 +18,7 @@ enum { PACE_SEGMENTS = 20 };
 
 typedef struct pace {
     uint64_t steps[PACE_SEGMENTS]; /* iterations of each part, >= 1 where known */
-    int known;                     /* parts decided so far; PACE_SEGMENTS from the start unless the time budget decides */
+    int known; /* parts decided so far; PACE_SEGMENTS from the start unless the time budget decides */
 } pace;
 
 /** Equal parts that sum to `iterations` (parts may be empty for fewer than PACE_SEGMENTS iterations). */
@@ -34,8 +37,8 @@ uint64_t pace_total(const pace *p); /* of the known parts */
 double pace_progress(const pace *p, uint64_t step);
 
 /**
- * How long the whole run will be, in steps, if the parts up to that of `step` (known) are like the rest: what comes later has no say, as
- * with a budget.
+ * How long the whole run will be, in steps, if the parts up to that of `step` (known) are like the rest: what
+ * comes later has no say, as with a budget.
  */
 double pace_expected(const pace *p, uint64_t step);
 
@@ -45,8 +48,9 @@ int pace_segment(const pace *p, uint64_t step);
 /**
  * How many of a photo's pixels a step looks at: 1 in 4^level (train/photos.h).
  *
- * A step teaches nearly as much from a sixteenth of the pixels as from all (docs/training.md), so all of them come last: level 0 from
- * SCHEDULE_WHOLE_FROM on, level 1 from 0.3 on, each coarser one until half of where the finer begins; `start_level` is the first.
+ * A step teaches nearly as much from a sixteenth of the pixels as from all (docs/training.md), so all of them
+ * come last: level 0 from SCHEDULE_WHOLE_FROM on, level 1 from 0.3 on, each coarser one until half of where
+ * the finer begins; `start_level` is the first.
  */
 int schedule_level(double progress, int start_level);
 
@@ -56,17 +60,20 @@ double schedule_level_start(int level, int start_level);
 /**
  * How much an anchor must bring, (0, 1]: what growth and pruning ask of it is multiplied by this.
  *
- * A long run has the steps to teach more anchors: 1 up to 1000 steps, then falling with their square root, down to 0.25 (docs/training.md).
+ * A long run has the steps to teach more anchors: 1 up to 1000 steps, then falling with their square root,
+ * down to 0.25 (docs/training.md).
  */
 float schedule_thrift(double steps);
 
-/** From here on all pixels, and the cut-offs of rendering; before, SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN: half as many hits per ray. */
+/** From here on all pixels, and the cut-offs of rendering; before, SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN:
+    half as many hits per ray. */
 #define SCHEDULE_WHOLE_FROM 0.85
 #define SCHEDULE_ALPHA_MIN 0.02f
 #define SCHEDULE_T_MIN 0.003f
 
 /**
- * In the last part of a run all rates fall: a step teaches a model of one photo at a time, and what it takes from the others comes to rest.
+ * In the last part of a run all rates fall: a step teaches a model of one photo at a time, and what it takes
+ * from the others comes to rest.
  */
 #define SCHEDULE_COOL_FROM 0.9
 
@@ -75,7 +82,8 @@ typedef struct learning_rates {
 } learning_rates;
 
 /**
- * Log-linear decays, and in the end, from SCHEDULE_COOL_FROM on, straight to nearly nothing (docs/training.md).
+ * Log-linear decays, and in the end, from SCHEDULE_COOL_FROM on, straight to nearly nothing
+ * (docs/training.md).
  *
  * @param compat [in] true: the reference method's rates; false: ours, higher, for runs of some thousand steps
  * @param extent [in] of the cameras; the reference's rate of offsets is proportional to it

@@ -1,4 +1,6 @@
-/* train/seed_points.c -- points by plane sweep: for a pixel, the depth at which its neighbourhood looks the same in the nearest photos. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/seed_points.c -- points by plane sweep: for a pixel, the depth at which its neighbourhood looks the
+   same in the nearest photos. */
 #include "train/seed_points.h"
 
 #include <math.h>
@@ -24,7 +26,8 @@ enum {
     STREAM_SEEDS = 3
 };
 
-/* Normalised correlation that counts as the same place; and by how much it must beat every depth that is not next to it. */
+/* Normalised correlation that counts as the same place; and by how much it must beat every depth that is not
+   next to it. */
 static const float agreement = 0.7f, lead = 0.05f;
 
 typedef struct candidate {
@@ -49,7 +52,8 @@ typedef struct seeding {
     candidate *out;
 } seeding;
 
-/* Point nearest to all optical axes in the least-squares sense; the mean distance to it is the scene's scale. */
+/* Point nearest to all optical axes in the least-squares sense; the mean distance to it is the scene's
+   scale. */
 static void find_focus(const seed_view *views, size_t count, double focus[3], double *distance)
 {
     double a[3][4] = {{0}};
@@ -64,7 +68,7 @@ static void find_focus(const seed_view *views, size_t count, double focus[3], do
     }
     for (int r = 0; r < 3; r++)
         a[r][r] += 1e-6 * (double)count; /* parallel axes: stay near the cameras */
-    for (int k = 0; k < 3; k++) /* the matrix is positive definite: no pivoting needed */
+    for (int k = 0; k < 3; k++)          /* the matrix is positive definite: no pivoting needed */
         for (int r = 0; r < 3; r++) {
             if (r == k)
                 continue;
@@ -83,8 +87,8 @@ static void find_focus(const seed_view *views, size_t count, double focus[3], do
     *distance = sum / (double)count > 1e-6 ? sum / (double)count : 1;
 }
 
-/* Photos from places that are about a fifth of the distance away and look the same way: near enough to look alike, far enough to tell
-   depths. */
+/* Photos from places that are about a fifth of the distance away and look the same way: near enough to look
+   alike, far enough to tell depths. */
 static void find_neighbors(seeding *s, double distance)
 {
     for (size_t i = 0; i < s->view_count; i++) {
@@ -94,19 +98,24 @@ static void find_neighbors(seeding *s, double distance)
             const gbt_camera *a = &v->camera, *b = &s->views[j].camera;
             if (j == i || dvec_dot(a->rotation + 6, b->rotation + 6) < 0.7)
                 continue;
-            const double d[3] = {b->center[0] - a->center[0], b->center[1] - a->center[1], b->center[2] - a->center[2]};
+            const double d[3] = {b->center[0] - a->center[0], b->center[1] - a->center[1],
+                                 b->center[2] - a->center[2]};
             const double baseline = dvec_length(d) / distance;
             if (baseline < 0.01)
                 continue;
             const double cost = fabs(log(baseline / 0.2));
             size_t at = v->neighbor_count < NEIGHBORS ? v->neighbor_count++ : NEIGHBORS;
             while (at > 0 && cost < worst[at - 1]) { /* insertion sort; what falls off the end is dropped */
-                if (at < NEIGHBORS)
-                    worst[at] = worst[at - 1], v->neighbor[at] = v->neighbor[at - 1];
+                if (at < NEIGHBORS) {
+                    worst[at] = worst[at - 1];
+                    v->neighbor[at] = v->neighbor[at - 1];
+                }
                 at--;
             }
-            if (at < NEIGHBORS)
-                worst[at] = cost, v->neighbor[at] = j;
+            if (at < NEIGHBORS) {
+                worst[at] = cost;
+                v->neighbor[at] = j;
+            }
         }
     }
 }
@@ -120,8 +129,10 @@ static bool project(const gbt_camera *camera, const double world[3], double pixe
     return cam[2] > 0 && gbt_camera_project(camera, cam, pixel);
 }
 
-/* Grey values on a grid of PATCH x PATCH points around `center` with steps `du`, `dv`, bilinear; false when a corner leaves the photo. */
-static bool read_patch(const seed_view *v, const double center[2], const double du[2], const double dv[2], float out[PATCH_AREA])
+/* Grey values on a grid of PATCH x PATCH points around `center` with steps `du`, `dv`, bilinear; false when a
+   corner leaves the photo. */
+static bool read_patch(const seed_view *v, const double center[2], const double du[2], const double dv[2],
+                       float out[PATCH_AREA])
 {
     const double half = PATCH / 2;
     const int width = v->photo.width, height = v->photo.height;
@@ -133,22 +144,28 @@ static bool read_patch(const seed_view *v, const double center[2], const double 
         for (int i = 0; i < PATCH; i++) {
             const double x = center[0] - 0.5 + (i - half) * du[0] + (j - half) * dv[0];
             const double y = center[1] - 0.5 + (i - half) * du[1] + (j - half) * dv[1];
-            const int x0 = (int)x, y0 = (int)y, x1 = x0 + 1 < width ? x0 + 1 : x0, y1 = y0 + 1 < height ? y0 + 1 : y0;
+            const int x0 = (int)x, y0 = (int)y, x1 = x0 + 1 < width ? x0 + 1 : x0,
+                      y1 = y0 + 1 < height ? y0 + 1 : y0;
             const float fx = (float)(x - x0), fy = (float)(y - y0);
-            const float *row0 = v->gray + (size_t)y0 * (size_t)width, *row1 = v->gray + (size_t)y1 * (size_t)width;
-            out[j * PATCH + i] = (1 - fy) * ((1 - fx) * row0[x0] + fx * row0[x1]) + fy * ((1 - fx) * row1[x0] + fx * row1[x1]);
+            const float *row0 = v->gray + (size_t)y0 * (size_t)width,
+                        *row1 = v->gray + (size_t)y1 * (size_t)width;
+            out[j * PATCH + i] =
+                (1 - fy) * ((1 - fx) * row0[x0] + fx * row0[x1]) + fy * ((1 - fx) * row1[x0] + fx * row1[x1]);
         }
     return true;
 }
 
-/* Subtract the mean and divide by the length; a flat patch becomes nearly 0 and so correlates with nothing. */
+/* Subtract the mean and divide by the length; a flat patch becomes nearly 0 and so correlates with
+   nothing. */
 static void normalize_patch(float p[PATCH_AREA])
 {
     float mean = 0, square = 0;
     for (int i = 0; i < PATCH_AREA; i++)
         mean += p[i] / PATCH_AREA;
-    for (int i = 0; i < PATCH_AREA; i++)
-        p[i] -= mean, square += p[i] * p[i];
+    for (int i = 0; i < PATCH_AREA; i++) {
+        p[i] -= mean;
+        square += p[i] * p[i];
+    }
     const float scale = 1 / sqrtf(square + PATCH_AREA * 1e-4f); /* noise of 0.01 */
     for (int i = 0; i < PATCH_AREA; i++)
         p[i] *= scale;
@@ -161,7 +178,8 @@ typedef struct sweep {
     float patch[PATCH_AREA];
 } sweep;
 
-/* Mean of the better half of the correlations: the other half may be hidden there. -1 when too few photos see the place. */
+/* Mean of the better half of the correlations: the other half may be hidden there. -1 when too few photos see
+   the place. */
 static float agreement_at(const sweep *w, double depth)
 {
     float best[NEIGHBORS];
@@ -177,8 +195,10 @@ static float agreement_at(const sweep *w, double depth)
         if (!project(&other->camera, world[0], pixel[0]) || !project(&other->camera, world[1], pixel[1]) ||
             !project(&other->camera, world[2], pixel[2]))
             continue;
-        for (int k = 0; k < 2; k++)
-            step[0][k] = pixel[1][k] - pixel[0][k], step[1][k] = pixel[2][k] - pixel[0][k];
+        for (int k = 0; k < 2; k++) {
+            step[0][k] = pixel[1][k] - pixel[0][k];
+            step[1][k] = pixel[2][k] - pixel[0][k];
+        }
         if (!read_patch(other, pixel[0], step[0], step[1], patch))
             continue;
         normalize_patch(patch);
@@ -201,7 +221,8 @@ static float agreement_at(const sweep *w, double depth)
 static bool start_sweep(const seeding *s, const seed_view *v, double px, double py, sweep *w)
 {
     static const double step[3][2] = {{0, 0}, {1, 0}, {0, 1}};
-    w->s = s, w->view = v;
+    w->s = s;
+    w->view = v;
     for (int p = 0; p < 3; p++) {
         double dir[3];
         if (!gbt_camera_unproject(&v->camera, px + step[p][0], py + step[p][1], dir) || dir[2] < 0.1)
@@ -218,7 +239,8 @@ static bool start_sweep(const seeding *s, const seed_view *v, double px, double 
 static double depth_of(const seeding *s, double index)
 {
     const double u = index / (DEPTHS - 1);
-    return 1 / ((1 - u) / s->near + u / s->far); /* even in inverse depth: even steps along the other photos' lines */
+    return 1 / ((1 - u) / s->near + u / s->far); /* even in inverse depth: even steps along the other photos'
+                                                    lines */
 }
 
 static void find_depth(const sweep *w, candidate *c)
@@ -235,8 +257,10 @@ static void find_depth(const sweep *w, candidate *c)
         if (abs(i - best) > 2)
             rival = fmaxf(rival, score[i]);
     double index = best;
-    if (best > 0 && best + 1 < DEPTHS && score[best - 1] > -1 && score[best + 1] > -1) { /* the top of the parabola through three */
-        const double left = (double)score[best - 1], right = (double)score[best + 1], bend = left + right - 2 * (double)score[best];
+    if (best > 0 && best + 1 < DEPTHS && score[best - 1] > -1 &&
+        score[best + 1] > -1) { /* the top of the parabola through three */
+        const double left = (double)score[best - 1], right = (double)score[best + 1],
+                     bend = left + right - 2 * (double)score[best];
         index += bend < 0 ? 0.5 * (left - right) / bend : 0;
     }
     const double depth = depth_of(w->s, index);
@@ -257,7 +281,7 @@ static void seed_block(size_t block, size_t begin, size_t end, void *context)
         rng_philox(s->seed, STREAM_SEEDS, i, words);
         const seed_view *v = &s->views[((uint64_t)words[0] * s->view_count) >> 32];
         const size_t x = (size_t)(((uint64_t)words[1] * (uint64_t)v->photo.width) >> 32),
-            y = (size_t)(((uint64_t)words[2] * (uint64_t)v->photo.height) >> 32);
+                     y = (size_t)(((uint64_t)words[2] * (uint64_t)v->photo.height) >> 32);
         memcpy(c->color, v->photo.pixels + 3 * (y * (size_t)v->photo.width + x), sizeof c->color);
         sweep w;
         if (start_sweep(s, v, (double)x + 0.5, (double)y + 0.5, &w))
@@ -298,10 +322,12 @@ static gbt_status keep_best(const seeding *s, scene_points *out, gbt_error *err)
 {
     qsort(s->out, SAMPLES, sizeof *s->out, by_doubt);
     size_t kept = 0;
-    while (kept < KEPT && isfinite(s->out[kept].doubt) && (kept < KEPT_AT_LEAST || s->out[kept].doubt <= 1 - agreement))
+    while (kept < KEPT && isfinite(s->out[kept].doubt) &&
+           (kept < KEPT_AT_LEAST || s->out[kept].doubt <= 1 - agreement))
         kept++;
     if (kept == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "no sparse points, and no place that several photos see (check the poses)");
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "no sparse points, and no place that several photos see (check the poses)");
     mem_free(out->position); /* a cloud of no points owns its arrays too */
     mem_free(out->color);
     out->position = mem_alloc(kept, 3 * sizeof *out->position, "seed points", err);
@@ -309,13 +335,17 @@ static gbt_status keep_best(const seeding *s, scene_points *out, gbt_error *err)
     if (out->position == NULL || out->color == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < kept; i++)
-        for (size_t k = 0; k < 3; k++)
-            out->position[3 * i + k] = s->out[i].position[k], out->color[3 * i + k] = s->out[i].color[k];
-    out->count = kept, out->has_color = true;
+        for (size_t k = 0; k < 3; k++) {
+            out->position[3 * i + k] = s->out[i].position[k];
+            out->color[3 * i + k] = s->out[i].color[k];
+        }
+    out->count = kept;
+    out->has_color = true;
     return GBT_OK;
 }
 
-gbt_status seed_points_make(photos *source, const size_t *views, size_t view_count, uint64_t seed, scene_points *out, gbt_error *err)
+gbt_status seed_points_make(photos *source, const size_t *views, size_t view_count, uint64_t seed,
+                            scene_points *out, gbt_error *err)
 {
     seeding s = {.view_count = view_count, .seed = seed};
     gbt_status status = GBT_ERR_NO_MEMORY;
@@ -326,7 +356,8 @@ gbt_status seed_points_make(photos *source, const size_t *views, size_t view_cou
     if (status == GBT_OK) {
         double focus[3], distance;
         find_focus(s.views, view_count, focus, &distance);
-        s.near = 0.2 * distance, s.far = 6 * distance;
+        s.near = 0.2 * distance;
+        s.far = 6 * distance;
         find_neighbors(&s, distance);
         parallel_blocks(SAMPLES, BLOCK, seed_block, &s);
         status = keep_best(&s, out, err);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/setup.c -- from a data set to a trainer that can take its first step. */
 #include <math.h>
 #include <stdio.h>
@@ -23,15 +24,13 @@ static bool any_point_is_seen(const trainer *t)
 {
     for (size_t i = 0; i < t->scene.points.count; i++)
         for (size_t v = 0; v < t->train_count; v++)
-            if (camera_sees(&t->scene.views[t->train_views[v]].camera, t->scene.points.position + 3 * i, NULL))
+            if (camera_sees(&t->scene.views[t->train_views[v]].camera, t->scene.points.position + 3 * i,
+                            NULL))
                 return true;
     return false;
 }
 
-static int compare_points(const void *a, const void *b)
-{
-    return memcmp(a, b, 3 * sizeof(float));
-}
+static int compare_points(const void *a, const void *b) { return memcmp(a, b, 3 * sizeof(float)); }
 
 /* How many points there are at different places; `most` is enough. */
 static gbt_status count_places(const scene_points *points, size_t most, size_t *out, gbt_error *err)
@@ -53,15 +52,18 @@ static gbt_status append_points(scene_points *points, const scene_points *more, 
 {
     const size_t before = points->count, after = before + more->count;
     size_t rows[2] = {before, before};
-    GBT_TRY(mem_reserve((void **)&points->position, &rows[0], before, after, 3 * sizeof(float), "points", err));
+    GBT_TRY(
+        mem_reserve((void **)&points->position, &rows[0], before, after, 3 * sizeof(float), "points", err));
     GBT_TRY(mem_reserve((void **)&points->color, &rows[1], before, after, 3 * sizeof(float), "points", err));
     memcpy(points->position + 3 * before, more->position, 3 * more->count * sizeof(float));
     memcpy(points->color + 3 * before, more->color, 3 * more->count * sizeof(float));
-    points->count = after, points->has_color = true;
+    points->count = after;
+    points->has_color = true;
     return GBT_OK;
 }
 
-/* Points of our own where the data set has none, none that a photo sees, or few; the reference method takes what there is. */
+/* Points of our own where the data set has none, none that a photo sees, or few; the reference method takes
+   what there is. */
 static gbt_status provide_points(trainer *t, gbt_error *err)
 {
     scene_points *points = &t->scene.points, made = {0};
@@ -78,17 +80,19 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
     if (blind)
         points->count = 0;
     gbt_error why = {0};
-    gbt_status status = seed_points_make(&t->photos, t->train_views, t->train_count, t->def.seed, &made, &why);
+    gbt_status status =
+        seed_points_make(&t->photos, t->train_views, t->train_count, t->def.seed, &made, &why);
     if (status == GBT_OK)
         status = append_points(points, &made, err);
     else if (blind || status == GBT_ERR_NO_MEMORY)
         status = base_fail(err, status, "%s", why.text);
     else
         status = GBT_OK; /* the few must do */
-    snprintf(t->start_text, sizeof t->start_text, "%zu sparse points and %zu found by photo consistency", t->points_used, made.count);
+    snprintf(t->start_text, sizeof t->start_text, "%zu sparse points and %zu found by photo consistency",
+             t->points_used, made.count);
     if (blind)
-        snprintf(t->start_text, sizeof t->start_text, "%zu points found by photo consistency (the data set has none that are seen)",
-                 made.count);
+        snprintf(t->start_text, sizeof t->start_text,
+                 "%zu points found by photo consistency (the data set has none that are seen)", made.count);
     t->points_made = blind;
     t->points_used = points->count;
     mem_free(made.position);
@@ -96,7 +100,8 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
     return status;
 }
 
-/* Distances from training cameras to a spread of anchors: they decide whether the networks see the distance, its unit, and t_near. */
+/* Distances from training cameras to a spread of anchors: they decide whether the networks see the distance,
+   its unit, and t_near. */
 static gbt_status measure_distances(trainer *t, float *p5, float *median, float *p95, gbt_error *err)
 {
     const size_t stride = t->anchors.count / 512 + 1, per_view = (t->anchors.count + stride - 1) / stride;
@@ -115,13 +120,16 @@ static gbt_status measure_distances(trainer *t, float *p5, float *median, float 
     *p5 = *median = *p95 = 1;
     if (count > 0) {
         qsort(all, count, sizeof *all, compare_floats);
-        *p5 = all[count / 20], *median = all[count / 2], *p95 = all[count - 1 - count / 20];
+        *p5 = all[count / 20];
+        *median = all[count / 2];
+        *p95 = all[count - 1 - count / 20];
     }
     mem_free(all);
     return GBT_OK;
 }
 
-/* The first features carry the colour of the nearest point: the networks need not discover it anchor by anchor. The rest is 0. */
+/* The first features carry the colour of the nearest point: the networks need not discover it anchor by
+   anchor. The rest is 0. */
 static gbt_status start_features(trainer *t, gbt_error *err)
 {
     point_tree *tree = NULL;
@@ -160,11 +168,13 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
     def.offset_count = t->def.offsets;
     def.scale_factor = (float)t->def.scale_factor;
     /* Cameras that stand together say nothing of the size of what they see. */
-    const double away = dvec_length(t->scene.views[t->train_views[0]].camera.center); /* from the middle of the points */
+    const double away =
+        dvec_length(t->scene.views[t->train_views[0]].camera.center); /* from the middle of the points */
     t->first_scale_max = t->def.compat ? (double)INFINITY : 0.1 * fmax(t->extent, 0.1 * away);
     def.scale_max = (float)t->first_scale_max;
     const scene_points *points = &t->scene.points;
-    GBT_TRY(anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def, &t->anchors, NULL, err));
+    GBT_TRY(anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def,
+                         &t->anchors, NULL, err));
     t->anchors_initial = t->anchors.count;
     return t->def.compat || !points->has_color ? GBT_OK : start_features(t, err);
 }
@@ -182,8 +192,8 @@ static gbt_status choose_views(trainer *t, gbt_error *err)
             t->train_views[t->train_count++] = i;
     }
     if (t->train_count == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no photo is left to train on (%zu views, %zu held out)", t->scene.folder,
-                         t->scene.view_count, t->test_count);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no photo is left to train on (%zu views, %zu held out)",
+                         t->scene.folder, t->scene.view_count, t->test_count);
     return GBT_OK;
 }
 
@@ -214,7 +224,8 @@ static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
     GBT_TRY(scene_load(data, &split, &t->scene, err));
     GBT_TRY(scene_set_alpha(&t->scene, def->alpha, err));
     if (t->scene.view_count == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no photos to train on (a point cloud alone is not enough)", data);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no photos to train on (a point cloud alone is not enough)",
+                         data);
     GBT_TRY(choose_views(t, err));
     GBT_TRY(photos_open(&t->photos, &t->scene, def->downscale, err));
     GBT_TRY(photos_load(&t->photos, t->train_views, t->train_count, err));
@@ -223,12 +234,13 @@ static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
     t->voxel_size = def->voxel_size;
     if (t->voxel_size > 0)
         return GBT_OK;
-    return balls_voxel_size(t->scene.points.position, t->scene.points.count, def->compat ? VOXEL_COMPAT_SQUARED : VOXEL_MEDIAN_SPACING,
-                            &t->voxel_size, err);
+    return balls_voxel_size(t->scene.points.position, t->scene.points.count,
+                            def->compat ? VOXEL_COMPAT_SQUARED : VOXEL_MEDIAN_SPACING, &t->voxel_size, err);
 }
 
-/* Nothing can be nearer to a camera than this. Where a photo was taken there is room up to what it shows, also when the model puts a wall
-   in its way that only others show, from afar, and from its other side. `median` of the distances of anchors. */
+/* Nothing can be nearer to a camera than this. Where a photo was taken there is room up to what it shows,
+   also when the model puts a wall in its way that only others show, from afar, and from its other side.
+   `median` of the distances of anchors. */
 static float near_depth(const trainer *t, float median)
 {
     const float least = 0.02f * median;
@@ -241,7 +253,8 @@ static float near_depth(const trainer *t, float median)
     return isfinite(nearest) ? fmaxf(least, (float)(t->def.near * nearest)) : least;
 }
 
-/* Networks with random weights, and what the anchors' distances say: their unit, t_near, the range of scales. */
+/* Networks with random weights, and what the anchors' distances say: their unit, t_near, the range of
+   scales. */
 static gbt_status make_decoder(trainer *t, gbt_error *err)
 {
     const gbt_train_def *def = &t->def;
@@ -249,16 +262,19 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     GBT_TRY(measure_distances(t, &p5, &median, &p95, err));
     /* Off by default in the reference, and a trap where distances vary widely. */
     const bool wide = p95 > 3 * p5;
-    const bool has_distance = strcmp(def->distance, "on") == 0 || (strcmp(def->distance, "auto") == 0 && wide && !def->compat);
+    const bool has_distance =
+        strcmp(def->distance, "on") == 0 || (strcmp(def->distance, "auto") == 0 && wide && !def->compat);
     uint32_t words[4];
     rng_philox(def->seed, STREAM_NETWORKS, 0, words);
     GBT_TRY(decoder_init(&t->decoder, def->offsets, has_distance, (uint64_t)words[1] << 32 | words[0], err));
     t->decoder.distance_scale = def->compat ? 1.0f : 1 / median;
-    t->decoder.distance_min = p5 * t->decoder.distance_scale, t->decoder.distance_max = p95 * t->decoder.distance_scale;
+    t->decoder.distance_min = p5 * t->decoder.distance_scale;
+    t->decoder.distance_max = p95 * t->decoder.distance_scale;
     t->settings = trace_settings_default();
     t->settings.t_near = near_depth(t, median);
     const double size = fmax(t->extent, (double)median);
-    t->scale_log_min = (float)log(1e-6 * size), t->scale_log_max = (float)log(100 * size);
+    t->scale_log_min = (float)log(1e-6 * size);
+    t->scale_log_max = (float)log(100 * size);
     return GBT_OK;
 }
 

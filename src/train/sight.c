@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/sight.c -- into camera axes, onto the picture. */
 #include "train/sight.h"
 
@@ -13,6 +14,6 @@ bool camera_sees(const gbt_camera *camera, const float position[3], double *dist
     if (distance != NULL)
         *distance = dvec_length(d);
     dmat_apply(camera->rotation, d, cam);
-    return gbt_camera_project(camera, cam, pixel) && pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera->width &&
-           pixel[1] < camera->height;
+    return gbt_camera_project(camera, cam, pixel) && pixel[0] >= 0 && pixel[1] >= 0 &&
+           pixel[0] < camera->width && pixel[1] < camera->height;
 }

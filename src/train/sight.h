@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/sight.h -- is a point in a picture? Of surfaces before it nothing is known. */
 #ifndef GBT_TRAIN_SIGHT_H
 #define GBT_TRAIN_SIGHT_H
@@ -6,7 +7,8 @@
 
 #include "gbtrace/camera.h"
 
-/** @param distance [out] optional (NULL): from the camera centre, also of a point beside the picture. Cost: one projection. */
+/** @param distance [out] optional (NULL): from the camera centre, also of a point beside the picture. Cost:
+                      one projection. */
 bool camera_sees(const gbt_camera *camera, const float position[3], double *distance);
 
 #endif

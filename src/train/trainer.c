@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/trainer.c -- one training step, readable from top to bottom. */
 #include "train/trainer.h"
 
@@ -26,10 +27,10 @@ enum {
     BARREN_STEPS = 5
 };
 
-/* ---- which view ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- which view ---- */
 
-/* An index into train_views: every view once per epoch, in an order that depends on (seed, epoch) only, so that there is no state to
-   save. */
+/* An index into train_views: every view once per epoch, in an order that depends on (seed, epoch) only, so
+   that there is no state to save. */
 static size_t pick_view(trainer *t)
 {
     const uint64_t epoch = t->step / t->train_count;
@@ -41,7 +42,8 @@ static size_t pick_view(trainer *t)
             rng_philox(t->def.seed, STREAM_VIEWS, epoch << 32 | i, words);
             const size_t j = (size_t)(((uint64_t)words[0] * i) >> 32);
             const uint32_t swap = t->order[i - 1];
-            t->order[i - 1] = t->order[j], t->order[j] = swap;
+            t->order[i - 1] = t->order[j];
+            t->order[j] = swap;
         }
         t->order_epoch = epoch;
         t->order_ready = true;
@@ -64,17 +66,20 @@ static photo_sample pick_pixels(const trainer *t, int level)
 {
     uint32_t words[4];
     rng_philox(t->def.seed, STREAM_PIXELS, t->step, words);
-    return (photo_sample){.level = level, .phase = {(int)(words[0] & ((1u << level) - 1)), (int)(words[1] & ((1u << level) - 1))}};
+    return (photo_sample){
+        .level = level,
+        .phase = {(int)(words[0] & ((1u << level) - 1)), (int)(words[1] & ((1u << level) - 1))}};
 }
 
 /* Splats teach a model that is still rough in half the time of rays, which have the last word. */
 static frame_renderer renderer_of_step(const trainer *t, const gbt_camera *camera, double progress)
 {
-    const bool rays = t->renderer != FRAME_TRACE || t->def.compat || progress >= t->def.splats_until || !raster_takes(camera);
+    const bool rays = t->renderer != FRAME_TRACE || t->def.compat || progress >= t->def.splats_until ||
+                      !raster_takes(camera);
     return rays ? t->renderer : FRAME_SPLAT;
 }
 
-/* ---- optimizer ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- optimizer ---- */
 
 typedef struct adam_job {
     trainer *t;
@@ -82,20 +87,21 @@ typedef struct adam_job {
     adam_rates feature; /* by the age of the run */
 } adam_job;
 
-/* Of one age. By the age of the run, the first steps of a new anchor would be up to six times too long, for its second moments are young:
-   geometry, which begins where it belongs, would be flung from there. Features begin as others' and have far to go: they keep that. */
+/* Of one age. By the age of the run, the first steps of a new anchor would be up to six times too long, for
+   its second moments are young: geometry, which begins where it belongs, would be flung from there. Features
+   begin as others' and have far to go: they keep that. */
 static void step_rows(const adam_job *job, size_t begin, size_t end)
 {
     anchors *p = &job->t->anchors, *g = &job->t->gradient, *m = &job->t->moment1, *v = &job->t->moment2;
     const uint64_t age = job->t->anchor_t - job->t->born[begin];
     const size_t rows = end - begin, feature = begin * ANCHOR_FEATURE_DIM, scale = begin * 6;
     const size_t offset_floats = 3 * (size_t)p->offset_count, offset = begin * offset_floats;
-    adam_step(p->feature + feature, g->feature + feature, m->feature + feature, v->feature + feature, rows * ANCHOR_FEATURE_DIM,
-              job->feature);
-    adam_step(p->offset + offset, g->offset + offset, m->offset + offset, v->offset + offset, rows * offset_floats,
-              adam_rates_at(job->rates->offset, age));
-    adam_step(p->scale_log + scale, g->scale_log + scale, m->scale_log + scale, v->scale_log + scale, rows * 6,
-              adam_rates_at(job->rates->scale, age));
+    adam_step(p->feature + feature, g->feature + feature, m->feature + feature, v->feature + feature,
+              rows * ANCHOR_FEATURE_DIM, job->feature);
+    adam_step(p->offset + offset, g->offset + offset, m->offset + offset, v->offset + offset,
+              rows * offset_floats, adam_rates_at(job->rates->offset, age));
+    adam_step(p->scale_log + scale, g->scale_log + scale, m->scale_log + scale, v->scale_log + scale,
+              rows * 6, adam_rates_at(job->rates->scale, age));
     for (size_t i = scale; i < 6 * end; i++)
         p->scale_log[i] = fminf(fmaxf(p->scale_log[i], job->t->scale_log_min), job->t->scale_log_max);
 }
@@ -119,7 +125,8 @@ static void step_networks(trainer *t, const learning_rates *rates)
     const double rate[3] = {rates->opacity_mlp, rates->shape_mlp, rates->color_mlp};
     for (int i = 0; i < 3; i++) {
         const size_t b = parts[i].begin, n = parts[i].end - b;
-        adam_step(t->decoder.params + b, t->d_params + b, t->params_m + b, t->params_v + b, n, adam_rates_at(rate[i], t->step + 1));
+        adam_step(t->decoder.params + b, t->d_params + b, t->params_m + b, t->params_v + b, n,
+                  adam_rates_at(rate[i], t->step + 1));
     }
 }
 
@@ -130,9 +137,10 @@ static void step_anchors(trainer *t, const learning_rates *rates)
     parallel_blocks(t->anchors.count, ADAM_BLOCK, adam_block, &job);
 }
 
-/* ---- one step ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- one step ---- */
 
-/* Count a step that teaches nothing; nothing may have changed yet but the gradients, which are cleared. `what` names the culprit. */
+/* Count a step that teaches nothing; nothing may have changed yet but the gradients, which are cleared.
+   `what` names the culprit. */
 static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_error *err)
 {
     anchors *g = &t->gradient;
@@ -143,15 +151,15 @@ static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_
     out->skipped = true;
     t->skipped_steps++;
     if (++t->skipped_in_row >= MAX_SKIPPED_IN_ROW)
-        return base_fail(err, GBT_ERR_FORMAT, "train: %d steps in a row taught nothing, last step %llu: %s", MAX_SKIPPED_IN_ROW,
-                         (unsigned long long)t->step, what);
+        return base_fail(err, GBT_ERR_FORMAT, "train: %d steps in a row taught nothing, last step %llu: %s",
+                         MAX_SKIPPED_IN_ROW, (unsigned long long)t->step, what);
     log_warn("step %llu skipped: %s", (unsigned long long)t->step, what);
     t->step++;
     return GBT_OK;
 }
 
-/* After the last render: is the scene empty, and for good? And in the first: is one offset of all anchors? The networks begin at random,
-   and an offset that begins below 0 everywhere would hardly ever be used. */
+/* After the last render: is the scene empty, and for good? And in the first: is one offset of all anchors?
+   The networks begin at random, and an offset that begins below 0 everywhere would hardly ever be used. */
 static void revive_when_barren(trainer *t)
 {
     const frame *f = &t->frame;
@@ -164,7 +172,8 @@ static void revive_when_barren(trainer *t)
     decode_raise_opacity(&f->tape, revived_opacity, revived_opacity, &t->decoder);
     decoder_part parts[3];
     decoder_parts(&t->decoder, parts);
-    const size_t begin = parts[0].begin, count = parts[0].end - begin; /* what pulled the opacities down must not go on */
+    const size_t begin = parts[0].begin,
+                 count = parts[0].end - begin; /* what pulled the opacities down must not go on */
     memset(t->params_m + begin, 0, count * sizeof *t->params_m);
     memset(t->params_v + begin, 0, count * sizeof *t->params_v);
     t->barren_in_row = 0;
@@ -172,9 +181,10 @@ static void revive_when_barren(trainer *t)
         log_info("step %llu: no anchor makes a Gaussian; opacities are raised", (unsigned long long)t->step);
 }
 
-/* The loss of the last render as the photo's exposure shows it; d_image becomes dL/drender, d_exposure dL/dmatrix. */
-static gbt_status compare(trainer *t, size_t slot, const unsigned char *valid, image_loss_result *loss, double d_exposure[AFFINE_NUMBERS],
-                          gbt_error *err)
+/* The loss of the last render as the photo's exposure shows it; d_image becomes dL/drender, d_exposure
+   dL/dmatrix. */
+static gbt_status compare(trainer *t, size_t slot, const unsigned char *valid, image_loss_result *loss,
+                          double d_exposure[AFFINE_NUMBERS], gbt_error *err)
 {
     const image *shown = &t->frame.rgb;
     image *fitted[] = {&t->d_image, &t->exposed};
@@ -184,7 +194,8 @@ static gbt_status compare(trainer *t, size_t slot, const unsigned char *valid, i
         return image_loss(shown, &t->photo, valid, dssim_weight, &t->loss_scratch, &t->d_image, loss, err);
     const float *matrix = t->exposures.matrix + slot * AFFINE_NUMBERS;
     affine_apply(matrix, shown, &t->exposed);
-    GBT_TRY(image_loss(&t->exposed, &t->photo, valid, dssim_weight, &t->loss_scratch, &t->d_image, loss, err));
+    GBT_TRY(
+        image_loss(&t->exposed, &t->photo, valid, dssim_weight, &t->loss_scratch, &t->d_image, loss, err));
     affine_backward(matrix, shown, &t->d_image, d_exposure);
     return GBT_OK;
 }
@@ -194,7 +205,8 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     const double start = clock_wall();
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
-    const learning_rates rates = schedule_rates(progress, t->def.compat, t->extent, t->def.learning_rate_factor);
+    const learning_rates rates =
+        schedule_rates(progress, t->def.compat, t->extent, t->def.learning_rate_factor);
 
     /* A view, and as many of its pixels as the model can already use. */
     const size_t slot = pick_view(t), view = t->train_views[slot];
@@ -204,24 +216,30 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     gbt_camera camera;
     const unsigned char *valid;
     frame *f = &t->frame;
-    GBT_TRY(photos_get_sample(&t->photos, view, &sample, &t->photo, &camera, &valid, &f->draw.pixel_step, err));
+    GBT_TRY(
+        photos_get_sample(&t->photos, view, &sample, &t->photo, &camera, &valid, &f->draw.pixel_step, err));
     out->photo_seconds = clock_wall() - clock;
-    out->width = camera.width, out->height = camera.height;
+    out->width = camera.width;
+    out->height = camera.height;
 
     /* Render, compare. */
     f->draw.renderer = renderer_of_step(t, &camera, progress);
     trace_settings settings = t->settings;
-    if (!t->def.compat && progress < SCHEDULE_WHOLE_FROM)
-        settings.alpha_min = SCHEDULE_ALPHA_MIN, settings.transmittance_min = SCHEDULE_T_MIN;
+    if (!t->def.compat && progress < SCHEDULE_WHOLE_FROM) {
+        settings.alpha_min = SCHEDULE_ALPHA_MIN;
+        settings.transmittance_min = SCHEDULE_T_MIN;
+    }
     GBT_TRY(frame_render(f, frame_neural(&t->anchors, &t->decoder), &camera, &settings, true, err));
-    out->gaussians = f->gaussians.count, out->visible = f->visible_count;
+    out->gaussians = f->gaussians.count;
+    out->visible = f->visible_count;
     revive_when_barren(t);
     clock = clock_wall();
     image_loss_result loss;
     double d_exposure[AFFINE_NUMBERS];
     GBT_TRY(compare(t, slot, valid, &loss, d_exposure, err));
     out->loss = loss.loss + (double)volume_weight * frame_volume(f);
-    out->l1 = loss.l1, out->ssim = loss.ssim;
+    out->l1 = loss.l1;
+    out->ssim = loss.ssim;
     out->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
     out->loss_seconds = clock_wall() - clock;
 
@@ -232,20 +250,24 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     }
 
     /* Gradients, then parameters. */
-    GBT_TRY(frame_backward(f, &t->anchors, &t->decoder, &t->d_image, volume_weight, &t->gradient, t->d_params, err));
+    GBT_TRY(frame_backward(f, &t->anchors, &t->decoder, &t->d_image, volume_weight, &t->gradient, t->d_params,
+                           err));
     clock = clock_wall();
     char where[80];
     if (gradient_is_bad(t, t->exposures.count > 0 ? d_exposure : NULL, where, sizeof where)) {
-        snprintf(culprit, sizeof culprit, "the gradient is not finite (%s; photo %.200s)", where, t->scene.views[view].name);
+        snprintf(culprit, sizeof culprit, "the gradient is not finite (%s; photo %.200s)", where,
+                 t->scene.views[view].name);
         return skip_step(t, out, culprit, err);
     }
     t->skipped_in_row = 0;
     if (t->exposures.count > 0)
         exposures_step(&t->exposures, slot, d_exposure,
-                       t->def.learning_rate_factor * exposures_rate(t->train_count, progress, next - progress));
+                       t->def.learning_rate_factor *
+                           exposures_rate(t->train_count, progress, next - progress));
     const bool adjust = growth_is_due(t, progress, next);
     step_networks(t, &rates);
-    if (!(adjust && t->def.compat)) /* in the reference the per-anchor groups miss the step in which anchors change */
+    if (!(adjust && t->def.compat)) /* in the reference the per-anchor groups miss the step in which anchors
+                                       change */
         step_anchors(t, &rates);
     out->optimizer_seconds = clock_wall() - clock;
 
@@ -274,12 +296,15 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
         const gbt_camera camera = photos_camera(&t->photos, i, 0);
         t->frame.draw.pixel_step = 1;
         t->frame.draw.renderer = t->renderer;
-        status = frame_render(&t->frame, frame_neural(&t->anchors, &t->decoder), &camera, &t->settings, false, err);
+        status = frame_render(&t->frame, frame_neural(&t->anchors, &t->decoder), &camera, &t->settings, false,
+                              err);
         if (status == GBT_OK)
-            status = scene_read_photo_valid(&t->scene.views[i], camera.width, camera.height, &photo, &valid, err);
+            status =
+                scene_read_photo_valid(&t->scene.views[i], camera.width, camera.height, &photo, &valid, err);
         image_scores scores = {0};
         if (status == GBT_OK)
-            status = image_score_photo(&t->frame.rgb, &photo, valid, t->exposures.count > 0, NULL, &scores, err);
+            status =
+                image_score_photo(&t->frame.rgb, &photo, valid, t->exposures.count > 0, NULL, &scores, err);
         if (status == GBT_OK && isfinite(scores.psnr)) { /* else every pixel is masked */
             sum += scores.psnr;
             count++;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* train/trainer.h -- the state of a training run and one step of it. */
 #ifndef GBT_TRAIN_TRAINER_H
 #define GBT_TRAIN_TRAINER_H
@@ -18,8 +19,9 @@ typedef struct step_report {
     double loss, l1, ssim, psnr;
     int width, height, level;
     size_t gaussians, visible;
-    double photo_seconds, loss_seconds, optimizer_seconds, adjust_seconds, total_seconds; /* frame times are in trainer.frame */
-    bool skipped; /* the loss or a gradient was not finite: nothing has learned */
+    double photo_seconds, loss_seconds, optimizer_seconds, adjust_seconds,
+        total_seconds; /* frame times are in trainer.frame */
+    bool skipped;      /* the loss or a gradient was not finite: nothing has learned */
 } step_report;
 
 typedef struct trainer {
@@ -39,20 +41,22 @@ typedef struct trainer {
 
     frame_renderer renderer; /* that the model is for */
     float voxel_size;
-    double extent, first_scale_max; /* an isolated point would start as a fog */
-    float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs, far inside what floats hold */
+    double extent, first_scale_max;     /* an isolated point would start as a fog */
+    float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs,
+                                           far inside what floats hold */
     trace_settings settings;
     size_t anchors_initial, points_used;
-    bool points_made;        /* the data set has no sparse points: ours */
-    char start_text[160];    /* what the run starts from, for people */
+    bool points_made;     /* the data set has no sparse points: ours */
+    char start_text[160]; /* what the run starts from, for people */
 
     pace pace;
     uint64_t step;        /* steps done */
     uint64_t adjust_step; /* steps done at the last adjust */
     uint64_t anchor_t;    /* Adam steps of the per-anchor groups */
     uint64_t skipped_steps, skipped_in_row;
-    uint64_t barren_in_row, revivals; /* steps in a row without a Gaussian though anchors were in sight; how often that was mended */
-    double seconds;       /* training time so far, over all runs that continued one another */
+    uint64_t barren_in_row, revivals; /* steps in a row without a Gaussian though anchors were in sight; how
+                                         often that was mended */
+    double seconds;                   /* training time so far, over all runs that continued one another */
 
     frame frame;
     image photo, d_image, exposed; /* exposed: the render as the photo's exposure shows it */
@@ -66,22 +70,27 @@ typedef struct trainer {
 gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, gbt_error *err);
 
 /**
- * One iteration: pick a view, render, loss, adjoint, Adam, statistics, grow and prune. The pace must know this step.
+ * One iteration: pick a view, render, loss, adjoint, Adam, statistics, grow and prune. The pace must know
+ * this step.
  *
- * A step whose loss or gradient is not finite is skipped: parameters, moments and statistics stay, it is counted, and a warning names the
- * photo or the first bad gradient. GBT_ERR_FORMAT after ten such steps in a row.
+ * A step whose loss or gradient is not finite is skipped: parameters, moments and statistics stay, it is
+ * counted, and a warning names the photo or the first bad gradient. GBT_ERR_FORMAT after ten such steps in a
+ * row.
  *
- * Gaussians below opacity 0 have no gradient, so a scene that has lost all of them (or begins without: the first networks are random)
- * would stay empty. After five views in a row with anchors in sight and not one Gaussian, opacities are raised to 0.1; in the first step
- * (not with `compat`) those of each offset whose mean is below 0.
+ * Gaussians below opacity 0 have no gradient, so a scene that has lost all of them (or begins without: the
+ * first networks are random) would stay empty. After five views in a row with anchors in sight and not one
+ * Gaussian, opacities are raised to 0.1; in the first step (not with `compat`) those of each offset whose
+ * mean is below 0.
  */
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err);
 
-/** Level at which a step at `progress` looks at a view: the schedule's, but never fewer than 80 pixels across. */
+/** Level at which a step at `progress` looks at a view: the schedule's, but never fewer than 80 pixels
+    across. */
 int trainer_level(const trainer *t, size_t view, double progress);
 
 /**
- * Mean PSNR over the held-out views at full training resolution, on 8-bit images; of their right halves with --exposure (affine_split()).
+ * Mean PSNR over the held-out views at full training resolution, on 8-bit images; of their right halves with
+ * --exposure (affine_split()).
  */
 gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err);
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/answer.c -- texts and failures as answers. */
 #include "view/answer.h"
 
@@ -21,5 +22,6 @@ void answer_failure(answer *out, gbt_status status, const gbt_error *err)
 {
     char text[sizeof err->text + 16];
     snprintf(text, sizeof text, "error: %s\n", err->text);
-    answer_text(out, status == GBT_ERR_ARGUMENT || status == GBT_ERR_FORMAT ? 400 : 500, "text/plain; charset=utf-8", text);
+    answer_text(out, status == GBT_ERR_ARGUMENT || status == GBT_ERR_FORMAT ? 400 : 500,
+                "text/plain; charset=utf-8", text);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/answer.h -- what goes back to the page. */
 #ifndef GBT_VIEW_ANSWER_H
 #define GBT_VIEW_ANSWER_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/guard.c -- address, Host and token. */
 #include "view/guard.h"
 
@@ -27,8 +28,10 @@ gbt_status guard_open(const char *host, guard *out, gbt_error *err)
     if (host == NULL || strcmp(host, "localhost") == 0)
         host = "127.0.0.1";
     if (inet_pton(AF_INET, host, &out->address) != 1)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "--host: \"%.60s\" (wanted an IPv4 address of this machine, or 0.0.0.0 for all that it has)", host);
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "--host: \"%.60s\" (wanted an IPv4 address of this machine, or 0.0.0.0 for all that it has)",
+            host);
     inet_ntop(AF_INET, &out->address, out->host, sizeof out->host);
     return ntohl(out->address.s_addr) >> 24 == IN_LOOPBACKNET ? GBT_OK : make_token(out->token, err);
 }
@@ -40,12 +43,13 @@ bool guard_knows_host(const guard *g, const char *host)
     if (host == NULL)
         return false;
     const size_t length = strcspn(host, ":");
-    if (length >= sizeof name || (host[length] == ':' && strspn(host + length + 1, "0123456789") != strlen(host + length + 1)))
+    if (length >= sizeof name ||
+        (host[length] == ':' && strspn(host + length + 1, "0123456789") != strlen(host + length + 1)))
         return false;
     memcpy(name, host, length);
     name[length] = '\0';
-    return strcmp(name, "127.0.0.1") == 0 || strcasecmp(name, "localhost") == 0 || strcmp(name, g->host) == 0 ||
-           (g->token[0] != '\0' && inet_pton(AF_INET, name, &any) == 1);
+    return strcmp(name, "127.0.0.1") == 0 || strcasecmp(name, "localhost") == 0 ||
+           strcmp(name, g->host) == 0 || (g->token[0] != '\0' && inet_pton(AF_INET, name, &any) == 1);
 }
 
 bool guard_knows_token(const guard *g, const char *given)
@@ -80,5 +84,6 @@ void guard_url(const guard *g, int port, char out[GUARD_URL_SIZE])
     memcpy(host, g->host, sizeof host);
     if (g->address.s_addr == htonl(INADDR_ANY) && !find_own_address(host))
         strcpy(host, "127.0.0.1");
-    snprintf(out, GUARD_URL_SIZE, "http://%s:%d%s%s", host, port, g->token[0] != '\0' ? "/?token=" : "", g->token);
+    snprintf(out, GUARD_URL_SIZE, "http://%s:%d%s%s", host, port, g->token[0] != '\0' ? "/?token=" : "",
+             g->token);
 }

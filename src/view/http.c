@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/http.c -- who may ask, and the headers of what is sent. */
 #include "view/http.h"
 
@@ -14,7 +15,8 @@ enum { COOKIE_NAME_SIZE = 24 };
 static void cookie_name(struct MHD_Connection *connection, char out[COOKIE_NAME_SIZE])
 {
     struct MHD_Daemon *daemon = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_DAEMON)->daemon;
-    snprintf(out, COOKIE_NAME_SIZE, "gbtrace_%d", MHD_get_daemon_info(daemon, MHD_DAEMON_INFO_BIND_PORT)->port);
+    snprintf(out, COOKIE_NAME_SIZE, "gbtrace_%d",
+             MHD_get_daemon_info(daemon, MHD_DAEMON_INFO_BIND_PORT)->port);
 }
 
 static const char *token_in_query(struct MHD_Connection *connection)
@@ -30,8 +32,9 @@ static bool has_token(struct MHD_Connection *connection, const guard *g)
            guard_knows_token(g, MHD_lookup_connection_value(connection, MHD_COOKIE_KIND, name));
 }
 
-/* As far as the browser tells: none says Sec-Fetch-Site to a plain http address that is not its own machine's, and Origin goes with few
-   requests. There the cookie does it, which no other site's page makes a browser send. */
+/* As far as the browser tells: none says Sec-Fetch-Site to a plain http address that is not its own
+   machine's, and Origin goes with few requests. There the cookie does it, which no other site's page makes a
+   browser send. */
 static bool is_another_sites(struct MHD_Connection *connection, const char *path, const char *host)
 {
     const char *site = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, "Sec-Fetch-Site");
@@ -41,32 +44,44 @@ static bool is_another_sites(struct MHD_Connection *connection, const char *path
            (origin != NULL && (strncmp(origin, "http://", 7) != 0 || strcasecmp(origin + 7, host) != 0));
 }
 
-int http_refusal(struct MHD_Connection *connection, const guard *g, const char *path, const char *method, const char **why)
+int http_refusal(struct MHD_Connection *connection, const guard *g, const char *path, const char *method,
+                 const char **why)
 {
     const char *host = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, MHD_HTTP_HEADER_HOST);
-    if (!guard_knows_host(g, host))
-        return *why = "error: Host: only the address that gbtrace view printed is answered\n", 403;
-    if (strcmp(method, MHD_HTTP_METHOD_GET) != 0)
-        return *why = "error: only GET is answered\n", 405;
-    if (!has_token(connection, g))
-        return *why = "error: no token, or not this server's: open the address that gbtrace view printed\n", 403;
-    if (is_another_sites(connection, path, host))
-        return *why = "error: another site's page may not ask\n", 403;
+    if (!guard_knows_host(g, host)) {
+        *why = "error: Host: only the address that gbtrace view printed is answered\n";
+        return 403;
+    }
+    if (strcmp(method, MHD_HTTP_METHOD_GET) != 0) {
+        *why = "error: only GET is answered\n";
+        return 405;
+    }
+    if (!has_token(connection, g)) {
+        *why = "error: no token, or not this server's: open the address that gbtrace view printed\n";
+        return 403;
+    }
+    if (is_another_sites(connection, path, host)) {
+        *why = "error: another site's page may not ask\n";
+        return 403;
+    }
     return 0;
 }
 
 enum MHD_Result http_send(struct MHD_Connection *connection, const guard *g, const answer *with, bool keeps)
 {
-    static const struct { const char *name, *value; } always[] = {
+    static const struct {
+        const char *name, *value;
+    } always[] = {
         {"Cache-Control", "no-store"},
         {"X-Content-Type-Options", "nosniff"},
         {"Cross-Origin-Resource-Policy", "same-origin"},
         {"Referrer-Policy", "no-referrer"},
-        {"Content-Security-Policy", "default-src 'self'; img-src 'self' blob: data:; frame-ancestors 'none'; base-uri 'none'; form-action "
-                                    "'none'"},
+        {"Content-Security-Policy", "default-src 'self'; img-src 'self' blob: data:; frame-ancestors 'none'; "
+                                    "base-uri 'none'; form-action 'none'"},
     };
-    struct MHD_Response *response = keeps ? MHD_create_response_from_buffer(with->count, with->bytes, MHD_RESPMEM_PERSISTENT)
-                                          : MHD_create_response_from_buffer_with_free_callback(with->count, with->bytes, mem_free);
+    struct MHD_Response *response =
+        keeps ? MHD_create_response_from_buffer(with->count, with->bytes, MHD_RESPMEM_PERSISTENT)
+              : MHD_create_response_from_buffer_with_free_callback(with->count, with->bytes, mem_free);
     if (response == NULL) {
         if (!keeps)
             mem_free(with->bytes);
@@ -92,13 +107,19 @@ enum MHD_Result http_send(struct MHD_Connection *connection, const guard *g, con
 
 bool http_page(const char *path, answer *out)
 {
-    static const struct { const char *ending, *type; } types[] = {
-        {".html", "text/html; charset=utf-8"}, {".css", "text/css; charset=utf-8"}, {".js", "text/javascript; charset=utf-8"},
-        {".svg", "image/svg+xml"}};
+    static const struct {
+        const char *ending, *type;
+    } types[] = {{".html", "text/html; charset=utf-8"},
+                 {".css", "text/css; charset=utf-8"},
+                 {".js", "text/javascript; charset=utf-8"},
+                 {".svg", "image/svg+xml"}};
     const page_file *file = page_file_find(strcmp(path, "/") == 0 ? "index.html" : path + 1);
     if (path[0] != '/' || file == NULL)
         return false;
-    *out = (answer){.code = 200, .type = "application/octet-stream", .bytes = (unsigned char *)file->bytes, .count = file->count};
+    *out = (answer){.code = 200,
+                    .type = "application/octet-stream",
+                    .bytes = (unsigned char *)file->bytes,
+                    .count = file->count};
     const char *dot = strrchr(file->name, '.');
     for (size_t i = 0; dot != NULL && i < sizeof types / sizeof *types; i++)
         if (strcmp(dot, types[i].ending) == 0)

@@ -1,4 +1,6 @@
-/* view/page_files.h -- the files of src/view/page/ as bytes; page_files.c is made of them at build time (page_files.cmake). */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* view/page_files.h -- the files of src/view/page/ as bytes; page_files.c is made of them at build time
+   (page_files.cmake). */
 #ifndef GBT_VIEW_PAGE_FILES_H
 #define GBT_VIEW_PAGE_FILES_H
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/pick.c -- the point of the scene behind a pixel. */
 #include <math.h>
 #include <stdio.h>
@@ -7,7 +8,8 @@
 #include "render/render_outputs.h"
 #include "view/studio.h"
 
-/* One pixel, as wide as those of `camera`, that looks along its ray through `pixel`. False where the lens has no ray. */
+/* One pixel, as wide as those of `camera`, that looks along its ray through `pixel`. False where the lens has
+   no ray. */
 static bool aim(const gbt_camera *camera, const double pixel[2], gbt_camera *out)
 {
     double origin[3], dir[3], target[3], half_fov_tan[2];
@@ -24,8 +26,10 @@ static bool aim(const gbt_camera *camera, const double pixel[2], gbt_camera *out
     double up[3] = {0, 0, 0};
     up[least] = 1; /* never along the view */
     memset(out, 0, sizeof *out);
-    out->model = GBT_CAMERA_PINHOLE, out->width = out->height = 1;
-    out->params[0] = out->params[1] = focal, out->params[2] = out->params[3] = 0.5;
+    out->model = GBT_CAMERA_PINHOLE;
+    out->width = out->height = 1;
+    out->params[0] = out->params[1] = focal;
+    out->params[2] = out->params[3] = 0.5;
     return gbt_camera_look_at(origin, target, up, out);
 }
 
@@ -49,8 +53,8 @@ gbt_status studio_pick(studio *s, const request *what, answer *out, gbt_error *e
     char text[256];
     GBT_TRY(studio_camera(s, what, &camera, err));
     if (!(what->pixel[0] < camera.width && what->pixel[1] < camera.height))
-        return base_fail(err, GBT_ERR_ARGUMENT, "x, y: %g, %g (the picture has %d x %d pixels)", what->pixel[0], what->pixel[1],
-                         camera.width, camera.height);
+        return base_fail(err, GBT_ERR_ARGUMENT, "x, y: %g, %g (the picture has %d x %d pixels)",
+                         what->pixel[0], what->pixel[1], camera.width, camera.height);
     if (aim(&camera, what->pixel, &one))
         GBT_TRY(find_depth(s, &one, &depth, err));
     if (depth > 0) {
@@ -58,7 +62,8 @@ gbt_status studio_pick(studio *s, const request *what, answer *out, gbt_error *e
         double point[3];
         for (int k = 0; k < 3; k++)
             point[k] = one.center[k] + origin[k] + depth * forward[k];
-        snprintf(text, sizeof text, "{\"hit\":true,\"depth\":%.9g,\"point\":[%.17g,%.17g,%.17g]}", depth, point[0], point[1], point[2]);
+        snprintf(text, sizeof text, "{\"hit\":true,\"depth\":%.9g,\"point\":[%.17g,%.17g,%.17g]}", depth,
+                 point[0], point[1], point[2]);
     } else {
         snprintf(text, sizeof text, "{\"hit\":false}");
     }

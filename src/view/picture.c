@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/picture.c -- a request for a picture: render or trace again, and the bytes of it. */
 #include <math.h>
 #include <stdio.h>
@@ -15,7 +16,7 @@ typedef struct picture_times {
     double prepare, trace, encode;
 } picture_times;
 
-/* ---- bytes ------------------------------------------------------------------------------------------------------------------- */
+/* ---- bytes ---- */
 
 typedef struct rgba_work {
     const image *from;
@@ -34,8 +35,12 @@ static void rgba_rows(size_t block, size_t begin, size_t end, void *context)
     (void)block;
     const float *from = w->from->pixels + 3 * begin;
     unsigned char *to = w->to + 4 * begin;
-    for (size_t i = 0; i < end - begin; i++, from += 3, to += 4)
-        to[0] = byte_of(from[0]), to[1] = byte_of(from[1]), to[2] = byte_of(from[2]), to[3] = 255;
+    for (size_t i = 0; i < end - begin; i++, from += 3, to += 4) {
+        to[0] = byte_of(from[0]);
+        to[1] = byte_of(from[1]);
+        to[2] = byte_of(from[2]);
+        to[3] = 255;
+    }
 }
 
 static gbt_status encode_raw(const image *im, answer *out, gbt_error *err)
@@ -63,8 +68,10 @@ static gbt_status encode_float(const image *im, answer *out, gbt_error *err)
 
 static gbt_status encode(const image *im, const request *what, answer *out, gbt_error *err)
 {
-    static const char *const types[] = {"application/octet-stream", "image/jpeg", "image/png", "application/octet-stream"};
-    out->code = 200, out->type = types[what->format];
+    static const char *const types[] = {"application/octet-stream", "image/jpeg", "image/png",
+                                        "application/octet-stream"};
+    out->code = 200;
+    out->type = types[what->format];
     if (what->format == REQUEST_JPEG)
         return image_encode_jpeg(im, what->quality, &out->bytes, &out->count, err);
     if (what->format == REQUEST_PNG)
@@ -72,7 +79,8 @@ static gbt_status encode(const image *im, const request *what, answer *out, gbt_
     return what->format == REQUEST_FLOAT ? encode_float(im, out, err) : encode_raw(im, out, err);
 }
 
-static gbt_status finish(const studio *s, const image *im, const request *what, picture_times *times, answer *out, gbt_error *err)
+static gbt_status finish(const studio *s, const image *im, const request *what, picture_times *times,
+                         answer *out, gbt_error *err)
 {
     const double begin = clock_wall();
     GBT_TRY(encode(im, what, out, err));
@@ -80,24 +88,26 @@ static gbt_status finish(const studio *s, const image *im, const request *what, 
     snprintf(out->about, sizeof out->about,
              "{\"width\":%d,\"height\":%d,\"channels\":%d,\"version\":%u,\"gaussians\":%zu,"
              "\"prepare_ms\":%.3f,\"trace_ms\":%.3f,\"encode_ms\":%.3f}",
-             im->width, im->height, what->format == REQUEST_RAW ? 4 : im->channels, s->version, s->run->frame.gaussians.count,
-             times->prepare, times->trace, times->encode);
+             im->width, im->height, what->format == REQUEST_RAW ? 4 : im->channels, s->version,
+             s->run->frame.gaussians.count, times->prepare, times->trace, times->encode);
     return GBT_OK;
 }
 
-/* ---- pixels ------------------------------------------------------------------------------------------------------------------ */
+/* ---- pixels ---- */
 
 /* Point `n` of Halton's sequence in a base, in (0, 1). */
 static double halton(int n, int base)
 {
     double value = 0, digit = 1;
-    for (; n > 0; n /= base)
-        digit /= base, value += digit * (n % base);
+    for (; n > 0; n /= base) {
+        digit /= base;
+        value += digit * (n % base);
+    }
     return value;
 }
 
-/* The camera of sample `n`: its rays meet other points of the pixels. Sample 0, and any of a lens without a principal point, is the camera
-   itself. */
+/* The camera of sample `n`: its rays meet other points of the pixels. Sample 0, and any of a lens without a
+   principal point, is the camera itself. */
 static gbt_camera sample_camera(const gbt_camera *camera, int n)
 {
     gbt_camera shifted = *camera;
@@ -120,12 +130,14 @@ gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error 
     gbt_camera camera, shifted;
     GBT_TRY(studio_camera(s, what, &camera, err));
     shifted = sample_camera(&camera, what->sample);
-    const bool traced = what->renderer == FRAME_TRACE, whole = !traced || (what->output == 0 && what->sample == 0);
+    const bool traced = what->renderer == FRAME_TRACE,
+               whole = !traced || (what->output == 0 && what->sample == 0);
     const double begin = clock_wall();
     GBT_TRY(studio_prepare(s, traced ? &camera : &shifted, what, whole, err));
     const double prepared = clock_wall(), before = 1000 * (prepared - begin);
     if (whole) {
-        picture_times times = {.trace = fmin(1000 * f->times.trace, before)}; /* nothing, when it was drawn already */
+        picture_times times = {.trace = fmin(1000 * f->times.trace, before)}; /* nothing, when it was drawn
+                                                                                 already */
         times.prepare = before - times.trace;
         return finish(s, &f->rgb, what, &times, out, err);
     }
@@ -134,7 +146,8 @@ gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error 
     gbt_status status = render_outputs_trace(s->run, &shot, what->output, &images, err);
     picture_times times = {.prepare = before, .trace = 1000 * (clock_wall() - prepared)};
     if (status == GBT_OK)
-        status = finish(s, what->output == 0 ? &images.rgb : &images.of[output_index(what->output)], what, &times, out, err);
+        status = finish(s, what->output == 0 ? &images.rgb : &images.of[output_index(what->output)], what,
+                        &times, out, err);
     render_output_images_free(&images);
     return status;
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/request.c -- a query's words, each checked. */
 #include "view/request.h"
 
@@ -14,10 +15,7 @@ typedef struct words {
     gbt_error *err;
 } words;
 
-static const char *word_of(const words *w, const char *name)
-{
-    return w->word(w->query, name);
-}
+static const char *word_of(const words *w, const char *name) { return w->word(w->query, name); }
 
 static gbt_status take_number(const words *w, const char *name, double low, double high, double *out)
 {
@@ -25,7 +23,8 @@ static gbt_status take_number(const words *w, const char *name, double low, doub
     if (text == NULL)
         return GBT_OK;
     if (number_parse_double(text, strlen(text), out) != NUMBER_OK || !(*out >= low && *out <= high))
-        return base_fail(w->err, GBT_ERR_ARGUMENT, "%s: \"%.40s\" (wanted a number from %g to %g)", name, text, low, high);
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "%s: \"%.40s\" (wanted a number from %g to %g)", name,
+                         text, low, high);
     return GBT_OK;
 }
 
@@ -34,23 +33,28 @@ static gbt_status take_whole(const words *w, const char *name, int low, int high
     double value = *out;
     GBT_TRY(take_number(w, name, low, high, &value));
     *out = (int)value;
-    return *out == value ? GBT_OK : base_fail(w->err, GBT_ERR_ARGUMENT, "%s: %g (wanted a whole number)", name, value);
+    return *out == value ? GBT_OK
+                         : base_fail(w->err, GBT_ERR_ARGUMENT, "%s: %g (wanted a whole number)", name, value);
 }
 
-static gbt_status take_choice(const words *w, const char *name, const char *const *choices, int count, int *out)
+static gbt_status take_choice(const words *w, const char *name, const char *const *choices, int count,
+                              int *out)
 {
     const char *text = word_of(w, name);
     for (int i = 0; i < count && text != NULL; i++)
-        if (strcmp(text, choices[i]) == 0)
-            return *out = i, GBT_OK;
+        if (strcmp(text, choices[i]) == 0) {
+            *out = i;
+            return GBT_OK;
+        }
     return text == NULL ? GBT_OK : base_fail(w->err, GBT_ERR_ARGUMENT, "%s: \"%.40s\": unknown", name, text);
 }
 
 static gbt_status check_size(int width, int height, gbt_error *err)
 {
     if (width > REQUEST_SIDE_MAX || height > REQUEST_SIDE_MAX || (double)width * height > REQUEST_PIXELS_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "picture of %d x %d pixels (wanted sides of at most %d, and at most %d pixels)", width,
-                         height, REQUEST_SIDE_MAX, REQUEST_PIXELS_MAX);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "picture of %d x %d pixels (wanted sides of at most %d, and at most %d pixels)",
+                         width, height, REQUEST_SIDE_MAX, REQUEST_PIXELS_MAX);
     return GBT_OK;
 }
 
@@ -72,7 +76,8 @@ static gbt_status take_camera(const words *w, request *out)
     ray_shot shot;
     GBT_TRY(camera_text_read(text, "camera", none, &shot, w->err));
     if (shot.aperture_radius > 0 || shot.shutter != RAY_SHUTTER_GLOBAL)
-        return base_fail(w->err, GBT_ERR_ARGUMENT, "camera: an open aperture or a rolling shutter is for gbtrace render");
+        return base_fail(w->err, GBT_ERR_ARGUMENT,
+                         "camera: an open aperture or a rolling shutter is for gbtrace render");
     out->camera = shot.camera;
     return check_size(shot.camera.width, shot.camera.height, w->err);
 }
@@ -85,16 +90,20 @@ static gbt_status take_background(const words *w, request *out)
     if (text == NULL)
         return GBT_OK;
     if (strlen(text) != 6 || strspn(text, digits) != 6)
-        return base_fail(w->err, GBT_ERR_ARGUMENT, "background: \"%.40s\" (wanted six digits, red, green and blue, as 3366ff)", text);
+        return base_fail(w->err, GBT_ERR_ARGUMENT,
+                         "background: \"%.40s\" (wanted six digits, red, green and blue, as 3366ff)", text);
     for (int c = 0; c < 3; c++)
-        out->background[c] = (float)(16 * (strchr(digits, text[2 * c]) - digits) + (strchr(digits, text[2 * c + 1]) - digits)) / 255;
+        out->background[c] = (float)(16 * (strchr(digits, text[2 * c]) - digits) +
+                                     (strchr(digits, text[2 * c + 1]) - digits)) /
+                             255;
     out->has_background = true;
     return GBT_OK;
 }
 
 static gbt_status take_picture(const words *w, request *out)
 {
-    static const char *const formats[] = {"raw", "jpeg", "png", "float"}, *const presets[] = {"exact", "default", "fast"};
+    static const char *const formats[] = {"raw", "jpeg", "png", "float"}, *const presets[] = {
+                                                                              "exact", "default", "fast"};
     int format = REQUEST_RAW, preset = 1;
     const char *output = word_of(w, "output"), *renderer = word_of(w, "renderer");
     if (output != NULL && strcmp(output, "color") != 0)
@@ -102,15 +111,18 @@ static gbt_status take_picture(const words *w, request *out)
     if ((out->output & (out->output - 1)) != 0)
         return base_fail(w->err, GBT_ERR_ARGUMENT, "output: \"%.40s\" (wanted one)", output);
     if (renderer != NULL && !frame_renderer_named(renderer, &out->renderer))
-        return base_fail(w->err, GBT_ERR_ARGUMENT, "renderer: \"%.40s\" (wanted trace, raster or per-ray)", renderer);
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "renderer: \"%.40s\" (wanted trace, raster or per-ray)",
+                         renderer);
     GBT_TRY(take_choice(w, "format", formats, 4, &format));
     GBT_TRY(take_choice(w, "preset", presets, 3, &preset));
     GBT_TRY(take_background(w, out));
     GBT_TRY(take_whole(w, "quality", 1, 100, &out->quality));
     GBT_TRY(take_whole(w, "sample", 0, REQUEST_SAMPLE_MAX, &out->sample));
-    out->format = (request_format)format, out->preset = presets[preset];
+    out->format = (request_format)format;
+    out->preset = presets[preset];
     if (out->output != 0 && (out->renderer != FRAME_TRACE || out->format != REQUEST_FLOAT))
-        return base_fail(w->err, GBT_ERR_ARGUMENT, "output: \"%.40s\" is traced, and has the format float alone", output);
+        return base_fail(w->err, GBT_ERR_ARGUMENT,
+                         "output: \"%.40s\" is traced, and has the format float alone", output);
     return GBT_OK;
 }
 
@@ -131,7 +143,8 @@ gbt_status request_parse(const char *path, request_word *word, void *query, requ
         kind++;
     if (kind == 4)
         return base_fail(err, GBT_ERR_IO, "%.100s: not here", path);
-    *out = (request){.kind = (request_kind)kind, .view = -1, .renderer = FRAME_TRACE, .preset = "default", .quality = 85};
+    *out = (request){
+        .kind = (request_kind)kind, .view = -1, .renderer = FRAME_TRACE, .preset = "default", .quality = 85};
     if (kind == REQUEST_SCENE)
         return GBT_OK;
     GBT_TRY(take_camera(&w, out));

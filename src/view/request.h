@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/request.h -- what the page asks for: a query's words to a checked struct. */
 #ifndef GBT_VIEW_REQUEST_H
 #define GBT_VIEW_REQUEST_H
@@ -16,10 +17,11 @@ typedef enum request_kind {
 } request_kind;
 
 typedef enum request_format {
-    REQUEST_RAW,   /* RGBA, 8 bit */
+    REQUEST_RAW, /* RGBA, 8 bit */
     REQUEST_JPEG,
     REQUEST_PNG,
-    REQUEST_FLOAT /* the channels as they are, 32-bit floats of this machine; outputs beside colour have no other */
+    REQUEST_FLOAT /* the channels as they are, 32-bit floats of this machine; outputs beside colour have no
+                     other */
 } request_format;
 
 typedef struct request {
@@ -34,8 +36,8 @@ typedef struct request {
     bool has_background;
     float background[3]; /* in place of the model's, [0, 1] */
     request_format format;
-    int quality;      /* of JPEG */
-    double pixel[2];  /* to pick */
+    int quality;     /* of JPEG */
+    double pixel[2]; /* to pick */
 } request;
 
 /** The word behind a name in the query; NULL: not there. */

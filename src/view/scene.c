@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/scene.c -- what there is to see, as JSON: counts, the scene's extent, the views and their cameras. */
 #include <jansson.h>
 #include <math.h>
@@ -17,10 +18,12 @@ static json_t *describe_pose(const gbt_camera *camera, const double origin[3])
 {
     const double *down = camera->rotation + 3, *forward = camera->rotation + 6;
     double at[3], to[3];
-    for (int k = 0; k < 3; k++)
-        at[k] = camera->center[k] + origin[k], to[k] = at[k] + forward[k];
-    return json_pack("{s:[fff],s:[fff],s:[fff]}", "origin", at[0], at[1], at[2], "target", to[0], to[1], to[2], "up", -down[0], -down[1],
-                     -down[2]);
+    for (int k = 0; k < 3; k++) {
+        at[k] = camera->center[k] + origin[k];
+        to[k] = at[k] + forward[k];
+    }
+    return json_pack("{s:[fff],s:[fff],s:[fff]}", "origin", at[0], at[1], at[2], "target", to[0], to[1],
+                     to[2], "up", -down[0], -down[1], -down[2]);
 }
 
 static json_t *describe_view(const loaded_run *r, size_t i)
@@ -29,14 +32,17 @@ static json_t *describe_view(const loaded_run *r, size_t i)
     const gbt_camera camera = photos_camera(&r->photos, i, 0);
     double half_fov_tan[2];
     gbt_camera_half_fov_tan(&camera, half_fov_tan);
-    return json_pack("{s:o,s:b,s:i,s:i,s:s,s:f,s:o}", "name", json_text(view->name), "test", view->is_test, "width", camera.width, "height",
-                     camera.height, "lens", gbt_camera_model_name(camera.model), "fov_x_deg", 2 * DEGREES * atan(half_fov_tan[0]), "camera",
-                     describe_pose(&camera, r->model.origin));
+    return json_pack("{s:o,s:b,s:i,s:i,s:s,s:f,s:o}", "name", json_text(view->name), "test", view->is_test,
+                     "width", camera.width, "height", camera.height, "lens",
+                     gbt_camera_model_name(camera.model), "fov_x_deg", 2 * DEGREES * atan(half_fov_tan[0]),
+                     "camera", describe_pose(&camera, r->model.origin));
 }
 
 typedef struct extent {
-    double center[3], size; /* of the middle half of what there is, in each direction; the largest of its three sides */
-    double up[3], floor;    /* up of the photos on the whole; how high what there is begins along it: all but 5 % is above */
+    double center[3],
+        size; /* of the middle half of what there is, in each direction; the largest of its three sides */
+    double up[3], floor; /* up of the photos on the whole; how high what there is begins along it: all but 5 %
+                            is above */
 } extent;
 
 static void find_up(const loaded_run *r, double up[3])
@@ -93,10 +99,12 @@ gbt_status studio_scene(const studio *s, answer *out, gbt_error *err)
     json_t *views = json_array();
     for (size_t i = 0; i < r->scene.view_count; i++)
         json_array_append_new(views, describe_view(r, i));
-    json_t *root = json_pack("{s:i,s:o,s:i,s:b,s:I,s:I,s:s,s:[fff],s:f,s:[fff],s:f,s:o}", "schema", 1, "input", json_text(s->input),
-                             "version", (int)s->version, "plain", r->cloud.count > 0, "gaussians", (json_int_t)r->cloud.count, "anchors",
-                             (json_int_t)r->model.anchors.count, "renderer", frame_renderer_name(s->trained), "center", e.center[0],
-                             e.center[1], e.center[2], "size", e.size, "up", e.up[0], e.up[1], e.up[2], "floor", e.floor, "views", views);
+    json_t *root =
+        json_pack("{s:i,s:o,s:i,s:b,s:I,s:I,s:s,s:[fff],s:f,s:[fff],s:f,s:o}", "schema", 1, "input",
+                  json_text(s->input), "version", (int)s->version, "plain", r->cloud.count > 0, "gaussians",
+                  (json_int_t)r->cloud.count, "anchors", (json_int_t)r->model.anchors.count, "renderer",
+                  frame_renderer_name(s->trained), "center", e.center[0], e.center[1], e.center[2], "size",
+                  e.size, "up", e.up[0], e.up[1], e.up[2], "floor", e.floor, "views", views);
     char *text = root != NULL ? json_dumps(root, JSON_COMPACT) : NULL;
     json_decref(root);
     if (text == NULL)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/server.c -- libmicrohttpd in one thread of its own, and the queue between it and the worker. */
 #include "view/server.h"
 
@@ -37,7 +38,7 @@ struct server {
     bool is_closing;
 };
 
-/* ---- the queue ----------------------------------------------------------------------------------------------------------------- */
+/* ---- the queue ---- */
 
 static const char text_plain[] = "text/plain; charset=utf-8";
 
@@ -75,8 +76,10 @@ server_job *server_next(server *s, double seconds)
     clock_gettime(CLOCK_MONOTONIC, &until);
     until.tv_sec += (time_t)seconds;
     until.tv_nsec += (long)((seconds - (double)(time_t)seconds) * 1e9);
-    if (until.tv_nsec >= 1000000000)
-        until.tv_sec++, until.tv_nsec -= 1000000000;
+    if (until.tv_nsec >= 1000000000) {
+        until.tv_sec++;
+        until.tv_nsec -= 1000000000;
+    }
     while (sem_clockwait(&s->wake, CLOCK_MONOTONIC, &until) != 0)
         if (errno != EINTR)
             return NULL;
@@ -88,10 +91,7 @@ server_job *server_next(server *s, double seconds)
     return job;
 }
 
-const request *server_request(const server_job *job)
-{
-    return &job->request;
-}
+const request *server_request(const server_job *job) { return &job->request; }
 
 void server_answer(server *s, server_job *job, const answer *with)
 {
@@ -102,10 +102,7 @@ void server_answer(server *s, server_job *job, const answer *with)
     pthread_mutex_unlock(&s->lock);
 }
 
-void server_wake(server *s)
-{
-    sem_post(&s->wake);
-}
+void server_wake(server *s) { sem_post(&s->wake); }
 
 void server_set_status(server *s, char *json)
 {
@@ -117,7 +114,7 @@ void server_set_status(server *s, char *json)
     pthread_mutex_unlock(&s->lock);
 }
 
-/* ---- requests, in the thread of libmicrohttpd ---------------------------------------------------------------------------------- */
+/* ---- requests, in the thread of libmicrohttpd ---- */
 
 static const char *query_word(void *query, const char *name)
 {
@@ -193,13 +190,15 @@ static enum MHD_Result begin(server *s, server_job *job, const char *path)
     return MHD_YES;
 }
 
-static enum MHD_Result on_request(void *context, struct MHD_Connection *connection, const char *path, const char *method,
-                                  const char *version, const char *body, size_t *body_bytes, void **state)
+static enum MHD_Result on_request(void *context, struct MHD_Connection *connection, const char *path,
+                                  const char *method, const char *version, const char *body,
+                                  size_t *body_bytes, void **state)
 {
     server *s = context;
     server_job *job = *state;
     const char *why;
-    (void)version, (void)body;
+    (void)version;
+    (void)body;
     if (job == NULL) { /* the head has come: no answer yet */
         job = mem_calloc(1, sizeof *job, "request", NULL);
         *state = job;
@@ -220,10 +219,13 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
     return refusal != 0 ? refuse(s, connection, refusal, why) : begin(s, job, path);
 }
 
-static void on_done(void *context, struct MHD_Connection *connection, void **state, enum MHD_RequestTerminationCode how)
+static void on_done(void *context, struct MHD_Connection *connection, void **state,
+                    enum MHD_RequestTerminationCode how)
 {
     server_job *job = *state;
-    (void)context, (void)connection, (void)how;
+    (void)context;
+    (void)connection;
+    (void)how;
     if (job != NULL)
         mem_free(job->answer.bytes);
     mem_free(job);
@@ -232,14 +234,18 @@ static void on_done(void *context, struct MHD_Connection *connection, void **sta
 
 static void on_message(void *context, const char *format, va_list words)
 {
-    (void)context, (void)format, (void)words; /* about connections that broke: not our user's business */
+    /* about connections that broke: not our user's business */
+    (void)context;
+    (void)format;
+    (void)words;
 }
 
-/* ---- start and stop -------------------------------------------------------------------------------------------------------------- */
+/* ---- start and stop ---- */
 
 gbt_status server_start(const guard *g, int port, const char *log_path, server **out, gbt_error *err)
 {
-    struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port), .sin_addr = g->address};
+    struct sockaddr_in address = {
+        .sin_family = AF_INET, .sin_port = htons((uint16_t)port), .sin_addr = g->address};
     server *s = mem_calloc(1, sizeof *s, "server", err);
     *out = s;
     if (s == NULL)
@@ -249,24 +255,23 @@ gbt_status server_start(const guard *g, int port, const char *log_path, server *
     sem_init(&s->wake, 0, 0);
     pthread_mutex_init(&s->lock, NULL);
     errno = 0;
-    s->daemon = MHD_start_daemon(MHD_USE_INTERNAL_POLLING_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, (uint16_t)port, NULL, NULL,
-                                 on_request, s, MHD_OPTION_EXTERNAL_LOGGER, on_message, NULL, MHD_OPTION_SOCK_ADDR,
-                                 (struct sockaddr *)&address, MHD_OPTION_NOTIFY_COMPLETED, on_done, NULL, MHD_OPTION_CONNECTION_LIMIT,
-                                 (unsigned)SERVER_CONNECTIONS, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)SERVER_HEAD_BYTES,
-                                 MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)SERVER_SILENT_SECONDS, MHD_OPTION_END);
+    s->daemon = MHD_start_daemon(
+        MHD_USE_INTERNAL_POLLING_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, (uint16_t)port, NULL,
+        NULL, on_request, s, MHD_OPTION_EXTERNAL_LOGGER, on_message, NULL, MHD_OPTION_SOCK_ADDR,
+        (struct sockaddr *)&address, MHD_OPTION_NOTIFY_COMPLETED, on_done, NULL, MHD_OPTION_CONNECTION_LIMIT,
+        (unsigned)SERVER_CONNECTIONS, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)SERVER_HEAD_BYTES,
+        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)SERVER_SILENT_SECONDS, MHD_OPTION_END);
     if (s->daemon != NULL)
         return GBT_OK;
     const int why = errno;
     server_stop(s);
     *out = NULL;
-    return base_fail(err, GBT_ERR_IO, "%s:%d: cannot listen: %s%s", g->host, port, why != 0 ? strerror(why) : "libmicrohttpd did not start",
+    return base_fail(err, GBT_ERR_IO, "%s:%d: cannot listen: %s%s", g->host, port,
+                     why != 0 ? strerror(why) : "libmicrohttpd did not start",
                      why == EADDRINUSE ? " (another --port, or 0 for any free one)" : "");
 }
 
-int server_port(const server *s)
-{
-    return MHD_get_daemon_info(s->daemon, MHD_DAEMON_INFO_BIND_PORT)->port;
-}
+int server_port(const server *s) { return MHD_get_daemon_info(s->daemon, MHD_DAEMON_INFO_BIND_PORT)->port; }
 
 void server_stop(server *s)
 {

@@ -1,5 +1,6 @@
-/* view/server.h -- HTTP: the page and small texts at once, all else as jobs for one worker, the newest picture first to
-   last. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* view/server.h -- HTTP: the page and small texts at once, all else as jobs for one worker, the newest
+   picture first to last. */
 #ifndef GBT_VIEW_SERVER_H
 #define GBT_VIEW_SERVER_H
 
@@ -7,7 +8,8 @@
 #include "view/guard.h"
 #include "view/request.h"
 
-/** Fixed limits: connections at once, waiting jobs, bytes of a request's head, seconds that a silent connection stays. */
+/** Fixed limits: connections at once, waiting jobs, bytes of a request's head, seconds that a silent
+    connection stays. */
 enum { SERVER_CONNECTIONS = 32, SERVER_JOBS = 16, SERVER_HEAD_BYTES = 32 * 1024, SERVER_SILENT_SECONDS = 60 };
 
 typedef struct server server;
@@ -18,8 +20,9 @@ typedef struct server_job server_job;
 /**
  * Listen where the guard says.
  *
- * Only GET is answered, only with a Host that the guard knows (so that no foreign name can be made to mean this server), only with the
- * token where there is one, and nothing but the page itself to requests that a browser marks as another site's.
+ * Only GET is answered, only with a Host that the guard knows (so that no foreign name can be made to mean
+ * this server), only with the token where there is one, and nothing but the page itself to requests that a
+ * browser marks as another site's.
  *
  * @param g        [in] copied
  * @param port     [in] 0: any free one
@@ -35,7 +38,8 @@ void server_stop(server *s);
 /** What /status says from now on: JSON, taken over, mem_free(). NULL: stays as it is. */
 void server_set_status(server *s, char *json);
 
-/** The oldest waiting job, for at most so many seconds; NULL: none, or server_wake(). Its request stays valid until it is answered. */
+/** The oldest waiting job, for at most so many seconds; NULL: none, or server_wake(). Its request stays valid
+    until it is answered. */
 server_job *server_next(server *s, double seconds);
 const request *server_request(const server_job *job);
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/studio.c -- open, follow, prepare; the picture itself is made in picture.c. */
 #include "view/studio.h"
 
@@ -71,14 +72,18 @@ gbt_status studio_open(const char *input, const char *data, studio *out, gbt_err
         GBT_TRY(file_join(out->model_path, sizeof out->model_path, input, "model.gbt", err));
         GBT_TRY(file_join(out->log_path, sizeof out->log_path, input, "log.csv", err));
         GBT_TRY(file_join(config, sizeof config, input, "config", err));
-    } else if (snprintf(out->model_path, sizeof out->model_path, "%s", input) >= (int)sizeof out->model_path) {
+    } else if (snprintf(out->model_path, sizeof out->model_path, "%s", input) >=
+               (int)sizeof out->model_path) {
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", input);
     }
     if (stat(out->model_path, &file) == 0)
         return reopen(out, &file, err);
     if (!folder || !file_exists(config))
-        return base_fail(err, GBT_ERR_IO, "%.1000s: not there (wanted a run, a model file or plain Gaussians)", out->model_path);
-    snprintf(out->note, sizeof out->note, "Training has not saved a model yet; it will be shown as soon as it has.");
+        return base_fail(err, GBT_ERR_IO,
+                         "%.1000s: not there (wanted a run, a model file or plain Gaussians)",
+                         out->model_path);
+    snprintf(out->note, sizeof out->note,
+             "Training has not saved a model yet; it will be shown as soon as it has.");
     return GBT_OK;
 }
 
@@ -149,8 +154,12 @@ gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *wh
     loaded_run *r = s->run;
     studio_picture wanted;
     memset(&wanted, 0, sizeof wanted);
-    wanted.camera = *camera, wanted.renderer = what->renderer, wanted.preset = what->preset, wanted.known = true;
-    memcpy(wanted.background, what->has_background ? what->background : s->background, sizeof wanted.background);
+    wanted.camera = *camera;
+    wanted.renderer = what->renderer;
+    wanted.preset = what->preset;
+    wanted.known = true;
+    memcpy(wanted.background, what->has_background ? what->background : s->background,
+           sizeof wanted.background);
     if (memcmp(&wanted, &s->last, sizeof wanted) == 0 && (s->drawn || !draw))
         return GBT_OK;
     memset(&s->last, 0, sizeof s->last);
@@ -159,7 +168,8 @@ gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *wh
     GBT_TRY(loaded_run_preset(what->preset, &r->settings, err));
     GBT_TRY(draw ? frame_render(&r->frame, loaded_run_subject(r), camera, &r->settings, false, err)
                  : frame_prepare(&r->frame, loaded_run_subject(r), camera, &r->settings, err));
-    s->last = wanted, s->drawn = draw;
+    s->last = wanted;
+    s->drawn = draw;
     return GBT_OK;
 }
 

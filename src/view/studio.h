@@ -1,4 +1,6 @@
-/* view/studio.h -- what is being looked at: the run that is open now, a newer one when training has saved it, and its last picture. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* view/studio.h -- what is being looked at: the run that is open now, a newer one when training has saved it,
+   and its last picture. */
 #ifndef GBT_VIEW_STUDIO_H
 #define GBT_VIEW_STUDIO_H
 
@@ -18,14 +20,14 @@ typedef struct studio_picture {
 } studio_picture;
 
 typedef struct studio {
-    const char *input, *data; /* borrowed */
+    const char *input, *data;              /* borrowed */
     char model_path[4096], log_path[4096]; /* log_path: empty when there is none */
-    struct stat loaded;  /* of the model file that is open */
-    frame_renderer trained; /* what the model was trained to be drawn with, and in front of */
+    struct stat loaded;                    /* of the model file that is open */
+    frame_renderer trained;                /* what the model was trained to be drawn with, and in front of */
     float background[3];
-    loaded_run *run;     /* NULL: nothing has been saved yet */
-    unsigned version;    /* 1, 2, ... counts what was opened */
-    char note[600];      /* for people: why there is no picture, or no photo; empty: all is well */
+    loaded_run *run;  /* NULL: nothing has been saved yet */
+    unsigned version; /* 1, 2, ... counts what was opened */
+    char note[600];   /* for people: why there is no picture, or no photo; empty: all is well */
     studio_picture last;
     bool drawn; /* the frame's picture is that of `last` too, not the tree alone */
 } studio;
@@ -39,7 +41,8 @@ typedef struct studio {
 gbt_status studio_open(const char *input, const char *data, studio *out, gbt_error *err);
 void studio_close(studio *s);
 
-/** Open the model again if its file is another one now; when that fails the old one stays and `note` says why. True: there is a new one. */
+/** Open the model again if its file is another one now; when that fails the old one stays and `note` says
+    why. True: there is a new one. */
 bool studio_follow(studio *s);
 
 /** What the page polls: version, counts, log, note. JSON; free with mem_free(). NULL without memory. */
@@ -53,8 +56,10 @@ void studio_answer(studio *s, const request *what, answer *out);
 /** The camera of a request, scene-local. GBT_ERR_ARGUMENT for a view that is not there. */
 gbt_status studio_camera(const studio *s, const request *what, gbt_camera *out, gbt_error *err);
 
-/** Make the frame's tree that of `camera`, drawn as `what` says, and with `draw` its picture too, unless they are. */
-gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *what, bool draw, gbt_error *err);
+/** Make the frame's tree that of `camera`, drawn as `what` says, and with `draw` its picture too, unless they
+    are. */
+gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *what, bool draw,
+                          gbt_error *err);
 
 gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error *err); /* picture.c */
 gbt_status studio_photo(studio *s, const request *what, answer *out, gbt_error *err);  /* picture.c */

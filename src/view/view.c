@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* view/view.c -- the page's server from start to Ctrl-C. */
 #include "gbtrace/view.h"
 
@@ -10,15 +11,9 @@
 
 static const double look_every_seconds = 1; /* for a newer model */
 
-gbt_view_def gbt_view_def_default(void)
-{
-    return (gbt_view_def){.port = 8470};
-}
+gbt_view_def gbt_view_def_default(void) { return (gbt_view_def){.port = 8470}; }
 
-static void wake(void *http)
-{
-    server_wake(http);
-}
+static void wake(void *http) { server_wake(http); }
 
 static void serve(studio *s, server *http)
 {

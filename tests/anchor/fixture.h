@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/anchor/fixture.h -- random anchors and decoders of any size, from a seed. */
 #ifndef GBT_TESTS_ANCHOR_FIXTURE_H
 #define GBT_TESTS_ANCHOR_FIXTURE_H
@@ -32,7 +33,9 @@ static inline decoder random_decoder(int offset_count, bool has_distance, uint64
 {
     decoder d;
     assert_ok(decoder_init(&d, offset_count, has_distance, seed, NULL));
-    d.distance_scale = 0.4f, d.distance_min = 0.2f, d.distance_max = 2.5f;
+    d.distance_scale = 0.4f;
+    d.distance_min = 0.2f;
+    d.distance_max = 2.5f;
     return d;
 }
 

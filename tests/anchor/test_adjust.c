@@ -1,4 +1,6 @@
-/* tests/anchor/test_adjust.c -- growing and pruning: the published oracles, every boundary, and a brute-force version of the whole. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/anchor/test_adjust.c -- growing and pruning: the published oracles, every boundary, and a brute-force
+   version of the whole. */
 #include "fixture.h"
 
 #include "anchor/activations.h"
@@ -50,17 +52,20 @@ static void keep_all(adjust_def *def, size_t count)
     }
 }
 
-/* ---- oracles ----------------------------------------------------------------------------------------------------------------- */
+/* ---- oracles ---- */
 
 static void two_candidates_in_one_cell(void **state) /* T6 */
 {
     (void)state;
-    scene sc = empty_scene(2, 2); /* anchor 1 only sits in the way of nothing; its candidate shares the cell */
+    scene sc =
+        empty_scene(2, 2); /* anchor 1 only sits in the way of nothing; its candidate shares the cell */
     sc.a.offset[0] = 17.0f;
     sc.a.position[3] = -3.0f;
     sc.a.offset[6] = 19.4f; /* at 16.4 */
-    for (size_t i = 0; i < 32; i++)
-        sc.a.feature[i] = i % 2 == 0 ? 1.0f : -1.0f, sc.a.feature[32 + i] = i % 3 == 0 ? 2.0f : -3.0f;
+    for (size_t i = 0; i < 32; i++) {
+        sc.a.feature[i] = i % 2 == 0 ? 1.0f : -1.0f;
+        sc.a.feature[32 + i] = i % 3 == 0 ? 2.0f : -3.0f;
+    }
     set_gradient(&sc, 0, 3e-4f); /* passes 2e-4, not 4e-4 */
     set_gradient(&sc, 2, 3e-4f);
     adjust_def def = adjust_def_default();
@@ -79,7 +84,8 @@ static void two_candidates_in_one_cell(void **state) /* T6 */
         assert_true(fabs((double)sc.a.scale_log[12 + c] - log(16.0)) < 1e-6 && sc.a.offset[12 + c] == 0.0f);
     for (size_t i = 0; i < 32; i++)
         assert_true(sc.a.feature[64 + i] == fmaxf(sc.a.feature[i], sc.a.feature[32 + i]));
-    assert_true(sc.s.visit_count[2] == 0 && sc.s.use_accum[2] == 0 && sc.s.grad_count[4] == 0 && sc.s.grad_accum[5] == 0);
+    assert_true(sc.s.visit_count[2] == 0 && sc.s.use_accum[2] == 0 && sc.s.grad_count[4] == 0 &&
+                sc.s.grad_accum[5] == 0);
     free_scene(&sc, &r);
 }
 
@@ -102,7 +108,8 @@ static void prunes(void **state)
 {
     const prune_case *c = *state;
     scene sc = empty_scene(2, 1); /* anchor 0 keeps the scene from becoming empty */
-    sc.s.use_accum[1] = c->accum, sc.s.visit_count[1] = c->visits;
+    sc.s.use_accum[1] = c->accum;
+    sc.s.visit_count[1] = c->visits;
     adjust_def def = adjust_def_default();
     def.voxel_size = 1.0f;
     adjust_result r;
@@ -137,8 +144,10 @@ static void grows(void **state)
     const grow_case *c = *state;
     scene sc = empty_scene(1, 1);
     sc.a.position[0] = 0.0f;
-    sc.a.offset[0] = 102.0f, sc.a.offset[1] = 50.0f; /* cells 6 (96), 26 (104), 102: three different places */
-    sc.s.grad_count[0] = c->views, sc.s.grad_accum[0] = c->gradient * c->views;
+    sc.a.offset[0] = 102.0f;
+    sc.a.offset[1] = 50.0f; /* cells 6 (96), 26 (104), 102: three different places */
+    sc.s.grad_count[0] = c->views;
+    sc.s.grad_accum[0] = c->gradient * c->views;
     adjust_def def = adjust_def_default();
     def.voxel_size = 1.0f;
     keep_all(&def, 1);
@@ -152,7 +161,8 @@ static void grows(void **state)
     free_scene(&sc, &r);
 }
 
-/* The reference puts anchors into the middle of cells, so one candidate may bring one per level; ours stand where it is. */
+/* The reference puts anchors into the middle of cells, so one candidate may bring one per level; ours stand
+   where it is. */
 static void levels_have_their_own_cells_and_thresholds(void **state)
 {
     (void)state;
@@ -162,7 +172,8 @@ static void levels_have_their_own_cells_and_thresholds(void **state)
         sc.a.offset[0] = 102.0f;
         set_gradient(&sc, 0, gradients[passes]);
         adjust_def def = adjust_def_default();
-        def.voxel_size = 1.0f, def.compat = true;
+        def.voxel_size = 1.0f;
+        def.compat = true;
         keep_all(&def, 1);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
@@ -209,7 +220,8 @@ static void cells_finer_than_one_exist_only_outside_compat_mode(void **state)
         sc.a.position[3] = 11.0f; /* in its cells of 4 and 1, not in that of 0.25 */
         set_gradient(&sc, 0, 1.0f);
         adjust_def def = adjust_def_default();
-        def.voxel_size = 1.0f, def.init_factor = 4;
+        def.voxel_size = 1.0f;
+        def.init_factor = 4;
         def.compat = compat == 1;
         keep_all(&def, 2);
         adjust_result r;
@@ -224,13 +236,15 @@ static void cells_finer_than_one_exist_only_outside_compat_mode(void **state)
 static void cells_round_half_to_even(void **state)
 {
     (void)state;
-    const float at[4] = {24.0f, 40.0f, -24.0f, 23.9f}, expected[4] = {32.0f, 32.0f, -32.0f, 16.0f}; /* 1.5 -> 2, 2.5 -> 2 */
+    const float at[4] = {24.0f, 40.0f, -24.0f, 23.9f},
+                expected[4] = {32.0f, 32.0f, -32.0f, 16.0f}; /* 1.5 -> 2, 2.5 -> 2 */
     for (size_t i = 0; i < 4; i++) {
         scene sc = empty_scene(1, 1);
         sc.a.offset[0] = at[i];
         set_gradient(&sc, 0, 3e-4f);
         adjust_def def = adjust_def_default();
-        def.voxel_size = 1.0f, def.compat = true;
+        def.voxel_size = 1.0f;
+        def.compat = true;
         keep_all(&def, 1);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
@@ -249,7 +263,8 @@ static void shape_scales_are_cut(void **state)
         sc.a.scale_log[c] = c == 4 ? -1.0f : 0.5f;
     set_gradient(&sc, 0, 2.5e-4f);
     adjust_def def = adjust_def_default();
-    def.voxel_size = 1.0f, def.shape_log_max = 0.05f;
+    def.voxel_size = 1.0f;
+    def.shape_log_max = 0.05f;
     keep_all(&def, 1);
     adjust_result r;
     assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
@@ -264,8 +279,11 @@ static void the_last_anchor_stays(void **state)
 {
     (void)state;
     scene sc = empty_scene(3, 1);
-    for (size_t i = 0; i < 3; i++)
-        sc.s.visit_count[i] = 100, sc.s.use_accum[i] = i == 1 ? 0.2f : 0.1f, sc.a.position[i * 3] = (float)i;
+    for (size_t i = 0; i < 3; i++) {
+        sc.s.visit_count[i] = 100;
+        sc.s.use_accum[i] = i == 1 ? 0.2f : 0.1f;
+        sc.a.position[i * 3] = (float)i;
+    }
     adjust_def def = adjust_def_default();
     def.voxel_size = 1.0f;
     adjust_result r;
@@ -286,7 +304,9 @@ static void parts_can_be_switched_off(void **state)
         set_gradient(&sc, 0, 2.5e-4f);
         sc.s.visit_count[1] = 100;
         adjust_def def = adjust_def_default();
-        def.voxel_size = 1.0f, def.grow = mode & 1, def.prune = mode & 2;
+        def.voxel_size = 1.0f;
+        def.grow = mode & 1;
+        def.prune = mode & 2;
         keep_all(&def, 2);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
@@ -299,22 +319,23 @@ static void parts_can_be_switched_off(void **state)
     }
 }
 
-/* ---- the cap ----------------------------------------------------------------------------------------------------------------- */
+/* ---- the cap ---- */
 
 static void the_cap_takes_the_largest_gradients(void **state)
 {
     (void)state;
-    /* Six free cells along x with gradients 3 1 2 3 3 1 (times 1e-4 above the threshold); one anchor is pruned and makes room. */
+    /* Six free cells along x with gradients 3 1 2 3 3 1 (times 1e-4 above the threshold); one anchor is
+       pruned and makes room. */
     const float gradients[6] = {3, 1, 2, 3, 3, 1};
     const struct {
         size_t max_anchors, expected_count;
         float expected[6]; /* cells, ascending */
     } cases[] = {
-        {6 + 1, 1, {1}},          /* six survive: one place; ties by cell */
+        {6 + 1, 1, {1}}, /* six survive: one place; ties by cell */
         {6 + 2, 2, {1, 4}},
         {6 + 4, 4, {1, 3, 4, 5}}, /* all the 3s and the 2 */
         {100, 6, {1, 2, 3, 4, 5, 6}},
-        {3, 0, {0}},              /* never removes anything by itself */
+        {3, 0, {0}}, /* never removes anything by itself */
     };
     for (size_t t = 0; t < 5; t++) {
         scene sc = empty_scene(7, 1);
@@ -324,7 +345,8 @@ static void the_cap_takes_the_largest_gradients(void **state)
         }
         sc.s.visit_count[6] = 100;
         adjust_def def = adjust_def_default();
-        def.voxel_size = 1.0f, def.max_anchors = cases[t].max_anchors;
+        def.voxel_size = 1.0f;
+        def.max_anchors = cases[t].max_anchors;
         keep_all(&def, 6);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
@@ -340,14 +362,17 @@ static void a_cell_is_worth_its_best_candidate(void **state)
 {
     (void)state;
     for (int order = 0; order <= 1; order++) {
-        scene sc = empty_scene(3, 1); /* 0 and 1 share the cell of 32, 2 is alone in that of 64 and between them in gradient */
-        const float to[3] = {32, 33, 64}, gradients[3] = {order == 0 ? 2.1e-4f : 3e-4f, order == 0 ? 3e-4f : 2.1e-4f, 2.5e-4f};
+        scene sc = empty_scene(3, 1); /* 0 and 1 share the cell of 32, 2 is alone in that of 64 and between
+                                         them in gradient */
+        const float to[3] = {32, 33, 64},
+                    gradients[3] = {order == 0 ? 2.1e-4f : 3e-4f, order == 0 ? 3e-4f : 2.1e-4f, 2.5e-4f};
         for (size_t i = 0; i < 3; i++) {
             sc.a.offset[i * 3] = to[i];
             set_gradient(&sc, i, gradients[i]);
         }
         adjust_def def = adjust_def_default();
-        def.voxel_size = 1.0f, def.max_anchors = 4;
+        def.voxel_size = 1.0f;
+        def.max_anchors = 4;
         keep_all(&def, 3);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
@@ -357,7 +382,7 @@ static void a_cell_is_worth_its_best_candidate(void **state)
     }
 }
 
-/* ---- brute force ------------------------------------------------------------------------------------------------------------- */
+/* ---- brute force ---- */
 
 typedef struct brute_anchor {
     double center[3], position[3], scale, feature[32], gradient;
@@ -378,18 +403,21 @@ static bool right_of_the_middle(const void *context, const float position[3])
     return position[0] >= 0;
 }
 
-static size_t keep_standing(brute_anchor *added, size_t count, bool (*may_stand)(const void *, const float[3]))
+static size_t keep_standing(brute_anchor *added, size_t count,
+                            bool (*may_stand)(const void *, const float[3]))
 {
     size_t kept = 0;
     for (size_t i = 0; i < count; i++) {
-        const float at[3] = {(float)added[i].position[0], (float)added[i].position[1], (float)added[i].position[2]};
+        const float at[3] = {(float)added[i].position[0], (float)added[i].position[1],
+                             (float)added[i].position[2]};
         if (may_stand == NULL || may_stand(NULL, at))
             added[kept++] = added[i];
     }
     return kept;
 }
 
-/* New anchors as the text says it, with quadratic searches; voxel sizes are powers of two, so that cells are exact in both. */
+/* New anchors as the text says it, with quadratic searches; voxel sizes are powers of two, so that cells are
+   exact in both. */
 static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *added)
 {
     const size_t offsets = (size_t)sc->a.offset_count;
@@ -405,15 +433,20 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
         const bool is_place = level == 3;
         for (size_t n = is_place ? slots : 0; n < slots + (is_place ? def->place_count : 0); n++) {
             const size_t p = n - slots, i = is_place ? def->place_anchor[p] : n / offsets;
-            brute_anchor b = {.scale = !is_place ? cell : as_start ? (double)def->place_scale[p] : 4 * cell, .gradient = -1};
-            for (size_t slot = is_place ? i * offsets : n; slot < (is_place ? (i + 1) * offsets : n + 1); slot++)
+            brute_anchor b = {.scale = !is_place  ? cell
+                                       : as_start ? (double)def->place_scale[p]
+                                                  : 4 * cell,
+                              .gradient = -1};
+            for (size_t slot = is_place ? i * offsets : n; slot < (is_place ? (i + 1) * offsets : n + 1);
+                 slot++)
                 if (sc->s.grad_count[slot] > (is_place && as_start ? 0 : 40))
                     b.gradient = fmax(b.gradient, (double)(sc->s.grad_accum[slot] / sc->s.grad_count[slot]));
             if (b.gradient < threshold || !(is_place || survives(def, level, n)))
                 continue;
             for (size_t c = 0; c < 3; c++) {
                 const float *anchor = &sc->a.position[i * 3 + c], *scale_log = &sc->a.scale_log[i * 6 + c];
-                const float at = is_place ? def->place[p * 3 + c] : *anchor + sc->a.offset[n * 3 + c] * activation_exp(*scale_log);
+                const float at = is_place ? def->place[p * 3 + c]
+                                          : *anchor + sc->a.offset[n * 3 + c] * activation_exp(*scale_log);
                 b.center[c] = rint((double)at / cell) * cell;
                 b.position[c] = def->compat ? b.center[c] : (double)at;
             }
@@ -421,7 +454,8 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
             for (size_t j = 0; j < sc->a.count + begin; j++) {
                 bool same = true;
                 for (size_t c = 0; c < 3; c++) {
-                    const double at = j < sc->a.count ? (double)sc->a.position[j * 3 + c] : added[j - sc->a.count].position[c];
+                    const double at = j < sc->a.count ? (double)sc->a.position[j * 3 + c]
+                                                      : added[j - sc->a.count].position[c];
                     same = same && rint(at / cell) * cell == b.center[c];
                 }
                 taken = taken || same;
@@ -436,7 +470,8 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
                 for (int f = 0; f < 32; f++)
                     added[known].feature[f] = -HUGE_VAL;
             } else if (b.gradient > added[known].gradient) {
-                added[known].gradient = b.gradient, added[known].scale = b.scale;
+                added[known].gradient = b.gradient;
+                added[known].scale = b.scale;
                 memcpy(added[known].position, b.position, sizeof b.position);
             }
             for (size_t f = 0; f < 32; f++)
@@ -473,11 +508,15 @@ static void adjust_agrees_with_brute_force(void **state)
         scene sc = random_scene(seed, count, offset_count), before = random_scene(seed, count, offset_count);
         adjust_def def = adjust_def_default();
         def.voxel_size = seed % 3 == 0 ? 0.5f : seed % 3 == 1 ? 0.03125f : 0.00390625f;
-        def.seed = seed, def.step = 100 * seed, def.compat = seed % 2 == 1;
+        def.seed = seed;
+        def.step = 100 * seed;
+        def.compat = seed % 2 == 1;
         def.may_stand = seed % 5 == 0 ? right_of_the_middle : NULL;
         float place[40][3], place_scale[40];
         uint32_t place_anchor[40];
-        def.place = place[0], def.place_scale = seed % 4 < 2 ? place_scale : NULL, def.place_anchor = place_anchor;
+        def.place = place[0];
+        def.place_scale = seed % 4 < 2 ? place_scale : NULL;
+        def.place_anchor = place_anchor;
         def.place_count = (size_t)spread(seed, 62, 0, 0, 40);
         for (size_t p = 0; p < def.place_count; p++) {
             place_anchor[p] = (uint32_t)(rng_uniform(seed, 63, p) * (float)count);
@@ -485,28 +524,34 @@ static void adjust_agrees_with_brute_force(void **state)
             for (size_t c = 0; c < 3; c++)
                 place[p][c] = spread(seed, 64 + c, p, -1, 1);
         }
-        brute_anchor *added = mem_calloc(3 * (count * (size_t)offset_count + def.place_count), sizeof *added, "test", NULL);
+        brute_anchor *added =
+            mem_calloc(3 * (count * (size_t)offset_count + def.place_count), sizeof *added, "test", NULL);
         const size_t grown = brute_grow(&before, &def, added);
         total_gated += grown == 0;
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
         if (r.grown != grown)
             fail_msg("seed %llu: %zu grown, not %zu", (unsigned long long)seed, r.grown, grown);
-        total_grown += grown, total_pruned += r.pruned;
+        total_grown += grown;
+        total_pruned += r.pruned;
         for (size_t g = 0; g < grown; g++)
             for (size_t p = 0; p < def.place_count; p++)
-                at_places += added[g].position[0] == (double)place[p][0] && added[g].position[1] == (double)place[p][1];
-        assert_true(r.count == sc.a.count && r.count == sc.s.count && r.count >= 1 && r.count == count - r.pruned + grown);
+                at_places += added[g].position[0] == (double)place[p][0] &&
+                             added[g].position[1] == (double)place[p][1];
+        assert_true(r.count == sc.a.count && r.count == sc.s.count && r.count >= 1 &&
+                    r.count == count - r.pruned + grown);
         size_t row = 0;
         const size_t k = (size_t)offset_count;
         for (size_t i = 0; i < count; i++) {
             const bool is_judged = before.s.visit_count[i] > 80;
             const bool transparent = before.s.use_accum[i] < 0.005f * before.s.visit_count[i];
-            if (is_judged && transparent && (row >= r.count || r.source[row] != (int64_t)i)) /* the last one may have stayed */
+            if (is_judged && transparent &&
+                (row >= r.count || r.source[row] != (int64_t)i)) /* the last one may have stayed */
                 continue;
             assert_int_equal(r.source[row], i);
             assert_memory_equal(sc.a.feature + row * 32, before.a.feature + i * 32, 32 * sizeof(float));
-            assert_memory_equal(sc.a.offset + row * k * 3, before.a.offset + i * k * 3, k * 3 * sizeof(float));
+            assert_memory_equal(sc.a.offset + row * k * 3, before.a.offset + i * k * 3,
+                                k * 3 * sizeof(float));
             assert_memory_equal(sc.a.scale_log + row * 6, before.a.scale_log + i * 6, 6 * sizeof(float));
             assert_memory_equal(sc.a.position + row * 3, before.a.position + i * 3, 3 * sizeof(float));
             assert_true(sc.s.visit_count[row] == (is_judged ? 0 : before.s.visit_count[i]));
@@ -543,7 +588,9 @@ static void the_cap_holds_for_random_scenes(void **state)
         for (size_t cap = 0; cap < 140; cap += 20) {
             scene sc = random_scene(seed, 50, 4);
             adjust_def def = adjust_def_default();
-            def.voxel_size = 0.03125f, def.seed = seed, def.max_anchors = cap;
+            def.voxel_size = 0.03125f;
+            def.seed = seed;
+            def.max_anchors = cap;
             adjust_result r;
             assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
             assert_true(sc.a.count <= cap || r.grown == 0);
@@ -557,7 +604,9 @@ static uint64_t adjust_hash(uint64_t seed)
 {
     scene sc = random_scene(7, 400, 10);
     adjust_def def = adjust_def_default();
-    def.voxel_size = 0.01f, def.seed = seed, def.max_anchors = 1500;
+    def.voxel_size = 0.01f;
+    def.seed = seed;
+    def.max_anchors = 1500;
     adjust_result r;
     assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
     uint64_t hash = hash_bytes(1, sc.a.position, sc.a.count * 3 * sizeof(float));
@@ -580,7 +629,8 @@ static void same_bits_for_all_threads(void **state)
     parallel_set_threads(before);
 }
 
-/* Every Gaussian a candidate: the largest gradients win, then the lower level, then the lower cell; the threshold may be 0. */
+/* Every Gaussian a candidate: the largest gradients win, then the lower level, then the lower cell; the
+   threshold may be 0. */
 static void an_explosion_is_capped(void **state)
 {
     (void)state;
@@ -594,14 +644,18 @@ static void an_explosion_is_capped(void **state)
                 for (size_t slot = 0; slot < SLOTS; slot++)
                     set_gradient(both[i], slot, equal ? 1.0f : spread(78, 0, slot, 0, 1));
                 adjust_def def = adjust_def_default();
-                def.voxel_size = 0.01f, def.grad_threshold = 0.0f, def.prune = false, def.max_anchors = i == 0 ? cap : SIZE_MAX;
+                def.voxel_size = 0.01f;
+                def.grad_threshold = 0.0f;
+                def.prune = false;
+                def.max_anchors = i == 0 ? cap : SIZE_MAX;
                 assert_ok(anchors_adjust(&both[i]->a, &both[i]->s, &def, &r[i], NULL));
             }
             assert_true(r[1].count > COUNT + 300);
             assert_int_equal(r[0].count, cap);
             size_t from = COUNT; /* what was kept is in the order of what could have been */
             for (size_t row = COUNT; row < cap; row++, from++) {
-                while (from < r[1].count && memcmp(whole.a.position + 3 * from, capped.a.position + 3 * row, 3 * sizeof(float)) != 0)
+                while (from < r[1].count && memcmp(whole.a.position + 3 * from, capped.a.position + 3 * row,
+                                                   3 * sizeof(float)) != 0)
                     from++;
                 assert_true(from < r[1].count);
                 if (equal) /* ties: the first cells of the first levels */
@@ -617,13 +671,15 @@ static void far_cells_have_addresses(void **state)
 {
     (void)state;
     scene sc = empty_scene(2, 1);
-    sc.a.position[0] = 4.5e6f, sc.a.position[3] = -4.5e6f;
+    sc.a.position[0] = 4.5e6f;
+    sc.a.position[3] = -4.5e6f;
     for (size_t i = 0; i < 2; i++) {
         sc.a.offset[3 * i + 1] = i == 0 ? 8.0f : -8.0f;
         set_gradient(&sc, i, 1.0f);
     }
     adjust_def def = adjust_def_default();
-    def.voxel_size = 0.001f / 16.0f, def.level_count = 1;
+    def.voxel_size = 0.001f / 16.0f;
+    def.level_count = 1;
     keep_all(&def, 2);
     adjust_result r;
     assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
@@ -633,7 +689,7 @@ static void far_cells_have_addresses(void **state)
     free_scene(&sc, &r);
 }
 
-/* ---- edges ------------------------------------------------------------------------------------------------------------------- */
+/* ---- edges ---- */
 
 static void wild_places_and_cells(void **state)
 {
@@ -696,7 +752,8 @@ static void no_memory_changes_nothing(void **state)
     long n = 0;
     for (;; n++) {
         scene sc = random_scene(3, 40, 4);
-        const uint64_t before = hash_bytes(hash_bytes(1, sc.a.feature, 40 * 32 * 4), sc.s.grad_count, 40 * 4 * 4);
+        const uint64_t before =
+            hash_bytes(hash_bytes(1, sc.a.feature, 40 * 32 * 4), sc.s.grad_count, 40 * 4 * 4);
         adjust_def def = adjust_def_default();
         def.voxel_size = 0.03125f;
         adjust_result r;
@@ -707,7 +764,8 @@ static void no_memory_changes_nothing(void **state)
         if (status != GBT_OK) {
             assert_int_equal(status, GBT_ERR_NO_MEMORY);
             assert_true(err.text[0] != '\0' && r.source == NULL && sc.a.count == 40 && sc.s.count == 40);
-            assert_true(hash_bytes(hash_bytes(1, sc.a.feature, 40 * 32 * 4), sc.s.grad_count, 40 * 4 * 4) == before);
+            assert_true(hash_bytes(hash_bytes(1, sc.a.feature, 40 * 32 * 4), sc.s.grad_count, 40 * 4 * 4) ==
+                        before);
         }
         free_scene(&sc, &r);
         if (status == GBT_OK)
@@ -721,10 +779,13 @@ static void statistics_follow_rows(void **state)
     (void)state;
     adjust_stats s = {0};
     assert_ok(adjust_stats_resize(&s, 3, 2, NULL));
-    for (size_t i = 0; i < 6; i++)
-        s.grad_accum[i] = (float)i, s.visit_count[i / 2] = (float)i;
+    for (size_t i = 0; i < 6; i++) {
+        s.grad_accum[i] = (float)i;
+        s.visit_count[i / 2] = (float)i;
+    }
     assert_ok(adjust_stats_resize(&s, 100, 2, NULL));
-    assert_true(s.grad_accum[5] == 5 && s.visit_count[2] == 5 && s.grad_accum[6] == 0 && s.grad_accum[199] == 0 && s.visit_count[99] == 0);
+    assert_true(s.grad_accum[5] == 5 && s.visit_count[2] == 5 && s.grad_accum[6] == 0 &&
+                s.grad_accum[199] == 0 && s.visit_count[99] == 0);
     assert_ok(adjust_stats_resize(&s, 2, 2, NULL));
     assert_ok(adjust_stats_resize(&s, 3, 2, NULL));
     assert_true(s.grad_accum[3] == 3 && s.grad_accum[4] == 0 && s.visit_count[2] == 0);
@@ -737,9 +798,11 @@ int main(void)
     struct CMUnitTest tests[64];
     size_t count = 0;
     for (size_t i = 0; i < sizeof prune_cases / sizeof *prune_cases; i++)
-        tests[count++] = (struct CMUnitTest){.name = prune_cases[i].name, .test_func = prunes, .initial_state = &prune_cases[i]};
+        tests[count++] = (struct CMUnitTest){
+            .name = prune_cases[i].name, .test_func = prunes, .initial_state = &prune_cases[i]};
     for (size_t i = 0; i < sizeof grow_cases / sizeof *grow_cases; i++)
-        tests[count++] = (struct CMUnitTest){.name = grow_cases[i].name, .test_func = grows, .initial_state = &grow_cases[i]};
+        tests[count++] = (struct CMUnitTest){
+            .name = grow_cases[i].name, .test_func = grows, .initial_state = &grow_cases[i]};
     const struct CMUnitTest single[] = {
         cmocka_unit_test(two_candidates_in_one_cell),
         cmocka_unit_test(levels_have_their_own_cells_and_thresholds),

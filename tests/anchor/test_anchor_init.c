@@ -1,4 +1,6 @@
-/* tests/anchor/test_anchor_init.c -- GBAI, GBSP, adaptive balls, random points and the voxel baseline, against hand values and double. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/anchor/test_anchor_init.c -- GBAI, GBSP, adaptive balls, random points and the voxel baseline,
+   against hand values and double. */
 #include "fixture.h"
 
 #include "anchor/init.h"
@@ -48,7 +50,8 @@ static double expected_prior(const anchors *a, const balls *b, size_t i, const a
         near = radius;
     const double clipped = fmin(fmax(radius, (double)def->clip_min * near), (double)def->clip_max * near);
     const double fused = (double)def->fusion * near + (1 - (double)def->fusion) * clipped;
-    return fmin(fmax(fused, fmax((double)(def->balls.min_scale * def->balls.voxel_size), 1e-6)), (double)def->scale_max);
+    return fmin(fmax(fused, fmax((double)(def->balls.min_scale * def->balls.voxel_size), 1e-6)),
+                (double)def->scale_max);
 }
 
 static double expected_spacing(const anchors *a, size_t i)
@@ -61,7 +64,8 @@ static double expected_spacing(const anchors *a, size_t i)
         for (int k = 0; k < 3; k++)
             if (square < best[k]) {
                 const double larger = best[k];
-                best[k] = square, square = larger;
+                best[k] = square;
+                square = larger;
             }
     }
     double sum = 0;
@@ -118,13 +122,18 @@ static void adaptive_anchors_stand_on_adaptive_balls(void **state)
     random_cloud(position, 900, 6);
     for (size_t i = 0; i < 900 * 3; i++)
         color[i] = spread(6, 1, i, 0.0f, 1.0f);
-    const struct { double fraction; size_t count; } rows[] = {
+    const struct {
+        double fraction;
+        size_t count;
+    } rows[] = {
         {0, half_of_the_papers(position, color, 900)}, {0.25, 225}, {0.3334, 301}, {1e-6, 1}, {1, 900}};
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
         anchor_init_def def = def_with_voxel(0.05f);
-        def.kind = ANCHOR_INIT_ADAPTIVE, def.fraction = rows[r].fraction;
+        def.kind = ANCHOR_INIT_ADAPTIVE;
+        def.fraction = rows[r].fraction;
         adaptive_def like = adaptive_def_default();
-        like.voxel_size = 0.05f, like.balls_max = rows[r].count;
+        like.voxel_size = 0.05f;
+        like.balls_max = rows[r].count;
         anchors a;
         balls b, again;
         assert_ok(anchors_init(position, color, 900, &def, &a, &b, NULL));
@@ -144,11 +153,15 @@ static void random_anchors_are_some_of_the_points(void **state)
     (void)state;
     static float position[1000 * 3];
     random_cloud(position, 1000, 7);
-    const struct { double fraction; size_t count; } rows[] = {
+    const struct {
+        double fraction;
+        size_t count;
+    } rows[] = {
         {0, half_of_the_papers(position, NULL, 1000)}, {0.25, 250}, {0.0001, 1}, {0.9991, 1000}, {1, 1000}};
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
         anchor_init_def def = def_with_voxel(0.05f);
-        def.kind = ANCHOR_INIT_RANDOM, def.fraction = rows[r].fraction;
+        def.kind = ANCHOR_INIT_RANDOM;
+        def.fraction = rows[r].fraction;
         anchors a;
         balls b;
         assert_ok(anchors_init(position, NULL, 1000, &def, &a, &b, NULL));
@@ -170,14 +183,20 @@ static void random_anchors_are_some_of_the_points(void **state)
 static void kinds_have_names(void **state)
 {
     (void)state;
-    const struct { const char *name; anchor_init_kind kind; } rows[] = {
-        {"gb", ANCHOR_INIT_GB}, {"voxel", ANCHOR_INIT_VOXEL}, {"adaptive", ANCHOR_INIT_ADAPTIVE}, {"random", ANCHOR_INIT_RANDOM}};
+    const struct {
+        const char *name;
+        anchor_init_kind kind;
+    } rows[] = {{"gb", ANCHOR_INIT_GB},
+                {"voxel", ANCHOR_INIT_VOXEL},
+                {"adaptive", ANCHOR_INIT_ADAPTIVE},
+                {"random", ANCHOR_INIT_RANDOM}};
     anchor_init_kind kind;
     for (size_t i = 0; i < 4; i++) {
         assert_true(anchor_init_kind_named(rows[i].name, &kind));
         assert_int_equal(kind, rows[i].kind);
     }
-    assert_false(anchor_init_kind_named("", &kind) || anchor_init_kind_named("gbx", &kind) || anchor_init_kind_named("g", &kind));
+    assert_false(anchor_init_kind_named("", &kind) || anchor_init_kind_named("gbx", &kind) ||
+                 anchor_init_kind_named("g", &kind));
 }
 
 static void neighbour_scale(void **state)
@@ -188,7 +207,8 @@ static void neighbour_scale(void **state)
     for (int kind = 0; kind <= 1; kind++) {
         anchor_init_def def = def_with_voxel(0.3f);
         def.kind = kind == 0 ? ANCHOR_INIT_GB : ANCHOR_INIT_VOXEL;
-        def.scale = kind == 0 ? ANCHOR_SCALE_NN : ANCHOR_SCALE_GB; /* voxels have no balls: the neighbour rule in any case */
+        def.scale = kind == 0 ? ANCHOR_SCALE_NN
+                              : ANCHOR_SCALE_GB; /* voxels have no balls: the neighbour rule in any case */
         anchors a;
         balls b;
         assert_ok(anchors_init(position, NULL, 600, &def, &a, &b, NULL));
@@ -222,32 +242,86 @@ typedef struct hand_case {
 
 static hand_case hand_cases[] = {
     /* Two pairs along x, 10 apart: radii 0.5, d_nn = 10. clip(0.5, 2.5, 40) = 2.5; 5 + 1.25 = 6.25. */
-    {"two far pairs: the lower clip", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 4, {0, 0, 0, 1, 0, 0, 10, 0, 0, 11, 0, 0}, 2, {6.25, 6.25},
+    {"two far pairs: the lower clip",
+     ANCHOR_INIT_GB,
+     ANCHOR_SCALE_GB,
+     4,
+     {0, 0, 0, 1, 0, 0, 10, 0, 0, 11, 0, 0},
+     2,
+     {6.25, 6.25},
      INFINITY},
-    {"the cap wins", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 4, {0, 0, 0, 1, 0, 0, 10, 0, 0, 11, 0, 0}, 2, {2, 2}, 2},
+    {"the cap wins",
+     ANCHOR_INIT_GB,
+     ANCHOR_SCALE_GB,
+     4,
+     {0, 0, 0, 1, 0, 0, 10, 0, 0, 11, 0, 0},
+     2,
+     {2, 2},
+     2},
     /* Pairs of width 2.5 that are 4 apart: r = 1.25 is inside [1, 16]: 2 + 0.625. */
-    {"two near pairs: no clip", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 4, {0, 0, 0, 2.5f, 0, 0, 4, 0, 0, 6.5f, 0, 0}, 2, {2.625, 2.625},
+    {"two near pairs: no clip",
+     ANCHOR_INIT_GB,
+     ANCHOR_SCALE_GB,
+     4,
+     {0, 0, 0, 2.5f, 0, 0, 4, 0, 0, 6.5f, 0, 0},
+     2,
+     {2.625, 2.625},
      INFINITY},
     /* A lone pair is one ball: no neighbour, s_nn := r = 1.5. */
     {"one ball: its radius", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 2, {0, 0, 0, 3, 0, 0}, 1, {1.5}, INFINITY},
     {"one point: the finest scale", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 1, {5, 5, 5}, 1, {0.25}, INFINITY},
     {"the cap wins over the floor", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 1, {5, 5, 5}, 1, {0.125}, 0.125f},
-    {"coincident points are one ball", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 3, {1, 2, 3, 1, 2, 3, 1, 2, 3}, 1, {0.25}, INFINITY},
+    {"coincident points are one ball",
+     ANCHOR_INIT_GB,
+     ANCHOR_SCALE_GB,
+     3,
+     {1, 2, 3, 1, 2, 3, 1, 2, 3},
+     1,
+     {0.25},
+     INFINITY},
     {"no point", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 0, {0}, 0, {0}, INFINITY},
     {"voxels: no point", ANCHOR_INIT_VOXEL, ANCHOR_SCALE_NN, 0, {0}, 0, {0}, INFINITY},
-    {"voxels: a lone one takes the voxel size", ANCHOR_INIT_VOXEL, ANCHOR_SCALE_NN, 1, {5.2f, 5, 5}, 1, {1}, INFINITY},
-    {"voxels: one neighbour", ANCHOR_INIT_VOXEL, ANCHOR_SCALE_NN, 2, {0, 0, 0, 3.1f, 4.2f, 0}, 2, {5, 5}, INFINITY},
-    {"voxels: two neighbours", ANCHOR_INIT_VOXEL, ANCHOR_SCALE_NN, 3, {0, 0, 0, 1, 0, 0, 3, 0, 0}, 3,
-     {2.2360679774997898, 1.5811388300841898, 2.5495097567963922}, INFINITY},
-    {"voxels: three neighbours", ANCHOR_INIT_VOXEL, ANCHOR_SCALE_NN, 4, {0, 0, 0, 0, 0, 2, 0, 3, 0, 6, 0, 0}, 4,
-     {4.041451884327381, 4.358898943540674, 4.725815626252609, 6.350852961085884}, INFINITY},
+    {"voxels: a lone one takes the voxel size",
+     ANCHOR_INIT_VOXEL,
+     ANCHOR_SCALE_NN,
+     1,
+     {5.2f, 5, 5},
+     1,
+     {1},
+     INFINITY},
+    {"voxels: one neighbour",
+     ANCHOR_INIT_VOXEL,
+     ANCHOR_SCALE_NN,
+     2,
+     {0, 0, 0, 3.1f, 4.2f, 0},
+     2,
+     {5, 5},
+     INFINITY},
+    {"voxels: two neighbours",
+     ANCHOR_INIT_VOXEL,
+     ANCHOR_SCALE_NN,
+     3,
+     {0, 0, 0, 1, 0, 0, 3, 0, 0},
+     3,
+     {2.2360679774997898, 1.5811388300841898, 2.5495097567963922},
+     INFINITY},
+    {"voxels: three neighbours",
+     ANCHOR_INIT_VOXEL,
+     ANCHOR_SCALE_NN,
+     4,
+     {0, 0, 0, 0, 0, 2, 0, 3, 0, 6, 0, 0},
+     4,
+     {4.041451884327381, 4.358898943540674, 4.725815626252609, 6.350852961085884},
+     INFINITY},
 };
 
 static void scales_by_hand(void **state)
 {
     const hand_case *c = *state;
     anchor_init_def def = def_with_voxel(1.0f);
-    def.kind = c->kind, def.scale = c->scale, def.scale_max = c->scale_max;
+    def.kind = c->kind;
+    def.scale = c->scale;
+    def.scale_max = c->scale_max;
     anchors a;
     assert_ok(anchors_init(c->position, NULL, c->count, &def, &a, NULL, NULL));
     assert_int_equal(a.count, c->expected_count);
@@ -259,7 +333,8 @@ static void scales_by_hand(void **state)
 static void tiny_scales_have_a_floor(void **state)
 {
     (void)state;
-    anchor_init_def def = def_with_voxel(1e-9f); /* everything below the floors: eps, and sqrt(1e-7) for neighbours */
+    anchor_init_def def =
+        def_with_voxel(1e-9f); /* everything below the floors: eps, and sqrt(1e-7) for neighbours */
     anchors a;
     const float close[12] = {0, 0, 0, 1e-8f, 0, 0, 2e-8f, 0, 0, 3e-8f, 0, 0};
     for (int nn = 0; nn <= 1; nn++) {
@@ -284,7 +359,8 @@ static void same_bits_for_all_threads(void **state)
         parallel_set_threads(t == 0 ? 1 : 5);
         anchors a;
         assert_ok(anchors_init(position, NULL, 5000, &def, &a, NULL, NULL));
-        hash[t] = hash_bytes(hash_bytes(1, a.position, a.count * 3 * sizeof(float)), a.scale_log, a.count * 6 * sizeof(float));
+        hash[t] = hash_bytes(hash_bytes(1, a.position, a.count * 3 * sizeof(float)), a.scale_log,
+                             a.count * 6 * sizeof(float));
         anchors_free(&a);
     }
     parallel_set_threads(before);
@@ -298,17 +374,39 @@ static void wrong_arguments_are_refused(void **state)
     for (int t = 0; t < 11; t++) {
         anchor_init_def def = def_with_voxel(1.0f);
         switch (t) {
-        case 0: def.balls.voxel_size = 0.0f; break;
-        case 1: def.balls.voxel_size = NAN; break;
-        case 2: def.offset_count = 0; break;
-        case 3: def.offset_count = ANCHOR_MAX_OFFSETS + 1; break;
-        case 4: def.fusion = 1.5f; break;
-        case 5: def.clip_min = 5.0f; break;
-        case 6: def.scale_max = 0.0f; break;
-        case 7: def.fraction = -0.1; break;
-        case 8: def.fraction = 1.001; break;
-        case 9: def.fraction = NAN; break;
-        default: def.balls.max_depth = 65; break;
+        case 0:
+            def.balls.voxel_size = 0.0f;
+            break;
+        case 1:
+            def.balls.voxel_size = NAN;
+            break;
+        case 2:
+            def.offset_count = 0;
+            break;
+        case 3:
+            def.offset_count = ANCHOR_MAX_OFFSETS + 1;
+            break;
+        case 4:
+            def.fusion = 1.5f;
+            break;
+        case 5:
+            def.clip_min = 5.0f;
+            break;
+        case 6:
+            def.scale_max = 0.0f;
+            break;
+        case 7:
+            def.fraction = -0.1;
+            break;
+        case 8:
+            def.fraction = 1.001;
+            break;
+        case 9:
+            def.fraction = NAN;
+            break;
+        default:
+            def.balls.max_depth = 65;
+            break;
         }
         anchors a;
         balls b;
@@ -359,12 +457,18 @@ int main(void)
     struct CMUnitTest tests[32];
     size_t count = 0;
     for (size_t i = 0; i < sizeof hand_cases / sizeof *hand_cases; i++)
-        tests[count++] = (struct CMUnitTest){.name = hand_cases[i].name, .test_func = scales_by_hand, .initial_state = &hand_cases[i]};
+        tests[count++] = (struct CMUnitTest){
+            .name = hand_cases[i].name, .test_func = scales_by_hand, .initial_state = &hand_cases[i]};
     const struct CMUnitTest single[] = {
-        cmocka_unit_test(anchors_stand_on_ball_centers), cmocka_unit_test(neighbour_scale),
-        cmocka_unit_test(adaptive_anchors_stand_on_adaptive_balls), cmocka_unit_test(random_anchors_are_some_of_the_points),
-        cmocka_unit_test(kinds_have_names), cmocka_unit_test(tiny_scales_have_a_floor), cmocka_unit_test(same_bits_for_all_threads),
-        cmocka_unit_test(wrong_arguments_are_refused), cmocka_unit_test(no_memory_is_an_error),
+        cmocka_unit_test(anchors_stand_on_ball_centers),
+        cmocka_unit_test(neighbour_scale),
+        cmocka_unit_test(adaptive_anchors_stand_on_adaptive_balls),
+        cmocka_unit_test(random_anchors_are_some_of_the_points),
+        cmocka_unit_test(kinds_have_names),
+        cmocka_unit_test(tiny_scales_have_a_floor),
+        cmocka_unit_test(same_bits_for_all_threads),
+        cmocka_unit_test(wrong_arguments_are_refused),
+        cmocka_unit_test(no_memory_is_an_error),
     };
     for (size_t i = 0; i < sizeof single / sizeof *single; i++)
         tests[count++] = single[i];

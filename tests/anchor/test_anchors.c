@@ -1,7 +1,9 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/anchor/test_anchors.c -- memory of anchors, sizes and first values of the networks. */
 #include "fixture.h"
 
-static void sizes_of_the_networks(void **state) /* scaffold-gs: 1482, 3462, 2142 for K = 10 without distance; one input more adds 32 each */
+static void sizes_of_the_networks(void **state) /* scaffold-gs: 1482, 3462, 2142 for K = 10 without distance;
+                                                   one input more adds 32 each */
 {
     (void)state;
     const size_t expected[3] = {1482, 3462, 2142};
@@ -38,9 +40,11 @@ static void first_values_fill_their_interval(void **state)
         const size_t in = dist == 1 ? 36 : 35;
         for (int p = 0; p < 3; p++) {
             const size_t first_layer = parts[p].begin + 32 * (in + 1);
-            const size_t bounds_begin[2] = {parts[p].begin, first_layer}, bounds_end[2] = {first_layer, parts[p].end};
+            const size_t bounds_begin[2] = {parts[p].begin, first_layer},
+                         bounds_end[2] = {first_layer, parts[p].end};
             const double bound[2] = {dist == 1 ? 0.16666667 : 0.16903085, 0.17677670};
-            const size_t at[4] = {0, 32 * (in + 1) - 1, 32 * (in + 1), parts[p].end - parts[p].begin - 1}; /* ends of both layers */
+            const size_t at[4] = {0, 32 * (in + 1) - 1, 32 * (in + 1),
+                                  parts[p].end - parts[p].begin - 1}; /* ends of both layers */
             for (int i = 0; i < 4; i++) {
                 const double want = (2.0 * (double)rng_uniform(3, (uint64_t)p, at[i]) - 1.0) * bound[i / 2];
                 assert_true(fabs((double)d.params[parts[p].begin + at[i]] - want) < 1e-6 * fabs(want));
@@ -48,7 +52,8 @@ static void first_values_fill_their_interval(void **state)
             for (int layer = 0; layer < 2; layer++) {
                 double low = 1, high = -1, sum = 0;
                 for (size_t i = bounds_begin[layer]; i < bounds_end[layer]; i++) {
-                    low = fmin(low, (double)d.params[i]), high = fmax(high, (double)d.params[i]);
+                    low = fmin(low, (double)d.params[i]);
+                    high = fmax(high, (double)d.params[i]);
                     sum += (double)d.params[i];
                 }
                 const double count = (double)(bounds_end[layer] - bounds_begin[layer]);

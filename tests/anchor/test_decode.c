@@ -1,4 +1,6 @@
-/* tests/anchor/test_decode.c -- the fast decoder against the double one, the double adjoint against differences, and the edges. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/anchor/test_decode.c -- the fast decoder against the double one, the double adjoint against
+   differences, and the edges. */
 #include "fixture.h"
 
 #include "anchor/decode_ref.h"
@@ -23,7 +25,7 @@ static void make_needles(anchors *a)
     }
 }
 
-/* ---- forward ----------------------------------------------------------------------------------------------------------------- */
+/* ---- forward ---- */
 
 typedef struct decode_case {
     const char *name;
@@ -75,7 +77,8 @@ static void forward_agrees_with_double(void **state)
         if (!kept)
             continue;
         for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++) {
-            /* Opacity and quaternions come from sums of order 1 that cancel, so their error is relative to 1. */
+            /* Opacity and quaternions come from sums of order 1 that cancel, so their error is relative to
+               1. */
             const bool cancels = f == 10 || (f >= 6 && f < 10) || f < 3;
             const double scale = fabs(w[f]) > 1 || !cancels ? fabs(w[f]) : 1;
             if (!(fabs((double)fields[f][at] - w[f]) <= 1e-5 * scale))
@@ -101,7 +104,7 @@ static void forward_agrees_with_double(void **state)
     anchors_free(&a);
 }
 
-/* ---- adjoint in double against differences ----------------------------------------------------------------------------------- */
+/* ---- adjoint in double against differences ---- */
 
 typedef struct gradient_case {
     const char *name;
@@ -118,7 +121,8 @@ static gradient_case gradient_cases[] = {
 
 enum { FD_ANCHORS = 5 };
 
-static double linear_loss(const decode_ref *r, const uint32_t *visible, size_t visible_count, const double *weight, double *scratch)
+static double linear_loss(const decode_ref *r, const uint32_t *visible, size_t visible_count,
+                          const double *weight, double *scratch)
 {
     double camera[3], sum = 0;
     widen_camera(camera);
@@ -133,14 +137,16 @@ static void double_adjoint_agrees_with_differences(void **state)
     const gradient_case *c = *state;
     anchors a = random_anchors(FD_ANCHORS, c->offset_count, 21);
     decoder d = random_decoder(c->offset_count, c->has_distance, 22);
-    a.scale_log[3] = 31.0f, a.scale_log[9] = -31.0f; /* beyond the cut: both must say 0 */
-    a.scale_log[4 * 6 + 4] = -14.0f;                 /* held to a part of the largest scale */
+    a.scale_log[3] = 31.0f;
+    a.scale_log[9] = -31.0f;         /* beyond the cut: both must say 0 */
+    a.scale_log[4 * 6 + 4] = -14.0f; /* held to a part of the largest scale */
     decode_ref r, grad;
     assert_ok(decode_ref_load(&r, &a, &d, NULL));
     assert_ok(decode_ref_zero(&grad, &r, NULL));
     const uint32_t visible[3] = {0, 1, 4};
     const size_t slots = 3 * (size_t)c->offset_count, fields = slots * DECODE_REF_FIELDS;
-    double *weight = mem_alloc(fields, sizeof *weight, "test", NULL), *scratch = mem_alloc(fields, sizeof *scratch, "test", NULL);
+    double *weight = mem_alloc(fields, sizeof *weight, "test", NULL),
+           *scratch = mem_alloc(fields, sizeof *scratch, "test", NULL);
     double camera[3];
     for (size_t i = 0; i < fields; i++)
         weight[i] = (double)spread(23, 0, i, -1, 1);
@@ -148,14 +154,16 @@ static void double_adjoint_agrees_with_differences(void **state)
         memset(weight + s * DECODE_REF_FIELDS, 0, DECODE_REF_FIELDS * sizeof *weight);
     for (size_t k = 0; k < (size_t)c->offset_count; k++)
         for (size_t f = 3; f < 6; f++)
-            weight[k * DECODE_REF_FIELDS + f] *= 1e-12; /* a scale of exp(30), and those held to it, would drown every other difference */
+            weight[k * DECODE_REF_FIELDS + f] *=
+                1e-12; /* a scale of exp(30), and those held to it, would drown every other difference */
     widen_camera(camera);
     decode_ref_backward(&r, camera, visible, 3, weight, &grad);
 
     double *const values[4] = {r.feature, r.offset, r.scale_log, r.params};
     double *const grads[4] = {grad.feature, grad.offset, grad.scale_log, grad.params};
-    const size_t counts[4] = {FD_ANCHORS * 32, FD_ANCHORS * (size_t)c->offset_count * 3, FD_ANCHORS * 6, r.param_count};
-    for (int class = 0; class < 4; class++) {
+    const size_t counts[4] = {FD_ANCHORS * 32, FD_ANCHORS * (size_t)c->offset_count * 3, FD_ANCHORS * 6,
+                              r.param_count};
+    for (int class = 0; class < 4; class ++) {
         size_t nonzero = 0;
         for (size_t i = 0; i < counts[class]; i++) {
             double *p = &values[class][i];
@@ -183,7 +191,7 @@ static void double_adjoint_agrees_with_differences(void **state)
     anchors_free(&a);
 }
 
-/* ---- float adjoint against the double one ------------------------------------------------------------------------------------ */
+/* ---- float adjoint against the double one ---- */
 
 static double relative_error(const float *got, const double *want, size_t begin, size_t end)
 {
@@ -212,7 +220,8 @@ static void adjoint_agrees_with_double(void **state)
     anchors a = random_anchors(c->count, c->offset_count, 11), da = {.offset_count = c->offset_count};
     decoder d = random_decoder(c->offset_count, c->has_distance, 12);
     make_needles(&a);
-    a.scale_log[3] = 30.5f, a.scale_log[1] = -30.5f;
+    a.scale_log[3] = 30.5f;
+    a.scale_log[1] = -30.5f;
     size_t visible_count;
     uint32_t *visible = every(c->count, c->step, &visible_count);
     gaussians g = {0}, dg = {0};
@@ -229,7 +238,9 @@ static void adjoint_agrees_with_double(void **state)
     decode_ref r, grad;
     assert_ok(decode_ref_load(&r, &a, &d, NULL));
     assert_ok(decode_ref_zero(&grad, &r, NULL));
-    double *d_out = mem_calloc(visible_count * (size_t)c->offset_count, DECODE_REF_FIELDS * sizeof *d_out, "test", NULL), camera[3];
+    double *d_out = mem_calloc(visible_count * (size_t)c->offset_count, DECODE_REF_FIELDS * sizeof *d_out,
+                               "test", NULL),
+           camera[3];
     float *fields[GAUSSIANS_FIELD_COUNT];
     field_list(&dg, fields);
     for (size_t i = 0; i < dg.count; i++)
@@ -254,7 +265,8 @@ static void adjoint_agrees_with_double(void **state)
         {"colour network", dp, grad.params, parts[2].begin, parts[2].end},
     };
     for (size_t i = 0; i < 6; i++) {
-        const double error = relative_error(classes[i].got, classes[i].want, classes[i].begin, classes[i].end);
+        const double error =
+            relative_error(classes[i].got, classes[i].want, classes[i].begin, classes[i].end);
         if (!(error <= 1e-5))
             fail_msg("%s: relative error %g", classes[i].name, error);
     }
@@ -307,7 +319,7 @@ static void quaternion_gradient_along_itself_is_ignored(void **state)
     anchors_free(&da);
 }
 
-/* ---- same bits --------------------------------------------------------------------------------------------------------------- */
+/* ---- same bits ---- */
 
 static uint64_t decode_hash(int offset_count)
 {
@@ -359,7 +371,7 @@ static void same_bits_for_all_threads_and_instructions(void **state)
     parallel_set_threads(threads_before);
 }
 
-/* ---- edges ------------------------------------------------------------------------------------------------------------------- */
+/* ---- edges ---- */
 
 /* Biases of the opacity head, the last K of its part. */
 static void set_opacity_bias(decoder *d, float value)
@@ -417,7 +429,8 @@ static void threshold_is_strict(void **state)
     assert_int_equal(g.count, 0);
     assert_ok(decode_forward(&a, &d, camera_center, visible, 1, -1e-30f, &g, &tape, NULL));
     assert_int_equal(g.count, 2);
-    assert_true(g.scale_x[1] == 0.5f && g.red[0] == 0.5f && g.quat_w[0] == 1.0f && g.quat_x[1] == 0.0f && g.opacity[0] == 0.0f);
+    assert_true(g.scale_x[1] == 0.5f && g.red[0] == 0.5f && g.quat_w[0] == 1.0f && g.quat_x[1] == 0.0f &&
+                g.opacity[0] == 0.0f);
     decode_tape_free(&tape);
     gaussians_free(&g);
     decoder_free(&d);
@@ -430,7 +443,10 @@ static void camera_on_an_anchor(void **state)
     anchors a = random_anchors(2, 10, 3);
     memcpy(a.position, camera_center, sizeof camera_center);
     memcpy(a.feature + 32, a.feature, 32 * sizeof(float));
-    a.position[3] = camera_center[0], a.position[4] = camera_center[1], a.position[5] = camera_center[2] + 0.125f; /* direction (0, 0, 1) */
+    /* direction (0, 0, 1) */
+    a.position[3] = camera_center[0];
+    a.position[4] = camera_center[1];
+    a.position[5] = camera_center[2] + 0.125f;
     decoder d = random_decoder(10, false, 4);
     const uint32_t visible[2] = {0, 1};
     gaussians g = {0};
@@ -449,7 +465,8 @@ static void distance_is_cut_to_twice_the_trained_range(void **state)
     (void)state;
     anchors a = {.offset_count = 1};
     assert_ok(anchors_resize(&a, 6, NULL));
-    /* Along +z: the direction is the same, only the distance differs. Scale 0.4: cut below 0.1 / 0.4 = 0.25 and above 5 / 0.4 = 12.5. */
+    /* Along +z: the direction is the same, only the distance differs. Scale 0.4: cut below 0.1 / 0.4 = 0.25
+       and above 5 / 0.4 = 12.5. */
     const float z[6] = {0.1f, 0.25f, 0.26f, 12.4f, 12.5f, 90.0f};
     for (size_t i = 0; i < 6; i++)
         a.position[i * 3 + 2] = z[i];
@@ -459,7 +476,8 @@ static void distance_is_cut_to_twice_the_trained_range(void **state)
     gaussians g = {0};
     decode_tape tape = {0};
     assert_ok(decode_forward(&a, &d, (const float[3]){0, 0, 0}, visible, 6, -2.0f, &g, &tape, NULL));
-    assert_true(fabsf(g.red[0] - g.red[1]) < 1e-7f && g.red[1] != g.red[2] && g.red[3] != g.red[4] && fabsf(g.red[4] - g.red[5]) < 1e-7f);
+    assert_true(fabsf(g.red[0] - g.red[1]) < 1e-7f && g.red[1] != g.red[2] && g.red[3] != g.red[4] &&
+                fabsf(g.red[4] - g.red[5]) < 1e-7f);
     decode_tape_free(&tape);
     mem_free(visible);
     gaussians_free(&g);
@@ -493,7 +511,8 @@ static void finite_for_wild_parameters(void **state)
         for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
             for (size_t i = 0; i < g.count; i++)
                 if (!isfinite(fields[f][i]) || (f >= 3 && f < 6 && !(fields[f][i] > 0)))
-                    fail_msg("seed %llu: field %d of Gaussian %zu is %g", (unsigned long long)seed, f, i, (double)fields[f][i]);
+                    fail_msg("seed %llu: field %d of Gaussian %zu is %g", (unsigned long long)seed, f, i,
+                             (double)fields[f][i]);
         decode_tape_free(&tape);
         mem_free(visible);
         gaussians_free(&g);
@@ -512,10 +531,12 @@ static void wrong_arguments_are_refused(void **state)
     gbt_error err = {0};
     const uint32_t lists[3][2] = {{1, 1}, {3, 2}, {0, 5}};
     for (int i = 0; i < 3; i++)
-        assert_int_equal(decode_forward(&a, &d, camera_center, lists[i], 2, 0, &g, &tape, &err), GBT_ERR_ARGUMENT);
+        assert_int_equal(decode_forward(&a, &d, camera_center, lists[i], 2, 0, &g, &tape, &err),
+                         GBT_ERR_ARGUMENT);
     assert_string_not_equal(err.text, "");
     const uint32_t visible[2] = {0, 4};
-    assert_int_equal(decode_forward(&other, &d, camera_center, visible, 2, 0, &g, &tape, NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(decode_forward(&other, &d, camera_center, visible, 2, 0, &g, &tape, NULL),
+                     GBT_ERR_ARGUMENT);
     assert_ok(decode_forward(&a, &d, camera_center, visible, 2, -2.0f, &g, &tape, NULL));
     float *dp = mem_calloc(d.param_count, sizeof *dp, "test", NULL);
     assert_ok(anchors_resize(&da, 5, NULL));
@@ -581,17 +602,18 @@ int main(void)
     static char names[64][128];
     for (size_t i = 0; i < sizeof decode_cases / sizeof *decode_cases; i++) {
         snprintf(names[count], sizeof names[count], "forward: %s", decode_cases[i].name);
-        tests[count] = (struct CMUnitTest){.name = names[count], .test_func = forward_agrees_with_double,
-                                           .initial_state = &decode_cases[i]};
+        tests[count] = (struct CMUnitTest){
+            .name = names[count], .test_func = forward_agrees_with_double, .initial_state = &decode_cases[i]};
         count++;
         snprintf(names[count], sizeof names[count], "adjoint: %s", decode_cases[i].name);
-        tests[count] = (struct CMUnitTest){.name = names[count], .test_func = adjoint_agrees_with_double,
-                                           .initial_state = &decode_cases[i]};
+        tests[count] = (struct CMUnitTest){
+            .name = names[count], .test_func = adjoint_agrees_with_double, .initial_state = &decode_cases[i]};
         count++;
     }
     for (size_t i = 0; i < sizeof gradient_cases / sizeof *gradient_cases; i++) {
         snprintf(names[count], sizeof names[count], "differences: %s", gradient_cases[i].name);
-        tests[count] = (struct CMUnitTest){.name = names[count], .test_func = double_adjoint_agrees_with_differences,
+        tests[count] = (struct CMUnitTest){.name = names[count],
+                                           .test_func = double_adjoint_agrees_with_differences,
                                            .initial_state = &gradient_cases[i]};
         count++;
     }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/bake/test_bake.c -- baked models against their networks. */
 #include "anchor/fixture.h"
 #include "bake/backdrop.h"
@@ -10,7 +11,7 @@
 
 enum { ANCHORS = 150, OFFSETS = 2 };
 
-/* ---- baking ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- baking ---- */
 
 typedef struct world {
     anchors a;
@@ -23,7 +24,9 @@ typedef struct world {
 /* `blind`: networks that do not look at the direction, so that a bake loses nothing. */
 static void make_world(world *w, bool blind)
 {
-    *w = (world){.a = random_anchors(ANCHORS, OFFSETS, 5), .d = random_decoder(OFFSETS, true, 9), .s = trace_settings_default(),
+    *w = (world){.a = random_anchors(ANCHORS, OFFSETS, 5),
+                 .d = random_decoder(OFFSETS, true, 9),
+                 .s = trace_settings_default(),
                  .f.draw.footprint = 0.1f};
     for (size_t i = 0; i < ANCHORS; i++)
         for (size_t k = 0; k < 6; k++)
@@ -66,7 +69,8 @@ static double likeness(world *w, const gaussian_cloud *cloud)
 static void bake_world(world *w, int degree, double prior, bake_result *out)
 {
     bake_def def = bake_def_default();
-    def.sh_degree = degree, def.prior = prior;
+    def.sh_degree = degree;
+    def.prior = prior;
     assert_ok(bake_cloud(&w->f, &w->a, &w->d, w->cameras, CAMERAS, &w->s, &def, out, NULL));
     assert_int_equal(out->cloud.count + out->unseen, ANCHORS * OFFSETS);
     assert_int_equal(w->f.draw.pixel_step, 0);
@@ -137,7 +141,8 @@ static void same_bits_for_all_threads(void **state)
     gaussian_cloud_free(&first);
 }
 
-/* From any camera, in any direction, pictures on black are those on the background's colour, and what was there stays in front. */
+/* From any camera, in any direction, pictures on black are those on the background's colour, and what was
+   there stays in front. */
 static void a_backdrop_stands_for_the_background(void **state)
 {
     (void)state;
@@ -163,19 +168,23 @@ static void a_backdrop_stands_for_the_background(void **state)
     for (int i = 0; i < 24; i++) { /* the last twelve look away from the Gaussians, half of them upward */
         gbt_camera camera = ring_camera(i % 12);
         if (i >= 12) {
-            for (int k = 0; k < 3; k++)
-                camera.rotation[6 + k] = -camera.rotation[6 + k], camera.rotation[3 + k] = -camera.rotation[3 + k];
+            for (int k = 0; k < 3; k++) {
+                camera.rotation[6 + k] = -camera.rotation[6 + k];
+                camera.rotation[3 + k] = -camera.rotation[3 + k];
+            }
             if (i % 2 == 0) /* a quarter turn about the picture's x axis */
                 for (int k = 0; k < 3; k++) {
                     const double y = camera.rotation[3 + k], z = camera.rotation[6 + k];
-                    camera.rotation[3 + k] = z, camera.rotation[6 + k] = -y;
+                    camera.rotation[3 + k] = z;
+                    camera.rotation[6 + k] = -y;
                 }
         }
         assert_ok(frame_render(&with, frame_plain(&r.cloud), &camera, &w.s, false, NULL));
         assert_ok(frame_render(&without, frame_plain(&bare), &camera, &on_color, false, NULL));
         for (size_t p = 0; p < 3 * (size_t)camera.width * (size_t)camera.height; p++)
             if (!(fabsf(with.rgb.pixels[p] - without.rgb.pixels[p]) < 1.0f / 255))
-                fail_msg("camera %d, value %zu: %g, on the colour %g", i, p, (double)with.rgb.pixels[p], (double)without.rgb.pixels[p]);
+                fail_msg("camera %d, value %zu: %g, on the colour %g", i, p, (double)with.rgb.pixels[p],
+                         (double)without.rgb.pixels[p]);
     }
     frame_free(&with);
     frame_free(&without);
@@ -193,7 +202,8 @@ static void refusals(void **state)
     bake_def def = bake_def_default();
     gbt_error err = {0};
     def.sh_degree = 4;
-    assert_int_equal(bake_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, &w.s, &def, &r, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(bake_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, &w.s, &def, &r, &err),
+                     GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "degree 4"));
     def.sh_degree = 3;
     err = (gbt_error){0};

@@ -1,4 +1,6 @@
-/* tests/base/test_base.c -- what every room stands on: errors, memory, random numbers, files, Gaussian arrays, images, threads, vectors. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/base/test_base.c -- what every room stands on: errors, memory, random numbers, files, Gaussian
+   arrays, images, threads, vectors. */
 #include <dirent.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -59,8 +61,11 @@ static void memory_is_aligned_and_zeroed(void **state)
 static void memory_sizes_are_checked(void **state)
 {
     (void)state;
-    static const size_t sizes[][2] = {
-        {SIZE_MAX, 2}, {SIZE_MAX / 2 + 1, 2}, {SIZE_MAX, 1}, {(size_t)PTRDIFF_MAX, 1}, {(size_t)1 << 32, (size_t)1 << 32}};
+    static const size_t sizes[][2] = {{SIZE_MAX, 2},
+                                      {SIZE_MAX / 2 + 1, 2},
+                                      {SIZE_MAX, 1},
+                                      {(size_t)PTRDIFF_MAX, 1},
+                                      {(size_t)1 << 32, (size_t)1 << 32}};
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         gbt_error err = {0};
         assert_null(mem_alloc(sizes[i][0], sizes[i][1], "points", &err));
@@ -102,7 +107,8 @@ static void memory_reserve_grows_and_keeps(void **state)
     size_t capacity = 0, moves = 0;
     for (int i = 0; i < 10000; i++) {
         const size_t before = capacity;
-        assert_ok(mem_reserve((void **)&array, &capacity, (size_t)i, (size_t)i + 1, sizeof *array, "list", NULL));
+        assert_ok(
+            mem_reserve((void **)&array, &capacity, (size_t)i, (size_t)i + 1, sizeof *array, "list", NULL));
         moves += capacity != before;
         array[i] = i;
     }
@@ -113,11 +119,14 @@ static void memory_reserve_grows_and_keeps(void **state)
     const size_t kept_capacity = capacity;
     mem_fail_after(0);
     gbt_error err = {0};
-    assert_int_equal(mem_reserve((void **)&array, &capacity, 10000, capacity + 1, sizeof *array, "list", &err), GBT_ERR_NO_MEMORY);
+    assert_int_equal(
+        mem_reserve((void **)&array, &capacity, 10000, capacity + 1, sizeof *array, "list", &err),
+        GBT_ERR_NO_MEMORY);
     assert_ptr_equal(array, kept);
     assert_int_equal(capacity, kept_capacity);
     assert_int_equal(array[9999], 9999);
-    assert_int_equal(mem_reserve((void **)&array, &capacity, 10000, SIZE_MAX, sizeof *array, "list", NULL), GBT_ERR_NO_MEMORY);
+    assert_int_equal(mem_reserve((void **)&array, &capacity, 10000, SIZE_MAX, sizeof *array, "list", NULL),
+                     GBT_ERR_NO_MEMORY);
     assert_ptr_equal(array, kept);
     mem_fail_after(-1);
     mem_free(array);
@@ -127,10 +136,16 @@ static void memory_reserve_grows_and_keeps(void **state)
 static void philox_known_answers(void **state)
 {
     (void)state;
-    static const struct { uint64_t seed, stream, index; uint32_t wanted[4]; } rows[] = {
+    static const struct {
+        uint64_t seed, stream, index;
+        uint32_t wanted[4];
+    } rows[] = {
         {0, 0, 0, {0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}},
         {UINT64_MAX, UINT64_MAX, UINT64_MAX, {0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}},
-        {0x299f31d0a4093822, 0x0370734413198a2e, 0x85a308d3243f6a88, {0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}},
+        {0x299f31d0a4093822,
+         0x0370734413198a2e,
+         0x85a308d3243f6a88,
+         {0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}},
     };
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         uint32_t got[4];
@@ -148,7 +163,10 @@ static void random_numbers_have_their_moments(void **state)
         const float u = rng_uniform(1, 2, i);
         assert_true(u >= 0 && u < 1);
         const double z = rng_normal(3, 4, i);
-        sum += (double)u, normal += z, normal2 += z * z, normal4 += z * z * z * z;
+        sum += (double)u;
+        normal += z;
+        normal2 += z * z;
+        normal4 += z * z * z * z;
     }
     assert_near(sum / COUNT, 0.5, 0.004); /* six standard errors each */
     assert_near(normal / COUNT, 0, 0.014);
@@ -235,14 +253,16 @@ static void failed_writes_leave_nothing(void **state)
     assert_ok(file_join(inner, sizeof inner, path, "keep", NULL));
     assert_ok(file_write_atomic(inner, "old", 3, NULL));
     gbt_error err = {0};
-    assert_int_equal(file_write_atomic(path, "new", 3, &err), GBT_ERR_IO); /* the rename fails: a folder is there */
+    assert_int_equal(file_write_atomic(path, "new", 3, &err), GBT_ERR_IO); /* the rename fails: a folder is
+                                                                              there */
     assert_int_equal(err.status, GBT_ERR_IO);
     assert_ptr_equal(strstr(err.text, path), err.text);
     assert_int_equal(entry_count(folder), 1);
     assert_int_equal(entry_count(path), 1);
     assert_int_equal(file_write_atomic("/nowhere/at/all", "x", 1, NULL), GBT_ERR_IO);
     char long_path[5000];
-    memset(long_path, 'x', sizeof long_path), long_path[sizeof long_path - 1] = '\0';
+    memset(long_path, 'x', sizeof long_path);
+    long_path[sizeof long_path - 1] = '\0';
     assert_int_equal(file_write_atomic(long_path, "x", 1, NULL), GBT_ERR_ARGUMENT);
     remove_entries(folder);
 }
@@ -257,7 +277,8 @@ static void full_disk_keeps_the_old_file(void **state)
     assert_ok(file_write_atomic(path, "old", 3, NULL));
     struct rlimit keep, tight;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &keep), 0);
-    tight = keep, tight.rlim_cur = 1000;
+    tight = keep;
+    tight.rlim_cur = 1000;
     void (*const handler)(int) = signal(SIGXFSZ, SIG_IGN);
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &tight), 0);
     gbt_error err = {0};
@@ -345,7 +366,8 @@ static void gaussians_resize_pad_zero(void **state)
         gaussians_pad(&g);
         for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
             for (size_t i = 0; i < padded; i++)
-                assert_true(fields[f][i] == (i < count ? (float)(100 * f) + 0.5f : pads[f])); /* also: fields do not overlap */
+                assert_true(fields[f][i] == (i < count ? (float)(100 * f) + 0.5f
+                                                       : pads[f])); /* also: fields do not overlap */
         gaussians copy = {0};
         assert_ok(gaussians_copy(&g, &copy, NULL));
         assert_int_equal(copy.count, count);
@@ -431,7 +453,8 @@ static void halve(size_t block, size_t begin, size_t end, void *context)
         values[i] = values[i] * 0.5f;
 }
 
-/* Denormals live on every thread, also when the caller, or a library in the worker threads, flushes them to zero. */
+/* Denormals live on every thread, also when the caller, or a library in the worker threads, flushes them to
+   zero. */
 static void denormals_are_kept(void **state)
 {
     (void)state;
@@ -452,7 +475,8 @@ static void denormals_are_kept(void **state)
         }
     }
 #ifdef __SSE__
-    assert_int_equal(__builtin_ia32_stmxcsr() & 0x8040, 0x8040); /* and the caller's own environment is not touched */
+    assert_int_equal(__builtin_ia32_stmxcsr() & 0x8040, 0x8040); /* and the caller's own environment is not
+                                                                    touched */
     __builtin_ia32_ldmxcsr(before);
 #endif
 }
@@ -471,7 +495,8 @@ static void instruction_sets_only_go_down(void **state)
     assert_string_equal(cpu_isa_name(CPU_AVX512), "avx512");
 }
 
-/* A quarter turn about z takes x to y; matrices of unit quaternions are orthonormal; the transpose undoes them. */
+/* A quarter turn about z takes x to y; matrices of unit quaternions are orthonormal; the transpose undoes
+   them. */
 static void rotations(void **state)
 {
     (void)state;
@@ -483,8 +508,10 @@ static void rotations(void **state)
     assert_near(v[1], 1, 1e-15);
     for (uint64_t i = 0; i < 100; i++) {
         double q[4], a[3] = {1, -2, 3}, b[3], length = 0;
-        for (uint64_t k = 0; k < 4; k++)
-            q[k] = rng_normal(1, k, i), length += q[k] * q[k];
+        for (uint64_t k = 0; k < 4; k++) {
+            q[k] = rng_normal(1, k, i);
+            length += q[k] * q[k];
+        }
         for (int k = 0; k < 4; k++)
             q[k] /= sqrt(length);
         dquat_to_matrix(q, m);

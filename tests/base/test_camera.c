@@ -1,4 +1,6 @@
-/* tests/base/test_camera.c -- lens models against numbers from their formulas, against their own inverse, and at their limits. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/base/test_camera.c -- lens models against numbers from their formulas, against their own inverse, and
+   at their limits. */
 #include "base/camera_lens.h"
 #include "base/near.h"
 #include "base/poly.h"
@@ -16,73 +18,123 @@ typedef struct lens_case {
 } lens_case;
 
 static const lens_case lens_cases[] = {
-    {GBT_CAMERA_SIMPLE_PINHOLE, {800, 320, 240},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{480, 133.3333333333333}, {40, 440}}},
-    {GBT_CAMERA_PINHOLE, {800, 810, 320, 240},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{480, 132}, {40, 442.5}}},
-    {GBT_CAMERA_SIMPLE_RADIAL, {800, 320, 240, -0.12},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{478.8906666666667, 134.0728888888889}, {46.21600000000001, 435.56}}},
-    {GBT_CAMERA_SIMPLE_RADIAL, {500, 310, 250, 0.3},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{411.7333333333333, 182.1777777777777}, {125.2875, 381.9375}}},
-    {GBT_CAMERA_RADIAL, {800, 320, 240, -0.2, 0.05},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{478.1778172839506, 134.5481218106996}, {49.88085000000001, 432.94225}}},
-    {GBT_CAMERA_RADIAL, {320, 320, 240, -0.28, 0.06},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{382.9774411851852, 198.0150392098765}, {213.571608, 316.02028}}},
-    {GBT_CAMERA_OPENCV, {600, 610, 322, 238, -0.28, 0.07, 0.001, -0.0008},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{439.9885748148148, 158.0464133662551}, {122.0634925000001, 383.240351875}}},
-    {GBT_CAMERA_OPENCV, {400, 400, 320, 240, -0.15, 0.02, 0.01, -0.01},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{398.5475634567901, 187.7119947325103}, {181.36917, 339.23345}}},
-    {GBT_CAMERA_OPENCV_FISHEYE, {300, 301, 320, 240, -0.01, 0.005, -0.002, 0.0003},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{378.8510467249929, 200.6351887461714}, {-158.3340775552063, 453.3015664357291}}},
-    {GBT_CAMERA_OPENCV_FISHEYE, {150, 150, 320, 240, 0.02, -0.004, 0.0005, -2e-05},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{349.4738647940632, 220.3507568039578}, {68.27433701960393, 351.8780724357316}}},
-    {GBT_CAMERA_FULL_OPENCV, {600, 600, 320, 240, 0.5, -0.2, 0.001, 0.0005, 0.01, 0.8, 0.1, 0.02},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{437.9068170639042, 161.4416775129528}, {122.0291077477582, 381.5584230373155}}},
-    {GBT_CAMERA_FULL_OPENCV, {350, 350, 320, 240, 4.2, 1.9, -0.0004, 0.0002, 0.08, 4.5, 3.1, 0.5},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{388.83688003985, 194.1033540475074}, {203.814676615929, 322.9728667029079}}},
-    {GBT_CAMERA_FOV, {400, 400, 320, 240, 0.9},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{404.3808445443296, 183.7461036371136}, {177.5675424724563, 341.7374696625312}}},
-    {GBT_CAMERA_FOV, {600, 590, 320, 240, 1.4},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{457.1963492631153, 150.0601710386244}, {101.3304292445999, 393.589341363912}}},
-    {GBT_CAMERA_SIMPLE_RADIAL_FISHEYE, {250, 320, 240, 0.03},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{369.1510167316897, 207.2326555122069}, {-122.7006489247924, 436.7558439665744}}},
-    {GBT_CAMERA_RADIAL_FISHEYE, {180, 320, 240, 0.03, -0.004},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{355.3882944494971, 216.4078037003353}, {12.72267549029812, 376.5676997820898}}},
-    {GBT_CAMERA_THIN_PRISM_FISHEYE, {300, 300, 320, 240, 0.01, -0.003, 0.001, -0.0005, 0.0005, -0.0001, 0.002, -0.001},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{378.9132194310145, 200.7412142977083}, {-169.309369469311, 458.0982191923317}}},
+    {GBT_CAMERA_SIMPLE_PINHOLE,
+     {800, 320, 240},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{480, 133.3333333333333}, {40, 440}}},
+    {GBT_CAMERA_PINHOLE,
+     {800, 810, 320, 240},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{480, 132}, {40, 442.5}}},
+    {GBT_CAMERA_SIMPLE_RADIAL,
+     {800, 320, 240, -0.12},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{478.8906666666667, 134.0728888888889}, {46.21600000000001, 435.56}}},
+    {GBT_CAMERA_SIMPLE_RADIAL,
+     {500, 310, 250, 0.3},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{411.7333333333333, 182.1777777777777}, {125.2875, 381.9375}}},
+    {GBT_CAMERA_RADIAL,
+     {800, 320, 240, -0.2, 0.05},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{478.1778172839506, 134.5481218106996}, {49.88085000000001, 432.94225}}},
+    {GBT_CAMERA_RADIAL,
+     {320, 320, 240, -0.28, 0.06},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{382.9774411851852, 198.0150392098765}, {213.571608, 316.02028}}},
+    {GBT_CAMERA_OPENCV,
+     {600, 610, 322, 238, -0.28, 0.07, 0.001, -0.0008},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{439.9885748148148, 158.0464133662551}, {122.0634925000001, 383.240351875}}},
+    {GBT_CAMERA_OPENCV,
+     {400, 400, 320, 240, -0.15, 0.02, 0.01, -0.01},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{398.5475634567901, 187.7119947325103}, {181.36917, 339.23345}}},
+    {GBT_CAMERA_OPENCV_FISHEYE,
+     {300, 301, 320, 240, -0.01, 0.005, -0.002, 0.0003},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{378.8510467249929, 200.6351887461714}, {-158.3340775552063, 453.3015664357291}}},
+    {GBT_CAMERA_OPENCV_FISHEYE,
+     {150, 150, 320, 240, 0.02, -0.004, 0.0005, -2e-05},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{349.4738647940632, 220.3507568039578}, {68.27433701960393, 351.8780724357316}}},
+    {GBT_CAMERA_FULL_OPENCV,
+     {600, 600, 320, 240, 0.5, -0.2, 0.001, 0.0005, 0.01, 0.8, 0.1, 0.02},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{437.9068170639042, 161.4416775129528}, {122.0291077477582, 381.5584230373155}}},
+    {GBT_CAMERA_FULL_OPENCV,
+     {350, 350, 320, 240, 4.2, 1.9, -0.0004, 0.0002, 0.08, 4.5, 3.1, 0.5},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{388.83688003985, 194.1033540475074}, {203.814676615929, 322.9728667029079}}},
+    {GBT_CAMERA_FOV,
+     {400, 400, 320, 240, 0.9},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{404.3808445443296, 183.7461036371136}, {177.5675424724563, 341.7374696625312}}},
+    {GBT_CAMERA_FOV,
+     {600, 590, 320, 240, 1.4},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{457.1963492631153, 150.0601710386244}, {101.3304292445999, 393.589341363912}}},
+    {GBT_CAMERA_SIMPLE_RADIAL_FISHEYE,
+     {250, 320, 240, 0.03},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{369.1510167316897, 207.2326555122069}, {-122.7006489247924, 436.7558439665744}}},
+    {GBT_CAMERA_RADIAL_FISHEYE,
+     {180, 320, 240, 0.03, -0.004},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{355.3882944494971, 216.4078037003353}, {12.72267549029812, 376.5676997820898}}},
+    {GBT_CAMERA_THIN_PRISM_FISHEYE,
+     {300, 300, 320, 240, 0.01, -0.003, 0.001, -0.0005, 0.0005, -0.0001, 0.002, -0.001},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{378.9132194310145, 200.7412142977083}, {-169.309369469311, 458.0982191923317}}},
     {GBT_CAMERA_RAD_TAN_THIN_PRISM_FISHEYE,
-     {240, 240, 320, 240, 0.4, -0.5, 0.3, -0.1, 0.02, -0.001, 0.0005, -0.0003, 0.001, -0.0002, -0.0008, 0.0001},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{368.1185128033729, 207.9195730277009}, {236.520473390107, 299.6266320810764}}},
-    {GBT_CAMERA_SIMPLE_DIVISION, {400, 320, 240, -0.2},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{399.0963225865847, 187.2691182756102}, {-703.7056339441313, 694.9802817529472}}},
-    {GBT_CAMERA_DIVISION, {250, 260, 320, 240, -0.4},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{368.8949575345776, 206.0994961093595}, {-103.830651186308, 435.9039454372269}}},
-    {GBT_CAMERA_DIVISION, {600, 610, 320, 240, 0.1},
-     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}}, {{440.7014628171879, 158.1912307572393}, {105.9642421212449, 395.4307289357626}}},
-    {GBT_CAMERA_SIMPLE_FISHEYE, {200, 320, 240},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{359.2552809397344, 213.8298127068437}, {-3.697879006852247, 383.8657240030454}}},
-    {GBT_CAMERA_FISHEYE, {130, 140, 320, 240},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{345.5159326108273, 221.6808688947906}, {109.5963786455461, 340.7060068021318}}},
-    {GBT_CAMERA_EUCM, {300, 300, 320, 240, 0.6, 1.1},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{378.8943770741039, 200.7370819505974}, {-169.765350787544, 457.6734892389085}}},
-    {GBT_CAMERA_EUCM, {200, 210, 320, 240, 0.4, 0.9},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{359.5934463775754, 212.2845875356972}, {-366.4880324195444, 560.3610817957874}}},
-    {GBT_CAMERA_EQUIRECTANGULAR, {640, 480},
-     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}}, {{340.1065466204804, 220.1364457923638}, {137.7265640726196, 302.5443661759895}}},
+     {240, 240, 320, 240, 0.4, -0.5, 0.3, -0.1, 0.02, -0.001, 0.0005, -0.0003, 0.001, -0.0002, -0.0008,
+      0.0001},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{368.1185128033729, 207.9195730277009}, {236.520473390107, 299.6266320810764}}},
+    {GBT_CAMERA_SIMPLE_DIVISION,
+     {400, 320, 240, -0.2},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{399.0963225865847, 187.2691182756102}, {-703.7056339441313, 694.9802817529472}}},
+    {GBT_CAMERA_DIVISION,
+     {250, 260, 320, 240, -0.4},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{368.8949575345776, 206.0994961093595}, {-103.830651186308, 435.9039454372269}}},
+    {GBT_CAMERA_DIVISION,
+     {600, 610, 320, 240, 0.1},
+     {{0.3, -0.2, 1.5}, {-0.35, 0.25, 1}},
+     {{440.7014628171879, 158.1912307572393}, {105.9642421212449, 395.4307289357626}}},
+    {GBT_CAMERA_SIMPLE_FISHEYE,
+     {200, 320, 240},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{359.2552809397344, 213.8298127068437}, {-3.697879006852247, 383.8657240030454}}},
+    {GBT_CAMERA_FISHEYE,
+     {130, 140, 320, 240},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{345.5159326108273, 221.6808688947906}, {109.5963786455461, 340.7060068021318}}},
+    {GBT_CAMERA_EUCM,
+     {300, 300, 320, 240, 0.6, 1.1},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{378.8943770741039, 200.7370819505974}, {-169.765350787544, 457.6734892389085}}},
+    {GBT_CAMERA_EUCM,
+     {200, 210, 320, 240, 0.4, 0.9},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{359.5934463775754, 212.2845875356972}, {-366.4880324195444, 560.3610817957874}}},
+    {GBT_CAMERA_EQUIRECTANGULAR,
+     {640, 480},
+     {{0.3, -0.2, 1.5}, {-0.9, 0.4, -0.2}},
+     {{340.1065466204804, 220.1364457923638}, {137.7265640726196, 302.5443661759895}}},
 };
 enum { CASE_COUNT = sizeof lens_cases / sizeof lens_cases[0] };
 
 static gbt_camera camera_of(gbt_camera_model model, const double *params)
 {
-    gbt_camera camera = {.model = model, .width = WIDTH, .height = HEIGHT, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    gbt_camera camera = {
+        .model = model, .width = WIDTH, .height = HEIGHT, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     memcpy(camera.params, params, sizeof camera.params);
     return camera;
 }
 
-static const char *name_of(const lens_case *c)
-{
-    return gbt_camera_model_name(c->model);
-}
+static const char *name_of(const lens_case *c) { return gbt_camera_model_name(c->model); }
 
 static void every_model_has_a_case(void **state)
 {
@@ -97,11 +149,27 @@ static void every_model_has_a_case(void **state)
 static void names_and_counts(void **state)
 {
     (void)state;
-    static const struct { const char *name; int count; } wanted[GBT_CAMERA_MODEL_COUNT] = {
-        {"SIMPLE_PINHOLE", 3}, {"PINHOLE", 4}, {"SIMPLE_RADIAL", 4}, {"RADIAL", 5}, {"OPENCV", 8}, {"OPENCV_FISHEYE", 8},
-        {"FULL_OPENCV", 12}, {"FOV", 5}, {"SIMPLE_RADIAL_FISHEYE", 4}, {"RADIAL_FISHEYE", 5}, {"THIN_PRISM_FISHEYE", 12},
-        {"RAD_TAN_THIN_PRISM_FISHEYE", 16}, {"SIMPLE_DIVISION", 4}, {"DIVISION", 5}, {"SIMPLE_FISHEYE", 3}, {"FISHEYE", 4},
-        {"EUCM", 6}, {"EQUIRECTANGULAR", 2}};
+    static const struct {
+        const char *name;
+        int count;
+    } wanted[GBT_CAMERA_MODEL_COUNT] = {{"SIMPLE_PINHOLE", 3},
+                                        {"PINHOLE", 4},
+                                        {"SIMPLE_RADIAL", 4},
+                                        {"RADIAL", 5},
+                                        {"OPENCV", 8},
+                                        {"OPENCV_FISHEYE", 8},
+                                        {"FULL_OPENCV", 12},
+                                        {"FOV", 5},
+                                        {"SIMPLE_RADIAL_FISHEYE", 4},
+                                        {"RADIAL_FISHEYE", 5},
+                                        {"THIN_PRISM_FISHEYE", 12},
+                                        {"RAD_TAN_THIN_PRISM_FISHEYE", 16},
+                                        {"SIMPLE_DIVISION", 4},
+                                        {"DIVISION", 5},
+                                        {"SIMPLE_FISHEYE", 3},
+                                        {"FISHEYE", 4},
+                                        {"EUCM", 6},
+                                        {"EQUIRECTANGULAR", 2}};
     for (int i = 0; i < GBT_CAMERA_MODEL_COUNT; i++) {
         assert_string_equal(gbt_camera_model_name((gbt_camera_model)i), wanted[i].name);
         assert_int_equal(gbt_camera_param_count((gbt_camera_model)i), wanted[i].count);
@@ -123,13 +191,15 @@ static void projects_as_the_formula(void **state)
                 fail_msg("%s, case %zu: point %d is not seen", name_of(c), i, k);
             for (int axis = 0; axis < 2; axis++)
                 if (fabs(pixel[axis] - c->pixels[k][axis]) > 1e-9)
-                    fail_msg("%s, case %zu, point %d: %.12g, wanted %.12g", name_of(c), i, k, pixel[axis], c->pixels[k][axis]);
+                    fail_msg("%s, case %zu, point %d: %.12g, wanted %.12g", name_of(c), i, k, pixel[axis],
+                             c->pixels[k][axis]);
             if (!gbt_camera_unproject(&camera, c->pixels[k][0], c->pixels[k][1], dir))
                 fail_msg("%s, case %zu: pixel %d has no ray", name_of(c), i, k);
             const double length = dvec_length(c->points[k]);
             for (int axis = 0; axis < 3; axis++)
                 if (fabs(dir[axis] - c->points[k][axis] / length) > 1e-10)
-                    fail_msg("%s, case %zu, pixel %d: direction %d is %.12g", name_of(c), i, k, axis, dir[axis]);
+                    fail_msg("%s, case %zu, pixel %d: direction %d is %.12g", name_of(c), i, k, axis,
+                             dir[axis]);
         }
     }
 }
@@ -155,12 +225,14 @@ static void pixels_come_back(void **state)
                 if (turn && (column == 0 || column == 64 || row == 0 || row == 48))
                     continue; /* the seam and the poles are one direction for many pixels */
                 if (fabs(pixel[0] - px) > 1e-9 || fabs(pixel[1] - py) > 1e-9)
-                    fail_msg("%s, case %zu: %g %g came back as %.15g %.15g", name_of(c), i, px, py, pixel[0], pixel[1]);
+                    fail_msg("%s, case %zu: %g %g came back as %.15g %.15g", name_of(c), i, px, py, pixel[0],
+                             pixel[1]);
             }
     }
 }
 
-/* Directions over the whole sphere: what is seen comes back as the same direction, and wide lenses see behind themselves. */
+/* Directions over the whole sphere: what is seen comes back as the same direction, and wide lenses see behind
+   themselves. */
 static void directions_come_back(void **state)
 {
     (void)state;
@@ -177,13 +249,15 @@ static void directions_come_back(void **state)
             const bool inside = pixel[0] >= 0 && pixel[0] <= WIDTH && pixel[1] >= 0 && pixel[1] <= HEIGHT;
             if (!inside)
                 continue;
-            seen++, seen_behind += point[2] < 0;
+            seen++;
+            seen_behind += point[2] < 0;
             dvec_normalize(point);
             if (!gbt_camera_unproject(&camera, pixel[0], pixel[1], dir))
                 fail_msg("%s, case %zu, direction %d: no ray", name_of(c), i, (int)k);
             for (int axis = 0; axis < 3; axis++)
                 if (fabs(dir[axis] - point[axis]) > 1e-10)
-                    fail_msg("%s, case %zu, direction %d: %.12g, wanted %.12g", name_of(c), i, (int)k, dir[axis], point[axis]);
+                    fail_msg("%s, case %zu, direction %d: %.12g, wanted %.12g", name_of(c), i, (int)k,
+                             dir[axis], point[axis]);
         }
         assert_true(seen > 30);
         if (c->model == GBT_CAMERA_FISHEYE || c->model == GBT_CAMERA_EQUIRECTANGULAR ||
@@ -205,23 +279,43 @@ static void no_distortion_is_the_plain_model(void **state)
         {GBT_CAMERA_SIMPLE_RADIAL, GBT_CAMERA_PINHOLE, {517.3, 318.6, 255.3}, {517.3, 517.3, 318.6, 255.3}},
         {GBT_CAMERA_RADIAL, GBT_CAMERA_PINHOLE, {517.3, 318.6, 255.3}, {517.3, 517.3, 318.6, 255.3}},
         {GBT_CAMERA_OPENCV, GBT_CAMERA_PINHOLE, {517.3, 516.5, 318.6, 255.3}, {517.3, 516.5, 318.6, 255.3}},
-        {GBT_CAMERA_FULL_OPENCV, GBT_CAMERA_PINHOLE, {517.3, 516.5, 318.6, 255.3}, {517.3, 516.5, 318.6, 255.3}},
+        {GBT_CAMERA_FULL_OPENCV,
+         GBT_CAMERA_PINHOLE,
+         {517.3, 516.5, 318.6, 255.3},
+         {517.3, 516.5, 318.6, 255.3}},
         {GBT_CAMERA_FOV, GBT_CAMERA_PINHOLE, {517.3, 516.5, 318.6, 255.3}, {517.3, 516.5, 318.6, 255.3}},
         {GBT_CAMERA_SIMPLE_DIVISION, GBT_CAMERA_PINHOLE, {517.3, 318.6, 255.3}, {517.3, 517.3, 318.6, 255.3}},
         {GBT_CAMERA_DIVISION, GBT_CAMERA_PINHOLE, {517.3, 516.5, 318.6, 255.3}, {517.3, 516.5, 318.6, 255.3}},
-        {GBT_CAMERA_EUCM, GBT_CAMERA_PINHOLE, {517.3, 516.5, 318.6, 255.3, 0, 1.2}, {517.3, 516.5, 318.6, 255.3}},
+        {GBT_CAMERA_EUCM,
+         GBT_CAMERA_PINHOLE,
+         {517.3, 516.5, 318.6, 255.3, 0, 1.2},
+         {517.3, 516.5, 318.6, 255.3}},
         {GBT_CAMERA_SIMPLE_PINHOLE, GBT_CAMERA_PINHOLE, {517.3, 318.6, 255.3}, {517.3, 517.3, 318.6, 255.3}},
-        {GBT_CAMERA_OPENCV_FISHEYE, GBT_CAMERA_FISHEYE, {217.3, 216.5, 318.6, 255.3}, {217.3, 216.5, 318.6, 255.3}},
+        {GBT_CAMERA_OPENCV_FISHEYE,
+         GBT_CAMERA_FISHEYE,
+         {217.3, 216.5, 318.6, 255.3},
+         {217.3, 216.5, 318.6, 255.3}},
         {GBT_CAMERA_RADIAL_FISHEYE, GBT_CAMERA_FISHEYE, {217.3, 318.6, 255.3}, {217.3, 217.3, 318.6, 255.3}},
-        {GBT_CAMERA_SIMPLE_RADIAL_FISHEYE, GBT_CAMERA_FISHEYE, {217.3, 318.6, 255.3}, {217.3, 217.3, 318.6, 255.3}},
-        {GBT_CAMERA_THIN_PRISM_FISHEYE, GBT_CAMERA_FISHEYE, {217.3, 216.5, 318.6, 255.3}, {217.3, 216.5, 318.6, 255.3}},
-        {GBT_CAMERA_RAD_TAN_THIN_PRISM_FISHEYE, GBT_CAMERA_FISHEYE, {217.3, 216.5, 318.6, 255.3}, {217.3, 216.5, 318.6, 255.3}},
+        {GBT_CAMERA_SIMPLE_RADIAL_FISHEYE,
+         GBT_CAMERA_FISHEYE,
+         {217.3, 318.6, 255.3},
+         {217.3, 217.3, 318.6, 255.3}},
+        {GBT_CAMERA_THIN_PRISM_FISHEYE,
+         GBT_CAMERA_FISHEYE,
+         {217.3, 216.5, 318.6, 255.3},
+         {217.3, 216.5, 318.6, 255.3}},
+        {GBT_CAMERA_RAD_TAN_THIN_PRISM_FISHEYE,
+         GBT_CAMERA_FISHEYE,
+         {217.3, 216.5, 318.6, 255.3},
+         {217.3, 216.5, 318.6, 255.3}},
         {GBT_CAMERA_SIMPLE_FISHEYE, GBT_CAMERA_FISHEYE, {217.3, 318.6, 255.3}, {217.3, 217.3, 318.6, 255.3}},
     };
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        const gbt_camera a = camera_of(rows[i].model, rows[i].params), b = camera_of(rows[i].plain, rows[i].plain_params);
+        const gbt_camera a = camera_of(rows[i].model, rows[i].params),
+                         b = camera_of(rows[i].plain, rows[i].plain_params);
         for (int k = 0; k < 500; k++) {
-            const double px = WIDTH * (double)rng_uniform(3, 0, (uint64_t)k), py = HEIGHT * (double)rng_uniform(3, 1, (uint64_t)k);
+            const double px = WIDTH * (double)rng_uniform(3, 0, (uint64_t)k),
+                         py = HEIGHT * (double)rng_uniform(3, 1, (uint64_t)k);
             double dir_a[3], dir_b[3], pixel_a[2], pixel_b[2];
             assert_true(gbt_camera_unproject(&a, px, py, dir_a) && gbt_camera_unproject(&b, px, py, dir_b));
             assert_memory_equal(dir_a, dir_b, sizeof dir_a);
@@ -231,11 +325,13 @@ static void no_distortion_is_the_plain_model(void **state)
     }
 }
 
-/* k = -0.5, f = 400: r (1 - r^2 / 2) grows up to r = sqrt(2 / 3), where it is 2/3 sqrt(2/3), 217.7 px from the centre. */
+/* k = -0.5, f = 400: r (1 - r^2 / 2) grows up to r = sqrt(2 / 3), where it is 2/3 sqrt(2/3), 217.7 px from
+   the centre. */
 static void nothing_beyond_the_fold(void **state)
 {
     (void)state;
-    const gbt_camera camera = camera_of(GBT_CAMERA_SIMPLE_RADIAL, (const double[GBT_CAMERA_MAX_PARAMS]){400, 320, 240, -0.5});
+    const gbt_camera camera =
+        camera_of(GBT_CAMERA_SIMPLE_RADIAL, (const double[GBT_CAMERA_MAX_PARAMS]){400, 320, 240, -0.5});
     const double edge_px = 400 * (2.0 / 3) * sqrt(2.0 / 3), edge = sqrt(2.0 / 3);
     double dir[3] = {7, 8, 9}, pixel[2] = {7, 8};
     assert_true(gbt_camera_unproject(&camera, 320 + edge_px - 1e-6, 240, dir));
@@ -248,11 +344,13 @@ static void nothing_beyond_the_fold(void **state)
     assert_false(gbt_camera_project(&camera, (const double[3]){edge + 1e-9, 0, 1}, pixel));
 }
 
-/* k < 0: almost straight behind, (r, 0, 1 - r^2 / 5) with r = 12345.6, where the textbook form of the division model cancels. */
+/* k < 0: almost straight behind, (r, 0, 1 - r^2 / 5) with r = 12345.6, where the textbook form of the
+   division model cancels. */
 static void division_is_exact_behind(void **state)
 {
     (void)state;
-    const gbt_camera camera = camera_of(GBT_CAMERA_DIVISION, (const double[GBT_CAMERA_MAX_PARAMS]){1, 1, 0, 0, -0.2});
+    const gbt_camera camera =
+        camera_of(GBT_CAMERA_DIVISION, (const double[GBT_CAMERA_MAX_PARAMS]){1, 1, 0, 0, -0.2});
     const double r = 12345.6;
     double pixel[2];
     assert_true(gbt_camera_project(&camera, (const double[3]){r / 7, 0, (1 - 0.2 * r * r) / 7}, pixel));
@@ -285,7 +383,11 @@ static const struct blind_case {
     {"not a number", GBT_CAMERA_EQUIRECTANGULAR, {640, 480}, {NAN, 3}, {NAN, 0, 1}},
     {"beside the panorama", GBT_CAMERA_EQUIRECTANGULAR, {640, 480}, {640.001, 3}, {0, 0, 0}},
     {"above the panorama", GBT_CAMERA_EQUIRECTANGULAR, {640, 480}, {3, -0.001}, {0, 0, 0}},
-    {"division, k > 0, past the last angle", GBT_CAMERA_DIVISION, {400, 400, 320, 240, 1}, {720.1, 240}, {1, 0, 1.99}},
+    {"division, k > 0, past the last angle",
+     GBT_CAMERA_DIVISION,
+     {400, 400, 320, 240, 1},
+     {720.1, 240},
+     {1, 0, 1.99}},
     {"division, k > 0, behind", GBT_CAMERA_DIVISION, {400, 400, 320, 240, 0.1}, {1e9, 240}, {0.1, 0, -1}},
     {"EUCM past its radius", GBT_CAMERA_EUCM, {100, 100, 320, 240, 1, 1}, {421, 240}, {0.1, 0, -1}},
     {"FOV past a right angle", GBT_CAMERA_FOV, {100, 100, 320, 240, 1}, {320 + 157.1, 240}, {0, 1, 0}},
@@ -315,20 +417,24 @@ static void limits_are_inside(void **state)
 {
     (void)state;
     double dir[3];
-    const gbt_camera panorama = camera_of(GBT_CAMERA_EQUIRECTANGULAR, (const double[GBT_CAMERA_MAX_PARAMS]){640, 480});
+    const gbt_camera panorama =
+        camera_of(GBT_CAMERA_EQUIRECTANGULAR, (const double[GBT_CAMERA_MAX_PARAMS]){640, 480});
     assert_true(gbt_camera_unproject(&panorama, 640, 480, dir));
     assert_near(dir[1], 1, 1e-15);
     assert_true(gbt_camera_unproject(&panorama, 320, 240, dir));
     assert_near(dir[2], 1, 0);
     assert_true(gbt_camera_unproject(&panorama, 480, 240, dir)); /* three quarters across looks along +x */
     assert_near(dir[0], 1, 1e-15);
-    const gbt_camera division = camera_of(GBT_CAMERA_DIVISION, (const double[GBT_CAMERA_MAX_PARAMS]){400, 400, 320, 240, 1});
+    const gbt_camera division =
+        camera_of(GBT_CAMERA_DIVISION, (const double[GBT_CAMERA_MAX_PARAMS]){400, 400, 320, 240, 1});
     assert_true(gbt_camera_unproject(&division, 720, 240, dir)); /* (1, 0, 1 + 1) */
     assert_near(dir[0] / dir[2], 0.5, 1e-15);
-    const gbt_camera sphere = camera_of(GBT_CAMERA_EUCM, (const double[GBT_CAMERA_MAX_PARAMS]){100, 100, 320, 240, 1, 1});
+    const gbt_camera sphere =
+        camera_of(GBT_CAMERA_EUCM, (const double[GBT_CAMERA_MAX_PARAMS]){100, 100, 320, 240, 1, 1});
     assert_true(gbt_camera_unproject(&sphere, 420, 240, dir)); /* orthographic: the rim is at 90 degrees */
     assert_near(dir[2], 0, 1e-15);
-    const gbt_camera ball = camera_of(GBT_CAMERA_FISHEYE, (const double[GBT_CAMERA_MAX_PARAMS]){100, 100, 320, 240});
+    const gbt_camera ball =
+        camera_of(GBT_CAMERA_FISHEYE, (const double[GBT_CAMERA_MAX_PARAMS]){100, 100, 320, 240});
     assert_true(gbt_camera_unproject(&ball, 320 + 314.159, 240, dir));
     assert_near(dir[2], -1, 1e-9);
     for (size_t i = 0; i < CASE_COUNT; i++) { /* the axis itself */
@@ -346,19 +452,25 @@ static void wild_parameters_stay_honest(void **state)
     (void)state;
     size_t rays = 0;
     for (uint64_t i = 0; i < 4000; i++) {
-        gbt_camera camera = {.model = (gbt_camera_model)(i % GBT_CAMERA_MODEL_COUNT), .width = WIDTH, .height = HEIGHT};
+        gbt_camera camera = {
+            .model = (gbt_camera_model)(i % GBT_CAMERA_MODEL_COUNT), .width = WIDTH, .height = HEIGHT};
         const int count = gbt_camera_param_count(camera.model);
         for (int k = 0; k < count; k++)
-            camera.params[k] = rng_normal(11, (uint64_t)k, i) * (i % 5 == 0 ? 1e150 : i % 5 == 1 ? 1e-200 : 1);
-        camera.params[0] = fabs(camera.params[0]) * 300, camera.params[1] = fabs(camera.params[1]) * 300;
+            camera.params[k] = rng_normal(11, (uint64_t)k, i) * (i % 5 == 0   ? 1e150
+                                                                 : i % 5 == 1 ? 1e-200
+                                                                              : 1);
+        camera.params[0] = fabs(camera.params[0]) * 300;
+        camera.params[1] = fabs(camera.params[1]) * 300;
         for (int k = 0; k < 10; k++) {
-            const double px = 1000 * rng_normal(12, (uint64_t)k, i), py = 1000 * rng_normal(13, (uint64_t)k, i);
+            const double px = 1000 * rng_normal(12, (uint64_t)k, i),
+                         py = 1000 * rng_normal(13, (uint64_t)k, i);
             double dir[3], pixel[2];
             if (!gbt_camera_unproject(&camera, px, py, dir))
                 continue;
             rays++;
             if (!(fabs(dvec_length(dir) - 1) < 1e-14))
-                fail_msg("camera %d, model %d: direction %g %g %g", (int)i, (int)camera.model, dir[0], dir[1], dir[2]);
+                fail_msg("camera %d, model %d: direction %g %g %g", (int)i, (int)camera.model, dir[0], dir[1],
+                         dir[2]);
             if (gbt_camera_project(&camera, dir, pixel) && !(isfinite(pixel[0]) && isfinite(pixel[1])))
                 fail_msg("camera %d, model %d: pixel %g %g", (int)i, (int)camera.model, pixel[0], pixel[1]);
         }
@@ -375,12 +487,15 @@ static void resizing_keeps_rays(void **state)
         assert_int_equal(half.model, camera.model);
         assert_int_equal(half.width, WIDTH / 2);
         assert_int_equal(half.height, HEIGHT / 2);
-        const bool own_ratios = gbt_camera_param_count(camera.model) >= 4 && camera.model != GBT_CAMERA_SIMPLE_RADIAL &&
-                                camera.model != GBT_CAMERA_RADIAL && camera.model != GBT_CAMERA_SIMPLE_RADIAL_FISHEYE &&
-                                camera.model != GBT_CAMERA_RADIAL_FISHEYE && camera.model != GBT_CAMERA_SIMPLE_DIVISION;
-        const gbt_camera flat = gbt_camera_resized(&camera, 2 * WIDTH, HEIGHT / 4); /* only for models with fx and fy */
+        const bool own_ratios =
+            gbt_camera_param_count(camera.model) >= 4 && camera.model != GBT_CAMERA_SIMPLE_RADIAL &&
+            camera.model != GBT_CAMERA_RADIAL && camera.model != GBT_CAMERA_SIMPLE_RADIAL_FISHEYE &&
+            camera.model != GBT_CAMERA_RADIAL_FISHEYE && camera.model != GBT_CAMERA_SIMPLE_DIVISION;
+        const gbt_camera flat =
+            gbt_camera_resized(&camera, 2 * WIDTH, HEIGHT / 4); /* only for models with fx and fy */
         for (int k = 0; k < 50; k++) {
-            const double px = WIDTH * (double)rng_uniform(5, 0, (uint64_t)k), py = HEIGHT * (double)rng_uniform(5, 1, (uint64_t)k);
+            const double px = WIDTH * (double)rng_uniform(5, 0, (uint64_t)k),
+                         py = HEIGHT * (double)rng_uniform(5, 1, (uint64_t)k);
             double dir[3], other[3];
             assert_true(gbt_camera_unproject(&camera, px, py, dir));
             assert_true(gbt_camera_unproject(&half, px / 2, py / 2, other));
@@ -442,9 +557,12 @@ static void shifting_keeps_rays(void **state)
 static void resizing_exact_numbers(void **state)
 {
     (void)state;
-    gbt_camera camera = camera_of(GBT_CAMERA_SIMPLE_RADIAL, (const double[GBT_CAMERA_MAX_PARAMS]){800, 310, 250, 0.1});
-    camera.width = 1001, camera.height = 500;
-    const gbt_camera out = gbt_camera_resized(&camera, 500, 250); /* 1001 / 2 was rounded: one f takes the mean of the ratios */
+    gbt_camera camera =
+        camera_of(GBT_CAMERA_SIMPLE_RADIAL, (const double[GBT_CAMERA_MAX_PARAMS]){800, 310, 250, 0.1});
+    camera.width = 1001;
+    camera.height = 500;
+    const gbt_camera out =
+        gbt_camera_resized(&camera, 500, 250); /* 1001 / 2 was rounded: one f takes the mean of the ratios */
     assert_near(out.params[0], 800 * 0.5 * (500.0 / 1001 + 0.5), 1e-12);
     assert_near(out.params[1], 310 * 500.0 / 1001, 1e-12);
     assert_near(out.params[2], 125, 0);
@@ -459,7 +577,8 @@ static void half_fov(void **state)
 {
     (void)state;
     double tan_half[2];
-    gbt_camera camera = camera_of(GBT_CAMERA_PINHOLE, (const double[GBT_CAMERA_MAX_PARAMS]){320, 480, 300, 200});
+    gbt_camera camera =
+        camera_of(GBT_CAMERA_PINHOLE, (const double[GBT_CAMERA_MAX_PARAMS]){320, 480, 300, 200});
     gbt_camera_half_fov_tan(&camera, tan_half);
     assert_near(tan_half[0], 1, 0);
     assert_near(tan_half[1], 0.5, 0);
@@ -477,28 +596,31 @@ static void half_fov(void **state)
     assert_near(tan_half[1], 0, 0);
 }
 
-/* Parallel rays: not one of COLMAP's models, so a data set cannot hold it; a pixel is a point of the plane, a point its place across the
-   view. */
+/* Parallel rays: not one of COLMAP's models, so a data set cannot hold it; a pixel is a point of the plane, a
+   point its place across the view. */
 static void orthographic(void **state)
 {
     (void)state;
     assert_true(GBT_CAMERA_ORTHOGRAPHIC >= GBT_CAMERA_MODEL_COUNT);
     assert_string_equal(gbt_camera_model_name(GBT_CAMERA_ORTHOGRAPHIC), "ORTHOGRAPHIC");
     assert_int_equal(gbt_camera_param_count(GBT_CAMERA_ORTHOGRAPHIC), 4);
-    gbt_camera camera = camera_of(GBT_CAMERA_ORTHOGRAPHIC, (const double[GBT_CAMERA_MAX_PARAMS]){40, 50, 320, 240});
+    gbt_camera camera =
+        camera_of(GBT_CAMERA_ORTHOGRAPHIC, (const double[GBT_CAMERA_MAX_PARAMS]){40, 50, 320, 240});
     double dir[3], origin[3], pixel[2], tan_half[2];
     assert_true(gbt_camera_unproject(&camera, 17, 400, dir));
     assert_memory_equal(dir, ((const double[3]){0, 0, 1}), sizeof dir);
     assert_true(gbt_camera_project(&camera, (const double[3]){-2, 3, 0.001}, pixel));
     assert_near(pixel[0], 240, 1e-12);
     assert_near(pixel[1], 390, 1e-12);
-    assert_false(gbt_camera_project(&camera, (const double[3]){-2, 3, 0}, pixel)); /* on the plane, where the rays start */
+    assert_false(gbt_camera_project(&camera, (const double[3]){-2, 3, 0}, pixel)); /* on the plane, where the
+                                                                                      rays start */
     assert_false(gbt_camera_project(&camera, (const double[3]){-2, 3, -1}, pixel));
     assert_false(gbt_camera_unproject(&camera, NAN, 400, dir));
     /* right = +y, down = -x of the world */
     const double turned[9] = {0, 1, 0, -1, 0, 0, 0, 0, 1};
     memcpy(camera.rotation, turned, sizeof turned);
-    camera.center[0] = 10, camera.center[2] = -4;
+    camera.center[0] = 10;
+    camera.center[2] = -4;
     assert_true(gbt_camera_ray(&camera, 360, 290, origin, dir)); /* one unit right and one down */
     assert_memory_equal(origin, ((const double[3]){9, 1, -4}), sizeof origin);
     assert_memory_equal(dir, ((const double[3]){0, 0, 1}), sizeof dir);
@@ -520,11 +642,14 @@ static void orthographic(void **state)
 static void continuous_at_zero(void **state)
 {
     (void)state;
-    static const gbt_camera_model with_k[] = {GBT_CAMERA_OPENCV, GBT_CAMERA_FOV, GBT_CAMERA_DIVISION, GBT_CAMERA_FULL_OPENCV};
+    static const gbt_camera_model with_k[] = {GBT_CAMERA_OPENCV, GBT_CAMERA_FOV, GBT_CAMERA_DIVISION,
+                                              GBT_CAMERA_FULL_OPENCV};
     for (size_t i = 0; i < sizeof with_k / sizeof with_k[0]; i++) {
-        const gbt_camera plain = camera_of(GBT_CAMERA_PINHOLE, (const double[GBT_CAMERA_MAX_PARAMS]){400, 410, 320, 240});
+        const gbt_camera plain =
+            camera_of(GBT_CAMERA_PINHOLE, (const double[GBT_CAMERA_MAX_PARAMS]){400, 410, 320, 240});
         gbt_camera tiny = plain;
-        tiny.model = with_k[i], tiny.params[4] = 1e-9;
+        tiny.model = with_k[i];
+        tiny.params[4] = 1e-9;
         double a[3], b[3], pixel[2];
         assert_true(gbt_camera_unproject(&plain, 17, 400, a) && gbt_camera_unproject(&tiny, 17, 400, b));
         for (int axis = 0; axis < 3; axis++)
@@ -535,7 +660,8 @@ static void continuous_at_zero(void **state)
     }
 }
 
-/* (x - 1)(x - 2)(x - 3)(x - 4)(x - 5), and the same with a double root at 2, where the sign does not change. */
+/* (x - 1)(x - 2)(x - 3)(x - 4)(x - 5), and the same with a double root at 2, where the sign does not
+   change. */
 static void polynomial_roots(void **state)
 {
     (void)state;
@@ -579,7 +705,8 @@ int main(void)
     struct CMUnitTest tests[FIXED + BLIND];
     memcpy(tests, fixed, sizeof fixed);
     for (size_t i = 0; i < BLIND; i++)
-        tests[FIXED + i] = (struct CMUnitTest){
-            .name = blind_cases[i].why, .test_func = sees_nothing, .initial_state = (void *)(uintptr_t)&blind_cases[i]};
+        tests[FIXED + i] = (struct CMUnitTest){.name = blind_cases[i].why,
+                                               .test_func = sees_nothing,
+                                               .initial_state = (void *)(uintptr_t)&blind_cases[i]};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/base/test_symmetric.c -- eigenvectors and Cholesky factors multiply back to what they came from. */
 #include "base/near.h"
 #include "base/rng.h"
@@ -13,7 +14,8 @@ static void make(int n, int rank, uint64_t seed, double *m)
         for (int j = 0; j < n; j++) {
             m[i * n + j] = 0;
             for (int k = 0; k < rank; k++)
-                m[i * n + j] += rng_normal(seed, 1, (uint64_t)(i * MOST + k)) * rng_normal(seed, 1, (uint64_t)(j * MOST + k));
+                m[i * n + j] += rng_normal(seed, 1, (uint64_t)(i * MOST + k)) *
+                                rng_normal(seed, 1, (uint64_t)(j * MOST + k));
         }
 }
 

@@ -1,4 +1,6 @@
-/* tests/bvh/test_device.c -- the Embree device: made once from any thread, its errors in words, its memory limit, the ray guard. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/bvh/test_device.c -- the Embree device: made once from any thread, its errors in words, its memory
+   limit, the ray guard. */
 #include "test_support.h"
 
 #include <float.h>
@@ -43,13 +45,15 @@ static void no_device_is_an_error(void **state)
         const float point[3] = {1, 2, 3};
         point_tree *points = (point_tree *)&err;
         err = (gbt_error){0};
-        if (point_tree_build(point, NULL, 1, &points, &err) == GBT_OK || points != NULL || err.text[0] == '\0')
+        if (point_tree_build(point, NULL, 1, &points, &err) == GBT_OK || points != NULL ||
+            err.text[0] == '\0')
             _exit(14);
         const float vertices[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
         const uint32_t corners[3] = {0, 1, 2};
         mesh_tree *mesh = (mesh_tree *)&err;
         err = (gbt_error){0};
-        if (mesh_tree_build(vertices, 3, corners, 1, &mesh, &err) == GBT_OK || mesh != NULL || err.text[0] == '\0')
+        if (mesh_tree_build(vertices, 3, corners, 1, &mesh, &err) == GBT_OK || mesh != NULL ||
+            err.text[0] == '\0')
             _exit(15);
         if (bvh_embree_version()[0] != '3' && bvh_embree_version()[0] != '4')
             _exit(16);
@@ -148,11 +152,13 @@ static void ray_guard(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof ray_cases / sizeof *ray_cases; i++)
-        if (bvh_ray_ok(ray_cases[i].origin, ray_cases[i].dir, ray_cases[i].t_min, ray_cases[i].t_max) != ray_cases[i].ok)
+        if (bvh_ray_ok(ray_cases[i].origin, ray_cases[i].dir, ray_cases[i].t_min, ray_cases[i].t_max) !=
+            ray_cases[i].ok)
             fail_msg("%s: wanted %d", ray_cases[i].name, ray_cases[i].ok);
 }
 
-/* Embree is refused memory at ever later points of a build, until it is enough: each time an error, nothing kept. */
+/* Embree is refused memory at ever later points of a build, until it is enough: each time an error, nothing
+   kept. */
 static void memory_limit_is_safe(void **state)
 {
     (void)state;
@@ -188,7 +194,8 @@ static void memory_limit_is_safe(void **state)
     }
     assert_true(refused > 10);
 
-    refused = 0, built = false;
+    refused = 0;
+    built = false;
     static uint32_t corners[COUNT - 2][3];
     for (uint32_t i = 0; i < COUNT - 2; i++)
         for (uint32_t j = 0; j < 3; j++)
@@ -198,7 +205,8 @@ static void memory_limit_is_safe(void **state)
         bvh_limit_memory(before + allowed);
         gbt_error err = {0};
         mesh_tree *mesh = (mesh_tree *)&err;
-        const gbt_status status = mesh_tree_build(&position[0][0], COUNT, &corners[0][0], COUNT - 2, &mesh, &err);
+        const gbt_status status =
+            mesh_tree_build(&position[0][0], COUNT, &corners[0][0], COUNT - 2, &mesh, &err);
         built = status == GBT_OK;
         if (!built) {
             refused++;
@@ -232,9 +240,12 @@ static void rebuilding_leaks_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_device_is_an_error),       cmocka_unit_test(one_device_for_all_threads),
-        cmocka_unit_test(version_is_that_of_the_library), cmocka_unit_test(complaints_reach_the_error),
-        cmocka_unit_test(ray_guard),                   cmocka_unit_test(memory_limit_is_safe),
+        cmocka_unit_test(no_device_is_an_error),
+        cmocka_unit_test(one_device_for_all_threads),
+        cmocka_unit_test(version_is_that_of_the_library),
+        cmocka_unit_test(complaints_reach_the_error),
+        cmocka_unit_test(ray_guard),
+        cmocka_unit_test(memory_limit_is_safe),
         cmocka_unit_test(rebuilding_leaks_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,5 +1,6 @@
-/* tests/bvh/test_gaussian_scene.c -- boxes of Gaussians under Embree's traversal: brute force in double, what is left out, bad rays,
-   memory. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/bvh/test_gaussian_scene.c -- boxes of Gaussians under Embree's traversal: brute force in double, what
+   is left out, bad rays, memory. */
 #include "test_support.h"
 
 #include "base/gaussians.h"
@@ -21,10 +22,10 @@ static float uniform(uint64_t seed, uint64_t stream, uint64_t index, float low, 
 typedef struct cloud_case {
     const char *name;
     size_t count;
-    float center, spread;          /* means lie in center +- spread along every axis */
-    float scale_low, scale_high;   /* logarithmically between */
-    float flatness;                /* the third scale is multiplied by this */
-    float distance;                /* of the ray origins from the center */
+    float center, spread;        /* means lie in center +- spread along every axis */
+    float scale_low, scale_high; /* logarithmically between */
+    float flatness;              /* the third scale is multiplied by this */
+    float distance;              /* of the ray origins from the center */
     float dir_length, t_near, t_far;
 } cloud_case;
 
@@ -62,17 +63,21 @@ static void fill_cloud(const cloud_case *c, uint64_t seed, gaussians *g)
         g->mean_x[i] = c->center + uniform(seed, 0, i, -c->spread, c->spread);
         g->mean_y[i] = c->center + uniform(seed, 1, i, -c->spread, c->spread);
         g->mean_z[i] = c->center + uniform(seed, 2, i, -c->spread, c->spread);
-        g->scale_x[i] = scale[0], g->scale_y[i] = scale[1], g->scale_z[i] = scale[2] * c->flatness;
-        g->quat_w[i] = (float)(q[0] / length), g->quat_x[i] = (float)(q[1] / length);
-        g->quat_y[i] = (float)(q[2] / length), g->quat_z[i] = (float)(q[3] / length);
+        g->scale_x[i] = scale[0];
+        g->scale_y[i] = scale[1];
+        g->scale_z[i] = scale[2] * c->flatness;
+        g->quat_w[i] = (float)(q[0] / length);
+        g->quat_x[i] = (float)(q[1] / length);
+        g->quat_y[i] = (float)(q[2] / length);
+        g->quat_z[i] = (float)(q[3] / length);
         g->opacity[i] = uniform(seed, 3, i, 0, 1);
         g->red[i] = g->green[i] = g->blue[i] = 0.5f;
     }
     gaussians_pad(g);
 }
 
-/* Sixteen rays from near `distance` before the center (behind it when negative) to points among the Gaussians: neighbours for even
-   numbers, each its own way for odd ones; some along an axis. */
+/* Sixteen rays from near `distance` before the center (behind it when negative) to points among the
+   Gaussians: neighbours for even numbers, each its own way for odd ones; some along an axis. */
 typedef struct ray_packet {
     float origin[3][SCENE_LANES], dir[3][SCENE_LANES];
     unsigned active;
@@ -80,26 +85,38 @@ typedef struct ray_packet {
 
 static ray_packet make_packet(const cloud_case *c, uint64_t seed, uint64_t number)
 {
-    ray_packet p = {.active = number % 3 == 0 ? 0xffffu : rng_uniform(seed, 30, number) < 0.5f ? 0x0ff0u : 0xa5a7u};
+    ray_packet p = {.active = number % 3 == 0                        ? 0xffffu
+                              : rng_uniform(seed, 30, number) < 0.5f ? 0x0ff0u
+                                                                     : 0xa5a7u};
     for (unsigned i = 0; i < SCENE_LANES; i++) {
         const uint64_t who = number % 2 == 0 ? 0 : i;
         double way[3], from[3];
         for (uint64_t k = 0; k < 3; k++) {
-            const float side = k == 0 ? -c->distance : uniform(seed, 40 + k, 64 * number + who, -0.5f, 0.5f) * c->distance;
-            const float jitter = uniform(seed, 50 + k, 64 * number + i, -1, 1) * (c->spread * 0.05f + c->scale_low);
-            const float target = c->center + uniform(seed, 60 + k, 64 * number + who, -c->spread, c->spread) + jitter;
+            const float side =
+                k == 0 ? -c->distance : uniform(seed, 40 + k, 64 * number + who, -0.5f, 0.5f) * c->distance;
+            const float jitter =
+                uniform(seed, 50 + k, 64 * number + i, -1, 1) * (c->spread * 0.05f + c->scale_low);
+            const float target =
+                c->center + uniform(seed, 60 + k, 64 * number + who, -c->spread, c->spread) + jitter;
             from[k] = (double)(c->center + side);
             way[k] = (double)target - from[k];
         }
-        if (c->distance < 0)
-            way[0] = -way[0], way[1] = -way[1], way[2] = -way[2];
+        if (c->distance < 0) {
+            way[0] = -way[0];
+            way[1] = -way[1];
+            way[2] = -way[2];
+        }
         if (number % 7 == 3) { /* exactly along x, and with components that Embree replaces */
-            from[1] += way[1], from[2] += way[2];
-            way[1] = number % 2 == 0 ? 0 : 1e-30, way[2] = number % 2 == 0 ? -0.0 : 0;
+            from[1] += way[1];
+            from[2] += way[2];
+            way[1] = number % 2 == 0 ? 0 : 1e-30;
+            way[2] = number % 2 == 0 ? -0.0 : 0;
         }
         dvec_normalize(way);
-        for (unsigned k = 0; k < 3; k++)
-            p.origin[k][i] = (float)from[k], p.dir[k][i] = (float)way[k] * c->dir_length;
+        for (unsigned k = 0; k < 3; k++) {
+            p.origin[k][i] = (float)from[k];
+            p.dir[k][i] = (float)way[k] * c->dir_length;
+        }
     }
     return p;
 }
@@ -125,19 +142,25 @@ typedef struct verdict {
     bool boxed;   /* the ray crosses a box a little larger than the padded one */
 } verdict;
 
-static verdict judge(const gaussians *g, size_t i, const float origin[3], const float dir[3], float t_near, float t_far, double reach)
+static verdict judge(const gaussians *g, size_t i, const float origin[3], const float dir[3], float t_near,
+                     float t_far, double reach)
 {
-    const double q[4] = {(double)g->quat_w[i], (double)g->quat_x[i], (double)g->quat_y[i], (double)g->quat_z[i]};
+    const double q[4] = {(double)g->quat_w[i], (double)g->quat_x[i], (double)g->quat_y[i],
+                         (double)g->quat_z[i]};
     const double scale[3] = {(double)g->scale_x[i], (double)g->scale_y[i], (double)g->scale_z[i]};
     const double mean[3] = {(double)g->mean_x[i], (double)g->mean_y[i], (double)g->mean_z[i]};
     double r[9], offset[3], way[3], x[3], w[3];
     dquat_to_matrix(q, r);
-    for (int k = 0; k < 3; k++)
-        offset[k] = (double)origin[k] - mean[k], way[k] = (double)dir[k];
+    for (int k = 0; k < 3; k++) {
+        offset[k] = (double)origin[k] - mean[k];
+        way[k] = (double)dir[k];
+    }
     dmat_apply_transposed(r, offset, x);
     dmat_apply_transposed(r, way, w);
-    for (int k = 0; k < 3; k++)
-        x[k] /= scale[k], w[k] /= scale[k];
+    for (int k = 0; k < 3; k++) {
+        x[k] /= scale[k];
+        w[k] /= scale[k];
+    }
     const double t = fmin(fmax(-dvec_dot(x, w) / dvec_dot(w, w), (double)t_near), (double)t_far);
     double d2 = 0, enter = (double)t_near, leave = (double)t_far;
     for (int k = 0; k < 3; k++)
@@ -151,9 +174,11 @@ static verdict judge(const gaussians *g, size_t i, const float origin[3], const 
             leave = fabs(offset[k]) <= half ? leave : -1;
             continue;
         }
-        enter = fmax(enter, fmin(t1, t2)), leave = fmin(leave, fmax(t1, t2));
+        enter = fmax(enter, fmin(t1, t2));
+        leave = fmin(leave, fmax(t1, t2));
     }
-    return (verdict){.reached = (double)g->opacity[i] * exp(-0.5 * d2) >= (double)alpha_min, .boxed = enter <= leave * (1 + 1e-6)};
+    return (verdict){.reached = (double)g->opacity[i] * exp(-0.5 * d2) >= (double)alpha_min,
+                     .boxed = enter <= leave * (1 + 1e-6)};
 }
 
 static double largest_coordinate(const cloud_case *c)
@@ -190,9 +215,10 @@ static void agrees_with_brute_force(void **state)
                 }
                 const verdict want = judge(&g, i, origin, dir, c->t_near, c->t_far, reach);
                 if (times > 1 || (want.reached && times != 1) || (!want.boxed && times != 0))
-                    fail_msg("packet %d, ray %u, Gaussian %zu: visited %u times, reached %d, boxed %d", (int)number, lane, i, times,
-                             want.reached, want.boxed);
-                reached_count += want.reached, visited_count += times;
+                    fail_msg("packet %d, ray %u, Gaussian %zu: visited %u times, reached %d, boxed %d",
+                             (int)number, lane, i, times, want.reached, want.boxed);
+                reached_count += want.reached;
+                visited_count += times;
             }
         }
     }
@@ -236,7 +262,8 @@ static void the_same_for_every_thread_count(void **state)
         gaussian_scene scene = {0};
         parallel_set_threads(threads);
         assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, NULL));
-        parallel_blocks(PACKETS, 1, visit_packets, &(thread_job){.scene = &scene, .times = threads == 1 ? want : got});
+        parallel_blocks(PACKETS, 1, visit_packets,
+                        &(thread_job){.scene = &scene, .times = threads == 1 ? want : got});
         gaussian_scene_free(&scene);
     }
     parallel_set_threads(before);
@@ -283,20 +310,22 @@ static void empty_scenes(void **state)
     gaussians_free(&g);
 }
 
-/* The box is tight and not too tight: rays beside each of its faces, just inside and just outside of the point where the proxy touches
-   it. */
+/* The box is tight and not too tight: rays beside each of its faces, just inside and just outside of the
+   point where the proxy touches it. */
 static void boxes_are_tight(void **state)
 {
     (void)state;
-    const cloud_case c = {.count = 1, .center = 3, .spread = 1, .scale_low = 0.2f, .scale_high = 2, .flatness = 1};
+    const cloud_case c = {
+        .count = 1, .center = 3, .spread = 1, .scale_low = 0.2f, .scale_high = 2, .flatness = 1};
     for (uint64_t seed = 1; seed <= 50; seed++) {
         gaussians g = {0};
         gaussian_scene scene = {0};
         fill_cloud(&c, seed, &g);
         g.opacity[0] = 0.9f;
         assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 20, &scene, NULL));
-        const double q[4] = {(double)g.quat_w[0], (double)g.quat_x[0], (double)g.quat_y[0], (double)g.quat_z[0]},
-            k = sqrt(2 * log(0.9 * 255));
+        const double q[4] = {(double)g.quat_w[0], (double)g.quat_x[0], (double)g.quat_y[0],
+                             (double)g.quat_z[0]},
+                     k = sqrt(2 * log(0.9 * 255));
         const double scale[3] = {(double)g.scale_x[0], (double)g.scale_y[0], (double)g.scale_z[0]};
         const double mean[3] = {(double)g.mean_x[0], (double)g.mean_y[0], (double)g.mean_z[0]};
         double r[9];
@@ -320,7 +349,8 @@ static void boxes_are_tight(void **state)
         gaussian_scene_visit(&scene, p.origin, p.dir, 0, INFINITY, p.active, count_visit, &v);
         for (int lane = 0; lane < 12; lane++)
             if (times[lane] != (lane < 6))
-                fail_msg("seed %d, axis %d, %s: visited %d times", (int)seed, lane % 3, lane < 6 ? "inside" : "outside", times[lane]);
+                fail_msg("seed %d, axis %d, %s: visited %d times", (int)seed, lane % 3,
+                         lane < 6 ? "inside" : "outside", times[lane]);
         gaussian_scene_free(&scene);
         gaussians_free(&g);
     }
@@ -329,7 +359,13 @@ static void boxes_are_tight(void **state)
 static void bad_gaussians_are_counted(void **state)
 {
     (void)state;
-    const cloud_case c = {.count = 64, .spread = 1, .scale_low = 0.5f, .scale_high = 1, .flatness = 1, .distance = 4, .dir_length = 1};
+    const cloud_case c = {.count = 64,
+                          .spread = 1,
+                          .scale_low = 0.5f,
+                          .scale_high = 1,
+                          .flatness = 1,
+                          .distance = 4,
+                          .dir_length = 1};
     const float bad[] = {NAN, INFINITY, -INFINITY};
     gaussians g = {0};
     fill_cloud(&c, 3, &g);
@@ -341,10 +377,17 @@ static void bad_gaussians_are_counted(void **state)
         for (size_t f = 0; f < sizeof fields / sizeof *fields; f++)
             fields[f][i++] = bad[k];
     }
-    g.opacity[i++] = NAN, g.opacity[i++] = INFINITY;
-    g.scale_x[i++] = 0, g.scale_z[i++] = -1, g.mean_y[i++] = 1e17f, g.mean_y[i++] = -3e38f;
+    g.opacity[i++] = NAN;
+    g.opacity[i++] = INFINITY;
+    g.scale_x[i++] = 0;
+    g.scale_z[i++] = -1;
+    g.mean_y[i++] = 1e17f;
+    g.mean_y[i++] = -3e38f;
     const size_t rejected = i;
-    g.opacity[i++] = 0, g.opacity[i++] = -INFINITY, g.opacity[i++] = alpha_min; /* unseen, but nothing is wrong with them */
+    /* unseen, but nothing is wrong with them */
+    g.opacity[i++] = 0;
+    g.opacity[i++] = -INFINITY;
+    g.opacity[i++] = alpha_min;
     gaussian_scene scene = {0};
     gaussian_tree tree = {0};
     assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 4, &scene, NULL));
@@ -375,10 +418,18 @@ static void bad_gaussians_are_counted(void **state)
 static void bad_rays_cross_nothing(void **state)
 {
     (void)state;
-    static const float bad[][8] = { /* origin, dir, t_near, t_far */
-        {NAN, 0, 0, 1, 0, 0, 0, INFINITY}, {INFINITY, 0, 0, 1, 0, 0, 0, INFINITY}, {0, 2e18f, 0, 1, 0, 0, 0, INFINITY},
-        {0, 0, 0, 0, 0, 0, 0, INFINITY}, {0, 0, 0, NAN, 0, 1, 0, INFINITY}, {0, 0, 0, 1, -INFINITY, 0, 0, INFINITY},
-        {0, 0, 0, 1, 0, 0, -1, INFINITY}, {0, 0, 0, 1, 0, 0, NAN, INFINITY}, {0, 0, 0, 1, 0, 0, 0, NAN}, {0, 0, 0, 1, 0, 0, 2, 1},
+    static const float bad[][8] = {
+        /* origin, dir, t_near, t_far */
+        {NAN, 0, 0, 1, 0, 0, 0, INFINITY},
+        {INFINITY, 0, 0, 1, 0, 0, 0, INFINITY},
+        {0, 2e18f, 0, 1, 0, 0, 0, INFINITY},
+        {0, 0, 0, 0, 0, 0, 0, INFINITY},
+        {0, 0, 0, NAN, 0, 1, 0, INFINITY},
+        {0, 0, 0, 1, -INFINITY, 0, 0, INFINITY},
+        {0, 0, 0, 1, 0, 0, -1, INFINITY},
+        {0, 0, 0, 1, 0, 0, NAN, INFINITY},
+        {0, 0, 0, 1, 0, 0, 0, NAN},
+        {0, 0, 0, 1, 0, 0, 2, 1},
         {0, 0, 0, 1, 0, 0, INFINITY, INFINITY},
     };
     const cloud_case c = {.count = 50, .spread = 0, .scale_low = 1, .scale_high = 1, .flatness = 1};
@@ -392,13 +443,16 @@ static void bad_rays_cross_nothing(void **state)
         const bool bad_range = !(bad[b][6] == 0 && bad[b][7] == INFINITY);
         ray_packet p = {.active = 0xffff};
         for (unsigned i = 0; i < SCENE_LANES; i++) /* every other one is good, if the range is */
-            for (unsigned k = 0; k < 3; k++)
-                p.origin[k][i] = i % 2 == 0 ? bad[b][k] : 0, p.dir[k][i] = i % 2 == 0 ? bad[b][3 + k] : k == 2;
+            for (unsigned k = 0; k < 3; k++) {
+                p.origin[k][i] = i % 2 == 0 ? bad[b][k] : 0;
+                p.dir[k][i] = i % 2 == 0 ? bad[b][3 + k] : k == 2;
+            }
         memset(v.times, 0, c.count * SCENE_LANES);
         gaussian_scene_visit(&scene, p.origin, p.dir, bad[b][6], bad[b][7], p.active, count_visit, &v);
         for (unsigned lane = 0; lane < SCENE_LANES; lane++)
             for (size_t i = 0; i < c.count; i++)
-                assert_int_equal(v.times[lane * c.count + i], lane % 2 == 1 && !bad_range && g.opacity[i] > alpha_min);
+                assert_int_equal(v.times[lane * c.count + i],
+                                 lane % 2 == 1 && !bad_range && g.opacity[i] > alpha_min);
     }
     mem_free(v.times);
     gaussian_scene_free(&scene);
@@ -412,7 +466,8 @@ static void memory_is_counted_and_limited(void **state)
     gaussians g = {0};
     gaussian_scene scene = {0};
     fill_cloud(&cloud_cases[0], 1, &g);
-    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, NULL)); /* Embree's own tables exist from here */
+    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, NULL)); /* Embree's own tables exist
+                                                                                   from here */
     gaussian_scene_free(&scene);
     const size_t before = bvh_memory_bytes();
     assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, NULL));
@@ -462,12 +517,17 @@ int main(void)
     enum { CASES = sizeof cloud_cases / sizeof *cloud_cases };
     struct CMUnitTest tests[CASES + 7];
     for (size_t i = 0; i < CASES; i++)
-        tests[i] = (struct CMUnitTest){.name = cloud_cases[i].name, .test_func = agrees_with_brute_force,
+        tests[i] = (struct CMUnitTest){.name = cloud_cases[i].name,
+                                       .test_func = agrees_with_brute_force,
                                        .initial_state = (void *)(uintptr_t)&cloud_cases[i]};
     const struct CMUnitTest others[] = {
-        cmocka_unit_test(the_same_for_every_thread_count), cmocka_unit_test(empty_scenes), cmocka_unit_test(boxes_are_tight),
-            cmocka_unit_test(bad_gaussians_are_counted),
-        cmocka_unit_test(bad_rays_cross_nothing), cmocka_unit_test(memory_is_counted_and_limited), cmocka_unit_test(no_memory_is_an_error),
+        cmocka_unit_test(the_same_for_every_thread_count),
+        cmocka_unit_test(empty_scenes),
+        cmocka_unit_test(boxes_are_tight),
+        cmocka_unit_test(bad_gaussians_are_counted),
+        cmocka_unit_test(bad_rays_cross_nothing),
+        cmocka_unit_test(memory_is_counted_and_limited),
+        cmocka_unit_test(no_memory_is_an_error),
     };
     memcpy(tests + CASES, others, sizeof others);
     return cmocka_run_group_tests_name("gaussian_scene", tests, NULL, NULL);

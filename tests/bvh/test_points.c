@@ -1,4 +1,6 @@
-/* tests/bvh/test_points.c -- queries on balls: exact boundaries, brute force in double, FLANN, ties, bad input, threads, real points. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/bvh/test_points.c -- queries on balls: exact boundaries, brute force in double, FLANN, ties, bad
+   input, threads, real points. */
 #include "test_support.h"
 
 #include <float.h>
@@ -120,9 +122,9 @@ typedef struct bad_ray {
 } bad_ray;
 
 static const bad_ray bad_rays[] = {
-    {"origin NaN", {0, NAN, 0}, {0, 0, 1}, 0, 1},         {"origin infinite", {INFINITY, 0, 0}, {0, 0, 1}, 0, 1},
-    {"dir NaN", {0, 0, 0}, {0, 0, NAN}, 0, 1},            {"dir infinite", {0, 0, 0}, {-INFINITY, 0, 1}, 0, 1},
-    {"dir zero", {0, 0, 0}, {0, -0.0f, 0}, 0, 1},         {"t_min NaN", {0, 0, 0}, {0, 0, 1}, NAN, 1},
+    {"origin NaN", {0, NAN, 0}, {0, 0, 1}, 0, 1}, {"origin infinite", {INFINITY, 0, 0}, {0, 0, 1}, 0, 1},
+    {"dir NaN", {0, 0, 0}, {0, 0, NAN}, 0, 1},    {"dir infinite", {0, 0, 0}, {-INFINITY, 0, 1}, 0, 1},
+    {"dir zero", {0, 0, 0}, {0, -0.0f, 0}, 0, 1}, {"t_min NaN", {0, 0, 0}, {0, 0, 1}, NAN, 1},
     {"t_max NaN", {0, 0, 0}, {0, 0, 1}, 0, NAN},
 };
 
@@ -139,8 +141,9 @@ static void bad_queries_are_refused(void **state)
         for (size_t i = 0; i < sizeof bad_rays / sizeof *bad_rays; i++) {
             const bad_ray *b = &bad_rays[i];
             gbt_error err = {0};
-            if (point_tree_crossed(tree, b->origin, b->dir, b->t_min, b->t_max, &list, &err) != GBT_ERR_ARGUMENT || list.count != 0 ||
-                strstr(err.text, "points: bad ray") != err.text)
+            if (point_tree_crossed(tree, b->origin, b->dir, b->t_min, b->t_max, &list, &err) !=
+                    GBT_ERR_ARGUMENT ||
+                list.count != 0 || strstr(err.text, "points: bad ray") != err.text)
                 fail_msg("%s: taken", b->name);
         }
         const float bad[] = {NAN, INFINITY, -INFINITY};
@@ -196,9 +199,21 @@ static void bad_points_are_named(void **state)
 
 /* ---- brute force in double ---- */
 
-typedef enum shape { RANDOM, CLUSTERS, LINE, PLANE, GRID, STACK, FAR, OUTLIER, TINY, HUGE_SIZE, SHAPE_COUNT } shape;
-static const char *const shape_names[] = {"random", "clusters", "line", "plane", "grid with copies",
-                                          "one stack", "far", "outlier", "tiny", "huge"};
+typedef enum shape {
+    RANDOM,
+    CLUSTERS,
+    LINE,
+    PLANE,
+    GRID,
+    STACK,
+    FAR,
+    OUTLIER,
+    TINY,
+    HUGE_SIZE,
+    SHAPE_COUNT
+} shape;
+static const char *const shape_names[] = {"random",    "clusters", "line",    "plane", "grid with copies",
+                                          "one stack", "far",      "outlier", "tiny",  "huge"};
 
 static void make_points(shape kind, uint64_t seed, size_t count, float *position)
 {
@@ -208,17 +223,38 @@ static void make_points(shape kind, uint64_t seed, size_t count, float *position
             a[j] = uniform(seed, 8 * i + j, -1, 1);
         for (size_t j = 0; j < 3; j++) {
             switch (kind) {
-            case RANDOM: p[j] = a[j]; break;
-            case CLUSTERS: p[j] = (float)((i % 5) * (j + 1)) + 0.001f * a[j]; break;
-            case LINE: p[j] = a[0] * (float)(j + 1); break;
-            case PLANE: p[j] = j == 2 ? 0.5f : a[j]; break;
-            case GRID: p[j] = floorf(2.5f * a[j]); break;
-            case STACK: p[j] = 0.3f; break;
-            case FAR: p[j] = 1e6f + 20 * a[j]; break;
-            case OUTLIER: p[j] = i == count / 2 ? 1e9f : a[j]; break;
-            case TINY: p[j] = 1e-38f * a[j]; break;
-            case HUGE_SIZE: p[j] = 3e38f * a[j]; break;
-            case SHAPE_COUNT: break;
+            case RANDOM:
+                p[j] = a[j];
+                break;
+            case CLUSTERS:
+                p[j] = (float)((i % 5) * (j + 1)) + 0.001f * a[j];
+                break;
+            case LINE:
+                p[j] = a[0] * (float)(j + 1);
+                break;
+            case PLANE:
+                p[j] = j == 2 ? 0.5f : a[j];
+                break;
+            case GRID:
+                p[j] = floorf(2.5f * a[j]);
+                break;
+            case STACK:
+                p[j] = 0.3f;
+                break;
+            case FAR:
+                p[j] = 1e6f + 20 * a[j];
+                break;
+            case OUTLIER:
+                p[j] = i == count / 2 ? 1e9f : a[j];
+                break;
+            case TINY:
+                p[j] = 1e-38f * a[j];
+                break;
+            case HUGE_SIZE:
+                p[j] = 3e38f * a[j];
+                break;
+            case SHAPE_COUNT:
+                break;
             }
         }
     }
@@ -226,7 +262,11 @@ static void make_points(shape kind, uint64_t seed, size_t count, float *position
 
 static float size_of(shape kind)
 {
-    return kind == TINY ? 1e-38f : kind == HUGE_SIZE ? 1e38f : kind == FAR ? 10 : kind == CLUSTERS ? 0.002f : 1;
+    return kind == TINY        ? 1e-38f
+           : kind == HUGE_SIZE ? 1e38f
+           : kind == FAR       ? 10
+           : kind == CLUSTERS  ? 0.002f
+                               : 1;
 }
 
 /* 0: none, 1: all zero, 2: moderate, 3: zero to huge. */
@@ -234,20 +274,27 @@ static void make_radii(int mode, uint64_t seed, size_t count, float size, float 
 {
     for (size_t i = 0; i < count; i++) {
         const float u = uniform(seed + 1000, i, 0, 1);
-        radius[i] = mode == 1 ? 0 : mode == 2 ? 0.3f * size * u : i % 7 == 0 ? 0 : i % 31 == 0 ? FLT_MAX * u : size * u * u * u;
+        radius[i] = mode == 1     ? 0
+                    : mode == 2   ? 0.3f * size * u
+                    : i % 7 == 0  ? 0
+                    : i % 31 == 0 ? FLT_MAX * u
+                                  : size * u * u * u;
     }
 }
 
 static void make_query(shape kind, uint64_t seed, size_t q, const float *position, size_t count, float out[3])
 {
     for (size_t j = 0; j < 3; j++)
-        out[j] = uniform(seed + 2000, 8 * q + j, -1.2f, 1.2f) * (kind == HUGE_SIZE ? 2.5e38f : kind == CLUSTERS ? 5 : size_of(kind)) +
+        out[j] = uniform(seed + 2000, 8 * q + j, -1.2f, 1.2f) * (kind == HUGE_SIZE  ? 2.5e38f
+                                                                 : kind == CLUSTERS ? 5
+                                                                                    : size_of(kind)) +
                  (kind == FAR ? 1e6f : 0);
     if (count > 0 && q % 3 == 0) /* on a point */
         memcpy(out, position + 3 * (q * 31 % count), 3 * sizeof *out);
     if (count > 0 && q % 3 == 1) /* beside a point */
         for (size_t j = 0; j < 3; j++)
-            out[j] = position[3 * (q * 17 % count) + j] + 0.05f * size_of(kind) * uniform(seed + 2000, 8 * q + 5 + j, -1, 1);
+            out[j] = position[3 * (q * 17 % count) + j] +
+                     0.05f * size_of(kind) * uniform(seed + 2000, 8 * q + 5 + j, -1, 1);
     if (q % 20 == 7)
         out[q % 3] = 1e6f;
     if (q % 20 == 13)
@@ -256,7 +303,8 @@ static void make_query(shape kind, uint64_t seed, size_t q, const float *positio
 
 static double brute_distance_squared(const float *p, const float q[3])
 {
-    const double x = (double)p[0] - (double)q[0], y = (double)p[1] - (double)q[1], z = (double)p[2] - (double)q[2];
+    const double x = (double)p[0] - (double)q[0], y = (double)p[1] - (double)q[1],
+                 z = (double)p[2] - (double)q[2];
     return x * x + y * y + z * z;
 }
 
@@ -271,14 +319,16 @@ static int compare_ranked(const void *a, const void *b)
     return x->d2 != y->d2 ? (x->d2 > y->d2) - (x->d2 < y->d2) : (x->index > y->index) - (x->index < y->index);
 }
 
-static void expect_list(const char *what, const char *where, size_t q, const point_list *list, const bool *wanted, size_t count)
+static void expect_list(const char *what, const char *where, size_t q, const point_list *list,
+                        const bool *wanted, size_t count)
 {
     size_t at = 0;
     for (size_t i = 0; i < count; i++) {
         const bool got = at < list->count && list->index[at] == i;
         at += got;
         if (got != wanted[i])
-            fail_msg("%s, %s, query %zu: point %zu is %s", where, what, q, i, got ? "there and should not be" : "missing");
+            fail_msg("%s, %s, query %zu: point %zu is %s", where, what, q, i,
+                     got ? "there and should not be" : "missing");
     }
     assert_int_equal(at, list->count); /* ascending, nothing twice */
 }
@@ -289,7 +339,8 @@ static void compare_one_set(shape kind, int mode, uint64_t seed, size_t count)
     static bool wanted[MAX_COUNT];
     static ranked rank[MAX_COUNT];
     char where[128];
-    snprintf(where, sizeof where, "%s, radii %d, %zu points, seed %llu", shape_names[kind], mode, count, (unsigned long long)seed);
+    snprintf(where, sizeof where, "%s, radii %d, %zu points, seed %llu", shape_names[kind], mode, count,
+             (unsigned long long)seed);
     make_points(kind, seed, count, position);
     make_radii(mode, seed, count, size_of(kind), radius);
     point_tree *tree = NULL;
@@ -306,7 +357,8 @@ static void compare_one_set(shape kind, int mode, uint64_t seed, size_t count)
 
         const size_t ks[] = {1, 3, 8, MAX_K};
         for (size_t n = 0; n < 4; n++) {
-            const size_t k = ks[n], skip = q % 2 == 0 || count == 0 ? SIZE_MAX : rank[q % (count < 3 ? count : 3)].index;
+            const size_t k = ks[n],
+                         skip = q % 2 == 0 || count == 0 ? SIZE_MAX : rank[q % (count < 3 ? count : 3)].index;
             uint32_t index[MAX_K];
             double d2[MAX_K];
             const size_t found = point_tree_nearest(tree, query, k, skip, index, d2);
@@ -315,12 +367,13 @@ static void compare_one_set(shape kind, int mode, uint64_t seed, size_t count)
             for (size_t i = 0, r = 0; i < found; i++, r++) {
                 r += rank[r].index == skip;
                 if (index[i] != rank[r].index || d2[i] != rank[r].d2)
-                    fail_msg("%s, query %zu, k %zu: rank %zu is %u at %.17g, wanted %u at %.17g", where, q, k, i, index[i], d2[i],
-                             rank[r].index, rank[r].d2);
+                    fail_msg("%s, query %zu, k %zu: rank %zu is %u at %.17g, wanted %u at %.17g", where, q, k,
+                             i, index[i], d2[i], rank[r].index, rank[r].d2);
             }
         }
 
-        /* A radius that is exactly some distance (or as near as float32 has it), so that boundaries are met. */
+        /* A radius that is exactly some distance (or as near as float32 has it), so that boundaries are
+           met. */
         float reach = count == 0 ? 1 : (float)sqrt(rank[q * 7 % count].d2);
         reach = q % 10 == 9 ? 1e30f : q % 10 == 8 ? 0 : isfinite(reach) ? reach : FLT_MAX;
         for (size_t i = 0; i < count; i++)
@@ -353,14 +406,17 @@ static void agrees_with_brute_force(void **state)
             compare_one_set(kind, mode, 10 * n + (uint64_t)mode, counts[n]);
 }
 
-/* Signed distance of the ball to the segment in long double, by the formula of another road: the foot of the perpendicular, or an end. */
-static long double clearance(const float *c, float radius, const float origin[3], const float dir[3], float t_min, float t_max,
-                             long double *size)
+/* Signed distance of the ball to the segment in long double, by the formula of another road: the foot of the
+   perpendicular, or an end. */
+static long double clearance(const float *c, float radius, const float origin[3], const float dir[3],
+                             float t_min, float t_max, long double *size)
 {
     long double md = 0, dd = 0, mm = 0;
     for (int j = 0; j < 3; j++) {
         const long double m = (long double)c[j] - (long double)origin[j], d = (long double)dir[j];
-        md += m * d, dd += d * d, mm += m * m;
+        md += m * d;
+        dd += d * d;
+        mm += m * m;
     }
     long double t = md / dd;
     t = t < (long double)t_min ? (long double)t_min : t > (long double)t_max ? (long double)t_max : t;
@@ -392,7 +448,8 @@ static void rays_agree_with_brute_force(void **state)
             make_query(kind, seed + 2, q + 1, position, count, target);
             bool some = false;
             for (int j = 0; j < 3; j++) {
-                dir[j] = target[j] * 0.5f - origin[j] * 0.5f; /* halved: no overflow between the largest numbers */
+                dir[j] =
+                    target[j] * 0.5f - origin[j] * 0.5f; /* halved: no overflow between the largest numbers */
                 if (q % 5 == 4)
                     dir[j] = j == (int)(q % 3) ? 1e-3f : 0; /* along an axis */
                 some = some || dir[j] != 0;
@@ -408,14 +465,17 @@ static void rays_agree_with_brute_force(void **state)
                 const bool got = at < list.count && list.index[at] == i;
                 at += got;
                 long double size;
-                const long double gap = clearance(position + 3 * i, mode > 0 ? radius[i] : 0, origin, dir, t_min, t_max, &size);
+                const long double gap =
+                    clearance(position + 3 * i, mode > 0 ? radius[i] : 0, origin, dir, t_min, t_max, &size);
                 if (fabsl(gap) <= 1e-14L * size) { /* a matter of rounding */
                     near++;
                     continue;
                 }
-                crossed += gap < 0, passed += gap > 0;
+                crossed += gap < 0;
+                passed += gap > 0;
                 if (got != (gap < 0))
-                    fail_msg("%s, radii %d, ray %zu, ball %zu: %d, gap %Lg", shape_names[kind], mode, q, i, got, gap);
+                    fail_msg("%s, radii %d, ray %zu, ball %zu: %d, gap %Lg", shape_names[kind], mode, q, i,
+                             got, gap);
             }
             assert_int_equal(at, list.count);
         }
@@ -444,7 +504,8 @@ static void agrees_with_flann(void **state)
         float speedup;
         flann_index_t flann = flann_build_index_float(position, COUNT, 3, &speedup, &p);
         assert_non_null(flann);
-        assert_int_equal(flann_find_nearest_neighbors_index_float(flann, query, COUNT, flann_index, flann_d2, K, &p), 0);
+        assert_int_equal(
+            flann_find_nearest_neighbors_index_float(flann, query, COUNT, flann_index, flann_d2, K, &p), 0);
         point_tree *tree = NULL;
         assert_ok(point_tree_build(position, NULL, COUNT, &tree, NULL));
         size_t same = 0;
@@ -517,14 +578,16 @@ static void spacing_agrees_with_brute_force(void **state)
             size_t others = 0;
             for (size_t j = 0; j < MAX_COUNT; j++)
                 if (j != i)
-                    rank[others++] = (ranked){brute_distance_squared(position + 3 * i, position + 3 * j), (uint32_t)j};
+                    rank[others++] =
+                        (ranked){brute_distance_squared(position + 3 * i, position + 3 * j), (uint32_t)j};
             qsort(rank, others, sizeof *rank, compare_ranked);
             double sum = 0;
             for (size_t j = 0; j < k; j++)
                 sum += rank[j].d2;
             d2[i] = sqrt(sum / (double)k);
             if (spacing[i] != (float)d2[i])
-                fail_msg("%s, k %zu, point %zu: %.9g, wanted %.9g", shape_names[kind], k, i, (double)spacing[i], d2[i]);
+                fail_msg("%s, k %zu, point %zu: %.9g, wanted %.9g", shape_names[kind], k, i,
+                         (double)spacing[i], d2[i]);
         }
     }
     point_tree_free(tree);
@@ -551,7 +614,8 @@ static void stacks_are_not_quadratic(void **state)
 {
     (void)state;
     enum { COUNT = 200000 };
-    float *position = mem_alloc(3 * COUNT, sizeof *position, "test", NULL), *spacing = mem_alloc(COUNT, sizeof *spacing, "test", NULL);
+    float *position = mem_alloc(3 * COUNT, sizeof *position, "test", NULL),
+          *spacing = mem_alloc(COUNT, sizeof *spacing, "test", NULL);
     for (int stacks = 1; stacks <= 100; stacks *= 10) {
         for (size_t i = 0; i < COUNT; i++)
             for (size_t j = 0; j < 3; j++)
@@ -566,14 +630,16 @@ static void stacks_are_not_quadratic(void **state)
         assert_int_equal(point_tree_nearest(tree, query, MAX_K, 0, index, d2), MAX_K);
         for (uint32_t i = 0; i < MAX_K; i++) {
             assert_true(d2[i] == 0);
-            assert_int_equal(index[i], (i + 1) * (uint32_t)stacks); /* the lowest of the stack, without number 0 */
+            assert_int_equal(index[i], (i + 1) * (uint32_t)stacks); /* the lowest of the stack, without number
+                                                                       0 */
         }
         for (size_t i = 0; i < COUNT; i++)
             assert_true(spacing[i] == 0);
         assert_true(cpu_seconds() - start < 10);
         point_tree_free(tree);
     }
-    mem_free(position), mem_free(spacing);
+    mem_free(position);
+    mem_free(spacing);
 }
 
 static void no_memory(void **state)
@@ -609,7 +675,8 @@ static void no_memory(void **state)
                      : kind == 2 ? point_tree_containing(tree, query, &list, &err)
                                  : point_tree_crossed(tree, query, dir, -10, 10, &list, &err);
             mem_fail_after(-1);
-            assert_true(status == GBT_OK || (status == GBT_ERR_NO_MEMORY && list.count == 0 && err.status == status));
+            assert_true(status == GBT_OK ||
+                        (status == GBT_ERR_NO_MEMORY && list.count == 0 && err.status == status));
             if (status != GBT_OK)
                 point_list_free(&list); /* begin again with the least memory */
         }
@@ -649,7 +716,8 @@ static void ask(size_t block, size_t begin, size_t end, void *context)
         for (size_t i = 0; i < list.count; i++)
             mix(&hash, list.index[i]);
         if (status == GBT_OK)
-            status = point_tree_crossed(job->tree, query, dir, 0, 1, &list, NULL); /* the first of all threads builds */
+            status = point_tree_crossed(job->tree, query, dir, 0, 1, &list, NULL); /* the first of all threads
+                                                                                      builds */
         for (size_t i = 0; i < list.count; i++)
             mix(&hash, list.index[i]);
         job->hash[q] = status == GBT_OK ? hash : 0;
@@ -661,7 +729,8 @@ static void same_answers_for_any_threads(void **state)
 {
     (void)state;
     enum { COUNT = 10000 };
-    float *position = mem_alloc(3 * COUNT, sizeof *position, "test", NULL), *radius = mem_alloc(COUNT, sizeof *radius, "test", NULL);
+    float *position = mem_alloc(3 * COUNT, sizeof *position, "test", NULL),
+          *radius = mem_alloc(COUNT, sizeof *radius, "test", NULL);
     float *spacing[4];
     uint64_t *hash[4];
     make_points(RANDOM, 8, COUNT, position);
@@ -682,9 +751,12 @@ static void same_answers_for_any_threads(void **state)
         assert_memory_equal(hash[run], hash[0], COUNT * sizeof **hash);
         assert_memory_equal(spacing[run], spacing[0], COUNT * sizeof **spacing);
     }
-    for (int run = 0; run < 4; run++)
-        mem_free(spacing[run]), mem_free(hash[run]);
-    mem_free(position), mem_free(radius);
+    for (int run = 0; run < 4; run++) {
+        mem_free(spacing[run]);
+        mem_free(hash[run]);
+    }
+    mem_free(position);
+    mem_free(radius);
 }
 
 /* ---- real points ---- */
@@ -713,7 +785,8 @@ static void garden(void **state)
         properties += strncmp(line, "property ", 9) == 0;
     }
     assert_true(counted && little && properties == 6); /* float x y z, uchar red green blue */
-    float *position = mem_alloc(3 * COUNT, sizeof *position, "test", NULL), *spacing = mem_alloc(COUNT, sizeof *spacing, "test", NULL);
+    float *position = mem_alloc(3 * COUNT, sizeof *position, "test", NULL),
+          *spacing = mem_alloc(COUNT, sizeof *spacing, "test", NULL);
     for (size_t i = 0; i < COUNT; i++) {
         unsigned char record[RECORD];
         assert_int_equal(fread(record, RECORD, 1, file), 1);
@@ -729,8 +802,8 @@ static void garden(void **state)
     const double t2 = wall_seconds();
     assert_ok(point_tree_spacing(tree, 1, spacing, NULL));
     const double t3 = wall_seconds();
-    print_message("garden, %d threads: build %.0f ms, spacing k = 3 %.0f ms, k = 1 %.0f ms\n", parallel_threads(), 1e3 * (t1 - t0),
-                  1e3 * (t2 - t1), 1e3 * (t3 - t2));
+    print_message("garden, %d threads: build %.0f ms, spacing k = 3 %.0f ms, k = 1 %.0f ms\n",
+                  parallel_threads(), 1e3 * (t1 - t0), 1e3 * (t2 - t1), 1e3 * (t3 - t2));
     for (size_t i = 0; i < COUNT; i += 3001) { /* a sample against every point */
         double best = INFINITY;
         for (size_t j = 0; j < COUNT; j++)
@@ -741,7 +814,8 @@ static void garden(void **state)
     qsort(spacing, COUNT, sizeof *spacing, compare_float);
     assert_float_equal(spacing[COUNT / 2], 0.0052808, 1e-7); /* as another tool reported it */
     point_tree_free(tree);
-    mem_free(position), mem_free(spacing);
+    mem_free(position);
+    mem_free(spacing);
 }
 
 enum {
@@ -753,28 +827,36 @@ enum {
 int main(void)
 {
     const struct CMUnitTest others[] = {
-        cmocka_unit_test(bad_queries_are_refused), cmocka_unit_test(bad_points_are_named),
-        cmocka_unit_test(agrees_with_flann),       cmocka_unit_test(stacks_are_not_quadratic),
-        cmocka_unit_test(no_memory),               cmocka_unit_test(garden),
+        cmocka_unit_test(bad_queries_are_refused),
+        cmocka_unit_test(bad_points_are_named),
+        cmocka_unit_test(agrees_with_flann),
+        cmocka_unit_test(stacks_are_not_quadratic),
+        cmocka_unit_test(no_memory),
+        cmocka_unit_test(garden),
         cmocka_unit_test(same_answers_for_any_threads),
     };
     enum { OTHERS = sizeof others / sizeof *others };
     struct CMUnitTest tests[BALLS + RAYS + SPACINGS + 3 * SHAPE_COUNT + OTHERS];
     size_t count = 0;
     for (size_t i = 0; i < BALLS; i++)
-        tests[count++] = (struct CMUnitTest){.name = ball_cases[i].name, .test_func = one_ball, .initial_state = (void *)&ball_cases[i]};
+        tests[count++] = (struct CMUnitTest){
+            .name = ball_cases[i].name, .test_func = one_ball, .initial_state = (void *)&ball_cases[i]};
     for (size_t i = 0; i < RAYS; i++)
-        tests[count++] = (struct CMUnitTest){.name = ray_cases[i].name, .test_func = one_ray, .initial_state = (void *)&ray_cases[i]};
+        tests[count++] = (struct CMUnitTest){
+            .name = ray_cases[i].name, .test_func = one_ray, .initial_state = (void *)&ray_cases[i]};
     for (size_t i = 0; i < SPACINGS; i++)
         tests[count++] = (struct CMUnitTest){.name = spacing_cases[i].name,
-                                               .test_func = spacing_by_hand, .initial_state = (void *)&spacing_cases[i]};
+                                             .test_func = spacing_by_hand,
+                                             .initial_state = (void *)&spacing_cases[i]};
     for (intptr_t kind = 0; kind < SHAPE_COUNT; kind++) {
+        tests[count++] = (struct CMUnitTest){
+            .name = shape_names[kind], .test_func = agrees_with_brute_force, .initial_state = (void *)kind};
         tests[count++] = (struct CMUnitTest){.name = shape_names[kind],
-                                               .test_func = agrees_with_brute_force, .initial_state = (void *)kind};
+                                             .test_func = rays_agree_with_brute_force,
+                                             .initial_state = (void *)kind};
         tests[count++] = (struct CMUnitTest){.name = shape_names[kind],
-                                               .test_func = rays_agree_with_brute_force, .initial_state = (void *)kind};
-        tests[count++] = (struct CMUnitTest){.name = shape_names[kind],
-                                               .test_func = spacing_agrees_with_brute_force, .initial_state = (void *)kind};
+                                             .test_func = spacing_agrees_with_brute_force,
+                                             .initial_state = (void *)kind};
     }
     memcpy(tests + count, others, sizeof others);
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # tests/cli/report.sh -- count what passed, as tools/count_tests.awk reads it. Sourced.
 passed=0
 failed=0

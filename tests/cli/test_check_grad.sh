@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/cli/test_check_grad.sh -- gbtrace check-grad on short runs of every kind: all errors below their limits, all stages there.
 # Usage: test_check_grad.sh PROGRAM
 set -u

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/cli/test_cli.sh -- exact exit codes and messages of the program. Usage: test_cli.sh PROGRAM [SHARED]
 set -u
 program=$1

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/cli/test_describe.sh -- the manual page and the completion scripts, by man, groff and the shells that are here. Usage: test_describe.sh PROGRAM
 set -u
 program=$1

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/cli/test_drive.sh -- what programs that start gbtrace read: JSON progress, TensorBoard events, the doctor, a run's own configuration.
 # Usage: test_drive.sh PROGRAM BUILD
 set -u

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/data/data_support.h -- temporary folders, exact-size copies, and mutations of good files. */
 #ifndef GBT_TEST_DATA_SUPPORT_H
 #define GBT_TEST_DATA_SUPPORT_H
@@ -15,17 +16,19 @@
 #include "data/raw.h"
 
 /** Calls with a visible message on failure. */
-#define must(call)                                                     \
-    do {                                                               \
-        gbt_error err = {0};                                           \
-        const gbt_status must_status_ = (call);                        \
-        if (must_status_ != GBT_OK)                                    \
-            fail_msg("%s: status %d: %s", #call, (int)must_status_, err.text); \
+#define must(call)                                                                                           \
+    do {                                                                                                     \
+        gbt_error err = {0};                                                                                 \
+        const gbt_status must_status_ = (call);                                                              \
+        if (must_status_ != GBT_OK)                                                                          \
+            fail_msg("%s: status %d: %s", #call, (int)must_status_, err.text);                               \
     } while (0)
 
 static inline int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *walk)
 {
-    (void)info, (void)kind, (void)walk;
+    (void)info;
+    (void)kind;
+    (void)walk;
     return remove(path);
 }
 
@@ -83,7 +86,9 @@ static inline void write_picture(const char *folder, const char *name, int width
     for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++) {
             float *pixel = im.pixels + 3 * (y * width + x);
-            pixel[0] = (float)x / 255, pixel[1] = (float)y / 255, pixel[2] = 0;
+            pixel[0] = (float)x / 255;
+            pixel[1] = (float)y / 255;
+            pixel[2] = 0;
         }
     must(image_write(path, &im, &err));
     image_free(&im);
@@ -171,12 +176,21 @@ static inline void try_gaussians(const unsigned char *bytes, size_t size, void *
 /** Feed one variant of a seed to a reader; `bytes` has exactly `size` bytes. */
 typedef void try_bytes(const unsigned char *bytes, size_t size, void *context);
 
-/** Truncate at every offset, flip every byte in three ways, put extreme 4- and 8-byte values at every offset. */
+/** Truncate at every offset, flip every byte in three ways, put extreme 4- and 8-byte values at every
+    offset. */
 static inline void mutate_all(const unsigned char *seed, size_t size, try_bytes *try_one, void *context)
 {
-    static const uint64_t extremes[] = {0,          1,          UINT64_MAX,           INT32_MAX, (uint64_t)INT32_MAX + 1,
-                                        UINT64_C(1) << 63, UINT64_C(1) << 61, UINT64_C(0x7FF8000000000000), UINT64_C(0x7FF0000000000000),
-                                        UINT64_C(0x7FC00000), UINT64_C(0x7F800000)};
+    static const uint64_t extremes[] = {0,
+                                        1,
+                                        UINT64_MAX,
+                                        INT32_MAX,
+                                        (uint64_t)INT32_MAX + 1,
+                                        UINT64_C(1) << 63,
+                                        UINT64_C(1) << 61,
+                                        UINT64_C(0x7FF8000000000000),
+                                        UINT64_C(0x7FF0000000000000),
+                                        UINT64_C(0x7FC00000),
+                                        UINT64_C(0x7F800000)};
     for (size_t length = 0; length < size; length++) {
         unsigned char *copy = exact_copy(seed, length);
         try_one(copy, length, context);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/data/test_cameras_json.c -- cameras of a 3DGS result folder, and the folder itself. */
 #include "data_support.h"
 
@@ -5,13 +6,18 @@
 #include "data/gaussian_file.h"
 #include "data/result_folder.h"
 
-#define CAMERA(name, rotation) \
-    "{\"id\": 0, \"img_name\": \"" name "\", \"width\": 64, \"height\": 48, \"position\": [1, 2, 3], \"rotation\": " rotation ", " \
+#define CAMERA(name, rotation)                                                                               \
+    "{\"id\": 0, \"img_name\": \"" name                                                                      \
+    "\", \"width\": 64, \"height\": 48, \"position\": [1, 2, 3], \"rotation\": " rotation ", "               \
     "\"fy\": 50, \"fx\": 51}"
 
 static void cameras(void **state)
 {
-    static const struct { const char *text; gbt_status status; const char *says; } cases[] = {
+    static const struct {
+        const char *text;
+        gbt_status status;
+        const char *says;
+    } cases[] = {
         {"[" CAMERA("a", "[[0,0,1],[1,0,0],[0,1,0]]") "]", GBT_OK, ""},
         {"[" CAMERA("a", "[[0,0,1],[1,0,0],[0,2,0]]") "]", GBT_ERR_FORMAT, "frame 0: rotation is not one"},
         {"[" CAMERA("a", "[[0,0,1],[-1,0,0],[0,1,0]]") "]", GBT_ERR_FORMAT, "no reflection"},
@@ -35,8 +41,8 @@ static void cameras(void **state)
             const gbt_camera *c = &s.views[0].camera;
             static const double world_to_camera[9] = {0, 1, 0, 0, 0, 1, 1, 0, 0};
             assert_memory_equal(c->rotation, world_to_camera, sizeof world_to_camera);
-            assert_true(c->center[2] == 3 && c->params[0] == 51 && c->params[1] == 50 && c->params[2] == 32 && c->params[3] == 24 &&
-                        s.views[0].is_test);
+            assert_true(c->center[2] == 3 && c->params[0] == 51 && c->params[1] == 50 && c->params[2] == 32 &&
+                        c->params[3] == 24 && s.views[0].is_test);
             image im;
             gbt_error no_photo = {0};
             assert_int_equal(scene_read_photo(&s.views[0], 4, 4, &im, &no_photo), GBT_ERR_IO);
@@ -48,11 +54,12 @@ static void cameras(void **state)
 /* The largest iteration counts; a run of ours is none. */
 static void newest_iteration(void **state)
 {
-    static const char point[] = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty "
-                                "float f_dc_0\nproperty float f_dc_1\n"
-                                "property float f_dc_2\nproperty float opacity\nproperty float scale_0\nproperty float scale_1\nproperty "
-                                "float scale_2\nproperty float rot_0\n"
-                                "property float rot_1\nproperty float rot_2\nproperty float rot_3\nend_header\n";
+    static const char point[] =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+        "z\nproperty float f_dc_0\nproperty float f_dc_1\n"
+        "property float f_dc_2\nproperty float opacity\nproperty float scale_0\nproperty float "
+        "scale_1\nproperty float scale_2\nproperty float rot_0\n"
+        "property float rot_1\nproperty float rot_2\nproperty float rot_3\nend_header\n";
     const char *folder = *state;
     char text[1024];
     result_folder found;

@@ -1,4 +1,6 @@
-/* tests/data/test_colmap.c -- COLMAP models: what is read, every malformed case, mutations, round trips through the writer. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/data/test_colmap.c -- COLMAP models: what is read, every malformed case, mutations, round trips
+   through the writer. */
 #include "data_support.h"
 
 #include <unistd.h>
@@ -18,10 +20,10 @@ static void build_seed(sink seed[3])
     sink *c = &seed[CAMERAS], *m = &seed[IMAGES], *p = &seed[POINTS];
     memset(seed, 0, 3 * sizeof *seed);
     sink_put_uint(c, 1, 8);
-    sink_put_uint(c, 7, 4); /* id at 8 */
-    sink_put_uint(c, GBT_CAMERA_PINHOLE, 4); /* model at 12 */
-    sink_put_uint(c, 640, 8); /* width at 16 */
-    sink_put_uint(c, 480, 8); /* height at 24 */
+    sink_put_uint(c, 7, 4);                        /* id at 8 */
+    sink_put_uint(c, GBT_CAMERA_PINHOLE, 4);       /* model at 12 */
+    sink_put_uint(c, 640, 8);                      /* width at 16 */
+    sink_put_uint(c, 480, 8);                      /* height at 24 */
     const double params[4] = {500, 510, 321, 239}; /* at 32, 40, 48, 56 */
     for (int k = 0; k < 4; k++)
         sink_put_f64(c, params[k]);
@@ -32,9 +34,9 @@ static void build_seed(sink seed[3])
         sink_put_uint(m, 10 + i, 4); /* ids at 8 and 110 */
         for (int k = 0; k < 7; k++)
             sink_put_f64(m, pose[k]); /* quaternions at 12 and 114, translations at 44 and 146 */
-        sink_put_uint(m, 7, 4); /* camera ids at 68 and 170 */
-        sink_put(m, names[i], 6); /* names at 72 and 174 */
-        sink_put_uint(m, 1 - i, 8); /* observation counts at 78 and 180 */
+        sink_put_uint(m, 7, 4);       /* camera ids at 68 and 170 */
+        sink_put(m, names[i], 6);     /* names at 72 and 174 */
+        sink_put_uint(m, 1 - i, 8);   /* observation counts at 78 and 180 */
         for (unsigned k = 0; k < 1 - i; k++) {
             sink_put_f64(m, 12.5);
             sink_put_f64(m, 13.5);
@@ -47,7 +49,7 @@ static void build_seed(sink seed[3])
         for (unsigned k = 0; k < 3; k++)
             sink_put_f64(p, 1 + i + 0.25 * k); /* positions at 16 and 83 */
         sink_put(p, (const unsigned char[3]){255, 51, 0}, 3);
-        sink_put_f64(p, 0.5); /* errors at 43 and 110 */
+        sink_put_f64(p, 0.5);           /* errors at 43 and 110 */
         sink_put_uint(p, 2 - 2 * i, 8); /* track lengths at 51 and 118 */
         for (unsigned k = 0; k < 2 - 2 * i; k++) {
             sink_put_uint(p, 10 + k, 4); /* first track image at 59 */
@@ -87,7 +89,8 @@ static void good_model(void **state)
     assert_int_equal(camera->model, GBT_CAMERA_PINHOLE);
     assert_int_equal(camera->width, 640);
     assert_int_equal(camera->height, 480);
-    assert_true(camera->params[0] == 500 && camera->params[1] == 510 && camera->params[2] == 321 && camera->params[3] == 239);
+    assert_true(camera->params[0] == 500 && camera->params[1] == 510 && camera->params[2] == 321 &&
+                camera->params[3] == 239);
     /* The quaternion (1, 1, 1, 1) / 2 takes x to y, y to z, z to x, so R^T (1, 2, 3) = (2, 3, 1). */
     const double rotation[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0}, center[3] = {-2, -3, -1};
     for (int k = 0; k < 9; k++)
@@ -98,7 +101,8 @@ static void good_model(void **state)
     assert_true(raw.position[3] == 2 && raw.position[4] == 2.25 && raw.position[5] == 2.5);
     assert_true(raw.has_color && raw.color[0] == 1.0f && raw.color[1] == 0.2f && raw.color[2] == 0.0f);
     assert_int_equal(raw.points_dropped + raw.tracks_missing + raw.trailing_bytes, 0);
-    /* The track of the first point, (1, 1.25, 1.5), names both images; the third row of that rotation is (0, 1, 0), the translation 3. */
+    /* The track of the first point, (1, 1.25, 1.5), names both images; the third row of that rotation is (0,
+       1, 0), the translation 3. */
     for (int i = 0; i < 2; i++)
         assert_int_equal(raw.views[i].sight_count, 1);
     assert_true(fabs(raw_nearest_sight(&raw.views[0]) - 4.25) < 1e-6);
@@ -131,7 +135,8 @@ static void cursor_ends(void **state)
     const source_file file = {"x", bytes, 7};
     cursor c = {.file = &file};
     assert_true(cursor_u32(&c) == 0x04030201 && c.at == 4 && !c.short_read);
-    assert_true(cursor_count_fits(&c, 3, 1) && !cursor_count_fits(&c, 4, 1) && cursor_count_fits(&c, 1, 3) && !cursor_count_fits(&c, 1, 4));
+    assert_true(cursor_count_fits(&c, 3, 1) && !cursor_count_fits(&c, 4, 1) && cursor_count_fits(&c, 1, 3) &&
+                !cursor_count_fits(&c, 1, 4));
     assert_int_equal(cursor_need(&c, 3, "it", NULL), GBT_OK);
     assert_int_equal(cursor_need(&c, 4, "it", NULL), GBT_ERR_FORMAT);
     assert_true(cursor_u32(&c) == 0 && c.at == 4 && c.short_read);
@@ -166,58 +171,91 @@ static bin_case bin_cases[] = {
     {"1 empty images", IMAGES, CUT, 0, .status = BAD, .says = "images.bin@0: file is empty"},
     {"1 empty points", POINTS, CUT, 0, .status = BAD, .says = "points3D.bin@0: file is empty"},
     {"2 shorter than the count", IMAGES, CUT, 7, .status = BAD, .says = "file ends inside the count"},
-    {"3 count 2^63 cameras", CAMERAS, SET_UINT, 0, 8, UINT64_C(1) << 63, .status = BAD, .says = "9223372036854775808 cameras cannot be"},
-    {"3 count 2^63 images", IMAGES, SET_UINT, 0, 8, UINT64_C(1) << 63, .status = BAD, .says = "9223372036854775808 images cannot be"},
-    {"3 count 2^63 points", POINTS, SET_UINT, 0, 8, UINT64_C(1) << 63, .status = BAD, .says = "9223372036854775808 points cannot be"},
-    {"3 count 2^64 - 1", POINTS, SET_UINT, 0, 8, UINT64_MAX, .status = BAD, .says = "cannot be in the 118 bytes"},
-    {"3 one camera too many", CAMERAS, SET_UINT, 0, 8, 2, .status = BAD, .says = "2 cameras cannot be in the 56 bytes"},
-    {"3 one image too many", IMAGES, SET_UINT, 0, 8, 3, .status = BAD, .says = "3 images cannot be in the 180 bytes"},
-    {"3 one point too many", POINTS, SET_UINT, 0, 8, 3, .status = BAD, .says = "3 points cannot be in the 118 bytes"},
+    {"3 count 2^63 cameras", CAMERAS, SET_UINT, 0, 8, UINT64_C(1) << 63, .status = BAD,
+     .says = "9223372036854775808 cameras cannot be"},
+    {"3 count 2^63 images", IMAGES, SET_UINT, 0, 8, UINT64_C(1) << 63, .status = BAD,
+     .says = "9223372036854775808 images cannot be"},
+    {"3 count 2^63 points", POINTS, SET_UINT, 0, 8, UINT64_C(1) << 63, .status = BAD,
+     .says = "9223372036854775808 points cannot be"},
+    {"3 count 2^64 - 1", POINTS, SET_UINT, 0, 8, UINT64_MAX, .status = BAD,
+     .says = "cannot be in the 118 bytes"},
+    {"3 one camera too many", CAMERAS, SET_UINT, 0, 8, 2, .status = BAD,
+     .says = "2 cameras cannot be in the 56 bytes"},
+    {"3 one image too many", IMAGES, SET_UINT, 0, 8, 3, .status = BAD,
+     .says = "3 images cannot be in the 180 bytes"},
+    {"3 one point too many", POINTS, SET_UINT, 0, 8, 3, .status = BAD,
+     .says = "3 points cannot be in the 118 bytes"},
     {"4 cameras cut in the parameters", CAMERAS, CUT, 63, .status = BAD,
      .says = "cameras.bin@32: file ends inside the camera's parameters"},
-    {"4 images cut in a pose", IMAGES, CUT, 160, .status = BAD, .says = "images.bin@110: file ends inside an image"},
-    {"4 images cut in the observation count", IMAGES, CUT, 184, .status = BAD, .says = "file ends inside the count of observations"},
+    {"4 images cut in a pose", IMAGES, CUT, 160, .status = BAD,
+     .says = "images.bin@110: file ends inside an image"},
+    {"4 images cut in the observation count", IMAGES, CUT, 184, .status = BAD,
+     .says = "file ends inside the count of observations"},
     {"4 points cut", POINTS, CUT, 125, .status = BAD, .says = "points3D.bin@75: file ends inside a point"},
     {"5 extra bytes", IMAGES, APPEND, 5, .status = GBT_OK, .trailing = 5},
-    {"6 model 99", CAMERAS, SET_UINT, 12, 4, 99, .status = BAD, .says = "cameras.bin@8: unknown camera model id 99"},
+    {"6 model 99", CAMERAS, SET_UINT, 12, 4, 99, .status = BAD,
+     .says = "cameras.bin@8: unknown camera model id 99"},
     {"6 model -1", CAMERAS, SET_UINT, 12, 4, UINT32_MAX, .status = BAD, .says = "unknown camera model id -1"},
     {"6 model 18", CAMERAS, SET_UINT, 12, 4, 18, .status = BAD, .says = "unknown camera model id 18"},
-    {"6 model 100 is ours alone", CAMERAS, SET_UINT, 12, 4, 100, .status = BAD, .says = "unknown camera model id 100"},
-    {"7 model with distortion, too short", CAMERAS, SET_UINT, 12, 4, 4, .status = BAD, .says = "wanted 64 more bytes, got 32"},
+    {"6 model 100 is ours alone", CAMERAS, SET_UINT, 12, 4, 100, .status = BAD,
+     .says = "unknown camera model id 100"},
+    {"7 model with distortion, too short", CAMERAS, SET_UINT, 12, 4, 4, .status = BAD,
+     .says = "wanted 64 more bytes, got 32"},
     {"8 width 0", CAMERAS, SET_UINT, 16, 8, 0, .status = BAD, .says = "wanted 1..65500, got 0 x 480"},
     {"8 height 65501", CAMERAS, SET_UINT, 24, 8, 65501, .status = BAD, .says = "got 640 x 65501"},
     {"8 height 65500", CAMERAS, SET_UINT, 24, 8, 65500, .status = GBT_OK},
-    {"8 width 2^32 + 640", CAMERAS, SET_UINT, 16, 8, (UINT64_C(1) << 32) + 640, .status = BAD, .says = "out of range"},
-    {"9 fx 0", CAMERAS, SET_DOUBLE, 32, .number = 0, .status = BAD, .says = "focal length of camera model PINHOLE is not positive"},
-    {"9 fx negative", CAMERAS, SET_DOUBLE, 32, .number = -500, .status = BAD, .says = "not positive (got -500)"},
-    {"9 fx NaN", CAMERAS, SET_DOUBLE, 32, .number = NOT_A_NUMBER, .status = BAD, .says = "parameter 0 of camera model PINHOLE"},
-    {"9 fx infinite", CAMERAS, SET_DOUBLE, 32, .number = INF, .status = BAD, .says = "parameter 0 of camera model PINHOLE"},
+    {"8 width 2^32 + 640", CAMERAS, SET_UINT, 16, 8, (UINT64_C(1) << 32) + 640, .status = BAD,
+     .says = "out of range"},
+    {"9 fx 0", CAMERAS, SET_DOUBLE, 32, .number = 0, .status = BAD,
+     .says = "focal length of camera model PINHOLE is not positive"},
+    {"9 fx negative", CAMERAS, SET_DOUBLE, 32, .number = -500, .status = BAD,
+     .says = "not positive (got -500)"},
+    {"9 fx NaN", CAMERAS, SET_DOUBLE, 32, .number = NOT_A_NUMBER, .status = BAD,
+     .says = "parameter 0 of camera model PINHOLE"},
+    {"9 fx infinite", CAMERAS, SET_DOUBLE, 32, .number = INF, .status = BAD,
+     .says = "parameter 0 of camera model PINHOLE"},
     {"9 fy 0", CAMERAS, SET_DOUBLE, 40, .number = 0, .status = BAD, .says = "not positive"},
-    {"10 cx NaN", CAMERAS, SET_DOUBLE, 48, .number = NOT_A_NUMBER, .status = BAD, .says = "parameter 2 of camera model PINHOLE"},
-    {"10 cy infinite", CAMERAS, SET_DOUBLE, 56, .number = -INF, .status = BAD, .says = "parameter 3 of camera model PINHOLE"},
-    {"12 missing camera", IMAGES, SET_UINT, 170, 4, 8, .status = BAD, .says = "images.bin@110: image refers to camera 8"},
-    {"13 duplicate image id", IMAGES, SET_UINT, 110, 4, 10, .status = BAD, .says = "images.bin: duplicate image id 10"},
-    {"14 name without end", IMAGES, CUT, 179, .status = BAD, .says = "images.bin@174: image name does not end"},
+    {"10 cx NaN", CAMERAS, SET_DOUBLE, 48, .number = NOT_A_NUMBER, .status = BAD,
+     .says = "parameter 2 of camera model PINHOLE"},
+    {"10 cy infinite", CAMERAS, SET_DOUBLE, 56, .number = -INF, .status = BAD,
+     .says = "parameter 3 of camera model PINHOLE"},
+    {"12 missing camera", IMAGES, SET_UINT, 170, 4, 8, .status = BAD,
+     .says = "images.bin@110: image refers to camera 8"},
+    {"13 duplicate image id", IMAGES, SET_UINT, 110, 4, 10, .status = BAD,
+     .says = "images.bin: duplicate image id 10"},
+    {"14 name without end", IMAGES, CUT, 179, .status = BAD,
+     .says = "images.bin@174: image name does not end"},
     {"15 name empty", IMAGES, SET_UINT, 174, 1, 0, .status = BAD, .says = "image name is empty"},
-    {"15 name absolute", IMAGES, PUT_TEXT, 174, .text = "/.png", .status = BAD, .says = "image name is absolute"},
+    {"15 name absolute", IMAGES, PUT_TEXT, 174, .text = "/.png", .status = BAD,
+     .says = "image name is absolute"},
     {"15 name with ..", IMAGES, PUT_TEXT, 174, .text = "../ab", .status = BAD, .says = "leaves the data set"},
-    {"15 name ends in ..", IMAGES, PUT_TEXT, 174, .text = "ab/..", .status = BAD, .says = "leaves the data set"},
+    {"15 name ends in ..", IMAGES, PUT_TEXT, 174, .text = "ab/..", .status = BAD,
+     .says = "leaves the data set"},
     {"15 name with dots inside", IMAGES, PUT_TEXT, 174, .text = "a..b.", .status = GBT_OK},
-    {"15 name with a newline", IMAGES, PUT_TEXT, 174, .text = "a\n.pn", .status = BAD, .says = "control character"},
-    {"15 name with DEL", IMAGES, PUT_TEXT, 174, .text = "a\x7f.pn", .status = BAD, .says = "control character"},
+    {"15 name with a newline", IMAGES, PUT_TEXT, 174, .text = "a\n.pn", .status = BAD,
+     .says = "control character"},
+    {"15 name with DEL", IMAGES, PUT_TEXT, 174, .text = "a\x7f.pn", .status = BAD,
+     .says = "control character"},
     {"15 name with a space", IMAGES, PUT_TEXT, 174, .text = "a b.p", .status = GBT_OK},
-    {"17 quaternion with NaN", IMAGES, SET_DOUBLE, 114, .number = NOT_A_NUMBER, .status = BAD, .says = "quaternion is not of unit length"},
-    {"17 quaternion too long", IMAGES, SET_DOUBLE, 114, .number = 0.503, .status = BAD, .says = "quaternion is not of unit length"},
+    {"17 quaternion with NaN", IMAGES, SET_DOUBLE, 114, .number = NOT_A_NUMBER, .status = BAD,
+     .says = "quaternion is not of unit length"},
+    {"17 quaternion too long", IMAGES, SET_DOUBLE, 114, .number = 0.503, .status = BAD,
+     .says = "quaternion is not of unit length"},
     {"17 quaternion nearly unit", IMAGES, SET_DOUBLE, 114, .number = 0.501, .status = GBT_OK},
-    {"17 quaternion infinite", IMAGES, SET_DOUBLE, 114, .number = INF, .status = BAD, .says = "quaternion is not of unit length"},
-    {"18 translation NaN", IMAGES, SET_DOUBLE, 146, .number = NOT_A_NUMBER, .status = BAD, .says = "translation is not usable"},
+    {"17 quaternion infinite", IMAGES, SET_DOUBLE, 114, .number = INF, .status = BAD,
+     .says = "quaternion is not of unit length"},
+    {"18 translation NaN", IMAGES, SET_DOUBLE, 146, .number = NOT_A_NUMBER, .status = BAD,
+     .says = "translation is not usable"},
     {"18 translation 1e30", IMAGES, SET_DOUBLE, 146, .number = 1e30, .status = BAD, .says = "got 1e+30"},
     {"18 translation 1e12", IMAGES, SET_DOUBLE, 146, .number = 1e12, .status = GBT_OK},
     {"19 observation count 2^61", IMAGES, SET_UINT, 180, 8, UINT64_C(1) << 61, .status = BAD,
      .says = "images.bin@180: 2305843009213693952 obs"},
-    {"19 observation count wraps", IMAGES, SET_UINT, 180, 8, UINT64_C(0x0AAAAAAAAAAAAAAB), .status = BAD, .says = "observations cannot be"},
-    {"20 track length 2^61", POINTS, SET_UINT, 118, 8, UINT64_C(1) << 61, .status = BAD, .says = "points3D.bin@118: a track of 2305843009"},
-    {"20 track length 1 too many", POINTS, SET_UINT, 118, 8, 1, .status = BAD, .says = "a track of 1 entries cannot be"},
+    {"19 observation count wraps", IMAGES, SET_UINT, 180, 8, UINT64_C(0x0AAAAAAAAAAAAAAB), .status = BAD,
+     .says = "observations cannot be"},
+    {"20 track length 2^61", POINTS, SET_UINT, 118, 8, UINT64_C(1) << 61, .status = BAD,
+     .says = "points3D.bin@118: a track of 2305843009"},
+    {"20 track length 1 too many", POINTS, SET_UINT, 118, 8, 1, .status = BAD,
+     .says = "a track of 1 entries cannot be"},
     {"21 point NaN", POINTS, SET_DOUBLE, 16, .number = NOT_A_NUMBER, .status = GBT_OK, .dropped = 1},
     {"21 point infinite", POINTS, SET_DOUBLE, 99, .number = -INF, .status = GBT_OK, .dropped = 1},
     {"21 point far beyond use", POINTS, SET_DOUBLE, 91, .number = 1e13, .status = GBT_OK, .dropped = 1},
@@ -225,18 +263,29 @@ static bin_case bin_cases[] = {
     {"22 error NaN", POINTS, SET_DOUBLE, 43, .number = NOT_A_NUMBER, .status = GBT_OK},
     {"23 track names a missing image", POINTS, SET_UINT, 59, 4, 99, .status = GBT_OK, .tracks_missing = 1},
     {"24 big-endian count", CAMERAS, SET_UINT, 0, 8, UINT64_C(1) << 56, .status = BAD, .says = "big-endian"},
-    {"25 text in place of binary", CAMERAS, PUT_TEXT, 0, .text = "# Camera list with one line", .status = BAD, .says = "looks like text"},
+    {"25 text in place of binary", CAMERAS, PUT_TEXT, 0, .text = "# Camera list with one line", .status = BAD,
+     .says = "looks like text"},
     {"28 no images", IMAGES, SET_UINT, 0, 8, 0, .status = GBT_OK, .trailing = 180, .tracks_missing = 2},
 };
 
 static void apply_edit(const bin_case *c, sink *target)
 {
     switch (c->kind) {
-    case SET_UINT: memcpy(target->bytes + c->at, &c->value, c->width); break;
-    case SET_DOUBLE: memcpy(target->bytes + c->at, &c->number, 8); break;
-    case CUT: target->size = c->at; break;
-    case APPEND: sink_put(target, "extra bytes", c->at); break;
-    case PUT_TEXT: memcpy(target->bytes + c->at, c->text, strlen(c->text) + (c->at > 0)); break;
+    case SET_UINT:
+        memcpy(target->bytes + c->at, &c->value, c->width);
+        break;
+    case SET_DOUBLE:
+        memcpy(target->bytes + c->at, &c->number, 8);
+        break;
+    case CUT:
+        target->size = c->at;
+        break;
+    case APPEND:
+        sink_put(target, "extra bytes", c->at);
+        break;
+    case PUT_TEXT:
+        memcpy(target->bytes + c->at, c->text, strlen(c->text) + (c->at > 0));
+        break;
     }
 }
 
@@ -250,7 +299,9 @@ static void malformed_binary(void **state)
     for (int i = 0; i < 3; i++)
         copies[i] = exact_copy(seed[i].bytes, seed[i].size);
     colmap_files files = files_of(seed);
-    files.cameras.bytes = copies[CAMERAS], files.images.bytes = copies[IMAGES], files.points.bytes = copies[POINTS];
+    files.cameras.bytes = copies[CAMERAS];
+    files.images.bytes = copies[IMAGES];
+    files.points.bytes = copies[POINTS];
     raw_scene raw = {0};
     gbt_error err = {0};
     const gbt_status status = colmap_bin_read(&files, &raw, &err);
@@ -280,7 +331,8 @@ static void duplicate_cameras(void **state)
     sink_put(&twice, seed[CAMERAS].bytes + 8, 56);
     sink_put(&twice, seed[CAMERAS].bytes + 8, 56);
     colmap_files files = files_of(seed);
-    files.cameras.bytes = twice.bytes, files.cameras.size = twice.size;
+    files.cameras.bytes = twice.bytes;
+    files.cameras.size = twice.size;
     raw_scene raw = {0};
     gbt_error err = {0};
     assert_int_equal(colmap_bin_read(&files, &raw, &err), GBT_ERR_FORMAT);
@@ -304,12 +356,14 @@ static void name_length_limit(void **state)
         sink_put_uint(&longer, 0, 1);
         sink_put_uint(&longer, 0, 8);
         colmap_files files = files_of(seed);
-        files.images.bytes = longer.bytes, files.images.size = longer.size;
+        files.images.bytes = longer.bytes;
+        files.images.size = longer.size;
         raw_scene raw = {0};
         gbt_error err = {0};
         const gbt_status status = colmap_bin_read(&files, &raw, &err);
         assert_int_equal(status, length == 4096 ? GBT_OK : GBT_ERR_FORMAT);
-        assert_true(status == GBT_OK || strstr(err.text, "too long (wanted at most 4096 bytes, got 4097)") != NULL);
+        assert_true(status == GBT_OK ||
+                    strstr(err.text, "too long (wanted at most 4096 bytes, got 4097)") != NULL);
         raw_free(&raw);
         sink_free(&longer);
         free_seed(seed);
@@ -329,7 +383,8 @@ static void all_models(void **state)
         for (int k = 0; k < count; k++)
             sink_put_f64(&camera, 0.25 + k);
         colmap_files files = files_of(seed);
-        files.cameras.bytes = camera.bytes, files.cameras.size = camera.size;
+        files.cameras.bytes = camera.bytes;
+        files.cameras.size = camera.size;
         raw_scene raw = {0};
         must(colmap_bin_read(&files, &raw, &err));
         assert_int_equal(raw.views[1].camera.model, id);
@@ -353,16 +408,23 @@ static void try_model(const unsigned char *bytes, size_t size, void *context)
 {
     mutation *m = context;
     colmap_files files = files_of(m->seed);
-    source_file *target = m->file == CAMERAS ? &files.cameras : m->file == IMAGES ? &files.images : &files.points;
-    target->bytes = bytes, target->size = size;
+    source_file *target = m->file == CAMERAS  ? &files.cameras
+                          : m->file == IMAGES ? &files.images
+                                              : &files.points;
+    target->bytes = bytes;
+    target->size = size;
     raw_scene raw = {0};
     gbt_error err = {0};
-    const gbt_status status = m->text ? colmap_txt_read(&files, &raw, &err) : colmap_bin_read(&files, &raw, &err);
+    const gbt_status status =
+        m->text ? colmap_txt_read(&files, &raw, &err) : colmap_bin_read(&files, &raw, &err);
     check_message(status, &err);
-    if (status == GBT_OK)
-        check_raw(&raw), m->accepted++;
-    else
-        assert_int_equal(status, GBT_ERR_FORMAT), m->refused++;
+    if (status == GBT_OK) {
+        check_raw(&raw);
+        m->accepted++;
+    } else {
+        assert_int_equal(status, GBT_ERR_FORMAT);
+        m->refused++;
+    }
     raw_free(&raw);
 }
 
@@ -379,8 +441,10 @@ static void mutations_of_binary(void **state)
 }
 
 static const char good_cameras[] = "# comment\n7 PINHOLE 640 480 500 510 321 239\n";
-static const char good_images[] = "# comment\n10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n12.5 13.5 3\n11 0.5 0.5 0.5 -0.5 1 2 4 7 a.png\n\n";
-static const char good_points[] = "# comment\n3 1 1.25 1.5 255 51 0 0.5 10 0 11 0\n4 2 2.25 2.5 255 51 0 0.5\n";
+static const char good_images[] =
+    "# comment\n10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n12.5 13.5 3\n11 0.5 0.5 0.5 -0.5 1 2 4 7 a.png\n\n";
+static const char good_points[] =
+    "# comment\n3 1 1.25 1.5 255 51 0 0.5 10 0 11 0\n4 2 2.25 2.5 255 51 0 0.5\n";
 
 static void mutations_of_text(void **state)
 {
@@ -413,54 +477,74 @@ static txt_case txt_cases[] = {
     {"32 nan in a point", NULL, NULL, "3 nan 1 1 255 51 0 0.5\n4 2 2 2 1 2 3 0\n", GBT_OK, NULL, 2, 1, 1},
     {"32 -nan(ind) in a point", NULL, NULL, "3 -nan(ind) 1 1 255 51 0 0.5\n", GBT_OK, NULL, 2, 0, 1},
     {"32 inf in a point", NULL, NULL, "3 1 1 inf 255 51 0 0.5\n", GBT_OK, NULL, 2, 0, 1},
-    {"32 nan focal length", "7 PINHOLE 640 480 nan 510 321 239\n", NULL, NULL, BAD, "cameras.txt:1: parameter 0", 0, 0, 0},
-    {"32 nan pose", NULL, "10 nan 0.5 0.5 0.5 1 2 3 7 b.png\n\n", NULL, BAD, "images.txt:1: quaternion", 0, 0, 0},
-    {"33 CRLF", "7 PINHOLE 640 480 500 510 321 239\r\n",
-     "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\r\n\r\n11 0.5 0.5 0.5 -0.5 1 2 4 7 a.png\r\n\r\n", "3 1 1.25 1.5 255 51 0 0.5 10 0 11 0\r\n", GBT_OK,
-     NULL, 2, 1, 0},
-    {"33 byte order mark", "\xEF\xBB\xBF" "7 PINHOLE 640 480 500 510 321 239\n", NULL, NULL, GBT_OK, NULL, 2, 2, 0},
-    {"34 blank observation line", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n\n11 0.5 0.5 0.5 -0.5 1 2 4 7 a.png\n", NULL, GBT_OK, NULL, 2, 2,
+    {"32 nan focal length", "7 PINHOLE 640 480 nan 510 321 239\n", NULL, NULL, BAD,
+     "cameras.txt:1: parameter 0", 0, 0, 0},
+    {"32 nan pose", NULL, "10 nan 0.5 0.5 0.5 1 2 3 7 b.png\n\n", NULL, BAD, "images.txt:1: quaternion", 0, 0,
      0},
-    {"34 blank lines between images", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n\n\n# x\n11 0.5 0.5 0.5 -0.5 1 2 4 7 a.png\n\n", NULL,
-     GBT_OK, NULL, 2, 2, 0},
-    {"35 name with spaces", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7 my photo 1.png \n\n", NULL, GBT_OK, NULL, 1, 2, 0},
+    {"33 CRLF", "7 PINHOLE 640 480 500 510 321 239\r\n",
+     "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\r\n\r\n11 0.5 0.5 0.5 -0.5 1 2 4 7 a.png\r\n\r\n",
+     "3 1 1.25 1.5 255 51 0 0.5 10 0 11 0\r\n", GBT_OK, NULL, 2, 1, 0},
+    {"33 byte order mark",
+     "\xEF\xBB\xBF"
+     "7 PINHOLE 640 480 500 510 321 239\n",
+     NULL, NULL, GBT_OK, NULL, 2, 2, 0},
+    {"34 blank observation line", NULL,
+     "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n\n11 0.5 0.5 0.5 -0.5 1 2 4 7 a.png\n", NULL, GBT_OK, NULL, 2, 2, 0},
+    {"34 blank lines between images", NULL,
+     "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n\n\n# x\n11 0.5 0.5 0.5 -0.5 1 2 4 7 a.png\n\n", NULL, GBT_OK, NULL,
+     2, 2, 0},
+    {"35 name with spaces", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7 my photo 1.png \n\n", NULL, GBT_OK, NULL, 1, 2,
+     0},
     {"36 observations not in threes", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n1 2 -1 4\n", NULL, BAD,
      "images.txt:2: observations are not triples", 0, 0, 0},
     {"36 observation not a number", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n1 2 x\n", NULL, BAD,
      "images.txt:2: an observation is not a number: x", 0, 0, 0},
-    {"36 observation line forgotten", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n11 0.5 0.5 0.5 -0.5 1 2 4 7 a.png\n", NULL, BAD,
+    {"36 observation line forgotten", NULL,
+     "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n11 0.5 0.5 0.5 -0.5 1 2 4 7 a.png\n", NULL, BAD,
      "images.txt:2: an observation is not a number: a.png", 0, 0, 0},
-    {"38 camera lacks a column", "7 PINHOLE 640 480 500 510 321\n", NULL, NULL, BAD, "cameras.txt:1: line ends before a camera parameter",
-     0, 0, 0},
+    {"38 camera lacks a column", "7 PINHOLE 640 480 500 510 321\n", NULL, NULL, BAD,
+     "cameras.txt:1: line ends before a camera parameter", 0, 0, 0},
     {"38 camera has a column too many", "7 PINHOLE 640 480 500 510 321 239 0\n", NULL, NULL, BAD,
      "cameras.txt:1: camera has too many fields, from 0", 0, 0, 0},
-    {"38 image lacks a name", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7\n\n", NULL, BAD, "images.txt:1: line ends before the image name", 0, 0, 0},
-    {"38 point lacks a column", NULL, NULL, "3 1 1 1 255 51 0\n", BAD, "points3D.txt:1: line ends before the error", 0, 0, 0},
-    {"38 track with half a pair", NULL, NULL, "3 1 1 1 255 51 0 0.5 10\n", BAD, "line ends before a track's observation", 0, 0, 0},
-    {"39 overflow", NULL, NULL, "# x\n3 1e999 1 1 255 51 0 0.5\n", BAD, "points3D.txt:2: the position is out of range: 1e999", 0, 0, 0},
-    {"39 integer overflow", NULL, "4294967296 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n\n", NULL, BAD, "the image id is out of range: 4294967296", 0,
-     0, 0},
+    {"38 image lacks a name", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7\n\n", NULL, BAD,
+     "images.txt:1: line ends before the image name", 0, 0, 0},
+    {"38 point lacks a column", NULL, NULL, "3 1 1 1 255 51 0\n", BAD,
+     "points3D.txt:1: line ends before the error", 0, 0, 0},
+    {"38 track with half a pair", NULL, NULL, "3 1 1 1 255 51 0 0.5 10\n", BAD,
+     "line ends before a track's observation", 0, 0, 0},
+    {"39 overflow", NULL, NULL, "# x\n3 1e999 1 1 255 51 0 0.5\n", BAD,
+     "points3D.txt:2: the position is out of range: 1e999", 0, 0, 0},
+    {"39 integer overflow", NULL, "4294967296 0.5 0.5 0.5 0.5 1 2 3 7 b.png\n\n", NULL, BAD,
+     "the image id is out of range: 4294967296", 0, 0, 0},
     {"39 colour 256", NULL, NULL, "3 1 1 1 256 51 0 0.5\n", BAD, "the colour is out of range: 256", 0, 0, 0},
-    {"39 negative id", "-7 PINHOLE 640 480 500 510 321 239\n", NULL, NULL, BAD, "the camera id is not a number: -7", 0, 0, 0},
-    {"39 width 2^31", "7 PINHOLE 2147483648 480 500 510 321 239\n", NULL, NULL, BAD, "the image width is out of range", 0, 0, 0},
-    {"39 width 65501", "7 PINHOLE 65501 480 500 510 321 239\n", NULL, NULL, BAD, "image width is out of range (wanted 1..65500, got 65501)",
-     0, 0, 0},
+    {"39 negative id", "-7 PINHOLE 640 480 500 510 321 239\n", NULL, NULL, BAD,
+     "the camera id is not a number: -7", 0, 0, 0},
+    {"39 width 2^31", "7 PINHOLE 2147483648 480 500 510 321 239\n", NULL, NULL, BAD,
+     "the image width is out of range", 0, 0, 0},
+    {"39 width 65501", "7 PINHOLE 65501 480 500 510 321 239\n", NULL, NULL, BAD,
+     "image width is out of range (wanted 1..65500, got 65501)", 0, 0, 0},
     {"40 only comments", "# nothing\n", "# nothing\n", "# nothing\n", GBT_OK, NULL, 0, 0, 0},
-    {"40 cameras only comments", "# nothing\n", NULL, NULL, BAD, "images.txt:2: image refers to camera 7", 0, 0, 0},
-    {"41 no final newline", "7 PINHOLE 640 480 500 510 321 239", "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png", "3 1 1 1 255 51 0 0.5", GBT_OK, NULL,
-     1, 1, 0},
-    {"6 unknown model", "7 MAGIC 640 480 500\n", NULL, NULL, BAD, "cameras.txt:1: unknown camera model: MAGIC", 0, 0, 0},
-    {"6 model name cut", "7 PINHOL 640 480 500 510 321 239\n", NULL, NULL, BAD, "unknown camera model: PINHOL", 0, 0, 0},
-    {"6 model is ours alone", "7 ORTHOGRAPHIC 640 480 1 1 0 0\n", NULL, NULL, BAD, "unknown camera model: ORTHOGRAPHIC", 0, 0, 0},
-    {"11 duplicate camera", "7 PINHOLE 640 480 500 510 321 239\n7 PINHOLE 640 480 500 510 321 239\n", NULL, NULL, BAD,
-     "duplicate camera id 7", 0, 0, 0},
-    {"15 name leaves", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7 a/../../b.png\n\n", NULL, BAD, "images.txt:1: image name leaves", 0, 0, 0},
+    {"40 cameras only comments", "# nothing\n", NULL, NULL, BAD, "images.txt:2: image refers to camera 7", 0,
+     0, 0},
+    {"41 no final newline", "7 PINHOLE 640 480 500 510 321 239", "10 0.5 0.5 0.5 0.5 1 2 3 7 b.png",
+     "3 1 1 1 255 51 0 0.5", GBT_OK, NULL, 1, 1, 0},
+    {"6 unknown model", "7 MAGIC 640 480 500\n", NULL, NULL, BAD,
+     "cameras.txt:1: unknown camera model: MAGIC", 0, 0, 0},
+    {"6 model name cut", "7 PINHOL 640 480 500 510 321 239\n", NULL, NULL, BAD,
+     "unknown camera model: PINHOL", 0, 0, 0},
+    {"6 model is ours alone", "7 ORTHOGRAPHIC 640 480 1 1 0 0\n", NULL, NULL, BAD,
+     "unknown camera model: ORTHOGRAPHIC", 0, 0, 0},
+    {"11 duplicate camera", "7 PINHOLE 640 480 500 510 321 239\n7 PINHOLE 640 480 500 510 321 239\n", NULL,
+     NULL, BAD, "duplicate camera id 7", 0, 0, 0},
+    {"15 name leaves", NULL, "10 0.5 0.5 0.5 0.5 1 2 3 7 a/../../b.png\n\n", NULL, BAD,
+     "images.txt:1: image name leaves", 0, 0, 0},
 };
 
 static void malformed_text(void **state)
 {
     const txt_case *c = *state;
-    const char *texts[3] = {c->cameras != NULL ? c->cameras : good_cameras, c->images != NULL ? c->images : good_images,
+    const char *texts[3] = {c->cameras != NULL ? c->cameras : good_cameras,
+                            c->images != NULL ? c->images : good_images,
                             c->points != NULL ? c->points : good_points};
     unsigned char *copies[3];
     for (int i = 0; i < 3; i++)
@@ -496,9 +580,10 @@ static void very_long_line(void **state)
     while (images.size < 10000000)
         sink_put_text(&images, "123.5 456.25 -1 ");
     sink_put_text(&images, "\n");
-    colmap_files files = {.cameras = {"cameras.txt", (const unsigned char *)good_cameras, strlen(good_cameras)},
-                          .images = {"images.txt", images.bytes, images.size},
-                          .points = {"points3D.txt", (const unsigned char *)good_points, strlen(good_points)}};
+    colmap_files files = {
+        .cameras = {"cameras.txt", (const unsigned char *)good_cameras, strlen(good_cameras)},
+        .images = {"images.txt", images.bytes, images.size},
+        .points = {"points3D.txt", (const unsigned char *)good_points, strlen(good_points)}};
     raw_scene raw = {0};
     must(colmap_txt_read(&files, &raw, &err));
     assert_int_equal(raw.view_count, 1);
@@ -530,7 +615,8 @@ static void build_trip(trip *t)
         colmap_image *im = &t->images[i];
         snprintf(t->names[i], sizeof t->names[i], "part %u/photo %u.png", i % 2, TRIP_IMAGES - i);
         im->name = t->names[i];
-        im->camera = (gbt_camera){.model = i % 3 == 0 ? GBT_CAMERA_OPENCV : GBT_CAMERA_SIMPLE_RADIAL, .width = 64, .height = 48};
+        im->camera = (gbt_camera){
+            .model = i % 3 == 0 ? GBT_CAMERA_OPENCV : GBT_CAMERA_SIMPLE_RADIAL, .width = 64, .height = 48};
         const int count = gbt_camera_param_count(im->camera.model);
         for (int k = 0; k < count; k++)
             im->camera.params[k] = 50.1 + k / 3.0;
@@ -548,18 +634,22 @@ static void build_trip(trip *t)
         im->observations = t->observations[i];
         im->observation_count = i == 4 ? 0 : TRIP_POINTS;
         for (unsigned k = 0; k < TRIP_POINTS; k++)
-            t->observations[i][k] = (colmap_observation){random_in(200 + i, k, 0, 64), random_in(300 + i, k, 0, 48),
-                                                         k % 5 == 0 ? COLMAP_NO_POINT : k};
+            t->observations[i][k] = (colmap_observation){
+                random_in(200 + i, k, 0, 64), random_in(300 + i, k, 0, 48), k % 5 == 0 ? COLMAP_NO_POINT : k};
     }
     for (unsigned i = 0; i < TRIP_POINTS; i++) {
         colmap_point *p = &t->points[i];
-        for (unsigned k = 0; k < 3; k++)
-            p->position[k] = random_in(400 + i, k, -3, 3) + 1e5, p->color[k] = (unsigned char)(i * 7 + k);
+        for (unsigned k = 0; k < 3; k++) {
+            p->position[k] = random_in(400 + i, k, -3, 3) + 1e5;
+            p->color[k] = (unsigned char)(i * 7 + k);
+        }
         p->error = i == 0 ? -1 : random_in(500, i, 0, 2);
         p->track = &t->tracks[i][0][0];
         p->track_count = i % 4;
-        for (unsigned k = 0; k < p->track_count; k++)
-            t->tracks[i][k][0] = k, t->tracks[i][k][1] = i;
+        for (unsigned k = 0; k < p->track_count; k++) {
+            t->tracks[i][k][0] = k;
+            t->tracks[i][k][1] = i;
+        }
     }
 }
 
@@ -587,7 +677,8 @@ static void check_trip(const trip *t, const scene *s)
         for (int k = 0; k < 9; k++)
             assert_true(fabs(got->rotation[k] - want->rotation[k]) < 1e-15);
         for (int k = 0; k < 3; k++)
-            assert_true(fabs(got->center[k] + s->origin[k] - want->center[k]) < 1e-9); /* of 1e5, and two rotations */
+            assert_true(fabs(got->center[k] + s->origin[k] - want->center[k]) < 1e-9); /* of 1e5, and two
+                                                                                          rotations */
     }
     for (size_t i = 0; i < TRIP_POINTS; i++)
         for (size_t k = 0; k < 3; k++) {
@@ -618,8 +709,12 @@ static void round_trip(void **state)
     check_trip(t, &binary);
     /* The text twin says exactly the same. */
     for (int i = 0; i < 3; i++)
-        unlink(inside(folder, (const char *const[]){"sparse/0/cameras.bin", "sparse/0/images.bin", "sparse/0/points3D.bin"}[i], 0));
-    must(colmap_write_text(inside(folder, "sparse/0", 0), t->images, TRIP_IMAGES, t->points, TRIP_POINTS, &err));
+        unlink(inside(
+            folder,
+            (const char *const[]){"sparse/0/cameras.bin", "sparse/0/images.bin", "sparse/0/points3D.bin"}[i],
+            0));
+    must(colmap_write_text(inside(folder, "sparse/0", 0), t->images, TRIP_IMAGES, t->points, TRIP_POINTS,
+                           &err));
     must(scene_load(folder, NULL, &text, &err));
     assert_string_equal(text.source, "colmap-txt");
     check_trip(t, &text);
@@ -628,9 +723,11 @@ static void round_trip(void **state)
     assert_memory_equal(binary.points.color, text.points.color, 3 * TRIP_POINTS * sizeof(float));
     for (size_t i = 0; i < TRIP_IMAGES; i++) {
         assert_string_equal(binary.views[i].name, text.views[i].name);
-        assert_memory_equal(binary.views[i].camera.rotation, text.views[i].camera.rotation, 9 * sizeof(double));
+        assert_memory_equal(binary.views[i].camera.rotation, text.views[i].camera.rotation,
+                            9 * sizeof(double));
         assert_memory_equal(binary.views[i].camera.center, text.views[i].camera.center, 3 * sizeof(double));
-        assert_memory_equal(binary.views[i].camera.params, text.views[i].camera.params, sizeof text.views[i].camera.params);
+        assert_memory_equal(binary.views[i].camera.params, text.views[i].camera.params,
+                            sizeof text.views[i].camera.params);
     }
     scene_free(&binary);
     scene_free(&text);
@@ -660,14 +757,25 @@ static void writer_refuses(void **state)
     for (int i = 0; i < 5; i++) {
         build_trip(t);
         switch (i) {
-        case 0: t->images[2].name = "../x.png"; break;
-        case 1: t->images[2].camera.params[0] = 0; break;
-        case 2: t->observations[2][3].point = TRIP_POINTS; break;
-        case 3: t->tracks[1][0][0] = TRIP_IMAGES; break;
-        default: t->tracks[3][2][1] = TRIP_POINTS; break;
+        case 0:
+            t->images[2].name = "../x.png";
+            break;
+        case 1:
+            t->images[2].camera.params[0] = 0;
+            break;
+        case 2:
+            t->observations[2][3].point = TRIP_POINTS;
+            break;
+        case 3:
+            t->tracks[1][0][0] = TRIP_IMAGES;
+            break;
+        default:
+            t->tracks[3][2][1] = TRIP_POINTS;
+            break;
         }
         gbt_error err = {0};
-        assert_int_equal(colmap_write(folder, t->images, TRIP_IMAGES, t->points, TRIP_POINTS, &err), GBT_ERR_ARGUMENT);
+        assert_int_equal(colmap_write(folder, t->images, TRIP_IMAGES, t->points, TRIP_POINTS, &err),
+                         GBT_ERR_ARGUMENT);
         check_message(GBT_ERR_ARGUMENT, &err);
         assert_false(file_exists(inside(folder, "cameras.bin", 0)));
     }
@@ -693,9 +801,11 @@ int main(void)
     };
     static struct CMUnitTest tests[BIN + TXT];
     for (size_t i = 0; i < BIN; i++)
-        tests[i] = (struct CMUnitTest){.name = bin_cases[i].name, .test_func = malformed_binary, .initial_state = &bin_cases[i]};
+        tests[i] = (struct CMUnitTest){
+            .name = bin_cases[i].name, .test_func = malformed_binary, .initial_state = &bin_cases[i]};
     for (size_t i = 0; i < TXT; i++)
-        tests[BIN + i] = (struct CMUnitTest){.name = txt_cases[i].name, .test_func = malformed_text, .initial_state = &txt_cases[i]};
+        tests[BIN + i] = (struct CMUnitTest){
+            .name = txt_cases[i].name, .test_func = malformed_text, .initial_state = &txt_cases[i]};
     const int failures = cmocka_run_group_tests_name("colmap, malformed", tests, NULL, NULL);
     return failures + cmocka_run_group_tests_name("colmap", fixed, NULL, NULL);
 }

@@ -1,5 +1,6 @@
-/* tests/data/test_gaussian_file.c -- plain Gaussians to .ply, .splat, .spz, .glb and back: what each format keeps, its bytes, damaged
-   files. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/data/test_gaussian_file.c -- plain Gaussians to .ply, .splat, .spz, .glb and back: what each format
+   keeps, its bytes, damaged files. */
 #include <jansson.h>
 #include <zlib.h>
 
@@ -23,14 +24,19 @@ static void make_cloud(gaussian_cloud *c, size_t count, int degree)
     for (size_t i = 0; i < count; i++) {
         float square = 0;
         c->opacity[i] = between(1, i, 0.01f, 0.99f);
-        for (size_t k = 0; k < 3; k++)
-            c->mean[3 * i + k] = between(2, 3 * i + k, -20, 20), c->scale_log[3 * i + k] = between(3, 3 * i + k, -6, 0);
-        for (size_t k = 0; k < 4; k++)
-            c->quat[4 * i + k] = (float)rng_normal(7, 4, 4 * i + k), square += c->quat[4 * i + k] * c->quat[4 * i + k];
+        for (size_t k = 0; k < 3; k++) {
+            c->mean[3 * i + k] = between(2, 3 * i + k, -20, 20);
+            c->scale_log[3 * i + k] = between(3, 3 * i + k, -6, 0);
+        }
+        for (size_t k = 0; k < 4; k++) {
+            c->quat[4 * i + k] = (float)rng_normal(7, 4, 4 * i + k);
+            square += c->quat[4 * i + k] * c->quat[4 * i + k];
+        }
         for (size_t k = 0; k < 4; k++)
             c->quat[4 * i + k] /= sqrtf(square);
         for (size_t k = 0; k < 48; k++)
-            c->sh[48 * i + k] = k < 3 * (size_t)((degree + 1) * (degree + 1)) ? between(5, 48 * i + k, -0.9f, 0.9f) : 0;
+            c->sh[48 * i + k] =
+                k < 3 * (size_t)((degree + 1) * (degree + 1)) ? between(5, 48 * i + k, -0.9f, 0.9f) : 0;
     }
 }
 
@@ -39,7 +45,8 @@ typedef struct limits {
     double mean, scale, quat, opacity, color, harmonics;
 } limits;
 
-static void check_near(const gaussian_cloud *a, const gaussian_cloud *b, const double origin[3], const limits *l)
+static void check_near(const gaussian_cloud *a, const gaussian_cloud *b, const double origin[3],
+                       const limits *l)
 {
     assert_int_equal(a->count, b->count);
     check_cloud(b);
@@ -82,8 +89,13 @@ static void spz_keeps_its_steps(void **state)
         must(gaussian_file_write(inside(*state, "a.SPZ", 0), &a, nowhere, &err));
         must(gaussian_file_read(inside(*state, "a.SPZ", 0), &b, &err));
         assert_int_equal(b.sh_degree, degree);
-        check_near(&a, &b, nowhere, &(limits){.mean = 0x1p-17 + 1e-6, .scale = 1.0 / 32 + 1e-6, .quat = 1e-5, .opacity = 1.0 / 510 + 1e-6,
-                                              .color = 0.5 / (0.15 * 255) + 1e-6, .harmonics = 8.5 / 128});
+        check_near(&a, &b, nowhere,
+                   &(limits){.mean = 0x1p-17 + 1e-6,
+                             .scale = 1.0 / 32 + 1e-6,
+                             .quat = 1e-5,
+                             .opacity = 1.0 / 510 + 1e-6,
+                             .color = 0.5 / (0.15 * 255) + 1e-6,
+                             .harmonics = 8.5 / 128});
         gaussian_cloud_free(&a);
         gaussian_cloud_free(&b);
     }
@@ -101,8 +113,13 @@ static void splat_keeps_one_color(void **state)
     }
     must(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &err));
     must(gaussian_file_read(inside(*state, "a.splat", 0), &b, &err));
-    check_near(&a, &b, nowhere, &(limits){.mean = 1e-9, .scale = 1e-6, .quat = 1e-4, .opacity = 1.0 / 510 + 1e-6,
-                                          .color = 0.5 / (255 * 0.28209479) + 1e-6, .harmonics = 1});
+    check_near(&a, &b, nowhere,
+               &(limits){.mean = 1e-9,
+                         .scale = 1e-6,
+                         .quat = 1e-4,
+                         .opacity = 1.0 / 510 + 1e-6,
+                         .color = 0.5 / (255 * 0.28209479) + 1e-6,
+                         .harmonics = 1});
     gaussian_cloud_free(&a);
     gaussian_cloud_free(&b);
     make_cloud(&a, 100, 0);
@@ -110,7 +127,8 @@ static void splat_keeps_one_color(void **state)
     must(gaussian_file_read(inside(*state, "a.splat", 0), &b, &err));
     double before = INFINITY;
     for (size_t i = 0; i < b.count; i++) { /* opacity is rounded to 1 / 255 */
-        const double size = exp((double)b.scale_log[3 * i] + (double)b.scale_log[3 * i + 1] + (double)b.scale_log[3 * i + 2]);
+        const double size =
+            exp((double)b.scale_log[3 * i] + (double)b.scale_log[3 * i + 1] + (double)b.scale_log[3 * i + 2]);
         assert_true(size * ((double)b.opacity[i] - 0.5 / 255) <= before * (1 + 1e-5));
         before = size * ((double)b.opacity[i] + 0.5 / 255);
     }
@@ -124,10 +142,15 @@ static void spz_bytes(void **state)
     gaussian_cloud a;
     make_cloud(&a, 1, 1);
     const float mean[3] = {1, -2, 64}, scale_log[3] = {-10, 0, -1.5f}, quat[4] = {0.5f, -0.5f, 0.5f, -0.5f};
-    memcpy(a.mean, mean, sizeof mean), memcpy(a.scale_log, scale_log, sizeof scale_log), memcpy(a.quat, quat, sizeof quat);
+    memcpy(a.mean, mean, sizeof mean);
+    memcpy(a.scale_log, scale_log, sizeof scale_log);
+    memcpy(a.quat, quat, sizeof quat);
     a.opacity[0] = 0.6f;
     memset(a.sh, 0, 48 * sizeof *a.sh);
-    a.sh[0] = 1, a.sh[1] = -1, a.sh[3] = 0.25f, a.sh[11] = -0.5f;
+    a.sh[0] = 1;
+    a.sh[1] = -1;
+    a.sh[3] = 0.25f;
+    a.sh[11] = -0.5f;
     must(gaussian_file_write(inside(*state, "one.spz", 0), &a, nowhere, &err));
     gaussian_cloud_free(&a);
     gzFile zipped = gzopen(inside(*state, "one.spz", 0), "rb");
@@ -135,17 +158,18 @@ static void spz_bytes(void **state)
     assert_int_equal(gzread(zipped, got, sizeof got), 16 + 9 + 1 + 3 + 3 + 4 + 9);
     gzclose(zipped);
     /* 64 2^16 is the largest power that fits: 16 fractional bits. */
-    static const unsigned char want[] = {'N', 'G', 'S', 'P', 3, 0, 0, 0, 1, 0, 0, 0, 1, 16, 0, 0,
-                                         0, 0, 1, 0, 0, 0xfe, 0, 0, 0x40,              /* 1, -2, 64 */
-                                         153,                                          /* 0.6 255 */
-                                         166, 89, 128,                                 /* 38.25 c + 127.5, ties to even */
-                                         0, 160, 136,                                  /* 16 (l + 10) */
-                                         0, 0, 0, 0,                                   /* the rotation: below */
+    static const unsigned char want[] = {'N', 'G', 'S', 'P', 3,   0,   0,   0,   1,    0, 0, 0,    1,
+                                         16,  0,   0,   0,   0,   1,   0,   0,   0xfe, 0, 0, 0x40, /* 1, -2,
+                                                                                                      64 */
+                                         153,              /* 0.6 255 */
+                                         166, 89,  128,    /* 38.25 c + 127.5, ties to even */
+                                         0,   160, 136,    /* 16 (l + 10) */
+                                         0,   0,   0,   0, /* the rotation: below */
                                          160, 128, 128, 128, 128, 128, 128, 128, 64};
     unsigned char expected[sizeof want];
     memcpy(expected, want, sizeof want);
-    /* x y z w = -.5 .5 -.5 .5: x is the first of the largest, left out and made positive, so the others change signs; 361 = 511 sqrt(2) /
-       2. */
+    /* x y z w = -.5 .5 -.5 .5: x is the first of the largest, left out and made positive, so the others
+       change signs; 361 = 511 sqrt(2) / 2. */
     const uint32_t rotation = 0u << 30 | (1u << 9 | 361u) << 20 | (0u << 9 | 361u) << 10 | (1u << 9 | 361u);
     for (int k = 0; k < 4; k++)
         expected[32 + k] = (unsigned char)(rotation >> (8 * k));
@@ -173,28 +197,33 @@ static void glb_is_what_gltf_wants(void **state)
     json_t *root = json_loadb((const char *)bytes + c.at, json_size, 0, NULL);
     assert_non_null(root);
     const size_t data_at = c.at + json_size + 8;
-    json_t *primitive = json_array_get(json_object_get(json_array_get(json_object_get(root, "meshes"), 0), "primitives"), 0);
-    json_t *attributes = json_object_get(primitive, "attributes"), *accessors = json_object_get(root, "accessors"),
-        *views = json_object_get(root, "bufferViews");
+    json_t *primitive =
+        json_array_get(json_object_get(json_array_get(json_object_get(root, "meshes"), 0), "primitives"), 0);
+    json_t *attributes = json_object_get(primitive, "attributes"),
+           *accessors = json_object_get(root, "accessors"), *views = json_object_get(root, "bufferViews");
     assert_int_equal(json_object_size(attributes), 1 + 1 + 3 + 9);
-    assert_int_equal(json_integer_value(json_object_get(json_array_get(json_object_get(root, "buffers"), 0), "byteLength")),
+    assert_int_equal(json_integer_value(
+                         json_object_get(json_array_get(json_object_get(root, "buffers"), 0), "byteLength")),
                      size - data_at);
-    json_t *position = json_array_get(accessors, (size_t)json_integer_value(json_object_get(attributes, "POSITION")));
+    json_t *position =
+        json_array_get(accessors, (size_t)json_integer_value(json_object_get(attributes, "POSITION")));
     double low = INFINITY;
     for (size_t i = 0; i < a.count; i++)
         low = fmin(low, -(double)a.mean[3 * i]);
     assert_true(fabs(json_number_value(json_array_get(json_object_get(position, "min"), 0)) - low) < 1e-12);
     /* The last value of the last accessor, and the quaternion of the first Gaussian. */
     json_t *last = json_array_get(views, json_array_size(views) - 1);
-    assert_int_equal(json_integer_value(json_object_get(last, "byteOffset")) + json_integer_value(json_object_get(last, "byteLength")),
+    assert_int_equal(json_integer_value(json_object_get(last, "byteOffset")) +
+                         json_integer_value(json_object_get(last, "byteLength")),
                      size - data_at);
     float value, quat[4];
     memcpy(&value, bytes + size - 4, 4);
     assert_true(value == a.sh[48 * 32 + 3 * 8 + 2]); /* function 8: even, keeps its sign */
-    json_t *rotation = json_array_get(accessors,
-                                      (size_t)json_integer_value(json_object_get(attributes, "KHR_gaussian_splatting:ROTATION")));
+    json_t *rotation = json_array_get(accessors, (size_t)json_integer_value(json_object_get(
+                                                     attributes, "KHR_gaussian_splatting:ROTATION")));
     json_t *view = json_array_get(views, (size_t)json_integer_value(json_object_get(rotation, "bufferView")));
-    memcpy(quat, bytes + data_at + (size_t)json_integer_value(json_object_get(view, "byteOffset")), sizeof quat);
+    memcpy(quat, bytes + data_at + (size_t)json_integer_value(json_object_get(view, "byteOffset")),
+           sizeof quat);
     const float want[4] = {-a.quat[1], -a.quat[2], a.quat[3], a.quat[0]};
     for (int k = 0; k < 4; k++)
         assert_true(fabsf(quat[k] - want[k]) < 1e-6f);
@@ -225,7 +254,10 @@ static void damaged_files(void **state)
             unsigned char changed[256], packed[512];
             memcpy(changed, plain, sizeof changed);
             changed[at] = (unsigned char)(changed[at] ^ flip);
-            z_stream z = {.next_in = changed, .avail_in = (uInt)plain_size, .next_out = packed, .avail_out = sizeof packed};
+            z_stream z = {.next_in = changed,
+                          .avail_in = (uInt)plain_size,
+                          .next_out = packed,
+                          .avail_out = sizeof packed};
             assert_int_equal(deflateInit2(&z, 6, Z_DEFLATED, 31, 8, Z_DEFAULT_STRATEGY), Z_OK);
             assert_int_equal(deflate(&z, Z_FINISH), Z_STREAM_END);
             try_gaussians(packed, z.total_out, &spz);
@@ -252,7 +284,9 @@ static void refusals(void **state)
     assert_non_null(strstr(err.text, "version 4"));
     make_cloud(&cloud, 1, 0);
     err = (gbt_error){0};
-    assert_int_equal(gaussian_file_write(inside(*state, "far.spz", 0), &cloud, (const double[3]){1e7, 0, 0}, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(
+        gaussian_file_write(inside(*state, "far.spz", 0), &cloud, (const double[3]){1e7, 0, 0}, &err),
+        GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "does not fit"));
     assert_false(file_exists(inside(*state, "far.spz", 0)));
     gaussian_cloud_free(&cloud);

@@ -1,13 +1,16 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/data/test_gaussian_ply.c -- 3DGS models: layout, repairs, refusals. */
 #include "data_support.h"
 
 #include "data/gaussian_ply.h"
 
-/* A model in ASCII: `rest` f_rest properties, rows of mean, dc, rest, opacity, scale, rot as the usual exporters order them. */
+/* A model in ASCII: `rest` f_rest properties, rows of mean, dc, rest, opacity, scale, rot as the usual
+   exporters order them. */
 static void put_header(sink *s, size_t count, size_t rest, const char *leave_out)
 {
     static const char *const before[] = {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"};
-    static const char *const behind[] = {"opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"};
+    static const char *const behind[] = {"opacity", "scale_0", "scale_1", "scale_2",
+                                         "rot_0",   "rot_1",   "rot_2",   "rot_3"};
     char line[128];
     snprintf(line, sizeof line, "ply\nformat ascii 1.0\nelement vertex %zu\n", count);
     sink_put_text(s, line);
@@ -17,7 +20,8 @@ static void put_header(sink *s, size_t count, size_t rest, const char *leave_out
             snprintf(name, sizeof name, "f_rest_%zu", i - 9);
         else
             snprintf(name, sizeof name, "%s", i < 9 ? before[i] : behind[i - 9 - rest]);
-        snprintf(line, sizeof line, "property float %s%s\n", leave_out != NULL && strcmp(leave_out, name) == 0 ? "other_" : "", name);
+        snprintf(line, sizeof line, "property float %s%s\n",
+                 leave_out != NULL && strcmp(leave_out, name) == 0 ? "other_" : "", name);
         sink_put_text(s, line);
     }
     sink_put_text(s, "end_header\n");
@@ -32,7 +36,8 @@ static void put_rest(sink *s, size_t rest)
     }
 }
 
-static void put_row(sink *s, const char *mean, size_t rest, const char *opacity, const char *scale, const char *rot)
+static void put_row(sink *s, const char *mean, size_t rest, const char *opacity, const char *scale,
+                    const char *rot)
 {
     sink_put_text(s, mean);
     sink_put_text(s, " 0 0 0 0.1 0.2 0.3 ");
@@ -70,7 +75,8 @@ static void layout_of_each_degree(void **state)
         assert_int_equal(cloud.count, 2);
         assert_int_equal(cloud.sh_degree, degree);
         assert_int_equal(cloud.dropped + cloud.identity_rotations + cloud.scales_clamped, 0);
-        const float mean[6] = {1, 2, 3, 4, 5, 6}, scale[6] = {-1, -2, -3, -1, -1, -1}, quat[8] = {1, 0, 0, 0, 0.5f, 0.5f, -0.5f, 0.5f};
+        const float mean[6] = {1, 2, 3, 4, 5, 6}, scale[6] = {-1, -2, -3, -1, -1, -1},
+                    quat[8] = {1, 0, 0, 0, 0.5f, 0.5f, -0.5f, 0.5f};
         assert_memory_equal(cloud.mean, mean, sizeof mean);
         assert_memory_equal(cloud.scale_log, scale, sizeof scale);
         for (int k = 0; k < 8; k++)
@@ -140,7 +146,8 @@ static void rows(void **state)
     assert_int_equal(cloud.identity_rotations, c->identity);
     assert_int_equal(cloud.scales_clamped, c->clamped);
     const size_t last = cloud.count - 1;
-    assert_true(cloud.mean[0] == 7 && cloud.quat[1] == 1 && cloud.mean[3 * last] == 10 && cloud.quat[4 * last + 2] == 1);
+    assert_true(cloud.mean[0] == 7 && cloud.quat[1] == 1 && cloud.mean[3 * last] == 10 &&
+                cloud.quat[4 * last + 2] == 1);
     if (c->dropped == 0) {
         assert_true(cloud.opacity[1] == c->opacity_out);
         for (int k = 0; k < 3; k++)
@@ -164,7 +171,8 @@ static void refused(sink *s, const char *says)
 static void missing_properties(void **state)
 {
     (void)state;
-    static const char *const names[] = {"x", "y", "z", "opacity", "f_dc_0", "f_dc_2", "scale_0", "scale_2", "rot_0", "rot_3"};
+    static const char *const names[] = {"x",      "y",       "z",       "opacity", "f_dc_0",
+                                        "f_dc_2", "scale_0", "scale_2", "rot_0",   "rot_3"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         sink s = {0};
         char says[64];
@@ -191,10 +199,11 @@ static void other_files(void **state)
 {
     (void)state;
     sink s = {0};
-    sink_put_text(&s, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n");
+    sink_put_text(&s, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
+                      "float z\nend_header\n1 2 3\n");
     refused(&s, "is a point cloud, not a Gaussian model");
-    sink_put_text(&s, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float f_anchor_feat_0\nproperty float "
-                      "opacity\nend_header\n1 2 3\n");
+    sink_put_text(&s, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+                      "f_anchor_feat_0\nproperty float opacity\nend_header\n1 2 3\n");
     refused(&s, "anchors of a neural model");
     put_header(&s, 0, 0, NULL);
     refused(&s, "holds no usable Gaussian (0 rows dropped)");
@@ -220,7 +229,8 @@ static void mutations(void **state)
     put_header(&s, 1, 0, NULL);
     sink binary = {0};
     sink_put_text(&binary, "ply\nformat binary_little_endian 1.0\n");
-    sink_put(&binary, s.bytes + strlen("ply\nformat ascii 1.0\n"), s.size - strlen("ply\nformat ascii 1.0\n"));
+    sink_put(&binary, s.bytes + strlen("ply\nformat ascii 1.0\n"),
+             s.size - strlen("ply\nformat ascii 1.0\n"));
     for (int k = 0; k < 17; k++)
         sink_put_f32(&binary, 0.25f * (float)(k - 8));
     mutate_all(binary.bytes, binary.size, try_gaussians, &little_endian);
@@ -239,15 +249,14 @@ static const float *load_array(const char *name, size_t count, size_t per_row, u
         return NULL;
     must(file_read(path, owned, &size, &err));
     assert_true(size > count * per_row * sizeof(float));
-    const float *values = (const float *)(*owned + size - count * per_row * sizeof(float)); /* the header is padded to 64 bytes */
+    const float *values =
+        (const float *)(*owned + size - count * per_row * sizeof(float)); /* the header is padded to 64 bytes
+                                                                           */
     assert_int_equal((uintptr_t)values % 4, 0);
     return values;
 }
 
-static double sign_of(double value)
-{
-    return value < 0 ? -1 : 1;
-}
+static double sign_of(double value) { return value < 0 ? -1 : 1; }
 
 /* The same 2000 Gaussians as plain arrays, written by another program. */
 static void same_as_arrays(void **state)
@@ -268,8 +277,8 @@ static void same_as_arrays(void **state)
     assert_int_equal(cloud.count, COUNT);
     for (size_t i = 0; i < COUNT; i++) {
         const float *q = cloud.quat + 4 * i, *want = quat + 4 * i;
-        const double flip = sign_of((double)q[0] * (double)want[3] + (double)q[1] * (double)want[0] + (double)q[2] * (double)want[1] +
-                                    (double)q[3] * (double)want[2]);
+        const double flip = sign_of((double)q[0] * (double)want[3] + (double)q[1] * (double)want[0] +
+                                    (double)q[2] * (double)want[1] + (double)q[3] * (double)want[2]);
         for (size_t k = 0; k < 3; k++) {
             assert_true(cloud.mean[3 * i + k] == center[3 * i + k]);
             assert_true(fabs(exp((double)cloud.scale_log[3 * i + k]) / (double)scale[3 * i + k] - 1) < 2e-6);
@@ -291,7 +300,9 @@ static void real_models(void **state)
     static const struct {
         const char *name;
         size_t count;
-    } models[] = {{"peer/vol10k/scene.ply", 10000}, {"peer/match2k/scene.ply", 2000}, {"peer/match1500/scene.ply", 1500}};
+    } models[] = {{"peer/vol10k/scene.ply", 10000},
+                  {"peer/match2k/scene.ply", 2000},
+                  {"peer/match1500/scene.ply", 1500}};
     size_t found = 0;
     for (size_t i = 0; i < sizeof models / sizeof models[0]; i++) {
         const char *path = shared_path(models[i].name);
@@ -313,7 +324,8 @@ int main(void)
     enum { ROW_COUNT = sizeof row_cases / sizeof row_cases[0] };
     static struct CMUnitTest tests[ROW_COUNT];
     for (size_t i = 0; i < ROW_COUNT; i++)
-        tests[i] = (struct CMUnitTest){.name = row_cases[i].name, .test_func = rows, .initial_state = &row_cases[i]};
+        tests[i] =
+            (struct CMUnitTest){.name = row_cases[i].name, .test_func = rows, .initial_state = &row_cases[i]};
     const struct CMUnitTest fixed[] = {
         cmocka_unit_test(layout_of_each_degree),
         cmocka_unit_test(missing_properties),

@@ -1,10 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/data/test_mesh_file.c -- OBJ and PLY meshes: what is read, and one clear line about what is wrong. */
 #include "data/mesh_file.h"
 #include "data_support.h"
 
 #define V3 "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 #define V4 V3 "v 1 1 0\n"
-#define PLY_HEAD "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+#define PLY_HEAD                                                                                             \
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
 #define PLY_FACES(n) "element face " #n "\nproperty list uchar int vertex_indices\nend_header\n"
 #define PLY_V4 "0 0 0\n1 0 0\n0 1 0\n1 1 0\n"
 
@@ -16,19 +18,35 @@ static struct good_case {
     {"a triangle", V3 "f 1 2 3\n", 3, 1, {0, 1, 2}},
     {"no newline at the end, Windows lines", "v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3", 3, 1, {0, 1, 2}},
     {"polygons are fans", V4 "f 1 2 4 3\n", 4, 2, {0, 1, 3, 0, 3, 2}},
-    {"texture and normal numbers", V3 "vt 0 0\nvn 0 0 1\nf 1/1 2/1 3/1\nf 1//1 2//1 3//1\nf 3/1/1 2/1/1 1/1/1\n", 3, 3,
+    {"texture and normal numbers",
+     V3 "vt 0 0\nvn 0 0 1\nf 1/1 2/1 3/1\nf 1//1 2//1 3//1\nf 3/1/1 2/1/1 1/1/1\n",
+     3,
+     3,
      {0, 1, 2, 0, 1, 2, 2, 1, 0}},
-    {"negative numbers count back from here", V3 "f -3 -2 -1\nv 1 1 0\nf -3 -2 -1\n", 4, 2, {0, 1, 2, 1, 2, 3}},
-    {"what is passed over", "# a\n\n  \t\nmtllib a.mtl\no b\n" V3 "g c d\nusemtl e\ns off\nl 1 2\np 1\n#f 9 9 9\n\tf  1\t2 3  \n", 3, 1,
+    {"negative numbers count back from here",
+     V3 "f -3 -2 -1\nv 1 1 0\nf -3 -2 -1\n",
+     4,
+     2,
+     {0, 1, 2, 1, 2, 3}},
+    {"what is passed over",
+     "# a\n\n  \t\nmtllib a.mtl\no b\n" V3 "g c d\nusemtl e\ns off\nl 1 2\np 1\n#f 9 9 9\n\tf  1\t2 3  \n",
+     3,
+     1,
      {0, 1, 2}},
-    {"a weight or a colour behind the position", "v 0 0 0 1\nv 1 0 0 .5 .5 .5\nv 0 1e0 -0 x\nf 1 2 3\n", 3, 1, {0, 1, 2}},
+    {"a weight or a colour behind the position",
+     "v 0 0 0 1\nv 1 0 0 .5 .5 .5\nv 0 1e0 -0 x\nf 1 2 3\n",
+     3,
+     1,
+     {0, 1, 2}},
     {"a corner twice", V3 "f 1 1 2\n", 3, 1, {0, 0, 1}},
     {"PLY", PLY_HEAD PLY_FACES(2) PLY_V4 "3 0 1 2\n4 0 1 3 2\n", 4, 3, {0, 1, 2, 0, 1, 3, 0, 3, 2}},
     {"PLY with other lists and the other name",
-     PLY_HEAD "property list uchar int n\nelement face 1\nproperty list uchar float a\nproperty list int uint vertex_index\nproperty int "
-              "b\nend_header\n"
+     PLY_HEAD "property list uchar int n\nelement face 1\nproperty list uchar float a\nproperty list int "
+              "uint vertex_index\nproperty int b\nend_header\n"
               "0 0 0 1 9\n1 0 0 0\n0 1 0 2 9 9\n1 1 0 0\n2 7 7 3 3 2 1 -5\n",
-     4, 1, {3, 2, 1}},
+     4,
+     1,
+     {3, 2, 1}},
 };
 
 static void good(void **state)
@@ -72,15 +90,18 @@ static struct bad_case {
     {V3 "curv2 1 2\n", "m:4: not a line of an OBJ mesh: curv2"},
     {"solid cube\n", "m:1: not a line of an OBJ mesh: solid"},
     {PLY_HEAD "end_header\n" PLY_V4, "m: no element face in the header"},
-    {PLY_HEAD "element face 1\nproperty int vertex_indices\nend_header\n" PLY_V4 "3\n", "m: element face has no list vertex_indices"},
-    {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n" PLY_FACES(1) "0 0\n3 0 0 0\n",
+    {PLY_HEAD "element face 1\nproperty int vertex_indices\nend_header\n" PLY_V4 "3\n",
+     "m: element face has no list vertex_indices"},
+    {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n" PLY_FACES(
+         1) "0 0\n3 0 0 0\n",
      "m: element vertex has no property z"},
     {PLY_HEAD PLY_FACES(0) PLY_V4, "m: no triangles in it (wanted an OBJ or PLY mesh)"},
     {PLY_HEAD PLY_FACES(1) PLY_V4 "3 0 1 4\n", "m: face 0: no such vertex: 4 (there are 4)"},
     {PLY_HEAD PLY_FACES(2) PLY_V4 "3 0 1 2\n3 0 1 -1\n", "m: face 1: no such vertex: -1 (there are 4)"},
     {PLY_HEAD PLY_FACES(1) PLY_V4 "3 0 1 0.5\n", "m: face 0: no such vertex: 0.5 (there are 4)"},
     {PLY_HEAD PLY_FACES(1) PLY_V4 "2 0 1\n", "m: face 0 of 2 corners (wanted 3 or more)"},
-    {PLY_HEAD PLY_FACES(1) "0 0 0\n1 0 nan\n0 1 0\n1 1 0\n3 0 1 2\n", "m: vertex 1: bad coordinate (wanted |x| <= 1e+12, got nan)"},
+    {PLY_HEAD PLY_FACES(1) "0 0 0\n1 0 nan\n0 1 0\n1 1 0\n3 0 1 2\n",
+     "m: vertex 1: bad coordinate (wanted |x| <= 1e+12, got nan)"},
     {PLY_HEAD PLY_FACES(1) PLY_V4 "3 0 1\n", "m:14: row has too few values"},
 };
 
@@ -93,7 +114,8 @@ static void bad(void **state)
         gbt_error err = {0};
         const gbt_status status = mesh_file_parse(&file, &mesh, &err);
         if (status != GBT_ERR_FORMAT || strcmp(err.text, bad_cases[i].message) != 0)
-            fail_msg("%s\n  wanted: %s\n  got %d: %s", bad_cases[i].text, bad_cases[i].message, (int)status, err.text);
+            fail_msg("%s\n  wanted: %s\n  got %d: %s", bad_cases[i].text, bad_cases[i].message, (int)status,
+                     err.text);
         mesh_data_free(&mesh);
     }
 }
@@ -120,7 +142,8 @@ static void try_mesh(const unsigned char *bytes, size_t size, void *context)
     check_message(status, &err);
     assert_true(status == GBT_OK || status == GBT_ERR_FORMAT);
     for (size_t i = 0; status == GBT_OK && i < 3 * mesh.triangle_count; i++)
-        assert_true(mesh.triangles[i] < mesh.vertex_count && fabs(mesh.position[3 * mesh.triangles[i]]) <= RAW_COORDINATE_LIMIT);
+        assert_true(mesh.triangles[i] < mesh.vertex_count &&
+                    fabs(mesh.position[3 * mesh.triangles[i]]) <= RAW_COORDINATE_LIMIT);
     *accepted += status == GBT_OK;
     mesh_data_free(&mesh);
 }
@@ -129,10 +152,22 @@ static void mutations(void **state)
 {
     (void)state;
     static const char obj[] = "v 0 0 0\nv 1 0 .5\nv 0 1 2e1\nv 1 1 0\nf 1//1 2//1 -1\nf 1 2 3 4\n";
-    static const char ply[] = "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uchar short a\nproperty list uchar "
-                              "uchar vertex_index\n"
-                              "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
-                              "\x01" "ab" "\x03\x00\x01\x02" "0123" "0124" "0125" "0223" "0224" "0225" "0323" "0324" "0325";
+    static const char ply[] =
+        "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uchar short a\nproperty list "
+        "uchar uchar vertex_index\n"
+        "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+        "\x01"
+        "ab"
+        "\x03\x00\x01\x02"
+        "0123"
+        "0124"
+        "0125"
+        "0223"
+        "0224"
+        "0225"
+        "0323"
+        "0324"
+        "0325";
     size_t accepted = 0;
     mutate_all((const unsigned char *)obj, sizeof obj - 1, try_mesh, &accepted);
     assert_true(accepted > 0);
@@ -146,7 +181,8 @@ int main(void)
     enum { GOOD_COUNT = sizeof good_cases / sizeof good_cases[0] };
     static struct CMUnitTest tests[GOOD_COUNT];
     for (size_t i = 0; i < GOOD_COUNT; i++)
-        tests[i] = (struct CMUnitTest){.name = good_cases[i].name, .test_func = good, .initial_state = &good_cases[i]};
+        tests[i] = (struct CMUnitTest){
+            .name = good_cases[i].name, .test_func = good, .initial_state = &good_cases[i]};
     const struct CMUnitTest fixed[] = {
         cmocka_unit_test(bad),
         cmocka_unit_test(mutations),

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/data/test_number.c -- numbers from text: grammar, rounding, locales; and back. */
 #include "data_support.h"
 
@@ -106,7 +107,8 @@ static void whole_numbers(void **state)
     assert_int_equal(number_parse_u64("1.0", 3, &value), NUMBER_BAD);
 }
 
-/* Every double that prints must read back as itself, for all bit patterns and for the sizes that files hold. */
+/* Every double that prints must read back as itself, for all bit patterns and for the sizes that files
+   hold. */
 static void round_trip(void **state)
 {
     (void)state;
@@ -171,8 +173,12 @@ static void any_locale(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(parses),        cmocka_unit_test(reads_only_its_bytes), cmocka_unit_test(long_tokens_are_refused),
-        cmocka_unit_test(whole_numbers), cmocka_unit_test(round_trip),           cmocka_unit_test(tokens),
+        cmocka_unit_test(parses),
+        cmocka_unit_test(reads_only_its_bytes),
+        cmocka_unit_test(long_tokens_are_refused),
+        cmocka_unit_test(whole_numbers),
+        cmocka_unit_test(round_trip),
+        cmocka_unit_test(tokens),
         cmocka_unit_test(any_locale),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,4 +1,6 @@
-/* tests/data/test_ply.c -- PLY: headers, every format and type, malformed cases, and what ply_write() writes. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/data/test_ply.c -- PLY: headers, every format and type, malformed cases, and what ply_write()
+   writes. */
 #include "data_support.h"
 
 #include "data/ply.h"
@@ -21,65 +23,100 @@ static ply_case ply_cases[] = {
     {"56 magic without an end", "ply", BAD, "x.ply:1: not a PLY file", 0, 0},
     {"57 no end_header", ASCII "element vertex 2\n" XYZ, BAD, "x.ply:7: header does not end", 0, 0},
     {"57 end_header cut", ASCII "element vertex 2\n" XYZ "end_header", BAD, "header does not end", 0, 0},
-    {"58 unknown format", "ply\nformat binary_middle_endian 1.0\nend_header\n", BAD, "x.ply:2: unknown format: binary_middle_endian", 0, 0},
-    {"58 version 2.0", "ply\nformat ascii 2.0\nend_header\n", BAD, "x.ply:2: unknown version (wanted 1.0, got 2.0)", 0, 0},
+    {"58 unknown format", "ply\nformat binary_middle_endian 1.0\nend_header\n", BAD,
+     "x.ply:2: unknown format: binary_middle_endian", 0, 0},
+    {"58 version 2.0", "ply\nformat ascii 2.0\nend_header\n", BAD,
+     "x.ply:2: unknown version (wanted 1.0, got 2.0)", 0, 0},
     {"58 no version", "ply\nformat ascii\nend_header\n", BAD, "x.ply:2: line ends before the version", 0, 0},
     {"58 no format", "ply\nelement vertex 0\n" XYZ "end_header\n", BAD, "no format line", 0, 0},
     {"58 two formats", ASCII "format ascii 1.0\nend_header\n", BAD, "x.ply:3: second format line", 0, 0},
-    {"59 count negative", ASCII "element vertex -1\n" XYZ "end_header\n", BAD, "x.ply:3: bad count of element vertex: -1", 0, 0},
-    {"59 count 2^31", ASCII "element vertex 2147483648\n" XYZ "end_header\n1 2 3\n", BAD, "2147483648 rows of element vertex cannot be", 0,
-     0},
-    {"59 count 2^63", ASCII "element vertex 9223372036854775808\n" XYZ "end_header\n1 2 3\n", BAD, "cannot be in the 6 bytes", 0, 0},
-    {"59 count 2^64", ASCII "element vertex 18446744073709551616\n" XYZ "end_header\n", BAD, "bad count of element vertex", 0, 0},
-    {"59 count 2^63, binary", "ply\nformat binary_little_endian 1.0\nelement vertex 9223372036854775808\n" XYZ "end_header\nabc", BAD,
+    {"59 count negative", ASCII "element vertex -1\n" XYZ "end_header\n", BAD,
+     "x.ply:3: bad count of element vertex: -1", 0, 0},
+    {"59 count 2^31", ASCII "element vertex 2147483648\n" XYZ "end_header\n1 2 3\n", BAD,
+     "2147483648 rows of element vertex cannot be", 0, 0},
+    {"59 count 2^63", ASCII "element vertex 9223372036854775808\n" XYZ "end_header\n1 2 3\n", BAD,
+     "cannot be in the 6 bytes", 0, 0},
+    {"59 count 2^64", ASCII "element vertex 18446744073709551616\n" XYZ "end_header\n", BAD,
+     "bad count of element vertex", 0, 0},
+    {"59 count 2^63, binary",
+     "ply\nformat binary_little_endian 1.0\nelement vertex 9223372036854775808\n" XYZ "end_header\nabc", BAD,
      "cannot be in the 3 bytes", 0, 0},
     {"60 count 0", ASCII "element vertex 0\n" XYZ "end_header\n", GBT_OK, NULL, 0, 0},
-    {"61 one vertex too many", ASCII "element vertex 3\n" XYZ "end_header\n1 2 3\n4 5 6\n", BAD, "3 rows of element vertex cannot be", 0,
-     0},
-    {"61 one vertex too many, long rows", ASCII "element vertex 3\n" XYZ "end_header\n1.0 2.0 3.0\n4.0 5.0 6.0\n", BAD,
+    {"61 one vertex too many", ASCII "element vertex 3\n" XYZ "end_header\n1 2 3\n4 5 6\n", BAD,
+     "3 rows of element vertex cannot be", 0, 0},
+    {"61 one vertex too many, long rows",
+     ASCII "element vertex 3\n" XYZ "end_header\n1.0 2.0 3.0\n4.0 5.0 6.0\n", BAD,
      "x.ply:9: file ends before the last row", 0, 0},
-    {"61 binary row cut", "ply\nformat binary_little_endian 1.0\nelement vertex 1\n" XYZ "end_header\n12345678901", BAD,
+    {"61 binary row cut",
+     "ply\nformat binary_little_endian 1.0\nelement vertex 1\n" XYZ "end_header\n12345678901", BAD,
      "1 rows of element vertex cannot be", 0, 0},
-    {"62 list in vertex", ASCII "element vertex 2\nproperty list uchar int n\n" XYZ "end_header\n2 7 8 1 2 3\n0 4 5 6\n", GBT_OK, NULL, 2,
-     0},
-    {"63 list longer than its row", ASCII "element vertex 2\nproperty list uchar int n\n" XYZ "end_header\n255 7 8 1 2 3\n0 4 5 6\n", BAD,
+    {"62 list in vertex",
+     ASCII "element vertex 2\nproperty list uchar int n\n" XYZ "end_header\n2 7 8 1 2 3\n0 4 5 6\n", GBT_OK,
+     NULL, 2, 0},
+    {"63 list longer than its row",
+     ASCII "element vertex 2\nproperty list uchar int n\n" XYZ "end_header\n255 7 8 1 2 3\n0 4 5 6\n", BAD,
      "x.ply:9: row has too few values", 0, 0},
-    {"63 list past the end", "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uchar int n\nelement vertex "
-                             "1\n" XYZ "end_header\n\xff" "23456789012345", BAD, "file ends inside a row of element face", 0, 0},
-    {"63 list of -1", ASCII "element vertex 1\nproperty list char int n\n" XYZ "end_header\n-1 1 2 3\n", BAD, "list of -1 items", 0, 0},
-    {"63 list of -1, binary", "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty list char int "
-                              "n\n" XYZ "end_header\n\xff" "23456789012345", BAD, "list of -1 items", 0, 0},
-    {"63 list of nan", ASCII "element vertex 1\nproperty list uchar int n\n" XYZ "end_header\nnan 1 2 3\n", BAD, "list of nan items", 0, 0},
-    {"63 list counted in floats", ASCII "element vertex 1\nproperty list float int n\n" XYZ "end_header\n0 1 2 3\n", BAD,
+    {"63 list past the end",
+     "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uchar int n\nelement vertex 1\n" XYZ
+     "end_header\n\xff"
+     "23456789012345",
+     BAD, "file ends inside a row of element face", 0, 0},
+    {"63 list of -1", ASCII "element vertex 1\nproperty list char int n\n" XYZ "end_header\n-1 1 2 3\n", BAD,
+     "list of -1 items", 0, 0},
+    {"63 list of -1, binary",
+     "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty list char int n\n" XYZ
+     "end_header\n\xff"
+     "23456789012345",
+     BAD, "list of -1 items", 0, 0},
+    {"63 list of nan", ASCII "element vertex 1\nproperty list uchar int n\n" XYZ "end_header\nnan 1 2 3\n",
+     BAD, "list of nan items", 0, 0},
+    {"63 list counted in floats",
+     ASCII "element vertex 1\nproperty list float int n\n" XYZ "end_header\n0 1 2 3\n", BAD,
      "cannot be counted in floats", 0, 0},
     {"64 duplicate property", ASCII "element vertex 1\n" XYZ "property float x\nend_header\n1 2 3 4\n", BAD,
      "x.ply:7: duplicate property: x", 0, 0},
     {"64 duplicate element", ASCII "element vertex 1\n" XYZ "element vertex 1\nend_header\n1 2 3\n", BAD,
      "x.ply:7: duplicate element: vertex", 0, 0},
-    {"65 no x", ASCII "element vertex 1\nproperty float y\nproperty float z\nend_header\n1 2\n", BAD, "element vertex has no property x", 0,
-     0},
-    {"65 x is a list", ASCII "element vertex 1\nproperty list uchar float x\nproperty float y\nproperty float z\nend_header\n0 1 2\n", BAD,
-     "no property x", 0, 0},
+    {"65 no x", ASCII "element vertex 1\nproperty float y\nproperty float z\nend_header\n1 2\n", BAD,
+     "element vertex has no property x", 0, 0},
+    {"65 x is a list",
+     ASCII
+     "element vertex 1\nproperty list uchar float x\nproperty float y\nproperty float z\nend_header\n0 1 2\n",
+     BAD, "no property x", 0, 0},
     {"65 no vertex", ASCII "element point 1\n" XYZ "end_header\n1 2 3\n", BAD, "no element vertex", 0, 0},
-    {"67 unknown type", ASCII "element vertex 1\nproperty half x\nend_header\n1\n", BAD, "x.ply:4: unknown property type: half", 0, 0},
-    {"68 unknown element before", ASCII "element camera 2\nproperty float f\nproperty list uchar int n\nelement vertex "
-                                        "1\n" XYZ "end_header\n1 2 8 9\n2 0\n1 2 3\n", GBT_OK, NULL, 1, 0},
-    {"68 unknown element behind", ASCII "element vertex 1\n" XYZ "element face 1\nproperty list uchar int n\nend_header\n1 2 3\n3 0 0 0\n",
+    {"67 unknown type", ASCII "element vertex 1\nproperty half x\nend_header\n1\n", BAD,
+     "x.ply:4: unknown property type: half", 0, 0},
+    {"68 unknown element before",
+     ASCII "element camera 2\nproperty float f\nproperty list uchar int n\nelement vertex 1\n" XYZ
+           "end_header\n1 2 8 9\n2 0\n1 2 3\n",
      GBT_OK, NULL, 1, 0},
-    {"68 unknown header line", ASCII "elephant vertex 1\nend_header\n", BAD, "x.ply:3: unknown header line: elephant", 0, 0},
-    {"68 property without element", ASCII "property float x\nend_header\n", BAD, "x.ply:3: property before any element", 0, 0},
+    {"68 unknown element behind",
+     ASCII "element vertex 1\n" XYZ "element face 1\nproperty list uchar int n\nend_header\n1 2 3\n3 0 0 0\n",
+     GBT_OK, NULL, 1, 0},
+    {"68 unknown header line", ASCII "elephant vertex 1\nend_header\n", BAD,
+     "x.ply:3: unknown header line: elephant", 0, 0},
+    {"68 property without element", ASCII "property float x\nend_header\n", BAD,
+     "x.ply:3: property before any element", 0, 0},
     {"68 element without properties", ASCII "element x 5\nelement vertex 1\n" XYZ "end_header\n1 2 3\n", BAD,
      "element x has rows but no properties", 0, 0},
-    {"69 too few values", ASCII "element vertex 2\n" XYZ "end_header\n1 2\n34 5 67\n", BAD, "x.ply:8: row has too few values", 0, 0},
-    {"69 too many values", ASCII "element vertex 2\n" XYZ "end_header\n1 2 3 4\n4 5 6\n", BAD, "x.ply:8: row has too many values, from 4",
-     0, 0},
-    {"69 not a number", ASCII "element vertex 1\n" XYZ "end_header\n1 2 three\n", BAD, "x.ply:8: value is not a number: three", 0, 0},
-    {"69 decimal comma", ASCII "element vertex 1\n" XYZ "end_header\n1,5 2 3\n", BAD, "value is not a number: 1,5", 0, 0},
-    {"69 1e999", ASCII "element vertex 1\n" XYZ "end_header\n1e999 2 3\n", BAD, "value is out of range: 1e999", 0, 0},
-    {"69 blank lines between rows", ASCII "element vertex 2\n" XYZ "end_header\n\n1 2 3\n\n \n4 5 6", GBT_OK, NULL, 2, 0},
-    {"69 CRLF", "ply\r\nformat ascii 1.0\r\ncomment hi\r\nelement vertex 1\r\nproperty float x\r\nproperty float y\r\nproperty float "
-                "z\r\nend_header\r\n1 2 3\r\n", GBT_OK, NULL, 1, 0},
-    {"70 NaN and Inf", ASCII "element vertex 4\n" XYZ "end_header\nnan 2 3\n1 -inf 3\n1 2 1e20\n4 5 6\n", GBT_OK, NULL, 1, 3},
+    {"69 too few values", ASCII "element vertex 2\n" XYZ "end_header\n1 2\n34 5 67\n", BAD,
+     "x.ply:8: row has too few values", 0, 0},
+    {"69 too many values", ASCII "element vertex 2\n" XYZ "end_header\n1 2 3 4\n4 5 6\n", BAD,
+     "x.ply:8: row has too many values, from 4", 0, 0},
+    {"69 not a number", ASCII "element vertex 1\n" XYZ "end_header\n1 2 three\n", BAD,
+     "x.ply:8: value is not a number: three", 0, 0},
+    {"69 decimal comma", ASCII "element vertex 1\n" XYZ "end_header\n1,5 2 3\n", BAD,
+     "value is not a number: 1,5", 0, 0},
+    {"69 1e999", ASCII "element vertex 1\n" XYZ "end_header\n1e999 2 3\n", BAD,
+     "value is out of range: 1e999", 0, 0},
+    {"69 blank lines between rows", ASCII "element vertex 2\n" XYZ "end_header\n\n1 2 3\n\n \n4 5 6", GBT_OK,
+     NULL, 2, 0},
+    {"69 CRLF",
+     "ply\r\nformat ascii 1.0\r\ncomment hi\r\nelement vertex 1\r\nproperty float x\r\nproperty float "
+     "y\r\nproperty float z\r\nend_header\r\n1 2 3\r\n",
+     GBT_OK, NULL, 1, 0},
+    {"70 NaN and Inf", ASCII "element vertex 4\n" XYZ "end_header\nnan 2 3\n1 -inf 3\n1 2 1e20\n4 5 6\n",
+     GBT_OK, NULL, 1, 3},
 };
 
 static gbt_status read_text(const char *text, size_t size, raw_scene *raw, gbt_error *err)
@@ -120,17 +157,20 @@ static void header_limit(void **state)
         sink_put_text(&s, "\nend_header\n1 2 3\n");
         raw_scene raw = {0};
         gbt_error err = {0};
-        assert_int_equal(read_text((const char *)s.bytes, s.size, &raw, &err), extra == 0 ? GBT_OK : GBT_ERR_FORMAT);
+        assert_int_equal(read_text((const char *)s.bytes, s.size, &raw, &err),
+                         extra == 0 ? GBT_OK : GBT_ERR_FORMAT);
         raw_free(&raw);
         sink_free(&s);
     }
 }
 
-/* The same three vertices in every type of coordinate, both byte orders, with colours of three types, unknown properties in between. */
+/* The same three vertices in every type of coordinate, both byte orders, with colours of three types, unknown
+   properties in between. */
 static void types_and_orders(void **state)
 {
     (void)state;
-    static const char *const names[] = {"char", "uint8", "short", "uint16", "int", "uint32", "float32", "double"};
+    static const char *const names[] = {"char", "uint8",  "short",   "uint16",
+                                        "int",  "uint32", "float32", "double"};
     static const size_t bytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
     static const char *const color_names[] = {"uchar", "ushort", "float"};
     for (size_t type = 0; type < 8; type++)
@@ -139,14 +179,16 @@ static void types_and_orders(void **state)
                 sink s = {0};
                 char header[512];
                 snprintf(header, sizeof header,
-                         "ply\nformat binary_%s_endian 1.0\nelement vertex 3\nproperty %s z\nproperty uchar skipped\nproperty %s "
-                         "blue\nproperty %s red\n"
-                         "property %s x\nproperty list ushort double skipped_list\nproperty %s y\nproperty %s green\nend_header\n",
-                         big ? "big" : "little", names[type], color_names[color], color_names[color], names[type], names[type],
-                         color_names[color]);
+                         "ply\nformat binary_%s_endian 1.0\nelement vertex 3\nproperty %s z\nproperty uchar "
+                         "skipped\nproperty %s blue\nproperty %s red\n"
+                         "property %s x\nproperty list ushort double skipped_list\nproperty %s y\nproperty "
+                         "%s green\nend_header\n",
+                         big ? "big" : "little", names[type], color_names[color], color_names[color],
+                         names[type], names[type], color_names[color]);
                 sink_put_text(&s, header);
                 for (int i = 0; i < 3; i++) {
-                    const int order[8] = {2, -1, 5, 3, 0, -2, 1, 4}; /* z, skipped, blue, red, x, list, y, green */
+                    const int order[8] = {2, -1, 5, 3,
+                                          0, -2, 1, 4}; /* z, skipped, blue, red, x, list, y, green */
                     for (int k = 0; k < 8; k++) {
                         const int value = 10 * i + order[k];
                         uint64_t bits = (uint64_t)value;
@@ -154,7 +196,8 @@ static void types_and_orders(void **state)
                         if (order[k] == -1)
                             width = 1;
                         if (order[k] == -2) {
-                            const unsigned char count[2] = {big ? 0 : (unsigned char)i, big ? (unsigned char)i : 0};
+                            const unsigned char count[2] = {big ? 0 : (unsigned char)i,
+                                                            big ? (unsigned char)i : 0};
                             sink_put(&s, count, 2);
                             for (int j = 0; j < i; j++)
                                 sink_put(&s, "12345678", 8);
@@ -198,8 +241,8 @@ static void types_and_orders(void **state)
 static void negative_integers(void **state)
 {
     (void)state;
-    static const char text[] = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty char x\nproperty short y\nproperty int "
-                               "z\nend_header\n"
+    static const char text[] = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty char "
+                               "x\nproperty short y\nproperty int z\nend_header\n"
                                "\xff\xfe\xff\xfd\xff\xff\xff";
     raw_scene raw = {0};
     must(read_text(text, sizeof text - 1, &raw, &err));
@@ -211,8 +254,9 @@ static void negative_integers(void **state)
 static void colors_are_bounded(void **state)
 {
     (void)state;
-    static const char text[] = ASCII "element vertex 1\n" XYZ "property float red\nproperty float green\nproperty float "
-                                                              "blue\nend_header\n1 2 3 200 -4 nan\n";
+    static const char text[] =
+        ASCII "element vertex 1\n" XYZ
+              "property float red\nproperty float green\nproperty float blue\nend_header\n1 2 3 200 -4 nan\n";
     raw_scene raw = {0};
     must(read_text(text, strlen(text), &raw, &err));
     assert_true(raw.color[0] == 1 && raw.color[1] == 0 && raw.color[2] == 0);
@@ -221,22 +265,31 @@ static void colors_are_bounded(void **state)
 
 static void written_cloud(void **state)
 {
-    const float position[9] = {1, 2, 3, 4, 5, 6, 7, 8, 9}, color[9] = {0, 0.5f, 1, -1, 2, NAN, 0.25f, 0.001f, 0.999f};
+    const float position[9] = {1, 2, 3, 4, 5, 6, 7, 8, 9},
+                color[9] = {0, 0.5f, 1, -1, 2, NAN, 0.25f, 0.001f, 0.999f};
     const float radius[6] = {0.5f, 99, 1.5f, 99, 2.5f, 99}, level[3] = {1, 2, 3};
     const ply_extra extras[2] = {{"radius", radius, 2}, {"level", level, 1}};
     const uint32_t faces[6] = {0, 1, 2, 2, 1, 0};
-    const ply_cloud cloud = {.vertex_count = 3, .position = position, .origin = {100, 0, -3}, .extra_count = 2, .extras = extras,
-                             .color = color, .face_count = 2, .faces = faces, .comment = "made by a test"};
+    const ply_cloud cloud = {.vertex_count = 3,
+                             .position = position,
+                             .origin = {100, 0, -3},
+                             .extra_count = 2,
+                             .extras = extras,
+                             .color = color,
+                             .face_count = 2,
+                             .faces = faces,
+                             .comment = "made by a test"};
     const char *path = inside(*state, "cloud.ply", 0);
     must(ply_write(path, &cloud, &err));
     unsigned char *bytes;
     source_file file = {.name = path};
     must(file_read(path, &bytes, &file.size, &err));
     file.bytes = bytes;
-    static const char header[] = "ply\nformat binary_little_endian 1.0\ncomment made by a test\nelement vertex 3\n" XYZ
-                                 "property float radius\nproperty float level\nproperty uchar red\nproperty uchar green\nproperty uchar "
-                                 "blue\n"
-                                 "element face 2\nproperty list uchar int vertex_indices\nend_header\n";
+    static const char header[] =
+        "ply\nformat binary_little_endian 1.0\ncomment made by a test\nelement vertex 3\n" XYZ
+        "property float radius\nproperty float level\nproperty uchar red\nproperty uchar green\nproperty "
+        "uchar blue\n"
+        "element face 2\nproperty list uchar int vertex_indices\nend_header\n";
     assert_int_equal(file.size, strlen(header) + 3 * 23 + 2 * 13);
     assert_memory_equal(bytes, header, strlen(header));
     raw_scene raw = {0};
@@ -299,9 +352,10 @@ static void try_points(const unsigned char *bytes, size_t size, void *context)
     gbt_error err = {0};
     const gbt_status status = ply_read_points(&file, &raw, &err);
     check_message(status, &err);
-    if (status == GBT_OK)
-        check_raw(&raw), ++*accepted;
-    else
+    if (status == GBT_OK) {
+        check_raw(&raw);
+        ++*accepted;
+    } else
         assert_int_equal(status, GBT_ERR_FORMAT);
     raw_free(&raw);
 }
@@ -309,11 +363,17 @@ static void try_points(const unsigned char *bytes, size_t size, void *context)
 static void mutations(void **state)
 {
     (void)state;
-    static const char ascii[] = ASCII "element e 1\nproperty list uchar int n\nelement vertex 2\n" XYZ "property uchar red\nproperty uchar "
-        "green\nproperty uchar blue\nend_header\n2 5 6\n1 -2.5 3e1 0 127 255\n4 5 6 1 2 3\n";
-    static const char binary[] = "ply\nformat binary_big_endian 1.0\nelement e 1\nproperty list uchar short n\nelement vertex 1\nproperty "
-                                 "int n\n" XYZ "end_header\n"
-                                 "\x02" "abcd" "ijkl" "\x3f\x80\x00\x00" "\x40\x00\x00\x00" "\xc0\x40\x00\x00";
+    static const char ascii[] = ASCII "element e 1\nproperty list uchar int n\nelement vertex 2\n" XYZ
+                                      "property uchar red\nproperty uchar green\nproperty uchar "
+                                      "blue\nend_header\n2 5 6\n1 -2.5 3e1 0 127 255\n4 5 6 1 2 3\n";
+    static const char binary[] = "ply\nformat binary_big_endian 1.0\nelement e 1\nproperty list uchar short "
+                                 "n\nelement vertex 1\nproperty int n\n" XYZ "end_header\n"
+                                 "\x02"
+                                 "abcd"
+                                 "ijkl"
+                                 "\x3f\x80\x00\x00"
+                                 "\x40\x00\x00\x00"
+                                 "\xc0\x40\x00\x00";
     size_t accepted = 0;
     mutate_all((const unsigned char *)ascii, sizeof ascii - 1, try_points, &accepted);
     assert_true(accepted > 0);
@@ -327,7 +387,8 @@ int main(void)
     enum { CASE_COUNT = sizeof ply_cases / sizeof ply_cases[0] };
     static struct CMUnitTest tests[CASE_COUNT];
     for (size_t i = 0; i < CASE_COUNT; i++)
-        tests[i] = (struct CMUnitTest){.name = ply_cases[i].name, .test_func = malformed, .initial_state = &ply_cases[i]};
+        tests[i] = (struct CMUnitTest){
+            .name = ply_cases[i].name, .test_func = malformed, .initial_state = &ply_cases[i]};
     const struct CMUnitTest fixed[] = {
         cmocka_unit_test(header_limit),
         cmocka_unit_test(types_and_orders),

@@ -1,4 +1,6 @@
-/* tests/data/test_scene.c -- scenes from folders: sniffing, photos, recentring, splits, memory failures, and the real data sets. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/data/test_scene.c -- scenes from folders: sniffing, photos, recentring, splits, memory failures, and
+   the real data sets. */
 #include "data_support.h"
 
 #include <unistd.h>
@@ -12,7 +14,8 @@
 
 enum { VIEW_COUNT = 9, POINT_COUNT = 5 };
 
-/* Nine images v1.png .. v9.png on a line at x = 1000 + 10 i, five points around (1000, 0, 0), one of them far off. */
+/* Nine images v1.png .. v9.png on a line at x = 1000 + 10 i, five points around (1000, 0, 0), one of them far
+   off. */
 static void write_model(const char *folder, bool text, bool with_photos)
 {
     colmap_image images[VIEW_COUNT] = {0};
@@ -21,8 +24,12 @@ static void write_model(const char *folder, bool text, bool with_photos)
     for (int i = 0; i < VIEW_COUNT; i++) {
         snprintf(names[i], sizeof names[i], "v%d.png", VIEW_COUNT - i);
         images[i].name = names[i];
-        images[i].camera = (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = 8, .height = 6, .params = {10, 10, 3.5, 2.5},
-                                        .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {1000 + 10 * i, 1, 2}};
+        images[i].camera = (gbt_camera){.model = GBT_CAMERA_PINHOLE,
+                                        .width = 8,
+                                        .height = 6,
+                                        .params = {10, 10, 3.5, 2.5},
+                                        .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                                        .center = {1000 + 10 * i, 1, 2}};
         char path[200];
         snprintf(path, sizeof path, "images/%s", names[i]);
         if (with_photos)
@@ -126,7 +133,8 @@ static void binary_is_preferred(void **state)
     assert_null(s.views);
 }
 
-/* 27: views without a photo are left out and counted, the first three named; without any photo there is nothing to do. */
+/* 27: views without a photo are left out and counted, the first three named; without any photo there is
+   nothing to do. */
 static void missing_photos(void **state)
 {
     const char *folder = *state;
@@ -134,7 +142,10 @@ static void missing_photos(void **state)
     scene s;
     for (int i = 1; i <= VIEW_COUNT; i++) {
         char name[32];
-        snprintf(name, sizeof name, "images/v%d.png", i == 1 ? 2 : i == 2 ? 1 : i); /* a first and a later one */
+        snprintf(name, sizeof name, "images/v%d.png",
+                 i == 1   ? 2
+                 : i == 2 ? 1
+                          : i); /* a first and a later one */
         unlink(inside(folder, name, 0));
         if (i == 1)
             must(file_make_folder(inside(folder, "images/v2.png", 0), &err)); /* a folder is not a photo */
@@ -143,7 +154,8 @@ static void missing_photos(void **state)
         must(scene_load(folder, NULL, &s, &err));
         assert_int_equal(s.photos_missing, i);
         assert_int_equal(s.view_count, VIEW_COUNT - i);
-        assert_string_equal(s.views[0].name, i == 1 ? "v1.png" : (snprintf(name, sizeof name, "v%d.png", i + 1), name));
+        assert_string_equal(s.views[0].name,
+                            i == 1 ? "v1.png" : (snprintf(name, sizeof name, "v%d.png", i + 1), name));
         assert_string_equal(s.views[s.view_count - 1].name, "v9.png");
         for (size_t v = 0; v < s.view_count; v++) { /* who is held out does not depend on who is missing */
             const int number = s.views[v].name[1] - '1';
@@ -194,16 +206,20 @@ static void nothing_to_load(void **state)
         {"nothing there", NULL, NULL, "no/such", GBT_ERR_IO, "no such file or folder"},
         {"empty folder", NULL, NULL, ".", GBT_ERR_FORMAT,
          "not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json"},
-        {"some file", "photo.jpg", "x", "photo.jpg", GBT_ERR_FORMAT, "not a data set (wanted a folder, a .ply or a transforms.json)"},
+        {"some file", "photo.jpg", "x", "photo.jpg", GBT_ERR_FORMAT,
+         "not a data set (wanted a folder, a .ply or a transforms.json)"},
         {"bad ply", "p.ply", "x", "p.ply", GBT_ERR_FORMAT, "p.ply:1: not a PLY file"},
         {"ply without points", "p.ply",
-         "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n", "p.ply",
-         GBT_ERR_FORMAT, "holds no usable point (0 dropped)"},
-        {"ply of NaN", "p.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
-                                "z\nend_header\nnan 1 2\n", "p.ply",
-         GBT_ERR_FORMAT, "holds no usable point (1 dropped)"},
+         "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float "
+         "z\nend_header\n",
+         "p.ply", GBT_ERR_FORMAT, "holds no usable point (0 dropped)"},
+        {"ply of NaN", "p.ply",
+         "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+         "z\nend_header\nnan 1 2\n",
+         "p.ply", GBT_ERR_FORMAT, "holds no usable point (1 dropped)"},
         {"bad json", "transforms.json", "x", ".", GBT_ERR_FORMAT, "transforms.json:1: not usable JSON"},
-        {"bad json by name", "transforms.json", "x", "transforms.json", GBT_ERR_FORMAT, "transforms.json:1: not usable JSON"},
+        {"bad json by name", "transforms.json", "x", "transforms.json", GBT_ERR_FORMAT,
+         "transforms.json:1: not usable JSON"},
         {"empty cameras.txt", "b/cameras.txt", "", "b", GBT_ERR_FORMAT, "not a data set"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -219,7 +235,10 @@ static void nothing_to_load(void **state)
     }
     /* 28: a model without images. */
     for (int i = 0; i < 3; i++)
-        write_bytes(folder, (const char *const[]){"sparse/cameras.bin", "sparse/images.bin", "sparse/points3D.bin"}[i], empty_count, 8);
+        write_bytes(
+            folder,
+            (const char *const[]){"sparse/cameras.bin", "sparse/images.bin", "sparse/points3D.bin"}[i],
+            empty_count, 8);
     scene s;
     gbt_error err = {0};
     assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_FORMAT);
@@ -248,14 +267,24 @@ static void parse_split(void **state)
         scene_split_kind kind;
         int every;
     } cases[] = {
-        {"every=8", true, SCENE_SPLIT_EVERY, 8},   {"every=2", true, SCENE_SPLIT_EVERY, 2},
+        {"every=8", true, SCENE_SPLIT_EVERY, 8},
+        {"every=2", true, SCENE_SPLIT_EVERY, 2},
         {"every=2147483647", true, SCENE_SPLIT_EVERY, 2147483647},
-        {"auto", true, SCENE_SPLIT_AUTO, 8},       {"autos", false, 0, 0},
-        {"none", true, SCENE_SPLIT_NONE, 8},       {"list=a b.txt", true, SCENE_SPLIT_LIST, 8},
-        {"every=1", false, 0, 0},                  {"every=0", false, 0, 0},                {"every=-8", false, 0, 0},
-        {"every=", false, 0, 0},                   {"every=8x", false, 0, 0},               {"every=2147483648", false, 0, 0},
-        {"every=99999999999999999999", false, 0, 0}, {"", false, 0, 0},                     {"list=", false, 0, 0},
-        {"nonee", false, 0, 0},                    {"8", false, 0, 0},
+        {"auto", true, SCENE_SPLIT_AUTO, 8},
+        {"autos", false, 0, 0},
+        {"none", true, SCENE_SPLIT_NONE, 8},
+        {"list=a b.txt", true, SCENE_SPLIT_LIST, 8},
+        {"every=1", false, 0, 0},
+        {"every=0", false, 0, 0},
+        {"every=-8", false, 0, 0},
+        {"every=", false, 0, 0},
+        {"every=8x", false, 0, 0},
+        {"every=2147483648", false, 0, 0},
+        {"every=99999999999999999999", false, 0, 0},
+        {"", false, 0, 0},
+        {"list=", false, 0, 0},
+        {"nonee", false, 0, 0},
+        {"8", false, 0, 0},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         scene_split split;
@@ -313,7 +342,8 @@ static void splits(void **state)
         const char *says;
     } bad[] = {
         {"v9.png\nv99.png\n", GBT_ERR_FORMAT, "list.txt:2: no image of the data set has this name: v99.png"},
-        {"v1.png\nv2.png\nv3.png\nv4.png\nv5.png\nv6.png\nv7.png\nv8.png\nv9.png\n", GBT_ERR_ARGUMENT, "all 9 views are held out"},
+        {"v1.png\nv2.png\nv3.png\nv4.png\nv5.png\nv6.png\nv7.png\nv8.png\nv9.png\n", GBT_ERR_ARGUMENT,
+         "all 9 views are held out"},
     };
     for (size_t i = 0; i < 2; i++) {
         gbt_error err = {0};
@@ -327,7 +357,8 @@ static void splits(void **state)
     gbt_error err = {0};
     assert_int_equal(scene_load(folder, &by_list, &s, &err), GBT_ERR_IO);
     gbt_error err2 = {0};
-    assert_int_equal(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_EVERY, .every = 1}, &s, &err2), GBT_ERR_ARGUMENT);
+    assert_int_equal(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_EVERY, .every = 1}, &s, &err2),
+                     GBT_ERR_ARGUMENT);
 }
 
 static void transforms_folder(void **state)
@@ -336,10 +367,12 @@ static void transforms_folder(void **state)
     write_picture(folder, "photos/b.png", 8, 6);
     write_picture(folder, "photos/a.png", 8, 6);
     write_text(folder, "points.ply",
-               "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n5 6 7\n");
-    static const char text[] = "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"ply_file_path\": \"points.ply\", \"frames\": ["
-                               "{\"file_path\": \"./photos/b.png\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
-                               "{\"file_path\": \"photos/a\", \"transform_matrix\": [[1,0,0,11],[0,1,0,22],[0,0,1,33],[0,0,0,1]]}]}";
+               "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+               "z\nend_header\n5 6 7\n");
+    static const char text[] = "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"ply_file_path\": \"points.ply\", "
+                               "\"frames\": [{\"file_path\": \"./photos/b.png\", \"transform_matrix\": "
+                               "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},{\"file_path\": \"photos/a\", "
+                               "\"transform_matrix\": [[1,0,0,11],[0,1,0,22],[0,0,1,33],[0,0,0,1]]}]}";
     write_text(folder, "transforms.json", text);
     scene s;
     for (int by_file = 0; by_file < 2; by_file++) {
@@ -371,9 +404,11 @@ static void transforms_folder(void **state)
     gbt_error err2 = {0};
     assert_int_equal(scene_load(folder, NULL, &s, &err2), GBT_ERR_IO);
     assert_non_null(strstr(err2.text, "points.ply"));
-    snprintf(rest, sizeof rest, "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"frames\": ["
-             "{\"file_path\": \"./photos/b.png\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
-             "{\"file_path\": \"photos/b.png\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
+    snprintf(rest, sizeof rest,
+             "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"frames\": ["
+             "{\"file_path\": \"./photos/b.png\", \"transform_matrix\": "
+             "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},{\"file_path\": \"photos/b.png\", "
+             "\"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
     write_text(folder, "transforms.json", rest);
     gbt_error err3 = {0};
     assert_int_equal(scene_load(folder, NULL, &s, &err3), GBT_ERR_FORMAT);
@@ -395,9 +430,13 @@ static void origin_is_the_median(void **state)
         double *sorted = malloc(count * sizeof *sorted);
         for (size_t i = 0; i < 3 * count; i++) {
             const float u = rng_uniform(seed, 0, i) - 0.5f;
-            position[i] = seed % 4 == 0 ? roundf(4 * u) : seed % 4 == 1 ? u * 1e-30f : seed % 4 == 2 ? u * 1e11f : -fabsf(u);
+            position[i] = seed % 4 == 0   ? roundf(4 * u)
+                          : seed % 4 == 1 ? u * 1e-30f
+                          : seed % 4 == 2 ? u * 1e11f
+                                          : -fabsf(u);
         }
-        must(ply_write(inside(*state, "m.ply", 0), &(ply_cloud){.vertex_count = count, .position = position}, &err));
+        must(ply_write(inside(*state, "m.ply", 0), &(ply_cloud){.vertex_count = count, .position = position},
+                       &err));
         scene s;
         must(scene_load(inside(*state, "m.ply", 0), NULL, &s, &err));
         assert_string_equal(s.source, "ply");
@@ -407,9 +446,11 @@ static void origin_is_the_median(void **state)
                 sorted[i] = (double)position[3 * i + k];
             qsort(sorted, count, sizeof *sorted, by_value);
             if (s.origin[k] != sorted[(count - 1) / 2])
-                fail_msg("seed %llu: axis %zu: %g, wanted %g", (unsigned long long)seed, k, s.origin[k], sorted[(count - 1) / 2]);
+                fail_msg("seed %llu: axis %zu: %g, wanted %g", (unsigned long long)seed, k, s.origin[k],
+                         sorted[(count - 1) / 2]);
             for (size_t i = 0; i < count; i++)
-                assert_true(s.points.position[3 * i + k] == (float)((double)position[3 * i + k] - s.origin[k]));
+                assert_true(s.points.position[3 * i + k] ==
+                            (float)((double)position[3 * i + k] - s.origin[k]));
         }
         scene_free(&s);
         free(position);
@@ -426,7 +467,8 @@ static void extent_is_positive(void **state)
     assert_true(scene_camera_extent(&(scene){0}) == 1e-3);
 }
 
-/* The k-th allocation fails, for every k: the right status, a message, an empty result; nothing is left behind (the sanitizer sees). */
+/* The k-th allocation fails, for every k: the right status, a message, an empty result; nothing is left
+   behind (the sanitizer sees). */
 static void no_memory(void **state)
 {
     const char *folder = *state;
@@ -437,16 +479,20 @@ static void no_memory(void **state)
         write_text(folder, name, "not read here");
     }
     write_text(folder, "j/a.png", "not read here");
-    write_text(folder, "j/p.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
-                                  "z\nend_header\n5 6 7\n");
-    write_text(folder, "j/transforms.json", "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"ply_file_path\": \"p.ply\", \"frames\": ["
-               "{\"file_path\": \"a\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
+    write_text(folder, "j/p.ply",
+               "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+               "z\nend_header\n5 6 7\n");
+    write_text(
+        folder, "j/transforms.json",
+        "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"ply_file_path\": \"p.ply\", \"frames\": [{\"file_path\": "
+        "\"a\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
     write_text(folder, "list.txt", "v9.png\n");
     char list[4096], path[4096];
     snprintf(list, sizeof list, "%s/list.txt", folder);
     for (int which = 0; which < 2; which++) {
         snprintf(path, sizeof path, "%s%s", folder, which == 0 ? "" : "/j");
-        const scene_split split = {.kind = which == 0 ? SCENE_SPLIT_LIST : SCENE_SPLIT_NONE, .list_path = list};
+        const scene_split split = {.kind = which == 0 ? SCENE_SPLIT_LIST : SCENE_SPLIT_NONE,
+                                   .list_path = list};
         long failures = 0;
         for (gbt_status status = GBT_ERR_NO_MEMORY; status != GBT_OK; failures++) {
             scene s;
@@ -481,8 +527,8 @@ static double box_mean(const image *in, int channel, double x0, double x1, doubl
 static void resize_is_the_area_mean(void **state)
 {
     (void)state;
-    static const int sizes[][4] = {{7, 5, 3, 2}, {8, 6, 4, 3}, {10, 9, 7, 9}, {5, 4, 5, 4}, {3, 2, 7, 5}, {1, 1, 4, 3}, {9, 11, 1, 1},
-                                   {640, 3, 641, 2}};
+    static const int sizes[][4] = {{7, 5, 3, 2}, {8, 6, 4, 3}, {10, 9, 7, 9}, {5, 4, 5, 4},
+                                   {3, 2, 7, 5}, {1, 1, 4, 3}, {9, 11, 1, 1}, {640, 3, 641, 2}};
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         const int *n = sizes[i];
         image in, out;
@@ -499,7 +545,8 @@ static void resize_is_the_area_mean(void **state)
                     const double want = box_mean(&in, c, x * fx, (x + 1) * fx, y * fy, (y + 1) * fy);
                     const double got = (double)out.pixels[(y * n[2] + x) * 3 + c];
                     if (fabs(got - want) > 1.5e-7)
-                        fail_msg("%d x %d to %d x %d at %d, %d: %.9g, wanted %.9g", n[0], n[1], n[2], n[3], x, y, got, want);
+                        fail_msg("%d x %d to %d x %d at %d, %d: %.9g, wanted %.9g", n[0], n[1], n[2], n[3], x,
+                                 y, got, want);
                 }
         for (int k = 0; k < 3 * n[0] * n[1]; k++)
             in.pixels[k] = 0.6f;
@@ -516,8 +563,9 @@ static void resize_is_the_area_mean(void **state)
 static void blender_folder(void **state)
 {
     const char *folder = *state;
-    static const char form[] = "{\"camera_angle_x\": 0.7853981633974483, \"frames\": [{\"file_path\": \"./%s/r_0\", \"transform_matrix\": "
-                               "[[1,0,0,%d],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]}";
+    static const char form[] =
+        "{\"camera_angle_x\": 0.7853981633974483, \"frames\": [{\"file_path\": \"./%s/r_0\", "
+        "\"transform_matrix\": [[1,0,0,%d],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]}";
     static const char *const sets[] = {"train", "val", "test"};
     scene s;
     for (int i = 0; i < 3; i++) {
@@ -538,7 +586,8 @@ static void blender_folder(void **state)
         }
         if (i > 0)
             assert_string_equal(s.views[i == 1].name, i == 1 ? "val/r_0" : "test/r_0");
-        assert_true(fabs(s.views[0].camera.params[0] - 4 / tan(0.39269908169872414)) < 1e-12 && s.views[0].camera.params[3] == 3);
+        assert_true(fabs(s.views[0].camera.params[0] - 4 / tan(0.39269908169872414)) < 1e-12 &&
+                    s.views[0].camera.params[3] == 3);
         must(scene_set_alpha(&s, "auto", &err));
         assert_int_equal(s.views[0].alpha, SCENE_ALPHA_WHITE);
         scene_free(&s);
@@ -558,11 +607,16 @@ static void blender_folder(void **state)
 static void transforms_masks_and_split(void **state)
 {
     const char *folder = *state;
-    static const char form[] = "{\"x_fov\": 45, \"train_filenames\": [\"./b.png\"], \"frames\": ["
-                               "{\"file_path\": \"a.png\", \"mask_path\": %s, \"transform_matrix\": "
-                               "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
-                               "{\"file_path\": \"b.png\", \"transform_matrix\": [[1,0,0,11],[0,1,0,22],[0,0,1,33],[0,0,0,1]]}]}";
-    static const struct { const char *mask; gbt_status status; const char *says; } cases[] = {
+    static const char form[] =
+        "{\"x_fov\": 45, \"train_filenames\": [\"./b.png\"], \"frames\": ["
+        "{\"file_path\": \"a.png\", \"mask_path\": %s, \"transform_matrix\": "
+        "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
+        "{\"file_path\": \"b.png\", \"transform_matrix\": [[1,0,0,11],[0,1,0,22],[0,0,1,33],[0,0,0,1]]}]}";
+    static const struct {
+        const char *mask;
+        gbt_status status;
+        const char *says;
+    } cases[] = {
         {"\"m.png\"", GBT_OK, ""},
         {"null", GBT_OK, ""},
         {"\"none.png\"", GBT_ERR_IO, "frame 0: mask is missing"},
@@ -590,13 +644,17 @@ static void transforms_masks_and_split(void **state)
         }
         scene_free(&s);
     }
-    static const struct { const char *list, *says; } bad[] = {{"7", "train_filenames: wanted a list"}, {"[7]", "entry 0 is not a string"},
-                                                             {"[]", "all 1 views are held out"}};
+    static const struct {
+        const char *list, *says;
+    } bad[] = {{"7", "train_filenames: wanted a list"},
+               {"[7]", "entry 0 is not a string"},
+               {"[]", "all 1 views are held out"}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         char text[512];
-        snprintf(text, sizeof text, "{\"x_fov\": 45, \"train_filenames\": %s, \"frames\": [{\"file_path\": \"a.png\", "
-                                    "\"transform_matrix\": "
-                 "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}", bad[i].list);
+        snprintf(text, sizeof text,
+                 "{\"x_fov\": 45, \"train_filenames\": %s, \"frames\": [{\"file_path\": \"a.png\", "
+                 "\"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}",
+                 bad[i].list);
         write_text(folder, "transforms.json", text);
         scene s;
         gbt_error err = {0};
@@ -612,23 +670,28 @@ static void photos(void **state)
     write_picture(folder, "p.png", 8, 6);
     char path[4096];
     snprintf(path, sizeof path, "%s/p.png", folder);
-    scene_view view = {.name = path, .path = path, .camera = {.model = GBT_CAMERA_PINHOLE, .width = 8, .height = 6}};
+    scene_view view = {
+        .name = path, .path = path, .camera = {.model = GBT_CAMERA_PINHOLE, .width = 8, .height = 6}};
     image im;
     must(scene_read_photo(&view, 8, 6, &im, &err));
     assert_int_equal(im.channels, 3);
-    assert_true(fabsf(im.pixels[3 * (2 * 8 + 5)] - 5.0f / 255) < 1e-7f && fabsf(im.pixels[3 * (2 * 8 + 5) + 1] - 2.0f / 255) < 1e-7f);
+    assert_true(fabsf(im.pixels[3 * (2 * 8 + 5)] - 5.0f / 255) < 1e-7f &&
+                fabsf(im.pixels[3 * (2 * 8 + 5) + 1] - 2.0f / 255) < 1e-7f);
     image_free(&im);
     must(scene_read_photo(&view, 4, 3, &im, &err));
-    assert_true(fabsf(im.pixels[3 * (2 * 4 + 1)] - 2.5f / 255) < 1e-7f && fabsf(im.pixels[3 * (2 * 4 + 1) + 1] - 4.5f / 255) < 1e-7f);
+    assert_true(fabsf(im.pixels[3 * (2 * 4 + 1)] - 2.5f / 255) < 1e-7f &&
+                fabsf(im.pixels[3 * (2 * 4 + 1) + 1] - 4.5f / 255) < 1e-7f);
     image_free(&im);
     /* 80: the aspect may miss by one pixel of the smaller image. */
     static const struct {
         int width, height;
         bool good;
-    } stated[] = {{16, 12, true}, {16, 13, true}, {16, 14, true}, {16, 16, false}, {17, 12, true}, {4, 3, true}, {5, 3, true},
-                  {6, 3, false},  {6, 8, false},  {8, 7, true},   {8, 8, false},   {800, 600, true}, {800, 750, false}};
+    } stated[] = {{16, 12, true}, {16, 13, true},   {16, 14, true},   {16, 16, false}, {17, 12, true},
+                  {4, 3, true},   {5, 3, true},     {6, 3, false},    {6, 8, false},   {8, 7, true},
+                  {8, 8, false},  {800, 600, true}, {800, 750, false}};
     for (size_t i = 0; i < sizeof stated / sizeof stated[0]; i++) {
-        view.camera.width = stated[i].width, view.camera.height = stated[i].height;
+        view.camera.width = stated[i].width;
+        view.camera.height = stated[i].height;
         gbt_error err = {0};
         const gbt_status status = scene_read_photo(&view, 4, 3, &im, &err);
         if (status != (stated[i].good ? GBT_OK : GBT_ERR_FORMAT))
@@ -689,7 +752,12 @@ static void masked_photos(void **state)
             im.pixels[4 * i + c] = c < 3 ? 0.2f : i == 5 ? 0.4f : 1;
     must(image_write(photo, &im, &err));
     image_free(&im);
-    static const struct { int width, height; float values[8]; scene_alpha alpha; unsigned valid; } cases[] = {
+    static const struct {
+        int width, height;
+        float values[8];
+        scene_alpha alpha;
+        unsigned valid;
+    } cases[] = {
         {4, 2, {1, 0, 1, 1, 1, 1, 0, 1}, SCENE_ALPHA_BLACK, 0xbd},
         {4, 2, {0.004f, 0, 0.004f, 0.004f, 0.004f, 0.004f, 0, 0.004f}, SCENE_ALPHA_BLACK, 0xbd},
         {4, 2, {0.97f, 0.04f, 1, 0.5f, 0.99f, 0.6f, 0.49f, 1}, SCENE_ALPHA_BLACK, 0xbd},
@@ -701,7 +769,8 @@ static void masked_photos(void **state)
         {2, 8, {0}, SCENE_ALPHA_WHITE, 0x100}, /* another aspect */
     };
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
-        scene_view view = {.name = photo, .path = photo, .alpha = cases[k].alpha, .camera = {.width = 4, .height = 2}};
+        scene_view view = {
+            .name = photo, .path = photo, .alpha = cases[k].alpha, .camera = {.width = 4, .height = 2}};
         if (cases[k].width > 0) {
             must(image_alloc(&im, cases[k].width, cases[k].height, 1, &err));
             for (int i = 0; i < cases[k].width * cases[k].height; i++)
@@ -719,7 +788,9 @@ static void masked_photos(void **state)
             if ((valid == NULL || valid[i]) != (cases[k].valid >> i & 1))
                 fail_msg("case %zu, pixel %u", k, i);
         if (status == GBT_OK) {
-            const float want = cases[k].alpha == SCENE_ALPHA_BLACK ? 0.08f : cases[k].alpha == SCENE_ALPHA_WHITE ? 0.68f : 0.2f;
+            const float want = cases[k].alpha == SCENE_ALPHA_BLACK   ? 0.08f
+                               : cases[k].alpha == SCENE_ALPHA_WHITE ? 0.68f
+                                                                     : 0.2f;
             assert_true(fabsf(im.pixels[3 * 5] - want) < 1e-6f && fabsf(im.pixels[0] - 0.2f) < 1e-6f);
         }
         mem_free(valid);
@@ -769,8 +840,8 @@ static void real_data(void **state)
             double in_camera[3], pixel[2];
             dmat_apply(camera->rotation, d, in_camera);
             looked_at++;
-            seen += in_camera[2] > 0 && gbt_camera_project(camera, in_camera, pixel) && pixel[0] >= 0 && pixel[0] <= camera->width &&
-                    pixel[1] >= 0 && pixel[1] <= camera->height;
+            seen += in_camera[2] > 0 && gbt_camera_project(camera, in_camera, pixel) && pixel[0] >= 0 &&
+                    pixel[0] <= camera->width && pixel[1] >= 0 && pixel[1] <= camera->height;
         }
     }
     /* Wrong axes or poses would put nearly all points behind the cameras or beside the photos. */
@@ -782,12 +853,13 @@ static void real_data(void **state)
         assert_int_equal(im.width, c->width / 4);
         image_free(&im);
     }
-    print_message("%s: origin %g %g %g, extent %g, seen %zu of %zu\n", c->path, s.origin[0], s.origin[1], s.origin[2],
-                  scene_camera_extent(&s), seen, looked_at);
+    print_message("%s: origin %g %g %g, extent %g, seen %zu of %zu\n", c->path, s.origin[0], s.origin[1],
+                  s.origin[2], scene_camera_extent(&s), seen, looked_at);
     scene_free(&s);
 }
 
-/* The two forms of fox share photos but not the world: angles between cameras must agree, so the axes of both readers do. */
+/* The two forms of fox share photos but not the world: angles between cameras must agree, so the axes of both
+   readers do. */
 static void fox_twice(void **state)
 {
     (void)state;
@@ -808,9 +880,12 @@ static void fox_twice(void **state)
             if (strcmp(a.views[k].name, slash != NULL ? slash + 1 : b.views[i].name) != 0)
                 continue;
             static const gbt_camera *first[2];
-            if (compared++ == 0)
-                first[0] = &a.views[k].camera, first[1] = &b.views[i].camera;
-            /* Rotation from the first camera to this one, in camera axes: R_i R_0^T, whatever the world is. */
+            if (compared++ == 0) {
+                first[0] = &a.views[k].camera;
+                first[1] = &b.views[i].camera;
+            }
+            /* Rotation from the first camera to this one, in camera axes: R_i R_0^T, whatever the world
+               is. */
             const double *now[2] = {a.views[k].camera.rotation, b.views[i].camera.rotation};
             for (int r = 0; r < 3; r++)
                 for (int q = 0; q < 3; q++) {
@@ -855,7 +930,8 @@ int main(void)
     };
     static struct CMUnitTest real[REAL_COUNT];
     for (size_t i = 0; i < REAL_COUNT; i++)
-        real[i] = (struct CMUnitTest){.name = real_cases[i].path, .test_func = real_data, .initial_state = &real_cases[i]};
+        real[i] = (struct CMUnitTest){
+            .name = real_cases[i].path, .test_func = real_data, .initial_state = &real_cases[i]};
     const int failures = cmocka_run_group_tests_name("scene", fixed, NULL, NULL);
     return failures + cmocka_run_group_tests_name("real data", real, NULL, NULL);
 }

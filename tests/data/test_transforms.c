@@ -1,11 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/data/test_transforms.c -- transforms.json: axes, lenses, and every malformed case. */
 #include "data_support.h"
 
 #include "base/vec.h"
 #include "data/transforms.h"
 
-/* The photos of the cases: a.png of 8 x 6 pixels, and sub/b.jpg. One folder for all, made by main(): a group's set-up would replace the
-   rows that the tests get as their state. */
+/* The photos of the cases: a.png of 8 x 6 pixels, and sub/b.jpg. One folder for all, made by main(): a
+   group's set-up would replace the rows that the tests get as their state. */
 static char *folder_of_photos;
 
 static gbt_status read_json(const char *text, size_t size, raw_scene *raw, char **points_name, gbt_error *err)
@@ -41,39 +42,64 @@ static json_case json_cases[] = {
     {"45 frames is a number", "{\"frames\": 3}", BAD, "frames is not a list"},
     {"45 frames empty", "{\"frames\": []}", BAD, "frames is not a list with at least one entry"},
     {"45 a frame is a string", SIZED "\"frames\": [\"a.png\"]}", BAD, "frame 0: wanted an object"},
-    {"46 3 x 3 matrix", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0],[0,1,0],[0,0,1]]}]}", BAD,
+    {"46 3 x 3 matrix",
+     SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0],[0,1,0],[0,0,1]]}]}", BAD,
      "3 or 4 rows of 4"},
-    {"46 4 x 3 matrix", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0],[0,1,0],[0,0,1],[1,2,3]]}]}", BAD,
-     "3 or 4 rows of 4"},
-    {"46 3 x 4 matrix", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,1],[0,1,0,2],[0,0,1,3]]}]}", GBT_OK,
-     NULL},
-    {"46 a string in it", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,\"1\"],[0,1,0,2],[0,0,1,3]]}]}", BAD,
-     "something that is not a number"},
-    {"46 a null in it", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,null],[0,1,0,2],[0,0,1,3]]}]}", BAD,
-     "something that is not a number"},
-    {"46 a null row", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [null,[0,1,0,2],[0,0,1,3]]}]}", BAD,
-     "3 or 4 rows of 4"},
-    {"46 no matrix", SIZED "\"frames\": [{\"file_path\": \"a.png\"}]}", BAD, "frame 0: transform_matrix: is missing"},
-    {"46 transposed matrix", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": "
-                                   "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[1,2,3,1]]}]}", BAD, "transposed"},
-    {"46 translation 1e30", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,1e30],[0,1,0,2],[0,0,1,3]]}]}",
-     BAD, "too large"},
-    {"47 scaled rotation", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[2,0,0,1],[0,2,0,2],[0,0,2,3]]}]}", BAD,
-     "is not a rotation (wanted |R'R - I| <= 1e-3, got 3)"},
-    {"47 just too far", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1.00051,0,0,1],[0,1,0,2],[0,0,1,3]]}]}", BAD,
-     "is not a rotation"},
-    {"47 just near enough", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1.00049,0,0,1],[0,1,0,2],[0,0,1,3]]}]}",
+    {"46 4 x 3 matrix",
+     SIZED
+     "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0],[0,1,0],[0,0,1],[1,2,3]]}]}",
+     BAD, "3 or 4 rows of 4"},
+    {"46 3 x 4 matrix",
+     SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,1],[0,1,0,2],[0,0,1,3]]}]}",
      GBT_OK, NULL},
-    {"47 reflection", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,1],[0,1,0,2],[0,0,-1,3]]}]}", BAD,
-     "reflection"},
-    {"47 zeros", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[0,0,0,1],[0,0,0,2],[0,0,0,3]]}]}", BAD,
-     "is not a rotation"},
+    {"46 a string in it",
+     SIZED
+     "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,\"1\"],[0,1,0,2],[0,0,1,3]]}]}",
+     BAD, "something that is not a number"},
+    {"46 a null in it",
+     SIZED
+     "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,null],[0,1,0,2],[0,0,1,3]]}]}",
+     BAD, "something that is not a number"},
+    {"46 a null row",
+     SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [null,[0,1,0,2],[0,0,1,3]]}]}", BAD,
+     "3 or 4 rows of 4"},
+    {"46 no matrix", SIZED "\"frames\": [{\"file_path\": \"a.png\"}]}", BAD,
+     "frame 0: transform_matrix: is missing"},
+    {"46 transposed matrix",
+     SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": "
+           "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[1,2,3,1]]}]}",
+     BAD, "transposed"},
+    {"46 translation 1e30",
+     SIZED
+     "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,1e30],[0,1,0,2],[0,0,1,3]]}]}",
+     BAD, "too large"},
+    {"47 scaled rotation",
+     SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[2,0,0,1],[0,2,0,2],[0,0,2,3]]}]}",
+     BAD, "is not a rotation (wanted |R'R - I| <= 1e-3, got 3)"},
+    {"47 just too far",
+     SIZED
+     "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1.00051,0,0,1],[0,1,0,2],[0,0,1,3]]}]}",
+     BAD, "is not a rotation"},
+    {"47 just near enough",
+     SIZED
+     "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1.00049,0,0,1],[0,1,0,2],[0,0,1,3]]}]}",
+     GBT_OK, NULL},
+    {"47 reflection",
+     SIZED
+     "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,1],[0,1,0,2],[0,0,-1,3]]}]}",
+     BAD, "reflection"},
+    {"47 zeros",
+     SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[0,0,0,1],[0,0,0,2],[0,0,0,3]]}]}",
+     BAD, "is not a rotation"},
     {"48 no focal length", "{\"w\": 8, \"h\": 6, " FRAMES, BAD, "neither fl_x nor camera_angle_x"},
-    {"49 both, agreeing or not", "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"camera_angle_x\": 1.5, " FRAMES, GBT_OK, NULL},
+    {"49 both, agreeing or not", "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"camera_angle_x\": 1.5, " FRAMES,
+     GBT_OK, NULL},
     {"50 angle pi", "{\"w\": 8, \"h\": 6, \"camera_angle_x\": 3.14159265358979324, " FRAMES, BAD,
      "camera_angle_x: out of range (wanted 0..pi"},
-    {"50 angle 0", "{\"w\": 8, \"h\": 6, \"camera_angle_x\": 0, " FRAMES, BAD, "camera_angle_x: out of range"},
-    {"50 angle a string", "{\"w\": 8, \"h\": 6, \"camera_angle_x\": \"1\", " FRAMES, BAD, "camera_angle_x: not a number"},
+    {"50 angle 0", "{\"w\": 8, \"h\": 6, \"camera_angle_x\": 0, " FRAMES, BAD,
+     "camera_angle_x: out of range"},
+    {"50 angle a string", "{\"w\": 8, \"h\": 6, \"camera_angle_x\": \"1\", " FRAMES, BAD,
+     "camera_angle_x: not a number"},
     {"51 width 0", "{\"w\": 0, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD,
      "frame 0: w: out of range (wanted a whole number in 1..65500, got 0)"},
     {"51 width 8.5", "{\"w\": 8.5, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD, "got 8.5"},
@@ -81,36 +107,52 @@ static json_case json_cases[] = {
     {"51 height 65501", "{\"w\": 8, \"h\": 65501, \"fl_x\": 10, " FRAMES, BAD, "h: out of range"},
     {"52 duplicate keys", "{\"w\": 8, \"w\": 9, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD, "duplicate"},
     {"53 NaN", "{\"w\": 8, \"h\": 6, \"fl_x\": NaN, " FRAMES, BAD, "not usable JSON"},
-    {"53 1e400", "{\"w\": 8, \"h\": 6, \"fl_x\": 1e400, " FRAMES, BAD, "not usable JSON: real number overflow"},
+    {"53 1e400", "{\"w\": 8, \"h\": 6, \"fl_x\": 1e400, " FRAMES, BAD,
+     "not usable JSON: real number overflow"},
     {"53 integer overflow", "{\"w\": 8, \"h\": 6, \"fl_x\": 99999999999999999999, " FRAMES, BAD, "too big"},
-    {"53 focal length 0", "{\"w\": 8, \"h\": 6, \"fl_x\": 0, " FRAMES, BAD, "focal length of camera model PINHOLE is not positive"},
+    {"53 focal length 0", "{\"w\": 8, \"h\": 6, \"fl_x\": 0, " FRAMES, BAD,
+     "focal length of camera model PINHOLE is not positive"},
     {"53 focal length negative", "{\"w\": 8, \"h\": 6, \"fl_x\": -5, " FRAMES, BAD, "not positive (got -5)"},
-    {"53 focal length 1e300", "{\"w\": 8, \"h\": 6, \"fl_x\": 1e300, " FRAMES, BAD, "fl_x: number is too large"},
-    {"54 invalid UTF-8", SIZED "\"frames\": [{\"file_path\": \"a\xff.png\", " POSE "}]}", BAD, "not usable JSON"},
-    {"54 zero in a path", SIZED "\"frames\": [{\"file_path\": \"a\\u0000.png\", " POSE "}]}", BAD, "not usable JSON"},
+    {"53 focal length 1e300", "{\"w\": 8, \"h\": 6, \"fl_x\": 1e300, " FRAMES, BAD,
+     "fl_x: number is too large"},
+    {"54 invalid UTF-8", SIZED "\"frames\": [{\"file_path\": \"a\xff.png\", " POSE "}]}", BAD,
+     "not usable JSON"},
+    {"54 zero in a path", SIZED "\"frames\": [{\"file_path\": \"a\\u0000.png\", " POSE "}]}", BAD,
+     "not usable JSON"},
     {"54 newline in a path", SIZED "\"frames\": [{\"file_path\": \"a\\n.png\", " POSE "}]}", BAD,
      "frame 0: image name has a control character"},
-    {"54 absolute path", SIZED "\"frames\": [{\"file_path\": \"/a.png\", " POSE "}]}", BAD, "image name is absolute"},
-    {"54 path leaves", SIZED "\"frames\": [{\"file_path\": \"sub/../../a.png\", " POSE "}]}", BAD, "leaves the data set"},
+    {"54 absolute path", SIZED "\"frames\": [{\"file_path\": \"/a.png\", " POSE "}]}", BAD,
+     "image name is absolute"},
+    {"54 path leaves", SIZED "\"frames\": [{\"file_path\": \"sub/../../a.png\", " POSE "}]}", BAD,
+     "leaves the data set"},
     {"54 path empty", SIZED "\"frames\": [{\"file_path\": \"./\", " POSE "}]}", BAD, "image name is empty"},
-    {"54 path a number", SIZED "\"frames\": [{\"file_path\": 3, " POSE "}]}", BAD, "file_path: wanted a string"},
+    {"54 path a number", SIZED "\"frames\": [{\"file_path\": 3, " POSE "}]}", BAD,
+     "file_path: wanted a string"},
     {"54 no path", SIZED "\"frames\": [{" POSE "}]}", BAD, "file_path: wanted a string"},
     {"55 without extension, png", SIZED "\"frames\": [{\"file_path\": \"./a\", " POSE "}]}", GBT_OK, NULL},
     {"55 without extension, jpg", SIZED "\"frames\": [{\"file_path\": \"sub/b\", " POSE "}]}", GBT_OK, NULL},
     {"55 no photo at all", SIZED "\"frames\": [{\"file_path\": \"c\", " POSE "}]}", GBT_ERR_IO,
      "none of the 1 photos exists, the first is c"},
-    {"55 a folder is no photo", SIZED "\"frames\": [{\"file_path\": \"sub\", " POSE "}]}", GBT_ERR_IO, "none of the 1 photos exists"},
-    {"unknown camera model", "{\"camera_model\": \"FISHEYE624\", \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD,
-     "camera_model is not supported: FISHEYE624"},
-    {"camera model a number", "{\"camera_model\": 4, \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD, "camera_model: not a string"},
-    {"k4 on a perspective lens", "{\"k4\": 0.1, \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD, "k4: not supported"},
-    {"p1 on a fisheye", "{\"p1\": 0.1, \"is_fisheye\": true, \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD, "fisheye with tangential"},
-    {"five distortion parameters", "{\"distortion_params\": [0,0,0,0,0], \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD,
+    {"55 a folder is no photo", SIZED "\"frames\": [{\"file_path\": \"sub\", " POSE "}]}", GBT_ERR_IO,
+     "none of the 1 photos exists"},
+    {"unknown camera model", "{\"camera_model\": \"FISHEYE624\", \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES,
+     BAD, "camera_model is not supported: FISHEYE624"},
+    {"camera model a number", "{\"camera_model\": 4, \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD,
+     "camera_model: not a string"},
+    {"k4 on a perspective lens", "{\"k4\": 0.1, \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD,
+     "k4: not supported"},
+    {"p1 on a fisheye", "{\"p1\": 0.1, \"is_fisheye\": true, \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD,
+     "fisheye with tangential"},
+    {"five distortion parameters",
+     "{\"distortion_params\": [0,0,0,0,0], \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD,
      "wanted 6 numbers"},
     {"size from the photo", "{\"fl_x\": 10, " FRAMES, GBT_OK, NULL},
-    {"size from something that is no photo", "{\"fl_x\": 10, \"frames\": [{\"file_path\": \"sub/b.jpg\", " POSE "}]}", BAD, "b.jpg"},
-    {"points named outside", "{\"ply_file_path\": \"../x.ply\", \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD, "leaves the data set"},
-    {"points name a number", "{\"ply_file_path\": 1, \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD, "ply_file_path: wanted a string"},
+    {"size from something that is no photo",
+     "{\"fl_x\": 10, \"frames\": [{\"file_path\": \"sub/b.jpg\", " POSE "}]}", BAD, "b.jpg"},
+    {"points named outside", "{\"ply_file_path\": \"../x.ply\", \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES,
+     BAD, "leaves the data set"},
+    {"points name a number", "{\"ply_file_path\": 1, \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD,
+     "ply_file_path: wanted a string"},
 };
 
 static void malformed(void **state)
@@ -160,28 +202,49 @@ typedef struct lens_case {
 
 static lens_case lens_cases[] = {
     {"focal length only", "\"fl_x\": 10", GBT_CAMERA_PINHOLE, {10, 10, 4, 3}},
-    {"two focal lengths", "\"fl_x\": 10, \"fl_y\": 11, \"cx\": 3.5, \"cy\": 2.5", GBT_CAMERA_PINHOLE, {10, 11, 3.5, 2.5}},
+    {"two focal lengths",
+     "\"fl_x\": 10, \"fl_y\": 11, \"cx\": 3.5, \"cy\": 2.5",
+     GBT_CAMERA_PINHOLE,
+     {10, 11, 3.5, 2.5}},
     {"only fl_y", "\"fl_y\": 11", GBT_CAMERA_PINHOLE, {11, 11, 4, 3}},
     {"named pinhole", "\"camera_model\": \"PINHOLE\", \"fl_x\": 10", GBT_CAMERA_PINHOLE, {10, 10, 4, 3}},
     {"one angle", "\"camera_angle_x\": 1.5707963267948966", GBT_CAMERA_PINHOLE, {4, 4, 4, 3}},
-    {"two angles", "\"camera_angle_x\": 1.5707963267948966, \"camera_angle_y\": 1.0471975511965976", GBT_CAMERA_PINHOLE,
+    {"two angles",
+     "\"camera_angle_x\": 1.5707963267948966, \"camera_angle_y\": 1.0471975511965976",
+     GBT_CAMERA_PINHOLE,
      {4, 5.196152422706632, 4, 3}},
-    {"fl_x beats the angles", "\"fl_x\": 10, \"camera_angle_x\": 0.761, \"camera_angle_y\": 0.3", GBT_CAMERA_PINHOLE, {10, 10, 4, 3}},
-    {"distortion without a name", "\"fl_x\": 10, \"k1\": 0.1, \"k2\": 0.2, \"p1\": 0.3, \"p2\": 0.4", GBT_CAMERA_OPENCV,
+    {"fl_x beats the angles",
+     "\"fl_x\": 10, \"camera_angle_x\": 0.761, \"camera_angle_y\": 0.3",
+     GBT_CAMERA_PINHOLE,
+     {10, 10, 4, 3}},
+    {"distortion without a name",
+     "\"fl_x\": 10, \"k1\": 0.1, \"k2\": 0.2, \"p1\": 0.3, \"p2\": 0.4",
+     GBT_CAMERA_OPENCV,
      {10, 10, 4, 3, 0.1, 0.2, 0.3, 0.4}},
     {"distortion of zeros", "\"fl_x\": 10, \"k1\": 0", GBT_CAMERA_OPENCV, {10, 10, 4, 3}},
     {"named OpenCV", "\"fl_x\": 10, \"camera_model\": \"OPENCV\"", GBT_CAMERA_OPENCV, {10, 10, 4, 3}},
-    {"third radial term", "\"fl_x\": 10, \"k1\": 0.1, \"k3\": 0.5", GBT_CAMERA_FULL_OPENCV, {10, 10, 4, 3, 0.1, 0, 0, 0, 0.5}},
-    {"list of parameters", "\"fl_x\": 10, \"distortion_params\": [0.1, 0.2, 0, 0, 0.3, 0.4]", GBT_CAMERA_OPENCV,
+    {"third radial term",
+     "\"fl_x\": 10, \"k1\": 0.1, \"k3\": 0.5",
+     GBT_CAMERA_FULL_OPENCV,
+     {10, 10, 4, 3, 0.1, 0, 0, 0, 0.5}},
+    {"list of parameters",
+     "\"fl_x\": 10, \"distortion_params\": [0.1, 0.2, 0, 0, 0.3, 0.4]",
+     GBT_CAMERA_OPENCV,
      {10, 10, 4, 3, 0.1, 0.2, 0.3, 0.4}},
-    {"fisheye", "\"fl_x\": 10, \"camera_model\": \"OPENCV_FISHEYE\", \"k1\": 0.1, \"k2\": 0.2, \"k3\": 0.3, \"k4\": 0.4",
-     GBT_CAMERA_OPENCV_FISHEYE, {10, 10, 4, 3, 0.1, 0.2, 0.3, 0.4}},
-    {"is_fisheye", "\"fl_x\": 10, \"is_fisheye\": true, \"k1\": 0.1", GBT_CAMERA_OPENCV_FISHEYE, {10, 10, 4, 3, 0.1}},
+    {"fisheye",
+     "\"fl_x\": 10, \"camera_model\": \"OPENCV_FISHEYE\", \"k1\": 0.1, \"k2\": 0.2, \"k3\": 0.3, \"k4\": 0.4",
+     GBT_CAMERA_OPENCV_FISHEYE,
+     {10, 10, 4, 3, 0.1, 0.2, 0.3, 0.4}},
+    {"is_fisheye",
+     "\"fl_x\": 10, \"is_fisheye\": true, \"k1\": 0.1",
+     GBT_CAMERA_OPENCV_FISHEYE,
+     {10, 10, 4, 3, 0.1}},
     {"is_fisheye false", "\"fl_x\": 10, \"is_fisheye\": false", GBT_CAMERA_PINHOLE, {10, 10, 4, 3}},
     {"equirectangular", "\"camera_model\": \"EQUIRECTANGULAR\"", GBT_CAMERA_EQUIRECTANGULAR, {8, 6}},
 };
 
-/* Each set of keys must mean the same at the top level, in the frame, and in the frame above contradicting ones at the top. */
+/* Each set of keys must mean the same at the top level, in the frame, and in the frame above contradicting
+   ones at the top. */
 static void lenses(void **state)
 {
     const lens_case *c = *state;
@@ -190,8 +253,11 @@ static void lenses(void **state)
         if (where == 0)
             snprintf(text, sizeof text, "{\"w\": 8, \"h\": 6, %s, \"frames\": [" FRAME "]}", c->keys);
         else
-            snprintf(text, sizeof text, "{\"w\": 80, \"h\": 60, \"frames\": [{\"w\": 8, \"h\": 6, %s, \"file_path\": \"a.png\", "
-                                        "" POSE "}]}", c->keys);
+            snprintf(
+                text, sizeof text,
+                "{\"w\": 80, \"h\": 60, \"frames\": [{\"w\": 8, \"h\": 6, %s, \"file_path\": \"a.png\", " POSE
+                "}]}",
+                c->keys);
         raw_scene raw = {0};
         char *points_name = NULL;
         must(read_json(text, strlen(text), &raw, &points_name, &err));
@@ -204,7 +270,8 @@ static void lenses(void **state)
     }
 }
 
-/* An OpenGL camera at the origin with axes as the world's looks along -z with y up: for COLMAP x right, y down, z forward. */
+/* An OpenGL camera at the origin with axes as the world's looks along -z with y up: for COLMAP x right, y
+   down, z forward. */
 static void axes(void **state)
 {
     (void)state;
@@ -219,12 +286,14 @@ static void axes(void **state)
     raw_free(&raw);
 }
 
-/* A turned camera: its forward direction must be minus the third column of the file's matrix, its down minus the second. */
+/* A turned camera: its forward direction must be minus the third column of the file's matrix, its down minus
+   the second. */
 static void turned_axes(void **state)
 {
     (void)state;
-    static const char text[] = SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\":"
-                                     "[[0.36, 0.48, -0.8, 5], [-0.8, 0.6, 0, 6], [0.48, 0.64, 0.6, 7], [0, 0, 0, 1]]}]}";
+    static const char text[] =
+        SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\":"
+              "[[0.36, 0.48, -0.8, 5], [-0.8, 0.6, 0, 6], [0.48, 0.64, 0.6, 7], [0, 0, 0, 1]]}]}";
     raw_scene raw = {0};
     char *points_name = NULL;
     must(read_json(text, strlen(text), &raw, &points_name, &err));
@@ -241,8 +310,9 @@ static void turned_axes(void **state)
 static void missing_frames_are_counted(void **state)
 {
     (void)state;
-    static const char text[] = SIZED "\"ply_file_path\": \"p.ply\", \"frames\": [" FRAME ", {\"file_path\": \"c.png\", " POSE "}, "
-        "{\"file_path\": \"d\", " POSE "}]}";
+    static const char text[] =
+        SIZED "\"ply_file_path\": \"p.ply\", \"frames\": [" FRAME ", {\"file_path\": \"c.png\", " POSE
+              "}, {\"file_path\": \"d\", " POSE "}]}";
     raw_scene raw = {0};
     char *points_name = NULL;
     must(read_json(text, strlen(text), &raw, &points_name, &err));
@@ -262,8 +332,10 @@ static void try_json(const unsigned char *bytes, size_t size, void *context)
     gbt_error err = {0};
     const gbt_status status = transforms_read(&file, folder_of_photos, &raw, &points_name, &err);
     check_message(status, &err);
-    if (status == GBT_OK)
-        check_raw(&raw), ++*accepted;
+    if (status == GBT_OK) {
+        check_raw(&raw);
+        ++*accepted;
+    }
     raw_free(&raw);
     mem_free(points_name);
 }
@@ -279,17 +351,20 @@ static void mutations(void **state)
 
 int main(void)
 {
-    enum { BAD_COUNT = sizeof json_cases / sizeof json_cases[0], LENS_COUNT = sizeof lens_cases / sizeof lens_cases[0] };
+    enum {
+        BAD_COUNT = sizeof json_cases / sizeof json_cases[0],
+        LENS_COUNT = sizeof lens_cases / sizeof lens_cases[0]
+    };
     static struct CMUnitTest tests[BAD_COUNT + LENS_COUNT];
     for (size_t i = 0; i < BAD_COUNT; i++)
-        tests[i] = (struct CMUnitTest){.name = json_cases[i].name, .test_func = malformed, .initial_state = &json_cases[i]};
+        tests[i] = (struct CMUnitTest){
+            .name = json_cases[i].name, .test_func = malformed, .initial_state = &json_cases[i]};
     for (size_t i = 0; i < LENS_COUNT; i++)
-        tests[BAD_COUNT + i] = (struct CMUnitTest){.name = lens_cases[i].name, .test_func = lenses, .initial_state = &lens_cases[i]};
+        tests[BAD_COUNT + i] = (struct CMUnitTest){
+            .name = lens_cases[i].name, .test_func = lenses, .initial_state = &lens_cases[i]};
     const struct CMUnitTest fixed[] = {
-        cmocka_unit_test(axes),
-        cmocka_unit_test(turned_axes),
-        cmocka_unit_test(deep_nesting),
-        cmocka_unit_test(missing_frames_are_counted),
+        cmocka_unit_test(axes),         cmocka_unit_test(turned_axes),
+        cmocka_unit_test(deep_nesting), cmocka_unit_test(missing_frames_are_counted),
         cmocka_unit_test(mutations),
     };
     void *folder = NULL;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/eval/lpips_network.h -- networks of random weights for LPIPS, and their files. */
 #ifndef GBT_TESTS_LPIPS_NETWORK_H
 #define GBT_TESTS_LPIPS_NETWORK_H
@@ -8,7 +9,7 @@
 #include "base/memory.h"
 #include "base/rng.h"
 
-/* ---- networks, as their papers draw them -------------------------------------------------------------------------------------------- */
+/* ---- networks, as their papers draw them ---- */
 
 /* out, kernel, stride, pad of a convolution; 0 and the window of maxima; taps are taken in order. */
 typedef struct step {
@@ -23,9 +24,18 @@ typedef struct network {
     float *weights[18], *bias[18], *taps[5]; /* [out][in][ky][kx] */
 } network;
 
-#define CONV(out) {out, 3, 1, 1, false}
-#define TAPPED(out) {out, 3, 1, 1, true}
-#define POOL(size) {0, size, 2, 0, false}
+#define CONV(out)                                                                                            \
+    {                                                                                                        \
+        out, 3, 1, 1, false                                                                                  \
+    }
+#define TAPPED(out)                                                                                          \
+    {                                                                                                        \
+        out, 3, 1, 1, true                                                                                   \
+    }
+#define POOL(size)                                                                                           \
+    {                                                                                                        \
+        0, size, 2, 0, false                                                                                 \
+    }
 
 static inline float *random_values(size_t count, double low, double high, uint64_t seed)
 {
@@ -49,37 +59,50 @@ static inline void fill_network(network *n)
         n->weights[i] = random_values((size_t)(s->out * inputs), -reach, reach, (uint64_t)i);
         n->bias[i] = random_values((size_t)s->out, -0.2, 0.2, 100 + (uint64_t)i);
         in = s->out;
-        if (s->tap)
-            n->taps[taps] = random_values((size_t)in, 0, 1, 200 + (uint64_t)taps), taps++;
+        if (s->tap) {
+            n->taps[taps] = random_values((size_t)in, 0, 1, 200 + (uint64_t)taps);
+            taps++;
+        }
     }
 }
 
 static inline network make_vgg(void)
 {
-    network n = {.name = "vgg", .count = 17,
-                 .steps = {CONV(64), TAPPED(64), POOL(2), CONV(128), TAPPED(128), POOL(2), CONV(256), CONV(256), TAPPED(256), POOL(2),
-                           CONV(512), CONV(512), TAPPED(512), POOL(2), CONV(512), CONV(512), TAPPED(512)}};
+    network n = {.name = "vgg",
+                 .count = 17,
+                 .steps = {CONV(64), TAPPED(64), POOL(2), CONV(128), TAPPED(128), POOL(2), CONV(256),
+                           CONV(256), TAPPED(256), POOL(2), CONV(512), CONV(512), TAPPED(512), POOL(2),
+                           CONV(512), CONV(512), TAPPED(512)}};
     fill_network(&n);
     return n;
 }
 
 static inline network make_alex(void)
 {
-    network n = {.name = "alex", .count = 7,
-                 .steps = {{64, 11, 4, 2, true}, POOL(3), {192, 5, 1, 2, true}, POOL(3), TAPPED(384), TAPPED(256), TAPPED(256)}};
+    network n = {.name = "alex",
+                 .count = 7,
+                 .steps = {{64, 11, 4, 2, true},
+                           POOL(3),
+                           {192, 5, 1, 2, true},
+                           POOL(3),
+                           TAPPED(384),
+                           TAPPED(256),
+                           TAPPED(256)}};
     fill_network(&n);
     return n;
 }
 
 static inline void free_network(network *n)
 {
-    for (int i = 0; i < n->count; i++)
-        mem_free(n->weights[i]), mem_free(n->bias[i]);
+    for (int i = 0; i < n->count; i++) {
+        mem_free(n->weights[i]);
+        mem_free(n->bias[i]);
+    }
     for (int i = 0; i < 5; i++)
         mem_free(n->taps[i]);
 }
 
-/* ---- the same as a file ------------------------------------------------------------------------------------------------------------- */
+/* ---- the same as a file ---- */
 
 typedef struct safetensors {
     char header[16384];
@@ -87,17 +110,20 @@ typedef struct safetensors {
     unsigned char *data;
 } safetensors;
 
-static inline void add_array(safetensors *f, const char *name, const char *shape, const float *values, size_t count)
+static inline void add_array(safetensors *f, const char *name, const char *shape, const float *values,
+                             size_t count)
 {
     f->length += (size_t)snprintf(f->header + f->length, sizeof f->header - f->length,
-                                  "%c\"%s\":{\"dtype\":\"F32\",\"shape\":%s,\"data_offsets\":[%zu,%zu]}", f->length == 0 ? '{' : ',', name,
-                                  shape, f->bytes, f->bytes + 4 * count);
+                                  "%c\"%s\":{\"dtype\":\"F32\",\"shape\":%s,\"data_offsets\":[%zu,%zu]}",
+                                  f->length == 0 ? '{' : ',', name, shape, f->bytes, f->bytes + 4 * count);
     assert_ok(mem_reserve((void **)&f->data, &f->capacity, f->bytes, f->bytes + 4 * count, 1, "file", NULL));
-    memcpy(f->data + f->bytes, values, 4 * count); /* little endian, as every machine that this is tested on */
+    memcpy(f->data + f->bytes, values, 4 * count); /* little endian, as every machine that this is tested on
+                                                    */
     f->bytes += 4 * count;
 }
 
-/* torchvision counts a convolution, its ReLU and maxima as a module each; a slice ends behind a compared ReLU. `without` is left out. */
+/* torchvision counts a convolution, its ReLU and maxima as a module each; a slice ends behind a compared
+   ReLU. `without` is left out. */
 static inline void write_network(const network *n, const char *path, const char *without)
 {
     safetensors f = {.length = 0};
@@ -116,7 +142,9 @@ static inline void write_network(const network *n, const char *path, const char 
         snprintf(name, sizeof name, "net.slice%d.%d.bias", slice, module);
         snprintf(shape, sizeof shape, "[%d]", s->out);
         add_array(&f, name, shape, n->bias[i], (size_t)s->out);
-        in = s->out, module += 2, slice += s->tap;
+        in = s->out;
+        module += 2;
+        slice += s->tap;
         if (!s->tap)
             continue;
         snprintf(name, sizeof name, "lin%d.model.1.weight", tap);
@@ -133,7 +161,8 @@ static inline void write_network(const network *n, const char *path, const char 
     memcpy(all + 8, f.header, f.length);
     memcpy(all + 8 + f.length, f.data, f.bytes);
     assert_ok(file_write_atomic(path, all, 8 + f.length + f.bytes, NULL));
-    mem_free(all), mem_free(f.data);
+    mem_free(all);
+    mem_free(f.data);
 }
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/eval/picture_support.h -- a folder for pictures, and pictures of noise. */
 #ifndef GBT_TESTS_PICTURE_SUPPORT_H
 #define GBT_TESTS_PICTURE_SUPPORT_H

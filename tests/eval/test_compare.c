@@ -1,4 +1,6 @@
-/* tests/eval/test_compare.c -- two image files compared: the figures of the metrics themselves, alpha and formats, what is refused. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/eval/test_compare.c -- two image files compared: the figures of the metrics themselves, alpha and
+   formats, what is refused. */
 #include "eval/picture_support.h"
 
 #include "gbtrace/evaluate.h"
@@ -30,7 +32,8 @@ static void figures_are_those_of_the_metrics(void **state)
     assert_int_equal(gbt_compare_pictures(a.pixels, b.pixels, 0, 20, &in_memory, NULL), GBT_ERR_ARGUMENT);
     assert_ok(gbt_compare_images(in_folder("a.png"), in_folder("a.png"), &c, NULL));
     assert_true(c.psnr == METRIC_PSNR_MAX && c.ssim == 1 && c.ssim_interior == 1 && c.flip == 0);
-    image_free(&a), image_free(&b);
+    image_free(&a);
+    image_free(&b);
 }
 
 static void alpha_is_left_out(void **state)
@@ -45,7 +48,8 @@ static void alpha_is_left_out(void **state)
     gbt_comparison c;
     assert_ok(gbt_compare_images(in_folder("with.png"), in_folder("without.png"), &c, NULL));
     assert_true(c.psnr == METRIC_PSNR_MAX && c.ssim == 1);
-    image_free(&with), image_free(&without);
+    image_free(&with);
+    image_free(&without);
 }
 
 static void what_cannot_be_compared(void **state)
@@ -53,13 +57,18 @@ static void what_cannot_be_compared(void **state)
     (void)state;
     write_noise("small.png", 8, 8, 3, 1);
     write_noise("wide.png", 9, 8, 3, 1);
-    const struct { const char *a, *b; gbt_status status; const char *says; } cases[] = {
-        {"small.png", "wide.png", GBT_ERR_ARGUMENT, "8 x 8"}, {"none.png", "wide.png", GBT_ERR_IO, "none.png"},
-        {"wide.png", "none.png", GBT_ERR_IO, "none.png"}};
+    const struct {
+        const char *a, *b;
+        gbt_status status;
+        const char *says;
+    } cases[] = {{"small.png", "wide.png", GBT_ERR_ARGUMENT, "8 x 8"},
+                 {"none.png", "wide.png", GBT_ERR_IO, "none.png"},
+                 {"wide.png", "none.png", GBT_ERR_IO, "none.png"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         gbt_comparison c;
         gbt_error err = {0};
-        assert_int_equal(gbt_compare_images(in_folder(cases[i].a), in_folder(cases[i].b), &c, &err), cases[i].status);
+        assert_int_equal(gbt_compare_images(in_folder(cases[i].a), in_folder(cases[i].b), &c, &err),
+                         cases[i].status);
         assert_non_null(strstr(err.text, cases[i].says));
     }
     gbt_comparison c;

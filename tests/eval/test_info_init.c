@@ -1,4 +1,6 @@
-/* tests/eval/test_info_init.c -- what info and init say of things whose numbers are known, as JSON; the spheres that init draws. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/eval/test_info_init.c -- what info and init say of things whose numbers are known, as JSON; the
+   spheres that init draws. */
 #include <jansson.h>
 #include <unistd.h>
 
@@ -37,7 +39,8 @@ static int make_folder(void **state)
 static int remove_folder(void **state)
 {
     (void)state;
-    static const char *const names[] = {"cloud.ply", "out.ply", "out.json", "model.gbt", "none.ply", "far.ply"};
+    static const char *const names[] = {"cloud.ply", "out.ply",  "out.json",
+                                        "model.gbt", "none.ply", "far.ply"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         unlink(in_folder(names[i]));
     return rmdir(folder);
@@ -49,7 +52,9 @@ static const char *write_grid(const char *name, int side, double step, double of
     const char *path = in_folder(name);
     FILE *file = fopen(path, "w");
     assert_non_null(file);
-    fprintf(file, "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\nend_header\n",
+    fprintf(file,
+            "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double "
+            "z\nend_header\n",
             side * side * side);
     for (int i = 0; i < side * side * side; i++)
         fprintf(file, "%.17g %.17g %.17g\n", offset + step * (i % side), offset + step * (i / side % side),
@@ -105,8 +110,12 @@ static void info_of_a_cloud(void **state)
 static void expectations_hold(void **state)
 {
     (void)state;
-    static const struct { const char *data; double downscale, bytes, step_seconds; } runs[] = {
-        {"data/fox", 1, 319.8e6, 41.72 / 1161}, {"data/plush", 1.33333, 338.3e6, 41.91 / 1483}, {"data/castle", 1, 348.0e6, 41.74 / 1410}};
+    static const struct {
+        const char *data;
+        double downscale, bytes, step_seconds;
+    } runs[] = {{"data/fox", 1, 319.8e6, 41.72 / 1161},
+                {"data/plush", 1.33333, 338.3e6, 41.91 / 1483},
+                {"data/castle", 1, 348.0e6, 41.74 / 1410}};
     for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
         const char *path = shared_path(runs[i].data);
         if (path == NULL)
@@ -117,7 +126,8 @@ static void expectations_hold(void **state)
         print_message("%s: %.2f of the memory, %.2f of the time\n", runs[i].data, e.bytes / runs[i].bytes,
                       e.step_seconds / runs[i].step_seconds);
         assert_true(e.bytes < 1.5 * runs[i].bytes && e.bytes > runs[i].bytes / 1.5);
-        assert_true(e.step_seconds < 1.5 * runs[i].step_seconds && e.step_seconds > runs[i].step_seconds / 1.5);
+        assert_true(e.step_seconds < 1.5 * runs[i].step_seconds &&
+                    e.step_seconds > runs[i].step_seconds / 1.5);
         assert_true(e.score_seconds > 0);
         scene_free(&s);
     }
@@ -126,8 +136,13 @@ static void expectations_hold(void **state)
 static void info_of_a_model(void **state)
 {
     (void)state;
-    model m = {.anchors.offset_count = 3, .origin = {1, 2, 4.5e6}, .voxel_size = 0.25f, .extent = 2, .data_folder = "photos",
-               .config = "a = 1\nb = \"x\"\n", .iterations = 1234};
+    model m = {.anchors.offset_count = 3,
+               .origin = {1, 2, 4.5e6},
+               .voxel_size = 0.25f,
+               .extent = 2,
+               .data_folder = "photos",
+               .config = "a = 1\nb = \"x\"\n",
+               .iterations = 1234};
     assert_ok(anchors_resize(&m.anchors, 17, NULL));
     assert_ok(decoder_init(&m.decoder, 3, true, 1, NULL));
     assert_ok(model_save(in_folder("model.gbt"), &m, NULL));
@@ -182,30 +197,44 @@ static void init_counts(void **state)
     FILE *report = fopen("/dev/null", "w");
     gbt_init_def def = gbt_init_def_default();
     def.init_count = 0.25;
-    const struct { const char *init; int max_depth; float voxel_size; double anchors, voxels, balls; } rows[] = {
+    const struct {
+        const char *init;
+        int max_depth;
+        float voxel_size;
+        double anchors, voxels, balls;
+    } rows[] = {
         /* cubes of 8 points: compact (eq 23) */
-        {"gb", 0, 0.0f, 1, 64, 1}, {"gb", 1, 0.0f, 2, 64, 2}, {"gb", 2, 0.0f, 4, 64, 4}, {"gb", 18, 0.0f, 8, 64, 8},
-        {"gb", 18, 0.125f, 32, 64, 32}, /* never compact: leaves of N_min = 2 points */
-        {"voxel", 18, 0.0f, 64, 64, 8}, {"voxel", 18, 100.0f, 1, 1, 1}, {"adaptive", 18, 0.0f, 16, 64, 8}, {"random", 18, 0.0f, 16, 64, 8},
+        {"gb", 0, 0.0f, 1, 64, 1},       {"gb", 1, 0.0f, 2, 64, 2},      {"gb", 2, 0.0f, 4, 64, 4},
+        {"gb", 18, 0.0f, 8, 64, 8},      {"gb", 18, 0.125f, 32, 64, 32}, /* never compact: leaves of N_min = 2
+                                                                            points */
+        {"voxel", 18, 0.0f, 64, 64, 8},  {"voxel", 18, 100.0f, 1, 1, 1}, {"adaptive", 18, 0.0f, 16, 64, 8},
+        {"random", 18, 0.0f, 16, 64, 8},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        def.init = rows[i].init, def.max_depth = rows[i].max_depth, def.voxel_size = rows[i].voxel_size;
+        def.init = rows[i].init;
+        def.max_depth = rows[i].max_depth;
+        def.voxel_size = rows[i].voxel_size;
         gbt_error err = {0};
         if (gbt_init(data, &def, in_folder("out.ply"), in_folder("out.json"), report, &err) != GBT_OK)
             fail_msg("row %zu: %s", i, err.text);
         json_t *value = json_load_file(in_folder("out.json"), 0, NULL);
         assert_non_null(value);
         if (number(value, "anchors") != rows[i].anchors || number(value, "voxel_anchors") != rows[i].voxels)
-            fail_msg("row %zu: %g anchors, %g voxels", i, number(value, "anchors"), number(value, "voxel_anchors"));
-        assert_true(number(value, "voxel_size") == (rows[i].voxel_size > 0 ? (double)rows[i].voxel_size : 1.0));
+            fail_msg("row %zu: %g anchors, %g voxels", i, number(value, "anchors"),
+                     number(value, "voxel_anchors"));
+        assert_true(number(value, "voxel_size") ==
+                    (rows[i].voxel_size > 0 ? (double)rows[i].voxel_size : 1.0));
         const double mean = number(json_object_get(value, "points_per_anchor"), "mean");
         assert_true(fabs(mean * rows[i].anchors - 64) < 1e-4); /* every point in one anchor */
-        const json_t *quality = json_object_get(value, "quality"), *gb = json_array_get(quality, 0), *adaptive = json_array_get(quality, 1),
-                     *voxel = json_array_get(quality, 2);
+        const json_t *quality = json_object_get(value, "quality"), *gb = json_array_get(quality, 0),
+                     *adaptive = json_array_get(quality, 1), *voxel = json_array_get(quality, 2);
         assert_int_equal(json_array_size(quality), 3);
-        assert_true(number(gb, "anchors") == rows[i].balls && number(adaptive, "anchors") == 16 && number(voxel, "anchors") <= 16);
-        /* 16 sets of 4 in a unit grid: squares, whose corners are sqrt(1/2) from their centre, are the best there is. */
-        assert_true(number(adaptive, "distance_rms") >= 0.7071 && number(adaptive, "distance_rms") < number(voxel, "distance_rms"));
+        assert_true(number(gb, "anchors") == rows[i].balls && number(adaptive, "anchors") == 16 &&
+                    number(voxel, "anchors") <= 16);
+        /* 16 sets of 4 in a unit grid: squares, whose corners are sqrt(1/2) from their centre, are the best
+           there is. */
+        assert_true(number(adaptive, "distance_rms") >= 0.7071 &&
+                    number(adaptive, "distance_rms") < number(voxel, "distance_rms"));
         assert_true(number(adaptive, "color_rms") == 0);
         json_decref(value);
         json_t *back = info_as_json(in_folder("out.ply"));
@@ -227,7 +256,8 @@ static void init_writes_world_coordinates(void **state)
     json_t *back = info_as_json(in_folder("out.ply"));
     for (size_t k = 0; k < 3; k++)
         /* a float there has steps of 0.25 */
-        assert_true(fabs(json_number_value(json_array_get(json_object_get(back, "origin"), k)) - (4e6 + 0.5)) <= 0.5);
+        assert_true(
+            fabs(json_number_value(json_array_get(json_object_get(back, "origin"), k)) - (4e6 + 0.5)) <= 0.5);
     json_decref(back);
 }
 
@@ -240,19 +270,25 @@ static void init_refuses(void **state)
     gbt_init_def bad[BAD];
     for (int i = 0; i < BAD; i++)
         bad[i] = good;
-    bad[0].init = "ball", bad[1].scale_prior = NULL, bad[2].voxel_rule = "", bad[3].voxel_size = -1, bad[4].voxel_size = NAN,
-        bad[5].max_depth = 65;
-    bad[6].init = NULL, bad[7].init_count = -0.1, bad[8].init_count = 1.5;
+    bad[0].init = "ball", bad[1].scale_prior = NULL, bad[2].voxel_rule = "", bad[3].voxel_size = -1,
+    bad[4].voxel_size = NAN, bad[5].max_depth = 65;
+    bad[6].init = NULL;
+    bad[7].init_count = -0.1;
+    bad[8].init_count = 1.5;
     for (int i = 0; i < BAD; i++) {
         gbt_error err = {0};
-        assert_int_equal(gbt_init(data, &bad[i], in_folder("none.ply"), NULL, stdout, &err), GBT_ERR_ARGUMENT);
+        assert_int_equal(gbt_init(data, &bad[i], in_folder("none.ply"), NULL, stdout, &err),
+                         GBT_ERR_ARGUMENT);
         assert_int_not_equal(err.text[0], '\0');
         assert_false(file_exists(in_folder("none.ply")));
     }
     gbt_error err = {0};
-    assert_int_equal(gbt_init(data, &good, data, NULL, stdout, &err), GBT_ERR_ARGUMENT); /* would overwrite its input */
-    assert_int_equal(gbt_init(data, &good, in_folder("none.ply"), in_folder("none.ply"), stdout, NULL), GBT_ERR_ARGUMENT);
-    assert_int_equal(gbt_init(in_folder("none.ply"), &good, in_folder("out.ply"), NULL, stdout, NULL), GBT_ERR_IO);
+    assert_int_equal(gbt_init(data, &good, data, NULL, stdout, &err), GBT_ERR_ARGUMENT); /* would overwrite
+                                                                                            its input */
+    assert_int_equal(gbt_init(data, &good, in_folder("none.ply"), in_folder("none.ply"), stdout, NULL),
+                     GBT_ERR_ARGUMENT);
+    assert_int_equal(gbt_init(in_folder("none.ply"), &good, in_folder("out.ply"), NULL, stdout, NULL),
+                     GBT_ERR_IO);
 }
 
 static void init_without_memory(void **state)
@@ -307,8 +343,10 @@ static void spheres(void **state)
             for (size_t axis = 0; axis < 3; axis++)
                 p[k][axis] = (double)mesh.position[3 * t[k] + axis] - (double)center[3 * (f / 80) + axis];
         }
-        volume[f / 80] += (p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) + p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
-                           p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0])) / 6;
+        volume[f / 80] += (p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
+                           p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
+                           p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0])) /
+                          6;
     }
     int edges = 0;
     for (int a = 0; a < 84; a++)
@@ -343,16 +381,11 @@ static void json_of_any_bytes(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(info_of_a_cloud),
-        cmocka_unit_test(expectations_hold),
-        cmocka_unit_test(info_of_a_model),
-        cmocka_unit_test(info_writes_nothing_when_it_fails),
-        cmocka_unit_test(init_counts),
-        cmocka_unit_test(init_writes_world_coordinates),
-        cmocka_unit_test(init_refuses),
-        cmocka_unit_test(init_without_memory),
-        cmocka_unit_test(spheres),
-        cmocka_unit_test(json_of_any_bytes),
+        cmocka_unit_test(info_of_a_cloud), cmocka_unit_test(expectations_hold),
+        cmocka_unit_test(info_of_a_model), cmocka_unit_test(info_writes_nothing_when_it_fails),
+        cmocka_unit_test(init_counts),     cmocka_unit_test(init_writes_world_coordinates),
+        cmocka_unit_test(init_refuses),    cmocka_unit_test(init_without_memory),
+        cmocka_unit_test(spheres),         cmocka_unit_test(json_of_any_bytes),
     };
     return cmocka_run_group_tests_name("info and init", tests, make_folder, remove_folder);
 }

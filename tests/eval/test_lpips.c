@@ -1,5 +1,6 @@
-/* tests/eval/test_lpips.c -- LPIPS with networks of random weights against the plainest form of both, in double; what is cut off and
-   masked; what is refused. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/eval/test_lpips.c -- LPIPS with networks of random weights against the plainest form of both, in
+   double; what is cut off and masked; what is refused. */
 #include "eval/picture_support.h"
 
 #include "base/near.h"
@@ -17,7 +18,7 @@ static lpips *open_network(const network *n, const char *name)
     return net;
 }
 
-/* ---- the plainest form -------------------------------------------------------------------------------------------------------------- */
+/* ---- the plainest form ---- */
 
 typedef struct volume {
     int width, height, channels;
@@ -26,7 +27,8 @@ typedef struct volume {
 
 static volume new_volume(int width, int height, int channels)
 {
-    const volume v = {width, height, channels, mem_calloc((size_t)(width * height * channels), sizeof(double), "volume", NULL)};
+    const volume v = {width, height, channels,
+                      mem_calloc((size_t)(width * height * channels), sizeof(double), "volume", NULL)};
     assert_non_null(v.at);
     return v;
 }
@@ -39,14 +41,16 @@ static double read_volume(const volume *v, int x, int y, int c)
 static volume apply(const network *n, int i, volume in)
 {
     const step *s = &n->steps[i];
-    volume out = new_volume((in.width + 2 * s->pad - s->kernel) / s->stride + 1, (in.height + 2 * s->pad - s->kernel) / s->stride + 1,
-                            s->out > 0 ? s->out : in.channels);
+    volume out =
+        new_volume((in.width + 2 * s->pad - s->kernel) / s->stride + 1,
+                   (in.height + 2 * s->pad - s->kernel) / s->stride + 1, s->out > 0 ? s->out : in.channels);
     for (int o = 0; o < out.channels; o++)
         for (int y = 0; y < out.height; y++)
             for (int x = 0; x < out.width; x++) {
                 double sum = s->out > 0 ? (double)n->bias[i][o] : -1e30;
                 for (int k = 0; k < s->kernel * s->kernel; k++) {
-                    const int from_x = x * s->stride - s->pad + k % s->kernel, from_y = y * s->stride - s->pad + k / s->kernel;
+                    const int from_x = x * s->stride - s->pad + k % s->kernel,
+                              from_y = y * s->stride - s->pad + k / s->kernel;
                     for (int c = 0; s->out > 0 && c < in.channels; c++)
                         sum += (double)n->weights[i][(o * in.channels + c) * s->kernel * s->kernel + k] *
                                read_volume(&in, from_x, from_y, c);
@@ -65,10 +69,13 @@ static double distance(const volume *a, const volume *b, const float *weight)
     for (int y = 0; y < a->height; y++)
         for (int x = 0; x < a->width; x++) {
             double aa = 0, bb = 0;
-            for (int c = 0; c < a->channels; c++)
-                aa += read_volume(a, x, y, c) * read_volume(a, x, y, c), bb += read_volume(b, x, y, c) * read_volume(b, x, y, c);
             for (int c = 0; c < a->channels; c++) {
-                const double d = read_volume(a, x, y, c) / (sqrt(aa) + 1e-10) - read_volume(b, x, y, c) / (sqrt(bb) + 1e-10);
+                aa += read_volume(a, x, y, c) * read_volume(a, x, y, c);
+                bb += read_volume(b, x, y, c) * read_volume(b, x, y, c);
+            }
+            for (int c = 0; c < a->channels; c++) {
+                const double d = read_volume(a, x, y, c) / (sqrt(aa) + 1e-10) -
+                                 read_volume(b, x, y, c) / (sqrt(bb) + 1e-10);
                 sum += (double)weight[c] * d * d;
             }
         }
@@ -80,7 +87,8 @@ static volume seen_by_network(const image *im, double low)
     static const double shift[3] = {-0.030, -0.088, -0.188}, scale[3] = {0.458, 0.448, 0.450};
     const volume v = new_volume(im->width, im->height, 3);
     for (int i = 0; i < im->width * im->height * 3; i++)
-        v.at[(i % 3) * im->width * im->height + i / 3] = (low + (1 - low) * (double)im->pixels[i] - shift[i % 3]) / scale[i % 3];
+        v.at[(i % 3) * im->width * im->height + i / 3] =
+            (low + (1 - low) * (double)im->pixels[i] - shift[i % 3]) / scale[i % 3];
     return v;
 }
 
@@ -89,15 +97,17 @@ static double plain_lpips(const network *n, const image *a, const image *b, doub
     volume x = seen_by_network(a, low), y = seen_by_network(b, low);
     double sum = 0;
     for (int i = 0, tap = 0; i < n->count; i++) {
-        x = apply(n, i, x), y = apply(n, i, y);
+        x = apply(n, i, x);
+        y = apply(n, i, y);
         if (n->steps[i].tap)
             sum += distance(&x, &y, n->taps[tap++]);
     }
-    mem_free(x.at), mem_free(y.at);
+    mem_free(x.at);
+    mem_free(y.at);
     return sum;
 }
 
-/* ---- tests -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- tests ---- */
 
 /* Odd sizes: maxima leave a row and a column out. */
 static void agrees(network whole, int width, int height)
@@ -117,7 +127,8 @@ static void agrees(network whole, int width, int height)
     assert_memory_equal(&got, &again, sizeof got);
     assert_ok(lpips_compare(net, &a, &a, NULL, 0, &again, NULL));
     assert_true(again.lpips == 0 && again.lpips_01 == 0);
-    image_free(&a), image_free(&b);
+    image_free(&a);
+    image_free(&b);
     lpips_close(net);
     free_network(&whole);
 }
@@ -148,8 +159,10 @@ static void halves_and_masks(void **state)
         const int x = i % WIDTH, to = (i / WIDTH) * HALF + x - HALF;
         valid[i] = rng_uniform(9, 0, (uint64_t)i) < 0.7f;
         for (int c = 0; c < 3; c++) {
-            if (x >= HALF)
-                right_a.pixels[3 * to + c] = a.pixels[3 * i + c], right_b.pixels[3 * to + c] = b.pixels[3 * i + c];
+            if (x >= HALF) {
+                right_a.pixels[3 * to + c] = a.pixels[3 * i + c];
+                right_b.pixels[3 * to + c] = b.pixels[3 * i + c];
+            }
             if (!valid[i])
                 mended.pixels[3 * i + c] = b.pixels[3 * i + c];
         }
@@ -180,11 +193,14 @@ static void files_compared(void **state)
     assert_ok(image_write(in_folder("a.png"), &a, NULL));
     assert_ok(image_write(in_folder("b.png"), &b, NULL));
     assert_ok(lpips_compare(net, &a, &b, NULL, 0, &wanted, NULL));
-    assert_ok(gbt_compare_lpips(in_folder("a.png"), in_folder("b.png"), in_folder("alex.safetensors"), got, NULL));
+    assert_ok(
+        gbt_compare_lpips(in_folder("a.png"), in_folder("b.png"), in_folder("alex.safetensors"), got, NULL));
     assert_near(got[0], wanted.lpips, 1e-6 * wanted.lpips);
     assert_near(got[1], wanted.lpips_01, 1e-6 * wanted.lpips_01);
-    assert_int_equal(gbt_compare_lpips(in_folder("a.png"), in_folder("b.png"), in_folder("none"), got, &err), GBT_ERR_IO);
-    image_free(&a), image_free(&b);
+    assert_int_equal(gbt_compare_lpips(in_folder("a.png"), in_folder("b.png"), in_folder("none"), got, &err),
+                     GBT_ERR_IO);
+    image_free(&a);
+    image_free(&b);
     lpips_close(net);
     free_network(&alex);
 }
@@ -220,7 +236,9 @@ static void refusals(void **state)
             break;
         assert_int_equal(status, GBT_ERR_NO_MEMORY);
     }
-    image_free(&small), image_free(&least), image_free(&other);
+    image_free(&small);
+    image_free(&least);
+    image_free(&other);
     lpips_close(net);
 
     write_network(&alex, in_folder("a.safetensors"), "net.slice4.8.weight");
@@ -252,7 +270,8 @@ static int open_folder(void **state)
 static int close_folder(void **state)
 {
     (void)state;
-    static const char *const names[] = {"net.safetensors", "alex.safetensors", "a.safetensors", "a.png", "b.png"};
+    static const char *const names[] = {"net.safetensors", "alex.safetensors", "a.safetensors", "a.png",
+                                        "b.png"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         unlink(in_folder(names[i]));
     return rmdir(folder);

@@ -1,5 +1,6 @@
-/* tests/frame/test_frame.c -- frames of any shot: nothing that a ray reaches is left out, samples are averaged in order, same bits for all
-   threads. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/frame/test_frame.c -- frames of any shot: nothing that a ray reaches is left out, samples are
+   averaged in order, same bits for all threads. */
 #include "anchor/fixture.h"
 #include "base/near.h"
 #include "base/parallel.h"
@@ -16,29 +17,39 @@ static double uniform(uint64_t seed, uint64_t index, double low, double high)
 static void random_pose(uint64_t seed, uint64_t first, double distance, gbt_camera *camera)
 {
     double q[4], length = 0;
-    for (uint64_t i = 0; i < 4; i++)
-        q[i] = rng_normal(seed, first, i), length += q[i] * q[i];
+    for (uint64_t i = 0; i < 4; i++) {
+        q[i] = rng_normal(seed, first, i);
+        length += q[i] * q[i];
+    }
     for (int i = 0; i < 4; i++)
         q[i] /= sqrt(length);
     dquat_to_matrix(q, camera->rotation);
     for (int k = 0; k < 3; k++) /* looking at somewhere near the middle */
-        camera->center[k] = uniform(seed, first * 16 + (uint64_t)k, -0.5, 0.5) - distance * camera->rotation[6 + k];
+        camera->center[k] =
+            uniform(seed, first * 16 + (uint64_t)k, -0.5, 0.5) - distance * camera->rotation[6 + k];
 }
 
 /* A shot of each kind: lenses, open apertures, shutters, rays given anyhow. */
 static ray_shot random_shot(uint64_t seed, int kind, ray_image *given)
 {
-    static const gbt_camera_model models[KINDS] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_PINHOLE, GBT_CAMERA_FISHEYE,
-                                                   GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_PINHOLE,
-                                                   GBT_CAMERA_EQUIRECTANGULAR, GBT_CAMERA_PINHOLE};
+    static const gbt_camera_model models[KINDS] = {
+        GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC,    GBT_CAMERA_PINHOLE,
+        GBT_CAMERA_FISHEYE, GBT_CAMERA_PINHOLE,         GBT_CAMERA_ORTHOGRAPHIC,
+        GBT_CAMERA_PINHOLE, GBT_CAMERA_EQUIRECTANGULAR, GBT_CAMERA_PINHOLE};
     const bool turn = models[kind] == GBT_CAMERA_EQUIRECTANGULAR;
     const double focal = kind == 3 ? 8 : uniform(seed, 0, 20, 60);
-    gbt_camera camera = {.model = models[kind], .width = W, .height = H, .params = {turn ? W : focal, turn ? H : focal, 0.5 * W, 0.4 * H}};
+    gbt_camera camera = {.model = models[kind],
+                         .width = W,
+                         .height = H,
+                         .params = {turn ? W : focal, turn ? H : focal, 0.5 * W, 0.4 * H}};
     random_pose(seed, 1, uniform(seed, 2, 0, 5), &camera);
     ray_shot shot = ray_shot_of(&camera);
-    shot.samples = 3, shot.seed = seed;
-    if (kind == 2 || kind == 3 || kind == 5 || kind == 6)
-        shot.aperture_radius = uniform(seed, 3, 0.01, 0.6), shot.focus_distance = uniform(seed, 4, 0.5, 6);
+    shot.samples = 3;
+    shot.seed = seed;
+    if (kind == 2 || kind == 3 || kind == 5 || kind == 6) {
+        shot.aperture_radius = uniform(seed, 3, 0.01, 0.6);
+        shot.focus_distance = uniform(seed, 4, 0.5, 6);
+    }
     if (kind == 4 || kind == 6) {
         shot.shutter = seed % 2 == 0 ? RAY_SHUTTER_ROWS : RAY_SHUTTER_COLUMNS;
         if (kind == 4)
@@ -53,7 +64,7 @@ static ray_shot random_shot(uint64_t seed, int kind, ray_image *given)
             double dir[3];
             for (size_t k = 0; k < 3; k++)
                 given->origin[3 * i + k] = (float)(camera.center[k] + 0.5 * rng_normal(seed, 20 + k, i)),
-                    dir[k] = camera.rotation[6 + k] + wide * rng_normal(seed, 30 + k, i);
+                                      dir[k] = camera.rotation[6 + k] + wide * rng_normal(seed, 30 + k, i);
             dvec_normalize(dir);
             for (size_t k = 0; k < 3; k++)
                 given->dir[3 * i + k] = i % 50 == 7 ? 0 : (float)dir[k];
@@ -71,7 +82,8 @@ typedef struct world {
 
 static world make_world(uint64_t seed)
 {
-    world w = {.a = random_anchors(ANCHORS, OFFSETS, seed), .d = random_decoder(OFFSETS, false, seed + 1000),
+    world w = {.a = random_anchors(ANCHORS, OFFSETS, seed),
+               .d = random_decoder(OFFSETS, false, seed + 1000),
                .s = trace_settings_default()};
     for (size_t i = 0; i < ANCHORS; i++)
         for (size_t k = 0; k < 6; k++)
@@ -125,8 +137,8 @@ static void nothing_reached_is_left_out(void **state)
             for (size_t i = 0; i < 3 * W * H; i++) {
                 const double want = sum[i] / samples;
                 if (!(fabs((double)f.rgb.pixels[i] - want) < 3e-6))
-                    fail_msg("seed %d, kind %d, pixel %zu: %.9g, with all anchors %.9g (%zu of them visible)", (int)seed, kind, i / 3,
-                             (double)f.rgb.pixels[i], want, f.visible_count);
+                    fail_msg("seed %d, kind %d, pixel %zu: %.9g, with all anchors %.9g (%zu of them visible)",
+                             (int)seed, kind, i / 3, (double)f.rgb.pixels[i], want, f.visible_count);
                 seen[kind] += fabs(want - (double)w.s.background[i % 3]) > 0.01;
             }
             frame_free(&f);
@@ -138,7 +150,8 @@ static void nothing_reached_is_left_out(void **state)
             image_free(&rgb);
             free_world(&w);
         }
-    for (int kind = 0; kind < KINDS; kind++) { /* the test sees something, and something is left out (a panorama sees all) */
+    for (int kind = 0; kind < KINDS; kind++) { /* the test sees something, and something is left out (a
+                                                  panorama sees all) */
         if (seen[kind] < 500 || (kind == 7) != (left_out[kind] < 15))
             fail_msg("kind %d: %zu values seen, %zu anchors left out", kind, seen[kind], left_out[kind]);
     }
@@ -161,7 +174,8 @@ static void a_camera_is_a_shot(void **state)
     free_world(&w);
 }
 
-static gbt_status plain_guest(void *context, trace_scene *scene, const ray_image *rays, image *rgb, gbt_error *err)
+static gbt_status plain_guest(void *context, trace_scene *scene, const ray_image *rays, image *rgb,
+                              gbt_error *err)
 {
     int *calls = context;
     assert_true(scene->reach >= 30);
@@ -228,7 +242,9 @@ static void no_rays(void **state)
     assert_ok(frame_render_shot(&f, frame_neural(&w.a, &w.d), &shot, &w.s, NULL));
     for (size_t i = 0; i < 3 * W * H; i++)
         assert_true(f.rgb.pixels[i] == w.s.background[i % 3]);
-    shot.given = NULL, shot.aperture_radius = 1, shot.focus_distance = 0;
+    shot.given = NULL;
+    shot.aperture_radius = 1;
+    shot.focus_distance = 0;
     gbt_error err = {0};
     assert_int_equal(frame_render_shot(&f, frame_neural(&w.a, &w.d), &shot, &w.s, &err), GBT_ERR_ARGUMENT);
     assert_string_equal(err.text, "camera: focus distance 0 (wanted > 0, as there is an aperture)");

@@ -1,4 +1,6 @@
-/* tests/frame/test_plain.c -- spherical harmonics, plain Gaussians as cameras see them, the adjoint of their colours and shapes. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/frame/test_plain.c -- spherical harmonics, plain Gaussians as cameras see them, the adjoint of their
+   colours and shapes. */
 #include "anchor/fixture.h"
 #include "base/near.h"
 #include "base/vec.h"
@@ -6,7 +8,7 @@
 #include "frame/ring.h"
 #include "frame/sh.h"
 
-/* ---- spherical harmonics ---------------------------------------------------------------------------------------------------------- */
+/* ---- spherical harmonics ---- */
 
 static void basis_is_orthonormal(void **state)
 {
@@ -41,7 +43,7 @@ static void half_a_turn(void **state)
     }
 }
 
-/* ---- pictures --------------------------------------------------------------------------------------------------------------------- */
+/* ---- pictures ---- */
 
 static void random_cloud(gaussian_cloud *c, size_t count)
 {
@@ -49,30 +51,37 @@ static void random_cloud(gaussian_cloud *c, size_t count)
     c->sh_degree = 3;
     for (size_t i = 0; i < count; i++) {
         double q[4], length = 0;
-        for (uint64_t k = 0; k < 4; k++)
-            q[k] = rng_normal(3, 1, 4 * i + k), length += q[k] * q[k];
+        for (uint64_t k = 0; k < 4; k++) {
+            q[k] = rng_normal(3, 1, 4 * i + k);
+            length += q[k] * q[k];
+        }
         for (size_t k = 0; k < 4; k++)
             c->quat[4 * i + k] = (float)(q[k] / sqrt(length));
-        for (size_t k = 0; k < 3; k++)
-            c->mean[3 * i + k] = spread(3, 2, 3 * i + k, -1.5f, 1.5f), c->scale_log[3 * i + k] = spread(3, 3, 3 * i + k, -2.5f, -0.7f);
+        for (size_t k = 0; k < 3; k++) {
+            c->mean[3 * i + k] = spread(3, 2, 3 * i + k, -1.5f, 1.5f);
+            c->scale_log[3 * i + k] = spread(3, 3, 3 * i + k, -2.5f, -0.7f);
+        }
         c->opacity[i] = spread(3, 4, i, 0.1f, 0.9f);
         for (size_t k = 0; k < 48; k++)
             c->sh[48 * i + k] = spread(3, 5, 48 * i + k, -0.8f, 0.8f);
     }
 }
 
-static gbt_status trace_all(void *context, trace_scene *scene, const ray_image *rays, image *rgb, gbt_error *err)
+static gbt_status trace_all(void *context, trace_scene *scene, const ray_image *rays, image *rgb,
+                            gbt_error *err)
 {
     (void)context;
     return trace_forward(scene, rays, false, &(trace_outputs){.rgb = rgb}, NULL, err);
 }
 
-/* What is left out is not seen: a frame of the visible Gaussians against a trace of all, cameras of every kind in the middle and around. */
+/* What is left out is not seen: a frame of the visible Gaussians against a trace of all, cameras of every
+   kind in the middle and around. */
 static void nothing_visible_is_left_out(void **state)
 {
     (void)state;
     enum { COUNT = 3000 };
-    const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_EQUIRECTANGULAR};
+    const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC,
+                                       GBT_CAMERA_EQUIRECTANGULAR};
     gaussian_cloud cloud;
     random_cloud(&cloud, COUNT);
     size_t left_out = 0;
@@ -81,8 +90,10 @@ static void nothing_visible_is_left_out(void **state)
         camera.model = models[i % 3];
         for (int k = 0; k < 3; k++)
             camera.center[k] *= i / 3 * 0.4; /* inside, at the edge, outside */
-        if (camera.model == GBT_CAMERA_EQUIRECTANGULAR)
-            camera.params[0] = W, camera.params[1] = H;
+        if (camera.model == GBT_CAMERA_EQUIRECTANGULAR) {
+            camera.params[0] = W;
+            camera.params[1] = H;
+        }
         const trace_settings settings = trace_settings_default();
         frame f = {.draw.footprint = 0.3f};
         assert_ok(frame_render(&f, frame_plain(&cloud), &camera, &settings, true, NULL));
@@ -99,7 +110,8 @@ static void nothing_visible_is_left_out(void **state)
         assert_ok(frame_render_guest(&all, frame_plain(&cloud), &shot, &settings, &guest, NULL));
         assert_int_equal(all.visible_count, COUNT);
         for (size_t k = 0; k < 3 * W * H; k++)
-            assert_near((double)f.rgb.pixels[k], (double)all.rgb.pixels[k], 1e-5); /* another tree adds in another order */
+            assert_near((double)f.rgb.pixels[k], (double)all.rgb.pixels[k], 1e-5); /* another tree adds in
+                                                                                      another order */
         frame_free(&f);
         frame_free(&all);
     }
@@ -108,10 +120,10 @@ static void nothing_visible_is_left_out(void **state)
     gaussian_cloud_free(&cloud);
 }
 
-/* ---- adjoint ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- adjoint ---- */
 
-/* The tracer's adjoint has its own tests: here it is taken as it is, and the way from the cloud's parameters to its fields is
-   differentiated in double. */
+/* The tracer's adjoint has its own tests: here it is taken as it is, and the way from the cloud's parameters
+   to its fields is differentiated in double. */
 static void adjoint_of_colors_and_shapes(void **state)
 {
     (void)state;
@@ -139,8 +151,10 @@ static void adjoint_of_colors_and_shapes(void **state)
             float y[16];
             sh_basis((const float[3]){(float)direction[0], (float)direction[1], (float)direction[2]}, y);
             const float *const field[3] = {f.gaussians.red, f.gaussians.green, f.gaussians.blue},
-                *const d_field[3] = {f.d_gaussians.red, f.d_gaussians.green, f.d_gaussians.blue};
-            const float *const d_scale[3] = {f.d_gaussians.scale_x, f.d_gaussians.scale_y, f.d_gaussians.scale_z};
+                               *const d_field[3] = {f.d_gaussians.red, f.d_gaussians.green,
+                                                    f.d_gaussians.blue};
+            const float *const d_scale[3] = {f.d_gaussians.scale_x, f.d_gaussians.scale_y,
+                                             f.d_gaussians.scale_z};
             seen += f.seen[i] > 0;
             for (size_t c = 0; c < 3; c++) {
                 double color = 0.5;
@@ -149,10 +163,12 @@ static void adjoint_of_colors_and_shapes(void **state)
                 assert_near((double)field[c][i], fmax(color, 0), 1e-6);
                 cut += color < 0;
                 for (size_t k = 0; k < 16; k++)
-                    assert_near((double)d.sh[48 * i + 3 * k + c], color > 0 ? (double)y[k] * (double)d_field[c][i] : 0,
+                    assert_near((double)d.sh[48 * i + 3 * k + c],
+                                color > 0 ? (double)y[k] * (double)d_field[c][i] : 0,
                                 1e-5 * (1 + fabs((double)d_field[c][i])));
                 const double scale = exp((double)cloud.scale_log[3 * i + c]);
-                assert_near((double)d.scale_log[3 * i + c], scale * (double)d_scale[c][i], 1e-5 * (1 + fabs((double)d_scale[c][i])));
+                assert_near((double)d.scale_log[3 * i + c], scale * (double)d_scale[c][i],
+                            1e-5 * (1 + fabs((double)d_scale[c][i])));
             }
             assert_near((double)d.opacity[i], (double)f.d_gaussians.opacity[i], 0);
         }

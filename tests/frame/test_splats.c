@@ -1,5 +1,6 @@
-/* tests/frame/test_splats.c -- splats that stand for rays: of the same footprint, so of the same picture and gradient where nothing
-   overlaps; without one they are dilated, which small Gaussians show. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/frame/test_splats.c -- splats that stand for rays: of the same footprint, so of the same picture and
+   gradient where nothing overlaps; without one they are dilated, which small Gaussians show. */
 #include "anchor/fixture.h"
 #include "base/near.h"
 #include "frame/frame.h"
@@ -7,19 +8,23 @@
 
 enum { ACROSS = 4, DOWN = 3, COUNT = ACROSS * DOWN };
 
-/* On a plane through the middle of the picture, four std-devs and more apart, from a twentieth of a pixel to a pixel; flat and turned. */
+/* On a plane through the middle of the picture, four std-devs and more apart, from a twentieth of a pixel to
+   a pixel; flat and turned. */
 static void make_dots(const gbt_camera *camera, gaussian_cloud *c)
 {
     assert_ok(gaussian_cloud_alloc(c, COUNT, NULL));
     c->sh_degree = 0;
     for (size_t i = 0; i < COUNT; i++) {
-        const double x = ((double)(i % ACROSS) - 1.5) * 1.4 + 0.03, y = ((double)(i / ACROSS) - 1) * 1.4 + 0.05, turn = 0.5 * (double)i;
+        const double x = ((double)(i % ACROSS) - 1.5) * 1.4 + 0.03,
+                     y = ((double)(i / ACROSS) - 1) * 1.4 + 0.05, turn = 0.5 * (double)i;
         const float size = 0.007f * powf(20, (float)i / (COUNT - 1));
         for (size_t k = 0; k < 3; k++) {
             c->mean[3 * i + k] = (float)(x * camera->rotation[k] + y * camera->rotation[3 + k]);
             c->scale_log[3 * i + k] = logf(size) - 0.4f * (float)((i + k) % 3);
         }
-        c->quat[4 * i] = (float)cos(turn), c->quat[4 * i + 1] = (float)(sin(turn) * 0.6), c->quat[4 * i + 2] = (float)(sin(turn) * 0.8);
+        c->quat[4 * i] = (float)cos(turn);
+        c->quat[4 * i + 1] = (float)(sin(turn) * 0.6);
+        c->quat[4 * i + 2] = (float)(sin(turn) * 0.8);
         c->quat[4 * i + 3] = 0;
         c->opacity[i] = 0.8f;
         memset(c->sh + 48 * i, 0, 48 * sizeof *c->sh);
@@ -34,7 +39,8 @@ typedef struct drawn {
     double light;
 } drawn;
 
-static void draw(const gaussian_cloud *cloud, const gbt_camera *camera, frame_renderer renderer, float footprint, drawn *out)
+static void draw(const gaussian_cloud *cloud, const gbt_camera *camera, frame_renderer renderer,
+                 float footprint, drawn *out)
 {
     trace_settings settings = trace_settings_default();
     settings.alpha_min = 1e-6f; /* dots of a twentieth of a pixel are faint */
@@ -44,7 +50,8 @@ static void draw(const gaussian_cloud *cloud, const gbt_camera *camera, frame_re
     assert_ok(image_alloc(&d_image, W, H, 3, NULL));
     for (size_t i = 0; i < 3 * W * H; i++) {
         out->light += (double)out->f.rgb.pixels[i];
-        d_image.pixels[i] = cosf(0.3f * (float)(i / 3 % W)) + 0.1f * (float)(i % 3); /* smooth, as it is about shapes */
+        d_image.pixels[i] =
+            cosf(0.3f * (float)(i / 3 % W)) + 0.1f * (float)(i % 3); /* smooth, as it is about shapes */
     }
     assert_ok(gaussian_cloud_alloc(&out->d, COUNT, NULL));
     assert_ok(frame_backward_plain(&out->f, cloud, &d_image, &out->d, NULL));
@@ -60,8 +67,10 @@ static void drawn_free(drawn *d)
 static double relative_error(const float *got, const float *wanted, size_t count)
 {
     double square = 0, norm = 0;
-    for (size_t i = 0; i < count; i++)
-        square += pow((double)got[i] - (double)wanted[i], 2), norm += pow((double)wanted[i], 2);
+    for (size_t i = 0; i < count; i++) {
+        square += pow((double)got[i] - (double)wanted[i], 2);
+        norm += pow((double)wanted[i], 2);
+    }
     return sqrt(square / norm);
 }
 
@@ -79,8 +88,9 @@ static void splats_of_a_footprint_are_rays(void **state)
     const double scale = relative_error(splats.d.scale_log, rays.d.scale_log, 3 * COUNT);
     const double opacity = relative_error(splats.d.opacity, rays.d.opacity, COUNT);
     const double color = relative_error(splats.d.sh, rays.d.sh, 48 * COUNT);
-    print_message("picture %.1e; gradient of scales %.1e, opacities %.1e, colours %.1e; light %.3f of the rays', dilated %.3f\n", picture,
-                  scale, opacity, color, splats.light / rays.light, dilated.light / rays.light);
+    print_message("picture %.1e; gradient of scales %.1e, opacities %.1e, colours %.1e; light %.3f of the "
+                  "rays', dilated %.3f\n",
+                  picture, scale, opacity, color, splats.light / rays.light, dilated.light / rays.light);
     assert_true(picture < 0.02 && scale < 0.03 && opacity < 0.01 && color < 0.01);
     assert_near(splats.light / rays.light, 1, 0.02);
     assert_true(dilated.light / rays.light > 1.3); /* what is smaller than the dilation is too bright */

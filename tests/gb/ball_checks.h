@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/gb/ball_checks.h -- what holds for balls however they were found, and a hash of all their bits. */
 #ifndef GBT_TESTS_GB_BALL_CHECKS_H
 #define GBT_TESTS_GB_BALL_CHECKS_H
@@ -7,8 +8,10 @@
 #include "gb/balls.h"
 #include "test_support.h"
 
-/** Eq 17 (disjoint and covering), order inside a ball, eqs 19-22 in double from the input; of `def` the depth and the floor. */
-static inline void check_balls(const balls *b, const float *position, const float *color, size_t count, const balls_def *def)
+/** Eq 17 (disjoint and covering), order inside a ball, eqs 19-22 in double from the input; of `def` the depth
+    and the floor. */
+static inline void check_balls(const balls *b, const float *position, const float *color, size_t count,
+                               const balls_def *def)
 {
     assert_int_equal(b->point_count, count);
     assert_int_equal(b->first[0], 0);
@@ -21,7 +24,8 @@ static inline void check_balls(const balls *b, const float *position, const floa
         assert_true(begin < end);
         assert_in_range(b->depth[j], 0, def->max_depth);
         double mean[3], tint[3] = {0, 0, 0}, cov[6] = {0}, var[3] = {0, 0, 0};
-        const float *origin = position + 3 * (size_t)b->member[begin]; /* else a thousand equal points get a mean beside them */
+        const float *origin =
+            position + 3 * (size_t)b->member[begin]; /* else a thousand equal points get a mean beside them */
         for (int k = 0; k < 3; k++)
             mean[k] = (double)origin[k];
         for (size_t i = begin; i < end; i++) {
@@ -43,14 +47,19 @@ static inline void check_balls(const balls *b, const float *position, const floa
                 const double c = color != NULL ? (double)color[3 * m + k] - tint[k] : 0;
                 var[k] += c * c / n;
             }
-            cov[0] += d[0] * d[0] / n, cov[1] += d[0] * d[1] / n, cov[2] += d[0] * d[2] / n;
-            cov[3] += d[1] * d[1] / n, cov[4] += d[1] * d[2] / n, cov[5] += d[2] * d[2] / n;
+            cov[0] += d[0] * d[0] / n;
+            cov[1] += d[0] * d[1] / n;
+            cov[2] += d[0] * d[2] / n;
+            cov[3] += d[1] * d[1] / n;
+            cov[4] += d[1] * d[2] / n;
+            cov[5] += d[2] * d[2] / n;
         }
         size = cov[0] + cov[3] + cov[5];
         const double floor_radius = fmax((double)def->min_scale * (double)def->voxel_size, 1e-6);
         const double radius = fmax(sqrt(size), floor_radius);
         if (!(fabs((double)b->radius[j] - radius) <= 1e-5 * radius))
-            fail_msg("ball %zu of %g points: radius wanted %.9g, got %.9g", j, n, radius, (double)b->radius[j]);
+            fail_msg("ball %zu of %g points: radius wanted %.9g, got %.9g", j, n, radius,
+                     (double)b->radius[j]);
         for (int k = 0; k < 3; k++) {
             if (!(fabs((double)b->center[3 * j + k] - mean[k]) <= 1e-6 * fabs(mean[k]) + 1e-6 * radius))
                 fail_msg("ball %zu: center wanted %.9g, got %.9g", j, mean[k], (double)b->center[3 * j + k]);
@@ -58,7 +67,8 @@ static inline void check_balls(const balls *b, const float *position, const floa
         }
         for (int k = 0; k < 6; k++)
             if (!(fabs((double)b->covariance[6 * j + k] - cov[k]) <= 1e-5 * size + (double)FLT_TRUE_MIN))
-                fail_msg("ball %zu: covariance %d wanted %.9g, got %.9g", j, k, cov[k], (double)b->covariance[6 * j + k]);
+                fail_msg("ball %zu: covariance %d wanted %.9g, got %.9g", j, k, cov[k],
+                         (double)b->covariance[6 * j + k]);
         const double spread = (sqrt(var[0]) + sqrt(var[1]) + sqrt(var[2])) / 3;
         assert_true(fabs((double)b->color_std[j] - spread) <= 1e-5);
     }
@@ -92,7 +102,8 @@ static inline int check_by_index(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/** `b` are the balls of the shuffled cloud: those of `a`, in the same order, where point i of `b` is point to[i] of `a`. */
+/** `b` are the balls of the shuffled cloud: those of `a`, in the same order, where point i of `b` is point
+    to[i] of `a`. */
 static inline void check_same_partition(const balls *a, const balls *b, const uint32_t *to)
 {
     assert_int_equal(a->count, b->count);

@@ -1,4 +1,6 @@
-/* tests/gb/bench_gb.c -- points per second of this room on random points; run by hand, judged by nobody. usage: bench_gb [POINTS] */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/gb/bench_gb.c -- points per second of this room on random points; run by hand, judged by nobody.
+   usage: bench_gb [POINTS] */
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
@@ -18,7 +20,8 @@ static double seconds(void)
 int main(int argc, char **argv)
 {
     const size_t count = argc > 1 ? (size_t)strtoull(argv[1], NULL, 10) : 1000000;
-    float *position = mem_alloc(count, 3 * sizeof *position, "position", NULL), *color = mem_alloc(count, 3 * sizeof *color, "color", NULL);
+    float *position = mem_alloc(count, 3 * sizeof *position, "position", NULL),
+          *color = mem_alloc(count, 3 * sizeof *color, "color", NULL);
     if (position == NULL || color == NULL)
         return EXIT_FAILURE;
     for (size_t i = 0; i < 3 * count; i++) {
@@ -56,7 +59,8 @@ int main(int argc, char **argv)
         }
         static const char *const names[3] = {"balls_voxel_size", "balls_build", "voxel_centers"};
         for (int i = 0; i < 3; i++)
-            printf("%-22s %9zu %8d %10.3f %14.3e\n", names[i], count, threads, best[i], (double)count / best[i]);
+            printf("%-22s %9zu %8d %10.3f %14.3e\n", names[i], count, threads, best[i],
+                   (double)count / best[i]);
     }
     mem_free(position);
     mem_free(color);

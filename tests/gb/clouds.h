@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/gb/clouds.h -- clouds for the tests of this room: random ones, and the real one from its PLY. */
 #ifndef GBT_TESTS_GB_CLOUDS_H
 #define GBT_TESTS_GB_CLOUDS_H
@@ -51,7 +52,8 @@ static inline uint32_t *cloud_shuffle(const cloud *c, uint64_t seed, cloud *out)
         rng_philox(seed, 9, i, words);
         const size_t j = words[0] % (i + 1);
         const uint32_t keep = to[i];
-        to[i] = to[j], to[j] = keep;
+        to[i] = to[j];
+        to[j] = keep;
     }
     *out = cloud_alloc(n);
     for (size_t i = 0; i < n; i++) {
@@ -61,12 +63,14 @@ static inline uint32_t *cloud_shuffle(const cloud *c, uint64_t seed, cloud *out)
     return to;
 }
 
-/** The garden points: binary PLY, float x y z, uchar red green blue. NULL position when the file is not there. */
+/** The garden points: binary PLY, float x y z, uchar red green blue. NULL position when the file is not
+    there. */
 static inline cloud cloud_garden(void)
 {
     static const char header[] = "ply\nformat binary_little_endian 1.0\n";
-    static const char columns[] = "property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
-                                  "property uchar blue\nend_header\n";
+    static const char columns[] =
+        "property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
+        "property uchar blue\nend_header\n";
     const char *path = shared_path("data/garden_points/points.ply");
     if (path == NULL)
         return (cloud){0};

@@ -1,4 +1,6 @@
-/* tests/gb/test_adaptive.c -- the best-first partition: a naive one in long double, colour, outliers, degenerate clouds, promises. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/gb/test_adaptive.c -- the best-first partition: a naive one in long double, colour, outliers,
+   degenerate clouds, promises. */
 #include <stdbool.h>
 
 #include "ball_checks.h"
@@ -13,17 +15,19 @@ enum { DIM = 6, NAIVE_POINTS = 96 };
 static adaptive_def def_of(float voxel_size, size_t most)
 {
     adaptive_def def = adaptive_def_default();
-    def.voxel_size = voxel_size, def.balls_max = most;
+    def.voxel_size = voxel_size;
+    def.balls_max = most;
     return def;
 }
 
-static void check_adaptive(const balls *b, const float *position, const float *color, size_t count, const adaptive_def *def)
+static void check_adaptive(const balls *b, const float *position, const float *color, size_t count,
+                           const adaptive_def *def)
 {
     const balls_def like = {.voxel_size = def->voxel_size, .max_depth = 64, .min_scale = def->min_scale};
     check_balls(b, position, color, count, &like);
 }
 
-/* ---- the same thing, naively ---------------------------------------------------------------------------------------------------- */
+/* ---- the same thing, naively ---- */
 
 typedef struct naive_set {
     size_t count, left_count;
@@ -40,8 +44,8 @@ static void naive_point(const cloud *c, const adaptive_def *def, uint32_t i, lon
     }
 }
 
-static void naive_moments(const cloud *c, const adaptive_def *def, const uint32_t *member, size_t n, long double mean[DIM],
-                          long double cov[DIM][DIM])
+static void naive_moments(const cloud *c, const adaptive_def *def, const uint32_t *member, size_t n,
+                          long double mean[DIM], long double cov[DIM][DIM])
 {
     long double y[DIM];
     for (int k = 0; k < DIM; k++)
@@ -118,8 +122,10 @@ static void naive_cut(const cloud *c, const adaptive_def *def, naive_set *s)
     for (int round = 0; round < 16; round++) {
         long double sum[2] = {0, 0};
         size_t in[2] = {0, 0};
-        for (size_t i = 0; i < s->count; i++)
-            sum[key[i] > bound] += key[i], in[key[i] > bound]++;
+        for (size_t i = 0; i < s->count; i++) {
+            sum[key[i] > bound] += key[i];
+            in[key[i] > bound]++;
+        }
         bound = (sum[0] / (long double)in[0] + sum[1] / (long double)in[1]) / 2;
     }
     uint32_t side[2][NAIVE_POINTS];
@@ -169,7 +175,8 @@ static void agrees_with_the_naive_partition(void **state)
     (void)state;
     static naive_set sets[NAIVE_POINTS + 1];
     for (uint64_t seed = 0; seed < 40; seed++) {
-        cloud c = cloud_random(3 + (size_t)(seed * 37 % (NAIVE_POINTS - 3)), seed, seed % 3 == 0 ? 50 : 0, seed % 4 == 0 ? 0.1 : 1);
+        cloud c = cloud_random(3 + (size_t)(seed * 37 % (NAIVE_POINTS - 3)), seed, seed % 3 == 0 ? 50 : 0,
+                               seed % 4 == 0 ? 0.1 : 1);
         adaptive_def def = def_of(seed % 2 == 0 ? 1 : 0.05f, 1 + c.count / (1 + seed % 4));
         def.color_unit = seed % 5 == 0 ? 0.5f : 0.1f;
         const size_t wanted = naive_partition(&c, &def, sets);
@@ -179,7 +186,8 @@ static void agrees_with_the_naive_partition(void **state)
         for (size_t j = 0; j < b.count; j++) {
             const size_t got = b.first[j + 1] - b.first[j];
             if (got != sets[j].count)
-                fail_msg("seed %llu, ball %zu: wanted %zu points, got %zu", (unsigned long long)seed, j, sets[j].count, got);
+                fail_msg("seed %llu, ball %zu: wanted %zu points, got %zu", (unsigned long long)seed, j,
+                         sets[j].count, got);
             assert_memory_equal(b.member + b.first[j], sets[j].member, sets[j].count * sizeof *b.member);
         }
         check_adaptive(&b, c.position, c.color, c.count, &def);
@@ -188,7 +196,7 @@ static void agrees_with_the_naive_partition(void **state)
     }
 }
 
-/* ---- what it is for -------------------------------------------------------------------------------------------------------------- */
+/* ---- what it is for ---- */
 
 static void counts_are_met_and_nested(void **state)
 {
@@ -200,7 +208,8 @@ static void counts_are_met_and_nested(void **state)
         balls fine;
         assert_ok(balls_adapt(c.position, c.color, c.count, &def, &fine, &assert_ok_err_));
         assert_int_equal(fine.count, most < 700 ? most : 700);
-        size_t next = 0; /* the finer balls begin wherever the coarser ones do: both are in the order of the tree */
+        size_t next =
+            0; /* the finer balls begin wherever the coarser ones do: both are in the order of the tree */
         for (size_t j = 0; j < coarse.count; j++) {
             while (next < fine.count && fine.first[next] < coarse.first[j])
                 next++;
@@ -223,7 +232,11 @@ static void colour_moves_the_cut(void **state)
         for (size_t k = 0; k < 3; k++)
             color[3 * i + k] = i < 5 ? 0.25f : 0.75f;
     }
-    const struct { const float *color; float color_unit; uint32_t left; } rows[] = {{NULL, 0.1f, 4}, {color, 10, 4}, {color, 0.05f, 5}};
+    const struct {
+        const float *color;
+        float color_unit;
+        uint32_t left;
+    } rows[] = {{NULL, 0.1f, 4}, {color, 10, 4}, {color, 0.05f, 5}};
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
         adaptive_def def = def_of(1, 2);
         def.color_unit = rows[r].color_unit;
@@ -257,7 +270,8 @@ static void balls_go_where_colours_differ(void **state)
     cloud_free(&c);
 }
 
-/* A surface of 4,000 points, 40 lone points around it, 100 balls: the surface keeps most; no ball holds a lone point and the surface. */
+/* A surface of 4,000 points, 40 lone points around it, 100 balls: the surface keeps most; no ball holds a
+   lone point and the surface. */
 static void outliers_neither_take_all_nor_stretch_balls(void **state)
 {
     (void)state;
@@ -272,7 +286,8 @@ static void outliers_neither_take_all_nor_stretch_balls(void **state)
     assert_ok(balls_adapt(c.position, NULL, c.count, &def, &b, &assert_ok_err_));
     size_t on_surface = 0, lone = 0;
     for (size_t j = 0; j < b.count; j++) {
-        const bool has_lone = b.member[b.first[j + 1] - 1] >= SURFACE, has_surface = b.member[b.first[j]] < SURFACE;
+        const bool has_lone = b.member[b.first[j + 1] - 1] >= SURFACE,
+                   has_surface = b.member[b.first[j]] < SURFACE;
         assert_true(has_lone != has_surface);
         on_surface += has_surface;
         lone += has_lone && b.first[j + 1] - b.first[j] == 1;
@@ -283,7 +298,7 @@ static void outliers_neither_take_all_nor_stretch_balls(void **state)
     cloud_free(&c);
 }
 
-/* ---- degenerate clouds ----------------------------------------------------------------------------------------------------------- */
+/* ---- degenerate clouds ---- */
 
 typedef struct shape {
     const char *name;
@@ -310,11 +325,13 @@ static void shape_is_covered(void **state)
     const shape *s = *state;
     cloud c = cloud_random(s->points, 3, 0, 1);
     for (size_t i = 0; i < s->points; i++) {
-        const double at[3] = {(double)(i % s->columns), (double)(i % s->columns), (double)(i / s->columns % s->rows)};
+        const double at[3] = {(double)(i % s->columns), (double)(i % s->columns),
+                              (double)(i / s->columns % s->rows)};
         for (size_t k = 0; k < 3; k++)
             c.position[3 * i + k] = (float)(s->step[k] * at[k]);
     }
-    for (int colored = 0; colored < (s->balls == s->points ? 2 : 1); colored++) { /* copies of a place part when colours differ */
+    for (int colored = 0; colored < (s->balls == s->points ? 2 : 1); colored++) { /* copies of a place part
+                                                                                     when colours differ */
         const adaptive_def def = def_of(0.1f, s->most);
         balls b;
         assert_ok(balls_adapt(c.position, colored ? c.color : NULL, s->points, &def, &b, &assert_ok_err_));
@@ -340,7 +357,8 @@ static void one_place_is_one_ball_whatever_the_colours(void **state)
     cloud_free(&c);
 }
 
-/* Each point twice as far as the one before: every cut takes a point or two off, to the depth where cutting ends. */
+/* Each point twice as far as the one before: every cut takes a point or two off, to the depth where cutting
+   ends. */
 static void skewed_clouds_end_at_depth_64(void **state)
 {
     (void)state;
@@ -365,7 +383,12 @@ static void skewed_clouds_end_at_depth_64(void **state)
 static void ties_are_settled(void **state)
 {
     (void)state;
-    const struct { const char *name; float x[4]; size_t count, most, balls; uint32_t first[4]; } rows[] = {
+    const struct {
+        const char *name;
+        float x[4];
+        size_t count, most, balls;
+        uint32_t first[4];
+    } rows[] = {
         {"a point at the mean starts on the left", {0, 1, 2}, 3, 2, 2, {0, 2, 3}},
         {"of equal savings the left one is taken", {0, 1, 10, 11}, 4, 3, 3, {0, 1, 2, 4}},
         {"whatever the order", {11, 0, 10, 1}, 4, 3, 3, {0, 1, 2, 4}},
@@ -379,8 +402,10 @@ static void ties_are_settled(void **state)
             const adaptive_def def = def_of(1, rows[r].most);
             balls b;
             assert_ok(balls_adapt(position, NULL, rows[r].count, &def, &b, &assert_ok_err_));
-            if (b.count != rows[r].balls || memcmp(b.first, rows[r].first, (b.count + 1) * sizeof *b.first) != 0)
-                fail_msg("%s: %zu balls, %u %u %u", rows[r].name, b.count, b.first[0], b.first[1], b.first[2]);
+            if (b.count != rows[r].balls ||
+                memcmp(b.first, rows[r].first, (b.count + 1) * sizeof *b.first) != 0)
+                fail_msg("%s: %zu balls, %u %u %u", rows[r].name, b.count, b.first[0], b.first[1],
+                         b.first[2]);
             balls_free(&b);
         }
 }
@@ -388,11 +413,15 @@ static void ties_are_settled(void **state)
 static void nats_and_axis_by_hand(void **state)
 {
     (void)state;
-    const struct { double diagonal[DIM], off, wanted, within; int axis; } rows[] = {
+    const struct {
+        double diagonal[DIM], off, wanted, within;
+        int axis;
+    } rows[] = {
         {{0}, 0, 0, 0, 0},
         {{0, 3, 0, 1, 0, 0}, 0, 5 * log(4 * 2), 1e-14, 1},
         {{0.5, 0.5, 0.5, 0.5, 0.5, 2}, 0, 5 * (5 * log(1.5) + log(3)), 1e-13, 5},
-        {{1e20, 1e20, 1e20}, 1e20, 5 * log(3e20), 6, 0}, /* rounding leaves nothing of I: less by a factor of 3, never -inf */
+        {{1e20, 1e20, 1e20}, 1e20, 5 * log(3e20), 6, 0}, /* rounding leaves nothing of I: less by a factor of
+                                                            3, never -inf */
     };
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
         joint_moments m = {0};
@@ -408,7 +437,7 @@ static void nats_and_axis_by_hand(void **state)
     }
 }
 
-/* ---- promises -------------------------------------------------------------------------------------------------------------------- */
+/* ---- promises ---- */
 
 static void input_order_does_not_matter(void **state)
 {
@@ -475,7 +504,11 @@ static void every_allocation_may_fail(void **state)
 static void bad_settings_are_refused(void **state)
 {
     (void)state;
-    const struct { adaptive_def def; float position, color; const char *text; } rows[] = {
+    const struct {
+        adaptive_def def;
+        float position, color;
+        const char *text;
+    } rows[] = {
         {{0, 0.1f, 2, 0.25f}, 0, 0, "voxel_size"},        {{NAN, 0.1f, 2, 0.25f}, 0, 0, "voxel_size"},
         {{INFINITY, 0.1f, 2, 0.25f}, 0, 0, "voxel_size"}, {{1, 0, 2, 0.25f}, 0, 0, "color_unit"},
         {{1, NAN, 2, 0.25f}, 0, 0, "color_unit"},         {{1, INFINITY, 2, 0.25f}, 0, 0, "color_unit"},
@@ -484,7 +517,8 @@ static void bad_settings_are_refused(void **state)
         {{1, 0.1f, 2, 0.25f}, 0, 1.5f, "point 1 "},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        const float position[6] = {1, 2, 3, 4, rows[i].position, 6}, color[6] = {0, 0, 0, 0, rows[i].color, 0};
+        const float position[6] = {1, 2, 3, 4, rows[i].position, 6},
+                    color[6] = {0, 0, 0, 0, rows[i].color, 0};
         balls b;
         gbt_error err = {0};
         assert_int_equal(balls_adapt(position, color, 2, &rows[i].def, &b, &err), GBT_ERR_ARGUMENT);
@@ -498,19 +532,26 @@ int main(void)
 {
     enum { SHAPES = sizeof shapes / sizeof *shapes };
     static const struct CMUnitTest others[] = {
-        cmocka_unit_test(agrees_with_the_naive_partition), cmocka_unit_test(counts_are_met_and_nested),
-        cmocka_unit_test(colour_moves_the_cut),            cmocka_unit_test(balls_go_where_colours_differ),
-        cmocka_unit_test(outliers_neither_take_all_nor_stretch_balls), cmocka_unit_test(one_place_is_one_ball_whatever_the_colours),
-        cmocka_unit_test(skewed_clouds_end_at_depth_64),   cmocka_unit_test(input_order_does_not_matter),
-        cmocka_unit_test(same_bits_for_any_thread_count),  cmocka_unit_test(every_allocation_may_fail),
+        cmocka_unit_test(agrees_with_the_naive_partition),
+        cmocka_unit_test(counts_are_met_and_nested),
+        cmocka_unit_test(colour_moves_the_cut),
+        cmocka_unit_test(balls_go_where_colours_differ),
+        cmocka_unit_test(outliers_neither_take_all_nor_stretch_balls),
+        cmocka_unit_test(one_place_is_one_ball_whatever_the_colours),
+        cmocka_unit_test(skewed_clouds_end_at_depth_64),
+        cmocka_unit_test(input_order_does_not_matter),
+        cmocka_unit_test(same_bits_for_any_thread_count),
+        cmocka_unit_test(every_allocation_may_fail),
         cmocka_unit_test(bad_settings_are_refused),
-        cmocka_unit_test(ties_are_settled),                cmocka_unit_test(nats_and_axis_by_hand),
+        cmocka_unit_test(ties_are_settled),
+        cmocka_unit_test(nats_and_axis_by_hand),
     };
     enum { OTHERS = sizeof others / sizeof *others };
     struct CMUnitTest tests[SHAPES + OTHERS];
     size_t n = 0;
     for (int i = 0; i < SHAPES; i++)
-        tests[n++] = (struct CMUnitTest){.name = shapes[i].name, .test_func = shape_is_covered, .initial_state = &shapes[i]};
+        tests[n++] = (struct CMUnitTest){
+            .name = shapes[i].name, .test_func = shape_is_covered, .initial_state = &shapes[i]};
     for (int i = 0; i < OTHERS; i++)
         tests[n++] = others[i];
     return _cmocka_run_group_tests("adaptive", tests, n, NULL, NULL);

@@ -1,4 +1,6 @@
-/* tests/gb/test_balls.c -- the partition: closed form, equations, stop rules, ties, degenerate clouds, threads, no memory. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/gb/test_balls.c -- the partition: closed form, equations, stop rules, ties, degenerate clouds,
+   threads, no memory. */
 #include <stdbool.h>
 #include <time.h>
 
@@ -8,7 +10,8 @@
 #include "clouds.h"
 #include "gb/balls.h"
 
-/* b = 2^(ceil(log2 n) - 2), M = min(n - b, 2 b): balls of the published settings when the quality stop does not fire. */
+/* b = 2^(ceil(log2 n) - 2), M = min(n - b, 2 b): balls of the published settings when the quality stop does
+   not fire. */
 static size_t closed_form(size_t n)
 {
     size_t b = 1;
@@ -98,7 +101,13 @@ static line_case line_cases[] = {
     {"a set of N_min + 1 points is cut, to a singleton", {1, 2, 3}, 3, 2, 2, {0, 2, 3}, {0, 1, 2}},
     {"N_min 1 cuts pairs", {9, 8}, 2, 1, 2, {0, 1, 2}, {1, 0}},
     {"N_min 2 keeps pairs", {9, 8}, 2, 2, 1, {0, 2}, {0, 1}},
-    {"depth first, left first", {8, 7, 6, 5, 4, 3, 2, 1}, 8, 1, 8, {0, 1, 2, 3, 4, 5, 6, 7, 8}, {7, 6, 5, 4, 3, 2, 1, 0}},
+    {"depth first, left first",
+     {8, 7, 6, 5, 4, 3, 2, 1},
+     8,
+     1,
+     8,
+     {0, 1, 2, 3, 4, 5, 6, 7, 8},
+     {7, 6, 5, 4, 3, 2, 1, 0}},
 };
 
 static void cuts_a_line(void **state)
@@ -121,7 +130,8 @@ static void cuts_a_line(void **state)
     }
 }
 
-/* A4: v = 1 and nothing is compact, so only the tie decides. r of {0, d, d} is d sqrt(2) / 3, which is 4 at d = 8.48528. */
+/* A4: v = 1 and nothing is compact, so only the tie decides. r of {0, d, d} is d sqrt(2) / 3, which is 4 at d
+   = 8.48528. */
 typedef struct tie_case {
     const char *name;
     float x[5];
@@ -162,8 +172,8 @@ static void settles_a_tie(void **state)
 
 typedef struct stop_case {
     const char *name;
-    float half;       /* points at -half and +half on x: r = half */
-    float shade[2];   /* grey of the two points: sigma_a = half their difference */
+    float half;     /* points at -half and +half on x: r = half */
+    float shade[2]; /* grey of the two points: sigma_a = half their difference */
     float voxel_size, radius_factor, color_std_max, min_scale;
     bool use_color;
     size_t balls;
@@ -232,8 +242,11 @@ static void identical_points_are_one_ball(void **state)
     (void)state;
     enum { N = 200000 };
     cloud c = cloud_alloc(N);
-    for (size_t i = 0; i < 3 * N; i++)
-        c.position[i] = 0.1f + 0.7f * (float)(i % 3), c.color[i] = rng_uniform(3, 0, i); /* colours differ: only the points tie */
+    for (size_t i = 0; i < 3 * N; i++) {
+        /* colours differ: only the points tie */
+        c.position[i] = 0.1f + 0.7f * (float)(i % 3);
+        c.color[i] = rng_uniform(3, 0, i);
+    }
     balls_def def = balls_def_default();
     def.voxel_size = 0.01f;
     def.max_depth = 64;
@@ -243,7 +256,8 @@ static void identical_points_are_one_ball(void **state)
     assert_true(clock() - start < CLOCKS_PER_SEC);
     assert_int_equal(b.count, 1);
     assert_memory_equal(b.center, c.position, 3 * sizeof(float));
-    assert_true(b.covariance[0] == 0 && b.covariance[3] == 0 && b.covariance[5] == 0); /* exactly: no cancellation */
+    assert_true(b.covariance[0] == 0 && b.covariance[3] == 0 && b.covariance[5] == 0); /* exactly: no
+                                                                                          cancellation */
     check_balls(&b, c.position, c.color, N, &def);
     balls_free(&b);
     cloud_free(&c);
@@ -251,34 +265,52 @@ static void identical_points_are_one_ball(void **state)
 
 enum { LINE, PLANE, OCTAHEDRON, OUTLIER, FAR_AWAY, GRID, FEW_PLACES, TINY, HUGE_UNITS, SHAPES };
 static const char *const shape_names[SHAPES] = {
-    "collinear", "exactly coplanar", "octahedron",     "one outlier at 1e6",          "coordinates at 4.5e6", "grid, all ties",
-    "duplicates", "denormal units",  "units near the float maximum",
+    "collinear",          "exactly coplanar",     "octahedron",
+    "one outlier at 1e6", "coordinates at 4.5e6", "grid, all ties",
+    "duplicates",         "denormal units",       "units near the float maximum",
 };
 
 static cloud shape_cloud(int shape, uint64_t seed)
 {
-    cloud c = cloud_random(shape == OCTAHEDRON ? 6 : 3000, seed, shape == FAR_AWAY ? 4.5e6 : 0, shape == FAR_AWAY ? 20 : 1);
+    cloud c = cloud_random(shape == OCTAHEDRON ? 6 : 3000, seed, shape == FAR_AWAY ? 4.5e6 : 0,
+                           shape == FAR_AWAY ? 20 : 1);
     for (size_t i = 0; i < c.count; i++) {
         float *p = c.position + 3 * i;
         switch (shape) {
-        case LINE: p[1] = 2 * p[0], p[2] = -4 * p[0]; break;
-        case PLANE: p[2] = 0.75f; break;
-        case OCTAHEDRON: p[0] = p[1] = p[2] = 0, p[i / 2] = i % 2 == 0 ? 1.0f : -1.0f; break;
+        case LINE:
+            p[1] = 2 * p[0], p[2] = -4 * p[0];
+            break;
+        case PLANE:
+            p[2] = 0.75f;
+            break;
+        case OCTAHEDRON:
+            p[0] = p[1] = p[2] = 0, p[i / 2] = i % 2 == 0 ? 1.0f : -1.0f;
+            break;
         case OUTLIER:
             if (i == 1234)
                 p[0] = p[1] = p[2] = 1e6f;
             break;
-        case GRID: p[0] = (float)(i % 10), p[1] = (float)(i / 10 % 15), p[2] = (float)(i / 150); break;
-        case FEW_PLACES: p[0] = rintf(p[0] / 3), p[1] = rintf(p[1] / 2), p[2] = 0; break;
-        case TINY: p[0] *= 1e-42f, p[1] *= 1e-42f, p[2] *= 1e-42f; break;
-        case HUGE_UNITS: p[0] *= 1e37f, p[1] *= 1e37f, p[2] *= 1e37f; break;
-        default: break;
+        case GRID:
+            p[0] = (float)(i % 10), p[1] = (float)(i / 10 % 15), p[2] = (float)(i / 150);
+            break;
+        case FEW_PLACES:
+            p[0] = rintf(p[0] / 3), p[1] = rintf(p[1] / 2), p[2] = 0;
+            break;
+        case TINY:
+            p[0] *= 1e-42f, p[1] *= 1e-42f, p[2] *= 1e-42f;
+            break;
+        case HUGE_UNITS:
+            p[0] *= 1e37f, p[1] *= 1e37f, p[2] *= 1e37f;
+            break;
+        default:
+            break;
         }
     }
     return c;
 }
 
-/* Every point once, depth bounded, statistics right and finite; leaves above N_min points only where nothing separates them. */
+/* Every point once, depth bounded, statistics right and finite; leaves above N_min points only where nothing
+   separates them. */
 static void shape_is_covered(void **state)
 {
     const int shape = *(const int *)*state;
@@ -303,7 +335,8 @@ static void shape_is_covered(void **state)
                     assert_true(c.position[3 * b.member[i] + k] == c.position[3 * b.member[i - 1] + k]);
         }
         if (shape == OUTLIER)
-            for (size_t j = 0; j < b.count; j++) /* soon alone: it never drags another point's ball across the scene */
+            for (size_t j = 0; j < b.count; j++) /* soon alone: it never drags another point's ball across the
+                                                    scene */
                 if (b.radius[j] > 100)
                     assert_true(b.first[j + 1] - b.first[j] <= (uint32_t)def.min_points);
         balls_free(&b);
@@ -326,7 +359,8 @@ static void denormal_points_are_separated(void **state)
     balls_free(&b);
 }
 
-/* Without ties the tree is a property of the set: shuffled input gives the same balls in the same order under new labels. */
+/* Without ties the tree is a property of the set: shuffled input gives the same balls in the same order under
+   new labels. */
 static void input_order_does_not_matter(void **state)
 {
     (void)state;
@@ -370,7 +404,8 @@ static void same_bits_for_any_thread_count(void **state)
             if (t == 0)
                 want = got;
             if (got != want)
-                fail_msg("%d threads: hash %016llx, with one %016llx", threads[t], (unsigned long long)got, (unsigned long long)want);
+                fail_msg("%d threads: hash %016llx, with one %016llx", threads[t], (unsigned long long)got,
+                         (unsigned long long)want);
             balls_free(&b);
         }
     }
@@ -398,7 +433,8 @@ static void every_allocation_may_fail(void **state)
         }
         assert_int_equal(status, GBT_ERR_NO_MEMORY);
         assert_true(err.text[0] != '\0' && err.status == status);
-        assert_true(b.count == 0 && b.point_count == 0 && b.first == NULL && b.depth == NULL && b.member == NULL);
+        assert_true(b.count == 0 && b.point_count == 0 && b.first == NULL && b.depth == NULL &&
+                    b.member == NULL);
         failures++;
     }
     assert_true(failures >= 11); /* 3 scratch arrays and 8 fields */
@@ -408,12 +444,15 @@ static void every_allocation_may_fail(void **state)
 typedef struct bad_case {
     const char *name;
     balls_def def;
-    size_t bad_point;  /* SIZE_MAX: none */
+    size_t bad_point; /* SIZE_MAX: none */
     float position, color;
     const char *text; /* part of the message */
 } bad_case;
 
-#define GOOD_DEF {1, 1.25f, 0.02f, 2, 18, 0.25f}
+#define GOOD_DEF                                                                                             \
+    {                                                                                                        \
+        1, 1.25f, 0.02f, 2, 18, 0.25f                                                                        \
+    }
 static bad_case bad_cases[] = {
     {"voxel_size not set", {0, 1.25f, 0.02f, 2, 18, 0.25f}, SIZE_MAX, 0, 0, "voxel_size"},
     {"voxel_size NaN", {NAN, 1.25f, 0.02f, 2, 18, 0.25f}, SIZE_MAX, 0, 0, "voxel_size"},
@@ -454,7 +493,8 @@ static void limits_of_the_def_are_accepted(void **state)
 {
     (void)state;
     const float position[6] = {0, 0, 0, 1, 0, 0};
-    static const balls_def defs[] = {{FLT_TRUE_MIN, FLT_TRUE_MIN, 0, 1, 0, 0}, {FLT_MAX, FLT_MAX, 1, INT32_MAX, 64, FLT_MAX}};
+    static const balls_def defs[] = {{FLT_TRUE_MIN, FLT_TRUE_MIN, 0, 1, 0, 0},
+                                     {FLT_MAX, FLT_MAX, 1, INT32_MAX, 64, FLT_MAX}};
     for (int i = 0; i < 2; i++) {
         balls b;
         assert_ok(balls_build(position, NULL, 2, &defs[i], &b, &assert_ok_err_));
@@ -464,9 +504,9 @@ static void limits_of_the_def_are_accepted(void **state)
     }
 }
 
-/* `peer`: an independent implementation in double (numpy) that leaves the sign of the axis to LAPACK and keeps every tied set whole, 281
-   and 248 of them. With our sign it would keep 539 and 481; we keep the 154 and 416 of these that span at most 4 v. Nothing else
-   differs. */
+/* `peer`: an independent implementation in double (numpy) that leaves the sign of the axis to LAPACK and
+   keeps every tied set whole, 281 and 248 of them. With our sign it would keep 539 and 481; we keep the 154
+   and 416 of these that span at most 4 v. Nothing else differs. */
 static void garden_has_the_known_number_of_balls(void **state)
 {
     (void)state;
@@ -475,8 +515,9 @@ static void garden_has_the_known_number_of_balls(void **state)
         size_t balls;
         double peer; /* 0: not counted */
     } rows[] = {
-        {0.001f, 0.02f, 1.25f, 73655, 73552},   {0.0052808f, 0.02f, 1.25f, 72415, 72525}, {0.0052808f, 0.1f, 1.25f, 63494, 0},
-        {0.0052808f, 1.0f, 1.25f, 58108, 0},    {0.0052808f, 0.1f, 5.0f, 43008, 0},       {0.0052808f, 1.0f, 5.0f, 19088, 0},
+        {0.001f, 0.02f, 1.25f, 73655, 73552}, {0.0052808f, 0.02f, 1.25f, 72415, 72525},
+        {0.0052808f, 0.1f, 1.25f, 63494, 0},  {0.0052808f, 1.0f, 1.25f, 58108, 0},
+        {0.0052808f, 0.1f, 5.0f, 43008, 0},   {0.0052808f, 1.0f, 5.0f, 19088, 0},
     };
     cloud c = cloud_garden();
     if (c.position == NULL)
@@ -507,29 +548,40 @@ int main(void)
         BADS = sizeof bad_cases / sizeof *bad_cases
     };
     static const struct CMUnitTest others[] = {
-        cmocka_unit_test(count_follows_the_closed_form),      cmocka_unit_test(no_points_no_balls),
-        cmocka_unit_test(a_lone_point_has_the_floor_radius),  cmocka_unit_test(identical_points_are_one_ball),
-        cmocka_unit_test(denormal_points_are_separated),      cmocka_unit_test(input_order_does_not_matter),
-        cmocka_unit_test(same_bits_for_any_thread_count),     cmocka_unit_test(every_allocation_may_fail),
-        cmocka_unit_test(limits_of_the_def_are_accepted),     cmocka_unit_test(garden_has_the_known_number_of_balls),
+        cmocka_unit_test(count_follows_the_closed_form),
+        cmocka_unit_test(no_points_no_balls),
+        cmocka_unit_test(a_lone_point_has_the_floor_radius),
+        cmocka_unit_test(identical_points_are_one_ball),
+        cmocka_unit_test(denormal_points_are_separated),
+        cmocka_unit_test(input_order_does_not_matter),
+        cmocka_unit_test(same_bits_for_any_thread_count),
+        cmocka_unit_test(every_allocation_may_fail),
+        cmocka_unit_test(limits_of_the_def_are_accepted),
+        cmocka_unit_test(garden_has_the_known_number_of_balls),
     };
     enum { OTHERS = sizeof others / sizeof *others };
     static int shapes[SHAPES];
     struct CMUnitTest tests[COUNTS + LINES + TIES + STOPS + BADS + SHAPES + OTHERS];
     size_t n = 0;
     for (int i = 0; i < COUNTS; i++)
-        tests[n++] = (struct CMUnitTest){.name = count_cases[i].name, .test_func = count_of_balls, .initial_state = &count_cases[i]};
+        tests[n++] = (struct CMUnitTest){
+            .name = count_cases[i].name, .test_func = count_of_balls, .initial_state = &count_cases[i]};
     for (int i = 0; i < LINES; i++)
-        tests[n++] = (struct CMUnitTest){.name = line_cases[i].name, .test_func = cuts_a_line, .initial_state = &line_cases[i]};
+        tests[n++] = (struct CMUnitTest){
+            .name = line_cases[i].name, .test_func = cuts_a_line, .initial_state = &line_cases[i]};
     for (int i = 0; i < TIES; i++)
-        tests[n++] = (struct CMUnitTest){.name = tie_cases[i].name, .test_func = settles_a_tie, .initial_state = &tie_cases[i]};
+        tests[n++] = (struct CMUnitTest){
+            .name = tie_cases[i].name, .test_func = settles_a_tie, .initial_state = &tie_cases[i]};
     for (int i = 0; i < STOPS; i++)
-        tests[n++] = (struct CMUnitTest){.name = stop_cases[i].name, .test_func = stops, .initial_state = &stop_cases[i]};
+        tests[n++] = (struct CMUnitTest){
+            .name = stop_cases[i].name, .test_func = stops, .initial_state = &stop_cases[i]};
     for (int i = 0; i < BADS; i++)
-        tests[n++] = (struct CMUnitTest){.name = bad_cases[i].name, .test_func = is_refused, .initial_state = &bad_cases[i]};
+        tests[n++] = (struct CMUnitTest){
+            .name = bad_cases[i].name, .test_func = is_refused, .initial_state = &bad_cases[i]};
     for (int i = 0; i < SHAPES; i++) {
         shapes[i] = i;
-        tests[n++] = (struct CMUnitTest){.name = shape_names[i], .test_func = shape_is_covered, .initial_state = &shapes[i]};
+        tests[n++] = (struct CMUnitTest){
+            .name = shape_names[i], .test_func = shape_is_covered, .initial_state = &shapes[i]};
     }
     for (int i = 0; i < OTHERS; i++)
         tests[n++] = others[i];

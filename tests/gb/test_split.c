@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/gb/test_split.c -- rank selection, principal axes, and the cut at the median. */
 #include "clouds.h"
 #include "gb/split.h"
@@ -8,17 +9,25 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Shapes that defeat careless quickselects: sorted, reversed, organ pipe, few values, all equal, saw, random. */
+/* Shapes that defeat careless quickselects: sorted, reversed, organ pipe, few values, all equal, saw,
+   random. */
 static double shaped(int shape, size_t i, size_t n, uint64_t seed)
 {
     switch (shape) {
-    case 0: return (double)i;
-    case 1: return (double)(n - i);
-    case 2: return (double)(i < n / 2 ? i : n - i);
-    case 3: return (double)(i * 7919 % 3);
-    case 4: return 1.5;
-    case 5: return (double)(i % 17) - 1e6 * (double)(i == n / 3);
-    default: return rng_normal(seed, 2, i);
+    case 0:
+        return (double)i;
+    case 1:
+        return (double)(n - i);
+    case 2:
+        return (double)(i < n / 2 ? i : n - i);
+    case 3:
+        return (double)(i * 7919 % 3);
+    case 4:
+        return 1.5;
+    case 5:
+        return (double)(i % 17) - 1e6 * (double)(i == n / 3);
+    default:
+        return rng_normal(seed, 2, i);
     }
 }
 
@@ -56,24 +65,28 @@ static void select_finds_every_rank(void **state)
     }
 }
 
-/* An adversary (after McIlroy): plays the selection on keys that are not yet decided, and makes whatever it samples the smallest so far.
-   Each round then drops a handful of keys. A selection that does not notice would need n^2 / 20 steps. */
+/* An adversary (after McIlroy): plays the selection on keys that are not yet decided, and makes whatever it
+   samples the smallest so far. Each round then drops a handful of keys. A selection that does not notice
+   would need n^2 / 20 steps. */
 static void select_survives_bad_pivots(void **state)
 {
     (void)state;
     enum { N = 40000, ROUNDS = 120 };
-    double *key = malloc(N * sizeof *key), *keys = malloc(N * sizeof *keys); /* key of an element; keys in input order */
-    size_t *at = malloc(N * sizeof *at);                                     /* element at a place, as the selection moves them */
+    double *key = malloc(N * sizeof *key),
+           *keys = malloc(N * sizeof *keys); /* key of an element; keys in input order */
+    size_t *at = malloc(N * sizeof *at);     /* element at a place, as the selection moves them */
     assert_true(key != NULL && keys != NULL && at != NULL);
-    for (size_t i = 0; i < N; i++)
-        key[i] = INFINITY, at[i] = i;
+    for (size_t i = 0; i < N; i++) {
+        key[i] = INFINITY;
+        at[i] = i;
+    }
     double next = 0;
     ptrdiff_t low = 0;
     const ptrdiff_t high = N - 1;
     for (int round = 0; round < ROUNDS; round++) {
         const ptrdiff_t n = high - low, middle = low + n / 2, step = n / 8;
-        const ptrdiff_t sampled[9] = {low,           low + step,      low + 2 * step,  middle - step, middle,
-                                      middle + step, high - 2 * step, high - step, high};
+        const ptrdiff_t sampled[9] = {low,           low + step,      low + 2 * step, middle - step, middle,
+                                      middle + step, high - 2 * step, high - step,    high};
         double sample[9];
         for (int i = 0; i < 9; i++) {
             if (isinf(key[at[sampled[i]]]))
@@ -123,14 +136,22 @@ static axes_case axes_cases[] = {
     {"two equal eigenvalues: the lower axis", {1, 0, 0, 2, 0, 2}, {0, 1, 0}},
     {"z is longest", {1, 0, 0, 2, 0, 3}, {0, 0, 1}},
     {"line along x = y", {1, 1, 0, 1, 0, 0}, {0.70710678118654752, 0.70710678118654752, 0}},
-    {"line along x = -y: the tie in size makes x positive", {1, -1, 0, 1, 0, 0}, {0.70710678118654752, -0.70710678118654752, 0}},
-    {"a tie up to rounding is a tie: x positive", {1, -1 - 1e-12, 0, 1 + 2e-12, 0, 0}, {0.70710678118654752, -0.70710678118654752, 0}},
+    {"line along x = -y: the tie in size makes x positive",
+     {1, -1, 0, 1, 0, 0},
+     {0.70710678118654752, -0.70710678118654752, 0}},
+    {"a tie up to rounding is a tie: x positive",
+     {1, -1 - 1e-12, 0, 1 + 2e-12, 0, 0},
+     {0.70710678118654752, -0.70710678118654752, 0}},
     {"line along (1, -2, 2): y and z tie, y positive", {1, -2, 2, 4, -4, 4}, {-1 / 3.0, 2 / 3.0, -2 / 3.0}},
     {"line along (-1, -3, 2): the largest is positive",
      {1, 3, -2, 9, -6, 4},
      {0.26726124191242440, 0.80178372573727319, -0.53452248382484879}},
-    {"tiny units", {1e-90, 3e-90, -2e-90, 9e-90, -6e-90, 4e-90}, {0.26726124191242440, 0.80178372573727319, -0.53452248382484879}},
-    {"huge units", {1e77, 3e77, -2e77, 9e77, -6e77, 4e77}, {0.26726124191242440, 0.80178372573727319, -0.53452248382484879}},
+    {"tiny units",
+     {1e-90, 3e-90, -2e-90, 9e-90, -6e-90, 4e-90},
+     {0.26726124191242440, 0.80178372573727319, -0.53452248382484879}},
+    {"huge units",
+     {1e77, 3e77, -2e77, 9e77, -6e77, 4e77},
+     {0.26726124191242440, 0.80178372573727319, -0.53452248382484879}},
 };
 
 static void first_axis(void **state)
@@ -140,11 +161,12 @@ static void first_axis(void **state)
     split_axes(c->covariance, axes);
     for (int k = 0; k < 3; k++)
         if (!(fabs(axes[0][k] - c->first[k]) < 1e-12))
-            fail_msg("axis: wanted %.17g %.17g %.17g, got %.17g %.17g %.17g", c->first[0], c->first[1], c->first[2], axes[0][0], axes[0][1],
-                     axes[0][2]);
+            fail_msg("axis: wanted %.17g %.17g %.17g, got %.17g %.17g %.17g", c->first[0], c->first[1],
+                     c->first[2], axes[0][0], axes[0][1], axes[0][2]);
 }
 
-/* C u = lambda u, lambda falling, u orthonormal, largest component positive; matrices of any rank and scale ratio. */
+/* C u = lambda u, lambda falling, u orthonormal, largest component positive; matrices of any rank and scale
+   ratio. */
 static void axes_are_eigenvectors(void **state)
 {
     (void)state;
@@ -169,10 +191,12 @@ static void axes_are_eigenvectors(void **state)
             const double norm = c[0] + c[3] + c[5];
             for (int i = 0; i < 3; i++)
                 if (!(fabs(product[i] - lambda[a] * axes[a][i]) < 1e-13 * norm))
-                    fail_msg("seed %llu axis %d: residual %g", (unsigned long long)seed, a, product[i] - lambda[a] * axes[a][i]);
+                    fail_msg("seed %llu axis %d: residual %g", (unsigned long long)seed, a,
+                             product[i] - lambda[a] * axes[a][i]);
             assert_true(largest > 0);
             for (int d = 0; d < 3; d++) {
-                const double dot = axes[a][0] * axes[d][0] + axes[a][1] * axes[d][1] + axes[a][2] * axes[d][2];
+                const double dot =
+                    axes[a][0] * axes[d][0] + axes[a][1] * axes[d][1] + axes[a][2] * axes[d][2];
                 assert_true(fabs(dot - (a == d)) < 1e-13);
             }
             if (a > 0)
@@ -202,7 +226,8 @@ static void an_axis_that_separates_nothing_gives_way(void **state)
     assert_int_equal(split_at_median(points, keys, 5, &third, false), 0); /* no axis */
 }
 
-/* {1, 4, 4}: the median is the maximum. A set that the first axis does not separate at all is not such a tie. */
+/* {1, 4, 4}: the median is the maximum. A set that the first axis does not separate at all is not such a
+   tie. */
 static void a_tied_set_may_be_kept(void **state)
 {
     (void)state;
@@ -226,7 +251,8 @@ int main(void)
     enum { AXES = sizeof axes_cases / sizeof *axes_cases };
     struct CMUnitTest tests[AXES + 5];
     for (int i = 0; i < AXES; i++)
-        tests[i] = (struct CMUnitTest){.name = axes_cases[i].name, .test_func = first_axis, .initial_state = &axes_cases[i]};
+        tests[i] = (struct CMUnitTest){
+            .name = axes_cases[i].name, .test_func = first_axis, .initial_state = &axes_cases[i]};
     tests[AXES] = (struct CMUnitTest)cmocka_unit_test(select_finds_every_rank);
     tests[AXES + 1] = (struct CMUnitTest)cmocka_unit_test(select_survives_bad_pivots);
     tests[AXES + 2] = (struct CMUnitTest)cmocka_unit_test(axes_are_eigenvectors);

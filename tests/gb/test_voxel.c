@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/gb/test_voxel.c -- the base spatial scale against brute force, and voxel centres. */
 #include <float.h>
 
@@ -49,7 +50,8 @@ static double brute_scale(const float *position, size_t count, voxel_rule rule)
             zeros++;
         const size_t left = count - zeros;
         assert_true(left > 0);
-        got = value[zeros + (rule == VOXEL_COMPAT_SQUARED ? (left / 2 > 0 ? left / 2 - 1 : 0) : (left - 1) / 2)];
+        got = value[zeros +
+                    (rule == VOXEL_COMPAT_SQUARED ? (left / 2 > 0 ? left / 2 - 1 : 0) : (left - 1) / 2)];
     }
     free(squared);
     free(value);
@@ -73,7 +75,8 @@ static void scale_equals_brute_force(void **state)
             const double want = brute_scale(c.position, n, (voxel_rule)rule);
             assert_ok(balls_voxel_size(c.position, n, (voxel_rule)rule, &got, &assert_ok_err_));
             if (!(fabs((double)got - want) <= 1e-6 * want))
-                fail_msg("seed %llu, %zu points, rule %d: wanted %.9g, got %.9g", (unsigned long long)seed, n, rule, want, (double)got);
+                fail_msg("seed %llu, %zu points, rule %d: wanted %.9g, got %.9g", (unsigned long long)seed, n,
+                         rule, want, (double)got);
             cloud_free(&c);
         }
 }
@@ -91,8 +94,10 @@ static scale_case scale_cases[] = {
     {"identical points: 1", {5, 5, 5, 5, 5}, 5, 1, 1},
     {"0 and -0 are one place", {0.0f, -0.0f}, 2, 1, 1},
     {"two points: their distance, one neighbour to average", {1, 4}, 2, 3, 9},
-    {"three points: two neighbours to average", {0, 1, 3}, 3, 1, 2.5f},            /* spacing 1 1 2; squares 5, 2.5, 6.5: first of 3 */
-    {"even count: the lower of the two in the middle", {0, 1, 3, 8}, 4, 1, 18}, /* spacing 1 1 2 5; squares 74 54 38 138 / 3 */
+    {"three points: two neighbours to average", {0, 1, 3}, 3, 1, 2.5f}, /* spacing 1 1 2; squares 5, 2.5, 6.5:
+                                                                           first of 3 */
+    {"even count: the lower of the two in the middle", {0, 1, 3, 8}, 4, 1, 18}, /* spacing 1 1 2 5; squares 74
+                                                                                   54 38 138 / 3 */
     {"most points doubled: the median of the others", {0, 0, 0, 0, 7, 9, 13}, 7, 2, 89 / 3.0f},
     {"every point doubled: the distinct points", {0, 0, 3, 3, 7, 7}, 6, 3, 6},
     {"every point four times: the distinct points", {0, 0, 0, 0, 2, 2, 2, 2}, 8, 2, 4},
@@ -159,8 +164,10 @@ static void same_scale_for_any_thread_count(void **state)
 static void centers_are_the_distinct_cells(void **state)
 {
     (void)state;
-    /* Halves go to the even cell; -0.1 and 0.1 share cell 0, whose centre is +0; order is by x, then y, then z. */
-    const float position[] = {0.25f, 0, 0, 0.75f, 0, 0, -0.1f, 0.1f, 0, 1.2f, 0, 0, 0.9f, -3, 0, 0.9f, -3, 2, 0.9f, -3, -2};
+    /* Halves go to the even cell; -0.1 and 0.1 share cell 0, whose centre is +0; order is by x, then y, then
+       z. */
+    const float position[] = {0.25f, 0,    0,  0.75f, 0,    0,  -0.1f, 0.1f, 0,  1.2f, 0,
+                              0,     0.9f, -3, 0,     0.9f, -3, 2,     0.9f, -3, -2};
     const float want[] = {0, 0, 0, 1, -3, -2, 1, -3, 0, 1, -3, 2, 1, 0, 0};
     float *got;
     size_t count;
@@ -174,7 +181,8 @@ static void centers_are_the_distinct_cells(void **state)
     mem_free(got);
 }
 
-/* Every point lies within half a cell of a centre, every centre is a cell, strictly ascending; the input order does not matter. */
+/* Every point lies within half a cell of a centre, every centre is a cell, strictly ascending; the input
+   order does not matter. */
 static void centers_cover_the_cloud(void **state)
 {
     (void)state;
@@ -226,22 +234,30 @@ static void centers_cover_the_cloud(void **state)
 static void bad_input_is_refused(void **state)
 {
     (void)state;
-    const float fine[6] = {1, 2, 3, 4, 5, 6}, nan_point[6] = {1, 2, 3, 4, NAN, 6}, far[3] = {1e30f, 0, 0}, edge[3] = {0, FLT_MAX, 0};
+    const float fine[6] = {1, 2, 3, 4, 5, 6}, nan_point[6] = {1, 2, 3, 4, NAN, 6}, far[3] = {1e30f, 0, 0},
+                edge[3] = {0, FLT_MAX, 0};
     const struct {
         const float *position;
         size_t count;
         float voxel_size;
         const char *text;
     } rows[] = {
-        {fine, 2, 0, "voxel_size"},          {fine, 2, -1, "voxel_size"},         {fine, 2, NAN, "voxel_size"},
-        {fine, 2, INFINITY, "voxel_size"},   {nan_point, 2, 1, "point 1 "},       {far, 1, 1e-30f, "point 0 "},
-        {edge, 1, 0.66f * FLT_MAX, "point 0 "}, {NULL, 2, 1, "no positions"},
+        {fine, 2, 0, "voxel_size"},
+        {fine, 2, -1, "voxel_size"},
+        {fine, 2, NAN, "voxel_size"},
+        {fine, 2, INFINITY, "voxel_size"},
+        {nan_point, 2, 1, "point 1 "},
+        {far, 1, 1e-30f, "point 0 "},
+        {edge, 1, 0.66f * FLT_MAX, "point 0 "},
+        {NULL, 2, 1, "no positions"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         gbt_error err = {0};
         float *centers = (float *)8;
         size_t count = 77;
-        assert_int_equal(voxel_centers(rows[i].position, rows[i].count, rows[i].voxel_size, &centers, &count, &err), GBT_ERR_ARGUMENT);
+        assert_int_equal(
+            voxel_centers(rows[i].position, rows[i].count, rows[i].voxel_size, &centers, &count, &err),
+            GBT_ERR_ARGUMENT);
         assert_non_null(strstr(err.text, rows[i].text));
         assert_null(centers);
         assert_int_equal(count, 0);
@@ -295,7 +311,8 @@ static void garden_has_the_known_spacing(void **state)
     float spacing = 0, squared = 0;
     assert_ok(balls_voxel_size(c.position, c.count, VOXEL_MEDIAN_SPACING, &spacing, &assert_ok_err_));
     assert_ok(balls_voxel_size(c.position, c.count, VOXEL_COMPAT_SQUARED, &squared, &assert_ok_err_));
-    print_message("garden: median spacing %.9g, reference code's quantity %.9g\n", (double)spacing, (double)squared);
+    print_message("garden: median spacing %.9g, reference code's quantity %.9g\n", (double)spacing,
+                  (double)squared);
     assert_float_equal(spacing, 0.0052808f, 5e-8f);
     assert_true(squared > 0 && squared < 10 * spacing * spacing);
     cloud_free(&c);
@@ -305,16 +322,21 @@ int main(void)
 {
     enum { SCALES = sizeof scale_cases / sizeof *scale_cases };
     static const struct CMUnitTest others[] = {
-        cmocka_unit_test(scale_equals_brute_force),        cmocka_unit_test(scale_is_positive_and_finite_at_the_ends_of_float),
-        cmocka_unit_test(many_duplicates_are_quick),       cmocka_unit_test(same_scale_for_any_thread_count),
-        cmocka_unit_test(centers_are_the_distinct_cells),  cmocka_unit_test(centers_cover_the_cloud),
-        cmocka_unit_test(bad_input_is_refused),            cmocka_unit_test(every_allocation_may_fail),
+        cmocka_unit_test(scale_equals_brute_force),
+        cmocka_unit_test(scale_is_positive_and_finite_at_the_ends_of_float),
+        cmocka_unit_test(many_duplicates_are_quick),
+        cmocka_unit_test(same_scale_for_any_thread_count),
+        cmocka_unit_test(centers_are_the_distinct_cells),
+        cmocka_unit_test(centers_cover_the_cloud),
+        cmocka_unit_test(bad_input_is_refused),
+        cmocka_unit_test(every_allocation_may_fail),
         cmocka_unit_test(garden_has_the_known_spacing),
     };
     enum { OTHERS = sizeof others / sizeof *others };
     struct CMUnitTest tests[SCALES + OTHERS];
     for (int i = 0; i < SCALES; i++)
-        tests[i] = (struct CMUnitTest){.name = scale_cases[i].name, .test_func = scale_of_a_line, .initial_state = &scale_cases[i]};
+        tests[i] = (struct CMUnitTest){
+            .name = scale_cases[i].name, .test_func = scale_of_a_line, .initial_state = &scale_cases[i]};
     for (int i = 0; i < OTHERS; i++)
         tests[SCALES + i] = others[i];
     return _cmocka_run_group_tests("voxel", tests, SCALES + OTHERS, NULL, NULL);

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/golden/golden.sh -- the bits of models, pictures and exports, on every instruction set and number of threads.
 #
 # Usage: golden.sh PROGRAM RECORD THREADS [ISA]
@@ -19,11 +20,35 @@ cd "$work" || exit 1
 GBTRACE_THREADS=$threads
 export GBTRACE_THREADS
 
-# ---- scenes. Embree's own arithmetic makes them, which differs between instruction sets: always the plainest.
-make() { GBT_ISA=plain "$program" make-scene "$@" --width 96 --height 72 --views 9 --points 500 --samples 2 --quiet >/dev/null || exit 1; }
-make tabletop -o plain
-make courtyard -o bent --distorted
-cp -r plain fisheye # the same photos, said to be from another lens
+# ---- scenes. Cameras and points are procedural. Photos are the tracer's pictures of plain Gaussians: Embree's own arithmetic, which the
+# procedural photos are made with, differs between instruction sets and between processors.
+awk 'function random() { state = (state * 16807) % 2147483647; return state / 2147483647 }
+    BEGIN {
+        state = 1
+        printf "ply\nformat ascii 1.0\nelement vertex 400\n"
+        n = split("x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3", name, " ")
+        for (k = 1; k <= n; k++) printf "property float %s\n", name[k]
+        print "end_header"
+        for (i = 0; i < 400; i++) {
+            for (k = 0; k < 3; k++) printf "%.6f ", 3 * random() - 1.5
+            for (k = 0; k < 3; k++) printf "%.6f ", 3 * random() - 1.5
+            printf "%.6f ", 6 * random() - 2
+            for (k = 0; k < 3; k++) printf "%.6f ", -3 + 2 * random()
+            printf "%.6f %.6f %.6f %.6f\n", 0.1 + random(), random() - 0.5, random() - 0.5, random() - 0.5
+        }
+    }' >gaussians.ply
+make() { # RECIPE NAME OPTIONS...
+    recipe=$1 name=$2
+    shift 2
+    GBT_ISA=plain "$program" make-scene "$recipe" -o "$name" "$@" --width 96 --height 72 --views 9 --points 500 --samples 2 --quiet >out 2>&1 &&
+        GBT_ISA=plain "$program" render gaussians.ply -o photos --data "$name" --split all --quiet >out 2>&1 || { cat out; exit 1; }
+    for photo in "$name"/images/*.png; do mv "photos/${photo##*/}" "$photo" || exit 1; done
+    rm -r photos
+}
+make tabletop plain
+make courtyard bent --distorted
+# The same photos, said to be from another lens.
+cp -r plain fisheye
 { head -c 12 plain/sparse/0/cameras.bin && printf '\5\0\0\0' && tail -c +17 plain/sparse/0/cameras.bin | head -c 48 && head -c 32 /dev/zero; } >fisheye/sparse/0/cameras.bin
 cp -r plain masked
 mkdir masked/masks
@@ -88,7 +113,7 @@ draw exports/a.ply -o drawn-ply --data plain --format exr
 for init in gb adaptive voxel; do "$program" init plain -o exports/$init.ply --init $init --quiet >out 2>&1 || cat out; done
 
 # ---- compare
-rm -rf plain bent fisheye masked pointless out
+rm -rf plain bent fisheye masked pointless out gaussians.ply
 for file in $(find . -name '*.exr'); do # they hold the time when they were written
     LC_ALL=C sed -i 's/20[0-9][0-9]:[0-9][0-9]:[0-9][0-9] [0-9][0-9]:[0-9][0-9]:[0-9][0-9]/(the time)/' "$file"
 done

@@ -1,4 +1,6 @@
-/* tests/image/image_support.h -- small pictures, and SSIM with its gradient as plain 121-term sums in double. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/image/image_support.h -- small pictures, and SSIM with its gradient as plain 121-term sums in
+   double. */
 #ifndef GBT_IMAGE_SUPPORT_H
 #define GBT_IMAGE_SUPPORT_H
 
@@ -6,12 +8,13 @@
 #include "base/rng.h"
 #include "test_support.h"
 
-/** |got - want| <= tolerance in double; NaN fails. cmocka's own assert_float_equal() rounds both to float first. */
-#define assert_near(got, want, tolerance)                                                                                          \
-    do {                                                                                                                           \
-        const double near_got_ = (got), near_want_ = (want);                                                                       \
-        if (!(fabs(near_got_ - near_want_) <= (tolerance)))                                                                        \
-            fail_msg("%s is %.17g, not %.17g within %g", #got, near_got_, near_want_, (double)(tolerance));                        \
+/** |got - want| <= tolerance in double; NaN fails. cmocka's own assert_float_equal() rounds both to float
+    first. */
+#define assert_near(got, want, tolerance)                                                                    \
+    do {                                                                                                     \
+        const double near_got_ = (got), near_want_ = (want);                                                 \
+        if (!(fabs(near_got_ - near_want_) <= (tolerance)))                                                  \
+            fail_msg("%s is %.17g, not %.17g within %g", #got, near_got_, near_want_, (double)(tolerance));  \
     } while (0)
 
 static inline image make_image(int width, int height, int channels)
@@ -50,9 +53,10 @@ typedef struct brute_point {
     double ssim, by_mean, by_variance, by_covariance, mean_x, mean_y;
 } brute_point;
 
-/* The map at one value of x and y, which are [height][width][channels], and its partials by mu_x, var_x and cov. */
-static inline brute_point brute_at(const double *x, const double *y, int width, int height, int channels, int column, int row, int c,
-                                   const double taps[121])
+/* The map at one value of x and y, which are [height][width][channels], and its partials by mu_x, var_x and
+   cov. */
+static inline brute_point brute_at(const double *x, const double *y, int width, int height, int channels,
+                                   int column, int row, int c, const double taps[121])
 {
     double a = 0, b = 0, xx = 0, yy = 0, xy = 0;
     for (int dy = -5; dy <= 5; dy++)
@@ -61,11 +65,17 @@ static inline brute_point brute_at(const double *x, const double *y, int width, 
                 continue;
             const size_t i = (size_t)(((row + dy) * width + column + dx) * channels + c);
             const double w = taps[(dy + 5) * 11 + dx + 5];
-            a += w * x[i], b += w * y[i], xx += w * x[i] * x[i], yy += w * y[i] * y[i], xy += w * x[i] * y[i];
+            a += w * x[i];
+            b += w * y[i];
+            xx += w * x[i] * x[i];
+            yy += w * y[i] * y[i];
+            xy += w * x[i] * y[i];
         }
-    const double n1 = 2 * a * b + 1e-4, n2 = 2 * (xy - a * b) + 9e-4, d1 = a * a + b * b + 1e-4, d2 = xx - a * a + yy - b * b + 9e-4;
+    const double n1 = 2 * a * b + 1e-4, n2 = 2 * (xy - a * b) + 9e-4, d1 = a * a + b * b + 1e-4,
+                 d2 = xx - a * a + yy - b * b + 9e-4;
     const double ssim = n1 * n2 / (d1 * d2);
-    return (brute_point){ssim, 2 * b * n2 / (d1 * d2) - 2 * a * ssim / d1, -ssim / d2, 2 * n1 / (d1 * d2), a, b};
+    return (brute_point){ssim, 2 * b * n2 / (d1 * d2) - 2 * a * ssim / d1, -ssim / d2, 2 * n1 / (d1 * d2), a,
+                         b};
 }
 
 static inline void brute_taps(double taps[121])
@@ -92,7 +102,8 @@ static inline double brute_ssim(const image *a, const image *b)
         for (int column = 0; column < a->width; column++)
             for (int c = 0; c < a->channels; c++)
                 sum += brute_at(x, y, a->width, a->height, a->channels, column, row, c, taps).ssim;
-    free(x), free(y);
+    free(x);
+    free(y);
     return sum / (a->width * a->height * a->channels);
 }
 

@@ -1,4 +1,6 @@
-/* tests/image/test_affine.c -- colour matrices: by hand, adjoint against differences, least squares that come back, halves. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/image/test_affine.c -- colour matrices: by hand, adjoint against differences, least squares that come
+   back, halves. */
 #include "image_support.h"
 
 #include "base/parallel.h"
@@ -16,14 +18,18 @@ static void by_hand(void **state)
     (void)state;
     float m[AFFINE_NUMBERS] = {2, 0, 0, 0.5f, 0, 0, 1, 0, 0, -1, 0, 0.25f};
     image im = make_image(1, 1, 3);
-    im.pixels[0] = 0.25f, im.pixels[1] = 0.5f, im.pixels[2] = 0.75f;
+    im.pixels[0] = 0.25f;
+    im.pixels[1] = 0.5f;
+    im.pixels[2] = 0.75f;
     affine_apply(m, &im, &im);
     assert_true(im.pixels[0] == 1.0f && im.pixels[1] == 0.75f && im.pixels[2] == -0.25f);
     affine_identity(m);
     image noise = make_noise(9, 7, 3, 1), same = make_image(9, 7, 3);
     affine_apply(m, &noise, &same);
     assert_memory_equal(noise.pixels, same.pixels, 9 * 7 * 3 * sizeof(float));
-    image_free(&im), image_free(&noise), image_free(&same);
+    image_free(&im);
+    image_free(&noise);
+    image_free(&same);
 }
 
 /* f = sum of weight * m(in), in double. */
@@ -47,24 +53,31 @@ static void adjoint_agrees_with_differences(void **state)
     enum { WIDTH = 83, HEIGHT = 61 };
     float m[AFFINE_NUMBERS];
     fill_matrix(m, 3);
-    image in = make_noise(WIDTH, HEIGHT, 3, 4), weight = make_noise(WIDTH, HEIGHT, 3, 5), d = make_noise(WIDTH, HEIGHT, 3, 5);
+    image in = make_noise(WIDTH, HEIGHT, 3, 4), weight = make_noise(WIDTH, HEIGHT, 3, 5),
+          d = make_noise(WIDTH, HEIGHT, 3, 5);
     double d_m[AFFINE_NUMBERS];
     affine_backward(m, &in, &d, d_m);
     for (int k = 0; k < AFFINE_NUMBERS; k++) {
         float up[AFFINE_NUMBERS], down[AFFINE_NUMBERS];
-        memcpy(up, m, sizeof m), memcpy(down, m, sizeof m);
-        up[k] += 0.5f, down[k] -= 0.5f;
+        memcpy(up, m, sizeof m);
+        memcpy(down, m, sizeof m);
+        up[k] += 0.5f;
+        down[k] -= 0.5f;
         const double step = (double)up[k] - (double)down[k];
-        assert_near(d_m[k], (weighted(up, &in, &weight) - weighted(down, &in, &weight)) / step, 1e-8 * fabs(d_m[k]));
+        assert_near(d_m[k], (weighted(up, &in, &weight) - weighted(down, &in, &weight)) / step,
+                    1e-8 * fabs(d_m[k]));
     }
     for (int i = 0; i < 3 * WIDTH * HEIGHT; i += 37) {
         const float keep = in.pixels[i];
         in.pixels[i] = keep + 0.5f;
         const double high = weighted(m, &in, &weight);
         in.pixels[i] = keep;
-        assert_near((double)d.pixels[i], (high - weighted(m, &in, &weight)) / ((double)(keep + 0.5f) - (double)keep), 1e-6);
+        assert_near((double)d.pixels[i],
+                    (high - weighted(m, &in, &weight)) / ((double)(keep + 0.5f) - (double)keep), 1e-6);
     }
-    image_free(&in), image_free(&weight), image_free(&d);
+    image_free(&in);
+    image_free(&weight);
+    image_free(&d);
 }
 
 static void threads_give_the_same_bits(void **state)
@@ -99,8 +112,10 @@ static void a_fit_finds_the_matrix(void **state)
             to.pixels[3 * i] = 77;
     affine_fit(&from, &to, NULL, 10, 30, got);
     for (int k = 0; k < AFFINE_NUMBERS; k++)
-        assert_near((double)got[k], (double)m[k], 3e-5); /* the pull to the identity is 1e-6 against variances of 1/12 */
-    image_free(&from), image_free(&to);
+        assert_near((double)got[k], (double)m[k], 3e-5); /* the pull to the identity is 1e-6 against variances
+                                                            of 1/12 */
+    image_free(&from);
+    image_free(&to);
 }
 
 static void masked_pixels_are_not_fitted(void **state)
@@ -124,16 +139,23 @@ static void masked_pixels_are_not_fitted(void **state)
     assert_ok(affine_split(&from, &to, valid, &half, NULL));
     for (int y = 0; y < HEIGHT; y++)
         assert_memory_equal(half.valid + y * WIDTH / 2, valid + y * WIDTH + WIDTH / 2, WIDTH / 2);
-    affine_half_free(&half), image_free(&from), image_free(&to);
+    affine_half_free(&half);
+    image_free(&from);
+    image_free(&to);
 }
 
-/* Pictures that say little leave the identity as it is, or the nearest matrix that explains them; nothing is ever not finite. */
+/* Pictures that say little leave the identity as it is, or the nearest matrix that explains them; nothing is
+   ever not finite. */
 static void poor_pictures_fit_too(void **state)
 {
     (void)state;
-    static const struct { float from, to; int begin, end; float identity_error; } cases[] = {
-        {0, 0, 0, 8, 0}, {0.5f, 0.5f, 0, 8, 0}, {0.3f, 0.3f, 4, 4, 0}, {0, 0.4f, 0, 8, 0.41f}, {NAN, 0.5f, 0, 8, 0.51f},
-        {INFINITY, INFINITY, 0, 8, 0},
+    static const struct {
+        float from, to;
+        int begin, end;
+        float identity_error;
+    } cases[] = {
+        {0, 0, 0, 8, 0},           {0.5f, 0.5f, 0, 8, 0},    {0.3f, 0.3f, 4, 4, 0},
+        {0, 0.4f, 0, 8, 0.41f},    {NAN, 0.5f, 0, 8, 0.51f}, {INFINITY, INFINITY, 0, 8, 0},
         {1e-30f, 1e-30f, 0, 8, 0},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -143,7 +165,8 @@ static void poor_pictures_fit_too(void **state)
         affine_identity(identity);
         for (int k = 0; k < AFFINE_NUMBERS; k++)
             assert_near((double)m[k], (double)identity[k], (double)cases[i].identity_error + 1e-9);
-        image_free(&from), image_free(&to);
+        image_free(&from);
+        image_free(&to);
     }
 }
 
@@ -156,12 +179,13 @@ static void halves(void **state)
     image render = make_noise(WIDTH, HEIGHT, 3, 22), photo = make_image(WIDTH, HEIGHT, 3);
     affine_half right_half;
     affine_apply(m, &render, &photo);
-    for (int i = 0; i < WIDTH * HEIGHT; i++) /* the right half shows something else: it must not be fitted to */
+    for (int i = 0; i < WIDTH * HEIGHT; i++) /* the right half shows something else: it must not be fitted to
+                                              */
         if (i % WIDTH >= WIDTH / 2)
             photo.pixels[3 * i + 1] = 5;
     assert_ok(affine_split(&render, &photo, NULL, &right_half, NULL));
-    assert_true(right_half.render.width == RIGHT && right_half.photo.width == RIGHT && right_half.render.height == HEIGHT &&
-                right_half.photo.height == HEIGHT);
+    assert_true(right_half.render.width == RIGHT && right_half.photo.width == RIGHT &&
+                right_half.render.height == HEIGHT && right_half.photo.height == HEIGHT);
     for (int y = 0; y < HEIGHT; y++)
         for (int x = 0; x < WIDTH; x++)
             for (int c = 0; c < 3; c++) {
@@ -169,19 +193,24 @@ static void halves(void **state)
                 if (x < WIDTH / 2)
                     assert_near((double)render.pixels[at], (double)photo.pixels[at], 1e-4);
                 else
-                    assert_true(right_half.render.pixels[right] == render.pixels[at] && right_half.photo.pixels[right] == photo.pixels[at]);
+                    assert_true(right_half.render.pixels[right] == render.pixels[at] &&
+                                right_half.photo.pixels[right] == photo.pixels[at]);
             }
-    affine_half_free(&right_half), image_free(&render), image_free(&photo);
+    affine_half_free(&right_half);
+    image_free(&render);
+    image_free(&photo);
 
     image thin = make_noise(1, 3, 3, 1), same = make_noise(1, 3, 3, 1); /* no left half: the identity */
     assert_ok(affine_split(&thin, &same, NULL, &right_half, NULL));
     assert_memory_equal(thin.pixels, same.pixels, 9 * sizeof(float));
     assert_int_equal(right_half.render.width, 1);
-    affine_half_free(&right_half), image_free(&thin);
+    affine_half_free(&right_half);
+    image_free(&thin);
     image other = make_image(2, 3, 3);
     assert_int_equal(affine_split(&other, &same, NULL, &right_half, NULL), GBT_ERR_ARGUMENT);
     assert_null(right_half.render.pixels);
-    image_free(&same), image_free(&other);
+    image_free(&same);
+    image_free(&other);
 }
 
 int main(void)

@@ -1,4 +1,6 @@
-/* tests/image/test_image_io.c -- image files in and out: values, channels, refusals. Files are built by hand, byte by byte. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/image/test_image_io.c -- image files in and out: values, channels, refusals. Files are built by hand,
+   byte by byte. */
 #include "test_support.h"
 
 #include <fcntl.h>
@@ -87,8 +89,10 @@ static buffer make_png(uint32_t width, uint32_t height, int bits, int type, cons
     put(&data, "", 1); /* filter: none */
     put(&data, row, row_bytes);
     uint32_t a = 1, c = 1; /* Adler-32; the filter byte is 0 */
-    for (size_t i = 0; i < row_bytes; i++)
-        a = (a + ((const unsigned char *)row)[i]) % 65521, c = (c + a) % 65521;
+    for (size_t i = 0; i < row_bytes; i++) {
+        a = (a + ((const unsigned char *)row)[i]) % 65521;
+        c = (c + a) % 65521;
+    }
     put_big_endian(&data, c << 16 | a);
     put_chunk(&b, "IDAT", data.bytes, data.count);
     put_chunk(&b, "IEND", "", 0);
@@ -112,12 +116,39 @@ typedef struct png_case {
 static png_case png_cases[] = {
     {"grey becomes RGB", 8, 0, {0, 51}, 2, 2, 3, {0, 0, 0, 51 / 255.0f, 51 / 255.0f, 51 / 255.0f}},
     {"1 bit", 1, 0, {0x40}, 1, 2, 3, {0, 0, 0, 1, 1, 1}},
-    {"16-bit grey", 16, 0, {0x12, 0x34, 0xff, 0xff}, 4, 2, 3, {4660 / 65535.0f, 4660 / 65535.0f, 4660 / 65535.0f, 1, 1, 1}},
+    {"16-bit grey",
+     16,
+     0,
+     {0x12, 0x34, 0xff, 0xff},
+     4,
+     2,
+     3,
+     {4660 / 65535.0f, 4660 / 65535.0f, 4660 / 65535.0f, 1, 1, 1}},
     {"RGB", 8, 2, {1, 2, 3, 254, 255, 0}, 6, 2, 3, {1 / 255.0f, 2 / 255.0f, 3 / 255.0f, 254 / 255.0f, 1, 0}},
-    {"16-bit RGB", 16, 2, {0, 1, 0x80, 0, 0xff, 0xfe}, 6, 1, 3, {1 / 65535.0f, 32768 / 65535.0f, 65534 / 65535.0f}},
-    {"palette with transparency", 8, 3, {3, 1}, 2, 2, 4, {51 / 255.0f, 102 / 255.0f, 153 / 255.0f, 1, 0, 1, 0, 0}},
+    {"16-bit RGB",
+     16,
+     2,
+     {0, 1, 0x80, 0, 0xff, 0xfe},
+     6,
+     1,
+     3,
+     {1 / 65535.0f, 32768 / 65535.0f, 65534 / 65535.0f}},
+    {"palette with transparency",
+     8,
+     3,
+     {3, 1},
+     2,
+     2,
+     4,
+     {51 / 255.0f, 102 / 255.0f, 153 / 255.0f, 1, 0, 1, 0, 0}},
     {"grey and alpha", 8, 4, {51, 0}, 2, 1, 4, {51 / 255.0f, 51 / 255.0f, 51 / 255.0f, 0}},
-    {"colour under alpha 0 is kept as stored", 8, 6, {255, 128, 7, 0, 10, 20, 30, 128}, 8, 2, 4,
+    {"colour under alpha 0 is kept as stored",
+     8,
+     6,
+     {255, 128, 7, 0, 10, 20, 30, 128},
+     8,
+     2,
+     4,
      {1, 128 / 255.0f, 7 / 255.0f, 0, 10 / 255.0f, 20 / 255.0f, 30 / 255.0f, 128 / 255.0f}},
 };
 
@@ -133,7 +164,8 @@ static void reads_png(void **state)
     assert_int_equal(im.channels, c->channels);
     for (int i = 0; i < c->width * c->channels; i++)
         if (im.pixels[i] != c->pixels[i])
-            fail_msg("%s: value %d is %.9g, not %.9g", c->name, i, (double)im.pixels[i], (double)c->pixels[i]);
+            fail_msg("%s: value %d is %.9g, not %.9g", c->name, i, (double)im.pixels[i],
+                     (double)c->pixels[i]);
     image_free(&im);
     int width, height, channels;
     assert_ok(image_probe(at("a.jpg"), &width, &height, &channels, &assert_ok_err_));
@@ -148,7 +180,8 @@ static void expect_failure(const char *path, gbt_status wanted, const char *text
     gbt_error err = {0};
     const gbt_status status = image_read(path, &im, &err);
     if (status != wanted || strstr(err.text, text) == NULL)
-        fail_msg("%s: status %d (wanted %d), text \"%s\" (wanted \"%s\")", path, (int)status, (int)wanted, err.text, text);
+        fail_msg("%s: status %d (wanted %d), text \"%s\" (wanted \"%s\")", path, (int)status, (int)wanted,
+                 err.text, text);
     assert_int_equal(err.status, wanted);
     assert_non_null(strstr(err.text, path));
     assert_null(im.pixels);
@@ -168,7 +201,8 @@ static void refuses_what_is_not_an_image(void **state)
     expect_failure(at("fifo.png"), GBT_ERR_IO, "not a regular file");
     err = (gbt_error){0};
     assert_int_equal(image_probe(at("fifo.png"), &width, &height, &channels, &err), GBT_ERR_IO);
-    static const char *const contents[] = {"", "\x89PNG", "<html>404</html>", "GIF89a\1\0\1\0\0\0\0;", "P6 1 1 255 aaa", "\xff\xd8"};
+    static const char *const contents[] = {
+        "", "\x89PNG", "<html>404</html>", "GIF89a\1\0\1\0\0\0\0;", "P6 1 1 255 aaa", "\xff\xd8"};
     for (size_t i = 0; i < sizeof contents / sizeof *contents; i++) {
         buffer b = {.count = 0};
         put(&b, contents[i], strlen(contents[i]));
@@ -182,8 +216,12 @@ static void refuses_what_is_not_an_image(void **state)
 static void refuses_bombs(void **state)
 {
     (void)state;
-    static const struct { uint32_t width, height; const char *text; } cases[] = {
-        {100000, 100000, "2^28"}, {16384, 16385, "2^28"}, {16384, 8192, "2^28"}, {0, 1, "0 x 1"}, {0xFFFFFFFFu, 0xFFFFFFFFu, "2^28"},
+    static const struct {
+        uint32_t width, height;
+        const char *text;
+    } cases[] = {
+        {100000, 100000, "2^28"},           {16384, 16385, "2^28"}, {16384, 8192, "2^28"}, {0, 1, "0 x 1"},
+        {0xFFFFFFFFu, 0xFFFFFFFFu, "2^28"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const buffer b = make_png(cases[i].width, cases[i].height, 8, 2, "abc", 3);
@@ -271,8 +309,8 @@ static void jpeg_round_trip_and_truncation(void **state)
 static void png_rounds_half_up_and_clamps(void **state)
 {
     (void)state;
-    const float values[] = {0.0f, -1.0f, NAN, INFINITY, -INFINITY, 1.0f, 2.0f, 0.49f / 255,
-                                   0.51f / 255, 127.5f / 255, 254.49f / 255, 1e-30f};
+    const float values[] = {0.0f, -1.0f,       NAN,         INFINITY,     -INFINITY,     1.0f,
+                            2.0f, 0.49f / 255, 0.51f / 255, 127.5f / 255, 254.49f / 255, 1e-30f};
     const int levels[] = {0, 0, 0, 255, 0, 255, 255, 0, 1, 128, 254, 0};
     image im, back;
     assert_ok(image_alloc(&im, 2, 2, 3, &assert_ok_err_));
@@ -289,8 +327,10 @@ static void png_rounds_half_up_and_clamps(void **state)
     assert_ok(file_read(at("d.PNG"), &file, &file_count, &assert_ok_err_));
     assert_int_equal(count, file_count);
     assert_memory_equal(bytes, file, count);
-    mem_free(bytes), mem_free(file);
-    image_free(&im), image_free(&back);
+    mem_free(bytes);
+    mem_free(file);
+    image_free(&im);
+    image_free(&back);
 }
 
 static void png_keeps_every_level_and_channel_count(void **state)
@@ -306,7 +346,8 @@ static void png_keeps_every_level_and_channel_count(void **state)
                 const int from = channels <= 2 ? c < 3 ? 0 : 1 : c;
                 assert_true(back.pixels[i * back.channels + c] == im.pixels[i * channels + from]);
             }
-        image_free(&im), image_free(&back);
+        image_free(&im);
+        image_free(&back);
     }
 }
 
@@ -314,14 +355,19 @@ static void exr_round_trip_is_exact(void **state)
 {
     (void)state;
     image im = make_gradient(37, 23, 3), back;
-    im.pixels[0] = -4.25f, im.pixels[1] = 1e30f, im.pixels[2] = 1e-30f;
-    im.pixels[300] = NAN, im.pixels[301] = INFINITY, im.pixels[302] = -INFINITY;
+    im.pixels[0] = -4.25f;
+    im.pixels[1] = 1e30f;
+    im.pixels[2] = 1e-30f;
+    im.pixels[300] = NAN;
+    im.pixels[301] = INFINITY;
+    im.pixels[302] = -INFINITY;
     assert_ok(image_write(at("f.exr"), &im, &assert_ok_err_));
     assert_ok(image_read(at("f.exr"), &back, &assert_ok_err_));
     assert_int_equal(back.width, 37);
     assert_int_equal(back.height, 23);
     assert_int_equal(back.channels, 3);
-    im.pixels[300] = im.pixels[301] = im.pixels[302] = 0.0f; /* what is not finite is read as 0, with one warning */
+    im.pixels[300] = im.pixels[301] = im.pixels[302] =
+        0.0f; /* what is not finite is read as 0, with one warning */
     assert_memory_equal(back.pixels, im.pixels, 37 * 23 * 3 * sizeof(float));
     image_free(&back);
     int width, height, channels;
@@ -346,7 +392,8 @@ static void put_attribute(buffer *b, const char *name, const char *type, const v
     put(b, value, size);
 }
 
-static void put_exr_header(buffer *b, const char *part, const char *part_type, const char *const *channels, int width)
+static void put_exr_header(buffer *b, const char *part, const char *part_type, const char *const *channels,
+                           int width)
 {
     buffer list = {.count = 0};
     for (; *channels != NULL; channels++) {
@@ -375,7 +422,8 @@ static void put_exr_header(buffer *b, const char *part, const char *part_type, c
 static void exr_half_with_extra_channels(void **state)
 {
     (void)state;
-    /* Channels are stored in the order of their names. 0x3C00 = 1, 0x3800 = 0.5, 0xC000 = -2, 0x7E00 = NaN, 0x7C00 = Inf. */
+    /* Channels are stored in the order of their names. 0x3C00 = 1, 0x3800 = 0.5, 0xC000 = -2, 0x7E00 = NaN,
+       0x7C00 = Inf. */
     buffer b = {.count = 0};
     put(&b, "\x76\x2f\x31\x01\2\0\0\0", 8);
     put_exr_header(&b, NULL, NULL, (const char *[]){"B", "G", "R", "Z", NULL}, 2);
@@ -492,7 +540,8 @@ int main(void)
     struct CMUnitTest tests[PNG_COUNT + 12];
     size_t count = 0;
     for (; count < PNG_COUNT; count++)
-        tests[count] = (struct CMUnitTest){.name = png_cases[count].name, .test_func = reads_png, .initial_state = &png_cases[count]};
+        tests[count] = (struct CMUnitTest){
+            .name = png_cases[count].name, .test_func = reads_png, .initial_state = &png_cases[count]};
     const struct CMUnitTest others[] = {
         cmocka_unit_test(refuses_what_is_not_an_image),
         cmocka_unit_test(refuses_bombs),

@@ -1,4 +1,6 @@
-/* tests/image/test_loss.c -- the training loss and its gradient against differences and against a plain adjoint in double. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/image/test_loss.c -- the training loss and its gradient against differences and against a plain
+   adjoint in double. */
 #include "test_support.h"
 
 #include "base/cpu.h"
@@ -8,9 +10,10 @@
 #include "image/metrics.h"
 #include "image_support.h"
 
-/* L in double, and optionally dL/dx, straight from the definition: 121 terms per value, nothing separable, nothing folded. */
-static double plain_loss(const double *source_x, const double *source_y, const unsigned char *valid, int width, int height, double weight,
-                         double *d_x)
+/* L in double, and optionally dL/dx, straight from the definition: 121 terms per value, nothing separable,
+   nothing folded. */
+static double plain_loss(const double *source_x, const double *source_y, const unsigned char *valid,
+                         int width, int height, double weight, double *d_x)
 {
     const int count = width * height * 3;
     double *x = calloc((size_t)count, sizeof *x), *y = calloc((size_t)count, sizeof *y), taps[121];
@@ -19,14 +22,18 @@ static double plain_loss(const double *source_x, const double *source_y, const u
     brute_taps(taps);
     int values = 0;
     for (int i = 0; i < count; i++)
-        if (valid == NULL || valid[i / 3])
-            x[i] = source_x[i], y[i] = source_y[i], values++;
+        if (valid == NULL || valid[i / 3]) {
+            x[i] = source_x[i];
+            y[i] = source_y[i];
+            values++;
+        }
     double l1 = 0, ssim = 0;
     for (int i = 0; i < count; i++) {
         if (valid != NULL && !valid[i / 3])
             continue; /* its partials stay 0 */
         points[i] = brute_at(x, y, width, height, 3, i / 3 % width, i / 3 / width, i % 3, taps);
-        l1 += fabs(x[i] - y[i]), ssim += points[i].ssim;
+        l1 += fabs(x[i] - y[i]);
+        ssim += points[i].ssim;
     }
     for (int i = 0; d_x != NULL && i < count; i++) {
         d_x[i] = 0;
@@ -38,11 +45,14 @@ static double plain_loss(const double *source_x, const double *source_y, const u
             if (column < 0 || column >= width || row < 0 || row >= height)
                 continue;
             const brute_point *p = &points[(row * width + column) * 3 + i % 3];
-            sum += taps[k] * (p->by_mean + 2 * (x[i] - p->mean_x) * p->by_variance + (y[i] - p->mean_y) * p->by_covariance);
+            sum += taps[k] * (p->by_mean + 2 * (x[i] - p->mean_x) * p->by_variance +
+                              (y[i] - p->mean_y) * p->by_covariance);
         }
         d_x[i] = ((1 - weight) * (x[i] > y[i] ? 1 : x[i] < y[i] ? -1 : 0) - weight * sum) / values;
     }
-    free(x), free(y), free(points);
+    free(x);
+    free(y);
+    free(points);
     return values == 0 ? 0 : (1 - weight) * l1 / values + weight * (1 - ssim / values);
 }
 
@@ -51,7 +61,8 @@ static double relative_error(const float *got, const double *want, int count)
     double error = 0, size = 0;
     for (int i = 0; i < count; i++) {
         const double difference = (double)got[i] - want[i];
-        error += difference * difference, size += want[i] * want[i];
+        error += difference * difference;
+        size += want[i] * want[i];
     }
     return sqrt(error / size);
 }
@@ -60,9 +71,9 @@ typedef struct loss_case {
     const char *name;
     int width, height;
     double weight;
-    float level;   /* around which x and y vary */
+    float level; /* around which x and y vary */
     float spread;
-    int mask;      /* 0 none, n: every n-th pixel is left out */
+    int mask; /* 0 none, n: every n-th pixel is left out */
 } loss_case;
 
 static loss_case loss_cases[] = {
@@ -87,13 +98,15 @@ static void gradient_is_right(void **state)
 {
     const loss_case *t = *state;
     const int count = t->width * t->height * 3;
-    image x = make_noise(t->width, t->height, 3, 3), y = make_noise(t->width, t->height, 3, 4), d_x = make_noise(t->width, t->height, 3, 5);
+    image x = make_noise(t->width, t->height, 3, 3), y = make_noise(t->width, t->height, 3, 4),
+          d_x = make_noise(t->width, t->height, 3, 5);
     unsigned char *valid = t->mask > 0 ? malloc((size_t)count) : NULL;
     for (int i = 0; i < count; i++) {
         x.pixels[i] = t->level + t->spread * (2 * x.pixels[i] - 1);
         y.pixels[i] = t->level + t->spread * (2 * y.pixels[i] - 1);
         if (fabsf(x.pixels[i] - y.pixels[i]) < 0.01f * t->spread)
-            y.pixels[i] = x.pixels[i] - 0.01f * t->spread; /* a difference across the kink of |x - y| means nothing */
+            y.pixels[i] =
+                x.pixels[i] - 0.01f * t->spread; /* a difference across the kink of |x - y| means nothing */
     }
     for (int i = 0; valid != NULL && i < count / 3; i++)
         valid[i] = i % t->mask != t->mask - 1 ? (unsigned char)(1 + i % 200) : 0;
@@ -111,7 +124,8 @@ static void gradient_is_right(void **state)
     if (!(adjoint_error <= 1e-7))
         fail_msg("%s: gradient is off by %g from the plain adjoint", t->name, adjoint_error);
 
-    /* Differences of fourth order, borders included: all values of the small images, every 11th of the others. */
+    /* Differences of fourth order, borders included: all values of the small images, every 11th of the
+       others. */
     const double h = 1e-3 * fmin((double)t->spread, 0.1);
     const int stride = count <= 100 ? 1 : 11;
     int taken = 0;
@@ -134,9 +148,15 @@ static void gradient_is_right(void **state)
     for (int i = 0; valid != NULL && i < count; i++)
         if (!valid[i / 3])
             assert_true(d_x.pixels[i] == 0.0f);
-    free(wide_x), free(wide_y), free(want), free(got), free(valid);
+    free(wide_x);
+    free(wide_y);
+    free(want);
+    free(got);
+    free(valid);
     loss_scratch_free(&scratch);
-    image_free(&x), image_free(&y), image_free(&d_x);
+    image_free(&x);
+    image_free(&y);
+    image_free(&d_x);
 }
 
 static void parts_agree_with_the_metrics(void **state)
@@ -156,12 +176,16 @@ static void parts_agree_with_the_metrics(void **state)
     memset(all, 1, sizeof all);
     image d_masked = make_image(45, 37, 3);
     image_loss_result masked;
-    assert_ok(image_loss(&x, &y, all, 0.2, &scratch, &d_masked, &masked, &assert_ok_err_)); /* scratch grows */
+    assert_ok(image_loss(&x, &y, all, 0.2, &scratch, &d_masked, &masked, &assert_ok_err_)); /* scratch grows
+                                                                                             */
     assert_memory_equal(&masked, &out, sizeof out);
     assert_memory_equal(d_masked.pixels, d_x.pixels, 45 * 37 * 3 * sizeof(float));
     loss_scratch_free(&scratch);
     assert_null(scratch.buffer);
-    image_free(&x), image_free(&y), image_free(&d_x), image_free(&d_masked);
+    image_free(&x);
+    image_free(&y);
+    image_free(&d_x);
+    image_free(&d_masked);
 }
 
 static void identical_images(void **state)
@@ -169,7 +193,8 @@ static void identical_images(void **state)
     (void)state;
     static const float levels[] = {-1.0f, 0.0f, 0.6f, 1.0f}; /* -1: noise */
     for (size_t k = 0; k < sizeof levels / sizeof *levels; k++) {
-        image x = levels[k] < 0.0f ? make_noise(23, 19, 3, 1) : make_constant(23, 19, levels[k]), d_x = make_noise(23, 19, 3, 2);
+        image x = levels[k] < 0.0f ? make_noise(23, 19, 3, 1) : make_constant(23, 19, levels[k]),
+              d_x = make_noise(23, 19, 3, 2);
         loss_scratch scratch = {0};
         image_loss_result out;
         assert_ok(image_loss(&x, &x, NULL, 0.2, &scratch, &d_x, &out, &assert_ok_err_));
@@ -177,22 +202,27 @@ static void identical_images(void **state)
         for (int i = 0; i < 23 * 19 * 3; i++)
             assert_true(fabsf(d_x.pixels[i]) < 1e-14f);
         loss_scratch_free(&scratch);
-        image_free(&x), image_free(&d_x);
+        image_free(&x);
+        image_free(&d_x);
     }
 }
 
 static void what_is_left_out_does_not_matter(void **state)
 {
     (void)state;
-    image x = make_noise(19, 18, 3, 1), y = make_noise(19, 18, 3, 2), d_x = make_image(19, 18, 3), d_again = make_image(19, 18, 3);
+    image x = make_noise(19, 18, 3, 1), y = make_noise(19, 18, 3, 2), d_x = make_image(19, 18, 3),
+          d_again = make_image(19, 18, 3);
     unsigned char valid[19 * 18];
     for (int i = 0; i < 19 * 18; i++)
         valid[i] = i % 7 != 0;
     loss_scratch scratch = {0};
     image_loss_result out, again;
     assert_ok(image_loss(&x, &y, valid, 0.2, &scratch, &d_x, &out, &assert_ok_err_));
-    for (int i = 0; i < 19 * 18; i += 7)
-        x.pixels[3 * i] = NAN, y.pixels[3 * i + 1] = INFINITY, x.pixels[3 * i + 2] = 1e30f;
+    for (int i = 0; i < 19 * 18; i += 7) {
+        x.pixels[3 * i] = NAN;
+        y.pixels[3 * i + 1] = INFINITY;
+        x.pixels[3 * i + 2] = 1e30f;
+    }
     assert_ok(image_loss(&x, &y, valid, 0.2, &scratch, &d_again, &again, &assert_ok_err_));
     assert_memory_equal(&out, &again, sizeof out);
     assert_memory_equal(d_x.pixels, d_again.pixels, 19 * 18 * 3 * sizeof(float));
@@ -203,17 +233,22 @@ static void what_is_left_out_does_not_matter(void **state)
     for (int i = 0; i < 19 * 18 * 3; i++)
         assert_true(d_x.pixels[i] == 0.0f);
 
-    assert_ok(image_loss(&x, &y, NULL, 0.2, &scratch, &d_x, &out, &assert_ok_err_)); /* a NaN that counts shows in the loss */
+    assert_ok(image_loss(&x, &y, NULL, 0.2, &scratch, &d_x, &out, &assert_ok_err_)); /* a NaN that counts
+                                                                                        shows in the loss */
     assert_false(isfinite(out.loss));
     loss_scratch_free(&scratch);
-    image_free(&x), image_free(&y), image_free(&d_x), image_free(&d_again);
+    image_free(&x);
+    image_free(&y);
+    image_free(&d_x);
+    image_free(&d_again);
 }
 
 static void same_bits_for_threads_and_instructions(void **state)
 {
     (void)state;
     enum { WIDTH = 61, HEIGHT = 70 };
-    image x = make_noise(WIDTH, HEIGHT, 3, 1), y = make_noise(WIDTH, HEIGHT, 3, 2), d_first = make_image(WIDTH, HEIGHT, 3);
+    image x = make_noise(WIDTH, HEIGHT, 3, 1), y = make_noise(WIDTH, HEIGHT, 3, 2),
+          d_first = make_image(WIDTH, HEIGHT, 3);
     image d_x = make_image(WIDTH, HEIGHT, 3);
     unsigned char valid[WIDTH * HEIGHT];
     for (int i = 0; i < WIDTH * HEIGHT; i++)
@@ -225,29 +260,40 @@ static void same_bits_for_threads_and_instructions(void **state)
             cpu_limit_isa((cpu_isa)isa);
             loss_scratch scratch = {0};
             const int is_first = threads == 1 && isa == CPU_PLAIN;
-            assert_ok(image_loss(&x, &y, valid, 0.2, &scratch, is_first ? &d_first : &d_x, is_first ? &first : &out, &assert_ok_err_));
+            assert_ok(image_loss(&x, &y, valid, 0.2, &scratch, is_first ? &d_first : &d_x,
+                                 is_first ? &first : &out, &assert_ok_err_));
             loss_scratch_free(&scratch);
             if (is_first)
                 continue;
             assert_memory_equal(&out, &first, sizeof out);
             assert_memory_equal(d_x.pixels, d_first.pixels, WIDTH * HEIGHT * 3 * sizeof(float));
         }
-    image_free(&x), image_free(&y), image_free(&d_x), image_free(&d_first);
+    image_free(&x);
+    image_free(&y);
+    image_free(&d_x);
+    image_free(&d_first);
 }
 
 static void refusals(void **state)
 {
     (void)state;
-    image x = make_noise(8, 9, 3, 1), y = make_noise(9, 8, 3, 2), grey = make_noise(8, 9, 1, 1), d_x = make_image(8, 9, 3);
+    image x = make_noise(8, 9, 3, 1), y = make_noise(9, 8, 3, 2), grey = make_noise(8, 9, 1, 1),
+          d_x = make_image(8, 9, 3);
     loss_scratch scratch = {0};
     image_loss_result out;
-    const struct { const image *x, *y; image *d_x; double weight; } cases[] = {
-        {&x, &y, &d_x, 0.2}, {&grey, &grey, &grey, 0.2}, {&x, &x, &y, 0.2},
-        {&x, &x, &d_x, -0.01}, {&x, &x, &d_x, 1.01}, {&x, &x, &d_x, (double)NAN},
+    const struct {
+        const image *x, *y;
+        image *d_x;
+        double weight;
+    } cases[] = {
+        {&x, &y, &d_x, 0.2},   {&grey, &grey, &grey, 0.2}, {&x, &x, &y, 0.2},
+        {&x, &x, &d_x, -0.01}, {&x, &x, &d_x, 1.01},       {&x, &x, &d_x, (double)NAN},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         gbt_error err = {0};
-        assert_int_equal(image_loss(cases[i].x, cases[i].y, NULL, cases[i].weight, &scratch, cases[i].d_x, &out, &err), GBT_ERR_ARGUMENT);
+        assert_int_equal(
+            image_loss(cases[i].x, cases[i].y, NULL, cases[i].weight, &scratch, cases[i].d_x, &out, &err),
+            GBT_ERR_ARGUMENT);
         assert_true(err.text[0] != '\0');
         assert_null(scratch.buffer);
     }
@@ -255,7 +301,10 @@ static void refusals(void **state)
     assert_int_equal(image_loss(&x, &x, NULL, 0.2, &scratch, &d_x, &out, NULL), GBT_ERR_NO_MEMORY);
     mem_fail_after(-1);
     assert_null(scratch.buffer);
-    image_free(&x), image_free(&y), image_free(&grey), image_free(&d_x);
+    image_free(&x);
+    image_free(&y);
+    image_free(&grey);
+    image_free(&d_x);
 }
 
 static void real_photo(void **state)
@@ -268,8 +317,10 @@ static void real_photo(void **state)
     image photo;
     assert_ok(image_read(path, &photo, &assert_ok_err_));
     assert_true(photo.width > WIDTH && photo.height > HEIGHT);
-    image x = make_image(WIDTH, HEIGHT, 3), y = make_image(WIDTH, HEIGHT, 3), d_x = make_image(WIDTH, HEIGHT, 3);
-    for (int i = 0; i < WIDTH * HEIGHT * 3; i++) { /* the top left corner, against itself moved by a pixel and darkened */
+    image x = make_image(WIDTH, HEIGHT, 3), y = make_image(WIDTH, HEIGHT, 3),
+          d_x = make_image(WIDTH, HEIGHT, 3);
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++) { /* the top left corner, against itself moved by a pixel and
+                                                      darkened */
         const int at = (i / 3 / WIDTH * photo.width + i / 3 % WIDTH) * 3 + i % 3;
         y.pixels[i] = photo.pixels[at];
         x.pixels[i] = 0.97f * photo.pixels[at + 3];
@@ -282,9 +333,14 @@ static void real_photo(void **state)
     const double error = relative_error(d_x.pixels, want, WIDTH * HEIGHT * 3);
     if (!(error <= 1e-7))
         fail_msg("gradient is off by %g", error);
-    free(wide_x), free(wide_y), free(want);
+    free(wide_x);
+    free(wide_y);
+    free(want);
     loss_scratch_free(&scratch);
-    image_free(&photo), image_free(&x), image_free(&y), image_free(&d_x);
+    image_free(&photo);
+    image_free(&x);
+    image_free(&y);
+    image_free(&d_x);
 }
 
 int main(void)
@@ -301,7 +357,8 @@ int main(void)
     struct CMUnitTest tests[CASE_COUNT + sizeof others / sizeof *others];
     size_t count = 0;
     for (; count < CASE_COUNT; count++)
-        tests[count] = (struct CMUnitTest){loss_cases[count].name, gradient_is_right, NULL, NULL, &loss_cases[count]};
+        tests[count] =
+            (struct CMUnitTest){loss_cases[count].name, gradient_is_right, NULL, NULL, &loss_cases[count]};
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)
         tests[count++] = others[i];
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/io/io_support.h -- a folder of its own for a test's files. */
 #ifndef GBT_TEST_IO_SUPPORT_H
 #define GBT_TEST_IO_SUPPORT_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/io/test_container.c -- the container: what goes in comes out, and nothing damaged does. */
 #include <fcntl.h>
 #include <sys/mount.h>
@@ -44,13 +45,16 @@ static void check_contents(const container *c)
     assert_int_equal(dims[1], 3);
     assert_memory_equal(data, floats, sizeof floats);
     assert_int_equal((uintptr_t)data % 64, 0);
-    dims[0] = CONTAINER_ANY, dims[1] = 10, dims[2] = 3;
+    dims[0] = CONTAINER_ANY;
+    dims[1] = 10;
+    dims[2] = 3;
     assert_ok(container_find(c, "empty", CONTAINER_F32, 3, dims, &data, NULL));
     assert_int_equal(dims[0], 0);
     double d[2];
     assert_ok(container_get(c, "doubles", CONTAINER_F64, 2, d, NULL));
     assert_memory_equal(d, doubles, sizeof d);
-    dims[0] = dims[1] = dims[3] = 1, dims[2] = 3;
+    dims[0] = dims[1] = dims[3] = 1;
+    dims[2] = 3;
     assert_ok(container_find(c, "words", CONTAINER_U64, 4, dims, &data, NULL));
     assert_memory_equal(data, words, sizeof words);
     int64_t s;
@@ -62,7 +66,8 @@ static void check_contents(const container *c)
     char text[13];
     assert_ok(container_get_text(c, "text", text, sizeof text, NULL));
     assert_string_equal(text, "key = value\n");
-    assert_ok(container_get_text(c, "a name of exactly sixty-three bytes, which is as long as it can", text, sizeof text, NULL));
+    assert_ok(container_get_text(c, "a name of exactly sixty-three bytes, which is as long as it can", text,
+                                 sizeof text, NULL));
     assert_string_equal(text, "");
     assert_null(container_section_named(c, "float"));
 }
@@ -136,7 +141,8 @@ static void every_other_length_is_found(void **state)
     for (size_t length = 0; length <= byte_count + 65; length++) {
         if (length == byte_count)
             continue;
-        unsigned char *copy = mem_calloc(length, 1, "copy", NULL); /* exact size: a sanitizer sees every byte read too far */
+        unsigned char *copy =
+            mem_calloc(length, 1, "copy", NULL); /* exact size: a sanitizer sees every byte read too far */
         assert_non_null(copy);
         memcpy(copy, bytes, length < byte_count ? length : byte_count);
         container c;
@@ -148,7 +154,7 @@ static void every_other_length_is_found(void **state)
     mem_free(bytes);
 }
 
-/* ---- files with good checksums and bad contents ------------------------------------------------------------------------------ */
+/* ---- files with good checksums and bad contents ---- */
 
 static uint32_t crc_by_bits(const unsigned char *bytes, size_t count)
 {
@@ -177,8 +183,8 @@ typedef struct forged_case {
     const char *message;
 } forged_case;
 
-/* Row 0 is "floats", f32[2][3], at 64; row 1 "empty" at 192. Inside a row: name 0, type 64, dimensions 68, sizes 72, offset 104, bytes 112,
-   crc 120. */
+/* Row 0 is "floats", f32[2][3], at 64; row 1 "empty" at 192. Inside a row: name 0, type 64, dimensions 68,
+   sizes 72, offset 104, bytes 112, crc 120. */
 static forged_case forged_cases[] = {
     {"newer version", 8, 4, 2, "memory@8: written by another version of gbtrace (wanted format 1, got 2)"},
     {"version 0", 8, 4, 0, "wanted format 1, got 0"},
@@ -195,15 +201,19 @@ static forged_case forged_cases[] = {
     {"no dimension", 64 + 68, 4, 0, "bad number of dimensions (wanted 1 to 4, got 0)"},
     {"5 dimensions", 64 + 68, 4, 5, "bad number of dimensions (wanted 1 to 4, got 5)"},
     {"shape larger than the bytes", 64 + 72, 8, 3, "section floats: its shape and its 24 bytes do not agree"},
-    {"shape that overflows", 64 + 72, 8, UINT64_MAX / 2, "section floats: its shape and its 24 bytes do not agree"},
+    {"shape that overflows", 64 + 72, 8, UINT64_MAX / 2,
+     "section floats: its shape and its 24 bytes do not agree"},
     {"product that wraps to the right number", 64 + 72, 8, (UINT64_C(1) << 62) + 2,
      "section floats: its shape and its 24 bytes do not agree"},
-    {"offset one alignment on", 64 + 104, 8, 64 + 8 * 128 + 64, "section floats: 24 bytes at 1152 are not where they should be"},
+    {"offset one alignment on", 64 + 104, 8, 64 + 8 * 128 + 64,
+     "section floats: 24 bytes at 1152 are not where they should be"},
     {"offset 0", 64 + 104, 8, 0, "section floats: 24 bytes at 0 are not where they should be"},
-    {"offset 2^64 - 1", 64 + 104, 8, UINT64_MAX, "section floats: 24 bytes at 18446744073709551615 are not where they should be"},
+    {"offset 2^64 - 1", 64 + 104, 8, UINT64_MAX,
+     "section floats: 24 bytes at 18446744073709551615 are not where they should be"},
     {"byte count 2^63", 64 + 112, 8, UINT64_C(1) << 63, "do not agree"},
     {"empty section with bytes", 192 + 112, 8, 4, "section empty: its shape and its 4 bytes do not agree"},
-    {"empty section of 2^63 x 0", 192 + 80, 8, UINT64_C(1) << 63, "section empty: its shape and its 0 bytes do not agree"},
+    {"empty section of 2^63 x 0", 192 + 80, 8, UINT64_C(1) << 63,
+     "section empty: its shape and its 0 bytes do not agree"},
     {"section checksum", 64 + 120, 4, 1, "memory@1088: section floats is damaged (checksum)"},
 };
 
@@ -218,7 +228,8 @@ static void forged(void **state)
     gbt_error err = {0};
     const gbt_status status = container_parse(bytes, byte_count, "memory", &c, &err);
     if (row->message == NULL) {
-        assert_int_equal(status, GBT_OK); /* the repaired checksums are right: so the others fail for their own reason */
+        assert_int_equal(status, GBT_OK); /* the repaired checksums are right: so the others fail for their
+                                             own reason */
         container_free(&c);
     } else {
         assert_int_equal(status, GBT_ERR_FORMAT);
@@ -256,7 +267,7 @@ static void unaligned_bytes_are_refused(void **state)
     mem_free(bytes);
 }
 
-/* ---- asking for what is not there --------------------------------------------------------------------------------------------- */
+/* ---- asking for what is not there ---- */
 
 static void wrong_questions(void **state)
 {
@@ -265,26 +276,55 @@ static void wrong_questions(void **state)
     unsigned char *bytes = encode(&byte_count);
     container c;
     assert_ok(container_parse(bytes, byte_count, "f.gbt", &c, NULL));
-    const struct { const char *name; container_dtype dtype; int dim_count; size_t dims[4]; const char *message; } rows[] = {
-        {"nothing", CONTAINER_F32, 2, {CONTAINER_ANY, 3}, "f.gbt: section nothing is missing (wanted f32[*][3])"},
-        {"floats", CONTAINER_F64, 2, {2, 3}, "f.gbt: section floats has another shape (wanted f64[2][3], got f32[2][3])"},
-        {"floats", CONTAINER_F32, 1, {6}, "f.gbt: section floats has another shape (wanted f32[6], got f32[2][3])"},
-        {"floats", CONTAINER_F32, 2, {2, 4}, "f.gbt: section floats has another shape (wanted f32[2][4], got f32[2][3])"},
-        {"floats", CONTAINER_F32, 2, {3, CONTAINER_ANY}, "f.gbt: section floats has another shape (wanted f32[3][*], got f32[2][3])"},
+    const struct {
+        const char *name;
+        container_dtype dtype;
+        int dim_count;
+        size_t dims[4];
+        const char *message;
+    } rows[] = {
+        {"nothing",
+         CONTAINER_F32,
+         2,
+         {CONTAINER_ANY, 3},
+         "f.gbt: section nothing is missing (wanted f32[*][3])"},
+        {"floats",
+         CONTAINER_F64,
+         2,
+         {2, 3},
+         "f.gbt: section floats has another shape (wanted f64[2][3], got f32[2][3])"},
+        {"floats",
+         CONTAINER_F32,
+         1,
+         {6},
+         "f.gbt: section floats has another shape (wanted f32[6], got f32[2][3])"},
+        {"floats",
+         CONTAINER_F32,
+         2,
+         {2, 4},
+         "f.gbt: section floats has another shape (wanted f32[2][4], got f32[2][3])"},
+        {"floats",
+         CONTAINER_F32,
+         2,
+         {3, CONTAINER_ANY},
+         "f.gbt: section floats has another shape (wanted f32[3][*], got f32[2][3])"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         size_t dims[4];
         memcpy(dims, rows[i].dims, sizeof dims);
         const void *data = &c;
         gbt_error err = {0};
-        assert_int_equal(container_find(&c, rows[i].name, rows[i].dtype, rows[i].dim_count, dims, &data, &err), GBT_ERR_FORMAT);
+        assert_int_equal(
+            container_find(&c, rows[i].name, rows[i].dtype, rows[i].dim_count, dims, &data, &err),
+            GBT_ERR_FORMAT);
         assert_string_equal(err.text, rows[i].message);
         assert_null(data);
     }
     char text[12];
     gbt_error err = {0};
     assert_int_equal(container_get_text(&c, "text", text, sizeof text, &err), GBT_ERR_FORMAT);
-    assert_string_equal(err.text, "f.gbt: section text: the text is too long (wanted at most 11 bytes, got 12)");
+    assert_string_equal(err.text,
+                        "f.gbt: section text: the text is too long (wanted at most 11 bytes, got 12)");
     container_free(&c);
     mem_free(bytes);
 }
@@ -308,21 +348,38 @@ static void zero_byte_in_a_text(void **state)
     container_writer_free(&w);
 }
 
-/* ---- misuse of the writer ----------------------------------------------------------------------------------------------------- */
+/* ---- misuse of the writer ---- */
 
-static void add_no_name(container_writer *w) { container_add(w, "", CONTAINER_F32, 1, (size_t[]){1}, floats); }
+static void add_no_name(container_writer *w)
+{
+    container_add(w, "", CONTAINER_F32, 1, (size_t[]){1}, floats);
+}
 static void add_long_name(container_writer *w)
 {
-    container_add(w, "a name of exactly sixty-four bytes, which is one more than fits.", CONTAINER_F32, 1, (size_t[]){1}, floats);
+    container_add(w, "a name of exactly sixty-four bytes, which is one more than fits.", CONTAINER_F32, 1,
+                  (size_t[]){1}, floats);
 }
-static void add_no_dims(container_writer *w) { container_add(w, "x", CONTAINER_F32, 0, (size_t[]){1}, floats); }
-static void add_five_dims(container_writer *w) { container_add(w, "x", CONTAINER_F32, 5, (size_t[]){1, 1, 1, 1, 1}, floats); }
-static void add_bad_type(container_writer *w) { container_add(w, "x", (container_dtype)9, 1, (size_t[]){1}, floats); }
-static void add_overflow(container_writer *w) { container_add(w, "x", CONTAINER_F32, 2, (size_t[]){SIZE_MAX / 2, 2}, floats); }
+static void add_no_dims(container_writer *w)
+{
+    container_add(w, "x", CONTAINER_F32, 0, (size_t[]){1}, floats);
+}
+static void add_five_dims(container_writer *w)
+{
+    container_add(w, "x", CONTAINER_F32, 5, (size_t[]){1, 1, 1, 1, 1}, floats);
+}
+static void add_bad_type(container_writer *w)
+{
+    container_add(w, "x", (container_dtype)9, 1, (size_t[]){1}, floats);
+}
+static void add_overflow(container_writer *w)
+{
+    container_add(w, "x", CONTAINER_F32, 2, (size_t[]){SIZE_MAX / 2, 2}, floats);
+}
 static void add_nothing(container_writer *w) { container_add(w, "x", CONTAINER_F32, 1, (size_t[]){1}, NULL); }
 static void add_large_small(container_writer *w)
 {
-    container_add_small(w, "x", CONTAINER_U8, 65, "0123456789012345678901234567890123456789012345678901234567890123456789");
+    container_add_small(w, "x", CONTAINER_U8, 65,
+                        "0123456789012345678901234567890123456789012345678901234567890123456789");
 }
 
 static void add_twice(container_writer *w)
@@ -363,7 +420,7 @@ static void misuse(void **state)
     container_writer_free(&w);
 }
 
-/* ---- when memory, disk or rights run out -------------------------------------------------------------------------------------- */
+/* ---- when memory, disk or rights run out ---- */
 
 static void no_memory(void **state)
 {
@@ -397,7 +454,10 @@ static void unwritable_places(void **state)
     (void)state;
     container_writer w = {0};
     fill(&w);
-    const struct { const char *path; gbt_status status; } rows[] = {
+    const struct {
+        const char *path;
+        gbt_status status;
+    } rows[] = {
         {"/proc/nothing/a.gbt", GBT_ERR_IO},
         {"/nonexistent folder/a.gbt", GBT_ERR_IO},
         {"/dev/null/a.gbt", GBT_ERR_IO},
@@ -464,7 +524,10 @@ static void full_disk_keeps_the_old_file(void **state)
 
 int main(void)
 {
-    enum { FORGED = sizeof forged_cases / sizeof *forged_cases, MISUSE = sizeof misuse_cases / sizeof *misuse_cases };
+    enum {
+        FORGED = sizeof forged_cases / sizeof *forged_cases,
+        MISUSE = sizeof misuse_cases / sizeof *misuse_cases
+    };
     static char names[FORGED + MISUSE][80];
     struct CMUnitTest tests[13 + FORGED + MISUSE] = {
         cmocka_unit_test(round_trip_in_memory),
@@ -484,11 +547,13 @@ int main(void)
     size_t count = 13;
     for (size_t i = 0; i < FORGED; i++, count++) {
         snprintf(names[i], sizeof names[i], "forged: %s", forged_cases[i].name);
-        tests[count] = (struct CMUnitTest){.name = names[i], .test_func = forged, .initial_state = &forged_cases[i]};
+        tests[count] =
+            (struct CMUnitTest){.name = names[i], .test_func = forged, .initial_state = &forged_cases[i]};
     }
     for (size_t i = 0; i < MISUSE; i++, count++) {
         snprintf(names[FORGED + i], sizeof names[0], "misuse: %s", misuse_cases[i].name);
-        tests[count] = (struct CMUnitTest){.name = names[FORGED + i], .test_func = misuse, .initial_state = &misuse_cases[i]};
+        tests[count] = (struct CMUnitTest){
+            .name = names[FORGED + i], .test_func = misuse, .initial_state = &misuse_cases[i]};
     }
     return _cmocka_run_group_tests("container", tests, count, make_test_folder, remove_test_folder);
 }

@@ -1,4 +1,6 @@
-/* tests/io/test_model_code.c -- small model files: what comes back, how far it is from what went in, and what damage does. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/io/test_model_code.c -- small model files: what comes back, how far it is from what went in, and what
+   damage does. */
 #include <math.h>
 
 #include "anchor/decode.h"
@@ -20,8 +22,13 @@ static void fill(float *values, size_t count, uint64_t stream, float scale)
 
 static void make_model(model *m, size_t count, int offset_count, bool has_distance)
 {
-    *m = (model){.anchors.offset_count = offset_count, .origin = {5, -4, 1}, .voxel_size = 0.02f, .extent = 3, .t_near = 0.01f,
-                 .data_folder = "nowhere", .config = "seed = 1\n"};
+    *m = (model){.anchors.offset_count = offset_count,
+                 .origin = {5, -4, 1},
+                 .voxel_size = 0.02f,
+                 .extent = 3,
+                 .t_near = 0.01f,
+                 .data_folder = "nowhere",
+                 .config = "seed = 1\n"};
     assert_ok(anchors_resize(&m->anchors, count, NULL));
     fill(m->anchors.position, count * 3, 1, 5);
     fill(m->anchors.feature, count * ANCHOR_FEATURE_DIM, 2, 1);
@@ -36,7 +43,8 @@ static void make_model(model *m, size_t count, int offset_count, bool has_distan
             m->anchor_pixel[i] = i % 7 == 0 ? 0 : 0.01f * (1 + rng_uniform(7, 5, i));
     }
     assert_ok(decoder_init(&m->decoder, offset_count, has_distance, 9, NULL));
-    m->decoder.distance_scale = 0.25f, m->decoder.distance_max = INFINITY;
+    m->decoder.distance_scale = 0.25f;
+    m->decoder.distance_max = INFINITY;
 }
 
 /* The same steps on every machine; model_steps_at() goes through the C library's functions. */
@@ -54,9 +62,10 @@ static void make_steps(model_steps *s, size_t count, bool with_doublings)
         s->doubling[i] = (uint8_t)(rng_uniform(7, 8, i) * 3);
 }
 
-/* ---- what comes back ---------------------------------------------------------------------------------------------------------- */
+/* ---- what comes back ---- */
 
-/* Every anchor of the small model next to the one that it was made of: nearest position, then nearest features. */
+/* Every anchor of the small model next to the one that it was made of: nearest position, then nearest
+   features. */
 static size_t find_anchor(const model *m, const model *small, size_t i, double cell)
 {
     size_t best = SIZE_MAX;
@@ -64,15 +73,18 @@ static size_t find_anchor(const model *m, const model *small, size_t i, double c
     for (size_t j = 0; j < m->anchors.count; j++) {
         double apart = 0;
         for (size_t k = 0; k < 3; k++)
-            apart = fmax(apart, fabs((double)m->anchors.position[3 * j + k] - (double)small->anchors.position[3 * i + k]));
+            apart = fmax(apart, fabs((double)m->anchors.position[3 * j + k] -
+                                     (double)small->anchors.position[3 * i + k]));
         if (apart > 0.501 * cell + 1e-5)
             continue;
         double sum = 0;
         for (size_t k = 0; k < ANCHOR_FEATURE_DIM; k++)
             sum += fabs((double)m->anchors.feature[j * ANCHOR_FEATURE_DIM + k] -
                         (double)small->anchors.feature[i * ANCHOR_FEATURE_DIM + k]);
-        if (sum < least)
-            least = sum, best = j;
+        if (sum < least) {
+            least = sum;
+            best = j;
+        }
     }
     return best;
 }
@@ -82,7 +94,8 @@ static void check_row(const float *from, const float *to, const float *steps, si
     for (size_t c = 0; c < width; c++) {
         const double apart = fabs((double)from[c] - (double)to[c]);
         if (apart > 0.50001 * (double)steps[c] * (1 << doubling) + 1e-6)
-            fail_msg("channel %d is %g away, of a step of %g", (int)c, apart, (double)steps[c] * (1 << doubling));
+            fail_msg("channel %d is %g away, of a step of %g", (int)c, apart,
+                     (double)steps[c] * (1 << doubling));
     }
 }
 
@@ -94,9 +107,14 @@ typedef struct shape_case {
 } shape_case;
 
 static shape_case shape_cases[] = {
-    {"K = 2, pixels, steps of every anchor", 900, 2, true, true}, {"K = 10", 200, 10, false, true}, {"K = 16", 50, 16, true, false},
-    {"K = 1", 300, 1, false, false},                              {"2 anchors", 2, 2, true, true},  {"1 anchor", 1, 3, true, true},
-    {"no anchor", 0, 2, true, true},                              {"K = 5", 100, 5, true, true},
+    {"K = 2, pixels, steps of every anchor", 900, 2, true, true},
+    {"K = 10", 200, 10, false, true},
+    {"K = 16", 50, 16, true, false},
+    {"K = 1", 300, 1, false, false},
+    {"2 anchors", 2, 2, true, true},
+    {"1 anchor", 1, 3, true, true},
+    {"no anchor", 0, 2, true, true},
+    {"K = 5", 100, 5, true, true},
 };
 
 static void rounded_by_half_a_step(void **state)
@@ -118,8 +136,8 @@ static void rounded_by_half_a_step(void **state)
         const size_t j = find_anchor(&m, &back, i, steps.position);
         assert_true(j != SIZE_MAX);
         const int d = row->with_doublings ? steps.doubling[j] : 0;
-        check_row(m.anchors.feature + j * ANCHOR_FEATURE_DIM, back.anchors.feature + i * ANCHOR_FEATURE_DIM, steps.feature,
-                  ANCHOR_FEATURE_DIM, d);
+        check_row(m.anchors.feature + j * ANCHOR_FEATURE_DIM, back.anchors.feature + i * ANCHOR_FEATURE_DIM,
+                  steps.feature, ANCHOR_FEATURE_DIM, d);
         check_row(m.anchors.offset + j * k3, back.anchors.offset + i * k3, steps.offset, k3, d);
         check_row(m.anchors.scale_log + j * 6, back.anchors.scale_log + i * 6, steps.scale_log, 6, d);
         if (row->has_distance && m.anchor_pixel[j] > 0)
@@ -128,8 +146,10 @@ static void rounded_by_half_a_step(void **state)
             assert_true(back.anchor_pixel[i] == 0);
     }
     for (size_t i = 0; i < m.decoder.param_count; i++)
-        assert_true(fabs((double)back.decoder.params[i] - (double)m.decoder.params[i]) <= fabs((double)m.decoder.params[i]) / 2048 + 1e-7);
-    size_t parts = sizes.positions + sizes.features + sizes.offsets + sizes.scales + sizes.pixels + sizes.steps + sizes.networks;
+        assert_true(fabs((double)back.decoder.params[i] - (double)m.decoder.params[i]) <=
+                    fabs((double)m.decoder.params[i]) / 2048 + 1e-7);
+    size_t parts = sizes.positions + sizes.features + sizes.offsets + sizes.scales + sizes.pixels +
+                   sizes.steps + sizes.networks;
     assert_true(parts < sizes.total && sizes.total < parts + 3000);
     unsigned char *bytes;
     size_t byte_count;
@@ -146,8 +166,11 @@ static void lossless_keeps_bits_and_order(void **state)
     const shape_case *row = *state;
     model m, back;
     make_model(&m, row->count, row->offset_count, row->has_distance);
-    if (row->count > 0)
-        m.anchors.feature[0] = -0.0f, m.anchors.offset[0] = 1e-42f, m.anchors.position[0] = 3e38f;
+    if (row->count > 0) {
+        m.anchors.feature[0] = -0.0f;
+        m.anchors.offset[0] = 1e-42f;
+        m.anchors.position[0] = 3e38f;
+    }
     assert_ok(model_save(test_path("plain.gbt"), &m, NULL));
     assert_ok(model_save_coded(test_path("small.gbt"), &m, NULL, NULL, NULL));
     assert_ok(model_load(test_path("small.gbt"), &back, NULL));
@@ -168,13 +191,17 @@ static void odd_models(void **state)
         make_steps(&steps, 200, true);
         for (size_t i = 0; i < 600; i++) {
             float *p = &m.anchors.position[i];
-            *p = kind == 0 ? *p * 1e30f : kind == 1 ? *p * 1e-30f : kind == 2 ? 1.5f : kind == 3 ? (float)(i % 3) : kind == 4 &&
-                 i == 7 ? 1e7f : *p;
+            *p = kind == 0             ? *p * 1e30f
+                 : kind == 1           ? *p * 1e-30f
+                 : kind == 2           ? 1.5f
+                 : kind == 3           ? (float)(i % 3)
+                 : kind == 4 && i == 7 ? 1e7f
+                                       : *p;
         }
         if (kind == 5) {
             memset(m.anchors.feature, 0, 200 * ANCHOR_FEATURE_DIM * sizeof(float));
-            m.anchors.offset[5] = 1e30f, m.anchors.scale_log[3] = -1e20f, m.decoder.params[2] = 1e9f, m.anchor_pixel[1] = 1e-45f,
-                m.anchor_pixel[2] = 3e38f;
+            m.anchors.offset[5] = 1e30f, m.anchors.scale_log[3] = -1e20f, m.decoder.params[2] = 1e9f,
+            m.anchor_pixel[1] = 1e-45f, m.anchor_pixel[2] = 3e38f;
         }
         assert_ok(model_save_coded(test_path("small.gbt"), &m, &steps, NULL, NULL));
         assert_ok(model_load(test_path("small.gbt"), &back, NULL));
@@ -184,7 +211,8 @@ static void odd_models(void **state)
         assert_ok(model_load(test_path("small.gbt"), &twice, NULL));
         assert_int_equal(twice.anchors.count, 200);
         if (kind != 5)
-            assert_memory_equal(back.anchors.feature, twice.anchors.feature, sizeof(float)); /* multiples of a step stay */
+            assert_memory_equal(back.anchors.feature, twice.anchors.feature, sizeof(float)); /* multiples of a
+                                                                                                step stay */
         model_steps_free(&steps);
         model_free(&m);
         model_free(&back);
@@ -192,7 +220,7 @@ static void odd_models(void **state)
     }
 }
 
-/* ---- the format --------------------------------------------------------------------------------------------------------------- */
+/* ---- the format ---- */
 
 static uint64_t hash(uint64_t h, const void *bytes, size_t count)
 {
@@ -212,7 +240,8 @@ static uint64_t hash_model(const model *m)
     return hash(h, m->decoder.params, m->decoder.param_count * 4);
 }
 
-/* Files that exist must stay readable: if these change, the format has, and needs a new number of its form. */
+/* Files that exist must stay readable: if these change, the format has, and needs a new number of its
+   form. */
 #define GOLDEN_BYTES UINT64_C(0x73319de7b7e4a132)
 #define GOLDEN_VALUES UINT64_C(0x7dba4383d3e276be)
 
@@ -237,7 +266,8 @@ static void the_format_has_not_changed(void **state)
     model_free(&back);
 }
 
-/* Every section but the texts is needed, and no bit of the coded ones may change without a message: checksums are made right again. */
+/* Every section but the texts is needed, and no bit of the coded ones may change without a message: checksums
+   are made right again. */
 static void damage(void **state)
 {
     (void)state;
@@ -262,7 +292,8 @@ static void damage(void **state)
                     assert_non_null(spoiled);
                     memcpy(spoiled, s.data, s.byte_count);
                     const size_t at = (size_t)(rng_uniform(5, 2, round) * (float)s.byte_count);
-                    spoiled[at < s.byte_count ? at : 0] ^= (unsigned char)(1u << (int)(rng_uniform(5, 3, round) * 8));
+                    spoiled[at < s.byte_count ? at : 0] ^=
+                        (unsigned char)(1u << (int)(rng_uniform(5, 3, round) * 8));
                     if (chosen == 3 && round % 4 == 0)
                         s.dims[0] = at; /* cut short */
                     s.data = spoiled;
@@ -283,7 +314,8 @@ static void damage(void **state)
             } else {
                 refused++;
                 assert_int_equal(status, GBT_ERR_FORMAT);
-                assert_true(strncmp(err.text, "damaged.gbt: section ", 21) == 0 && strchr(err.text, '\n') == NULL);
+                assert_true(strncmp(err.text, "damaged.gbt: section ", 21) == 0 &&
+                            strchr(err.text, '\n') == NULL);
             }
             container_free(&damaged);
             mem_free(bytes);
@@ -301,7 +333,11 @@ static void damage(void **state)
 static void forged_shapes(void **state)
 {
     (void)state;
-    const struct { int place; uint32_t value; const char *message; } rows[] = {
+    const struct {
+        int place;
+        uint32_t value;
+        const char *message;
+    } rows[] = {
         {0, 3, "section coded.shape: coded by another version of gbtrace (wanted form 1 or 2, got 3)"},
         {1, UINT32_MAX, "section coded.shape: 4294967295 anchors cannot be in"},
         {2, 0, "section coded.shape: 0 offsets per anchor"},
@@ -355,7 +391,7 @@ static void no_memory(void **state)
     model_free(&m);
 }
 
-/* ---- steps -------------------------------------------------------------------------------------------------------------------- */
+/* ---- steps ---- */
 
 static void decode_from(const model *m, gaussians *out)
 {
@@ -363,7 +399,8 @@ static void decode_from(const model *m, gaussians *out)
     uint32_t visible[1000];
     for (uint32_t i = 0; i < m->anchors.count; i++)
         visible[i] = i;
-    assert_ok(decode_forward(&m->anchors, &m->decoder, (float[3]){1, 2, 9}, visible, m->anchors.count, 0, out, &tape, NULL));
+    assert_ok(decode_forward(&m->anchors, &m->decoder, (float[3]){1, 2, 9}, visible, m->anchors.count, 0, out,
+                             &tape, NULL));
     decode_tape_free(&tape);
 }
 
@@ -388,12 +425,15 @@ static void turned_features_decode_the_same(void **state)
         assert_true(fabsf(before.scale_x[i] - after.scale_x[i]) < 1e-4f);
     }
     double last = INFINITY;
-    for (size_t c = 0; c < ANCHOR_FEATURE_DIM; c++) { /* uncorrelated, variances falling, mean 0; noise counts the same everywhere */
+    for (size_t c = 0; c < ANCHOR_FEATURE_DIM; c++) { /* uncorrelated, variances falling, mean 0; noise counts
+                                                         the same everywhere */
         double square = 0, product = 0, sum = 0;
         for (size_t i = 0; i < 600; i++) {
             const double x = (double)m.anchors.feature[i * ANCHOR_FEATURE_DIM + c],
-                y = (double)m.anchors.feature[i * ANCHOR_FEATURE_DIM + (c + 1) % ANCHOR_FEATURE_DIM];
-            sum += x, square += x * x, product += x * y;
+                         y = (double)m.anchors.feature[i * ANCHOR_FEATURE_DIM + (c + 1) % ANCHOR_FEATURE_DIM];
+            sum += x;
+            square += x * x;
+            product += x * y;
         }
         assert_true(fabs(sum) < 1e-3 * 600 && square <= last * 1.000001 && fabs(product) < 1e-4 * 600);
         last = square;
@@ -401,7 +441,8 @@ static void turned_features_decode_the_same(void **state)
             assert_true(s.feature[c][d] == (c == d ? s.feature[0][0] : 0));
     }
     assert_true(last < 1e-6 * 600); /* one direction was told by another */
-    gaussians_free(&before), gaussians_free(&after);
+    gaussians_free(&before);
+    gaussians_free(&after);
     model_sensitivity_free(&s);
     model_free(&m);
 }
@@ -423,13 +464,16 @@ static void steps_follow_quality(void **state)
     assert_ok(model_steps_at(&m, &s, 40, &coarse, NULL));
     assert_ok(model_steps_at(&m, &s, 60, &fine, NULL));
     for (size_t c = 0; c < ANCHOR_FEATURE_DIM; c++)
-        assert_true(fabs((double)coarse.feature[c] / (double)fine.feature[c] - 10) < 1e-3 || coarse.feature[c] >= 0.99f);
+        assert_true(fabs((double)coarse.feature[c] / (double)fine.feature[c] - 10) < 1e-3 ||
+                    coarse.feature[c] >= 0.99f);
     assert_int_equal(model_steps_at(&m, &s, 0, &fine, NULL), GBT_ERR_ARGUMENT);
     assert_int_equal(model_steps_at(&m, &s, NAN, &fine, NULL), GBT_ERR_ARGUMENT);
     s.count--;
     assert_int_equal(model_steps_at(&m, &s, 40, &fine, NULL), GBT_ERR_ARGUMENT);
-    model_steps_free(&coarse), model_steps_free(&fine);
-    model_sensitivity_free(&s), model_sensitivity_free(&one);
+    model_steps_free(&coarse);
+    model_steps_free(&fine);
+    model_sensitivity_free(&s);
+    model_sensitivity_free(&one);
     model_free(&m);
 }
 
@@ -448,7 +492,8 @@ static void steps_of_anchors(void **state)
     assert_ok(model_steps_at(&m, &s, 50, &steps, NULL));
     for (size_t c = 0; c < ANCHOR_FEATURE_DIM; c++)
         assert_true(steps.feature[c] > 0 && isfinite(steps.feature[c]));
-    assert_true(steps.position > 0 && isfinite(steps.position) && steps.offset[5] > 0 && steps.scale_log[5] > 0);
+    assert_true(steps.position > 0 && isfinite(steps.position) && steps.offset[5] > 0 &&
+                steps.scale_log[5] > 0);
     model_steps_free(&steps);
     model_sensitivity_free(&s);
     assert_ok(model_sensitivity_start(&s, 4, NULL));
@@ -458,7 +503,8 @@ static void steps_of_anchors(void **state)
     model_sensitivity_end(&s);
     assert_true(fabs(s.feature[3][7] - (4 + 1 + 0.25) / 4 / 100) < 1e-9);
     assert_ok(model_steps_at(&m, &s, 50, &steps, NULL));
-    const int wanted[] = {0, 0, 1, 2}; /* sqrt(5.25 / 4) = 1.15 is the mean: 0.57, 1.15, 2.3, at most 4 of a step */
+    const int wanted[] = {0, 0, 1, 2}; /* sqrt(5.25 / 4) = 1.15 is the mean: 0.57, 1.15, 2.3, at most 4 of a
+                                          step */
     for (size_t i = 0; i < 4; i++)
         assert_int_equal(steps.doubling[i], wanted[i]);
     model_steps_free(&steps);
@@ -472,16 +518,23 @@ int main(void)
     enum { SHAPES = sizeof shape_cases / sizeof *shape_cases, SINGLE = 8 };
     static char names[2 * SHAPES][96];
     struct CMUnitTest tests[SINGLE + 2 * SHAPES] = {
-        cmocka_unit_test(odd_models), cmocka_unit_test(the_format_has_not_changed), cmocka_unit_test(damage),
-            cmocka_unit_test(forged_shapes),
-        cmocka_unit_test(no_memory), cmocka_unit_test(turned_features_decode_the_same), cmocka_unit_test(steps_follow_quality),
+        cmocka_unit_test(odd_models),
+        cmocka_unit_test(the_format_has_not_changed),
+        cmocka_unit_test(damage),
+        cmocka_unit_test(forged_shapes),
+        cmocka_unit_test(no_memory),
+        cmocka_unit_test(turned_features_decode_the_same),
+        cmocka_unit_test(steps_follow_quality),
         cmocka_unit_test(steps_of_anchors),
     };
     size_t count = SINGLE;
     for (size_t i = 0; i < 2 * SHAPES; i++, count++) {
-        snprintf(names[i], sizeof names[i], "%s: %s", i % 2 ? "lossless" : "rounded by half a step", shape_cases[i / 2].name);
-        tests[count] = (struct CMUnitTest){.name = names[i], .test_func = i % 2 ? lossless_keeps_bits_and_order : rounded_by_half_a_step,
-                                           .initial_state = &shape_cases[i / 2]};
+        snprintf(names[i], sizeof names[i], "%s: %s", i % 2 ? "lossless" : "rounded by half a step",
+                 shape_cases[i / 2].name);
+        tests[count] =
+            (struct CMUnitTest){.name = names[i],
+                                .test_func = i % 2 ? lossless_keeps_bits_and_order : rounded_by_half_a_step,
+                                .initial_state = &shape_cases[i / 2]};
     }
     return cmocka_run_group_tests(tests, make_test_folder, remove_test_folder);
 }

@@ -1,4 +1,6 @@
-/* tests/io/test_model_file.c -- a model survives the file bit for bit; a damaged or impossible one is refused with its section. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/io/test_model_file.c -- a model survives the file bit for bit; a damaged or impossible one is refused
+   with its section. */
 #include <math.h>
 
 #include "base/file.h"
@@ -15,8 +17,14 @@ static void fill_values(float *values, size_t count, uint64_t stream)
 
 static void make_model(model *m, size_t count, int offset_count, bool has_distance)
 {
-    *m = (model){.anchors.offset_count = offset_count, .origin = {5e5, -4.5e6, 0.1}, .voxel_size = 0.02f, .extent = 3.5f,
-                 .background = {0.0f, 0.5f, 1.0f}, .t_near = 0.01f, .data_folder = "photos/some folder", .config = "seed = 1\ninit = gb\n",
+    *m = (model){.anchors.offset_count = offset_count,
+                 .origin = {5e5, -4.5e6, 0.1},
+                 .voxel_size = 0.02f,
+                 .extent = 3.5f,
+                 .background = {0.0f, 0.5f, 1.0f},
+                 .t_near = 0.01f,
+                 .data_folder = "photos/some folder",
+                 .config = "seed = 1\ninit = gb\n",
                  .iterations = UINT64_C(1) << 40};
     assert_ok(anchors_resize(&m->anchors, count, NULL));
     fill_values(m->anchors.position, count * 3, 1);
@@ -29,7 +37,9 @@ static void make_model(model *m, size_t count, int offset_count, bool has_distan
             m->anchor_pixel[i] = rng_uniform(7, 5, i);
     }
     assert_ok(decoder_init(&m->decoder, offset_count, has_distance, 9, NULL));
-    m->decoder.distance_scale = 0.25f, m->decoder.distance_min = 0.5f, m->decoder.distance_max = INFINITY;
+    m->decoder.distance_scale = 0.25f;
+    m->decoder.distance_min = 0.5f;
+    m->decoder.distance_max = INFINITY;
 }
 
 static void check_same(const model *a, const model *b)
@@ -102,7 +112,7 @@ static void same_model_same_bytes(void **state)
     model_free(&back);
 }
 
-/* ---- models that must not be saved, and files with good checksums that must not be loaded -------------------------------------- */
+/* ---- models that must not be saved, and files with good checksums that must not be loaded ---- */
 
 static void spoil_position(model *m) { m->anchors.position[5] = NAN; }
 static void spoil_feature(model *m) { m->anchors.feature[0] = INFINITY; }
@@ -132,14 +142,16 @@ static spoil_case spoil_cases[] = {
     {"scale", spoil_scale, "section anchor.scale_log: value 17 is not finite"},
     {"decoder weights", spoil_params, "section decoder.params: value"},
     {"too few weights", spoil_param_count, "section decoder.params does not fit 10 offsets per anchor"},
-    {"weights of another network", spoil_has_distance, "section decoder.params does not fit 10 offsets per anchor"},
+    {"weights of another network", spoil_has_distance,
+     "section decoder.params does not fit 10 offsets per anchor"},
     {"origin", spoil_origin, "section scene.origin: value 2 is not finite"},
     {"voxel size", spoil_voxel, "section scene.numbers: a length is negative"},
     {"extent", spoil_extent, "section scene.numbers: value 0 is not finite"},
     {"near", spoil_near, "section scene.numbers: value 0 is not finite"},
     {"background", spoil_background, "section scene.numbers: value 1 is not finite"},
     {"distance scale", spoil_distance_scale, "section decoder.numbers: value 0 is not finite"},
-    {"distance range", spoil_distance_max, "section decoder.numbers: the trained range of distances is not a number"},
+    {"distance range", spoil_distance_max,
+     "section decoder.numbers: the trained range of distances is not a number"},
 };
 
 static void spoiled(void **state)
@@ -187,7 +199,8 @@ static void every_section_is_needed(void **state)
             for (size_t i = 0; i < whole.count; i++) {
                 const container_section *s = &whole.sections[i];
                 if (i != left_out)
-                    container_add(&w, s->name, s->dtype, s->dim_count, s->dims, s->data != NULL ? s->data : s->small);
+                    container_add(&w, s->name, s->dtype, s->dim_count, s->dims,
+                                  s->data != NULL ? s->data : s->small);
                 else if (empty == 1)
                     container_add(&w, s->name, s->dtype, 1, (size_t[]){0}, NULL);
             }
@@ -208,7 +221,10 @@ static void shapes_that_disagree(void **state)
 {
     (void)state;
     const float zeros[17 * 3 * 4] = {0};
-    const struct { size_t positions, features, offsets, k; const char *message; } rows[] = {
+    const struct {
+        size_t positions, features, offsets, k;
+        const char *message;
+    } rows[] = {
         {4, 3, 4, 1, "section anchor.feature has another shape (wanted f32[4][32], got f32[3][32])"},
         {3, 3, 4, 1, "section anchor.offset has another shape (wanted f32[3][*][3], got f32[4][1][3])"},
         {1, 1, 1, 0, "section anchor.offset: bad number of offsets per anchor (wanted 1 to 16, got 0)"},
@@ -218,7 +234,8 @@ static void shapes_that_disagree(void **state)
         container_writer w = {0};
         container_add(&w, "anchor.position", CONTAINER_F32, 2, (size_t[]){rows[i].positions, 3}, zeros);
         container_add(&w, "anchor.feature", CONTAINER_F32, 2, (size_t[]){rows[i].features, 32}, zeros);
-        container_add(&w, "anchor.offset", CONTAINER_F32, 3, (size_t[]){rows[i].offsets, rows[i].k, 3}, zeros);
+        container_add(&w, "anchor.offset", CONTAINER_F32, 3, (size_t[]){rows[i].offsets, rows[i].k, 3},
+                      zeros);
         container_add(&w, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){rows[i].positions, 6}, zeros);
         assert_ok(container_save(&w, test_path("odd.gbt"), NULL));
         container_writer_free(&w);
@@ -275,7 +292,8 @@ static void no_memory(void **state)
             assert_int_equal(status, GBT_ERR_NO_MEMORY);
             assert_int_not_equal(err.text[0], '\0');
         } else {
-            assert_true(n >= 9); /* 5 growing sections lists or image, file, sections, 4 arrays, weights: at least these */
+            assert_true(n >= 9); /* 5 growing sections lists or image, file, sections, 4 arrays, weights: at
+                                    least these */
             check_same(&m, &back);
         }
         if (saved)
@@ -310,19 +328,28 @@ static void missing_file(void **state)
 
 int main(void)
 {
-    enum { SHAPES = sizeof shape_cases / sizeof *shape_cases, SPOILS = sizeof spoil_cases / sizeof *spoil_cases };
+    enum {
+        SHAPES = sizeof shape_cases / sizeof *shape_cases,
+        SPOILS = sizeof spoil_cases / sizeof *spoil_cases
+    };
     static char names[SPOILS][80];
     struct CMUnitTest tests[7 + SHAPES + SPOILS] = {
-        cmocka_unit_test(same_model_same_bytes), cmocka_unit_test(every_section_is_needed), cmocka_unit_test(shapes_that_disagree),
-        cmocka_unit_test(every_flipped_byte_is_found), cmocka_unit_test(no_memory), cmocka_unit_test(texts_up_to_their_size),
+        cmocka_unit_test(same_model_same_bytes),
+        cmocka_unit_test(every_section_is_needed),
+        cmocka_unit_test(shapes_that_disagree),
+        cmocka_unit_test(every_flipped_byte_is_found),
+        cmocka_unit_test(no_memory),
+        cmocka_unit_test(texts_up_to_their_size),
         cmocka_unit_test(missing_file),
     };
     size_t count = 7;
     for (size_t i = 0; i < SHAPES; i++)
-        tests[count++] = (struct CMUnitTest){.name = shape_cases[i].name, .test_func = round_trip, .initial_state = &shape_cases[i]};
+        tests[count++] = (struct CMUnitTest){
+            .name = shape_cases[i].name, .test_func = round_trip, .initial_state = &shape_cases[i]};
     for (size_t i = 0; i < SPOILS; i++) {
         snprintf(names[i], sizeof names[i], "spoiled: %s", spoil_cases[i].name);
-        tests[count++] = (struct CMUnitTest){.name = names[i], .test_func = spoiled, .initial_state = &spoil_cases[i]};
+        tests[count++] =
+            (struct CMUnitTest){.name = names[i], .test_func = spoiled, .initial_state = &spoil_cases[i]};
     }
     return _cmocka_run_group_tests("model_file", tests, count, make_test_folder, remove_test_folder);
 }

@@ -1,4 +1,6 @@
-/* tests/io/test_range_coder.c -- what is written is read again, in no more bits than theory says; any bytes are read without harm. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/io/test_range_coder.c -- what is written is read again, in no more bits than theory says; any bytes
+   are read without harm. */
 #include <math.h>
 
 #include "base/memory.h"
@@ -33,9 +35,10 @@ static void end(range_coder *written, range_coder *reader)
     coder_free(written);
 }
 
-/* ---- bits --------------------------------------------------------------------------------------------------------------------- */
+/* ---- bits ---- */
 
-/* Probability and bit of step i of the given kind: sure bits, surprises, and long runs that push carries through bytes of 255. */
+/* Probability and bit of step i of the given kind: sure bits, surprises, and long runs that push carries
+   through bytes of 255. */
 static int bit_at(int kind, uint64_t i, uint32_t *p)
 {
     const uint32_t r = random_bits(10 + (uint64_t)kind, i);
@@ -85,11 +88,12 @@ static void carries_through_long_runs(void **state)
     }
 }
 
-/* ---- integers ----------------------------------------------------------------------------------------------------------------- */
+/* ---- integers ---- */
 
 static int32_t int_at(uint64_t i)
 {
-    static const int32_t edges[] = {0, 1, -1, 2, -2, 14, 15, -15, 16, 32767, -32768, CODER_INT_MAX, -CODER_INT_MAX, CODER_INT_MAX - 1};
+    static const int32_t edges[] = {
+        0, 1, -1, 2, -2, 14, 15, -15, 16, 32767, -32768, CODER_INT_MAX, -CODER_INT_MAX, CODER_INT_MAX - 1};
     if (i < sizeof edges / sizeof *edges)
         return edges[i];
     const int32_t size = (int32_t)(random_bits(1, i) & 0x3FFFFFFF) >> (random_bits(2, i) % 31);
@@ -105,12 +109,16 @@ static int32_t code_int_at(range_coder *c, int_models *m, uint64_t i, int32_t va
 {
     if (i % 5 == 4)
         return coder_int_alone(c, &m->alone, value);
-    return coder_int(c, (coder_int_model *const[CODER_INPUTS]){&m->a[i % 4], &m->b[i % 3], &m->c[i % 2]}, &m->mixer, value);
+    return coder_int(c, (coder_int_model *const[CODER_INPUTS]){&m->a[i % 4], &m->b[i % 3], &m->c[i % 2]},
+                     &m->mixer, value);
 }
 
 static void start_ints(int_models *m)
 {
-    coder_ints_start(m->a, 4), coder_ints_start(m->b, 3), coder_ints_start(m->c, 2), coder_ints_start(&m->alone, 1);
+    coder_ints_start(m->a, 4);
+    coder_ints_start(m->b, 3);
+    coder_ints_start(m->c, 2);
+    coder_ints_start(&m->alone, 1);
     coder_mixers_start(m->mixer.bin, CODER_INT_BINS);
 }
 
@@ -130,7 +138,7 @@ static void integers_come_back(void **state)
     end(&w, &r);
 }
 
-/* ---- how many bits ------------------------------------------------------------------------------------------------------------ */
+/* ---- how many bits ---- */
 
 static void a_coin_costs_its_entropy(void **state)
 {
@@ -146,7 +154,8 @@ static void a_coin_costs_its_entropy(void **state)
         for (int i = 0; i < count; i++) {
             const int bit = (double)random_bits(40 + k, (uint64_t)i) < chances[k] * 4294967296.0;
             coder_adaptive(&w, &m, bit);
-            bits -= log2(bit ? chances[k] : 1 - chances[k]); /* the best a coder that knows the chance can do with this sequence */
+            bits -= log2(bit ? chances[k] : 1 - chances[k]); /* the best a coder that knows the chance can do
+                                                                with this sequence */
         }
         assert_ok(coder_write_end(&w, NULL));
         const double excess = 8 * (double)w.size / bits - 1;
@@ -173,8 +182,9 @@ static void integers_cost_their_entropy(void **state)
         for (uint64_t i = 0; i < (uint64_t)count; i++) {
             const double t = spreads[k];
             const double u = ((double)random_bits(50 + k, i) + 0.5) / 4294967296.0,
-                v = ((double)random_bits(60 + k, i) + 0.5) / 4294967296.0;
-            const int n = (int)floor(log(u) / log(t)) - (int)floor(log(v) / log(t)); /* the difference of two geometric numbers */
+                         v = ((double)random_bits(60 + k, i) + 0.5) / 4294967296.0;
+            const int n = (int)floor(log(u) / log(t)) -
+                          (int)floor(log(v) / log(t)); /* the difference of two geometric numbers */
             coder_int(&w, (coder_int_model *const[CODER_INPUTS]){&m[0], &m[1], &m[2]}, &mixer, n);
             bits -= log2((1 - t) / (1 + t)) + abs(n) * log2(t);
         }
@@ -186,7 +196,7 @@ static void integers_cost_their_entropy(void **state)
     }
 }
 
-/* ---- any bytes ---------------------------------------------------------------------------------------------------------------- */
+/* ---- any bytes ---- */
 
 static void any_bytes_are_read(void **state)
 {
@@ -206,14 +216,15 @@ static void any_bytes_are_read(void **state)
             assert_true(value >= -CODER_INT_MAX && value <= CODER_INT_MAX);
         }
         uint64_t cells[50];
-        const gbt_status status = positions_code(&r, (int)(round % (POSITION_LEVELS_MAX + 1)), cells, 50, NULL);
+        const gbt_status status =
+            positions_code(&r, (int)(round % (POSITION_LEVELS_MAX + 1)), cells, 50, NULL);
         assert_true(status == GBT_OK || status == GBT_ERR_FORMAT);
         assert_true(r.at <= size);
         free(bytes);
     }
 }
 
-/* ---- positions ---------------------------------------------------------------------------------------------------------------- */
+/* ---- positions ---- */
 
 static int by_code(const void *a, const void *b)
 {
@@ -231,7 +242,8 @@ static void cells_come_back(void **state)
         const size_t count = round < 3 ? (size_t)round : 1 + random_bits(80, round) % MOST;
         const uint64_t most = levels == 0 ? 1 : UINT64_C(1) << (3 * levels);
         for (uint64_t i = 0; i < count; i++) {
-            const uint64_t any = (uint64_t)random_bits(81 + round, 2 * i) << 32 | random_bits(81 + round, 2 * i + 1);
+            const uint64_t any =
+                (uint64_t)random_bits(81 + round, 2 * i) << 32 | random_bits(81 + round, 2 * i + 1);
             codes[i] = (round % 2 == 0 ? any : any % 1000 + most / 2) % most; /* all over, and crowded */
         }
         qsort(codes, count, sizeof *codes, by_code);
@@ -260,7 +272,8 @@ static void points_are_in_their_cells(void **state)
                 float middle[3];
                 position_middle(&grid, position_cell(&grid, points + i), middle);
                 for (size_t k = 0; k < 3; k++) /* half a cell, and what float32 rounds away */
-                    assert_true(fabs((double)middle[k] - (double)points[i + k]) <= 0.5001 * (double)grid.cell + 2e-7 * (double)sides[s]);
+                    assert_true(fabs((double)middle[k] - (double)points[i + k]) <=
+                                0.5001 * (double)grid.cell + 2e-7 * (double)sides[s]);
             }
             if (grid.levels < POSITION_LEVELS_MAX)
                 assert_true((double)grid.cell <= (double)sides[s] * part * 1.000001);
@@ -276,7 +289,7 @@ static void points_are_in_their_cells(void **state)
     assert_int_equal(cell[2], 0);
 }
 
-/* ---- floats ------------------------------------------------------------------------------------------------------------------- */
+/* ---- floats ---- */
 
 static void floats_come_back(void **state)
 {
@@ -302,8 +315,10 @@ static void halves_are_nearest(void **state)
     for (uint32_t h = 0; h < 0x10000; h++)
         if ((h & 0x7C00) != 0x7C00)
             assert_int_equal(half_from_float(float_from_half((uint16_t)h)), h);
-    for (uint32_t h = 0; h < 0x7BFF; h++) { /* between two halves: the even one in the middle, else the nearer */
-        const float low = float_from_half((uint16_t)h), high = float_from_half((uint16_t)(h + 1)), middle = 0.5f * (low + high);
+    for (uint32_t h = 0; h < 0x7BFF; h++) { /* between two halves: the even one in the middle, else the nearer
+                                             */
+        const float low = float_from_half((uint16_t)h), high = float_from_half((uint16_t)(h + 1)),
+                    middle = 0.5f * (low + high);
         assert_int_equal(half_from_float(middle), h & 1 ? h + 1 : h);
         assert_int_equal(half_from_float(nextafterf(middle, 0)), h);
         assert_int_equal(half_from_float(nextafterf(middle, 1e9f)), h + 1);
@@ -311,15 +326,22 @@ static void halves_are_nearest(void **state)
     }
     assert_int_equal(half_from_float(1e30f), 0x7BFF);
     assert_int_equal(half_from_float(-65520.0f), 0xFBFF);
-    assert_true(float_from_half(0x3C00) == 1.0f && float_from_half(0x0001) == 0x1p-24f && float_from_half(0xC000) == -2.0f);
+    assert_true(float_from_half(0x3C00) == 1.0f && float_from_half(0x0001) == 0x1p-24f &&
+                float_from_half(0xC000) == -2.0f);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bits_come_back), cmocka_unit_test(carries_through_long_runs), cmocka_unit_test(integers_come_back),
-        cmocka_unit_test(a_coin_costs_its_entropy), cmocka_unit_test(integers_cost_their_entropy), cmocka_unit_test(any_bytes_are_read),
-        cmocka_unit_test(cells_come_back), cmocka_unit_test(points_are_in_their_cells), cmocka_unit_test(floats_come_back),
+        cmocka_unit_test(bits_come_back),
+        cmocka_unit_test(carries_through_long_runs),
+        cmocka_unit_test(integers_come_back),
+        cmocka_unit_test(a_coin_costs_its_entropy),
+        cmocka_unit_test(integers_cost_their_entropy),
+        cmocka_unit_test(any_bytes_are_read),
+        cmocka_unit_test(cells_come_back),
+        cmocka_unit_test(points_are_in_their_cells),
+        cmocka_unit_test(floats_come_back),
         cmocka_unit_test(halves_are_nearest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,5 +1,6 @@
-/* tests/io/test_scaffold_file.c -- models of Scaffold-GS: written here by the description of the format, evaluated here in double by its
-   equations, and read and decoded by ours. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/io/test_scaffold_file.c -- models of Scaffold-GS: written here by the description of the format,
+   evaluated here in double by its equations, and read and decoded by ours. */
 #include "io_support.h"
 
 #include "anchor/decode.h"
@@ -17,7 +18,8 @@ typedef struct layer {
 
 /* What the files say. */
 static struct {
-    double position[ANCHORS][3], offset[ANCHORS][OFFSETS][3], feature[ANCHORS][FEATURES], scale_log[ANCHORS][6];
+    double position[ANCHORS][3], offset[ANCHORS][OFFSETS][3], feature[ANCHORS][FEATURES],
+        scale_log[ANCHORS][6];
     layer first[3], second[3];
 } scaffold;
 
@@ -32,7 +34,8 @@ static double draw(double size)
 
 static void draw_layer(layer *l, size_t in, size_t out)
 {
-    l->in = in, l->out = out;
+    l->in = in;
+    l->out = out;
     for (size_t i = 0; i < in * out; i++)
         l->weight[i] = draw(0.4);
     for (size_t i = 0; i < out; i++)
@@ -60,7 +63,7 @@ static void draw_model(unsigned with_distance)
     }
 }
 
-/* ---- files --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- files ---- */
 
 static void save(sink *s, const char *name)
 {
@@ -84,7 +87,8 @@ static void write_anchors(void)
     char line[96];
     snprintf(line, sizeof line, "ply\nformat binary_little_endian 1.0\nelement vertex %d\n", ANCHORS + 1);
     sink_put_text(&s, line);
-    sink_put_text(&s, "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\n");
+    sink_put_text(&s, "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty "
+                      "float ny\nproperty float nz\n");
     put_stem(&s, "f_offset_", 3 * OFFSETS);
     put_stem(&s, "f_anchor_feat_", FEATURES);
     sink_put_text(&s, "property float opacity\n");
@@ -94,7 +98,8 @@ static void write_anchors(void)
     for (size_t row = 0; row <= ANCHORS; row++) {
         const size_t a = row < ANCHORS ? row : 0;
         for (size_t k = 0; k < 3; k++)
-            sink_put_f32(&s, row < ANCHORS ? (float)scaffold.position[a][k] : NAN); /* the last is of no use */
+            sink_put_f32(&s, row < ANCHORS ? (float)scaffold.position[a][k] : NAN); /* the last is of no use
+                                                                                     */
         for (size_t k = 0; k < 3; k++)
             sink_put_f32(&s, 0);
         for (size_t k = 0; k < 3; k++) /* all x, all y, all z */
@@ -123,14 +128,15 @@ static void write_network(size_t n)
     const layer *l1 = &scaffold.first[n], *l2 = &scaffold.second[n];
     const size_t sizes[] = {4 * l2->out, 4 * l1->in * l1->out, 4 * l1->out, 4 * l2->in * l2->out};
     char header[1024], name[64];
-    const int length = snprintf(header, sizeof header,
-                                "{\"__metadata__\":{\"format\":\"pt\"},\"0.weight\":{\"dtype\":\"F32\",\"shape\":[%zu,%zu],\"data_offsets\":[%zu,%zu]},"
-                                "\"0.bias\":{\"dtype\":\"F32\",\"shape\":[%zu],\"data_offsets\":[%zu,%zu]},"
-                                "\"2.weight\":{\"dtype\":\"F32\",\"shape\":[%zu,%zu],\"data_offsets\":[%zu,%zu]},"
-                                "\"2.bias\":{\"dtype\":\"F32\",\"shape\":[%zu],\"data_offsets\":[0,%zu]}}   ",
-                                l1->out, l1->in, sizes[0], sizes[0] + sizes[1], l1->out, sizes[0] + sizes[1],
-                                sizes[0] + sizes[1] + sizes[2], l2->out, l2->in, sizes[0] + sizes[1] + sizes[2],
-                                sizes[0] + sizes[1] + sizes[2] + sizes[3], l2->out, sizes[0]);
+    const int length =
+        snprintf(header, sizeof header,
+                 "{\"__metadata__\":{\"format\":\"pt\"},\"0.weight\":{\"dtype\":\"F32\",\"shape\":[%zu,%zu],"
+                 "\"data_offsets\":[%zu,%zu]},\"0.bias\":{\"dtype\":\"F32\",\"shape\":[%zu],\"data_offsets\":"
+                 "[%zu,%zu]},\"2.weight\":{\"dtype\":\"F32\",\"shape\":[%zu,%zu],\"data_offsets\":[%zu,%zu]},"
+                 "\"2.bias\":{\"dtype\":\"F32\",\"shape\":[%zu],\"data_offsets\":[0,%zu]}}   ",
+                 l1->out, l1->in, sizes[0], sizes[0] + sizes[1], l1->out, sizes[0] + sizes[1],
+                 sizes[0] + sizes[1] + sizes[2], l2->out, l2->in, sizes[0] + sizes[1] + sizes[2],
+                 sizes[0] + sizes[1] + sizes[2] + sizes[3], l2->out, sizes[0]);
     sink s = {0};
     sink_put_uint(&s, (uint64_t)length, 8);
     sink_put_text(&s, header);
@@ -150,12 +156,9 @@ static void write_model(unsigned with_distance)
         write_network(n);
 }
 
-/* ---- the equations ------------------------------------------------------------------------------------------------------------------- */
+/* ---- the equations ---- */
 
-static double sigmoid(double x)
-{
-    return 1 / (1 + exp(-x));
-}
+static double sigmoid(double x) { return 1 / (1 + exp(-x)); }
 
 static void evaluate(size_t n, const double *input, double *out)
 {
@@ -173,8 +176,8 @@ static void evaluate(size_t n, const double *input, double *out)
     }
 }
 
-/* Gaussians of anchor `a` seen from `camera`: mean 3, scale 3, quaternion 4, opacity, colour 3; returns how many have an opacity above
-   0. */
+/* Gaussians of anchor `a` seen from `camera`: mean 3, scale 3, quaternion 4, opacity, colour 3; returns how
+   many have an opacity above 0. */
 static size_t decode(size_t a, const double camera[3], double out[OFFSETS][14])
 {
     double input[FEATURES + 4], d[3], opacity[70], shape[70], color[70];
@@ -237,12 +240,15 @@ static void decodes_to_the_same_gaussians(void **state)
             const size_t kept = decode(a, camera, want);
             for (size_t i = 0; i < kept; i++, at++) {
                 assert_true(at < g.count);
-                const float got[14] = {g.mean_x[at], g.mean_y[at], g.mean_z[at], g.scale_x[at], g.scale_y[at], g.scale_z[at], g.quat_w[at],
-                                       g.quat_x[at], g.quat_y[at], g.quat_z[at], g.opacity[at], g.red[at], g.green[at], g.blue[at]};
+                const float got[14] = {g.mean_x[at],  g.mean_y[at],  g.mean_z[at],  g.scale_x[at],
+                                       g.scale_y[at], g.scale_z[at], g.quat_w[at],  g.quat_x[at],
+                                       g.quat_y[at],  g.quat_z[at],  g.opacity[at], g.red[at],
+                                       g.green[at],   g.blue[at]};
                 for (size_t k = 0; k < 14; k++) {
                     const double value = (double)got[k] + (k < 3 ? m.origin[k] : 0);
                     if (!(fabs(value - want[i][k]) < 2e-5))
-                        fail_msg("anchor %zu, Gaussian %zu, value %zu: %g, not %g", a, i, k, value, want[i][k]);
+                        fail_msg("anchor %zu, Gaussian %zu, value %zu: %g, not %g", a, i, k, value,
+                                 want[i][k]);
                 }
             }
         }
@@ -254,7 +260,7 @@ static void decodes_to_the_same_gaussians(void **state)
     }
 }
 
-/* ---- what is wrong ------------------------------------------------------------------------------------------------------------------- */
+/* ---- what is wrong ---- */
 
 static void refused(const char *says, gbt_status status)
 {
@@ -302,16 +308,18 @@ static void says_what_is_wrong(void **state)
     scaffold.second[2].bias[3] = (double)NAN;
     write_network(2);
     refused("array 2.bias: value 3 is not finite", GBT_ERR_FORMAT);
-    write_text("point_cloud.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
-                                  "z\nend_header\n1 2 3\n");
+    write_text("point_cloud.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+                                  "y\nproperty float z\nend_header\n1 2 3\n");
     refused("no number f_anchor_feat_0 (wanted anchors of Scaffold-GS)", GBT_ERR_FORMAT);
 }
 
-/* Cut off or flipped anywhere, a file of arrays is refused in one line, or read with values that are finite. */
+/* Cut off or flipped anywhere, a file of arrays is refused in one line, or read with values that are
+   finite. */
 static void damaged_arrays(void **state)
 {
     (void)state;
-    static const char header[] = "{\"a\":{\"dtype\":\"F32\",\"shape\":[2,2],\"data_offsets\":[0,16]},\"b\":{\"dtype\":\"F32\",\"shape\":[1],\"data_offsets\":[16,20]}}";
+    static const char header[] = "{\"a\":{\"dtype\":\"F32\",\"shape\":[2,2],\"data_offsets\":[0,16]},\"b\":{"
+                                 "\"dtype\":\"F32\",\"shape\":[1],\"data_offsets\":[16,20]}}";
     sink s = {0};
     sink_put_uint(&s, sizeof header - 1, 8);
     sink_put_text(&s, header);
@@ -330,7 +338,8 @@ static void damaged_arrays(void **state)
             assert_true((status == GBT_OK) == (err.text[0] == '\0') && strchr(err.text, '\n') == NULL);
             for (size_t i = 0; status == GBT_OK && i < t.rows * t.columns; i++)
                 assert_true(isfinite(t.values[i]));
-            taken += status == GBT_OK, refusals += status == GBT_ERR_FORMAT;
+            taken += status == GBT_OK;
+            refusals += status == GBT_ERR_FORMAT;
             mem_free(t.values);
             free(copy);
         }

@@ -1,4 +1,6 @@
-/* tests/library/double_scene.h -- what a camera sees, in double from end to end: lens, colours or networks, footprint, ray, blending. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/library/double_scene.h -- what a camera sees, in double from end to end: lens, colours or networks,
+   footprint, ray, blending. */
 #ifndef GBT_TESTS_LIBRARY_DOUBLE_SCENE_H
 #define GBT_TESTS_LIBRARY_DOUBLE_SCENE_H
 
@@ -13,15 +15,16 @@
 
 enum { FIELDS = GAUSSIANS_FIELD_COUNT };
 
-/* Plain Gaussians as their user has them, in double: one array, in the order mean, scale_log, quat, opacity, sh. */
+/* Plain Gaussians as their user has them, in double: one array, in the order mean, scale_log, quat, opacity,
+   sh. */
 enum { PLAIN_FLOATS = 3 + 3 + 4 + 1 + 3 * GAUSSIAN_SH_COUNT };
 
 typedef struct double_scene {
-    size_t count;             /* Gaussians */
-    int functions;            /* of the harmonics; 0: networks */
-    double *plain;            /* [count][PLAIN_FLOATS] */
+    size_t count;  /* Gaussians */
+    int functions; /* of the harmonics; 0: networks */
+    double *plain; /* [count][PLAIN_FLOATS] */
     decode_ref *networks;
-    const uint32_t *anchors;  /* all of them */
+    const uint32_t *anchors; /* all of them */
     const float *anchor_pixel;
     trace_settings settings;
     double footprint;
@@ -35,7 +38,8 @@ static inline double legendre(int l, int m, double x)
         p *= -(2 * i - 1) * sqrt(1 - x * x);
     for (int n = m + 1; n <= l; n++) {
         const double next = ((2 * n - 1) * x * p - (n + m - 1) * before) / (n - m);
-        before = p, p = next;
+        before = p;
+        p = next;
     }
     return p;
 }
@@ -59,7 +63,9 @@ static inline void see_plain(const double_scene *s, size_t i, const double eye[3
     const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     dvec_normalize(d);
     for (int k = 0; k < 3; k++) {
-        out[k] = g[k], out[3 + k] = exp(g[3 + k]), out[11 + k] = 0.5;
+        out[k] = g[k];
+        out[3 + k] = exp(g[3 + k]);
+        out[11 + k] = 0.5;
         for (int f = 0; f < s->functions; f++)
             out[11 + k] += sh[3 * f + k] * harmonic(f, d);
         out[11 + k] = fmax(out[11 + k], 0);
@@ -84,7 +90,8 @@ static inline reference_scene seen_from(const double_scene *s, const gbt_camera 
             see_plain(s, i, eye, fields);
         if (s->footprint > 0) {
             memcpy(&wide, fields, sizeof wide);
-            const double least = s->anchor_pixel != NULL ? (double)s->anchor_pixel[i / (size_t)s->networks->offset_count] : 0;
+            const double least =
+                s->anchor_pixel != NULL ? (double)s->anchor_pixel[i / (size_t)s->networks->offset_count] : 0;
             footprint_widen(&view, s->footprint, least, &wide);
             memcpy(fields, &wide, sizeof wide);
         }
@@ -102,7 +109,8 @@ static inline void pixel_ray(const gbt_camera *camera, size_t i, double origin[3
 }
 
 /* sum of weight . rgb over all pixels; `rgb` is optional, [height][width][3]. */
-static inline double double_loss(const double_scene *s, const gbt_camera *camera, const float *weight, double *rgb)
+static inline double double_loss(const double_scene *s, const gbt_camera *camera, const float *weight,
+                                 double *rgb)
 {
     double eye[3] = {0, 0, 0}, origin[3], dir[3], loss = 0;
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
@@ -117,8 +125,10 @@ static inline double double_loss(const double_scene *s, const gbt_camera *camera
     for (size_t i = 0; i < pixels; i++) {
         double clear = 1, color[3] = {0, 0, 0};
         pixel_ray(camera, i, origin, dir);
-        assert_ok(reference_scene_ray_hits(&scene, &s->settings, origin, dir, &hits, &count, &capacity, NULL));
-        for (size_t h = 0; h < count && clear * (1 - hits[h].alpha) >= (double)s->settings.transmittance_min; h++) {
+        assert_ok(
+            reference_scene_ray_hits(&scene, &s->settings, origin, dir, &hits, &count, &capacity, NULL));
+        for (size_t h = 0; h < count && clear * (1 - hits[h].alpha) >= (double)s->settings.transmittance_min;
+             h++) {
             for (size_t k = 0; k < 3; k++)
                 color[k] += clear * hits[h].alpha * scene.fields[(11 + k) * s->count + hits[h].id];
             clear *= 1 - hits[h].alpha;

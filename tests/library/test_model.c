@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/library/test_model.c -- models in memory: what is refused, what can be asked, where pictures go. */
 #include "test_support.h"
 
@@ -14,11 +15,19 @@ static float opacity[COUNT] = {1, 0.25f}, sh[3 * COUNT] = {1.7724539f, 1.7724539
 
 static gbt_gaussians two(void)
 {
-    return (gbt_gaussians){.count = COUNT, .sh_degree = 0, .mean = mean, .scale_log = scale_log, .quat = quat, .opacity = opacity,
+    return (gbt_gaussians){.count = COUNT,
+                           .sh_degree = 0,
+                           .mean = mean,
+                           .scale_log = scale_log,
+                           .quat = quat,
+                           .opacity = opacity,
                            .sh = sh};
 }
 
-static const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = W, .height = H, .params = {12, 12, 4.5, 3.5},
+static const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE,
+                                  .width = W,
+                                  .height = H,
+                                  .params = {12, 12, 4.5, 3.5},
                                   .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 
 static gbt_model *made(void)
@@ -43,8 +52,13 @@ static void what_cannot_be_opened(void **state)
     const int file = mkstemps(path, 4);
     assert_int_equal(write(file, "ply\nno\n", 7), 7);
     close(file);
-    const struct { const char *path; gbt_status status; } rows[] = {
-        {"/nowhere/run", GBT_ERR_IO}, {"/tmp", GBT_ERR_IO}, {path, GBT_ERR_FORMAT}, {"/nowhere/scene.spz", GBT_ERR_IO}};
+    const struct {
+        const char *path;
+        gbt_status status;
+    } rows[] = {{"/nowhere/run", GBT_ERR_IO},
+                {"/tmp", GBT_ERR_IO},
+                {path, GBT_ERR_FORMAT},
+                {"/nowhere/scene.spz", GBT_ERR_IO}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         gbt_error err = {0};
         gbt_model *model = (gbt_model *)&err;
@@ -58,23 +72,29 @@ static void what_cannot_be_opened(void **state)
 static void gaussians_that_are_refused(void **state)
 {
     (void)state;
-    static float bad_mean[3 * COUNT] = {0, NAN}, bad_scale[3 * COUNT] = {0, 0, 0, 31}, bad_quat[4 * COUNT] = {1};
+    static float bad_mean[3 * COUNT] = {0, NAN}, bad_scale[3 * COUNT] = {0, 0, 0, 31},
+                              bad_quat[4 * COUNT] = {1};
     static float bad_opacity[COUNT] = {0, 1.5f}, bad_sh[3 * COUNT] = {INFINITY};
-    const struct { gbt_gaussians g; const char *says; } rows[] = {
-        {{0, 0, mean, scale_log, quat, opacity, sh}, "0 (wanted 1"}, {{COUNT, 4, mean, scale_log, quat, opacity, sh}, "sh_degree 4"},
-        {{COUNT, 0, bad_mean, scale_log, quat, opacity, sh}, "mean of Gaussian 0 is nan"},
-        {{COUNT, 0, mean, bad_scale, quat, opacity, sh}, "scale_log of Gaussian 1 is 31"},
-        {{COUNT, 0, mean, scale_log, bad_quat, opacity, sh}, "quat of Gaussian 1 has length 0"},
-        {{COUNT, 0, mean, scale_log, quat, bad_opacity, sh}, "opacity of Gaussian 1 is 1.5"},
-        {{COUNT, 0, mean, scale_log, quat, opacity, bad_sh}, "sh of Gaussian 0 is inf"},
-        {{COUNT, 0, mean, scale_log, quat, NULL, sh}, "opacity is NULL"}};
+    const struct {
+        gbt_gaussians g;
+        const char *says;
+    } rows[] = {{{0, 0, mean, scale_log, quat, opacity, sh}, "0 (wanted 1"},
+                {{COUNT, 4, mean, scale_log, quat, opacity, sh}, "sh_degree 4"},
+                {{COUNT, 0, bad_mean, scale_log, quat, opacity, sh}, "mean of Gaussian 0 is nan"},
+                {{COUNT, 0, mean, bad_scale, quat, opacity, sh}, "scale_log of Gaussian 1 is 31"},
+                {{COUNT, 0, mean, scale_log, bad_quat, opacity, sh}, "quat of Gaussian 1 has length 0"},
+                {{COUNT, 0, mean, scale_log, quat, bad_opacity, sh}, "opacity of Gaussian 1 is 1.5"},
+                {{COUNT, 0, mean, scale_log, quat, opacity, bad_sh}, "sh of Gaussian 0 is inf"},
+                {{COUNT, 0, mean, scale_log, quat, NULL, sh}, "opacity is NULL"}};
     gbt_model *kept = made();
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         gbt_error err = {0}, again = {0};
         gbt_model *model;
-        assert_refused(gbt_model_from_gaussians(&rows[i].g, &model, &err), &err, GBT_ERR_ARGUMENT, rows[i].says);
+        assert_refused(gbt_model_from_gaussians(&rows[i].g, &model, &err), &err, GBT_ERR_ARGUMENT,
+                       rows[i].says);
         assert_null(model);
-        assert_refused(gbt_model_set_gaussians(kept, &rows[i].g, &again), &again, GBT_ERR_ARGUMENT, rows[i].says);
+        assert_refused(gbt_model_set_gaussians(kept, &rows[i].g, &again), &again, GBT_ERR_ARGUMENT,
+                       rows[i].says);
         assert_int_equal(gbt_model_get_info(kept).gaussians, COUNT);
     }
     gbt_model_close(kept);
@@ -107,8 +127,14 @@ static void settings_are_checked(void **state)
     gbt_model_settings rows[8];
     for (int i = 0; i < 8; i++)
         rows[i] = fine;
-    rows[0].background[2] = NAN, rows[1].footprint = 5, rows[2].t_near = -1, rows[3].alpha_min = 0, rows[4].alpha_max = 1;
-    rows[5].transmittance_min = NAN, rows[6].footprint = NAN, rows[7].t_near = INFINITY;
+    rows[0].background[2] = NAN;
+    rows[1].footprint = 5;
+    rows[2].t_near = -1;
+    rows[3].alpha_min = 0;
+    rows[4].alpha_max = 1;
+    rows[5].transmittance_min = NAN;
+    rows[6].footprint = NAN;
+    rows[7].t_near = INFINITY;
     for (int i = 0; i < 8; i++) {
         gbt_error err = {0};
         assert_refused(gbt_model_set_settings(model, &rows[i], &err), &err, GBT_ERR_ARGUMENT, "settings:");
@@ -127,23 +153,28 @@ static void pictures_go_where_they_should(void **state)
     for (int keep = 0; keep < 2; keep++) {
         gbt_model *model = made();
         gbt_model_settings settings = gbt_model_get_settings(model);
-        settings.background[0] = 0.5f, settings.footprint = 0;
+        settings.background[0] = 0.5f;
+        settings.footprint = 0;
         assert_ok(gbt_model_set_settings(model, &settings, NULL));
         for (int i = 0; i < 3 * PIXELS + 2 * MARGIN; i++)
             rgb[i] = -7;
         for (int i = 0; i < PIXELS + 2 * MARGIN; i++)
             depth[i] = clear[i] = -7;
-        assert_ok(gbt_model_render(model, &camera, keep, &(gbt_picture){rgb + MARGIN, depth + MARGIN, clear + MARGIN}, NULL));
+        assert_ok(gbt_model_render(model, &camera, keep,
+                                   &(gbt_picture){rgb + MARGIN, depth + MARGIN, clear + MARGIN}, NULL));
         for (int i = 0; i < 3 * PIXELS + 2 * MARGIN; i++)
             assert_true((rgb[i] == -7) == (i < MARGIN || i >= 3 * PIXELS + MARGIN));
         for (int i = 0; i < PIXELS + 2 * MARGIN; i++) {
             assert_true((depth[i] == -7) == (i < MARGIN || i >= PIXELS + MARGIN));
             assert_true((clear[i] == -7) == (i < MARGIN || i >= PIXELS + MARGIN));
         }
-        const int middle = MARGIN + PIXELS / 2; /* looks through the centre of the ball, which is white and cut at 0.99 */
+        const int middle =
+            MARGIN + PIXELS / 2; /* looks through the centre of the ball, which is white and cut at 0.99 */
         assert_true(fabsf(depth[middle] - 5) < 1e-4f && fabsf(clear[middle] - 0.01f) < 1e-5f);
-        assert_true(fabsf(rgb[MARGIN + 3 * (PIXELS / 2)] - 0.995f) < 1e-4f && fabsf(rgb[MARGIN + 3 * (PIXELS / 2) + 1] - 0.99f) < 1e-4f);
-        assert_true(rgb[MARGIN] == 0.5f && depth[MARGIN] == 0 && clear[MARGIN] == 1); /* a corner sees nothing */
+        assert_true(fabsf(rgb[MARGIN + 3 * (PIXELS / 2)] - 0.995f) < 1e-4f &&
+                    fabsf(rgb[MARGIN + 3 * (PIXELS / 2) + 1] - 0.99f) < 1e-4f);
+        assert_true(rgb[MARGIN] == 0.5f && depth[MARGIN] == 0 && clear[MARGIN] == 1); /* a corner sees nothing
+                                                                                       */
         gbt_model_close(model);
     }
 }
@@ -158,9 +189,12 @@ static void what_is_not_rendered(void **state)
     gbt_camera bad = camera;
     bad.params[0] = 0;
     gbt_error no_rgb = {0}, no_camera = {0}, not_kept = {0}, twice = {0}, nan = {0}, changed = {0};
-    assert_refused(gbt_model_render(model, &camera, 0, &(gbt_picture){0}, &no_rgb), &no_rgb, GBT_ERR_ARGUMENT, "rgb is NULL");
-    assert_refused(gbt_model_render(model, &bad, 1, &picture, &no_camera), &no_camera, GBT_ERR_ARGUMENT, "camera");
-    assert_refused(gbt_model_gradient(model, d_rgb, pose, NULL, &not_kept), &not_kept, GBT_ERR_ARGUMENT, "keep");
+    assert_refused(gbt_model_render(model, &camera, 0, &(gbt_picture){0}, &no_rgb), &no_rgb, GBT_ERR_ARGUMENT,
+                   "rgb is NULL");
+    assert_refused(gbt_model_render(model, &bad, 1, &picture, &no_camera), &no_camera, GBT_ERR_ARGUMENT,
+                   "camera");
+    assert_refused(gbt_model_gradient(model, d_rgb, pose, NULL, &not_kept), &not_kept, GBT_ERR_ARGUMENT,
+                   "keep");
     assert_ok(gbt_model_render(model, &camera, 1, &picture, NULL));
     d_rgb[4] = NAN;
     assert_refused(gbt_model_gradient(model, d_rgb, pose, NULL, &nan), &nan, GBT_ERR_ARGUMENT, "value 4");
@@ -170,7 +204,8 @@ static void what_is_not_rendered(void **state)
     assert_ok(gbt_model_render(model, &camera, 1, &picture, NULL));
     const gbt_gaussians g = two();
     assert_ok(gbt_model_set_gaussians(model, &g, NULL));
-    assert_refused(gbt_model_gradient(model, d_rgb, pose, NULL, &changed), &changed, GBT_ERR_ARGUMENT, "keep");
+    assert_refused(gbt_model_gradient(model, d_rgb, pose, NULL, &changed), &changed, GBT_ERR_ARGUMENT,
+                   "keep");
     gbt_model_close(model);
 }
 
@@ -184,9 +219,10 @@ static void gradients_point_the_right_way(void **state)
     gbt_model *model = made();
     assert_ok(gbt_model_render(model, &camera, 1, &(gbt_picture){.rgb = rgb}, NULL));
     d_rgb[3 * (3 * W + 5)] = -1; /* right of the middle wants to be brighter */
-    assert_ok(gbt_model_gradient(model, d_rgb, pose, &(gbt_gaussians_gradient){.mean = d_mean, .opacity = d_opacity}, NULL));
-    assert_true(d_mean[0] < -0.1f && pose[0] > 0.1 && pose[4] > 0.1); /* a step to the left, or a turn to the left, brings the ball to the
-                                                                         right */
+    assert_ok(gbt_model_gradient(model, d_rgb, pose,
+                                 &(gbt_gaussians_gradient){.mean = d_mean, .opacity = d_opacity}, NULL));
+    assert_true(d_mean[0] < -0.1f && pose[0] > 0.1 && pose[4] > 0.1); /* a step to the left, or a turn to the
+                                                                         left, brings the ball to the right */
     assert_true(fabs(pose[0] + (double)d_mean[0]) < 1e-4);
     assert_true(d_opacity[0] < 0 && d_opacity[1] == 0 && d_mean[3] == 0 && d_mean[5] == 0);
     gbt_model_close(model);
@@ -194,9 +230,12 @@ static void gradients_point_the_right_way(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_cannot_be_opened), cmocka_unit_test(gaussians_that_are_refused), cmocka_unit_test(what_can_be_asked),
-        cmocka_unit_test(settings_are_checked), cmocka_unit_test(pictures_go_where_they_should), cmocka_unit_test(what_is_not_rendered),
-        cmocka_unit_test(gradients_point_the_right_way)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_cannot_be_opened),
+                                       cmocka_unit_test(gaussians_that_are_refused),
+                                       cmocka_unit_test(what_can_be_asked),
+                                       cmocka_unit_test(settings_are_checked),
+                                       cmocka_unit_test(pictures_go_where_they_should),
+                                       cmocka_unit_test(what_is_not_rendered),
+                                       cmocka_unit_test(gradients_point_the_right_way)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,9 @@
-/* tests/library/test_model_gradient.c -- gradients of pictures by the pose and by plain Gaussians, against central differences in double.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/library/test_model_gradient.c -- gradients of pictures by the pose and by plain Gaussians, against
+   central differences in double.
 
-   The differences move the real camera: its rays, the eye of its colours, the footprints of its pixels, all in double (double_scene.h). */
+   The differences move the real camera: its rays, the eye of its colours, the footprints of its pixels, all
+   in double (double_scene.h). */
 #include "double_scene.h"
 
 #include <unistd.h>
@@ -13,7 +16,8 @@
 
 enum { W = 22, H = 15, VALUES = 3 * W * H, COUNT = 70, ANCHORS = 40, OFFSETS = 2 };
 
-static const double origin[3] = {20, -7.5, 3}; /* of a trained model: its cameras are not in local coordinates */
+static const double origin[3] = {20, -7.5, 3}; /* of a trained model: its cameras are not in local coordinates
+                                                */
 static const double motion_step = 1e-7;
 
 typedef struct camera_case {
@@ -24,7 +28,8 @@ typedef struct camera_case {
 
 static const camera_case cameras[] = {
     {"PINHOLE", GBT_CAMERA_PINHOLE, {20, 21, 11, 7}, 4},
-    {"PINHOLE, inside", GBT_CAMERA_PINHOLE, {14, 14, 11.5, 7}, 0.6}, /* at 0.5 a cut lies within the step of the differences */
+    {"PINHOLE, inside", GBT_CAMERA_PINHOLE, {14, 14, 11.5, 7}, 0.6}, /* at 0.5 a cut lies within the step of
+                                                                        the differences */
     {"OPENCV", GBT_CAMERA_OPENCV, {18, 18, 11, 7.5, -0.12, 0.03, 0.01, -0.02}, 4},
     {"OPENCV_FISHEYE", GBT_CAMERA_OPENCV_FISHEYE, {9, 9, 11, 7.5, 0.02, -0.01, 0.003, 0}, 2},
     {"EQUIRECTANGULAR", GBT_CAMERA_EQUIRECTANGULAR, {W, H}, 1},
@@ -32,7 +37,8 @@ static const camera_case cameras[] = {
 };
 enum { CAMERAS = sizeof cameras / sizeof *cameras, CASES = CAMERAS * 4 };
 
-/* At a turned pose, looking past the middle of the scene at `at`. Coordinates are floats: the eye is rounded to such. */
+/* At a turned pose, looking past the middle of the scene at `at`. Coordinates are floats: the eye is rounded
+   to such. */
 static gbt_camera camera_of(const camera_case *c, const double at[3])
 {
     gbt_camera camera = {.model = c->model, .width = W, .height = H};
@@ -52,7 +58,7 @@ static void make_weights(void)
         weights[i] = (float)rng_normal(7, 1, i);
 }
 
-/* ---- the two kinds of scenes ------------------------------------------------------------------------------------------------- */
+/* ---- the two kinds of scenes ---- */
 
 typedef struct world {
     gbt_model *model;
@@ -68,19 +74,31 @@ static const char *const class_names[5] = {"mean", "scale_log", "quat", "opacity
 
 static gbt_gaussians gaussians_of(const world *w)
 {
-    return (gbt_gaussians){.count = COUNT, .sh_degree = 3, .mean = w->arrays[0], .scale_log = w->arrays[1], .quat = w->arrays[2],
-                           .opacity = w->arrays[3], .sh = w->arrays[4]};
+    return (gbt_gaussians){.count = COUNT,
+                           .sh_degree = 3,
+                           .mean = w->arrays[0],
+                           .scale_log = w->arrays[1],
+                           .quat = w->arrays[2],
+                           .opacity = w->arrays[3],
+                           .sh = w->arrays[4]};
 }
 
 static void set_up(world *w, double footprint)
 {
     gbt_model_settings settings = gbt_model_get_settings(w->model);
-    settings.footprint = (float)footprint, settings.alpha_min = 1e-5f, settings.transmittance_min = 1e-6f, settings.t_near = 0.05f;
-    settings.background[0] = 0.3f, settings.background[1] = 0.1f, settings.background[2] = 0.9f;
+    settings.footprint = (float)footprint;
+    settings.alpha_min = 1e-5f;
+    settings.transmittance_min = 1e-6f;
+    settings.t_near = 0.05f;
+    settings.background[0] = 0.3f;
+    settings.background[1] = 0.1f;
+    settings.background[2] = 0.9f;
     assert_ok(gbt_model_set_settings(w->model, &settings, NULL));
     trace_settings *s = &w->exact.settings;
     *s = trace_settings_default();
-    s->alpha_min = settings.alpha_min, s->transmittance_min = settings.transmittance_min, s->t_near = settings.t_near;
+    s->alpha_min = settings.alpha_min;
+    s->transmittance_min = settings.transmittance_min;
+    s->t_near = settings.t_near;
     memcpy(s->background, settings.background, sizeof s->background);
     w->exact.footprint = (double)settings.footprint;
 }
@@ -88,7 +106,8 @@ static void set_up(world *w, double footprint)
 static void make_plain(world *w, double footprint)
 {
     memset(w, 0, sizeof *w);
-    w->exact.count = COUNT, w->exact.functions = GAUSSIAN_SH_COUNT;
+    w->exact.count = COUNT;
+    w->exact.functions = GAUSSIAN_SH_COUNT;
     w->exact.plain = mem_alloc(COUNT, PLAIN_FLOATS * sizeof(double), "test", NULL);
     for (int c = 0; c < 5; c++)
         w->arrays[c] = mem_alloc(COUNT * widths[c], sizeof(float), "test", NULL);
@@ -96,8 +115,11 @@ static void make_plain(world *w, double footprint)
         for (int c = 0; c < 5; c++)
             for (size_t k = 0; k < widths[c]; k++) {
                 const double normal = rng_normal(3, firsts[c] + k, i), uniform = (double)rng_uniform(4, 3, i);
-                const double value = c == 0 ? normal : c == 1 ? -1.6 + 0.5 * normal : c == 3 ? 0.15 + 0.8 * uniform : c == 4 ? 0.25 * normal
-                                     : normal;
+                const double value = c == 0   ? normal
+                                     : c == 1 ? -1.6 + 0.5 * normal
+                                     : c == 3 ? 0.15 + 0.8 * uniform
+                                     : c == 4 ? 0.25 * normal
+                                              : normal;
                 w->arrays[c][i * widths[c] + k] = (float)value;
                 w->exact.plain[i * PLAIN_FLOATS + firsts[c] + k] = (double)(float)value;
             }
@@ -111,12 +133,15 @@ static void make_plain(world *w, double footprint)
 static void make_neural(world *w, double footprint)
 {
     memset(w, 0, sizeof *w);
-    model m = {.voxel_size = 0.1f, .extent = 2, .t_near = 0.05f, .iterations = 11, .anchor_pixel = w->anchor_pixel};
+    model m = {
+        .voxel_size = 0.1f, .extent = 2, .t_near = 0.05f, .iterations = 11, .anchor_pixel = w->anchor_pixel};
     memcpy(m.origin, origin, sizeof origin);
     m.anchors.offset_count = OFFSETS;
     assert_ok(anchors_resize(&m.anchors, ANCHORS, NULL));
     assert_ok(decoder_init(&m.decoder, OFFSETS, true, 5, NULL));
-    m.decoder.distance_scale = 0.4f, m.decoder.distance_min = 0.2f, m.decoder.distance_max = 2.5f;
+    m.decoder.distance_scale = 0.4f;
+    m.decoder.distance_min = 0.2f;
+    m.decoder.distance_max = 2.5f;
     for (uint64_t i = 0; i < m.decoder.param_count; i++) /* a view that matters */
         m.decoder.params[i] *= 2;
     decoder_part parts[3];
@@ -124,7 +149,8 @@ static void make_neural(world *w, double footprint)
     for (size_t i = 0; i < OFFSETS; i++) /* biases of the opacities */
         m.decoder.params[parts[0].end - 1 - i] = 0.6f;
     for (uint32_t i = 0; i < ANCHORS; i++) {
-        w->all[i] = i, w->anchor_pixel[i] = i % 3 == 0 ? 0.5f : 0;
+        w->all[i] = i;
+        w->anchor_pixel[i] = i % 3 == 0 ? 0.5f : 0;
         for (uint64_t k = 0; k < 3; k++)
             m.anchors.position[3 * i + k] = (float)rng_normal(9, k, i);
         for (uint64_t k = 0; k < ANCHOR_FEATURE_DIM; k++)
@@ -145,7 +171,10 @@ static void make_neural(world *w, double footprint)
     model_free(&m);
     for (size_t i = 0; i < 3 * ANCHORS; i++) /* differences in world coordinates */
         w->networks.position[i] += origin[i % 3];
-    w->exact = (double_scene){.count = ANCHORS * OFFSETS, .networks = &w->networks, .anchors = w->all, .anchor_pixel = w->anchor_pixel};
+    w->exact = (double_scene){.count = ANCHORS * OFFSETS,
+                              .networks = &w->networks,
+                              .anchors = w->all,
+                              .anchor_pixel = w->anchor_pixel};
     set_up(w, footprint);
 }
 
@@ -158,7 +187,7 @@ static void free_world(world *w)
     decode_ref_free(&w->networks);
 }
 
-/* ---- pose -------------------------------------------------------------------------------------------------------------------- */
+/* ---- pose ---- */
 
 typedef struct pose_case {
     char name[64];
@@ -197,19 +226,22 @@ static void pose_agrees_with_differences(void **state)
         const gbt_camera there = gbt_camera_moved(&camera, motion);
         motion[k] = -motion_step;
         const gbt_camera back = gbt_camera_moved(&camera, motion);
-        wanted[k] = (double_loss(&w.exact, &there, weights, NULL) - double_loss(&w.exact, &back, weights, NULL)) / (2 * motion_step);
-        error += (got[k] - wanted[k]) * (got[k] - wanted[k]), size += wanted[k] * wanted[k];
+        wanted[k] =
+            (double_loss(&w.exact, &there, weights, NULL) - double_loss(&w.exact, &back, weights, NULL)) /
+            (2 * motion_step);
+        error += (got[k] - wanted[k]) * (got[k] - wanted[k]);
+        size += wanted[k] * wanted[k];
     }
     print_message("| %s | %.1e | %.3g | %.1e |\n", c->name, picture, sqrt(size), sqrt(error / size));
     if (!(picture < 3e-6))
         fail_msg("the pictures differ by %g", picture);
     if (!(sqrt(error / size) < 3e-5) || !(size > 1e-3))
-        fail_msg("got %g %g %g  %g %g %g, wanted %g %g %g  %g %g %g", got[0], got[1], got[2], got[3], got[4], got[5], wanted[0], wanted[1],
-                 wanted[2], wanted[3], wanted[4], wanted[5]);
+        fail_msg("got %g %g %g  %g %g %g, wanted %g %g %g  %g %g %g", got[0], got[1], got[2], got[3], got[4],
+                 got[5], wanted[0], wanted[1], wanted[2], wanted[3], wanted[4], wanted[5]);
     free_world(&w);
 }
 
-/* ---- plain Gaussians --------------------------------------------------------------------------------------------------------- */
+/* ---- plain Gaussians ---- */
 
 static void gaussians_agree_with_differences(void **state)
 {
@@ -224,34 +256,37 @@ static void gaussians_agree_with_differences(void **state)
     render_ok(&w, &camera, rgb);
     const gbt_gaussians_gradient gradient = {got[0], got[1], got[2], got[3], got[4]};
     assert_ok(gbt_model_gradient(w.model, weights, NULL, &gradient, NULL));
-    for (int class = 0; class < 5; class++)
+    for (int class = 0; class < 5; class ++)
         for (uint64_t attempt = 0; attempt < 2; attempt++) {
             double along = 0, size = 0, losses[2];
             for (int side = 0; side < 2; side++) {
                 const double step = (side == 0 ? 1 : -1) * motion_step;
                 for (size_t i = 0; i < COUNT; i++)
                     for (size_t k = 0; k < widths[class]; k++)
-                        w.exact.plain[i * PLAIN_FLOATS + firsts[class] + k] += step * rng_normal(30 + attempt, k, i);
+                        w.exact.plain[i * PLAIN_FLOATS + firsts[class] + k] +=
+                            step * rng_normal(30 + attempt, k, i);
                 losses[side] = double_loss(&w.exact, &camera, weights, NULL);
                 for (size_t i = 0; i < COUNT; i++)
                     for (size_t k = 0; k < widths[class]; k++)
-                        w.exact.plain[i * PLAIN_FLOATS + firsts[class] + k] = (double)w.arrays[class][i * widths[class] + k];
+                        w.exact.plain[i * PLAIN_FLOATS + firsts[class] + k] =
+                            (double)w.arrays[class][i * widths[class] + k];
             }
             for (size_t i = 0; i < COUNT * widths[class]; i++) {
-                along += (double)got[class][i] * rng_normal(30 + attempt, i % widths[class], i / widths[class]);
+                along +=
+                    (double)got[class][i] * rng_normal(30 + attempt, i % widths[class], i / widths[class]);
                 size += (double)got[class][i] * (double)got[class][i];
             }
             const double wanted = (losses[0] - losses[1]) / (2 * motion_step);
             if (!(fabs(along - wanted) < 3e-5 * sqrt(size)) || !(size > 1e-6))
-                fail_msg("%s along direction %d: %g, not %g (gradient of size %g)", class_names[class], (int)attempt, along, wanted,
-                         sqrt(size));
+                fail_msg("%s along direction %d: %g, not %g (gradient of size %g)", class_names[class],
+                         (int)attempt, along, wanted, sqrt(size));
         }
     for (int k = 0; k < 5; k++)
         mem_free(got[k]);
     free_world(&w);
 }
 
-/* ---- threads, memory --------------------------------------------------------------------------------------------------------- */
+/* ---- threads, memory ---- */
 
 static void threads_do_not_matter(void **state)
 {
@@ -308,15 +343,20 @@ int main(void)
     make_weights();
     for (size_t i = 0; i < CASES; i++) {
         pose_case *c = &pose_cases[i];
-        *c = (pose_case){.camera = &cameras[i % CAMERAS], .neural = i / CAMERAS % 2 == 1, .footprint = i / CAMERAS / 2 == 1 ? 0.3 : 0};
+        *c = (pose_case){.camera = &cameras[i % CAMERAS],
+                         .neural = i / CAMERAS % 2 == 1,
+                         .footprint = i / CAMERAS / 2 == 1 ? 0.3 : 0};
         snprintf(c->name, sizeof c->name, "%s | %s | %s", c->camera->name, c->neural ? "networks" : "plain",
                  c->footprint > 0 ? "0.3 px^2" : "thin");
-        tests[count++] = (struct CMUnitTest){.name = c->name, .test_func = pose_agrees_with_differences, .initial_state = c};
+        tests[count++] = (struct CMUnitTest){
+            .name = c->name, .test_func = pose_agrees_with_differences, .initial_state = c};
         if (!c->neural)
-            tests[count++] = (struct CMUnitTest){.name = c->name, .test_func = gaussians_agree_with_differences, .initial_state = c};
+            tests[count++] = (struct CMUnitTest){
+                .name = c->name, .test_func = gaussians_agree_with_differences, .initial_state = c};
     }
     tests[count++] = (struct CMUnitTest)cmocka_unit_test(threads_do_not_matter);
     tests[count++] = (struct CMUnitTest)cmocka_unit_test(no_memory_is_a_status);
-    print_message("| camera | scene | footprint | picture differs by | size of the gradient | relative error |\n");
+    print_message(
+        "| camera | scene | footprint | picture differs by | size of the gradient | relative error |\n");
     return _cmocka_run_group_tests("model_gradient", tests, count, NULL, NULL);
 }

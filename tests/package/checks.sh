@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # tests/package/checks.sh -- one line per check, for the scripts beside it and in tests/readers. check wants $work.
 passed=0
 failed=0

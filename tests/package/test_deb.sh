@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/package/test_deb.sh -- makes the Debian package and looks into it. Usage: test_deb.sh SOURCE BUILD. Needs cpack, dpkg-deb, dpkg-shlibdeps.
 set -u
 source=$1

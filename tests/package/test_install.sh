@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/package/test_install.sh -- installs into a temporary prefix and uses what is there as somebody else would.
 # Usage: test_install.sh SOURCE BUILD. Needs cmake, ninja, cc, c++, pkg-config, nm.
 set -u

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/package/test_python.sh -- the Python package in an environment of its own, around the library that was built; then its tests and its example.
 # Usage: test_python.sh SOURCE BUILD. Needs python3 with venv, and PyPI.
 set -u

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/package/test_reference.sh -- the reference of the library has no warnings, and no public function is missing. Usage: test_reference.sh SOURCE BUILD
 set -u
 source=$1

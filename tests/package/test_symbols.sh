@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/package/test_symbols.sh -- libgbtrace gives its public functions and nothing else, and nothing of the laboratory.
 # Usage: test_symbols.sh SOURCE BUILD
 set -u

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/project/test_figures.sh -- pages say what docs/figures.txt (bench/figures.py) holds. Usage: test_figures.sh PROJECT
 set -u
 cd "$1" || exit 1

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/project/test_names.sh -- files, options and commands that pages and comments name are there. Usage: test_names.sh SOURCE PROGRAM
 set -u
 cd "$1" || exit 1
@@ -19,13 +20,14 @@ done <"$work/files" | grep -v '^tests/project/' >"$work/dangling"
 [ ! -s "$work/dangling" ] && [ "$(wc -l <"$work/files")" -ge 100 ]
 report $? "files that are named are there" "$(cat "$work/dangling")"
 
-# A file says in its first line which one it is.
+# A file says in its first lines what its licence is and which file it is.
 for file in $(find src lab include -name '*.[ch]' -o -name '*.cpp'); do
     own=${file#src/} own=${own#include/}
-    case $(head -n 1 "$file") in "/* $own -- "* | "/* ${own#lab/} -- "*) ;; *) echo "$file: $(head -n 1 "$file")" ;; esac
+    case $(head -n 1 "$file") in "/* SPDX-License-Identifier: Apache-2.0 */") ;; *) echo "$file: $(head -n 1 "$file")" ;; esac
+    case $(sed -n 2p "$file") in "/* $own -- "* | "/* ${own#lab/} -- "*) ;; *) echo "$file: $(sed -n 2p "$file")" ;; esac
 done >"$work/first"
 [ ! -s "$work/first" ]
-report $? "first lines name their files" "$(cat "$work/first")"
+report $? "first lines name licence and file" "$(cat "$work/first")"
 
 # Commands and options: what stands on a page behind gbtrace COMMAND, up to a quote or the end of the line.
 "$program" describe man >"$work/man" 2>/dev/null

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/project/test_tools.sh -- plants offences that tools/check_layers.sh and tools/count_tests.awk must see. Usage: test_tools.sh SOURCE
 set -u
 source=$1

@@ -1,4 +1,6 @@
-/* tests/raster/bench_raster.c -- the rasterizer's two forms beside the tracer on one model and camera; run by hand, judged by nobody. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/raster/bench_raster.c -- the rasterizer's two forms beside the tracer on one model and camera; run by
+   hand, judged by nobody. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -39,19 +41,24 @@ static void run(bench *b, renderer which, bool back, bool tape)
             need(trace_backward(&b->traced, &s->rays, &b->d_rgb, &b->d, NULL, NULL, &err), &err);
         else {
             need(trace_build(&b->traced, s->gaussians, &s->settings, ray_image_reach(&s->rays), &err), &err);
-            need(trace_forward(&b->traced, &s->rays, tape, &(trace_outputs){.rgb = &b->rgb[which]}, NULL, &err), &err);
+            need(trace_forward(&b->traced, &s->rays, tape, &(trace_outputs){.rgb = &b->rgb[which]}, NULL,
+                               &err),
+                 &err);
         }
         return;
     }
     raster_settings settings = raster_settings_default();
-    if (which == RENDER_PER_RAY)
-        settings.form = RASTER_PER_RAY, settings.near = s->settings.t_near;
+    if (which == RENDER_PER_RAY) {
+        settings.form = RASTER_PER_RAY;
+        settings.near = s->settings.t_near;
+    }
     if (back)
         need(raster_backward(&b->raster, &b->d_rgb, &b->d, NULL, NULL, &err), &err);
     else {
         memset(&b->counters[which], 0, sizeof b->counters[which]);
-        need(raster_forward(&b->raster, s->gaussians, &s->camera.shot.camera, &settings, tape, &b->rgb[which], NULL, &b->counters[which],
-                            &err), &err);
+        need(raster_forward(&b->raster, s->gaussians, &s->camera.shot.camera, &settings, tape, &b->rgb[which],
+                            NULL, &b->counters[which], &err),
+             &err);
     }
 }
 
@@ -68,17 +75,19 @@ static void measure(bench *b, renderer which, int repeats)
         for (int back = 0; back < 2; back++) {
             const double wall_start = clock_wall(), core_start = clock_process();
             run(b, which, back, true);
-            if (i >= 0)
-                wall[back][i] = (float)(clock_wall() - wall_start), core[back][i] = (float)(clock_process() - core_start);
+            if (i >= 0) {
+                wall[back][i] = (float)(clock_wall() - wall_start);
+                core[back][i] = (float)(clock_process() - core_start);
+            }
         }
     const double pixels = (double)b->rgb[which].width * b->rgb[which].height;
     printf("%-8s", names[which]);
     for (int back = 0; back < 2; back++)
-        printf("  %s %8.2f ms %7.3f core-us/pixel", back ? "adjoint" : "forward", 1e3 * (double)middle(wall[back], repeats),
-               1e6 * (double)middle(core[back], repeats) / pixels);
+        printf("  %s %8.2f ms %7.3f core-us/pixel", back ? "adjoint" : "forward",
+               1e3 * (double)middle(wall[back], repeats), 1e6 * (double)middle(core[back], repeats) / pixels);
     const raster_counters *c = &b->counters[which];
-    printf("  drawn %llu, pairs %llu, tests %.1f, blended %.1f per pixel\n", (unsigned long long)c->drawn, (unsigned long long)c->pairs,
-           (double)c->tests / pixels, (double)c->blended / pixels);
+    printf("  drawn %llu, pairs %llu, tests %.1f, blended %.1f per pixel\n", (unsigned long long)c->drawn,
+           (unsigned long long)c->pairs, (double)c->tests / pixels, (double)c->blended / pixels);
 }
 
 int main(int argc, char **argv)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/raster/raster_support.h -- random Gaussians, cameras, and passes over them. */
 #ifndef GBT_TESTS_RASTER_SUPPORT_H
 #define GBT_TESTS_RASTER_SUPPORT_H
@@ -13,18 +14,20 @@ typedef struct cloud_def {
     const char *name;
     size_t count;
     float spread, scale_low, scale_high; /* means are normal, scales log-uniform */
-    float flatness;                      /* the x axis is divided by this, and y too for odd ids: discs and needles */
-    double camera[3];                    /* looks at the origin */
+    float flatness;   /* the x axis is divided by this, and y too for odd ids: discs and needles */
+    double camera[3]; /* looks at the origin */
     int width, height;
 } cloud_def;
 
 /* Of both forms' tests; discs and needles as flat as each can be held to. */
-#define RASTER_CLOUDS(flatness)                                                                   \
-    {"one", 1, 0.5f, 0.2f, 0.5f, 1, {0, 0.5, -4}, 40, 24},                                        \
-    {"ordinary, from outside", 400, 1, 0.05f, 0.4f, 1, {3, -2, -5}, 70, 53},                      \
-    {"ordinary, from inside", 300, 2, 0.05f, 0.4f, 1, {0.2, 0.1, -0.3}, 64, 48},                  \
-    {"discs and needles", 400, 1, 0.2f, 0.6f, flatness, {2, 1, -5}, 64, 48},                      \
-    {"one pixel", 200, 1, 0.05f, 0.5f, 1, {0, 0, -5}, 1, 1}
+#define RASTER_CLOUDS(flatness)                                                                              \
+    {"one", 1, 0.5f, 0.2f, 0.5f, 1, {0, 0.5, -4}, 40, 24},                                                   \
+        {"ordinary, from outside", 400, 1, 0.05f, 0.4f, 1, {3, -2, -5}, 70, 53},                             \
+        {"ordinary, from inside", 300, 2, 0.05f, 0.4f, 1, {0.2, 0.1, -0.3}, 64, 48},                         \
+        {"discs and needles", 400, 1, 0.2f, 0.6f, flatness, {2, 1, -5}, 64, 48},                             \
+    {                                                                                                        \
+        "one pixel", 200, 1, 0.05f, 0.5f, 1, {0, 0, -5}, 1, 1                                                \
+    }
 
 static inline void field_list(const gaussians *g, float *fields[GAUSSIANS_FIELD_COUNT])
 {
@@ -44,12 +47,16 @@ static inline gaussians make_cloud(const cloud_def *def, uint64_t seed)
         double square = 0;
         for (uint64_t k = 0; k < 3; k++) {
             f[FIELD_MEAN + k][i] = (float)((double)def->spread * rng_normal(seed, k, i));
-            f[FIELD_SCALE + k][i] = def->scale_low * powf(def->scale_high / def->scale_low, rng_uniform(seed, 3 + k, i));
+            f[FIELD_SCALE + k][i] =
+                def->scale_low * powf(def->scale_high / def->scale_low, rng_uniform(seed, 3 + k, i));
             f[FIELD_COLOR + k][i] = rng_uniform(seed, 11 + k, i);
         }
-        f[FIELD_SCALE][i] /= def->flatness, f[FIELD_SCALE + 1][i] /= i % 2 == 1 ? def->flatness : 1;
-        for (uint64_t k = 0; k < 4; k++)
-            f[FIELD_QUAT + k][i] = (float)rng_normal(seed, 6 + k, i), square += pow((double)f[FIELD_QUAT + k][i], 2);
+        f[FIELD_SCALE][i] /= def->flatness;
+        f[FIELD_SCALE + 1][i] /= i % 2 == 1 ? def->flatness : 1;
+        for (uint64_t k = 0; k < 4; k++) {
+            f[FIELD_QUAT + k][i] = (float)rng_normal(seed, 6 + k, i);
+            square += pow((double)f[FIELD_QUAT + k][i], 2);
+        }
         for (int k = 0; k < 4; k++)
             f[FIELD_QUAT + k][i] = (float)((double)f[FIELD_QUAT + k][i] / sqrt(square));
         g.opacity[i] = 0.02f + 0.98f * rng_uniform(seed, 10, i);
@@ -60,8 +67,11 @@ static inline gaussians make_cloud(const cloud_def *def, uint64_t seed)
 
 static inline gbt_camera make_camera(int width, int height, const double center[3])
 {
-    gbt_camera c = {.model = GBT_CAMERA_PINHOLE, .width = width, .height = height,
-                    .params = {0.8 * width, 0.85 * width, 0.5 * width + 0.3, 0.5 * height - 0.2}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    gbt_camera c = {.model = GBT_CAMERA_PINHOLE,
+                    .width = width,
+                    .height = height,
+                    .params = {0.8 * width, 0.85 * width, 0.5 * width + 0.3, 0.5 * height - 0.2},
+                    .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     assert_true(gbt_camera_look_at(center, (const double[3]){0, 0, 0}, (const double[3]){0.05, -1, 0.1}, &c));
     return c;
 }
@@ -83,7 +93,8 @@ static inline image random_image(int width, int height, uint64_t seed)
     return im;
 }
 
-static inline drawn draw(const gaussians *g, const gbt_camera *camera, const raster_settings *s, const image *d_rgb)
+static inline drawn draw(const gaussians *g, const gbt_camera *camera, const raster_settings *s,
+                         const image *d_rgb)
 {
     drawn out = {0};
     raster_scene scene = {0};

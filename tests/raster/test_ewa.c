@@ -1,4 +1,6 @@
-/* tests/raster/test_ewa.c -- the EWA form and its adjoint against the double reference, and the reference against differences. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/raster/test_ewa.c -- the EWA form and its adjoint against the double reference, and the reference
+   against differences. */
 #include "base/near.h"
 #include "base/parallel.h"
 #include "raster/raster_ref.h"
@@ -11,14 +13,21 @@ static const cloud_def clouds[] = {
 };
 
 /* Forms of the cuts. Backgrounds are not black, so that their gradients are seen. */
-static const struct { const char *name; float dilation, near; bool exact_cut; } forms[] = {
-    {"3DGS", 0.3f, 0.2f, false}, {"exact cut", 0.3f, 0.2f, true}, {"no dilation", 0, 0.05f, true}};
+static const struct {
+    const char *name;
+    float dilation, near;
+    bool exact_cut;
+} forms[] = {{"3DGS", 0.3f, 0.2f, false}, {"exact cut", 0.3f, 0.2f, true}, {"no dilation", 0, 0.05f, true}};
 
 static raster_settings settings_of(size_t form)
 {
     raster_settings s = raster_settings_default();
-    s.dilation = forms[form].dilation, s.near = forms[form].near, s.exact_cut = forms[form].exact_cut;
-    s.background[0] = 0.3f, s.background[1] = 0.6f, s.background[2] = 0.1f;
+    s.dilation = forms[form].dilation;
+    s.near = forms[form].near;
+    s.exact_cut = forms[form].exact_cut;
+    s.background[0] = 0.3f;
+    s.background[1] = 0.6f;
+    s.background[2] = 0.1f;
     return s;
 }
 
@@ -37,7 +46,8 @@ static void image_agrees(void **state)
             assert_ok(raster_reference_forward(&reference, &camera, &s, 1, wanted, NULL));
             drawn got = draw(&g, &camera, &s, NULL);
             const double psnr = psnr_of(got.rgb.pixels, wanted, floats);
-            print_message("%s, %s: %.1f dB, %llu pairs\n", clouds[i].name, forms[form].name, psnr, (unsigned long long)got.counters.pairs);
+            print_message("%s, %s: %.1f dB, %llu pairs\n", clouds[i].name, forms[form].name, psnr,
+                          (unsigned long long)got.counters.pairs);
             if (!(psnr >= 100))
                 fail_msg("%s, %s: %.1f dB", clouds[i].name, forms[form].name, psnr);
             drawn_free(&got);
@@ -50,9 +60,14 @@ static void image_agrees(void **state)
 /* Relative L2 error of each class of fields. */
 static void compare_gradients(const char *what, const gaussians *got, const double *wanted, double limit)
 {
-    static const struct { const char *name; int first, end; } classes[] = {
-        {"mean", FIELD_MEAN, FIELD_SCALE}, {"scale", FIELD_SCALE, FIELD_QUAT}, {"rotation", FIELD_QUAT, FIELD_OPACITY},
-        {"opacity", FIELD_OPACITY, FIELD_COLOR}, {"colour", FIELD_COLOR, GAUSSIANS_FIELD_COUNT}};
+    static const struct {
+        const char *name;
+        int first, end;
+    } classes[] = {{"mean", FIELD_MEAN, FIELD_SCALE},
+                   {"scale", FIELD_SCALE, FIELD_QUAT},
+                   {"rotation", FIELD_QUAT, FIELD_OPACITY},
+                   {"opacity", FIELD_OPACITY, FIELD_COLOR},
+                   {"colour", FIELD_COLOR, GAUSSIANS_FIELD_COUNT}};
     float *f[GAUSSIANS_FIELD_COUNT];
     field_list(got, f);
     for (size_t c = 0; c < sizeof classes / sizeof *classes; c++) {
@@ -60,7 +75,8 @@ static void compare_gradients(const char *what, const gaussians *got, const doub
         for (int k = classes[c].first; k < classes[c].end; k++)
             for (size_t i = 0; i < got->count; i++) {
                 const double want = wanted[(size_t)k * got->count + i];
-                off += pow((double)f[k][i] - want, 2), all += want * want;
+                off += pow((double)f[k][i] - want, 2);
+                all += want * want;
             }
         print_message("%s: %s %.2e\n", what, classes[c].name, sqrt(off / all));
         if (!(sqrt(off) <= limit * sqrt(all)))
@@ -78,8 +94,8 @@ static void gradients_agree(void **state)
         image d_rgb = random_image(camera.width, camera.height, i);
         const size_t floats = 3 * raster_reference_pixels(&camera, 1);
         raster_reference reference;
-        double *d = mem_alloc(floats, sizeof *d, "test", NULL), *wanted = mem_calloc(GAUSSIANS_FIELD_COUNT * g.count, sizeof *wanted,
-                                                                                     "test", NULL);
+        double *d = mem_alloc(floats, sizeof *d, "test", NULL),
+               *wanted = mem_calloc(GAUSSIANS_FIELD_COUNT * g.count, sizeof *wanted, "test", NULL);
         double d_background[3] = {0};
         for (size_t k = 0; k < floats; k++)
             d[k] = (double)d_rgb.pixels[k];
@@ -90,13 +106,16 @@ static void gradients_agree(void **state)
         for (int c = 0; c < 3; c++)
             assert_near((double)got.d_background[c], d_background[c], 1e-4 * fmax(1, fabs(d_background[c])));
         drawn_free(&got);
-        mem_free(d), mem_free(wanted), mem_free(reference.fields);
+        mem_free(d);
+        mem_free(wanted);
+        mem_free(reference.fields);
         image_free(&d_rgb);
         gaussians_free(&g);
     }
 }
 
-static double loss_of(const raster_reference *reference, const gbt_camera *camera, const raster_settings *s, const double *d, double *rgb)
+static double loss_of(const raster_reference *reference, const gbt_camera *camera, const raster_settings *s,
+                      const double *d, double *rgb)
 {
     double loss = 0;
     assert_ok(raster_reference_forward(reference, camera, s, 1, rgb, NULL));
@@ -118,21 +137,25 @@ static void move_field(raster_reference *r, int f, size_t i, double h)
         r->fields[(size_t)k * r->count + i] /= sqrt(square);
 }
 
-/* The reference's own adjoint. No cuts that jump: alpha_min is tiny, the box does not cut, and few Gaussians, so that no pixel is opaque.
-   Some are clamped in J, and some are cut at alpha_max. */
+/* The reference's own adjoint. No cuts that jump: alpha_min is tiny, the box does not cut, and few Gaussians,
+   so that no pixel is opaque. Some are clamped in J, and some are cut at alpha_max. */
 static void reference_is_its_own_derivative(void **state)
 {
     (void)state;
     const cloud_def def = {"differences", 12, 0.7f, 0.1f, 0.5f, 1, {0.3, -0.2, -1.6}, 12, 9};
     raster_settings s = settings_of(1);
-    s.alpha_min = 1e-12f, s.transmittance_min = 1e-12f, s.alpha_max = 0.9f;
+    s.alpha_min = 1e-12f;
+    s.transmittance_min = 1e-12f;
+    s.alpha_max = 0.9f;
     gaussians g = make_cloud(&def, 5);
     const gbt_camera camera = make_camera(def.width, def.height, def.camera);
     const size_t floats = 3 * raster_reference_pixels(&camera, 1), n = def.count;
     raster_reference reference;
     assert_ok(raster_reference_make(&g, &reference, NULL));
-    double *d = mem_alloc(floats, sizeof *d, "test", NULL), *rgb = mem_alloc(floats, sizeof *rgb, "test", NULL);
-    double *got = mem_calloc(GAUSSIANS_FIELD_COUNT * n, sizeof *got, "test", NULL), d_background[3] = {0}, off = 0, all = 0;
+    double *d = mem_alloc(floats, sizeof *d, "test", NULL),
+           *rgb = mem_alloc(floats, sizeof *rgb, "test", NULL);
+    double *got = mem_calloc(GAUSSIANS_FIELD_COUNT * n, sizeof *got, "test", NULL), d_background[3] = {0},
+           off = 0, all = 0;
     for (size_t k = 0; k < floats; k++)
         d[k] = rng_normal(3, 1, k);
     for (size_t i = 0; i < n; i++) /* unit to double's precision, so that moved ones are compared with it */
@@ -151,13 +174,17 @@ static void reference_is_its_own_derivative(void **state)
                     reference.fields[(size_t)k * n + i] = keep[k];
             }
             const double want = (loss[1] - loss[0]) / (2 * h), have = got[(size_t)f * n + i];
-            off += pow(have - want, 2), all += want * want;
+            off += pow(have - want, 2);
+            all += want * want;
             if (!(fabs(have - want) <= 2e-5 * fmax(1, fabs(want))))
                 fail_msg("field %d of Gaussian %zu: %.10g, differences say %.10g", f, i, have, want);
         }
     print_message("adjoint of the reference against differences: %.1e\n", sqrt(off / all));
     assert_true(sqrt(off) <= 1e-6 * sqrt(all));
-    mem_free(d), mem_free(rgb), mem_free(got), mem_free(reference.fields);
+    mem_free(d);
+    mem_free(rgb);
+    mem_free(got);
+    mem_free(reference.fields);
     gaussians_free(&g);
 }
 

@@ -1,4 +1,6 @@
-/* tests/raster/test_per_ray.c -- the per-ray form against the tracer and the tracer's double reference, forward and back. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/raster/test_per_ray.c -- the per-ray form against the tracer and the tracer's double reference,
+   forward and back. */
 #include "base/near.h"
 #include "data/gaussian_ply.h"
 #include "raster/raster_support.h"
@@ -16,7 +18,8 @@ static raster_settings settings_of(trace_settings *traced)
 {
     raster_settings s = raster_settings_default();
     *traced = trace_settings_default();
-    s.form = RASTER_PER_RAY, s.near = traced->t_near;
+    s.form = RASTER_PER_RAY;
+    s.near = traced->t_near;
     for (int c = 0; c < 3; c++)
         s.background[c] = traced->background[c] = 0.2f + 0.3f * (float)c;
     return s;
@@ -34,7 +37,8 @@ typedef struct traced {
 } traced;
 
 /* Without `d_rgb` the picture alone. */
-static traced trace_view(const gaussians *g, const gbt_camera *camera, const trace_settings *s, const image *d_rgb)
+static traced trace_view(const gaussians *g, const gbt_camera *camera, const trace_settings *s,
+                         const image *d_rgb)
 {
     traced out = {0};
     trace_scene scene = {0};
@@ -61,15 +65,18 @@ static double field_error(const gaussians *got, const gaussians *wanted, int fir
 {
     float *f[GAUSSIANS_FIELD_COUNT], *w[GAUSSIANS_FIELD_COUNT];
     double off = 0, all = 1e-30;
-    field_list(got, f), field_list(wanted, w);
+    field_list(got, f);
+    field_list(wanted, w);
     for (int k = first; k < end; k++)
-        for (size_t i = 0; i < wanted->count; i++)
-            off += pow((double)f[k][i] - (double)w[k][i], 2), all += pow((double)w[k][i], 2);
+        for (size_t i = 0; i < wanted->count; i++) {
+            off += pow((double)f[k][i] - (double)w[k][i], 2);
+            all += pow((double)w[k][i], 2);
+        }
     return sqrt(off / all);
 }
 
-/* A pixel differs by 1e-5 at most, but for those whose ray has a response, a T or two depths within rounding of a cut: those are few, and
-   `d_rgb` becomes 0 there, so that gradients can be compared. */
+/* A pixel differs by 1e-5 at most, but for those whose ray has a response, a T or two depths within rounding
+   of a cut: those are few, and `d_rgb` becomes 0 there, so that gradients can be compared. */
 static void compare_images(const char *what, const image *got, const image *wanted, image *d_rgb)
 {
     const size_t floats = 3 * (size_t)wanted->width * (size_t)wanted->height;
@@ -82,11 +89,14 @@ static void compare_images(const char *what, const image *got, const image *want
             off++;
             for (size_t c = 0; c < 3 && d_rgb != NULL; c++)
                 d_rgb->pixels[i / 3 * 3 + c] = 0;
-        } else
-            largest = fmax(largest, difference), square += difference * difference;
+        } else {
+            largest = fmax(largest, difference);
+            square += difference * difference;
+        }
     }
     const double psnr = square > 0 ? -10 * log10(square / (double)floats) : 200;
-    print_message("%s: %zu of %zu values beyond 1e-5, the others within %.1e, %.1f dB\n", what, off, floats, largest, psnr);
+    print_message("%s: %zu of %zu values beyond 1e-5, the others within %.1e, %.1f dB\n", what, off, floats,
+                  largest, psnr);
     if (!(psnr >= 100) || off > floats / 200)
         fail_msg("%s: %.1f dB, %zu values beyond 1e-5", what, psnr, off);
 }
@@ -112,13 +122,14 @@ static void agrees_with_the_tracer(void **state)
                                 field_error(&got.d, &wanted.d, FIELD_QUAT, FIELD_OPACITY),
                                 field_error(&got.d, &wanted.d, FIELD_OPACITY, FIELD_COLOR),
                                 field_error(&got.d, &wanted.d, FIELD_COLOR, GAUSSIANS_FIELD_COUNT)};
-        print_message("  gradients: mean %.1e, scale %.1e, rotation %.1e, opacity %.1e, colour %.1e\n", error[0], error[1], error[2],
-                      error[3], error[4]);
+        print_message("  gradients: mean %.1e, scale %.1e, rotation %.1e, opacity %.1e, colour %.1e\n",
+                      error[0], error[1], error[2], error[3], error[4]);
         for (size_t k = 0; k < sizeof error / sizeof *error; k++)
             if (!(error[k] <= 1e-3))
                 fail_msg("%s: gradients of class %zu off by %g", clouds[i].name, k, error[k]);
         for (int c = 0; c < 3; c++)
-            assert_near((double)got.d_background[c], (double)wanted.d_background[c], 1e-4 * fmax(1, fabs((double)wanted.d_background[c])));
+            assert_near((double)got.d_background[c], (double)wanted.d_background[c],
+                        1e-4 * fmax(1, fabs((double)wanted.d_background[c])));
         traced_free(&wanted);
         drawn_free(&got);
         image_free(&d_rgb);
@@ -126,7 +137,8 @@ static void agrees_with_the_tracer(void **state)
     }
 }
 
-/* A sheet a thousand times as wide as it is thick, seen slantwise: turning it moves its thin axis, along which float32 has few digits. */
+/* A sheet a thousand times as wide as it is thick, seen slantwise: turning it moves its thin axis, along
+   which float32 has few digits. */
 static void a_thin_sheet_keeps_its_gradients(void **state)
 {
     (void)state;
@@ -137,10 +149,13 @@ static void a_thin_sheet_keeps_its_gradients(void **state)
     double worst = 0;
     for (uint64_t seed = 0; seed < 20; seed++) {
         gaussians g = make_cloud(&def, 90 + seed);
-        g.scale_x[0] = 0.0266f, g.scale_z[0] = 4, g.opacity[0] = 0.5f;
+        g.scale_x[0] = 0.0266f;
+        g.scale_z[0] = 4;
+        g.opacity[0] = 0.5f;
         image d_rgb = random_image(camera.width, camera.height, seed);
         const size_t floats = 3 * (size_t)camera.width * (size_t)camera.height;
-        double *d = mem_alloc(floats, sizeof *d, "test", NULL), wanted[GAUSSIANS_FIELD_COUNT] = {0}, d_background[3] = {0}, off = 0, all = 0;
+        double *d = mem_alloc(floats, sizeof *d, "test", NULL), wanted[GAUSSIANS_FIELD_COUNT] = {0},
+               d_background[3] = {0}, off = 0, all = 0;
         for (size_t i = 0; i < floats; i++)
             d[i] = (double)d_rgb.pixels[i];
         ray_image rays = {0};
@@ -149,8 +164,10 @@ static void a_thin_sheet_keeps_its_gradients(void **state)
         drawn got = draw(&g, &camera, &s, &d_rgb);
         float *f[GAUSSIANS_FIELD_COUNT];
         field_list(&got.d, f);
-        for (int k = FIELD_QUAT; k < FIELD_OPACITY; k++)
-            off += pow((double)f[k][0] - wanted[k], 2), all += pow(wanted[k], 2);
+        for (int k = FIELD_QUAT; k < FIELD_OPACITY; k++) {
+            off += pow((double)f[k][0] - wanted[k], 2);
+            all += pow(wanted[k], 2);
+        }
         worst = fmax(worst, sqrt(off / all));
         drawn_free(&got);
         mem_free(d);
@@ -177,7 +194,8 @@ static void peer_scene_agrees(void **state)
     field_list(&g, f);
     for (size_t i = 0; i < cloud.count; i++) {
         for (size_t k = 0; k < 3; k++) {
-            f[FIELD_MEAN + k][i] = cloud.mean[3 * i + k], f[FIELD_SCALE + k][i] = expf(cloud.scale_log[3 * i + k]);
+            f[FIELD_MEAN + k][i] = cloud.mean[3 * i + k];
+            f[FIELD_SCALE + k][i] = expf(cloud.scale_log[3 * i + k]);
             f[FIELD_COLOR + k][i] = fmaxf(0, 0.5f + 0.28209479f * cloud.sh[i * GAUSSIAN_SH_COUNT * 3 + k]);
         }
         for (size_t k = 0; k < 4; k++)
@@ -188,7 +206,8 @@ static void peer_scene_agrees(void **state)
     trace_settings traced_settings;
     const raster_settings s = settings_of(&traced_settings);
     gbt_camera camera = make_camera(256, 256, (const double[3]){0, -38, 9});
-    camera.params[0] = camera.params[1] = 128 / tan(19 * 3.14159265358979 / 180), camera.params[2] = camera.params[3] = 128;
+    camera.params[0] = camera.params[1] = 128 / tan(19 * 3.14159265358979 / 180);
+    camera.params[2] = camera.params[3] = 128;
     traced wanted = trace_view(&g, &camera, &traced_settings, NULL);
     drawn got = draw(&g, &camera, &s, NULL);
     compare_images("match1500", &got.rgb, &wanted.rgb, NULL);
@@ -198,7 +217,8 @@ static void peer_scene_agrees(void **state)
     gaussians_free(&g);
 }
 
-/* In the order of the centres all else is the same: with one Gaussian nothing changes, with crossing ones something does. */
+/* In the order of the centres all else is the same: with one Gaussian nothing changes, with crossing ones
+   something does. */
 static void order_by_center(void **state)
 {
     (void)state;
@@ -210,7 +230,8 @@ static void order_by_center(void **state)
         s.transmittance_min = 1e-30f; /* so that no pixel stops */
         for (size_t i = 0; i < g.count; i++)
             g.opacity[i] *= 0.3f;
-        by_center = s, by_center.order_by_center = true;
+        by_center = s;
+        by_center.order_by_center = true;
         const gbt_camera camera = make_camera(def.width, def.height, def.camera);
         image d_rgb = random_image(def.width, def.height, 1);
         drawn a = draw(&g, &camera, &s, &d_rgb), b = draw(&g, &camera, &by_center, &d_rgb);
@@ -221,7 +242,8 @@ static void order_by_center(void **state)
             assert_near((double)b.T[i], (double)a.T[i], 1e-5 * (double)a.T[i]);
         for (int c = 0; c < 3; c++)
             assert_near((double)b.d_background[c], (double)a.d_background[c], 1e-4);
-        drawn_free(&a), drawn_free(&b);
+        drawn_free(&a);
+        drawn_free(&b);
         image_free(&d_rgb);
         gaussians_free(&g);
     }

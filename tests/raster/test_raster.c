@@ -1,11 +1,16 @@
-/* tests/raster/test_raster.c -- values known by hand, what is not drawn, sizes, threads, instruction sets, failures: both forms. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/raster/test_raster.c -- values known by hand, what is not drawn, sizes, threads, instruction sets,
+   failures: both forms. */
 #include "base/near.h"
 #include "base/parallel.h"
 #include "raster/raster_support.h"
 
 static gbt_camera plain_camera(int width, int height)
 {
-    return (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = width, .height = height, .params = {100, 100, 0.5 * width, 0.5 * height},
+    return (gbt_camera){.model = GBT_CAMERA_PINHOLE,
+                        .width = width,
+                        .height = height,
+                        .params = {100, 100, 0.5 * width, 0.5 * height},
                         .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 }
 
@@ -16,8 +21,13 @@ static gaussians ball(double x, double y, double z, float opacity)
     assert_ok(gaussians_resize(&g, 1, NULL));
     gaussians_zero(&g);
     gaussians_pad(&g);
-    g.mean_x[0] = (float)x, g.mean_y[0] = (float)y, g.mean_z[0] = (float)z;
-    g.scale_x[0] = g.scale_y[0] = g.scale_z[0] = 0.1f, g.quat_w[0] = 1, g.opacity[0] = opacity, g.red[0] = 1;
+    g.mean_x[0] = (float)x;
+    g.mean_y[0] = (float)y;
+    g.mean_z[0] = (float)z;
+    g.scale_x[0] = g.scale_y[0] = g.scale_z[0] = 0.1f;
+    g.quat_w[0] = 1;
+    g.opacity[0] = opacity;
+    g.red[0] = 1;
     return g;
 }
 
@@ -38,7 +48,8 @@ static double red_at(const gaussians *g, const gbt_camera *camera, const raster_
     return red;
 }
 
-/* Variance on the image: (0.1 * 100 / 10)^2 + 0.3 = 1.3 px^2. The centre is between pixels in an image of even size. */
+/* Variance on the image: (0.1 * 100 / 10)^2 + 0.3 = 1.3 px^2. The centre is between pixels in an image of
+   even size. */
 static void one_gaussian_by_hand(void **state)
 {
     (void)state;
@@ -70,7 +81,8 @@ static void one_ray_by_hand(void **state)
     gaussians_free(&g);
 }
 
-/* The cut at 3 std-devs is by tiles: radius ceil(3 sqrt(1.3)) = 4 from pixel 16 on, so tile 0 is drawn in and tile -1 never is. */
+/* The cut at 3 std-devs is by tiles: radius ceil(3 sqrt(1.3)) = 4 from pixel 16 on, so tile 0 is drawn in and
+   tile -1 never is. */
 static void three_sigma_goes_by_tiles(void **state)
 {
     (void)state;
@@ -78,10 +90,11 @@ static void three_sigma_goes_by_tiles(void **state)
     s.alpha_min = 1e-10f;
     const gbt_camera camera = plain_camera(64, 16);
     gaussians g = ball(0, 0, 10, 1);
-    g.mean_x[0] = (float)((32.0 - 32.0 + 4.4) * 0.1); /* at pixel 35.9: 4 further is still in tile 2 on the left, 39.9 on the right */
+    g.mean_x[0] = (float)((32.0 - 32.0 + 4.4) * 0.1); /* at pixel 35.9: 4 further is still in tile 2 on the
+                                                         left, 39.9 on the right */
     assert_true(red_at(&g, &camera, &s, 32, 7) > 0);
     assert_true(red_at(&g, &camera, &s, 31, 7) > 0); /* 31.9 is in tile 1 */
-    g.mean_x[0] = (float)(4.6 * 0.1); /* at 36.1: 32.1 is in tile 2 */
+    g.mean_x[0] = (float)(4.6 * 0.1);                /* at 36.1: 32.1 is in tile 2 */
     assert_true(red_at(&g, &camera, &s, 32, 7) > 0);
     assert_true(red_at(&g, &camera, &s, 31, 7) == 0);
     s.exact_cut = true;
@@ -100,10 +113,17 @@ static void stops_before_it_is_dark(void **state)
         assert_ok(gaussians_resize(&g, 3, NULL));
         gaussians_zero(&g);
         gaussians_pad(&g);
-        for (int i = 0; i < 3; i++)
-            g.mean_z[i] = 10 + (float)i, g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 0.1f, g.quat_w[i] = 1, g.opacity[i] = 1;
-        g.red[0] = 1, g.green[1] = 1, g.red[2] = 1;
-        /* T: 1, 0.01, then 1e-4 in float is below 1e-4 or not: 0.01 (1 - 0.99) is decided by rounding, so use 2e-4 */
+        for (int i = 0; i < 3; i++) {
+            g.mean_z[i] = 10 + (float)i;
+            g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 0.1f;
+            g.quat_w[i] = 1;
+            g.opacity[i] = 1;
+        }
+        g.red[0] = 1;
+        g.green[1] = 1;
+        g.red[2] = 1;
+        /* T: 1, 0.01, then 1e-4 in float is below 1e-4 or not: 0.01 (1 - 0.99) is decided by rounding, so use
+           2e-4 */
         s.transmittance_min = 2e-4f;
         drawn got = draw(&g, &camera, &s, NULL);
         const float *p = got.rgb.pixels + 3 * (16 * 33 + 16);
@@ -123,9 +143,11 @@ typedef struct hidden_case {
 } hidden_case;
 
 static const hidden_case hidden_cases[] = {
-    {"in front", 0, 0, 10, {true, true}},           {"behind", 0, 0, -10, {false, false}},
+    {"in front", 0, 0, 10, {true, true}},
+    {"behind", 0, 0, -10, {false, false}},
     {"at the near plane", 0, 0, 0.2f, {false, true}},
-    {"just beyond it", 0, 0, 0.21, {true, true}},   {"far to the side", 90, 0, 10, {false, false}},
+    {"just beyond it", 0, 0, 0.21, {true, true}},
+    {"far to the side", 90, 0, 10, {false, false}},
     {"around the eye", 0.02, 0.02, 0, {false, true}},
     {"beside the eye, out of sight", 3, 0, 0, {false, false}},
 };
@@ -142,7 +164,8 @@ static void what_is_not_seen(void **state)
             image d_rgb = random_image(33, 33, 4);
             drawn got = draw(&g, &camera, &s, &d_rgb);
             if ((got.counters.blended > 0) != c->drawn[form])
-                fail_msg("%s, form %d: %llu blended", c->name, form, (unsigned long long)got.counters.blended);
+                fail_msg("%s, form %d: %llu blended", c->name, form,
+                         (unsigned long long)got.counters.blended);
             assert_int_equal(got.d.red[0] != 0, c->drawn[form]);
             drawn_free(&got);
             image_free(&d_rgb);
@@ -150,7 +173,8 @@ static void what_is_not_seen(void **state)
         }
 }
 
-/* Each field in turn is not a number, or infinite, or a scale is not positive: the other Gaussian is drawn as if alone. */
+/* Each field in turn is not a number, or infinite, or a scale is not positive: the other Gaussian is drawn as
+   if alone. */
 static void unusable_fields_are_not_drawn(void **state)
 {
     (void)state;
@@ -167,8 +191,13 @@ static void unusable_fields_are_not_drawn(void **state)
                 gaussians_zero(&g);
                 gaussians_pad(&g);
                 field_list(&g, fields);
-                for (int i = 0; i < 2; i++)
-                    g.mean_z[i] = 10, g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 0.3f, g.quat_w[i] = 1, g.opacity[i] = 0.5f, g.red[i] = 1;
+                for (int i = 0; i < 2; i++) {
+                    g.mean_z[i] = 10;
+                    g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 0.3f;
+                    g.quat_w[i] = 1;
+                    g.opacity[i] = 0.5f;
+                    g.red[i] = 1;
+                }
                 fields[f][0] = bad[k];
                 drawn got = draw(&g, &camera, &s, &d_rgb);
                 float *d[GAUSSIANS_FIELD_COUNT];
@@ -212,7 +241,8 @@ static void nothing_to_draw(void **state)
     }
 }
 
-/* A larger image is the smaller one with more around it: pixels outside of the small one neither count nor show. */
+/* A larger image is the smaller one with more around it: pixels outside of the small one neither count nor
+   show. */
 static void any_size(void **state)
 {
     (void)state;
@@ -224,19 +254,23 @@ static void any_size(void **state)
             raster_settings s = form_settings(form);
             s.exact_cut = true;
             gbt_camera small = make_camera(80, 80, def.camera), large = small;
-            small.width = sizes[i][0], small.height = sizes[i][1];
+            small.width = sizes[i][0];
+            small.height = sizes[i][1];
             drawn a = draw(&g, &small, &s, NULL), b = draw(&g, &large, &s, NULL);
             for (int y = 0; y < small.height; y++)
                 for (int x = 0; x < small.width; x++)
                     for (int c = 0; c < 3; c++) {
-                        /* the limits of J depend on the size of the image: not of a view as narrow as this one */
-                        const float in_small = a.rgb.pixels[3 * (y * small.width + x) + c], in_large = b.rgb.pixels[3 * (y * 80 + x) + c];
+                        /* the limits of J depend on the size of the image: not of a view as narrow as this
+                           one */
+                        const float in_small = a.rgb.pixels[3 * (y * small.width + x) + c],
+                                    in_large = b.rgb.pixels[3 * (y * 80 + x) + c];
                         if (form == 1 && in_small != in_large)
-                            fail_msg("%d x %d, pixel %d %d: %g and %g", small.width, small.height, x, y, (double)in_small,
-                                     (double)in_large);
+                            fail_msg("%d x %d, pixel %d %d: %g and %g", small.width, small.height, x, y,
+                                     (double)in_small, (double)in_large);
                         assert_true(isfinite(in_small));
                     }
-            drawn_free(&a), drawn_free(&b);
+            drawn_free(&a);
+            drawn_free(&b);
         }
     gaussians_free(&g);
 }
@@ -245,9 +279,11 @@ static void any_size(void **state)
 static void assert_same(const char *what, const drawn *a, const drawn *b)
 {
     float *f[2][GAUSSIANS_FIELD_COUNT];
-    field_list(&a->d, f[0]), field_list(&b->d, f[1]);
+    field_list(&a->d, f[0]);
+    field_list(&b->d, f[1]);
     const size_t pixels = (size_t)a->rgb.width * (size_t)a->rgb.height;
-    if (memcmp(a->rgb.pixels, b->rgb.pixels, 3 * pixels * sizeof(float)) != 0 || memcmp(a->T, b->T, pixels * sizeof(float)) != 0)
+    if (memcmp(a->rgb.pixels, b->rgb.pixels, 3 * pixels * sizeof(float)) != 0 ||
+        memcmp(a->T, b->T, pixels * sizeof(float)) != 0)
         fail_msg("%s: another picture", what);
     for (int k = 0; k < GAUSSIANS_FIELD_COUNT; k++)
         if (memcmp(f[0][k], f[1][k], a->d.count * sizeof(float)) != 0)
@@ -274,7 +310,8 @@ static void weights_are_what_colors_feel(void **state)
         for (size_t i = 0; i < g.count; i++) {
             seen += d.weight[i] > 0;
             if (fabsf(d.weight[i] - d.d.red[i]) > 1e-6f * d.weight[i])
-                fail_msg("form %d, Gaussian %zu: weight %g, gradient %g", form, i, (double)d.weight[i], (double)d.d.red[i]);
+                fail_msg("form %d, Gaussian %zu: weight %g, gradient %g", form, i, (double)d.weight[i],
+                         (double)d.d.red[i]);
         }
         assert_true(seen > 300);
         drawn_free(&d);
@@ -332,13 +369,16 @@ static void memory_is_used_again(void **state)
         assert_ok(raster_forward(&scene, &g, &camera, &s, true, &rgb, NULL, NULL, NULL));
         for (int twice = 0; twice < 2; twice++) /* the tape is kept */
             assert_ok(raster_backward(&scene, &d_rgb, &d, NULL, NULL, NULL));
-        assert_memory_equal(rgb.pixels, fresh.rgb.pixels, 3 * (size_t)(camera.width * camera.height) * sizeof(float));
+        assert_memory_equal(rgb.pixels, fresh.rgb.pixels,
+                            3 * (size_t)(camera.width * camera.height) * sizeof(float));
         assert_memory_equal(d.mean_z, fresh.d.mean_z, g.count * sizeof(float));
         drawn_free(&fresh);
-        image_free(&d_rgb), image_free(&rgb);
+        image_free(&d_rgb);
+        image_free(&rgb);
     }
     raster_scene_free(&scene);
-    gaussians_free(&g), gaussians_free(&d);
+    gaussians_free(&g);
+    gaussians_free(&d);
 }
 
 static void wrong_arguments(void **state)
@@ -353,13 +393,16 @@ static void wrong_arguments(void **state)
     assert_ok(image_alloc(&rgb, 20, 20, 3, NULL));
     assert_ok(image_alloc(&small, 19, 20, 3, NULL));
     assert_int_equal(raster_backward(&scene, &rgb, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
-    assert_int_equal(raster_forward(&scene, &g, &camera, &s, true, &small, NULL, NULL, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(raster_forward(&scene, &g, &camera, &s, true, &small, NULL, NULL, &err),
+                     GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "19 x 20"));
     other.model = GBT_CAMERA_OPENCV;
     assert_int_equal(raster_forward(&scene, &g, &other, &s, true, &rgb, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
-    other = camera, other.params[0] = NAN;
+    other = camera;
+    other.params[0] = NAN;
     assert_int_equal(raster_forward(&scene, &g, &other, &s, true, &rgb, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
-    other = camera, other.rotation[4] = INFINITY;
+    other = camera;
+    other.rotation[4] = INFINITY;
     assert_int_equal(raster_forward(&scene, &g, &other, &s, true, &rgb, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
     s.alpha_min = 0;
     assert_int_equal(raster_forward(&scene, &g, &camera, &s, true, &rgb, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
@@ -371,8 +414,10 @@ static void wrong_arguments(void **state)
     assert_ok(raster_backward(&scene, &rgb, &d, NULL, NULL, NULL));
     raster_scene_free(&scene);
     raster_scene_free(&scene); /* twice is fine */
-    image_free(&rgb), image_free(&small);
-    gaussians_free(&g), gaussians_free(&d);
+    image_free(&rgb);
+    image_free(&small);
+    gaussians_free(&g);
+    gaussians_free(&d);
 }
 
 static void memory_runs_out(void **state)
@@ -406,7 +451,8 @@ static void memory_runs_out(void **state)
         }
         assert_true(failures >= 15);
     }
-    image_free(&d_rgb), image_free(&rgb);
+    image_free(&d_rgb);
+    image_free(&rgb);
     gaussians_free(&g);
 }
 

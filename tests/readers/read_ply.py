@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """tests/readers/read_ply.py -- a PLY as the package plyfile reads it: its columns as JSON. Usage: read_ply.py FILE"""
 import json
 import sys

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // Gaussians written by gbtrace export, read by splat-transform, plyfile and glTF-Transform, and looked over by Khronos' validator: counts and every attribute.
 // Usage: readers.mjs PROGRAM PYTHON READ_PLY; see test_readers.sh.
 import {execFileSync} from "node:child_process";

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # tests/readers/test_readers.sh -- exported files in the hands of readers that are not ours. Usage: test_readers.sh PROGRAM SOURCE BUILD
 # Packages from npm and PyPI go into BUILD/readers-env, once, and nothing anywhere else; ends with 77, skipped, where they cannot be had.
 set -u

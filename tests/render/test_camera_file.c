@@ -1,4 +1,6 @@
-/* tests/render/test_camera_file.c -- camera files: what each field means, and one clear line about what is wrong. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/render/test_camera_file.c -- camera files: what each field means, and one clear line about what is
+   wrong. */
 #include <unistd.h>
 
 #include "base/near.h"
@@ -31,7 +33,8 @@ static void write_text(const char *text)
     assert_ok(file_write_atomic(path, text, strlen(text), &assert_ok_err_));
 }
 
-#define POSE "\"origin\": [1, 2, 3], \"target\": [1, 2, 13], \"up\": [0, -2, 0], \"width\": 64, \"height\": 32"
+#define POSE                                                                                                 \
+    "\"origin\": [1, 2, 3], \"target\": [1, 2, 13], \"up\": [0, -2, 0], \"width\": 64, \"height\": 32"
 
 static camera_file read_good(const char *text, const double origin[3])
 {
@@ -47,7 +50,8 @@ static void a_plain_pinhole(void **state)
 {
     (void)state;
     const double shift[3] = {0.5, 2, -1};
-    const camera_file f = read_good("{" POSE ", \"fov_x_deg\": 90, \"near_clip\": 0.1, \"far_clip\": 100}", shift);
+    const camera_file f =
+        read_good("{" POSE ", \"fov_x_deg\": 90, \"near_clip\": 0.1, \"far_clip\": 100}", shift);
     const gbt_camera *c = &f.shot.camera;
     assert_true(c->model == GBT_CAMERA_PINHOLE && c->width == 64 && c->height == 32);
     assert_near(c->params[0], 32, 1e-13);
@@ -88,7 +92,8 @@ static void aperture_and_shutter(void **state)
     assert_near(f.shot.aperture_radius, 0.25, 0);
     assert_near(f.shot.focus_distance, 4, 0);
     assert_int_equal(ray_shot_sample_count(&f.shot), 64);
-    f = read_good("{" POSE ", \"fov_x_deg\": 90, \"aperture\": 0.25, \"focus\": 4, \"samples\": 9, \"seed\": 3}", none);
+    f = read_good(
+        "{" POSE ", \"fov_x_deg\": 90, \"aperture\": 0.25, \"focus\": 4, \"samples\": 9, \"seed\": 3}", none);
     assert_int_equal(ray_shot_sample_count(&f.shot), 9);
     assert_true(f.shot.seed == 3);
     f = read_good("{" POSE ", \"fov_x_deg\": 90, \"aperture\": 0, \"samples\": 9}", none);
@@ -100,7 +105,8 @@ static void aperture_and_shutter(void **state)
     assert_near(f.shot.end.center[2], 4, 0);
     assert_near(f.shot.end.center[0], 0, 0);
     assert_near(f.shot.end.rotation[8], 1, 1e-15);
-    f = read_good("{" POSE ", \"fov_x_deg\": 90, \"shutter\": \"columns\", \"end\": {\"up\": [1, 0, 0]}}", none);
+    f = read_good("{" POSE ", \"fov_x_deg\": 90, \"shutter\": \"columns\", \"end\": {\"up\": [1, 0, 0]}}",
+                  none);
     assert_int_equal(f.shot.shutter, RAY_SHUTTER_COLUMNS);
     assert_near(f.shot.end.rotation[1], 1, 1e-15); /* right is now +y */
     assert_near(f.shot.end.center[2], 3, 0);
@@ -140,40 +146,60 @@ static const struct bad_case {
     {"{" POSE ", \"model\": \"fisheye\", \"fov_x_deg\": 361}", ": fov_x_deg: wanted a number in (0, 360]"},
     {"{" POSE ", \"model\": \"orthographic\"}",
      ": view_width: missing (units of the data set from the left edge of the picture to the right)"},
-    {"{" POSE ", \"model\": \"orthographic\", \"view_width\": 0}", ": view_width: wanted a number in (0, 1e+15]"},
+    {"{" POSE ", \"model\": \"orthographic\", \"view_width\": 0}",
+     ": view_width: wanted a number in (0, 1e+15]"},
     {"{" POSE ", \"model\": \"orthographic\", \"view_width\": 3, \"fov_x_deg\": 60}",
      ": fov_x_deg: this model has none (wanted it with pinhole or fisheye)"},
-    {"{" POSE ", \"view_width\": 3, \"fov_x_deg\": 60}", ": view_width: this model has none (wanted it with orthographic)"},
-    {"{" POSE ", \"model\": \"pinhoel\"}", ": model: wanted one of pinhole, orthographic, equirectangular, fisheye"},
+    {"{" POSE ", \"view_width\": 3, \"fov_x_deg\": 60}",
+     ": view_width: this model has none (wanted it with orthographic)"},
+    {"{" POSE ", \"model\": \"pinhoel\"}",
+     ": model: wanted one of pinhole, orthographic, equirectangular, fisheye"},
     {"{" POSE ", \"model\": 3}", ": model: wanted one of pinhole, orthographic, equirectangular, fisheye"},
-    {"{" POSE ", \"fov_x_deg\": 60, \"apperture\": 1}", ": apperture: unknown field (wanted one of origin target up model width"},
+    {"{" POSE ", \"fov_x_deg\": 60, \"apperture\": 1}",
+     ": apperture: unknown field (wanted one of origin target up model width"},
     {"{" POSE ", \"fov_x_deg\": 60, \"\": 1}", ": : unknown field (wanted one of origin"},
-    {"{" POSE ", \"fov_x_deg\": 60, \"origin target\": 1}", ": origin target: unknown field (wanted one of origin"},
-    {"{\"origin\": [1, 2, 3], \"up\": [0, 1, 0], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}", ": target: missing (wanted 3 numbers)"},
+    {"{" POSE ", \"fov_x_deg\": 60, \"origin target\": 1}",
+     ": origin target: unknown field (wanted one of origin"},
+    {"{\"origin\": [1, 2, 3], \"up\": [0, 1, 0], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}",
+     ": target: missing (wanted 3 numbers)"},
     {"{\"origin\": [1, 2], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}", ": origin: wanted 3 numbers"},
-    {"{\"origin\": [1, 2, \"3\"], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}", ": origin: wanted 3 numbers, within 1e15"},
-    {"{\"origin\": [1, 2, 1e16], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}", ": origin: wanted 3 numbers, within 1e15"},
+    {"{\"origin\": [1, 2, \"3\"], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}",
+     ": origin: wanted 3 numbers, within 1e15"},
+    {"{\"origin\": [1, 2, 1e16], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}",
+     ": origin: wanted 3 numbers, within 1e15"},
     {"{\"height\": 4}", ": width: missing (pixels)"},
     {"{\"width\": 4}", ": height: missing (pixels)"},
     {"{\"width\": 0, \"height\": 4}", ": width: wanted a whole number in [1, 65500]"},
     {"{\"width\": 4.5, \"height\": 4}", ": width: wanted a whole number in [1, 65500]"},
     {"{\"width\": 4, \"height\": 65501}", ": height: wanted a whole number in [1, 65500]"},
-    {"{\"origin\": [1, 2, 3], \"target\": [1, 2, 3], \"up\": [0, 1, 0], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}",
+    {"{\"origin\": [1, 2, 3], \"target\": [1, 2, 3], \"up\": [0, 1, 0], \"fov_x_deg\": 60, \"width\": 4, "
+     "\"height\": 4}",
      ": target: is the origin (wanted another point)"},
-    {"{\"origin\": [1, 2, 3], \"target\": [1, 3, 3], \"up\": [0, 1, 0], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}",
+    {"{\"origin\": [1, 2, 3], \"target\": [1, 3, 3], \"up\": [0, 1, 0], \"fov_x_deg\": 60, \"width\": 4, "
+     "\"height\": 4}",
      ": up: is 0, or along the view"},
-    {"{\"origin\": [1, 2, 3], \"target\": [1, 3, 3], \"up\": [0, 0, 0], \"fov_x_deg\": 60, \"width\": 4, \"height\": 4}",
+    {"{\"origin\": [1, 2, 3], \"target\": [1, 3, 3], \"up\": [0, 0, 0], \"fov_x_deg\": 60, \"width\": 4, "
+     "\"height\": 4}",
      ": up: is 0, or along the view"},
-    {"{" POSE ", \"fov_x_deg\": 60, \"focus\": 1}", ": aperture: missing (there is a focus, samples or seed)"},
-    {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": 1}", ": focus: missing (distance that is sharp, units of the data set)"},
-    {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": -1, \"focus\": 1}", ": aperture: wanted a number in [0, 1e+15]"},
-    {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": 1, \"focus\": 0}", ": focus: wanted a number in (0, 1e+15]"},
-    {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": 1, \"focus\": 1, \"samples\": 0}", ": samples: wanted a whole number in [1, 65536]"},
-    {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": 1, \"focus\": 1, \"seed\": -1}", ": seed: wanted a whole number in [0, 2147483647]"},
-    {"{" POSE ", \"fov_x_deg\": 60, \"shutter\": \"rows\"}", ": end: missing (a shutter wants the pose at the end of its way)"},
-    {"{" POSE ", \"fov_x_deg\": 60, \"shutter\": \"up\", \"end\": {}}", ": shutter: wanted one of rows, columns"},
+    {"{" POSE ", \"fov_x_deg\": 60, \"focus\": 1}",
+     ": aperture: missing (there is a focus, samples or seed)"},
+    {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": 1}",
+     ": focus: missing (distance that is sharp, units of the data set)"},
+    {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": -1, \"focus\": 1}",
+     ": aperture: wanted a number in [0, 1e+15]"},
+    {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": 1, \"focus\": 0}",
+     ": focus: wanted a number in (0, 1e+15]"},
+    {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": 1, \"focus\": 1, \"samples\": 0}",
+     ": samples: wanted a whole number in [1, 65536]"},
+    {"{" POSE ", \"fov_x_deg\": 60, \"aperture\": 1, \"focus\": 1, \"seed\": -1}",
+     ": seed: wanted a whole number in [0, 2147483647]"},
+    {"{" POSE ", \"fov_x_deg\": 60, \"shutter\": \"rows\"}",
+     ": end: missing (a shutter wants the pose at the end of its way)"},
+    {"{" POSE ", \"fov_x_deg\": 60, \"shutter\": \"up\", \"end\": {}}",
+     ": shutter: wanted one of rows, columns"},
     {"{" POSE ", \"fov_x_deg\": 60, \"end\": [1]}", ": end: wanted an object with origin, target or up"},
-    {"{" POSE ", \"fov_x_deg\": 60, \"end\": {\"fov_x_deg\": 3}}", ": end.fov_x_deg: unknown field (wanted one of origin target up)"},
+    {"{" POSE ", \"fov_x_deg\": 60, \"end\": {\"fov_x_deg\": 3}}",
+     ": end.fov_x_deg: unknown field (wanted one of origin target up)"},
     {"{" POSE ", \"fov_x_deg\": 60, \"end\": {\"up\": [0, 0, 1]}}", ": end.up: is 0, or along the view"},
     {"{\"rays\": 3}", ": rays: wanted the name of an EXR file"},
     {"{\"rays\": \"r.exr\", \"width\": 3}", ": width: unknown field (wanted one of rays)"},
@@ -208,8 +234,9 @@ static void says_what_is_wrong(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_plain_pinhole), cmocka_unit_test(models),         cmocka_unit_test(aperture_and_shutter),
-        cmocka_unit_test(rays_beside_it),  cmocka_unit_test(says_what_is_wrong),
+        cmocka_unit_test(a_plain_pinhole),      cmocka_unit_test(models),
+        cmocka_unit_test(aperture_and_shutter), cmocka_unit_test(rays_beside_it),
+        cmocka_unit_test(says_what_is_wrong),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

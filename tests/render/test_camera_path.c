@@ -1,4 +1,6 @@
-/* tests/render/test_camera_path.c -- films: ways around and through cameras, path files, and pictures to ffmpeg and back. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/render/test_camera_path.c -- films: ways around and through cameras, path files, and pictures to
+   ffmpeg and back. */
 #include <stdio.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -36,7 +38,7 @@ static int remove_folder(void **state)
     return rmdir(folder);
 }
 
-/* ---- cameras ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- cameras ---- */
 
 static gbt_camera looking(double x, double y, double z, const double target[3])
 {
@@ -50,7 +52,8 @@ static gbt_camera looking(double x, double y, double z, const double target[3])
 static void ring(gbt_camera *out, size_t count, double from, double to, const double target[3])
 {
     for (size_t i = 0; i < count; i++) {
-        const double angle = (from + (to - from) * (double)i / (double)(count > 1 ? count - 1 : 1)) * PI / 180;
+        const double angle =
+            (from + (to - from) * (double)i / (double)(count > 1 ? count - 1 : 1)) * PI / 180;
         out[i] = looking(target[0] + 4 * cos(angle), target[1] - 1.5, target[2] + 4 * sin(angle), target);
     }
 }
@@ -65,7 +68,8 @@ static double angle_between(const gbt_camera *a, const gbt_camera *b)
 
 static double distance_between(const gbt_camera *a, const gbt_camera *b)
 {
-    const double way[3] = {b->center[0] - a->center[0], b->center[1] - a->center[1], b->center[2] - a->center[2]};
+    const double way[3] = {b->center[0] - a->center[0], b->center[1] - a->center[1],
+                           b->center[2] - a->center[2]};
     return dvec_length(way);
 }
 
@@ -119,12 +123,13 @@ static void parallel_cameras(void **state)
     assert_ok(camera_group_make(cameras, 5, points, 4, &g, &assert_ok_err_));
     assert_near(g.focus[0], 2, 1e-9);
     assert_near(g.focus[2], 7, 1e-6);
-    assert_ok(camera_group_make(cameras, 5, NULL, 0, &g, &assert_ok_err_)); /* nothing to go by: the local origin */
+    assert_ok(camera_group_make(cameras, 5, NULL, 0, &g, &assert_ok_err_)); /* nothing to go by: the local
+                                                                               origin */
     assert_near(g.focus[2], 0, 0);
     assert_true(g.distance > 0);
 }
 
-/* ---- around -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- around ---- */
 
 static void closed_orbit(void **state)
 {
@@ -141,7 +146,8 @@ static void closed_orbit(void **state)
     for (size_t i = 0; i < 90; i++) {
         const gbt_camera *c = &path.shots[i].camera;
         assert_rotation(c);
-        assert_near(distance_between(c, &path.shots[(i + 1) % 90].camera), step, 1e-9); /* the last goes on to the first */
+        assert_near(distance_between(c, &path.shots[(i + 1) % 90].camera), step, 1e-9); /* the last goes on to
+                                                                                           the first */
         const double way[3] = {target[0] - c->center[0], target[1] - c->center[1], target[2] - c->center[2]};
         assert_near(dvec_dot(way, c->rotation + 6), dvec_length(way), 1e-9);
         assert_true(c->rotation[4] > 0); /* down stays down */
@@ -164,7 +170,8 @@ static void orbit_of_an_arc(void **state)
         double angle = atan2(c->center[2], c->center[0]) * 180 / PI;
         if (angle < -90)
             angle += 360;
-        least = fmin(least, angle), most = fmax(most, angle);
+        least = fmin(least, angle);
+        most = fmax(most, angle);
         assert_near(distance_between(c, &path.shots[(100 - i) % 100].camera), 0, 1e-9); /* back as it came */
     }
     assert_near(least, 30, 1e-6);
@@ -216,7 +223,8 @@ static void orbit_of_a_shape(void **state)
     camera_path_free(&path);
 }
 
-/** A head before a wall: axes of view meet in the wall, and what sticks out left the picture at the ends of the arc. */
+/** A head before a wall: axes of view meet in the wall, and what sticks out left the picture at the ends of
+    the arc. */
 static void orbit_shows_what_most_see(void **state)
 {
     (void)state;
@@ -226,12 +234,19 @@ static void orbit_shows_what_most_see(void **state)
     ring(cameras, CAMERAS, 210, 330, wall); /* z < 0.6 */
     float points[3 * (HEAD + WALL + 50)];
     for (size_t i = 0; i < HEAD; i++) /* a cylinder from the wall towards the cameras */
-        points[3 * i] = (float)(0.8 * cos(0.7 * (double)i)), points[3 * i + 1] = (float)(0.8 * sin(0.7 * (double)i)),
-        points[3 * i + 2] = (float)(0.6 - 1.8 * (double)i / HEAD);
-    for (size_t i = HEAD; i < HEAD + WALL; i++)
-        points[3 * i] = (float)(0.1 * (double)(i % 10) - 0.5), points[3 * i + 1] = (float)(0.01 * (double)i - 3.5), points[3 * i + 2] = 0.6f;
-    for (size_t i = HEAD + WALL; i < HEAD + WALL + 50; i++) /* far to the side: in few pictures */
-        points[3 * i] = 4 + 0.01f * (float)i, points[3 * i + 1] = 0, points[3 * i + 2] = 0.6f;
+        points[3 * i] = (float)(0.8 * cos(0.7 * (double)i)),
+                   points[3 * i + 1] = (float)(0.8 * sin(0.7 * (double)i)),
+                   points[3 * i + 2] = (float)(0.6 - 1.8 * (double)i / HEAD);
+    for (size_t i = HEAD; i < HEAD + WALL; i++) {
+        points[3 * i] = (float)(0.1 * (double)(i % 10) - 0.5);
+        points[3 * i + 1] = (float)(0.01 * (double)i - 3.5);
+        points[3 * i + 2] = 0.6f;
+    }
+    for (size_t i = HEAD + WALL; i < HEAD + WALL + 50; i++) { /* far to the side: in few pictures */
+        points[3 * i] = 4 + 0.01f * (float)i;
+        points[3 * i + 1] = 0;
+        points[3 * i + 2] = 0.6f;
+    }
     shared_points shared;
     assert_ok(shared_points_find(cameras, CAMERAS, points, HEAD + WALL + 50, &shared, &assert_ok_err_));
     assert_true(shared.count >= HEAD && shared.count <= HEAD + WALL);
@@ -240,7 +255,8 @@ static void orbit_shows_what_most_see(void **state)
     assert_near(g.focus[2], 0.6, 0.01);
     camera_path path;
     gbt_camera lens = camera_group_lens(&g, 60, 80);
-    lens.params[0] *= 1.3, lens.params[1] *= 1.3; /* too narrow for the head */
+    lens.params[0] *= 1.3;
+    lens.params[1] *= 1.3; /* too narrow for the head */
     assert_ok(camera_path_orbit(cameras, CAMERAS, &g, &lens, &as_cameras, 24, &path, &assert_ok_err_));
     const double before = path.shots[0].camera.params[0];
     assert_ok(camera_path_show(&path, &shared, &assert_ok_err_));
@@ -263,8 +279,10 @@ static void orbit_shows_what_most_see(void **state)
         const double angle = 2 * PI * i / CAMERAS, target[3] = {cos(angle), 0, sin(angle)};
         cameras[i] = looking(0, 0, 0, target);
     }
-    for (size_t i = 0; i < HEAD; i++)
-        points[3 * i] = (float)(3 * cos(0.1 * (double)i)), points[3 * i + 2] = (float)(3 * sin(0.1 * (double)i));
+    for (size_t i = 0; i < HEAD; i++) {
+        points[3 * i] = (float)(3 * cos(0.1 * (double)i));
+        points[3 * i + 2] = (float)(3 * sin(0.1 * (double)i));
+    }
     assert_ok(shared_points_find(cameras, CAMERAS, points, HEAD, &shared, &assert_ok_err_));
     assert_int_equal(shared.count, 0);
     shared_points_free(&shared);
@@ -284,7 +302,8 @@ static void orbit_looks_as_the_cameras(void **state)
     assert_ok(camera_path_orbit(cameras, 24, &g, &g.lens, &as_cameras, 24, &paths[0], &assert_ok_err_));
     assert_ok(camera_path_orbit(cameras, 24, &g, &g.lens, &there, 24, &paths[1], &assert_ok_err_));
     for (int i = 0; i < 24; i++) {
-        const double *up = paths[0].shots[i].camera.rotation + 6, *level = paths[1].shots[i].camera.rotation + 6;
+        const double *up = paths[0].shots[i].camera.rotation + 6,
+                     *level = paths[1].shots[i].camera.rotation + 6;
         assert_near(up[1] / hypot(up[0], up[2]), -1.5 / 4, 0.05);
         assert_near(level[1] / hypot(level[0], level[2]), 0.5 / 4, 1e-6);
     }
@@ -292,7 +311,7 @@ static void orbit_looks_as_the_cameras(void **state)
         camera_path_free(&paths[i]);
 }
 
-/* ---- through ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- through ---- */
 
 enum { KEYS = 9, FRAMES = 2001 };
 
@@ -316,8 +335,10 @@ static void through_all_keys(void **state)
         mean += step[i] / (FRAMES - 1);
         if (i > 0) { /* no corners: the way turns little from step to step */
             const gbt_camera *before = &path.shots[i - 1].camera;
-            const double came[3] = {a->center[0] - before->center[0], a->center[1] - before->center[1], a->center[2] - before->center[2]};
-            const double goes[3] = {b->center[0] - a->center[0], b->center[1] - a->center[1], b->center[2] - a->center[2]};
+            const double came[3] = {a->center[0] - before->center[0], a->center[1] - before->center[1],
+                                    a->center[2] - before->center[2]};
+            const double goes[3] = {b->center[0] - a->center[0], b->center[1] - a->center[1],
+                                    b->center[2] - a->center[2]};
             assert_true(dvec_dot(came, goes) > 0.98 * dvec_length(came) * dvec_length(goes));
         }
     }
@@ -328,10 +349,12 @@ static void through_all_keys(void **state)
     for (int k = 0; k < KEYS; k++) {
         size_t nearest = 0;
         for (size_t i = 1; i < FRAMES; i++)
-            if (distance_between(&path.shots[i].camera, &keys[k]) < distance_between(&path.shots[nearest].camera, &keys[k]))
+            if (distance_between(&path.shots[i].camera, &keys[k]) <
+                distance_between(&path.shots[nearest].camera, &keys[k]))
                 nearest = i;
         const gbt_camera *c = &path.shots[nearest].camera;
-        assert_true(hypot(distance_between(c, &keys[k]), turn_length * angle_between(c, &keys[k])) < 0.6 * mean + 1e-9);
+        assert_true(hypot(distance_between(c, &keys[k]), turn_length * angle_between(c, &keys[k])) <
+                    0.6 * mean + 1e-9);
         assert_near(c->params[0], keys[k].params[0], 0.05);
     }
     camera_path_free(&path);
@@ -376,13 +399,15 @@ static void order_to_go_through(void **state)
     assert_ok(camera_path_order(keys, 10, 1, &assert_ok_err_));
     for (int i = 0; i < 10; i++)
         assert_near(distance_between(&keys[i], &known[i]), 0, 0);
-    const gbt_camera swap = keys[4]; /* nearly in order: names win, though the nearest would be a little shorter */
-    keys[4] = keys[5], keys[5] = swap;
+    const gbt_camera swap =
+        keys[4]; /* nearly in order: names win, though the nearest would be a little shorter */
+    keys[4] = keys[5];
+    keys[5] = swap;
     assert_ok(camera_path_order(keys, 10, 1, &assert_ok_err_));
     assert_near(distance_between(&keys[4], &known[5]), 0, 0);
 }
 
-/* ---- files --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- files ---- */
 
 static void write_text(const char *path, const char *text)
 {
@@ -400,7 +425,9 @@ static camera_path read_good(const char *text, const double origin[3], size_t fr
 }
 
 #define COMMON "\"width\": 64, \"height\": 32, \"up\": [0, -1, 0], \"fov_x_deg\": 90"
-#define TWO "[{\"origin\": [0, 0, 0], \"target\": [0, 0, 5]}, {\"origin\": [4, 0, 0], \"target\": [4, 0, 5], \"fov_x_deg\": 60}]"
+#define TWO                                                                                                  \
+    "[{\"origin\": [0, 0, 0], \"target\": [0, 0, 5]}, {\"origin\": [4, 0, 0], \"target\": [4, 0, 5], "       \
+    "\"fov_x_deg\": 60}]"
 
 static void our_file(void **state)
 {
@@ -412,7 +439,8 @@ static void our_file(void **state)
     assert_near(p.shots[1].camera.center[0], 3, 1e-12);
     assert_near(p.shots[1].camera.center[2], -3, 1e-12);
     assert_near(p.shots[0].camera.params[0], 32, 1e-12);
-    assert_near(p.shots[1].camera.params[0], 32 / tan(PI / 6), 1e-12); /* its own field of view over the common one */
+    assert_near(p.shots[1].camera.params[0], 32 / tan(PI / 6), 1e-12); /* its own field of view over the
+                                                                          common one */
     camera_path_free(&p);
     p = read_good("{\"frames\": 5, " COMMON ", \"cameras\": " TWO "}", none, 0);
     assert_int_equal(p.count, 5);
@@ -424,7 +452,8 @@ static void our_file(void **state)
     assert_int_equal(p.count, 3);
     assert_near(p.fps, 0, 0);
     camera_path_free(&p);
-    p = read_good("{" COMMON ", \"aperture\": 0.5, \"focus\": 3, \"cameras\": " TWO "}", none, 0); /* all that a camera file can do */
+    p = read_good("{" COMMON ", \"aperture\": 0.5, \"focus\": 3, \"cameras\": " TWO "}", none,
+                  0); /* all that a camera file can do */
     assert_near(p.shots[1].aperture_radius, 0.5, 0);
     camera_path_free(&p);
 }
@@ -435,10 +464,12 @@ static void our_file(void **state)
 static void nerfstudio_file(void **state)
 {
     (void)state;
-    camera_path p = read_good("{\"keyframes\": [], \"camera_type\": \"perspective\", " NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90, "
-                              "\"aspect\": 1}]}", none, 0);
+    camera_path p = read_good("{\"keyframes\": [], \"camera_type\": \"perspective\", " NERF
+                              ", \"camera_path\": [{" AT_123 ", \"fov\": 90, \"aspect\": 1}]}",
+                              none, 0);
     const gbt_camera *c = &p.shots[0].camera;
-    const double axes[9] = {1, 0, 0, 0, -1, 0, 0, 0, -1}; /* OpenGL's y up, z back: right x, down -y, forward -z */
+    const double axes[9] = {1, 0, 0, 0, -1,
+                            0, 0, 0, -1}; /* OpenGL's y up, z back: right x, down -y, forward -z */
     for (int k = 0; k < 9; k++)
         assert_near(c->rotation[k], axes[k], 1e-12);
     assert_near(c->center[2], 3, 1e-12);
@@ -446,18 +477,21 @@ static void nerfstudio_file(void **state)
     assert_int_equal(c->model, GBT_CAMERA_PINHOLE);
     assert_near(p.fps, 12, 0);
     camera_path_free(&p);
-    p = read_good("{\"camera_type\": \"fisheye\", " NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90}]}", none, 0);
+    p = read_good("{\"camera_type\": \"fisheye\", " NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90}]}",
+                  none, 0);
     assert_int_equal(p.shots[0].camera.model, GBT_CAMERA_FISHEYE);
     assert_near(p.shots[0].camera.params[0], 30, 1e-9);
     camera_path_free(&p);
-    p = read_good("{\"camera_type\": \"equirectangular\", \"render_width\": 80, \"render_height\": 40, \"seconds\": 2, \"camera_path\": "
-                  "[{" AT_123 "}, {" AT_123 "}]}", none, 0);
+    p = read_good("{\"camera_type\": \"equirectangular\", \"render_width\": 80, \"render_height\": 40, "
+                  "\"seconds\": 2, \"camera_path\": [{" AT_123 "}, {" AT_123 "}]}",
+                  none, 0);
     assert_int_equal(p.shots[1].camera.model, GBT_CAMERA_EQUIRECTANGULAR);
     assert_near(p.fps, 1, 1e-12);
     camera_path_free(&p);
 }
 
-/** The trainer's world is p' = 2 (R p + t), R a quarter turn about z, t = (1, 0, 0): (1, 2, 3) there is (1, 0.5, 1.5) here. */
+/** The trainer's world is p' = 2 (R p + t), R a quarter turn about z, t = (1, 0, 0): (1, 2, 3) there is (1,
+    0.5, 1.5) here. */
 static void nerfstudio_world(void **state)
 {
     (void)state;
@@ -466,7 +500,8 @@ static void nerfstudio_world(void **state)
     for (int beside = 0; beside < 2; beside++) {
         if (beside)
             write_text(beside_path, "{" WORLD "}");
-        camera_path p = read_good(beside ? path : "{" WORLD ", " NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90}]}", none, 0);
+        camera_path p = read_good(
+            beside ? path : "{" WORLD ", " NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90}]}", none, 0);
         const gbt_camera *c = &p.shots[0].camera;
         const double center[3] = {1, 0.5, 1.5}, right[3] = {0, -1, 0}, forward[3] = {0, 0, -1};
         for (int k = 0; k < 3; k++) {
@@ -479,7 +514,9 @@ static void nerfstudio_world(void **state)
     unlink(beside_path);
 }
 
-static const struct bad_case { const char *text, *message; } bad_cases[] = {
+static const struct bad_case {
+    const char *text, *message;
+} bad_cases[] = {
     {"", ":1: not JSON: "},
     {"{}", ": not a camera path (wanted \"cameras\", or nerfstudio's \"camera_path\")"},
     {"{\"cameras\": []}", ": cameras: wanted a list of 1 to 100000 cameras"},
@@ -488,25 +525,32 @@ static const struct bad_case { const char *text, *message; } bad_cases[] = {
     {"{\"fps\": 0, " COMMON ", \"cameras\": " TWO "}", ": fps: wanted a number in (0, 1000]"},
     {"{\"frames\": 0, " COMMON ", \"cameras\": " TWO "}", ": frames: wanted a whole number in [1, 100000]"},
     {"{\"frames\": 2.5, " COMMON ", \"cameras\": " TWO "}", ": frames: wanted a whole number in [1, 100000]"},
-    {"{" COMMON ", \"cameras\": [{\"origin\": [0, 0, 0]}]}", ": cameras[0].target: missing (wanted 3 numbers)"},
+    {"{" COMMON ", \"cameras\": [{\"origin\": [0, 0, 0]}]}",
+     ": cameras[0].target: missing (wanted 3 numbers)"},
     {"{" COMMON ", \"fov\": 3, \"cameras\": " TWO "}", ": cameras[0].fov: unknown field"},
-    {"{" COMMON ", \"cameras\": [{\"rays\": \"x.exr\"}]}", ": cameras[0].rays: not in a path (wanted a camera)"},
-    {"{\"width\": 64, \"up\": [0, 1, 0], \"fov_x_deg\": 90, \"cameras\": [{\"origin\": [0, 0, 0], \"target\": [0, 0, 1], \"height\": 32},"
-     " {\"origin\": [0, 0, 0], \"target\": [0, 0, 1], \"height\": 16}]}", ": cameras[1]: 64 x 16 pixels (wanted 64 x 32, as the first)"},
-    {"{\"frames\": 9, " COMMON ", \"cameras\": [{\"origin\": [0, 0, 0], \"target\": [0, 0, 1]}, {\"origin\": [0, 0, 0], \"target\": [0, 0, "
-                               "1], \"model\": \"fisheye\"}]}",
+    {"{" COMMON ", \"cameras\": [{\"rays\": \"x.exr\"}]}",
+     ": cameras[0].rays: not in a path (wanted a camera)"},
+    {"{\"width\": 64, \"up\": [0, 1, 0], \"fov_x_deg\": 90, \"cameras\": [{\"origin\": [0, 0, 0], "
+     "\"target\": [0, 0, 1], \"height\": 32}, {\"origin\": [0, 0, 0], \"target\": [0, 0, 1], \"height\": "
+     "16}]}",
+     ": cameras[1]: 64 x 16 pixels (wanted 64 x 32, as the first)"},
+    {"{\"frames\": 9, " COMMON ", \"cameras\": [{\"origin\": [0, 0, 0], \"target\": [0, 0, 1]}, {\"origin\": "
+     "[0, 0, 0], \"target\": [0, 0, 1], \"model\": \"fisheye\"}]}",
      ": cameras[1].model: not that of the first (wanted one lens on a way with \"frames\")"},
     {"{\"frames\": 9, \"aperture\": 1, \"focus\": 2, " COMMON ", \"cameras\": " TWO "}",
      ": cameras[0]: an aperture or a shutter (wanted none"},
     {"{\"camera_path\": []}", ": camera_path: wanted a list of 1 to 100000 cameras"},
     {"{\"camera_path\": [{}]}", ": render_width: missing (pixels)"},
     {"{\"render_width\": 8, \"camera_path\": [{}]}", ": render_height: missing (pixels)"},
-    {"{\"render_width\": 0, \"render_height\": 8, \"camera_path\": [{}]}", ": render_width: wanted a whole number in [1, 65500]"},
-    {"{\"camera_type\": \"vr180\", " NERF ", \"camera_path\": [{}]}", ": camera_type: wanted one of perspective, fisheye, equirectangular"},
+    {"{\"render_width\": 0, \"render_height\": 8, \"camera_path\": [{}]}",
+     ": render_width: wanted a whole number in [1, 65500]"},
+    {"{\"camera_type\": \"vr180\", " NERF ", \"camera_path\": [{}]}",
+     ": camera_type: wanted one of perspective, fisheye, equirectangular"},
     {"{" NERF ", \"camera_path\": [3]}", ": camera_path[0]: wanted an object"},
     {"{" NERF ", \"camera_path\": [{}]}", ": camera_path[0].fov: missing (degrees from the top"},
     {"{" NERF ", \"camera_path\": [{\"fov\": 180}]}", ": camera_path[0].fov: wanted a number in (0, 179.9]"},
-    {"{" NERF ", \"camera_path\": [{\"fov\": 50}]}", ": camera_path[0].camera_to_world: wanted 12 or 16 numbers, row after row"},
+    {"{" NERF ", \"camera_path\": [{\"fov\": 50}]}",
+     ": camera_path[0].camera_to_world: wanted 12 or 16 numbers, row after row"},
     {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [1, 2, 3]}]}",
      ": camera_path[0].camera_to_world: wanted 12 or 16 numbers, row after row"},
     {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [1,0,0,0,0,1,0,0,0,0,1,\"0\"]}]}",
@@ -517,8 +561,10 @@ static const struct bad_case { const char *text, *message; } bad_cases[] = {
      ": camera_path[0].camera_to_world: not a rotation"},
     {"{" NERF ", \"camera_path\": [{\"fov\": 50, \"camera_to_world\": [-1,0,0,0,0,1,0,0,0,0,1,0]}]}",
      ": camera_path[0].camera_to_world: not a rotation"},
-    {"{\"transform\": [], " NERF ", \"camera_path\": [{}]}", ": transform: wanted 12 or 16 numbers, row after row"},
-    {"{\"scale\": 0, \"transform\": [], " NERF ", \"camera_path\": [{}]}", ": scale: wanted a number in (0, 1e+15]"},
+    {"{\"transform\": [], " NERF ", \"camera_path\": [{}]}",
+     ": transform: wanted 12 or 16 numbers, row after row"},
+    {"{\"scale\": 0, \"transform\": [], " NERF ", \"camera_path\": [{}]}",
+     ": scale: wanted a number in (0, 1e+15]"},
 };
 
 static void says_what_is_wrong(void **state)
@@ -541,7 +587,7 @@ static void says_what_is_wrong(void **state)
     camera_path_free(&p);
 }
 
-/* ---- films --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- films ---- */
 
 static void no_film_left(const char *path)
 {
@@ -569,7 +615,8 @@ static void film_without_ffmpeg(void **state)
     memset(&err, 0, sizeof err);
     assert_int_equal(video_open(path, 15, 16, 30, &v, &err), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "15 x 16 pixels (wanted even numbers"));
-    assert_true(video_named("a.webm") && video_named("b/a.gif") && !video_named(".mp4") && !video_named("mp4") && !video_named("a.mp4/"));
+    assert_true(video_named("a.webm") && video_named("b/a.gif") && !video_named(".mp4") &&
+                !video_named("mp4") && !video_named("a.mp4/"));
 }
 
 /** A program of that name which reads nothing, says something and fails. */
@@ -626,14 +673,16 @@ static void film_and_back(void **state)
     }
     assert_false(file_exists(path)); /* not before it is whole */
     assert_ok(video_close(v, true, &assert_ok_err_));
-    snprintf(command, sizeof command, "ffmpeg -nostdin -loglevel error -y -i %s -f rawvideo -pix_fmt rgb24 %s", path, raw);
+    snprintf(command, sizeof command,
+             "ffmpeg -nostdin -loglevel error -y -i %s -f rawvideo -pix_fmt rgb24 %s", path, raw);
     assert_int_equal(system(command), 0);
     unsigned char *bytes;
     size_t count;
     assert_ok(file_read(raw, &bytes, &count, &assert_ok_err_));
     assert_int_equal(count, COUNT * 3 * SIDE * SIDE);
     for (int frame = 0; frame < COUNT; frame++)
-        assert_near(bytes[(frame * SIDE + SIDE / 2) * SIDE * 3 + SIDE / 2 * 3], 255 * (0.1 + 0.15 * frame), 6);
+        assert_near(bytes[(frame * SIDE + SIDE / 2) * SIDE * 3 + SIDE / 2 * 3], 255 * (0.1 + 0.15 * frame),
+                    6);
     mem_free(bytes);
     image_free(&picture);
     unlink(path);
@@ -643,12 +692,23 @@ static void film_and_back(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_cameras_look_at), cmocka_unit_test(parallel_cameras), cmocka_unit_test(closed_orbit),
-        cmocka_unit_test(orbit_of_an_arc), cmocka_unit_test(orbit_follows_the_cameras), cmocka_unit_test(orbit_of_a_shape),
-        cmocka_unit_test(orbit_looks_as_the_cameras), cmocka_unit_test(orbit_shows_what_most_see),
-        cmocka_unit_test(through_all_keys), cmocka_unit_test(turning_on_the_spot), cmocka_unit_test(order_to_go_through),
-        cmocka_unit_test(our_file), cmocka_unit_test(nerfstudio_file), cmocka_unit_test(nerfstudio_world),
-        cmocka_unit_test(says_what_is_wrong), cmocka_unit_test(film_without_ffmpeg), cmocka_unit_test(film_that_fails),
+        cmocka_unit_test(what_cameras_look_at),
+        cmocka_unit_test(parallel_cameras),
+        cmocka_unit_test(closed_orbit),
+        cmocka_unit_test(orbit_of_an_arc),
+        cmocka_unit_test(orbit_follows_the_cameras),
+        cmocka_unit_test(orbit_of_a_shape),
+        cmocka_unit_test(orbit_looks_as_the_cameras),
+        cmocka_unit_test(orbit_shows_what_most_see),
+        cmocka_unit_test(through_all_keys),
+        cmocka_unit_test(turning_on_the_spot),
+        cmocka_unit_test(order_to_go_through),
+        cmocka_unit_test(our_file),
+        cmocka_unit_test(nerfstudio_file),
+        cmocka_unit_test(nerfstudio_world),
+        cmocka_unit_test(says_what_is_wrong),
+        cmocka_unit_test(film_without_ffmpeg),
+        cmocka_unit_test(film_that_fails),
         {.name = "film and back: mp4", .test_func = film_and_back, .initial_state = "mp4"},
         {.name = "film and back: webm", .test_func = film_and_back, .initial_state = "webm"},
         {.name = "film and back: gif", .test_func = film_and_back, .initial_state = "gif"},

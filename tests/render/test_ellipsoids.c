@@ -1,4 +1,6 @@
-/* tests/render/test_ellipsoids.c -- solid ellipsoids as pictures: where they are, which is in front, and what is left out. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/render/test_ellipsoids.c -- solid ellipsoids as pictures: where they are, which is in front, and what
+   is left out. */
 #include "base/image.h"
 #include "base/near.h"
 #include "base/parallel.h"
@@ -8,7 +10,10 @@ enum { SIDE = 64 };
 
 static gbt_camera pinhole(void)
 {
-    return (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = SIDE, .height = SIDE, .params = {64, 64, 32, 32},
+    return (gbt_camera){.model = GBT_CAMERA_PINHOLE,
+                        .width = SIDE,
+                        .height = SIDE,
+                        .params = {64, 64, 32, 32},
                         .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 }
 
@@ -55,7 +60,7 @@ static void a_sphere(void **state)
     const double radius = 64 * tan(asin(0.25));
     assert_near(area(&im), 3.14159265 * radius * radius, 0.02 * area(&im));
     assert_near(at(&im, 32, 32, 3), 1, 0);
-    assert_near(at(&im, 32, 32, 0), 1, 0.01); /* faces the camera */
+    assert_near(at(&im, 32, 32, 0), 1, 0.01);    /* faces the camera */
     assert_true(at(&im, 32 + 15, 32, 0) < 0.75); /* the rim is darker */
     assert_near(at(&im, 32 + 18, 32, 3), 0, 0);
     image_free(&im);
@@ -76,7 +81,8 @@ static void a_sphere(void **state)
 static void turned(void **state)
 {
     (void)state;
-    const float center[3] = {0, 0, 4}, axes[3] = {2, 0.5f, 0.5f}, quat[4] = {cosf(0.39269908f), 0, 0, sinf(0.39269908f)};
+    const float center[3] = {0, 0, 4}, axes[3] = {2, 0.5f, 0.5f},
+                quat[4] = {cosf(0.39269908f), 0, 0, sinf(0.39269908f)};
     const ellipsoids set = {.count = 1, .center = center, .axes = axes, .quat = quat, .color = white};
     const gbt_camera camera = parallel_rays();
     image im = draw(&set, &camera);
@@ -89,7 +95,8 @@ static void turned(void **state)
 static void order_and_limits(void **state)
 {
     (void)state;
-    /* behind, in front, around the camera, behind it, not a number, a flat one seen from its edge, a point beside */
+    /* behind, in front, around the camera, behind it, not a number, a flat one seen from its edge, a point
+       beside */
     const float center[21] = {0, 0, 6, 0, 0, 4, 0, 0, 0.5f, 0, 0, -4, NAN, 0, 4, 0, 1.2f, 4, 1.2f, 0, 4};
     const float axes[21] = {2, 2, 2, 0.5f, 0.5f, 0.5f, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0.5f, 0, 0.5f, 0, 0, 0};
     const float color[21] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 0, 0, 1, 1, 1, 1, 1, 1, 0};
@@ -99,7 +106,8 @@ static void order_and_limits(void **state)
     assert_true(at(&im, 32, 32, 1) > 0.9 && at(&im, 32, 32, 0) == 0); /* the green one hides the red one */
     assert_true(at(&im, 32 + 12, 32 - 6, 0) > 0.4 && at(&im, 32 + 12, 32 - 6, 1) == 0);
     for (int i = 0; i < SIDE * SIDE; i++)
-        assert_true(im.pixels[4 * i + 2] == 0 || im.pixels[4 * i] > 0.2f); /* nothing blue: only what is white has blue */
+        assert_true(im.pixels[4 * i + 2] == 0 || im.pixels[4 * i] > 0.2f); /* nothing blue: only what is white
+                                                                              has blue */
     assert_true(at(&im, 32, 32 + 19, 2) > 0.3); /* not thinner than it can be seen */
     assert_true(at(&im, 32 + 19, 32, 3) == 1 && at(&im, 32 + 19, 32, 1) > 0.3);
     parallel_set_threads(3);
@@ -139,14 +147,17 @@ static void refuses(void **state)
     assert_ok(image_alloc(&im, SIDE, SIDE, 4, &assert_ok_err_));
     camera.model = GBT_CAMERA_FISHEYE;
     assert_int_equal(ellipsoids_draw(&set, &camera, &im, &err), GBT_ERR_ARGUMENT);
-    camera = pinhole(), camera.width = SIDE + 1, memset(&err, 0, sizeof err);
+    camera = pinhole();
+    camera.width = SIDE + 1;
+    memset(&err, 0, sizeof err);
     assert_int_equal(ellipsoids_draw(&set, &camera, &im, &err), GBT_ERR_ARGUMENT);
     image_free(&im);
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_sphere), cmocka_unit_test(turned), cmocka_unit_test(order_and_limits),
-                                       cmocka_unit_test(over_a_picture), cmocka_unit_test(refuses)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_sphere), cmocka_unit_test(turned),
+                                       cmocka_unit_test(order_and_limits), cmocka_unit_test(over_a_picture),
+                                       cmocka_unit_test(refuses)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,6 @@
-/* tests/render/test_insert.c -- meshes among Gaussians: occlusion, mirrors and shadows against the double reference. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/render/test_insert.c -- meshes among Gaussians: occlusion, mirrors and shadows against the double
+   reference. */
 #include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"
@@ -24,12 +26,16 @@ static gaussians cloud(uint64_t seed, const double low[3], const double high[3])
         g.mean_y[i] = (float)(low[1] + value[1] * (high[1] - low[1]));
         g.mean_z[i] = (float)(low[2] + value[2] * (high[2] - low[2]));
         g.scale_x[i] = (float)(0.05 + 0.3 * value[3]), g.scale_y[i] = (float)(0.05 + 0.3 * value[4]),
-            g.scale_z[i] = (float)(0.05 + 0.3 * value[5]);
+        g.scale_z[i] = (float)(0.05 + 0.3 * value[5]);
         const double length = sqrt(value[6] * value[6] + value[7] * value[7] + value[8] * value[8] + 1);
-        g.quat_w[i] = (float)(1 / length), g.quat_x[i] = (float)(value[6] / length);
-        g.quat_y[i] = (float)(value[7] / length), g.quat_z[i] = (float)(value[8] / length);
+        g.quat_w[i] = (float)(1 / length);
+        g.quat_x[i] = (float)(value[6] / length);
+        g.quat_y[i] = (float)(value[7] / length);
+        g.quat_z[i] = (float)(value[8] / length);
         g.opacity[i] = (float)(i % 2 == 0 ? 0.95 : 0.3 * value[9]);
-        g.red[i] = (float)value[10], g.green[i] = (float)value[11], g.blue[i] = (float)value[12];
+        g.red[i] = (float)value[10];
+        g.green[i] = (float)value[11];
+        g.blue[i] = (float)value[12];
     }
     gaussians_pad(&g);
     return g;
@@ -38,7 +44,10 @@ static gaussians cloud(uint64_t seed, const double low[3], const double high[3])
 /* A pinhole at the origin of the world that looks along z. */
 static ray_image look(void)
 {
-    const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = W, .height = H, .params = {30, 30, 0.5 * W, 0.5 * H},
+    const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE,
+                               .width = W,
+                               .height = H,
+                               .params = {30, 30, 0.5 * W, 0.5 * H},
                                .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     ray_image rays = {0};
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
@@ -67,7 +76,8 @@ typedef struct studio {
 /* A cloud with z from `near` to `far`. */
 static studio open_studio(uint64_t seed, double near, double far)
 {
-    studio st = {.g = cloud(seed, (const double[3]){-2, -1.5, near}, (const double[3]){2, 1.5, far}), .settings = trace_settings_default(),
+    studio st = {.g = cloud(seed, (const double[3]){-2, -1.5, near}, (const double[3]){2, 1.5, far}),
+                 .settings = trace_settings_default(),
                  .rays = look()};
     memcpy(st.settings.background, background, sizeof background);
     assert_ok(image_alloc(&st.rgb, W, H, 3, NULL));
@@ -135,8 +145,10 @@ static void occlusion(void **state)
         for (size_t i = 0; i < W * H; i++) {
             const float *behind = isfinite(st.rays.far[i]) ? matt.color : background;
             for (size_t k = 0; k < 3; k++)
-                assert_near((double)st.rgb.pixels[3 * i + k], rgb[3 * i + k] + left[i] * (double)behind[k], 1e-5);
-            seen += 1 - left[i], hidden += left[i];
+                assert_near((double)st.rgb.pixels[3 * i + k], rgb[3 * i + k] + left[i] * (double)behind[k],
+                            1e-5);
+            seen += 1 - left[i];
+            hidden += left[i];
         }
         assert_true(c->hidden == 1 ? seen == 0 : seen > 50);
         assert_true(hidden > 50);
@@ -159,8 +171,8 @@ static void elsewhere_nothing_changes(void **state)
     close_studio(&st, &in);
 }
 
-/* The camera at 0 looks into a mirror at z = 5: what is behind the camera is seen as from 10, looking back. There is no room before the
-   mirror, whatever there is before the camera. */
+/* The camera at 0 looks into a mirror at z = 5: what is behind the camera is seen as from 10, looking back.
+   There is no room before the mirror, whatever there is before the camera. */
 static void mirrored_camera(void **state)
 {
     (void)state;
@@ -181,7 +193,8 @@ static void mirrored_camera(void **state)
         for (size_t i = 0; i < W * H; i++) {
             seen += 1 - left[i];
             for (size_t k = 0; k < 3; k++)
-                assert_near((double)st.rgb.pixels[3 * i + k], (double)mirror.color[k] * (rgb[3 * i + k] + left[i] * (double)background[k]),
+                assert_near((double)st.rgb.pixels[3 * i + k],
+                            (double)mirror.color[k] * (rgb[3 * i + k] + left[i] * (double)background[k]),
                             1e-4);
         }
         assert_true(seen > 50);
@@ -203,8 +216,10 @@ static void smooth_plane(void **state)
         shoot(&st, &in);
         for (size_t i = 0; smooth && i < 3 * W * H; i++)
             assert_near((double)st.rgb.pixels[i], (double)flat_rgb.pixels[i], 1e-5);
-        if (!smooth)
-            flat_rgb = st.rgb, st.rgb = (image){0};
+        if (!smooth) {
+            flat_rgb = st.rgb;
+            st.rgb = (image){0};
+        }
         close_studio(&st, &in);
     }
     image_free(&flat_rgb);
@@ -277,7 +292,8 @@ static void shadow_of_gaussians(void **state)
                 loose += fabs((double)st.rgb.pixels[3 * i + k] - wanted) > 1e-4;
             }
         }
-        /* Where the lamp's ray starts is rounded, so that a Gaussian may fall to the other side of alpha_min. */
+        /* Where the lamp's ray starts is rounded, so that a Gaussian may fall to the other side of
+           alpha_min. */
         assert_true(loose <= 6);
         assert_true(c->at[2] < 10 ? dark > 20 : dark == 0);
         ray_image_free(&to_lamp);
@@ -291,21 +307,31 @@ static studio open_wall(void)
     studio st = open_studio(0, 3, 7);
     gaussians *g = &st.g;
     assert_ok(gaussians_resize(g, 1, NULL));
-    g->mean_x[0] = g->mean_y[0] = 0, g->mean_z[0] = 6;
-    g->scale_x[0] = g->scale_y[0] = 1000, g->scale_z[0] = 1e-3f;
-    g->quat_w[0] = 1, g->quat_x[0] = g->quat_y[0] = g->quat_z[0] = 0;
-    g->opacity[0] = 1, g->red[0] = 0.5f, g->green[0] = 0.25f, g->blue[0] = 1;
+    g->mean_x[0] = g->mean_y[0] = 0;
+    g->mean_z[0] = 6;
+    g->scale_x[0] = g->scale_y[0] = 1000;
+    g->scale_z[0] = 1e-3f;
+    g->quat_w[0] = 1;
+    g->quat_x[0] = g->quat_y[0] = g->quat_z[0] = 0;
+    g->opacity[0] = 1;
+    g->red[0] = 0.5f;
+    g->green[0] = 0.25f;
+    g->blue[0] = 1;
     gaussians_pad(g);
     return st;
 }
 
-/* The lamp at (-3, 0, 4) sees the screen, -0.6 < x < -0.2 at z = 5, in front of 1.8 < x < 2.6 of the wall. The camera sees the wall at
-   x = +-0.1, +-0.3 and so on; a lamp of radius 0.08 makes half shadows of about 0.16 to both sides of the edges. */
+/* The lamp at (-3, 0, 4) sees the screen, -0.6 < x < -0.2 at z = 5, in front of 1.8 < x < 2.6 of the wall.
+   The camera sees the wall at x = +-0.1, +-0.3 and so on; a lamp of radius 0.08 makes half shadows of about
+   0.16 to both sides of the edges. */
 static void shadow_on_gaussians(void **state)
 {
     (void)state;
     for (int soft = 0; soft < 2; soft++) {
-        insert_scene in = {.ambient = 0.25f, .lamp = INSERT_LAMP_POINT, .lamp_at = {-3, 0, 4}, .lamp_radius = soft ? 0.08 : 0};
+        insert_scene in = {.ambient = 0.25f,
+                           .lamp = INSERT_LAMP_POINT,
+                           .lamp_at = {-3, 0, 4},
+                           .lamp_radius = soft ? 0.08 : 0};
         studio st = open_wall();
         const float vertices[12] = {-0.6f, -50, 5, -0.2f, -50, 5, -0.2f, 50, 5, -0.6f, 50, 5};
         const uint32_t triangles[6] = {0, 1, 2, 2, 3, 0};
@@ -317,7 +343,8 @@ static void shadow_on_gaussians(void **state)
             if (x > -0.72 && x < -0.24)
                 continue; /* the screen itself */
             /* The wall's alpha is cut at 0.99. */
-            const double green = (double)st.rgb.pixels[3 * i + 1], light = (green - 0.01 * (double)background[1]) / (0.99 * 0.25);
+            const double green = (double)st.rgb.pixels[3 * i + 1],
+                         light = (green - 0.01 * (double)background[1]) / (0.99 * 0.25);
             const bool near_edge = fmin(fabs(x - 1.8), fabs(x - 2.6)) < 0.15;
             if (soft && near_edge) {
                 assert_true(light > 0.26 && light < 0.99);
@@ -341,7 +368,8 @@ static double lit(const double normal[3], const double point[3], const double la
     return ambient + (1 - ambient) * fabs(dvec_dot(d, normal));
 }
 
-/* The screen, -0.6 < x < -0.2 at z = 5, and its shadow, 1.8 < x < 2.6 at z = 7, each in the colour of its object. */
+/* The screen, -0.6 < x < -0.2 at z = 5, and its shadow, 1.8 < x < 2.6 at z = 7, each in the colour of its
+   object. */
 static void shadow_on_a_mesh(void **state)
 {
     (void)state;
@@ -362,8 +390,10 @@ static void shadow_on_a_mesh(void **state)
         const bool in_shadow = !on_screen && point[0] > 1.8 && point[0] < 2.6;
         const double light = in_shadow ? 0.25 : lit(normal, point, in.lamp_at, 0.25);
         for (size_t k = 0; k < 3; k++)
-            assert_near((double)st.rgb.pixels[3 * i + k], light * (double)(on_screen ? red : matt).color[k], 1e-5);
-        screen += on_screen, dark += in_shadow;
+            assert_near((double)st.rgb.pixels[3 * i + k], light * (double)(on_screen ? red : matt).color[k],
+                        1e-5);
+        screen += on_screen;
+        dark += in_shadow;
     }
     assert_true(screen >= H && dark >= 3 * H);
     close_studio(&st, &in);
@@ -381,22 +411,27 @@ static void no_surface_hides_itself(void **state)
         float corners[9];
         for (size_t c = 0; c < 3; c++) { /* around (0, 0, 6) */
             const double x = 200 * cos(2.1 * (double)c), y = 200 * sin(2.1 * (double)c);
-            vertices[3 * c] = x, vertices[3 * c + 1] = y, vertices[3 * c + 2] = 6 - (normal[0] * x + normal[1] * y) / normal[2];
+            vertices[3 * c] = x;
+            vertices[3 * c + 1] = y;
+            vertices[3 * c + 2] = 6 - (normal[0] * x + normal[1] * y) / normal[2];
             for (size_t k = 0; k < 3; k++)
                 corners[3 * c + k] = (float)vertices[3 * c + k];
         }
         const bool mirrors = seed % 2 == 1;
-        assert_ok(insert_add(&in, mirrors ? &mirror : &matt, corners, 3, (const uint32_t[3]){0, 1, 2}, 1, NULL));
+        assert_ok(
+            insert_add(&in, mirrors ? &mirror : &matt, corners, 3, (const uint32_t[3]){0, 1, 2}, 1, NULL));
         shoot(&st, &in);
         for (size_t i = 0; i < W * H; i++) {
-            const double d[3] = {(double)st.rays.dir[3 * i], (double)st.rays.dir[3 * i + 1], (double)st.rays.dir[3 * i + 2]};
+            const double d[3] = {(double)st.rays.dir[3 * i], (double)st.rays.dir[3 * i + 1],
+                                 (double)st.rays.dir[3 * i + 2]};
             const double t = 6 * normal[2] / dvec_dot(d, normal), point[3] = {t * d[0], t * d[1], t * d[2]};
             if (!(t > 0 && t < 40))
                 continue;
             for (size_t k = 0; k < 3; k++)
                 assert_near((double)st.rgb.pixels[3 * i + k],
                             mirrors ? (double)(mirror.color[k] * background[k])
-                                    : (double)matt.color[k] * lit(normal, point, in.lamp_at, 0.25), 2e-5);
+                                    : (double)matt.color[k] * lit(normal, point, in.lamp_at, 0.25),
+                            2e-5);
         }
         close_studio(&st, &in);
     }
@@ -408,7 +443,8 @@ static void threads_agree(void **state)
     image first = {0};
     for (int threads = 1; threads <= 4; threads += 3) {
         parallel_set_threads(threads);
-        insert_scene in = {.ambient = 0.3f, .lamp = INSERT_LAMP_POINT, .lamp_at = {1, -3, 2}, .lamp_radius = 0.3};
+        insert_scene in = {
+            .ambient = 0.3f, .lamp = INSERT_LAMP_POINT, .lamp_at = {1, -3, 2}, .lamp_radius = 0.3};
         studio st = open_studio(7, 3, 7);
         insert_object object = mirror;
         object.smooth = true;
@@ -418,8 +454,10 @@ static void threads_agree(void **state)
         shoot(&st, &in);
         if (threads > 1)
             assert_memory_equal(first.pixels, st.rgb.pixels, W * H * 3 * sizeof *first.pixels);
-        else
-            first = st.rgb, st.rgb = (image){0};
+        else {
+            first = st.rgb;
+            st.rgb = (image){0};
+        }
         close_studio(&st, &in);
     }
     image_free(&first);
@@ -449,17 +487,26 @@ static void without_memory(void **state)
 
 int main(void)
 {
-    enum { PLANES = sizeof plane_cases / sizeof *plane_cases, LAMPS = sizeof lamp_cases / sizeof *lamp_cases };
+    enum {
+        PLANES = sizeof plane_cases / sizeof *plane_cases,
+        LAMPS = sizeof lamp_cases / sizeof *lamp_cases
+    };
     static struct CMUnitTest tables[PLANES + LAMPS];
     for (size_t i = 0; i < PLANES; i++)
-        tables[i] = (struct CMUnitTest){.name = plane_cases[i].name, .test_func = occlusion, .initial_state = &plane_cases[i]};
+        tables[i] = (struct CMUnitTest){
+            .name = plane_cases[i].name, .test_func = occlusion, .initial_state = &plane_cases[i]};
     for (size_t i = 0; i < LAMPS; i++)
-        tables[PLANES + i] = (struct CMUnitTest){.name = lamp_cases[i].name, .test_func = shadow_of_gaussians,
-                                                 .initial_state = &lamp_cases[i]};
+        tables[PLANES + i] = (struct CMUnitTest){
+            .name = lamp_cases[i].name, .test_func = shadow_of_gaussians, .initial_state = &lamp_cases[i]};
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(elsewhere_nothing_changes), cmocka_unit_test(mirrored_camera),  cmocka_unit_test(smooth_plane),
-        cmocka_unit_test(mirrors_end),               cmocka_unit_test(shadow_on_gaussians), cmocka_unit_test(shadow_on_a_mesh),
-        cmocka_unit_test(no_surface_hides_itself),   cmocka_unit_test(threads_agree),
+        cmocka_unit_test(elsewhere_nothing_changes),
+        cmocka_unit_test(mirrored_camera),
+        cmocka_unit_test(smooth_plane),
+        cmocka_unit_test(mirrors_end),
+        cmocka_unit_test(shadow_on_gaussians),
+        cmocka_unit_test(shadow_on_a_mesh),
+        cmocka_unit_test(no_surface_hides_itself),
+        cmocka_unit_test(threads_agree),
         cmocka_unit_test(without_memory),
     };
     const int failures = cmocka_run_group_tests_name("insert, tables", tables, NULL, NULL);

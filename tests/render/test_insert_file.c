@@ -1,4 +1,6 @@
-/* tests/render/test_insert_file.c -- insert files: what each field means, and one clear line about what is wrong. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/render/test_insert_file.c -- insert files: what each field means, and one clear line about what is
+   wrong. */
 #include <unistd.h>
 
 #include "base/file.h"
@@ -47,10 +49,11 @@ static void defaults(void **state)
 {
     (void)state;
     insert_scene in = read_good("{\"objects\": [{\"mesh\": \"m.obj\"}]}", none);
-    assert_true(in.lamp == INSERT_NO_LAMP && in.ambient == 1 && in.object_count == 1 && in.triangle_count == 1 && in.vertex_count == 4);
+    assert_true(in.lamp == INSERT_NO_LAMP && in.ambient == 1 && in.object_count == 1 &&
+                in.triangle_count == 1 && in.vertex_count == 4);
     const insert_object *o = in.objects;
-    assert_true(o->material == INSERT_MATT && !o->smooth && o->color[0] == 0.8f && o->color[1] == 0.8f && o->color[2] == 0.8f &&
-                o->triangle_end == 1);
+    assert_true(o->material == INSERT_MATT && !o->smooth && o->color[0] == 0.8f && o->color[1] == 0.8f &&
+                o->color[2] == 0.8f && o->triangle_end == 1);
     const float vertices[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 9, 9, 9};
     assert_memory_equal(in.vertices, vertices, sizeof vertices);
     assert_true(in.reach >= 9 && in.reach < 9.01f && in.offset_min > 0);
@@ -63,19 +66,22 @@ static void placed(void **state)
 {
     (void)state;
     const double origin[3] = {1000000, 0, -5};
-    insert_scene in = read_good("{\"light\": {\"position\": [1000001, 2, 3], \"radius\": 0.5, \"ambient\": 0.125},"
-                                " \"objects\": [{\"mesh\": \"m.obj\", \"material\": \"mirror\", \"color\": [0, 0.5, 1], \"smooth\": true, "
-                                "\"position\": [1000000.25, 1, 0],"
-                                " \"scale\": 2, \"axis\": [0, 0, 3], \"angle_deg\": 90}, {\"mesh\": \"m.obj\", \"position\": [1000000, 0, "
-                                "-5]}]}", origin);
+    insert_scene in =
+        read_good("{\"light\": {\"position\": [1000001, 2, 3], \"radius\": 0.5, \"ambient\": 0.125}, "
+                  "\"objects\": [{\"mesh\": \"m.obj\", \"material\": \"mirror\", \"color\": [0, 0.5, 1], "
+                  "\"smooth\": true, \"position\": [1000000.25, 1, 0], \"scale\": 2, \"axis\": [0, 0, 3], "
+                  "\"angle_deg\": 90}, {\"mesh\": \"m.obj\", \"position\": [1000000, 0, -5]}]}",
+                  origin);
     const double wanted[6] = {0.25, 3, 5, -1.75, 1, 5};
     for (int i = 0; i < 6; i++)
         assert_near((double)in.vertices[i], wanted[i], 1e-6);
     assert_near((double)in.vertices[12], 1, 0);
-    assert_true(in.lamp == INSERT_LAMP_POINT && in.lamp_at[0] == 1 && in.lamp_at[1] == 2 && in.lamp_at[2] == 8 && in.lamp_radius == 0.5 &&
-                in.ambient == 0.125f);
-    assert_true(in.objects[0].material == INSERT_MIRROR && in.objects[0].smooth && in.objects[0].color[1] == 0.5f);
-    assert_true(in.objects[1].material == INSERT_MATT && in.objects[1].triangle_end == 2 && in.triangles[3] == 4);
+    assert_true(in.lamp == INSERT_LAMP_POINT && in.lamp_at[0] == 1 && in.lamp_at[1] == 2 &&
+                in.lamp_at[2] == 8 && in.lamp_radius == 0.5 && in.ambient == 0.125f);
+    assert_true(in.objects[0].material == INSERT_MIRROR && in.objects[0].smooth &&
+                in.objects[0].color[1] == 0.5f);
+    assert_true(in.objects[1].material == INSERT_MATT && in.objects[1].triangle_end == 2 &&
+                in.triangles[3] == 4);
     insert_scene_free(&in);
     in = read_good("{\"light\": {\"towards\": [0, -3, 4]}, \"objects\": [{\"mesh\": \"m.obj\"}]}", origin);
     assert_true(in.lamp == INSERT_LAMP_DISTANT && in.ambient == 0.4f);
@@ -95,7 +101,8 @@ static const struct bad_case {
     {"{\"objects\": []}", ": objects: wanted a list of 1 to 1000 objects"},
     {"{\"objects\": {}}", ": objects: wanted a list of 1 to 1000 objects"},
     {"{\"objects\": [3]}", ": objects[0].mesh: missing (wanted an object with a mesh)"},
-    {"{\"objects\": [{\"mesh\": \"m.obj\"}, {}]}", ": objects[1].mesh: wanted the name of an OBJ or PLY file"},
+    {"{\"objects\": [{\"mesh\": \"m.obj\"}, {}]}",
+     ": objects[1].mesh: wanted the name of an OBJ or PLY file"},
     {"{\"object\": []}", ": object: unknown field (wanted one of objects light)"},
     {ONE(", \"colour\": [1, 1, 1]"), ": objects[0].colour: unknown field (wanted one of mesh material color"},
     {ONE(", \"material\": \"glass\""), ": objects[0].material: wanted one of matt, mirror"},
@@ -108,16 +115,20 @@ static const struct bad_case {
     {ONE(", \"axis\": [1, 0, 0]"), ": objects[0].angle_deg: missing (a turn has both)"},
     {ONE(", \"angle_deg\": 3"), ": objects[0].axis: missing (a turn has both)"},
     {ONE(", \"axis\": [0, 0, 0], \"angle_deg\": 3"), ": objects[0].axis: is 0 (wanted a direction)"},
-    {ONE(", \"axis\": [0, 0, 1], \"angle_deg\": 361"), ": objects[0].angle_deg: wanted a number in [-360, 360]"},
+    {ONE(", \"axis\": [0, 0, 1], \"angle_deg\": 361"),
+     ": objects[0].angle_deg: wanted a number in [-360, 360]"},
     {LIGHT("[1, 2, 3]"), ": light: wanted an object with position or towards"},
     {LIGHT("{}"), ": light: wanted one of position and towards"},
-    {LIGHT("{\"position\": [1, 2, 3], \"towards\": [1, 2, 3]}"), ": light: wanted one of position and towards"},
+    {LIGHT("{\"position\": [1, 2, 3], \"towards\": [1, 2, 3]}"),
+     ": light: wanted one of position and towards"},
     {LIGHT("{\"position\": [1, 2]}"), ": light.position: wanted 3 numbers"},
     {LIGHT("{\"towards\": [0, 0, 0]}"), ": light.towards: is 0 (wanted a direction)"},
-    {LIGHT("{\"towards\": [0, 0, 1], \"radius\": 1}"), ": light.radius: a distant lamp has none (wanted it with position)"},
+    {LIGHT("{\"towards\": [0, 0, 1], \"radius\": 1}"),
+     ": light.radius: a distant lamp has none (wanted it with position)"},
     {LIGHT("{\"position\": [0, 0, 1], \"radius\": -1}"), ": light.radius: wanted a number in [0, 1e+15]"},
     {LIGHT("{\"position\": [0, 0, 1], \"ambient\": 2}"), ": light.ambient: wanted a number in [0, 1]"},
-    {LIGHT("{\"at\": [0, 0, 1]}"), ": light.at: unknown field (wanted one of position towards radius ambient)"},
+    {LIGHT("{\"at\": [0, 0, 1]}"),
+     ": light.at: unknown field (wanted one of position towards radius ambient)"},
 };
 
 static void says_what_is_wrong(void **state)
@@ -161,7 +172,8 @@ static void without_memory(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(defaults), cmocka_unit_test(placed), cmocka_unit_test(says_what_is_wrong),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(defaults), cmocka_unit_test(placed),
+                                       cmocka_unit_test(says_what_is_wrong),
                                        cmocka_unit_test(without_memory)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -1,4 +1,6 @@
-/* tests/render/test_render_outputs.c -- outputs beside a picture: their list, the files and channels, the anchor behind each ray. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/render/test_render_outputs.c -- outputs beside a picture: their list, the files and channels, the
+   anchor behind each ray. */
 #include <unistd.h>
 
 #include "anchor/fixture.h"
@@ -12,11 +14,16 @@ static const char *const names[] = {"transmittance", "depth", "median-depth", "n
 static void lists_of_outputs(void **state)
 {
     (void)state;
-    static const struct { const char *list; unsigned wanted; } good[] = {
-        {NULL, 0}, {"transmittance", 1}, {"depth", 2}, {"median-depth", 4}, {"normal", 8}, {"hits", 16}, {"anchor", 32},
-        {"anchor,depth", 34},
-        {"depth,depth", 2}, {"transmittance,depth,median-depth,normal,hits,anchor", 63}};
-    static const char *const bad[] = {"", "Depth", "dept", "depths", "depth,", ",depth", "depth,,hits", "depth hits"};
+    static const struct {
+        const char *list;
+        unsigned wanted;
+    } good[] = {{NULL, 0},          {"transmittance", 1},
+                {"depth", 2},       {"median-depth", 4},
+                {"normal", 8},      {"hits", 16},
+                {"anchor", 32},     {"anchor,depth", 34},
+                {"depth,depth", 2}, {"transmittance,depth,median-depth,normal,hits,anchor", 63}};
+    static const char *const bad[] = {"",       "Depth",  "dept",        "depths",
+                                      "depth,", ",depth", "depth,,hits", "depth hits"};
     unsigned wanted;
     for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
         assert_ok(render_outputs_parse(good[i].list, &wanted, NULL));
@@ -35,7 +42,8 @@ static loaded_run *random_run(const ray_shot *shot)
     for (size_t i = 0; i < ANCHORS; i++)
         for (size_t k = 0; k < 6; k++)
             r->model.anchors.scale_log[6 * i + k] = -2.5f;
-    assert_ok(frame_render_shot(&r->frame, frame_neural(&r->model.anchors, &r->model.decoder), shot, &r->settings, NULL));
+    assert_ok(frame_render_shot(&r->frame, frame_neural(&r->model.anchors, &r->model.decoder), shot,
+                                &r->settings, NULL));
     return r;
 }
 
@@ -46,8 +54,9 @@ static bool belongs_to(const gaussians *g, size_t i, const anchors *a, size_t an
     for (size_t k = 0; k < OFFSETS; k++) {
         float square = 0;
         for (size_t c = 0; c < 3; c++) {
-            const float d = a->position[3 * anchor + c] + a->offset[3 * (OFFSETS * anchor + k) +
-                                                                    c] * expf(a->scale_log[6 * anchor + c]) - mean[c];
+            const float d = a->position[3 * anchor + c] +
+                            a->offset[3 * (OFFSETS * anchor + k) + c] * expf(a->scale_log[6 * anchor + c]) -
+                            mean[c];
             square += d * d;
         }
         if (square < 1e-10f)
@@ -60,10 +69,17 @@ static void files_hold_what_was_traced(void **state)
 {
     (void)state;
     char folder[] = "/tmp/gbt_outputs_XXXXXX", path[96];
-    gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = WIDTH, .height = HEIGHT, .center = {0, 0, -5}, .params = {24, 24, 20, 12},
+    gbt_camera camera = {.model = GBT_CAMERA_PINHOLE,
+                         .width = WIDTH,
+                         .height = HEIGHT,
+                         .center = {0, 0, -5},
+                         .params = {24, 24, 20, 12},
                          .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     ray_shot shot = ray_shot_of(&camera);
-    shot.aperture_radius = 0.05, shot.focus_distance = 5, shot.samples = 2; /* outputs are those of the pinhole in its middle */
+    /* outputs are those of the pinhole in its middle */
+    shot.aperture_radius = 0.05;
+    shot.focus_distance = 5;
+    shot.samples = 2;
     loaded_run *r = random_run(&shot);
     assert_non_null(mkdtemp(folder));
     assert_ok(render_outputs_write(r, &shot, 63, folder, "view", NULL));
@@ -85,8 +101,10 @@ static void files_hold_what_was_traced(void **state)
     ray_image rays = {0};
     assert_ok(image_alloc(&rgb, WIDTH, HEIGHT, 3, NULL));
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-    assert_ok(trace_forward(&r->frame.scene, &rays, false, &(trace_outputs){.rgb = &rgb, .depth = depth, .hit_count = hits,
-                                                                            .strongest = strongest}, NULL, NULL));
+    assert_ok(trace_forward(
+        &r->frame.scene, &rays, false,
+        &(trace_outputs){.rgb = &rgb, .depth = depth, .hit_count = hits, .strongest = strongest}, NULL,
+        NULL));
     size_t seen = 0, empty = 0, anchors_seen = 0;
     float last = -1;
     for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
@@ -97,8 +115,11 @@ static void files_hold_what_was_traced(void **state)
         empty += anchor < 0;
         if (anchor < 0)
             continue;
-        seen++, anchors_seen += anchor != last, last = anchor;
-        assert_true(anchor < ANCHORS && belongs_to(&r->frame.gaussians, strongest[i], &r->model.anchors, (size_t)anchor));
+        seen++;
+        anchors_seen += anchor != last;
+        last = anchor;
+        assert_true(anchor < ANCHORS &&
+                    belongs_to(&r->frame.gaussians, strongest[i], &r->model.anchors, (size_t)anchor));
         const float *n = of[3].pixels + 3 * i;
         assert_true(sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) <= 1 - of[0].pixels[i] + 1e-5f);
     }

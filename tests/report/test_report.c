@@ -1,4 +1,6 @@
-/* tests/report/test_report.c -- the page of a run: whole, escaped, without the network, whatever is missing. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/report/test_report.c -- the page of a run: whole, escaped, without the network, whatever is
+   missing. */
 #include <ctype.h>
 #include <jansson.h>
 #include <sys/stat.h>
@@ -20,7 +22,7 @@
 
 static char folder[] = "/tmp/gbt_report_XXXXXX";
 
-/* ---- a folder to write into --------------------------------------------------------------------------------------------------- */
+/* ---- a folder to write into ---- */
 
 static void in_folder(char out[VIEW_PATH_SIZE], const char *name)
 {
@@ -36,7 +38,8 @@ static int make_folder(void **state)
 static int remove_folder(void **state)
 {
     (void)state;
-    static const char *const names[] = {"log.csv", "report.html", "render.png", "photo.png", "error.png", "torn.png"};
+    static const char *const names[] = {"log.csv",   "report.html", "render.png",
+                                        "photo.png", "error.png",   "torn.png"};
     char path[VIEW_PATH_SIZE];
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         in_folder(path, names[i]);
@@ -71,7 +74,7 @@ static void write_picture(const char *name, int width, int height, int channels,
     image_free(&im);
 }
 
-/* ---- what a page must be ------------------------------------------------------------------------------------------------------ */
+/* ---- what a page must be ---- */
 
 /** The page without the pixels: what "data:" URIs hold is arbitrary text. Free with free(). */
 static char *read_page(void)
@@ -88,14 +91,16 @@ static char *read_page(void)
         static const char start[] = "data:image/jpeg;base64,", other_start[] = "data:image/png;base64,";
         const bool is_jpeg = strncmp((char *)bytes + i, start, sizeof start - 1) == 0;
         if (is_jpeg || strncmp((char *)bytes + i, other_start, sizeof other_start - 1) == 0) {
-            memcpy(page + used, "PIXELS", 6), used += 6;
+            memcpy(page + used, "PIXELS", 6);
+            used += 6;
             i += is_jpeg ? sizeof start - 1 : sizeof other_start - 1;
             const size_t first = i;
             while (isalnum(bytes[i]) || bytes[i] == '+' || bytes[i] == '/' || bytes[i] == '=')
                 i++;
             assert_int_equal((i - first) % 4, 0);
             assert_int_equal(bytes[i], '"');
-            assert_memory_equal(bytes + first, is_jpeg ? "/9j/" : "iVBO", 4); /* FF D8 FF: a JPEG; 89 50 4E: a PNG */
+            assert_memory_equal(bytes + first, is_jpeg ? "/9j/" : "iVBO", 4); /* FF D8 FF: a JPEG; 89 50 4E: a
+                                                                                 PNG */
         } else {
             page[used++] = (char)bytes[i++];
         }
@@ -158,7 +163,8 @@ static void assert_balanced(const char *page)
         at++;
         if (closes) {
             if (depth == 0 || strcmp(open[depth - 1], name) != 0)
-                fail_msg("</%s> closes <%s> before: %.60s", name, depth > 0 ? open[depth - 1] : "nothing", at);
+                fail_msg("</%s> closes <%s> before: %.60s", name, depth > 0 ? open[depth - 1] : "nothing",
+                         at);
             depth--;
         } else if (!self_closed && !is_void_element(name)) {
             assert_true(depth < 64);
@@ -175,7 +181,8 @@ static void assert_no_number_word(const char *page, const char *word)
 {
     const size_t length = strlen(word);
     for (const char *at = page; *at != '\0'; at++)
-        if (strncasecmp(at, word, length) == 0 && !isalpha((unsigned char)at[length]) && (at == page || !isalpha((unsigned char)at[-1])))
+        if (strncasecmp(at, word, length) == 0 && !isalpha((unsigned char)at[length]) &&
+            (at == page || !isalpha((unsigned char)at[-1])))
             fail_msg("%s: %.80s", word, at > page + 30 ? at - 30 : page);
 }
 
@@ -199,14 +206,14 @@ static char *check_page(void)
     return page;
 }
 
-/* ---- inputs ------------------------------------------------------------------------------------------------------------------- */
+/* ---- inputs ---- */
 
 static const char log_header[] =
-    "step,seconds,progress,width,height,loss,l1,ssim,train_psnr,test_psnr,anchors,gaussians,visible_anchors,blended_per_ray,"
-                                 "rays_per_second,memory_bytes\n";
+    "step,seconds,progress,width,height,loss,l1,ssim,train_psnr,test_psnr,anchors,gaussians,visible_anchors,"
+    "blended_per_ray,rays_per_second,memory_bytes\n";
 
-static const char stage_names[] =
-    ",photo_ms,rays_ms,visible_ms,decode_ms,build_ms,trace_ms,loss_ms,adjoint_ms,decode_adjoint_ms,optimizer_ms,adjust_ms\n";
+static const char stage_names[] = ",photo_ms,rays_ms,visible_ms,decode_ms,build_ms,trace_ms,loss_ms,adjoint_"
+                                  "ms,decode_adjoint_ms,optimizer_ms,adjust_ms\n";
 
 static void write_log(int rows, const char *tail)
 {
@@ -214,9 +221,11 @@ static void write_log(int rows, const char *tail)
     assert_non_null(csv);
     int used = sprintf(csv, "%.*s%s", (int)strlen(log_header) - 1, log_header, stage_names);
     for (int i = 0; i < rows; i++)
-        used += sprintf(csv + used, "%d,%.3f,0.1,%d,%d,%.6f,0.1,0.5,%.4f,,%d,%d,300,20.5,%d,1000,1,2,3,4,5,6,7,8,9,10,11\n", 10 * (i + 1),
-                        1.01 * (i + 1), i < rows / 2 ? 120 : 240, i < rows / 2 ? 90 : 180, 0.4 / (1 + i), 10 + 15.0 * i / rows, 1000 + i,
-                        5000 + 7 * i, 400000 + 100 * i);
+        used +=
+            sprintf(csv + used,
+                    "%d,%.3f,0.1,%d,%d,%.6f,0.1,0.5,%.4f,,%d,%d,300,20.5,%d,1000,1,2,3,4,5,6,7,8,9,10,11\n",
+                    10 * (i + 1), 1.01 * (i + 1), i < rows / 2 ? 120 : 240, i < rows / 2 ? 90 : 180,
+                    0.4 / (1 + i), 10 + 15.0 * i / rows, 1000 + i, 5000 + 7 * i, 400000 + 100 * i);
     strcpy(csv + used, tail);
     write_text("log.csv", csv);
     free(csv);
@@ -224,25 +233,37 @@ static void write_log(int rows, const char *tail)
 
 static json_t *full_metrics(void)
 {
-    return json_pack("{s:s,s:s,s:s,s:s,s:i,s:i,s:i,s:i,s:i,s:f,s:f,s:f,s:f,s:{s:f,s:f,s:f,s:f},s:[i,i,i],s:[{s:f,s:i,s:f}],s:f,s:s,s:i,s:i,s:s,s:s,s:I}", "command",
-                     "gbtrace train 'a <b> & \"c\"' -o run", "data", "/data/<script>alert(1)</script>/", "start", "900 sparse points",
-                     "protocol", "8-bit images", "points", 900, "anchors_initial", 700, "anchors_final", 1234567, "iterations", 1000,
-                     "skipped_steps", 0, "train_seconds", 61.5, "rays_per_second", 387187.4, "hits_per_ray", 87.7, "blended_per_ray", 75.6,
-                     "stage_ms_per_step", "trace", 146.9, "adjoint", 90.6, "build", 32.4, "all", 300.1, "pace", 333, 333, 334, "held_out",
-                     "seconds", 20.1, "step", 168, "psnr", 19.88, "downscale", 2.0, "eval_split", "every=8", "seed", 7, "threads", 2, "isa",
-                     "avx2", "embree_version", "3.13.5", "peak_memory_bytes", (json_int_t)2518880256);
+    return json_pack(
+        "{s:s,s:s,s:s,s:s,s:i,s:i,s:i,s:i,s:i,s:f,s:f,s:f,s:f,s:{s:f,s:f,s:f,s:f},s:[i,i,i],s:[{s:f,s:i,s:f}]"
+        ",s:f,s:s,s:i,s:i,s:s,s:s,s:I}",
+        "command", "gbtrace train 'a <b> & \"c\"' -o run", "data", "/data/<script>alert(1)</script>/",
+        "start", "900 sparse points", "protocol", "8-bit images", "points", 900, "anchors_initial", 700,
+        "anchors_final", 1234567, "iterations", 1000, "skipped_steps", 0, "train_seconds", 61.5,
+        "rays_per_second", 387187.4, "hits_per_ray", 87.7, "blended_per_ray", 75.6, "stage_ms_per_step",
+        "trace", 146.9, "adjoint", 90.6, "build", 32.4, "all", 300.1, "pace", 333, 333, 334, "held_out",
+        "seconds", 20.1, "step", 168, "psnr", 19.88, "downscale", 2.0, "eval_split", "every=8", "seed", 7,
+        "threads", 2, "isa", "avx2", "embree_version", "3.13.5", "peak_memory_bytes", (json_int_t)2518880256);
 }
 
 static evaluation make_views(size_t count)
 {
-    evaluation e = {.view_count = count, .psnr = 24.25, .ssim = 0.8125, .flip = 0.125, .gaussians_per_view = 54321, .anchors = 1234567,
+    evaluation e = {.view_count = count,
+                    .psnr = 24.25,
+                    .ssim = 0.8125,
+                    .flip = 0.125,
+                    .gaussians_per_view = 54321,
+                    .anchors = 1234567,
                     .model_bytes = 5182216};
     e.views = calloc(count + 1, sizeof *e.views);
     assert_non_null(e.views);
     for (size_t i = 0; i < count; i++) {
         view_score *v = &e.views[i];
         snprintf(v->name, sizeof v->name, "view_%zu.jpg", i);
-        v->psnr = 20 + (double)((i * 7) % count), v->ssim = 0.5, v->flip = 0.25, v->seconds = 0.125, v->gaussians = 54321;
+        v->psnr = 20 + (double)((i * 7) % count);
+        v->ssim = 0.5;
+        v->flip = 0.25;
+        v->seconds = 0.125;
+        v->gaussians = 54321;
         in_folder(v->render_path, "render.png");
         in_folder(v->photo_path, "photo.png");
         in_folder(v->error_path, "error.png");
@@ -263,7 +284,7 @@ static char *write_report(const evaluation *e, const json_t *metrics)
     return check_page();
 }
 
-/* ---- the page ----------------------------------------------------------------------------------------------------------------- */
+/* ---- the page ---- */
 
 static void whole_page(void **state)
 {
@@ -275,20 +296,45 @@ static void whole_page(void **state)
     json_t *metrics = full_metrics();
     assert_non_null(metrics);
     char *page = write_report(&e, metrics);
-    static const struct { const char *text; size_t least; } wanted[] = {
-        {"&lt;img src=x onerror=&#39;a&#39;&gt;&amp;&quot;\xef\xbf\xbd?.jpg", 5}, /* heading, slider, three pictures' texts */
-        {"<h1>script&gt;</h1>", 1},                                                /* the last part of the path */
+    static const struct {
+        const char *text;
+        size_t least;
+    } wanted[] = {
+        {"&lt;img src=x onerror=&#39;a&#39;&gt;&amp;&quot;\xef\xbf\xbd?.jpg", 5}, /* heading, slider, three
+                                                                                     pictures' texts */
+        {"<h1>script&gt;</h1>", 1}, /* the last part of the path */
         {"gbtrace train &#39;a &lt;b&gt; &amp; &quot;c&quot;&#39; -o run", 2},
-        {"--pace 333,333,334", 1}, {"24.25", 1}, {"0.8125", 1}, {"0.1250", 1}, {"1,234,567", 2}, {"54,321", 2}, {"5.18 MB", 2},
+        {"--pace 333,333,334", 1},
+        {"24.25", 1},
+        {"0.8125", 1},
+        {"0.1250", 1},
+        {"1,234,567", 2},
+        {"54,321", 2},
+        {"5.18 MB", 2},
         {"61.5 s", 2},
-        {"5,182,216 bytes", 1}, {"2.52 GB", 1}, {"PIXELS", 9}, {"type=\"range\"", 3}, {"<svg ", 5}, {"<title>", 100},
+        {"5,182,216 bytes", 1},
+        {"2.52 GB", 1},
+        {"PIXELS", 9},
+        {"type=\"range\"", 3},
+        {"<svg ", 5},
+        {"<title>", 100},
         {"held-out 19.88 at 20.10 s", 1},
-        {"held-out 24.25 at 61.50 s", 1}, {"240\xc3\x97" "180 px", 1}, {"avx2", 1}, {"every=8", 1}, {"900 sparse points", 1},
-        {"grow and prune", 1}, {">Render, s<", 1}, {"Made by gbtrace " GBT_VERSION, 1}, {"\xc2\xa0ms</td>", 1},
+        {"held-out 24.25 at 61.50 s", 1},
+        {"240\xc3\x97"
+         "180 px",
+         1},
+        {"avx2", 1},
+        {"every=8", 1},
+        {"900 sparse points", 1},
+        {"grow and prune", 1},
+        {">Render, s<", 1},
+        {"Made by gbtrace " GBT_VERSION, 1},
+        {"\xc2\xa0ms</td>", 1},
     };
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++)
         if (occurrences(page, wanted[i].text) < wanted[i].least)
-            fail_msg("\"%s\": %zu times, wanted %zu", wanted[i].text, occurrences(page, wanted[i].text), wanted[i].least);
+            fail_msg("\"%s\": %zu times, wanted %zu", wanted[i].text, occurrences(page, wanted[i].text),
+                     wanted[i].least);
     assert_null(strstr(page, "<img src=x"));
     assert_null(strstr(page, "<script>alert"));
     assert_null(strstr(page, "class=\"none\""));
@@ -304,7 +350,13 @@ static void whole_page(void **state)
     free(e.views);
 }
 
-typedef struct bare_case { const char *name, *log; bool has_metrics; size_t views; bool has_pictures; size_t empty_charts; } bare_case;
+typedef struct bare_case {
+    const char *name, *log;
+    bool has_metrics;
+    size_t views;
+    bool has_pictures;
+    size_t empty_charts;
+} bare_case;
 
 static const bare_case bare_cases[] = {
     {"nothing at all", NULL, false, 0, false, 8},
@@ -336,7 +388,9 @@ static void bare_page(void **state)
         e.psnr = e.ssim = e.flip = e.gaussians_per_view = (double)NAN;
         e.model_bytes = e.anchors = 0;
     } else {
-        e.views[0].psnr = (double)NAN, e.views[0].ssim = (double)NAN, e.views[0].flip = (double)NAN;
+        e.views[0].psnr = (double)NAN;
+        e.views[0].ssim = (double)NAN;
+        e.views[0].flip = (double)NAN;
     }
     char *page = write_report(&e, metrics);
     assert_int_equal(occurrences(page, "n/a: nothing was"), c->empty_charts);
@@ -350,24 +404,29 @@ static void bare_page(void **state)
     free(e.views);
 }
 
-/* ---- the scene ---------------------------------------------------------------------------------------------------------------- */
+/* ---- the scene ---- */
 
 enum { POINTS = 200, VIEWS = 5 };
 
 /**
- * A cloud in a box, an untrained model of it, cameras around it; the photos are the pictures of this folder. Free with loaded_run_close().
+ * A cloud in a box, an untrained model of it, cameras around it; the photos are the pictures of this folder.
+ * Free with loaded_run_close().
  */
 static loaded_run *make_run(gbt_camera_model lens)
 {
     loaded_run *r = calloc(1, sizeof *r);
     assert_non_null(r);
-    r->def = gbt_train_def_default(), r->settings = trace_settings_default();
+    r->def = gbt_train_def_default();
+    r->settings = trace_settings_default();
     scene *s = &r->scene;
-    s->view_count = VIEWS, s->points.count = POINTS, s->points.has_color = true;
+    s->view_count = VIEWS;
+    s->points.count = POINTS;
+    s->points.has_color = true;
     s->views = mem_calloc(VIEWS, sizeof *s->views, "views", NULL);
     s->points.position = mem_calloc(POINTS, 3 * sizeof(float), "points", NULL),
-        s->points.color = mem_calloc(POINTS, 3 * sizeof(float), "points", NULL);
-    r->model.anchors.offset_count = 2, r->model.voxel_size = 0.1f;
+    s->points.color = mem_calloc(POINTS, 3 * sizeof(float), "points", NULL);
+    r->model.anchors.offset_count = 2;
+    r->model.voxel_size = 0.1f;
     assert_ok(anchors_resize(&r->model.anchors, POINTS, &assert_ok_err_));
     assert_ok(decoder_init(&r->model.decoder, 2, false, 1, &assert_ok_err_));
     for (uint64_t i = 0; i < 3 * POINTS; i++) {
@@ -381,7 +440,9 @@ static loaded_run *make_run(gbt_camera_model lens)
         scene_view *v = &s->views[i];
         char name[32];
         snprintf(name, sizeof name, "view_%d<&>.jpg", i);
-        v->name = strdup(name), v->path = mem_calloc(VIEW_PATH_SIZE, 1, "path", NULL), v->is_test = i < 2;
+        v->name = strdup(name);
+        v->path = mem_calloc(VIEW_PATH_SIZE, 1, "path", NULL);
+        v->is_test = i < 2;
         in_folder(v->path, "photo.png");
         v->camera = (gbt_camera){.model = lens, .width = 24, .height = 16, .params = {24, 24, 12, 8}};
         assert_true(gbt_camera_look_at(at, middle, up, &v->camera));
@@ -403,9 +464,14 @@ static void close_run(loaded_run *r)
 static void scene_on_the_page(void **state)
 {
     (void)state;
-    static const struct { gbt_camera_model lens; size_t layers; bool has_photos, has_points; } cases[] = {
-        {GBT_CAMERA_PINHOLE, 6, true, true}, {GBT_CAMERA_PINHOLE, 5, false, true}, {GBT_CAMERA_PINHOLE, 4, true, false},
-        {GBT_CAMERA_EQUIRECTANGULAR, 0, true, true}};
+    static const struct {
+        gbt_camera_model lens;
+        size_t layers;
+        bool has_photos, has_points;
+    } cases[] = {{GBT_CAMERA_PINHOLE, 6, true, true},
+                 {GBT_CAMERA_PINHOLE, 5, false, true},
+                 {GBT_CAMERA_PINHOLE, 4, true, false},
+                 {GBT_CAMERA_EQUIRECTANGULAR, 0, true, true}};
     write_log(5, "");
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         write_pictures();
@@ -441,19 +507,25 @@ static void odd_metrics(void **state)
     write_pictures();
     char csv[2048];
     snprintf(csv, sizeof csv, "%s%s", log_header,
-             "1,1,0,120,90,-1,0,0,1e308,,1e308,-1e308,0,0,1e-320,0\n2,2,0,-5,1e300,0,0,0,-1e308,,0,0,0,0,1e305,0\n3,1e300,0,1,1,inf,0,0,nan,,nan,0x10,0,0,,0\n");
+             "1,1,0,120,90,-1,0,0,1e308,,1e308,-1e308,0,0,1e-320,0\n2,2,0,-5,1e300,0,0,0,-1e308,,0,0,0,0,"
+             "1e305,0\n3,1e300,0,1,1,inf,0,0,nan,,nan,0x10,0,0,,0\n");
     write_text("log.csv", csv);
     evaluation e = make_views(1);
-    e.views[0].psnr = e.psnr = (double)INFINITY, e.views[0].ssim = -1e300, e.views[0].flip = 1e300, e.views[0].seconds = 1e300;
+    e.views[0].psnr = e.psnr = (double)INFINITY;
+    e.views[0].ssim = -1e300;
+    e.views[0].flip = 1e300;
+    e.views[0].seconds = 1e300;
     static const char *const texts[] = {
-        "{\"command\": 5, \"data\": null, \"pace\": [1, \"x\"], \"held_out\": 3, \"stage_ms_per_step\": [1], \"seed\": \"s\", "
-        "\"iterations\": -5}",
-        "{\"command\": \"\", \"data\": \"/\", \"pace\": [], \"held_out\": [1, null, {\"seconds\": 1e300, \"psnr\": 1e300}, {\"seconds\": "
-        "-4, \"psnr\": 3}],"
-        " \"stage_ms_per_step\": {\"all\": -3, \"trace\": 1e308, \"build\": -1, \"loss\": 0}, \"train_seconds\": 1e300, \"iterations\": "
-        "1e300, \"isa\": {}}",
-        "{\"train_seconds\": -1, \"peak_memory_bytes\": 1e300, \"stage_ms_per_step\": {\"all\": 0, \"trace\": 0}, \"downscale\": -0.0}",
-        "[]", "3", "{}",
+        "{\"command\": 5, \"data\": null, \"pace\": [1, \"x\"], \"held_out\": 3, \"stage_ms_per_step\": [1], "
+        "\"seed\": \"s\", \"iterations\": -5}",
+        "{\"command\": \"\", \"data\": \"/\", \"pace\": [], \"held_out\": [1, null, {\"seconds\": 1e300, "
+        "\"psnr\": 1e300}, {\"seconds\": -4, \"psnr\": 3}], \"stage_ms_per_step\": {\"all\": -3, \"trace\": "
+        "1e308, \"build\": -1, \"loss\": 0}, \"train_seconds\": 1e300, \"iterations\": 1e300, \"isa\": {}}",
+        "{\"train_seconds\": -1, \"peak_memory_bytes\": 1e300, \"stage_ms_per_step\": {\"all\": 0, "
+        "\"trace\": 0}, \"downscale\": -0.0}",
+        "[]",
+        "3",
+        "{}",
     };
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
         json_t *metrics = json_loads(texts[i], JSON_DECODE_ANY, NULL);
@@ -536,22 +608,31 @@ static void not_a_folder(void **state)
     assert_non_null(strstr(err.text, "/nonexistent/run/report.html"));
 }
 
-/* ---- log.csv ------------------------------------------------------------------------------------------------------------------ */
+/* ---- log.csv ---- */
 
-typedef struct log_case { const char *name, *rows; size_t count; double last_step, last_loss; } log_case;
+typedef struct log_case {
+    const char *name, *rows;
+    size_t count;
+    double last_step, last_loss;
+} log_case;
 
 static const log_case log_cases[] = {
     {"whole rows", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n2,2.0,0,8,6,0.25,0,0,9,,5,6,0,0,7,0\n", 2, 2, 0.25},
     {"torn in a number", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n2,2.0,0,8,6,0.2", 1, 1, 0.5},
-    {"torn before its end of line", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n2,2.0,0,8,6,0.2,0,0,9,,5,6,0,0,7,1", 1, 1, 0.5},
+    {"torn before its end of line", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n2,2.0,0,8,6,0.2,0,0,9,,5,6,0,0,7,1",
+     1, 1, 0.5},
     {"too few fields", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n2,2.0,0\n", 1, 1, 0.5},
     {"too many fields", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0,9\n", 0, 0, 0},
     {"no time", "1,x,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n", 0, 0, 0},
     {"DOS line ends", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\r\n", 1, 1, 0.5},
-    {"resumed from step 1", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n3,3.0,0,8,6,0.2,0,0,9,,5,6,0,0,7,0\n2,2.0,0,8,6,0.3,0,0,9,,5,6,0,0,7,0\n",
+    {"resumed from step 1",
+     "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n3,3.0,0,8,6,0.2,0,0,9,,5,6,0,0,7,0\n2,2.0,0,8,6,0.3,0,0,9,,5,6,0,0,"
+     "7,0\n",
      2, 2, 0.3},
-    {"a score right after a row has no loss", "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n1,1.0,0,8,6,0,0,0,0,21.5,5,0,0,0,0,0\n", 2, 1, NAN},
-    {"time that falls", "1,2.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n2,1.0,0,8,6,0.2,0,0,9,,5,6,0,0,7,0\n", 1, 1, 0.5},
+    {"a score right after a row has no loss",
+     "1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n1,1.0,0,8,6,0,0,0,0,21.5,5,0,0,0,0,0\n", 2, 1, NAN},
+    {"time that falls", "1,2.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n2,1.0,0,8,6,0.2,0,0,9,,5,6,0,0,7,0\n", 1, 1,
+     0.5},
     {"zero bytes, blank lines", "\n\n1,1.0,0,8,6,0.5,0,0,9,,5,6,0,0,7,0\n\n", 1, 1, 0.5},
 };
 
@@ -598,7 +679,8 @@ static void smooths(void **state)
     (void)state;
     double seconds[] = {0, 1, 2, 3, 10}, loss[] = {4, 2, (double)NAN, 6, 8}, out[5];
     training_log log = {.count = 5};
-    log.column[LOG_SECONDS] = seconds, log.column[LOG_LOSS] = loss;
+    log.column[LOG_SECONDS] = seconds;
+    log.column[LOG_LOSS] = loss;
     training_log_smooth(&log, LOG_LOSS, 1, out);
     static const double wanted[] = {3, 3, 4, 6, 8};
     for (int i = 0; i < 5; i++)
@@ -608,29 +690,41 @@ static void smooths(void **state)
     assert_true(isnan(out[4]));
 }
 
-/* ---- text --------------------------------------------------------------------------------------------------------------------- */
+/* ---- text ---- */
 
-typedef struct text_case { const char *name; void (*add)(text *t, double value); double value; const char *wanted; } text_case;
+typedef struct text_case {
+    const char *name;
+    void (*add)(text *t, double value);
+    double value;
+    const char *wanted;
+} text_case;
 
-static void add_2_decimals(text *t, double value)
-{
-    text_number(t, value, 2);
-}
+static void add_2_decimals(text *t, double value) { text_number(t, value, 2); }
 
 static const text_case text_cases[] = {
-    {"number", add_2_decimals, 1.005, "1.00"}, {"number NaN", add_2_decimals, NAN, "n/a"},
+    {"number", add_2_decimals, 1.005, "1.00"},
+    {"number NaN", add_2_decimals, NAN, "n/a"},
     {"number infinite", add_2_decimals, -INFINITY, "n/a"},
-    {"count 0", text_count, 0, "0"}, {"count 999", text_count, 999, "999"}, {"count 1000", text_count, 1000, "1,000"},
-    {"count rounds up to four digits", text_count, 999.6, "1,000"}, {"count -1234567", text_count, -1234567, "-1,234,567"},
-    {"count -0.4", text_count, -0.4, "0"}, {"count NaN", text_count, NAN, "n/a"}, {"bytes 0", text_bytes, 0, "0 B"},
+    {"count 0", text_count, 0, "0"},
+    {"count 999", text_count, 999, "999"},
+    {"count 1000", text_count, 1000, "1,000"},
+    {"count rounds up to four digits", text_count, 999.6, "1,000"},
+    {"count -1234567", text_count, -1234567, "-1,234,567"},
+    {"count -0.4", text_count, -0.4, "0"},
+    {"count NaN", text_count, NAN, "n/a"},
+    {"bytes 0", text_bytes, 0, "0 B"},
     {"bytes 999", text_bytes, 999, "999 B"},
-    {"bytes 1000", text_bytes, 1000, "1.00 kB"}, {"bytes 999600", text_bytes, 999600, "1.00 MB"},
+    {"bytes 1000", text_bytes, 1000, "1.00 kB"},
+    {"bytes 999600", text_bytes, 999600, "1.00 MB"},
     {"bytes 12.34 M", text_bytes, 12.34e6, "12.3 MB"},
-    {"bytes 2.5e12", text_bytes, 2.5e12, "2.50 TB"}, {"bytes NaN", text_bytes, NAN, "n/a"},
+    {"bytes 2.5e12", text_bytes, 2.5e12, "2.50 TB"},
+    {"bytes NaN", text_bytes, NAN, "n/a"},
     {"duration 1.234", text_duration, 1.234, "1.23 s"},
-    {"duration 99.9", text_duration, 99.9, "99.9 s"}, {"duration 119.7", text_duration, 119.7, "2 min 00 s"},
+    {"duration 99.9", text_duration, 99.9, "99.9 s"},
+    {"duration 119.7", text_duration, 119.7, "2 min 00 s"},
     {"duration 300.4", text_duration, 300.4, "5 min 00 s"},
-    {"duration 7199.9", text_duration, 7199.9, "2 h 00 min"}, {"duration 2 h 5 min", text_duration, 7500, "2 h 05 min"},
+    {"duration 7199.9", text_duration, 7199.9, "2 h 00 min"},
+    {"duration 2 h 5 min", text_duration, 7500, "2 h 05 min"},
     {"duration NaN", text_duration, NAN, "n/a"},
 };
 
@@ -653,12 +747,24 @@ static void numbers_as_text(void **state)
 static void escapes(void **state)
 {
     (void)state;
-    static const struct { const char *in, *out; } cases[] = {
-        {"a<b>&\"'", "a&lt;b&gt;&amp;&quot;&#39;"}, {NULL, "n/a"}, {"", ""}, {"\t\n\x01\x7f", "  ??"},
-        {"gr\xc3\xbc\xc3\x9f \xe2\x82\xac \xf0\x9f\xa6\x8a", "gr\xc3\xbc\xc3\x9f \xe2\x82\xac \xf0\x9f\xa6\x8a"},
-        {"\xff" "a", "\xef\xbf\xbd" "a"}, {"\xc3", "\xef\xbf\xbd"}, {"\xc0\x80", "\xef\xbf\xbd\xef\xbf\xbd"},
+    static const struct {
+        const char *in, *out;
+    } cases[] = {
+        {"a<b>&\"'", "a&lt;b&gt;&amp;&quot;&#39;"},
+        {NULL, "n/a"},
+        {"", ""},
+        {"\t\n\x01\x7f", "  ??"},
+        {"gr\xc3\xbc\xc3\x9f \xe2\x82\xac \xf0\x9f\xa6\x8a",
+         "gr\xc3\xbc\xc3\x9f \xe2\x82\xac \xf0\x9f\xa6\x8a"},
+        {"\xff"
+         "a",
+         "\xef\xbf\xbd"
+         "a"},
+        {"\xc3", "\xef\xbf\xbd"},
+        {"\xc0\x80", "\xef\xbf\xbd\xef\xbf\xbd"},
         {"\xe2\x82", "\xef\xbf\xbd\xef\xbf\xbd"},
-        {"\xed\xa0\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"}, {"\xf4\x90\x80\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"},
+        {"\xed\xa0\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"},
+        {"\xf4\x90\x80\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"},
         {"\xe2<b>", "\xef\xbf\xbd&lt;b&gt;"},
         {"%s%n", "%s%n"},
     };
@@ -677,8 +783,16 @@ static void escapes(void **state)
 static void base64(void **state)
 {
     (void)state;
-    static const struct { const char *in, *out; } cases[] = {{"", ""}, {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foob", "Zm9vYg=="},
-                                                             {"fooba", "Zm9vYmE="}, {"foobar", "Zm9vYmFy"}, {"\xff\xfe\xfd", "//79"}};
+    static const struct {
+        const char *in, *out;
+    } cases[] = {{"", ""},
+                 {"f", "Zg=="},
+                 {"fo", "Zm8="},
+                 {"foo", "Zm9v"},
+                 {"foob", "Zm9vYg=="},
+                 {"fooba", "Zm9vYmE="},
+                 {"foobar", "Zm9vYmFy"},
+                 {"\xff\xfe\xfd", "//79"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         text t = {0};
         text_base64(&t, (const unsigned char *)cases[i].in, strlen(cases[i].in));
@@ -687,19 +801,21 @@ static void base64(void **state)
     }
 }
 
-/* ---- charts and colours ------------------------------------------------------------------------------------------------------- */
+/* ---- charts and colours ---- */
 
 static void ticks_are_round(void **state)
 {
     (void)state;
-    static const double ranges[][2] = {{0, 1}, {0, 0.3}, {9.885, 29.6}, {0, 18138}, {-3, 7}, {5, 5}, {0, 0}, {1e-9, 2e-9}, {1e9, 1e9 + 1},
-                                       {-1e99, 1e99}, {99.99, 100}, {0, 61.5}};
+    static const double ranges[][2] = {{0, 1},         {0, 0.3},      {9.885, 29.6}, {0, 18138},
+                                       {-3, 7},        {5, 5},        {0, 0},        {1e-9, 2e-9},
+                                       {1e9, 1e9 + 1}, {-1e99, 1e99}, {99.99, 100},  {0, 61.5}};
     for (size_t i = 0; i < sizeof ranges / sizeof *ranges; i++) {
         double ticks[CHART_MAX_TICKS];
         const double low = ranges[i][0], high = ranges[i][1];
         const int count = chart_ticks(low, high, 5, ticks);
         assert_in_range(count, 2, CHART_MAX_TICKS);
-        const double step = ticks[1] - ticks[0], digit = step / pow(10, floor(log10(step) + 1e-4)), slack = 1e-5 * step;
+        const double step = ticks[1] - ticks[0], digit = step / pow(10, floor(log10(step) + 1e-4)),
+                     slack = 1e-5 * step;
         assert_true(fabs(digit - 1) < 1e-3 || fabs(digit - 2) < 1e-3 || fabs(digit - 5) < 1e-3);
         assert_true(ticks[0] <= low + slack && ticks[count - 1] >= high - slack);
         if (high - low > 1e-6 * fabs(high)) {
@@ -716,7 +832,8 @@ static void ticks_are_round(void **state)
 static void log_ticks_are_round(void **state)
 {
     (void)state;
-    static const double ranges[][2] = {{0.0448, 0.3788}, {1, 1}, {1, 10}, {1e-99, 1e99}, {0.9, 1.1}, {2, 5}, {1e-3, 1e5}};
+    static const double ranges[][2] = {{0.0448, 0.3788}, {1, 1}, {1, 10},    {1e-99, 1e99},
+                                       {0.9, 1.1},       {2, 5}, {1e-3, 1e5}};
     for (size_t i = 0; i < sizeof ranges / sizeof *ranges; i++) {
         double ticks[CHART_MAX_TICKS];
         const int count = chart_log_ticks(ranges[i][0], ranges[i][1], ticks);
@@ -752,7 +869,8 @@ static void error_colors_are_even(void **state)
     for (int i = 0; i <= 255; i++) {
         float rgb[3];
         error_color(i / 255.0, rgb);
-        const double lightness = lightness_of(rgb); /* CIELAB: another space than the one that they were made in */
+        const double lightness =
+            lightness_of(rgb); /* CIELAB: another space than the one that they were made in */
         if (i > 0)
             assert_true(lightness > before && lightness < before + 0.8);
         before = lightness;
@@ -772,8 +890,10 @@ static void error_colors_are_even(void **state)
 static void large_pictures_shrink(void **state)
 {
     (void)state;
-    static const struct { int width, height, out_width, out_height; } cases[] = {{1280, 8, 1280, 8}, {1281, 8, 640, 4}, {4, 2570, 1, 856},
-                                                                                 {2600, 1, 2600, 1}, {400, 300, 200, 150}};
+    static const struct {
+        int width, height, out_width, out_height;
+    } cases[] = {
+        {1280, 8, 1280, 8}, {1281, 8, 640, 4}, {4, 2570, 1, 856}, {2600, 1, 2600, 1}, {400, 300, 200, 150}};
     const size_t most = 100 * 1000;
     char path[VIEW_PATH_SIZE];
     in_folder(path, "render.png");
@@ -799,9 +919,10 @@ int main(void)
     struct CMUnitTest tests[80];
     size_t count = 0;
 #define ADD(function) tests[count++] = (struct CMUnitTest)cmocka_unit_test(function)
-#define ADD_ROWS(function, rows)                                                                                                      \
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)                                                                           \
-    tests[count++] = (struct CMUnitTest){.name = rows[i].name, .test_func = function, .initial_state = (void *)(uintptr_t)&rows[i]}
+#define ADD_ROWS(function, rows)                                                                             \
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)                                                  \
+    tests[count++] = (struct CMUnitTest){                                                                    \
+        .name = rows[i].name, .test_func = function, .initial_state = (void *)(uintptr_t)&rows[i]}
     ADD(whole_page);
     ADD_ROWS(bare_page, bare_cases);
     ADD(scene_on_the_page);

@@ -1,4 +1,6 @@
-/* tests/scenes/test_make_scene.c -- what gbt_make_scene() writes: same bytes, true points, true cameras, and its refusals. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/scenes/test_make_scene.c -- what gbt_make_scene() writes: same bytes, true points, true cameras, and
+   its refusals. */
 #include "test_support.h"
 
 #include <ftw.h>
@@ -17,7 +19,9 @@ static char root[64];
 
 static int remove_one(const char *path, const struct stat *info, int kind, struct FTW *walk)
 {
-    (void)info, (void)kind, (void)walk;
+    (void)info;
+    (void)kind;
+    (void)walk;
     return remove(path);
 }
 
@@ -47,7 +51,12 @@ static gbt_make_scene_def small_def(const char *name)
 {
     gbt_make_scene_def def = gbt_make_scene_def_default();
     def.name = name;
-    def.width = 96, def.height = 72, def.view_count = 8, def.points = 300, def.samples = 4, def.depth = 1;
+    def.width = 96;
+    def.height = 72;
+    def.view_count = 8;
+    def.points = 300;
+    def.samples = 4;
+    def.depth = 1;
     return def;
 }
 
@@ -93,7 +102,8 @@ static void read_written(const char *folder, written *out)
         assert_string_equal((const char *)at, out->s.views[i].name);
         at += strlen((const char *)at) + 1;
         take(&at, &observations, 8);
-        image_at[i] = at, ids[i] = id;
+        image_at[i] = at;
+        ids[i] = id;
         at += observations * 24;
     }
     at = out->points_file;
@@ -126,8 +136,8 @@ static void read_written(const char *folder, written *out)
             memcpy(out->pixel[out->observation_count], observation, 16);
             memcpy(&back, observation + 16, 8);
             assert_true(back == id); /* both files tell the same story */
-            out->track[out->observation_count][0] = (uint32_t)p, out->track[out->observation_count][1] = number,
-            out->track[out->observation_count][2] = index;
+            out->track[out->observation_count][0] = (uint32_t)p,
+            out->track[out->observation_count][1] = number, out->track[out->observation_count][2] = index;
             out->observation_count++;
         }
     }
@@ -179,7 +189,8 @@ static void check_written(const char *folder, int points_wanted, double point_no
         const double distance = distance_to(camera, w.position[p], in_camera);
         assert_true(gbt_camera_project(camera, in_camera, pixel));
         const double miss = hypot(pixel[0] - w.pixel[i][0], pixel[1] - w.pixel[i][1]);
-        sum[2 * p] += miss, sum[2 * p + 1] += 1;
+        sum[2 * p] += miss;
+        sum[2 * p + 1] += 1;
         if (p % 100 == 99)
             continue; /* an outlier, on purpose */
         if (miss > 0.3 * 6 + 6 * point_noise * 80)
@@ -189,7 +200,8 @@ static void check_written(const char *folder, int points_wanted, double point_no
             continue; /* the noise moved it out */
         /* The depth at the pixel's centre is not the depth at the point, but mostly near it. */
         tried++;
-        near += fabs((double)depth[v].pixels[(size_t)depth[v].channels * ((size_t)y * 96 + (size_t)x)] - distance) < 0.05 * distance;
+        near += fabs((double)depth[v].pixels[(size_t)depth[v].channels * ((size_t)y * 96 + (size_t)x)] -
+                     distance) < 0.05 * distance;
     }
     if ((double)near < 0.85 * (double)tried)
         fail_msg("%zu of %zu observations agree with the depth of their pixel", near, tried);
@@ -257,12 +269,15 @@ static void distorted_cameras_are_true(void **state)
     scene_free(&s);
 }
 
-/* Without noise a point is on the surface: the exact depth along its first ray ends at it. With noise it is moved by what was asked. */
+/* Without noise a point is on the surface: the exact depth along its first ray ends at it. With noise it is
+   moved by what was asked. */
 static void noise_is_what_was_asked(void **state)
 {
     (void)state;
     gbt_make_scene_def def = small_def("tabletop");
-    def.depth = 0, def.samples = 1, def.point_noise = 0;
+    def.depth = 0;
+    def.samples = 1;
+    def.point_noise = 0;
     assert_ok(gbt_make_scene(&def, under_root("exact"), NULL));
     def.point_noise = 0.01;
     assert_ok(gbt_make_scene(&def, under_root("noisy"), NULL));
@@ -276,7 +291,8 @@ static void noise_is_what_was_asked(void **state)
     for (size_t i = 0; i < exact.observation_count; i++) {
         double in_camera[3];
         const uint32_t p = exact.track[i][0];
-        nearest[p] = fmin(nearest[p], distance_to(&exact.s.views[exact.track[i][1]].camera, exact.position[p], in_camera));
+        nearest[p] = fmin(
+            nearest[p], distance_to(&exact.s.views[exact.track[i][1]].camera, exact.position[p], in_camera));
     }
     double square = 0;
     size_t used = 0;
@@ -284,7 +300,8 @@ static void noise_is_what_was_asked(void **state)
         if (p % 100 == 99)
             continue; /* outliers have moved, and with them their distance */
         for (int k = 0; k < 3; k++) {
-            const double moved = noisy.position[p][k] + noisy.s.origin[k] - exact.position[p][k] - exact.s.origin[k];
+            const double moved =
+                noisy.position[p][k] + noisy.s.origin[k] - exact.position[p][k] - exact.s.origin[k];
             square += moved * moved / (nearest[p] * nearest[p]);
             used++;
         }
@@ -315,10 +332,15 @@ static void assert_same_file(const char *a, const char *b, const char *name)
 static void same_seed_same_bytes(void **state)
 {
     (void)state;
-    static const char *const files[] = {"images/0000.png",     "images/0005.png",       "sparse/0/cameras.bin",
-                                        "sparse/0/images.bin", "sparse/0/points3D.bin", "SCENE.md"};
+    static const char *const files[] = {"images/0000.png",       "images/0005.png",
+                                        "sparse/0/cameras.bin",  "sparse/0/images.bin",
+                                        "sparse/0/points3D.bin", "SCENE.md"};
     gbt_make_scene_def def = small_def("tabletop");
-    def.samples = 5, def.view_count = 6, def.width = 64, def.height = 48; /* 3 x 3: both passes of the sampler */
+    /* 3 x 3: both passes of the sampler */
+    def.samples = 5;
+    def.view_count = 6;
+    def.width = 64;
+    def.height = 48;
     const int threads[2] = {1, 2};
     const char *const names[2] = {"threads1", "threads2"};
     const int before = parallel_threads();
@@ -332,10 +354,12 @@ static void same_seed_same_bytes(void **state)
     image depth[2]; /* EXR headers hold the time of writing, so only their values can be equal */
     assert_ok(image_read(under_root("threads1/depth/0003.exr"), &depth[0], NULL));
     assert_ok(image_read(under_root("threads2/depth/0003.exr"), &depth[1], NULL));
-    assert_memory_equal(depth[0].pixels, depth[1].pixels, (size_t)64 * 48 * (size_t)depth[0].channels * sizeof *depth[0].pixels);
+    assert_memory_equal(depth[0].pixels, depth[1].pixels,
+                        (size_t)64 * 48 * (size_t)depth[0].channels * sizeof *depth[0].pixels);
     image_free(&depth[0]);
     image_free(&depth[1]);
-    def.seed = 2, def.samples = 1;
+    def.seed = 2;
+    def.samples = 1;
     assert_ok(gbt_make_scene(&def, under_root("seed2"), NULL));
     unsigned char *bytes[2];
     size_t size[2];
@@ -425,7 +449,10 @@ static void unwritable_folder_is_io(void **state)
     assert_int_equal(gbt_make_scene(&def, under_root("file/below"), &err), GBT_ERR_IO);
     /* A photo that cannot be written: its name is taken by a folder. */
     gbt_make_scene_def tiny = def;
-    tiny.width = tiny.height = 8, tiny.view_count = 3, tiny.samples = 1, tiny.depth = 0;
+    tiny.width = tiny.height = 8;
+    tiny.view_count = 3;
+    tiny.samples = 1;
+    tiny.depth = 0;
     assert_ok(file_make_folder(under_root("taken/images/0001.png/x"), NULL));
     err = (gbt_error){0};
     assert_int_equal(gbt_make_scene(&tiny, under_root("taken"), &err), GBT_ERR_IO);
@@ -438,13 +465,17 @@ static void names_are_the_scenes(void **state)
     const char *const *names = gbt_make_scene_names();
     assert_string_equal(names[0], gbt_make_scene_def_default().name);
     gbt_make_scene_def def = gbt_make_scene_def_default();
-    def.width = def.height = 8, def.view_count = 3, def.points = 5, def.samples = 1;
+    def.width = def.height = 8;
+    def.view_count = 3;
+    def.points = 5;
+    def.samples = 1;
     int count = 0;
     for (; names[count] != NULL; count++) {
         def.name = names[count];
         assert_ok(gbt_make_scene(&def, under_root("named"), NULL));
         const char *summary = gbt_make_scene_summary(names[count]);
-        assert_true(summary != NULL && strlen(summary) > 20 && strlen(summary) < 100 && strchr(summary, '\n') == NULL);
+        assert_true(summary != NULL && strlen(summary) > 20 && strlen(summary) < 100 &&
+                    strchr(summary, '\n') == NULL);
     }
     assert_int_equal(count, 3);
     assert_null(gbt_make_scene_summary("none"));
@@ -454,7 +485,10 @@ static void no_memory_is_a_status(void **state)
 {
     (void)state;
     gbt_make_scene_def def = gbt_make_scene_def_default();
-    def.width = def.height = 8, def.view_count = 3, def.points = 20, def.samples = 1;
+    def.width = def.height = 8;
+    def.view_count = 3;
+    def.points = 20;
+    def.samples = 1;
     for (long k = 0;; k += 1 + k / 4) { /* every allocation would take a minute */
         gbt_error err = {0};
         mem_fail_after(k);
@@ -487,6 +521,7 @@ int main(void)
         cmocka_unit_test(no_memory_is_a_status),
     };
     for (int i = 0; i < REFUSALS; i++)
-        tests[OTHERS + i] = (struct CMUnitTest){.name = refusals[i].name, .test_func = is_refused, .initial_state = &refusals[i]};
+        tests[OTHERS + i] = (struct CMUnitTest){
+            .name = refusals[i].name, .test_func = is_refused, .initial_state = &refusals[i]};
     return cmocka_run_group_tests(tests, make_root, remove_root);
 }

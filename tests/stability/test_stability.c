@@ -1,4 +1,6 @@
-/* tests/stability/test_stability.c -- every row of the catalogue within its limit, in the quick sizes; and the study's own machinery. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/stability/test_stability.c -- every row of the catalogue within its limit, in the quick sizes; and
+   the study's own machinery. */
 #include "test_support.h"
 
 #include <unistd.h>
@@ -30,18 +32,19 @@ static void rows_of(const char *id)
     assert_true(study->row_count > 0);
     for (size_t i = 0; i < study->row_count; i++) {
         const stability_row *r = &study->rows[i];
-        print_message("%s %s: %.4g (limit %.4g, rasterizer %.4g)\n", r->id, r->quantity, r->value, r->limit, r->raster);
+        print_message("%s %s: %.4g (limit %.4g, rasterizer %.4g)\n", r->id, r->quantity, r->value, r->limit,
+                      r->raster);
         broken += !r->timed && r->pass == r->open; /* an open row that passes is open no more */
     }
     assert_int_equal(broken, 0);
     mem_free(study);
 }
 
-#define X(tag, id, file)            \
-    static void case_##tag(void **state) \
-    {                               \
-        (void)state;                \
-        rows_of(id);                \
+#define X(tag, id, file)                                                                                     \
+    static void case_##tag(void **state)                                                                     \
+    {                                                                                                        \
+        (void)state;                                                                                         \
+        rows_of(id);                                                                                         \
     }
 STABILITY_CASES(X)
 #undef X
@@ -65,7 +68,7 @@ static void names_of_cases(void **state)
     mem_free(study);
 }
 
-/* ---- what a scene file may say ------------------------------------------------------------------------------------------------------- */
+/* ---- what a scene file may say ---- */
 
 static stability open_text(stability_study *study, const char *json, gbt_error *err)
 {
@@ -81,7 +84,8 @@ static void numbers_and_their_quick_form(void **state)
     (void)state;
     stability_study *study = mem_calloc(1, sizeof *study, "study", NULL);
     gbt_error err = {0};
-    stability s = open_text(study, "{\"numbers\":{\"a\":1,\"b\":[1,2,3],\"c\":\"no\"},\"quick\":{\"a\":0.5}}", &err);
+    stability s =
+        open_text(study, "{\"numbers\":{\"a\":1,\"b\":[1,2,3],\"c\":\"no\"},\"quick\":{\"a\":0.5}}", &err);
     double list[3] = {0};
     assert_true(stability_number(&s, "a") == 1);
     study->quick = true;
@@ -94,7 +98,8 @@ static void numbers_and_their_quick_form(void **state)
     assert_string_equal(err.text, "x.json: b: wanted a list of numbers, neither empty nor too long");
     static const char *const missing[] = {"c", "d"};
     for (size_t i = 0; i < 2; i++) {
-        s.status = GBT_OK, err = (gbt_error){0};
+        s.status = GBT_OK;
+        err = (gbt_error){0};
         assert_true(stability_number(&s, missing[i]) == 0);
         assert_int_equal(s.status, GBT_ERR_FORMAT);
     }
@@ -107,11 +112,15 @@ static void limits_are_exact(void **state)
     (void)state;
     stability_study *study = mem_calloc(1, sizeof *study, "study", NULL);
     gbt_error err = {0};
-    stability s =
-        open_text(study,
-                  "{\"checks\":[{\"row\":\"a\",\"quantity\":\"q\",\"at_most\":1},{\"row\":\"b\",\"quantity\":\"q\",\"at_least\":1}]}",
-                  &err);
-    static const struct { const char *row; double value; bool pass; } tries[] = {
+    stability s = open_text(study,
+                            "{\"checks\":[{\"row\":\"a\",\"quantity\":\"q\",\"at_most\":1},{\"row\":\"b\","
+                            "\"quantity\":\"q\",\"at_least\":1}]}",
+                            &err);
+    static const struct {
+        const char *row;
+        double value;
+        bool pass;
+    } tries[] = {
         {"a", 1, true}, {"a", 0, true}, {"a", 1.0000001, false}, {"a", NAN, false}, {"a", INFINITY, false},
         {"b", 1, true}, {"b", 2, true}, {"b", 0.9999999, false}, {"b", NAN, false}, {"b", -INFINITY, false},
     };
@@ -130,13 +139,14 @@ static void limits_are_exact(void **state)
 static void differences_keep_nan(void **state)
 {
     (void)state;
-    static const float a[4] = {0, 0.5f, 1, 0.25f}, b[4] = {0, 0.25f, 1, 0.25f}, bad[4] = {9, NAN, 0, INFINITY};
+    static const float a[4] = {0, 0.5f, 1, 0.25f}, b[4] = {0, 0.25f, 1, 0.25f},
+                       bad[4] = {9, NAN, 0, INFINITY};
     static const double exact[4] = {0, 0.5, 0.5, 0.25};
     assert_true(draw_difference(a, a, 4) == 0 && draw_difference(a, b, 4) == 0.25);
     assert_true(isnan(draw_difference(a, bad, 4)) && isnan(draw_difference(bad, a, 2)));
     assert_true(draw_error(a, exact, 4) == 0.5 && isnan(draw_error(bad, exact, 3)));
-    assert_true(fabs(draw_psnr(a, exact, 4) - -10 * log10(0.25 / 4)) < 1e-12 && draw_psnr(a, exact, 2) == 200 &&
-                isnan(draw_psnr(bad, exact, 2)));
+    assert_true(fabs(draw_psnr(a, exact, 4) - -10 * log10(0.25 / 4)) < 1e-12 &&
+                draw_psnr(a, exact, 2) == 200 && isnan(draw_psnr(bad, exact, 2)));
     assert_int_equal(draw_count_bad(bad, 4), 2);
     assert_int_equal(draw_count_bad(a, 4), 0);
 }
@@ -149,9 +159,10 @@ static void turns_are_rotations(void **state)
         draw_turned(0.3 * i, 0.2 * i - 3, m);
         for (int r = 0; r < 3; r++)
             for (int q = 0; q < 3; q++)
-                assert_true(fabs(m[3 * r] * m[3 * q] + m[3 * r + 1] * m[3 * q + 1] + m[3 * r + 2] * m[3 * q + 2] - (r == q)) < 1e-14);
-        const double determinant =
-            m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+                assert_true(fabs(m[3 * r] * m[3 * q] + m[3 * r + 1] * m[3 * q + 1] +
+                                 m[3 * r + 2] * m[3 * q + 2] - (r == q)) < 1e-14);
+        const double determinant = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+                                   m[2] * (m[3] * m[7] - m[4] * m[6]);
         assert_true(fabs(determinant - 1) < 1e-14);
     }
 }
@@ -164,8 +175,8 @@ static void charts_of_little(void **state)
     gbt_error err = {0};
     stability s = open_text(study, "{}", &err);
     stability_new_chart(&s, "empty", "note", "x", "y");
-    stability_chart *chart =
-        stability_new_chart(&s, "a < b", "a note that is so long that it has to go on in a second line below it", "x", "y");
+    stability_chart *chart = stability_new_chart(
+        &s, "a < b", "a note that is so long that it has to go on in a second line below it", "x", "y");
     chart->log_y = true;
     static const double points[][2] = {{0, 1}, {1, 10}, {2, NAN}, {3, 0}, {INFINITY, 1}, {4, 100}};
     for (size_t i = 0; i < 6; i++)
@@ -194,11 +205,13 @@ static void charts_of_little(void **state)
 static void files_of_the_study(void **state)
 {
     (void)state;
-    static const char *const names[] = {"stability.json", "stability.md", "stability.svg", "stability_a1.png"};
+    static const char *const names[] = {"stability.json", "stability.md", "stability.svg",
+                                        "stability_a1.png"};
     lab_stability_def def = lab_stability_def_default();
     gbt_error err = {0};
     FILE *out = tmpfile();
-    def.only = "A1,A3", def.quick = 1;
+    def.only = "A1,A3";
+    def.quick = 1;
     assert_non_null(out);
     assert_int_equal(lab_study_stability(&def, folder, out, &err), GBT_OK);
     assert_true(ftell(out) > 500);
@@ -213,7 +226,8 @@ static void files_of_the_study(void **state)
         if (i < 3)
             assert_null(strstr((const char *)bytes, "nan"));
         if (i == 1) /* terminals show it too */
-            assert_true(strstr((const char *)bytes, " | <= 0 | ") != NULL && strchr((const char *)bytes, '&') == NULL);
+            assert_true(strstr((const char *)bytes, " | <= 0 | ") != NULL &&
+                        strchr((const char *)bytes, '&') == NULL);
         mem_free(bytes);
         remove(path);
     }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/study/test_study.c -- lists of kernels, passes in turn, and a chart whose words cover nothing. */
 #include "base/memory.h"
 #include "base/near.h"
@@ -14,8 +15,9 @@ static void lists_of_kernels(void **state)
     assert_int_equal(k[0], TRACE_TILE);
     assert_int_equal(bench_kernels_parse("embree,tile,single", k, 3), 3);
     assert_true(k[0] == TRACE_EMBREE && k[1] == TRACE_TILE && k[2] == TRACE_SINGLE);
-    static const char *const bad[] = {"", "tiles", "til", "tile,", ",tile", "tile,,embree", "tile,tile", "tile embree",
-                                      "tile,single,embree,tile"};
+    static const char *const bad[] = {"",          "tiles",       "til",
+                                      "tile,",     ",tile",       "tile,,embree",
+                                      "tile,tile", "tile embree", "tile,single,embree,tile"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         assert_int_equal(bench_kernels_parse(bad[i], k, 3), 0);
     for (int i = TRACE_TILE; i <= TRACE_EMBREE; i++) {
@@ -46,10 +48,11 @@ static void ways_in_turn(void **state)
     assert_int_equal(ray_image_count(&want.rays), 6 * 4);
     for (int i = 0; i < WAYS; i++) {
         const bench_figures *f = &ways[i].figures;
-        assert_true((f->build_ms > 0 || ways[i].splat != NULL) && f->build_us >= 0 && f->forward_us > 0 && f->adjoint_us > 0 &&
-                    f->forward_seconds > 0 && f->adjoint_seconds > 0);
+        assert_true((f->build_ms > 0 || ways[i].splat != NULL) && f->build_us >= 0 && f->forward_us > 0 &&
+                    f->adjoint_us > 0 && f->forward_seconds > 0 && f->adjoint_seconds > 0);
         assert_int_equal(f->counters.rays, 48 * 32);
-        assert_true(f->counters.blended > 0 && (ways[i].splat != NULL || (f->tree_bytes > 0 && f->record_bytes == 300 * 64)));
+        assert_true(f->counters.blended > 0 &&
+                    (ways[i].splat != NULL || (f->tree_bytes > 0 && f->record_bytes == 300 * 64)));
         assert_true(bench_reference_compare(&want, &ways[i].rgb).psnr > 90);
     }
     assert_memory_equal(ways[0].rgb.pixels, ways[2].rgb.pixels, 3 * 48 * 32 * sizeof(float));
@@ -69,12 +72,19 @@ static void ways_in_turn(void **state)
     ray_image_free(&rays);
 }
 
-/* ---- the chart ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- the chart ---- */
 
 static char *draw(const scatter_point *points, size_t count, const scatter_level *levels, size_t level_count)
 {
-    const scatter_chart chart = {.title = "a < b", .note = "note", .x_unit = "x", .y_unit = "y", .series = {"zero", "one", "two"},
-                                 .points = points, .point_count = count, .levels = levels, .level_count = level_count};
+    const scatter_chart chart = {.title = "a < b",
+                                 .note = "note",
+                                 .x_unit = "x",
+                                 .y_unit = "y",
+                                 .series = {"zero", "one", "two"},
+                                 .points = points,
+                                 .point_count = count,
+                                 .levels = levels,
+                                 .level_count = level_count};
     text out = {0};
     scatter_draw(&out, &chart, 7);
     assert_int_equal(out.status, GBT_OK);
@@ -124,14 +134,15 @@ static void words_cover_nothing(void **state)
     scatter_point points[COUNT];
     const scatter_level levels[] = {{50, "first level"}, {50.4, "second level"}};
     for (uint64_t i = 0; i < COUNT; i++) /* a heap of points around one place, and the named ones in it */
-        points[i] = (scatter_point){i < 3 ? 0 : 1 + (int)(i % 2), exp(0.3 * rng_normal(3, 0, i)), 50 + 4 * rng_normal(3, 1, i),
-                                    i < 3 ? "named" : "0.0123"};
+        points[i] = (scatter_point){i < 3 ? 0 : 1 + (int)(i % 2), exp(0.3 * rng_normal(3, 0, i)),
+                                    50 + 4 * rng_normal(3, 1, i), i < 3 ? "named" : "0.0123"};
     char *svg = draw(points, COUNT, levels, 2);
     double x[64], y[64], width[64];
     size_t count = 0, large = 0;
     for (const char *at = strstr(svg, "class=\"l"); at != NULL; at = strstr(at + 1, "class=\"l")) {
         char kind[16];
-        if (sscanf(at, "class=\"%15[a-z-]", kind) == 1 && strcmp(kind, "label") != 0 && strcmp(kind, "level-label") != 0)
+        if (sscanf(at, "class=\"%15[a-z-]", kind) == 1 && strcmp(kind, "label") != 0 &&
+            strcmp(kind, "level-label") != 0)
             continue;
         const char *place = strstr(at, "x=\"");
         assert_int_equal(sscanf(place, "x=\"%lf\" y=\"%lf\"", &x[count], &y[count]), 2);
@@ -151,8 +162,9 @@ static void words_cover_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lists_of_kernels), cmocka_unit_test(ways_in_turn),        cmocka_unit_test(chart_of_nothing),
-        cmocka_unit_test(one_point_is_a_chart), cmocka_unit_test(words_cover_nothing),
+        cmocka_unit_test(lists_of_kernels),    cmocka_unit_test(ways_in_turn),
+        cmocka_unit_test(chart_of_nothing),    cmocka_unit_test(one_point_is_a_chart),
+        cmocka_unit_test(words_cover_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
-/* tests/study/test_study_paper.c -- the studies that train: statistics, the paper's numbers, runs made once, figures that are those of the
-   runs. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/study/test_study_paper.c -- the studies that train: statistics, the paper's numbers, runs made once,
+   figures that are those of the runs. */
 #include "train/run_support.h"
 
 #include "base/near.h"
@@ -10,20 +11,21 @@
 #include "study/time.h"
 #include "gbtrace/export.h"
 
-/* ---- numbers ------------------------------------------------------------------------------------------------------------------ */
+/* ---- numbers ---- */
 
 static void mean_and_spread(void **state)
 {
     (void)state;
     const stat_sample s = stat_of((const double[]){1, NAN, 2, 6}, 4), one = stat_of((const double[]){5}, 1),
-        none = stat_of((const double[]){NAN}, 1);
+                      none = stat_of((const double[]){NAN}, 1);
     assert_int_equal(s.count, 3);
     assert_near(s.mean, 3, 1e-15);
     assert_near(s.deviation, sqrt(7), 1e-15); /* (4 + 1 + 9) / 2 */
     assert_near(stat_half_width(&s), 4.303 * sqrt(7 / 3.0), 1e-12);
     assert_true(one.count == 1 && one.mean == 5 && isnan(one.deviation) && isnan(stat_half_width(&one)));
     assert_true(none.count == 0 && isnan(none.mean));
-    assert_true(stat_is_apart(&s, 3 + 6.58) && !stat_is_apart(&s, 3 - 6.57) && !stat_is_apart(&one, 100) && !stat_is_apart(&none, 0));
+    assert_true(stat_is_apart(&s, 3 + 6.58) && !stat_is_apart(&s, 3 - 6.57) && !stat_is_apart(&one, 100) &&
+                !stat_is_apart(&none, 0));
     const double ten[10] = {0, 1, 0, 1, 0, 1, 0, 1, 0, 1};
     const stat_sample many = stat_of(ten, 10);
     assert_near(stat_half_width(&many), 2.262 * sqrt(2.5 / 9) / sqrt(10), 1e-12);
@@ -34,9 +36,18 @@ static void mean_and_spread(void **state)
 static void figures_as_text(void **state)
 {
     (void)state;
-    const struct { double values[3]; size_t count; int decimals; bool is_change; const char *wanted; } cases[] = {
-        {{1, 2, 3}, 3, 2, false, "2.00 ± 1.00"}, {{1, 2, 3}, 3, 1, true, "+2.0 ± 1.0"}, {{7}, 1, 0, false, "7"},
-        {{NAN}, 1, 1, true, "n/a"}, {{-0.04}, 1, 1, true, "0.0"}, {{-0.06}, 1, 1, true, "-0.1"}};
+    const struct {
+        double values[3];
+        size_t count;
+        int decimals;
+        bool is_change;
+        const char *wanted;
+    } cases[] = {{{1, 2, 3}, 3, 2, false, "2.00 ± 1.00"},
+                 {{1, 2, 3}, 3, 1, true, "+2.0 ± 1.0"},
+                 {{7}, 1, 0, false, "7"},
+                 {{NAN}, 1, 1, true, "n/a"},
+                 {{-0.04}, 1, 1, true, "0.0"},
+                 {{-0.06}, 1, 1, true, "-0.1"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         text out = {0};
         const stat_sample s = stat_of(cases[i].values, cases[i].count);
@@ -50,16 +61,21 @@ static void figures_as_text(void **state)
 /* Halves of halves, counted one by one. */
 static double count_balls(size_t points, int depth)
 {
-    return points <= 2 || depth == 0 ? points > 0 : count_balls(points / 2, depth - 1) + count_balls(points - points / 2, depth - 1);
+    return points <= 2 || depth == 0
+               ? points > 0
+               : count_balls(points / 2, depth - 1) + count_balls(points - points / 2, depth - 1);
 }
 
 static void closed_form_of_balls(void **state)
 {
     (void)state;
-    const struct { double points; int depth; double balls; } known[] = {{54275, 18, 32768}, {32049, 18, 16384}, {80861, 18, 48093},
-                                                                        {80861, 10, 1024}, {80861, 12, 4096},
-                                                                        {0, 18, 0}, {1, 18, 1}, {2, 18, 1}, {3, 18, 2}, {3, 0, 1},
-                                                                        {1e6, 18, 262144}};
+    const struct {
+        double points;
+        int depth;
+        double balls;
+    } known[] = {{54275, 18, 32768}, {32049, 18, 16384}, {80861, 18, 48093}, {80861, 10, 1024},
+                 {80861, 12, 4096},  {0, 18, 0},         {1, 18, 1},         {2, 18, 1},
+                 {3, 18, 2},         {3, 0, 1},          {1e6, 18, 262144}};
     for (size_t i = 0; i < sizeof known / sizeof *known; i++)
         assert_near(paper_ball_count(known[i].points, known[i].depth), known[i].balls, 0);
     for (size_t points = 0; points < 700; points++)
@@ -67,12 +83,13 @@ static void closed_form_of_balls(void **state)
             assert_near(paper_ball_count((double)points, depth), count_balls(points, depth), 0);
 }
 
-/* Two pairs of points: two small balls far apart, so that the spacing is all that counts: (1 + 1/4) / 2 of it. */
+/* Two pairs of points: two small balls far apart, so that the spacing is all that counts: (1 + 1/4) / 2 of
+   it. */
 static void constant_of_pairs(void **state)
 {
     (void)state;
-    static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
-                              "z\nend_header\n0 0 0\n.01 0 0\n.1 0 0\n.12 0 0\n";
+    static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float "
+                              "y\nproperty float z\nend_header\n0 0 0\n.01 0 0\n.1 0 0\n.12 0 0\n";
     const char *path = in_root("pairs.ply");
     assert_ok(file_write_atomic(path, ply, sizeof ply - 1, NULL));
     paper_scene look;
@@ -84,14 +101,16 @@ static void constant_of_pairs(void **state)
 static void what_the_paper_says(void **state)
 {
     (void)state;
-    const struct { paper_claim claim; double wanted, near, low, high; } cases[] = {
-        {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_INITIAL}, -37.1, 0.05, -42.6, -30.0},
-        {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_FINAL}, -10.0, 0.05, -12.0, -8.0},
-        {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_STORAGE}, -9.8, 0.05, -11.9, -7.9},
-        {{2, "", PAPER_GBSP, PAPER_VOXEL, PAPER_FINAL}, -12.0, 0.05, -22.7, -5.4},
-        {{2, "", PAPER_GBAI, PAPER_VOXEL, PAPER_PSNR}, 0.071, 0.002, -0.376, 0.576},
-        {{3, "", PAPER_GBSP, PAPER_VOXEL, PAPER_ARITHMETIC}, -15.9, 0.05, -29.6, -5.0},
-        {{4, "", PAPER_DEPTH_10, PAPER_GBSP, PAPER_FINAL}, 1.9, 0.05, 1.9, 1.9}};
+    const struct {
+        paper_claim claim;
+        double wanted, near, low, high;
+    } cases[] = {{{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_INITIAL}, -37.1, 0.05, -42.6, -30.0},
+                 {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_FINAL}, -10.0, 0.05, -12.0, -8.0},
+                 {{1, "", PAPER_GBSP, PAPER_VOXEL, PAPER_STORAGE}, -9.8, 0.05, -11.9, -7.9},
+                 {{2, "", PAPER_GBSP, PAPER_VOXEL, PAPER_FINAL}, -12.0, 0.05, -22.7, -5.4},
+                 {{2, "", PAPER_GBAI, PAPER_VOXEL, PAPER_PSNR}, 0.071, 0.002, -0.376, 0.576},
+                 {{3, "", PAPER_GBSP, PAPER_VOXEL, PAPER_ARITHMETIC}, -15.9, 0.05, -29.6, -5.0},
+                 {{4, "", PAPER_DEPTH_10, PAPER_GBSP, PAPER_FINAL}, 1.9, 0.05, 1.9, 1.9}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         double range[2];
         assert_near(paper_published(&cases[i].claim), cases[i].wanted, cases[i].near);
@@ -107,21 +126,25 @@ static void what_the_paper_says(void **state)
 static void verdicts(void **state)
 {
     (void)state;
-    const struct { double ours[3]; size_t count; double paper; const char *wanted; } cases[] = {
-        {{-9, -10, -11}, 3, -10, "agrees with the paper"},
-        {{-11.9, -12, -12}, 3, -10, "within the range of the paper's scenes"},
-        {{-12.1, -12.1, -12.1}, 3, -10, "the same way as the paper, and more"},
-        {{-3, -3.1, -3.2}, 3, -10, "the same way as the paper, but less"},
-        {{-20, -21, -22}, 3, -10, "the same way as the paper, and more"},
-        {{3, 3.1, 3.2}, 3, -10, "the other way than the paper"},
-        {{-3, 1, 2}, 3, -10, "not told apart from zero, but from the paper"},
-        {{-30, 1, 2}, 3, -10, "told apart neither from zero nor from the paper"},
-        {{-30, 1, 2}, 3, NAN, "not told apart from zero"},
-        {{-3, -3.1, -3.2}, 3, NAN, "lower, beyond the spread"},
-        {{3, 3.1, 3.2}, 3, NAN, "higher, beyond the spread"},
-        {{0, 0, 0}, 3, -10, "none at all"},
-        {{-10}, 1, -10, "one seed says nothing of the spread"},
-        {{NAN}, 1, -10, "not measured"}};
+    const struct {
+        double ours[3];
+        size_t count;
+        double paper;
+        const char *wanted;
+    } cases[] = {{{-9, -10, -11}, 3, -10, "agrees with the paper"},
+                 {{-11.9, -12, -12}, 3, -10, "within the range of the paper's scenes"},
+                 {{-12.1, -12.1, -12.1}, 3, -10, "the same way as the paper, and more"},
+                 {{-3, -3.1, -3.2}, 3, -10, "the same way as the paper, but less"},
+                 {{-20, -21, -22}, 3, -10, "the same way as the paper, and more"},
+                 {{3, 3.1, 3.2}, 3, -10, "the other way than the paper"},
+                 {{-3, 1, 2}, 3, -10, "not told apart from zero, but from the paper"},
+                 {{-30, 1, 2}, 3, -10, "told apart neither from zero nor from the paper"},
+                 {{-30, 1, 2}, 3, NAN, "not told apart from zero"},
+                 {{-3, -3.1, -3.2}, 3, NAN, "lower, beyond the spread"},
+                 {{3, 3.1, 3.2}, 3, NAN, "higher, beyond the spread"},
+                 {{0, 0, 0}, 3, -10, "none at all"},
+                 {{-10}, 1, -10, "one seed says nothing of the spread"},
+                 {{NAN}, 1, -10, "not measured"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const stat_sample s = stat_of(cases[i].ours, cases[i].count);
         assert_string_equal(paper_verdict_of(&s, cases[i].paper, (const double[]){-12, -8}), cases[i].wanted);
@@ -147,7 +170,8 @@ static void names_and_folders(void **state)
     char names[STUDY_SCENES_MAX][STUDY_NAME_SIZE], path[PATH_SIZE];
     gbt_error err = {0};
     make_tiny_scene(in_root("other/tiny"));
-    const char *same[] = {tiny, in_root("other/tiny")}, *missing[] = {in_root("nowhere")}, *dotted[] = {in_root("tiny/../other/./tiny/")};
+    const char *same[] = {tiny, in_root("other/tiny")}, *missing[] = {in_root("nowhere")},
+               *dotted[] = {in_root("tiny/../other/./tiny/")};
     assert_int_equal(study_runs_names(same, 2, names, &err), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "two data sets are called tiny"));
     assert_int_equal(study_runs_names(missing, 1, names, NULL), GBT_ERR_IO);
@@ -159,14 +183,18 @@ static void names_and_folders(void **state)
     assert_int_equal(study_runs_folder("d", "a", "b", 3, path, 10, NULL), GBT_ERR_ARGUMENT);
 }
 
-/* ---- whole studies ------------------------------------------------------------------------------------------------------------- */
+/* ---- whole studies ---- */
 
 enum { SEEDS = 2 };
 
 static lab_paper_def small_paper(const char *const *data, const char *tables)
 {
     lab_paper_def def = lab_paper_def_default();
-    def.data = data, def.data_count = 1, def.iterations = 40, def.seeds = SEEDS, def.tables = tables;
+    def.data = data;
+    def.data_count = 1;
+    def.iterations = 40;
+    def.seeds = SEEDS;
+    def.tables = tables;
     return def;
 }
 
@@ -180,10 +208,7 @@ static void paper_ok(const lab_paper_def *def, const char *folder)
 }
 
 /* A file as a zero-terminated text; mem_free(). */
-static char *read_text(const char *path)
-{
-    return (char *)read_bytes(path).data;
-}
+static char *read_text(const char *path) { return (char *)read_bytes(path).data; }
 
 static size_t count_of(const char *where, const char *what)
 {
@@ -228,10 +253,12 @@ static void check_csv(const char *folder)
         char name[64];
         int seed;
         double v[9];
-        assert_int_equal(sscanf(line + 1, "\"tiny\",%63[^,],%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", name, &seed, v, v + 1, v + 2, v + 3,
-                                v + 4, v + 5, v + 6, v + 7, v + 8), 11);
+        assert_int_equal(sscanf(line + 1, "\"tiny\",%63[^,],%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", name,
+                                &seed, v, v + 1, v + 2, v + 3, v + 4, v + 5, v + 6, v + 7, v + 8),
+                         11);
         const char *run = in_root("%s/runs/tiny/%s/seed-%d", folder, name, seed);
-        const char *const fields[] = {"points", "anchors_initial", "anchors_final", NULL, "model_bytes", "psnr", "ssim"};
+        const char *const fields[] = {
+            "points", "anchors_initial", "anchors_final", NULL, "model_bytes", "psnr", "ssim"};
         for (size_t i = 0; i < 7; i++)
             if (fields[i] != NULL)
                 assert_near(v[i], metric_of(run, fields[i]), 1e-6 * fabs(v[i]));
@@ -270,12 +297,14 @@ static void check_json(const char *folder)
     json_t *whole;
     assert_ok(json_read(in_root("%s/paper.json", folder), &whole, NULL));
     const json_t *counts = row_of(whole, "tiny: initial anchors at D_max 18 against the closed form"),
-        *change = row_of(whole, "table 1, tiny: balls in place of voxels: change of PSNR, dB");
+                 *change = row_of(whole, "table 1, tiny: balls in place of voxels: change of PSNR, dB");
     assert_true(json_is_true(json_object_get(counts, "pass")));
     assert_near(json_number_value(json_object_get(counts, "limit")), 0.015, 0);
-    assert_true(json_is_null(json_object_get(change, "limit")) && json_is_null(json_object_get(change, "pass")));
+    assert_true(json_is_null(json_object_get(change, "limit")) &&
+                json_is_null(json_object_get(change, "pass")));
     assert_near(json_number_value(json_object_get(change, "value")),
-                mean_over_seeds(folder, "gbai-gbsp", "psnr") - mean_over_seeds(folder, "voxel", "psnr"), 1e-6);
+                mean_over_seeds(folder, "gbai-gbsp", "psnr") - mean_over_seeds(folder, "voxel", "psnr"),
+                1e-6);
     assert_near(json_number_value(json_object_get(change, "paper")), -0.071, 0.001);
     const json_t *first = json_array_get(json_object_get(whole, "figures"), 0);
     assert_string_equal(json_string_value(json_object_get(first, "variant")), "voxel");
@@ -286,9 +315,12 @@ static void check_json(const char *folder)
 
 static void check_page(const char *folder)
 {
-    char *page = read_text(in_root("%s/paper.md", folder)), *svg = read_text(in_root("%s/paper.svg", folder)), cell[160];
-    assert_true(count_of(page, "\n## ") == 2 && strstr(page, "\n## 1. ") != NULL && strstr(page, "\n## 2. ") != NULL);
-    snprintf(cell, sizeof cell, "| tiny | %.0f | GBAI | %.0f ± ", metric_of(in_root("%s/runs/tiny/gbai/seed-0", folder), "points"),
+    char *page = read_text(in_root("%s/paper.md", folder)), *svg = read_text(in_root("%s/paper.svg", folder)),
+         cell[160];
+    assert_true(count_of(page, "\n## ") == 2 && strstr(page, "\n## 1. ") != NULL &&
+                strstr(page, "\n## 2. ") != NULL);
+    snprintf(cell, sizeof cell, "| tiny | %.0f | GBAI | %.0f ± ",
+             metric_of(in_root("%s/runs/tiny/gbai/seed-0", folder), "points"),
              mean_over_seeds(folder, "gbai", "anchors_initial"));
     assert_int_equal(count_of(page, cell), 1);
     assert_int_equal(count_of(page, "| balls in place of voxels | initial anchors, % |"), 1);
@@ -316,13 +348,15 @@ static void the_papers_tables(void **state)
     json_t *whole;
     char wanted[64];
     assert_ok(json_read(in_root("paper/paper.json"), &whole, NULL));
-    const double constant = json_number_value(json_object_get(json_array_get(json_object_get(whole, "scenes"), 0), "scale_constant"));
+    const double constant = json_number_value(
+        json_object_get(json_array_get(json_object_get(whole, "scenes"), 0), "scale_constant"));
     json_decref(whole);
     assert_true(constant > 0.2 && constant < 1);
     char *config = read_text(in_root("paper/runs/tiny/gbai-scaled/seed-1/config"));
     const char *line = strstr(config, "scale-factor = ");
     snprintf(wanted, sizeof wanted, "%.9g", constant);
-    assert_true(line != NULL && fabs(strtod(line + 15, NULL) - constant) < 1e-9 && strstr(config, "compat = 1") != NULL);
+    assert_true(line != NULL && fabs(strtod(line + 15, NULL) - constant) < 1e-9 &&
+                strstr(config, "compat = 1") != NULL);
     mem_free(config);
 }
 
@@ -354,27 +388,33 @@ static void lpips_of_finished_runs(void **state)
     gbt_export_def export = gbt_export_def_default();
     const char *result[] = {in_root("result/")};
     json_t *means, *values;
-    export.refine_steps = 0, export.lpips = def.lpips;
+    export.refine_steps = 0;
+    export.lpips = def.lpips;
     assert_ok(gbt_export(in_root("paper/runs/tiny/voxel/seed-0"), &export, result, 1, NULL, NULL));
     assert_ok(json_read(in_root("result/results.json"), &means, NULL));
     assert_ok(json_read(in_root("result/per_view.json"), &values, NULL));
-    const json_t *ours = json_object_get(means, "ours_40"), *each = json_object_get(json_object_get(values, "ours_40"), "LPIPS");
+    const json_t *ours = json_object_get(means, "ours_40"),
+                 *each = json_object_get(json_object_get(values, "ours_40"), "LPIPS");
     const double first = json_number_value(json_object_get(each, "00000.png")),
-        second = json_number_value(json_object_get(each, "00001.png"));
+                 second = json_number_value(json_object_get(each, "00001.png"));
     assert_true(json_object_size(each) == 2 && first > 0 && second > 0);
     assert_near(json_number_value(json_object_get(ours, "LPIPS")), (first + second) / 2, 1e-9);
-    json_decref(means), json_decref(values);
+    json_decref(means);
+    json_decref(values);
     const char *file[] = {in_root("scene.ply")};
-    assert_int_equal(gbt_export(in_root("paper/runs/tiny/voxel/seed-0"), &export, file, 1, NULL, NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(gbt_export(in_root("paper/runs/tiny/voxel/seed-0"), &export, file, 1, NULL, NULL),
+                     GBT_ERR_ARGUMENT);
 
     def.lpips = NULL; /* no column, and the scores of before */
     paper_ok(&def, in_root("paper"));
     page = read_text(in_root("paper/paper.csv"));
     assert_string_equal(page, before);
-    mem_free(before), mem_free(page);
+    mem_free(before);
+    mem_free(page);
 }
 
-/* After the_papers_tables(): what is there is taken, what is damaged, missing or of other settings is made again, to the same bits. */
+/* After the_papers_tables(): what is there is taken, what is damaged, missing or of other settings is made
+   again, to the same bits. */
 static void runs_are_made_once(void **state)
 {
     (void)state;
@@ -387,7 +427,8 @@ static void runs_are_made_once(void **state)
             before[v][seed] = time_of(in_root("paper/runs/tiny/%s/seed-%d", variants[v], seed));
     bytes csv = read_bytes(in_root("paper/paper.csv"));
     bytes metrics = read_bytes(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"));
-    assert_ok(file_write_atomic(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"), metrics.data, metrics.count / 2, NULL)); /* damaged */
+    assert_ok(file_write_atomic(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"), metrics.data,
+                                metrics.count / 2, NULL)); /* damaged */
     /* interrupted */
     assert_int_equal(unlink(in_root("paper/runs/tiny/voxel-scaled/seed-0/study.json")), 0);
     /* and a table more */
@@ -396,19 +437,24 @@ static void runs_are_made_once(void **state)
     for (int v = 0; v < VARIANTS; v++)
         for (int seed = 0; seed < SEEDS; seed++) {
             const bool again = (v == 1 && seed == 1) || (v == 3 && seed == 0);
-            assert_int_equal(is_newer(time_of(in_root("paper/runs/tiny/%s/seed-%d", variants[v], seed)), before[v][seed]), again);
+            assert_int_equal(
+                is_newer(time_of(in_root("paper/runs/tiny/%s/seed-%d", variants[v], seed)), before[v][seed]),
+                again);
         }
-    assert_false(file_exists(in_root("paper/runs/tiny/gbai-gbsp-depth-14"))); /* 150 points end at depth 7: the runs are those of D_max
+    assert_false(file_exists(in_root("paper/runs/tiny/gbai-gbsp-depth-14"))); /* 150 points end at depth 7:
+                                                                                 the runs are those of D_max
                                                                                  18 */
     char *page = read_text(in_root("paper/paper.md"));
-    assert_int_equal(count_of(page, "| D_max 14 in place of 18 | final anchors, % | 0.0 ± 0.0 | **0.0 ± 0.0** | -6.0 |  | none at all |"),
+    assert_int_equal(count_of(page, "| D_max 14 in place of 18 | final anchors, % | 0.0 ± 0.0 | **0.0 ± "
+                                    "0.0** | -6.0 |  | none at all |"),
                      1);
     mem_free(page);
     mem_free(csv.data);
     mem_free(metrics.data);
 
     lab_paper_def other = small_paper(data, "1"); /* other settings */
-    other.iterations++, other.seeds = 1;
+    other.iterations++;
+    other.seeds = 1;
     paper_ok(&other, in_root("paper"));
     assert_true(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-0")), before[0][0]));
     assert_false(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-1")), before[0][1]));
@@ -427,28 +473,37 @@ static void bad_requests(void **state)
     lab_paper_def paper = small_paper(data, "1");
     paper.seeds = 0;
     assert_int_equal(lab_study_paper(&paper, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
-    paper.seeds = 1, paper.iterations = 19;
+    paper.seeds = 1;
+    paper.iterations = 19;
     assert_int_equal(lab_study_paper(&paper, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     lab_time_def time = lab_time_def_default();
-    time.data = data, time.data_count = 1, time.budget_seconds = 0;
+    time.data = data;
+    time.data_count = 1;
+    time.budget_seconds = 0;
     assert_int_equal(lab_study_time(&time, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
-    time.budget_seconds = 1, time.seeds = 11;
+    time.budget_seconds = 1;
+    time.seeds = 11;
     assert_int_equal(lab_study_time(&time, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     lab_anchors_def needs = lab_anchors_def_default();
-    needs.data = data, needs.data_count = 1, needs.iterations = 19;
+    needs.data = data;
+    needs.data_count = 1;
+    needs.iterations = 19;
     assert_int_equal(lab_study_anchors(&needs, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
-    needs.iterations = 20, needs.seeds = 0;
+    needs.iterations = 20;
+    needs.seeds = 0;
     assert_int_equal(lab_study_anchors(&needs, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     assert_false(file_exists(in_root("bad")));
 }
 
-/* ---- quality against time --------------------------------------------------------------------------------------------------------- */
+/* ---- quality against time ---- */
 
 static void time_ok(const char *const *data, const char *folder)
 {
     gbt_error err = {0};
     lab_time_def def = lab_time_def_default();
-    def.data = data, def.data_count = 1, def.budget_seconds = 0.1;
+    def.data = data;
+    def.data_count = 1;
+    def.budget_seconds = 0.1;
     FILE *out = tmpfile();
     if (lab_study_time(&def, folder, out, &err) != GBT_OK)
         fail_msg("%s", err.text);
@@ -470,7 +525,8 @@ static void quality_against_time(void **state)
     char run[PATH_SIZE];
     for (size_t v = 0; v < time_variant_count; v++) {
         const json_t *psnr = json_object_get(json_array_get(runs, v), "psnr");
-        assert_ok(study_runs_folder(in_root("time"), "tiny", time_variants[v].name, 0, run, sizeof run, NULL));
+        assert_ok(
+            study_runs_folder(in_root("time"), "tiny", time_variants[v].name, 0, run, sizeof run, NULL));
         before[v] = time_of(run);
         assert_near(json_number_value(json_object_get(psnr, "mean")), metric_of(run, "psnr"), 1e-6);
         assert_true(metric_of(run, "train_seconds") >= 0.9 * time_variants[v].budgets * 0.1);
@@ -483,17 +539,19 @@ static void quality_against_time(void **state)
     char *page = read_text(in_root("time/time.md")), *svg = read_text(in_root("time/time.svg"));
     assert_int_equal(count_of(page, "| faithful protocol |"), 2);
     assert_int_equal(count_of(page, "The faithful protocol ends at "), 1);
-    assert_true(count_of(svg, ">no growth<") <= 1 && count_of(svg, "no growth") >= 1 && strstr(svg, "nan") == NULL);
+    assert_true(count_of(svg, ">no growth<") <= 1 && count_of(svg, "no growth") >= 1 &&
+                strstr(svg, "nan") == NULL);
     mem_free(svg);
     mem_free(page);
     time_ok(data, in_root("time"));
     for (size_t v = 0; v < time_variant_count; v++) {
-        assert_ok(study_runs_folder(in_root("time"), "tiny", time_variants[v].name, 0, run, sizeof run, NULL));
+        assert_ok(
+            study_runs_folder(in_root("time"), "tiny", time_variants[v].name, 0, run, sizeof run, NULL));
         assert_false(is_newer(time_of(run), before[v]));
     }
 }
 
-/* ---- anchors ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- anchors ---- */
 
 static double figure_of(const json_t *run, const char *name)
 {
@@ -505,7 +563,10 @@ static void what_a_scene_needs(void **state)
     (void)state;
     const char *data[] = {tiny};
     lab_anchors_def def = lab_anchors_def_default();
-    def.data = data, def.data_count = 1, def.iterations = 40, def.seeds = 2;
+    def.data = data;
+    def.data_count = 1;
+    def.iterations = 40;
+    def.seeds = 2;
     gbt_error err = {0};
     FILE *out = tmpfile();
     if (lab_study_anchors(&def, in_root("anchors"), out, &err) != GBT_OK)
@@ -519,19 +580,22 @@ static void what_a_scene_needs(void **state)
         char run[PATH_SIZE];
         double psnr = 0, final = 0;
         for (uint64_t seed = 0; seed < 2; seed++) {
-            assert_ok(study_runs_folder(in_root("anchors"), "tiny", anchors_variants[v].name, seed, run, sizeof run, NULL));
-            psnr += metric_of(run, "psnr") / 2, final += metric_of(run, "anchors_final") / 2;
+            assert_ok(study_runs_folder(in_root("anchors"), "tiny", anchors_variants[v].name, seed, run,
+                                        sizeof run, NULL));
+            psnr += metric_of(run, "psnr") / 2;
+            final += metric_of(run, "anchors_final") / 2;
         }
         assert_near(figure_of(json_array_get(runs, v), "psnr"), psnr, 1e-6);
         assert_near(figure_of(json_array_get(runs, v), "anchors_final"), final, 1e-6);
     }
     /* More is asked of an anchor from 0.5 to 1 to 1.5 to 2.5. */
-    assert_true(figure_of(json_array_get(runs, 6), "anchors_final") > figure_of(json_array_get(runs, 5), "anchors_final"));
+    assert_true(figure_of(json_array_get(runs, 6), "anchors_final") >
+                figure_of(json_array_get(runs, 5), "anchors_final"));
     const double paper = figure_of(json_array_get(runs, 1), "anchors_initial");
     assert_true(figure_of(json_array_get(runs, 2), "anchors_initial") == floor(paper / 2));
     json_decref(whole);
     char *page = read_text(in_root("anchors/anchors.md")), *svg = read_text(in_root("anchors/anchors.svg")),
-        *csv = read_text(in_root("anchors/anchors.csv"));
+         *csv = read_text(in_root("anchors/anchors.csv"));
     assert_int_equal(count_of(page, "| random points |"), 1);
     assert_int_equal(count_of(csv, "\n"), 1 + 2 * anchors_variant_count);
     assert_null(strstr(svg, "nan"));
@@ -543,11 +607,13 @@ static void what_a_scene_needs(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mean_and_spread),      cmocka_unit_test(figures_as_text),          cmocka_unit_test(closed_form_of_balls),
-        cmocka_unit_test(constant_of_pairs),    cmocka_unit_test(what_the_paper_says),      cmocka_unit_test(verdicts),
-        cmocka_unit_test(names_and_folders),    cmocka_unit_test(when_a_curve_comes_there), cmocka_unit_test(bad_requests),
-        cmocka_unit_test(the_papers_tables),    cmocka_unit_test(lpips_of_finished_runs),   cmocka_unit_test(runs_are_made_once),
-        cmocka_unit_test(quality_against_time), cmocka_unit_test(what_a_scene_needs),
+        cmocka_unit_test(mean_and_spread),        cmocka_unit_test(figures_as_text),
+        cmocka_unit_test(closed_form_of_balls),   cmocka_unit_test(constant_of_pairs),
+        cmocka_unit_test(what_the_paper_says),    cmocka_unit_test(verdicts),
+        cmocka_unit_test(names_and_folders),      cmocka_unit_test(when_a_curve_comes_there),
+        cmocka_unit_test(bad_requests),           cmocka_unit_test(the_papers_tables),
+        cmocka_unit_test(lpips_of_finished_runs), cmocka_unit_test(runs_are_made_once),
+        cmocka_unit_test(quality_against_time),   cmocka_unit_test(what_a_scene_needs),
     };
     return cmocka_run_group_tests(tests, make_root, remove_root);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/trace/fixture.h -- Gaussians that several tests of this room start from. */
 #ifndef GBT_TESTS_TRACE_FIXTURE_H
 #define GBT_TESTS_TRACE_FIXTURE_H
@@ -12,8 +13,10 @@ static gaussians some(size_t count, float opacity)
     assert_ok(gaussians_resize(&g, count, NULL));
     gaussians_zero(&g);
     for (size_t i = 0; i < count; i++) {
-        g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 1, g.quat_w[i] = 1;
-        g.opacity[i] = opacity, g.red[i] = g.green[i] = g.blue[i] = 1;
+        g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 1;
+        g.quat_w[i] = 1;
+        g.opacity[i] = opacity;
+        g.red[i] = g.green[i] = g.blue[i] = 1;
     }
     gaussians_pad(&g);
     return g;

@@ -1,4 +1,6 @@
-/* Rays with a width: energy, the cases that can be said by hand, the adjoint in double, and the mean over many thin rays. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Rays with a width: energy, the cases that can be said by hand, the adjoint in double, and the mean over
+   many thin rays. */
 #include "test_support.h"
 
 #include <math.h>
@@ -14,10 +16,16 @@ enum { NUMBERS = 11 };
 
 static gbt_camera camera_of(gbt_camera_model model)
 {
-    gbt_camera c = {.model = model, .width = 64, .height = 48, .params = {80, 80, 32, 24}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+    gbt_camera c = {.model = model,
+                    .width = 64,
+                    .height = 48,
+                    .params = {80, 80, 32, 24},
+                    .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
                     .center = {0.3, -0.2, -6}};
-    if (model == GBT_CAMERA_EQUIRECTANGULAR)
-        c.params[0] = 64, c.params[1] = 48;
+    if (model == GBT_CAMERA_EQUIRECTANGULAR) {
+        c.params[0] = 64;
+        c.params[1] = 48;
+    }
     return c;
 }
 
@@ -29,8 +37,10 @@ static footprint_gaussian random_gaussian(uint64_t seed)
         g.mean[k] = rng_normal(seed, k, 0);
         g.scale[k] = 0.02 * pow(20, (double)rng_uniform(seed, 3 + k, 0));
     }
-    for (uint64_t k = 0; k < 4; k++)
-        g.quat[k] = rng_normal(seed, 6 + k, 0), square += g.quat[k] * g.quat[k];
+    for (uint64_t k = 0; k < 4; k++) {
+        g.quat[k] = rng_normal(seed, 6 + k, 0);
+        square += g.quat[k] * g.quat[k];
+    }
     for (int k = 0; k < 4; k++)
         g.quat[k] /= sqrt(square);
     return g;
@@ -49,7 +59,8 @@ static void test_sizes(void **state)
     footprint_view view = footprint_view_of(&c);
     assert_true(fabs(footprint_pixel(&view, (double[]){0.3, -0.2, 2}) - 8 / 80.0) < 1e-12);
     /* 45 degrees off the axis at distance t: t cos^(3/2) / f */
-    assert_true(fabs(footprint_pixel(&view, (double[]){2.3, -0.2, -4}) - sqrt(8) * pow(0.5, 0.75) / 80) < 1e-12);
+    assert_true(fabs(footprint_pixel(&view, (double[]){2.3, -0.2, -4}) - sqrt(8) * pow(0.5, 0.75) / 80) <
+                1e-12);
     assert_true(footprint_pixel(&view, (double[]){0, 0, -7}) == 0); /* behind */
     assert_true(footprint_pixel(&view, c.center) == 0);
     c = camera_of(GBT_CAMERA_ORTHOGRAPHIC);
@@ -57,24 +68,31 @@ static void test_sizes(void **state)
     assert_true(fabs(footprint_pixel(&view, (double[]){5, 5, 100}) - 1 / 80.0) < 1e-12);
     c = camera_of(GBT_CAMERA_OPENCV_FISHEYE);
     view = footprint_view_of(&c);
-    assert_true(fabs(footprint_pixel(&view, (double[]){0.3, 3.8, -6}) - 4 / 80.0) < 1e-12); /* 90 degrees off the axis */
+    assert_true(fabs(footprint_pixel(&view, (double[]){0.3, 3.8, -6}) - 4 / 80.0) < 1e-12); /* 90 degrees off
+                                                                                               the axis */
     c.params[0] = NAN;
     view = footprint_view_of(&c);
     assert_true(footprint_pixel(&view, (double[]){0, 0, 1}) == 0);
 }
 
-/* A ball of std-dev s on the axis keeps o s^2; a disc seen flat keeps its area, seen edge-on only its width grows. */
+/* A ball of std-dev s on the axis keeps o s^2; a disc seen flat keeps its area, seen edge-on only its width
+   grows. */
 static void test_energy(void **state)
 {
     (void)state;
     const gbt_camera c = camera_of(GBT_CAMERA_PINHOLE);
     const footprint_view view = footprint_view_of(&c);
     const double pixel = 6 / 80.0, w = 0.1 * pixel * pixel;
-    footprint_gaussian ball = {.mean = {0.3, -0.2, 0}, .scale = {0.02, 0.02, 0.02}, .quat = {1, 0, 0, 0}, .opacity = 0.8};
+    footprint_gaussian ball = {
+        .mean = {0.3, -0.2, 0}, .scale = {0.02, 0.02, 0.02}, .quat = {1, 0, 0, 0}, .opacity = 0.8};
     footprint_widen(&view, 0.1, 0, &ball);
     assert_true(fabs(ball.scale[0] * ball.scale[0] - (4e-4 + w)) < 1e-15);
     assert_true(fabs(ball.opacity * (4e-4 + w) - 0.8 * 4e-4) < 1e-15);
-    footprint_gaussian flat = {.mean = {0.3, -0.2, 0}, .scale = {0.5, 0.25, 0}, .quat = {1, 0, 0, 0}, .opacity = 0.8}, edge = flat;
+    footprint_gaussian flat = {.mean = {0.3, -0.2, 0},
+                               .scale = {0.5, 0.25, 0},
+                               .quat = {1, 0, 0, 0},
+                               .opacity = 0.8},
+                       edge = flat;
     footprint_widen(&view, 0.1, 0, &flat);
     assert_true(fabs(flat.opacity - 0.8 * 0.125 / sqrt((0.25 + w) * (0.0625 + w))) < 1e-12);
     edge.quat[0] = edge.quat[1] = sqrt(0.5); /* its normal along y */
@@ -85,7 +103,8 @@ static void test_energy(void **state)
     assert_true(point.opacity == 0 && point.scale[0] > 0);
 }
 
-/* Without a width nothing changes; a pixel counts as no smaller than the smallest that the Gaussian was made for. */
+/* Without a width nothing changes; a pixel counts as no smaller than the smallest that the Gaussian was made
+   for. */
 static void test_limits(void **state)
 {
     (void)state;
@@ -102,11 +121,13 @@ static void test_limits(void **state)
         assert_true(fabs(*number_of(&held, i) - *number_of(&far, i)) <= 1e-14);
 }
 
-static double loss_of(const footprint_view *view, double pixel_min, footprint_gaussian g, const footprint_gaussian *weights)
+static double loss_of(const footprint_view *view, double pixel_min, footprint_gaussian g,
+                      const footprint_gaussian *weights)
 {
     double sum = 0;
     footprint_gaussian w = *weights;
-    const double norm = sqrt(g.quat[0] * g.quat[0] + g.quat[1] * g.quat[1] + g.quat[2] * g.quat[2] + g.quat[3] * g.quat[3]);
+    const double norm =
+        sqrt(g.quat[0] * g.quat[0] + g.quat[1] * g.quat[1] + g.quat[2] * g.quat[2] + g.quat[3] * g.quat[3]);
     for (int k = 0; k < 4; k++)
         g.quat[k] /= norm;
     footprint_widen(view, 0.3, pixel_min, &g);
@@ -116,12 +137,13 @@ static double loss_of(const footprint_view *view, double pixel_min, footprint_ga
     return sum;
 }
 
-/* Against central differences, relative to the largest gradient. Through a normalised quaternion, so that the tangent is what is
-   compared. */
+/* Against central differences, relative to the largest gradient. Through a normalised quaternion, so that the
+   tangent is what is compared. */
 static void test_adjoint(void **state)
 {
     (void)state;
-    const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_OPENCV_FISHEYE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_EQUIRECTANGULAR};
+    const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_OPENCV_FISHEYE, GBT_CAMERA_ORTHOGRAPHIC,
+                                       GBT_CAMERA_EQUIRECTANGULAR};
     for (uint64_t seed = 0; seed < 40; seed++) {
         const gbt_camera c = camera_of(models[seed % 4]);
         const footprint_view view = footprint_view_of(&c);
@@ -134,8 +156,11 @@ static void test_adjoint(void **state)
         for (int i = 0; i < NUMBERS; i++) {
             const double h = 1e-6;
             footprint_gaussian up = g, down = g;
-            *number_of(&up, i) += h, *number_of(&down, i) -= h;
-            const double slope = (loss_of(&view, pixel_min, up, &weights) - loss_of(&view, pixel_min, down, &weights)) / (2 * h);
+            *number_of(&up, i) += h;
+            *number_of(&down, i) -= h;
+            const double slope =
+                (loss_of(&view, pixel_min, up, &weights) - loss_of(&view, pixel_min, down, &weights)) /
+                (2 * h);
             worst = fmax(worst, fabs(slope - *number_of(&d, i)));
             largest = fmax(largest, fabs(slope));
         }
@@ -143,16 +168,24 @@ static void test_adjoint(void **state)
     }
 }
 
-/* The picture of one faint Gaussian with a width is the mean of many pictures without, spread over the pixel. */
+/* The picture of one faint Gaussian with a width is the mean of many pictures without, spread over the
+   pixel. */
 static void test_mean_over_pixel(void **state)
 {
     (void)state;
     enum { SIDE = 12, SHIFTS = 24 };
-    gbt_camera c = {.model = GBT_CAMERA_PINHOLE, .width = SIDE, .height = SIDE, .params = {40, 40, 6, 6},
-                    .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0, 0, -6}};
+    gbt_camera c = {.model = GBT_CAMERA_PINHOLE,
+                    .width = SIDE,
+                    .height = SIDE,
+                    .params = {40, 40, 6, 6},
+                    .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                    .center = {0, 0, -6}};
     gaussians g = random_gaussians(1, 0, 3), wide = {0};
     g.mean_x[0] = g.mean_y[0] = g.mean_z[0] = 0.02f;
-    g.scale_x[0] = 0.03f, g.scale_y[0] = 0.25f, g.scale_z[0] = 0.06f, g.opacity[0] = 0.2f;
+    g.scale_x[0] = 0.03f;
+    g.scale_y[0] = 0.25f;
+    g.scale_z[0] = 0.06f;
+    g.opacity[0] = 0.2f;
     const footprint_view view = footprint_view_of(&c);
     const float variance = 1 / 12.0f; /* of the square pixel */
     assert_ok(footprint_forward(&view, variance, NULL, &g, &wide, NULL));
@@ -161,7 +194,8 @@ static void test_mean_over_pixel(void **state)
     ray_image rays = {0};
     double mean[SIDE * SIDE] = {0}, rgb[SIDE * SIDE * 3], left[SIDE * SIDE], worst = 0, unfiltered = 0;
     for (int j = 0; j < SHIFTS * SHIFTS; j++) {
-        c.params[2] = 6 + (j % SHIFTS + 0.5) / SHIFTS - 0.5, c.params[3] = 6 + (j / SHIFTS + 0.5) / SHIFTS - 0.5;
+        c.params[2] = 6 + (j % SHIFTS + 0.5) / SHIFTS - 0.5;
+        c.params[3] = 6 + (j / SHIFTS + 0.5) / SHIFTS - 0.5;
         assert_ok(ray_image_from_camera(&c, &rays, NULL));
         assert_ok(reference_forward(&g, &s, &rays, rgb, left, NULL, NULL));
         for (int i = 0; i < SIDE * SIDE; i++)
@@ -188,7 +222,8 @@ static void test_arrays(void **state)
     (void)state;
     const gbt_camera c = camera_of(GBT_CAMERA_PINHOLE);
     const footprint_view view = footprint_view_of(&c);
-    gaussians g = random_gaussians(3001, 0.1f, 9), out = {0}, d = random_gaussians(3001, 0.1f, 10), d1 = random_gaussians(3001, 0.1f, 10);
+    gaussians g = random_gaussians(3001, 0.1f, 9), out = {0}, d = random_gaussians(3001, 0.1f, 10),
+              d1 = random_gaussians(3001, 0.1f, 10);
     float *pixel_min = calloc(g.count, sizeof *pixel_min);
     for (size_t i = 0; i < g.count; i++)
         pixel_min[i] = 0.2f * rng_uniform(1, 2, i);
@@ -201,10 +236,11 @@ static void test_arrays(void **state)
     GAUSSIANS_FIELDS(X)
 #undef X
     for (size_t i = 0; i < g.count; i += 97) {
-        footprint_gaussian one = {.mean = {(double)g.mean_x[i], (double)g.mean_y[i], (double)g.mean_z[i]},
-                                  .scale = {(double)g.scale_x[i], (double)g.scale_y[i], (double)g.scale_z[i]},
-                                  .quat = {(double)g.quat_w[i], (double)g.quat_x[i], (double)g.quat_y[i], (double)g.quat_z[i]},
-                                  .opacity = (double)g.opacity[i]};
+        footprint_gaussian one = {
+            .mean = {(double)g.mean_x[i], (double)g.mean_y[i], (double)g.mean_z[i]},
+            .scale = {(double)g.scale_x[i], (double)g.scale_y[i], (double)g.scale_z[i]},
+            .quat = {(double)g.quat_w[i], (double)g.quat_x[i], (double)g.quat_y[i], (double)g.quat_z[i]},
+            .opacity = (double)g.opacity[i]};
         footprint_widen(&view, (double)0.1f, (double)pixel_min[i], &one);
         assert_true(out.scale_y[i] == (float)one.scale[1] && out.opacity[i] == (float)one.opacity);
         assert_true(out.mean_x[i] == g.mean_x[i] && out.quat_z[i] == g.quat_z[i] && out.red[i] == g.red[i]);
@@ -218,8 +254,8 @@ static void test_arrays(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_sizes),  cmocka_unit_test(test_energy),          cmocka_unit_test(test_limits),
-                                       cmocka_unit_test(test_adjoint), cmocka_unit_test(test_mean_over_pixel),
-                                       cmocka_unit_test(test_arrays)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_sizes),           cmocka_unit_test(test_energy),
+                                       cmocka_unit_test(test_limits),          cmocka_unit_test(test_adjoint),
+                                       cmocka_unit_test(test_mean_over_pixel), cmocka_unit_test(test_arrays)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

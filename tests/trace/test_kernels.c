@@ -1,5 +1,6 @@
-/* tests/trace/test_kernels.c -- every kernel against the double reference: picture, order, outputs beside colour, surfaces, radius,
-   memory. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/trace/test_kernels.c -- every kernel against the double reference: picture, order, outputs beside
+   colour, surfaces, radius, memory. */
 #include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"
@@ -18,17 +19,23 @@ static gaussians cloud(size_t count, uint64_t seed, float spread, float size, fl
     gaussians g = some(count, 0);
     for (size_t i = 0; i < count; i++) {
         double q[4], square = 0;
-        for (uint64_t k = 0; k < 4; k++)
-            q[k] = rng_normal(seed, k, i), square += q[k] * q[k];
+        for (uint64_t k = 0; k < 4; k++) {
+            q[k] = rng_normal(seed, k, i);
+            square += q[k] * q[k];
+        }
         const float inverse = (float)(1 / sqrt(square));
-        g.quat_w[i] = (float)q[0] * inverse, g.quat_x[i] = (float)q[1] * inverse, g.quat_y[i] = (float)q[2] * inverse,
-            g.quat_z[i] = (float)q[3] * inverse;
-        g.mean_x[i] = spread * (float)rng_normal(seed, 4, i), g.mean_y[i] = spread * (float)rng_normal(seed, 5, i),
-            g.mean_z[i] = spread * (float)rng_normal(seed, 6, i);
-        g.scale_x[i] = size * powf(4, rng_uniform(seed, 7, i) - 0.5f), g.scale_y[i] = size * powf(4, rng_uniform(seed, 8, i) - 0.5f);
+        g.quat_w[i] = (float)q[0] * inverse, g.quat_x[i] = (float)q[1] * inverse,
+        g.quat_y[i] = (float)q[2] * inverse, g.quat_z[i] = (float)q[3] * inverse;
+        g.mean_x[i] = spread * (float)rng_normal(seed, 4, i),
+        g.mean_y[i] = spread * (float)rng_normal(seed, 5, i),
+        g.mean_z[i] = spread * (float)rng_normal(seed, 6, i);
+        g.scale_x[i] = size * powf(4, rng_uniform(seed, 7, i) - 0.5f);
+        g.scale_y[i] = size * powf(4, rng_uniform(seed, 8, i) - 0.5f);
         g.scale_z[i] = 0.2f * size; /* flat, as trained ones are */
         g.opacity[i] = opacity * rng_uniform(seed, 9, i);
-        g.red[i] = rng_uniform(seed, 10, i), g.green[i] = rng_uniform(seed, 11, i), g.blue[i] = rng_uniform(seed, 12, i);
+        g.red[i] = rng_uniform(seed, 10, i);
+        g.green[i] = rng_uniform(seed, 11, i);
+        g.blue[i] = rng_uniform(seed, 12, i);
     }
     gaussians_pad(&g);
     return g;
@@ -40,17 +47,21 @@ static ray_image make_rays(bool spread)
     ray_image rays = {0};
     assert_ok(ray_image_reserve(&rays, WIDTH, HEIGHT, !spread, NULL));
     for (size_t i = 0; i < RAYS; i++) {
-        double d[3] = {((double)(i % WIDTH) - WIDTH / 2.0) * 0.02, ((double)(i / WIDTH) - HEIGHT / 2.0) * 0.02, 1};
+        double d[3] = {((double)(i % WIDTH) - WIDTH / 2.0) * 0.02,
+                       ((double)(i / WIDTH) - HEIGHT / 2.0) * 0.02, 1};
         if (spread)
             for (size_t k = 0; k < 3; k++)
                 rays.origin[3 * i + k] = (float)(k == 2 ? -5 : 0.05 * rng_normal(77, k, i)),
-                    d[k] -= k == 2 ? 0 : (double)rays.origin[3 * i + k] / 5;
+                                    d[k] -= k == 2 ? 0 : (double)rays.origin[3 * i + k] / 5;
         dvec_normalize(d);
         for (size_t k = 0; k < 3; k++)
             rays.dir[3 * i + k] = (float)d[k];
     }
-    if (!spread)
-        rays.origin[0] = 0.3f, rays.origin[1] = -0.2f, rays.origin[2] = -5;
+    if (!spread) {
+        rays.origin[0] = 0.3f;
+        rays.origin[1] = -0.2f;
+        rays.origin[2] = -5;
+    }
     return rays;
 }
 
@@ -62,7 +73,8 @@ typedef struct pass_result {
     kernel_counters counters;
 } pass_result;
 
-static pass_result *run(const gaussians *g, const trace_settings *s, const ray_image *rays, trace_kernel kernel, size_t tape_bytes_max)
+static pass_result *run(const gaussians *g, const trace_settings *s, const ray_image *rays,
+                        trace_kernel kernel, size_t tape_bytes_max)
 {
     pass_result *r = mem_calloc(1, sizeof *r, "test", NULL);
     trace_scene scene = {.kernel = kernel, .tape_bytes_max = tape_bytes_max};
@@ -71,7 +83,8 @@ static pass_result *run(const gaussians *g, const trace_settings *s, const ray_i
     assert_ok(image_alloc(&d_rgb, WIDTH, HEIGHT, 3, NULL));
     for (size_t i = 0; i < 3 * RAYS; i++)
         d_rgb.pixels[i] = (float)rng_normal(5, 5, i);
-    const trace_outputs out = {&r->rgb, r->transmittance, r->depth, r->median, r->normal, r->hit_count, r->strongest};
+    const trace_outputs out = {&r->rgb,   r->transmittance, r->depth,    r->median,
+                               r->normal, r->hit_count,     r->strongest};
     assert_ok(trace_build(&scene, g, s, 5, NULL));
     assert_ok(trace_forward(&scene, rays, true, &out, &r->counters, NULL));
     assert_ok(trace_backward(&scene, rays, &d_rgb, &r->d, NULL, NULL, NULL));
@@ -87,28 +100,33 @@ static void pass_free(pass_result *r)
     mem_free(r);
 }
 
-/* What the reference says of one ray, beside its colour; `fine` is false where rounding may decide something. */
+/* What the reference says of one ray, beside its colour; `fine` is false where rounding may decide
+   something. */
 typedef struct expected {
     double rgb[3], transmittance, depth, median, hit_count, normal[3];
     uint32_t strongest;
     bool fine;
 } expected;
 
-static expected expect_ray(const gaussians *g, const trace_settings *s, const ray_image *rays, size_t ray, reference_hit **hits,
-                           size_t *capacity)
+static expected expect_ray(const gaussians *g, const trace_settings *s, const ray_image *rays, size_t ray,
+                           reference_hit **hits, size_t *capacity)
 {
     expected e = {.transmittance = 1, .strongest = UINT32_MAX, .fine = true};
     double origin[3], dir[3], top = 0, second = 0, before = -1;
     size_t count;
     trace_settings loose = *s;
     loose.alpha_min *= 0.999f;
-    for (size_t k = 0; k < 3; k++)
-        origin[k] = (double)ray_image_origin(rays, ray)[k], dir[k] = (double)rays->dir[3 * ray + k];
+    for (size_t k = 0; k < 3; k++) {
+        origin[k] = (double)ray_image_origin(rays, ray)[k];
+        dir[k] = (double)rays->dir[3 * ray + k];
+    }
     assert_ok(reference_ray_hits(g, &loose, origin, dir, hits, &count, capacity, NULL));
-    const double far = rays->far == NULL ? HUGE_VAL : (double)rays->far[ray], cut = (double)s->proxy_radius * (double)s->proxy_radius;
+    const double far = rays->far == NULL ? HUGE_VAL : (double)rays->far[ray],
+                 cut = (double)s->proxy_radius * (double)s->proxy_radius;
     for (size_t i = 0; i < count; i++) {
         const reference_hit *h = &(*hits)[i];
-        e.fine = e.fine && fabs(h->alpha - (double)s->alpha_min) > 1e-6 && fabs(h->d2 - cut) > 1e-4 && fabs(h->t - far) > 1e-5;
+        e.fine = e.fine && fabs(h->alpha - (double)s->alpha_min) > 1e-6 && fabs(h->d2 - cut) > 1e-4 &&
+                 fabs(h->t - far) > 1e-5;
         if (h->alpha < (double)s->alpha_min || h->d2 > cut || h->t >= far)
             continue;
         e.fine = e.fine && h->t - before > 2e-6 * h->t;
@@ -118,19 +136,26 @@ static expected expect_ray(const gaussians *g, const trace_settings *s, const ra
         if (next < (double)s->transmittance_min)
             break;
         const float color[3] = {g->red[h->id], g->green[h->id], g->blue[h->id]};
-        const double q[4] = {(double)g->quat_w[h->id], (double)g->quat_x[h->id], (double)g->quat_y[h->id], (double)g->quat_z[h->id]};
+        const double q[4] = {(double)g->quat_w[h->id], (double)g->quat_x[h->id], (double)g->quat_y[h->id],
+                             (double)g->quat_z[h->id]};
         double m[9];
         dquat_to_matrix(q, m);
-        const double axis[3] = {m[2], m[5], m[8]}, facing = dvec_dot(axis, dir); /* z is the shortest axis of cloud() */
+        const double axis[3] = {m[2], m[5], m[8]},
+                     facing = dvec_dot(axis, dir); /* z is the shortest axis of cloud() */
         e.fine = e.fine && fabs(facing) > 1e-5;
-        for (int k = 0; k < 3; k++)
-            e.rgb[k] += weight * (double)color[k], e.normal[k] += (facing < 0 ? weight : -weight) * axis[k];
-        e.depth += weight * h->t, e.hit_count++;
+        for (int k = 0; k < 3; k++) {
+            e.rgb[k] += weight * (double)color[k];
+            e.normal[k] += (facing < 0 ? weight : -weight) * axis[k];
+        }
+        e.depth += weight * h->t;
+        e.hit_count++;
         if (next < 0.5 && e.median == 0)
             e.median = h->t;
-        if (weight > top)
-            second = top, top = weight, e.strongest = h->id;
-        else
+        if (weight > top) {
+            second = top;
+            top = weight;
+            e.strongest = h->id;
+        } else
             second = fmax(second, weight);
         e.transmittance = next;
     }
@@ -141,7 +166,8 @@ static expected expect_ray(const gaussians *g, const trace_settings *s, const ra
     return e;
 }
 
-static void check_run(const char *name, const gaussians *g, const trace_settings *s, const ray_image *rays, const pass_result *r)
+static void check_run(const char *name, const gaussians *g, const trace_settings *s, const ray_image *rays,
+                      const pass_result *r)
 {
     reference_hit *hits = NULL;
     size_t capacity = 0, left_out = 0;
@@ -175,9 +201,12 @@ static void all_kernels_all_outputs(void **state)
         const char *name;
         size_t count;
         float spread, size, opacity;
-    } rows[] = {{"thin", 300, 1, 0.15f, 0.7f}, {"opaque", 1500, 0.7f, 0.1f, 1}, {"around the camera", 400, 4, 0.5f, 0.6f}};
+    } rows[] = {{"thin", 300, 1, 0.15f, 0.7f},
+                {"opaque", 1500, 0.7f, 0.1f, 1},
+                {"around the camera", 400, 4, 0.5f, 0.6f}};
     trace_settings s = trace_settings_default();
-    s.background[0] = 0.2f, s.background[2] = 0.7f;
+    s.background[0] = 0.2f;
+    s.background[2] = 0.7f;
     for (size_t i = 0; i < 3; i++)
         for (int spread = 0; spread < 2; spread++) {
             gaussians g = cloud(rows[i].count, i, rows[i].spread, rows[i].size, rows[i].opacity);
@@ -203,13 +232,18 @@ static void kernels_share_the_adjoint(void **state)
     pass_result *tile = run(&g, &s, &rays, TRACE_TILE, 0);
     for (int kernel = TRACE_SINGLE; kernel <= TRACE_EMBREE; kernel++) {
         pass_result *other = run(&g, &s, &rays, (trace_kernel)kernel, 0);
-        const float *const a[] = {tile->d.mean_x, tile->d.scale_y, tile->d.quat_z, tile->d.opacity, tile->d.red};
-        const float *const b[] = {other->d.mean_x, other->d.scale_y, other->d.quat_z, other->d.opacity, other->d.red};
+        const float *const a[] = {tile->d.mean_x, tile->d.scale_y, tile->d.quat_z, tile->d.opacity,
+                                  tile->d.red};
+        const float *const b[] = {other->d.mean_x, other->d.scale_y, other->d.quat_z, other->d.opacity,
+                                  other->d.red};
         for (size_t f = 0; f < 5; f++) {
             double error = 0, norm = 0;
-            for (size_t i = 0; i < g.count; i++)
-                error += pow((double)(a[f][i] - b[f][i]), 2), norm += pow((double)a[f][i], 2);
-            if (!(error < 1e-8 * norm)) /* a hit at a cut may be on one side here and on the other there: 1e-4 */
+            for (size_t i = 0; i < g.count; i++) {
+                error += pow((double)(a[f][i] - b[f][i]), 2);
+                norm += pow((double)a[f][i], 2);
+            }
+            if (!(error < 1e-8 * norm)) /* a hit at a cut may be on one side here and on the other there: 1e-4
+                                         */
                 fail_msg("%s: field %zu differs by %.2g", kernel_names[kernel], f, sqrt(error / norm));
         }
         pass_free(other);
@@ -219,7 +253,8 @@ static void kernels_share_the_adjoint(void **state)
     gaussians_free(&g);
 }
 
-/* Rays that end at a surface, in front of everything, inside and behind; and a fixed radius in place of alpha_min alone. */
+/* Rays that end at a surface, in front of everything, inside and behind; and a fixed radius in place of
+   alpha_min alone. */
 static void surfaces_and_radius(void **state)
 {
     (void)state;
@@ -259,7 +294,7 @@ static void no_room_for_the_tape(void **state)
     gaussians_free(&g);
 }
 
-/* ---- order --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- order ---- */
 
 typedef struct brute_row {
     float t;
@@ -272,14 +307,14 @@ static int by_depth(const void *a, const void *b)
     return x->t != y->t ? (x->t < y->t ? -1 : 1) : x->row - y->row;
 }
 
-/* Rows that overlap little, much and wholly, with ties: on every ray, T in front of each hit is the product of the hits sorted before
-   it. */
+/* Rows that overlap little, much and wholly, with ties: on every ray, T in front of each hit is the product
+   of the hits sorted before it. */
 static void rows_are_in_exact_order(void **state)
 {
     (void)state;
     enum { COUNT = 90 };
-    static _Alignas(64) float t[(COUNT + ROW_BLOCK) * 16], clear[(COUNT + ROW_BLOCK) * 16], before[(COUNT + 1) * 16],
-        term[(COUNT + ROW_BLOCK) * 16];
+    static _Alignas(64) float t[(COUNT + ROW_BLOCK) * 16], clear[(COUNT + ROW_BLOCK) * 16],
+        before[(COUNT + 1) * 16], term[(COUNT + ROW_BLOCK) * 16];
     static _Alignas(64) float after[(COUNT + 1) * 16];
     static float near[COUNT + ROW_BLOCK], far_reached[COUNT], start[COUNT];
     static const float overlaps[] = {0, 0.5f, 3, 1000};
@@ -292,38 +327,43 @@ static void rows_are_in_exact_order(void **state)
             for (uint64_t lane = 0; lane < 16; lane++) {
                 const bool hit = rng_uniform(round, 1, 16 * i + lane) < 0.7f || lane == i % 16;
                 /* many ties */
-                raw[i][lane] = hit ? start[i] + floorf(8 * overlaps[round] * rng_uniform(round, 2, 16 * i + lane)) / 8 : INFINITY;
+                raw[i][lane] =
+                    hit ? start[i] + floorf(8 * overlaps[round] * rng_uniform(round, 2, 16 * i + lane)) / 8
+                        : INFINITY;
                 key[i] = fminf(key[i], raw[i][lane]);
             }
         }
         rank_keys(key, COUNT, order);
         float reached = 0;
-        f16 product = f16_set1(1);
+        vfloat16 product = vfloat16_set1(1);
         for (int i = 0; i < COUNT; i++) {
             near[i] = INFINITY;
             float far = 0;
             for (int lane = 0; lane < 16; lane++) {
                 const float depth = raw[order[i]][lane];
-                t[16 * i + lane] = depth, clear[16 * i + lane] = isinf(depth) ? 1
-                                   : 0.3f + 0.6f * rng_uniform(round, 3, (uint64_t)(16 * i + lane));
+                t[16 * i + lane] = depth,
+                           clear[16 * i + lane] =
+                               isinf(depth) ? 1
+                                            : 0.3f + 0.6f * rng_uniform(round, 3, (uint64_t)(16 * i + lane));
                 term[16 * i + lane] = isinf(depth) ? 0 : rng_uniform(round, 4, (uint64_t)(16 * i + lane));
-                near[i] = fminf(near[i], depth), far = fmaxf(far, isinf(depth) ? 0 : depth);
+                near[i] = fminf(near[i], depth);
+                far = fmaxf(far, isinf(depth) ? 0 : depth);
             }
             reached = fmaxf(reached, far);
             far_reached[i] = reached;
             row_store(before, i, product);
-            product = f16_mul(product, row_load(clear, i));
+            product = vfloat16_mul(product, row_load(clear, i));
         }
         sorted_rows o = {t, clear, before, near, far_reached, COUNT};
         end_rows(&o);
-        f16 behind = f16_set1(0.25f);
+        vfloat16 behind = vfloat16_set1(0.25f);
         row_store(after, COUNT, behind);
         for (int i = COUNT; i-- > 0;)
-            row_store(after, i, behind = f16_add(behind, row_load(term, i)));
+            row_store(after, i, behind = vfloat16_add(behind, row_load(term, i)));
         memset(term + (size_t)COUNT * 16, 0, ROW_BLOCK * 16 * sizeof *term);
         row_window window = {0};
         for (int first = 0; first < COUNT; first += ROW_BLOCK) {
-            f16 T[ROW_BLOCK], sum[ROW_BLOCK];
+            vfloat16 T[ROW_BLOCK], sum[ROW_BLOCK];
             move_window(&o, first, &window);
             window_transmittance(&o, first, &window, T);
             window_behind(&o, first, &window, term, after, sum);
@@ -343,7 +383,7 @@ static void rows_are_in_exact_order(void **state)
                     for (int i = at + 1; i < n; i++)
                         want_behind += (double)term[16 * hits[i].row + lane];
                     _Alignas(64) float got[2][16];
-                    f16_store(got[0], T[k]), f16_store(got[1], sum[k]);
+                    vfloat16_store(got[0], T[k]), vfloat16_store(got[1], sum[k]);
                     assert_near((double)got[0][lane], want, 1e-5 * want);
                     assert_near((double)got[1][lane], want_behind, 1e-5 * want_behind);
                 }
@@ -354,8 +394,9 @@ static void rows_are_in_exact_order(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(all_kernels_all_outputs), cmocka_unit_test(kernels_share_the_adjoint), cmocka_unit_test(surfaces_and_radius),
-        cmocka_unit_test(no_room_for_the_tape),    cmocka_unit_test(rows_are_in_exact_order),
+        cmocka_unit_test(all_kernels_all_outputs), cmocka_unit_test(kernels_share_the_adjoint),
+        cmocka_unit_test(surfaces_and_radius),     cmocka_unit_test(no_room_for_the_tape),
+        cmocka_unit_test(rows_are_in_exact_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

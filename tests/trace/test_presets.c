@@ -1,4 +1,6 @@
-/* tests/trace/test_presets.c -- what cut-offs leave out of a picture stays below the bounds of docs/accuracy.md, and comes near them. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/trace/test_presets.c -- what cut-offs leave out of a picture stays below the bounds of
+   docs/accuracy.md, and comes near them. */
 #include "base/memory.h"
 #include "base/near.h"
 #include "data/gaussian_ply.h"
@@ -21,7 +23,8 @@ static trace_settings preset(const char *name)
 static trace_settings whole(void)
 {
     trace_settings s = trace_settings_default();
-    s.alpha_min = 1e-12f, s.transmittance_min = 1e-20f;
+    s.alpha_min = 1e-12f;
+    s.transmittance_min = 1e-20f;
     return s;
 }
 
@@ -29,21 +32,26 @@ static void presets_by_name(void **state)
 {
     (void)state;
     trace_settings s = trace_settings_default(), before;
-    s.alpha_max = 0.5f, s.t_near = 3, s.background[1] = 0.25f, s.proxy_radius = 2;
+    s.alpha_max = 0.5f;
+    s.t_near = 3;
+    s.background[1] = 0.25f;
+    s.proxy_radius = 2;
     before = s;
     assert_false(trace_settings_preset("Fast", &s));
     assert_false(trace_settings_preset("", &s));
     assert_memory_equal(&s, &before, sizeof s);
     assert_true(trace_settings_preset("default", &s));
     const trace_settings d = trace_settings_default();
-    assert_true(s.alpha_min == d.alpha_min && s.transmittance_min == d.transmittance_min && isinf(s.proxy_radius));
+    assert_true(s.alpha_min == d.alpha_min && s.transmittance_min == d.transmittance_min &&
+                isinf(s.proxy_radius));
     assert_true(s.alpha_max == 0.5f && s.t_near == 3 && s.background[1] == 0.25f); /* the model's stay */
     const trace_settings exact = preset("exact"), fast = preset("fast");
     assert_true(exact.alpha_min < d.alpha_min && d.alpha_min < fast.alpha_min);
-    assert_true(exact.transmittance_min < d.transmittance_min && d.transmittance_min < fast.transmittance_min);
+    assert_true(exact.transmittance_min < d.transmittance_min &&
+                d.transmittance_min < fast.transmittance_min);
 }
 
-/* ---- the bounds, on every ray -------------------------------------------------------------------------------------------------------- */
+/* ---- the bounds, on every ray ---- */
 
 /* Hits of one ray in order; `hits` is used again and freed with mem_free(). */
 typedef struct ray_hits {
@@ -51,11 +59,14 @@ typedef struct ray_hits {
     size_t count, capacity;
 } ray_hits;
 
-static void find_hits(const reference_scene *scene, const trace_settings *s, const ray_image *rays, size_t ray, ray_hits *out)
+static void find_hits(const reference_scene *scene, const trace_settings *s, const ray_image *rays,
+                      size_t ray, ray_hits *out)
 {
     double origin[3], dir[3];
-    for (size_t k = 0; k < 3; k++)
-        origin[k] = (double)ray_image_origin(rays, ray)[k], dir[k] = (double)rays->dir[3 * ray + k];
+    for (size_t k = 0; k < 3; k++) {
+        origin[k] = (double)ray_image_origin(rays, ray)[k];
+        dir[k] = (double)rays->dir[3 * ray + k];
+    }
     assert_ok(reference_scene_ray_hits(scene, s, origin, dir, &out->hits, &out->count, &out->capacity, NULL));
 }
 
@@ -72,8 +83,11 @@ static ray_bound bound_ray(const ray_hits *list, double alpha_min)
     double T = 1, open = 1;
     for (size_t i = 0; i < list->count; i++) {
         const double alpha = list->hits[i].alpha;
-        if (alpha < alpha_min)
-            b.dropped += T * alpha, open *= 1 - alpha, b.dropped_count++;
+        if (alpha < alpha_min) {
+            b.dropped += T * alpha;
+            open *= 1 - alpha;
+            b.dropped_count++;
+        }
         T *= 1 - alpha;
     }
     b.dropped_odds = 1 - open;
@@ -81,16 +95,20 @@ static ray_bound bound_ray(const ray_hits *list, double alpha_min)
 }
 
 typedef struct preset_figures {
-    double error, bound, of_bound; /* worst error of the tracer, worst bound, worst error as a part of its ray's bound */
+    double error, bound,
+        of_bound; /* worst error of the tracer, worst bound, worst error as a part of its ray's bound */
 } preset_figures;
 
-static preset_figures check_preset(const gaussians *g, const ray_image *rays, const char *name, const float background[3])
+static preset_figures check_preset(const gaussians *g, const ray_image *rays, const char *name,
+                                   const float background[3])
 {
     trace_settings s = preset(name), all = whole();
-    memcpy(s.background, background, sizeof s.background), memcpy(all.background, background, sizeof all.background);
+    memcpy(s.background, background, sizeof s.background);
+    memcpy(all.background, background, sizeof all.background);
     const size_t count = ray_image_count(rays);
     const double stop = (double)s.transmittance_min / (1 - (double)s.alpha_max);
-    double *want = mem_alloc(count, 3 * sizeof *want, "test", NULL), *cut = mem_alloc(count, 3 * sizeof *cut, "test", NULL), color_max = 1;
+    double *want = mem_alloc(count, 3 * sizeof *want, "test", NULL),
+           *cut = mem_alloc(count, 3 * sizeof *cut, "test", NULL), color_max = 1;
     for (size_t i = 0; i < g->count; i++)
         color_max = fmax(color_max, (double)fmaxf(g->red[i], fmaxf(g->green[i], g->blue[i])));
     trace_scene traced = {0};
@@ -106,11 +124,13 @@ static preset_figures check_preset(const gaussians *g, const ray_image *rays, co
     assert_ok(reference_scene_forward(&scene, &s, rays, cut, NULL, NULL, NULL));
     for (size_t i = 0; i < count; i++) {
         find_hits(&scene, &all, rays, i, &list);
-        const ray_bound b = bound_ray(&list, (double)s.alpha_min), wider = bound_ray(&list, (double)s.alpha_min * (1 + 1e-4));
+        const ray_bound b = bound_ray(&list, (double)s.alpha_min),
+                        wider = bound_ray(&list, (double)s.alpha_min * (1 + 1e-4));
         const double m = (double)b.dropped_count, a = (double)s.alpha_min;
         assert_true(b.dropped <= b.dropped_odds + 1e-12);
         assert_true(b.dropped_odds <= 1 - pow(1 - a, m) + 1e-12 && 1 - pow(1 - a, m) <= m * a + 1e-12);
-        const double bound = color_max * (b.dropped + stop), float_bound = color_max * (wider.dropped + stop * (1 + 1e-4)) + 3e-5;
+        const double bound = color_max * (b.dropped + stop),
+                     float_bound = color_max * (wider.dropped + stop * (1 + 1e-4)) + 3e-5;
         for (size_t k = 3 * i; k < 3 * i + 3; k++) {
             assert_near(cut[k], want[k], bound + 1e-9);
             assert_near((double)rgb.pixels[k], want[k], float_bound);
@@ -119,7 +139,9 @@ static preset_figures check_preset(const gaussians *g, const ray_image *rays, co
         }
         worst.bound = fmax(worst.bound, bound);
     }
-    mem_free(want), mem_free(cut), mem_free(list.hits);
+    mem_free(want);
+    mem_free(cut);
+    mem_free(list.hits);
     reference_scene_free(&scene);
     trace_scene_free(&traced);
     image_free(&rgb);
@@ -131,8 +153,8 @@ static void check_scene(const char *scene, const gaussians *g, const ray_image *
     const float background[3] = {0, 0.5f, 1};
     for (size_t i = 0; i < 3; i++) {
         const preset_figures f = check_preset(g, rays, names[i], background);
-        print_message("%-14s %-8s max error %.2e, bound %.2e, %2.0f %% of a ray's bound reached\n", scene, names[i], f.error, f.bound,
-                      100 * f.of_bound);
+        print_message("%-14s %-8s max error %.2e, bound %.2e, %2.0f %% of a ray's bound reached\n", scene,
+                      names[i], f.error, f.bound, 100 * f.of_bound);
         assert_true(i > 0 || f.error < 0.5 * half_step); /* exact: half of half an 8-bit step */
         assert_true(i == 0 || f.error > half_step);      /* and the others do leave something out */
     }
@@ -141,8 +163,11 @@ static void check_scene(const char *scene, const gaussians *g, const ray_image *
 static void random_scenes_stay_in_bounds(void **state)
 {
     (void)state;
-    const struct { const char *name; size_t count; float opacity_low; } scenes[] = {{"thin", 60, 0.02f}, {"thick", 1500, 0.05f},
-                                                                                    {"opaque", 300, 0.95f}};
+    const struct {
+        const char *name;
+        size_t count;
+        float opacity_low;
+    } scenes[] = {{"thin", 60, 0.02f}, {"thick", 1500, 0.05f}, {"opaque", 300, 0.95f}};
     ray_image rays = pinhole_rays(24, 20);
     for (size_t i = 0; i < 3; i++) {
         gaussians g = random_gaussians(scenes[i].count, scenes[i].opacity_low, 30 + i);
@@ -163,11 +188,14 @@ static void peer_scene_stays_in_bounds(void **state)
     assert_ok(gaussian_ply_load(path, &cloud, NULL));
     assert_ok(gaussians_resize(&g, cloud.count, NULL));
     const float scale = 0.12f; /* to where pinhole_rays() looks */
-    float *const means[3] = {g.mean_x, g.mean_y, g.mean_z}, *const scales[3] = {g.scale_x, g.scale_y, g.scale_z};
-    float *const quats[4] = {g.quat_w, g.quat_x, g.quat_y, g.quat_z}, *const colors[3] = {g.red, g.green, g.blue};
+    float *const means[3] = {g.mean_x, g.mean_y, g.mean_z}, *const scales[3] = {g.scale_x, g.scale_y,
+                                                                                g.scale_z};
+    float *const quats[4] = {g.quat_w, g.quat_x, g.quat_y, g.quat_z}, *const colors[3] = {g.red, g.green,
+                                                                                          g.blue};
     for (size_t i = 0; i < cloud.count; i++) {
         for (size_t k = 0; k < 3; k++) {
-            means[k][i] = scale * cloud.mean[3 * i + k], scales[k][i] = scale * expf(cloud.scale_log[3 * i + k]);
+            means[k][i] = scale * cloud.mean[3 * i + k];
+            scales[k][i] = scale * expf(cloud.scale_log[3 * i + k]);
             colors[k][i] = fmaxf(0, 0.5f + 0.28209479f * cloud.sh[i * GAUSSIAN_SH_COUNT * 3 + k]);
         }
         for (size_t k = 0; k < 4; k++)
@@ -182,15 +210,19 @@ static void peer_scene_stays_in_bounds(void **state)
     gaussians_free(&g);
 }
 
-/* ---- the bounds are reached ---------------------------------------------------------------------------------------------------------- */
+/* ---- the bounds are reached ---- */
 
-/* Red of the ray through the middle: discs of these opacities, one behind the other, of these colours, on black. */
+/* Red of the ray through the middle: discs of these opacities, one behind the other, of these colours, on
+   black. */
 static double blend_discs(const trace_settings *s, size_t count, const float *opacity, const float *color)
 {
     gaussians g = some(count, 0);
     for (size_t i = 0; i < count; i++) {
-        g.mean_z[i] = 0.1f * (float)i, g.scale_z[i] = 0.01f, g.scale_x[i] = g.scale_y[i] = 1e4f;
-        g.opacity[i] = opacity[i], g.red[i] = color[i];
+        g.mean_z[i] = 0.1f * (float)i;
+        g.scale_z[i] = 0.01f;
+        g.scale_x[i] = g.scale_y[i] = 1e4f;
+        g.opacity[i] = opacity[i];
+        g.red[i] = color[i];
     }
     ray_image rays = pinhole_rays(1, 1);
     double rgb[3];
@@ -208,14 +240,17 @@ static void dropped_hits_reach_their_bound(void **state)
     for (size_t i = 0; i < 3; i++) {
         const trace_settings s = preset(names[i]);
         float opacity[COUNT], white[COUNT];
-        for (int k = 0; k < COUNT; k++)
-            opacity[k] = 0.999f * s.alpha_min, white[k] = 1;
+        for (int k = 0; k < COUNT; k++) {
+            opacity[k] = 0.999f * s.alpha_min;
+            white[k] = 1;
+        }
         assert_near(blend_discs(&s, COUNT, opacity, white), 0, 0);
         assert_near(blend_discs(&all, COUNT, opacity, white), 1 - pow(1 - (double)opacity[0], COUNT), 1e-7);
     }
 }
 
-/* A hit of alpha_max that would bring T just below T_min is not blended, and T_min / (1 - alpha_max) is what it would have covered. */
+/* A hit of alpha_max that would bring T just below T_min is not blended, and T_min / (1 - alpha_max) is what
+   it would have covered. */
 static void the_stop_reaches_its_bound(void **state)
 {
     (void)state;
@@ -223,7 +258,8 @@ static void the_stop_reaches_its_bound(void **state)
     for (size_t i = 0; i < 3; i++) {
         const trace_settings s = preset(names[i]);
         const double stop = (double)s.transmittance_min / (1 - (double)s.alpha_max), left = 0.99 * stop;
-        const float in_front = (float)(1 - sqrt(left)), opacity[3] = {in_front, in_front, 1}, color[3] = {0, 0, 1};
+        const float in_front = (float)(1 - sqrt(left)), opacity[3] = {in_front, in_front, 1},
+                    color[3] = {0, 0, 1};
         const double error = fabs(blend_discs(&s, 3, opacity, color) - blend_discs(&all, 3, opacity, color));
         assert_true(error <= stop && error > 0.97 * stop);
     }
@@ -237,7 +273,8 @@ static void alpha_max_reaches_its_bound(void **state)
     for (float alpha_max = 0.9f; alpha_max < 0.9995f; alpha_max = 1 - 0.1f * (1 - alpha_max)) {
         const float opacity[3] = {1, 1, 1}, color[3] = {1, 0, 0};
         cut.alpha_max = alpha_max;
-        assert_near(blend_discs(&all, 3, opacity, color) - blend_discs(&cut, 3, opacity, color), 1 - (double)alpha_max, 2e-7);
+        assert_near(blend_discs(&all, 3, opacity, color) - blend_discs(&cut, 3, opacity, color),
+                    1 - (double)alpha_max, 2e-7);
     }
 }
 

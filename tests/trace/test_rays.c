@@ -1,4 +1,6 @@
-/* tests/trace/test_rays.c -- rays of every kind of shot against their formulas in double, and rays from a file. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/trace/test_rays.c -- rays of every kind of shot against their formulas in double, and rays from a
+   file. */
 #include <unistd.h>
 
 #include "base/camera_pose.h"
@@ -15,7 +17,8 @@ enum { W = 37, H = 23, COUNT = W * H };
 static gbt_camera camera_of(gbt_camera_model model)
 {
     const double q[4] = {0.5, -0.5, 0.1, sqrt(0.49)};
-    gbt_camera camera = {.model = model, .width = W, .height = H, .params = {30, 33, 18, 12}, .center = {1, -2, 3.5}};
+    gbt_camera camera = {
+        .model = model, .width = W, .height = H, .params = {30, 33, 18, 12}, .center = {1, -2, 3.5}};
     dquat_to_matrix(q, camera.rotation);
     return camera;
 }
@@ -35,7 +38,8 @@ static void give_end(ray_shot *shot, ray_shutter shutter)
     shot->shutter = shutter;
     for (int row = 0; row < 3; row++)
         dmat_apply_transposed(shot->camera.rotation, turn + 3 * row, shot->end.rotation + 3 * row);
-    shot->end.center[0] += 0.6, shot->end.center[1] -= 0.8;
+    shot->end.center[0] += 0.6;
+    shot->end.center[1] -= 0.8;
 }
 
 static void doubles(const float from[3], double to[3])
@@ -98,7 +102,8 @@ static void orthographic(void **state)
             double origin[3], made[3], dir[3];
             for (int k = 0; k < 3; k++) {
                 origin[k] = c->center[k] + u * c->rotation[k] + v * c->rotation[3 + k];
-                assert_true(rays.dir[3 * (W * y + x) + k] == (float)c->rotation[6 + k]); /* exact: the same for all */
+                assert_true(rays.dir[3 * (W * y + x) + k] == (float)c->rotation[6 + k]); /* exact: the same
+                                                                                            for all */
                 reach = fmaxf(reach, fabsf(rays.origin[3 * (W * y + x) + k]));
             }
             assert_ray(&rays, x, y, origin, c->rotation + 6);
@@ -113,7 +118,8 @@ static void orthographic(void **state)
 static void rolling_shutter(void **state)
 {
     (void)state;
-    static const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC, GBT_CAMERA_FISHEYE};
+    static const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC,
+                                              GBT_CAMERA_FISHEYE};
     for (int m = 0; m < 3; m++)
         for (ray_shutter shutter = RAY_SHUTTER_ROWS; shutter <= RAY_SHUTTER_COLUMNS; shutter++) {
             ray_shot shot = shot_of(models[m]);
@@ -130,10 +136,12 @@ static void rolling_shutter(void **state)
                 dquat_to_matrix(q, turn);
                 for (int row = 0; row < 3; row++)
                     dmat_apply_transposed(shot.camera.rotation, turn + 3 * row, at.rotation + 3 * row);
-                at.center[0] += 0.6 * t, at.center[1] -= 0.8 * t;
+                at.center[0] += 0.6 * t;
+                at.center[1] -= 0.8 * t;
                 assert_ok(ray_image_from_camera(&at, &still, NULL));
                 for (int i = 0; i < W + H - lines; i++) {
-                    const int x = shutter == RAY_SHUTTER_ROWS ? i : line, y = shutter == RAY_SHUTTER_ROWS ? line : i;
+                    const int x = shutter == RAY_SHUTTER_ROWS ? i : line,
+                              y = shutter == RAY_SHUTTER_ROWS ? line : i;
                     double origin[3], dir[3];
                     doubles(ray_image_origin(&still, (size_t)(W * y + x)), origin);
                     doubles(still.dir + 3 * (W * y + x), dir);
@@ -152,12 +160,15 @@ static void rolling_shutter(void **state)
 static void poses_between(void **state)
 {
     (void)state;
-    static const double angles[] = {0, 1e-12, 1e-6, 0.3, 1.5707963267948966, 2, 3.1415, 3.14159265, 3.141592653589793};
-    static const double axes[][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.6, -0.8, 0}, {0.48, 0.6, -0.64}, {-0.48, 0.6, 0.64}};
+    static const double angles[] = {
+        0, 1e-12, 1e-6, 0.3, 1.5707963267948966, 2, 3.1415, 3.14159265, 3.141592653589793};
+    static const double axes[][3] = {{1, 0, 0},      {0, 1, 0},          {0, 0, 1},
+                                     {0.6, -0.8, 0}, {0.48, 0.6, -0.64}, {-0.48, 0.6, 0.64}};
     for (size_t i = 0; i < sizeof angles / sizeof *angles; i++)
         for (size_t j = 0; j < sizeof axes / sizeof *axes; j++) {
             gbt_camera start = camera_of(GBT_CAMERA_PINHOLE), end = start;
-            const double half = 0.5 * angles[i], q[4] = {cos(half), sin(half) * axes[j][0], sin(half) * axes[j][1], sin(half) * axes[j][2]};
+            const double half = 0.5 * angles[i], q[4] = {cos(half), sin(half) * axes[j][0],
+                                                         sin(half) * axes[j][1], sin(half) * axes[j][2]};
             double turn[9], rotation[9], center[3];
             dquat_to_matrix(q, turn);
             for (int row = 0; row < 3; row++)
@@ -192,18 +203,23 @@ static void poses_between(void **state)
     assert_false(camera_motion_prepare(&good, &bad, &motion));
 }
 
-/* All rays of a pixel meet where the ray through the middle is in focus, from points of the disc that fill it evenly. */
+/* All rays of a pixel meet where the ray through the middle is in focus, from points of the disc that fill it
+   evenly. */
 static void thin_lens(void **state)
 {
     (void)state;
-    static const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_FISHEYE, GBT_CAMERA_ORTHOGRAPHIC};
+    static const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_FISHEYE,
+                                              GBT_CAMERA_ORTHOGRAPHIC};
     static const int sample_counts[] = {1, 2, 7, 64};
     for (int m = 0; m < 3; m++)
         for (size_t n = 0; n < 4; n++) {
             ray_shot shot = shot_of(models[m]), middle = shot;
             const double radius = 0.25, focus = 6;
             const int samples = sample_counts[n];
-            shot.aperture_radius = radius, shot.focus_distance = focus, shot.samples = samples, shot.seed = 5;
+            shot.aperture_radius = radius;
+            shot.focus_distance = focus;
+            shot.samples = samples;
+            shot.seed = 5;
             assert_int_equal(ray_shot_sample_count(&shot), samples);
             ray_image rays = {0}, again = {0};
             double sum[3] = {0, 0, 0}, squares = 0;
@@ -212,12 +228,15 @@ static void thin_lens(void **state)
                 for (int i = 0; i < COUNT; i++) {
                     double start[3], d[3], p[3], o[3], dir[3], shift[3], to[3], off[3];
                     assert_true(gbt_camera_ray(&middle.camera, i % W + 0.5, i / W + 0.5, o, d));
-                    const double depth = models[m] == GBT_CAMERA_FISHEYE ? focus : focus / dvec_dot(d, shot.camera.rotation + 6);
+                    const double depth = models[m] == GBT_CAMERA_FISHEYE
+                                             ? focus
+                                             : focus / dvec_dot(d, shot.camera.rotation + 6);
                     doubles(ray_image_origin(&rays, (size_t)i), start);
                     doubles(rays.dir + 3 * i, dir);
                     for (int k = 0; k < 3; k++) {
                         p[k] = o[k] + depth * d[k];
-                        to[k] = p[k] - start[k], shift[k] = start[k] - o[k];
+                        to[k] = p[k] - start[k];
+                        shift[k] = start[k] - o[k];
                         sum[k] += shift[k];
                     }
                     dvec_cross(to, dir, off);
@@ -226,14 +245,17 @@ static void thin_lens(void **state)
                     assert_near(dvec_length(dir), 1, 2e-7);
                     assert_true(dvec_length(shift) <= radius * (1 + 3e-6));
                     /* The disc is across the axis, or across the ray when the focus is a sphere. */
-                    assert_near(dvec_dot(shift, models[m] == GBT_CAMERA_FISHEYE ? d : shot.camera.rotation + 6), 0, 1e-6);
+                    assert_near(
+                        dvec_dot(shift, models[m] == GBT_CAMERA_FISHEYE ? d : shot.camera.rotation + 6), 0,
+                        1e-6);
                     squares += dvec_dot(shift, shift);
                 }
             }
             const double rays_total = (double)samples * COUNT;
             for (int k = 0; k < 3; k++) /* 5 standard errors of unstratified samples: R / 2 per axis */
                 assert_near(sum[k] / rays_total, 0, 5 * 0.5 * radius / sqrt(rays_total));
-            assert_near(squares / rays_total, 0.5 * radius * radius, 5 * 0.29 * radius * radius / sqrt(rays_total));
+            assert_near(squares / rays_total, 0.5 * radius * radius,
+                        5 * 0.29 * radius * radius / sqrt(rays_total));
             assert_ok(ray_image_from_shot(&shot, 0, &rays, NULL));
             shot.seed = 6;
             assert_ok(ray_image_from_shot(&shot, 0, &again, NULL));
@@ -243,14 +265,20 @@ static void thin_lens(void **state)
         }
 }
 
-/* Cut the disc into 4 sectors and 2 rings, of equal area: the 64 samples of a pixel are spread over them more evenly than by chance. */
+/* Cut the disc into 4 sectors and 2 rings, of equal area: the 64 samples of a pixel are spread over them more
+   evenly than by chance. */
 static void samples_are_stratified(void **state)
 {
     (void)state;
-    gbt_camera camera = {.model = GBT_CAMERA_PINHOLE, .width = W, .height = H, .params = {30, 33, 18, 12},
+    gbt_camera camera = {.model = GBT_CAMERA_PINHOLE,
+                         .width = W,
+                         .height = H,
+                         .params = {30, 33, 18, 12},
                          .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     ray_shot shot = ray_shot_of(&camera);
-    shot.aperture_radius = 1, shot.focus_distance = 3, shot.samples = 64;
+    shot.aperture_radius = 1;
+    shot.focus_distance = 3;
+    shot.samples = 64;
     ray_image rays = {0};
     static double share[COUNT][8];
     memset(share, 0, sizeof share);
@@ -275,12 +303,16 @@ static void same_bits_for_every_thread_count(void **state)
     (void)state;
     ray_shot shots[5];
     for (int i = 0; i < 5; i++)
-        shots[i] = shot_of(i == 0 ? GBT_CAMERA_ORTHOGRAPHIC : i == 4 ? GBT_CAMERA_OPENCV_FISHEYE : GBT_CAMERA_PINHOLE);
+        shots[i] = shot_of(i == 0   ? GBT_CAMERA_ORTHOGRAPHIC
+                           : i == 4 ? GBT_CAMERA_OPENCV_FISHEYE
+                                    : GBT_CAMERA_PINHOLE);
     give_end(&shots[1], RAY_SHUTTER_ROWS);
     give_end(&shots[2], RAY_SHUTTER_COLUMNS);
     give_end(&shots[4], RAY_SHUTTER_ROWS);
-    for (int i = 3; i < 5; i++)
-        shots[i].aperture_radius = 0.1, shots[i].focus_distance = 2;
+    for (int i = 3; i < 5; i++) {
+        shots[i].aperture_radius = 0.1;
+        shots[i].focus_distance = 2;
+    }
     for (int i = 0; i < 5; i++) {
         ray_image rays[4] = {{0}};
         for (int t = 0; t < 4; t++) {
@@ -301,7 +333,8 @@ static void nothing_comes_from_nothing(void **state)
     (void)state;
     ray_shot shot = shot_of(GBT_CAMERA_FISHEYE);
     shot.camera.params[0] = shot.camera.params[1] = 4; /* the corners are beyond 180 degrees */
-    shot.aperture_radius = 0.5, shot.focus_distance = 1;
+    shot.aperture_radius = 0.5;
+    shot.focus_distance = 1;
     ray_image rays = {0};
     assert_ok(ray_image_from_shot(&shot, 3, &rays, NULL));
     size_t none = 0;
@@ -322,13 +355,23 @@ static void bad_shots(void **state)
     ray_shot bad[13];
     for (int i = 0; i < 13; i++) {
         bad[i] = shot_of(i == 9 ? GBT_CAMERA_ORTHOGRAPHIC : GBT_CAMERA_PINHOLE);
-        bad[i].aperture_radius = 0.1, bad[i].focus_distance = 1;
+        bad[i].aperture_radius = 0.1;
+        bad[i].focus_distance = 1;
     }
-    bad[0].aperture_radius = -1, bad[1].aperture_radius = NAN, bad[2].aperture_radius = HUGE_VAL;
-    bad[3].focus_distance = 0, bad[4].focus_distance = NAN, bad[5].samples = 0;
-    bad[6].shutter = RAY_SHUTTER_ROWS, bad[6].end.rotation[0] = 3;
-    bad[7].end.center[1] = NAN, bad[8].camera.center[0] = 1.1e17, bad[9].camera.params[0] = 1e-17;
-    bad[10].camera.rotation[3] = INFINITY, bad[11].camera.width = 0, bad[12].camera.model = (gbt_camera_model)99;
+    bad[0].aperture_radius = -1;
+    bad[1].aperture_radius = NAN;
+    bad[2].aperture_radius = HUGE_VAL;
+    bad[3].focus_distance = 0;
+    bad[4].focus_distance = NAN;
+    bad[5].samples = 0;
+    bad[6].shutter = RAY_SHUTTER_ROWS;
+    bad[6].end.rotation[0] = 3;
+    bad[7].end.center[1] = NAN;
+    bad[8].camera.center[0] = 1.1e17;
+    bad[9].camera.params[0] = 1e-17;
+    bad[10].camera.rotation[3] = INFINITY;
+    bad[11].camera.width = 0;
+    bad[12].camera.model = (gbt_camera_model)99;
     for (int i = 0; i < 13; i++) {
         ray_image rays = {0};
         gbt_error err = {0};
@@ -349,7 +392,8 @@ static void memory_runs_out(void **state)
     (void)state;
     ray_shot shot = shot_of(GBT_CAMERA_FISHEYE);
     give_end(&shot, RAY_SHUTTER_ROWS);
-    shot.aperture_radius = 0.1, shot.focus_distance = 1;
+    shot.aperture_radius = 0.1;
+    shot.focus_distance = 1;
     gbt_status status = GBT_ERR_NO_MEMORY;
     long k = 0;
     for (; status != GBT_OK && k < 20; k++) {
@@ -358,13 +402,14 @@ static void memory_runs_out(void **state)
         mem_fail_after(k);
         status = ray_image_from_shot(&shot, 0, &rays, &err);
         mem_fail_after(-1);
-        assert_true(status == GBT_OK || (status == GBT_ERR_NO_MEMORY && err.text[0] != '\0' && rays.dir == NULL));
+        assert_true(status == GBT_OK ||
+                    (status == GBT_ERR_NO_MEMORY && err.text[0] != '\0' && rays.dir == NULL));
         ray_image_free(&rays);
     }
     assert_true(status == GBT_OK && k == 6);
 }
 
-/* ---- rays from a file ---------------------------------------------------------------------------------------------------------------- */
+/* ---- rays from a file ---- */
 
 static char path[] = "/tmp/gbt_rays_XXXXXX";
 
@@ -378,9 +423,14 @@ static void rays_of_a_file(void **state)
 {
     (void)state;
     /* Alphabetical, as the format wants; slot[c]: what channel c holds. */
-    static const struct { const char *names[8]; int count, slot[8]; } rows[] = {
+    static const struct {
+        const char *names[8];
+        int count, slot[8];
+    } rows[] = {
         {{"dx", "dy", "dz", "ox", "oy", "oz"}, 6, {3, 4, 5, 0, 1, 2}},
-        {{"Direction.X", "Direction.Y", "Direction.Z", "Origin.X", "Origin.Y", "Origin.Z"}, 6, {3, 4, 5, 0, 1, 2}},
+        {{"Direction.X", "Direction.Y", "Direction.Z", "Origin.X", "Origin.Y", "Origin.Z"},
+         6,
+         {3, 4, 5, 0, 1, 2}},
         {{"A", "dir.x", "dir.y", "dir.z", "o.x", "o.y", "o.z", "weight"}, 8, {6, 3, 4, 5, 0, 1, 2, 7}},
         {{"c1", "c2", "c3", "c4", "c5", "c6"}, 6, {0, 1, 2, 3, 4, 5}},
     };
@@ -390,7 +440,8 @@ static void rays_of_a_file(void **state)
         float pixels[FW * FH * 8];
         for (int i = 0; i < FW * FH; i++)
             for (int c = 0; c < rows[r].count; c++)
-                pixels[i * rows[r].count + c] = i == 4 && rows[r].slot[c] >= 3 ? 0 : value_of(i, rows[r].slot[c]);
+                pixels[i * rows[r].count + c] =
+                    i == 4 && rows[r].slot[c] >= 3 ? 0 : value_of(i, rows[r].slot[c]);
         exr_write(path, FW, FH, rows[r].count, rows[r].names, 2, pixels);
         ray_image rays = {0}, copy = {0};
         gbt_error err = {0};
@@ -421,13 +472,26 @@ static void rays_of_a_file(void **state)
 static void files_that_are_not_rays(void **state)
 {
     (void)state;
-    static const char *const good[] = {"dx", "dy", "dz", "ox", "oy", "oz"}, *const five[] = {"dx", "dy", "dz", "ox", "oy"},
-                      *const twice[] = {"d.x", "dx", "dy", "ox", "oy", "oz"}, *const rgb[] = {"B", "G", "R"};
-    static const struct { const char *text; const char *const *names; int count, type; float value; int channel; } rows[] = {
-        {"pixel (1, 0): ray (", good, 6, 2, NAN, 0},     {"pixel (1, 0): ray (", good, 6, 2, INFINITY, 4},
-        {"pixel (1, 0): ray (", good, 6, 2, -INFINITY, 2}, {"pixel (1, 0): ray (", good, 6, 2, 2e17f, 5},
-        {"5 channels, 5 of them named as rays", five, 5, 2, 1, 0}, {"name the same thing", twice, 6, 2, 1, 0},
-        {"3 channels, 0 of them named as rays", rgb, 3, 2, 1, 0},  {"wanted an EXR of 32-bit floats", good, 6, 1, 1, 0},
+    static const char *const good[] = {"dx", "dy", "dz", "ox", "oy", "oz"},
+                             *const five[] = {"dx", "dy", "dz", "ox", "oy"}, *const twice[] = {"d.x", "dx",
+                                                                                               "dy",  "ox",
+                                                                                               "oy",  "oz"},
+                             *const rgb[] = {"B", "G", "R"};
+    static const struct {
+        const char *text;
+        const char *const *names;
+        int count, type;
+        float value;
+        int channel;
+    } rows[] = {
+        {"pixel (1, 0): ray (", good, 6, 2, NAN, 0},
+        {"pixel (1, 0): ray (", good, 6, 2, INFINITY, 4},
+        {"pixel (1, 0): ray (", good, 6, 2, -INFINITY, 2},
+        {"pixel (1, 0): ray (", good, 6, 2, 2e17f, 5},
+        {"5 channels, 5 of them named as rays", five, 5, 2, 1, 0},
+        {"name the same thing", twice, 6, 2, 1, 0},
+        {"3 channels, 0 of them named as rays", rgb, 3, 2, 1, 0},
+        {"wanted an EXR of 32-bit floats", good, 6, 1, 1, 0},
     };
     const double origin[3] = {0, 0, 0};
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
@@ -439,7 +503,8 @@ static void files_that_are_not_rays(void **state)
         ray_image rays = {0};
         gbt_error err = {0};
         const gbt_status status = ray_image_read(path, origin, &rays, &err);
-        if (status != GBT_ERR_FORMAT || strstr(err.text, rows[r].text) == NULL || strncmp(err.text, path, strlen(path)) != 0)
+        if (status != GBT_ERR_FORMAT || strstr(err.text, rows[r].text) == NULL ||
+            strncmp(err.text, path, strlen(path)) != 0)
             fail_msg("row %zu: %d %s", r, (int)status, err.text);
         assert_true(rays.dir == NULL && rays.origin == NULL);
     }

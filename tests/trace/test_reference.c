@@ -1,4 +1,6 @@
-/* tests/trace/test_reference.c -- the double reference against closed forms and central differences, and the rays that feed it. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/trace/test_reference.c -- the double reference against closed forms and central differences, and the
+   rays that feed it. */
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/near.h"
@@ -12,7 +14,12 @@
 /* One ray along +z from (x, y, z). The arrays live in `store`. */
 static ray_image one_ray(float store[6], float x, float y, float z)
 {
-    store[0] = x, store[1] = y, store[2] = z, store[3] = 0, store[4] = 0, store[5] = 1;
+    store[0] = x;
+    store[1] = y;
+    store[2] = z;
+    store[3] = 0;
+    store[4] = 0;
+    store[5] = 1;
     return (ray_image){.width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
 }
 
@@ -62,9 +69,12 @@ static void rotation_and_scale_in_closed_form(void **state)
     (void)state;
     const trace_settings s = trace_settings_default();
     gaussians g = some(1, 0.8f);
-    g.scale_y[0] = 2, g.scale_z[0] = 3, g.quat_w[0] = g.quat_z[0] = sqrtf(0.5f);
+    g.scale_y[0] = 2;
+    g.scale_z[0] = 3;
+    g.quat_w[0] = g.quat_z[0] = sqrtf(0.5f);
     const seen a = look(&g, &s, 1, 0.5f, -50);
-    assert_near(a.T, 1 - (double)0.8f * exp(-0.5 * (0.25 + 0.25)), 1e-7); /* x / 2 and y / 1; the quaternion is rounded */
+    assert_near(a.T, 1 - (double)0.8f * exp(-0.5 * (0.25 + 0.25)), 1e-7); /* x / 2 and y / 1; the quaternion
+                                                                             is rounded */
     gaussians_free(&g);
 }
 
@@ -72,7 +82,9 @@ static void layers_multiply(void **state)
 {
     (void)state;
     trace_settings s = trace_settings_default();
-    s.background[0] = 0.5f, s.background[1] = 0, s.background[2] = 1;
+    s.background[0] = 0.5f;
+    s.background[1] = 0;
+    s.background[2] = 1;
     gaussians g = some(6, 0.3f);
     for (int i = 0; i < 6; i++)
         g.mean_z[i] = (float)(10 * ((i * 5) % 6)); /* ids are not in depth order */
@@ -97,7 +109,8 @@ static void camera_inside(void **state)
     assert_near(1 - look(&g, &s, 0, 0, -0.5f).T, 0.9, 1e-7); /* the centre is still ahead */
     s.t_near = 0.25f;
     assert_near(1 - look(&g, &s, 0, 0, 0.5f).T, 0.9 * exp(-0.5 * 0.75 * 0.75), 1e-7);
-    assert_near(1 - look(&g, &s, 0, 0, -0.125f).T, 0.9 * exp(-0.5 * 0.125 * 0.125), 1e-7); /* the centre is nearer than t_near */
+    assert_near(1 - look(&g, &s, 0, 0, -0.125f).T, 0.9 * exp(-0.5 * 0.125 * 0.125),
+                1e-7); /* the centre is nearer than t_near */
     gaussians_free(&g);
 }
 
@@ -110,7 +123,8 @@ static void ties_go_by_id(void **state)
         g.red[i] = (float)(1 << i);
     reference_hit *hits = NULL;
     size_t count, capacity = 0;
-    assert_ok(reference_ray_hits(&g, &s, (double[3]){0, 0, -4}, (double[3]){0, 0, 1}, &hits, &count, &capacity, NULL));
+    assert_ok(reference_ray_hits(&g, &s, (double[3]){0, 0, -4}, (double[3]){0, 0, 1}, &hits, &count,
+                                 &capacity, NULL));
     assert_int_equal(count, 5);
     for (uint32_t i = 0; i < 5; i++) {
         assert_int_equal(hits[i].id, i);
@@ -119,8 +133,10 @@ static void ties_go_by_id(void **state)
         assert_near(hits[i].alpha, 0.5, 0);
     }
     assert_near(look(&g, &s, 0, 0, -4).rgb[0], 0.5 + 0.5 + 0.5 + 0.5 + 0.5, 1e-15); /* 2^-(i+1) 2^i each */
-    g.mean_z[4] = -1, g.mean_z[1] = 2; /* now 4 comes first, and 1 last */
-    assert_ok(reference_ray_hits(&g, &s, (double[3]){0, 0, -4}, (double[3]){0, 0, 1}, &hits, &count, &capacity, NULL));
+    g.mean_z[4] = -1;
+    g.mean_z[1] = 2; /* now 4 comes first, and 1 last */
+    assert_ok(reference_ray_hits(&g, &s, (double[3]){0, 0, -4}, (double[3]){0, 0, 1}, &hits, &count,
+                                 &capacity, NULL));
     static const uint32_t wanted[] = {4, 0, 2, 3, 1};
     for (int i = 0; i < 5; i++)
         assert_int_equal(hits[i].id, wanted[i]);
@@ -144,7 +160,8 @@ static void nothing_there(void **state)
     gaussians_free(&g);
     g = some(1, 0.9f);
     float store[6] = {0}; /* a zero direction is no ray, even inside a Gaussian */
-    const ray_image rays = {.width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
+    const ray_image rays = {
+        .width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
     double rgb[3], T, d[GAUSSIANS_FIELD_COUNT] = {0}, d_background[3] = {0};
     assert_ok(reference_forward(&g, &s, &rays, rgb, &T, NULL, NULL));
     assert_near(T, 1, 0);
@@ -165,7 +182,8 @@ static void the_cut_is_inclusive(void **state)
     g.opacity[1] = nextafterf(s.alpha_min, 0);
     reference_hit *hits = NULL;
     size_t count, capacity = 0;
-    assert_ok(reference_ray_hits(&g, &s, (double[3]){0, 0, -4}, (double[3]){0, 0, 1}, &hits, &count, &capacity, NULL));
+    assert_ok(reference_ray_hits(&g, &s, (double[3]){0, 0, -4}, (double[3]){0, 0, 1}, &hits, &count,
+                                 &capacity, NULL));
     assert_int_equal(count, 1);
     assert_int_equal(hits[0].id, 0);
     mem_free(hits);
@@ -218,7 +236,7 @@ static void stops_before_transmittance_min(void **state)
     assert_near(a.T, 0x1p-13, 0);
     assert_near(a.rgb[0], 1 - 0x1p-13, 1e-16);
     assert_near(a.rgb[2], 1, 1e-16); /* the background gets the rest */
-    s.transmittance_min = 0x1p-13f; /* reaching the limit exactly is allowed */
+    s.transmittance_min = 0x1p-13f;  /* reaching the limit exactly is allowed */
     assert_int_equal(look(&g, &s, 0, 0, -4).blended, 13);
     s.transmittance_min = nextafterf(0x1p-13f, 1);
     assert_int_equal(look(&g, &s, 0, 0, -4).blended, 12);
@@ -234,8 +252,13 @@ static void broken_gaussians_are_not_seen(void **state)
     (void)state;
     const trace_settings s = trace_settings_default();
     gaussians g = some(8, 0.5f);
-    g.mean_x[0] = NAN, g.scale_y[1] = 0, g.scale_x[2] = NAN, g.quat_w[3] = NAN;
-    g.opacity[4] = NAN, g.mean_z[5] = INFINITY, g.opacity[6] = -1;
+    g.mean_x[0] = NAN;
+    g.scale_y[1] = 0;
+    g.scale_x[2] = NAN;
+    g.quat_w[3] = NAN;
+    g.opacity[4] = NAN;
+    g.mean_z[5] = INFINITY;
+    g.opacity[6] = -1;
     const seen a = look(&g, &s, 0, 0, -4);
     assert_int_equal(a.blended, 1);
     assert_near(a.rgb[0], 0.5, 0);
@@ -253,7 +276,8 @@ typedef struct random_scene {
     double d_rgb[3], d_T;
 } random_scene;
 
-/* 1 to 12 Gaussians around the ray; some behind the origin (the clipped branch), some cut at alpha_max, some below alpha_min. */
+/* 1 to 12 Gaussians around the ray; some behind the origin (the clipped branch), some cut at alpha_max, some
+   below alpha_min. */
 static void make_random(random_scene *r, uint64_t seed)
 {
     memset(r, 0, sizeof *r);
@@ -263,16 +287,26 @@ static void make_random(random_scene *r, uint64_t seed)
     assert_ok(gaussians_resize(&r->g, count, NULL));
     for (size_t i = 0; i < count; i++) {
         gaussians *g = &r->g;
-        g->mean_x[i] = UNIFORM(-0.5f, 0.5f), g->mean_y[i] = UNIFORM(-0.5f, 0.5f), g->mean_z[i] = UNIFORM(-0.5f, 4.0f);
-        g->scale_x[i] = expf(UNIFORM(-2.0f, 0.5f)), g->scale_y[i] = expf(UNIFORM(-2.0f, 0.5f)), g->scale_z[i] = expf(UNIFORM(-2.0f, 0.5f));
+        g->mean_x[i] = UNIFORM(-0.5f, 0.5f);
+        g->mean_y[i] = UNIFORM(-0.5f, 0.5f);
+        g->mean_z[i] = UNIFORM(-0.5f, 4.0f);
+        g->scale_x[i] = expf(UNIFORM(-2.0f, 0.5f));
+        g->scale_y[i] = expf(UNIFORM(-2.0f, 0.5f));
+        g->scale_z[i] = expf(UNIFORM(-2.0f, 0.5f));
         double q[4], length = 0;
-        for (uint64_t k = 0; k < 4; k++)
-            q[k] = rng_normal(seed, 2 + k, i), length += q[k] * q[k];
+        for (uint64_t k = 0; k < 4; k++) {
+            q[k] = rng_normal(seed, 2 + k, i);
+            length += q[k] * q[k];
+        }
         length = sqrt(length);
-        g->quat_w[i] = (float)(q[0] / length), g->quat_x[i] = (float)(q[1] / length);
-        g->quat_y[i] = (float)(q[2] / length), g->quat_z[i] = (float)(q[3] / length);
+        g->quat_w[i] = (float)(q[0] / length);
+        g->quat_x[i] = (float)(q[1] / length);
+        g->quat_y[i] = (float)(q[2] / length);
+        g->quat_z[i] = (float)(q[3] / length);
         g->opacity[i] = UNIFORM(0.05f, 1.1f);
-        g->red[i] = UNIFORM(-0.2f, 1.2f), g->green[i] = UNIFORM(0.0f, 1.0f), g->blue[i] = UNIFORM(0.0f, 1.0f);
+        g->red[i] = UNIFORM(-0.2f, 1.2f);
+        g->green[i] = UNIFORM(0.0f, 1.0f);
+        g->blue[i] = UNIFORM(0.0f, 1.0f);
     }
     gaussians_pad(&r->g);
     assert_ok(reference_scene_make(&r->g, &r->scene, NULL));
@@ -284,8 +318,10 @@ static void make_random(random_scene *r, uint64_t seed)
             q[k * count] /= sqrt(length);
     }
     r->s = trace_settings_default();
-    for (int c = 0; c < 3; c++)
-        r->s.background[c] = UNIFORM(0.0f, 1.0f), r->d_rgb[c] = rng_normal(seed, 9, (uint64_t)c);
+    for (int c = 0; c < 3; c++) {
+        r->s.background[c] = UNIFORM(0.0f, 1.0f);
+        r->d_rgb[c] = rng_normal(seed, 9, (uint64_t)c);
+    }
     r->d_T = rng_normal(seed, 10, 0);
     r->rays = one_ray(r->store, 0, 0, 0);
     double dir[3] = {(double)UNIFORM(-0.1f, 0.1f), (double)UNIFORM(-0.1f, 0.1f), 1};
@@ -302,7 +338,8 @@ static double loss(const random_scene *r)
     return dvec_dot(rgb, r->d_rgb) + T * r->d_T;
 }
 
-/* What must not change under a perturbation: which hits, in which order, how many blended, which of them cut at alpha_max or at t_near. */
+/* What must not change under a perturbation: which hits, in which order, how many blended, which of them cut
+   at alpha_max or at t_near. */
 static void hit_list_of(const random_scene *r, uint64_t list[LIST_MAX + 2])
 {
     reference_hit *hits = NULL;
@@ -310,20 +347,25 @@ static void hit_list_of(const random_scene *r, uint64_t list[LIST_MAX + 2])
     double rgb[3];
     uint32_t blended;
     double origin[3], dir[3];
-    for (int k = 0; k < 3; k++)
-        origin[k] = (double)r->store[k], dir[k] = (double)r->store[3 + k];
+    for (int k = 0; k < 3; k++) {
+        origin[k] = (double)r->store[k];
+        dir[k] = (double)r->store[3 + k];
+    }
     memset(list, 0, (LIST_MAX + 2) * sizeof *list);
     assert_ok(reference_scene_ray_hits(&r->scene, &r->s, origin, dir, &hits, &count, &capacity, NULL));
     assert_ok(reference_scene_forward(&r->scene, &r->s, &r->rays, rgb, NULL, &blended, NULL));
-    list[0] = count, list[1] = blended;
+    list[0] = count;
+    list[1] = blended;
     for (size_t i = 0; i < count; i++)
-        list[2 + i] = 4 * (uint64_t)hits[i].id + 2 * (hits[i].alpha == (double)r->s.alpha_max) + (hits[i].t == (double)r->s.t_near);
+        list[2 + i] = 4 * (uint64_t)hits[i].id + 2 * (hits[i].alpha == (double)r->s.alpha_max) +
+                      (hits[i].t == (double)r->s.t_near);
     mem_free(hits);
 }
 
 enum { CLASS_MEAN, CLASS_SCALE, CLASS_ROTATION, CLASS_OPACITY, CLASS_COLOR, CLASS_COUNT };
 
-/* q (0, e_k) for k = 0, 1, 2: the directions in which a quaternion stays unit. `stride` is the distance between its components. */
+/* q (0, e_k) for k = 0, 1, 2: the directions in which a quaternion stays unit. `stride` is the distance
+   between its components. */
 static void tangents(const double *q, size_t stride, double out[3][4])
 {
     const double w = q[0], x = q[stride], y = q[2 * stride], z = q[3 * stride];
@@ -331,10 +373,12 @@ static void tangents(const double *q, size_t stride, double out[3][4])
     memcpy(out, rows, sizeof rows);
 }
 
-/* Move parameter `k` of one class of Gaussian `i` by `h`; a rotation turns about local axis k, with the quaternion normalised again. */
+/* Move parameter `k` of one class of Gaussian `i` by `h`; a rotation turns about local axis k, with the
+   quaternion normalised again. */
 static void perturb(random_scene *r, int class, size_t i, size_t k, double h)
 {
-    static const enum reference_field first[] = {REFERENCE_mean_x, REFERENCE_scale_x, REFERENCE_quat_w, REFERENCE_opacity, REFERENCE_red};
+    static const enum reference_field first[] = {REFERENCE_mean_x, REFERENCE_scale_x, REFERENCE_quat_w,
+                                                 REFERENCE_opacity, REFERENCE_red};
     const size_t n = r->scene.count;
     double *p = r->scene.fields + first[class] * n + i;
     if (class != CLASS_ROTATION) {
@@ -352,7 +396,8 @@ static void gradients_agree_with_differences(void **state)
     (void)state;
     static const char *const names[CLASS_COUNT] = {"mean", "scale", "rotation", "opacity", "colour"};
     static const size_t widths[CLASS_COUNT] = {3, 3, 3, 1, 3};
-    static const enum reference_field first[] = {REFERENCE_mean_x, REFERENCE_scale_x, REFERENCE_quat_w, REFERENCE_opacity, REFERENCE_red};
+    static const enum reference_field first[] = {REFERENCE_mean_x, REFERENCE_scale_x, REFERENCE_quat_w,
+                                                 REFERENCE_opacity, REFERENCE_red};
     double worst[CLASS_COUNT] = {0}, worst_background = 0;
     size_t tested[CLASS_COUNT] = {0}, skipped = 0, near_hits = 0, cut_hits = 0, hit_total = 0;
     for (uint64_t seed = 0; seed < SCENES; seed++) {
@@ -364,21 +409,25 @@ static void gradients_agree_with_differences(void **state)
         uint64_t list[LIST_MAX + 2], moved[LIST_MAX + 2];
         hit_list_of(&r, list);
         hit_total += list[0];
-        for (size_t i = 0; i < list[0]; i++)
-            near_hits += list[2 + i] & 1, cut_hits += list[2 + i] >> 1 & 1;
+        for (size_t i = 0; i < list[0]; i++) {
+            near_hits += list[2 + i] & 1;
+            cut_hits += list[2 + i] >> 1 & 1;
+        }
         for (size_t i = 0; i < n; i++) {
-            double *const q = r.scene.fields + REFERENCE_quat_w * n + i, *const d_q = d + REFERENCE_quat_w * n + i;
+            double *const q = r.scene.fields + REFERENCE_quat_w * n + i, *const d_q =
+                                                                             d + REFERENCE_quat_w * n + i;
             double along = 0;
             for (size_t c = 0; c < 4; c++)
                 along += q[c * n] * d_q[c * n];
             assert_near(along, 0, 1e-14 * (1 + fabs(d_q[0]))); /* tangent */
-            for (int class = 0; class < CLASS_COUNT; class++)
+            for (int class = 0; class < CLASS_COUNT; class ++)
                 for (size_t k = 0; k < widths[class]; k++) {
                     double got = d[(first[class] + k) * n + i];
                     if (class == CLASS_ROTATION) {
                         double tangent[3][4];
                         tangents(q, n, tangent);
-                        got = d_q[0] * tangent[k][0] + d_q[n] * tangent[k][1] + d_q[2 * n] * tangent[k][2] + d_q[3 * n] * tangent[k][3];
+                        got = d_q[0] * tangent[k][0] + d_q[n] * tangent[k][1] + d_q[2 * n] * tangent[k][2] +
+                              d_q[3 * n] * tangent[k][3];
                     }
                     double keep[GAUSSIANS_FIELD_COUNT], value[2];
                     bool same = true;
@@ -398,11 +447,12 @@ static void gradients_agree_with_differences(void **state)
                         continue;
                     }
                     tested[class]++;
-                    const double wanted = (value[1] - value[0]) / (2 * h), error = fabs(got - wanted) / fmax(0.01, fabs(wanted));
+                    const double wanted = (value[1] - value[0]) / (2 * h),
+                                 error = fabs(got - wanted) / fmax(0.01, fabs(wanted));
                     worst[class] = fmax(worst[class], error);
                     if (!(error <= 1e-6))
-                        fail_msg("seed %d, Gaussian %zu of %zu, %s %zu: %.12g, difference %.12g", (int)seed, i, n, names[class], k, got,
-                                 wanted);
+                        fail_msg("seed %d, Gaussian %zu of %zu, %s %zu: %.12g, difference %.12g", (int)seed,
+                                 i, n, names[class], k, got, wanted);
                 }
         }
         for (int c = 0; c < 3; c++) { /* linear, so a large step is exact */
@@ -419,12 +469,13 @@ static void gradients_agree_with_differences(void **state)
         reference_scene_free(&r.scene);
         gaussians_free(&r.g);
     }
-    for (int class = 0; class < CLASS_COUNT; class++) {
-        print_message("%-8s worst error %.1e of max(0.01, |difference|) in %zu\n", names[class], worst[class], tested[class]);
+    for (int class = 0; class < CLASS_COUNT; class ++) {
+        print_message("%-8s worst error %.1e of max(0.01, |difference|) in %zu\n", names[class], worst[class],
+                      tested[class]);
         assert_true(tested[class] > 500);
     }
-    print_message("background worst %.1e; %zu skipped; %zu hits, %zu at t_near, %zu cut at alpha_max\n", worst_background, skipped,
-                  hit_total, near_hits, cut_hits);
+    print_message("background worst %.1e; %zu skipped; %zu hits, %zu at t_near, %zu cut at alpha_max\n",
+                  worst_background, skipped, hit_total, near_hits, cut_hits);
     assert_true(skipped < 20 && near_hits > 20 && cut_hits > 5 && hit_total > 300);
 }
 
@@ -455,7 +506,8 @@ static void float_entries_and_threads(void **state)
     const ray_image rays = {.width = W, .height = H, .origin = origin, .dir = dir};
     for (int threads = 1; threads <= 3; threads++) {
         parallel_set_threads(threads);
-        assert_ok(reference_forward(&r.g, &r.s, &rays, rgb[threads - 1], T[threads - 1], blended[threads - 1], NULL));
+        assert_ok(reference_forward(&r.g, &r.s, &rays, rgb[threads - 1], T[threads - 1], blended[threads - 1],
+                                    NULL));
     }
     assert_memory_equal(rgb[0], rgb[1], sizeof rgb[0]);
     assert_memory_equal(rgb[0], rgb[2], sizeof rgb[0]);
@@ -469,7 +521,8 @@ static void float_entries_and_threads(void **state)
     double background[2][3] = {{0}};
     assert_ok(reference_backward(&r.g, &r.s, &rays, d_rgb, d_T, all, background[0], NULL));
     for (size_t i = 0; i < RAYS; i++) {
-        const ray_image one = {.width = 1, .height = 1, .origin = origin + 3 * i, .dir = dir + 3 * i, .common_origin = true};
+        const ray_image one = {
+            .width = 1, .height = 1, .origin = origin + 3 * i, .dir = dir + 3 * i, .common_origin = true};
         double rgb_one[3];
         assert_ok(reference_forward(&r.g, &r.s, &one, rgb_one, NULL, NULL, NULL));
         assert_memory_equal(rgb_one, rgb[0] + 3 * i, sizeof rgb_one);
@@ -486,8 +539,11 @@ static void float_entries_and_threads(void **state)
 
 static gbt_camera plain_camera(void)
 {
-    return (gbt_camera){
-        .model = GBT_CAMERA_PINHOLE, .width = 4, .height = 4, .params = {4, 4, 2, 2}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    return (gbt_camera){.model = GBT_CAMERA_PINHOLE,
+                        .width = 4,
+                        .height = 4,
+                        .params = {4, 4, 2, 2},
+                        .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 }
 
 static void memory_runs_out(void **state)
@@ -513,11 +569,13 @@ static void memory_runs_out(void **state)
             else if (entry == 1)
                 status = reference_backward(&g, &s, &rays, (double[3]){1, 1, 1}, NULL, d, d_background, &err);
             else if (entry == 2)
-                status = reference_ray_hits(&g, &s, (double[3]){0, 0, -4}, (double[3]){0, 0, 1}, &hits, &count, &capacity, &err);
+                status = reference_ray_hits(&g, &s, (double[3]){0, 0, -4}, (double[3]){0, 0, 1}, &hits,
+                                            &count, &capacity, &err);
             else
                 status = ray_image_from_camera(&camera, &made, &err);
             mem_fail_after(-1);
-            assert_true(status == GBT_OK || (status == GBT_ERR_NO_MEMORY && err.status == status && err.text[0] != '\0'));
+            assert_true(status == GBT_OK ||
+                        (status == GBT_ERR_NO_MEMORY && err.status == status && err.text[0] != '\0'));
             if (status != GBT_OK && entry == 3)
                 assert_true(made.dir == NULL && made.origin == NULL);
             if (status != GBT_OK && entry == 2)
@@ -535,7 +593,10 @@ static void memory_runs_out(void **state)
 static void rays_of_every_model(void **state)
 {
     (void)state;
-    static const struct { gbt_camera_model model; double params[GBT_CAMERA_MAX_PARAMS]; } rows[] = {
+    static const struct {
+        gbt_camera_model model;
+        double params[GBT_CAMERA_MAX_PARAMS];
+    } rows[] = {
         {GBT_CAMERA_PINHOLE, {50, 55, 31, 22}},
         {GBT_CAMERA_SIMPLE_PINHOLE, {50, 31, 22}},
         {GBT_CAMERA_SIMPLE_RADIAL, {50, 31, 22, -0.5}}, /* folds inside the image: some pixels have no ray */
@@ -571,7 +632,8 @@ static void rays_of_every_model(void **state)
                 if (dvec_length(d) == 0)
                     assert_true(got[0] == 0 && got[1] == 0 && got[2] == 0);
             }
-        const bool partial = rows[k].model == GBT_CAMERA_SIMPLE_RADIAL || rows[k].model == GBT_CAMERA_OPENCV_FISHEYE;
+        const bool partial =
+            rows[k].model == GBT_CAMERA_SIMPLE_RADIAL || rows[k].model == GBT_CAMERA_OPENCV_FISHEYE;
         assert_true(partial ? none > 20 && none < 61 * 43 / 2 : none == 0);
         ray_image_free(&rays[0]);
         ray_image_free(&rays[1]);
@@ -586,8 +648,12 @@ static void cameras_that_cannot_make_rays(void **state)
     gbt_camera bad[6];
     for (int i = 0; i < 6; i++)
         bad[i] = good;
-    bad[0].width = 0, bad[1].height = -1, bad[2].params[0] = 0, bad[3].model = GBT_CAMERA_MODEL_COUNT;
-    bad[4].rotation[4] = NAN, bad[5].center[0] = 1e39;
+    bad[0].width = 0;
+    bad[1].height = -1;
+    bad[2].params[0] = 0;
+    bad[3].model = GBT_CAMERA_MODEL_COUNT;
+    bad[4].rotation[4] = NAN;
+    bad[5].center[0] = 1e39;
     for (int i = 0; i < 6; i++) {
         ray_image rays = {0};
         gbt_error err = {0};

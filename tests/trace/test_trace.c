@@ -1,5 +1,6 @@
-/* tests/trace/test_trace.c -- the packet tracer and its adjoint against the double reference; threads, instruction sets, limits,
-   failures. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/trace/test_trace.c -- the packet tracer and its adjoint against the double reference; threads,
+   instruction sets, limits, failures. */
 #include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"
@@ -13,19 +14,20 @@
 
 enum { CLASS_MEAN, CLASS_SCALE, CLASS_ROTATION, CLASS_OPACITY, CLASS_COLOR, CLASS_COUNT };
 static const char *const class_names[CLASS_COUNT] = {"mean", "scale", "rotation", "opacity", "colour"};
-static const size_t class_first[CLASS_COUNT + 1] = {REFERENCE_mean_x, REFERENCE_scale_x, REFERENCE_quat_w, REFERENCE_opacity, REFERENCE_red,
-                                                    GAUSSIANS_FIELD_COUNT};
+static const size_t class_first[CLASS_COUNT + 1] = {REFERENCE_mean_x, REFERENCE_scale_x,
+                                                    REFERENCE_quat_w, REFERENCE_opacity,
+                                                    REFERENCE_red,    GAUSSIANS_FIELD_COUNT};
 
-/* ---- scenes and rays ----------------------------------------------------------------------------------------------------------------- */
+/* ---- scenes and rays ---- */
 
 typedef struct cloud_def {
     const char *name;
     size_t count;
-    float spread;             /* means are normal with this std-dev */
+    float spread;                /* means are normal with this std-dev */
     float scale_low, scale_high; /* log-uniform */
-    float flatness;           /* axis x is divided by this, and y too for odd ids: discs and needles */
+    float flatness;              /* axis x is divided by this, and y too for odd ids: discs and needles */
     float opacity_high;
-    double camera[3];         /* looks at the origin */
+    double camera[3]; /* looks at the origin */
 } cloud_def;
 
 static gaussians make_cloud(const cloud_def *def, uint64_t seed)
@@ -34,29 +36,41 @@ static gaussians make_cloud(const cloud_def *def, uint64_t seed)
     assert_ok(gaussians_resize(&g, def->count, NULL));
     for (size_t i = 0; i < def->count; i++) {
         const double s = (double)def->spread;
-        g.mean_x[i] = (float)(s * rng_normal(seed, 0, i)), g.mean_y[i] = (float)(s * rng_normal(seed, 1, i));
+        g.mean_x[i] = (float)(s * rng_normal(seed, 0, i));
+        g.mean_y[i] = (float)(s * rng_normal(seed, 1, i));
         g.mean_z[i] = (float)(s * rng_normal(seed, 2, i));
         const float ratio = def->scale_high / def->scale_low;
         g.scale_x[i] = def->scale_low * powf(ratio, rng_uniform(seed, 3, i)) / def->flatness;
-        g.scale_y[i] = def->scale_low * powf(ratio, rng_uniform(seed, 4, i)) / (i % 2 == 1 ? def->flatness : 1);
+        g.scale_y[i] =
+            def->scale_low * powf(ratio, rng_uniform(seed, 4, i)) / (i % 2 == 1 ? def->flatness : 1);
         g.scale_z[i] = def->scale_low * powf(ratio, rng_uniform(seed, 5, i));
         double q[4], square = 0;
-        for (uint64_t k = 0; k < 4; k++)
-            q[k] = rng_normal(seed, 6 + k, i), square += q[k] * q[k];
+        for (uint64_t k = 0; k < 4; k++) {
+            q[k] = rng_normal(seed, 6 + k, i);
+            square += q[k] * q[k];
+        }
         const double inverse = 1 / sqrt(square);
-        g.quat_w[i] = (float)(q[0] * inverse), g.quat_x[i] = (float)(q[1] * inverse);
-        g.quat_y[i] = (float)(q[2] * inverse), g.quat_z[i] = (float)(q[3] * inverse);
+        g.quat_w[i] = (float)(q[0] * inverse);
+        g.quat_x[i] = (float)(q[1] * inverse);
+        g.quat_y[i] = (float)(q[2] * inverse);
+        g.quat_z[i] = (float)(q[3] * inverse);
         g.opacity[i] = 0.02f + (def->opacity_high - 0.02f) * rng_uniform(seed, 10, i);
-        g.red[i] = rng_uniform(seed, 11, i), g.green[i] = rng_uniform(seed, 12, i), g.blue[i] = rng_uniform(seed, 13, i);
+        g.red[i] = rng_uniform(seed, 11, i);
+        g.green[i] = rng_uniform(seed, 12, i);
+        g.blue[i] = rng_uniform(seed, 13, i);
     }
     gaussians_pad(&g);
     return g;
 }
 
-static gbt_camera camera_at(const double center[3], const double target[3], int width, int height, double fov_degrees)
+static gbt_camera camera_at(const double center[3], const double target[3], int width, int height,
+                            double fov_degrees)
 {
     const double focal = 0.5 * width / tan(fov_degrees * 3.14159265358979323846 / 360);
-    gbt_camera c = {.model = GBT_CAMERA_PINHOLE, .width = width, .height = height, .params = {focal, focal, 0.5 * width, 0.5 * height}};
+    gbt_camera c = {.model = GBT_CAMERA_PINHOLE,
+                    .width = width,
+                    .height = height,
+                    .params = {focal, focal, 0.5 * width, 0.5 * height}};
     double forward[3], right[3], down[3];
     for (int k = 0; k < 3; k++)
         forward[k] = target[k] - center[k], c.center[k] = center[k];
@@ -66,8 +80,11 @@ static gbt_camera camera_at(const double center[3], const double target[3], int 
     dvec_cross((double[3]){0.05, 1, 0.02}, forward, right);
     dvec_normalize(right);
     dvec_cross(forward, right, down);
-    for (int k = 0; k < 3; k++)
-        c.rotation[k] = right[k], c.rotation[3 + k] = down[k], c.rotation[6 + k] = forward[k];
+    for (int k = 0; k < 3; k++) {
+        c.rotation[k] = right[k];
+        c.rotation[3 + k] = down[k];
+        c.rotation[6 + k] = forward[k];
+    }
     return c;
 }
 
@@ -80,7 +97,7 @@ static float reach_of(const ray_image *rays)
     return reach;
 }
 
-/* ---- both renderers ------------------------------------------------------------------------------------------------------------------ */
+/* ---- both renderers ---- */
 
 typedef struct traced {
     image rgb;
@@ -90,7 +107,8 @@ typedef struct traced {
     size_t rejected;
 } traced;
 
-static traced trace_all(const gaussians *g, const trace_settings *s, const ray_image *rays, const image *d_rgb)
+static traced trace_all(const gaussians *g, const trace_settings *s, const ray_image *rays,
+                        const image *d_rgb)
 {
     traced out = {0};
     trace_scene scene = {0};
@@ -98,7 +116,8 @@ static traced trace_all(const gaussians *g, const trace_settings *s, const ray_i
     out.T = mem_alloc(ray_image_count(rays), sizeof(float), "test", NULL);
     out.weight = mem_alloc(g->count, sizeof(float), "test", NULL);
     assert_ok(trace_build(&scene, g, s, reach_of(rays), NULL));
-    assert_ok(trace_forward(&scene, rays, true, &(trace_outputs){.rgb = &out.rgb, .transmittance = out.T}, &out.counters, NULL));
+    assert_ok(trace_forward(&scene, rays, true, &(trace_outputs){.rgb = &out.rgb, .transmittance = out.T},
+                            &out.counters, NULL));
     assert_ok(trace_backward(&scene, rays, d_rgb, &out.d, out.weight, out.d_background, NULL));
     out.rejected = scene.tree.rejected_count;
     trace_scene_free(&scene);
@@ -130,13 +149,15 @@ static void field_list(const gaussians *g, const float *fields[GAUSSIANS_FIELD_C
 #undef X
 }
 
-/* Rays on which rounding may change the hits: alpha within 1e-6 of a cut, T within 1e-9 of the stop, depths closer than float32 can
-   tell. */
-static bool is_in_band(const reference_scene *scene, const trace_settings *s, const reference_hit *hits, size_t count, double depth_band)
+/* Rays on which rounding may change the hits: alpha within 1e-6 of a cut, T within 1e-9 of the stop, depths
+   closer than float32 can tell. */
+static bool is_in_band(const reference_scene *scene, const trace_settings *s, const reference_hit *hits,
+                       size_t count, double depth_band)
 {
     double T = 1, before = -1;
     for (size_t i = 0; i < count; i++) {
-        const double raw = scene->fields[REFERENCE_opacity * scene->count + hits[i].id] * exp(-0.5 * hits[i].d2);
+        const double raw =
+            scene->fields[REFERENCE_opacity * scene->count + hits[i].id] * exp(-0.5 * hits[i].d2);
         if (fabs(raw - (double)s->alpha_min) < 1e-6 || fabs(raw - (double)s->alpha_max) < 1e-6)
             return true;
         if (hits[i].alpha < (double)s->alpha_min)
@@ -159,13 +180,14 @@ typedef struct figures {
     kernel_counters counters;
 } figures;
 
-static figures compare(const gaussians *g, const trace_settings *s, const ray_image *rays, uint64_t seed, double depth_band)
+static figures compare(const gaussians *g, const trace_settings *s, const ray_image *rays, uint64_t seed,
+                       double depth_band)
 {
     figures out = {.rays = ray_image_count(rays)};
     const size_t n = out.rays;
     double *rgb = mem_alloc(n, 3 * sizeof *rgb, "test", NULL), *T = mem_alloc(n, sizeof *T, "test", NULL);
-    double *d_rgb = mem_calloc(n, 3 * sizeof *d_rgb, "test", NULL), *d = mem_calloc(g->count, GAUSSIANS_FIELD_COUNT * sizeof *d, "test",
-                                                                                    NULL);
+    double *d_rgb = mem_calloc(n, 3 * sizeof *d_rgb, "test", NULL),
+           *d = mem_calloc(g->count, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL);
     bool *band = mem_calloc(n, sizeof *band, "test", NULL);
     double d_background[3] = {0};
     image d_image = random_gradient(rays, seed);
@@ -177,11 +199,14 @@ static figures compare(const gaussians *g, const trace_settings *s, const ray_im
     loose.alpha_min = fmaxf(s->alpha_min - 2e-6f, 0.5f * s->alpha_min);
     for (size_t i = 0; i < n; i++) {
         double origin[3], dir[3];
-        for (size_t k = 0; k < 3; k++)
-            origin[k] = (double)ray_image_origin(rays, i)[k], dir[k] = (double)rays->dir[3 * i + k];
+        for (size_t k = 0; k < 3; k++) {
+            origin[k] = (double)ray_image_origin(rays, i)[k];
+            dir[k] = (double)rays->dir[3 * i + k];
+        }
         assert_ok(reference_scene_ray_hits(&scene, &loose, origin, dir, &hits, &count, &capacity, NULL));
         band[i] = is_in_band(&scene, s, hits, count, depth_band);
-        out.band += band[i], out.hits += count;
+        out.band += band[i];
+        out.hits += count;
         for (size_t k = 3 * i; k < 3 * i + 3; k++) {
             if (band[i])
                 d_image.pixels[k] = 0;
@@ -197,7 +222,8 @@ static figures compare(const gaussians *g, const trace_settings *s, const ray_im
     for (size_t i = 0; i < n; i++) {
         for (size_t k = 3 * i; k < 3 * i + 3 && !band[i]; k++) {
             const double error = fabs((double)t.rgb.pixels[k] - rgb[k]);
-            square += error * error, out.max_error = fmax(out.max_error, error);
+            square += error * error;
+            out.max_error = fmax(out.max_error, error);
             if (!isfinite(error))
                 out.max_error = INFINITY;
         }
@@ -207,32 +233,40 @@ static figures compare(const gaussians *g, const trace_settings *s, const ray_im
     out.psnr = square > 0 ? -10 * log10(square / (3.0 * (double)(n - out.band))) : 200;
     const float *got[GAUSSIANS_FIELD_COUNT];
     field_list(&t.d, got);
-    for (int class = 0; class < CLASS_COUNT; class++) {
+    for (int class = 0; class < CLASS_COUNT; class ++) {
         double error = 0, norm = 0;
         for (size_t f = class_first[class]; f < class_first[class + 1]; f++)
             for (size_t i = 0; i < g->count; i++) {
                 const double wanted = d[f * g->count + i], off = (double)got[f][i] - wanted;
-                error += off * off, norm += wanted * wanted;
+                error += off * off;
+                norm += wanted * wanted;
             }
         out.gradient[class] = error > 0 ? sqrt(error / norm) : error; /* NaN stays NaN */
     }
     double error = 0, norm = 0;
-    for (int c = 0; c < 3; c++)
-        error += pow((double)t.d_background[c] - d_background[c], 2), norm += d_background[c] * d_background[c];
+    for (int c = 0; c < 3; c++) {
+        error += pow((double)t.d_background[c] - d_background[c], 2);
+        norm += d_background[c] * d_background[c];
+    }
     out.background = sqrt(error / norm);
     traced_free(&t);
     reference_scene_free(&scene);
     image_free(&d_image);
-    mem_free(rgb), mem_free(T), mem_free(d_rgb), mem_free(d), mem_free(band);
+    mem_free(rgb);
+    mem_free(T);
+    mem_free(d_rgb);
+    mem_free(d);
+    mem_free(band);
     return out;
 }
 
 static void print_figures(const char *name, const figures *f)
 {
-    print_message("%-14s %5.1f hits, %3zu of %zu rays in the band, %llu packets spilled: %.1f dB, max %.1e, T %.1e; adjoint", name,
-                  (double)f->hits / (double)f->rays, f->band, f->rays, (unsigned long long)f->counters.spilled_packets, f->psnr,
-                  f->max_error, f->T_error);
-    for (int class = 0; class < CLASS_COUNT; class++)
+    print_message("%-14s %5.1f hits, %3zu of %zu rays in the band, %llu packets spilled: %.1f dB, max %.1e, "
+                  "T %.1e; adjoint",
+                  name, (double)f->hits / (double)f->rays, f->band, f->rays,
+                  (unsigned long long)f->counters.spilled_packets, f->psnr, f->max_error, f->T_error);
+    for (int class = 0; class < CLASS_COUNT; class ++)
         print_message(" %.1e", f->gradient[class]);
     print_message(" %.1e\n", f->background);
 }
@@ -242,7 +276,7 @@ static void assert_figures(const char *name, const figures *f, double gradient_l
     print_figures(name, f);
     if (!(f->psnr >= 100 && f->max_error <= 2e-5 && f->T_error <= 2e-5))
         fail_msg("%s: %.1f dB, max error %.3g, of T %.3g", name, f->psnr, f->max_error, f->T_error);
-    for (int class = 0; class < CLASS_COUNT; class++)
+    for (int class = 0; class < CLASS_COUNT; class ++)
         if (!(f->gradient[class] <= gradient_limit))
             fail_msg("%s: gradient of %s is off by %.3g", name, class_names[class], f->gradient[class]);
     if (!(f->background <= gradient_limit))
@@ -253,11 +287,13 @@ static void assert_figures(const char *name, const figures *f, double gradient_l
 static trace_settings with_background(void)
 {
     trace_settings s = trace_settings_default();
-    s.background[0] = 0.3f, s.background[1] = 0.6f, s.background[2] = 0.1f;
+    s.background[0] = 0.3f;
+    s.background[1] = 0.6f;
+    s.background[2] = 0.1f;
     return s;
 }
 
-/* ---- against the reference ----------------------------------------------------------------------------------------------------------- */
+/* ---- against the reference ---- */
 
 static void random_scenes(void **state)
 {
@@ -284,8 +320,8 @@ static void random_scenes(void **state)
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
         const figures f = compare(&g, &s, &rays, i, 1e-6);
-        /* At 1:100 and 1:1000 the thin axis is 1e-3 and 1e-4 of the distance: rounding of coordinates alone moves every hit by that much
-           more of a std-dev. */
+        /* At 1:100 and 1:1000 the thin axis is 1e-3 and 1e-4 of the distance: rounding of coordinates alone
+           moves every hit by that much more of a std-dev. */
         const float thin = rows[i].flatness;
         assert_figures(rows[i].name, &f, thin > 500 ? 5e-4 : thin > 50 ? 5e-5 : 1e-5);
         assert_true(f.hits > 0);
@@ -300,7 +336,8 @@ static int compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* One needle (1, 1/r, 1/r) at a time, and a ray through its one-sigma shell: the worst that float32 coordinates allow. */
+/* One needle (1, 1/r, 1/r) at a time, and a ray through its one-sigma shell: the worst that float32
+   coordinates allow. */
 static void needles_one_by_one(void **state)
 {
     (void)state;
@@ -319,20 +356,28 @@ static void needles_one_by_one(void **state)
             const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
             for (int j = 0; j < 4; j++)
                 q[j] /= length;
-            g.quat_w[0] = (float)q[0], g.quat_x[0] = (float)q[1], g.quat_y[0] = (float)q[2], g.quat_z[0] = (float)q[3];
+            g.quat_w[0] = (float)q[0];
+            g.quat_x[0] = (float)q[1];
+            g.quat_y[0] = (float)q[2];
+            g.quat_z[0] = (float)q[3];
             dquat_to_matrix(q, rotation);
             g.scale_y[0] = g.scale_z[0] = (float)thin;
-            g.mean_x[0] = (float)(2 * rng_normal(30 + k, 4, i)), g.mean_y[0] = (float)(2 * rng_normal(30 + k, 5, i));
+            g.mean_x[0] = (float)(2 * rng_normal(30 + k, 4, i));
+            g.mean_y[0] = (float)(2 * rng_normal(30 + k, 5, i));
             g.mean_z[0] = (float)(6 + 2 * rng_normal(30 + k, 6, i));
             for (uint64_t j = 0; j < 3; j++)
                 shell[j] = rng_normal(30 + k, 7 + j, i);
             dvec_normalize(shell);
-            shell[1] *= thin, shell[2] *= thin;
+            shell[1] *= thin;
+            shell[2] *= thin;
             dmat_apply(rotation, shell, turned);
-            dir[0] = turned[0] + (double)g.mean_x[0], dir[1] = turned[1] + (double)g.mean_y[0], dir[2] = turned[2] + (double)g.mean_z[0];
+            dir[0] = turned[0] + (double)g.mean_x[0];
+            dir[1] = turned[1] + (double)g.mean_y[0];
+            dir[2] = turned[2] + (double)g.mean_z[0];
             dvec_normalize(dir);
             float store[6] = {0, 0, 0, (float)dir[0], (float)dir[1], (float)dir[2]};
-            const ray_image rays = {.width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
+            const ray_image rays = {
+                .width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
             for (int j = 0; j < 3; j++)
                 dir[j] = (double)store[3 + j]; /* the reference sees the same float32 ray */
             reference_hit *hits = NULL;
@@ -354,8 +399,8 @@ static void needles_one_by_one(void **state)
             gaussians_free(&g);
         }
         qsort(error, NEEDLES, sizeof *error, compare_doubles);
-        print_message("needles 1:%g: |alpha - reference| 95 %% %.1e, worst %.1e\n", ratios[k], error[NEEDLES * 95 / 100],
-                      error[NEEDLES - 1]);
+        print_message("needles 1:%g: |alpha - reference| 95 %% %.1e, worst %.1e\n", ratios[k],
+                      error[NEEDLES * 95 / 100], error[NEEDLES - 1]);
         if (ratios[k] <= 1e4) {
             assert_int_equal(seen, NEEDLES);
             assert_true(error[NEEDLES * 95 / 100] <= 1.0 / 255);
@@ -374,7 +419,8 @@ static void rays_that_do_not_run_together(void **state)
         gbt_camera_model model;
         const char *name;
         double params[8];
-    } rows[] = {{GBT_CAMERA_EQUIRECTANGULAR, "all around", {36, 18}}, {GBT_CAMERA_OPENCV_FISHEYE, "fisheye", {8, 8, 18, 9, 0.01, 0, 0, 0}}};
+    } rows[] = {{GBT_CAMERA_EQUIRECTANGULAR, "all around", {36, 18}},
+                {GBT_CAMERA_OPENCV_FISHEYE, "fisheye", {8, 8, 18, 9, 0.01, 0, 0, 0}}};
     for (size_t i = 0; i < 2; i++) {
         camera.model = rows[i].model;
         memcpy(camera.params, rows[i].params, sizeof rows[i].params);
@@ -389,8 +435,10 @@ static void rays_that_do_not_run_together(void **state)
     static float origin[3 * W * H], dir[3 * W * H];
     for (size_t i = 0; i < W * H; i++) {
         double d[3];
-        for (size_t k = 0; k < 3; k++)
-            d[k] = rng_normal(40, k, i), origin[3 * i + k] = (float)rng_normal(41, k, i);
+        for (size_t k = 0; k < 3; k++) {
+            d[k] = rng_normal(40, k, i);
+            origin[3 * i + k] = (float)rng_normal(41, k, i);
+        }
         dvec_normalize(d);
         for (size_t k = 0; k < 3; k++)
             dir[3 * i + k] = (float)d[k];
@@ -408,14 +456,17 @@ static void one_hundred_thousand_hits(void **state)
     for (size_t count = 10000; count <= 100000; count *= 10) {
         gaussians g = some(count, 0);
         for (size_t i = 0; i < count; i++) {
-            g.mean_z[i] = 2 * rng_uniform(1, 0, i), g.mean_x[i] = 0.2f * rng_uniform(1, 1, i);
+            g.mean_z[i] = 2 * rng_uniform(1, 0, i);
+            g.mean_x[i] = 0.2f * rng_uniform(1, 1, i);
             g.opacity[i] = 4 / (float)count * (0.5f + rng_uniform(1, 2, i));
-            g.red[i] = rng_uniform(1, 3, i), g.blue[i] = 0;
+            g.red[i] = rng_uniform(1, 3, i);
+            g.blue[i] = 0;
         }
         trace_settings s = with_background();
         s.alpha_min = 0.1f / (float)count;
         float store[6] = {0, 0, -5, 0, 0, 1};
-        const ray_image rays = {.width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
+        const ray_image rays = {
+            .width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
         image d_rgb = random_gradient(&rays, 3);
         traced t = trace_all(&g, &s, &rays, &d_rgb);
         double rgb[3], T;
@@ -428,16 +479,20 @@ static void one_hundred_thousand_hits(void **state)
             assert_near((double)t.rgb.pixels[c], rgb[c], 1e-4); /* 10^5 additions in float32 */
         assert_near((double)t.T[0], T, 1e-4);
         if (count == 10000) { /* the reference's adjoint is quadratic in the hits */
-            double *d = mem_calloc(count, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL), d_background[3] = {0}, worst = 0;
-            const double d_in[3] = {(double)d_rgb.pixels[0], (double)d_rgb.pixels[1], (double)d_rgb.pixels[2]};
+            double *d = mem_calloc(count, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL),
+                   d_background[3] = {0}, worst = 0;
+            const double d_in[3] = {(double)d_rgb.pixels[0], (double)d_rgb.pixels[1],
+                                    (double)d_rgb.pixels[2]};
             assert_ok(reference_backward(&g, &s, &rays, d_in, NULL, d, d_background, NULL));
             const float *got[GAUSSIANS_FIELD_COUNT];
             field_list(&t.d, got);
-            for (int class = 0; class < CLASS_COUNT; class++) {
+            for (int class = 0; class < CLASS_COUNT; class ++) {
                 double error = 0, norm = 0;
                 for (size_t f = class_first[class]; f < class_first[class + 1]; f++)
-                    for (size_t i = 0; i < count; i++)
-                        error += pow((double)got[f][i] - d[f * count + i], 2), norm += pow(d[f * count + i], 2);
+                    for (size_t i = 0; i < count; i++) {
+                        error += pow((double)got[f][i] - d[f * count + i], 2);
+                        norm += pow(d[f * count + i], 2);
+                    }
                 if (class != CLASS_ROTATION) /* round: no gradient */
                     worst = fmax(worst, sqrt(error / norm));
                 else
@@ -461,21 +516,23 @@ static void coincident_gaussians(void **state)
     for (size_t count = 150; count <= 800; count += 650) {
         gaussians g = some(count, 0.01f);
         for (size_t i = 0; i < count; i++)
-            g.red[i] = rng_uniform(8, 0, i), g.green[i] = i % 2 == 0, g.blue[i] = (float)i / (float)count, g.scale_y[i] = 2,
-                g.scale_z[i] = 0.5f;
+            g.red[i] = rng_uniform(8, 0, i), g.green[i] = i % 2 == 0, g.blue[i] = (float)i / (float)count,
+            g.scale_y[i] = 2, g.scale_z[i] = 0.5f;
         const gbt_camera camera = camera_at((double[3]){1, 0.5, -6}, (double[3]){0, 0, 0}, 16, 12, 20);
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
         const figures f = compare(&g, &s, &rays, 50, 1e-6);
-        assert_figures(count == 150 ? "150 at once" : "800 at once", &f, count == 150 ? 1e-5 : 5e-5); /* T is a product of 800 roundings */
+        assert_figures(count == 150 ? "150 at once" : "800 at once", &f,
+                       count == 150 ? 1e-5 : 5e-5); /* T is a product of 800 roundings */
         assert_int_equal(f.counters.spilled_packets, count == 150 ? 0 : 12);
         ray_image_free(&rays);
         gaussians_free(&g);
     }
 }
 
-/* A sheet across the depths, whose near part is blended rounds before its far part is reached, and a wall in front of the far part alone:
-   the rays of that part become opaque while the sheet waits for them. What was blended must still reach the adjoint. */
+/* A sheet across the depths, whose near part is blended rounds before its far part is reached, and a wall in
+   front of the far part alone: the rays of that part become opaque while the sheet waits for them. What was
+   blended must still reach the adjoint. */
 static void sheets_that_end_behind_a_wall(void **state)
 {
     (void)state;
@@ -483,19 +540,34 @@ static void sheets_that_end_behind_a_wall(void **state)
     gaussians g = some(COUNT, 0.03f);
     for (size_t i = 0; i < COUNT; i++) { /* faint ones all along the rays, so that there are rounds */
         const float depth = 1.5f + 25 * rng_uniform(90, 0, i);
-        g.mean_x[i] = depth * (rng_uniform(90, 1, i) - 0.5f), g.mean_y[i] = depth * (rng_uniform(90, 2, i) - 0.5f), g.mean_z[i] = depth;
+        g.mean_x[i] = depth * (rng_uniform(90, 1, i) - 0.5f);
+        g.mean_y[i] = depth * (rng_uniform(90, 2, i) - 0.5f);
+        g.mean_z[i] = depth;
         g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 0.05f;
-        g.red[i] = rng_uniform(90, 3, i), g.green[i] = rng_uniform(90, 4, i), g.blue[i] = rng_uniform(90, 5, i);
+        g.red[i] = rng_uniform(90, 3, i);
+        g.green[i] = rng_uniform(90, 4, i);
+        g.blue[i] = rng_uniform(90, 5, i);
     }
     for (size_t i = 0; i < SHEETS; i++) { /* from (-1.5, y, 4) to (7.5, y, 20) */
-        g.mean_x[i] = 3, g.mean_y[i] = 0, g.mean_z[i] = 12 + 0.3f * (float)i;
-        g.scale_x[i] = 0.1f, g.scale_y[i] = 5, g.scale_z[i] = 9;
-        g.quat_w[i] = 0.9673f, g.quat_x[i] = 0, g.quat_y[i] = 0.2537f, g.quat_z[i] = 0;
+        g.mean_x[i] = 3;
+        g.mean_y[i] = 0;
+        g.mean_z[i] = 12 + 0.3f * (float)i;
+        g.scale_x[i] = 0.1f;
+        g.scale_y[i] = 5;
+        g.scale_z[i] = 9;
+        g.quat_w[i] = 0.9673f;
+        g.quat_x[i] = 0;
+        g.quat_y[i] = 0.2537f;
+        g.quat_z[i] = 0;
         g.opacity[i] = 0.4f;
     }
     for (size_t i = SHEETS; i < SHEETS + WALLS; i++) { /* in front of the last column */
-        g.mean_x[i] = 3.5f, g.mean_y[i] = 0, g.mean_z[i] = 9 + 0.2f * (float)i;
-        g.scale_x[i] = 0.7f, g.scale_y[i] = 9, g.scale_z[i] = 0.05f;
+        g.mean_x[i] = 3.5f;
+        g.mean_y[i] = 0;
+        g.mean_z[i] = 9 + 0.2f * (float)i;
+        g.scale_x[i] = 0.7f;
+        g.scale_y[i] = 9;
+        g.scale_z[i] = 0.05f;
         g.opacity[i] = 2.5f; /* opaque beyond a std-dev */
     }
     gaussians_pad(&g);
@@ -516,7 +588,8 @@ static void the_cap_is_exact(void **state)
     (void)state;
     const trace_settings s = trace_settings_default();
     float store[6] = {0, 0, -5, 0, 0, 1};
-    const ray_image rays = {.width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
+    const ray_image rays = {
+        .width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
     image d_rgb;
     assert_ok(image_alloc(&d_rgb, 1, 1, 3, NULL));
     d_rgb.pixels[0] = d_rgb.pixels[1] = d_rgb.pixels[2] = 1;
@@ -539,7 +612,7 @@ static void the_cap_is_exact(void **state)
     image_free(&d_rgb);
 }
 
-/* ---- the same bits ------------------------------------------------------------------------------------------------------------------- */
+/* ---- the same bits ---- */
 
 static void assert_same(const traced *a, const traced *b, size_t rays, size_t count)
 {
@@ -558,15 +631,19 @@ static void assert_same(const traced *a, const traced *b, size_t rays, size_t co
 static void instruction_sets_and_threads_give_the_same_bits(void **state)
 {
     (void)state;
-    const cloud_def defs[] = {{"", 3000, 1, 0.03f, 0.3f, 30, 0.9f, {2, 1, -5}}, {"", 500, 0.2f, 1, 2, 1, 0.03f, {0, 0, 0}}};
+    const cloud_def defs[] = {{"", 3000, 1, 0.03f, 0.3f, 30, 0.9f, {2, 1, -5}},
+                              {"", 500, 0.2f, 1, 2, 1, 0.03f, {0, 0, 0}}};
     const int before = parallel_threads();
     uint64_t spilled = 0;
     for (size_t i = 0; i < 2; i++) {
         gaussians g = make_cloud(&defs[i], 60 + i);
         const trace_settings s = with_background();
         gbt_camera camera = camera_at(defs[i].camera, (double[3]){0, 0, 0.5}, 22, 14, 50);
-        if (i == 1) /* wide and deep: packets spill */
-            camera.model = GBT_CAMERA_EQUIRECTANGULAR, camera.params[0] = 22, camera.params[1] = 14;
+        if (i == 1) { /* wide and deep: packets spill */
+            camera.model = GBT_CAMERA_EQUIRECTANGULAR;
+            camera.params[0] = 22;
+            camera.params[1] = 14;
+        }
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
         image d_rgb = random_gradient(&rays, 70);
@@ -588,12 +665,13 @@ static void instruction_sets_and_threads_give_the_same_bits(void **state)
         ray_image_free(&rays);
         gaussians_free(&g);
     }
-    print_message("widest instruction set here: %s; %llu packets spilled\n", cpu_isa_name(cpu_best_isa()), (unsigned long long)spilled);
+    print_message("widest instruction set here: %s; %llu packets spilled\n", cpu_isa_name(cpu_best_isa()),
+                  (unsigned long long)spilled);
     assert_true(spilled > 5);
     parallel_set_threads(before);
 }
 
-/* ---- odd input ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- odd input ---- */
 
 static void rays_that_are_none(void **state)
 {
@@ -601,10 +679,17 @@ static void rays_that_are_none(void **state)
     enum { W = 6, H = 5, RAYS = W * H };
     float origin[3 * RAYS], dir[3 * RAYS];
     for (size_t i = 0; i < RAYS; i++) {
-        origin[3 * i] = 0.1f * (float)(i % W), origin[3 * i + 1] = 0, origin[3 * i + 2] = -4;
-        dir[3 * i] = dir[3 * i + 1] = 0, dir[3 * i + 2] = 1;
+        origin[3 * i] = 0.1f * (float)(i % W);
+        origin[3 * i + 1] = 0;
+        origin[3 * i + 2] = -4;
+        dir[3 * i] = dir[3 * i + 1] = 0;
+        dir[3 * i + 2] = 1;
     }
-    dir[3 * 2 + 2] = 0, dir[3 * 7] = NAN, dir[3 * 9 + 2] = INFINITY, origin[3 * 11] = NAN, origin[3 * 13 + 1] = INFINITY;
+    dir[3 * 2 + 2] = 0;
+    dir[3 * 7] = NAN;
+    dir[3 * 9 + 2] = INFINITY;
+    origin[3 * 11] = NAN;
+    origin[3 * 13 + 1] = INFINITY;
     dir[3 * 28 + 2] = dir[3 * 29 + 2] = 0; /* a packet without any ray */
     static const size_t none[] = {2, 7, 9, 11, 13, 28, 29};
     const ray_image rays = {.width = W, .height = H, .origin = origin, .dir = dir};
@@ -616,7 +701,8 @@ static void rays_that_are_none(void **state)
     assert_ok(image_alloc(&t.rgb, W, H, 3, NULL));
     float T[RAYS], want[3] = {0};
     assert_ok(trace_build(&scene, &g, &s, 4, NULL));
-    assert_ok(trace_forward(&scene, &rays, true, &(trace_outputs){.rgb = &t.rgb, .transmittance = T}, &t.counters, NULL));
+    assert_ok(trace_forward(&scene, &rays, true, &(trace_outputs){.rgb = &t.rgb, .transmittance = T},
+                            &t.counters, NULL));
     assert_ok(trace_backward(&scene, &rays, &d_rgb, &t.d, NULL, t.d_background, NULL));
     assert_int_equal(t.counters.rays, RAYS - 7);
     for (size_t i = 0; i < RAYS; i++) {
@@ -643,9 +729,15 @@ static void broken_gaussians_are_left_out(void **state)
 {
     (void)state;
     gaussians g = some(12, 0.4f);
-    g.mean_x[0] = NAN, g.scale_y[1] = 0, g.scale_x[2] = NAN, g.quat_w[3] = NAN, g.opacity[4] = NAN, g.mean_z[5] = INFINITY;
-    g.opacity[6] = -1, g.opacity[7] = 0; /* below alpha_min: not rejected, only never seen */
-    g.opacity[8] = 1.5f;                 /* cut at alpha_max near the centre, as any other */
+    g.mean_x[0] = NAN;
+    g.scale_y[1] = 0;
+    g.scale_x[2] = NAN;
+    g.quat_w[3] = NAN;
+    g.opacity[4] = NAN;
+    g.mean_z[5] = INFINITY;
+    g.opacity[6] = -1;
+    g.opacity[7] = 0;    /* below alpha_min: not rejected, only never seen */
+    g.opacity[8] = 1.5f; /* cut at alpha_max near the centre, as any other */
     g.mean_z[8] = 3;
     const trace_settings s = with_background();
     const gbt_camera camera = camera_at((double[3]){1, 0.5, -6}, (double[3]){0, 0, 0}, 13, 9, 30);
@@ -677,14 +769,17 @@ static void broken_gaussians_are_left_out(void **state)
     gaussians_free(&g);
 }
 
-/* A disc thinner than float32 can square: the ray inside its plane hits it, its neighbours make infinities. No gradient may be NaN. */
+/* A disc thinner than float32 can square: the ray inside its plane hits it, its neighbours make infinities.
+   No gradient may be NaN. */
 static void no_nan_from_neighbours(void **state)
 {
     (void)state;
     gaussians g = some(2, 0.5f);
-    g.scale_x[0] = 1e-25f, g.mean_x[1] = 0.2f;
+    g.scale_x[0] = 1e-25f;
+    g.mean_x[1] = 0.2f;
     enum { W = 4, H = 1 };
-    float origin[3] = {0, 0, -4}, dir[3 * W] = {0, 0, 1, 0.02f, 0, 0.9998f, -0.02f, 0, 0.9998f, 0.04f, 0, 0.9992f};
+    float origin[3] = {0, 0, -4},
+          dir[3 * W] = {0, 0, 1, 0.02f, 0, 0.9998f, -0.02f, 0, 0.9998f, 0.04f, 0, 0.9992f};
     const ray_image rays = {.width = W, .height = H, .origin = origin, .dir = dir, .common_origin = true};
     const trace_settings s = with_background();
     image d_rgb = random_gradient(&rays, 95);
@@ -714,15 +809,19 @@ static void wrong_sizes_are_refused(void **state)
     assert_ok(image_alloc(&rgb, 2, 1, 3, NULL));
     assert_ok(image_alloc(&small, 1, 1, 3, NULL));
     assert_ok(trace_build(&scene, &g, &s, 5, NULL));
-    assert_int_equal(trace_forward(&scene, &rays, true, &(trace_outputs){.rgb = &small}, NULL, &err), GBT_ERR_ARGUMENT);
-    assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT); /* no forward pass */
+    assert_int_equal(trace_forward(&scene, &rays, true, &(trace_outputs){.rgb = &small}, NULL, &err),
+                     GBT_ERR_ARGUMENT);
+    assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL),
+                     GBT_ERR_ARGUMENT); /* no forward pass */
     assert_ok(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = &rgb}, NULL, NULL));
-    assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT); /* without a tape */
+    assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL),
+                     GBT_ERR_ARGUMENT); /* without a tape */
     assert_ok(trace_forward(&scene, &rays, true, &(trace_outputs){.rgb = &rgb}, NULL, NULL));
     assert_int_equal(trace_backward(&scene, &rays, &small, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
     assert_ok(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL));
     assert_ok(trace_build(&scene, &g, &s, 5, NULL));
-    assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT); /* the tape was of another build */
+    assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL),
+                     GBT_ERR_ARGUMENT); /* the tape was of another build */
     trace_scene_free(&scene);
     image_free(&rgb);
     image_free(&small);
@@ -730,8 +829,8 @@ static void wrong_sizes_are_refused(void **state)
     gaussians_free(&d);
 }
 
-static gbt_status run_once(const gaussians *g, const trace_settings *s, const ray_image *rays, image *rgb, const image *d_rgb,
-                           gbt_error *err)
+static gbt_status run_once(const gaussians *g, const trace_settings *s, const ray_image *rays, image *rgb,
+                           const image *d_rgb, gbt_error *err)
 {
     trace_scene scene = {0};
     gaussians d = {0};
@@ -748,7 +847,8 @@ static gbt_status run_once(const gaussians *g, const trace_settings *s, const ra
 static void memory_runs_out(void **state)
 {
     (void)state;
-    const cloud_def defs[2] = {{"", 200, 1, 0.1f, 0.3f, 1, 0.9f, {2, 1, -5}}, {"", 300, 0.2f, 1, 2, 1, 0.03f, {2, 1, -5}}};
+    const cloud_def defs[2] = {{"", 200, 1, 0.1f, 0.3f, 1, 0.9f, {2, 1, -5}},
+                               {"", 300, 0.2f, 1, 2, 1, 0.03f, {2, 1, -5}}};
     const trace_settings s = with_background();
     const int before = parallel_threads();
     parallel_set_threads(1);
@@ -780,7 +880,7 @@ static void memory_runs_out(void **state)
     parallel_set_threads(before);
 }
 
-/* ---- a scene of others --------------------------------------------------------------------------------------------------------------- */
+/* ---- a scene of others ---- */
 
 static void peer_scene(void **state)
 {
@@ -793,11 +893,21 @@ static void peer_scene(void **state)
     gaussians g = some(cloud.count, 0);
     for (size_t i = 0; i < cloud.count; i++) {
         const float *m = cloud.mean + 3 * i, *l = cloud.scale_log + 3 * i, *q = cloud.quat + 4 * i,
-            *sh = cloud.sh + i * GAUSSIAN_SH_COUNT * 3;
-        g.mean_x[i] = m[0], g.mean_y[i] = m[1], g.mean_z[i] = m[2];
-        g.scale_x[i] = expf(l[0]), g.scale_y[i] = expf(l[1]), g.scale_z[i] = expf(l[2]);
-        g.quat_w[i] = q[0], g.quat_x[i] = q[1], g.quat_y[i] = q[2], g.quat_z[i] = q[3], g.opacity[i] = cloud.opacity[i];
-        g.red[i] = 0.5f + 0.28209479f * sh[0], g.green[i] = 0.5f + 0.28209479f * sh[1], g.blue[i] = 0.5f + 0.28209479f * sh[2];
+                    *sh = cloud.sh + i * GAUSSIAN_SH_COUNT * 3;
+        g.mean_x[i] = m[0];
+        g.mean_y[i] = m[1];
+        g.mean_z[i] = m[2];
+        g.scale_x[i] = expf(l[0]);
+        g.scale_y[i] = expf(l[1]);
+        g.scale_z[i] = expf(l[2]);
+        g.quat_w[i] = q[0];
+        g.quat_x[i] = q[1];
+        g.quat_y[i] = q[2];
+        g.quat_z[i] = q[3];
+        g.opacity[i] = cloud.opacity[i];
+        g.red[i] = 0.5f + 0.28209479f * sh[0];
+        g.green[i] = 0.5f + 0.28209479f * sh[1];
+        g.blue[i] = 0.5f + 0.28209479f * sh[2];
     }
     assert_int_equal(cloud.count, 2000);
     const gbt_camera camera = camera_at((double[3]){0, -38, 9}, (double[3]){0, 0, 0}, 48, 48, 38);

@@ -1,4 +1,6 @@
-/* tests/train/run_support.h -- a folder for runs, a tiny scene to train on, and runs that must succeed or fail.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/train/run_support.h -- a folder for runs, a tiny scene to train on, and runs that must succeed or
+   fail.
 
    The scene is tiny (photos of 48 x 36), so a run takes a fraction of a second. */
 #ifndef GBT_TESTS_RUN_SUPPORT_H
@@ -19,11 +21,13 @@ enum { PATH_SIZE = 512, STEPS = 60, VIEWS = 9 };
 
 static char root[64], tiny[PATH_SIZE];
 
-/* ---- folders, files ----------------------------------------------------------------------------------------------------------- */
+/* ---- folders, files ---- */
 
 static inline int remove_one(const char *path, const struct stat *info, int kind, struct FTW *walk)
 {
-    (void)info, (void)kind, (void)walk;
+    (void)info;
+    (void)kind;
+    (void)walk;
     return remove(path);
 }
 
@@ -75,7 +79,11 @@ static inline bool is_same_file(const char *a, const char *b)
 static inline void make_tiny_scene(const char *folder)
 {
     gbt_make_scene_def def = gbt_make_scene_def_default();
-    def.width = 48, def.height = 36, def.view_count = VIEWS, def.points = 150, def.samples = 4;
+    def.width = 48;
+    def.height = 36;
+    def.view_count = VIEWS;
+    def.points = 150;
+    def.samples = 4;
     gbt_error err = {0};
     if (gbt_make_scene(&def, folder, &err) != GBT_OK)
         fail_msg("%s", err.text);
@@ -98,7 +106,7 @@ static inline int remove_root(void **state)
     return nftw(root, remove_one, 16, FTW_DEPTH | FTW_PHYS);
 }
 
-/* ---- runs --------------------------------------------------------------------------------------------------------------------- */
+/* ---- runs ---- */
 
 static inline gbt_train_def run_def(void)
 {
@@ -116,11 +124,13 @@ static inline void train_ok(const char *data, const char *run, const gbt_train_d
         fail_msg("%s: %s", run, err.text);
 }
 
-static inline void train_fails(const char *data, const char *run, const gbt_train_def *def, gbt_status wanted, const char *says)
+static inline void train_fails(const char *data, const char *run, const gbt_train_def *def, gbt_status wanted,
+                               const char *says)
 {
     gbt_error err = {0};
     const gbt_status status = gbt_train(data, run, def, &err);
-    if (status != wanted || err.status != wanted || strstr(err.text, says) == NULL || strchr(err.text, '\n') != NULL)
+    if (status != wanted || err.status != wanted || strstr(err.text, says) == NULL ||
+        strchr(err.text, '\n') != NULL)
         fail_msg("wanted status %d and \"%s\", got %d: %s", (int)wanted, says, (int)status, err.text);
 }
 

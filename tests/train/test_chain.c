@@ -1,5 +1,7 @@
-/* tests/train/test_chain.c -- the training loss as a function of the anchors and networks: its gradient in double against differences, and
-   the float32 chain (frame_render, image_loss, frame_backward) against the gradient in double. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/train/test_chain.c -- the training loss as a function of the anchors and networks: its gradient in
+   double against differences, and the float32 chain (frame_render, image_loss, frame_backward) against the
+   gradient in double. */
 #include "anchor/decode_ref.h"
 #include "anchor/fixture.h"
 #include "base/near.h"
@@ -9,10 +11,12 @@
 #include "frame/frame.h"
 
 enum { OFFSETS = 5, WIDTH = 20, HEIGHT = 14, RAYS = WIDTH * HEIGHT, CLASS_COUNT = 6, RADIUS = 5 };
-static const char *const class_names[CLASS_COUNT] = {"feature", "offset", "scale", "opacity mlp", "shape mlp", "colour mlp"};
+static const char *const class_names[CLASS_COUNT] = {"feature",     "offset",    "scale",
+                                                     "opacity mlp", "shape mlp", "colour mlp"};
 static const double dssim_weight = 0.2, volume_weight = 0.01;
 
-/* One small view. The visible anchors, the rays and the Gaussians that count are those of the float32 frame; all else is in double. */
+/* One small view. The visible anchors, the rays and the Gaussians that count are those of the float32 frame;
+   all else is in double. */
 typedef struct view {
     anchors a;
     decoder d;
@@ -22,8 +26,8 @@ typedef struct view {
     frame f;
     decode_ref p;
     double center[3];
-    double *slots;      /* [visible * K][14] */
-    reference_scene g;  /* the slots that became Gaussians */
+    double *slots;              /* [visible * K][14] */
+    reference_scene g;          /* the slots that became Gaussians */
     footprint_gaussian *narrow; /* [g.count], before they are widened */
     double rgb[3 * RAYS];
 } view;
@@ -37,15 +41,22 @@ static void make_view(view *v, uint64_t seed, bool has_distance)
     for (size_t i = 0; i < count; i++)
         for (size_t k = 0; k < 6; k++)
             v->a.scale_log[6 * i + k] = spread(seed, 200 + k, i, -1.5f, -0.2f);
-    v->a.scale_log[6 * (seed % count) + 3 + seed % 3] = -14; /* a sheet or needle that the least ratio of scales holds */
+    v->a.scale_log[6 * (seed % count) + 3 + seed % 3] =
+        -14; /* a sheet or needle that the least ratio of scales holds */
     decoder_part parts[3];
     decoder_parts(&v->d, parts);
     for (size_t i = 0; i < OFFSETS; i++) /* biases of the opacities: most Gaussians are there */
         v->d.params[parts[0].end - 1 - i] = 0.7f;
     v->s = trace_settings_default();
-    v->s.background[0] = 0.2f, v->s.background[1] = 0.4f, v->s.background[2] = 0.3f;
-    v->camera = (gbt_camera){.model = GBT_CAMERA_PINHOLE, .width = WIDTH, .height = HEIGHT, .params = {16, 16, 0.5 * WIDTH, 0.5 * HEIGHT},
-                             .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0.25, -0.125, -5}};
+    v->s.background[0] = 0.2f;
+    v->s.background[1] = 0.4f;
+    v->s.background[2] = 0.3f;
+    v->camera = (gbt_camera){.model = GBT_CAMERA_PINHOLE,
+                             .width = WIDTH,
+                             .height = HEIGHT,
+                             .params = {16, 16, 0.5 * WIDTH, 0.5 * HEIGHT},
+                             .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                             .center = {0.25, -0.125, -5}};
     for (int k = 0; k < 3; k++)
         v->center[k] = v->camera.center[k]; /* exact in float */
     assert_ok(image_alloc(&v->photo, WIDTH, HEIGHT, 3, NULL));
@@ -72,7 +83,7 @@ static void view_free(view *v)
     reference_scene_free(&v->g);
 }
 
-/* ---- the loss in double -------------------------------------------------------------------------------------------------------------- */
+/* ---- the loss in double ---- */
 
 static double tap(int dx, int dy)
 {
@@ -82,7 +93,8 @@ static double tap(int dx, int dy)
     return exp(-(dx * dx + dy * dy) / (2 * 1.5 * 1.5)) / (sum * sum);
 }
 
-/* (1 - w) mean|x - y| + w (1 - mean SSIM); its gradient into d_x unless that is NULL: one window at a time, spread over its 121 pixels. */
+/* (1 - w) mean|x - y| + w (1 - mean SSIM); its gradient into d_x unless that is NULL: one window at a time,
+   spread over its 121 pixels. */
 static double image_term(const double *x, const float *y, double *d_x)
 {
     const double c1 = 1e-4, c2 = 9e-4, values = 3.0 * RAYS;
@@ -102,8 +114,8 @@ static double image_term(const double *x, const float *y, double *d_x)
                 double a = 0, b = 0, aa = 0, bb = 0, ab = 0;
                 for (int pass = 0; pass < 2; pass++) {
                     const double va = aa - a * a, vb = bb - b * b, cov = ab - a * b;
-                    const double n1 = 2 * a * b + c1, n2 = 2 * cov + c2, d1 = a * a + b * b + c1, d2 = va + vb + c2,
-                        ssim = n1 * n2 / (d1 * d2);
+                    const double n1 = 2 * a * b + c1, n2 = 2 * cov + c2, d1 = a * a + b * b + c1,
+                                 d2 = va + vb + c2, ssim = n1 * n2 / (d1 * d2);
                     if (pass == 1) {
                         loss += dssim_weight * (1 - ssim) / values;
                         if (d_x == NULL)
@@ -116,11 +128,16 @@ static double image_term(const double *x, const float *y, double *d_x)
                             const size_t at = (size_t)(3 * ((row + dy) * WIDTH + column + dx) + c);
                             const double t = taps[dy + RADIUS][dx + RADIUS], p = x[at], q = (double)y[at];
                             if (pass == 0) {
-                                a += t * p, b += t * q, aa += t * p * p, bb += t * q * q, ab += t * p * q;
+                                a += t * p;
+                                b += t * q;
+                                aa += t * p * p;
+                                bb += t * q * q;
+                                ab += t * p * q;
                                 continue;
                             }
                             /* d(ssim)/dp by d(mean) = t, d(var) = 2 t (p - a), d(cov) = t (q - b) */
-                            const double d_ssim = t * ssim * (2 * b / n1 + 2 * (q - b) / n2 - 2 * a / d1 - 2 * (p - a) / d2);
+                            const double d_ssim =
+                                t * ssim * (2 * b / n1 + 2 * (q - b) / n2 - 2 * a / d1 - 2 * (p - a) / d2);
                             d_x[at] -= dssim_weight / values * d_ssim;
                         }
                 }
@@ -153,7 +170,8 @@ static void gradient_of(view *v, decode_ref *out)
     image_term(v->rgb, v->photo.pixels, d_rgb);
     const size_t n = v->g.count;
     double *d = mem_calloc(n, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL);
-    double *d_slots = mem_calloc(v->f.visible_count * OFFSETS, DECODE_REF_FIELDS * sizeof *d_slots, "test", NULL);
+    double *d_slots =
+        mem_calloc(v->f.visible_count * OFFSETS, DECODE_REF_FIELDS * sizeof *d_slots, "test", NULL);
     assert_ok(reference_scene_backward(&v->g, &v->s, &v->f.rays, d_rgb, NULL, d, d_background, NULL));
     for (size_t i = 0; i < n; i++) {
         double *to = d_slots + v->f.tape.slot[i] * (size_t)DECODE_REF_FIELDS;
@@ -180,16 +198,25 @@ static size_t class_of(const decoder *d, decode_ref *r, int class, double **out)
     decoder_part parts[3];
     decoder_parts(d, parts);
     switch (class) {
-    case 0: *out = r->feature; return r->count * ANCHOR_FEATURE_DIM;
-    case 1: *out = r->offset; return r->count * OFFSETS * 3;
-    case 2: *out = r->scale_log; return r->count * 6;
-    default: *out = r->params + parts[class - 3].begin; return parts[class - 3].end - parts[class - 3].begin;
+    case 0:
+        *out = r->feature;
+        return r->count * ANCHOR_FEATURE_DIM;
+    case 1:
+        *out = r->offset;
+        return r->count * OFFSETS * 3;
+    case 2:
+        *out = r->scale_log;
+        return r->count * 6;
+    default:
+        *out = r->params + parts[class - 3].begin;
+        return parts[class - 3].end - parts[class - 3].begin;
     }
 }
 
-/* ---- tests --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- tests ---- */
 
-/* Single parameters, those with the largest gradient and random ones; the difference of two steps tells where a cut was crossed. */
+/* Single parameters, those with the largest gradient and random ones; the difference of two steps tells where
+   a cut was crossed. */
 static void gradient_in_double_agrees_with_differences(void **state)
 {
     (void)state;
@@ -201,16 +228,17 @@ static void gradient_in_double_agrees_with_differences(void **state)
         make_view(&v, seed, seed % 2 == 0);
         decode_ref gradient;
         gradient_of(&v, &gradient);
-        for (int class = 0; class < CLASS_COUNT; class++) {
+        for (int class = 0; class < CLASS_COUNT; class ++) {
             double *value, *got, square = 0, wanted_square = 0, largest = 0;
             const size_t count = class_of(&v.d, &v.p, class, &value);
             class_of(&v.d, &gradient, class, &got);
             for (size_t i = 0; i < count; i++)
                 largest = fmax(largest, fabs(got[i]));
             for (uint64_t k = 0, drawn = 0; k < PARAMETERS && drawn < 5000; drawn++) {
-                const size_t i = (size_t)(rng_uniform(seed, 400 + (uint64_t)class, drawn) * (float)count) % count;
-                if (fabs(got[i]) < 0.05 * largest) /* elsewhere a difference is rounding; the whole gradient is compared along directions
-                                                      below */
+                const size_t i =
+                    (size_t)(rng_uniform(seed, 400 + (uint64_t) class, drawn) * (float)count) % count;
+                if (fabs(got[i]) < 0.05 * largest) /* elsewhere a difference is rounding; the whole gradient
+                                                      is compared along directions below */
                     continue;
                 k++;
                 const double keep = value[i], h = 1e-5;
@@ -227,8 +255,10 @@ static void gradient_in_double_agrees_with_differences(void **state)
                     crossed++;
                     continue;
                 }
-                const double wanted = (4 * difference[1] - difference[0]) / 3; /* without the error of second order */
-                square += (got[i] - wanted) * (got[i] - wanted), wanted_square += wanted * wanted;
+                const double wanted =
+                    (4 * difference[1] - difference[0]) / 3; /* without the error of second order */
+                square += (got[i] - wanted) * (got[i] - wanted);
+                wanted_square += wanted * wanted;
                 tested[class]++;
             }
             const double error = sqrt(square / wanted_square);
@@ -239,15 +269,16 @@ static void gradient_in_double_agrees_with_differences(void **state)
         decode_ref_free(&gradient);
         view_free(&v);
     }
-    for (int class = 0; class < CLASS_COUNT; class++) {
-        print_message("%-12s worst relative L2 error %.1e in %zu parameters\n", class_names[class], worst[class], tested[class]);
+    for (int class = 0; class < CLASS_COUNT; class ++) {
+        print_message("%-12s worst relative L2 error %.1e in %zu parameters\n", class_names[class],
+                      worst[class], tested[class]);
         assert_true(tested[class] >= SEEDS * PARAMETERS / 2);
     }
     print_message("%zu differences crossed a cut\n", crossed);
 }
 
-/* Along normally distributed directions of a whole class, so that parameters with small gradients count too: E[(d . (g - g'))^2] = |g -
-   g'|^2. */
+/* Along normally distributed directions of a whole class, so that parameters with small gradients count too:
+   E[(d . (g - g'))^2] = |g - g'|^2. */
 static void no_parameter_is_forgotten(void **state)
 {
     (void)state;
@@ -256,11 +287,12 @@ static void no_parameter_is_forgotten(void **state)
     make_view(&v, 3, true);
     decode_ref gradient;
     gradient_of(&v, &gradient);
-    for (int class = 0; class < CLASS_COUNT; class++) {
+    for (int class = 0; class < CLASS_COUNT; class ++) {
         double *value, *got, square = 0, norm = 0;
         const size_t count = class_of(&v.d, &v.p, class, &value);
         class_of(&v.d, &gradient, class, &got);
-        double *direction = mem_alloc(count, sizeof *direction, "test", NULL), *keep = mem_alloc(count, sizeof *keep, "test", NULL);
+        double *direction = mem_alloc(count, sizeof *direction, "test", NULL),
+               *keep = mem_alloc(count, sizeof *keep, "test", NULL);
         memcpy(keep, value, count * sizeof *keep);
         for (size_t i = 0; i < count; i++)
             norm += got[i] * got[i];
@@ -268,15 +300,18 @@ static void no_parameter_is_forgotten(void **state)
         for (uint64_t attempt = 0; measured < DIRECTIONS && attempt < 60; attempt++) {
             double along = 0, side[3];
             const double h = 1e-6;
-            for (size_t i = 0; i < count; i++)
-                direction[i] = rng_normal(500 + (uint64_t)class, attempt, i), along += direction[i] * got[i];
+            for (size_t i = 0; i < count; i++) {
+                direction[i] = rng_normal(500 + (uint64_t) class, attempt, i);
+                along += direction[i] * got[i];
+            }
             for (int k = 0; k < 3; k++) {
                 for (size_t i = 0; i < count; i++)
                     value[i] = keep[i] + (k - 1) * h * direction[i];
                 side[k] = loss_of(&v);
             }
             memcpy(value, keep, count * sizeof *keep);
-            if (fabs(side[2] + side[0] - 2 * side[1]) > 1e-4 * h * sqrt(norm)) /* a jump or a kink: smooth ones are of order h^2 */
+            if (fabs(side[2] + side[0] - 2 * side[1]) > 1e-4 * h * sqrt(norm)) /* a jump or a kink: smooth
+                                                                                  ones are of order h^2 */
                 continue;
             square += pow(along - (side[2] - side[0]) / (2 * h), 2);
             measured++;
@@ -313,16 +348,20 @@ static void float_chain_agrees_with_double(void **state)
         anchors d_anchors = {.offset_count = OFFSETS};
         assert_ok(anchors_resize(&d_anchors, v.a.count, NULL));
         float *d_params = mem_calloc(v.d.param_count, sizeof *d_params, "test", NULL);
-        assert_ok(frame_backward(&v.f, &v.a, &v.d, &d_image, (float)volume_weight, &d_anchors, d_params, NULL));
-        for (int class = 0; class < CLASS_COUNT; class++) {
+        assert_ok(
+            frame_backward(&v.f, &v.a, &v.d, &d_image, (float)volume_weight, &d_anchors, d_params, NULL));
+        for (int class = 0; class < CLASS_COUNT; class ++) {
             decoder_part parts[3];
             decoder_parts(&v.d, parts);
-            const float *got[CLASS_COUNT] = {d_anchors.feature, d_anchors.offset, d_anchors.scale_log, d_params + parts[0].begin,
+            const float *got[CLASS_COUNT] = {d_anchors.feature,         d_anchors.offset,
+                                             d_anchors.scale_log,       d_params + parts[0].begin,
                                              d_params + parts[1].begin, d_params + parts[2].begin};
             double *w, square = 0, norm = 0;
             const size_t count = class_of(&v.d, &wanted, class, &w);
-            for (size_t i = 0; i < count; i++)
-                square += pow((double)got[class][i] - w[i], 2), norm += w[i] * w[i];
+            for (size_t i = 0; i < count; i++) {
+                square += pow((double)got[class][i] - w[i], 2);
+                norm += w[i] * w[i];
+            }
             const double error = sqrt(square / norm);
             worst[class] = fmax(worst[class], error);
             if (!(error <= 1e-5))
@@ -336,7 +375,7 @@ static void float_chain_agrees_with_double(void **state)
         view_free(&v);
     }
     print_message("image within %.1e, loss within %.1e\n", worst_image, worst_loss);
-    for (int class = 0; class < CLASS_COUNT; class++)
+    for (int class = 0; class < CLASS_COUNT; class ++)
         print_message("%-12s worst relative L2 error %.1e\n", class_names[class], worst[class]);
     assert_true(worst_image <= 2e-6 && worst_loss <= 1e-7);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/train/test_event_records.c -- TensorBoard records to the byte; what is kept of a damaged file. */
 #include "base/memory.h"
 #include "test_support.h"
@@ -22,8 +23,8 @@ static void frame_is_known(void **state)
     (void)state;
     event_records r = {0};
     event_add_version(&r);
-    /* Length 26: a double behind its key, step 0, the text of 13 bytes. CRC-32C of the eight bytes, rotated and masked, from the
-       definition. */
+    /* Length 26: a double behind its key, step 0, the text of 13 bytes. CRC-32C of the eight bytes, rotated
+       and masked, from the definition. */
     const unsigned char length[8] = {26};
     uint32_t crc = UINT32_MAX;
     for (int i = 0; i < 8; i++) {
@@ -37,7 +38,10 @@ static void frame_is_known(void **state)
     assert_memory_equal(r.bytes, length, 8);
     assert_memory_equal(r.bytes + 8, &crc, 4);
     assert_int_equal(r.bytes[12], 0x09); /* field 1, 64 bit */
-    assert_memory_equal(r.bytes + 21, "\x10\x00\x1a\x0d" "brain.Event:2", 17);
+    assert_memory_equal(r.bytes + 21,
+                        "\x10\x00\x1a\x0d"
+                        "brain.Event:2",
+                        17);
     event_records_free(&r);
     assert_null(r.bytes);
 }
@@ -47,10 +51,11 @@ static void scalars_are_protobuf(void **state)
     (void)state;
     event_records r = {0};
     event_add_scalars(&r, 300, (event_scalar[]){{"a/b", 1.5}, {"c", -2}}, 2);
-    static const unsigned char wanted[] = {0x10, 0xac, 0x02,                                                        /* step 300 */
-                                           0x2a, 22,                                                                /* summary */
-                                           0x0a, 10, 0x0a, 3, 'a', '/', 'b', 0x15, 0x00, 0x00, 0xc0, 0x3f,          /* value: tag, float */
-                                           0x0a, 8, 0x0a, 1, 'c', 0x15, 0x00, 0x00, 0x00, 0xc0};
+    static const unsigned char wanted[] = {0x10, 0xac, 0x02, /* step 300 */
+                                           0x2a, 22,         /* summary */
+                                           0x0a, 10,   0x0a, 3, 'a', '/',  'b',  0x15, 0x00, 0x00,
+                                           0xc0, 0x3f, /* value: tag, float */
+                                           0x0a, 8,    0x0a, 1, 'c', 0x15, 0x00, 0x00, 0x00, 0xc0};
     assert_int_equal(r.count, 8 + 4 + 9 + sizeof wanted + 4);
     assert_memory_equal(r.bytes + 21, wanted, sizeof wanted);
     event_records_free(&r);
@@ -59,10 +64,10 @@ static void scalars_are_protobuf(void **state)
 static void pictures_are_protobuf(void **state)
 {
     (void)state;
-    static const unsigned char png[30] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R', 0, 0, 1, 0, 0, 0, 0,
-                                          7};
-    static const unsigned char wanted[] = {0x10, 5, 0x2a, 46, 0x0a, 44, 0x0a, 1, 'x', 0x22, 39, 0x08, 7, 0x10, 0x80, 0x02, 0x18, 3, 0x22,
-                                           30, 0x89, 'P', 'N', 'G'};
+    static const unsigned char png[30] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13,
+                                          'I',  'H', 'D', 'R', 0,    0,    1,    0,    0, 0, 0, 7};
+    static const unsigned char wanted[] = {0x10, 5,    0x2a, 46,   0x0a, 44, 0x0a, 1,  'x',  0x22, 39,  0x08,
+                                           7,    0x10, 0x80, 0x02, 0x18, 3,  0x22, 30, 0x89, 'P',  'N', 'G'};
     event_records r = {0};
     event_add_png(&r, 5, "x", png, 23);
     assert_int_equal(r.count, 0); /* too short for a size */
@@ -122,8 +127,11 @@ static void without_memory_nothing_is_half(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(frame_is_known),       cmocka_unit_test(scalars_are_protobuf),           cmocka_unit_test(pictures_are_protobuf),
-        cmocka_unit_test(damaged_ends_are_cut), cmocka_unit_test(without_memory_nothing_is_half),
+        cmocka_unit_test(frame_is_known),
+        cmocka_unit_test(scalars_are_protobuf),
+        cmocka_unit_test(pictures_are_protobuf),
+        cmocka_unit_test(damaged_ends_are_cut),
+        cmocka_unit_test(without_memory_nothing_is_half),
     };
     return cmocka_run_group_tests_name("event records", tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
-/* tests/train/test_masks.c -- what a mask or an alpha channel leaves out has no say in training and in scores; what is transparent is the
-   background. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/train/test_masks.c -- what a mask or an alpha channel leaves out has no say in training and in
+   scores; what is transparent is the background. */
 #include "run_support.h"
 
 #include <jansson.h>
@@ -38,7 +39,8 @@ static void scramble(image *photo, size_t view)
     for (int y = 0; y < photo->height; y++)
         for (int x = 0; x < photo->width; x++)
             for (int c = 0; c < 3 && is_masked(x, y, view); c++)
-                photo->pixels[photo->channels * (y * photo->width + x) + c] = (x + y + c) % 2 == 0 ? scrambled : 0;
+                photo->pixels[photo->channels * (y * photo->width + x) + c] =
+                    (x + y + c) % 2 == 0 ? scrambled : 0;
 }
 
 static void write_mask(const char *folder, const char *name, int width, int height, size_t view)
@@ -91,7 +93,8 @@ static json_t *scores_of(const char *run)
     return metrics;
 }
 
-/* Whatever stands under the masks, the model is the same to the bit, and so are its scores, with and without exposures. */
+/* Whatever stands under the masks, the model is the same to the bit, and so are its scores, with and without
+   exposures. */
 static void masked_pixels_have_no_say(void **state)
 {
     (void)state;
@@ -111,10 +114,11 @@ static void masked_pixels_have_no_say(void **state)
         static const char *const names[] = {"psnr", "ssim", "flip"};
         for (int k = 0; k < 3; k++) {
             const double a = json_real_value(json_object_get(metrics[0], names[k])),
-                b = json_real_value(json_object_get(metrics[1], names[k]));
+                         b = json_real_value(json_object_get(metrics[1], names[k]));
             assert_true(a > 0 && a == b);
         }
-        assert_non_null(strstr(json_string_value(json_object_get(metrics[0], "scored")), "without masked pixels"));
+        assert_non_null(
+            strstr(json_string_value(json_object_get(metrics[0], "scored")), "without masked pixels"));
         json_decref(metrics[0]);
         json_decref(metrics[1]);
     }
@@ -145,7 +149,7 @@ static void a_black_mask_leaves_nothing(void **state)
     json_decref(metrics);
 }
 
-/* ---- alpha --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- alpha ---- */
 
 /* An alpha channel with the shape of the masks; beneath it the colour stays. */
 static void cut_out(image *photo, size_t view)
@@ -166,25 +170,31 @@ static void alpha_is_what_it_is_said_to_be(void **state)
     const char *folder = in_root("alpha");
     make_tiny_scene(folder);
     change_photos(folder, cut_out);
-    static const struct { const char *alpha; float background; bool masked; } cases[] = {
-        {"auto", 0, false}, {"black", 0, false}, {"white", 1, false}, {"mask", -1, true}};
+    static const struct {
+        const char *alpha;
+        float background;
+        bool masked;
+    } cases[] = {{"auto", 0, false}, {"black", 0, false}, {"white", 1, false}, {"mask", -1, true}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         gbt_train_def def = run_def();
         def.alpha = cases[i].alpha;
         const char *run = in_root("alpha_%s", cases[i].alpha);
         train_ok(folder, run, &def);
         json_t *metrics = scores_of(run);
-        assert_int_equal(strstr(json_string_value(json_object_get(metrics, "scored")), "masked") != NULL, cases[i].masked);
+        assert_int_equal(strstr(json_string_value(json_object_get(metrics, "scored")), "masked") != NULL,
+                         cases[i].masked);
         json_decref(metrics);
         model m;
         assert_ok(model_load(in_root("alpha_%s/model.gbt", cases[i].alpha), &m, NULL));
         for (int c = 0; c < 3; c++)
-            assert_true(cases[i].background < 0 ? m.background[c] > 0 && m.background[c] < 1 : m.background[c] == cases[i].background);
+            assert_true(cases[i].background < 0 ? m.background[c] > 0 && m.background[c] < 1
+                                                : m.background[c] == cases[i].background);
         model_free(&m);
     }
     gbt_train_def def = run_def();
     def.alpha = "green";
-    train_fails(folder, in_root("alpha_green"), &def, GBT_ERR_ARGUMENT, "--alpha: \"green\" (wanted auto, black, white or mask)");
+    train_fails(folder, in_root("alpha_green"), &def, GBT_ERR_ARGUMENT,
+                "--alpha: \"green\" (wanted auto, black, white or mask)");
 }
 
 int main(void)

@@ -1,4 +1,6 @@
-/* tests/train/test_resume.c -- going on: a finished run to another length, the run's own data, what is refused. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/train/test_resume.c -- going on: a finished run to another length, the run's own data, what is
+   refused. */
 #include "run_support.h"
 
 #include <jansson.h>
@@ -69,13 +71,15 @@ static void a_finished_run_goes_on(void **state)
     model_free(&m);
 }
 
-/* At the first step all lengths are alike: a run that was to be three times as long is from there on the straight one. */
+/* At the first step all lengths are alike: a run that was to be three times as long is from there on the
+   straight one. */
 static void the_new_length_decides(void **state)
 {
     (void)state;
     gbt_train_def def = run_def();
     train_ok(tiny, in_root("straight"), &def);
-    def.iterations = 3 * STEPS, def.stop_at_step = 1;
+    def.iterations = 3 * STEPS;
+    def.stop_at_step = 1;
     train_fails(tiny, in_root("stretched"), &def, GBT_ERR_INTERRUPTED, "after step 1");
     const gbt_train_def on = resume_def(STEPS, 0);
     train_ok(tiny, in_root("stretched"), &on);
@@ -97,7 +101,8 @@ static void a_run_goes_on_for_a_time(void **state)
         train_fails(tiny, run, &shorter, GBT_ERR_ARGUMENT, "seconds of training were asked for");
     }
     assert_true(number_of(run, "iterations") > STEPS);
-    const gbt_train_def steps = resume_def((uint64_t)number_of(run, "iterations") + 5, 0); /* and back to a number of steps */
+    const gbt_train_def steps =
+        resume_def((uint64_t)number_of(run, "iterations") + 5, 0); /* and back to a number of steps */
     train_ok(tiny, run, &steps);
     assert_true(number_of(run, "iterations") == (double)steps.iterations);
 }
@@ -108,14 +113,19 @@ static void a_length_that_has_passed_is_refused(void **state)
     const char *run = in_root("passed");
     const gbt_train_def def = run_def(), shorter = resume_def(STEPS - 1, 0);
     train_ok(tiny, run, &def);
-    bytes model_bytes = read_bytes(in_root("passed/model.gbt")), config = read_bytes(in_root("passed/config"));
+    bytes model_bytes = read_bytes(in_root("passed/model.gbt")),
+          config = read_bytes(in_root("passed/config"));
     train_fails(tiny, run, &shorter, GBT_ERR_ARGUMENT, "wanted more than the 60 that it has done");
-    bytes model_after = read_bytes(in_root("passed/model.gbt")), config_after = read_bytes(in_root("passed/config"));
+    bytes model_after = read_bytes(in_root("passed/model.gbt")),
+          config_after = read_bytes(in_root("passed/config"));
     assert_int_equal(model_bytes.count, model_after.count);
     assert_memory_equal(model_bytes.data, model_after.data, model_bytes.count);
     assert_int_equal(config.count, config_after.count);
     assert_memory_equal(config.data, config_after.data, config.count);
-    mem_free(model_bytes.data), mem_free(config.data), mem_free(model_after.data), mem_free(config_after.data);
+    mem_free(model_bytes.data);
+    mem_free(config.data);
+    mem_free(model_after.data);
+    mem_free(config_after.data);
 }
 
 /* What the run took to train is still told when it is resumed at its end. */
@@ -128,12 +138,16 @@ static void nothing_left_changes_nothing(void **state)
     bytes summary = read_bytes(in_root("whole/train.json")), log = read_bytes(in_root("whole/log.csv"));
     train_ok(tiny, run, &on);
     train_ok(tiny, run, &same);
-    bytes summary_after = read_bytes(in_root("whole/train.json")), log_after = read_bytes(in_root("whole/log.csv"));
+    bytes summary_after = read_bytes(in_root("whole/train.json")),
+          log_after = read_bytes(in_root("whole/log.csv"));
     assert_int_equal(summary.count, summary_after.count);
     assert_memory_equal(summary.data, summary_after.data, summary.count);
     assert_int_equal(log.count, log_after.count);
     assert_memory_equal(log.data, log_after.data, log.count);
-    mem_free(summary.data), mem_free(log.data), mem_free(summary_after.data), mem_free(log_after.data);
+    mem_free(summary.data);
+    mem_free(log.data);
+    mem_free(summary_after.data);
+    mem_free(log_after.data);
     /* A kill may come after the checkpoint and before the summary. */
     assert_int_equal(remove(in_root("whole/train.json")), 0);
     train_ok(tiny, run, &on);
@@ -165,7 +179,11 @@ static void other_data_are_refused(void **state)
     /* As many photos and points, from other places. */
     gbt_make_scene_def scene_def = gbt_make_scene_def_default();
     scene_def.name = "terrain";
-    scene_def.width = 48, scene_def.height = 36, scene_def.view_count = VIEWS, scene_def.points = 150, scene_def.samples = 1;
+    scene_def.width = 48;
+    scene_def.height = 36;
+    scene_def.view_count = VIEWS;
+    scene_def.points = 150;
+    scene_def.samples = 1;
     gbt_error err = {0};
     assert_ok(gbt_make_scene(&scene_def, in_root("elsewhere"), &err));
     train_fails(in_root("elsewhere"), in_root("first"), &on, GBT_ERR_FORMAT, "other data");
@@ -180,12 +198,9 @@ int main(void)
 {
     log_set_quiet(1);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_finished_run_goes_on),
-        cmocka_unit_test(the_new_length_decides),
-        cmocka_unit_test(a_run_goes_on_for_a_time),
-        cmocka_unit_test(a_length_that_has_passed_is_refused),
-        cmocka_unit_test(nothing_left_changes_nothing),
-        cmocka_unit_test(the_run_knows_its_data),
+        cmocka_unit_test(a_finished_run_goes_on),       cmocka_unit_test(the_new_length_decides),
+        cmocka_unit_test(a_run_goes_on_for_a_time),     cmocka_unit_test(a_length_that_has_passed_is_refused),
+        cmocka_unit_test(nothing_left_changes_nothing), cmocka_unit_test(the_run_knows_its_data),
         cmocka_unit_test(other_data_are_refused),
     };
     return cmocka_run_group_tests_name("resume", tests, make_root, remove_root);

@@ -1,5 +1,6 @@
-/* tests/train/test_robust.c -- training that cannot break: photos, learning rates and gradients that are not numbers; photos that differ in
-   exposure. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/train/test_robust.c -- training that cannot break: photos, learning rates and gradients that are not
+   numbers; photos that differ in exposure. */
 #include "run_support.h"
 
 #include <jansson.h>
@@ -24,7 +25,7 @@ static const char *joined(const char *folder, const char *name)
     return path;
 }
 
-/* ---- scenes ------------------------------------------------------------------------------------------------------------------- */
+/* ---- scenes ---- */
 
 static void copy_file(const char *from, const char *to)
 {
@@ -33,7 +34,8 @@ static void copy_file(const char *from, const char *to)
     mem_free(b.data);
 }
 
-/* A data set like `from`, whose photos `change` has gone over. They become EXR files under their old names: magic decides. */
+/* A data set like `from`, whose photos `change` has gone over. They become EXR files under their old names:
+   magic decides. */
 static void copy_scene(const char *from, const char *folder, void (*change)(image *photo, size_t view))
 {
     scene s;
@@ -41,7 +43,8 @@ static void copy_scene(const char *from, const char *folder, void (*change)(imag
     assert_ok(scene_load(from, &split, &s, NULL));
     assert_ok(file_make_folder(joined(folder, "images"), NULL));
     assert_ok(file_make_folder(joined(folder, "sparse/0"), NULL));
-    static const char *const models[] = {"sparse/0/cameras.bin", "sparse/0/images.bin", "sparse/0/points3D.bin"};
+    static const char *const models[] = {"sparse/0/cameras.bin", "sparse/0/images.bin",
+                                         "sparse/0/points3D.bin"};
     for (int i = 0; i < 3; i++)
         copy_file(joined(from, models[i]), joined(folder, models[i]));
     for (size_t i = 0; i < s.view_count; i++) {
@@ -78,7 +81,7 @@ static const char *poisoned_scene(void)
     return in_root("poisoned");
 }
 
-/* ---- nothing that is not a number in any file ----------------------------------------------------------------------------------- */
+/* ---- nothing that is not a number in any file ---- */
 
 static void assert_no_nan_in_text(const char *path)
 {
@@ -99,7 +102,8 @@ static void assert_no_nan_in_container(const char *path)
     size_t floats = 0;
     for (size_t s = 0; s < c.count; s++) {
         const container_section *section = &c.sections[s];
-        for (size_t i = 0; section->dtype == CONTAINER_F32 && i < section->byte_count / sizeof(float); i++, floats++)
+        for (size_t i = 0; section->dtype == CONTAINER_F32 && i < section->byte_count / sizeof(float);
+             i++, floats++)
             if (!isfinite(((const float *)section->data)[i]) && strcmp(section->name, "decoder.numbers") != 0)
                 fail_msg("%s: %s[%zu] is not finite", path, section->name, i);
     }
@@ -110,7 +114,9 @@ static void assert_no_nan_in_container(const char *path)
 static void assert_no_nan_in_renders(const char *run, const char *data)
 {
     gbt_render_def def = gbt_render_def_default();
-    def.data = data, def.split = GBT_SPLIT_ALL, def.format = "exr";
+    def.data = data;
+    def.split = GBT_SPLIT_ALL;
+    def.format = "exr";
     assert_ok(gbt_render(run, joined(run, "exr"), &def, NULL));
     scene s;
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
@@ -154,14 +160,22 @@ static int64_t skipped_in(const char *run)
 static void wild_rates_and_photos_leave_no_nan(void **state)
 {
     (void)state;
-    static const struct { const char *name; double factor; bool exposure, compat; const char *distance; uint64_t steps; } runs[] = {
-        {"rates 1", 1, false, false, "auto", 200},   {"rates 100", 100, false, false, "on", 1000},
-        {"rates 1000", 1000, true, false, "on", 200}, {"compat 100", 100, false, true, "off", 200},
+    static const struct {
+        const char *name;
+        double factor;
+        bool exposure, compat;
+        const char *distance;
+        uint64_t steps;
+    } runs[] = {
+        {"rates 1", 1, false, false, "auto", 200},
+        {"rates 100", 100, false, false, "on", 1000},
+        {"rates 1000", 1000, true, false, "on", 200},
+        {"compat 100", 100, false, true, "off", 200},
     };
     for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
         gbt_train_def def = run_def();
-        def.iterations = runs[i].steps, def.learning_rate_factor = runs[i].factor, def.exposure = runs[i].exposure,
-            def.compat = runs[i].compat;
+        def.iterations = runs[i].steps, def.learning_rate_factor = runs[i].factor,
+        def.exposure = runs[i].exposure, def.compat = runs[i].compat;
         def.distance = runs[i].distance;
         const char *run = in_root("%s", runs[i].name);
         train_ok(poisoned_scene(), run, &def);
@@ -170,7 +184,7 @@ static void wild_rates_and_photos_leave_no_nan(void **state)
     }
 }
 
-/* ---- a pixel that is not a number counts in no loss ----------------------------------------------------------------------------- */
+/* ---- a pixel that is not a number counts in no loss ---- */
 
 static void pixels_that_are_not_numbers_are_marked(void **state)
 {
@@ -192,7 +206,8 @@ static void pixels_that_are_not_numbers_are_marked(void **state)
             assert_non_null(valid);
             for (int y = 0; y < photo.height; y++)
                 for (int x = 0; x < photo.width; x++) /* 48 x 36 halves evenly */
-                    assert_int_equal(valid[y * photo.width + x], x != POISONED_X >> level || y != POISONED_Y >> level);
+                    assert_int_equal(valid[y * photo.width + x],
+                                     x != POISONED_X >> level || y != POISONED_Y >> level);
         }
     for (int phase = 0; phase < 4; phase++) { /* picked pixels carry their own marks */
         const photo_sample sample = {.level = 1, .phase = {phase % 2, phase / 2}};
@@ -203,7 +218,7 @@ static void pixels_that_are_not_numbers_are_marked(void **state)
         for (int y = 0; y < photo.height; y++)
             for (int x = 0; x < photo.width; x++)
                 assert_int_equal(valid[y * photo.width + x], 2 * x + sample.phase[0] != POISONED_X ||
-                                 2 * y + sample.phase[1] != POISONED_Y);
+                                                                 2 * y + sample.phase[1] != POISONED_Y);
     }
     assert_ok(photos_get(&p, POISONED_VIEW, 1, &photo, NULL)); /* back to a level that was dropped */
     assert_non_null(photos_valid(&p, POISONED_VIEW));
@@ -225,16 +240,18 @@ static void a_bad_pixel_has_no_say(void **state)
     assert_ok(model_load(in_root("nan/model.gbt"), &a, NULL));
     assert_ok(model_load(in_root("inf/model.gbt"), &b, NULL));
     assert_int_equal(a.anchors.count, b.anchors.count);
-    assert_memory_equal(a.anchors.feature, b.anchors.feature, a.anchors.count * ANCHOR_FEATURE_DIM * sizeof(float));
+    assert_memory_equal(a.anchors.feature, b.anchors.feature,
+                        a.anchors.count * ANCHOR_FEATURE_DIM * sizeof(float));
     assert_memory_equal(a.decoder.params, b.decoder.params, a.decoder.param_count * sizeof(float));
     assert_int_equal(a.iterations, STEPS);
-    model_free(&a), model_free(&b);
+    model_free(&a);
+    model_free(&b);
     const gbt_evaluate_def score = gbt_evaluate_def_default();
     assert_ok(gbt_evaluate(in_root("nan"), &score, NULL));
     assert_int_equal(skipped_in(in_root("nan")), 0);
 }
 
-/* ---- steps that teach nothing ----------------------------------------------------------------------------------------------------- */
+/* ---- steps that teach nothing ---- */
 
 typedef struct learned {
     float *values;
@@ -276,7 +293,8 @@ static void assert_unchanged(const trainer *t, learned before)
     learned now = snapshot(t);
     assert_int_equal(now.count, before.count);
     assert_memory_equal(now.values, before.values, now.count * sizeof(float));
-    free(now.values), free(before.values);
+    free(now.values);
+    free(before.values);
 }
 
 static void assert_no_gradient_left(const trainer *t)
@@ -290,7 +308,8 @@ static void assert_no_gradient_left(const trainer *t)
         assert_true(t->d_params[i] == 0);
 }
 
-/* A background that is not a number makes the loss one; an exposure of 1e30 makes gradients too large for Adam. */
+/* A background that is not a number makes the loss one; an exposure of 1e30 makes gradients too large for
+   Adam. */
 static void a_bad_step_changes_nothing(void **state)
 {
     (void)state;
@@ -328,7 +347,10 @@ static void a_bad_step_changes_nothing(void **state)
 static void ten_bad_steps_end_the_run(void **state)
 {
     (void)state;
-    static const struct { bool exposure; const char *says; } cases[] = {{false, "the loss is not finite (photo 00"}, {true, "of anchor"}};
+    static const struct {
+        bool exposure;
+        const char *says;
+    } cases[] = {{false, "the loss is not finite (photo 00"}, {true, "of anchor"}};
     for (int kind = 0; kind <= 1; kind++) {
         gbt_train_def def = run_def();
         def.exposure = cases[kind].exposure;
@@ -344,7 +366,8 @@ static void ten_bad_steps_end_the_run(void **state)
             step_ok(&t, &r);
         gbt_error err = {0};
         assert_int_equal(trainer_step(&t, &r, &err), GBT_ERR_FORMAT);
-        if (strstr(err.text, "10 steps in a row") == NULL || strstr(err.text, cases[kind].says) == NULL || strchr(err.text, '\n') != NULL)
+        if (strstr(err.text, "10 steps in a row") == NULL || strstr(err.text, cases[kind].says) == NULL ||
+            strchr(err.text, '\n') != NULL)
             fail_msg("%s", err.text);
         print_message("%s\n", err.text);
         trainer_free(&t);
@@ -367,7 +390,12 @@ static void a_bad_gradient_is_named(void **state)
     const size_t anchor = t.frame.visible[t.frame.visible_count - 1], k = (size_t)t.gradient.offset_count;
     decoder_part parts[3];
     decoder_parts(&t.decoder, parts);
-    const struct { float *place; const char *name; size_t value; bool of_anchor; } places[] = {
+    const struct {
+        float *place;
+        const char *name;
+        size_t value;
+        bool of_anchor;
+    } places[] = {
         {t.gradient.feature + anchor * 32 + 31, "feature", 31, true},
         {t.gradient.offset + anchor * 3 * k, "offset", 0, true},
         {t.gradient.scale_log + anchor * 6 + 5, "scale", 5, true},
@@ -382,7 +410,8 @@ static void a_bad_gradient_is_named(void **state)
             *places[i].place = values[v];
             assert_true(gradient_is_bad(&t, exposure, where, sizeof where));
             if (places[i].of_anchor)
-                snprintf(wanted, sizeof wanted, "%s of anchor %zu, value %zu", places[i].name, anchor, places[i].value);
+                snprintf(wanted, sizeof wanted, "%s of anchor %zu, value %zu", places[i].name, anchor,
+                         places[i].value);
             else
                 snprintf(wanted, sizeof wanted, "%s, value %zu", places[i].name, places[i].value);
             assert_string_equal(where, wanted);
@@ -415,11 +444,12 @@ static void scales_stay_in_their_range(void **state)
         held += t.anchors.scale_log[i] <= t.scale_log_min || t.anchors.scale_log[i] >= t.scale_log_max;
     }
     assert_true(held > 0);
-    assert_true(exp((double)t.scale_log_max) > 50 * t.extent && exp((double)t.scale_log_min) < 1e-5 * t.extent);
+    assert_true(exp((double)t.scale_log_max) > 50 * t.extent &&
+                exp((double)t.scale_log_min) < 1e-5 * t.extent);
     trainer_free(&t);
 }
 
-/* ---- what stands before a camera ---------------------------------------------------------------------------------------------------- */
+/* ---- what stands before a camera ---- */
 
 /* Where a photo was taken there is room; the held-out ones say nothing, nor do points that no track names. */
 static void nothing_is_nearer_than_photos_show(void **state)
@@ -441,7 +471,8 @@ static void nothing_is_nearer_than_photos_show(void **state)
     for (int i = 1; i <= 2; i++) {
         def.near = 0.5 * i;
         open_ok(&t, tiny, &def);
-        assert_true(t.settings.t_near == fmaxf(least, (float)(def.near * nearest)) && t.settings.t_near > least);
+        assert_true(t.settings.t_near == fmaxf(least, (float)(def.near * nearest)) &&
+                    t.settings.t_near > least);
         trainer_free(&t);
     }
     def.compat = true;
@@ -450,7 +481,7 @@ static void nothing_is_nearer_than_photos_show(void **state)
     trainer_free(&t);
 }
 
-/* ---- a scene that has lost all its Gaussians ---------------------------------------------------------------------------------------- */
+/* ---- a scene that has lost all its Gaussians ---- */
 
 /* Opacities far below 0 have no gradient: without help the scene would stay empty for ever. */
 static void an_empty_scene_comes_back(void **state)
@@ -458,7 +489,8 @@ static void an_empty_scene_comes_back(void **state)
     (void)state;
     for (int compat = 0; compat <= 1; compat++) {
         gbt_train_def def = run_def();
-        def.compat = compat == 1, def.grow = false;
+        def.compat = compat == 1;
+        def.grow = false;
         trainer t;
         step_report r;
         open_ok(&t, tiny, &def);
@@ -480,7 +512,8 @@ static void an_empty_scene_comes_back(void **state)
     }
 }
 
-/* An offset that begins below 0 for every anchor is raised in the first step; with --compat it stays as the reference has it. */
+/* An offset that begins below 0 for every anchor is raised in the first step; with --compat it stays as the
+   reference has it. */
 static void no_offset_is_born_dead(void **state)
 {
     (void)state;
@@ -517,10 +550,12 @@ static void opacities_are_raised(void **state)
     decoder_parts(&t.decoder, parts);
     const size_t k_count = (size_t)t.decoder.offset_count;
     float *bias = t.decoder.params + parts[0].end - k_count;
-    bias[0] = -1, bias[1] = 1.5f;
+    bias[0] = -1;
+    bias[1] = 1.5f;
     const gbt_camera camera = photos_camera(&t.photos, 0, 0);
     for (int pass = 0; pass < 2; pass++) {
-        assert_ok(frame_render(&t.frame, frame_neural(&t.anchors, &t.decoder), &camera, &t.settings, true, NULL));
+        assert_ok(
+            frame_render(&t.frame, frame_neural(&t.anchors, &t.decoder), &camera, &t.settings, true, NULL));
         if (pass == 0)
             decode_raise_opacity(&t.frame.tape, 0.1f, 0.25f, &t.decoder);
     }
@@ -533,22 +568,29 @@ static void opacities_are_raised(void **state)
     trainer_free(&t);
 }
 
-/* ---- poor points --------------------------------------------------------------------------------------------------------------------- */
+/* ---- poor points ---- */
 
 /* A copy of the tiny scene with only its first points, moved along the optical axes by `shift`. */
 static void points_that_tell_nothing_are_replaced(void **state)
 {
     (void)state;
-    static const struct { const char *name; size_t keep; double shift; bool made; const char *says; } cases[] = {
-        {"few", 60, 0, false, "60 sparse points and "}, {"unseen", 150, 1e4, true, "none that are seen"},
-        {"all", 150, 0, false, "150 sparse points"}};
+    static const struct {
+        const char *name;
+        size_t keep;
+        double shift;
+        bool made;
+        const char *says;
+    } cases[] = {{"few", 60, 0, false, "60 sparse points and "},
+                 {"unseen", 150, 1e4, true, "none that are seen"},
+                 {"all", 150, 0, false, "150 sparse points"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         scene s;
         const scene_split split = {.kind = SCENE_SPLIT_NONE};
         assert_ok(scene_load(tiny, &split, &s, NULL));
         colmap_image pictures[VIEWS];
         colmap_point points[200];
-        memset(pictures, 0, sizeof pictures), memset(points, 0, sizeof points);
+        memset(pictures, 0, sizeof pictures);
+        memset(points, 0, sizeof points);
         const char *folder = in_root("%s", cases[i].name);
         assert_ok(file_make_folder(folder, NULL));
         assert_int_equal(symlink("../tiny/images", joined(folder, "images")), 0);
@@ -557,7 +599,8 @@ static void points_that_tell_nothing_are_replaced(void **state)
         for (size_t p = 0; p < cases[i].keep; p++)
             for (size_t k = 0; k < 3; k++)
                 points[p].position[k] = (double)s.points.position[3 * p + k] + (k == 2 ? cases[i].shift : 0);
-        assert_ok(colmap_write(joined(folder, "sparse/0"), pictures, s.view_count, points, cases[i].keep, NULL));
+        assert_ok(
+            colmap_write(joined(folder, "sparse/0"), pictures, s.view_count, points, cases[i].keep, NULL));
         gbt_train_def def = run_def();
         trainer t;
         step_report r;
@@ -571,7 +614,7 @@ static void points_that_tell_nothing_are_replaced(void **state)
     }
 }
 
-/* ---- photos that differ in exposure ----------------------------------------------------------------------------------------------- */
+/* ---- photos that differ in exposure ---- */
 
 /* Half as bright, so that twice that does not clip. */
 static void expose(image *photo, size_t view)
@@ -589,10 +632,13 @@ static double score_of(const char *run, const char *data, gbt_train_def def)
     json_t *metrics = json_load_file(joined(run, "metrics.json"), 0, NULL);
     const double psnr = json_number_value(json_object_get(metrics, "psnr"));
     assert_int_equal(json_is_true(json_object_get(metrics, "exposure")), def.exposure);
-    assert_int_equal(strncmp(json_string_value(json_object_get(metrics, "scored")), def.exposure ? "right half" : "whole image", 10), 0);
+    assert_int_equal(strncmp(json_string_value(json_object_get(metrics, "scored")),
+                             def.exposure ? "right half" : "whole image", 10),
+                     0);
     json_decref(metrics);
 
-    trainer t; /* in passing and at the end: one protocol. Eval also knows the smallest pixel of each anchor (frame/frame.h). */
+    trainer t; /* in passing and at the end: one protocol. Eval also knows the smallest pixel of each anchor
+                  (frame/frame.h). */
     double in_passing;
     open_ok(&t, data, &def);
     assert_ok(checkpoint_load(&t, joined(run, "checkpoints/last.gbt"), NULL));
@@ -608,7 +654,11 @@ static void exposure_is_learned(void **state)
 {
     (void)state;
     gbt_make_scene_def make = gbt_make_scene_def_default();
-    make.width = 80, make.height = 60, make.view_count = 20, make.points = 800, make.samples = 4;
+    make.width = 80;
+    make.height = 60;
+    make.view_count = 20;
+    make.points = 800;
+    make.samples = 4;
     assert_ok(gbt_make_scene(&make, in_root("even"), NULL));
     copy_scene(in_root("even"), in_root("exposed"), expose);
     gbt_train_def def = run_def();
@@ -626,7 +676,8 @@ static void exposure_is_learned(void **state)
     double sum[AFFINE_NUMBERS] = {0};
     for (size_t i = 0; i < json_array_size(list); i++)
         for (size_t k = 0; k < AFFINE_NUMBERS; k++)
-            sum[k] += json_number_value(json_array_get(json_object_get(json_array_get(list, i), "matrix"), k));
+            sum[k] +=
+                json_number_value(json_array_get(json_object_get(json_array_get(list, i), "matrix"), k));
     assert_int_equal(json_array_size(list), 17);
     for (size_t k = 0; k < AFFINE_NUMBERS; k++)
         assert_true(fabs(sum[k] / 17 - (k % 5 == 0)) < 1e-5);

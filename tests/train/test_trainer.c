@@ -1,4 +1,6 @@
-/* tests/train/test_trainer.c -- training runs: same bits whatever happens on the way, budget, growing, no points, hostile surroundings.
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/train/test_trainer.c -- training runs: same bits whatever happens on the way, budget, growing, no
+   points, hostile surroundings.
 
    Nothing here depends on a tuned constant. */
 #include "run_support.h"
@@ -38,7 +40,8 @@ static void resume_ok(const char *run)
     train_ok(tiny, run, &def);
 }
 
-/* A run in a process of its own, so that it can be signalled. It is this program again: threads do not live through a bare fork(). */
+/* A run in a process of its own, so that it can be signalled. It is this program again: threads do not live
+   through a bare fork(). */
 static pid_t start_child(const char *run)
 {
     fflush(NULL);
@@ -60,10 +63,7 @@ static int child_main(const char *data, const char *run)
     return gbt_status_exit_code(gbt_train(data, run, &def, &err));
 }
 
-static void nap(void)
-{
-    nanosleep(&(struct timespec){.tv_nsec = 500000}, NULL);
-}
+static void nap(void) { nanosleep(&(struct timespec){.tv_nsec = 500000}, NULL); }
 
 /* Wait for a checkpoint, signal, wait for the end; the child's status. */
 static int signal_once(const char *run, int number)
@@ -97,7 +97,7 @@ static int signal_when_saved(const char *run, int number)
     return 0;
 }
 
-/* ---- the same bits ------------------------------------------------------------------------------------------------------------ */
+/* ---- the same bits ---- */
 
 static void interrupted_and_resumed_is_straight(void **state)
 {
@@ -112,7 +112,8 @@ static void interrupted_and_resumed_is_straight(void **state)
     trainer_free(&t);
     model_free(&m);
     const char *run = in_root("pieces");
-    static const uint64_t stops[] = {1, 2, 29, 30, STEPS - 1}; /* around growing, around resolutions, at the ends */
+    static const uint64_t stops[] = {1, 2, 29, 30, STEPS - 1}; /* around growing, around resolutions, at the
+                                                                  ends */
     for (size_t i = 0; i < sizeof stops / sizeof *stops; i++) {
         gbt_train_def def = run_def();
         def.resume = i > 0;
@@ -155,7 +156,8 @@ static void resumes_from_the_previous_checkpoint(void **state)
     gbt_train_def def = run_def();
     def.stop_at_step = 20;
     train_fails(tiny, in_root("previous"), &def, GBT_ERR_INTERRUPTED, "after step 20");
-    assert_int_equal(rename(in_root("previous/checkpoints/last.gbt"), in_root("previous/checkpoints/last.gbt.prev")), 0);
+    assert_int_equal(
+        rename(in_root("previous/checkpoints/last.gbt"), in_root("previous/checkpoints/last.gbt.prev")), 0);
     resume_ok(in_root("previous"));
     assert_same_file(straight_run(), in_root("previous/model.gbt"));
 }
@@ -213,7 +215,7 @@ static void another_seed_changes_bits(void **state)
     model_free(&b);
 }
 
-/* ---- the budget --------------------------------------------------------------------------------------------------------------- */
+/* ---- the budget ---- */
 
 static json_t *read_summary(const char *run)
 {
@@ -230,7 +232,8 @@ static void a_budget_run_can_be_repeated(void **state)
     gbt_train_def def = run_def();
     def.iterations = 0;
     def.budget_seconds = 1;
-    def.eval_at_seconds[0] = 0.3, def.eval_at_count = 1;
+    def.eval_at_seconds[0] = 0.3;
+    def.eval_at_count = 1;
     train_ok(tiny, in_root("budget"), &def);
 
     json_t *summary = read_summary(in_root("budget"));
@@ -247,7 +250,8 @@ static void a_budget_run_can_be_repeated(void **state)
     assert_int_equal(sum, json_integer_value(json_object_get(summary, "iterations")));
     assert_int_equal(json_array_size(held_out), 1);
     assert_true(json_number_value(json_object_get(json_array_get(held_out, 0), "psnr")) > 3);
-    /* Wide, for the machine may be busy with other things; a schedule that ignores the clock is off by far more. */
+    /* Wide, for the machine may be busy with other things; a schedule that ignores the clock is off by far
+       more. */
     const double seconds = json_number_value(json_object_get(summary, "train_seconds"));
     if (!(seconds > 0.4 && seconds < 4))
         fail_msg("a budget of 1 s took %g s", seconds);
@@ -280,7 +284,7 @@ static void a_budget_run_resumes_its_clock(void **state)
     json_decref(summary);
 }
 
-/* ---- what a step does --------------------------------------------------------------------------------------------------------- */
+/* ---- what a step does ---- */
 
 static void assert_rows_agree(const trainer *t)
 {
@@ -299,7 +303,8 @@ static void training_learns(void **state)
     def.start_level = 0;
     trainer t;
     open_ok(&t, tiny, &def);
-    memset(t.settings.background, 0, sizeof t.settings.background); /* in front of black all that is right has been learnt */
+    memset(t.settings.background, 0, sizeof t.settings.background); /* in front of black all that is right has
+                                                                       been learnt */
     double before, after, first_loss = 0, last_loss = 0;
     assert_ok(trainer_held_out_psnr(&t, &before, NULL));
     bool changed = false;
@@ -308,15 +313,16 @@ static void training_learns(void **state)
         step_report r;
         step_ok(&t, &r);
         assert_false(r.skipped);
-        assert_true(isfinite(r.loss) && r.loss > 0 && r.l1 >= 0 && r.ssim <= 1 && r.width == 48 && r.height == 36 && r.level == 0);
+        assert_true(isfinite(r.loss) && r.loss > 0 && r.l1 >= 0 && r.ssim <= 1 && r.width == 48 &&
+                    r.height == 36 && r.level == 0);
         assert_rows_agree(&t);
         changed |= t.anchors.count != count;
         first_loss += i < 8 ? r.loss / 8 : 0;
         last_loss += i >= 152 ? r.loss / 8 : 0;
     }
     assert_ok(trainer_held_out_psnr(&t, &after, NULL));
-    print_message("held out: %.2f -> %.2f dB, loss %.4f -> %.4f, anchors %zu -> %zu\n", before, after, first_loss, last_loss,
-                  t.anchors_initial, t.anchors.count);
+    print_message("held out: %.2f -> %.2f dB, loss %.4f -> %.4f, anchors %zu -> %zu\n", before, after,
+                  first_loss, last_loss, t.anchors_initial, t.anchors.count);
     assert_true(after > before + 4);
     assert_true(last_loss < 0.6 * first_loss);
     assert_true(changed);
@@ -362,7 +368,8 @@ static void growth_stops_at_max_anchors(void **state)
 static bool is_at_point(const trainer *t, size_t anchor)
 {
     size_t p = 0;
-    while (p < t->scene.points.count && memcmp(t->anchors.position + 3 * anchor, t->scene.points.position + 3 * p, 3 * sizeof(float)) != 0)
+    while (p < t->scene.points.count &&
+           memcmp(t->anchors.position + 3 * anchor, t->scene.points.position + 3 * p, 3 * sizeof(float)) != 0)
         p++;
     return p < t->scene.points.count;
 }
@@ -380,11 +387,14 @@ enum { FEW_BALLS_STEPS = 320 };
 static void open_from_few_balls(trainer *t)
 {
     gbt_train_def def = run_def();
-    def.init = "adaptive", def.init_count = 0.1, def.iterations = FEW_BALLS_STEPS;
+    def.init = "adaptive";
+    def.init_count = 0.1;
+    def.iterations = FEW_BALLS_STEPS;
     open_ok(t, tiny, &def);
 }
 
-/* A start from a few balls leaves most points without an anchor; early growth comes back to them, later growth has Gaussians to go by. */
+/* A start from a few balls leaves most points without an anchor; early growth comes back to them, later
+   growth has Gaussians to go by. */
 static void growth_begins_at_the_points(void **state)
 {
     (void)state;
@@ -397,7 +407,8 @@ static void growth_begins_at_the_points(void **state)
         step_report r;
         step_ok(&t, &r);
     }
-    print_message("%zu of %zu anchors at points, %zu at the start\n", anchors_at_points(&t), t.anchors.count, at_points);
+    print_message("%zu of %zu anchors at points, %zu at the start\n", anchors_at_points(&t), t.anchors.count,
+                  at_points);
     assert_true(anchors_at_points(&t) > at_points + 5);
     at_points = anchors_at_points(&t);
     while (t.step < 2 * until) {
@@ -408,15 +419,18 @@ static void growth_begins_at_the_points(void **state)
     trainer_free(&t);
 }
 
-/* How many anchors have grown away from the points, when only two photos teach and the second looks away, or not. */
+/* How many anchors have grown away from the points, when only two photos teach and the second looks away, or
+   not. */
 static size_t grown_in_the_open(bool looks_away)
 {
     trainer t;
     open_from_few_balls(&t);
     t.train_count = 2;
     double *turn = t.scene.views[t.train_views[1]].camera.rotation;
-    for (int k = 0; looks_away && k < 3; k++)
-        turn[k] = -turn[k], turn[6 + k] = -turn[6 + k];
+    for (int k = 0; looks_away && k < 3; k++) {
+        turn[k] = -turn[k];
+        turn[6 + k] = -turn[6 + k];
+    }
     while (t.step < FEW_BALLS_STEPS / 4) {
         step_report r;
         step_ok(&t, &r);
@@ -437,8 +451,9 @@ static void growth_asks_for_two_views(void **state)
     assert_true(grown_in_the_open(false) > 20);
 }
 
-/* Adam's first step is one rate long, whatever the gradient. New rows that are corrected by the age of the run, as the reference does it and
-   ours for features alone, make one of 0.1 / sqrt(0.001) rates in a long run. */
+/* Adam's first step is one rate long, whatever the gradient. New rows that are corrected by the age of the
+   run, as the reference does it and ours for features alone, make one of 0.1 / sqrt(0.001) rates in a long
+   run. */
 static void new_geometry_begins_at_its_own_pace(void **state)
 {
     (void)state;
@@ -456,7 +471,8 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     memcpy(before.offset, t.anchors.offset, n * 3 * k * sizeof(float));
     memcpy(before.scale_log, t.anchors.scale_log, n * 6 * sizeof(float));
     memcpy(before.feature, t.anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float));
-    const learning_rates rates = schedule_rates(pace_progress(&t.pace, t.step), false, t.extent, t.def.learning_rate_factor);
+    const learning_rates rates =
+        schedule_rates(pace_progress(&t.pace, t.step), false, t.extent, t.def.learning_rate_factor);
     step_ok(&t, &r);
     assert_int_equal(t.anchors.count, n); /* no round: rows are where they were */
     double offset = 0, scale = 0, feature = 0;
@@ -467,16 +483,19 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     for (size_t i = old * ANCHOR_FEATURE_DIM; i < n * ANCHOR_FEATURE_DIM; i++)
         feature = fmax(feature, fabs((double)t.anchors.feature[i] - (double)before.feature[i]));
     const adam_rates by_run = adam_rates_at(rates.feature, t.anchor_t);
-    const double expected = rates.feature * 0.1 * (double)by_run.correct_m / sqrt(0.001 * (double)by_run.correct_v);
-    print_message("%zu new anchors; first steps of %.3f, %.3f and %.3f rates\n", n - old, offset / rates.offset, scale / rates.scale,
-                  feature / rates.feature);
-    assert_true(fabs(offset / rates.offset - 1) < 1e-3 && fabs(scale / rates.scale - 1) < 1e-3 && fabs(feature / expected - 1) < 1e-3);
+    const double expected =
+        rates.feature * 0.1 * (double)by_run.correct_m / sqrt(0.001 * (double)by_run.correct_v);
+    print_message("%zu new anchors; first steps of %.3f, %.3f and %.3f rates\n", n - old,
+                  offset / rates.offset, scale / rates.scale, feature / rates.feature);
+    assert_true(fabs(offset / rates.offset - 1) < 1e-3 && fabs(scale / rates.scale - 1) < 1e-3 &&
+                fabs(feature / expected - 1) < 1e-3);
     anchors_free(&before);
     trainer_free(&t);
 }
 
-/* One adjust of the reference's kind, in whose step the anchors' Adam groups rest: what moves is the rows alone. Every second anchor is
-   made transparent by its statistics, the first candidates are made to grow by theirs. Anchors never move, so a position names a row. */
+/* One adjust of the reference's kind, in whose step the anchors' Adam groups rest: what moves is the rows
+   alone. Every second anchor is made transparent by its statistics, the first candidates are made to grow by
+   theirs. Anchors never move, so a position names a row. */
 static void moments_follow_their_rows(void **state)
 {
     (void)state;
@@ -492,7 +511,8 @@ static void moments_follow_their_rows(void **state)
         step_ok(&t, &r);
     const size_t n = t.anchors.count, k = (size_t)t.anchors.offset_count;
     assert_int_equal(n, t.anchors_initial);
-    float *position = malloc(3 * n * sizeof *position), *m1 = malloc(n * 3 * k * sizeof *m1), *m2 = malloc(n * 6 * sizeof *m2);
+    float *position = malloc(3 * n * sizeof *position), *m1 = malloc(n * 3 * k * sizeof *m1),
+          *m2 = malloc(n * 6 * sizeof *m2);
     assert_true(position != NULL && m1 != NULL && m2 != NULL);
     memcpy(position, t.anchors.position, 3 * n * sizeof *position);
     memcpy(m1, t.moment1.offset, n * 3 * k * sizeof *m1);
@@ -510,7 +530,8 @@ static void moments_follow_their_rows(void **state)
     size_t kept = 0, grown = 0;
     for (size_t row = 0; row < t.anchors.count; row++) {
         size_t from = 0;
-        while (from < n && memcmp(position + 3 * from, t.anchors.position + 3 * row, 3 * sizeof *position) != 0)
+        while (from < n &&
+               memcmp(position + 3 * from, t.anchors.position + 3 * row, 3 * sizeof *position) != 0)
             from++;
         if (from < n) {
             kept++;
@@ -529,11 +550,13 @@ static void moments_follow_their_rows(void **state)
     assert_true(grown > 0);
     for (int i = 0; i < 5; i++) /* and the next steps see consistent rows */
         step_ok(&t, &r);
-    free(position), free(m1), free(m2);
+    free(position);
+    free(m1);
+    free(m2);
     trainer_free(&t);
 }
 
-/* ---- no sparse points --------------------------------------------------------------------------------------------------------- */
+/* ---- no sparse points ---- */
 
 /* The tiny scene's photos and cameras as a transforms.json, which has no points. */
 static void write_transforms(const char *folder)
@@ -550,11 +573,14 @@ static void write_transforms(const char *folder)
     assert_non_null(file);
     const gbt_camera *c = &s.views[0].camera;
     assert_int_equal(c->model, GBT_CAMERA_PINHOLE);
-    fprintf(file, "{\"w\": %d, \"h\": %d, \"fl_x\": %.17g, \"fl_y\": %.17g, \"cx\": %.17g, \"cy\": %.17g, \"frames\": [", c->width,
-            c->height, c->params[0], c->params[1], c->params[2], c->params[3]);
+    fprintf(file,
+            "{\"w\": %d, \"h\": %d, \"fl_x\": %.17g, \"fl_y\": %.17g, \"cx\": %.17g, \"cy\": %.17g, "
+            "\"frames\": [",
+            c->width, c->height, c->params[0], c->params[1], c->params[2], c->params[3]);
     for (size_t i = 0; i < s.view_count; i++) {
         const double *r = s.views[i].camera.rotation, *at = s.views[i].camera.center;
-        fprintf(file, "%s{\"file_path\": \"images/%s\", \"transform_matrix\": [", i > 0 ? ", " : "", s.views[i].name);
+        fprintf(file, "%s{\"file_path\": \"images/%s\", \"transform_matrix\": [", i > 0 ? ", " : "",
+                s.views[i].name);
         for (int k = 0; k < 3; k++) /* columns: x right, y up, z back */
             fprintf(file, "[%.17g, %.17g, %.17g, %.17g], ", r[k], -r[3 + k], -r[6 + k], at[k] + s.origin[k]);
         fprintf(file, "[0, 0, 0, 1]]}");
@@ -578,7 +604,10 @@ static void points_are_made_where_there_are_none(void **state)
         views[i] = i;
     scene_points made[3] = {{0}};
     const int before = parallel_threads();
-    static const struct { int threads; uint64_t seed; } runs[] = {{1, 5}, {2, 5}, {2, 6}};
+    static const struct {
+        int threads;
+        uint64_t seed;
+    } runs[] = {{1, 5}, {2, 5}, {2, 6}};
     for (int i = 0; i < 3; i++) {
         gbt_set_threads(runs[i].threads);
         photos p;
@@ -593,11 +622,14 @@ static void points_are_made_where_there_are_none(void **state)
     assert_int_equal(made[0].count, made[1].count);
     assert_memory_equal(made[0].position, made[1].position, 3 * made[0].count * sizeof(float));
     assert_memory_equal(made[0].color, made[1].color, 3 * made[0].count * sizeof(float));
-    assert_true(made[0].count != made[2].count || memcmp(made[0].position, made[2].position, 3 * made[0].count * sizeof(float)) != 0);
+    assert_true(made[0].count != made[2].count ||
+                memcmp(made[0].position, made[2].position, 3 * made[0].count * sizeof(float)) != 0);
     for (size_t i = 0; i < 3 * made[0].count; i++)
         assert_true(isfinite(made[0].position[i]) && made[0].color[i] >= 0 && made[0].color[i] <= 1);
-    for (int i = 0; i < 3; i++)
-        mem_free(made[i].position), mem_free(made[i].color);
+    for (int i = 0; i < 3; i++) {
+        mem_free(made[i].position);
+        mem_free(made[i].color);
+    }
     scene_free(&s);
 
     gbt_train_def def = run_def();
@@ -612,7 +644,7 @@ static void points_are_made_where_there_are_none(void **state)
     assert_same_file(in_root("made/model.gbt"), in_root("made2/model.gbt"));
 }
 
-/* ---- hostile surroundings ----------------------------------------------------------------------------------------------------- */
+/* ---- hostile surroundings ---- */
 
 static void data_without_training_photos_is_refused(void **state)
 {
@@ -644,11 +676,13 @@ static void a_run_is_overwritten_only_when_asked(void **state)
     static const char *const files[] = {"model.gbt", "config", "log.csv", "checkpoints/last.gbt"};
     bytes before[4];
     gbt_train_def def = run_def();
-    def.iterations = 3, def.stop_at_step = 2;
+    def.iterations = 3;
+    def.stop_at_step = 2;
     train_fails(tiny, in_root("kept"), &def, GBT_ERR_INTERRUPTED, "after step 2");
     for (int i = 0; i < 4; i++)
         before[i] = read_bytes(in_root("kept/%s", files[i]));
-    def.seed = 6, def.stop_at_step = 0;
+    def.seed = 6;
+    def.stop_at_step = 0;
     train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "kept: holds a run already");
     for (int i = 0; i < 4; i++) {
         bytes after = read_bytes(in_root("kept/%s", files[i]));
@@ -660,7 +694,8 @@ static void a_run_is_overwritten_only_when_asked(void **state)
     /* The checkpoint alone can be resumed, the model alone is a finished run. */
     assert_int_equal(rename(in_root("kept/model.gbt"), in_root("kept/aside")), 0);
     train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "--resume");
-    assert_int_equal(rename(in_root("kept/checkpoints/last.gbt"), in_root("kept/checkpoints/last.gbt.prev")), 0);
+    assert_int_equal(rename(in_root("kept/checkpoints/last.gbt"), in_root("kept/checkpoints/last.gbt.prev")),
+                     0);
     train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "--overwrite");
     assert_int_equal(unlink(in_root("kept/checkpoints/last.gbt.prev")), 0);
     assert_int_equal(rename(in_root("kept/aside"), in_root("kept/model.gbt")), 0);
@@ -727,7 +762,8 @@ static void a_full_disk_leaves_the_old_checkpoint(void **state)
     const struct rlimit small = {50000, limit.rlim_max};
     void (*old_action)(int) = signal(SIGXFSZ, SIG_IGN);
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
-    def.resume = true, def.stop_at_step = 20;
+    def.resume = true;
+    def.stop_at_step = 20;
     gbt_error err = {0};
     const gbt_status status = gbt_train(tiny, in_root("full"), &def, &err);
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
@@ -787,7 +823,8 @@ static void a_damaged_checkpoint_is_refused(void **state)
     train_fails(tiny, in_root("empty"), &on, GBT_ERR_IO, "empty/checkpoints/last.gbt");
 }
 
-/* A kill leaves rows of steps behind that the checkpoint does not know, and perhaps half a row: resuming takes them out. */
+/* A kill leaves rows of steps behind that the checkpoint does not know, and perhaps half a row: resuming
+   takes them out. */
 static void the_log_goes_back_with_the_checkpoint(void **state)
 {
     (void)state;
@@ -827,7 +864,11 @@ static void a_foreign_checkpoint_is_refused(void **state)
     trainer_free(&t);
 
     gbt_make_scene_def scene_def = gbt_make_scene_def_default(); /* other data */
-    scene_def.width = 48, scene_def.height = 36, scene_def.view_count = VIEWS - 1, scene_def.points = 150, scene_def.samples = 1;
+    scene_def.width = 48;
+    scene_def.height = 36;
+    scene_def.view_count = VIEWS - 1;
+    scene_def.points = 150;
+    scene_def.samples = 1;
     assert_ok(gbt_make_scene(&scene_def, in_root("other"), &err));
     gbt_train_def on = gbt_train_def_default();
     on.resume = true;
@@ -839,7 +880,7 @@ static void a_foreign_checkpoint_is_refused(void **state)
     trainer_free(&t);
 }
 
-/* ---- schedule and settings ---------------------------------------------------------------------------------------------------- */
+/* ---- schedule and settings ---- */
 
 static void progress_rises_from_0_to_1(void **state)
 {
@@ -878,7 +919,10 @@ static void pace_is_read(void **state)
     assert_int_equal(p.known, PACE_SEGMENTS);
     for (int i = 0; i < PACE_SEGMENTS; i++)
         assert_int_equal(p.steps[i], i + 1);
-    static const char *const bad[] = {"", "1", "1,2", "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20,21",
+    static const char *const bad[] = {"",
+                                      "1",
+                                      "1,2",
+                                      "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20,21",
                                       "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,",
                                       "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,x",
                                       "-1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
@@ -892,7 +936,8 @@ static void pace_is_read(void **state)
             fail_msg("\"%s\" was taken: %s", bad[i], err.text);
     }
     gbt_train_def def = run_def();
-    def.iterations = 0, def.pace = "1,2";
+    def.iterations = 0;
+    def.pace = "1,2";
     train_fails(tiny, in_root("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace");
 }
 
@@ -931,7 +976,8 @@ static void levels_and_rates(void **state)
     for (int i = 0; i <= 100; i++) {
         const learning_rates r = schedule_rates(i / 100.0, true, 2.0, 1);
         assert_true(fabs(r.offset / schedule_rates(i / 100.0, true, 1.0, 1).offset - 2) < 1e-12);
-        assert_true(schedule_rates(i / 100.0, false, 2.0, 1).offset == schedule_rates(i / 100.0, false, 1.0, 1).offset);
+        assert_true(schedule_rates(i / 100.0, false, 2.0, 1).offset ==
+                    schedule_rates(i / 100.0, false, 1.0, 1).offset);
     }
 }
 
@@ -939,10 +985,24 @@ static void config_comes_back(void **state)
 {
     (void)state;
     gbt_train_def def = gbt_train_def_default();
-    def.init = "voxel", def.scale_prior = "nn", def.max_depth = 7, def.voxel_size = 0.1f, def.offsets = 3, def.distance = "off";
-    def.iterations = 123456789012ull, def.budget_seconds = 1 / 3.0, def.pace = "1,2,3", def.downscale = 1.1, def.start_level = 1;
-    def.eval_split = "list=a = b.txt", def.seed = UINT64_MAX, def.max_anchors = 77, def.grow = false, def.compat = true;
-    def.exposure = true, def.learning_rate_factor = 0.3;
+    def.init = "voxel";
+    def.scale_prior = "nn";
+    def.max_depth = 7;
+    def.voxel_size = 0.1f;
+    def.offsets = 3;
+    def.distance = "off";
+    def.iterations = 123456789012ull;
+    def.budget_seconds = 1 / 3.0;
+    def.pace = "1,2,3";
+    def.downscale = 1.1;
+    def.start_level = 1;
+    def.eval_split = "list=a = b.txt";
+    def.seed = UINT64_MAX;
+    def.max_anchors = 77;
+    def.grow = false;
+    def.compat = true;
+    def.exposure = true;
+    def.learning_rate_factor = 0.3;
     char text[CONFIG_TEXT_SIZE], again[CONFIG_TEXT_SIZE];
     config_text(&def, "/some where/= data", text, sizeof text);
     gbt_train_def back = gbt_train_def_default();
@@ -952,13 +1012,14 @@ static void config_comes_back(void **state)
         fail_msg("%s", err.text);
     config_text(&back, strings.data, again, sizeof again);
     assert_string_equal(text, again);
-    assert_true(back.voxel_size == def.voxel_size && back.budget_seconds == def.budget_seconds && back.seed == UINT64_MAX && !back.grow &&
-                back.compat);
+    assert_true(back.voxel_size == def.voxel_size && back.budget_seconds == def.budget_seconds &&
+                back.seed == UINT64_MAX && !back.grow && back.compat);
     assert_true(back.exposure && back.learning_rate_factor == 0.3);
 
     def = gbt_train_def_default();
     config_text(&def, "d", text, sizeof text);
-    static const char *const shortest[] = {"\nsplats-until = 0.7\n", "\nfootprint = 0.1\n", "\nnear = 0.5\n", "\nscale-factor = 0\n"};
+    static const char *const shortest[] = {"\nsplats-until = 0.7\n", "\nfootprint = 0.1\n", "\nnear = 0.5\n",
+                                           "\nscale-factor = 0\n"};
     for (size_t i = 0; i < sizeof shortest / sizeof *shortest; i++)
         assert_non_null(strstr(text, shortest[i]));
     back.pace = "1";
@@ -972,17 +1033,22 @@ static void config_comes_back(void **state)
     assert_ok(config_parse(text, "config", &back, &strings, &err));
     assert_string_equal(strings.data, folder);
 
-    static const struct { const char *text, *says; } bad[] = {
-        {"seed = 1\nnonsense\n", "config:2"}, {"seed = x\n", "config:1"}, {"colour = 1\n", "colour"}, {"offsets = \n", "offsets"},
-        {"grow=1\n", "config:1"},
+    static const struct {
+        const char *text, *says;
+    } bad[] = {
+        {"seed = 1\nnonsense\n", "config:2"}, {"seed = x\n", "config:1"}, {"colour = 1\n", "colour"},
+        {"offsets = \n", "offsets"},          {"grow=1\n", "config:1"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         err = (gbt_error){0};
-        if (config_parse(bad[i].text, "config", &back, &strings, &err) != GBT_ERR_FORMAT || strstr(err.text, bad[i].says) == NULL)
+        if (config_parse(bad[i].text, "config", &back, &strings, &err) != GBT_ERR_FORMAT ||
+            strstr(err.text, bad[i].says) == NULL)
             fail_msg("\"%s\": %s", bad[i].text, err.text);
     }
-    static const char *const wild[] = {"max-depth = 1e30\n", "max-depth = nan\n", "offsets = -1e300\n", "start-level = inf\n"};
-    for (size_t i = 0; i < sizeof wild / sizeof *wild; i++) { /* whole numbers out of range: refused here or where the def is checked */
+    static const char *const wild[] = {"max-depth = 1e30\n", "max-depth = nan\n", "offsets = -1e300\n",
+                                       "start-level = inf\n"};
+    for (size_t i = 0; i < sizeof wild / sizeof *wild; i++) { /* whole numbers out of range: refused here or
+                                                                 where the def is checked */
         err = (gbt_error){0};
         back = gbt_train_def_default();
         trainer t = {0};
@@ -993,7 +1059,7 @@ static void config_comes_back(void **state)
     }
 }
 
-/* ---- photos ------------------------------------------------------------------------------------------------------------------- */
+/* ---- photos ---- */
 
 /* Every pixel of every phase is the photo's, seen by the photo's ray. */
 static void samples_are_pixels_of_the_photo(void **state)
@@ -1014,7 +1080,8 @@ static void samples_are_pixels_of_the_photo(void **state)
     size_t seen = 0;
     for (int level = 0; level <= 2; level++)
         for (int phase = 0; phase < 1 << 2 * level; phase++) {
-            const photo_sample sample = {.level = level, .phase = {phase % (1 << level), phase / (1 << level)}};
+            const photo_sample sample = {.level = level,
+                                         .phase = {phase % (1 << level), phase / (1 << level)}};
             gbt_camera camera;
             int step;
             assert_ok(photos_get_sample(&p, 0, &sample, &got, &camera, &valid, &step, NULL));
@@ -1025,8 +1092,8 @@ static void samples_are_pixels_of_the_photo(void **state)
             for (int y = 0; y < got.height; y++)
                 for (int x = 0; x < got.width; x++, seen++) {
                     const int at[2] = {x * step + sample.phase[0], y * step + sample.phase[1]};
-                    assert_memory_equal(got.pixels + 3 * (y * got.width + x), full.pixels + 3 * (at[1] * full.width + at[0]),
-                                        3 * sizeof(float));
+                    assert_memory_equal(got.pixels + 3 * (y * got.width + x),
+                                        full.pixels + 3 * (at[1] * full.width + at[0]), 3 * sizeof(float));
                     double a[3], b[3];
                     assert_true(gbt_camera_unproject(&camera, x + 0.5, y + 0.5, a) &&
                                 gbt_camera_unproject(&whole, at[0] + 0.5, at[1] + 0.5, b));
@@ -1034,7 +1101,8 @@ static void samples_are_pixels_of_the_photo(void **state)
                         assert_true(fabs(a[c] - b[c]) < 1e-14);
                 }
         }
-    assert_int_equal(seen, 3 * whole.width * whole.height); /* all of them, once a level: the size is a multiple of 4 */
+    assert_int_equal(seen, 3 * whole.width * whole.height); /* all of them, once a level: the size is a
+                                                               multiple of 4 */
     const size_t bad[] = {1, 0};
     mem_free(p.full[0]);
     p.full[0] = NULL;
@@ -1072,7 +1140,8 @@ static void photos_are_the_resized_reference(void **state)
             for (size_t v = 0; v < 3; v++) {
                 const int level = levels[l];
                 const double divide = downscales[d] * exp2(level);
-                const int width = (int)fmax(1, floor(48 / divide + 0.5)), height = (int)fmax(1, floor(36 / divide + 0.5));
+                const int width = (int)fmax(1, floor(48 / divide + 0.5)),
+                          height = (int)fmax(1, floor(36 / divide + 0.5));
                 const gbt_camera camera = photos_camera(&p, v, level), full_camera = photos_camera(&p, v, 0);
                 assert_int_equal(camera.width, width);
                 assert_int_equal(camera.height, height);
@@ -1085,15 +1154,17 @@ static void photos_are_the_resized_reference(void **state)
                 quantize(&want);
                 for (size_t i = 0; i < (size_t)width * (size_t)height * 3; i++)
                     if (!(fabsf(got.pixels[i] - want.pixels[i]) < 1e-6f))
-                        fail_msg("downscale %g level %d value %zu: wanted %.9g, got %.9g", downscales[d], level, i, (double)want.pixels[i],
-                                 (double)got.pixels[i]);
+                        fail_msg("downscale %g level %d value %zu: wanted %.9g, got %.9g", downscales[d],
+                                 level, i, (double)want.pixels[i], (double)got.pixels[i]);
                 image_free(&full);
                 image_free(&want);
-                /* What is kept: the full photo, and one level above it at most, of the views asked for only. */
+                /* What is kept: the full photo, and one level above it at most, of the views asked for
+                   only. */
                 for (size_t other = 0; other < VIEWS; other++) {
                     assert_true(other < 3 || (p.full[other] == NULL && p.pixels[other] == NULL));
                     if (level == 0 || other > v)
-                        assert_true(p.pixels[other] == NULL || (level > 0 && l > 0 && levels[l - 1] == level));
+                        assert_true(p.pixels[other] == NULL ||
+                                    (level > 0 && l > 0 && levels[l - 1] == level));
                 }
             }
         image_free(&got);
@@ -1102,7 +1173,7 @@ static void photos_are_the_resized_reference(void **state)
     scene_free(&s);
 }
 
-/* ---- no memory ---------------------------------------------------------------------------------------------------------------- */
+/* ---- no memory ---- */
 
 static void every_allocation_may_fail(void **state)
 {
@@ -1125,7 +1196,8 @@ static void every_allocation_may_fail(void **state)
             trainer_free(t);
         assert_true(n < 100000);
     }
-    /* Step after step with everything fresh: first the step's own allocations, then (adjusts) those of growing. */
+    /* Step after step with everything fresh: first the step's own allocations, then (adjusts) those of
+       growing. */
     for (long n = 0; stepped < 0; n += n < 40 ? 1 : 5) {
         gbt_error err = {0};
         step_report r;

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """tests/view/browser.py -- headless Chromium by its debugging pipe (no package beside Chromium and Python): pages, scripts, mice, pictures."""
 import base64
 import fcntl

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/view/http_client.h -- bytes to a port of this machine, and all that comes back. */
 #ifndef GBT_TESTS_HTTP_CLIENT_H
 #define GBT_TESTS_HTTP_CLIENT_H
@@ -20,7 +21,8 @@ typedef struct reply {
 
 static inline int http_connect(int port)
 {
-    const struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port), .sin_addr = {htonl(INADDR_LOOPBACK)}};
+    const struct sockaddr_in address = {
+        .sin_family = AF_INET, .sin_port = htons((uint16_t)port), .sin_addr = {htonl(INADDR_LOOPBACK)}};
     const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (fd < 0 || connect(fd, (const struct sockaddr *)&address, sizeof address) != 0)
         fail_msg("cannot connect to port %d", port);
@@ -30,7 +32,8 @@ static inline int http_connect(int port)
 /* The other side may have closed before it has read all. */
 static inline void http_write(int fd, const char *data, size_t count)
 {
-    for (ssize_t sent; count > 0 && (sent = send(fd, data, count, MSG_NOSIGNAL)) > 0; data += sent, count -= (size_t)sent)
+    for (ssize_t sent; count > 0 && (sent = send(fd, data, count, MSG_NOSIGNAL)) > 0;
+         data += sent, count -= (size_t)sent)
         ;
 }
 
@@ -67,15 +70,13 @@ static inline reply http_raw(int port, const char *data, size_t count)
 static inline int http_ask(int port, const char *path)
 {
     char head[8192];
-    const int length = snprintf(head, sizeof head, "GET %s HTTP/1.1\r\n" GOOD_HEAD, path), fd = http_connect(port);
+    const int length = snprintf(head, sizeof head, "GET %s HTTP/1.1\r\n" GOOD_HEAD, path),
+              fd = http_connect(port);
     assert_true(length < (int)sizeof head);
     http_write(fd, head, (size_t)length);
     return fd;
 }
 
-static inline reply http_get(int port, const char *path)
-{
-    return http_read(http_ask(port, path));
-}
+static inline reply http_get(int port, const char *path) { return http_read(http_ask(port, path)); }
 
 #endif

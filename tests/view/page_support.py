@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """tests/view/page_support.py -- what the tests of the page share: checks, a tiny run, the viewer with a browser in front of it."""
 import contextlib
 import os

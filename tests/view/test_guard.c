@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/view/test_guard.c -- whose Host is ours, which token is right, what is printed. */
 #include "test_support.h"
 
@@ -14,15 +15,28 @@ static void check_hosts(const guard *g, const char *const *hosts, size_t count, 
 
 #define CHECK_HOSTS(g, hosts, ours) check_hosts(g, hosts, sizeof(hosts) / sizeof *(hosts), ours)
 
-static const char *const foreign[] = {"", ":8470", "evil.example", "127.0.0.1.evil.example", "localhost.evil.example:8470",
-                                      "127.0.0.1:80.evil.example", "127.0.0.1@evil.example", "[::1]:8470", " localhost", "localhost ",
-                                      "127.0.0.1:1:2", "192.168.1.5.evil.example:8470", "192.168.1.5x", "192.168.1", "0x7f.1",
+static const char *const foreign[] = {"",
+                                      ":8470",
+                                      "evil.example",
+                                      "127.0.0.1.evil.example",
+                                      "localhost.evil.example:8470",
+                                      "127.0.0.1:80.evil.example",
+                                      "127.0.0.1@evil.example",
+                                      "[::1]:8470",
+                                      " localhost",
+                                      "localhost ",
+                                      "127.0.0.1:1:2",
+                                      "192.168.1.5.evil.example:8470",
+                                      "192.168.1.5x",
+                                      "192.168.1",
+                                      "0x7f.1",
                                       "1111111111111111111111111111111111111111111111"};
 
 static void hosts_of_this_machine(void **state)
 {
     (void)state;
-    static const char *const ours[] = {"127.0.0.1", "localhost", "127.0.0.1:8470", "LOCALHOST:1", "localhost:"};
+    static const char *const ours[] = {"127.0.0.1", "localhost", "127.0.0.1:8470", "LOCALHOST:1",
+                                       "localhost:"};
     static const char *const others[] = {"127.0.0.2", "0.0.0.0", "192.168.1.5:8470"};
     guard g;
     assert_ok(guard_open(NULL, &g, NULL));
@@ -48,7 +62,8 @@ static void hosts_with_a_token(void **state)
 static void addresses(void **state)
 {
     (void)state;
-    static const char *const wrong[] = {"", "example.org", "192.168.1", "192.168.1.256", "::1", "192.168.1.5:80", "0.0.0.0/0", "-1"};
+    static const char *const wrong[] = {"",    "example.org",    "192.168.1", "192.168.1.256",
+                                        "::1", "192.168.1.5:80", "0.0.0.0/0", "-1"};
     guard g;
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         gbt_error err = {0};
@@ -106,8 +121,11 @@ static void what_is_opened(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(hosts_of_this_machine), cmocka_unit_test(hosts_with_a_token), cmocka_unit_test(addresses),
-        cmocka_unit_test(tokens),                cmocka_unit_test(what_is_opened),
+        cmocka_unit_test(hosts_of_this_machine),
+        cmocka_unit_test(hosts_with_a_token),
+        cmocka_unit_test(addresses),
+        cmocka_unit_test(tokens),
+        cmocka_unit_test(what_is_opened),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

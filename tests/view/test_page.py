@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """tests/view/test_page.py -- the page in headless Chromium: it draws, refines, moves, compares, saves what `gbtrace render` draws too. Usage: test_page.py PROGRAM"""
 import base64
 import json

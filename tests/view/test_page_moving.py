@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """tests/view/test_page_moving.py -- moving about in the page: keys after clicks, speed, fit, lines over the picture, sizes, fingers.
 
 Usage: test_page_moving.py PROGRAM

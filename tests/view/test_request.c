@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* tests/view/test_request.c -- queries to requests: every word's range. */
 #include "test_support.h"
 
@@ -26,10 +27,19 @@ static request_case cases[] = {
     {"camera", "/render", {"camera", PINHOLE}, NULL},
     {"view", "/render", {"view", "3"}, NULL},
     {"view of a size", "/render", {"view", "3", "width", "40", "height", "30"}, NULL},
-    {"everything", "/render", {"camera", PINHOLE, "format", "float", "output", "normal", "preset", "exact", "sample", "7"}, NULL},
-    {"splats", "/render", {"camera", PINHOLE, "renderer", "per-ray", "format", "jpeg", "quality", "1", "output", "color"}, NULL},
+    {"everything",
+     "/render",
+     {"camera", PINHOLE, "format", "float", "output", "normal", "preset", "exact", "sample", "7"},
+     NULL},
+    {"splats",
+     "/render",
+     {"camera", PINHOLE, "renderer", "per-ray", "format", "jpeg", "quality", "1", "output", "color"},
+     NULL},
     {"background", "/render", {"view", "0", "background", "00ff7a"}, NULL},
-    {"background of a name", "/render", {"view", "0", "background", "white"}, "background: \"white\" (wanted six digits"},
+    {"background of a name",
+     "/render",
+     {"view", "0", "background", "white"},
+     "background: \"white\" (wanted six digits"},
     {"background with a tail", "/render", {"view", "0", "background", "00ff7a0"}, "background: \"00ff7a0\""},
     {"pick", "/pick", {"camera", PINHOLE, "x", "63.5", "y", "0"}, NULL},
     {"photo", "/photo", {"view", "0", "format", "png"}, NULL},
@@ -48,24 +58,48 @@ static request_case cases[] = {
     {"width alone", "/render", {"view", "0", "width", "64"}, "wanted width and height"},
     {"no pixels", "/render", {"view", "0", "width", "0", "height", "64"}, "width: \"0\""},
     {"too wide", "/render", {"view", "0", "width", "8193", "height", "1"}, "width: \"8193\""},
-    {"too many pixels", "/render", {"view", "0", "width", "8192", "height", "1025"}, "at most 8388608 pixels"},
-    {"camera too wide", "/render", {"camera", "{" POSE ",\"fov_x_deg\":9,\"width\":65000,\"height\":1}"}, "sides of at most 8192"},
-    {"camera and width", "/render", {"camera", PINHOLE, "width", "8", "height", "8"}, "the camera says its own"},
+    {"too many pixels",
+     "/render",
+     {"view", "0", "width", "8192", "height", "1025"},
+     "at most 8388608 pixels"},
+    {"camera too wide",
+     "/render",
+     {"camera", "{" POSE ",\"fov_x_deg\":9,\"width\":65000,\"height\":1}"},
+     "sides of at most 8192"},
+    {"camera and width",
+     "/render",
+     {"camera", PINHOLE, "width", "8", "height", "8"},
+     "the camera says its own"},
     {"not JSON", "/render", {"camera", "{"}, "camera:1: not JSON"},
     {"a list", "/render", {"camera", "[]"}, "camera: wanted a JSON object"},
     {"unknown field", "/render", {"camera", CAMERA(",\"fov\":3")}, "fov: unknown field"},
     {"no field of view", "/render", {"camera", CAMERA("")}, "camera: fov_x_deg: missing"},
     {"NaN", "/render", {"camera", CAMERA(",\"fov_x_deg\":NaN")}, "not JSON"},
-    {"a file of rays", "/render", {"camera", "{\"rays\":\"/etc/passwd\"}"}, "camera: rays: only a camera file can name them"},
-    {"an aperture", "/render", {"camera", CAMERA(",\"fov_x_deg\":90,\"aperture\":1,\"focus\":2,\"samples\":65536")}, "for gbtrace render"},
-    {"a rolling shutter", "/render", {"camera", CAMERA(",\"fov_x_deg\":90,\"end\":{\"origin\":[1,2,4]}")}, "for gbtrace render"},
+    {"a file of rays",
+     "/render",
+     {"camera", "{\"rays\":\"/etc/passwd\"}"},
+     "camera: rays: only a camera file can name them"},
+    {"an aperture",
+     "/render",
+     {"camera", CAMERA(",\"fov_x_deg\":90,\"aperture\":1,\"focus\":2,\"samples\":65536")},
+     "for gbtrace render"},
+    {"a rolling shutter",
+     "/render",
+     {"camera", CAMERA(",\"fov_x_deg\":90,\"end\":{\"origin\":[1,2,4]}")},
+     "for gbtrace render"},
     {"format", "/render", {"view", "0", "format", "exr"}, "format: \"exr\": unknown"},
     {"preset", "/render", {"view", "0", "preset", ""}, "preset: \"\": unknown"},
     {"renderer", "/render", {"view", "0", "renderer", "reference"}, "renderer: \"reference\""},
     {"output", "/render", {"view", "0", "output", "dept", "format", "float"}, "\"dept\""},
-    {"two outputs", "/render", {"view", "0", "output", "depth,hits", "format", "float"}, "output: \"depth,hits\" (wanted one)"},
+    {"two outputs",
+     "/render",
+     {"view", "0", "output", "depth,hits", "format", "float"},
+     "output: \"depth,hits\" (wanted one)"},
     {"output as bytes", "/render", {"view", "0", "output", "depth"}, "format float alone"},
-    {"output of splats", "/render", {"view", "0", "output", "depth", "format", "float", "renderer", "raster"}, "is traced"},
+    {"output of splats",
+     "/render",
+     {"view", "0", "output", "depth", "format", "float", "renderer", "raster"},
+     "is traced"},
     {"quality", "/render", {"view", "0", "quality", "101"}, "quality: \"101\""},
     {"sample", "/render", {"view", "0", "sample", "4097"}, "sample: \"4097\""},
     {"nothing to pick", "/pick", {"view", "0", "x", "1"}, "wanted x and y"},
@@ -80,29 +114,33 @@ static void parses(void **state)
     gbt_error err = {0};
     const gbt_status status = request_parse(c->path, word_in, (void *)c->query, &r, &err);
     if ((status == GBT_OK) != (c->says == NULL) || (c->says != NULL && strstr(err.text, c->says) == NULL))
-        fail_msg("wanted \"%s\", got status %d: %s", c->says != NULL ? c->says : "no error", (int)status, err.text);
+        fail_msg("wanted \"%s\", got status %d: %s", c->says != NULL ? c->says : "no error", (int)status,
+                 err.text);
 }
 
 static void all_words_arrive(void **state)
 {
     (void)state;
     request r;
-    const char *const picture[] = {"camera", PINHOLE, "format", "float", "output", "normal", "preset", "fast", "sample", "7", NULL};
+    const char *const picture[] = {"camera", PINHOLE, "format", "float", "output", "normal",
+                                   "preset", "fast",  "sample", "7",     NULL};
     assert_ok(request_parse("/render", word_in, (void *)picture, &r, NULL));
-    assert_true(r.kind == REQUEST_RENDER && r.view == -1 && r.format == REQUEST_FLOAT && r.renderer == FRAME_TRACE && r.output == 8 &&
-                r.sample == 7);
+    assert_true(r.kind == REQUEST_RENDER && r.view == -1 && r.format == REQUEST_FLOAT &&
+                r.renderer == FRAME_TRACE && r.output == 8 && r.sample == 7);
     assert_string_equal(r.preset, "fast");
     assert_true(r.camera.width == 64 && r.camera.height == 48 && r.camera.center[2] == 3);
     const char *const colored[] = {"view", "0", "background", "00ff33", NULL};
     assert_ok(request_parse("/render", word_in, (void *)colored, &r, NULL));
-    assert_true(r.has_background && r.background[0] == 0 && r.background[1] == 1 && fabsf(r.background[2] - 0.2f) < 1e-6f);
+    assert_true(r.has_background && r.background[0] == 0 && r.background[1] == 1 &&
+                fabsf(r.background[2] - 0.2f) < 1e-6f);
     const char *const pick[] = {"view", "4", "width", "40", "height", "30", "x", "1.5", "y", "2", NULL};
     assert_ok(request_parse("/pick", word_in, (void *)pick, &r, NULL));
-    assert_true(r.kind == REQUEST_PICK && r.view == 4 && r.width == 40 && r.height == 30 && r.pixel[0] == 1.5 && r.pixel[1] == 2);
+    assert_true(r.kind == REQUEST_PICK && r.view == 4 && r.width == 40 && r.height == 30 &&
+                r.pixel[0] == 1.5 && r.pixel[1] == 2);
     const char *const plain[] = {"view", "0", NULL};
     assert_ok(request_parse("/render", word_in, (void *)plain, &r, NULL));
-    assert_true(r.width == 0 && r.output == 0 && r.sample == 0 && r.format == REQUEST_RAW && !r.has_background &&
-                strcmp(r.preset, "default") == 0);
+    assert_true(r.width == 0 && r.output == 0 && r.sample == 0 && r.format == REQUEST_RAW &&
+                !r.has_background && strcmp(r.preset, "default") == 0);
 }
 
 int main(void)
@@ -110,6 +148,7 @@ int main(void)
     enum { CASES = sizeof cases / sizeof *cases };
     struct CMUnitTest tests[CASES + 1] = {cmocka_unit_test(all_words_arrive)};
     for (size_t i = 0; i < CASES; i++)
-        tests[i + 1] = (struct CMUnitTest){.name = cases[i].name, .test_func = parses, .initial_state = &cases[i]};
+        tests[i + 1] =
+            (struct CMUnitTest){.name = cases[i].name, .test_func = parses, .initial_state = &cases[i]};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,6 @@
-/* tests/view/test_server.c -- the server alone, with this program as its worker: bad requests, the queue, limits, the end. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/view/test_server.c -- the server alone, with this program as its worker: bad requests, the queue,
+   limits, the end. */
 #include "view/http_client.h"
 
 #include "base/file.h"
@@ -14,8 +16,8 @@ static int start(void **state)
     (void)state;
     gbt_error err = {0};
     const int fd = mkstemp(log_path);
-    if (fd < 0 || write(fd, "a,b\n1,2\n", 8) != 8 || close(fd) != 0 || guard_open(NULL, &here, &err) != GBT_OK ||
-        server_start(&here, 0, log_path, &s, &err) != GBT_OK)
+    if (fd < 0 || write(fd, "a,b\n1,2\n", 8) != 8 || close(fd) != 0 ||
+        guard_open(NULL, &here, &err) != GBT_OK || server_start(&here, 0, log_path, &s, &err) != GBT_OK)
         return -1;
     port = server_port(s);
     return 0;
@@ -28,7 +30,7 @@ static int stop(void **state)
     return unlink(log_path);
 }
 
-/* ---- requests that are wrong ----------------------------------------------------------------------------------------------------- */
+/* ---- requests that are wrong ---- */
 
 #define GET(path) "GET " path " HTTP/1.1\r\n"
 #define BAD_OR_CLOSED (-1)
@@ -44,18 +46,23 @@ static bad_case bad[] = {
     {"no Host in HTTP/1.0", "GET / HTTP/1.0\r\n\r\n", 403, 0},
     {"a foreign Host", GET("/") "Host: evil.example\r\nConnection: close\r\n\r\n", 403, 0},
     {"a foreign Host for data", GET("/status") "Host: evil.example\r\nConnection: close\r\n\r\n", 403, 0},
-    {"a name that begins like ours", GET("/") "Host: 127.0.0.1.evil.example\r\nConnection: close\r\n\r\n", 403, 0},
+    {"a name that begins like ours", GET("/") "Host: 127.0.0.1.evil.example\r\nConnection: close\r\n\r\n",
+     403, 0},
     {"another site's script", GET("/status") "Sec-Fetch-Site: cross-site\r\n" GOOD_HEAD, 403, 0},
     {"another port's script", GET("/render?view=0") "Sec-Fetch-Site: same-site\r\n" GOOD_HEAD, 403, 0},
-    {"another site's script, with its name", GET("/status") "Origin: https://evil.example\r\n" GOOD_HEAD, 403, 0},
+    {"another site's script, with its name", GET("/status") "Origin: https://evil.example\r\n" GOOD_HEAD, 403,
+     0},
     {"POST", "POST /render HTTP/1.1\r\nContent-Length: 4\r\n" GOOD_HEAD "view", 405, 0},
     {"PUT", "PUT /index.html HTTP/1.1\r\nContent-Length: 0\r\n" GOOD_HEAD, 405, 0},
     {"HEAD", "HEAD / HTTP/1.1\r\n" GOOD_HEAD, 405, 0},
     {"a method of its own", "FROB / HTTP/1.1\r\n" GOOD_HEAD, BAD_OR_CLOSED, 0},
-    {"a body that never comes", "POST / HTTP/1.1\r\nContent-Length: 1000000\r\n" GOOD_HEAD "x", BAD_OR_CLOSED, 0},
+    {"a body that never comes", "POST / HTTP/1.1\r\nContent-Length: 1000000\r\n" GOOD_HEAD "x", BAD_OR_CLOSED,
+     0},
     {"a length that is none", "POST / HTTP/1.1\r\nContent-Length: -5\r\n" GOOD_HEAD, BAD_OR_CLOSED, 0},
-    {"a length beyond 64 bits", "POST / HTTP/1.1\r\nContent-Length: 99999999999999999999999\r\n" GOOD_HEAD, BAD_OR_CLOSED, 0},
-    {"chunks that are none", "POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n" GOOD_HEAD "zz\r\n", BAD_OR_CLOSED, 0},
+    {"a length beyond 64 bits", "POST / HTTP/1.1\r\nContent-Length: 99999999999999999999999\r\n" GOOD_HEAD,
+     BAD_OR_CLOSED, 0},
+    {"chunks that are none", "POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n" GOOD_HEAD "zz\r\n",
+     BAD_OR_CLOSED, 0},
     {"no path", "GET\r\n\r\n", BAD_OR_CLOSED, 0},
     {"nothing", "", BAD_OR_CLOSED, 0},
     {"one byte", "G", BAD_OR_CLOSED, 0},
@@ -63,7 +70,8 @@ static bad_case bad[] = {
     {"no protocol", "GET /status\r\n\r\n", BAD_OR_CLOSED, 0},
     {"a protocol to come", "GET / HTTP/9.9\r\n" GOOD_HEAD, BAD_OR_CLOSED, 0},
     {"zeros", "\0\0\0\0\r\n\r\n\0\0", BAD_OR_CLOSED, 10},
-    {"a zero in a header", GET("/nowhere") "X: a\0b\r\n" GOOD_HEAD, BAD_OR_CLOSED, sizeof(GET("/nowhere") "X: a\0b\r\n" GOOD_HEAD) - 1},
+    {"a zero in a header", GET("/nowhere") "X: a\0b\r\n" GOOD_HEAD, BAD_OR_CLOSED,
+     sizeof(GET("/nowhere") "X: a\0b\r\n" GOOD_HEAD) - 1},
     {"TLS", "\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n", BAD_OR_CLOSED, 15},
     {"a header without a name", GET("/nowhere") ": x\r\n" GOOD_HEAD, BAD_OR_CLOSED, 0},
     {"no such path", GET("/nowhere") GOOD_HEAD, 404, 0},
@@ -91,7 +99,8 @@ static void refused(void **state)
 {
     const bad_case *c = *state;
     reply r = http_raw(port, c->bytes, c->count > 0 ? c->count : strlen(c->bytes));
-    const bool fine = c->code == BAD_OR_CLOSED ? r.code == 0 || (r.code >= 400 && r.code < 600) : r.code == c->code;
+    const bool fine =
+        c->code == BAD_OR_CLOSED ? r.code == 0 || (r.code >= 400 && r.code < 600) : r.code == c->code;
     if (!fine)
         fail_msg("wanted %d, got %.200s", c->code, r.text);
     free(r.text);
@@ -123,7 +132,7 @@ static void long_heads_are_refused(void **state)
     too_long(true, 3000000);
 }
 
-/* ---- what is there --------------------------------------------------------------------------------------------------------------- */
+/* ---- what is there ---- */
 
 static void assert_has(const reply *r, const char *text)
 {
@@ -134,9 +143,13 @@ static void assert_has(const reply *r, const char *text)
 static void the_page_is_there(void **state)
 {
     (void)state;
-    static const struct { const char *path, *type, *text; } files[] = {
-        {"/", "text/html", "<title>gbtrace</title>"}, {"/index.html", "text/html", "</html>"}, {"/view.js", "text/javascript", "import"},
-        {"/view.css", "text/css", "prefers-color-scheme"}, {"/icon.svg", "image/svg+xml", "</svg>"}};
+    static const struct {
+        const char *path, *type, *text;
+    } files[] = {{"/", "text/html", "<title>gbtrace</title>"},
+                 {"/index.html", "text/html", "</html>"},
+                 {"/view.js", "text/javascript", "import"},
+                 {"/view.css", "text/css", "prefers-color-scheme"},
+                 {"/icon.svg", "image/svg+xml", "</svg>"}};
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         reply r = http_get(port, files[i].path);
         assert_int_equal(r.code, 200);
@@ -151,9 +164,12 @@ static void the_page_is_there(void **state)
 static void the_log_is_read_on(void **state)
 {
     (void)state;
-    static const struct { const char *path, *body, *about; } parts[] = {
-        {"/log", "a,b\n1,2\n", "{\"from\":0}"}, {"/log?from=4", "1,2\n", "{\"from\":4}"}, {"/log?from=8", "", "{\"from\":8}"},
-        {"/log?from=9", "a,b\n1,2\n", "{\"from\":0}"}};
+    static const struct {
+        const char *path, *body, *about;
+    } parts[] = {{"/log", "a,b\n1,2\n", "{\"from\":0}"},
+                 {"/log?from=4", "1,2\n", "{\"from\":4}"},
+                 {"/log?from=8", "", "{\"from\":8}"},
+                 {"/log?from=9", "a,b\n1,2\n", "{\"from\":0}"}};
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
         reply r = http_get(port, parts[i].path);
         assert_int_equal(r.code, 200);
@@ -175,7 +191,7 @@ static void status_is_what_was_set(void **state)
     free(r.text);
 }
 
-/* ---- the queue --------------------------------------------------------------------------------------------------------------------- */
+/* ---- the queue ---- */
 
 static void expect(int fd, int code, const char *body)
 {
@@ -193,7 +209,8 @@ static server_job *wait_for_job(server *from)
     return job;
 }
 
-/* What was sent before has been read after this: the server looks at all connections in each round of its one thread. */
+/* What was sent before has been read after this: the server looks at all connections in each round of its one
+   thread. */
 static void settle(int at)
 {
     for (int i = 0; i < 2; i++) {
@@ -219,7 +236,8 @@ static void the_newest_picture_wins(void **state)
     server_job *other = wait_for_job(s);
     if (server_request(job)->kind != REQUEST_RENDER) { /* they came on two connections, in any order */
         server_job *swap = job;
-        job = other, other = swap;
+        job = other;
+        other = swap;
     }
     assert_true(server_request(job)->kind == REQUEST_RENDER && server_request(job)->view == 1 &&
                 server_request(other)->kind == REQUEST_PHOTO);
@@ -300,12 +318,13 @@ static void the_end_answers_all(void **state)
     free(r.text);
 }
 
-/* ---- with a token ------------------------------------------------------------------------------------------------------------------ */
+/* ---- with a token ---- */
 
 static reply get_with(int at, const char *path, const char *headers)
 {
     char head[1024];
-    const int length = snprintf(head, sizeof head, "GET %s HTTP/1.1\r\n%sConnection: close\r\n\r\n", path, headers);
+    const int length =
+        snprintf(head, sizeof head, "GET %s HTTP/1.1\r\n%sConnection: close\r\n\r\n", path, headers);
     return http_raw(at, head, (size_t)length);
 }
 
@@ -314,7 +333,8 @@ static void assert_code(int at, const char *path, const char *headers, int code)
     reply r = get_with(at, path, headers);
     if (r.code != code)
         fail_msg("%s %s: wanted %d, got %.300s", path, headers, code, r.text);
-    if (code == 403 && (r.body_count == 0 || strchr(r.body, '\n') != r.body + r.body_count - 1 || strncmp(r.body, "error: ", 7) != 0))
+    if (code == 403 && (r.body_count == 0 || strchr(r.body, '\n') != r.body + r.body_count - 1 ||
+                        strncmp(r.body, "error: ", 7) != 0))
         fail_msg("%s %s: wanted one line, got \"%s\"", path, headers, r.body);
     if (code == 403 && strstr(r.text, "Set-Cookie") != NULL)
         fail_msg("%s %s: a cookie for a stranger", path, headers);
@@ -324,7 +344,8 @@ static void assert_code(int at, const char *path, const char *headers, int code)
 static void others_need_the_token(void **state)
 {
     (void)state;
-    static const char *const paths[] = {"/", "/index.html", "/view.js", "/status", "/log", "/scene", "/render?view=0", "/nowhere"};
+    static const char *const paths[] = {"/",    "/index.html", "/view.js",       "/status",
+                                        "/log", "/scene",      "/render?view=0", "/nowhere"};
     static const char host[] = "Host: 192.168.1.5:8470\r\n";
     server *other;
     guard g;
@@ -334,14 +355,16 @@ static void others_need_the_token(void **state)
     const int at = server_port(other);
     for (size_t i = 0; i < sizeof paths / sizeof *paths; i++) {
         assert_code(at, paths[i], host, 403);
-        assert_code(at, paths[i], "Host: 127.0.0.1\r\n", 403); /* from this machine too: its address is not whose request it is */
+        assert_code(at, paths[i], "Host: 127.0.0.1\r\n", 403); /* from this machine too: its address is not
+                                                                  whose request it is */
     }
     assert_code(at, "/status?token=", host, 403);
     assert_code(at, "/status?token=00000000000000000000000000000000", host, 403);
     snprintf(path, sizeof path, "/?token=%s", g.token);
     reply r = get_with(at, path, host);
     assert_int_equal(r.code, 200);
-    snprintf(wanted, sizeof wanted, "Set-Cookie: gbtrace_%d=%s; Path=/; HttpOnly; SameSite=Strict\r\n", at, g.token);
+    snprintf(wanted, sizeof wanted, "Set-Cookie: gbtrace_%d=%s; Path=/; HttpOnly; SameSite=Strict\r\n", at,
+             g.token);
     assert_has(&r, wanted);
     assert_has(&r, "Referrer-Policy: no-referrer");
     free(r.text);
@@ -352,13 +375,16 @@ static void others_need_the_token(void **state)
     /* with the token, but for a foreign name or another site */
     snprintf(headers, sizeof headers, "Host: evil.example:8470\r\nCookie: gbtrace_%d=%s\r\n", at, g.token);
     assert_code(at, "/status", headers, 403);
-    snprintf(headers, sizeof headers, "%sOrigin: http://192.168.1.5:80\r\nCookie: gbtrace_%d=%s\r\n", host, at, g.token);
+    snprintf(headers, sizeof headers, "%sOrigin: http://192.168.1.5:80\r\nCookie: gbtrace_%d=%s\r\n", host,
+             at, g.token);
     assert_code(at, "/status", headers, 403);
     snprintf(headers, sizeof headers, "%sOrigin: null\r\nCookie: gbtrace_%d=%s\r\n", host, at, g.token);
     assert_code(at, "/status", headers, 403);
-    snprintf(headers, sizeof headers, "%sSec-Fetch-Site: same-site\r\nCookie: gbtrace_%d=%s\r\n", host, at, g.token);
+    snprintf(headers, sizeof headers, "%sSec-Fetch-Site: same-site\r\nCookie: gbtrace_%d=%s\r\n", host, at,
+             g.token);
     assert_code(at, "/status", headers, 403);
-    snprintf(headers, sizeof headers, "%sOrigin: http://192.168.1.5:8470\r\nCookie: gbtrace_%d=%s\r\n", host, at, g.token);
+    snprintf(headers, sizeof headers, "%sOrigin: http://192.168.1.5:8470\r\nCookie: gbtrace_%d=%s\r\n", host,
+             at, g.token);
     assert_code(at, "/status", headers, 200);
     server_stop(other);
 }

@@ -1,5 +1,6 @@
-/* tests/view/test_view.c -- gbt_view() on a tiny run: the same pictures as gbt_render(), photos, points behind pixels, newer models, the
-   end. */
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/view/test_view.c -- gbt_view() on a tiny run: the same pictures as gbt_render(), photos, points
+   behind pixels, newer models, the end. */
 #include "train/run_support.h"
 #include "view/http_client.h"
 
@@ -13,7 +14,7 @@
 #include "gbtrace/export.h"
 #include "gbtrace/view.h"
 
-/* ---- the viewer in a thread of its own ---------------------------------------------------------------------------------------------- */
+/* ---- the viewer in a thread of its own ---- */
 
 typedef struct viewer {
     pthread_t thread;
@@ -44,7 +45,9 @@ static int open_viewer(viewer *v, const char *input)
 {
     int port = 0;
     *v = (viewer){.input = input, .def = gbt_view_def_default()};
-    v->def.port = 0, v->def.ready = tell, v->def.context = v;
+    v->def.port = 0;
+    v->def.ready = tell;
+    v->def.context = v;
     assert_int_equal(pipe(v->ready), 0);
     assert_int_equal(pthread_create(&v->thread, NULL, view, v), 0);
     const ssize_t got = read(v->ready[0], &port, sizeof port);
@@ -108,7 +111,7 @@ static int clean_up(void **state)
     return remove_root(state);
 }
 
-/* ---- pictures ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- pictures ---- */
 
 static void assert_same_pixels(const reply *rgba, const char *png)
 {
@@ -116,7 +119,8 @@ static void assert_same_pixels(const reply *rgba, const char *png)
     assert_ok(image_read(png, &file, NULL));
     assert_int_equal(rgba->body_count, 4 * file.width * file.height);
     for (size_t i = 0; i < rgba->body_count; i++)
-        if ((unsigned char)rgba->body[i] != (i % 4 == 3 ? 255 : (int)(file.pixels[i / 4 * (size_t)file.channels + i % 4] * 255 + 0.5f)))
+        if ((unsigned char)rgba->body[i] !=
+            (i % 4 == 3 ? 255 : (int)(file.pixels[i / 4 * (size_t)file.channels + i % 4] * 255 + 0.5f)))
             fail_msg("%s: byte %zu", png, i);
     image_free(&file);
 }
@@ -127,11 +131,13 @@ static void views_are_what_render_draws(void **state)
     viewer v;
     gbt_render_def def = gbt_render_def_default();
     const int port = open_viewer(&v, run_folder);
-    json_t *there = get_json(port, "/scene"), *views = json_object_get(there, "views"), *first = json_array_get(views, 0);
+    json_t *there = get_json(port, "/scene"), *views = json_object_get(there, "views"),
+           *first = json_array_get(views, 0);
     char path[2 * PATH_SIZE], file[PATH_SIZE];
     assert_int_equal(json_array_size(views), VIEWS);
     assert_true(json_is_true(json_object_get(first, "test")));
-    assert_true(number_of(first, "width") == 48 && number_of(first, "height") == 36 && number_of(there, "anchors") > 0);
+    assert_true(number_of(first, "width") == 48 && number_of(first, "height") == 36 &&
+                number_of(there, "anchors") > 0);
     assert_ok(gbt_render(run_folder, in_root("drawn"), &def, NULL));
     snprintf(file, sizeof file, "drawn/%s", json_string_value(json_object_get(first, "name")));
     for (int i = 0; i < 2; i++) { /* drawn, and kept from before */
@@ -151,14 +157,17 @@ static void views_are_what_render_draws(void **state)
 static void cameras_are_what_render_draws(void **state)
 {
     (void)state;
-    static const char *const lenses[] = {"\"model\":\"pinhole\",\"fov_x_deg\":70", "\"model\":\"fisheye\",\"fov_x_deg\":200",
-                                         "\"model\":\"orthographic\",\"view_width\":3", "\"model\":\"equirectangular\""};
+    static const char *const lenses[] = {
+        "\"model\":\"pinhole\",\"fov_x_deg\":70", "\"model\":\"fisheye\",\"fov_x_deg\":200",
+        "\"model\":\"orthographic\",\"view_width\":3", "\"model\":\"equirectangular\""};
     viewer v;
     const int port = open_viewer(&v, run_folder);
     for (size_t i = 0; i < sizeof lenses / sizeof *lenses; i++) {
         char text[512], path[600];
-        const int length = snprintf(text, sizeof text,
-                                    "{\"origin\":[0.5,-2,1],\"target\":[0,0,0.2],\"up\":[0,0,1],\"width\":40,\"height\":20,%s}", lenses[i]);
+        const int length = snprintf(
+            text, sizeof text,
+            "{\"origin\":[0.5,-2,1],\"target\":[0,0,0.2],\"up\":[0,0,1],\"width\":40,\"height\":20,%s}",
+            lenses[i]);
         gbt_render_def def = gbt_render_def_default();
         def.camera = in_root("lens.json");
         assert_ok(file_write_atomic(def.camera, text, (size_t)length, NULL));
@@ -186,7 +195,7 @@ static void samples_are_other_points_of_the_pixels(void **state)
     viewer v;
     const int port = open_viewer(&v, run_folder);
     reply middle = get_ok(port, "/render?view=1&sample=0"), other = get_ok(port, "/render?view=1&sample=3"),
-        again = get_ok(port, "/render?view=1&sample=3");
+          again = get_ok(port, "/render?view=1&sample=3");
     const double moved = mean_difference(&middle, &other);
     assert_true(moved > 0.01 && moved < 8);
     assert_true(mean_difference(&other, &again) == 0);
@@ -197,7 +206,10 @@ static void samples_are_other_points_of_the_pixels(void **state)
     free(again.text);
     again = get_ok(port, "/render?view=1&sample=3");
     assert_true(mean_difference(&other, &again) == 0);
-    free(middle.text), free(other.text), free(again.text), free(after.text);
+    free(middle.text);
+    free(other.text);
+    free(again.text);
+    free(after.text);
     close_viewer(&v, SIGINT);
 }
 
@@ -205,7 +217,8 @@ static void samples_are_other_points_of_the_pixels(void **state)
 static void a_background_is_chosen(void **state)
 {
     (void)state;
-    static const char away[] = "{\"origin\":[0,0,900],\"target\":[0,0,999],\"up\":[0,1,0],\"width\":8,\"height\":8,\"fov_x_deg\":30}";
+    static const char away[] = "{\"origin\":[0,0,900],\"target\":[0,0,999],\"up\":[0,1,0],\"width\":8,"
+                               "\"height\":8,\"fov_x_deg\":30}";
     static const char *const renderers[] = {"trace", "raster", "per-ray"};
     viewer v;
     const int port = open_viewer(&v, run_folder);
@@ -215,7 +228,8 @@ static void a_background_is_chosen(void **state)
         reply before = get_ok(port, path);
         reply r;
         for (int sample = 0; sample < 2; sample++) {
-            snprintf(path, sizeof path, "/render?renderer=%s&background=336600&sample=%d&camera=%s", renderers[i], sample, away);
+            snprintf(path, sizeof path, "/render?renderer=%s&background=336600&sample=%d&camera=%s",
+                     renderers[i], sample, away);
             r = get_ok(port, path);
             for (size_t k = 0; k < r.body_count; k++)
                 assert_int_equal((unsigned char)r.body[k], ((unsigned char[]){0x33, 0x66, 0, 255})[k % 4]);
@@ -224,7 +238,8 @@ static void a_background_is_chosen(void **state)
         snprintf(path, sizeof path, "/render?renderer=%s&camera=%s", renderers[i], away);
         r = get_ok(port, path);
         assert_true(mean_difference(&before, &r) == 0);
-        free(before.text), free(r.text);
+        free(before.text);
+        free(r.text);
     }
     close_viewer(&v, SIGINT);
 }
@@ -232,28 +247,38 @@ static void a_background_is_chosen(void **state)
 static void every_format_and_output(void **state)
 {
     (void)state;
-    static const struct { const char *words, *starts; size_t bytes; } pictures[] = {
-        {"", NULL, 48 * 36 * 4}, {"&format=float", NULL, 48 * 36 * 12}, {"&format=jpeg&quality=50", "\xff\xd8\xff", 0},
-        {"&format=png", "\x89PNG", 0},
-        {"&renderer=raster", NULL, 48 * 36 * 4}, {"&renderer=per-ray&sample=2", NULL, 48 * 36 * 4}, {"&preset=exact", NULL, 48 * 36 * 4},
-        {"&output=depth&format=float", NULL, 48 * 36 * 4}, {"&output=median-depth&format=float", NULL, 48 * 36 * 4},
-        {"&output=normal&format=float", NULL, 48 * 36 * 12},
-        {"&output=transmittance&format=float", NULL, 48 * 36 * 4}, {"&output=hits&format=float", NULL, 48 * 36 * 4},
-        {"&output=anchor&format=float", NULL, 48 * 36 * 4},
-        {"&width=20&height=15", NULL, 20 * 15 * 4}};
+    static const struct {
+        const char *words, *starts;
+        size_t bytes;
+    } pictures[] = {{"", NULL, 48 * 36 * 4},
+                    {"&format=float", NULL, 48 * 36 * 12},
+                    {"&format=jpeg&quality=50", "\xff\xd8\xff", 0},
+                    {"&format=png", "\x89PNG", 0},
+                    {"&renderer=raster", NULL, 48 * 36 * 4},
+                    {"&renderer=per-ray&sample=2", NULL, 48 * 36 * 4},
+                    {"&preset=exact", NULL, 48 * 36 * 4},
+                    {"&output=depth&format=float", NULL, 48 * 36 * 4},
+                    {"&output=median-depth&format=float", NULL, 48 * 36 * 4},
+                    {"&output=normal&format=float", NULL, 48 * 36 * 12},
+                    {"&output=transmittance&format=float", NULL, 48 * 36 * 4},
+                    {"&output=hits&format=float", NULL, 48 * 36 * 4},
+                    {"&output=anchor&format=float", NULL, 48 * 36 * 4},
+                    {"&width=20&height=15", NULL, 20 * 15 * 4}};
     viewer v;
     const int port = open_viewer(&v, run_folder);
     for (size_t i = 0; i < sizeof pictures / sizeof *pictures; i++) {
         char path[128];
         snprintf(path, sizeof path, "/render?view=2%s", pictures[i].words);
         reply r = get_ok(port, path);
-        if (pictures[i].bytes != 0 ? r.body_count != pictures[i].bytes : memcmp(r.body, pictures[i].starts,
-                                                                                strlen(pictures[i].starts)) != 0)
+        if (pictures[i].bytes != 0 ? r.body_count != pictures[i].bytes
+                                   : memcmp(r.body, pictures[i].starts, strlen(pictures[i].starts)) != 0)
             fail_msg("%s: %zu bytes", path, r.body_count);
         free(r.text);
     }
-    static const char *const wrong[] = {"/render?view=9", "/photo?view=9", "/pick?view=0&x=48&y=0", "/pick?view=9&x=1&y=1",
-                                        "/render?renderer=raster&camera={\"origin\":[0,0,0],\"target\":[0,0,1],\"up\":[0,1,0],\"model\":\"equirectangular\",\"width\":8,\"height\":4}"};
+    static const char *const wrong[] = {
+        "/render?view=9", "/photo?view=9", "/pick?view=0&x=48&y=0", "/pick?view=9&x=1&y=1",
+        "/render?renderer=raster&camera={\"origin\":[0,0,0],\"target\":[0,0,1],\"up\":[0,1,0],\"model\":"
+        "\"equirectangular\",\"width\":8,\"height\":4}"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         reply r = http_get(port, wrong[i]);
         if (r.code != 400 || strncmp(r.body, "error: ", 7) != 0)
@@ -269,11 +294,14 @@ static int smoothest(const float *depth)
     int best = -1;
     float least = 0.02f;
     for (int i = 48; i < 48 * 35; i++) {
-        const float most = fmaxf(fmaxf(depth[i - 1], depth[i + 1]), fmaxf(depth[i - 48], depth[i + 48])), d = fmaxf(most, depth[i]);
+        const float most = fmaxf(fmaxf(depth[i - 1], depth[i + 1]), fmaxf(depth[i - 48], depth[i + 48])),
+                    d = fmaxf(most, depth[i]);
         const float low = fminf(fminf(depth[i - 1], depth[i + 1]), fminf(depth[i - 48], depth[i + 48])),
-            step = (d - fminf(low, depth[i])) / d;
-        if (depth[i] > 0 && step < least)
-            best = i, least = step;
+                    step = (d - fminf(low, depth[i])) / d;
+        if (depth[i] > 0 && step < least) {
+            best = i;
+            least = step;
+        }
     }
     assert_true(best > 0);
     return best;
@@ -292,23 +320,28 @@ static void points_lie_behind_their_pixels(void **state)
     memcpy(depth, depths.body, sizeof depth);
     const int at = smoothest(depth);
     snprintf(path, sizeof path, "/pick?view=0&x=%d.5&y=%d.5", at % 48, at / 48);
-    json_t *there = get_json(port, "/scene"), *found = get_json(port, path), *point = json_object_get(found, "point");
-    const json_t *origin = json_object_get(json_object_get(json_array_get(json_object_get(there, "views"), 0), "camera"), "origin");
+    json_t *there = get_json(port, "/scene"), *found = get_json(port, path),
+           *point = json_object_get(found, "point");
+    const json_t *origin = json_object_get(
+        json_object_get(json_array_get(json_object_get(there, "views"), 0), "camera"), "origin");
     double square = 0;
     assert_true(json_is_true(json_object_get(found, "hit")));
     for (size_t k = 0; k < 3; k++) {
-        const double d = json_number_value(json_array_get(point, k)) - json_number_value(json_array_get(origin, k));
+        const double d =
+            json_number_value(json_array_get(point, k)) - json_number_value(json_array_get(origin, k));
         square += d * d;
     }
     assert_true(fabs(sqrt(square) / number_of(found, "depth") - 1) < 1e-5);
-    assert_true(fabs(number_of(found, "depth") / (double)depth[at] - 1) < 0.02); /* Gaussians are as wide as pixels, and these differ by the
-                                                                                    lens */
-    json_decref(there), json_decref(found);
+    assert_true(fabs(number_of(found, "depth") / (double)depth[at] - 1) < 0.02); /* Gaussians are as wide as
+                                                                                    pixels, and these differ
+                                                                                    by the lens */
+    json_decref(there);
+    json_decref(found);
     free(depths.text);
     close_viewer(&v, SIGINT);
 }
 
-/* ---- while it trains ----------------------------------------------------------------------------------------------------------------- */
+/* ---- while it trains ---- */
 
 static void wait_for_version(int port, int version)
 {
@@ -350,9 +383,11 @@ static void newer_models_are_shown(void **state)
     assert_ok(file_write_atomic(model, "damaged", 7, NULL)); /* said, and the old one stays */
     for (json_t *status = NULL; status == NULL;) {
         status = get_json(port, "/status");
-        if (strstr(json_string_value(json_object_get(status, "note")), "model.gbt") == NULL)
-            json_decref(status), status = NULL, usleep(50000);
-        else
+        if (strstr(json_string_value(json_object_get(status, "note")), "model.gbt") == NULL) {
+            json_decref(status);
+            status = NULL;
+            usleep(50000);
+        } else
             json_decref(status);
     }
     reply same = get_ok(port, "/render?view=0");
@@ -367,7 +402,9 @@ static void newer_models_are_shown(void **state)
     assert_true(number_of(status, "iterations") == 20);
     assert_string_equal(json_string_value(json_object_get(status, "note")), "");
     json_decref(status);
-    free(before.text), free(same.text), free(after.text);
+    free(before.text);
+    free(same.text);
+    free(after.text);
     close_viewer(&v, SIGINT);
     free(live);
 }
@@ -375,7 +412,8 @@ static void newer_models_are_shown(void **state)
 static void plain_gaussians_are_shown(void **state)
 {
     (void)state;
-    static const char camera[] = "{\"origin\":[0.5,-2,1],\"target\":[0,0,0.2],\"up\":[0,0,1],\"width\":40,\"height\":30,\"fov_x_deg\":60}";
+    static const char camera[] = "{\"origin\":[0.5,-2,1],\"target\":[0,0,0.2],\"up\":[0,0,1],\"width\":40,"
+                                 "\"height\":30,\"fov_x_deg\":60}";
     const char *ply = in_root("plain.ply");
     gbt_export_def baked = gbt_export_def_default();
     baked.refine_steps = 0;
@@ -383,7 +421,8 @@ static void plain_gaussians_are_shown(void **state)
     viewer v;
     const int port = open_viewer(&v, ply);
     json_t *there = get_json(port, "/scene"), *status = get_json(port, "/status");
-    assert_true(json_is_true(json_object_get(there, "plain")) && number_of(there, "gaussians") > 0 && number_of(there, "size") > 0);
+    assert_true(json_is_true(json_object_get(there, "plain")) && number_of(there, "gaussians") > 0 &&
+                number_of(there, "size") > 0);
     assert_int_equal(json_array_size(json_object_get(there, "views")), 0);
     assert_string_equal(json_string_value(json_object_get(status, "note")), "");
     gbt_render_def def = gbt_render_def_default();
@@ -399,27 +438,36 @@ static void plain_gaussians_are_shown(void **state)
     r = get_ok(port, path);
     assert_int_equal(r.body_count, 40 * 30 * 4);
     free(r.text);
-    json_decref(there), json_decref(status);
+    json_decref(there);
+    json_decref(status);
     close_viewer(&v, SIGINT);
 }
 
 static void what_cannot_be_shown(void **state)
 {
     (void)state;
-    static const struct { const char *input, *data, *says, *host; int port; gbt_status status; } rows[] = {
-        {"nowhere", NULL, "nowhere", NULL, 0, GBT_ERR_IO}, {"tiny", NULL, "model.gbt: not there", NULL, 0, GBT_ERR_IO},
-        {"tiny/images", NULL, "model.gbt", NULL, 0, GBT_ERR_IO},
-        {"run/config", NULL, "config", NULL, 0, GBT_ERR_FORMAT}, {"run", "nowhere", "nowhere", NULL, 0, GBT_ERR_IO},
-        {"run", NULL, "--port: 65536", NULL, 65536, GBT_ERR_ARGUMENT},
-        {"run", NULL, "--host: \"here\"", "here", 0, GBT_ERR_ARGUMENT},
-        {"run", NULL, "203.0.113.77:0: cannot listen", "203.0.113.77", 0, GBT_ERR_IO}};
+    static const struct {
+        const char *input, *data, *says, *host;
+        int port;
+        gbt_status status;
+    } rows[] = {{"nowhere", NULL, "nowhere", NULL, 0, GBT_ERR_IO},
+                {"tiny", NULL, "model.gbt: not there", NULL, 0, GBT_ERR_IO},
+                {"tiny/images", NULL, "model.gbt", NULL, 0, GBT_ERR_IO},
+                {"run/config", NULL, "config", NULL, 0, GBT_ERR_FORMAT},
+                {"run", "nowhere", "nowhere", NULL, 0, GBT_ERR_IO},
+                {"run", NULL, "--port: 65536", NULL, 65536, GBT_ERR_ARGUMENT},
+                {"run", NULL, "--host: \"here\"", "here", 0, GBT_ERR_ARGUMENT},
+                {"run", NULL, "203.0.113.77:0: cannot listen", "203.0.113.77", 0, GBT_ERR_IO}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         gbt_view_def def = gbt_view_def_default();
         gbt_error err = {0};
-        def.port = rows[i].port, def.host = rows[i].host, def.data = rows[i].data != NULL ? in_root("%s", rows[i].data) : NULL;
+        def.port = rows[i].port;
+        def.host = rows[i].host;
+        def.data = rows[i].data != NULL ? in_root("%s", rows[i].data) : NULL;
         const gbt_status status = gbt_view(in_root("%s", rows[i].input), &def, &err);
         if (status != rows[i].status || strstr(err.text, rows[i].says) == NULL)
-            fail_msg("%s: wanted %d with \"%s\", got %d: %s", rows[i].input, (int)rows[i].status, rows[i].says, (int)status, err.text);
+            fail_msg("%s: wanted %d with \"%s\", got %d: %s", rows[i].input, (int)rows[i].status,
+                     rows[i].says, (int)status, err.text);
     }
 }
 
@@ -437,7 +485,8 @@ static void a_model_without_its_photos(void **state)
     assert_int_equal(json_array_size(json_object_get(there, "views")), 0);
     assert_true(number_of(there, "size") > 0);
     assert_non_null(strstr(json_string_value(json_object_get(status, "note")), "No photos: "));
-    json_decref(there), json_decref(status);
+    json_decref(there);
+    json_decref(status);
     close_viewer(&v, SIGINT);
 }
 

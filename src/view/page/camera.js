@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // camera.js -- where the camera is and how it moves. Axes and units are the data set's; a camera is what a camera file says (docs/cameras.md).
 
 export const add = (a, b) => a.map((x, i) => x + b[i]);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // hands.js -- pointers, wheel and keys to movements; what they do to the camera is not known here.
 
 const keysOf = {

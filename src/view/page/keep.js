@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // keep.js -- what is shown to a file, texts to the clipboard.
 
 export function savePicture(canvas, name) {

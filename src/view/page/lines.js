@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // lines.js -- lines over the picture, by the camera that it was drawn with: the floor's grid, the axes, the photos' cameras.
 import { add, cross, dot, length, mul, sub, unit } from "./camera.js";
 

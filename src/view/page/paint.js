@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // paint.js -- numbers to colours: outputs beside colour, and the difference of two pictures.
 
 // Dark blue, teal, green, yellow, near white: rising in lightness, so that order shows in grey too.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // pictures.js -- one picture after the other: of fewer pixels while the camera moves, then whole, then more rays per pixel, averaged.
 
 const frameMs = 70, wholeMs = 400, stillMs = 180, retryMs = 150, callMs = 5, leastSide = 240;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // subject.js -- what the photos look at, and how large it is: where orbits turn, how fast flights are, what F shows.
 import { cross, dot, length, sub, unit } from "./camera.js";
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // training.js -- how the run goes on: polls /status, reads what log.csv has new, draws PSNR by step.
 
 const pollMs = 1000, liveSeconds = 15;

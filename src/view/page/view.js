@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // view.js -- the page put together: controls to camera, camera to pictures, pictures to canvases.
 import { Camera, sub } from "./camera.js";
 import { Lines, roundBelow } from "./lines.js";

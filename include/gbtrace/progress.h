@@ -38,7 +38,7 @@ typedef void (*gbt_listener)(const gbt_event *event, void *context);
  * The listener is called by one thread at a time, and must not call the library.
  * Threads: not while another call runs.
  */
-void gbt_listen(gbt_listener listener, void *context);
+void gbt_listen(gbt_listener to, void *context);
 
 GBT_API_END
 #endif

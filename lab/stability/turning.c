@@ -260,7 +260,7 @@ static void turn_slowly(stability *s)
         s, "Turning the camera",
         "Red in one fixed direction. Only the camera turns; it should stay the same.", "yaw, degrees", "red");
     for (int i = -half; i <= half && s->status == GBT_OK; i++) {
-        double aside[3];
+        double aside[3] = {0};
         draw_turned(i * step * degree, 0, camera.rotation);
         draw_camera(s, &ours->d, &g, &settings, &camera, &rays);
         draw_splatted(s, &theirs->d, &g, &splat, &camera);

@@ -20,7 +20,7 @@ gbt_status gaussian_file_check_readable(const char *path, gbt_error *err);
 
 /** Read a .ply, .splat or .spz, or the newest .ply of a result folder. GBT_ERR_ARGUMENT for anything else;
     else as its reader. Free with gaussian_cloud_free(). */
-gbt_status gaussian_file_read(const char *path, gaussian_cloud *out, gbt_error *err);
+gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error *err);
 
 /** GBT_ERR_ARGUMENT unless the name ends in .ply, .splat, .spz or .glb: before any work is done. */
 gbt_status gaussian_file_check_writable(const char *path, gbt_error *err);

@@ -316,7 +316,7 @@ static gbt_status find_photo(const char *folder, const char *name, char path[PAT
     *found = false;
     for (size_t i = 0; i < sizeof endings / sizeof endings[0] && !*found; i++) {
         GBT_TRY(file_join(path, PATH_SIZE - 8, folder, name, err));
-        strcat(path, endings[i]);
+        memcpy(path + strlen(path), endings[i], strlen(endings[i]) + 1); /* the 8 bytes left out above */
         *found = file_exists(path) && !file_is_folder(path);
     }
     return GBT_OK;

@@ -250,18 +250,20 @@ static int32_t code_int(range_coder *c, const int_contexts *x, int32_t value)
 {
     const uint32_t magnitude = (uint32_t)(value < 0 ? -value : value) + 1;
     const int own = 31 - __builtin_clz(magnitude);
-    int class = 0;
-    while (class < CLASS_MAX && int_bit(c, x, (size_t)(BIN_CLASS + class), class < own))
-        class ++;
-    if (class == 0)
+    int magnitude_class = 0;
+    while (magnitude_class < CLASS_MAX &&
+           int_bit(c, x, (size_t)(BIN_CLASS + magnitude_class), magnitude_class < own))
+        magnitude_class++;
+    if (magnitude_class == 0)
         return 0;
     uint32_t out = 1;
-    int left = class;
-    for (int k = 0; k < MANTISSA_BITS && left > 0 && class <= MANTISSA_CLASSES; k++) {
+    int left = magnitude_class;
+    for (int k = 0; k < MANTISSA_BITS && left > 0 && magnitude_class <= MANTISSA_CLASSES; k++) {
         left--;
         const size_t node = out - 1; /* 0; 1, 2; 3 .. 6 */
-        out = out << 1 | (uint32_t)int_bit(c, x, (size_t)BIN_MANTISSA + (size_t)(class - 1) * 7 + node,
-                                           (int)(magnitude >> left & 1));
+        out = out << 1 |
+              (uint32_t)int_bit(c, x, (size_t)BIN_MANTISSA + (size_t)(magnitude_class - 1) * 7 + node,
+                                (int)(magnitude >> left & 1));
     }
     out = (uint32_t)((uint64_t)out << left) |
           coder_plain(c, left, left > 0 ? magnitude & ((1u << left) - 1) : 0);

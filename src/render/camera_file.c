@@ -131,23 +131,24 @@ static gbt_status take_rays(const json_fields *r, const double origin[3], camera
     return ray_image_read(path, origin, &out->rays, r->err);
 }
 
-gbt_status camera_file_take(const json_fields *r, const double origin[3], camera_file *out)
+gbt_status camera_file_take(const json_fields *fields, const double origin[3], camera_file *out)
 {
     gbt_camera camera = {0};
     out->shot = ray_shot_of(&camera);
-    if (json_field_given(r, "rays"))
-        return take_rays(r, origin, out);
-    GBT_TRY(json_field_names(r, " origin target up model width height fov_x_deg view_width aperture focus "
-                                "samples seed end shutter rays near_clip far_clip "));
+    if (json_field_given(fields, "rays"))
+        return take_rays(fields, origin, out);
+    GBT_TRY(json_field_names(fields,
+                             " origin target up model width height fov_x_deg view_width aperture focus "
+                             "samples seed end shutter rays near_clip far_clip "));
     stand start = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
-    GBT_TRY(take_lens(r, &camera));
-    GBT_TRY(take_pose(r, true, origin, &start, &camera));
+    GBT_TRY(take_lens(fields, &camera));
+    GBT_TRY(take_pose(fields, true, origin, &start, &camera));
     out->shot = ray_shot_of(&camera);
-    GBT_TRY(take_aperture(r, &out->shot));
-    GBT_TRY(take_shutter(r, origin, &start, &out->shot));
+    GBT_TRY(take_aperture(fields, &out->shot));
+    GBT_TRY(take_shutter(fields, origin, &start, &out->shot));
     gbt_error why = {0};
     if (ray_shot_check(&out->shot, &why) != GBT_OK)
-        return base_fail(r->err, GBT_ERR_FORMAT, "%s: %s", r->path, why.text);
+        return base_fail(fields->err, GBT_ERR_FORMAT, "%s: %s", fields->path, why.text);
     return GBT_OK;
 }
 

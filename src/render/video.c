@@ -66,7 +66,6 @@ static gbt_status start(video *v, char *const *arguments, gbt_error *err)
     posix_spawn_file_actions_adddup2(&actions, ends[1], STDIN_FILENO);
     posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
     posix_spawn_file_actions_adddup2(&actions, fileno(v->complaints), STDERR_FILENO);
-    extern char **environ;
     const int code = posix_spawnp(&v->process, "ffmpeg", &actions, NULL, arguments, environ);
     posix_spawn_file_actions_destroy(&actions);
     close(ends[1]);

@@ -35,7 +35,7 @@ int chart_ticks(double low, double high, int wanted, double *ticks)
 int chart_log_ticks(double low, double high, double *ticks)
 {
     static const int digits[] = {1, 2, 5};
-    int first = 3 * (int)floor(log10(low)), last = first; /* tick k is digits[k mod 3] * 10^(k / 3) */
+    int first = 3 * (int)floor(log10(low)), last; /* tick k is digits[k mod 3] * 10^(k / 3) */
     int stride = 1;
 #define LOG_TICK(k) (digits[(((k) % 3) + 3) % 3] * pow(10, floor((k) / 3.0)))
     while (LOG_TICK(first + 1) <= low * 1.0000001)

@@ -125,9 +125,10 @@ char *studio_status(const studio *s)
     }
     char *text = status != NULL ? json_dumps(status, JSON_COMPACT) : NULL;
     json_decref(status);
-    char *out = text != NULL ? mem_alloc(strlen(text) + 1, 1, "status", NULL) : NULL;
+    const size_t size = text != NULL ? strlen(text) + 1 : 0;
+    char *out = text != NULL ? mem_alloc(size, 1, "status", NULL) : NULL;
     if (out != NULL)
-        strcpy(out, text);
+        memcpy(out, text, size);
     free(text);
     return out;
 }

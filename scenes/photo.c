@@ -57,9 +57,9 @@ static int sample(const photo_job *job, int column, int row, int x, int y, int n
         world_sky(job->w, dir, rgb);
         return -1;
     }
-    /* The lamp is sampled by an additive recurrence (R2), which is even for every number of samples. It is
-       the same for every pixel: a soft shadow then has faint steps but no grain, and all views agree about
-       it. */
+    /* The lamp is sampled by an additive recurrence (R2, Roberts 2018), which is even for every number of
+       samples. It is the same for every pixel: a soft shadow then has faint steps but no grain, and all views
+       agree about it. */
     const float jitter[2] = {fraction(0.5f + 0.7548777f * (float)number),
                              fraction(0.5f + 0.5698403f * (float)number)};
     world_shade(job->w, &s, dir, jitter, rgb);

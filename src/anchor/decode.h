@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/decode.h -- anchors + camera centre -> Gaussians, and back (Scaffold-GS eqs 13-15;
-   docs/training.md). */
+/* anchor/decode.h -- anchors + camera centre -> Gaussians, and back (Lu 2024; Yang 2026, eqs
+   13-15; docs/training.md). */
 #ifndef GBT_ANCHOR_DECODE_H
 #define GBT_ANCHOR_DECODE_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/decode_ref.c -- the decoder in double, written from the equations (Scaffold-GS eqs 13-15) without
+/* anchor/decode_ref.c -- the decoder in double, written from the equations (Yang 2026, eqs 13-15) without
    any regard for speed. */
 #include "anchor/decode_ref.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/init.c -- anchors from balls, voxels or points, and their first scale.
+/* anchor/init.c -- anchors from balls, voxels or points, and their first scale (Yang 2026).
 
    points --> balls (GBAI, eq 28), voxels (eq 12) or some points --> centres
         --> spacing (+ ball radius: GBSP, eqs 29-34) --> log-scales */

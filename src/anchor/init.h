@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/init.h -- where anchors come from: balls (GBAI), voxels or points, with a scale from balls (GBSP) or
-   from neighbours. */
+   from neighbours (Yang 2026, eqs 28-34). */
 #ifndef GBT_ANCHOR_INIT_H
 #define GBT_ANCHOR_INIT_H
 

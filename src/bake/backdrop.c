@@ -47,7 +47,8 @@ gbt_status backdrop_add(gaussian_cloud *cloud, const gbt_camera *cameras, size_t
     memcpy(all.quat, cloud->quat, 4 * n * sizeof *all.quat);
     memcpy(all.opacity, cloud->opacity, n * sizeof *all.opacity);
     memcpy(all.sh, cloud->sh, n * sh_width * sizeof *all.sh);
-    for (size_t i = 0; i < BACKDROP_COUNT; i++) { /* evenly over the sphere: a Fibonacci spiral */
+    for (size_t i = 0; i < BACKDROP_COUNT; i++) { /* evenly over the sphere: a Fibonacci spiral (Gonzalez
+                                                     2010) */
         const size_t to = n + i;
         const double z = 1 - (2 * (double)i + 1) / BACKDROP_COUNT, across = sqrt(1 - z * z),
                      turn = (double)i * 2.399963229728653;

@@ -107,7 +107,7 @@ static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_came
     return GBT_OK;
 }
 
-/* Evenly over the sphere: a Fibonacci spiral. */
+/* Evenly over the sphere: a Fibonacci spiral (Gonzalez 2010). */
 static void spread_direction(int i, double out[3])
 {
     const double z = 1 - (2 * i + 1.0) / DIRECTIONS, r = sqrt(1 - z * z), turn = i * 2.399963229728653;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/rng.h -- counter-based random numbers (Philox 4x32-10, Salmon et al. 2011).
+/* base/rng.h -- counter-based random numbers (Philox 4x32-10, Salmon 2011).
 
    A number is a function of (seed, stream, index), so it is the same for any number of threads and any order
    of evaluation. */
@@ -39,7 +39,7 @@ static inline float rng_uniform(uint64_t seed, uint64_t stream, uint64_t index)
     return (float)(words[0] >> 8) * 0x1p-24f;
 }
 
-/** Standard normal (Box-Muller). */
+/** Standard normal (Box 1958). */
 static inline double rng_normal(uint64_t seed, uint64_t stream, uint64_t index)
 {
     uint32_t words[4];

@@ -5,8 +5,8 @@
 #define GBT_BASE_SYMMETRIC_H
 
 /**
- * Eigenvalues and eigenvectors by Jacobi's method: plain loops in a fixed order, the same bits on every
- * machine.
+ * Eigenvalues and eigenvectors by Jacobi's method (Jacobi 1846): plain loops in a fixed order, the same bits
+ * on every machine.
  *
  * @param a      [in, out] [n][n] symmetric, finite; leaves the eigenvalues on its diagonal, in no order
  * @param v      [out] [n][n] unit eigenvectors in its columns

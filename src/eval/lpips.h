@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/lpips.h -- LPIPS (Zhang et al. 2018, version 0.1): how far apart two pictures are for a network that
+/* eval/lpips.h -- LPIPS (Zhang 2018, version 0.1): how far apart two pictures are for a network that
    was trained on photos.
 
    The network is the user's: a .safetensors file of what the Python package `lpips` calls its state

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* frame/sh.h -- real spherical harmonics up to degree 3, in the order and with the signs of 3DGS files. */
+/* frame/sh.h -- real spherical harmonics up to degree 3, in the order and with the signs of 3DGS files (Kerbl
+ * 2023). */
 #ifndef GBT_FRAME_SH_H
 #define GBT_FRAME_SH_H
 

@@ -20,11 +20,12 @@ adaptive_def adaptive_def_default(void);
  * Partition a cloud into at most balls_max balls, best first. docs/balls.md has the equations and what they
  * were measured against.
  *
- * A set costs L = n / 2 ln det(I + C) nats, C being the covariance of y = (x / v, colour / tau). The set
- * whose cut saves the most, L(set) - L(left) - L(right), is cut next: along the principal axis of C, between
- * the two means that the points fall into (2-means along the axis, from the mean). Sets of points that are
- * all in one place are not cut, nor sets at depth 64. The balls for m are those for m + 1 with two of them
- * joined. Without ties they do not depend on the order of the points; equal savings are taken from the left.
+ * A set costs L = n / 2 ln det(I + C) nats (a coding length as in Ma 2007), C being the covariance of y = (x
+ * / v, colour / tau). The set whose cut saves the most, L(set) - L(left) - L(right), is cut next: along the
+ * principal axis of C, between the two means that the points fall into (2-means along the axis, from the
+ * mean: the split of Xia 2019). Sets of points that are all in one place are not cut, nor sets at depth 64.
+ * The balls for m are those for m + 1 with two of them joined. Without ties they do not depend on the order
+ * of the points; equal savings are taken from the left.
  *
  * @param position [in] [count][3], finite
  * @param color    [in] [count][3] in [0, 1], or NULL: positions alone decide

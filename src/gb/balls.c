@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/balls.c -- the recursive granular-ball partition (3DGBGS sec. IV-A).
+/* gb/balls.c -- the recursive granular-ball partition (Yang 2026, eqs 16-27).
 
    points --> [moments: mean, r; sigma_a] --stop?--> mark a ball where the set begins
                    |

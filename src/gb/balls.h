@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/balls.h -- granular balls: the recursive PCA-median partition of a sparse cloud (3DGBGS sec. IV-A). */
+/* gb/balls.h -- granular balls: the recursive PCA-median partition of a sparse cloud (Yang 2026, eqs 16-27).
+ */
 #ifndef GBT_GB_BALLS_H
 #define GBT_GB_BALLS_H
 
@@ -20,14 +21,14 @@ typedef struct balls_def {
 
 balls_def balls_def_default(void); /* the paper's settings; voxel_size is 0 and must be set */
 
-/** One ball per element; the general form (Omega, x, Sigma, rho) of granular-ball computing plus colour. All
+/** One ball per element: members, centre mu, radius r (Yang 2026, eqs 17-21), covariance and colour. All
     owned by the struct. */
 typedef struct balls {
     size_t count, point_count;
-    uint32_t *first;   /* [count + 1]: ball j holds points member[first[j] .. first[j+1]) (Omega) */
+    uint32_t *first;   /* [count + 1]: ball j holds points member[first[j] .. first[j+1]) (P, eq 17) */
     uint32_t *member;  /* [point_count]: input indices, each once; ascending inside a ball */
-    float *center;     /* [count][3]: mean (x, eq 19) */
-    float *radius;     /* [count]: max(RMS distance, s_min) (rho, eqs 20, 21) */
+    float *center;     /* [count][3]: mean (mu, eq 19) */
+    float *radius;     /* [count]: max(RMS distance, s_min) (r, eqs 20, 21) */
     float *covariance; /* [count][6]: xx xy xz yy yz zz, population (Sigma) */
     float *color;      /* [count][3]: mean colour */
     float *color_std;  /* [count]: mean over channels of the population std-dev (eq 22) */
@@ -71,8 +72,8 @@ typedef enum voxel_rule {
 gbt_status balls_voxel_size(const float *position, size_t count, voxel_rule rule, float *out, gbt_error *err);
 
 /**
- * Scaffold-GS's baseline (eq 12): distinct cells round(p / v) (half to even, in float32), times v, sorted by
- * x, y, z cell.
+ * Scaffold-GS's baseline (Lu 2024; Yang 2026, eq 12): distinct cells round(p / v) (half to even, in float32),
+ * times v, sorted by x, y, z cell.
  *
  * @param centers [out] [*out_count][3], free with mem_free(); NULL on failure
  * @return GBT_OK, GBT_ERR_ARGUMENT (voxel_size, non-finite point, or a cell out of the range of float: says

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/moments.h -- mean, covariance, radius and colour spread of a set of points, in double. */
+/* gb/moments.h -- mean, covariance, radius and colour spread of a set of points, in double (Yang 2026, eqs
+   19, 20, 22). */
 #ifndef GBT_GB_MOMENTS_H
 #define GBT_GB_MOMENTS_H
 

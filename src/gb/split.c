@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/split.c -- cut a set of points in two at the median of its principal axis (3DGBGS eqs 24-27). */
+/* gb/split.c -- cut a set of points in two at the median of its principal axis (Yang 2026, eqs 24-27). */
 #include "gb/split.h"
 
 #include <math.h>

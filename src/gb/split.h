@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/split.h -- cut a set of points in two at the median of its principal axis (3DGBGS eqs 24-27). */
+/* gb/split.h -- cut a set of points in two at the median of its principal axis (Yang 2026, eqs 24-27). */
 #ifndef GBT_GB_SPLIT_H
 #define GBT_GB_SPLIT_H
 

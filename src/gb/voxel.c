@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/voxel.c -- the base spatial scale of a cloud, and Scaffold-GS's voxel centres, the baseline of the
-   balls. */
+/* gb/voxel.c -- the base spatial scale of a cloud, and Scaffold-GS's voxel centres (Lu 2024; Yang 2026, eq
+   12), the baseline of the balls. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>

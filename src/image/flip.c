@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* image/flip.c -- LDR-FLIP: how visible the difference of two images is when one flips between them
-   (Andersson et al. 2020).
+   (Andersson 2020).
 
    sRGB --> YCxCz --+--> [contrast sensitivity filters] --> L*a*b*, Hunt --> HyAB --> colour difference c
                     +--> [edge and point detectors on Y] -------------------------> feature difference f

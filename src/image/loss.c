@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* image/loss.c -- L1 + DSSIM of a rendered image and its gradient, once per training step.
+/* image/loss.c -- L1 + DSSIM of a rendered image and its gradient, once per training step (Kerbl 2023, eq 7;
+   SSIM: Wang 2004, eq 13).
 
    x, y --> [column pass] --> [row pass, SSIM map, partials] --> [row pass] --> full-size partials
         --> [column pass] --> dL/dx

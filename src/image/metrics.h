@@ -43,7 +43,7 @@ double metric_ssim(const image *a, const image *b);
 double metric_ssim_interior(const image *a, const image *b);
 
 /**
- * Mean LDR-FLIP (Andersson et al. 2020) at 67.02 pixels per degree (0.7 m from a screen of 3840 pixels in 0.7
+ * Mean LDR-FLIP (Andersson 2020) at 67.02 pixels per degree (0.7 m from a screen of 3840 pixels in 0.7
  * m).
  *
  * @param a, reference  3 channels, equal size; sRGB values, clamped to [0, 1], NaN as 0

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* image/ssim.c -- mean SSIM of two images (Wang et al. 2004, with the borders of Scaffold-GS and 3DGS). */
+/* image/ssim.c -- mean SSIM of two images (Wang 2004, eq 13, with the borders of Scaffold-GS and 3DGS). */
 #include "image/metrics.h"
 
 #include <math.h>

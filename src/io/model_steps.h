@@ -4,8 +4,8 @@
 
    A change of a parameter by e changes the pictures by J e; what counts is s = J^T J, the mean squared change
    of a pixel per squared unit. At a given loss the fewest bits are spent when every parameter loses the same:
-   its step is proportional to 1 / sqrt(s). s comes from adjoint passes of random signs, for which E[(J^T
-   n)(J^T n)^T] = J^T J. */
+   its step is proportional to 1 / sqrt(s). s comes from adjoint passes of random signs (Hutchinson 1990), for
+   which E[(J^T n)(J^T n)^T] = J^T J. */
 #ifndef GBT_IO_MODEL_STEPS_H
 #define GBT_IO_MODEL_STEPS_H
 

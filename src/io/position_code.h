@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/position_code.h -- anchor positions as cells of a cube, in Morton order, and these cells as an
-   octree. */
+/* io/position_code.h -- anchor positions as cells of a cube, in Morton order (Morton 1966), and these cells
+   as an octree. */
 #ifndef GBT_IO_POSITION_CODE_H
 #define GBT_IO_POSITION_CODE_H
 

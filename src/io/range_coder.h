@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* io/range_coder.h -- adaptive binary range coder with mixed contexts; one set of calls writes and reads, so
-   that both stay in step.
+   that both stay in step (Witten 1987; mixing: Mahoney 2005).
 
    Integers only: the same bits on every machine. A coder that reads takes zeros behind the end of its bytes
    and remembers that it did; every call ends after a bounded number of steps whatever the bytes are. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* raster/project16.h -- Gaussians to splats: projection, box of tiles, sixteen at a time in double.
+/* raster/project16.h -- Gaussians to splats: projection, box of tiles, sixteen at a time in double (Kerbl
+   2023, eq 5).
 
    Doubles, because a pixel may lie thousands of pixels from a corner and a Gaussian's edge is a third of one.
    The loops over lanes are plain C that compilers turn into vectors; no operation is fused, so all

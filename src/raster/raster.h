@@ -3,10 +3,10 @@
    of the tracer.
 
    Two forms. RASTER_EWA has the conventions of 3D Gaussian splatting: each Gaussian becomes a 2D Gaussian by
-   the affine projection at its centre, dilated by 0.3 px^2, and all pixels blend in the order of the centres'
-   depths. RASTER_PER_RAY keeps the tiles but takes response and order from the ray of each pixel, as
-   docs/tracing.md defines them: what is left between the two is the projection and the order. Shares with the
-   tracer the cameras and the Gaussian arrays, nothing else. */
+   the affine projection at its centre (Zwicker 2001; Kerbl 2023, eq 5), dilated by 0.3 px^2, and all pixels
+   blend in the order of the centres' depths. RASTER_PER_RAY keeps the tiles but takes response and order from
+   the ray of each pixel, as docs/tracing.md defines them: what is left between the two is the projection and
+   the order. Shares with the tracer the cameras and the Gaussian arrays, nothing else. */
 #ifndef GBT_RASTER_RASTER_H
 #define GBT_RASTER_RASTER_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* raster/raster_ref.h -- the EWA form in double, every Gaussian against every pixel, and its adjoint: what
-   raster.h is tested against.
+   raster.h is tested against (Kerbl 2023, eqs 5, 6).
 
    Per Gaussian with mean mu, Sigma = R S^2 R^T, opacity o, and a camera (rotation W, centre c, focal lengths,
    principal point):

@@ -50,9 +50,9 @@ gbt_status camera_path_show(camera_path *path, const shared_points *points, gbt_
 /**
  * Smoothly through all keys, from the first to the last.
  *
- * One Catmull-Rom curve (centripetal: no loops, no cusps) through the points (centre, 2 L q), q the unit
- * quaternion with the sign nearer to the one before; q is made unit again. Then frames at even steps of
- * sqrt(|dx|^2 + (L angle)^2), L = turn_length: turning by an angle counts as much as moving far enough to
+ * One Catmull-Rom curve (centripetal, Yuksel 2011: no loops, no cusps) through the points (centre, 2 L q), q
+ * the unit quaternion with the sign nearer to the one before; q is made unit again. Then frames at even steps
+ * of sqrt(|dx|^2 + (L angle)^2), L = turn_length: turning by an angle counts as much as moving far enough to
  * turn the view of something L away by it. The lens goes from key to key with the curve.
  *
  * @param keys        [in] [count], count >= 1, of one model and size

@@ -8,7 +8,7 @@
    added to its covariance, and adding w to the marginal of every ray is adding w to the 3D covariance. So a
    cone costs nothing while tracing: the rotation stays, s_i'^2 = s_i^2 + w. What a Gaussian covers, opacity
    times area across the ray, is kept: o' = o sqrt(a / a') with a = det S^2 |S^-1 R^T d|^2, d from the camera
-   to the centre. */
+   to the centre. Splats have such filters in Yu 2024. */
 #ifndef GBT_TRACE_FOOTPRINT_H
 #define GBT_TRACE_FOOTPRINT_H
 

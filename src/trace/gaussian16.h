@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/gaussian16.h -- Gaussians against rays, sixteen pairs at a time: depth, canonical point, response.
+/* trace/gaussian16.h -- Gaussians against rays, sixteen pairs at a time: depth, canonical point, response
+   (Moenne-Loccoz 2024; docs/tracing.md).
 
    The same arithmetic serves one Gaussian on sixteen rays (lanes of `gaussian_lanes` all equal) and sixteen
    Gaussians on one ray, so both give the same bits for the same pair. Included by kernels after simd16.h. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* trace/reference.h -- the definition of what one ray sees, in double, every Gaussian against every ray; and
-   its adjoint.
+   its adjoint. One contribution of each Gaussian, at its maximum response on the ray, as in Moenne-Loccoz
+   2024.
 
    x' = S^-1 R^T (x - mu), w' = S^-1 R^T w, t* = -(x'.w') / (w'.w'), t_c = max(t*, t_near), d2 = |x' + t_c
    w'|^2, alpha = min(alpha_max, o exp(-d2 / 2)), kept if alpha >= alpha_min; ordered by (t_c, id); blended

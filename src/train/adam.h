@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/adam.h -- Adam on flat arrays (Kingma & Ba 2015), no weight decay. */
+/* train/adam.h -- Adam on flat arrays (Kingma 2015, algorithm 1), no weight decay. */
 #ifndef GBT_TRAIN_ADAM_H
 #define GBT_TRAIN_ADAM_H
 

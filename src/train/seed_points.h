@@ -7,7 +7,7 @@
 #include "train/photos.h"
 
 /**
- * Make points by plane sweep, for data sets without any.
+ * Make points by plane sweep (Collins 1996), for data sets without any.
  *
  * Random pixels of the photos (halved until 400 pixels long) are swept through 96 depths around the point
  * where the cameras' axes meet; a depth counts by the normalised correlation of 5 x 5 pixels with up to four

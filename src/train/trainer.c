@@ -37,7 +37,7 @@ static size_t pick_view(trainer *t)
     if (!t->order_ready || t->order_epoch != epoch) {
         for (size_t i = 0; i < t->train_count; i++)
             t->order[i] = (uint32_t)i;
-        for (size_t i = t->train_count; i > 1; i--) { /* Fisher-Yates */
+        for (size_t i = t->train_count; i > 1; i--) { /* Durstenfeld 1964 */
             uint32_t words[4];
             rng_philox(t->def.seed, STREAM_VIEWS, epoch << 32 | i, words);
             const size_t j = (size_t)(((uint64_t)words[0] * i) >> 32);

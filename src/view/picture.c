@@ -95,7 +95,7 @@ static gbt_status finish(const studio *s, const image *im, const request *what, 
 
 /* ---- pixels ---- */
 
-/* Point `n` of Halton's sequence in a base, in (0, 1). */
+/* Point `n` of Halton's sequence (Halton 1960) in a base, in (0, 1). */
 static double halton(int n, int base)
 {
     double value = 0, digit = 1;

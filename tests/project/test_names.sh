@@ -12,13 +12,21 @@ sources="src lab include tests scenes examples tools cmake python bench"
 # Files: every path that begins with a folder of the project and ends like a file.
 grep -rnoE --include='*.md' --include='*.[ch]' --include='*.cpp' --include='*.sh' --include='*.cmake' --include='*.py' --include='CMakeLists.txt' \
     '(^|[^A-Za-z0-9_./{}-])(docs|src|lab|tests|include|scenes|examples|tools|cmake|python|bench)/[A-Za-z0-9_/.-]*[A-Za-z0-9_]\.(md|c|h|cpp|json|svg|png|sh|py|txt|cmake|js|css|html|awk|cjs|mjs)\b' \
-    README.md docs $sources 2>/dev/null | awk -F: '{place = $1 ":" $2; name = $0; sub(/^[^:]*:[^:]*:/, "", name); sub(/^[^A-Za-z]*/, "", name); print place, name}' |
+    README.md CONTRIBUTING.md CHANGELOG.md docs $sources 2>/dev/null | awk -F: '{place = $1 ":" $2; name = $0; sub(/^[^:]*:[^:]*:/, "", name); sub(/^[^A-Za-z]*/, "", name); print place, name}' |
     sort -u >"$work/files"
 while read -r place name; do
     [ -e "$name" ] || [ -e "$name.in" ] || printf '%s: %s is not there\n' "$place" "$name"
 done <"$work/files" | grep -v '^tests/project/' >"$work/dangling"
 [ ! -s "$work/dangling" ] && [ "$(wc -l <"$work/files")" -ge 100 ]
 report $? "files that are named are there" "$(cat "$work/dangling")"
+
+# Links of pages lead to files, beside the page.
+grep -rnoE --include='*.md' '\]\([^):]+\)' README.md CONTRIBUTING.md CHANGELOG.md docs | sed 's/:[0-9]*:\](/ /; s/#.*//; s/)$//' | sort -u >"$work/links"
+while read -r page link; do
+    [ -e "$(dirname "$page")/$link" ] || printf '%s: %s is not there\n' "$page" "$link"
+done <"$work/links" >"$work/dangling"
+[ ! -s "$work/dangling" ] && [ "$(wc -l <"$work/links")" -ge 40 ]
+report $? "links lead to files" "$(cat "$work/dangling")"
 
 # A file says in its first lines what its licence is and which file it is.
 for file in $(find src lab include -name '*.[ch]' -o -name '*.cpp'); do

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/lpips.c -- the networks of LPIPS, their weights out of a file, and the distance.
+/* eval/lpips.c -- the networks of LPIPS (Simonyan 2015, Krizhevsky 2012), their weights out of a file, and
+   the distance.
 
    picture --> (x - shift) / scale --> [maxima] convolution + ReLU, again and again
         --> distance of two pictures at five layers */

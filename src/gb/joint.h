@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/joint.h -- position and colour of a set of points as one vector of six: moments, principal axis, length
-   of its description. */
+/* gb/joint.h -- position and colour of a set of points as one vector of six: moments, principal axis, coding
+   length (Ma 2007). */
 #ifndef GBT_GB_JOINT_H
 #define GBT_GB_JOINT_H
 

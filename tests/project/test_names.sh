@@ -28,6 +28,14 @@ done <"$work/links" >"$work/dangling"
 [ ! -s "$work/dangling" ] && [ "$(wc -l <"$work/links")" -ge 40 ]
 report $? "links lead to files" "$(cat "$work/dangling")"
 
+# Papers that comments cite as "Author year" have a row of docs/references.md.
+grep -rhoE --include='*.[ch]' '\b[A-Z][A-Za-z-]+ (19|20)[0-9]{2}\b' src | sort -u >"$work/cited"
+while read -r name; do
+    grep -qF "| $name |" docs/references.md || echo "$name"
+done <"$work/cited" >"$work/unknown"
+[ ! -s "$work/unknown" ] && [ "$(wc -l <"$work/cited")" -ge 20 ]
+report $? "papers that are cited are in docs/references.md" "$(cat "$work/unknown")"
+
 # A file says in its first lines what its licence is and which file it is.
 for file in $(find src lab include -name '*.[ch]' -o -name '*.cpp'); do
     own=${file#src/} own=${own#include/}

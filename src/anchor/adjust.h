@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/adjust.h -- growing and pruning anchors (Lu 2024; docs/training.md). */
+/* anchor/adjust.h -- growing and pruning anchors (Scaffold-GS; docs/training.md). */
 #ifndef GBT_ANCHOR_ADJUST_H
 #define GBT_ANCHOR_ADJUST_H
 

@@ -7,7 +7,7 @@
    A model is a row of parameters for that one pipeline (camera_lens_prepare), so the inversion is written
    once. The radial part is only used up to the first radius where it stops increasing: beyond it the formula
    folds back into the image, and a point there would be drawn on top of others. docs/cameras.md has the
-   formulas and where they come from. */
+   formulas. */
 #include "base/camera_lens.h"
 
 #include <math.h>

@@ -183,8 +183,8 @@ size_t practice_count_bad(const trainer *t)
            draw_count_bad(a->offset, a->count * 3 * (size_t)a->offset_count) +
            draw_count_bad(a->scale_log, a->count * 6) +
            draw_count_bad(t->decoder.params, t->decoder.param_count) +
-           draw_count_bad(t->params_m, t->decoder.param_count) +
-           draw_count_bad(t->params_v, t->decoder.param_count);
+           draw_count_bad(t->moment1.networks, t->decoder.param_count) +
+           draw_count_bad(t->moment2.networks, t->decoder.param_count);
 }
 
 static void mean_of_photos(trainer *t, float mean[3], gbt_status *status, gbt_error *why)

@@ -19,17 +19,22 @@
 
 /* ---- statistics ---- */
 
+const row_field adjust_stat_fields[ADJUST_STATS] = {
+#define X(name, per_offset, meaning) {#name, #name, 1, per_offset},
+    ADJUST_STAT_LIST(X)
+#undef X
+};
+
 gbt_status adjust_stats_resize(adjust_stats *s, size_t count, int offset_count, gbt_error *err)
 {
     if (offset_count < 1 || offset_count > ANCHOR_MAX_OFFSETS ||
         (s->count > 0 && offset_count != s->offset_count))
         return base_fail(err, GBT_ERR_ARGUMENT, "statistics: offset_count %d (wanted 1 to %d, constant)",
                          offset_count, ANCHOR_MAX_OFFSETS);
-    const size_t widths[ROWS_FIELDS] = {1, 1, (size_t)offset_count, (size_t)offset_count};
-    float **const fields[ROWS_FIELDS] = {&s->use_accum, &s->visit_count, &s->grad_accum, &s->grad_count};
     if (offset_count != s->offset_count)
         s->capacity = 0; /* no rows are in use: arrays of another width must be made */
-    GBT_TRY(rows_resize(fields, widths, &s->capacity, s->count, count, "statistics", err));
+    GBT_TRY(rows_resize(s->field, adjust_stat_fields, ADJUST_STATS, offset_count, &s->capacity, s->count,
+                        count, "statistics", err));
     s->count = count;
     s->offset_count = offset_count;
     return GBT_OK;
@@ -37,10 +42,8 @@ gbt_status adjust_stats_resize(adjust_stats *s, size_t count, int offset_count, 
 
 void adjust_stats_free(adjust_stats *s)
 {
-    mem_free(s->use_accum);
-    mem_free(s->visit_count);
-    mem_free(s->grad_accum);
-    mem_free(s->grad_count);
+    for (int f = 0; f < ADJUST_STATS; f++)
+        mem_free(s->field[f]);
     memset(s, 0, sizeof *s);
 }
 
@@ -112,11 +115,7 @@ static size_t compact(anchors *a, adjust_stats *s, const adjust_def *def, const 
         if (pruned[i])
             continue;
         source[to] = (int64_t)i;
-        memmove(a->position + to * 3, a->position + i * 3, 3 * sizeof(float));
-        memmove(a->feature + to * ANCHOR_FEATURE_DIM, a->feature + i * ANCHOR_FEATURE_DIM,
-                ANCHOR_FEATURE_DIM * sizeof(float));
-        memmove(a->offset + to * offsets * 3, a->offset + i * offsets * 3, offsets * 3 * sizeof(float));
-        memmove(a->scale_log + to * 6, a->scale_log + i * 6, 6 * sizeof(float));
+        rows_move(a->field, anchor_fields, ANCHOR_FIELDS, a->offset_count, to, a->field, i);
         const bool used = def->prune && judged(def, s->visit_count[i]);
         s->use_accum[to] = used ? 0.0f : s->use_accum[i];
         s->visit_count[to] = used ? 0.0f : s->visit_count[i];

@@ -7,15 +7,34 @@
 
 enum { ADJUST_MAX_LEVELS = 8 };
 
+/** What is gathered of every anchor and Gaussian, listed once: X(name, per_offset, meaning). */
+#define ADJUST_STAT_LIST(X)                                                                                  \
+    X(use_accum, false,                                                                                      \
+      "sum over views of its importance: opacities, or shares of the picture (mean T alpha)")                \
+    X(visit_count, false, "views in which the anchor was visible")                                           \
+    X(grad_accum, true, "sum of screen-space gradient norms")                                                \
+    X(grad_count, true, "views in which the Gaussian was geometrically visible")
+
+enum {
+#define X(name, per_offset, meaning) ADJUST_STAT_##name,
+    ADJUST_STAT_LIST(X)
+#undef X
+        ADJUST_STATS
+};
+extern const row_field adjust_stat_fields[ADJUST_STATS];
+
 /** Gathered every step between two adjusts. Row counts follow the anchors. Start from {0}. */
 typedef struct adjust_stats {
     size_t count, capacity;
     int offset_count;
-    float *use_accum; /* [count] sum over views of what the anchor was good for: decoded opacities, or shares
-                         of the picture (mean over rays of T alpha) */
-    float *visit_count; /* [count] views in which the anchor was visible */
-    float *grad_accum;  /* [count][K] sum of screen-space gradient norms */
-    float *grad_count;  /* [count][K] views in which the Gaussian was geometrically visible */
+    union { /* owned arrays, [count] or [count][K]: by name, or in order */
+        struct {
+#define X(name, per_offset, meaning) float *name;
+            ADJUST_STAT_LIST(X)
+#undef X
+        };
+        float *field[ADJUST_STATS];
+    };
 } adjust_stats;
 
 /** Keeps the first min(old, new) rows; new rows are zero. offset_count is fixed while there are rows. On

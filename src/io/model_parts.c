@@ -39,13 +39,13 @@ static gbt_status make_coarse(model_parts *p, bool has_pixel, gbt_error *err)
 gbt_status model_parts_make(model_parts *p, size_t count, int offset_count, bool has_pixel, bool has_distance,
                             bool coarse, gbt_error *err)
 {
-    decoder_part networks[3];
+    decoder_part networks[DECODER_PARTS];
     decoder_parts(&(decoder){.offset_count = offset_count, .has_distance = has_distance}, networks);
     *p = (model_parts){.coarse = coarse,
                        .count = count,
                        .offset_count = offset_count,
                        .has_distance = has_distance,
-                       .param_count = networks[2].end};
+                       .param_count = networks[DECODER_PARTS - 1].end};
     if (coarse)
         return make_coarse(p, has_pixel, err);
     p->anchors.offset_count = offset_count;
@@ -155,14 +155,6 @@ static void copy_floats(float *to, const float *from, size_t count)
         memcpy(to, from, count * sizeof *to);
 }
 
-static void copy_anchors(anchors *to, const anchors *from)
-{
-    copy_floats(to->position, from->position, from->count * 3);
-    copy_floats(to->feature, from->feature, from->count * ANCHOR_FEATURE_DIM);
-    copy_floats(to->offset, from->offset, from->count * (size_t)from->offset_count * 3);
-    copy_floats(to->scale_log, from->scale_log, from->count * 6);
-}
-
 gbt_status model_parts_fill(model_parts *p, const model *m, const model_steps *steps, gbt_error *err)
 {
     if (m->decoder.param_count != p->param_count)
@@ -170,7 +162,7 @@ gbt_status model_parts_fill(model_parts *p, const model *m, const model_steps *s
                          p->offset_count);
     if (p->coarse)
         return fill_coarse(p, m, steps, err);
-    copy_anchors(&p->anchors, &m->anchors);
+    anchors_copy(&p->anchors, &m->anchors);
     copy_floats(p->params, m->decoder.params, p->param_count);
     if (p->anchor_pixel != NULL)
         copy_floats(p->anchor_pixel, m->anchor_pixel, p->count);
@@ -307,7 +299,7 @@ gbt_status model_parts_to_model(const model_parts *p, model *out, gbt_error *err
     out->decoder.offset_count = p->offset_count;
     out->decoder.has_distance = p->has_distance;
     if (!p->coarse) {
-        copy_anchors(&out->anchors, &p->anchors);
+        anchors_copy(&out->anchors, &p->anchors);
         copy_floats(out->decoder.params, p->params, p->param_count);
         if (has_pixel)
             copy_floats(out->anchor_pixel, p->anchor_pixel, p->count);

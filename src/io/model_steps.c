@@ -146,9 +146,7 @@ static gbt_status guess_view(const model *m, guess *g, uint64_t view, model_sens
     double covered = 0;
     for (size_t i = 0; i < g->drawn.count; i++)
         covered += guess_gradient(&g->drawn, i, view, &g->gradient);
-    memset(g->d_anchors.feature, 0, a->count * DIM * sizeof(float));
-    memset(g->d_anchors.offset, 0, a->count * (size_t)a->offset_count * 3 * sizeof(float));
-    memset(g->d_anchors.scale_log, 0, a->count * 6 * sizeof(float));
+    anchors_zero_learned(&g->d_anchors);
     GBT_TRY(decode_backward(a, &m->decoder, &g->tape, &g->gradient, &g->d_anchors, g->d_params, err));
     model_sensitivity_add(s, a, &g->d_anchors, 3 * HIDDEN * covered);
     return GBT_OK;

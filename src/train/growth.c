@@ -86,27 +86,6 @@ bool growth_is_due(const trainer *t, double progress, double next)
     return floor(progress * ADJUSTS_PER_RUN) != floor(next * ADJUSTS_PER_RUN);
 }
 
-/* Rows of `a` in the order of `source`; -1 gives zeros (new anchors have no momentum yet). */
-static gbt_status follow_rows(anchors *a, const adjust_result *result, gbt_error *err)
-{
-    anchors old = *a;
-    *a = (anchors){.offset_count = old.offset_count};
-    const gbt_status status = anchors_resize(a, result->count, err);
-    const size_t offset_floats = 3 * (size_t)old.offset_count;
-    for (size_t i = 0; status == GBT_OK && i < result->count; i++) {
-        if (result->source[i] < 0)
-            continue;
-        const size_t from = (size_t)result->source[i];
-        memcpy(a->feature + i * ANCHOR_FEATURE_DIM, old.feature + from * ANCHOR_FEATURE_DIM,
-               ANCHOR_FEATURE_DIM * sizeof(float));
-        memcpy(a->offset + i * offset_floats, old.offset + from * offset_floats,
-               offset_floats * sizeof(float));
-        memcpy(a->scale_log + i * 6, old.scale_log + from * 6, 6 * sizeof(float));
-    }
-    anchors_free(&old);
-    return status;
-}
-
 /* New rows come last, so the order by birth stays. The reference corrects all by the age of the run. */
 static gbt_status follow_births(trainer *t, const adjust_result *result, gbt_error *err)
 {
@@ -219,9 +198,9 @@ gbt_status growth_adjust(trainer *t, gbt_error *err)
         status = grow_at_points(t, &def, &nearest, &scale, err);
     if (status == GBT_OK)
         status = anchors_adjust(&t->anchors, &t->stats, &def, &result, err);
-    anchors *followers[] = {&t->gradient, &t->moment1, &t->moment2};
+    learnables *const kept[] = {&t->gradient, &t->moment1, &t->moment2};
     for (int i = 0; i < 3 && status == GBT_OK; i++)
-        status = follow_rows(followers[i], &result, err);
+        status = learnables_follow(kept[i], &result, err);
     if (status == GBT_OK)
         status = follow_births(t, &result, err);
     mem_free(nearest);

@@ -199,17 +199,11 @@ static gbt_status choose_views(trainer *t, gbt_error *err)
 
 static gbt_status make_state(trainer *t, gbt_error *err)
 {
-    anchors *same[] = {&t->gradient, &t->moment1, &t->moment2};
-    for (int i = 0; i < 3; i++) {
-        same[i]->offset_count = t->def.offsets;
-        GBT_TRY(anchors_resize(same[i], t->anchors.count, err));
-    }
+    learnables *const kept[] = {&t->gradient, &t->moment1, &t->moment2};
+    for (int i = 0; i < 3; i++)
+        GBT_TRY(learnables_make(kept[i], t->anchors.count, &t->decoder, err));
     t->born = mem_calloc(t->anchors.count, sizeof *t->born, "anchors", err);
-    const size_t n = t->decoder.param_count;
-    t->d_params = mem_calloc(n, sizeof *t->d_params, "network gradient", err);
-    t->params_m = mem_calloc(n, sizeof *t->params_m, "network moments", err);
-    t->params_v = mem_calloc(n, sizeof *t->params_v, "network moments", err);
-    if (t->born == NULL || t->d_params == NULL || t->params_m == NULL || t->params_v == NULL)
+    if (t->born == NULL)
         return GBT_ERR_NO_MEMORY;
     if (t->def.exposure)
         GBT_TRY(exposures_make(&t->exposures, t->train_count, err));

@@ -11,6 +11,7 @@
 #include "image/metrics.h"
 #include "train/exposure.h"
 #include "frame/frame.h"
+#include "train/learnables.h"
 #include "train/photos.h"
 #include "train/schedule.h"
 
@@ -31,11 +32,11 @@ typedef struct trainer {
     size_t *train_views; /* indices into scene.views */
     size_t train_count, test_count;
 
-    /* What learns, its gradient and its Adam moments: same shapes. */
-    anchors anchors, gradient, moment1, moment2;
+    /* What learns; its gradient and its Adam moments have the same shapes. */
+    anchors anchors;
     uint64_t *born; /* [anchors.count]: anchor_t when the anchor was made, ascending */
     decoder decoder;
-    float *d_params, *params_m, *params_v;
+    learnables gradient, moment1, moment2;
     adjust_stats stats;
     exposures exposures; /* of the training photos, in the order of train_views; count 0 without --exposure */
 

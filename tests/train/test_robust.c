@@ -270,13 +270,13 @@ static void append(learned *out, const float *values, size_t count)
 static learned snapshot(const trainer *t)
 {
     learned out = {0};
-    const anchors *sets[] = {&t->anchors, &t->moment1, &t->moment2};
+    const anchors *sets[] = {&t->anchors, &t->moment1.anchors, &t->moment2.anchors};
     for (int i = 0; i < 3; i++) {
         append(&out, sets[i]->feature, sets[i]->count * ANCHOR_FEATURE_DIM);
         append(&out, sets[i]->offset, sets[i]->count * 3 * (size_t)sets[i]->offset_count);
         append(&out, sets[i]->scale_log, sets[i]->count * 6);
     }
-    const float *networks[] = {t->decoder.params, t->params_m, t->params_v};
+    const float *networks[] = {t->decoder.params, t->moment1.networks, t->moment2.networks};
     for (int i = 0; i < 3; i++)
         append(&out, networks[i], t->decoder.param_count);
     append(&out, t->stats.use_accum, t->stats.count);
@@ -305,7 +305,7 @@ static void assert_no_gradient_left(const trainer *t)
     for (size_t i = 0; i < g->count * 6; i++)
         assert_true(g->scale_log[i] == 0);
     for (size_t i = 0; i < t->decoder.param_count; i++)
-        assert_true(t->d_params[i] == 0);
+        assert_true(t->gradient.networks[i] == 0);
 }
 
 /* A background that is not a number makes the loss one; an exposure of 1e30 makes gradients too large for
@@ -387,7 +387,8 @@ static void a_bad_gradient_is_named(void **state)
     double exposure[AFFINE_NUMBERS] = {1};
     assert_false(gradient_is_bad(&t, exposure, where, sizeof where));
     assert_string_equal(where, "untouched");
-    const size_t anchor = t.frame.visible[t.frame.visible_count - 1], k = (size_t)t.gradient.offset_count;
+    const size_t anchor = t.frame.visible[t.frame.visible_count - 1],
+                 k = (size_t)t.gradient.anchors.offset_count;
     decoder_part parts[3];
     decoder_parts(&t.decoder, parts);
     const struct {
@@ -396,12 +397,12 @@ static void a_bad_gradient_is_named(void **state)
         size_t value;
         bool of_anchor;
     } places[] = {
-        {t.gradient.feature + anchor * 32 + 31, "feature", 31, true},
-        {t.gradient.offset + anchor * 3 * k, "offset", 0, true},
-        {t.gradient.scale_log + anchor * 6 + 5, "scale", 5, true},
-        {t.d_params, "opacity network", 0, false},
-        {t.d_params + parts[1].begin + 7, "shape network", 7, false},
-        {t.d_params + parts[2].end - 1, "colour network", parts[2].end - 1 - parts[2].begin, false},
+        {t.gradient.anchors.feature + anchor * 32 + 31, "feature", 31, true},
+        {t.gradient.anchors.offset + anchor * 3 * k, "offset", 0, true},
+        {t.gradient.anchors.scale_log + anchor * 6 + 5, "scale", 5, true},
+        {t.gradient.networks, "opacity network", 0, false},
+        {t.gradient.networks + parts[1].begin + 7, "shape network", 7, false},
+        {t.gradient.networks + parts[2].end - 1, "colour network", parts[2].end - 1 - parts[2].begin, false},
     };
     static const float values[] = {NAN, INFINITY, -INFINITY, 1.1e18f, -3e38f};
     for (size_t i = 0; i < sizeof places / sizeof *places; i++)

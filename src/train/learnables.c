@@ -14,11 +14,11 @@
 enum { ADAM_BLOCK = 512 };
 
 typedef struct rate_rule {
-    double first, last;     /* of the reference: log-linear from one to the other over the run */
-    double own;             /* ours is so many times that */
-    bool times_extent;      /* the reference's is proportional to the extent of the cameras */
-    bool ages_with_run;     /* Adam's bias is corrected by the age of the run, not of the anchor */
-    bool is_log_scale;      /* kept between scale_log_min and scale_log_max */
+    double first, last; /* of the reference: log-linear from one to the other over the run */
+    double own;         /* ours is so many times that */
+    bool times_extent;  /* the reference's is proportional to the extent of the cameras */
+    bool ages_with_run; /* Adam's bias is corrected by the age of the run, not of the anchor */
+    bool is_log_scale;  /* kept between scale_log_min and scale_log_max */
 } rate_rule;
 
 /* By the age of the run, the first steps of a new anchor would be up to six times too long, for its second

@@ -59,7 +59,6 @@ adjust_def adjust_def_default(void)
                         .success_threshold = 0.8f,
                         .shape_log_max = INFINITY,
                         .max_anchors = SIZE_MAX,
-                        .compat = false,
                         .seed = 0,
                         .step = 0,
                         .grow = true,

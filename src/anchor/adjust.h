@@ -43,10 +43,9 @@ gbt_status adjust_stats_resize(adjust_stats *s, size_t count, int offset_count, 
 void adjust_stats_free(adjust_stats *s);
 
 typedef struct adjust_def {
-    float voxel_size; /* v: cells are v * init_factor / hierarchy^level (an integer division in compat mode: 4
-                         / 16 is 0) */
-    int level_count;  /* [0, ADJUST_MAX_LEVELS], default 3 */
-    int init_factor;  /* default 16 */
+    float voxel_size;     /* v: cells are v * init_factor / hierarchy^level */
+    int level_count;      /* [0, ADJUST_MAX_LEVELS], default 3 */
+    int init_factor;      /* default 16 */
     int hierarchy_factor; /* default 4 */
     float grad_threshold; /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */
     float min_use;        /* anchors with less in the mean over their views are pruned, in units of use_accum.
@@ -55,15 +54,16 @@ typedef struct adjust_def {
     float success_threshold; /* default 0.8: a Gaussian counts when grad_count > interval * success * 0.5; an
                                 anchor is judged when visit_count > interval * success. What was judged starts
                                 again from 0 */
-    float shape_log_max; /* scale_log[3..5] are clamped to this at every adjust: 0.05 in compat mode, infinity
-                            else */
-    size_t max_anchors;  /* hard cap on the rows after the adjust; pruning makes room first, the cap prunes
-                            nothing. When it bites, the cells with the largest gradient of all levels win,
-                            ties by level, then cell. Default SIZE_MAX */
-    bool compat;   /* every quirk of the reference: a coarse level that adds nothing gates the finer ones;
-                      integer cells */
-    uint64_t seed; /* of the random candidate drop (in both modes): level j keeps 1 - 0.5^(j+1) of the
-                      candidates */
+    float shape_log_max;     /* scale_log[3..5] are clamped to this at every adjust. Default infinity */
+    size_t max_anchors;    /* hard cap on the rows after the adjust; pruning makes room first, the cap prunes
+                              nothing. When it bites, the cells with the largest gradient of all levels win,
+                              ties by level, then cell. Default SIZE_MAX */
+    bool integer_division; /* init_factor / hierarchy^level and hierarchy/2 are divided as integers: 4 / 16 is
+                              0. Default false, as the next two */
+    bool coarse_level_gates; /* a level that adds nothing ends the search */
+    bool at_cell_center;     /* new anchors stand in the middle of their cell */
+    uint64_t seed;           /* of the random candidate drop: level j keeps 1 - 0.5^(j+1) of the
+                                candidates */
     uint64_t step;
     bool grow, prune;                                                /* both true by default */
     bool (*may_stand)(const void *context, const float position[3]); /* where Gaussians may have an anchor;
@@ -92,8 +92,8 @@ typedef struct adjust_result {
  * Candidates are the means of Gaussians; then, in cells finer by one more level, the known places, each with
  * the largest gradient of its anchor's Gaussians. Places with a scale are asked for as at the first level,
  * however few views saw those Gaussians; without, as Gaussians at the last level, and are as large. New
- * anchor: position = the cell's candidate with the largest gradient, the first of equals; in compat mode the
- * cell's centre, and no places. Log-scales log(cell), at places log(place_scale), offsets 0, feature =
+ * anchor: position = the cell's candidate with the largest gradient, the first of equals; or the
+ * cell's centre. Log-scales log(cell), at places log(place_scale), offsets 0, feature =
  * elementwise maximum over the parents of the cell's candidates. Where one may not stand none is made, unless
  * that is a place. Cells use 64-bit keys; a level whose cell is not > 0 is skipped. Never prunes the last
  * anchor (the most opaque stays). Survivors keep their order; new anchors follow by level, then cell (x, y,

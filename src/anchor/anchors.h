@@ -74,8 +74,8 @@ void anchors_zero_learned(anchors *a);
 typedef struct decoder {
     int offset_count;
     bool has_distance;
-    float distance_scale; /* the distance input is |x - c| * distance_scale: 1 / median training distance; 1
-                             in compat mode */
+    float distance_scale; /* the distance input is |x - c| * distance_scale: 1 / median training distance, or
+                             1 */
     float distance_min, distance_max; /* trained range (scaled): the input is cut to [min / 2, 2 max].
                                          decoder_init() gives 0, infinity */
     size_t param_count;               /* all weights and biases, one flat array */

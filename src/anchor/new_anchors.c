@@ -173,8 +173,7 @@ static float level_cell_size(const adjust_def *def, int level)
     for (int i = 0; i < level; i++)
         divisor *= def->hierarchy_factor;
     const double factor = def->init_factor / divisor;
-    return def->voxel_size *
-           (float)(def->compat ? floor(factor) : factor); /* the reference divides integers: 4 / 16 is 0 */
+    return def->voxel_size * (float)(def->integer_division ? floor(factor) : factor);
 }
 
 /* Mean over the views that saw the Gaussian; 0 when none did. */
@@ -186,8 +185,9 @@ static float mean_gradient(const adjust_stats *stats, size_t slot)
 static float level_threshold(const adjust_def *def, int level)
 {
     float threshold = def->grad_threshold;
-    for (int i = 0; i < level; i++) /* integer division in the reference */
-        threshold *= def->compat ? (float)(def->hierarchy_factor / 2) : (float)def->hierarchy_factor / 2.0f;
+    for (int i = 0; i < level; i++)
+        threshold *=
+            def->integer_division ? (float)(def->hierarchy_factor / 2) : (float)def->hierarchy_factor / 2.0f;
     return threshold;
 }
 
@@ -257,7 +257,7 @@ static gbt_status add_new_anchor(growth *g, const cell *c, int level, float size
     const adjust_def *def = g->def;
     float position[3];
     for (int k = 0; k < 3; k++) /* there is surface; the middle of a cell is where the cell is */
-        position[k] = def->compat ? (float)c->at[k] * size : c->position[k];
+        position[k] = def->at_cell_center ? (float)c->at[k] * size : c->position[k];
     if (level < def->level_count && def->may_stand != NULL &&
         !def->may_stand(def->may_stand_context, position))
         return GBT_OK;
@@ -307,7 +307,7 @@ gbt_status new_anchors_find(const anchors *a, const adjust_stats *stats, const a
     const int levels = def->level_count + (def->place_count > 0);
     gbt_status status = GBT_OK;
     for (int level = 0; level < levels && status == GBT_OK; level++) {
-        if (def->compat && level > 0 && out->count == 0)
+        if (def->coarse_level_gates && level > 0 && out->count == 0)
             break;
         status = grow_level(&g, level, err);
     }

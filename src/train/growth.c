@@ -19,7 +19,7 @@ static const float share_min = 2.5e-6f;     /* of short runs: schedule_thrift() 
 static const double last_rounds_from = 0.9; /* of growing */
 enum {
     ADJUSTS_PER_RUN = 100,
-    COMPAT_INTERVAL = 100 /* steps */,
+    ADJUST_INTERVAL = 100 /* steps, where rounds do not go by progress */,
     INTERVAL_MIN = 20 /* a judgement of fewer views is chance */
 };
 enum { VIEWS_MIN = 2 };
@@ -34,10 +34,10 @@ static void gather_use(trainer *t)
     float *use = t->stats.use_accum;
     for (size_t v = 0; v < f->visible_count; v++) {
         t->stats.visit_count[f->visible[v]] += 1;
-        if (t->def.compat)
+        if (!t->rules.importance_is_share)
             use[f->visible[v]] += f->tape.opacity_sum[v];
     }
-    for (size_t i = 0; !t->def.compat && i < f->gaussians.count; i++)
+    for (size_t i = 0; t->rules.importance_is_share && i < f->gaussians.count; i++)
         use[f->visible[f->tape.slot[i] / (uint32_t)t->anchors.offset_count]] += f->seen[i] / rays;
 }
 
@@ -81,8 +81,8 @@ bool growth_is_due(const trainer *t, double progress, double next)
 {
     if (!t->def.grow || progress < SCHEDULE_ADJUST_FROM || progress >= t->def.grow_until)
         return false;
-    if (t->def.compat)
-        return (t->step + 1) % COMPAT_INTERVAL == 0;
+    if (!t->rules.rounds_by_progress)
+        return (t->step + 1) % ADJUST_INTERVAL == 0;
     return floor(progress * ADJUSTS_PER_RUN) != floor(next * ADJUSTS_PER_RUN);
 }
 
@@ -93,7 +93,9 @@ static gbt_status follow_births(trainer *t, const adjust_result *result, gbt_err
     if (born == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < result->count; i++)
-        born[i] = result->source[i] >= 0 ? t->born[result->source[i]] : t->def.compat ? 0 : t->anchor_t;
+        born[i] = result->source[i] >= 0  ? t->born[result->source[i]]
+                  : t->rules.births_count ? t->anchor_t
+                                          : 0;
     mem_free(t->born);
     t->born = born;
     return GBT_OK;
@@ -165,25 +167,28 @@ static adjust_def rules_of(const trainer *t)
     adjust_def def = adjust_def_default();
     def.voxel_size = t->voxel_size;
     def.max_anchors = t->def.max_anchors;
-    def.compat = t->def.compat;
+    def.integer_division = t->rules.integer_division;
+    def.coarse_level_gates = t->rules.coarse_level_gates;
+    def.at_cell_center = t->rules.at_cell_center;
+    def.shape_log_max = t->rules.shape_log_max;
     def.seed = t->def.seed;
     def.step = t->step;
-    if (t->def.compat) {
-        def.interval = COMPAT_INTERVAL;
-        def.shape_log_max = 0.05f;
-        return def;
-    }
-    const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
-    const bool last =
-        t->def.last_thrift > 1 && pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
-    def.interval = fmaxf((float)(t->step + 1 - t->adjust_step), (float)INTERVAL_MIN);
-    def.grad_threshold *= thrift;
-    def.min_use = thrift * share_min * (last ? (float)t->def.last_thrift : 1);
-    def.grow = !last;
-    if (t->train_count >= VIEWS_MIN) {
+    if (t->rules.needs_two_views && t->train_count >= VIEWS_MIN) {
         def.may_stand = two_views_see;
         def.may_stand_context = t;
     }
+    if (!t->rules.rounds_by_progress)
+        def.interval = ADJUST_INTERVAL;
+    else
+        def.interval = fmaxf((float)(t->step + 1 - t->adjust_step), (float)INTERVAL_MIN);
+    if (!t->rules.thresholds_by_length)
+        return def;
+    const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
+    const bool last =
+        t->def.last_thrift > 1 && pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
+    def.grad_threshold *= thrift;
+    def.min_use = thrift * share_min * (last ? (float)t->def.last_thrift : 1);
+    def.grow = !last;
     return def;
 }
 
@@ -194,7 +199,7 @@ gbt_status growth_adjust(trainer *t, gbt_error *err)
     float *scale = NULL;
     adjust_result result = {0};
     gbt_status status = GBT_OK;
-    if (!def.compat && def.grow && pace_progress(&t->pace, t->step) < SCHEDULE_POINTS_UNTIL)
+    if (t->rules.grows_at_points && def.grow && pace_progress(&t->pace, t->step) < SCHEDULE_POINTS_UNTIL)
         status = grow_at_points(t, &def, &nearest, &scale, err);
     if (status == GBT_OK)
         status = anchors_adjust(&t->anchors, &t->stats, &def, &result, err);

@@ -9,8 +9,8 @@
 /** After frame_backward() of the step: add what it says of every anchor and offset to t->stats. */
 void growth_gather(trainer *t);
 
-/** Does the step from `progress` to `next` pass a multiple of 1/100 of the run (compat: 100 steps) between
-    start and end of growth? */
+/** Does the step from `progress` to `next` pass a multiple of 1/100 of the run (or of 100 steps:
+   train/rules.h) between start and end of growth? */
 bool growth_is_due(const trainer *t, double progress, double next);
 
 /** Grow and prune: anchors, gradients and moments change together; new anchors have no momentum. GBT_OK,

@@ -34,11 +34,11 @@ typedef struct learning_rates {
  * Log-linear decays, and in the end, from SCHEDULE_COOL_FROM on, straight to nearly nothing
  * (docs/training.md).
  *
- * @param compat [in] true: the reference method's rates; false: ours, higher, for runs of some thousand steps
+ * @param own    [in] true: ours, higher, for runs of some thousand steps; false: the reference method's
  * @param extent [in] of the cameras; the reference's rate of offsets is proportional to it
  * @param factor [in] of all rates
  */
-learning_rates learning_rates_at(double progress, bool compat, double extent, double factor);
+learning_rates learning_rates_at(double progress, bool own, double extent, double factor);
 
 /** A model in training: the values and what belongs to each. All borrowed. */
 typedef struct learning_model {

@@ -80,7 +80,7 @@ float schedule_thrift(double steps);
 /** Statistics are gathered from STATS_FROM on; anchors grow and are pruned from ADJUST_FROM on. */
 #define SCHEDULE_STATS_FROM (500.0 / 30000)
 #define SCHEDULE_ADJUST_FROM (1500.0 / 30000)
-/** Until then anchors grow at sparse points too: the start left most of them out (not with compat). */
+/** Until then anchors grow at sparse points too: the start left most of them out. */
 #define SCHEDULE_POINTS_UNTIL 0.15
 
 #endif

@@ -53,7 +53,7 @@ int trainer_level(const trainer *t, size_t view, double progress)
 {
     const gbt_camera camera = photos_camera(&t->photos, view, 0);
     const int across = camera.width < camera.height ? camera.width : camera.height;
-    int level = schedule_level(progress, t->def.compat ? 0 : t->def.start_level);
+    int level = schedule_level(progress, t->rules.start_level);
     while (level > 0 && across >> level < LEAST_PIXELS_ACROSS)
         level--;
     return level;
@@ -72,8 +72,8 @@ static photo_sample pick_pixels(const trainer *t, int level)
 /* Splats teach a model that is still rough in half the time of rays, which have the last word. */
 static frame_renderer renderer_of_step(const trainer *t, const gbt_camera *camera, double progress)
 {
-    const bool rays = t->renderer != FRAME_TRACE || t->def.compat || progress >= t->def.splats_until ||
-                      !raster_takes(camera);
+    const bool rays =
+        t->renderer != FRAME_TRACE || progress >= t->rules.splats_until || !raster_takes(camera);
     return rays ? t->renderer : FRAME_SPLAT;
 }
 
@@ -113,7 +113,7 @@ static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_
 static void revive_when_barren(trainer *t)
 {
     const frame *f = &t->frame;
-    if (t->step == 0 && !t->def.compat)
+    if (t->step == 0 && t->rules.raises_first_opacity)
         decode_raise_opacity(&f->tape, 0, revived_opacity, &t->decoder);
     const bool barren = f->visible_count > 0 && f->gaussians.count == 0;
     t->barren_in_row = barren ? t->barren_in_row + 1 : 0;
@@ -156,7 +156,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
     const learning_rates rates =
-        learning_rates_at(progress, t->def.compat, t->extent, t->def.learning_rate_factor);
+        learning_rates_at(progress, t->rules.own_rates, t->extent, t->def.learning_rate_factor);
 
     /* A view, and as many of its pixels as the model can already use. */
     const size_t slot = pick_view(t), view = t->train_views[slot];
@@ -175,7 +175,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     /* Render, compare. */
     f->draw.renderer = renderer_of_step(t, &camera, progress);
     trace_settings settings = t->settings;
-    if (!t->def.compat && progress < SCHEDULE_WHOLE_FROM) {
+    if (t->rules.loose_cutoffs && progress < SCHEDULE_WHOLE_FROM) {
         settings.alpha_min = SCHEDULE_ALPHA_MIN;
         settings.transmittance_min = SCHEDULE_T_MIN;
     }
@@ -217,8 +217,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     const bool adjust = growth_is_due(t, progress, next);
     const learning_model model = model_of(t);
     learn_networks(&model, &rates, t->step + 1);
-    if (!(adjust && t->def.compat)) /* in the reference the per-anchor groups miss the step in which anchors
-                                       change */
+    if (!adjust || t->rules.anchors_learn_when_adjusted)
         learn_anchors(&model, &rates, ++t->anchor_t);
     out->optimizer_seconds = clock_wall() - clock;
 

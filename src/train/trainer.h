@@ -13,6 +13,7 @@
 #include "frame/frame.h"
 #include "train/learnables.h"
 #include "train/photos.h"
+#include "train/rules.h"
 #include "train/schedule.h"
 
 /** What the last step did. */
@@ -27,6 +28,7 @@ typedef struct step_report {
 
 typedef struct trainer {
     gbt_train_def def; /* strings borrowed from the caller */
+    train_rules rules;
     scene scene;
     photos photos;
     size_t *train_views; /* indices into scene.views */
@@ -80,7 +82,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
  *
  * Gaussians below opacity 0 have no gradient, so a scene that has lost all of them (or begins without: the
  * first networks are random) would stay empty. After five views in a row with anchors in sight and not one
- * Gaussian, opacities are raised to 0.1; in the first step (not with `compat`) those of each offset whose
+ * Gaussian, opacities are raised to 0.1; in the first step (raises_first_opacity) those of each offset whose
  * mean is below 0.
  */
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err);

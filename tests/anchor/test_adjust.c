@@ -52,6 +52,14 @@ static void keep_all(adjust_def *def, size_t count)
     }
 }
 
+/* Where the reference differs. */
+static void set_reference(adjust_def *def, bool on)
+{
+    def->integer_division = on;
+    def->coarse_level_gates = on;
+    def->at_cell_center = on;
+}
+
 /* ---- oracles ---- */
 
 static void two_candidates_in_one_cell(void **state) /* T6 */
@@ -173,7 +181,7 @@ static void levels_have_their_own_cells_and_thresholds(void **state)
         set_gradient(&sc, 0, gradients[passes]);
         adjust_def def = adjust_def_default();
         def.voxel_size = 1.0f;
-        def.compat = true;
+        set_reference(&def, true);
         keep_all(&def, 1);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
@@ -185,7 +193,7 @@ static void levels_have_their_own_cells_and_thresholds(void **state)
         sc = empty_scene(1, 1);
         sc.a.offset[0] = 102.0f;
         set_gradient(&sc, 0, gradients[passes]);
-        def.compat = false;
+        set_reference(&def, false);
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
         assert_int_equal(r.grown, 1);
         assert_true(sc.a.position[3] == 102.0f);
@@ -193,28 +201,28 @@ static void levels_have_their_own_cells_and_thresholds(void **state)
     }
 }
 
-static void a_silent_coarse_level_gates_only_in_compat_mode(void **state)
+static void a_silent_coarse_level_gates_only_by_the_reference_rule(void **state)
 {
     (void)state;
-    for (int compat = 0; compat <= 1; compat++) {
+    for (int reference = 0; reference <= 1; reference++) {
         scene sc = empty_scene(1, 1);
         sc.a.offset[0] = 7.0f; /* the coarse cell is the anchor's own; the finer ones are free */
         set_gradient(&sc, 0, 1.0f);
         adjust_def def = adjust_def_default();
         def.voxel_size = 1.0f;
-        def.compat = compat == 1;
+        set_reference(&def, reference == 1);
         keep_all(&def, 1);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
-        assert_int_equal(r.grown, compat == 1 ? 0 : 1);
+        assert_int_equal(r.grown, reference == 1 ? 0 : 1);
         free_scene(&sc, &r);
     }
 }
 
-static void cells_finer_than_one_exist_only_outside_compat_mode(void **state)
+static void cells_finer_than_one_exist_only_without_integer_division(void **state)
 {
     (void)state; /* init_factor 4: cells 4, 1 and then 0 in the reference's integers, 0.25 in ours */
-    for (int compat = 0; compat <= 1; compat++) {
+    for (int reference = 0; reference <= 1; reference++) {
         scene sc = empty_scene(2, 1);
         sc.a.offset[0] = 11.3f;
         sc.a.position[3] = 11.0f; /* in its cells of 4 and 1, not in that of 0.25 */
@@ -222,12 +230,12 @@ static void cells_finer_than_one_exist_only_outside_compat_mode(void **state)
         adjust_def def = adjust_def_default();
         def.voxel_size = 1.0f;
         def.init_factor = 4;
-        def.compat = compat == 1;
+        set_reference(&def, reference == 1);
         keep_all(&def, 2);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
-        assert_int_equal(r.grown, compat == 1 ? 0 : 1);
-        if (compat == 0)
+        assert_int_equal(r.grown, reference == 1 ? 0 : 1);
+        if (reference == 0)
             assert_true(sc.a.position[6] == 11.3f && fabs((double)sc.a.scale_log[12] - log(0.25)) < 1e-6);
         free_scene(&sc, &r);
     }
@@ -244,7 +252,7 @@ static void cells_round_half_to_even(void **state)
         set_gradient(&sc, 0, 3e-4f);
         adjust_def def = adjust_def_default();
         def.voxel_size = 1.0f;
-        def.compat = true;
+        set_reference(&def, true);
         keep_all(&def, 1);
         adjust_result r;
         assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
@@ -422,12 +430,15 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
 {
     const size_t offsets = (size_t)sc->a.offset_count;
     size_t count = 0;
-    for (int level = 0; level < (def->compat ? 3 : 4); level++) { /* Gaussians, then places */
-        const double cell = (double)def->voxel_size * (double[4]){16, 4, 1, 0.25}[level];
+    for (int level = 0; level < 4; level++) { /* Gaussians, then places */
+        const double factor = (double[4]){16, 4, 1, 0.25}[level];
+        const double cell = (double)def->voxel_size * (def->integer_division ? floor(factor) : factor);
+        if (!(cell > 0))
+            continue;
         const bool as_start = def->place_scale != NULL;
         const double threshold = (double)def->grad_threshold * (double[4]){1, 2, 4, as_start ? 1 : 4}[level];
         const size_t begin = count;
-        if (def->compat && level > 0 && count == 0)
+        if (def->coarse_level_gates && level > 0 && count == 0)
             break;
         const size_t slots = sc->a.count * offsets;
         const bool is_place = level == 3;
@@ -448,7 +459,7 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
                 const float at = is_place ? def->place[p * 3 + c]
                                           : *anchor + sc->a.offset[n * 3 + c] * activation_exp(*scale_log);
                 b.center[c] = rint((double)at / cell) * cell;
-                b.position[c] = def->compat ? b.center[c] : (double)at;
+                b.position[c] = def->at_cell_center ? b.center[c] : (double)at;
             }
             bool taken = false;
             for (size_t j = 0; j < sc->a.count + begin; j++) {
@@ -510,7 +521,9 @@ static void adjust_agrees_with_brute_force(void **state)
         def.voxel_size = seed % 3 == 0 ? 0.5f : seed % 3 == 1 ? 0.03125f : 0.00390625f;
         def.seed = seed;
         def.step = 100 * seed;
-        def.compat = seed % 2 == 1;
+        def.integer_division = seed % 2 == 1;
+        def.coarse_level_gates = seed / 2 % 2 == 1;
+        def.at_cell_center = seed / 4 % 2 == 1;
         def.may_stand = seed % 5 == 0 ? right_of_the_middle : NULL;
         float place[40][3], place_scale[40];
         uint32_t place_anchor[40];
@@ -806,8 +819,8 @@ int main(void)
     const struct CMUnitTest single[] = {
         cmocka_unit_test(two_candidates_in_one_cell),
         cmocka_unit_test(levels_have_their_own_cells_and_thresholds),
-        cmocka_unit_test(a_silent_coarse_level_gates_only_in_compat_mode),
-        cmocka_unit_test(cells_finer_than_one_exist_only_outside_compat_mode),
+        cmocka_unit_test(a_silent_coarse_level_gates_only_by_the_reference_rule),
+        cmocka_unit_test(cells_finer_than_one_exist_only_without_integer_division),
         cmocka_unit_test(cells_round_half_to_even),
         cmocka_unit_test(shape_scales_are_cut),
         cmocka_unit_test(the_last_anchor_stays),

@@ -299,7 +299,7 @@ static void assert_unchanged(const trainer *t, learned before)
 
 static void assert_no_gradient_left(const trainer *t)
 {
-    const anchors *g = &t->gradient;
+    const anchors *g = &t->gradient.anchors;
     for (size_t i = 0; i < g->count * ANCHOR_FEATURE_DIM; i++)
         assert_true(g->feature[i] == 0);
     for (size_t i = 0; i < g->count * 6; i++)

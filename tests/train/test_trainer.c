@@ -288,7 +288,7 @@ static void a_budget_run_resumes_its_clock(void **state)
 
 static void assert_rows_agree(const trainer *t)
 {
-    assert_int_equal(t->gradient.count, t->anchors.count);
+    assert_int_equal(t->gradient.anchors.count, t->anchors.count);
     assert_int_equal(t->moment1.anchors.count, t->anchors.count);
     assert_int_equal(t->moment2.anchors.count, t->anchors.count);
     assert_int_equal(t->stats.count, t->anchors.count);
@@ -472,7 +472,7 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     memcpy(before.scale_log, t.anchors.scale_log, n * 6 * sizeof(float));
     memcpy(before.feature, t.anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float));
     const learning_rates rates =
-        learning_rates_at(pace_progress(&t.pace, t.step), false, t.extent, t.def.learning_rate_factor);
+        learning_rates_at(pace_progress(&t.pace, t.step), true, t.extent, t.def.learning_rate_factor);
     step_ok(&t, &r);
     assert_int_equal(t.anchors.count, n); /* no round: rows are where they were */
     double offset = 0, scale = 0, feature = 0;
@@ -964,9 +964,9 @@ static void levels_and_rates(void **state)
         }
     }
     double before[6];
-    for (int compat = 0; compat < 2; compat++)
+    for (int own = 0; own < 2; own++)
         for (int i = 0; i <= 100; i++) { /* positive, finite, and none ever rises */
-            const learning_rates r = learning_rates_at(i / 100.0, compat, 2.0, 1);
+            const learning_rates r = learning_rates_at(i / 100.0, own, 2.0, 1);
             const double now[6] = {r.anchor[ANCHOR_OFFSET],    r.anchor[ANCHOR_FEATURE],
                                    r.anchor[ANCHOR_SCALE_LOG], r.network[DECODER_OPACITY],
                                    r.network[DECODER_SHAPE],   r.network[DECODER_COLOR]};
@@ -976,17 +976,17 @@ static void levels_and_rates(void **state)
                 before[k] = now[k];
             }
         }
-    assert_true(learning_rates_at(1, false, 1, 1).anchor[ANCHOR_FEATURE] <
-                0.05 * learning_rates_at(0.9, false, 1, 1).anchor[ANCHOR_FEATURE]);
-    assert_true(learning_rates_at(1, true, 1, 1).anchor[ANCHOR_FEATURE] ==
-                learning_rates_at(0.9, true, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(learning_rates_at(1, true, 1, 1).anchor[ANCHOR_FEATURE] <
+                0.05 * learning_rates_at(0.9, true, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(learning_rates_at(1, false, 1, 1).anchor[ANCHOR_FEATURE] ==
+                learning_rates_at(0.9, false, 1, 1).anchor[ANCHOR_FEATURE]);
     for (int i = 0; i <= 100; i++) {
-        const learning_rates r = learning_rates_at(i / 100.0, true, 2.0, 1);
+        const learning_rates r = learning_rates_at(i / 100.0, false, 2.0, 1);
         assert_true(
-            fabs(r.anchor[ANCHOR_OFFSET] / learning_rates_at(i / 100.0, true, 1.0, 1).anchor[ANCHOR_OFFSET] -
+            fabs(r.anchor[ANCHOR_OFFSET] / learning_rates_at(i / 100.0, false, 1.0, 1).anchor[ANCHOR_OFFSET] -
                  2) < 1e-12);
-        assert_true(learning_rates_at(i / 100.0, false, 2.0, 1).anchor[ANCHOR_OFFSET] ==
-                    learning_rates_at(i / 100.0, false, 1.0, 1).anchor[ANCHOR_OFFSET]);
+        assert_true(learning_rates_at(i / 100.0, true, 2.0, 1).anchor[ANCHOR_OFFSET] ==
+                    learning_rates_at(i / 100.0, true, 1.0, 1).anchor[ANCHOR_OFFSET]);
     }
 }
 

@@ -14,8 +14,9 @@
 #include "base/vec.h"
 #include "train/gradient_check.h"
 #include "train/growth.h"
+#include "train/loss.h"
 
-static const float dssim_weight = 0.2f, volume_weight = 0.01f, revived_opacity = 0.1f;
+static const float revived_opacity = 0.1f;
 enum { MAX_SKIPPED_IN_ROW = 10 };
 enum {
     STREAM_VIEWS = 1,
@@ -141,11 +142,10 @@ static gbt_status compare(trainer *t, size_t slot, const unsigned char *valid, i
     for (int i = 0; i < (t->exposures.count > 0 ? 2 : 1); i++)
         GBT_TRY(image_fit(fitted[i], shown->width, shown->height, 3, err));
     if (t->exposures.count == 0)
-        return image_loss(shown, &t->photo, valid, dssim_weight, &t->loss_scratch, &t->d_image, loss, err);
+        return loss_of_image(shown, &t->photo, valid, &t->loss_scratch, &t->d_image, loss, err);
     const float *matrix = t->exposures.matrix + slot * AFFINE_NUMBERS;
     affine_apply(matrix, shown, &t->exposed);
-    GBT_TRY(
-        image_loss(&t->exposed, &t->photo, valid, dssim_weight, &t->loss_scratch, &t->d_image, loss, err));
+    GBT_TRY(loss_of_image(&t->exposed, &t->photo, valid, &t->loss_scratch, &t->d_image, loss, err));
     affine_backward(matrix, shown, &t->d_image, d_exposure);
     return GBT_OK;
 }
@@ -187,7 +187,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     image_loss_result loss;
     double d_exposure[AFFINE_NUMBERS];
     GBT_TRY(compare(t, slot, valid, &loss, d_exposure, err));
-    out->loss = loss.loss + (double)volume_weight * frame_volume(f);
+    out->loss = loss.loss + loss_of_gaussians(&f->gaussians);
     out->l1 = loss.l1;
     out->ssim = loss.ssim;
     out->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
@@ -200,8 +200,10 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     }
 
     /* Gradients, then parameters. */
-    GBT_TRY(frame_backward(f, &t->anchors, &t->decoder, &t->d_image, volume_weight, &t->gradient.anchors,
-                           t->gradient.networks, err));
+    GBT_TRY(frame_backward_gaussians(f, &t->d_image, err));
+    loss_add_gradient(&f->gaussians, &f->d_gaussians);
+    GBT_TRY(
+        frame_backward_anchors(f, &t->anchors, &t->decoder, &t->gradient.anchors, t->gradient.networks, err));
     clock = clock_wall();
     char where[80];
     if (gradient_is_bad(t, t->exposures.count > 0 ? d_exposure : NULL, where, sizeof where)) {

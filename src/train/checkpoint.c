@@ -106,7 +106,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     container_add(&w, "anchors.born", CONTAINER_U64, 1, &rows, t->born);
     for (int i = 0; i < ANCHOR_SETS; i++)
         container_add(&w, network_set_names[i], CONTAINER_F32, 1, &n, networks[i]);
-    row_sections_add(&w, "stats", adjust_stat_fields, ADJUST_STATS, rows, (size_t)t->stats.offset_count,
+    row_sections_add(&w, "stats", growth_stat_fields, GROWTH_STATS, rows, (size_t)t->stats.offset_count,
                      t->stats.field);
     /* A kill between the two renames leaves only PATH.prev: whoever resumes looks there next. */
     char previous[4096];
@@ -192,8 +192,8 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     GBT_TRY(anchors_resize(&t->gradient.anchors, rows, err));
     for (int i = 0; i < ANCHOR_SETS; i++)
         GBT_TRY(container_get(c, network_set_names[i], CONTAINER_F32, n, networks[i], err));
-    GBT_TRY(adjust_stats_resize(&t->stats, rows, t->def.offsets, err));
-    GBT_TRY(row_sections_get(c, "stats", adjust_stat_fields, ADJUST_STATS, rows, (size_t)t->def.offsets,
+    GBT_TRY(growth_stats_resize(&t->stats, rows, t->def.offsets, err));
+    GBT_TRY(row_sections_get(c, "stats", growth_stat_fields, GROWTH_STATS, rows, (size_t)t->def.offsets,
                              t->stats.field, err));
     if (t->exposures.count > 0)
         GBT_TRY(read_exposures(c, &t->exposures, err));

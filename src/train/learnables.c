@@ -85,15 +85,14 @@ void learnables_zero(learnables *l, size_t param_count)
     memset(l->networks, 0, param_count * sizeof *l->networks);
 }
 
-gbt_status learnables_follow(learnables *l, const adjust_result *result, gbt_error *err)
+gbt_status learnables_follow(learnables *l, const growth_result *result, gbt_error *err)
 {
     anchors old = l->anchors;
     l->anchors = (anchors){.offset_count = old.offset_count};
     const gbt_status status = anchors_resize(&l->anchors, result->count, err);
-    for (size_t i = 0; status == GBT_OK && i < result->count; i++)
-        if (result->source[i] >= 0)
-            rows_move(l->anchors.field, anchor_fields, ANCHOR_FIELDS, old.offset_count, i, old.field,
-                      (size_t)result->source[i]);
+    for (size_t i = 0; status == GBT_OK && i < result->survivors; i++)
+        rows_move(l->anchors.field, anchor_fields, ANCHOR_FIELDS, old.offset_count, i, old.field,
+                  result->source[i]);
     anchors_free(&old);
     return status;
 }

@@ -6,8 +6,8 @@
 #ifndef GBT_TRAIN_LEARNABLES_H
 #define GBT_TRAIN_LEARNABLES_H
 
-#include "anchor/adjust.h"
 #include "anchor/anchors.h"
+#include "growth/growth.h"
 
 /** One number for each that a model learns: a gradient, or a moment of Adam. The position is unused. */
 typedef struct learnables {
@@ -23,7 +23,7 @@ void learnables_free(learnables *l);
 void learnables_zero(learnables *l, size_t param_count);
 
 /** Rows follow the anchors; those of new anchors are 0. */
-gbt_status learnables_follow(learnables *l, const adjust_result *result, gbt_error *err);
+gbt_status learnables_follow(learnables *l, const growth_result *result, gbt_error *err);
 
 typedef struct learning_rates {
     double anchor[ANCHOR_FIELDS]; /* of the fields that learn */

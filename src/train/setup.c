@@ -207,7 +207,7 @@ static gbt_status make_state(trainer *t, gbt_error *err)
         return GBT_ERR_NO_MEMORY;
     if (t->def.exposure)
         GBT_TRY(exposures_make(&t->exposures, t->train_count, err));
-    return adjust_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
+    return growth_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
 }
 
 static gbt_status load_data(trainer *t, const char *data, gbt_error *err)

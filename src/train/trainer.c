@@ -13,7 +13,7 @@
 #include "base/rng.h"
 #include "base/vec.h"
 #include "train/gradient_check.h"
-#include "train/growth.h"
+#include "train/growing.h"
 #include "train/loss.h"
 
 static const float revived_opacity = 0.1f;
@@ -216,7 +216,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
         exposures_step(&t->exposures, slot, d_exposure,
                        t->def.learning_rate_factor *
                            exposures_rate(t->train_count, progress, next - progress));
-    const bool adjust = growth_is_due(t, progress, next);
+    const bool adjust = growing_is_due(t, progress, next);
     const learning_model model = model_of(t);
     learn_networks(&model, &rates, t->step + 1);
     if (!adjust || t->rules.anchors_learn_when_adjusted)
@@ -226,9 +226,9 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     /* Anchors. */
     clock = clock_wall();
     if (t->def.grow && progress >= SCHEDULE_STATS_FROM && progress < t->def.grow_until)
-        growth_gather(t);
+        growth_stats_gather(&t->stats, f, t->rules.importance, t->settings.t_near);
     if (adjust)
-        GBT_TRY(growth_adjust(t, err));
+        GBT_TRY(growing_round(t, err));
     out->adjust_seconds = clock_wall() - clock;
     t->step++;
     out->total_seconds = clock_wall() - start;
@@ -276,7 +276,7 @@ void trainer_free(trainer *t)
         learnables_free(kept[i]);
     mem_free(t->born);
     decoder_free(&t->decoder);
-    adjust_stats_free(&t->stats);
+    growth_stats_free(&t->stats);
     frame_free(&t->frame);
     image_free(&t->photo);
     image_free(&t->d_image);

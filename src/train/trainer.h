@@ -3,7 +3,6 @@
 #ifndef GBT_TRAIN_TRAINER_H
 #define GBT_TRAIN_TRAINER_H
 
-#include "anchor/adjust.h"
 #include "anchor/anchors.h"
 #include "anchor/init.h"
 #include "data/scene.h"
@@ -11,6 +10,7 @@
 #include "image/metrics.h"
 #include "train/exposure.h"
 #include "frame/frame.h"
+#include "growth/growth.h"
 #include "train/learnables.h"
 #include "train/photos.h"
 #include "train/rules.h"
@@ -39,7 +39,7 @@ typedef struct trainer {
     uint64_t *born; /* [anchors.count]: anchor_t when the anchor was made, ascending */
     decoder decoder;
     learnables gradient, moment1, moment2;
-    adjust_stats stats;
+    growth_stats stats;
     exposures exposures; /* of the training photos, in the order of train_views; count 0 without --exposure */
 
     frame_renderer renderer; /* that the model is for */
@@ -54,7 +54,7 @@ typedef struct trainer {
 
     pace pace;
     uint64_t step;        /* steps done */
-    uint64_t adjust_step; /* steps done at the last adjust */
+    uint64_t adjust_step; /* steps done at the last round of growth */
     uint64_t anchor_t;    /* Adam steps of the per-anchor groups */
     uint64_t skipped_steps, skipped_in_row;
     uint64_t barren_in_row, revivals; /* steps in a row without a Gaussian though anchors were in sight; how

@@ -279,7 +279,7 @@ static learned snapshot(const trainer *t)
     const float *networks[] = {t->decoder.params, t->moment1.networks, t->moment2.networks};
     for (int i = 0; i < 3; i++)
         append(&out, networks[i], t->decoder.param_count);
-    append(&out, t->stats.use_accum, t->stats.count);
+    append(&out, t->stats.importance_accum, t->stats.count);
     append(&out, t->stats.visit_count, t->stats.count);
     append(&out, t->stats.grad_accum, t->stats.count * (size_t)t->stats.offset_count);
     const float *exposure[] = {t->exposures.matrix, t->exposures.moment1, t->exposures.moment2};

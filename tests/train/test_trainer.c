@@ -521,7 +521,7 @@ static void moments_follow_their_rows(void **state)
     memcpy(m2, t.moment2.anchors.scale_log, n * 6 * sizeof *m2);
     for (size_t i = 0; i < n; i++) {
         t.stats.visit_count[i] = 1e6f;
-        t.stats.use_accum[i] = i % 2 == 0 ? 0.0f : 1e6f;
+        t.stats.importance_accum[i] = i % 2 == 0 ? 0.0f : 1e6f;
         for (size_t j = 0; j < k; j++) {
             t.stats.grad_count[i * k + j] = 1e6f;
             t.stats.grad_accum[i * k + j] = i < 20 ? 1e9f : 0.0f;

@@ -38,7 +38,7 @@ void growth_stats_free(growth_stats *s)
     memset(s, 0, sizeof *s);
 }
 
-/* What an anchor is good for is what pictures would miss without it: the share of them that its Gaussians
+/* The importance of an anchor is what pictures would miss without it: the share of them that its Gaussians
    cover. Opacity, which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of
    all anchors. */
 static void gather_importance(growth_stats *s, const frame *f, growth_importance importance)

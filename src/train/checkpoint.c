@@ -78,7 +78,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     const anchors *const sets[ANCHOR_SETS] = {&t->anchors, &t->moment1.anchors, &t->moment2.anchors};
     const float *const networks[ANCHOR_SETS] = {t->decoder.params, t->moment1.networks, t->moment2.networks};
     const uint64_t counters[] = {t->step,
-                                 t->adjust_step,
+                                 t->round_step,
                                  t->anchor_t,
                                  t->skipped_steps,
                                  (uint64_t)t->pace.known,
@@ -90,7 +90,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     container_add_small(&w, "counters", CONTAINER_U64, sizeof counters / sizeof *counters, counters);
     container_add(&w, "pace", CONTAINER_U64, 1, (const size_t[]){PACE_SEGMENTS}, t->pace.steps);
     container_add_small(&w, "in_row", CONTAINER_U64, 3,
-                        (const uint64_t[]){t->skipped_in_row, t->barren_in_row, t->revivals});
+                        (const uint64_t[]){t->skipped_in_row, t->empty_in_row, t->opacity_raises});
     container_add_small(&w, "seconds", CONTAINER_F64, 1, &t->seconds);
     container_add_small(&w, "views", CONTAINER_U64, 1, (const uint64_t[]){hash_of_views(&t->scene)});
     const exposures *e = &t->exposures;
@@ -203,10 +203,10 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     if (container_section_named(c, "in_row") != NULL) /* older checkpoints have none */
         GBT_TRY(container_get(c, "in_row", CONTAINER_U64, 3, in_row, err));
     t->skipped_in_row = in_row[0];
-    t->barren_in_row = in_row[1];
-    t->revivals = in_row[2];
+    t->empty_in_row = in_row[1];
+    t->opacity_raises = in_row[2];
     t->step = counters[0];
-    t->adjust_step = counters[1];
+    t->round_step = counters[1];
     t->anchor_t = counters[2];
     t->skipped_steps = counters[3];
     t->pace.known = (int)counters[4];

@@ -17,8 +17,8 @@
 static const float share_min = 2.5e-6f;     /* of short runs: schedule_thrift() */
 static const double last_rounds_from = 0.9; /* of growing */
 enum {
-    ADJUSTS_PER_RUN = 100,
-    ADJUST_INTERVAL = 100 /* steps, where rounds do not go by progress */,
+    ROUNDS_PER_RUN = 100,
+    ROUND_INTERVAL = 100 /* steps, where rounds do not go by progress */,
     INTERVAL_MIN = 20 /* a judgement of fewer views is chance */
 };
 enum { VIEWS_MIN = 2 };
@@ -28,8 +28,8 @@ bool growing_is_due(const trainer *t, double progress, double next)
     if (!t->def.grow || progress < SCHEDULE_ADJUST_FROM || progress >= t->def.grow_until)
         return false;
     if (!t->rules.rounds_by_progress)
-        return (t->step + 1) % ADJUST_INTERVAL == 0;
-    return floor(progress * ADJUSTS_PER_RUN) != floor(next * ADJUSTS_PER_RUN);
+        return (t->step + 1) % ROUND_INTERVAL == 0;
+    return floor(progress * ROUNDS_PER_RUN) != floor(next * ROUNDS_PER_RUN);
 }
 
 /* New rows come last, so the order by birth stays. */
@@ -77,7 +77,7 @@ typedef struct known_points {
 static gbt_status find_points(const trainer *t, known_points *known, growth_points *out, gbt_error *err)
 {
     const scene_points *points = &t->scene.points;
-    const bool first = t->adjust_step == 0;
+    const bool first = t->round_step == 0;
     known->nearest = mem_alloc(points->count, sizeof *known->nearest, "growth", err);
     if (known->nearest == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -131,9 +131,9 @@ static growth_def def_of(const trainer *t)
         def.may_stand_context = t;
     }
     if (!t->rules.rounds_by_progress)
-        def.interval = ADJUST_INTERVAL;
+        def.interval = ROUND_INTERVAL;
     else
-        def.interval = fmaxf((float)(t->step + 1 - t->adjust_step), (float)INTERVAL_MIN);
+        def.interval = fmaxf((float)(t->step + 1 - t->round_step), (float)INTERVAL_MIN);
     if (!t->rules.thresholds_by_length)
         return def;
     const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
@@ -164,8 +164,8 @@ gbt_status growing_round(trainer *t, gbt_error *err)
     mem_free(known.scale);
     mem_free(result.source);
     if (result.kept_last)
-        log_warn("step %llu: every anchor had become transparent; the most opaque one stays",
+        log_warn("step %llu: every anchor would be pruned; the most important one stays",
                  (unsigned long long)t->step);
-    t->adjust_step = t->step + 1;
+    t->round_step = t->step + 1;
     return status;
 }

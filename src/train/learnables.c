@@ -22,8 +22,8 @@ typedef struct rate_rule {
 } rate_rule;
 
 /* By the age of the run, the first steps of a new anchor would be up to six times too long, for its second
-   moments are young: geometry, which begins where it belongs, would be flung from there. Features begin as
-   others' and have far to go: they keep that. */
+   moments are young: offsets and scales, which begin about right, would overshoot. Features begin as those of
+   others and have far to go: they keep that. */
 static const rate_rule anchor_rules[ANCHOR_FIELDS] = {
     [ANCHOR_FEATURE] = {.first = 0.0075, .last = 0.0075, .own = 1.5, .ages_with_run = true},
     [ANCHOR_OFFSET] = {.first = 0.01, .last = 0.0001, .own = 4.5, .times_extent = true},

@@ -100,8 +100,8 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
     return status;
 }
 
-/* Distances from training cameras to a spread of anchors: they decide whether the networks see the distance,
-   its unit, and t_near. */
+/* Distances from training cameras to a sample of the anchors: they decide whether the networks see the
+   distance, its unit, and t_near. */
 static gbt_status measure_distances(trainer *t, float *p5, float *median, float *p95, gbt_error *err)
 {
     const size_t stride = t->anchors.count / 512 + 1, per_view = (t->anchors.count + stride - 1) / stride;

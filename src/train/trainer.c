@@ -16,14 +16,14 @@
 #include "train/growing.h"
 #include "train/loss.h"
 
-static const float revived_opacity = 0.1f;
+static const float raised_opacity = 0.1f;
 enum { MAX_SKIPPED_IN_ROW = 10 };
 enum {
     STREAM_VIEWS = 1,
     STREAM_PIXELS = 4,
     LEAST_PIXELS_ACROSS = 80, /* with fewer a step would not be faster */
-    CULPRIT_SIZE = 384,
-    BARREN_STEPS = 5
+    REASON_SIZE = 384,
+    EMPTY_STEPS = 5
 };
 
 /* ---- which view ---- */
@@ -95,7 +95,7 @@ static learning_model model_of(trainer *t)
 /* ---- one step ---- */
 
 /* Count a step that teaches nothing; nothing may have changed yet but the gradients, which are cleared.
-   `what` names the culprit. */
+   `what` names the reason. */
 static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_error *err)
 {
     learnables_zero(&t->gradient, t->decoder.param_count);
@@ -111,24 +111,24 @@ static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_
 
 /* After the last render: is the scene empty, and for good? And in the first: is one offset of all anchors?
    The networks begin at random, and an offset that begins below 0 everywhere would hardly ever be used. */
-static void revive_when_barren(trainer *t)
+static void raise_opacities_when_empty(trainer *t)
 {
     const frame *f = &t->frame;
     if (t->step == 0 && t->rules.raises_first_opacity)
-        decode_raise_opacity(&f->tape, 0, revived_opacity, &t->decoder);
-    const bool barren = f->visible_count > 0 && f->gaussians.count == 0;
-    t->barren_in_row = barren ? t->barren_in_row + 1 : 0;
-    if (t->barren_in_row < BARREN_STEPS)
+        decode_raise_opacity(&f->tape, 0, raised_opacity, &t->decoder);
+    const bool empty = f->visible_count > 0 && f->gaussians.count == 0;
+    t->empty_in_row = empty ? t->empty_in_row + 1 : 0;
+    if (t->empty_in_row < EMPTY_STEPS)
         return;
-    decode_raise_opacity(&f->tape, revived_opacity, revived_opacity, &t->decoder);
+    decode_raise_opacity(&f->tape, raised_opacity, raised_opacity, &t->decoder);
     decoder_part parts[DECODER_PARTS];
     decoder_parts(&t->decoder, parts);
     const decoder_part *opacity = &parts[DECODER_OPACITY];
     learnables *const moments[] = {&t->moment1, &t->moment2};
     for (int i = 0; i < 2; i++) /* what pulled the opacities down must not go on */
         memset(moments[i]->networks + opacity->begin, 0, (opacity->end - opacity->begin) * sizeof(float));
-    t->barren_in_row = 0;
-    if (t->revivals++ == 0)
+    t->empty_in_row = 0;
+    if (t->opacity_raises++ == 0)
         log_info("step %llu: no anchor makes a Gaussian; opacities are raised", (unsigned long long)t->step);
 }
 
@@ -182,7 +182,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     GBT_TRY(frame_render(f, frame_neural(&t->anchors, &t->decoder), &camera, &settings, true, err));
     out->gaussians = f->gaussians.count;
     out->visible = f->visible_count;
-    revive_when_barren(t);
+    raise_opacities_when_empty(t);
     clock = clock_wall();
     image_loss_result loss;
     double d_exposure[AFFINE_NUMBERS];
@@ -193,10 +193,10 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     out->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
     out->loss_seconds = clock_wall() - clock;
 
-    char culprit[CULPRIT_SIZE];
+    char reason[REASON_SIZE];
     if (!isfinite(out->loss)) {
-        snprintf(culprit, sizeof culprit, "the loss is not finite (photo %.200s)", t->scene.views[view].name);
-        return skip_step(t, out, culprit, err);
+        snprintf(reason, sizeof reason, "the loss is not finite (photo %.200s)", t->scene.views[view].name);
+        return skip_step(t, out, reason, err);
     }
 
     /* Gradients, then parameters. */
@@ -207,9 +207,9 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     clock = clock_wall();
     char where[80];
     if (gradient_is_bad(t, t->exposures.count > 0 ? d_exposure : NULL, where, sizeof where)) {
-        snprintf(culprit, sizeof culprit, "the gradient is not finite (%s; photo %.200s)", where,
+        snprintf(reason, sizeof reason, "the gradient is not finite (%s; photo %.200s)", where,
                  t->scene.views[view].name);
-        return skip_step(t, out, culprit, err);
+        return skip_step(t, out, reason, err);
     }
     t->skipped_in_row = 0;
     if (t->exposures.count > 0)

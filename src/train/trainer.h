@@ -44,7 +44,7 @@ typedef struct trainer {
 
     frame_renderer renderer; /* that the model is for */
     float voxel_size;
-    double extent, first_scale_max;     /* an isolated point would start as a fog */
+    double extent, first_scale_max;     /* an isolated point would start as a floater */
     float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs,
                                            far inside what floats hold */
     trace_settings settings;
@@ -53,13 +53,13 @@ typedef struct trainer {
     char start_text[160]; /* what the run starts from, for people */
 
     pace pace;
-    uint64_t step;        /* steps done */
-    uint64_t adjust_step; /* steps done at the last round of growth */
-    uint64_t anchor_t;    /* Adam steps of the per-anchor groups */
+    uint64_t step;       /* steps done */
+    uint64_t round_step; /* steps done at the last round of growth */
+    uint64_t anchor_t;   /* Adam steps of the per-anchor groups */
     uint64_t skipped_steps, skipped_in_row;
-    uint64_t barren_in_row, revivals; /* steps in a row without a Gaussian though anchors were in sight; how
-                                         often that was mended */
-    double seconds;                   /* training time so far, over all runs that continued one another */
+    uint64_t empty_in_row, opacity_raises; /* steps in a row without a Gaussian though anchors were in sight;
+                                         how often that was mended */
+    double seconds; /* training time so far, over all runs that continued one another */
 
     frame frame;
     image photo, d_image, exposed; /* exposed: the render as the photo's exposure shows it */

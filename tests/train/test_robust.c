@@ -502,13 +502,13 @@ static void an_empty_scene_comes_back(void **state)
             t.decoder.params[parts[0].end - 1 - (size_t)k] = -4;
         for (int i = 0; i < 4; i++) {
             step_ok(&t, &r);
-            assert_true(r.gaussians == 0 && r.visible > 0 && t.revivals == 0);
+            assert_true(r.gaussians == 0 && r.visible > 0 && t.opacity_raises == 0);
         }
         step_ok(&t, &r);
-        assert_int_equal(t.revivals, 1);
+        assert_int_equal(t.opacity_raises, 1);
         for (int i = 0; i < 10; i++)
             step_ok(&t, &r);
-        assert_true(r.gaussians > t.anchors.count / 2 && t.revivals == 1);
+        assert_true(r.gaussians > t.anchors.count / 2 && t.opacity_raises == 1);
         trainer_free(&t);
     }
 }

@@ -460,7 +460,7 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     trainer t;
     open_from_few_balls(&t);
     step_report r;
-    while (t.adjust_step == 0 || t.born[t.anchors.count - 1] == 0)
+    while (t.round_step == 0 || t.born[t.anchors.count - 1] == 0)
         step_ok(&t, &r);
     const size_t n = t.anchors.count, k = (size_t)t.anchors.offset_count;
     size_t old = 0;

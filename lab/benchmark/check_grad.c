@@ -313,31 +313,36 @@ static gbt_status check_renderers(checker *c, frame_renderer trained, gbt_error 
 
 /* A class of parameters in the three forms in which it appears here. */
 typedef struct parameter_class {
-    const char *name;
+    char name[24];
     double *value;        /* in c->parameters */
     const double *wanted; /* in c->d_parameters */
     const float *got;     /* in c->d_anchors or c->d_params */
     size_t count;
 } parameter_class;
 
-enum { CLASS_COUNT = 6 };
+enum { CLASS_COUNT = ANCHOR_FIELDS - ANCHOR_FIRST_LEARNED + DECODER_PARTS };
 
 static void list_classes(checker *c, parameter_class out[CLASS_COUNT])
 {
-    static const char *const networks[] = {"opacity mlp", "shape mlp", "colour mlp"};
     const size_t n = c->parameters.count;
-    out[0] = (parameter_class){"feature", c->parameters.feature, c->d_parameters.feature,
-                               c->d_anchors.feature, n * ANCHOR_FEATURE_DIM};
-    out[1] = (parameter_class){"offset", c->parameters.offset, c->d_parameters.offset, c->d_anchors.offset,
-                               n * 3 * (size_t)c->parameters.offset_count};
-    out[2] = (parameter_class){"scale", c->parameters.scale_log, c->d_parameters.scale_log,
-                               c->d_anchors.scale_log, n * 6};
-    decoder_part parts[3];
+    for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
+        *out = (parameter_class){.value = c->parameters.field[f],
+                                 .wanted = c->d_parameters.field[f],
+                                 .got = c->d_anchors.field[f],
+                                 .count = n * anchors_width(&c->d_anchors, f)};
+        snprintf(out->name, sizeof out->name, "%s", anchor_fields[f].label);
+        out++;
+    }
+    decoder_part parts[DECODER_PARTS];
     decoder_parts(&c->run->model.decoder, parts);
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < DECODER_PARTS; i++) {
         const size_t b = parts[i].begin;
-        out[3 + i] = (parameter_class){networks[i], c->parameters.params + b, c->d_parameters.params + b,
-                                       c->d_params + b, parts[i].end - b};
+        *out = (parameter_class){.value = c->parameters.params + b,
+                                 .wanted = c->d_parameters.params + b,
+                                 .got = c->d_params + b,
+                                 .count = parts[i].end - b};
+        snprintf(out->name, sizeof out->name, "%s mlp", parts[i].label);
+        out++;
     }
 }
 

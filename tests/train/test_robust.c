@@ -271,11 +271,9 @@ static learned snapshot(const trainer *t)
 {
     learned out = {0};
     const anchors *sets[] = {&t->anchors, &t->moment1.anchors, &t->moment2.anchors};
-    for (int i = 0; i < 3; i++) {
-        append(&out, sets[i]->feature, sets[i]->count * ANCHOR_FEATURE_DIM);
-        append(&out, sets[i]->offset, sets[i]->count * 3 * (size_t)sets[i]->offset_count);
-        append(&out, sets[i]->scale_log, sets[i]->count * 6);
-    }
+    for (int i = 0; i < 3; i++)
+        for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
+            append(&out, sets[i]->field[f], sets[i]->count * anchors_width(sets[i], f));
     const float *networks[] = {t->decoder.params, t->moment1.networks, t->moment2.networks};
     for (int i = 0; i < 3; i++)
         append(&out, networks[i], t->decoder.param_count);

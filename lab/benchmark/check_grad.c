@@ -25,6 +25,7 @@
 #include "render/loaded_run.h"
 #include "trace/reference.h"
 #include "trace/rounding_band.h"
+#include "train/loss.h"
 
 enum {
     CHECK_WIDTH = 48,
@@ -48,7 +49,6 @@ static const double step =
 static const double smooth_limit =
     1e-4; /* the differences to both sides agree to this part of the gradient, or a cut was crossed */
 static const double gradient_floor = 1e-6; /* below it a difference of double losses is rounding */
-static const double dssim_weight = 0.2, volume_weight = 0.01; /* the training loss */
 
 typedef struct checker {
     loaded_run *run;
@@ -68,9 +68,9 @@ typedef struct checker {
     decode_ref parameters, d_parameters;
     double *slots, *d_slots; /* [visible * K][DECODE_REF_FIELDS] */
     double *rgb;
-    double *terms[3]; /* [rays][3]: every pixel's share of the loss at 0, -step, +step */
-    double volume[3];
-    double camera[3]; /* as the decoder gets it, rounded to float */
+    double *terms[3];        /* [rays][3]: every pixel's share of the loss at 0, -step, +step */
+    double gaussian_loss[3]; /* the Gaussians' own terms, the same */
+    double camera[3];        /* as the decoder gets it, rounded to float */
     FILE *out;
     size_t broken;
 } checker;
@@ -140,11 +140,10 @@ static gbt_status set_up(checker *c, gbt_error *err)
         c->valid_count += c->valid == NULL || c->valid[i];
     GBT_TRY(allocate(c, err));
     image_loss_result loss;
-    GBT_TRY(
-        image_loss(&c->frame->rgb, &c->photo, c->valid, dssim_weight, &c->scratch, &c->d_image, &loss, err));
+    GBT_TRY(loss_of_image(&c->frame->rgb, &c->photo, c->valid, &c->scratch, &c->d_image, &loss, err));
     fprintf(c->out, "%s, %d x %d pixels: %zu Gaussians of %zu visible anchors, loss %.6g\n",
             s->views[view].name, c->width, c->height, c->scene.count, c->frame->visible_count,
-            loss.loss + volume_weight * frame_volume(c->frame));
+            loss.loss + loss_of_gaussians(&c->frame->gaussians));
     fprintf(c->out, "%-12s%-12s%12s%12s\n", "stage", "class", "error", "limit");
     return GBT_OK;
 }
@@ -314,42 +313,49 @@ static gbt_status check_renderers(checker *c, frame_renderer trained, gbt_error 
 
 /* A class of parameters in the three forms in which it appears here. */
 typedef struct parameter_class {
-    const char *name;
+    char name[24];
     double *value;        /* in c->parameters */
     const double *wanted; /* in c->d_parameters */
     const float *got;     /* in c->d_anchors or c->d_params */
     size_t count;
 } parameter_class;
 
-enum { CLASS_COUNT = 6 };
+enum { CLASS_COUNT = ANCHOR_FIELDS - ANCHOR_FIRST_LEARNED + DECODER_PARTS };
 
 static void list_classes(checker *c, parameter_class out[CLASS_COUNT])
 {
-    static const char *const networks[] = {"opacity mlp", "shape mlp", "colour mlp"};
     const size_t n = c->parameters.count;
-    out[0] = (parameter_class){"feature", c->parameters.feature, c->d_parameters.feature,
-                               c->d_anchors.feature, n * ANCHOR_FEATURE_DIM};
-    out[1] = (parameter_class){"offset", c->parameters.offset, c->d_parameters.offset, c->d_anchors.offset,
-                               n * 3 * (size_t)c->parameters.offset_count};
-    out[2] = (parameter_class){"scale", c->parameters.scale_log, c->d_parameters.scale_log,
-                               c->d_anchors.scale_log, n * 6};
-    decoder_part parts[3];
+    for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
+        *out = (parameter_class){.value = c->parameters.field[f],
+                                 .wanted = c->d_parameters.field[f],
+                                 .got = c->d_anchors.field[f],
+                                 .count = n * anchors_width(&c->d_anchors, f)};
+        snprintf(out->name, sizeof out->name, "%s", anchor_fields[f].label);
+        out++;
+    }
+    decoder_part parts[DECODER_PARTS];
     decoder_parts(&c->run->model.decoder, parts);
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < DECODER_PARTS; i++) {
         const size_t b = parts[i].begin;
-        out[3 + i] = (parameter_class){networks[i], c->parameters.params + b, c->d_parameters.params + b,
-                                       c->d_params + b, parts[i].end - b};
+        *out = (parameter_class){.value = c->parameters.params + b,
+                                 .wanted = c->d_parameters.params + b,
+                                 .got = c->d_params + b,
+                                 .count = parts[i].end - b};
+        snprintf(out->name, sizeof out->name, "%s mlp", parts[i].label);
+        out++;
     }
 }
 
-/* frame_backward() on the whole image; then the same gradients of the Gaussians through the decoder in
+/* The adjoint of the whole image; then the same gradients of the Gaussians through the decoder in
    double. */
 static gbt_status check_decode(checker *c, gbt_error *err)
 {
     frame *f = c->frame;
     GBT_TRY(render_at(c, c->view, c->width, err)); /* a kept pass has one adjoint */
-    GBT_TRY(frame_backward(f, &c->run->model.anchors, &c->run->model.decoder, &c->d_image,
-                           (float)volume_weight, &c->d_anchors, c->d_params, err));
+    GBT_TRY(frame_backward_gaussians(f, &c->d_image, err));
+    loss_add_gradient(&f->gaussians, &f->d_gaussians);
+    GBT_TRY(frame_backward_anchors(f, &c->run->model.anchors, &c->run->model.decoder, &c->d_anchors,
+                                   c->d_params, err));
     const float *d_fields[GAUSSIANS_FIELD_COUNT];
     fields_of(&f->d_gaussians, d_fields);
     for (size_t i = 0; i < f->gaussians.count; i++)
@@ -368,7 +374,7 @@ static gbt_status check_decode(checker *c, gbt_error *err)
     return GBT_OK;
 }
 
-/* (1 - w) mean|x - y| + w (1 - SSIM), from the definition (image/metrics.h), in double: the terms of its
+/* The loss of the picture with SSIM from its definition (image/metrics.h), in double: the terms of its
    mean. */
 static void loss_terms(const checker *c, double *terms)
 {
@@ -406,9 +412,7 @@ static void loss_terms(const checker *c, double *terms)
                     }
                 const double ssim = (2 * a * b + c1) * (2 * (ab - a * b) + c2) /
                                     ((a * a + b * b + c1) * (aa - a * a + bb - b * b + c2));
-                terms[out] = ((1 - dssim_weight) * fabs(c->rgb[out] - (double)c->photo.pixels[out]) +
-                              dssim_weight * (1 - ssim)) /
-                             values;
+                terms[out] = loss_of_value(c->rgb[out], (double)c->photo.pixels[out], ssim) / values;
             }
 }
 
@@ -426,11 +430,11 @@ static gbt_status chain_loss(checker *c, reference_scene *seen, int which, gbt_e
 {
     const frame *f = c->frame;
     parallel_blocks(f->visible_count, ANCHOR_GRAIN, decode_block, c);
-    double volume = 0;
+    double shares = 0;
     size_t to = 0;
     for (size_t i = 0; i < f->gaussians.count; i++) {
         double *slot = c->slots + f->tape.slot[i] * (size_t)DECODE_REF_FIELDS;
-        volume += slot[3] * slot[4] * slot[5];
+        shares += loss_of_gaussian(slot);
         if (!(c->weight[i] > 0))
             continue;
         frame_widen_exact(f, i, slot);
@@ -440,7 +444,7 @@ static gbt_status chain_loss(checker *c, reference_scene *seen, int which, gbt_e
     }
     GBT_TRY(reference_scene_forward(seen, &c->run->settings, &f->rays, c->rgb, NULL, NULL, err));
     loss_terms(c, c->terms[which]);
-    c->volume[which] = f->gaussians.count > 0 ? volume_weight * volume / (double)f->gaussians.count : 0;
+    c->gaussian_loss[which] = f->gaussians.count > 0 ? shares / (double)f->gaussians.count : 0;
     return GBT_OK;
 }
 
@@ -457,8 +461,8 @@ static gbt_status differences_along(checker *c, const parameter_class *class, co
         status = chain_loss(c, seen, side, err);
     }
     memcpy(class->value, keep, class->count * sizeof *keep);
-    out[0] = c->volume[0] - c->volume[1];
-    out[1] = c->volume[2] - c->volume[0];
+    out[0] = c->gaussian_loss[0] - c->gaussian_loss[1];
+    out[1] = c->gaussian_loss[2] - c->gaussian_loss[0];
     for (size_t i = 0; i < 3 * c->ray_count; i++) {
         out[0] += c->terms[0][i] - c->terms[1][i];
         out[1] += c->terms[2][i] - c->terms[0][i];

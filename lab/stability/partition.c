@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "anchor/adjust.h"
 #include "base/clock.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -14,19 +13,20 @@
 #include "gb/balls.h"
 #include "image/metrics.h"
 #include "frame/frame.h"
+#include "growth/growth.h"
 
 /* ---- A14: growth explodes, or all anchors go ---- */
 
 typedef struct colony {
     anchors a;
-    adjust_stats stats;
-    adjust_result result;
+    growth_stats stats;
+    growth_result result;
 } colony;
 
 static void colony_free(colony *c)
 {
     anchors_free(&c->a);
-    adjust_stats_free(&c->stats);
+    growth_stats_free(&c->stats);
     mem_free(c->result.source);
     memset(c, 0, sizeof *c);
 }
@@ -36,7 +36,7 @@ static void colony_make(stability *s, colony *c, size_t count, double at, float 
 {
     c->a.offset_count = 5;
     if (s->status != GBT_OK || !stability_ok(s, anchors_resize(&c->a, count, s->err)) ||
-        !stability_ok(s, adjust_stats_resize(&c->stats, count, 5, s->err)))
+        !stability_ok(s, growth_stats_resize(&c->stats, count, 5, s->err)))
         return;
     for (size_t i = 0; i < count; i++) {
         for (size_t k = 0; k < 3; k++)
@@ -48,18 +48,18 @@ static void colony_make(stability *s, colony *c, size_t count, double at, float 
             c->stats.grad_accum[5 * i + k] = 100;
         }
         c->stats.visit_count[i] = 100;
-        c->stats.use_accum[i] = 100 * opacity * (1 + rng_uniform(14, 30, i));
+        c->stats.importance_accum[i] = 100 * opacity * (1 + rng_uniform(14, 30, i));
     }
 }
 
-static void colony_adjust(stability *s, colony *c, size_t cap, float voxel)
+static void colony_round(stability *s, colony *c, size_t cap, float voxel)
 {
-    adjust_def def = adjust_def_default();
+    growth_def def = growth_def_default();
     def.grad_threshold = 0;
     def.voxel_size = voxel;
     def.max_anchors = cap;
     if (s->status == GBT_OK)
-        stability_ok(s, anchors_adjust(&c->a, &c->stats, &def, &c->result, s->err));
+        stability_ok(s, growth_round(&c->a, &c->stats, &def, &c->result, s->err));
 }
 
 static void explosion(stability *s)
@@ -71,11 +71,11 @@ static void explosion(stability *s)
     for (int i = 0; i < 2; i++) {
         parallel_set_threads(1 + i);
         colony_make(s, &c[i], count, 0, 1);
-        colony_adjust(s, &c[i], cap, 0.001f);
+        colony_round(s, &c[i], cap, 0.001f);
     }
     parallel_set_threads(before);
     colony_make(s, &whole, count, 0, 1);
-    colony_adjust(s, &whole, SIZE_MAX, 0.001f);
+    colony_round(s, &whole, SIZE_MAX, 0.001f);
     const size_t rows = c[0].a.count;
     const bool same =
         rows == c[1].a.count && memcmp(c[0].a.position, c[1].a.position, 3 * rows * sizeof(float)) == 0;
@@ -122,14 +122,14 @@ gbt_status stability_a14(stability *s)
     colony_make(s, &c, 1000, 0, 0.0001f);
     for (size_t i = 0; i < 5000 && s->status == GBT_OK; i++)
         c.stats.grad_count[i] = 0; /* nothing grows */
-    colony_adjust(s, &c, SIZE_MAX, 0.001f);
+    colony_round(s, &c, SIZE_MAX, 0.001f);
     stability_check(s, "A14c", fabs((double)c.a.count - 1), NAN, "The most opaque one; training says so.");
     colony_free(&c);
     nobody_left(s);
 
     /* Cells of a millimetre on a map grid. */
     colony_make(s, &c, 100, 4.5e6, 1);
-    colony_adjust(s, &c, SIZE_MAX, 0.001f / 16);
+    colony_round(s, &c, SIZE_MAX, 0.001f / 16);
     double far = 0;
     for (size_t i = 100; i < c.a.count; i++)
         for (size_t k = 0; k < 3; k++)

@@ -178,13 +178,12 @@ gbt_status practice_steps(trainer *t, gbt_error *why)
 size_t practice_count_bad(const trainer *t)
 {
     const anchors *a = &t->anchors;
-    return draw_count_bad(a->position, a->count * 3) +
-           draw_count_bad(a->feature, a->count * ANCHOR_FEATURE_DIM) +
-           draw_count_bad(a->offset, a->count * 3 * (size_t)a->offset_count) +
-           draw_count_bad(a->scale_log, a->count * 6) +
-           draw_count_bad(t->decoder.params, t->decoder.param_count) +
-           draw_count_bad(t->params_m, t->decoder.param_count) +
-           draw_count_bad(t->params_v, t->decoder.param_count);
+    size_t bad = 0;
+    for (int f = 0; f < ANCHOR_FIELDS; f++)
+        bad += draw_count_bad(a->field[f], a->count * anchors_width(a, f));
+    return bad + draw_count_bad(t->decoder.params, t->decoder.param_count) +
+           draw_count_bad(t->moment1.networks, t->decoder.param_count) +
+           draw_count_bad(t->moment2.networks, t->decoder.param_count);
 }
 
 static void mean_of_photos(trainer *t, float mean[3], gbt_status *status, gbt_error *why)

@@ -374,15 +374,12 @@ static uint64_t hash_of_run(stability *s, const practice *p, const gbt_train_def
         stability_ok(s, GBT_ERR_NO_MEMORY);
     else if (s->status == GBT_OK && must(s, practice_open(s, p, def, t, &why), &why) &&
              must(s, practice_steps(t, &why), &why)) {
-        const anchors *sets[] = {&t->anchors, &t->moment1, &t->moment2};
-        for (int i = 0; i < 3; i++) {
-            hash = add_hash(hash, sets[i]->position, sets[i]->count * 3 * sizeof(float));
-            hash = add_hash(hash, sets[i]->feature, sets[i]->count * ANCHOR_FEATURE_DIM * sizeof(float));
-            hash = add_hash(hash, sets[i]->offset,
-                            sets[i]->count * 3 * (size_t)sets[i]->offset_count * sizeof(float));
-            hash = add_hash(hash, sets[i]->scale_log, sets[i]->count * 6 * sizeof(float));
-        }
-        const float *networks[] = {t->decoder.params, t->params_m, t->params_v};
+        const anchors *sets[] = {&t->anchors, &t->moment1.anchors, &t->moment2.anchors};
+        for (int i = 0; i < 3; i++)
+            for (int f = 0; f < ANCHOR_FIELDS; f++)
+                hash = add_hash(hash, sets[i]->field[f],
+                                sets[i]->count * anchors_width(sets[i], f) * sizeof(float));
+        const float *networks[] = {t->decoder.params, t->moment1.networks, t->moment2.networks};
         for (int i = 0; i < 3; i++)
             hash = add_hash(hash, networks[i], t->decoder.param_count * sizeof(float));
     }

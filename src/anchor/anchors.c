@@ -10,36 +10,56 @@
 #include "base/memory.h"
 #include "base/rng.h"
 
-enum { SCALES = 6 };
+const row_field anchor_fields[ANCHOR_FIELDS] = {
+#define X(name, id, label, width, per_offset, meaning) {#name, label, width, per_offset},
+    ANCHOR_FIELD_LIST(X)
+#undef X
+};
 
 gbt_status anchors_resize(anchors *a, size_t count, gbt_error *err)
 {
     if (a->offset_count < 1 || a->offset_count > ANCHOR_MAX_OFFSETS)
         return base_fail(err, GBT_ERR_ARGUMENT, "anchors: offset_count %d (wanted 1 to %d)", a->offset_count,
                          ANCHOR_MAX_OFFSETS);
-    const size_t widths[ROWS_FIELDS] = {3, ANCHOR_FEATURE_DIM, (size_t)a->offset_count * 3, SCALES};
-    float **const fields[ROWS_FIELDS] = {&a->position, &a->feature, &a->offset, &a->scale_log};
-    GBT_TRY(rows_resize(fields, widths, &a->capacity, a->count, count, "anchors", err));
+    GBT_TRY(rows_resize(a->field, anchor_fields, ANCHOR_FIELDS, a->offset_count, &a->capacity, a->count,
+                        count, "anchors", err));
     a->count = count;
     return GBT_OK;
 }
 
 void anchors_free(anchors *a)
 {
-    mem_free(a->position);
-    mem_free(a->feature);
-    mem_free(a->offset);
-    mem_free(a->scale_log);
+    for (int f = 0; f < ANCHOR_FIELDS; f++)
+        mem_free(a->field[f]);
     memset(a, 0, sizeof *a);
+}
+
+void anchors_copy(anchors *to, const anchors *from)
+{
+    for (int f = 0; f < ANCHOR_FIELDS && from->count > 0; f++)
+        memcpy(to->field[f], from->field[f], from->count * anchors_width(from, f) * sizeof(float));
+}
+
+void anchors_zero_learned(anchors *a)
+{
+    for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS && a->count > 0; f++)
+        memset(a->field[f], 0, a->count * anchors_width(a, f) * sizeof(float));
 }
 
 /* ---- networks ---- */
 
-static const int outputs_per_offset[3] = {1, 7, 3};
+static const struct {
+    const char *label;
+    size_t outputs; /* for each Gaussian */
+} networks[DECODER_PARTS] = {
+#define X(id, label, outputs) {label, outputs},
+    DECODER_PART_LIST(X)
+#undef X
+};
 
 static size_t part_size(int part, size_t offset_count, size_t input_count)
 {
-    const size_t out = offset_count * (size_t)outputs_per_offset[part];
+    const size_t out = offset_count * networks[part].outputs;
     return ANCHOR_HIDDEN_DIM * (input_count + 1) + out * (ANCHOR_HIDDEN_DIM + 1);
 }
 
@@ -53,7 +73,7 @@ gbt_status decoder_init(decoder *d, int offset_count, bool has_distance, uint64_
                          ANCHOR_MAX_OFFSETS);
     const size_t in = input_dim(has_distance);
     size_t param_count = 0;
-    for (int part = 0; part < 3; part++)
+    for (int part = 0; part < DECODER_PARTS; part++)
         param_count += part_size(part, (size_t)offset_count, in);
     float *params = mem_alloc(param_count, sizeof *params, "decoder", err);
     if (params == NULL)
@@ -65,9 +85,9 @@ gbt_status decoder_init(decoder *d, int offset_count, bool has_distance, uint64_
                    .distance_max = INFINITY,
                    .param_count = param_count,
                    .params = params};
-    decoder_part parts[3];
+    decoder_part parts[DECODER_PARTS];
     decoder_parts(d, parts);
-    for (int part = 0; part < 3; part++) {
+    for (int part = 0; part < DECODER_PARTS; part++) {
         const size_t first_layer = ANCHOR_HIDDEN_DIM * (in + 1);
         for (size_t i = 0; i < parts[part].end - parts[part].begin; i++) {
             const double bound = 1.0 / sqrt(i < first_layer ? (double)in : (double)ANCHOR_HIDDEN_DIM);
@@ -84,12 +104,12 @@ void decoder_free(decoder *d)
     memset(d, 0, sizeof *d);
 }
 
-void decoder_parts(const decoder *d, decoder_part parts[3])
+void decoder_parts(const decoder *d, decoder_part parts[DECODER_PARTS])
 {
     size_t begin = 0;
-    for (int part = 0; part < 3; part++) {
-        parts[part].begin = begin;
-        begin += part_size(part, (size_t)d->offset_count, input_dim(d->has_distance));
-        parts[part].end = begin;
+    for (int part = 0; part < DECODER_PARTS; part++) {
+        const size_t size = part_size(part, (size_t)d->offset_count, input_dim(d->has_distance));
+        parts[part] = (decoder_part){networks[part].label, networks[part].outputs, begin, begin + size};
+        begin += size;
     }
 }

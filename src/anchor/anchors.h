@@ -11,23 +11,61 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "anchor/rows.h"
 #include "gbtrace/status.h"
 
 enum { ANCHOR_FEATURE_DIM = 32, ANCHOR_HIDDEN_DIM = 32, ANCHOR_MAX_OFFSETS = 16 };
 
+/** Every array of the anchors, listed once: memory, gradients, Adam moments and files are loops over it. The
+    position never moves; the others learn (train/learnables.c has their rates).
+
+    X(name, label, width, per_offset, meaning): label is for people; a row has `width` floats, per_offset: for
+    each of the K Gaussians. */
+#define ANCHOR_FIELD_LIST(X)                                                                                 \
+    X(position, POSITION, "position", 3, false, "scene-local units")                                         \
+    X(feature, FEATURE, "feature", ANCHOR_FEATURE_DIM, false, "input of the networks")                       \
+    X(offset, OFFSET, "offset", 3, true, "of each Gaussian, in units of exp(scale_log[0..2])")               \
+    X(scale_log, SCALE_LOG, "scale", 6, false, "0..2 scale the offsets, 3..5 bound the std-devs")
+
+typedef enum anchor_field {
+#define X(name, id, label, width, per_offset, meaning) ANCHOR_##id,
+    ANCHOR_FIELD_LIST(X)
+#undef X
+        ANCHOR_FIELDS,
+    ANCHOR_FIRST_LEARNED = ANCHOR_FEATURE /* this one and all that follow */
+} anchor_field;
+
+extern const row_field anchor_fields[ANCHOR_FIELDS];
+
 typedef struct anchors {
     size_t count, capacity;
-    int offset_count; /* K, Gaussians per anchor, [1, ANCHOR_MAX_OFFSETS]; default 10 */
-    float *position;  /* [count][3], scene-local units */
-    float *feature;   /* [count][32] */
-    float *offset;    /* [count][K][3], in units of exp(scale_log[0..2]) */
-    float *scale_log; /* [count][6]: 0..2 scale the offsets, 3..5 bound the Gaussians' std-devs */
+    int offset_count; /* K, Gaussians per anchor, [1, ANCHOR_MAX_OFFSETS] */
+    union {           /* owned arrays [count][width] or [count][K][width]: by name, or by anchor_field */
+        struct {
+#define X(name, id, label, width, per_offset, meaning) float *name;
+            ANCHOR_FIELD_LIST(X)
+#undef X
+        };
+        float *field[ANCHOR_FIELDS];
+    };
 } anchors;
+
+/** Floats that one anchor has in a field. */
+static inline size_t anchors_width(const anchors *a, int field)
+{
+    return row_field_width(&anchor_fields[field], a->offset_count);
+}
 
 /** Keeps the first min(old, new) rows; new rows are zero; offset_count must be set first. On failure nothing
     changes. */
 gbt_status anchors_resize(anchors *a, size_t count, gbt_error *err);
 void anchors_free(anchors *a);
+
+/** Copy every row of every field; both have the same shape. */
+void anchors_copy(anchors *to, const anchors *from);
+
+/** Every field that learns becomes 0: gradients before they are added to. */
+void anchors_zero_learned(anchors *a);
 
 /* ---- networks ---- */
 
@@ -36,8 +74,8 @@ void anchors_free(anchors *a);
 typedef struct decoder {
     int offset_count;
     bool has_distance;
-    float distance_scale; /* the distance input is |x - c| * distance_scale: 1 / median training distance; 1
-                             in compat mode */
+    float distance_scale; /* the distance input is |x - c| * distance_scale: 1 / median training distance, or
+                             1 */
     float distance_min, distance_max; /* trained range (scaled): the input is cut to [min / 2, 2 max].
                                          decoder_init() gives 0, infinity */
     size_t param_count;               /* all weights and biases, one flat array */
@@ -49,11 +87,26 @@ typedef struct decoder {
 gbt_status decoder_init(decoder *d, int offset_count, bool has_distance, uint64_t seed, gbt_error *err);
 void decoder_free(decoder *d);
 
-/** Where each network's part starts in params, and how long it is: {opacity, shape, colour}. They have
-    learning rates of their own. */
+/** The networks, listed once, in the order of their parameters: X(id, label, outputs per Gaussian). They have
+    learning rates of their own (train/learnables.c). */
+#define DECODER_PART_LIST(X)                                                                                 \
+    X(OPACITY, "opacity", 1)                                                                                 \
+    X(SHAPE, "shape", 7)                                                                                     \
+    X(COLOR, "colour", 3)
+
+enum {
+#define X(id, label, outputs) DECODER_##id,
+    DECODER_PART_LIST(X)
+#undef X
+        DECODER_PARTS
+};
+
+/** Which of decoder.params are a network's. */
 typedef struct decoder_part {
+    const char *label;
+    size_t outputs; /* for each Gaussian */
     size_t begin, end;
 } decoder_part;
-void decoder_parts(const decoder *d, decoder_part parts[3]);
+void decoder_parts(const decoder *d, decoder_part parts[DECODER_PARTS]);
 
 #endif

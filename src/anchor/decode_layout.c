@@ -8,13 +8,12 @@
 
 decode_layout decode_layout_of(const decoder *d)
 {
-    const size_t outputs[HEAD_COUNT] = {1, SHAPE_OUTPUTS, COLOR_OUTPUTS};
     decode_layout layout = {.offset_count = (size_t)d->offset_count,
                             .input_count = ANCHOR_FEATURE_DIM + 3 + (d->has_distance ? 1 : 0)};
     decoder_part parts[HEAD_COUNT];
     decoder_parts(d, parts);
     for (int head = 0; head < HEAD_COUNT; head++) {
-        layout.out_count[head] = outputs[head] * layout.offset_count;
+        layout.out_count[head] = parts[head].outputs * layout.offset_count;
         layout.out_stride[head] =
             (layout.out_count[head] + DENSE_COLUMNS - 1) / DENSE_COLUMNS * DENSE_COLUMNS;
         layout.param_first[head] = parts[head].begin;

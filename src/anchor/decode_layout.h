@@ -20,7 +20,7 @@ enum {
                                              do not have it */
     INPUT_ONE = INPUT_COUNT, /* a column of ones: it turns the bias gradient into one more weight gradient */
     INPUT_STRIDE = 48,
-    HEAD_COUNT = 3, /* opacity, shape, colour */
+    HEAD_COUNT = DECODER_PARTS, /* opacity, shape, colour */
     HIDDEN_STRIDE = HEAD_COUNT * ANCHOR_HIDDEN_DIM,
     ALPHA_STRIDE = ANCHOR_MAX_OFFSETS,
     SHAPE_OUTPUTS = 7,

@@ -28,21 +28,24 @@ static size_t input_count(const decode_ref *r) { return FEATURE + 3 + (r->has_di
 
 static size_t out_count(const decode_ref *r, int head)
 {
-    static const size_t per_offset[3] = {1, 7, 3};
+    static const size_t per_offset[DECODER_PARTS] = {
+#define X(id, label, outputs) outputs,
+        DECODER_PART_LIST(X)
+#undef X
+    };
     return per_offset[head] * (size_t)r->offset_count;
 }
 
 static gbt_status allocate(decode_ref *out, gbt_error *err)
 {
-    const size_t widths[4] = {3, FEATURE, (size_t)out->offset_count * 3, 6};
-    double **const fields[4] = {&out->position, &out->feature, &out->offset, &out->scale_log};
-    for (int f = 0; f < 4; f++)
-        *fields[f] = NULL;
     out->params = mem_calloc(out->param_count, sizeof(double), "decode reference", err);
-    for (int f = 0; f < 4; f++)
-        *fields[f] = mem_calloc(out->count * widths[f], sizeof(double), "decode reference", err);
-    if (out->params != NULL && out->position != NULL && out->feature != NULL && out->offset != NULL &&
-        out->scale_log != NULL)
+    bool made = out->params != NULL;
+    for (int f = 0; f < ANCHOR_FIELDS; f++) {
+        const size_t width = row_field_width(&anchor_fields[f], out->offset_count);
+        out->field[f] = mem_calloc(out->count * width, sizeof(double), "decode reference", err);
+        made = made && out->field[f] != NULL;
+    }
+    if (made)
         return GBT_OK;
     decode_ref_free(out);
     return GBT_ERR_NO_MEMORY;
@@ -66,10 +69,8 @@ gbt_status decode_ref_load(decode_ref *out, const anchors *a, const decoder *d, 
     const gbt_status status = allocate(out, err);
     if (status != GBT_OK)
         return status;
-    widen(out->position, a->position, a->count * 3);
-    widen(out->feature, a->feature, a->count * FEATURE);
-    widen(out->offset, a->offset, a->count * (size_t)a->offset_count * 3);
-    widen(out->scale_log, a->scale_log, a->count * 6);
+    for (int f = 0; f < ANCHOR_FIELDS; f++)
+        widen(out->field[f], a->field[f], a->count * anchors_width(a, f));
     widen(out->params, d->params, d->param_count);
     return GBT_OK;
 }
@@ -82,10 +83,8 @@ gbt_status decode_ref_zero(decode_ref *out, const decode_ref *like, gbt_error *e
 
 void decode_ref_free(decode_ref *r)
 {
-    mem_free(r->position);
-    mem_free(r->feature);
-    mem_free(r->offset);
-    mem_free(r->scale_log);
+    for (int f = 0; f < ANCHOR_FIELDS; f++)
+        mem_free(r->field[f]);
     mem_free(r->params);
     memset(r, 0, sizeof *r);
 }

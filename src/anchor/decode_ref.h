@@ -13,7 +13,15 @@ typedef struct decode_ref {
     int offset_count;
     bool has_distance;
     double distance_scale, distance_min, distance_max;
-    double *position, *feature, *offset, *scale_log, *params;
+    double *params;
+    union { /* as in anchors */
+        struct {
+#define X(name, id, label, width, per_offset, meaning) double *name;
+            ANCHOR_FIELD_LIST(X)
+#undef X
+        };
+        double *field[ANCHOR_FIELDS];
+    };
 } decode_ref;
 
 /** A copy of the parameters. */

@@ -6,32 +6,56 @@
 
 #include "base/memory.h"
 
-gbt_status rows_resize(float **const fields[ROWS_FIELDS], const size_t widths[ROWS_FIELDS], size_t *capacity,
-                       size_t used, size_t count, const char *what, gbt_error *err)
+int row_field_dims(const row_field *field, size_t count, size_t offset_count, size_t dims[ROWS_DIMS_MAX])
+{
+    int n = 0;
+    dims[n++] = count;
+    if (field->per_offset)
+        dims[n++] = offset_count;
+    if (field->width > 1)
+        dims[n++] = field->width;
+    return n;
+}
+
+gbt_status rows_resize(float **arrays, const row_field *fields, int field_count, int offset_count,
+                       size_t *capacity, size_t used, size_t count, const char *what, gbt_error *err)
 {
     const size_t kept = count < used ? count : used;
-    if (count > *capacity || *fields[0] == NULL) {
+    if (count > *capacity || arrays[0] == NULL) {
         size_t wanted = *capacity + *capacity / 2;
         if (wanted < count)
             wanted = count;
-        float *bigger[ROWS_FIELDS] = {NULL};
-        for (int f = 0; f < ROWS_FIELDS; f++) {
-            bigger[f] = mem_alloc(wanted, widths[f] * sizeof(float), what, err);
+        float *bigger[ROWS_FIELDS_MAX] = {NULL};
+        for (int f = 0; f < field_count; f++) {
+            bigger[f] =
+                mem_alloc(wanted, row_field_width(&fields[f], offset_count) * sizeof(float), what, err);
             if (bigger[f] == NULL) {
                 while (f-- > 0)
                     mem_free(bigger[f]);
                 return GBT_ERR_NO_MEMORY;
             }
         }
-        for (int f = 0; f < ROWS_FIELDS; f++) {
+        for (int f = 0; f < field_count; f++) {
+            const size_t width = row_field_width(&fields[f], offset_count);
             if (kept > 0)
-                memcpy(bigger[f], *fields[f], kept * widths[f] * sizeof(float));
-            mem_free(*fields[f]);
-            *fields[f] = bigger[f];
+                memcpy(bigger[f], arrays[f], kept * width * sizeof(float));
+            mem_free(arrays[f]);
+            arrays[f] = bigger[f];
         }
         *capacity = wanted;
     }
-    for (int f = 0; f < ROWS_FIELDS; f++)
-        memset(*fields[f] + kept * widths[f], 0, (count - kept) * widths[f] * sizeof(float));
+    for (int f = 0; f < field_count; f++) {
+        const size_t width = row_field_width(&fields[f], offset_count);
+        memset(arrays[f] + kept * width, 0, (count - kept) * width * sizeof(float));
+    }
     return GBT_OK;
+}
+
+void rows_move(float *const *arrays, const row_field *fields, int field_count, int offset_count, size_t to,
+               float *const *source, size_t from)
+{
+    for (int f = 0; f < field_count; f++) {
+        const size_t width = row_field_width(&fields[f], offset_count);
+        memmove(arrays[f] + to * width, source[f] + from * width, width * sizeof(float));
+    }
 }

@@ -1,23 +1,45 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/rows.h -- float arrays that have one row per anchor and grow together. */
+/* anchor/rows.h -- float arrays that have one row per anchor and grow together, and what a row of each is. */
 #ifndef GBT_ANCHOR_ROWS_H
 #define GBT_ANCHOR_ROWS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "gbtrace/status.h"
 
-enum { ROWS_FIELDS = 4 };
+enum { ROWS_FIELDS_MAX = 16, ROWS_DIMS_MAX = 3 };
+
+typedef struct row_field {
+    const char *name;  /* of its section in files */
+    const char *label; /* for people */
+    size_t width;      /* floats per anchor, or */
+    bool per_offset;   /* for each of the K Gaussians of an anchor */
+} row_field;
+
+/** Floats in one row. */
+static inline size_t row_field_width(const row_field *field, int offset_count)
+{
+    return field->width * (field->per_offset ? (size_t)offset_count : 1);
+}
+
+/** The shape of `count` rows: [count], then [K] if per_offset, then [width] if that is not 1. Returns the
+    number of dimensions. */
+int row_field_dims(const row_field *field, size_t count, size_t offset_count, size_t dims[ROWS_DIMS_MAX]);
 
 /**
- * Make every field hold `count` rows: the first min(used, count) are kept, the others are zero.
+ * Make every array hold `count` rows: the first min(used, count) are kept, the others are zero.
  *
- * @param fields   [in,out] the arrays, owned by the caller, from base/memory.h; NULL at the start
- * @param widths   [in] floats per row of each field
- * @param capacity [in,out] rows allocated; grows by half at least
+ * @param arrays      [in,out] [field_count], owned by the caller, from base/memory.h; NULL at the start
+ * @param fields      [in] [field_count] what a row of each is; at most ROWS_FIELDS_MAX
+ * @param capacity    [in,out] rows allocated; grows by half at least
  * @return GBT_OK or GBT_ERR_NO_MEMORY: then nothing has changed
  */
-gbt_status rows_resize(float **const fields[ROWS_FIELDS], const size_t widths[ROWS_FIELDS], size_t *capacity,
-                       size_t used, size_t count, const char *what, gbt_error *err);
+gbt_status rows_resize(float **arrays, const row_field *fields, int field_count, int offset_count,
+                       size_t *capacity, size_t used, size_t count, const char *what, gbt_error *err);
+
+/** Row `to` of every array becomes row `from` of `source`, which may be `arrays`. */
+void rows_move(float *const *arrays, const row_field *fields, int field_count, int offset_count, size_t to,
+               float *const *source, size_t from);
 
 #endif

@@ -32,10 +32,9 @@ static gbt_status add_view(loaded_run *r, size_t view, probe *p, model_sensitivi
     const size_t values = (size_t)camera.width * (size_t)camera.height * 3;
     for (size_t i = 0; i < values; i++)
         p->signs.pixels[i] = rng_uniform(SEED, view, i) < 0.5f ? -1.0f : 1.0f;
-    memset(p->d_anchors.feature, 0, a->count * ANCHOR_FEATURE_DIM * sizeof(float));
-    memset(p->d_anchors.offset, 0, a->count * (size_t)a->offset_count * 3 * sizeof(float));
-    memset(p->d_anchors.scale_log, 0, a->count * 6 * sizeof(float));
-    GBT_TRY(frame_backward(&r->frame, a, &r->model.decoder, &p->signs, 0, &p->d_anchors, p->d_params, err));
+    anchors_zero_learned(&p->d_anchors);
+    GBT_TRY(frame_backward_gaussians(&r->frame, &p->signs, err));
+    GBT_TRY(frame_backward_anchors(&r->frame, a, &r->model.decoder, &p->d_anchors, p->d_params, err));
     model_sensitivity_add(out, a, &p->d_anchors, (double)values);
     return GBT_OK;
 }

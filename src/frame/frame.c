@@ -233,15 +233,6 @@ void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_CO
     memcpy(field, &g, sizeof g);
 }
 
-double frame_volume(const frame *f)
-{
-    const gaussians *g = &f->gaussians;
-    double sum = 0;
-    for (size_t i = 0; i < g->count; i++)
-        sum += (double)g->scale_x[i] * (double)g->scale_y[i] * (double)g->scale_z[i];
-    return g->count > 0 ? sum / (double)g->count : 0;
-}
-
 gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err)
 {
     double clock = clock_wall();
@@ -258,19 +249,11 @@ gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *e
     return GBT_OK;
 }
 
-gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image,
-                          float volume_weight, anchors *d_anchors, float *d_params, gbt_error *err)
+gbt_status frame_backward_anchors(frame *f, const anchors *a, const decoder *d, anchors *d_anchors,
+                                  float *d_params, gbt_error *err)
 {
-    GBT_TRY(frame_backward_gaussians(f, d_image, err));
     double clock = clock_wall();
-    gaussians *g = &f->gaussians, *dg = &f->d_gaussians;
-    const float share = g->count > 0 ? volume_weight / (float)g->count : 0;
-    for (size_t i = 0; i < g->count; i++) {
-        dg->scale_x[i] += share * g->scale_y[i] * g->scale_z[i];
-        dg->scale_y[i] += share * g->scale_x[i] * g->scale_z[i];
-        dg->scale_z[i] += share * g->scale_x[i] * g->scale_y[i];
-    }
-    GBT_TRY(decode_backward(a, d, &f->tape, dg, d_anchors, d_params, err));
+    GBT_TRY(decode_backward(a, d, &f->tape, &f->d_gaussians, d_anchors, d_params, err));
     f->times.decode_adjoint = lap(&clock);
     return GBT_OK;
 }

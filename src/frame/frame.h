@@ -73,7 +73,8 @@ typedef struct frame {
  * cameras that look forward, else a cone around their mean direction, thickened by the distance between their
  * origins. Networks and spherical harmonics see it from the camera centre.
  *
- * @param keep_tape [in] true when frame_backward(), frame_backward_plain() or frame_weigh() follows
+ * @param keep_tape [in] true when frame_backward_gaussians(), frame_backward_plain() or frame_weigh()
+ *                       follows
  * Threads: one frame per thread; parallel inside; same bits for every thread count.
  */
 gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera,
@@ -113,23 +114,17 @@ typedef struct frame_guest {
 gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot,
                               const trace_settings *settings, const frame_guest *guest, gbt_error *err);
 
-/**
- * Adjoint of the last frame_render(keep_tape) of anchors: d_image -> d_anchors (rows of f->visible, added)
- * and d_params (added).
- *
- * @param volume_weight [in] adds the gradient of volume_weight * mean(scale_x scale_y scale_z) over the
- *                           frame's Gaussians
- */
-gbt_status frame_backward(frame *f, const anchors *a, const decoder *d, const image *d_image,
-                          float volume_weight, anchors *d_anchors, float *d_params, gbt_error *err);
+/** Adjoint of the last frame_render(keep_tape), its first part: d_image -> f->d_gaussians and f->seen. */
+gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err);
 
-/** Adjoint of the last frame_render(keep_tape) of a cloud. `d_cloud`: as many Gaussians as it has; see
-    plain_backward(). */
+/** The second part, of anchors: f->d_gaussians, and what the caller has added to it -> d_anchors (rows of
+    f->visible, added) and d_params (added). */
+gbt_status frame_backward_anchors(frame *f, const anchors *a, const decoder *d, anchors *d_anchors,
+                                  float *d_params, gbt_error *err);
+
+/** Both parts of a cloud. `d_cloud`: as many Gaussians as it has; see plain_backward(). */
 gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const image *d_image,
                                 gaussian_cloud *d_cloud, gbt_error *err);
-
-/** The part that both have in common: d_image -> f->d_gaussians and f->seen. */
-gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err);
 
 /** f->seen of the last frame_render(keep_tape), and no gradient. */
 gbt_status frame_weigh(frame *f, gbt_error *err);
@@ -146,9 +141,6 @@ static inline const gaussians *frame_drawn(const frame *f) { return f->widened ?
 /** What widening did to Gaussian `i` of the last render, in double: for checks. `field`: in the order of
     GAUSSIANS_FIELDS. */
 void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_COUNT]);
-
-/** Mean volume term of the last render's Gaussians: mean(scale_x scale_y scale_z), 0 without Gaussians. */
-double frame_volume(const frame *f);
 
 void frame_free(frame *f);
 

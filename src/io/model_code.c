@@ -60,8 +60,15 @@ static gbt_status write_parts(const model_parts *parts, model_coded *out, gbt_er
 static gbt_status read_parts(const model_parts *parts, const char *path, const unsigned char *bytes,
                              const uint32_t part_bytes[CODE_PARTS], gbt_error *err)
 {
-    static const char *const names[CODE_PARTS] = {"positions", "doublings", "rules",  "scales",
-                                                  "offsets",   "features",  "pixels", "networks"};
+    static const char *const names[CODE_PARTS] = {[CODE_POSITIONS] = "positions",
+                                                  [CODE_DOUBLINGS] = "doublings",
+                                                  [CODE_RULES] = "rules",
+                                                  [CODE_PIXELS] = "pixels",
+                                                  [CODE_NETWORKS] = "networks",
+#define X(part, name, field, divisor, most, of_largest) [CODE_##part] = name,
+                                                  CODE_FIELD_LIST(X)
+#undef X
+    };
     range_coder *c = mem_alloc(1, sizeof *c, "coder", err);
     if (c == NULL)
         return GBT_ERR_NO_MEMORY;

@@ -20,10 +20,10 @@ typedef enum code_part {
     CODE_POSITIONS,
     CODE_DOUBLINGS, /* of the steps of each anchor */
     CODE_RULES,     /* of prediction */
-    CODE_SCALES,
-    CODE_OFFSETS,
-    CODE_FEATURES,
-    CODE_PIXELS,
+#define X(part, name, field, divisor, most, of_largest) CODE_##part,
+    CODE_FIELD_LIST(X)
+#undef X
+        CODE_PIXELS,
     CODE_NETWORKS,
     CODE_PARTS
 } code_part;

@@ -3,12 +3,14 @@
 #include "io/model_file.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
 #include "io/model_code.h"
+#include "io/row_sections.h"
 
 /* Scalars travel in three vectors; the enums name their places. */
 enum { SCENE_VOXEL_SIZE, SCENE_EXTENT, SCENE_T_NEAR, SCENE_BACKGROUND, SCENE_NUMBERS = SCENE_BACKGROUND + 3 };
@@ -33,12 +35,7 @@ static void add_scene(container_writer *w, const model *m)
 void model_add(container_writer *w, const model *m)
 {
     const anchors *a = &m->anchors;
-    const size_t k = (size_t)a->offset_count;
-    container_add(w, "anchor.position", CONTAINER_F32, 2, (size_t[]){a->count, 3}, a->position);
-    container_add(w, "anchor.feature", CONTAINER_F32, 2, (size_t[]){a->count, ANCHOR_FEATURE_DIM},
-                  a->feature);
-    container_add(w, "anchor.offset", CONTAINER_F32, 3, (size_t[]){a->count, k, 3}, a->offset);
-    container_add(w, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){a->count, 6}, a->scale_log);
+    row_sections_add(w, "anchor", anchor_fields, ANCHOR_FIELDS, a->count, (size_t)a->offset_count, a->field);
     if (m->anchor_pixel != NULL)
         container_add(w, "anchor.pixel", CONTAINER_F32, 1, (size_t[]){a->count}, m->anchor_pixel);
     container_add(w, "decoder.params", CONTAINER_F32, 1, (size_t[]){m->decoder.param_count},
@@ -69,22 +66,24 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
         return base_fail(err, failure,
                          "%s: section anchor.position: too many anchors (wanted at most %u, got %zu)", path,
                          UINT32_MAX / ANCHOR_MAX_OFFSETS, a->count);
-    decoder_part parts[3];
+    decoder_part parts[DECODER_PARTS];
     decoder_parts(d, parts);
-    if (d->offset_count != a->offset_count || d->param_count != parts[2].end)
+    const size_t param_count = parts[DECODER_PARTS - 1].end;
+    if (d->offset_count != a->offset_count || d->param_count != param_count)
         return base_fail(
             err, failure,
             "%s: section decoder.params does not fit %d offsets per anchor (wanted %zu values, got %zu)",
-            path, a->offset_count, parts[2].end, d->param_count);
+            path, a->offset_count, param_count, d->param_count);
+    for (int f = 0; f < ANCHOR_FIELDS; f++) {
+        char section[CONTAINER_NAME_SIZE];
+        snprintf(section, sizeof section, "anchor.%s", anchor_fields[f].name);
+        GBT_TRY(check_finite(path, section, a->field[f], a->count * anchors_width(a, f), failure, err));
+    }
     const struct {
         const char *section;
         const float *values;
         size_t count;
     } arrays[] = {
-        {"anchor.position", a->position, a->count * 3},
-        {"anchor.feature", a->feature, a->count * ANCHOR_FEATURE_DIM},
-        {"anchor.offset", a->offset, a->count * (size_t)a->offset_count * 3},
-        {"anchor.scale_log", a->scale_log, a->count * 6},
         {"anchor.pixel", m->anchor_pixel, m->anchor_pixel != NULL ? a->count : 0},
         {"decoder.params", d->params, d->param_count},
         {"scene.numbers", &m->voxel_size, 1},
@@ -124,19 +123,19 @@ gbt_status model_save(const char *path, const model *m, gbt_error *err)
 /* Same bits in all that the coded parts hold? */
 static bool same_parts(const model *a, const model *b)
 {
-    const size_t n = a->anchors.count, k = (size_t)a->anchors.offset_count;
+    const size_t n = a->anchors.count;
     if (b->anchors.count != n || b->anchors.offset_count != a->anchors.offset_count ||
         a->decoder.param_count != b->decoder.param_count ||
         (a->anchor_pixel == NULL) != (b->anchor_pixel == NULL))
         return false;
     if (memcmp(a->decoder.params, b->decoder.params, a->decoder.param_count * sizeof(float)) != 0)
         return false;
-    return n == 0 ||
-           (memcmp(a->anchors.position, b->anchors.position, n * 3 * sizeof(float)) == 0 &&
-            memcmp(a->anchors.feature, b->anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float)) == 0 &&
-            memcmp(a->anchors.offset, b->anchors.offset, n * k * 3 * sizeof(float)) == 0 &&
-            memcmp(a->anchors.scale_log, b->anchors.scale_log, n * 6 * sizeof(float)) == 0 &&
-            (a->anchor_pixel == NULL || memcmp(a->anchor_pixel, b->anchor_pixel, n * sizeof(float)) == 0));
+    for (int f = 0; f < ANCHOR_FIELDS && n > 0; f++)
+        if (memcmp(a->anchors.field[f], b->anchors.field[f],
+                   n * anchors_width(&a->anchors, f) * sizeof(float)) != 0)
+            return false;
+    return n == 0 || a->anchor_pixel == NULL ||
+           memcmp(a->anchor_pixel, b->anchor_pixel, n * sizeof(float)) == 0;
 }
 
 /* Read what is about to be written: a model that cannot come back is not saved. */
@@ -207,18 +206,8 @@ gbt_status model_save_coded(const char *path, const model *m, const model_steps 
 static gbt_status read_anchors(const container *c, anchors *a, gbt_error *err)
 {
     size_t count = CONTAINER_ANY, k = CONTAINER_ANY;
-    const void *position, *feature, *offset, *scale_log;
-    size_t shape[3] = {count, 3};
-    GBT_TRY(container_find(c, "anchor.position", CONTAINER_F32, 2, shape, &position, err));
-    count = shape[0];
-    GBT_TRY(container_find(c, "anchor.feature", CONTAINER_F32, 2, (size_t[]){count, ANCHOR_FEATURE_DIM},
-                           &feature, err));
-    shape[0] = count;
-    shape[1] = k;
-    shape[2] = 3;
-    GBT_TRY(container_find(c, "anchor.offset", CONTAINER_F32, 3, shape, &offset, err));
-    k = shape[1];
-    GBT_TRY(container_find(c, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){count, 6}, &scale_log, err));
+    const void *data[ANCHOR_FIELDS];
+    GBT_TRY(row_sections_find(c, "anchor", anchor_fields, ANCHOR_FIELDS, &count, &k, data, err));
     if (k < 1 || k > ANCHOR_MAX_OFFSETS)
         return base_fail(
             err, GBT_ERR_FORMAT,
@@ -226,12 +215,8 @@ static gbt_status read_anchors(const container *c, anchors *a, gbt_error *err)
             ANCHOR_MAX_OFFSETS, k);
     a->offset_count = (int)k;
     GBT_TRY(anchors_resize(a, count, err));
-    if (count > 0) {
-        memcpy(a->position, position, count * 3 * sizeof(float));
-        memcpy(a->feature, feature, count * ANCHOR_FEATURE_DIM * sizeof(float));
-        memcpy(a->offset, offset, count * k * 3 * sizeof(float));
-        memcpy(a->scale_log, scale_log, count * 6 * sizeof(float));
-    }
+    for (int f = 0; f < ANCHOR_FIELDS && count > 0; f++)
+        memcpy(a->field[f], data[f], count * anchors_width(a, f) * sizeof(float));
     return GBT_OK;
 }
 

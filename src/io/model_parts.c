@@ -11,24 +11,44 @@
 #include "io/float_code.h"
 #include "io/half.h"
 
-enum {
-    COLUMN_OFFSET = 6,
-    PIXEL_NONE = INT32_MIN,
-    PIXEL_LEAST = -126 * 8,
-    PIXEL_MOST = 127 * 8,
-    INDEX_MAX = 1 << 20
+enum { PIXEL_NONE = INT32_MIN, PIXEL_LEAST = -126 * 8, PIXEL_MOST = 127 * 8, INDEX_MAX = 1 << 20 };
+
+/* The fields in the order of their columns. */
+static const struct {
+    code_part part;
+    anchor_field field;
+} coded_fields[] = {
+#define X(part, name, field, divisor, most, of_largest) {CODE_##part, field},
+    CODE_FIELD_LIST(X)
+#undef X
 };
+enum { CODED_FIELDS = sizeof coded_fields / sizeof *coded_fields };
 
-_Static_assert(COLUMN_OFFSET + 3 * ANCHOR_MAX_OFFSETS + ANCHOR_FEATURE_DIM <= ATTRIBUTE_COLUMNS_MAX,
-               "every channel has a column");
+_Static_assert(CODED_FIELDS == ANCHOR_FIELDS - ANCHOR_FIRST_LEARNED, "all that learns is coded");
 
-static int feature_column(const model_parts *p) { return COLUMN_OFFSET + 3 * p->offset_count; }
+#define X(name, id, label, width, per_offset, meaning) +(width) * ((per_offset) ? ANCHOR_MAX_OFFSETS : 1)
+_Static_assert(0 ANCHOR_FIELD_LIST(X) - 3 <= ATTRIBUTE_COLUMNS_MAX, "all but the position has its columns");
+#undef X
+
+static int field_width(const model_parts *p, int coded)
+{
+    return (int)row_field_width(&anchor_fields[coded_fields[coded].field], p->offset_count);
+}
+
+/* First column of a coded field, or how many there are. */
+static int first_column(const model_parts *p, int coded)
+{
+    int first = 0;
+    for (int i = 0; i < coded; i++)
+        first += field_width(p, i);
+    return first;
+}
 
 /* ---- room ---- */
 
 static gbt_status make_coarse(model_parts *p, bool has_pixel, gbt_error *err)
 {
-    GBT_TRY(attribute_table_make(&p->table, p->count, feature_column(p) + ANCHOR_FEATURE_DIM, err));
+    GBT_TRY(attribute_table_make(&p->table, p->count, first_column(p, CODED_FIELDS), err));
     p->cell = mem_calloc(p->count, sizeof *p->cell, "cells", err);
     p->half = mem_calloc(p->param_count, sizeof *p->half, "networks", err);
     if (has_pixel)
@@ -39,13 +59,13 @@ static gbt_status make_coarse(model_parts *p, bool has_pixel, gbt_error *err)
 gbt_status model_parts_make(model_parts *p, size_t count, int offset_count, bool has_pixel, bool has_distance,
                             bool coarse, gbt_error *err)
 {
-    decoder_part networks[3];
+    decoder_part networks[DECODER_PARTS];
     decoder_parts(&(decoder){.offset_count = offset_count, .has_distance = has_distance}, networks);
     *p = (model_parts){.coarse = coarse,
                        .count = count,
                        .offset_count = offset_count,
                        .has_distance = has_distance,
-                       .param_count = networks[2].end};
+                       .param_count = networks[DECODER_PARTS - 1].end};
     if (coarse)
         return make_coarse(p, has_pixel, err);
     p->anchors.offset_count = offset_count;
@@ -139,9 +159,10 @@ static gbt_status fill_coarse(model_parts *p, const model *m, const model_steps 
         if (p->pixel != NULL)
             p->pixel[i] = pixel_number(m->anchor_pixel[order[i].anchor]);
     }
-    fill_columns(p, order, a->scale_log, 0, 6, steps->scale_log);
-    fill_columns(p, order, a->offset, COLUMN_OFFSET, 3 * p->offset_count, steps->offset);
-    fill_columns(p, order, a->feature, feature_column(p), ANCHOR_FEATURE_DIM, steps->feature);
+    for (int i = 0; i < CODED_FIELDS; i++) {
+        const anchor_field field = coded_fields[i].field;
+        fill_columns(p, order, a->field[field], first_column(p, i), field_width(p, i), steps->field[field]);
+    }
     for (size_t i = 0; i < p->param_count; i++)
         p->half[i] = half_from_float(m->decoder.params[i]);
     mem_free(order);
@@ -155,14 +176,6 @@ static void copy_floats(float *to, const float *from, size_t count)
         memcpy(to, from, count * sizeof *to);
 }
 
-static void copy_anchors(anchors *to, const anchors *from)
-{
-    copy_floats(to->position, from->position, from->count * 3);
-    copy_floats(to->feature, from->feature, from->count * ANCHOR_FEATURE_DIM);
-    copy_floats(to->offset, from->offset, from->count * (size_t)from->offset_count * 3);
-    copy_floats(to->scale_log, from->scale_log, from->count * 6);
-}
-
 gbt_status model_parts_fill(model_parts *p, const model *m, const model_steps *steps, gbt_error *err)
 {
     if (m->decoder.param_count != p->param_count)
@@ -170,7 +183,7 @@ gbt_status model_parts_fill(model_parts *p, const model *m, const model_steps *s
                          p->offset_count);
     if (p->coarse)
         return fill_coarse(p, m, steps, err);
-    copy_anchors(&p->anchors, &m->anchors);
+    anchors_copy(&p->anchors, &m->anchors);
     copy_floats(p->params, m->decoder.params, p->param_count);
     if (p->anchor_pixel != NULL)
         copy_floats(p->anchor_pixel, m->anchor_pixel, p->count);
@@ -213,7 +226,9 @@ static void code_networks(const model_parts *p, range_coder *c)
 static gbt_status code_coarse(const model_parts *p, code_part part, range_coder *c, gbt_error *err)
 {
     attribute_table table = p->table; /* its arrays are written through */
-    const int offsets = COLUMN_OFFSET, features = feature_column(p), end = features + ANCHOR_FEATURE_DIM;
+    for (int i = 0; i < CODED_FIELDS; i++)
+        if (coded_fields[i].part == part)
+            return attribute_code_columns(c, &table, first_column(p, i), first_column(p, i + 1), err);
     gbt_status status = GBT_OK;
     switch (part) {
     case CODE_POSITIONS:
@@ -227,18 +242,12 @@ static gbt_status code_coarse(const model_parts *p, code_part part, range_coder 
     case CODE_RULES:
         attribute_code_rules(c, &table);
         return GBT_OK;
-    case CODE_SCALES:
-        return attribute_code_columns(c, &table, 0, offsets, err);
-    case CODE_OFFSETS:
-        return attribute_code_columns(c, &table, offsets, features, err);
-    case CODE_FEATURES:
-        return attribute_code_columns(c, &table, features, end, err);
     case CODE_PIXELS:
         return code_pixels(p, c);
     case CODE_NETWORKS:
         code_networks(p, c);
         return GBT_OK;
-    case CODE_PARTS:
+    default:
         break;
     }
     return GBT_OK;
@@ -247,23 +256,17 @@ static gbt_status code_coarse(const model_parts *p, code_part part, range_coder 
 static gbt_status code_lossless(const model_parts *p, code_part part, range_coder *c, gbt_error *err)
 {
     const anchors *a = &p->anchors;
-    const size_t k3 = 3 * (size_t)p->offset_count;
+    for (int i = 0; i < CODED_FIELDS; i++)
+        if (coded_fields[i].part == part)
+            return floats_code(c, a->field[coded_fields[i].field], p->count, (size_t)field_width(p, i), err);
     switch (part) {
     case CODE_POSITIONS:
         return floats_code(c, a->position, p->count, 3, err);
-    case CODE_SCALES:
-        return floats_code(c, a->scale_log, p->count, 6, err);
-    case CODE_OFFSETS:
-        return floats_code(c, a->offset, p->count, k3, err);
-    case CODE_FEATURES:
-        return floats_code(c, a->feature, p->count, ANCHOR_FEATURE_DIM, err);
     case CODE_PIXELS:
         return floats_code(c, p->anchor_pixel, p->anchor_pixel != NULL ? p->count : 0, 1, err);
     case CODE_NETWORKS:
         return floats_code(c, p->params, p->param_count, 1, err);
-    case CODE_DOUBLINGS:
-    case CODE_RULES:
-    case CODE_PARTS:
+    default:
         break;
     }
     return GBT_OK;
@@ -285,7 +288,7 @@ static float pixel_size(int32_t number)
                : ldexpf(eighths[(number - PIXEL_LEAST) % 8], (number - PIXEL_LEAST) / 8 + PIXEL_LEAST / 8);
 }
 
-static void spread_columns(const model_parts *p, int first, int width, float *out)
+static void columns_to_floats(const model_parts *p, int first, int width, float *out)
 {
     for (size_t i = 0; i < p->count; i++)
         for (int c = 0; c < width; c++)
@@ -307,7 +310,7 @@ gbt_status model_parts_to_model(const model_parts *p, model *out, gbt_error *err
     out->decoder.offset_count = p->offset_count;
     out->decoder.has_distance = p->has_distance;
     if (!p->coarse) {
-        copy_anchors(&out->anchors, &p->anchors);
+        anchors_copy(&out->anchors, &p->anchors);
         copy_floats(out->decoder.params, p->params, p->param_count);
         if (has_pixel)
             copy_floats(out->anchor_pixel, p->anchor_pixel, p->count);
@@ -318,9 +321,9 @@ gbt_status model_parts_to_model(const model_parts *p, model *out, gbt_error *err
         if (has_pixel)
             out->anchor_pixel[i] = pixel_size(p->pixel[i]);
     }
-    spread_columns(p, 0, 6, out->anchors.scale_log);
-    spread_columns(p, COLUMN_OFFSET, 3 * p->offset_count, out->anchors.offset);
-    spread_columns(p, feature_column(p), ANCHOR_FEATURE_DIM, out->anchors.feature);
+    for (int i = 0; i < CODED_FIELDS; i++)
+        columns_to_floats(p, first_column(p, i), field_width(p, i),
+                          out->anchors.field[coded_fields[i].field]);
     for (size_t i = 0; i < p->param_count; i++)
         out->decoder.params[i] = float_from_half(p->half[i]);
     return GBT_OK;

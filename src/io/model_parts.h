@@ -15,7 +15,7 @@ typedef struct model_parts {
     /* coarse: anchors in the order of their cells */
     position_grid grid;
     uint64_t *cell;        /* [count] */
-    attribute_table table; /* columns: scale_log 6, offset 3 K, feature */
+    attribute_table table; /* columns: CODE_FIELD_LIST */
     float step[ATTRIBUTE_COLUMNS_MAX];
     int32_t *pixel; /* [count], optional: eighths of a doubling, or PIXEL_NONE */
     uint16_t *half; /* [param_count]: the networks */

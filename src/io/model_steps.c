@@ -33,21 +33,34 @@ static double sum_squares(const float *x, size_t count)
     return sum;
 }
 
+/* Floats of one anchor that learn. */
+static size_t channel_count(const anchors *a)
+{
+    size_t count = 0;
+    for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
+        count += anchors_width(a, f);
+    return count;
+}
+
 void model_sensitivity_add(model_sensitivity *s, const anchors *a, const anchors *gradient, double values)
 {
-    const size_t k3 = (size_t)a->offset_count * 3;
+    const size_t k3 = (size_t)a->offset_count * 3, channels = channel_count(a);
     s->values += values;
     for (size_t i = 0; i < s->count; i++) {
-        const float *f = gradient->feature + i * DIM, *offset = gradient->offset + i * k3,
-                    *scale = gradient->scale_log + i * 6;
-        const double all = sum_squares(f, DIM) + sum_squares(offset, k3) + sum_squares(scale, 6);
+        double all = 0;
+        for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
+            all += sum_squares(gradient->field[f] + i * anchors_width(a, f), anchors_width(a, f));
         if (!(all > 0) || !isfinite(all))
             continue;
-        s->anchor[i] += all / (double)(DIM + k3 + 6);
-        for (size_t c = 0; c < k3; c++)
-            s->offset[c] += (double)offset[c] * (double)offset[c];
-        for (size_t c = 0; c < 6; c++)
-            s->scale_log[c] += (double)scale[c] * (double)scale[c];
+        s->anchor[i] += all / (double)channels;
+        for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
+            const size_t width = anchors_width(a, f);
+            for (size_t c = 0; c < width; c++) {
+                const double x = (double)gradient->field[f][i * width + c];
+                s->field[f][c] += x * x;
+            }
+        }
+        const float *feature = gradient->feature + i * DIM, *offset = gradient->offset + i * k3;
         for (size_t axis = 0; axis < 3; axis++) { /* the mean is position + offset exp(scale) */
             double sum = 0;
             for (size_t c = axis; c < k3; c += 3)
@@ -57,7 +70,7 @@ void model_sensitivity_add(model_sensitivity *s, const anchors *a, const anchors
         }
         for (size_t c = 0; c < DIM; c++)
             for (size_t d = 0; d <= c; d++)
-                s->feature[c][d] += (double)f[c] * (double)f[d];
+                s->feature[c][d] += (double)feature[c] * (double)feature[d];
     }
 }
 
@@ -67,10 +80,9 @@ void model_sensitivity_end(model_sensitivity *s)
     for (size_t i = 0; i < s->count; i++)
         s->anchor[i] *= scale;
     s->position *= scale / count;
-    for (size_t c = 0; c < ANCHOR_MAX_OFFSETS * 3; c++)
-        s->offset[c] *= scale / count;
-    for (size_t c = 0; c < 6; c++)
-        s->scale_log[c] *= scale / count;
+    for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
+        for (size_t c = 0; c < MODEL_WIDTH_MAX; c++)
+            s->field[f][c] *= scale / count;
     double trace = 0;
     for (size_t c = 0; c < DIM; c++)
         trace += s->feature[c][c] *= scale / count;
@@ -146,9 +158,7 @@ static gbt_status guess_view(const model *m, guess *g, uint64_t view, model_sens
     double covered = 0;
     for (size_t i = 0; i < g->drawn.count; i++)
         covered += guess_gradient(&g->drawn, i, view, &g->gradient);
-    memset(g->d_anchors.feature, 0, a->count * DIM * sizeof(float));
-    memset(g->d_anchors.offset, 0, a->count * (size_t)a->offset_count * 3 * sizeof(float));
-    memset(g->d_anchors.scale_log, 0, a->count * 6 * sizeof(float));
+    anchors_zero_learned(&g->d_anchors);
     GBT_TRY(decode_backward(a, &m->decoder, &g->tape, &g->gradient, &g->d_anchors, g->d_params, err));
     model_sensitivity_add(s, a, &g->d_anchors, 3 * HIDDEN * covered);
     return GBT_OK;
@@ -182,6 +192,23 @@ gbt_status model_sensitivity_guess(const model *m, model_sensitivity *s, gbt_err
 
 /* ---- steps ---- */
 
+static const struct {
+    double divisor, most;
+    bool of_largest;
+} step_limits[ANCHOR_FIELDS] = {
+#define X(part, name, field, divisor, most, of_largest) [field] = {divisor, most, of_largest},
+    CODE_FIELD_LIST(X)
+#undef X
+};
+
+static double largest_of(const float *values, size_t count)
+{
+    double largest = 0;
+    for (size_t i = 0; i < count; i++)
+        largest = fmax(largest, fabs((double)values[i]));
+    return largest;
+}
+
 /* Within limits; the upper one where nothing counts. */
 static double step_of(double noise, double sensitivity, double least, double most)
 {
@@ -209,7 +236,7 @@ gbt_status model_steps_at(const model *m, const model_sensitivity *s, double qua
                           gbt_error *err)
 {
     const anchors *a = &m->anchors;
-    const size_t k3 = (size_t)a->offset_count * 3, channels = DIM + k3 + 6;
+    const size_t channels = channel_count(a);
     if (!(quality > 0 && quality < 200))
         return base_fail(err, GBT_ERR_ARGUMENT, "quality: wanted 0 to 200 dB, got %g", quality);
     if (s->count != a->count)
@@ -217,18 +244,17 @@ gbt_status model_steps_at(const model *m, const model_sensitivity *s, double qua
                          "sensitivities of another model (wanted %zu anchors, got %zu)", a->count, s->count);
     /* Uniform noise of one step has the variance 1/12. */
     const double noise = sqrt(12 * pow(10, -quality / 10) / ((double)channels * fmax((double)a->count, 1)));
-    double largest = 0, side = 0;
-    for (size_t i = 0; i < a->count * DIM; i++)
-        largest = fmax(largest, fabs((double)a->feature[i]));
+    double side = 0;
     for (size_t i = 0; i < a->count * 3; i++)
         side = fmax(side, fabs((double)a->position[i] - (double)a->position[i % 3]));
-    for (size_t c = 0; c < DIM; c++)
-        out->feature[c] =
-            (float)step_of(noise, s->feature[c][c], fmax(largest, 1e-20) / 65536, fmax(largest, 1e-20));
-    for (size_t c = 0; c < k3; c++)
-        out->offset[c] = (float)step_of(noise, s->offset[c], 1.0 / 4096, 0.25);
-    for (size_t c = 0; c < 6; c++)
-        out->scale_log[c] = (float)step_of(noise, s->scale_log[c], 1.0 / 1024, 0.25);
+    for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
+        const size_t width = anchors_width(a, f);
+        const double unit =
+            step_limits[f].of_largest ? fmax(largest_of(a->field[f], a->count * width), 1e-20) : 1;
+        for (size_t c = 0; c < width; c++)
+            out->field[f][c] = (float)step_of(noise, f == ANCHOR_FEATURE ? s->feature[c][c] : s->field[f][c],
+                                              unit / step_limits[f].divisor, unit * step_limits[f].most);
+    }
     out->position = step_of(noise, s->position, fmax(side, 1e-20) / (1 << 20), fmax(side, 1e-20) / 64);
     return s->anchor != NULL ? find_doublings(s, out, err) : GBT_OK;
 }

@@ -16,6 +16,17 @@
 #include "gbtrace/status.h"
 #include "io/model_file.h"
 
+/** What learns of the anchors, in the order of its parts of a coded file and of its columns: X(PART, name of
+   the part, anchor_field, and the limits of its steps: the least is a unit / divisor, the most in units; the
+   unit is the largest value if of_largest, else 1). */
+#define CODE_FIELD_LIST(X)                                                                                   \
+    X(SCALES, "scales", ANCHOR_SCALE_LOG, 1024, 0.25, false)                                                 \
+    X(OFFSETS, "offsets", ANCHOR_OFFSET, 4096, 0.25, false)                                                  \
+    X(FEATURES, "features", ANCHOR_FEATURE, 65536, 1, true)
+
+/** Most floats that one anchor has in a field. */
+enum { MODEL_WIDTH_MAX = ANCHOR_MAX_OFFSETS * 3 };
+
 /**
  * Between _start() and _end() sums over pictures, then: mean squared change of a pixel per squared change of
  * the parameter of one anchor.
@@ -23,8 +34,9 @@
 typedef struct model_sensitivity {
     size_t count;  /* anchors */
     double values; /* pixels x 3 of all pictures, of a moment: 1 after _end() */
-    double position, offset[ANCHOR_MAX_OFFSETS * 3], scale_log[6]; /* mean over anchors */
-    double feature[ANCHOR_FEATURE_DIM][ANCHOR_FEATURE_DIM];        /* mean over anchors of the matrix J^T J */
+    double position, field[ANCHOR_FIELDS][MODEL_WIDTH_MAX]; /* mean over anchors; fields that learn */
+    double feature[ANCHOR_FEATURE_DIM][ANCHOR_FEATURE_DIM]; /* mean over anchors of the matrix J^T J: in place
+                                                               of their field */
     double *anchor; /* [count]: mean over the parameters of each anchor; NULL: not told apart */
 } model_sensitivity;
 
@@ -34,7 +46,7 @@ gbt_status model_sensitivity_start(model_sensitivity *s, size_t count, gbt_error
 /**
  * Add one picture.
  *
- * @param gradient [in] rows of dL/d(feature, offset, scale_log) where dL/dpixel is +1 or -1 at random, and
+ * @param gradient [in] rows of dL/d(what learns) where dL/dpixel is +1 or -1 at random, and
  *                      independent
  * @param values   [in] pixels x channels
  * Cost: about 1000 multiply-adds per anchor that has a gradient.
@@ -70,9 +82,9 @@ gbt_status model_turn_features(model *m, model_sensitivity *s, gbt_error *err);
 
 /** Steps of quantisation; each > 0 and finite. */
 typedef struct model_steps {
-    double position; /* side of a cell, scene units */
-    float feature[ANCHOR_FEATURE_DIM], offset[ANCHOR_MAX_OFFSETS * 3], scale_log[6];
-    size_t count;      /* of doublings: anchors */
+    double position;                             /* side of a cell, scene units */
+    float field[ANCHOR_FIELDS][MODEL_WIDTH_MAX]; /* of fields that learn */
+    size_t count;                                /* of doublings: anchors */
     uint8_t *doubling; /* [count]: the steps of an anchor (not its position) are 2^this as large, [0, 2];
                           NULL: all 0 */
 } model_steps;

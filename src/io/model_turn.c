@@ -88,10 +88,10 @@ static void find_basis(const square sensitivity, const square covariance, square
 /* Rows of W1 as they see the turned features; b1 takes what the mean did. */
 static void turn_networks(decoder *d, const double mean[DIM], const square back)
 {
-    decoder_part parts[3];
+    decoder_part parts[DECODER_PARTS];
     decoder_parts(d, parts);
     const size_t inputs = DIM + 3 + (d->has_distance ? 1 : 0);
-    for (int head = 0; head < 3; head++)
+    for (int head = 0; head < DECODER_PARTS; head++)
         for (size_t h = 0; h < ANCHOR_HIDDEN_DIM; h++) {
             float *w = d->params + parts[head].begin + h * inputs,
                   *bias = d->params + parts[head].begin + ANCHOR_HIDDEN_DIM * inputs + h;

@@ -10,6 +10,7 @@
 #include "base/file.h"
 #include "base/memory.h"
 #include "io/container.h"
+#include "io/row_sections.h"
 #include "train/config.h"
 
 enum { NAME_SIZE = 64 };
@@ -22,36 +23,35 @@ static void add_field(container_writer *w, const char *prefix, const char *field
     container_add(w, name, CONTAINER_F32, dim_count, dims, data);
 }
 
-static void add_anchors(container_writer *w, const char *prefix, const anchors *a)
-{
-    add_field(w, prefix, "position", 2, (const size_t[]){a->count, 3}, a->position);
-    add_field(w, prefix, "feature", 2, (const size_t[]){a->count, ANCHOR_FEATURE_DIM}, a->feature);
-    add_field(w, prefix, "offset", 3, (const size_t[]){a->count, (size_t)a->offset_count, 3}, a->offset);
-    add_field(w, prefix, "scale_log", 2, (const size_t[]){a->count, 6}, a->scale_log);
-}
-
-static gbt_status copy_field(const container *c, const char *prefix, const char *field, size_t rows,
-                             size_t row_floats, int dim_count, const size_t *tail, float *out, gbt_error *err)
+/* One field of the exposures, which have a row of AFFINE_NUMBERS per photo. */
+static gbt_status copy_exposures(const container *c, const char *field, size_t rows, float *out,
+                                 gbt_error *err)
 {
     char name[NAME_SIZE];
-    snprintf(name, sizeof name, "%s.%s", prefix, field);
-    size_t dims[3] = {rows, tail[0], tail[1]};
+    snprintf(name, sizeof name, "exposure.%s", field);
     const void *data;
-    GBT_TRY(container_find(c, name, CONTAINER_F32, dim_count, dims, &data, err));
-    memcpy(out, data, rows * row_floats * sizeof *out);
+    GBT_TRY(container_find(c, name, CONTAINER_F32, 2, (size_t[]){rows, AFFINE_NUMBERS}, &data, err));
+    memcpy(out, data, rows * AFFINE_NUMBERS * sizeof *out);
     return GBT_OK;
+}
+
+/* Anchors in the file, in the order of their sections. */
+enum { ANCHOR_SETS = 3 };
+static const char *const anchor_set_names[ANCHOR_SETS] = {"anchors", "moment1", "moment2"};
+static const char *const network_set_names[ANCHOR_SETS] = {"networks", "networks.moment1",
+                                                           "networks.moment2"};
+
+static void add_anchors(container_writer *w, const char *prefix, const anchors *a)
+{
+    row_sections_add(w, prefix, anchor_fields, ANCHOR_FIELDS, a->count, (size_t)a->offset_count, a->field);
 }
 
 static gbt_status read_anchors(const container *c, const char *prefix, size_t rows, anchors *a,
                                gbt_error *err)
 {
-    const size_t k = (size_t)a->offset_count;
     GBT_TRY(anchors_resize(a, rows, err));
-    GBT_TRY(copy_field(c, prefix, "position", rows, 3, 2, (const size_t[]){3, 0}, a->position, err));
-    GBT_TRY(copy_field(c, prefix, "feature", rows, ANCHOR_FEATURE_DIM, 2,
-                       (const size_t[]){ANCHOR_FEATURE_DIM, 0}, a->feature, err));
-    GBT_TRY(copy_field(c, prefix, "offset", rows, 3 * k, 3, (const size_t[]){k, 3}, a->offset, err));
-    return copy_field(c, prefix, "scale_log", rows, 6, 2, (const size_t[]){6, 0}, a->scale_log, err);
+    return row_sections_get(c, prefix, anchor_fields, ANCHOR_FIELDS, rows, (size_t)a->offset_count, a->field,
+                            err);
 }
 
 /* FNV-1a of what tells one data set from another: the names, sizes and centres of its views. */
@@ -74,9 +74,11 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
 {
     char config[CONFIG_TEXT_SIZE];
     config_text(&t->def, t->scene.folder, config, sizeof config);
-    const size_t n = t->decoder.param_count, rows = t->stats.count, k = (size_t)t->stats.offset_count;
+    const size_t n = t->decoder.param_count, rows = t->stats.count;
+    const anchors *const sets[ANCHOR_SETS] = {&t->anchors, &t->moment1.anchors, &t->moment2.anchors};
+    const float *const networks[ANCHOR_SETS] = {t->decoder.params, t->moment1.networks, t->moment2.networks};
     const uint64_t counters[] = {t->step,
-                                 t->adjust_step,
+                                 t->round_step,
                                  t->anchor_t,
                                  t->skipped_steps,
                                  (uint64_t)t->pace.known,
@@ -88,7 +90,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     container_add_small(&w, "counters", CONTAINER_U64, sizeof counters / sizeof *counters, counters);
     container_add(&w, "pace", CONTAINER_U64, 1, (const size_t[]){PACE_SEGMENTS}, t->pace.steps);
     container_add_small(&w, "in_row", CONTAINER_U64, 3,
-                        (const uint64_t[]){t->skipped_in_row, t->barren_in_row, t->revivals});
+                        (const uint64_t[]){t->skipped_in_row, t->empty_in_row, t->opacity_raises});
     container_add_small(&w, "seconds", CONTAINER_F64, 1, &t->seconds);
     container_add_small(&w, "views", CONTAINER_U64, 1, (const uint64_t[]){hash_of_views(&t->scene)});
     const exposures *e = &t->exposures;
@@ -99,17 +101,13 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
         add_field(&w, "exposure", "moment2", 2, exposure_dims, e->moment2);
         container_add(&w, "exposure.visits", CONTAINER_U64, 1, &e->count, e->visits);
     }
-    add_anchors(&w, "anchors", &t->anchors);
-    add_anchors(&w, "moment1", &t->moment1);
-    add_anchors(&w, "moment2", &t->moment2);
+    for (int i = 0; i < ANCHOR_SETS; i++)
+        add_anchors(&w, anchor_set_names[i], sets[i]);
     container_add(&w, "anchors.born", CONTAINER_U64, 1, &rows, t->born);
-    container_add(&w, "networks", CONTAINER_F32, 1, &n, t->decoder.params);
-    container_add(&w, "networks.moment1", CONTAINER_F32, 1, &n, t->params_m);
-    container_add(&w, "networks.moment2", CONTAINER_F32, 1, &n, t->params_v);
-    container_add(&w, "stats.use_accum", CONTAINER_F32, 1, &rows, t->stats.use_accum);
-    container_add(&w, "stats.visit_count", CONTAINER_F32, 1, &rows, t->stats.visit_count);
-    container_add(&w, "stats.grad_accum", CONTAINER_F32, 2, (const size_t[]){rows, k}, t->stats.grad_accum);
-    container_add(&w, "stats.grad_count", CONTAINER_F32, 2, (const size_t[]){rows, k}, t->stats.grad_count);
+    for (int i = 0; i < ANCHOR_SETS; i++)
+        container_add(&w, network_set_names[i], CONTAINER_F32, 1, &n, networks[i]);
+    row_sections_add(&w, "stats", growth_stat_fields, GROWTH_STATS, rows, (size_t)t->stats.offset_count,
+                     t->stats.field);
     /* A kill between the two renames leaves only PATH.prev: whoever resumes looks there next. */
     char previous[4096];
     if (snprintf(previous, sizeof previous, "%s.prev", path) < (int)sizeof previous && file_exists(path)) {
@@ -140,8 +138,7 @@ static gbt_status read_exposures(const container *c, exposures *e, gbt_error *er
         float *out;
     } fields[] = {{"matrix", e->matrix}, {"moment1", e->moment1}, {"moment2", e->moment2}};
     for (int i = 0; i < 3; i++)
-        GBT_TRY(copy_field(c, "exposure", fields[i].field, e->count, AFFINE_NUMBERS, 2,
-                           (const size_t[]){AFFINE_NUMBERS, 0}, fields[i].out, err));
+        GBT_TRY(copy_exposures(c, fields[i].field, e->count, fields[i].out, err));
     return container_get(c, "exposure.visits", CONTAINER_U64, e->count, e->visits, err);
 }
 
@@ -187,21 +184,17 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     size_t position[2] = {CONTAINER_ANY, 3};
     const void *data;
     GBT_TRY(container_find(c, "anchors.position", CONTAINER_F32, 2, position, &data, err));
-    const size_t rows = position[0], n = t->decoder.param_count, k = (size_t)t->def.offsets;
-    GBT_TRY(read_anchors(c, "anchors", rows, &t->anchors, err));
-    GBT_TRY(read_anchors(c, "moment1", rows, &t->moment1, err));
-    GBT_TRY(read_anchors(c, "moment2", rows, &t->moment2, err));
-    GBT_TRY(anchors_resize(&t->gradient, rows, err));
-    GBT_TRY(container_get(c, "networks", CONTAINER_F32, n, t->decoder.params, err));
-    GBT_TRY(container_get(c, "networks.moment1", CONTAINER_F32, n, t->params_m, err));
-    GBT_TRY(container_get(c, "networks.moment2", CONTAINER_F32, n, t->params_v, err));
-    GBT_TRY(adjust_stats_resize(&t->stats, rows, t->def.offsets, err));
-    GBT_TRY(container_get(c, "stats.use_accum", CONTAINER_F32, rows, t->stats.use_accum, err));
-    GBT_TRY(container_get(c, "stats.visit_count", CONTAINER_F32, rows, t->stats.visit_count, err));
-    GBT_TRY(container_find(c, "stats.grad_accum", CONTAINER_F32, 2, (size_t[]){rows, k}, &data, err));
-    memcpy(t->stats.grad_accum, data, rows * k * sizeof(float));
-    GBT_TRY(container_find(c, "stats.grad_count", CONTAINER_F32, 2, (size_t[]){rows, k}, &data, err));
-    memcpy(t->stats.grad_count, data, rows * k * sizeof(float));
+    const size_t rows = position[0], n = t->decoder.param_count;
+    anchors *const sets[ANCHOR_SETS] = {&t->anchors, &t->moment1.anchors, &t->moment2.anchors};
+    float *const networks[ANCHOR_SETS] = {t->decoder.params, t->moment1.networks, t->moment2.networks};
+    for (int i = 0; i < ANCHOR_SETS; i++)
+        GBT_TRY(read_anchors(c, anchor_set_names[i], rows, sets[i], err));
+    GBT_TRY(anchors_resize(&t->gradient.anchors, rows, err));
+    for (int i = 0; i < ANCHOR_SETS; i++)
+        GBT_TRY(container_get(c, network_set_names[i], CONTAINER_F32, n, networks[i], err));
+    GBT_TRY(growth_stats_resize(&t->stats, rows, t->def.offsets, err));
+    GBT_TRY(row_sections_get(c, "stats", growth_stat_fields, GROWTH_STATS, rows, (size_t)t->def.offsets,
+                             t->stats.field, err));
     if (t->exposures.count > 0)
         GBT_TRY(read_exposures(c, &t->exposures, err));
     GBT_TRY(container_get(c, "pace", CONTAINER_U64, PACE_SEGMENTS, t->pace.steps, err));
@@ -210,10 +203,10 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     if (container_section_named(c, "in_row") != NULL) /* older checkpoints have none */
         GBT_TRY(container_get(c, "in_row", CONTAINER_U64, 3, in_row, err));
     t->skipped_in_row = in_row[0];
-    t->barren_in_row = in_row[1];
-    t->revivals = in_row[2];
+    t->empty_in_row = in_row[1];
+    t->opacity_raises = in_row[2];
     t->step = counters[0];
-    t->adjust_step = counters[1];
+    t->round_step = counters[1];
     t->anchor_t = counters[2];
     t->skipped_steps = counters[3];
     t->pace.known = (int)counters[4];

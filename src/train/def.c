@@ -7,15 +7,9 @@
 #include "anchor/init.h"
 #include "base/fail.h"
 #include "frame/frame.h"
-
-/* Fewer Gaussians per anchor than in the paper's base: at equal time the models are better
-   (docs/training.md). */
-enum { default_offsets = 2 };
+#include "train/rules.h"
 
 static const double default_budget_seconds = 600;
-
-/* Of the balls' scale prior, which is smaller than their spacing. */
-static const double ball_scale_factor = 2;
 
 gbt_train_def gbt_train_def_default(void)
 {
@@ -103,16 +97,17 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err)
 
 void train_def_settle(gbt_train_def *d)
 {
+    const train_rules rules = train_rules_of(d);
     if (d->budget_seconds == 0)
         d->budget_seconds = default_budget_seconds;
     if (d->offsets == 0)
-        d->offsets = d->compat ? 10 : default_offsets;
+        d->offsets = rules.offsets;
     if (d->scale_factor == 0) {
         const bool from_balls = strcmp(d->init, "gb") == 0 && strcmp(d->scale_prior, "gb") == 0;
-        d->scale_factor = d->compat ? 1 : from_balls ? ball_scale_factor : TRAIN_SPACING_SCALE;
+        d->scale_factor = from_balls ? rules.ball_scale_factor : rules.spacing_scale_factor;
     }
-    if (d->compat) {
+    if (!rules.uses_footprint)
         d->footprint = 0;
+    if (!rules.uses_near)
         d->near = 0;
-    }
 }

@@ -27,24 +27,8 @@ static size_t first_bad(const float *values, size_t count)
     return i;
 }
 
-/* The rows of one field of the anchors. */
-typedef struct field {
-    const char *name;
-    const float *values;
-    size_t width;
-} field;
-
-enum { FIELD_COUNT = 3 };
-
-static void anchor_fields(const anchors *g, field out[FIELD_COUNT])
-{
-    out[0] = (field){"feature", g->feature, ANCHOR_FEATURE_DIM};
-    out[1] = (field){"offset", g->offset, 3 * (size_t)g->offset_count};
-    out[2] = (field){"scale", g->scale_log, 6};
-}
-
 typedef struct row_job {
-    field fields[FIELD_COUNT];
+    const anchors *gradient;
     const uint32_t *rows;
     atomic_bool bad;
 } row_job;
@@ -55,20 +39,22 @@ static void check_rows(size_t block, size_t begin, size_t end, void *context)
     row_job *job = context;
     bool bad = false;
     for (size_t i = begin; i < end; i++)
-        for (int k = 0; k < FIELD_COUNT; k++)
-            bad |= any_bad(job->fields[k].values + job->rows[i] * job->fields[k].width, job->fields[k].width);
+        for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
+            const size_t width = anchors_width(job->gradient, f);
+            bad |= any_bad(job->gradient->field[f] + job->rows[i] * width, width);
+        }
     if (bad)
         atomic_store(&job->bad, true);
 }
 
 static void name_row(const row_job *job, size_t count, char *where, size_t size)
 {
-    for (int k = 0; k < FIELD_COUNT; k++)
+    for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
         for (size_t i = 0; i < count; i++) {
-            const size_t width = job->fields[k].width,
-                         at = first_bad(job->fields[k].values + job->rows[i] * width, width);
+            const size_t width = anchors_width(job->gradient, f),
+                         at = first_bad(job->gradient->field[f] + job->rows[i] * width, width);
             if (at < width) {
-                snprintf(where, size, "%s of anchor %u, value %zu", job->fields[k].name, job->rows[i], at);
+                snprintf(where, size, "%s of anchor %u, value %zu", anchor_fields[f].label, job->rows[i], at);
                 return;
             }
         }
@@ -76,22 +62,20 @@ static void name_row(const row_job *job, size_t count, char *where, size_t size)
 
 bool gradient_is_bad(const trainer *t, const double exposure[AFFINE_NUMBERS], char *where, size_t size)
 {
-    row_job job = {.rows = t->frame.visible};
-    anchor_fields(&t->gradient, job.fields);
+    row_job job = {.gradient = &t->gradient.anchors, .rows = t->frame.visible};
     atomic_init(&job.bad, false);
     parallel_blocks(t->frame.visible_count, ROW_BLOCK, check_rows, &job);
     if (atomic_load(&job.bad)) {
         name_row(&job, t->frame.visible_count, where, size);
         return true;
     }
-    static const char *const networks[3] = {"opacity", "shape", "colour"};
-    decoder_part parts[3];
+    decoder_part parts[DECODER_PARTS];
     decoder_parts(&t->decoder, parts);
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < DECODER_PARTS; i++) {
         const size_t count = parts[i].end - parts[i].begin,
-                     at = first_bad(t->d_params + parts[i].begin, count);
+                     at = first_bad(t->gradient.networks + parts[i].begin, count);
         if (at < count) {
-            snprintf(where, size, "%s network, value %zu", networks[i], at);
+            snprintf(where, size, "%s network, value %zu", parts[i].label, at);
             return true;
         }
     }

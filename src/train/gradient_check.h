@@ -10,8 +10,8 @@
 #define GRADIENT_LIMIT 1e18f
 
 /**
- * Look at every gradient of the last frame_backward(): rows of the visible anchors, networks, and the photo's
- * exposure.
+ * Look at every gradient of the last frame_backward_anchors(): rows of the visible anchors, networks, and the
+ * photo's exposure.
  *
  * @param exposure [in]  [12] gradient of the photo's colour matrix, NULL without
  * @param where    [out] "feature of anchor 17, value 3", "shape network, value 200": the first bad one, in

@@ -97,25 +97,3 @@ int schedule_level(double progress, int start_level)
         level--;
     return level;
 }
-
-static const double cool_end = 0.02;
-
-static double decay(double first, double last, double progress)
-{
-    return exp((1 - progress) * log(first) + progress * log(last));
-}
-
-learning_rates schedule_rates(double progress, bool compat, double extent, double factor)
-{
-    if (!compat && progress > SCHEDULE_COOL_FROM)
-        factor *= cool_end + (1 - cool_end) * fmax(1 - progress, 0) / (1 - SCHEDULE_COOL_FROM);
-    const double network = factor * (compat ? 1 : 2);
-    return (learning_rates){
-        .offset = factor * decay(0.01, 0.0001, progress) * (compat ? extent : 4.5),
-        .feature = factor * 0.0075 * (compat ? 1 : 1.5),
-        .scale = factor * 0.007 * (compat ? 1 : 3),
-        .opacity_mlp = network * decay(0.002, 0.00002, progress),
-        .shape_mlp = network * 0.004,
-        .color_mlp = network * decay(0.008, 0.00005, progress),
-    };
-}

@@ -77,24 +77,10 @@ float schedule_thrift(double steps);
  */
 #define SCHEDULE_COOL_FROM 0.9
 
-typedef struct learning_rates {
-    double offset, feature, scale, opacity_mlp, shape_mlp, color_mlp;
-} learning_rates;
-
-/**
- * Log-linear decays, and in the end, from SCHEDULE_COOL_FROM on, straight to nearly nothing
- * (docs/training.md).
- *
- * @param compat [in] true: the reference method's rates; false: ours, higher, for runs of some thousand steps
- * @param extent [in] of the cameras; the reference's rate of offsets is proportional to it
- * @param factor [in] of all rates
- */
-learning_rates schedule_rates(double progress, bool compat, double extent, double factor);
-
 /** Statistics are gathered from STATS_FROM on; anchors grow and are pruned from ADJUST_FROM on. */
 #define SCHEDULE_STATS_FROM (500.0 / 30000)
 #define SCHEDULE_ADJUST_FROM (1500.0 / 30000)
-/** Until then anchors grow at sparse points too: the start left most of them out (not with compat). */
+/** Until then anchors grow at sparse points too: the start left most of them out. */
 #define SCHEDULE_POINTS_UNTIL 0.15
 
 #endif

@@ -70,7 +70,7 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
     size_t places = 0;
     if (any_point_is_seen(t))
         GBT_TRY(count_places(points, FEW_PLACES, &places, err));
-    const bool blind = places == 0, few = places < FEW_PLACES && !t->def.compat;
+    const bool blind = places == 0, few = places < FEW_PLACES && t->rules.adds_to_few_points;
     t->points_used = points->count;
     snprintf(t->start_text, sizeof t->start_text, "%zu sparse points", points->count);
     if (!blind && !few)
@@ -100,8 +100,8 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
     return status;
 }
 
-/* Distances from training cameras to a spread of anchors: they decide whether the networks see the distance,
-   its unit, and t_near. */
+/* Distances from training cameras to a sample of the anchors: they decide whether the networks see the
+   distance, its unit, and t_near. */
 static gbt_status measure_distances(trainer *t, float *p5, float *median, float *p95, gbt_error *err)
 {
     const size_t stride = t->anchors.count / 512 + 1, per_view = (t->anchors.count + stride - 1) / stride;
@@ -170,13 +170,13 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
     /* Cameras that stand together say nothing of the size of what they see. */
     const double away =
         dvec_length(t->scene.views[t->train_views[0]].camera.center); /* from the middle of the points */
-    t->first_scale_max = t->def.compat ? (double)INFINITY : 0.1 * fmax(t->extent, 0.1 * away);
+    t->first_scale_max = t->rules.limits_first_scale ? 0.1 * fmax(t->extent, 0.1 * away) : (double)INFINITY;
     def.scale_max = (float)t->first_scale_max;
     const scene_points *points = &t->scene.points;
     GBT_TRY(anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def,
                          &t->anchors, NULL, err));
     t->anchors_initial = t->anchors.count;
-    return t->def.compat || !points->has_color ? GBT_OK : start_features(t, err);
+    return t->rules.features_from_colors && points->has_color ? start_features(t, err) : GBT_OK;
 }
 
 static gbt_status choose_views(trainer *t, gbt_error *err)
@@ -199,21 +199,15 @@ static gbt_status choose_views(trainer *t, gbt_error *err)
 
 static gbt_status make_state(trainer *t, gbt_error *err)
 {
-    anchors *same[] = {&t->gradient, &t->moment1, &t->moment2};
-    for (int i = 0; i < 3; i++) {
-        same[i]->offset_count = t->def.offsets;
-        GBT_TRY(anchors_resize(same[i], t->anchors.count, err));
-    }
+    learnables *const kept[] = {&t->gradient, &t->moment1, &t->moment2};
+    for (int i = 0; i < 3; i++)
+        GBT_TRY(learnables_make(kept[i], t->anchors.count, &t->decoder, err));
     t->born = mem_calloc(t->anchors.count, sizeof *t->born, "anchors", err);
-    const size_t n = t->decoder.param_count;
-    t->d_params = mem_calloc(n, sizeof *t->d_params, "network gradient", err);
-    t->params_m = mem_calloc(n, sizeof *t->params_m, "network moments", err);
-    t->params_v = mem_calloc(n, sizeof *t->params_v, "network moments", err);
-    if (t->born == NULL || t->d_params == NULL || t->params_m == NULL || t->params_v == NULL)
+    if (t->born == NULL)
         return GBT_ERR_NO_MEMORY;
     if (t->def.exposure)
         GBT_TRY(exposures_make(&t->exposures, t->train_count, err));
-    return adjust_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
+    return growth_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
 }
 
 static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
@@ -234,8 +228,8 @@ static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
     t->voxel_size = def->voxel_size;
     if (t->voxel_size > 0)
         return GBT_OK;
-    return balls_voxel_size(t->scene.points.position, t->scene.points.count,
-                            def->compat ? VOXEL_COMPAT_SQUARED : VOXEL_MEDIAN_SPACING, &t->voxel_size, err);
+    return balls_voxel_size(t->scene.points.position, t->scene.points.count, t->rules.voxel, &t->voxel_size,
+                            err);
 }
 
 /* Nothing can be nearer to a camera than this. Where a photo was taken there is room up to what it shows,
@@ -262,12 +256,12 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     GBT_TRY(measure_distances(t, &p5, &median, &p95, err));
     /* Off by default in the reference, and a trap where distances vary widely. */
     const bool wide = p95 > 3 * p5;
-    const bool has_distance =
-        strcmp(def->distance, "on") == 0 || (strcmp(def->distance, "auto") == 0 && wide && !def->compat);
+    const bool has_distance = strcmp(def->distance, "on") == 0 ||
+                              (strcmp(def->distance, "auto") == 0 && wide && t->rules.distance_where_wide);
     uint32_t words[4];
     rng_philox(def->seed, STREAM_NETWORKS, 0, words);
     GBT_TRY(decoder_init(&t->decoder, def->offsets, has_distance, (uint64_t)words[1] << 32 | words[0], err));
-    t->decoder.distance_scale = def->compat ? 1.0f : 1 / median;
+    t->decoder.distance_scale = t->rules.distance_by_median ? 1 / median : 1.0f;
     t->decoder.distance_min = p5 * t->decoder.distance_scale;
     t->decoder.distance_max = p95 * t->decoder.distance_scale;
     t->settings = trace_settings_default();
@@ -283,6 +277,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     GBT_TRY(train_def_check(def, err));
     t->def = *def;
     train_def_settle(&t->def);
+    t->rules = train_rules_of(&t->def);
     GBT_TRY(load_data(t, data, err));
     GBT_TRY(make_anchors(t, err));
     GBT_TRY(make_decoder(t, err));
@@ -290,7 +285,8 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->frame.draw.renderer = t->renderer;
     t->frame.draw.footprint = (float)t->def.footprint;
     GBT_TRY(make_state(t, err));
-    if (!scene_background(&t->scene, t->settings.background) && !def->compat && t->scene.points.has_color)
+    if (!scene_background(&t->scene, t->settings.background) && t->rules.background_from_points &&
+        t->scene.points.has_color)
         mean_color(&t->scene.points, t->settings.background);
 
     if (def->pace != NULL)

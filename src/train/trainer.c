@@ -10,21 +10,20 @@
 #include "base/fail.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "base/rng.h"
 #include "base/vec.h"
-#include "train/adam.h"
 #include "train/gradient_check.h"
-#include "train/growth.h"
+#include "train/growing.h"
+#include "train/loss.h"
 
-static const float dssim_weight = 0.2f, volume_weight = 0.01f, revived_opacity = 0.1f;
-enum { ADAM_BLOCK = 512, MAX_SKIPPED_IN_ROW = 10 };
+static const float raised_opacity = 0.1f;
+enum { MAX_SKIPPED_IN_ROW = 10 };
 enum {
     STREAM_VIEWS = 1,
     STREAM_PIXELS = 4,
     LEAST_PIXELS_ACROSS = 80, /* with fewer a step would not be faster */
-    CULPRIT_SIZE = 384,
-    BARREN_STEPS = 5
+    REASON_SIZE = 384,
+    EMPTY_STEPS = 5
 };
 
 /* ---- which view ---- */
@@ -55,7 +54,7 @@ int trainer_level(const trainer *t, size_t view, double progress)
 {
     const gbt_camera camera = photos_camera(&t->photos, view, 0);
     const int across = camera.width < camera.height ? camera.width : camera.height;
-    int level = schedule_level(progress, t->def.compat ? 0 : t->def.start_level);
+    int level = schedule_level(progress, t->rules.start_level);
     while (level > 0 && across >> level < LEAST_PIXELS_ACROSS)
         level--;
     return level;
@@ -74,80 +73,32 @@ static photo_sample pick_pixels(const trainer *t, int level)
 /* Splats teach a model that is still rough in half the time of rays, which have the last word. */
 static frame_renderer renderer_of_step(const trainer *t, const gbt_camera *camera, double progress)
 {
-    const bool rays = t->renderer != FRAME_TRACE || t->def.compat || progress >= t->def.splats_until ||
-                      !raster_takes(camera);
+    const bool rays =
+        t->renderer != FRAME_TRACE || progress >= t->rules.splats_until || !raster_takes(camera);
     return rays ? t->renderer : FRAME_SPLAT;
 }
 
 /* ---- optimizer ---- */
 
-typedef struct adam_job {
-    trainer *t;
-    const learning_rates *rates;
-    adam_rates feature; /* by the age of the run */
-} adam_job;
-
-/* Of one age. By the age of the run, the first steps of a new anchor would be up to six times too long, for
-   its second moments are young: geometry, which begins where it belongs, would be flung from there. Features
-   begin as others' and have far to go: they keep that. */
-static void step_rows(const adam_job *job, size_t begin, size_t end)
+static learning_model model_of(trainer *t)
 {
-    anchors *p = &job->t->anchors, *g = &job->t->gradient, *m = &job->t->moment1, *v = &job->t->moment2;
-    const uint64_t age = job->t->anchor_t - job->t->born[begin];
-    const size_t rows = end - begin, feature = begin * ANCHOR_FEATURE_DIM, scale = begin * 6;
-    const size_t offset_floats = 3 * (size_t)p->offset_count, offset = begin * offset_floats;
-    adam_step(p->feature + feature, g->feature + feature, m->feature + feature, v->feature + feature,
-              rows * ANCHOR_FEATURE_DIM, job->feature);
-    adam_step(p->offset + offset, g->offset + offset, m->offset + offset, v->offset + offset,
-              rows * offset_floats, adam_rates_at(job->rates->offset, age));
-    adam_step(p->scale_log + scale, g->scale_log + scale, m->scale_log + scale, v->scale_log + scale,
-              rows * 6, adam_rates_at(job->rates->scale, age));
-    for (size_t i = scale; i < 6 * end; i++)
-        p->scale_log[i] = fminf(fmaxf(p->scale_log[i], job->t->scale_log_min), job->t->scale_log_max);
-}
-
-static void adam_block(size_t block, size_t begin, size_t end, void *context)
-{
-    (void)block;
-    const adam_job *job = context;
-    const uint64_t *born = job->t->born;
-    for (size_t i = begin, next; i < end; i = next) {
-        for (next = i + 1; next < end && born[next] == born[i];)
-            next++;
-        step_rows(job, i, next);
-    }
-}
-
-static void step_networks(trainer *t, const learning_rates *rates)
-{
-    decoder_part parts[3];
-    decoder_parts(&t->decoder, parts);
-    const double rate[3] = {rates->opacity_mlp, rates->shape_mlp, rates->color_mlp};
-    for (int i = 0; i < 3; i++) {
-        const size_t b = parts[i].begin, n = parts[i].end - b;
-        adam_step(t->decoder.params + b, t->d_params + b, t->params_m + b, t->params_v + b, n,
-                  adam_rates_at(rate[i], t->step + 1));
-    }
-}
-
-static void step_anchors(trainer *t, const learning_rates *rates)
-{
-    t->anchor_t++;
-    adam_job job = {t, rates, adam_rates_at(rates->feature, t->anchor_t)};
-    parallel_blocks(t->anchors.count, ADAM_BLOCK, adam_block, &job);
+    return (learning_model){.anchors = &t->anchors,
+                            .born = t->born,
+                            .decoder = &t->decoder,
+                            .gradient = &t->gradient,
+                            .moment1 = &t->moment1,
+                            .moment2 = &t->moment2,
+                            .scale_log_min = t->scale_log_min,
+                            .scale_log_max = t->scale_log_max};
 }
 
 /* ---- one step ---- */
 
 /* Count a step that teaches nothing; nothing may have changed yet but the gradients, which are cleared.
-   `what` names the culprit. */
+   `what` names the reason. */
 static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_error *err)
 {
-    anchors *g = &t->gradient;
-    memset(g->feature, 0, g->count * ANCHOR_FEATURE_DIM * sizeof *g->feature);
-    memset(g->offset, 0, g->count * 3 * (size_t)g->offset_count * sizeof *g->offset);
-    memset(g->scale_log, 0, g->count * 6 * sizeof *g->scale_log);
-    memset(t->d_params, 0, t->decoder.param_count * sizeof *t->d_params);
+    learnables_zero(&t->gradient, t->decoder.param_count);
     out->skipped = true;
     t->skipped_steps++;
     if (++t->skipped_in_row >= MAX_SKIPPED_IN_ROW)
@@ -160,24 +111,24 @@ static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_
 
 /* After the last render: is the scene empty, and for good? And in the first: is one offset of all anchors?
    The networks begin at random, and an offset that begins below 0 everywhere would hardly ever be used. */
-static void revive_when_barren(trainer *t)
+static void raise_opacities_when_empty(trainer *t)
 {
     const frame *f = &t->frame;
-    if (t->step == 0 && !t->def.compat)
-        decode_raise_opacity(&f->tape, 0, revived_opacity, &t->decoder);
-    const bool barren = f->visible_count > 0 && f->gaussians.count == 0;
-    t->barren_in_row = barren ? t->barren_in_row + 1 : 0;
-    if (t->barren_in_row < BARREN_STEPS)
+    if (t->step == 0 && t->rules.raises_first_opacity)
+        decode_raise_opacity(&f->tape, 0, raised_opacity, &t->decoder);
+    const bool empty = f->visible_count > 0 && f->gaussians.count == 0;
+    t->empty_in_row = empty ? t->empty_in_row + 1 : 0;
+    if (t->empty_in_row < EMPTY_STEPS)
         return;
-    decode_raise_opacity(&f->tape, revived_opacity, revived_opacity, &t->decoder);
-    decoder_part parts[3];
+    decode_raise_opacity(&f->tape, raised_opacity, raised_opacity, &t->decoder);
+    decoder_part parts[DECODER_PARTS];
     decoder_parts(&t->decoder, parts);
-    const size_t begin = parts[0].begin,
-                 count = parts[0].end - begin; /* what pulled the opacities down must not go on */
-    memset(t->params_m + begin, 0, count * sizeof *t->params_m);
-    memset(t->params_v + begin, 0, count * sizeof *t->params_v);
-    t->barren_in_row = 0;
-    if (t->revivals++ == 0)
+    const decoder_part *opacity = &parts[DECODER_OPACITY];
+    learnables *const moments[] = {&t->moment1, &t->moment2};
+    for (int i = 0; i < 2; i++) /* what pulled the opacities down must not go on */
+        memset(moments[i]->networks + opacity->begin, 0, (opacity->end - opacity->begin) * sizeof(float));
+    t->empty_in_row = 0;
+    if (t->opacity_raises++ == 0)
         log_info("step %llu: no anchor makes a Gaussian; opacities are raised", (unsigned long long)t->step);
 }
 
@@ -191,11 +142,10 @@ static gbt_status compare(trainer *t, size_t slot, const unsigned char *valid, i
     for (int i = 0; i < (t->exposures.count > 0 ? 2 : 1); i++)
         GBT_TRY(image_fit(fitted[i], shown->width, shown->height, 3, err));
     if (t->exposures.count == 0)
-        return image_loss(shown, &t->photo, valid, dssim_weight, &t->loss_scratch, &t->d_image, loss, err);
+        return loss_of_image(shown, &t->photo, valid, &t->loss_scratch, &t->d_image, loss, err);
     const float *matrix = t->exposures.matrix + slot * AFFINE_NUMBERS;
     affine_apply(matrix, shown, &t->exposed);
-    GBT_TRY(
-        image_loss(&t->exposed, &t->photo, valid, dssim_weight, &t->loss_scratch, &t->d_image, loss, err));
+    GBT_TRY(loss_of_image(&t->exposed, &t->photo, valid, &t->loss_scratch, &t->d_image, loss, err));
     affine_backward(matrix, shown, &t->d_image, d_exposure);
     return GBT_OK;
 }
@@ -206,7 +156,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
     const learning_rates rates =
-        schedule_rates(progress, t->def.compat, t->extent, t->def.learning_rate_factor);
+        learning_rates_at(progress, t->rules.own_rates, t->extent, t->def.learning_rate_factor);
 
     /* A view, and as many of its pixels as the model can already use. */
     const size_t slot = pick_view(t), view = t->train_views[slot];
@@ -225,58 +175,60 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     /* Render, compare. */
     f->draw.renderer = renderer_of_step(t, &camera, progress);
     trace_settings settings = t->settings;
-    if (!t->def.compat && progress < SCHEDULE_WHOLE_FROM) {
+    if (t->rules.loose_cutoffs && progress < SCHEDULE_WHOLE_FROM) {
         settings.alpha_min = SCHEDULE_ALPHA_MIN;
         settings.transmittance_min = SCHEDULE_T_MIN;
     }
     GBT_TRY(frame_render(f, frame_neural(&t->anchors, &t->decoder), &camera, &settings, true, err));
     out->gaussians = f->gaussians.count;
     out->visible = f->visible_count;
-    revive_when_barren(t);
+    raise_opacities_when_empty(t);
     clock = clock_wall();
     image_loss_result loss;
     double d_exposure[AFFINE_NUMBERS];
     GBT_TRY(compare(t, slot, valid, &loss, d_exposure, err));
-    out->loss = loss.loss + (double)volume_weight * frame_volume(f);
+    out->loss = loss.loss + loss_of_gaussians(&f->gaussians);
     out->l1 = loss.l1;
     out->ssim = loss.ssim;
     out->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
     out->loss_seconds = clock_wall() - clock;
 
-    char culprit[CULPRIT_SIZE];
+    char reason[REASON_SIZE];
     if (!isfinite(out->loss)) {
-        snprintf(culprit, sizeof culprit, "the loss is not finite (photo %.200s)", t->scene.views[view].name);
-        return skip_step(t, out, culprit, err);
+        snprintf(reason, sizeof reason, "the loss is not finite (photo %.200s)", t->scene.views[view].name);
+        return skip_step(t, out, reason, err);
     }
 
     /* Gradients, then parameters. */
-    GBT_TRY(frame_backward(f, &t->anchors, &t->decoder, &t->d_image, volume_weight, &t->gradient, t->d_params,
-                           err));
+    GBT_TRY(frame_backward_gaussians(f, &t->d_image, err));
+    loss_add_gradient(&f->gaussians, &f->d_gaussians);
+    GBT_TRY(
+        frame_backward_anchors(f, &t->anchors, &t->decoder, &t->gradient.anchors, t->gradient.networks, err));
     clock = clock_wall();
     char where[80];
     if (gradient_is_bad(t, t->exposures.count > 0 ? d_exposure : NULL, where, sizeof where)) {
-        snprintf(culprit, sizeof culprit, "the gradient is not finite (%s; photo %.200s)", where,
+        snprintf(reason, sizeof reason, "the gradient is not finite (%s; photo %.200s)", where,
                  t->scene.views[view].name);
-        return skip_step(t, out, culprit, err);
+        return skip_step(t, out, reason, err);
     }
     t->skipped_in_row = 0;
     if (t->exposures.count > 0)
         exposures_step(&t->exposures, slot, d_exposure,
                        t->def.learning_rate_factor *
                            exposures_rate(t->train_count, progress, next - progress));
-    const bool adjust = growth_is_due(t, progress, next);
-    step_networks(t, &rates);
-    if (!(adjust && t->def.compat)) /* in the reference the per-anchor groups miss the step in which anchors
-                                       change */
-        step_anchors(t, &rates);
+    const bool adjust = growing_is_due(t, progress, next);
+    const learning_model model = model_of(t);
+    learn_networks(&model, &rates, t->step + 1);
+    if (!adjust || t->rules.anchors_learn_when_adjusted)
+        learn_anchors(&model, &rates, ++t->anchor_t);
     out->optimizer_seconds = clock_wall() - clock;
 
     /* Anchors. */
     clock = clock_wall();
     if (t->def.grow && progress >= SCHEDULE_STATS_FROM && progress < t->def.grow_until)
-        growth_gather(t);
+        growth_stats_gather(&t->stats, f, t->rules.importance, t->settings.t_near);
     if (adjust)
-        GBT_TRY(growth_adjust(t, err));
+        GBT_TRY(growing_round(t, err));
     out->adjust_seconds = clock_wall() - clock;
     t->step++;
     out->total_seconds = clock_wall() - start;
@@ -318,15 +270,13 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
 
 void trainer_free(trainer *t)
 {
-    anchors *all[] = {&t->anchors, &t->gradient, &t->moment1, &t->moment2};
-    for (int i = 0; i < 4; i++)
-        anchors_free(all[i]);
+    anchors_free(&t->anchors);
+    learnables *const kept[] = {&t->gradient, &t->moment1, &t->moment2};
+    for (int i = 0; i < 3; i++)
+        learnables_free(kept[i]);
     mem_free(t->born);
     decoder_free(&t->decoder);
-    mem_free(t->d_params);
-    mem_free(t->params_m);
-    mem_free(t->params_v);
-    adjust_stats_free(&t->stats);
+    growth_stats_free(&t->stats);
     frame_free(&t->frame);
     image_free(&t->photo);
     image_free(&t->d_image);

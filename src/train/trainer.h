@@ -3,7 +3,6 @@
 #ifndef GBT_TRAIN_TRAINER_H
 #define GBT_TRAIN_TRAINER_H
 
-#include "anchor/adjust.h"
 #include "anchor/anchors.h"
 #include "anchor/init.h"
 #include "data/scene.h"
@@ -11,7 +10,10 @@
 #include "image/metrics.h"
 #include "train/exposure.h"
 #include "frame/frame.h"
+#include "growth/growth.h"
+#include "train/learnables.h"
 #include "train/photos.h"
+#include "train/rules.h"
 #include "train/schedule.h"
 
 /** What the last step did. */
@@ -26,22 +28,23 @@ typedef struct step_report {
 
 typedef struct trainer {
     gbt_train_def def; /* strings borrowed from the caller */
+    train_rules rules;
     scene scene;
     photos photos;
     size_t *train_views; /* indices into scene.views */
     size_t train_count, test_count;
 
-    /* What learns, its gradient and its Adam moments: same shapes. */
-    anchors anchors, gradient, moment1, moment2;
+    /* What learns; its gradient and its Adam moments have the same shapes. */
+    anchors anchors;
     uint64_t *born; /* [anchors.count]: anchor_t when the anchor was made, ascending */
     decoder decoder;
-    float *d_params, *params_m, *params_v;
-    adjust_stats stats;
+    learnables gradient, moment1, moment2;
+    growth_stats stats;
     exposures exposures; /* of the training photos, in the order of train_views; count 0 without --exposure */
 
     frame_renderer renderer; /* that the model is for */
     float voxel_size;
-    double extent, first_scale_max;     /* an isolated point would start as a fog */
+    double extent, first_scale_max;     /* an isolated point would start as a floater */
     float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs,
                                            far inside what floats hold */
     trace_settings settings;
@@ -50,13 +53,13 @@ typedef struct trainer {
     char start_text[160]; /* what the run starts from, for people */
 
     pace pace;
-    uint64_t step;        /* steps done */
-    uint64_t adjust_step; /* steps done at the last adjust */
-    uint64_t anchor_t;    /* Adam steps of the per-anchor groups */
+    uint64_t step;       /* steps done */
+    uint64_t round_step; /* steps done at the last round of growth */
+    uint64_t anchor_t;   /* Adam steps of the per-anchor groups */
     uint64_t skipped_steps, skipped_in_row;
-    uint64_t barren_in_row, revivals; /* steps in a row without a Gaussian though anchors were in sight; how
-                                         often that was mended */
-    double seconds;                   /* training time so far, over all runs that continued one another */
+    uint64_t empty_in_row, opacity_raises; /* steps in a row without a Gaussian though anchors were in sight;
+                                         how often that was mended */
+    double seconds; /* training time so far, over all runs that continued one another */
 
     frame frame;
     image photo, d_image, exposed; /* exposed: the render as the photo's exposure shows it */
@@ -79,7 +82,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
  *
  * Gaussians below opacity 0 have no gradient, so a scene that has lost all of them (or begins without: the
  * first networks are random) would stay empty. After five views in a row with anchors in sight and not one
- * Gaussian, opacities are raised to 0.1; in the first step (not with `compat`) those of each offset whose
+ * Gaussian, opacities are raised to 0.1; in the first step (raises_first_opacity) those of each offset whose
  * mean is below 0.
  */
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err);

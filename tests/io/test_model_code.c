@@ -52,11 +52,11 @@ static void make_steps(model_steps *s, size_t count, bool with_doublings)
 {
     *s = (model_steps){.position = 0.01, .count = count};
     for (size_t i = 0; i < ANCHOR_FEATURE_DIM; i++)
-        s->feature[i] = 0.0625f * (float)(1 + i % 5);
+        s->field[ANCHOR_FEATURE][i] = 0.0625f * (float)(1 + i % 5);
     for (size_t i = 0; i < ANCHOR_MAX_OFFSETS * 3; i++)
-        s->offset[i] = 0.03125f;
+        s->field[ANCHOR_OFFSET][i] = 0.03125f;
     for (size_t i = 0; i < 6; i++)
-        s->scale_log[i] = 0.046875f;
+        s->field[ANCHOR_SCALE_LOG][i] = 0.046875f;
     s->doubling = with_doublings ? mem_calloc(count, 1, "test", NULL) : NULL;
     for (size_t i = 0; with_doublings && i < count; i++)
         s->doubling[i] = (uint8_t)(rng_uniform(7, 8, i) * 3);
@@ -137,9 +137,10 @@ static void rounded_by_half_a_step(void **state)
         assert_true(j != SIZE_MAX);
         const int d = row->with_doublings ? steps.doubling[j] : 0;
         check_row(m.anchors.feature + j * ANCHOR_FEATURE_DIM, back.anchors.feature + i * ANCHOR_FEATURE_DIM,
-                  steps.feature, ANCHOR_FEATURE_DIM, d);
-        check_row(m.anchors.offset + j * k3, back.anchors.offset + i * k3, steps.offset, k3, d);
-        check_row(m.anchors.scale_log + j * 6, back.anchors.scale_log + i * 6, steps.scale_log, 6, d);
+                  steps.field[ANCHOR_FEATURE], ANCHOR_FEATURE_DIM, d);
+        check_row(m.anchors.offset + j * k3, back.anchors.offset + i * k3, steps.field[ANCHOR_OFFSET], k3, d);
+        check_row(m.anchors.scale_log + j * 6, back.anchors.scale_log + i * 6, steps.field[ANCHOR_SCALE_LOG],
+                  6, d);
         if (row->has_distance && m.anchor_pixel[j] > 0)
             assert_true(fabs(log2((double)back.anchor_pixel[i] / (double)m.anchor_pixel[j])) < 0.0626);
         else if (row->has_distance)
@@ -460,12 +461,13 @@ static void steps_follow_quality(void **state)
     parallel_set_threads(1);
     assert_ok(model_sensitivity_guess(&m, &one, NULL));
     assert_memory_equal(s.feature, one.feature, sizeof s.feature);
-    assert_memory_equal(s.offset, one.offset, sizeof s.offset);
+    assert_memory_equal(s.field, one.field, sizeof s.field);
     assert_ok(model_steps_at(&m, &s, 40, &coarse, NULL));
     assert_ok(model_steps_at(&m, &s, 60, &fine, NULL));
     for (size_t c = 0; c < ANCHOR_FEATURE_DIM; c++)
-        assert_true(fabs((double)coarse.feature[c] / (double)fine.feature[c] - 10) < 1e-3 ||
-                    coarse.feature[c] >= 0.99f);
+        assert_true(fabs((double)coarse.field[ANCHOR_FEATURE][c] / (double)fine.field[ANCHOR_FEATURE][c] -
+                         10) < 1e-3 ||
+                    coarse.field[ANCHOR_FEATURE][c] >= 0.99f);
     assert_int_equal(model_steps_at(&m, &s, 0, &fine, NULL), GBT_ERR_ARGUMENT);
     assert_int_equal(model_steps_at(&m, &s, NAN, &fine, NULL), GBT_ERR_ARGUMENT);
     s.count--;
@@ -491,9 +493,9 @@ static void steps_of_anchors(void **state)
     model_sensitivity_end(&s);
     assert_ok(model_steps_at(&m, &s, 50, &steps, NULL));
     for (size_t c = 0; c < ANCHOR_FEATURE_DIM; c++)
-        assert_true(steps.feature[c] > 0 && isfinite(steps.feature[c]));
-    assert_true(steps.position > 0 && isfinite(steps.position) && steps.offset[5] > 0 &&
-                steps.scale_log[5] > 0);
+        assert_true(steps.field[ANCHOR_FEATURE][c] > 0 && isfinite(steps.field[ANCHOR_FEATURE][c]));
+    assert_true(steps.position > 0 && isfinite(steps.position) && steps.field[ANCHOR_OFFSET][5] > 0 &&
+                steps.field[ANCHOR_SCALE_LOG][5] > 0);
     model_steps_free(&steps);
     model_sensitivity_free(&s);
     assert_ok(model_sensitivity_start(&s, 4, NULL));

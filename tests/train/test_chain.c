@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/train/test_chain.c -- the training loss as a function of the anchors and networks: its gradient in
-   double against differences, and the float32 chain (frame_render, image_loss, frame_backward) against the
+   double against differences, and the float32 chain (frame_render, train/loss.h, the adjoint) against the
    gradient in double. */
 #include "anchor/decode_ref.h"
 #include "anchor/fixture.h"
@@ -9,6 +9,7 @@
 #include "image/metrics.h"
 #include "trace/reference.h"
 #include "frame/frame.h"
+#include "train/loss.h"
 
 enum { OFFSETS = 5, WIDTH = 20, HEIGHT = 14, RAYS = WIDTH * HEIGHT, CLASS_COUNT = 6, RADIUS = 5 };
 static const char *const class_names[CLASS_COUNT] = {"feature",     "offset",    "scale",
@@ -343,13 +344,14 @@ static void float_chain_agrees_with_double(void **state)
         image d_image;
         image_loss_result loss;
         assert_ok(image_alloc(&d_image, WIDTH, HEIGHT, 3, NULL));
-        assert_ok(image_loss(&v.f.rgb, &v.photo, NULL, dssim_weight, &scratch, &d_image, &loss, NULL));
-        worst_loss = fmax(worst_loss, fabs(loss.loss + volume_weight * frame_volume(&v.f) - loss_of(&v)));
+        assert_ok(loss_of_image(&v.f.rgb, &v.photo, NULL, &scratch, &d_image, &loss, NULL));
+        worst_loss = fmax(worst_loss, fabs(loss.loss + loss_of_gaussians(&v.f.gaussians) - loss_of(&v)));
         anchors d_anchors = {.offset_count = OFFSETS};
         assert_ok(anchors_resize(&d_anchors, v.a.count, NULL));
         float *d_params = mem_calloc(v.d.param_count, sizeof *d_params, "test", NULL);
-        assert_ok(
-            frame_backward(&v.f, &v.a, &v.d, &d_image, (float)volume_weight, &d_anchors, d_params, NULL));
+        assert_ok(frame_backward_gaussians(&v.f, &d_image, NULL));
+        loss_add_gradient(&v.f.gaussians, &v.f.d_gaussians);
+        assert_ok(frame_backward_anchors(&v.f, &v.a, &v.d, &d_anchors, d_params, NULL));
         for (int class = 0; class < CLASS_COUNT; class ++) {
             decoder_part parts[3];
             decoder_parts(&v.d, parts);
@@ -393,7 +395,9 @@ static void threads_give_the_same_bits(void **state)
         anchors d_anchors = {.offset_count = OFFSETS};
         assert_ok(anchors_resize(&d_anchors, v.a.count, NULL));
         float *d_params = mem_calloc(v.d.param_count, sizeof *d_params, "test", NULL);
-        assert_ok(frame_backward(&v.f, &v.a, &v.d, &v.photo, 0.01f, &d_anchors, d_params, NULL));
+        assert_ok(frame_backward_gaussians(&v.f, &v.photo, NULL));
+        loss_add_gradient(&v.f.gaussians, &v.f.d_gaussians);
+        assert_ok(frame_backward_anchors(&v.f, &v.a, &v.d, &d_anchors, d_params, NULL));
         uint64_t h = hash_bytes(1, v.f.rgb.pixels, 3 * RAYS * sizeof(float));
         h = hash_bytes(h, d_anchors.feature, v.a.count * ANCHOR_FEATURE_DIM * sizeof(float));
         h = hash_bytes(h, d_anchors.offset, v.a.count * OFFSETS * 3 * sizeof(float));

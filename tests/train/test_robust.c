@@ -270,16 +270,14 @@ static void append(learned *out, const float *values, size_t count)
 static learned snapshot(const trainer *t)
 {
     learned out = {0};
-    const anchors *sets[] = {&t->anchors, &t->moment1, &t->moment2};
-    for (int i = 0; i < 3; i++) {
-        append(&out, sets[i]->feature, sets[i]->count * ANCHOR_FEATURE_DIM);
-        append(&out, sets[i]->offset, sets[i]->count * 3 * (size_t)sets[i]->offset_count);
-        append(&out, sets[i]->scale_log, sets[i]->count * 6);
-    }
-    const float *networks[] = {t->decoder.params, t->params_m, t->params_v};
+    const anchors *sets[] = {&t->anchors, &t->moment1.anchors, &t->moment2.anchors};
+    for (int i = 0; i < 3; i++)
+        for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
+            append(&out, sets[i]->field[f], sets[i]->count * anchors_width(sets[i], f));
+    const float *networks[] = {t->decoder.params, t->moment1.networks, t->moment2.networks};
     for (int i = 0; i < 3; i++)
         append(&out, networks[i], t->decoder.param_count);
-    append(&out, t->stats.use_accum, t->stats.count);
+    append(&out, t->stats.importance_accum, t->stats.count);
     append(&out, t->stats.visit_count, t->stats.count);
     append(&out, t->stats.grad_accum, t->stats.count * (size_t)t->stats.offset_count);
     const float *exposure[] = {t->exposures.matrix, t->exposures.moment1, t->exposures.moment2};
@@ -299,13 +297,13 @@ static void assert_unchanged(const trainer *t, learned before)
 
 static void assert_no_gradient_left(const trainer *t)
 {
-    const anchors *g = &t->gradient;
+    const anchors *g = &t->gradient.anchors;
     for (size_t i = 0; i < g->count * ANCHOR_FEATURE_DIM; i++)
         assert_true(g->feature[i] == 0);
     for (size_t i = 0; i < g->count * 6; i++)
         assert_true(g->scale_log[i] == 0);
     for (size_t i = 0; i < t->decoder.param_count; i++)
-        assert_true(t->d_params[i] == 0);
+        assert_true(t->gradient.networks[i] == 0);
 }
 
 /* A background that is not a number makes the loss one; an exposure of 1e30 makes gradients too large for
@@ -387,7 +385,8 @@ static void a_bad_gradient_is_named(void **state)
     double exposure[AFFINE_NUMBERS] = {1};
     assert_false(gradient_is_bad(&t, exposure, where, sizeof where));
     assert_string_equal(where, "untouched");
-    const size_t anchor = t.frame.visible[t.frame.visible_count - 1], k = (size_t)t.gradient.offset_count;
+    const size_t anchor = t.frame.visible[t.frame.visible_count - 1],
+                 k = (size_t)t.gradient.anchors.offset_count;
     decoder_part parts[3];
     decoder_parts(&t.decoder, parts);
     const struct {
@@ -396,12 +395,12 @@ static void a_bad_gradient_is_named(void **state)
         size_t value;
         bool of_anchor;
     } places[] = {
-        {t.gradient.feature + anchor * 32 + 31, "feature", 31, true},
-        {t.gradient.offset + anchor * 3 * k, "offset", 0, true},
-        {t.gradient.scale_log + anchor * 6 + 5, "scale", 5, true},
-        {t.d_params, "opacity network", 0, false},
-        {t.d_params + parts[1].begin + 7, "shape network", 7, false},
-        {t.d_params + parts[2].end - 1, "colour network", parts[2].end - 1 - parts[2].begin, false},
+        {t.gradient.anchors.feature + anchor * 32 + 31, "feature", 31, true},
+        {t.gradient.anchors.offset + anchor * 3 * k, "offset", 0, true},
+        {t.gradient.anchors.scale_log + anchor * 6 + 5, "scale", 5, true},
+        {t.gradient.networks, "opacity network", 0, false},
+        {t.gradient.networks + parts[1].begin + 7, "shape network", 7, false},
+        {t.gradient.networks + parts[2].end - 1, "colour network", parts[2].end - 1 - parts[2].begin, false},
     };
     static const float values[] = {NAN, INFINITY, -INFINITY, 1.1e18f, -3e38f};
     for (size_t i = 0; i < sizeof places / sizeof *places; i++)
@@ -501,13 +500,13 @@ static void an_empty_scene_comes_back(void **state)
             t.decoder.params[parts[0].end - 1 - (size_t)k] = -4;
         for (int i = 0; i < 4; i++) {
             step_ok(&t, &r);
-            assert_true(r.gaussians == 0 && r.visible > 0 && t.revivals == 0);
+            assert_true(r.gaussians == 0 && r.visible > 0 && t.opacity_raises == 0);
         }
         step_ok(&t, &r);
-        assert_int_equal(t.revivals, 1);
+        assert_int_equal(t.opacity_raises, 1);
         for (int i = 0; i < 10; i++)
             step_ok(&t, &r);
-        assert_true(r.gaussians > t.anchors.count / 2 && t.revivals == 1);
+        assert_true(r.gaussians > t.anchors.count / 2 && t.opacity_raises == 1);
         trainer_free(&t);
     }
 }

@@ -288,9 +288,9 @@ static void a_budget_run_resumes_its_clock(void **state)
 
 static void assert_rows_agree(const trainer *t)
 {
-    assert_int_equal(t->gradient.count, t->anchors.count);
-    assert_int_equal(t->moment1.count, t->anchors.count);
-    assert_int_equal(t->moment2.count, t->anchors.count);
+    assert_int_equal(t->gradient.anchors.count, t->anchors.count);
+    assert_int_equal(t->moment1.anchors.count, t->anchors.count);
+    assert_int_equal(t->moment2.anchors.count, t->anchors.count);
     assert_int_equal(t->stats.count, t->anchors.count);
 }
 
@@ -460,7 +460,7 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     trainer t;
     open_from_few_balls(&t);
     step_report r;
-    while (t.adjust_step == 0 || t.born[t.anchors.count - 1] == 0)
+    while (t.round_step == 0 || t.born[t.anchors.count - 1] == 0)
         step_ok(&t, &r);
     const size_t n = t.anchors.count, k = (size_t)t.anchors.offset_count;
     size_t old = 0;
@@ -472,7 +472,7 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     memcpy(before.scale_log, t.anchors.scale_log, n * 6 * sizeof(float));
     memcpy(before.feature, t.anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float));
     const learning_rates rates =
-        schedule_rates(pace_progress(&t.pace, t.step), false, t.extent, t.def.learning_rate_factor);
+        learning_rates_at(pace_progress(&t.pace, t.step), true, t.extent, t.def.learning_rate_factor);
     step_ok(&t, &r);
     assert_int_equal(t.anchors.count, n); /* no round: rows are where they were */
     double offset = 0, scale = 0, feature = 0;
@@ -482,12 +482,14 @@ static void new_geometry_begins_at_its_own_pace(void **state)
         scale = fmax(scale, fabs((double)t.anchors.scale_log[i] - (double)before.scale_log[i]));
     for (size_t i = old * ANCHOR_FEATURE_DIM; i < n * ANCHOR_FEATURE_DIM; i++)
         feature = fmax(feature, fabs((double)t.anchors.feature[i] - (double)before.feature[i]));
-    const adam_rates by_run = adam_rates_at(rates.feature, t.anchor_t);
-    const double expected =
-        rates.feature * 0.1 * (double)by_run.correct_m / sqrt(0.001 * (double)by_run.correct_v);
+    const adam_rates by_run = adam_rates_at(rates.anchor[ANCHOR_FEATURE], t.anchor_t);
+    const double expected = rates.anchor[ANCHOR_FEATURE] * 0.1 * (double)by_run.correct_m /
+                            sqrt(0.001 * (double)by_run.correct_v);
     print_message("%zu new anchors; first steps of %.3f, %.3f and %.3f rates\n", n - old,
-                  offset / rates.offset, scale / rates.scale, feature / rates.feature);
-    assert_true(fabs(offset / rates.offset - 1) < 1e-3 && fabs(scale / rates.scale - 1) < 1e-3 &&
+                  offset / rates.anchor[ANCHOR_OFFSET], scale / rates.anchor[ANCHOR_SCALE_LOG],
+                  feature / rates.anchor[ANCHOR_FEATURE]);
+    assert_true(fabs(offset / rates.anchor[ANCHOR_OFFSET] - 1) < 1e-3 &&
+                fabs(scale / rates.anchor[ANCHOR_SCALE_LOG] - 1) < 1e-3 &&
                 fabs(feature / expected - 1) < 1e-3);
     anchors_free(&before);
     trainer_free(&t);
@@ -515,11 +517,11 @@ static void moments_follow_their_rows(void **state)
           *m2 = malloc(n * 6 * sizeof *m2);
     assert_true(position != NULL && m1 != NULL && m2 != NULL);
     memcpy(position, t.anchors.position, 3 * n * sizeof *position);
-    memcpy(m1, t.moment1.offset, n * 3 * k * sizeof *m1);
-    memcpy(m2, t.moment2.scale_log, n * 6 * sizeof *m2);
+    memcpy(m1, t.moment1.anchors.offset, n * 3 * k * sizeof *m1);
+    memcpy(m2, t.moment2.anchors.scale_log, n * 6 * sizeof *m2);
     for (size_t i = 0; i < n; i++) {
         t.stats.visit_count[i] = 1e6f;
-        t.stats.use_accum[i] = i % 2 == 0 ? 0.0f : 1e6f;
+        t.stats.importance_accum[i] = i % 2 == 0 ? 0.0f : 1e6f;
         for (size_t j = 0; j < k; j++) {
             t.stats.grad_count[i * k + j] = 1e6f;
             t.stats.grad_accum[i * k + j] = i < 20 ? 1e9f : 0.0f;
@@ -536,14 +538,15 @@ static void moments_follow_their_rows(void **state)
         if (from < n) {
             kept++;
             assert_int_equal(from % 2, 1);
-            assert_memory_equal(t.moment1.offset + row * 3 * k, m1 + from * 3 * k, 3 * k * sizeof *m1);
-            assert_memory_equal(t.moment2.scale_log + row * 6, m2 + from * 6, 6 * sizeof *m2);
+            assert_memory_equal(t.moment1.anchors.offset + row * 3 * k, m1 + from * 3 * k,
+                                3 * k * sizeof *m1);
+            assert_memory_equal(t.moment2.anchors.scale_log + row * 6, m2 + from * 6, 6 * sizeof *m2);
         } else {
             grown++;
             for (size_t j = 0; j < 3 * k; j++)
-                assert_true(t.moment1.offset[row * 3 * k + j] == 0);
+                assert_true(t.moment1.anchors.offset[row * 3 * k + j] == 0);
             for (size_t j = 0; j < 6; j++)
-                assert_true(t.moment2.scale_log[row * 6 + j] == 0);
+                assert_true(t.moment2.anchors.scale_log[row * 6 + j] == 0);
         }
     }
     assert_int_equal(kept, n / 2);
@@ -961,23 +964,29 @@ static void levels_and_rates(void **state)
         }
     }
     double before[6];
-    for (int compat = 0; compat < 2; compat++)
+    for (int own = 0; own < 2; own++)
         for (int i = 0; i <= 100; i++) { /* positive, finite, and none ever rises */
-            const learning_rates r = schedule_rates(i / 100.0, compat, 2.0, 1);
-            const double now[6] = {r.offset, r.feature, r.scale, r.opacity_mlp, r.shape_mlp, r.color_mlp};
+            const learning_rates r = learning_rates_at(i / 100.0, own, 2.0, 1);
+            const double now[6] = {r.anchor[ANCHOR_OFFSET],    r.anchor[ANCHOR_FEATURE],
+                                   r.anchor[ANCHOR_SCALE_LOG], r.network[DECODER_OPACITY],
+                                   r.network[DECODER_SHAPE],   r.network[DECODER_COLOR]};
             for (int k = 0; k < 6; k++) {
                 assert_true(isfinite(now[k]) && now[k] > 0);
                 assert_true(i == 0 || now[k] <= before[k] * (1 + 1e-12));
                 before[k] = now[k];
             }
         }
-    assert_true(schedule_rates(1, false, 1, 1).feature < 0.05 * schedule_rates(0.9, false, 1, 1).feature);
-    assert_true(schedule_rates(1, true, 1, 1).feature == schedule_rates(0.9, true, 1, 1).feature);
+    assert_true(learning_rates_at(1, true, 1, 1).anchor[ANCHOR_FEATURE] <
+                0.05 * learning_rates_at(0.9, true, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(learning_rates_at(1, false, 1, 1).anchor[ANCHOR_FEATURE] ==
+                learning_rates_at(0.9, false, 1, 1).anchor[ANCHOR_FEATURE]);
     for (int i = 0; i <= 100; i++) {
-        const learning_rates r = schedule_rates(i / 100.0, true, 2.0, 1);
-        assert_true(fabs(r.offset / schedule_rates(i / 100.0, true, 1.0, 1).offset - 2) < 1e-12);
-        assert_true(schedule_rates(i / 100.0, false, 2.0, 1).offset ==
-                    schedule_rates(i / 100.0, false, 1.0, 1).offset);
+        const learning_rates r = learning_rates_at(i / 100.0, false, 2.0, 1);
+        assert_true(
+            fabs(r.anchor[ANCHOR_OFFSET] / learning_rates_at(i / 100.0, false, 1.0, 1).anchor[ANCHOR_OFFSET] -
+                 2) < 1e-12);
+        assert_true(learning_rates_at(i / 100.0, true, 2.0, 1).anchor[ANCHOR_OFFSET] ==
+                    learning_rates_at(i / 100.0, true, 1.0, 1).anchor[ANCHOR_OFFSET]);
     }
 }
 

@@ -1,29 +1,29 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/anchor/test_adjust.c -- growing and pruning: the published oracles, every boundary, and a brute-force
+/* tests/growth/test_growth.c -- growing and pruning: the published oracles, every boundary, and a brute-force
    version of the whole. */
-#include "fixture.h"
+#include "anchor/fixture.h"
 
 #include "anchor/activations.h"
-#include "anchor/adjust.h"
 #include "base/parallel.h"
+#include "growth/growth.h"
 
 typedef struct scene {
     anchors a;
-    adjust_stats s;
+    growth_stats s;
 } scene;
 
 static scene empty_scene(size_t count, int offset_count)
 {
     scene sc = {.a = {.offset_count = offset_count}};
     assert_ok(anchors_resize(&sc.a, count, NULL));
-    assert_ok(adjust_stats_resize(&sc.s, count, offset_count, NULL));
+    assert_ok(growth_stats_resize(&sc.s, count, offset_count, NULL));
     return sc;
 }
 
-static void free_scene(scene *sc, adjust_result *r)
+static void free_scene(scene *sc, growth_result *r)
 {
     anchors_free(&sc->a);
-    adjust_stats_free(&sc->s);
+    growth_stats_free(&sc->s);
     if (r != NULL)
         mem_free(r->source);
 }
@@ -34,13 +34,13 @@ static void set_gradient(scene *sc, size_t slot, float gradient)
     sc->s.grad_accum[slot] = 50.0f * gradient;
 }
 
-static bool survives(const adjust_def *def, int level, size_t slot)
+static bool survives(const growth_def *def, int level, size_t slot)
 {
     return rng_uniform(def->seed, def->step * 8 + (uint64_t)level, slot) > ldexpf(1.0f, -(level + 1));
 }
 
 /* The first seed for which slots [0, count) survive the drop at every level. */
-static void keep_all(adjust_def *def, size_t count)
+static void keep_all(growth_def *def, size_t count)
 {
     for (def->seed = 0;; def->seed++) {
         bool all = true;
@@ -50,6 +50,14 @@ static void keep_all(adjust_def *def, size_t count)
         if (all)
             return;
     }
+}
+
+/* Where the reference differs. */
+static void set_reference(growth_def *def, bool on)
+{
+    def->integer_division = on;
+    def->coarse_level_gates = on;
+    def->at_cell_center = on;
 }
 
 /* ---- oracles ---- */
@@ -68,23 +76,23 @@ static void two_candidates_in_one_cell(void **state) /* T6 */
     }
     set_gradient(&sc, 0, 3e-4f); /* passes 2e-4, not 4e-4 */
     set_gradient(&sc, 2, 3e-4f);
-    adjust_def def = adjust_def_default();
+    growth_def def = growth_def_default();
     def.voxel_size = 1.0f;
     keep_all(&def, 4);
-    adjust_result r;
-    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    growth_result r;
+    assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
     assert_int_equal(r.grown, 1);
     assert_int_equal(r.pruned, 0);
     assert_int_equal(r.count, 3);
     assert_int_equal(sc.a.count, 3);
     assert_int_equal(sc.s.count, 3);
-    assert_true(r.source[0] == 0 && r.source[1] == 1 && r.source[2] == -1);
+    assert_true(r.survivors == 2 && r.source[0] == 0 && r.source[1] == 1);
     assert_true(sc.a.position[6] == 17.0f && sc.a.position[7] == 0.0f && sc.a.position[8] == 0.0f);
     for (size_t c = 0; c < 6; c++)
         assert_true(fabs((double)sc.a.scale_log[12 + c] - log(16.0)) < 1e-6 && sc.a.offset[12 + c] == 0.0f);
     for (size_t i = 0; i < 32; i++)
         assert_true(sc.a.feature[64 + i] == fmaxf(sc.a.feature[i], sc.a.feature[32 + i]));
-    assert_true(sc.s.visit_count[2] == 0 && sc.s.use_accum[2] == 0 && sc.s.grad_count[4] == 0 &&
+    assert_true(sc.s.visit_count[2] == 0 && sc.s.importance_accum[2] == 0 && sc.s.grad_count[4] == 0 &&
                 sc.s.grad_accum[5] == 0);
     free_scene(&sc, &r);
 }
@@ -108,16 +116,16 @@ static void prunes(void **state)
 {
     const prune_case *c = *state;
     scene sc = empty_scene(2, 1); /* anchor 0 keeps the scene from becoming empty */
-    sc.s.use_accum[1] = c->accum;
+    sc.s.importance_accum[1] = c->accum;
     sc.s.visit_count[1] = c->visits;
-    adjust_def def = adjust_def_default();
+    growth_def def = growth_def_default();
     def.voxel_size = 1.0f;
-    adjust_result r;
-    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    growth_result r;
+    assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
     assert_int_equal(r.pruned, c->pruned);
     assert_int_equal(sc.a.count, c->pruned ? 1 : 2);
     if (!c->pruned) {
-        assert_true(sc.s.use_accum[1] == (c->reset ? 0 : c->accum));
+        assert_true(sc.s.importance_accum[1] == (c->reset ? 0 : c->accum));
         assert_true(sc.s.visit_count[1] == (c->reset ? 0 : c->visits));
     }
     free_scene(&sc, &r);
@@ -148,11 +156,11 @@ static void grows(void **state)
     sc.a.offset[1] = 50.0f; /* cells 6 (96), 26 (104), 102: three different places */
     sc.s.grad_count[0] = c->views;
     sc.s.grad_accum[0] = c->gradient * c->views;
-    adjust_def def = adjust_def_default();
+    growth_def def = growth_def_default();
     def.voxel_size = 1.0f;
     keep_all(&def, 1);
-    adjust_result r;
-    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    growth_result r;
+    assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
     assert_int_equal(r.grown, c->grown);
     if (c->reset)
         assert_true(sc.s.grad_count[0] == 0 && sc.s.grad_accum[0] == 0);
@@ -171,12 +179,12 @@ static void levels_have_their_own_cells_and_thresholds(void **state)
         scene sc = empty_scene(1, 1);
         sc.a.offset[0] = 102.0f;
         set_gradient(&sc, 0, gradients[passes]);
-        adjust_def def = adjust_def_default();
+        growth_def def = growth_def_default();
         def.voxel_size = 1.0f;
-        def.compat = true;
+        set_reference(&def, true);
         keep_all(&def, 1);
-        adjust_result r;
-        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        growth_result r;
+        assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
         assert_int_equal(r.grown, passes + 1);
         for (size_t i = 0; i <= passes; i++)
             assert_true(sc.a.position[3 + 3 * i] == expected[passes][i]);
@@ -185,49 +193,49 @@ static void levels_have_their_own_cells_and_thresholds(void **state)
         sc = empty_scene(1, 1);
         sc.a.offset[0] = 102.0f;
         set_gradient(&sc, 0, gradients[passes]);
-        def.compat = false;
-        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        set_reference(&def, false);
+        assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
         assert_int_equal(r.grown, 1);
         assert_true(sc.a.position[3] == 102.0f);
         free_scene(&sc, &r);
     }
 }
 
-static void a_silent_coarse_level_gates_only_in_compat_mode(void **state)
+static void a_silent_coarse_level_gates_only_by_the_reference_rule(void **state)
 {
     (void)state;
-    for (int compat = 0; compat <= 1; compat++) {
+    for (int reference = 0; reference <= 1; reference++) {
         scene sc = empty_scene(1, 1);
         sc.a.offset[0] = 7.0f; /* the coarse cell is the anchor's own; the finer ones are free */
         set_gradient(&sc, 0, 1.0f);
-        adjust_def def = adjust_def_default();
+        growth_def def = growth_def_default();
         def.voxel_size = 1.0f;
-        def.compat = compat == 1;
+        set_reference(&def, reference == 1);
         keep_all(&def, 1);
-        adjust_result r;
-        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
-        assert_int_equal(r.grown, compat == 1 ? 0 : 1);
+        growth_result r;
+        assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
+        assert_int_equal(r.grown, reference == 1 ? 0 : 1);
         free_scene(&sc, &r);
     }
 }
 
-static void cells_finer_than_one_exist_only_outside_compat_mode(void **state)
+static void cells_finer_than_one_exist_only_without_integer_division(void **state)
 {
     (void)state; /* init_factor 4: cells 4, 1 and then 0 in the reference's integers, 0.25 in ours */
-    for (int compat = 0; compat <= 1; compat++) {
+    for (int reference = 0; reference <= 1; reference++) {
         scene sc = empty_scene(2, 1);
         sc.a.offset[0] = 11.3f;
         sc.a.position[3] = 11.0f; /* in its cells of 4 and 1, not in that of 0.25 */
         set_gradient(&sc, 0, 1.0f);
-        adjust_def def = adjust_def_default();
+        growth_def def = growth_def_default();
         def.voxel_size = 1.0f;
         def.init_factor = 4;
-        def.compat = compat == 1;
+        set_reference(&def, reference == 1);
         keep_all(&def, 2);
-        adjust_result r;
-        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
-        assert_int_equal(r.grown, compat == 1 ? 0 : 1);
-        if (compat == 0)
+        growth_result r;
+        assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
+        assert_int_equal(r.grown, reference == 1 ? 0 : 1);
+        if (reference == 0)
             assert_true(sc.a.position[6] == 11.3f && fabs((double)sc.a.scale_log[12] - log(0.25)) < 1e-6);
         free_scene(&sc, &r);
     }
@@ -242,12 +250,12 @@ static void cells_round_half_to_even(void **state)
         scene sc = empty_scene(1, 1);
         sc.a.offset[0] = at[i];
         set_gradient(&sc, 0, 3e-4f);
-        adjust_def def = adjust_def_default();
+        growth_def def = growth_def_default();
         def.voxel_size = 1.0f;
-        def.compat = true;
+        set_reference(&def, true);
         keep_all(&def, 1);
-        adjust_result r;
-        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        growth_result r;
+        assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
         assert_int_equal(r.grown, 1);
         assert_true(sc.a.position[3] == expected[i]);
         free_scene(&sc, &r);
@@ -262,12 +270,12 @@ static void shape_scales_are_cut(void **state)
     for (size_t c = 0; c < 6; c++)
         sc.a.scale_log[c] = c == 4 ? -1.0f : 0.5f;
     set_gradient(&sc, 0, 2.5e-4f);
-    adjust_def def = adjust_def_default();
+    growth_def def = growth_def_default();
     def.voxel_size = 1.0f;
     def.shape_log_max = 0.05f;
     keep_all(&def, 1);
-    adjust_result r;
-    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    growth_result r;
+    assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
     const float expected[6] = {0.5f, 0.5f, 0.5f, 0.05f, -1.0f, 0.05f};
     assert_memory_equal(sc.a.scale_log, expected, sizeof expected);
     assert_int_equal(r.count, 2);
@@ -281,13 +289,13 @@ static void the_last_anchor_stays(void **state)
     scene sc = empty_scene(3, 1);
     for (size_t i = 0; i < 3; i++) {
         sc.s.visit_count[i] = 100;
-        sc.s.use_accum[i] = i == 1 ? 0.2f : 0.1f;
+        sc.s.importance_accum[i] = i == 1 ? 0.2f : 0.1f;
         sc.a.position[i * 3] = (float)i;
     }
-    adjust_def def = adjust_def_default();
+    growth_def def = growth_def_default();
     def.voxel_size = 1.0f;
-    adjust_result r;
-    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    growth_result r;
+    assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
     assert_int_equal(r.count, 1);
     assert_int_equal(r.pruned, 2);
     assert_int_equal(r.source[0], 1); /* the most opaque of them */
@@ -303,13 +311,13 @@ static void parts_can_be_switched_off(void **state)
         sc.a.offset[0] = 17.0f;
         set_gradient(&sc, 0, 2.5e-4f);
         sc.s.visit_count[1] = 100;
-        adjust_def def = adjust_def_default();
+        growth_def def = growth_def_default();
         def.voxel_size = 1.0f;
         def.grow = mode & 1;
         def.prune = mode & 2;
         keep_all(&def, 2);
-        adjust_result r;
-        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        growth_result r;
+        assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
         assert_int_equal(r.grown, mode & 1);
         assert_int_equal(r.pruned, mode >> 1);
         assert_true(sc.s.grad_count[0] == (def.grow ? 0.0f : 50.0f)); /* what was not used is kept */
@@ -344,12 +352,12 @@ static void the_cap_takes_the_largest_gradients(void **state)
             set_gradient(&sc, i, 2e-4f + gradients[i] * 1e-5f);
         }
         sc.s.visit_count[6] = 100;
-        adjust_def def = adjust_def_default();
+        growth_def def = growth_def_default();
         def.voxel_size = 1.0f;
         def.max_anchors = cases[t].max_anchors;
         keep_all(&def, 6);
-        adjust_result r;
-        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        growth_result r;
+        assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
         assert_int_equal(r.pruned, 1);
         assert_int_equal(r.grown, cases[t].expected_count);
         for (size_t i = 0; i < r.grown; i++)
@@ -370,12 +378,12 @@ static void a_cell_is_worth_its_best_candidate(void **state)
             sc.a.offset[i * 3] = to[i];
             set_gradient(&sc, i, gradients[i]);
         }
-        adjust_def def = adjust_def_default();
+        growth_def def = growth_def_default();
         def.voxel_size = 1.0f;
         def.max_anchors = 4;
         keep_all(&def, 3);
-        adjust_result r;
-        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        growth_result r;
+        assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
         assert_int_equal(r.count, 4);
         assert_true(sc.a.position[9] == (order == 0 ? 33.0f : 32.0f));
         free_scene(&sc, &r);
@@ -410,7 +418,7 @@ static size_t keep_standing(brute_anchor *added, size_t count,
     for (size_t i = 0; i < count; i++) {
         const float at[3] = {(float)added[i].position[0], (float)added[i].position[1],
                              (float)added[i].position[2]};
-        if (may_stand == NULL || may_stand(NULL, at))
+        if (may_stand(NULL, at))
             added[kept++] = added[i];
     }
     return kept;
@@ -418,23 +426,26 @@ static size_t keep_standing(brute_anchor *added, size_t count,
 
 /* New anchors as the text says it, with quadratic searches; voxel sizes are powers of two, so that cells are
    exact in both. */
-static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *added)
+static size_t brute_grow(const scene *sc, const growth_def *def, brute_anchor *added)
 {
     const size_t offsets = (size_t)sc->a.offset_count;
     size_t count = 0;
-    for (int level = 0; level < (def->compat ? 3 : 4); level++) { /* Gaussians, then places */
-        const double cell = (double)def->voxel_size * (double[4]){16, 4, 1, 0.25}[level];
-        const bool as_start = def->place_scale != NULL;
+    for (int level = 0; level < 4; level++) { /* Gaussians, then places */
+        const double factor = (double[4]){16, 4, 1, 0.25}[level];
+        const double cell = (double)def->voxel_size * (def->integer_division ? floor(factor) : factor);
+        if (!(cell > 0))
+            continue;
+        const bool as_start = def->points.as_start;
         const double threshold = (double)def->grad_threshold * (double[4]){1, 2, 4, as_start ? 1 : 4}[level];
         const size_t begin = count;
-        if (def->compat && level > 0 && count == 0)
+        if (def->coarse_level_gates && level > 0 && count == 0)
             break;
         const size_t slots = sc->a.count * offsets;
         const bool is_place = level == 3;
-        for (size_t n = is_place ? slots : 0; n < slots + (is_place ? def->place_count : 0); n++) {
-            const size_t p = n - slots, i = is_place ? def->place_anchor[p] : n / offsets;
+        for (size_t n = is_place ? slots : 0; n < slots + (is_place ? def->points.count : 0); n++) {
+            const size_t p = n - slots, i = is_place ? def->points.anchor[p] : n / offsets;
             brute_anchor b = {.scale = !is_place  ? cell
-                                       : as_start ? (double)def->place_scale[p]
+                                       : as_start ? (double)def->points.scale[p]
                                                   : 4 * cell,
                               .gradient = -1};
             for (size_t slot = is_place ? i * offsets : n; slot < (is_place ? (i + 1) * offsets : n + 1);
@@ -445,10 +456,10 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
                 continue;
             for (size_t c = 0; c < 3; c++) {
                 const float *anchor = &sc->a.position[i * 3 + c], *scale_log = &sc->a.scale_log[i * 6 + c];
-                const float at = is_place ? def->place[p * 3 + c]
+                const float at = is_place ? def->points.position[p * 3 + c]
                                           : *anchor + sc->a.offset[n * 3 + c] * activation_exp(*scale_log);
                 b.center[c] = rint((double)at / cell) * cell;
-                b.position[c] = def->compat ? b.center[c] : (double)at;
+                b.position[c] = def->at_cell_center ? b.center[c] : (double)at;
             }
             bool taken = false;
             for (size_t j = 0; j < sc->a.count + begin; j++) {
@@ -477,7 +488,8 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
             for (size_t f = 0; f < 32; f++)
                 added[known].feature[f] = fmax(added[known].feature[f], (double)sc->a.feature[i * 32 + f]);
         }
-        count = begin + keep_standing(added + begin, count - begin, is_place ? NULL : def->may_stand);
+        count =
+            begin + keep_standing(added + begin, count - begin, is_place ? growth_anywhere : def->may_stand);
         qsort(added + begin, count - begin, sizeof *added, by_place);
     }
     return count;
@@ -486,10 +498,10 @@ static size_t brute_grow(const scene *sc, const adjust_def *def, brute_anchor *a
 static scene random_scene(uint64_t seed, size_t count, int offset_count)
 {
     scene sc = {.a = random_anchors(count, offset_count, seed)};
-    assert_ok(adjust_stats_resize(&sc.s, count, offset_count, NULL));
+    assert_ok(growth_stats_resize(&sc.s, count, offset_count, NULL));
     for (size_t i = 0; i < count; i++) {
         sc.s.visit_count[i] = floorf(spread(seed, 50, i, 0, 160));
-        sc.s.use_accum[i] = sc.s.visit_count[i] * spread(seed, 51, i, 0, 0.02f);
+        sc.s.importance_accum[i] = sc.s.visit_count[i] * spread(seed, 51, i, 0, 0.02f);
     }
     for (size_t i = 0; i < count * (size_t)offset_count; i++) {
         sc.s.grad_count[i] = floorf(spread(seed, 52, i, 0, 80));
@@ -498,7 +510,7 @@ static scene random_scene(uint64_t seed, size_t count, int offset_count)
     return sc;
 }
 
-static void adjust_agrees_with_brute_force(void **state)
+static void rounds_agree_with_brute_force(void **state)
 {
     (void)state;
     size_t at_places = 0, total_grown = 0, total_pruned = 0, total_gated = 0;
@@ -506,36 +518,39 @@ static void adjust_agrees_with_brute_force(void **state)
         const size_t count = 1 + (size_t)spread(seed, 60, 0, 0, 60);
         const int offset_count = 1 + (int)spread(seed, 61, 0, 0, 5);
         scene sc = random_scene(seed, count, offset_count), before = random_scene(seed, count, offset_count);
-        adjust_def def = adjust_def_default();
+        growth_def def = growth_def_default();
         def.voxel_size = seed % 3 == 0 ? 0.5f : seed % 3 == 1 ? 0.03125f : 0.00390625f;
         def.seed = seed;
         def.step = 100 * seed;
-        def.compat = seed % 2 == 1;
-        def.may_stand = seed % 5 == 0 ? right_of_the_middle : NULL;
+        def.integer_division = seed % 2 == 1;
+        def.coarse_level_gates = seed / 2 % 2 == 1;
+        def.at_cell_center = seed / 4 % 2 == 1;
+        def.may_stand = seed % 5 == 0 ? right_of_the_middle : growth_anywhere;
         float place[40][3], place_scale[40];
         uint32_t place_anchor[40];
-        def.place = place[0];
-        def.place_scale = seed % 4 < 2 ? place_scale : NULL;
-        def.place_anchor = place_anchor;
-        def.place_count = (size_t)spread(seed, 62, 0, 0, 40);
-        for (size_t p = 0; p < def.place_count; p++) {
+        def.points.position = place[0];
+        def.points.as_start = seed % 4 < 2;
+        def.points.scale = place_scale;
+        def.points.anchor = place_anchor;
+        def.points.count = (size_t)spread(seed, 62, 0, 0, 40);
+        for (size_t p = 0; p < def.points.count; p++) {
             place_anchor[p] = (uint32_t)(rng_uniform(seed, 63, p) * (float)count);
             place_scale[p] = spread(seed, 67, p, 0.01f, 1);
             for (size_t c = 0; c < 3; c++)
                 place[p][c] = spread(seed, 64 + c, p, -1, 1);
         }
         brute_anchor *added =
-            mem_calloc(3 * (count * (size_t)offset_count + def.place_count), sizeof *added, "test", NULL);
+            mem_calloc(3 * (count * (size_t)offset_count + def.points.count), sizeof *added, "test", NULL);
         const size_t grown = brute_grow(&before, &def, added);
         total_gated += grown == 0;
-        adjust_result r;
-        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        growth_result r;
+        assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
         if (r.grown != grown)
             fail_msg("seed %llu: %zu grown, not %zu", (unsigned long long)seed, r.grown, grown);
         total_grown += grown;
         total_pruned += r.pruned;
         for (size_t g = 0; g < grown; g++)
-            for (size_t p = 0; p < def.place_count; p++)
+            for (size_t p = 0; p < def.points.count; p++)
                 at_places += added[g].position[0] == (double)place[p][0] &&
                              added[g].position[1] == (double)place[p][1];
         assert_true(r.count == sc.a.count && r.count == sc.s.count && r.count >= 1 &&
@@ -544,9 +559,9 @@ static void adjust_agrees_with_brute_force(void **state)
         const size_t k = (size_t)offset_count;
         for (size_t i = 0; i < count; i++) {
             const bool is_judged = before.s.visit_count[i] > 80;
-            const bool transparent = before.s.use_accum[i] < 0.005f * before.s.visit_count[i];
-            if (is_judged && transparent &&
-                (row >= r.count || r.source[row] != (int64_t)i)) /* the last one may have stayed */
+            const bool transparent = before.s.importance_accum[i] < 0.005f * before.s.visit_count[i];
+            if (is_judged && transparent && (row >= r.survivors || r.source[row] != i)) /* the last one may
+                                                                                           have stayed */
                 continue;
             assert_int_equal(r.source[row], i);
             assert_memory_equal(sc.a.feature + row * 32, before.a.feature + i * 32, 32 * sizeof(float));
@@ -555,7 +570,7 @@ static void adjust_agrees_with_brute_force(void **state)
             assert_memory_equal(sc.a.scale_log + row * 6, before.a.scale_log + i * 6, 6 * sizeof(float));
             assert_memory_equal(sc.a.position + row * 3, before.a.position + i * 3, 3 * sizeof(float));
             assert_true(sc.s.visit_count[row] == (is_judged ? 0 : before.s.visit_count[i]));
-            assert_true(sc.s.use_accum[row] == (is_judged ? 0 : before.s.use_accum[i]));
+            assert_true(sc.s.importance_accum[row] == (is_judged ? 0 : before.s.importance_accum[i]));
             for (size_t j = 0; j < k; j++) {
                 const bool sampled = before.s.grad_count[i * k + j] > 40;
                 assert_true(sc.s.grad_count[row * k + j] == (sampled ? 0 : before.s.grad_count[i * k + j]));
@@ -563,9 +578,9 @@ static void adjust_agrees_with_brute_force(void **state)
             }
             row++;
         }
+        assert_int_equal(row, r.survivors);
         assert_int_equal(row + grown, r.count);
         for (size_t i = 0; i < grown; i++, row++) {
-            assert_int_equal(r.source[row], -1);
             for (size_t c = 0; c < 3; c++)
                 assert_true((double)sc.a.position[row * 3 + c] == added[i].position[c]);
             for (size_t f = 0; f < 32; f++)
@@ -587,12 +602,12 @@ static void the_cap_holds_for_random_scenes(void **state)
     for (uint64_t seed = 0; seed < 40; seed++) {
         for (size_t cap = 0; cap < 140; cap += 20) {
             scene sc = random_scene(seed, 50, 4);
-            adjust_def def = adjust_def_default();
+            growth_def def = growth_def_default();
             def.voxel_size = 0.03125f;
             def.seed = seed;
             def.max_anchors = cap;
-            adjust_result r;
-            assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+            growth_result r;
+            assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
             assert_true(sc.a.count <= cap || r.grown == 0);
             assert_int_equal(50 + r.grown - r.pruned, sc.a.count);
             free_scene(&sc, &r);
@@ -600,18 +615,18 @@ static void the_cap_holds_for_random_scenes(void **state)
     }
 }
 
-static uint64_t adjust_hash(uint64_t seed)
+static uint64_t round_hash(uint64_t seed)
 {
     scene sc = random_scene(7, 400, 10);
-    adjust_def def = adjust_def_default();
+    growth_def def = growth_def_default();
     def.voxel_size = 0.01f;
     def.seed = seed;
     def.max_anchors = 1500;
-    adjust_result r;
-    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    growth_result r;
+    assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
     uint64_t hash = hash_bytes(1, sc.a.position, sc.a.count * 3 * sizeof(float));
     hash = hash_bytes(hash, sc.a.feature, sc.a.count * 32 * sizeof(float));
-    hash = hash_bytes(hash, r.source, r.count * sizeof *r.source);
+    hash = hash_bytes(hash, r.source, r.survivors * sizeof *r.source);
     hash = hash_bytes(hash, sc.s.grad_accum, sc.s.count * 10 * sizeof(float));
     free_scene(&sc, &r);
     return hash;
@@ -622,10 +637,10 @@ static void same_bits_for_all_threads(void **state)
     (void)state;
     const int before = parallel_threads();
     parallel_set_threads(1);
-    const uint64_t want = adjust_hash(5);
+    const uint64_t want = round_hash(5);
     parallel_set_threads(4);
-    assert_true(adjust_hash(5) == want);
-    assert_true(adjust_hash(6) != want);
+    assert_true(round_hash(5) == want);
+    assert_true(round_hash(6) != want);
     parallel_set_threads(before);
 }
 
@@ -639,16 +654,16 @@ static void an_explosion_is_capped(void **state)
         for (size_t cap = COUNT; cap <= COUNT + 300; cap += 100) {
             scene capped = random_scene(77, COUNT, OFFSETS), whole = random_scene(77, COUNT, OFFSETS);
             scene *const both[2] = {&capped, &whole};
-            adjust_result r[2];
+            growth_result r[2];
             for (int i = 0; i < 2; i++) {
                 for (size_t slot = 0; slot < SLOTS; slot++)
                     set_gradient(both[i], slot, equal ? 1.0f : spread(78, 0, slot, 0, 1));
-                adjust_def def = adjust_def_default();
+                growth_def def = growth_def_default();
                 def.voxel_size = 0.01f;
                 def.grad_threshold = 0.0f;
                 def.prune = false;
                 def.max_anchors = i == 0 ? cap : SIZE_MAX;
-                assert_ok(anchors_adjust(&both[i]->a, &both[i]->s, &def, &r[i], NULL));
+                assert_ok(growth_round(&both[i]->a, &both[i]->s, &def, &r[i], NULL));
             }
             assert_true(r[1].count > COUNT + 300);
             assert_int_equal(r[0].count, cap);
@@ -677,12 +692,12 @@ static void far_cells_have_addresses(void **state)
         sc.a.offset[3 * i + 1] = i == 0 ? 8.0f : -8.0f;
         set_gradient(&sc, i, 1.0f);
     }
-    adjust_def def = adjust_def_default();
+    growth_def def = growth_def_default();
     def.voxel_size = 0.001f / 16.0f;
     def.level_count = 1;
     keep_all(&def, 2);
-    adjust_result r;
-    assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+    growth_result r;
+    assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
     assert_int_equal(r.grown, 2);
     assert_true(fabsf(sc.a.position[6] + 4.5e6f) <= 0.5f && fabsf(sc.a.position[9] - 4.5e6f) <= 0.5f);
     assert_true(fabsf(sc.a.position[7] + 8.0f) < 0.001f && fabsf(sc.a.position[10] - 8.0f) < 0.001f);
@@ -703,11 +718,11 @@ static void wild_places_and_cells(void **state)
             set_gradient(&sc, i, 1.0f);
         }
         sc.a.position[3] = 3e38f;
-        adjust_def def = adjust_def_default();
+        growth_def def = growth_def_default();
         def.voxel_size = cells[t];
         keep_all(&def, 4);
-        adjust_result r;
-        assert_ok(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL));
+        growth_result r;
+        assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
         for (size_t i = 0; i < r.grown * 3; i++)
             assert_true(isfinite(sc.a.position[12 + i]));
         if (t >= 1 && t <= 4)
@@ -720,12 +735,12 @@ static void wrong_arguments_are_refused(void **state)
 {
     (void)state;
     scene sc = empty_scene(3, 2);
-    adjust_result r;
+    growth_result r;
     gbt_error err = {0};
-    adjust_def def = adjust_def_default();
+    growth_def def = growth_def_default();
     def.voxel_size = 1.0f;
     for (int t = 0; t < 5; t++) {
-        adjust_def wrong = def;
+        growth_def wrong = def;
         if (t == 0)
             wrong.level_count = 9;
         else if (t == 1)
@@ -736,13 +751,13 @@ static void wrong_arguments_are_refused(void **state)
             wrong.grad_threshold = NAN;
         else
             wrong.shape_log_max = NAN;
-        assert_int_equal(anchors_adjust(&sc.a, &sc.s, &wrong, &r, &err), GBT_ERR_ARGUMENT);
+        assert_int_equal(growth_round(&sc.a, &sc.s, &wrong, &r, &err), GBT_ERR_ARGUMENT);
         assert_null(r.source);
     }
     assert_string_not_equal(err.text, "");
-    assert_ok(adjust_stats_resize(&sc.s, 2, 2, NULL));
-    assert_int_equal(anchors_adjust(&sc.a, &sc.s, &def, &r, NULL), GBT_ERR_ARGUMENT);
-    assert_int_equal(adjust_stats_resize(&sc.s, 2, 3, NULL), GBT_ERR_ARGUMENT);
+    assert_ok(growth_stats_resize(&sc.s, 2, 2, NULL));
+    assert_int_equal(growth_round(&sc.a, &sc.s, &def, &r, NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(growth_stats_resize(&sc.s, 2, 3, NULL), GBT_ERR_ARGUMENT);
     free_scene(&sc, NULL);
 }
 
@@ -754,12 +769,12 @@ static void no_memory_changes_nothing(void **state)
         scene sc = random_scene(3, 40, 4);
         const uint64_t before =
             hash_bytes(hash_bytes(1, sc.a.feature, 40 * 32 * 4), sc.s.grad_count, 40 * 4 * 4);
-        adjust_def def = adjust_def_default();
+        growth_def def = growth_def_default();
         def.voxel_size = 0.03125f;
-        adjust_result r;
+        growth_result r;
         gbt_error err = {0};
         mem_fail_after(n);
-        const gbt_status status = anchors_adjust(&sc.a, &sc.s, &def, &r, &err);
+        const gbt_status status = growth_round(&sc.a, &sc.s, &def, &r, &err);
         mem_fail_after(-1);
         if (status != GBT_OK) {
             assert_int_equal(status, GBT_ERR_NO_MEMORY);
@@ -777,19 +792,19 @@ static void no_memory_changes_nothing(void **state)
 static void statistics_follow_rows(void **state)
 {
     (void)state;
-    adjust_stats s = {0};
-    assert_ok(adjust_stats_resize(&s, 3, 2, NULL));
+    growth_stats s = {0};
+    assert_ok(growth_stats_resize(&s, 3, 2, NULL));
     for (size_t i = 0; i < 6; i++) {
         s.grad_accum[i] = (float)i;
         s.visit_count[i / 2] = (float)i;
     }
-    assert_ok(adjust_stats_resize(&s, 100, 2, NULL));
+    assert_ok(growth_stats_resize(&s, 100, 2, NULL));
     assert_true(s.grad_accum[5] == 5 && s.visit_count[2] == 5 && s.grad_accum[6] == 0 &&
                 s.grad_accum[199] == 0 && s.visit_count[99] == 0);
-    assert_ok(adjust_stats_resize(&s, 2, 2, NULL));
-    assert_ok(adjust_stats_resize(&s, 3, 2, NULL));
+    assert_ok(growth_stats_resize(&s, 2, 2, NULL));
+    assert_ok(growth_stats_resize(&s, 3, 2, NULL));
     assert_true(s.grad_accum[3] == 3 && s.grad_accum[4] == 0 && s.visit_count[2] == 0);
-    adjust_stats_free(&s);
+    growth_stats_free(&s);
     assert_int_equal(s.count, 0);
 }
 
@@ -806,15 +821,15 @@ int main(void)
     const struct CMUnitTest single[] = {
         cmocka_unit_test(two_candidates_in_one_cell),
         cmocka_unit_test(levels_have_their_own_cells_and_thresholds),
-        cmocka_unit_test(a_silent_coarse_level_gates_only_in_compat_mode),
-        cmocka_unit_test(cells_finer_than_one_exist_only_outside_compat_mode),
+        cmocka_unit_test(a_silent_coarse_level_gates_only_by_the_reference_rule),
+        cmocka_unit_test(cells_finer_than_one_exist_only_without_integer_division),
         cmocka_unit_test(cells_round_half_to_even),
         cmocka_unit_test(shape_scales_are_cut),
         cmocka_unit_test(the_last_anchor_stays),
         cmocka_unit_test(parts_can_be_switched_off),
         cmocka_unit_test(the_cap_takes_the_largest_gradients),
         cmocka_unit_test(a_cell_is_worth_its_best_candidate),
-        cmocka_unit_test(adjust_agrees_with_brute_force),
+        cmocka_unit_test(rounds_agree_with_brute_force),
         cmocka_unit_test(the_cap_holds_for_random_scenes),
         cmocka_unit_test(same_bits_for_all_threads),
         cmocka_unit_test(an_explosion_is_capped),
@@ -826,5 +841,5 @@ int main(void)
     };
     for (size_t i = 0; i < sizeof single / sizeof *single; i++)
         tests[count++] = single[i];
-    return _cmocka_run_group_tests("adjust", tests, count, NULL, NULL);
+    return _cmocka_run_group_tests("growth", tests, count, NULL, NULL);
 }

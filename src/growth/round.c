@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* growth/round.c -- one round: where the scene needs more anchors, and which ones it can do without.
+
+   statistics --> candidates (from_*.c) --> cells (search.c) --> new anchors ---+
+        |                                                                       +--> survivors, then new rows
+        +--> judged and unimportant (pruning.c) --> pruned ---------------------+
+
+   Everything is decided and allocated before the first row moves, so a failure leaves anchors and statistics
+   as they were. */
+#include "growth/growth.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "growth/pruning.h"
+#include "growth/sources.h"
+
+bool growth_anywhere(const void *context, const float position[3])
+{
+    (void)context;
+    (void)position;
+    return true;
+}
+
+growth_def growth_def_default(void)
+{
+    return (growth_def){.voxel_size = 0.0f,
+                        .level_count = 3,
+                        .init_factor = 16,
+                        .hierarchy_factor = 4,
+                        .grad_threshold = 2e-4f,
+                        .importance_min = 0.005f,
+                        .interval = 100.0f,
+                        .success_threshold = 0.8f,
+                        .shape_log_max = INFINITY,
+                        .max_anchors = SIZE_MAX,
+                        .seed = 0,
+                        .step = 0,
+                        .grow = true,
+                        .prune = true,
+                        .may_stand = growth_anywhere};
+}
+
+static gbt_status check_arguments(const anchors *a, const growth_stats *stats, const growth_def *def,
+                                  gbt_error *err)
+{
+    if (stats->count != a->count || (a->count > 0 && stats->offset_count != a->offset_count))
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "growth: statistics of %zu anchors with %d offsets (wanted %zu, %d)", stats->count,
+                         stats->offset_count, a->count, a->offset_count);
+    if (a->count > UINT32_MAX / ANCHOR_MAX_OFFSETS)
+        return base_fail(err, GBT_ERR_NO_MEMORY, "growth: %zu anchors (wanted at most %u)", a->count,
+                         (unsigned)(UINT32_MAX / ANCHOR_MAX_OFFSETS));
+    if (def->level_count < 0 || def->level_count > GROWTH_MAX_LEVELS || def->init_factor < 1 ||
+        def->hierarchy_factor < 1)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "growth: %d levels, factors %d and %d (wanted 0 to %d, and both at least 1)",
+                         def->level_count, def->init_factor, def->hierarchy_factor, GROWTH_MAX_LEVELS);
+    for (size_t p = 0; p < def->points.count; p++)
+        if (def->points.anchor[p] >= a->count)
+            return base_fail(err, GBT_ERR_ARGUMENT, "growth: point %zu is anchor %u's (wanted below %zu)", p,
+                             (unsigned)def->points.anchor[p], a->count);
+    if (!(def->grad_threshold >= 0.0f) || !(def->interval >= 0.0f) || !(def->success_threshold >= 0.0f) ||
+        isnan(def->shape_log_max))
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "growth: threshold %g, interval %g, success %g (wanted all >= 0)",
+                         (double)def->grad_threshold, (double)def->interval, (double)def->success_threshold);
+    return GBT_OK;
+}
+
+/* Survivors move up in their order; their statistics are reset where they were used. */
+static size_t compact(anchors *a, growth_stats *s, const growth_def *def, const bool *pruned, size_t *source)
+{
+    const size_t offsets = (size_t)a->offset_count, before = a->count;
+    size_t to = 0;
+    for (size_t i = 0; i < before; i++) {
+        if (pruned[i])
+            continue;
+        source[to] = i;
+        rows_move(a->field, anchor_fields, ANCHOR_FIELDS, a->offset_count, to, a->field, i);
+        const bool used = def->prune && growth_is_judged(def, s->visit_count[i]);
+        s->importance_accum[to] = used ? 0.0f : s->importance_accum[i];
+        s->visit_count[to] = used ? 0.0f : s->visit_count[i];
+        for (size_t k = 0; k < offsets; k++) {
+            const bool sampled = def->grow && growth_well_sampled(def, s->grad_count[i * offsets + k]);
+            s->grad_accum[to * offsets + k] = sampled ? 0.0f : s->grad_accum[i * offsets + k];
+            s->grad_count[to * offsets + k] = sampled ? 0.0f : s->grad_count[i * offsets + k];
+        }
+        to++;
+    }
+    return to;
+}
+
+/* Rows are zero but for what is set here. */
+static void append(anchors *a, const new_anchors *n, size_t first)
+{
+    for (size_t i = 0; i < n->count; i++) {
+        const new_anchor *f = &n->rows[i];
+        const size_t row = first + i;
+        memcpy(a->position + row * 3, f->position, sizeof f->position);
+        memcpy(a->feature + row * ANCHOR_FEATURE_DIM, n->feature + f->feature * ANCHOR_FEATURE_DIM,
+               ANCHOR_FEATURE_DIM * sizeof(float));
+        for (size_t c = 0; c < 6; c++)
+            a->scale_log[row * 6 + c] = (float)log((double)f->scale);
+    }
+}
+
+/* With what was decided: the room is made first, then nothing can fail. */
+static gbt_status apply(anchors *a, growth_stats *stats, const growth_def *def, const new_anchors *n,
+                        const bool *pruned, size_t survivors, growth_result *out, gbt_error *err)
+{
+    const size_t before = a->count, after = survivors + n->count, widest = after > before ? after : before;
+    size_t *source = mem_alloc(survivors, sizeof *source, "growth", err);
+    gbt_status status = source == NULL ? GBT_ERR_NO_MEMORY : anchors_resize(a, widest, err);
+    if (status == GBT_OK)
+        status = growth_stats_resize(stats, widest, a->offset_count, err);
+    a->count = before;
+    if (status != GBT_OK) {
+        mem_free(source);
+        return status;
+    }
+    a->count = stats->count = compact(a, stats, def, pruned, source);
+    (void)anchors_resize(a, after, NULL);
+    (void)growth_stats_resize(stats, after, a->offset_count, NULL);
+    append(a, n, survivors);
+    for (size_t i = 0; i < after; i++)
+        for (size_t c = 3; c < 6; c++)
+            a->scale_log[i * 6 + c] = fminf(a->scale_log[i * 6 + c], def->shape_log_max);
+    *out = (growth_result){.grown = n->count,
+                           .pruned = before - survivors,
+                           .count = after,
+                           .survivors = survivors,
+                           .source = source};
+    return GBT_OK;
+}
+
+static gbt_status find_new_anchors(const anchors *a, const growth_stats *stats, const growth_def *def,
+                                   new_anchors *out, gbt_error *err)
+{
+    static gbt_status (*const sources[])(growth_search *, gbt_error *) = {
+#define X(source) source,
+        GROWTH_SOURCES(X)
+#undef X
+    };
+    growth_search search = {.a = a, .stats = stats, .def = def, .out = out};
+    gbt_status status = GBT_OK;
+    for (size_t i = 0; i < sizeof sources / sizeof *sources && status == GBT_OK; i++)
+        status = sources[i](&search, err);
+    growth_search_free(&search);
+    return status;
+}
+
+gbt_status growth_round(anchors *a, growth_stats *stats, const growth_def *def, growth_result *out,
+                        gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    GBT_TRY(check_arguments(a, stats, def, err));
+    new_anchors added = {0};
+    bool *pruned = mem_calloc(a->count, sizeof *pruned, "growth", err);
+    gbt_status status = pruned == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    if (status == GBT_OK && def->grow)
+        status = find_new_anchors(a, stats, def, &added, err);
+    if (status == GBT_OK) {
+        size_t most_important, survivors = growth_mark_pruned(stats, def, pruned, &most_important);
+        /* The cap counts the room that pruning makes; it never removes an anchor by itself. */
+        new_anchors_keep_largest(&added, def->max_anchors > survivors ? def->max_anchors - survivors : 0);
+        const bool keep_last = survivors + added.count == 0 && a->count > 0;
+        if (keep_last) {
+            pruned[most_important] = false;
+            survivors = 1;
+        }
+        status = apply(a, stats, def, &added, pruned, survivors, out, err);
+        out->kept_last = keep_last && status == GBT_OK;
+    }
+    mem_free(pruned);
+    new_anchors_free(&added);
+    return status;
+}

@@ -1,0 +1,77 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* growth/search.h -- where growing would put anchors, and what they begin with: candidates of a level,
+   gathered in the cells of a grid; cells that hold no anchor yet get one. Nothing of the model changes here.
+ */
+#ifndef GBT_GROWTH_SEARCH_H
+#define GBT_GROWTH_SEARCH_H
+
+#include "growth/growth.h"
+
+typedef struct growth_candidate {
+    float position[3];
+    float scale;    /* of all three axes, of an anchor there */
+    float gradient; /* the largest of a cell wins */
+    size_t parent;  /* row of the anchors */
+} growth_candidate;
+
+typedef struct new_anchor {
+    float position[3];
+    float scale;
+    float gradient; /* of the candidate that it stands at */
+    int level;
+    int64_t at[3];  /* its cell in the grid of the level */
+    size_t feature; /* row of new_anchors.feature */
+} new_anchor;
+
+/** By level, then cell (x, y, z). Start from {0}; free with new_anchors_free() after success or failure. */
+typedef struct new_anchors {
+    new_anchor *rows;
+    size_t count, capacity;
+    float *feature; /* [feature_count][ANCHOR_FEATURE_DIM]: maxima over the parents of a cell's candidates;
+                       cells that hold an anchor already have rows too */
+    size_t feature_count, feature_capacity;
+} new_anchors;
+
+/** At most `room` stay: those with the largest gradients, ties by level, then cell. */
+void new_anchors_keep_largest(new_anchors *n, size_t room);
+void new_anchors_free(new_anchors *n);
+
+/** A search through one grid after the other, coarse to fine. Start from {.a, .stats, .def, .out}; free with
+    growth_search_free(). */
+typedef struct growth_search {
+    const anchors *a;
+    const growth_stats *stats; /* rows match `a` */
+    const growth_def *def;
+    new_anchors *out; /* of all levels so far */
+    int level;        /* the current one */
+    float size;       /* of its cells */
+    struct cell *cells;
+    size_t cell_count, cell_capacity;
+    uint32_t *table; /* hash -> cell + 1, 0 is empty; its size is a power of two, at least twice cell_count */
+    size_t table_size, table_capacity;
+} growth_search;
+
+float growth_cell_size(const growth_def *def, int level);
+float growth_level_threshold(const growth_def *def, int level);
+
+/** Was the Gaussian seen in enough views for its mean gradient to say something? */
+static inline bool growth_well_sampled(const growth_def *def, float grad_count)
+{
+    return grad_count > def->interval * def->success_threshold * 0.5f;
+}
+
+/** Start on an empty grid of the level; false when there is none, or the level is not to be searched. */
+bool growth_search_begin(growth_search *s, int level);
+
+/** Into its cell of the level; what has no cell is left out. GBT_OK or GBT_ERR_NO_MEMORY. */
+gbt_status growth_search_add(growth_search *s, const growth_candidate *c, gbt_error *err);
+
+/** An anchor for each cell that has candidates, holds no anchor yet, and may have one. GBT_OK or
+    GBT_ERR_NO_MEMORY. */
+gbt_status growth_search_end(growth_search *s,
+                             bool (*may_stand)(const void *context, const float position[3]),
+                             const void *context, gbt_error *err);
+
+void growth_search_free(growth_search *s);
+
+#endif

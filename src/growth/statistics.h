@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* growth/statistics.h -- what is gathered step by step of every anchor and Gaussian, to grow and prune by. */
+#ifndef GBT_GROWTH_STATISTICS_H
+#define GBT_GROWTH_STATISTICS_H
+
+#include "anchor/rows.h"
+#include "frame/frame.h"
+
+/** The arrays, listed once: X(name, name in checkpoints, per_offset, meaning). */
+#define GROWTH_STAT_LIST(X)                                                                                  \
+    X(importance_accum, "use_accum", false, "sum over views of the anchor's importance")                     \
+    X(visit_count, "visit_count", false, "views in which the anchor was visible")                            \
+    X(grad_accum, "grad_accum", true, "sum of screen-space gradient norms")                                  \
+    X(grad_count, "grad_count", true, "views in which the Gaussian was geometrically visible")
+
+enum {
+#define X(name, label, per_offset, meaning) GROWTH_STAT_##name,
+    GROWTH_STAT_LIST(X)
+#undef X
+        GROWTH_STATS
+};
+extern const row_field growth_stat_fields[GROWTH_STATS];
+
+/** Gathered between two rounds. Row counts follow the anchors. Start from {0}. */
+typedef struct growth_stats {
+    size_t count, capacity;
+    int offset_count;
+    union { /* owned arrays, [count] or [count][K]: by name, or in order */
+        struct {
+#define X(name, label, per_offset, meaning) float *name;
+            GROWTH_STAT_LIST(X)
+#undef X
+        };
+        float *field[GROWTH_STATS];
+    };
+} growth_stats;
+
+/** Keeps the first min(old, new) rows; new rows are zero. offset_count is fixed while there are rows. On
+    failure nothing changes. */
+gbt_status growth_stats_resize(growth_stats *s, size_t count, int offset_count, gbt_error *err);
+void growth_stats_free(growth_stats *s);
+
+/** How an anchor's importance is measured. */
+typedef enum growth_importance {
+    GROWTH_BY_SHARE,  /* of the picture that its Gaussians cover: mean over rays of T alpha */
+    GROWTH_BY_OPACITY /* sum of their decoded opacities, as the reference takes it */
+} growth_importance;
+
+/** Add what the last render of anchors and its adjoint (frame_backward_gaussians()) say; one thread. */
+void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance, float t_near);
+
+/** Mean over the views that saw the Gaussian `slot` (anchor * K + offset); 0 when none did. */
+static inline float growth_mean_gradient(const growth_stats *s, size_t slot)
+{
+    return s->grad_count[slot] > 0 ? s->grad_accum[slot] / s->grad_count[slot] : 0;
+}
+
+#endif

@@ -1,0 +1,171 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/growing.c -- the rounds of a run: when, with which thresholds, at which sparse points; and what
+   follows the anchors. */
+#include "train/growing.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "bvh/points.h"
+#include "train/def.h"
+#include "train/sight.h"
+
+static const float share_min = 2.5e-6f;     /* of short runs: schedule_thrift() */
+static const double last_rounds_from = 0.9; /* of growing */
+enum {
+    ROUNDS_PER_RUN = 100,
+    ROUND_INTERVAL = 100 /* steps, where rounds do not go by progress */,
+    INTERVAL_MIN = 20 /* a judgement of fewer views is chance */
+};
+enum { VIEWS_MIN = 2 };
+
+bool growing_is_due(const trainer *t, double progress, double next)
+{
+    if (!t->def.grow || progress < SCHEDULE_ADJUST_FROM || progress >= t->def.grow_until)
+        return false;
+    if (!t->rules.rounds_by_progress)
+        return (t->step + 1) % ROUND_INTERVAL == 0;
+    return floor(progress * ROUNDS_PER_RUN) != floor(next * ROUNDS_PER_RUN);
+}
+
+/* New rows come last, so the order by birth stays. */
+static gbt_status follow_births(trainer *t, const growth_result *result, gbt_error *err)
+{
+    uint64_t *born = mem_alloc(result->count, sizeof *born, "growth", err);
+    if (born == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < result->survivors; i++)
+        born[i] = t->born[result->source[i]];
+    for (size_t i = result->survivors; i < result->count; i++)
+        born[i] = t->rules.births_count ? t->anchor_t : 0;
+    mem_free(t->born);
+    t->born = born;
+    return GBT_OK;
+}
+
+typedef struct nearest_job {
+    const point_tree *anchors;
+    const float *point;
+    uint32_t *nearest;
+} nearest_job;
+
+static void nearest_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const nearest_job *job = context;
+    for (size_t i = begin; i < end; i++) {
+        double square;
+        job->nearest[i] = 0;
+        point_tree_nearest(job->anchors, job->point + 3 * i, 1, SIZE_MAX, &job->nearest[i], &square);
+    }
+}
+
+/* What find_points() makes; owned. */
+typedef struct known_points {
+    uint32_t *nearest; /* [points]: anchor */
+    float *scale;      /* [points] in the first round */
+} known_points;
+
+/* The sparse points are known surface, and a start from balls has left most of them out: where the nearest
+   anchor asks for more, they are candidates. Gaussians are not enough, for they are where anchors are. In the
+   first round they make good what the start lacks, as a start would; after it they are asked for and sized as
+   Gaussians are. */
+static gbt_status find_points(const trainer *t, known_points *known, growth_points *out, gbt_error *err)
+{
+    const scene_points *points = &t->scene.points;
+    const bool first = t->round_step == 0;
+    known->nearest = mem_alloc(points->count, sizeof *known->nearest, "growth", err);
+    if (known->nearest == NULL)
+        return GBT_ERR_NO_MEMORY;
+    if (first) {
+        known->scale = mem_alloc(points->count, sizeof *known->scale, "growth", err);
+        if (known->scale == NULL)
+            return GBT_ERR_NO_MEMORY;
+        GBT_TRY(anchor_scales_from_spacing(points->position, points->count, TRAIN_SPACING_SCALE,
+                                           t->first_scale_max, known->scale, err));
+    }
+    point_tree *tree;
+    GBT_TRY(point_tree_build(t->anchors.position, NULL, t->anchors.count, &tree, err));
+    nearest_job job = {tree, points->position, known->nearest};
+    parallel_blocks(points->count, 256, nearest_block, &job);
+    point_tree_free(tree);
+    *out = (growth_points){.count = points->count,
+                           .position = points->position,
+                           .anchor = known->nearest,
+                           .as_start = first,
+                           .scale = known->scale};
+    return GBT_OK;
+}
+
+/* One photo cannot tell how far off something is: what only it shows may stand anywhere along its rays, as a
+   floater before other cameras. */
+static bool two_views_see(const void *context, const float position[3])
+{
+    const trainer *t = context;
+    size_t seen = 0;
+    for (size_t v = 0; v < t->train_count && seen < VIEWS_MIN; v++) {
+        double distance;
+        seen += camera_sees(&t->scene.views[t->train_views[v]].camera, position, &distance) &&
+                distance > (double)t->settings.t_near;
+    }
+    return seen == VIEWS_MIN;
+}
+
+static growth_def def_of(const trainer *t)
+{
+    growth_def def = growth_def_default();
+    def.voxel_size = t->voxel_size;
+    def.max_anchors = t->def.max_anchors;
+    def.integer_division = t->rules.integer_division;
+    def.coarse_level_gates = t->rules.coarse_level_gates;
+    def.at_cell_center = t->rules.at_cell_center;
+    def.shape_log_max = t->rules.shape_log_max;
+    def.seed = t->def.seed;
+    def.step = t->step;
+    if (t->rules.needs_two_views && t->train_count >= VIEWS_MIN) {
+        def.may_stand = two_views_see;
+        def.may_stand_context = t;
+    }
+    if (!t->rules.rounds_by_progress)
+        def.interval = ROUND_INTERVAL;
+    else
+        def.interval = fmaxf((float)(t->step + 1 - t->round_step), (float)INTERVAL_MIN);
+    if (!t->rules.thresholds_by_length)
+        return def;
+    const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
+    const bool last =
+        t->def.last_thrift > 1 && pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
+    def.grad_threshold *= thrift;
+    def.importance_min = thrift * share_min * (last ? (float)t->def.last_thrift : 1);
+    def.grow = !last;
+    return def;
+}
+
+gbt_status growing_round(trainer *t, gbt_error *err)
+{
+    growth_def def = def_of(t);
+    known_points known = {0};
+    growth_result result = {0};
+    gbt_status status = GBT_OK;
+    if (t->rules.grows_at_points && def.grow && pace_progress(&t->pace, t->step) < SCHEDULE_POINTS_UNTIL)
+        status = find_points(t, &known, &def.points, err);
+    if (status == GBT_OK)
+        status = growth_round(&t->anchors, &t->stats, &def, &result, err);
+    learnables *const kept[] = {&t->gradient, &t->moment1, &t->moment2};
+    for (int i = 0; i < 3 && status == GBT_OK; i++)
+        status = learnables_follow(kept[i], &result, err);
+    if (status == GBT_OK)
+        status = follow_births(t, &result, err);
+    mem_free(known.nearest);
+    mem_free(known.scale);
+    mem_free(result.source);
+    if (result.kept_last)
+        log_warn("step %llu: every anchor would be pruned; the most important one stays",
+                 (unsigned long long)t->step);
+    t->round_step = t->step + 1;
+    return status;
+}

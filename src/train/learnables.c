@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/learnables.c -- the table of what learns, and Adam over it. */
+#include "train/learnables.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "train/adam.h"
+#include "train/schedule.h"
+
+enum { ADAM_BLOCK = 512 };
+
+typedef struct rate_rule {
+    double first, last; /* of the reference: log-linear from one to the other over the run */
+    double own;         /* ours is so many times that */
+    bool times_extent;  /* the reference's is proportional to the extent of the cameras */
+    bool ages_with_run; /* Adam's bias is corrected by the age of the run, not of the anchor */
+    bool is_log_scale;  /* kept between scale_log_min and scale_log_max */
+} rate_rule;
+
+/* By the age of the run, the first steps of a new anchor would be up to six times too long, for its second
+   moments are young: offsets and scales, which begin about right, would overshoot. Features begin as those of
+   others and have far to go: they keep that. */
+static const rate_rule anchor_rules[ANCHOR_FIELDS] = {
+    [ANCHOR_FEATURE] = {.first = 0.0075, .last = 0.0075, .own = 1.5, .ages_with_run = true},
+    [ANCHOR_OFFSET] = {.first = 0.01, .last = 0.0001, .own = 4.5, .times_extent = true},
+    [ANCHOR_SCALE_LOG] = {.first = 0.007, .last = 0.007, .own = 3, .is_log_scale = true},
+};
+static const rate_rule network_rules[DECODER_PARTS] = {
+    [DECODER_OPACITY] = {.first = 0.002, .last = 0.00002, .own = 2},
+    [DECODER_SHAPE] = {.first = 0.004, .last = 0.004, .own = 2},
+    [DECODER_COLOR] = {.first = 0.008, .last = 0.00005, .own = 2},
+};
+
+/* ---- rates ---- */
+
+static const double cool_end = 0.02;
+
+static double decay(double first, double last, double progress)
+{
+    return first == last ? first : exp((1 - progress) * log(first) + progress * log(last));
+}
+
+static double rate_at(const rate_rule *r, double progress, bool own, double extent, double factor)
+{
+    const double scale = own ? r->own : r->times_extent ? extent : 1;
+    return factor * decay(r->first, r->last, progress) * scale;
+}
+
+learning_rates learning_rates_at(double progress, bool own, double extent, double factor)
+{
+    learning_rates rates = {0};
+    if (own && progress > SCHEDULE_COOL_FROM)
+        factor *= cool_end + (1 - cool_end) * fmax(1 - progress, 0) / (1 - SCHEDULE_COOL_FROM);
+    for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
+        rates.anchor[f] = rate_at(&anchor_rules[f], progress, own, extent, factor);
+    for (int part = 0; part < DECODER_PARTS; part++)
+        rates.network[part] = rate_at(&network_rules[part], progress, own, extent, factor);
+    return rates;
+}
+
+/* ---- memory ---- */
+
+gbt_status learnables_make(learnables *l, size_t anchor_count, const decoder *d, gbt_error *err)
+{
+    l->anchors.offset_count = d->offset_count;
+    GBT_TRY(anchors_resize(&l->anchors, anchor_count, err));
+    l->networks = mem_calloc(d->param_count, sizeof *l->networks, "networks", err);
+    return l->networks == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+}
+
+void learnables_free(learnables *l)
+{
+    anchors_free(&l->anchors);
+    mem_free(l->networks);
+    *l = (learnables){0};
+}
+
+void learnables_zero(learnables *l, size_t param_count)
+{
+    anchors_zero_learned(&l->anchors);
+    memset(l->networks, 0, param_count * sizeof *l->networks);
+}
+
+gbt_status learnables_follow(learnables *l, const growth_result *result, gbt_error *err)
+{
+    anchors old = l->anchors;
+    l->anchors = (anchors){.offset_count = old.offset_count};
+    const gbt_status status = anchors_resize(&l->anchors, result->count, err);
+    for (size_t i = 0; status == GBT_OK && i < result->survivors; i++)
+        rows_move(l->anchors.field, anchor_fields, ANCHOR_FIELDS, old.offset_count, i, old.field,
+                  result->source[i]);
+    anchors_free(&old);
+    return status;
+}
+
+/* ---- Adam ---- */
+
+typedef struct anchor_job {
+    const learning_model *m;
+    const learning_rates *rates;
+    uint64_t age; /* of the run */
+} anchor_job;
+
+/* Rows [begin, end), all of one age. */
+static void learn_rows(const anchor_job *job, size_t begin, size_t end)
+{
+    const learning_model *m = job->m;
+    const uint64_t age = job->age - m->born[begin];
+    for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
+        const rate_rule *rule = &anchor_rules[f];
+        const size_t width = anchors_width(m->anchors, f), at = begin * width, count = (end - begin) * width;
+        float *values = m->anchors->field[f] + at;
+        adam_step(values, m->gradient->anchors.field[f] + at, m->moment1->anchors.field[f] + at,
+                  m->moment2->anchors.field[f] + at, count,
+                  adam_rates_at(job->rates->anchor[f], rule->ages_with_run ? job->age : age));
+        for (size_t i = 0; rule->is_log_scale && i < count; i++)
+            values[i] = fminf(fmaxf(values[i], m->scale_log_min), m->scale_log_max);
+    }
+}
+
+static void learn_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const anchor_job *job = context;
+    const uint64_t *born = job->m->born;
+    for (size_t i = begin, next; i < end; i = next) {
+        for (next = i + 1; next < end && born[next] == born[i];)
+            next++;
+        learn_rows(job, i, next);
+    }
+}
+
+void learn_anchors(const learning_model *m, const learning_rates *rates, uint64_t age)
+{
+    anchor_job job = {m, rates, age};
+    parallel_blocks(m->anchors->count, ADAM_BLOCK, learn_block, &job);
+}
+
+void learn_networks(const learning_model *m, const learning_rates *rates, uint64_t age)
+{
+    decoder_part parts[DECODER_PARTS];
+    decoder_parts(m->decoder, parts);
+    for (int i = 0; i < DECODER_PARTS; i++) {
+        const size_t at = parts[i].begin;
+        adam_step(m->decoder->params + at, m->gradient->networks + at, m->moment1->networks + at,
+                  m->moment2->networks + at, parts[i].end - at, adam_rates_at(rates->network[i], age));
+    }
+}

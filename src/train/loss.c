@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/loss.c -- the terms of the training loss and their weights. */
+#include "train/loss.h"
+
+#include <math.h>
+
+static const float dssim_weight = 0.2f, volume_weight = 0.01f;
+
+/* ---- of the picture ---- */
+
+gbt_status loss_of_image(const image *shown, const image *photo, const unsigned char *valid,
+                         loss_scratch *scratch, image *d_image, image_loss_result *out, gbt_error *err)
+{
+    return image_loss(shown, photo, valid, (double)dssim_weight, scratch, d_image, out, err);
+}
+
+double loss_of_value(double shown, double photo, double ssim)
+{
+    const double w = (double)dssim_weight;
+    return (1 - w) * fabs(shown - photo) + w * (1 - ssim);
+}
+
+/* ---- of the Gaussians ---- */
+
+double loss_of_gaussians(const gaussians *g)
+{
+    double volume = 0;
+    for (size_t i = 0; i < g->count; i++)
+        volume += (double)g->scale_x[i] * (double)g->scale_y[i] * (double)g->scale_z[i];
+    return g->count > 0 ? (double)volume_weight * (volume / (double)g->count) : 0;
+}
+
+void loss_add_gradient(const gaussians *g, gaussians *d)
+{
+    const float share = g->count > 0 ? volume_weight / (float)g->count : 0;
+    for (size_t i = 0; i < g->count; i++) {
+        d->scale_x[i] += share * g->scale_y[i] * g->scale_z[i];
+        d->scale_y[i] += share * g->scale_x[i] * g->scale_z[i];
+        d->scale_z[i] += share * g->scale_x[i] * g->scale_y[i];
+    }
+}
+
+double loss_of_gaussian(const double field[GAUSSIANS_FIELD_COUNT])
+{
+    enum { SCALE = 3 }; /* of the fields: means come first */
+    return (double)volume_weight * (field[SCALE] * field[SCALE + 1] * field[SCALE + 2]);
+}

@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/rules.c -- our rules, and the reference's. */
+#include "train/rules.h"
+
+#include <math.h>
+
+#include "train/def.h"
+
+static train_rules own_rules(const gbt_train_def *def)
+{
+    return (train_rules){
+        .offsets = 2,           /* fewer than in the paper's base: at equal time the models are better */
+        .ball_scale_factor = 2, /* the balls' scale prior is smaller than their spacing */
+        .spacing_scale_factor = TRAIN_SPACING_SCALE,
+        .uses_footprint = true,
+        .uses_near = true,
+        .adds_to_few_points = true,
+        .limits_first_scale = true,
+        .features_from_colors = true,
+        .background_from_points = true,
+        .voxel = VOXEL_MEDIAN_SPACING,
+        .distance_where_wide = true,
+        .distance_by_median = true,
+        .start_level = def->start_level,
+        .splats_until = def->splats_until,
+        .loose_cutoffs = true,
+        .raises_first_opacity = true,
+        .own_rates = true,
+        .anchors_learn_when_adjusted = true,
+        .importance = GROWTH_BY_SHARE,
+        .births_count = true,
+        .rounds_by_progress = true,
+        .thresholds_by_length = true,
+        .grows_at_points = true,
+        .needs_two_views = true,
+        .integer_division = false,
+        .coarse_level_gates = false,
+        .at_cell_center = false,
+        .shape_log_max = INFINITY,
+    };
+}
+
+/* Everything that is not named is false or 0. */
+static train_rules reference_rules(void)
+{
+    return (train_rules){
+        .offsets = 10,
+        .ball_scale_factor = 1,
+        .spacing_scale_factor = 1,
+        .voxel = VOXEL_COMPAT_SQUARED,
+        .start_level = 0,
+        .splats_until = 0,
+        .importance = GROWTH_BY_OPACITY,
+        .integer_division = true,
+        .coarse_level_gates = true,
+        .at_cell_center = true,
+        .shape_log_max = 0.05f,
+    };
+}
+
+train_rules train_rules_of(const gbt_train_def *def)
+{
+    return def->compat ? reference_rules() : own_rules(def);
+}

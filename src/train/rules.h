@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/rules.h -- where training follows the reference method to the letter and where it does not
+   (docs/training.md). Filled once, from `compat`; everything else reads the rule it needs. */
+#ifndef GBT_TRAIN_RULES_H
+#define GBT_TRAIN_RULES_H
+
+#include "gb/balls.h"
+#include "gbtrace/train.h"
+#include "growth/statistics.h"
+
+typedef struct train_rules {
+    /* settings that are left open, or decided */
+    int offsets;                                    /* Gaussians per anchor */
+    double ball_scale_factor, spacing_scale_factor; /* of first scales from balls, from spacing */
+    bool uses_footprint;                            /* rays as wide as pixels */
+    bool uses_near;                                 /* nothing nearer than the sparse points let it be */
+
+    /* the start */
+    bool adds_to_few_points;     /* by photo consistency, where the data set has few points */
+    bool limits_first_scale;     /* an isolated point would start as a floater */
+    bool features_from_colors;   /* first features carry the colour of the nearest point */
+    bool background_from_points; /* their mean colour, where the data set has none */
+    voxel_rule voxel;            /* what v is where it is not given */
+    bool distance_where_wide;    /* "auto": the networks see the distance where it varies widely */
+    bool distance_by_median;     /* in units of the median distance of anchors */
+
+    /* a step */
+    int start_level;                  /* first steps look at 1 pixel in 4^this */
+    double splats_until;              /* part of the run in which splats stand for rays */
+    bool loose_cutoffs;               /* SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN until SCHEDULE_WHOLE_FROM */
+    bool raises_first_opacity;        /* of offsets that begin below 0 */
+    bool own_rates;                   /* higher learning rates, that fall to nothing in the end */
+    bool anchors_learn_when_adjusted; /* else they miss the step in which anchors change */
+
+    /* growing and pruning */
+    growth_importance importance; /* by which anchors are pruned */
+    bool births_count;            /* Adam's age of an anchor is from its birth; else from the run's start */
+    bool rounds_by_progress;      /* 100 rounds a run; else every 100 steps */
+    bool thresholds_by_length;    /* of growing and pruning: schedule_thrift() and the settings' factors */
+    bool grows_at_points;         /* sparse points are candidates too */
+    bool needs_two_views;         /* new anchors stand where two training photos look */
+    bool integer_division;        /* of cell sizes and thresholds of levels: 4 / 16 is 0 */
+    bool coarse_level_gates;      /* a level that adds nothing ends the search */
+    bool at_cell_center;          /* new anchors stand in the middle of their cell; else at the candidate */
+    float shape_log_max;          /* scale_log[3..5] are cut to this in a round */
+} train_rules;
+
+/** The rules for these settings: ours, or with `compat` all of the reference. */
+train_rules train_rules_of(const gbt_train_def *def);
+
+#endif

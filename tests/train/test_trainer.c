@@ -387,7 +387,7 @@ enum { FEW_BALLS_STEPS = 320 };
 static void open_from_few_balls(trainer *t)
 {
     gbt_train_def def = run_def();
-    def.init = "adaptive";
+    def.init = GBT_INIT_ADAPTIVE;
     def.init_count = 0.1;
     def.iterations = FEW_BALLS_STEPS;
     open_ok(t, tiny, &def);
@@ -693,7 +693,7 @@ static void a_run_is_overwritten_only_when_asked(void **state)
     }
     /* The checkpoint alone can be resumed, the model alone is a finished run. */
     assert_int_equal(rename(in_root("kept/model.gbt"), in_root("kept/aside")), 0);
-    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "--resume");
+    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "resume it");
     assert_int_equal(rename(in_root("kept/checkpoints/last.gbt"), in_root("kept/checkpoints/last.gbt.prev")),
                      0);
     train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "--overwrite");
@@ -985,12 +985,12 @@ static void config_comes_back(void **state)
 {
     (void)state;
     gbt_train_def def = gbt_train_def_default();
-    def.init = "voxel";
-    def.scale_prior = "nn";
+    def.init = GBT_INIT_VOXEL;
+    def.scale_prior = GBT_SCALE_PRIOR_NN;
     def.max_depth = 7;
     def.voxel_size = 0.1f;
     def.offsets = 3;
-    def.distance = "off";
+    def.distance = GBT_DISTANCE_INPUT_OFF;
     def.iterations = 123456789012ull;
     def.budget_seconds = 1 / 3.0;
     def.pace = "1,2,3";

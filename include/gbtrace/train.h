@@ -43,14 +43,14 @@ typedef struct gbt_train_def {
     const char *eval_split; /* "auto" (as the data set says, else every=8), "every=8", "none", "list=FILE" */
     gbt_alpha alpha;        /* black and white are also the background */
     uint64_t seed;
-    size_t hit_bytes_max; /* memory for the hits of a view that are kept for the adjoint; tiles beyond are
-                             traced again, to the same bits. 0: no limit */
-    uint64_t max_anchors; /* growth stops there */
-    bool grow;            /* grow and prune anchors */
-    double thrift; /* anchors must bring so many times as much to be made and to be kept. Not with compat */
-    double last_thrift; /* and so many times that to be kept in the last tenth of growing, when none are made
-                           any more; 1: as before. Not with compat */
-    bool compat;        /* every quirk of the reference method (docs/training.md) */
+    size_t hit_bytes_max;    /* memory for the hits of a view that are kept for the adjoint; tiles beyond are
+                                traced again, to the same bits. 0: no limit */
+    uint64_t max_anchors;    /* growth stops there */
+    bool grow;               /* grow and prune anchors */
+    double threshold_factor; /* of the thresholds of densification and of pruning. Not with compat */
+    double final_prune_factor; /* of the threshold of pruning, once more, in the last tenth of growing, when
+                                  no anchors are made any more; 1: as before. Not with compat */
+    bool compat;               /* every quirk of the reference method (docs/training.md) */
     bool exposure; /* learn a colour matrix per photo; held-out photos are then scored on their right half,
                       with a matrix fitted to the left */
     double splats_until; /* splats stand for rays until this part of the run: their steps are quicker. Pinhole

@@ -146,6 +146,14 @@ static void add_default(const option *o, char *out, size_t size)
     }
 }
 
+/** Help that tells what 0 stands for says enough of the default 0. */
+static bool explains_zero(const option *o, const char *note)
+{
+    const char *zero = strstr(o->help, "0: ");
+    return zero != NULL && (zero == o->help || zero[-1] == ' ') &&
+           (strcmp(note, " (default 0)") == 0 || strcmp(note, " (default 0s)") == 0);
+}
+
 void options_notes(const option *o, bool names, char *out, size_t size)
 {
     out[0] = '\0';
@@ -153,6 +161,8 @@ void options_notes(const option *o, bool names, char *out, size_t size)
         add(out, size, " (needed)");
     else if (o->fixed == NULL)
         add_default(o, out, size);
+    if (explains_zero(o, out))
+        out[0] = '\0';
     const char *name = names && o->aliases != NULL ? o->aliases : "";
     for (const char *before = " (also "; *name != '\0'; before = ", ") {
         const int end = (int)strcspn(name, " ");
@@ -170,15 +180,17 @@ enum { HELP_COLUMNS = 100, HELP_INDENT = 30 };
 /** `text` from column `at` on, its further lines indented. */
 static void print_wrapped(const char *text, int at)
 {
+    bool first = true;
     while (*text != '\0') {
         const int length = (int)strcspn(text, " ");
-        if (at + 1 + length > HELP_COLUMNS && at > HELP_INDENT) {
+        if (at + 1 + length > HELP_COLUMNS) {
             printf("\n%*s", HELP_INDENT, "");
             at = HELP_INDENT;
-        } else if (at > HELP_INDENT) {
+        } else if (!first) {
             putchar(' ');
             at++;
         }
+        first = false;
         printf("%.*s", length, text);
         at += length;
         text += length + strspn(text + length, " ");
@@ -196,8 +208,8 @@ static void print_row(const option *o, bool all)
                               value_name[0] != '\0' ? " " : "", value_name);
     options_notes(o, all, notes, sizeof notes);
     snprintf(text, sizeof text, "%s%s", o->help, notes);
-    printf("%-*s", HELP_INDENT, left);
-    print_wrapped(text, used >= HELP_INDENT ? used + 1 : HELP_INDENT);
+    printf("%-*s", used > HELP_INDENT - 2 ? used + 2 : HELP_INDENT, left);
+    print_wrapped(text, used > HELP_INDENT - 2 ? used + 2 : HELP_INDENT);
 }
 
 void options_print_help(const command *self, const option_table *t, bool all)

@@ -53,7 +53,7 @@ typedef struct option {
 #define THREADS_OPTION                                                                                       \
     {                                                                                                        \
         .name = "threads", .kind = OPTION_INT, .value = &options_threads, .min = 0, .max = 1024,             \
-        .value_name = "T", .help = "number of threads; 0: all processors, within the container's limit"      \
+        .value_name = "T", .help = "threads; 0: all processors, within the container's limit"                \
     }
 extern int options_threads;
 

@@ -15,7 +15,7 @@
 #include "train/gradient_check.h"
 #include "train/sight.h"
 
-static const float share_min = 2.5e-6f;     /* of short runs: schedule_thrift() */
+static const float share_min = 2.5e-6f;     /* of short runs: schedule_threshold_factor() */
 static const double last_rounds_from = 0.9; /* of growing */
 enum {
     ADJUSTS_PER_RUN = 100,
@@ -194,12 +194,13 @@ static adjust_def rules_of(const trainer *t)
         def.shape_log_max = 0.05f;
         return def;
     }
-    const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
-    const bool last =
-        t->def.last_thrift > 1 && pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
+    const float factor =
+        (float)t->def.threshold_factor * schedule_threshold_factor(pace_expected(&t->pace, t->step));
+    const bool last = t->def.final_prune_factor > 1 &&
+                      pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
     def.interval = fmaxf((float)(t->step + 1 - t->adjust_step), (float)INTERVAL_MIN);
-    def.grad_threshold *= thrift;
-    def.min_use = thrift * share_min * (last ? (float)t->def.last_thrift : 1);
+    def.grad_threshold *= factor;
+    def.min_use = factor * share_min * (last ? (float)t->def.final_prune_factor : 1);
     def.grow = !last;
     if (t->train_count >= VIEWS_MIN) {
         def.may_stand = two_views_see;

@@ -21,6 +21,12 @@
 #define CHOICE(names) .kind = GBT_SETTING_CHOICE, .choices = names
 
 static const gbt_train_setting settings[] = {
+    {NAMED("budget-seconds", budget_seconds), .option = "budget", RANGE(SECONDS, 0, 1e9, "TIME"), .number = 0,
+     .saved = true,
+     .help = "training time in all, such as 90s, 10min or 1h; the schedule is fitted to it; 0: 10min"},
+    {NAMED("iterations", iterations), RANGE(UINT64, 0, 1e15, "N"), .number = 0, .saved = true,
+     .help = "number of iterations instead of a time budget; 0: the budget decides",
+     .aliases = "max-steps num-iters"},
     {NAMED("init", init), CHOICE(GBT_INIT_NAMES), .number = GBT_INIT_GB, .saved = true,
      .help =
          "initial anchors: the paper's granular balls, adaptive granular balls, voxels, or random points"},
@@ -38,12 +44,6 @@ static const gbt_train_setting settings[] = {
      .rare = true, .help = "Gaussians per anchor; 0: 2, or 10 with compat", .aliases = "n-offsets"},
     {NAMED("distance", distance), CHOICE(GBT_DISTANCE_INPUT_NAMES), .number = GBT_DISTANCE_INPUT_AUTO,
      .saved = true, .rare = true, .help = "whether the camera distance is an input of the networks"},
-    {NAMED("iterations", iterations), RANGE(UINT64, 0, 1e15, "N"), .number = 0, .saved = true,
-     .help = "number of iterations instead of a time budget; 0: the budget decides",
-     .aliases = "max-steps num-iters"},
-    {NAMED("budget-seconds", budget_seconds), .option = "budget", RANGE(SECONDS, 0, 1e9, "TIME"), .number = 0,
-     .saved = true,
-     .help = "training time in all, such as 90s, 10min or 1h; the schedule is fitted to it; 0: 10min"},
     {NAMED("pace", pace), .kind = GBT_SETTING_TEXT, .unit = "N1,...,N20", .saved = true, .rare = true,
      .help = "repeat a run with a budget bit for bit: the pace recorded in its train.json"},
     {NAMED("downscale", downscale), RANGE(DOUBLE, 1, 64, "F"), .number = 1, .saved = true,
@@ -72,17 +72,18 @@ static const gbt_train_setting settings[] = {
      .help = "of everything that is random"},
     {NAMED("max-anchors", max_anchors), RANGE(UINT64, 1, 1e8, "N"), .number = 2000000, .saved = true,
      .help = "maximum number of anchors"},
-    {NAMED("grow", grow), FLAG, .number = 1, .saved = true,
+    {NAMED("grow", grow), FLAG, .rare = true, .number = 1, .saved = true,
      .help = "keep the initial anchors: no growing, no pruning"},
-    {NAMED("thrift", thrift), RANGE(DOUBLE, 0.1, 10, "F"), .number = 1, .saved = true,
-     .help = "multiply the thresholds for growing and for keeping an anchor: above 1 for smaller models, "
+    {NAMED("threshold-factor", threshold_factor), RANGE(DOUBLE, 0.1, 10, "F"), .number = 1, .saved = true,
+     .aliases = "thrift",
+     .help = "multiply the thresholds of densification and of pruning: above 1 for smaller models, "
              "below 1 for "
              "larger"},
-    {NAMED("last-thrift", last_thrift), RANGE(DOUBLE, 1, 100, "F"), .number = 4, .saved = true, .rare = true,
-     .help =
-         "multiply the threshold for keeping an anchor once more in the last tenth of growing, when none are "
-         "added; 1: no change"},
-    {NAMED("compat", compat), FLAG, .saved = true,
+    {NAMED("final-prune-factor", final_prune_factor), RANGE(DOUBLE, 1, 100, "F"), .number = 4, .saved = true,
+     .rare = true, .aliases = "last-thrift",
+     .help = "multiply the threshold of pruning once more in the last tenth of growing, when none are "
+             "added; 1: no change"},
+    {NAMED("compat", compat), FLAG, .rare = true, .saved = true,
      .help = "follow the reference implementation in every detail (docs/training.md)"},
     {NAMED("exposure", exposure), FLAG, .saved = true,
      .help = "learn a colour matrix per photo, for photos that differ in exposure or white balance"},
@@ -105,7 +106,8 @@ static const gbt_train_setting settings[] = {
      .help = "one more checkpoint right after this step; 0: none"},
     {NAMED("stop-at-step", stop_at_step), RANGE(UINT64, 0, 0, "N"), .rare = true,
      .help = "stop, as an interrupt would, after this step; 0: never"},
-    {NAMED("tensorboard", tensorboard), FLAG, .help = "also write RUN/events.out.tfevents.* for TensorBoard"},
+    {NAMED("tensorboard", tensorboard), FLAG, .rare = true,
+     .help = "also write RUN/events.out.tfevents.* for TensorBoard"},
     {NAMED("resume", resume), FLAG,
      .help = "go on with RUN from its last checkpoint, with its settings and data; with other iterations or "
              "another "
@@ -298,6 +300,13 @@ bool setting_read(const gbt_train_setting *s, const char *text, setting_texts *t
 
 static bool is_named(const gbt_train_setting *s, const char *name)
 {
+    const size_t length = strlen(name);
+    for (const char *alias = s->aliases; alias != NULL && *alias != '\0';) {
+        const size_t end = strcspn(alias, " ");
+        if (end == length && strncmp(alias, name, length) == 0)
+            return true;
+        alias += end + strspn(alias + end, " ");
+    }
     return strcmp(s->name, name) == 0 || (s->option != NULL && strcmp(s->option, name) == 0);
 }
 

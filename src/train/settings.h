@@ -12,7 +12,8 @@ typedef struct setting_texts {
     char text[SETTING_TEXTS][SETTING_TEXT_SIZE];
 } setting_texts;
 
-/** The setting of a name, as RUN/config or as the command line has it; NULL: there is none. */
+/** The setting of a name: as RUN/config has it, or had it in former versions, or as the command line has it;
+    NULL: there is none. */
 const gbt_train_setting *setting_find(const char *name);
 
 void setting_set_default(const gbt_train_setting *s, gbt_train_def *def);

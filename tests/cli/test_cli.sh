@@ -37,9 +37,17 @@ prints "help" '^  info  *show what' --help
 prints "help, short" '^usage: gbtrace COMMAND' -h
 prints "help, as a verb" '^usage: gbtrace COMMAND' help
 prints "help about a verb" '^usage: gbtrace init DATA -o FILE.ply \[options\]$' help init
-prints "help of a verb" '^      --max-depth D  *maximum depth of the ball tree (default 18)$' init --help
+prints "help of a verb" '^      --max-depth D  *maximum depth of the ball tree (default 18)$' init --help-all
 prints "help wins over what is wrong" '^usage: gbtrace init' init --nonsense -h
 prints "needed options say so" '^  -o, --output FILE.ply  *.* (needed)$' init --help
+for command in $("$program" --help | sed -n 's/^  \([a-z-]*\) .*/\1/p'); do
+    "$program" "$command" --help >out 2>err && awk 'length($0) > 100 || NR > 40 { print FILENAME ": line " NR; bad = 1 } END { exit bad }' out >>err
+    report $? "help of $command fits a screen: 40 lines of 100 columns" "$(cat err)"
+done
+prints "rare options are in the whole help" '^      --final-prune-factor F .*' train --help-all
+"$program" train --help | grep -q -e '--final-prune-factor' -e '--pace' -e '--distance'
+[ $? = 1 ]
+report $? "and not in the short one" "$("$program" train --help)"
 prints "choices" '--init gb|adaptive|voxel|random  *initial' init --help
 prints "choices with their default" '--scale-prior gb|nn  *initial scale' init --help
 prints "help of a verb with words: each with its line" '^  courtyard   a town square: ' make-scene --help
@@ -126,7 +134,7 @@ config 'config = other\n' '1: config: unknown option'
 config 'a\0b\n' ' not a configuration file (wanted name = value lines, at most 1 MiB)'
 
 # ---- the environment, between the configuration file and the command line
-prints "help with a variable" '--max-depth D  *maximum depth of the ball tree (default 18)$' init --help
+prints "help with a variable" '--max-depth D  *maximum depth of the ball tree (default 18)$' init --help-all
 export GBTRACE_MAX_DEPTH=65
 misuse 2 "GBTRACE_MAX_DEPTH: bad value (wanted $depth, got 65)" init d -o p
 export GBTRACE_MAX_DEPTH=5 GBTRACE_INIT_VOXEL_SIZE=nan
@@ -347,7 +355,7 @@ prints "bench of other plain Gaussians" '^forward, core-us/ray' bench trace --mo
 misuse 2 'study: "pace" (wanted speed, crosscheck, rate, stability, paper, time or anchors; did you mean rate?)' study pace gaussians.ply -o study
 misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study zzzzzz gaussians.ply -o study
 misuse 2 'bench: "tarce" (wanted trace; did you mean trace?)' bench tarce --model gaussians.ply
-misuse 2 "argument missing (usage: gbtrace study speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR)" study -o study
+misuse 2 "argument missing (usage: gbtrace study STUDY [MODEL|DATA...] -o DIR)" study -o study
 misuse 2 "study crosscheck: wanted a model, or data to train on" study crosscheck -o study
 misuse 2 'study stability: "gaussians.ply" is one too many' study stability gaussians.ply -o study
 misuse 2 'study stability: "A99" is not a list of different cases (wanted some of A1 to A18, as A1,A9)' study stability --only A99 -o study
@@ -432,7 +440,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     "$program" train made -o run-small --iterations 4 --overwrite >out 2>err && "$program" info run-small | grep -q 'trained   4 iterations'
     report $? "train --overwrite trains anew" "$(cat err out; "$program" info run-small)"
     "$program" train -o run-small --resume --iterations 9 --thrift 2 >out 2>err && grep -q '^run-small: 4 steps done; training goes on to step 9' err &&
-        grep -q "^warning: a run is resumed with its own settings: thrift = 1, not 2" err && [ "$(grep -c '^warning' err)" = 1 ] &&
+        grep -q "^warning: a run is resumed with its own settings: threshold-factor = 1, not 2" err && [ "$(grep -c '^warning' err)" = 1 ] &&
         "$program" train -o run-small --resume >out 2>>err && grep -q '^run-small: all 9 steps are done' err && ! grep -q 0x0 err &&
         "$program" info run-small | grep -q 'trained   9 iterations'
     report $? "train --resume goes on without naming the data" "$(cat err out)"

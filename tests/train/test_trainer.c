@@ -696,7 +696,7 @@ static void a_run_is_overwritten_only_when_asked(void **state)
     train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "resume it");
     assert_int_equal(rename(in_root("kept/checkpoints/last.gbt"), in_root("kept/checkpoints/last.gbt.prev")),
                      0);
-    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "--overwrite");
+    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "overwrite it");
     assert_int_equal(unlink(in_root("kept/checkpoints/last.gbt.prev")), 0);
     assert_int_equal(rename(in_root("kept/aside"), in_root("kept/model.gbt")), 0);
     train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "holds a run already");

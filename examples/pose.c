@@ -47,7 +47,7 @@ static gbt_status find_pose(gbt_model *model, const float *target, float *rgb, f
     const gbt_picture picture = {.rgb = rgb};
     double first[6] = {0}, second[6] = {0}, gradient[6];
     for (int step = 1; step <= STEPS; step++) {
-        gbt_status status = gbt_model_render(model, camera, 1, &picture, err);
+        gbt_status status = gbt_model_render(model, camera, true, &picture, err);
         for (size_t i = 0; i < values; i++) /* of the mean square difference */
             d_rgb[i] = 2 * (rgb[i] - target[i]) / (float)values;
         if (status == GBT_OK)
@@ -74,7 +74,7 @@ static gbt_status run(gbt_model *model, gbt_error *err)
     float *target = malloc(bytes), *rgb = malloc(bytes), *d_rgb = malloc(bytes);
     status = target != NULL && rgb != NULL && d_rgb != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
     if (status == GBT_OK)
-        status = gbt_model_render(model, &view.camera, 0, &(gbt_picture){.rgb = target}, err);
+        status = gbt_model_render(model, &view.camera, false, &(gbt_picture){.rgb = target}, err);
     printf("before: %.4f units and %.3f degrees away\n", distance_between(&camera, &view.camera),
            angle_between(&camera, &view.camera));
     if (status == GBT_OK)

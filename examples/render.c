@@ -43,7 +43,7 @@ int main(int argc, char **argv)
         if (rgb == NULL)
             status = GBT_ERR_NO_MEMORY;
         if (status == GBT_OK)
-            status = gbt_model_render(model, &view.camera, 0, &picture, &err);
+            status = gbt_model_render(model, &view.camera, false, &picture, &err);
         if (status == GBT_OK && !write_ppm(argv[2], rgb, view.camera.width, view.camera.height)) {
             status = GBT_ERR_IO;
             perror(argv[2]);

@@ -4,10 +4,12 @@
 #ifndef LAB_LAB_H
 #define LAB_LAB_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 
+#include "gbtrace/choices.h"
 #include "gbtrace/status.h"
 
 typedef struct lab_bench_def {
@@ -15,7 +17,7 @@ typedef struct lab_bench_def {
     const char *camera; /* camera file (docs/cameras.md; of an aperture the first sample); required for plain
                            Gaussians, else the first held-out view */
     int repeats;        /* timed passes after one warm-up; the median is reported. Default 5 */
-    int check; /* 1: compare with the double reference on every 8th pixel in both directions. Default 0 */
+    bool check; /* compare with the double reference on every 8th pixel in both directions. Default false */
     const char *json; /* where to write the figures; NULL: nowhere */
     float alpha_min;  /* smallest response that counts, in (0, 1); 0 or NaN: that of the run, 1/255 for a .ply
                        */
@@ -24,8 +26,7 @@ typedef struct lab_bench_def {
                     a .ply */
     float proxy_radius; /* a Gaussian ends at this many std-devs, > 0; 0 or NaN: where its response falls to
                            alpha_min. Default 0 */
-    const char *preset; /* "exact", "default" or "fast" (docs/accuracy.md); the four numbers above win over
-                           it. NULL: as the model is. Default NULL */
+    gbt_preset preset;  /* the four numbers above win over it. Default GBT_PRESET_AS_TRAINED */
     const char *kernel; /* "tile" (default, and NULL), "single" or "embree"; or some of them, as
                            "tile,embree": measured in turn and compared with the first */
     size_t tape_bytes_max; /* memory for the hits that forward keeps for the adjoint; what goes beyond is
@@ -95,7 +96,7 @@ gbt_status lab_study_rate(const lab_study_def *def, const char *folder, FILE *ou
 
 typedef struct lab_stability_def {
     const char *only; /* cases, as "A1,A9"; NULL: all. Default NULL */
-    int quick;        /* 1: smaller sizes where a scene file gives them. Default 0 */
+    bool quick;       /* smaller sizes where a scene file gives them. Default false */
 } lab_stability_def;
 
 lab_stability_def lab_stability_def_default(void);
@@ -136,7 +137,7 @@ typedef struct lab_paper_def {
     uint64_t iterations;     /* of every run, at least 20. Default 3000; the paper's is 30000 */
     double downscale;        /* photos are divided by this, [1, 64]. Default 1 */
     int seeds;               /* runs of each variant, seeds 0, 1, ...; [1, 10]. Default 3 */
-    const char *renderer;    /* "raster" (default, as the paper), "trace" or "per-ray" */
+    gbt_renderer renderer;   /* that trains. Default GBT_RENDERER_RASTER, as the paper */
     const char *tables;      /* which, as "1,3". Default "1,2,3,4" */
     const char *lpips; /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such column.
                           Default NULL */

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/def.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
@@ -35,7 +36,8 @@ gbt_make_scene_def gbt_make_scene_def_default(void)
                                 .points = 6000,
                                 .point_noise = 0.001,
                                 .samples = 16,
-                                .seed = 1};
+                                .seed = 1,
+                                .cookie_ = DEF_COOKIE};
 }
 
 const char *const *gbt_make_scene_names(void)
@@ -263,6 +265,7 @@ gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt
     if (def == NULL || folder == NULL)
         return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: no %s given",
                          def == NULL ? "settings" : "folder");
+    GBT_TRY(def_check(def->cookie_, "gbt_make_scene_def_default", err));
     GBT_TRY(find_recipe(def->name, &r, err));
     GBT_TRY(check_def(def, err));
     /* Before any work: an unwritable folder should fail at once. */

@@ -3,7 +3,8 @@
 #ifndef GBTRACE_COMPRESS_H
 #define GBTRACE_COMPRESS_H
 
-#include <stddef.h>
+#include <stdbool.h>
+#include <stdint.h>
 #include <stdio.h>
 
 #include "gbtrace/status.h"
@@ -13,10 +14,11 @@ GBT_API_BEGIN
 typedef struct gbt_compress_def {
     double quality; /* dB: what the pictures of the model may differ from before, as a PSNR; [20, 90]. Default
                        60 */
-    int lossless;   /* 1: every bit of the model is kept; `quality` is not used. Default 0 */
+    bool lossless;  /* every bit of the model is kept; `quality` is not used. Default false */
     const char *data; /* data set whose training cameras tell what counts; NULL: the one it was trained on.
                          Default NULL */
     const char *json; /* also write the figures here; NULL: nowhere. Default NULL */
+    uint32_t cookie_; /* set by gbt_compress_def_default() */
 } gbt_compress_def;
 
 gbt_compress_def gbt_compress_def_default(void);

@@ -3,24 +3,27 @@
 #ifndef GBTRACE_EVALUATE_H
 #define GBTRACE_EVALUATE_H
 
+#include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
+#include "gbtrace/choices.h"
 #include "gbtrace/status.h"
 
 GBT_API_BEGIN
 
 typedef struct gbt_evaluate_def {
-    const char *data;     /* data set folder; NULL: the one the model was trained on. Default NULL */
-    const char *json;     /* also write the scores here; NULL: nowhere else. Default NULL */
-    const char *renderer; /* "trace", "raster" or "per-ray"; NULL: as in training. Default NULL */
-    double downscale;     /* photos are divided by this, >= 1; 0: as in training. Default 0 */
-    int report;           /* 1: also write RUN/report.html. Default 1 */
-    const char *preset;   /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is
-                             "default". Default NULL */
-    int tensorboard; /* 1: also write RUN/events.out.tfevents.1.eval: scores, up to eight renders and photos.
-                        Default 0 */
+    const char *data;      /* data set folder; NULL: the one the model was trained on. Default NULL */
+    const char *json;      /* also write the scores here; NULL: nowhere else. Default NULL */
+    gbt_renderer renderer; /* that trains, or GBT_RENDERER_AS_TRAINED, the default */
+    double downscale;      /* photos are divided by this, >= 1; 0: as in training. Default 0 */
+    bool report;           /* also write RUN/report.html. Default true */
+    gbt_preset preset;     /* default GBT_PRESET_AS_TRAINED */
+    bool tensorboard;  /* also write RUN/events.out.tfevents.1.eval: scores, up to eight renders and photos.
+                          Default false */
     const char *lpips; /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such score.
                           Default NULL */
+    uint32_t cookie_;  /* set by gbt_evaluate_def_default() */
 } gbt_evaluate_def;
 
 gbt_evaluate_def gbt_evaluate_def_default(void);
@@ -87,26 +90,21 @@ gbt_status gbt_compare_lpips(const char *path, const char *reference, const char
 gbt_status gbt_compare_pictures(const float *picture, const float *reference, int width, int height,
                                 gbt_comparison *out, gbt_error *err);
 
-typedef enum gbt_split { GBT_SPLIT_TEST, GBT_SPLIT_TRAIN, GBT_SPLIT_ALL } gbt_split;
-
 typedef struct gbt_render_def {
-    const char *data;     /* data set whose cameras are used; NULL: the model's. Default NULL */
-    gbt_split split;      /* default GBT_SPLIT_TEST */
-    const char *renderer; /* "trace", "raster" (EWA splats; pinhole cameras), "per-ray" (the same tiles,
-                             response and order of rays), or "reference" (double, every Gaussian against every
-                             ray: slow). NULL: as in training. Default NULL */
-    const char *format;   /* "png" (default) or "exr" (32-bit float) */
-    double downscale;     /* 0: as in training. Default 0 */
-    const char *camera;   /* camera file (docs/cameras.md): render that and no views; the data set is not
-                             needed. Default NULL */
-    const char *outputs;  /* also write these, as float EXR (docs/formats.md): "depth,normal". Always by the
-                             tracer, without meshes. Default NULL */
-    const char *preset;   /* "exact", "default" or "fast" (docs/accuracy.md). NULL: as in training, which is
-                             "default". Default NULL */
-    const char *insert;   /* meshes to put into the scene (docs/inserting.md); with the renderer "trace" only.
-                             Default NULL */
-    const char *path; /* a film in place of views (docs/video.md): "orbit", "interpolate", or the name of a
-                         path file. Default NULL */
+    const char *data;          /* data set whose cameras are used; NULL: the model's. Default NULL */
+    gbt_split split;           /* default GBT_SPLIT_TEST */
+    gbt_renderer renderer;     /* default GBT_RENDERER_AS_TRAINED */
+    gbt_picture_format format; /* default GBT_PICTURE_PNG */
+    double downscale;          /* 0: as in training. Default 0 */
+    const char *camera;        /* camera file (docs/cameras.md): render that and no views; the data set is not
+                                  needed. Default NULL */
+    const char *outputs; /* also write these, as float EXR (docs/formats.md): "depth,normal". Always by the
+                            tracer, without meshes. Default NULL */
+    gbt_preset preset;   /* default GBT_PRESET_AS_TRAINED */
+    const char *insert;  /* meshes to put into the scene (docs/inserting.md); traced only.
+                            Default NULL */
+    const char *path;    /* a film in place of views (docs/video.md): "orbit", "interpolate", or the name of a
+                            path file. Default NULL */
     int frames; /* of the film, [0, 100000]; 0: 240 around, 15 for each training camera (900 at most), as many
                    as a file has. Default 0 */
     double fps; /* frames per second, [0, 1000]; 0: what a path file says, else 30. Default 0 */
@@ -118,6 +116,7 @@ typedef struct gbt_render_def {
                             units; 0: as the photos' cameras. Default 0 */
     double orbit_height; /* path "orbit": height above that point, scene units; NaN: as the photos' cameras.
                             Default NaN */
+    uint32_t cookie_;    /* set by gbt_render_def_default() */
 } gbt_render_def;
 
 gbt_render_def gbt_render_def_default(void);

@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 
 #include "gbtrace/status.h"
@@ -21,6 +22,7 @@ typedef struct gbt_export_def {
     const char *json;  /* also write the figures here; NULL: nowhere. Default NULL */
     const char *lpips; /* .safetensors file of a network: a result folder gets LPIPS too (docs/metrics.md).
                           Default NULL */
+    uint32_t cookie_;  /* set by gbt_export_def_default() */
 } gbt_export_def;
 
 gbt_export_def gbt_export_def_default(void);

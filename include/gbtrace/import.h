@@ -3,9 +3,11 @@
 #ifndef GBTRACE_IMPORT_H
 #define GBTRACE_IMPORT_H
 
+#include <stdint.h>
 #include <stdio.h>
 
 #include "gbtrace/api.h"
+#include "gbtrace/choices.h"
 #include "gbtrace/status.h"
 
 GBT_API_BEGIN
@@ -13,7 +15,8 @@ GBT_API_BEGIN
 typedef struct gbt_import_def {
     const char *data; /* data set for rendering and scoring; NULL: what the result folder's cfg_args names, if
                          anything. Default NULL */
-    const char *renderer; /* "raster" (default: the model was trained with splats), "trace" or "per-ray" */
+    gbt_renderer renderer; /* that trains. Default GBT_RENDERER_RASTER: the model was trained with splats */
+    uint32_t cookie_;      /* set by gbt_import_def_default() */
 } gbt_import_def;
 
 gbt_import_def gbt_import_def_default(void);

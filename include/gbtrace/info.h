@@ -3,6 +3,7 @@
 #ifndef GBTRACE_INFO_H
 #define GBTRACE_INFO_H
 
+#include <stdbool.h>
 #include <stdio.h>
 
 #include "gbtrace/status.h"
@@ -18,14 +19,14 @@ GBT_API_BEGIN
  * Unreadable photos are only counted.
  *
  * @param path [in]  data set folder, point cloud (.ply), run folder or model.gbt
- * @param json [in]  not 0: one JSON object with "schema": 1 in place of lines for a person
+ * @param json [in]  one JSON object with "schema": 1 in place of lines for a person
  * @param out  [in]  open stream, written only after everything was read; its errors are the caller's to check
  * @param err  [out] optional
  * @return GBT_OK, GBT_ERR_IO (cannot read), GBT_ERR_FORMAT (neither of these, or damaged), GBT_ERR_NO_MEMORY
  *
  * Threads: any. Cost: reads cameras, points and image headers, not pixels.
  */
-gbt_status gbt_info(const char *path, int json, FILE *out, gbt_error *err);
+gbt_status gbt_info(const char *path, bool json, FILE *out, gbt_error *err);
 
 GBT_API_END
 #endif

@@ -4,24 +4,26 @@
 #ifndef GBTRACE_INIT_H
 #define GBTRACE_INIT_H
 
+#include <stdbool.h>
+#include <stdint.h>
 #include <stdio.h>
 
+#include "gbtrace/choices.h"
 #include "gbtrace/status.h"
 
 GBT_API_BEGIN
 
 typedef struct gbt_init_def {
-    const char *init;  /* "gb" (granular balls, default), "adaptive" (balls where the scene needs them),
-                          "voxel", or "random"  points */
-    double init_count; /* anchors per point of adaptive and random, [0, 1], at least one; 0: half as many as
-                          the paper's balls. Default 0 */
-    const char *scale_prior; /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use
-                                "nn" */
-    int max_depth;           /* D_max of the balls, [0, 64]. Default 18 */
-    float voxel_size;        /* v, scene units; 0: from the points by `voxel_rule`. Default 0 */
-    const char *voxel_rule; /* "median" (spacing of the points, default) or "squared" (what the reference code
-                               computes) */
-    int mesh;               /* 1: an icosphere per ball in place of one vertex. Default 0 */
+    gbt_init_kind init; /* default GBT_INIT_GB */
+    double init_count;  /* anchors per point of adaptive and random, [0, 1], at least one; 0: half as many as
+                           the paper's balls. Default 0 */
+    gbt_scale_prior scale_prior; /* of GBT_INIT_GB; the others use GBT_SCALE_PRIOR_NN. Default
+                                    GBT_SCALE_PRIOR_GB */
+    int max_depth;               /* D_max of the balls, [0, 64]. Default 18 */
+    float voxel_size;            /* v, scene units; 0: from the points by `voxel_rule`. Default 0 */
+    gbt_voxel_rule voxel_rule;   /* default GBT_VOXEL_RULE_MEDIAN */
+    bool mesh;                   /* an icosphere per ball in place of one vertex. Default false */
+    uint32_t cookie_;            /* set by gbt_init_def_default() */
 } gbt_init_def;
 
 gbt_init_def gbt_init_def_default(void);

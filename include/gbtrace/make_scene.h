@@ -4,6 +4,7 @@
 #ifndef GBTRACE_MAKE_SCENE_H
 #define GBTRACE_MAKE_SCENE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "gbtrace/status.h"
@@ -20,8 +21,9 @@ typedef struct gbt_make_scene_def {
     int samples;        /* rays per pixel at most, rounded up to a square number, [1, 1024]. Default 16. */
     uint64_t seed;      /* of the camera jitter, the samples and the sparse cloud; the geometry is fixed.
                            Default 1. */
-    int depth;          /* 1: also write exact depth, depth/NNNN.exr. Default 0. */
-    int distorted;      /* 1: OPENCV cameras with moderate distortion, 0: PINHOLE. Default 0. */
+    bool depth;         /* also write exact depth, depth/NNNN.exr. Default false. */
+    bool distorted;     /* OPENCV cameras with moderate distortion, else PINHOLE. Default false. */
+    uint32_t cookie_;   /* set by gbt_make_scene_def_default() */
 } gbt_make_scene_def;
 
 gbt_make_scene_def gbt_make_scene_def_default(void);

@@ -8,6 +8,7 @@
 #ifndef GBTRACE_MODEL_H
 #define GBTRACE_MODEL_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -110,7 +111,7 @@ gbt_status gbt_model_set_settings(gbt_model *model, const gbt_model_settings *se
 typedef struct gbt_model_view {
     const char *name;  /* of the photo, as the data set has it; borrowed until the views are opened again, or
                           the model closed */
-    int held_out;      /* 1: training did not see it */
+    bool held_out;     /* training did not see it */
     gbt_camera camera; /* at the size that training used */
 } gbt_model_view;
 
@@ -141,13 +142,13 @@ typedef struct gbt_picture {
  * Render what a camera sees.
  *
  * @param camera [in]  any lens model; pixels without a ray get the background
- * @param keep   [in]  1: gbt_model_gradient() follows. It costs about a byte per blended hit
+ * @param keep   [in]  gbt_model_gradient() follows. It costs about a byte per blended hit
  * @param out    [out] arrays for camera->width x camera->height pixels
  * @param err    [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT (an unusable camera), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL; the arrays hold
  *         anything after a failure
  */
-gbt_status gbt_model_render(gbt_model *model, const gbt_camera *camera, int keep, const gbt_picture *out,
+gbt_status gbt_model_render(gbt_model *model, const gbt_camera *camera, bool keep, const gbt_picture *out,
                             gbt_error *err);
 
 /** Where gradients of plain Gaussians go: the caller's arrays, shapes as in gbt_gaussians, overwritten. NULL:

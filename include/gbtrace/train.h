@@ -7,73 +7,66 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "gbtrace/choices.h"
 #include "gbtrace/status.h"
 
 GBT_API_BEGIN
 
 enum { GBT_TRAIN_MAX_EVALS = 16 };
 
+/** What text, range and default a field has: gbt_train_setting_at(). 0 stands for a choice of the program
+   only where it can be no value of its own: init_count, voxel_size, offsets, iterations, budget_seconds,
+   scale_factor. */
 typedef struct gbt_train_def {
-    const char *init;  /* "gb" (the paper's granular balls, default), "adaptive" (balls where the scene needs
-                          them), "voxel",  "random" points */
-    double init_count; /* anchors per point of adaptive and random, [0, 1], at least one; 0: half as many as
-                          the paper's balls. Default 0 */
-    const char *scale_prior; /* "gb" (default) or "nn"; only the balls of "gb" have a choice, the others use
-                                "nn" */
-    int max_depth;           /* D_max of the balls, [0, 64]. Default 18 */
-    float voxel_size;        /* v, scene units; 0: the median spacing of the points. Default 0 */
-    int offsets;             /* K, Gaussians per anchor, [1, 16]; 0: 2, or 10 with compat. Default 0 */
-    const char *distance;    /* distance input of the networks: "auto" (default), "on", "off" */
-    uint64_t iterations;     /* length of the run, with what was done before `resume`; 0: the budget decides.
-                                Default 0 */
-    double budget_seconds;   /* wall time for training, with what was spent before `resume`; used when
-                                iterations is 0. 0: 600, or with `resume` as long as the run was to be.
-                                Default
-                                0 */
+    gbt_init_kind init;
+    double init_count; /* anchors per point of GBT_INIT_ADAPTIVE and _RANDOM, at least one; 0: half as many as
+                          the paper's balls */
+    gbt_scale_prior scale_prior;
+    int max_depth;    /* D_max of the balls */
+    float voxel_size; /* v, scene units; 0: the median spacing of the points */
+    int offsets;      /* K, Gaussians per anchor; 0: 2, or 10 with compat */
+    gbt_distance_input distance;
+    uint64_t iterations;   /* length of the run, with what was done before `resume`; 0: the budget decides */
+    double budget_seconds; /* wall time for training, with what was spent before `resume`; used when
+                              iterations is 0. 0: 600, or with `resume` as long as the run was to be */
     const char *pace; /* "n1,...,n20": iterations in each twentieth of the schedule, as a budget run records
-                         them. Default NULL */
-    double downscale; /* photos are divided by this, >= 1. Default 1 */
-    const char *renderer; /* what the photos are compared with: "trace" (default), "raster" (EWA splats;
-                             pinhole photos), or "per-ray" */
-    double footprint;     /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays.
-                             Default 0.1; 0 with compat, splats are dilated then */
+                         them; NULL: as the budget allows */
+    double downscale;
+    gbt_renderer renderer; /* what the photos are compared with; one that trains */
+    double footprint; /* rays are as wide as pixels: variance of a pixel, px^2; 0: thin rays. 0 with compat,
+                         splats are dilated then */
     double near; /* nothing is seen nearer to a camera than this part of the depth at which its photo's first
-                    sparse points are, of all training photos the least, [0, 1]; 0, or where points have no
-                    tracks: 2 % of the median distance of anchors. Default 0.5; 0 with compat */
-    int start_level; /* first steps look at 1 pixel in 4^start_level, at random places; all come last. [0, 4].
-                        Default 2; 0 with compat */
-    const char *eval_split; /* "auto" (default: as the data set says, else every=8), "every=8", "none",
-                               "list=FILE" */
-    const char *alpha; /* the transparent part of photos: "black", "white", "mask" (it counts neither in the
-                          loss nor in the scores); "auto" (default): white for Blender's synthetic scenes,
-                          else black. Black and white are also the background then */
-    uint64_t seed;     /* Default 0 */
-    size_t hit_bytes_max; /* memory for the hits of a view that are kept for the adjoint; tiles beyond are
-                             traced again, to the same bits. 0: no limit. Default 0 */
-    size_t max_anchors;   /* growth stops there. Default 2,000,000 */
-    bool grow;            /* grow and prune anchors. Default true */
-    double thrift; /* anchors must bring so many times as much to be made and to be kept, [0.1, 10]. Not with
-                      compat. Default
-                      1 */
-    double last_thrift; /* and so many times that to be kept in the last tenth of growing, when none are made
-                           any more, [1, 100]; 1: as before. Not with compat. Default 4 */
-    bool compat;        /* every quirk of the reference method (docs/training.md). Default false */
-    bool exposure; /* learn a colour matrix per photo, for photos whose exposure differs; held-out photos are
-                      then scored on their right half, with a matrix fitted to the left. Default false */
-    double splats_until; /* splats stand for rays until this part of the run, [0, 1]: their steps are quicker.
-                            Pinhole photos, the renderer "trace", not with compat. Default 0.7 */
-    double grow_until;   /* anchors grow and are pruned until this fraction of the run, [0, 1]. Default 0.5 */
-    double scale_factor; /* of the anchors' first scales, [0.01, 100]; 0: 2 with the balls' scale prior, 0.7
-                            with spacing, 1 with compat. Default 0 */
-    double learning_rate_factor; /* of all learning rates, [1e-3, 1e3]. Default 1 */
-    double save_every_seconds;   /* wall time between checkpoints; 0: only at the end. Default 120 */
-    uint64_t save_at_step;       /* one extra checkpoint right after this step; 0: none. Default 0 */
-    uint64_t stop_at_step;       /* stop, as a signal would, after this step; 0: never. Default 0 */
-    bool tensorboard; /* also write `run`/events.out.tfevents.0.train: scalars of log.csv. Default false */
+                    sparse points are, of all training photos the least, nor than 2 % of the median distance
+                    of anchors, which is what counts where points have no tracks. 0 with compat */
+    int start_level; /* first steps look at 1 pixel in 4^start_level, at random places; all come last. 0 with
+                        compat */
+    const char *eval_split; /* "auto" (as the data set says, else every=8), "every=8", "none", "list=FILE" */
+    gbt_alpha alpha;        /* black and white are also the background */
+    uint64_t seed;
+    size_t hit_bytes_max;    /* memory for the hits of a view that are kept for the adjoint; tiles beyond are
+                                traced again, to the same bits. 0: no limit */
+    uint64_t max_anchors;    /* growth stops there */
+    bool grow;               /* grow and prune anchors */
+    double threshold_factor; /* of the thresholds of densification and of pruning. Not with compat */
+    double final_prune_factor; /* of the threshold of pruning, once more, in the last tenth of growing, when
+                                  no anchors are made any more; 1: as before. Not with compat */
+    bool compat;               /* every quirk of the reference method (docs/training.md) */
+    bool exposure; /* learn a colour matrix per photo; held-out photos are then scored on their right half,
+                      with a matrix fitted to the left */
+    double splats_until; /* splats stand for rays until this part of the run: their steps are quicker. Pinhole
+                            photos, GBT_RENDERER_TRACE, not with compat */
+    double grow_until;   /* anchors grow and are pruned until this part of the run */
+    double scale_factor; /* of the anchors' first scales; 0: 2 with the balls' scale prior, 0.7 with spacing,
+                            1 with compat */
+    double learning_rate_factor; /* of all learning rates */
+    double save_every_seconds;   /* wall time between checkpoints; 0: only at the end */
+    uint64_t save_at_step;       /* one extra checkpoint right after this step; 0: none */
+    uint64_t stop_at_step;       /* stop, as a signal would, after this step; 0: never */
+    bool tensorboard;            /* also write `run`/events.out.tfevents.0.train: scalars of log.csv */
     bool resume;    /* go on from the run's last checkpoint, with its settings. Other `iterations`, or another
                        budget, give the run another length: schedules go on where a run of that length would
-                       be. Default false */
-    bool overwrite; /* train anew in a folder that holds a run, which is lost. Default false */
+                       be */
+    bool overwrite; /* train anew in a folder that holds a run, which is lost */
     double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* held-out PSNR after so many seconds of training; the clock
                                                     stops meanwhile */
     int eval_at_count;
@@ -114,6 +107,45 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
  * @return as gbt_train(); GBT_ERR_FORMAT ("settings:LINE: ...") for a line that says nothing
  */
 gbt_status gbt_train_with(const char *data, const char *run, const char *settings, gbt_error *err);
+
+/* ---- the settings as a table, for programs that read them from people ---- */
+
+typedef enum gbt_setting_kind {
+    GBT_SETTING_FLAG,    /* bool */
+    GBT_SETTING_INT,     /* int */
+    GBT_SETTING_UINT64,  /* uint64_t */
+    GBT_SETTING_BYTES,   /* size_t */
+    GBT_SETTING_FLOAT,   /* float */
+    GBT_SETTING_DOUBLE,  /* double */
+    GBT_SETTING_SECONDS, /* double */
+    GBT_SETTING_CHOICE,  /* an enum, by the names in `choices` */
+    GBT_SETTING_TEXT     /* const char * */
+} gbt_setting_kind;
+
+typedef struct gbt_train_setting {
+    const char *name;   /* in RUN/config and gbt_train_with() */
+    const char *option; /* of the program gbtrace, without dashes; NULL: as `name` */
+    const char *field;  /* of gbt_train_def */
+    size_t offset;      /* of that field, bytes */
+    gbt_setting_kind kind;
+    double min, max;     /* numbers: inclusive; both 0: any */
+    bool or_zero;        /* numbers: 0 is taken too */
+    double number;       /* the default, but of GBT_SETTING_TEXT */
+    const char *text;    /* the default of GBT_SETTING_TEXT; NULL: none */
+    const char *choices; /* GBT_SETTING_CHOICE: "a|b|c", in the order of the enum. GBT_SETTING_TEXT: some of
+                            the values */
+    const char *unit;    /* what stands for a value in a list: "N", "TIME"; NULL for flags and choices */
+    const char *help;    /* one line */
+    const char *aliases; /* names that this or other programs had, with blanks between; NULL: none */
+    bool saved;          /* in RUN/config: it decides the result */
+    bool rare;           /* few people need it */
+} gbt_train_setting;
+
+/** How many settings there are. */
+size_t gbt_train_setting_count(void);
+
+/** One of them, static; `index` is below the count. */
+const gbt_train_setting *gbt_train_setting_at(size_t index);
 
 /** Threads for everything that follows, >= 1. Without this call: the processors of this process, at most its
     control group's quota. */

@@ -3,6 +3,8 @@
 #ifndef GBTRACE_VIEW_H
 #define GBTRACE_VIEW_H
 
+#include <stdint.h>
+
 #include "gbtrace/status.h"
 
 GBT_API_BEGIN
@@ -16,6 +18,7 @@ typedef struct gbt_view_def {
     void (*ready)(const char *url, void *context); /* called once, when this can be opened (borrowed); NULL:
                                                       not. Default NULL */
     void *context;                                 /* for ready() */
+    uint32_t cookie_;                              /* set by gbt_view_def_default() */
 } gbt_view_def;
 
 gbt_view_def gbt_view_def_default(void);

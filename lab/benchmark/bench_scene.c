@@ -75,7 +75,8 @@ static gbt_status open_run(const char *path, const char *camera, bench_scene *ou
         out->camera.shot = ray_shot_of(&taken);
     }
     out->settings = run->settings;
-    run->frame.draw.renderer = FRAME_TRACE; /* of a run trained with splats too: who measures chooses */
+    run->frame.draw.renderer =
+        GBT_RENDERER_TRACE; /* of a run trained with splats too: who measures chooses */
     return GBT_OK;
 }
 

@@ -15,7 +15,10 @@
 
 enum { KERNELS_MAX = 3 };
 
-lab_bench_def lab_bench_def_default(void) { return (lab_bench_def){.repeats = 5, .kernel = "tile"}; }
+lab_bench_def lab_bench_def_default(void)
+{
+    return (lab_bench_def){.repeats = 5, .preset = GBT_PRESET_AS_TRAINED, .kernel = "tile"};
+}
 
 /* What the caller has given in place of the model's own. */
 static gbt_status override_setting(const char *name, float given, float high, float *setting, gbt_error *err)

@@ -225,7 +225,7 @@ static gbt_status renderer_in_double(checker *c, const raster_reference *splats,
                                      const raster_settings *settings, const double *d_rgb, double *wanted,
                                      double d_background[3], gbt_error *err)
 {
-    if (c->frame->draw.renderer == FRAME_SPLAT)
+    if (c->frame->draw.renderer == GBT_RENDERER_RASTER)
         return raster_reference_backward(splats, &c->frame->camera, settings, d_rgb, wanted, d_background,
                                          err);
     return reference_scene_backward(&c->scene, &c->run->settings, &c->frame->rays, d_rgb, NULL, wanted,
@@ -253,7 +253,7 @@ static void print_renderer(checker *c, const char *stage, const double *wanted, 
     print_row(c, stage, "background", difference_relative(&d), renderer_limit);
 }
 
-static gbt_status check_renderer(checker *c, frame_renderer renderer, const char *stage, gbt_error *err)
+static gbt_status check_renderer(checker *c, gbt_renderer renderer, const char *stage, gbt_error *err)
 {
     frame *f = c->frame;
     f->draw.renderer = renderer;
@@ -271,18 +271,19 @@ static gbt_status check_renderer(checker *c, frame_renderer renderer, const char
     size_t left_out = 0;
     gbt_status status = in_band == NULL || d_rgb == NULL || wanted == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK)
-        status = renderer == FRAME_SPLAT ? find_other_colours(c, &splats, &settings, in_band, err)
-                                         : find_band(c, in_band, err);
+        status = renderer == GBT_RENDERER_RASTER ? find_other_colours(c, &splats, &settings, in_band, err)
+                                                 : find_band(c, in_band, err);
     for (size_t i = 0; status == GBT_OK && i < 3 * c->ray_count; i++) {
         left_out += i % 3 == 0 && in_band[i / 3];
         c->d_masked.pixels[i] = in_band[i / 3] ? 0 : c->d_image.pixels[i];
         d_rgb[i] = (double)c->d_masked.pixels[i];
     }
     if (status == GBT_OK)
-        status = renderer == FRAME_TRACE ? trace_backward(&f->scene, &f->rays, &c->d_masked, &c->d_gaussians,
-                                                          c->weight, d_background, err)
-                                         : raster_backward(&f->splats, &c->d_masked, &c->d_gaussians,
-                                                           c->weight, d_background, err);
+        status =
+            renderer == GBT_RENDERER_TRACE
+                ? trace_backward(&f->scene, &f->rays, &c->d_masked, &c->d_gaussians, c->weight, d_background,
+                                 err)
+                : raster_backward(&f->splats, &c->d_masked, &c->d_gaussians, c->weight, d_background, err);
     if (status == GBT_OK)
         status = renderer_in_double(c, &splats, &settings, d_rgb, wanted, d_background_wanted, err);
     if (status == GBT_OK) {
@@ -300,13 +301,13 @@ static gbt_status check_renderer(checker *c, frame_renderer renderer, const char
 }
 
 /* The tracer last: the chain goes on with its weights. */
-static gbt_status check_renderers(checker *c, frame_renderer trained, gbt_error *err)
+static gbt_status check_renderers(checker *c, gbt_renderer trained, gbt_error *err)
 {
     if (raster_takes(&c->frame->camera))
-        GBT_TRY(check_renderer(c, FRAME_SPLAT, "rasterizer", err));
-    if (trained == FRAME_SPLAT_PER_RAY)
-        GBT_TRY(check_renderer(c, FRAME_SPLAT_PER_RAY, "per-ray", err));
-    return check_renderer(c, FRAME_TRACE, "tracer", err);
+        GBT_TRY(check_renderer(c, GBT_RENDERER_RASTER, "rasterizer", err));
+    if (trained == GBT_RENDERER_PER_RAY)
+        GBT_TRY(check_renderer(c, GBT_RENDERER_PER_RAY, "per-ray", err));
+    return check_renderer(c, GBT_RENDERER_TRACE, "tracer", err);
 }
 
 /* ---- decode and chain ---- */
@@ -564,8 +565,8 @@ gbt_status lab_check_grad(const char *run, FILE *out, gbt_error *err)
         status = loaded_run_need_anchors(loaded, run, err);
     if (status == GBT_OK)
         status = loaded_run_open_views(run, NULL, 0, loaded, err);
-    const frame_renderer trained = loaded->frame.draw.renderer;
-    loaded->frame.draw.renderer = FRAME_TRACE;
+    const gbt_renderer trained = loaded->frame.draw.renderer;
+    loaded->frame.draw.renderer = GBT_RENDERER_TRACE;
     if (status == GBT_OK)
         status = set_up(&c, err);
     if (status == GBT_OK)

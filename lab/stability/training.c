@@ -174,7 +174,7 @@ gbt_status stability_a12(stability *s)
                                           radius + spread * sin(2.4 * (double)i));
     practice_write(s, f->p, "a12");
     gbt_train_def def = practice_def(s);
-    def.distance = "on";
+    def.distance = GBT_DISTANCE_INPUT_ON;
     gbt_error why = {0};
     if (s->status == GBT_OK && must(s, practice_open(s, f->p, &def, &f->t, &why), &why) &&
         must(s, practice_steps(&f->t, &why), &why))

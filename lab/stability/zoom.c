@@ -143,7 +143,7 @@ gbt_status stability_a9(stability *s)
     zoom z = {.settings = trace_settings_default(),
               .variance = (float)stability_number(s, "variance"),
               .samples = (int)stability_number(s, "samples")};
-    trace_settings_preset("exact", &z.settings);
+    trace_settings_preset(GBT_PRESET_EXACT, &z.settings);
     lay_grid(s, stability_number(s, "spacing"), &z.grid);
     stability_chart *chart = stability_new_chart(
         s, "Zooming out",
@@ -156,7 +156,7 @@ gbt_status stability_a9(stability *s)
     compare_flicker(s, &z, flicker);
     z.settings = trace_settings_default();
     compare_brightness(s, &z, NULL, usual);
-    trace_settings_preset("exact", &z.settings);
+    trace_settings_preset(GBT_PRESET_EXACT, &z.settings);
     lay_grid(s, stability_number(s, "dense_spacing"), &z.grid);
     compare_brightness(s, &z, NULL, dense);
     stability_check(s, "A9a", bright[ZOOM_FOOTPRINT], bright[ZOOM_SPLAT],

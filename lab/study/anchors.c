@@ -8,13 +8,13 @@
 /* THE table to edit: name, settings, series of the chart. The first three have their places. A new meaning
    needs a new name: the name is the folder of the runs. */
 const anchors_variant anchors_variants[] = {
-    {"voxels, last-thrift 1", "init = voxel\nlast-thrift = 1", 1},
+    {"voxels, final prune factor 1", "init = voxel\nfinal-prune-factor = 1", 1},
     {"the paper's balls", "", 2},
     {"adaptive balls", "init = adaptive", 3},
     {"random points", "init = random", 4},
-    {"adaptive balls, thrift 1.5", "init = adaptive\nthrift = 1.5", 3},
-    {"adaptive balls, thrift 2.5", "init = adaptive\nthrift = 2.5", 3},
-    {"adaptive balls, thrift 0.5", "init = adaptive\nthrift = 0.5", 3},
+    {"adaptive balls, threshold factor 1.5", "init = adaptive\nthreshold-factor = 1.5", 3},
+    {"adaptive balls, threshold factor 2.5", "init = adaptive\nthreshold-factor = 2.5", 3},
+    {"adaptive balls, threshold factor 0.5", "init = adaptive\nthreshold-factor = 0.5", 3},
     {"voxels", "init = voxel", 1},
 };
 

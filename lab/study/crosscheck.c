@@ -178,7 +178,7 @@ static gbt_status compare_exact(const bench_scene *s, image scratch[3], cross_vi
 {
     references want = {0};
     trace_settings settings = s->settings;
-    trace_settings_preset("exact", &settings);
+    trace_settings_preset(GBT_PRESET_EXACT, &settings);
     gbt_status status = make_references(s, &settings, CROSS_DILATION, &want, err);
     if (status == GBT_OK)
         status = bench_reference_leave_band(s->gaussians, &settings, &want.rays, err);

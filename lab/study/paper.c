@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 
+#include "base/choice.h"
 #include "base/fail.h"
 #include "base/memory.h"
 
@@ -13,21 +14,25 @@ enum { D_MAX = 18, LEAST_ITERATIONS = 20 };
 
 /* Names are folders of runs: a change of a row's meaning needs another name. */
 const paper_variant paper_variants[PAPER_VARIANTS] = {
-    [PAPER_VOXEL] = {"voxel", "voxels", "voxel", "nn", false, full, D_MAX},
-    [PAPER_GBSP] = {"gbai-gbsp", "GBAI + GBSP", "gb", "gb", false, full, D_MAX},
-    [PAPER_GBAI] = {"gbai", "GBAI", "gb", "nn", false, full, D_MAX},
-    [PAPER_VOXEL_SCALED] = {"voxel-scaled", "voxels, scale x constant", "voxel", "nn", true, full, D_MAX},
-    [PAPER_GBAI_SCALED] = {"gbai-scaled", "GBAI, scale x constant", "gb", "nn", true, full, D_MAX},
-    [PAPER_VOXEL_SIXTH] = {"voxel-grow-sixth", "voxels, growth to 1/6", "voxel", "nn", false, sixth, D_MAX},
-    [PAPER_GBSP_SIXTH] = {"gbai-gbsp-grow-sixth", "GBAI + GBSP, growth to 1/6", "gb", "gb", false, sixth,
-                          D_MAX},
-    [PAPER_VOXEL_THIRD] = {"voxel-grow-third", "voxels, growth to 1/3", "voxel", "nn", false, third, D_MAX},
-    [PAPER_GBSP_THIRD] = {"gbai-gbsp-grow-third", "GBAI + GBSP, growth to 1/3", "gb", "gb", false, third,
-                          D_MAX},
-    [PAPER_DEPTH_10] = {"gbai-gbsp-depth-10", "D_max 10", "gb", "gb", false, full, 10},
-    [PAPER_DEPTH_12] = {"gbai-gbsp-depth-12", "D_max 12", "gb", "gb", false, full, 12},
-    [PAPER_DEPTH_14] = {"gbai-gbsp-depth-14", "D_max 14", "gb", "gb", false, full, 14},
-    [PAPER_DEPTH_16] = {"gbai-gbsp-depth-16", "D_max 16", "gb", "gb", false, full, 16},
+    [PAPER_VOXEL] = {"voxel", "voxels", GBT_INIT_VOXEL, GBT_SCALE_PRIOR_NN, false, full, D_MAX},
+    [PAPER_GBSP] = {"gbai-gbsp", "GBAI + GBSP", GBT_INIT_GB, GBT_SCALE_PRIOR_GB, false, full, D_MAX},
+    [PAPER_GBAI] = {"gbai", "GBAI", GBT_INIT_GB, GBT_SCALE_PRIOR_NN, false, full, D_MAX},
+    [PAPER_VOXEL_SCALED] = {"voxel-scaled", "voxels, scale x constant", GBT_INIT_VOXEL, GBT_SCALE_PRIOR_NN,
+                            true, full, D_MAX},
+    [PAPER_GBAI_SCALED] = {"gbai-scaled", "GBAI, scale x constant", GBT_INIT_GB, GBT_SCALE_PRIOR_NN, true,
+                           full, D_MAX},
+    [PAPER_VOXEL_SIXTH] = {"voxel-grow-sixth", "voxels, growth to 1/6", GBT_INIT_VOXEL, GBT_SCALE_PRIOR_NN,
+                           false, sixth, D_MAX},
+    [PAPER_GBSP_SIXTH] = {"gbai-gbsp-grow-sixth", "GBAI + GBSP, growth to 1/6", GBT_INIT_GB,
+                          GBT_SCALE_PRIOR_GB, false, sixth, D_MAX},
+    [PAPER_VOXEL_THIRD] = {"voxel-grow-third", "voxels, growth to 1/3", GBT_INIT_VOXEL, GBT_SCALE_PRIOR_NN,
+                           false, third, D_MAX},
+    [PAPER_GBSP_THIRD] = {"gbai-gbsp-grow-third", "GBAI + GBSP, growth to 1/3", GBT_INIT_GB,
+                          GBT_SCALE_PRIOR_GB, false, third, D_MAX},
+    [PAPER_DEPTH_10] = {"gbai-gbsp-depth-10", "D_max 10", GBT_INIT_GB, GBT_SCALE_PRIOR_GB, false, full, 10},
+    [PAPER_DEPTH_12] = {"gbai-gbsp-depth-12", "D_max 12", GBT_INIT_GB, GBT_SCALE_PRIOR_GB, false, full, 12},
+    [PAPER_DEPTH_14] = {"gbai-gbsp-depth-14", "D_max 14", GBT_INIT_GB, GBT_SCALE_PRIOR_GB, false, full, 14},
+    [PAPER_DEPTH_16] = {"gbai-gbsp-depth-16", "D_max 16", GBT_INIT_GB, GBT_SCALE_PRIOR_GB, false, full, 16},
 };
 
 size_t paper_table_variants(int table, const paper_variant_id **out)
@@ -53,7 +58,7 @@ size_t paper_table_variants(int table, const paper_variant_id **out)
 lab_paper_def lab_paper_def_default(void)
 {
     return (lab_paper_def){
-        .iterations = 3000, .downscale = 1, .seeds = 3, .renderer = "raster", .tables = "1,2,3,4"};
+        .iterations = 3000, .downscale = 1, .seeds = 3, .renderer = GBT_RENDERER_RASTER, .tables = "1,2,3,4"};
 }
 
 /* "1,3": digits of tables, each once, with commas between. */

@@ -34,7 +34,8 @@ typedef enum paper_variant_id {
 typedef struct paper_variant {
     const char *name; /* of its folder, in data */
     const char *says; /* in tables */
-    const char *init, *scale_prior;
+    gbt_init_kind init;
+    gbt_scale_prior scale_prior;
     bool scaled;       /* first scales times the scene's constant */
     double grow_until; /* part of the run */
     int max_depth;

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/choice.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "data/json_out.h"
@@ -44,7 +45,7 @@ void paper_csv(const paper_study *s, text *out)
 static void add_count_rows(const paper_study *s, size_t scene, json_t *rows)
 {
     for (int v = 0; v < PAPER_VARIANTS; v++) {
-        const bool from_balls = strcmp(paper_variants[v].init, "gb") == 0;
+        const bool from_balls = paper_variants[v].init == GBT_INIT_GB;
         const bool is_first = v == PAPER_GBSP || v >= PAPER_DEPTH_10; /* of the same balls */
         if (!s->has_variant[v] || !from_balls || !is_first)
             continue;
@@ -110,10 +111,10 @@ gbt_status paper_json(const paper_study *s, const char *folder, gbt_error *err)
                 json_array_append_new(figures, variant_to_json(s, scene, (paper_variant_id)v));
     }
     add_change_rows(s, rows);
-    json_t *root =
-        json_pack("{s:i,s:s,s:I,s:f,s:s,s:i,s:o,s:o,s:o}", "schema", 1, "study", "paper", "iterations",
-                  (json_int_t)s->def.iterations, "downscale", s->def.downscale, "renderer", s->def.renderer,
-                  "seeds", s->grid.seeds, "rows", rows, "scenes", scenes, "figures", figures);
+    json_t *root = json_pack("{s:i,s:s,s:I,s:f,s:s,s:i,s:o,s:o,s:o}", "schema", 1, "study", "paper",
+                             "iterations", (json_int_t)s->def.iterations, "downscale", s->def.downscale,
+                             "renderer", CHOICE_NAME(GBT_RENDERER_NAMES, s->def.renderer), "seeds",
+                             s->grid.seeds, "rows", rows, "scenes", scenes, "figures", figures);
     const gbt_status status = json_save(root, path, err);
     json_decref(root);
     return status;

@@ -33,13 +33,13 @@ double paper_ball_count(double points, int max_depth)
 }
 
 /* As training with `compat` makes them. */
-static gbt_status make_anchors(const scene_points *points, anchor_scale_kind scale, anchors *out,
+static gbt_status make_anchors(const scene_points *points, gbt_scale_prior scale, anchors *out,
                                balls *out_balls, gbt_error *err)
 {
     anchor_init_def def = anchor_init_def_default();
     def.scale = scale;
-    GBT_TRY(
-        balls_voxel_size(points->position, points->count, VOXEL_COMPAT_SQUARED, &def.balls.voxel_size, err));
+    GBT_TRY(balls_voxel_size(points->position, points->count, GBT_VOXEL_RULE_SQUARED, &def.balls.voxel_size,
+                             err));
     return anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def, out,
                         out_balls, err);
 }
@@ -48,9 +48,9 @@ static gbt_status look_at_points(const scene_points *points, paper_scene *out, g
 {
     anchors prior = {0}, spacing = {0};
     balls found = {0};
-    gbt_status status = make_anchors(points, ANCHOR_SCALE_GB, &prior, &found, err);
+    gbt_status status = make_anchors(points, GBT_SCALE_PRIOR_GB, &prior, &found, err);
     if (status == GBT_OK)
-        status = make_anchors(points, ANCHOR_SCALE_NN, &spacing, NULL, err);
+        status = make_anchors(points, GBT_SCALE_PRIOR_NN, &spacing, NULL, err);
     if (status == GBT_OK) {
         double sum = 0;
         out->tree_depth = 0;

@@ -4,6 +4,7 @@
 #include <limits.h>
 #include <math.h>
 
+#include "base/choice.h"
 #include "study/paper.h"
 
 static const char *const titles[PAPER_TABLES] = {"Voxels against balls",
@@ -154,7 +155,8 @@ void paper_tables(const paper_study *s, text *out)
     text_format(out,
                 "# The paper's tables, from our runs\n\n%llu iterations of the faithful protocol "
                 "(`--compat`), photos divided by %g, %s, ",
-                (unsigned long long)s->def.iterations, s->def.downscale, s->def.renderer);
+                (unsigned long long)s->def.iterations, s->def.downscale,
+                CHOICE_NAME(GBT_RENDERER_NAMES, s->def.renderer));
     text_format(out, "seeds 0 to %d; every eighth photo held out.\n", s->grid.seeds - 1);
     text_add(out, "Mean ± standard deviation over the seeds. Changes compare runs of the same seed; \"all\" "
                   "is the mean over the scenes. Told apart: outside the 95 % interval of the mean (Student's "

@@ -161,7 +161,7 @@ static double network_macs(const decoder *d)
 static gbt_status measure_views(loaded_run *r, study_figures *f, gbt_error *err)
 {
     double views = 0, visible = 0, blended = 0, rays = 0;
-    r->frame.draw.renderer = FRAME_TRACE;
+    r->frame.draw.renderer = GBT_RENDERER_TRACE;
     for (size_t view = 0; view < r->scene.view_count; view++) {
         if (!r->scene.views[view].is_test)
             continue;

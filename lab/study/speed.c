@@ -24,14 +24,14 @@ typedef struct speed_step {
     speed_knob knob;
     const char *value;
     float number; /* of the knob; 0: the default itself */
-    int choice;   /* kernel or instruction set */
+    int choice;   /* preset, kernel or instruction set */
 } speed_step;
 
 /* Along each knob from exact to fast, through the default. */
 static const speed_step steps[] = {
-    {KNOB_PRESET, "exact", 0, 0},
-    {KNOB_PRESET, "default", 0, 0},
-    {KNOB_PRESET, "fast", 0, 0},
+    {KNOB_PRESET, "exact", 0, GBT_PRESET_EXACT},
+    {KNOB_PRESET, "default", 0, GBT_PRESET_DEFAULT},
+    {KNOB_PRESET, "fast", 0, GBT_PRESET_FAST},
     {KNOB_ALPHA, "1e-4", 1e-4f, 0},
     {KNOB_ALPHA, "0.001", 1e-3f, 0},
     {KNOB_ALPHA, "1/255", 0, 0},
@@ -75,7 +75,8 @@ static void list_rows(const trace_settings *own, speed_model *out)
         speed_row *row = &out->rows[out->row_count++];
         *row = (speed_row){
             .knob = s->knob, .value = s->value, .settings = *own, .kernel = TRACE_TILE, .isa = best};
-        trace_settings_preset(s->knob == KNOB_PRESET ? s->value : "default", &row->settings);
+        trace_settings_preset(s->knob == KNOB_PRESET ? (gbt_preset)s->choice : GBT_PRESET_DEFAULT,
+                              &row->settings);
         row->is_default = s->knob != KNOB_PRESET && s->number == 0;
         switch (s->knob) {
         case KNOB_ALPHA:

@@ -12,12 +12,12 @@ const time_variant time_variants[] = {
     {"rays from the start", "splats-until = 0", 1},
     {"first scales x 1", "scale-factor = 1", 1},
     {"no growth", "grow = 0", 1},
-    {"last-thrift 1", "last-thrift = 1", 1},
+    {"final prune factor 1", "final-prune-factor = 1", 1},
     {"near 0", "near = 0", 1},
     {"K = 10", "offsets = 10", 1},
     {"adaptive balls", "init = adaptive", 1},
     {"voxels", "init = voxel", 1},
-    {"voxels, last-thrift 1", "init = voxel\nlast-thrift = 1", 1},
+    {"voxels, final prune factor 1", "init = voxel\nfinal-prune-factor = 1", 1},
 };
 
 const size_t time_variant_count = sizeof time_variants / sizeof *time_variants;

@@ -59,7 +59,7 @@ class CModelSettings(c.Structure):
 
 
 class CModelView(c.Structure):
-    _fields_ = [("name", c.c_char_p), ("held_out", c.c_int), ("camera", CCamera)]
+    _fields_ = [("name", c.c_char_p), ("held_out", c.c_bool), ("camera", CCamera)]
 
 
 class CPicture(c.Structure):
@@ -71,12 +71,13 @@ class CComparison(c.Structure):
 
 
 class CEvaluateDef(c.Structure):
-    _fields_ = [("data", c.c_char_p), ("json", c.c_char_p), ("renderer", c.c_char_p), ("downscale", c.c_double), ("report", c.c_int),
-                ("preset", c.c_char_p), ("tensorboard", c.c_int), ("lpips", c.c_char_p)]
+    _fields_ = [("data", c.c_char_p), ("json", c.c_char_p), ("renderer", c.c_int), ("downscale", c.c_double), ("report", c.c_bool),
+                ("preset", c.c_int), ("tensorboard", c.c_bool), ("lpips", c.c_char_p), ("cookie_", c.c_uint32)]
 
 
 class CExportDef(c.Structure):
-    _fields_ = [("sh_degree", c.c_int), ("refine_steps", c.c_int), ("backdrop", c.c_bool), ("data", c.c_char_p), ("json", c.c_char_p), ("lpips", c.c_char_p)]
+    _fields_ = [("sh_degree", c.c_int), ("refine_steps", c.c_int), ("backdrop", c.c_bool), ("data", c.c_char_p), ("json", c.c_char_p), ("lpips", c.c_char_p),
+                ("cookie_", c.c_uint32)]
 
 
 STRUCTS = {"gbt_error": CError, "gbt_camera": CCamera, "gbt_gaussians": CGaussians, "gbt_gaussians_gradient": CGaussiansGradient,
@@ -102,7 +103,7 @@ FUNCTIONS = {
     "gbt_model_set_settings": ("status", [pointer, c.POINTER(CModelSettings)]),
     "gbt_model_open_views": ("status", [pointer, text, c.POINTER(number)]),
     "gbt_model_get_view": ("status", [pointer, number, c.POINTER(CModelView)]),
-    "gbt_model_render": ("status", [pointer, c.POINTER(CCamera), c.c_int, c.POINTER(CPicture)]),
+    "gbt_model_render": ("status", [pointer, c.POINTER(CCamera), c.c_bool, c.POINTER(CPicture)]),
     "gbt_model_gradient": ("status", [pointer, pointer, c.POINTER(c.c_double), c.POINTER(CGaussiansGradient)]),
     "gbt_train_with": ("status", [text, text, text]),
     "gbt_evaluate_def_default": (CEvaluateDef, []),

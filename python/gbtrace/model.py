@@ -145,7 +145,7 @@ class Model:
         picture = lib.CPicture(lib.address(rgb, "rgb", (*size, 3), True), *(None if a is None else lib.address(a, name, size, True)
                                                                             for a, name in ((depth, "depth"), (transmittance, "transmittance"))))
         self._size = None
-        lib.call("gbt_model_render", self._open(), c.byref(camera._c), int(keep), c.byref(picture))
+        lib.call("gbt_model_render", self._open(), c.byref(camera._c), bool(keep), c.byref(picture))
         self._size = size
         return rgb
 

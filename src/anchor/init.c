@@ -17,8 +17,8 @@
 
 anchor_init_def anchor_init_def_default(void)
 {
-    return (anchor_init_def){.kind = ANCHOR_INIT_GB,
-                             .scale = ANCHOR_SCALE_GB,
+    return (anchor_init_def){.kind = GBT_INIT_GB,
+                             .scale = GBT_SCALE_PRIOR_GB,
                              .fraction = 0,
                              .balls = balls_def_default(),
                              .offset_count = 10,
@@ -27,17 +27,6 @@ anchor_init_def anchor_init_def_default(void)
                              .clip_max = 4.0f,
                              .scale_factor = 1.0f,
                              .scale_max = INFINITY};
-}
-
-bool anchor_init_kind_named(const char *name, anchor_init_kind *out)
-{
-    static const char *const names[] = {"gb", "voxel", "adaptive", "random"}; /* in the order of the enum */
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (strcmp(name, names[i]) == 0) {
-            *out = (anchor_init_kind)i;
-            return true;
-        }
-    return false;
 }
 
 static gbt_status check_def(const anchor_init_def *def, gbt_error *err)
@@ -194,13 +183,13 @@ static gbt_status find_centers(const float *position, const float *color, size_t
                                const anchor_init_def *def, balls *found, float **centers,
                                size_t *center_count, gbt_error *err)
 {
-    if (def->kind == ANCHOR_INIT_VOXEL)
+    if (def->kind == GBT_INIT_VOXEL)
         return voxel_centers(position, count, def->balls.voxel_size, centers, center_count, err);
-    if (def->kind == ANCHOR_INIT_GB)
+    if (def->kind == GBT_INIT_GB)
         return balls_build(position, color, count, &def->balls, found, err);
     size_t wanted;
     GBT_TRY(count_wanted(position, color, count, def, &wanted, err));
-    if (def->kind == ANCHOR_INIT_RANDOM) {
+    if (def->kind == GBT_INIT_RANDOM) {
         *center_count = wanted;
         return choose_points(position, count, wanted, centers, err);
     }
@@ -227,7 +216,7 @@ gbt_status anchors_init(const float *position, const float *color, size_t count,
         status = centers != NULL ? place(&a, centers, center_count, err)
                                  : place(&a, found.center, found.count, err);
     if (status == GBT_OK && a.count > 0)
-        status = def->kind == ANCHOR_INIT_GB && def->scale == ANCHOR_SCALE_GB
+        status = def->kind == GBT_INIT_GB && def->scale == GBT_SCALE_PRIOR_GB
                      ? scale_from_balls(&a, found.radius, def, err)
                      : scale_from_spacing(&a, def, err);
     mem_free(centers);

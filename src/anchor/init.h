@@ -9,22 +9,15 @@
 #include "anchor/anchors.h"
 #include "gb/adaptive.h"
 #include "gb/balls.h"
-
-typedef enum anchor_init_kind {
-    ANCHOR_INIT_GB,       /* the paper's balls */
-    ANCHOR_INIT_VOXEL,    /* the baseline's voxels */
-    ANCHOR_INIT_ADAPTIVE, /* balls where the scene needs them */
-    ANCHOR_INIT_RANDOM    /* points at random, for comparison */
-} anchor_init_kind;
-typedef enum anchor_scale_kind { ANCHOR_SCALE_GB, ANCHOR_SCALE_NN } anchor_scale_kind;
+#include "gbtrace/choices.h"
 
 typedef struct anchor_init_def {
-    anchor_init_kind kind;   /* default ANCHOR_INIT_GB */
-    anchor_scale_kind scale; /* default ANCHOR_SCALE_GB, for ANCHOR_INIT_GB alone: the others always use
-                                ANCHOR_SCALE_NN */
-    double fraction;  /* anchors per point of ANCHOR_INIT_ADAPTIVE and _RANDOM, [0, 1], at least one; 0: half
-                         as many as ANCHOR_INIT_GB makes. Default 0 */
-    balls_def balls;  /* voxel_size must be set; also the voxel edge of ANCHOR_INIT_VOXEL */
+    gbt_init_kind kind;    /* default GBT_INIT_GB */
+    gbt_scale_prior scale; /* default GBT_SCALE_PRIOR_GB, for GBT_INIT_GB alone: the others always use
+                                GBT_SCALE_PRIOR_NN */
+    double fraction;  /* anchors per point of GBT_INIT_ADAPTIVE and _RANDOM, [0, 1], at least one; 0: half
+                         as many as GBT_INIT_GB makes. Default 0 */
+    balls_def balls;  /* voxel_size must be set; also the voxel edge of GBT_INIT_VOXEL */
     int offset_count; /* K, default 10 */
     float fusion;     /* alpha, eq 34: weight of the neighbour scale. Default 0.5 */
     float clip_min, clip_max; /* lambda_min, lambda_max, eq 33: defaults 0.25 and 4 */
@@ -34,15 +27,12 @@ typedef struct anchor_init_def {
 } anchor_init_def;
 anchor_init_def anchor_init_def_default(void);
 
-/** The kind called "gb", "voxel", "adaptive" or "random"; false for any other name. */
-bool anchor_init_kind_named(const char *name, anchor_init_kind *out);
-
 /**
  * Make anchors: offsets and features 0, log-scales from the scale rule.
  *
- * ANCHOR_SCALE_NN: root mean square distance to the 3 nearest anchors (or as many as there are), floor
- * sqrt(1e-7); a lone anchor takes the voxel size. ANCHOR_SCALE_GB: eqs 29-34 with the nearest anchor, floor
- * max(gamma v, 1e-6); an anchor that is alone or coincides with another takes its ball's radius for the
+ * GBT_SCALE_PRIOR_NN: root mean square distance to the 3 nearest anchors (or as many as there are), floor
+ * sqrt(1e-7); a lone anchor takes the voxel size. GBT_SCALE_PRIOR_GB: eqs 29-34 with the nearest anchor,
+ * floor max(gamma v, 1e-6); an anchor that is alone or coincides with another takes its ball's radius for the
  * spacing. Then all are multiplied by scale_factor; scale_max wins over floors and factor. No points give no
  * anchors.
  *
@@ -60,8 +50,8 @@ gbt_status anchors_init(const float *position, const float *color, size_t count,
                         anchors *out, balls *out_balls, gbt_error *err);
 
 /**
- * First scales of anchors at these positions by ANCHOR_SCALE_NN; one that is alone has no spacing: 0, and so
- * the floor.
+ * First scales of anchors at these positions by GBT_SCALE_PRIOR_NN; one that is alone has no spacing: 0, and
+ * so the floor.
  *
  * @param position [in]  [count][3], finite
  * @param factor   [in]  > 0; `most` wins over it

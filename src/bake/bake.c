@@ -265,7 +265,7 @@ gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_ca
     b.visible = mem_calloc(a->count, sizeof *b.visible, "anchors to bake", err);
     gbt_status status = b.sums == NULL || b.visible == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     const frame_drawing drawing = f->draw;
-    f->draw.renderer = FRAME_TRACE;
+    f->draw.renderer = GBT_RENDERER_TRACE;
     for (size_t i = 0; i < camera_count && status == GBT_OK; i++) {
         status = add_view(&b, f, d, &cameras[i], settings, err);
         log_count("bake", i + 1, camera_count, (double)NAN);

@@ -11,6 +11,7 @@
 #include "bake/export_folder.h"
 #include "bake/refine.h"
 #include "base/clock.h"
+#include "base/def.h"
 #include "base/fail.h"
 #include "base/log.h"
 #include "base/memory.h"
@@ -23,7 +24,7 @@ enum { OUTPUTS_MAX = 8, VIEWS_MAX = 16 };
 
 gbt_export_def gbt_export_def_default(void)
 {
-    return (gbt_export_def){.sh_degree = 3, .refine_steps = 500, .backdrop = true};
+    return (gbt_export_def){.sh_degree = 3, .refine_steps = 500, .backdrop = true, .cookie_ = DEF_COOKIE};
 }
 
 /* One output, and what it gives back: PSNR in dB of 8-bit images, means over views. */
@@ -190,9 +191,9 @@ static gbt_status check(const char *input, const gbt_export_def *def, const char
                         size_t output_count, gbt_error *err)
 {
     if (def->sh_degree < 0 || def->sh_degree > 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--sh-degree: %d (wanted 0 to 3)", def->sh_degree);
+        return base_fail(err, GBT_ERR_ARGUMENT, "sh_degree: %d (wanted 0 to 3)", def->sh_degree);
     if (def->refine_steps < 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--refine: %d (wanted 0 or more)", def->refine_steps);
+        return base_fail(err, GBT_ERR_ARGUMENT, "refine_steps: %d (wanted 0 or more)", def->refine_steps);
     if (output_count < 1 || output_count > OUTPUTS_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu files to write (wanted 1 to %d)", input,
                          output_count, (int)OUTPUTS_MAX);
@@ -326,6 +327,7 @@ static void exporting_free(exporting *e)
 gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs,
                       size_t output_count, FILE *report, gbt_error *err)
 {
+    GBT_TRY(def_check(def->cookie_, "gbt_export_def_default", err));
     GBT_TRY(check(input, def, outputs, output_count, err));
     exporting *e = mem_calloc(1, sizeof *e, "export", err);
     if (e == NULL)
@@ -339,7 +341,7 @@ gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *
     if (def->lpips != NULL)
         status = e->folder != NULL
                      ? lpips_open(def->lpips, &e->net, err)
-                     : base_fail(err, GBT_ERR_ARGUMENT, "--lpips: is for result folders alone (wanted OUT/)");
+                     : base_fail(err, GBT_ERR_ARGUMENT, "lpips: is for result folders alone (wanted OUT/)");
     if (status == GBT_OK && e->baked)
         status = open_run(e, input, err);
     for (int flat = 0; flat < 2 && status == GBT_OK; flat++)

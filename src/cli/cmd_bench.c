@@ -3,7 +3,6 @@
 #include <stdio.h>
 
 #include "cli/options.h"
-#include "gbtrace/train.h"
 #include "lab/lab.h"
 
 static const command_word *workloads(void)
@@ -13,12 +12,12 @@ static const command_word *workloads(void)
     return words;
 }
 
-static int run_bench(const command *self, int argc, char **argv)
+static lab_bench_def def;
+
+static const option *options_bench(int *count)
 {
-    lab_bench_def def = lab_bench_def_default();
-    bool check = false;
-    int threads = 0;
-    const option options[] = {
+    def = lab_bench_def_default();
+    static const option rows[] = {
         {.name = "model",
          .kind = OPTION_STRING,
          .value = &def.model,
@@ -37,32 +36,36 @@ static int run_bench(const command *self, int argc, char **argv)
          .min = 1e-6,
          .max = 0.999,
          .value_name = "A",
-         .help = "ignore hits with an alpha below this; 0: as the run, else 1/255"},
+         .help = "ignore hits with an alpha below this; 0: as the run, else 1/255",
+         .rare = true},
         {.name = "alpha-max",
          .kind = OPTION_FLOAT,
          .value = &def.alpha_max,
          .min = 1e-6,
          .max = 0.999999,
          .value_name = "A",
-         .help = "clamp alpha to this; 0: as the run, else 0.99"},
+         .help = "clamp alpha to this; 0: as the run, else 0.99",
+         .rare = true},
         {.name = "t-min",
          .kind = OPTION_FLOAT,
          .value = &def.t_min,
          .min = 1e-9,
          .max = 0.999,
          .value_name = "T",
-         .help = "stop a ray below this transmittance; 0: as the run, else 1e-4"},
+         .help = "stop a ray below this transmittance; 0: as the run, else 1e-4",
+         .rare = true},
         {.name = "proxy-radius",
          .kind = OPTION_FLOAT,
          .value = &def.proxy_radius,
          .min = 0,
          .max = 1e6,
          .value_name = "R",
-         .help = "cut Gaussians off at this many standard deviations; 0: where alpha falls to --alpha-min"},
+         .help = "cut Gaussians off at this many standard deviations; 0: where alpha falls to --alpha-min",
+         .rare = true},
         {.name = "preset",
          .kind = OPTION_CHOICE,
          .value = &def.preset,
-         .choices = "exact|default|fast",
+         .choices = GBT_PRESET_NAMES,
          .help = "cut-off preset (docs/accuracy.md); the options above override it"},
         {.name = "kernel",
          .kind = OPTION_STRING,
@@ -87,28 +90,22 @@ static int run_bench(const command *self, int argc, char **argv)
          .help = "timed passes; the median is reported"},
         {.name = "check",
          .kind = OPTION_FLAG,
-         .value = &check,
+         .value = &def.check,
          .help = "compare with the double-precision reference"},
         {.name = "json",
          .kind = OPTION_STRING,
          .value = &def.json,
          .value_name = "FILE",
          .help = "write the figures to this file"},
-        {.name = "threads",
-         .kind = OPTION_INT,
-         .value = &threads,
-         .min = 0,
-         .max = 1024,
-         .value_name = "T",
-         .help = THREADS_HELP},
+        THREADS_OPTION,
     };
-    operands name;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &name);
-    if (code >= 0)
-        return code;
-    if (threads > 0)
-        gbt_set_threads(threads);
-    def.check = check;
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run_bench(const operands *given)
+{
+    (void)given; /* "trace", the only word */
     gbt_error err = {0};
     return command_failed(lab_bench_trace(&def, stdout, &err), &err);
 }
@@ -116,33 +113,32 @@ static int run_bench(const command *self, int argc, char **argv)
 const command command_bench = {.name = "bench",
                                .summary = "benchmark the ray tracer on given Gaussians",
                                .usage = "trace --model FILE|RUN [--camera FILE.json]",
+                               .options = options_bench,
+                               .min_operands = 1,
+                               .max_operands = 1,
                                .run = run_bench,
                                .words = workloads};
 
-static int run_check_grad(const command *self, int argc, char **argv)
+static const option *options_check_grad(int *count)
 {
-    int threads = 0;
-    const option options[] = {
-        {.name = "threads",
-         .kind = OPTION_INT,
-         .value = &threads,
-         .min = 0,
-         .max = 1024,
-         .value_name = "T",
-         .help = THREADS_HELP},
+    static const option rows[] = {
+        THREADS_OPTION,
     };
-    operands run;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &run);
-    if (code >= 0)
-        return code;
-    if (threads > 0)
-        gbt_set_threads(threads);
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run_check_grad(const operands *given)
+{
     gbt_error err = {0};
-    return command_failed(lab_check_grad(run.value[0], stdout, &err), &err);
+    return command_failed(lab_check_grad(given->value[0], stdout, &err), &err);
 }
 
 const command command_check_grad = {
     .name = "check-grad",
     .summary = "check the gradients of a trained run against double precision and finite differences",
     .usage = "RUN",
+    .options = options_check_grad,
+    .min_operands = 1,
+    .max_operands = 1,
     .run = run_check_grad};

@@ -13,24 +13,27 @@ static void print_number(const char *name, double value, const char *end)
     fputs(end, stdout);
 }
 
-static int run(const command *self, int argc, char **argv)
+static bool json;
+static const char *network;
+
+static const option *options(int *count)
 {
-    bool json = false;
-    const char *network = NULL;
-    const option options[] = {
+    static const option rows[] = {
         {.name = "lpips", .kind = OPTION_STRING, .value = &network, .value_name = "FILE", .help = LPIPS_HELP},
         {.name = "json", .kind = OPTION_FLAG, .value = &json, .help = "print JSON"},
     };
-    operands named;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 2, 2, argc, argv, &named);
-    if (code >= 0)
-        return code;
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
     gbt_error err = {0};
     gbt_comparison c;
     double lpips[2];
-    gbt_status status = gbt_compare_images(named.value[0], named.value[1], &c, &err);
+    gbt_status status = gbt_compare_images(given->value[0], given->value[1], &c, &err);
     if (status == GBT_OK && network != NULL)
-        status = gbt_compare_lpips(named.value[0], named.value[1], network, lpips, &err);
+        status = gbt_compare_lpips(given->value[0], given->value[1], network, lpips, &err);
     if (status != GBT_OK)
         return command_failed(status, &err);
     if (json) {
@@ -56,4 +59,7 @@ static int run(const command *self, int argc, char **argv)
 const command command_compare = {.name = "compare",
                                  .summary = "compare two pictures: PSNR, SSIM, FLIP, LPIPS",
                                  .usage = "IMAGE REFERENCE",
+                                 .options = options,
+                                 .min_operands = 2,
+                                 .max_operands = 2,
                                  .run = run};

@@ -2,15 +2,14 @@
 /* cli/cmd_compress.c -- gbtrace compress. */
 #include "cli/options.h"
 #include "gbtrace/compress.h"
-#include "gbtrace/train.h"
 
-static int run(const command *self, int argc, char **argv)
+static gbt_compress_def def;
+static const char *out;
+
+static const option *options(int *count)
 {
-    gbt_compress_def def = gbt_compress_def_default();
-    const char *out = NULL;
-    bool lossless = false;
-    int threads = 0;
-    const option options[] = {
+    def = gbt_compress_def_default();
+    static const option rows[] = {
         {.name = "output",
          .short_name = 'o',
          .kind = OPTION_STRING,
@@ -26,7 +25,10 @@ static int run(const command *self, int argc, char **argv)
          .max = 90,
          .value_name = "DB",
          .help = "PSNR between renders of the small and of the original model; higher makes a larger file"},
-        {.name = "lossless", .kind = OPTION_FLAG, .value = &lossless, .help = "store the model without loss"},
+        {.name = "lossless",
+         .kind = OPTION_FLAG,
+         .value = &def.lossless,
+         .help = "store the model without loss"},
         {.name = "data",
          .kind = OPTION_STRING,
          .value = &def.data,
@@ -38,27 +40,23 @@ static int run(const command *self, int argc, char **argv)
          .value = &def.json,
          .value_name = "FILE",
          .help = "write the figures to this file"},
-        {.name = "threads",
-         .kind = OPTION_INT,
-         .value = &threads,
-         .min = 0,
-         .max = 1024,
-         .value_name = "T",
-         .help = THREADS_HELP},
+        THREADS_OPTION,
     };
-    operands model;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);
-    if (code >= 0)
-        return code;
-    if (threads > 0)
-        gbt_set_threads(threads);
-    def.lossless = lossless;
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
     gbt_error err = {0};
-    return command_failed(gbt_compress(model.value[0], &def, out, stdout, &err), &err);
+    return command_failed(gbt_compress(given->value[0], &def, out, stdout, &err), &err);
 }
 
 const command command_compress = {.name = "compress",
                                   .summary =
                                       "write a trained model as a small file, which every command can read",
                                   .usage = "RUN|MODEL.gbt -o FILE.gbt",
+                                  .options = options,
+                                  .min_operands = 1,
+                                  .max_operands = 1,
                                   .run = run};

@@ -10,24 +10,24 @@
 #include "gbtrace/train.h"
 
 /** "tabletop|courtyard|..." */
-static const char *scene_choices(void)
+static char scene_choices[256];
+static int scene_index;
+
+static gbt_make_scene_def scene;
+static gbt_train_def train;
+static const char *out = "demo";
+static double minutes = 2;
+
+static const option *options(int *count)
 {
-    static char list[256];
+    scene = gbt_make_scene_def_default();
+    train = gbt_train_def_default();
     const char *const *names = gbt_make_scene_names();
     size_t used = 0;
-    for (int i = 0; names[i] != NULL && used < sizeof list; i++)
-        used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? "|" : "", names[i]);
-    return list;
-}
-
-static int run(const command *self, int argc, char **argv)
-{
-    gbt_make_scene_def scene = gbt_make_scene_def_default();
-    gbt_train_def train = gbt_train_def_default();
-    const char *out = "demo";
-    double minutes = 2;
-    int threads = 0;
-    const option options[] = {
+    for (int i = 0; names[i] != NULL && used < sizeof scene_choices; i++)
+        used += (size_t)snprintf(scene_choices + used, sizeof scene_choices - used, "%s%s", i > 0 ? "|" : "",
+                                 names[i]);
+    static const option rows[] = {
         {.name = "output",
          .short_name = 'o',
          .kind = OPTION_STRING,
@@ -43,28 +43,23 @@ static int run(const command *self, int argc, char **argv)
          .help = "training time, minutes"},
         {.name = "scene",
          .kind = OPTION_CHOICE,
-         .value = &scene.name,
-         .choices = scene_choices(),
+         .value = &scene_index,
+         .choices = scene_choices,
          .help = "which procedural scene (gbtrace make-scene --help says what they show)"},
         {.name = "seed",
          .kind = OPTION_UINT64,
          .value = &train.seed,
          .value_name = "S",
          .help = "random seed"},
-        {.name = "threads",
-         .kind = OPTION_INT,
-         .value = &threads,
-         .min = 0,
-         .max = 1024,
-         .value_name = "T",
-         .help = THREADS_HELP},
+        THREADS_OPTION,
     };
-    operands none;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 0, 0, argc, argv, &none);
-    if (code >= 0)
-        return code;
-    if (threads > 0)
-        gbt_set_threads(threads);
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
+    (void)given; /* it takes none */
     char data[4096], run_folder[4096], command_line[8400];
     if (snprintf(data, sizeof data, "%s/scene", out) >= (int)sizeof data ||
         snprintf(run_folder, sizeof run_folder, "%s/run", out) >= (int)sizeof run_folder)
@@ -74,6 +69,7 @@ static int run(const command *self, int argc, char **argv)
     train.budget_seconds = 60 * minutes;
     train.command = command_line;
     train.overwrite = true;
+    scene.name = gbt_make_scene_names()[scene_index];
     gbt_error err = {0};
     progress_say("1/3 photographing the procedural scene \"%s\"", scene.name);
     gbt_status status = gbt_make_scene(&scene, data, &err);
@@ -97,4 +93,7 @@ const command command_demo = {.name = "demo",
                               .summary =
                                   "make a procedural scene, train on it, score it and write the report",
                               .usage = "[--minutes M] [-o DIR]",
+                              .options = options,
+                              .min_operands = 0,
+                              .max_operands = 0,
                               .run = run};

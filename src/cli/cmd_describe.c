@@ -13,14 +13,10 @@ static void (*const writers[])(FILE *) = {describe_man, describe_bash, describe_
 
 static const command_word *form_words(void) { return forms; }
 
-static int run(const command *self, int argc, char **argv)
+static int run(const operands *given)
 {
-    operands form;
-    const int code = options_parse(self, NULL, 0, 1, 1, argc, argv, &form);
-    if (code >= 0)
-        return code;
     for (int i = 0; forms[i].name != NULL; i++)
-        if (strcmp(forms[i].name, form.value[0]) == 0)
+        if (strcmp(forms[i].name, given->value[0]) == 0)
             writers[i](stdout);
     return 0;
 }
@@ -28,5 +24,7 @@ static int run(const command *self, int argc, char **argv)
 const command command_describe = {.name = "describe",
                                   .summary = "print the manual page, or a completion script for a shell",
                                   .usage = "man|bash|zsh|fish",
+                                  .min_operands = 1,
+                                  .max_operands = 1,
                                   .run = run,
                                   .words = form_words};

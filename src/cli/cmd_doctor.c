@@ -13,24 +13,22 @@ static const char *const level_names[] = {"ok", "warn", "fail"};
 
 /* ---- variables that nobody reads ---- */
 
-typedef struct search {
-    const char *name; /* up to its = */
-    bool found;
-} search;
-
-static void look_in(const command *self, const option *options, int option_count, void *context)
+/** Whether NAME=VALUE sets an option of some command. */
+static bool sets_option(const char *variable)
 {
-    search *s = context;
-    for (int i = 0; i < option_count && !s->found; i++) {
-        if (!options_in_environment(&options[i]))
-            continue;
-        for (int own = 0; own < 2; own++) {
-            char variable[128];
-            options_variable(own ? self->name : NULL, options[i].name, variable, sizeof variable);
-            const size_t length = strlen(variable);
-            s->found = s->found || (strncmp(s->name, variable, length) == 0 && s->name[length] == '=');
+    for (int c = 0; c < command_list_count; c++) {
+        option_table t;
+        options_table(command_list[c], &t);
+        for (int i = 0; i < 2 * t.count; i++) {
+            char name[128];
+            const option *o = &t.rows[i / 2];
+            options_variable(i % 2 == 1 ? command_list[c]->name : NULL, o->name, name, sizeof name);
+            const size_t length = strlen(name);
+            if (options_in_environment(o) && strncmp(variable, name, length) == 0 && variable[length] == '=')
+                return true;
         }
     }
+    return false;
 }
 
 static void check_environment(gbt_diagnosis *d)
@@ -41,17 +39,15 @@ static void check_environment(gbt_diagnosis *d)
     int known = 0, unknown = 0;
     *c = (gbt_check){.name = "environment"};
     for (char **variable = environ; *variable != NULL; variable++) {
-        search s = {.name = *variable};
-        if (strncmp(s.name, "GBTRACE_", 8) != 0)
+        if (strncmp(*variable, "GBTRACE_", 8) != 0)
             continue;
-        for (int i = 0; i < command_list_count && !s.found; i++)
-            options_visit(command_list[i], look_in, &s);
-        known += s.found;
-        unknown += !s.found;
-        if (!s.found && unknown == 1)
+        const bool found = sets_option(*variable);
+        known += found;
+        unknown += !found;
+        if (!found && unknown == 1)
             snprintf(c->advice, sizeof c->advice,
                      "no command has the option of %.*s: unset it, or correct its name",
-                     (int)strcspn(s.name, "="), s.name);
+                     (int)strcspn(*variable, "="), *variable);
     }
     c->level = unknown > 0 ? GBT_CHECK_WARN : GBT_CHECK_OK;
     snprintf(c->found, sizeof c->found, "%d variables set options, %d name no option", known, unknown);
@@ -84,20 +80,22 @@ static void print_json(const gbt_diagnosis *d, int failed)
     puts("\n]}");
 }
 
-static int run(const command *self, int argc, char **argv)
+static bool json;
+
+static const option *options(int *count)
 {
-    bool json = false;
-    const option options[] = {
+    static const option rows[] = {
         {.name = "json", .kind = OPTION_FLAG, .value = &json, .help = "print JSON"},
     };
-    operands folder;
-    const int code =
-        options_parse(self, options, sizeof options / sizeof *options, 0, 1, argc, argv, &folder);
-    if (code >= 0)
-        return code;
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
     static gbt_diagnosis d; /* 16 kB */
     gbt_error err = {0};
-    const gbt_status status = gbt_doctor(folder.count > 0 ? folder.value[0] : ".", &d, &err);
+    const gbt_status status = gbt_doctor(given->count > 0 ? given->value[0] : ".", &d, &err);
     if (status != GBT_OK)
         return command_failed(status, &err);
     check_environment(&d);
@@ -116,4 +114,7 @@ const command command_doctor = {
     .summary =
         "check build, machine and folder: version, processor, memory, libraries, tracer, gradients, speed",
     .usage = "[FOLDER]",
+    .options = options,
+    .min_operands = 0,
+    .max_operands = 1,
     .run = run};

@@ -2,19 +2,20 @@
 /* cli/cmd_eval.c -- gbtrace eval. */
 #include "cli/options.h"
 #include "gbtrace/evaluate.h"
-#include "gbtrace/train.h"
 
-static int run(const command *self, int argc, char **argv)
+static gbt_evaluate_def def;
+
+static const option *options(int *count)
 {
-    gbt_evaluate_def def = gbt_evaluate_def_default();
-    int threads = 0;
-    const option options[] = {
+    def = gbt_evaluate_def_default();
+    static const option rows[] = {
         {.name = "model-path",
          .short_name = 'm',
          .kind = OPTION_OPERAND,
          .value_name = "RUN",
          .help = "the same as RUN",
-         .aliases = "model-paths"},
+         .aliases = "model-paths",
+         .rare = true},
         {.name = "data",
          .kind = OPTION_STRING,
          .value = &def.data,
@@ -29,7 +30,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "renderer",
          .kind = OPTION_CHOICE,
          .value = &def.renderer,
-         .choices = "trace|raster|per-ray",
+         .choices = GBT_RENDERER_TRAINING_NAMES,
          .help = "renderer; default: the one it was trained with"},
         {.name = "downscale",
          .short_name = 'd',
@@ -43,34 +44,31 @@ static int run(const command *self, int argc, char **argv)
         {.name = "preset",
          .kind = OPTION_CHOICE,
          .value = &def.preset,
-         .choices = "exact|default|fast",
+         .choices = GBT_PRESET_NAMES,
          .help = "cut-off preset (docs/accuracy.md); training uses default"},
         {.name = "lpips",
          .kind = OPTION_STRING,
          .value = &def.lpips,
          .value_name = "FILE",
          .help = LPIPS_HELP},
-        {.name = "threads",
-         .kind = OPTION_INT,
-         .value = &threads,
-         .min = 0,
-         .max = 1024,
-         .value_name = "T",
-         .help = THREADS_HELP},
+        THREADS_OPTION,
     };
-    operands model;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);
-    if (code >= 0)
-        return code;
-    if (threads > 0)
-        gbt_set_threads(threads);
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
     gbt_error err = {0};
-    return command_failed(gbt_evaluate(model.value[0], &def, &err), &err);
+    return command_failed(gbt_evaluate(given->value[0], &def, &err), &err);
 }
 
 const command command_eval = {.name = "eval",
                               .summary =
                                   "score the held-out views (PSNR, SSIM, FLIP, LPIPS) and update the report",
                               .usage = "RUN",
+                              .options = options,
+                              .min_operands = 1,
+                              .max_operands = 1,
                               .run = run,
                               .alias = "metrics"};

@@ -2,14 +2,14 @@
 /* cli/cmd_export.c -- gbtrace export. */
 #include "cli/options.h"
 #include "gbtrace/export.h"
-#include "gbtrace/train.h"
 
-static int run(const command *self, int argc, char **argv)
+static gbt_export_def def;
+static const char *output;
+
+static const option *options(int *count)
 {
-    gbt_export_def def = gbt_export_def_default();
-    int threads = 0;
-    const char *output = NULL;
-    const option options[] = {
+    def = gbt_export_def_default();
+    static const option rows[] = {
         {.name = "output",
          .short_name = 'o',
          .kind = OPTION_STRING,
@@ -26,6 +26,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "refine",
          .kind = OPTION_INT,
          .value = &def.refine_steps,
+         .field = "refine_steps",
          .min = 0,
          .max = 100000,
          .value_name = "N",
@@ -51,24 +52,20 @@ static int run(const command *self, int argc, char **argv)
          .value = &def.lpips,
          .value_name = "FILE",
          .help = "result folder: " LPIPS_HELP},
-        {.name = "threads",
-         .kind = OPTION_INT,
-         .value = &threads,
-         .min = 0,
-         .max = 1024,
-         .value_name = "T",
-         .help = THREADS_HELP},
+        THREADS_OPTION,
     };
-    operands files;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 9, argc, argv, &files);
-    if (code >= 0)
-        return code;
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
+    operands files = *given;
     if (output != NULL)
         files.value[files.count++] = output;
     if (files.count < 2)
-        return command_misused("argument missing (usage: gbtrace %s %s)", self->name, self->usage);
-    if (threads > 0)
-        gbt_set_threads(threads);
+        return command_misused("argument missing (usage: gbtrace %s %s)", command_export.name,
+                               command_export.usage);
     gbt_error err = {0};
     return command_failed(
         gbt_export(files.value[0], &def, files.value + 1, (size_t)files.count - 1, stdout, &err), &err);
@@ -80,4 +77,7 @@ const command command_export = {
     .summary =
         "export a scene as plain Gaussians (.ply, .splat, .spz, .glb), or convert .ply, .splat and .spz",
     .usage = "RUN|MODEL.gbt|SCENE.ply|.splat|.spz OUT.ply|.splat|.spz|.glb...",
+    .options = options,
+    .min_operands = 1,
+    .max_operands = 9,
     .run = run};

@@ -3,11 +3,13 @@
 #include "cli/options.h"
 #include "gbtrace/import.h"
 
-static int run(const command *self, int argc, char **argv)
+static gbt_import_def def;
+static const char *out;
+
+static const option *options(int *count)
 {
-    gbt_import_def def = gbt_import_def_default();
-    const char *out = NULL;
-    const option options[] = {
+    def = gbt_import_def_default();
+    static const option rows[] = {
         {.name = "output",
          .short_name = 'o',
          .kind = OPTION_STRING,
@@ -23,18 +25,23 @@ static int run(const command *self, int argc, char **argv)
         {.name = "renderer",
          .kind = OPTION_CHOICE,
          .value = &def.renderer,
-         .choices = "trace|raster|per-ray",
+         .choices = GBT_RENDERER_TRAINING_NAMES,
          .help = "renderer of the run"},
     };
-    operands model;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);
-    if (code >= 0)
-        return code;
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
     gbt_error err = {0};
-    return command_failed(gbt_import(model.value[0], &def, out, stdout, &err), &err);
+    return command_failed(gbt_import(given->value[0], &def, out, stdout, &err), &err);
 }
 
 const command command_import = {.name = "import",
                                 .summary = "import a trained Scaffold-GS model as a run",
                                 .usage = "FOLDER|point_cloud.ply -o RUN",
+                                .options = options,
+                                .min_operands = 1,
+                                .max_operands = 1,
                                 .run = run};

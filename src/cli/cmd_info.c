@@ -3,19 +3,27 @@
 #include "cli/options.h"
 #include "gbtrace/info.h"
 
-static int run(const command *self, int argc, char **argv)
+static bool json;
+
+static const option *options(int *count)
 {
-    bool json = false;
-    const option options[] = {
+    static const option rows[] = {
         {.name = "json", .kind = OPTION_FLAG, .value = &json, .help = "print JSON"},
     };
-    operands paths;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &paths);
-    if (code >= 0)
-        return code;
-    gbt_error err = {0};
-    return command_failed(gbt_info(paths.value[0], json, stdout, &err), &err);
+    *count = sizeof rows / sizeof *rows;
+    return rows;
 }
 
-const command command_info = {
-    .name = "info", .summary = "show what a data set or a model contains", .usage = "PATH", .run = run};
+static int run(const operands *given)
+{
+    gbt_error err = {0};
+    return command_failed(gbt_info(given->value[0], json, stdout, &err), &err);
+}
+
+const command command_info = {.name = "info",
+                              .summary = "show what a data set or a model contains",
+                              .usage = "PATH",
+                              .options = options,
+                              .min_operands = 1,
+                              .max_operands = 1,
+                              .run = run};

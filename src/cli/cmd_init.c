@@ -3,12 +3,13 @@
 #include "cli/options.h"
 #include "gbtrace/init.h"
 
-static int run(const command *self, int argc, char **argv)
+static gbt_init_def def;
+static const char *out, *json;
+
+static const option *options(int *count)
 {
-    gbt_init_def def = gbt_init_def_default();
-    const char *out = NULL, *json = NULL;
-    bool mesh = false;
-    const option options[] = {
+    def = gbt_init_def_default();
+    static const option rows[] = {
         {.name = "output",
          .short_name = 'o',
          .kind = OPTION_STRING,
@@ -19,7 +20,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "init",
          .kind = OPTION_CHOICE,
          .value = &def.init,
-         .choices = "gb|adaptive|voxel|random",
+         .choices = GBT_INIT_NAMES,
          .help = "initial anchors: the paper's granular balls, adaptive granular balls, the voxel baseline, "
                  "or random points"},
         {.name = "init-count",
@@ -28,11 +29,12 @@ static int run(const command *self, int argc, char **argv)
          .min = 0,
          .max = 1,
          .value_name = "F",
-         .help = "adaptive and random: anchors per sparse point; 0: half as many anchors as gb gives"},
+         .help = "adaptive and random: anchors per sparse point; 0: half as many anchors as gb gives",
+         .rare = true},
         {.name = "scale-prior",
          .kind = OPTION_CHOICE,
          .value = &def.scale_prior,
-         .choices = "gb|nn",
+         .choices = GBT_SCALE_PRIOR_NAMES,
          .help = "initial scale with --init gb: from ball radius and point spacing, or from spacing alone, "
                  "as with the other --init"},
         {.name = "max-depth",
@@ -41,23 +43,26 @@ static int run(const command *self, int argc, char **argv)
          .min = 0,
          .max = 64,
          .value_name = "D",
-         .help = "maximum depth of the ball tree"},
+         .help = "maximum depth of the ball tree",
+         .rare = true},
         {.name = "voxel-size",
          .kind = OPTION_FLOAT,
          .value = &def.voxel_size,
          .min = 0,
          .max = 1e30,
          .value_name = "V",
-         .help = "voxel size, scene units; 0: estimated from the points"},
+         .help = "voxel size, scene units; 0: estimated from the points",
+         .rare = true},
         {.name = "voxel-rule",
          .kind = OPTION_CHOICE,
          .value = &def.voxel_rule,
-         .choices = "median|squared",
+         .choices = GBT_VOXEL_RULE_NAMES,
          .help = "how it is estimated: median point spacing, or the squared spacing that the reference code "
-                 "uses"},
+                 "uses",
+         .rare = true},
         {.name = "mesh",
          .kind = OPTION_FLAG,
-         .value = &mesh,
+         .value = &def.mesh,
          .help = "write each ball as a sphere mesh instead of a point"},
         {.name = "json",
          .kind = OPTION_STRING,
@@ -65,17 +70,21 @@ static int run(const command *self, int argc, char **argv)
          .value_name = "FILE",
          .help = "write the counts to this file"},
     };
-    operands data;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &data);
-    if (code >= 0)
-        return code;
-    def.mesh = mesh;
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
     gbt_error err = {0};
-    return command_failed(gbt_init(data.value[0], &def, out, json, stdout, &err), &err);
+    return command_failed(gbt_init(given->value[0], &def, out, json, stdout, &err), &err);
 }
 
 const command command_init = {
     .name = "init",
     .summary = "compute granular balls and anchors of a data set, and compare them with the voxel baseline",
     .usage = "DATA -o FILE.ply",
+    .options = options,
+    .min_operands = 1,
+    .max_operands = 1,
     .run = run};

@@ -16,12 +16,13 @@ static const command_word *scene_words(void)
     return words;
 }
 
-static int run(const command *self, int argc, char **argv)
+static gbt_make_scene_def def;
+static const char *out;
+
+static const option *options(int *count)
 {
-    gbt_make_scene_def def = gbt_make_scene_def_default();
-    const char *out = NULL;
-    bool depth = false, distorted = false;
-    const option options[] = {
+    def = gbt_make_scene_def_default();
+    static const option rows[] = {
         {.name = "output",
          .short_name = 'o',
          .kind = OPTION_STRING,
@@ -46,6 +47,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "views",
          .kind = OPTION_INT,
          .value = &def.view_count,
+         .field = "view_count",
          .min = 3,
          .max = 9999,
          .value_name = "N",
@@ -72,19 +74,19 @@ static int run(const command *self, int argc, char **argv)
          .value_name = "N",
          .help = "rays per pixel at most"},
         {.name = "seed", .kind = OPTION_UINT64, .value = &def.seed, .value_name = "S", .help = "random seed"},
-        {.name = "depth", .kind = OPTION_FLAG, .value = &depth, .help = "also write exact depth images"},
+        {.name = "depth", .kind = OPTION_FLAG, .value = &def.depth, .help = "also write exact depth images"},
         {.name = "distorted",
          .kind = OPTION_FLAG,
-         .value = &distorted,
+         .value = &def.distorted,
          .help = "cameras with lens distortion"},
     };
-    operands name;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &name);
-    if (code >= 0)
-        return code;
-    def.name = name.value[0];
-    def.depth = depth;
-    def.distorted = distorted;
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
+    def.name = given->value[0];
     gbt_error err = {0};
     const gbt_status status = gbt_make_scene(&def, out, &err);
     if (status == GBT_OK)
@@ -96,5 +98,8 @@ const command command_make_scene = {
     .name = "make-scene",
     .summary = "a procedural scene with known geometry, written as photos and a COLMAP model",
     .usage = "NAME -o DIR",
+    .options = options,
+    .min_operands = 1,
+    .max_operands = 1,
     .run = run,
     .words = scene_words};

@@ -6,9 +6,6 @@
 
 #include "cli/options.h"
 #include "gbtrace/evaluate.h"
-#include "gbtrace/train.h"
-
-static const char splits[] = "test|train|all";
 
 /** "1280x720", nothing more. */
 static bool read_size(const char *text, int *width, int *height)
@@ -19,12 +16,13 @@ static bool read_size(const char *text, int *width, int *height)
            *height > 0;
 }
 
-static int run(const command *self, int argc, char **argv)
+static gbt_render_def def;
+static const char *out, *size;
+
+static const option *options(int *count)
 {
-    gbt_render_def def = gbt_render_def_default();
-    const char *out = NULL, *split = "test", *size = NULL;
-    int threads = 0;
-    const option options[] = {
+    def = gbt_render_def_default();
+    static const option rows[] = {
         {.name = "output",
          .short_name = 'o',
          .kind = OPTION_STRING,
@@ -36,24 +34,27 @@ static int run(const command *self, int argc, char **argv)
          .short_name = 'm',
          .kind = OPTION_OPERAND,
          .value_name = "RUN",
-         .help = "the same as RUN"},
+         .help = "the same as RUN",
+         .rare = true},
         {.name = "split",
          .kind = OPTION_CHOICE,
-         .value = &split,
-         .choices = splits,
+         .value = &def.split,
+         .choices = GBT_SPLIT_NAMES,
          .help = "which views of the data set"},
         {.name = "skip-train",
          .kind = OPTION_CHOICE,
-         .value = &split,
-         .choices = splits,
+         .value = &def.split,
+         .choices = GBT_SPLIT_NAMES,
          .fixed = "test",
-         .help = "the same as --split test"},
+         .help = "the same as --split test",
+         .rare = true},
         {.name = "skip-test",
          .kind = OPTION_CHOICE,
-         .value = &split,
-         .choices = splits,
+         .value = &def.split,
+         .choices = GBT_SPLIT_NAMES,
          .fixed = "train",
-         .help = "the same as --split train"},
+         .help = "the same as --split train",
+         .rare = true},
         {.name = "iteration", .kind = OPTION_ELSEWHERE, .help = "a run keeps its last model alone"},
         {.name = "camera",
          .kind = OPTION_STRING,
@@ -73,22 +74,27 @@ static int run(const command *self, int argc, char **argv)
          .value = &def.look_at,
          .value_name = "X,Y,Z",
          .help = "orbit: the point to look at, in the data set's coordinates; default: where the photos' "
-                 "cameras look"},
+                 "cameras look",
+         .rare = true},
         {.name = "radius",
          .kind = OPTION_DOUBLE,
          .value = &def.orbit_radius,
+         .field = "orbit_radius",
          .min = 0,
          .max = 1e9,
          .value_name = "R",
-         .help = "orbit: its radius, scene units; 0: as far as the photos' cameras"},
+         .help = "orbit: its radius, scene units; 0: as far as the photos' cameras",
+         .rare = true},
         {.name = "height",
          .kind = OPTION_DOUBLE,
          .value = &def.orbit_height,
+         .field = "orbit_height",
          .min = -1e9,
          .max = 1e9,
          .value_name = "H",
          .help = "orbit: height above the point that it looks at, scene units; default: as high as the "
-                 "photos' cameras"},
+                 "photos' cameras",
+         .rare = true},
         {.name = "frames",
          .kind = OPTION_INT,
          .value = &def.frames,
@@ -102,10 +108,12 @@ static int run(const command *self, int argc, char **argv)
          .min = 0,
          .max = 1000,
          .value_name = "F",
-         .help = "frames per second; 0: as the path file says, else 30"},
+         .help = "frames per second; 0: as the path file says, else 30",
+         .rare = true},
         {.name = "size",
          .kind = OPTION_STRING,
          .value = &size,
+         .field = "width",
          .value_name = "WxH",
          .help = "size of the film, such as 1280x720; default: that of the photos"},
         {.name = "outputs",
@@ -120,7 +128,7 @@ static int run(const command *self, int argc, char **argv)
         {.name = "preset",
          .kind = OPTION_CHOICE,
          .value = &def.preset,
-         .choices = "exact|default|fast",
+         .choices = GBT_PRESET_NAMES,
          .help = "cut-off preset (docs/accuracy.md); training uses default"},
         {.name = "insert",
          .kind = OPTION_STRING,
@@ -136,12 +144,12 @@ static int run(const command *self, int argc, char **argv)
         {.name = "renderer",
          .kind = OPTION_CHOICE,
          .value = &def.renderer,
-         .choices = "trace|raster|per-ray|reference",
+         .choices = GBT_RENDERER_NAMES,
          .help = "renderer; default: the one it was trained with. reference: double precision, slow"},
         {.name = "format",
          .kind = OPTION_CHOICE,
          .value = &def.format,
-         .choices = "png|exr",
+         .choices = GBT_PICTURE_FORMAT_NAMES,
          .help = "8-bit PNG, or float EXR"},
         {.name = "downscale",
          .short_name = 'd',
@@ -152,37 +160,30 @@ static int run(const command *self, int argc, char **argv)
          .value_name = "F",
          .help = "divide the photos' width and height by this; 0: as in training",
          .aliases = "r resolution"},
-        {.name = "threads",
-         .kind = OPTION_INT,
-         .value = &threads,
-         .min = 0,
-         .max = 1024,
-         .value_name = "T",
-         .help = THREADS_HELP},
+        THREADS_OPTION,
     };
-    operands model;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &model);
-    if (code >= 0)
-        return code;
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
     if (size != NULL && !read_size(size, &def.width, &def.height))
         return command_misused("--size: bad value (wanted WxH like 1280x720, got %.80s)", size);
-    if (threads > 0)
-        gbt_set_threads(threads);
+    static const char *const split_names[] = {"test", "train", "all"};
     char folder[4096];
     if (out == NULL) {
         struct stat info;
-        if (stat(model.value[0], &info) != 0 || !S_ISDIR(info.st_mode))
-            return command_misused("--output is missing (usage: gbtrace %s %s)", self->name, self->usage);
-        if (snprintf(folder, sizeof folder, "%s/renders%s%s", model.value[0], def.camera == NULL ? "/" : "",
-                     def.camera == NULL ? split : "") >= (int)sizeof folder)
-            return command_misused("%.60s...: the path is too long", model.value[0]);
+        if (stat(given->value[0], &info) != 0 || !S_ISDIR(info.st_mode))
+            return command_misused("--output is missing (usage: gbtrace %s %s)", command_render.name,
+                                   command_render.usage);
+        if (snprintf(folder, sizeof folder, "%s/renders%s%s", given->value[0], def.camera == NULL ? "/" : "",
+                     def.camera == NULL ? split_names[def.split] : "") >= (int)sizeof folder)
+            return command_misused("%.60s...: the path is too long", given->value[0]);
         out = folder;
     }
-    def.split = strcmp(split, "train") == 0 ? GBT_SPLIT_TRAIN
-                : strcmp(split, "all") == 0 ? GBT_SPLIT_ALL
-                                            : GBT_SPLIT_TEST;
     gbt_error err = {0};
-    const gbt_status status = gbt_render(model.value[0], out, &def, &err);
+    const gbt_status status = gbt_render(given->value[0], out, &def, &err);
     if (status == GBT_OK)
         printf("%s\n", out);
     return command_failed(status, &err);
@@ -191,4 +192,7 @@ static int run(const command *self, int argc, char **argv)
 const command command_render = {.name = "render",
                                 .summary = "render the views of a scene, a camera of your own, or a film",
                                 .usage = "RUN|GAUSSIANS [-o DIR]",
+                                .options = options,
+                                .min_operands = 1,
+                                .max_operands = 1,
                                 .run = run};

@@ -3,17 +3,16 @@
 #include "cli/options.h"
 #include "gbtrace/evaluate.h"
 
-static int run(const command *self, int argc, char **argv)
+static int run(const operands *given)
 {
-    operands given;
-    const int code = options_parse(self, NULL, 0, 1, OPTIONS_MAX_OPERANDS, argc, argv, &given);
-    if (code >= 0)
-        return code;
     gbt_error err = {0};
-    return command_failed(gbt_report(given.value[0], given.value + 1, (size_t)given.count - 1, &err), &err);
+    return command_failed(gbt_report(given->value[0], given->value + 1, (size_t)given->count - 1, &err),
+                          &err);
 }
 
 const command command_report = {.name = "report",
                                 .summary = "write the report of a run again, with the charts of studies",
                                 .usage = "RUN [STUDY...]",
+                                .min_operands = 1,
+                                .max_operands = OPTIONS_MAX_OPERANDS,
                                 .run = run};

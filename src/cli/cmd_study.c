@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "cli/options.h"
-#include "gbtrace/train.h"
 #include "lab/lab.h"
 
 /* What the command line says, for all studies. */
@@ -72,21 +71,19 @@ static const struct {
 
 static const command_word *words_of_studies(void) { return study_words; }
 
-static int run(const command *self, int argc, char **argv)
+static study_request request;
+static int seeds;
+static double downscale = 1;
+static uint64_t iterations;
+
+static const option *options(int *count)
 {
-    study_request request = {.def = lab_study_def_default(),
-                             .stability = lab_stability_def_default(),
-                             .paper = lab_paper_def_default(),
-                             .time = lab_time_def_default(),
-                             .anchors = lab_anchors_def_default()};
-    bool quick = false;
-    lab_study_def *def = &request.def;
-    lab_paper_def *paper = &request.paper;
-    lab_anchors_def *anchors = &request.anchors;
-    int threads = 0, seeds = 0;
-    double downscale = 1;
-    uint64_t iterations = 0;
-    const option options[] = {
+    request = (study_request){.def = lab_study_def_default(),
+                              .stability = lab_stability_def_default(),
+                              .paper = lab_paper_def_default(),
+                              .time = lab_time_def_default(),
+                              .anchors = lab_anchors_def_default()};
+    static const option rows[] = {
         {.name = "output",
          .short_name = 'o',
          .kind = OPTION_STRING,
@@ -96,17 +93,18 @@ static int run(const command *self, int argc, char **argv)
          .required = true},
         {.name = "camera",
          .kind = OPTION_STRING,
-         .value = &def->camera,
+         .value = &request.def.camera,
          .value_name = "FILE.json",
          .help =
              "speed, crosscheck: the camera of files of plain Gaussians; default: camera.json beside each"},
         {.name = "repeats",
          .kind = OPTION_INT,
-         .value = &def->repeats,
+         .value = &request.def.repeats,
          .min = 1,
          .max = 1000,
          .value_name = "N",
-         .help = "speed: timed passes of each setting; the median is reported"},
+         .help = "speed: timed passes of each setting; the median is reported",
+         .rare = true},
         {.name = "only",
          .kind = OPTION_STRING,
          .value = &request.stability.only,
@@ -116,7 +114,7 @@ static int run(const command *self, int argc, char **argv)
          .help = "stability: only these cases; default: all"},
         {.name = "quick",
          .kind = OPTION_FLAG,
-         .value = &quick,
+         .value = &request.stability.quick,
          .help = "stability: the smaller scenes of its tests"},
         {.name = "iterations",
          .kind = OPTION_UINT64,
@@ -124,22 +122,24 @@ static int run(const command *self, int argc, char **argv)
          .min = 0,
          .max = 1e9,
          .value_name = "N",
-         .help = "paper, anchors: iterations of each run; 0: 3000 and 1000"},
+         .help = "paper, anchors: iterations of each run; 0: 3000 and 1000",
+         .rare = true},
         {.name = "renderer",
          .kind = OPTION_CHOICE,
-         .value = &paper->renderer,
-         .choices = "raster|trace|per-ray",
+         .value = &request.paper.renderer,
+         .choices = GBT_RENDERER_TRAINING_NAMES,
          .help = "paper: renderer of the runs"},
         {.name = "tables",
          .kind = OPTION_STRING,
-         .value = &paper->tables,
+         .value = &request.paper.tables,
          .value_name = "1,3",
          .choices = "1|2|3|4",
          .list = true,
-         .help = "paper: only these of its four tables"},
+         .help = "paper: only these of its four tables",
+         .rare = true},
         {.name = "lpips",
          .kind = OPTION_STRING,
-         .value = &paper->lpips,
+         .value = &request.paper.lpips,
          .value_name = "FILE",
          .help = "paper: " LPIPS_HELP},
         {.name = "budget",
@@ -164,33 +164,28 @@ static int run(const command *self, int argc, char **argv)
          .max = 10,
          .value_name = "N",
          .help = "paper, time, anchors: runs of each variant; 0: 3, 1 and 3"},
-        {.name = "threads",
-         .kind = OPTION_INT,
-         .value = &threads,
-         .min = 0,
-         .max = 1024,
-         .value_name = "T",
-         .help = THREADS_HELP},
+        THREADS_OPTION,
     };
-    operands named;
-    const int code =
-        options_parse(self, options, sizeof options / sizeof *options, 1, 17, argc, argv, &named);
-    if (code >= 0)
-        return code;
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
+    lab_study_def *def = &request.def;
+    lab_paper_def *paper = &request.paper;
+    lab_anchors_def *anchors = &request.anchors;
     size_t which = 0;
-    while (strcmp(named.value[0], study_words[which].name) != 0) /* options_parse() takes no others */
+    while (strcmp(given->value[0], study_words[which].name) != 0) /* options_parse() takes no others */
         which++;
-    if (named.count - 1 < studies[which].models_min)
+    if (given->count - 1 < studies[which].models_min)
         return command_misused("study %s: wanted a model, or data to train on", study_words[which].name);
-    if (named.count - 1 > studies[which].models_max)
+    if (given->count - 1 > studies[which].models_max)
         return command_misused("study %s: \"%.60s\" is one too many", study_words[which].name,
-                               named.value[1 + studies[which].models_max]);
-    if (threads > 0)
-        gbt_set_threads(threads);
-    request.stability.quick = quick;
-    def->models = paper->data = request.time.data = anchors->data = named.value + 1;
+                               given->value[1 + studies[which].models_max]);
+    def->models = paper->data = request.time.data = anchors->data = given->value + 1;
     def->model_count = paper->data_count = request.time.data_count = anchors->data_count =
-        (size_t)named.count - 1;
+        (size_t)given->count - 1;
     paper->downscale = request.time.downscale = anchors->downscale = downscale;
     if (seeds > 0)
         paper->seeds = request.time.seeds = anchors->seeds = seeds;
@@ -203,6 +198,9 @@ static int run(const command *self, int argc, char **argv)
 const command command_study = {
     .name = "study",
     .summary = "measure and draw charts: speed, accuracy, size, stability, the paper's tables",
-    .usage = "speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR",
+    .usage = "STUDY [MODEL|DATA...] -o DIR",
+    .options = options,
+    .min_operands = 1,
+    .max_operands = 17,
     .run = run,
     .words = words_of_studies};

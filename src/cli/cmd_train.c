@@ -1,49 +1,71 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_train.c -- gbtrace train. */
+#include <string.h>
+
 #include "cli/finish_run.h"
 #include "cli/options.h"
 #include "cli/train_options.h"
 
-static int run(const command *self, int argc, char **argv)
+static gbt_train_def def;
+static const char *output, *eval_at;
+static bool lossless;
+
+static const option own_rows[] = {
+    {.name = "output",
+     .short_name = 'o',
+     .kind = OPTION_STRING,
+     .value = &output,
+     .value_name = "RUN",
+     .help = "folder for the model, scores and report",
+     .aliases = "m model-path",
+     .required = true},
+    {.name = "source-path",
+     .short_name = 's',
+     .kind = OPTION_OPERAND,
+     .value_name = "DATA",
+     .help = "the same as DATA",
+     .aliases = "data",
+     .rare = true},
+    {.name = "lossless",
+     .kind = OPTION_FLAG,
+     .value = &lossless,
+     .help = "store the model without loss (see compress); the file is about seven times larger"},
+    {.name = "eval",
+     .kind = OPTION_STRING,
+     .value = &def.eval_split,
+     .fixed = "every=8",
+     .help = "the same as --eval-split every=8",
+     .rare = true},
+    {.name = "eval-at",
+     .kind = OPTION_STRING,
+     .value = &eval_at,
+     .value_name = "T1,T2",
+     .help = "measure held-out PSNR after these training times, such as 1m,2m; not counted as training time",
+     .rare = true},
+    THREADS_OPTION,
+};
+
+static const option *options(int *count)
 {
-    train_options t;
-    train_options_init(&t);
-    const char *output = NULL;
-    bool lossless = false;
-    const option own[] = {
-        {.name = "output",
-         .short_name = 'o',
-         .kind = OPTION_STRING,
-         .value = &output,
-         .value_name = "RUN",
-         .help = "folder for the model, scores and report",
-         .aliases = "m model-path",
-         .required = true},
-        {.name = "source-path",
-         .short_name = 's',
-         .kind = OPTION_OPERAND,
-         .value_name = "DATA",
-         .help = "the same as DATA",
-         .aliases = "data"},
-        {.name = "lossless",
-         .kind = OPTION_FLAG,
-         .value = &lossless,
-         .help = "store the model without loss (see compress); the file is about seven times larger"},
-    };
-    option options[OPTIONS_MAX];
-    const int count = train_options_table(&t, own, sizeof own / sizeof *own, options);
-    operands data;
-    const int code = options_parse(self, options, count, 0, 1, argc, argv, &data);
-    if (code >= 0)
-        return code;
-    if (data.count == 0 && !t.def.resume)
-        return command_misused("argument missing (usage: gbtrace %s %s)", self->name, self->usage);
+    static option rows[OPTIONS_MAX];
+    def = gbt_train_def_default();
+    memcpy(rows, own_rows, sizeof own_rows);
+    *count = sizeof own_rows / sizeof *own_rows;
+    *count += train_options(&def, rows + *count);
+    return rows;
+}
+
+static int run(const operands *given)
+{
+    if (given->count == 0 && !def.resume)
+        return command_misused("argument missing (usage: gbtrace %s %s)", command_train.name,
+                               command_train.usage);
     gbt_error err = {0};
-    gbt_status status = train_options_finish(&t, "gbtrace train", argc, argv, &err);
+    gbt_status status = train_options_finish(&def, eval_at, given, &err);
     if (status == GBT_OK)
-        status = gbt_train(data.count > 0 ? data.value[0] : NULL, output, &t.def, &err);
+        status = gbt_train(given->count > 0 ? given->value[0] : NULL, output, &def, &err);
     if (status == GBT_OK)
-        status = finish_run(output, lossless, t.def.tensorboard, &err);
+        status = finish_run(output, lossless, def.tensorboard, &err);
     if (status == GBT_OK)
         finish_run_say(output);
     return command_failed(status, &err);
@@ -52,4 +74,6 @@ static int run(const command *self, int argc, char **argv)
 const command command_train = {.name = "train",
                                .summary = "train on posed photos, score the held-out ones, write a report",
                                .usage = "DATA -o RUN",
+                               .options = options,
+                               .max_operands = 1,
                                .run = run};

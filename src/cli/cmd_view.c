@@ -4,7 +4,6 @@
 
 #include "cli/options.h"
 #include "cli/progress.h"
-#include "gbtrace/train.h"
 #include "gbtrace/view.h"
 
 static void print_address(const char *url, void *context)
@@ -15,17 +14,19 @@ static void print_address(const char *url, void *context)
     progress_say("open this in a browser; Ctrl-C ends");
 }
 
-static int run(const command *self, int argc, char **argv)
+static gbt_view_def def;
+
+static const option *options(int *count)
 {
-    gbt_view_def def = gbt_view_def_default();
-    int threads = 0;
+    def = gbt_view_def_default();
     def.ready = print_address;
-    const option options[] = {
+    static const option rows[] = {
         {.name = "model-path",
          .short_name = 'm',
          .kind = OPTION_OPERAND,
          .value_name = "RUN",
-         .help = "the same as RUN"},
+         .help = "the same as RUN",
+         .rare = true},
         {.name = "port",
          .short_name = 'p',
          .kind = OPTION_INT,
@@ -46,26 +47,23 @@ static int run(const command *self, int argc, char **argv)
          .value_name = "DATA",
          .help = "photos of another data set",
          .aliases = "s source-path"},
-        {.name = "threads",
-         .kind = OPTION_INT,
-         .value = &threads,
-         .min = 0,
-         .max = 1024,
-         .value_name = "T",
-         .help = THREADS_HELP},
+        THREADS_OPTION,
     };
-    operands input;
-    const int code = options_parse(self, options, sizeof options / sizeof *options, 1, 1, argc, argv, &input);
-    if (code >= 0)
-        return code;
-    if (threads > 0)
-        gbt_set_threads(threads);
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
     gbt_error err = {0};
-    return command_failed(gbt_view(input.value[0], &def, &err), &err);
+    return command_failed(gbt_view(given->value[0], &def, &err), &err);
 }
 
 const command command_view = {.name = "view",
                               .summary =
                                   "view a scene in the browser beside its photos, also during training",
                               .usage = "RUN|MODEL.gbt|SCENE.ply|.splat|.spz",
+                              .options = options,
+                              .min_operands = 1,
+                              .max_operands = 1,
                               .run = run};

@@ -5,6 +5,9 @@
 
 #include "gbtrace/status.h"
 
+struct option;
+struct operands;
+
 typedef struct command_word {
     const char *name;
     const char *help; /* one line, for --help and the manual page */
@@ -14,15 +17,17 @@ typedef struct command {
     const char *name;
     const char *summary; /* one line, for the list of commands */
     const char *usage;   /* operands and the options that it needs, for example "DATA -o FILE.ply" */
-    int (*run)(const struct command *self, int argc, char **argv); /* arguments after the name; returns the
-                                                                      exit code */
-    const char *alias;                                             /* a second name, or NULL */
-    const command_word *(*words)(void); /* what the first operand may be, up to a name of NULL; NULL:
-                                           anything, such as a path */
+    const struct option *(*options)(int *count); /* its rows, static: their places hold the defaults. NULL:
+                                                    it has none of its own */
+    int min_operands, max_operands;              /* how many arguments without a dash */
+    int (*run)(const struct operands *given);    /* after the command line was read; returns the exit code */
+    const char *alias;                           /* a second name, or NULL */
+    const command_word *(*words)(void);          /* what the first operand may be, up to a name of NULL; NULL:
+                                                    anything, such as a path */
 } command;
 
-/** One `error: ...` line on stderr for a failure (control characters become ?); returns the exit code that
-    belongs to the status. */
+/** One `error: ...` line on stderr for a failure (control characters become ?), with options for the fields
+   that it names; returns the exit code that belongs to the status. */
 int command_failed(gbt_status status, const gbt_error *err);
 
 /** The same for the caller's own text: usage, exit code 2. */

@@ -2,14 +2,13 @@
 /* cli/describe_bash.c -- completion for bash. */
 #include "cli/describe.h"
 
-static void write_names(const command *self, const option *options, int option_count, void *context)
+static void write_names(const command *self, const option_table *t, FILE *out)
 {
-    FILE *out = context;
     fprintf(out, "    %s%s%s) options='", self->name, self->alias != NULL ? "|" : "",
             self->alias != NULL ? self->alias : "");
-    for (int i = 0; i < option_count; i++)
-        if (options[i].kind != OPTION_ELSEWHERE)
-            describe_names(out, &options[i], " ", false);
+    for (int i = 0; i < t->count; i++)
+        if (t->rows[i].kind != OPTION_ELSEWHERE)
+            describe_names(out, &t->rows[i], " ", false);
     fputs("' ;;\n", out);
 }
 
@@ -22,11 +21,10 @@ static void write_pattern(FILE *out, const command *self, const option *o)
     fputs(") ", out);
 }
 
-static void write_values(const command *self, const option *options, int option_count, void *context)
+static void write_values(const command *self, const option_table *t, FILE *out)
 {
-    FILE *out = context;
-    for (int i = 0; i < option_count; i++) {
-        const option *o = &options[i];
+    for (int i = 0; i < t->count; i++) {
+        const option *o = &t->rows[i];
         const value_kind kind = describe_value(o);
         if (kind == VALUE_NONE)
             continue;
@@ -69,8 +67,11 @@ void describe_bash(FILE *out)
           out);
     write_command_words(out);
     fputs("' want=none ;;\n", out);
-    for (int i = 0; i < command_list_count; i++)
-        options_visit(command_list[i], write_names, out);
+    for (int i = 0; i < command_list_count; i++) {
+        option_table t;
+        options_table(command_list[i], &t);
+        write_names(command_list[i], &t, out);
+    }
     fputs("    esac\n"
           "    if [ \"$COMP_CWORD\" = 2 ]; then\n"
           "        case $command in\n",
@@ -86,8 +87,11 @@ void describe_bash(FILE *out)
           "    fi\n"
           "    case $command:$before in\n",
           out);
-    for (int i = 0; i < command_list_count; i++)
-        options_visit(command_list[i], write_values, out);
+    for (int i = 0; i < command_list_count; i++) {
+        option_table t;
+        options_table(command_list[i], &t);
+        write_values(command_list[i], &t, out);
+    }
     fputs("    esac\n"
           "    if [[ $current = -* ]]; then\n"
           "        COMPREPLY=($(compgen -W \"$options\" -- \"$current\"))\n"

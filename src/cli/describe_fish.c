@@ -9,11 +9,10 @@ static void write_note(FILE *out, const char *text)
     fputs("'\n", out);
 }
 
-static void write_rows(const command *self, const option *options, int option_count, void *context)
+static void write_rows(const command *self, const option_table *t, FILE *out)
 {
-    FILE *out = context;
-    for (int i = 0; i < option_count; i++) {
-        const option *o = &options[i];
+    for (int i = 0; i < t->count; i++) {
+        const option *o = &t->rows[i];
         if (o->kind == OPTION_ELSEWHERE)
             continue;
         fprintf(out, "complete -c gbtrace -n '__fish_seen_subcommand_from %s' -l %s", self->name, o->name);
@@ -66,6 +65,9 @@ void describe_fish(FILE *out)
         fprintf(out, "complete -c gbtrace -n __fish_use_subcommand -f -a %s", command_list[i]->name);
         write_note(out, command_list[i]->summary);
     }
-    for (int i = 0; i < command_list_count; i++)
-        options_visit(command_list[i], write_rows, out);
+    for (int i = 0; i < command_list_count; i++) {
+        option_table t;
+        options_table(command_list[i], &t);
+        write_rows(command_list[i], &t, out);
+    }
 }

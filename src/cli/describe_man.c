@@ -33,12 +33,10 @@ static void write_text(FILE *out, const char *text)
         }
 }
 
-static void write_rows(const command *self, const option *options, int option_count, void *context)
+static void write_rows(const option_table *t, FILE *out)
 {
-    FILE *out = context;
-    (void)self;
-    for (int i = 0; i < option_count - OPTIONS_COMMON; i++) {
-        const option *o = &options[i];
+    for (int i = 0; i < t->own; i++) {
+        const option *o = &t->rows[i];
         if (o->kind == OPTION_ELSEWHERE)
             continue;
         const char *value_name = options_value_name(o);
@@ -56,7 +54,7 @@ static void write_rows(const command *self, const option *options, int option_co
         }
         fputc('\n', out);
         write_text(out, o->help);
-        options_notes(o, notes, sizeof notes);
+        options_notes(o, true, notes, sizeof notes);
         write_text(out, notes);
         fputc('\n', out);
     }
@@ -91,7 +89,9 @@ static const char tail[] =
     "Progress on standard error: text, one JSON object per line, or warnings and errors only.\n"
     ".TP\n\\fB\\-\\-quiet\\fR\nThe same as\n.BR \"\\-\\-progress none\" .\n"
     ".TP\n\\fB\\-h\\fR, \\fB\\-\\-help\\fR\n"
-    "List the options of the command.\n"
+    "List the options that most people need.\n"
+    ".TP\n\\fB\\-\\-help\\-all\\fR\n"
+    "List all options of the command.\n"
     ".SH ENVIRONMENT\n"
     ".TP\n\\fBGBTRACE_\\fIOPTION\\fR\n"
     "Value of an option, for every command that has it: its name in capitals, with underscores for dashes.\n"
@@ -143,7 +143,9 @@ void describe_man(FILE *out)
             write_text(out, words[w].help);
             fputc('\n', out);
         }
-        options_visit(c, write_rows, out);
+        option_table t;
+        options_table(c, &t);
+        write_rows(&t, out);
     }
     fputs(tail, out);
 }

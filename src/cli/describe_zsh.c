@@ -11,13 +11,12 @@ static void write_note(FILE *out, const char *text)
         fprintf(out, *text == '\'' ? "'\\''" : strchr("[]:\\", *text) != NULL ? "\\%c" : "%c", *text);
 }
 
-static void write_rows(const command *self, const option *options, int option_count, void *context)
+static void write_rows(const command *self, const option_table *t, FILE *out)
 {
-    FILE *out = context;
     fprintf(out, "  %s%s%s)\n    _arguments -S", self->name, self->alias != NULL ? "|" : "",
             self->alias != NULL ? self->alias : "");
-    for (int i = 0; i < option_count; i++) {
-        const option *o = &options[i];
+    for (int i = 0; i < t->count; i++) {
+        const option *o = &t->rows[i];
         if (o->kind == OPTION_ELSEWHERE)
             continue;
         fputs(" \\\n      ", out);
@@ -80,8 +79,11 @@ void describe_zsh(FILE *out)
           "  case $command in\n"
           "  help) _describe command commands ;;\n",
           out);
-    for (int i = 0; i < command_list_count; i++)
-        options_visit(command_list[i], write_rows, out);
+    for (int i = 0; i < command_list_count; i++) {
+        option_table t;
+        options_table(command_list[i], &t);
+        write_rows(command_list[i], &t, out);
+    }
     fputs("  esac\n"
           "}\n"
           "# Read as a function of completion, or by source.\n"

@@ -4,8 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "cli/command.h"
+#include "cli/options.h"
 #include "cli/progress.h"
+#include "gbtrace/train.h"
 #include "gbtrace/version.h"
 
 enum { NAMES_MAX = 64 };
@@ -44,6 +45,17 @@ static int unknown(const char *name)
     return command_misused("%.100s: unknown command (see gbtrace --help)", name);
 }
 
+static int run(const command *self, int argc, char **argv)
+{
+    static operands given;
+    const int code = options_parse(self, argc, argv, &given);
+    if (code >= 0)
+        return code;
+    if (options_threads > 0)
+        gbt_set_threads(options_threads);
+    return self->run(&given);
+}
+
 static int dispatch(int argc, char **argv)
 {
     if (argc < 2)
@@ -59,10 +71,10 @@ static int dispatch(int argc, char **argv)
         if (argc == 2)
             return print_help();
         const command *about = find(argv[2]);
-        return about == NULL ? unknown(argv[2]) : about->run(about, 1, (char *[]){"--help", NULL});
+        return about == NULL ? unknown(argv[2]) : run(about, 1, (char *[]){"--help", NULL});
     }
     const command *found = find(verb);
-    return found == NULL ? unknown(verb) : found->run(found, argc - 2, argv + 2);
+    return found == NULL ? unknown(verb) : run(found, argc - 2, argv + 2);
 }
 
 int main(int argc, char **argv)

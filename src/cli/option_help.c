@@ -41,7 +41,18 @@ static bool row_is(const option *o, const char *typed, size_t length)
             return true;
         name += end + strspn(name + end, " ");
     }
-    return false;
+    return o->kind != OPTION_FLAG_OFF && options_is_field(o, typed, length);
+}
+
+bool options_is_field(const option *o, const char *name, size_t length)
+{
+    const char *field = o->field != NULL ? o->field : o->name;
+    if (o->kind == OPTION_ELSEWHERE || strlen(field) != length)
+        return false;
+    for (size_t i = 0; i < length; i++)
+        if ((field[i] == '_' ? '-' : field[i]) != (name[i] == '_' ? '-' : name[i]))
+            return false;
+    return true;
 }
 
 int options_find(const option *options, int option_count, const char *name, size_t length)
@@ -84,6 +95,18 @@ static void add_size(char *out, size_t size, double bytes)
         add(out, size, " (default %g%.*s)", bytes, unit > 0, unit > 0 ? &"KMGT"[unit - 1] : "");
 }
 
+/** What stands for "as it was trained" has no name. */
+static void add_choice(char *out, size_t size, const char *choices, int index)
+{
+    const char *name = choices;
+    for (; name != NULL && index > 0; index--) {
+        name = strchr(name, '|');
+        name = name != NULL ? name + 1 : NULL;
+    }
+    if (name != NULL)
+        add(out, size, " (default %.*s)", (int)strcspn(name, "|"), name);
+}
+
 static void add_default(const option *o, char *out, size_t size)
 {
     switch (o->kind) {
@@ -111,8 +134,10 @@ static void add_default(const option *o, char *out, size_t size)
     case OPTION_SIZE:
         add_size(out, size, (double)*(const size_t *)o->value);
         return;
-    case OPTION_STRING:
-    case OPTION_CHOICE: {
+    case OPTION_CHOICE:
+        add_choice(out, size, o->choices, *(const int *)o->value);
+        return;
+    case OPTION_STRING: {
         const char *text = *(const char *const *)o->value;
         if (text != NULL && text[0] != '\0')
             add(out, size, " (default %s)", text);
@@ -121,14 +146,24 @@ static void add_default(const option *o, char *out, size_t size)
     }
 }
 
-void options_notes(const option *o, char *out, size_t size)
+/** Help that tells what 0 stands for says enough of the default 0. */
+static bool explains_zero(const option *o, const char *note)
+{
+    const char *zero = strstr(o->help, "0: ");
+    return zero != NULL && (zero == o->help || zero[-1] == ' ') &&
+           (strcmp(note, " (default 0)") == 0 || strcmp(note, " (default 0s)") == 0);
+}
+
+void options_notes(const option *o, bool names, char *out, size_t size)
 {
     out[0] = '\0';
     if (o->required)
         add(out, size, " (needed)");
     else if (o->fixed == NULL)
         add_default(o, out, size);
-    const char *name = o->aliases != NULL ? o->aliases : "";
+    if (explains_zero(o, out))
+        out[0] = '\0';
+    const char *name = names && o->aliases != NULL ? o->aliases : "";
     for (const char *before = " (also "; *name != '\0'; before = ", ") {
         const int end = (int)strcspn(name, " ");
         add(out, size, "%s%s%.*s", before, end > 1 ? "--" : "-", end, name);
@@ -140,7 +175,44 @@ void options_notes(const option *o, char *out, size_t size)
 
 /* ---- help ---- */
 
-void options_print_help(const command *self, const option *options, int option_count)
+enum { HELP_COLUMNS = 100, HELP_INDENT = 30 };
+
+/** `text` from column `at` on, its further lines indented. */
+static void print_wrapped(const char *text, int at)
+{
+    bool first = true;
+    while (*text != '\0') {
+        const int length = (int)strcspn(text, " ");
+        if (at + 1 + length > HELP_COLUMNS) {
+            printf("\n%*s", HELP_INDENT, "");
+            at = HELP_INDENT;
+        } else if (!first) {
+            putchar(' ');
+            at++;
+        }
+        first = false;
+        printf("%.*s", length, text);
+        at += length;
+        text += length + strspn(text + length, " ");
+    }
+    putchar('\n');
+}
+
+static void print_row(const option *o, bool all)
+{
+    char left[256], text[1024], notes[512], short_text[8] = "    ";
+    const char *value_name = options_value_name(o);
+    if (o->short_name != 0)
+        snprintf(short_text, sizeof short_text, "-%c, ", o->short_name);
+    const int used = snprintf(left, sizeof left, "  %s--%s%s%s", short_text, o->name,
+                              value_name[0] != '\0' ? " " : "", value_name);
+    options_notes(o, all, notes, sizeof notes);
+    snprintf(text, sizeof text, "%s%s", o->help, notes);
+    printf("%-*s", used > HELP_INDENT - 2 ? used + 2 : HELP_INDENT, left);
+    print_wrapped(text, used > HELP_INDENT - 2 ? used + 2 : HELP_INDENT);
+}
+
+void options_print_help(const command *self, const option_table *t, bool all)
 {
     printf("usage: gbtrace %s %s%s[options]\n\n%s\n\n", self->name, self->usage,
            self->usage[0] != '\0' ? " " : "", self->summary);
@@ -149,18 +221,7 @@ void options_print_help(const command *self, const option *options, int option_c
         printf("%s  %-12s%s\n%s", i == 0 ? "the first argument is one of:\n" : "", words[i].name,
                words[i].help, words[i + 1].name == NULL ? "\n" : "");
     puts("options:");
-    for (int i = 0; i < option_count; i++) {
-        const option *o = &options[i];
-        if (o->kind == OPTION_ELSEWHERE)
-            continue;
-        char left[128], notes[512], short_text[8] = "    ";
-        const char *value_name = options_value_name(o);
-        if (o->short_name != 0)
-            snprintf(short_text, sizeof short_text, "-%c, ", o->short_name);
-        const int used = snprintf(left, sizeof left, "  %s--%s%s%s", short_text, o->name,
-                                  value_name[0] != '\0' ? " " : "", value_name);
-        options_notes(o, notes, sizeof notes);
-        printf(used > 30 ? "%s\n%32s" : "%-32s%s", left, "");
-        printf("%s%s\n", o->help, notes);
-    }
+    for (int i = 0; i < t->count; i++)
+        if (t->rows[i].kind != OPTION_ELSEWHERE && (all || !t->rows[i].rare))
+            print_row(&t->rows[i], all);
 }

@@ -62,6 +62,20 @@ static char *trim(char *text)
     return text;
 }
 
+/** The row that a line names, or -1: also `grow` for --no-grow, which it then says the inverse of. */
+static int find_configured(const option *options, int option_count, const char *name, bool *is_inverse)
+{
+    const size_t length = strlen(name);
+    const int found = length > 1 ? options_find(options, option_count, name, length) : -1;
+    for (int i = 0; i < option_count && found < 0; i++)
+        if (options[i].kind == OPTION_FLAG_OFF && options[i].field != NULL &&
+            options_is_field(&options[i], name, length)) {
+            *is_inverse = true;
+            return i;
+        }
+    return found;
+}
+
 int options_read_config(const char *path, const option *options, int option_count, bool *given)
 {
     char *text;
@@ -82,7 +96,8 @@ int options_read_config(const char *path, const option *options, int option_coun
         *value++ = '\0';
         name = trim(name);
         value = trim(value);
-        const int i = strlen(name) > 1 ? options_find(options, option_count, name, strlen(name)) : -1;
+        bool is_inverse = false;
+        const int i = find_configured(options, option_count, name, &is_inverse);
         if (i < 0 || !may_stand_here(&options[i]))
             return config_failed(GBT_ERR_FORMAT, path, line, ": unknown option", name);
         if (given[i])
@@ -91,8 +106,11 @@ int options_read_config(const char *path, const option *options, int option_coun
             continue; /* no text, which is what a run says of an option that it was not given */
         given[i] = true;
         char wanted[OPTIONS_WANTED_SIZE], what[2 * OPTIONS_WANTED_SIZE] = ": ";
-        if (!options_read_value(&options[i], value, wanted, sizeof wanted)) {
-            options_bad_value(&options[i], wanted, value, what + 2, sizeof what - 2);
+        option row = options[i];
+        if (is_inverse)
+            row.kind = OPTION_FLAG;
+        if (!options_read_value(&row, value, wanted, sizeof wanted)) {
+            options_bad_value(&row, wanted, value, what + 2, sizeof what - 2);
             return config_failed(GBT_ERR_FORMAT, path, line, what, name);
         }
     }

@@ -133,16 +133,18 @@ static bool read_size(const char *text, double min, double max, size_t *out)
     return true;
 }
 
-static bool is_choice(const char *choices, const char *text)
+/** Where `text` stands among "a|b|c"; -1: nowhere. */
+static int find_choice(const char *choices, const char *text)
 {
-    const size_t length = strcspn(text, "|"); /* several choices are not one */
-    if (text[length] != '\0')
-        return false;
-    for (const char *part = choices; part != NULL;
-         part = strchr(part, '|') != NULL ? strchr(part, '|') + 1 : NULL)
-        if (length > 0 && strncmp(part, text, length) == 0 && (part[length] == '|' || part[length] == '\0'))
-            return true;
-    return false;
+    const size_t length = strlen(text);
+    int index = 0;
+    for (const char *part = choices; part != NULL; index++) {
+        if (length > 0 && strcspn(part, "|") == length && strncmp(part, text, length) == 0)
+            return index;
+        part = strchr(part, '|');
+        part = part != NULL ? part + 1 : NULL;
+    }
+    return -1;
 }
 
 bool options_read_value(const option *o, const char *text, char *wanted, size_t wanted_size)
@@ -193,9 +195,10 @@ bool options_read_value(const option *o, const char *text, char *wanted, size_t 
         snprintf(wanted, wanted_size, "a text that is not empty");
         break;
     case OPTION_CHOICE:
-        ok = is_choice(o->choices, text);
+        whole = find_choice(o->choices, text);
+        ok = whole >= 0;
         if (ok)
-            *(const char **)o->value = text;
+            *(int *)o->value = (int)whole;
         snprintf(wanted, wanted_size, "one of %s", o->choices);
         break;
     case OPTION_DURATION:

@@ -11,28 +11,26 @@
 
 enum { GO_ON = -1, TABLE_MAX = OPTIONS_MAX + OPTIONS_COMMON };
 
+int options_threads;
+
 /* ---- the table: a command's own rows, then those that every command has ---- */
 
 static const char progress_modes[] = "auto|json|none";
-static const char *progress_mode, *config_path, *first_operand;
+static const char *config_path, *first_operand;
+static int wanted_progress;
 static bool help_wanted;
 
-typedef struct table {
-    option rows[TABLE_MAX];
-    int own, count;
-} table;
-
-static void make_table(table *t, const option *options, int option_count)
+void options_table(const command *self, option_table *t)
 {
     const option common[OPTIONS_COMMON] = {
         {.name = "progress",
          .kind = OPTION_CHOICE,
-         .value = &progress_mode,
+         .value = &wanted_progress,
          .choices = progress_modes,
-         .help = "progress on stderr: text, JSON lines (docs/command-line.md), or warnings and errors only"},
+         .help = "progress on stderr, as text or JSON (docs/command-line.md)"},
         {.name = "quiet",
          .kind = OPTION_CHOICE,
-         .value = &progress_mode,
+         .value = &wanted_progress,
          .choices = progress_modes,
          .fixed = "none",
          .help = "the same as --progress none"},
@@ -40,41 +38,37 @@ static void make_table(table *t, const option *options, int option_count)
          .kind = OPTION_STRING,
          .value = &config_path,
          .value_name = "FILE",
-         .help = "read options from a file of name = value lines; environment and command line override it"},
+         .help = "read name = value lines; environment and command line override them"},
         {.name = "help",
          .short_name = 'h',
          .kind = OPTION_FLAG,
          .value = &help_wanted,
-         .help = "print this help"},
+         .help = "the options that most people need"},
+        {.name = "help-all",
+         .kind = OPTION_FLAG,
+         .value = &help_wanted,
+         .help = "all options, and other names"},
     };
-    progress_mode = "auto";
+    int own = 0;
+    const option *rows = self->options != NULL ? self->options(&own) : NULL;
+    options_threads = 0;
+    wanted_progress = PROGRESS_AUTO;
     config_path = NULL;
     first_operand = NULL;
     help_wanted = false;
-    if (option_count > 0)
-        memcpy(t->rows, options, (size_t)option_count * sizeof *options);
-    memcpy(t->rows + option_count, common, sizeof common);
-    t->own = option_count;
-    t->count = option_count + OPTIONS_COMMON;
-    for (int i = 0; i < option_count; i++)
+    if (own > 0)
+        memcpy(t->rows, rows, (size_t)own * sizeof *rows);
+    memcpy(t->rows + own, common, sizeof common);
+    t->own = own;
+    t->count = own + OPTIONS_COMMON;
+    for (int i = 0; i < own; i++)
         if (t->rows[i].kind == OPTION_OPERAND)
             t->rows[i].value = &first_operand;
 }
 
-static options_visitor *visitor;
-static void *visitor_context;
-
-void options_visit(const command *c, options_visitor *visit, void *context)
-{
-    visitor = visit;
-    visitor_context = context;
-    c->run(c, 0, (char *[]){NULL});
-    visitor = NULL;
-}
-
 /* ---- arguments ---- */
 
-static int unknown_option(const char *typed, const table *t)
+static int unknown_option(const char *typed, const option_table *t)
 {
     const char *names[TABLE_MAX];
     int count = 0;
@@ -97,7 +91,7 @@ typedef struct argument {
     const char *value; /* behind =, or NULL */
 } argument;
 
-static int take_apart(char *text, const table *t, argument *out)
+static int take_apart(char *text, const option_table *t, argument *out)
 {
     static char label[128];
     *out = (argument){.index = -1, .label = label};
@@ -153,7 +147,7 @@ static int apply(const argument *a, const option *o, int argc, char **argv, int 
  *                     everything
  * @param given  [out] [t->count]
  */
-static int walk(const table *t, bool common, int argc, char **argv, bool *given, operands *out)
+static int walk(const option_table *t, bool common, int argc, char **argv, bool *given, operands *out)
 {
     bool options_ended = false;
     for (int i = 0; i < argc; i++) {
@@ -216,18 +210,17 @@ static int check_words(const command *self, const char *typed)
                            nearest != NULL ? "?" : "");
 }
 
-static int check_complete(const command *self, const table *t, const bool *given, int min_operands,
-                          int max_operands, const operands *out)
+static int check_complete(const command *self, const option_table *t, const bool *given, const operands *out)
 {
     for (int i = 0; i < out->count; i++)
         if (out->value[i][0] == '\0')
             return command_misused("argument %d is empty (usage: gbtrace %s %s)", i + 1, self->name,
                                    self->usage);
-    if (out->count < min_operands)
+    if (out->count < self->min_operands)
         return command_misused("argument missing (usage: gbtrace %s %s)", self->name, self->usage);
-    if (out->count > max_operands)
+    if (out->count > self->max_operands)
         return command_misused("%.100s: one argument too many (usage: gbtrace %s %s)",
-                               out->value[max_operands], self->name, self->usage);
+                               out->value[self->max_operands], self->name, self->usage);
     for (int i = 0; i < t->own; i++)
         if (t->rows[i].required && !given[i])
             return command_misused("--%s is missing (usage: gbtrace %s %s)", t->rows[i].name, self->name,
@@ -237,50 +230,73 @@ static int check_complete(const command *self, const table *t, const bool *given
 
 /* ---- entry ---- */
 
-static bool wants_help(int argc, char **argv)
+/** The table of the command that runs. */
+static option_table current;
+
+void options_name_fields(const char *text, char *out, size_t size)
 {
-    for (int i = 0; i < argc && strcmp(argv[i], "--") != 0; i++)
-        if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0)
-            return true;
-    return false;
+    size_t used = 0;
+    const char *at = text;
+    for (;;) {
+        const size_t length = strspn(at, "abcdefghijklmnopqrstuvwxyz0123456789_");
+        int row = 0;
+        while (row < current.own && !options_is_field(&current.rows[row], at, length))
+            row++;
+        const bool last = at[length] == ':' && at[length + 1] == ' ';
+        if (length == 0 || row == current.own || !(last || strncmp(at + length, ", ", 2) == 0) ||
+            used >= size)
+            break;
+        used += (size_t)snprintf(out + used, size - used, "--%s%s", current.rows[row].name, last ? "" : ", ");
+        at += length + (last ? 0 : 2);
+        if (last) {
+            snprintf(out + (used < size ? used : size), used < size ? size - used : 0, "%s", at);
+            return;
+        }
+    }
+    snprintf(out, size, "%s", text);
 }
 
-int options_parse(const command *self, const option *options, int option_count, int min_operands,
-                  int max_operands, int argc, char **argv, operands *out)
+static const char *help_option(int argc, char **argv)
 {
-    table t;
+    for (int i = 0; i < argc && strcmp(argv[i], "--") != 0; i++)
+        if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0 ||
+            strcmp(argv[i], "--help-all") == 0)
+            return argv[i];
+    return NULL;
+}
+
+int options_parse(const command *self, int argc, char **argv, operands *out)
+{
+    option_table *t = &current;
     bool given[TABLE_MAX] = {false}, before[TABLE_MAX] = {false};
-    out->count = 0;
-    make_table(&t, options, option_count);
-    if (visitor != NULL) {
-        visitor(self, t.rows, t.count, visitor_context);
+    *out = (operands){.argc = argc, .argv = argv};
+    options_table(self, t);
+    const char *help = help_option(argc, argv);
+    if (help != NULL) {
+        options_print_help(self, t, strcmp(help, "--help-all") == 0);
         return 0;
     }
-    if (wants_help(argc, argv)) {
-        options_print_help(self, t.rows, t.count);
-        return 0;
-    }
-    int code = options_read_environment(self, t.rows + t.own, OPTIONS_COMMON, before + t.own);
+    int code = options_read_environment(self, t->rows + t->own, OPTIONS_COMMON, before + t->own);
     if (code == GO_ON)
-        code = walk(&t, true, argc, argv, given, out);
+        code = walk(t, true, argc, argv, given, out);
     if (code == GO_ON)
-        progress_start(progress_mode, self->name);
+        progress_start((progress_mode)wanted_progress, self->name);
     if (code == GO_ON && config_path != NULL)
-        code = options_read_config(config_path, t.rows, t.own, before);
+        code = options_read_config(config_path, t->rows, t->own, before);
     const char *configured_operand = first_operand;
     first_operand = NULL;
     if (code == GO_ON)
-        code = options_read_environment(self, t.rows, t.own, before);
+        code = options_read_environment(self, t->rows, t->own, before);
     memset(given, 0, sizeof given);
     if (code == GO_ON)
-        code = walk(&t, false, argc, argv, given, out);
+        code = walk(t, false, argc, argv, given, out);
     if (code != GO_ON)
         return code;
     if (first_operand != NULL)
         put_first(out, first_operand);
-    else if (configured_operand != NULL && out->count < (min_operands > 0 ? min_operands : 1))
+    else if (configured_operand != NULL && out->count < (self->min_operands > 0 ? self->min_operands : 1))
         put_first(out, configured_operand);
-    for (int i = 0; i < t.count; i++)
+    for (int i = 0; i < t->count; i++)
         given[i] = given[i] || before[i];
-    return check_complete(self, &t, given, min_operands, max_operands, out);
+    return check_complete(self, t, given, out);
 }

@@ -19,7 +19,7 @@ typedef enum option_kind {
     OPTION_FLOAT,    /* float, [min, max], finite */
     OPTION_DOUBLE,   /* double, [min, max], finite */
     OPTION_STRING,   /* const char *, not empty */
-    OPTION_CHOICE,   /* const char *, one of `choices` */
+    OPTION_CHOICE,   /* int or an enum: the place of the value among `choices` */
     OPTION_DURATION, /* double, seconds, [min, max]: 90, 90s, 10m, 10min, 1h, 1h30m */
     OPTION_SIZE,     /* size_t, bytes, [min, max]: 512M, 6G (powers of 1024) */
     OPTION_OPERAND,  /* the first operand by a name that other programs gave it; no `value` */
@@ -38,46 +38,62 @@ typedef struct option {
     bool list;           /* OPTION_STRING: several of `choices` may stand with commas between */
     const char *value_name; /* for help and messages: "N", "FILE"; NULL for flags and choices */
     const char *help;
+    const char *field;   /* what the library calls it, in its errors and in configurations, where that is
+                            another   name; of OPTION_FLAG_OFF what it turns off */
     const char *aliases; /* more names with blanks between, as other programs call it; one letter goes with
                             one dash */
     const char *fixed;   /* OPTION_STRING, OPTION_CHOICE: takes no value, and sets this one */
     bool required;
+    bool rare; /* in --help-all alone */
 } option;
 
 #define LPIPS_HELP "network weights (.safetensors), to compute LPIPS too (docs/metrics.md)"
-#define THREADS_HELP "number of threads; 0: all processors, within the container's limit"
 
-enum { OPTIONS_MAX = 64, OPTIONS_MAX_OPERANDS = 64, OPTIONS_COMMON = 4, OPTIONS_WANTED_SIZE = 256 };
+/** The row of a command that can use several threads; the program gives their number to the library. */
+#define THREADS_OPTION                                                                                       \
+    {                                                                                                        \
+        .name = "threads", .kind = OPTION_INT, .value = &options_threads, .min = 0, .max = 1024,             \
+        .value_name = "T", .help = "threads; 0: all processors, within the container's limit"                \
+    }
+extern int options_threads;
+
+enum { OPTIONS_MAX = 80, OPTIONS_MAX_OPERANDS = 64, OPTIONS_COMMON = 5, OPTIONS_WANTED_SIZE = 256 };
 
 typedef struct operands {
     int count;
     const char *value[OPTIONS_MAX_OPERANDS]; /* borrowed from argv */
+    int argc;                                /* everything as it was typed, after the command's name */
+    char **argv;
 } operands;
 
+/** The rows of a command, the common ones last. */
+typedef struct option_table {
+    option rows[OPTIONS_MAX + OPTIONS_COMMON];
+    int own, count; /* own ones; all */
+} option_table;
+
+void options_table(const command *self, option_table *out);
+
 /**
- * Parse the arguments of a subcommand into the places that the table names.
+ * Parse the arguments of a subcommand into the places that its table names.
  *
- * Takes `--name VALUE`, `--name=VALUE`, `-x VALUE`; `--` ends the options. Three options belong to every
- * command: `--help` prints the help to stdout, `--progress` says how to tell what is going on, `--config
- * FILE` reads `name = value` lines (# starts a comment; flags are true or false). The environment wins over
- * the file (GBTRACE_NAME, and over that GBTRACE_COMMAND_NAME), the command line over both. Strings stay valid
- * until the program ends.
+ * Takes `--name VALUE`, `--name=VALUE`, `-x VALUE`; `--` ends the options. Five options belong to every
+ * command: `--help` and `--help-all` print the help to stdout, `--progress` and `--quiet` say how to tell
+ * what is going on, `--config FILE` reads `name = value` lines (# starts a comment; flags are true or false).
+ * The environment wins over the file (GBTRACE_NAME, and over that GBTRACE_COMMAND_NAME), the command line
+ * over both. Strings stay valid until the program ends.
  *
- * @param options       [in] at most OPTIONS_MAX rows
- * @param min_operands, max_operands [in] how many arguments without a dash are wanted; max at most
- *                      OPTIONS_MAX_OPERANDS
  * @return -1: go on; else the exit code to end with: 0 after --help, 2 for a bad command line or environment
  *         (3 and 4 for a bad --config file), after one line on stderr
  */
-int options_parse(const command *self, const option *options, int option_count, int min_operands,
-                  int max_operands, int argc, char **argv, operands *out);
+int options_parse(const command *self, int argc, char **argv, operands *out);
 
-/** Shown the rows of a command, the common ones last. */
-typedef void options_visitor(const command *self, const option *options, int option_count, void *context);
-
-/** Run `c` only as far as its options_parse(), which calls `visit` in place of parsing: so a table stands in
-    one place alone. */
-void options_visit(const command *c, options_visitor *visit, void *context);
+/**
+ * What the library says of a field, "init_count: ...", as what the user typed: "--init-count: ...". Every
+ * field of a list "a, b: ..." must be an option of the command that was parsed last; any other text stays as
+ * it is.
+ */
+void options_name_fields(const char *text, char *out, size_t size);
 
 /* ---- for the files that make the above ---- */
 
@@ -91,15 +107,19 @@ void options_bad_value(const option *o, const char *wanted, const char *text, ch
     letter. */
 int options_find(const option *options, int option_count, const char *name, size_t length);
 
+/** Whether the library calls a row by this name. */
+bool options_is_field(const option *o, const char *name, size_t length);
+
 bool options_takes_value(const option *o);
 
 /** What stands for its value in a list: choices, a name, or "". */
 const char *options_value_name(const option *o);
 
-/** "(default 2)", "(needed)" or "", and the other names. */
-void options_notes(const option *o, char *out, size_t size);
+/** "(default 2)", "(needed)" or "", and `names`: the other names. */
+void options_notes(const option *o, bool names, char *out, size_t size);
 
-void options_print_help(const command *self, const option *options, int option_count);
+/** @param all [in] rare rows too, and other names */
+void options_print_help(const command *self, const option_table *t, bool all);
 
 /** Values from a `name = value` file, or from the environment, for rows that may come from there. `given`
     [option_count] is set for what was. -1 or an exit code. */

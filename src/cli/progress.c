@@ -56,10 +56,10 @@ static void hear(const gbt_event *e, void *context)
     }
 }
 
-void progress_start(const char *mode, const char *command_name)
+void progress_start(progress_mode mode, const char *command_name)
 {
-    as_json = strcmp(mode, "json") == 0;
-    silent = strcmp(mode, "none") == 0;
+    as_json = mode == PROGRESS_JSON;
+    silent = mode == PROGRESS_NONE;
     if (as_json) {
         setvbuf(stderr, NULL, _IOLBF, BUFSIZ); /* a line at a time: readers see whole objects */
         fputs("{\"event\": \"start\", \"schema\": 1, \"command\": ", stderr);

@@ -6,9 +6,11 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/** "auto", "json" or "none", for the rest of the program. With "json" everything on stderr is JSON from here
-    on (docs/command-line.md). */
-void progress_start(const char *mode, const char *command_name);
+typedef enum progress_mode { PROGRESS_AUTO, PROGRESS_JSON, PROGRESS_NONE } progress_mode;
+
+/** For the rest of the program. With PROGRESS_JSON everything on stderr is JSON from here on
+    (docs/command-line.md). */
+void progress_start(progress_mode mode, const char *command_name);
 
 /** A message of the program's own. */
 void progress_say(const char *format, ...) __attribute__((format(printf, 1, 2)));

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "cli/command.h"
+#include "cli/options.h"
 #include "cli/progress.h"
 
 static void print_error(const char *text)
@@ -19,9 +19,14 @@ static void print_error(const char *text)
 
 int command_failed(gbt_status status, const gbt_error *err)
 {
+    char text[sizeof err->text + 64];
     if (status == GBT_OK)
         return 0;
-    print_error(err->text[0] != '\0' ? err->text : "failed without a reason");
+    if (status == GBT_ERR_ARGUMENT)
+        options_name_fields(err->text, text, sizeof text);
+    else
+        snprintf(text, sizeof text, "%s", err->text);
+    print_error(text[0] != '\0' ? text : "failed without a reason");
     return gbt_status_exit_code(status);
 }
 

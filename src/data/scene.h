@@ -12,6 +12,7 @@
 
 #include "base/image.h"
 #include "gbtrace/camera.h"
+#include "gbtrace/choices.h"
 #include "gbtrace/status.h"
 
 /** What the transparent part of a photo is. */
@@ -89,12 +90,10 @@ gbt_status scene_load(const char *path, const scene_split *split, scene *out, gb
 void scene_free(scene *s);
 
 /**
- * Say what the transparent part of photos is: "black", "white", "mask" or "auto", which is white for
- * Blender's synthetic scenes, as everybody scores them, else black, which is also what scene_load() leaves.
- *
- * @return GBT_OK or GBT_ERR_ARGUMENT ("--alpha: ...")
+ * Say what the transparent part of photos is; GBT_ALPHA_AUTO is white for Blender's synthetic scenes, as
+ * everybody scores them, else black, which is also what scene_load() leaves.
  */
-gbt_status scene_set_alpha(scene *s, const char *name, gbt_error *err);
+void scene_set_alpha(scene *s, gbt_alpha alpha);
 
 /**
  * What is behind everything, when a training photo has an alpha channel and lies on a colour: true, and the

@@ -77,22 +77,14 @@ gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
 
 /* ---- what is transparent ---- */
 
-gbt_status scene_set_alpha(scene *s, const char *name, gbt_error *err)
+void scene_set_alpha(scene *s, gbt_alpha alpha)
 {
-    static const char *const names[] = {
-        [SCENE_ALPHA_BLACK] = "black", [SCENE_ALPHA_WHITE] = "white", [SCENE_ALPHA_MASK] = "mask"};
-    int alpha = strcmp(name, "auto") == 0
-                    ? (strcmp(s->source, "blender") == 0 ? SCENE_ALPHA_WHITE : SCENE_ALPHA_BLACK)
-                    : -1;
-    for (int i = 0; i < 3; i++)
-        if (strcmp(name, names[i]) == 0)
-            alpha = i;
-    if (alpha < 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--alpha: \"%.40s\" (wanted auto, black, white or mask)",
-                         name);
+    if (alpha == GBT_ALPHA_AUTO)
+        alpha = strcmp(s->source, "blender") == 0 ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK;
     for (size_t i = 0; i < s->view_count; i++)
-        s->views[i].alpha = (scene_alpha)alpha;
-    return GBT_OK;
+        s->views[i].alpha = alpha == GBT_ALPHA_WHITE  ? SCENE_ALPHA_WHITE
+                            : alpha == GBT_ALPHA_MASK ? SCENE_ALPHA_MASK
+                                                      : SCENE_ALPHA_BLACK;
 }
 
 bool scene_background(const scene *s, float color[3])

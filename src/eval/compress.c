@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "base/def.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
@@ -14,7 +15,10 @@
 #include "eval/run_sensitivity.h"
 #include "io/model_code.h"
 
-gbt_compress_def gbt_compress_def_default(void) { return (gbt_compress_def){.quality = 60}; }
+gbt_compress_def gbt_compress_def_default(void)
+{
+    return (gbt_compress_def){.quality = 60, .cookie_ = DEF_COOKIE};
+}
 
 /* What is reported. */
 typedef struct compression {
@@ -45,9 +49,8 @@ static gbt_status open_run(const char *run, const gbt_compress_def *def, loaded_
         return GBT_OK;
     *has_views = def->data != NULL || r->data.place[0] != '\0';
     if (!*has_views) {
-        log_info(
-            "%s is not there: the steps come from the model alone (--data DIR says where the data set is)",
-            r->model.data_folder);
+        log_info("%s is not there: the steps come from the model alone (name the folder where it is now)",
+                 r->model.data_folder);
         return GBT_OK;
     }
     loaded_run_close(r);
@@ -165,7 +168,7 @@ static void print_kept(const compression *c, const char *path, const char *out, 
             c->anchors, c->before, (double)c->before / (c->anchors > 0 ? (double)c->anchors : 1),
             itself ? "nothing to do" : out, itself ? "" : " is a copy");
     if (!lossless)
-        fprintf(report, "  --quality below %g makes it smaller\n", gbt_compress_def_default().quality);
+        fprintf(report, "  a quality below %g makes it smaller\n", gbt_compress_def_default().quality);
 }
 
 static gbt_status save_report(const compression *c, const gbt_compress_def *def, gbt_error *err)
@@ -192,8 +195,9 @@ static gbt_status save_report(const compression *c, const gbt_compress_def *def,
 gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report,
                         gbt_error *err)
 {
+    GBT_TRY(def_check(def->cookie_, "gbt_compress_def_default", err));
     if (!def->lossless && !(def->quality >= 20 && def->quality <= 90))
-        return base_fail(err, GBT_ERR_ARGUMENT, "quality: wanted 20 to 90 dB, got %g", def->quality);
+        return base_fail(err, GBT_ERR_ARGUMENT, "quality: %g dB (wanted 20 to 90)", def->quality);
     compression c = {0};
     char path[4096];
     bool has_views = false;

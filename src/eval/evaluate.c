@@ -4,8 +4,9 @@
 #include "gbtrace/evaluate.h"
 
 #include <jansson.h>
-#include <string.h>
 
+#include "base/choice.h"
+#include "base/def.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
@@ -15,7 +16,13 @@
 #include "eval/score_run.h"
 #include "report/report.h"
 
-gbt_evaluate_def gbt_evaluate_def_default(void) { return (gbt_evaluate_def){.report = 1}; }
+gbt_evaluate_def gbt_evaluate_def_default(void)
+{
+    return (gbt_evaluate_def){.renderer = GBT_RENDERER_AS_TRAINED,
+                              .report = true,
+                              .preset = GBT_PRESET_AS_TRAINED,
+                              .cookie_ = DEF_COOKIE};
+}
 
 static void log_scores(const evaluation *e)
 {
@@ -39,13 +46,14 @@ static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_
 {
     GBT_TRY(loaded_run_open(run, def->data, def->downscale, r, err));
     GBT_TRY(loaded_run_preset(def->preset, &r->settings, err));
-    const frame_renderer trained = r->frame.draw.renderer;
-    if (def->renderer != NULL && !frame_renderer_named(def->renderer, &r->frame.draw.renderer))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)",
-                         def->renderer);
+    const gbt_renderer trained = r->frame.draw.renderer;
+    if (def->renderer != GBT_RENDERER_AS_TRAINED) {
+        GBT_TRY(choice_check("renderer", GBT_RENDERER_TRAINING_NAMES, (int)def->renderer, err));
+        r->frame.draw.renderer = def->renderer;
+    }
     const char *data = r->model.data_folder;
     *own = r->frame.draw.renderer == trained && (def->downscale <= 0 || def->downscale == r->def.downscale) &&
-           (def->preset == NULL || strcmp(def->preset, "default") == 0) &&
+           (def->preset == GBT_PRESET_AS_TRAINED || def->preset == GBT_PRESET_DEFAULT) &&
            (def->data == NULL || data[0] == '\0' || !file_exists(data) || file_is_same(def->data, data));
     return GBT_OK;
 }
@@ -64,6 +72,7 @@ static gbt_status write_own(const char *run, const gbt_evaluate_def *def, loaded
 
 gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err)
 {
+    GBT_TRY(def_check(def->cookie_, "gbt_evaluate_def_default", err));
     if (!file_is_folder(run))
         return base_fail(err, GBT_ERR_IO, "%s: not a run folder (wanted what gbtrace train wrote)", run);
     evaluation e = {0};
@@ -79,8 +88,8 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
         status = score_run(r, run, own, net, &e, err);
     if (status == GBT_OK) {
         json_t *metrics = score_files_json(&e, run);
-        if (def->preset != NULL)
-            json_object_set_new(metrics, "preset", json_string(def->preset));
+        if (def->preset != GBT_PRESET_AS_TRAINED)
+            json_object_set_new(metrics, "preset", json_string(CHOICE_NAME(GBT_PRESET_NAMES, def->preset)));
         if (def->data != NULL)
             json_object_set_new(metrics, "data", json_text(def->data));
         if (own)
@@ -96,8 +105,9 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
             "other settings than the run's own: these scores are in %s; %s/metrics.json and report.html stay",
             def->json, run);
     else if (status == GBT_OK && !own)
-        log_info("other settings than the run's own: %s/metrics.json and report.html stay; --json FILE keeps "
-                 "these scores",
+        log_info("other settings than the run's own: %s/metrics.json and report.html stay; a JSON file that "
+                 "is named "
+                 "keeps these scores",
                  run);
     lpips_close(net);
     mem_free(e.views);

@@ -47,7 +47,7 @@ static double rounded(double value)
 void expect_print(const expectation *e, FILE *out)
 {
     fprintf(out,
-            "  expect    training takes about %.0f MB; in 10 minutes (--budget 10m, the default) %.0f "
+            "  expect    training takes about %.0f MB; in 10 minutes (the default budget) %.0f "
             "iterations on %d threads",
             rounded(e->bytes / 1e6), rounded(default_budget_seconds / e->step_seconds), e->threads);
     if (e->score_seconds > 0)

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/choice.h"
+#include "base/def.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
@@ -17,7 +19,10 @@
 /* Where the reference implementation stops seeing, along the view axis. */
 static const float reference_near = 0.2f;
 
-gbt_import_def gbt_import_def_default(void) { return (gbt_import_def){.renderer = "raster"}; }
+gbt_import_def gbt_import_def_default(void)
+{
+    return (gbt_import_def){.renderer = GBT_RENDERER_RASTER, .cookie_ = DEF_COOKIE};
+}
 
 static gbt_status find_input(const char *input, result_folder *out, gbt_error *err)
 {
@@ -54,7 +59,7 @@ static gbt_status describe(model *m, const result_folder *from, const gbt_import
     train.footprint = 0;
     train.compat = true;
     train.offsets = m->anchors.offset_count;
-    train.alpha = from->white_background ? "white" : "black";
+    train.alpha = from->white_background ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK;
     config_text(&train, m->data_folder, m->config, sizeof m->config);
     m->iterations = from->iteration;
     m->t_near = reference_near;
@@ -74,10 +79,8 @@ static gbt_status write_run(const model *m, const char *run, gbt_error *err)
 gbt_status gbt_import(const char *input, const gbt_import_def *def, const char *run, FILE *report,
                       gbt_error *err)
 {
-    frame_renderer unused;
-    if (!frame_renderer_named(def->renderer, &unused))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--renderer: \"%.40s\" (wanted trace, raster or per-ray)",
-                         def->renderer);
+    GBT_TRY(def_check(def->cookie_, "gbt_import_def_default", err));
+    GBT_TRY(choice_check("renderer", GBT_RENDERER_TRAINING_NAMES, (int)def->renderer, err));
     result_folder *from = mem_calloc(1, sizeof *from, "import", err);
     model *m = mem_calloc(1, sizeof *m, "import", err);
     size_t dropped = 0;

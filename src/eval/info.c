@@ -133,8 +133,10 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
         if (p->other_size > 0)
             fprintf(out, ", %zu not of their camera's size", p->other_size);
         if (p->with_alpha + p->with_mask > 0)
-            fprintf(out, "\n  masks     %zu photos have a mask, %zu an alpha channel (on %s; --alpha)",
-                    p->with_mask, p->with_alpha, strcmp(s->source, "blender") == 0 ? "white" : "black");
+            fprintf(
+                out,
+                "\n  masks     %zu photos have a mask, %zu an alpha channel (on %s; see the setting alpha)",
+                p->with_mask, p->with_alpha, strcmp(s->source, "blender") == 0 ? "white" : "black");
         fprintf(out, "\n  extent    %g (of the training cameras)\n", f->extent);
     }
     fprintf(out, "  points    %zu%s", s->points.count,
@@ -149,7 +151,7 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
         expect_print(&f->expect, out);
 }
 
-static gbt_status info_of_dataset(const char *path, int json, FILE *out, gbt_error *err)
+static gbt_status info_of_dataset(const char *path, bool json, FILE *out, gbt_error *err)
 {
     scene s;
     GBT_TRY(scene_load(path, NULL, &s, err));
@@ -173,7 +175,7 @@ static gbt_status info_of_dataset(const char *path, int json, FILE *out, gbt_err
 
 /* ---- plain Gaussians ---- */
 
-static gbt_status info_of_gaussians(const char *path, int json, FILE *out, gbt_error *err)
+static gbt_status info_of_gaussians(const char *path, bool json, FILE *out, gbt_error *err)
 {
     static const double world[3] = {0, 0, 0};
     gaussian_cloud cloud;
@@ -202,7 +204,7 @@ static gbt_status info_of_gaussians(const char *path, int json, FILE *out, gbt_e
 
 /* ---- models ---- */
 
-static gbt_status info_of_model(const char *path, int json, FILE *out, gbt_error *err)
+static gbt_status info_of_model(const char *path, bool json, FILE *out, gbt_error *err)
 {
     unsigned char *bytes;
     size_t byte_count;
@@ -257,7 +259,7 @@ static bool is_model_name(const char *path)
     return dot != NULL && strcasecmp(dot, ".gbt") == 0;
 }
 
-gbt_status gbt_info(const char *path, int json, FILE *out, gbt_error *err)
+gbt_status gbt_info(const char *path, bool json, FILE *out, gbt_error *err)
 {
     char inside[4096];
     if (file_is_folder(path)) {

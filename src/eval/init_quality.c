@@ -108,8 +108,8 @@ gbt_status init_quality_measure(const scene_points *points, float voxel_size, in
     def.fraction = fraction;
     static const struct {
         const char *name;
-        anchor_init_kind kind;
-    } rows[] = {{"gb", ANCHOR_INIT_GB}, {"adaptive", ANCHOR_INIT_ADAPTIVE}};
+        gbt_init_kind kind;
+    } rows[] = {{"gb", GBT_INIT_GB}, {"adaptive", GBT_INIT_ADAPTIVE}};
     for (int i = 0; i < 2; i++) {
         anchors a;
         def.kind = rows[i].kind;

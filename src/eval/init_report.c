@@ -11,7 +11,9 @@
 #include <string.h>
 
 #include "anchor/init.h"
+#include "base/choice.h"
 #include "base/compare.h"
+#include "base/def.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
@@ -26,24 +28,12 @@ enum { ANCHOR_SCALES = 6 };
 
 gbt_init_def gbt_init_def_default(void)
 {
-    return (gbt_init_def){.init = "gb",
+    return (gbt_init_def){.init = GBT_INIT_GB,
                           .init_count = anchor_init_def_default().fraction,
-                          .scale_prior = "gb",
+                          .scale_prior = GBT_SCALE_PRIOR_GB,
                           .max_depth = balls_def_default().max_depth,
-                          .voxel_size = 0.0f,
-                          .voxel_rule = "median"};
-}
-
-/** Index of `text` among `a`, `b`; -1 with a message. */
-static int choose(const char *what, const char *text, const char *a, const char *b, gbt_error *err)
-{
-    if (text != NULL && strcmp(text, a) == 0)
-        return 0;
-    if (text != NULL && strcmp(text, b) == 0)
-        return 1;
-    base_fail(err, GBT_ERR_ARGUMENT, "%s: wanted %s or %s, got %.80s", what, a, b,
-              text != NULL ? text : "nothing");
-    return -1;
+                          .voxel_rule = GBT_VOXEL_RULE_MEDIAN,
+                          .cookie_ = DEF_COOKIE};
 }
 
 /* ---- a row per anchor ---- */
@@ -173,7 +163,10 @@ static spread spread_of(const float *values, size_t stride, size_t count, float 
 }
 
 typedef struct init_facts {
-    const char *kind, *scale_prior, *voxel_rule;
+    gbt_init_kind kind;
+    gbt_scale_prior scale_prior;
+    gbt_voxel_rule voxel_rule;
+    bool voxel_size_given;
     size_t points, anchors, voxel_anchors;
     float voxel_size;
     bool has_balls;
@@ -196,11 +189,19 @@ static json_t *qualities_to_json(const init_quality *rows)
     return list;
 }
 
+/* Where the voxel size is from. */
+static const char *size_from(const init_facts *f, char *out)
+{
+    return f->voxel_size_given ? "given" : choice_name(GBT_VOXEL_RULE_NAMES, (int)f->voxel_rule, out);
+}
+
 static gbt_status save_json(const char *path, const char *data, const init_facts *f, gbt_error *err)
 {
+    char from[CHOICE_TEXT_SIZE];
     json_t *value = json_pack("{s:i,s:o,s:s,s:s,s:s,s:f,s:I,s:I,s:I,s:o,s:o,s:o,s:o,s:o}", "schema", 1,
-                              "data", json_text(data), "init", f->kind, "scale_prior", f->scale_prior,
-                              "voxel_rule", f->voxel_rule, "voxel_size", (double)f->voxel_size, "points",
+                              "data", json_text(data), "init", CHOICE_NAME(GBT_INIT_NAMES, f->kind),
+                              "scale_prior", CHOICE_NAME(GBT_SCALE_PRIOR_NAMES, f->scale_prior), "voxel_rule",
+                              size_from(f, from), "voxel_size", (double)f->voxel_size, "points",
                               (json_int_t)f->points, "anchors", (json_int_t)f->anchors, "voxel_anchors",
                               (json_int_t)f->voxel_anchors, "radius", spread_to_json(&f->radius), "scale",
                               spread_to_json(&f->scale), "points_per_anchor", spread_to_json(&f->count),
@@ -215,18 +216,20 @@ static void print_spread(FILE *out, const char *name, const spread *s)
     fprintf(out, "  %-18s %10.4g %10.4g %10.4g %10.4g\n", name, s->min, s->median, s->mean, s->max);
 }
 
-static const char *what_they_are(const char *kind)
+static const char *what_they_are(gbt_init_kind kind)
 {
-    return strcmp(kind, "gb") == 0         ? "granular balls"
-           : strcmp(kind, "adaptive") == 0 ? "adaptive balls"
-           : strcmp(kind, "voxel") == 0    ? "voxels"
-                                           : "random points";
+    static const char *const words[] = {[GBT_INIT_GB] = "granular balls",
+                                        [GBT_INIT_ADAPTIVE] = "adaptive balls",
+                                        [GBT_INIT_VOXEL] = "voxels",
+                                        [GBT_INIT_RANDOM] = "random points"};
+    return words[kind];
 }
 
 static void print_facts(FILE *out, const init_facts *f)
 {
+    char from[CHOICE_TEXT_SIZE];
     fprintf(out, "points             %zu\n", f->points);
-    fprintf(out, "voxel size         %g (%s)\n", (double)f->voxel_size, f->voxel_rule);
+    fprintf(out, "voxel size         %g (%s)\n", (double)f->voxel_size, size_from(f, from));
     fprintf(out, "anchors            %zu (%s), %.3g points each\n", f->anchors, what_they_are(f->kind),
             (double)f->points / (double)f->anchors);
     fprintf(out, "voxel baseline     %zu anchors at the same voxel size\n", f->voxel_anchors);
@@ -281,20 +284,23 @@ done:
     return status;
 }
 
+static gbt_status check_def(const gbt_init_def *def, gbt_error *err)
+{
+    GBT_TRY(def_check(def->cookie_, "gbt_init_def_default", err));
+    GBT_TRY(choice_check("init", GBT_INIT_NAMES, (int)def->init, err));
+    GBT_TRY(choice_check("scale_prior", GBT_SCALE_PRIOR_NAMES, (int)def->scale_prior, err));
+    GBT_TRY(choice_check("voxel_rule", GBT_VOXEL_RULE_NAMES, (int)def->voxel_rule, err));
+    if (!(def->voxel_size >= 0.0f && isfinite(def->voxel_size)))
+        return base_fail(err, GBT_ERR_ARGUMENT, "voxel_size: %g (wanted a finite number >= 0)",
+                         (double)def->voxel_size);
+    return GBT_OK;
+}
+
 gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path,
                     FILE *report, gbt_error *err)
 {
     anchor_init_def how = anchor_init_def_default();
-    if (def->init == NULL || !anchor_init_kind_named(def->init, &how.kind))
-        return base_fail(err, GBT_ERR_ARGUMENT, "init: wanted gb, adaptive, voxel or random, got %.80s",
-                         def->init != NULL ? def->init : "nothing");
-    const int scale = choose("scale prior", def->scale_prior, "gb", "nn", err),
-              rule = choose("voxel rule", def->voxel_rule, "median", "squared", err);
-    if (scale < 0 || rule < 0)
-        return GBT_ERR_ARGUMENT;
-    if (!(def->voxel_size >= 0.0f && isfinite(def->voxel_size)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "voxel size: wanted a finite number >= 0, got %g",
-                         (double)def->voxel_size);
+    GBT_TRY(check_def(def, err));
     if (file_is_same(data, out_ply) ||
         (json_path != NULL && (file_is_same(data, json_path) || strcmp(out_ply, json_path) == 0)))
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (the output must be another file)",
@@ -307,18 +313,18 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
     const scene_points *points = &s.points;
     init_facts facts = {.kind = def->init,
                         .points = points->count,
-                        .voxel_rule = def->voxel_size > 0.0f ? "given" : def->voxel_rule,
+                        .voxel_rule = def->voxel_rule,
+                        .voxel_size_given = def->voxel_size > 0.0f,
                         .voxel_size = def->voxel_size};
     gbt_status status = GBT_OK;
     if (points->count == 0)
         status = base_fail(err, GBT_ERR_FORMAT, "%s: no sparse points to start from", data);
     if (status == GBT_OK && !(facts.voxel_size > 0.0f))
-        status =
-            balls_voxel_size(points->position, points->count,
-                             rule == 0 ? VOXEL_MEDIAN_SPACING : VOXEL_COMPAT_SQUARED, &facts.voxel_size, err);
+        status = balls_voxel_size(points->position, points->count, def->voxel_rule, &facts.voxel_size, err);
     if (status == GBT_OK) {
+        how.kind = def->init;
         how.fraction = def->init_count;
-        how.scale = scale == 0 ? ANCHOR_SCALE_GB : ANCHOR_SCALE_NN;
+        how.scale = def->scale_prior;
         how.balls.voxel_size = facts.voxel_size;
         how.balls.max_depth = def->max_depth;
         status = anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &how,
@@ -330,7 +336,7 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
     if (status == GBT_OK) {
         facts.anchors = a.count;
         facts.has_balls = b.count > 0;
-        facts.scale_prior = how.kind == ANCHOR_INIT_GB && scale == 0 ? "gb" : "nn";
+        facts.scale_prior = def->init == GBT_INIT_GB ? def->scale_prior : GBT_SCALE_PRIOR_NN;
         status = init_quality_measure(points, facts.voxel_size, def->max_depth, def->init_count,
                                       facts.quality, err);
     }

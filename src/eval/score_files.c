@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 
+#include "base/choice.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
@@ -45,7 +46,7 @@ static json_t *from_scores(const evaluation *e)
             add_lpips(view, &v->lpips);
         json_array_append_new(views, view);
     }
-    json_object_set_new(root, "renderer", json_string(e->renderer));
+    json_object_set_new(root, "renderer", json_string(CHOICE_NAME(GBT_RENDERER_NAMES, e->renderer)));
     json_object_set_new(root, "downscale", json_real(e->downscale));
     json_object_set_new(root, "exposure", json_boolean(e->exposure));
     char scored[128];

@@ -91,7 +91,7 @@ gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips 
     e->gaussians_per_view /= (double)e->view_count;
     e->anchors = r->model.anchors.count;
     e->exposure = r->def.exposure;
-    e->renderer = frame_renderer_name(r->frame.draw.renderer);
+    e->renderer = r->frame.draw.renderer;
     e->downscale = r->photos.downscale;
     char model_path[4096];
     struct stat info;

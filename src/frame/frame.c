@@ -11,21 +11,6 @@
 #include "frame/plain.h"
 #include "frame/visible.h"
 
-static const char *const renderer_names[] = {
-    [FRAME_TRACE] = "trace", [FRAME_SPLAT] = "raster", [FRAME_SPLAT_PER_RAY] = "per-ray"};
-
-const char *frame_renderer_name(frame_renderer renderer) { return renderer_names[renderer]; }
-
-bool frame_renderer_named(const char *name, frame_renderer *out)
-{
-    for (int i = 0; i < (int)(sizeof renderer_names / sizeof *renderer_names); i++)
-        if (strcmp(name, renderer_names[i]) == 0) {
-            *out = (frame_renderer)i;
-            return true;
-        }
-    return false;
-}
-
 static double lap(double *since)
 {
     const double now = clock_wall(), passed = now - *since;
@@ -53,7 +38,7 @@ static float pixel_variance(const frame *f, float variance)
 /* By which splats are dilated, in pixels of the camera: what is as wide as the pixels already need not be. */
 static float dilation_of(const frame *f)
 {
-    return f->draw.renderer == FRAME_SPLAT && !f->widened
+    return f->draw.renderer == GBT_RENDERER_RASTER && !f->widened
                ? pixel_variance(f, raster_settings_default().dilation)
                : 0;
 }
@@ -115,7 +100,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     f->times.build = 0;
     memset(&f->counters, 0, sizeof f->counters);
     GBT_TRY(fit_picture(&f->rgb, f->rays.width, f->rays.height, err));
-    if (f->draw.renderer != FRAME_TRACE)
+    if (f->draw.renderer != GBT_RENDERER_TRACE)
         return GBT_OK;
     const float aperture = shot->given == NULL ? (float)shot->aperture_radius : 0;
     const float reach = fmaxf(ray_image_reach(&f->rays) + aperture, guest != NULL ? guest->reach : 0);
@@ -139,7 +124,7 @@ raster_settings frame_splat_settings(const trace_settings *settings, raster_form
 static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape, gbt_error *err)
 {
     raster_settings s =
-        frame_splat_settings(settings, f->draw.renderer == FRAME_SPLAT ? RASTER_EWA : RASTER_PER_RAY);
+        frame_splat_settings(settings, f->draw.renderer == GBT_RENDERER_RASTER ? RASTER_EWA : RASTER_PER_RAY);
     s.dilation = dilation_of(f);
     raster_counters counted = {0};
     GBT_TRY(
@@ -162,7 +147,7 @@ gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camer
     const ray_shot shot = ray_shot_of(camera);
     GBT_TRY(prepare(f, subject, &shot, settings, NULL, err));
     double clock = clock_wall();
-    if (f->draw.renderer == FRAME_TRACE)
+    if (f->draw.renderer == GBT_RENDERER_TRACE)
         GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters,
                               err));
     else
@@ -200,7 +185,7 @@ gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *s
                               const trace_settings *settings, const frame_guest *guest, gbt_error *err)
 {
     GBT_TRY(ray_shot_check(shot, err));
-    if (f->draw.renderer != FRAME_TRACE) {
+    if (f->draw.renderer != GBT_RENDERER_TRACE) {
         if (guest != NULL || shot->given != NULL || shot->aperture_radius > 0 ||
             shot->shutter != RAY_SHUTTER_GLOBAL)
             return base_fail(err, GBT_ERR_ARGUMENT,
@@ -238,7 +223,7 @@ gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *e
     double clock = clock_wall();
     GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen,
                         "weights", err));
-    if (f->draw.renderer == FRAME_TRACE)
+    if (f->draw.renderer == GBT_RENDERER_TRACE)
         GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, f->seen, NULL, err));
     else
         GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, f->seen, NULL, err));

@@ -5,6 +5,7 @@
 #define GBT_FRAME_FRAME_H
 
 #include "frame/subject.h"
+#include "gbtrace/choices.h"
 #include "raster/raster.h"
 #include "trace/footprint.h"
 #include "trace/trace.h"
@@ -14,23 +15,13 @@ typedef struct frame_times {
     double rays, visible, decode, build, trace, adjoint, decode_adjoint;
 } frame_times;
 
-typedef enum frame_renderer {
-    FRAME_TRACE,
-    FRAME_SPLAT,        /* raster/raster.h: EWA splats in the order of their centres; pinhole cameras only */
-    FRAME_SPLAT_PER_RAY /* the same tiles, with the response and the order of each ray */
-} frame_renderer;
-
-/** The renderer called "trace", "raster" or "per-ray"; false for another name. */
-bool frame_renderer_named(const char *name, frame_renderer *out);
-const char *frame_renderer_name(frame_renderer renderer);
-
 /** The rasterizer's settings for what the tracer's say: alphas, T, near, background. The rest is its
     default. */
 raster_settings frame_splat_settings(const trace_settings *settings, raster_form form);
 
 /** How Gaussians become a picture. Set in the frame before rendering; {0}: traced, thin rays. */
 typedef struct frame_drawing {
-    frame_renderer renderer;
+    gbt_renderer renderer; /* one of those that train */
     float footprint; /* variance of a pixel, px^2 (trace/footprint.h); 0: rays are thin, splats dilated as in
                         the paper's base */
     int pixel_step;  /* the camera's pixels are every n-th of a picture, and as wide as that one's; 0 and 1:
@@ -80,8 +71,8 @@ typedef struct frame {
 gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera,
                         const trace_settings *settings, bool keep_tape, gbt_error *err);
 
-/** frame_render() up to the picture: f->scene is built, for other passes over it (FRAME_TRACE). f->rgb has
-    its size and no meaning. */
+/** frame_render() up to the picture: f->scene is built, for other passes over it (GBT_RENDERER_TRACE). f->rgb
+   has its size and no meaning. */
 gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *camera,
                          const trace_settings *settings, gbt_error *err);
 

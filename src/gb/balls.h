@@ -7,6 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "gbtrace/choices.h"
 #include "gbtrace/status.h"
 
 typedef struct balls_def {
@@ -54,22 +55,18 @@ gbt_status balls_build(const float *position, const float *color, size_t count, 
                        balls *out, gbt_error *err);
 void balls_free(balls *b);
 
-typedef enum voxel_rule {
-    VOXEL_MEDIAN_SPACING, /* lower median of the distance to the nearest neighbour: what the paper's text says
-                           */
-    VOXEL_COMPAT_SQUARED  /* lower median of the mean of the 3 squared neighbour distances: what the reference
-                             code computes */
-} voxel_rule;
-
 /**
  * Base spatial scale of a cloud (v), > 0 and finite for >= 2 distinct points, else 1.
  *
- * When the plain median is 0 (duplicates): the median over the points whose value is > 0; when there are
- * none, over the distinct points. Fewer than 4 points have fewer than 3 neighbours to average.
+ * GBT_VOXEL_RULE_MEDIAN: lower median of the distance to the nearest neighbour. GBT_VOXEL_RULE_SQUARED: lower
+ * median of the mean of the 3 squared neighbour distances. When the plain median is 0 (duplicates): the
+ * median over the points whose value is > 0; when there are none, over the distinct points. Fewer than 4
+ * points have fewer than 3 neighbours to average.
  * @return GBT_OK, GBT_ERR_ARGUMENT (non-finite point: says which), GBT_ERR_NO_MEMORY; *out is 1 on failure
  * Threads: same bits for every thread count. Cost: one nearest-neighbour query per point.
  */
-gbt_status balls_voxel_size(const float *position, size_t count, voxel_rule rule, float *out, gbt_error *err);
+gbt_status balls_voxel_size(const float *position, size_t count, gbt_voxel_rule rule, float *out,
+                            gbt_error *err);
 
 /**
  * Scaffold-GS's baseline (Lu 2024; Yang 2026, eq 12): distinct cells round(p / v) (half to even, in float32),

@@ -44,7 +44,7 @@ static size_t sort_unique(row *rows, size_t count)
 typedef struct spacing_job {
     const point_tree *tree;
     const float *position;
-    voxel_rule rule;
+    gbt_voxel_rule rule;
     double *value; /* one per point of the tree */
 } spacing_job;
 
@@ -55,18 +55,19 @@ static void measure_spacing(size_t block, size_t begin, size_t end, void *contex
     for (size_t i = begin; i < end; i++) {
         uint32_t index[3];
         double squared[3], sum = 0;
-        const size_t wanted = job->rule == VOXEL_COMPAT_SQUARED ? 3 : 1;
+        const size_t wanted = job->rule == GBT_VOXEL_RULE_SQUARED ? 3 : 1;
         const size_t found = point_tree_nearest(job->tree, job->position + 3 * i, wanted, i, index, squared);
         for (size_t k = 0; k < found; k++)
             sum += squared[k];
         /* At least one neighbour: there are 2 points. Fewer than 4 points have fewer than 3 neighbours to
            average. */
-        job->value[i] = job->rule == VOXEL_COMPAT_SQUARED ? sum / (double)found : sqrt(sum);
+        job->value[i] = job->rule == GBT_VOXEL_RULE_SQUARED ? sum / (double)found : sqrt(sum);
     }
 }
 
 /* Fills value[0 .. count) for count >= 2 points. */
-static gbt_status measure(const float *position, size_t count, voxel_rule rule, double *value, gbt_error *err)
+static gbt_status measure(const float *position, size_t count, gbt_voxel_rule rule, double *value,
+                          gbt_error *err)
 {
     spacing_job job = {.position = position, .rule = rule, .value = value};
     point_tree *tree;
@@ -79,10 +80,10 @@ static gbt_status measure(const float *position, size_t count, voxel_rule rule, 
 
 /* Lower median: rank (n - 1) / 2. The reference code takes the k-th smallest, k = floor(n / 2) from 1: one
    rank lower when n is odd. */
-static double median_of(double *values, size_t count, voxel_rule rule)
+static double median_of(double *values, size_t count, gbt_voxel_rule rule)
 {
     size_t rank = (count - 1) / 2;
-    if (rule == VOXEL_COMPAT_SQUARED)
+    if (rule == GBT_VOXEL_RULE_SQUARED)
         rank = count >= 2 ? count / 2 - 1 : 0;
     return split_select(values, count, rank);
 }
@@ -96,11 +97,12 @@ static size_t keep_positive(double *values, size_t count)
     return kept;
 }
 
-gbt_status balls_voxel_size(const float *position, size_t count, voxel_rule rule, float *out, gbt_error *err)
+gbt_status balls_voxel_size(const float *position, size_t count, gbt_voxel_rule rule, float *out,
+                            gbt_error *err)
 {
     *out = 1.0f;
     GBT_TRY(cloud_check("voxel size", position, NULL, count, err));
-    if (rule != VOXEL_MEDIAN_SPACING && rule != VOXEL_COMPAT_SQUARED)
+    if (rule != GBT_VOXEL_RULE_MEDIAN && rule != GBT_VOXEL_RULE_SQUARED)
         return base_fail(err, GBT_ERR_ARGUMENT, "voxel size: unknown rule %d", (int)rule);
 
     if (count < 2)

@@ -17,7 +17,7 @@ static gbt_status make(gbt_model **out, gbt_error *err)
 /* The result of opening `m`, which is closed when that failed. */
 static gbt_status opened(gbt_model *m, gbt_status status, gbt_model **out)
 {
-    m->run.frame.draw.renderer = FRAME_TRACE;
+    m->run.frame.draw.renderer = GBT_RENDERER_TRACE;
     *out = status == GBT_OK ? m : NULL;
     if (status != GBT_OK)
         gbt_model_close(m);

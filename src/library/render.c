@@ -10,7 +10,7 @@
 #include "library/handle.h"
 #include "trace/pose_gradient.h"
 
-gbt_status gbt_model_render(gbt_model *m, const gbt_camera *camera, int keep, const gbt_picture *out,
+gbt_status gbt_model_render(gbt_model *m, const gbt_camera *camera, bool keep, const gbt_picture *out,
                             gbt_error *err)
 {
     loaded_run *r = &m->run;

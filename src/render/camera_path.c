@@ -18,7 +18,7 @@ gbt_status camera_path_alloc(camera_path *out, size_t count, gbt_error *err)
 {
     *out = (camera_path){.count = count};
     if (count < 1 || count > CAMERA_PATH_FRAMES_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--frames: %zu (wanted 1 to %d)", count,
+        return base_fail(err, GBT_ERR_ARGUMENT, "frames: %zu (wanted 1 to %d)", count,
                          (int)CAMERA_PATH_FRAMES_MAX);
     out->shots = mem_calloc(count, sizeof *out->shots, "camera path", err);
     return out->shots != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
@@ -161,9 +161,9 @@ gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const came
         double at[3], target[3];
         circle_at(&c, shape, angle, at, target);
         if (!gbt_camera_look_at(at, target, c.axis, &camera))
-            status = base_fail(
-                err, GBT_ERR_FORMAT,
-                "--path orbit: the cameras say no way around (wanted them apart from what they look at)");
+            status =
+                base_fail(err, GBT_ERR_FORMAT,
+                          "path: the cameras say no way around (wanted them apart from what they look at)");
         out->shots[i] = ray_shot_of(&camera);
     }
     mem_free(c.stations);

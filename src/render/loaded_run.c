@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/choice.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
@@ -22,7 +23,7 @@ static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *
     snprintf(out->model.data_folder, sizeof out->model.data_folder, "%.*s",
              (int)sizeof out->model.data_folder - 1, folder.source);
     out->model.iterations = folder.iteration;
-    out->def.alpha = folder.white_background ? "white" : "black";
+    out->def.alpha = folder.white_background ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK;
     for (int c = 0; c < 3; c++)
         out->settings.background[c] = folder.white_background;
     return GBT_OK;
@@ -75,9 +76,7 @@ static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
     out->def = gbt_train_def_default();
     out->def.footprint = 0; /* of models that do not say */
     GBT_TRY(config_parse(out->model.config, path, &out->def, &out->strings, err));
-    if (!frame_renderer_named(out->def.renderer, &out->frame.draw.renderer))
-        return base_fail(err, GBT_ERR_FORMAT, "%.1000s: section train.config: unknown renderer \"%.40s\"",
-                         path, out->def.renderer);
+    out->frame.draw.renderer = out->def.renderer;
     out->frame.draw.footprint = (float)out->def.footprint;
     out->frame.draw.anchor_pixel = out->model.anchor_pixel;
     out->settings = trace_settings_default();
@@ -117,18 +116,16 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
         return place_views(downscale, out, err);
     }
     if (data == NULL && out->cloud.count > 0 && !has_data)
-        return base_fail(
-            err, GBT_ERR_ARGUMENT,
-            "%.1000s: plain Gaussians know no cameras: name a camera or a data set (--camera or --data)",
-            run);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%.1000s: plain Gaussians know no cameras: name a camera or a data set", run);
     if (data == NULL && !has_data)
         return base_fail(err, GBT_ERR_IO,
-                         "%.300s: its data set is not there (tried %.1200s); say with --data where it is",
+                         "%.300s: its data set is not there (tried %.1200s); name the folder where it is now",
                          run, out->data.tried);
     if (data == NULL && out->data.moved)
         log_info("%s: its data set is taken from %s, for both were moved", run, out->data.place);
     GBT_TRY(scene_load(data != NULL ? data : out->data.place, &split, &out->scene, err));
-    GBT_TRY(scene_set_alpha(&out->scene, out->def.alpha, err));
+    scene_set_alpha(&out->scene, out->def.alpha);
     return place_views(downscale, out, err);
 }
 
@@ -180,10 +177,11 @@ gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err)
     return frame_render(&r->frame, loaded_run_subject(r), &camera, &r->settings, false, err);
 }
 
-gbt_status loaded_run_preset(const char *name, trace_settings *settings, gbt_error *err)
+gbt_status loaded_run_preset(gbt_preset preset, trace_settings *settings, gbt_error *err)
 {
-    if (name != NULL && !trace_settings_preset(name, settings))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--preset: \"%.40s\" (wanted exact, default or fast)", name);
+    if (preset != GBT_PRESET_AS_TRAINED)
+        GBT_TRY(choice_check("preset", GBT_PRESET_NAMES, (int)preset, err));
+    trace_settings_preset(preset, settings);
     return GBT_OK;
 }
 

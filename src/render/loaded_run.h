@@ -66,9 +66,8 @@ void loaded_run_close(loaded_run *r);
 /** Render a view into r->frame.rgb, at the run's resolution. */
 gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err);
 
-/** Settings by the name of a preset (trace/settings.h); NULL changes nothing. GBT_OK or GBT_ERR_ARGUMENT
-    ("--preset: ..."). */
-gbt_status loaded_run_preset(const char *name, trace_settings *settings, gbt_error *err);
+/** Settings by a preset. GBT_OK, or GBT_ERR_ARGUMENT ("preset: ...") for what is none. */
+gbt_status loaded_run_preset(gbt_preset preset, trace_settings *settings, gbt_error *err);
 
 /** "folder/a/b.jpg" becomes "a_b": a file name for what belongs to a view. */
 void loaded_run_view_name(const scene_view *view, char *out, size_t size);

@@ -4,7 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/choice.h"
 #include "base/clock.h"
+#include "base/def.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
@@ -20,7 +22,12 @@
 
 gbt_render_def gbt_render_def_default(void)
 {
-    return (gbt_render_def){.split = GBT_SPLIT_TEST, .format = "png", .orbit_height = (double)NAN};
+    return (gbt_render_def){.split = GBT_SPLIT_TEST,
+                            .renderer = GBT_RENDERER_AS_TRAINED,
+                            .format = GBT_PICTURE_PNG,
+                            .preset = GBT_PRESET_AS_TRAINED,
+                            .orbit_height = (double)NAN,
+                            .cookie_ = DEF_COOKIE};
 }
 
 /* Same Gaussians, same rays, in double: the picture that the tracer is measured against. */
@@ -70,7 +77,7 @@ static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, 
     char file[1100], path[4096];
     loaded_run *r = &st->run;
     GBT_TRY(draw(st, shot, def, err));
-    snprintf(file, sizeof file, "%s.%s", name, def->format);
+    snprintf(file, sizeof file, "%s.%s", name, CHOICE_NAME(GBT_PICTURE_FORMAT_NAMES, def->format));
     GBT_TRY(file_join(path, sizeof path, out, file, err));
     GBT_TRY(image_write(path, &r->frame.rgb, err));
     return render_outputs_write(r, shot, st->outputs, out, name, err);
@@ -178,66 +185,70 @@ static gbt_status render_film(studio *st, const char *out, const gbt_render_def 
     return status;
 }
 
-static const char insert_is_traced[] = "--insert: meshes are traced (wanted --renderer trace)";
+static const char insert_is_traced[] = "insert: meshes are traced (wanted the renderer trace)";
 
 /* What draws the model that is open. */
 static gbt_status choose_renderer(studio *st, const gbt_render_def *def, gbt_error *err)
 {
-    frame_renderer *renderer = &st->run.frame.draw.renderer;
-    st->in_double = def->renderer != NULL && strcmp(def->renderer, "reference") == 0;
+    gbt_renderer *renderer = &st->run.frame.draw.renderer;
+    st->in_double = def->renderer == GBT_RENDERER_REFERENCE;
     if (st->in_double)
-        *renderer = FRAME_TRACE;
-    else if (def->renderer != NULL && !frame_renderer_named(def->renderer, renderer))
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "--renderer: \"%.40s\" (wanted trace, raster, per-ray or reference)", def->renderer);
-    if (def->insert != NULL && *renderer != FRAME_TRACE)
+        *renderer = GBT_RENDERER_TRACE;
+    else if (def->renderer != GBT_RENDERER_AS_TRAINED)
+        *renderer = def->renderer;
+    if (def->insert != NULL && *renderer != GBT_RENDERER_TRACE)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
-    if (st->outputs != 0 && *renderer != FRAME_TRACE)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--outputs: these are traced (wanted --renderer trace)");
+    if (st->outputs != 0 && *renderer != GBT_RENDERER_TRACE)
+        return base_fail(err, GBT_ERR_ARGUMENT, "outputs: these are traced (wanted the renderer trace)");
     return GBT_OK;
 }
 
 static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_error *err)
 {
     if (def->path == NULL && (def->frames != 0 || def->fps != 0 || def->width != 0 || def->height != 0))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--frames, --fps, --size: of a path (wanted --path)");
+        return base_fail(err, GBT_ERR_ARGUMENT, "frames, fps, width: of a film (wanted a path)");
     const bool orbit = def->path != NULL && strcmp(def->path, "orbit") == 0;
     if (!orbit && (def->look_at != NULL || def->orbit_radius != 0 || !isnan(def->orbit_height)))
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "--look-at, --radius, --height: of an orbit (wanted --path orbit)");
+                         "look_at, orbit_radius, orbit_height: of an orbit (wanted the path orbit)");
     if (!(def->orbit_radius >= 0 && def->orbit_radius <= 1e9) || fabs(def->orbit_height) > 1e9)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--radius, --height: %g, %g (wanted up to 1e+09)",
+        return base_fail(err, GBT_ERR_ARGUMENT, "orbit_radius, orbit_height: %g, %g (wanted up to 1e+09)",
                          def->orbit_radius, def->orbit_height);
     if (def->path == NULL)
-        return video_named(out) ? base_fail(err, GBT_ERR_ARGUMENT, "%s: a film wants --path", out) : GBT_OK;
+        return video_named(out) ? base_fail(err, GBT_ERR_ARGUMENT, "%s: a film wants a path", out) : GBT_OK;
     if (def->camera != NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--path: not with --camera");
+        return base_fail(err, GBT_ERR_ARGUMENT, "path: not with a camera");
     if (!render_path_wants_views(def->path) && def->downscale != 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: not with a path file (wanted --size)");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "downscale: not with a path file (wanted the size of the film)");
     if (def->frames < 0 || def->frames > CAMERA_PATH_FRAMES_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--frames: %d (wanted 1 to %d)", def->frames,
+        return base_fail(err, GBT_ERR_ARGUMENT, "frames: %d (wanted 1 to %d)", def->frames,
                          (int)CAMERA_PATH_FRAMES_MAX);
     if (!(def->fps >= 0 && def->fps <= 1000))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--fps: %g (wanted up to 1000)", def->fps);
+        return base_fail(err, GBT_ERR_ARGUMENT, "fps: %g (wanted up to 1000)", def->fps);
     if ((def->width != 0 || def->height != 0) &&
         !(def->width > 0 && def->height > 0 && def->width <= 65500 && def->height <= 65500))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--size: %d x %d (wanted 1 to 65500 pixels)", def->width,
+        return base_fail(err, GBT_ERR_ARGUMENT, "width: %d x %d (wanted 1 to 65500 pixels)", def->width,
                          def->height);
     if (video_named(out) && def->outputs != NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--outputs: not with a film (wanted -o DIR)");
+        return base_fail(err, GBT_ERR_ARGUMENT, "outputs: not with a film (wanted a folder)");
     return GBT_OK;
 }
 
 static gbt_status check_def(const char *out, const gbt_render_def *def, gbt_error *err)
 {
-    if (strcmp(def->format, "png") != 0 && strcmp(def->format, "exr") != 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--format: \"%.40s\" (wanted png or exr)", def->format);
+    GBT_TRY(def_check(def->cookie_, "gbt_render_def_default", err));
+    GBT_TRY(choice_check("split", GBT_SPLIT_NAMES, (int)def->split, err));
+    GBT_TRY(choice_check("format", GBT_PICTURE_FORMAT_NAMES, (int)def->format, err));
+    if (def->renderer != GBT_RENDERER_AS_TRAINED)
+        GBT_TRY(choice_check("renderer", GBT_RENDERER_NAMES, (int)def->renderer, err));
     if (!(def->downscale == 0 || (def->downscale >= 1 && def->downscale <= 64)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "--downscale: %g (wanted 1 to 64)", def->downscale);
+        return base_fail(err, GBT_ERR_ARGUMENT, "downscale: %g (wanted 1 to 64)", def->downscale);
     if (def->camera != NULL && def->downscale != 0)
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "--downscale: not with --camera (the camera file says the size)");
-    if (def->insert != NULL && def->renderer != NULL && strcmp(def->renderer, "trace") != 0)
+                         "downscale: not with a camera (the camera file says the size)");
+    if (def->insert != NULL && def->renderer != GBT_RENDERER_AS_TRAINED &&
+        def->renderer != GBT_RENDERER_TRACE)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
     return check_path(out, def, err);
 }

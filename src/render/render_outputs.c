@@ -26,7 +26,7 @@ gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *e
             i++;
         if (i == OUTPUT_COUNT)
             return base_fail(err, GBT_ERR_ARGUMENT,
-                             "--outputs: \"%.*s\" (wanted transmittance, depth, median-depth, normal, hits "
+                             "outputs: \"%.*s\" (wanted transmittance, depth, median-depth, normal, hits "
                              "or anchor, with commas between)",
                              length < 40 ? (int)length : 40, word);
         *wanted |= 1u << i;

@@ -31,7 +31,7 @@ static gbt_status take_cameras(const loaded_run *r, gbt_camera **out, size_t *co
                 (*out)[(*count)++] = photos_camera(&r->photos, i, 0);
     return *count > 0 ? GBT_OK
                       : base_fail(err, GBT_ERR_FORMAT,
-                                  "--path: %s has no cameras (wanted a data set with photos, or a path file)",
+                                  "path: %s has no cameras (wanted a data set with photos, or a path file)",
                                   r->scene.folder);
 }
 
@@ -52,7 +52,7 @@ static gbt_status read_place(const char *text, const double origin[3], double ou
         const size_t length = strcspn(at, ",");
         if (number_parse_double(at, length, &out[k]) != NUMBER_OK || !isfinite(out[k]) ||
             (at[length] == ',') != (k < 2))
-            return base_fail(err, GBT_ERR_ARGUMENT, "--look-at: \"%.80s\" (wanted X,Y,Z, as in 0.5,-1,2)",
+            return base_fail(err, GBT_ERR_ARGUMENT, "look_at: \"%.80s\" (wanted X,Y,Z, as in 0.5,-1,2)",
                              text);
         out[k] -= origin[k];
         at += length + (k < 2);
@@ -122,7 +122,7 @@ static gbt_status resize(camera_path *path, const gbt_render_def *def, gbt_error
         camera_group group = {.lens = shot->camera};
         if (shot->camera.model != GBT_CAMERA_PINHOLE)
             return base_fail(err, GBT_ERR_ARGUMENT,
-                             "--size: not with a path of %s cameras (its file says the size)",
+                             "width: not with a path of %s cameras (its file says the size)",
                              gbt_camera_model_name(shot->camera.model));
         const gbt_camera lens = camera_group_lens(&group, def->width, def->height);
         shot->camera.width = lens.width;

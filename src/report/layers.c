@@ -63,8 +63,9 @@ static gbt_status make_balls(const loaded_run *r, solids *s, gbt_error *err)
     anchor_init_def how = anchor_init_def_default();
     anchors made = {0};
     balls b = {0};
-    if (!anchor_init_kind_named(r->def.init, &how.kind) || !(r->model.voxel_size > 0))
+    if (!(r->model.voxel_size > 0))
         return GBT_OK;
+    how.kind = r->def.init;
     how.fraction = r->def.init_count;
     how.balls.voxel_size = r->model.voxel_size;
     how.balls.max_depth = r->def.max_depth;

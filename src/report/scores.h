@@ -6,6 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "gbtrace/choices.h"
 #include "gbtrace/status.h"
 #include "image/metrics.h"
 
@@ -29,10 +30,10 @@ typedef struct evaluation {
     lpips_scores lpips;
     const char *lpips_network; /* "vgg", "alex"; NULL: there are no such scores */
     size_t anchors, model_bytes;
-    const char *renderer; /* what drew the views: "trace", "raster", "per-ray" */
-    double downscale;     /* the photos were divided by this */
-    bool masked;          /* some view is */
-    bool exposure;        /* scored on the right halves of the photos (image/affine.h) */
+    gbt_renderer renderer; /* what drew the views */
+    double downscale;      /* the photos were divided by this */
+    bool masked;           /* some view is */
+    bool exposure;         /* scored on the right halves of the photos (image/affine.h) */
 } evaluation;
 
 /** Where the pictures of score->name are: FOLDER/NAME.png, .photo.png, .flip.png. GBT_ERR_ARGUMENT when a

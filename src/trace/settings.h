@@ -7,6 +7,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "gbtrace/choices.h"
+
 typedef struct trace_settings {
     float alpha_min; /* a hit counts when alpha >= this; > 0. Default 1/255 */
     float alpha_max; /* alpha is cut here; the gradient through the cut is exactly 0. (0, 1). Default 0.99 */
@@ -27,26 +29,23 @@ static inline trace_settings trace_settings_default(void)
 }
 
 /**
- * Set how much is left out of a picture, by name: "exact", "default" or "fast"; bounds on what that changes:
- * docs/accuracy.md.
+ * Set how much is left out of a picture; bounds on what that changes: docs/accuracy.md.
  *
  * Sets alpha_min, transmittance_min and proxy_radius. The rest is what the model was trained with, and stays.
- * False, and nothing is set, for another name.
+ * GBT_PRESET_AS_TRAINED sets nothing.
  */
-static inline bool trace_settings_preset(const char *name, trace_settings *out)
+static inline void trace_settings_preset(gbt_preset preset, trace_settings *out)
 {
     static const struct {
-        const char *name;
         float alpha_min, transmittance_min;
-    } presets[] = {{"exact", 1e-5f, 1e-6f}, {"default", 1.0f / 255.0f, 1e-4f}, {"fast", 0.02f, 1e-3f}};
-    for (size_t i = 0; i < sizeof presets / sizeof *presets; i++)
-        if (strcmp(name, presets[i].name) == 0) {
-            out->alpha_min = presets[i].alpha_min;
-            out->transmittance_min = presets[i].transmittance_min;
-            out->proxy_radius = INFINITY;
-            return true;
-        }
-    return false;
+    } presets[] = {[GBT_PRESET_EXACT] = {1e-5f, 1e-6f},
+                   [GBT_PRESET_DEFAULT] = {1.0f / 255.0f, 1e-4f},
+                   [GBT_PRESET_FAST] = {0.02f, 1e-3f}};
+    if (preset == GBT_PRESET_AS_TRAINED)
+        return;
+    out->alpha_min = presets[preset].alpha_min;
+    out->transmittance_min = presets[preset].transmittance_min;
+    out->proxy_radius = INFINITY;
 }
 
 #endif

@@ -4,9 +4,9 @@
 #ifndef GBT_TRAIN_CONFIG_H
 #define GBT_TRAIN_CONFIG_H
 
-#include "gbtrace/train.h"
+#include "train/settings.h"
 
-enum { CONFIG_TEXT_SIZE = 4096, CONFIG_STRING_SIZE = 1024 };
+enum { CONFIG_TEXT_SIZE = 4096 };
 
 /** "key = value" lines for everything that decides the result (not threads, not when checkpoints are made),
     and the data folder. */
@@ -14,8 +14,8 @@ void config_text(const gbt_train_def *def, const char *data, char *out, size_t s
 
 /** Where config_parse() keeps the strings that the def points to. */
 typedef struct config_strings {
-    char init[32], alpha[32], renderer[32], scale_prior[32], distance[32], pace[CONFIG_STRING_SIZE],
-        eval_split[CONFIG_STRING_SIZE], data[CONFIG_STRING_SIZE];
+    setting_texts texts;
+    char data[SETTING_TEXT_SIZE];
 } config_strings;
 
 /** Read such text over `def` (other fields stay). GBT_ERR_FORMAT with file and line for anything else. */

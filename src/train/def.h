@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/def.h -- the settings of training: ranges, and what 0 stands for. */
+/* train/def.h -- the def of training: checked, and what 0 stands for in it. */
 #ifndef GBT_TRAIN_DEF_H
 #define GBT_TRAIN_DEF_H
 
@@ -10,7 +10,7 @@
     (docs/training.md). */
 #define TRAIN_SPACING_SCALE 0.7
 
-/** GBT_OK, or GBT_ERR_ARGUMENT and the option that is out of its range. */
+/** GBT_OK, or GBT_ERR_ARGUMENT and the field that is out of its range. */
 gbt_status train_def_check(const gbt_train_def *d, gbt_error *err);
 
 /** Values for what 0 leaves to us, and for what `compat` decides. A second call changes nothing. */

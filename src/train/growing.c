@@ -14,7 +14,7 @@
 #include "train/def.h"
 #include "train/sight.h"
 
-static const float share_min = 2.5e-6f;     /* of short runs: schedule_thrift() */
+static const float share_min = 2.5e-6f;     /* of short runs: schedule_threshold_factor() */
 static const double last_rounds_from = 0.9; /* of growing */
 enum {
     ROUNDS_PER_RUN = 100,
@@ -136,11 +136,12 @@ static growth_def def_of(const trainer *t)
         def.interval = fmaxf((float)(t->step + 1 - t->round_step), (float)INTERVAL_MIN);
     if (!t->rules.thresholds_by_length)
         return def;
-    const float thrift = (float)t->def.thrift * schedule_thrift(pace_expected(&t->pace, t->step));
-    const bool last =
-        t->def.last_thrift > 1 && pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
-    def.grad_threshold *= thrift;
-    def.importance_min = thrift * share_min * (last ? (float)t->def.last_thrift : 1);
+    const float factor =
+        (float)t->def.threshold_factor * schedule_threshold_factor(pace_expected(&t->pace, t->step));
+    const bool last = t->def.final_prune_factor > 1 &&
+                      pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
+    def.grad_threshold *= factor;
+    def.importance_min = factor * share_min * (last ? (float)t->def.final_prune_factor : 1);
     def.grow = !last;
     return def;
 }

@@ -29,37 +29,26 @@ static gbt_status find_checkpoint(const char *latest, const char *previous, cons
     return checkpoint_config(previous, config, CONFIG_TEXT_SIZE, err);
 }
 
-/* The end of the line that begins at `line`. */
-static const char *line_end(const char *line)
+/* The length of the run is asked for on purpose: change_length() takes it. */
+static bool is_length(const gbt_train_setting *s)
 {
-    const char *end = strchr(line, '\n');
-    return end != NULL ? end : line + strlen(line);
+    return s->offset == offsetof(gbt_train_def, iterations) ||
+           s->offset == offsetof(gbt_train_def, budget_seconds);
 }
 
 /* Settings that were asked for, which is what differs from the default, and that the run does not have.
-   `saved` is settled, too. */
+   `saved` is settled. */
 static void warn_of_differences(const gbt_train_def *asked, const gbt_train_def *saved)
 {
-    static const char *const length[] = {"iterations", "budget-seconds"};
-    char texts[3][CONFIG_TEXT_SIZE];
-    gbt_train_def defs[3] = {*asked, gbt_train_def_default(), *saved};
-    for (int i = 0; i < 3; i++)
-        config_text(&defs[i], "", texts[i], sizeof texts[i]);
-    const char *lines[3] = {texts[0], texts[1], texts[2]};
-    while (*lines[0] != '\0') {
-        size_t sizes[3];
-        for (int i = 0; i < 3; i++)
-            sizes[i] = (size_t)(line_end(lines[i]) - lines[i]);
-        const size_t name = (size_t)(strchr(lines[0], ' ') - lines[0]);
-        bool skip = false;
-        for (size_t i = 0; i < sizeof length / sizeof *length; i++)
-            skip = skip || (strlen(length[i]) == name && strncmp(lines[0], length[i], name) == 0);
-        const bool asked_for = sizes[0] != sizes[1] || memcmp(lines[0], lines[1], sizes[0]) != 0;
-        if (!skip && asked_for && (sizes[0] != sizes[2] || memcmp(lines[0], lines[2], sizes[0]) != 0))
-            log_warn("a run is resumed with its own settings: %.*s, not %.*s", (int)sizes[2], lines[2],
-                     (int)(sizes[0] - name - 3), lines[0] + name + 3);
-        for (int i = 0; i < 3; i++)
-            lines[i] += sizes[i] + (lines[i][sizes[i]] == '\n');
+    const gbt_train_def usual = gbt_train_def_default();
+    for (size_t i = 0; i < gbt_train_setting_count(); i++) {
+        const gbt_train_setting *s = gbt_train_setting_at(i);
+        char wanted[SETTING_TEXT_SIZE], by_default[SETTING_TEXT_SIZE], own[SETTING_TEXT_SIZE];
+        setting_text(s, asked, wanted, sizeof wanted);
+        setting_text(s, &usual, by_default, sizeof by_default);
+        setting_text(s, saved, own, sizeof own);
+        if (s->saved && !is_length(s) && strcmp(wanted, by_default) != 0 && strcmp(wanted, own) != 0)
+            log_warn("a run is resumed with its own settings: %s = %s, not %s", s->name, own, wanted);
     }
 }
 

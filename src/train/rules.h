@@ -20,7 +20,7 @@ typedef struct train_rules {
     bool limits_first_scale;     /* an isolated point would start as a floater */
     bool features_from_colors;   /* first features carry the colour of the nearest point */
     bool background_from_points; /* their mean colour, where the data set has none */
-    voxel_rule voxel;            /* what v is where it is not given */
+    gbt_voxel_rule voxel;        /* what v is where it is not given */
     bool distance_where_wide;    /* "auto": the networks see the distance where it varies widely */
     bool distance_by_median;     /* in units of the median distance of anchors */
 
@@ -36,7 +36,8 @@ typedef struct train_rules {
     growth_importance importance; /* by which anchors are pruned */
     bool births_count;            /* Adam's age of an anchor is from its birth; else from the run's start */
     bool rounds_by_progress;      /* 100 rounds a run; else every 100 steps */
-    bool thresholds_by_length;    /* of growing and pruning: schedule_thrift() and the settings' factors */
+    bool thresholds_by_length;    /* of growing and pruning: schedule_threshold_factor() and the settings'
+                                     factors */
     bool grows_at_points;         /* sparse points are candidates too */
     bool needs_two_views;         /* new anchors stand where two training photos look */
     bool integer_division;        /* of cell sizes and thresholds of levels: 4 / 16 is 0 */

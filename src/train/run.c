@@ -50,8 +50,7 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, run_pat
                          p->checkpoint);
     if (!def->resume && !def->overwrite && (file_exists(p->model) || has_checkpoint))
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%.1000s: holds a run already (go on with it by --resume, name another folder, or "
-                         "lose it by --overwrite)",
+                         "%.1000s: holds a run already (resume it, name another folder, or overwrite it)",
                          run);
     return file_make_folder(checkpoints, err);
 }
@@ -205,7 +204,7 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
             last_save = t->seconds;
             if (stop)
                 return base_fail(err, GBT_ERR_INTERRUPTED,
-                                 "stopped after step %llu; saved in %s (go on with --resume)",
+                                 "stopped after step %llu; saved in %s (resume goes on)",
                                  (unsigned long long)t->step, paths->checkpoint);
         }
         if (evaluate) {

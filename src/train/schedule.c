@@ -81,7 +81,10 @@ double pace_expected(const pace *p, uint64_t step)
     return (double)sum * PACE_SEGMENTS / parts;
 }
 
-float schedule_thrift(double steps) { return (float)fmin(fmax(sqrt(1000 / fmax(steps, 1)), 0.25), 1); }
+float schedule_threshold_factor(double steps)
+{
+    return (float)fmin(fmax(sqrt(1000 / fmax(steps, 1)), 0.25), 1);
+}
 
 double schedule_level_start(int level, int start_level)
 {

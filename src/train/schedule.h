@@ -63,7 +63,7 @@ double schedule_level_start(int level, int start_level);
  * A long run has the steps to teach more anchors: 1 up to 1000 steps, then falling with their square root,
  * down to 0.25 (docs/training.md).
  */
-float schedule_thrift(double steps);
+float schedule_threshold_factor(double steps);
 
 /** From here on all pixels, and the cut-offs of rendering; before, SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN:
     half as many hits per ray. */

@@ -160,9 +160,9 @@ static void mean_color(const scene_points *points, float color[3])
 static gbt_status make_anchors(trainer *t, gbt_error *err)
 {
     anchor_init_def def = anchor_init_def_default();
-    anchor_init_kind_named(t->def.init, &def.kind);
+    def.kind = t->def.init;
     def.fraction = t->def.init_count;
-    def.scale = strcmp(t->def.scale_prior, "gb") == 0 ? ANCHOR_SCALE_GB : ANCHOR_SCALE_NN;
+    def.scale = t->def.scale_prior;
     def.balls.max_depth = t->def.max_depth;
     def.balls.voxel_size = t->voxel_size;
     def.offset_count = t->def.offsets;
@@ -216,7 +216,7 @@ static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
     scene_split split;
     GBT_TRY(scene_split_parse(def->eval_split, &split, err));
     GBT_TRY(scene_load(data, &split, &t->scene, err));
-    GBT_TRY(scene_set_alpha(&t->scene, def->alpha, err));
+    scene_set_alpha(&t->scene, def->alpha);
     if (t->scene.view_count == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no photos to train on (a point cloud alone is not enough)",
                          data);
@@ -256,8 +256,9 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     GBT_TRY(measure_distances(t, &p5, &median, &p95, err));
     /* Off by default in the reference, and a trap where distances vary widely. */
     const bool wide = p95 > 3 * p5;
-    const bool has_distance = strcmp(def->distance, "on") == 0 ||
-                              (strcmp(def->distance, "auto") == 0 && wide && t->rules.distance_where_wide);
+    const bool has_distance =
+        def->distance == GBT_DISTANCE_INPUT_ON ||
+        (def->distance == GBT_DISTANCE_INPUT_AUTO && wide && t->rules.distance_where_wide);
     uint32_t words[4];
     rng_philox(def->seed, STREAM_NETWORKS, 0, words);
     GBT_TRY(decoder_init(&t->decoder, def->offsets, has_distance, (uint64_t)words[1] << 32 | words[0], err));
@@ -281,7 +282,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     GBT_TRY(load_data(t, data, err));
     GBT_TRY(make_anchors(t, err));
     GBT_TRY(make_decoder(t, err));
-    frame_renderer_named(t->def.renderer, &t->renderer);
+    t->renderer = t->def.renderer;
     t->frame.draw.renderer = t->renderer;
     t->frame.draw.footprint = (float)t->def.footprint;
     GBT_TRY(make_state(t, err));

@@ -71,11 +71,11 @@ static photo_sample pick_pixels(const trainer *t, int level)
 }
 
 /* Splats teach a model that is still rough in half the time of rays, which have the last word. */
-static frame_renderer renderer_of_step(const trainer *t, const gbt_camera *camera, double progress)
+static gbt_renderer renderer_of_step(const trainer *t, const gbt_camera *camera, double progress)
 {
     const bool rays =
-        t->renderer != FRAME_TRACE || progress >= t->rules.splats_until || !raster_takes(camera);
-    return rays ? t->renderer : FRAME_SPLAT;
+        t->renderer != GBT_RENDERER_TRACE || progress >= t->rules.splats_until || !raster_takes(camera);
+    return rays ? t->renderer : GBT_RENDERER_RASTER;
 }
 
 /* ---- optimizer ---- */

@@ -42,7 +42,7 @@ typedef struct trainer {
     growth_stats stats;
     exposures exposures; /* of the training photos, in the order of train_views; count 0 without --exposure */
 
-    frame_renderer renderer; /* that the model is for */
+    gbt_renderer renderer; /* that the model is for */
     float voxel_size;
     double extent, first_scale_max;     /* an isolated point would start as a floater */
     float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs,

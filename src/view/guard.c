@@ -16,7 +16,7 @@ static gbt_status make_token(char token[GUARD_TOKEN_DIGITS + 1], gbt_error *err)
 {
     unsigned char bytes[GUARD_TOKEN_DIGITS / 2];
     if (getentropy(bytes, sizeof bytes) != 0)
-        return base_fail(err, GBT_ERR_IO, "--host: no random bytes for a token");
+        return base_fail(err, GBT_ERR_IO, "host: no random bytes for a token");
     for (size_t i = 0; i < sizeof bytes; i++)
         snprintf(token + 2 * i, 3, "%02x", bytes[i]);
     return GBT_OK;
@@ -30,8 +30,7 @@ gbt_status guard_open(const char *host, guard *out, gbt_error *err)
     if (inet_pton(AF_INET, host, &out->address) != 1)
         return base_fail(
             err, GBT_ERR_ARGUMENT,
-            "--host: \"%.60s\" (wanted an IPv4 address of this machine, or 0.0.0.0 for all that it has)",
-            host);
+            "host: \"%.60s\" (wanted an IPv4 address of this machine, or 0.0.0.0 for all that it has)", host);
     inet_ntop(AF_INET, &out->address, out->host, sizeof out->host);
     return ntohl(out->address.s_addr) >> 24 == IN_LOOPBACKNET ? GBT_OK : make_token(out->token, err);
 }

@@ -20,7 +20,7 @@ typedef struct guard {
 /**
  * @param host [in] IPv4 address of this machine, 0.0.0.0 for all that it has; NULL and "localhost":
  *                  127.0.0.1. Outside 127.0.0.0/8 a token of 128 random bits is made
- * @return GBT_OK, GBT_ERR_ARGUMENT ("--host: ..."), GBT_ERR_IO (no random bytes)
+ * @return GBT_OK, GBT_ERR_ARGUMENT ("host: ..."), GBT_ERR_IO (no random bytes)
  */
 gbt_status guard_open(const char *host, guard *out, gbt_error *err);
 

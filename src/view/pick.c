@@ -37,7 +37,7 @@ static bool aim(const gbt_camera *camera, const double pixel[2], gbt_camera *out
 static gbt_status find_depth(studio *s, const gbt_camera *one, double *depth, gbt_error *err)
 {
     const ray_shot shot = ray_shot_of(one);
-    const request plain = {.renderer = FRAME_TRACE, .preset = "default"};
+    const request plain = {.renderer = GBT_RENDERER_TRACE, .preset = GBT_PRESET_DEFAULT};
     render_output_images images = {0};
     GBT_TRY(studio_prepare(s, one, &plain, false, err));
     const gbt_status status = render_outputs_trace(s->run, &shot, 1u << OUTPUT_MEDIAN_DEPTH, &images, err);

@@ -130,7 +130,7 @@ gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error 
     gbt_camera camera, shifted;
     GBT_TRY(studio_camera(s, what, &camera, err));
     shifted = sample_camera(&camera, what->sample);
-    const bool traced = what->renderer == FRAME_TRACE,
+    const bool traced = what->renderer == GBT_RENDERER_TRACE,
                whole = !traced || (what->output == 0 && what->sample == 0);
     const double begin = clock_wall();
     GBT_TRY(studio_prepare(s, traced ? &camera : &shifted, what, whole, err));

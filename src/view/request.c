@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "base/choice.h"
 #include "base/fail.h"
 #include "data/number.h"
 #include "render/camera_file.h"
@@ -37,16 +38,18 @@ static gbt_status take_whole(const words *w, const char *name, int low, int high
                          : base_fail(w->err, GBT_ERR_ARGUMENT, "%s: %g (wanted a whole number)", name, value);
 }
 
-static gbt_status take_choice(const words *w, const char *name, const char *const *choices, int count,
-                              int *out)
+static gbt_status take_choice(const words *w, const char *name, const char *choices, int *out)
 {
     const char *text = word_of(w, name);
-    for (int i = 0; i < count && text != NULL; i++)
-        if (strcmp(text, choices[i]) == 0) {
-            *out = i;
-            return GBT_OK;
-        }
-    return text == NULL ? GBT_OK : base_fail(w->err, GBT_ERR_ARGUMENT, "%s: \"%.40s\": unknown", name, text);
+    if (text == NULL)
+        return GBT_OK;
+    char list[CHOICE_TEXT_SIZE];
+    const int index = choice_find(choices, text);
+    if (index < 0)
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "%s: \"%.40s\" (wanted %s)", name, text,
+                         choice_list(choices, list));
+    *out = index;
+    return GBT_OK;
 }
 
 static gbt_status check_size(int width, int height, gbt_error *err)
@@ -102,25 +105,22 @@ static gbt_status take_background(const words *w, request *out)
 
 static gbt_status take_picture(const words *w, request *out)
 {
-    static const char *const formats[] = {"raw", "jpeg", "png", "float"}, *const presets[] = {
-                                                                              "exact", "default", "fast"};
-    int format = REQUEST_RAW, preset = 1;
-    const char *output = word_of(w, "output"), *renderer = word_of(w, "renderer");
+    int format = REQUEST_RAW, preset = GBT_PRESET_DEFAULT, renderer = GBT_RENDERER_TRACE;
+    const char *output = word_of(w, "output");
     if (output != NULL && strcmp(output, "color") != 0)
         GBT_TRY(render_outputs_parse(output, &out->output, w->err));
     if ((out->output & (out->output - 1)) != 0)
         return base_fail(w->err, GBT_ERR_ARGUMENT, "output: \"%.40s\" (wanted one)", output);
-    if (renderer != NULL && !frame_renderer_named(renderer, &out->renderer))
-        return base_fail(w->err, GBT_ERR_ARGUMENT, "renderer: \"%.40s\" (wanted trace, raster or per-ray)",
-                         renderer);
-    GBT_TRY(take_choice(w, "format", formats, 4, &format));
-    GBT_TRY(take_choice(w, "preset", presets, 3, &preset));
+    GBT_TRY(take_choice(w, "renderer", GBT_RENDERER_TRAINING_NAMES, &renderer));
+    GBT_TRY(take_choice(w, "format", "raw|jpeg|png|float", &format));
+    GBT_TRY(take_choice(w, "preset", GBT_PRESET_NAMES, &preset));
     GBT_TRY(take_background(w, out));
     GBT_TRY(take_whole(w, "quality", 1, 100, &out->quality));
     GBT_TRY(take_whole(w, "sample", 0, REQUEST_SAMPLE_MAX, &out->sample));
     out->format = (request_format)format;
-    out->preset = presets[preset];
-    if (out->output != 0 && (out->renderer != FRAME_TRACE || out->format != REQUEST_FLOAT))
+    out->renderer = (gbt_renderer)renderer;
+    out->preset = (gbt_preset)preset;
+    if (out->output != 0 && (out->renderer != GBT_RENDERER_TRACE || out->format != REQUEST_FLOAT))
         return base_fail(w->err, GBT_ERR_ARGUMENT,
                          "output: \"%.40s\" is traced, and has the format float alone", output);
     return GBT_OK;
@@ -143,8 +143,11 @@ gbt_status request_parse(const char *path, request_word *word, void *query, requ
         kind++;
     if (kind == 4)
         return base_fail(err, GBT_ERR_IO, "%.100s: not here", path);
-    *out = (request){
-        .kind = (request_kind)kind, .view = -1, .renderer = FRAME_TRACE, .preset = "default", .quality = 85};
+    *out = (request){.kind = (request_kind)kind,
+                     .view = -1,
+                     .renderer = GBT_RENDERER_TRACE,
+                     .preset = GBT_PRESET_DEFAULT,
+                     .quality = 85};
     if (kind == REQUEST_SCENE)
         return GBT_OK;
     GBT_TRY(take_camera(&w, out));

@@ -31,8 +31,8 @@ typedef struct request {
     gbt_camera camera; /* in the data set's own coordinates */
     int sample;        /* 0: rays through the middle of the pixels; n: through the n-th other point of them */
     unsigned output;   /* one bit of render_outputs_parse(); 0: colour */
-    frame_renderer renderer;
-    const char *preset; /* "exact", "default" or "fast"; static */
+    gbt_renderer renderer;
+    gbt_preset preset;
     bool has_background;
     float background[3]; /* in place of the model's, [0, 1] */
     request_format format;

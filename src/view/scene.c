@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/choice.h"
 #include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
@@ -99,12 +100,12 @@ gbt_status studio_scene(const studio *s, answer *out, gbt_error *err)
     json_t *views = json_array();
     for (size_t i = 0; i < r->scene.view_count; i++)
         json_array_append_new(views, describe_view(r, i));
-    json_t *root =
-        json_pack("{s:i,s:o,s:i,s:b,s:I,s:I,s:s,s:[fff],s:f,s:[fff],s:f,s:o}", "schema", 1, "input",
-                  json_text(s->input), "version", (int)s->version, "plain", r->cloud.count > 0, "gaussians",
-                  (json_int_t)r->cloud.count, "anchors", (json_int_t)r->model.anchors.count, "renderer",
-                  frame_renderer_name(s->trained), "center", e.center[0], e.center[1], e.center[2], "size",
-                  e.size, "up", e.up[0], e.up[1], e.up[2], "floor", e.floor, "views", views);
+    json_t *root = json_pack(
+        "{s:i,s:o,s:i,s:b,s:I,s:I,s:s,s:[fff],s:f,s:[fff],s:f,s:o}", "schema", 1, "input",
+        json_text(s->input), "version", (int)s->version, "plain", r->cloud.count > 0, "gaussians",
+        (json_int_t)r->cloud.count, "anchors", (json_int_t)r->model.anchors.count, "renderer",
+        CHOICE_NAME(GBT_RENDERER_NAMES, s->trained), "center", e.center[0], e.center[1], e.center[2], "size",
+        e.size, "up", e.up[0], e.up[1], e.up[2], "floor", e.floor, "views", views);
     char *text = root != NULL ? json_dumps(root, JSON_COMPACT) : NULL;
     json_decref(root);
     if (text == NULL)

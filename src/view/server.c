@@ -268,7 +268,7 @@ gbt_status server_start(const guard *g, int port, const char *log_path, server *
     *out = NULL;
     return base_fail(err, GBT_ERR_IO, "%s:%d: cannot listen: %s%s", g->host, port,
                      why != 0 ? strerror(why) : "libmicrohttpd did not start",
-                     why == EADDRINUSE ? " (another --port, or 0 for any free one)" : "");
+                     why == EADDRINUSE ? " (wanted another, or 0 for any free one)" : "");
 }
 
 int server_port(const server *s) { return MHD_get_daemon_info(s->daemon, MHD_DAEMON_INFO_BIND_PORT)->port; }

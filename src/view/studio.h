@@ -13,8 +13,8 @@
 /** Which picture the frame's tree was built for. Zeroed before it is filled: compared as bytes. */
 typedef struct studio_picture {
     gbt_camera camera; /* scene-local, through the middle of the pixels */
-    frame_renderer renderer;
-    const char *preset;
+    gbt_renderer renderer;
+    gbt_preset preset;
     float background[3];
     bool known;
 } studio_picture;
@@ -23,7 +23,7 @@ typedef struct studio {
     const char *input, *data;              /* borrowed */
     char model_path[4096], log_path[4096]; /* log_path: empty when there is none */
     struct stat loaded;                    /* of the model file that is open */
-    frame_renderer trained;                /* what the model was trained to be drawn with, and in front of */
+    gbt_renderer trained;                  /* what the model was trained to be drawn with, and in front of */
     float background[3];
     loaded_run *run;  /* NULL: nothing has been saved yet */
     unsigned version; /* 1, 2, ... counts what was opened */

@@ -3,6 +3,7 @@
 #include "gbtrace/view.h"
 
 #include "base/clock.h"
+#include "base/def.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/stop_signal.h"
@@ -11,7 +12,7 @@
 
 static const double look_every_seconds = 1; /* for a newer model */
 
-gbt_view_def gbt_view_def_default(void) { return (gbt_view_def){.port = 8470}; }
+gbt_view_def gbt_view_def_default(void) { return (gbt_view_def){.port = 8470, .cookie_ = DEF_COOKIE}; }
 
 static void wake(void *http) { server_wake(http); }
 
@@ -48,8 +49,9 @@ gbt_status gbt_view(const char *input, const gbt_view_def *def, gbt_error *err)
     server *http = NULL;
     guard who;
     char url[GUARD_URL_SIZE];
+    GBT_TRY(def_check(def->cookie_, "gbt_view_def_default", err));
     if (def->port < 0 || def->port > 65535)
-        return base_fail(err, GBT_ERR_ARGUMENT, "--port: %d (wanted 0 to 65535)", def->port);
+        return base_fail(err, GBT_ERR_ARGUMENT, "port: %d (wanted 0 to 65535)", def->port);
     GBT_TRY(guard_open(def->host, &who, err));
     studio *s = mem_calloc(1, sizeof *s, "scene", err);
     if (s == NULL)

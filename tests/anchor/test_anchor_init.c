@@ -129,7 +129,7 @@ static void adaptive_anchors_stand_on_adaptive_balls(void **state)
         {0, half_of_the_papers(position, color, 900)}, {0.25, 225}, {0.3334, 301}, {1e-6, 1}, {1, 900}};
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
         anchor_init_def def = def_with_voxel(0.05f);
-        def.kind = ANCHOR_INIT_ADAPTIVE;
+        def.kind = GBT_INIT_ADAPTIVE;
         def.fraction = rows[r].fraction;
         adaptive_def like = adaptive_def_default();
         like.voxel_size = 0.05f;
@@ -160,7 +160,7 @@ static void random_anchors_are_some_of_the_points(void **state)
         {0, half_of_the_papers(position, NULL, 1000)}, {0.25, 250}, {0.0001, 1}, {0.9991, 1000}, {1, 1000}};
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
         anchor_init_def def = def_with_voxel(0.05f);
-        def.kind = ANCHOR_INIT_RANDOM;
+        def.kind = GBT_INIT_RANDOM;
         def.fraction = rows[r].fraction;
         anchors a;
         balls b;
@@ -180,25 +180,6 @@ static void random_anchors_are_some_of_the_points(void **state)
     }
 }
 
-static void kinds_have_names(void **state)
-{
-    (void)state;
-    const struct {
-        const char *name;
-        anchor_init_kind kind;
-    } rows[] = {{"gb", ANCHOR_INIT_GB},
-                {"voxel", ANCHOR_INIT_VOXEL},
-                {"adaptive", ANCHOR_INIT_ADAPTIVE},
-                {"random", ANCHOR_INIT_RANDOM}};
-    anchor_init_kind kind;
-    for (size_t i = 0; i < 4; i++) {
-        assert_true(anchor_init_kind_named(rows[i].name, &kind));
-        assert_int_equal(kind, rows[i].kind);
-    }
-    assert_false(anchor_init_kind_named("", &kind) || anchor_init_kind_named("gbx", &kind) ||
-                 anchor_init_kind_named("g", &kind));
-}
-
 static void neighbour_scale(void **state)
 {
     (void)state;
@@ -206,9 +187,9 @@ static void neighbour_scale(void **state)
     random_cloud(position, 600, 2);
     for (int kind = 0; kind <= 1; kind++) {
         anchor_init_def def = def_with_voxel(0.3f);
-        def.kind = kind == 0 ? ANCHOR_INIT_GB : ANCHOR_INIT_VOXEL;
-        def.scale = kind == 0 ? ANCHOR_SCALE_NN
-                              : ANCHOR_SCALE_GB; /* voxels have no balls: the neighbour rule in any case */
+        def.kind = kind == 0 ? GBT_INIT_GB : GBT_INIT_VOXEL;
+        def.scale = kind == 0 ? GBT_SCALE_PRIOR_NN
+                              : GBT_SCALE_PRIOR_GB; /* voxels have no balls: the neighbour rule in any case */
         anchors a;
         balls b;
         assert_ok(anchors_init(position, NULL, 600, &def, &a, &b, NULL));
@@ -231,8 +212,8 @@ static void neighbour_scale(void **state)
 
 typedef struct hand_case {
     const char *name;
-    anchor_init_kind kind;
-    anchor_scale_kind scale;
+    gbt_init_kind kind;
+    gbt_scale_prior scale;
     size_t count;
     float position[12];
     size_t expected_count;
@@ -243,16 +224,16 @@ typedef struct hand_case {
 static hand_case hand_cases[] = {
     /* Two pairs along x, 10 apart: radii 0.5, d_nn = 10. clip(0.5, 2.5, 40) = 2.5; 5 + 1.25 = 6.25. */
     {"two far pairs: the lower clip",
-     ANCHOR_INIT_GB,
-     ANCHOR_SCALE_GB,
+     GBT_INIT_GB,
+     GBT_SCALE_PRIOR_GB,
      4,
      {0, 0, 0, 1, 0, 0, 10, 0, 0, 11, 0, 0},
      2,
      {6.25, 6.25},
      INFINITY},
     {"the cap wins",
-     ANCHOR_INIT_GB,
-     ANCHOR_SCALE_GB,
+     GBT_INIT_GB,
+     GBT_SCALE_PRIOR_GB,
      4,
      {0, 0, 0, 1, 0, 0, 10, 0, 0, 11, 0, 0},
      2,
@@ -260,54 +241,54 @@ static hand_case hand_cases[] = {
      2},
     /* Pairs of width 2.5 that are 4 apart: r = 1.25 is inside [1, 16]: 2 + 0.625. */
     {"two near pairs: no clip",
-     ANCHOR_INIT_GB,
-     ANCHOR_SCALE_GB,
+     GBT_INIT_GB,
+     GBT_SCALE_PRIOR_GB,
      4,
      {0, 0, 0, 2.5f, 0, 0, 4, 0, 0, 6.5f, 0, 0},
      2,
      {2.625, 2.625},
      INFINITY},
     /* A lone pair is one ball: no neighbour, s_nn := r = 1.5. */
-    {"one ball: its radius", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 2, {0, 0, 0, 3, 0, 0}, 1, {1.5}, INFINITY},
-    {"one point: the finest scale", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 1, {5, 5, 5}, 1, {0.25}, INFINITY},
-    {"the cap wins over the floor", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 1, {5, 5, 5}, 1, {0.125}, 0.125f},
+    {"one ball: its radius", GBT_INIT_GB, GBT_SCALE_PRIOR_GB, 2, {0, 0, 0, 3, 0, 0}, 1, {1.5}, INFINITY},
+    {"one point: the finest scale", GBT_INIT_GB, GBT_SCALE_PRIOR_GB, 1, {5, 5, 5}, 1, {0.25}, INFINITY},
+    {"the cap wins over the floor", GBT_INIT_GB, GBT_SCALE_PRIOR_GB, 1, {5, 5, 5}, 1, {0.125}, 0.125f},
     {"coincident points are one ball",
-     ANCHOR_INIT_GB,
-     ANCHOR_SCALE_GB,
+     GBT_INIT_GB,
+     GBT_SCALE_PRIOR_GB,
      3,
      {1, 2, 3, 1, 2, 3, 1, 2, 3},
      1,
      {0.25},
      INFINITY},
-    {"no point", ANCHOR_INIT_GB, ANCHOR_SCALE_GB, 0, {0}, 0, {0}, INFINITY},
-    {"voxels: no point", ANCHOR_INIT_VOXEL, ANCHOR_SCALE_NN, 0, {0}, 0, {0}, INFINITY},
+    {"no point", GBT_INIT_GB, GBT_SCALE_PRIOR_GB, 0, {0}, 0, {0}, INFINITY},
+    {"voxels: no point", GBT_INIT_VOXEL, GBT_SCALE_PRIOR_NN, 0, {0}, 0, {0}, INFINITY},
     {"voxels: a lone one takes the voxel size",
-     ANCHOR_INIT_VOXEL,
-     ANCHOR_SCALE_NN,
+     GBT_INIT_VOXEL,
+     GBT_SCALE_PRIOR_NN,
      1,
      {5.2f, 5, 5},
      1,
      {1},
      INFINITY},
     {"voxels: one neighbour",
-     ANCHOR_INIT_VOXEL,
-     ANCHOR_SCALE_NN,
+     GBT_INIT_VOXEL,
+     GBT_SCALE_PRIOR_NN,
      2,
      {0, 0, 0, 3.1f, 4.2f, 0},
      2,
      {5, 5},
      INFINITY},
     {"voxels: two neighbours",
-     ANCHOR_INIT_VOXEL,
-     ANCHOR_SCALE_NN,
+     GBT_INIT_VOXEL,
+     GBT_SCALE_PRIOR_NN,
      3,
      {0, 0, 0, 1, 0, 0, 3, 0, 0},
      3,
      {2.2360679774997898, 1.5811388300841898, 2.5495097567963922},
      INFINITY},
     {"voxels: three neighbours",
-     ANCHOR_INIT_VOXEL,
-     ANCHOR_SCALE_NN,
+     GBT_INIT_VOXEL,
+     GBT_SCALE_PRIOR_NN,
      4,
      {0, 0, 0, 0, 0, 2, 0, 3, 0, 6, 0, 0},
      4,
@@ -338,7 +319,7 @@ static void tiny_scales_have_a_floor(void **state)
     anchors a;
     const float close[12] = {0, 0, 0, 1e-8f, 0, 0, 2e-8f, 0, 0, 3e-8f, 0, 0};
     for (int nn = 0; nn <= 1; nn++) {
-        def.scale = nn == 1 ? ANCHOR_SCALE_NN : ANCHOR_SCALE_GB;
+        def.scale = nn == 1 ? GBT_SCALE_PRIOR_NN : GBT_SCALE_PRIOR_GB;
         assert_ok(anchors_init(close, NULL, 4, &def, &a, NULL, NULL));
         assert_true(a.count > 1);
         for (size_t i = 0; i < a.count; i++)
@@ -417,7 +398,7 @@ static void wrong_arguments_are_refused(void **state)
     }
     const float bad[3] = {0, NAN, 0};
     anchors a;
-    for (anchor_init_kind kind = ANCHOR_INIT_GB; kind <= ANCHOR_INIT_RANDOM; kind++) {
+    for (gbt_init_kind kind = GBT_INIT_GB; kind <= GBT_INIT_RANDOM; kind++) {
         anchor_init_def def = def_with_voxel(1.0f);
         def.kind = kind;
         assert_int_equal(anchors_init(bad, NULL, 1, &def, &a, NULL, NULL), GBT_ERR_ARGUMENT);
@@ -429,7 +410,7 @@ static void no_memory_is_an_error(void **state)
     (void)state;
     static float position[50 * 3];
     random_cloud(position, 50, 4);
-    for (anchor_init_kind kind = ANCHOR_INIT_GB; kind <= ANCHOR_INIT_RANDOM; kind++) {
+    for (gbt_init_kind kind = GBT_INIT_GB; kind <= GBT_INIT_RANDOM; kind++) {
         anchor_init_def def = def_with_voxel(0.1f);
         def.kind = kind;
         long n = 0;
@@ -464,7 +445,6 @@ int main(void)
         cmocka_unit_test(neighbour_scale),
         cmocka_unit_test(adaptive_anchors_stand_on_adaptive_balls),
         cmocka_unit_test(random_anchors_are_some_of_the_points),
-        cmocka_unit_test(kinds_have_names),
         cmocka_unit_test(tiny_scales_have_a_floor),
         cmocka_unit_test(same_bits_for_all_threads),
         cmocka_unit_test(wrong_arguments_are_refused),

@@ -37,11 +37,19 @@ prints "help" '^  info  *show what' --help
 prints "help, short" '^usage: gbtrace COMMAND' -h
 prints "help, as a verb" '^usage: gbtrace COMMAND' help
 prints "help about a verb" '^usage: gbtrace init DATA -o FILE.ply \[options\]$' help init
-prints "help of a verb" '^      --max-depth D  *maximum depth of the ball tree (default 18)$' init --help
+prints "help of a verb" '^      --max-depth D  *maximum depth of the ball tree (default 18)$' init --help-all
 prints "help wins over what is wrong" '^usage: gbtrace init' init --nonsense -h
 prints "needed options say so" '^  -o, --output FILE.ply  *.* (needed)$' init --help
-prints "choices" '--init gb|adaptive|voxel|random$' init --help
-prints "choices with their default" '--scale-prior gb|nn .*(default gb)' init --help
+for command in $("$program" --help | sed -n 's/^  \([a-z-]*\) .*/\1/p'); do
+    "$program" "$command" --help >out 2>err && awk 'length($0) > 100 || NR > 40 { print FILENAME ": line " NR; bad = 1 } END { exit bad }' out >>err
+    report $? "help of $command fits a screen: 40 lines of 100 columns" "$(cat err)"
+done
+prints "rare options are in the whole help" '^      --final-prune-factor F .*' train --help-all
+"$program" train --help | grep -q -e '--final-prune-factor' -e '--pace' -e '--distance'
+[ $? = 1 ]
+report $? "and not in the short one" "$("$program" train --help)"
+prints "choices" '--init gb|adaptive|voxel|random  *initial' init --help
+prints "choices with their default" '--scale-prior gb|nn  *initial scale' init --help
 prints "help of a verb with words: each with its line" '^  courtyard   a town square: ' make-scene --help
 prints "help of a study" '^  rate        file size against picture quality' study --help
 prints "version, short" '^gbtrace [0-9]*\.[0-9]*\.[0-9]*$' -V
@@ -126,7 +134,7 @@ config 'config = other\n' '1: config: unknown option'
 config 'a\0b\n' ' not a configuration file (wanted name = value lines, at most 1 MiB)'
 
 # ---- the environment, between the configuration file and the command line
-prints "help with a variable" '--max-depth D  *maximum depth of the ball tree (default 18)$' init --help
+prints "help with a variable" '--max-depth D  *maximum depth of the ball tree (default 18)$' init --help-all
 export GBTRACE_MAX_DEPTH=65
 misuse 2 "GBTRACE_MAX_DEPTH: bad value (wanted $depth, got 65)" init d -o p
 export GBTRACE_MAX_DEPTH=5 GBTRACE_INIT_VOXEL_SIZE=nan
@@ -151,8 +159,8 @@ misuse 2 "--iteration: not here; a run keeps its last model alone" render -m not
 misuse 4 "nothing: no such file or folder" info nothing
 misuse 4 "no.gbt: cannot open: No such file or directory" info no.gbt
 misuse 4 "nothing/model.gbt: cannot open: No such file or directory" render nothing/model.gbt -o o --camera c.json
-misuse 2 "--downscale: not with --camera (the camera file says the size)" render nothing -o o --camera c.json --downscale 2
-misuse 2 "--insert: meshes are traced (wanted --renderer trace)" render nothing -o o --insert i.json --renderer reference
+misuse 2 "--downscale: not with a camera (the camera file says the size)" render nothing -o o --camera c.json --downscale 2
+misuse 2 "--insert: meshes are traced (wanted the renderer trace)" render nothing -o o --insert i.json --renderer reference
 mkdir empty
 misuse 3 "empty: not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json in it)" info empty
 printf 'GBTMODEL' >short.gbt
@@ -265,17 +273,17 @@ film "a low, near orbit around a place" 3 low --path orbit --frames 3 --look-at 
 cmp -s low/frame_00001.png around/frame_00001.png
 [ $? = 1 ]
 report $? "it is another film" ""
-misuse 2 "--look-at, --radius, --height: of an orbit (wanted --path orbit)" render tiny -o o --path interpolate --height 1
-misuse 2 "--look-at, --radius, --height: of an orbit (wanted --path orbit)" render tiny -o o --radius 1
+misuse 2 "--look-at, --radius, --height: of an orbit (wanted the path orbit)" render tiny -o o --path interpolate --height 1
+misuse 2 "--look-at, --radius, --height: of an orbit (wanted the path orbit)" render tiny -o o --radius 1
 for bad in 1,2 1,2,3,4 1,2,x 1,2,nan 1,,2 ,; do
     misuse 2 "--look-at: \"$bad\" (wanted X,Y,Z, as in 0.5,-1,2)" render tiny -o o --path orbit --look-at "$bad"
 done
 misuse 2 "--radius: bad value (wanted a number from 0 to 1e+09, got -1)" render tiny -o o --path orbit --radius -1
-misuse 2 "--frames, --fps, --size: of a path (wanted --path)" render tiny -o o --frames 3
-misuse 2 "film.mp4: a film wants --path" render tiny -o film.mp4
-misuse 2 "--path: not with --camera" render tiny -o o --path orbit --camera c.json
-misuse 2 "--downscale: not with a path file (wanted --size)" render tiny -o o --path path.json --downscale 2
-misuse 2 "--outputs: not with a film (wanted -o DIR)" render tiny -o film.mp4 --path orbit --outputs depth
+misuse 2 "--frames, --fps, --size: of a film (wanted a path)" render tiny -o o --frames 3
+misuse 2 "film.mp4: a film wants a path" render tiny -o film.mp4
+misuse 2 "--path: not with a camera" render tiny -o o --path orbit --camera c.json
+misuse 2 "--downscale: not with a path file (wanted the size of the film)" render tiny -o o --path path.json --downscale 2
+misuse 2 "--outputs: not with a film (wanted a folder)" render tiny -o film.mp4 --path orbit --outputs depth
 misuse 2 "film.mp4: 21 x 10 pixels (wanted even numbers: films keep colours for 2 x 2 pixels)" render tiny -o film.mp4 --path orbit --size 21x10
 for bad in 20x10x5 -3x4; do
     misuse 2 "--size: bad value (wanted WxH like 1280x720, got $bad)" render tiny -o o --path orbit --size="$bad"
@@ -347,7 +355,7 @@ prints "bench of other plain Gaussians" '^forward, core-us/ray' bench trace --mo
 misuse 2 'study: "pace" (wanted speed, crosscheck, rate, stability, paper, time or anchors; did you mean rate?)' study pace gaussians.ply -o study
 misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study zzzzzz gaussians.ply -o study
 misuse 2 'bench: "tarce" (wanted trace; did you mean trace?)' bench tarce --model gaussians.ply
-misuse 2 "argument missing (usage: gbtrace study speed|crosscheck|rate|stability|paper|time|anchors [MODEL|DATA...] -o DIR)" study -o study
+misuse 2 "argument missing (usage: gbtrace study STUDY [MODEL|DATA...] -o DIR)" study -o study
 misuse 2 "study crosscheck: wanted a model, or data to train on" study crosscheck -o study
 misuse 2 'study stability: "gaussians.ply" is one too many' study stability gaussians.ply -o study
 misuse 2 'study stability: "A99" is not a list of different cases (wanted some of A1 to A18, as A1,A9)' study stability --only A99 -o study
@@ -386,7 +394,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     find run -type f -exec cksum {} + | sort >before
     for other in '--preset fast' '--renderer raster' '--downscale 2' "--data moved"; do
         rm -rf moved && cp -r made moved
-        "$program" eval run $other >out 2>err && grep -q -F 'run/metrics.json and report.html stay; --json FILE keeps these scores' err &&
+        "$program" eval run $other >out 2>err && grep -q -F 'run/metrics.json and report.html stay; a JSON file that is named keeps these scores' err &&
             "$program" eval run $other --json other.json >out 2>err && grep -q 'these scores are in other.json; ' err &&
             find run -type f -exec cksum {} + | sort | cmp -s - before
         report $? "eval $other changes nothing in the run" "$(cat err; find run -newer before)"
@@ -427,12 +435,12 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "a lossless model is copied without loss only" "$(cat err out)"
     "$program" train made -o run-small --iterations 4 >out 2>err
     got=$?
-    [ "$got" = 2 ] && [ "$(grep -c '^error: run-small: .*--resume.*--overwrite' err)" = 1 ] && cmp -s small.gbt run-small/model.gbt
+    [ "$got" = 2 ] && [ "$(grep -c '^error: run-small: .*resume it.*overwrite it' err)" = 1 ] && cmp -s small.gbt run-small/model.gbt
     report $? "train leaves a run alone" "  got $got: $(cat err out)"
     "$program" train made -o run-small --iterations 4 --overwrite >out 2>err && "$program" info run-small | grep -q 'trained   4 iterations'
     report $? "train --overwrite trains anew" "$(cat err out; "$program" info run-small)"
     "$program" train -o run-small --resume --iterations 9 --thrift 2 >out 2>err && grep -q '^run-small: 4 steps done; training goes on to step 9' err &&
-        grep -q "^warning: a run is resumed with its own settings: thrift = 1, not 2" err && [ "$(grep -c '^warning' err)" = 1 ] &&
+        grep -q "^warning: a run is resumed with its own settings: threshold-factor = 1, not 2" err && [ "$(grep -c '^warning' err)" = 1 ] &&
         "$program" train -o run-small --resume >out 2>>err && grep -q '^run-small: all 9 steps are done' err && ! grep -q 0x0 err &&
         "$program" info run-small | grep -q 'trained   9 iterations'
     report $? "train --resume goes on without naming the data" "$(cat err out)"
@@ -448,7 +456,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "eval of an older run, in the folder where it was trained" "$(cat err out)"
     (cd elsewhere && "$program" eval ../pair/run-small) >out 2>err
     got=$?
-    [ "$got" = 4 ] && [ "$(grep error err)" = "error: ../pair/run-small: its data set is not there (tried made); say with --data where it is" ]
+    [ "$got" = 4 ] && [ "$(grep error err)" = "error: ../pair/run-small: its data set is not there (tried made); name the folder where it is now" ]
     report $? "eval names the place of a missing data set" "  got $got: $(cat err out)"
     printf 'made\n/gone/made\n../gone\n' >pair/run-small/data_places
     (cd elsewhere && "$program" eval ../pair/run-small) >out 2>err

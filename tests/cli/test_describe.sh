@@ -18,7 +18,7 @@ commands=$("$program" --help | sed -n 's/^  \([a-z-]*\) .*/\1/p')
 [ "$(echo "$commands" | wc -l)" -ge 15 ]
 report $? "commands are listed" "$commands"
 for command in $commands; do
-    "$program" help $command | grep -v -e '--progress' -e '--quiet' -e '--config' -e '--help' | grep -o -e '--[a-z][a-z-]*' | sort -u
+    "$program" $command --help-all | grep -v -e '--progress' -e '--quiet' -e '--config' -e '--help' -e '--help-all' | grep -o -e '--[a-z][a-z-]*' | sort -u
 done | sort -u | sed 's/-/\\-/g' >wanted
 grep -o -F -f wanted man | sort -u | grep -F -x -v -f - wanted >missing
 [ -s wanted ] && [ ! -s missing ]

@@ -116,8 +116,8 @@ static const value_case value_cases[] = {
     {OPTION_STRING, "a b", 0, 0, true, 0},
     {OPTION_STRING, "", 0, 0, false, 0},
     {OPTION_CHOICE, "one", 0, 0, true, 0},
-    {OPTION_CHOICE, "two", 0, 0, true, 0},
-    {OPTION_CHOICE, "three", 0, 0, true, 0},
+    {OPTION_CHOICE, "two", 0, 0, true, 1},
+    {OPTION_CHOICE, "three", 0, 0, true, 2},
     {OPTION_CHOICE, "on", 0, 0, false, 0},
     {OPTION_CHOICE, "one|two", 0, 0, false, 0},
     {OPTION_CHOICE, "", 0, 0, false, 0},
@@ -143,6 +143,7 @@ static double number_of(option_kind kind, const any_value *v)
     case OPTION_FLAG_OFF:
         return v->flag ? 1 : 0;
     case OPTION_INT:
+    case OPTION_CHOICE:
         return v->whole;
     case OPTION_UINT64:
         return (double)v->word;
@@ -154,7 +155,6 @@ static double number_of(option_kind kind, const any_value *v)
     case OPTION_SIZE:
         return (double)v->size;
     case OPTION_STRING:
-    case OPTION_CHOICE:
     case OPTION_OPERAND:
     case OPTION_ELSEWHERE:
         return 0;
@@ -183,8 +183,7 @@ static void values(void **state)
             fail_msg("kind %d says nothing about what is wanted", (int)c->kind);
         if (!ok)
             continue;
-        if ((c->kind == OPTION_STRING || c->kind == OPTION_CHOICE || c->kind == OPTION_OPERAND) &&
-            value.text != c->text)
+        if ((c->kind == OPTION_STRING || c->kind == OPTION_OPERAND) && value.text != c->text)
             fail_msg("\"%s\" was not kept", c->text);
         if (number_of(c->kind, &value) != c->value)
             fail_msg("kind %d, \"%s\": got %.17g", (int)c->kind, c->text, number_of(c->kind, &value));
@@ -198,7 +197,7 @@ static void refused_values_change_nothing(void **state)
     int whole = 7;
     float single = 0.25f;
     double seconds = 600;
-    const char *choice = "one";
+    int choice = 0;
     const option rows[] = {
         {.name = "a", .kind = OPTION_INT, .value = &whole, .min = 0, .max = 9},
         {.name = "b", .kind = OPTION_FLOAT, .value = &single, .min = 0, .max = 1},
@@ -210,22 +209,16 @@ static void refused_values_change_nothing(void **state)
         assert_false(options_read_value(&rows[i], "10000000000x", wanted, sizeof wanted));
     assert_int_equal(whole, 7);
     assert_true(single == 0.25f && seconds == 600);
-    assert_string_equal(choice, "one");
+    assert_int_equal(choice, 0);
 }
 
-static void order_of_config_and_command_line(void **state)
+static int depth = 1, other = 2;
+static bool grow = true, prune = true;
+static const char *name;
+
+static const option *ordered(int *count)
 {
-    (void)state;
-    char path[] = "/tmp/gbt_options_XXXXXX";
-    const int fd = mkstemp(path);
-    assert_true(fd >= 0);
-    FILE *file = fdopen(fd, "w");
-    fputs("depth = 3\nname=from file # not a comment\ngrow = false\nno-prune = true\n", file);
-    fclose(file);
-    int depth = 1, other = 2;
-    bool grow = true, prune = true;
-    const char *name = NULL;
-    const option options[] = {
+    static const option rows[] = {
         {.name = "depth",
          .short_name = 'd',
          .kind = OPTION_INT,
@@ -248,12 +241,25 @@ static void order_of_config_and_command_line(void **state)
          .help = "",
          .required = true},
         {.name = "grow", .kind = OPTION_FLAG, .value = &grow, .help = ""},
-        {.name = "no-prune", .kind = OPTION_FLAG_OFF, .value = &prune, .help = ""},
+        {.name = "no-prune", .kind = OPTION_FLAG_OFF, .value = &prune, .field = "prune", .help = ""},
     };
-    const command self = {.name = "test", .summary = "", .usage = ""};
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static void order_of_config_and_command_line(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/gbt_options_XXXXXX";
+    const int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    FILE *file = fdopen(fd, "w");
+    fputs("depth = 3\nname=from file # not a comment\ngrow = false\nno-prune = true\n", file);
+    fclose(file);
+    const command self = {.name = "test", .summary = "", .usage = "", .options = ordered, .max_operands = 3};
     operands found;
     char *argv[] = {"first", "-d", "4", "--config", path, "-", "--", "--depth", NULL};
-    assert_int_equal(options_parse(&self, options, 5, 0, 3, 8, argv, &found), -1);
+    assert_int_equal(options_parse(&self, 8, argv, &found), -1);
     assert_int_equal(depth, 4);
     assert_int_equal(other, 2);
     assert_false(grow);
@@ -270,17 +276,20 @@ static void order_of_config_and_command_line(void **state)
 typedef struct spelled {
     int depth;
     bool grow;
-    const char *split, *name, *folder;
+    int split;
+    const char *name, *folder;
 } spelled;
 
-static int parse_spelled(spelled *s, int argc, char **argv, operands *found)
+static spelled typed;
+
+static const option *spelled_rows(int *count)
 {
-    *s = (spelled){.depth = 1, .grow = true, .split = "test"};
-    const option options[] = {
+    typed = (spelled){.depth = 1, .grow = true};
+    static const option rows[] = {
         {.name = "folder",
          .short_name = 'o',
          .kind = OPTION_STRING,
-         .value = &s->folder,
+         .value = &typed.folder,
          .value_name = "DIR",
          .help = "",
          .aliases = "m model-path"},
@@ -292,24 +301,41 @@ static int parse_spelled(spelled *s, int argc, char **argv, operands *found)
          .aliases = "data"},
         {.name = "max-depth",
          .kind = OPTION_INT,
-         .value = &s->depth,
+         .value = &typed.depth,
          .min = 0,
          .max = 9,
          .value_name = "N",
          .help = "",
          .aliases = "r resolution"},
-        {.name = "split", .kind = OPTION_CHOICE, .value = &s->split, .choices = "test|train|all", .help = ""},
+        {.name = "split",
+         .kind = OPTION_CHOICE,
+         .value = &typed.split,
+         .choices = "test|train|all",
+         .help = ""},
         {.name = "skip-test",
          .kind = OPTION_CHOICE,
-         .value = &s->split,
+         .value = &typed.split,
          .choices = "test|train|all",
          .fixed = "train",
          .help = ""},
-        {.name = "no-grow", .kind = OPTION_FLAG_OFF, .value = &s->grow, .help = ""},
+        {.name = "no-grow", .kind = OPTION_FLAG_OFF, .value = &typed.grow, .help = ""},
         {.name = "gpu", .kind = OPTION_ELSEWHERE, .aliases = "w", .help = "leave it out"},
     };
-    static const command self = {.name = "my-test", .summary = "", .usage = ""};
-    return options_parse(&self, options, sizeof options / sizeof *options, 1, 2, argc, argv, found);
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int parse_spelled(spelled *s, int argc, char **argv, operands *found)
+{
+    static const command self = {.name = "my-test",
+                                 .summary = "",
+                                 .usage = "",
+                                 .options = spelled_rows,
+                                 .min_operands = 1,
+                                 .max_operands = 2};
+    const int code = options_parse(&self, argc, argv, found);
+    *s = typed;
+    return code;
 }
 
 static void other_names(void **state)
@@ -322,13 +348,13 @@ static void other_names(void **state)
                       &found),
         -1);
     assert_true(found.count == 1 && strcmp(found.value[0], "data") == 0);
-    assert_true(strcmp(s.folder, "run") == 0 && s.depth == 4 && strcmp(s.split, "train") == 0 && !s.grow);
+    assert_true(strcmp(s.folder, "run") == 0 && s.depth == 4 && s.split == 1 && !s.grow);
     assert_int_equal(
         parse_spelled(&s, 5, (char *[]){"second", "--data=first", "--skip-test", "--split", "all"}, &found),
         -1);
     assert_true(found.count == 2 && strcmp(found.value[0], "first") == 0 &&
                 strcmp(found.value[1], "second") == 0);
-    assert_string_equal(s.split, "all");
+    assert_int_equal(s.split, 2);
     static char *const wrong[][4] = {{"x", "-w"},
                                      {"x", "--gpu=0"},
                                      {"x", "--r", "4"},
@@ -372,7 +398,7 @@ static void environment(void **state)
         assert_int_equal(parse_spelled(&s, rows[i].typed != NULL ? 3 : 2, argv, &found), -1);
         if (s.depth != rows[i].depth)
             fail_msg("row %zu: got %d", i, s.depth);
-        assert_true(strcmp(s.split, "all") == 0 && s.folder == NULL);
+        assert_true(s.split == 2 && s.folder == NULL);
         assert_true(found.count == 1 && strcmp(found.value[0], "here") == 0);
     }
     setenv("GBTRACE_MY_TEST_MAX_DEPTH", "10", 1);
@@ -383,7 +409,7 @@ static void environment(void **state)
     setenv("GBTRACE_CONFIG", path, 1);
     assert_int_equal(parse_spelled(&s, 1, (char *[]){"x"}, &found), -1);
     assert_false(s.grow);
-    assert_string_equal(s.split, "all"); /* from the file that the environment named */
+    assert_int_equal(s.split, 2); /* from the file that the environment named */
     assert_string_equal(found.value[0], "x");
     unsetenv("GBTRACE_CONFIG"), unsetenv("GBTRACE_NO_GROW"), unsetenv("GBTRACE_SKIP_TEST"),
         unsetenv("GBTRACE_MY_TEST_MAX_DEPTH"), unsetenv("GBTRACE_MAX_DEPTH");

@@ -588,7 +588,7 @@ static void blender_folder(void **state)
             assert_string_equal(s.views[i == 1].name, i == 1 ? "val/r_0" : "test/r_0");
         assert_true(fabs(s.views[0].camera.params[0] - 4 / tan(0.39269908169872414)) < 1e-12 &&
                     s.views[0].camera.params[3] == 3);
-        must(scene_set_alpha(&s, "auto", &err));
+        scene_set_alpha(&s, GBT_ALPHA_AUTO);
         assert_int_equal(s.views[0].alpha, SCENE_ALPHA_WHITE);
         scene_free(&s);
     }

@@ -198,17 +198,18 @@ static void init_counts(void **state)
     gbt_init_def def = gbt_init_def_default();
     def.init_count = 0.25;
     const struct {
-        const char *init;
+        gbt_init_kind init;
         int max_depth;
         float voxel_size;
         double anchors, voxels, balls;
     } rows[] = {
         /* cubes of 8 points: compact (eq 23) */
-        {"gb", 0, 0.0f, 1, 64, 1},       {"gb", 1, 0.0f, 2, 64, 2},      {"gb", 2, 0.0f, 4, 64, 4},
-        {"gb", 18, 0.0f, 8, 64, 8},      {"gb", 18, 0.125f, 32, 64, 32}, /* never compact: leaves of N_min = 2
-                                                                            points */
-        {"voxel", 18, 0.0f, 64, 64, 8},  {"voxel", 18, 100.0f, 1, 1, 1}, {"adaptive", 18, 0.0f, 16, 64, 8},
-        {"random", 18, 0.0f, 16, 64, 8},
+        {GBT_INIT_GB, 0, 0.0f, 1, 64, 1},         {GBT_INIT_GB, 1, 0.0f, 2, 64, 2},
+        {GBT_INIT_GB, 2, 0.0f, 4, 64, 4},         {GBT_INIT_GB, 18, 0.0f, 8, 64, 8},
+        {GBT_INIT_GB, 18, 0.125f, 32, 64, 32}, /* never compact: leaves of N_min = 2
+                                    points */
+        {GBT_INIT_VOXEL, 18, 0.0f, 64, 64, 8},    {GBT_INIT_VOXEL, 18, 100.0f, 1, 1, 1},
+        {GBT_INIT_ADAPTIVE, 18, 0.0f, 16, 64, 8}, {GBT_INIT_RANDOM, 18, 0.0f, 16, 64, 8},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         def.init = rows[i].init;
@@ -270,9 +271,13 @@ static void init_refuses(void **state)
     gbt_init_def bad[BAD];
     for (int i = 0; i < BAD; i++)
         bad[i] = good;
-    bad[0].init = "ball", bad[1].scale_prior = NULL, bad[2].voxel_rule = "", bad[3].voxel_size = -1,
-    bad[4].voxel_size = NAN, bad[5].max_depth = 65;
-    bad[6].init = NULL;
+    bad[0].init = (gbt_init_kind)4;
+    bad[1].scale_prior = (gbt_scale_prior)2;
+    bad[2].voxel_rule = (gbt_voxel_rule)2;
+    bad[3].voxel_size = -1;
+    bad[4].voxel_size = NAN;
+    bad[5].max_depth = 65;
+    bad[6] = (gbt_init_def){0};
     bad[7].init_count = -0.1;
     bad[8].init_count = 1.5;
     for (int i = 0; i < BAD; i++) {

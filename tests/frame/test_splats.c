@@ -39,7 +39,7 @@ typedef struct drawn {
     double light;
 } drawn;
 
-static void draw(const gaussian_cloud *cloud, const gbt_camera *camera, frame_renderer renderer,
+static void draw(const gaussian_cloud *cloud, const gbt_camera *camera, gbt_renderer renderer,
                  float footprint, drawn *out)
 {
     trace_settings settings = trace_settings_default();
@@ -81,9 +81,9 @@ static void splats_of_a_footprint_are_rays(void **state)
     gaussian_cloud cloud;
     make_dots(&camera, &cloud);
     drawn rays, splats, dilated;
-    draw(&cloud, &camera, FRAME_TRACE, 0.1f, &rays);
-    draw(&cloud, &camera, FRAME_SPLAT, 0.1f, &splats);
-    draw(&cloud, &camera, FRAME_SPLAT, 0, &dilated);
+    draw(&cloud, &camera, GBT_RENDERER_TRACE, 0.1f, &rays);
+    draw(&cloud, &camera, GBT_RENDERER_RASTER, 0.1f, &splats);
+    draw(&cloud, &camera, GBT_RENDERER_RASTER, 0, &dilated);
     const double picture = relative_error(splats.f.rgb.pixels, rays.f.rgb.pixels, 3 * W * H);
     const double scale = relative_error(splats.d.scale_log, rays.d.scale_log, 3 * COUNT);
     const double opacity = relative_error(splats.d.opacity, rays.d.opacity, COUNT);

@@ -39,7 +39,7 @@ int main(int argc, char **argv)
             gbt_error err = {0};
             balls_def def = balls_def_default();
             const double start = seconds();
-            if (balls_voxel_size(position, count, VOXEL_MEDIAN_SPACING, &def.voxel_size, &err) != GBT_OK)
+            if (balls_voxel_size(position, count, GBT_VOXEL_RULE_MEDIAN, &def.voxel_size, &err) != GBT_OK)
                 return EXIT_FAILURE;
             const double sized = seconds();
             balls b;

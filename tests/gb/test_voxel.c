@@ -29,7 +29,7 @@ static void all_distances(const float *position, size_t count, size_t i, double 
     qsort(squared, n, sizeof *squared, by_value);
 }
 
-static double brute_scale(const float *position, size_t count, voxel_rule rule)
+static double brute_scale(const float *position, size_t count, gbt_voxel_rule rule)
 {
     double *squared = malloc(count * sizeof *squared), *value = malloc(count * sizeof *value);
     assert_true(squared != NULL && value != NULL);
@@ -39,10 +39,10 @@ static double brute_scale(const float *position, size_t count, voxel_rule rule)
         double mean = 0;
         for (size_t j = 0; j < k; j++)
             mean += squared[j] / (double)k;
-        value[i] = rule == VOXEL_COMPAT_SQUARED ? mean : sqrt(squared[0]);
+        value[i] = rule == GBT_VOXEL_RULE_SQUARED ? mean : sqrt(squared[0]);
     }
     qsort(value, count, sizeof *value, by_value);
-    size_t rank = rule == VOXEL_COMPAT_SQUARED ? (count / 2 > 0 ? count / 2 - 1 : 0) : (count - 1) / 2;
+    size_t rank = rule == GBT_VOXEL_RULE_SQUARED ? (count / 2 > 0 ? count / 2 - 1 : 0) : (count - 1) / 2;
     double got = value[rank];
     if (got == 0) { /* the median of the positive ones */
         size_t zeros = 0;
@@ -51,7 +51,7 @@ static double brute_scale(const float *position, size_t count, voxel_rule rule)
         const size_t left = count - zeros;
         assert_true(left > 0);
         got = value[zeros +
-                    (rule == VOXEL_COMPAT_SQUARED ? (left / 2 > 0 ? left / 2 - 1 : 0) : (left - 1) / 2)];
+                    (rule == GBT_VOXEL_RULE_SQUARED ? (left / 2 > 0 ? left / 2 - 1 : 0) : (left - 1) / 2)];
     }
     free(squared);
     free(value);
@@ -72,8 +72,8 @@ static void scale_equals_brute_force(void **state)
                 for (size_t i = 0; i < 3 * n; i++)
                     c.position[i] = rintf(2 * c.position[i]);
             float got = 0;
-            const double want = brute_scale(c.position, n, (voxel_rule)rule);
-            assert_ok(balls_voxel_size(c.position, n, (voxel_rule)rule, &got, &assert_ok_err_));
+            const double want = brute_scale(c.position, n, (gbt_voxel_rule)rule);
+            assert_ok(balls_voxel_size(c.position, n, (gbt_voxel_rule)rule, &got, &assert_ok_err_));
             if (!(fabs((double)got - want) <= 1e-6 * want))
                 fail_msg("seed %llu, %zu points, rule %d: wanted %.9g, got %.9g", (unsigned long long)seed, n,
                          rule, want, (double)got);
@@ -109,9 +109,9 @@ static void scale_of_a_line(void **state)
     float position[24] = {0}, got = -1;
     for (size_t i = 0; i < c->count; i++)
         position[3 * i] = c->x[i];
-    assert_ok(balls_voxel_size(position, c->count, VOXEL_MEDIAN_SPACING, &got, &assert_ok_err_));
+    assert_ok(balls_voxel_size(position, c->count, GBT_VOXEL_RULE_MEDIAN, &got, &assert_ok_err_));
     assert_float_equal(got, c->spacing, 0);
-    assert_ok(balls_voxel_size(position, c->count, VOXEL_COMPAT_SQUARED, &got, &assert_ok_err_));
+    assert_ok(balls_voxel_size(position, c->count, GBT_VOXEL_RULE_SQUARED, &got, &assert_ok_err_));
     assert_float_equal(got, c->squared, 1e-6f * c->squared);
 }
 
@@ -121,9 +121,9 @@ static void scale_is_positive_and_finite_at_the_ends_of_float(void **state)
     const float far[6] = {-FLT_MAX, 0, 0, FLT_MAX, 0, 0}, near[6] = {0, 0, 0, FLT_TRUE_MIN, 0, 0};
     for (int rule = 0; rule < 2; rule++) {
         float got = -1;
-        assert_ok(balls_voxel_size(far, 2, (voxel_rule)rule, &got, &assert_ok_err_));
+        assert_ok(balls_voxel_size(far, 2, (gbt_voxel_rule)rule, &got, &assert_ok_err_));
         assert_true(got == FLT_MAX);
-        assert_ok(balls_voxel_size(near, 2, (voxel_rule)rule, &got, &assert_ok_err_));
+        assert_ok(balls_voxel_size(near, 2, (gbt_voxel_rule)rule, &got, &assert_ok_err_));
         assert_true(got == FLT_TRUE_MIN);
     }
 }
@@ -137,7 +137,7 @@ static void many_duplicates_are_quick(void **state)
     for (size_t i = 0; i < N / 2; i++)
         memcpy(c.position + 3 * i, c.position, 3 * sizeof(float));
     float got = 0;
-    assert_ok(balls_voxel_size(c.position, N, VOXEL_COMPAT_SQUARED, &got, &assert_ok_err_));
+    assert_ok(balls_voxel_size(c.position, N, GBT_VOXEL_RULE_SQUARED, &got, &assert_ok_err_));
     assert_true(got > 0 && got < 1);
     cloud_free(&c);
 }
@@ -150,10 +150,10 @@ static void same_scale_for_any_thread_count(void **state)
     for (int rule = 0; rule < 2; rule++) {
         float want = 0, got = 0;
         parallel_set_threads(1);
-        assert_ok(balls_voxel_size(c.position, c.count, (voxel_rule)rule, &want, &assert_ok_err_));
+        assert_ok(balls_voxel_size(c.position, c.count, (gbt_voxel_rule)rule, &want, &assert_ok_err_));
         for (int threads = 2; threads <= 8; threads += 3) {
             parallel_set_threads(threads);
-            assert_ok(balls_voxel_size(c.position, c.count, (voxel_rule)rule, &got, &assert_ok_err_));
+            assert_ok(balls_voxel_size(c.position, c.count, (gbt_voxel_rule)rule, &got, &assert_ok_err_));
             assert_memory_equal(&got, &want, sizeof got);
         }
     }
@@ -264,11 +264,11 @@ static void bad_input_is_refused(void **state)
     }
     gbt_error err = {0};
     float scale = -1;
-    assert_int_equal(balls_voxel_size(nan_point, 2, VOXEL_MEDIAN_SPACING, &scale, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(balls_voxel_size(nan_point, 2, GBT_VOXEL_RULE_MEDIAN, &scale, &err), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "point 1 "));
     assert_true(scale == 1.0f);
     err = (gbt_error){0};
-    assert_int_equal(balls_voxel_size(fine, 2, (voxel_rule)7, &scale, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(balls_voxel_size(fine, 2, (gbt_voxel_rule)7, &scale, &err), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "rule 7"));
 }
 
@@ -281,7 +281,7 @@ static void every_allocation_may_fail(void **state)
         gbt_error err = {0};
         float scale = -1;
         mem_fail_after(k);
-        const gbt_status status = balls_voxel_size(c.position, c.count, VOXEL_MEDIAN_SPACING, &scale, &err);
+        const gbt_status status = balls_voxel_size(c.position, c.count, GBT_VOXEL_RULE_MEDIAN, &scale, &err);
         mem_fail_after(-1);
         if (status == GBT_OK)
             break;
@@ -309,8 +309,8 @@ static void garden_has_the_known_spacing(void **state)
     if (c.position == NULL)
         skip();
     float spacing = 0, squared = 0;
-    assert_ok(balls_voxel_size(c.position, c.count, VOXEL_MEDIAN_SPACING, &spacing, &assert_ok_err_));
-    assert_ok(balls_voxel_size(c.position, c.count, VOXEL_COMPAT_SQUARED, &squared, &assert_ok_err_));
+    assert_ok(balls_voxel_size(c.position, c.count, GBT_VOXEL_RULE_MEDIAN, &spacing, &assert_ok_err_));
+    assert_ok(balls_voxel_size(c.position, c.count, GBT_VOXEL_RULE_SQUARED, &squared, &assert_ok_err_));
     print_message("garden: median spacing %.9g, reference code's quantity %.9g\n", (double)spacing,
                   (double)squared);
     assert_float_equal(spacing, 0.0052808f, 5e-8f);

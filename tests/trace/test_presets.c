@@ -10,12 +10,12 @@
 #include "trace/trace.h"
 
 static const double half_step = 0.5 / 255;
-static const char *const names[] = {"exact", "default", "fast"};
+static const char *const names[] = {"exact", "default", "fast"}; /* in the order of gbt_preset */
 
-static trace_settings preset(const char *name)
+static trace_settings preset(gbt_preset which)
 {
     trace_settings s = trace_settings_default();
-    assert_true(trace_settings_preset(name, &s));
+    trace_settings_preset(which, &s);
     return s;
 }
 
@@ -37,15 +37,14 @@ static void presets_by_name(void **state)
     s.background[1] = 0.25f;
     s.proxy_radius = 2;
     before = s;
-    assert_false(trace_settings_preset("Fast", &s));
-    assert_false(trace_settings_preset("", &s));
+    trace_settings_preset(GBT_PRESET_AS_TRAINED, &s);
     assert_memory_equal(&s, &before, sizeof s);
-    assert_true(trace_settings_preset("default", &s));
+    trace_settings_preset(GBT_PRESET_DEFAULT, &s);
     const trace_settings d = trace_settings_default();
     assert_true(s.alpha_min == d.alpha_min && s.transmittance_min == d.transmittance_min &&
                 isinf(s.proxy_radius));
     assert_true(s.alpha_max == 0.5f && s.t_near == 3 && s.background[1] == 0.25f); /* the model's stay */
-    const trace_settings exact = preset("exact"), fast = preset("fast");
+    const trace_settings exact = preset(GBT_PRESET_EXACT), fast = preset(GBT_PRESET_FAST);
     assert_true(exact.alpha_min < d.alpha_min && d.alpha_min < fast.alpha_min);
     assert_true(exact.transmittance_min < d.transmittance_min &&
                 d.transmittance_min < fast.transmittance_min);
@@ -99,10 +98,10 @@ typedef struct preset_figures {
         of_bound; /* worst error of the tracer, worst bound, worst error as a part of its ray's bound */
 } preset_figures;
 
-static preset_figures check_preset(const gaussians *g, const ray_image *rays, const char *name,
+static preset_figures check_preset(const gaussians *g, const ray_image *rays, gbt_preset which,
                                    const float background[3])
 {
-    trace_settings s = preset(name), all = whole();
+    trace_settings s = preset(which), all = whole();
     memcpy(s.background, background, sizeof s.background);
     memcpy(all.background, background, sizeof all.background);
     const size_t count = ray_image_count(rays);
@@ -152,7 +151,7 @@ static void check_scene(const char *scene, const gaussians *g, const ray_image *
 {
     const float background[3] = {0, 0.5f, 1};
     for (size_t i = 0; i < 3; i++) {
-        const preset_figures f = check_preset(g, rays, names[i], background);
+        const preset_figures f = check_preset(g, rays, (gbt_preset)i, background);
         print_message("%-14s %-8s max error %.2e, bound %.2e, %2.0f %% of a ray's bound reached\n", scene,
                       names[i], f.error, f.bound, 100 * f.of_bound);
         assert_true(i > 0 || f.error < 0.5 * half_step); /* exact: half of half an 8-bit step */
@@ -238,7 +237,7 @@ static void dropped_hits_reach_their_bound(void **state)
     enum { COUNT = 50 };
     const trace_settings all = whole();
     for (size_t i = 0; i < 3; i++) {
-        const trace_settings s = preset(names[i]);
+        const trace_settings s = preset((gbt_preset)i);
         float opacity[COUNT], white[COUNT];
         for (int k = 0; k < COUNT; k++) {
             opacity[k] = 0.999f * s.alpha_min;
@@ -256,7 +255,7 @@ static void the_stop_reaches_its_bound(void **state)
     (void)state;
     const trace_settings all = whole();
     for (size_t i = 0; i < 3; i++) {
-        const trace_settings s = preset(names[i]);
+        const trace_settings s = preset((gbt_preset)i);
         const double stop = (double)s.transmittance_min / (1 - (double)s.alpha_max), left = 0.99 * stop;
         const float in_front = (float)(1 - sqrt(left)), opacity[3] = {in_front, in_front, 1},
                     color[3] = {0, 0, 1};

@@ -171,30 +171,33 @@ static void alpha_is_what_it_is_said_to_be(void **state)
     make_tiny_scene(folder);
     change_photos(folder, cut_out);
     static const struct {
-        const char *alpha;
+        gbt_alpha alpha;
         float background;
         bool masked;
-    } cases[] = {{"auto", 0, false}, {"black", 0, false}, {"white", 1, false}, {"mask", -1, true}};
+    } cases[] = {{GBT_ALPHA_AUTO, 0, false},
+                 {GBT_ALPHA_BLACK, 0, false},
+                 {GBT_ALPHA_WHITE, 1, false},
+                 {GBT_ALPHA_MASK, -1, true}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         gbt_train_def def = run_def();
         def.alpha = cases[i].alpha;
-        const char *run = in_root("alpha_%s", cases[i].alpha);
+        const char *run = in_root("alpha_%d", (int)cases[i].alpha);
         train_ok(folder, run, &def);
         json_t *metrics = scores_of(run);
         assert_int_equal(strstr(json_string_value(json_object_get(metrics, "scored")), "masked") != NULL,
                          cases[i].masked);
         json_decref(metrics);
         model m;
-        assert_ok(model_load(in_root("alpha_%s/model.gbt", cases[i].alpha), &m, NULL));
+        assert_ok(model_load(in_root("alpha_%d/model.gbt", (int)cases[i].alpha), &m, NULL));
         for (int c = 0; c < 3; c++)
             assert_true(cases[i].background < 0 ? m.background[c] > 0 && m.background[c] < 1
                                                 : m.background[c] == cases[i].background);
         model_free(&m);
     }
     gbt_train_def def = run_def();
-    def.alpha = "green";
-    train_fails(folder, in_root("alpha_green"), &def, GBT_ERR_ARGUMENT,
-                "--alpha: \"green\" (wanted auto, black, white or mask)");
+    def.alpha = (gbt_alpha)7;
+    train_fails(folder, in_root("alpha_7"), &def, GBT_ERR_ARGUMENT,
+                "alpha: 7 (wanted auto, black, white or mask)");
 }
 
 int main(void)

@@ -116,7 +116,7 @@ static void assert_no_nan_in_renders(const char *run, const char *data)
     gbt_render_def def = gbt_render_def_default();
     def.data = data;
     def.split = GBT_SPLIT_ALL;
-    def.format = "exr";
+    def.format = GBT_PICTURE_EXR;
     assert_ok(gbt_render(run, joined(run, "exr"), &def, NULL));
     scene s;
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
@@ -164,13 +164,13 @@ static void wild_rates_and_photos_leave_no_nan(void **state)
         const char *name;
         double factor;
         bool exposure, compat;
-        const char *distance;
+        gbt_distance_input distance;
         uint64_t steps;
     } runs[] = {
-        {"rates 1", 1, false, false, "auto", 200},
-        {"rates 100", 100, false, false, "on", 1000},
-        {"rates 1000", 1000, true, false, "on", 200},
-        {"compat 100", 100, false, true, "off", 200},
+        {"rates 1", 1, false, false, GBT_DISTANCE_INPUT_AUTO, 200},
+        {"rates 100", 100, false, false, GBT_DISTANCE_INPUT_ON, 1000},
+        {"rates 1000", 1000, true, false, GBT_DISTANCE_INPUT_ON, 200},
+        {"compat 100", 100, false, true, GBT_DISTANCE_INPUT_OFF, 200},
     };
     for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
         gbt_train_def def = run_def();
@@ -692,7 +692,7 @@ static void exposure_resumes_to_the_same_bits(void **state)
     def.exposure = true;
     train_ok(tiny, in_root("exposure straight"), &def);
     def.stop_at_step = 23;
-    train_fails(tiny, in_root("exposure halves"), &def, GBT_ERR_INTERRUPTED, "--resume");
+    train_fails(tiny, in_root("exposure halves"), &def, GBT_ERR_INTERRUPTED, "resume goes on");
     gbt_train_def more = gbt_train_def_default();
     more.resume = true;
     gbt_set_threads(3);

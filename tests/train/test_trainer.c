@@ -387,7 +387,7 @@ enum { FEW_BALLS_STEPS = 320 };
 static void open_from_few_balls(trainer *t)
 {
     gbt_train_def def = run_def();
-    def.init = "adaptive";
+    def.init = GBT_INIT_ADAPTIVE;
     def.init_count = 0.1;
     def.iterations = FEW_BALLS_STEPS;
     open_ok(t, tiny, &def);
@@ -696,10 +696,10 @@ static void a_run_is_overwritten_only_when_asked(void **state)
     }
     /* The checkpoint alone can be resumed, the model alone is a finished run. */
     assert_int_equal(rename(in_root("kept/model.gbt"), in_root("kept/aside")), 0);
-    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "--resume");
+    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "resume it");
     assert_int_equal(rename(in_root("kept/checkpoints/last.gbt"), in_root("kept/checkpoints/last.gbt.prev")),
                      0);
-    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "--overwrite");
+    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "overwrite it");
     assert_int_equal(unlink(in_root("kept/checkpoints/last.gbt.prev")), 0);
     assert_int_equal(rename(in_root("kept/aside"), in_root("kept/model.gbt")), 0);
     train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "holds a run already");
@@ -990,16 +990,69 @@ static void levels_and_rates(void **state)
     }
 }
 
+/* Every setting: its default is within its range, and reads back from text to the same bits. */
+static void settings_are_whole(void **state)
+{
+    (void)state;
+    const gbt_train_def usual = gbt_train_def_default();
+    int texts = 0;
+    for (size_t i = 0; i < gbt_train_setting_count(); i++) {
+        const gbt_train_setting *s = gbt_train_setting_at(i);
+        static setting_texts kept;
+        char text[SETTING_TEXT_SIZE], again[SETTING_TEXT_SIZE];
+        gbt_train_def back = usual;
+        gbt_error err = {0};
+        texts += s->kind == GBT_SETTING_TEXT;
+        if (setting_find(s->name) != s || (s->option != NULL && setting_find(s->option) != s))
+            fail_msg("%s: another setting has its name", s->name);
+        setting_text(s, &usual, text, sizeof text);
+        if (setting_check(s, &usual, &err) != GBT_OK || !setting_read(s, text, &kept, &back))
+            fail_msg("%s = %s: %s", s->name, text, err.text);
+        setting_text(s, &back, again, sizeof again);
+        assert_string_equal(text, again);
+        if (s->help == NULL || (s->kind == GBT_SETTING_CHOICE && s->choices == NULL))
+            fail_msg("%s: incomplete", s->name);
+    }
+    assert_int_equal(texts, SETTING_TEXTS);
+}
+
+static void settings_out_of_range_are_named(void **state)
+{
+    (void)state;
+    gbt_train_def bad[6];
+    for (int i = 0; i < 6; i++)
+        bad[i] = gbt_train_def_default();
+    bad[0].init_count = 3;
+    bad[1].init = (gbt_init_kind)9;
+    bad[2].renderer = GBT_RENDERER_REFERENCE;
+    bad[3].scale_factor = 0.001;
+    bad[4].max_anchors = 0;
+    bad[5].cookie_ = 0;
+    static const char *const says[6] = {"init_count: 3 (wanted 0 to 1)",
+                                        "init: 9 (wanted gb, adaptive, voxel or random)",
+                                        "renderer: 3 (wanted trace, raster or per-ray)",
+                                        "scale_factor: 0.001 (wanted 0.01 to 100, or 0)",
+                                        "max_anchors: 0 (wanted 1 to 1e+08)",
+                                        "the def was not made by gbt_train_def_default() of this version"};
+    for (int i = 0; i < 6; i++) {
+        gbt_error err = {0};
+        trainer t = {0};
+        assert_int_equal(trainer_open(&t, tiny, &bad[i], &err), GBT_ERR_ARGUMENT);
+        trainer_free(&t);
+        assert_string_equal(err.text, says[i]);
+    }
+}
+
 static void config_comes_back(void **state)
 {
     (void)state;
     gbt_train_def def = gbt_train_def_default();
-    def.init = "voxel";
-    def.scale_prior = "nn";
+    def.init = GBT_INIT_VOXEL;
+    def.scale_prior = GBT_SCALE_PRIOR_NN;
     def.max_depth = 7;
     def.voxel_size = 0.1f;
     def.offsets = 3;
-    def.distance = "off";
+    def.distance = GBT_DISTANCE_INPUT_OFF;
     def.iterations = 123456789012ull;
     def.budget_seconds = 1 / 3.0;
     def.pace = "1,2,3";
@@ -1034,6 +1087,12 @@ static void config_comes_back(void **state)
     back.pace = "1";
     assert_ok(config_parse(text, "config", &back, &strings, &err));
     assert_null(back.pace);
+
+    /* Names of former versions, and of the command line. */
+    assert_ok(config_parse("thrift = 2\nlast-thrift = 3\nbudget = 7\ngrow = false\n", "config", &back,
+                           &strings, &err));
+    assert_true(back.threshold_factor == 2 && back.final_prune_factor == 3 && back.budget_seconds == 7 &&
+                !back.grow);
 
     char folder[900]; /* a deep folder must not make a run that cannot go on */
     memset(folder, 'd', sizeof folder - 1);
@@ -1251,6 +1310,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(progress_rises_from_0_to_1),
         cmocka_unit_test(pace_is_read),
         cmocka_unit_test(levels_and_rates),
+        cmocka_unit_test(settings_are_whole),
+        cmocka_unit_test(settings_out_of_range_are_named),
         cmocka_unit_test(config_comes_back),
         cmocka_unit_test(samples_are_pixels_of_the_photo),
         cmocka_unit_test(photos_are_the_resized_reference),

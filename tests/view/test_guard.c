@@ -68,7 +68,7 @@ static void addresses(void **state)
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         gbt_error err = {0};
         assert_int_equal(guard_open(wrong[i], &g, &err), GBT_ERR_ARGUMENT);
-        assert_non_null(strstr(err.text, "--host: \""));
+        assert_non_null(strstr(err.text, "host: \""));
     }
     assert_ok(guard_open("localhost", &g, NULL));
     assert_true(g.address.s_addr == htonl(INADDR_LOOPBACK) && g.token[0] == '\0');

@@ -87,8 +87,8 @@ static request_case cases[] = {
      "/render",
      {"camera", CAMERA(",\"fov_x_deg\":90,\"end\":{\"origin\":[1,2,4]}")},
      "for gbtrace render"},
-    {"format", "/render", {"view", "0", "format", "exr"}, "format: \"exr\": unknown"},
-    {"preset", "/render", {"view", "0", "preset", ""}, "preset: \"\": unknown"},
+    {"format", "/render", {"view", "0", "format", "exr"}, "format: \"exr\" (wanted raw, jpeg, png or float)"},
+    {"preset", "/render", {"view", "0", "preset", ""}, "preset: \"\" (wanted exact, default or fast)"},
     {"renderer", "/render", {"view", "0", "renderer", "reference"}, "renderer: \"reference\""},
     {"output", "/render", {"view", "0", "output", "dept", "format", "float"}, "\"dept\""},
     {"two outputs",
@@ -126,8 +126,8 @@ static void all_words_arrive(void **state)
                                    "preset", "fast",  "sample", "7",     NULL};
     assert_ok(request_parse("/render", word_in, (void *)picture, &r, NULL));
     assert_true(r.kind == REQUEST_RENDER && r.view == -1 && r.format == REQUEST_FLOAT &&
-                r.renderer == FRAME_TRACE && r.output == 8 && r.sample == 7);
-    assert_string_equal(r.preset, "fast");
+                r.renderer == GBT_RENDERER_TRACE && r.output == 8 && r.sample == 7);
+    assert_int_equal(r.preset, GBT_PRESET_FAST);
     assert_true(r.camera.width == 64 && r.camera.height == 48 && r.camera.center[2] == 3);
     const char *const colored[] = {"view", "0", "background", "00ff33", NULL};
     assert_ok(request_parse("/render", word_in, (void *)colored, &r, NULL));
@@ -140,7 +140,7 @@ static void all_words_arrive(void **state)
     const char *const plain[] = {"view", "0", NULL};
     assert_ok(request_parse("/render", word_in, (void *)plain, &r, NULL));
     assert_true(r.width == 0 && r.output == 0 && r.sample == 0 && r.format == REQUEST_RAW &&
-                !r.has_background && strcmp(r.preset, "default") == 0);
+                !r.has_background && r.preset == GBT_PRESET_DEFAULT);
 }
 
 int main(void)

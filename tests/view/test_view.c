@@ -455,8 +455,8 @@ static void what_cannot_be_shown(void **state)
                 {"tiny/images", NULL, "model.gbt", NULL, 0, GBT_ERR_IO},
                 {"run/config", NULL, "config", NULL, 0, GBT_ERR_FORMAT},
                 {"run", "nowhere", "nowhere", NULL, 0, GBT_ERR_IO},
-                {"run", NULL, "--port: 65536", NULL, 65536, GBT_ERR_ARGUMENT},
-                {"run", NULL, "--host: \"here\"", "here", 0, GBT_ERR_ARGUMENT},
+                {"run", NULL, "port: 65536", NULL, 65536, GBT_ERR_ARGUMENT},
+                {"run", NULL, "host: \"here\"", "here", 0, GBT_ERR_ARGUMENT},
                 {"run", NULL, "203.0.113.77:0: cannot listen", "203.0.113.77", 0, GBT_ERR_IO}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         gbt_view_def def = gbt_view_def_default();

@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* gbtrace/choices.h -- what settings choose from: closed sets, and the names that they have in files and on
+   the command line. Names stand in the order of their enum. */
+#ifndef GBTRACE_CHOICES_H
+#define GBTRACE_CHOICES_H
+
+/** Where anchors start. */
+typedef enum gbt_init_kind {
+    GBT_INIT_GB,       /* the paper's granular balls */
+    GBT_INIT_ADAPTIVE, /* granular balls where the scene needs them */
+    GBT_INIT_VOXEL,    /* the voxels of Scaffold-GS */
+    GBT_INIT_RANDOM    /* sparse points at random, for comparison */
+} gbt_init_kind;
+#define GBT_INIT_NAMES "gb|adaptive|voxel|random"
+
+/** What the first scales of anchors come from; only GBT_INIT_GB has a choice, the others use spacing. */
+typedef enum gbt_scale_prior {
+    GBT_SCALE_PRIOR_GB, /* the balls' radii and the spacing of their centres */
+    GBT_SCALE_PRIOR_NN  /* the spacing alone */
+} gbt_scale_prior;
+#define GBT_SCALE_PRIOR_NAMES "gb|nn"
+
+/** How the voxel size is estimated from sparse points. */
+typedef enum gbt_voxel_rule {
+    GBT_VOXEL_RULE_MEDIAN, /* median distance to the nearest neighbour: what the paper's text says */
+    GBT_VOXEL_RULE_SQUARED /* median of the mean squared distance to three: what the reference code computes
+                            */
+} gbt_voxel_rule;
+#define GBT_VOXEL_RULE_NAMES "median|squared"
+
+/** Whether the networks are given the distance from the camera to the anchor. */
+typedef enum gbt_distance_input {
+    GBT_DISTANCE_INPUT_AUTO, /* where the distances of a scene vary widely */
+    GBT_DISTANCE_INPUT_ON,
+    GBT_DISTANCE_INPUT_OFF
+} gbt_distance_input;
+#define GBT_DISTANCE_INPUT_NAMES "auto|on|off"
+
+/** What the transparent part of photos is. */
+typedef enum gbt_alpha {
+    GBT_ALPHA_AUTO, /* white for Blender's synthetic scenes, else black */
+    GBT_ALPHA_BLACK,
+    GBT_ALPHA_WHITE,
+    GBT_ALPHA_MASK /* it counts neither in the loss nor in the scores */
+} gbt_alpha;
+#define GBT_ALPHA_NAMES "auto|black|white|mask"
+
+/** How Gaussians become a picture. */
+typedef enum gbt_renderer {
+    GBT_RENDERER_TRACE,
+    GBT_RENDERER_RASTER,    /* EWA splats in the order of their centres; pinhole cameras only */
+    GBT_RENDERER_PER_RAY,   /* the same tiles, with the response and the order of each ray */
+    GBT_RENDERER_REFERENCE, /* in double, every Gaussian against every ray: slow. Renders, does not train */
+    GBT_RENDERER_AS_TRAINED /* the one that the model was trained with; of a model that is there */
+} gbt_renderer;
+#define GBT_RENDERER_NAMES "trace|raster|per-ray|reference"
+#define GBT_RENDERER_TRAINING_NAMES "trace|raster|per-ray"
+
+/** Cut-offs of rays and responses (docs/accuracy.md). */
+typedef enum gbt_preset {
+    GBT_PRESET_EXACT,
+    GBT_PRESET_DEFAULT, /* that of training */
+    GBT_PRESET_FAST,
+    GBT_PRESET_AS_TRAINED /* nothing is changed */
+} gbt_preset;
+#define GBT_PRESET_NAMES "exact|default|fast"
+
+/** Which views of a data set. */
+typedef enum gbt_split { GBT_SPLIT_TEST, GBT_SPLIT_TRAIN, GBT_SPLIT_ALL } gbt_split;
+#define GBT_SPLIT_NAMES "test|train|all"
+
+/** Files of pictures. */
+typedef enum gbt_picture_format {
+    GBT_PICTURE_PNG,
+    GBT_PICTURE_EXR /* 32-bit float */
+} gbt_picture_format;
+#define GBT_PICTURE_FORMAT_NAMES "png|exr"
+
+#endif

@@ -5,7 +5,7 @@
 #define GBT_EVAL_BENCH_SCENE_H
 
 #include "render/camera_file.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 
 /** Start from {0}; free with bench_scene_close() after success or failure. Not to be copied. */
 typedef struct bench_scene {

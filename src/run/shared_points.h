@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/shared_points.h -- what the photos have in common: the sparse points that most cameras see. */
-#ifndef GBT_RENDER_SHARED_POINTS_H
-#define GBT_RENDER_SHARED_POINTS_H
+/* run/shared_points.h -- what the photos have in common: the sparse points that most cameras see. */
+#ifndef GBT_RUN_SHARED_POINTS_H
+#define GBT_RUN_SHARED_POINTS_H
 
 #include <stddef.h>
 

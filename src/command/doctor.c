@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/doctor.c -- the checks of the machine and of the build. */
-#include "eval/doctor.h"
+/* command/doctor.c -- the checks of the machine and of the build. */
+#include "command/doctor.h"
 
 #include <jansson.h>
 #include <locale.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/compress.c -- a trained model to a small file, and what its bytes are. */
+/* command/compress.c -- a trained model to a small file, and what its bytes are. */
 #include "gbtrace/compress.h"
 
 #include <stdio.h>
@@ -11,7 +11,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "data/json_out.h"
-#include "eval/run_sensitivity.h"
+#include "run/run_sensitivity.h"
 #include "io/model_code.h"
 
 gbt_compress_def gbt_compress_def_default(void) { return (gbt_compress_def){.quality = 60}; }

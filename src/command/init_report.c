@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/init_report.c -- anchors of a cloud as a PLY that people can look at, and their number beside the
+/* command/init_report.c -- anchors of a cloud as a PLY that people can look at, and their number beside the
    voxel baseline's.
 
    scene --> voxel size --> anchors (+ balls)
@@ -19,8 +19,8 @@
 #include "data/json_out.h"
 #include "data/ply.h"
 #include "data/scene.h"
-#include "eval/ball_mesh.h"
-#include "eval/init_quality.h"
+#include "command/ball_mesh.h"
+#include "command/init_quality.h"
 
 enum { ANCHOR_SCALES = 6 };
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/shared_points.c -- what all photos show. */
-#include "render/shared_points.h"
+/* run/shared_points.c -- what all photos show. */
+#include "run/shared_points.h"
 
 #include <math.h>
 #include <stdint.h>

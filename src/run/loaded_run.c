@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/loaded_run.c -- open a trained run for rendering. */
-#include "render/loaded_run.h"
+/* run/loaded_run.c -- open a trained run for rendering. */
+#include "run/loaded_run.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/run_sensitivity.h -- what the training views of a run lose by a change of each parameter. */
-#ifndef GBT_EVAL_RUN_SENSITIVITY_H
-#define GBT_EVAL_RUN_SENSITIVITY_H
+/* run/run_sensitivity.h -- what the training views of a run lose by a change of each parameter. */
+#ifndef GBT_RUN_RUN_SENSITIVITY_H
+#define GBT_RUN_RUN_SENSITIVITY_H
 
 #include "io/model_steps.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 
 /**
  * Sensitivities of the run's model (io/model_steps.h), from its training cameras alone: photos are not read.

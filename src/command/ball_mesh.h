@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/ball_mesh.h -- balls as triangles: one icosphere each, for mesh viewers. */
-#ifndef GBT_EVAL_BALL_MESH_H
-#define GBT_EVAL_BALL_MESH_H
+/* command/ball_mesh.h -- balls as triangles: one icosphere each, for mesh viewers. */
+#ifndef GBT_COMMAND_BALL_MESH_H
+#define GBT_COMMAND_BALL_MESH_H
 
 #include <stddef.h>
 #include <stdint.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/init_quality.c -- how well so many centres stand for a cloud: the paper's balls, adaptive ones and
+/* command/init_quality.c -- how well so many centres stand for a cloud: the paper's balls, adaptive ones and
    voxels side by side. */
-#include "eval/init_quality.h"
+#include "command/init_quality.h"
 
 #include <math.h>
 #include <stdint.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/scores.h -- the scores of a run, as the page shows them. */
-#ifndef GBT_REPORT_SCORES_H
-#define GBT_REPORT_SCORES_H
+/* eval/scores.h -- the scores of a run, as the page shows them. */
+#ifndef GBT_EVAL_SCORES_H
+#define GBT_EVAL_SCORES_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/evaluate.c -- score a run on its held-out views and write what is known of it: metrics.json, the page,
-   events. */
+/* command/evaluate.c -- score a run on its held-out views and write what is known of it: metrics.json, the
+   page, events. */
 #include "gbtrace/evaluate.h"
 
 #include <jansson.h>

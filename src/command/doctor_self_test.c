@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/doctor_self_test.c -- a small cloud traced, and its gradients, beside the double references; a larger
-   one against the clock. */
+/* command/doctor_self_test.c -- a small cloud traced, and its gradients, beside the double references; a
+   larger one against the clock. */
 #include <math.h>
 #include <stdio.h>
 
@@ -8,7 +8,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/rng.h"
-#include "eval/doctor.h"
+#include "command/doctor.h"
 #include "trace/rounding_band.h"
 #include "trace/reference.h"
 #include "trace/trace.h"

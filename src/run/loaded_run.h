@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/loaded_run.h -- a trained run opened for rendering: its model, its settings, the views of its data
+/* run/loaded_run.h -- a trained run opened for rendering: its model, its settings, the views of its data
    set. */
-#ifndef GBT_RENDER_LOADED_RUN_H
-#define GBT_RENDER_LOADED_RUN_H
+#ifndef GBT_RUN_LOADED_RUN_H
+#define GBT_RUN_LOADED_RUN_H
 
 #include "data/scene.h"
 #include "gbtrace/train.h"

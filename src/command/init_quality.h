@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/init_quality.h -- how well so many centres stand for a cloud: the paper's balls, adaptive ones and
+/* command/init_quality.h -- how well so many centres stand for a cloud: the paper's balls, adaptive ones and
    voxels side by side. */
-#ifndef GBT_EVAL_INIT_QUALITY_H
-#define GBT_EVAL_INIT_QUALITY_H
+#ifndef GBT_COMMAND_INIT_QUALITY_H
+#define GBT_COMMAND_INIT_QUALITY_H
 
 #include "data/scene.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/expect.c -- memory and time of a training run from the sizes of its data. */
-#include "eval/expect.h"
+/* command/expect.c -- memory and time of a training run from the sizes of its data. */
+#include "command/expect.h"
 
 #include <math.h>
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/run_sensitivity.c -- adjoint passes of random signs through the training views. */
-#include "eval/run_sensitivity.h"
+/* run/run_sensitivity.c -- adjoint passes of random signs through the training views. */
+#include "run/run_sensitivity.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/info.c -- what a data set or a model holds, for a person or as JSON. */
+/* command/info.c -- what a data set or a model holds, for a person or as JSON. */
 #include "gbtrace/info.h"
 
 #include <math.h>
@@ -15,7 +15,7 @@
 #include "data/gaussian_file.h"
 #include "data/json_out.h"
 #include "data/scene.h"
-#include "eval/expect.h"
+#include "command/expect.h"
 #include "io/model_file.h"
 
 /* ---- data sets ---- */

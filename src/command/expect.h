@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/expect.h -- what training on a data set will ask of the machine: memory and time, from constants that
-   were measured. */
-#ifndef GBT_EVAL_EXPECT_H
-#define GBT_EVAL_EXPECT_H
+/* command/expect.h -- what training on a data set will ask of the machine: memory and time, from constants
+   that were measured. */
+#ifndef GBT_COMMAND_EXPECT_H
+#define GBT_COMMAND_EXPECT_H
 
 #include <jansson.h>
 #include <stdio.h>

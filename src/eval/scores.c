@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/scores.c -- where the pictures of a scored view are. */
-#include "report/scores.h"
+/* eval/scores.c -- where the pictures of a scored view are. */
+#include "eval/scores.h"
 
 #include <stdio.h>
 
 #include "base/fail.h"
 #include "base/file.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 
 gbt_status view_score_paths(view_score *score, const char *folder, gbt_error *err)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/doctor.h -- how the doctor's checks write their lines. */
-#ifndef GBT_EVAL_DOCTOR_H
-#define GBT_EVAL_DOCTOR_H
+/* command/doctor.h -- how the doctor's checks write their lines. */
+#ifndef GBT_COMMAND_DOCTOR_H
+#define GBT_COMMAND_DOCTOR_H
 
 #include "gbtrace/doctor.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/ball_mesh.c -- balls as icospheres: the 12 corners and 30 edge middles of an icosahedron, 80
+/* command/ball_mesh.c -- balls as icospheres: the 12 corners and 30 edge middles of an icosahedron, 80
    triangles. */
-#include "eval/ball_mesh.h"
+#include "command/ball_mesh.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/import.c -- a trained Scaffold-GS model as a run. */
+/* command/import.c -- a trained Scaffold-GS model as a run. */
 #include "gbtrace/import.h"
 
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/eval/test_info_init.c -- what info and init say of things whose numbers are known, as JSON; the
+/* tests/command/test_info_init.c -- what info and init say of things whose numbers are known, as JSON; the
    spheres that init draws. */
 #include <jansson.h>
 #include <unistd.h>
@@ -8,8 +8,8 @@
 #include "base/memory.h"
 #include "data/json_out.h"
 #include "data/scene.h"
-#include "eval/ball_mesh.h"
-#include "eval/expect.h"
+#include "command/ball_mesh.h"
+#include "command/expect.h"
 #include "gbtrace/info.h"
 #include "gbtrace/init.h"
 #include "io/model_file.h"

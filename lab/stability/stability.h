@@ -136,6 +136,9 @@ bool stability_ok(stability *s, gbt_status status);
 /** Write a picture into the study's folder as "stability_<name>.png". */
 void stability_picture(stability *s, const char *name, const image *picture);
 
+/** The scene file is not as it should be: `what` is wrong with `field`. */
+void stability_scene_fail(stability *s, const char *field, const char *what);
+
 /* ---- for the study ---- */
 
 /**

@@ -25,13 +25,6 @@ static const double memory_warn = 2e9,
                     memory_fail = 3e8; /* bytes: a run on 100 small photos, and less than starting needs */
 static const double disk_warn = 2e9, disk_fail = 1e8; /* bytes: some runs with checkpoints, and not one */
 
-gbt_check *doctor_line(gbt_diagnosis *d, const char *name)
-{
-    gbt_check *c = &d->checks[d->count < GBT_DOCTOR_MAX ? d->count++ : GBT_DOCTOR_MAX - 1];
-    *c = (gbt_check){.name = name};
-    return c;
-}
-
 static void advise(gbt_check *c, gbt_check_level level, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 

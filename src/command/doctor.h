@@ -6,7 +6,12 @@
 #include "gbtrace/doctor.h"
 
 /** The next line, with level ok. The caller writes its texts. */
-gbt_check *doctor_line(gbt_diagnosis *d, const char *name);
+static inline gbt_check *doctor_line(gbt_diagnosis *d, const char *name)
+{
+    gbt_check *c = &d->checks[d->count < GBT_DOCTOR_MAX ? d->count++ : GBT_DOCTOR_MAX - 1];
+    *c = (gbt_check){.name = name};
+    return c;
+}
 
 /** Tracer and adjoint against the double references on a procedural cloud; and how many rays go through a
     larger one in a second. */

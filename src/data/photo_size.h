@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/photo.h -- exact area averaging of images. */
-#ifndef GBT_DATA_PHOTO_H
-#define GBT_DATA_PHOTO_H
+/* data/photo_size.h -- exact area averaging of images. */
+#ifndef GBT_DATA_PHOTO_SIZE_H
+#define GBT_DATA_PHOTO_SIZE_H
 
 #include <stdbool.h>
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/case.c -- which cases the study "stability" has, and one of them from its scene file to its rows. */
+/* stability/case.c -- which cases the study "stability" has, and one of them from its scene file to its rows.
+ */
 #include <stdio.h>
 #include <string.h>
 

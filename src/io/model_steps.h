@@ -14,7 +14,7 @@
 #include <stdint.h>
 
 #include "gbtrace/status.h"
-#include "io/model_file.h"
+#include "io/model.h"
 
 /**
  * Between _start() and _end() sums over pictures, then: mean squared change of a pixel per squared change of

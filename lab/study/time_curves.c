@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/time_curves.c -- what the curves of the study "time" say: scores, marks on the way, and the time to a score. */
+/* study/time_curves.c -- what the curves of the study "time" say: scores, marks on the way, and the time to a
+ * score. */
 #include "study/time.h"
 
 #include <math.h>

@@ -131,7 +131,7 @@ static int run(const command *self, int argc, char **argv)
          .kind = OPTION_STRING,
          .value = &def.data,
          .value_name = "DATA",
-         .help = "cameras of this data set; needed for plain Gaussians (.ply, .splat, .spz) without --camera",
+         .help = "cameras of this data set; needed for plain Gaussians without --camera",
          .aliases = "s source-path"},
         {.name = "renderer",
          .kind = OPTION_CHOICE,

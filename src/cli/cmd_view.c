@@ -67,5 +67,5 @@ static int run(const command *self, int argc, char **argv)
 const command command_view = {.name = "view",
                               .summary =
                                   "view a scene in the browser beside its photos, also during training",
-                              .usage = "RUN|MODEL.gbt|SCENE.ply|.splat|.spz",
+                              .usage = "RUN|MODEL.gbt|GAUSSIANS",
                               .run = run};

@@ -26,7 +26,7 @@ typedef struct loaded_run {
 } loaded_run;
 
 /**
- * Open RUN: a folder with model.gbt, a model file, or plain Gaussians (.ply, .splat, .spz), which know no
+ * Open RUN: a folder with model.gbt, a model file, or plain Gaussians, which know no
  * data set. A result folder of 3DGS may: the one that its cfg_args names, else its cameras.json.
  *
  * @param data      [in] data set folder; NULL: the one it was trained on

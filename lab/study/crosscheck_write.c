@@ -9,11 +9,19 @@
 #include "base/file.h"
 #include "data/json_out.h"
 #include "report/image.h"
+#include "report/plot.h"
 #include "report/style.h"
-#include "study/chart.h"
 #include "study/crosscheck.h"
 
-enum { BAR_HEIGHT = 16, BAR_GAP = 6, HEAD = 62, VIEW_GAP = 26, LABEL_WIDTH = 96, BARS_RIGHT = 700 };
+enum {
+    BAR_HEIGHT = 16,
+    BAR_GAP = 6,
+    HEAD = 62,
+    VIEW_GAP = 26,
+    LABEL_WIDTH = 96,
+    BARS_RIGHT = 700,
+    PICTURE_WIDTH = 760
+};
 
 /* What changes with a step: a word or two; and a sentence. */
 static const char *step_name(cross_step step)
@@ -155,6 +163,9 @@ static gbt_status write_json(const cross_study *study, const char *folder, gbt_e
 
 /* ---- chart ---- */
 
+static const char bar_css[] =
+    ".plot .bar{fill:var(--k);opacity:.55}.plot .total{stroke:var(--k);stroke-width:2.5}\n";
+
 static int view_height(void) { return CROSS_STEPS * (BAR_HEIGHT + BAR_GAP) + VIEW_GAP; }
 
 /* The longer, the closer: from 10 to 120 dB. */
@@ -188,19 +199,7 @@ static void add_svg(const cross_study *study, bool alone, text *out)
     int height = HEAD, top = HEAD;
     for (size_t m = 0; m < study->model_count; m++)
         height += (int)study->models[m].view_count * view_height();
-    text_format(
-        out,
-        "<svg %sclass=\"scatter\" viewBox=\"0 0 %d %d\"%s role=\"img\" aria-label=\"from tracer to splats\">",
-        alone ? "xmlns=\"http://www.w3.org/2000/svg\" " : "", SCATTER_WIDTH, height,
-        alone ? " width=\"760\"" : "");
-    if (alone) {
-        text_add(out, "<style>");
-        text_add(out, scatter_css);
-        text_add(out, ".scatter .bar{fill:var(--k);opacity:.55}.scatter "
-                      ".total{stroke:var(--k);stroke-width:2.5}</style>");
-        text_format(out, "<rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH,
-                    height);
-    }
+    plot_begin(out, "from tracer to splats", bar_css, "", PICTURE_WIDTH, height, !alone);
     text_add(out, "<text class=\"title\" x=\"8\" y=\"22\">From tracer to splats, one change at a time</text>"
                   "<text x=\"8\" y=\"42\">PSNR in dB, longer is closer: the bar to the step before, the mark "
                   "to the tracer</text>");
@@ -244,9 +243,9 @@ static void add_page(const cross_study *study, const char *folder, text *out)
                   "content=\"width=device-width,initial-scale=1\">"
                   "<title>Tracer against rasterizer</title>\n<style>\n");
     text_add(out, report_css);
-    text_add(out, scatter_css);
-    text_add(out, ".scatter .bar{fill:var(--k);opacity:.55}.scatter "
-                  ".total{stroke:var(--k);stroke-width:2.5}.panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n"
+    text_add(out, plot_css);
+    text_add(out, bar_css);
+    text_add(out, ".panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n"
                   "</style></head>\n<body>\n<header><h1>Tracer against rasterizer</h1><p class=\"lead\">From "
                   "the tracer's picture to that of 3D Gaussian splatting, one change at a time; each keeps "
                   "those before it.</p></header>\n<main>\n<ul>");

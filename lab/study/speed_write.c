@@ -8,6 +8,7 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "data/json_out.h"
+#include "report/plot.h"
 #include "report/style.h"
 #include "study/chart.h"
 #include "study/speed.h"
@@ -183,18 +184,7 @@ static void add_svg(const speed_study *study, size_t first, size_t count, bool a
     for (size_t i = 0; i < count; i++)
         panels += panel_count(&study->models[first + i]);
     const int height = (int)panels * (SCATTER_HEIGHT + PANEL_GAP) - PANEL_GAP;
-    text_format(out,
-                "<svg %sclass=\"scatter\" viewBox=\"0 0 %d %d\"%s role=\"img\" aria-label=\"speed against "
-                "accuracy\">",
-                alone ? "xmlns=\"http://www.w3.org/2000/svg\" " : "", SCATTER_WIDTH, height,
-                alone ? " width=\"760\"" : "");
-    if (alone) {
-        text_add(out, "<style>");
-        text_add(out, scatter_css);
-        text_add(out, "</style>");
-        text_format(out, "<rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH,
-                    height);
-    }
+    scatter_begin(out, "speed against accuracy", "", height, !alone);
     int top = 0;
     for (size_t i = 0; i < count; i++)
         for (size_t panel = 0; panel < panel_count(&study->models[first + i]);
@@ -234,6 +224,7 @@ static void add_page(const speed_study *study, text *out)
                   "content=\"width=device-width,initial-scale=1\">"
                   "<title>Speed against accuracy</title>\n<style>\n");
     text_add(out, report_css);
+    text_add(out, plot_css);
     text_add(out, scatter_css);
     text_add(out,
              ".panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n</style></head>\n<body>\n<header><h1>Speed "

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/scores.h -- the scores of a run, as the page shows them. */
+/* eval/scores.h -- the scores of a run: of its held-out views, and their means. */
 #ifndef GBT_EVAL_SCORES_H
 #define GBT_EVAL_SCORES_H
 

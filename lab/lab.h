@@ -13,7 +13,7 @@
 #include "gbtrace/status.h"
 
 typedef struct lab_bench_def {
-    const char *model;  /* plain Gaussians (.ply, .splat, .spz), or a run; required */
+    const char *model;  /* plain Gaussians, or a run; required */
     const char *camera; /* camera file (docs/cameras.md; of an aperture the first sample); required for plain
                            Gaussians, else the first held-out view */
     int repeats;        /* timed passes after one warm-up; the median is reported. Default 5 */
@@ -44,7 +44,7 @@ lab_bench_def lab_bench_def_default(void);
 gbt_status lab_bench_trace(const lab_bench_def *def, FILE *out, gbt_error *err);
 
 typedef struct lab_study_def {
-    const char *const *models; /* plain Gaussians (.ply, .splat, .spz), or runs */
+    const char *const *models; /* plain Gaussians, or runs */
     size_t model_count;        /* 1 to 16 */
     const char *camera; /* camera file of all plain Gaussians; NULL: the camera.json beside each. Runs: their
                            first held-out view. Default NULL */

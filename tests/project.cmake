@@ -4,11 +4,12 @@ add_test(NAME layers COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tools/check_layer
 add_test(NAME tools COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/test_tools.sh ${CMAKE_SOURCE_DIR})
 add_test(NAME figures COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/test_figures.sh ${CMAKE_SOURCE_DIR})
 add_test(NAME names COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/test_names.sh ${CMAKE_SOURCE_DIR} $<TARGET_FILE:gbtrace>)
+add_test(NAME circles COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/test_circles.sh ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR} ${CMAKE_C_COMPILER})
 add_test(NAME lines COMMAND ${SH_PROGRAM} -c "! grep -rnE '^.{111}' --include=*.[ch] --include=*.cpp src lab include examples scenes" WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
 # The library names fields; dashes are the program's. A page of a run (report) has style sheets, and the command that made it.
 add_test(NAME messages COMMAND ${SH_PROGRAM} -c "! grep -rnE '\"([^\"]*[^-\"a-z])?--[a-z]' --include=*.c --include=*.h --include=*.cpp --exclude-dir=cli --exclude-dir=report src"
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
-set_tests_properties(layers tools figures lines messages PROPERTIES TIMEOUT 60)
+set_tests_properties(layers tools figures circles lines messages PROPERTIES TIMEOUT 60)
 
 # Every public header alone, twice, as C11 and as C++17: it compiles or the build fails.
 file(GLOB public_headers CONFIGURE_DEPENDS RELATIVE ${CMAKE_SOURCE_DIR}/include ${CMAKE_SOURCE_DIR}/include/gbtrace/*.h)

@@ -25,7 +25,7 @@ typedef enum gbt_camera_model {
     GBT_CAMERA_SIMPLE_RADIAL_FISHEYE = 8,       /* f cx cy k */
     GBT_CAMERA_RADIAL_FISHEYE = 9,              /* f cx cy k1 k2 */
     GBT_CAMERA_THIN_PRISM_FISHEYE = 10,         /* fx fy cx cy k1 k2 p1 p2 k3 k4 sx1 sy1 */
-    GBT_CAMERA_RAD_TAN_THIN_PRISM_FISHEYE = 11, /* fx fy cx cy k0..k5 p0 p1 s0..s3 */
+    GBT_CAMERA_RAD_TAN_THIN_PRISM_FISHEYE = 11, /* fx fy cx cy k0 to k5 p0 p1 s0 to s3 */
     GBT_CAMERA_SIMPLE_DIVISION = 12,            /* f cx cy k */
     GBT_CAMERA_DIVISION = 13,                   /* fx fy cx cy k */
     GBT_CAMERA_SIMPLE_FISHEYE = 14,             /* f cx cy */
@@ -47,9 +47,14 @@ typedef struct gbt_camera {
     double center[3];                     /* camera centre, world (scene-local) units */
 } gbt_camera;
 
-/** Number of parameters of a model, and its name (COLMAP's where it has one); 0 and NULL for an unknown
-    model. */
+/** How many models there are, and the one of a place in their list, 0 to count - 1. */
+int gbt_camera_model_count(void);
+gbt_camera_model gbt_camera_model_at(int index);
+
+/** Number of parameters of a model, their names ("f cx cy"), and its name (COLMAP's where it has one); 0 and
+    NULL for an unknown model. */
 int gbt_camera_param_count(gbt_camera_model model);
+const char *gbt_camera_param_names(gbt_camera_model model);
 const char *gbt_camera_model_name(gbt_camera_model model);
 
 /**

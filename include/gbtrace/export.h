@@ -27,21 +27,30 @@ typedef struct gbt_export_def {
 
 gbt_export_def gbt_export_def_default(void);
 
+/** A format of plain Gaussians. Texts are static. */
+typedef struct gbt_export_format {
+    const char *ending; /* of its files: ".ply" */
+    const char *what;   /* what it keeps, in a few words */
+    bool readable;      /* else it is only written */
+} gbt_export_format;
+
+/** How many formats there are, and the one of a place in their list, 0 to count - 1. */
+int gbt_export_format_count(void);
+gbt_export_format gbt_export_format_at(int index);
+
 /**
- * Write a scene as plain 3DGS Gaussians: .ply, .splat, .spz (version 3) or .glb (KHR_gaussian_splatting), by
- * the ending of each name. World coordinates and axes are those of the data set; .glb has glTF's (x and y
- * change signs).
+ * Write a scene as plain 3DGS Gaussians in the format (gbt_export_format_at()) of each name's ending. World
+ * coordinates and axes are those of the data set; .glb has glTF's (x and y change signs).
  *
  * A trained model is baked: networks become spherical harmonics (docs/exporting.md). What that loses is
- * measured on the held-out views, for each file as it reads back, and reported. A .ply, .splat, .spz or
- * result folder of 3DGS is converted.
+ * measured on the held-out views, for each file as it reads back, and reported. A file of a format that
+ * is read, or a result folder of 3DGS, is converted.
  *
  * A name that ends in / is a folder: it gets what the reference implementation of 3DGS leaves, cfg_args,
  * cameras.json, input.ply, point_cloud/iteration_N/point_cloud.ply, and of the held-out views test/ours_N/,
  * results.json and per_view.json. Runs alone can be written so.
  *
- * @param input  [in] RUN (a folder with model.gbt), a model file, a .ply, .splat or .spz, or a result folder
- *                    of 3DGS
+ * @param input  [in] RUN (a folder with model.gbt), a model file, plain Gaussians, or a result folder of 3DGS
  * @param outputs [in] [output_count] file names, each written atomically; their endings are checked before
  *                     any work
  * @param report [in] open stream; NULL: none

@@ -5,7 +5,7 @@
 #define GBT_EVAL_BENCH_SCENE_H
 
 #include "render/camera_file.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 
 /** Start from {0}; free with bench_scene_close() after success or failure. Not to be copied. */
 typedef struct bench_scene {
@@ -32,7 +32,7 @@ gbt_status bench_scene_decode(bench_scene *s, gbt_error *err);
 
 void bench_scene_close(bench_scene *s);
 
-/** Whether a model is one file of plain Gaussians (.ply, .splat, .spz), which knows no camera. */
+/** Whether a model is one file of plain Gaussians, which knows no camera. */
 bool bench_scene_needs_camera(const char *path);
 
 #endif

@@ -22,7 +22,7 @@
 #include "image/metrics.h"
 #include "lab/lab.h"
 #include "raster/raster_ref.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 #include "trace/reference.h"
 #include "trace/rounding_band.h"
 #include "train/loss.h"

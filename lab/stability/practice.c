@@ -175,7 +175,7 @@ gbt_status practice_steps(trainer *t, gbt_error *why)
     return status;
 }
 
-size_t practice_count_bad(const trainer *t)
+static size_t practice_count_bad(const trainer *t)
 {
     const anchors *a = &t->anchors;
     size_t bad = 0;

@@ -61,7 +61,4 @@ gbt_status practice_run(stability *s, const practice *p, const gbt_train_def *de
 /** Take the steps of an opened trainer up to def.iterations. */
 gbt_status practice_steps(trainer *t, gbt_error *why);
 
-/** Parameters that are not finite. */
-size_t practice_count_bad(const trainer *t);
-
 #endif

@@ -21,7 +21,7 @@ bool stability_ok(stability *s, gbt_status status)
 
 /* ---- reading ---- */
 
-static void scene_fail(stability *s, const char *field, const char *what)
+void stability_scene_fail(stability *s, const char *field, const char *what)
 {
     stability_ok(s, base_fail(s->err, GBT_ERR_FORMAT, "%s: %s: %s", s->path, field, what));
 }
@@ -32,7 +32,7 @@ static const json_t *find_number(stability *s, const char *name)
     if (value == NULL)
         value = json_object_get(json_object_get(s->scene, "numbers"), name);
     if (value == NULL)
-        scene_fail(s, name, "missing in \"numbers\"");
+        stability_scene_fail(s, name, "missing in \"numbers\"");
     return value;
 }
 
@@ -40,7 +40,7 @@ double stability_number(stability *s, const char *name)
 {
     const json_t *value = s->status == GBT_OK ? find_number(s, name) : NULL;
     if (value != NULL && !json_is_number(value))
-        scene_fail(s, name, "wanted a number");
+        stability_scene_fail(s, name, "wanted a number");
     return json_number_value(value);
 }
 
@@ -49,10 +49,10 @@ size_t stability_list(stability *s, const char *name, size_t most, double *out)
     const json_t *list = s->status == GBT_OK ? find_number(s, name) : NULL;
     const size_t count = json_array_size(list);
     if (list != NULL && (count < 1 || count > most))
-        scene_fail(s, name, "wanted a list of numbers, neither empty nor too long");
+        stability_scene_fail(s, name, "wanted a list of numbers, neither empty nor too long");
     for (size_t i = 0; i < count && s->status == GBT_OK; i++) {
         if (!json_is_number(json_array_get(list, i)))
-            scene_fail(s, name, "wanted a list of numbers");
+            stability_scene_fail(s, name, "wanted a list of numbers");
         out[i] = json_number_value(json_array_get(list, i));
     }
     return s->status == GBT_OK ? count : 0;
@@ -96,7 +96,7 @@ void stability_gaussians(stability *s, gaussians *out)
     if (s->status != GBT_OK)
         return;
     if (count == 0)
-        scene_fail(s, "gaussians", "wanted a list of objects");
+        stability_scene_fail(s, "gaussians", "wanted a list of objects");
     stability_ok(s, gaussians_resize(out, count, s->err));
     for (size_t i = 0; i < count && s->status == GBT_OK; i++) {
         char prefix[48];
@@ -130,11 +130,12 @@ void stability_check(stability *s, const char *row, double value, double raster,
     const char *quantity = json_string_value(json_object_get(check, "quantity"));
     stability_study *study = s->study;
     if (quantity == NULL || json_is_number(most) == json_is_number(least)) {
-        scene_fail(s, row, "wanted a check with \"quantity\", and a number \"at_most\" or \"at_least\"");
+        stability_scene_fail(s, row,
+                             "wanted a check with \"quantity\", and a number \"at_most\" or \"at_least\"");
         return;
     }
     if (study->row_count == STABILITY_ROWS_MAX) {
-        scene_fail(s, row, "too many rows");
+        stability_scene_fail(s, row, "too many rows");
         return;
     }
     stability_row *r = &study->rows[study->row_count++];
@@ -180,105 +181,4 @@ void stability_picture(stability *s, const char *name, const image *picture)
     snprintf(file, sizeof file, "stability_%s.png", name);
     if (s->status == GBT_OK && stability_ok(s, file_join(path, sizeof path, s->folder, file, s->err)))
         stability_ok(s, image_write(path, picture, s->err));
-}
-
-/* ---- cases ---- */
-
-typedef struct stability_case {
-    const char *id, *file;
-    gbt_status (*run)(stability *s);
-} stability_case;
-
-static const stability_case cases[] = {
-#define X(tag, id, file) {id, file, stability_##tag},
-    STABILITY_CASES(X)
-#undef X
-};
-enum { CASE_COUNT = sizeof cases / sizeof *cases };
-
-/* Whether a comma-separated list holds a name; *known counts how many of its entries do. */
-static bool is_listed(const char *list, const char *name)
-{
-    const size_t length = strlen(name);
-    for (const char *at = list; at != NULL && *at != '\0';
-         at = strchr(at, ',') == NULL ? NULL : strchr(at, ',') + 1)
-        if (strncmp(at, name, length) == 0 && (at[length] == ',' || at[length] == '\0'))
-            return true;
-    return false;
-}
-
-static gbt_status check_list(const char *only, gbt_error *err)
-{
-    size_t wanted = 1, found = 0;
-    for (const char *at = only; at != NULL && (at = strchr(at, ',')) != NULL; at++)
-        wanted++;
-    for (size_t i = 0; i < CASE_COUNT && only != NULL; i++)
-        found += is_listed(only, cases[i].id);
-    if (only == NULL || found == wanted)
-        return GBT_OK;
-    return base_fail(
-        err, GBT_ERR_ARGUMENT,
-        "study stability: \"%.60s\" is not a list of different cases (wanted some of A1 to A18, as A1,A9)",
-        only);
-}
-
-static gbt_status read_text(stability *s, const char *field, char *out, size_t size)
-{
-    const char *value = json_string_value(json_object_get(s->scene, field));
-    if (value == NULL || strlen(value) >= size)
-        scene_fail(s, field, "wanted a text, not too long");
-    else
-        memcpy(out, value, strlen(value) + 1);
-    return s->status;
-}
-
-static gbt_status open_scene(stability *s, const stability_case *c)
-{
-    json_error_t where;
-    const char *file = stability_file(c->file);
-    snprintf(s->path, sizeof s->path, "lab/stability/cases/%s.json", c->file);
-    if (file == NULL)
-        return base_fail(s->err, GBT_ERR_INTERNAL, "%s: not compiled into this program", s->path);
-    s->scene = json_loads(file, JSON_REJECT_DUPLICATES, &where);
-    if (s->scene == NULL)
-        return base_fail(s->err, GBT_ERR_FORMAT, "%s:%d: not JSON: %s", s->path, where.line, where.text);
-    return GBT_OK;
-}
-
-static gbt_status measure_case(const stability_case *c, stability *s)
-{
-    stability_part *part = &s->study->parts[s->study->part_count++];
-    const size_t first = s->study->row_count;
-    const double start = clock_wall();
-    snprintf(part->id, sizeof part->id, "%s", c->id);
-    s->scene = NULL;
-    if (stability_ok(s, open_scene(s, c))) {
-        read_text(s, "title", part->title, sizeof part->title);
-        read_text(s, "elsewhere", part->elsewhere, sizeof part->elsewhere);
-        read_text(s, "ours", part->ours, sizeof part->ours);
-    }
-    if (s->status == GBT_OK)
-        stability_ok(s, c->run(s));
-    if (s->status == GBT_OK &&
-        s->study->row_count - first != json_array_size(json_object_get(s->scene, "checks")))
-        scene_fail(s, "checks", "a check was not measured, or measured twice");
-    part->seconds = clock_wall() - start;
-    json_decref(s->scene);
-    return s->status;
-}
-
-gbt_status stability_measure(const char *only, bool quick, const char *folder, stability_study *study,
-                             gbt_error *err)
-{
-    stability s = {.study = study, .folder = folder, .err = err};
-    GBT_TRY(check_list(only, err));
-    GBT_TRY(file_make_folder(folder, err));
-    memset(study, 0, sizeof *study);
-    study->quick = quick;
-    for (size_t i = 0; i < CASE_COUNT && s.status == GBT_OK; i++)
-        if (only == NULL || is_listed(only, cases[i].id)) {
-            log_info("study stability: %s", cases[i].id);
-            measure_case(&cases[i], &s);
-        }
-    return s.status;
 }

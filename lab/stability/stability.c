@@ -26,7 +26,7 @@ static void add_figure(text *out, double value)
         text_format(out, "%.3g", value);
 }
 
-void stability_table(const stability_study *study, text *out)
+static void stability_table(const stability_study *study, text *out)
 {
     text_add(out, "| row | what is measured | limit | gbtrace | within | rasterizer (3DGS) "
                   "|\n|---|---|---|---|---|---|\n");
@@ -109,7 +109,7 @@ static gbt_status write_json(const stability_study *study, const char *path, gbt
     return status;
 }
 
-gbt_status stability_write(const stability_study *study, const char *folder, gbt_error *err)
+static gbt_status stability_write(const stability_study *study, const char *folder, gbt_error *err)
 {
     char path[4096];
     GBT_TRY(file_join(path, sizeof path, folder, "stability.json", err));

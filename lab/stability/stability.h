@@ -136,6 +136,9 @@ bool stability_ok(stability *s, gbt_status status);
 /** Write a picture into the study's folder as "stability_<name>.png". */
 void stability_picture(stability *s, const char *name, const image *picture);
 
+/** The scene file is not as it should be: `what` is wrong with `field`. */
+void stability_scene_fail(stability *s, const char *field, const char *what);
+
 /* ---- for the study ---- */
 
 /**
@@ -146,12 +149,6 @@ void stability_picture(stability *s, const char *name, const image *picture);
  */
 gbt_status stability_measure(const char *only, bool quick, const char *folder, stability_study *study,
                              gbt_error *err);
-
-/** stability.json, .md and .svg into `folder`. */
-gbt_status stability_write(const stability_study *study, const char *folder, gbt_error *err);
-
-/** The table as Markdown. */
-void stability_table(const stability_study *study, struct text *out);
 
 /** All charts as one SVG that stands alone. */
 void stability_draw_charts(const stability_study *study, struct text *out);

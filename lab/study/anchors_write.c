@@ -209,7 +209,7 @@ static void draw_scene(const anchors_study *s, size_t scene, int top, text *out)
 
 void anchors_charts(const anchors_study *s, text *out)
 {
-    scatter_begin(out, "PSNR against anchors", "", SCATTER_HEIGHT * (int)s->grid.scene_count);
+    scatter_begin(out, "PSNR against anchors", "", SCATTER_HEIGHT * (int)s->grid.scene_count, false);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         draw_scene(s, scene, SCATTER_HEIGHT * (int)scene, out);
     text_add(out, "</svg>\n");

@@ -5,31 +5,18 @@
 #include <math.h>
 #include <string.h>
 
-#include "report/chart.h"
+#include "report/plot.h"
 
-enum { LEFT = 58, RIGHT = 738, TOP = 84, BOTTOM = 450, BOXES_MAX = 256 };
+enum { LEFT = 54, RIGHT = 738, TOP = 84, BOTTOM = 450, BOXES_MAX = 256 };
 
-const char scatter_css[] =
-    ".scatter{--k0:#1b1c1e;--k1:#0b62c4;--k2:#d9480f;--k3:#2b8a3e;--k4:#7b3fc4;--k5:#b0246e;--k6:#0a7f8c;--"
-    "page:#fff;--text:#1b1c1e;--dim:#62666d;--rule:#e8e8e5}\n"
-    "@media(prefers-color-scheme:dark){.scatter{--k0:#f2f2f0;--k1:#6cb0ff;--k2:#ff9a5c;--k3:#6fd08c;--k4:#"
-    "c19bff;--k5:#ff8cc2;--k6:#5fd3e0;--page:#1c1e22;--text:#e8e8e6;--dim:#9ba0a8;--rule:#2e3136}}\n"
-    ".scatter .paper{fill:var(--page)}\n"
-    ".scatter text{font:12px system-ui,-apple-system,\"Segoe UI\",Roboto,Arial,sans-serif;fill:var(--dim)}\n"
-    ".scatter .title{font-size:15px;font-weight:600;fill:var(--text)}\n"
-    ".scatter .tick-y{text-anchor:end}.scatter .tick-x{text-anchor:middle}\n"
-    ".scatter .rule{stroke:var(--rule);stroke-width:1}.scatter .axis{stroke:var(--dim);stroke-width:1}\n"
-    ".scatter .s0{--k:var(--k0)}.scatter .s1{--k:var(--k1)}.scatter .s2{--k:var(--k2)}.scatter "
-    ".s3{--k:var(--k3)}.scatter .s4{--k:var(--k4)}.scatter .s5{--k:var(--k5)}.scatter .s6{--k:var(--k6)}\n"
-    ".scatter .join{fill:none;stroke:var(--k);stroke-width:1.5;opacity:.45}\n"
-    ".scatter .mark{fill:var(--k);stroke:var(--page);stroke-width:1.5}\n"
-    ".scatter .label,.scatter "
-    ".level-label{font-size:11px;paint-order:stroke;stroke:var(--page);stroke-width:3px;stroke-linejoin:"
-    "round}\n"
-    ".scatter .label{fill:var(--k)}.scatter .label.s0{font-size:14px;font-weight:700}\n"
-    ".scatter .key{font-size:12px;fill:var(--text)}\n"
-    ".scatter .level{stroke:var(--dim);stroke-width:1;stroke-dasharray:5 4}.scatter "
-    ".level-label{font-style:italic}\n";
+const char scatter_css[] = ".plot .join{fill:none;stroke:var(--k);stroke-width:1.5;opacity:.45}\n"
+                           ".plot .mark{fill:var(--k);stroke:var(--page);stroke-width:1.5}\n"
+                           ".plot .label,.plot "
+                           ".level-label{font-size:11px;paint-order:stroke;stroke:var(--page);stroke-width:"
+                           "3px;stroke-linejoin:round}\n"
+                           ".plot .label{fill:var(--k)}.plot .label.s0{font-size:14px;font-weight:700}\n"
+                           ".plot .level{stroke:var(--dim);stroke-width:1;stroke-dasharray:5 4}.plot "
+                           ".level-label{font-style:italic}\n";
 
 /* ---- room ---- */
 
@@ -38,20 +25,10 @@ typedef struct box {
 } box;
 
 typedef struct plane {
-    double x_low, x_high, y_low, y_high;
+    plot plot;
     box taken[BOXES_MAX];
     int taken_count;
 } plane;
-
-static double place_x(const plane *p, double x)
-{
-    return LEFT + (RIGHT - LEFT) * log(x / p->x_low) / log(p->x_high / p->x_low);
-}
-
-static double place_y(const plane *p, double y)
-{
-    return BOTTOM - (BOTTOM - TOP) * (y - p->y_low) / (p->y_high - p->y_low);
-}
 
 static bool is_free(const plane *p, box b)
 {
@@ -99,60 +76,25 @@ static bool find_room(plane *p, double x, double y, double radius, const char *l
 
 /* ---- drawing ---- */
 
-static bool can_show(const scatter_point *point)
+static bool can_show(const plane *p, const scatter_point *point)
 {
-    return isfinite(point->x) && isfinite(point->y) && point->x > 0 && point->x < 1e30 &&
-           fabs(point->y) < 1e30;
+    return plot_can_show(&p->plot, point->x, point->y);
 }
 
-static bool find_range(const scatter_chart *c, plane *p)
+static bool find_plot(const scatter_chart *c, plot *p)
 {
-    p->x_low = p->y_low = INFINITY;
-    p->x_high = p->y_high = -INFINITY;
+    *p = (plot){.left = LEFT,
+                .right = RIGHT,
+                .top = TOP,
+                .bottom = BOTTOM,
+                .x = {.label = c->x_unit, .log = true, .from_ticks = true, .grid = true, .wanted = 6},
+                .y = {.label = c->y_unit, .from_ticks = true, .grid = true, .wanted = 6}};
+    plot_clear(p);
     for (size_t i = 0; i < c->point_count; i++)
-        if (can_show(&c->points[i])) {
-            p->x_low = fmin(p->x_low, c->points[i].x);
-            p->x_high = fmax(p->x_high, c->points[i].x);
-            p->y_low = fmin(p->y_low, c->points[i].y);
-            p->y_high = fmax(p->y_high, c->points[i].y);
-        }
+        plot_take(p, c->points[i].x, c->points[i].y);
     for (size_t i = 0; i < c->level_count; i++)
-        if (isfinite(c->levels[i].y)) {
-            p->y_low = fmin(p->y_low, c->levels[i].y);
-            p->y_high = fmax(p->y_high, c->levels[i].y);
-        }
-    return p->x_low <= p->x_high;
-}
-
-static void draw_axes(text *out, const scatter_chart *c, plane *p)
-{
-    double ticks[CHART_MAX_TICKS];
-    int count = chart_ticks(p->y_low, p->y_high, 6, ticks);
-    p->y_low = ticks[0];
-    p->y_high = ticks[count - 1];
-    for (int i = 0; i < count; i++)
-        text_format(out,
-                    "<line class=\"rule\" x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/><text "
-                    "class=\"tick-y\" x=\"%d\" y=\"%.1f\">%g</text>",
-                    LEFT, place_y(p, ticks[i]), RIGHT, place_y(p, ticks[i]), LEFT - 8,
-                    place_y(p, ticks[i]) + 4, ticks[i]);
-    count = chart_log_ticks(p->x_low, p->x_high, ticks);
-    p->x_low = ticks[0];
-    p->x_high = ticks[count - 1];
-    for (int i = 0; i < count; i++)
-        text_format(out,
-                    "<line class=\"rule\" x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text "
-                    "class=\"tick-x\" x=\"%.1f\" y=\"%d\">%g</text>",
-                    place_x(p, ticks[i]), TOP, place_x(p, ticks[i]), BOTTOM, place_x(p, ticks[i]),
-                    BOTTOM + 18, ticks[i]);
-    text_format(out,
-                "<line class=\"axis\" x1=\"%d\" y1=\"%d\" x2=\"%d\" y2=\"%d\"/><text class=\"tick-x\" "
-                "x=\"%d\" y=\"%d\">",
-                LEFT, BOTTOM, RIGHT, BOTTOM, (LEFT + RIGHT) / 2, BOTTOM + 40);
-    text_escaped(out, c->x_unit);
-    text_format(out, "</text><text x=\"%d\" y=\"%d\">", 10, TOP - 14);
-    text_escaped(out, c->y_unit);
-    text_add(out, "</text>");
+        plot_take(p, p->x.low, c->levels[i].y); /* nothing, when there is no point */
+    return plot_close(p);
 }
 
 /* A mark, its tag left open: a large diamond for series 0, else a circle. */
@@ -186,18 +128,15 @@ static void draw_joins(text *out, const scatter_chart *c, const plane *p)
             continue;
         text_format(out, "<path class=\"join s%d\" d=\"", s);
         for (size_t i = 0; i < c->point_count; i++)
-            if (c->points[i].series == s && can_show(&c->points[i])) {
-                text_format(out, "%s%.1f %.1f", open ? "L" : "M", place_x(p, c->points[i].x),
-                            place_y(p, c->points[i].y));
-                open = true;
-            }
+            if (c->points[i].series == s && can_show(p, &c->points[i]))
+                plot_line_to(out, &p->plot, &open, c->points[i].x, c->points[i].y);
         text_add(out, open ? "\"/>" : "M0 0\"/>");
     }
 }
 
 static void draw_mark(text *out, const scatter_chart *c, const plane *p, const scatter_point *point)
 {
-    const double x = place_x(p, point->x), y = place_y(p, point->y);
+    const double x = plot_x(&p->plot, point->x), y = plot_y(&p->plot, point->y);
     draw_shape(out, point->series, x, y);
     text_add(out, "><title>");
     text_escaped(out, c->series[point->series]);
@@ -212,10 +151,10 @@ static void draw_labels(text *out, const scatter_chart *c, plane *p, bool large)
     for (size_t i = 0; i < c->point_count; i++) {
         const scatter_point *point = &c->points[i];
         double x, y;
-        if ((point->series == 0) != large || !can_show(point) || point->label[0] == '\0')
+        if ((point->series == 0) != large || !can_show(p, point) || point->label[0] == '\0')
             continue;
-        if (!find_room(p, place_x(p, point->x), place_y(p, point->y), large ? 9 : 5, point->label, large, &x,
-                       &y))
+        if (!find_room(p, plot_x(&p->plot, point->x), plot_y(&p->plot, point->y), large ? 9 : 5, point->label,
+                       large, &x, &y))
             continue;
         text_format(out, "<text class=\"label s%d\" x=\"%.1f\" y=\"%.1f\">", point->series, x, y);
         text_escaped(out, point->label);
@@ -229,7 +168,7 @@ static void draw_levels(text *out, const scatter_chart *c, plane *p)
     for (size_t i = 0; i < c->level_count; i++) {
         if (!isfinite(c->levels[i].y))
             continue;
-        const double y = place_y(p, c->levels[i].y), width = text_width(c->levels[i].label, false);
+        const double y = plot_y(&p->plot, c->levels[i].y), width = text_width(c->levels[i].label, false);
         text_format(out, "<line class=\"level\" x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/>", LEFT, y,
                     RIGHT, y);
         bool done = false;
@@ -248,17 +187,9 @@ static void draw_levels(text *out, const scatter_chart *c, plane *p)
     }
 }
 
-void scatter_begin(text *out, const char *label, const char *css, int height)
+void scatter_begin(text *out, const char *label, const char *css, int height, bool in_page)
 {
-    text_format(out,
-                "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"scatter\" viewBox=\"0 0 %d %d\" "
-                "width=\"%d\" role=\"img\"",
-                SCATTER_WIDTH, height, SCATTER_WIDTH);
-    text_format(out, " aria-label=\"%s\"><style>", label);
-    text_add(out, scatter_css);
-    text_add(out, css);
-    text_format(out, "</style><rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH,
-                height);
+    plot_begin(out, label, scatter_css, css, SCATTER_WIDTH, height, in_page);
 }
 
 void scatter_draw(text *out, const scatter_chart *c, int top)
@@ -269,22 +200,22 @@ void scatter_draw(text *out, const scatter_chart *c, int top)
     text_format(out, "</text><text x=\"%d\" y=\"24\" text-anchor=\"end\">", RIGHT);
     text_escaped(out, c->note);
     text_add(out, "</text>");
-    if (!find_range(c, &p)) {
+    if (!find_plot(c, &p.plot)) {
         text_add(out, "<text x=\"58\" y=\"100\">n/a: nothing was measured.</text></g>");
         return;
     }
     draw_legend(out, c);
-    draw_axes(out, c, &p);
+    plot_draw_axes(out, &p.plot);
     for (size_t i = 0; i < c->point_count; i++)
-        if (can_show(&c->points[i])) {
-            const double x = place_x(&p, c->points[i].x), y = place_y(&p, c->points[i].y),
+        if (can_show(&p, &c->points[i])) {
+            const double x = plot_x(&p.plot, c->points[i].x), y = plot_y(&p.plot, c->points[i].y),
                          r = c->points[i].series == 0 ? 8 : 5;
             take(&p, (box){x - r, y - r, x + r, y + r});
         }
     draw_joins(out, c, &p);
     for (int pass = 0; pass < 2; pass++) /* the named ones on top */
         for (size_t i = 0; i < c->point_count; i++)
-            if (can_show(&c->points[i]) && (c->points[i].series == 0) == (pass == 1))
+            if (can_show(&p, &c->points[i]) && (c->points[i].series == 0) == (pass == 1))
                 draw_mark(out, c, &p, &c->points[i]);
     draw_labels(out, c, &p, true);
     draw_levels(out, c, &p);

@@ -34,14 +34,11 @@ typedef struct scatter_chart {
     size_t level_count;
 } scatter_chart;
 
-/** Rules for the SVG of scatter_draw(), light and dark; they stand alone. */
+/** Rules for what scatter_draw() adds to a plot (report/plot.h). */
 extern const char scatter_css[];
 
-/**
- * A file of charts begins: SVG of SCATTER_WIDTH x `height` with their rules and its paper; what ends it is
- * "</svg>". `css`: further rules, or "".
- */
-void scatter_begin(text *out, const char *label, const char *css, int height);
+/** An SVG of scatter charts begins: plot_begin() with their rules. `css`: further rules, or "". */
+void scatter_begin(text *out, const char *label, const char *css, int height, bool in_page);
 
 /**
  * The chart as an SVG group, SCATTER_WIDTH x SCATTER_HEIGHT, its upper left corner at (0, top). Log x from

@@ -21,24 +21,6 @@
 
 enum { REFERENCE_STEP = 8 }; /* as bench_reference: every 8th pixel in both directions */
 
-const char *cross_step_name(cross_step step)
-{
-    static const char *const names[CROSS_STEPS] = {"tiles", "order", "projection", "dilation", "cut-offs"};
-    return names[step];
-}
-
-const char *cross_step_text(cross_step step)
-{
-    static const char *const texts[CROSS_STEPS] = {
-        "the same responses in the same order, found through tiles in place of a tree: rounding alone",
-        "blended by the depth of the centres in place of the depth on each ray",
-        "the affine projection at the centre in place of the response along the ray",
-        "0.3 px^2 added to every projection, in place of the footprint of a run",
-        "drawn to 3 std-devs by tiles, and from z = 0.2 on, in place of where the response ends",
-    };
-    return texts[step];
-}
-
 /* ---- pictures ---- */
 
 static raster_settings settings_of_step(const trace_settings *s, cross_step step)

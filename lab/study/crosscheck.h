@@ -49,10 +49,6 @@ typedef struct cross_study {
     size_t model_count;
 } cross_study;
 
-/** What changes with a step: a word or two; and a sentence. */
-const char *cross_step_name(cross_step step);
-const char *cross_step_text(cross_step step);
-
 /** Differences are shown times this; the step CROSS_TILES, which is rounding alone, times the second. */
 enum { CROSS_AMPLIFIED = 8, CROSS_AMPLIFIED_TILES = 1000 };
 

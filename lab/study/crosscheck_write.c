@@ -9,11 +9,38 @@
 #include "base/file.h"
 #include "data/json_out.h"
 #include "report/image.h"
+#include "report/plot.h"
 #include "report/style.h"
-#include "study/chart.h"
 #include "study/crosscheck.h"
 
-enum { BAR_HEIGHT = 16, BAR_GAP = 6, HEAD = 62, VIEW_GAP = 26, LABEL_WIDTH = 96, BARS_RIGHT = 700 };
+enum {
+    BAR_HEIGHT = 16,
+    BAR_GAP = 6,
+    HEAD = 62,
+    VIEW_GAP = 26,
+    LABEL_WIDTH = 96,
+    BARS_RIGHT = 700,
+    PICTURE_WIDTH = 760
+};
+
+/* What changes with a step: a word or two; and a sentence. */
+static const char *step_name(cross_step step)
+{
+    static const char *const names[CROSS_STEPS] = {"tiles", "order", "projection", "dilation", "cut-offs"};
+    return names[step];
+}
+
+static const char *step_text(cross_step step)
+{
+    static const char *const texts[CROSS_STEPS] = {
+        "the same responses in the same order, found through tiles in place of a tree: rounding alone",
+        "blended by the depth of the centres in place of the depth on each ray",
+        "the affine projection at the centre in place of the response along the ray",
+        "0.3 px^2 added to every projection, in place of the footprint of a run",
+        "drawn to 3 std-devs by tiles, and from z = 0.2 on, in place of where the response ends",
+    };
+    return texts[step];
+}
 
 static bool passes(const cross_check *c) { return c->value >= c->limit; }
 
@@ -46,7 +73,7 @@ static void add_view_table(const cross_model *model, const cross_view *v, text *
         out,
         "| change | dB to the step before | largest | dB to the tracer | largest |\n|---|---|---|---|---|\n");
     for (cross_step step = 0; step < CROSS_STEPS; step++)
-        add_error_row(out, cross_step_name(step), &v->step[step], &v->total[step]);
+        add_error_row(out, step_name(step), &v->step[step], &v->total[step]);
     text_add(out, "\n| own cut-offs, against double | dB | largest |\n|---|---|---|\n");
     add_error_row(out, "tracer", &v->traced, NULL);
     add_error_row(out, "per-ray form", &v->per_ray, NULL);
@@ -74,7 +101,7 @@ static void add_markdown(const cross_study *study, text *out)
                 "one change at a time; each keeps those before it. Rows beyond their limit: %zu.\n\n",
                 count_failures(study));
     for (cross_step step = 0; step < CROSS_STEPS; step++)
-        text_format(out, "- **%s**: %s\n", cross_step_name(step), cross_step_text(step));
+        text_format(out, "- **%s**: %s\n", step_name(step), step_text(step));
     text_format(
         out,
         "\nPictures of each view, from the upper left: tracer, splats, their difference x %d, that of the "
@@ -103,10 +130,10 @@ static json_t *view_to_json(const cross_view *v)
                       isfinite(v->checks[i].value) ? json_real(v->checks[i].value) : json_null(), "pass",
                       passes(&v->checks[i])));
     for (cross_step step = 0; step < CROSS_STEPS; step++)
-        json_array_append_new(chain, json_pack("{s:s,s:s,s:o,s:o}", "change", cross_step_name(step), "what",
-                                               cross_step_text(step), "to_step_before",
-                                               error_to_json(&v->step[step]), "to_tracer",
-                                               error_to_json(&v->total[step])));
+        json_array_append_new(chain,
+                              json_pack("{s:s,s:s,s:o,s:o}", "change", step_name(step), "what",
+                                        step_text(step), "to_step_before", error_to_json(&v->step[step]),
+                                        "to_tracer", error_to_json(&v->total[step])));
     return json_pack("{s:o,s:i,s:i,s:I,s:b,s:o,s:o,s:{s:o,s:o,s:o},s:o}", "view", json_text(v->name), "width",
                      v->width, "height", v->height, "gaussians", (json_int_t)v->gaussians, "pinhole_stand_in",
                      v->stand_in, "chain", chain, "rows", rows, "to_double", "tracer",
@@ -136,6 +163,9 @@ static gbt_status write_json(const cross_study *study, const char *folder, gbt_e
 
 /* ---- chart ---- */
 
+static const char bar_css[] =
+    ".plot .bar{fill:var(--k);opacity:.55}.plot .total{stroke:var(--k);stroke-width:2.5}\n";
+
 static int view_height(void) { return CROSS_STEPS * (BAR_HEIGHT + BAR_GAP) + VIEW_GAP; }
 
 /* The longer, the closer: from 10 to 120 dB. */
@@ -155,7 +185,7 @@ static void draw_bars(const cross_model *model, const cross_view *v, int top, te
         const int y = top + VIEW_GAP - 4 + i * (BAR_HEIGHT + BAR_GAP);
         const double end = bar_end(v->step[i].psnr), total = bar_end(v->total[i].psnr);
         text_format(out, "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%s</text>", LABEL_WIDTH - 8, y + 12,
-                    cross_step_name((cross_step)i));
+                    step_name((cross_step)i));
         text_format(out, "<rect class=\"s1 bar\" x=\"%d\" y=\"%d\" width=\"%.1f\" height=\"%d\"/>",
                     LABEL_WIDTH, y, end - LABEL_WIDTH, BAR_HEIGHT);
         text_format(out, "<path class=\"s2 total\" d=\"M%.1f %dv%d\"/>", total, y - 2, BAR_HEIGHT + 4);
@@ -169,19 +199,7 @@ static void add_svg(const cross_study *study, bool alone, text *out)
     int height = HEAD, top = HEAD;
     for (size_t m = 0; m < study->model_count; m++)
         height += (int)study->models[m].view_count * view_height();
-    text_format(
-        out,
-        "<svg %sclass=\"scatter\" viewBox=\"0 0 %d %d\"%s role=\"img\" aria-label=\"from tracer to splats\">",
-        alone ? "xmlns=\"http://www.w3.org/2000/svg\" " : "", SCATTER_WIDTH, height,
-        alone ? " width=\"760\"" : "");
-    if (alone) {
-        text_add(out, "<style>");
-        text_add(out, scatter_css);
-        text_add(out, ".scatter .bar{fill:var(--k);opacity:.55}.scatter "
-                      ".total{stroke:var(--k);stroke-width:2.5}</style>");
-        text_format(out, "<rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH,
-                    height);
-    }
+    plot_begin(out, "from tracer to splats", bar_css, "", PICTURE_WIDTH, height, !alone);
     text_add(out, "<text class=\"title\" x=\"8\" y=\"22\">From tracer to splats, one change at a time</text>"
                   "<text x=\"8\" y=\"42\">PSNR in dB, longer is closer: the bar to the step before, the mark "
                   "to the tracer</text>");
@@ -225,14 +243,14 @@ static void add_page(const cross_study *study, const char *folder, text *out)
                   "content=\"width=device-width,initial-scale=1\">"
                   "<title>Tracer against rasterizer</title>\n<style>\n");
     text_add(out, report_css);
-    text_add(out, scatter_css);
-    text_add(out, ".scatter .bar{fill:var(--k);opacity:.55}.scatter "
-                  ".total{stroke:var(--k);stroke-width:2.5}.panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n"
+    text_add(out, plot_css);
+    text_add(out, bar_css);
+    text_add(out, ".panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n"
                   "</style></head>\n<body>\n<header><h1>Tracer against rasterizer</h1><p class=\"lead\">From "
                   "the tracer's picture to that of 3D Gaussian splatting, one change at a time; each keeps "
                   "those before it.</p></header>\n<main>\n<ul>");
     for (cross_step step = 0; step < CROSS_STEPS; step++)
-        text_format(out, "<li><b>%s</b>: %s</li>", cross_step_name(step), cross_step_text(step));
+        text_format(out, "<li><b>%s</b>: %s</li>", step_name(step), step_text(step));
     text_add(out, "</ul>\n<figure class=\"card panel\">");
     add_svg(study, false, out);
     text_format(

@@ -10,7 +10,11 @@
 #include "study/grid.h"
 #include "study/runs_stat.h"
 
-enum { PAPER_TABLES = 4, PAPER_ALL = STUDY_SCENES_MAX /* in place of a scene: the mean over all */ };
+enum {
+    PAPER_TABLES = 4,
+    PAPER_DEPTH_MAX = 18 /* where nothing else is said */,
+    PAPER_ALL = STUDY_SCENES_MAX /* in place of a scene: the mean over all */
+};
 
 /* ---- what is trained ---- */
 

@@ -4,87 +4,57 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "report/chart.h"
+#include "report/plot.h"
 #include "study/chart.h"
 #include "study/paper.h"
 
 /* A panel per scene: a row per variant, and two plots side by side. */
-enum { NAMES_RIGHT = 196, PLOT_WIDTH = 252, PLOT_GAP = 38, ROW = 24, HEAD = 66, FOOT = 42, MARGIN = 12 };
+enum { NAMES_RIGHT = 196, PLOT_WIDTH = 252, PLOT_GAP = 38, ROW = 24, HEAD = 44, FOOT = 42, MARGIN = 12 };
 
 static const char css[] =
-    ".scatter .seed{fill:var(--k);opacity:.45}.scatter .bar{stroke:var(--k);stroke-width:2}.scatter "
+    ".plot .seed{fill:var(--k);opacity:.45}.plot .bar{stroke:var(--k);stroke-width:2}.plot "
     ".name{text-anchor:end;fill:var(--text)}\n";
-
-typedef struct plot {
-    paper_figure figure;
-    double left, low, high;
-} plot;
-
-static double place(const plot *p, double value)
-{
-    return p->left + PLOT_WIDTH * (value - p->low) / (p->high - p->low);
-}
 
 static int panel_height(size_t variant_count) { return HEAD + ROW * (int)variant_count + FOOT; }
 
-/* Everything that will be drawn: means, their spreads, single seeds. False without any of it. */
-static bool find_range(const paper_study *s, size_t scene, const paper_variant_id *variants, size_t count,
-                       plot *p)
+/* The axis of one figure for everything that will be drawn: means, their spreads, single seeds. False without
+   any of it. */
+static bool find_plot(const paper_study *s, size_t scene, const paper_variant_id *variants, size_t count,
+                      paper_figure figure, plot *p)
 {
-    p->low = INFINITY;
-    p->high = -INFINITY;
+    p->x = (plot_axis){
+        .label = paper_figure_texts[figure].value_name, .from_ticks = true, .grid = true, .wanted = 4};
+    plot_clear(p);
     for (size_t v = 0; v < count; v++) {
-        const stat_sample stat = paper_stat(s, scene, variants[v], p->figure);
+        const stat_sample stat = paper_stat(s, scene, variants[v], figure);
         const double reach = isfinite(stat.deviation) ? stat.deviation : 0;
-        if (isfinite(stat.mean)) {
-            p->low = fmin(p->low, stat.mean - reach);
-            p->high = fmax(p->high, stat.mean + reach);
-        }
-        for (int seed = 0; seed < s->grid.seeds; seed++) {
-            const double value = paper_figure_of(paper_run(s, scene, variants[v], seed), p->figure);
-            if (isfinite(value)) {
-                p->low = fmin(p->low, value);
-                p->high = fmax(p->high, value);
-            }
-        }
+        plot_take(p, stat.mean - reach, 0);
+        plot_take(p, stat.mean + reach, 0);
+        for (int seed = 0; seed < s->grid.seeds; seed++)
+            plot_take(p, paper_figure_of(paper_run(s, scene, variants[v], seed), figure), 0);
     }
-    return p->low <= p->high && fmax(fabs(p->low), fabs(p->high)) < 1e15;
+    return plot_close(p);
 }
 
-static void draw_frame(text *out, plot *p, int top, int bottom)
+static void draw_row(text *out, const paper_study *s, size_t scene, paper_variant_id variant,
+                     paper_figure figure, const plot *p, int y)
 {
-    double ticks[CHART_MAX_TICKS];
-    const int count = chart_ticks(p->low, p->high, 4, ticks);
-    p->low = ticks[0];
-    p->high = ticks[count - 1];
-    for (int i = 0; i < count; i++)
-        text_format(
-            out,
-            "<path class=\"rule\" d=\"M%.1f %dV%d\"/><text class=\"tick-x\" x=\"%.1f\" y=\"%d\">%.6g</text>",
-            place(p, ticks[i]), top, bottom, place(p, ticks[i]), bottom + 17, ticks[i]);
-    text_format(out, "<text x=\"%.1f\" y=\"%d\">%s</text>", p->left, top - 10,
-                paper_figure_texts[p->figure].value_name);
-}
-
-static void draw_row(text *out, const paper_study *s, size_t scene, paper_variant_id variant, const plot *p,
-                     int y)
-{
-    const stat_sample stat = paper_stat(s, scene, variant, p->figure);
+    const stat_sample stat = paper_stat(s, scene, variant, figure);
     const int color = variant == PAPER_VOXEL || variant == PAPER_VOXEL_SCALED ? 2 : 1;
     if (!isfinite(stat.mean))
         return;
     if (isfinite(stat.deviation))
         text_format(out, "<path class=\"bar s%d\" d=\"M%.1f %dH%.1f\"/>", color,
-                    place(p, stat.mean - stat.deviation), y, place(p, stat.mean + stat.deviation));
+                    plot_x(p, stat.mean - stat.deviation), y, plot_x(p, stat.mean + stat.deviation));
     for (int seed = 0; seed < s->grid.seeds; seed++) {
-        const double value = paper_figure_of(paper_run(s, scene, variant, seed), p->figure);
+        const double value = paper_figure_of(paper_run(s, scene, variant, seed), figure);
         if (isfinite(value))
             text_format(out, "<circle class=\"seed s%d\" cx=\"%.1f\" cy=\"%d\" r=\"2.5\"/>", color,
-                        place(p, value), y);
+                        plot_x(p, value), y);
     }
     text_format(out, "<circle class=\"mark s%d\" cx=\"%.1f\" cy=\"%d\" r=\"5\"><title>", color,
-                place(p, stat.mean), y);
-    stat_add(out, &stat, paper_figure_texts[p->figure].decimals, false);
+                plot_x(p, stat.mean), y);
+    stat_add(out, &stat, paper_figure_texts[figure].decimals, false);
     text_add(out, "</title></circle>");
 }
 
@@ -99,13 +69,14 @@ static void draw_panel(text *out, const paper_study *s, size_t scene, const pape
         text_format(out, "<text class=\"name\" x=\"%d\" y=\"%d\">%s</text>", NAMES_RIGHT - MARGIN,
                     HEAD + ROW * (int)v + ROW / 2 + 4, paper_variants[variants[v]].says);
     for (int i = 0; i < 2; i++) {
-        plot p = {.figure = i == 0 ? PAPER_FINAL : PAPER_PSNR,
-                  .left = NAMES_RIGHT + i * (PLOT_WIDTH + PLOT_GAP)};
-        if (!find_range(s, scene, variants, count, &p))
+        const paper_figure figure = i == 0 ? PAPER_FINAL : PAPER_PSNR;
+        const int left = NAMES_RIGHT + i * (PLOT_WIDTH + PLOT_GAP);
+        plot p = {.left = left, .right = left + PLOT_WIDTH, .top = HEAD, .bottom = bottom};
+        if (!find_plot(s, scene, variants, count, figure, &p))
             continue;
-        draw_frame(out, &p, HEAD, bottom);
+        plot_draw_axes(out, &p);
         for (size_t v = 0; v < count; v++)
-            draw_row(out, s, scene, variants[v], &p, HEAD + ROW * (int)v + ROW / 2);
+            draw_row(out, s, scene, variants[v], figure, &p, HEAD + ROW * (int)v + ROW / 2);
     }
     text_add(out, "</g>");
 }
@@ -154,7 +125,7 @@ void paper_charts(const paper_study *s, text *out)
     const size_t count = spread_table > 0 ? paper_table_variants(spread_table, &variants) : 0;
     const int spread = spread_table > 0 ? panel_height(count) : 0,
               one = spread + (has_growth ? SCATTER_HEIGHT : 0);
-    scatter_begin(out, "anchors and PSNR by start", css, one * (int)s->grid.scene_count);
+    scatter_begin(out, "anchors and PSNR by start", css, one * (int)s->grid.scene_count, false);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         if (spread_table > 0)
             draw_panel(out, s, scene, variants, count, (int)scene * one);

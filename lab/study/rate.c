@@ -10,7 +10,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "eval/run_sensitivity.h"
+#include "run/run_sensitivity.h"
 #include "image/metrics.h"
 #include "lab/lab.h"
 #include "study/model.h"

@@ -161,7 +161,7 @@ static void add_picture(const rate_study *study, text *out)
             chart.point_count++;
         }
     }
-    scatter_begin(out, "size against picture", "", SCATTER_HEIGHT);
+    scatter_begin(out, "size against picture", "", SCATTER_HEIGHT, false);
     scatter_draw(out, &chart, 0);
     text_add(out, "</svg>\n");
 }

@@ -19,7 +19,7 @@
 #include "data/json_out.h"
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 #include "study/runs_stat.h"
 
 enum { PATH_SIZE = 4096, SETTINGS_SIZE = CONFIG_TEXT_SIZE + 1024 };

@@ -58,13 +58,6 @@ static const speed_step steps[] = {
     {KNOB_RENDERER, "EWA splats", 0, RASTER_EWA},
 };
 
-const char *speed_knob_name(speed_knob knob)
-{
-    static const char *const names[KNOB_COUNT] = {"preset", "alpha_min",       "T_min",   "proxy radius",
-                                                  "kernel", "instruction set", "renderer"};
-    return names[knob];
-}
-
 static void list_rows(const trace_settings *own, speed_model *out)
 {
     const cpu_isa best = cpu_best_isa();

@@ -61,8 +61,6 @@ typedef struct speed_study {
     int repeats, threads;
 } speed_study;
 
-const char *speed_knob_name(speed_knob knob);
-
 /** PSNR of every row to the held-out photos of `s`, which is decoded anew; row->photo_psnr and photo_count.
     Nothing for a .ply. */
 gbt_status speed_measure_photos(struct bench_scene *s, speed_model *out, gbt_error *err);

@@ -8,6 +8,7 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "data/json_out.h"
+#include "report/plot.h"
 #include "report/style.h"
 #include "study/chart.h"
 #include "study/speed.h"
@@ -17,6 +18,13 @@ enum { PANEL_GAP = 18 };
 static const char x_unit[] = "core-microseconds per pixel: tree and picture (log)";
 static const char y_unit[] = "PSNR to the picture without cut-offs, dB";
 static const char y_photo_unit[] = "PSNR to the held-out photos, mean, dB";
+
+static const char *knob_name(speed_knob knob)
+{
+    static const char *const names[KNOB_COUNT] = {"preset", "alpha_min",       "T_min",   "proxy radius",
+                                                  "kernel", "instruction set", "renderer"};
+    return names[knob];
+}
 
 /* ---- tables ---- */
 
@@ -40,7 +48,7 @@ void speed_table(const speed_study *study, text *out)
                       "|---|---|---|---|---|---|---|---|---|---|\n");
         for (size_t i = 0; i < model->row_count; i++) {
             const speed_row *row = &model->rows[i];
-            text_format(out, "| %s | %s | %.3f | %.3f | %.3f | %.1f | %.0f | ", speed_knob_name(row->knob),
+            text_format(out, "| %s | %s | %.3f | %.3f | %.3f | %.1f | %.0f | ", knob_name(row->knob),
                         row->value, row->picture_us, row->forward_us, row->both_us, row->blended, row->pairs);
             add_error(out, &row->error, " | ");
             text_add(out, " | ");
@@ -75,7 +83,7 @@ static void add_csv(const speed_study *study, text *out)
             const speed_row *r = &model->rows[i];
             add_csv_text(out, model->name);
             text_format(out, ",%s,\"%s\",%s,%s,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n",
-                        speed_knob_name(r->knob), r->value, r->splats ? "" : bench_kernel_name(r->kernel),
+                        knob_name(r->knob), r->value, r->splats ? "" : bench_kernel_name(r->kernel),
                         cpu_isa_name(r->isa), (double)r->settings.alpha_min,
                         (double)r->settings.transmittance_min, (double)r->settings.proxy_radius,
                         r->picture_us, r->forward_us, r->both_us, r->blended, r->pairs, r->error.psnr,
@@ -99,7 +107,7 @@ static json_t *model_to_json(const speed_model *model)
         json_array_append_new(
             rows,
             json_pack("{s:s,s:s,s:s,s:s,s:f,s:f,s:o,s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:o}", "knob",
-                      speed_knob_name(r->knob), "value", r->value, "kernel",
+                      knob_name(r->knob), "value", r->value, "kernel",
                       r->splats ? "" : bench_kernel_name(r->kernel), "isa", cpu_isa_name(r->isa), "alpha_min",
                       (double)r->settings.alpha_min, "transmittance_min",
                       (double)r->settings.transmittance_min, "proxy_radius",
@@ -159,7 +167,7 @@ static void draw_panel(const speed_study *study, size_t m, bool photos, int top,
                            .level_count = photos ? 0 : SPEED_ERRORS,
                            .apart = 1u << KNOB_KERNEL | 1u << KNOB_ISA | 1u << KNOB_RENDERER};
     for (int k = 0; k < KNOB_COUNT; k++)
-        chart.series[k] = speed_knob_name((speed_knob)k);
+        chart.series[k] = knob_name((speed_knob)k);
     for (size_t i = 0; i < model->row_count; i++) {
         const speed_row *r = &model->rows[i];
         points[i] = (scatter_point){(int)r->knob, r->picture_us, photos ? r->photo_psnr : r->error.psnr,
@@ -176,18 +184,7 @@ static void add_svg(const speed_study *study, size_t first, size_t count, bool a
     for (size_t i = 0; i < count; i++)
         panels += panel_count(&study->models[first + i]);
     const int height = (int)panels * (SCATTER_HEIGHT + PANEL_GAP) - PANEL_GAP;
-    text_format(out,
-                "<svg %sclass=\"scatter\" viewBox=\"0 0 %d %d\"%s role=\"img\" aria-label=\"speed against "
-                "accuracy\">",
-                alone ? "xmlns=\"http://www.w3.org/2000/svg\" " : "", SCATTER_WIDTH, height,
-                alone ? " width=\"760\"" : "");
-    if (alone) {
-        text_add(out, "<style>");
-        text_add(out, scatter_css);
-        text_add(out, "</style>");
-        text_format(out, "<rect class=\"paper\" width=\"%d\" height=\"%d\" rx=\"12\"/>", SCATTER_WIDTH,
-                    height);
-    }
+    scatter_begin(out, "speed against accuracy", "", height, !alone);
     int top = 0;
     for (size_t i = 0; i < count; i++)
         for (size_t panel = 0; panel < panel_count(&study->models[first + i]);
@@ -206,7 +203,7 @@ static void add_page_table(const speed_model *model, text *out)
     for (size_t i = 0; i < model->row_count; i++) {
         const speed_row *r = &model->rows[i];
         text_format(out, "<tr><th>%s</th><td>%s</td><td>%.3f</td><td>%.3f</td><td>%.3f</td><td>%.1f</td><td>",
-                    speed_knob_name(r->knob), r->value, r->picture_us, r->forward_us, r->both_us, r->blended);
+                    knob_name(r->knob), r->value, r->picture_us, r->forward_us, r->both_us, r->blended);
         add_error(out, &r->error, "</td><td>");
         text_add(out, "</td><td>");
         text_number(out, r->photo_psnr, 2);
@@ -227,6 +224,7 @@ static void add_page(const speed_study *study, text *out)
                   "content=\"width=device-width,initial-scale=1\">"
                   "<title>Speed against accuracy</title>\n<style>\n");
     text_add(out, report_css);
+    text_add(out, plot_css);
     text_add(out, scatter_css);
     text_add(out,
              ".panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n</style></head>\n<body>\n<header><h1>Speed "

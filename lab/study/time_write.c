@@ -212,7 +212,7 @@ static void draw_scene(const time_study *s, size_t scene, int top, text *out)
 
 void time_charts(const time_study *s, text *out)
 {
-    scatter_begin(out, "PSNR against seconds", "", SCATTER_HEIGHT * (int)s->grid.scene_count);
+    scatter_begin(out, "PSNR against seconds", "", SCATTER_HEIGHT * (int)s->grid.scene_count, false);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         draw_scene(s, scene, SCATTER_HEIGHT * (int)scene, out);
     text_add(out, "</svg>\n");

@@ -89,7 +89,10 @@ pointer, text, number = c.c_void_p, c.c_char_p, c.c_size_t
 FUNCTIONS = {
     "gbt_version": (text, []),
     "gbt_set_threads": (None, [c.c_int]),
+    "gbt_camera_model_count": (c.c_int, []),
+    "gbt_camera_model_at": (c.c_int, [c.c_int]),
     "gbt_camera_model_name": (text, [c.c_int]),
+    "gbt_camera_param_names": (text, [c.c_int]),
     "gbt_camera_param_count": (c.c_int, [c.c_int]),
     "gbt_camera_look_at": (c.c_bool, [c.c_double * 3, c.c_double * 3, c.c_double * 3, c.POINTER(CCamera)]),
     "gbt_camera_moved": (CCamera, [c.POINTER(CCamera), c.c_double * 6]),

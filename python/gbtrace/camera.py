@@ -8,7 +8,7 @@ import numpy as np
 
 from gbtrace._library import ArgumentError, CCamera, library, wanted
 
-MODELS = {library.gbt_camera_model_name(i).decode(): i for i in list(range(18)) + [100]}
+MODELS = {library.gbt_camera_model_name(i).decode(): i for i in map(library.gbt_camera_model_at, range(library.gbt_camera_model_count()))}
 
 
 class Camera:
@@ -24,7 +24,8 @@ class Camera:
             raise ValueError(f"model: {model!r} (wanted one of {', '.join(MODELS)})")
         count = library.gbt_camera_param_count(MODELS[model])
         if len(params) != count:
-            raise ValueError(f"params: {len(params)} (wanted {count} for {model})")
+            names = library.gbt_camera_param_names(MODELS[model]).decode()
+            raise ValueError(f"params: {len(params)} (wanted {count} for {model}: {names})")
         self._c = CCamera(MODELS[model], width, height)
         self.params[:] = params
         self.rotation[:] = np.eye(3) if rotation is None else rotation

@@ -62,7 +62,7 @@ def _gaussians_struct(g):
 
 
 class Model:
-    """A trained model (a run's folder or its model.gbt), or plain Gaussians (.ply, .splat, .spz). One thread at a time may use it.
+    """A trained model (a run's folder or its model.gbt), or plain Gaussians. One thread at a time may use it.
 
     Coordinates are those of the data set, or of the file or arrays.
     """

@@ -41,7 +41,7 @@ def evaluate(run, data=None, lpips=None, json=None):
 
 
 def export(path, *outputs, sh_degree=3, refine_steps=500, backdrop=True, data=None):
-    """Write a trained model, or plain Gaussians, as plain Gaussians: .ply, .splat, .spz or .glb by the ending of each name."""
+    """Write a trained model, or plain Gaussians, as plain Gaussians, in the format of each name's ending (docs/exporting.md)."""
     settings = lib.library.gbt_export_def_default()
     settings.sh_degree, settings.refine_steps, settings.backdrop, settings.data = sh_degree, refine_steps, backdrop, lib.optional(data)
     names = (c.c_char_p * len(outputs))(*(lib.encode(name) for name in outputs))

@@ -18,7 +18,7 @@
 #include "data/gaussian_file.h"
 #include "data/json_out.h"
 #include "image/metrics.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 
 enum { OUTPUTS_MAX = 8, VIEWS_MAX = 16 };
 

@@ -6,7 +6,7 @@
 
 #include "eval/lpips.h"
 #include "image/metrics.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 
 /** Whether an output is meant as a result folder: its name ends in a slash. */
 bool export_folder_is(const char *path);

@@ -87,11 +87,8 @@ bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_came
 void gbt_camera_half_fov_tan(const gbt_camera *camera, double tan_half[2])
 {
     camera_lens lens;
-    tan_half[0] = tan_half[1] = 0;
-    if (!camera_lens_prepare(camera, &lens) || lens.kind == LENS_ORTHOGRAPHIC)
-        return;
-    /* The full turn of an equirectangular image has, at its centre, w / (2 pi) pixels per radian. */
-    const bool turn = lens.kind == LENS_EQUIRECTANGULAR;
-    tan_half[0] = camera->width / (2 * (turn ? lens.fx / (2 * PI) : lens.fx));
-    tan_half[1] = camera->height / (2 * (turn ? lens.fy / PI : lens.fy));
+    if (camera_lens_prepare(camera, &lens))
+        camera_lens_half_fov_tan(&lens, camera->width, camera->height, tan_half);
+    else
+        tan_half[0] = tan_half[1] = 0;
 }

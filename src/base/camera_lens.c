@@ -4,16 +4,15 @@
    direction --[kind: X/Z | theta | closed form]--> plane point
         --[radial N/D, tangential, prism]--> distorted --[f, c]--> pixel
 
-   A model is a row of parameters for that one pipeline (camera_lens_prepare), so the inversion is written
-   once. The radial part is only used up to the first radius where it stops increasing: beyond it the formula
-   folds back into the image, and a point there would be drawn on top of others. docs/cameras.md has the
-   formulas. */
+   A model is a row that says where that one pipeline takes its parameters (base/camera_model.c), so the
+   inversion is written once. The radial part is only used up to the first radius where it stops increasing:
+   beyond it the formula folds back into the image, and a point there would be drawn on top of others.
+   docs/cameras.md has the formulas. */
 #include "base/camera_lens.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "base/camera_model.h"
 #include "base/poly.h"
 
 #define PI 3.14159265358979323846
@@ -66,15 +65,6 @@ static void find_monotone_range(camera_lens *lens, double radius_limit)
     }
 }
 
-static void set_radial(camera_lens *lens, const double *first, int first_count, const double *second,
-                       int second_count)
-{
-    for (int i = 0; i < first_count; i++)
-        lens->numerator[1 + i] = first[i];
-    for (int i = 0; i < second_count; i++)
-        lens->numerator[1 + first_count + i] = second[i];
-}
-
 static bool any_nonzero(const double *values, int count)
 {
     for (int i = 0; i < count; i++)
@@ -83,103 +73,68 @@ static bool any_nonzero(const double *values, int count)
     return false;
 }
 
+/* The parameters of a camera where its model's row says that they go; false where one is not finite. */
+static bool take_params(const gbt_camera *camera, const camera_model *model, camera_lens *lens)
+{
+    double *const places[] = {[LENS_FX] = &lens->fx,
+                              [LENS_FY] = &lens->fy,
+                              [LENS_CX] = &lens->cx,
+                              [LENS_CY] = &lens->cy,
+                              [LENS_N1] = &lens->numerator[1],
+                              [LENS_N2] = &lens->numerator[2],
+                              [LENS_N3] = &lens->numerator[3],
+                              [LENS_N4] = &lens->numerator[4],
+                              [LENS_N5] = &lens->numerator[5],
+                              [LENS_N6] = &lens->numerator[6],
+                              [LENS_D1] = &lens->denominator[1],
+                              [LENS_D2] = &lens->denominator[2],
+                              [LENS_D3] = &lens->denominator[3],
+                              [LENS_TX] = &lens->tangent_x,
+                              [LENS_TY] = &lens->tangent_y,
+                              [LENS_S0] = &lens->prism[0],
+                              [LENS_S1] = &lens->prism[1],
+                              [LENS_S2] = &lens->prism[2],
+                              [LENS_S3] = &lens->prism[3],
+                              [LENS_SHAPE0] = &lens->shape[0],
+                              [LENS_SHAPE1] = &lens->shape[1]};
+    for (int i = 0; i < gbt_camera_param_count(camera->model); i++) {
+        const double value = camera->params[i];
+        if (!isfinite(value))
+            return false;
+        if (model->slots[i] == LENS_F)
+            lens->fx = lens->fy = value;
+        else
+            *places[model->slots[i]] = value;
+    }
+    return true;
+}
+
+/* The closed forms: are their shape parameters in the domain? Without distortion they are a pinhole, and then
+   to the same bits. */
+static bool check_shape(camera_lens *lens)
+{
+    const double k = lens->shape[0];
+    const lens_kind kind = lens->kind;
+    if (k == 0 && (kind == LENS_FOV || kind == LENS_DIVISION || kind == LENS_EUCM))
+        lens->kind = LENS_PERSPECTIVE;
+    if (kind == LENS_FOV)
+        return fabs(k) < PI;
+    return kind != LENS_EUCM || (k >= 0 && k <= 1 && lens->shape[1] > 0);
+}
+
 bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
 {
-    const int focal_count = camera_focal_count(camera->model),
-              param_count = gbt_camera_param_count(camera->model);
-    if (focal_count == 0)
+    const camera_model *model = camera_model_of(camera->model);
+    if (model == NULL)
         return false;
-    const double *p = camera->params;
-    for (int i = 0; i < param_count; i++)
-        if (!isfinite(p[i]))
-            return false;
     memset(lens, 0, sizeof *lens);
     lens->numerator[0] = lens->denominator[0] = 1;
-    lens->fx = p[0];
-    lens->fy = p[focal_count - 1];
-    if (!(lens->fx > 0 && lens->fy > 0))
+    lens->kind = model->kind;
+    lens->extra_last = model->extra_last;
+    if (!take_params(camera, model, lens) || !(lens->fx > 0 && lens->fy > 0))
         return false;
-    if (camera->model == GBT_CAMERA_EQUIRECTANGULAR) {
-        lens->kind = LENS_EQUIRECTANGULAR;
-        return true;
-    }
-    p += focal_count;
-    lens->cx = p[0];
-    lens->cy = p[1];
-    const double *k = p + 2;
-    switch (camera->model) {
-    case GBT_CAMERA_ORTHOGRAPHIC:
-        lens->kind = LENS_ORTHOGRAPHIC;
-        return true;
-    case GBT_CAMERA_SIMPLE_PINHOLE:
-    case GBT_CAMERA_PINHOLE:
-        lens->kind = LENS_PERSPECTIVE;
-        break;
-    case GBT_CAMERA_SIMPLE_RADIAL:
-    case GBT_CAMERA_RADIAL:
-        lens->kind = LENS_PERSPECTIVE;
-        set_radial(lens, k, camera->model == GBT_CAMERA_RADIAL ? 2 : 1, NULL, 0);
-        break;
-    case GBT_CAMERA_OPENCV:
-        lens->kind = LENS_PERSPECTIVE;
-        set_radial(lens, k, 2, NULL, 0);
-        lens->tangent_y = k[2];
-        lens->tangent_x = k[3];
-        break;
-    case GBT_CAMERA_FULL_OPENCV:
-        lens->kind = LENS_PERSPECTIVE;
-        set_radial(lens, k, 2, k + 4, 1);
-        lens->tangent_y = k[2];
-        lens->tangent_x = k[3];
-        memcpy(lens->denominator + 1, k + 5, 3 * sizeof *k);
-        break;
-    case GBT_CAMERA_FOV:
-        /* Without distortion it is a pinhole, and then to the same bits. */
-        lens->kind = k[0] == 0 ? LENS_PERSPECTIVE : LENS_FOV;
-        lens->shape[0] = k[0];
-        return fabs(k[0]) < PI;
-    case GBT_CAMERA_SIMPLE_FISHEYE:
-    case GBT_CAMERA_FISHEYE:
-        lens->kind = LENS_FISHEYE;
-        break;
-    case GBT_CAMERA_SIMPLE_RADIAL_FISHEYE:
-    case GBT_CAMERA_RADIAL_FISHEYE:
-        lens->kind = LENS_FISHEYE;
-        set_radial(lens, k, camera->model == GBT_CAMERA_RADIAL_FISHEYE ? 2 : 1, NULL, 0);
-        break;
-    case GBT_CAMERA_OPENCV_FISHEYE:
-        lens->kind = LENS_FISHEYE;
-        set_radial(lens, k, 4, NULL, 0);
-        break;
-    case GBT_CAMERA_THIN_PRISM_FISHEYE:
-        lens->kind = LENS_FISHEYE;
-        set_radial(lens, k, 2, k + 4, 2);
-        lens->tangent_y = k[2];
-        lens->tangent_x = k[3];
-        lens->prism[0] = k[6];
-        lens->prism[2] = k[7];
-        break;
-    case GBT_CAMERA_RAD_TAN_THIN_PRISM_FISHEYE:
-        lens->kind = LENS_FISHEYE;
-        set_radial(lens, k, 6, NULL, 0);
-        lens->tangent_x = k[6];
-        lens->tangent_y = k[7];
-        memcpy(lens->prism, k + 8, sizeof lens->prism);
-        lens->extra_last = true;
-        break;
-    case GBT_CAMERA_SIMPLE_DIVISION:
-    case GBT_CAMERA_DIVISION:
-        lens->kind = k[0] == 0 ? LENS_PERSPECTIVE : LENS_DIVISION;
-        lens->shape[0] = k[0];
-        return true;
-    case GBT_CAMERA_EUCM:
-        lens->kind = k[0] == 0 ? LENS_PERSPECTIVE : LENS_EUCM;
-        lens->shape[0] = k[0];
-        lens->shape[1] = k[1];
-        return k[0] >= 0 && k[0] <= 1 && k[1] > 0;
-    default:
-        return false;
-    }
+    if (model->kind != LENS_PERSPECTIVE && model->kind != LENS_FISHEYE)
+        return check_shape(lens);
     lens->radial = any_nonzero(lens->numerator + 1, LENS_NUMERATOR - 1) ||
                    any_nonzero(lens->denominator + 1, LENS_DENOMINATOR - 1);
     lens->extra = lens->tangent_x != 0 || lens->tangent_y != 0 || any_nonzero(lens->prism, 4);
@@ -190,6 +145,17 @@ bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
         lens->radius_max = lens->distorted_max =
             lens->kind == LENS_FISHEYE || lens->extra ? radius_limit : HUGE_VAL;
     return true;
+}
+
+void camera_lens_half_fov_tan(const camera_lens *lens, int width, int height, double tan_half[2])
+{
+    tan_half[0] = tan_half[1] = 0;
+    if (lens->kind == LENS_ORTHOGRAPHIC)
+        return;
+    /* The full turn of an equirectangular image has, at its centre, w / (2 pi) pixels per radian. */
+    const bool turn = lens->kind == LENS_EQUIRECTANGULAR;
+    tan_half[0] = width / (2 * (turn ? lens->fx / (2 * PI) : lens->fx));
+    tan_half[1] = height / (2 * (turn ? lens->fy / PI : lens->fy));
 }
 
 /* Tangential and prism terms at (x, y), and I + their Jacobian (row-major), which is what is missing for the

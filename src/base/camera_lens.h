@@ -5,18 +5,7 @@
 
 #include <stdbool.h>
 
-#include "gbtrace/camera.h"
-
-/** How a direction becomes a point of the plane, before distortion. */
-typedef enum lens_kind {
-    LENS_PERSPECTIVE, /* (X / Z, Y / Z), Z > 0 */
-    LENS_FISHEYE,     /* (X, Y) scaled to length theta = angle to the axis, theta in [0, pi] */
-    LENS_FOV,         /* perspective, then radius atan(2 r tan(omega / 2)) / omega */
-    LENS_DIVISION,
-    LENS_EUCM,
-    LENS_EQUIRECTANGULAR,
-    LENS_ORTHOGRAPHIC /* (X, Y), whatever Z > 0 */
-} lens_kind;
+#include "base/camera_model.h"
 
 enum { LENS_NUMERATOR = 7, LENS_DENOMINATOR = 4 };
 
@@ -42,6 +31,9 @@ typedef struct camera_lens {
  * Threads: any. Cost: about a microsecond, some more for the six-coefficient models.
  */
 bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens);
+
+/** As gbt_camera_half_fov_tan(), of a prepared lens and its picture. */
+void camera_lens_half_fov_tan(const camera_lens *lens, int width, int height, double tan_half[2]);
 
 /**
  * Where the ray through an image point starts, in camera axes: the centre (0, 0, 0), or a point of the plane

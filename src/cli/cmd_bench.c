@@ -22,7 +22,7 @@ static const option *options_bench(int *count)
          .kind = OPTION_STRING,
          .value = &def.model,
          .value_name = "FILE|RUN",
-         .help = "plain Gaussians (.ply, .splat, .spz), or a trained run",
+         .help = "plain Gaussians (gbtrace export --help lists their formats), or a trained run",
          .required = true},
         {.name = "camera",
          .kind = OPTION_STRING,

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_export.c -- gbtrace export. */
+#include <stdio.h>
+
 #include "cli/options.h"
 #include "gbtrace/export.h"
 
@@ -71,13 +73,25 @@ static int run(const operands *given)
         gbt_export(files.value[0], &def, files.value + 1, (size_t)files.count - 1, stdout, &err), &err);
 }
 
+static const command_word *format_words(void)
+{
+    enum { FORMATS_MAX = 16, TEXT_SIZE = 160 };
+    static command_word words[FORMATS_MAX + 1];
+    static char texts[FORMATS_MAX][TEXT_SIZE];
+    for (int i = 0; i < gbt_export_format_count() && i < FORMATS_MAX; i++) {
+        const gbt_export_format f = gbt_export_format_at(i);
+        snprintf(texts[i], TEXT_SIZE, "%s%s", f.what, f.readable ? "" : "; written, not read");
+        words[i] = (command_word){f.ending, texts[i]};
+    }
+    return words;
+}
+
 const command command_export = {
     .name = "export",
-
-    .summary =
-        "export a scene as plain Gaussians (.ply, .splat, .spz, .glb), or convert .ply, .splat and .spz",
-    .usage = "RUN|MODEL.gbt|SCENE.ply|.splat|.spz OUT.ply|.splat|.spz|.glb...",
+    .summary = "export a scene as plain Gaussians for other programs, or convert plain Gaussians",
+    .usage = "RUN|MODEL.gbt|GAUSSIANS OUT...",
     .options = options,
     .min_operands = 1,
     .max_operands = 9,
-    .run = run};
+    .run = run,
+    .endings = format_words};

@@ -139,7 +139,7 @@ static const option *options(int *count)
          .kind = OPTION_STRING,
          .value = &def.data,
          .value_name = "DATA",
-         .help = "cameras of this data set; needed for plain Gaussians (.ply, .splat, .spz) without --camera",
+         .help = "cameras of this data set; needed for plain Gaussians without --camera",
          .aliases = "s source-path"},
         {.name = "renderer",
          .kind = OPTION_CHOICE,

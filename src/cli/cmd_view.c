@@ -62,7 +62,7 @@ static int run(const operands *given)
 const command command_view = {.name = "view",
                               .summary =
                                   "view a scene in the browser beside its photos, also during training",
-                              .usage = "RUN|MODEL.gbt|SCENE.ply|.splat|.spz",
+                              .usage = "RUN|MODEL.gbt|GAUSSIANS",
                               .options = options,
                               .min_operands = 1,
                               .max_operands = 1,

@@ -24,6 +24,8 @@ typedef struct command {
     const char *alias;                           /* a second name, or NULL */
     const command_word *(*words)(void);          /* what the first operand may be, up to a name of NULL; NULL:
                                                     anything, such as a path */
+    const command_word *(*endings)(void); /* what file names end in, and what that means, up to a name of
+                                             NULL; NULL: nothing to tell */
 } command;
 
 /** One `error: ...` line on stderr for a failure (control characters become ?), with options for the fields

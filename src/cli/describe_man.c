@@ -121,6 +121,16 @@ static const char tail[] =
     "gbtrace export RUN scene.ply scene.spz\n"
     ".fi\n";
 
+static void write_words(FILE *out, const command_word *(*list)(void))
+{
+    const command_word *words = list != NULL ? list() : NULL;
+    for (int w = 0; words != NULL && words[w].name != NULL; w++) {
+        fprintf(out, ".TP\n\\fB%s\\fR\n", words[w].name);
+        write_text(out, words[w].help);
+        fputc('\n', out);
+    }
+}
+
 void describe_man(FILE *out)
 {
     fprintf(out,
@@ -137,12 +147,8 @@ void describe_man(FILE *out)
         fputs(c->alias != NULL ? " (also " : "", out);
         write_text(out, c->alias != NULL ? c->alias : "");
         fputs(c->alias != NULL ? ").\n" : ".\n", out);
-        const command_word *words = c->words != NULL ? c->words() : NULL;
-        for (int w = 0; words != NULL && words[w].name != NULL; w++) {
-            fprintf(out, ".TP\n\\fB%s\\fR\n", words[w].name);
-            write_text(out, words[w].help);
-            fputc('\n', out);
-        }
+        write_words(out, c->words);
+        write_words(out, c->endings);
         option_table t;
         options_table(c, &t);
         write_rows(&t, out);

@@ -212,14 +212,20 @@ static void print_row(const option *o, bool all)
     print_wrapped(text, used > HELP_INDENT - 2 ? used + 2 : HELP_INDENT);
 }
 
+static void print_words(const char *title, const command_word *(*list)(void))
+{
+    const command_word *words = list != NULL ? list() : NULL;
+    for (int i = 0; words != NULL && words[i].name != NULL; i++)
+        printf("%s%s  %-12s%s\n%s", i == 0 ? title : "", i == 0 ? "\n" : "", words[i].name, words[i].help,
+               words[i + 1].name == NULL ? "\n" : "");
+}
+
 void options_print_help(const command *self, const option_table *t, bool all)
 {
     printf("usage: gbtrace %s %s%s[options]\n\n%s\n\n", self->name, self->usage,
            self->usage[0] != '\0' ? " " : "", self->summary);
-    const command_word *words = self->words != NULL ? self->words() : NULL;
-    for (int i = 0; words != NULL && words[i].name != NULL; i++)
-        printf("%s  %-12s%s\n%s", i == 0 ? "the first argument is one of:\n" : "", words[i].name,
-               words[i].help, words[i + 1].name == NULL ? "\n" : "");
+    print_words("the first argument is one of:", self->words);
+    print_words("files, by the ending of their names:", self->endings);
     puts("options:");
     for (int i = 0; i < t->count; i++)
         if (t->rows[i].kind != OPTION_ELSEWHERE && (all || !t->rows[i].rare))

@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "base/camera_model.h"
 #include "data/number.h"
 
 /* Lines of a file, one at a time; `at` walks inside the current line. */
@@ -103,13 +104,8 @@ static gbt_status take_model(text_lines *lines, gbt_camera_model *model, gbt_err
     const char *token;
     size_t length;
     GBT_TRY(take_token(lines, "the camera model", &token, &length, err));
-    for (int i = 0; i < GBT_CAMERA_MODEL_COUNT; i++) {
-        const char *name = gbt_camera_model_name((gbt_camera_model)i);
-        if (strlen(name) == length && memcmp(name, token, length) == 0) {
-            *model = (gbt_camera_model)i;
-            return GBT_OK;
-        }
-    }
+    if (camera_model_find(token, length, model) && (int)*model < GBT_CAMERA_MODEL_COUNT)
+        return GBT_OK;
     return raw_fail(err, place_of(lines), "unknown camera model: %.*s", length < 60 ? (int)length : 60,
                     token);
 }

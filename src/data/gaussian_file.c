@@ -1,41 +1,61 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/gaussian_file.c -- formats by the ending of a name. */
+/* data/gaussian_file.c -- formats of plain Gaussians by the ending of a name. */
 #include "data/gaussian_file.h"
 
+#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
 #include "base/file.h"
-#include "data/glb_file.h"
-#include "data/gaussian_ply.h"
+#include "data/gaussian_formats.h"
 #include "data/result_folder.h"
-#include "data/splat_file.h"
-#include "data/spz_file.h"
+#include "gbtrace/export.h"
 
-static const struct {
-    const char *ending;
-    int degree; /* of the colours it keeps */
-    gbt_status (*read)(const source_file *file, gaussian_cloud *out, gbt_error *err); /* NULL: cannot */
-    gbt_status (*write)(const char *path, const gaussian_cloud *cloud, const double origin[3],
-                        gbt_error *err);
-} formats[] = {
-    {".ply", 3, gaussian_ply_read, gaussian_ply_write},
-    {".splat", 0, splat_file_read, splat_file_write},
-    {".spz", 3, spz_file_read, spz_file_write},
-    {".glb", 3, NULL, glb_file_write},
+static const gaussian_format *const formats[] = {
+#define X(name) &gaussian_format_##name,
+    GAUSSIAN_FORMATS(X)
+#undef X
 };
 
-enum { FORMAT_COUNT = sizeof formats / sizeof *formats };
+enum { FORMAT_COUNT = sizeof formats / sizeof *formats, LIST_SIZE = 128 };
 
-static int format_of(const char *path)
+int gbt_export_format_count(void) { return FORMAT_COUNT; }
+
+gbt_export_format gbt_export_format_at(int index)
+{
+    const gaussian_format *f = formats[index];
+    return (gbt_export_format){.ending = f->ending, .what = f->what, .readable = f->read != NULL};
+}
+
+/* ".ply, .splat or .glb": of those that can be read, or of all. */
+static const char *list(bool readable, const char *before_last, char out[LIST_SIZE])
+{
+    int wanted = 0, count = 0;
+    size_t used = 0;
+    for (int i = 0; i < FORMAT_COUNT; i++)
+        wanted += !readable || formats[i]->read != NULL;
+    out[0] = '\0';
+    for (int i = 0; i < FORMAT_COUNT && used < LIST_SIZE; i++)
+        if (!readable || formats[i]->read != NULL) {
+            used += (size_t)snprintf(out + used, LIST_SIZE - used, "%s%s",
+                                     count == 0            ? ""
+                                     : count == wanted - 1 ? before_last
+                                                           : ", ",
+                                     formats[i]->ending);
+            count++;
+        }
+    return out;
+}
+
+static const gaussian_format *format_of(const char *path)
 {
     const size_t length = strlen(path);
     for (int i = 0; i < FORMAT_COUNT; i++) {
-        const size_t ending = strlen(formats[i].ending);
-        if (length > ending && strcasecmp(path + length - ending, formats[i].ending) == 0)
-            return i;
+        const size_t ending = strlen(formats[i]->ending);
+        if (length > ending && strcasecmp(path + length - ending, formats[i]->ending) == 0)
+            return formats[i];
     }
-    return -1;
+    return NULL;
 }
 
 /* The file itself, or the newest one of a result folder; NULL when there is none that can be read. */
@@ -44,8 +64,8 @@ static const char *find_file(const char *path, result_folder *folder)
     bool found;
     if (file_is_folder(path))
         return result_folder_find(path, folder, &found, NULL) == GBT_OK && found ? folder->ply : NULL;
-    const int format = format_of(path);
-    return format >= 0 && formats[format].read != NULL ? path : NULL;
+    const gaussian_format *format = format_of(path);
+    return format != NULL && format->read != NULL ? path : NULL;
 }
 
 bool gaussian_file_readable(const char *path)
@@ -56,65 +76,67 @@ bool gaussian_file_readable(const char *path)
 
 gbt_status gaussian_file_check_readable(const char *path, gbt_error *err)
 {
-    const int format = format_of(path);
-    return format < 0 || formats[format].read != NULL || file_is_folder(path)
-               ? GBT_OK
-               : base_fail(
-                     err, GBT_ERR_ARGUMENT,
-                     "%s: %s is written for other programs, not read (wanted .ply, .splat, .spz, or a run)",
-                     path, formats[format].ending);
+    char readable[LIST_SIZE];
+    const gaussian_format *format = format_of(path);
+    if (format == NULL || format->read != NULL || file_is_folder(path))
+        return GBT_OK;
+    return base_fail(err, GBT_ERR_ARGUMENT,
+                     "%s: %s is written for other programs, not read (wanted %s, or a run)", path,
+                     format->ending, list(true, ", ", readable));
 }
 
 bool gaussian_file_has_gaussians(const char *given)
 {
     result_folder folder;
     const char *path = find_file(given, &folder);
-    if (path == NULL || formats[format_of(path)].read != gaussian_ply_read)
+    if (path == NULL || format_of(path)->holds == NULL)
         return path != NULL;
     source_file file = {.name = path};
     unsigned char *bytes;
     if (file_read(path, &bytes, &file.size, NULL) != GBT_OK)
         return false;
     file.bytes = bytes;
-    const bool has = gaussian_ply_has_gaussians(&file);
+    const bool has = format_of(path)->holds(&file);
     mem_free(bytes);
     return has;
 }
 
 gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error *err)
 {
+    char readable[LIST_SIZE];
     memset(out, 0, sizeof *out);
     result_folder folder;
     const char *path = find_file(given, &folder);
     if (path == NULL)
-        return base_fail(
-            err, GBT_ERR_ARGUMENT,
-            "%s: cannot be read as Gaussians (wanted .ply, .splat, .spz or a 3DGS result folder)", given);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%s: cannot be read as Gaussians (wanted %s or a 3DGS result folder)", given,
+                         list(true, ", ", readable));
     source_file file = {.name = path};
     unsigned char *bytes;
     GBT_TRY(file_read(path, &bytes, &file.size, err));
     file.bytes = bytes;
-    const gbt_status status = formats[format_of(path)].read(&file, out, err);
+    const gbt_status status = format_of(path)->read(&file, out, err);
     mem_free(bytes);
     return status;
 }
 
 gbt_status gaussian_file_check_writable(const char *path, gbt_error *err)
 {
-    return format_of(path) >= 0 ? GBT_OK
-                                : base_fail(err, GBT_ERR_ARGUMENT,
-                                            "%s: which format? (wanted .ply, .splat, .spz or .glb)", path);
+    char all[LIST_SIZE];
+    return format_of(path) != NULL ? GBT_OK
+                                   : base_fail(err, GBT_ERR_ARGUMENT, "%s: which format? (wanted %s)", path,
+                                               list(false, " or ", all));
 }
 
 int gaussian_file_degree(const char *path)
 {
-    const int format = format_of(path);
-    return format >= 0 ? formats[format].degree : 3;
+    const gaussian_format *format = format_of(path);
+    return format != NULL ? format->degree : 3;
 }
 
 gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
                                gbt_error *err)
 {
     GBT_TRY(gaussian_file_check_writable(path, err));
-    return formats[format_of(path)].write(path, cloud, origin, err);
+    return format_of(path)->write(path, cloud, origin, err);
 }

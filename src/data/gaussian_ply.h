@@ -25,13 +25,4 @@ gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *e
 /** Whether the header names what every Gaussian has: false for points, anchors, and what is no .ply. */
 bool gaussian_ply_has_gaussians(const source_file *file);
 
-/**
- * Write one as the reference implementation does: binary, normals of 0, f_rest channel-major, opacity as a
- * logit, scales as logs.
- *
- * @param origin [in] added to every mean in double
- */
-gbt_status gaussian_ply_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
-                              gbt_error *err);
-
 #endif

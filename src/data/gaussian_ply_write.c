@@ -4,6 +4,7 @@
 #include <stdio.h>
 
 #include "base/file.h"
+#include "data/gaussian_formats.h"
 #include "data/gaussian_ply.h"
 
 /* The inverse of the sigmoid; 0 and 1 are as near as a float's sigmoid comes. */
@@ -22,8 +23,14 @@ static void put_properties(sink *s, const char *stem, size_t count)
     }
 }
 
-gbt_status gaussian_ply_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
-                              gbt_error *err)
+/*
+ * Write one as the reference implementation does: binary, normals of 0, f_rest channel-major, opacity as a
+ * logit, scales as logs.
+ *
+ * @param origin [in] added to every mean in double
+ */
+static gbt_status write_ply(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                            gbt_error *err)
 {
     const size_t functions = (size_t)((cloud->sh_degree + 1) * (cloud->sh_degree + 1));
     sink s = {.err = err};
@@ -61,3 +68,11 @@ gbt_status gaussian_ply_write(const char *path, const gaussian_cloud *cloud, con
     sink_free(&s);
     return status;
 }
+
+const gaussian_format gaussian_format_ply = {
+    .ending = ".ply",
+    .what = "everything, as the reference implementation of 3DGS writes it",
+    .degree = 3,
+    .read = gaussian_ply_read,
+    .holds = gaussian_ply_has_gaussians,
+    .write = write_ply};

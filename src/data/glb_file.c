@@ -1,14 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* data/glb_file.c -- glTF's JSON chunk and its binary chunk: one array after the other, each an accessor. */
-#include "data/glb_file.h"
-
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "base/file.h"
-#include "data/bytes.h"
+#include "data/gaussian_formats.h"
 
 enum {
     GLB_MAGIC = 0x46546C67,
@@ -147,8 +145,17 @@ static gbt_status write_chunks(const char *path, const glb *g, const char *json,
     return status;
 }
 
-gbt_status glb_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
-                          gbt_error *err)
+/*
+ * Write one. glTF's y is up and cameras' y is down: x and y change their signs, and rotations and spherical
+ * harmonics with them.
+ *
+ * Viewers without the extension see points: COLOR_0 holds the mean colour, linear, with the opacity.
+ *
+ * @param origin [in] added to every mean in double
+ * @return GBT_OK; GBT_ERR_ARGUMENT (beyond 4 GiB); GBT_ERR_NO_MEMORY; as file_write_atomic()
+ */
+static gbt_status write_glb(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                            gbt_error *err)
 {
     glb g = {.data.err = err,
              .attributes = json_object(),
@@ -174,3 +181,9 @@ gbt_status glb_file_write(const char *path, const gaussian_cloud *cloud, const d
     sink_free(&g.data);
     return status;
 }
+
+const gaussian_format gaussian_format_glb = {
+    .ending = ".glb",
+    .what = "glTF 2.0 with KHR_gaussian_splatting: everything, as floats",
+    .degree = 3,
+    .write = write_glb};

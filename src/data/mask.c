@@ -7,7 +7,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "data/photo.h"
+#include "data/photo_size.h"
 
 /* valid = valid and marks; `marks` is taken over or freed. */
 static void combine(unsigned char *marks, size_t count, unsigned char **valid)

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* data/splat_file.c -- rows of { f32 x y z; f32 scale[3]; u8 r g b a; u8 quaternion w x y z as 128 + 128 q
    }. */
-#include "data/splat_file.h"
-
 #include <math.h>
 #include <stdlib.h>
 
 #include "base/file.h"
+#include "data/gaussian_formats.h"
 
 enum { ROW_BYTES = 32 };
 
@@ -48,7 +47,14 @@ static bool read_row(cursor *c, gaussian_cloud *out, size_t i)
     return fine;
 }
 
-gbt_status splat_file_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
+/*
+ * Read one: rows with a value that is not finite, or a scale that is not above 0, are dropped and counted;
+ * ratios of scales are limited.
+ *
+ * @param out [out] sh_degree 0; free with gaussian_cloud_free(); zeroed on failure
+ * @return GBT_OK; GBT_ERR_FORMAT (not a multiple of 32 bytes, no usable Gaussian); GBT_ERR_NO_MEMORY
+ */
+static gbt_status read_splat(const source_file *file, gaussian_cloud *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
     if (file->size == 0 || file->size % ROW_BYTES != 0)
@@ -97,8 +103,12 @@ static void put_row(sink *s, const gaussian_cloud *cloud, size_t i, const double
         sink_put_level(s, 128 + 128 * (double)cloud->quat[4 * i + k]);
 }
 
-gbt_status splat_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
-                            gbt_error *err)
+/*
+ * Write one, most opaque volume first: viewers show what has been loaded. Only the first spherical harmonic
+ * is kept. `origin` as in gaussian_ply.h.
+ */
+static gbt_status write_splat(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                              gbt_error *err)
 {
     ranked *order = mem_alloc(cloud->count, sizeof *order, "order of splats", err);
     if (order == NULL)
@@ -119,3 +129,9 @@ gbt_status splat_file_write(const char *path, const gaussian_cloud *cloud, const
     sink_free(&s);
     return status;
 }
+
+const gaussian_format gaussian_format_splat = {.ending = ".splat",
+                                               .what = "32 bytes per Gaussian, one colour for all directions",
+                                               .degree = 0,
+                                               .read = read_splat,
+                                               .write = write_splat};

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* data/spz_file.c -- header { "NGSP", version, count, degree, fractional bits, flags, 0 }, then streams of
    positions, opacities, colours, scales, rotations and spherical harmonics; all of it gzipped. */
-#include "data/spz_file.h"
-
 #include <math.h>
 #include <zlib.h>
 
 #include "base/file.h"
+#include "data/gaussian_formats.h"
 
 enum {
     MAGIC = 0x5053474e,
@@ -123,8 +122,16 @@ static gbt_status zip_and_write(const char *path, const sink *plain, gbt_error *
     return status;
 }
 
-gbt_status spz_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
-                          gbt_error *err)
+/*
+ * Write version 3, in the cloud's own axes. Positions get as many fractional bits, up to 16, as their largest
+ * coordinate leaves of 23; scales are steps of 6 % between e^-10 and e^5.9, spherical harmonics 5 bits in
+ * degree 1 and 4 above.
+ *
+ * @param origin [in] added to every mean in double
+ * @return GBT_OK; GBT_ERR_ARGUMENT (a coordinate beyond 8 million); as file_write_atomic()
+ */
+static gbt_status write_spz(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                            gbt_error *err)
 {
     int fraction = 0;
     GBT_TRY(find_fraction(cloud, origin, path, &fraction, err));
@@ -251,7 +258,13 @@ static gbt_status read_zipped(z_stream *z, const source_file *file, gaussian_clo
     return status;
 }
 
-gbt_status spz_file_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
+/*
+ * Read one, in the axes that it has (those of the .ply it was made from, as nearly every writer keeps them).
+ *
+ * @param out [out] free with gaussian_cloud_free(); zeroed on failure
+ * @return GBT_OK; GBT_ERR_FORMAT (damaged, another version, more than the streams hold); GBT_ERR_NO_MEMORY
+ */
+static gbt_status read_spz(const source_file *file, gaussian_cloud *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
     if (file->size >= 4 && memcmp(file->bytes, "NGSP", 4) == 0)
@@ -275,3 +288,10 @@ gbt_status spz_file_read(const source_file *file, gaussian_cloud *out, gbt_error
     mem_free(copy);
     return status;
 }
+
+const gaussian_format gaussian_format_spz = {
+    .ending = ".spz",
+    .what = "about a tenth of a .ply: positions to 2^-16 of a unit, colours in 4 to 8 bits",
+    .degree = 3,
+    .read = read_spz,
+    .write = write_spz};

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "base/camera_model.h"
 #include "base/file.h"
 #include "base/image.h"
 #include "base/vec.h"
@@ -84,36 +85,34 @@ static gbt_status focal_from_angle(const scope *s, char axis, int size, double *
     return GBT_OK;
 }
 
-typedef enum lens_family { LENS_PERSPECTIVE, LENS_FISHEYE, LENS_EQUIRECTANGULAR } lens_family;
-
-static gbt_status find_family(const scope *s, lens_family *family, bool *is_opencv, gbt_error *err)
+/* What a file of this kind can say of a lens are the keys k1 to k4, p1 and p2: every model of them is taken,
+   and so is FULL_OPENCV, whose other coefficients are then 0. */
+static bool is_supported(gbt_camera_model model)
 {
-    static const struct {
-        const char *name;
-        lens_family family;
-    } known[] = {
-        {"SIMPLE_PINHOLE", LENS_PERSPECTIVE}, {"PINHOLE", LENS_PERSPECTIVE},
-        {"SIMPLE_RADIAL", LENS_PERSPECTIVE},  {"RADIAL", LENS_PERSPECTIVE},
-        {"OPENCV", LENS_PERSPECTIVE},         {"FULL_OPENCV", LENS_PERSPECTIVE},
-        {"OPENCV_FISHEYE", LENS_FISHEYE},     {"EQUIRECTANGULAR", LENS_EQUIRECTANGULAR},
-    };
+    const lens_kind kind = camera_model_of(model)->kind;
+    return (kind == LENS_PERSPECTIVE || kind == LENS_FISHEYE || kind == LENS_EQUIRECTANGULAR) &&
+           !camera_model_has_prism(model);
+}
+
+static gbt_status find_kind(const scope *s, lens_kind *kind, bool *is_opencv, gbt_error *err)
+{
+    gbt_camera_model model;
     *is_opencv = false;
     const json_t *value = find(s, "camera_model");
     if (value == NULL) {
-        *family = json_is_true(find(s, "is_fisheye"))        ? LENS_FISHEYE
-                  : json_is_true(find(s, "equirectangular")) ? LENS_EQUIRECTANGULAR
-                                                             : LENS_PERSPECTIVE;
+        *kind = json_is_true(find(s, "is_fisheye"))        ? LENS_FISHEYE
+                : json_is_true(find(s, "equirectangular")) ? LENS_EQUIRECTANGULAR
+                                                           : LENS_PERSPECTIVE;
         return GBT_OK;
     }
     if (!json_is_string(value))
         return scope_fail(s, err, "not a string", "camera_model");
     const char *name = json_string_value(value);
-    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
-        if (strcmp(name, known[i].name) == 0) {
-            *family = known[i].family;
-            *is_opencv = strcmp(name, "OPENCV") == 0;
-            return GBT_OK;
-        }
+    if (camera_model_find(name, strlen(name), &model) && is_supported(model)) {
+        *kind = camera_model_of(model)->kind;
+        *is_opencv = model == GBT_CAMERA_OPENCV;
+        return GBT_OK;
+    }
     return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: camera_model is not supported: %.60s",
                      s->file->name, s->frame_index, name);
 }
@@ -166,7 +165,7 @@ static gbt_status read_camera(const scope *s, const char *photo, gbt_camera *cam
                               gbt_error *err)
 {
     bool has_width, has_height, has_cx, has_cy, is_opencv, any;
-    lens_family family = LENS_PERSPECTIVE;
+    lens_kind kind = LENS_PERSPECTIVE;
     double focal[2] = {0}, lens[LENS_COUNT];
     GBT_TRY(find_size(s, "w", &camera->width, &has_width, err));
     GBT_TRY(find_size(s, "h", &camera->height, &has_height, err));
@@ -176,10 +175,10 @@ static gbt_status read_camera(const scope *s, const char *photo, gbt_camera *cam
         camera->width = has_width ? camera->width : width;
         camera->height = has_height ? camera->height : height;
     }
-    GBT_TRY(find_family(s, &family, &is_opencv, err));
+    GBT_TRY(find_kind(s, &kind, &is_opencv, err));
     double *p = camera->params;
     const raw_place place = {s->file->name, RAW_MARK_FRAME, s->frame_index};
-    if (family == LENS_EQUIRECTANGULAR) {
+    if (kind == LENS_EQUIRECTANGULAR) {
         camera->model = GBT_CAMERA_EQUIRECTANGULAR;
         p[0] = camera->width;
         p[1] = camera->height;
@@ -194,7 +193,7 @@ static gbt_status read_camera(const scope *s, const char *photo, gbt_camera *cam
     p[1] = focal[1];
     p[2] = cx;
     p[3] = cy;
-    if (family == LENS_FISHEYE) {
+    if (kind == LENS_FISHEYE) {
         if (lens[P1] != 0 || lens[P2] != 0)
             return scope_fail(s, err, "a fisheye with tangential distortion is not supported", "p1, p2");
         camera->model = GBT_CAMERA_OPENCV_FISHEYE;

@@ -6,7 +6,7 @@
 #include <jansson.h>
 #include <stdint.h>
 
-#include "report/scores.h"
+#include "eval/scores.h"
 
 /** What metrics.json says of a run: its scores, and what training left in RUN/train.json. Free with
     json_decref(); NULL without memory. */

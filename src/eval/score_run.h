@@ -4,8 +4,8 @@
 #define GBT_EVAL_SCORE_RUN_H
 
 #include "eval/lpips.h"
-#include "render/loaded_run.h"
-#include "report/scores.h"
+#include "run/loaded_run.h"
+#include "eval/scores.h"
 
 /**
  * Render and score every held-out view.

@@ -67,15 +67,18 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     ray_shot middle = *shot;
     middle.aperture_radius = 0;
     f->camera = shot->camera;
-    gbt_camera_half_fov_tan(&shot->camera, f->half_fov_tan);
     GBT_TRY(ray_image_from_shot(&middle, 0, &f->rays, err));
+    const camera_lens *lens = f->rays.lens.fx > 0 ? &f->rays.lens : NULL; /* NULL: the rays were given */
+    memset(f->half_fov_tan, 0, sizeof f->half_fov_tan);
+    if (lens != NULL)
+        camera_lens_half_fov_tan(lens, shot->camera.width, shot->camera.height, f->half_fov_tan);
     f->times.rays = lap(&clock);
     view_bounds bounds;
     GBT_TRY(view_bounds_find(shot, &f->rays, &bounds, err));
     memcpy(f->eye, bounds.center, sizeof f->eye);
     if (guest != NULL)
         bounds = view_bounds_none();
-    f->view = footprint_view_of(&shot->camera);
+    f->view = footprint_view_with(&shot->camera, lens);
     f->pixel_limited = f->draw.anchor_pixel != NULL && subject.cloud == NULL;
     f->widened = f->draw.footprint > 0 && shot->given == NULL; /* nobody says how wide given rays are */
     /* where an opaque Gaussian falls to alpha_min */

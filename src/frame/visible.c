@@ -5,7 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/camera_lens.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -166,11 +165,9 @@ static void find_normals(bounds_job *job, const block_bounds *all, double spread
 
 /* Is the image of a slope under another point of the aperture known? With a plane in focus every ray of a
    pixel is divided by the same depth, in the axes of the pose that took it. */
-static bool slopes_are_known(const ray_shot *shot, double aperture)
+static bool slopes_are_known(const ray_shot *shot, const ray_image *rays, double aperture)
 {
-    camera_lens lens;
-    return aperture <= 0 || (shot->shutter == RAY_SHUTTER_GLOBAL &&
-                             camera_lens_prepare(&shot->camera, &lens) && camera_lens_looks_forward(&lens));
+    return aperture <= 0 || (shot->shutter == RAY_SHUTTER_GLOBAL && camera_lens_looks_forward(&rays->lens));
 }
 
 /* `rays` are those through the middle of the aperture. Another point of it shifts an origin by at most its
@@ -203,7 +200,8 @@ gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bo
                  cos_min = fmax(cos_wide - 2e-3, -1);
     out->cos_angle = (float)cos_min;
     out->sin_angle = (float)sqrt(fmax(0, 1 - cos_min * cos_min));
-    out->plane_count = all.depth_min > 0.05 && slopes_are_known(shot, aperture) ? cos_wide > 0 ? 5 : 4 : 0;
+    out->plane_count =
+        all.depth_min > 0.05 && slopes_are_known(shot, rays, aperture) ? cos_wide > 0 ? 5 : 4 : 0;
     find_normals(&job, &all, spread);
     if (!rays->common_origin) {
         parallel_blocks(rows, ROW_GRAIN, bound_offsets, &job);

@@ -12,7 +12,7 @@
 
 #include "gbtrace/status.h"
 #include "io/container.h"
-#include "io/model_file.h"
+#include "io/model.h"
 #include "io/model_steps.h"
 
 /** The parts of the bytes, in their order. */

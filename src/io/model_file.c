@@ -316,11 +316,3 @@ gbt_status model_load(const char *path, model *out, gbt_error *err)
     container_free(&c);
     return status;
 }
-
-void model_free(model *m)
-{
-    anchors_free(&m->anchors);
-    mem_free(m->anchor_pixel);
-    decoder_free(&m->decoder);
-    memset(m, 0, sizeof *m);
-}

@@ -1,31 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/model_file.h -- the scene model in a file: anchors, decoder, and what a render needs to know about the
-   scene. */
+/* io/model_file.h -- the scene model in a file: plain, or in one of the two small forms. */
 #ifndef GBT_IO_MODEL_FILE_H
 #define GBT_IO_MODEL_FILE_H
 
-#include <stdint.h>
-
-#include "anchor/anchors.h"
 #include "gbtrace/status.h"
 #include "io/container.h"
-
-enum { MODEL_FOLDER_SIZE = 1024, MODEL_CONFIG_SIZE = 4096 };
-
-typedef struct model {
-    anchors anchors;
-    float *anchor_pixel; /* optional (NULL), [anchors.count]: smallest pixel with which training saw an
-                            anchor, scene units, >= 0; 0: none did */
-    decoder decoder;     /* decoder.offset_count equals anchors.offset_count */
-    double origin[3];    /* world = local + origin */
-    float voxel_size;    /* v, scene units, >= 0 */
-    float extent;        /* of the training cameras, scene units, >= 0 */
-    float background[3];
-    float t_near;                        /* scene units, >= 0 */
-    char data_folder[MODEL_FOLDER_SIZE]; /* the data set it was trained on */
-    char config[MODEL_CONFIG_SIZE];      /* key = value lines: how it was trained */
-    uint64_t iterations;
-} model;
+#include "io/model.h"
 
 /** Save atomically: after any failure the old file is whole. GBT_ERR_ARGUMENT if the model is not one that
     model_load() would take. */
@@ -71,7 +51,5 @@ void model_add(container_writer *w, const model *m);
 
 /** The model in a file that holds more; as model_load(). */
 gbt_status model_from_container(const container *c, model *out, gbt_error *err);
-
-void model_free(model *m);
 
 #endif

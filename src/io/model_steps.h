@@ -14,7 +14,7 @@
 #include <stdint.h>
 
 #include "gbtrace/status.h"
-#include "io/model_file.h"
+#include "io/model.h"
 
 /** What learns of the anchors, in the order of its parts of a coded file and of its columns: X(PART, name of
    the part, anchor_field, and the limits of its steps: the least is a unit / divisor, the most in units; the

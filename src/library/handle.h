@@ -4,7 +4,7 @@
 #define GBT_LIBRARY_HANDLE_H
 
 #include "gbtrace/model.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 
 struct gbt_model {
     loaded_run run;

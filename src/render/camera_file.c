@@ -2,55 +2,76 @@
 /* render/camera_file.c -- a camera file: one picture to take, in JSON. */
 #include "render/camera_file.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <string.h>
 
+#include "base/camera_model.h"
 #include "base/fail.h"
 #include "trace/ray_file.h"
 
 enum { SAMPLES_MAX = 65536 };
 #define PI 3.14159265358979323846
 
-typedef enum file_model {
-    FILE_PINHOLE,
-    FILE_ORTHOGRAPHIC,
-    FILE_EQUIRECTANGULAR,
-    FILE_FISHEYE,
-    FILE_MODEL_COUNT
-} file_model;
+/* The models that a field of view, or the width of a view, says all of: two focal lengths and a centre at
+   most. In a file their names have small letters. */
+enum { FILE_MODELS_MAX = 8, FILE_NAME_SIZE = 32 };
+
+typedef struct file_models {
+    gbt_camera_model models[FILE_MODELS_MAX];
+    char texts[FILE_MODELS_MAX][FILE_NAME_SIZE];
+    const char *names[FILE_MODELS_MAX];
+    int count;
+} file_models;
+
+static void find_models(file_models *out)
+{
+    out->count = 0;
+    for (int i = 0; i < gbt_camera_model_count() && out->count < FILE_MODELS_MAX; i++) {
+        const gbt_camera_model model = gbt_camera_model_at(i);
+        if (camera_focal_count(model) != 2 || gbt_camera_param_count(model) > 4)
+            continue;
+        char *text = out->texts[out->count];
+        const char *name = gbt_camera_model_name(model);
+        for (int k = 0; k < FILE_NAME_SIZE && (k == 0 || name[k - 1] != '\0'); k++)
+            text[k] = (char)tolower((unsigned char)name[k]);
+        out->models[out->count] = model;
+        out->names[out->count] = text;
+        out->count++;
+    }
+}
 
 static gbt_status take_lens(const json_fields *r, gbt_camera *camera)
 {
-    static const char *const names[FILE_MODEL_COUNT] = {"pinhole", "orthographic", "equirectangular",
-                                                        "fisheye"};
+    file_models known;
     int model;
     double fov_deg = 0, view_width = 0;
-    GBT_TRY(json_field_choice(r, "model", names, FILE_MODEL_COUNT, &model));
+    find_models(&known);
+    GBT_TRY(json_field_choice(r, "model", known.names, known.count, &model));
+    const lens_kind kind = camera_model_of(known.models[model])->kind;
     GBT_TRY(json_field_needed(r, "width", "pixels"));
     GBT_TRY(json_field_needed(r, "height", "pixels"));
     GBT_TRY(json_field_whole(r, "width", 1, CAMERA_FILE_SIZE_MAX, &camera->width));
     GBT_TRY(json_field_whole(r, "height", 1, CAMERA_FILE_SIZE_MAX, &camera->height));
-    const bool has_fov = model == FILE_PINHOLE || model == FILE_FISHEYE;
+    const bool has_fov = kind == LENS_PERSPECTIVE || kind == LENS_FISHEYE;
     if (has_fov)
         GBT_TRY(json_field_needed(r, "fov_x_deg", "degrees from the left edge of the picture to the right"));
     else if (json_field_given(r, "fov_x_deg"))
         return json_field_fail(r, "fov_x_deg", "this model has none (wanted it with pinhole or fisheye)");
-    if (model == FILE_ORTHOGRAPHIC)
+    if (kind == LENS_ORTHOGRAPHIC)
         GBT_TRY(json_field_needed(r, "view_width",
                                   "units of the data set from the left edge of the picture to the right"));
     else if (json_field_given(r, "view_width"))
         return json_field_fail(r, "view_width", "this model has none (wanted it with orthographic)");
-    GBT_TRY(json_field_number(r, "fov_x_deg", 0, false, model == FILE_FISHEYE ? 360 : 179.9, &fov_deg));
+    GBT_TRY(json_field_number(r, "fov_x_deg", 0, false, kind == LENS_FISHEYE ? 360 : 179.9, &fov_deg));
     GBT_TRY(json_field_number(r, "view_width", 0, false, JSON_VALUE_MAX, &view_width));
     const double half_width = 0.5 * camera->width, half_height = 0.5 * camera->height,
                  half_fov = fov_deg * PI / 360;
-    const double scale = model == FILE_PINHOLE   ? half_width / tan(half_fov)
-                         : model == FILE_FISHEYE ? half_width / half_fov
-                                                 : camera->width / view_width;
-    static const gbt_camera_model models[FILE_MODEL_COUNT] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC,
-                                                              GBT_CAMERA_EQUIRECTANGULAR, GBT_CAMERA_FISHEYE};
-    camera->model = models[model];
-    if (model == FILE_EQUIRECTANGULAR) {
+    const double scale = kind == LENS_PERSPECTIVE ? half_width / tan(half_fov)
+                         : kind == LENS_FISHEYE   ? half_width / half_fov
+                                                  : camera->width / view_width;
+    camera->model = known.models[model];
+    if (kind == LENS_EQUIRECTANGULAR) {
         camera->params[0] = camera->width;
         camera->params[1] = camera->height;
     } else {

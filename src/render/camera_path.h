@@ -5,7 +5,7 @@
 #define GBT_RENDER_CAMERA_PATH_H
 
 #include "render/camera_group.h"
-#include "render/shared_points.h"
+#include "run/shared_points.h"
 #include "trace/rays.h"
 
 enum { CAMERA_PATH_FRAMES_MAX = 100000 };

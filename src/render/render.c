@@ -14,7 +14,7 @@
 #include "gbtrace/evaluate.h"
 #include "render/camera_file.h"
 #include "render/insert_file.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 #include "render/render_outputs.h"
 #include "render/render_path.h"
 #include "render/video.h"

@@ -3,7 +3,7 @@
 #ifndef GBT_RENDER_RENDER_OUTPUTS_H
 #define GBT_RENDER_RENDER_OUTPUTS_H
 
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 
 typedef enum render_output {
     OUTPUT_TRANSMITTANCE,

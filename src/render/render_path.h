@@ -6,7 +6,7 @@
 
 #include "gbtrace/evaluate.h"
 #include "render/camera_path.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 
 /** Whether a path wants the cameras of the data set: the named ones do, files do not. */
 bool render_path_wants_views(const char *path);

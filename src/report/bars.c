@@ -1,8 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* report/bars.c -- what a whole is made of, as inline SVG: bars, and layers over time. */
 #include <math.h>
+#include <stdio.h>
 
-#include "report/axes.h"
+#include "report/chart.h"
+#include "report/plot.h"
+
+static bool is_amount(double value) { return isfinite(value) && value >= 0 && value < 1e100; }
 
 void chart_bars(text *out, const char *title, const char *unit, const chart_bar *bars, size_t count,
                 double whole)
@@ -10,9 +14,9 @@ void chart_bars(text *out, const char *title, const char *unit, const chart_bar 
     enum { BAR_LEFT = 140, BAR_RIGHT = 352, ROW = 24, BAR = 15 };
     double longest = 0, sum = 0;
     for (size_t i = 0; i < count; i++)
-        if (chart_is_amount(bars[i].value))
+        if (is_amount(bars[i].value))
             longest = fmax(longest, bars[i].value), sum += bars[i].value;
-    if (!(chart_is_amount(whole) && whole > 0))
+    if (!(is_amount(whole) && whole > 0))
         whole = sum;
     text_add(out, "<figure class=\"chart card\"><figcaption><h3>");
     text_escaped(out, title);
@@ -35,7 +39,7 @@ void chart_bars(text *out, const char *title, const char *unit, const chart_bar 
         text_format(out, "</title><text class=\"name\" x=\"%d\" y=\"%zu\">", BAR_LEFT - 8, base);
         text_escaped(out, bars[i].name);
         text_add(out, "</text>");
-        if (!chart_is_amount(bars[i].value)) {
+        if (!is_amount(bars[i].value)) {
             text_format(out, "<text x=\"%d\" y=\"%zu\">n/a</text></g>", BAR_LEFT + 6, base);
             continue;
         }
@@ -72,7 +76,7 @@ static void average(const double *x, size_t count, const chart_layer *layers, si
         for (size_t i = first; i < count && i < first + per_step; i++) {
             bool known = fabs(x[i]) < 1e100;
             for (size_t k = 0; k < s->layer_count; k++)
-                known = known && chart_is_amount(layers[k].y[i]);
+                known = known && is_amount(layers[k].y[i]);
             for (size_t k = 0; k < s->layer_count && known; k++)
                 sum[k] += layers[k].y[i];
             sum_x += known ? x[i] : 0;
@@ -87,15 +91,14 @@ static void average(const double *x, size_t count, const chart_layer *layers, si
     }
 }
 
-static void draw_layer(text *out, const stack *s, size_t layer, const chart_axes *a, const char *name,
-                       int color)
+static void draw_layer(text *out, const stack *s, size_t layer, const plot *p, const char *name, int color)
 {
+    bool open = false;
     text_format(out, "<path class=\"area s%d\" d=\"", color);
     for (size_t i = 0; i < s->count; i++)
-        text_format(out, "%s%.1f %.1f", i == 0 ? "M" : "L", chart_place_x(a, s->x[i]),
-                    chart_place_y(a, s->top[layer + 1][i]));
+        plot_line_to(out, p, &open, s->x[i], s->top[layer + 1][i]);
     for (size_t i = s->count; i-- > 0;)
-        text_format(out, "L%.1f %.1f", chart_place_x(a, s->x[i]), chart_place_y(a, s->top[layer][i]));
+        plot_line_to(out, p, &open, s->x[i], s->top[layer][i]);
     text_add(out, "Z\"><title>");
     text_escaped(out, name);
     text_add(out, "</title></path>");
@@ -105,19 +108,23 @@ void chart_stack(text *out, const char *title, const char *x_unit, const char *y
                  size_t count, const chart_layer *layers, size_t layer_count)
 {
     stack s;
-    chart_axes a;
+    char x_label[64];
     average(x, count, layers, layer_count, &s);
-    const chart_series whole = {.x = s.x, .y = s.top[s.layer_count], .count = s.count, .style = CHART_LINE};
-    const line_chart frame = {.title = title,
-                              .x_unit = x_unit,
-                              .y_unit = y_unit,
-                              .from_zero = true,
-                              .series = &whole,
-                              .series_count = 1};
+    snprintf(x_label, sizeof x_label, "training time, %s", x_unit);
+    plot p = {.left = CHART_LEFT,
+              .right = CHART_RIGHT,
+              .top = CHART_TOP,
+              .bottom = CHART_BOTTOM,
+              .x = {.label = x_label, .wanted = 6},
+              .y = {.label = y_unit, .from_ticks = true, .grid = true, .wanted = 5}};
+    plot_clear(&p);
+    plot_take(&p, 0, 0);
+    for (size_t i = 0; i < s.count; i++)
+        plot_take(&p, s.x[i], s.top[s.layer_count][i]);
     text_add(out, "<figure class=\"chart card\"><figcaption><h3>");
     text_escaped(out, title);
     text_add(out, "</h3>");
-    if (s.count < 2 || !chart_find_range(&frame, &a)) {
+    if (s.count < 2 || !plot_close(&p)) {
         text_add(out, "</figcaption><p class=\"none\">n/a: nothing was logged.</p></figure>\n");
         return;
     }
@@ -131,8 +138,8 @@ void chart_stack(text *out, const char *title, const char *x_unit, const char *y
                 CHART_HEIGHT);
     text_escaped(out, title);
     text_add(out, "\">");
-    chart_draw_axes(out, &frame, &a);
+    plot_draw_axes(out, &p);
     for (size_t k = 0; k < s.layer_count; k++)
-        draw_layer(out, &s, k, &a, layers[k].name, layers[k].color);
+        draw_layer(out, &s, k, &p, layers[k].name, layers[k].color);
     text_add(out, "</svg></figure>\n");
 }

@@ -4,18 +4,19 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "report/axes.h"
+#include "report/chart.h"
+#include "report/plot.h"
 
 enum { PATH_POINTS = 400, STRIPS = 80 };
 
-static void draw_marks(text *out, const line_chart *c, const chart_axes *a)
+static void draw_marks(text *out, const line_chart *c, const plot *p)
 {
     double free_from = CHART_LEFT - 1; /* labels must not cover each other */
     text_add(out, "<g class=\"marks\">");
     for (size_t i = 0; i < c->mark_count; i++) {
-        if (!(c->marks[i].x >= a->x_low && c->marks[i].x <= a->x_high))
+        if (!(c->marks[i].x >= p->x.low && c->marks[i].x <= p->x.high))
             continue;
-        const double x = chart_place_x(a, c->marks[i].x), width = 6.0 * (double)strlen(c->marks[i].label);
+        const double x = plot_x(p, c->marks[i].x), width = 6.0 * (double)strlen(c->marks[i].label);
         if (x > CHART_LEFT + 1)
             text_format(out, "<line x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/>", x, CHART_TOP, x,
                         CHART_BOTTOM);
@@ -29,7 +30,7 @@ static void draw_marks(text *out, const line_chart *c, const chart_axes *a)
     text_add(out, "</g>");
 }
 
-static void draw_line(text *out, const line_chart *c, const chart_series *line, const chart_axes *a)
+static void draw_line(text *out, const chart_series *line, const plot *p)
 {
     const size_t per_point = (line->count + PATH_POINTS - 1) / PATH_POINTS;
     bool is_open = false;
@@ -38,15 +39,13 @@ static void draw_line(text *out, const line_chart *c, const chart_series *line, 
     for (size_t i = 0; i < line->count; i += per_point) {
         double x = 0, y = 0, n = 0;
         for (size_t j = i; j < line->count && j < i + per_point; j++)
-            if (chart_can_show(c, line->x[j], line->y[j])) {
+            if (plot_can_show(p, line->x[j], line->y[j])) {
                 x += line->x[j];
                 y += line->y[j];
                 n++;
             }
         if (n > 0)
-            text_format(out, "%s%.1f %.1f", is_open ? "L" : "M", chart_place_x(a, x / n),
-                        chart_place_y(a, y / n));
-        is_open = is_open || n > 0; /* a gap (a score between two rows) is bridged */
+            plot_line_to(out, p, &is_open, x / n, y / n); /* a gap (a score between two rows) is bridged */
     }
     text_add(out, "\"/>");
 }
@@ -59,13 +58,13 @@ static void add_value(text *out, const line_chart *c, double y)
         text_number(out, y, c->y_decimals);
 }
 
-static void draw_dots(text *out, const line_chart *c, const chart_series *line, const chart_axes *a)
+static void draw_dots(text *out, const line_chart *c, const chart_series *line, const plot *p)
 {
     for (size_t i = 0; i < line->count; i++) {
-        if (!chart_can_show(c, line->x[i], line->y[i]))
+        if (!plot_can_show(p, line->x[i], line->y[i]))
             continue;
         text_format(out, "<circle class=\"dot c%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"4\"><title>", line->color & 3,
-                    chart_place_x(a, line->x[i]), chart_place_y(a, line->y[i]));
+                    plot_x(p, line->x[i]), plot_y(p, line->y[i]));
         text_escaped(out, line->name != NULL ? line->name : "");
         text_add(out, " ");
         add_value(out, c, line->y[i]);
@@ -77,7 +76,7 @@ static void draw_dots(text *out, const line_chart *c, const chart_series *line, 
     }
 }
 
-static void add_readout(text *out, const line_chart *c, double x)
+static void add_readout(text *out, const line_chart *c, const plot *p, double x)
 {
     text_number(out, x, 2);
     text_add(out, " ");
@@ -88,7 +87,7 @@ static void add_readout(text *out, const line_chart *c, double x)
             continue;
         size_t nearest = line->count;
         for (size_t i = 0; i < line->count; i++)
-            if (chart_can_show(c, line->x[i], line->y[i]) &&
+            if (plot_can_show(p, line->x[i], line->y[i]) &&
                 (nearest == line->count || fabs(line->x[i] - x) < fabs(line->x[nearest] - x)))
                 nearest = i;
         if (nearest == line->count)
@@ -102,19 +101,19 @@ static void add_readout(text *out, const line_chart *c, double x)
 
 /** Invisible columns over the plot; the one under the pointer shows a guide and the values there (a tap does
     it on a phone). */
-static void draw_strips(text *out, const line_chart *c, const chart_axes *a)
+static void draw_strips(text *out, const line_chart *c, const plot *p)
 {
     const double width = (double)(CHART_RIGHT - CHART_LEFT) / STRIPS;
     for (int i = 0; i < STRIPS; i++) {
         const double left = CHART_LEFT + i * width, middle = left + width / 2,
-                     x = a->x_low + (a->x_high - a->x_low) * (i + 0.5) / STRIPS;
+                     x = p->x.low + (p->x.high - p->x.low) * (i + 0.5) / STRIPS;
         text_format(out, "<g class=\"tip\"><rect x=\"%.1f\" y=\"%d\" width=\"%.1f\" height=\"%d\"><title>",
                     left, CHART_TOP, width, CHART_BOTTOM - CHART_TOP);
-        add_readout(out, c, x);
+        add_readout(out, c, p, x);
         text_format(
             out, "</title></rect><line x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/><text x=\"%d\" y=\"%d\">",
             middle, CHART_TOP, middle, CHART_BOTTOM, CHART_RIGHT, CHART_TOP - 12);
-        add_readout(out, c, x);
+        add_readout(out, c, p, x);
         text_add(out, "</text></g>");
     }
 }
@@ -137,13 +136,36 @@ static void draw_legend(text *out, const line_chart *c)
     text_add(out, "</p>");
 }
 
+/* Axes that end at round numbers; x starts at 0 (the run does) and ends with the values. */
+static bool find_plot(const line_chart *c, const char *x_label, plot *p)
+{
+    *p = (plot){.left = CHART_LEFT,
+                .right = CHART_RIGHT,
+                .top = CHART_TOP,
+                .bottom = CHART_BOTTOM,
+                .x = {.label = x_label, .wanted = 6},
+                .y = {.label = c->y_unit, .log = c->log_y, .from_ticks = true, .grid = true, .wanted = 5}};
+    plot_clear(p);
+    for (size_t s = 0; s < c->series_count; s++)
+        for (size_t i = 0; i < c->series[s].count; i++)
+            plot_take(p, c->series[s].x[i], c->series[s].y[i]);
+    if (c->from_zero) {
+        p->y.low = fmin(p->y.low, 0);
+        p->y.high = fmax(p->y.high, 0);
+    }
+    p->x.low = fmin(p->x.low, 0);
+    return plot_close(p);
+}
+
 void chart_lines(text *out, const line_chart *c)
 {
     text_add(out, "<figure class=\"chart card\"><figcaption><h3>");
     text_escaped(out, c->title);
     text_add(out, "</h3>");
-    chart_axes a;
-    if (!chart_find_range(c, &a)) {
+    plot p;
+    char x_label[64];
+    snprintf(x_label, sizeof x_label, "training time, %s", c->x_unit);
+    if (!find_plot(c, x_label, &p)) {
         text_add(out, "</figcaption><p class=\"none\">n/a: nothing was logged.</p></figure>\n");
         return;
     }
@@ -152,17 +174,17 @@ void chart_lines(text *out, const line_chart *c)
                 CHART_HEIGHT);
     text_escaped(out, c->title);
     text_add(out, " over training time\">");
-    chart_draw_axes(out, c, &a);
-    draw_marks(out, c, &a);
+    plot_draw_axes(out, &p);
+    draw_marks(out, c, &p);
     for (int pass = 0; pass < 2; pass++) /* what is faint lies below */
         for (size_t s = 0; s < c->series_count; s++)
             if (c->series[s].count > 0 &&
                 (pass == 0 ? c->series[s].style == CHART_FAINT : c->series[s].style == CHART_LINE))
-                draw_line(out, c, &c->series[s], &a);
-    draw_strips(out, c, &a);
+                draw_line(out, &c->series[s], &p);
+    draw_strips(out, c, &p);
     for (size_t s = 0; s < c->series_count; s++)
         if (c->series[s].style == CHART_DOTS)
-            draw_dots(out, c, &c->series[s], &a);
+            draw_dots(out, c, &c->series[s], &p);
     text_add(out, "</svg>");
     if (c->note != NULL) {
         text_add(out, "<p class=\"note\">");

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/chart.h -- line and bar charts as inline SVG. Colours and fonts come from the page's style sheet. */
+/* report/chart.h -- the charts of the page, lines, bars and layers, as inline SVG. Colours and fonts come
+ * from the page's style sheet. */
 #ifndef GBT_REPORT_CHART_H
 #define GBT_REPORT_CHART_H
 
@@ -8,7 +9,16 @@
 
 #include "report/text.h"
 
-enum { CHART_MAX_TICKS = 16 };
+/* A chart of the page in its own units; the page scales it. Small enough that its text can still be read on a
+   phone. */
+enum {
+    CHART_WIDTH = 460,
+    CHART_HEIGHT = 268,
+    CHART_LEFT = 50,
+    CHART_RIGHT = 448,
+    CHART_TOP = 26,
+    CHART_BOTTOM = 224
+};
 
 typedef enum chart_style {
     CHART_LINE,  /* read out where the pointer is */
@@ -67,19 +77,5 @@ void chart_bars(text *out, const char *title, const char *unit, const chart_bar 
     layer are left out. */
 void chart_stack(text *out, const char *title, const char *x_unit, const char *y_unit, const double *x,
                  size_t count, const chart_layer *layers, size_t layer_count);
-
-/**
- * Round numbers (1, 2 or 5 times a power of ten apart) that reach from at or below `low` to at or above
- * `high`, about `wanted` of them.
- *
- * @param low, high [in] finite, low <= high; equal: a step around them
- * @param ticks     [out] [CHART_MAX_TICKS], rising
- * @return how many, 2 to CHART_MAX_TICKS
- */
-int chart_ticks(double low, double high, int wanted, double *ticks);
-
-/** The same for a logarithmic axis: 1, 2 and 5 times powers of ten; powers alone when there are many. 0 < low
-    <= high. */
-int chart_log_ticks(double low, double high, double *ticks);
 
 #endif

@@ -6,7 +6,7 @@
 
 #include <jansson.h>
 
-#include "report/scores.h"
+#include "eval/scores.h"
 #include "report/text.h"
 
 /** Add the section "Facts". `settings`: "key = value" lines; NULL: not known. */

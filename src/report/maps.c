@@ -10,7 +10,7 @@
 #include "base/vec.h"
 #include "render/camera_group.h"
 #include "render/ellipsoids.h"
-#include "report/chart.h"
+#include "report/plot.h"
 #include "report/image.h"
 #include "report/scene.h"
 

@@ -5,9 +5,9 @@
 
 #include <jansson.h>
 
-#include "report/scores.h"
+#include "eval/scores.h"
 #include "gbtrace/status.h"
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 
 /** What a page can show beside the scores. */
 typedef struct report_more {

@@ -3,8 +3,8 @@
 #ifndef GBT_REPORT_SCENE_H
 #define GBT_REPORT_SCENE_H
 
-#include "report/scores.h"
-#include "render/loaded_run.h"
+#include "eval/scores.h"
+#include "run/loaded_run.h"
 #include "report/text.h"
 
 /** The section "The scene": the two maps. `r` with its data set. */

@@ -5,7 +5,7 @@
 
 #include <jansson.h>
 
-#include "report/scores.h"
+#include "eval/scores.h"
 #include "report/text.h"
 
 /** Add the sections "Training" and "Where the time goes" from RUN/log.csv and what metrics.json holds. */

@@ -4,7 +4,7 @@
 #ifndef GBT_REPORT_VIEWS_H
 #define GBT_REPORT_VIEWS_H
 
-#include "report/scores.h"
+#include "eval/scores.h"
 #include "report/text.h"
 
 enum { REPORT_MAX_VIEWS = 24 }; /* of more, a third each: worst, middle, best */

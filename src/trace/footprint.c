@@ -10,7 +10,6 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "base/camera_lens.h"
 #include "base/clones.h"
 #include "base/fail.h"
 #include "base/parallel.h"
@@ -25,21 +24,26 @@ typedef int64_t m8
 /* Inlined into every clone. */
 #define LANE_CODE static inline __attribute__((always_inline))
 
-footprint_view footprint_view_of(const gbt_camera *camera)
+footprint_view footprint_view_with(const gbt_camera *camera, const camera_lens *lens)
 {
     footprint_view view = {.kind = FOOTPRINT_ANGULAR};
-    camera_lens lens;
     for (int k = 0; k < 3; k++) {
         view.center[k] = camera->center[k];
         view.axis[k] = camera->rotation[6 + k];
     }
-    if (!camera_lens_prepare(camera, &lens))
+    if (lens == NULL)
         return view;
-    if (camera_lens_looks_forward(&lens))
-        view.kind = lens.kind == LENS_ORTHOGRAPHIC ? FOOTPRINT_PARALLEL : FOOTPRINT_PERSPECTIVE;
+    if (camera_lens_looks_forward(lens))
+        view.kind = lens->kind == LENS_ORTHOGRAPHIC ? FOOTPRINT_PARALLEL : FOOTPRINT_PERSPECTIVE;
     /* Of an equirectangular picture: on its horizon; towards the poles columns are closer. */
-    view.pixel = 1 / sqrt(lens.fx * lens.fy);
+    view.pixel = 1 / sqrt(lens->fx * lens->fy);
     return view;
+}
+
+footprint_view footprint_view_of(const gbt_camera *camera)
+{
+    camera_lens lens;
+    return footprint_view_with(camera, camera_lens_prepare(camera, &lens) ? &lens : NULL);
 }
 
 /* ---- lanes ---- */

@@ -12,6 +12,7 @@
 #ifndef GBT_TRACE_FOOTPRINT_H
 #define GBT_TRACE_FOOTPRINT_H
 
+#include "base/camera_lens.h"
 #include "base/gaussians.h"
 #include "gbtrace/camera.h"
 #include "gbtrace/status.h"
@@ -27,6 +28,9 @@ typedef struct footprint_view {
 /** Distorted lenses are taken as the lens without distortion. A camera that sees nothing has pixels of size
     0. */
 footprint_view footprint_view_of(const gbt_camera *camera);
+
+/** The same with the camera's lens as it was prepared; NULL: it sees nothing. */
+footprint_view footprint_view_with(const gbt_camera *camera, const camera_lens *lens);
 
 /** Size of a pixel at a point, scene units: the square root of the area that its cone cuts there. 0 behind a
     perspective camera. */

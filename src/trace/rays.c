@@ -9,7 +9,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/camera_lens.h"
 #include "base/camera_pose.h"
 #include "base/fail.h"
 #include "base/memory.h"
@@ -356,6 +355,7 @@ static gbt_status copy_given(const ray_image *given, ray_image *out, gbt_error *
     const size_t count = ray_image_count(given);
     memcpy(out->origin, given->origin, (given->common_origin ? 1 : count) * 3 * sizeof *out->origin);
     memcpy(out->dir, given->dir, count * 3 * sizeof *out->dir);
+    memset(&out->lens, 0, sizeof out->lens);
     return GBT_OK;
 }
 
@@ -382,6 +382,7 @@ static gbt_status make_rays(const ray_shot *given, int sample, ray_image *out, g
     const bool common_origin = !flat && shot->shutter == RAY_SHUTTER_GLOBAL && !(shot->aperture_radius > 0);
     job.pinhole = job.lens.kind == LENS_PERSPECTIVE && !job.lens.radial && !job.lens.extra;
     GBT_TRY(ray_image_reserve(out, shot->camera.width, shot->camera.height, common_origin, err));
+    out->lens = job.lens;
     if (!flat && !job.pinhole)
         GBT_TRY(unproject_lens(&job, out, err));
     pose *poses = NULL;

@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/camera_lens.h"
 #include "gbtrace/camera.h"
 #include "gbtrace/status.h"
 
@@ -23,6 +24,7 @@ typedef struct ray_image {
     /* Kept by ray_image_from_shot() for the next pose of the same lens; NULL for a pinhole. */
     double *camera_dir; /* [height * width][3] in camera axes; owned */
     gbt_camera camera;  /* whose lens camera_dir is */
+    camera_lens lens;   /* prepared, of the shot's camera; fx is 0 when the rays were given */
 } ray_image;
 
 typedef enum ray_shutter {

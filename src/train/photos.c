@@ -8,7 +8,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "data/photo.h"
+#include "data/photo_size.h"
 
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err)
 {

@@ -173,23 +173,3 @@ gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *wh
     s->drawn = draw;
     return GBT_OK;
 }
-
-void studio_answer(studio *s, const request *what, answer *out)
-{
-    gbt_error err = {0};
-    gbt_status status;
-    if (s->run == NULL) {
-        answer_text(out, 503, "text/plain; charset=utf-8", s->note);
-        return;
-    }
-    if (what->kind == REQUEST_SCENE)
-        status = studio_scene(s, out, &err);
-    else if (what->kind == REQUEST_PICK)
-        status = studio_pick(s, what, out, &err);
-    else if (what->kind == REQUEST_PHOTO)
-        status = studio_photo(s, what, out, &err);
-    else
-        status = studio_render(s, what, out, &err);
-    if (status != GBT_OK)
-        answer_failure(out, status, &err);
-}

@@ -6,7 +6,7 @@
 
 #include <sys/stat.h>
 
-#include "render/loaded_run.h"
+#include "run/loaded_run.h"
 #include "view/answer.h"
 #include "view/request.h"
 

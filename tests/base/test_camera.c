@@ -678,11 +678,39 @@ static void polynomial_roots(void **state)
     assert_near(poly_first_root((const double[]){6, -3, 0, 0}, 3, 2), 2, 0); /* at the limit: not inside */
 }
 
+/* docs/cameras.md lists every model as the library does: number, name and parameters. */
+static void the_page_has_the_list(void **state)
+{
+    (void)state;
+    static char page[1 << 16];
+    char path[4096], row[256];
+    const char *root = getenv("GBT_SOURCE");
+    if (root == NULL)
+        skip();
+    snprintf(path, sizeof path, "%s/docs/cameras.md", root);
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    page[fread(page, 1, sizeof page - 1, file)] = '\0';
+    fclose(file);
+    for (int i = 0; i < gbt_camera_model_count(); i++) {
+        const gbt_camera_model model = gbt_camera_model_at(i);
+        const bool colmap = i < GBT_CAMERA_MODEL_COUNT;
+        char number[16] = "-";
+        if (colmap)
+            snprintf(number, sizeof number, "%d", (int)model);
+        snprintf(row, sizeof row, "\n| %s | %s | %s |", number, gbt_camera_model_name(model),
+                 gbt_camera_param_names(model));
+        if (strstr(page, row) == NULL)
+            fail_msg("docs/cameras.md has no row%s", row);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest fixed[] = {
         cmocka_unit_test(every_model_has_a_case),
         cmocka_unit_test(names_and_counts),
+        cmocka_unit_test(the_page_has_the_list),
         cmocka_unit_test(projects_as_the_formula),
         cmocka_unit_test(pixels_come_back),
         cmocka_unit_test(directions_come_back),

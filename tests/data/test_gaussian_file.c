@@ -7,8 +7,7 @@
 #include "base/rng.h"
 #include "data/data_support.h"
 #include "data/gaussian_file.h"
-#include "data/splat_file.h"
-#include "data/spz_file.h"
+#include "data/gaussian_formats.h"
 
 static const double nowhere[3] = {0, 0, 0};
 
@@ -235,7 +234,7 @@ static void glb_is_what_gltf_wants(void **state)
 /* Every truncation and flip of the zipped bytes, then of what was zipped. */
 static void damaged_files(void **state)
 {
-    gaussian_attempts spz = {.read = spz_file_read}, splat = {.read = splat_file_read};
+    gaussian_attempts spz = {.read = gaussian_format_spz.read}, splat = {.read = gaussian_format_splat.read};
     gaussian_cloud a;
     make_cloud(&a, 2, 1);
     must(gaussian_file_write(inside(*state, "a.spz", 0), &a, nowhere, &err));
@@ -280,7 +279,7 @@ static void refusals(void **state)
     assert_non_null(strstr(err.text, "wanted .ply, .splat, .spz or .glb"));
     err = (gbt_error){0};
     const source_file four = {"v4.spz", (const unsigned char *)"NGSP\4\0\0\0", 8};
-    assert_int_equal(spz_file_read(&four, &cloud, &err), GBT_ERR_FORMAT);
+    assert_int_equal(gaussian_format_spz.read(&four, &cloud, &err), GBT_ERR_FORMAT);
     assert_non_null(strstr(err.text, "version 4"));
     make_cloud(&cloud, 1, 0);
     err = (gbt_error){0};

@@ -8,7 +8,7 @@
 #include "base/rng.h"
 #include "base/vec.h"
 #include "data/colmap_write.h"
-#include "data/photo.h"
+#include "data/photo_size.h"
 #include "data/ply.h"
 #include "data/scene.h"
 

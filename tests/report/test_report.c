@@ -12,7 +12,7 @@
 #include "base/memory.h"
 #include "base/rng.h"
 #include "gbtrace/version.h"
-#include "report/chart.h"
+#include "report/plot.h"
 #include "report/image.h"
 #include "report/log.h"
 #include "report/report.h"

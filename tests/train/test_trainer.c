@@ -13,7 +13,7 @@
 
 #include "base/log.h"
 #include "base/parallel.h"
-#include "data/photo.h"
+#include "data/photo_size.h"
 #include "io/model_file.h"
 #include "train/adam.h"
 #include "train/checkpoint.h"

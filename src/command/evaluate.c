@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* command/evaluate.c -- score a run on its held-out views and write what is known of it: metrics.json, the
+   page, events. */
+#include "gbtrace/evaluate.h"
+
+#include <jansson.h>
+
+#include "base/choice.h"
+#include "base/def.h"
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "data/json_out.h"
+#include "eval/score_files.h"
+#include "eval/score_run.h"
+#include "report/report.h"
+
+gbt_evaluate_def gbt_evaluate_def_default(void)
+{
+    return (gbt_evaluate_def){.renderer = GBT_RENDERER_AS_TRAINED,
+                              .report = true,
+                              .preset = GBT_PRESET_AS_TRAINED,
+                              .cookie_ = DEF_COOKIE};
+}
+
+static void log_scores(const evaluation *e)
+{
+    char more[64] = "";
+    if (e->lpips_network != NULL)
+        snprintf(more, sizeof more, ", LPIPS (%s) %.4f, in [0, 1] %.4f", e->lpips_network, e->lpips.lpips,
+                 e->lpips.lpips_01);
+    if (e->view_count == 0)
+        log_info("no held-out views: scores are n/a");
+    else
+        log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f%s", e->view_count, e->psnr, e->ssim,
+                 e->flip, more);
+}
+
+/**
+ * @param own [out] whether the scores are those of the run's own settings: its renderer, size and cut-offs,
+ *                  and its data set, or one that stands for it when it has none or its own is gone
+ */
+static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_run *r, bool *own,
+                           gbt_error *err)
+{
+    GBT_TRY(loaded_run_open(run, def->data, def->downscale, r, err));
+    GBT_TRY(loaded_run_preset(def->preset, &r->settings, err));
+    const gbt_renderer trained = r->frame.draw.renderer;
+    if (def->renderer != GBT_RENDERER_AS_TRAINED) {
+        GBT_TRY(choice_check("renderer", GBT_RENDERER_TRAINING_NAMES, (int)def->renderer, err));
+        r->frame.draw.renderer = def->renderer;
+    }
+    const char *data = r->model.data_folder;
+    *own = r->frame.draw.renderer == trained && (def->downscale <= 0 || def->downscale == r->def.downscale) &&
+           (def->preset == GBT_PRESET_AS_TRAINED || def->preset == GBT_PRESET_DEFAULT) &&
+           (def->data == NULL || data[0] == '\0' || !file_exists(data) || file_is_same(def->data, data));
+    return GBT_OK;
+}
+
+/* What belongs to the run. */
+static gbt_status write_own(const char *run, const gbt_evaluate_def *def, loaded_run *r, const evaluation *e,
+                            const json_t *metrics, gbt_error *err)
+{
+    char path[4096];
+    GBT_TRY(file_join(path, sizeof path, run, "metrics.json", err));
+    GBT_TRY(json_save(metrics, path, err));
+    if (def->report)
+        GBT_TRY(report_write(run, e, metrics, &(report_more){.open = r}, err));
+    return def->tensorboard ? score_files_events(e, r->model.iterations, run, err) : GBT_OK;
+}
+
+gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err)
+{
+    GBT_TRY(def_check(def->cookie_, "gbt_evaluate_def_default", err));
+    if (!file_is_folder(run))
+        return base_fail(err, GBT_ERR_IO, "%s: not a run folder (wanted what gbtrace train wrote)", run);
+    evaluation e = {0};
+    lpips *net = NULL;
+    loaded_run *r = mem_calloc(1, sizeof *r, "run", err);
+    if (r == NULL)
+        return GBT_ERR_NO_MEMORY;
+    bool own = false;
+    gbt_status status = open_run(run, def, r, &own, err);
+    if (status == GBT_OK && def->lpips != NULL)
+        status = lpips_open(def->lpips, &net, err);
+    if (status == GBT_OK)
+        status = score_run(r, run, own, net, &e, err);
+    if (status == GBT_OK) {
+        json_t *metrics = score_files_json(&e, run);
+        if (def->preset != GBT_PRESET_AS_TRAINED)
+            json_object_set_new(metrics, "preset", json_string(CHOICE_NAME(GBT_PRESET_NAMES, def->preset)));
+        if (def->data != NULL)
+            json_object_set_new(metrics, "data", json_text(def->data));
+        if (own)
+            status = write_own(run, def, r, &e, metrics, err);
+        if (status == GBT_OK && def->json != NULL)
+            status = json_save(metrics, def->json, err);
+        json_decref(metrics);
+    }
+    if (status == GBT_OK)
+        log_scores(&e);
+    if (status == GBT_OK && !own && def->json != NULL)
+        log_info(
+            "other settings than the run's own: these scores are in %s; %s/metrics.json and report.html stay",
+            def->json, run);
+    else if (status == GBT_OK && !own)
+        log_info("other settings than the run's own: %s/metrics.json and report.html stay; a JSON file that "
+                 "is named "
+                 "keeps these scores",
+                 run);
+    lpips_close(net);
+    mem_free(e.views);
+    loaded_run_close(r);
+    mem_free(r);
+    return status;
+}

@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* command/expect.c -- memory and time of a training run from the sizes of its data. */
+#include "command/expect.h"
+
+#include <math.h>
+
+/* Measured on fox, plush and castle: 42 s of training with the default settings on two cores of a server CPU
+   with AVX-512 (docs/training.md). */
+static const double program_bytes = 150e6, bytes_per_point = 3000, bytes_per_pixel = 300,
+                    cache_bytes_per_pixel = 3;
+static const double step_core_seconds_per_megapixel = 0.29, score_core_seconds_per_megapixel = 3.3;
+static const double found_points = 20000; /* by photo consistency, where the data set has none */
+static const double default_budget_seconds = 600;
+
+expectation expect_training(const scene *s, double downscale, int threads)
+{
+    double train_pixels = 0, test_pixels = 0, largest = 0, train_count = 0;
+    for (size_t i = 0; i < s->view_count; i++) {
+        const gbt_camera *c = &s->views[i].camera;
+        const double pixels = (double)c->width * (double)c->height / (downscale * downscale);
+        largest = fmax(largest, pixels);
+        train_count += !s->views[i].is_test;
+        *(s->views[i].is_test ? &test_pixels : &train_pixels) += pixels;
+    }
+    const double points = s->points.count > 0 ? (double)s->points.count : found_points;
+    const double photo_megapixels = train_pixels / fmax(train_count, 1) / 1e6;
+    return (expectation){.bytes = program_bytes + cache_bytes_per_pixel * train_pixels +
+                                  bytes_per_pixel * largest + bytes_per_point * points,
+                         .step_seconds = step_core_seconds_per_megapixel * photo_megapixels / threads,
+                         .score_seconds = score_core_seconds_per_megapixel * test_pixels / 1e6 / threads,
+                         .threads = threads};
+}
+
+json_t *expect_to_json(const expectation *e)
+{
+    return json_pack("{s:f,s:f,s:f,s:i}", "bytes", e->bytes, "step_seconds", e->step_seconds, "score_seconds",
+                     e->score_seconds, "threads", e->threads);
+}
+
+/* Two digits are more than is known. */
+static double rounded(double value)
+{
+    const double unit = value > 0 ? pow(10, floor(log10(value)) - 1) : 1;
+    return floor(value / unit + 0.5) * unit;
+}
+
+void expect_print(const expectation *e, FILE *out)
+{
+    fprintf(out,
+            "  expect    training takes about %.0f MB; in 10 minutes (the default budget) %.0f "
+            "iterations on %d threads",
+            rounded(e->bytes / 1e6), rounded(default_budget_seconds / e->step_seconds), e->threads);
+    if (e->score_seconds > 0)
+        fprintf(out, ", then %.0f s for the scores", fmax(1, rounded(e->score_seconds)));
+    fprintf(out, "\n");
+}

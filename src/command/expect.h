@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* command/expect.h -- what training on a data set will ask of the machine: memory and time, from constants
+   that were measured. */
+#ifndef GBT_COMMAND_EXPECT_H
+#define GBT_COMMAND_EXPECT_H
+
+#include <jansson.h>
+#include <stdio.h>
+
+#include "data/scene.h"
+
+typedef struct expectation {
+    double bytes;         /* peak memory */
+    double step_seconds;  /* one iteration, the mean over a run with a budget */
+    double score_seconds; /* the held-out views: rendered, compared, written */
+    int threads;          /* that the times are for */
+} expectation;
+
+/**
+ * Of a run with the default settings and photos divided by `downscale`. Good within a factor of 1.5 on scenes
+ * like those it was measured on.
+ */
+expectation expect_training(const scene *s, double downscale, int threads);
+
+json_t *expect_to_json(const expectation *e);
+
+/** One line for a person. */
+void expect_print(const expectation *e, FILE *out);
+
+#endif

@@ -1,0 +1,202 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* run/loaded_run.c -- open a trained run for rendering. */
+#include "run/loaded_run.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/choice.h"
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/log.h"
+#include "data/cameras_json.h"
+#include "data/gaussian_file.h"
+#include "data/result_folder.h"
+
+/* What a result folder says beside its Gaussians: the data set, and what is behind them. */
+static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *err)
+{
+    result_folder folder;
+    bool found;
+    GBT_TRY(result_folder_find(path, &folder, &found, err));
+    snprintf(out->model.data_folder, sizeof out->model.data_folder, "%.*s",
+             (int)sizeof out->model.data_folder - 1, folder.source);
+    out->model.iterations = folder.iteration;
+    out->def.alpha = folder.white_background ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK;
+    for (int c = 0; c < 3; c++)
+        out->settings.background[c] = folder.white_background;
+    return GBT_OK;
+}
+
+void loaded_run_draw_plain(loaded_run *r)
+{
+    r->def = gbt_train_def_default();
+    r->frame.draw.footprint = (float)r->def.footprint;
+    r->settings = trace_settings_default();
+}
+
+void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud)
+{
+    gaussian_cloud_free(&r->cloud);
+    r->cloud = *cloud;
+    memset(cloud, 0, sizeof *cloud);
+    gaussian_cloud *c = &r->cloud;
+    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    for (size_t i = 0; i < 3 * c->count; i++) {
+        low[i % 3] = fmin(low[i % 3], (double)c->mean[i]);
+        high[i % 3] = fmax(high[i % 3], (double)c->mean[i]);
+    }
+    for (int k = 0; k < 3; k++)
+        r->model.origin[k] = 0.5 * (low[k] + high[k]);
+    for (size_t i = 0; i < 3 * c->count; i++)
+        c->mean[i] = (float)((double)c->mean[i] - r->model.origin[i % 3]);
+}
+
+static gbt_status open_cloud(const char *path, loaded_run *out, gbt_error *err)
+{
+    gaussian_cloud cloud;
+    GBT_TRY(gaussian_file_read(path, &cloud, err));
+    loaded_run_draw_plain(out);
+    loaded_run_take_cloud(out, &cloud);
+    return file_is_folder(path) ? describe_folder(path, out, err) : GBT_OK;
+}
+
+static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
+{
+    char path[4096];
+    GBT_TRY(gaussian_file_check_readable(run, err));
+    if (gaussian_file_readable(run))
+        return open_cloud(run, out, err);
+    if (file_is_folder(run))
+        GBT_TRY(file_join(path, sizeof path, run, "model.gbt", err));
+    else if (snprintf(path, sizeof path, "%s", run) >= (int)sizeof path)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", run);
+    GBT_TRY(model_load(path, &out->model, err));
+    out->def = gbt_train_def_default();
+    out->def.footprint = 0; /* of models that do not say */
+    GBT_TRY(config_parse(out->model.config, path, &out->def, &out->strings, err));
+    out->frame.draw.renderer = out->def.renderer;
+    out->frame.draw.footprint = (float)out->def.footprint;
+    out->frame.draw.anchor_pixel = out->model.anchor_pixel;
+    out->settings = trace_settings_default();
+    out->settings.t_near = out->model.t_near;
+    memcpy(out->settings.background, out->model.background, sizeof out->settings.background);
+    return GBT_OK;
+}
+
+static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
+{
+    GBT_TRY(read_model(run, out, err));
+    run_data_find(run, out->model.data_folder, &out->data);
+    return GBT_OK;
+}
+
+/* Another data set of the same place has another local origin. */
+static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
+{
+    for (size_t i = 0; i < out->scene.view_count; i++)
+        for (int k = 0; k < 3; k++)
+            out->scene.views[i].camera.center[k] += out->scene.origin[k] - out->model.origin[k];
+    for (size_t i = 0; i < 3 * out->scene.points.count; i++)
+        out->scene.points.position[i] += (float)(out->scene.origin[i % 3] - out->model.origin[i % 3]);
+    return photos_open(&out->photos, &out->scene, downscale > 0 ? downscale : out->def.downscale, err);
+}
+
+gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out,
+                                 gbt_error *err)
+{
+    scene_split split;
+    GBT_TRY(scene_split_parse(out->def.eval_split, &split, err));
+    const bool has_data = out->data.place[0] != '\0';
+    char cameras[4096];
+    GBT_TRY(file_join(cameras, sizeof cameras, run, "cameras.json", err));
+    if (data == NULL && out->cloud.count > 0 && !has_data && file_exists(cameras)) {
+        GBT_TRY(cameras_json_load(cameras, &out->scene, err));
+        return place_views(downscale, out, err);
+    }
+    if (data == NULL && out->cloud.count > 0 && !has_data)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%.1000s: plain Gaussians know no cameras: name a camera or a data set", run);
+    if (data == NULL && !has_data)
+        return base_fail(err, GBT_ERR_IO,
+                         "%.300s: its data set is not there (tried %.1200s); name the folder where it is now",
+                         run, out->data.tried);
+    if (data == NULL && out->data.moved)
+        log_info("%s: its data set is taken from %s, for both were moved", run, out->data.place);
+    GBT_TRY(scene_load(data != NULL ? data : out->data.place, &split, &out->scene, err));
+    scene_set_alpha(&out->scene, out->def.alpha);
+    return place_views(downscale, out, err);
+}
+
+gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out,
+                           gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    GBT_TRY(open_model(run, out, err));
+    return loaded_run_open_views(run, data, downscale, out, err);
+}
+
+gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    return open_model(run, out, err);
+}
+
+void loaded_run_close_views(loaded_run *r)
+{
+    if (r->photos.source != NULL)
+        photos_close(&r->photos);
+    scene_free(&r->scene);
+}
+
+void loaded_run_close(loaded_run *r)
+{
+    model_free(&r->model);
+    gaussian_cloud_free(&r->cloud);
+    loaded_run_close_views(r);
+    frame_free(&r->frame);
+}
+
+gbt_status loaded_run_need_anchors(const loaded_run *r, const char *run, gbt_error *err)
+{
+    return r->cloud.count == 0
+               ? GBT_OK
+               : base_fail(err, GBT_ERR_ARGUMENT,
+                           "%.1000s: plain Gaussians, no anchors (wanted a run or its model.gbt)", run);
+}
+
+frame_subject loaded_run_subject(const loaded_run *r)
+{
+    return r->cloud.count > 0 ? frame_plain(&r->cloud) : frame_neural(&r->model.anchors, &r->model.decoder);
+}
+
+gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err)
+{
+    const gbt_camera camera = photos_camera(&r->photos, view, 0);
+    return frame_render(&r->frame, loaded_run_subject(r), &camera, &r->settings, false, err);
+}
+
+gbt_status loaded_run_preset(gbt_preset preset, trace_settings *settings, gbt_error *err)
+{
+    if (preset != GBT_PRESET_AS_TRAINED)
+        GBT_TRY(choice_check("preset", GBT_PRESET_NAMES, (int)preset, err));
+    trace_settings_preset(preset, settings);
+    return GBT_OK;
+}
+
+void loaded_run_view_name(const scene_view *view, char *out, size_t size)
+{
+    loaded_run_file_name(view->name, out, size);
+}
+
+void loaded_run_file_name(const char *name, char *out, size_t size)
+{
+    snprintf(out, size, "%s", name);
+    char *dot = strrchr(out, '.');
+    if (dot != NULL && dot != out && strchr(dot, '/') == NULL)
+        *dot = '\0';
+    for (char *c = out; *c != '\0'; c++)
+        if (*c == '/')
+            *c = '_';
+}

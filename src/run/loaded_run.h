@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* run/loaded_run.h -- a trained run opened for rendering: its model, its settings, the views of its data
+   set. */
+#ifndef GBT_RUN_LOADED_RUN_H
+#define GBT_RUN_LOADED_RUN_H
+
+#include "data/scene.h"
+#include "gbtrace/train.h"
+#include "io/model_file.h"
+#include "train/config.h"
+#include "frame/frame.h"
+#include "train/photos.h"
+#include "train/run_data.h"
+
+typedef struct loaded_run {
+    model model;
+    gaussian_cloud cloud; /* of a file of plain Gaussians, local coordinates; then `model` has no anchors and
+                             is about the scene alone */
+    gbt_train_def def;    /* the settings it was trained with; strings point into `strings` */
+    config_strings strings;
+    run_data data; /* where its data set is */
+    scene scene;   /* cameras and points in the model's local coordinates */
+    photos photos;
+    trace_settings settings;
+    frame frame;
+} loaded_run;
+
+/**
+ * Open RUN: a folder with model.gbt, a model file, or plain Gaussians, which know no
+ * data set. A result folder of 3DGS may: the one that its cfg_args names, else its cameras.json.
+ *
+ * @param data      [in] data set folder; NULL: the one it was trained on
+ * @param downscale [in] 0: as in training
+ * @param out       [out] start from {0}; free with loaded_run_close() after success or failure
+ */
+gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out,
+                           gbt_error *err);
+
+/** GBT_ERR_ARGUMENT when it holds plain Gaussians, `run` is their file, and anchors are wanted. */
+gbt_status loaded_run_need_anchors(const loaded_run *r, const char *run, gbt_error *err);
+
+/** What frames show. */
+frame_subject loaded_run_subject(const loaded_run *r);
+
+/** The same without the data set: no views, no photos. For cameras that come from elsewhere. */
+gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *err);
+
+/** The other half of loaded_run_open(), for a run that has no views open: `run` is what messages call it. */
+gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out,
+                                 gbt_error *err);
+
+/** Back to no views, whether there were any or not. */
+void loaded_run_close_views(loaded_run *r);
+
+/** Draw as plain Gaussians are drawn: on black, as every viewer does. */
+void loaded_run_draw_plain(loaded_run *r);
+
+/** Let `r` show these plain Gaussians, given in world coordinates, around the middle of their bounds, where
+    floats are fine. `cloud` is
+ * taken
+    over, and is {0} then. */
+void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud);
+
+void loaded_run_close(loaded_run *r);
+
+/** Render a view into r->frame.rgb, at the run's resolution. */
+gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err);
+
+/** Settings by a preset. GBT_OK, or GBT_ERR_ARGUMENT ("preset: ...") for what is none. */
+gbt_status loaded_run_preset(gbt_preset preset, trace_settings *settings, gbt_error *err);
+
+/** "folder/a/b.jpg" becomes "a_b": a file name for what belongs to a view. */
+void loaded_run_view_name(const scene_view *view, char *out, size_t size);
+void loaded_run_file_name(const char *view_name, char *out, size_t size);
+
+#endif

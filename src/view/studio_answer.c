@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* view/studio_answer.c -- which part of the studio answers which request. */
+#include "view/studio.h"
+
+void studio_answer(studio *s, const request *what, answer *out)
+{
+    gbt_error err = {0};
+    gbt_status status;
+    if (s->run == NULL) {
+        answer_text(out, 503, "text/plain; charset=utf-8", s->note);
+        return;
+    }
+    if (what->kind == REQUEST_SCENE)
+        status = studio_scene(s, out, &err);
+    else if (what->kind == REQUEST_PICK)
+        status = studio_pick(s, what, out, &err);
+    else if (what->kind == REQUEST_PHOTO)
+        status = studio_photo(s, what, out, &err);
+    else
+        status = studio_render(s, what, out, &err);
+    if (status != GBT_OK)
+        answer_failure(out, status, &err);
+}

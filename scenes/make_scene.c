@@ -70,11 +70,10 @@ static gbt_status find_recipe(const char *name, const recipe **out, gbt_error *e
                      name != NULL ? name : "none");
 }
 
-static gbt_status check_range(const char *what, int value, int low, int high, gbt_error *err)
+static gbt_status check_range(const char *field, int value, int low, int high, gbt_error *err)
 {
     if (value < low || value > high)
-        return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: bad %s (wanted %d to %d, got %d)", what, low,
-                         high, value);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %d (wanted %d to %d)", field, value, low, high);
     return GBT_OK;
 }
 
@@ -82,14 +81,11 @@ static gbt_status check_def(const gbt_make_scene_def *def, gbt_error *err)
 {
     GBT_TRY(check_range("width", def->width, 8, 8192, err));
     GBT_TRY(check_range("height", def->height, 8, 8192, err));
-    GBT_TRY(check_range("number of views", def->view_count, 3, 9999, err));
-    GBT_TRY(check_range("number of points", def->points, 1, 10000000, err));
-    GBT_TRY(check_range("number of samples", def->samples, 1, 1024, err));
-    GBT_TRY(check_range("depth switch", def->depth, 0, 1, err));
-    GBT_TRY(check_range("distortion switch", def->distorted, 0, 1, err));
+    GBT_TRY(check_range("view_count", def->view_count, 3, 9999, err));
+    GBT_TRY(check_range("points", def->points, 1, 10000000, err));
+    GBT_TRY(check_range("samples", def->samples, 1, 1024, err));
     if (!(def->point_noise >= 0 && def->point_noise <= 0.1))
-        return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: bad point noise (wanted 0 to 0.1, got %g)",
-                         def->point_noise);
+        return base_fail(err, GBT_ERR_ARGUMENT, "point_noise: %g (wanted 0 to 0.1)", def->point_noise);
     return GBT_OK;
 }
 

@@ -233,29 +233,6 @@ static int check_complete(const command *self, const option_table *t, const bool
 /** The table of the command that runs. */
 static option_table current;
 
-void options_name_fields(const char *text, char *out, size_t size)
-{
-    size_t used = 0;
-    const char *at = text;
-    for (;;) {
-        const size_t length = strspn(at, "abcdefghijklmnopqrstuvwxyz0123456789_");
-        int row = 0;
-        while (row < current.own && !options_is_field(&current.rows[row], at, length))
-            row++;
-        const bool last = at[length] == ':' && at[length + 1] == ' ';
-        if (length == 0 || row == current.own || !(last || strncmp(at + length, ", ", 2) == 0) ||
-            used >= size)
-            break;
-        used += (size_t)snprintf(out + used, size - used, "--%s%s", current.rows[row].name, last ? "" : ", ");
-        at += length + (last ? 0 : 2);
-        if (last) {
-            snprintf(out + (used < size ? used : size), used < size ? size - used : 0, "%s", at);
-            return;
-        }
-    }
-    snprintf(out, size, "%s", text);
-}
-
 static const char *help_option(int argc, char **argv)
 {
     for (int i = 0; i < argc && strcmp(argv[i], "--") != 0; i++)
@@ -268,6 +245,7 @@ static const char *help_option(int argc, char **argv)
 int options_parse(const command *self, int argc, char **argv, operands *out)
 {
     option_table *t = &current;
+    options_set_fields(t);
     bool given[TABLE_MAX] = {false}, before[TABLE_MAX] = {false};
     *out = (operands){.argc = argc, .argv = argv};
     options_table(self, t);

@@ -95,6 +95,9 @@ int options_parse(const command *self, int argc, char **argv, operands *out);
  */
 void options_name_fields(const char *text, char *out, size_t size);
 
+/** From now on the fields are those of `t`, which stays the caller's. */
+void options_set_fields(const option_table *t);
+
 /* ---- for the files that make the above ---- */
 
 /** Text to the option's place. On failure false, and `wanted` says what would have been right. */

@@ -17,13 +17,6 @@
 #include "growth/pruning.h"
 #include "growth/sources.h"
 
-bool growth_anywhere(const void *context, const float position[3])
-{
-    (void)context;
-    (void)position;
-    return true;
-}
-
 growth_def growth_def_default(void)
 {
     return (growth_def){.voxel_size = 0.0f,

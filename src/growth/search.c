@@ -9,6 +9,13 @@
 #include "base/fail.h"
 #include "base/memory.h"
 
+bool growth_anywhere(const void *context, const float position[3])
+{
+    (void)context;
+    (void)position;
+    return true;
+}
+
 typedef struct cell {
     int64_t at[3];
     float position[3], scale, gradient; /* of the candidate with the largest gradient */

@@ -44,7 +44,7 @@ BODY void row_pass_body(const double *restrict in, size_t count, double *restric
     for (size_t begin = 0; begin < count; begin += PART) {
         const double *p = in + begin - LOSS_MARGIN;
         double *q = out + begin;
-#define AT(k) p[i + (k) * LOSS_STEP]
+#define AT(k) p[i + (k)*LOSS_STEP]
 #pragma GCC ivdep
         for (size_t i = 0; i < LOSS_STEP; i++)
             WINDOW_GROUP(AT, q[i], q[i + LOSS_STEP], q[i + 2 * LOSS_STEP], q[i + 3 * LOSS_STEP]);
@@ -105,7 +105,8 @@ BODY void map_body(const double *const moments[LOSS_MOMENTS][LOSS_SPAN],
                 const double ab = a * b, square = a * a + b * b;
                 const double n1 = 2 * ab + c1, n2 = 2 * (product[i] - ab) + c2;
                 const double d1 = square + c1, d2 = (squares[i] - square) + c2;
-                const double above = n1 * n2, below = d1 * d2, inverse = 1 / below, quotient = above * inverse;
+                const double above = n1 * n2, below = d1 * d2, inverse = 1 / below,
+                             quotient = above * inverse;
                 const double similarity =
                     __builtin_fma(__builtin_fma(-quotient, below, above), inverse, quotient);
                 const double over_d1 = similarity * (d2 * inverse), over_d2 = similarity * (d1 * inverse);
@@ -241,14 +242,14 @@ BODY void from_lanes_body(const float *lanes, size_t count, float *pixels)
     {                                                                                                        \
         row_pass_body(in, count, out);                                                                       \
     }                                                                                                        \
-    attribute static void margins_##isa(double *row, size_t count, const double *left, const double *right) \
-    { \
-        margins_body(row, count, left, right); \
-    } \
-    attribute static void map_##isa(                                                                         \
-        const double *const moments[LOSS_MOMENTS][LOSS_SPAN], const double *const counts[LOSS_GROUP],        \
-        const double weight[LOSS_GROUP], size_t count, double *const partials[LOSS_GROUP][LOSS_PARTIALS],    \
-        double *sum)                                                                                         \
+    attribute static void margins_##isa(double *row, size_t count, const double *left, const double *right)  \
+    {                                                                                                        \
+        margins_body(row, count, left, right);                                                               \
+    }                                                                                                        \
+    attribute static void map_##isa(const double *const moments[LOSS_MOMENTS][LOSS_SPAN],                    \
+                                    const double *const counts[LOSS_GROUP], const double weight[LOSS_GROUP], \
+                                    size_t count, double *const partials[LOSS_GROUP][LOSS_PARTIALS],         \
+                                    double *sum)                                                             \
     {                                                                                                        \
         map_body(moments, counts, weight, count, partials, sum);                                             \
     }                                                                                                        \
@@ -260,7 +261,8 @@ BODY void from_lanes_body(const float *lanes, size_t count, float *pixels)
         gradient_body(partials, x, y, weight, count, l1, ssim, d_x, absolute, square);                       \
     }                                                                                                        \
     static const loss_kernels kernels_##isa = {to_lanes_##isa, from_lanes_##isa, products_##isa,             \
-                                               row_pass_##isa, margins_##isa, map_##isa,        gradient_##isa};
+                                               row_pass_##isa, margins_##isa,    map_##isa,                  \
+                                               gradient_##isa};
 
 LOSS_VARIANT(plain, )
 LOSS_VARIANT(avx2, __attribute__((target("avx2,fma"))))

@@ -7,9 +7,9 @@
    LOSS_STEP values away and in its own lane, so the row pass reads whole vectors, like the column pass. Both
    make LOSS_GROUP results from LOSS_SPAN values, so that a value is loaded 3.5 times for 11 taps.
 
-   Everything is in double: E[x^2] - mu^2 against C2 = 9e-4 in float32 is wrong by 1e-4 of the gradient in even
-   parts of a photo. Every variant does the same operations on each value in the same order, so all give the
-   same bits. */
+   Everything is in double: E[x^2] - mu^2 against C2 = 9e-4 in float32 is wrong by 1e-4 of the gradient in
+   even parts of a photo. Every variant does the same operations on each value in the same order, so all give
+   the same bits. */
 #ifndef GBT_IMAGE_LOSS_ROWS_H
 #define GBT_IMAGE_LOSS_ROWS_H
 
@@ -23,10 +23,10 @@ enum {
     LOSS_STEP = LOSS_CHANNELS * LOSS_LANES, /* values from a pixel to the next of its row */
     LOSS_GROUP = 4,                         /* rows, or pixels, whose results are made at once */
     LOSS_SPAN = LOSS_GROUP + 2 * WINDOW_RADIUS,
-    LOSS_MARGIN = WINDOW_RADIUS * LOSS_STEP, /* values that a row pass reads beyond both ends of a row */
+    LOSS_MARGIN = WINDOW_RADIUS * LOSS_STEP,   /* values that a row pass reads beyond both ends of a row */
     LOSS_EDGE = WINDOW_RADIUS * LOSS_CHANNELS, /* values of the pixels beyond one end of a row */
-    LOSS_MOMENTS = 4,                        /* x, y, x^2 + y^2, x y */
-    LOSS_PARTIALS = 3                        /* of the map by mu_x (total), var_x, cov */
+    LOSS_MOMENTS = 4,                          /* x, y, x^2 + y^2, x y */
+    LOSS_PARTIALS = 3                          /* of the map by mu_x (total), var_x, cov */
 };
 
 /* In all of these `count` is the values of a row of the tile, LOSS_STEP L, with L a multiple of LOSS_GROUP
@@ -42,8 +42,8 @@ typedef struct loss_kernels {
     /** Row pass; `in` is readable for LOSS_MARGIN values before and after. */
     void (*row_pass)(const double *in, size_t count, double *out);
 
-    /** Fills the LOSS_MARGIN values before and after a row: what stands in the neighbouring lane, and beyond the
-        outer lanes `left` and `right`, LOSS_EDGE values each. */
+    /** Fills the LOSS_MARGIN values before and after a row: what stands in the neighbouring lane, and beyond
+       the outer lanes `left` and `right`, LOSS_EDGE values each. */
     void (*margins)(double *row, size_t count, const double *left, const double *right);
 
     /**

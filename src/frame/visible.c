@@ -298,18 +298,24 @@ typedef struct part_ball {
     float farthest, scale;
 } part_ball;
 
+/* As fmaxf() and fminf() of numbers, but not calls. */
+static inline float larger(float a, float b) { return a > b ? a : b; }
+
+static inline float smaller(float a, float b) { return a < b ? a : b; }
+
 static part_ball anchor_ball(const anchors *a, size_t i)
 {
     const float *l = a->scale_log + 6 * i;
-    const float ex = expf(fminf(l[0], 30.0f)), ey = expf(fminf(l[1], 30.0f)), ez = expf(fminf(l[2], 30.0f));
+    const float ex = expf(smaller(l[0], 30.0f)), ey = expf(smaller(l[1], 30.0f)),
+                ez = expf(smaller(l[2], 30.0f));
     const float *o = a->offset + 3 * (size_t)a->offset_count * i;
     float far_square = 0;
     for (int k = 0; k < a->offset_count; k++, o += 3) {
         const float x = o[0] * ex, y = o[1] * ey, z = o[2] * ez;
-        far_square = fmaxf(far_square, x * x + y * y + z * z);
+        far_square = larger(x * x + y * y + z * z, far_square);
     }
     return (part_ball){a->position + 3 * i, sqrtf(far_square),
-                       expf(fminf(fmaxf(l[3], fmaxf(l[4], l[5])), 30.0f))};
+                       expf(smaller(larger(l[3], larger(l[4], l[5])), 30.0f))};
 }
 
 static part_ball plain_ball(const gaussian_cloud *cloud, size_t i)
@@ -366,7 +372,14 @@ static void visible_block(size_t block, size_t begin, size_t end, void *context)
 {
     const visible_job *job = context;
     uint32_t kept = 0;
+    const anchors *a = job->subject.anchors;
     for (size_t i = begin; i < end; i++) {
+        /* An anchor in view is visible however far it reaches: most need no more. */
+        if (job->subject.cloud == NULL && job->bounds->plane_count > 0 &&
+            is_visible(job->bounds, a->position + 3 * i, 0)) {
+            job->out[begin + kept++] = (uint32_t)i;
+            continue;
+        }
         const part_ball part = job->subject.cloud != NULL ? plain_ball(job->subject.cloud, i)
                                                           : anchor_ball(job->subject.anchors, i);
         const float pixel_min = job->reach->pixel_min != NULL ? job->reach->pixel_min[i] : 0;

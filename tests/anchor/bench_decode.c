@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/anchor/bench_decode.c -- what decoding the anchors of a view costs, and its adjoint; run by hand, judged by
-   nobody. */
+/* tests/anchor/bench_decode.c -- what decoding the anchors of a view costs, and its adjoint; run by hand,
+   judged by nobody. */
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -170,35 +170,38 @@ BODY void margins_body(double *row, size_t count, const double *left, const doub
 }
 
 typedef float vec8 __attribute__((vector_size(32)));
-typedef int pick8 __attribute__((vector_size(32)));
+
+#define LOW1(a, b) __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13)
+#define HIGH1(a, b) __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15)
+#define LOW2(a, b) __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13)
+#define HIGH2(a, b) __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15)
+#define LOW4(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11)
+#define HIGH4(a, b) __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15)
 
 /* Eight rows of eight, turned: pairs of 1, 2 and 4 values change places, which no instruction set does across
    halves of 128 bits but in the last step. */
 BODY void turn8(const float *in, size_t in_row, float *out, size_t out_row)
 {
-    const pick8 low1 = {0, 8, 1, 9, 4, 12, 5, 13}, high1 = {2, 10, 3, 11, 6, 14, 7, 15};
-    const pick8 low2 = {0, 1, 8, 9, 4, 5, 12, 13}, high2 = {2, 3, 10, 11, 6, 7, 14, 15};
-    const pick8 low4 = {0, 1, 2, 3, 8, 9, 10, 11}, high4 = {4, 5, 6, 7, 12, 13, 14, 15};
     vec8 x[8], y[8];
 #pragma GCC unroll 8
     for (int i = 0; i < 8; i++)
         memcpy(&x[i], in + (size_t)i * in_row, sizeof x[i]);
 #pragma GCC unroll 4
     for (int i = 0; i < 4; i++) {
-        y[2 * i] = __builtin_shuffle(x[2 * i], x[2 * i + 1], low1);
-        y[2 * i + 1] = __builtin_shuffle(x[2 * i], x[2 * i + 1], high1);
+        y[2 * i] = LOW1(x[2 * i], x[2 * i + 1]);
+        y[2 * i + 1] = HIGH1(x[2 * i], x[2 * i + 1]);
     }
 #pragma GCC unroll 2
     for (int i = 0; i < 8; i += 4)
 #pragma GCC unroll 2
         for (int k = 0; k < 2; k++) {
-            x[i + 2 * k] = __builtin_shuffle(y[i + k], y[i + 2 + k], low2);
-            x[i + 2 * k + 1] = __builtin_shuffle(y[i + k], y[i + 2 + k], high2);
+            x[i + 2 * k] = LOW2(y[i + k], y[i + 2 + k]);
+            x[i + 2 * k + 1] = HIGH2(y[i + k], y[i + 2 + k]);
         }
 #pragma GCC unroll 4
     for (int i = 0; i < 4; i++) {
-        y[i] = __builtin_shuffle(x[i], x[4 + i], low4);
-        y[4 + i] = __builtin_shuffle(x[i], x[4 + i], high4);
+        y[i] = LOW4(x[i], x[4 + i]);
+        y[4 + i] = HIGH4(x[i], x[4 + i]);
     }
 #pragma GCC unroll 8
     for (int i = 0; i < 8; i++)

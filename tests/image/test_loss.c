@@ -115,7 +115,7 @@ static void gradient_is_right(void **state)
     image_loss_result out;
     assert_ok(image_loss(&x, &y, valid, t->weight, &scratch, &d_x, &out, &assert_ok_err_));
     double *wide_x = widened(&x), *wide_y = widened(&y), *want = malloc((size_t)count * sizeof *want);
-    float *got = malloc((size_t)count * sizeof *got);
+    float *got = calloc((size_t)count, sizeof *got);
     assert_true(want != NULL && got != NULL);
     const double loss = plain_loss(wide_x, wide_y, valid, t->width, t->height, t->weight, want);
     assert_near(out.loss, loss, 1e-12);

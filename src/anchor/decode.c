@@ -14,6 +14,7 @@
 
 #include "anchor/activations.h"
 #include "anchor/decode_layout.h"
+#include "base/clones.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -65,7 +66,8 @@ static void decide_rows(const forward_job *job, size_t begin, size_t end)
     decode_tape *tape = job->tape;
     const size_t rows = end - begin, tiled = round_up(rows, DECODE_TILE), offsets = job->layout.offset_count;
     float *input = tape->input + begin * INPUT_STRIDE, *hidden = tape->hidden + begin * HIDDEN_STRIDE;
-    float *alpha = tape->alpha + begin * ALPHA_STRIDE;
+    float *alpha = tape->alpha + begin * offsets;
+    _Alignas(64) float logits[DECODE_CHUNK * ALPHA_STRIDE];
     memset(input, 0, tiled * INPUT_STRIDE * sizeof *input);
     for (size_t r = 0; r < rows; r++) {
         const size_t anchor = tape->visible[begin + r];
@@ -95,14 +97,17 @@ static void decide_rows(const forward_job *job, size_t begin, size_t end)
                                            .b = job->weights.hidden_out[0],
                                            .b_row = ALPHA_STRIDE,
                                            .bias = job->weights.out_bias[0],
-                                           .c = alpha,
+                                           .c = logits,
                                            .c_row = ALPHA_STRIDE});
-    job->kernels->tanh(alpha, rows * ALPHA_STRIDE);
+    for (size_t r = 0; r < rows; r++)
+        for (size_t k = 0; k < offsets; k++)
+            alpha[r * offsets + k] = logits[r * ALPHA_STRIDE + k];
+    job->kernels->tanh(alpha, rows * offsets);
     size_t kept = 0;
     for (size_t r = 0; r < rows; r++) {
         float sum = 0.0f;
         for (size_t k = 0; k < offsets; k++) {
-            const float value = alpha[r * ALPHA_STRIDE + k];
+            const float value = alpha[r * offsets + k];
             sum += value > 0.0f ? value : 0.0f;
             kept += value > job->opacity_min;
         }
@@ -131,7 +136,7 @@ static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, con
     size_t g = first;
     for (size_t r = 0; r < rows; r++) {
         const size_t anchor = tape->visible[begin + r];
-        const float *alpha = tape->alpha + (begin + r) * ALPHA_STRIDE, *e = extent + r * 6;
+        const float *alpha = tape->alpha + (begin + r) * offsets, *e = extent + r * 6;
         const float *x = job->a->position + anchor * 3, *offset = job->a->offset + anchor * offsets * 3;
         for (size_t k = 0; k < offsets; k++) {
             if (!(alpha[k] > job->opacity_min))
@@ -161,7 +166,7 @@ static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, con
 
 static float larger(float a, float b) { return a > b ? a : b; }
 
-static void hold_ratio(float *const scale[3], size_t count)
+FASTEST_CLONE static void hold_ratio(float *const scale[3], size_t count)
 {
     float *restrict x = scale[0], *restrict y = scale[1], *restrict z = scale[2];
     for (size_t i = 0; i < count; i++) {

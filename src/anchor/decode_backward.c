@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "anchor/decode_layout.h"
+#include "base/clones.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -129,6 +130,21 @@ static void activations_backward(const backward_job *job, size_t begin, size_t r
     }
 }
 
+FASTEST_CLONE static void relu_backward(const float *restrict hidden, size_t count, float *restrict d_hidden)
+{
+    for (size_t i = 0; i < count; i++)
+        d_hidden[i] = hidden[i] > 0.0f ? d_hidden[i] : 0.0f;
+}
+
+/* Adds `rows` rows of `count` values, `stride` apart, to `sum`. */
+FASTEST_CLONE static void add_rows(const float *restrict values, size_t rows, size_t stride, size_t count,
+                                   float *restrict sum)
+{
+    for (size_t r = 0; r < rows; r++)
+        for (size_t i = 0; i < count; i++)
+            sum[i] += values[r * stride + i];
+}
+
 /* Logit gradients back through the second layer and the ReLU. */
 static void hidden_backward(const backward_job *job, size_t begin, size_t tiled, const float *d_out,
                             float *d_hidden)
@@ -146,8 +162,7 @@ static void hidden_backward(const backward_job *job, size_t begin, size_t tiled,
                                                .bias = zeros,
                                                .c = d_hidden + head * ANCHOR_HIDDEN_DIM,
                                                .c_row = HIDDEN_STRIDE});
-    for (size_t i = 0; i < tiled * HIDDEN_STRIDE; i++)
-        d_hidden[i] = hidden[i] > 0.0f ? d_hidden[i] : 0.0f;
+    relu_backward(hidden, tiled * HIDDEN_STRIDE, d_hidden);
 }
 
 /* dL/dcamera of one row from the gradient of its direction and distance: moving the camera is moving every
@@ -198,10 +213,8 @@ static void layers_backward(const backward_job *job, size_t begin, size_t rows, 
                                           .b_row = HIDDEN_STRIDE,
                                           .c = record + job->record.weight_first[head],
                                           .c_row = ANCHOR_HIDDEN_DIM});
-        float *d_bias = record + job->record.bias_first[head];
-        for (size_t r = 0; r < rows; r++)
-            for (size_t o = 0; o < job->layout.out_stride[head]; o++)
-                d_bias[o] += d_logit[r * job->out_stride + o];
+        add_rows(d_logit, rows, job->out_stride, job->layout.out_stride[head],
+                 record + job->record.bias_first[head]);
     }
     kernels->product(&(dense_product){.m = HIDDEN_STRIDE,
                                       .n = INPUT_STRIDE,
@@ -269,11 +282,7 @@ static void backward_block(size_t block, size_t begin, size_t end, void *context
 static void sum_records(const backward_job *job, size_t entry, size_t count, float *sum)
 {
     memset(sum, 0, count * sizeof *sum);
-    for (size_t block = 0; block < job->block_count; block++) {
-        const float *record = job->tape->block_grad + block * job->record.size + entry;
-        for (size_t i = 0; i < count; i++)
-            sum[i] += record[i];
-    }
+    add_rows(job->tape->block_grad + entry, job->block_count, job->record.size, count, sum);
 }
 
 /* Rows of W1 with their bias as a column first, then rows of W2, each with its bias. */

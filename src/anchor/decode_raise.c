@@ -15,7 +15,7 @@ void decode_raise_opacity(const decode_tape *tape, float least, float opacity, d
     for (size_t k = 0; k < offsets && tape->visible_count > 0; k++) {
         double sum = 0;
         for (size_t v = 0; v < tape->visible_count; v++)
-            sum += (double)tape->alpha[v * ALPHA_STRIDE + k];
+            sum += (double)tape->alpha[v * offsets + k];
         const double mean = sum / (double)tape->visible_count, lowest = -0.9999;
         if (mean < (double)least)
             bias[k] += (float)(atanh((double)opacity) - atanh(fmax(mean, lowest)));

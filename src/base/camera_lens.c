@@ -217,8 +217,9 @@ static double tolerance_of(const camera_lens *lens, double radius)
 }
 
 /* Solve r f(r^2) = wanted in [0, radius_max], where the left side increases: Newton, kept inside a shrinking
-   bracket. */
-static bool invert_radius(const camera_lens *lens, double wanted, double *radius)
+   bracket. Ends after a step that is at most `enough` of the radius, which 0 never is; then how near it came
+   is not asked. */
+static bool invert_radius(const camera_lens *lens, double wanted, double enough, double *radius)
 {
     if (!(wanted <= lens->distorted_max))
         return false;
@@ -234,17 +235,20 @@ static bool invert_radius(const camera_lens *lens, double wanted, double *radius
             hi = r;
         else
             lo = r;
+        const bool last = fabs(step) <= enough * r;
         r = r - step > lo && r - step < hi ? r - step : 0.5 * (lo + hi);
+        if (last)
+            break;
     }
     *radius = r;
-    return fabs(residual) <= tolerance_of(lens, wanted);
+    return enough > 0 || fabs(residual) <= tolerance_of(lens, wanted);
 }
 
-static bool invert_radial(const camera_lens *lens, double p[2])
+static bool invert_radial(const camera_lens *lens, double enough, double p[2])
 {
     const double wanted = hypot(p[0], p[1]);
     double radius;
-    if (!invert_radius(lens, wanted, &radius))
+    if (!invert_radius(lens, wanted, enough, &radius))
         return false;
     if (wanted > 0) {
         p[0] *= radius / wanted;
@@ -260,7 +264,9 @@ static bool invert_mixed(const camera_lens *lens, const double wanted[2], double
     double out[2], j[4];
     mixed_stage(lens, p, out, j);
     double rx = out[0] - wanted[0], ry = out[1] - wanted[1];
-    for (int i = 0; i < 50 && (rx != 0 || ry != 0); i++) {
+    /* No step comes nearer than this, so none need be halved in search of one. */
+    const double rounding = 5e-16 * (fabs(wanted[0]) + fabs(wanted[1]));
+    for (int i = 0; i < 50 && fabs(rx) + fabs(ry) > rounding; i++) {
         const double determinant = j[0] * j[3] - j[1] * j[2];
         const double step_x = (j[3] * rx - j[1] * ry) / determinant,
                      step_y = (j[0] * ry - j[2] * rx) / determinant;
@@ -289,7 +295,7 @@ static bool undistort(const camera_lens *lens, double p[2])
 {
     if (lens->extra) {
         const double wanted[2] = {p[0], p[1]};
-        if (lens->radial && !lens->extra_last && !invert_radial(lens, p)) {
+        if (lens->radial && !lens->extra_last && !invert_radial(lens, 1e-3, p)) {
             /* The extra terms may reach a little beyond the radial range: start inside it. */
             const double scale = 0.9 * lens->radius_max / hypot(wanted[0], wanted[1]);
             p[0] = wanted[0] * scale;
@@ -298,7 +304,7 @@ static bool undistort(const camera_lens *lens, double p[2])
         if (!invert_mixed(lens, wanted, p))
             return false;
     }
-    if (lens->radial && (!lens->extra || lens->extra_last) && !invert_radial(lens, p))
+    if (lens->radial && (!lens->extra || lens->extra_last) && !invert_radial(lens, 0, p))
         return false;
     return hypot(p[0], p[1]) <= lens->radius_max;
 }

@@ -21,10 +21,10 @@ void options_name_fields(const char *text, char *out, size_t size)
         while (row < own && !options_is_field(&running->rows[row], at, length))
             row++;
         const bool last = at[length] == ':' && at[length + 1] == ' ';
-        if (length == 0 || row == own || !(last || strncmp(at + length, ", ", 2) == 0) ||
-            used >= size)
+        if (length == 0 || row == own || !(last || strncmp(at + length, ", ", 2) == 0) || used >= size)
             break;
-        used += (size_t)snprintf(out + used, size - used, "--%s%s", running->rows[row].name, last ? "" : ", ");
+        used +=
+            (size_t)snprintf(out + used, size - used, "--%s%s", running->rows[row].name, last ? "" : ", ");
         at += length + (last ? 0 : 2);
         if (last) {
             snprintf(out + (used < size ? used : size), used < size ? size - used : 0, "%s", at);

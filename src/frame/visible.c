@@ -5,12 +5,18 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/clones.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
 
-enum { PART_BLOCK = 4096, ROW_GRAIN = 16 };
+enum {
+    PART_BLOCK = 4096,
+    ROW_GRAIN = 16,
+    LANES = 4,
+    AXIS_STEP = 7 /* one ray of so many gives the mean direction */
+};
 
 /* What is asked of the rays: `axes` turns world to the axes in which slopes are taken. */
 typedef struct bounds_job {
@@ -21,7 +27,7 @@ typedef struct bounds_job {
 } bounds_job;
 
 typedef struct block_bounds {
-    double cos_min, depth_min, low[2], high[2], origin_square, offset[VIEW_PLANES];
+    double cos_min, depth_min, low[2], high[2], origin_square, offset[VIEW_PLANES], direction[3]; /* summed */
 } block_bounds;
 
 static bool ray_at(const ray_image *rays, size_t i, const double center[3], double start[3], double dir[3])
@@ -40,28 +46,81 @@ static inline double least(double a, double b) { return a < b ? a : b; }
 
 static inline double most(double a, double b) { return a > b ? a : b; }
 
+typedef double lanes4 __attribute__((vector_size(32)));
+typedef int64_t mask4 __attribute__((vector_size(32)));
+
+/* Vectors of 256 bits: every instruction set that has wider ones has these, and GCC takes wider ones apart
+   value by value for those that have not. */
+#define PICK(mask, yes, no) ((lanes4)(((mask) & (mask4)(yes)) | (~(mask) & (mask4)(no))))
+#define KEEP_LEAST(value, bound) bound = PICK((value) < (bound), value, bound)
+#define KEEP_MOST(value, bound) bound = PICK((value) > (bound), value, bound)
+
+/* Bounds of rays side by side. */
+typedef struct lane_bounds {
+    lanes4 cos_min, depth_min, low[2], high[2];
+} lane_bounds;
+
+/* Of `count` directions, a multiple of LANES; those that are 0 do not matter. */
+FASTEST_CLONE static void bound_lanes(const float *dir, size_t count, const double axes[9],
+                                      const double axis[3], lane_bounds *bounds)
+{
+    lane_bounds b = *bounds;
+    const lanes4 one = {1, 1, 1, 1}, wide = 1e9 * one;
+    for (size_t i = 0; i < count; i += LANES) {
+        lanes4 x, y, z;
+        for (int l = 0; l < LANES; l++) {
+            x[l] = (double)dir[3 * (i + (size_t)l)];
+            y[l] = (double)dir[3 * (i + (size_t)l) + 1];
+            z[l] = (double)dir[3 * (i + (size_t)l) + 2];
+        }
+        const lanes4 depth = axes[6] * x + axes[7] * y + axes[8] * z;
+        const lanes4 along = axis[0] * x + axis[1] * y + axis[2] * z;
+        const mask4 is_ray = x * x + y * y + z * z > 0, is_ahead = depth > 0.05;
+        const lanes4 part = PICK(is_ahead, depth, one);
+        const lanes4 u = (axes[0] * x + axes[1] * y + axes[2] * z) / part,
+                     v = (axes[3] * x + axes[4] * y + axes[5] * z) / part;
+        KEEP_LEAST(PICK(is_ray, along, one), b.cos_min);
+        KEEP_LEAST(PICK(is_ray, depth, one), b.depth_min);
+        KEEP_LEAST(PICK(is_ahead, u, wide), b.low[0]);
+        KEEP_MOST(PICK(is_ahead, u, -wide), b.high[0]);
+        KEEP_LEAST(PICK(is_ahead, v, wide), b.low[1]);
+        KEEP_MOST(PICK(is_ahead, v, -wide), b.high[1]);
+    }
+    *bounds = b;
+}
+
 static void bound_directions(size_t block, size_t begin, size_t end, void *context)
 {
     const bounds_job *job = context;
-    const size_t width = (size_t)job->rays->width;
-    block_bounds out = job->blocks[block];
-    for (size_t i = begin * width; i < end * width; i++) {
-        double start[3], dir[3], turned[3];
-        if (!ray_at(job->rays, i, job->center, start, dir))
-            continue;
-        dmat_apply(job->axes, dir, turned);
-        out.cos_min = least(dvec_dot(dir, job->axis), out.cos_min);
-        out.depth_min = least(turned[2], out.depth_min);
-        out.origin_square = most(dvec_dot(start, start), out.origin_square);
-        if (turned[2] > 0.05) {
-            const double x = turned[0] / turned[2], y = turned[1] / turned[2];
-            out.low[0] = least(x, out.low[0]);
-            out.high[0] = most(x, out.high[0]);
-            out.low[1] = least(y, out.low[1]);
-            out.high[1] = most(y, out.high[1]);
+    const size_t width = (size_t)job->rays->width, count = (end - begin) * width,
+                 whole = count / LANES * LANES;
+    const float *dir = job->rays->dir + 3 * begin * width;
+    block_bounds *out = &job->blocks[block];
+    lane_bounds lanes;
+    for (int l = 0; l < LANES; l++) {
+        lanes.cos_min[l] = lanes.depth_min[l] = 1;
+        lanes.low[0][l] = lanes.low[1][l] = 1e9;
+        lanes.high[0][l] = lanes.high[1][l] = -1e9;
+    }
+    float rest[3 * LANES] = {0};
+    memcpy(rest, dir + 3 * whole, 3 * (count - whole) * sizeof *rest);
+    bound_lanes(dir, whole, job->axes, job->axis, &lanes);
+    bound_lanes(rest, LANES, job->axes, job->axis, &lanes);
+    for (int l = 0; l < LANES; l++) {
+        out->cos_min = least(lanes.cos_min[l], out->cos_min);
+        out->depth_min = least(lanes.depth_min[l], out->depth_min);
+        for (int k = 0; k < 2; k++) {
+            out->low[k] = least(lanes.low[k][l], out->low[k]);
+            out->high[k] = most(lanes.high[k][l], out->high[k]);
         }
     }
-    job->blocks[block] = out;
+    if (job->rays->common_origin)
+        return;
+    for (size_t i = begin * width; i < end * width; i++) {
+        double start[3], d[3];
+        if (ray_at(job->rays, i, job->center, start, d))
+            out->origin_square = most(dvec_dot(start, start), out->origin_square);
+    }
 }
 
 static void bound_offsets(size_t block, size_t begin, size_t end, void *context)
@@ -103,15 +162,25 @@ static block_bounds join(const block_bounds *blocks, size_t count)
     return all;
 }
 
-/* The mean direction of every 7th ray; 0 without rays. */
-static void find_axis(const ray_image *rays, double axis[3])
+static void sum_directions(size_t block, size_t begin, size_t end, void *context)
 {
-    axis[0] = axis[1] = axis[2] = 0;
-    const size_t count = ray_image_count(rays);
-    for (size_t i = 0; i < count; i += 7)
+    const bounds_job *job = context;
+    const size_t width = (size_t)job->rays->width;
+    double sum[3] = {0};
+    for (size_t i = (begin * width + AXIS_STEP - 1) / AXIS_STEP * AXIS_STEP; i < end * width; i += AXIS_STEP)
+        for (size_t k = 0; k < 3; k++)
+            sum[k] += (double)job->rays->dir[3 * i + k];
+    memcpy(job->blocks[block].direction, sum, sizeof sum);
+}
+
+/* The mean direction of every AXIS_STEP-th ray; 0 without rays. */
+static void find_axis(bounds_job *job, size_t rows, size_t block_count)
+{
+    parallel_blocks(rows, ROW_GRAIN, sum_directions, job);
+    for (size_t i = 0; i < block_count; i++)
         for (int k = 0; k < 3; k++)
-            axis[k] += (double)rays->dir[3 * i + (size_t)k];
-    dvec_normalize(axis);
+            job->axis[k] += job->blocks[i].direction[k];
+    dvec_normalize(job->axis);
 }
 
 /* Axes in which to take slopes: the camera's, or for given rays some with z along their mean direction. */
@@ -178,18 +247,18 @@ gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bo
     const double aperture = shot->given == NULL ? shot->aperture_radius : 0,
                  spread = aperture > 0 ? aperture / shot->focus_distance : 0;
     const size_t rows = (size_t)rays->height, count = parallel_block_count(rows, ROW_GRAIN);
-    find_axis(rays, job.axis);
+    job.blocks = mem_alloc(count, sizeof *job.blocks, "view bounds", err);
+    if (job.blocks == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < count; i++)
+        job.blocks[i] = no_bounds();
+    find_axis(&job, rows, count);
     find_axes(shot, job.axis, job.axes);
     find_center(rays, out->center);
     for (int k = 0; k < 3; k++) {
         job.center[k] = (double)out->center[k];
         out->axis[k] = (float)job.axis[k];
     }
-    job.blocks = mem_alloc(count, sizeof *job.blocks, "view bounds", err);
-    if (job.blocks == NULL)
-        return GBT_ERR_NO_MEMORY;
-    for (size_t i = 0; i < count; i++)
-        job.blocks[i] = no_bounds();
     parallel_blocks(rows, ROW_GRAIN, bound_directions, &job);
     block_bounds all = join(job.blocks, count);
     const double widest = fmin(1, fmax(-1, all.cos_min)), sine = sqrt(1 - widest * widest);
@@ -227,18 +296,24 @@ typedef struct part_ball {
     float farthest, scale;
 } part_ball;
 
+/* As fmaxf() and fminf() of numbers, but not calls. */
+static inline float larger(float a, float b) { return a > b ? a : b; }
+
+static inline float smaller(float a, float b) { return a < b ? a : b; }
+
 static part_ball anchor_ball(const anchors *a, size_t i)
 {
     const float *l = a->scale_log + 6 * i;
-    const float ex = expf(fminf(l[0], 30.0f)), ey = expf(fminf(l[1], 30.0f)), ez = expf(fminf(l[2], 30.0f));
+    const float ex = expf(smaller(l[0], 30.0f)), ey = expf(smaller(l[1], 30.0f)),
+                ez = expf(smaller(l[2], 30.0f));
     const float *o = a->offset + 3 * (size_t)a->offset_count * i;
     float far_square = 0;
     for (int k = 0; k < a->offset_count; k++, o += 3) {
         const float x = o[0] * ex, y = o[1] * ey, z = o[2] * ez;
-        far_square = fmaxf(far_square, x * x + y * y + z * z);
+        far_square = larger(x * x + y * y + z * z, far_square);
     }
     return (part_ball){a->position + 3 * i, sqrtf(far_square),
-                       expf(fminf(fmaxf(l[3], fmaxf(l[4], l[5])), 30.0f))};
+                       expf(smaller(larger(l[3], larger(l[4], l[5])), 30.0f))};
 }
 
 static part_ball plain_ball(const gaussian_cloud *cloud, size_t i)
@@ -295,7 +370,14 @@ static void visible_block(size_t block, size_t begin, size_t end, void *context)
 {
     const visible_job *job = context;
     uint32_t kept = 0;
+    const anchors *a = job->subject.anchors;
     for (size_t i = begin; i < end; i++) {
+        /* An anchor in view is visible however far it reaches: most need no more. */
+        if (job->subject.cloud == NULL && job->bounds->plane_count > 0 &&
+            is_visible(job->bounds, a->position + 3 * i, 0)) {
+            job->out[begin + kept++] = (uint32_t)i;
+            continue;
+        }
         const part_ball part = job->subject.cloud != NULL ? plain_ball(job->subject.cloud, i)
                                                           : anchor_ball(job->subject.anchors, i);
         const float pixel_min = job->reach->pixel_min != NULL ? job->reach->pixel_min[i] : 0;

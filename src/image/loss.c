@@ -2,157 +2,305 @@
 /* image/loss.c -- L1 + DSSIM of a rendered image and its gradient, once per training step (Kerbl 2023, eq 7;
    SSIM: Wang 2004, eq 13).
 
-   x, y --> [column pass] --> [row pass, SSIM map, partials] --> [row pass] --> full-size partials
-        --> [column pass] --> dL/dx
-            \_______________ a row at a time, in cache _______________/
+   x, y --> [row pass] --> [column pass, SSIM map, partials] --> [row pass] --> [column pass] --> dL/dx
+            \_________________ a few rows of one tile at a time, in cache _________________/
 
    With p the partial of the map by mu_x (total), q by var_x, r by cov, and G the window:
-   dSSIM/dx = G*p + 2 x G*q + y G*r. */
+   dSSIM/dx = G*p + 2 x G*q + y G*r.
+
+   The picture is cut into tiles, which do not depend on the number of threads. A tile makes the map of
+   WINDOW_RADIUS pixels more than it owns on all sides, from moments of as many more, so that no tile waits
+   for another. */
 #include "image/metrics.h"
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "image/loss_rows.h"
 #include "image/window.h"
 
 enum {
-    ROWS_PER_BLOCK = 16,
-    CHANNELS = 3,
-    MARGIN = WINDOW_RADIUS * CHANNELS,
-    BLOCK_ROWS = WINDOW_MOMENTS + WINDOW_PARTIALS + 2
+    CHANNELS = LOSS_CHANNELS,
+    RADIUS = WINDOW_RADIUS,
+    SEGMENT_MAX = 32, /* pixels; the rows of both rings then fit the second-level cache */
+    TILE_WIDTH = LOSS_LANES * SEGMENT_MAX,    /* pixels */
+    TILE_OWNED = TILE_WIDTH - 2 * RADIUS,     /* of them, those whose gradient it makes */
+    BAND_ROWS = 128,                          /* at most, owned by a tile */
+    ROW_MAX = TILE_WIDTH * CHANNELS,          /* values */
+    ROW_STRIDE = ROW_MAX + LOSS_STEP,         /* not a multiple of a page: rows fall on different lines */
+    WIDE_STRIDE = ROW_MAX + 2 * LOSS_MARGIN,  /* a row with both margins */
+    RING = 16,                                /* rows: LOSS_SPAN, in whole groups */
+    AHEAD = (RING - LOSS_GROUP) / LOSS_GROUP, /* groups by which a pass is ahead of the next */
+    SUMS = 3
 };
 
+/* Where one thread keeps the rows it is at. */
+typedef struct loss_room {
+    double moments[LOSS_MOMENTS][RING][ROW_STRIDE], partials[LOSS_PARTIALS][RING][ROW_STRIDE];
+    double wide[LOSS_GROUP * LOSS_PARTIALS][WIDE_STRIDE];
+    double sums[SUMS][ROW_STRIDE]; /* of map, |x - y| and (x - y)^2, one for each place in a row */
+    double inside[ROW_STRIDE], nothing[ROW_STRIDE], counted[LOSS_GROUP][ROW_STRIDE];
+    float x[LOSS_GROUP][ROW_STRIDE], y[LOSS_GROUP][ROW_STRIDE], d_x[LOSS_GROUP][ROW_STRIDE];
+    float pixels_x[ROW_MAX + 2 * LOSS_STEP], pixels_y[ROW_MAX + 2 * LOSS_STEP];
+} loss_room;
+
 typedef struct loss_job {
-    const window_kernels *kernels;
-    const float *x, *y;         /* zeroed where not valid */
-    float *masked_x, *masked_y; /* what x and y point to when there is a mask */
-    const float *source_x, *source_y;
+    const loss_kernels *kernels;
+    const float *x, *y;
     const unsigned char *valid;
     float *d_x;
-    float *zeros;            /* one row */
-    double *double_zeros;    /* one row */
-    double *partials;        /* [WINDOW_PARTIALS][height][count], after the row pass */
-    double *rows;            /* per block: BLOCK_ROWS padded rows */
-    double *ssim, *l1, *mse; /* sums, one per row */
     double l1_scale, ssim_scale;
-    size_t count, padded, width, height;
+    size_t width, height, across, tile_count, band_rows;
+    double *sums; /* [SUMS][tile_count] */
+    loss_room *rooms;
+    atomic_size_t next; /* tile to be done */
 } loss_job;
 
-static void zero_invalid(const unsigned char *valid, size_t width, double *row)
+typedef struct loss_tile {
+    const loss_job *job;
+    loss_room *room;
+    ptrdiff_t first;      /* column of its first pixel; may lie left of the picture */
+    size_t segment;       /* pixels of a lane */
+    size_t count;         /* values in a row */
+    size_t begin, end;    /* rows it owns */
+    size_t owned, column; /* columns it owns, from `column` on */
+} loss_tile;
+
+static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
+
+static size_t round_up(size_t count, size_t multiple) { return (count + multiple - 1) / multiple * multiple; }
+
+static loss_tile tile_at(const loss_job *job, loss_room *room, size_t index)
 {
-    for (size_t i = 0; i < width; i++)
+    loss_tile t = {.job = job, .room = room};
+    t.column = index % job->across * TILE_OWNED;
+    t.owned = min_size(TILE_OWNED, job->width - t.column);
+    t.first = (ptrdiff_t)t.column - RADIUS;
+    t.segment = round_up(t.owned + 2 * RADIUS, LOSS_LANES * LOSS_GROUP) / LOSS_LANES;
+    if (t.segment < LOSS_LANES)
+        t.segment = LOSS_LANES;
+    t.count = t.segment * LOSS_STEP;
+    t.begin = index / job->across * job->band_rows;
+    t.end = min_size(t.begin + job->band_rows, job->height);
+    return t;
+}
+
+static bool is_row(const loss_tile *t, ptrdiff_t row) { return row >= 0 && row < (ptrdiff_t)t->job->height; }
+
+/* ---- rows of pixels ---- */
+
+/* Pixels [first, first + count) of a row, 0 where there is none or it is not valid. */
+static void copy_pixels(const loss_job *job, const float *picture, size_t row, ptrdiff_t first, size_t count,
+                        float *out)
+{
+    const ptrdiff_t width = (ptrdiff_t)job->width, end = first + (ptrdiff_t)count;
+    const ptrdiff_t from = first > 0 ? first : 0, to = end < width ? end : width;
+    const size_t before = (size_t)(from - first) * CHANNELS, here = (size_t)(to - from) * CHANNELS;
+    memset(out, 0, before * sizeof *out);
+    memcpy(out + before, picture + (row * job->width + (size_t)from) * CHANNELS, here * sizeof *out);
+    memset(out + before + here, 0, (size_t)(end - to) * CHANNELS * sizeof *out);
+    if (job->valid == NULL)
+        return;
+    const unsigned char *valid = job->valid + row * job->width;
+    for (ptrdiff_t i = from; i < to; i++)
         if (!valid[i])
-            row[CHANNELS * i] = row[CHANNELS * i + 1] = row[CHANNELS * i + 2] = 0;
+            memset(out + (i - first) * CHANNELS, 0, CHANNELS * sizeof *out);
 }
 
-static void mask_rows(size_t block, size_t begin, size_t end, void *context)
+/* Asks for the pixels of a row that will be wanted soon: a tile's rows lie far apart in memory. */
+static void fetch_pixels(const loss_tile *t, const float *picture, ptrdiff_t row)
 {
-    (void)block;
-    const loss_job *job = context;
-    for (size_t i = begin * job->width; i < end * job->width; i++)
-        for (size_t c = CHANNELS * i; c < CHANNELS * i + CHANNELS; c++) {
-            job->masked_x[c] = job->valid[i] ? job->source_x[c] : 0.0f;
-            job->masked_y[c] = job->valid[i] ? job->source_y[c] : 0.0f;
-        }
+    enum { LINE = 16 /* floats */ };
+    if (!is_row(t, row))
+        return;
+    const float *p = picture + ((size_t)row * t->job->width + t->column) * CHANNELS;
+    for (size_t i = 0; i < t->owned * CHANNELS; i += LINE)
+        __builtin_prefetch(p + i);
 }
 
-static void map_rows(size_t block, size_t begin, size_t end, void *context)
+/* ---- the passes ---- */
+
+/* A row of the moments, into its place of their ring. */
+static void moment_row(const loss_tile *t, ptrdiff_t row, size_t place)
 {
-    const loss_job *job = context;
-    double *const rows = job->rows + block * BLOCK_ROWS * job->padded;
-    memset(rows, 0, BLOCK_ROWS * job->padded * sizeof *rows); /* the margins stay zero */
-    double *moments[WINDOW_MOMENTS], *partials[WINDOW_PARTIALS];
-    for (size_t m = 0; m < WINDOW_MOMENTS; m++)
-        moments[m] = rows + m * job->padded + MARGIN;
-    for (size_t m = 0; m < WINDOW_PARTIALS; m++)
-        partials[m] = rows + (WINDOW_MOMENTS + m) * job->padded + MARGIN;
-    double *const map = rows + (WINDOW_MOMENTS + WINDOW_PARTIALS) * job->padded;
-    for (size_t row = begin; row < end; row++) {
-        const float *x[WINDOW_TAPS], *y[WINDOW_TAPS];
-        window_rows(job->x, job->count, job->height, row, job->zeros, x);
-        window_rows(job->y, job->count, job->height, row, job->zeros, y);
-        job->kernels->moments(x, y, job->count, moments);
-        job->kernels->map_partials((const double *const *)moments, job->count, CHANNELS, map, partials);
-        if (job->valid != NULL) {
-            const unsigned char *valid = job->valid + row * job->width;
-            zero_invalid(valid, job->width, map);
-            for (size_t m = 0; m < WINDOW_PARTIALS; m++)
-                zero_invalid(valid, job->width, partials[m]);
-        }
-        job->ssim[row] = window_sum(map, job->count);
-        double *filtered[WINDOW_PARTIALS];
-        for (size_t m = 0; m < WINDOW_PARTIALS; m++)
-            filtered[m] = job->partials + (m * job->height + row) * job->count;
-        job->kernels->filter((const double *const *)partials, job->count, CHANNELS, filtered);
+    loss_room *room = t->room;
+    if (!is_row(t, row)) {
+        for (int m = 0; m < LOSS_MOMENTS; m++)
+            memset(room->moments[m][place], 0, t->count * sizeof(double));
+        return;
+    }
+    const loss_kernels *kernels = t->job->kernels;
+    const size_t pixels = t->count / CHANNELS + 2 * RADIUS;
+    fetch_pixels(t, t->job->x, row + LOSS_GROUP);
+    fetch_pixels(t, t->job->y, row + LOSS_GROUP);
+    copy_pixels(t->job, t->job->x, (size_t)row, t->first - RADIUS, pixels, room->pixels_x);
+    copy_pixels(t->job, t->job->y, (size_t)row, t->first - RADIUS, pixels, room->pixels_y);
+    kernels->to_lanes(room->pixels_x + LOSS_EDGE, t->count, room->x[0]);
+    kernels->to_lanes(room->pixels_y + LOSS_EDGE, t->count, room->y[0]);
+    double edges[LOSS_MOMENTS][2][LOSS_EDGE], *products[LOSS_MOMENTS];
+    for (int side = 0; side < 2; side++) {
+        const size_t from = side == 0 ? 0 : LOSS_EDGE + t->count;
+        double *const out[LOSS_MOMENTS] = {edges[0][side], edges[1][side], edges[2][side], edges[3][side]};
+        kernels->products(room->pixels_x + from, room->pixels_y + from, LOSS_EDGE, out);
+    }
+    for (int m = 0; m < LOSS_MOMENTS; m++)
+        products[m] = room->wide[m] + LOSS_MARGIN;
+    kernels->products(room->x[0], room->y[0], t->count, products);
+    for (int m = 0; m < LOSS_MOMENTS; m++)
+        kernels->margins(products[m], t->count, edges[m][0], edges[m][1]);
+    for (int m = 0; m < LOSS_MOMENTS; m++)
+        kernels->row_pass(products[m], t->count, room->moments[m][place]);
+}
+
+/* Where the map of a row counts. */
+static const double *counts_of(const loss_tile *t, ptrdiff_t row, double *out)
+{
+    const loss_job *job = t->job;
+    if (!is_row(t, row))
+        return t->room->nothing;
+    if (job->valid == NULL)
+        return t->room->inside;
+    memcpy(out, t->room->inside, t->count * sizeof *out);
+    const unsigned char *valid = job->valid + (size_t)row * job->width;
+    for (size_t i = 0; i < LOSS_LANES * t->segment; i++) {
+        const ptrdiff_t column = t->first + (ptrdiff_t)i;
+        double *place = out + i % t->segment * LOSS_STEP + i / t->segment;
+        if (column >= 0 && column < (ptrdiff_t)job->width && !valid[column])
+            place[0] = place[LOSS_LANES] = place[2 * LOSS_LANES] = 0;
+    }
+    return out;
+}
+
+/* A group of rows of the partials, into their places of the ring. */
+static void map_rows(const loss_tile *t, ptrdiff_t first_row, size_t first_place)
+{
+    loss_room *room = t->room;
+    const double *moments[LOSS_MOMENTS][LOSS_SPAN], *counts[LOSS_GROUP], none[LOSS_EDGE] = {0};
+    double weight[LOSS_GROUP], *partials[LOSS_GROUP][LOSS_PARTIALS];
+    for (size_t m = 0; m < LOSS_MOMENTS; m++)
+        for (size_t k = 0; k < LOSS_SPAN; k++)
+            moments[m][k] = room->moments[m][(first_place + k) % RING];
+    for (size_t k = 0; k < LOSS_GROUP; k++) {
+        const ptrdiff_t row = first_row + (ptrdiff_t)k;
+        counts[k] = counts_of(t, row, room->counted[k]);
+        weight[k] = row >= (ptrdiff_t)t->begin && row < (ptrdiff_t)t->end;
+        for (size_t m = 0; m < LOSS_PARTIALS; m++)
+            partials[k][m] = room->wide[k * LOSS_PARTIALS + m] + LOSS_MARGIN;
+    }
+    t->job->kernels->map((const double *const(*)[LOSS_SPAN])moments, counts, weight, t->count,
+                         (double *const(*)[LOSS_PARTIALS])partials, room->sums[0]);
+    for (size_t k = 0; k < LOSS_GROUP; k++)
+        for (size_t m = 0; m < LOSS_PARTIALS; m++)
+            t->job->kernels->margins(partials[k][m], t->count, none, none);
+    for (size_t k = 0; k < LOSS_GROUP; k++)
+        for (size_t m = 0; m < LOSS_PARTIALS; m++)
+            t->job->kernels->row_pass(partials[k][m], t->count, room->partials[m][(first_place + k) % RING]);
+}
+
+/* A group of rows of the gradient, into the picture. */
+static void gradient_rows(const loss_tile *t, size_t first_row, size_t first_place)
+{
+    const loss_job *job = t->job;
+    loss_room *room = t->room;
+    const double *partials[LOSS_PARTIALS][LOSS_SPAN];
+    const float *x[LOSS_GROUP], *y[LOSS_GROUP];
+    float *d_x[LOSS_GROUP];
+    double weight[LOSS_GROUP];
+    for (size_t m = 0; m < LOSS_PARTIALS; m++)
+        for (size_t k = 0; k < LOSS_SPAN; k++)
+            partials[m][k] = room->partials[m][(first_place + k) % RING];
+    for (size_t k = 0; k < LOSS_GROUP; k++) {
+        x[k] = room->x[k];
+        y[k] = room->y[k];
+        d_x[k] = room->d_x[k];
+        weight[k] = first_row + k < t->end;
+        if (first_row + k >= t->end)
+            continue;
+        copy_pixels(job, job->x, first_row + k, t->first, t->count / CHANNELS, room->pixels_x);
+        copy_pixels(job, job->y, first_row + k, t->first, t->count / CHANNELS, room->pixels_y);
+        job->kernels->to_lanes(room->pixels_x, t->count, room->x[k]);
+        job->kernels->to_lanes(room->pixels_y, t->count, room->y[k]);
+    }
+    job->kernels->gradient((const double *const(*)[LOSS_SPAN])partials, x, y, weight, t->count, job->l1_scale,
+                           job->ssim_scale, d_x, room->sums[1], room->sums[2]);
+    for (size_t k = 0; k < LOSS_GROUP && first_row + k < t->end; k++) {
+        const size_t at = (first_row + k) * job->width + t->column;
+        job->kernels->from_lanes(room->d_x[k], t->count, room->pixels_x);
+        memcpy(job->d_x + at * CHANNELS, room->pixels_x + LOSS_EDGE, t->owned * CHANNELS * sizeof *job->d_x);
+        for (size_t i = at; job->valid != NULL && i < at + t->owned; i++)
+            if (!job->valid[i])
+                memset(job->d_x + i * CHANNELS, 0, CHANNELS * sizeof *job->d_x);
     }
 }
 
-static void gradient_rows(size_t block, size_t begin, size_t end, void *context)
+/* Sets 0 in a row in lanes at all pixels but [begin, end) of the tile. */
+static void keep_pixels(const loss_tile *t, size_t begin, size_t end, double *row)
 {
-    const loss_job *job = context;
-    double *const absolute = job->rows + block * BLOCK_ROWS * job->padded, *const square =
-                                                                               absolute + job->padded;
-    for (size_t row = begin; row < end; row++) {
-        const double *partials[WINDOW_PARTIALS][WINDOW_TAPS];
-        for (size_t m = 0; m < WINDOW_PARTIALS; m++)
-            for (size_t k = 0; k < WINDOW_TAPS; k++) {
-                const size_t shifted = row + k;
-                const bool is_inside = shifted >= WINDOW_RADIUS && shifted - WINDOW_RADIUS < job->height;
-                partials[m][k] =
-                    is_inside ? job->partials + (m * job->height + shifted - WINDOW_RADIUS) * job->count
-                              : job->double_zeros;
-            }
-        float *d_x = job->d_x + row * job->count;
-        job->kernels->gradient((const double *const(*)[WINDOW_TAPS])partials, job->x + row * job->count,
-                               job->y + row * job->count, job->count, job->l1_scale, job->ssim_scale, d_x,
-                               absolute, square);
-        job->l1[row] = window_sum(absolute, job->count);
-        job->mse[row] = window_sum(square, job->count);
-        for (size_t i = 0; job->valid != NULL && i < job->width; i++)
-            if (!job->valid[row * job->width + i])
-                d_x[CHANNELS * i] = d_x[CHANNELS * i + 1] = d_x[CHANNELS * i + 2] = 0.0f;
+    for (size_t i = 0; i < LOSS_LANES * t->segment; i++) {
+        double *place = row + i % t->segment * LOSS_STEP + i / t->segment;
+        if (i < begin || i >= end)
+            place[0] = place[LOSS_LANES] = place[2 * LOSS_LANES] = 0;
     }
 }
+
+static void run_tile(const loss_job *job, loss_room *room, size_t index)
+{
+    const loss_tile t = tile_at(job, room, index);
+    for (size_t i = 0; i < t.count; i++)
+        room->inside[i] = 1;
+    const size_t left = t.first < 0 ? (size_t)-t.first : 0;
+    keep_pixels(&t, left, (size_t)((ptrdiff_t)job->width - t.first), room->inside);
+    memset(room->nothing, 0, sizeof room->nothing);
+    memset(room->sums, 0, sizeof room->sums);
+    memset(room->x, 0, sizeof room->x);
+    memset(room->y, 0, sizeof room->y);
+
+    /* Groups of rows go in at the bottom: moments 2 RADIUS above the first row of the gradient, partials
+       RADIUS above it. */
+    const size_t groups = round_up(t.end - t.begin, LOSS_GROUP) / LOSS_GROUP;
+    for (size_t step = 0; step < groups + 2 * AHEAD; step++) {
+        const size_t place = step * LOSS_GROUP;
+        const ptrdiff_t top = (ptrdiff_t)(t.begin + place);
+        for (size_t k = 0; k < LOSS_GROUP; k++)
+            moment_row(&t, top + (ptrdiff_t)k - 2 * RADIUS, (place + k) % RING);
+        if (step >= AHEAD)
+            map_rows(&t, top - AHEAD * LOSS_GROUP - RADIUS, place - AHEAD * LOSS_GROUP);
+        if (step >= 2 * AHEAD)
+            gradient_rows(&t, t.begin + place - 2 * AHEAD * LOSS_GROUP, place - 2 * AHEAD * LOSS_GROUP);
+    }
+    for (size_t i = 0; i < SUMS; i++) {
+        keep_pixels(&t, RADIUS, RADIUS + t.owned, room->sums[i]);
+        job->sums[i * job->tile_count + index] = window_sum(room->sums[i], t.count);
+    }
+}
+
+/* Takes tiles until none is left. */
+static void run_tiles(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)begin;
+    (void)end;
+    loss_job *job = context;
+    for (size_t tile; (tile = atomic_fetch_add(&job->next, 1)) < job->tile_count;)
+        run_tile(job, &job->rooms[block], tile);
+}
+
+/* ---- the loss ---- */
 
 static bool is_size_equal(const image *a, const image *b)
 {
     return a->width == b->width && a->height == b->height && a->channels == b->channels;
 }
 
-/* Divide the scratch; every part starts on a cache line. Without a buffer this counts what is needed. */
-static size_t lay_out(loss_job *job, double *buffer)
+static size_t count_valid(const unsigned char *valid, size_t pixels)
 {
-    size_t used = 0;
-    const size_t sizes[] = {
-        job->count,                                                                   /* zeros, as float */
-        job->count,                                                                   /* double_zeros */
-        WINDOW_PARTIALS * job->height * job->count,                                   /* partials */
-        parallel_block_count(job->height, ROWS_PER_BLOCK) * BLOCK_ROWS * job->padded, /* rows */
-        job->height,
-        job->height,
-        job->height,                                                 /* ssim, l1, mse */
-        job->valid != NULL ? (job->height * job->count + 1) / 2 : 0, /* masked_x, as float */
-        job->valid != NULL ? (job->height * job->count + 1) / 2 : 0, /* masked_y, as float */
-    };
-    double *parts[sizeof sizes / sizeof *sizes] = {0};
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
-        if (buffer != NULL)
-            parts[i] = buffer + used;
-        used += (sizes[i] + 7) / 8 * 8;
-    }
-    job->zeros = (float *)parts[0];
-    job->double_zeros = parts[1];
-    job->partials = parts[2];
-    job->rows = parts[3];
-    job->ssim = parts[4];
-    job->l1 = parts[5];
-    job->mse = parts[6];
-    job->masked_x = (float *)parts[7];
-    job->masked_y = (float *)parts[8];
-    return used;
+    size_t count = 0;
+    for (size_t i = 0; i < pixels; i++)
+        count += valid[i] != 0;
+    return count;
 }
 
 gbt_status image_loss(const image *x, const image *y, const unsigned char *valid, double dssim_weight,
@@ -167,49 +315,39 @@ gbt_status image_loss(const image *x, const image *y, const unsigned char *valid
             d_x->channels);
     if (!(dssim_weight >= 0 && dssim_weight <= 1))
         return base_fail(err, GBT_ERR_ARGUMENT, "loss: DSSIM weight %g (wanted 0 to 1)", dssim_weight);
-    loss_job job = {.kernels = window_kernels_best(),
-                    .source_x = x->pixels,
-                    .source_y = y->pixels,
+    loss_job job = {.kernels = loss_kernels_best(),
+                    .x = x->pixels,
+                    .y = y->pixels,
                     .valid = valid,
                     .d_x = d_x->pixels,
                     .width = (size_t)x->width,
-                    .height = (size_t)x->height,
-                    .count = CHANNELS * (size_t)x->width,
-                    .padded = (CHANNELS * (size_t)x->width + 2 * MARGIN + 7) / 8 * 8};
-    const size_t wanted = lay_out(&job, NULL);
-    GBT_TRY(mem_reserve((void **)&scratch->buffer, &scratch->capacity, 0, wanted, sizeof *scratch->buffer,
+                    .height = (size_t)x->height};
+    const size_t bands = parallel_block_count(job.height, BAND_ROWS);
+    job.across = parallel_block_count(job.width, TILE_OWNED);
+    job.tile_count = job.across * bands;
+    job.band_rows = round_up(parallel_block_count(job.height, bands), LOSS_GROUP);
+    const size_t workers = min_size((size_t)parallel_threads(), job.tile_count),
+                 room_doubles = sizeof(loss_room) / sizeof(double);
+    GBT_TRY(mem_reserve((void **)&scratch->buffer, &scratch->capacity, 0,
+                        workers * room_doubles + SUMS * job.tile_count, sizeof *scratch->buffer,
                         "loss scratch", err));
-    lay_out(&job, scratch->buffer);
-    memset(job.zeros, 0, job.count * sizeof *job.zeros);
-    memset(job.double_zeros, 0, job.count * sizeof *job.double_zeros);
+    job.rooms = (loss_room *)scratch->buffer;
+    job.sums = scratch->buffer + workers * room_doubles;
 
-    size_t pixels = job.width * job.height;
-    if (valid != NULL) {
-        size_t valid_count = 0;
-        for (size_t i = 0; i < pixels; i++)
-            valid_count += valid[i] != 0;
-        pixels = valid_count;
-    }
+    const size_t all = job.width * job.height, pixels = valid != NULL ? count_valid(valid, all) : all;
     if (pixels == 0) {
-        memset(d_x->pixels, 0, job.height * job.count * sizeof *d_x->pixels);
+        memset(d_x->pixels, 0, all * CHANNELS * sizeof *d_x->pixels);
         out->ssim = 1;
         return GBT_OK;
-    }
-    job.x = x->pixels;
-    job.y = y->pixels;
-    if (valid != NULL) {
-        parallel_blocks(job.height, ROWS_PER_BLOCK, mask_rows, &job);
-        job.x = job.masked_x;
-        job.y = job.masked_y;
     }
     const double values = (double)(CHANNELS * pixels);
     job.l1_scale = (1 - dssim_weight) / values;
     job.ssim_scale = -dssim_weight / values;
-    parallel_blocks(job.height, ROWS_PER_BLOCK, map_rows, &job);
-    parallel_blocks(job.height, ROWS_PER_BLOCK, gradient_rows, &job);
-    out->l1 = window_sum(job.l1, job.height) / values;
-    out->ssim = window_sum(job.ssim, job.height) / values;
-    out->mse = window_sum(job.mse, job.height) / values;
+    atomic_init(&job.next, 0);
+    parallel_blocks(workers, 1, run_tiles, &job);
+    out->ssim = window_sum(job.sums, job.tile_count) / values;
+    out->l1 = window_sum(job.sums + job.tile_count, job.tile_count) / values;
+    out->mse = window_sum(job.sums + 2 * job.tile_count, job.tile_count) / values;
     out->loss = (1 - dssim_weight) * out->l1 + dssim_weight * (1 - out->ssim);
     return GBT_OK;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* image/window.h -- the inner loops of SSIM and of its adjoint: one image row at a time, in double, for each
+/* image/window.h -- the inner loops of SSIM: one image row at a time, in double, for each
    instruction set.
 
    The window is the 11 x 11 Gaussian of sigma 1.5 with zero padding, not renormalised at borders, applied as
@@ -14,7 +14,15 @@
 
 #include <stddef.h>
 
-enum { WINDOW_RADIUS = 5, WINDOW_TAPS = 2 * WINDOW_RADIUS + 1, WINDOW_MOMENTS = 5, WINDOW_PARTIALS = 3 };
+/* exp(-k^2 / (2 1.5^2)) / sum; the sum of all eleven is 1 to the last bit but one. */
+#define WINDOW_TAP0 0.2660117248617943
+#define WINDOW_TAP1 0.21300553771125366
+#define WINDOW_TAP2 0.1093606895097
+#define WINDOW_TAP3 0.03600077212843082
+#define WINDOW_TAP4 0.007598758135239184
+#define WINDOW_TAP5 0.0010283800844791099
+
+enum { WINDOW_RADIUS = 5, WINDOW_TAPS = 2 * WINDOW_RADIUS + 1, WINDOW_MOMENTS = 5 };
 
 typedef struct window_kernels {
     /** Column pass of x, y, x^2, y^2, x y over 11 rows of `count` values; rows outside the image are rows of
@@ -25,22 +33,6 @@ typedef struct window_kernels {
     /** Row pass of the five, then the SSIM map. Each input is readable for 5 `step` zeros before and after
         its `count` values. */
     void (*map)(const double *const in[WINDOW_MOMENTS], size_t count, size_t step, double *map);
-
-    /** The same, and the partials that the adjoint filters: dS/dmu_x (total), dS/dvar_x, dS/dcov. */
-    void (*map_partials)(const double *const in[WINDOW_MOMENTS], size_t count, size_t step, double *map,
-                         double *const partials[WINDOW_PARTIALS]);
-
-    /** Row pass of the partials; inputs are padded like those of map(). */
-    void (*filter)(const double *const in[WINDOW_PARTIALS], size_t count, size_t step,
-                   double *const out[WINDOW_PARTIALS]);
-
-    /**
-     * Column pass of the partials and the gradient of one row: d_x = l1 sign(x - y) + ssim (G*p0 + 2 x G*p1 +
-     * y G*p2). `absolute` and `square` receive |x - y| and (x - y)^2.
-     */
-    void (*gradient)(const double *const partials[WINDOW_PARTIALS][WINDOW_TAPS], const float *x,
-                     const float *y, size_t count, double l1, double ssim, float *d_x, double *absolute,
-                     double *square);
 } window_kernels;
 
 /** The widest set that cpu_best_isa() allows. */

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "base/camera_pose.h"
+#include "base/clones.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -22,6 +23,9 @@ enum { ROW_GRAIN = 8 };
 
 /* The tracer sees no ray that starts farther out. */
 static const double origin_max = 1e17;
+
+/* Directions of so many rays are kept of several lenses, 24 bytes each; of one lens, always. */
+static const size_t kept_rays = (size_t)1 << 23;
 
 typedef struct pose {
     double rotation[9], center[3];
@@ -38,14 +42,14 @@ typedef struct ray_job {
     camera_lens lens;
     bool pinhole;
     const double *column_u; /* [width] (x + 0.5 - cx) / fx; pinhole and orthographic only */
-    double *camera_dir;     /* other lenses only */
+    double *lens_dir;       /* ray_lens.dir; other lenses only */
     const pose *poses;      /* [1], or one for each row or column */
     aperture_cell cell;
     float *origin; /* NULL: one for all */
     float *dir;
 } ray_job;
 
-static void pinhole_row(const ray_job *job, const double *r, int row, float *dir)
+FASTEST_CLONE static void pinhole_row(const ray_job *job, const double *r, int row, float *restrict dir)
 {
     const double v = (row + 0.5 - job->lens.cy) / job->lens.fy;
     const int width = job->shot->camera.width;
@@ -72,11 +76,11 @@ static void orthographic_row(const ray_job *job, const pose *at, int row, float 
         }
 }
 
-static void unproject_row(const ray_job *job, int row, double *camera_dir)
+static void unproject_row(const ray_job *job, int row, double *dir)
 {
-    for (int i = 0; i < job->shot->camera.width; i++, camera_dir += 3)
-        if (!camera_lens_unproject(&job->lens, i + 0.5, row + 0.5, camera_dir))
-            memset(camera_dir, 0, 3 * sizeof *camera_dir);
+    for (int i = 0; i < job->shot->camera.width; i++, dir += 3)
+        if (!camera_lens_unproject(&job->lens, i + 0.5, row + 0.5, dir))
+            memset(dir, 0, 3 * sizeof *dir);
 }
 
 static void round3(const double from[3], float to[3])
@@ -86,11 +90,11 @@ static void round3(const double from[3], float to[3])
     to[2] = (float)from[2];
 }
 
-static void turn_row(const ray_job *job, const double *rotation, const double *camera_dir, float *dir)
+static void turn_row(const ray_job *job, const double *rotation, const double *lens_dir, float *dir)
 {
-    for (int i = 0; i < job->shot->camera.width; i++, camera_dir += 3, dir += 3) {
+    for (int i = 0; i < job->shot->camera.width; i++, lens_dir += 3, dir += 3) {
         double d[3];
-        dmat_apply_transposed(rotation, camera_dir, d);
+        dmat_apply_transposed(rotation, lens_dir, d);
         round3(d, dir);
     }
 }
@@ -156,7 +160,7 @@ static void any_row(const ray_job *job, int row, float *origin, float *dir)
             d[0] = job->column_u[i];
             d[1] = v;
         } else
-            memcpy(d, job->camera_dir + 3 * pixel, sizeof d);
+            memcpy(d, job->lens_dir + 3 * pixel, sizeof d);
         if (d[0] != 0 || d[1] != 0 || d[2] != 0) {
             if (opens)
                 open_aperture(job, pixel, start, d);
@@ -177,7 +181,7 @@ static void unproject_rows(size_t block, size_t begin, size_t end, void *context
     const ray_job *job = context;
     (void)block;
     for (size_t row = begin; row < end; row++)
-        unproject_row(job, (int)row, job->camera_dir + 3 * row * (size_t)job->shot->camera.width);
+        unproject_row(job, (int)row, job->lens_dir + 3 * row * (size_t)job->shot->camera.width);
 }
 
 static void make_rows(size_t block, size_t begin, size_t end, void *context)
@@ -201,7 +205,7 @@ static void make_rows(size_t block, size_t begin, size_t end, void *context)
         if (job->pinhole)
             pinhole_row(job, stand->rotation, (int)row, dir);
         else
-            turn_row(job, stand->rotation, job->camera_dir + at, dir);
+            turn_row(job, stand->rotation, job->lens_dir + at, dir);
         if (origin != NULL)
             repeat_origin(stand->center, width, origin);
     }
@@ -288,20 +292,25 @@ gbt_status ray_image_reserve(ray_image *out, int width, int height, bool common_
     return GBT_OK;
 }
 
-/* Directions in camera axes, unless they are there from the pose before. */
+/* Directions in camera axes, unless they are there from a pose before. */
 static gbt_status unproject_lens(ray_job *job, ray_image *rays, gbt_error *err)
 {
     const gbt_camera *camera = &job->shot->camera;
-    if (rays->camera_dir == NULL || !same_lens(camera, &rays->camera)) {
-        mem_free(rays->camera_dir);
-        rays->camera_dir = mem_alloc(ray_image_count(rays), 3 * sizeof *rays->camera_dir, "rays", err);
-        if (rays->camera_dir == NULL)
-            return GBT_ERR_NO_MEMORY;
-        rays->camera = *camera;
-        job->camera_dir = rays->camera_dir;
-        parallel_blocks((size_t)camera->height, ROW_GRAIN, unproject_rows, job);
-    }
-    job->camera_dir = rays->camera_dir;
+    for (int i = 0; i < RAY_LENSES; i++)
+        if (rays->lenses[i].dir != NULL && same_lens(camera, &rays->lenses[i].camera)) {
+            job->lens_dir = rays->lenses[i].dir;
+            return GBT_OK;
+        }
+    const size_t count = ray_image_count(rays), fit = kept_rays / count;
+    ray_lens *lens = &rays->lenses[rays->next_lens];
+    if (lens->dir == NULL)
+        lens->dir = mem_alloc(count, 3 * sizeof *lens->dir, "rays", err);
+    if (lens->dir == NULL)
+        return GBT_ERR_NO_MEMORY;
+    rays->next_lens = (size_t)rays->next_lens + 1 < fit ? (rays->next_lens + 1) % RAY_LENSES : 0;
+    lens->camera = *camera;
+    job->lens_dir = lens->dir;
+    parallel_blocks((size_t)camera->height, ROW_GRAIN, unproject_rows, job);
     return GBT_OK;
 }
 
@@ -431,6 +440,7 @@ void ray_image_free(ray_image *rays)
     mem_free(rays->origin);
     mem_free(rays->dir);
     mem_free(rays->far);
-    mem_free(rays->camera_dir);
+    for (int i = 0; i < RAY_LENSES; i++)
+        mem_free(rays->lenses[i].dir);
     memset(rays, 0, sizeof *rays);
 }

@@ -12,6 +12,14 @@
 #include "gbtrace/camera.h"
 #include "gbtrace/status.h"
 
+enum { RAY_LENSES = 16 /* a photo trained on every fourth pixel of a row and a column is as many lenses */ };
+
+/** What a lens makes of the pixel centres: directions in camera axes, [height * width][3]; owned. */
+typedef struct ray_lens {
+    gbt_camera camera;
+    double *dir; /* NULL: none yet */
+} ray_lens;
+
 /** Row-major. A ray with a zero direction is invalid: it sees the background, and its transmittance is 1. */
 typedef struct ray_image {
     int width, height;
@@ -21,10 +29,10 @@ typedef struct ray_image {
     bool common_origin;
     float *far; /* [height * width] or NULL: nothing at this distance or behind it is seen (a surface stands
                    there); owned */
-    /* Kept by ray_image_from_shot() for the next pose of the same lens; NULL for a pinhole. */
-    double *camera_dir; /* [height * width][3] in camera axes; owned */
-    gbt_camera camera;  /* whose lens camera_dir is */
-    camera_lens lens;   /* prepared, of the shot's camera; fx is 0 when the rays were given */
+    camera_lens lens; /* prepared, of the shot's camera; fx is 0 when the rays were given */
+    /* Kept by ray_image_from_shot() for the next poses of the same lenses, all of this size. */
+    ray_lens lenses[RAY_LENSES];
+    int next_lens; /* the one to be replaced */
 } ray_image;
 
 typedef enum ray_shutter {
@@ -79,8 +87,8 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err);
  *         a rotation, rays that start beyond 1e17, an aperture without a focus), GBT_ERR_NO_MEMORY
  * Threads: runs in parallel over rows; same bits for every thread count.
  * Cost: 0.4 to 1 ms of one core per 10^5 rays of a pinhole or orthographic camera, also when it moves by
- * rows; 2 ms by columns; 7 ms with an aperture; a distorted lens 20 to 60 ms more when it is not the lens of
- * the call before.
+ * rows; 2 ms by columns; 7 ms with an aperture; a distorted lens 20 to 60 ms more when it is none of those
+ * that `out` still has.
  */
 gbt_status ray_image_from_shot(const ray_shot *shot, int sample, ray_image *out, gbt_error *err);
 

@@ -10,6 +10,8 @@
 #include "base/parallel.h"
 #include "data/photo_size.h"
 
+enum { PICK_ROWS = 32 /* of one thread at a time */ };
+
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err)
 {
     *p = (photos){.source = source, .downscale = downscale};
@@ -62,10 +64,36 @@ static gbt_status to_bytes(const image *im, unsigned char **out, gbt_error *err)
     return GBT_OK;
 }
 
+/* Every `step`-th pixel of every `step`-th row, from `from` on; rows are `row` bytes long. */
+typedef struct pick_job {
+    const unsigned char *from;
+    size_t row, step;
+    image *out;
+} pick_job;
+
+static void pick_rows(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const pick_job *job = context;
+    const size_t width = (size_t)job->out->width, stride = 3 * job->step;
+    for (size_t y = begin; y < end; y++) {
+        const unsigned char *from = job->from + y * job->step * job->row;
+        float *to = job->out->pixels + 3 * y * width;
+        if (job->step == 1) { /* one run, of which the compiler makes vectors */
+            for (size_t i = 0; i < 3 * width; i++)
+                to[i] = (float)from[i] * (1.0f / 255);
+            continue;
+        }
+        for (size_t x = 0; x < width; x++)
+            for (size_t c = 0; c < 3; c++)
+                to[3 * x + c] = (float)from[x * stride + c] * (1.0f / 255);
+    }
+}
+
 static void from_bytes(const unsigned char *bytes, image *out)
 {
-    for (size_t i = 0; i < (size_t)out->width * (size_t)out->height * 3; i++)
-        out->pixels[i] = (float)bytes[i] * (1.0f / 255);
+    pick_job job = {.from = bytes, .row = 3 * (size_t)out->width, .step = 1, .out = out};
+    parallel_blocks((size_t)out->height, PICK_ROWS, pick_rows, &job);
 }
 
 /* Into p->full, if it is not there. */
@@ -203,14 +231,11 @@ gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample,
     *step = 1 << sample->level;
     GBT_TRY(read_full(p, view, err));
     GBT_TRY(image_fit(out, camera->width, camera->height, 3, err));
-    const size_t stride = 3 * (size_t)*step, row = 3 * (size_t)full.width;
-    for (size_t y = 0; y < (size_t)camera->height; y++) {
-        const unsigned char *from = p->full[view] + (y * (size_t)*step + (size_t)sample->phase[1]) * row +
-                                    3 * (size_t)sample->phase[0];
-        float *to = out->pixels + 3 * y * (size_t)camera->width;
-        for (size_t x = 0; x < (size_t)camera->width; x++)
-            for (size_t c = 0; c < 3; c++)
-                to[3 * x + c] = (float)from[x * stride + c] * (1.0f / 255);
-    }
+    const size_t row = 3 * (size_t)full.width;
+    pick_job job = {.from = p->full[view] + (size_t)sample->phase[1] * row + 3 * (size_t)sample->phase[0],
+                    .row = row,
+                    .step = (size_t)*step,
+                    .out = out};
+    parallel_blocks((size_t)out->height, PICK_ROWS, pick_rows, &job);
     return pick_valid(p, view, full.width, sample, camera->width, camera->height, valid, err);
 }

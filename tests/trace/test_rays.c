@@ -87,6 +87,24 @@ static void plain_shots_are_cameras(void **state)
     }
 }
 
+/* More lenses of one size than are kept, twice: always the bits of a lens seen for the first time. */
+static void lenses_are_kept(void **state)
+{
+    (void)state;
+    const ray_shot shot = shot_of(GBT_CAMERA_OPENCV);
+    ray_image kept = {0};
+    for (int i = 0; i < 2 * (RAY_LENSES + 3); i++) {
+        gbt_camera camera;
+        ray_image fresh = {0};
+        assert_true(gbt_camera_shifted(&shot.camera, 0.25 * (i % (RAY_LENSES + 3)), 0, &camera));
+        assert_ok(ray_image_from_camera(&camera, &kept, NULL));
+        assert_ok(ray_image_from_camera(&camera, &fresh, NULL));
+        assert_memory_equal(kept.dir, fresh.dir, COUNT * 3 * sizeof *fresh.dir);
+        ray_image_free(&fresh);
+    }
+    ray_image_free(&kept);
+}
+
 static void orthographic(void **state)
 {
     (void)state;
@@ -533,6 +551,7 @@ int main(void)
         cmocka_unit_test(orthographic),
         cmocka_unit_test(rolling_shutter),
         cmocka_unit_test(poses_between),
+        cmocka_unit_test(lenses_are_kept),
         cmocka_unit_test(thin_lens),
         cmocka_unit_test(samples_are_stratified),
         cmocka_unit_test(same_bits_for_every_thread_count),

@@ -171,5 +171,7 @@ gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *e
     file.bytes = bytes;
     const gbt_status status = gaussian_ply_read(&file, out, err);
     mem_free(bytes);
+    if (status == GBT_OK)
+        gaussian_cloud_warn(out, path);
     return status;
 }

@@ -73,6 +73,7 @@ try() { # name, goes on (yes or no), command...
         faulty "$call:0:count" "$@"
         [ $code = 0 ] || { bad "$name" "exit code $code without a fault"; return; }
         total=$(cat count)
+        [ "$total" -gt 0 ] || [ "$call" = mkdir ] || bad "$name" "no $call was counted: the shim does not work"
         for ((n = 1; n <= total; n += step)); do
             prepare
             faulty "$call:$n:fail" "$@"
@@ -88,12 +89,14 @@ try() { # name, goes on (yes or no), command...
 
 mkdir base
 cp_run() { # iterations of each part: a run in base/run, made in parts
-    rm -rf base/run
+    rm -rf base/run case
     local part
+    mv base case # a run tells the name of its data
     for part in "$@"; do
-        "$program" train base/data -o base/run $([ -d base/run ] && echo --resume) --iterations "$part" --threads 1 --quiet >said 2>&1 ||
+        "$program" train case/data -o case/run $([ -d case/run ] && echo --resume) --iterations "$part" --threads 1 --quiet >said 2>&1 ||
             { bad "a run" "not made"; exit 1; }
     done
+    mv case base
 }
 "$program" make-scene tabletop -o base/data --width 32 --height 24 --views 4 --points 200 --samples 1 --quiet >said 2>&1 || { bad "a scene" "not made"; exit 1; }
 cp_run 3 6 && cp -R base/run resumed

@@ -81,6 +81,8 @@ static int open_as(const char *name, const char *path, int flags, mode_t mode)
     return fd;
 }
 
+#pragma GCC visibility push(default)
+
 int open(const char *path, int flags, ...)
 {
     va_list more;

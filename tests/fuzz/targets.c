@@ -109,6 +109,7 @@ void fuzz_safetensors(const source_file *file)
     tensor out;
     gbt_error err = {0};
     check(safetensors_read(file, "lin0.model.1.weight", &out, &err), &err);
+    mem_free(out.values);
 }
 
 /* The container with its coder and the checkpoint's fields. */

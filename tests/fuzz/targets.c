@@ -17,11 +17,10 @@
 #include "base/memory.h"
 #include "data/colmap_bin.h"
 #include "data/colmap_txt.h"
+#include "data/gaussian_formats.h"
 #include "data/gaussian_ply.h"
 #include "data/mesh_file.h"
 #include "data/ply.h"
-#include "data/splat_file.h"
-#include "data/spz_file.h"
 #include "data/transforms.h"
 #include "io/model_file.h"
 #include "io/safetensors.h"
@@ -100,9 +99,9 @@ static void gaussians_of(const source_file *file,
 
 void fuzz_ply_gaussians(const source_file *file) { gaussians_of(file, gaussian_ply_read); }
 
-void fuzz_splat(const source_file *file) { gaussians_of(file, splat_file_read); }
+void fuzz_splat(const source_file *file) { gaussians_of(file, gaussian_format_splat.read); }
 
-void fuzz_spz(const source_file *file) { gaussians_of(file, spz_file_read); }
+void fuzz_spz(const source_file *file) { gaussians_of(file, gaussian_format_spz.read); }
 
 void fuzz_safetensors(const source_file *file)
 {

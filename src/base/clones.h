@@ -4,8 +4,9 @@
 #define GBT_BASE_CLONES_H
 
 /** Before a function. The project compiles without contraction (no fused operations), so every clone gives
-    the same bits. None under ThreadSanitizer, which is not up yet when the loader picks. */
-#if defined(__SANITIZE_THREAD__)
+    the same bits. None under ThreadSanitizer, which is not up yet when the loader picks, nor with clang,
+   which cannot pass vectors between clones. */
+#if defined(__SANITIZE_THREAD__) || defined(__clang__)
 #define FASTEST_CLONE
 #else
 #define FASTEST_CLONE __attribute__((target_clones("avx512f", "avx2", "default")))

@@ -6,6 +6,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -58,6 +59,39 @@ done:
     mem_free(buffer);
     close(fd);
     return status;
+}
+
+static size_t read_at(int fd, unsigned char *out, size_t count, off_t at)
+{
+    size_t have = 0;
+    while (have < count) {
+        const ssize_t got = pread(fd, out + have, count - have, at + (off_t)have);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got <= 0)
+            break;
+        have += (size_t)got;
+    }
+    return have;
+}
+
+size_t file_read_ends(const char *path, size_t count, unsigned char *out)
+{
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    struct stat info;
+    if (fd < 0)
+        return 0;
+    size_t used = 0;
+    if (fstat(fd, &info) == 0 && S_ISREG(info.st_mode)) {
+        const uint64_t size = (uint64_t)info.st_size, first = size < count ? size : count,
+                       last = size - first < count ? size - first : count;
+        for (int i = 0; i < 8; i++)
+            out[used++] = (unsigned char)(size >> (8 * i));
+        used += read_at(fd, out + used, (size_t)first, 0);
+        used += read_at(fd, out + used, (size_t)last, (off_t)(size - last));
+    }
+    close(fd);
+    return used;
 }
 
 static gbt_status write_all(int fd, const unsigned char *bytes, size_t byte_count, const char *path,

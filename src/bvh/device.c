@@ -5,7 +5,9 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdint.h>
+#include <stdbool.h>
 #include <stdio.h>
+#include <string.h>
 #include <sys/types.h>
 
 #include "base/cpu.h"
@@ -115,8 +117,11 @@ gbt_status bvh_check(const char *what, gbt_error *err)
     const enum RTCError code = rtcGetDeviceError(device);
     if (code == RTC_ERROR_NONE)
         return GBT_OK;
-    const gbt_status status = base_fail(err, error_status(code), "%s: embree: %s%s%s", what, error_name(code),
-                                        complaint[0] != '\0' ? ": " : "", complaint);
+    /* What oneTBB could not allocate within Embree comes as an unknown error with the exception's name. */
+    const bool memory = strstr(complaint, "bad_alloc") != NULL;
+    const gbt_status status =
+        base_fail(err, memory ? GBT_ERR_NO_MEMORY : error_status(code), "%s: embree: %s%s%s", what,
+                  error_name(code), complaint[0] != '\0' ? ": " : "", complaint);
     complaint[0] = '\0';
     return status;
 }

@@ -14,39 +14,12 @@
 #include "base/parallel.h"
 #include "data/gaussian_file.h"
 #include "data/json_out.h"
+#include "data/photo_check.h"
 #include "data/scene.h"
 #include "command/expect.h"
 #include "io/model_file.h"
 
 /* ---- data sets ---- */
-
-typedef struct photo_counts {
-    size_t found, unreadable, other_size; /* other_size: readable, but not the camera's size */
-    size_t with_alpha, with_mask;
-    int min_width, min_height, max_width, max_height;
-} photo_counts;
-
-static photo_counts count_photos(const scene *s)
-{
-    photo_counts c = {0};
-    for (size_t i = 0; i < s->view_count; i++) {
-        const scene_view *view = &s->views[i];
-        int width, height, channels;
-        if (image_probe(view->path, &width, &height, &channels, NULL) != GBT_OK) {
-            c.unreadable++;
-            continue;
-        }
-        const bool is_first = c.found++ == 0;
-        c.with_alpha += channels == 4;
-        c.with_mask += view->mask_path != NULL;
-        c.other_size += width != view->camera.width || height != view->camera.height;
-        c.min_width = is_first || width < c.min_width ? width : c.min_width;
-        c.min_height = is_first || height < c.min_height ? height : c.min_height;
-        c.max_width = width > c.max_width ? width : c.max_width;
-        c.max_height = height > c.max_height ? height : c.max_height;
-    }
-    return c;
-}
 
 /**
  * The box that leaves out 5 % of the points on each side of each axis, world coordinates: a few outliers must
@@ -71,7 +44,7 @@ static gbt_status find_box(const float *position, size_t count, const double ori
 
 typedef struct dataset_facts {
     const scene *s;
-    photo_counts photos;
+    photo_check photos;
     size_t views_by_model[GBT_CAMERA_MODEL_COUNT], test_views;
     double low[3], high[3], extent;
     expectation expect;
@@ -91,25 +64,31 @@ static json_t *dataset_to_json(const char *path, const dataset_facts *f)
     json_t *box = s->points.count == 0 ? json_null()
                                        : json_pack("[[f,f,f],[f,f,f]]", f->low[0], f->low[1], f->low[2],
                                                    f->high[0], f->high[1], f->high[2]);
-    return json_pack(
-        "{s:i,s:s,s:o,s:s,s:I,s:o,s:{s:I,s:I,s:I,s:I,s:I,s:I,s:[i,i],s:[i,i]},s:I,s:I,s:s,s:I,s:b,s:I,s:[f,f,"
-        "f],s:o,s:f,s:o}",
-        "schema", 1, "kind", "dataset", "path", json_text(path), "source", s->source, "views",
-        (json_int_t)s->view_count, "cameras", cameras, "photos", "found", (json_int_t)f->photos.found,
-        "missing", (json_int_t)s->photos_missing, "unreadable", (json_int_t)f->photos.unreadable,
-        "other_size", (json_int_t)f->photos.other_size, "with_alpha", (json_int_t)f->photos.with_alpha,
-        "with_mask", (json_int_t)f->photos.with_mask, "min_size", f->photos.min_width, f->photos.min_height,
-        "max_size", f->photos.max_width, f->photos.max_height, "train_views",
-        (json_int_t)(s->view_count - f->test_views), "test_views", (json_int_t)f->test_views, "split",
-        split_name(s), "points", (json_int_t)s->points.count, "points_have_color", (int)s->points.has_color,
-        "points_dropped", (json_int_t)s->points_dropped, "origin", s->origin[0], s->origin[1], s->origin[2],
-        "point_box", box, "camera_extent", f->extent, "expect", expect_to_json(&f->expect));
+    json_t *problems = json_array();
+    for (size_t i = 0; i < f->photos.problem_count && i < PHOTO_CHECK_SHOWN; i++)
+        json_array_append_new(problems, json_text(f->photos.problem[i]));
+    return json_pack("{s:i,s:s,s:o,s:s,s:I,s:o,s:{s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:[i,i],s:[i,i],s:o},s:"
+                     "I,s:I,s:s,s:I,s:b,s:I,s:[f,f,"
+                     "f],s:o,s:f,s:o}",
+                     "schema", 1, "kind", "dataset", "path", json_text(path), "source", s->source, "views",
+                     (json_int_t)s->view_count, "cameras", cameras, "photos", "found",
+                     (json_int_t)f->photos.found, "missing", (json_int_t)s->photos_missing, "unreadable",
+                     (json_int_t)f->photos.unreadable, "other_shape", (json_int_t)f->photos.other_shape,
+                     "other_size", (json_int_t)f->photos.other_size, "tiny", (json_int_t)f->photos.tiny,
+                     "turned", (json_int_t)f->photos.turned, "with_alpha", (json_int_t)f->photos.with_alpha,
+                     "with_mask", (json_int_t)f->photos.with_mask, "min_size", f->photos.min_width,
+                     f->photos.min_height, "max_size", f->photos.max_width, f->photos.max_height, "problems",
+                     problems, "train_views", (json_int_t)(s->view_count - f->test_views), "test_views",
+                     (json_int_t)f->test_views, "split", split_name(s), "points", (json_int_t)s->points.count,
+                     "points_have_color", (int)s->points.has_color, "points_dropped",
+                     (json_int_t)s->points_dropped, "origin", s->origin[0], s->origin[1], s->origin[2],
+                     "point_box", box, "camera_extent", f->extent, "expect", expect_to_json(&f->expect));
 }
 
 static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
 {
     const scene *s = f->s;
-    const photo_counts *p = &f->photos;
+    const photo_check *p = &f->photos;
     fprintf(out, "%s: data set (%s)\n", path, s->source);
     fprintf(out, "  views     %zu: %zu to train, %zu held out (%s)\n", s->view_count,
             s->view_count - f->test_views, f->test_views, s->has_split ? "by the data set" : "every 8th");
@@ -130,8 +109,14 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
         else if (p->found > 0)
             fprintf(out, ", %d x %d to %d x %d pixels", p->min_width, p->min_height, p->max_width,
                     p->max_height);
+        if (p->other_shape > 0)
+            fprintf(out, ", %zu not of their camera's shape", p->other_shape);
         if (p->other_size > 0)
             fprintf(out, ", %zu not of their camera's size", p->other_size);
+        for (size_t i = 0; i < p->problem_count && i < PHOTO_CHECK_SHOWN; i++)
+            fprintf(out, "\n            %s", p->problem[i]);
+        if (p->problem_count > PHOTO_CHECK_SHOWN)
+            fprintf(out, "\n            and %zu more", p->problem_count - PHOTO_CHECK_SHOWN);
         if (p->with_alpha + p->with_mask > 0)
             fprintf(
                 out,
@@ -155,8 +140,8 @@ static gbt_status info_of_dataset(const char *path, bool json, FILE *out, gbt_er
 {
     scene s;
     GBT_TRY(scene_load(path, NULL, &s, err));
-    dataset_facts facts = {
-        .s = &s, .photos = count_photos(&s), .extent = s.view_count > 0 ? scene_camera_extent(&s) : 0};
+    dataset_facts facts = {.s = &s, .extent = s.view_count > 0 ? scene_camera_extent(&s) : 0};
+    photo_check_all(&s, &facts.photos);
     for (size_t i = 0; i < s.view_count; i++) {
         facts.views_by_model[s.views[i].camera.model]++;
         facts.test_views += s.views[i].is_test;

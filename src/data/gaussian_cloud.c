@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/log.h"
 #include "base/memory.h"
 
 gbt_status gaussian_cloud_alloc(gaussian_cloud *cloud, size_t count, gbt_error *err)
@@ -42,4 +43,15 @@ bool gaussian_limit_scales(float scale_log[3])
         scale_log[k] = fmaxf(scale_log[k], least);
     }
     return changed;
+}
+
+void gaussian_cloud_warn(const gaussian_cloud *cloud, const char *name)
+{
+    if (cloud->dropped + cloud->identity_rotations + cloud->scales_clamped == 0)
+        return;
+    log_warn("%s: of %zu Gaussians %zu were left out (a value is not usable), %zu have no rotation (all "
+             "zero: read as "
+             "none), %zu a scale below 1/%g of their largest (raised to it)",
+             name, cloud->count + cloud->dropped, cloud->dropped, cloud->identity_rotations,
+             cloud->scales_clamped, GAUSSIAN_SCALE_RATIO);
 }

@@ -42,6 +42,9 @@ typedef struct gaussian_cloud {
 gbt_status gaussian_cloud_alloc(gaussian_cloud *cloud, size_t count, gbt_error *err);
 void gaussian_cloud_free(gaussian_cloud *cloud);
 
+/** A warning in one line when rows were left out or mended: how many, and how. `name` of the file. */
+void gaussian_cloud_warn(const gaussian_cloud *cloud, const char *name);
+
 /** Raise the scales of one Gaussian to GAUSSIAN_SCALE_RATIO below their largest; true when that changed
     one. */
 bool gaussian_limit_scales(float scale_log[3]);

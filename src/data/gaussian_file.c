@@ -117,6 +117,8 @@ gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error 
     file.bytes = bytes;
     const gbt_status status = format_of(path)->read(&file, out, err);
     mem_free(bytes);
+    if (status == GBT_OK)
+        gaussian_cloud_warn(out, path);
     return status;
 }
 

@@ -109,6 +109,14 @@ static gbt_status find_columns(const source_file *file, const ply_header *header
         if (columns[FIXED_COLUMNS + rest] < 0)
             break;
     }
+    size_t named = 0;
+    for (size_t k = 0; k < e->property_count; k++) {
+        const ply_property *p = &header->properties[e->first_property + k];
+        named += p->name_length > 7 && memcmp(p->name, "f_rest_", 7) == 0;
+    }
+    if (rest != named)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %zu f_rest properties that are not numbered from 0 on",
+                         file->name, named);
     if (rest != 0 && rest != 9 && rest != 24 && rest != 45)
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: wrong number of f_rest properties (wanted 0, 9, 24 or 45, got %zu)", file->name,
@@ -171,5 +179,7 @@ gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *e
     file.bytes = bytes;
     const gbt_status status = gaussian_ply_read(&file, out, err);
     mem_free(bytes);
+    if (status == GBT_OK)
+        gaussian_cloud_warn(out, path);
     return status;
 }

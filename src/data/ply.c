@@ -177,15 +177,16 @@ static gbt_status read_rows(const source_file *file, const ply_header *header, i
     size_t line = header->line_count;
     double values[PLY_MAX_PROPERTIES];
     kept_list none = {.property = -1};
-    for (int i = 0; i <= element; i++) {
+    /* What follows the wanted element is read too: a file that ends inside of it is damaged. */
+    for (int i = 0; i < (int)header->element_count; i++) {
         const ply_element *e = &header->elements[i];
         GBT_TRY(check_count(file, &c, header, e, err));
         for (uint64_t k = 0; k < e->count; k++) {
             list->count = 0;
             if (header->format == PLY_ASCII)
-                GBT_TRY(take_ascii_row(&c, &line, header, e, values, i < element ? &none : list, err));
+                GBT_TRY(take_ascii_row(&c, &line, header, e, values, i == element ? list : &none, err));
             else
-                GBT_TRY(take_binary_row(&c, header, e, values, i < element ? &none : list, err));
+                GBT_TRY(take_binary_row(&c, header, e, values, i == element ? list : &none, err));
             if (i == element)
                 GBT_TRY(use(context, values, list, err));
         }

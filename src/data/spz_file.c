@@ -174,6 +174,18 @@ static gbt_status unzip(z_stream *z, const char *name, unsigned char *out, size_
     return GBT_OK;
 }
 
+/* The stream ends here: its checksum and its length are right. */
+static gbt_status unzip_end(z_stream *z, const char *name, gbt_error *err)
+{
+    unsigned char more;
+    z->next_out = &more;
+    z->avail_out = 1;
+    if (inflate(z, Z_FINISH) == Z_STREAM_END)
+        return GBT_OK;
+    return base_fail(err, GBT_ERR_FORMAT, "%s: its gzip stream is damaged, or longer or shorter than it says",
+                     name);
+}
+
 static void unpack_rotation(const unsigned char *bytes, unsigned version, float wxyz[4])
 {
     float q[4] = {0, 0, 0, 0}, square = 0;
@@ -250,6 +262,8 @@ static gbt_status read_zipped(z_stream *z, const source_file *file, gaussian_clo
                          file->size);
     unsigned char *streams = mem_alloc(count, row, "splats", err);
     gbt_status status = streams == NULL ? GBT_ERR_NO_MEMORY : unzip(z, file->name, streams, count * row, err);
+    if (status == GBT_OK)
+        status = unzip_end(z, file->name, err);
     if (status == GBT_OK)
         status = gaussian_cloud_alloc(out, count, err);
     if (status == GBT_OK)

@@ -82,6 +82,9 @@ static gbt_status focal_from_angle(const scope *s, char axis, int size, double *
                          "%s: frame %zu: %s: out of range (wanted 0..pi radians, got %g)", s->file->name,
                          s->frame_index, key, angle);
     *focal = 0.5 * size / tan(0.5 * angle);
+    if (!(*focal > 0 && *focal <= RAW_COORDINATE_LIMIT))
+        return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: %s: no lens has this angle (got %g)",
+                         s->file->name, s->frame_index, key, angle);
     return GBT_OK;
 }
 

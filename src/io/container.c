@@ -49,6 +49,19 @@ static uint32_t checksum(const void *bytes, size_t count)
     return (uint32_t)crc32_z(crc32_z(0, NULL, 0), bytes, count);
 }
 
+/* A fuzzer finds no checksum, and what is behind it must hold without. */
+static bool is_sound(uint32_t wanted, const void *bytes, size_t count)
+{
+#ifdef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION
+    (void)wanted;
+    (void)bytes;
+    (void)count;
+    return true;
+#else
+    return wanted == checksum(bytes, count);
+#endif
+}
+
 static size_t dtype_size(container_dtype dtype)
 {
     switch (dtype) {
@@ -258,7 +271,7 @@ static gbt_status check_header(const unsigned char *bytes, size_t byte_count, co
     memcpy(h, bytes, sizeof *h);
     if (memcmp(h->magic, magic, sizeof magic) != 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s@0: not a gbtrace file (wanted \"GBTMODEL\")", path);
-    if (h->crc != checksum(h, sizeof *h - sizeof h->crc))
+    if (!is_sound(h->crc, h, sizeof *h - sizeof h->crc))
         return base_fail(err, GBT_ERR_FORMAT, "%s@0: the header is damaged (checksum)", path);
     if (h->version != VERSION)
         return base_fail(err, GBT_ERR_FORMAT,
@@ -308,7 +321,7 @@ static gbt_status check_row(const unsigned char *bytes, size_t byte_count, const
         if (bytes[gap] != 0)
             return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: not zero between two sections", path, gap);
     s->data = bytes + begin;
-    if (row.crc != checksum(s->data, s->byte_count))
+    if (!is_sound(row.crc, s->data, s->byte_count))
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s is damaged (checksum)", path, begin,
                          row.name);
     memcpy(s->name, row.name, sizeof s->name);
@@ -325,7 +338,7 @@ gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const 
     header h;
     GBT_TRY(check_header(bytes, byte_count, path, &h, err));
     const size_t table_bytes = h.section_count * sizeof(table_row);
-    if (h.table_crc != checksum(bytes + sizeof h, table_bytes))
+    if (!is_sound(h.table_crc, bytes + sizeof h, table_bytes))
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: the table of sections is damaged (checksum)", path,
                          sizeof h);
     container_section *sections = mem_calloc(h.section_count, sizeof *sections, "container sections", err);

@@ -95,7 +95,9 @@ static gbt_status check_alike(const json_fields *root, const camera_path *path, 
 
 static gbt_status take_cameras(const json_fields *root, const double origin[3], int *frames, camera_path *out)
 {
+    int schema = 1;
     size_t count;
+    GBT_TRY(json_field_whole(root, "schema", 1, 1, &schema));
     GBT_TRY(count_of(root, "cameras", &count));
     GBT_TRY(camera_path_alloc(out, count, root->err));
     GBT_TRY(json_field_number(root, "fps", 0, false, fps_most, &out->fps));

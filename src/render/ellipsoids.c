@@ -15,6 +15,8 @@ enum {
     BAND = 16 /* rows of rays that are drawn together */
 };
 
+static const double rays_most = 1e9; /* that are tested against boxes in one drawing */
+
 /** One ellipsoid as its rays meet it: to_unit takes world differences to the unit sphere. */
 typedef struct solid {
     float center[3], to_unit[9], color[3];
@@ -188,6 +190,20 @@ static void blend(const drawing *d, image *out)
         }
 }
 
+/** Solids that all cover the picture hide one another: of more than can be drawn in seconds every n-th stays.
+ */
+static void thin_out(solid *solids, size_t *count)
+{
+    double rays = 0;
+    for (size_t i = 0; i < *count; i++)
+        rays += (double)(solids[i].right - solids[i].left) * (solids[i].bottom - solids[i].top);
+    const size_t step = (size_t)ceil(fmax(rays / rays_most, 1));
+    size_t kept = 0;
+    for (size_t i = 0; i < *count; i += step)
+        solids[kept++] = solids[i];
+    *count = kept;
+}
+
 gbt_status ellipsoids_draw(const ellipsoids *set, const gbt_camera *camera, image *out, gbt_error *err)
 {
     if ((camera->model != GBT_CAMERA_PINHOLE && camera->model != GBT_CAMERA_ORTHOGRAPHIC) ||
@@ -206,6 +222,7 @@ gbt_status ellipsoids_draw(const ellipsoids *set, const gbt_camera *camera, imag
             d.depth[i] = INFINITY;
         for (size_t i = 0; i < set->count; i++)
             d.count += make_solid(set, i, &d, &solids[d.count]);
+        thin_out(solids, &d.count);
         d.solids = solids;
         parallel_blocks((size_t)d.height, BAND, draw_band, &d);
         blend(&d, out);

@@ -26,14 +26,16 @@
 extern "C" {
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/image_header.h"
 #include "base/log.h"
 #include "base/memory.h"
 }
 
 namespace {
 
-constexpr int64_t max_samples = int64_t(1) << 28;
+constexpr int64_t max_samples = IMAGE_SAMPLES_MAX;
 constexpr size_t magic_bytes = 8;
+constexpr size_t reader_bytes = size_t(1) << 20; /* that a reader needs beside the pixels */
 
 struct bytes_owner {
     unsigned char *bytes = nullptr;
@@ -54,20 +56,6 @@ struct opened_image {
     int stored_channels = 0; /* how many of the leading channels we read: 1..4 */
     int channels() const { return is_grey ? stored_channels + 2 : stored_channels; }
 };
-
-const char *plugin_of(const unsigned char *bytes, size_t count)
-{
-    static const unsigned char png[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-    static const unsigned char jpeg[3] = {0xff, 0xd8, 0xff};
-    static const unsigned char exr[4] = {0x76, 0x2f, 0x31, 0x01};
-    if (count >= sizeof png && std::memcmp(bytes, png, sizeof png) == 0)
-        return "png";
-    if (count >= sizeof jpeg && std::memcmp(bytes, jpeg, sizeof jpeg) == 0)
-        return "jpeg";
-    if (count >= sizeof exr && std::memcmp(bytes, exr, sizeof exr) == 0)
-        return "openexr";
-    return nullptr;
-}
 
 std::string first_line(const std::string &text)
 {
@@ -150,15 +138,16 @@ gbt_status png_reduce(const char *path, unsigned char *bytes, size_t *count, gbt
     return GBT_OK;
 }
 
-/* libpng prints these too, and OpenImageIO allocates before it looks. */
-gbt_status png_check_header(const char *path, const unsigned char *bytes, gbt_error *err)
+/* What libpng, libjpeg and OpenEXR allocate is not checked everywhere inside of them: as much must be there
+   before they begin. The file may have become another one since its header was read; that is not a promise.
+ */
+gbt_status check_memory(const char *path, const image_header &header, gbt_error *err)
 {
-    const unsigned char *header = bytes + magic_bytes + 8;
-    const int64_t width = big_endian(header), height = big_endian(header + 4);
-    if (width < 1 || height < 1 || width > max_samples || height > max_samples ||
-        width * height > max_samples)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: image of %u x %u pixels (wanted 1 x 1 to 2^28 samples)",
-                         path, (unsigned)width, (unsigned)height);
+    const size_t samples = size_t(header.width) * size_t(header.height) * 4;
+    void *room = mem_alloc(samples + size_t(reader_bytes), sizeof(float) + 2, path, err);
+    if (room == nullptr)
+        return GBT_ERR_NO_MEMORY;
+    mem_free(room);
     return GBT_OK;
 }
 
@@ -193,47 +182,31 @@ gbt_status check_spec(const char *path, const char *plugin, opened_image *o, gbt
     return GBT_OK;
 }
 
-/* `whole` reads the file into memory; otherwise only JPEG and EXR headers are read, from the path. */
-gbt_status open_image(const char *path, bool whole, opened_image *o, gbt_error *err)
+/* The header comes first: what it refuses costs no memory. */
+gbt_status open_image(const char *path, opened_image *o, gbt_error *err)
 {
-    const char *plugin = nullptr;
-    if (!whole) {
-        if (!file_exists(path))
-            return base_fail(err, GBT_ERR_IO, "%s: cannot open: no such file", path);
-        if (!OIIO::Filesystem::is_regular(path))
-            return base_fail(err, GBT_ERR_IO, "%s: not a regular file", path);
-        unsigned char magic[magic_bytes];
-        const size_t got = OIIO::Filesystem::read_bytes(path, magic, sizeof magic);
-        plugin = plugin_of(magic, got);
-        whole = plugin == nullptr || std::strcmp(plugin, "png") == 0;
-    }
-    if (whole) {
-        const gbt_status status = file_read(path, &o->file.bytes, &o->file.count, err);
-        if (status != GBT_OK)
-            return status;
-        plugin = plugin_of(o->file.bytes, o->file.count);
-    }
-    if (plugin == nullptr)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: not a PNG, JPEG or EXR file", path);
-    if (std::strcmp(plugin, "png") == 0) {
-        gbt_status status = png_reduce(path, o->file.bytes, &o->file.count, err);
-        if (status == GBT_OK)
-            status = png_check_header(path, o->file.bytes, err);
-        if (status != GBT_OK)
-            return status;
-    }
+    static const char *const plugins[] = {"png", "jpeg", "openexr"}; /* by image_kind */
+    image_header header;
+    gbt_status status = image_header_read(path, &header, err);
+    if (status == GBT_OK)
+        status = file_read(path, &o->file.bytes, &o->file.count, err);
+    const char *plugin = plugins[header.kind];
+    if (status == GBT_OK && header.kind == IMAGE_PNG)
+        status = png_reduce(path, o->file.bytes, &o->file.count, err);
+    if (status == GBT_OK)
+        status = check_memory(path, header, err);
+    if (status != GBT_OK)
+        return status;
     o->input = OIIO::ImageInput::create(plugin);
     if (!o->input)
         return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO has no %s reader: %s", path, plugin,
                          reason_of(nullptr).c_str());
     OIIO::ImageSpec config, spec;
     config.attribute("oiio:UnassociatedAlpha", 1); /* colours as stored, not multiplied by alpha */
-    if (whole) {
-        o->proxy = std::make_unique<OIIO::Filesystem::IOMemReader>(o->file.bytes, o->file.count);
-        if (!o->input->set_ioproxy(o->proxy.get()))
-            return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO's %s reader cannot read from memory",
-                             path, plugin);
-    }
+    o->proxy = std::make_unique<OIIO::Filesystem::IOMemReader>(o->file.bytes, o->file.count);
+    if (!o->input->set_ioproxy(o->proxy.get()))
+        return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO's %s reader cannot read from memory", path,
+                         plugin);
     if (!o->input->open(path, spec, config))
         return base_fail(err, GBT_ERR_FORMAT, "%s: cannot be read as %s: %s", path, plugin,
                          reason_of(o->input.get()).c_str());
@@ -455,7 +428,7 @@ template <typename reader> gbt_status read_file(const char *path, image *out, gb
 try {
     std::memset(out, 0, sizeof *out);
     opened_image o;
-    gbt_status status = open_image(path, true, &o, err);
+    gbt_status status = open_image(path, &o, err);
     if (status == GBT_OK)
         status = read(&o);
     if (status != GBT_OK)
@@ -467,21 +440,6 @@ try {
 }
 
 } // namespace
-
-extern "C" gbt_status image_probe(const char *path, int *width, int *height, int *channels, gbt_error *err)
-try {
-    *width = *height = *channels = 0;
-    opened_image o;
-    const gbt_status status = open_image(path, false, &o, err);
-    if (status != GBT_OK)
-        return status;
-    *width = o.input->spec().width;
-    *height = o.input->spec().height;
-    *channels = o.channels();
-    return GBT_OK;
-} catch (...) {
-    return caught(path, GBT_ERR_FORMAT, err);
-}
 
 extern "C" gbt_status image_read(const char *path, image *out, gbt_error *err)
 {

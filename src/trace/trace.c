@@ -226,6 +226,11 @@ static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int 
     return fine && gradient_list_close(&tile->gradients) == GBT_OK;
 }
 
+static bool is_stopped(const trace_scene *scene)
+{
+    return scene->stop != NULL && atomic_load_explicit(scene->stop, memory_order_relaxed);
+}
+
 static void run_tile(size_t index, size_t begin, size_t end, void *context)
 {
     (void)begin;
@@ -236,7 +241,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     tile_rays rays;
     const int x0 = (int)(index % (size_t)p->tiles_across) * TILE_PIXELS,
               y0 = (int)(index / (size_t)p->tiles_across) * TILE_PIXELS;
-    if (atomic_load_explicit(&p->failed, memory_order_relaxed))
+    if (atomic_load_explicit(&p->failed, memory_order_relaxed) || is_stopped(p->scene))
         return;
     gradient_list_free(&tile->gradients);
     memset(tile->d_background, 0, sizeof tile->d_background);
@@ -275,6 +280,8 @@ static gbt_status run_pass(pass *p, gbt_error *err)
     atomic_init(&p->tape_bytes, 0);
     atomic_init(&p->failed, false);
     parallel_blocks(count, 1, run_tile, p);
+    if (is_stopped(scene))
+        return base_fail(err, GBT_ERR_INTERRUPTED, "trace: stopped");
     if (atomic_load(&p->failed))
         return base_fail(err, GBT_ERR_NO_MEMORY, "trace: no memory for the hits of a %d x %d image",
                          p->rays->width, p->rays->height);

@@ -6,6 +6,9 @@
 #ifndef GBT_TRACE_TRACE_H
 #define GBT_TRACE_TRACE_H
 
+#include <stdatomic.h>
+#include <stdbool.h>
+
 #include "base/cpu.h"
 #include "base/gaussians.h"
 #include "base/image.h"
@@ -28,6 +31,7 @@ typedef struct trace_scene {
     trace_kernel kernel;     /* set before trace_build(); default TRACE_TILE */
     size_t tape_bytes_max;   /* tiles whose hits would go beyond this are traced again by trace_backward(), to
                                 the same bits; 0: no limit */
+    const atomic_bool *stop; /* optional (NULL): once true a pass ends with GBT_ERR_INTERRUPTED; borrowed */
     const gaussians *source; /* borrowed from trace_build() */
     gaussian_tree tree;
     gaussian_scene embree; /* in place of the tree, for TRACE_EMBREE */

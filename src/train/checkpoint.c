@@ -13,7 +13,7 @@
 #include "io/row_sections.h"
 #include "train/config.h"
 
-enum { NAME_SIZE = 64 };
+enum { NAME_SIZE = 64, PHOTO_END_BYTES = 2048 };
 
 static void add_field(container_writer *w, const char *prefix, const char *field, int dim_count,
                       const size_t *dims, const float *data)
@@ -70,6 +70,20 @@ static uint64_t hash_of_views(const scene *s)
     return hash;
 }
 
+/* FNV-1a of the sizes of all photos, and of the bytes at both ends of each: another photo under the same name
+   has another one. */
+static uint64_t hash_of_photos(const scene *s)
+{
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < s->view_count; i++) {
+        unsigned char ends[2 * PHOTO_END_BYTES + sizeof(uint64_t)];
+        const size_t count = file_read_ends(s->views[i].path, PHOTO_END_BYTES, ends);
+        for (size_t k = 0; k < count; k++)
+            hash = (hash ^ ends[k]) * 0x100000001b3u;
+    }
+    return hash;
+}
+
 gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
 {
     char config[CONFIG_TEXT_SIZE];
@@ -93,6 +107,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
                         (const uint64_t[]){t->skipped_in_row, t->empty_in_row, t->opacity_raises});
     container_add_small(&w, "seconds", CONTAINER_F64, 1, &t->seconds);
     container_add_small(&w, "views", CONTAINER_U64, 1, (const uint64_t[]){hash_of_views(&t->scene)});
+    container_add_small(&w, "photos", CONTAINER_U64, 1, (const uint64_t[]){hash_of_photos(&t->scene)});
     const exposures *e = &t->exposures;
     const size_t exposure_dims[2] = {e->count, AFFINE_NUMBERS};
     if (e->count > 0) {
@@ -178,6 +193,15 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: made from other data (%.1000s has photos of other names, sizes or cameras)",
                          path, t->scene.folder);
+    uint64_t saved;
+    if (container_section_named(c, "photos") != NULL) { /* older checkpoints have none */
+        GBT_TRY(container_get(c, "photos", CONTAINER_U64, 1, &saved, err));
+        if (saved != hash_of_photos(&t->scene))
+            return base_fail(
+                err, GBT_ERR_FORMAT,
+                "%s: made from other data (%.1000s has photos of the same names, but other pictures)", path,
+                t->scene.folder);
+    }
     if (counters[4] > PACE_SEGMENTS)
         return base_fail(err, GBT_ERR_FORMAT, "%s: pace of %llu parts (limit %d)", path,
                          (unsigned long long)counters[4], PACE_SEGMENTS);

@@ -12,6 +12,7 @@
 #include "base/rng.h"
 #include "base/vec.h"
 #include "bvh/points.h"
+#include "data/photo_check.h"
 #include "train/def.h"
 #include "train/seed_points.h"
 #include "train/sight.h"
@@ -221,6 +222,9 @@ static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no photos to train on (a point cloud alone is not enough)",
                          data);
     GBT_TRY(choose_views(t, err));
+    photo_check check;
+    photo_check_all(&t->scene, &check);
+    photo_check_warn(&check, data);
     GBT_TRY(photos_open(&t->photos, &t->scene, def->downscale, err));
     GBT_TRY(photos_load(&t->photos, t->train_views, t->train_count, err));
     t->extent = scene_camera_extent(&t->scene);

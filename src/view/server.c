@@ -14,6 +14,7 @@
 #include "base/file.h"
 #include "base/memory.h"
 #include "data/number.h"
+#include "view/connections.h"
 #include "view/http.h"
 
 enum { LOG_BYTES_MAX = 1 << 20, BODY_BYTES_MAX = 1 << 16 };
@@ -36,6 +37,12 @@ struct server {
     int waiting_count;
     char *status;
     bool is_closing;
+    connections clients;
+    connection_entry client_entries[SERVER_CONNECTIONS];
+    const struct MHD_Connection *working_for; /* the job that server_next() gave last; NULL: none */
+    atomic_bool nobody_waits;
+    pthread_t watch;
+    bool is_watched;
 };
 
 /* ---- the queue ---- */
@@ -87,8 +94,19 @@ server_job *server_next(server *s, double seconds)
     server_job *job = s->waiting_count > 0 ? s->waiting[0] : NULL;
     if (job != NULL)
         take_out(s, 0);
+    s->working_for = job != NULL ? job->connection : NULL;
+    atomic_store(&s->nobody_waits, false);
     pthread_mutex_unlock(&s->lock);
     return job;
+}
+
+const atomic_bool *server_nobody_waits(const server *s) { return &s->nobody_waits; }
+
+void server_set_request_seconds(server *s, double seconds)
+{
+    pthread_mutex_lock(&s->lock);
+    s->clients.request_seconds = seconds;
+    pthread_mutex_unlock(&s->lock);
 }
 
 const request *server_request(const server_job *job) { return &job->request; }
@@ -96,6 +114,8 @@ const request *server_request(const server_job *job) { return &job->request; }
 void server_answer(server *s, server_job *job, const answer *with)
 {
     pthread_mutex_lock(&s->lock);
+    if (s->working_for == job->connection)
+        s->working_for = NULL;
     job->answer = *with;
     job->is_answered = true;
     MHD_resume_connection(job->connection);
@@ -111,6 +131,38 @@ void server_set_status(server *s, char *json)
     pthread_mutex_lock(&s->lock);
     mem_free(s->status);
     s->status = json;
+    pthread_mutex_unlock(&s->lock);
+}
+
+/* ---- the clients, watched in a thread ---- */
+
+static void *watch_clients(void *context)
+{
+    static const struct timespec pause = {.tv_nsec = 100000000};
+    server *s = context;
+    for (bool go_on = true; go_on;) {
+        pthread_mutex_lock(&s->lock);
+        go_on = !s->is_closing;
+        connections_shut_slow(&s->clients);
+        if (s->working_for != NULL && connections_has_left(&s->clients, s->working_for))
+            atomic_store(&s->nobody_waits, true);
+        pthread_mutex_unlock(&s->lock);
+        if (go_on)
+            nanosleep(&pause, NULL);
+    }
+    return NULL;
+}
+
+static void on_connection(void *context, struct MHD_Connection *connection, void **state,
+                          enum MHD_ConnectionNotificationCode what)
+{
+    server *s = context;
+    (void)state;
+    pthread_mutex_lock(&s->lock);
+    if (what == MHD_CONNECTION_NOTIFY_STARTED)
+        connections_expect_request(&s->clients, connection);
+    else
+        connections_forget(&s->clients, connection);
     pthread_mutex_unlock(&s->lock);
 }
 
@@ -181,8 +233,10 @@ static enum MHD_Result begin(server *s, server_job *job, const char *path)
     }
     pthread_mutex_lock(&s->lock);
     const bool waits = put_in(s, job);
-    if (waits)
+    if (waits) {
+        connections_hold(&s->clients, job->connection);
         MHD_suspend_connection(job->connection);
+    }
     pthread_mutex_unlock(&s->lock);
     if (!waits)
         return refuse(s, job->connection, 503, "error: too many requests wait\n");
@@ -205,6 +259,11 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
         return job != NULL ? MHD_YES : MHD_NO;
     }
     job->connection = connection;
+    if (*body_bytes == 0) {
+        pthread_mutex_lock(&s->lock);
+        connections_expect_taking(&s->clients, connection);
+        pthread_mutex_unlock(&s->lock);
+    }
     if (*body_bytes > 0) { /* not read, and not for long */
         job->body_bytes += *body_bytes;
         *body_bytes = 0;
@@ -222,10 +281,12 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
 static void on_done(void *context, struct MHD_Connection *connection, void **state,
                     enum MHD_RequestTerminationCode how)
 {
+    server *s = context;
     server_job *job = *state;
-    (void)context;
-    (void)connection;
     (void)how;
+    pthread_mutex_lock(&s->lock);
+    connections_expect_request(&s->clients, connection);
+    pthread_mutex_unlock(&s->lock);
     if (job != NULL)
         mem_free(job->answer.bytes);
     mem_free(job);
@@ -254,16 +315,25 @@ gbt_status server_start(const guard *g, int port, const char *log_path, server *
     s->log_path = log_path;
     sem_init(&s->wake, 0, 0);
     pthread_mutex_init(&s->lock, NULL);
+    s->clients = (connections){.entries = s->client_entries,
+                               .capacity = SERVER_CONNECTIONS,
+                               .request_seconds = SERVER_REQUEST_SECONDS,
+                               .answer_seconds = SERVER_ANSWER_SECONDS};
     errno = 0;
     s->daemon = MHD_start_daemon(
         MHD_USE_INTERNAL_POLLING_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, (uint16_t)port, NULL,
         NULL, on_request, s, MHD_OPTION_EXTERNAL_LOGGER, on_message, NULL, MHD_OPTION_SOCK_ADDR,
-        (struct sockaddr *)&address, MHD_OPTION_NOTIFY_COMPLETED, on_done, NULL, MHD_OPTION_CONNECTION_LIMIT,
-        (unsigned)SERVER_CONNECTIONS, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)SERVER_HEAD_BYTES,
-        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)SERVER_SILENT_SECONDS, MHD_OPTION_END);
-    if (s->daemon != NULL)
+        (struct sockaddr *)&address, MHD_OPTION_NOTIFY_COMPLETED, on_done, s, MHD_OPTION_NOTIFY_CONNECTION,
+        on_connection, s, MHD_OPTION_CONNECTION_LIMIT, (unsigned)SERVER_CONNECTIONS,
+        MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)SERVER_HEAD_BYTES, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
+        (unsigned)SERVER_ADDRESS_CONNECTIONS, MHD_OPTION_END);
+    int why = errno;
+    if (s->daemon != NULL) {
+        why = pthread_create(&s->watch, NULL, watch_clients, s);
+        s->is_watched = why == 0;
+    }
+    if (s->is_watched)
         return GBT_OK;
-    const int why = errno;
     server_stop(s);
     *out = NULL;
     return base_fail(err, GBT_ERR_IO, "%s:%d: cannot listen: %s%s", g->host, port,
@@ -280,6 +350,8 @@ void server_stop(server *s)
     while (s->waiting_count > 0)
         resume_with_text(s->waiting[--s->waiting_count], 503, "error: the server ends\n");
     pthread_mutex_unlock(&s->lock);
+    if (s->is_watched)
+        pthread_join(s->watch, NULL);
     if (s->daemon != NULL)
         MHD_stop_daemon(s->daemon);
     pthread_mutex_destroy(&s->lock);

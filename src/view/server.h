@@ -4,13 +4,22 @@
 #ifndef GBT_VIEW_SERVER_H
 #define GBT_VIEW_SERVER_H
 
+#include <stdatomic.h>
+
 #include "view/answer.h"
 #include "view/guard.h"
 #include "view/request.h"
 
-/** Fixed limits: connections at once, waiting jobs, bytes of a request's head, seconds that a silent
-    connection stays. */
-enum { SERVER_CONNECTIONS = 32, SERVER_JOBS = 16, SERVER_HEAD_BYTES = 32 * 1024, SERVER_SILENT_SECONDS = 60 };
+/** Fixed limits: connections at once, of one address, waiting jobs, bytes of a request's head, seconds for a
+   whole request since the connection began or the last answer ended, and to take a whole answer. */
+enum {
+    SERVER_CONNECTIONS = 32,
+    SERVER_ADDRESS_CONNECTIONS = 24,
+    SERVER_JOBS = 16,
+    SERVER_HEAD_BYTES = 32 * 1024,
+    SERVER_REQUEST_SECONDS = 10,
+    SERVER_ANSWER_SECONDS = 120
+};
 
 typedef struct server server;
 
@@ -42,6 +51,13 @@ void server_set_status(server *s, char *json);
     until it is answered. */
 server_job *server_next(server *s, double seconds);
 const request *server_request(const server_job *job);
+
+/** True, in place, as soon as whoever asked for the job of the last server_next() has left: what is made for
+   it may stop. */
+const atomic_bool *server_nobody_waits(const server *s);
+
+/** In place of SERVER_REQUEST_SECONDS, from the next connection on. For tests. */
+void server_set_request_seconds(server *s, double seconds);
 
 /** Send; the answer's bytes are taken over. */
 void server_answer(server *s, server_job *job, const answer *with);

@@ -4,6 +4,7 @@
 #ifndef GBT_VIEW_STUDIO_H
 #define GBT_VIEW_STUDIO_H
 
+#include <stdatomic.h>
 #include <sys/stat.h>
 
 #include "run/loaded_run.h"
@@ -25,9 +26,11 @@ typedef struct studio {
     struct stat loaded;                    /* of the model file that is open */
     gbt_renderer trained;                  /* what the model was trained to be drawn with, and in front of */
     float background[3];
-    loaded_run *run;  /* NULL: nothing has been saved yet */
-    unsigned version; /* 1, 2, ... counts what was opened */
-    char note[600];   /* for people: why there is no picture, or no photo; empty: all is well */
+    loaded_run *run;         /* NULL: nothing has been saved yet */
+    unsigned version;        /* 1, 2, ... counts what was opened */
+    char note[600];          /* for people: why there is no picture, or no photo; empty: all is well */
+    const atomic_bool *stop; /* optional (NULL): once true a picture that is being traced is given up;
+                                borrowed */
     studio_picture last;
     bool drawn; /* the frame's picture is that of `last` too, not the tree alone */
 } studio;

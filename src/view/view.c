@@ -19,6 +19,7 @@ static void wake(void *http) { server_wake(http); }
 static void serve(studio *s, server *http)
 {
     double looked = clock_wall();
+    s->stop = server_nobody_waits(http);
     while (!stop_signal_seen()) {
         server_job *job = server_next(http, look_every_seconds);
         if (job != NULL) {

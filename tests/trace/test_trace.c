@@ -813,6 +813,13 @@ static void wrong_sizes_are_refused(void **state)
                      GBT_ERR_ARGUMENT);
     assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL),
                      GBT_ERR_ARGUMENT); /* no forward pass */
+    /* Nobody wants the picture any more; the next one is drawn. */
+    const atomic_bool stopped = true;
+    scene.stop = &stopped;
+    err = (gbt_error){0};
+    assert_int_equal(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = &rgb}, NULL, &err),
+                     GBT_ERR_INTERRUPTED);
+    scene.stop = NULL;
     assert_ok(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = &rgb}, NULL, NULL));
     assert_int_equal(trace_backward(&scene, &rays, &rgb, &d, NULL, NULL, NULL),
                      GBT_ERR_ARGUMENT); /* without a tape */

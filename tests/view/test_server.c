@@ -297,6 +297,66 @@ static void nobody_waits_for_an_answer_that_nobody_wants(void **state)
     assert_lives();
 }
 
+/* As many as one address may have, each with half a request: they are shut, and the server answers again. */
+static void slow_clients_are_shut(void **state)
+{
+    (void)state;
+    server *other;
+    int slow[SERVER_ADDRESS_CONNECTIONS];
+    assert_ok(server_start(&here, 0, "", &other, NULL));
+    server_set_request_seconds(other, 0.2);
+    for (int i = 0; i < SERVER_ADDRESS_CONNECTIONS; i++) {
+        slow[i] = http_connect(server_port(other));
+        http_write(slow[i], "GET /status HTTP/1.1\r\nX: ", 26);
+    }
+    for (int i = 0; i < SERVER_ADDRESS_CONNECTIONS; i++) {
+        char byte;
+        while (recv(slow[i], &byte, 1, MSG_DONTWAIT) < 0) { /* a byte now and then, until it is closed */
+            http_write(slow[i], "x", 1);
+            usleep(20000);
+        }
+        close(slow[i]);
+    }
+    reply r = http_get(server_port(other), "/status");
+    assert_int_equal(r.code, 200);
+    free(r.text);
+    server_stop(other);
+}
+
+static void one_address_leaves_room_for_others(void **state)
+{
+    (void)state;
+    server *other;
+    int fd[SERVER_CONNECTIONS];
+    assert_ok(server_start(&here, 0, "", &other, NULL));
+    for (int i = 0; i < SERVER_CONNECTIONS; i++)
+        fd[i] = http_connect(server_port(other));
+    /* The last ones are closed unasked, the first stay open. */
+    char byte;
+    assert_int_equal(recv(fd[SERVER_CONNECTIONS - 1], &byte, 1, 0), 0);
+    assert_true(recv(fd[0], &byte, 1, MSG_DONTWAIT) < 0);
+    for (int i = 0; i < SERVER_CONNECTIONS; i++)
+        close(fd[i]);
+    server_stop(other);
+}
+
+static void it_is_known_that_nobody_waits(void **state)
+{
+    (void)state;
+    const int fd = http_ask(port, "/render?view=0");
+    server_job *job = wait_for_job(s);
+    assert_false(atomic_load(server_nobody_waits(s)));
+    close(fd);
+    while (!atomic_load(server_nobody_waits(s)))
+        usleep(10000);
+    answer_with(s, job, "late");
+    const int next = http_ask(port, "/render?view=0");
+    job = wait_for_job(s);
+    assert_false(atomic_load(server_nobody_waits(s)));
+    answer_with(s, job, "here");
+    expect(next, 200, "here");
+}
+
 static void the_end_answers_all(void **state)
 {
     (void)state;
@@ -421,6 +481,9 @@ int main(void)
         cmocka_unit_test(the_newest_picture_wins),
         cmocka_unit_test(the_queue_has_an_end),
         cmocka_unit_test(nobody_waits_for_an_answer_that_nobody_wants),
+        cmocka_unit_test(slow_clients_are_shut),
+        cmocka_unit_test(one_address_leaves_room_for_others),
+        cmocka_unit_test(it_is_known_that_nobody_waits),
         cmocka_unit_test(the_end_answers_all),
         cmocka_unit_test(others_need_the_token),
         cmocka_unit_test(an_address_of_another_machine),

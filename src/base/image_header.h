@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/image_header.h -- what the first bytes of a PNG, JPEG or EXR file say, without its pixels and without
+   the libraries that decode them. */
+#ifndef GBT_BASE_IMAGE_HEADER_H
+#define GBT_BASE_IMAGE_HEADER_H
+
+#include <stdbool.h>
+
+#include "gbtrace/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum image_kind { IMAGE_PNG, IMAGE_JPEG, IMAGE_EXR } image_kind;
+
+/** Largest width * height * channels that is read. */
+#define IMAGE_SAMPLES_MAX (INT64_C(1) << 28)
+
+typedef struct image_header {
+    image_kind kind;
+    int width, height;
+    bool has_alpha;
+    int orientation; /* EXIF: 1 as stored, 3 upside down, 6 and 8 on a side, ...; 1 when there is none */
+} image_header;
+
+/**
+ * Read the header of an image file, and see that the file goes on to its end: PNG by the lengths of its
+ * chunks, JPEG by its end marker, EXR by its table of offsets.
+ *
+ * Whatever this refuses image_read() refuses; pixels may be damaged all the same.
+ *
+ * @return GBT_OK, GBT_ERR_IO (not a file, cannot be read), GBT_ERR_FORMAT (another format, truncated, an
+ * image of no pixels or of more than IMAGE_SAMPLES_MAX samples) Threads: any. Cost: a few reads, whatever the
+ * size of the file.
+ */
+gbt_status image_header_read(const char *path, image_header *out, gbt_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

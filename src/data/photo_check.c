@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/photo_check.c -- the headers of all photos, against their cameras. */
+#include "data/photo_check.h"
+
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#include "base/image_header.h"
+#include "base/log.h"
+#include "data/photo_size.h"
+
+/* A photo of less than a sixteenth of its camera's pixels on a side is no reduced copy that anybody trains
+ * on. */
+enum { TINY_RATIO = 16 };
+
+static void add_problem(photo_check *c, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+static void add_problem(photo_check *c, const char *format, ...)
+{
+    if (c->problem_count < PHOTO_CHECK_SHOWN) {
+        va_list words;
+        va_start(words, format);
+        vsnprintf(c->problem[c->problem_count], PHOTO_CHECK_TEXT, format, words);
+        va_end(words);
+    }
+    c->problem_count++;
+}
+
+static void compare_with_camera(photo_check *c, const scene_view *view, const image_header *h)
+{
+    const gbt_camera *camera = &view->camera;
+    if (!photo_same_aspect(h->width, h->height, camera->width, camera->height)) {
+        c->other_shape++;
+        add_problem(c, "%.250s: %d x %d is not the shape of its camera, %d x %d%s", view->path, h->width,
+                    h->height, camera->width, camera->height,
+                    h->orientation > 4 ? " (it has an EXIF rotation, which is not applied)" : "");
+        return;
+    }
+    c->other_size += h->width != camera->width || h->height != camera->height;
+    if (h->orientation != 1) {
+        c->turned++;
+        add_problem(c, "%.250s: has an EXIF rotation (%d), which is not applied", view->path, h->orientation);
+    }
+    if ((int64_t)TINY_RATIO * h->width < camera->width || (int64_t)TINY_RATIO * h->height < camera->height) {
+        c->tiny++;
+        add_problem(c, "%.250s: is only %d x %d pixels, for a camera of %d x %d", view->path, h->width,
+                    h->height, camera->width, camera->height);
+    }
+}
+
+static void check_view(photo_check *c, const scene_view *view)
+{
+    image_header h, mask;
+    gbt_error err = {0};
+    c->with_mask += view->mask_path != NULL;
+    if (view->mask_path != NULL && image_header_read(view->mask_path, &mask, &err) != GBT_OK) {
+        c->unreadable++;
+        add_problem(c, "%.350s", err.text);
+    }
+    err = (gbt_error){0};
+    if (image_header_read(view->path, &h, &err) != GBT_OK) {
+        c->unreadable++;
+        add_problem(c, "%.350s", err.text);
+        return;
+    }
+    const bool is_first = c->found++ == 0;
+    c->with_alpha += h.has_alpha;
+    c->min_width = is_first || h.width < c->min_width ? h.width : c->min_width;
+    c->min_height = is_first || h.height < c->min_height ? h.height : c->min_height;
+    c->max_width = h.width > c->max_width ? h.width : c->max_width;
+    c->max_height = h.height > c->max_height ? h.height : c->max_height;
+    compare_with_camera(c, view, &h);
+}
+
+void photo_check_all(const scene *s, photo_check *out)
+{
+    *out = (photo_check){0};
+    for (size_t i = 0; i < s->view_count; i++)
+        if (s->views[i].path != NULL)
+            check_view(out, &s->views[i]);
+}
+
+void photo_check_warn(const photo_check *check, const char *data)
+{
+    if (check->turned > 0)
+        log_warn(
+            "%s: %zu photos have an EXIF rotation, which is not applied: they are used as they are stored",
+            data, check->turned);
+    if (check->tiny > 0)
+        log_warn("%s: %zu photos have less than 1/%d of their camera's width or height", data, check->tiny,
+                 (int)TINY_RATIO);
+}

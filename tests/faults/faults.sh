@@ -1,0 +1,133 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# tests/faults/faults.sh -- system calls that fail, and kills at them. Usage: faults.sh PROGRAM SHIM STEP [COMMAND]
+#
+# Each command is run over a tiny scene with its 1st, 1 + STEP-th, ... call of every kind made to fail, and killed there. Wanted: one line and an exit
+# code, or success where a failure does not matter; no temporary file left by a failure; the run that was there before still whole; and after a kill
+# of a training, --resume to the same bits as without.
+set -u
+program=$(realpath "$1") shim=$(realpath "$2") step=$3 only=${4:-}
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failed=0 runs=0
+
+bad() {
+    failed=$((failed + 1))
+    printf 'FAILED  %s: %s\n%s\n' "$1" "$2" "$(head -c 1000 said)"
+}
+
+faulty() { # CALL:N:WHAT, command
+    local what=$1
+    shift
+    # the shell's own line about a killed program goes away
+    { GBT_FAULT=$what GBT_FAULT_COUNT=$work/count LD_PRELOAD=$shim "$@" >said 2>&1 </dev/null; code=$?; } 2>/dev/null
+    runs=$((runs + 1))
+}
+
+prepare() { # a fresh copy of what a command works on
+    rm -rf case
+    mkdir case
+    cp -R base/. case/
+}
+
+look() { # name, kind of end
+    local name=$1 end=$2 errors
+    errors=$(grep -c '^error: ' said)
+    case $end in
+    fail)
+        case $code in
+        0) [ "$errors" = 0 ] || bad "$name" "a success with an error" ;;
+        4 | 5) [ "$errors" = 1 ] || bad "$name" "$errors lines with an error" ;;
+        *) bad "$name" "exit code $code" ;;
+        esac
+        [ -z "$(find case -name '.*.tmp')" ] || bad "$name" "a temporary file is left: $(find case -name '.*.tmp')"
+        ;;
+    kill) [ "$code" = 137 ] || [ "$code" = 0 ] || bad "$name" "exit code $code after a kill" ;;
+    esac
+    # What was there is whole, old or new.
+    if [ -e case/run/model.gbt ]; then
+        "$program" info case/run >info 2>&1 || { cp info said; bad "$name" "the run is damaged"; }
+    fi
+}
+
+go_on() { # name: go on with what was killed, by the same command or by --resume, and compare
+    local run=case/run
+    if [ -e $run/checkpoints/last.gbt ] || [ -e $run/checkpoints/last.gbt.prev ]; then
+        "$program" train case/data -o $run --resume --iterations 6 --threads 1 --quiet >said 2>&1
+    else
+        "$program" train case/data -o $run --overwrite --iterations 6 --threads 1 --quiet >said 2>&1
+    fi
+    code=$?
+    [ $code = 0 ] || { bad "$1" "exit code $code when it goes on"; return; }
+    cmp -s $run/model.gbt "$whole/model.gbt" || bad "$1" "other bits after going on"
+    [ -z "$(find case -name '.*.tmp')" ] || bad "$1" "a temporary file is left after going on"
+}
+
+try() { # name, goes on (yes or no), command...
+    local name=$1 on=$2 call total n each
+    shift 2
+    [ -z "$only" ] || [ "$only" = "$name" ] || return 0
+    for call in open write fsync close rename mkdir memory; do
+        prepare
+        faulty "$call:0:count" "$@"
+        [ $code = 0 ] || { bad "$name" "exit code $code without a fault"; return; }
+        total=$(cat count)
+        [ "$total" -gt 0 ] || [ "$call" = mkdir ] || bad "$name" "no $call was counted: the shim does not work"
+        each=$step
+        [ $call != memory ] || [ "$step" = 1 ] || each=$((total / 3 + 1)) # there are thousands
+        for ((n = 1; n <= total; n += each)); do
+            prepare
+            faulty "$call:$n:fail" "$@"
+            look "$name, $call $n of $total fails" fail
+            [ $call = memory ] && continue
+            prepare
+            faulty "$call:$n:kill" "$@"
+            look "$name, killed at $call $n of $total" kill
+            [ "$on" = no ] || go_on "$name, killed at $call $n of $total"
+        done
+    done
+}
+
+mkdir base
+cp_run() { # iterations of each part: a run in base/run, made in parts
+    rm -rf base/run case
+    local part
+    mv base case # a run tells the name of its data
+    for part in "$@"; do
+        "$program" train case/data -o case/run $([ -d case/run ] && echo --resume) --iterations "$part" --threads 1 --quiet >said 2>&1 ||
+            { bad "a run" "not made"; exit 1; }
+    done
+    mv case base
+}
+"$program" make-scene tabletop -o base/data --width 32 --height 24 --views 4 --points 200 --samples 1 --quiet >said 2>&1 || { bad "a scene" "not made"; exit 1; }
+cp_run 3 6 && cp -R base/run resumed
+cp_run 6 && cp -R base/run straight
+
+rm -rf base/run
+whole=straight
+try make-scene no "$program" make-scene tabletop -o case/made --width 16 --height 16 --views 3 --points 20 --samples 1 --quiet
+try train yes "$program" train case/data -o case/run --iterations 6 --threads 1 --quiet
+cp_run 3
+whole=resumed
+try resume yes "$program" train case/data -o case/run --resume --iterations 6 --threads 1 --quiet
+try render no "$program" render case/run -o case/pictures --data case/data --quiet
+try export no "$program" export case/run -o case/model.ply
+try compress no "$program" compress case/run -o case/small.gbt
+try report no "$program" report case/run
+
+# A full disk as the shell's limit on the size of a file sees it: in blocks of 1024 bytes.
+for limit in 0 1 8 64; do
+    [ -z "$only" ] || break
+    prepare
+    (ulimit -f $limit; "$program" train case/data -o case/run --overwrite --iterations 6 --threads 1 --quiet >"$work/all" 2>&1)
+    code=$?
+    cp all said 2>/dev/null
+    runs=$((runs + 1))
+    case $code in
+    0 | 4) [ -z "$(find case -name '.*.tmp')" ] || bad "files of $limit kB" "a temporary file is left" ;;
+    *) bad "files of $limit kB" "exit code $code" ;;
+    esac
+done
+printf '%d runs, %d failed\n' "$runs" "$failed"
+[ "$failed" = 0 ]

@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/faults/shim.c -- loaded before a program's libraries (LD_PRELOAD): makes one of its system calls
+   fail, or ends the process there.
+
+   GBT_FAULT=CALL:N:WHAT: the N-th CALL (open, write, fsync, close, rename, mkdir, memory; from 1) does WHAT:
+   fail, or kill. GBT_FAULT=CALL:0:count: nothing happens. In each case the number of such calls is written to
+   the file GBT_FAULT_COUNT when the process ends by itself. Calls count when they make, write or rename
+   files; memory is aligned_alloc(), which is all that the program's own code takes. */
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { FILES_MAX = 4096 };
+
+static struct {
+    char call[16];
+    long at;
+    bool kill;
+} fault;
+static atomic_long seen;
+static atomic_bool is_written[FILES_MAX]; /* by number: opened to write */
+
+/* Set before any thread is. */
+__attribute__((constructor)) static void read_fault(void)
+{
+    const char *text = getenv("GBT_FAULT");
+    char what[8] = "";
+    if (text != NULL && sscanf(text, "%15[a-z]:%ld:%7[a-z]", fault.call, &fault.at, what) == 3)
+        fault.kill = strcmp(what, "kill") == 0;
+}
+
+__attribute__((destructor)) static void write_count(void)
+{
+    const char *path = getenv("GBT_FAULT_COUNT");
+    FILE *file = path != NULL ? fopen(path, "w") : NULL;
+    if (file == NULL)
+        return;
+    fprintf(file, "%ld\n", atomic_load(&seen));
+    fclose(file);
+}
+
+/* True when this call is the one that fails. */
+static bool strikes(const char *call)
+{
+    if (strcmp(call, fault.call) != 0 || atomic_fetch_add(&seen, 1) + 1 != fault.at)
+        return false;
+    if (fault.kill)
+        raise(SIGKILL);
+    return true;
+}
+
+static bool fails(const char *call, int why)
+{
+    if (!strikes(call))
+        return false;
+    errno = why;
+    return true;
+}
+
+static void *next(const char *name) { return dlsym(RTLD_NEXT, name); }
+
+static int open_as(const char *name, const char *path, int flags, mode_t mode)
+{
+    int (*real)(const char *, int, ...);
+    *(void **)&real = next(name);
+    const bool writes = (flags & O_ACCMODE) != O_RDONLY && strncmp(path, "/dev/", 5) != 0;
+    if (writes && fails("open", EMFILE))
+        return -1;
+    const int fd = real(path, flags, mode);
+    if (fd >= 0 && fd < FILES_MAX)
+        atomic_store(&is_written[fd], writes);
+    return fd;
+}
+
+#pragma GCC visibility push(default)
+
+int open(const char *path, int flags, ...)
+{
+    va_list more;
+    va_start(more, flags);
+    const mode_t mode = (flags & O_CREAT) != 0 ? va_arg(more, mode_t) : 0;
+    va_end(more);
+    return open_as("open", path, flags, mode);
+}
+
+int open64(const char *path, int flags, ...)
+{
+    va_list more;
+    va_start(more, flags);
+    const mode_t mode = (flags & O_CREAT) != 0 ? va_arg(more, mode_t) : 0;
+    va_end(more);
+    return open_as("open64", path, flags, mode);
+}
+
+static bool counts(int fd) { return fd >= 0 && fd < FILES_MAX && atomic_load(&is_written[fd]); }
+
+ssize_t write(int fd, const void *bytes, size_t count)
+{
+    static ssize_t (*real)(int, const void *, size_t);
+    if (real == NULL)
+        *(void **)&real = next("write");
+    return counts(fd) && fails("write", ENOSPC) ? -1 : real(fd, bytes, count);
+}
+
+int fsync(int fd)
+{
+    static int (*real)(int);
+    if (real == NULL)
+        *(void **)&real = next("fsync");
+    return counts(fd) && fails("fsync", EIO) ? -1 : real(fd);
+}
+
+int close(int fd)
+{
+    static int (*real)(int);
+    if (real == NULL)
+        *(void **)&real = next("close");
+    const bool wanted = counts(fd) && fails("close", EIO);
+    if (fd >= 0 && fd < FILES_MAX)
+        atomic_store(&is_written[fd], false);
+    const int result = real(fd);
+    if (wanted)
+        errno = EIO;
+    return wanted ? -1 : result;
+}
+
+int rename(const char *from, const char *to)
+{
+    static int (*real)(const char *, const char *);
+    if (real == NULL)
+        *(void **)&real = next("rename");
+    return fails("rename", EACCES) ? -1 : real(from, to);
+}
+
+int mkdir(const char *path, mode_t mode)
+{
+    static int (*real)(const char *, mode_t);
+    if (real == NULL)
+        *(void **)&real = next("mkdir");
+    return fails("mkdir", EACCES) ? -1 : real(path, mode);
+}
+
+void *aligned_alloc(size_t align, size_t size)
+{
+    static void *(*real)(size_t, size_t);
+    if (real == NULL)
+        *(void **)&real = next("aligned_alloc");
+    return fails("memory", ENOMEM) ? NULL : real(align, size);
+}

@@ -28,7 +28,7 @@ gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err)
         out->every = (int)every;
     } else {
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "--eval-split: \"%.200s\" (wanted auto, every=N with N >= 2, none or list=FILE)",
+                         "eval_split: \"%.200s\" (wanted auto, every=N with N >= 2, none or list=FILE)",
                          text);
     }
     return GBT_OK;

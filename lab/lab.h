@@ -27,8 +27,8 @@ typedef struct lab_bench_def {
     float proxy_radius; /* a Gaussian ends at this many std-devs, > 0; 0 or NaN: where its response falls to
                            alpha_min. Default 0 */
     gbt_preset preset;  /* the four numbers above win over it. Default GBT_PRESET_AS_TRAINED */
-    const char *kernel; /* "tile" (default, and NULL), "single" or "embree"; or some of them, as
-                           "tile,embree": measured in turn and compared with the first */
+    const char *kernel; /* "list" (default, and NULL), "tile", "single", "embree", or "splats" of the same; or
+                           some of them, as "list,tile": measured in turn and compared with the first */
     size_t tape_bytes_max; /* memory for the hits that forward keeps for the adjoint; what goes beyond is
                               traced again. 0, the default: no limit */
 } lab_bench_def;

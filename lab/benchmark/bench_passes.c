@@ -23,12 +23,15 @@ enum {
     SAMPLE_COUNT
 };
 
-static const char *const kernel_names[] = {
-    [TRACE_TILE] = "tile", [TRACE_SINGLE] = "single", [TRACE_EMBREE] = "embree"};
+static const char *const kernel_names[] = {[TRACE_LIST] = "list",
+                                           [TRACE_TILE] = "tile",
+                                           [TRACE_SINGLE] = "single",
+                                           [TRACE_EMBREE] = "embree",
+                                           [BENCH_SPLATS] = "splats"};
 
-const char *bench_kernel_name(trace_kernel kernel) { return kernel_names[kernel]; }
+const char *bench_kernel_name(int kernel) { return kernel_names[kernel]; }
 
-size_t bench_kernels_parse(const char *list, trace_kernel *out, size_t capacity)
+size_t bench_kernels_parse(const char *list, int *out, size_t capacity)
 {
     size_t count = 0;
     for (const char *word = list;; word++) {
@@ -40,9 +43,9 @@ size_t bench_kernels_parse(const char *list, trace_kernel *out, size_t capacity)
         if (kernel == sizeof kernel_names / sizeof *kernel_names || count == capacity)
             return 0;
         for (size_t i = 0; i < count; i++)
-            if (out[i] == (trace_kernel)kernel)
+            if (out[i] == (int)kernel)
                 return 0;
-        out[count++] = (trace_kernel)kernel;
+        out[count++] = (int)kernel;
         word += length;
         if (*word == '\0')
             return count;

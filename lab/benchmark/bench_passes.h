@@ -51,11 +51,14 @@ gbt_status bench_measure(bench_way *ways, size_t count, const gaussians *g, cons
 
 void bench_way_free(bench_way *way);
 
-/** "tile", "single" or "embree". */
-const char *bench_kernel_name(trace_kernel kernel);
+/** What is measured: a trace_kernel, or splats in their place. */
+enum { BENCH_SPLATS = TRACE_EMBREE + 1, BENCH_KERNELS };
+
+/** "list", "tile", "single", "embree" or "splats". */
+const char *bench_kernel_name(int kernel);
 
 /** A list of kernels, "tile,embree", of at most `capacity`; 0 when there is another word in it, or one
     twice. */
-size_t bench_kernels_parse(const char *list, trace_kernel *out, size_t capacity);
+size_t bench_kernels_parse(const char *list, int *out, size_t capacity);
 
 #endif

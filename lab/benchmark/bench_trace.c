@@ -13,11 +13,11 @@
 #include "data/json_out.h"
 #include "lab/lab.h"
 
-enum { KERNELS_MAX = 3 };
+enum { KERNELS_MAX = BENCH_KERNELS };
 
 lab_bench_def lab_bench_def_default(void)
 {
-    return (lab_bench_def){.repeats = 5, .preset = GBT_PRESET_AS_TRAINED, .kernel = "tile"};
+    return (lab_bench_def){.repeats = 5, .preset = GBT_PRESET_AS_TRAINED, .kernel = "list"};
 }
 
 /* What the caller has given in place of the model's own. */
@@ -46,12 +46,14 @@ static gbt_status override_settings(const lab_bench_def *def, trace_settings *se
 typedef struct measured {
     const lab_bench_def *def;
     const bench_scene *scene;
+    int kernel[KERNELS_MAX];
     bench_way ways[KERNELS_MAX];
+    bench_splat splat;
     bench_error error[KERNELS_MAX]; /* when checked */
     size_t count, check_rays;
 } measured;
 
-enum { ROW_COUNT = 21 };
+enum { ROW_COUNT = 23 };
 typedef struct figure_row {
     const char *label, *key; /* what people read; the name in the file */
     double value;
@@ -66,10 +68,12 @@ static void list_figures(const measured *m, size_t way, figure_row rows[ROW_COUN
     const double n = (double)ray_image_count(&m->scene->rays), packets = n / PACKET_LANES;
     const figure_row all[ROW_COUNT] = {
         {"build, ms", "build_ms", f->build_ms, 2, true},
+        {"build, core-us/ray", "build_core_us_per_ray", f->build_us, 3, true},
         {"forward, ms", NULL, 1000 * f->forward_seconds, 2, true},
         {"forward, core-us/ray", "forward_core_us_per_ray", f->forward_us, 3, true},
         {"adjoint, ms", NULL, 1000 * f->adjoint_seconds, 2, true},
         {"adjoint, core-us/ray", "adjoint_core_us_per_ray", f->adjoint_us, 3, true},
+        {"all three, core-us/ray", "core_us_per_ray", f->build_us + f->forward_us + f->adjoint_us, 3, true},
         {NULL, "forward_seconds", f->forward_seconds, 0, false},
         {NULL, "adjoint_seconds", f->adjoint_seconds, 0, false},
         {"hits per ray", "hits_per_ray", (double)c->hits / n, 2, false},
@@ -93,17 +97,17 @@ static void list_figures(const measured *m, size_t way, figure_row rows[ROW_COUN
 static void print_head(const measured *m, FILE *out)
 {
     const bench_scene *s = m->scene;
-    const bench_way *first = &m->ways[0];
-    const bool embree = first->kernel == TRACE_EMBREE;
-    fprintf(out, "%s: %zu Gaussians (%zu can be seen), %d x %d rays, %d threads, %s\n", m->def->model,
-            s->gaussians->count, embree ? first->traced.embree.box_count : first->traced.tree.box_count,
-            s->rays.width, s->rays.height, parallel_threads(), cpu_isa_name(first->isa));
+    fprintf(out, "%s: %zu Gaussians, %d x %d rays, %d threads, %s\n", m->def->model, s->gaussians->count,
+            s->rays.width, s->rays.height, parallel_threads(), cpu_isa_name(m->ways[0].isa));
+    for (size_t k = 0; k < m->count; k++)
+        if (m->kernel[k] == TRACE_LIST && !m->ways[k].traced.listed)
+            fputs("list: these rays walk the tree\n", out);
     fprintf(out, "alpha_min %g, alpha_max %g, T_min %g, proxy radius %g; medians of %d\n\n",
             (double)s->settings.alpha_min, (double)s->settings.alpha_max,
             (double)s->settings.transmittance_min, (double)s->settings.proxy_radius, m->def->repeats);
 }
 
-/* One column per kernel; of the second and third, how often the first's is in it. */
+/* One column per kernel; of the others, how often the first's is in it. */
 static void print_figures(const measured *m, FILE *out)
 {
     figure_row rows[KERNELS_MAX][ROW_COUNT];
@@ -111,7 +115,7 @@ static void print_figures(const measured *m, FILE *out)
     fprintf(out, "%-26s", "");
     for (size_t k = 0; k < m->count; k++) {
         list_figures(m, k, rows[k]);
-        fprintf(out, k == 0 ? "%10s" : "%10s         ", bench_kernel_name(m->ways[k].kernel));
+        fprintf(out, k == 0 ? "%10s" : "%10s         ", bench_kernel_name(m->kernel[k]));
     }
     fputs("\n", out);
     for (int r = 0; r < ROW_COUNT; r++) {
@@ -130,7 +134,7 @@ static void print_figures(const measured *m, FILE *out)
     }
     for (size_t k = 0; m->def->check && k < m->count; k++)
         fprintf(out, "%s to the double reference (%zu rays): PSNR %.1f dB, max error %.3g\n",
-                bench_kernel_name(m->ways[k].kernel), m->check_rays, m->error[k].psnr, m->error[k].max);
+                bench_kernel_name(m->kernel[k]), m->check_rays, m->error[k].psnr, m->error[k].max);
 }
 
 static json_t *way_to_json(const measured *m, size_t way)
@@ -138,8 +142,10 @@ static json_t *way_to_json(const measured *m, size_t way)
     figure_row rows[ROW_COUNT], first[ROW_COUNT];
     list_figures(m, way, rows);
     list_figures(m, 0, first);
-    json_t *out = json_pack("{s:s,s:s}", "kernel", bench_kernel_name(m->ways[way].kernel), "isa",
+    json_t *out = json_pack("{s:s,s:s}", "kernel", bench_kernel_name(m->kernel[way]), "isa",
                             cpu_isa_name(m->ways[way].isa));
+    if (m->kernel[way] == TRACE_LIST)
+        json_object_set_new(out, "listed", json_boolean(m->ways[way].traced.listed));
     for (int r = 0; r < ROW_COUNT; r++)
         if (rows[r].key != NULL)
             json_object_set_new(out, rows[r].key, json_real(rows[r].value));
@@ -180,7 +186,14 @@ static gbt_status bench(measured *m, bench_scene *traced, bench_reference *want,
         m->ways[k].isa = cpu_best_isa();
         m->ways[k].settings = traced->settings;
         m->ways[k].tape_bytes_max = def->tape_bytes_max;
+        if (m->kernel[k] == BENCH_SPLATS)
+            m->ways[k].splat = &m->splat;
+        else
+            m->ways[k].kernel = (trace_kernel)m->kernel[k];
     }
+    m->splat =
+        (bench_splat){&traced->camera.shot.camera,
+                      traced->run != NULL ? &traced->run->frame.gaussians : traced->gaussians, RASTER_EWA};
     GBT_TRY(bench_measure(m->ways, m->count, traced->gaussians, &traced->rays, def->repeats, err));
     if (def->check)
         GBT_TRY(bench_reference_make(traced->gaussians, &traced->settings, &traced->rays, want, err));
@@ -198,15 +211,13 @@ gbt_status lab_bench_trace(const lab_bench_def *def, FILE *out, gbt_error *err)
     bench_scene traced = {0};
     bench_reference want = {0};
     measured m = {.def = def, .scene = &traced};
-    trace_kernel kernels[KERNELS_MAX];
-    const char *list = def->kernel != NULL ? def->kernel : "tile";
-    m.count = bench_kernels_parse(list, kernels, KERNELS_MAX);
+    const char *list = def->kernel != NULL ? def->kernel : "list";
+    m.count = bench_kernels_parse(list, m.kernel, KERNELS_MAX);
     if (m.count == 0)
-        return base_fail(
-            err, GBT_ERR_ARGUMENT,
-            "--kernel: \"%.60s\" (wanted tile, single or embree, or some of them with commas between)", list);
-    for (size_t k = 0; k < m.count; k++)
-        m.ways[k].kernel = kernels[k];
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "--kernel: \"%.60s\" (wanted list, tile, single, embree or splats, or some of them "
+                         "with commas between)",
+                         list);
     const gbt_status status = bench(&m, &traced, &want, out, err);
     for (size_t k = 0; k < m.count; k++)
         bench_way_free(&m.ways[k]);

@@ -50,6 +50,7 @@ static const speed_step steps[] = {
     {KNOB_KERNEL, "embree", 0, TRACE_EMBREE},
     {KNOB_KERNEL, "single", 0, TRACE_SINGLE},
     {KNOB_KERNEL, "tile", 0, TRACE_TILE},
+    {KNOB_KERNEL, "list", 0, TRACE_LIST},
     {KNOB_ISA, "plain", 0, CPU_PLAIN},
     {KNOB_ISA, "avx2", 0, CPU_AVX2},
     {KNOB_ISA, "avx512", 0, CPU_AVX512},
@@ -67,7 +68,7 @@ static void list_rows(const trace_settings *own, speed_model *out)
             continue;
         speed_row *row = &out->rows[out->row_count++];
         *row = (speed_row){
-            .knob = s->knob, .value = s->value, .settings = *own, .kernel = TRACE_TILE, .isa = best};
+            .knob = s->knob, .value = s->value, .settings = *own, .kernel = TRACE_LIST, .isa = best};
         trace_settings_preset(s->knob == KNOB_PRESET ? (gbt_preset)s->choice : GBT_PRESET_DEFAULT,
                               &row->settings);
         row->is_default = s->knob != KNOB_PRESET && s->number == 0;
@@ -82,7 +83,7 @@ static void list_rows(const trace_settings *own, speed_model *out)
             row->settings.proxy_radius = row->is_default ? row->settings.proxy_radius : s->number;
             break;
         case KNOB_KERNEL:
-            row->kernel = (trace_kernel)s->choice, row->is_default = row->kernel == TRACE_TILE;
+            row->kernel = (trace_kernel)s->choice, row->is_default = row->kernel == TRACE_LIST;
             break;
         case KNOB_ISA:
             row->isa = (cpu_isa)s->choice, row->is_default = row->isa == best;

@@ -9,7 +9,7 @@
 
 struct bench_scene;
 
-enum { SPEED_WAYS_MAX = 28, SPEED_ERRORS = 3, SPEED_MODELS_MAX = 16 };
+enum { SPEED_WAYS_MAX = 29, SPEED_ERRORS = 3, SPEED_MODELS_MAX = 16 };
 
 typedef enum speed_knob {
     KNOB_PRESET,

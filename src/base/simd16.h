@@ -71,6 +71,17 @@ static inline vmask16 vmask16_andnot(vmask16 a, vmask16 b) { return (vmask16)(b 
 static inline unsigned vmask16_bits(vmask16 m) { return m; }
 static inline vmask16 vmask16_from_bits(unsigned bits) { return (vmask16)bits; }
 
+/* first + number of every lane that is true, in order; sixteen places of `out` are written. Returned: how
+   many are true. */
+#define VMASK16_NUMBERS
+static inline unsigned vmask16_numbers(vmask16 m, uint32_t first, uint32_t *out)
+{
+    const __m512i lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    _mm512_storeu_si512(
+        out, _mm512_maskz_compress_epi32(m, _mm512_add_epi32(lane, _mm512_set1_epi32((int)first))));
+    return (unsigned)__builtin_popcount(m);
+}
+
 /* out[j] = all lanes of in[j] combined, j = 0..15, in the fixed order ((e0+e2)+(e1+e3)) per group of 4 lanes,
    then (g0+g1)+(g2+g3). */
 #define VFLOAT16_REDUCE_ROWS(name, op)                                                                       \
@@ -452,6 +463,19 @@ static inline void vfloat16_load_turned(const float *const rows[16], vfloat16 ou
     EACH for (int j = 0; j < 16; j++) out[j].v[i] = rows[i][j];
 }
 #undef EACH
+#endif
+
+#ifndef VMASK16_NUMBERS
+static inline unsigned vmask16_numbers(vmask16 m, uint32_t first, uint32_t *out)
+{
+    const unsigned bits = vmask16_bits(m);
+    unsigned count = 0;
+    for (unsigned i = 0; i < 16; i++) {
+        out[count] = first + i;
+        count += bits >> i & 1;
+    }
+    return count;
+}
 #endif
 
 /* As fmaxf() and fminf() of numbers, but not calls. */

@@ -71,9 +71,10 @@ static const option *options_bench(int *count)
          .kind = OPTION_STRING,
          .value = &def.kernel,
          .value_name = "LIST",
-         .choices = "tile|single|embree",
+         .choices = "list|tile|single|embree|splats",
          .list = true,
-         .help = "tile, single or embree; tile,embree measures both alternately and compares them"},
+         .help =
+             "list, tile, single, embree or splats; list,tile measures both alternately and compares them"},
         {.name = "memory",
          .kind = OPTION_SIZE,
          .value = &def.tape_bytes_max,

@@ -78,42 +78,51 @@ typedef struct reduction {
     float *weight;
 } reduction;
 
+/* The gradient of the fields of Gaussian `i` from its sums; NULL: it was not seen, and may hold anything,
+   even NaN. */
+static void write_gradient(const gaussians *g, const float *records, size_t i, const float *sum,
+                           gaussians *out, float *weight)
+{
+    static const float nothing[GRADIENT_FLOATS];
+    const bool seen = sum != NULL;
+    sum = seen ? sum : nothing;
+    const float *m = records + i * RECORD_FLOATS + RECORD_MATRIX;
+    const float s[3] = {g->scale_x[i], g->scale_y[i], g->scale_z[i]};
+    const float *v = sum + GRADIENT_V, *vv = sum + GRADIENT_VV;
+    out->mean_x[i] = seen ? -2 * (m[0] * v[0] + m[3] * v[1] + m[6] * v[2]) : 0;
+    out->mean_y[i] = seen ? -2 * (m[1] * v[0] + m[4] * v[1] + m[7] * v[2]) : 0;
+    out->mean_z[i] = seen ? -2 * (m[2] * v[0] + m[5] * v[1] + m[8] * v[2]) : 0;
+    out->scale_x[i] = seen ? -2 * vv[0] / s[0] : 0;
+    out->scale_y[i] = seen ? -2 * vv[1] / s[1] : 0;
+    out->scale_z[i] = seen ? -2 * vv[2] / s[2] : 0;
+    const float wx = seen ? 2 * vv[3] * (s[2] / s[1] - s[1] / s[2]) : 0;
+    const float wy = seen ? 2 * vv[4] * (s[0] / s[2] - s[2] / s[0]) : 0;
+    const float wz = seen ? 2 * vv[5] * (s[1] / s[0] - s[0] / s[1]) : 0;
+    const float qw = g->quat_w[i], qx = g->quat_x[i], qy = g->quat_y[i], qz = g->quat_z[i];
+    /* dL/dq = 2 q (0, dL/domega), a quaternion product: tangent to the unit sphere */
+    out->quat_w[i] = seen ? 2 * (-qx * wx - qy * wy - qz * wz) : 0;
+    out->quat_x[i] = seen ? 2 * (qw * wx + qy * wz - qz * wy) : 0;
+    out->quat_y[i] = seen ? 2 * (qw * wy + qz * wx - qx * wz) : 0;
+    out->quat_z[i] = seen ? 2 * (qw * wz + qx * wy - qy * wx) : 0;
+    out->opacity[i] = sum[GRADIENT_OPACITY];
+    out->red[i] = sum[GRADIENT_COLOR];
+    out->green[i] = sum[GRADIENT_COLOR + 1];
+    out->blue[i] = sum[GRADIENT_COLOR + 2];
+    if (weight != NULL)
+        weight[i] = sum[GRADIENT_WEIGHT];
+}
+
 static void reduce_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
     const reduction *job = context;
-    const gaussians *g = job->g;
-    gaussians *out = job->out;
     for (size_t i = begin; i < end; i++) {
         float sum[GRADIENT_FLOATS] = {0};
         for (uint32_t k = job->first[i]; k < job->first[i + 1]; k++)
             for (int j = 0; j < GRADIENT_FLOATS; j++)
                 sum[j] += job->record[k]->sum[j];
-        const float *m = job->records + i * RECORD_FLOATS + RECORD_MATRIX;
-        const float s[3] = {g->scale_x[i], g->scale_y[i], g->scale_z[i]};
-        const float *v = sum + GRADIENT_V, *vv = sum + GRADIENT_VV;
-        const bool seen = job->first[i] != job->first[i + 1]; /* unseen ones may hold anything, even NaN */
-        out->mean_x[i] = seen ? -2 * (m[0] * v[0] + m[3] * v[1] + m[6] * v[2]) : 0;
-        out->mean_y[i] = seen ? -2 * (m[1] * v[0] + m[4] * v[1] + m[7] * v[2]) : 0;
-        out->mean_z[i] = seen ? -2 * (m[2] * v[0] + m[5] * v[1] + m[8] * v[2]) : 0;
-        out->scale_x[i] = seen ? -2 * vv[0] / s[0] : 0;
-        out->scale_y[i] = seen ? -2 * vv[1] / s[1] : 0;
-        out->scale_z[i] = seen ? -2 * vv[2] / s[2] : 0;
-        const float wx = seen ? 2 * vv[3] * (s[2] / s[1] - s[1] / s[2]) : 0;
-        const float wy = seen ? 2 * vv[4] * (s[0] / s[2] - s[2] / s[0]) : 0;
-        const float wz = seen ? 2 * vv[5] * (s[1] / s[0] - s[0] / s[1]) : 0;
-        const float qw = g->quat_w[i], qx = g->quat_x[i], qy = g->quat_y[i], qz = g->quat_z[i];
-        /* dL/dq = 2 q (0, dL/domega), a quaternion product: tangent to the unit sphere */
-        out->quat_w[i] = seen ? 2 * (-qx * wx - qy * wy - qz * wz) : 0;
-        out->quat_x[i] = seen ? 2 * (qw * wx + qy * wz - qz * wy) : 0;
-        out->quat_y[i] = seen ? 2 * (qw * wy + qz * wx - qx * wz) : 0;
-        out->quat_z[i] = seen ? 2 * (qw * wz + qx * wy - qy * wx) : 0;
-        out->opacity[i] = sum[GRADIENT_OPACITY];
-        out->red[i] = sum[GRADIENT_COLOR];
-        out->green[i] = sum[GRADIENT_COLOR + 1];
-        out->blue[i] = sum[GRADIENT_COLOR + 2];
-        if (job->weight != NULL)
-            job->weight[i] = sum[GRADIENT_WEIGHT];
+        write_gradient(job->g, job->records, i, job->first[i] != job->first[i + 1] ? sum : NULL, job->out,
+                       job->weight);
     }
 }
 
@@ -148,6 +157,42 @@ gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *l
     reduction job = {
         .g = g, .records = records, .record = order->record, .first = first, .out = out, .weight = weight};
     parallel_blocks(g->count, RECORD_BLOCK, reduce_block, &job);
+    return GBT_OK;
+}
+
+typedef struct list_reduction {
+    const list_kernel *kernel;
+    const kernel_scene *scene;
+    const list_view *view;
+    const gaussians *g;
+    gaussians *out;
+    float *weight;
+} list_reduction;
+
+/* Gaussians [begin, end), whose records are those of a block. */
+static void reduce_view_block(size_t block, size_t begin, size_t end, void *context)
+{
+    const list_reduction *job = context;
+    const size_t kept = job->view->kept[block].records;
+    gradient_record sum[VIEW_GRAIN];
+    job->kernel->turn_sums(job->scene, job->view, begin, begin + kept, sum);
+    size_t next = 0;
+    for (size_t i = begin; i < end; i++) {
+        const bool listed = next < kept && sum[next].id == i,
+                   seen = listed && sum[next].sum[GRADIENT_WEIGHT] > 0;
+        write_gradient(job->g, job->scene->records, i, seen ? sum[next].sum : NULL, job->out, job->weight);
+        next += listed;
+    }
+}
+
+gbt_status gradients_reduce_view(const list_kernel *kernel, const kernel_scene *scene, const list_view *view,
+                                 const gaussians *g, gaussians *out, float *weight, gbt_error *err)
+{
+    GBT_TRY(gaussians_resize(out, g->count, err));
+    gaussians_zero(out);
+    list_reduction job = {
+        .kernel = kernel, .scene = scene, .view = view, .g = g, .out = out, .weight = weight};
+    parallel_blocks(g->count, VIEW_GRAIN, reduce_view_block, &job);
     return GBT_OK;
 }
 

@@ -5,6 +5,7 @@
 
 #include "base/gaussians.h"
 #include "trace/kernel.h"
+#include "trace/list_view.h"
 
 /** Forget the hash table and cut the array to what is used. GBT_OK or GBT_ERR_NO_MEMORY. */
 gbt_status gradient_list_close(gradient_list *list);
@@ -36,6 +37,15 @@ typedef struct gradient_order {
 gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *lists, size_t list_count,
                             const gaussians *g, const float *records, gaussians *out, float *weight,
                             gbt_error *err);
+
+/**
+ * The same from what the tiles of a view left in the slots of their pairs.
+ *
+ * @return GBT_OK or GBT_ERR_NO_MEMORY
+ * Threads: uses all; same bits for every thread count.
+ */
+gbt_status gradients_reduce_view(const list_kernel *kernel, const kernel_scene *scene, const list_view *view,
+                                 const gaussians *g, gaussians *out, float *weight, gbt_error *err);
 
 void gradient_order_free(gradient_order *order); /* back to {0} */
 

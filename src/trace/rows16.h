@@ -15,15 +15,9 @@
 #ifndef GBT_TRACE_ROWS16_H
 #define GBT_TRACE_ROWS16_H
 
-#include "trace/gaussian16.h"
+#include "trace/packet_extra16.h"
 
 enum { ROW_CAPACITY = 512, ROW_BLOCK = 4 /* rows whose windows are walked together */ };
-
-/* What a ray shows beside its colour. */
-typedef struct packet_extra {
-    vfloat16 depth, median, normal[3], count, top_weight;
-    _Alignas(64) uint32_t top_id[PACKET_LANES];
-} packet_extra;
 
 typedef struct packet_rows {
     _Alignas(64) float t[ROW_CAPACITY * PACKET_LANES]; /* infinity where the ray has no hit left in this row

@@ -36,9 +36,7 @@ enum {
 
 static void start_packet(packet_rows *p, const packet_rays *rays)
 {
-    const vfloat16 zero = vfloat16_set1(0);
-    p->extra = (packet_extra){zero, vfloat16_set1(INFINITY), {zero, zero, zero}, zero, zero, {0}};
-    memset(p->extra.top_id, 0xFF, sizeof p->extra.top_id);
+    start_extra(&p->extra);
     p->far = vfloat16_load(rays->far);
     p->count = 0;
     p->transmittance = vfloat16_set1(1);
@@ -112,31 +110,6 @@ static bool close_rows(packet_rows *p, int packet, float horizon, const round_ro
     return true;
 }
 
-/* What a blended row adds to the outputs beside colour. */
-static void note_row(packet_rows *p, const packet_rays *rays, const float *record, uint32_t id, vmask16 blend,
-                     vfloat16 weight, vfloat16 next, vfloat16 t)
-{
-    packet_extra *e = &p->extra;
-    const vfloat16 zero = vfloat16_set1(0);
-    float normal[3];
-    shortest_axis(record, normal);
-    const vfloat16 dir[3] = {vfloat16_load(rays->dir[0]), vfloat16_load(rays->dir[1]),
-                             vfloat16_load(rays->dir[2])};
-    const vfloat16 toward = vfloat16_select(vfloat16_lt(dot_lanes(normal, dir), zero), weight,
-                                            vfloat16_sub(zero, weight)); /* normals look at the camera */
-    for (int k = 0; k < 3; k++)
-        e->normal[k] = vfloat16_fma(toward, vfloat16_set1(normal[k]), e->normal[k]);
-    e->depth = vfloat16_fma(weight, vfloat16_select(blend, t, zero), e->depth);
-    e->median =
-        vfloat16_min(e->median, vfloat16_select(vmask16_and(blend, vfloat16_lt(next, vfloat16_set1(0.5f))), t,
-                                                vfloat16_set1(INFINITY)));
-    e->count = vfloat16_add_where(blend, e->count, vfloat16_set1(1));
-    const vmask16 top = vfloat16_lt(e->top_weight, weight);
-    e->top_weight = vfloat16_max(e->top_weight, weight);
-    for (unsigned bits = vmask16_bits(top); bits != 0; bits &= bits - 1)
-        e->top_id[__builtin_ctz(bits)] = id;
-}
-
 /* Blend all hits nearer than `horizon`; keep the rest. */
 static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, const packet_rays *rays,
                        float horizon, hit_tape *tape, round_rows *o, kernel_counters *counters)
@@ -170,7 +143,7 @@ static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, co
             for (int c = 0; c < 3; c++)
                 p->rgb[c] = vfloat16_fma(weight, vfloat16_set1(color[c]), p->rgb[c]);
             if (scene->extra)
-                note_row(p, rays, color - RECORD_COLOR, p->id[row], blend, weight, next,
+                note_row(&p->extra, rays, color - RECORD_COLOR, p->id[row], blend, weight, next,
                          row_load(o->t, first + k));
             p->blended[row] = (uint16_t)(p->blended[row] | vmask16_bits(blend));
         }
@@ -427,12 +400,7 @@ static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const 
                                                            vfloat16_set1(scene->settings.background[c]),
                                                            s->packet[p].rgb[c]));
             vfloat16_store(out[p].transmittance, s->packet[p].transmittance);
-            const packet_extra *e = &s->packet[p].extra;
-            vfloat16_store(out[p].weighted_depth, e->depth), vfloat16_store(out[p].median_depth, e->median),
-                vfloat16_store(out[p].hit_count, e->count);
-            for (int k = 0; k < 3; k++)
-                vfloat16_store(out[p].normal[k], e->normal[k]);
-            memcpy(out[p].strongest, e->top_id, sizeof e->top_id);
+            store_extra(&s->packet[p].extra, &out[p]);
             continue;
         }
         counters->spilled_packets += rays->packet[p].active != 0;

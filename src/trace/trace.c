@@ -37,6 +37,19 @@ static const tile_kernel *kernel_for(cpu_isa isa)
     return &tile_kernel_plain;
 }
 
+static const list_kernel *list_kernel_for(cpu_isa isa)
+{
+    switch (isa) {
+    case CPU_AVX512:
+        return &list_kernel_avx512;
+    case CPU_AVX2:
+        return &list_kernel_avx2;
+    case CPU_PLAIN:
+        break;
+    }
+    return &list_kernel_plain;
+}
+
 /* ---- build ---- */
 
 static void write_records(size_t block, size_t begin, size_t end, void *context)
@@ -64,6 +77,16 @@ static void write_records(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
+static gbt_status build_tree(trace_scene *scene, gbt_error *err)
+{
+    if (scene->tree_ready)
+        return GBT_OK;
+    GBT_TRY(gaussian_tree_build(scene->source, scene->settings.alpha_min, scene->settings.proxy_radius,
+                                scene->reach, &scene->tree, err));
+    scene->tree_ready = true;
+    return GBT_OK;
+}
+
 gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_settings *settings, float reach,
                        gbt_error *err)
 {
@@ -74,10 +97,11 @@ gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_setti
     GBT_TRY(mem_reserve((void **)&scene->records, &scene->record_capacity, 0, g->count + 1,
                         RECORD_FLOATS * sizeof(float), "gaussian records", err));
     parallel_blocks(g->count, RECORD_BLOCK, write_records, scene);
+    scene->tree_ready = false;
     if (scene->kernel == TRACE_EMBREE)
         return gaussian_scene_build(g, settings->alpha_min, settings->proxy_radius, reach, &scene->embree,
                                     err);
-    return gaussian_tree_build(g, settings->alpha_min, settings->proxy_radius, reach, &scene->tree, err);
+    return scene->kernel == TRACE_LIST ? GBT_OK : build_tree(scene, err);
 }
 
 static kernel_scene scene_for_kernel(const trace_scene *scene)
@@ -92,6 +116,49 @@ static kernel_scene scene_for_kernel(const trace_scene *scene)
                               expf(-0.5f * scene->settings.proxy_radius * scene->settings.proxy_radius)};
 }
 
+/* ---- memory of the tiles in flight, from tile to tile ---- */
+
+typedef struct tile_scratch {
+    kernel_scratch tree;
+    list_scratch list;
+} tile_scratch;
+
+static void scratch_free(tile_scratch *s)
+{
+    mem_free(s->tree.rows);
+    mem_free(s->tree.hits);
+    mem_free(s->tree.heap);
+    mem_free(s->tree.lane_hits);
+    list_scratch_free(&s->list);
+}
+
+enum { POOL_PLACES = 64 };
+typedef struct scratch_pool {
+    atomic_bool taken[POOL_PLACES];
+    tile_scratch place[POOL_PLACES];
+} scratch_pool;
+
+/* A place that nobody uses; NULL when all are taken. */
+static tile_scratch *scratch_take(scratch_pool *pool)
+{
+    for (int i = 0; i < POOL_PLACES; i++)
+        if (!atomic_exchange(&pool->taken[i], true))
+            return &pool->place[i];
+    return NULL;
+}
+
+static void scratch_give(scratch_pool *pool, const tile_scratch *place)
+{
+    atomic_store(&pool->taken[place - pool->place], false);
+}
+
+static void scratch_pool_free(scratch_pool *pool)
+{
+    for (int i = 0; pool != NULL && i < POOL_PLACES; i++)
+        scratch_free(&pool->place[i]);
+    mem_free(pool);
+}
+
 /* ---- passes over the image ---- */
 
 typedef struct pass {
@@ -99,6 +166,7 @@ typedef struct pass {
     kernel_scene view;
     const tile_kernel *kernel;
     tile_forward_fn *forward;
+    const list_kernel *list; /* NULL: by `forward` and the tree */
     const ray_image *rays;
     int tiles_across;
     bool keep_tape;
@@ -117,30 +185,68 @@ static bool lane_pixel(const ray_image *rays, int x0, int y0, int packet, int la
     return x < rays->width && y < rays->height;
 }
 
+/* First pixel of a packet all of whose pixels lie in the image; false for others. */
+static bool packet_pixel(const ray_image *rays, int x0, int y0, int packet, size_t *out)
+{
+    const int x = x0 + packet % TILE_ACROSS * PACKET_PIXELS, y = y0 + packet / TILE_ACROSS * PACKET_PIXELS;
+    *out = (size_t)y * (size_t)rays->width + (size_t)x;
+    return x + PACKET_PIXELS <= rays->width && y + PACKET_PIXELS <= rays->height;
+}
+
+/* Written so that NaN fails: a ray that is not a unit vector from a sensible place sees the background. */
+static bool ray_is_sound(const float d[3], const float o[3])
+{
+    const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    return square > 0.99f && square < 1.01f && fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f;
+}
+
+/* A ray of the packet; it is not active when it is outside the image or none. */
+static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
+{
+    const float *d = rays->dir + 3 * at, *o = ray_image_origin(rays, at);
+    if (!ray_is_sound(d, o))
+        return;
+    for (int axis = 0; axis < 3; axis++) {
+        p->dir[axis][lane] = d[axis];
+        p->origin[axis][lane] = o[axis];
+    }
+    p->far[lane] = rays->far == NULL ? INFINITY : rays->far[at];
+    p->active |= 1u << lane;
+}
+
+/* The common case: pixels in the image, rays from one point, nothing in their way. */
+static void load_whole_packet(const ray_image *rays, size_t first, packet_rays *p)
+{
+    for (int row = 0; row < PACKET_PIXELS; row++) {
+        const float *d = rays->dir + 3 * (first + (size_t)row * (size_t)rays->width);
+        for (int i = 0; i < PACKET_PIXELS; i++)
+            for (int axis = 0; axis < 3; axis++)
+                p->dir[axis][PACKET_PIXELS * row + i] = d[3 * i + axis];
+    }
+    for (int axis = 0; axis < 3; axis++)
+        for (int lane = 0; lane < PACKET_LANES; lane++)
+            p->origin[axis][lane] = rays->origin[axis];
+    for (int lane = 0; lane < PACKET_LANES; lane++) {
+        const float d[3] = {p->dir[0][lane], p->dir[1][lane], p->dir[2][lane]};
+        p->far[lane] = INFINITY;
+        p->active |= (unsigned)ray_is_sound(d, rays->origin) << lane;
+    }
+}
+
 /* Rays of the tile whose first pixel is (x0, y0); lanes outside the image or without a ray are not active. */
 static void load_tile(const ray_image *rays, int x0, int y0, tile_rays *out)
 {
     out->common_origin = rays->common_origin;
     for (int packet = 0; packet < TILE_PACKETS; packet++) {
         packet_rays *p = &out->packet[packet];
+        size_t at;
         p->active = 0;
-        for (int lane = 0; lane < PACKET_LANES; lane++) {
-            size_t at;
-            if (!lane_pixel(rays, x0, y0, packet, lane, &at))
-                continue;
-            const float *d = rays->dir + 3 * at, *o = ray_image_origin(rays, at);
-            const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            /* Written so that NaN fails: a ray that is not a unit vector from a sensible place sees the
-               background. */
-            if (!(square > 0.99f && square < 1.01f) || !(fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f))
-                continue;
-            for (int axis = 0; axis < 3; axis++) {
-                p->dir[axis][lane] = d[axis];
-                p->origin[axis][lane] = o[axis];
-            }
-            p->far[lane] = rays->far == NULL ? INFINITY : rays->far[at];
-            p->active |= 1u << lane;
-        }
+        if (packet_pixel(rays, x0, y0, packet, &at) && rays->common_origin && rays->far == NULL)
+            load_whole_packet(rays, at, p);
+        else
+            for (int lane = 0; lane < PACKET_LANES; lane++)
+                if (lane_pixel(rays, x0, y0, packet, lane, &at))
+                    load_ray(rays, at, lane, p);
         if (p->active == 0 || p->active == (1u << PACKET_LANES) - 1)
             continue;
         const int first = __builtin_ctz(p->active);
@@ -178,22 +284,61 @@ static void store_pixel(const pass *p, size_t at, const packet_output *o, int la
         out->strongest[at] = o == NULL ? UINT32_MAX : o->strongest[lane];
 }
 
+static void store_colors(const pass *p, size_t first, const packet_output *o)
+{
+    for (int row = 0; row < PACKET_PIXELS; row++) {
+        float *to = p->out.rgb->pixels + 3 * (first + (size_t)row * (size_t)p->rays->width);
+        for (int i = 0; i < PACKET_PIXELS; i++)
+            for (int c = 0; c < 3; c++)
+                to[3 * i + c] = o->rgb[c][PACKET_PIXELS * row + i];
+    }
+}
+
+static bool trace_tile_rays(pass *p, trace_tile *tile, const tile_rays *rays, packet_output out[TILE_PACKETS],
+                            bool keep_tape, tile_scratch *scratch, kernel_counters *counters)
+{
+    hit_tape *tape = keep_tape ? &tile->tape : NULL;
+    if (p->list == NULL)
+        return p->forward(&p->view, rays, out, tape, &scratch->tree, counters);
+    return p->list->forward(&p->view, &p->scene->lists.view, (size_t)(tile - p->scene->tiles), rays, out,
+                            tape, &scratch->list, counters);
+}
+
+/* The tapes of lists are filled again view after view, and keep their memory. */
+static void empty_tape(const pass *p, hit_tape *tape)
+{
+    if (p->list != NULL)
+        tape->count = 0;
+    else
+        hit_tape_free(tape);
+}
+
 static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x0, int y0,
-                         kernel_scratch *scratch)
+                         tile_scratch *scratch)
 {
     packet_output out[TILE_PACKETS];
-    if (!p->forward(&p->view, rays, out, p->keep_tape ? &tile->tape : NULL, scratch, &tile->counters))
+    if (!trace_tile_rays(p, tile, rays, out, p->keep_tape, scratch, &tile->counters))
         return false;
-    for (int packet = 0; packet < TILE_PACKETS; packet++)
+    const bool color_alone = !p->view.extra && p->out.transmittance == NULL;
+    for (int packet = 0; packet < TILE_PACKETS; packet++) {
+        size_t first;
+        if (packet_pixel(p->rays, x0, y0, packet, &first) && color_alone &&
+            rays->packet[packet].active == (1u << PACKET_LANES) - 1) {
+            store_colors(p, first, &out[packet]);
+            continue;
+        }
         for (int lane = 0; lane < PACKET_LANES; lane++) {
             size_t at;
             if (lane_pixel(p->rays, x0, y0, packet, lane, &at))
                 store_pixel(p, at, rays->packet[packet].active >> lane & 1 ? &out[packet] : NULL, lane);
         }
+    }
     const size_t bytes = tile->tape.count * sizeof *tile->tape.entries;
     tile->tape_dropped = p->keep_tape &&
                          atomic_fetch_add(&p->tape_bytes, bytes) + bytes > p->scene->tape_bytes_max &&
                          p->scene->tape_bytes_max > 0;
+    if (!tile->tape_dropped && p->list != NULL)
+        return true;
     if (!tile->tape_dropped)
         return mem_trim((void **)&tile->tape.entries, &tile->tape.capacity, tile->tape.count,
                         sizeof *tile->tape.entries, "hit tape", NULL) == GBT_OK;
@@ -201,11 +346,27 @@ static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x
     return true;
 }
 
+static void load_gradients(const pass *p, size_t first, float d_rgb[3][PACKET_LANES])
+{
+    for (int row = 0; row < PACKET_PIXELS; row++) {
+        const float *d = p->d_rgb->pixels + 3 * (first + (size_t)row * (size_t)p->rays->width);
+        for (int i = 0; i < PACKET_PIXELS; i++)
+            for (int c = 0; c < 3; c++)
+                d_rgb[c][PACKET_PIXELS * row + i] = d[3 * i + c];
+    }
+}
+
 static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x0, int y0,
-                          kernel_scratch *scratch)
+                          tile_scratch *scratch)
 {
     _Alignas(64) float d_rgb[TILE_PACKETS][3][PACKET_LANES] = {0};
-    for (int packet = 0; packet < TILE_PACKETS; packet++)
+    for (int packet = 0; packet < TILE_PACKETS; packet++) {
+        size_t first;
+        if (packet_pixel(p->rays, x0, y0, packet, &first) &&
+            rays->packet[packet].active == (1u << PACKET_LANES) - 1) {
+            load_gradients(p, first, d_rgb[packet]);
+            continue;
+        }
         for (int lane = 0; lane < PACKET_LANES; lane++) {
             size_t at;
             if (!lane_pixel(p->rays, x0, y0, packet, lane, &at))
@@ -217,12 +378,17 @@ static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int 
                 else
                     tile->d_background[c] += d[c]; /* the pixel is the background */
         }
+    }
     packet_output again[TILE_PACKETS];
     kernel_counters counters = {0};
-    bool fine = !tile->tape_dropped || p->forward(&p->view, rays, again, &tile->tape, scratch, &counters);
-    fine = fine && p->kernel->backward(&p->view, rays, d_rgb, tile->tape.entries, &tile->gradients,
-                                       tile->d_background, scratch);
-    hit_tape_free(&tile->tape);
+    bool fine = !tile->tape_dropped || trace_tile_rays(p, tile, rays, again, true, scratch, &counters);
+    if (p->list == NULL)
+        fine = fine && p->kernel->backward(&p->view, rays, d_rgb, tile->tape.entries, &tile->gradients,
+                                           tile->d_background, &scratch->tree);
+    else
+        fine = fine && p->list->backward(&p->view, &p->scene->lists.view, (size_t)(tile - p->scene->tiles),
+                                         rays, d_rgb, &tile->tape, tile->d_background, &scratch->list);
+    empty_tape(p, &tile->tape);
     return fine && gradient_list_close(&tile->gradients) == GBT_OK;
 }
 
@@ -237,7 +403,6 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     (void)end;
     pass *p = context;
     trace_tile *tile = &p->scene->tiles[index];
-    kernel_scratch scratch = {0};
     tile_rays rays;
     const int x0 = (int)(index % (size_t)p->tiles_across) * TILE_PIXELS,
               y0 = (int)(index / (size_t)p->tiles_across) * TILE_PIXELS;
@@ -246,18 +411,20 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     gradient_list_free(&tile->gradients);
     memset(tile->d_background, 0, sizeof tile->d_background);
     if (p->d_rgb == NULL) {
-        hit_tape_free(&tile->tape);
+        empty_tape(p, &tile->tape);
         memset(&tile->counters, 0, sizeof tile->counters);
     }
     load_tile(p->rays, x0, y0, &rays);
-    const bool fine = p->d_rgb == NULL ? forward_tile(p, tile, &rays, x0, y0, &scratch)
-                                       : backward_tile(p, tile, &rays, x0, y0, &scratch);
+    tile_scratch own = {{0}, {0}}, *place = scratch_take(p->scene->scratch),
+                 *scratch = place != NULL ? place : &own;
+    const bool fine = p->d_rgb == NULL ? forward_tile(p, tile, &rays, x0, y0, scratch)
+                                       : backward_tile(p, tile, &rays, x0, y0, scratch);
+    if (place != NULL)
+        scratch_give(p->scene->scratch, place);
+    else
+        scratch_free(&own);
     if (!fine)
         atomic_store(&p->failed, true);
-    mem_free(scratch.rows);
-    mem_free(scratch.hits);
-    mem_free(scratch.heap);
-    mem_free(scratch.lane_hits);
 }
 
 static gbt_status run_pass(pass *p, gbt_error *err)
@@ -273,7 +440,11 @@ static gbt_status run_pass(pass *p, gbt_error *err)
         memset(scene->tiles + old, 0, (scene->tile_capacity - old) * sizeof *scene->tiles);
     }
     scene->tile_count = count;
+    if (scene->scratch == NULL &&
+        (scene->scratch = mem_calloc(1, sizeof *scene->scratch, "scratch of tiles", err)) == NULL)
+        return GBT_ERR_NO_MEMORY;
     p->kernel = kernel_for(cpu_best_isa());
+    p->list = scene->listed ? list_kernel_for(cpu_best_isa()) : NULL;
     p->forward = scene->kernel == TRACE_EMBREE   ? p->kernel->forward_embree
                  : scene->kernel == TRACE_SINGLE ? p->kernel->forward_single
                                                  : p->kernel->forward;
@@ -288,6 +459,18 @@ static gbt_status run_pass(pass *p, gbt_error *err)
     return GBT_OK;
 }
 
+/* Lists of the tiles for TRACE_LIST when they can be made, else the tree. */
+static gbt_status prepare_view(trace_scene *scene, const ray_image *rays, gbt_error *err)
+{
+    scene->listed = false;
+    if (scene->kernel != TRACE_LIST)
+        return GBT_OK;
+    const kernel_scene view = scene_for_kernel(scene);
+    GBT_TRY(view_lists_make(&scene->lists, list_kernel_for(cpu_best_isa()), &view, scene->source, rays,
+                            &scene->listed, err));
+    return scene->listed ? GBT_OK : build_tree(scene, err);
+}
+
 gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out,
                          kernel_counters *counters, gbt_error *err)
 {
@@ -295,6 +478,7 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
     if (rgb->width != rays->width || rgb->height != rays->height || rgb->channels != 3)
         return base_fail(err, GBT_ERR_ARGUMENT, "trace: image is %d x %d x %d (wanted %d x %d x 3)",
                          rgb->width, rgb->height, rgb->channels, rays->width, rays->height);
+    GBT_TRY(prepare_view(scene, rays, err));
     pass p = {
         .scene = scene, .view = scene_for_kernel(scene), .rays = rays, .keep_tape = keep_tape, .out = *out};
     p.view.extra = out->depth != NULL || out->median_depth != NULL || out->normal != NULL ||
@@ -321,17 +505,12 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
     return GBT_OK;
 }
 
-gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb,
-                          gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err)
+static gbt_status reduce(const pass *p, gaussians *d_gaussians, float *weight, gbt_error *err)
 {
-    if (scene->tape_width != rays->width || scene->tape_height != rays->height ||
-        d_rgb->width != rays->width || d_rgb->height != rays->height)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "trace: adjoint of %d x %d rays, but the kept forward pass has %d x %d", rays->width,
-                         rays->height, scene->tape_width, scene->tape_height);
-    pass p = {.scene = scene, .view = scene_for_kernel(scene), .rays = rays, .d_rgb = d_rgb};
-    scene->tape_width = scene->tape_height = 0; /* each tile lets go of its tape */
-    GBT_TRY(run_pass(&p, err));
+    trace_scene *scene = p->scene;
+    if (scene->listed)
+        return gradients_reduce_view(p->list, &p->view, &scene->lists.view, scene->source, d_gaussians,
+                                     weight, err);
     const gradient_list **lists = mem_alloc(scene->tile_count, sizeof *lists, "gradient lists", err);
     if (lists == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -342,12 +521,41 @@ gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image
     mem_free(lists);
     for (size_t i = 0; i < scene->tile_count; i++)
         gradient_list_free(&scene->tiles[i].gradients);
+    return status;
+}
+
+gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb,
+                          gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err)
+{
+    if (scene->tape_width != rays->width || scene->tape_height != rays->height ||
+        d_rgb->width != rays->width || d_rgb->height != rays->height)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "trace: adjoint of %d x %d rays, but the kept forward pass has %d x %d", rays->width,
+                         rays->height, scene->tape_width, scene->tape_height);
+    pass p = {.scene = scene, .view = scene_for_kernel(scene), .rays = rays, .d_rgb = d_rgb};
+    scene->tape_width = scene->tape_height = 0; /* each tile lets go of its tape */
+    if (scene->listed)
+        GBT_TRY(view_lists_reserve_slots(&scene->lists, err));
+    GBT_TRY(run_pass(&p, err));
+    GBT_TRY(reduce(&p, d_gaussians, weight, err));
     for (int c = 0; c < 3 && d_background != NULL; c++) {
         d_background[c] = 0;
         for (size_t i = 0; i < scene->tile_count; i++)
             d_background[c] += scene->tiles[i].d_background[c];
     }
-    return status;
+    return GBT_OK;
+}
+
+size_t trace_rejected_count(const trace_scene *scene)
+{
+    size_t rejected = 0;
+    if (scene->kernel == TRACE_EMBREE)
+        return scene->embree.rejected_count;
+    if (!scene->listed)
+        return scene->tree.rejected_count;
+    for (size_t i = 0; i < scene->lists.view.block_count; i++)
+        rejected += scene->lists.view.kept[i].rejected;
+    return rejected;
 }
 
 void trace_scene_free(trace_scene *scene)
@@ -361,5 +569,7 @@ void trace_scene_free(trace_scene *scene)
     mem_free(scene->tiles);
     mem_free(scene->records);
     gradient_order_free(&scene->order);
+    view_lists_free(&scene->lists);
+    scratch_pool_free(scene->scratch);
     memset(scene, 0, sizeof *scene);
 }

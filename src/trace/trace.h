@@ -17,10 +17,13 @@
 #include "trace/kernel.h"
 #include "trace/rays.h"
 #include "trace/settings.h"
+#include "trace/view_lists.h"
 
 /** Which way rays go. All give the same picture to float rounding; the adjoint is the same for all. */
 typedef enum trace_kernel {
-    TRACE_TILE,   /* 16 x 16 pixels share one way through the tree: for cameras */
+    TRACE_LIST,   /* the default: 16 x 16 pixels over a list of what they may see, where all rays start at one
+                     point and look into the same half space; other rays as TRACE_TILE */
+    TRACE_TILE,   /* 16 x 16 pixels share one way through the tree */
     TRACE_SINGLE, /* ray by ray: for rays that do not run together */
     TRACE_EMBREE  /* packets of 16 under Embree's own traversal: the baseline of every benchmark */
 } trace_kernel;
@@ -28,12 +31,13 @@ typedef enum trace_kernel {
 /** One view's Gaussians, ready to be traced; and the memory of passes over them, reused from view to view.
     Start from {0}. */
 typedef struct trace_scene {
-    trace_kernel kernel;     /* set before trace_build(); default TRACE_TILE */
+    trace_kernel kernel;     /* set before trace_build(); default TRACE_LIST */
     size_t tape_bytes_max;   /* tiles whose hits would go beyond this are traced again by trace_backward(), to
                                 the same bits; 0: no limit */
     const atomic_bool *stop; /* optional (NULL): once true a pass ends with GBT_ERR_INTERRUPTED; borrowed */
     const gaussians *source; /* borrowed from trace_build() */
-    gaussian_tree tree;
+    gaussian_tree tree;      /* for TRACE_LIST made when it is first needed */
+    bool tree_ready;
     gaussian_scene embree; /* in place of the tree, for TRACE_EMBREE */
     trace_settings settings;
     float *records;
@@ -41,8 +45,11 @@ typedef struct trace_scene {
     float reach;              /* largest |coordinate| of the ray origins announced to trace_build() */
     struct trace_tile *tiles; /* internal: tape and gradient records of each tile */
     size_t tile_count, tile_capacity;
-    int tape_width, tape_height; /* rays of the forward pass that the tape holds; 0: none */
-    gradient_order order;        /* internal */
+    int tape_width, tape_height;  /* rays of the forward pass that the tape holds; 0: none */
+    gradient_order order;         /* internal */
+    view_lists lists;             /* of the last forward pass, for TRACE_LIST */
+    bool listed;                  /* whether it went over them */
+    struct scratch_pool *scratch; /* internal */
 } trace_scene;
 
 /** What trace_forward() writes; arrays of one value per ray unless said otherwise. All but `rgb` are optional
@@ -64,7 +71,8 @@ typedef struct trace_outputs {
  * @param g        [in] borrowed until the last pass over this build; padded (gaussians_pad)
  * @param reach    [in] largest |coordinate| of any ray origin that will be traced
  * @return GBT_OK, GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL Gaussians with non-finite fields are not seen
- *         (scene->tree.rejected_count). Cost: 10-20 ms per 100,000 on two cores.
+ *         (trace_rejected_count()). Cost: 1 ms per 100,000 on two cores, and 10 to 20 for the tree, which
+ *         TRACE_LIST makes with the first rays that need it.
  */
 gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_settings *settings, float reach,
                        gbt_error *err);
@@ -95,6 +103,9 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
  */
 gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb,
                           gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err);
+
+/** How many Gaussians are not seen because of non-finite fields: after trace_forward(). */
+size_t trace_rejected_count(const trace_scene *scene);
 
 void trace_scene_free(trace_scene *scene);
 

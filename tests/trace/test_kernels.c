@@ -192,7 +192,7 @@ static void check_run(const char *name, const gaussians *g, const trace_settings
         fail_msg("%s: %zu of %d rays are within rounding of a cut", name, left_out, RAYS);
 }
 
-static const char *const kernel_names[] = {"tile", "single", "embree"};
+static const char *const kernel_names[] = {"list", "tile", "single", "embree"};
 
 static void all_kernels_all_outputs(void **state)
 {
@@ -203,17 +203,19 @@ static void all_kernels_all_outputs(void **state)
         float spread, size, opacity;
     } rows[] = {{"thin", 300, 1, 0.15f, 0.7f},
                 {"opaque", 1500, 0.7f, 0.1f, 1},
-                {"around the camera", 400, 4, 0.5f, 0.6f}};
+                {"around the camera", 400, 4, 0.5f, 0.6f},
+                {"through one another", 500, 0.02f, 0.5f, 0.03f}}; /* in another order on every ray */
     trace_settings s = trace_settings_default();
     s.background[0] = 0.2f;
     s.background[2] = 0.7f;
-    for (size_t i = 0; i < 3; i++)
+    for (size_t i = 0; i < 4; i++)
         for (int spread = 0; spread < 2; spread++) {
             gaussians g = cloud(rows[i].count, i, rows[i].spread, rows[i].size, rows[i].opacity);
             ray_image rays = make_rays(spread == 1);
-            for (int kernel = TRACE_TILE; kernel <= TRACE_EMBREE; kernel++) {
+            for (int kernel = TRACE_LIST; kernel <= TRACE_EMBREE; kernel++) {
                 pass_result *r = run(&g, &s, &rays, (trace_kernel)kernel, 0);
                 check_run(rows[i].name, &g, &s, &rays, r);
+                assert_true(i < 3 || kernel != TRACE_LIST || r->counters.spilled_packets > 0 || spread == 1);
                 assert_true(r->counters.hits >= r->counters.blended && r->counters.blended > RAYS);
                 pass_free(r);
             }
@@ -230,7 +232,7 @@ static void kernels_share_the_adjoint(void **state)
     ray_image rays = make_rays(false);
     const trace_settings s = trace_settings_default();
     pass_result *tile = run(&g, &s, &rays, TRACE_TILE, 0);
-    for (int kernel = TRACE_SINGLE; kernel <= TRACE_EMBREE; kernel++) {
+    for (int kernel = TRACE_LIST; kernel <= TRACE_EMBREE; kernel++) {
         pass_result *other = run(&g, &s, &rays, (trace_kernel)kernel, 0);
         const float *const a[] = {tile->d.mean_x, tile->d.scale_y, tile->d.quat_z, tile->d.opacity,
                                   tile->d.red};
@@ -266,7 +268,7 @@ static void surfaces_and_radius(void **state)
         rays.far[i] = i % 7 == 0 ? INFINITY : 3 + 4 * rng_uniform(1, 1, i);
     for (int round = 0; round < 2; round++) {
         s.proxy_radius = round == 0 ? INFINITY : 1.5f;
-        for (int kernel = TRACE_TILE; kernel <= TRACE_EMBREE; kernel++) {
+        for (int kernel = TRACE_LIST; kernel <= TRACE_EMBREE; kernel++) {
             pass_result *r = run(&g, &s, &rays, (trace_kernel)kernel, 0);
             check_run(kernel_names[kernel], &g, &s, &rays, r);
             pass_free(r);

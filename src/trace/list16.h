@@ -1,0 +1,328 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/list16.h -- the Gaussians of one tile: read from the view's records about the middle of the tile, put
+   in the order of their depth there, and tested against the packets. Included by list_kernel.inc.h. */
+#ifndef GBT_TRACE_LIST16_H
+#define GBT_TRACE_LIST16_H
+
+#include "trace/list_view.h"
+#include "trace/view_records16.h"
+
+/* A Gaussian as the rows of a tile read it; slopes are from the middle of the tile. */
+typedef struct list_row {
+    float a, b, q[5], depth, falloff, opacity, threshold, color[3];
+    uint32_t id;
+    uint32_t pair; /* number in the tile's list; with ROW_GENERAL */
+} list_row;
+enum { ROW_GENERAL = 1u << 31 };
+_Static_assert(sizeof(list_row) == 64, "a cache line");
+
+/* Where the Gaussians can be hit, one array each, in their order. */
+enum { SHAPE_X, SHAPE_Y, SHAPE_CHOL, SHAPE_ACROSS = SHAPE_CHOL + 3, SHAPE_DOWN, SHAPE_FIELDS };
+
+typedef struct tile_list {
+    size_t count;  /* whole sixteens have memory */
+    list_row *row; /* [count] */
+    float *shape[SHAPE_FIELDS];
+    float *nearest; /* [count / 16 and one more] t / |(a, b, 1)| of all hits of a sixteen and those
+                       behind it is larger; the last is infinite */
+    bool any_general;
+    uint16_t *general;         /* [sixteens] bit per row */
+    view_ellipsoid *ellipsoid; /* of rows that are general */
+} tile_list;
+
+/* The rays of a packet as slopes from the middle of the tile. */
+typedef struct list_rays {
+    _Alignas(64) float a[PACKET_LANES], b[PACKET_LANES], length[PACKET_LANES];
+    slope_box box;      /* of the active ones, and a little more */
+    slope_box view_box; /* the same in the axes of the view */
+} list_rays;
+
+/* Slopes of a packet's rays in the axes of the view, from (middle_a, middle_b): in double from the rays' own
+   directions. */
+static inline void slope_rays(const view_frame *frame, const packet_rays *rays, const double middle[2],
+                              list_rays *out)
+{
+    const double(*dual)[3] = frame->dual;
+    for (int i = 0; i < PACKET_LANES; i++) {
+        const double x = (double)rays->dir[0][i], y = (double)rays->dir[1][i], z = (double)rays->dir[2][i];
+        const double u = dual[0][0] * x + dual[0][1] * y + dual[0][2] * z,
+                     v = dual[1][0] * x + dual[1][1] * y + dual[1][2] * z,
+                     w = dual[2][0] * x + dual[2][1] * y + dual[2][2] * z, inverse = 1 / w;
+        out->a[i] = (float)(u * inverse - middle[0]);
+        out->b[i] = (float)(v * inverse - middle[1]);
+        out->length[i] = (float)inverse;
+    }
+    const vfloat16 a = vfloat16_load(out->a), b = vfloat16_load(out->b); /* lanes that are not active repeat
+                                                                            one that is */
+    out->box =
+        (slope_box){{vfloat16_lowest(a), vfloat16_lowest(b)}, {vfloat16_highest(a), vfloat16_highest(b)}};
+    for (int k = 0; k < 2; k++) {
+        const float open = 1e-6f + 1e-3f * (out->box.high[k] - out->box.low[k]);
+        out->box.low[k] -= open;
+        out->box.high[k] += open;
+        out->view_box.low[k] = (float)(middle[k] + (double)out->box.low[k]) - 1e-6f;
+        out->view_box.high[k] = (float)(middle[k] + (double)out->box.high[k]) + 1e-6f;
+    }
+}
+
+static inline void tile_middle(const slope_box *box, double middle[2])
+{
+    for (int k = 0; k < 2; k++)
+        middle[k] = 0.5 * ((double)box->low[k] + (double)box->high[k]);
+}
+
+static inline void read_row(const kernel_scene *scene, const view_record *r, const double middle[2],
+                            uint32_t pair, list_row *out)
+{
+    out->a = (float)(r->a - middle[0]);
+    out->b = (float)(r->b - middle[1]);
+    memcpy(out->q, r->q, sizeof r->q);
+    out->depth = r->depth;
+    out->falloff = r->falloff;
+    out->opacity = r->opacity;
+    out->threshold = larger(scene->settings.alpha_min, r->opacity * scene->radius_response);
+    memcpy(out->color, r->color, sizeof r->color);
+    out->id = record_id(r);
+    out->pair = pair | (record_is_general(r) ? ROW_GENERAL : 0);
+}
+
+/* Memory for the rows of a tile, and for sorting them. */
+typedef struct list_memory {
+    tile_list list;
+    list_row *unsorted;
+    view_shape *shape;
+    float *key, *bound;
+    uint64_t *order, *spare;
+} list_memory;
+
+static bool reserve_list(list_scratch *scratch, size_t count, list_memory *out)
+{
+    const size_t n = (count + 15) & ~(size_t)15, wide = n + 16;
+    const size_t floats = 2 * 16 * n + 2 * 8 * n + SHAPE_FIELDS * n + 8 * wide;
+    if (mem_reserve((void **)&scratch->list, &scratch->list_capacity, 0, floats, sizeof(float),
+                    "list of a tile", NULL) != GBT_OK)
+        return false;
+    float *at = scratch->list;
+    out->list.count = count;
+    out->list.row = (list_row *)(void *)at;
+    at += 16 * n;
+    out->unsorted = (list_row *)(void *)at;
+    at += 16 * n;
+    out->shape = (view_shape *)(void *)at;
+    at += 8 * n;
+    out->list.ellipsoid = (view_ellipsoid *)(void *)at;
+    at += 8 * n;
+    for (int k = 0; k < SHAPE_FIELDS; k++, at += n)
+        out->list.shape[k] = at;
+    out->key = at;
+    out->bound = at + wide;
+    out->list.nearest = at + 2 * wide;
+    out->order = (uint64_t *)(void *)(at + 3 * wide);
+    out->spare = (uint64_t *)(void *)(at + 5 * wide);
+    out->list.general = (uint16_t *)(void *)(at + 7 * wide);
+    return true;
+}
+
+/* t / |(a, b, 1)| where sixteen Gaussians are nearest to the middle of the tile, and a lower bound of it in
+   all of the tile. Rows and shapes have been read; those of general ones are set after. */
+static inline void depth_in_tile(const list_memory *m, size_t first, const float low[2], const float high[2])
+{
+    const float *rows[16], *shapes[16];
+    vfloat16 r[16], s[16];
+    for (int i = 0; i < 16; i++) {
+        rows[i] = (const float *)(const void *)&m->unsorted[first + (size_t)i];
+        shapes[i] = (const float *)(const void *)&m->shape[first + (size_t)i];
+    }
+    vfloat16_load_turned(rows, r);
+    vfloat16_load_turned(shapes, s);
+    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0);
+    vfloat16 at[2], reach = one;
+    for (int k = 0; k < 2; k++) {
+        const vfloat16 from = vfloat16_sub(vfloat16_set1(low[k]), r[k]),
+                       to = vfloat16_sub(vfloat16_set1(high[k]), r[k]);
+        at[k] = vfloat16_min(vfloat16_max(s[k], from), to);
+        const vfloat16 left = vfloat16_max(from, vfloat16_sub(s[k], s[5 + k])),
+                       right = vfloat16_min(to, vfloat16_add(s[k], s[5 + k]));
+        reach =
+            vfloat16_add(reach, vfloat16_max(vfloat16_mul(r[2 + k], left), vfloat16_mul(r[2 + k], right)));
+    }
+    const vfloat16 w1 = vfloat16_fma(r[2], at[0], vfloat16_fma(r[3], at[1], one)),
+                   w2 = vfloat16_fma(r[4], at[0], vfloat16_mul(r[5], at[1])), w3 = vfloat16_mul(r[6], at[1]);
+    const vfloat16 den = vfloat16_fma(w1, w1, vfloat16_fma(w2, w2, vfloat16_mul(w3, w3)));
+    vfloat16_store(m->key + first, vfloat16_max(vfloat16_div(vfloat16_mul(r[7], w1), den), zero));
+    vfloat16_store(m->bound + first, vfloat16_div(vfloat16_mul(vfloat16_mul(r[7], vfloat16_set1(0.99999f)),
+                                                               vfloat16_sub(one, s[7])),
+                                                  vfloat16_max(reach, vfloat16_set1(1e-3f))));
+}
+
+/* The same of a general one, on the ray through the middle. */
+static inline void depth_of_ellipsoid(const kernel_scene *scene, const view_frame *frame,
+                                      const double middle[2], const list_memory *m, size_t i)
+{
+    const view_ellipsoid *e = &m->shape[i].ellipsoid;
+    const float *record = scene->records + (size_t)m->unsorted[i].id * RECORD_FLOATS;
+    const float a = (float)middle[0], b = (float)middle[1];
+    float along = 0, square = 0;
+    for (int k = 0; k < 3; k++) {
+        float w = 0, x = 0;
+        for (int j = 0; j < 3; j++) {
+            const float cell = record[RECORD_MATRIX + 3 * k + j];
+            w += cell * (a * frame->axis[0][j] + b * frame->axis[1][j] + frame->axis[2][j]);
+            x += cell * (record[RECORD_MEAN + j] - (float)frame->origin[j]);
+        }
+        along += w * x;
+        square += w * w;
+    }
+    const float near = e->center[2] - 1.0001f * sqrtf(e->ww) -
+                       4e-6f * (fabsf(e->center[0]) + fabsf(e->center[1]) + fabsf(e->center[2])),
+                t = along / square, t_near = scene->settings.t_near;
+    m->bound[i] = larger(0.3f * t_near, 0.99999f * near);
+    m->key[i] = t > 0.5f * t_near && t < 1e30f ? t : 0.5f * t_near; /* NaN fails */
+}
+
+/* Numbers of the rows by key; those whose keys have the same sixteen bits, by number. */
+static const uint64_t *sort_list(const float *key, size_t count, uint64_t *from, uint64_t *to)
+{
+    uint32_t lowest = UINT32_MAX, highest = 0, place[2][256] = {{0}};
+    for (size_t i = 0; i < count; i++) {
+        uint32_t bits;
+        memcpy(&bits, &key[i], sizeof bits);
+        lowest = bits < lowest ? bits : lowest;
+        highest = bits > highest ? bits : highest;
+    }
+    int shift = 0;
+    while ((highest - lowest) >> shift > 0xFFFF)
+        shift++;
+    for (size_t i = 0; i < count; i++) {
+        uint32_t bits;
+        memcpy(&bits, &key[i], sizeof bits);
+        bits = (bits - lowest) >> shift;
+        from[i] = (uint64_t)bits << 32 | i;
+        place[0][bits & 255]++;
+        place[1][bits >> 8]++;
+    }
+    for (uint32_t d = 0, next[2] = {0, 0}; d < 256; d++)
+        for (int pass = 0; pass < 2; pass++) {
+            const uint32_t of_digit = place[pass][d];
+            place[pass][d] = next[pass];
+            next[pass] += of_digit;
+        }
+    for (size_t i = 0; i < count; i++)
+        to[place[0][from[i] >> 32 & 255]++] = from[i];
+    for (size_t i = 0; i < count; i++)
+        from[place[1][to[i] >> 40]++] = to[i];
+    return from;
+}
+
+/* Row `i` of the order: number `from` of those read. */
+static inline void place_shape(const list_memory *m, size_t from, size_t i)
+{
+    const list_row *row = &m->unsorted[from];
+    const tile_list *list = &m->list;
+    list->row[i] = *row;
+    if (row->pair & ROW_GENERAL) {
+        list->ellipsoid[i] = m->shape[from].ellipsoid;
+        list->general[i / 16] |= (uint16_t)(1u << i % 16);
+        for (int k = 0; k < SHAPE_FIELDS; k++)
+            list->shape[k][i] = 0; /* is tested by itself */
+        return;
+    }
+    const view_outline *o = &m->shape[from].outline;
+    const float *c = o->chol;
+    list->shape[SHAPE_X][i] = row->a + o->x;
+    list->shape[SHAPE_Y][i] = row->b + o->y;
+    for (int k = 0; k < 3; k++)
+        list->shape[SHAPE_CHOL + k][i] = c[k];
+    list->shape[SHAPE_ACROSS][i] = -c[1] / c[0];
+    list->shape[SHAPE_DOWN][i] = -c[0] * c[1] / (c[1] * c[1] + c[2] * c[2]);
+}
+
+/* The list of tile `tile`, in order. False when memory ran out. */
+static bool load_list(const kernel_scene *scene, const list_view *view, size_t tile, const double middle[2],
+                      list_scratch *scratch, tile_list *out)
+{
+    const size_t begin = view->first[tile], count = view->first[tile + 1] - begin;
+    const slope_box *box = &view->tiles[tile];
+    list_memory m;
+    if (!reserve_list(scratch, count, &m))
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        const list_pair *pair = &view->pairs[begin + i];
+        if (i + 8 < count) {
+            __builtin_prefetch(&view->records[pair[8].record]);
+            __builtin_prefetch(&view->shapes[pair[8].record]);
+        }
+        m.shape[i] = view->shapes[pair->record];
+        read_row(scene, &view->records[pair->record], middle, (uint32_t)i, &m.unsorted[i]);
+    }
+    const size_t n = (count + 15) & ~(size_t)15;
+    for (size_t i = count; i < n; i++) { /* repeat one, for whole sixteens */
+        m.unsorted[i] = m.unsorted[count - 1];
+        m.shape[i] = m.shape[count - 1];
+    }
+    float low[2], high[2];
+    for (int k = 0; k < 2; k++) {
+        low[k] = (float)((double)box->low[k] - middle[k]);
+        high[k] = (float)((double)box->high[k] - middle[k]);
+    }
+    for (size_t i = 0; i < n; i += 16)
+        depth_in_tile(&m, i, low, high);
+    m.list.any_general = false;
+    for (size_t i = 0; i < count; i++)
+        if (m.unsorted[i].pair & ROW_GENERAL) {
+            m.list.any_general = true;
+            depth_of_ellipsoid(scene, &view->frame, middle, &m, i);
+        }
+    const uint64_t *order = sort_list(m.key, count, m.order, m.spare);
+    memset(m.list.general, 0, n / 16 * sizeof *m.list.general);
+    for (size_t i = 0; i < n; i++)
+        place_shape(&m, (uint32_t)order[i < count ? i : count - 1], i);
+    float nearest = INFINITY;
+    m.list.nearest[n / 16] = nearest;
+    for (size_t i = count; i-- > 0;) {
+        nearest = smaller(nearest, m.bound[(uint32_t)order[i]]);
+        if (i % 16 == 0)
+            m.list.nearest[i / 16] = nearest;
+    }
+    *out = m.list;
+    return true;
+}
+
+/* Which of rows first .. first + 15 reach into a packet. Seen from its pixels, the smallest value of an
+   ellipse's form is at its centre, or on the edge nearest to it across or down. */
+static inline unsigned rows_in_packet(const tile_list *list, size_t first, const list_rays *rays)
+{
+    const slope_box *box = &rays->box;
+    const float *const *shape = (const float *const *)list->shape;
+    const vfloat16 x = vfloat16_load(shape[SHAPE_X] + first), y = vfloat16_load(shape[SHAPE_Y] + first);
+    const vfloat16 left = vfloat16_sub(vfloat16_set1(box->low[0]), x),
+                   right = vfloat16_sub(vfloat16_set1(box->high[0]), x),
+                   bottom = vfloat16_sub(vfloat16_set1(box->low[1]), y),
+                   top = vfloat16_sub(vfloat16_set1(box->high[1]), y), zero = vfloat16_set1(0);
+    const vfloat16 near_x = vfloat16_min(vfloat16_max(zero, left), right),
+                   near_y = vfloat16_min(vfloat16_max(zero, bottom), top);
+    const vfloat16 c0 = vfloat16_load(shape[SHAPE_CHOL] + first),
+                   c1 = vfloat16_load(shape[SHAPE_CHOL + 1] + first),
+                   c2 = vfloat16_load(shape[SHAPE_CHOL + 2] + first);
+    const vfloat16 row_x = vfloat16_min(
+                       vfloat16_max(vfloat16_mul(vfloat16_load(shape[SHAPE_ACROSS] + first), near_y), left),
+                       right),
+                   column_y = vfloat16_min(
+                       vfloat16_max(vfloat16_mul(vfloat16_load(shape[SHAPE_DOWN] + first), near_x), bottom),
+                       top);
+    const vfloat16 row_u = vfloat16_fma(c0, row_x, vfloat16_mul(c1, near_y)),
+                   row_v = vfloat16_mul(c2, near_y),
+                   column_u = vfloat16_fma(c0, near_x, vfloat16_mul(c1, column_y)),
+                   column_v = vfloat16_mul(c2, column_y);
+    const vfloat16 on_row = vfloat16_fma(row_u, row_u, vfloat16_mul(row_v, row_v)),
+                   on_column = vfloat16_fma(column_u, column_u, vfloat16_mul(column_v, column_v));
+    unsigned bits = vmask16_bits(vfloat16_le(vfloat16_min(on_row, on_column), vfloat16_set1(1)));
+    for (unsigned rest = list->general[first / 16]; rest != 0; rest &= rest - 1) {
+        const int i = __builtin_ctz(rest);
+        if (!ellipsoid_meets_box(&list->ellipsoid[first + (size_t)i], &rays->view_box))
+            bits &= ~(1u << i);
+    }
+    return first + 16 <= list->count ? bits : bits & 0xFFFFu >> (16 - (list->count - first));
+}
+
+#endif

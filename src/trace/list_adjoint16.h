@@ -1,0 +1,420 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/list_adjoint16.h -- the adjoint of a tile over its list: evaluate what was blended again, follow T to
+   the back and the colour to the front, and add every Gaussian's sums to its slot. Included by
+   list_kernel.inc.h. docs/tracing.md has the formulas. */
+#ifndef GBT_TRACE_LIST_ADJOINT16_H
+#define GBT_TRACE_LIST_ADJOINT16_H
+
+#include "trace/list_rows16.h"
+
+enum { AHEAD = 12 /* records that are asked for before they are read */ };
+
+/* The Gaussians that a tile has blended. */
+typedef struct used_list {
+    list_row *row;    /* [count] */
+    uint32_t *number; /* [list] place in `row` of those that are used */
+    size_t count;
+} used_list;
+
+static bool load_used(const kernel_scene *scene, const list_view *view, size_t tile, const double middle[2],
+                      const hit_tape *tape, list_scratch *scratch, used_list *out)
+{
+    const size_t begin = view->first[tile], count = view->first[tile + 1] - begin;
+    if (mem_reserve((void **)&scratch->list, &scratch->list_capacity, 0, 18 * count + 1, sizeof(float),
+                    "list of a tile", NULL) != GBT_OK ||
+        mem_reserve((void **)&scratch->sums, &scratch->sum_capacity, 0, count, sizeof *scratch->sums,
+                    "sums of a tile", NULL) != GBT_OK)
+        return false;
+    out->row = (list_row *)(void *)scratch->list;
+    out->number = (uint32_t *)(void *)(scratch->list + 16 * count);
+    out->count = 0;
+    uint32_t *pair = out->number + count;
+    memset(out->number, 0xFF, count * sizeof *out->number);
+    for (size_t i = 0; i < tape->count; i++) {
+        const uint32_t at = tape->entries[i].id;
+        const bool first = out->number[at] == UINT32_MAX;
+        pair[out->count] = at;
+        out->number[at] = first ? (uint32_t)out->count : out->number[at];
+        out->count += first;
+    }
+    const list_pair *pairs = view->pairs + begin;
+    memset(scratch->sums, 0, out->count * sizeof *scratch->sums);
+    for (size_t i = 0; i < out->count; i++) {
+        if (i + AHEAD < out->count)
+            __builtin_prefetch(&view->records[pairs[pair[i + AHEAD]].record]);
+        read_row(scene, &view->records[pairs[pair[i]].record], middle, pair[i], &out->row[i]);
+    }
+    return true;
+}
+
+/* Evaluate the rows of a packet again. */
+static void replay_list(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
+                        const list_rays *seen, const tape_entry *entry, size_t count, const vfloat16 d_rgb[3],
+                        list_rows *out)
+{
+    const list_rows copy = *out, *const rows = &copy; /* what stores cannot change */
+    const list_row *used_row = used->row;
+    const uint32_t *used_number = used->number;
+    const vfloat16 a = vfloat16_load(seen->a), b = vfloat16_load(seen->b),
+                   length = vfloat16_load(seen->length), alpha_max = vfloat16_set1(scene->settings.alpha_max);
+    out->count = count;
+    for (size_t i = 0; i < count; i++) {
+        const uint32_t number = used_number[entry[i].id];
+        const list_row *g = &used_row[number];
+        const vmask16 blended = vmask16_from_bits(entry[i].lanes);
+        const row_response r =
+            g->pair & ROW_GENERAL ? respond_general(scene, rays, g->id) : respond_in_list(g, a, b, length);
+        const vfloat16 alpha = vfloat16_select(blended, vfloat16_min(r.raw, alpha_max), vfloat16_set1(0));
+        row_store(rows->t, (int)i, r.t);
+        row_store(rows->alpha, (int)i, alpha);
+        rows->order[i] = (uint32_t)i; /* the tape's */
+        row_store(rows->color, (int)i, dot_lanes(g->color, d_rgb));
+        row_store(rows->inverse, (int)i, r.inverse);
+        rows->number[i] = number;
+        rows->lanes[i] = entry[i].lanes;
+    }
+}
+
+/* Row i goes on past `other`: what lies behind is added to the one in front. */
+static inline void pass_on(const near_row *now, near_row *other, vfloat16 *sum)
+{
+    const vmask16 behind = vfloat16_lt(other->t, now->t);
+    other->value = vfloat16_add_where(behind, other->value, now->term);
+    *sum = vfloat16_add_where(vmask16_andnot(behind, vmask16_from_bits(0xFFFF)), *sum, other->term);
+}
+
+/* Row i goes on past row j and those after it, too; returned is what lies behind it from there on. */
+static vfloat16 step_on(list_rows *rows, const near_row *now, vmask16 hit, int j)
+{
+    const vfloat16 zero = vfloat16_set1(0);
+    vfloat16 sum = zero;
+    do {
+        const vmask16 behind = vfloat16_lt(row_load(rows->t, j), now->t);
+        sum = vfloat16_add(sum, vfloat16_select(behind, zero, row_load(rows->term, j)));
+        row_store(rows->behind, j,
+                  vfloat16_add(row_load(rows->behind, j), vfloat16_select(behind, now->term, zero)));
+        j++;
+    } while (vmask16_any(vmask16_and(vfloat16_lt(row_load(rows->reached, j), now->t), hit)));
+    return vfloat16_add(row_load(rows->before, j), sum);
+}
+
+/* What lies behind every hit, with the background: from the last row to the first, as T was found from the
+   first to the last. `before` and `reached` are used again: sum of the terms of a row and those after it,
+   their nearest hits. Only sums of what has been added, so nothing cancels. */
+static void collect_behind(list_rows *out, vfloat16 background)
+{
+    const list_rows copy = *out, *const rows = &copy; /* what stores cannot change */
+    const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0);
+    const int count = (int)rows->count;
+    near_row next = {infinite, zero, zero, zero}, second = next;
+    vfloat16 after[3] = {background, background, background}, nearest[3] = {infinite, infinite, infinite};
+    row_store(rows->before, count, background);
+    row_store(rows->reached, count, infinite);
+    for (int i = count; i-- > 0;) {
+        const vfloat16 alpha = row_load(rows->alpha, i);
+        near_row now = {.t = row_load(rows->t, i), .clear = zero};
+        now.term = vfloat16_mul(vfloat16_mul(row_load(rows->through, i), alpha), row_load(rows->color, i));
+        const vmask16 hit = vfloat16_lt(zero, alpha);
+        vfloat16 sum = zero;
+        row_store(rows->term, i, now.term);
+        pass_on(&now, &next, &sum);
+        pass_on(&now, &second, &sum);
+        now.value = vfloat16_add(after[2], sum);
+        if (vmask16_any(vmask16_and(vfloat16_lt(nearest[2], now.t), hit)))
+            now.value = vfloat16_add(step_on(out, &now, hit, i + 3), sum);
+        row_store(rows->behind, i + 2, second.value);
+        second = next;
+        next = now;
+        for (int k = 2; k > 0; k--) {
+            after[k] = after[k - 1];
+            nearest[k] = nearest[k - 1];
+        }
+        after[0] = vfloat16_add(after[0], now.term);
+        nearest[0] = vfloat16_min(nearest[0], vfloat16_select(hit, now.t, infinite));
+        row_store(rows->before, i, after[0]);
+        row_store(rows->reached, i, nearest[0]);
+    }
+    row_store(rows->behind, 1, second.value);
+    row_store(rows->behind, 0, next.value);
+}
+
+/* The same ray by ray. False when memory ran out. */
+static bool collect_behind_by_ray(list_rows *rows, vfloat16 background, list_scratch *scratch)
+{
+    _Alignas(64) float last[PACKET_LANES];
+    vfloat16_store(last, background);
+    for (int lane = 0; lane < PACKET_LANES; lane++) {
+        size_t count;
+        const ray_hit *hits = sort_lane(rows, lane, scratch, &count);
+        float behind = last[lane];
+        if (hits == NULL)
+            return false;
+        for (size_t k = count; k-- > 0;) {
+            const size_t at = (size_t)(uint32_t)hits[k].key * PACKET_LANES + (size_t)lane;
+            rows->behind[at] = behind;
+            behind += rows->through[at] * rows->alpha[at] * rows->color[at];
+        }
+    }
+    return true;
+}
+
+/* h = dL/d(d2) into `behind`, the weight into `term`. */
+static void find_row_gradients(const kernel_scene *scene, const list_rows *from)
+{
+    const list_rows copy = *from, *const rows = &copy; /* what stores cannot change */
+    const vfloat16 alpha_max = vfloat16_set1(scene->settings.alpha_max), zero = vfloat16_set1(0);
+    for (size_t i = 0; i < rows->count; i++) {
+        const int at = (int)i;
+        const vfloat16 T = row_load(rows->through, at), alpha = row_load(rows->alpha, at);
+        const vfloat16 d_alpha =
+            vfloat16_sub(vfloat16_mul(T, row_load(rows->color, at)),
+                         vfloat16_div(row_load(rows->behind, at), vfloat16_sub(vfloat16_set1(1), alpha)));
+        /* alpha = min(alpha_max, o G): from the cap on nothing but the colour has a gradient. */
+        const vmask16 moves = vmask16_and(vfloat16_lt(zero, alpha), vfloat16_lt(alpha, alpha_max));
+        row_store(
+            rows->behind, at,
+            vfloat16_select(moves, vfloat16_mul(vfloat16_mul(vfloat16_set1(-0.5f), alpha), d_alpha), zero));
+        row_store(rows->term, at, vfloat16_mul(T, alpha));
+    }
+}
+
+/* The sums of rows first .. first + 15 over the rays, a Gaussian per lane: no lane has to be added to
+   another. v = R / den z, z = (y, w1 w2, w1 w3); R and the sign of the first come later (turn_sums). */
+static void sum_sixteen(const used_list *used, const list_rows *rows, size_t first, const list_rays *seen,
+                        float d_rgb[3][PACKET_LANES], gradient_slot *sums)
+{
+    const float *row[16], *h_row[16], *weight_row[16], *inverse_row[16];
+    vfloat16 field[16], h[16], weight[16], inverse[16], sum[16];
+    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0);
+    for (size_t i = 0; i < 16; i++) {
+        const size_t at = first + i < rows->count ? first + i : first;
+        row[i] = (const float *)(const void *)&used->row[rows->number[at]];
+        h_row[i] = rows->behind + at * PACKET_LANES;
+        weight_row[i] = rows->term + at * PACKET_LANES;
+        inverse_row[i] = rows->inverse + at * PACKET_LANES;
+    }
+    vfloat16_load_turned(row, field);
+    vfloat16_load_turned(h_row, h);
+    vfloat16_load_turned(weight_row, weight);
+    vfloat16_load_turned(inverse_row, inverse);
+    for (int k = 0; k < 16; k++)
+        sum[k] = zero;
+    for (int ray = 0; ray < PACKET_LANES; ray++) {
+        const vfloat16 da = vfloat16_sub(vfloat16_set1(seen->a[ray]), field[0]),
+                       db = vfloat16_sub(vfloat16_set1(seen->b[ray]), field[1]);
+        const vfloat16 w1 = vfloat16_fma(field[2], da, vfloat16_fma(field[3], db, one)),
+                       w2 = vfloat16_fma(field[4], da, vfloat16_mul(field[5], db)),
+                       w3 = vfloat16_mul(field[6], db);
+        const vfloat16 y = vfloat16_fma(w2, w2, vfloat16_mul(w3, w3));
+        const vfloat16 z[3] = {y, vfloat16_mul(w1, w2), vfloat16_mul(w1, w3)},
+                       once = vfloat16_mul(h[ray], inverse[ray]), twice = vfloat16_mul(once, inverse[ray]);
+        const vfloat16 p[3] = {vfloat16_mul(twice, z[0]), vfloat16_mul(twice, z[1]),
+                               vfloat16_mul(twice, z[2])};
+        sum[SLOT_H] = vfloat16_add(sum[SLOT_H], h[ray]);
+        for (int k = 0; k < 3; k++) {
+            sum[SLOT_HV + k] = vfloat16_fma(once, z[k], sum[SLOT_HV + k]);
+            sum[SLOT_HVV + k] = vfloat16_fma(p[k], z[k], sum[SLOT_HVV + k]);
+            sum[SLOT_COLOR + k] =
+                vfloat16_fma(weight[ray], vfloat16_set1(d_rgb[k][ray]), sum[SLOT_COLOR + k]);
+        }
+        sum[SLOT_HVV + 3] = vfloat16_fma(p[1], z[2], sum[SLOT_HVV + 3]);
+        sum[SLOT_HVV + 4] = vfloat16_fma(p[2], z[0], sum[SLOT_HVV + 4]);
+        sum[SLOT_HVV + 5] = vfloat16_fma(p[0], z[1], sum[SLOT_HVV + 5]);
+        sum[SLOT_WEIGHT] = vfloat16_add(sum[SLOT_WEIGHT], weight[ray]);
+    }
+    _Alignas(64) float lane[16][16];
+    const float *lanes[16];
+    for (int k = 0; k < 16; k++) {
+        vfloat16_store(lane[k], sum[k]);
+        lanes[k] = lane[k];
+    }
+    vfloat16_load_turned(lanes, sum);
+    for (size_t i = 0; i < 16 && first + i < rows->count; i++) {
+        const uint32_t number = rows->number[first + i];
+        float *to = sums[number].sum;
+        if ((used->row[number].pair & ROW_GENERAL) == 0)
+            vfloat16_store(to, vfloat16_add(vfloat16_load(to), sum[i]));
+    }
+}
+
+/* A row that the form does not hold for. */
+static void sum_general(const kernel_scene *scene, const packet_rays *rays, const list_rows *rows, size_t i,
+                        uint32_t id, float d_rgb[3][PACKET_LANES], gradient_slot *out)
+{
+    const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
+    const vfloat16 t_near = vfloat16_set1(scene->settings.t_near), zero = vfloat16_set1(0);
+    ray_lanes ray;
+    vfloat16 v[3], terms[16];
+    load_rays(rays, &ray);
+    response r = respond(&g, &ray, t_near);
+    refine_point(&g, &ray, t_near, &r);
+    const vmask16 blended = vmask16_from_bits(rows->lanes[i]);
+    for (int k = 0; k < 3; k++) /* v may be more than a float holds where the ray did not hit */
+        v[k] = vfloat16_select(blended, r.v[k], zero);
+    const vfloat16 h = row_load(rows->behind, (int)i), weight = row_load(rows->term, (int)i);
+    vfloat16 hv[3];
+    terms[SLOT_H] = h;
+    for (int k = 0; k < 3; k++) {
+        terms[SLOT_HV + k] = hv[k] = vfloat16_mul(h, v[k]);
+        terms[SLOT_HVV + k] = vfloat16_mul(hv[k], v[k]);
+        terms[SLOT_COLOR + k] = vfloat16_mul(weight, vfloat16_load(d_rgb[k]));
+    }
+    terms[SLOT_HVV + 3] = vfloat16_mul(hv[1], v[2]);
+    terms[SLOT_HVV + 4] = vfloat16_mul(hv[2], v[0]);
+    terms[SLOT_HVV + 5] = vfloat16_mul(hv[0], v[1]);
+    terms[SLOT_WEIGHT] = weight;
+    terms[14] = terms[15] = zero;
+    vfloat16_store(out->sum, vfloat16_add(vfloat16_load(out->sum), vfloat16_sum_rows(terms)));
+}
+
+static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
+                              const list_rays *seen, const tape_entry *entry, size_t count,
+                              float d_rgb_in[3][PACKET_LANES], float d_background[3], list_rows *rows,
+                              list_scratch *scratch)
+{
+    vfloat16 d_rgb[3];
+    for (int c = 0; c < 3; c++)
+        d_rgb[c] = vfloat16_load(d_rgb_in[c]);
+    replay_list(scene, used, rays, seen, entry, count, d_rgb, rows);
+    insert_rows(rows);
+    if (rows->crowded && !sort_rows_by_ray(rows, scratch))
+        return false;
+    const vfloat16 last = rows->product;
+    const vfloat16 background = vfloat16_mul(dot_lanes(scene->settings.background, d_rgb), last);
+    if (!rows->crowded)
+        collect_behind(rows, background);
+    else if (!collect_behind_by_ray(rows, background, scratch))
+        return false;
+    find_row_gradients(scene, rows);
+    for (size_t first = 0; first < count; first += 16)
+        sum_sixteen(used, rows, first, seen, d_rgb_in, scratch->sums);
+    for (size_t i = 0; i < count; i++) {
+        const list_row *g = &used->row[rows->number[i]];
+        if (g->pair & ROW_GENERAL)
+            sum_general(scene, rays, rows, i, g->id, d_rgb_in, &scratch->sums[rows->number[i]]);
+    }
+    _Alignas(64) float T[PACKET_LANES];
+    vfloat16_store(T, last);
+    for (int c = 0; c < 3; c++)
+        for (int lane = 0; lane < PACKET_LANES; lane++)
+            if (rays->active >> lane & 1)
+                d_background[c] += T[lane] * d_rgb_in[c][lane];
+    return true;
+}
+
+static bool backward_list(const kernel_scene *scene, list_view *view, size_t tile, const tile_rays *rays,
+                          float d_rgb[TILE_PACKETS][3][PACKET_LANES], const hit_tape *tape,
+                          float d_background[3], list_scratch *scratch)
+{
+    const size_t begin = view->first[tile], pairs = view->first[tile + 1] - begin;
+    double middle[2];
+    used_list used;
+    list_rows rows;
+    tile_middle(&view->tiles[tile], middle);
+    if (!load_used(scene, view, tile, middle, tape, scratch, &used) ||
+        !reserve_rows_of_list(scratch, used.count, true, &rows))
+        return false;
+    size_t at = 0;
+    for (int p = 0; p < TILE_PACKETS; p++) {
+        const size_t from = at;
+        list_rays seen;
+        if (rays->packet[p].active == 0)
+            continue;
+        while (at < tape->count && tape->entries[at].packet == p)
+            at++;
+        slope_rays(&view->frame, &rays->packet[p], middle, &seen);
+        if (!adjoint_of_packet(scene, &used, &rays->packet[p], &seen, tape->entries + from, at - from,
+                               d_rgb[p], d_background, &rows, scratch))
+            return false;
+    }
+    for (size_t i = 0; i < pairs; i++) {
+        if (i + AHEAD < pairs)
+            __builtin_prefetch(&view->slots[view->pairs[begin + i + AHEAD].slot], 1);
+        const uint32_t slot = view->pairs[begin + i].slot;
+        view->slot_used[slot] = used.number[i] != UINT32_MAX;
+        if (view->slot_used[slot])
+            view->slots[slot] = scratch->sums[used.number[i]];
+    }
+    return true;
+}
+
+/* The sums of records first .. first + 15 over their tiles, in their order. */
+static inline void gather_slots(const list_view *view, size_t first, size_t end, float sum[16][16])
+{
+    for (size_t i = 0; i < 16; i++) {
+        vfloat16 total = vfloat16_set1(0);
+        const size_t at = first + i;
+        const uint32_t slots = at < end ? view->slot_count[at] : 0;
+        for (uint32_t k = 0; k < slots; k++) {
+            const uint32_t slot = view->slot_first[at] + k;
+            if (view->slot_used[slot])
+                total = vfloat16_add(total, vfloat16_load(view->slots[slot].sum));
+        }
+        vfloat16_store(sum[i], total);
+    }
+}
+
+/* From the turned axes of the view to the Gaussians' own. */
+static void turn_sums(const kernel_scene *scene, const list_view *view, size_t begin, size_t end,
+                      gradient_record *out)
+{
+    static const int at[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}}; /* in xx yy zz yz zx xy */
+    for (size_t first = begin; first < end; first += 16) {
+        _Alignas(64) float by_record[16][16], turned[16][16];
+        _Alignas(64) float slope[3][16];
+        const float *rows[16];
+        uint32_t id[16];
+        vfloat16 sum[16], half[3][3], to[16];
+        view_form form;
+        gather_slots(view, first, end, by_record);
+        for (size_t i = 0; i < 16; i++) {
+            const view_record *r = &view->records[first + i < end ? first + i : first];
+            rows[i] = by_record[i];
+            id[i] = record_id(r);
+            slope[0][i] = (float)r->a;
+            slope[1][i] = (float)r->b;
+            slope[2][i] = r->depth;
+        }
+        const gaussian_lanes g = load_gaussians(scene, id, NULL);
+        view_form_find(view->frame.axis, &g, vfloat16_load(slope[0]), vfloat16_load(slope[1]),
+                       vfloat16_load(slope[2]), &form);
+        vfloat16_load_turned(rows, sum);
+        const vfloat16 zero = vfloat16_set1(0), R = form.distance, RR = vfloat16_mul(R, R);
+        vfloat16 hv[3], hvv[6];
+        for (int k = 0; k < 3; k++)
+            hv[k] = vfloat16_mul(R, sum[SLOT_HV + k]);
+        for (int k = 0; k < 6; k++)
+            hvv[k] = vfloat16_mul(RR, sum[SLOT_HVV + k]);
+        hv[0] = vfloat16_sub(zero, hv[0]);
+        hvv[4] = vfloat16_sub(zero, hvv[4]);
+        hvv[5] = vfloat16_sub(zero, hvv[5]);
+        for (int k = 0; k < 3; k++)
+            for (int j = 0; j < 3; j++)
+                half[k][j] = vfloat16_fma(
+                    hvv[at[k][2]], form.e[2][j],
+                    vfloat16_fma(hvv[at[k][1]], form.e[1][j], vfloat16_mul(hvv[at[k][0]], form.e[0][j])));
+        for (int i = 0; i < 3; i++)
+            for (int j = i; j < 3; j++)
+                to[GRADIENT_VV + at[i][j]] = vfloat16_fma(
+                    form.e[2][i], half[2][j],
+                    vfloat16_fma(form.e[1][i], half[1][j], vfloat16_mul(form.e[0][i], half[0][j])));
+        for (int i = 0; i < 3; i++)
+            to[GRADIENT_V + i] = vfloat16_fma(
+                form.e[2][i], hv[2], vfloat16_fma(form.e[1][i], hv[1], vfloat16_mul(form.e[0][i], hv[0])));
+        for (int k = 0; k < 9; k++)
+            vfloat16_store(turned[k], to[k]);
+        for (size_t i = 0; i < 16 && first + i < end; i++) {
+            gradient_record *o = &out[first + i - begin];
+            const bool general = record_is_general(&view->records[first + i]);
+            for (int k = 0; k < 9; k++) /* V, VV; own axes have SLOT_HV and SLOT_HVV in the same order */
+                o->sum[k] = general ? by_record[i][SLOT_HV + k] : turned[k][i];
+            o->sum[GRADIENT_OPACITY] = -2 * by_record[i][SLOT_H] / view->records[first + i].opacity;
+            for (int k = 0; k < 3; k++)
+                o->sum[GRADIENT_COLOR + k] = by_record[i][SLOT_COLOR + k];
+            o->sum[GRADIENT_WEIGHT] = by_record[i][SLOT_WEIGHT];
+            o->id = record_id(&view->records[first + i]);
+        }
+    }
+}
+
+#endif

@@ -1,0 +1,188 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/list_forward16.h -- a tile over its list: each packet evaluates the rows that reach into it, sixteen
+   at a time without a branch, orders and blends them. Included by list_kernel.inc.h. */
+#ifndef GBT_TRACE_LIST_FORWARD16_H
+#define GBT_TRACE_LIST_FORWARD16_H
+
+#include "trace/list_rows16.h"
+#include "trace/packet_extra16.h"
+
+/* Rows that reach into a packet, waiting until there are sixteen. */
+typedef struct row_queue {
+    _Alignas(64) uint32_t number[3 * PACKET_LANES];
+    unsigned count;
+} row_queue;
+
+/* What the rays of a packet still see. */
+typedef struct packet_sight {
+    vfloat16 far;     /* hits at this depth or behind are not seen */
+    vfloat16 product; /* of 1 - alpha over all hits so far */
+    vfloat16 reached; /* the farthest of them */
+} packet_sight;
+
+/* One row more, when it has a hit. */
+static inline void append_response(const list_rows *rows, size_t *count, const list_row *g, uint32_t number,
+                                   row_response r, vfloat16 alpha_max, packet_sight *sight)
+{
+    const int at = (int)*count;
+    const vfloat16 zero = vfloat16_set1(0);
+    const vmask16 hit =
+        vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), vfloat16_lt(r.t, sight->far));
+    const vfloat16 alpha = vfloat16_select(hit, vfloat16_min(r.raw, alpha_max), zero);
+    row_store(rows->t, at, r.t);
+    row_store(rows->alpha, at, alpha);
+    sight->product = vfloat16_fnma(sight->product, alpha, sight->product);
+    sight->reached = vfloat16_max(sight->reached, vfloat16_select(hit, r.t, zero));
+    rows->number[at] = number;
+    rows->id[at] = g->id;
+    *count += vmask16_any(hit) != 0;
+}
+
+/* `seen_by` and the rows are copied, so that compilers know what stores cannot change. */
+static void evaluate_queue(const kernel_scene *scene, const tile_list *list, const packet_rays *rays,
+                           const list_rays *seen, const row_queue *queue, unsigned take, list_rows *out,
+                           packet_sight *seen_by)
+{
+    const vfloat16 a = vfloat16_load(seen->a), b = vfloat16_load(seen->b),
+                   length = vfloat16_load(seen->length), alpha_max = vfloat16_set1(scene->settings.alpha_max);
+    const list_rows rows = *out;
+    const list_row *row = list->row;
+    packet_sight sight = *seen_by;
+    size_t count = rows.count;
+    uint32_t general = 0;
+    for (unsigned k = 0; k < take; k++)
+        general |= row[queue->number[k]].pair;
+    if ((general & ROW_GENERAL) == 0)
+        for (unsigned k = 0; k < take; k++) {
+            const list_row *g = &row[queue->number[k]];
+            append_response(&rows, &count, g, queue->number[k], respond_in_list(g, a, b, length), alpha_max,
+                            &sight);
+        }
+    else
+        for (unsigned k = 0; k < take; k++) {
+            const list_row *g = &row[queue->number[k]];
+            const row_response r = g->pair & ROW_GENERAL ? respond_general(scene, rays, g->id)
+                                                         : respond_in_list(g, a, b, length);
+            append_response(&rows, &count, g, queue->number[k], r, alpha_max, &sight);
+        }
+    out->count = count;
+    *seen_by = sight;
+}
+
+/* All rows that can be seen. */
+static void gather_rows(const kernel_scene *scene, const tile_list *list, const packet_rays *rays,
+                        const list_rays *seen, list_rows *rows, kernel_counters *counters)
+{
+    const vfloat16 opaque = vfloat16_set1(0.9999f * scene->settings.transmittance_min),
+                   length = vfloat16_mul(vfloat16_load(seen->length), vfloat16_set1(0.99999f)),
+                   zero = vfloat16_set1(0);
+    /* Rays that are not active see nothing. */
+    packet_sight sight = {vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
+                          vfloat16_set1(1), zero};
+    row_queue queue = {.count = 0};
+    rows->count = 0;
+    for (size_t first = 0; first < list->count; first += 16) {
+        const unsigned bits = rows_in_packet(list, first, seen);
+        queue.count += vmask16_numbers(vmask16_from_bits(bits), (uint32_t)first, queue.number + queue.count);
+        const bool last = first + 16 >= list->count;
+        if (queue.count < 16 && !last)
+            continue;
+        const unsigned take = last ? queue.count : 16;
+        evaluate_queue(scene, list, rays, seen, &queue, take, rows, &sight);
+        counters->tests += (uint64_t)take * PACKET_LANES;
+        queue.count -= take;
+        memcpy(queue.number, queue.number + 16, 16 * sizeof *queue.number);
+        /* What lies behind all hits of a ray that is opaque is not seen. */
+        sight.far = vfloat16_select(
+            vfloat16_lt(sight.product, opaque),
+            vfloat16_min(sight.far, vfloat16_mul(sight.reached, vfloat16_set1(1.000001f))), sight.far);
+        /* Those that still wait are of this sixteen. */
+        const float nearest = list->nearest[first / 16 + (queue.count == 0)];
+        if (!vmask16_any(vfloat16_lt(vfloat16_mul(length, vfloat16_set1(nearest)), sight.far)))
+            break;
+    }
+}
+
+static bool blend_list(const kernel_scene *scene, const tile_list *list, const list_rows *from,
+                       const packet_rays *rays, int packet, packet_output *out, hit_tape *tape,
+                       kernel_counters *counters)
+{
+    const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0), one = vfloat16_set1(1),
+                   stop_at = vfloat16_set1(scene->settings.transmittance_min);
+    vfloat16 lowest = one, rgb[3] = {zero, zero, zero};
+    const list_rows copy = *from, *rows = &copy;
+    uint64_t hits = 0, blended = 0;
+    size_t kept = tape != NULL ? tape->count : 0;
+    packet_extra extra;
+    start_extra(&extra);
+    if (tape != NULL &&
+        mem_reserve((void **)&tape->entries, &tape->capacity, tape->count, tape->count + rows->count + 1,
+                    sizeof *tape->entries, "hit tape", NULL) != GBT_OK)
+        return false;
+    tape_entry *entries = tape != NULL ? tape->entries : NULL;
+    for (size_t i = 0; i < rows->count; i++) {
+        const int row = (int)rows->order[i];
+        const vfloat16 T = row_load(rows->through, (int)i), alpha = row_load(rows->alpha, row),
+                       next = vfloat16_fnma(T, alpha, T);
+        const vmask16 hit = vfloat16_lt(zero, alpha), blend = vmask16_and(hit, vfloat16_le(stop_at, next));
+        const vfloat16 weight = vfloat16_select(blend, vfloat16_mul(T, alpha), zero);
+        const list_row *g = &list->row[rows->number[row]];
+        const unsigned bits = vmask16_bits(blend);
+        lowest = vfloat16_min(lowest, vfloat16_select(blend, next, infinite));
+        for (int c = 0; c < 3; c++)
+            rgb[c] = vfloat16_fma(weight, vfloat16_set1(g->color[c]), rgb[c]);
+        if (scene->extra)
+            note_row(&extra, rays, scene->records + (size_t)g->id * RECORD_FLOATS, g->id, blend, weight, next,
+                     row_load(rows->t, row));
+        hits += (uint64_t)__builtin_popcount(vmask16_bits(hit));
+        blended += (uint64_t)__builtin_popcount(bits);
+        if (tape != NULL) {
+            entries[kept] = (tape_entry){g->pair & ~ROW_GENERAL, (uint16_t)bits, (uint16_t)packet};
+            kept += bits != 0;
+        }
+    }
+    if (tape != NULL)
+        tape->count = kept;
+    counters->hits += hits;
+    counters->blended += blended;
+    counters->rows += rows->count;
+    counters->pairs += rows->steps;
+    counters->spilled_packets += rows->crowded;
+    for (int c = 0; c < 3; c++)
+        vfloat16_store(out->rgb[c],
+                       vfloat16_fma(lowest, vfloat16_set1(scene->settings.background[c]), rgb[c]));
+    vfloat16_store(out->transmittance, lowest);
+    store_extra(&extra, out);
+    return true;
+}
+
+static bool forward_list(const kernel_scene *scene, const list_view *view, size_t tile, const tile_rays *rays,
+                         packet_output out[TILE_PACKETS], hit_tape *tape, list_scratch *scratch,
+                         kernel_counters *counters)
+{
+    double middle[2];
+    tile_list list;
+    list_rows rows;
+    tile_middle(&view->tiles[tile], middle);
+    if (!load_list(scene, view, tile, middle, scratch, &list) ||
+        !reserve_rows_of_list(scratch, list.count, false, &rows))
+        return false;
+    counters->candidates += (uint64_t)list.count;
+    for (int p = 0; p < TILE_PACKETS; p++) {
+        const packet_rays *packet = &rays->packet[p];
+        list_rays seen;
+        if (packet->active == 0)
+            continue;
+        counters->rays += (uint64_t)__builtin_popcount(packet->active);
+        slope_rays(&view->frame, packet, middle, &seen);
+        gather_rows(scene, &list, packet, &seen, &rows, counters);
+        order_by_middle(&list, scene->settings.t_near, &rows);
+        insert_rows(&rows);
+        if ((rows.crowded && !sort_rows_by_ray(&rows, scratch)) ||
+            !blend_list(scene, &list, &rows, packet, p, &out[p], tape, counters))
+            return false;
+    }
+    return true;
+}
+
+#endif

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/view_lists.h -- which Gaussians each tile of a picture may see, for rays that all start at one
+   point. */
+#ifndef GBT_TRACE_VIEW_LISTS_H
+#define GBT_TRACE_VIEW_LISTS_H
+
+#include "trace/list_view.h"
+#include "trace/rays.h"
+
+/** The lists of one view, and the memory they are made in, used again from view to view. Start from {0}. */
+typedef struct view_lists {
+    list_view view;
+    struct list_group *groups; /* internal, as all that follows */
+    uint32_t *histogram;
+    uint16_t *lookup;
+    size_t tile_capacity, record_capacity, kept_capacity, pair_capacity, first_capacity, group_capacity,
+        histogram_capacity, lookup_capacity, slot_capacity, used_capacity;
+} view_lists;
+
+/**
+ * Make the lists for `rays`.
+ *
+ * @param usable [out] false: these rays do not start at one point or run too far apart (beyond 72 degrees
+ * from their middle), or too many Gaussians are near that point: there are no lists, and the tree has to be
+ * walked
+ * @return GBT_OK or GBT_ERR_NO_MEMORY
+ * Threads: uses all; the same lists for every thread count.
+ */
+gbt_status view_lists_make(view_lists *lists, const list_kernel *kernel, const kernel_scene *scene,
+                           const gaussians *g, const ray_image *rays, bool *usable, gbt_error *err);
+
+/** Memory for what the adjoint leaves. GBT_OK or GBT_ERR_NO_MEMORY. */
+gbt_status view_lists_reserve_slots(view_lists *lists, gbt_error *err);
+
+void view_lists_free(view_lists *lists); /* back to {0} */
+
+#endif

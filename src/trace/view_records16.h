@@ -1,0 +1,225 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* trace/view_records16.h -- the records of a view, sixteen Gaussians at a time, and where each can be hit.
+
+   With kappa = c / R^2, c the d2 where the response falls to alpha_min, a ray is hit where y <= lambda w1^2,
+   lambda = kappa / (1 - kappa): an ellipse in (a, b) when all of the ellipsoid lies ahead. With p = q1 q4 -
+   q2 q3, P = p^2 + q1^2 q5^2 and S = q3^2 q5^2 its determinant is D = S - lambda P, and everything else is
+   made of sums that do not cancel while lambda P <= 3/4 S. Included by list_kernel.inc.h. */
+#ifndef GBT_TRACE_VIEW_RECORDS16_H
+#define GBT_TRACE_VIEW_RECORDS16_H
+
+#include "trace/list_view.h"
+#include "trace/view_form16.h"
+
+/* Means of sixteen Gaussians in the axes of the view. In double, so that slopes have the digits of the
+   coordinates. */
+typedef struct view_means {
+    double a[16], b[16];
+    _Alignas(64) float slope[2][16], at[3][16];
+} view_means;
+
+static inline void place_means(const gaussians *g, const view_frame *frame, size_t first, view_means *out)
+{
+    const double(*dual)[3] = frame->dual, *o = frame->origin;
+    for (int i = 0; i < 16; i++) {
+        const size_t at = first + (size_t)i;
+        const double x = (double)g->mean_x[at] - o[0], y = (double)g->mean_y[at] - o[1],
+                     z = (double)g->mean_z[at] - o[2];
+        const double u = dual[0][0] * x + dual[0][1] * y + dual[0][2] * z,
+                     v = dual[1][0] * x + dual[1][1] * y + dual[1][2] * z,
+                     w = dual[2][0] * x + dual[2][1] * y + dual[2][2] * z, inverse = 1 / w;
+        out->a[i] = u * inverse;
+        out->b[i] = v * inverse;
+        out->slope[0][i] = (float)out->a[i];
+        out->slope[1][i] = (float)out->b[i];
+        out->at[0][i] = (float)u;
+        out->at[1][i] = (float)v;
+        out->at[2][i] = (float)w;
+    }
+}
+
+/* Which of sixteen can be seen at all: the rule of bvh/proxy.c. */
+static inline unsigned visible_lanes(const kernel_scene *scene, const gaussians *g, size_t first, size_t end,
+                                     uint32_t *rejected)
+{
+    unsigned bits = 0;
+    for (unsigned i = 0; i < 16 && first + i < end; i++) {
+        const size_t at = first + i;
+        const float color = g->red[at] + g->green[at] + g->blue[at],
+                    turn = g->quat_w[at] * g->quat_w[at] + g->quat_x[at] * g->quat_x[at] +
+                           g->quat_y[at] * g->quat_y[at] + g->quat_z[at] * g->quat_z[at],
+                    size = (1 + 4 * turn) * (g->scale_x[at] + g->scale_y[at] + g->scale_z[at]),
+                    reach = fabsf(g->mean_x[at]) + fabsf(g->mean_y[at]) + fabsf(g->mean_z[at]) + 10 * size;
+        if (g->opacity[at] <= scene->settings.alpha_min)
+            continue;
+        const bool sound = isfinite(g->opacity[at]) && g->scale_x[at] > 0 && g->scale_y[at] > 0 &&
+                           g->scale_z[at] > 0 && isfinite(color) && reach < 1e17f; /* false for NaN too */
+        bits |= (unsigned)sound << i;
+        *rejected += !sound;
+    }
+    return bits;
+}
+
+/* d2 where sixteen Gaussians end, and a little more than rounding of alpha can change. */
+static inline vfloat16 cut_squares(const kernel_scene *scene, const float *opacity, unsigned lanes)
+{
+    _Alignas(64) float cut[16] = {0};
+    const float radius2 = scene->settings.proxy_radius * scene->settings.proxy_radius;
+    for (int i = 0; i < 16; i++)
+        if (lanes >> i & 1)
+            cut[i] = smaller(2 * logf(opacity[i] / scene->settings.alpha_min), radius2);
+    return vfloat16_fma(vfloat16_load(cut), vfloat16_set1(1.0001f), vfloat16_set1(2e-5f));
+}
+
+typedef struct outline_lanes {
+    vfloat16 field[8]; /* of view_outline */
+    vmask16 holds;     /* the form holds; the others need their ellipsoids */
+} outline_lanes;
+
+static inline outline_lanes find_outlines(const kernel_scene *scene, const view_form *form, vfloat16 depth,
+                                          vfloat16 cut)
+{
+    const vfloat16 *q = form->q, one = vfloat16_set1(1), limit = vfloat16_set1(1e9f);
+    outline_lanes o;
+    const vfloat16 kappa = vfloat16_div(cut, vfloat16_mul(form->distance, form->distance)),
+                   lambda = vfloat16_div(kappa, vfloat16_sub(one, kappa));
+    const vfloat16 p = vfloat16_fnma(q[1], q[2], vfloat16_mul(q[0], q[3])), q55 = vfloat16_mul(q[4], q[4]),
+                   q33 = vfloat16_mul(q[2], q[2]), S = vfloat16_mul(q33, q55);
+    const vfloat16 across = vfloat16_mul(q[0], q55),
+                   P = vfloat16_fma(p, p, vfloat16_mul(vfloat16_mul(q[0], q[0]), q55)),
+                   D = vfloat16_fnma(lambda, P, S);
+    const vfloat16 A = vfloat16_fnma(lambda, vfloat16_mul(q[0], q[0]), q33),
+                   B = vfloat16_fnma(lambda, vfloat16_mul(q[0], q[1]), vfloat16_mul(q[2], q[3])),
+                   C = vfloat16_div(vfloat16_fma(B, B, D), A);
+    const vfloat16 inverse = vfloat16_div(one, D), share = vfloat16_mul(lambda, inverse),
+                   G = vfloat16_mul(S, inverse),
+                   s = vfloat16_mul(vfloat16_mul(lambda, vfloat16_set1(1.001f)), G);
+    o.field[0] = vfloat16_mul(share, vfloat16_fma(q[3], p, across));
+    o.field[1] = vfloat16_sub(vfloat16_set1(0), vfloat16_mul(share, vfloat16_mul(q[2], p)));
+    const vfloat16 root = vfloat16_sqrt(vfloat16_div(A, s)), over = vfloat16_div(root, A);
+    o.field[2] = root;
+    o.field[3] = vfloat16_mul(B, over);
+    o.field[4] = vfloat16_mul(vfloat16_sqrt(D), over);
+    o.field[5] = vfloat16_sqrt(vfloat16_mul(vfloat16_mul(s, C), inverse));
+    o.field[6] = vfloat16_sqrt(vfloat16_mul(vfloat16_mul(s, A), inverse));
+    o.field[7] = kappa;
+    const vfloat16 w1_most = vfloat16_add(G, vfloat16_sqrt(vfloat16_mul(share, vfloat16_mul(G, P)))),
+                   nearest = vfloat16_div(vfloat16_mul(depth, vfloat16_sub(one, kappa)), w1_most);
+    const vmask16 ahead =
+        vmask16_and(vfloat16_lt(vfloat16_set1(1.001f * scene->settings.t_near), nearest),
+                    vmask16_and(vfloat16_lt(vfloat16_set1(0), depth), vfloat16_lt(vfloat16_set1(0), D)));
+    const vmask16 small =
+        vmask16_and(vfloat16_lt(kappa, vfloat16_set1(0.5f)),
+                    vfloat16_lt(vfloat16_mul(lambda, P), vfloat16_mul(vfloat16_set1(0.75f), S)));
+    /* The adjoint squares R and y twice. */
+    const vmask16 sound = vmask16_and(
+        vmask16_and(form->sound, vmask16_and(vfloat16_lt(vfloat16_set1(1e-30f), S),
+                                             vfloat16_lt(form->falloff, vfloat16_set1(1e14f)))),
+        vmask16_and(
+            vfloat16_lt(q[2], limit),
+            vmask16_and(vfloat16_lt(q[4], limit),
+                        vfloat16_lt(vfloat16_max(q[3], vfloat16_sub(vfloat16_set1(0), q[3])), limit))));
+    o.holds = vmask16_and(sound, vmask16_and(ahead, small));
+    return o;
+}
+
+/* Covariances of sixteen ellipsoids in the axes of the view: k^2 times the sum of the scaled axes' squares.
+ */
+static inline void find_ellipsoids(const gaussian_lanes *g, const view_frame *frame, const float at[3][16],
+                                   vfloat16 cut, vfloat16 out[8])
+{
+    vfloat16 axis[3][3];
+    float dual[3][3];
+    for (int r = 0; r < 3; r++)
+        for (int k = 0; k < 3; k++)
+            dual[r][k] = (float)frame->dual[r][k];
+    for (int k = 0; k < 3; k++) { /* row k of the matrix is the axis over its length: over its square, scaled
+                                   */
+        const vfloat16 inverse = vfloat16_div(vfloat16_set1(1), dot16(g->matrix + 3 * k, g->matrix + 3 * k));
+        for (int r = 0; r < 3; r++)
+            axis[r][k] = vfloat16_mul(dot_lanes(dual[r], g->matrix + 3 * k), inverse);
+    }
+    for (int r = 0; r < 3; r++)
+        out[r] = vfloat16_load(at[r]);
+    out[3] = vfloat16_mul(cut, dot16(axis[0], axis[0]));
+    out[4] = vfloat16_mul(cut, dot16(axis[1], axis[1]));
+    out[5] = vfloat16_mul(cut, dot16(axis[2], axis[2]));
+    out[6] = vfloat16_mul(cut, dot16(axis[0], axis[2]));
+    out[7] = vfloat16_mul(cut, dot16(axis[1], axis[2]));
+    const vfloat16 slack =
+        vfloat16_mul(vfloat16_set1(0x1p-17f), vfloat16_add(out[3], vfloat16_add(out[4], out[5])));
+    for (int k = 3; k < 6; k++)
+        out[k] = vfloat16_add(out[k], slack);
+}
+
+static view_kept make_records(const kernel_scene *scene, const gaussians *g, const view_frame *frame,
+                              const slope_box *bounds, size_t begin, size_t end, view_record *records,
+                              view_shape *shapes)
+{
+    uint32_t count = 0, general = 0, rejected = 0;
+    const vfloat16 low[2] = {vfloat16_set1(bounds->low[0]), vfloat16_set1(bounds->low[1])},
+                   high[2] = {vfloat16_set1(bounds->high[0]), vfloat16_set1(bounds->high[1])};
+    for (size_t first = begin; first < end; first += 16) {
+        const unsigned visible = visible_lanes(scene, g, first, end, &rejected);
+        if (visible == 0)
+            continue;
+        uint32_t id[16];
+        view_means means;
+        view_form form;
+        for (unsigned i = 0; i < 16; i++)
+            id[i] = (uint32_t)(first + i < end ? first + i : first);
+        const gaussian_lanes lanes = load_gaussians(scene, id, NULL);
+        place_means(g, frame, first, &means);
+        const vfloat16 slope[2] = {vfloat16_load(means.slope[0]), vfloat16_load(means.slope[1])},
+                       depth = vfloat16_load(means.at[2]);
+        view_form_find(frame->axis, &lanes, slope[0], slope[1], depth, &form);
+        const vfloat16 cut = cut_squares(scene, g->opacity + first, visible);
+        const outline_lanes outline = find_outlines(scene, &form, depth, cut);
+        const unsigned holds = vmask16_bits(outline.holds) & visible;
+        vmask16 inside = vmask16_from_bits(holds);
+        for (int k = 0; k < 2; k++) {
+            const vfloat16 middle = vfloat16_add(slope[k], outline.field[k]), half = outline.field[5 + k];
+            inside = vmask16_and(inside, vmask16_and(vfloat16_le(vfloat16_sub(middle, half), high[k]),
+                                                     vfloat16_le(low[k], vfloat16_add(middle, half))));
+        }
+        unsigned kept = vmask16_bits(inside);
+        _Alignas(64) float q[5][16], falloff[16], shape[8][16], round[8][16];
+        for (int k = 0; k < 5; k++)
+            vfloat16_store(q[k], form.q[k]);
+        vfloat16_store(falloff, form.falloff);
+        for (int k = 0; k < 8; k++)
+            vfloat16_store(shape[k], outline.field[k]);
+        if (holds != visible) {
+            vfloat16 field[8];
+            find_ellipsoids(&lanes, frame, (const float(*)[16])means.at, cut, field);
+            for (int k = 0; k < 8; k++)
+                vfloat16_store(round[k], field[k]);
+            kept |= visible & ~holds;
+        }
+        for (; kept != 0; kept &= kept - 1) {
+            const int i = __builtin_ctz(kept);
+            const size_t at = first + (size_t)i;
+            const bool front = (holds >> i & 1) != 0;
+            const float(*field)[16] = front ? (const float(*)[16])shape : (const float(*)[16])round;
+            float eight[8];
+            for (int k = 0; k < 8; k++)
+                eight[k] = field[k][i];
+            memcpy(&shapes[count], eight, sizeof eight);
+            if (!front && !ellipsoid_meets_box(&shapes[count].ellipsoid, bounds))
+                continue;
+            records[count] = (view_record){.a = means.a[i],
+                                           .b = means.b[i],
+                                           .q = {q[0][i], q[1][i], q[2][i], q[3][i], q[4][i]},
+                                           .depth = means.at[2][i],
+                                           .falloff = falloff[i],
+                                           .opacity = g->opacity[at],
+                                           .color = {g->red[at], g->green[at], g->blue[at]},
+                                           .id = (uint32_t)at | (front ? 0 : RECORD_GENERAL)};
+            general += !front;
+            count++;
+        }
+    }
+    return (view_kept){count, general, rejected};
+}
+
+#endif

@@ -5,8 +5,10 @@
 
 #include "cli/options.h"
 
-/** The table of the command that runs; NULL before one does. */
-static const option_table *running;
+static const option_table none;
+
+/** The table of the command that runs; an empty one before one does. */
+static const option_table *running = &none;
 
 void options_set_fields(const option_table *t) { running = t; }
 
@@ -14,14 +16,14 @@ void options_name_fields(const char *text, char *out, size_t size)
 {
     size_t used = 0;
     const char *at = text;
-    const int own = running != NULL ? running->own : 0;
     for (;;) {
         const size_t length = strspn(at, "abcdefghijklmnopqrstuvwxyz0123456789_");
         int row = 0;
-        while (row < own && !options_is_field(&running->rows[row], at, length))
+        while (row < running->own && !options_is_field(&running->rows[row], at, length))
             row++;
         const bool last = at[length] == ':' && at[length + 1] == ' ';
-        if (length == 0 || row == own || !(last || strncmp(at + length, ", ", 2) == 0) || used >= size)
+        if (length == 0 || row == running->own || !(last || strncmp(at + length, ", ", 2) == 0) ||
+            used >= size)
             break;
         used +=
             (size_t)snprintf(out + used, size - used, "--%s%s", running->rows[row].name, last ? "" : ", ");
@@ -32,4 +34,23 @@ void options_name_fields(const char *text, char *out, size_t size)
         }
     }
     snprintf(out, size, "%s", text);
+}
+
+void options_name_quoted(const char *text, char *out, size_t size)
+{
+    size_t used = 0;
+    for (const char *at = text; *at != '\0' && used + 1 < size;) {
+        const size_t length = *at == '`' ? strcspn(at + 1, "`") : 0;
+        int row = 0;
+        while (length > 0 && row < running->own && !options_is_field(&running->rows[row], at + 1, length))
+            row++;
+        if (length > 0 && at[length + 1] == '`' && row < running->own) {
+            const int put = snprintf(out + used, size - used, "--%s", running->rows[row].name);
+            used += (size_t)put < size - used ? (size_t)put : size - used - 1;
+            at += length + 2;
+        } else {
+            out[used++] = *at++;
+        }
+    }
+    out[used] = '\0';
 }

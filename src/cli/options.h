@@ -95,6 +95,10 @@ int options_parse(const command *self, int argc, char **argv, operands *out);
  */
 void options_name_fields(const char *text, char *out, size_t size);
 
+/** A field that the library quotes anywhere, "go on by `resume`", as its option: "go on by --resume". Other
+    quoted words stay. */
+void options_name_quoted(const char *text, char *out, size_t size);
+
 /** From now on the fields are those of `t`, which stays the caller's. */
 void options_set_fields(const option_table *t);
 

@@ -19,14 +19,15 @@ static void print_error(const char *text)
 
 int command_failed(gbt_status status, const gbt_error *err)
 {
-    char text[sizeof err->text + 64];
+    char text[sizeof err->text + 64], named[sizeof err->text + 128];
     if (status == GBT_OK)
         return 0;
     if (status == GBT_ERR_ARGUMENT)
         options_name_fields(err->text, text, sizeof text);
     else
         snprintf(text, sizeof text, "%s", err->text);
-    print_error(text[0] != '\0' ? text : "failed without a reason");
+    options_name_quoted(text, named, sizeof named);
+    print_error(named[0] != '\0' ? named : "failed without a reason");
     return gbt_status_exit_code(status);
 }
 

@@ -117,10 +117,10 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     }
     if (data == NULL && out->cloud.count > 0 && !has_data)
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%.1000s: plain Gaussians know no cameras: name a camera or a data set", run);
+                         "%.1000s: plain Gaussians know no cameras (wanted `camera` or `data`)", run);
     if (data == NULL && !has_data)
         return base_fail(err, GBT_ERR_IO,
-                         "%.300s: its data set is not there (tried %.1200s); name the folder where it is now",
+                         "%.300s: its data set is not there (tried %.1200s); `data` says where it is now",
                          run, out->data.tried);
     if (data == NULL && out->data.moved)
         log_info("%s: its data set is taken from %s, for both were moved", run, out->data.place);

@@ -50,7 +50,8 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, run_pat
                          p->checkpoint);
     if (!def->resume && !def->overwrite && (file_exists(p->model) || has_checkpoint))
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%.1000s: holds a run already (resume it, name another folder, or overwrite it)",
+                         "%.1000s: holds a run already (go on with it by `resume`, name another folder, or "
+                         "lose it by `overwrite`)",
                          run);
     return file_make_folder(checkpoints, err);
 }

@@ -435,7 +435,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "a lossless model is copied without loss only" "$(cat err out)"
     "$program" train made -o run-small --iterations 4 >out 2>err
     got=$?
-    [ "$got" = 2 ] && [ "$(grep -c '^error: run-small: .*resume it.*overwrite it' err)" = 1 ] && cmp -s small.gbt run-small/model.gbt
+    [ "$got" = 2 ] && [ "$(grep -c '^error: run-small: .*by --resume,.*by --overwrite)' err)" = 1 ] && cmp -s small.gbt run-small/model.gbt
     report $? "train leaves a run alone" "  got $got: $(cat err out)"
     "$program" train made -o run-small --iterations 4 --overwrite >out 2>err && "$program" info run-small | grep -q 'trained   4 iterations'
     report $? "train --overwrite trains anew" "$(cat err out; "$program" info run-small)"
@@ -456,7 +456,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "eval of an older run, in the folder where it was trained" "$(cat err out)"
     (cd elsewhere && "$program" eval ../pair/run-small) >out 2>err
     got=$?
-    [ "$got" = 4 ] && [ "$(grep error err)" = "error: ../pair/run-small: its data set is not there (tried made); name the folder where it is now" ]
+    [ "$got" = 4 ] && [ "$(grep error err)" = "error: ../pair/run-small: its data set is not there (tried made); --data says where it is now" ]
     report $? "eval names the place of a missing data set" "  got $got: $(cat err out)"
     printf 'made\n/gone/made\n../gone\n' >pair/run-small/data_places
     (cd elsewhere && "$program" eval ../pair/run-small) >out 2>err

@@ -465,6 +465,36 @@ static void nearest_names(void **state)
     }
 }
 
+/* Errors of the library, as they reach the terminal: leading fields, and quoted ones anywhere. */
+static void fields_as_options(void **state)
+{
+    (void)state;
+    static option_table t = {.rows = {{.name = "init-count"}, {.name = "resume"}}, .own = 2, .count = 2};
+    options_set_fields(&t);
+    const struct {
+        const char *text, *leading, *quoted;
+    } rows[] = {
+        {"init_count: 3", "--init-count: 3", "init_count: 3"},
+        {"init_count, resume: not both", "--init-count, --resume: not both", "init_count, resume: not both"},
+        {"init_count, other: no", "init_count, other: no", "init_count, other: no"},
+        {"r: by `resume`, `other` or `", "r: by `resume`, `other` or `", "r: by --resume, `other` or `"},
+        {"`init_count``resume`", "`init_count``resume`", "--init-count--resume"},
+        {"", "", ""},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char got[64];
+        options_name_fields(rows[i].text, got, sizeof got);
+        assert_string_equal(got, rows[i].leading);
+        options_name_quoted(rows[i].text, got, sizeof got);
+        assert_string_equal(got, rows[i].quoted);
+        for (size_t size = 1; size < sizeof got; size++) { /* cut, never past the end */
+            memset(got, 'x', sizeof got);
+            options_name_quoted(rows[i].text, got, size);
+            assert_true(strlen(got) < size && got[size] == 'x');
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -475,6 +505,7 @@ int main(void)
         cmocka_unit_test(environment),
         cmocka_unit_test(json_texts),
         cmocka_unit_test(nearest_names),
+        cmocka_unit_test(fields_as_options),
     };
     return cmocka_run_group_tests_name("options", tests, NULL, NULL);
 }

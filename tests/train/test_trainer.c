@@ -696,10 +696,10 @@ static void a_run_is_overwritten_only_when_asked(void **state)
     }
     /* The checkpoint alone can be resumed, the model alone is a finished run. */
     assert_int_equal(rename(in_root("kept/model.gbt"), in_root("kept/aside")), 0);
-    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "resume it");
+    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "by `resume`");
     assert_int_equal(rename(in_root("kept/checkpoints/last.gbt"), in_root("kept/checkpoints/last.gbt.prev")),
                      0);
-    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "overwrite it");
+    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "by `overwrite`");
     assert_int_equal(unlink(in_root("kept/checkpoints/last.gbt.prev")), 0);
     assert_int_equal(rename(in_root("kept/aside"), in_root("kept/model.gbt")), 0);
     train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "holds a run already");

@@ -12,21 +12,26 @@ static const option_table *running = &none;
 
 void options_set_fields(const option_table *t) { running = t; }
 
+/** The option of the field at `name`; NULL: the command has none. */
+static const option *option_of(const char *name, size_t length)
+{
+    for (int row = 0; length > 0 && row < running->own; row++)
+        if (options_is_field(&running->rows[row], name, length))
+            return &running->rows[row];
+    return NULL;
+}
+
 void options_name_fields(const char *text, char *out, size_t size)
 {
     size_t used = 0;
     const char *at = text;
     for (;;) {
         const size_t length = strspn(at, "abcdefghijklmnopqrstuvwxyz0123456789_");
-        int row = 0;
-        while (row < running->own && !options_is_field(&running->rows[row], at, length))
-            row++;
+        const option *o = option_of(at, length);
         const bool last = at[length] == ':' && at[length + 1] == ' ';
-        if (length == 0 || row == running->own || !(last || strncmp(at + length, ", ", 2) == 0) ||
-            used >= size)
+        if (o == NULL || !(last || strncmp(at + length, ", ", 2) == 0) || used >= size)
             break;
-        used +=
-            (size_t)snprintf(out + used, size - used, "--%s%s", running->rows[row].name, last ? "" : ", ");
+        used += (size_t)snprintf(out + used, size - used, "--%s%s", o->name, last ? "" : ", ");
         at += length + (last ? 0 : 2);
         if (last) {
             snprintf(out + (used < size ? used : size), used < size ? size - used : 0, "%s", at);
@@ -41,11 +46,9 @@ void options_name_quoted(const char *text, char *out, size_t size)
     size_t used = 0;
     for (const char *at = text; *at != '\0' && used + 1 < size;) {
         const size_t length = *at == '`' ? strcspn(at + 1, "`") : 0;
-        int row = 0;
-        while (length > 0 && row < running->own && !options_is_field(&running->rows[row], at + 1, length))
-            row++;
-        if (length > 0 && at[length + 1] == '`' && row < running->own) {
-            const int put = snprintf(out + used, size - used, "--%s", running->rows[row].name);
+        const option *o = option_of(at + 1, length);
+        if (o != NULL && at[length + 1] == '`') {
+            const int put = snprintf(out + used, size - used, "--%s", o->name);
             used += (size_t)put < size - used ? (size_t)put : size - used - 1;
             at += length + 2;
         } else {

@@ -48,8 +48,9 @@ void expect_print(const expectation *e, FILE *out)
 {
     fprintf(out,
             "  expect    training takes about %.0f MB; in 10 minutes (the default budget) %.0f "
-            "iterations on %d threads",
-            rounded(e->bytes / 1e6), rounded(default_budget_seconds / e->step_seconds), e->threads);
+            "iterations on %d thread%s",
+            rounded(e->bytes / 1e6), rounded(default_budget_seconds / e->step_seconds), e->threads,
+            e->threads == 1 ? "" : "s");
     if (e->score_seconds > 0)
         fprintf(out, ", then %.0f s for the scores", fmax(1, rounded(e->score_seconds)));
     fprintf(out, "\n");

@@ -75,7 +75,8 @@ static gbt_status start(video *v, char *const *arguments, gbt_error *err)
     v->process = 0;
     if (code == ENOENT)
         return base_fail(err, GBT_ERR_IO,
-                         "%s: a film wants the program ffmpeg, which is not there (install it, or give a "
+                         "%s: a film wants the program ffmpeg, which is not there (install it: apt install "
+                         "ffmpeg, or give a "
                          "folder for pictures)",
                          v->path);
     return base_fail(err, GBT_ERR_IO, "%s: ffmpeg does not start: %s", v->path, strerror(code));

@@ -293,7 +293,7 @@ printf '{}' >path.json
 misuse 3 "path.json: not a camera path (wanted \"cameras\", or nerfstudio's \"camera_path\")" render tiny -o o --path path.json
 PATH=/nowhere "$program" render tiny -o film.mp4 --path orbit --frames 2 >out 2>err
 got=$?
-[ "$got" = 4 ] && [ "$(cat err)" = "error: film.mp4: a film wants the program ffmpeg, which is not there (install it, or give a folder for pictures)" ] && [ ! -e film.mp4 ]
+[ "$got" = 4 ] && [ "$(cat err)" = "error: film.mp4: a film wants the program ffmpeg, which is not there (install it: apt install ffmpeg, or give a folder for pictures)" ] && [ ! -e film.mp4 ]
 report $? "a film without ffmpeg" "  got $got: $(cat err)"
 if command -v ffmpeg >/dev/null; then
     "$program" render tiny -o film.gif --path orbit --frames 2 >out 2>err && [ "$(head -c 4 film.gif)" = GIF8 ] && [ ! -e .film.gif.tmp ] &&

@@ -10,7 +10,7 @@ import puppeteer from "puppeteer-core";
 
 import {count} from "./count.mjs";
 
-const [gbtrace, browserPath, cameraPath, scene, work] = process.argv.slice(2);
+const [gbtrace, browserPath, cameraPath, scene, work, model] = process.argv.slice(2);
 const here = path.dirname(fileURLToPath(import.meta.url));
 const camera = JSON.parse(fs.readFileSync(cameraPath, "utf8"));
 const types = {".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascript", ".wasm": "application/wasm"};
@@ -57,6 +57,13 @@ function ours(file, renderer) {
     return path.join(folder, path.basename(cameraPath, ".json") + ".png");
 }
 
+// The picture of the run from which the Gaussians were exported.
+function modelPicture() {
+    const folder = path.join(work, "model");
+    run("render", model, "-o", folder, "--camera", cameraPath);
+    return path.join(folder, path.basename(cameraPath, ".json") + ".png");
+}
+
 function difference(picture, own) {
     const figures = JSON.parse(run("compare", picture, own, "--json"));
     return `${figures.psnr.toFixed(1)} dB, ${figures.flip.toFixed(3)}`;
@@ -65,8 +72,9 @@ function difference(picture, own) {
 run("export", scene, ...files.map((file) => path.join(work, file)));
 const server = http.createServer(serve).listen(0);
 const browser = await puppeteer.launch({executablePath: browserPath, args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]});
-console.log("| file | bytes | Gaussians, degree | drawn by | to our splats: PSNR, FLIP | to our rays |");
-console.log("|---|---|---|---|---|---|");
+const whole = model === undefined ? null : modelPicture();
+console.log("| file | bytes | Gaussians, degree | drawn by | to our splats: PSNR, FLIP | to our rays |" + (whole ? " to the run |" : ""));
+console.log("|---|---|---|---|---|---|" + (whole ? "---|" : ""));
 for (const file of files) {
     const inside = await count(path.join(work, file));
     const own = {};
@@ -81,7 +89,7 @@ for (const file of files) {
             continue;
         }
         console.log(`| \`${path.extname(file)}\` | ${fs.statSync(path.join(work, file)).size} | ${inside.count}, ${inside.degree} | ${viewer.name} (${shown.count}) | ` +
-            `${difference(shown.picture, own.raster)} | ${difference(shown.picture, own.trace)} |`);
+            `${difference(shown.picture, own.raster)} | ${difference(shown.picture, own.trace)} |` + (whole ? ` ${difference(shown.picture, whole)} |` : ""));
     }
 }
 await browser.close();

@@ -4,10 +4,10 @@
 const frameMs = 70, wholeMs = 400, stillMs = 180, retryMs = 150, callMs = 5, leastSide = 240;
 
 // fetch() that waits: the server draws for one at a time, and lets an old picture go when a newer one is asked for.
-async function ask(query) {
+async function ask(query, signal) {
     const begin = performance.now();
     for (;;) {
-        const response = await fetch("render?" + query);
+        const response = await fetch("render?" + query, { signal });
         if (response.status === 503) {
             await response.arrayBuffer();
             await new Promise(done => setTimeout(done, retryMs));
@@ -27,7 +27,8 @@ async function ask(query) {
 
 export class Pictures {
     // wanted(): { query(width, height) -> URLSearchParams, output, width, height, samples, small: while it moves, fewer pixels may come,
-    // bounded: when it stands too, where they cost too much, shot: kept for show() } or null; show(picture, done): draws it.
+    // bounded: when it stands, one of fewer pixels comes before a whole one that takes long, shot: kept for show() } or null;
+    // show(picture, done): draws it.
     constructor(wanted, show, fail) {
         Object.assign(this, { wanted, show, fail });
         this.generation = 0;  // counts what would make another picture
@@ -36,6 +37,7 @@ export class Pictures {
         this.cost = { fixed: 0, pixel: 0 }; // ms, and ms per pixel; 0: nothing is known yet
         this.recent = [];     // times of the last pictures
         this.wake = () => {};
+        this.asked = new AbortController(); // of the picture that is waited for
         this.run();
     }
 
@@ -43,6 +45,8 @@ export class Pictures {
     change(moving = false) {
         this.generation++;
         this.movedAt = moving ? performance.now() : -1e9;
+        if (performance.now() - this.askedAt > wholeMs)
+            this.asked.abort(); // a long one that nobody wants any more
         this.wake();
     }
 
@@ -66,15 +70,19 @@ export class Pictures {
         let scale = 1;
         if (!still)
             scale = this.scaleFor(want, frameMs);
-        else if (want.bounded)
-            scale = begun ? last.scale : this.scaleFor(want, wholeMs);
-        const sample = begun ? last.samples : 0;
+        else if (want.bounded && !begun)
+            scale = this.scaleFor(want, wholeMs);
+        const sample = begun && last.scale === scale ? last.samples : 0; // a mean is over pictures of one size
         if (!fresh && (moving || last.failed || sample >= want.samples))
             return null;
         const width = Math.max(1, Math.round(want.width * scale)), height = Math.max(1, Math.round(want.height * scale));
         const query = want.query(width, height);
         query.set("sample", sample);
-        return { generation: this.generation, output: want.output, shot: want.shot, scale, still, samples: sample + 1, answer: ask(query) };
+        this.asked = new AbortController();
+        this.askedAt = performance.now();
+        const answer = ask(query, this.asked.signal);
+        answer.catch(() => {}); // run() tells, when it comes to it
+        return { generation: this.generation, output: want.output, shot: want.shot, scale, still, samples: sample + 1, answer };
     }
 
     async run() {
@@ -97,7 +105,8 @@ export class Pictures {
                 picture.about.draw_ms = performance.now() - begin;
             } catch (error) {
                 this.shown = { ...asked, failed: true }; // until something changes
-                this.fail(error);
+                if (error.name !== "AbortError")
+                    this.fail(error);
                 asked = this.next(this.shown);
             }
         }

@@ -2,9 +2,9 @@
 /* benchmark/check_grad.c -- gradients on the user's own scene: renderers and decode against the same in
    double, the whole chain against differences. docs/gradients.md.
 
-   tracer      float adjoint of the image gradient      | reference_backward() on the same Gaussians
+   tracer      float adjoint of the image gradient      | reference_scene_backward() on the same Gaussians
    rasterizer  the same                                 | raster_reference_backward()
-   per-ray     the same                                 | reference_backward()
+   per-ray     the same                                 | reference_scene_backward()
    decode      float adjoint of the Gaussians' gradient | decode_ref_backward() on the same anchors
    chain       float gradient of the training loss g    | d . g against central differences of the loss,
                                                         | all of it in double; by the tracer

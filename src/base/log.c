@@ -20,7 +20,6 @@ static const double often_seconds = 0.5, line_seconds = 10;
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER; /* lines of two threads never mix */
 static gbt_listener listener;
 static void *listener_context;
-static int is_quiet = 0;
 static bool line_is_open; /* progress stands at the end of the terminal, without a newline */
 
 void gbt_listen(gbt_listener to, void *context)
@@ -85,8 +84,6 @@ void log_warn(const char *format, ...)
 
 void log_info(const char *format, ...)
 {
-    if (is_quiet)
-        return;
     va_list args;
     va_start(args, format);
     tell_text(GBT_EVENT_MESSAGE, format, args);
@@ -107,8 +104,6 @@ bool log_progress_due(void)
 
 void log_progress(const gbt_event *event)
 {
-    if (is_quiet)
-        return;
     gbt_event e = *event;
     e.kind = GBT_EVENT_PROGRESS;
     tell(&e);
@@ -142,5 +137,3 @@ void log_count(const char *stage, uint64_t done, uint64_t total, double psnr)
                  floor(fmod(e.seconds_left, 60)));
     log_progress(&e);
 }
-
-void log_set_quiet(int quiet) { is_quiet = quiet; }

@@ -11,7 +11,7 @@
 /** A warning; "warning: ..." on stderr. Threads: any. */
 void log_warn(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
-/** A message, unless log_set_quiet(1). Threads: any. */
+/** A message. Threads: any. */
 void log_info(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 /** Whether so much time has passed since the last progress that more is wanted. The first call starts the
@@ -29,7 +29,5 @@ void log_progress(const gbt_event *event);
  * @param psnr [in] of what was just done; NaN: none
  */
 void log_count(const char *stage, uint64_t done, uint64_t total, double psnr);
-
-void log_set_quiet(int quiet); /* warnings stay */
 
 #endif

@@ -1,14 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/colmap_write.c -- COLMAP models from structs: binary, or text. */
+/* data/colmap_write.c -- COLMAP models from structs, in the binary form. */
 #include "data/colmap_write.h"
 
 #include <math.h>
-#include <stdio.h>
 
 #include "base/file.h"
 #include "base/vec.h"
 #include "data/bytes.h"
-#include "data/number.h"
 #include "data/raw.h"
 
 typedef struct model {
@@ -186,129 +184,28 @@ static void put_points(sink *s, const model *m)
     }
 }
 
-static void put_text_uint(sink *s, uint64_t value)
+gbt_status colmap_write(const char *folder, const colmap_image *images, size_t image_count,
+                        const colmap_point *points, size_t point_count, gbt_error *err)
 {
-    char text[24];
-    snprintf(text, sizeof text, "%llu", (unsigned long long)value);
-    sink_put_text(s, text);
-}
-
-static void put_text_double(sink *s, double value)
-{
-    char text[NUMBER_TEXT_SIZE];
-    number_format_double(value, text);
-    sink_put_text(s, " ");
-    sink_put_text(s, text);
-}
-
-static void put_cameras_text(sink *s, const model *m)
-{
-    uint32_t seen = 0;
-    sink_put_text(s, "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n");
-    for (size_t i = 0; i < m->image_count; i++) {
-        if (!is_first_use(m, i, &seen))
-            continue;
-        const gbt_camera *camera = &m->images[i].camera;
-        put_text_uint(s, m->camera_ids[i]);
-        sink_put_text(s, " ");
-        sink_put_text(s, gbt_camera_model_name(camera->model));
-        sink_put_text(s, " ");
-        put_text_uint(s, (uint64_t)camera->width);
-        sink_put_text(s, " ");
-        put_text_uint(s, (uint64_t)camera->height);
-        for (int k = 0; k < gbt_camera_param_count(camera->model); k++)
-            put_text_double(s, camera->params[k]);
-        sink_put_text(s, "\n");
-    }
-}
-
-static void put_images_text(sink *s, const model *m)
-{
-    sink_put_text(s, "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# POINTS2D[] as X Y POINT3D_ID\n");
-    for (size_t i = 0; i < m->image_count; i++) {
-        const colmap_image *im = &m->images[i];
-        double q[4], t[3];
-        pose_of(&im->camera, q, t);
-        put_text_uint(s, i + 1);
-        for (int k = 0; k < 4; k++)
-            put_text_double(s, q[k]);
-        for (int k = 0; k < 3; k++)
-            put_text_double(s, t[k]);
-        sink_put_text(s, " ");
-        put_text_uint(s, m->camera_ids[i]);
-        sink_put_text(s, " ");
-        sink_put_text(s, im->name);
-        sink_put_text(s, "\n");
-        for (size_t k = 0; k < im->observation_count; k++) {
-            const colmap_observation *o = &im->observations[k];
-            put_text_double(s, o->x);
-            put_text_double(s, o->y);
-            sink_put_text(s, o->point == COLMAP_NO_POINT ? " -1" : " ");
-            if (o->point != COLMAP_NO_POINT)
-                put_text_uint(s, o->point + 1);
-        }
-        sink_put_text(s, "\n");
-    }
-}
-
-static void put_points_text(sink *s, const model *m)
-{
-    sink_put_text(s, "# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n");
-    for (size_t i = 0; i < m->point_count; i++) {
-        const colmap_point *p = &m->points[i];
-        put_text_uint(s, i + 1);
-        for (int k = 0; k < 3; k++)
-            put_text_double(s, p->position[k]);
-        for (int k = 0; k < 3; k++) {
-            sink_put_text(s, " ");
-            put_text_uint(s, p->color[k]);
-        }
-        put_text_double(s, p->error);
-        for (size_t k = 0; k < p->track_count; k++) {
-            sink_put_text(s, " ");
-            put_text_uint(s, (uint64_t)p->track[2 * k] + 1);
-            sink_put_text(s, " ");
-            put_text_uint(s, p->track[2 * k + 1]);
-        }
-        sink_put_text(s, "\n");
-    }
-}
-
-typedef void put_file(sink *s, const model *m);
-
-static gbt_status write_model(const char *folder, model *m, const char *const names[3],
-                              put_file *const writers[3], gbt_error *err)
-{
-    gbt_status status = prepare(m, err);
+    static const struct {
+        const char *name;
+        void (*put)(sink *s, const model *m);
+    } files[] = {{"cameras.bin", put_cameras}, {"images.bin", put_images}, {"points3D.bin", put_points}};
+    model m = {.images = images, .image_count = image_count, .points = points, .point_count = point_count};
+    gbt_status status = prepare(&m, err);
     if (status == GBT_OK)
         status = file_make_folder(folder, err);
-    for (int i = 0; i < 3 && status == GBT_OK; i++) {
+    for (size_t i = 0; i < sizeof files / sizeof files[0] && status == GBT_OK; i++) {
         char path[4096];
         sink s = {.err = err};
-        writers[i](&s, m);
+        files[i].put(&s, &m);
         status = s.status;
         if (status == GBT_OK)
-            status = file_join(path, sizeof path, folder, names[i], err);
+            status = file_join(path, sizeof path, folder, files[i].name, err);
         if (status == GBT_OK)
             status = file_write_atomic(path, s.bytes, s.size, err);
         sink_free(&s);
     }
-    mem_free(m->camera_ids);
+    mem_free(m.camera_ids);
     return status;
-}
-
-gbt_status colmap_write(const char *folder, const colmap_image *images, size_t image_count,
-                        const colmap_point *points, size_t point_count, gbt_error *err)
-{
-    model m = {.images = images, .image_count = image_count, .points = points, .point_count = point_count};
-    return write_model(folder, &m, (const char *const[3]){"cameras.bin", "images.bin", "points3D.bin"},
-                       (put_file *const[3]){put_cameras, put_images, put_points}, err);
-}
-
-gbt_status colmap_write_text(const char *folder, const colmap_image *images, size_t image_count,
-                             const colmap_point *points, size_t point_count, gbt_error *err)
-{
-    model m = {.images = images, .image_count = image_count, .points = points, .point_count = point_count};
-    return write_model(folder, &m, (const char *const[3]){"cameras.txt", "images.txt", "points3D.txt"},
-                       (put_file *const[3]){put_cameras_text, put_images_text, put_points_text}, err);
 }

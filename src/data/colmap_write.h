@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/colmap_write.h -- COLMAP models from structs: binary, or text. */
+/* data/colmap_write.h -- COLMAP models from structs, in the binary form. */
 #ifndef GBT_DATA_COLMAP_WRITE_H
 #define GBT_DATA_COLMAP_WRITE_H
 
@@ -42,10 +42,5 @@ typedef struct colmap_image {
  */
 gbt_status colmap_write(const char *folder, const colmap_image *images, size_t image_count,
                         const colmap_point *points, size_t point_count, gbt_error *err);
-
-/** The same as cameras.txt, images.txt and points3D.txt; doubles are written so that they read back bit for
-    bit. */
-gbt_status colmap_write_text(const char *folder, const colmap_image *images, size_t image_count,
-                             const colmap_point *points, size_t point_count, gbt_error *err);
 
 #endif

@@ -231,7 +231,7 @@ LANE_CODE void adjoint_lanes(const footprint_view *view, double variance, d8 pix
 
 /* ---- one Gaussian ---- */
 
-static gaussian8 spread(const footprint_gaussian *g)
+static gaussian8 broadcast(const footprint_gaussian *g)
 {
     gaussian8 out = {.opacity = d8_set(g->opacity)};
     for (int k = 0; k < 3; k++) {
@@ -253,18 +253,9 @@ static footprint_gaussian first(const gaussian8 *g)
 
 void footprint_widen(const footprint_view *view, double variance, double pixel_min, footprint_gaussian *g)
 {
-    gaussian8 lanes = spread(g);
+    gaussian8 lanes = broadcast(g);
     widen_lanes(view, variance, d8_set(pixel_min), &lanes);
     *g = first(&lanes);
-}
-
-void footprint_adjoint(const footprint_view *view, double variance, double pixel_min,
-                       const footprint_gaussian *g, footprint_gaussian *d)
-{
-    const gaussian8 lanes = spread(g);
-    gaussian8 back = spread(d);
-    adjoint_lanes(view, variance, d8_set(pixel_min), &lanes, &back);
-    *d = first(&back);
 }
 
 /* ---- arrays ---- */

@@ -44,10 +44,6 @@ typedef struct footprint_gaussian {
 /** The Gaussian widened: scale and opacity are replaced. Pixels count as no smaller than `pixel_min`. */
 void footprint_widen(const footprint_view *view, double variance, double pixel_min, footprint_gaussian *g);
 
-/** `d`: dL/d(widened) in, dL/d(g) out. The quaternion's is tangent. `g` is the Gaussian as it was before. */
-void footprint_adjoint(const footprint_view *view, double variance, double pixel_min,
-                       const footprint_gaussian *g, footprint_gaussian *d);
-
 /**
  * Widen every Gaussian of a view.
  *
@@ -61,7 +57,8 @@ void footprint_adjoint(const footprint_view *view, double variance, double pixel
 gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min,
                              const gaussians *g, gaussians *out, gbt_error *err);
 
-/** Adjoint of footprint_forward(): `d` holds dL/d(out), and then dL/d(g). Colours keep their gradient. */
+/** Adjoint of footprint_forward(): `d` holds dL/d(out), and then dL/d(g). The quaternion's is tangent;
+   colours keep theirs. */
 void footprint_backward(const footprint_view *view, float variance, const float *pixel_min,
                         const gaussians *g, gaussians *d);
 

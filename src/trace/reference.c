@@ -333,33 +333,13 @@ void reference_scene_free(reference_scene *scene)
     memset(scene, 0, sizeof *scene);
 }
 
-/* Copy `g` as `scene`, run `call` on it. */
-#define ON_COPY(call)                                                                                        \
-    reference_scene scene;                                                                                   \
-    gbt_status status = reference_scene_make(g, &scene, err);                                                \
-    if (status == GBT_OK)                                                                                    \
-        status = call;                                                                                       \
-    reference_scene_free(&scene);                                                                            \
-    return status
-
-gbt_status reference_ray_hits(const gaussians *g, const trace_settings *s, const double origin[3],
-                              const double dir[3], reference_hit **hits, size_t *count, size_t *capacity,
-                              gbt_error *err)
-{
-    *count = 0;
-    ON_COPY(reference_scene_ray_hits(&scene, s, origin, dir, hits, count, capacity, err));
-}
-
 gbt_status reference_forward(const gaussians *g, const trace_settings *s, const ray_image *rays, double *rgb,
                              double *transmittance, uint32_t *blended, gbt_error *err)
 {
-    ON_COPY(reference_scene_forward(&scene, s, rays, rgb, transmittance, blended, err));
-}
-
-gbt_status reference_backward(const gaussians *g, const trace_settings *s, const ray_image *rays,
-                              const double *d_rgb, const double *d_transmittance, double *d_gaussians,
-                              double d_background[3], gbt_error *err)
-{
-    ON_COPY(
-        reference_scene_backward(&scene, s, rays, d_rgb, d_transmittance, d_gaussians, d_background, err));
+    reference_scene scene;
+    gbt_status status = reference_scene_make(g, &scene, err);
+    if (status == GBT_OK)
+        status = reference_scene_forward(&scene, s, rays, rgb, transmittance, blended, err);
+    reference_scene_free(&scene);
+    return status;
 }

@@ -48,11 +48,8 @@ void reference_scene_free(reference_scene *scene); /* zeroes the struct */
  * @param count          [out]    number of hits; 0 for a zero direction
  * Gaussians with values that are not finite, or scales that are not positive, are never hit.
  * @return GBT_OK or GBT_ERR_NO_MEMORY
- * Threads: any, with distinct `hits`. Cost: about 10 ns per Gaussian, plus making a scene in the first form.
+ * Threads: any, with distinct `hits`. Cost: about 10 ns per Gaussian.
  */
-gbt_status reference_ray_hits(const gaussians *g, const trace_settings *s, const double origin[3],
-                              const double dir[3], reference_hit **hits, size_t *count, size_t *capacity,
-                              gbt_error *err);
 gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_settings *s,
                                     const double origin[3], const double dir[3], reference_hit **hits,
                                     size_t *count, size_t *capacity, gbt_error *err);
@@ -74,7 +71,8 @@ gbt_status reference_scene_forward(const reference_scene *scene, const trace_set
                                    uint32_t *blended, gbt_error *err);
 
 /**
- * Adjoint of reference_forward(): adds dL/dfield into `d_gaussians` and dL/dbackground into `d_background`.
+ * Adjoint of reference_scene_forward(): adds dL/dfield into `d_gaussians` and dL/dbackground into
+ * `d_background`.
  *
  * t_c is held fixed: exact at an inner t* (there d2 is at its minimum along the ray) and at t_near (a
  * constant). The gradient is 0 where alpha is cut at alpha_max. Scales are linear. The quaternion is taken as
@@ -87,9 +85,6 @@ gbt_status reference_scene_forward(const reference_scene *scene, const trace_set
  * @return as reference_forward(); after a failure the gradients are incomplete
  * Threads: one; sums are in ray order.
  */
-gbt_status reference_backward(const gaussians *g, const trace_settings *s, const ray_image *rays,
-                              const double *d_rgb, const double *d_transmittance, double *d_gaussians,
-                              double d_background[3], gbt_error *err);
 gbt_status reference_scene_backward(const reference_scene *scene, const trace_settings *s,
                                     const ray_image *rays, const double *d_rgb, const double *d_transmittance,
                                     double *d_gaussians, double d_background[3], gbt_error *err);

@@ -546,18 +546,6 @@ gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image
     return GBT_OK;
 }
 
-size_t trace_rejected_count(const trace_scene *scene)
-{
-    size_t rejected = 0;
-    if (scene->kernel == TRACE_EMBREE)
-        return scene->embree.rejected_count;
-    if (!scene->listed)
-        return scene->tree.rejected_count;
-    for (size_t i = 0; i < scene->lists.view.block_count; i++)
-        rejected += scene->lists.view.kept[i].rejected;
-    return rejected;
-}
-
 void trace_scene_free(trace_scene *scene)
 {
     gaussian_tree_free(&scene->tree);

@@ -70,8 +70,8 @@ typedef struct trace_outputs {
  *
  * @param g        [in] borrowed until the last pass over this build; padded (gaussians_pad)
  * @param reach    [in] largest |coordinate| of any ray origin that will be traced
- * @return GBT_OK, GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL Gaussians with non-finite fields are not seen
- *         (trace_rejected_count()). Cost: 1 ms per 100,000 on two cores, and 10 to 20 for the tree, which
+ * @return GBT_OK, GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL. Gaussians with non-finite fields are not seen.
+ *         Cost: 1 ms per 100,000 on two cores, and 10 to 20 for the tree, which
  *         TRACE_LIST makes with the first rays that need it.
  */
 gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_settings *settings, float reach,
@@ -103,9 +103,6 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
  */
 gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb,
                           gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err);
-
-/** How many Gaussians are not seen because of non-finite fields: after trace_forward(). */
-size_t trace_rejected_count(const trace_scene *scene);
 
 void trace_scene_free(trace_scene *scene);
 

@@ -7,6 +7,7 @@
 
 #include "base/rng.h"
 #include "base/vec.h"
+#include "colmap_text.h"
 #include "data/colmap_bin.h"
 #include "data/colmap_txt.h"
 #include "data/colmap_write.h"
@@ -708,13 +709,7 @@ static void round_trip(void **state)
     assert_string_equal(binary.source, "colmap-bin");
     check_trip(t, &binary);
     /* The text twin says exactly the same. */
-    for (int i = 0; i < 3; i++)
-        unlink(inside(
-            folder,
-            (const char *const[]){"sparse/0/cameras.bin", "sparse/0/images.bin", "sparse/0/points3D.bin"}[i],
-            0));
-    must(colmap_write_text(inside(folder, "sparse/0", 0), t->images, TRIP_IMAGES, t->points, TRIP_POINTS,
-                           &err));
+    colmap_to_text(inside(folder, "sparse/0", 0));
     must(scene_load(folder, NULL, &text, &err));
     assert_string_equal(text.source, "colmap-txt");
     check_trip(t, &text);

@@ -7,6 +7,7 @@
 
 #include "base/rng.h"
 #include "base/vec.h"
+#include "colmap_text.h"
 #include "data/colmap_write.h"
 #include "data/photo_size.h"
 #include "data/ply.h"
@@ -39,10 +40,9 @@ static void write_model(const char *folder, bool text, bool with_photos)
         points[i] = (colmap_point){.position = {999 + i, -i, i == 4 ? 1e9 : 0}, .color = {10, 20, 30}};
     char model[4096];
     snprintf(model, sizeof model, "%s/sparse/0", folder);
+    must(colmap_write(model, images, VIEW_COUNT, points, POINT_COUNT, &err));
     if (text)
-        must(colmap_write_text(model, images, VIEW_COUNT, points, POINT_COUNT, &err));
-    else
-        must(colmap_write(model, images, VIEW_COUNT, points, POINT_COUNT, &err));
+        colmap_to_text(model);
 }
 
 static void move(const char *folder, const char *from, const char *to)

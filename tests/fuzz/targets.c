@@ -13,7 +13,6 @@
 
 #include "base/file.h"
 #include "base/image.h"
-#include "base/log.h"
 #include "base/memory.h"
 #include "data/colmap_bin.h"
 #include "data/colmap_txt.h"
@@ -24,6 +23,7 @@
 #include "data/transforms.h"
 #include "io/model_file.h"
 #include "io/safetensors.h"
+#include "quiet.h"
 #include "render/camera_file.h"
 #include "render/camera_path_file.h"
 #include "train/config.h"
@@ -230,7 +230,7 @@ void fuzz_one(fuzz_target *target, const unsigned char *bytes, size_t size)
         memcpy(copy, bytes, size);
     copy[size] = '\0'; /* as file_read() leaves it */
     const source_file file = {.name = "input", .bytes = copy, .size = size};
-    log_set_quiet(1);
+    be_quiet();
     target(&file);
     mem_free(copy);
 }

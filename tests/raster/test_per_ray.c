@@ -4,7 +4,7 @@
 #include "base/near.h"
 #include "data/gaussian_ply.h"
 #include "raster/raster_support.h"
-#include "trace/reference.h"
+#include "trace/reference_once.h"
 #include "trace/trace.h"
 
 static const cloud_def clouds[] = {

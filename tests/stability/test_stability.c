@@ -6,9 +6,9 @@
 #include <unistd.h>
 
 #include "base/file.h"
-#include "base/log.h"
 #include "base/memory.h"
 #include "lab/lab.h"
+#include "quiet.h"
 #include "report/text.h"
 #include "stability/draw.h"
 
@@ -246,7 +246,7 @@ int main(void)
                                        STABILITY_CASES(X)
 #undef X
     };
-    log_set_quiet(1);
+    be_quiet();
     if (mkdtemp(folder) == NULL)
         return 1;
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);

@@ -8,7 +8,7 @@
 #include "base/vec.h"
 #include "test_support.h"
 #include "trace/fixture.h"
-#include "trace/reference.h"
+#include "reference_once.h"
 #include "trace/rows16.h"
 #include "trace/trace.h"
 

@@ -9,7 +9,7 @@
 #include "base/vec.h"
 #include "test_support.h"
 #include "trace/fixture.h"
-#include "trace/reference.h"
+#include "reference_once.h"
 
 /* One ray along +z from (x, y, z). The arrays live in `store`. */
 static ray_image one_ray(float store[6], float x, float y, float z)

@@ -7,6 +7,7 @@
 #include "base/near.h"
 #include "base/parallel.h"
 #include "image/metrics.h"
+#include "trace/footprint_one.h"
 #include "trace/reference.h"
 #include "frame/frame.h"
 #include "train/loss.h"
@@ -182,7 +183,7 @@ static void gradient_of(view *v, decode_ref *out)
         if (v->f.widened) {
             footprint_gaussian back;
             memcpy(&back, to, sizeof back);
-            footprint_adjoint(&v->f.view, (double)v->f.draw.footprint, 0, g, &back);
+            assert_ok(footprint_adjoint(&v->f.view, v->f.draw.footprint, 0, g, &back));
             memcpy(to, &back, sizeof back);
         }
         for (size_t k = 0; k < 3; k++)

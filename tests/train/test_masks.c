@@ -5,9 +5,9 @@
 
 #include <jansson.h>
 
-#include "base/log.h"
 #include "gbtrace/evaluate.h"
 #include "io/model_file.h"
+#include "quiet.h"
 
 /* Photos of `scene`, changed in place. */
 static void change_photos(const char *folder, void (*change)(image *photo, size_t view))
@@ -202,7 +202,7 @@ static void alpha_is_what_it_is_said_to_be(void **state)
 
 int main(void)
 {
-    log_set_quiet(1);
+    be_quiet();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(masked_pixels_have_no_say),
         cmocka_unit_test(a_black_mask_leaves_nothing),

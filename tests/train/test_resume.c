@@ -8,6 +8,7 @@
 #include "base/log.h"
 #include "base/parallel.h"
 #include "io/model_file.h"
+#include "quiet.h"
 #include "train/config.h"
 
 static gbt_train_def resume_def(uint64_t iterations, double budget_seconds)
@@ -196,7 +197,7 @@ static void other_data_are_refused(void **state)
 
 int main(void)
 {
-    log_set_quiet(1);
+    be_quiet();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_finished_run_goes_on),       cmocka_unit_test(the_new_length_decides),
         cmocka_unit_test(a_run_goes_on_for_a_time),     cmocka_unit_test(a_length_that_has_passed_is_refused),

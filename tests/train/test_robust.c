@@ -11,6 +11,7 @@
 #include "gbtrace/evaluate.h"
 #include "io/container.h"
 #include "io/model_file.h"
+#include "quiet.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
 #include "train/gradient_check.h"
@@ -704,7 +705,7 @@ static void exposure_resumes_to_the_same_bits(void **state)
 
 int main(void)
 {
-    log_set_quiet(1);
+    be_quiet();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pixels_that_are_not_numbers_are_marked),
         cmocka_unit_test(a_bad_pixel_has_no_say),

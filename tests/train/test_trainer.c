@@ -15,6 +15,7 @@
 #include "base/parallel.h"
 #include "data/photo_size.h"
 #include "io/model_file.h"
+#include "quiet.h"
 #include "train/adam.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
@@ -56,7 +57,7 @@ static pid_t start_child(const char *run)
 
 static int child_main(const char *data, const char *run)
 {
-    log_set_quiet(1);
+    be_quiet();
     gbt_train_def def = run_def();
     def.save_every_seconds = 1e-6; /* after every step */
     gbt_error err = {0};
@@ -1305,7 +1306,7 @@ int main(int argc, char **argv)
 {
     if (argc == 4 && strcmp(argv[1], "--child") == 0)
         return child_main(argv[2], argv[3]);
-    log_set_quiet(1);
+    be_quiet();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(progress_rises_from_0_to_1),
         cmocka_unit_test(pace_is_read),

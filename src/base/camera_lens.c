@@ -13,139 +13,13 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/poly.h"
+#include "base/camera_lens_radial.h"
 
 #define PI 3.14159265358979323846
-
-/* A perspective ray flatter than this (1e-6 rad from the image plane) is outside every real image. */
-static const double perspective_radius_max = 1e6;
 
 /* Accepted reprojection error of an inversion: absolute part in pixels, and a relative one for points far
    outside the image. */
 static const double converged_px = 1e-10, converged_relative = 1e-14;
-
-/* Radial factor f(x) = N / D at x = squared radius, and df/dx. */
-static double radial_factor(const camera_lens *lens, double x, double *d_factor)
-{
-    double n = 0, dn = 0, d = 0, dd = 0;
-    for (int i = LENS_NUMERATOR - 1; i >= 0; i--) {
-        dn = dn * x + n;
-        n = n * x + lens->numerator[i];
-    }
-    for (int i = LENS_DENOMINATOR - 1; i >= 0; i--) {
-        dd = dd * x + d;
-        d = d * x + lens->denominator[i];
-    }
-    const double factor = n / d;
-    *d_factor = (dn - factor * dd) / d;
-    return factor;
-}
-
-enum { SLOPE_COUNT = LENS_NUMERATOR + LENS_DENOMINATOR - 1 };
-
-/* The distorted radius r f(r^2) has slope f + 2 x f' = (N D + 2 x (N' D - N D')) / D^2: find its first zero,
-   and that of D. */
-static void find_monotone_range(camera_lens *lens, double radius_limit)
-{
-    double slope[SLOPE_COUNT] = {0};
-    for (int i = 0; i < LENS_NUMERATOR; i++)
-        for (int j = 0; j < LENS_DENOMINATOR; j++)
-            slope[i + j] += lens->numerator[i] * lens->denominator[j] * (1 + 2 * (i - j));
-    const double limit = radius_limit * radius_limit;
-    const double turn = poly_first_root(slope, SLOPE_COUNT - 1, limit);
-    const double pole = poly_first_root(lens->denominator, LENS_DENOMINATOR - 1, limit);
-    double d_factor;
-    if (pole < limit && pole <= turn) {
-        lens->radius_max = sqrt(pole);
-        lens->distorted_max = HUGE_VAL;
-    } else {
-        lens->radius_max = turn < limit ? sqrt(turn) : radius_limit;
-        lens->distorted_max =
-            lens->radius_max * radial_factor(lens, lens->radius_max * lens->radius_max, &d_factor);
-    }
-}
-
-static bool any_nonzero(const double *values, int count)
-{
-    for (int i = 0; i < count; i++)
-        if (values[i] != 0)
-            return true;
-    return false;
-}
-
-/* The parameters of a camera where its model's row says that they go; false where one is not finite. */
-static bool take_params(const gbt_camera *camera, const camera_model *model, camera_lens *lens)
-{
-    double *const places[] = {[LENS_FX] = &lens->fx,
-                              [LENS_FY] = &lens->fy,
-                              [LENS_CX] = &lens->cx,
-                              [LENS_CY] = &lens->cy,
-                              [LENS_N1] = &lens->numerator[1],
-                              [LENS_N2] = &lens->numerator[2],
-                              [LENS_N3] = &lens->numerator[3],
-                              [LENS_N4] = &lens->numerator[4],
-                              [LENS_N5] = &lens->numerator[5],
-                              [LENS_N6] = &lens->numerator[6],
-                              [LENS_D1] = &lens->denominator[1],
-                              [LENS_D2] = &lens->denominator[2],
-                              [LENS_D3] = &lens->denominator[3],
-                              [LENS_TX] = &lens->tangent_x,
-                              [LENS_TY] = &lens->tangent_y,
-                              [LENS_S0] = &lens->prism[0],
-                              [LENS_S1] = &lens->prism[1],
-                              [LENS_S2] = &lens->prism[2],
-                              [LENS_S3] = &lens->prism[3],
-                              [LENS_SHAPE0] = &lens->shape[0],
-                              [LENS_SHAPE1] = &lens->shape[1]};
-    for (int i = 0; i < gbt_camera_param_count(camera->model); i++) {
-        const double value = camera->params[i];
-        if (!isfinite(value))
-            return false;
-        if (model->slots[i] == LENS_F)
-            lens->fx = lens->fy = value;
-        else
-            *places[model->slots[i]] = value;
-    }
-    return true;
-}
-
-/* The closed forms: are their shape parameters in the domain? Without distortion they are a pinhole, and then
-   to the same bits. */
-static bool check_shape(camera_lens *lens)
-{
-    const double k = lens->shape[0];
-    const lens_kind kind = lens->kind;
-    if (k == 0 && (kind == LENS_FOV || kind == LENS_DIVISION || kind == LENS_EUCM))
-        lens->kind = LENS_PERSPECTIVE;
-    if (kind == LENS_FOV)
-        return fabs(k) < PI;
-    return kind != LENS_EUCM || (k >= 0 && k <= 1 && lens->shape[1] > 0);
-}
-
-bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
-{
-    const camera_model *model = camera_model_of(camera->model);
-    if (model == NULL)
-        return false;
-    memset(lens, 0, sizeof *lens);
-    lens->numerator[0] = lens->denominator[0] = 1;
-    lens->kind = model->kind;
-    lens->extra_last = model->extra_last;
-    if (!take_params(camera, model, lens) || !(lens->fx > 0 && lens->fy > 0))
-        return false;
-    if (model->kind != LENS_PERSPECTIVE && model->kind != LENS_FISHEYE)
-        return check_shape(lens);
-    lens->radial = any_nonzero(lens->numerator + 1, LENS_NUMERATOR - 1) ||
-                   any_nonzero(lens->denominator + 1, LENS_DENOMINATOR - 1);
-    lens->extra = lens->tangent_x != 0 || lens->tangent_y != 0 || any_nonzero(lens->prism, 4);
-    const double radius_limit = lens->kind == LENS_FISHEYE ? PI : perspective_radius_max;
-    if (lens->radial)
-        find_monotone_range(lens, radius_limit);
-    else
-        lens->radius_max = lens->distorted_max =
-            lens->kind == LENS_FISHEYE || lens->extra ? radius_limit : HUGE_VAL;
-    return true;
-}
 
 void camera_lens_half_fov_tan(const camera_lens *lens, int width, int height, double tan_half[2])
 {
@@ -178,7 +52,7 @@ static void mixed_stage(const camera_lens *lens, const double p[2], double out[2
 {
     double d_factor = 0, factor = 1;
     if (!lens->extra_last)
-        factor = radial_factor(lens, p[0] * p[0] + p[1] * p[1], &d_factor);
+        factor = camera_lens_radial(lens, p[0] * p[0] + p[1] * p[1], &d_factor);
     extra_terms(lens, p[0], p[1], out, jacobian);
     out[0] += p[0] * factor;
     out[1] += p[1] * factor;
@@ -198,7 +72,7 @@ static bool distort(const camera_lens *lens, double p[2])
     if (!(sqrt(r2) <= lens->radius_max))
         return false;
     if (lens->radial && (!lens->extra || lens->extra_last)) {
-        const double factor = radial_factor(lens, r2, &d_factor);
+        const double factor = camera_lens_radial(lens, r2, &d_factor);
         p[0] *= factor;
         p[1] *= factor;
     }
@@ -226,7 +100,7 @@ static bool invert_radius(const camera_lens *lens, double wanted, double enough,
     double lo = 0, hi = lens->radius_max, r = wanted < hi ? wanted : hi, residual = 0;
     for (int i = 0; i < 200; i++) {
         double d_factor;
-        const double factor = radial_factor(lens, r * r, &d_factor);
+        const double factor = camera_lens_radial(lens, r * r, &d_factor);
         residual = r * factor - wanted;
         const double step = residual / (factor + 2 * r * r * d_factor);
         if (fabs(step) <= 2e-16 * r || residual == 0)

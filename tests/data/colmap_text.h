@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/data/colmap_text.h -- a binary COLMAP model to its text form, number by number: 17 digits, so that they
-   read back bit for bit. */
+/* tests/data/colmap_text.h -- a binary COLMAP model to its text form, number by number: 17 digits, so that
+   they read back bit for bit. */
 #ifndef GBT_TEST_DATA_COLMAP_TEXT_H
 #define GBT_TEST_DATA_COLMAP_TEXT_H
 
@@ -85,7 +85,8 @@ static inline void colmap_to_text(const char *folder)
     static const struct {
         const char *name;
         void (*copy)(colmap_bytes *f);
-    } parts[] = {{"cameras", colmap_copy_camera}, {"images", colmap_copy_image}, {"points3D", colmap_copy_point}};
+    } parts[] = {
+        {"cameras", colmap_copy_camera}, {"images", colmap_copy_image}, {"points3D", colmap_copy_point}};
     for (int i = 0; i < 3; i++) {
         char path[8192];
         colmap_bytes f = {0};

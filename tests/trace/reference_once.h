@@ -26,8 +26,8 @@ static inline gbt_status reference_backward(const gaussians *g, const trace_sett
     reference_scene scene;
     gbt_status status = reference_scene_make(g, &scene, err);
     if (status == GBT_OK)
-        status = reference_scene_backward(&scene, s, rays, d_rgb, d_transmittance, d_gaussians, d_background,
-                                          err);
+        status =
+            reference_scene_backward(&scene, s, rays, d_rgb, d_transmittance, d_gaussians, d_background, err);
     reference_scene_free(&scene);
     return status;
 }

@@ -136,7 +136,7 @@ typedef struct gbt_train_setting {
                             the values */
     const char *unit;    /* what stands for a value in a list: "N", "TIME"; NULL for flags and choices */
     const char *help;    /* one line */
-    const char *aliases; /* names that this or other programs had, with blanks between; NULL: none */
+    const char *aliases; /* names that other programs have, with blanks between; NULL: none */
     bool saved;          /* in RUN/config: it decides the result */
     bool rare;           /* few people need it */
 } gbt_train_setting;

@@ -82,7 +82,7 @@ static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_came
     gbt_camera sparse = *camera;
     f->draw.pixel_step = gbt_camera_every(camera, PIXEL_STEP, 0, 0, &sparse) ? PIXEL_STEP : 1;
     GBT_TRY(frame_render(f, frame_neural(b->a, d), &sparse, settings, true, err));
-    GBT_TRY(frame_weigh(f, err));
+    GBT_TRY(frame_blend_weights(f, err));
     for (size_t v = 0; v < f->visible_count; v++)
         b->visible[f->visible[v]]++;
     const gaussians *g = &f->gaussians;
@@ -90,7 +90,7 @@ static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_came
     for (size_t i = 0; i < g->count; i++) {
         const size_t row = f->tape.slot[i] / k_count, k = f->tape.slot[i] % k_count;
         sums *s = &b->sums[f->visible[row] * k_count + k];
-        const double weight = (double)f->seen[i];
+        const double weight = (double)f->blend_weight[i];
         s->kept++;
         s->mean[0] = g->mean_x[i];
         s->mean[1] = g->mean_y[i];

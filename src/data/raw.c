@@ -32,7 +32,7 @@ void raw_view_free(raw_view *view)
     mem_free(view->name);
     mem_free(view->path);
     mem_free(view->mask_path);
-    mem_free(view->sight);
+    mem_free(view->point_depths);
     memset(view, 0, sizeof *view);
 }
 
@@ -89,25 +89,25 @@ void raw_add_point(raw_scene *raw, const double position[3], const float color[3
     raw->point_count++;
 }
 
-gbt_status raw_add_sight(raw_view *view, const double position[3], gbt_error *err)
+gbt_status raw_add_point_depth(raw_view *view, const double position[3], gbt_error *err)
 {
     double depth = 0;
     for (int k = 0; k < 3; k++)
         depth += view->camera.rotation[6 + k] * (position[k] - view->camera.center[k]);
     if (!(depth > 0 && depth <= RAW_COORDINATE_LIMIT))
         return GBT_OK;
-    GBT_TRY(mem_reserve((void **)&view->sight, &view->sight_capacity, view->sight_count,
-                        view->sight_count + 1, sizeof *view->sight, "depths", err));
-    view->sight[view->sight_count++] = (float)depth;
+    GBT_TRY(mem_reserve((void **)&view->point_depths, &view->point_depth_capacity, view->point_depth_count,
+                        view->point_depth_count + 1, sizeof *view->point_depths, "depths", err));
+    view->point_depths[view->point_depth_count++] = (float)depth;
     return GBT_OK;
 }
 
-double raw_nearest_sight(raw_view *view)
+double raw_nearest_depth(raw_view *view)
 {
-    if (view->sight_count == 0)
+    if (view->point_depth_count == 0)
         return 0;
-    qsort(view->sight, view->sight_count, sizeof *view->sight, compare_floats);
-    return (double)view->sight[(view->sight_count - 1) / 100];
+    qsort(view->point_depths, view->point_depth_count, sizeof *view->point_depths, compare_floats);
+    return (double)view->point_depths[(view->point_depth_count - 1) / 100];
 }
 
 gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_error *err)

@@ -19,9 +19,9 @@ typedef struct raw_view {
     gbt_camera camera; /* pose in world coordinates */
     uint32_t id;       /* COLMAP's image id, 0 elsewhere */
     size_t rank;       /* place in the sorted list, set by raw_sort_views(); stays when others are left out */
-    float *sight; /* [sight_count] depth of each sparse point that, by its track, is in the photo; > 0; owned
-                   */
-    size_t sight_count, sight_capacity;
+    float *point_depths; /* [point_depth_count] of the sparse points that, by their tracks, are in the photo;
+                            > 0; owned */
+    size_t point_depth_count, point_depth_capacity;
 } raw_view;
 
 typedef struct raw_scene {
@@ -77,11 +77,11 @@ void raw_add_point(raw_scene *raw, const double position[3], const float color[3
 
 /** A point at `position` is in the view's photo; one behind its camera, or not usable, is not. The pose must
     be known. */
-gbt_status raw_add_sight(raw_view *view, const double position[3], gbt_error *err);
+gbt_status raw_add_point_depth(raw_view *view, const double position[3], gbt_error *err);
 
 /** How near the points in its photo come: the first percentile of their depths, for some are wrong. 0 without
     any. Sorts them. */
-double raw_nearest_sight(raw_view *view);
+double raw_nearest_depth(raw_view *view);
 
 /** A relative path of 1..RAW_NAME_LIMIT bytes without control characters and without a ".." part. */
 gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_error *err);

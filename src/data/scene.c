@@ -289,7 +289,7 @@ static gbt_status recentre(raw_scene *raw, scene *out, gbt_error *err)
                                      .camera = view->camera,
                                      .is_test = view->is_test,
                                      .rank = view->rank,
-                                     .nearest = raw_nearest_sight(view)};
+                                     .nearest = raw_nearest_depth(view)};
         view->name = NULL;
         view->path = NULL;
         view->mask_path = NULL;

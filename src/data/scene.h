@@ -32,7 +32,7 @@ typedef struct scene_view {
     bool is_test;      /* held out */
     size_t rank; /* place in the sorted list of all views that the data set names, those without a photo too
                   */
-    double nearest; /* depth of the nearest sparse points in the photo, by their tracks (raw_nearest_sight());
+    double nearest; /* depth of the nearest sparse points in the photo, by their tracks (raw_nearest_depth());
                        0: it has none */
 } scene_view;
 

@@ -59,9 +59,9 @@ static gbt_status widen(frame *f, frame_subject subject, gbt_error *err)
                              &f->wide, err);
 }
 
-/* Everything up to the tree, and f->rays through the middle of the aperture. `guest` is optional. */
+/* Everything up to the tree, and f->rays through the middle of the aperture. `tracer` is optional. */
 static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
-                          const trace_settings *settings, const frame_guest *guest, gbt_error *err)
+                          const trace_settings *settings, const frame_tracer *tracer, gbt_error *err)
 {
     double clock = clock_wall();
     ray_shot middle = *shot;
@@ -76,7 +76,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     view_bounds bounds;
     GBT_TRY(view_bounds_find(shot, &f->rays, &bounds, err));
     memcpy(f->eye, bounds.center, sizeof f->eye);
-    if (guest != NULL)
+    if (tracer != NULL)
         bounds = view_bounds_none();
     f->view = footprint_view_with(&shot->camera, lens);
     f->pixel_limited = f->draw.anchor_pixel != NULL && subject.cloud == NULL;
@@ -106,7 +106,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     if (f->draw.renderer != GBT_RENDERER_TRACE)
         return GBT_OK;
     const float aperture = shot->given == NULL ? (float)shot->aperture_radius : 0;
-    const float reach = fmaxf(ray_image_reach(&f->rays) + aperture, guest != NULL ? guest->reach : 0);
+    const float reach = fmaxf(ray_image_reach(&f->rays) + aperture, tracer != NULL ? tracer->reach : 0);
     GBT_TRY(trace_build(&f->scene, frame_drawn(f), settings, reach, err));
     f->times.build = lap(&clock);
     return GBT_OK;
@@ -160,7 +160,7 @@ gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camer
 }
 
 /* Trace every sample and add them up, in order, in double. */
-static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_guest *guest, double *sum,
+static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_tracer *tracer, double *sum,
                                 gbt_error *err)
 {
     const size_t values = 3 * ray_image_count(&f->rays);
@@ -170,8 +170,8 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_gues
         if (shot->given == NULL && shot->aperture_radius > 0)
             GBT_TRY(ray_image_from_shot(shot, s, &f->rays, err));
         f->times.rays += lap(&clock);
-        if (guest != NULL)
-            GBT_TRY(guest->trace(guest->context, &f->scene, &f->rays, &f->rgb, err));
+        if (tracer != NULL)
+            GBT_TRY(tracer->trace(tracer->context, &f->scene, &f->rays, &f->rgb, err));
         else
             GBT_TRY(trace_forward(&f->scene, &f->rays, false, &(trace_outputs){.rgb = &f->rgb}, &f->counters,
                                   err));
@@ -184,22 +184,22 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_gues
     return GBT_OK;
 }
 
-gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot,
-                              const trace_settings *settings, const frame_guest *guest, gbt_error *err)
+gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *shot,
+                             const trace_settings *settings, const frame_tracer *tracer, gbt_error *err)
 {
     GBT_TRY(ray_shot_check(shot, err));
     if (f->draw.renderer != GBT_RENDERER_TRACE) {
-        if (guest != NULL || shot->given != NULL || shot->aperture_radius > 0 ||
+        if (tracer != NULL || shot->given != NULL || shot->aperture_radius > 0 ||
             shot->shutter != RAY_SHUTTER_GLOBAL)
             return base_fail(err, GBT_ERR_ARGUMENT,
                              "the rasterizer draws what a pinhole camera sees that stands still, and no "
                              "more; trace this picture");
         return frame_render(f, subject, &shot->camera, settings, false, err);
     }
-    GBT_TRY(prepare(f, subject, shot, settings, guest, err));
+    GBT_TRY(prepare(f, subject, shot, settings, tracer, err));
     f->times.trace = 0;
     double *sum = mem_calloc(ray_image_count(&f->rays), 3 * sizeof *sum, "picture", err);
-    const gbt_status status = sum == NULL ? GBT_ERR_NO_MEMORY : trace_samples(f, shot, guest, sum, err);
+    const gbt_status status = sum == NULL ? GBT_ERR_NO_MEMORY : trace_samples(f, shot, tracer, sum, err);
     mem_free(sum);
     return status;
 }
@@ -207,7 +207,7 @@ gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *s
 gbt_status frame_render_shot(frame *f, frame_subject subject, const ray_shot *shot,
                              const trace_settings *settings, gbt_error *err)
 {
-    return frame_render_guest(f, subject, shot, settings, NULL, err);
+    return frame_render_with(f, subject, shot, settings, NULL, err);
 }
 
 void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_COUNT])
@@ -224,12 +224,12 @@ void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_CO
 gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err)
 {
     double clock = clock_wall();
-    GBT_TRY(mem_reserve((void **)&f->seen, &f->seen_capacity, 0, f->gaussians.count + 1, sizeof *f->seen,
-                        "weights", err));
+    GBT_TRY(mem_reserve((void **)&f->blend_weight, &f->blend_weight_capacity, 0, f->gaussians.count + 1,
+                        sizeof *f->blend_weight, "weights", err));
     if (f->draw.renderer == GBT_RENDERER_TRACE)
-        GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, f->seen, NULL, err));
+        GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, f->blend_weight, NULL, err));
     else
-        GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, f->seen, NULL, err));
+        GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, f->blend_weight, NULL, err));
     if (f->widened)
         footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians,
                            &f->d_gaussians);
@@ -254,7 +254,7 @@ gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const ima
     return GBT_OK;
 }
 
-gbt_status frame_weigh(frame *f, gbt_error *err)
+gbt_status frame_blend_weights(frame *f, gbt_error *err)
 {
     image nothing = {0};
     GBT_TRY(image_alloc(&nothing, f->rgb.width, f->rgb.height, 3, err));
@@ -269,7 +269,7 @@ void frame_free(frame *f)
     ray_image_free(&f->rays);
     mem_free(f->visible);
     mem_free(f->pixel_min);
-    mem_free(f->seen);
+    mem_free(f->blend_weight);
     gaussians_free(&f->gaussians);
     gaussians_free(&f->wide);
     gaussians_free(&f->d_gaussians);

@@ -46,8 +46,8 @@ typedef struct frame {
     decode_tape tape;
     trace_scene scene;
     raster_scene splats;
-    float *seen; /* [gaussians] after an adjoint: sum over rays of T alpha */
-    size_t seen_capacity;
+    float *blend_weight; /* [gaussians] after an adjoint: sum over rays of T alpha */
+    size_t blend_weight_capacity;
     image rgb; /* the render */
     kernel_counters counters;
     frame_times times;
@@ -64,7 +64,7 @@ typedef struct frame {
  * cameras that look forward, else a cone around their mean direction, thickened by the distance between their
  * origins. Networks and spherical harmonics see it from the camera centre.
  *
- * @param keep_tape [in] true when frame_backward_gaussians(), frame_backward_plain() or frame_weigh()
+ * @param keep_tape [in] true when frame_backward_gaussians(), frame_backward_plain() or frame_blend_weights()
  *                       follows
  * Threads: one frame per thread; parallel inside; same bits for every thread count.
  */
@@ -93,19 +93,20 @@ gbt_status frame_render_shot(frame *f, frame_subject subject, const ray_shot *sh
 
 /** What traces the rays of a shot in place of trace_forward(), and sends rays of its own where the picture
     does not look. */
-typedef struct frame_guest {
+typedef struct frame_tracer {
     /* rgb has the size of rays */
     gbt_status (*trace)(void *context, trace_scene *scene, const ray_image *rays, image *rgb, gbt_error *err);
     void *context;
     float reach; /* largest |coordinate| of an origin of its own rays */
-} frame_guest;
+} frame_tracer;
 
-/** frame_render_shot() with a guest: everything is made, seen from the camera or not, all from the one
+/** frame_render_shot() with a tracer: everything is made, seen from the camera or not, all from the one
     point. */
-gbt_status frame_render_guest(frame *f, frame_subject subject, const ray_shot *shot,
-                              const trace_settings *settings, const frame_guest *guest, gbt_error *err);
+gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *shot,
+                             const trace_settings *settings, const frame_tracer *tracer, gbt_error *err);
 
-/** Adjoint of the last frame_render(keep_tape), its first part: d_image -> f->d_gaussians and f->seen. */
+/** Adjoint of the last frame_render(keep_tape), its first part: d_image -> f->d_gaussians and
+ * f->blend_weight. */
 gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err);
 
 /** The second part, of anchors: f->d_gaussians, and what the caller has added to it -> d_anchors (rows of
@@ -117,8 +118,8 @@ gbt_status frame_backward_anchors(frame *f, const anchors *a, const decoder *d, 
 gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const image *d_image,
                                 gaussian_cloud *d_cloud, gbt_error *err);
 
-/** f->seen of the last frame_render(keep_tape), and no gradient. */
-gbt_status frame_weigh(frame *f, gbt_error *err);
+/** f->blend_weight of the last frame_render(keep_tape), and no gradient. */
+gbt_status frame_blend_weights(frame *f, gbt_error *err);
 
 /** The part of the subject, an anchor or a plain Gaussian, that Gaussian `i` of the last render is of. */
 static inline uint32_t frame_part(const frame *f, frame_subject subject, size_t i)

@@ -50,7 +50,8 @@ static void gather_importance(growth_stats *s, const frame *f, growth_importance
             s->importance_accum[f->visible[v]] += f->tape.opacity_sum[v];
     }
     for (size_t i = 0; importance == GROWTH_BY_SHARE && i < f->gaussians.count; i++)
-        s->importance_accum[f->visible[f->tape.slot[i] / (uint32_t)s->offset_count]] += f->seen[i] / rays;
+        s->importance_accum[f->visible[f->tape.slot[i] / (uint32_t)s->offset_count]] +=
+            f->blend_weight[i] / rays;
 }
 
 /* The norm of dL/d(projected mean in NDC), from the ray-traced gradient of the mean in camera axes (g): (z

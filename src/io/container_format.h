@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/container_format.h -- the bytes of a container: header, row of the table, sizes; for its reader and writer.
+/* io/container_format.h -- the bytes of a container: header, row of the table, sizes; for its reader and
+   writer.
 
    [header 64][table 128 x count][section 0][zeros][section 1]...   every part starts on a multiple of 64 */
 #ifndef GBT_IO_CONTAINER_FORMAT_H
@@ -64,7 +65,8 @@ static inline size_t container_dtype_size(container_dtype dtype)
 
 /** Size in bytes of a shape; false if it overflows. Zero sizes do not excuse an overflow of the others: no
     honest file has that. */
-static inline bool container_shape_bytes(container_dtype dtype, int dim_count, const size_t *dims, size_t *out)
+static inline bool container_shape_bytes(container_dtype dtype, int dim_count, const size_t *dims,
+                                         size_t *out)
 {
     size_t bytes = container_dtype_size(dtype);
     bool is_empty = false;
@@ -87,6 +89,9 @@ static inline bool container_align_up(size_t offset, size_t *out)
     return true;
 }
 
-static inline const void *container_section_data(const container_section *s) { return s->data != NULL ? s->data : s->small; }
+static inline const void *container_section_data(const container_section *s)
+{
+    return s->data != NULL ? s->data : s->small;
+}
 
 #endif

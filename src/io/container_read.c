@@ -40,8 +40,8 @@ static const char *dtype_name(container_dtype dtype)
     return "?";
 }
 
-static gbt_status check_header(const unsigned char *bytes, size_t byte_count, const char *path, container_header *h,
-                               gbt_error *err)
+static gbt_status check_header(const unsigned char *bytes, size_t byte_count, const char *path,
+                               container_header *h, gbt_error *err)
 {
     if (byte_count < sizeof *h)
         return base_fail(err, GBT_ERR_FORMAT,
@@ -87,7 +87,8 @@ static gbt_status check_row(const unsigned char *bytes, size_t byte_count, const
     s->dim_count = (int)row.dim_count;
     for (int d = 0; d < s->dim_count; d++)
         s->dims[d] = row.dims[d];
-    if (!container_shape_bytes(s->dtype, s->dim_count, s->dims, &s->byte_count) || s->byte_count != row.byte_count)
+    if (!container_shape_bytes(s->dtype, s->dim_count, s->dims, &s->byte_count) ||
+        s->byte_count != row.byte_count)
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s: its shape and its %llu bytes do not agree",
                          path, place, row.name, (unsigned long long)row.byte_count);
     size_t begin;

@@ -86,7 +86,8 @@ gbt_status container_encode(const container_writer *w, unsigned char **bytes, si
     const size_t table_bytes = w->count * sizeof(container_row);
     size_t total = sizeof(container_header) + table_bytes;
     for (size_t i = 0; i < w->count; i++)
-        if (!container_align_up(total, &total) || __builtin_add_overflow(total, w->sections[i].byte_count, &total))
+        if (!container_align_up(total, &total) ||
+            __builtin_add_overflow(total, w->sections[i].byte_count, &total))
             return base_fail(err, GBT_ERR_NO_MEMORY, "section %s: the file is larger than memory can hold",
                              w->sections[i].name);
     unsigned char *file = mem_calloc(total, 1, "file image", err); /* zeros: the gaps */

@@ -10,7 +10,7 @@
 /* ---- cells ---- */
 
 /* Two zeros between any two of 21 bits, and back. */
-static uint64_t spread(uint64_t x)
+static uint64_t spread_bits(uint64_t x)
 {
     x = (x | x << 32) & UINT64_C(0x1F00000000FFFF);
     x = (x | x << 16) & UINT64_C(0x1F0000FF0000FF);
@@ -31,7 +31,7 @@ static uint32_t gather(uint64_t x)
 
 static uint64_t code_of(const uint32_t cell[3])
 {
-    return spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2;
+    return spread_bits(cell[0]) | spread_bits(cell[1]) << 1 | spread_bits(cell[2]) << 2;
 }
 
 void position_split(uint64_t code, uint32_t cell[3])

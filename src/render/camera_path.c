@@ -121,7 +121,7 @@ static gbt_status circle_make(const gbt_camera *cameras, size_t count, const cam
     return GBT_OK;
 }
 
-/** As far and as high as the cameras are at about that angle, and where they look: means, weighed with a
+/** As far and as high as the cameras are at about that angle, and where they look: means, weighted with a
     spread of 20 degrees. */
 static void circle_at(const circle *c, const orbit_shape *shape, double angle, double out[3],
                       double target[3])

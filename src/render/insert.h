@@ -53,7 +53,7 @@ gbt_status insert_finish(insert_scene *in, gbt_error *err);
 /**
  * Trace rays among Gaussians and objects.
  *
- * @param context [in]     the insert_scene, finished: this is a frame_guest.trace
+ * @param context [in]     the insert_scene, finished: this is a frame_tracer.trace
  * @param scene   [in,out] built by trace_build() for origins within in->reach too; not a TRACE_EMBREE one
  * @param rgb     [out]    allocated, 3 channels, size of the rays
  * @return as trace_forward()

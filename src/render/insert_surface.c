@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/insert_surface.c -- the surface that a ray meets; the rays from there to the lamp and out of a mirror. */
+/* render/insert_surface.c -- the surface that a ray meets; the rays from there to the lamp and out of a
+ * mirror. */
 #include "render/insert_surface.h"
 
 #include <math.h>

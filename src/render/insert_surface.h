@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/insert_surface.h -- the surface that a ray meets among inserted objects, and where rays go from there. */
+/* render/insert_surface.h -- the surface that a ray meets among inserted objects, and where rays go from
+ * there. */
 #ifndef GBT_RENDER_INSERT_SURFACE_H
 #define GBT_RENDER_INSERT_SURFACE_H
 

@@ -65,9 +65,9 @@ typedef struct studio {
 static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *def, gbt_error *err)
 {
     loaded_run *r = &st->run;
-    const frame_guest guest = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
-    GBT_TRY(frame_render_guest(&r->frame, loaded_run_subject(r), shot, &r->settings,
-                               def->insert != NULL ? &guest : NULL, err));
+    const frame_tracer tracer = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
+    GBT_TRY(frame_render_with(&r->frame, loaded_run_subject(r), shot, &r->settings,
+                              def->insert != NULL ? &tracer : NULL, err));
     return st->in_double ? render_reference(r, shot, err) : GBT_OK;
 }
 

@@ -79,7 +79,7 @@ static gbt_status make_balls(const loaded_run *r, solids *s, gbt_error *err)
     return status;
 }
 
-/** All anchors; those that the view decoded in the mean colour of their Gaussians, weighed by opacity, the
+/** All anchors; those that the view decoded in the mean colour of their Gaussians, weighted by opacity, the
     others grey. */
 static gbt_status make_anchors(const loaded_run *r, solids *s, gbt_error *err)
 {

@@ -10,25 +10,25 @@
 #include "base/compare.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "train/sight.h"
+#include "train/camera_sees.h"
 
 enum { ASKED_MOST = 20000, SHARED_LEAST = 20, POINT_BLOCK = 256 };
 
 static const double shown = 0.99;  /* of the points, in every picture */
 static const double border = 0.05; /* of half the picture */
 
-typedef struct sight_job {
+typedef struct point_job {
     const gbt_camera *cameras;
     size_t camera_count;
     const float *points;
     size_t stride;
     uint32_t *seen_by; /* [asked] */
-} sight_job;
+} point_job;
 
 static void count_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
-    const sight_job *job = context;
+    const point_job *job = context;
     for (size_t i = begin; i < end; i++)
         for (size_t c = 0; c < job->camera_count; c++)
             job->seen_by[i] += camera_sees(&job->cameras[c], job->points + 3 * i * job->stride, NULL);
@@ -39,7 +39,7 @@ gbt_status shared_points_find(const gbt_camera *cameras, size_t count, const flo
 {
     *out = (shared_points){0};
     const size_t stride = point_count / ASKED_MOST + 1, asked = point_count / stride;
-    sight_job job = {cameras, count, points, stride,
+    point_job job = {cameras, count, points, stride,
                      mem_calloc(asked + 1, sizeof *job.seen_by, "shared points", err)};
     out->position = mem_alloc(asked + 1, 3 * sizeof *out->position, "shared points", err);
     if (job.seen_by == NULL || out->position == NULL) {

@@ -12,7 +12,7 @@
 #include "base/parallel.h"
 #include "bvh/points.h"
 #include "train/def.h"
-#include "train/sight.h"
+#include "train/camera_sees.h"
 
 static const float share_min = 2.5e-6f;     /* of short runs: schedule_threshold_factor() */
 static const double last_rounds_from = 0.9; /* of growing */

@@ -6,7 +6,7 @@
 
 #include "base/parallel.h"
 #include "trace/footprint.h"
-#include "train/sight.h"
+#include "train/camera_sees.h"
 
 enum { ANCHOR_BLOCK = 1024 };
 

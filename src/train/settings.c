@@ -75,12 +75,11 @@ static const gbt_train_setting settings[] = {
     {NAMED("grow", grow), FLAG, .rare = true, .number = 1, .saved = true,
      .help = "keep the initial anchors: no growing, no pruning"},
     {NAMED("threshold-factor", threshold_factor), RANGE(DOUBLE, 0.1, 10, "F"), .number = 1, .saved = true,
-     .aliases = "thrift",
      .help = "multiply the thresholds of densification and of pruning: above 1 for smaller models, "
              "below 1 for "
              "larger"},
     {NAMED("final-prune-factor", final_prune_factor), RANGE(DOUBLE, 1, 100, "F"), .number = 4, .saved = true,
-     .rare = true, .aliases = "last-thrift",
+     .rare = true,
      .help = "multiply the threshold of pruning once more in the last tenth of growing, when none are "
              "added; 1: no change"},
     {NAMED("compat", compat), FLAG, .rare = true, .saved = true,

@@ -15,7 +15,7 @@
 #include "data/photo_check.h"
 #include "train/def.h"
 #include "train/seed_points.h"
-#include "train/sight.h"
+#include "train/camera_sees.h"
 #include "train/trainer.h"
 
 enum { STREAM_NETWORKS = 2, FEW_PLACES = 128 };

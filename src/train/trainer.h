@@ -57,7 +57,7 @@ typedef struct trainer {
     uint64_t round_step; /* steps done at the last round of growth */
     uint64_t anchor_t;   /* Adam steps of the per-anchor groups */
     uint64_t skipped_steps, skipped_in_row;
-    uint64_t empty_in_row, opacity_raises; /* steps in a row without a Gaussian though anchors were in sight;
+    uint64_t empty_in_row, opacity_raises; /* steps in a row without a Gaussian though anchors were visible;
                                          how often that was mended */
     double seconds; /* training time so far, over all runs that continued one another */
 
@@ -81,7 +81,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
  * row.
  *
  * Gaussians below opacity 0 have no gradient, so a scene that has lost all of them (or begins without: the
- * first networks are random) would stay empty. After five views in a row with anchors in sight and not one
+ * first networks are random) would stay empty. After five views in a row with visible anchors and not one
  * Gaussian, opacities are raised to 0.1; in the first step (raises_first_opacity) those of each offset whose
  * mean is below 0.
  */

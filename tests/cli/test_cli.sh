@@ -439,7 +439,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "train leaves a run alone" "  got $got: $(cat err out)"
     "$program" train made -o run-small --iterations 4 --overwrite >out 2>err && "$program" info run-small | grep -q 'trained   4 iterations'
     report $? "train --overwrite trains anew" "$(cat err out; "$program" info run-small)"
-    "$program" train -o run-small --resume --iterations 9 --thrift 2 >out 2>err && grep -q '^run-small: 4 steps done; training goes on to step 9' err &&
+    "$program" train -o run-small --resume --iterations 9 --threshold-factor 2 >out 2>err && grep -q '^run-small: 4 steps done; training goes on to step 9' err &&
         grep -q "^warning: a run is resumed with its own settings: threshold-factor = 1, not 2" err && [ "$(grep -c '^warning' err)" = 1 ] &&
         "$program" train -o run-small --resume >out 2>>err && grep -q '^run-small: all 9 steps are done' err && ! grep -q 0x0 err &&
         "$program" info run-small | grep -q 'trained   9 iterations'

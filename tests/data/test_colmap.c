@@ -106,7 +106,7 @@ static void good_model(void **state)
        1, 0), the translation 3. */
     for (int i = 0; i < 2; i++)
         assert_int_equal(raw.views[i].sight_count, 1);
-    assert_true(fabs(raw_nearest_sight(&raw.views[0]) - 4.25) < 1e-6);
+    assert_true(fabs(raw_nearest_depth(&raw.views[0]) - 4.25) < 1e-6);
     raw_free(&raw);
     free_seed(seed);
 }
@@ -116,16 +116,16 @@ static void nearest_in_a_photo(void **state)
 {
     (void)state;
     raw_view view = {.camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0, 0, 1}}};
-    assert_true(raw_nearest_sight(&view) == 0);
+    assert_true(raw_nearest_depth(&view) == 0);
     for (int i = 201; i >= 1; i--)
-        assert_int_equal(raw_add_sight(&view, (const double[3]){7, -7, 1 + i}, NULL), GBT_OK);
+        assert_int_equal(raw_add_point_depth(&view, (const double[3]){7, -7, 1 + i}, NULL), GBT_OK);
     static const double out_of_sight[] = {1, -5, NAN, INFINITY, 1e13};
     for (int i = 0; i < 5; i++)
-        assert_int_equal(raw_add_sight(&view, (const double[3]){0, 0, out_of_sight[i]}, NULL), GBT_OK);
+        assert_int_equal(raw_add_point_depth(&view, (const double[3]){0, 0, out_of_sight[i]}, NULL), GBT_OK);
     assert_int_equal(view.sight_count, 201);
-    assert_true(raw_nearest_sight(&view) == 3);
+    assert_true(raw_nearest_depth(&view) == 3);
     raw_view_free(&view);
-    assert_true(raw_nearest_sight(&view) == 0);
+    assert_true(raw_nearest_depth(&view) == 0);
 }
 
 /* The cursor itself, at its exact ends: one byte past them reads as 0 and is noticed, and nothing moves. */

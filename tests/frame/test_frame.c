@@ -174,8 +174,8 @@ static void a_camera_is_a_shot(void **state)
     free_world(&w);
 }
 
-static gbt_status plain_guest(void *context, trace_scene *scene, const ray_image *rays, image *rgb,
-                              gbt_error *err)
+static gbt_status plain_tracer(void *context, trace_scene *scene, const ray_image *rays, image *rgb,
+                               gbt_error *err)
 {
     int *calls = context;
     assert_true(scene->reach >= 30);
@@ -183,8 +183,9 @@ static gbt_status plain_guest(void *context, trace_scene *scene, const ray_image
     return trace_forward(scene, rays, false, &(trace_outputs){.rgb = rgb}, NULL, err);
 }
 
-/* A guest gets every sample and every anchor; one that does nothing of its own changes nothing. */
-static void a_guest_that_only_traces(void **state)
+/* A tracer of the caller gets every sample and every anchor; one that does nothing of its own changes
+ * nothing. */
+static void a_tracer_of_the_caller(void **state)
 {
     (void)state;
     for (int kind = 0; kind < KINDS; kind++) {
@@ -193,10 +194,10 @@ static void a_guest_that_only_traces(void **state)
         ray_image given = {0};
         int calls = 0;
         const ray_shot shot = random_shot(200 + (uint64_t)kind, kind, &given);
-        const frame_guest guest = {.trace = plain_guest, .context = &calls, .reach = 30};
+        const frame_tracer tracer = {.trace = plain_tracer, .context = &calls, .reach = 30};
         w.a.position[0] = NAN; /* an anchor that is nowhere is not decoded */
         assert_ok(frame_render_shot(&a, frame_neural(&w.a, &w.d), &shot, &w.s, NULL));
-        assert_ok(frame_render_guest(&b, frame_neural(&w.a, &w.d), &shot, &w.s, &guest, NULL));
+        assert_ok(frame_render_with(&b, frame_neural(&w.a, &w.d), &shot, &w.s, &tracer, NULL));
         assert_int_equal(b.visible_count, ANCHORS - 1);
         assert_int_equal(calls, ray_shot_sample_count(&shot));
         for (size_t i = 0; i < 3 * W * H; i++)
@@ -258,7 +259,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_reached_is_left_out),
         cmocka_unit_test(a_camera_is_a_shot),
-        cmocka_unit_test(a_guest_that_only_traces),
+        cmocka_unit_test(a_tracer_of_the_caller),
         cmocka_unit_test(same_bits_for_every_thread_count),
         cmocka_unit_test(no_rays),
     };

@@ -98,16 +98,16 @@ static void nothing_visible_is_left_out(void **state)
         frame f = {.draw.footprint = 0.3f};
         assert_ok(frame_render(&f, frame_plain(&cloud), &camera, &settings, true, NULL));
         left_out += COUNT - f.visible_count;
-        assert_ok(frame_weigh(&f, NULL));
+        assert_ok(frame_blend_weights(&f, NULL));
         double weight = 0;
         for (size_t k = 0; k < f.visible_count; k++)
-            weight += (double)f.seen[k];
+            weight += (double)f.blend_weight[k];
         assert_true(weight > 0);
 
         frame all = {.draw.footprint = 0.3f};
         const ray_shot shot = ray_shot_of(&camera);
-        frame_guest guest = {.trace = trace_all};
-        assert_ok(frame_render_guest(&all, frame_plain(&cloud), &shot, &settings, &guest, NULL));
+        frame_tracer tracer = {.trace = trace_all};
+        assert_ok(frame_render_with(&all, frame_plain(&cloud), &shot, &settings, &tracer, NULL));
         assert_int_equal(all.visible_count, COUNT);
         for (size_t k = 0; k < 3 * W * H; k++)
             assert_near((double)f.rgb.pixels[k], (double)all.rgb.pixels[k], 1e-5); /* another tree adds in
@@ -155,7 +155,7 @@ static void adjoint_of_colors_and_shapes(void **state)
                                                     f.d_gaussians.blue};
             const float *const d_scale[3] = {f.d_gaussians.scale_x, f.d_gaussians.scale_y,
                                              f.d_gaussians.scale_z};
-            seen += f.seen[i] > 0;
+            seen += f.blend_weight[i] > 0;
             for (size_t c = 0; c < 3; c++) {
                 double color = 0.5;
                 for (size_t k = 0; k < 16; k++)

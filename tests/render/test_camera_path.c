@@ -13,7 +13,7 @@
 #include "render/camera_path.h"
 #include "render/camera_path_file.h"
 #include "render/video.h"
-#include "train/sight.h"
+#include "train/camera_sees.h"
 
 #define PI 3.14159265358979323846
 static char folder[] = "/tmp/gbt_path_XXXXXX", file_path[64], beside_path[96];

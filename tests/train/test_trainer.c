@@ -1089,9 +1089,9 @@ static void config_comes_back(void **state)
     assert_ok(config_parse(text, "config", &back, &strings, &err));
     assert_null(back.pace);
 
-    /* Names of former versions, and of the command line. */
-    assert_ok(config_parse("thrift = 2\nlast-thrift = 3\nbudget = 7\ngrow = false\n", "config", &back,
-                           &strings, &err));
+    /* Names of the command line. */
+    assert_ok(config_parse("threshold-factor = 2\nfinal-prune-factor = 3\nbudget = 7\ngrow = false\n",
+                           "config", &back, &strings, &err));
     assert_true(back.threshold_factor == 2 && back.final_prune_factor == 3 && back.budget_seconds == 7 &&
                 !back.grow);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/sight.h -- is a point in a picture? Of surfaces before it nothing is known. */
-#ifndef GBT_TRAIN_SIGHT_H
-#define GBT_TRAIN_SIGHT_H
+/* train/camera_sees.h -- is a point in a picture? Of surfaces before it nothing is known. */
+#ifndef GBT_TRAIN_CAMERA_SEES_H
+#define GBT_TRAIN_CAMERA_SEES_H
 
 #include <stdbool.h>
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/sight.c -- into camera axes, onto the picture. */
-#include "train/sight.h"
+/* train/camera_sees.c -- into camera axes, onto the picture. */
+#include "train/camera_sees.h"
 
 #include <stddef.h>
 

@@ -3,7 +3,6 @@
 #include "study/anchors.h"
 
 #include "base/fail.h"
-#include "base/memory.h"
 
 lab_anchors_def lab_anchors_def_default(void)
 {
@@ -25,36 +24,12 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
                                  out, err);
 }
 
-static gbt_status write_all(const anchors_study *s, const char *folder, FILE *out, gbt_error *err)
+gbt_status lab_study_anchors(const lab_anchors_def *def, const char *folder, FILE *out, gbt_error *err)
 {
-    study_texts texts = {.csv.err = err, .page.err = err, .charts.err = err};
-    anchors_csv(s, &texts.csv);
-    anchors_tables(s, &texts.page);
-    anchors_charts(s, &texts.charts);
-    GBT_TRY(study_texts_save(&texts, folder, "anchors", out));
-    return anchors_json(s, folder, err);
-}
-
-static gbt_status open_study(anchors_study *s, const lab_anchors_def *def, gbt_error *err)
-{
-    s->def = *def;
+    anchors_study s = {.def = *def};
     if (def->iterations < 20)
         return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least 20)",
                          (unsigned long long)def->iterations);
-    return study_grid_open(&s->grid, def->data, def->data_count, anchors_variant_count, def->seeds, err);
-}
-
-gbt_status lab_study_anchors(const lab_anchors_def *def, const char *folder, FILE *out, gbt_error *err)
-{
-    anchors_study *s = mem_calloc(1, sizeof *s, "study", err);
-    if (s == NULL)
-        return GBT_ERR_NO_MEMORY;
-    gbt_status status = open_study(s, def, err);
-    if (status == GBT_OK)
-        status = study_grid_fill(&s->grid, folder, NULL, run_one, s, err);
-    if (status == GBT_OK)
-        status = write_all(s, folder, out, err);
-    study_grid_close(&s->grid);
-    mem_free(s);
-    return status;
+    GBT_TRY(study_grid_open(&s.grid, def->data, def->data_count, anchors_variant_count, def->seeds, err));
+    return study_grid_report(&s.grid, NULL, run_one, &anchors_output, &s, folder, out, err);
 }

@@ -33,10 +33,7 @@ static inline const study_figures *anchors_run(const anchors_study *s, size_t pl
     return study_grid_at(&s->grid, place, variant, seed);
 }
 
-void anchors_tables(const anchors_study *s, text *out); /* Markdown */
-void anchors_csv(const anchors_study *s, text *out);
-void anchors_charts(const anchors_study *s, text *out);                              /* SVG */
-gbt_status anchors_json(const anchors_study *s, const char *folder, gbt_error *err); /* anchors.json in the
-                                                                                        folder */
+/** How it is written down. */
+extern const study_output anchors_output;
 
 #endif

@@ -3,8 +3,6 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "base/fail.h"
-#include "base/file.h"
 #include "data/json_out.h"
 #include "study/anchors.h"
 #include "study/chart.h"
@@ -85,8 +83,9 @@ static void add_row(const anchors_study *s, size_t scene, size_t v, text *out)
     text_add(out, " |\n");
 }
 
-void anchors_tables(const anchors_study *s, text *out)
+static void add_tables(const void *study, text *out)
 {
+    const anchors_study *s = study;
     text_format(out,
                 "# Anchors against held-out PSNR\n\n%llu iterations of the default settings, photos divided "
                 "by %g, seeds 0 to %d, every eighth photo held out.\n",
@@ -113,8 +112,9 @@ void anchors_tables(const anchors_study *s, text *out)
 
 /* ---- CSV, JSON ---- */
 
-void anchors_csv(const anchors_study *s, text *out)
+static void add_csv(const void *study, text *out)
 {
+    const anchors_study *s = study;
     text_add(out, "scene,start,seed");
     for (int f = 0; f < FIGURES; f++)
         text_format(out, ",%s", figure_texts[f].name);
@@ -157,10 +157,9 @@ static void add_rows(const anchors_study *s, size_t scene, json_t *rows)
                 change_over(s, scene, ANCHORS_ADAPTIVE, ANCHORS_BALLS, INITIAL, true).mean, 50);
 }
 
-gbt_status anchors_json(const anchors_study *s, const char *folder, gbt_error *err)
+static json_t *data_of(const void *study)
 {
-    char path[4096];
-    GBT_TRY(file_join(path, sizeof path, folder, "anchors.json", err));
+    const anchors_study *s = study;
     json_t *rows = json_array(), *runs = json_array();
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         add_rows(s, scene, rows);
@@ -174,12 +173,8 @@ gbt_status anchors_json(const anchors_study *s, const char *folder, gbt_error *e
             json_array_append_new(runs, run);
         }
     }
-    json_t *root = json_pack("{s:i,s:s,s:I,s:f,s:i,s:o,s:o}", "schema", 1, "study", "anchors", "iterations",
-                             (json_int_t)s->def.iterations, "downscale", s->def.downscale, "seeds",
-                             s->grid.seeds, "rows", rows, "runs", runs);
-    const gbt_status status = json_save(root, path, err);
-    json_decref(root);
-    return status;
+    return json_pack("{s:I,s:f,s:i,s:o,s:o}", "iterations", (json_int_t)s->def.iterations, "downscale",
+                     s->def.downscale, "seeds", s->grid.seeds, "rows", rows, "runs", runs);
 }
 
 /* ---- charts ---- */
@@ -207,10 +202,14 @@ static void draw_scene(const anchors_study *s, size_t scene, int top, text *out)
     scatter_draw(out, &chart, top);
 }
 
-void anchors_charts(const anchors_study *s, text *out)
+static void add_charts(const void *study, text *out)
 {
+    const anchors_study *s = study;
     scatter_begin(out, "PSNR against anchors", "", SCATTER_HEIGHT * (int)s->grid.scene_count, false);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         draw_scene(s, scene, SCATTER_HEIGHT * (int)scene, out);
     text_add(out, "</svg>\n");
 }
+
+const study_output anchors_output = {
+    .name = "anchors", .csv = add_csv, .tables = add_tables, .charts = add_charts, .data = data_of};

@@ -337,12 +337,7 @@ gbt_status lab_study_crosscheck(const lab_study_def *def, const char *folder, FI
     for (size_t i = 0; i < def->model_count && status == GBT_OK; i++)
         status = measure_model(def, i, folder, &study->models[i], err);
     if (status == GBT_OK)
-        status = cross_write(study, folder, err);
-    if (status == GBT_OK) {
-        text table = {.err = err};
-        cross_table(study, &table);
-        status = text_print(&table, out);
-    }
+        status = study_output_save(&cross_output, study, folder, out, err);
     mem_free(study);
     return status;
 }

@@ -8,7 +8,7 @@
 
 #include "base/image.h"
 #include "benchmark/bench_reference.h"
-#include "report/text.h"
+#include "study/output.h"
 
 enum { CROSS_MODELS_MAX = 16, CROSS_VIEWS_MAX = 4, CROSS_CHECKS = 7, CROSS_NAME_SIZE = 320 };
 
@@ -63,10 +63,7 @@ enum { CROSS_AMPLIFIED = 8, CROSS_AMPLIFIED_TILES = 1000 };
 gbt_status cross_write_sheet(const image *traced, const image pictures[CROSS_STEPS], const char *path,
                              gbt_error *err);
 
-/** crosscheck.json, .md, .svg and .html into `folder`. */
-gbt_status cross_write(const cross_study *study, const char *folder, gbt_error *err);
-
-/** The tables as Markdown. */
-void cross_table(const cross_study *study, text *out);
+/** How it is written down. */
+extern const study_output cross_output;
 
 #endif

@@ -84,7 +84,7 @@ static void add_view_table(const cross_model *model, const cross_view *v, text *
                     v->checks[i].value, passes(&v->checks[i]) ? "yes" : "**NO**");
 }
 
-void cross_table(const cross_study *study, text *out)
+static void cross_table(const cross_study *study, text *out)
 {
     bool first = true;
     for (size_t m = 0; m < study->model_count; m++)
@@ -94,8 +94,9 @@ void cross_table(const cross_study *study, text *out)
         }
 }
 
-static void add_markdown(const cross_study *study, text *out)
+static void add_tables(const void *of, text *out)
 {
+    const cross_study *study = of;
     text_format(out,
                 "# Tracer against rasterizer\n\nFrom the tracer's picture to that of 3D Gaussian splatting, "
                 "one change at a time; each keeps those before it. Rows beyond their limit: %zu.\n\n",
@@ -141,10 +142,9 @@ static json_t *view_to_json(const cross_view *v)
                      error_to_json(&v->splat), "pictures", json_text(v->sheet));
 }
 
-static gbt_status write_json(const cross_study *study, const char *folder, gbt_error *err)
+static json_t *data_of(const void *of)
 {
-    char path[4096];
-    GBT_TRY(file_join(path, sizeof path, folder, "crosscheck.json", err));
+    const cross_study *study = of;
     json_t *models = json_array();
     for (size_t m = 0; m < study->model_count; m++) {
         json_t *views = json_array();
@@ -153,12 +153,8 @@ static gbt_status write_json(const cross_study *study, const char *folder, gbt_e
         json_array_append_new(
             models, json_pack("{s:o,s:o}", "model", json_text(study->models[m].name), "views", views));
     }
-    json_t *root =
-        json_pack("{s:i,s:s,s:i,s:i,s:o}", "schema", 1, "study", "crosscheck", "amplified",
-                  (int)CROSS_AMPLIFIED, "amplified_tiles", (int)CROSS_AMPLIFIED_TILES, "models", models);
-    const gbt_status status = json_save(root, path, err);
-    json_decref(root);
-    return status;
+    return json_pack("{s:i,s:i,s:o}", "amplified", (int)CROSS_AMPLIFIED, "amplified_tiles",
+                     (int)CROSS_AMPLIFIED_TILES, "models", models);
 }
 
 /* ---- chart ---- */
@@ -209,7 +205,7 @@ static void add_svg(const cross_study *study, bool alone, text *out)
     text_add(out, "</svg>\n");
 }
 
-static void add_picture(const cross_study *study, text *out) { add_svg(study, true, out); }
+static void add_charts(const void *study, text *out) { add_svg(study, true, out); }
 
 /* ---- page ---- */
 
@@ -237,8 +233,9 @@ static void add_page_view(const cross_model *model, const cross_view *v, const c
     text_add(out, "</tbody></table></div></figure>\n");
 }
 
-static void add_page(const cross_study *study, const char *folder, text *out)
+static void add_page(const void *of, const char *folder, text *out)
 {
+    const cross_study *study = of;
     text_add(out, "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
                   "content=\"width=device-width,initial-scale=1\">"
                   "<title>Tracer against rasterizer</title>\n<style>\n");
@@ -265,16 +262,5 @@ static void add_page(const cross_study *study, const char *folder, text *out)
                   "This page is one file and loads nothing.</p></footer>\n</body></html>\n");
 }
 
-/* ---- files ---- */
-
-gbt_status cross_write(const cross_study *study, const char *folder, gbt_error *err)
-{
-    text markdown = {.err = err}, picture = {.err = err}, page = {.err = err};
-    GBT_TRY(write_json(study, folder, err));
-    add_markdown(study, &markdown);
-    GBT_TRY(text_save(&markdown, folder, "crosscheck.md"));
-    add_picture(study, &picture);
-    GBT_TRY(text_save(&picture, folder, "crosscheck.svg"));
-    add_page(study, folder, &page);
-    return text_save(&page, folder, "crosscheck.html");
-}
+const study_output cross_output = {
+    .name = "crosscheck", .tables = add_tables, .charts = add_charts, .data = data_of, .page = add_page};

@@ -41,8 +41,8 @@ static void tell(size_t number, size_t count)
     log_progress(&e);
 }
 
-gbt_status study_grid_fill(study_grid *g, const char *folder, const bool *wanted, study_grid_run *run,
-                           const void *study, gbt_error *err)
+static gbt_status fill(study_grid *g, const bool *wanted, study_grid_run *run, const void *study,
+                       const char *folder, gbt_error *err)
 {
     size_t variants = 0, done = 0;
     for (size_t v = 0; v < g->variant_count; v++)
@@ -57,4 +57,15 @@ gbt_status study_grid_fill(study_grid *g, const char *folder, const bool *wanted
                 GBT_TRY(run(study, scene, v, seed, folder, study_grid_at(g, scene, v, seed), err));
             }
     return GBT_OK;
+}
+
+gbt_status study_grid_report(study_grid *g, const bool *wanted, study_grid_run *run,
+                             const study_output *output, const void *study, const char *folder, FILE *out,
+                             gbt_error *err)
+{
+    gbt_status status = fill(g, wanted, run, study, folder, err);
+    if (status == GBT_OK)
+        status = study_output_save(output, study, folder, out, err);
+    study_grid_close(g);
+    return status;
 }

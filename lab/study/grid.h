@@ -3,6 +3,7 @@
 #ifndef GBT_STUDY_GRID_H
 #define GBT_STUDY_GRID_H
 
+#include "study/output.h"
 #include "study/runs.h"
 
 typedef struct study_grid {
@@ -32,13 +33,14 @@ typedef gbt_status study_grid_run(const void *study, size_t scene, size_t varian
                                   const char *folder, study_figures *out, gbt_error *err);
 
 /**
- * Make `folder` and all runs. Seeds are outermost: an interrupted study has whole comparisons of the first
- * seeds.
+ * Make `folder` and all runs, save what came out, close the grid. Seeds are outermost: an interrupted study
+ * has whole comparisons of the first seeds.
  *
  * @param wanted [in] [variant_count], false: not made, its figures stay zero; NULL: all
- * @return as `run`, which fails first; GBT_ERR_IO
+ * @return as `run`, which fails first, and study_output_save(); GBT_ERR_IO
  */
-gbt_status study_grid_fill(study_grid *g, const char *folder, const bool *wanted, study_grid_run *run,
-                           const void *study, gbt_error *err);
+gbt_status study_grid_report(study_grid *g, const bool *wanted, study_grid_run *run,
+                             const study_output *output, const void *study, const char *folder, FILE *out,
+                             gbt_error *err);
 
 #endif

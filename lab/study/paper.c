@@ -6,7 +6,6 @@
 
 #include "base/choice.h"
 #include "base/fail.h"
-#include "base/memory.h"
 
 enum { LEAST_ITERATIONS = 20 };
 
@@ -29,14 +28,13 @@ static gbt_status choose_tables(const char *list, bool has_table[PAPER_TABLES + 
     }
 }
 
+/* Which tables and variants, and what the scenes say. */
 static gbt_status plan(paper_study *s, const lab_paper_def *def, gbt_error *err)
 {
-    s->def = *def;
     if (def->iterations < LEAST_ITERATIONS)
         return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least %d)",
                          (unsigned long long)def->iterations, (int)LEAST_ITERATIONS);
     GBT_TRY(choose_tables(def->tables, s->has_table, err));
-    GBT_TRY(study_grid_open(&s->grid, def->data, def->data_count, PAPER_VARIANTS, def->seeds, err));
     for (size_t i = 0; i < s->grid.scene_count; i++)
         GBT_TRY(paper_scene_look(def->data[i], &s->scenes[i], err));
     for (int table = 1; table <= PAPER_TABLES; table++) {
@@ -80,27 +78,13 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     return study_runs_do(s->def.data[scene], run, &def, s->def.lpips, out, err);
 }
 
-static gbt_status write_all(const paper_study *s, const char *folder, FILE *out, gbt_error *err)
-{
-    study_texts texts = {.csv.err = err, .page.err = err, .charts.err = err};
-    paper_csv(s, &texts.csv);
-    paper_tables(s, &texts.page);
-    paper_charts(s, &texts.charts);
-    GBT_TRY(study_texts_save(&texts, folder, "paper", out));
-    return paper_json(s, folder, err);
-}
-
 gbt_status lab_study_paper(const lab_paper_def *def, const char *folder, FILE *out, gbt_error *err)
 {
-    paper_study *s = mem_calloc(1, sizeof *s, "study", err);
-    if (s == NULL)
-        return GBT_ERR_NO_MEMORY;
-    gbt_status status = plan(s, def, err);
+    paper_study s = {.def = *def};
+    GBT_TRY(study_grid_open(&s.grid, def->data, def->data_count, PAPER_VARIANTS, def->seeds, err));
+    const gbt_status status = plan(&s, def, err);
     if (status == GBT_OK)
-        status = study_grid_fill(&s->grid, folder, s->has_variant, run_one, s, err);
-    if (status == GBT_OK)
-        status = write_all(s, folder, out, err);
-    study_grid_close(&s->grid);
-    mem_free(s);
+        return study_grid_report(&s.grid, s.has_variant, run_one, &paper_output, &s, folder, out, err);
+    study_grid_close(&s.grid);
     return status;
 }

@@ -146,10 +146,10 @@ const char *paper_verdict(const stat_sample *ours, const paper_claim *claim);
     NaN without one. */
 const char *paper_verdict_of(const stat_sample *ours, double published, const double range[2]);
 
-void paper_tables(const paper_study *s, text *out); /* Markdown */
-void paper_csv(const paper_study *s, text *out);
-void paper_charts(const paper_study *s, text *out);                              /* SVG */
-gbt_status paper_json(const paper_study *s, const char *folder, gbt_error *err); /* paper.json in the folder
-                                                                                  */
+void paper_tables(const void *study, text *out); /* Markdown */
+void paper_charts(const void *study, text *out); /* SVG */
+
+/** How it is written down. */
+extern const study_output paper_output;
 
 #endif

@@ -117,8 +117,9 @@ static void draw_growth(text *out, const paper_study *s, size_t scene, int top)
 
 /* ---- the picture ---- */
 
-void paper_charts(const paper_study *s, text *out)
+void paper_charts(const void *study, text *out)
 {
+    const paper_study *s = study;
     const int spread_table = s->has_table[2] ? 2 : s->has_table[1] ? 1 : 0;
     const bool has_growth = s->has_table[3] || s->has_table[4];
     const paper_variant_id *variants = NULL;

@@ -29,8 +29,9 @@ static void add_csv_run(const paper_study *s, size_t scene, paper_variant_id var
     text_add(out, "\n");
 }
 
-void paper_csv(const paper_study *s, text *out)
+static void add_csv(const void *study, text *out)
 {
+    const paper_study *s = study;
     text_add(out, "scene,variant,seed,points,anchors_initial,anchors_final,storage_mib,model_bytes,psnr,ssim,"
                   "anchors_in_view,giga_macs_per_view,blended_per_ray,iterations,train_seconds,lpips_01\n");
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
@@ -97,10 +98,9 @@ static json_t *variant_to_json(const paper_study *s, size_t scene, paper_variant
     return root;
 }
 
-gbt_status paper_json(const paper_study *s, const char *folder, gbt_error *err)
+static json_t *data_of(const void *study)
 {
-    char path[4096];
-    GBT_TRY(file_join(path, sizeof path, folder, "paper.json", err));
+    const paper_study *s = study;
     json_t *rows = json_array(), *figures = json_array(), *scenes = json_array();
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         add_count_rows(s, scene, rows);
@@ -111,11 +111,11 @@ gbt_status paper_json(const paper_study *s, const char *folder, gbt_error *err)
                 json_array_append_new(figures, variant_to_json(s, scene, (paper_variant_id)v));
     }
     add_change_rows(s, rows);
-    json_t *root = json_pack("{s:i,s:s,s:I,s:f,s:s,s:i,s:o,s:o,s:o}", "schema", 1, "study", "paper",
-                             "iterations", (json_int_t)s->def.iterations, "downscale", s->def.downscale,
-                             "renderer", CHOICE_NAME(GBT_RENDERER_NAMES, s->def.renderer), "seeds",
-                             s->grid.seeds, "rows", rows, "scenes", scenes, "figures", figures);
-    const gbt_status status = json_save(root, path, err);
-    json_decref(root);
-    return status;
+    return json_pack("{s:I,s:f,s:s,s:i,s:o,s:o,s:o}", "iterations", (json_int_t)s->def.iterations,
+                     "downscale", s->def.downscale, "renderer",
+                     CHOICE_NAME(GBT_RENDERER_NAMES, s->def.renderer), "seeds", s->grid.seeds, "rows", rows,
+                     "scenes", scenes, "figures", figures);
 }
+
+const study_output paper_output = {
+    .name = "paper", .csv = add_csv, .tables = paper_tables, .charts = paper_charts, .data = data_of};

@@ -150,8 +150,9 @@ static void add_scenes(const paper_study *s, text *out)
     }
 }
 
-void paper_tables(const paper_study *s, text *out)
+void paper_tables(const void *study, text *out)
 {
+    const paper_study *s = study;
     text_format(out,
                 "# The paper's tables, from our runs\n\n%llu iterations of the faithful protocol "
                 "(`--compat`), photos divided by %g, %s, ",

@@ -148,12 +148,7 @@ gbt_status lab_study_rate(const lab_study_def *def, const char *folder, FILE *ou
             measure_model(def->models[study->model_count], path, &study->models[study->model_count], err);
     unlink(path); /* the file that every row was written to */
     if (status == GBT_OK)
-        status = rate_write(study, folder, err);
-    if (status == GBT_OK) {
-        text table = {.err = err};
-        rate_table(study, &table);
-        status = text_print(&table, out);
-    }
+        status = study_output_save(&rate_output, study, folder, out, err);
     mem_free(study);
     return status;
 }

@@ -5,7 +5,7 @@
 #define GBT_STUDY_RATE_H
 
 #include "io/model_file.h"
-#include "report/text.h"
+#include "study/output.h"
 
 enum { RATE_MODELS_MAX = 6, RATE_ROWS_MAX = 12 };
 
@@ -32,10 +32,7 @@ typedef struct rate_study {
     size_t model_count;
 } rate_study;
 
-/** rate.csv, .json, .md and .svg into `folder`. */
-gbt_status rate_write(const rate_study *study, const char *folder, gbt_error *err);
-
-/** The tables as Markdown. */
-void rate_table(const rate_study *study, text *out);
+/** How it is written down. */
+extern const study_output rate_output;
 
 #endif

@@ -4,8 +4,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/fail.h"
-#include "base/file.h"
 #include "data/json_out.h"
 #include "gbtrace/compress.h"
 #include "study/chart.h"
@@ -26,8 +24,9 @@ static const char *row_name(const rate_row *row, char *out, size_t size)
     return out;
 }
 
-void rate_table(const rate_study *study, text *out)
+static void add_tables(const void *of, text *out)
 {
+    const rate_study *study = of;
     char name[32];
     for (size_t i = 0; i < study->model_count; i++) {
         const rate_model *m = &study->models[i];
@@ -62,8 +61,9 @@ void rate_table(const rate_study *study, text *out)
     }
 }
 
-static void add_csv(const rate_study *study, text *out)
+static void add_csv(const void *of, text *out)
 {
+    const rate_study *study = of;
     text_add(out, "model,quality,anchors,bytes,positions,features,offsets,scales,pixels,steps,networks,psnr,"
                   "ssim,psnr_loss,encode_seconds,decode_seconds\n");
     for (size_t i = 0; i < study->model_count; i++) {
@@ -113,8 +113,9 @@ static void add_check(json_t *checks, const rate_model *m, const char *what, dou
                                             "value", json_number(value), "pass", value <= limit));
 }
 
-static gbt_status write_json(const rate_study *study, const char *path, gbt_error *err)
+static json_t *data_of(const void *of)
 {
+    const rate_study *study = of;
     json_t *models = json_array(), *checks = json_array();
     for (size_t i = 0; i < study->model_count; i++) {
         const rate_model *m = &study->models[i];
@@ -128,16 +129,13 @@ static gbt_status write_json(const rate_study *study, const char *path, gbt_erro
             add_check(checks, m, "loss of PSNR at the default quality, dB", loss_limit, m->psnr - r->psnr);
         }
     }
-    json_t *root =
-        json_pack("{s:i,s:s,s:o,s:o}", "schema", 1, "study", "rate", "models", models, "rows", checks);
-    const gbt_status status = json_save(root, path, err);
-    json_decref(root);
-    return status;
+    return json_pack("{s:o,s:o}", "models", models, "rows", checks);
 }
 
 /* One line per model: what a byte buys. Without loss there is no place on it. */
-static void add_picture(const rate_study *study, text *out)
+static void add_charts(const void *of, text *out)
 {
+    const rate_study *study = of;
     scatter_point points[RATE_MODELS_MAX * RATE_ROWS_MAX];
     char names[RATE_MODELS_MAX * RATE_ROWS_MAX][32];
     const scatter_level levels[] = {{0, "as trained"}, {-loss_limit, "0.05 dB less"}};
@@ -166,20 +164,5 @@ static void add_picture(const rate_study *study, text *out)
     text_add(out, "</svg>\n");
 }
 
-static gbt_status write_text(const rate_study *study, const char *folder, const char *name,
-                             void (*add)(const rate_study *, text *), gbt_error *err)
-{
-    text out = {.err = err};
-    add(study, &out);
-    return text_save(&out, folder, name);
-}
-
-gbt_status rate_write(const rate_study *study, const char *folder, gbt_error *err)
-{
-    char path[4096];
-    GBT_TRY(file_join(path, sizeof path, folder, "rate.json", err));
-    GBT_TRY(write_json(study, path, err));
-    GBT_TRY(write_text(study, folder, "rate.csv", add_csv, err));
-    GBT_TRY(write_text(study, folder, "rate.md", rate_table, err));
-    return write_text(study, folder, "rate.svg", add_picture, err);
-}
+const study_output rate_output = {
+    .name = "rate", .csv = add_csv, .tables = add_tables, .charts = add_charts, .data = data_of};

@@ -282,21 +282,3 @@ gbt_status study_runs_do_variant(const char *folder, const char *data, const cha
     GBT_TRY(study_runs_folder(folder, data_name, variant, def.seed, run, sizeof run, err));
     return study_runs_do(data, run, &def, NULL, out, err);
 }
-
-gbt_status study_texts_save(study_texts *texts, const char *folder, const char *name, FILE *out)
-{
-    const struct {
-        const char *suffix;
-        text *body;
-    } files[] = {{"csv", &texts->csv}, {"svg", &texts->charts}, {"md", &texts->page}};
-    gbt_status status = GBT_OK;
-    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
-        char file[STUDY_NAME_SIZE];
-        snprintf(file, sizeof file, "%s.%s", name, files[i].suffix);
-        if (files[i].body == &texts->page && files[i].body->status == GBT_OK)
-            fwrite(texts->page.bytes, 1, texts->page.length, out);
-        const gbt_status saved = text_save(files[i].body, folder, file);
-        status = status == GBT_OK ? saved : status;
-    }
-    return status;
-}

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/runs.h -- the training runs of a study: made, or taken from an earlier call; their figures read back;
-   what is said of them saved. */
+/* study/runs.h -- the training runs of a study: made, or taken from an earlier call; their figures read
+   back. */
 #ifndef GBT_STUDY_RUNS_H
 #define GBT_STUDY_RUNS_H
 
@@ -68,13 +68,5 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
 gbt_status study_runs_do_variant(const char *folder, const char *data, const char *data_name,
                                  const char *variant, const char *settings, gbt_train_def def,
                                  study_figures *out, gbt_error *err);
-
-/** What a study has to say. Each starts from {.err = err}. */
-typedef struct study_texts {
-    text csv, page, charts;
-} study_texts;
-
-/** NAME.csv, NAME.md and NAME.svg into `folder`, the page to `out` too. Frees them, whatever happens. */
-gbt_status study_texts_save(study_texts *texts, const char *folder, const char *name, FILE *out);
 
 #endif

@@ -362,12 +362,7 @@ gbt_status lab_study_speed(const lab_study_def *def, const char *folder, FILE *o
     for (size_t i = 0; i < def->model_count && status == GBT_OK; i++)
         status = measure_model(def, i, &study->models[i], err);
     if (status == GBT_OK)
-        status = speed_write(study, folder, err);
-    if (status == GBT_OK) {
-        text table = {.err = err};
-        speed_table(study, &table);
-        status = text_print(&table, out);
-    }
+        status = study_output_save(&speed_output, study, folder, out, err);
     mem_free(study);
     return status;
 }

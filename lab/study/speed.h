@@ -5,7 +5,7 @@
 
 #include "benchmark/bench_passes.h"
 #include "benchmark/bench_reference.h"
-#include "report/text.h"
+#include "study/output.h"
 
 struct bench_scene;
 
@@ -65,10 +65,7 @@ typedef struct speed_study {
     Nothing for a .ply. */
 gbt_status speed_measure_photos(struct bench_scene *s, speed_model *out, gbt_error *err);
 
-/** speed.csv, .json, .md, .svg and .html into `folder`. */
-gbt_status speed_write(const speed_study *study, const char *folder, gbt_error *err);
-
-/** The table as Markdown. */
-void speed_table(const speed_study *study, text *out);
+/** How it is written down. */
+extern const study_output speed_output;
 
 #endif

@@ -5,8 +5,6 @@
 #include <stdio.h>
 
 #include "base/cpu.h"
-#include "base/fail.h"
-#include "base/file.h"
 #include "data/json_out.h"
 #include "report/plot.h"
 #include "report/style.h"
@@ -35,8 +33,9 @@ static void add_error(text *out, const bench_error *e, const char *between)
     text_format(out, "%.2g", e->max);
 }
 
-void speed_table(const speed_study *study, text *out)
+static void add_tables(const void *of, text *out)
 {
+    const speed_study *study = of;
     for (size_t m = 0; m < study->model_count; m++) {
         const speed_model *model = &study->models[m];
         text_format(out,
@@ -72,8 +71,9 @@ static void add_csv_text(text *out, const char *value)
     text_add(out, "\"");
 }
 
-static void add_csv(const speed_study *study, text *out)
+static void add_csv(const void *of, text *out)
 {
+    const speed_study *study = of;
     text_add(out, "model,knob,value,kernel,isa,alpha_min,t_min,proxy_radius,tree_forward_core_us_per_ray,"
                   "forward_core_us_per_ray,forward_adjoint_core_us_per_ray,blended_per_ray,row_pairs_per_"
                   "packet,psnr,max_error,photo_psnr\n");
@@ -129,16 +129,13 @@ static json_t *model_to_json(const speed_model *model)
                      (json_int_t)model->check_rays, "settings", rows, "not_built", ideas, "checks", check);
 }
 
-static gbt_status write_json(const speed_study *study, const char *path, gbt_error *err)
+static json_t *data_of(const void *of)
 {
+    const speed_study *study = of;
     json_t *models = json_array();
     for (size_t m = 0; m < study->model_count; m++)
         json_array_append_new(models, model_to_json(&study->models[m]));
-    json_t *root = json_pack("{s:i,s:s,s:i,s:i,s:o}", "schema", 1, "study", "speed", "repeats",
-                             study->repeats, "threads", study->threads, "models", models);
-    const gbt_status status = json_save(root, path, err);
-    json_decref(root);
-    return status;
+    return json_pack("{s:i,s:i,s:o}", "repeats", study->repeats, "threads", study->threads, "models", models);
 }
 
 /* ---- chart ---- */
@@ -218,8 +215,10 @@ static void add_page_table(const speed_model *model, text *out)
     text_add(out, "</tbody></table></div></details>\n");
 }
 
-static void add_page(const speed_study *study, text *out)
+static void add_page(const void *of, const char *folder, text *out)
 {
+    const speed_study *study = of;
+    (void)folder;
     text_add(out, "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
                   "content=\"width=device-width,initial-scale=1\">"
                   "<title>Speed against accuracy</title>\n<style>\n");
@@ -245,28 +244,15 @@ static void add_page(const speed_study *study, text *out)
                   "nothing.</p></footer>\n</body></html>\n");
 }
 
-/* ---- files ---- */
-
-static void add_picture(const speed_study *study, text *out)
+static void add_charts(const void *of, text *out)
 {
+    const speed_study *study = of;
     add_svg(study, 0, study->model_count, true, out);
 }
 
-static gbt_status write_text(const speed_study *study, const char *folder, const char *name,
-                             void (*add)(const speed_study *, text *), gbt_error *err)
-{
-    text out = {.err = err};
-    add(study, &out);
-    return text_save(&out, folder, name);
-}
-
-gbt_status speed_write(const speed_study *study, const char *folder, gbt_error *err)
-{
-    char path[4096];
-    GBT_TRY(file_join(path, sizeof path, folder, "speed.json", err));
-    GBT_TRY(write_json(study, path, err));
-    GBT_TRY(write_text(study, folder, "speed.csv", add_csv, err));
-    GBT_TRY(write_text(study, folder, "speed.md", speed_table, err));
-    GBT_TRY(write_text(study, folder, "speed.svg", add_picture, err));
-    return write_text(study, folder, "speed.html", add_page, err);
-}
+const study_output speed_output = {.name = "speed",
+                                   .csv = add_csv,
+                                   .tables = add_tables,
+                                   .charts = add_charts,
+                                   .data = data_of,
+                                   .page = add_page};

@@ -55,9 +55,7 @@ double time_to_reach(const study_figures *run, double psnr);
     come there. */
 stat_sample time_saved(const time_study *s, size_t scene);
 
-void time_tables(const time_study *s, text *out); /* Markdown */
-void time_csv(const time_study *s, text *out);
-void time_charts(const time_study *s, text *out);                              /* SVG */
-gbt_status time_json(const time_study *s, const char *folder, gbt_error *err); /* time.json in the folder */
+/** How it is written down. */
+extern const study_output time_output;
 
 #endif

@@ -4,8 +4,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/fail.h"
-#include "base/file.h"
 #include "data/json_out.h"
 #include "study/chart.h"
 #include "study/time.h"
@@ -84,8 +82,9 @@ static void add_words(const time_study *s, size_t scene, text *out)
     }
 }
 
-void time_tables(const time_study *s, text *out)
+static void add_tables(const void *study, text *out)
 {
+    const time_study *s = study;
     text_format(out,
                 "# Held-out PSNR against seconds\n\nA budget is %.4g s; the faithful protocol has %g of "
                 "them. Photos divided by %g, ",
@@ -115,8 +114,9 @@ static void add_csv_row(const time_study *s, size_t scene, size_t variant, int s
                 seconds, psnr, run->iterations, run->anchors_final);
 }
 
-void time_csv(const time_study *s, text *out)
+static void add_csv(const void *study, text *out)
 {
+    const time_study *s = study;
     text_add(out, "scene,run,seed,is_end,seconds,psnr,iterations,anchors_final\n");
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         for (size_t v = 0; v < time_variant_count; v++)
@@ -166,19 +166,14 @@ static void add_scene(const time_study *s, size_t scene, json_t *rows, json_t *r
     }
 }
 
-gbt_status time_json(const time_study *s, const char *folder, gbt_error *err)
+static json_t *data_of(const void *study)
 {
-    char path[4096];
-    GBT_TRY(file_join(path, sizeof path, folder, "time.json", err));
+    const time_study *s = study;
     json_t *rows = json_array(), *runs = json_array();
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         add_scene(s, scene, rows, runs);
-    json_t *root = json_pack("{s:i,s:s,s:f,s:f,s:i,s:o,s:o}", "schema", 1, "study", "time", "budget_seconds",
-                             s->def.budget_seconds, "downscale", s->def.downscale, "seeds", s->grid.seeds,
-                             "rows", rows, "runs", runs);
-    const gbt_status status = json_save(root, path, err);
-    json_decref(root);
-    return status;
+    return json_pack("{s:f,s:f,s:i,s:o,s:o}", "budget_seconds", s->def.budget_seconds, "downscale",
+                     s->def.downscale, "seeds", s->grid.seeds, "rows", rows, "runs", runs);
 }
 
 /* ---- charts ---- */
@@ -210,10 +205,14 @@ static void draw_scene(const time_study *s, size_t scene, int top, text *out)
     scatter_draw(out, &chart, top);
 }
 
-void time_charts(const time_study *s, text *out)
+static void add_charts(const void *study, text *out)
 {
+    const time_study *s = study;
     scatter_begin(out, "PSNR against seconds", "", SCATTER_HEIGHT * (int)s->grid.scene_count, false);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         draw_scene(s, scene, SCATTER_HEIGHT * (int)scene, out);
     text_add(out, "</svg>\n");
 }
+
+const study_output time_output = {
+    .name = "time", .csv = add_csv, .tables = add_tables, .charts = add_charts, .data = data_of};

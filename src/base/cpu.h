@@ -6,6 +6,7 @@
 
 #include <stddef.h>
 
+/** From the narrowest to the widest: tables of kernels have a row for each, in this order. */
 typedef enum cpu_isa { CPU_PLAIN = 0, CPU_AVX2 = 1, CPU_AVX512 = 2 } cpu_isa;
 
 /** Chosen once per process: the smaller of what the processor has and the environment variable GBT_ISA

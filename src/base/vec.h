@@ -67,34 +67,23 @@ static inline void dmat_apply_transposed(const double m[9], const double a[3], d
     out[2] = z;
 }
 
-/** Rotation matrix of a unit quaternion. */
-static inline void dquat_to_matrix(const double q[4], double m[9])
-{
-    const double w = q[0], x = q[1], y = q[2], z = q[3];
-    m[0] = 1 - 2 * (y * y + z * z);
-    m[1] = 2 * (x * y - w * z);
-    m[2] = 2 * (x * z + w * y);
-    m[3] = 2 * (x * y + w * z);
-    m[4] = 1 - 2 * (x * x + z * z);
-    m[5] = 2 * (y * z - w * x);
-    m[6] = 2 * (x * z - w * y);
-    m[7] = 2 * (y * z + w * x);
-    m[8] = 1 - 2 * (x * x + y * y);
-}
-
-/** The same in single precision. */
-static inline void quat_to_matrix(const float q[4], float m[9])
-{
-    const float w = q[0], x = q[1], y = q[2], z = q[3];
-    m[0] = 1 - 2 * (y * y + z * z);
-    m[1] = 2 * (x * y - w * z);
-    m[2] = 2 * (x * z + w * y);
-    m[3] = 2 * (x * y + w * z);
-    m[4] = 1 - 2 * (x * x + z * z);
-    m[5] = 2 * (y * z - w * x);
-    m[6] = 2 * (x * z - w * y);
-    m[7] = 2 * (y * z + w * x);
-    m[8] = 1 - 2 * (x * x + y * y);
-}
+/** Rotation matrix of a unit quaternion, in double and in single precision. */
+#define QUAT_TO_MATRIX(name, real)                                                                           \
+    static inline void name(const real q[4], real m[9])                                                      \
+    {                                                                                                        \
+        const real w = q[0], x = q[1], y = q[2], z = q[3];                                                   \
+        m[0] = 1 - 2 * (y * y + z * z);                                                                      \
+        m[1] = 2 * (x * y - w * z);                                                                          \
+        m[2] = 2 * (x * z + w * y);                                                                          \
+        m[3] = 2 * (x * y + w * z);                                                                          \
+        m[4] = 1 - 2 * (x * x + z * z);                                                                      \
+        m[5] = 2 * (y * z - w * x);                                                                          \
+        m[6] = 2 * (x * z - w * y);                                                                          \
+        m[7] = 2 * (y * z + w * x);                                                                          \
+        m[8] = 1 - 2 * (x * x + y * y);                                                                      \
+    }
+QUAT_TO_MATRIX(dquat_to_matrix, double)
+QUAT_TO_MATRIX(quat_to_matrix, float)
+#undef QUAT_TO_MATRIX
 
 #endif

@@ -93,11 +93,7 @@ static const option *options_bench(int *count)
          .kind = OPTION_FLAG,
          .value = &def.check,
          .help = "compare with the double-precision reference"},
-        {.name = "json",
-         .kind = OPTION_STRING,
-         .value = &def.json,
-         .value_name = "FILE",
-         .help = "write the figures to this file"},
+        JSON_OPTION(&def.json, "write the figures to this file"),
         THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;

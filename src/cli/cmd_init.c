@@ -64,11 +64,7 @@ static const option *options(int *count)
          .kind = OPTION_FLAG,
          .value = &def.mesh,
          .help = "write each ball as a sphere mesh instead of a point"},
-        {.name = "json",
-         .kind = OPTION_STRING,
-         .value = &json,
-         .value_name = "FILE",
-         .help = "write the counts to this file"},
+        JSON_OPTION(&json, "write the counts to this file"),
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

@@ -21,12 +21,7 @@ static const option *options(int *count)
     def = gbt_view_def_default();
     def.ready = print_address;
     static const option rows[] = {
-        {.name = "model-path",
-         .short_name = 'm',
-         .kind = OPTION_OPERAND,
-         .value_name = "RUN",
-         .help = "the same as RUN",
-         .rare = true},
+        RUN_OPTION(NULL),
         {.name = "port",
          .short_name = 'p',
          .kind = OPTION_INT,
@@ -41,12 +36,7 @@ static const option *options(int *count)
          .value_name = "ADDRESS",
          .help = "listen at this IPv4 address of the machine, 0.0.0.0: at all; others than 127.0.0.1 answer "
                  "only with the token printed"},
-        {.name = "data",
-         .kind = OPTION_STRING,
-         .value = &def.data,
-         .value_name = "DATA",
-         .help = "photos of another data set",
-         .aliases = "s source-path"},
+        DATA_OPTION(&def.data, "photos of another data set"),
         THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;

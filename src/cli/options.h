@@ -57,6 +57,34 @@ typedef struct option {
     }
 extern int options_threads;
 
+/* Rows that several commands have; each says where the value goes. */
+#define DATA_OPTION(place, text)                                                                             \
+    {                                                                                                        \
+        .name = "data", .kind = OPTION_STRING, .value = (place), .value_name = "DATA", .help = (text),       \
+        .aliases = "s source-path"                                                                           \
+    }
+#define JSON_OPTION(place, text)                                                                             \
+    {                                                                                                        \
+        .name = "json", .kind = OPTION_STRING, .value = (place), .value_name = "FILE", .help = (text)        \
+    }
+#define PRESET_OPTION(place)                                                                                 \
+    {                                                                                                        \
+        .name = "preset", .kind = OPTION_CHOICE, .value = (place), .choices = GBT_PRESET_NAMES,              \
+        .help = "cut-off preset (docs/accuracy.md); training uses default"                                   \
+    }
+#define DOWNSCALE_OPTION(place)                                                                              \
+    {                                                                                                        \
+        .name = "downscale", .short_name = 'd', .kind = OPTION_DOUBLE, .value = (place), .min = 0,           \
+        .max = 64, .value_name = "F",                                                                        \
+        .help = "divide the photos' width and height by this; 0: as in training", .aliases = "r resolution"  \
+    }
+/* RUN by the name that other programs give it, and more of their names or NULL. */
+#define RUN_OPTION(more)                                                                                     \
+    {                                                                                                        \
+        .name = "model-path", .short_name = 'm', .kind = OPTION_OPERAND, .value_name = "RUN",                \
+        .help = "the same as RUN", .aliases = (more), .rare = true                                           \
+    }
+
 enum { OPTIONS_MAX = 80, OPTIONS_MAX_OPERANDS = 64, OPTIONS_COMMON = 5, OPTIONS_WANTED_SIZE = 256 };
 
 typedef struct operands {

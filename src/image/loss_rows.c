@@ -273,12 +273,6 @@ LOSS_VARIANT(avx512, __attribute__((target("fma,avx512f,avx512dq,avx512vl,prefer
 
 const loss_kernels *loss_kernels_best(void)
 {
-    switch (cpu_best_isa()) {
-    case CPU_AVX512:
-        return &kernels_avx512;
-    case CPU_AVX2:
-        return &kernels_avx2;
-    default:
-        return &kernels_plain;
-    }
+    static const loss_kernels *const kernels[] = {&kernels_plain, &kernels_avx2, &kernels_avx512};
+    return kernels[cpu_best_isa()];
 }

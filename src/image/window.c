@@ -89,14 +89,8 @@ WINDOW_VARIANT(avx512, __attribute__((target("avx512f,avx512dq,avx512vl,prefer-v
 
 const window_kernels *window_kernels_best(void)
 {
-    switch (cpu_best_isa()) {
-    case CPU_AVX512:
-        return &kernels_avx512;
-    case CPU_AVX2:
-        return &kernels_avx2;
-    default:
-        return &kernels_plain;
-    }
+    static const window_kernels *const kernels[] = {&kernels_plain, &kernels_avx2, &kernels_avx512};
+    return kernels[cpu_best_isa()];
 }
 
 void window_rows(const float *pixels, size_t count, size_t height, size_t row, const float *zeros,

@@ -43,15 +43,9 @@ raster_settings raster_settings_default(void)
 
 static const raster_kernel *kernel_for(cpu_isa isa)
 {
-    switch (isa) {
-    case CPU_AVX512:
-        return &raster_kernel_avx512;
-    case CPU_AVX2:
-        return &raster_kernel_avx2;
-    case CPU_PLAIN:
-        break;
-    }
-    return &raster_kernel_plain;
+    static const raster_kernel *const kernels[] = {&raster_kernel_plain, &raster_kernel_avx2,
+                                                   &raster_kernel_avx512};
+    return kernels[isa];
 }
 
 static size_t tile_count_of(const raster_view *view)

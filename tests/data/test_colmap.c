@@ -105,7 +105,7 @@ static void good_model(void **state)
     /* The track of the first point, (1, 1.25, 1.5), names both images; the third row of that rotation is (0,
        1, 0), the translation 3. */
     for (int i = 0; i < 2; i++)
-        assert_int_equal(raw.views[i].sight_count, 1);
+        assert_int_equal(raw.views[i].point_depth_count, 1);
     assert_true(fabs(raw_nearest_depth(&raw.views[0]) - 4.25) < 1e-6);
     raw_free(&raw);
     free_seed(seed);
@@ -119,10 +119,10 @@ static void nearest_in_a_photo(void **state)
     assert_true(raw_nearest_depth(&view) == 0);
     for (int i = 201; i >= 1; i--)
         assert_int_equal(raw_add_point_depth(&view, (const double[3]){7, -7, 1 + i}, NULL), GBT_OK);
-    static const double out_of_sight[] = {1, -5, NAN, INFINITY, 1e13};
+    static const double out_of_view[] = {1, -5, NAN, INFINITY, 1e13};
     for (int i = 0; i < 5; i++)
-        assert_int_equal(raw_add_point_depth(&view, (const double[3]){0, 0, out_of_sight[i]}, NULL), GBT_OK);
-    assert_int_equal(view.sight_count, 201);
+        assert_int_equal(raw_add_point_depth(&view, (const double[3]){0, 0, out_of_view[i]}, NULL), GBT_OK);
+    assert_int_equal(view.point_depth_count, 201);
     assert_true(raw_nearest_depth(&view) == 3);
     raw_view_free(&view);
     assert_true(raw_nearest_depth(&view) == 0);

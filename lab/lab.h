@@ -30,7 +30,7 @@ typedef struct lab_bench_def {
     const char *kernel; /* "list" (default, and NULL), "tile", "single", "embree", or "splats" of the same; or
                            some of them, as "list,tile": measured in turn and compared with the first */
     size_t tape_bytes_max; /* memory for the hits that forward keeps for the adjoint; what goes beyond is
-                              traced again. 0, the default: no limit */
+                              traced again. Default 2^60 */
 } lab_bench_def;
 
 lab_bench_def lab_bench_def_default(void);

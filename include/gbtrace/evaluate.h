@@ -112,8 +112,8 @@ typedef struct gbt_render_def {
                             photos. Default 0: as they, to even numbers */
     const char *look_at; /* path "orbit": what it is around, "X,Y,Z" in the data set's coordinates. NULL: as
                             the photos' cameras look. Default NULL */
-    double orbit_radius; /* path "orbit": distance from the vertical axis through that point, [0, 1e9], scene
-                            units; 0: as the photos' cameras. Default 0 */
+    double orbit_radius; /* path "orbit": distance from the vertical axis through that point, (0, 1e9], scene
+                            units; NaN: as the photos' cameras. Default NaN */
     double orbit_height; /* path "orbit": height above that point, scene units; NaN: as the photos' cameras.
                             Default NaN */
     uint32_t cookie_;    /* set by gbt_render_def_default() */

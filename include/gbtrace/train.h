@@ -44,7 +44,7 @@ typedef struct gbt_train_def {
     gbt_alpha alpha;        /* black and white are also the background */
     uint64_t seed;
     size_t hit_bytes_max;    /* memory for the hits of a view that are kept for the adjoint; tiles beyond are
-                                traced again, to the same bits. 0: no limit */
+                                traced again, to the same bits. [0, 2^60], default 2^60 */
     uint64_t max_anchors;    /* growth stops there */
     bool grow;               /* grow and prune anchors */
     double threshold_factor; /* of the thresholds of densification and of pruning. Not with compat */

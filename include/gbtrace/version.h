@@ -8,9 +8,9 @@
 /**
  * The version of these headers. While the first number is 0, another second number means that programs must
  * be compiled again; after that, another first one. The name of the shared library (soname) says the same:
- * libgbtrace.so.0.1.
+ * libgbtrace.so.0.2.
  */
-#define GBT_VERSION "0.1.0"
+#define GBT_VERSION "0.2.0"
 
 GBT_API_BEGIN
 

@@ -17,7 +17,8 @@ enum { KERNELS_MAX = BENCH_KERNELS };
 
 lab_bench_def lab_bench_def_default(void)
 {
-    return (lab_bench_def){.repeats = 5, .preset = GBT_PRESET_AS_TRAINED, .kernel = "list"};
+    return (lab_bench_def){
+        .repeats = 5, .preset = GBT_PRESET_AS_TRAINED, .kernel = "list", .tape_bytes_max = (size_t)1 << 60};
 }
 
 /* What the caller has given in place of the model's own. */
@@ -185,7 +186,7 @@ static gbt_status bench(measured *m, bench_scene *traced, bench_reference *want,
     for (size_t k = 0; k < m->count; k++) {
         m->ways[k].isa = cpu_best_isa();
         m->ways[k].settings = traced->settings;
-        m->ways[k].tape_bytes_max = def->tape_bytes_max;
+        m->ways[k].tape_bytes_max = def->tape_bytes_max > 0 ? def->tape_bytes_max : 1;
         if (m->kernel[k] == BENCH_SPLATS)
             m->ways[k].splat = &m->splat;
         else

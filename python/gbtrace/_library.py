@@ -121,7 +121,7 @@ FUNCTIONS = {
 def _load():
     """The library in GBTRACE_LIBRARY, else the one in this package, else the system's."""
     own = Path(__file__).with_name("libgbtrace.so")
-    path = os.environ.get("GBTRACE_LIBRARY") or (str(own) if own.exists() else "libgbtrace.so.0.1")
+    path = os.environ.get("GBTRACE_LIBRARY") or (str(own) if own.exists() else "libgbtrace.so.0.2")
     try:
         library = c.CDLL(path)
     except OSError as error:

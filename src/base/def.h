@@ -8,7 +8,7 @@
 #include "base/fail.h"
 
 /* Another one whenever a public def changes: a program that was compiled with other headers is refused. */
-enum { DEF_COOKIE = 0x67627432 };
+enum { DEF_COOKIE = 0x67627433 };
 
 /** GBT_OK, or GBT_ERR_ARGUMENT: a zeroed def has no defaults. */
 static inline gbt_status def_check(uint32_t cookie, const char *maker, gbt_error *err)

@@ -81,7 +81,8 @@ static const option *options_bench(int *count)
          .min = 0,
          .max = 0x1p60,
          .value_name = "BYTES",
-         .help = "memory for ray hits kept for the backward pass, such as 100M; 0: no limit"},
+         .help = "memory for ray hits kept for the backward pass, such as 100M; hits beyond it are traced "
+                 "again; default: no limit"},
         {.name = "repeats",
          .kind = OPTION_INT,
          .value = &def.repeats,

@@ -78,7 +78,7 @@ static const option *options(int *count)
          .min = 0,
          .max = 1e9,
          .value_name = "R",
-         .help = "orbit: its radius, scene units; 0: as far as the photos' cameras",
+         .help = "orbit: its radius, scene units; default: as far as the photos' cameras",
          .rare = true},
         {.name = "height",
          .kind = OPTION_DOUBLE,

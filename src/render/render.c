@@ -26,6 +26,7 @@ gbt_render_def gbt_render_def_default(void)
                             .renderer = GBT_RENDERER_AS_TRAINED,
                             .format = GBT_PICTURE_PNG,
                             .preset = GBT_PRESET_AS_TRAINED,
+                            .orbit_radius = (double)NAN,
                             .orbit_height = (double)NAN,
                             .cookie_ = DEF_COOKIE};
 }
@@ -208,11 +209,12 @@ static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_err
     if (def->path == NULL && (def->frames != 0 || def->fps != 0 || def->width != 0 || def->height != 0))
         return base_fail(err, GBT_ERR_ARGUMENT, "frames, fps, width: of a film (wanted a path)");
     const bool orbit = def->path != NULL && strcmp(def->path, "orbit") == 0;
-    if (!orbit && (def->look_at != NULL || def->orbit_radius != 0 || !isnan(def->orbit_height)))
+    if (!orbit && (def->look_at != NULL || !isnan(def->orbit_radius) || !isnan(def->orbit_height)))
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "look_at, orbit_radius, orbit_height: of an orbit (wanted the path orbit)");
-    if (!(def->orbit_radius >= 0 && def->orbit_radius <= 1e9) || fabs(def->orbit_height) > 1e9)
-        return base_fail(err, GBT_ERR_ARGUMENT, "orbit_radius, orbit_height: %g, %g (wanted up to 1e+09)",
+    if (def->orbit_radius <= 0 || def->orbit_radius > 1e9 || fabs(def->orbit_height) > 1e9)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "orbit_radius, orbit_height: %g, %g (wanted up to 1e+09, and a radius above 0)",
                          def->orbit_radius, def->orbit_height);
     if (def->path == NULL)
         return video_named(out) ? base_fail(err, GBT_ERR_ARGUMENT, "%s: a film wants a path", out) : GBT_OK;

@@ -65,8 +65,9 @@ static gbt_status make_orbit(const loaded_run *r, const gbt_render_def *def, con
                              size_t count, const shared_points *shared, camera_group *group, camera_path *out,
                              gbt_error *err)
 {
-    const orbit_shape shape = {
-        .radius = def->orbit_radius, .height = def->orbit_height, .at_focus = def->look_at != NULL};
+    const orbit_shape shape = {.radius = isnan(def->orbit_radius) ? 0 : def->orbit_radius,
+                               .height = def->orbit_height,
+                               .at_focus = def->look_at != NULL};
     if (shape.at_focus)
         GBT_TRY(read_place(def->look_at, r->model.origin, group->focus, err));
     const gbt_camera lens = choose_lens(group, def);

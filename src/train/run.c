@@ -228,7 +228,7 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
         GBT_TRY(resume_open(t, data, run, paths.checkpoint, paths.checkpoint_previous, def, strings, err));
     else
         GBT_TRY(trainer_open(t, data, def, err));
-    t->frame.scene.tape_bytes_max = def->hit_bytes_max;
+    t->frame.scene.tape_bytes_max = def->hit_bytes_max > 0 ? def->hit_bytes_max : 1; /* there 0 is no limit */
     if (t->step == 0)
         t->seconds = clock_wall() - begin; /* loading counts */
     char config[CONFIG_TEXT_SIZE];

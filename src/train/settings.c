@@ -113,9 +113,9 @@ static const gbt_train_setting settings[] = {
              "budget to that length in all, also when it was finished"},
     {NAMED("overwrite", overwrite), FLAG, .help = "train anew in a folder that holds a run, which is lost"},
     {NAMED("hit-bytes-max", hit_bytes_max), .option = "memory", RANGE(BYTES, 0, 0x1p60, "BYTES"),
+     .number = 0x1p60,
      .help = "memory for ray hits kept for the backward pass, such as 100M; hits beyond it are traced again; "
-             "0: no "
-             "limit; does not change the result"},
+             "does not change the result; default: no limit"},
 };
 
 enum { SETTING_COUNT = sizeof settings / sizeof *settings };

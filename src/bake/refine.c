@@ -15,7 +15,7 @@
 
 enum { BLOCK = 512, PIXEL_STEP = 2, STREAM = 1, REST = 3 * (GAUSSIAN_SH_COUNT - 1) };
 
-static const double dssim_weight = 0.2, rate_end = 0.1; /* rates fall to this share */
+static const double rate_end = 0.1; /* rates fall to this share */
 static const struct {
     double opacity, scale, rotation, color, harmonics;
 } first_rates = {0.04, 0.006, 0.002, 0.005, 0.0025};
@@ -114,8 +114,8 @@ static gbt_status refine_step(refining *r, frame *teacher, const anchors *a, con
     GBT_TRY(frame_render(&r->frame, frame_plain(r->cloud), &sparse, settings, true, err));
     GBT_TRY(image_fit(&r->d_image, sparse.width, sparse.height, 3, err));
     image_loss_result loss;
-    GBT_TRY(
-        image_loss(&r->frame.rgb, &teacher->rgb, NULL, dssim_weight, &r->scratch, &r->d_image, &loss, err));
+    GBT_TRY(image_loss(&r->frame.rgb, &teacher->rgb, NULL, IMAGE_DSSIM_WEIGHT, &r->scratch, &r->d_image,
+                       &loss, err));
     GBT_TRY(frame_backward_plain(&r->frame, r->cloud, &r->d_image, &r->gradient, err));
     parallel_blocks(r->cloud->count, BLOCK, step_block, r);
     return GBT_OK;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* growth/growth.h -- growing and pruning anchors (Scaffold-GS; docs/training.md): the rules of a round, and
-   the round. */
+/* growth/growth.h -- growing and pruning anchors (Lu 2024, "Anchor Points Refinement"; docs/training.md): the
+   rules of a round, and the round. */
 #ifndef GBT_GROWTH_GROWTH_H
 #define GBT_GROWTH_GROWTH_H
 

@@ -90,6 +90,9 @@ typedef struct lpips_scores {
     double lpips, lpips_01;
 } lpips_scores;
 
+/** Share of 1 - SSIM in the loss of pictures, the other is L1's (Kerbl 2023, eq 7). */
+#define IMAGE_DSSIM_WEIGHT 0.2
+
 /** Scratch of image_loss(), reused from step to step. Start from {0}. */
 typedef struct loss_scratch {
     double *buffer;

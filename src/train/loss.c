@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/loss.c -- the terms of the training loss and their weights. */
+/* train/loss.c -- the terms of the training loss and their weights (Yang 2026, eq 35; Lu 2024 has the same
+   three). */
 #include "train/loss.h"
 
 #include <math.h>
 
-static const float dssim_weight = 0.2f, volume_weight = 0.01f;
+static const float dssim_weight = (float)IMAGE_DSSIM_WEIGHT, volume_weight = 0.01f;
 
 /* ---- of the picture ---- */
 

@@ -8,7 +8,7 @@
 #include "image/metrics.h"
 
 /**
- * The picture's terms: (1 - w) L1 + w (1 - SSIM), w = 0.2.
+ * The picture's terms: (1 - w) L1 + w (1 - SSIM), w = IMAGE_DSSIM_WEIGHT.
  *
  * @param shown, photo, valid, scratch, d_image, out [in,out] as image_loss()
  */

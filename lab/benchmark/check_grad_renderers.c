@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* benchmark/check_grad_renderers.c -- the adjoints of the renderers against the same in double. */
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "benchmark/check_grad.h"
+#include "raster/raster_ref.h"
+#include "trace/rounding_band.h"
+
+enum { RAY_GRAIN = 16 };
+
+/* What float32 leaves. A trained scene has Gaussians that are 1e-5 of their distance thin, where the rounding
+   of coordinates alone is 1e-2 of a std-dev: five times that of the tests' random scenes. */
+static const double renderer_limit = 5e-5;
+static const double colour_limit = 1e-5; /* between splats in float and in double that blend the same */
+
+typedef struct band_job {
+    const grad_checker *c;
+    bool *in_band;      /* [rays] */
+    gbt_status *status; /* per block */
+} band_job;
+
+static void band_block(size_t block, size_t begin, size_t end, void *context)
+{
+    const band_job *job = context;
+    const ray_image *rays = &job->c->frame->rays;
+    band_scratch scratch = {0};
+    for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++)
+        job->status[block] =
+            rounding_band_find(&job->c->scene, &job->c->run->settings, ray_image_origin(rays, i),
+                               rays->dir + 3 * i, &scratch, &job->in_band[i]);
+    band_scratch_free(&scratch);
+}
+
+/* Rays where rounding may change which Gaussians are blended, or their order. */
+static gbt_status find_band(grad_checker *c, bool *in_band, gbt_error *err)
+{
+    const size_t blocks = parallel_block_count(c->ray_count, RAY_GRAIN);
+    band_job job = {
+        .c = c, .in_band = in_band, .status = mem_calloc(blocks, sizeof *job.status, "check band", err)};
+    gbt_status status = job.status == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    if (status == GBT_OK)
+        parallel_blocks(c->ray_count, RAY_GRAIN, band_block, &job);
+    for (size_t block = 0; status == GBT_OK && block < blocks; block++)
+        if (job.status[block] != GBT_OK)
+            status = base_fail(err, job.status[block], "check-grad: no memory for the hits of a ray");
+    mem_free(job.status);
+    return status;
+}
+
+/* The same for splats, whose definition in double shows no hits: pixels on which it draws another colour. */
+static gbt_status find_other_colours(grad_checker *c, const raster_reference *splats,
+                                     const raster_settings *settings, bool *in_band, gbt_error *err)
+{
+    GBT_TRY(raster_reference_forward(splats, &c->frame->camera, settings, 1, c->rgb, err));
+    for (size_t i = 0; i < 3 * c->ray_count; i++)
+        in_band[i / 3] =
+            in_band[i / 3] || !(fabs(c->rgb[i] - (double)c->frame->rgb.pixels[i]) <= colour_limit);
+    return GBT_OK;
+}
+
+/* The adjoint in double of d_masked, by the renderer's definition. `wanted` [GAUSSIANS_FIELD_COUNT][count],
+   zero before. */
+static gbt_status renderer_in_double(grad_checker *c, const raster_reference *splats,
+                                     const raster_settings *settings, const double *d_rgb, double *wanted,
+                                     double d_background[3], gbt_error *err)
+{
+    if (c->frame->draw.renderer == GBT_RENDERER_RASTER)
+        return raster_reference_backward(splats, &c->frame->camera, settings, d_rgb, wanted, d_background,
+                                         err);
+    return reference_scene_backward(&c->scene, &c->run->settings, &c->frame->rays, d_rgb, NULL, wanted,
+                                    d_background, err);
+}
+
+static void print_renderer(grad_checker *c, const char *stage, const double *wanted, const float d_background[3],
+                           const double d_background_wanted[3])
+{
+    static const char *const names[] = {"mean", "scale", "rotation", "opacity", "colour"};
+    static const size_t first[] = {REFERENCE_mean_x,  REFERENCE_scale_x, REFERENCE_quat_w,
+                                   REFERENCE_opacity, REFERENCE_red,     GAUSSIANS_FIELD_COUNT};
+    const float *got[GAUSSIANS_FIELD_COUNT];
+    grad_fields_of(&c->d_gaussians, got);
+    for (size_t class = 0; class < sizeof names / sizeof *names; class ++) {
+        grad_difference d = {0};
+        for (size_t f = first[class]; f < first[class + 1]; f++)
+            for (size_t i = 0; i < c->scene.count; i++)
+                grad_difference_add(&d, (double)got[f][i], wanted[f * c->scene.count + i]);
+        grad_print_row(c, stage, names[class], grad_difference_relative(&d), renderer_limit);
+    }
+    grad_difference d = {0};
+    for (int k = 0; k < 3; k++)
+        grad_difference_add(&d, (double)d_background[k], d_background_wanted[k]);
+    grad_print_row(c, stage, "background", grad_difference_relative(&d), renderer_limit);
+}
+
+static gbt_status check_renderer(grad_checker *c, gbt_renderer renderer, const char *stage, gbt_error *err)
+{
+    frame *f = c->frame;
+    f->draw.renderer = renderer;
+    GBT_TRY(grad_render_at(c, c->view, c->width, err));
+    /* As frame.c draws splats: dilated where they have no footprint. */
+    raster_settings settings = frame_splat_settings(&c->run->settings, RASTER_EWA);
+    settings.dilation = f->widened ? 0 : settings.dilation;
+    const raster_reference splats = {c->scene.count, c->scene.fields};
+    bool *in_band = mem_calloc(c->ray_count, sizeof *in_band, "check rays", err);
+    double *d_rgb = mem_alloc(c->ray_count, 3 * sizeof *d_rgb, "check gradient", err);
+    double *wanted =
+        mem_calloc(c->scene.count, GAUSSIANS_FIELD_COUNT * sizeof *wanted, "check gradient", err);
+    double d_background_wanted[3] = {0};
+    float d_background[3];
+    size_t left_out = 0;
+    gbt_status status = in_band == NULL || d_rgb == NULL || wanted == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    if (status == GBT_OK)
+        status = renderer == GBT_RENDERER_RASTER ? find_other_colours(c, &splats, &settings, in_band, err)
+                                                 : find_band(c, in_band, err);
+    for (size_t i = 0; status == GBT_OK && i < 3 * c->ray_count; i++) {
+        left_out += i % 3 == 0 && in_band[i / 3];
+        c->d_masked.pixels[i] = in_band[i / 3] ? 0 : c->d_image.pixels[i];
+        d_rgb[i] = (double)c->d_masked.pixels[i];
+    }
+    if (status == GBT_OK)
+        status =
+            renderer == GBT_RENDERER_TRACE
+                ? trace_backward(&f->scene, &f->rays, &c->d_masked, &c->d_gaussians, c->weight, d_background,
+                                 err)
+                : raster_backward(&f->splats, &c->d_masked, &c->d_gaussians, c->weight, d_background, err);
+    if (status == GBT_OK)
+        status = renderer_in_double(c, &splats, &settings, d_rgb, wanted, d_background_wanted, err);
+    if (status == GBT_OK) {
+        print_renderer(c, stage, wanted, d_background, d_background_wanted);
+        fprintf(c->out, "%s: %zu of %zu rays are left out: rounding may change what they blend\n", stage,
+                left_out, c->ray_count);
+        if (10 * left_out > 9 * c->ray_count)
+            status = base_fail(err, GBT_ERR_INTERNAL,
+                               "check-grad: too few rays are left for the %s's gradients", stage);
+    }
+    mem_free(in_band);
+    mem_free(d_rgb);
+    mem_free(wanted);
+    return status;
+}
+
+gbt_status grad_check_renderers(grad_checker *c, gbt_renderer trained, gbt_error *err)
+{
+    if (raster_takes(&c->frame->camera))
+        GBT_TRY(check_renderer(c, GBT_RENDERER_RASTER, "rasterizer", err));
+    if (trained == GBT_RENDERER_PER_RAY)
+        GBT_TRY(check_renderer(c, GBT_RENDERER_PER_RAY, "per-ray", err));
+    return check_renderer(c, GBT_RENDERER_TRACE, "tracer", err);
+}

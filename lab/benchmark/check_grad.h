@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/check_grad.h -- what the parts of the gradient check share: the scene in float and in double, and the rows
-   that they print. */
+/* benchmark/check_grad.h -- what the parts of the gradient check share: the scene in float and in double, and
+   the rows that they print. */
 #ifndef GBT_BENCHMARK_CHECK_GRAD_H
 #define GBT_BENCHMARK_CHECK_GRAD_H
 
@@ -37,7 +37,8 @@ typedef struct grad_checker {
     size_t broken;
 } grad_checker;
 
-static inline void grad_print_row(grad_checker *c, const char *stage, const char *class, double error, double limit)
+static inline void grad_print_row(grad_checker *c, const char *stage, const char *class, double error,
+                                  double limit)
 {
     const bool fine = error <= limit; /* false for NaN */
     fprintf(c->out, "%-12s%-12s%12.1e%12.0e%s\n", stage, class, error, limit, fine ? "" : "  broken");
@@ -71,7 +72,8 @@ static inline void grad_fields_of(const gaussians *g, const float *fields[GAUSSI
 /** A small picture of a view, with the tape for its adjoint. */
 gbt_status grad_render_at(grad_checker *c, size_t view, int width, gbt_error *err);
 
-/** The view, its photo, and everything else that is allocated; free with grad_free(), also after a failure. */
+/** The view, its photo, and everything else that is allocated; free with grad_free(), also after a failure.
+ */
 gbt_status grad_set_up(grad_checker *c, gbt_error *err);
 void grad_free(grad_checker *c);
 

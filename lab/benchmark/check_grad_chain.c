@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/check_grad_chain.c -- the decoder's adjoint against the same in double, and the gradient of the training loss
-   against differences. */
+/* benchmark/check_grad_chain.c -- the decoder's adjoint against the same in double, and the gradient of the
+   training loss against differences. */
 #include <string.h>
 
 #include "base/fail.h"

@@ -74,8 +74,8 @@ static gbt_status renderer_in_double(grad_checker *c, const raster_reference *sp
                                     d_background, err);
 }
 
-static void print_renderer(grad_checker *c, const char *stage, const double *wanted, const float d_background[3],
-                           const double d_background_wanted[3])
+static void print_renderer(grad_checker *c, const char *stage, const double *wanted,
+                           const float d_background[3], const double d_background_wanted[3])
 {
     static const char *const names[] = {"mean", "scale", "rotation", "opacity", "colour"};
     static const size_t first[] = {REFERENCE_mean_x,  REFERENCE_scale_x, REFERENCE_quat_w,

@@ -18,7 +18,8 @@ static const json_t *find(const transforms_frame *s, const char *key)
 }
 
 /* A number when the key is there; `*found` says whether it is. */
-static gbt_status find_number(const transforms_frame *s, const char *key, double *out, bool *found, gbt_error *err)
+static gbt_status find_number(const transforms_frame *s, const char *key, double *out, bool *found,
+                              gbt_error *err)
 {
     const json_t *value = find(s, key);
     *found = value != NULL;
@@ -48,7 +49,8 @@ static gbt_status find_size(const transforms_frame *s, const char *key, int *out
 
 /* camera_angle_x or _y, radians, else x_fov or y_fov, degrees, to a focal length in pixels; 0 when neither is
    there. */
-static gbt_status focal_from_angle(const transforms_frame *s, char axis, int size, double *focal, gbt_error *err)
+static gbt_status focal_from_angle(const transforms_frame *s, char axis, int size, double *focal,
+                                   gbt_error *err)
 {
     double angle = 0;
     bool found;
@@ -109,7 +111,8 @@ static gbt_status find_kind(const transforms_frame *s, lens_kind *kind, bool *is
 enum { K1, K2, K3, K4, P1, P2, LENS_COUNT };
 
 /* k1 k2 k3 k4 p1 p2, from keys of their own or from distortion_params in this order; absent ones are 0. */
-static gbt_status find_distortion(const transforms_frame *s, double lens[LENS_COUNT], bool *any, gbt_error *err)
+static gbt_status find_distortion(const transforms_frame *s, double lens[LENS_COUNT], bool *any,
+                                  gbt_error *err)
 {
     static const char *const keys[LENS_COUNT] = {"k1", "k2", "k3", "k4", "p1", "p2"};
     *any = false;
@@ -130,8 +133,8 @@ static gbt_status find_distortion(const transforms_frame *s, double lens[LENS_CO
 }
 
 /* The focal lengths: fl_x and fl_y, else the angles; a missing y follows x. */
-static gbt_status find_focal(const transforms_frame *s, const gbt_camera *camera, double focal[2], raw_scene *out,
-                             gbt_error *err)
+static gbt_status find_focal(const transforms_frame *s, const gbt_camera *camera, double focal[2],
+                             raw_scene *out, gbt_error *err)
 {
     bool has_x, has_y;
     double from_angle[2];
@@ -151,7 +154,7 @@ static gbt_status find_focal(const transforms_frame *s, const gbt_camera *camera
 }
 
 gbt_status transforms_camera(const transforms_frame *s, const char *photo, gbt_camera *camera, raw_scene *out,
-                              gbt_error *err)
+                             gbt_error *err)
 {
     bool has_width, has_height, has_cx, has_cy, is_opencv, any;
     lens_kind kind = LENS_PERSPECTIVE;

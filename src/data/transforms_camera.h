@@ -15,12 +15,14 @@ typedef struct transforms_frame {
     size_t frame_index;
 } transforms_frame;
 
-static inline gbt_status transforms_fail(const transforms_frame *s, gbt_error *err, const char *text, const char *key)
+static inline gbt_status transforms_fail(const transforms_frame *s, gbt_error *err, const char *text,
+                                         const char *key)
 {
     return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: %s: %s", s->file->name, s->frame_index, key, text);
 }
 
-/** Size and lens; `photo` is asked for a size that the file does not say. Counts angles that do not fit in `out`. */
+/** Size and lens; `photo` is asked for a size that the file does not say. Counts angles that do not fit in
+ * `out`. */
 gbt_status transforms_camera(const transforms_frame *s, const char *photo, gbt_camera *camera, raw_scene *out,
                              gbt_error *err);
 

@@ -118,7 +118,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     }
     for (int i = 0; i < ANCHOR_SETS; i++)
         add_anchors(&w, anchor_set_names[i], sets[i]);
-    container_add(&w, "anchors.born", CONTAINER_U64, 1, &rows, t->born);
+    container_add(&w, "anchors.born", CONTAINER_U64, 1, &rows, t->created);
     for (int i = 0; i < ANCHOR_SETS; i++)
         container_add(&w, network_set_names[i], CONTAINER_F32, 1, &n, networks[i]);
     row_sections_add(&w, "stats", growth_stat_fields, GROWTH_STATS, rows, (size_t)t->stats.offset_count,
@@ -158,20 +158,20 @@ static gbt_status read_exposures(const container *c, exposures *e, gbt_error *er
 }
 
 /* Older checkpoints have none. */
-static gbt_status read_births(trainer *t, const container *c, const char *path, gbt_error *err)
+static gbt_status read_creation(trainer *t, const container *c, const char *path, gbt_error *err)
 {
     const size_t rows = t->anchors.count;
-    mem_free(t->born);
-    t->born = mem_calloc(rows, sizeof *t->born, "anchors", err);
-    if (t->born == NULL)
+    mem_free(t->created);
+    t->created = mem_calloc(rows, sizeof *t->created, "anchors", err);
+    if (t->created == NULL)
         return GBT_ERR_NO_MEMORY;
     if (container_section_named(c, "anchors.born") != NULL)
-        GBT_TRY(container_get(c, "anchors.born", CONTAINER_U64, rows, t->born, err));
+        GBT_TRY(container_get(c, "anchors.born", CONTAINER_U64, rows, t->created, err));
     for (size_t i = 0; i < rows; i++)
-        if (t->born[i] > t->anchor_t)
+        if (t->created[i] > t->anchor_t)
             return base_fail(err, GBT_ERR_FORMAT,
                              "%s: anchor %zu was made in step %llu (wanted at most %llu)", path, i,
-                             (unsigned long long)t->born[i], (unsigned long long)t->anchor_t);
+                             (unsigned long long)t->created[i], (unsigned long long)t->anchor_t);
     return GBT_OK;
 }
 
@@ -235,7 +235,7 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     t->skipped_steps = counters[3];
     t->pace.known = (int)counters[4];
     t->anchors_initial = counters[7];
-    return read_births(t, c, path, err);
+    return read_creation(t, c, path, err);
 }
 
 gbt_status checkpoint_load(trainer *t, const char *path, gbt_error *err)

@@ -32,18 +32,18 @@ bool growing_is_due(const trainer *t, double progress, double next)
     return floor(progress * ROUNDS_PER_RUN) != floor(next * ROUNDS_PER_RUN);
 }
 
-/* New rows come last, so the order by birth stays. */
-static gbt_status follow_births(trainer *t, const growth_result *result, gbt_error *err)
+/* New rows come last, so the order of creation stays. */
+static gbt_status follow_creation(trainer *t, const growth_result *result, gbt_error *err)
 {
-    uint64_t *born = mem_alloc(result->count, sizeof *born, "growth", err);
-    if (born == NULL)
+    uint64_t *created = mem_alloc(result->count, sizeof *created, "growth", err);
+    if (created == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < result->survivors; i++)
-        born[i] = t->born[result->source[i]];
+        created[i] = t->created[result->source[i]];
     for (size_t i = result->survivors; i < result->count; i++)
-        born[i] = t->rules.births_count ? t->anchor_t : 0;
-    mem_free(t->born);
-    t->born = born;
+        created[i] = t->rules.age_since_creation ? t->anchor_t : 0;
+    mem_free(t->created);
+    t->created = created;
     return GBT_OK;
 }
 
@@ -160,7 +160,7 @@ gbt_status growing_round(trainer *t, gbt_error *err)
     for (int i = 0; i < 3 && status == GBT_OK; i++)
         status = learnables_follow(kept[i], &result, err);
     if (status == GBT_OK)
-        status = follow_births(t, &result, err);
+        status = follow_creation(t, &result, err);
     mem_free(known.nearest);
     mem_free(known.scale);
     mem_free(result.source);

@@ -109,7 +109,7 @@ typedef struct anchor_job {
 static void learn_rows(const anchor_job *job, size_t begin, size_t end)
 {
     const learning_model *m = job->m;
-    const uint64_t age = job->age - m->born[begin];
+    const uint64_t age = job->age - m->created[begin];
     for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
         const rate_rule *rule = &anchor_rules[f];
         const size_t width = anchors_width(m->anchors, f), at = begin * width, count = (end - begin) * width;
@@ -126,9 +126,9 @@ static void learn_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
     const anchor_job *job = context;
-    const uint64_t *born = job->m->born;
+    const uint64_t *created = job->m->created;
     for (size_t i = begin, next; i < end; i = next) {
-        for (next = i + 1; next < end && born[next] == born[i];)
+        for (next = i + 1; next < end && created[next] == created[i];)
             next++;
         learn_rows(job, i, next);
     }

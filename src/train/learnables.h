@@ -43,7 +43,8 @@ learning_rates learning_rates_at(double progress, bool own, double extent, doubl
 /** A model in training: the values and what belongs to each. All borrowed. */
 typedef struct learning_model {
     anchors *anchors;
-    const uint64_t *born; /* [anchors->count], ascending: Adam steps of the anchors when this one was made */
+    const uint64_t *created; /* [anchors->count], ascending: Adam steps of the anchors when this one was made
+                              */
     decoder *decoder;
     learnables *gradient, *moment1, *moment2;
     float scale_log_min, scale_log_max; /* every log-scale is kept in here */

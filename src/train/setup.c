@@ -203,8 +203,8 @@ static gbt_status make_state(trainer *t, gbt_error *err)
     learnables *const kept[] = {&t->gradient, &t->moment1, &t->moment2};
     for (int i = 0; i < 3; i++)
         GBT_TRY(learnables_make(kept[i], t->anchors.count, &t->decoder, err));
-    t->born = mem_calloc(t->anchors.count, sizeof *t->born, "anchors", err);
-    if (t->born == NULL)
+    t->created = mem_calloc(t->anchors.count, sizeof *t->created, "anchors", err);
+    if (t->created == NULL)
         return GBT_ERR_NO_MEMORY;
     if (t->def.exposure)
         GBT_TRY(exposures_make(&t->exposures, t->train_count, err));

@@ -83,7 +83,7 @@ static gbt_renderer renderer_of_step(const trainer *t, const gbt_camera *camera,
 static learning_model model_of(trainer *t)
 {
     return (learning_model){.anchors = &t->anchors,
-                            .born = t->born,
+                            .created = t->created,
                             .decoder = &t->decoder,
                             .gradient = &t->gradient,
                             .moment1 = &t->moment1,
@@ -274,7 +274,7 @@ void trainer_free(trainer *t)
     learnables *const kept[] = {&t->gradient, &t->moment1, &t->moment2};
     for (int i = 0; i < 3; i++)
         learnables_free(kept[i]);
-    mem_free(t->born);
+    mem_free(t->created);
     decoder_free(&t->decoder);
     growth_stats_free(&t->stats);
     frame_free(&t->frame);

@@ -36,7 +36,7 @@ typedef struct trainer {
 
     /* What learns; its gradient and its Adam moments have the same shapes. */
     anchors anchors;
-    uint64_t *born; /* [anchors.count]: anchor_t when the anchor was made, ascending */
+    uint64_t *created; /* [anchors.count]: anchor_t when the anchor was made, ascending */
     decoder decoder;
     learnables gradient, moment1, moment2;
     growth_stats stats;

@@ -439,7 +439,7 @@ static size_t grown_in_the_open(bool looks_away)
     }
     size_t count = 0;
     for (size_t i = 0; i < t.anchors.count; i++)
-        count += t.born[i] > 0 && !is_at_point(&t, i);
+        count += t.created[i] > 0 && !is_at_point(&t, i);
     print_message("%zu of %zu anchors are new, and not at points\n", count, t.anchors.count);
     trainer_free(&t);
     return count;
@@ -462,11 +462,11 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     trainer t;
     open_from_few_balls(&t);
     step_report r;
-    while (t.round_step == 0 || t.born[t.anchors.count - 1] == 0)
+    while (t.round_step == 0 || t.created[t.anchors.count - 1] == 0)
         step_ok(&t, &r);
     const size_t n = t.anchors.count, k = (size_t)t.anchors.offset_count;
     size_t old = 0;
-    while (t.born[old] == 0)
+    while (t.created[old] == 0)
         old++;
     anchors before = {.offset_count = t.anchors.offset_count};
     assert_ok(anchors_resize(&before, n, NULL));

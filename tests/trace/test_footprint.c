@@ -121,7 +121,7 @@ static void test_limits(void **state)
         assert_true(fabs(*number_of(&held, i) - *number_of(&far, i)) <= 1e-14);
 }
 
-static const float variance = 0.3f;
+static const float checked_variance = 0.3f;
 
 static double loss_of(const footprint_view *view, double pixel_min, footprint_gaussian g,
                       const footprint_gaussian *weights)
@@ -132,7 +132,7 @@ static double loss_of(const footprint_view *view, double pixel_min, footprint_ga
         sqrt(g.quat[0] * g.quat[0] + g.quat[1] * g.quat[1] + g.quat[2] * g.quat[2] + g.quat[3] * g.quat[3]);
     for (int k = 0; k < 4; k++)
         g.quat[k] /= norm;
-    footprint_widen(view, (double)variance, pixel_min, &g);
+    footprint_widen(view, (double)checked_variance, pixel_min, &g);
     for (int i = 0; i < NUMBERS; i++)
         if (i < 6 || i >= 10)
             sum += *number_of(&g, i) * *number_of(&w, i);
@@ -155,7 +155,7 @@ static void test_adjoint(void **state)
         const double pixel_min = seed % 8 >= 4 ? (double)(float)(2 * footprint_pixel(&view, g.mean)) : 0;
         footprint_gaussian d = weights;
         memset(d.quat, 0, sizeof d.quat);
-        assert_ok(footprint_adjoint(&view, variance, (float)pixel_min, &g, &d));
+        assert_ok(footprint_adjoint(&view, checked_variance, (float)pixel_min, &g, &d));
         double worst = 0, largest = 0;
         for (int i = 0; i < NUMBERS; i++) {
             const double h = 1e-6;

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "anchor/decode_ref.h"
+#include "reference/decode_ref.h"
 #include "run/loaded_run.h"
 #include "trace/reference.h"
 #include "train/loss.h"

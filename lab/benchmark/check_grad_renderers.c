@@ -6,7 +6,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "benchmark/check_grad.h"
-#include "raster/raster_ref.h"
+#include "reference/raster_ref.h"
 #include "trace/rounding_band.h"
 
 enum { RAY_GRAIN = 16 };

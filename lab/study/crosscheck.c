@@ -14,7 +14,7 @@
 #include "benchmark/bench_scene.h"
 #include "lab/lab.h"
 #include "raster/raster.h"
-#include "raster/raster_ref.h"
+#include "reference/raster_ref.h"
 #include "study/model.h"
 #include "trace/rounding_band.h"
 #include "trace/trace.h"

@@ -3,7 +3,7 @@
    differences, and the edges. */
 #include "fixture.h"
 
-#include "anchor/decode_ref.h"
+#include "reference/decode_ref.h"
 #include "base/cpu.h"
 #include "base/parallel.h"
 

@@ -6,7 +6,7 @@
 
 #include "test_support.h"
 
-#include "anchor/decode_ref.h"
+#include "reference/decode_ref.h"
 #include "base/memory.h"
 #include "base/vec.h"
 #include "data/gaussian_cloud.h"

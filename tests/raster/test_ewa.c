@@ -3,7 +3,7 @@
    against differences. */
 #include "base/near.h"
 #include "base/parallel.h"
-#include "raster/raster_ref.h"
+#include "reference/raster_ref.h"
 #include "raster/raster_support.h"
 
 static const cloud_def clouds[] = {

@@ -2,7 +2,7 @@
 /* tests/train/test_chain.c -- the training loss as a function of the anchors and networks: its gradient in
    double against differences, and the float32 chain (frame_render, train/loss.h, the adjoint) against the
    gradient in double. */
-#include "anchor/decode_ref.h"
+#include "reference/decode_ref.h"
 #include "anchor/fixture.h"
 #include "base/near.h"
 #include "base/parallel.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* raster/raster_ref.c -- splatting in double and without any cleverness. The equations are in the header. */
-#include "raster/raster_ref.h"
+/* reference/raster_ref.c -- splatting in double and without any cleverness. The equations are in the header.
+ */
+#include "reference/raster_ref.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* raster/raster_ref.h -- the EWA form in double, every Gaussian against every pixel, and its adjoint: what
+/* reference/raster_ref.h -- the EWA form in double, every Gaussian against every pixel, and its adjoint: what
    raster.h is tested against (Kerbl 2023, eqs 5, 6).
 
    Per Gaussian with mean mu, Sigma = R S^2 R^T, opacity o, and a camera (rotation W, centre c, focal lengths,
@@ -14,8 +14,8 @@
    drawn in the tiles of 16 x 16 pixels that centre +- ceil(3 sqrt(largest eigenvalue of C)) touches (or
    everywhere: exact_cut), where alpha >= alpha_min. Blended in the order of (t_z, index), stopped before T <
    transmittance_min; the background last. */
-#ifndef GBT_RASTER_RASTER_REF_H
-#define GBT_RASTER_RASTER_REF_H
+#ifndef GBT_REFERENCE_RASTER_REF_H
+#define GBT_REFERENCE_RASTER_REF_H
 
 #include "raster/raster.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/decode_ref.c -- the decoder in double, written from the equations (Yang 2026, eqs 13-15) without
+/* reference/decode_ref.c -- the decoder in double, written from the equations (Yang 2026, eqs 13-15) without
    any regard for speed. */
-#include "anchor/decode_ref.h"
+#include "reference/decode_ref.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/decode_ref.h -- the decoder and its adjoint once more, in double and plain loops: what decode.c is
-   tested against. */
-#ifndef GBT_ANCHOR_DECODE_REF_H
-#define GBT_ANCHOR_DECODE_REF_H
+/* reference/decode_ref.h -- the decoder and its adjoint once more, in double and plain loops: what decode.c
+   is tested against. */
+#ifndef GBT_REFERENCE_DECODE_REF_H
+#define GBT_REFERENCE_DECODE_REF_H
 
 #include "anchor/anchors.h"
 

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "scenes/place.h"
 #include "scenes/recipe.h"
 #include "scenes/texture.h"
 
@@ -31,13 +32,6 @@ enum {
 };
 
 static const float dome_radius = 95;
-
-static void set(float out[3], float r, float g, float b)
-{
-    out[0] = r;
-    out[1] = g;
-    out[2] = b;
-}
 
 static void look_at_square(const surface *s, look *l)
 {
@@ -215,19 +209,6 @@ static void look_at_square(const surface *s, look *l)
         break;
     }
     }
-}
-
-static void box(world *w, int material, int variant, float x, float y, float z, float half_x, float half_y,
-                float half_z, float cell)
-{
-    world_box(w, material, variant, (const float[3]){x, y, z}, (const float[3]){half_x, half_y, half_z},
-              cell);
-}
-
-static void tube(world *w, int material, float ax, float ay, float az, float bx, float by, float bz,
-                 float radius)
-{
-    world_tube(w, material, 0, (const float[3]){ax, ay, az}, (const float[3]){bx, by, bz}, radius, 8);
 }
 
 /** A house front in the current frame: its wall stands at y = distance, from x0 to x1, and looks towards the

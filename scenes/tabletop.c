@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "scenes/place.h"
 #include "scenes/recipe.h"
 #include "scenes/texture.h"
 
@@ -37,13 +38,6 @@ enum {
 
 static const float room = 2.7f, room_height = 2.7f,
                    top = 0.76f; /* half the room's side; its height; the table's surface */
-
-static void set(float out[3], float r, float g, float b)
-{
-    out[0] = r;
-    out[1] = g;
-    out[2] = b;
-}
 
 static float between(float value, float low, float high) { return value >= low && value < high; }
 
@@ -323,19 +317,6 @@ static void look_at_room(const surface *s, look *l)
         l->shininess = 80;
         break;
     }
-}
-
-static void box(world *w, int material, int variant, float x, float y, float z, float half_x, float half_y,
-                float half_z, float cell)
-{
-    world_box(w, material, variant, (const float[3]){x, y, z}, (const float[3]){half_x, half_y, half_z},
-              cell);
-}
-
-static void tube(world *w, int material, float ax, float ay, float az, float bx, float by, float bz,
-                 float radius)
-{
-    world_tube(w, material, 0, (const float[3]){ax, ay, az}, (const float[3]){bx, by, bz}, radius, 8);
 }
 
 /** A leaf: a strip of `width` that rises from the origin towards `angle` and bends over. */

@@ -88,7 +88,7 @@ static inline void colmap_to_text(const char *folder)
     } parts[] = {
         {"cameras", colmap_copy_camera}, {"images", colmap_copy_image}, {"points3D", colmap_copy_point}};
     for (int i = 0; i < 3; i++) {
-        char path[8192];
+        char path[16384];
         colmap_bytes f = {0};
         size_t size;
         uint64_t count;

@@ -288,7 +288,10 @@ gbt_status stability_a3(stability *s)
     stability_check(s, "A3b", known_poses(s, &d, &g, &settings), NAN,
                     "0.9 in front and at the centre, 0.9 exp(-1/8) = 0.7942 half a std-dev behind it and on "
                     "rays across.");
-    for (cpu_isa isa = CPU_PLAIN; isa < best; isa++, isas++) {
+    for (cpu_isa isa = CPU_PLAIN; isa < best; isa++) {
+        if (!cpu_has_isa(isa))
+            continue;
+        isas++;
         cpu_limit_isa(isa);
         walk_through(s, &d, &g, &settings, steps, other);
         for (size_t i = 0; i <= steps; i++)

@@ -391,7 +391,6 @@ static uint64_t hash_of_run(stability *s, const practice *p, const gbt_train_def
 
 gbt_status stability_a18(stability *s)
 {
-    static const cpu_isa isas[] = {CPU_PLAIN, CPU_AVX2, CPU_AVX512};
     double threads[8];
     const size_t thread_count = stability_list(s, "threads", 8, threads);
     const int repeats = (int)stability_number(s, "repeats"), threads_before = parallel_threads();
@@ -408,8 +407,10 @@ gbt_status stability_a18(stability *s)
             by_threads += hash_of_run(s, p, &def) != first;
         }
     parallel_set_threads(threads_before);
-    for (int i = 0; i < 3 && s->status == GBT_OK; i++) {
-        cpu_limit_isa(isas[i]);
+    for (cpu_isa isa = CPU_PLAIN; isa < CPU_ISA_COUNT && s->status == GBT_OK; isa++) {
+        if (!cpu_has_isa(isa))
+            continue;
+        cpu_limit_isa(isa);
         by_isa += hash_of_run(s, p, &def) != first;
     }
     cpu_limit_isa(isa_before);

@@ -52,6 +52,7 @@ static const speed_step steps[] = {
     {KNOB_KERNEL, "tile", 0, TRACE_TILE},
     {KNOB_KERNEL, "list", 0, TRACE_LIST},
     {KNOB_ISA, "plain", 0, CPU_PLAIN},
+    {KNOB_ISA, "neon", 0, CPU_NEON},
     {KNOB_ISA, "avx2", 0, CPU_AVX2},
     {KNOB_ISA, "avx512", 0, CPU_AVX512},
     {KNOB_RENDERER, "rays", 0, -1},
@@ -64,7 +65,7 @@ static void list_rows(const trace_settings *own, speed_model *out)
     const cpu_isa best = cpu_best_isa();
     for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
         const speed_step *s = &steps[i];
-        if (s->knob == KNOB_ISA && s->choice > (int)best)
+        if (s->knob == KNOB_ISA && (s->choice > (int)best || !cpu_has_isa((cpu_isa)s->choice)))
             continue;
         speed_row *row = &out->rows[out->row_count++];
         *row = (speed_row){

@@ -2,13 +2,15 @@
 /* anchor/dense.h -- the arithmetic of the decoder that is worth vector instructions: one matrix product and
    the activations.
 
-   Three implementations (plain C, AVX2, AVX-512) give the same bits: every sum is a chain of fused
+   The implementations (plain C, NEON, AVX2, AVX-512) give the same bits: every sum is a chain of fused
    multiply-adds in the order of k. */
 #ifndef GBT_ANCHOR_DENSE_H
 #define GBT_ANCHOR_DENSE_H
 
 #include <stdbool.h>
 #include <stddef.h>
+
+#include "base/cpu.h"
 
 enum { DENSE_COLUMNS = 16 /* n is a multiple of it */ };
 
@@ -36,7 +38,7 @@ typedef struct dense_kernels {
     void (*normalize)(float *w, float *x, float *y, float *z, float *inverse_length, size_t count);
 } dense_kernels;
 
-extern const dense_kernels dense_kernels_plain, dense_kernels_avx2, dense_kernels_avx512;
+CPU_DECLARE_VARIANTS(dense_kernels, dense_kernels);
 
 /** The implementation for cpu_best_isa(). */
 const dense_kernels *dense_best(void);

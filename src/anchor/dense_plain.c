@@ -22,12 +22,5 @@ const dense_kernels dense_kernels_plain = {dense_multiply, dense_exp, dense_tanh
 
 const dense_kernels *dense_best(void)
 {
-#if defined(__x86_64__)
-    const cpu_isa isa = cpu_best_isa();
-    if (isa == CPU_AVX512)
-        return &dense_kernels_avx512;
-    if (isa == CPU_AVX2)
-        return &dense_kernels_avx2;
-#endif
-    return &dense_kernels_plain;
+    return CPU_VARIANT(dense_kernels, cpu_best_isa());
 }

@@ -5,8 +5,8 @@
 
 /** Before a function. The project compiles without contraction (no fused operations), so every clone gives
     the same bits. None under ThreadSanitizer, which is not up yet when the loader picks, nor with clang,
-   which cannot pass vectors between clones. */
-#if defined(__SANITIZE_THREAD__) || defined(__clang__)
+   which cannot pass vectors between clones, nor where the compiler's own instruction set is all there is. */
+#if defined(__SANITIZE_THREAD__) || defined(__clang__) || !defined(__x86_64__)
 #define FASTEST_CLONE
 #else
 #define FASTEST_CLONE __attribute__((target_clones("avx512f", "avx2", "default")))

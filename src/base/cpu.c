@@ -3,48 +3,55 @@
 #include "base/cpu.h"
 
 #include <stdio.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const names[] = {"plain", "avx2", "avx512"};
+static const char *const names[CPU_ISA_COUNT] = {"plain", "neon", "avx2", "avx512"};
 static int chosen = -1;
 
-static cpu_isa detect(void)
+bool cpu_has_isa(cpu_isa isa)
 {
+#if defined(__x86_64__)
     __builtin_cpu_init();
-    cpu_isa best = CPU_PLAIN;
 #ifdef __clang__ /* does not know the name f16c; no processor has AVX2 without it */
     const bool halves = true;
 #else
     const bool halves = __builtin_cpu_supports("f16c");
 #endif
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && halves)
-        best = CPU_AVX2;
-    if (best == CPU_AVX2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-        __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
-        best = CPU_AVX512;
-    return best;
+    const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && halves;
+    if (isa == CPU_AVX512)
+        return avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+               __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+    return isa == CPU_PLAIN || (isa == CPU_AVX2 && avx2);
+#elif defined(__aarch64__)
+    return isa == CPU_PLAIN || isa == CPU_NEON;
+#else
+    return isa == CPU_PLAIN;
+#endif
+}
+
+/* The widest that is there and no wider than `isa`. */
+static cpu_isa within(cpu_isa isa)
+{
+    while (!cpu_has_isa(isa))
+        isa--;
+    return isa;
 }
 
 cpu_isa cpu_best_isa(void)
 {
-    if (chosen >= 0)
-        return (cpu_isa)chosen;
-    cpu_isa best = detect();
-    const char *wanted = getenv("GBT_ISA");
-    for (int i = 0; wanted != NULL && i < (int)best; i++)
-        if (strcmp(wanted, names[i]) == 0)
-            best = (cpu_isa)i;
-    chosen = (int)best;
-    return best;
+    if (chosen < 0) {
+        cpu_isa most = CPU_AVX512;
+        const char *wanted = getenv("GBT_ISA");
+        for (int i = 0; wanted != NULL && i < CPU_ISA_COUNT; i++)
+            if (strcmp(wanted, names[i]) == 0)
+                most = (cpu_isa)i;
+        chosen = (int)within(most);
+    }
+    return (cpu_isa)chosen;
 }
 
-void cpu_limit_isa(cpu_isa isa)
-{
-    const cpu_isa best = detect();
-    chosen = (int)(isa < best ? isa : best);
-}
+void cpu_limit_isa(cpu_isa isa) { chosen = (int)within(isa); }
 
 const char *cpu_isa_name(cpu_isa isa) { return names[isa]; }
 

@@ -50,14 +50,12 @@ static const char *configuration(void)
 {
     /* GBT_ISA holds the kernels of others too: a run that must not use wide vectors does not get them from
        here. */
-    switch (cpu_best_isa()) {
-    case CPU_PLAIN:
+#if defined(__x86_64__)
+    if (cpu_best_isa() == CPU_PLAIN)
         return "max_isa=sse4.2";
-    case CPU_AVX2:
+    if (cpu_best_isa() == CPU_AVX2)
         return "max_isa=avx2";
-    case CPU_AVX512:
-        break;
-    }
+#endif
     return NULL;
 }
 

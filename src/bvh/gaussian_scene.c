@@ -83,9 +83,6 @@ CROSSING_VARIANT(plain, )
 #if defined(__x86_64__)
 CROSSING_VARIANT(avx2, __attribute__((target("avx2"))))
 CROSSING_VARIANT(avx512, __attribute__((target("avx512f,avx512dq,avx512vl,prefer-vector-width=512"))))
-#else
-#define crossing_lanes_avx2 crossing_lanes_plain
-#define crossing_lanes_avx512 crossing_lanes_plain
 #endif
 
 /* Writes nothing to the rays: to Embree every box is missed, and it goes on to the next. */
@@ -203,13 +200,9 @@ void gaussian_scene_visit(const gaussian_scene *scene, const float origin[3][SCE
     const content *c = scene->internal;
     struct RTCRayHit16 rays;
     _Alignas(64) int valid[SCENE_LANES] = {0};
-    static unsigned (*const variants[])(const packet *, const struct RTCBuildPrimitive *) = {
-        [CPU_PLAIN] = crossing_lanes_plain,
-        [CPU_AVX2] = crossing_lanes_avx2,
-        [CPU_AVX512] = crossing_lanes_avx512};
     packet p = {.box = c->boxes.box,
                 .rays = &rays,
-                .crossing_lanes = variants[cpu_best_isa()],
+                .crossing_lanes = CPU_CLONE(crossing_lanes, cpu_best_isa()),
                 .visit = visit,
                 .user = user};
     bool some = false;

@@ -268,11 +268,12 @@ BODY void from_lanes_body(const float *lanes, size_t count, float *pixels)
                                                gradient_##isa};
 
 LOSS_VARIANT(plain, )
+#if defined(__x86_64__)
 LOSS_VARIANT(avx2, __attribute__((target("avx2,fma"))))
 LOSS_VARIANT(avx512, __attribute__((target("fma,avx512f,avx512dq,avx512vl,prefer-vector-width=512"))))
+#endif
 
 const loss_kernels *loss_kernels_best(void)
 {
-    static const loss_kernels *const kernels[] = {&kernels_plain, &kernels_avx2, &kernels_avx512};
-    return kernels[cpu_best_isa()];
+    return CPU_CLONE(kernels, cpu_best_isa());
 }

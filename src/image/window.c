@@ -84,13 +84,14 @@ BODY void map_body(const double *const in[WINDOW_MOMENTS], size_t count, size_t 
     static const window_kernels kernels_##isa = {moments_##isa, map_##isa};
 
 WINDOW_VARIANT(plain, )
+#if defined(__x86_64__)
 WINDOW_VARIANT(avx2, __attribute__((target("avx2"))))
 WINDOW_VARIANT(avx512, __attribute__((target("avx512f,avx512dq,avx512vl,prefer-vector-width=512"))))
+#endif
 
 const window_kernels *window_kernels_best(void)
 {
-    static const window_kernels *const kernels[] = {&kernels_plain, &kernels_avx2, &kernels_avx512};
-    return kernels[cpu_best_isa()];
+    return CPU_CLONE(kernels, cpu_best_isa());
 }
 
 void window_rows(const float *pixels, size_t count, size_t height, size_t row, const float *zeros,

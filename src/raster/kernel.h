@@ -6,6 +6,7 @@
 #ifndef GBT_RASTER_KERNEL_H
 #define GBT_RASTER_KERNEL_H
 
+#include "base/cpu.h"
 #include "base/memory.h"
 #include "raster/raster.h"
 
@@ -122,6 +123,6 @@ typedef struct raster_kernel {
     bool (*backward[2])(tile_job *job, ray_scratch *scratch);
 } raster_kernel;
 
-extern const raster_kernel raster_kernel_plain, raster_kernel_avx2, raster_kernel_avx512;
+CPU_DECLARE_VARIANTS(raster_kernel, raster_kernel);
 
 #endif

@@ -43,9 +43,7 @@ raster_settings raster_settings_default(void)
 
 static const raster_kernel *kernel_for(cpu_isa isa)
 {
-    static const raster_kernel *const kernels[] = {&raster_kernel_plain, &raster_kernel_avx2,
-                                                   &raster_kernel_avx512};
-    return kernels[isa];
+    return CPU_VARIANT(raster_kernel, isa);
 }
 
 static size_t tile_count_of(const raster_view *view)

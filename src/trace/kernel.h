@@ -10,6 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/cpu.h"
 #include "base/memory.h"
 #include "bvh/gaussian_tree.h"
 #include "trace/settings.h"
@@ -163,6 +164,6 @@ typedef struct tile_kernel {
     tile_backward_fn *backward;
 } tile_kernel;
 
-extern const tile_kernel tile_kernel_plain, tile_kernel_avx2, tile_kernel_avx512;
+CPU_DECLARE_VARIANTS(tile_kernel, tile_kernel);
 
 #endif

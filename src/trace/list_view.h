@@ -11,6 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/cpu.h"
 #include "base/gaussians.h"
 #include "trace/kernel.h"
 
@@ -155,6 +156,6 @@ typedef struct list_kernel {
                       gradient_record *out);
 } list_kernel;
 
-extern const list_kernel list_kernel_plain, list_kernel_avx2, list_kernel_avx512;
+CPU_DECLARE_VARIANTS(list_kernel, list_kernel);
 
 #endif

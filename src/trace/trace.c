@@ -26,28 +26,12 @@ typedef struct trace_tile {
 
 static const tile_kernel *kernel_for(cpu_isa isa)
 {
-    switch (isa) {
-    case CPU_AVX512:
-        return &tile_kernel_avx512;
-    case CPU_AVX2:
-        return &tile_kernel_avx2;
-    case CPU_PLAIN:
-        break;
-    }
-    return &tile_kernel_plain;
+    return CPU_VARIANT(tile_kernel, isa);
 }
 
 static const list_kernel *list_kernel_for(cpu_isa isa)
 {
-    switch (isa) {
-    case CPU_AVX512:
-        return &list_kernel_avx512;
-    case CPU_AVX2:
-        return &list_kernel_avx2;
-    case CPU_PLAIN:
-        break;
-    }
-    return &list_kernel_plain;
+    return CPU_VARIANT(list_kernel, isa);
 }
 
 /* ---- build ---- */

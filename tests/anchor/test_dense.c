@@ -7,11 +7,7 @@
 #include "anchor/dense.h"
 #include "base/cpu.h"
 
-static const dense_kernels *kernels_of(int isa)
-{
-    const dense_kernels *const all[3] = {&dense_kernels_plain, &dense_kernels_avx2, &dense_kernels_avx512};
-    return all[isa];
-}
+static const dense_kernels *kernels_of(int isa) { return CPU_VARIANT(dense_kernels, isa); }
 
 /* Distance in units of the last place of `want`. */
 static double ulps(float got, double want)
@@ -65,7 +61,7 @@ static void products(void **state)
     (void)state;
     const size_t ms[] = {1, 2, 3, 4, 5, 9, 10, 13, 23, 30}, ns[] = {16, 32, 48, 80}, ks[] = {0, 1, 7, 36};
     enum { SIZE = 80 * 80 };
-    static float a[SIZE], b[SIZE], start[SIZE], got[3][SIZE];
+    static float a[SIZE], b[SIZE], start[SIZE], got[CPU_ISA_COUNT][SIZE];
     for (size_t i = 0; i < SIZE; i++) {
         a[i] = spread(1, 0, i, -1, 1);
         b[i] = spread(1, 1, i, -1, 1);
@@ -139,7 +135,7 @@ static void elementwise_same_bits(void **state)
 {
     (void)state;
     enum { COUNT = 1003 };
-    static float x[5][COUNT], got[3][5][COUNT];
+    static float x[5][COUNT], got[CPU_ISA_COUNT][5][COUNT];
     const float special[] = {0.0f,    -0.0f, INFINITY, -INFINITY, NAN,    1e-30f,
                              -1e-30f, 3e38f, -3e38f,   30.0f,     -30.0f, 1e-41f};
     for (int row = 0; row < 5; row++)

@@ -491,6 +491,12 @@ static void instruction_sets_only_go_down(void **state)
     cpu_limit_isa(CPU_AVX512);
     assert_true(cpu_best_isa() <= best);
     assert_string_equal(cpu_isa_name(CPU_PLAIN), "plain");
+    for (cpu_isa isa = CPU_PLAIN; isa < CPU_ISA_COUNT; isa++) {
+        cpu_limit_isa(isa);
+        assert_true(cpu_has_isa(cpu_best_isa()) && cpu_best_isa() <= isa);
+        assert_true(cpu_best_isa() == isa || !cpu_has_isa(isa));
+    }
+    assert_string_equal(cpu_isa_name(CPU_NEON), "neon");
     assert_string_equal(cpu_isa_name(CPU_AVX2), "avx2");
     assert_string_equal(cpu_isa_name(CPU_AVX512), "avx512");
 }

@@ -324,7 +324,6 @@ static void threads_and_instruction_sets_give_the_same_bits(void **state)
 {
     (void)state;
     const cloud_def def = {"bits", 9000, 1.5f, 0.02f, 0.3f, 5, {1, 0.5, -4}, 100, 70};
-    static const cpu_isa isas[] = {CPU_PLAIN, CPU_AVX2, CPU_AVX512};
     const int threads = parallel_threads();
     gaussians g = make_cloud(&def, 11);
     const gbt_camera camera = make_camera(def.width, def.height, def.camera);
@@ -340,8 +339,8 @@ static void threads_and_instruction_sets_give_the_same_bits(void **state)
             drawn_free(&other);
         }
         parallel_set_threads(threads);
-        for (size_t i = 0; i < sizeof isas / sizeof *isas; i++) {
-            cpu_limit_isa(isas[i]);
+        for (cpu_isa isa = CPU_PLAIN; isa <= CPU_AVX512; isa++) {
+            cpu_limit_isa(isa);
             drawn other = draw(&g, &camera, &s, &d_rgb);
             assert_same(cpu_isa_name(cpu_best_isa()), &other, &first);
             drawn_free(&other);

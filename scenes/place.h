@@ -12,15 +12,15 @@ static inline void set(float out[3], float r, float g, float b)
     out[2] = b;
 }
 
-static inline void box(world *w, int material, int variant, float x, float y, float z, float half_x, float half_y,
-                float half_z, float cell)
+static inline void box(world *w, int material, int variant, float x, float y, float z, float half_x,
+                       float half_y, float half_z, float cell)
 {
     world_box(w, material, variant, (const float[3]){x, y, z}, (const float[3]){half_x, half_y, half_z},
               cell);
 }
 
 static inline void tube(world *w, int material, float ax, float ay, float az, float bx, float by, float bz,
-                 float radius)
+                        float radius)
 {
     world_tube(w, material, 0, (const float[3]){ax, ay, az}, (const float[3]){bx, by, bz}, radius, 8);
 }

@@ -41,7 +41,7 @@ static gbt_status follow_creation(trainer *t, const growth_result *result, gbt_e
     for (size_t i = 0; i < result->survivors; i++)
         created[i] = t->created[result->source[i]];
     for (size_t i = result->survivors; i < result->count; i++)
-        created[i] = t->rules.age_since_creation ? t->anchor_t : 0;
+        created[i] = t->rules.own_adam_age ? t->anchor_t : 0;
     mem_free(t->created);
     t->created = created;
     return GBT_OK;

@@ -28,7 +28,7 @@ static train_rules own_rules(const gbt_train_def *def)
         .own_rates = true,
         .anchors_learn_when_adjusted = true,
         .importance = GROWTH_BY_SHARE,
-        .age_since_creation = true,
+        .own_adam_age = true,
         .rounds_by_progress = true,
         .thresholds_by_length = true,
         .grows_at_points = true,

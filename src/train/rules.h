@@ -34,16 +34,16 @@ typedef struct train_rules {
 
     /* growing and pruning */
     growth_importance importance; /* by which anchors are pruned */
-    bool age_since_creation; /* Adam's age of an anchor counts from its creation; else from the run's start */
-    bool rounds_by_progress; /* 100 rounds a run; else every 100 steps */
-    bool thresholds_by_length; /* of growing and pruning: schedule_threshold_factor() and the settings'
-                                  factors */
-    bool grows_at_points;      /* sparse points are candidates too */
-    bool needs_two_views;      /* new anchors stand where two training photos look */
-    bool integer_division;     /* of cell sizes and thresholds of levels: 4 / 16 is 0 */
-    bool coarse_level_gates;   /* a level that adds nothing ends the search */
-    bool at_cell_center;       /* new anchors stand in the middle of their cell; else at the candidate */
-    float shape_log_max;       /* scale_log[3..5] are cut to this in a round */
+    bool own_adam_age;            /* Adam's age of an anchor is from its start; else from the run's start */
+    bool rounds_by_progress;      /* 100 rounds a run; else every 100 steps */
+    bool thresholds_by_length;    /* of growing and pruning: schedule_threshold_factor() and the settings'
+                                     factors */
+    bool grows_at_points;         /* sparse points are candidates too */
+    bool needs_two_views;         /* new anchors stand where two training photos look */
+    bool integer_division;        /* of cell sizes and thresholds of levels: 4 / 16 is 0 */
+    bool coarse_level_gates;      /* a level that adds nothing ends the search */
+    bool at_cell_center;          /* new anchors stand in the middle of their cell; else at the candidate */
+    float shape_log_max;          /* scale_log[3..5] are cut to this in a round */
 } train_rules;
 
 /** The rules for these settings: ours, or with `compat` all of the reference. */

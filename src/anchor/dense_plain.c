@@ -20,7 +20,4 @@ static void dense_multiply(const dense_product *job)
 const dense_kernels dense_kernels_plain = {dense_multiply, dense_exp, dense_tanh, dense_sigmoid,
                                            dense_normalize};
 
-const dense_kernels *dense_best(void)
-{
-    return CPU_VARIANT(dense_kernels, cpu_best_isa());
-}
+const dense_kernels *dense_best(void) { return CPU_VARIANT(dense_kernels, cpu_best_isa()); }

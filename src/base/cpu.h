@@ -11,8 +11,8 @@
 typedef enum cpu_isa { CPU_PLAIN, CPU_NEON, CPU_AVX2, CPU_AVX512, CPU_ISA_COUNT } cpu_isa;
 
 /* For a kernel that is compiled once per instruction set as NAME_plain, NAME_avx2, ... (gbt_kernels in
-   CMakeLists.txt): CPU_DECLARE_VARIANTS declares them, CPU_VARIANT points to the one for `isa`. CPU_CLONE does
-   so where one C source is compiled with several options, which on ARM are the compiler's own. */
+   CMakeLists.txt): CPU_DECLARE_VARIANTS declares them, CPU_VARIANT points to the one for `isa`. CPU_CLONE
+   does so where one C source is compiled with several options, which on ARM are the compiler's own. */
 #if defined(__x86_64__)
 #define CPU_DECLARE_VARIANTS(type, name) extern const type name##_plain, name##_avx2, name##_avx512
 #define CPU_VARIANT(name, isa)                                                                               \

@@ -72,7 +72,8 @@ static void check_processor(gbt_diagnosis *d, const machine *m)
         advise(c, GBT_CHECK_WARN, "GBT_ISA=%.20s holds the kernels back: unset it", wanted);
     else if (isa == CPU_PLAIN)
         advise(c, GBT_CHECK_WARN,
-               "without NEON, or AVX2, FMA and F16C, everything is several times slower; the results are the same");
+               "without NEON, or AVX2, FMA and F16C, everything is several times slower; the results are the "
+               "same");
 }
 
 static void check_threads(gbt_diagnosis *d, const machine *m)

@@ -273,7 +273,4 @@ LOSS_VARIANT(avx2, __attribute__((target("avx2,fma"))))
 LOSS_VARIANT(avx512, __attribute__((target("fma,avx512f,avx512dq,avx512vl,prefer-vector-width=512"))))
 #endif
 
-const loss_kernels *loss_kernels_best(void)
-{
-    return CPU_CLONE(kernels, cpu_best_isa());
-}
+const loss_kernels *loss_kernels_best(void) { return CPU_CLONE(kernels, cpu_best_isa()); }

@@ -89,10 +89,7 @@ WINDOW_VARIANT(avx2, __attribute__((target("avx2"))))
 WINDOW_VARIANT(avx512, __attribute__((target("avx512f,avx512dq,avx512vl,prefer-vector-width=512"))))
 #endif
 
-const window_kernels *window_kernels_best(void)
-{
-    return CPU_CLONE(kernels, cpu_best_isa());
-}
+const window_kernels *window_kernels_best(void) { return CPU_CLONE(kernels, cpu_best_isa()); }
 
 void window_rows(const float *pixels, size_t count, size_t height, size_t row, const float *zeros,
                  const float *rows[WINDOW_TAPS])

@@ -41,10 +41,7 @@ raster_settings raster_settings_default(void)
                              .dilation = 0.3f};
 }
 
-static const raster_kernel *kernel_for(cpu_isa isa)
-{
-    return CPU_VARIANT(raster_kernel, isa);
-}
+static const raster_kernel *kernel_for(cpu_isa isa) { return CPU_VARIANT(raster_kernel, isa); }
 
 static size_t tile_count_of(const raster_view *view)
 {

@@ -24,15 +24,9 @@ typedef struct trace_tile {
     float d_background[3];
 } trace_tile;
 
-static const tile_kernel *kernel_for(cpu_isa isa)
-{
-    return CPU_VARIANT(tile_kernel, isa);
-}
+static const tile_kernel *kernel_for(cpu_isa isa) { return CPU_VARIANT(tile_kernel, isa); }
 
-static const list_kernel *list_kernel_for(cpu_isa isa)
-{
-    return CPU_VARIANT(list_kernel, isa);
-}
+static const list_kernel *list_kernel_for(cpu_isa isa) { return CPU_VARIANT(list_kernel, isa); }
 
 /* ---- build ---- */
 

@@ -25,7 +25,7 @@ const char *query_engine_name(query_engine engine)
 
 lab_bench_query_def lab_bench_query_def_default(void)
 {
-    return (lab_bench_query_def){.points = 1000000, .queries = 100000};
+    return (lab_bench_query_def){.points = 1000000, .queries = 20000};
 }
 
 /* ---- clouds ---- */
@@ -157,7 +157,7 @@ static gbt_status measure_ours(query_bench *b, test *t, gbt_error *err)
 
 static gbt_status measure_flann(query_bench *b, test *t, bool exact, gbt_error *err)
 {
-    static const int few[] = {16, 64, 256, 1024};
+    static const int few[] = {16, 64, 256};
     struct FLANNParameters p = DEFAULT_FLANN_PARAMETERS;
     p.algorithm = exact ? FLANN_INDEX_KDTREE_SINGLE : FLANN_INDEX_KDTREE;
     p.trees = 4;

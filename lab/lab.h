@@ -54,7 +54,7 @@ lab_bench_query_def lab_bench_query_def_default(void);
 
 /**
  * Nearest neighbours on random, surface and sparse clouds: ours in a batch and one by one, FLANN's exact
- * kd-tree, its approximate ones at three settings, and brute force (docs/queries.md).
+ * kd-tree, its approximate ones (up to 10^6 points) at three settings, and brute force (docs/queries.md).
  *
  * Writes query.csv, query.json and query.svg (the chart) into `folder` (NULL: nowhere), and the table as
  * Markdown to `out`. Times are of one core: process CPU time / queries.

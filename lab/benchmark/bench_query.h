@@ -5,6 +5,9 @@
 
 #include "lab/lab.h"
 
+/* Beyond it, building FLANN's random trees takes most of the time. */
+enum { QUERY_APPROXIMATE_MAX = 1000000 };
+
 enum { QUERY_CLOUDS = 3, QUERY_ROWS_MAX = 512, QUERY_CHECKS = 6 };
 
 typedef enum query_engine {
@@ -22,7 +25,7 @@ typedef struct query_row {
     query_engine engine;
     int checks;           /* of ENGINE_APPROXIMATE */
     double build_seconds; /* of one core */
-    double us;            /* core-microseconds per query, least of three */
+    double us;            /* core-microseconds per query, least of three; of one for ENGINE_APPROXIMATE */
     double right;         /* share of the k neighbours that are no farther than the true ones */
     double bytes;         /* of ours, per point; NaN for others */
 } query_row;

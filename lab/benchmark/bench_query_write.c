@@ -97,12 +97,19 @@ static gbt_status write_json(const query_bench *b, const char *folder, gbt_error
 
 /* ---- chart: above time against size, below what is right against time on the largest clouds ---- */
 
+/* The largest cloud that every engine was asked about. */
+static size_t accuracy_points(const query_bench *b)
+{
+    const size_t largest = b->row[b->row_count - 1].points;
+    return largest < QUERY_APPROXIMATE_MAX ? largest : QUERY_APPROXIMATE_MAX;
+}
+
 static bool in_panel(const query_bench *b, const query_row *r, int cloud, bool accuracy)
 {
     if (r->cloud != cloud || r->k != CHART_K)
         return false;
     if (accuracy)
-        return r->points == b->row[b->row_count - 1].points && r->engine != ENGINE_BRUTE;
+        return r->points == accuracy_points(b) && r->engine != ENGINE_BRUTE;
     return r->engine != ENGINE_APPROXIMATE || r->checks == 64;
 }
 
@@ -128,7 +135,7 @@ static void draw_panel(text *out, const query_bench *b, int cloud, bool accuracy
         return;
     text_format(out, "<text class=\"title\" x=\"%d\" y=\"%d\">%s", left, top - 30, query_cloud_names[cloud]);
     if (accuracy)
-        text_format(out, ", %zu points", b->row[b->row_count - 1].points);
+        text_format(out, ", %zu points", accuracy_points(b));
     text_add(out, "</text>");
     plot_draw_axes(out, &p);
     for (int e = 0; e < ENGINE_COUNT; e++) {

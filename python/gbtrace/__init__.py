@@ -8,8 +8,9 @@
 from gbtrace._library import ArgumentError, Error, FileError, FormatError, OutOfMemoryError, set_threads, version
 from gbtrace.camera import Camera
 from gbtrace.model import Gaussians, Info, Model, Settings, View
+from gbtrace.query import Answers, Balls
 from gbtrace.run import Comparison, compare, evaluate, export, train
 
 __version__ = version()
-__all__ = ["ArgumentError", "Camera", "Comparison", "Error", "FileError", "FormatError", "Gaussians", "Info", "Model", "OutOfMemoryError",
+__all__ = ["Answers", "ArgumentError", "Balls", "Camera", "Comparison", "Error", "FileError", "FormatError", "Gaussians", "Info", "Model", "OutOfMemoryError",
            "Settings", "View", "compare", "evaluate", "export", "set_threads", "train", "version"]

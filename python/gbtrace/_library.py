@@ -80,9 +80,18 @@ class CExportDef(c.Structure):
                 ("cookie_", c.c_uint32)]
 
 
+class CBallsView(c.Structure):
+    _fields_ = [("count", c.c_size_t), ("position", c.c_void_p), ("radius", c.c_void_p), ("anchors", c.c_bool)]
+
+
+class CAnswers(c.Structure):
+    _fields_ = [("count", c.c_size_t), ("first", c.c_void_p), ("index", c.c_void_p), ("value", c.c_void_p)]
+
+
 STRUCTS = {"gbt_error": CError, "gbt_camera": CCamera, "gbt_gaussians": CGaussians, "gbt_gaussians_gradient": CGaussiansGradient,
            "gbt_model_info": CModelInfo, "gbt_model_settings": CModelSettings, "gbt_model_view": CModelView, "gbt_picture": CPicture,
-           "gbt_comparison": CComparison, "gbt_evaluate_def": CEvaluateDef, "gbt_export_def": CExportDef}
+           "gbt_comparison": CComparison, "gbt_evaluate_def": CEvaluateDef, "gbt_export_def": CExportDef,
+           "gbt_balls_view": CBallsView, "gbt_answers": CAnswers}
 
 # name: result, arguments. "status": the last argument is the error, which call() adds.
 pointer, text, number = c.c_void_p, c.c_char_p, c.c_size_t
@@ -108,6 +117,16 @@ FUNCTIONS = {
     "gbt_model_get_view": ("status", [pointer, number, c.POINTER(CModelView)]),
     "gbt_model_render": ("status", [pointer, c.POINTER(CCamera), c.c_bool, c.POINTER(CPicture)]),
     "gbt_model_gradient": ("status", [pointer, pointer, c.POINTER(c.c_double), c.POINTER(CGaussiansGradient)]),
+    "gbt_balls_open": ("status", [text, c.POINTER(pointer)]),
+    "gbt_balls_from_arrays": ("status", [pointer, pointer, number, c.POINTER(pointer)]),
+    "gbt_balls_free": (None, [pointer]),
+    "gbt_balls_get": (CBallsView, [pointer]),
+    "gbt_balls_nearest": ("status", [pointer, pointer, number, number, c.c_bool, pointer, pointer]),
+    "gbt_balls_within": ("status", [pointer, pointer, pointer, number, c.POINTER(CAnswers)]),
+    "gbt_balls_containing": ("status", [pointer, pointer, number, c.POINTER(CAnswers)]),
+    "gbt_balls_overlapping": ("status", [pointer, pointer, pointer, number, c.POINTER(CAnswers)]),
+    "gbt_balls_crossed": ("status", [pointer, pointer, pointer, pointer, pointer, number, c.POINTER(CAnswers)]),
+    "gbt_answers_free": (None, [c.POINTER(CAnswers)]),
     "gbt_train_with": ("status", [text, text, text]),
     "gbt_evaluate_def_default": (CEvaluateDef, []),
     "gbt_evaluate": ("status", [text, c.POINTER(CEvaluateDef)]),

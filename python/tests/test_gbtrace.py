@@ -32,7 +32,7 @@ class Structs(unittest.TestCase):
         for name, struct in _library.STRUCTS.items():
             lines.append(f'printf("%s. %zu\\n", "{name}", sizeof({name}));')
             lines += [f'printf("%s.%s %zu\\n", "{name}", "{field}", offsetof({name}, {field}));' for field, _ in struct._fields_]
-        headers = "\n".join(f'#include "gbtrace/{h}.h"' for h in ("camera", "evaluate", "export", "model", "status"))
+        headers = "\n".join(f'#include "gbtrace/{h}.h"' for h in ("camera", "evaluate", "export", "model", "query", "status"))
         source, program = SCRATCH / "layout.c", SCRATCH / "layout"
         source.write_text(f"#include <stddef.h>\n#include <stdio.h>\n{headers}\nint main(void)\n{{\n" + "\n".join(lines) + "\nreturn 0;\n}\n")
         subprocess.run(["cc", "-I", os.environ["GBT_INCLUDE"], str(source), "-o", str(program)], check=True)
@@ -41,6 +41,58 @@ class Structs(unittest.TestCase):
             got.append(f"{name}. {ctypes.sizeof(struct)}")
             got += [f"{name}.{field} {getattr(struct, field).offset}" for field, _ in struct._fields_]
         self.assertEqual(subprocess.run([str(program)], check=True, capture_output=True, text=True).stdout.split("\n")[:-1], got)
+
+
+class Balls(unittest.TestCase):
+    def setUp(self):
+        random = np.random.default_rng(3)
+        self.position = random.uniform(-1, 1, (400, 3)) + (5e6, 0, 0)
+        self.radius = random.uniform(0, 0.2, 400)
+        self.points = random.uniform(-1, 1, (60, 3)) + (5e6, 0, 0)
+        self.balls = gbtrace.Balls.from_arrays(self.position, self.radius)
+        self.distance = np.linalg.norm(self.position[None] - self.points[:, None], axis=2)
+
+    def test_nearest(self):
+        index, distance = self.balls.nearest(self.points, k=5)
+        np.testing.assert_array_equal(index, np.argsort(self.distance, axis=1)[:, :5])
+        np.testing.assert_allclose(distance, np.sort(self.distance, axis=1)[:, :5], rtol=1e-12)
+        self.assertFalse((self.balls.nearest(self.balls.position, skip_same=True)[0][:, 0] == np.arange(400)).any())
+        index, distance = gbtrace.Balls.from_arrays(np.zeros((1, 3))).nearest([[0, 3, 4]], k=2)
+        self.assertEqual((index.tolist(), distance.tolist()), ([[0, 2**32 - 1]], [[5, np.inf]]))
+
+    def test_lists(self):
+        for answers, wanted in ((self.balls.within(self.points, 0.4), self.distance <= 0.4),
+                                (self.balls.containing(self.points), self.distance <= self.radius),
+                                (self.balls.overlapping(self.points, 0.3), self.distance <= self.radius + 0.3)):
+            self.assertEqual(len(answers), 60)
+            for i in range(60):
+                np.testing.assert_array_equal(answers[i], np.flatnonzero(wanted[i]))
+
+    def test_rays(self):
+        m = self.position[None] - self.points[:, None]
+        for t_max in (np.inf, 0.5):
+            t = np.clip(m[:, :, 2], 0, t_max)
+            away = np.linalg.norm(m - t[:, :, None] * (0, 0, 1), axis=2)
+            answers = self.balls.crossed(self.points, np.tile((0.0, 0, 1), (60, 1)), t_max=t_max)
+            for i in range(60):
+                np.testing.assert_array_equal(answers[i], np.flatnonzero(away[i] <= self.radius))
+
+    def test_anchors_of_a_run(self):
+        balls, info = gbtrace.Balls(MODEL), gbtrace.Model(MODEL).info
+        self.assertTrue(balls.anchors)
+        self.assertEqual(len(balls), info.anchors)
+        self.assertTrue((balls.radius > 0).all())
+        np.testing.assert_array_equal(balls.position.min(axis=0), info.low)
+
+    def test_what_is_refused(self):
+        with self.assertRaisesRegex(ValueError, r"points: shape \(3,\) \(wanted \(count, 3\)\)"):
+            self.balls.nearest([1, 2, 3])
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "query 1: points: bad query"):
+            self.balls.containing([[0, 0, 0], [0, np.nan, 0]])
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "point 0: bad radius"):
+            gbtrace.Balls.from_arrays(np.zeros((1, 3)), -1)
+        with self.assertRaises(gbtrace.FileError):
+            gbtrace.Balls("/nowhere/run")
 
 
 class Library(unittest.TestCase):

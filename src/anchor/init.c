@@ -68,8 +68,8 @@ gbt_status anchor_scales_from_spacing(const float *position, size_t count, doubl
                                       float *out, gbt_error *err)
 {
     point_tree *tree = NULL;
-    GBT_TRY(point_tree_build(position, NULL, count, &tree, err));
-    const gbt_status status = point_tree_spacing(tree, 3, out, err);
+    GBT_TRY(point_tree_build(number_floats(position), (number_array){0}, count, &tree, err));
+    const gbt_status status = point_tree_spacing(tree, number_floats(position), 3, out, err);
     for (size_t i = 0; i < count && status == GBT_OK; i++)
         out[i] = (float)first_scale((double)out[i], spacing_min, factor, most);
     point_tree_free(tree);
@@ -100,7 +100,7 @@ typedef struct prior_job {
     anchors *a;
     const anchor_init_def *def;
     const float *radius;
-    const point_tree *tree; /* over the centres */
+    const double *squared; /* [count], to the nearest other centre; infinite for a lone one */
     double floor_scale;
 } prior_job;
 
@@ -111,10 +111,8 @@ static void prior_block(size_t block, size_t begin, size_t end, void *context)
     const anchor_init_def *def = job->def;
     for (size_t i = begin; i < end; i++) {
         const double radius = (double)job->radius[i];
-        uint32_t index;
-        double square;
-        const bool spaced =
-            point_tree_nearest(job->tree, job->a->position + i * 3, 1, i, &index, &square) == 1 && square > 0;
+        const double square = job->squared[i];
+        const bool spaced = square > 0 && square < HUGE_VAL;
         const double near =
             spaced ? sqrt(square) : radius; /* lone or coincident: the radius is all that is known */
         const double clipped = fmin(fmax(radius, (double)def->clip_min * near), (double)def->clip_max * near);
@@ -127,17 +125,25 @@ static void prior_block(size_t block, size_t begin, size_t end, void *context)
 static gbt_status scale_from_balls(anchors *a, const float *radius, const anchor_init_def *def,
                                    gbt_error *err)
 {
-    point_tree *tree = NULL;
-    GBT_TRY(point_tree_build(a->position, NULL, a->count, &tree, err));
-    /* eps of eq 34 is s_min of eq 21: no scale is finer than the finest ball. */
-    prior_job job = {.a = a,
-                     .def = def,
-                     .radius = radius,
-                     .tree = tree,
-                     .floor_scale = fmax((double)def->balls.min_scale * (double)def->balls.voxel_size, 1e-6)};
-    parallel_blocks(a->count, 1024, prior_block, &job);
-    point_tree_free(tree);
-    return GBT_OK;
+    uint32_t *index = mem_alloc(a->count, sizeof *index, "anchors", err);
+    double *squared = mem_alloc(a->count, sizeof *squared, "anchors", err);
+    const gbt_status status =
+        index == NULL || squared == NULL
+            ? GBT_ERR_NO_MEMORY
+            : points_find_nearest(a->position, a->count, NULL, a->count, index, squared, err);
+    if (status == GBT_OK) {
+        /* eps of eq 34 is s_min of eq 21: no scale is finer than the finest ball. */
+        prior_job job = {.a = a,
+                         .def = def,
+                         .radius = radius,
+                         .squared = squared,
+                         .floor_scale =
+                             fmax((double)def->balls.min_scale * (double)def->balls.voxel_size, 1e-6)};
+        parallel_blocks(a->count, 1024, prior_block, &job);
+    }
+    mem_free(index);
+    mem_free(squared);
+    return status;
 }
 
 /* ---- entry ---- */

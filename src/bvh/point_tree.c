@@ -1,225 +1,472 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bvh/point_tree.c -- sites of equal positions, Embree trees over them, and the search that all point queries
-   share. */
+/* bvh/point_tree.c -- Embree's builder over the boxes of balls, its nodes laid out for our walks. */
 #include "bvh/point_tree.h"
+
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "bvh/device.h"
+#include "bvh/embree_api.h"
 
-/* ---- sites ---- */
+enum { CHECK_BLOCK = 65536, LEAF_BLOCK = 1024, MEDIAN_SAMPLES = 4095 };
 
-/* Equal floats have equal bits here: the sum turns -0 into +0. */
-static uint64_t hash_position(const float p[3])
+typedef struct binary_node {
+    struct RTCBounds bounds[2];
+    uint64_t child[2]; /* address of a binary_node, or that of leaf_members + 1 */
+} binary_node;
+
+typedef struct leaf_members {
+    uint32_t count, id[POINT_WIDTH];
+} leaf_members;
+
+typedef struct leaf_place {
+    const leaf_members *members;
+    uint32_t first;
+} leaf_place;
+
+typedef struct builder {
+    number_array position, radius;
+    size_t count;
+    double origin[3],
+        scale; /* what Embree sees: (position - origin) scale, about 1 at most but for outliers */
+    struct RTCBuildPrimitive *boxes;
+    atomic_size_t binary_count, leaf_count, bad;
+    atomic_bool refused; /* an allocation of Embree's was refused: the tree has holes */
+    point_tree *tree;
+    leaf_place *leaves;
+    size_t filled_count, filled_points, node_capacity;
+    int depth;
+    gbt_status status; /* of making room for nodes */
+    gbt_error *err;
+} builder;
+
+/* ---- points --> boxes ---- */
+
+static bool bad_point(const builder *b, size_t i)
 {
-    union {
-        float value[3];
-        uint32_t bits[3];
-    } key = {.value = {p[0] + 0.0f, p[1] + 0.0f, p[2] + 0.0f}};
-    uint64_t h = ((uint64_t)key.bits[0] << 32 | key.bits[1]) * 0x9E3779B97F4A7C15u;
-    h = (h ^ h >> 29 ^ key.bits[2]) * 0xBF58476D1CE4E5B9u;
-    h = (h ^ h >> 32) * 0x94D049BB133111EBu;
-    return h ^ h >> 29;
+    for (size_t j = 0; j < 3; j++)
+        if (!(fabs(number_at(b->position, 3 * i + j)) <= POINT_LIMIT))
+            return true;
+    return !number_none(b->radius) &&
+           !(number_at(b->radius, i) >= 0 && number_at(b->radius, i) <= POINT_LIMIT);
 }
 
-static bool same_position(const double site[3], const float p[3])
+static void check_block(size_t block, size_t begin, size_t end, void *context)
 {
-    return site[0] == (double)p[0] && site[1] == (double)p[1] && site[2] == (double)p[2];
+    (void)block;
+    builder *b = context;
+    size_t i = begin;
+    while (i < end && !bad_point(b, i))
+        i++;
+    size_t known = atomic_load(&b->bad);
+    while (i < end && i < known && !atomic_compare_exchange_weak(&b->bad, &known, i))
+        ;
 }
 
-/* Sites in the order of their first points; member lists by counting, so they ascend. */
-static gbt_status group_points(point_tree *tree, const float *position, gbt_error *err)
+static gbt_status check_points(builder *b, gbt_error *err)
 {
-    const size_t count = tree->count;
-    size_t slots = 16;
-    while (slots < 2 * count)
-        slots *= 2;
-    gbt_status status = GBT_ERR_NO_MEMORY;
-    uint32_t *slot = mem_calloc(slots, sizeof *slot, "points.slots", err); /* site + 1, or 0 */
-    uint32_t *site_of = mem_alloc(count, sizeof *site_of, "points.site_of", err);
-    tree->site = mem_alloc(count, 3 * sizeof *tree->site, "points.site", err);
-    tree->first = mem_calloc(count + 1, sizeof *tree->first, "points.first", err);
-    tree->member = mem_alloc(count, sizeof *tree->member, "points.member", err);
-    if (tree->radius != NULL)
-        tree->site_radius = mem_calloc(count, sizeof *tree->site_radius, "points.site_radius", err);
-    if (slot == NULL || site_of == NULL || tree->site == NULL || tree->first == NULL ||
-        tree->member == NULL || (tree->radius != NULL && tree->site_radius == NULL))
-        goto done;
+    if (b->count >= UINT32_MAX)
+        return base_fail(err, GBT_ERR_ARGUMENT, "points: too many (wanted fewer than 2^32 - 1, got %zu)",
+                         b->count);
+    atomic_store(&b->bad, SIZE_MAX);
+    parallel_blocks(b->count, CHECK_BLOCK, check_block, b);
+    const size_t i = atomic_load(&b->bad);
+    if (i == SIZE_MAX)
+        return GBT_OK;
+    for (size_t j = 0; j < 3; j++)
+        if (!(fabs(number_at(b->position, 3 * i + j)) <= POINT_LIMIT))
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "points: point %zu: bad coordinate (wanted a finite number, got %g)", i,
+                             number_at(b->position, 3 * i + j));
+    return base_fail(err, GBT_ERR_ARGUMENT,
+                     "points: point %zu: bad radius (wanted a finite number >= 0, got %g)", i,
+                     number_at(b->radius, i));
+}
 
-    for (size_t i = 0; i < count; i++) {
-        const float *p = position + 3 * i;
-        size_t at = hash_position(p) & (slots - 1);
-        while (slot[at] != 0 && !same_position(tree->site + 3 * (size_t)(slot[at] - 1), p))
-            at = (at + 1) & (slots - 1);
-        if (slot[at] == 0) {
-            for (int j = 0; j < 3; j++)
-                tree->site[3 * tree->site_count + j] = (double)p[j];
-            slot[at] = (uint32_t)++tree->site_count;
+static int compare_double(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Outliers must not cost the others their digits in Embree's float32: the origin is the median, and the
+   quartiles are at about 1. Of a sample; boxes in double make the answers right whatever Embree sees. */
+static gbt_status find_frame(builder *b, gbt_error *err)
+{
+    const size_t step = 1 + (b->count - 1) / MEDIAN_SAMPLES, samples = (b->count - 1) / step + 1;
+    double *value = mem_alloc(samples, sizeof *value, "points.sample", err), spread = 0, far = 0;
+    if (value == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t j = 0; j < 3; j++) {
+        for (size_t i = 0; i < samples; i++)
+            value[i] = number_at(b->position, 3 * i * step + j);
+        qsort(value, samples, sizeof *value, compare_double);
+        b->origin[j] = value[samples / 2];
+        spread = fmax(spread, value[samples - 1 - samples / 4] - value[samples / 4]);
+        far = fmax(far, value[samples - 1] - value[0]);
+    }
+    mem_free(value);
+    spread = spread > 0 ? spread : far;
+    int exponent = 0;
+    if (spread > 0)
+        frexp(spread, &exponent);
+    b->scale = ldexp(1, -(exponent > -1000 ? exponent : -1000));
+    return GBT_OK;
+}
+
+static float held(double x)
+{
+    return (float)fmax(fmin(x, (double)bvh_coordinate_limit), (double)-bvh_coordinate_limit);
+}
+
+static void box_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const builder *b = context;
+    for (size_t i = begin; i < end; i++) {
+        float lower[3], upper[3];
+        const double radius = number_none(b->radius) ? 0 : number_at(b->radius, i);
+        for (size_t j = 0; j < 3; j++) {
+            const double center = number_at(b->position, 3 * i + j) - b->origin[j];
+            lower[j] = held((center - radius) * b->scale);
+            upper[j] = held((center + radius) * b->scale);
         }
-        site_of[i] = slot[at] - 1;
-        tree->first[site_of[i] + 1]++;
-        if (tree->radius != NULL)
-            tree->site_radius[site_of[i]] = fmax(tree->site_radius[site_of[i]], (double)tree->radius[i]);
+        b->boxes[i] = (struct RTCBuildPrimitive){.lower_x = lower[0],
+                                                 .lower_y = lower[1],
+                                                 .lower_z = lower[2],
+                                                 .upper_x = upper[0],
+                                                 .upper_y = upper[1],
+                                                 .upper_z = upper[2],
+                                                 .primID = (unsigned)i};
     }
-    for (size_t s = 0; s < tree->site_count; s++)
-        tree->first[s + 1] += tree->first[s];
-    /* first[s] walks to the end of its list while the list is filled, and is then the start of the next:
-       moved back by one below. */
-    for (size_t i = 0; i < count; i++)
-        tree->member[tree->first[site_of[i]]++] = (uint32_t)i;
-    for (size_t s = tree->site_count; s > 0; s--)
-        tree->first[s] = tree->first[s - 1];
-    tree->first[0] = 0;
-    status = GBT_OK;
-done:
-    mem_free(slot);
-    mem_free(site_of);
-    return status;
 }
 
-/* ---- boxes ---- */
+/* ---- Embree's callbacks; a leaf is a tagged address in place of a pointer ---- */
 
-void site_bounds(const point_tree *tree, size_t site, double lower[3], double upper[3])
+static void *take(builder *b, RTCThreadLocalAllocator allocator, size_t size)
 {
-    const double radius = tree->site_radius != NULL ? tree->site_radius[site] * tree->scale : 0;
-    for (int j = 0; j < 3; j++) {
-        const double center = tree->site[3 * site + j] * tree->scale;
-        const double half = radius > 0 ? radius + 0x1p-50 * (fabs(center) + radius) : 0;
-        lower[j] = fmax(center - half, -scaled_limit);
-        upper[j] = fmin(center + half, scaled_limit);
+    void *memory = rtcThreadLocalAlloc(allocator, size, 16);
+    if (memory == NULL) /* the memory limit (bvh_limit_memory) */
+        atomic_store_explicit(&b->refused, true, memory_order_relaxed);
+    return memory;
+}
+
+static void *create_node(RTCThreadLocalAllocator allocator, unsigned child_count, void *user)
+{
+    (void)child_count;
+    builder *b = user;
+    embree_receive(b);
+    atomic_fetch_add_explicit(&b->binary_count, 1, memory_order_relaxed);
+    void *node = take(b, allocator, sizeof(binary_node));
+    embree_publish(b);
+    return node;
+}
+
+static void set_children(void *pointer, void **children, unsigned child_count, void *user)
+{
+    binary_node *node = pointer;
+    embree_receive(user);
+    for (unsigned i = 0; i < child_count && node != NULL; i++)
+        node->child[i] = (uint64_t)(uintptr_t)children[i];
+    embree_publish(user);
+}
+
+static void set_bounds(void *pointer, const struct RTCBounds **bounds, unsigned child_count, void *user)
+{
+    binary_node *node = pointer;
+    embree_receive(user);
+    for (unsigned i = 0; i < child_count && node != NULL; i++)
+        node->bounds[i] = *bounds[i];
+    embree_publish(user);
+}
+
+static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuildPrimitive *primitives,
+                         size_t count, void *user)
+{
+    builder *b = user;
+    embree_receive(b);
+    atomic_fetch_add_explicit(&b->leaf_count, 1, memory_order_relaxed);
+    leaf_members *leaf = take(b, allocator, sizeof *leaf);
+    if (leaf != NULL) {
+        leaf->count = (uint32_t)count;
+        for (size_t i = 0; i < count; i++)
+            leaf->id[i] = primitives[i].primID;
+    }
+    embree_publish(b);
+    return leaf == NULL ? NULL : (char *)leaf + 1;
+}
+
+/* ---- binary nodes --> nodes of 8 ---- */
+
+static float half_area(const struct RTCBounds *b)
+{
+    const float x = b->upper_x - b->lower_x, y = b->upper_y - b->lower_y, z = b->upper_z - b->lower_z;
+    return x * y + y * z + z * x;
+}
+
+static uint32_t add_node(builder *b)
+{
+    point_tree *t = b->tree;
+    void *nodes = t->nodes;
+    if (b->status == GBT_OK)
+        b->status = mem_reserve(&nodes, &b->node_capacity, t->node_count, t->node_count + 1, sizeof *t->nodes,
+                                "points.nodes", b->err);
+    if (b->status != GBT_OK)
+        return 0;
+    t->nodes = nodes;
+    memset(&t->nodes[t->node_count], 0, sizeof *t->nodes);
+    return (uint32_t)t->node_count++;
+}
+
+static void place_leaf(builder *b, uint64_t child, point_node *node, int lane)
+{
+    const leaf_members *members = (const leaf_members *)(uintptr_t)(child - 1);
+    b->leaves[b->filled_count++] = (leaf_place){members, (uint32_t)b->filled_points};
+    node->child[lane] = (uint32_t)b->filled_points;
+    node->size[lane] = (uint8_t)members->count;
+    b->filled_points += members->count;
+}
+
+/* The wide node for a binary one: its largest child is opened until there are 8. Depth first, so that
+   neighbours lie side by side. */
+static uint32_t widen(builder *b, const binary_node *root, int depth)
+{
+    struct RTCBounds bounds[POINT_WIDTH];
+    uint64_t child[POINT_WIDTH];
+    int count = 2;
+    memcpy(bounds, root->bounds, 2 * sizeof *bounds);
+    memcpy(child, root->child, 2 * sizeof *child);
+    while (count < POINT_WIDTH) {
+        int largest = -1;
+        float area = -1;
+        for (int i = 0; i < count; i++)
+            if ((child[i] & 1) == 0 && half_area(&bounds[i]) > area) {
+                largest = i;
+                area = half_area(&bounds[i]);
+            }
+        if (largest < 0)
+            break;
+        const binary_node *opened = (const binary_node *)(uintptr_t)child[largest];
+        bounds[largest] = opened->bounds[0];
+        child[largest] = opened->child[0];
+        bounds[count] = opened->bounds[1];
+        child[count++] = opened->child[1];
+    }
+    b->depth = depth > b->depth ? depth : b->depth;
+    const uint32_t at = add_node(b);
+    if (b->status != GBT_OK)
+        return 0;
+    b->tree->nodes[at].child_count = (uint8_t)count;
+    for (int i = 0; i < count && b->status == GBT_OK; i++) {
+        if ((child[i] & 1) != 0)
+            place_leaf(b, child[i], &b->tree->nodes[at], i);
+        else if (depth < POINT_DEPTH_MAX) {
+            const uint32_t below = widen(b, (const binary_node *)(uintptr_t)child[i], depth + 1);
+            b->tree->nodes[at].child[i] = below; /* the array may have moved */
+        } else {
+            b->depth = POINT_DEPTH_MAX + 1;
+        }
+    }
+    return at;
+}
+
+static void fill_leaves(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const builder *b = context;
+    point_tree *t = b->tree;
+    for (size_t at = begin; at < end; at++) {
+        const leaf_members *members = b->leaves[at].members;
+        const size_t first = b->leaves[at].first, count = members->count;
+        for (size_t i = 0; i < count; i++) {
+            const uint32_t id = members->id[i];
+            t->index[first + i] = id;
+            for (size_t j = 0; j < 3; j++)
+                t->coordinate[3 * first + j * count + i] = number_at(b->position, 3 * (size_t)id + j);
+            if (t->radius != NULL)
+                t->radius[first + i] = number_at(b->radius, id);
+        }
     }
 }
 
-static float round_down(double x)
+static float round_up(double x)
 {
     const float f = (float)x;
-    return (double)f > x ? nextafterf(f, -INFINITY) : f;
+    return (double)f < x ? nextafterf(f, INFINITY) : f;
 }
 
-void site_write_bounds(struct RTCBounds *out, const double lower[3], const double upper[3], double pad)
-{
-    out->lower_x = round_down(lower[0] - pad);
-    out->upper_x = round_up(upper[0] + pad);
-    out->lower_y = round_down(lower[1] - pad);
-    out->upper_y = round_up(upper[1] + pad);
-    out->lower_z = round_down(lower[2] - pad);
-    out->upper_z = round_up(upper[2] + pad);
-}
+typedef struct lane_sum {
+    double lower[3], upper[3], radius;
+    uint32_t least_index;
+} lane_sum;
 
-static void center_bounds(const struct RTCBoundsFunctionArguments *args)
+static lane_sum sum_leaf(const point_tree *t, size_t first, size_t count)
 {
-    const point_tree *tree = args->geometryUserPtr;
-    embree_receive(args->geometryUserPtr);
-    double center[3];
-    for (int j = 0; j < 3; j++)
-        center[j] = tree->site[3 * (size_t)args->primID + j] * tree->scale;
-    site_write_bounds(args->bounds_o, center, center, 0);
-}
-
-static void ball_bounds(const struct RTCBoundsFunctionArguments *args)
-{
-    const point_tree *tree = args->geometryUserPtr;
-    embree_receive(args->geometryUserPtr);
-    double lower[3], upper[3];
-    site_bounds(tree, args->primID, lower, upper);
-    site_write_bounds(args->bounds_o, lower, upper, 0);
-}
-
-gbt_status site_scene_build(const point_tree *tree, RTCBoundsFunction bounds, RTCIntersectFunctionN intersect,
-                            RTCScene *out, gbt_error *err)
-{
-    RTCDevice device = bvh_device(err);
-    if (device == NULL)
-        return bvh_check("points", err);
-    RTCScene scene = rtcNewScene(device);
-    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-    gbt_status status = bvh_check("points", err);
-    if (status == GBT_OK) {
-        rtcSetGeometryUserPrimitiveCount(geometry, (unsigned)tree->site_count);
-        rtcSetGeometryUserData(geometry, (void *)tree);
-        rtcSetGeometryBoundsFunction(geometry, bounds, NULL);
-        if (intersect != NULL)
-            rtcSetGeometryIntersectFunction(geometry, intersect);
-        embree_publish((void *)tree);
-        rtcCommitGeometry(geometry);
-        rtcAttachGeometry(scene, geometry);
-        rtcCommitScene(scene);
-        status = bvh_check("points", err);
+    lane_sum s = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0, UINT32_MAX};
+    for (size_t i = 0; i < count; i++) {
+        for (size_t j = 0; j < 3; j++) {
+            const double x = t->coordinate[3 * first + j * count + i];
+            s.lower[j] = fmin(s.lower[j], x);
+            s.upper[j] = fmax(s.upper[j], x);
+        }
+        if (t->radius != NULL)
+            s.radius = fmax(s.radius, t->radius[first + i]);
+        if (t->index[first + i] < s.least_index)
+            s.least_index = t->index[first + i];
     }
-    if (geometry != NULL)
-        rtcReleaseGeometry(geometry); /* the scene holds its own reference */
-    if (status == GBT_OK)
-        *out = scene;
-    else if (scene != NULL)
-        rtcReleaseScene(scene);
-    return status;
+    return s;
+}
+
+static lane_sum sum_node(const point_node *node)
+{
+    lane_sum s = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0, UINT32_MAX};
+    for (int i = 0; i < node->child_count; i++) {
+        for (int j = 0; j < 3; j++) {
+            s.lower[j] = fmin(s.lower[j], node->lower[j][i]);
+            s.upper[j] = fmax(s.upper[j], node->upper[j][i]);
+        }
+        s.radius = fmax(s.radius, (double)node->radius[i]);
+        if (node->least_index[i] < s.least_index)
+            s.least_index = node->least_index[i];
+    }
+    return s;
+}
+
+/* Children stand behind their parents, so the last node comes first. */
+static void fill_nodes(point_tree *t)
+{
+    for (size_t at = t->node_count; at-- > 0;) {
+        point_node *node = &t->nodes[at];
+        for (int i = 0; i < POINT_WIDTH; i++) {
+            const int from = i < node->child_count ? i : 0;
+            const lane_sum s = node->size[from] > 0 ? sum_leaf(t, node->child[from], node->size[from])
+                                                    : sum_node(&t->nodes[node->child[from]]);
+            for (int j = 0; j < 3; j++) {
+                node->lower[j][i] = s.lower[j];
+                node->upper[j][i] = s.upper[j];
+            }
+            node->radius[i] = round_up(s.radius);
+            node->least_index[i] = s.least_index;
+        }
+    }
+    const lane_sum all = sum_node(t->nodes);
+    memcpy(t->lower, all.lower, sizeof t->lower);
+    memcpy(t->upper, all.upper, sizeof t->upper);
+    for (int j = 0; j < 3; j++)
+        t->reach = fmax(t->reach, fmax(fabs(all.lower[j]), fabs(all.upper[j])) + all.radius);
 }
 
 /* ---- build ---- */
 
-static gbt_status check_points(const float *position, const float *radius, size_t count, gbt_error *err)
+static gbt_status run_builder(builder *b, RTCBVH bvh, gbt_error *err)
 {
-    if (count >= UINT32_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "points: too many (wanted fewer than 2^32 - 1, got %zu)",
-                         count);
-    for (size_t i = 0; i < count; i++) {
-        for (int j = 0; j < 3; j++)
-            if (!isfinite(position[3 * i + j]))
-                return base_fail(err, GBT_ERR_ARGUMENT,
-                                 "points: point %zu: bad coordinate (wanted a finite number, got %g)", i,
-                                 (double)position[3 * i + j]);
-        if (radius != NULL && !(radius[i] >= 0 && isfinite(radius[i])))
-            return base_fail(err, GBT_ERR_ARGUMENT,
-                             "points: point %zu: bad radius (wanted a finite number >= 0, got %g)", i,
-                             (double)radius[i]);
+    struct RTCBuildArguments arguments = rtcDefaultBuildArguments();
+    arguments.byteSize = sizeof arguments;
+    arguments.buildQuality = RTC_BUILD_QUALITY_MEDIUM; /* deterministic, unlike HIGH */
+    arguments.maxBranchingFactor = 2; /* wider ones make as many children as they can: leaves almost empty */
+    arguments.maxDepth = 48;
+    arguments.sahBlockSize = POINT_WIDTH; /* a leaf costs the same, whether it holds 1 or 8 */
+    arguments.minLeafSize = 1;
+    arguments.maxLeafSize = POINT_WIDTH;
+    arguments.traversalCost = 1;
+    arguments.intersectionCost = 1;
+    arguments.bvh = bvh;
+    arguments.primitives = b->boxes;
+    arguments.primitiveCount = b->count;
+    arguments.primitiveArrayCapacity = b->count;
+    arguments.createNode = create_node;
+    arguments.setNodeChildren = set_children;
+    arguments.setNodeBounds = set_bounds;
+    arguments.createLeaf = create_leaf;
+    arguments.userPtr = b;
+    embree_publish(b);
+    const void *root = rtcBuildBVH(&arguments);
+    embree_receive(b);
+    GBT_TRY(bvh_check("points", err));
+    if (b->refused)
+        return base_fail(err, GBT_ERR_NO_MEMORY, "points: embree: out of memory");
+    if (root == NULL)
+        return base_fail(err, GBT_ERR_INTERNAL, "points: Embree could not build a tree over %zu points",
+                         b->count);
+
+    point_tree *t = b->tree;
+    b->leaves = mem_alloc(atomic_load(&b->leaf_count), sizeof *b->leaves, "points.leaves", err);
+    if (b->leaves == NULL)
+        return GBT_ERR_NO_MEMORY;
+    b->err = err;
+    if (atomic_load(&b->binary_count) > 0) {
+        widen(b, root, 1);
+    } else { /* one leaf; the node above it is ours */
+        const uint32_t at = add_node(b);
+        if (b->status == GBT_OK) {
+            t->nodes[at].child_count = 1;
+            place_leaf(b, (uint64_t)(uintptr_t)root, &t->nodes[at], 0);
+        }
     }
+    GBT_TRY(b->status);
+    if (b->depth > POINT_DEPTH_MAX)
+        return base_fail(err, GBT_ERR_INTERNAL, "points: Embree's tree is deeper than %d nodes",
+                         (int)POINT_DEPTH_MAX);
+    void *nodes = t->nodes;
+    GBT_TRY(mem_trim(&nodes, &b->node_capacity, t->node_count, sizeof *t->nodes, "points.nodes", err));
+    t->nodes = nodes;
     return GBT_OK;
 }
 
-static void measure(point_tree *tree)
+static gbt_status fill(builder *b, gbt_error *err)
 {
-    double largest = 0, largest_radius = 0;
-    for (size_t i = 0; i < 3 * tree->site_count; i++)
-        largest = fmax(largest, fabs(tree->site[i]));
-    for (size_t s = 0; s < tree->site_count && tree->site_radius != NULL; s++)
-        largest_radius = fmax(largest_radius, tree->site_radius[s]);
-    int exponent = 0;
-    frexp(largest > 0 ? largest : largest_radius, &exponent);
-    tree->scale = ldexp(1, -exponent);
-    for (int j = 0; j < 3; j++) {
-        tree->lower[j] = INFINITY;
-        tree->upper[j] = -INFINITY;
-    }
-    tree->reach = 0.5;
-    for (size_t s = 0; s < tree->site_count; s++) {
-        double lower[3], upper[3];
-        site_bounds(tree, s, lower, upper);
-        for (int j = 0; j < 3; j++) {
-            tree->lower[j] = fmin(tree->lower[j], lower[j]);
-            tree->upper[j] = fmax(tree->upper[j], upper[j]);
-            tree->reach = fmax(tree->reach, fmax(-lower[j], upper[j]));
-        }
-    }
+    point_tree *t = b->tree;
+    /* Every lane of 8 may be read: at the last place 7 beyond the end. */
+    t->coordinate = mem_calloc(3 * b->count + POINT_WIDTH, sizeof *t->coordinate, "points.coordinate", err);
+    t->index = mem_alloc(b->count, sizeof *t->index, "points.index", err);
+    if (!number_none(b->radius))
+        t->radius = mem_calloc(b->count + POINT_WIDTH, sizeof *t->radius, "points.radius", err);
+    if (t->coordinate == NULL || t->index == NULL || (t->radius == NULL && !number_none(b->radius)))
+        return GBT_ERR_NO_MEMORY;
+    parallel_blocks(b->filled_count, LEAF_BLOCK, fill_leaves, b);
+    fill_nodes(t);
+    return GBT_OK;
 }
 
-gbt_status point_tree_build(const float *position, const float *radius, size_t count, point_tree **out,
+static gbt_status build(builder *b, gbt_error *err)
+{
+    GBT_TRY(find_frame(b, err));
+    RTCDevice device = bvh_device(err);
+    if (device == NULL)
+        return bvh_check("points", err);
+    b->boxes = mem_alloc(b->count, sizeof *b->boxes, "points.boxes", err);
+    if (b->boxes == NULL)
+        return GBT_ERR_NO_MEMORY;
+    parallel_blocks(b->count, CHECK_BLOCK, box_block, b);
+    RTCBVH bvh = rtcNewBVH(device);
+    gbt_status status = bvh_check("points", err);
+    if (status == GBT_OK)
+        status = run_builder(b, bvh, err);
+    mem_free(b->boxes);
+    if (status == GBT_OK)
+        status = fill(b, err);
+    if (bvh != NULL)
+        rtcReleaseBVH(bvh);
+    mem_free(b->leaves);
+    return status;
+}
+
+gbt_status point_tree_build(number_array position, number_array radius, size_t count, point_tree **out,
                             gbt_error *err)
 {
     *out = NULL;
-    GBT_TRY(check_points(position, radius, count, err));
+    builder b = {.position = position, .radius = radius, .count = count};
+    GBT_TRY(check_points(&b, err));
     point_tree *tree = mem_calloc(1, sizeof *tree, "points", err);
     if (tree == NULL)
         return GBT_ERR_NO_MEMORY;
-    tree->radius = radius;
+    b.tree = tree;
     tree->count = count;
-    pthread_mutex_init(&tree->rays_lock, NULL);
-    gbt_status status = group_points(tree, position, err);
-    if (status == GBT_OK && count > 0) {
-        measure(tree);
-        status = site_scene_build(tree, center_bounds, NULL, &tree->centers, err);
-        if (status == GBT_OK && radius != NULL)
-            status = site_scene_build(tree, ball_bounds, NULL, &tree->balls, err);
-    }
+    const gbt_status status = count > 0 ? build(&b, err) : GBT_OK;
     if (status != GBT_OK) {
         point_tree_free(tree);
         return status;
@@ -232,43 +479,16 @@ void point_tree_free(point_tree *tree)
 {
     if (tree == NULL)
         return;
-    RTCScene scenes[3] = {tree->centers, tree->balls, tree->rays};
-    for (int i = 0; i < 3; i++)
-        if (scenes[i] != NULL)
-            rtcReleaseScene(scenes[i]);
-    pthread_mutex_destroy(&tree->rays_lock);
-    mem_free(tree->site);
-    mem_free(tree->site_radius);
-    mem_free(tree->first);
-    mem_free(tree->member);
+    mem_free(tree->nodes);
+    mem_free(tree->coordinate);
+    mem_free(tree->radius);
+    mem_free(tree->index);
     mem_free(tree);
 }
 
-/* ---- search ---- */
-
-float site_search_radius(const point_tree *tree, double radius)
+size_t point_tree_bytes(const point_tree *t)
 {
-    const double scaled = radius * tree->scale * (1 + 0x1p-20) + 1e-18;
-    return scaled < 1e18 ? (float)scaled : INFINITY;
-}
-
-void sites_search(const point_tree *tree, RTCScene scene, const double query[3], double radius,
-                  RTCPointQueryFunction visit, void *search)
-{
-    if (tree->site_count == 0)
-        return;
-    const double x = query[0] * tree->scale, y = query[1] * tree->scale, z = query[2] * tree->scale;
-    struct RTCPointQuery point = {.radius = site_search_radius(tree, radius)};
-    if (fmax(fabs(x), fmax(fabs(y), fabs(z))) > scaled_limit) {
-        for (size_t s = 0; s < tree->site_count; s++)
-            visit(&(struct RTCPointQueryFunctionArguments){
-                .query = &point, .userPtr = search, .primID = (unsigned)s});
-        return;
-    }
-    point.x = (float)x;
-    point.y = (float)y;
-    point.z = (float)z;
-    struct RTCPointQueryContext context;
-    rtcInitPointQueryContext(&context);
-    rtcPointQuery(scene, &point, &context, visit, search);
+    return sizeof *t + t->node_count * sizeof *t->nodes +
+           t->count *
+               (3 * sizeof *t->coordinate + sizeof *t->index + (t->radius != NULL ? sizeof *t->radius : 0));
 }

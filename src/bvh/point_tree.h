@@ -2,103 +2,81 @@
 /* bvh/point_tree.h -- inside of a point_tree (bvh/points.h), for the files that build it and those that ask
    it.
 
-   position --> [group equal positions] --> sites --> Embree trees over boxes of sites     point_tree.c
-                                                        |  candidates: a superset, in float32
-                                                        v
-              [decide in double from the float32 input] --> answers, by (distance, index)  points_nearest.c
-                                                            or by index       points_list.c, points_ray.c
+   position --> [boxes in float32] --> Embree's builder --> binary tree     point_tree.c
+                                                               |  opened to 8 children, boxes in double
+                                                               v
+       answers <-- [walk, nearest first or all that touch] <-- nodes, and points in the order of the leaves
+                    points_nearest.c, points_list.c; many queries: points_batch.c
 
-   A site is one distinct position with the ascending list of the points on it. Embree sees coordinates scaled
-   by a power of two so that the largest is about 1: scaling is exact, and squares in its float32 arithmetic
-   neither overflow nor vanish. Three trees:
-     centers  boxes of no size, for queries on centres: float32 distances to them need no padding
-     balls    boxes of the balls, only when there are radii
-     rays     the same boxes padded for the slab test; built at the first ray, because padding spoils trees
-              with far outliers */
+   Box and point are compared with the query by the same expression in double. Subtraction, squares and sums
+   are monotone under rounding, so the squared distance of a box is never above that of a point in it: walks
+   need no margins, and lose nothing. Rays alone have one (points_list.c). */
 #ifndef GBT_BVH_POINT_TREE_H
 #define GBT_BVH_POINT_TREE_H
 
 #include <math.h>
-#include <pthread.h>
-#include <stdbool.h>
 
-#include "bvh/embree_api.h"
 #include "bvh/points.h"
 
-/* In scaled coordinates. Beyond it, float32 squares would not stay finite: boxes are clamped to it, and
-   queries from outside test every site; so do all rays when a box was clamped. */
-static const double scaled_limit = 0x1p40;
+enum { POINT_WIDTH = 8, POINT_DEPTH_MAX = 96, POINT_STACK = POINT_DEPTH_MAX * (POINT_WIDTH - 1) + 1 };
+
+/* Eight lines of a cache. Lanes from child_count on repeat the first. */
+typedef struct point_node {
+    _Alignas(64) double lower[3][POINT_WIDTH], upper[3][POINT_WIDTH]; /* of the centres */
+    float radius[POINT_WIDTH];         /* the largest of the child's balls, rounded up */
+    uint32_t child[POINT_WIDTH];       /* a node, or the first place of a leaf */
+    uint32_t least_index[POINT_WIDTH]; /* of the points in the child: among equal distances the least wins */
+    uint8_t size[POINT_WIDTH];         /* points of a leaf; 0: a node */
+    uint8_t child_count;
+} point_node;
 
 struct point_tree {
-    const float *radius; /* borrowed; NULL for points */
-    size_t count, site_count;
-    /* In double, because Embree calls for boxes in a mode that takes float32 numbers below 1.2e-38 for 0. */
-    double *site;              /* [site_count][3], unscaled */
-    double *site_radius;       /* [site_count]: largest radius on the site; NULL for points */
-    uint32_t *first;           /* [site_count + 1]: site s holds member[first[s] .. first[s+1]) */
-    uint32_t *member;          /* [count]: point indices, ascending inside a site */
-    double scale;              /* power of two */
-    double lower[3], upper[3]; /* of all balls, scaled, clamped */
-    double reach;              /* largest |coordinate| of these, at least 1/2 */
-    RTCScene centers, balls;
-    pthread_mutex_t rays_lock; /* guards the next one */
-    RTCScene rays;
+    size_t count, node_count;
+    point_node *nodes; /* the root first, children behind their parents */
+    /* By place, the order of the leaves. A leaf of m points from place p on has its x, its y and its z, m of
+       each, from coordinate[3 p] on. Behind the end there is room to read on for a lane of 8. */
+    double *coordinate;
+    double *radius;                   /* NULL for points */
+    uint32_t *index;                  /* of the point as it was given */
+    double lower[3], upper[3], reach; /* of the centres; the largest |coordinate| of any ball */
 };
 
-static inline bool finite3(const float v[3]) { return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]); }
-
-static inline double distance_squared_to(const point_tree *tree, uint32_t site, const double query[3])
+/** Squared distances to eight boxes, of any node. */
+static inline __attribute__((always_inline)) void boxes_distance(const point_node *node, const double q[3],
+                                                                 double out[POINT_WIDTH])
 {
-    const double *p = tree->site + 3 * (size_t)site;
-    const double x = p[0] - query[0], y = p[1] - query[1], z = p[2] - query[2];
-    return x * x + y * y + z * z;
+    for (int i = 0; i < POINT_WIDTH; i++) {
+        double sum = 0;
+        for (int j = 0; j < 3; j++) {
+            const double below = node->lower[j][i] - q[j], above = q[j] - node->upper[j][i];
+            const double most = below > above ? below : above, d = most > 0 ? most : 0;
+            sum += d * d;
+        }
+        out[i] = sum;
+    }
 }
 
-/** The least float that is not less. */
-static inline float round_up(double x)
+/** Squared distances to the points of a leaf; of what is behind its end anything. */
+static inline __attribute__((always_inline)) void points_distance(const point_tree *tree, uint32_t place,
+                                                                  size_t size, const double q[3],
+                                                                  double out[POINT_WIDTH])
 {
-    const float f = (float)x;
-    return (double)f < x ? nextafterf(f, INFINITY) : f;
+    const double *x = tree->coordinate + 3 * (size_t)place, *y = x + size, *z = y + size;
+    for (int i = 0; i < POINT_WIDTH; i++) {
+        const double dx = x[i] - q[0], dy = y[i] - q[1], dz = z[i] - q[2];
+        out[i] = dx * dx + dy * dy + dz * dz;
+    }
 }
 
-/** Scaled bounds of a site's balls in double, a little outside the true ones (2^-50 of what was added),
-    clamped. */
-void site_bounds(const point_tree *tree, size_t site, double lower[3], double upper[3]);
+static inline bool usable3(const double v[3])
+{
+    return fabs(v[0]) <= POINT_LIMIT && fabs(v[1]) <= POINT_LIMIT && fabs(v[2]) <= POINT_LIMIT;
+}
 
-/** Those, grown by `pad` and rounded outwards, as Embree wants them. */
-void site_write_bounds(struct RTCBounds *out, const double lower[3], const double upper[3], double pad);
+/** GBT_OK, or what is wrong with a query. */
+gbt_status point_query_check(const point_query *query, gbt_error *err);
 
-/** An Embree scene of one box per site. `intersect` may be NULL when no ray comes. */
-gbt_status site_scene_build(const point_tree *tree, RTCBoundsFunction bounds, RTCIntersectFunctionN intersect,
-                            RTCScene *out, gbt_error *err);
-
-/**
- * A radius for Embree that no site at `radius` or nearer can miss: its float32 squares are wrong by a few
- * 2^-24 of themselves, and by 1e-45 where they vanish.
- */
-float site_search_radius(const point_tree *tree, double radius);
-
-/** Call `visit` for (at least) every site whose box in `scene` is within `radius` of the query. */
-void sites_search(const point_tree *tree, RTCScene scene, const double query[3], double radius,
-                  RTCPointQueryFunction visit, void *search);
-
-/** What the queries that answer with a list have in common: points_list.c. */
-typedef struct list_search {
-    const point_tree *tree;
-    double query[3];
-    double radius; /* added to every ball's radius; a query on centres when there is no tree->radius or
-                      `centers` is set */
-    bool centers;
-    point_list *out;
-    gbt_status status; /* the first failure; the search then runs to its end and keeps nothing */
-    gbt_error *err;
-    double dir[3], t_min, t_max; /* of a segment that starts at `query` */
-} list_search;
-
-/** Push the points of a site whose ball, grown by s->radius, reaches as far as the distance. */
-void list_push_reaching(list_search *s, uint32_t site, double d2);
-
-/** Sort what was found; after a failure there is nothing. */
-gbt_status list_finish(list_search *s);
+/** Ascending by the high 32 bits, of which `bits` are used; equal ones stay in order. `spare` [count]. */
+void point_sort(uint64_t *item, uint64_t *spare, size_t count, int bits);
 
 #endif

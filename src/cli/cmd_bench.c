@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/cmd_bench.c -- gbtrace bench trace, and gbtrace check-grad. */
+/* cli/cmd_bench.c -- gbtrace bench trace, bench query, and gbtrace check-grad. */
 #include <stdio.h>
+#include <string.h>
 
 #include "cli/options.h"
 #include "lab/lab.h"
@@ -8,22 +9,25 @@
 static const command_word *workloads(void)
 {
     static const command_word words[] = {{"trace", "forward and backward pass of the ray tracer"},
+                                         {"query", "nearest neighbours: ours, FLANN, brute force"},
                                          {NULL, NULL}};
     return words;
 }
 
 static lab_bench_def def;
+static lab_bench_query_def query_def;
+static const char *query_folder;
 
 static const option *options_bench(int *count)
 {
     def = lab_bench_def_default();
+    query_def = lab_bench_query_def_default();
     static const option rows[] = {
         {.name = "model",
          .kind = OPTION_STRING,
          .value = &def.model,
          .value_name = "FILE|RUN",
-         .help = "plain Gaussians (gbtrace export --help lists their formats), or a trained run",
-         .required = true},
+         .help = "of trace: plain Gaussians (gbtrace export --help lists their formats), or a trained run"},
         {.name = "camera",
          .kind = OPTION_STRING,
          .value = &def.camera,
@@ -93,8 +97,28 @@ static const option *options_bench(int *count)
         {.name = "check",
          .kind = OPTION_FLAG,
          .value = &def.check,
-         .help = "compare with the double-precision reference"},
+         .help = "compare with the double-precision reference; queries with brute force"},
         JSON_OPTION(&def.json, "write the figures to this file"),
+        {.name = "points",
+         .kind = OPTION_UINT64,
+         .value = &query_def.points,
+         .min = 10000,
+         .max = 10000000,
+         .value_name = "N",
+         .help = "of query: the largest cloud, beside its tenths down to 10000"},
+        {.name = "queries",
+         .kind = OPTION_UINT64,
+         .value = &query_def.queries,
+         .min = 1,
+         .max = 10000000,
+         .value_name = "N",
+         .help = "of query: how many"},
+        {.name = "output",
+         .short_name = 'o',
+         .kind = OPTION_STRING,
+         .value = &query_folder,
+         .value_name = "DIR",
+         .help = "of query: write query.csv, query.json and query.svg there"},
         THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
@@ -103,14 +127,19 @@ static const option *options_bench(int *count)
 
 static int run_bench(const operands *given)
 {
-    (void)given; /* "trace", the only word */
     gbt_error err = {0};
+    if (strcmp(given->value[0], "query") == 0) {
+        query_def.check = def.check;
+        return command_failed(lab_bench_query(&query_def, query_folder, stdout, &err), &err);
+    }
+    if (def.model == NULL)
+        return command_misused("bench trace: --model is missing (wanted --model FILE|RUN)");
     return command_failed(lab_bench_trace(&def, stdout, &err), &err);
 }
 
 const command command_bench = {.name = "bench",
-                               .summary = "benchmark the ray tracer on given Gaussians",
-                               .usage = "trace --model FILE|RUN [--camera FILE.json]",
+                               .summary = "benchmark the ray tracer on given Gaussians, or neighbour queries",
+                               .usage = "trace --model FILE|RUN [--camera FILE.json] | query [-o DIR]",
                                .options = options_bench,
                                .min_operands = 1,
                                .max_operands = 1,

@@ -15,16 +15,15 @@
 static gbt_status find_nearest(const scene_points *points, const float *center, size_t count,
                                uint32_t *nearest, double *squares, gbt_error *err)
 {
-    point_tree *tree;
-    GBT_TRY(point_tree_build(center, NULL, count, &tree, err));
-    for (size_t i = 0; i < points->count; i++) {
-        double square = 0;
-        nearest[i] = 0;
-        point_tree_nearest(tree, points->position + 3 * i, 1, SIZE_MAX, &nearest[i], &square);
-        *squares += square;
-    }
-    point_tree_free(tree);
-    return GBT_OK;
+    double *square = mem_alloc(points->count, sizeof *square, "nearest anchors", err);
+    if (square == NULL)
+        return GBT_ERR_NO_MEMORY;
+    const gbt_status status =
+        points_find_nearest(center, count, points->position, points->count, nearest, square, err);
+    for (size_t i = 0; i < points->count && status == GBT_OK; i++)
+        *squares += square[i];
+    mem_free(square);
+    return status;
 }
 
 /* Squares of the differences to the mean colour of the points that share a centre, added up over points and

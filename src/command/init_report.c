@@ -80,19 +80,19 @@ static void rows_from_balls(anchor_rows *r, const balls *b, bool has_color)
 static gbt_status rows_from_nearest(anchor_rows *r, const anchors *a, const scene_points *points,
                                     gbt_error *err)
 {
-    point_tree *tree;
-    GBT_TRY(point_tree_build(a->position, NULL, a->count, &tree, err));
-    for (size_t i = 0; i < points->count; i++) {
-        uint32_t nearest;
-        double distance_squared;
-        if (point_tree_nearest(tree, points->position + 3 * i, 1, SIZE_MAX, &nearest, &distance_squared) == 0)
-            continue;
-        r->count[nearest] += 1.0f;
+    uint32_t *nearest = mem_alloc(points->count, sizeof *nearest, "nearest anchors", err);
+    if (nearest == NULL)
+        return GBT_ERR_NO_MEMORY;
+    const gbt_status status =
+        points_find_nearest(a->position, a->count, points->position, points->count, nearest, NULL, err);
+    for (size_t i = 0; i < points->count && status == GBT_OK; i++) {
+        const size_t j = nearest[i];
+        r->count[j] += 1.0f;
         for (size_t k = 0; k < 3; k++) /* a running mean, so that a crowded cell loses no digits */
-            r->color[3 * nearest + k] +=
-                (points->color[3 * i + k] - r->color[3 * nearest + k]) / r->count[nearest];
+            r->color[3 * j + k] += (points->color[3 * i + k] - r->color[3 * j + k]) / r->count[j];
     }
-    point_tree_free(tree);
+    mem_free(nearest);
+    GBT_TRY(status);
     for (size_t j = 0; j < a->count; j++)
         r->radius[j] = expf(a->scale_log[ANCHOR_SCALES * j]);
     return GBT_OK;

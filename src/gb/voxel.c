@@ -8,13 +8,10 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "bvh/points.h"
 #include "gb/balls.h"
 #include "gb/cloud.h"
 #include "gb/split.h"
-
-enum { POINTS_PER_BLOCK = 1024 };
 
 typedef struct row {
     float x[3];
@@ -41,41 +38,31 @@ static size_t sort_unique(row *rows, size_t count)
     return kept;
 }
 
-typedef struct spacing_job {
-    const point_tree *tree;
-    const float *position;
-    gbt_voxel_rule rule;
-    double *value; /* one per point of the tree */
-} spacing_job;
-
-static void measure_spacing(size_t block, size_t begin, size_t end, void *context)
-{
-    (void)block;
-    const spacing_job *job = context;
-    for (size_t i = begin; i < end; i++) {
-        uint32_t index[3];
-        double squared[3], sum = 0;
-        const size_t wanted = job->rule == GBT_VOXEL_RULE_SQUARED ? 3 : 1;
-        const size_t found = point_tree_nearest(job->tree, job->position + 3 * i, wanted, i, index, squared);
-        for (size_t k = 0; k < found; k++)
-            sum += squared[k];
-        /* At least one neighbour: there are 2 points. Fewer than 4 points have fewer than 3 neighbours to
-           average. */
-        job->value[i] = job->rule == GBT_VOXEL_RULE_SQUARED ? sum / (double)found : sqrt(sum);
-    }
-}
-
 /* Fills value[0 .. count) for count >= 2 points. */
 static gbt_status measure(const float *position, size_t count, gbt_voxel_rule rule, double *value,
                           gbt_error *err)
 {
-    spacing_job job = {.position = position, .rule = rule, .value = value};
-    point_tree *tree;
-    GBT_TRY(point_tree_build(position, NULL, count, &tree, err));
-    job.tree = tree;
-    parallel_blocks(count, POINTS_PER_BLOCK, measure_spacing, &job);
+    const size_t wanted = rule == GBT_VOXEL_RULE_SQUARED ? 3 : 1;
+    point_tree *tree = NULL;
+    uint32_t *index = mem_alloc(count, wanted * sizeof *index, "voxel size.nearest", err);
+    double *squared = mem_alloc(count, wanted * sizeof *squared, "voxel size.nearest", err);
+    gbt_status status = index == NULL || squared == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    if (status == GBT_OK)
+        status = point_tree_build(number_floats(position), (number_array){0}, count, &tree, err);
+    if (status == GBT_OK)
+        status =
+            point_tree_nearest_all(tree, number_floats(position), count, wanted, true, index, squared, err);
+    for (size_t i = 0; i < count && status == GBT_OK; i++) {
+        double sum = 0;
+        size_t found = 0; /* at least one: there are 2 points; fewer than 4 points have fewer than 3 */
+        for (size_t k = 0; k < wanted && index[wanted * i + k] != UINT32_MAX; k++, found++)
+            sum += squared[wanted * i + k];
+        value[i] = rule == GBT_VOXEL_RULE_SQUARED ? sum / (double)found : sqrt(sum);
+    }
     point_tree_free(tree);
-    return GBT_OK;
+    mem_free(index);
+    mem_free(squared);
+    return status;
 }
 
 /* Lower median: rank (n - 1) / 2. The reference code takes the k-th smallest, k = floor(n / 2) from 1: one

@@ -9,7 +9,6 @@
 #include "base/fail.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "bvh/points.h"
 #include "train/def.h"
 #include "train/camera_sees.h"
@@ -47,23 +46,6 @@ static gbt_status follow_creation(trainer *t, const growth_result *result, gbt_e
     return GBT_OK;
 }
 
-typedef struct nearest_job {
-    const point_tree *anchors;
-    const float *point;
-    uint32_t *nearest;
-} nearest_job;
-
-static void nearest_block(size_t block, size_t begin, size_t end, void *context)
-{
-    (void)block;
-    const nearest_job *job = context;
-    for (size_t i = begin; i < end; i++) {
-        double square;
-        job->nearest[i] = 0;
-        point_tree_nearest(job->anchors, job->point + 3 * i, 1, SIZE_MAX, &job->nearest[i], &square);
-    }
-}
-
 /* What find_points() makes; owned. */
 typedef struct known_points {
     uint32_t *nearest; /* [points]: anchor */
@@ -88,11 +70,10 @@ static gbt_status find_points(const trainer *t, known_points *known, growth_poin
         GBT_TRY(anchor_scales_from_spacing(points->position, points->count, TRAIN_SPACING_SCALE,
                                            t->first_scale_max, known->scale, err));
     }
-    point_tree *tree;
-    GBT_TRY(point_tree_build(t->anchors.position, NULL, t->anchors.count, &tree, err));
-    nearest_job job = {tree, points->position, known->nearest};
-    parallel_blocks(points->count, 256, nearest_block, &job);
-    point_tree_free(tree);
+    if (t->anchors.count == 0)
+        return GBT_OK; /* nothing that could ask for more */
+    GBT_TRY(points_find_nearest(t->anchors.position, t->anchors.count, points->position, points->count,
+                                known->nearest, NULL, err));
     *out = (growth_points){.count = points->count,
                            .position = points->position,
                            .anchor = known->nearest,

@@ -133,18 +133,18 @@ static gbt_status measure_distances(trainer *t, float *p5, float *median, float 
    anchor. The rest is 0. */
 static gbt_status start_features(trainer *t, gbt_error *err)
 {
-    point_tree *tree = NULL;
-    GBT_TRY(point_tree_build(t->scene.points.position, NULL, t->scene.points.count, &tree, err));
-    for (size_t i = 0; i < t->anchors.count; i++) {
-        uint32_t nearest;
-        double square;
-        if (point_tree_nearest(tree, t->anchors.position + 3 * i, 1, SIZE_MAX, &nearest, &square) == 0)
-            continue;
+    const scene_points *points = &t->scene.points;
+    uint32_t *nearest = mem_alloc(t->anchors.count, sizeof *nearest, "features", err);
+    if (nearest == NULL)
+        return GBT_ERR_NO_MEMORY;
+    const gbt_status status = points_find_nearest(points->position, points->count, t->anchors.position,
+                                                  t->anchors.count, nearest, NULL, err);
+    for (size_t i = 0; i < t->anchors.count && status == GBT_OK && points->count > 0; i++)
         for (size_t c = 0; c < 3; c++)
-            t->anchors.feature[i * ANCHOR_FEATURE_DIM + c] = 2 * t->scene.points.color[3 * nearest + c] - 1;
-    }
-    point_tree_free(tree);
-    return GBT_OK;
+            t->anchors.feature[i * ANCHOR_FEATURE_DIM + c] =
+                2 * points->color[3 * (size_t)nearest[i] + c] - 1;
+    mem_free(nearest);
+    return status;
 }
 
 /* What lies behind everything and was never photographed looks least wrong in the scene's mean colour. */

@@ -23,6 +23,57 @@ static float uniform(uint64_t seed, uint64_t index, float low, float high)
 
 /* ---- exact boundaries, one ball ---- */
 
+/* ---- as floats ---- */
+
+static gbt_status build(const float *position, const float *radius, size_t count, point_tree **out,
+                        gbt_error *err)
+{
+    return point_tree_build(number_floats(position), number_floats(radius), count, out, err);
+}
+
+static size_t nearest(const point_tree *tree, const float *q, size_t k, size_t skip, uint32_t *index,
+                      double *d2)
+{
+    const double query[3] = {(double)q[0], (double)q[1], (double)q[2]};
+    return point_tree_nearest(tree, query, k, skip, index, d2);
+}
+
+static gbt_status around(const point_tree *tree, point_question what, const float q[3], float radius,
+                         point_list *out, gbt_error *err)
+{
+    const point_query query = {
+        .what = what, .a = {(double)q[0], (double)q[1], (double)q[2]}, .radius = (double)radius};
+    return point_tree_list(tree, &query, out, err);
+}
+
+static gbt_status within(const point_tree *tree, const float q[3], float radius, point_list *out,
+                         gbt_error *err)
+{
+    return around(tree, POINTS_WITHIN, q, radius, out, err);
+}
+
+static gbt_status containing(const point_tree *tree, const float q[3], point_list *out, gbt_error *err)
+{
+    return around(tree, POINTS_CONTAINING, q, 0, out, err);
+}
+
+static gbt_status overlapping(const point_tree *tree, const float q[3], float radius, point_list *out,
+                              gbt_error *err)
+{
+    return around(tree, POINTS_OVERLAPPING, q, radius, out, err);
+}
+
+static gbt_status crossed_by(const point_tree *tree, const float origin[3], const float dir[3], float t_min,
+                             float t_max, point_list *out, gbt_error *err)
+{
+    const point_query query = {.what = POINTS_CROSSED,
+                               .a = {(double)origin[0], (double)origin[1], (double)origin[2]},
+                               .b = {(double)dir[0], (double)dir[1], (double)dir[2]},
+                               .t_min = (double)t_min,
+                               .t_max = (double)t_max};
+    return point_tree_list(tree, &query, out, err);
+}
+
 typedef struct ball_case {
     const char *name;
     float center[3], ball_radius, query[3], radius;
@@ -53,14 +104,14 @@ static void one_ball(void **state)
 {
     const ball_case *c = *state;
     point_tree *tree = NULL;
-    assert_ok(point_tree_build(c->center, &c->ball_radius, 1, &tree, NULL));
+    assert_ok(build(c->center, &c->ball_radius, 1, &tree, NULL));
     point_list list = {0};
     gbt_error err = {0};
-    assert_int_equal(point_tree_within(tree, c->query, c->radius, &list, &err), GBT_OK);
+    assert_int_equal(within(tree, c->query, c->radius, &list, &err), GBT_OK);
     assert_int_equal(list.count, c->within);
-    assert_int_equal(point_tree_containing(tree, c->query, &list, &err), GBT_OK);
+    assert_int_equal(containing(tree, c->query, &list, &err), GBT_OK);
     assert_int_equal(list.count, c->containing);
-    assert_int_equal(point_tree_overlapping(tree, c->query, c->radius, &list, &err), GBT_OK);
+    assert_int_equal(overlapping(tree, c->query, c->radius, &list, &err), GBT_OK);
     assert_int_equal(list.count, c->overlapping);
     point_list_free(&list);
     point_tree_free(tree);
@@ -106,9 +157,9 @@ static void one_ray(void **state)
 {
     const ray_case *c = *state;
     point_tree *tree = NULL;
-    assert_ok(point_tree_build(c->center, &c->radius, 1, &tree, NULL));
+    assert_ok(build(c->center, &c->radius, 1, &tree, NULL));
     point_list list = {0};
-    assert_ok(point_tree_crossed(tree, c->origin, c->dir, c->t_min, c->t_max, &list, NULL));
+    assert_ok(crossed_by(tree, c->origin, c->dir, c->t_min, c->t_max, &list, NULL));
     assert_int_equal(list.count, c->crossed);
     point_list_free(&list);
     point_tree_free(tree);
@@ -134,15 +185,14 @@ static void bad_queries_are_refused(void **state)
     const float position[6] = {0, 0, 0, 1, 1, 1}, radius[2] = {1, 2}, good[3] = {0, 0, 0};
     for (int with_points = 0; with_points < 2; with_points++) {
         point_tree *tree = NULL;
-        assert_ok(point_tree_build(position, radius, with_points ? 2 : 0, &tree, NULL));
+        assert_ok(build(position, radius, with_points ? 2 : 0, &tree, NULL));
         point_list list = {0};
-        assert_ok(point_tree_within(tree, good, 9, &list, NULL));
+        assert_ok(within(tree, good, 9, &list, NULL));
         assert_int_equal(list.count, with_points ? 2 : 0);
         for (size_t i = 0; i < sizeof bad_rays / sizeof *bad_rays; i++) {
             const bad_ray *b = &bad_rays[i];
             gbt_error err = {0};
-            if (point_tree_crossed(tree, b->origin, b->dir, b->t_min, b->t_max, &list, &err) !=
-                    GBT_ERR_ARGUMENT ||
+            if (crossed_by(tree, b->origin, b->dir, b->t_min, b->t_max, &list, &err) != GBT_ERR_ARGUMENT ||
                 list.count != 0 || strstr(err.text, "points: bad ray") != err.text)
                 fail_msg("%s: taken", b->name);
         }
@@ -151,24 +201,25 @@ static void bad_queries_are_refused(void **state)
             float query[3] = {0, 0, 0}, spare;
             query[i % 3] = bad[i / 3];
             gbt_error err = {0};
-            assert_int_equal(point_tree_within(tree, query, 1, &list, &err), GBT_ERR_ARGUMENT);
-            assert_int_equal(point_tree_containing(tree, query, &list, &err), GBT_ERR_ARGUMENT);
-            assert_int_equal(point_tree_overlapping(tree, query, 1, &list, &err), GBT_ERR_ARGUMENT);
+            assert_int_equal(within(tree, query, 1, &list, &err), GBT_ERR_ARGUMENT);
+            assert_int_equal(containing(tree, query, &list, &err), GBT_ERR_ARGUMENT);
+            assert_int_equal(overlapping(tree, query, 1, &list, &err), GBT_ERR_ARGUMENT);
             assert_non_null(strstr(err.text, "points: bad query"));
             uint32_t index;
             double d2;
-            assert_int_equal(point_tree_nearest(tree, query, 1, SIZE_MAX, &index, &d2), 0);
+            assert_int_equal(nearest(tree, query, 1, SIZE_MAX, &index, &d2), 0);
             err = (gbt_error){0};
-            assert_int_equal(point_tree_spacing(tree, i % 2 ? 0 : 65, &spare, &err), GBT_ERR_ARGUMENT);
+            assert_int_equal(point_tree_spacing(tree, number_floats(position), i % 2 ? 0 : 65, &spare, &err),
+                             GBT_ERR_ARGUMENT);
             assert_non_null(strstr(err.text, "1..64"));
         }
         gbt_error err = {0};
-        assert_int_equal(point_tree_within(tree, good, NAN, &list, &err), GBT_ERR_ARGUMENT);
-        assert_int_equal(point_tree_within(tree, good, -1e-30f, &list, NULL), GBT_ERR_ARGUMENT);
-        assert_int_equal(point_tree_overlapping(tree, good, -1, &list, NULL), GBT_ERR_ARGUMENT);
+        assert_int_equal(within(tree, good, NAN, &list, &err), GBT_ERR_ARGUMENT);
+        assert_int_equal(within(tree, good, -1e-30f, &list, NULL), GBT_ERR_ARGUMENT);
+        assert_int_equal(overlapping(tree, good, -1, &list, NULL), GBT_ERR_ARGUMENT);
         assert_non_null(strstr(err.text, "points: bad search radius"));
         point_list_free(&list);
-        assert_null(list.index);
+        assert_null(list.item);
         point_tree_free(tree);
     }
     point_tree_free(NULL);
@@ -183,18 +234,18 @@ static void bad_points_are_named(void **state)
         position[3 * 7 + 2] = bad[i];
         point_tree *tree = (point_tree *)position;
         gbt_error err = {0};
-        assert_int_equal(point_tree_build(position, NULL, 10, &tree, &err), GBT_ERR_ARGUMENT);
+        assert_int_equal(build(position, NULL, 10, &tree, &err), GBT_ERR_ARGUMENT);
         assert_null(tree);
         assert_non_null(strstr(err.text, "point 7: bad coordinate"));
         position[3 * 7 + 2] = 0;
         radius[4] = i == 0 ? -1 : bad[i - 1];
         err = (gbt_error){0};
-        assert_int_equal(point_tree_build(position, radius, 10, &tree, &err), GBT_ERR_ARGUMENT);
+        assert_int_equal(build(position, radius, 10, &tree, &err), GBT_ERR_ARGUMENT);
         assert_non_null(strstr(err.text, "point 4: bad radius"));
     }
     point_tree *tree = NULL;
     gbt_error err = {0};
-    assert_int_equal(point_tree_build(NULL, NULL, UINT32_MAX, &tree, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(build(NULL, NULL, UINT32_MAX, &tree, &err), GBT_ERR_ARGUMENT);
 }
 
 /* ---- brute force in double ---- */
@@ -324,7 +375,7 @@ static void expect_list(const char *what, const char *where, size_t q, const poi
 {
     size_t at = 0;
     for (size_t i = 0; i < count; i++) {
-        const bool got = at < list->count && list->index[at] == i;
+        const bool got = at < list->count && point_list_index(list, at) == i;
         at += got;
         if (got != wanted[i])
             fail_msg("%s, %s, query %zu: point %zu is %s", where, what, q, i,
@@ -345,7 +396,7 @@ static void compare_one_set(shape kind, int mode, uint64_t seed, size_t count)
     make_radii(mode, seed, count, size_of(kind), radius);
     point_tree *tree = NULL;
     gbt_error err = {0};
-    if (point_tree_build(position, mode > 0 ? radius : NULL, count, &tree, &err) != GBT_OK)
+    if (build(position, mode > 0 ? radius : NULL, count, &tree, &err) != GBT_OK)
         fail_msg("%s: %s", where, err.text);
     point_list list = {0};
     for (size_t q = 0; q < 40; q++) {
@@ -361,7 +412,7 @@ static void compare_one_set(shape kind, int mode, uint64_t seed, size_t count)
                          skip = q % 2 == 0 || count == 0 ? SIZE_MAX : rank[q % (count < 3 ? count : 3)].index;
             uint32_t index[MAX_K];
             double d2[MAX_K];
-            const size_t found = point_tree_nearest(tree, query, k, skip, index, d2);
+            const size_t found = nearest(tree, query, k, skip, index, d2);
             const size_t there = count - (skip != SIZE_MAX);
             assert_int_equal(found, k < there ? k : there);
             for (size_t i = 0, r = 0; i < found; i++, r++) {
@@ -378,19 +429,19 @@ static void compare_one_set(shape kind, int mode, uint64_t seed, size_t count)
         reach = q % 10 == 9 ? 1e30f : q % 10 == 8 ? 0 : isfinite(reach) ? reach : FLT_MAX;
         for (size_t i = 0; i < count; i++)
             wanted[i] = brute_distance_squared(position + 3 * i, query) <= (double)reach * (double)reach;
-        assert_ok(point_tree_within(tree, query, reach, &list, NULL));
+        assert_ok(within(tree, query, reach, &list, NULL));
         expect_list("within", where, q, &list, wanted, count);
         for (size_t i = 0; i < count; i++) {
             const double r = mode > 0 ? (double)radius[i] : 0;
             wanted[i] = brute_distance_squared(position + 3 * i, query) <= r * r;
         }
-        assert_ok(point_tree_containing(tree, query, &list, NULL));
+        assert_ok(containing(tree, query, &list, NULL));
         expect_list("containing", where, q, &list, wanted, count);
         for (size_t i = 0; i < count; i++) {
             const double r = (double)reach + (mode > 0 ? (double)radius[i] : 0);
             wanted[i] = brute_distance_squared(position + 3 * i, query) <= r * r;
         }
-        assert_ok(point_tree_overlapping(tree, query, reach, &list, NULL));
+        assert_ok(overlapping(tree, query, reach, &list, NULL));
         expect_list("overlapping", where, q, &list, wanted, count);
     }
     point_list_free(&list);
@@ -440,7 +491,7 @@ static void rays_agree_with_brute_force(void **state)
         make_points(kind, seed, count, position);
         make_radii(mode, seed, count, size_of(kind), radius);
         point_tree *tree = NULL;
-        assert_ok(point_tree_build(position, mode > 0 ? radius : NULL, count, &tree, NULL));
+        assert_ok(build(position, mode > 0 ? radius : NULL, count, &tree, NULL));
         point_list list = {0};
         for (size_t q = 0; q < 200; q++) {
             float origin[3], target[3], dir[3];
@@ -458,11 +509,11 @@ static void rays_agree_with_brute_force(void **state)
                 continue;
             const float t_min = q % 4 == 1 ? 0.5f : q % 4 == 2 ? -1 : 0, t_max = q % 2 ? INFINITY : 2;
             gbt_error err = {0};
-            if (point_tree_crossed(tree, origin, dir, t_min, t_max, &list, &err) != GBT_OK)
+            if (crossed_by(tree, origin, dir, t_min, t_max, &list, &err) != GBT_OK)
                 fail_msg("%s: %s", shape_names[kind], err.text);
             size_t at = 0;
             for (size_t i = 0; i < count; i++) {
-                const bool got = at < list.count && list.index[at] == i;
+                const bool got = at < list.count && point_list_index(&list, at) == i;
                 at += got;
                 long double size;
                 const long double gap =
@@ -507,12 +558,12 @@ static void agrees_with_flann(void **state)
         assert_int_equal(
             flann_find_nearest_neighbors_index_float(flann, query, COUNT, flann_index, flann_d2, K, &p), 0);
         point_tree *tree = NULL;
-        assert_ok(point_tree_build(position, NULL, COUNT, &tree, NULL));
+        assert_ok(build(position, NULL, COUNT, &tree, NULL));
         size_t same = 0;
         for (size_t q = 0; q < COUNT; q++) {
             uint32_t index[K];
             double d2[K];
-            assert_int_equal(point_tree_nearest(tree, query + 3 * q, K, SIZE_MAX, index, d2), K);
+            assert_int_equal(nearest(tree, query + 3 * q, K, SIZE_MAX, index, d2), K);
             for (size_t i = 0; i < K; i++) {
                 same += (int)index[i] == flann_index[q * K + i];
                 assert_true(fabs(d2[i] - (double)flann_d2[q * K + i]) <= 1e-5 * d2[i] + 1e-12);
@@ -555,8 +606,8 @@ static void spacing_by_hand(void **state)
     for (size_t i = 0; i < 9; i++)
         spacing[i] = -1;
     point_tree *tree = NULL;
-    assert_ok(point_tree_build(position, NULL, c->count, &tree, NULL));
-    assert_ok(point_tree_spacing(tree, c->k, spacing, NULL));
+    assert_ok(build(position, NULL, c->count, &tree, NULL));
+    assert_ok(point_tree_spacing(tree, number_floats(position), c->k, spacing, NULL));
     for (size_t i = 0; i < c->count; i++)
         assert_float_equal(spacing[i], c->spacing[i], 1e-6);
     assert_true(spacing[c->count] == -1);
@@ -571,9 +622,9 @@ static void spacing_agrees_with_brute_force(void **state)
     static ranked rank[MAX_COUNT];
     make_points(kind, 31, MAX_COUNT, position);
     point_tree *tree = NULL;
-    assert_ok(point_tree_build(position, NULL, MAX_COUNT, &tree, NULL));
+    assert_ok(build(position, NULL, MAX_COUNT, &tree, NULL));
     for (size_t k = 1; k <= MAX_K; k += 21) {
-        assert_ok(point_tree_spacing(tree, k, spacing, NULL));
+        assert_ok(point_tree_spacing(tree, number_floats(position), k, spacing, NULL));
         for (size_t i = 0; i < MAX_COUNT; i++) {
             size_t others = 0;
             for (size_t j = 0; j < MAX_COUNT; j++)
@@ -622,12 +673,12 @@ static void stacks_are_not_quadratic(void **state)
                 position[3 * i + j] = (float)(i % (size_t)stacks) * 0.25f;
         const double start = cpu_seconds();
         point_tree *tree = NULL;
-        assert_ok(point_tree_build(position, NULL, COUNT, &tree, NULL));
-        assert_ok(point_tree_spacing(tree, 3, spacing, NULL));
+        assert_ok(build(position, NULL, COUNT, &tree, NULL));
+        assert_ok(point_tree_spacing(tree, number_floats(position), 3, spacing, NULL));
         const float query[3] = {0, 0, 0};
         uint32_t index[MAX_K];
         double d2[MAX_K];
-        assert_int_equal(point_tree_nearest(tree, query, MAX_K, 0, index, d2), MAX_K);
+        assert_int_equal(nearest(tree, query, MAX_K, 0, index, d2), MAX_K);
         for (uint32_t i = 0; i < MAX_K; i++) {
             assert_true(d2[i] == 0);
             assert_int_equal(index[i], (i + 1) * (uint32_t)stacks); /* the lowest of the stack, without number
@@ -656,7 +707,7 @@ static void no_memory(void **state)
         tree = (point_tree *)position;
         gbt_error err = {0};
         mem_fail_after(n);
-        status = point_tree_build(position, radius, 100, &tree, &err);
+        status = build(position, radius, 100, &tree, &err);
         mem_fail_after(-1);
         assert_true(status == GBT_OK || (status == GBT_ERR_NO_MEMORY && tree == NULL && err.text[0] != '\0'));
     }
@@ -670,10 +721,10 @@ static void no_memory(void **state)
             assert_true(n < 100);
             gbt_error err = {0};
             mem_fail_after(n);
-            status = kind == 0   ? point_tree_within(tree, query, 10, &list, &err)
-                     : kind == 1 ? point_tree_overlapping(tree, query, 10, &list, &err)
-                     : kind == 2 ? point_tree_containing(tree, query, &list, &err)
-                                 : point_tree_crossed(tree, query, dir, -10, 10, &list, &err);
+            status = kind == 0   ? within(tree, query, 10, &list, &err)
+                     : kind == 1 ? overlapping(tree, query, 10, &list, &err)
+                     : kind == 2 ? containing(tree, query, &list, &err)
+                                 : crossed_by(tree, query, dir, -10, 10, &list, &err);
             mem_fail_after(-1);
             assert_true(status == GBT_OK ||
                         (status == GBT_ERR_NO_MEMORY && list.count == 0 && err.status == status));
@@ -709,17 +760,17 @@ static void ask(size_t block, size_t begin, size_t end, void *context)
         uint64_t hash = q;
         uint32_t index[5];
         double d2[5];
-        const size_t found = point_tree_nearest(job->tree, query, 5, q, index, d2);
+        const size_t found = nearest(job->tree, query, 5, q, index, d2);
         for (size_t i = 0; i < found; i++)
             mix(&hash, index[i]);
-        gbt_status status = point_tree_overlapping(job->tree, query, 0.05f, &list, NULL);
+        gbt_status status = overlapping(job->tree, query, 0.05f, &list, NULL);
         for (size_t i = 0; i < list.count; i++)
-            mix(&hash, list.index[i]);
+            mix(&hash, point_list_index(&list, i));
         if (status == GBT_OK)
-            status = point_tree_crossed(job->tree, query, dir, 0, 1, &list, NULL); /* the first of all threads
+            status = crossed_by(job->tree, query, dir, 0, 1, &list, NULL); /* the first of all threads
                                                                                       builds */
         for (size_t i = 0; i < list.count; i++)
-            mix(&hash, list.index[i]);
+            mix(&hash, point_list_index(&list, i));
         job->hash[q] = status == GBT_OK ? hash : 0;
     }
     point_list_free(&list);
@@ -741,10 +792,10 @@ static void same_answers_for_any_threads(void **state)
         spacing[run] = mem_alloc(COUNT, sizeof **spacing, "test", NULL);
         hash[run] = mem_alloc(COUNT, sizeof **hash, "test", NULL);
         point_tree *tree = NULL;
-        assert_ok(point_tree_build(position, radius, COUNT, &tree, NULL));
+        assert_ok(build(position, radius, COUNT, &tree, NULL));
         thread_job job = {.tree = tree, .position = position, .hash = hash[run]};
         parallel_blocks(COUNT, 16, ask, &job);
-        assert_ok(point_tree_spacing(tree, 3, spacing[run], NULL));
+        assert_ok(point_tree_spacing(tree, number_floats(position), 3, spacing[run], NULL));
         point_tree_free(tree);
         for (size_t i = 0; i < COUNT; i++)
             assert_true(hash[run][i] != 0);
@@ -796,11 +847,11 @@ static void garden(void **state)
 
     const double t0 = wall_seconds();
     point_tree *tree = NULL;
-    assert_ok(point_tree_build(position, NULL, COUNT, &tree, NULL));
+    assert_ok(build(position, NULL, COUNT, &tree, NULL));
     const double t1 = wall_seconds();
-    assert_ok(point_tree_spacing(tree, 3, spacing, NULL));
+    assert_ok(point_tree_spacing(tree, number_floats(position), 3, spacing, NULL));
     const double t2 = wall_seconds();
-    assert_ok(point_tree_spacing(tree, 1, spacing, NULL));
+    assert_ok(point_tree_spacing(tree, number_floats(position), 1, spacing, NULL));
     const double t3 = wall_seconds();
     print_message("garden, %d threads: build %.0f ms, spacing k = 3 %.0f ms, k = 1 %.0f ms\n",
                   parallel_threads(), 1e3 * (t1 - t0), 1e3 * (t2 - t1), 1e3 * (t3 - t2));

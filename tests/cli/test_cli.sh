@@ -354,7 +354,24 @@ rm -rf study
 prints "bench of other plain Gaussians" '^forward, core-us/ray' bench trace --model alone/gaussians.splat --camera camera.json --repeats 1
 misuse 2 'study: "pace" (wanted speed, crosscheck, rate, stability, paper, time or anchors; did you mean rate?)' study pace gaussians.ply -o study
 misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study zzzzzz gaussians.ply -o study
-misuse 2 'bench: "tarce" (wanted trace; did you mean trace?)' bench tarce --model gaussians.ply
+misuse 2 'bench: "tarce" (wanted trace or query; did you mean trace?)' bench tarce --model gaussians.ply
+misuse 2 "bench trace: --model is missing (wanted --model FILE|RUN)" bench trace
+misuse 2 "--points: bad value (wanted a whole number from 10000 to 10000000, got 10)" bench query --points 10
+bench="bench query --points 10000 --queries 2000 --check"
+prints "bench query agrees with brute force" '^| 8 nearest | 2000 | 16000 | 0 |$' $bench -o query
+prints "for rays too" '^| crossed | 2000 | [1-9][0-9]* | 0 |$' $bench
+[ "$(sed -n 's/^random,10000,flann,0,8,[^,]*,[^,]*,\([^,]*\),$/\1/p' query/query.csv)" = 1 ] && grep -q '"pass": true' query/query.json &&
+    grep -q 'brute force' query/query.svg
+report $? "bench query writes its figures; FLANN finds the same" "$(cat query/query.csv)"
+printf '0 0 0 1\n3 4 0 2\n' >balls.txt
+prints "query, a header" '^query,rank,ball,distance,x,y,z,radius$' query nearest balls.txt --at 0,0,1
+prints "query, nearest" '^0,1,1,5,3,4,0,2$' query nearest balls.txt --at 0,0,0 -k 2
+prints "query along a ray" '^0,0,1,4,3,4,0,2$' query crossed balls.txt --at 3,0,0,0,1,0
+prints "query of plain Gaussians" '^0,0,[0-9]*,' query nearest gaussians.ply --at=-1,0,0
+misuse 2 "--at, --from: neither (wanted one of them)" query nearest balls.txt
+misuse 3 "at:1: 2 numbers (wanted 3)" query nearest balls.txt --at 0,0
+misuse 4 "nowhere.txt: No such file or directory" query nearest nowhere.txt --at 0,0,0
+misuse 2 'query: "near" (wanted nearest, within, containing, overlapping or crossed; did you mean nearest?)' query near balls.txt --at 0,0,0
 misuse 2 "argument missing (usage: gbtrace study STUDY [MODEL|DATA...] -o DIR)" study -o study
 misuse 2 "study crosscheck: wanted a model, or data to train on" study crosscheck -o study
 misuse 2 'study stability: "gaussians.ply" is one too many' study stability gaussians.ply -o study

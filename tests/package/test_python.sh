@@ -31,5 +31,7 @@ GBT_MODEL=$work/run GBT_DATA=$work/data GBT_INCLUDE=$source/include GBT_SCRATCH=
 export GBT_MODEL GBT_DATA GBT_INCLUDE GBT_SCRATCH
 check "python/tests" "$python" "$source/python/tests/test_gbtrace.py"
 check "examples/python/pose.py" sh -c "'$python' '$source/examples/python/pose.py' '$work/run' >'$work/pose.txt'"
+check "examples/python/query.py" sh -c "'$python' '$source/examples/python/query.py' '$work/run' >'$work/query.txt'"
+check "the query is answered" grep -q 'anchors, [1-9][0-9]* along the ray; the first is' "$work/query.txt"
 check "the pose is found" awk '/^before/ { d = $2; a = $4 } /^after/ { ok = $2 < 0.01 * d && $4 < 0.01 * a } END { exit !ok }' "$work/pose.txt"
 report "$work/pose.txt"

@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* query/answer.c -- queries of a file, answered as CSV. */
+#include <math.h>
+#include <string.h>
+
+#include "base/def.h"
+#include "base/fail.h"
+#include "base/memory.h"
+#include "data/number.h"
+#include "gbtrace/query.h"
+#include "query/rows.h"
+
+gbt_query_def gbt_query_def_default(void) { return (gbt_query_def){.k = 1, .cookie_ = DEF_COOKIE}; }
+
+static gbt_status check(const gbt_query_def *def, gbt_error *err)
+{
+    GBT_TRY(def_check(def->cookie_, "gbt_query_def_default", err));
+    if ((unsigned)def->kind > GBT_QUERY_CROSSED)
+        return base_fail(err, GBT_ERR_ARGUMENT, "kind: %d", (int)def->kind);
+    if ((def->at == NULL) == (def->from == NULL))
+        return base_fail(err, GBT_ERR_ARGUMENT, "at, from: %s (wanted one of them)",
+                         def->at == NULL ? "neither" : "both");
+    if (def->k < 1 || def->k > 1000000)
+        return base_fail(err, GBT_ERR_ARGUMENT, "k: %d (wanted 1 to 1000000)", def->k);
+    if (!(def->radius >= 0))
+        return base_fail(err, GBT_ERR_ARGUMENT, "radius: %g (wanted 0 or more)", def->radius);
+    return GBT_OK;
+}
+
+static gbt_status read_queries(const gbt_query_def *def, query_rows *rows, gbt_error *err)
+{
+    const bool ray = def->kind == GBT_QUERY_CROSSED,
+               round = def->kind == GBT_QUERY_WITHIN || def->kind == GBT_QUERY_OVERLAPPING;
+    const size_t least = ray ? 6 : 3, most = ray ? 8 : round ? 4 : 3;
+    if (def->at != NULL)
+        GBT_TRY(query_rows_parse("at", def->at, strlen(def->at), least, most, rows, err));
+    else
+        GBT_TRY(query_rows_read(def->from, least, most, rows, err));
+    if (rows->count == 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%.400s: no queries", def->at != NULL ? "at" : def->from);
+    if (rows->width == 7)
+        return base_fail(err, GBT_ERR_FORMAT, "%.400s: 7 numbers (wanted 6, or 8 with t_min and t_max)",
+                         def->at != NULL ? "at" : def->from);
+    return GBT_OK;
+}
+
+/* Numbers `from` to `from` + `width` of each row, side by side. NULL without memory. */
+static double *take(const query_rows *rows, size_t from, size_t width, gbt_error *err)
+{
+    double *out = mem_alloc(rows->count, width * sizeof *out, "queries", err);
+    for (size_t i = 0; i < rows->count && out != NULL; i++)
+        memcpy(out + width * i, rows->value + rows->width * i + from, width * sizeof *out);
+    return out;
+}
+
+/* ---- out ---- */
+
+static void put(FILE *out, char before, double value)
+{
+    char text[NUMBER_TEXT_SIZE];
+    number_format_double(value, text);
+    fprintf(out, "%c%s", before, text);
+}
+
+static void print_answer(FILE *out, const gbt_balls_view *v, size_t query, size_t rank, uint32_t ball,
+                         double value)
+{
+    fprintf(out, "%zu,%zu,%u", query, rank, (unsigned)ball);
+    put(out, ',', value);
+    for (size_t j = 0; j < 3; j++)
+        put(out, ',', v->position[3 * (size_t)ball + j]);
+    put(out, ',', v->radius != NULL ? v->radius[ball] : 0);
+    putc('\n', out);
+}
+
+static gbt_status nearest(const gbt_balls *balls, const gbt_query_def *def, const double *point, size_t count,
+                          FILE *out, gbt_error *err)
+{
+    const gbt_balls_view v = gbt_balls_get(balls);
+    const size_t k = (size_t)def->k < v.count ? (size_t)def->k : v.count;
+    if (k == 0)
+        return GBT_OK;
+    uint32_t *index = mem_alloc(count, k * sizeof *index, "answers", err);
+    double *distance = mem_alloc(count, k * sizeof *distance, "answers", err);
+    const gbt_status status = index == NULL || distance == NULL
+                                  ? GBT_ERR_NO_MEMORY
+                                  : gbt_balls_nearest(balls, point, count, k, false, index, distance, err);
+    for (size_t i = 0; i < count * k && status == GBT_OK; i++)
+        print_answer(out, &v, i / k, i % k, index[i], distance[i]);
+    mem_free(index);
+    mem_free(distance);
+    return status;
+}
+
+static gbt_status lists(const gbt_balls *balls, const gbt_query_def *def, const query_rows *rows,
+                        const double *point, FILE *out, gbt_error *err)
+{
+    const gbt_balls_view v = gbt_balls_get(balls);
+    const size_t n = rows->count;
+    const bool ray = def->kind == GBT_QUERY_CROSSED;
+    double *direction = ray ? take(rows, 3, 3, err) : NULL;
+    double *first = rows->width == 4   ? take(rows, 3, 1, err)
+                    : rows->width == 8 ? take(rows, 6, 1, err)
+                                       : mem_alloc(n, sizeof *first, "queries", err);
+    double *second = rows->width == 8 ? take(rows, 7, 1, err) : mem_alloc(n, sizeof *second, "queries", err);
+    gbt_answers a = {0};
+    gbt_status status =
+        first == NULL || second == NULL || (ray && direction == NULL) ? GBT_ERR_NO_MEMORY : GBT_OK;
+    for (size_t i = 0; i < n && status == GBT_OK; i++) {
+        if (rows->width < 4 || rows->width == 6)
+            first[i] = ray ? 0 : def->radius;
+        if (rows->width != 8)
+            second[i] = HUGE_VAL;
+    }
+    if (status == GBT_OK)
+        status = ray ? gbt_balls_crossed(balls, point, direction, first, second, n, &a, err)
+                 : def->kind == GBT_QUERY_WITHIN     ? gbt_balls_within(balls, point, first, n, &a, err)
+                 : def->kind == GBT_QUERY_CONTAINING ? gbt_balls_containing(balls, point, n, &a, err)
+                                                     : gbt_balls_overlapping(balls, point, first, n, &a, err);
+    for (size_t i = 0; i < n && status == GBT_OK; i++)
+        for (size_t at = a.first[i]; at < a.first[i + 1]; at++)
+            print_answer(out, &v, i, at - a.first[i], a.index[at], a.value[at]);
+    gbt_answers_free(&a);
+    mem_free(direction);
+    mem_free(first);
+    mem_free(second);
+    return status;
+}
+
+static gbt_status answer(const gbt_balls *balls, const gbt_query_def *def, const query_rows *rows, FILE *out,
+                         gbt_error *err)
+{
+    double *point = take(rows, 0, 3, err);
+    if (point == NULL)
+        return GBT_ERR_NO_MEMORY;
+    fprintf(out, "query,rank,ball,%s,x,y,z,radius\n", def->kind == GBT_QUERY_CROSSED ? "t" : "distance");
+    const gbt_status status = def->kind == GBT_QUERY_NEAREST
+                                  ? nearest(balls, def, point, rows->count, out, err)
+                                  : lists(balls, def, rows, point, out, err);
+    mem_free(point);
+    return status;
+}
+
+gbt_status gbt_query(const char *path, const gbt_query_def *def, FILE *out, gbt_error *err)
+{
+    GBT_TRY(check(def, err));
+    query_rows rows = {0};
+    gbt_balls *balls = NULL;
+    gbt_status status = read_queries(def, &rows, err);
+    if (status == GBT_OK)
+        status = gbt_balls_open(path, &balls, err);
+    if (status == GBT_OK)
+        status = answer(balls, def, &rows, out, err);
+    gbt_balls_free(balls);
+    query_rows_free(&rows);
+    if (status == GBT_OK && ferror(out))
+        return base_fail(err, GBT_ERR_IO, "query: the answers could not be written");
+    return status;
+}

@@ -47,15 +47,18 @@ static const char *list(bool readable, const char *before_last, char out[LIST_SI
     return out;
 }
 
+/* The longest ending that fits: .compressed.ply ends in .ply too. */
 static const gaussian_format *format_of(const char *path)
 {
     const size_t length = strlen(path);
+    const gaussian_format *found = NULL;
     for (int i = 0; i < FORMAT_COUNT; i++) {
         const size_t ending = strlen(formats[i]->ending);
-        if (length > ending && strcasecmp(path + length - ending, formats[i]->ending) == 0)
-            return formats[i];
+        if (length > ending && strcasecmp(path + length - ending, formats[i]->ending) == 0 &&
+            (found == NULL || ending > strlen(found->ending)))
+            found = formats[i];
     }
-    return NULL;
+    return found;
 }
 
 /* The file itself, or the newest one of a result folder; NULL when there is none that can be read. */

@@ -23,7 +23,7 @@ typedef struct gaussian_format {
                         gbt_error *err);
 } gaussian_format;
 
-#define GAUSSIAN_FORMATS(X) X(ply) X(splat) X(spz) X(glb)
+#define GAUSSIAN_FORMATS(X) X(ply) X(compressed_ply) X(splat) X(spz) X(spz4) X(sog) X(glb) X(usda) X(usdz)
 
 #define X(name) extern const gaussian_format gaussian_format_##name;
 GAUSSIAN_FORMATS(X)

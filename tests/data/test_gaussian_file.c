@@ -4,66 +4,9 @@
 #include <jansson.h>
 #include <zlib.h>
 
-#include "base/rng.h"
-#include "data/data_support.h"
 #include "data/gaussian_file.h"
 #include "data/gaussian_formats.h"
-
-static const double nowhere[3] = {0, 0, 0};
-
-static float between(uint64_t stream, uint64_t index, float low, float high)
-{
-    return low + (high - low) * rng_uniform(7, stream, index);
-}
-
-static void make_cloud(gaussian_cloud *c, size_t count, int degree)
-{
-    must(gaussian_cloud_alloc(c, count, &err));
-    c->sh_degree = degree;
-    for (size_t i = 0; i < count; i++) {
-        float square = 0;
-        c->opacity[i] = between(1, i, 0.01f, 0.99f);
-        for (size_t k = 0; k < 3; k++) {
-            c->mean[3 * i + k] = between(2, 3 * i + k, -20, 20);
-            c->scale_log[3 * i + k] = between(3, 3 * i + k, -6, 0);
-        }
-        for (size_t k = 0; k < 4; k++) {
-            c->quat[4 * i + k] = (float)rng_normal(7, 4, 4 * i + k);
-            square += c->quat[4 * i + k] * c->quat[4 * i + k];
-        }
-        for (size_t k = 0; k < 4; k++)
-            c->quat[4 * i + k] /= sqrtf(square);
-        for (size_t k = 0; k < 48; k++)
-            c->sh[48 * i + k] =
-                k < 3 * (size_t)((degree + 1) * (degree + 1)) ? between(5, 48 * i + k, -0.9f, 0.9f) : 0;
-    }
-}
-
-/* How far a format may move a value; scales as logs. */
-typedef struct limits {
-    double mean, scale, quat, opacity, color, harmonics;
-} limits;
-
-static void check_near(const gaussian_cloud *a, const gaussian_cloud *b, const double origin[3],
-                       const limits *l)
-{
-    assert_int_equal(a->count, b->count);
-    check_cloud(b);
-    for (size_t i = 0; i < a->count; i++) {
-        double dot = 0;
-        for (size_t k = 0; k < 3; k++) {
-            assert_true(fabs((double)a->mean[3 * i + k] + origin[k] - (double)b->mean[3 * i + k]) <= l->mean);
-            assert_true(fabs((double)a->scale_log[3 * i + k] - (double)b->scale_log[3 * i + k]) <= l->scale);
-            assert_true(fabs((double)a->sh[48 * i + k] - (double)b->sh[48 * i + k]) <= l->color);
-        }
-        for (size_t k = 0; k < 4; k++)
-            dot += (double)a->quat[4 * i + k] * (double)b->quat[4 * i + k];
-        assert_true(1 - fabs(dot) <= l->quat);
-        assert_true(fabs((double)a->opacity[i] - (double)b->opacity[i]) <= l->opacity);
-        for (size_t k = 3; k < 48; k++)
-            assert_true(fabs((double)a->sh[48 * i + k] - (double)b->sh[48 * i + k]) <= l->harmonics);
-    }
-}
+#include "data/gaussian_support.h"
 
 static void ply_keeps_everything(void **state)
 {
@@ -276,11 +219,12 @@ static void refusals(void **state)
     assert_non_null(strstr(err.text, "scene.obj: cannot be read as Gaussians"));
     err = (gbt_error){0};
     assert_int_equal(gaussian_file_check_writable("scene", &err), GBT_ERR_ARGUMENT);
-    assert_non_null(strstr(err.text, "wanted .ply, .splat, .spz or .glb"));
+    assert_non_null(
+        strstr(err.text, "wanted .ply, .compressed.ply, .splat, .spz, .v4.spz, .sog, .glb, .usda or .usdz"));
     err = (gbt_error){0};
-    const source_file four = {"v4.spz", (const unsigned char *)"NGSP\4\0\0\0", 8};
-    assert_int_equal(gaussian_format_spz.read(&four, &cloud, &err), GBT_ERR_FORMAT);
-    assert_non_null(strstr(err.text, "version 4"));
+    const source_file five = {"v5.spz", (const unsigned char *)"NGSP\5\0\0\0xxxxxxxxxxxxxxxxxxxxxxxx", 32};
+    assert_int_equal(gaussian_format_spz.read(&five, &cloud, &err), GBT_ERR_FORMAT);
+    assert_non_null(strstr(err.text, "version 5"));
     make_cloud(&cloud, 1, 0);
     err = (gbt_error){0};
     assert_int_equal(

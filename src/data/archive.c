@@ -68,8 +68,8 @@ gbt_status archive_put(sink *out, const char *path, const archive_member *member
     for (size_t i = 0; i < count; i++)
         total += members[i].size;
     if (total > UINT32_MAX - (1u << 20))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu bytes are too many for such a file (limit 4 GiB)", path,
-                         total);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu bytes are too many for such a file (limit 4 GiB)",
+                         path, total);
     zip_error_t why;
     zip_source_t *source = zip_source_buffer_create(NULL, 0, 0, &why);
     if (source == NULL)
@@ -154,7 +154,8 @@ gbt_status archive_take(const source_file *file, const char *member, unsigned ch
     return status;
 }
 
-gbt_status archive_find(const source_file *file, const char *ending, char *out, size_t out_size, gbt_error *err)
+gbt_status archive_find(const source_file *file, const char *ending, char *out, size_t out_size,
+                        gbt_error *err)
 {
     zip_t *archive;
     GBT_TRY(open_archive(file, &archive, err));

@@ -19,14 +19,14 @@ enum {
     REST_MAX = 3 * (GAUSSIAN_SH_COUNT - 1)
 };
 
-static const double scale_limit = 20;                      /* of logs, as other programs write them */
-static const double rest_range = 8;                        /* harmonics within +-4 in 256 steps */
+static const double scale_limit = 20; /* of logs, as other programs write them */
+static const double rest_range = 8;   /* harmonics within +-4 in 256 steps */
 static const int bits[GROUPS][3] = {{11, 10, 11}, {11, 10, 11}, {8, 8, 8}}; /* of each axis, highest first */
 
 static const char *const chunk_names[CHUNK_COLUMNS] = {
-    "min_x",     "min_y",     "min_z",       "max_x",       "max_y",       "max_z",
+    "min_x",       "min_y",       "min_z",       "max_x",       "max_y",       "max_z",
     "min_scale_x", "min_scale_y", "min_scale_z", "max_scale_x", "max_scale_y", "max_scale_z",
-    "min_r",     "min_g",     "min_b",       "max_r",       "max_g",       "max_b"};
+    "min_r",       "min_g",       "min_b",       "max_r",       "max_g",       "max_b"};
 static const char *const vertex_names[VERTEX_COLUMNS] = {"packed_position", "packed_rotation", "packed_scale",
                                                          "packed_color"};
 
@@ -75,8 +75,8 @@ static void unpack_group(uint32_t word, int group, const float *chunk, double ou
         const int count = bits[group][k];
         shift -= count;
         const double low = (double)chunk[6 * group + k], high = (double)chunk[6 * group + 3 + k];
-        out[k] = low + (high - low) * (double)(word >> shift & ((1u << count) - 1)) /
-                           (double)((1u << count) - 1);
+        out[k] =
+            low + (high - low) * (double)(word >> shift & ((1u << count) - 1)) / (double)((1u << count) - 1);
     }
 }
 
@@ -91,8 +91,8 @@ static double value_of(const gaussian_cloud *cloud, size_t i, int group, size_t 
     return 0.5 + GAUSSIAN_SH_0 * (double)cloud->sh[i * GAUSSIAN_SH_COUNT * 3 + k];
 }
 
-static void find_range(const gaussian_cloud *cloud, const uint32_t *rows, size_t count, const double origin[3],
-                       float chunk[CHUNK_COLUMNS])
+static void find_range(const gaussian_cloud *cloud, const uint32_t *rows, size_t count,
+                       const double origin[3], float chunk[CHUNK_COLUMNS])
 {
     for (int group = 0; group < GROUPS; group++)
         for (size_t k = 0; k < 3; k++) {
@@ -155,7 +155,8 @@ static void put_header(sink *s, const gaussian_cloud *cloud, size_t rest)
 
 static void put_all(sink *s, const gaussian_cloud *cloud, const uint32_t *order, const double origin[3])
 {
-    const size_t n = cloud->count, per_channel = (size_t)((cloud->sh_degree + 1) * (cloud->sh_degree + 1)) - 1;
+    const size_t n = cloud->count,
+                 per_channel = (size_t)((cloud->sh_degree + 1) * (cloud->sh_degree + 1)) - 1;
     float chunk[CHUNK_COLUMNS];
     put_header(s, cloud, 3 * per_channel);
     for (int pass = 0; pass < 2; pass++)
@@ -202,11 +203,11 @@ static gbt_status write_compressed(const char *path, const gaussian_cloud *cloud
 
 typedef struct packed {
     const source_file *file;
-    float *chunks;          /* [chunk_count][CHUNK_COLUMNS] */
-    uint32_t *words;        /* [count][VERTEX_COLUMNS] */
-    unsigned char *rest;    /* [count][rest_count] */
+    float *chunks;         /* [chunk_count][CHUNK_COLUMNS] */
+    uint32_t *words;       /* [count][VERTEX_COLUMNS] */
+    unsigned char *rest;   /* [count][rest_count] */
     size_t at, rest_count; /* rows taken; harmonics of a Gaussian */
-    bool has_color;         /* chunks of older files have none: 0 to 1 */
+    bool has_color;        /* chunks of older files have none: 0 to 1 */
 } packed;
 
 static void add_chunk(void *context, const double *values)

@@ -27,6 +27,7 @@ enum { GAUSSIAN_SH_COUNT = 16 };
  */
 typedef struct gaussian_cloud {
     size_t count;
+    double origin[3]; /* to be added to every mean: 0, but of formats that keep a place in double */
     float *mean;      /* [count][3] */
     float *scale_log; /* [count][3], natural log of the std-dev; ratio limited */
     float *quat;      /* [count][4], w x y z, unit */

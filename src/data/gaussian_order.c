@@ -31,10 +31,10 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static double median(float *values, size_t count)
+float gaussian_median(float *values, size_t count)
 {
     qsort(values, count, sizeof *values, by_value);
-    return (double)values[count / 2];
+    return values[count / 2];
 }
 
 /* Bit k of `value` to bit 3 k. */
@@ -61,11 +61,11 @@ static void find_codes(const gaussian_cloud *cloud, float *values, coded *list)
     for (size_t k = 0; k < 3; k++) {
         for (size_t i = 0; i < n; i++)
             values[i] = cloud->mean[3 * i + k];
-        middle[k] = median(values, n);
+        middle[k] = (double)gaussian_median(values, n);
     }
     for (size_t i = 0; i < n; i++)
         values[i] = (float)distance(cloud->mean + 3 * i, middle);
-    const double near = fmax(median(values, n), 1e-12);
+    const double near = fmax((double)gaussian_median(values, n), 1e-12);
     for (size_t i = 0; i < n; i++) {
         const float *mean = cloud->mean + 3 * i;
         double half = near;

@@ -18,4 +18,7 @@
  */
 uint32_t *gaussian_order(const gaussian_cloud *cloud, gbt_error *err);
 
+/** The median of at least one value; sorts them. */
+float gaussian_median(float *values, size_t count);
+
 #endif

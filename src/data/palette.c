@@ -46,7 +46,8 @@ static range range_of(const double (*sums)[2], size_t begin, size_t end)
     return (range){begin, end, sum / count, sums[end][1] - sums[begin][1] - sum * sum / count};
 }
 
-static void cut_ranges(const float *sorted, const double (*sums)[2], size_t count, float levels[PALETTE_LEVELS])
+static void cut_ranges(const float *sorted, const double (*sums)[2], size_t count,
+                       float levels[PALETTE_LEVELS])
 {
     range ranges[PALETTE_LEVELS] = {range_of(sums, 0, count)};
     size_t used = 1;

@@ -10,8 +10,8 @@
 
 enum { PALETTE_LEVELS = 256 };
 
-/** Levels with a small mean squared distance to the values, ascending: as the entries of palette_make(). At least
-    one value. */
+/** Levels with a small mean squared distance to the values, ascending: as the entries of palette_make(). At
+   least one value. */
 gbt_status palette_levels(const float *values, size_t count, float levels[PALETTE_LEVELS], gbt_error *err);
 
 /** The nearest level. */
@@ -25,9 +25,9 @@ typedef struct palette {
 } palette;
 
 /**
- * At most `limit` entries: all vectors are one cell at first, then the cell with the largest squared error is cut
- * in two at its mean, across its principal axis, again and again. Entries are the means of cells; cells of one
- * branch are neighbours in the list.
+ * At most `limit` entries: all vectors are one cell at first, then the cell with the largest squared error is
+ * cut in two at its mean, across its principal axis, again and again. Entries are the means of cells; cells
+ * of one branch are neighbours in the list.
  *
  * @param vectors [in] [count][width]
  * @param out     [out] free with palette_free()

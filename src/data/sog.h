@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/sog.h -- .sog bundles, version 2: a .zip of meta.json and of lossless .webp tables with a pixel for each
-   Gaussian. */
+/* data/sog.h -- .sog bundles, version 2: a .zip of meta.json and of lossless .webp tables with a pixel for
+   each Gaussian. */
 #ifndef GBT_DATA_SOG_H
 #define GBT_DATA_SOG_H
 

@@ -27,7 +27,7 @@ typedef struct bundle {
     json_t *meta;
     size_t count, entries; /* Gaussians; of the palette, 0: none */
     int degree;
-    double low[3], high[3];                                  /* of positions, as logs */
+    double low[3], high[3]; /* of positions, as logs */
     float scales[PALETTE_LEVELS], colors[PALETTE_LEVELS], harmonics[PALETTE_LEVELS];
     webp_table tables[TABLES];
 } bundle;
@@ -123,7 +123,8 @@ static gbt_status read_table(bundle *b, table_id id, gbt_error *err)
 
 static double position_of(const bundle *b, size_t i, size_t k)
 {
-    const unsigned level = (unsigned)b->tables[MEANS_HIGH].bytes[4 * i + k] << 8 | b->tables[MEANS_LOW].bytes[4 * i + k];
+    const unsigned level =
+        (unsigned)b->tables[MEANS_HIGH].bytes[4 * i + k] << 8 | b->tables[MEANS_LOW].bytes[4 * i + k];
     const double value = b->low[k] + (b->high[k] - b->low[k]) * level / 65535;
     return copysign(expm1(fabs(value)), value);
 }

@@ -150,9 +150,8 @@ static gbt_status put_levels(writing *w, const float *values, size_t stride, boo
     }
     mem_free(all);
     GBT_TRY(status);
-    json_object_set_new(
-        w->meta, key,
-        json_pack("{s:o,s:[s]}", "codebook", numbers(levels, PALETTE_LEVELS), "files", file));
+    json_object_set_new(w->meta, key,
+                        json_pack("{s:o,s:[s]}", "codebook", numbers(levels, PALETTE_LEVELS), "files", file));
     return close_table(w, file);
 }
 
@@ -192,8 +191,9 @@ static gbt_status put_harmonics(writing *w)
     for (size_t i = 0; i < n; i++)
         memcpy(vectors + 3 * functions * i, w->cloud->sh + 3 * (GAUSSIAN_SH_COUNT * i + 1),
                3 * functions * sizeof *vectors);
-    const size_t share = n / GAUSSIANS_PER_ENTRY,
-                 limit = share < 1024 ? 1024 : share > SOG_PALETTE_MAX ? SOG_PALETTE_MAX : share;
+    const size_t share = n / GAUSSIANS_PER_ENTRY, limit = share < 1024              ? 1024
+                                                          : share > SOG_PALETTE_MAX ? SOG_PALETTE_MAX
+                                                                                    : share;
     palette p;
     gbt_status status = palette_make(vectors, n, 3 * functions, limit, &p, w->err);
     mem_free(vectors);
@@ -262,7 +262,7 @@ static gbt_status write_sog(const char *path, const gaussian_cloud *cloud, const
 
 const gaussian_format gaussian_format_sog = {
     .ending = ".sog",
-    .what = "a twentieth of a .ply: positions in 16 bits, harmonics by a palette",
+    .what = "a tenth of a .ply: positions in 16 bits, harmonics by a palette",
     .degree = 3,
     .read = sog_read,
     .write = write_sog};

@@ -1,14 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/spz4_file.c -- .spz version 4: header { "NGSP", 4, count, degree, fractional bits, flags, streams, offset
-   of the table, 12 zeros }, a table of { packed bytes, bytes } for each stream, then the streams, a frame of
-   zstd each. */
+/* data/spz4_file.c -- .spz version 4: header { "NGSP", 4, count, degree, fractional bits, flags, streams,
+   offset of the table, 12 zeros }, a table of { packed bytes, bytes } for each stream, then the streams, a
+   frame of zstd each. */
 #include <zstd.h>
 
 #include "base/file.h"
 #include "data/gaussian_formats.h"
 #include "data/spz_streams.h"
 
-enum { HEADER_BYTES = 32, TABLE_ROW = 16, LEVEL = 12, PACKED_LIMIT = 1 << 16 /* zstd makes nothing smaller */ };
+enum {
+    HEADER_BYTES = 32,
+    TABLE_ROW = 16,
+    LEVEL = 12,
+    PACKED_LIMIT = 1 << 16 /* zstd makes nothing smaller */
+};
 
 /* ---- writing ---- */
 
@@ -100,11 +105,11 @@ static gbt_status read_table(cursor *c, frames *f, gbt_error *err)
         f->packed[i] = cursor_u64(c);
         const uint64_t bytes = cursor_u64(c), wanted = (uint64_t)f->header.count * row[i];
         if (bytes != wanted || f->packed[i] > left || bytes / PACKED_LIMIT > f->packed[i])
-            return base_fail(err, GBT_ERR_FORMAT,
-                             "%s@%zu: stream %d has %llu bytes in %llu (wanted %llu bytes, and %llu are left)",
-                             f->file->name, c->at - TABLE_ROW, i, (unsigned long long)bytes,
-                             (unsigned long long)f->packed[i], (unsigned long long)wanted,
-                             (unsigned long long)left);
+            return base_fail(
+                err, GBT_ERR_FORMAT,
+                "%s@%zu: stream %d has %llu bytes in %llu (wanted %llu bytes, and %llu are left)",
+                f->file->name, c->at - TABLE_ROW, i, (unsigned long long)bytes,
+                (unsigned long long)f->packed[i], (unsigned long long)wanted, (unsigned long long)left);
         left -= f->packed[i];
         f->plain[i] = (size_t)bytes;
         f->plain_all += (size_t)bytes;

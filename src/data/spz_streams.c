@@ -87,7 +87,8 @@ void spz_put_stream(sink *s, const gaussian_cloud *cloud, const double origin[3]
         const float *mean = cloud->mean + 3 * i, *scale = cloud->scale_log + 3 * i,
                     *sh = cloud->sh + i * GAUSSIAN_SH_COUNT * 3;
         for (size_t k = 0; k < 3 && stream == 0; k++)
-            sink_put_uint(s, (uint64_t)(int64_t)llrint(((double)mean[k] + origin[k]) * exp2(header->fraction)), 3);
+            sink_put_uint(
+                s, (uint64_t)(int64_t)llrint(((double)mean[k] + origin[k]) * exp2(header->fraction)), 3);
         if (stream == 1)
             sink_put_level(s, 255 * (double)cloud->opacity[i]);
         for (size_t c = 0; c < 3 && stream == 2; c++)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/usd.h -- USD scenes with a prim ParticleField3DGaussianSplat (OpenUSD 26.03), as text (.usda) or as text in
-   a package (.usdz).
+/* data/usd.h -- USD scenes with a prim ParticleField3DGaussianSplat (OpenUSD 26.03), as text (.usda) or as
+   text in a package (.usdz).
 
    The prim has the axes of the data set; half a turn about z puts them into USD's, whose y is up. The scene's
    origin is a translation in double, so that coordinates of a country are kept. */

@@ -6,6 +6,7 @@
 #include "base/log.h"
 #include "data/archive.h"
 #include "data/number.h"
+#include "data/raw.h"
 #include "data/usd.h"
 
 static const char prim_type[] = "ParticleField3DGaussianSplat";
@@ -74,7 +75,10 @@ static bool next(reading *r, token *out)
     return true;
 }
 
-static bool is(token t, const char *text) { return t.length == strlen(text) && memcmp(t.at, text, t.length) == 0; }
+static bool is(token t, const char *text)
+{
+    return t.length == strlen(text) && memcmp(t.at, text, t.length) == 0;
+}
 
 /* Behind the bracket that closes the one before, of whatever kind. */
 static void skip_group(reading *r)
@@ -92,9 +96,19 @@ static gbt_status fail(const reading *r, const char *what, gbt_error *err)
 
 /* ---- what a prim has ---- */
 
-typedef enum field_id { POSITIONS, ORIENTATIONS, SCALES, OPACITIES, HARMONICS, DEGREE, TRANSLATE, FIELDS } field_id;
+typedef enum field_id {
+    POSITIONS,
+    ORIENTATIONS,
+    SCALES,
+    OPACITIES,
+    HARMONICS,
+    DEGREE,
+    TRANSLATE,
+    FIELDS
+} field_id;
 
-/* Names of the arrays; with an h behind they have less precision, and count where the others are not there. */
+/* Names of the arrays; with an h behind they have less precision, and count where the others are not there.
+ */
 static const struct {
     const char *name;
     size_t width;
@@ -140,7 +154,8 @@ static gbt_status add_number(reading *r, prim *p, field_id f, token t, gbt_error
     if (f == TRANSLATE && n->count < 3)
         p->translate[n->count] = value;
     void *grown = n->values;
-    GBT_TRY(mem_reserve(&grown, &n->capacity, n->count, n->count + 1, sizeof *n->values, "numbers of USD", err));
+    GBT_TRY(
+        mem_reserve(&grown, &n->capacity, n->count, n->count + 1, sizeof *n->values, "numbers of USD", err));
     n->values = grown;
     n->values[n->count++] = result == NUMBER_RANGE ? NAN : (float)value;
     return GBT_OK;
@@ -184,7 +199,8 @@ static gbt_status take_value(reading *r, prim *p, token name, gbt_error *err)
         skip_value(r);
         token value = {.at = r->at};
         reading again = {.file = r->file, .at = from, .end = r->at};
-        p->other_place |= is_place && !(is(name, "xformOp:rotateZ") && next(&again, &value) && is(value, "180"));
+        p->other_place |=
+            is_place && !(is(name, "xformOp:rotateZ") && next(&again, &value) && is(value, "180"));
         return GBT_OK;
     }
     return take_numbers(r, p, f, err);
@@ -228,11 +244,16 @@ static gbt_status find_prim(reading *r, gbt_error *err)
 
 static gbt_status check(const reading *r, const prim *p, size_t *functions, gbt_error *err)
 {
+    for (int k = 0; k < 3; k++)
+        if (!(fabs(p->translate[k]) <= RAW_COORDINATE_LIMIT))
+            return base_fail(err, GBT_ERR_FORMAT, "%s: a translation of %g is not usable", r->file->name,
+                             p->translate[k]);
     const size_t count = p->fields[POSITIONS].count / 3;
     for (int f = 0; f <= OPACITIES; f++)
         if (count == 0 || p->fields[f].count != count * fields[f].width)
-            return base_fail(err, GBT_ERR_FORMAT, "%s: %zu numbers in %s (wanted %zu for each of %zu positions)",
-                             r->file->name, p->fields[f].count, fields[f].name, fields[f].width, count);
+            return base_fail(err, GBT_ERR_FORMAT,
+                             "%s: %zu numbers in %s (wanted %zu for each of %zu positions)", r->file->name,
+                             p->fields[f].count, fields[f].name, fields[f].width, count);
     const numbers *degree = &p->fields[DEGREE], *sh = &p->fields[HARMONICS];
     const float value = degree->count == 1 ? degree->values[0] : 3; /* the schema's own default */
     if (!(value >= 0 && value <= 3))
@@ -250,7 +271,7 @@ static void add_gaussian(const prim *p, size_t i, size_t functions, gaussian_clo
     gaussian_row row = {.opacity = (double)p->fields[OPACITIES].values[i]};
     for (size_t k = 0; k < 3; k++) {
         const double scale = (double)p->fields[SCALES].values[3 * i + k];
-        row.mean[k] = (double)p->fields[POSITIONS].values[3 * i + k] + p->translate[k];
+        row.mean[k] = (double)p->fields[POSITIONS].values[3 * i + k];
         row.scale_log[k] = scale >= 0 ? log(scale) : (double)NAN;
     }
     for (size_t k = 0; k < 4; k++)
@@ -269,11 +290,13 @@ static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error 
     const size_t count = p->fields[POSITIONS].count / 3;
     GBT_TRY(gaussian_cloud_alloc(out, count, err));
     out->count = 0; /* of those that are usable */
+    memcpy(out->origin, p->translate, sizeof out->origin);
     out->sh_degree = functions == 16 ? 3 : functions == 9 ? 2 : functions == 4 ? 1 : 0;
     for (size_t i = 0; i < count; i++)
         add_gaussian(p, i, functions, out);
     if (p->other_place)
-        log_warn("%s: the prim's rotation and scale are left out; its own coordinates are read, and its translation",
+        log_warn("%s: the prim's rotation and scale are left out; its own coordinates are read, and its "
+                 "translation",
                  r->file->name);
     return out->count > 0 ? GBT_OK
                           : base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu dropped)",
@@ -282,14 +305,16 @@ static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error 
 
 gbt_status usda_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
 {
-    reading r = {.file = file, .at = (const char *)file->bytes, .end = (const char *)file->bytes + file->size};
+    reading r = {
+        .file = file, .at = (const char *)file->bytes, .end = (const char *)file->bytes + file->size};
     prim p = {0};
     memset(out, 0, sizeof *out);
     if (file->size >= 8 && memcmp(file->bytes, "PXR-USDC", 8) == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: is binary USD (wanted text: usdcat --usdFormat usda makes it)",
-                         file->name);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: is binary USD (wanted text: usdcat --usdFormat usda makes it)", file->name);
     if (file->size < 6 || memcmp(file->bytes, "#usda ", 6) != 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no USD text (wanted a file that begins with #usda)", file->name);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no USD text (wanted a file that begins with #usda)",
+                         file->name);
     const gbt_status status = read_text(&r, &p, out, err);
     for (int f = 0; f < FIELDS; f++)
         mem_free(p.fields[f].values);

@@ -49,8 +49,8 @@ static void put_extent(sink *s, const gaussian_cloud *cloud)
             high[k] = fmax(high[k], (double)cloud->mean[3 * i + k] + reach);
         }
     }
-    put(s, "    float3[] extent = [(%.9g, %.9g, %.9g), (%.9g, %.9g, %.9g)]\n", low[0], low[1], low[2], high[0],
-        high[1], high[2]);
+    put(s, "    float3[] extent = [(%.9g, %.9g, %.9g), (%.9g, %.9g, %.9g)]\n", low[0], low[1], low[2],
+        high[0], high[1], high[2]);
 }
 
 static void put_harmonics(sink *s, const gaussian_cloud *cloud)
@@ -81,8 +81,9 @@ static gbt_status put_scales(sink *s, const gaussian_cloud *cloud, gbt_error *er
 
 static gbt_status put_text(sink *s, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)
 {
-    sink_put_text(s, "#usda 1.0\n(\n    defaultPrim = \"Gaussians\"\n    metersPerUnit = 1\n    upAxis = \"Y\"\n"
-                     ")\n\ndef ParticleField3DGaussianSplat \"Gaussians\"\n{\n");
+    sink_put_text(s,
+                  "#usda 1.0\n(\n    defaultPrim = \"Gaussians\"\n    metersPerUnit = 1\n    upAxis = \"Y\"\n"
+                  ")\n\ndef ParticleField3DGaussianSplat \"Gaussians\"\n{\n");
     put_extent(s, cloud);
     put_array(s, "point3f[] positions", cloud->mean, cloud->count, 3);
     sink_put_text(s, "\n");
@@ -133,11 +134,13 @@ const gaussian_format gaussian_format_usda = {
     .ending = ".usda",
     .what = "USD with ParticleField3DGaussianSplat: everything, as text, and the scene's origin in double",
     .degree = 3,
+    .keeps_origin = true,
     .read = usda_read,
     .write = write_usda};
 
 const gaussian_format gaussian_format_usdz = {.ending = ".usdz",
                                               .what = "the same text in a package of USD",
                                               .degree = 3,
+                                              .keeps_origin = true,
                                               .read = usdz_read,
                                               .write = write_usdz};

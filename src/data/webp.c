@@ -12,8 +12,9 @@ gbt_status webp_put(sink *out, const webp_table *table, gbt_error *err)
     WebPConfig config;
     WebPPicture picture;
     if (table->width > WEBP_MAX_DIMENSION || table->height > WEBP_MAX_DIMENSION)
-        return base_fail(err, out->status = GBT_ERR_ARGUMENT, "%d x %d pixels are too many for a .webp (limit %d)",
-                         table->width, table->height, (int)WEBP_MAX_DIMENSION);
+        return base_fail(err, out->status = GBT_ERR_ARGUMENT,
+                         "%d x %d pixels are too many for a .webp (limit %d)", table->width, table->height,
+                         (int)WEBP_MAX_DIMENSION);
     if (!WebPConfigInit(&config) || !WebPConfigLosslessPreset(&config, EFFORT) || !WebPPictureInit(&picture))
         return base_fail(err, out->status = GBT_ERR_INTERNAL, "libwebp: another version than at the build");
     config.exact = 1;

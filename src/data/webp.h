@@ -11,7 +11,8 @@ typedef struct webp_table {
     unsigned char *bytes; /* [height][width][4] */
 } webp_table;
 
-/** Put a file with exactly these bytes, invisible pixels' too. GBT_ERR_ARGUMENT beyond 16,383 pixels a side. */
+/** Put a file with exactly these bytes, invisible pixels' too. GBT_ERR_ARGUMENT beyond 16,383 pixels a side.
+ */
 gbt_status webp_put(sink *out, const webp_table *table, gbt_error *err);
 
 /**

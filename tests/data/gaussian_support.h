@@ -42,14 +42,15 @@ typedef struct limits {
 } limits;
 
 static inline void check_near(const gaussian_cloud *a, const gaussian_cloud *b, const double origin[3],
-                       const limits *l)
+                              const limits *l)
 {
     assert_int_equal(a->count, b->count);
     check_cloud(b);
     for (size_t i = 0; i < a->count; i++) {
         double dot = 0;
         for (size_t k = 0; k < 3; k++) {
-            assert_true(fabs((double)a->mean[3 * i + k] + origin[k] - (double)b->mean[3 * i + k]) <= l->mean);
+            assert_true(fabs((double)a->mean[3 * i + k] + origin[k] - (double)b->mean[3 * i + k] -
+                             b->origin[k]) <= l->mean);
             assert_true(fabs((double)a->scale_log[3 * i + k] - (double)b->scale_log[3 * i + k]) <= l->scale);
             assert_true(fabs((double)a->sh[48 * i + k] - (double)b->sh[48 * i + k]) <= l->color);
         }
@@ -62,8 +63,8 @@ static inline void check_near(const gaussian_cloud *a, const gaussian_cloud *b, 
     }
 }
 
-/** Put the Gaussians of `b` into the order of `a`: each goes to the nearest mean, one to one. For formats that
-    sort. */
+/** Put the Gaussians of `b` into the order of `a`: each goes to the nearest mean, one to one. For formats
+   that sort. */
 static inline void match_order(const gaussian_cloud *a, gaussian_cloud *b, const double origin[3])
 {
     gaussian_cloud out;

@@ -8,7 +8,8 @@
 #include "data/palette.h"
 
 /* Write, read, and bring back into order. */
-static void there_and_back(const char *path, const gaussian_cloud *a, const double origin[3], gaussian_cloud *b)
+static void there_and_back(const char *path, const gaussian_cloud *a, const double origin[3],
+                           gaussian_cloud *b)
 {
     must(gaussian_file_write(path, a, origin, &err));
     assert_true(gaussian_file_has_gaussians(path));
@@ -71,8 +72,8 @@ static void spz4_bytes(void **state)
     unsigned char *bytes;
     size_t size;
     must(file_read(inside(*state, "a.v4.spz", 0), &bytes, &size, &err));
-    static const unsigned char want[32] = {'N', 'G', 'S', 'P', 4,  0, 0, 0, 300 & 255, 300 >> 8, 0, 0, 1, 16,
-                                           1,   6,   32,  0,   0, 0};
+    static const unsigned char want[32] = {'N', 'G', 'S', 'P', 4, 0, 0,  0, 300 & 255, 300 >> 8,
+                                           0,   0,   1,   16,  1, 6, 32, 0, 0,         0};
     assert_memory_equal(bytes, want, sizeof want);
     const source_file file = {"a", bytes, size};
     cursor c = {.file = &file, .at = 32};
@@ -245,10 +246,12 @@ static void older_compressed_ply(void **state)
 {
     (void)state;
     static const char text[] =
-        "ply\nformat ascii 1.0\nelement chunk 1\nproperty float min_x\nproperty float min_y\nproperty float min_z\n"
+        "ply\nformat ascii 1.0\nelement chunk 1\nproperty float min_x\nproperty float min_y\nproperty float "
+        "min_z\n"
         "property float max_x\nproperty float max_y\nproperty float max_z\nproperty float min_scale_x\n"
         "property float min_scale_y\nproperty float min_scale_z\nproperty float max_scale_x\n"
-        "property float max_scale_y\nproperty float max_scale_z\nelement vertex 1\nproperty uint packed_position\n"
+        "property float max_scale_y\nproperty float max_scale_z\nelement vertex 1\nproperty uint "
+        "packed_position\n"
         "property uint packed_rotation\nproperty uint packed_scale\nproperty uint packed_color\nend_header\n"
         "-1 0 2 1 4 3 -5 -5 -5 -1 -1 -1\n4294967295 537395712 0 4278190335\n";
     const source_file file = {"old.ply", (const unsigned char *)text, sizeof text - 1};
@@ -285,14 +288,16 @@ static void damaged_files(void **state)
 
 /* A .usda with one Gaussian as another program may write it. */
 static const char usda[] =
-    "#usda 1.0\n(\n    \"\"\"Made { by = hand\"\"\"\n    upAxis = \"Y\"\n)\n# def ParticleField3DGaussianSplat\n"
+    "#usda 1.0\n(\n    \"\"\"Made { by = hand\"\"\"\n    upAxis = \"Y\"\n)\n# def "
+    "ParticleField3DGaussianSplat\n"
     "def Xform \"World\" (kind = \"group\")\n{\n"
     "  def ParticleField3DGaussianSplat \"one\" (\n    displayName = \"}\"\n  )\n  {\n"
     "    half[] opacitiesh = [0.5]\n    custom string note = \"positions = [1]\"\n"
     "    point3f[] positions = [(1, 2.5e0,\n 3)] (interpolation = \"vertex\")\n"
     "    quatf[] orientations = [(0, 2, 0, 0)]\n    float[] opacities = [0.25]\n    float[] other = [7]\n"
     "    float3[] scales = [(1, 2, 4)]\n    uniform int radiance:sphericalHarmonicsDegree = 1\n"
-    "    float3[] radiance:sphericalHarmonicsCoefficients = [(1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12)] (\n"
+    "    float3[] radiance:sphericalHarmonicsCoefficients = [(1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12)] "
+    "(\n"
     "        elementSize = 4\n    )\n    def Scope \"inner\" {\n float[] positions = [9]\n }\n"
     "    double3 xformOp:translate = (10, 20, 30)\n"
     "  }\n}\n";
@@ -308,11 +313,11 @@ static void usda_of_others(void **state)
     (void)state;
     gaussian_cloud c;
     must(read_text(usda, &c, &err));
-    const float mean[3] = {11, 22.5f, 33};
+    const float mean[3] = {1, 2.5f, 3};
     assert_int_equal(c.count, 1);
     assert_int_equal(c.sh_degree, 1);
     for (int k = 0; k < 3; k++) {
-        assert_true(c.mean[k] == mean[k]);
+        assert_true(c.mean[k] == mean[k] && c.origin[k] == 10 * (k + 1));
         assert_true(fabsf(c.scale_log[k] - (float)k * logf(2)) < 1e-6f);
     }
     for (int k = 0; k < 48; k++)
@@ -345,17 +350,18 @@ static void usda_that_is_wrong(void **state)
     }
 }
 
+/* Coordinates of a country too: floats keep half a metre of them. */
 static void usd_keeps_everything(void **state)
 {
     for (int degree = 0; degree <= 3; degree++) {
         gaussian_cloud a, b;
         make_cloud(&a, 40, degree);
-        const double origin[3] = {100, -200, 300};
+        const double origin[3] = {691234.0625, 5334567.123, -0.1};
         const char *const path = inside(*state, degree % 2 == 0 ? "a.usda" : "a.usdz", 0);
         must(gaussian_file_write(path, &a, origin, &err));
         must(gaussian_file_read(path, &b, &err));
         assert_int_equal(b.sh_degree, degree);
-        check_near(&a, &b, origin, &(limits){.mean = 2e-5, .scale = 1e-6, .quat = 1e-6});
+        check_near(&a, &b, origin, &(limits){.mean = 1e-8, .scale = 1e-6, .quat = 1e-6});
         gaussian_cloud_free(&a);
         gaussian_cloud_free(&b);
     }

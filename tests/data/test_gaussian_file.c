@@ -23,6 +23,34 @@ static void ply_keeps_everything(void **state)
     }
 }
 
+/* The mark of a model that is drawn as wide as pixels: as Brush and SuperSplat write it, and as Postshot
+ * does. */
+static void ply_says_how_it_is_drawn(void **state)
+{
+    static const char other[] =
+        "ply\nformat ascii 1.0\ncomment antialiased 1\nelement vertex 1\n"
+        "property float x\nproperty float y\nproperty float z\nproperty float f_dc_0\n"
+        "property float f_dc_1\nproperty float f_dc_2\nproperty float opacity\n"
+        "property float scale_0\nproperty float scale_1\nproperty float scale_2\n"
+        "property float rot_0\nproperty float rot_1\nproperty float rot_2\n"
+        "property float rot_3\nend_header\n1 2 3 0 0 0 0 0 0 0 1 0 0 0\n";
+    for (int marked = 0; marked < 2; marked++) {
+        gaussian_cloud a, b;
+        make_cloud(&a, 3, 1);
+        a.antialiased = marked == 1;
+        must(gaussian_file_write(inside(*state, "a.ply", 0), &a, nowhere, &err));
+        must(gaussian_file_read(inside(*state, "a.ply", 0), &b, &err));
+        assert_int_equal(b.antialiased, marked);
+        gaussian_cloud_free(&a);
+        gaussian_cloud_free(&b);
+    }
+    write_text(*state, "b.ply", other);
+    gaussian_cloud b;
+    must(gaussian_file_read(inside(*state, "b.ply", 0), &b, &err));
+    assert_true(b.antialiased);
+    gaussian_cloud_free(&b);
+}
+
 static void spz_keeps_its_steps(void **state)
 {
     for (int degree = 0; degree <= 3; degree++) {
@@ -124,7 +152,8 @@ static void glb_is_what_gltf_wants(void **state)
 {
     gaussian_cloud a;
     make_cloud(&a, 33, 2);
-    must(gaussian_file_write(inside(*state, "a.glb", 0), &a, nowhere, &err));
+    const double origin[3] = {691234.0625, 5334567.123, -0.1};
+    must(gaussian_file_write(inside(*state, "a.glb", 0), &a, origin, &err));
     unsigned char *bytes;
     size_t size;
     must(file_read(inside(*state, "a.glb", 0), &bytes, &size, &err));
@@ -153,6 +182,10 @@ static void glb_is_what_gltf_wants(void **state)
     for (size_t i = 0; i < a.count; i++)
         low = fmin(low, -(double)a.mean[3 * i]);
     assert_true(fabs(json_number_value(json_array_get(json_object_get(position, "min"), 0)) - low) < 1e-12);
+    /* The origin is the node's place, with all its digits. */
+    json_t *place = json_object_get(json_array_get(json_object_get(root, "nodes"), 0), "translation");
+    for (size_t k = 0; k < 3; k++)
+        assert_true(json_number_value(json_array_get(place, k)) == (k < 2 ? -origin[k] : origin[k]));
     /* The last value of the last accessor, and the quaternion of the first Gaussian. */
     json_t *last = json_array_get(views, json_array_size(views) - 1);
     assert_int_equal(json_integer_value(json_object_get(last, "byteOffset")) +
@@ -239,6 +272,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(ply_keeps_everything, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(ply_says_how_it_is_drawn, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(spz_keeps_its_steps, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(splat_keeps_one_color, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(spz_bytes, make_temporary, remove_temporary),

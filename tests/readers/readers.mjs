@@ -8,7 +8,7 @@ import path from "node:path";
 
 import validator from "gltf-validator";
 
-import {attributes, columns, convert} from "./count.mjs";
+import {attributes, columns, convert, describe} from "./count.mjs";
 
 const [program, python, readColumns] = process.argv.slice(2), COUNT = 200;
 const folder = fs.mkdtempSync(path.join(os.tmpdir(), "gbt_readers_"));
@@ -59,8 +59,7 @@ function byPython(reader, path) {
 }
 
 // Every attribute of every Gaussian, as one reader has it.
-function compare(ending, reader, read) {
-    const limit = limits[ending];
+function compare(ending, reader, read, limit = limits[ending]) {
     check(`${ending} by ${reader}: Gaussians missing`, Math.abs(read.rows - COUNT), 0);
     const get = Object.fromEntries(read.names.map((name) => [name, read.column(name)]));
     const pairs = partners((j) => [get.x[j], get.y[j], get.z[j]]);
@@ -95,11 +94,22 @@ for (const ending of ["usda", "usdz"]) {
     check(`${ending}: errors of OpenUSD's validators`, said.length, 0);
 }
 
-// The other way: what splat-transform packs, we read.
-const packed = path.join(folder, "theirs.compressed.ply"), unpacked = path.join(folder, "unpacked.ply");
-convert(source, packed);
-execFileSync(program, ["export", packed, unpacked], {stdio: "ignore"});
-compare("compressed.ply", "gbtrace, of splat-transform", columns(unpacked));
+// The other way: what splat-transform packs, we read. Its .spz is of version 4, with 12 bits behind the point.
+for (const ending of ["compressed.ply", "spz"]) {
+    const packed = path.join(folder, `theirs.${ending}`), unpacked = path.join(folder, "unpacked.ply");
+    convert(source, packed);
+    execFileSync(program, ["export", packed, unpacked], {stdio: "ignore"});
+    compare(ending, "gbtrace, of splat-transform", columns(unpacked), {...limits[ending], place: ending === "spz" ? 2.2e-4 : 0.015});
+}
+
+// The mark of a model that is drawn as wide as pixels goes from file to file.
+const marked = path.join(folder, "marked.ply");
+fs.writeFileSync(marked, Buffer.from(fs.readFileSync(source).toString("latin1").replace("1.0\n", "1.0\ncomment SplatRenderMode: mip\n"), "latin1"));
+for (const ending of ["ply", "compressed.ply", "spz", "v4.spz", "sog"]) {
+    const out = path.join(folder, `marked_out.${ending}`);
+    execFileSync(program, ["export", marked, out], {stdio: "ignore"});
+    check(`${ending}: the mark is missing`, describe(out).includes("antialiased") ? 0 : 1, 0);
+}
 
 // What splat-transform reads of a .ply, plyfile reads too: the same numbers in the same columns.
 const byName = byPython("plyfile", file("ply")), plain = columns(file("ply"));

@@ -33,6 +33,8 @@ typedef struct exported {
     gaussian_cloud back;         /* of a file that we read */
     const gaussian_cloud *shown; /* in the model's coordinates: `back`, or what was written, where floats stay
                                     floats */
+    const gaussian_cloud *baked; /* what was written */
+    double to_bake;              /* of a file that we read; infinite: the same pictures */
     double to_model, to_photo;
     long long bytes;
 } exported;
@@ -49,7 +51,7 @@ typedef struct exporting {
     double origin[3], bake_seconds, refine_seconds, model_to_photo;
     size_t view_count, *views; /* that are compared */
     bool held_out;
-    frame frame;
+    frame frame, bake;    /* of what a file gives back, and of what was written */
     const char *folder;   /* the output that is a result folder, or NULL */
     image_scores *scores; /* [view_count], of what it gives back */
     lpips *net;           /* for the folder, or NULL */
@@ -98,7 +100,7 @@ static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
     GBT_TRY(loaded_run_open(run, e->def->data, 0, r, err));
     GBT_TRY(choose_views(e, err));
     memcpy(e->origin, r->model.origin, sizeof e->origin);
-    e->frame.draw.footprint = r->frame.draw.footprint;
+    e->frame.draw.footprint = e->bake.draw.footprint = r->frame.draw.footprint;
     /* Behind photos with an alpha channel is nothing, and what they are laid on is no part of the scene. */
     e->viewer = r->settings;
     float laid_on[3];
@@ -154,7 +156,8 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
                                const unsigned char *valid, gbt_error *err)
 {
     const double share = 1 / (double)e->view_count;
-    image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb;
+    image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb, *bake = &e->bake.rgb;
+    const gaussian_cloud *drawn = NULL; /* by `bake` */
     image_quantize(photo);
     image_quantize(neural);
     e->model_to_photo += share * metric_psnr_valid(neural, photo, valid);
@@ -162,6 +165,12 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
         exported *f = &e->files[i];
         GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &e->viewer, false, err));
         image_quantize(shown);
+        if (f->shown != f->baked && drawn != f->baked) {
+            GBT_TRY(frame_render(&e->bake, frame_plain(f->baked), camera, &e->viewer, false, err));
+            image_quantize(bake);
+            drawn = f->baked;
+        }
+        f->to_bake += f->shown != f->baked ? share * metric_psnr(shown, bake) : 0;
         f->to_model += share * metric_psnr(shown, neural);
         f->to_photo += share * metric_psnr_valid(shown, photo, valid);
         if (f->path != e->folder || !e->held_out)
@@ -238,7 +247,7 @@ static void say_source(const exporting *e, const gaussian_cloud *cloud, const ch
 static gbt_status write_file(exporting *e, const char *path, const gaussian_cloud *cloud, gbt_error *err)
 {
     exported *f = &e->files[e->file_count++];
-    *f = (exported){.path = path, .shown = cloud};
+    *f = (exported){.path = path, .shown = cloud, .baked = cloud};
     if (export_folder_is(path))
         return export_folder_write(path, &e->run, cloud, &f->bytes, err);
     GBT_TRY(gaussian_file_write(path, cloud, e->origin, err));
@@ -259,6 +268,8 @@ static json_t *file_to_json(const exporting *e, const exported *f)
     json_t *row = json_pack("{s:s,s:I,s:i}", "file", f->path, "bytes", (json_int_t)f->bytes, "sh_degree",
                             f->shown->sh_degree);
     if (e->baked && e->view_count > 0) {
+        if (f->shown != f->baked)
+            json_object_set_new(row, "psnr_to_bake", json_number(f->to_bake));
         json_object_set_new(row, "psnr_to_model", json_real(f->to_model));
         json_object_set_new(row, "psnr_to_photos", json_real(f->to_photo));
         json_object_set_new(row, "model_psnr_to_photos", json_real(e->model_to_photo));
@@ -272,6 +283,8 @@ static void say_file(const exporting *e, const exported *f, FILE *report)
     if (e->baked && e->view_count > 0) {
         fprintf(report, "; %zu %s views: %.2f dB to the model", e->view_count,
                 e->held_out ? "held-out" : "training", f->to_model);
+        if (f->shown != f->baked && isfinite(f->to_bake))
+            fprintf(report, ", %.2f dB to what was written", f->to_bake);
         if (!e->run.def.exposure)
             fprintf(report, ", %.2f dB to the photos (the model: %.2f)", f->to_photo, e->model_to_photo);
         fprintf(report, ", drawn on %s", e->viewer.background[0] > 0 ? "white" : "black");
@@ -334,6 +347,7 @@ static void exporting_free(exporting *e)
     mem_free(e->lpips);
     lpips_close(e->net);
     frame_free(&e->frame);
+    frame_free(&e->bake);
     loaded_run_close(&e->run);
     mem_free(e);
 }

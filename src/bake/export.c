@@ -34,7 +34,7 @@ typedef struct exported {
     const gaussian_cloud *shown; /* in the model's coordinates: `back`, or what was written, where floats stay
                                     floats */
     const gaussian_cloud *baked; /* what was written */
-    double to_bake;              /* of a file that we read; infinite: the same pictures */
+    double to_bake;              /* of a file that we read */
     double to_model, to_photo;
     long long bytes;
 } exported;
@@ -283,8 +283,6 @@ static void say_file(const exporting *e, const exported *f, FILE *report)
     if (e->baked && e->view_count > 0) {
         fprintf(report, "; %zu %s views: %.2f dB to the model", e->view_count,
                 e->held_out ? "held-out" : "training", f->to_model);
-        if (f->shown != f->baked && isfinite(f->to_bake))
-            fprintf(report, ", %.2f dB to what was written", f->to_bake);
         if (!e->run.def.exposure)
             fprintf(report, ", %.2f dB to the photos (the model: %.2f)", f->to_photo, e->model_to_photo);
         fprintf(report, ", drawn on %s", e->viewer.background[0] > 0 ? "white" : "black");

@@ -9,7 +9,7 @@ enum {
     EXTRA_HEADER_BYTES = 4,
     EXTRA_PADDING = 0x1986, /* the number under which .usdz files pad */
     ALIGN_MAX = 64,
-    FIRST_DAY = 1 << 5 | 1, /* 1 January 1980, as DOS counts: no time of writing is kept */
+    FIRST_DAY = 1 << 5 | 1, /* that DOS counts: no time of writing is kept */
     RATIO_MAX = 1032        /* deflate makes nothing smaller than that */
 };
 

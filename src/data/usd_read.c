@@ -310,8 +310,8 @@ gbt_status usda_read(const source_file *file, gaussian_cloud *out, gbt_error *er
     prim p = {0};
     memset(out, 0, sizeof *out);
     if (file->size >= 8 && memcmp(file->bytes, "PXR-USDC", 8) == 0)
-        return base_fail(err, GBT_ERR_FORMAT,
-                         "%s: is binary USD (wanted text: usdcat --usdFormat usda makes it)", file->name);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: is binary USD (wanted text, which usdcat makes of it)",
+                         file->name);
     if (file->size < 6 || memcmp(file->bytes, "#usda ", 6) != 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no USD text (wanted a file that begins with #usda)",
                          file->name);

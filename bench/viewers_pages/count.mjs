@@ -11,11 +11,23 @@ import {NodeIO} from "@gltf-transform/core";
 const here = path.dirname(fileURLToPath(import.meta.url));
 const degrees = {0: 0, 9: 1, 24: 2, 45: 3};
 
+const splatTransform = path.join(here, "node_modules/@playcanvas/splat-transform/bin/cli.mjs");
+
+// A file in another format, by splat-transform.
+export function convert(from, to) {
+    execFileSync(process.execPath, [splatTransform, "-w", from, to], {stdio: "ignore"});
+}
+
+// What splat-transform says about a file, in its words.
+export function describe(file) {
+    return execFileSync(process.execPath, [splatTransform, "-w", file, "null", "--info"], {encoding: "utf8", stdio: ["ignore", "pipe", "ignore"]});
+}
+
 // The columns of a file as splat-transform reads them: it writes them as a .ply, whose header says their names.
 export function columns(file) {
     const folder = fs.mkdtempSync(path.join(os.tmpdir(), "gbt_count_"));
     const ply = path.join(folder, "read.ply");
-    execFileSync(process.execPath, [path.join(here, "node_modules/@playcanvas/splat-transform/bin/cli.mjs"), "-w", file, ply], {stdio: "ignore"});
+    convert(file, ply);
     const bytes = fs.readFileSync(ply);
     fs.rmSync(folder, {recursive: true});
     const end = bytes.indexOf("end_header\n") + 11;

@@ -14,10 +14,11 @@ const [gbtrace, browserPath, cameraPath, scene, work, model] = process.argv.slic
 const here = path.dirname(fileURLToPath(import.meta.url));
 const camera = JSON.parse(fs.readFileSync(cameraPath, "utf8"));
 const types = {".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascript", ".wasm": "application/wasm"};
-const files = [".ply", ".splat", ".spz", ".glb"].map((ending) => "scene" + ending);
+const endings = [".ply", ".compressed.ply", ".splat", ".spz", ".sog", ".glb"], files = endings.map((ending) => "scene" + ending);
+const endingOf = (file) => file.slice("scene".length), flat = (file) => endingOf(file).replaceAll(".", "_").slice(1);
 const viewers = [
     {name: "Babylon.js", page: "babylon.html", reads: files},
-    {name: "Spark", page: "spark.html", reads: files.slice(0, 3)},
+    {name: "Spark", page: "spark.html", reads: files.filter((file) => !file.endsWith(".glb"))},
     {name: "Spark, blur as 3DGS", page: "spark.html", reads: ["scene.ply"], options: {preBlurAmount: 0.3, blurAmount: 0}},
 ];
 
@@ -45,14 +46,14 @@ async function draw(browser, port, viewer, file) {
     await page.waitForFunction("typeof draw === 'function'");
     const shown = await page.evaluate((...words) => draw(...words), `/files/${file}`, camera, [0, 0, 0], file.endsWith(".glb"), viewer.options ?? {});
     await page.close();
-    const picture = path.join(work, `${viewer.name.replace(/[^A-Za-z0-9]+/g, "_")}_${path.extname(file).slice(1)}.png`);
+    const picture = path.join(work, `${viewer.name.replace(/[^A-Za-z0-9]+/g, "_")}_${flat(file)}.png`);
     fs.writeFileSync(picture, Buffer.from(shown.png.split(",")[1], "base64"));
     return {count: shown.count, picture};
 }
 
 // Our own pictures of what a file gives back; a .glb holds the floats of the .ply.
 function ours(file, renderer) {
-    const folder = path.join(work, `${path.extname(file).slice(1)}_${renderer}`);
+    const folder = path.join(work, `${flat(file)}_${renderer}`);
     run("render", path.join(work, file), "-o", folder, "--camera", cameraPath, "--renderer", renderer);
     return path.join(folder, path.basename(cameraPath, ".json") + ".png");
 }
@@ -85,10 +86,10 @@ for (const file of files) {
         try {
             shown = await draw(browser, server.address().port, viewer, file);
         } catch (error) {
-            console.log(`| \`${path.extname(file)}\` | | ${inside.count}, ${inside.degree} | ${viewer.name} | fails: ${error.message.split("\n")[0]} | |`);
+            console.log(`| \`${endingOf(file)}\` | | ${inside.count}, ${inside.degree} | ${viewer.name} | fails: ${error.message.split("\n")[0]} | |`);
             continue;
         }
-        console.log(`| \`${path.extname(file)}\` | ${fs.statSync(path.join(work, file)).size} | ${inside.count}, ${inside.degree} | ${viewer.name} (${shown.count}) | ` +
+        console.log(`| \`${endingOf(file)}\` | ${fs.statSync(path.join(work, file)).size} | ${inside.count}, ${inside.degree} | ${viewer.name} (${shown.count}) | ` +
             `${difference(shown.picture, own.raster)} | ${difference(shown.picture, own.trace)} |` + (whole ? ` ${difference(shown.picture, whole)} |` : ""));
     }
 }

@@ -15,6 +15,8 @@ GBT_API_BEGIN
 typedef struct gbt_export_def {
     int sh_degree;    /* of the colours' dependence on the direction, 0 to 3. Default 3 */
     int refine_steps; /* steps that fit the plain Gaussians to the model's own pictures, >= 0. Default 500 */
+    int gaussians;    /* at most so many in a file made from a model, the backdrop among them: those that the
+                               training views blend most; 0: all. Default 0 */
     bool backdrop; /* add the model's background as a sphere of 1000 Gaussians around everything: files have
                       no background, and viewers draw on black. Not where photos have an alpha channel.
                       Default true */

@@ -76,7 +76,7 @@ class CEvaluateDef(c.Structure):
 
 
 class CExportDef(c.Structure):
-    _fields_ = [("sh_degree", c.c_int), ("refine_steps", c.c_int), ("backdrop", c.c_bool), ("data", c.c_char_p), ("json", c.c_char_p), ("lpips", c.c_char_p),
+    _fields_ = [("sh_degree", c.c_int), ("refine_steps", c.c_int), ("gaussians", c.c_int), ("backdrop", c.c_bool), ("data", c.c_char_p), ("json", c.c_char_p), ("lpips", c.c_char_p),
                 ("cookie_", c.c_uint32)]
 
 

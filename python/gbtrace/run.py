@@ -40,10 +40,11 @@ def evaluate(run, data=None, lpips=None, json=None):
     lib.call("gbt_evaluate", lib.encode(run), c.byref(settings))
 
 
-def export(path, *outputs, sh_degree=3, refine_steps=500, backdrop=True, data=None):
+def export(path, *outputs, sh_degree=3, refine_steps=500, gaussians=0, backdrop=True, data=None):
     """Write a trained model, or plain Gaussians, as plain Gaussians, in the format of each name's ending (docs/exporting.md)."""
     settings = lib.library.gbt_export_def_default()
-    settings.sh_degree, settings.refine_steps, settings.backdrop, settings.data = sh_degree, refine_steps, backdrop, lib.optional(data)
+    settings.sh_degree, settings.refine_steps, settings.gaussians, settings.backdrop = sh_degree, refine_steps, gaussians, backdrop
+    settings.data = lib.optional(data)
     names = (c.c_char_p * len(outputs))(*(lib.encode(name) for name in outputs))
     lib.call("gbt_export", lib.encode(path), c.byref(settings), names, len(outputs), None)
 

@@ -6,6 +6,7 @@
 #include "bake/bake.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -224,32 +225,64 @@ static float opacity_of(const sums *s, uint32_t visible)
     return s->weight > 0 ? (float)fmin(s->weight / (s->opaque * (1 + missed)), 1) : 0;
 }
 
-static gbt_status solve(const baking *b, int sh_degree, bake_result *out, gbt_error *err)
+typedef struct ranked {
+    double weight;
+    size_t slot;
+} ranked;
+
+static int by_weight(const void *a, const void *b)
+{
+    const ranked *x = a, *y = b;
+    if (x->weight > y->weight || x->weight < y->weight)
+        return x->weight > y->weight ? -1 : 1;
+    return (x->slot > y->slot) - (x->slot < y->slot);
+}
+
+static int by_slot(const void *a, const void *b)
+{
+    const ranked *x = a, *y = b;
+    return (x->slot > y->slot) - (x->slot < y->slot);
+}
+
+/* Those that are seen, at most `count_max` (0: all) of the largest weights, in the order of slots. */
+static size_t choose(const baking *b, size_t count_max, ranked *list, bake_result *out)
 {
     const size_t k_count = (size_t)b->a->offset_count, slots = b->a->count * k_count;
     size_t count = 0;
     for (size_t i = 0; i < slots; i++)
-        count += opacity_of(&b->sums[i], b->visible[i / k_count]) >= opacity_min;
-    if (count == 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "no camera sees any Gaussian: nothing to bake");
+        if (opacity_of(&b->sums[i], b->visible[i / k_count]) >= opacity_min)
+            list[count++] = (ranked){b->sums[i].weight, i};
+    out->unseen = slots - count;
+    if (count_max == 0 || count <= count_max)
+        return count;
+    out->thinned = count - count_max;
+    qsort(list, count, sizeof *list, by_weight);
+    qsort(list, count_max, sizeof *list, by_slot);
+    return count_max;
+}
+
+static gbt_status solve(const baking *b, const bake_def *def, bake_result *out, gbt_error *err)
+{
+    const size_t k_count = (size_t)b->a->offset_count;
+    ranked *list = mem_alloc(b->a->count * k_count, sizeof *list, "Gaussians to keep", err);
+    if (list == NULL)
+        return GBT_ERR_NO_MEMORY;
+    const size_t count = choose(b, def->count_max, list, out);
     gaussian_cloud *cloud = &out->cloud;
-    GBT_TRY(gaussian_cloud_alloc(cloud, count, err));
-    cloud->sh_degree = sh_degree;
-    size_t to = 0;
-    for (size_t i = 0; i < slots; i++) {
-        const sums *s = &b->sums[i];
-        const float opacity = opacity_of(s, b->visible[i / k_count]);
-        if (opacity < opacity_min) {
-            out->unseen++;
-            continue;
-        }
+    gbt_status status =
+        count > 0 ? gaussian_cloud_alloc(cloud, count, err)
+                  : base_fail(err, GBT_ERR_ARGUMENT, "no camera sees any Gaussian: nothing to bake");
+    cloud->sh_degree = def->sh_degree;
+    for (size_t to = 0; to < count && status == GBT_OK; to++) {
+        const size_t slot = list[to].slot;
+        const sums *s = &b->sums[slot];
         memcpy(cloud->mean + 3 * to, s->mean, sizeof s->mean);
-        cloud->opacity[to] = opacity;
+        cloud->opacity[to] = opacity_of(s, b->visible[slot / k_count]);
         solve_shape(s, cloud->scale_log + 3 * to, cloud->quat + 4 * to);
         solve_color(b, s, cloud->sh + to * TERMS * 3);
-        to++;
     }
-    return GBT_OK;
+    mem_free(list);
+    return status;
 }
 
 gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_camera *cameras,
@@ -274,7 +307,7 @@ gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_ca
     if (status == GBT_OK && def->prior > 0)
         status = add_directions(&b, f, d, def->prior, err);
     if (status == GBT_OK)
-        status = solve(&b, def->sh_degree, out, err);
+        status = solve(&b, def, out, err);
     mem_free(b.sums);
     mem_free(b.visible);
     return status;

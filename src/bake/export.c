@@ -33,6 +33,8 @@ typedef struct exported {
     gaussian_cloud back;         /* of a file that we read */
     const gaussian_cloud *shown; /* in the model's coordinates: `back`, or what was written, where floats stay
                                     floats */
+    const gaussian_cloud *baked; /* what was written */
+    double to_bake;              /* of a file that we read */
     double to_model, to_photo;
     long long bytes;
 } exported;
@@ -45,11 +47,11 @@ typedef struct exporting {
     gaussian_cloud clouds[2]; /* with colours of the degree asked for, and with one colour */
     exported files[OUTPUTS_MAX];
     size_t file_count;
-    size_t unseen;
+    size_t unseen, thinned;
     double origin[3], bake_seconds, refine_seconds, model_to_photo;
     size_t view_count, *views; /* that are compared */
     bool held_out;
-    frame frame;
+    frame frame, bake;    /* of what a file gives back, and of what was written */
     const char *folder;   /* the output that is a result folder, or NULL */
     image_scores *scores; /* [view_count], of what it gives back */
     lpips *net;           /* for the folder, or NULL */
@@ -98,7 +100,7 @@ static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
     GBT_TRY(loaded_run_open(run, e->def->data, 0, r, err));
     GBT_TRY(choose_views(e, err));
     memcpy(e->origin, r->model.origin, sizeof e->origin);
-    e->frame.draw.footprint = r->frame.draw.footprint;
+    e->frame.draw.footprint = e->bake.draw.footprint = r->frame.draw.footprint;
     /* Behind photos with an alpha channel is nothing, and what they are laid on is no part of the scene. */
     e->viewer = r->settings;
     float laid_on[3];
@@ -106,6 +108,10 @@ static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
         return GBT_OK;
     const float *behind = r->model.background;
     e->backdrop = e->def->backdrop && (behind[0] > 0 || behind[1] > 0 || behind[2] > 0);
+    if (e->backdrop && e->def->gaussians > 0 && e->def->gaussians <= BACKDROP_COUNT)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "gaussians: %d (wanted more than the %d of the background, or no background)",
+                         e->def->gaussians, (int)BACKDROP_COUNT);
     memset(e->viewer.background, 0, sizeof e->viewer.background);
     return GBT_OK;
 }
@@ -119,12 +125,15 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
     GBT_TRY(training_cameras(r, &cameras, &count, err));
     bake_def bake = bake_def_default();
     bake.sh_degree = sh_degree;
+    if (e->def->gaussians > 0)
+        bake.count_max = (size_t)e->def->gaussians - (e->backdrop ? BACKDROP_COUNT : 0);
     bake_result result = {0};
     double clock = clock_wall();
     gbt_status status = bake_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count,
                                    &r->settings, &bake, &result, err);
     *out = result.cloud;
     e->unseen = result.unseen;
+    e->thinned = result.thinned;
     e->bake_seconds = clock_wall() - clock;
     clock = clock_wall();
     refine_def refine = refine_def_default();
@@ -135,6 +144,7 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
     e->refine_seconds = clock_wall() - clock;
     if (status == GBT_OK && e->backdrop)
         status = backdrop_add(out, cameras, count, r->model.background, err);
+    out->antialiased = r->frame.draw.footprint > 0;
     mem_free(cameras);
     return status;
 }
@@ -146,7 +156,8 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
                                const unsigned char *valid, gbt_error *err)
 {
     const double share = 1 / (double)e->view_count;
-    image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb;
+    image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb, *bake = &e->bake.rgb;
+    const gaussian_cloud *drawn = NULL; /* by `bake` */
     image_quantize(photo);
     image_quantize(neural);
     e->model_to_photo += share * metric_psnr_valid(neural, photo, valid);
@@ -154,6 +165,12 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
         exported *f = &e->files[i];
         GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &e->viewer, false, err));
         image_quantize(shown);
+        if (f->shown != f->baked && drawn != f->baked) {
+            GBT_TRY(frame_render(&e->bake, frame_plain(f->baked), camera, &e->viewer, false, err));
+            image_quantize(bake);
+            drawn = f->baked;
+        }
+        f->to_bake += f->shown != f->baked ? share * metric_psnr(shown, bake) : 0;
         f->to_model += share * metric_psnr(shown, neural);
         f->to_photo += share * metric_psnr_valid(shown, photo, valid);
         if (f->path != e->folder || !e->held_out)
@@ -194,6 +211,9 @@ static gbt_status check(const char *input, const gbt_export_def *def, const char
         return base_fail(err, GBT_ERR_ARGUMENT, "sh_degree: %d (wanted 0 to 3)", def->sh_degree);
     if (def->refine_steps < 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "refine_steps: %d (wanted 0 or more)", def->refine_steps);
+    if (def->gaussians < 0 || (def->gaussians > 0 && gaussian_file_readable(input)))
+        return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: %d of %s (wanted 0 or more, and a trained model)",
+                         def->gaussians, input);
     if (output_count < 1 || output_count > OUTPUTS_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu files to write (wanted 1 to %d)", input,
                          output_count, (int)OUTPUTS_MAX);
@@ -211,12 +231,14 @@ static gbt_status check(const char *input, const gbt_export_def *def, const char
 static void say_source(const exporting *e, const gaussian_cloud *cloud, const char *input, FILE *report)
 {
     fprintf(report, "%s: %zu Gaussians, colours of degree %d", input, cloud->count, cloud->sh_degree);
-    if (e->baked)
-        fprintf(report,
-                "; %s%zu that no training camera sees are left out; baked in %.1f s, refined in %.1f s",
-                e->backdrop ? "1000 of them the background; " : "", e->unseen, e->bake_seconds,
-                e->refine_seconds);
-    else if (cloud->dropped > 0)
+    if (e->baked) {
+        fprintf(report, "; %s%zu that no training camera sees are left out",
+                e->backdrop ? "1000 of them the background; " : "", e->unseen);
+        if (e->thinned > 0)
+            fprintf(report, ", and %zu that are blended least", e->thinned);
+        fprintf(report, "; baked in %.1f s, refined in %.1f s", e->bake_seconds, e->refine_seconds);
+    }
+    if (!e->baked && cloud->dropped > 0)
         fprintf(report, "; %zu unusable rows dropped", cloud->dropped);
     fprintf(report, "\n");
 }
@@ -225,7 +247,7 @@ static void say_source(const exporting *e, const gaussian_cloud *cloud, const ch
 static gbt_status write_file(exporting *e, const char *path, const gaussian_cloud *cloud, gbt_error *err)
 {
     exported *f = &e->files[e->file_count++];
-    *f = (exported){.path = path, .shown = cloud};
+    *f = (exported){.path = path, .shown = cloud, .baked = cloud};
     if (export_folder_is(path))
         return export_folder_write(path, &e->run, cloud, &f->bytes, err);
     GBT_TRY(gaussian_file_write(path, cloud, e->origin, err));
@@ -236,7 +258,7 @@ static gbt_status write_file(exporting *e, const char *path, const gaussian_clou
         return GBT_OK;
     GBT_TRY(gaussian_file_read(path, &f->back, err));
     for (size_t i = 0; i < 3 * f->back.count; i++)
-        f->back.mean[i] = (float)((double)f->back.mean[i] - e->origin[i % 3]);
+        f->back.mean[i] = (float)((double)f->back.mean[i] + (f->back.origin[i % 3] - e->origin[i % 3]));
     f->shown = &f->back;
     return GBT_OK;
 }
@@ -246,6 +268,8 @@ static json_t *file_to_json(const exporting *e, const exported *f)
     json_t *row = json_pack("{s:s,s:I,s:i}", "file", f->path, "bytes", (json_int_t)f->bytes, "sh_degree",
                             f->shown->sh_degree);
     if (e->baked && e->view_count > 0) {
+        if (f->shown != f->baked)
+            json_object_set_new(row, "psnr_to_bake", json_number(f->to_bake));
         json_object_set_new(row, "psnr_to_model", json_real(f->to_model));
         json_object_set_new(row, "psnr_to_photos", json_real(f->to_photo));
         json_object_set_new(row, "model_psnr_to_photos", json_real(e->model_to_photo));
@@ -300,8 +324,9 @@ static gbt_status report_all(const exporting *e, const char *input, FILE *report
     gbt_status status = GBT_OK;
     if (e->def->json != NULL) {
         const size_t count = e->file_count > 0 ? e->files[e->file_count - 1].shown->count : 0;
-        json_t *root = json_pack("{s:i,s:s,s:I,s:I,s:O}", "schema", 1, "input", input, "gaussians",
-                                 (json_int_t)count, "unseen", (json_int_t)e->unseen, "files", files);
+        json_t *root = json_pack("{s:i,s:s,s:I,s:I,s:I,s:O}", "schema", 1, "input", input, "gaussians",
+                                 (json_int_t)count, "unseen", (json_int_t)e->unseen, "thinned",
+                                 (json_int_t)e->thinned, "files", files);
         status = json_save(root, e->def->json, err);
         json_decref(root);
     }
@@ -320,6 +345,7 @@ static void exporting_free(exporting *e)
     mem_free(e->lpips);
     lpips_close(e->net);
     frame_free(&e->frame);
+    frame_free(&e->bake);
     loaded_run_close(&e->run);
     mem_free(e);
 }

@@ -116,7 +116,9 @@ static gbt_status write_cloud(const char *folder, const loaded_run *r, const gau
     GBT_TRY(file_join(place, sizeof place, folder, name, err));
     GBT_TRY(file_make_folder(place, err));
     GBT_TRY(file_join(path, sizeof path, place, "point_cloud.ply", err));
-    GBT_TRY(gaussian_file_write(path, cloud, r->model.origin, err));
+    gaussian_cloud plain = *cloud; /* its viewer wants the count in the third line: no comment before it */
+    plain.antialiased = false;
+    GBT_TRY(gaussian_file_write(path, &plain, r->model.origin, err));
     struct stat info = {0};
     stat(path, &info);
     *bytes = (long long)info.st_size;

@@ -216,7 +216,7 @@ static void print_words(const char *title, const command_word *(*list)(void))
 {
     const command_word *words = list != NULL ? list() : NULL;
     for (int i = 0; words != NULL && words[i].name != NULL; i++)
-        printf("%s%s  %-12s%s\n%s", i == 0 ? title : "", i == 0 ? "\n" : "", words[i].name, words[i].help,
+        printf("%s%s  %-16s%s\n%s", i == 0 ? title : "", i == 0 ? "\n" : "", words[i].name, words[i].help,
                words[i + 1].name == NULL ? "\n" : "");
 }
 

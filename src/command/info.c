@@ -162,11 +162,10 @@ static gbt_status info_of_dataset(const char *path, bool json, FILE *out, gbt_er
 
 static gbt_status info_of_gaussians(const char *path, bool json, FILE *out, gbt_error *err)
 {
-    static const double world[3] = {0, 0, 0};
     gaussian_cloud cloud;
     double low[3], high[3];
     GBT_TRY(gaussian_file_read(path, &cloud, err));
-    gbt_status status = find_box(cloud.mean, cloud.count, world, low, high, err);
+    gbt_status status = find_box(cloud.mean, cloud.count, cloud.origin, low, high, err);
     if (status == GBT_OK && json) {
         json_t *value = json_pack("{s:i,s:s,s:o,s:I,s:i,s:I,s:[[f,f,f],[f,f,f]]}", "schema", 1, "kind",
                                   "gaussians", "path", json_text(path), "gaussians", (json_int_t)cloud.count,

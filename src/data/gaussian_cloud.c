@@ -7,6 +7,9 @@
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "data/raw.h"
+
+#define VALUE_LIMIT 1e18 /* squares of anything below are floats */
 
 gbt_status gaussian_cloud_alloc(gaussian_cloud *cloud, size_t count, gbt_error *err)
 {
@@ -31,6 +34,46 @@ void gaussian_cloud_free(gaussian_cloud *cloud)
     mem_free(cloud->opacity);
     mem_free(cloud->sh);
     memset(cloud, 0, sizeof *cloud);
+}
+
+static bool all_within(const double *values, size_t count, double limit)
+{
+    for (size_t k = 0; k < count; k++)
+        if (!(fabs(values[k]) <= limit))
+            return false;
+    return true;
+}
+
+static double limited_log(double scale_log) { return fmax(scale_log, -GAUSSIAN_SCALE_LOG_LIMIT); }
+
+void gaussian_cloud_add(gaussian_cloud *out, const gaussian_row *row)
+{
+    const double *log_scale = row->scale_log, largest = fmax(log_scale[0], fmax(log_scale[1], log_scale[2]));
+    const bool no_scale = isnan(log_scale[0]) || isnan(log_scale[1]) || isnan(log_scale[2]);
+    if (!all_within(row->mean, 3, RAW_COORDINATE_LIMIT) || no_scale || largest > GAUSSIAN_SCALE_LOG_LIMIT ||
+        !all_within(row->quat, 4, VALUE_LIMIT) || isnan(row->opacity) ||
+        !all_within(&row->sh[0][0], GAUSSIAN_SH_COUNT * 3, VALUE_LIMIT)) {
+        out->dropped++;
+        return;
+    }
+    const size_t i = out->count++;
+    bool clamped = false;
+    const double least = limited_log(limited_log(largest) - log(GAUSSIAN_SCALE_RATIO));
+    for (size_t k = 0; k < 3; k++) {
+        clamped = clamped || log_scale[k] < least;
+        out->scale_log[3 * i + k] = (float)fmax(log_scale[k], least);
+        out->mean[3 * i + k] = (float)row->mean[k];
+    }
+    out->scales_clamped += clamped;
+    out->opacity[i] = (float)fmin(fmax(row->opacity, 0), 1);
+    const double *q = row->quat;
+    const double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    const bool has_rotation = norm > 1e-30;
+    out->identity_rotations += !has_rotation;
+    for (size_t k = 0; k < 4; k++)
+        out->quat[4 * i + k] = has_rotation ? (float)(q[k] / norm) : k == 0 ? 1.0f : 0.0f;
+    for (size_t k = 0; k < GAUSSIAN_SH_COUNT * 3; k++)
+        out->sh[i * GAUSSIAN_SH_COUNT * 3 + k] = (float)row->sh[k / 3][k % 3];
 }
 
 bool gaussian_limit_scales(float scale_log[3])

@@ -27,12 +27,15 @@ enum { GAUSSIAN_SH_COUNT = 16 };
  */
 typedef struct gaussian_cloud {
     size_t count;
+    double origin[3]; /* to be added to every mean: 0, but of formats that keep a place in double */
     float *mean;      /* [count][3] */
     float *scale_log; /* [count][3], natural log of the std-dev; ratio limited */
     float *quat;      /* [count][4], w x y z, unit */
     float *opacity;   /* [count], [0, 1] */
     float *sh;        /* [count][GAUSSIAN_SH_COUNT][3], coefficient-major; those above sh_degree are 0 */
     int sh_degree;    /* 0..3 */
+    bool antialiased; /* made to be drawn as wide as pixels (docs/antialiasing.md), without a blur on top: of
+                         the formats that can say so */
     size_t dropped;   /* rows with a value that is not usable */
     size_t identity_rotations; /* zero quaternions, read as no rotation */
     size_t scales_clamped;     /* rows with a scale raised to 1e-4 of their largest */
@@ -41,6 +44,22 @@ typedef struct gaussian_cloud {
 /** Room for `count` Gaussians, in use; values undefined. On failure zeroed. */
 gbt_status gaussian_cloud_alloc(gaussian_cloud *cloud, size_t count, gbt_error *err);
 void gaussian_cloud_free(gaussian_cloud *cloud);
+
+/** One Gaussian as a file has it, before it is checked. */
+typedef struct gaussian_row {
+    double mean[3];
+    double scale_log[3]; /* -INFINITY: flat */
+    double quat[4];      /* w x y z, of any length */
+    double opacity;
+    double sh[GAUSSIAN_SH_COUNT][3];
+} gaussian_row;
+
+/**
+ * Append one Gaussian, checked and normalised, to a cloud that has room for it; or count it as dropped, when
+ * a value is not finite (but a flat scale), a coordinate is beyond RAW_COORDINATE_LIMIT, or a log-scale above
+ * GAUSSIAN_SCALE_LOG_LIMIT. What was mended is counted too.
+ */
+void gaussian_cloud_add(gaussian_cloud *out, const gaussian_row *row);
 
 /** A warning in one line when rows were left out or mended: how many, and how. `name` of the file. */
 void gaussian_cloud_warn(const gaussian_cloud *cloud, const char *name);

@@ -2,12 +2,16 @@
 /* data/gaussian_file.c -- formats of plain Gaussians by the ending of a name. */
 #include "data/gaussian_file.h"
 
+#include <float.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
 #include "base/file.h"
+#include "base/log.h"
 #include "data/gaussian_formats.h"
+#include "data/gaussian_order.h"
 #include "data/result_folder.h"
 #include "gbtrace/export.h"
 
@@ -47,15 +51,18 @@ static const char *list(bool readable, const char *before_last, char out[LIST_SI
     return out;
 }
 
+/* The longest ending that fits: .compressed.ply ends in .ply too. */
 static const gaussian_format *format_of(const char *path)
 {
     const size_t length = strlen(path);
+    const gaussian_format *found = NULL;
     for (int i = 0; i < FORMAT_COUNT; i++) {
         const size_t ending = strlen(formats[i]->ending);
-        if (length > ending && strcasecmp(path + length - ending, formats[i]->ending) == 0)
-            return formats[i];
+        if (length > ending && strcasecmp(path + length - ending, formats[i]->ending) == 0 &&
+            (found == NULL || ending > strlen(found->ending)))
+            found = formats[i];
     }
-    return NULL;
+    return found;
 }
 
 /* The file itself, or the newest one of a result folder; NULL when there is none that can be read. */
@@ -136,9 +143,39 @@ int gaussian_file_degree(const char *path)
     return format != NULL ? format->degree : 3;
 }
 
+/* A warning when floats of the world's coordinates have steps that are large beside the Gaussians. */
+static gbt_status check_precision(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                                  gbt_error *err)
+{
+    double farthest = 0, size = 0;
+    for (int k = 0; k < 3; k++)
+        farthest = fmax(farthest, fabs(origin[k]));
+    float *sizes = mem_alloc(cloud->count, sizeof *sizes, "sizes", err);
+    if (sizes == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < cloud->count; i++) {
+        const float *l = cloud->scale_log + 3 * i;
+        sizes[i] = fmaxf(l[0], fmaxf(l[1], l[2]));
+    }
+    if (cloud->count > 0)
+        size = exp((double)gaussian_median(sizes, cloud->count));
+    mem_free(sizes);
+    if (farthest * (double)FLT_EPSILON > 0.1 * size)
+        log_warn(
+            "%s: coordinates as far as %g are rounded to %.2g, and half of all Gaussians are smaller than "
+            "%.2g (.usda, .usdz and .glb keep the origin apart)",
+            path, farthest, farthest * (double)FLT_EPSILON, size);
+    return GBT_OK;
+}
+
 gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
                                gbt_error *err)
 {
+    double whole[3];
     GBT_TRY(gaussian_file_check_writable(path, err));
-    return format_of(path)->write(path, cloud, origin, err);
+    for (int k = 0; k < 3; k++)
+        whole[k] = origin[k] + cloud->origin[k];
+    if (!format_of(path)->keeps_origin)
+        GBT_TRY(check_precision(path, cloud, whole, err));
+    return format_of(path)->write(path, cloud, whole, err);
 }

@@ -28,7 +28,8 @@ gbt_status gaussian_file_check_writable(const char *path, gbt_error *err);
 /** The largest degree of colours that the format keeps: 0 for .splat, else 3. */
 int gaussian_file_degree(const char *path);
 
-/** Write one of these, atomically; `origin` is added to every mean in double. As its writer. */
+/** Write one of these, atomically; `origin` and the cloud's own are added to every mean in double, or kept
+   apart (gaussian_format.keeps_origin). A warning where floats are too coarse for that. As its writer. */
 gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
                                gbt_error *err);
 

@@ -6,6 +6,7 @@
 #include <stdio.h>
 
 #include "base/file.h"
+#include "data/compressed_ply.h"
 #include "data/ply.h"
 
 enum {
@@ -18,65 +19,26 @@ enum {
     FIXED_COLUMNS = 14
 };
 
-#define VALUE_LIMIT 1e18 /* squares of anything below are floats */
-
 typedef struct gaussian_rows {
     gaussian_cloud *out;
     size_t rest_count; /* f_rest properties: 0, 9, 24 or 45 */
 } gaussian_rows;
 
-static double limited_log(double scale_log) { return fmax(scale_log, -GAUSSIAN_SCALE_LOG_LIMIT); }
-
-/* False when the row is not usable. */
-static bool convert_row(const gaussian_rows *rows, const double *values, size_t i)
-{
-    gaussian_cloud *out = rows->out;
-    for (size_t k = 0; k < FIXED_COLUMNS + rows->rest_count; k++) {
-        const bool may_be_infinite = k >= COLUMN_OPACITY && k < COLUMN_ROT;
-        const double limit = k < COLUMN_OPACITY ? RAW_COORDINATE_LIMIT : VALUE_LIMIT;
-        if (isnan(values[k]) || (!may_be_infinite && fabs(values[k]) > limit))
-            return false;
-    }
-    double largest = -(double)INFINITY;
-    for (int k = 0; k < 3; k++)
-        largest = fmax(largest, values[COLUMN_SCALE + k]);
-    if (largest > GAUSSIAN_SCALE_LOG_LIMIT)
-        return false;
-    bool clamped = false;
-    const double least = limited_log(limited_log(largest) - log(GAUSSIAN_SCALE_RATIO));
-    for (size_t k = 0; k < 3; k++) {
-        const double scale_log = values[COLUMN_SCALE + k];
-        clamped = clamped || scale_log < least;
-        out->scale_log[3 * i + k] = (float)fmax(scale_log, least);
-        out->mean[3 * i + k] = (float)values[COLUMN_MEAN + k];
-    }
-    out->scales_clamped += clamped;
-    out->opacity[i] = (float)(1 / (1 + exp(-values[COLUMN_OPACITY])));
-    const double *q = values + COLUMN_ROT;
-    const double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    const bool has_rotation = norm > 1e-30;
-    out->identity_rotations += !has_rotation;
-    for (size_t k = 0; k < 4; k++)
-        out->quat[4 * i + k] = has_rotation ? (float)(q[k] / norm) : k == 0 ? 1.0f : 0.0f;
-    float(*sh)[3] = (float(*)[3])(out->sh + i * GAUSSIAN_SH_COUNT * 3);
-    memset(sh, 0, GAUSSIAN_SH_COUNT * sizeof *sh);
-    /* f_rest is channel-major in the file: all of red, then green, then blue. */
-    const size_t per_channel = rows->rest_count / 3;
-    for (size_t channel = 0; channel < 3; channel++) {
-        sh[0][channel] = (float)values[COLUMN_DC + channel];
-        for (size_t k = 0; k < per_channel; k++)
-            sh[1 + k][channel] = (float)values[COLUMN_REST + channel * per_channel + k];
-    }
-    return true;
-}
-
 static void add_row(void *context, const double *values)
 {
     const gaussian_rows *rows = context;
-    if (convert_row(rows, values, rows->out->count))
-        rows->out->count++;
-    else
-        rows->out->dropped++;
+    gaussian_row row = {.opacity = 1 / (1 + exp(-values[COLUMN_OPACITY]))};
+    memcpy(row.mean, values + COLUMN_MEAN, sizeof row.mean);
+    memcpy(row.scale_log, values + COLUMN_SCALE, sizeof row.scale_log);
+    memcpy(row.quat, values + COLUMN_ROT, sizeof row.quat);
+    /* f_rest is channel-major in the file: all of red, then green, then blue. */
+    const size_t per_channel = rows->rest_count / 3;
+    for (size_t channel = 0; channel < 3; channel++) {
+        row.sh[0][channel] = values[COLUMN_DC + channel];
+        for (size_t k = 0; k < per_channel; k++)
+            row.sh[1 + k][channel] = values[COLUMN_REST + channel * per_channel + k];
+    }
+    gaussian_cloud_add(rows->out, &row);
 }
 
 /* Property indices of the columns; says what is missing. */
@@ -129,6 +91,30 @@ static gbt_status find_columns(const source_file *file, const ply_header *header
     return GBT_OK;
 }
 
+static gbt_status read_plain(const source_file *file, const ply_header *header, int vertex,
+                             gaussian_cloud *out, gbt_error *err)
+{
+    int columns[PLY_MAX_COLUMNS + 1];
+    gaussian_rows rows = {.out = out};
+    GBT_TRY(find_columns(file, header, vertex, columns, &rows.rest_count, err));
+    /* A column takes at least a byte, so this bounds the memory by a small multiple of the file. */
+    const uint64_t row_count = header->elements[vertex].count, least_bytes = FIXED_COLUMNS + rows.rest_count;
+    if (row_count > (file->size - header->data_at) / least_bytes)
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu Gaussians cannot be in the %zu bytes that follow",
+                         file->name, header->data_at, (unsigned long long)row_count,
+                         file->size - header->data_at);
+    GBT_TRY(gaussian_cloud_alloc(out, (size_t)row_count, err));
+    out->count = 0; /* of rows that are usable */
+    out->sh_degree = rows.rest_count == 45 ? 3 : rows.rest_count == 24 ? 2 : rows.rest_count == 9 ? 1 : 0;
+    return ply_read_rows(file, header, vertex, columns, FIXED_COLUMNS + rows.rest_count, add_row, &rows, err);
+}
+
+/* A line of the header; a later one would count, but nobody writes two. */
+static bool says(const source_file *file, const ply_header *header, const char *line)
+{
+    return memmem(file->bytes, header->data_at, line, strlen(line)) != NULL;
+}
+
 gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
@@ -137,21 +123,10 @@ gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_e
     const int vertex = ply_find_element(&header, "vertex");
     if (vertex < 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no element vertex in the header", file->name);
-    int columns[PLY_MAX_COLUMNS + 1];
-    gaussian_rows rows = {.out = out};
-    GBT_TRY(find_columns(file, &header, vertex, columns, &rows.rest_count, err));
-    /* A column takes at least a byte, so this bounds the memory by a small multiple of the file. */
-    const uint64_t row_count = header.elements[vertex].count, least_bytes = FIXED_COLUMNS + rows.rest_count;
-    if (row_count > (file->size - header.data_at) / least_bytes)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu Gaussians cannot be in the %zu bytes that follow",
-                         file->name, header.data_at, (unsigned long long)row_count,
-                         file->size - header.data_at);
-    gbt_status status = gaussian_cloud_alloc(out, (size_t)row_count, err);
-    out->count = 0; /* of rows that are usable */
-    out->sh_degree = rows.rest_count == 45 ? 3 : rows.rest_count == 24 ? 2 : rows.rest_count == 9 ? 1 : 0;
-    if (status == GBT_OK)
-        status = ply_read_rows(file, &header, vertex, columns, FIXED_COLUMNS + rows.rest_count, add_row,
-                               &rows, err);
+    gbt_status status = compressed_ply_is(&header) ? compressed_ply_read(file, &header, out, err)
+                                                   : read_plain(file, &header, vertex, out, err);
+    out->antialiased =
+        says(file, &header, "\n" GAUSSIAN_PLY_MIP) || says(file, &header, "\ncomment antialiased 1");
     if (status == GBT_OK && out->count == 0)
         status = base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu rows dropped)", file->name,
                            out->dropped);
@@ -166,8 +141,8 @@ bool gaussian_ply_has_gaussians(const source_file *file)
     if (ply_read_header(file, &header, NULL) != GBT_OK)
         return false;
     const int vertex = ply_find_element(&header, "vertex");
-    return vertex >= 0 && ply_find_property(&header, vertex, "f_dc_0") >= 0 &&
-           ply_find_property(&header, vertex, "rot_0") >= 0;
+    return compressed_ply_is(&header) || (vertex >= 0 && ply_find_property(&header, vertex, "f_dc_0") >= 0 &&
+                                          ply_find_property(&header, vertex, "rot_0") >= 0);
 }
 
 gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *err)

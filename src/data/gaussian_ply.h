@@ -6,8 +6,19 @@
 #include "data/bytes.h"
 #include "data/gaussian_cloud.h"
 
+/** The line of a header that says that Gaussians are to be drawn as wide as pixels. */
+#define GAUSSIAN_PLY_MIP "comment SplatRenderMode: mip"
+
+/** What goes behind the line of the format: that line, or nothing. */
+static inline void gaussian_ply_put_comment(sink *s, const gaussian_cloud *cloud)
+{
+    if (cloud->antialiased)
+        sink_put_text(s, GAUSSIAN_PLY_MIP "\n");
+}
+
 /**
- * Read a 3DGS .ply: any property order and types, extra properties ignored, ASCII or binary.
+ * Read a 3DGS .ply: any property order and types, extra properties ignored, ASCII or binary; or one whose
+ * Gaussians are packed into chunks (data/compressed_ply.h).
  *
  * colour = max(0, 0.5 + sum sh_k Y_k). A row is dropped when a value is NaN or infinite; but an opacity logit
  * of +-inf is 1 or 0 and a log-scale of -inf is a flat axis, both as exporters write them. A log-scale above

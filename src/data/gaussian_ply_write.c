@@ -35,7 +35,9 @@ static gbt_status write_ply(const char *path, const gaussian_cloud *cloud, const
     const size_t functions = (size_t)((cloud->sh_degree + 1) * (cloud->sh_degree + 1));
     sink s = {.err = err};
     char line[128];
-    snprintf(line, sizeof line, "ply\nformat binary_little_endian 1.0\nelement vertex %zu\n", cloud->count);
+    sink_put_text(&s, "ply\nformat binary_little_endian 1.0\n");
+    gaussian_ply_put_comment(&s, cloud);
+    snprintf(line, sizeof line, "element vertex %zu\n", cloud->count);
     sink_put_text(&s, line);
     sink_put_text(&s, "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty "
                       "float ny\nproperty float nz\n");

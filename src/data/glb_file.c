@@ -35,13 +35,12 @@ static json_t *add_attribute(glb *g, const char *name, const char *type, int com
     return accessor;
 }
 
-static void put_positions(glb *g, const gaussian_cloud *cloud, const double origin[3])
+static void put_positions(glb *g, const gaussian_cloud *cloud)
 {
     const size_t from = g->data.size;
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (size_t i = 0; i < 3 * cloud->count; i++) {
-        const double world = (double)cloud->mean[i] + origin[i % 3];
-        const float turned = (float)(i % 3 < 2 ? -world : world);
+        const float turned = i % 3 < 2 ? -cloud->mean[i] : cloud->mean[i];
         low[i % 3] = fmin(low[i % 3], (double)turned);
         high[i % 3] = fmax(high[i % 3], (double)turned);
         sink_put_f32(&g->data, turned);
@@ -105,17 +104,19 @@ static void put_harmonics(glb *g, const gaussian_cloud *cloud)
         }
 }
 
-static json_t *document(const glb *g)
+/* The origin is the node's place, where numbers are doubles. */
+static json_t *document(const glb *g, const double origin[3])
 {
     json_t *primitive =
         json_pack("{s:i,s:O,s:{s:{s:s,s:s,s:s,s:s}}}", "mode", (int)MODE_POINTS, "attributes", g->attributes,
                   "extensions", "KHR_gaussian_splatting", "kernel", "ellipse", "colorSpace",
                   "srgb_rec709_display", "sortingMethod", "cameraDistance", "projection", "perspective");
-    return json_pack("{s:{s:s,s:s},s:[s],s:[{s:I}],s:O,s:O,s:[{s:[o]}],s:[{s:i}],s:[{s:[i]}],s:i}", "asset",
-                     "version", "2.0", "generator", "gbtrace", "extensionsUsed", "KHR_gaussian_splatting",
-                     "buffers", "byteLength", (json_int_t)g->data.size, "bufferViews", g->views, "accessors",
-                     g->accessors, "meshes", "primitives", primitive, "nodes", "mesh", 0, "scenes", "nodes",
-                     0, "scene", 0);
+    return json_pack("{s:{s:s,s:s},s:[s],s:[{s:I}],s:O,s:O,s:[{s:[o]}],s:[{s:i,s:[f,f,f]}],s:[{s:[i]}],s:i}",
+                     "asset", "version", "2.0", "generator", "gbtrace", "extensionsUsed",
+                     "KHR_gaussian_splatting", "buffers", "byteLength", (json_int_t)g->data.size,
+                     "bufferViews", g->views, "accessors", g->accessors, "meshes", "primitives", primitive,
+                     "nodes", "mesh", 0, "translation", 0 - origin[0], 0 - origin[1], origin[2], "scenes",
+                     "nodes", 0, "scene", 0);
 }
 
 static gbt_status write_chunks(const char *path, const glb *g, const char *json, gbt_error *err)
@@ -151,7 +152,7 @@ static gbt_status write_chunks(const char *path, const glb *g, const char *json,
  *
  * Viewers without the extension see points: COLOR_0 holds the mean colour, linear, with the opacity.
  *
- * @param origin [in] added to every mean in double
+ * @param origin [in] the node's translation
  * @return GBT_OK; GBT_ERR_ARGUMENT (beyond 4 GiB); GBT_ERR_NO_MEMORY; as file_write_atomic()
  */
 static gbt_status write_glb(const char *path, const gaussian_cloud *cloud, const double origin[3],
@@ -162,12 +163,12 @@ static gbt_status write_glb(const char *path, const gaussian_cloud *cloud, const
              .accessors = json_array(),
              .views = json_array(),
              .count = cloud->count};
-    put_positions(&g, cloud, origin);
+    put_positions(&g, cloud);
     put_shape(&g, cloud);
     put_harmonics(&g, cloud);
     gbt_status status = g.data.status;
     if (status == GBT_OK) {
-        json_t *root = document(&g);
+        json_t *root = document(&g, origin);
         char *json =
             root == NULL ? NULL : json_dumps(root, JSON_COMPACT | JSON_SORT_KEYS | JSON_REAL_PRECISION(17));
         status = json == NULL ? base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path)
@@ -186,4 +187,5 @@ const gaussian_format gaussian_format_glb = {
     .ending = ".glb",
     .what = "glTF 2.0 with KHR_gaussian_splatting: everything, as floats",
     .degree = 3,
+    .keeps_origin = true,
     .write = write_glb};

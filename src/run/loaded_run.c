@@ -47,10 +47,12 @@ void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud)
         low[i % 3] = fmin(low[i % 3], (double)c->mean[i]);
         high[i % 3] = fmax(high[i % 3], (double)c->mean[i]);
     }
-    for (int k = 0; k < 3; k++)
-        r->model.origin[k] = 0.5 * (low[k] + high[k]);
     for (size_t i = 0; i < 3 * c->count; i++)
-        c->mean[i] = (float)((double)c->mean[i] - r->model.origin[i % 3]);
+        c->mean[i] = (float)((double)c->mean[i] - 0.5 * (low[i % 3] + high[i % 3]));
+    for (int k = 0; k < 3; k++) {
+        r->model.origin[k] = c->origin[k] + 0.5 * (low[k] + high[k]);
+        c->origin[k] = 0;
+    }
 }
 
 static gbt_status open_cloud(const char *path, loaded_run *out, gbt_error *err)

@@ -193,6 +193,39 @@ static void a_backdrop_stands_for_the_background(void **state)
     free_world(&w);
 }
 
+/* What is kept has the values that it has among all; what is left out is blended least: the picture changes
+   less than without as many others. */
+static void the_most_blended_are_kept(void **state)
+{
+    (void)state;
+    world w;
+    make_world(&w, false);
+    bake_result all, some;
+    bake_def def = bake_def_default();
+    assert_ok(bake_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, &w.s, &def, &all, NULL));
+    def.count_max = all.cloud.count / 2;
+    assert_ok(bake_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, &w.s, &def, &some, NULL));
+    assert_int_equal(some.cloud.count, def.count_max);
+    assert_int_equal(some.thinned, all.cloud.count - def.count_max);
+    assert_int_equal(some.unseen, all.unseen);
+    size_t from = 0, left_out = 0;
+    for (size_t i = 0; i < all.cloud.count; i++) {
+        if (from < some.cloud.count &&
+            memcmp(all.cloud.mean + 3 * i, some.cloud.mean + 3 * from, 3 * sizeof(float)) == 0) {
+            assert_memory_equal(all.cloud.sh + 48 * i, some.cloud.sh + 48 * from, 48 * sizeof(float));
+            assert_true(all.cloud.opacity[i] == some.cloud.opacity[from]);
+            from++;
+            continue;
+        }
+        left_out++;
+    }
+    assert_int_equal(from, some.cloud.count);
+    assert_int_equal(left_out, some.thinned);
+    gaussian_cloud_free(&all.cloud);
+    gaussian_cloud_free(&some.cloud);
+    free_world(&w);
+}
+
 static void refusals(void **state)
 {
     (void)state;
@@ -219,6 +252,7 @@ int main(void)
         cmocka_unit_test(more_functions_and_steps_come_nearer),
         cmocka_unit_test(same_bits_for_all_threads),
         cmocka_unit_test(a_backdrop_stands_for_the_background),
+        cmocka_unit_test(the_most_blended_are_kept),
         cmocka_unit_test(refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

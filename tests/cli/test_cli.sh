@@ -493,8 +493,17 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "export bakes a run into every format, and converts" "$(cat err out)"
     "$program" export plain.spz -o named.ply >out 2>err && cmp -s named.ply back.ply
     report $? "export takes -o too" "$(cat err out)"
+    "$program" export plain.ply all.compressed.ply all.v4.spz all.sog all.usda all.usdz >out 2>err && for ending in compressed.ply v4.spz sog usda usdz; do
+        "$program" info all.$ending && "$program" export all.$ending again.ply || break
+    done >>out 2>>err && [ "$(grep -c "gaussians $(sed -n 's/^  "gaussians": \([0-9]*\),$/\1/p' plain.json)," out)" = 5 ]
+    report $? "every small format is written, looked into and converted" "$(cat err out)"
+    "$program" export run thin.sog --gaussians 1050 --refine 2 --json thin.json >out 2>err && grep -q '^  "gaussians": 1050,$' thin.json && grep -q '^  "thinned": [1-9]' thin.json &&
+        grep -q ' that are blended least' out
+    report $? "export keeps the Gaussians that are blended most" "$(cat err out)"
+    misuse 2 "--gaussians: 10 of plain.ply (wanted 0 or more, and a trained model)" export plain.ply o.ply --gaussians 10
+    misuse 2 "--gaussians: 1000 (wanted more than the 1000 of the background, or no background)" export run o.ply --gaussians 1000
     for command in 'info plain.glb' 'view plain.glb' 'render plain.glb -o o' 'export plain.glb back.ply' 'compress plain.glb -o o.gbt'; do
-        misuse 2 "plain.glb: .glb is written for other programs, not read (wanted .ply, .splat, .spz, or a run)" $command
+        misuse 2 "plain.glb: .glb is written for other programs, not read (wanted .ply, .compressed.ply, .splat, .spz, .v4.spz, .sog, .usda, .usdz, or a run)" $command
     done
     for file in plain.ply plain.splat plain.spz; do
         prints "info of $file" "^$file: plain Gaussians$" info $file

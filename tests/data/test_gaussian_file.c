@@ -4,66 +4,9 @@
 #include <jansson.h>
 #include <zlib.h>
 
-#include "base/rng.h"
-#include "data/data_support.h"
 #include "data/gaussian_file.h"
 #include "data/gaussian_formats.h"
-
-static const double nowhere[3] = {0, 0, 0};
-
-static float between(uint64_t stream, uint64_t index, float low, float high)
-{
-    return low + (high - low) * rng_uniform(7, stream, index);
-}
-
-static void make_cloud(gaussian_cloud *c, size_t count, int degree)
-{
-    must(gaussian_cloud_alloc(c, count, &err));
-    c->sh_degree = degree;
-    for (size_t i = 0; i < count; i++) {
-        float square = 0;
-        c->opacity[i] = between(1, i, 0.01f, 0.99f);
-        for (size_t k = 0; k < 3; k++) {
-            c->mean[3 * i + k] = between(2, 3 * i + k, -20, 20);
-            c->scale_log[3 * i + k] = between(3, 3 * i + k, -6, 0);
-        }
-        for (size_t k = 0; k < 4; k++) {
-            c->quat[4 * i + k] = (float)rng_normal(7, 4, 4 * i + k);
-            square += c->quat[4 * i + k] * c->quat[4 * i + k];
-        }
-        for (size_t k = 0; k < 4; k++)
-            c->quat[4 * i + k] /= sqrtf(square);
-        for (size_t k = 0; k < 48; k++)
-            c->sh[48 * i + k] =
-                k < 3 * (size_t)((degree + 1) * (degree + 1)) ? between(5, 48 * i + k, -0.9f, 0.9f) : 0;
-    }
-}
-
-/* How far a format may move a value; scales as logs. */
-typedef struct limits {
-    double mean, scale, quat, opacity, color, harmonics;
-} limits;
-
-static void check_near(const gaussian_cloud *a, const gaussian_cloud *b, const double origin[3],
-                       const limits *l)
-{
-    assert_int_equal(a->count, b->count);
-    check_cloud(b);
-    for (size_t i = 0; i < a->count; i++) {
-        double dot = 0;
-        for (size_t k = 0; k < 3; k++) {
-            assert_true(fabs((double)a->mean[3 * i + k] + origin[k] - (double)b->mean[3 * i + k]) <= l->mean);
-            assert_true(fabs((double)a->scale_log[3 * i + k] - (double)b->scale_log[3 * i + k]) <= l->scale);
-            assert_true(fabs((double)a->sh[48 * i + k] - (double)b->sh[48 * i + k]) <= l->color);
-        }
-        for (size_t k = 0; k < 4; k++)
-            dot += (double)a->quat[4 * i + k] * (double)b->quat[4 * i + k];
-        assert_true(1 - fabs(dot) <= l->quat);
-        assert_true(fabs((double)a->opacity[i] - (double)b->opacity[i]) <= l->opacity);
-        for (size_t k = 3; k < 48; k++)
-            assert_true(fabs((double)a->sh[48 * i + k] - (double)b->sh[48 * i + k]) <= l->harmonics);
-    }
-}
+#include "data/gaussian_support.h"
 
 static void ply_keeps_everything(void **state)
 {
@@ -78,6 +21,34 @@ static void ply_keeps_everything(void **state)
         gaussian_cloud_free(&a);
         gaussian_cloud_free(&b);
     }
+}
+
+/* The mark of a model that is drawn as wide as pixels: as Brush and SuperSplat write it, and as Postshot
+ * does. */
+static void ply_says_how_it_is_drawn(void **state)
+{
+    static const char other[] =
+        "ply\nformat ascii 1.0\ncomment antialiased 1\nelement vertex 1\n"
+        "property float x\nproperty float y\nproperty float z\nproperty float f_dc_0\n"
+        "property float f_dc_1\nproperty float f_dc_2\nproperty float opacity\n"
+        "property float scale_0\nproperty float scale_1\nproperty float scale_2\n"
+        "property float rot_0\nproperty float rot_1\nproperty float rot_2\n"
+        "property float rot_3\nend_header\n1 2 3 0 0 0 0 0 0 0 1 0 0 0\n";
+    for (int marked = 0; marked < 2; marked++) {
+        gaussian_cloud a, b;
+        make_cloud(&a, 3, 1);
+        a.antialiased = marked == 1;
+        must(gaussian_file_write(inside(*state, "a.ply", 0), &a, nowhere, &err));
+        must(gaussian_file_read(inside(*state, "a.ply", 0), &b, &err));
+        assert_int_equal(b.antialiased, marked);
+        gaussian_cloud_free(&a);
+        gaussian_cloud_free(&b);
+    }
+    write_text(*state, "b.ply", other);
+    gaussian_cloud b;
+    must(gaussian_file_read(inside(*state, "b.ply", 0), &b, &err));
+    assert_true(b.antialiased);
+    gaussian_cloud_free(&b);
 }
 
 static void spz_keeps_its_steps(void **state)
@@ -181,7 +152,8 @@ static void glb_is_what_gltf_wants(void **state)
 {
     gaussian_cloud a;
     make_cloud(&a, 33, 2);
-    must(gaussian_file_write(inside(*state, "a.glb", 0), &a, nowhere, &err));
+    const double origin[3] = {691234.0625, 5334567.123, -0.1};
+    must(gaussian_file_write(inside(*state, "a.glb", 0), &a, origin, &err));
     unsigned char *bytes;
     size_t size;
     must(file_read(inside(*state, "a.glb", 0), &bytes, &size, &err));
@@ -210,6 +182,10 @@ static void glb_is_what_gltf_wants(void **state)
     for (size_t i = 0; i < a.count; i++)
         low = fmin(low, -(double)a.mean[3 * i]);
     assert_true(fabs(json_number_value(json_array_get(json_object_get(position, "min"), 0)) - low) < 1e-12);
+    /* The origin is the node's place, with all its digits. */
+    json_t *place = json_object_get(json_array_get(json_object_get(root, "nodes"), 0), "translation");
+    for (size_t k = 0; k < 3; k++)
+        assert_true(json_number_value(json_array_get(place, k)) == (k < 2 ? -origin[k] : origin[k]));
     /* The last value of the last accessor, and the quaternion of the first Gaussian. */
     json_t *last = json_array_get(views, json_array_size(views) - 1);
     assert_int_equal(json_integer_value(json_object_get(last, "byteOffset")) +
@@ -276,11 +252,12 @@ static void refusals(void **state)
     assert_non_null(strstr(err.text, "scene.obj: cannot be read as Gaussians"));
     err = (gbt_error){0};
     assert_int_equal(gaussian_file_check_writable("scene", &err), GBT_ERR_ARGUMENT);
-    assert_non_null(strstr(err.text, "wanted .ply, .splat, .spz or .glb"));
+    assert_non_null(
+        strstr(err.text, "wanted .ply, .compressed.ply, .splat, .spz, .v4.spz, .sog, .glb, .usda or .usdz"));
     err = (gbt_error){0};
-    const source_file four = {"v4.spz", (const unsigned char *)"NGSP\4\0\0\0", 8};
-    assert_int_equal(gaussian_format_spz.read(&four, &cloud, &err), GBT_ERR_FORMAT);
-    assert_non_null(strstr(err.text, "version 4"));
+    const source_file five = {"v5.spz", (const unsigned char *)"NGSP\5\0\0\0xxxxxxxxxxxxxxxxxxxxxxxx", 32};
+    assert_int_equal(gaussian_format_spz.read(&five, &cloud, &err), GBT_ERR_FORMAT);
+    assert_non_null(strstr(err.text, "version 5"));
     make_cloud(&cloud, 1, 0);
     err = (gbt_error){0};
     assert_int_equal(
@@ -295,6 +272,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(ply_keeps_everything, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(ply_says_how_it_is_drawn, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(spz_keeps_its_steps, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(splat_keeps_one_color, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(spz_bytes, make_temporary, remove_temporary),

@@ -103,6 +103,12 @@ void fuzz_splat(const source_file *file) { gaussians_of(file, gaussian_format_sp
 
 void fuzz_spz(const source_file *file) { gaussians_of(file, gaussian_format_spz.read); }
 
+void fuzz_sog(const source_file *file) { gaussians_of(file, gaussian_format_sog.read); }
+
+void fuzz_usda(const source_file *file) { gaussians_of(file, gaussian_format_usda.read); }
+
+void fuzz_usdz(const source_file *file) { gaussians_of(file, gaussian_format_usdz.read); }
+
 void fuzz_safetensors(const source_file *file)
 {
     tensor out;

@@ -64,8 +64,8 @@ done >"$work/unknown"
 report $? "commands that pages name are there" "$(cat "$work/unknown")"
 
 # Formats: the page on exporting has a row for each that the program knows, and no other.
-"$program" export --help | sed -n 's/^  \(\.[a-z0-9]*\) .*/\1/p' | sort >"$work/formats"
-sed -n 's/^| `\(\.[a-z0-9]*\)` .*/\1/p' docs/exporting.md | sort -u >"$work/named"
+"$program" export --help | sed -n 's/^  \(\.[a-z0-9.]*\) .*/\1/p' | sort >"$work/formats"
+sed -n 's/^| `\(\.[a-z0-9.]*\)` .*/\1/p' docs/exporting.md | sort -u >"$work/named"
 [ -s "$work/formats" ] && cmp -s "$work/formats" "$work/named"
 report $? "formats on the page on exporting" "$(diff "$work/formats" "$work/named")"
 finish

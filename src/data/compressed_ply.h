@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/compressed_ply.h -- reading of .ply files whose Gaussians are packed into chunks, as SuperSplat writes
+   them. */
+#ifndef GBT_DATA_COMPRESSED_PLY_H
+#define GBT_DATA_COMPRESSED_PLY_H
+
+#include "data/bytes.h"
+#include "data/gaussian_cloud.h"
+#include "data/ply.h"
+
+/** Whether the header has packed Gaussians. */
+bool compressed_ply_is(const ply_header *header);
+
+/** Read them, as gaussian_ply_read(). `out` zeroed by the caller; on failure its memory is the caller's to
+    free. */
+gbt_status compressed_ply_read(const source_file *file, const ply_header *header, gaussian_cloud *out,
+                               gbt_error *err);
+
+#endif

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/sog.h -- .sog bundles, version 2: a .zip of meta.json and of lossless .webp tables with a pixel for
+   each Gaussian. */
+#ifndef GBT_DATA_SOG_H
+#define GBT_DATA_SOG_H
+
+#include "data/bytes.h"
+#include "data/gaussian_cloud.h"
+
+enum {
+    SOG_PALETTE_MAX = 65536, /* labels have 16 bits */
+    SOG_ENTRIES_PER_ROW = 64 /* of the table of harmonics */
+};
+
+/** As gaussian_format.read. */
+gbt_status sog_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
+
+#endif

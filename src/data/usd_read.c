@@ -1,0 +1,339 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/usd_read.c -- the first prim of Gaussians in a USD text: its arrays of numbers, and its place. */
+#include <math.h>
+#include <stdio.h>
+
+#include "base/log.h"
+#include "data/archive.h"
+#include "data/number.h"
+#include "data/raw.h"
+#include "data/usd.h"
+
+static const char prim_type[] = "ParticleField3DGaussianSplat";
+
+/* ---- tokens ---- */
+
+/* A word, a text in quotes, or one character of punctuation. */
+typedef struct token {
+    const char *at;
+    size_t length;
+} token;
+
+typedef struct reading {
+    const source_file *file;
+    const char *at, *end;
+} reading;
+
+static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == ','; }
+
+static bool is_single(char c) { return c != '\0' && strchr("()[]{}=;", c) != NULL; }
+
+/* Blanks, commas and comments. */
+static void skip_blanks(reading *r)
+{
+    while (r->at < r->end && (is_blank(*r->at) || *r->at == '#')) {
+        if (*r->at == '#')
+            while (r->at < r->end && *r->at != '\n')
+                r->at++;
+        else
+            r->at++;
+    }
+}
+
+/* Behind the quotes that close the text at `from`, which may be three. */
+static const char *behind_quotes(const reading *r, const char *from)
+{
+    const char quote = *from;
+    const bool three = r->end - from >= 6 && from[1] == quote && from[2] == quote;
+    const ptrdiff_t width = three ? 3 : 1;
+    for (const char *c = from + width; c < r->end; c++) {
+        if (*c == '\\')
+            c++;
+        else if (*c == quote && (!three || (r->end - c >= 3 && c[1] == quote && c[2] == quote)))
+            return c + width;
+    }
+    return r->end;
+}
+
+/* False at the end. */
+static bool next(reading *r, token *out)
+{
+    skip_blanks(r);
+    if (r->at >= r->end)
+        return false;
+    const char *from = r->at;
+    if (is_single(*from))
+        r->at++;
+    else if (*from == '"' || *from == '\'')
+        r->at = behind_quotes(r, from);
+    else
+        while (r->at < r->end && !is_blank(*r->at) && !is_single(*r->at) && *r->at != '#' && *r->at != '"')
+            r->at++;
+    if (r->at == from)
+        r->at++;
+    *out = (token){from, (size_t)(r->at - from)};
+    return true;
+}
+
+static bool is(token t, const char *text)
+{
+    return t.length == strlen(text) && memcmp(t.at, text, t.length) == 0;
+}
+
+/* Behind the bracket that closes the one before, of whatever kind. */
+static void skip_group(reading *r)
+{
+    token t;
+    for (int depth = 1; depth > 0 && next(r, &t);)
+        depth += is(t, "(") || is(t, "[") || is(t, "{") ? 1 : is(t, ")") || is(t, "]") || is(t, "}") ? -1 : 0;
+}
+
+static gbt_status fail(const reading *r, const char *what, gbt_error *err)
+{
+    return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %s", r->file->name,
+                     (size_t)(r->at - (const char *)r->file->bytes), what);
+}
+
+/* ---- what a prim has ---- */
+
+typedef enum field_id {
+    POSITIONS,
+    ORIENTATIONS,
+    SCALES,
+    OPACITIES,
+    HARMONICS,
+    DEGREE,
+    TRANSLATE,
+    FIELDS
+} field_id;
+
+/* Names of the arrays; with an h behind they have less precision, and count where the others are not there.
+ */
+static const struct {
+    const char *name;
+    size_t width;
+} fields[FIELDS] = {{"positions", 3},
+                    {"orientations", 4},
+                    {"scales", 3},
+                    {"opacities", 1},
+                    {"radiance:sphericalHarmonicsCoefficients", 3},
+                    {"radiance:sphericalHarmonicsDegree", 1},
+                    {"xformOp:translate", 3}};
+
+typedef struct numbers {
+    float *values; /* of arrays */
+    size_t count, capacity;
+} numbers;
+
+typedef struct prim {
+    numbers fields[FIELDS];
+    double translate[3]; /* all its digits */
+    bool other_place;    /* a transformation that is not read */
+} prim;
+
+static field_id field_of(token name, bool *half)
+{
+    for (int f = 0; f < FIELDS; f++) {
+        const size_t length = strlen(fields[f].name);
+        if (name.length < length || memcmp(name.at, fields[f].name, length) != 0)
+            continue;
+        *half = name.length == length + 1 && name.at[length] == 'h';
+        if (*half || name.length == length)
+            return (field_id)f;
+    }
+    return FIELDS;
+}
+
+static gbt_status add_number(reading *r, prim *p, field_id f, token t, gbt_error *err)
+{
+    numbers *n = &p->fields[f];
+    double value;
+    const number_result result = number_parse_double(t.at, t.length, &value);
+    if (result == NUMBER_BAD)
+        return fail(r, "no number in a list of numbers", err);
+    if (f == TRANSLATE && n->count < 3)
+        p->translate[n->count] = value;
+    void *grown = n->values;
+    GBT_TRY(
+        mem_reserve(&grown, &n->capacity, n->count, n->count + 1, sizeof *n->values, "numbers of USD", err));
+    n->values = grown;
+    n->values[n->count++] = result == NUMBER_RANGE ? NAN : (float)value;
+    return GBT_OK;
+}
+
+/* A number, or all numbers in brackets. */
+static gbt_status take_numbers(reading *r, prim *p, field_id f, gbt_error *err)
+{
+    token t;
+    int depth = 0;
+    p->fields[f].count = 0;
+    do {
+        if (!next(r, &t))
+            return fail(r, "the text ends inside a list", err);
+        if (is(t, "(") || is(t, "["))
+            depth++;
+        else if (is(t, ")") || is(t, "]"))
+            depth--;
+        else
+            GBT_TRY(add_number(r, p, f, t, err));
+    } while (depth > 0);
+    return GBT_OK;
+}
+
+/* Any value but those that are read. */
+static void skip_value(reading *r)
+{
+    token t;
+    if (next(r, &t) && (is(t, "(") || is(t, "[") || is(t, "{")))
+        skip_group(r);
+}
+
+static gbt_status take_value(reading *r, prim *p, token name, gbt_error *err)
+{
+    static const char place[] = "xformOp:";
+    bool half = false;
+    const field_id f = field_of(name, &half);
+    const bool is_place = name.length > sizeof place && memcmp(name.at, place, sizeof place - 1) == 0;
+    const char *from = r->at;
+    if (f == FIELDS || (half && p->fields[f].count > 0)) {
+        skip_value(r);
+        token value = {.at = r->at};
+        reading again = {.file = r->file, .at = from, .end = r->at};
+        p->other_place |=
+            is_place && !(is(name, "xformOp:rotateZ") && next(&again, &value) && is(value, "180"));
+        return GBT_OK;
+    }
+    return take_numbers(r, p, f, err);
+}
+
+/* Between the braces of the prim. */
+static gbt_status read_prim(reading *r, prim *p, gbt_error *err)
+{
+    token t, before = {.at = r->at};
+    while (next(r, &t)) {
+        if (is(t, "}"))
+            return GBT_OK;
+        if (is(t, "="))
+            GBT_TRY(take_value(r, p, before, err));
+        else if (is(t, "(") || is(t, "[") || is(t, "{"))
+            skip_group(r); /* of metadata, and of prims inside; a type's [] */
+        before = is(t, "]") ? before : t;
+    }
+    return fail(r, "the text ends inside the prim", err);
+}
+
+/* To the first prim of Gaussians: behind its brace. */
+static gbt_status find_prim(reading *r, gbt_error *err)
+{
+    token t;
+    bool defined = false;
+    while (next(r, &t)) {
+        if (!(defined && is(t, prim_type))) {
+            defined = is(t, "def");
+            continue;
+        }
+        while (next(r, &t) && !is(t, "{"))
+            if (is(t, "("))
+                skip_group(r);
+        return GBT_OK;
+    }
+    return base_fail(err, GBT_ERR_FORMAT, "%s: has no prim of the type %s", r->file->name, prim_type);
+}
+
+/* ---- Gaussians ---- */
+
+static gbt_status check(const reading *r, const prim *p, size_t *functions, gbt_error *err)
+{
+    for (int k = 0; k < 3; k++)
+        if (!(fabs(p->translate[k]) <= RAW_COORDINATE_LIMIT))
+            return base_fail(err, GBT_ERR_FORMAT, "%s: a translation of %g is not usable", r->file->name,
+                             p->translate[k]);
+    const size_t count = p->fields[POSITIONS].count / 3;
+    for (int f = 0; f <= OPACITIES; f++)
+        if (count == 0 || p->fields[f].count != count * fields[f].width)
+            return base_fail(err, GBT_ERR_FORMAT,
+                             "%s: %zu numbers in %s (wanted %zu for each of %zu positions)", r->file->name,
+                             p->fields[f].count, fields[f].name, fields[f].width, count);
+    const numbers *degree = &p->fields[DEGREE], *sh = &p->fields[HARMONICS];
+    const float value = degree->count == 1 ? degree->values[0] : 3; /* the schema's own default */
+    if (!(value >= 0 && value <= 3))
+        return base_fail(err, GBT_ERR_FORMAT, "%s: harmonics of degree %g (wanted 0 to 3)", r->file->name,
+                         (double)value);
+    *functions = sh->count == 0 ? 0 : (size_t)(((int)value + 1) * ((int)value + 1));
+    if (sh->count != 3 * *functions * count)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %zu numbers of harmonics (wanted %zu)", r->file->name,
+                         sh->count, 3 * *functions * count);
+    return GBT_OK;
+}
+
+static void add_gaussian(const prim *p, size_t i, size_t functions, gaussian_cloud *out)
+{
+    gaussian_row row = {.opacity = (double)p->fields[OPACITIES].values[i]};
+    for (size_t k = 0; k < 3; k++) {
+        const double scale = (double)p->fields[SCALES].values[3 * i + k];
+        row.mean[k] = (double)p->fields[POSITIONS].values[3 * i + k];
+        row.scale_log[k] = scale >= 0 ? log(scale) : (double)NAN;
+    }
+    for (size_t k = 0; k < 4; k++)
+        row.quat[k] = (double)p->fields[ORIENTATIONS].values[4 * i + k];
+    for (size_t k = 0; k < 3 * functions; k++)
+        row.sh[k / 3][k % 3] = (double)p->fields[HARMONICS].values[3 * functions * i + k];
+    gaussian_cloud_add(out, &row);
+}
+
+static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error *err)
+{
+    size_t functions = 0;
+    GBT_TRY(find_prim(r, err));
+    GBT_TRY(read_prim(r, p, err));
+    GBT_TRY(check(r, p, &functions, err));
+    const size_t count = p->fields[POSITIONS].count / 3;
+    GBT_TRY(gaussian_cloud_alloc(out, count, err));
+    out->count = 0; /* of those that are usable */
+    memcpy(out->origin, p->translate, sizeof out->origin);
+    out->sh_degree = functions == 16 ? 3 : functions == 9 ? 2 : functions == 4 ? 1 : 0;
+    for (size_t i = 0; i < count; i++)
+        add_gaussian(p, i, functions, out);
+    if (p->other_place)
+        log_warn("%s: the prim's rotation and scale are left out; its own coordinates are read, and its "
+                 "translation",
+                 r->file->name);
+    return out->count > 0 ? GBT_OK
+                          : base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu dropped)",
+                                      r->file->name, out->dropped);
+}
+
+gbt_status usda_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
+{
+    reading r = {
+        .file = file, .at = (const char *)file->bytes, .end = (const char *)file->bytes + file->size};
+    prim p = {0};
+    memset(out, 0, sizeof *out);
+    if (file->size >= 8 && memcmp(file->bytes, "PXR-USDC", 8) == 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: is binary USD (wanted text, which usdcat makes of it)",
+                         file->name);
+    if (file->size < 6 || memcmp(file->bytes, "#usda ", 6) != 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no USD text (wanted a file that begins with #usda)",
+                         file->name);
+    const gbt_status status = read_text(&r, &p, out, err);
+    for (int f = 0; f < FIELDS; f++)
+        mem_free(p.fields[f].values);
+    if (status != GBT_OK)
+        gaussian_cloud_free(out);
+    return status;
+}
+
+gbt_status usdz_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
+{
+    char name[512], full[1024];
+    unsigned char *bytes;
+    source_file inside = {.name = full};
+    memset(out, 0, sizeof *out);
+    GBT_TRY(archive_find(file, ".usda", name, sizeof name, err));
+    GBT_TRY(archive_take(file, name, &bytes, &inside.size, err));
+    snprintf(full, sizeof full, "%.500s: %s", file->name, name);
+    inside.bytes = bytes;
+    const gbt_status status = usda_read(&inside, out, err);
+    mem_free(bytes);
+    return status;
+}

@@ -1,0 +1,440 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/data/test_gaussian_packed.c -- plain Gaussians in small files and back: what each format keeps, its
+   bytes, damaged files. */
+#include "data/gaussian_file.h"
+#include "data/gaussian_formats.h"
+#include "data/gaussian_order.h"
+#include "data/gaussian_support.h"
+#include "data/palette.h"
+
+/* Write, read, and bring back into order. */
+static void there_and_back(const char *path, const gaussian_cloud *a, const double origin[3],
+                           gaussian_cloud *b)
+{
+    must(gaussian_file_write(path, a, origin, &err));
+    assert_true(gaussian_file_has_gaussians(path));
+    must(gaussian_file_read(path, b, &err));
+    match_order(a, b, origin);
+    assert_int_equal(b->sh_degree, a->sh_degree);
+    assert_int_equal(b->antialiased, a->antialiased);
+}
+
+/* 600 Gaussians are two chunks and a part of one. */
+static void compressed_ply_keeps_its_steps(void **state)
+{
+    for (int degree = 0; degree <= 3; degree++) {
+        gaussian_cloud a, b;
+        make_cloud(&a, 600, degree);
+        a.antialiased = degree % 2 == 1;
+        const double origin[3] = {100, -200, 300};
+        there_and_back(inside(*state, "a.Compressed.PLY", 0), &a, origin, &b);
+        check_near(&a, &b, origin,
+                   &(limits){.mean = 20.0 / 1023 + 1e-4,
+                             .scale = 3.0 / 1023 + 1e-5,
+                             .quat = 3e-6,
+                             .opacity = 0.5 / 255 + 1e-6,
+                             .color = 0.9 / 255 + 1e-6,
+                             .harmonics = 1.0 / 64 + 1e-6});
+        gaussian_cloud_free(&a);
+        gaussian_cloud_free(&b);
+    }
+}
+
+static void spz4_keeps_the_values_of_spz(void **state)
+{
+    for (int degree = 0; degree <= 3; degree++) {
+        gaussian_cloud a, three, four;
+        make_cloud(&a, 300, degree);
+        a.antialiased = degree % 2 == 1;
+        const double origin[3] = {100, -200, 300};
+        must(gaussian_file_write(inside(*state, "a.spz", 0), &a, origin, &err));
+        must(gaussian_file_write(inside(*state, "a.v4.spz", 1), &a, origin, &err));
+        must(gaussian_file_read(inside(*state, "a.spz", 0), &three, &err));
+        must(gaussian_file_read(inside(*state, "a.v4.spz", 1), &four, &err));
+        assert_true(three.antialiased == a.antialiased && four.antialiased == a.antialiased);
+        assert_int_equal(four.sh_degree, degree);
+        check_near(&three, &four, nowhere, &(limits){.quat = 1e-7});
+        gaussian_cloud_free(&a);
+        gaussian_cloud_free(&three);
+        gaussian_cloud_free(&four);
+    }
+}
+
+/* The header and the table, which are not packed: 300 Gaussians of degree 1. */
+static void spz4_bytes(void **state)
+{
+    gaussian_cloud a;
+    make_cloud(&a, 300, 1);
+    a.antialiased = true;
+    a.mean[0] = 64;
+    must(gaussian_file_write(inside(*state, "a.v4.spz", 0), &a, nowhere, &err));
+    gaussian_cloud_free(&a);
+    unsigned char *bytes;
+    size_t size;
+    must(file_read(inside(*state, "a.v4.spz", 0), &bytes, &size, &err));
+    static const unsigned char want[32] = {'N', 'G', 'S', 'P', 4, 0, 0,  0, 300 & 255, 300 >> 8,
+                                           0,   0,   1,   16,  1, 6, 32, 0, 0,         0};
+    assert_memory_equal(bytes, want, sizeof want);
+    const source_file file = {"a", bytes, size};
+    cursor c = {.file = &file, .at = 32};
+    uint64_t packed = 32 + 6 * 16;
+    static const uint64_t row[6] = {9, 1, 3, 3, 4, 9};
+    for (int i = 0; i < 6; i++) {
+        packed += cursor_u64(&c);
+        assert_int_equal(cursor_u64(&c), 300 * row[i]);
+    }
+    assert_int_equal(packed, size);
+    /* Every frame of zstd begins so. */
+    assert_int_equal(cursor_u32(&c), 0xFD2FB528);
+    mem_free(bytes);
+}
+
+/* A palette of 1024 entries holds all harmonics of 600. */
+static void sog_keeps_its_steps(void **state)
+{
+    for (int degree = 0; degree <= 3; degree++) {
+        gaussian_cloud a, b;
+        make_cloud(&a, 600, degree);
+        a.antialiased = degree % 2 == 1;
+        const double origin[3] = {1, -2, 3};
+        there_and_back(inside(*state, "a.sog", 0), &a, origin, &b);
+        check_near(&a, &b, origin,
+                   &(limits){.mean = 24 * 2 * log(24) / 65535,
+                             .scale = 6.0 / 256,
+                             .quat = 5e-5,
+                             .opacity = 0.5 / 255 + 1e-6,
+                             .color = 1.8 / 256,
+                             .harmonics = 1.8 / 256});
+        gaussian_cloud_free(&a);
+        gaussian_cloud_free(&b);
+    }
+}
+
+/* Of 8000 Gaussians with 300 colours each has its own entry: cells are cut until nothing differs. */
+static void sog_palette_is_exact(void **state)
+{
+    gaussian_cloud a, b;
+    make_cloud(&a, 8000, 3);
+    for (size_t i = 300; i < a.count; i++)
+        memcpy(a.sh + 48 * i, a.sh + 48 * (i % 300), 48 * sizeof(float));
+    for (size_t i = 0; i < 48 * a.count; i++)
+        a.sh[i] = roundf(a.sh[i] * 20) / 20;
+    must(gaussian_file_write(inside(*state, "a.sog", 0), &a, nowhere, &err));
+    must(gaussian_file_read(inside(*state, "a.sog", 0), &b, &err));
+    uint32_t *order = gaussian_order(&a, NULL);
+    for (size_t i = 0; i < a.count; i++)
+        for (size_t k = 0; k < 48; k++)
+            assert_true(fabsf(a.sh[48 * order[i] + k] - b.sh[48 * i + k]) < 1e-5f);
+    mem_free(order);
+    gaussian_cloud_free(&a);
+    gaussian_cloud_free(&b);
+}
+
+/* Levels beat equal steps where values crowd, and are exact for few values. */
+static void levels_follow_the_values(void **state)
+{
+    (void)state;
+    enum { COUNT = 5000 };
+    static float values[COUNT];
+    float levels[PALETTE_LEVELS];
+    double error = 0, equal = 0;
+    for (size_t i = 0; i < COUNT; i++)
+        values[i] = (float)pow(rng_normal(3, 1, i), 3);
+    float low = INFINITY, high = -INFINITY;
+    for (size_t i = 0; i < COUNT; i++) {
+        low = fminf(low, values[i]);
+        high = fmaxf(high, values[i]);
+    }
+    must(palette_levels(values, COUNT, levels, &err));
+    const double step = ((double)high - (double)low) / 255;
+    for (size_t i = 0; i < COUNT; i++) {
+        const unsigned char k = palette_nearest(levels, values[i]);
+        const double d = (double)values[i] - (double)levels[k], from = (double)values[i] - (double)low;
+        for (int j = 0; j < PALETTE_LEVELS; j++)
+            assert_true(fabs(d) <= fabs((double)values[i] - (double)levels[j]));
+        error += d * d;
+        equal += pow(from - step * nearbyint(from / step), 2);
+    }
+    if (error > 0.2 * equal)
+        fail_msg("%g of equal steps", error / equal);
+    for (size_t i = 0; i < COUNT; i++)
+        values[i] = (float)(i % 7);
+    must(palette_levels(values, COUNT, levels, &err));
+    for (size_t i = 0; i < COUNT; i++)
+        assert_true(fabsf(levels[palette_nearest(levels, values[i])] - values[i]) < 1e-6f);
+}
+
+/* An entry is the mean of its vectors, and a larger palette is nearer. */
+static void palette_entries_are_means(void **state)
+{
+    (void)state;
+    enum { COUNT = 2000, WIDTH = 9 };
+    static float vectors[COUNT * WIDTH];
+    double before = INFINITY;
+    for (size_t i = 0; i < COUNT * WIDTH; i++)
+        vectors[i] = (float)rng_normal(4, i % WIDTH, i / WIDTH) * (float)(1 + i % WIDTH);
+    for (size_t limit = 1; limit <= 4096; limit *= 8) {
+        palette p;
+        must(palette_make(vectors, COUNT, WIDTH, limit, &p, &err));
+        assert_int_equal(p.count, limit < COUNT ? limit : COUNT);
+        double error = 0;
+        for (size_t e = 0; e < p.count; e++)
+            for (size_t k = 0; k < WIDTH; k++) {
+                double sum = 0, members = 0;
+                for (size_t i = 0; i < COUNT; i++)
+                    if (p.labels[i] == e) {
+                        members++;
+                        sum += (double)vectors[i * WIDTH + k];
+                        error += pow((double)vectors[i * WIDTH + k] - (double)p.entries[e * WIDTH + k], 2);
+                    }
+                assert_true(members > 0 && fabs(sum / members - (double)p.entries[e * WIDTH + k]) < 1e-5);
+            }
+        assert_true(error < 0.9 * before);
+        before = error;
+        palette_free(&p);
+    }
+    assert_true(before < 1e-6);
+}
+
+/* A sky of Gaussians far outside costs those inside no precision: they share no chunk but one. */
+static void far_ones_are_apart(void **state)
+{
+    (void)state;
+    gaussian_cloud a;
+    make_cloud(&a, 2000, 0);
+    for (size_t i = 0; i < 300; i++)
+        for (size_t k = 0; k < 3; k++)
+            a.mean[3 * (6 * i) + k] *= 1000;
+    gbt_error err = {0};
+    uint32_t *order = gaussian_order(&a, &err);
+    assert_non_null(order);
+    unsigned char *seen = calloc(a.count, 1);
+    for (size_t i = 0; i < a.count; i++) {
+        assert_false(seen[order[i]]);
+        seen[order[i]] = 1;
+        assert_true((order[i] % 6 == 0 && order[i] < 1800) == (i >= 1700));
+    }
+    free(seen);
+    mem_free(order);
+    gaussian_cloud_free(&a);
+}
+
+/* One Gaussian whose words follow from the format's description by hand: every range is empty, so all shares
+   are 0 but those of rotation and opacity. */
+static void compressed_ply_bytes(void **state)
+{
+    gaussian_cloud a;
+    make_cloud(&a, 1, 0);
+    const float quat[4] = {0.5f, -0.5f, 0.5f, -0.5f};
+    memcpy(a.quat, quat, sizeof quat);
+    a.opacity[0] = 0.6f;
+    must(gaussian_file_write(inside(*state, "one.compressed.ply", 0), &a, nowhere, &err));
+    gaussian_cloud_free(&a);
+    unsigned char *bytes;
+    size_t size;
+    must(file_read(inside(*state, "one.compressed.ply", 0), &bytes, &size, &err));
+    /* w is left out; 1023 (1/2 + 1/2 c sqrt 2) of the others, which are -1/2 1/2 -1/2. */
+    const uint32_t low = 150, high = 873;
+    const uint32_t words[4] = {0, 0u << 30 | low << 20 | high << 10 | low, 0, 153};
+    for (size_t k = 0; k < 16; k++)
+        assert_int_equal(bytes[size - 16 + k], words[k / 4] >> 8 * (k % 4) & 255);
+    mem_free(bytes);
+}
+
+/* Files before colours had a range: 0 to 1. */
+static void older_compressed_ply(void **state)
+{
+    (void)state;
+    static const char text[] =
+        "ply\nformat ascii 1.0\nelement chunk 1\nproperty float min_x\nproperty float min_y\nproperty float "
+        "min_z\n"
+        "property float max_x\nproperty float max_y\nproperty float max_z\nproperty float min_scale_x\n"
+        "property float min_scale_y\nproperty float min_scale_z\nproperty float max_scale_x\n"
+        "property float max_scale_y\nproperty float max_scale_z\nelement vertex 1\nproperty uint "
+        "packed_position\n"
+        "property uint packed_rotation\nproperty uint packed_scale\nproperty uint packed_color\nend_header\n"
+        "-1 0 2 1 4 3 -5 -5 -5 -1 -1 -1\n4294967295 537395712 0 4278190335\n";
+    const source_file file = {"old.ply", (const unsigned char *)text, sizeof text - 1};
+    gaussian_cloud c;
+    must(gaussian_format_ply.read(&file, &c, &err));
+    const float mean[3] = {1, 4, 3};
+    for (int k = 0; k < 3; k++) {
+        assert_true(fabsf(c.mean[k] - mean[k]) < 1e-6f);
+        assert_true(fabsf(c.scale_log[k] + 5) < 1e-6f);
+        assert_true(fabsf(c.sh[k] - (k == 0 ? 0.5f : -0.5f) / 0.28209479f) < 1e-5f);
+    }
+    assert_true(c.opacity[0] == 1 && c.quat[0] > 0.999f);
+    gaussian_cloud_free(&c);
+}
+
+/* Every truncation and mutation. */
+static void damaged_files(void **state)
+{
+    static const char *const names[] = {"a.compressed.ply", "a.v4.spz"};
+    static const gaussian_format *const formats[] = {&gaussian_format_compressed_ply, &gaussian_format_spz4};
+    for (size_t f = 0; f < sizeof formats / sizeof *formats; f++) {
+        gaussian_attempts attempts = {.read = formats[f]->read};
+        gaussian_cloud a;
+        make_cloud(&a, 2, 1);
+        must(gaussian_file_write(inside(*state, names[f], 0), &a, nowhere, &err));
+        gaussian_cloud_free(&a);
+        unsigned char *bytes;
+        size_t size;
+        must(file_read(inside(*state, names[f], 0), &bytes, &size, &err));
+        mutate_all(bytes, size, try_gaussians, &attempts);
+        mem_free(bytes);
+    }
+}
+
+/* A .usda with one Gaussian as another program may write it. */
+static const char usda[] =
+    "#usda 1.0\n(\n    \"\"\"Made { by = hand\"\"\"\n    upAxis = \"Y\"\n)\n# def "
+    "ParticleField3DGaussianSplat\n"
+    "def Xform \"World\" (kind = \"group\")\n{\n"
+    "  def ParticleField3DGaussianSplat \"one\" (\n    displayName = \"}\"\n  )\n  {\n"
+    "    half[] opacitiesh = [0.5]\n    custom string note = \"positions = [1]\"\n"
+    "    point3f[] positions = [(1, 2.5e0,\n 3)] (interpolation = \"vertex\")\n"
+    "    quatf[] orientations = [(0, 2, 0, 0)]\n    float[] opacities = [0.25]\n    float[] other = [7]\n"
+    "    float3[] scales = [(1, 2, 4)]\n    uniform int radiance:sphericalHarmonicsDegree = 1\n"
+    "    float3[] radiance:sphericalHarmonicsCoefficients = [(1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12)] "
+    "(\n"
+    "        elementSize = 4\n    )\n    def Scope \"inner\" {\n float[] positions = [9]\n }\n"
+    "    double3 xformOp:translate = (10, 20, 30)\n"
+    "  }\n}\n";
+
+static gbt_status read_text(const char *text, gaussian_cloud *out, gbt_error *err)
+{
+    const source_file file = {"a.usda", (const unsigned char *)text, strlen(text)};
+    return gaussian_format_usda.read(&file, out, err);
+}
+
+static void usda_of_others(void **state)
+{
+    (void)state;
+    gaussian_cloud c;
+    must(read_text(usda, &c, &err));
+    const float mean[3] = {1, 2.5f, 3};
+    assert_int_equal(c.count, 1);
+    assert_int_equal(c.sh_degree, 1);
+    for (int k = 0; k < 3; k++) {
+        assert_true(c.mean[k] == mean[k] && c.origin[k] == 10 * (k + 1));
+        assert_true(fabsf(c.scale_log[k] - (float)k * logf(2)) < 1e-6f);
+    }
+    for (int k = 0; k < 48; k++)
+        assert_true(c.sh[k] == (k < 12 ? (float)(k + 1) : 0));
+    assert_true(c.opacity[0] == 0.25f && c.quat[1] == 1);
+    gaussian_cloud_free(&c);
+}
+
+/* Old text, new text, what is said. */
+static void usda_that_is_wrong(void **state)
+{
+    (void)state;
+    static const char *const rows[][3] = {{"ParticleField3DGaussianSplat \"one", "Mesh \"one", "has no prim"},
+                                          {"#usda 1.0", "#usdb 1.0", "begins with #usda"},
+                                          {"(1, 2, 4)", "(1, 2)", "2 numbers in scales (wanted 3"},
+                                          {"(1, 2, 4)", "(1, x, 4)", "no number"},
+                                          {"Degree = 1", "Degree = 4", "degree 4"},
+                                          {"Degree = 1", "Degree = 2", "12 numbers of harmonics (wanted 27)"},
+                                          {"(1, 2, 4)", "(1, -2, 4)", "no usable Gaussian"}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char text[sizeof usda + 64];
+        const char *at = strstr(usda, rows[i][0]);
+        assert_non_null(at);
+        snprintf(text, sizeof text, "%.*s%s%s", (int)(at - usda), usda, rows[i][1], at + strlen(rows[i][0]));
+        gaussian_cloud c;
+        gbt_error err = {0};
+        assert_int_equal(read_text(text, &c, &err), GBT_ERR_FORMAT);
+        if (strstr(err.text, rows[i][2]) == NULL)
+            fail_msg("%s (wanted: %s)", err.text, rows[i][2]);
+    }
+}
+
+/* Coordinates of a country too: floats keep half a metre of them. */
+static void usd_keeps_everything(void **state)
+{
+    for (int degree = 0; degree <= 3; degree++) {
+        gaussian_cloud a, b;
+        make_cloud(&a, 40, degree);
+        const double origin[3] = {691234.0625, 5334567.123, -0.1};
+        const char *const path = inside(*state, degree % 2 == 0 ? "a.usda" : "a.usdz", 0);
+        must(gaussian_file_write(path, &a, origin, &err));
+        must(gaussian_file_read(path, &b, &err));
+        assert_int_equal(b.sh_degree, degree);
+        check_near(&a, &b, origin, &(limits){.mean = 1e-8, .scale = 1e-6, .quat = 1e-6});
+        gaussian_cloud_free(&a);
+        gaussian_cloud_free(&b);
+    }
+}
+
+/* Bytes of a package begin at a multiple of 64: so it can be mapped. */
+static void usdz_is_aligned(void **state)
+{
+    gaussian_cloud a;
+    make_cloud(&a, 3, 0);
+    must(gaussian_file_write(inside(*state, "a.usdz", 0), &a, nowhere, &err));
+    gaussian_cloud_free(&a);
+    unsigned char *bytes;
+    size_t size;
+    must(file_read(inside(*state, "a.usdz", 0), &bytes, &size, &err));
+    const unsigned char *text = memmem(bytes, size, "#usda 1.0", 9);
+    assert_non_null(text);
+    assert_int_equal((text - bytes) % 64, 0);
+    assert_int_equal(bytes[8] | bytes[9] << 8, 0); /* stored */
+    mem_free(bytes);
+}
+
+/* Larger files: every so many bytes. */
+static void check_damage(const char *path, const gaussian_format *format, size_t step)
+{
+    gaussian_attempts attempts = {.read = format->read};
+    unsigned char *bytes;
+    size_t size;
+    must(file_read(path, &bytes, &size, &err));
+    for (size_t at = 0; at < size; at += step) {
+        unsigned char *copy = exact_copy(bytes, at);
+        try_gaussians(copy, at, &attempts);
+        free(copy);
+        copy = exact_copy(bytes, size);
+        copy[at] ^= 0x81;
+        try_gaussians(copy, size, &attempts);
+        free(copy);
+    }
+    mem_free(bytes);
+}
+
+static void damaged_bundles(void **state)
+{
+    gaussian_cloud a;
+    make_cloud(&a, 2, 1);
+    must(gaussian_file_write(inside(*state, "a.sog", 0), &a, nowhere, &err));
+    must(gaussian_file_write(inside(*state, "a.usda", 1), &a, nowhere, &err));
+    must(gaussian_file_write(inside(*state, "a.usdz", 2), &a, nowhere, &err));
+    gaussian_cloud_free(&a);
+    check_damage(inside(*state, "a.sog", 0), &gaussian_format_sog, 13);
+    check_damage(inside(*state, "a.usda", 1), &gaussian_format_usda, 5);
+    check_damage(inside(*state, "a.usdz", 2), &gaussian_format_usdz, 13);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(compressed_ply_keeps_its_steps, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(compressed_ply_bytes, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(spz4_keeps_the_values_of_spz, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(spz4_bytes, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(sog_keeps_its_steps, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(sog_palette_is_exact, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(usd_keeps_everything, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(usdz_is_aligned, make_temporary, remove_temporary),
+        cmocka_unit_test(usda_of_others),
+        cmocka_unit_test(usda_that_is_wrong),
+        cmocka_unit_test(levels_follow_the_values),
+        cmocka_unit_test(palette_entries_are_means),
+        cmocka_unit_test_setup_teardown(damaged_files, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(damaged_bundles, make_temporary, remove_temporary),
+        cmocka_unit_test(older_compressed_ply),
+        cmocka_unit_test(far_ones_are_apart),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -65,12 +65,17 @@ typedef enum scene_split_kind {
 
 typedef struct scene_split {
     scene_split_kind kind;
-    int every; /* SCENE_SPLIT_EVERY: views 0, every, 2 every, ... of the sorted list are held out, a missing
-                  photo does not shift them; >= 2. Default 8 */
+    int every;  /* SCENE_SPLIT_EVERY: of the sorted list, views offset, offset + every, ... are held out, a
+                   missing photo does not shift them; >= 2. Default 8 */
+    int offset; /* [0, every). Default 0 */
     const char *list_path; /* SCENE_SPLIT_LIST: text file, one image name per line */
+    int validate_every;    /* > 0: constants are being chosen. Held-out views are not in the scene, and of the
+                              others every N-th, in their order, is held out in their place. Default 0 */
+    int validate_offset;   /* [0, validate_every): the first of them */
 } scene_split;
 
-/** "auto", "every=8", "none" or "list=FILE", as on the command line. */
+/** As on the command line: "auto", "every=8", "every=8:3", "none" or "list=FILE"; "validate=8" or
+    "validate=8:3" alone (then auto), or before it and a comma. list_path points into `text`. */
 gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err);
 
 /**
@@ -87,7 +92,12 @@ gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err)
  * Threads: any, with distinct `out`.
  */
 gbt_status scene_load(const char *path, const scene_split *split, scene *out, gbt_error *err);
+
+/** scene_load() with the origin 0: coordinates are the world's, rounded to float where they are points. */
+gbt_status scene_load_in_place(const char *path, const scene_split *split, scene *out, gbt_error *err);
+
 void scene_free(scene *s);
+void scene_view_free(scene_view *view);
 
 /**
  * Say what the transparent part of photos is; GBT_ALPHA_AUTO is white for Blender's synthetic scenes, as

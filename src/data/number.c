@@ -4,6 +4,7 @@
 
 #include <locale.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -128,4 +129,26 @@ number_result number_parse_u64(const char *text, size_t length, uint64_t *out)
         return NUMBER_RANGE;
     *out = value;
     return NUMBER_OK;
+}
+
+void number_format_double(double value, char out[NUMBER_TEXT_SIZE])
+{
+    for (int digits = 15; digits <= 17; digits++) {
+        char text[NUMBER_TEXT_SIZE];
+        snprintf(text, sizeof text, "%.*g", digits, value);
+        /* The host may have set a locale: whatever its decimal separator is (one byte or several), it becomes
+           one '.'. */
+        size_t used = 0;
+        bool in_separator = false;
+        for (const char *c = text; *c != '\0'; c++) {
+            const bool plain = is_digit(*c) || *c == '+' || *c == '-' || (*c >= 'a' && *c <= 'z');
+            if (plain || !in_separator)
+                out[used++] = plain ? *c : '.';
+            in_separator = !plain;
+        }
+        out[used] = '\0';
+        double back;
+        if (!isfinite(value) || (number_parse_double(out, used, &back) == NUMBER_OK && back == value))
+            return;
+    }
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/number.h -- numbers from text, the same in every locale. */
+/* data/number.h -- numbers from and to text, the same in every locale. */
 #ifndef GBT_DATA_NUMBER_H
 #define GBT_DATA_NUMBER_H
 
@@ -23,5 +23,10 @@ number_result number_parse_double(const char *text, size_t length, double *out);
 
 /** A whole token of decimal digits; NUMBER_RANGE past 2^64 - 1. */
 number_result number_parse_u64(const char *text, size_t length, uint64_t *out);
+
+enum { NUMBER_TEXT_SIZE = 40 };
+
+/** The shortest of 15, 16 or 17 significant digits that reads back as the same double, with a '.'. */
+void number_format_double(double value, char out[NUMBER_TEXT_SIZE]);
 
 #endif

@@ -122,8 +122,8 @@ static void round_trip(void **state)
             value = ((double)words[0] - 2e9) * (i % 4 == 1 ? 1e-7 : 1e-3);
         if (!isfinite(value))
             continue;
-        char text[64], plain[64];
-        snprintf(text, sizeof text, "%.17g", value);
+        char text[NUMBER_TEXT_SIZE], plain[64];
+        number_format_double(value, text);
         snprintf(plain, sizeof plain, "%.*e", (int)(words[2] % 20), value);
         double back = 0, want = strtod(plain, NULL), got = 0;
         assert_int_equal(number_parse_double(text, strlen(text), &back), NUMBER_OK);
@@ -148,7 +148,7 @@ static void tokens(void **state)
     assert_false(number_next_token(&at, text + strlen(text), &token, &length));
 }
 
-/* A host program with a decimal comma must not change what we read. */
+/* A host program with a decimal comma must not change what we read or write. */
 static void any_locale(void **state)
 {
     (void)state;
@@ -161,10 +161,13 @@ static void any_locale(void **state)
         skip();
     }
     double value = 0;
+    char text[NUMBER_TEXT_SIZE];
     const number_result result = number_parse_double("1.23456789012345678901234", 25, &value);
+    number_format_double(0.1, text);
     setlocale(LC_ALL, "C");
     assert_int_equal(result, NUMBER_OK);
     assert_true(value == 1.23456789012345678901234);
+    assert_string_equal(text, "0.1");
 }
 
 int main(void)

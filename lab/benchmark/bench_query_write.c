@@ -12,7 +12,7 @@
 #include "data/json_out.h"
 #include "report/plot.h"
 
-enum { PANEL = 330, TOP = 112, HEIGHT = 250, GAP = 100, CHART_K = 8 };
+enum { PANEL = 330, TOP = 96, HEIGHT = 250, GAP = 100, CHART_K = 8 };
 
 static const char css[] =
     ".plot .join{fill:none;stroke:var(--k);stroke-width:2}\n"

@@ -141,7 +141,7 @@ typedef struct point_queries {
     size_t count;
     number_array a, b;         /* [count][3]; b of POINTS_CROSSED alone */
     number_array radius;       /* [count] */
-    number_array t_min, t_max; /* [count]; {0}: -infinity, infinity */
+    number_array t_min, t_max; /* [count]; {0}: 0, infinity */
 } point_queries;
 
 /** Answers of many queries: those of query i are index[first[i] .. first[i + 1]), ascending. */

@@ -41,7 +41,7 @@ typedef struct gbt_balls gbt_balls;
  * @param out  [out] free with gbt_balls_free(); NULL on failure
  * @param err  [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
- * Cost: O(n log n); about 80 bytes a ball are kept.
+ * Cost: O(n log n); about 90 bytes a ball are kept.
  */
 gbt_status gbt_balls_open(const char *path, gbt_balls **out, gbt_error *err);
 

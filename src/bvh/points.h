@@ -44,7 +44,7 @@ typedef struct point_tree point_tree; /* immutable once built; queries are calla
  * @return GBT_OK, GBT_ERR_ARGUMENT (bad point: says which), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL (Embree's own
  *         words)
  *
- * Threads: any; builds on all threads inside; the same tree for every number of them. Cost: O(n log n); 45
+ * Threads: any; builds on all threads inside; the same tree for every number of them. Cost: O(n log n); 50
  * bytes per point are kept, 8 more with radii, and 100 more are used while it builds.
  */
 gbt_status point_tree_build(number_array position, number_array radius, size_t count, point_tree **out,
@@ -141,7 +141,7 @@ typedef struct point_queries {
     size_t count;
     number_array a, b;         /* [count][3]; b of POINTS_CROSSED alone */
     number_array radius;       /* [count] */
-    number_array t_min, t_max; /* [count]; {0}: -infinity, infinity */
+    number_array t_min, t_max; /* [count]; {0}: 0, infinity */
 } point_queries;
 
 /** Answers of many queries: those of query i are index[first[i] .. first[i + 1]), ascending. */

@@ -223,7 +223,7 @@ static void read3(number_array a, size_t i, double out[3])
 
 static point_query query_at(const point_queries *all, size_t i)
 {
-    point_query q = {.what = all->what, .t_min = -INFINITY, .t_max = INFINITY};
+    point_query q = {.what = all->what, .t_min = 0, .t_max = HUGE_VAL};
     read3(all->a, i, q.a);
     if (!number_none(all->b))
         read3(all->b, i, q.b);

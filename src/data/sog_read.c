@@ -11,7 +11,7 @@
 
 enum {
     TABLES = 7,
-    RATIO_MAX = 256 /* Gaussians to a byte of the file: beyond, it is no scene */
+    RATIO_MAX = 16 /* Gaussians to a byte of the file: beyond, it is no scene */
 };
 
 typedef enum table_id { MEANS_LOW, MEANS_HIGH, SCALES, ROTATIONS, COLORS, CENTROIDS, LABELS } table_id;

@@ -12,7 +12,8 @@ enum {
     HEADER_BYTES = 32,
     TABLE_ROW = 16,
     LEVEL = 12,
-    PACKED_LIMIT = 1 << 16 /* zstd makes nothing smaller */
+    PACKED_LIMIT = 1 << 16, /* of a frame: zstd makes nothing smaller */
+    RATIO_MAX = 1024        /* of all of them: places and colours are never that regular */
 };
 
 /* ---- writing ---- */
@@ -115,6 +116,9 @@ static gbt_status read_table(cursor *c, frames *f, gbt_error *err)
         f->plain_all += (size_t)bytes;
     }
     f->data_at = c->at;
+    if (f->plain_all / RATIO_MAX > f->file->size)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %u Gaussians cannot be in %zu bytes", f->file->name,
+                         f->header.count, f->file->size);
     return GBT_OK;
 }
 

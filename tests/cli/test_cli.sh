@@ -370,8 +370,8 @@ prints "query along a ray" '^0,0,1,4,3,4,0,2$' query crossed balls.txt --at 3,0,
 prints "query of plain Gaussians" '^0,0,[0-9]*,' query nearest gaussians.ply --at=-1,0,0
 misuse 2 "--at, --from: neither (wanted one of them)" query nearest balls.txt
 misuse 3 "at:1: 2 numbers (wanted 3)" query nearest balls.txt --at 0,0
-misuse 4 "nowhere.txt: No such file or directory" query nearest nowhere.txt --at 0,0,0
-misuse 2 'query: "near" (wanted nearest, within, containing, overlapping or crossed; did you mean nearest?)' query near balls.txt --at 0,0,0
+misuse 4 "nowhere.txt: cannot open: No such file or directory" query nearest nowhere.txt --at 0,0,0
+misuse 2 'query: "near" (wanted nearest, within, containing, overlapping or crossed)' query near balls.txt --at 0,0,0
 misuse 2 "argument missing (usage: gbtrace study STUDY [MODEL|DATA...] -o DIR)" study -o study
 misuse 2 "study crosscheck: wanted a model, or data to train on" study crosscheck -o study
 misuse 2 'study stability: "gaussians.ply" is one too many' study stability gaussians.ply -o study

@@ -159,6 +159,11 @@ static void few_balls(void **state)
     assert_ok(gbt_balls_from_arrays((double[]){0, 0, 0, 0, 0, 0}, NULL, 2, &balls, NULL));
     assert_ok(gbt_balls_nearest(balls, (double[]){3, 4, 0}, 1, 3, false, index, distance, NULL));
     assert_true(index[0] == 0 && index[1] == 1 && index[2] == UINT32_MAX && distance[1] == 5);
+    for (int sign = -1; sign <= 1; sign += 2) { /* a ray without ends goes forwards alone */
+        assert_ok(
+            gbt_balls_crossed(balls, (double[]){0, 0, -1}, (double[]){0, 0, sign}, NULL, NULL, 1, &a, NULL));
+        assert_int_equal(a.first[1], sign > 0 ? 2 : 0);
+    }
     gbt_answers_free(&a);
     gbt_answers_free(&a);
     gbt_balls_free(balls);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-// Gaussians written by gbtrace export, read by splat-transform, glTF-Transform, plyfile, gsply, usd-core and tinyusdz, and looked over by Khronos' and OpenUSD's
-// validators: counts and every attribute. Usage: readers.mjs PROGRAM PYTHON READ_COLUMNS; see test_readers.sh.
+// Gaussians written by gbtrace export, read by splat-transform, glTF-Transform, plyfile, gsply, usd-core and tinyusdz, the other way packed by splat-transform and sogpy;
+// and looked over by Khronos' and OpenUSD's validators: counts and every attribute. Usage: readers.mjs PROGRAM PYTHON READ_COLUMNS; see test_readers.sh.
 import {execFileSync} from "node:child_process";
 import fs from "node:fs";
 import os from "node:os";
@@ -100,6 +100,16 @@ for (const ending of ["compressed.ply", "spz"]) {
     convert(source, packed);
     execFileSync(program, ["export", packed, unpacked], {stdio: "ignore"});
     compare(ending, "gbtrace, of splat-transform", columns(unpacked), {...limits[ending], place: ending === "spz" ? 2.2e-4 : 0.015});
+}
+
+// A .sog by sogpy, one colour for all directions: it wants more Gaussians for a palette. It cuts numbers off where others round.
+{
+    const plain = path.join(folder, "plain.ply"), packed = path.join(folder, "theirs.sog"), unpacked = path.join(folder, "unpacked.ply");
+    const {rest: _, ...kept} = limits.sog;
+    execFileSync(program, ["export", source, plain, "--sh-degree", "0"], {stdio: "ignore"});
+    execFileSync(path.join(path.dirname(python), "sogpy"), [plain, packed], {stdio: "ignore"});
+    execFileSync(program, ["export", packed, unpacked], {stdio: "ignore"});
+    compare("sog", "gbtrace, of sogpy", columns(unpacked), {...kept, place: 0.002, scale: 0.02, rotation: 1e-4, alpha: 0.004});
 }
 
 // The mark of a model that is drawn as wide as pixels goes from file to file.

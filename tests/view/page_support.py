@@ -11,7 +11,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import browser  # noqa: E402
 
 SKIPPED = 77
-STILL = "gbtrace.look.done && gbtrace.look.done.generation === gbtrace.pictures.generation && gbtrace.look.done.still"
+STILL = "gbtrace.look.done && gbtrace.look.done.generation === gbtrace.pictures.generation && gbtrace.look.done.still && gbtrace.look.done.scale === 1"
 CAMERA = "JSON.stringify(gbtrace.camera.file(8, 8))"
 program = sys.argv[1]
 checks = {"passed": 0, "failed": 0}

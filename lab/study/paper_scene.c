@@ -71,7 +71,7 @@ gbt_status paper_scene_look(const char *data, paper_scene *out, gbt_error *err)
     scene s;
     out->tree_depth = INT_MAX;
     out->scale_constant = constant_of_singletons;
-    GBT_TRY(scene_load(data, NULL, &s, err));
+    GBT_TRY(scene_load_in_place(data, NULL, &s, err));
     const gbt_status status = s.points.count > 0 ? look_at_points(&s.points, out, err) : GBT_OK;
     scene_free(&s);
     return status;

@@ -15,9 +15,7 @@
 #include "gbtrace/train.h"
 #include "io/scaffold_file.h"
 #include "train/config.h"
-
-/* Where the reference implementation stops seeing, along the view axis. */
-static const float reference_near = 0.2f;
+#include "train/rules.h"
 
 gbt_import_def gbt_import_def_default(void)
 {
@@ -62,7 +60,7 @@ static gbt_status describe(model *m, const result_folder *from, const gbt_import
     train.alpha = from->white_background ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK;
     config_text(&train, m->data_folder, m->config, sizeof m->config);
     m->iterations = from->iteration;
-    m->t_near = reference_near;
+    m->t_near = train_rules_of(&train).near_depth;
     for (int c = 0; c < 3; c++)
         m->background[c] = from->white_background;
     return GBT_OK;

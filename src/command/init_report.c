@@ -244,6 +244,21 @@ static void print_facts(FILE *out, const init_facts *f)
         fprintf(out, "  %-18s %10zu %10.4g %10.4g\n", q->name, q->anchors, q->distance, q->color);
 }
 
+/* How many voxels the baseline starts from: its cells are the world's. */
+static gbt_status count_voxels(const scene *s, float voxel_size, size_t *out, gbt_error *err)
+{
+    const size_t values = 3 * s->points.count;
+    float *world = mem_alloc(values, sizeof *world, "points", err), *centers = NULL;
+    if (world == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < values; i++)
+        world[i] = (float)((double)s->points.position[i] + s->origin[i % 3]);
+    const gbt_status status = voxel_centers(world, s->points.count, voxel_size, &centers, out, err);
+    mem_free(centers);
+    mem_free(world);
+    return status;
+}
+
 /** Everything after the anchors are made. */
 static gbt_status report_anchors(const char *data, const gbt_init_def *def, const char *out_ply,
                                  const char *json_path, FILE *report, const scene *s, const anchors *a,
@@ -308,8 +323,7 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
     scene s;
     anchors a = {0};
     balls b = {0};
-    float *centers = NULL;
-    GBT_TRY(scene_load(data, NULL, &s, err));
+    GBT_TRY((def->init == GBT_INIT_VOXEL ? scene_load_in_place : scene_load)(data, NULL, &s, err));
     const scene_points *points = &s.points;
     init_facts facts = {.kind = def->init,
                         .points = points->count,
@@ -331,8 +345,7 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
                               &a, &b, err);
     }
     if (status == GBT_OK)
-        status = voxel_centers(points->position, points->count, facts.voxel_size, &centers,
-                               &facts.voxel_anchors, err);
+        status = count_voxels(&s, facts.voxel_size, &facts.voxel_anchors, err);
     if (status == GBT_OK) {
         facts.anchors = a.count;
         facts.has_balls = b.count > 0;
@@ -342,7 +355,6 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
     }
     if (status == GBT_OK)
         status = report_anchors(data, def, out_ply, json_path, report, &s, &a, &b, &facts, err);
-    mem_free(centers);
     balls_free(&b);
     anchors_free(&a);
     scene_free(&s);

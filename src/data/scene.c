@@ -262,10 +262,9 @@ static gbt_status find_origin(const raw_scene *raw, double origin[3], gbt_error 
     return GBT_OK;
 }
 
-/* Move everything from `raw` to `out`, relative to the origin. */
-static gbt_status recentre(raw_scene *raw, scene *out, gbt_error *err)
+/* Move everything from `raw` to `out`, relative to out->origin. */
+static gbt_status place(raw_scene *raw, scene *out, gbt_error *err)
 {
-    GBT_TRY(find_origin(raw, out->origin, err));
     out->points.position = mem_alloc(raw->point_count, 3 * sizeof *out->points.position, "points", err);
     out->views = mem_calloc(raw->view_count, sizeof *out->views, "views", err);
     if (out->points.position == NULL || out->views == NULL)
@@ -328,15 +327,17 @@ static void warn_about(const char *path, const raw_scene *raw, const scene *s)
         log_warn("%s: only one view", path);
 }
 
-gbt_status scene_load(const char *path, const scene_split *split, scene *out, gbt_error *err)
+static gbt_status load(const char *path, const scene_split *split, bool recentres, scene *out, gbt_error *err)
 {
     const scene_split usual = {.kind = SCENE_SPLIT_AUTO};
     memset(out, 0, sizeof *out);
     raw_scene raw = {0};
     const char *source = "";
     gbt_status status = load_raw(path, &raw, &source, err);
+    if (status == GBT_OK && recentres)
+        status = find_origin(&raw, out->origin, err);
     if (status == GBT_OK)
-        status = recentre(&raw, out, err);
+        status = place(&raw, out, err);
     if (status == GBT_OK) {
         snprintf(out->source, sizeof out->source, "%s", source);
         out->folder = raw_copy_text(path, strlen(path), err);
@@ -349,6 +350,16 @@ gbt_status scene_load(const char *path, const scene_split *split, scene *out, gb
         scene_free(out);
     raw_free(&raw);
     return status;
+}
+
+gbt_status scene_load(const char *path, const scene_split *split, scene *out, gbt_error *err)
+{
+    return load(path, split, true, out, err);
+}
+
+gbt_status scene_load_in_place(const char *path, const scene_split *split, scene *out, gbt_error *err)
+{
+    return load(path, split, false, out, err);
 }
 
 void scene_free(scene *s)

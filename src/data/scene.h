@@ -87,6 +87,10 @@ gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err)
  * Threads: any, with distinct `out`.
  */
 gbt_status scene_load(const char *path, const scene_split *split, scene *out, gbt_error *err);
+
+/** scene_load() with the origin 0: coordinates are the world's, rounded to float where they are points. */
+gbt_status scene_load_in_place(const char *path, const scene_split *split, scene *out, gbt_error *err);
+
 void scene_free(scene *s);
 
 /**

@@ -59,6 +59,13 @@ static gbt_status widen(frame *f, frame_subject subject, gbt_error *err)
                              &f->wide, err);
 }
 
+/* What a rasterizer could draw. */
+static bool is_plain_view(const ray_shot *shot)
+{
+    return shot->given == NULL && shot->aperture_radius <= 0 && shot->shutter == RAY_SHUTTER_GLOBAL &&
+           raster_takes(&shot->camera);
+}
+
 /* Everything up to the tree, and f->rays through the middle of the aperture. `tracer` is optional. */
 static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
                           const trace_settings *settings, const frame_tracer *tracer, gbt_error *err)
@@ -78,6 +85,10 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     memcpy(f->eye, bounds.center, sizeof f->eye);
     if (tracer != NULL)
         bounds = view_bounds_none();
+    f->by_screen = f->draw.sight == FRAME_SIGHT_BY_ANCHOR && subject.cloud == NULL && tracer == NULL &&
+                   is_plain_view(shot);
+    if (f->by_screen)
+        f->screen = screen_of(&shot->camera, (double)settings->t_near);
     f->view = footprint_view_with(&shot->camera, lens);
     f->pixel_limited = f->draw.anchor_pixel != NULL && subject.cloud == NULL;
     f->widened = f->draw.footprint > 0 && shot->given == NULL; /* nobody says how wide given rays are */
@@ -88,15 +99,15 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
         .pixel = (float)f->view.pixel,
         .parallel = f->view.kind == FOOTPRINT_PARALLEL,
         .pixel_min = f->pixel_limited ? f->draw.anchor_pixel : NULL};
-    GBT_TRY(
-        visible_find(subject, &bounds, &extent, &f->visible, &f->visible_count, &f->visible_capacity, err));
+    GBT_TRY(visible_find(subject, &bounds, &extent, f->by_screen ? &f->screen : NULL, &f->visible,
+                         &f->visible_count, &f->visible_capacity, err));
     f->times.visible = lap(&clock);
     /* A Gaussian below alpha_min is never blended and so has no gradient: it need not be made. */
     if (subject.cloud != NULL)
         GBT_TRY(plain_forward(subject.cloud, f->eye, f->visible, f->visible_count, &f->gaussians, err));
     else
         GBT_TRY(decode_forward(subject.anchors, subject.decoder, f->eye, f->visible, f->visible_count,
-                               settings->alpha_min, &f->gaussians, &f->tape, err));
+                               f->draw.makes_faint ? 0 : settings->alpha_min, &f->gaussians, &f->tape, err));
     if (f->widened)
         GBT_TRY(widen(f, subject, err));
     f->times.decode = lap(&clock);

@@ -4,6 +4,7 @@
 #ifndef GBT_FRAME_FRAME_H
 #define GBT_FRAME_FRAME_H
 
+#include "frame/screen.h"
 #include "frame/subject.h"
 #include "gbtrace/choices.h"
 #include "raster/raster.h"
@@ -19,6 +20,13 @@ typedef struct frame_times {
     default. */
 raster_settings frame_splat_settings(const trace_settings *settings, raster_form form);
 
+/** Which anchors a view decodes. */
+typedef enum frame_sight {
+    FRAME_SIGHT_WHOLE,    /* those whose Gaussians a ray may meet */
+    FRAME_SIGHT_BY_ANCHOR /* as the reference does, and in pinhole views alone: those whose own ellipsoid
+                             touches the picture (frame/screen.h), however far their Gaussians reach */
+} frame_sight;
+
 /** How Gaussians become a picture. Set in the frame before rendering; {0}: traced, thin rays. */
 typedef struct frame_drawing {
     gbt_renderer renderer; /* one of those that train */
@@ -26,6 +34,8 @@ typedef struct frame_drawing {
                         the paper's base */
     int pixel_step;  /* the camera's pixels are every n-th of a picture, and as wide as that one's; 0 and 1:
                         all */
+    frame_sight sight;
+    bool makes_faint;          /* Gaussians of opacity below alpha_min are made, though not drawn */
     const float *anchor_pixel; /* optional (NULL), [anchors]: the smallest pixel an anchor was made for;
                                   borrowed */
 } frame_drawing;
@@ -52,6 +62,8 @@ typedef struct frame {
     kernel_counters counters;
     frame_times times;
     double half_fov_tan[2]; /* of the camera */
+    screen_view screen;     /* of the last view, if by_screen: FRAME_SIGHT_BY_ANCHOR holds for it */
+    bool by_screen;
     gbt_camera camera;
     float eye[3]; /* from where the networks saw the anchors */
 } frame;

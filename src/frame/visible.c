@@ -362,9 +362,18 @@ typedef struct visible_job {
     frame_subject subject;
     const view_bounds *bounds;
     const visible_reach *reach;
+    const screen_view *screen;
     uint32_t *out;       /* [count]; block b writes from its own begin */
     uint32_t *out_count; /* per block */
 } visible_job;
+
+/* An anchor's own ellipsoid is as wide as its offsets are long, and does not turn. */
+static bool is_on_screen(const screen_view *s, const anchors *a, size_t i)
+{
+    static const float straight[4] = {1, 0, 0, 0};
+    const float *l = a->scale_log + 6 * i, scale[3] = {expf(l[0]), expf(l[1]), expf(l[2])};
+    return screen_touches(s, a->position + 3 * i, straight, scale);
+}
 
 static void visible_block(size_t block, size_t begin, size_t end, void *context)
 {
@@ -372,6 +381,11 @@ static void visible_block(size_t block, size_t begin, size_t end, void *context)
     uint32_t kept = 0;
     const anchors *a = job->subject.anchors;
     for (size_t i = begin; i < end; i++) {
+        if (job->screen != NULL) {
+            if (is_on_screen(job->screen, a, i))
+                job->out[begin + kept++] = (uint32_t)i;
+            continue;
+        }
         /* An anchor in view is visible however far it reaches: most need no more. */
         if (job->subject.cloud == NULL && job->bounds->plane_count > 0 &&
             is_visible(job->bounds, a->position + 3 * i, 0)) {
@@ -388,13 +402,14 @@ static void visible_block(size_t block, size_t begin, size_t end, void *context)
 }
 
 gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach,
-                        uint32_t **visible, size_t *count, size_t *capacity, gbt_error *err)
+                        const screen_view *screen, uint32_t **visible, size_t *count, size_t *capacity,
+                        gbt_error *err)
 {
     const size_t parts = frame_subject_count(subject), blocks = parallel_block_count(parts, PART_BLOCK);
     GBT_TRY(mem_reserve((void **)visible, capacity, 0, parts + blocks + 1, sizeof **visible, "visible parts",
                         err));
     uint32_t *list = *visible;
-    visible_job job = {subject, bounds, reach, list, list + parts};
+    visible_job job = {subject, bounds, reach, screen, list, list + parts};
     parallel_blocks(parts, PART_BLOCK, visible_block, &job);
     *count = 0;
     for (size_t b = 0; b < blocks; b++) {

@@ -5,6 +5,7 @@
 
 #include <math.h>
 
+#include "frame/screen.h"
 #include "frame/subject.h"
 #include "trace/rays.h"
 
@@ -53,8 +54,11 @@ typedef struct visible_reach {
 /**
  * Indices of the anchors whose Gaussians a ray may meet, or of such Gaussians, ascending, into a growing
  * array. GBT_OK or GBT_ERR_NO_MEMORY.
+ *
+ * @param screen [in] optional (NULL): anchors whose own ellipsoid touches it, whatever the bounds say
  */
 gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach,
-                        uint32_t **visible, size_t *count, size_t *capacity, gbt_error *err);
+                        const screen_view *screen, uint32_t **visible, size_t *count, size_t *capacity,
+                        gbt_error *err);
 
 #endif

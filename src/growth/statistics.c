@@ -54,6 +54,14 @@ static void gather_importance(growth_stats *s, const frame *f, growth_importance
             f->blend_weight[i] / rays;
 }
 
+static bool is_on_screen(const screen_view *s, const gaussians *g, size_t i)
+{
+    const float mean[3] = {g->mean_x[i], g->mean_y[i], g->mean_z[i]},
+                quat[4] = {g->quat_w[i], g->quat_x[i], g->quat_y[i], g->quat_z[i]},
+                scale[3] = {g->scale_x[i], g->scale_y[i], g->scale_z[i]};
+    return screen_touches(s, mean, quat, scale);
+}
+
 /* The norm of dL/d(projected mean in NDC), from the ray-traced gradient of the mean in camera axes (g): (z
    tan_x g.x, z tan_y g.y). Counted for every Gaussian whose box may touch the image, hit or not: counting
    hits alone would grow what is mostly hidden. */
@@ -74,7 +82,8 @@ static void gather_gradients(growth_stats *s, const frame *f, float t_near)
             continue;
         const float cam_x = r[0] * x + r[1] * y + r[2] * z, cam_y = r[3] * x + r[4] * y + r[5] * z;
         const float reach = 3 * fmaxf(g->scale_x[i], fmaxf(g->scale_y[i], g->scale_z[i]));
-        if (fabsf(cam_x) > tan_x * cam_z + reach || fabsf(cam_y) > tan_y * cam_z + reach)
+        if (f->by_screen ? !is_on_screen(&f->screen, g, i)
+                         : fabsf(cam_x) > tan_x * cam_z + reach || fabsf(cam_y) > tan_y * cam_z + reach)
             continue;
         const float gx = r[0] * dg->mean_x[i] + r[1] * dg->mean_y[i] + r[2] * dg->mean_z[i];
         const float gy = r[3] * dg->mean_x[i] + r[4] * dg->mean_y[i] + r[5] * dg->mean_z[i];

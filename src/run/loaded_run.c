@@ -13,6 +13,7 @@
 #include "data/cameras_json.h"
 #include "data/gaussian_file.h"
 #include "data/result_folder.h"
+#include "train/rules.h"
 
 /* What a result folder says beside its Gaussians: the data set, and what is behind them. */
 static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *err)
@@ -76,8 +77,7 @@ static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
     out->def = gbt_train_def_default();
     out->def.footprint = 0; /* of models that do not say */
     GBT_TRY(config_parse(out->model.config, path, &out->def, &out->strings, err));
-    out->frame.draw.renderer = out->def.renderer;
-    out->frame.draw.footprint = (float)out->def.footprint;
+    out->frame.draw = train_drawing_of(&out->def);
     out->frame.draw.anchor_pixel = out->model.anchor_pixel;
     out->settings = trace_settings_default();
     out->settings.t_near = out->model.t_near;

@@ -16,6 +16,7 @@
 
 static const float share_min = 2.5e-6f;     /* of short runs: schedule_threshold_factor() */
 static const double last_rounds_from = 0.9; /* of growing */
+#define PROGRESS_ROUNDING 1e-10             /* far below a step */
 enum {
     ROUNDS_PER_RUN = 100,
     ROUND_INTERVAL = 100 /* steps, where rounds do not go by progress */,
@@ -23,12 +24,26 @@ enum {
 };
 enum { VIEWS_MIN = 2 };
 
-bool growing_is_due(const trainer *t, double progress, double next)
+/* Is the next step one of those from `from` to the end of growth? */
+static bool is_within(const trainer *t, double from)
 {
-    if (!t->def.grow || progress < SCHEDULE_ADJUST_FROM || progress >= t->def.grow_until)
+    const double progress = train_rules_progress(&t->rules, &t->pace, t->step);
+    if (!t->def.grow)
+        return false;
+    if (!t->rules.counts_from_one)
+        return progress >= from && progress < t->def.grow_until;
+    return progress > from + PROGRESS_ROUNDING && progress < t->def.grow_until - PROGRESS_ROUNDING;
+}
+
+bool growing_gathers(const trainer *t) { return is_within(t, SCHEDULE_STATS_FROM); }
+
+bool growing_is_due(const trainer *t)
+{
+    if (!is_within(t, SCHEDULE_ADJUST_FROM))
         return false;
     if (!t->rules.rounds_by_progress)
         return (t->step + 1) % ROUND_INTERVAL == 0;
+    const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
     return floor(progress * ROUNDS_PER_RUN) != floor(next * ROUNDS_PER_RUN);
 }
 

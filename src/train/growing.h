@@ -6,9 +6,12 @@
 
 #include "train/trainer.h"
 
-/** Does the step from `progress` to `next` pass a multiple of 1/100 of the run (or of 100 steps:
-    train/rules.h) between start and end of growth? */
-bool growing_is_due(const trainer *t, double progress, double next);
+/** Does the next step gather statistics for growth? */
+bool growing_gathers(const trainer *t);
+
+/** Does the next step pass a multiple of 1/100 of the run (or of 100 steps: train/rules.h) between start and
+    end of growth? */
+bool growing_is_due(const trainer *t);
 
 /** Grow and prune: anchors, gradients and moments change together; new anchors have no momentum. GBT_OK,
     GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL (Embree). */

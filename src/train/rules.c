@@ -14,6 +14,7 @@ static train_rules own_rules(const gbt_train_def *def)
         .spacing_scale_factor = TRAIN_SPACING_SCALE,
         .uses_footprint = true,
         .uses_near = true,
+        .recentres = true,
         .adds_to_few_points = true,
         .limits_first_scale = true,
         .features_from_colors = true,
@@ -25,6 +26,7 @@ static train_rules own_rules(const gbt_train_def *def)
         .splats_until = def->splats_until,
         .loose_cutoffs = true,
         .raises_first_opacity = true,
+        .last_step_learns = true,
         .own_rates = true,
         .anchors_learn_when_adjusted = true,
         .importance = GROWTH_BY_SHARE,
@@ -47,7 +49,11 @@ static train_rules reference_rules(void)
         .offsets = 10,
         .ball_scale_factor = 1,
         .spacing_scale_factor = 1,
+        .near_depth = 0.2f,
         .voxel = GBT_VOXEL_RULE_SQUARED,
+        .sight = FRAME_SIGHT_BY_ANCHOR,
+        .makes_faint = true,
+        .counts_from_one = true,
         .start_level = 0,
         .splats_until = 0,
         .importance = GROWTH_BY_OPACITY,
@@ -61,4 +67,15 @@ static train_rules reference_rules(void)
 train_rules train_rules_of(const gbt_train_def *def)
 {
     return def->compat ? reference_rules() : own_rules(def);
+}
+
+double train_rules_progress(const train_rules *rules, const pace *p, uint64_t step)
+{
+    return pace_progress(p, rules->counts_from_one ? step + 1 : step);
+}
+
+frame_drawing train_drawing_of(const gbt_train_def *def)
+{
+    return (frame_drawing){
+        .renderer = def->renderer, .footprint = (float)def->footprint, .sight = train_rules_of(def).sight};
 }

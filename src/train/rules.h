@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* train/rules.h -- where training follows the reference method to the letter and where it does not
-   (docs/training.md). Filled once, from `compat`; everything else reads the rule it needs. */
+   (docs/compat.md). Filled once, from `compat`; everything else reads the rule it needs. */
 #ifndef GBT_TRAIN_RULES_H
 #define GBT_TRAIN_RULES_H
 
+#include "frame/frame.h"
 #include "gb/balls.h"
 #include "gbtrace/train.h"
 #include "growth/statistics.h"
+#include "train/schedule.h"
 
 typedef struct train_rules {
     /* settings that are left open, or decided */
@@ -16,6 +18,9 @@ typedef struct train_rules {
     bool uses_near;                                 /* nothing nearer than the sparse points let it be */
 
     /* the start */
+    bool recentres;              /* local coordinates begin in the middle of the points; else the cells of
+                                    voxels and of growth are where the world's coordinates put them */
+    float near_depth;            /* scene units: nothing nearer, where uses_near does not say */
     bool adds_to_few_points;     /* by photo consistency, where the data set has few points */
     bool limits_first_scale;     /* an isolated point would start as a floater */
     bool features_from_colors;   /* first features carry the colour of the nearest point */
@@ -24,7 +29,15 @@ typedef struct train_rules {
     bool distance_where_wide;    /* "auto": the networks see the distance where it varies widely */
     bool distance_by_median;     /* in units of the median distance of anchors */
 
+    /* what is seen */
+    frame_sight sight;
+    bool makes_faint; /* Gaussians of opacity below alpha_min count in the loss and as seen, though nobody
+                         draws them */
+
     /* a step */
+    bool counts_from_one;             /* rates and growth go by the progress after a step, and growth leaves
+                                         out its first and last one; else by the progress before it */
+    bool last_step_learns;            /* else nothing changes in the last step of a run */
     int start_level;                  /* first steps look at 1 pixel in 4^this */
     double splats_until;              /* part of the run in which splats stand for rays */
     bool loose_cutoffs;               /* SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN until SCHEDULE_WHOLE_FROM */
@@ -35,7 +48,7 @@ typedef struct train_rules {
     /* growing and pruning */
     growth_importance importance; /* by which anchors are pruned */
     bool own_adam_age;            /* Adam's age of an anchor is from its start; else from the run's start */
-    bool rounds_by_progress;      /* 100 rounds a run; else every 100 steps */
+    bool rounds_by_progress;      /* each hundredth of the run; else every 100 steps */
     bool thresholds_by_length;    /* of growing and pruning: schedule_threshold_factor() and the settings'
                                      factors */
     bool grows_at_points;         /* sparse points are candidates too */
@@ -48,5 +61,11 @@ typedef struct train_rules {
 
 /** The rules for these settings: ours, or with `compat` all of the reference. */
 train_rules train_rules_of(const gbt_train_def *def);
+
+/** By which the learning rates of a step (0-based) and its growth go. */
+double train_rules_progress(const train_rules *rules, const pace *p, uint64_t step);
+
+/** How a model trained with these settings is drawn, but for the sizes of anchors' pixels. */
+frame_drawing train_drawing_of(const gbt_train_def *def);
 
 #endif

@@ -216,7 +216,7 @@ static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
     const gbt_train_def *def = &t->def;
     scene_split split;
     GBT_TRY(scene_split_parse(def->eval_split, &split, err));
-    GBT_TRY(scene_load(data, &split, &t->scene, err));
+    GBT_TRY((t->rules.recentres ? scene_load : scene_load_in_place)(data, &split, &t->scene, err));
     scene_set_alpha(&t->scene, def->alpha);
     if (t->scene.view_count == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no photos to train on (a point cloud alone is not enough)",
@@ -270,7 +270,10 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     t->decoder.distance_min = p5 * t->decoder.distance_scale;
     t->decoder.distance_max = p95 * t->decoder.distance_scale;
     t->settings = trace_settings_default();
-    t->settings.t_near = near_depth(t, median);
+    t->settings.t_near = t->rules.uses_near ? near_depth(t, median) : t->rules.near_depth;
+    if (!(p5 > t->settings.t_near))
+        log_warn("%s: nothing nearer to a camera than %g is drawn, and some of the scene is at %g",
+                 t->scene.folder, (double)t->settings.t_near, (double)p5);
     const double size = fmax(t->extent, (double)median);
     t->scale_log_min = (float)log(1e-6 * size);
     t->scale_log_max = (float)log(100 * size);
@@ -287,8 +290,8 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     GBT_TRY(make_anchors(t, err));
     GBT_TRY(make_decoder(t, err));
     t->renderer = t->def.renderer;
-    t->frame.draw.renderer = t->renderer;
-    t->frame.draw.footprint = (float)t->def.footprint;
+    t->frame.draw = train_drawing_of(&t->def);
+    t->frame.draw.makes_faint = t->rules.makes_faint;
     GBT_TRY(make_state(t, err));
     if (!scene_background(&t->scene, t->settings.background) && t->rules.background_from_points &&
         t->scene.points.has_color)

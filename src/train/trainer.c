@@ -155,8 +155,10 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     const double start = clock_wall();
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
+    const bool learns = t->rules.last_step_learns || next < 1;
     const learning_rates rates =
-        learning_rates_at(progress, t->rules.own_rates, t->extent, t->def.learning_rate_factor);
+        learning_rates_at(train_rules_progress(&t->rules, &t->pace, t->step), t->rules.own_rates, t->extent,
+                          t->def.learning_rate_factor);
 
     /* A view, and as many of its pixels as the model can already use. */
     const size_t slot = pick_view(t), view = t->train_views[slot];
@@ -212,20 +214,21 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
         return skip_step(t, out, reason, err);
     }
     t->skipped_in_row = 0;
-    if (t->exposures.count > 0)
+    if (t->exposures.count > 0 && learns)
         exposures_step(&t->exposures, slot, d_exposure,
                        t->def.learning_rate_factor *
                            exposures_rate(t->train_count, progress, next - progress));
-    const bool adjust = growing_is_due(t, progress, next);
+    const bool adjust = growing_is_due(t);
     const learning_model model = model_of(t);
-    learn_networks(&model, &rates, t->step + 1);
-    if (!adjust || t->rules.anchors_learn_when_adjusted)
+    if (learns)
+        learn_networks(&model, &rates, t->step + 1);
+    if (learns && (!adjust || t->rules.anchors_learn_when_adjusted))
         learn_anchors(&model, &rates, ++t->anchor_t);
     out->optimizer_seconds = clock_wall() - clock;
 
     /* Anchors. */
     clock = clock_wall();
-    if (t->def.grow && progress >= SCHEDULE_STATS_FROM && progress < t->def.grow_until)
+    if (growing_gathers(t))
         growth_stats_gather(&t->stats, f, t->rules.importance, t->settings.t_near);
     if (adjust)
         GBT_TRY(growing_round(t, err));

@@ -318,6 +318,28 @@ static void garden_has_the_known_spacing(void **state)
     cloud_free(&c);
 }
 
+/* What the reference implementation counts, in the world's coordinates. */
+static void garden_has_the_references_voxels(void **state)
+{
+    (void)state;
+    static const struct {
+        float voxel_size;
+        size_t count;
+    } wanted[] = {{0.001f, 132996}, {0.00528082391f, 115131}};
+    cloud c = cloud_garden();
+    if (c.position == NULL)
+        skip();
+    for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
+        float *centers;
+        size_t count;
+        assert_ok(
+            voxel_centers(c.position, c.count, wanted[i].voxel_size, &centers, &count, &assert_ok_err_));
+        assert_int_equal(count, wanted[i].count);
+        mem_free(centers);
+    }
+    cloud_free(&c);
+}
+
 int main(void)
 {
     enum { SCALES = sizeof scale_cases / sizeof *scale_cases };
@@ -331,6 +353,7 @@ int main(void)
         cmocka_unit_test(bad_input_is_refused),
         cmocka_unit_test(every_allocation_may_fail),
         cmocka_unit_test(garden_has_the_known_spacing),
+        cmocka_unit_test(garden_has_the_references_voxels),
     };
     enum { OTHERS = sizeof others / sizeof *others };
     struct CMUnitTest tests[SCALES + OTHERS];

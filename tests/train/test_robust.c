@@ -475,10 +475,6 @@ static void nothing_is_nearer_than_photos_show(void **state)
                     t.settings.t_near > least);
         trainer_free(&t);
     }
-    def.compat = true;
-    open_ok(&t, tiny, &def);
-    assert_true(t.settings.t_near <= least);
-    trainer_free(&t);
 }
 
 /* ---- a scene that has lost all its Gaussians ---- */

@@ -1,0 +1,273 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/train/test_compat.c -- each quirk of the reference implementation that docs/compat.md lists: there
+   with `compat`, not there without. */
+#include "run_support.h"
+
+#include "train/growing.h"
+
+enum { WHOLE = 30000 }; /* steps of the reference's run */
+
+static gbt_train_def def_of(bool compat)
+{
+    gbt_train_def def = run_def();
+    def.compat = compat;
+    def.voxel_size = 0.02f;
+    return def;
+}
+
+/* A run of WHOLE steps in front of which there is no data. */
+static trainer long_run(bool compat)
+{
+    trainer t = {.def = def_of(compat), .pace = pace_of_iterations(WHOLE)};
+    t.rules = train_rules_of(&t.def);
+    return t;
+}
+
+/* 1600, 1700, ... 14900: neither the step at which growth may begin nor that at which it ends. */
+static void there_are_134_rounds(void **state)
+{
+    (void)state;
+    trainer t = long_run(true);
+    size_t rounds = 0, first = 0, last = 0;
+    for (t.step = 0; t.step < WHOLE; t.step++)
+        if (growing_is_due(&t)) {
+            last = (size_t)t.step + 1;
+            first = rounds++ == 0 ? last : first;
+        }
+    assert_int_equal(rounds, 134);
+    assert_int_equal(first, 1600);
+    assert_int_equal(last, 14900);
+    t = long_run(false);
+    for (t.step = rounds = 0; t.step < WHOLE; t.step++)
+        rounds += growing_is_due(&t);
+    assert_int_equal(rounds, 45);
+}
+
+static void statistics_are_of_steps_501_to_14999(void **state)
+{
+    (void)state;
+    trainer t = long_run(true);
+    size_t steps = 0, first = 0, last = 0;
+    for (t.step = 0; t.step < WHOLE; t.step++)
+        if (growing_gathers(&t)) {
+            last = (size_t)t.step + 1;
+            first = steps++ == 0 ? last : first;
+        }
+    assert_int_equal(steps, 14499);
+    assert_int_equal(first, 501);
+    assert_int_equal(last, 14999);
+}
+
+/* Growth to a third of the run ends before step 10,000, though a third is no double. */
+static void growth_ends_before_its_last_step(void **state)
+{
+    (void)state;
+    trainer t = long_run(true);
+    t.def.grow_until = 1.0 / 3;
+    size_t last = 0;
+    for (t.step = 0; t.step < WHOLE; t.step++)
+        last = growing_is_due(&t) ? (size_t)t.step + 1 : last;
+    assert_int_equal(last, 9900);
+}
+
+/* Rates of the networks of colour and opacity, by the reference's formula at step 1, 1500, ... */
+static void rates_count_from_one(void **state)
+{
+    (void)state;
+    static const struct {
+        uint64_t step;
+        double color, opacity, offset;
+    } wanted[] = {{1, 7.9986467e-3, 1.999693e-3, 9.9984651e-3},
+                  {1500, 6.207032e-3, 1.5886565e-3, 7.9432823e-3},
+                  {15000, 6.3245553e-4, 2e-4, 1e-3},
+                  {29999, 5.0008459e-5, 2.000307e-5, 1.0001535e-4}};
+    trainer t = long_run(true);
+    for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
+        t.step = wanted[i].step - 1;
+        const learning_rates r =
+            learning_rates_at(train_rules_progress(&t.rules, &t.pace, t.step), t.rules.own_rates, 2, 1);
+        assert_true(fabs(r.network[DECODER_COLOR] / wanted[i].color - 1) < 1e-6);
+        assert_true(fabs(r.network[DECODER_OPACITY] / wanted[i].opacity - 1) < 1e-6);
+        assert_true(fabs(r.anchor[ANCHOR_OFFSET] / (2 * wanted[i].offset) - 1) < 1e-6);
+    }
+}
+
+/* Does a step change the networks? And the offsets of the anchors? */
+static void step_and_compare(trainer *t, bool *of_networks, bool *of_anchors)
+{
+    const size_t params = t->decoder.param_count, offsets = 3 * t->anchors.count * (size_t)t->def.offsets;
+    float *before = malloc((params + offsets) * sizeof *before);
+    assert_non_null(before);
+    memcpy(before, t->decoder.params, params * sizeof *before);
+    memcpy(before + params, t->anchors.offset, offsets * sizeof *before);
+    step_report r;
+    step_ok(t, &r);
+    *of_networks = memcmp(before, t->decoder.params, params * sizeof *before) != 0;
+    *of_anchors = memcmp(before + params, t->anchors.offset, offsets * sizeof *before) != 0;
+    free(before);
+}
+
+static void the_last_step_teaches_nothing(void **state)
+{
+    (void)state;
+    for (int compat = 0; compat <= 1; compat++) {
+        gbt_train_def def = def_of(compat == 1);
+        def.grow = false;
+        trainer t;
+        open_ok(&t, tiny, &def);
+        for (int i = 0; i < STEPS; i++) {
+            bool networks, offsets;
+            step_and_compare(&t, &networks, &offsets);
+            const bool learns = compat == 0 || i + 1 < STEPS;
+            if (networks != learns || offsets != learns)
+                fail_msg("compat %d, step %d: networks %s, offsets %s", compat, i + 1,
+                         networks ? "learn" : "rest", offsets ? "learn" : "rest");
+        }
+        trainer_free(&t);
+    }
+}
+
+/* Of the statistics nothing is left that could grow or prune. */
+static void anchors_rest_in_a_round(void **state)
+{
+    (void)state;
+    gbt_train_def def = def_of(true);
+    def.iterations = 400;
+    trainer t;
+    step_report r;
+    open_ok(&t, tiny, &def);
+    for (int i = 0; i < 99; i++)
+        step_ok(&t, &r);
+    const size_t k = (size_t)t.stats.offset_count;
+    memset(t.stats.visit_count, 0, t.stats.count * sizeof(float));
+    memset(t.stats.grad_count, 0, t.stats.count * k * sizeof(float));
+    assert_true(growing_is_due(&t));
+    bool networks, offsets;
+    step_and_compare(&t, &networks, &offsets);
+    assert_true(networks && !offsets);
+    step_and_compare(&t, &networks, &offsets);
+    assert_true(networks && offsets);
+    trainer_free(&t);
+}
+
+/* The other rules, whose effects are tested where they act; and what they make of settings and scene. */
+static void the_other_rules_are_the_references(void **state)
+{
+    (void)state;
+    const gbt_train_def def = def_of(true);
+    trainer t;
+    open_ok(&t, tiny, &def);
+    const train_rules *r = &t.rules;
+    assert_true(t.def.offsets == 10 && t.def.scale_factor == 1 && t.def.footprint == 0);
+    assert_true(!r->features_from_colors && !r->raises_first_opacity && !r->limits_first_scale);
+    for (size_t i = 0; i < t.anchors.count * ANCHOR_FEATURE_DIM; i++)
+        assert_true(t.anchors.feature[i] == 0);
+    assert_int_equal(r->voxel, GBT_VOXEL_RULE_SQUARED);
+    assert_true(r->integer_division && r->coarse_level_gates && r->at_cell_center);
+    assert_true(!r->own_adam_age && r->importance == GROWTH_BY_OPACITY && r->shape_log_max == 0.05f);
+    assert_true(!r->thresholds_by_length && !r->grows_at_points && !r->needs_two_views);
+    assert_true(!t.decoder.has_distance && !r->distance_where_wide);
+    assert_true(r->start_level == 0 && r->splats_until == 0 && !r->loose_cutoffs);
+    for (int c = 0; c < 3; c++)
+        assert_true(t.settings.background[c] == 0);
+    trainer_free(&t);
+}
+
+/* All opacities a little above 0: nothing is drawn, and still all count in the loss's last term. */
+static void faint_gaussians_count(void **state)
+{
+    (void)state;
+    for (int compat = 0; compat <= 1; compat++) {
+        const gbt_train_def def = def_of(compat == 1);
+        trainer t;
+        step_report r;
+        open_ok(&t, tiny, &def);
+        decoder_part parts[DECODER_PARTS];
+        decoder_parts(&t.decoder, parts);
+        const decoder_part *p = &parts[DECODER_OPACITY];
+        memset(t.decoder.params + p->begin, 0, (p->end - p->begin) * sizeof(float));
+        for (int k = 0; k < t.def.offsets; k++)
+            t.decoder.params[p->end - 1 - (size_t)k] = 0.002f; /* below 1/255 */
+        t.rules.raises_first_opacity = false;
+        for (size_t i = 0; i < t.anchors.count; i++)
+            for (size_t c = 3; c < 6; c++)
+                t.anchors.scale_log[6 * i + c] = 0;
+        step_ok(&t, &r);
+        assert_int_equal(r.gaussians, compat == 1 ? r.visible * (size_t)t.def.offsets : 0);
+        assert_int_equal(t.frame.counters.blended, 0);
+        assert_true((r.loss - (0.8 * r.l1 + 0.2 * (1 - r.ssim)) > 1e-4) == (compat == 1));
+        trainer_free(&t);
+    }
+}
+
+static void nothing_is_nearer_than_a_fifth(void **state)
+{
+    (void)state;
+    const gbt_train_def def = def_of(true);
+    trainer t;
+    open_ok(&t, tiny, &def);
+    assert_true(t.settings.t_near == 0.2f);
+    trainer_free(&t);
+}
+
+/* An anchor beside the picture is decoded if its own ellipsoid touches it, not if only its Gaussians do. */
+static void anchors_are_seen_by_themselves(void **state)
+{
+    (void)state;
+    for (int compat = 0; compat <= 1; compat++) {
+        const gbt_train_def def = def_of(compat == 1);
+        trainer t;
+        step_report r;
+        open_ok(&t, tiny, &def);
+        for (size_t i = 0; i < t.anchors.count; i++)
+            for (size_t c = 0; c < 6; c++)
+                t.anchors.scale_log[6 * i + c] = logf(c < 3 ? 1e-3f : 100.0f);
+        step_ok(&t, &r);
+        size_t on_screen = 0;
+        static const float quat[4] = {1, 0, 0, 0}, scale[3] = {1e-3f, 1e-3f, 1e-3f};
+        const screen_view screen = screen_of(&t.frame.camera, (double)t.settings.t_near);
+        for (size_t i = 0; i < t.anchors.count; i++)
+            on_screen += screen_touches(&screen, t.anchors.position + 3 * i, quat, scale);
+        assert_true(on_screen > 0 && on_screen < t.anchors.count);
+        assert_int_equal(r.visible, compat == 1 ? on_screen : t.anchors.count);
+        assert_int_equal(t.frame.by_screen, compat == 1);
+        trainer_free(&t);
+    }
+}
+
+/* Anchors of voxels are whole multiples of v in the world. */
+static void voxels_are_where_the_world_puts_them(void **state)
+{
+    (void)state;
+    gbt_train_def def = def_of(true);
+    def.init = GBT_INIT_VOXEL;
+    trainer t;
+    open_ok(&t, tiny, &def);
+    for (int k = 0; k < 3; k++)
+        assert_true(t.scene.origin[k] == 0);
+    for (size_t i = 0; i < 3 * t.anchors.count; i++)
+        assert_true(t.anchors.position[i] == rintf(t.anchors.position[i] / def.voxel_size) * def.voxel_size);
+    trainer_free(&t);
+    def.compat = false;
+    open_ok(&t, tiny, &def);
+    assert_true(t.scene.origin[0] != 0 || t.scene.origin[1] != 0 || t.scene.origin[2] != 0);
+    trainer_free(&t);
+}
+
+int main(void)
+{
+    static const struct CMUnitTest tests[] = {
+        cmocka_unit_test(there_are_134_rounds),
+        cmocka_unit_test(statistics_are_of_steps_501_to_14999),
+        cmocka_unit_test(growth_ends_before_its_last_step),
+        cmocka_unit_test(rates_count_from_one),
+        cmocka_unit_test(the_last_step_teaches_nothing),
+        cmocka_unit_test(anchors_rest_in_a_round),
+        cmocka_unit_test(the_other_rules_are_the_references),
+        cmocka_unit_test(faint_gaussians_count),
+        cmocka_unit_test(nothing_is_nearer_than_a_fifth),
+        cmocka_unit_test(anchors_are_seen_by_themselves),
+        cmocka_unit_test(voxels_are_where_the_world_puts_them),
+    };
+    return cmocka_run_group_tests_name("compat", tests, make_root, remove_root);
+}

@@ -137,6 +137,7 @@ typedef struct lab_paper_def {
     uint64_t iterations;     /* of every run, at least 20. Default 3000; the paper's is 30000 */
     double downscale;        /* photos are divided by this, [1, 64]. Default 1 */
     int seeds;               /* runs of each variant, seeds 0, 1, ...; [1, 10]. Default 3 */
+    const char *eval_split;  /* gbt_train_def.eval_split of the runs. Default "every=8" */
     gbt_renderer renderer;   /* that trains. Default GBT_RENDERER_RASTER, as the paper */
     const char *tables;      /* which, as "1,3". Default "1,2,3,4" */
     const char *lpips; /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such column.
@@ -163,6 +164,7 @@ typedef struct lab_time_def {
     double budget_seconds;   /* of a run, (0, 1e6]. Default 84 */
     double downscale;        /* photos are divided by this, [1, 64]. Default 1 */
     int seeds;               /* [1, 10]. Default 1 */
+    const char *eval_split;  /* as above. Default "auto" */
 } lab_time_def;
 
 lab_time_def lab_time_def_default(void);
@@ -185,6 +187,7 @@ typedef struct lab_anchors_def {
     uint64_t iterations;     /* of every run, at least 20. Default 1000 */
     double downscale;        /* photos are divided by this, [1, 64]. Default 1 */
     int seeds;               /* runs of each variant, [1, 10]. Default 3 */
+    const char *eval_split;  /* as above. Default "auto" */
 } lab_anchors_def;
 
 lab_anchors_def lab_anchors_def_default(void);

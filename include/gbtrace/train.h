@@ -40,7 +40,10 @@ typedef struct gbt_train_def {
                     of anchors, which is what counts where points have no tracks. 0 with compat */
     int start_level; /* first steps look at 1 pixel in 4^start_level, at random places; all come last. 0 with
                         compat */
-    const char *eval_split; /* "auto" (as the data set says, else every=8), "every=8", "none", "list=FILE" */
+    const char *eval_split; /* held-out photos: "auto" (as the data set says, else every=8), "every=N",
+                               "every=N:K" (photos K, K + N, ... of the sorted list; K is 0 without), "none",
+                               "list=FILE". "validate=N:K," before it, for choosing constants: these are not
+                               even read, and every N-th of the training photos is held out in their place */
     gbt_alpha alpha;        /* black and white are also the background */
     uint64_t seed;
     size_t hit_bytes_max;    /* memory for the hits of a view that are kept for the adjoint; tiles beyond are
@@ -50,7 +53,7 @@ typedef struct gbt_train_def {
     double threshold_factor; /* of the thresholds of densification and of pruning. Not with compat */
     double final_prune_factor; /* of the threshold of pruning, once more, in the last tenth of growing, when
                                   no anchors are made any more; 1: as before. Not with compat */
-    bool compat;               /* every quirk of the reference method (docs/training.md) */
+    bool compat;               /* every quirk of the reference method (docs/compat.md) */
     bool exposure; /* learn a colour matrix per photo; held-out photos are then scored on their right half,
                       with a matrix fitted to the left */
     double splats_until; /* splats stand for rays until this part of the run: their steps are quicker. Pinhole

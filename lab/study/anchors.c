@@ -6,7 +6,7 @@
 
 lab_anchors_def lab_anchors_def_default(void)
 {
-    return (lab_anchors_def){.iterations = 1000, .downscale = 1, .seeds = 3};
+    return (lab_anchors_def){.iterations = 1000, .downscale = 1, .seeds = 3, .eval_split = "auto"};
 }
 
 static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder,
@@ -15,6 +15,7 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     const anchors_study *s = study;
     const anchors_variant *v = &anchors_variants[variant];
     gbt_train_def def = gbt_train_def_default();
+    def.eval_split = s->def.eval_split;
     def.iterations = s->def.iterations;
     def.downscale = s->def.downscale;
     def.seed = (uint64_t)seed;

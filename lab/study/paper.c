@@ -11,8 +11,12 @@ enum { LEAST_ITERATIONS = 20 };
 
 lab_paper_def lab_paper_def_default(void)
 {
-    return (lab_paper_def){
-        .iterations = 3000, .downscale = 1, .seeds = 3, .renderer = GBT_RENDERER_RASTER, .tables = "1,2,3,4"};
+    return (lab_paper_def){.iterations = 3000,
+                           .downscale = 1,
+                           .seeds = 3,
+                           .eval_split = "every=8",
+                           .renderer = GBT_RENDERER_RASTER,
+                           .tables = "1,2,3,4"};
 }
 
 /* "1,3": digits of tables, each once, with commas between. */
@@ -58,7 +62,7 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     }
     gbt_train_def def = gbt_train_def_default();
     def.compat = true;
-    def.eval_split = "every=8";
+    def.eval_split = s->def.eval_split;
     def.save_every_seconds = 0;
     /* As compat has them: a new default must not make old runs look like others. */
     def.start_level = 0;

@@ -158,7 +158,7 @@ void paper_tables(const void *study, text *out)
                 "(`--compat`), photos divided by %g, %s, ",
                 (unsigned long long)s->def.iterations, s->def.downscale,
                 CHOICE_NAME(GBT_RENDERER_NAMES, s->def.renderer));
-    text_format(out, "seeds 0 to %d; every eighth photo held out.\n", s->grid.seeds - 1);
+    text_format(out, "seeds 0 to %d; held-out photos: %s.\n", s->grid.seeds - 1, s->def.eval_split);
     text_add(out, "Mean ± standard deviation over the seeds. Changes compare runs of the same seed; \"all\" "
                   "is the mean over the scenes. Told apart: outside the 95 % interval of the mean (Student's "
                   "t over the seeds). The paper gives single runs on other scenes.\n\n");

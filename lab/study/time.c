@@ -6,7 +6,7 @@
 
 lab_time_def lab_time_def_default(void)
 {
-    return (lab_time_def){.budget_seconds = 84, .downscale = 1, .seeds = 1};
+    return (lab_time_def){.budget_seconds = 84, .downscale = 1, .seeds = 1, .eval_split = "auto"};
 }
 
 static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder,
@@ -15,6 +15,7 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     const time_study *s = study;
     const time_variant *v = &time_variants[variant];
     gbt_train_def def = gbt_train_def_default();
+    def.eval_split = s->def.eval_split;
     def.downscale = s->def.downscale;
     def.seed = (uint64_t)seed;
     def.save_every_seconds = 0;

@@ -75,6 +75,7 @@ static study_request request;
 static int seeds;
 static double downscale = 1;
 static uint64_t iterations;
+static const char *eval_split;
 
 static const option *options(int *count)
 {
@@ -157,6 +158,14 @@ static const option *options(int *count)
          .max = 64,
          .value_name = "F",
          .help = "paper, time, anchors: divide the photos' width and height by this"},
+        {.name = "eval-split",
+         .kind = OPTION_STRING,
+         .value = &eval_split,
+         .value_name = "SPLIT",
+         .choices = "auto|every=8|validate=8",
+         .help =
+             "paper, time, anchors: held-out photos, as of train; validate=8 to choose settings by. Default: "
+             "every=8, auto and auto"},
         {.name = "seeds",
          .kind = OPTION_INT,
          .value = &seeds,
@@ -189,6 +198,8 @@ static int run(const operands *given)
     paper->downscale = request.time.downscale = anchors->downscale = downscale;
     if (seeds > 0)
         paper->seeds = request.time.seeds = anchors->seeds = seeds;
+    if (eval_split != NULL)
+        paper->eval_split = request.time.eval_split = anchors->eval_split = eval_split;
     if (iterations > 0)
         paper->iterations = anchors->iterations = iterations;
     gbt_error err = {0};

@@ -364,11 +364,8 @@ gbt_status scene_load_in_place(const char *path, const scene_split *split, scene
 
 void scene_free(scene *s)
 {
-    for (size_t i = 0; i < s->view_count; i++) {
-        mem_free(s->views[i].name);
-        mem_free(s->views[i].path);
-        mem_free(s->views[i].mask_path);
-    }
+    for (size_t i = 0; i < s->view_count; i++)
+        scene_view_free(&s->views[i]);
     mem_free(s->folder);
     mem_free(s->views);
     mem_free(s->points.position);

@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #include "base/image.h"
+#include "base/memory.h"
 #include "gbtrace/camera.h"
 #include "gbtrace/choices.h"
 #include "gbtrace/status.h"
@@ -65,12 +66,17 @@ typedef enum scene_split_kind {
 
 typedef struct scene_split {
     scene_split_kind kind;
-    int every; /* SCENE_SPLIT_EVERY: views 0, every, 2 every, ... of the sorted list are held out, a missing
-                  photo does not shift them; >= 2. Default 8 */
+    int every;  /* SCENE_SPLIT_EVERY: of the sorted list, views offset, offset + every, ... are held out, a
+                   missing photo does not shift them; >= 2. Default 8 */
+    int offset; /* [0, every). Default 0 */
     const char *list_path; /* SCENE_SPLIT_LIST: text file, one image name per line */
+    int validate_every;    /* > 0: constants are being chosen. Held-out views are not in the scene, and of the
+                              others every N-th, in their order, is held out in their place. Default 0 */
+    int validate_offset;   /* [0, validate_every): the first of them */
 } scene_split;
 
-/** "auto", "every=8", "none" or "list=FILE", as on the command line. */
+/** As on the command line: "auto", "every=8", "every=8:3", "none" or "list=FILE"; "validate=8" or
+    "validate=8:3" alone (then auto), or before it and a comma. list_path points into `text`. */
 gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err);
 
 /**
@@ -92,6 +98,13 @@ gbt_status scene_load(const char *path, const scene_split *split, scene *out, gb
 gbt_status scene_load_in_place(const char *path, const scene_split *split, scene *out, gbt_error *err);
 
 void scene_free(scene *s);
+static inline void scene_view_free(scene_view *view)
+{
+    mem_free(view->name);
+    mem_free(view->path);
+    mem_free(view->mask_path);
+    *view = (scene_view){0};
+}
 
 /**
  * Say what the transparent part of photos is; GBT_ALPHA_AUTO is white for Blender's synthetic scenes, as

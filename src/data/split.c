@@ -11,27 +11,56 @@
 #include "base/memory.h"
 #include "data/number.h"
 
-gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err)
+/* "N" or "N:K" of `length`, N >= 2, K < N. */
+static bool parse_fold(const char *text, size_t length, int *every, int *offset)
 {
-    *out = (scene_split){.kind = SCENE_SPLIT_EVERY, .every = SCENE_SPLIT_DEFAULT_EVERY};
-    uint64_t every;
-    if (strcmp(text, "auto") == 0) {
+    const char *colon = memchr(text, ':', length);
+    const size_t first = colon != NULL ? (size_t)(colon - text) : length;
+    uint64_t n, k = 0;
+    if (number_parse_u64(text, first, &n) != NUMBER_OK || n < 2 || n > INT_MAX)
+        return false;
+    if (colon != NULL && (number_parse_u64(colon + 1, length - first - 1, &k) != NUMBER_OK || k >= n))
+        return false;
+    *every = (int)n;
+    *offset = (int)k;
+    return true;
+}
+
+/* The split itself, without validation. */
+static bool parse_kind(const char *text, scene_split *out)
+{
+    if (strcmp(text, "auto") == 0)
         out->kind = SCENE_SPLIT_AUTO;
-    } else if (strcmp(text, "none") == 0) {
+    else if (strcmp(text, "none") == 0)
         out->kind = SCENE_SPLIT_NONE;
-    } else if (strncmp(text, "list=", 5) == 0 && text[5] != '\0') {
+    else if (strncmp(text, "list=", 5) == 0 && text[5] != '\0') {
         out->kind = SCENE_SPLIT_LIST;
         out->list_path = text + 5;
-    } else if (strncmp(text, "every=", 6) == 0 &&
-               number_parse_u64(text + 6, strlen(text + 6), &every) == NUMBER_OK && every >= 2 &&
-               every <= INT_MAX) {
-        out->every = (int)every;
-    } else {
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "eval_split: \"%.200s\" (wanted auto, every=N with N >= 2, none or list=FILE)",
-                         text);
+    } else
+        return strncmp(text, "every=", 6) == 0 &&
+               parse_fold(text + 6, strlen(text + 6), &out->every, &out->offset);
+    return true;
+}
+
+gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err)
+{
+    static const char validate[] = "validate=";
+    *out = (scene_split){.kind = SCENE_SPLIT_EVERY, .every = SCENE_SPLIT_DEFAULT_EVERY};
+    const char *kind = text;
+    bool fine = true;
+    if (strncmp(text, validate, strlen(validate)) == 0) {
+        const char *fold = text + strlen(validate);
+        const size_t length = strcspn(fold, ",");
+        fine = parse_fold(fold, length, &out->validate_every, &out->validate_offset);
+        kind = fold[length] == ',' ? fold + length + 1 : "auto";
     }
-    return GBT_OK;
+    if (fine && parse_kind(kind, out))
+        return GBT_OK;
+    return base_fail(
+        err, GBT_ERR_ARGUMENT,
+        "eval_split: \"%.200s\" (wanted auto, every=N or every=N:K with N >= 2 and K < N, none or "
+        "list=FILE; before it, or alone, validate=N or validate=N:K)",
+        text);
 }
 
 static int name_against_view(const void *name, const void *view)
@@ -66,10 +95,27 @@ static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *pa
 }
 
 /* A single photo is trained on: holding it out would leave nothing. */
-static void mark_every(scene *s, int every)
+static void mark_every(scene *s, int every, int offset)
 {
     for (size_t i = 0; i < s->view_count && s->view_count > 1; i++)
-        s->views[i].is_test = s->views[i].rank % (size_t)every == 0;
+        s->views[i].is_test = s->views[i].rank % (size_t)every == (size_t)offset;
+}
+
+/* Held-out views go, and of the others some are held out: what is chosen by their scores has seen nothing of
+   the views that went. */
+static void validate(const scene_split *split, scene *s)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < s->view_count; i++) {
+        if (s->views[i].is_test) {
+            scene_view_free(&s->views[i]);
+            continue;
+        }
+        s->views[kept] = s->views[i];
+        s->views[kept].is_test = kept % (size_t)split->validate_every == (size_t)split->validate_offset;
+        kept++;
+    }
+    s->view_count = kept;
 }
 
 gbt_status split_apply(const scene_split *split, scene *s, gbt_error *err)
@@ -79,14 +125,14 @@ gbt_status split_apply(const scene_split *split, scene *s, gbt_error *err)
     switch (split->kind) {
     case SCENE_SPLIT_AUTO:
         if (!s->has_split)
-            mark_every(s, SCENE_SPLIT_DEFAULT_EVERY);
+            mark_every(s, SCENE_SPLIT_DEFAULT_EVERY, 0);
         break;
     case SCENE_SPLIT_NONE:
         break;
     case SCENE_SPLIT_EVERY:
         if (split->every < 2)
             return base_fail(err, GBT_ERR_ARGUMENT, "split: wanted every >= 2, got %d", split->every);
-        mark_every(s, split->every);
+        mark_every(s, split->every, split->offset);
         break;
     case SCENE_SPLIT_LIST: {
         unsigned char *bytes;
@@ -98,9 +144,18 @@ gbt_status split_apply(const scene_split *split, scene *s, gbt_error *err)
         break;
     }
     }
+    const size_t all = s->view_count;
+    if (split->validate_every > 0)
+        validate(split, s);
     size_t test_count = 0;
     for (size_t i = 0; i < s->view_count; i++)
         test_count += s->views[i].is_test;
+    if (split->validate_every > 0 && test_count == 0)
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "split: validation holds out none of %zu training photos (%zu photos; wanted more than "
+            "%d)",
+            s->view_count, all, split->validate_offset);
     if (test_count > 0 && test_count == s->view_count)
         return base_fail(err, GBT_ERR_ARGUMENT, "split: all %zu views are held out, none is left to train on",
                          test_count);

@@ -62,8 +62,10 @@ static const gbt_train_setting settings[] = {
     {NAMED("start-level", start_level), RANGE(INT, 0, 4, "L"), .number = 2, .saved = true, .rare = true,
      .help = "start by training on one random pixel in 4^L"},
     {NAMED("eval-split", eval_split), .kind = GBT_SETTING_TEXT, .unit = "SPLIT", .text = "auto",
-     .choices = "auto|every=8|none", .saved = true,
-     .help = "held-out photos: auto (as the data set says, else every=8), every=N, none, list=FILE"},
+     .choices = "auto|every=8|none|validate=8", .saved = true,
+     .help = "held-out photos: auto (as the data set says, else every=8), every=N, every=N:K (from photo K "
+             "on), none, list=FILE; validate=N:K before it and a comma, or alone: leave those out and hold "
+             "out every N-th of the training photos, to choose settings by"},
     {NAMED("alpha", alpha), CHOICE(GBT_ALPHA_NAMES), .number = GBT_ALPHA_AUTO, .saved = true,
      .help = "transparent pixels of photos: composited on black or white, or masked out of loss and scores; "
              "auto: "
@@ -83,7 +85,7 @@ static const gbt_train_setting settings[] = {
      .help = "multiply the threshold of pruning once more in the last tenth of growing, when none are "
              "added; 1: no change"},
     {NAMED("compat", compat), FLAG, .rare = true, .saved = true,
-     .help = "follow the reference implementation in every detail (docs/training.md)"},
+     .help = "follow the reference implementation in every detail (docs/compat.md)"},
     {NAMED("exposure", exposure), FLAG, .saved = true,
      .help = "learn a colour matrix per photo, for photos that differ in exposure or white balance"},
     {NAMED("splats-until", splats_until), RANGE(DOUBLE, 0, 1, "F"), .number = 0.7, .saved = true,

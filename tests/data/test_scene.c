@@ -265,26 +265,46 @@ static void parse_split(void **state)
         const char *text;
         bool good;
         scene_split_kind kind;
-        int every;
+        int every, offset, validate_every, validate_offset;
     } cases[] = {
-        {"every=8", true, SCENE_SPLIT_EVERY, 8},
-        {"every=2", true, SCENE_SPLIT_EVERY, 2},
-        {"every=2147483647", true, SCENE_SPLIT_EVERY, 2147483647},
-        {"auto", true, SCENE_SPLIT_AUTO, 8},
-        {"autos", false, 0, 0},
-        {"none", true, SCENE_SPLIT_NONE, 8},
-        {"list=a b.txt", true, SCENE_SPLIT_LIST, 8},
-        {"every=1", false, 0, 0},
-        {"every=0", false, 0, 0},
-        {"every=-8", false, 0, 0},
-        {"every=", false, 0, 0},
-        {"every=8x", false, 0, 0},
-        {"every=2147483648", false, 0, 0},
-        {"every=99999999999999999999", false, 0, 0},
-        {"", false, 0, 0},
-        {"list=", false, 0, 0},
-        {"nonee", false, 0, 0},
-        {"8", false, 0, 0},
+        {"every=8:3", true, SCENE_SPLIT_EVERY, .every = 8, .offset = 3},
+        {"every=8:7", true, SCENE_SPLIT_EVERY, .every = 8, .offset = 7},
+        {.text = "every=8:8"},
+        {.text = "every=8:"},
+        {.text = "every=8:-1"},
+        {.text = "every=8:1x"},
+        {.text = "every=:1"},
+        {"validate=6", true, SCENE_SPLIT_AUTO, .every = 8, .validate_every = 6},
+        {"validate=6:5", true, SCENE_SPLIT_AUTO, .every = 8, .validate_every = 6, .validate_offset = 5},
+        {"validate=6:5,auto", true, SCENE_SPLIT_AUTO, .every = 8, .validate_every = 6, .validate_offset = 5},
+        {"validate=2,none", true, SCENE_SPLIT_NONE, .every = 8, .validate_every = 2},
+        {"validate=2,every=4:1", true, SCENE_SPLIT_EVERY, .every = 4, .offset = 1, .validate_every = 2},
+        {"validate=2,list=a b.txt", true, SCENE_SPLIT_LIST, .every = 8, .validate_every = 2},
+        {.text = "validate="},
+        {.text = "validate=1"},
+        {.text = "validate=6:6"},
+        {.text = "validate=6,"},
+        {.text = "validate=6:,auto"},
+        {.text = "validate=6,validate=6"},
+        {.text = "auto,validate=6"},
+        {"every=8", true, SCENE_SPLIT_EVERY, .every = 8},
+        {"every=2", true, SCENE_SPLIT_EVERY, .every = 2},
+        {"every=2147483647", true, SCENE_SPLIT_EVERY, .every = 2147483647},
+        {"auto", true, SCENE_SPLIT_AUTO, .every = 8},
+        {.text = "autos"},
+        {"none", true, SCENE_SPLIT_NONE, .every = 8},
+        {"list=a b.txt", true, SCENE_SPLIT_LIST, .every = 8},
+        {.text = "every=1"},
+        {.text = "every=0"},
+        {.text = "every=-8"},
+        {.text = "every="},
+        {.text = "every=8x"},
+        {.text = "every=2147483648"},
+        {.text = "every=99999999999999999999"},
+        {.text = ""},
+        {.text = "list="},
+        {.text = "nonee"},
+        {.text = "8"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         scene_split split;
@@ -299,6 +319,9 @@ static void parse_split(void **state)
         }
         assert_int_equal(split.kind, cases[i].kind);
         assert_int_equal(split.every, cases[i].every);
+        assert_int_equal(split.offset, cases[i].offset);
+        assert_int_equal(split.validate_every, cases[i].validate_every);
+        assert_int_equal(split.validate_offset, cases[i].validate_offset);
         if (split.kind == SCENE_SPLIT_LIST)
             assert_string_equal(split.list_path, "a b.txt");
     }
@@ -310,6 +333,38 @@ static size_t count_tests(const scene *s)
     for (size_t i = 0; i < s->view_count; i++)
         count += s->views[i].is_test;
     return count;
+}
+
+/* Held-out photos are gone, and each fold of the others is held out once. */
+static void validation_leaves_held_out_photos_alone(void **state)
+{
+    const char *folder = *state;
+    enum { EVERY = 3, FOLDS = 2 };
+    write_model(folder, false, true);
+    for (int offset = 0; offset < EVERY; offset++) {
+        size_t times[VIEW_COUNT] = {0};
+        for (int fold = 0; fold < FOLDS; fold++) {
+            scene s;
+            const scene_split split = {.kind = SCENE_SPLIT_EVERY,
+                                       .every = EVERY,
+                                       .offset = offset,
+                                       .validate_every = FOLDS,
+                                       .validate_offset = fold};
+            must(scene_load(folder, &split, &s, &err));
+            for (size_t i = 0; i < s.view_count; i++) {
+                assert_int_not_equal(s.views[i].rank % EVERY, offset);
+                times[s.views[i].rank] += s.views[i].is_test;
+            }
+            scene_free(&s);
+        }
+        for (size_t i = 0; i < VIEW_COUNT; i++)
+            assert_int_equal(times[i], i % EVERY != (size_t)offset);
+    }
+    scene s;
+    gbt_error none = {0};
+    const scene_split far = {.kind = SCENE_SPLIT_NONE, .validate_every = 100, .validate_offset = 50};
+    assert_int_equal(scene_load(folder, &far, &s, &none), GBT_ERR_ARGUMENT);
+    assert_non_null(strstr(none.text, "validation holds out none"));
 }
 
 static void splits(void **state)
@@ -916,6 +971,8 @@ int main(void)
         cmocka_unit_test(too_long_path),
         cmocka_unit_test(parse_split),
         cmocka_unit_test_setup_teardown(splits, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(validation_leaves_held_out_photos_alone, make_temporary,
+                                        remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_folder, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(blender_folder, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_masks_and_split, make_temporary, remove_temporary),

@@ -675,6 +675,41 @@ static void data_without_training_photos_is_refused(void **state)
     assert_false(file_exists(in_root("none/model.gbt")));
 }
 
+/* Validation scores training photos, and does not so much as open the held-out ones. */
+static void validation_needs_no_held_out_photo(void **state)
+{
+    (void)state;
+    scene s;
+    make_tiny_scene(in_root("validate"));
+    assert_ok(scene_load(in_root("validate"), NULL, &s, NULL));
+    size_t held_out = 0;
+    for (size_t i = 0; i < s.view_count; i++)
+        if (s.views[i].is_test) {
+            held_out++;
+            FILE *photo = fopen(s.views[i].path, "w");
+            assert_true(photo != NULL && fputs("no photo", photo) >= 0 && fclose(photo) == 0);
+        }
+    const size_t others = s.view_count - held_out;
+    scene_free(&s);
+    for (int fold = 0; fold < 4; fold++) {
+        char split[32];
+        snprintf(split, sizeof split, "validate=4:%d", fold);
+        gbt_train_def def = run_def();
+        def.eval_split = split;
+        trainer t;
+        step_report r;
+        double psnr = 0;
+        open_ok(&t, in_root("validate"), &def);
+        assert_int_equal(t.scene.view_count, others);
+        assert_int_equal(t.test_count, (others - (size_t)fold + 3) / 4);
+        assert_int_equal(t.train_count, others - t.test_count);
+        step_ok(&t, &r);
+        assert_ok(trainer_held_out_psnr(&t, &psnr, NULL));
+        assert_true(isfinite(psnr));
+        trainer_free(&t);
+    }
+}
+
 static void a_run_is_overwritten_only_when_asked(void **state)
 {
     (void)state;
@@ -1335,6 +1370,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(moments_follow_their_rows),
         cmocka_unit_test(points_are_made_where_there_are_none),
         cmocka_unit_test(data_without_training_photos_is_refused),
+        cmocka_unit_test(validation_needs_no_held_out_photo),
         cmocka_unit_test(a_run_is_overwritten_only_when_asked),
         cmocka_unit_test(a_vanished_photo_is_named),
         cmocka_unit_test(a_full_disk_leaves_the_old_checkpoint),

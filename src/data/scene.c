@@ -362,14 +362,6 @@ gbt_status scene_load_in_place(const char *path, const scene_split *split, scene
     return load(path, split, false, out, err);
 }
 
-void scene_view_free(scene_view *view)
-{
-    mem_free(view->name);
-    mem_free(view->path);
-    mem_free(view->mask_path);
-    *view = (scene_view){0};
-}
-
 void scene_free(scene *s)
 {
     for (size_t i = 0; i < s->view_count; i++)

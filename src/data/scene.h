@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #include "base/image.h"
+#include "base/memory.h"
 #include "gbtrace/camera.h"
 #include "gbtrace/choices.h"
 #include "gbtrace/status.h"
@@ -97,7 +98,13 @@ gbt_status scene_load(const char *path, const scene_split *split, scene *out, gb
 gbt_status scene_load_in_place(const char *path, const scene_split *split, scene *out, gbt_error *err);
 
 void scene_free(scene *s);
-void scene_view_free(scene_view *view);
+static inline void scene_view_free(scene_view *view)
+{
+    mem_free(view->name);
+    mem_free(view->path);
+    mem_free(view->mask_path);
+    *view = (scene_view){0};
+}
 
 /**
  * Say what the transparent part of photos is; GBT_ALPHA_AUTO is white for Blender's synthetic scenes, as

@@ -325,7 +325,7 @@ static void garden_has_the_references_voxels(void **state)
     static const struct {
         float voxel_size;
         size_t count;
-    } wanted[] = {{0.001f, 132996}, {0.0052808182f, 115131}};
+    } wanted[] = {{0.001f, 132996}, {0.00528082391f, 115131}};
     cloud c = cloud_garden();
     if (c.position == NULL)
         skip();

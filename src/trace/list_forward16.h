@@ -113,7 +113,8 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     uint64_t hits = 0, blended = 0;
     size_t kept = tape != NULL ? tape->count : 0;
     packet_extra extra;
-    start_extra(&extra);
+    if (scene->extra)
+        start_extra(&extra);
     if (tape != NULL &&
         mem_reserve((void **)&tape->entries, &tape->capacity, tape->count, tape->count + rows->count + 1,
                     sizeof *tape->entries, "hit tape", NULL) != GBT_OK)
@@ -151,7 +152,8 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
         vfloat16_store(out->rgb[c],
                        vfloat16_fma(lowest, vfloat16_set1(scene->settings.background[c]), rgb[c]));
     vfloat16_store(out->transmittance, lowest);
-    store_extra(&extra, out);
+    if (scene->extra)
+        store_extra(&extra, out);
     return true;
 }
 

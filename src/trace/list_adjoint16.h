@@ -47,32 +47,44 @@ static bool load_used(const kernel_scene *scene, const list_view *view, size_t t
     return true;
 }
 
-/* Evaluate the rows of a packet again. */
+/* Evaluate the rows of a packet again, in the order of the tape, and find T of all of them. */
 static void replay_list(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
-                        const list_rays *seen, const tape_entry *entry, size_t count, const vfloat16 d_rgb[3],
-                        list_rows *out)
+                        const list_rays *seen, const tape_entry *entry, size_t count, list_rows *out)
 {
-    const list_rows copy = *out, *const rows = &copy; /* what stores cannot change */
+    out->count = count;
+    const list_rows rows = *out; /* what stores cannot change */
     const list_row *used_row = used->row;
     const uint32_t *used_number = used->number;
     const vfloat16 a = vfloat16_load(seen->a), b = vfloat16_load(seen->b),
                    length = vfloat16_load(seen->length), alpha_max = vfloat16_set1(scene->settings.alpha_max);
-    out->count = count;
-    for (size_t i = 0; i < count; i++) {
-        const uint32_t number = used_number[entry[i].id];
-        const list_row *g = &used_row[number];
-        const vmask16 blended = vmask16_from_bits(entry[i].lanes);
-        const row_response r =
-            g->pair & ROW_GENERAL ? respond_general(scene, rays, g->id) : respond_in_list(g, a, b, length);
-        const vfloat16 alpha = vfloat16_select(blended, vfloat16_min(r.raw, alpha_max), vfloat16_set1(0));
-        row_store(rows->t, (int)i, r.t);
-        row_store(rows->alpha, (int)i, alpha);
-        rows->order[i] = (uint32_t)i; /* the tape's */
-        row_store(rows->color, (int)i, dot_lanes(g->color, d_rgb));
-        row_store(rows->inverse, (int)i, r.inverse);
-        rows->number[i] = number;
-        rows->lanes[i] = entry[i].lanes;
+    insertion s = start_insertion();
+    for (size_t first = 0; first < count; first += TOGETHER) {
+        const list_row *g[TOGETHER];
+        row_response r[TOGETHER];
+        uint32_t number[TOGETHER], general = 0;
+        for (size_t k = 0; k < TOGETHER; k++) {
+            number[k] = used_number[entry[first + k < count ? first + k : first].id];
+            g[k] = &used_row[number[k]];
+            general |= g[k]->pair;
+        }
+        respond_together(g, a, b, length, r);
+        if (general & ROW_GENERAL)
+            for (size_t k = 0; k < TOGETHER; k++)
+                if (g[k]->pair & ROW_GENERAL)
+                    r[k] = respond_general(scene, rays, g[k]->id);
+        for (size_t k = 0; k < TOGETHER && first + k < count; k++) {
+            const int i = (int)(first + k);
+            const vfloat16 alpha = vfloat16_select(vmask16_from_bits(entry[i].lanes),
+                                                   vfloat16_min(r[k].raw, alpha_max), vfloat16_set1(0));
+            row_store(rows.t, i, r[k].t);
+            row_store(rows.alpha, i, alpha);
+            row_store(rows.inverse, i, r[k].inverse);
+            rows.order[i] = (uint32_t)i;
+            rows.number[i] = number[k];
+            insert_row(&rows, &s, i, r[k].t, alpha);
+        }
     }
+    end_insertion(out, &s);
 }
 
 /* Row i goes on past `other`: what lies behind is added to the one in front. */
@@ -84,7 +96,8 @@ static inline void pass_on(const near_row *now, near_row *other, vfloat16 *sum)
 }
 
 /* Row i goes on past row j and those after it, too; returned is what lies behind it from there on. */
-static vfloat16 step_on(list_rows *rows, const near_row *now, vmask16 hit, int j)
+static inline __attribute__((always_inline)) vfloat16 step_on(const list_rows *rows, const near_row *now,
+                                                              vmask16 hit, int j)
 {
     const vfloat16 zero = vfloat16_set1(0);
     vfloat16 sum = zero;
@@ -101,10 +114,13 @@ static vfloat16 step_on(list_rows *rows, const near_row *now, vmask16 hit, int j
 /* What lies behind every hit, with the background: from the last row to the first, as T was found from the
    first to the last. `before` and `reached` are used again: sum of the terms of a row and those after it,
    their nearest hits. Only sums of what has been added, so nothing cancels. */
-static void collect_behind(list_rows *out, vfloat16 background)
+static void collect_behind(list_rows *out, const used_list *used, const vfloat16 d_rgb[3],
+                           vfloat16 background)
 {
     const list_rows copy = *out, *const rows = &copy; /* what stores cannot change */
     const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0);
+    const list_row *used_row = used->row;
+    const vfloat16 direction[3] = {d_rgb[0], d_rgb[1], d_rgb[2]};
     const int count = (int)rows->count;
     near_row next = {infinite, zero, zero, zero}, second = next;
     vfloat16 after[3] = {background, background, background}, nearest[3] = {infinite, infinite, infinite};
@@ -113,7 +129,8 @@ static void collect_behind(list_rows *out, vfloat16 background)
     for (int i = count; i-- > 0;) {
         const vfloat16 alpha = row_load(rows->alpha, i);
         near_row now = {.t = row_load(rows->t, i), .clear = zero};
-        now.term = vfloat16_mul(vfloat16_mul(row_load(rows->through, i), alpha), row_load(rows->color, i));
+        now.term = vfloat16_mul(vfloat16_mul(row_load(rows->through, i), alpha),
+                                dot_lanes(used_row[rows->number[i]].color, direction));
         const vmask16 hit = vfloat16_lt(zero, alpha);
         vfloat16 sum = zero;
         row_store(rows->term, i, now.term);
@@ -121,7 +138,7 @@ static void collect_behind(list_rows *out, vfloat16 background)
         pass_on(&now, &second, &sum);
         now.value = vfloat16_add(after[2], sum);
         if (vmask16_any(vmask16_and(vfloat16_lt(nearest[2], now.t), hit)))
-            now.value = vfloat16_add(step_on(out, &now, hit, i + 3), sum);
+            now.value = vfloat16_add(step_on(rows, &now, hit, i + 3), sum);
         row_store(rows->behind, i + 2, second.value);
         second = next;
         next = now;
@@ -139,10 +156,15 @@ static void collect_behind(list_rows *out, vfloat16 background)
 }
 
 /* The same ray by ray. False when memory ran out. */
-static bool collect_behind_by_ray(list_rows *rows, vfloat16 background, list_scratch *scratch)
+static bool collect_behind_by_ray(list_rows *rows, const used_list *used, const vfloat16 d_rgb[3],
+                                  vfloat16 background, list_scratch *scratch)
 {
     _Alignas(64) float last[PACKET_LANES];
     vfloat16_store(last, background);
+    for (int i = 0; i < (int)rows->count; i++)
+        row_store(rows->term, i,
+                  vfloat16_mul(vfloat16_mul(row_load(rows->through, i), row_load(rows->alpha, i)),
+                               dot_lanes(used->row[rows->number[i]].color, d_rgb)));
     for (int lane = 0; lane < PACKET_LANES; lane++) {
         size_t count;
         const ray_hit *hits = sort_lane(rows, lane, scratch, &count);
@@ -152,153 +174,126 @@ static bool collect_behind_by_ray(list_rows *rows, vfloat16 background, list_scr
         for (size_t k = count; k-- > 0;) {
             const size_t at = (size_t)(uint32_t)hits[k].key * PACKET_LANES + (size_t)lane;
             rows->behind[at] = behind;
-            behind += rows->through[at] * rows->alpha[at] * rows->color[at];
+            behind += rows->term[at];
         }
     }
     return true;
 }
 
-/* h = dL/d(d2) into `behind`, the weight into `term`. */
-static void find_row_gradients(const kernel_scene *scene, const list_rows *from)
+/* h = dL/d(d2) of a row, and the weight T alpha. alpha = min(alpha_max, o G): from the cap on nothing but
+   the colour has a gradient. */
+static inline void row_gradients(const list_rows *rows, int i, vfloat16 alpha_max, vfloat16 *h,
+                                 vfloat16 *weight)
 {
-    const list_rows copy = *from, *const rows = &copy; /* what stores cannot change */
-    const vfloat16 alpha_max = vfloat16_set1(scene->settings.alpha_max), zero = vfloat16_set1(0);
-    for (size_t i = 0; i < rows->count; i++) {
-        const int at = (int)i;
-        const vfloat16 T = row_load(rows->through, at), alpha = row_load(rows->alpha, at);
-        const vfloat16 d_alpha =
-            vfloat16_sub(vfloat16_mul(T, row_load(rows->color, at)),
-                         vfloat16_div(row_load(rows->behind, at), vfloat16_sub(vfloat16_set1(1), alpha)));
-        /* alpha = min(alpha_max, o G): from the cap on nothing but the colour has a gradient. */
-        const vmask16 moves = vmask16_and(vfloat16_lt(zero, alpha), vfloat16_lt(alpha, alpha_max));
-        row_store(
-            rows->behind, at,
-            vfloat16_select(moves, vfloat16_mul(vfloat16_mul(vfloat16_set1(-0.5f), alpha), d_alpha), zero));
-        row_store(rows->term, at, vfloat16_mul(T, alpha));
-    }
+    const vfloat16 alpha = row_load(rows->alpha, i),
+                   share = vfloat16_div(alpha, vfloat16_sub(vfloat16_set1(1), alpha));
+    const vfloat16 d_log = vfloat16_fnma(share, row_load(rows->behind, i), row_load(rows->term, i));
+    *h = vfloat16_select(vfloat16_lt(alpha, alpha_max), vfloat16_mul(vfloat16_set1(-0.5f), d_log),
+                         vfloat16_set1(0));
+    *weight = vfloat16_mul(row_load(rows->through, i), alpha);
 }
 
-/* The sums of rows first .. first + 15 over the rays, a Gaussian per lane: no lane has to be added to
-   another. v = R / den z, z = (y, w1 w2, w1 w3); R and the sign of the first come later (turn_sums). */
-static void sum_sixteen(const used_list *used, const list_rows *rows, size_t first, const list_rays *seen,
-                        float d_rgb[3][PACKET_LANES], gradient_slot *sums)
+/* The sums of a row over the rays, to those of its Gaussian. */
+static inline void add_sums(vfloat16 h, vfloat16 weight, const vfloat16 v[3], const vfloat16 d_rgb[3],
+                            float *to)
 {
-    const float *row[16], *h_row[16], *weight_row[16], *inverse_row[16];
-    vfloat16 field[16], h[16], weight[16], inverse[16], sum[16];
-    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0);
-    for (size_t i = 0; i < 16; i++) {
-        const size_t at = first + i < rows->count ? first + i : first;
-        row[i] = (const float *)(const void *)&used->row[rows->number[at]];
-        h_row[i] = rows->behind + at * PACKET_LANES;
-        weight_row[i] = rows->term + at * PACKET_LANES;
-        inverse_row[i] = rows->inverse + at * PACKET_LANES;
-    }
-    vfloat16_load_turned(row, field);
-    vfloat16_load_turned(h_row, h);
-    vfloat16_load_turned(weight_row, weight);
-    vfloat16_load_turned(inverse_row, inverse);
-    for (int k = 0; k < 16; k++)
-        sum[k] = zero;
-    for (int ray = 0; ray < PACKET_LANES; ray++) {
-        const vfloat16 da = vfloat16_sub(vfloat16_set1(seen->a[ray]), field[0]),
-                       db = vfloat16_sub(vfloat16_set1(seen->b[ray]), field[1]);
-        const vfloat16 w1 = vfloat16_fma(field[2], da, vfloat16_fma(field[3], db, one)),
-                       w2 = vfloat16_fma(field[4], da, vfloat16_mul(field[5], db)),
-                       w3 = vfloat16_mul(field[6], db);
-        const vfloat16 y = vfloat16_fma(w2, w2, vfloat16_mul(w3, w3));
-        const vfloat16 z[3] = {y, vfloat16_mul(w1, w2), vfloat16_mul(w1, w3)},
-                       once = vfloat16_mul(h[ray], inverse[ray]), twice = vfloat16_mul(once, inverse[ray]);
-        const vfloat16 p[3] = {vfloat16_mul(twice, z[0]), vfloat16_mul(twice, z[1]),
-                               vfloat16_mul(twice, z[2])};
-        sum[SLOT_H] = vfloat16_add(sum[SLOT_H], h[ray]);
-        for (int k = 0; k < 3; k++) {
-            sum[SLOT_HV + k] = vfloat16_fma(once, z[k], sum[SLOT_HV + k]);
-            sum[SLOT_HVV + k] = vfloat16_fma(p[k], z[k], sum[SLOT_HVV + k]);
-            sum[SLOT_COLOR + k] =
-                vfloat16_fma(weight[ray], vfloat16_set1(d_rgb[k][ray]), sum[SLOT_COLOR + k]);
-        }
-        sum[SLOT_HVV + 3] = vfloat16_fma(p[1], z[2], sum[SLOT_HVV + 3]);
-        sum[SLOT_HVV + 4] = vfloat16_fma(p[2], z[0], sum[SLOT_HVV + 4]);
-        sum[SLOT_HVV + 5] = vfloat16_fma(p[0], z[1], sum[SLOT_HVV + 5]);
-        sum[SLOT_WEIGHT] = vfloat16_add(sum[SLOT_WEIGHT], weight[ray]);
-    }
-    _Alignas(64) float lane[16][16];
-    const float *lanes[16];
-    for (int k = 0; k < 16; k++) {
-        vfloat16_store(lane[k], sum[k]);
-        lanes[k] = lane[k];
-    }
-    vfloat16_load_turned(lanes, sum);
-    for (size_t i = 0; i < 16 && first + i < rows->count; i++) {
-        const uint32_t number = rows->number[first + i];
-        float *to = sums[number].sum;
-        if ((used->row[number].pair & ROW_GENERAL) == 0)
-            vfloat16_store(to, vfloat16_add(vfloat16_load(to), sum[i]));
-    }
-}
-
-/* A row that the form does not hold for. */
-static void sum_general(const kernel_scene *scene, const packet_rays *rays, const list_rows *rows, size_t i,
-                        uint32_t id, float d_rgb[3][PACKET_LANES], gradient_slot *out)
-{
-    const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
-    const vfloat16 t_near = vfloat16_set1(scene->settings.t_near), zero = vfloat16_set1(0);
-    ray_lanes ray;
-    vfloat16 v[3], terms[16];
-    load_rays(rays, &ray);
-    response r = respond(&g, &ray, t_near);
-    refine_point(&g, &ray, t_near, &r);
-    const vmask16 blended = vmask16_from_bits(rows->lanes[i]);
-    for (int k = 0; k < 3; k++) /* v may be more than a float holds where the ray did not hit */
-        v[k] = vfloat16_select(blended, r.v[k], zero);
-    const vfloat16 h = row_load(rows->behind, (int)i), weight = row_load(rows->term, (int)i);
-    vfloat16 hv[3];
+    vfloat16 terms[16], hv[3];
     terms[SLOT_H] = h;
     for (int k = 0; k < 3; k++) {
         terms[SLOT_HV + k] = hv[k] = vfloat16_mul(h, v[k]);
         terms[SLOT_HVV + k] = vfloat16_mul(hv[k], v[k]);
-        terms[SLOT_COLOR + k] = vfloat16_mul(weight, vfloat16_load(d_rgb[k]));
+        terms[SLOT_COLOR + k] = vfloat16_mul(weight, d_rgb[k]);
     }
     terms[SLOT_HVV + 3] = vfloat16_mul(hv[1], v[2]);
     terms[SLOT_HVV + 4] = vfloat16_mul(hv[2], v[0]);
     terms[SLOT_HVV + 5] = vfloat16_mul(hv[0], v[1]);
     terms[SLOT_WEIGHT] = weight;
-    terms[14] = terms[15] = zero;
-    vfloat16_store(out->sum, vfloat16_add(vfloat16_load(out->sum), vfloat16_sum_rows(terms)));
+    terms[14] = terms[15] = vfloat16_set1(0);
+    vfloat16_store(to, vfloat16_add(vfloat16_load(to), vfloat16_sum_rows(terms)));
+}
+
+/* A row that the form does not hold for. */
+static void sum_general(const kernel_scene *scene, const packet_rays *rays, const list_rows *rows, int i,
+                        uint32_t id, const vfloat16 d_rgb[3], float *to)
+{
+    const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
+    const vfloat16 t_near = vfloat16_set1(scene->settings.t_near), zero = vfloat16_set1(0);
+    ray_lanes ray;
+    vfloat16 v[3], h, weight;
+    load_rays(rays, &ray);
+    response r = respond(&g, &ray, t_near);
+    refine_point(&g, &ray, t_near, &r);
+    row_gradients(rows, i, vfloat16_set1(scene->settings.alpha_max), &h, &weight);
+    const vmask16 hit = vfloat16_lt(zero, row_load(rows->alpha, i));
+    for (int k = 0; k < 3; k++) /* v may be more than a float holds where the ray did not hit */
+        v[k] = vfloat16_select(hit, r.v[k], zero);
+    add_sums(h, weight, v, d_rgb, to);
+}
+
+/* The sums of all rows. v = R / den z, z = (y, w1 w2, w1 w3); R and the sign of the first come later
+   (turn_sums). */
+static void sum_rows(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
+                     const list_rays *seen, const vfloat16 direction[3], const list_rows *from,
+                     gradient_slot *sums)
+{
+    const list_rows copy = *from, *const rows = &copy; /* what stores cannot change */
+    const list_row *used_row = used->row;
+    const vfloat16 one = vfloat16_set1(1), a = vfloat16_load(seen->a), b = vfloat16_load(seen->b),
+                   alpha_max = vfloat16_set1(scene->settings.alpha_max),
+                   d_rgb[3] = {direction[0], direction[1], direction[2]};
+    for (int first = 0; first < (int)rows->count; first += TOGETHER) {
+        const list_row *g[TOGETHER];
+        vfloat16 h[TOGETHER], weight[TOGETHER], v[TOGETHER][3];
+        for (int k = 0; k < TOGETHER; k++) {
+            const int i = first + k < (int)rows->count ? first + k : first;
+            g[k] = &used_row[rows->number[i]];
+            row_gradients(rows, i, alpha_max, &h[k], &weight[k]);
+        }
+        for (int k = 0; k < TOGETHER; k++) {
+            const vfloat16 inverse = row_load(rows->inverse, first + k);
+            const vfloat16 da = vfloat16_sub(a, vfloat16_set1(g[k]->a)),
+                           db = vfloat16_sub(b, vfloat16_set1(g[k]->b));
+            const vfloat16 w1 = vfloat16_fma(vfloat16_set1(g[k]->q[0]), da,
+                                             vfloat16_fma(vfloat16_set1(g[k]->q[1]), db, one)),
+                           w2 = vfloat16_fma(vfloat16_set1(g[k]->q[2]), da,
+                                             vfloat16_mul(vfloat16_set1(g[k]->q[3]), db)),
+                           w3 = vfloat16_mul(vfloat16_set1(g[k]->q[4]), db);
+            const vfloat16 y = vfloat16_fma(w2, w2, vfloat16_mul(w3, w3)), along = vfloat16_mul(w1, inverse);
+            v[k][0] = vfloat16_mul(y, inverse);
+            v[k][1] = vfloat16_mul(along, w2);
+            v[k][2] = vfloat16_mul(along, w3);
+        }
+        for (int k = 0; k < TOGETHER && first + k < (int)rows->count; k++) {
+            float *to = sums[rows->number[first + k]].sum;
+            if (g[k]->pair & ROW_GENERAL)
+                sum_general(scene, rays, rows, first + k, g[k]->id, d_rgb, to);
+            else
+                add_sums(h[k], weight[k], v[k], d_rgb, to);
+        }
+    }
 }
 
 static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
                               const list_rays *seen, const tape_entry *entry, size_t count,
-                              float d_rgb_in[3][PACKET_LANES], float d_background[3], list_rows *rows,
+                              float d_rgb_in[3][PACKET_LANES], vfloat16 d_background[3], list_rows *rows,
                               list_scratch *scratch)
 {
     vfloat16 d_rgb[3];
     for (int c = 0; c < 3; c++)
         d_rgb[c] = vfloat16_load(d_rgb_in[c]);
-    replay_list(scene, used, rays, seen, entry, count, d_rgb, rows);
-    insert_rows(rows);
+    replay_list(scene, used, rays, seen, entry, count, rows);
     if (rows->crowded && !sort_rows_by_ray(rows, scratch))
         return false;
     const vfloat16 last = rows->product;
     const vfloat16 background = vfloat16_mul(dot_lanes(scene->settings.background, d_rgb), last);
     if (!rows->crowded)
-        collect_behind(rows, background);
-    else if (!collect_behind_by_ray(rows, background, scratch))
+        collect_behind(rows, used, d_rgb, background);
+    else if (!collect_behind_by_ray(rows, used, d_rgb, background, scratch))
         return false;
-    find_row_gradients(scene, rows);
-    for (size_t first = 0; first < count; first += 16)
-        sum_sixteen(used, rows, first, seen, d_rgb_in, scratch->sums);
-    for (size_t i = 0; i < count; i++) {
-        const list_row *g = &used->row[rows->number[i]];
-        if (g->pair & ROW_GENERAL)
-            sum_general(scene, rays, rows, i, g->id, d_rgb_in, &scratch->sums[rows->number[i]]);
-    }
-    _Alignas(64) float T[PACKET_LANES];
-    vfloat16_store(T, last);
+    sum_rows(scene, used, rays, seen, d_rgb, rows, scratch->sums);
+    const vmask16 active = vmask16_from_bits(rays->active);
     for (int c = 0; c < 3; c++)
-        for (int lane = 0; lane < PACKET_LANES; lane++)
-            if (rays->active >> lane & 1)
-                d_background[c] += T[lane] * d_rgb_in[c][lane];
+        d_background[c] = vfloat16_add_where(active, d_background[c], vfloat16_mul(last, d_rgb[c]));
     return true;
 }
 
@@ -315,6 +310,9 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t til
         !reserve_rows_of_list(scratch, used.count, true, &rows))
         return false;
     size_t at = 0;
+    vfloat16 total[16];
+    for (int k = 0; k < 16; k++)
+        total[k] = vfloat16_set1(0);
     for (int p = 0; p < TILE_PACKETS; p++) {
         const size_t from = at;
         list_rays seen;
@@ -324,9 +322,13 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t til
             at++;
         slope_rays(&view->frame, &rays->packet[p], middle, &seen);
         if (!adjoint_of_packet(scene, &used, &rays->packet[p], &seen, tape->entries + from, at - from,
-                               d_rgb[p], d_background, &rows, scratch))
+                               d_rgb[p], total, &rows, scratch))
             return false;
     }
+    _Alignas(64) float sum[16];
+    vfloat16_store(sum, vfloat16_sum_rows(total));
+    for (int c = 0; c < 3; c++)
+        d_background[c] += sum[c];
     for (size_t i = 0; i < pairs; i++) {
         if (i + AHEAD < pairs)
             __builtin_prefetch(&view->slots[view->pairs[begin + i + AHEAD].slot], 1);

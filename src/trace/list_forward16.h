@@ -34,7 +34,6 @@ static inline void append_response(const list_rows *rows, size_t *count, const l
     sight->product = vfloat16_fnma(sight->product, alpha, sight->product);
     sight->reached = vfloat16_max(sight->reached, vfloat16_select(hit, r.t, zero));
     rows->number[at] = number;
-    rows->id[at] = g->id;
     *count += vmask16_any(hit) != 0;
 }
 
@@ -49,22 +48,22 @@ static void evaluate_queue(const kernel_scene *scene, const tile_list *list, con
     const list_row *row = list->row;
     packet_sight sight = *seen_by;
     size_t count = rows.count;
-    uint32_t general = 0;
-    for (unsigned k = 0; k < take; k++)
-        general |= row[queue->number[k]].pair;
-    if ((general & ROW_GENERAL) == 0)
-        for (unsigned k = 0; k < take; k++) {
-            const list_row *g = &row[queue->number[k]];
-            append_response(&rows, &count, g, queue->number[k], respond_in_list(g, a, b, length), alpha_max,
-                            &sight);
+    for (unsigned first = 0; first < take; first += TOGETHER) {
+        const list_row *g[TOGETHER];
+        row_response r[TOGETHER];
+        uint32_t general = 0;
+        for (unsigned k = 0; k < TOGETHER; k++) {
+            g[k] = &row[queue->number[first + k < take ? first + k : take - 1]];
+            general |= g[k]->pair;
         }
-    else
-        for (unsigned k = 0; k < take; k++) {
-            const list_row *g = &row[queue->number[k]];
-            const row_response r = g->pair & ROW_GENERAL ? respond_general(scene, rays, g->id)
-                                                         : respond_in_list(g, a, b, length);
-            append_response(&rows, &count, g, queue->number[k], r, alpha_max, &sight);
-        }
+        respond_together(g, a, b, length, r);
+        if (general & ROW_GENERAL)
+            for (unsigned k = 0; k < TOGETHER; k++)
+                if (g[k]->pair & ROW_GENERAL)
+                    r[k] = respond_general(scene, rays, g[k]->id);
+        for (unsigned k = 0; k < TOGETHER && first + k < take; k++)
+            append_response(&rows, &count, g[k], queue->number[first + k], r[k], alpha_max, &sight);
+    }
     out->count = count;
     *seen_by = sight;
 }
@@ -114,7 +113,8 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     uint64_t hits = 0, blended = 0;
     size_t kept = tape != NULL ? tape->count : 0;
     packet_extra extra;
-    start_extra(&extra);
+    if (scene->extra)
+        start_extra(&extra);
     if (tape != NULL &&
         mem_reserve((void **)&tape->entries, &tape->capacity, tape->count, tape->count + rows->count + 1,
                     sizeof *tape->entries, "hit tape", NULL) != GBT_OK)
@@ -152,7 +152,8 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
         vfloat16_store(out->rgb[c],
                        vfloat16_fma(lowest, vfloat16_set1(scene->settings.background[c]), rgb[c]));
     vfloat16_store(out->transmittance, lowest);
-    store_extra(&extra, out);
+    if (scene->extra)
+        store_extra(&extra, out);
     return true;
 }
 

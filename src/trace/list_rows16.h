@@ -26,13 +26,12 @@ typedef struct list_rows {
     float *through; /* T in front of the hit; two more stand before the first */
     float *before;  /* product of 1 - alpha over all rows before this one */
     float *reached; /* farthest hit of all rows before this one */
-    /* Adjoint: g . color, T alpha g . color, and the sum of that behind, of which two more stand after the
-       last; of a row, 1 / den of its response. */
-    float *color, *term, *behind, *inverse;
-    uint32_t *order;               /* row */
-    uint32_t *number, *id, *lanes; /* of a row: number in the tile's list; Gaussian; adjoint: bit per ray that
-                                      blended it */
-    float *key;                    /* depth on a ray in the middle */
+    /* Adjoint: T alpha g . color, and the sum of that behind, of which two more stand after the last; of a
+       row, 1 / den of its response. */
+    float *term, *behind, *inverse;
+    uint32_t *order;  /* row */
+    uint32_t *number; /* of a row, in the tile's list */
+    float *key;       /* depth on a ray in the middle */
     size_t count;
     size_t steps;
     vfloat16 product; /* of 1 - alpha over all rows */
@@ -42,12 +41,12 @@ typedef struct list_rows {
 static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoint, list_rows *out)
 {
     /* Arrays 4096 bytes apart would compete for the same lines of the cache. */
-    const size_t n = ((most + 48 + 63) & ~(size_t)63) + 7, wide = n * PACKET_LANES, arrays = adjoint ? 9 : 5;
-    if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, arrays * wide + 5 * (n + 9),
+    const size_t n = ((most + 48 + 63) & ~(size_t)63) + 7, wide = n * PACKET_LANES, arrays = adjoint ? 8 : 5;
+    if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, arrays * wide + 3 * (n + 9),
                     sizeof(float), "rows of a packet", NULL) != GBT_OK)
         return false;
-    float **field[9] = {&out->t,     &out->alpha, &out->through, &out->before, &out->reached,
-                        &out->color, &out->term,  &out->behind,  &out->inverse};
+    float **field[8] = {&out->t,       &out->alpha, &out->through, &out->before,
+                        &out->reached, &out->term,  &out->behind,  &out->inverse};
     float *at = scratch->rows;
     for (size_t k = 0; k < arrays; k++, at += wide)
         *field[k] = at;
@@ -56,8 +55,6 @@ static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoin
     uint32_t *word = (uint32_t *)(void *)(at + n + 9); /* whole sixteens */
     out->order = word;
     out->number = word + n;
-    out->id = word + 2 * n;
-    out->lanes = word + 3 * n;
     return true;
 }
 
@@ -66,21 +63,35 @@ typedef struct row_response {
     vfloat16 inverse; /* 1 / den */
 } row_response;
 
-static inline row_response respond_in_list(const list_row *g, vfloat16 a, vfloat16 b, vfloat16 length)
+/* Rows whose chains of operations run beside each other: a processor does not look far enough ahead to find
+   the next row by itself. */
+enum { TOGETHER = 4 };
+
+static inline void respond_together(const list_row *const g[TOGETHER], vfloat16 a, vfloat16 b,
+                                    vfloat16 length, row_response out[TOGETHER])
 {
-    const vfloat16 da = vfloat16_sub(a, vfloat16_set1(g->a)), db = vfloat16_sub(b, vfloat16_set1(g->b));
-    const vfloat16 w1 = vfloat16_fma(vfloat16_set1(g->q[0]), da,
-                                     vfloat16_fma(vfloat16_set1(g->q[1]), db, vfloat16_set1(1))),
-                   w2 = vfloat16_fma(vfloat16_set1(g->q[2]), da, vfloat16_mul(vfloat16_set1(g->q[3]), db)),
-                   w3 = vfloat16_mul(vfloat16_set1(g->q[4]), db);
-    const vfloat16 y = vfloat16_fma(w2, w2, vfloat16_mul(w3, w3)),
-                   inverse = vfloat16_div(vfloat16_set1(1), vfloat16_fma(w1, w1, y));
-    const vfloat16 exponent = vfloat16_mul(vfloat16_set1(-g->falloff), vfloat16_mul(y, inverse));
-    return (row_response){
-        vfloat16_mul(vfloat16_mul(length, vfloat16_set1(g->depth)), vfloat16_mul(w1, inverse)),
-        vfloat16_mul(vfloat16_set1(g->opacity),
-                     vfloat16_exp2(vfloat16_max(exponent, vfloat16_set1(-120.0f)))),
-        inverse};
+    vfloat16 w1[TOGETHER], w2[TOGETHER], w3[TOGETHER], y[TOGETHER], exponent[TOGETHER];
+    const vfloat16 one = vfloat16_set1(1);
+    for (int k = 0; k < TOGETHER; k++) {
+        const vfloat16 da = vfloat16_sub(a, vfloat16_set1(g[k]->a)),
+                       db = vfloat16_sub(b, vfloat16_set1(g[k]->b));
+        w1[k] = vfloat16_fma(vfloat16_set1(g[k]->q[0]), da, vfloat16_fma(vfloat16_set1(g[k]->q[1]), db, one));
+        w2[k] = vfloat16_fma(vfloat16_set1(g[k]->q[2]), da, vfloat16_mul(vfloat16_set1(g[k]->q[3]), db));
+        w3[k] = vfloat16_mul(vfloat16_set1(g[k]->q[4]), db);
+    }
+    for (int k = 0; k < TOGETHER; k++)
+        y[k] = vfloat16_fma(w2[k], w2[k], vfloat16_mul(w3[k], w3[k]));
+    for (int k = 0; k < TOGETHER; k++)
+        out[k].inverse = vfloat16_div(one, vfloat16_fma(w1[k], w1[k], y[k]));
+    for (int k = 0; k < TOGETHER; k++) {
+        exponent[k] =
+            vfloat16_max(vfloat16_mul(vfloat16_set1(-g[k]->falloff), vfloat16_mul(y[k], out[k].inverse)),
+                         vfloat16_set1(-120.0f));
+        out[k].t = vfloat16_mul(vfloat16_mul(length, vfloat16_set1(g[k]->depth)),
+                                vfloat16_mul(w1[k], out[k].inverse));
+    }
+    for (int k = 0; k < TOGETHER; k++)
+        out[k].raw = vfloat16_mul(vfloat16_set1(g[k]->opacity), vfloat16_exp2(exponent[k]));
 }
 
 /* By the general form of gaussian16.h. */
@@ -95,14 +106,51 @@ static row_response respond_general(const kernel_scene *scene, const packet_rays
 
 /* Rows that are cut at the near depth on some ray come first, by index, which is how their hits at that very
    depth are ordered. Their keys are 0. */
-static void order_cut_rows(list_rows *rows)
+static void order_cut_rows(const tile_list *list, list_rows *rows)
 {
     for (size_t i = 1; i < rows->count && rows->key[rows->order[i]] == 0; i++) {
-        const uint32_t row = rows->order[i];
+        const uint32_t row = rows->order[i], id = list->row[rows->number[row]].id;
         size_t j = i;
-        for (; j > 0 && rows->id[rows->order[j - 1]] > rows->id[row]; j--)
+        for (; j > 0 && list->row[rows->number[rows->order[j - 1]]].id > id; j--)
             rows->order[j] = rows->order[j - 1];
         rows->order[j] = row;
+    }
+}
+
+static inline vfloat16 count_where(vmask16 m, vfloat16 count)
+{
+    return vfloat16_add_where(m, count, vfloat16_set1(1));
+}
+
+/* order[place] = number of the key that comes there: as many keys are smaller, or equal and before it. Keys
+   are finite; room for 16 more is overwritten. */
+static void rank_rows(float *key, size_t count, uint32_t *order)
+{
+    const vfloat16 zero = vfloat16_set1(0);
+    for (size_t i = count; i < count + 16; i++)
+        key[i] = INFINITY;
+    for (size_t first = 0; first < count; first += 16) {
+        _Alignas(64) float place[16];
+        const vfloat16 mine = vfloat16_load(key + first);
+        vfloat16 before[4] = {zero, zero, zero, zero};
+        for (size_t i = 0; i < first; i += 4)
+            for (int k = 0; k < 4; k++)
+                before[k] = count_where(vfloat16_le(vfloat16_set1(key[i + k]), mine), before[k]);
+        for (size_t i = first + 16; i < count; i += 4)
+            for (int k = 0; k < 4; k++)
+                before[k] = count_where(vfloat16_lt(vfloat16_set1(key[i + k]), mine), before[k]);
+        for (size_t i = 0; i < 16; i += 4)
+            for (int k = 0; k < 4; k++) {
+                const vfloat16 other = vfloat16_set1(key[first + i + k]);
+                const vmask16 later = vmask16_from_bits(0xFFFEu << (i + k) & 0xFFFF);
+                before[k] = count_where(
+                    vmask16_or(vfloat16_lt(other, mine), vmask16_and(vfloat16_le(other, mine), later)),
+                    before[k]);
+            }
+        vfloat16_store(place,
+                       vfloat16_add(vfloat16_add(before[0], before[1]), vfloat16_add(before[2], before[3])));
+        for (size_t k = 0; k < 16 && first + k < count; k++)
+            order[(size_t)place[k]] = (uint32_t)(first + k);
     }
 }
 
@@ -113,27 +161,26 @@ static void order_by_middle(const tile_list *list, float t_near, list_rows *rows
     enum { MIDDLE = PACKET_PIXELS + 1, FEW = 256 };
     const size_t count = rows->count;
     bool cut = false;
-    for (size_t i = 0; i < count; i++)
-        rows->key[i] = rows->t[i * PACKET_LANES + MIDDLE];
+    for (size_t i = 0; i < count; i++) {
+        const float t = rows->t[i * PACKET_LANES + MIDDLE];
+        rows->key[i] = t < FLT_MAX ? t : FLT_MAX; /* NaN, too */
+    }
     for (size_t i = 0; list->any_general && i < count; i++) {
         const bool first = vmask16_any(vfloat16_le(row_load(rows->t, (int)i), vfloat16_set1(t_near)));
-        if (first || !(rows->key[i] < FLT_MAX)) /* NaN: no hit there */
+        if (first || rows->key[i] == FLT_MAX) /* no hit there */
             rows->key[i] = 0;
         cut = cut || rows->key[i] == 0;
     }
-    if (count <= FEW) {
-        uint16_t order[FEW];
-        rank_keys(rows->key, (int)count, order);
-        for (size_t i = 0; i < count; i++)
-            rows->order[i] = order[i];
-    } else { /* in the place of arrays that are not yet set */
+    if (count <= FEW)
+        rank_rows(rows->key, count, rows->order);
+    else { /* in the place of arrays that are not yet set */
         const uint64_t *order =
             sort_list(rows->key, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
         for (size_t i = 0; i < count; i++)
             rows->order[i] = (uint32_t)order[i];
     }
     if (cut)
-        order_cut_rows(rows);
+        order_cut_rows(list, rows);
 }
 
 /* A row whose neighbours in the order may still change its value: T, or the sum of what lies behind. */
@@ -151,13 +198,10 @@ static inline void pass_row(vfloat16 t, vfloat16 clear, near_row *other, vfloat1
 }
 
 /* Row i goes back past those before j, too; returned is its T. */
-static vfloat16 step_back(list_rows *rows, int i, int j)
+static inline __attribute__((always_inline)) vfloat16 step_back(const list_rows *rows, const near_row *now,
+                                                                vmask16 hit, int j, size_t *steps)
 {
-    const vfloat16 zero = vfloat16_set1(0), one = vfloat16_set1(1);
-    const int row = (int)rows->order[i];
-    const vfloat16 t = row_load(rows->t, row), alpha = row_load(rows->alpha, row),
-                   clear = vfloat16_sub(one, alpha);
-    const vmask16 hit = vfloat16_lt(zero, alpha);
+    const vfloat16 one = vfloat16_set1(1), t = now->t, clear = now->clear;
     vfloat16 product = one;
     const int from = j;
     do {
@@ -167,51 +211,74 @@ static vfloat16 step_back(list_rows *rows, int i, int j)
         product = vfloat16_mul(product,
                                vfloat16_select(front, one, vfloat16_sub(one, row_load(rows->alpha, other))));
     } while (vmask16_any(vmask16_and(vfloat16_lt(t, row_load(rows->reached, j)), hit)));
-    rows->steps += (size_t)(from - j);
+    *steps += (size_t)(from - j);
     return vfloat16_mul(row_load(rows->before, j), product);
 }
 
-/* Find T of all rows. Each goes back past the last two without asking, because a branch that cannot be
-   foretold costs more. */
+/* The end of the rows so far, for the next one. */
+typedef struct insertion {
+    near_row last, second;
+    vfloat16 before, before1, before2;    /* product of 1 - alpha before the next row, the last, the second */
+    vfloat16 reached, reached1, reached2; /* farthest hit there */
+    size_t steps;
+    bool crowded;
+} insertion;
+
+static inline insertion start_insertion(void)
+{
+    const vfloat16 zero = vfloat16_set1(0), one = vfloat16_set1(1);
+    const near_row none = {zero, one, zero, one};
+    return (insertion){none, none, one, one, one, zero, zero, zero, 0, false};
+}
+
+/* Row i of the order: T in front of its hits, and in front of those that they hide. Each goes back past the
+   last two without asking, because a branch that cannot be foretold costs more. `rows` is a copy of `out`,
+   so that compilers know what stores cannot change. */
+static inline void insert_row(const list_rows *rows, insertion *s, int i, vfloat16 t, vfloat16 alpha)
+{
+    const vfloat16 zero = vfloat16_set1(0), one = vfloat16_set1(1);
+    near_row now = {.t = t, .clear = vfloat16_sub(one, alpha), .term = zero};
+    const vmask16 hit = vfloat16_lt(zero, alpha);
+    vfloat16 product = one;
+    row_store(rows->before, i, s->before);
+    row_store(rows->reached, i, s->reached);
+    pass_row(now.t, now.clear, &s->last, &product);
+    pass_row(now.t, now.clear, &s->second, &product);
+    now.value = vfloat16_mul(s->before2, product);
+    if (vmask16_any(vmask16_and(vfloat16_lt(now.t, s->reached2), hit)) && !s->crowded) {
+        now.value = vfloat16_mul(step_back(rows, &now, hit, i - 2, &s->steps), product);
+        s->crowded = s->steps > STEPS_PER_ROW * (size_t)i + STEPS_FREE;
+    }
+    row_store(rows->through, i - 2, s->second.value);
+    s->second = s->last;
+    s->last = now;
+    s->before2 = s->before1;
+    s->before1 = s->before;
+    s->before = vfloat16_mul(s->before, now.clear);
+    s->reached2 = s->reached1;
+    s->reached1 = s->reached;
+    s->reached = vfloat16_max(s->reached, vfloat16_select(hit, now.t, zero));
+}
+
+static inline void end_insertion(list_rows *out, const insertion *s)
+{
+    const int end = (int)out->count;
+    row_store(out->through, end - 2, s->second.value);
+    row_store(out->through, end - 1, s->last.value);
+    out->product = s->before;
+    out->steps = s->steps;
+    out->crowded = s->crowded;
+}
+
 static void insert_rows(list_rows *out)
 {
-    const list_rows copy = *out, *const rows = &copy; /* what stores cannot change */
-    const vfloat16 zero = vfloat16_set1(0), one = vfloat16_set1(1);
-    const int end = (int)rows->count;
-    near_row last = {zero, one, zero, one}, second = last;
-    vfloat16 before[3] = {one, one, one},
-             reached[3] = {zero, zero, zero}; /* of this row, the last, the second */
-    bool crowded = false;
-    out->steps = 0;
-    for (int i = 0; i < end; i++) {
-        const int row = (int)rows->order[i];
-        const vfloat16 alpha = row_load(rows->alpha, row);
-        near_row now = {.t = row_load(rows->t, row), .clear = vfloat16_sub(one, alpha), .term = zero};
-        const vmask16 hit = vfloat16_lt(zero, alpha);
-        vfloat16 product = one;
-        row_store(rows->before, i, before[0]);
-        row_store(rows->reached, i, reached[0]);
-        pass_row(now.t, now.clear, &last, &product);
-        pass_row(now.t, now.clear, &second, &product);
-        now.value = vfloat16_mul(before[2], product);
-        if (vmask16_any(vmask16_and(vfloat16_lt(now.t, reached[2]), hit)) && !crowded) {
-            now.value = vfloat16_mul(step_back(out, i, i - 2), product);
-            crowded = out->steps > STEPS_PER_ROW * (size_t)i + STEPS_FREE;
-        }
-        row_store(rows->through, i - 2, second.value);
-        second = last;
-        last = now;
-        for (int k = 2; k > 0; k--) {
-            before[k] = before[k - 1];
-            reached[k] = reached[k - 1];
-        }
-        before[0] = vfloat16_mul(before[0], now.clear);
-        reached[0] = vfloat16_max(reached[0], vfloat16_select(hit, now.t, zero));
+    const list_rows rows = *out;
+    insertion s = start_insertion();
+    for (int i = 0; i < (int)rows.count; i++) {
+        const int row = (int)rows.order[i];
+        insert_row(&rows, &s, i, row_load(rows.t, row), row_load(rows.alpha, row));
     }
-    row_store(rows->through, end - 2, second.value);
-    row_store(rows->through, end - 1, last.value);
-    out->product = before[0];
-    out->crowded = crowded;
+    end_insertion(out, &s);
 }
 
 /* The hits of one ray in their order, in scratch, each with its place; NULL when memory ran out. */

@@ -13,6 +13,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
+#include "trace/triples.h"
 
 enum { TILE_PIXELS = TILE_ACROSS * PACKET_PIXELS, RECORD_BLOCK = 2048 };
 
@@ -195,20 +196,24 @@ static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
 /* The common case: pixels in the image, rays from one point, nothing in their way. */
 static void load_whole_packet(const ray_image *rays, size_t first, packet_rays *p)
 {
+    const float *o = rays->origin;
+    const bool here = fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f;
+    const four_ints lane_bits = {1, 2, 4, 8};
+    four_ints sound = {0, 0, 0, 0};
     for (int row = 0; row < PACKET_PIXELS; row++) {
-        const float *d = rays->dir + 3 * (first + (size_t)row * (size_t)rays->width);
-        for (int i = 0; i < PACKET_PIXELS; i++)
-            for (int axis = 0; axis < 3; axis++)
-                p->dir[axis][PACKET_PIXELS * row + i] = d[3 * i + axis];
+        four_floats d[3];
+        load_triples(rays->dir + 3 * (first + (size_t)row * (size_t)rays->width), d);
+        for (int axis = 0; axis < 3; axis++)
+            four_store(p->dir[axis] + PACKET_PIXELS * row, d[axis]);
+        const four_floats square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]; /* as ray_is_sound */
+        sound |= (square > 0.99f) & (square < 1.01f) & (lane_bits << (PACKET_PIXELS * row));
     }
     for (int axis = 0; axis < 3; axis++)
         for (int lane = 0; lane < PACKET_LANES; lane++)
-            p->origin[axis][lane] = rays->origin[axis];
-    for (int lane = 0; lane < PACKET_LANES; lane++) {
-        const float d[3] = {p->dir[0][lane], p->dir[1][lane], p->dir[2][lane]};
+            p->origin[axis][lane] = o[axis];
+    for (int lane = 0; lane < PACKET_LANES; lane++)
         p->far[lane] = INFINITY;
-        p->active |= (unsigned)ray_is_sound(d, rays->origin) << lane;
-    }
+    p->active = here ? (unsigned)(sound[0] | sound[1] | sound[2] | sound[3]) : 0;
 }
 
 /* Rays of the tile whose first pixel is (x0, y0); lanes outside the image or without a ray are not active. */
@@ -265,10 +270,10 @@ static void store_pixel(const pass *p, size_t at, const packet_output *o, int la
 static void store_colors(const pass *p, size_t first, const packet_output *o)
 {
     for (int row = 0; row < PACKET_PIXELS; row++) {
-        float *to = p->out.rgb->pixels + 3 * (first + (size_t)row * (size_t)p->rays->width);
-        for (int i = 0; i < PACKET_PIXELS; i++)
-            for (int c = 0; c < 3; c++)
-                to[3 * i + c] = o->rgb[c][PACKET_PIXELS * row + i];
+        four_floats rgb[3];
+        for (int c = 0; c < 3; c++)
+            rgb[c] = four_load(o->rgb[c] + PACKET_PIXELS * row);
+        store_triples(rgb, p->out.rgb->pixels + 3 * (first + (size_t)row * (size_t)p->rays->width));
     }
 }
 
@@ -327,17 +332,17 @@ static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x
 static void load_gradients(const pass *p, size_t first, float d_rgb[3][PACKET_LANES])
 {
     for (int row = 0; row < PACKET_PIXELS; row++) {
-        const float *d = p->d_rgb->pixels + 3 * (first + (size_t)row * (size_t)p->rays->width);
-        for (int i = 0; i < PACKET_PIXELS; i++)
-            for (int c = 0; c < 3; c++)
-                d_rgb[c][PACKET_PIXELS * row + i] = d[3 * i + c];
+        four_floats d[3];
+        load_triples(p->d_rgb->pixels + 3 * (first + (size_t)row * (size_t)p->rays->width), d);
+        for (int c = 0; c < 3; c++)
+            four_store(d_rgb[c] + PACKET_PIXELS * row, d[c]);
     }
 }
 
 static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x0, int y0,
                           tile_scratch *scratch)
 {
-    _Alignas(64) float d_rgb[TILE_PACKETS][3][PACKET_LANES] = {0};
+    _Alignas(64) float d_rgb[TILE_PACKETS][3][PACKET_LANES];
     for (int packet = 0; packet < TILE_PACKETS; packet++) {
         size_t first;
         if (packet_pixel(p->rays, x0, y0, packet, &first) &&
@@ -345,6 +350,7 @@ static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int 
             load_gradients(p, first, d_rgb[packet]);
             continue;
         }
+        memset(d_rgb[packet], 0, sizeof d_rgb[packet]);
         for (int lane = 0; lane < PACKET_LANES; lane++) {
             size_t at;
             if (!lane_pixel(p->rays, x0, y0, packet, lane, &at))

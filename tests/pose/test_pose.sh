@@ -109,7 +109,7 @@ chmod +x tools/colmap
 
 export FALSE_COLMAP=feature_extractor-fails
 says "features fail: what it said, and the log" 4 "^error: colmap: failed (code 1): ERROR: no space left (log: fails/colmap/features.log)" pose "my photos" -o fails
-grep -q no space fails/colmap/features.log && [ ! -e fails/sparse ]
+grep -q 'no space' fails/colmap/features.log && [ ! -e fails/sparse ]
 report $? "the log has it, and there is no model" "$(ls -R fails)"
 export FALSE_COLMAP=mapper-fails
 says "mapping fails" 4 "^error: colmap: failed (code 1): ERROR: no space left" pose "my photos" -o fails
@@ -139,14 +139,14 @@ report $? "train reads it" "$(cat err)"
 
 # ---- a signal is passed on, and the next run goes on where the last one was
 export FALSE_COLMAP=exhaustive_matcher-hangs
-PATH=$tools "$program" pose "my photos" -o stopped >out 2>err </dev/null &
+PATH=$tools "$program" pose "my photos" -o stopped >out_stopped 2>err_stopped </dev/null &
 gbtrace=$!
 while [ ! -e tools/hanging ] && kill -0 $gbtrace 2>/dev/null; do sleep 0.1; done
 says "two in one folder" 4 "^error: stopped: another process works in it" pose "my photos" -o stopped
 kill -INT $gbtrace
 wait $gbtrace
 [ $? = 130 ] && [ -e tools/interrupted ] && [ ! -e stopped/sparse ]
-report $? "SIGINT reaches colmap; 130" "$(cat err)"
+report $? "SIGINT reaches colmap; 130" "$(cat err_stopped)"
 export FALSE_COLMAP=
 : >tools/calls
 says "the same command goes on" 0 "^stopped: 5 of 5 photos registered" pose "my photos" -o stopped
@@ -154,7 +154,7 @@ says "the same command goes on" 0 "^stopped: 5 of 5 photos registered" pose "my 
 report $? "finished stages are skipped" "$(cat tools/calls)"
 rm -f tools/hanging
 export FALSE_COLMAP=mapper-hangs
-PATH=$tools "$program" pose "my photos" -o killed >out 2>err </dev/null &
+PATH=$tools "$program" pose "my photos" -o killed >out_killed 2>err_killed </dev/null &
 gbtrace=$!
 while [ ! -e tools/hanging ] && kill -0 $gbtrace 2>/dev/null; do sleep 0.1; done
 kill -KILL $gbtrace

@@ -39,6 +39,7 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "colmap, ffmpeg")
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
 # Change log, copyright, and the place of zsh's completion, for a tree that goes into /usr.
 foreach(file changelog copyright install.cmake)

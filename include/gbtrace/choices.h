@@ -69,6 +69,25 @@ typedef enum gbt_preset {
 typedef enum gbt_split { GBT_SPLIT_TEST, GBT_SPLIT_TRAIN, GBT_SPLIT_ALL } gbt_split;
 #define GBT_SPLIT_NAMES "test|train|all"
 
+/** The lens that COLMAP fits to photos. */
+typedef enum gbt_pose_camera {
+    GBT_POSE_CAMERA_AUTO, /* SIMPLE_RADIAL; OPENCV where many photos share a camera */
+    GBT_POSE_CAMERA_PINHOLE,
+    GBT_POSE_CAMERA_SIMPLE_RADIAL,
+    GBT_POSE_CAMERA_OPENCV,
+    GBT_POSE_CAMERA_OPENCV_FISHEYE
+} gbt_pose_camera;
+#define GBT_POSE_CAMERA_NAMES "auto|PINHOLE|SIMPLE_RADIAL|OPENCV|OPENCV_FISHEYE"
+
+/** Which pairs of photos are matched. */
+typedef enum gbt_pose_matcher {
+    GBT_POSE_MATCHER_AUTO,
+    GBT_POSE_MATCHER_EXHAUSTIVE, /* all */
+    GBT_POSE_MATCHER_SEQUENTIAL, /* those that follow each other by name, and some farther apart */
+    GBT_POSE_MATCHER_SPATIAL     /* those that GPS puts near each other */
+} gbt_pose_matcher;
+#define GBT_POSE_MATCHER_NAMES "auto|exhaustive|sequential|spatial"
+
 /** Files of pictures. */
 typedef enum gbt_picture_format {
     GBT_PICTURE_PNG,

@@ -70,6 +70,15 @@ typedef struct image_names {
  */
 gbt_status image_read_raw(const char *path, image *out, image_names *names, gbt_error *err);
 
+/** What EXIF says of the camera that took a photo. */
+typedef struct image_lens {
+    char camera[128]; /* make and model; empty when it says nothing */
+    float focal;      /* millimetres; 0: unknown */
+} image_lens;
+
+/** Reads the whole file and decodes no pixel. Errors as of image_read(). */
+gbt_status image_lens_read(const char *path, image_lens *out, gbt_error *err);
+
 /**
  * Write atomically (temporary name in the same folder, then rename). PNG: 8 bit, floor(clamp(x) * 255 + 0.5).
  * EXR: 32-bit float. By extension.

@@ -42,7 +42,7 @@ const char *command_nearest(const char *typed, const char *const *names, int cou
 extern const command command_demo, command_info, command_init, command_train, command_eval, command_render,
     command_report, command_make_scene, command_bench, command_check_grad, command_study, command_compare,
     command_compress, command_export, command_import, command_view, command_query, command_doctor,
-    command_describe;
+    command_describe, command_pose;
 
 /** All of them, in the order of the help. */
 extern const command *const command_list[];

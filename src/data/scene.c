@@ -20,6 +20,7 @@
 #include "data/scene_photos.h"
 #include "data/split.h"
 #include "data/transforms.h"
+#include "data/unposed.h"
 
 enum { PATH_SIZE = RAW_NAME_LIMIT + 4096 };
 
@@ -191,6 +192,8 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
         return load_transforms(path, place, raw, err);
     }
     if (!file_is_folder(path))
+        GBT_TRY(unposed_check(path, err));
+    if (!file_is_folder(path))
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: not a data set (wanted a folder, a .ply or a transforms.json)", path);
     GBT_TRY(find_colmap(path, place, &ending, err));
@@ -205,6 +208,8 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
         return load_transforms(place, path, raw, err);
     }
     GBT_TRY(file_join(place, sizeof place, path, "transforms_train.json", err));
+    if (!file_exists(place))
+        GBT_TRY(unposed_check(path, err));
     if (!file_exists(place))
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: not a data set (wanted sparse/0/cameras.bin, transforms.json or "

@@ -482,6 +482,24 @@ try {
     return caught(path, GBT_ERR_INTERNAL, err);
 }
 
+extern "C" gbt_status image_lens_read(const char *path, image_lens *out, gbt_error *err)
+try {
+    *out = image_lens{};
+    opened_image o;
+    const gbt_status status = open_image(path, &o, err);
+    if (status != GBT_OK)
+        return status;
+    const OIIO::ImageSpec &spec = o.input->spec();
+    std::snprintf(out->camera, sizeof out->camera, "%s %s", spec.get_string_attribute("Make").c_str(),
+                  spec.get_string_attribute("Model").c_str());
+    if (std::strcmp(out->camera, " ") == 0)
+        out->camera[0] = '\0';
+    out->focal = spec.get_float_attribute("Exif:FocalLength", 0.0f);
+    return GBT_OK;
+} catch (...) {
+    return caught(path, GBT_ERR_INTERNAL, err);
+}
+
 extern "C" gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte_count,
                                        gbt_error *err)
 try {

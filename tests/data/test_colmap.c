@@ -777,6 +777,41 @@ static void writer_refuses(void **state)
     free(t);
 }
 
+/* What COLMAP 4 wrote (colmap4/make.py): a rig of a panorama and a pinhole camera 0.1 beside it, three
+   times. */
+static void colmap_4_rig(void **state)
+{
+    (void)state;
+    static const char *const names[3] = {"cameras", "images", "points3D"};
+    const char *root = getenv("GBT_SOURCE");
+    char paths[3][4096];
+    unsigned char *bytes[3];
+    source_file files[3];
+    for (int i = 0; i < 3; i++) {
+        snprintf(paths[i], sizeof paths[i], "%s/tests/data/colmap4/sparse/0/%s.bin",
+                 root != NULL ? root : ".", names[i]);
+        must(file_read(paths[i], &bytes[i], &files[i].size, &err));
+        files[i].name = paths[i];
+        files[i].bytes = bytes[i];
+    }
+    raw_scene raw = {0};
+    must(colmap_bin_read(&(colmap_files){files[0], files[1], files[2]}, &raw, &err));
+    assert_int_equal(raw.view_count, 6);
+    assert_int_equal(raw.point_count, 1);
+    for (size_t i = 0; i < raw.view_count; i++) {
+        const raw_view *v = &raw.views[i];
+        int camera, frame;
+        assert_int_equal(sscanf(v->name, "c%d/%d.png", &camera, &frame), 2);
+        assert_int_equal(v->camera.model,
+                         camera == 1 ? GBT_CAMERA_EQUIRECTANGULAR : GBT_CAMERA_SIMPLE_PINHOLE);
+        assert_true(fabs(v->camera.center[0] - (camera == 1 ? 0 : -0.1)) < 1e-12);
+        assert_true(fabs(v->camera.center[2] + frame) < 1e-12);
+    }
+    raw_free(&raw);
+    for (int i = 0; i < 3; i++)
+        mem_free(bytes[i]);
+}
+
 int main(void)
 {
     enum { BIN = sizeof bin_cases / sizeof bin_cases[0], TXT = sizeof txt_cases / sizeof txt_cases[0] };
@@ -785,6 +820,7 @@ int main(void)
         cmocka_unit_test(good_model),
         cmocka_unit_test(nearest_in_a_photo),
         cmocka_unit_test(duplicate_cameras),
+        cmocka_unit_test(colmap_4_rig),
         cmocka_unit_test(name_length_limit),
         cmocka_unit_test(all_models),
         cmocka_unit_test(mutations_of_binary),

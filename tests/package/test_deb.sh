@@ -26,7 +26,7 @@ check "documents" has share/doc/gbtrace/README.md
 check "files belong to root, nobody else may write" awk '$2 != "root/root" || ($1 !~ /^l/ && substr($1, 9, 1) == "w") { print; bad = 1 } END { exit bad }' "$work/contents"
 check "nothing from this machine's folders" sh -c "! grep -v ' \./usr/' '$work/contents' | grep -q ' \./.*[^/]$'"
 dpkg-deb -I "$deb" >"$work/info"
-for wanted in libc6 libstdc++6 libembree libtbb12 libopenimageio libjansson4 zlib1g libzstd1 libwebp libzip libmicrohttpd; do
+for wanted in libc6 libstdc++6 libembree libtbb12 libopenimageio libjansson4 zlib1g libzstd1 libwebp libzip libmicrohttpd libsqlite3-0; do
     check "depends on $wanted" grep -q "^ Depends:.*$wanted" "$work/info"
 done
 check "ldconfig is asked for" sh -c "dpkg-deb --ctrl-tarfile '$deb' | tar -xO ./triggers | grep -q ldconfig"

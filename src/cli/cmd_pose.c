@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* cli/cmd_pose.c -- gbtrace pose. */
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/options.h"
+#include "gbtrace/pose.h"
+
+static gbt_pose_def def;
+static const char *out;
+
+static const option *options(int *count)
+{
+    def = gbt_pose_def_default();
+    static const option rows[] = {
+        {.name = "output",
+         .short_name = 'o',
+         .kind = OPTION_STRING,
+         .value = &out,
+         .value_name = "DATA",
+         .help = "folder for the data set; the same command goes on after an interruption",
+         .required = true},
+        {.name = "frames",
+         .kind = OPTION_INT,
+         .value = &def.frames,
+         .min = 0,
+         .max = 2000,
+         .value_name = "N",
+         .help = "frames to take from a video; 0: three a second, 60 to 200"},
+        {.name = "camera-model",
+         .kind = OPTION_CHOICE,
+         .value = &def.camera_model,
+         .choices = GBT_POSE_CAMERA_NAMES,
+         .help = "the lens; auto: OPENCV for 20 photos or more of one camera, else SIMPLE_RADIAL"},
+        {.name = "matcher",
+         .kind = OPTION_CHOICE,
+         .value = &def.matcher,
+         .choices = GBT_POSE_MATCHER_NAMES,
+         .help = "which pairs are matched; auto: all, of many those near in time or by GPS"},
+        THREADS_OPTION,
+    };
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
+static int run(const operands *given)
+{
+    gbt_error err = {0};
+    const gbt_status status = gbt_pose(given->value[0], &def, out, stdout, &err);
+    if (status == GBT_OK)
+        printf(strchr(out, ' ') != NULL ? "Train: gbtrace train '%s' -o RUN\n"
+                                        : "Train: gbtrace train %s -o RUN\n",
+               out);
+    return command_failed(status, &err);
+}
+
+const command command_pose = {.name = "pose",
+                              .summary = "find the camera poses of photos or of a video, with COLMAP",
+                              .usage = "PHOTOS|VIDEO -o DATA",
+                              .options = options,
+                              .min_operands = 1,
+                              .max_operands = 1,
+                              .run = run};

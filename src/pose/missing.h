@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* pose/missing.h -- why photos were not registered. */
+#ifndef GBT_POSE_MISSING_H
+#define GBT_POSE_MISSING_H
+
+#include "pose/job.h"
+
+/** A line for each photo that is not `registered` [photo_count]: the first ones on `report` (NULL: none), all
+    in DATA/colmap/not_registered.txt. */
+gbt_status missing_report(const job *j, const bool *registered, FILE *report, gbt_error *err);
+
+#endif

@@ -1,0 +1,186 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# tests/pose/test_pose.sh -- gbtrace pose with tools that fail: a false colmap or ffmpeg stands first in PATH. What the real
+# COLMAP does is in test_known.c. Usage: test_pose.sh PROGRAM
+set -u
+program=$1
+. "$(dirname "$0")/../cli/report.sh"
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+tools=$PATH # what the program finds
+command -v python3 >/dev/null || { skip "all" "python3 is not installed"; finish; }
+
+# says NAME CODE PATTERN ARGUMENTS...: exit code; one line of error that matches, or none for code 0.
+says() {
+    name=$1
+    code=$2
+    pattern=$3
+    shift 3
+    PATH=$tools "$program" "$@" >out 2>err </dev/null
+    got=$?
+    wanted=1
+    [ "$code" = 0 ] && wanted=0
+    [ "$got" = "$code" ] && [ "$(grep -c '^error: ' err)" = "$wanted" ] && cat out err | grep -q -e "$pattern"
+    report $? "$name" "  wanted $code with $pattern
+  got    $got: $(head -c 2000 err) $(head -c 1000 out)"
+}
+
+# ---- photos, and models that the false colmap hands out
+"$program" make-scene tabletop -o five --width 80 --height 64 --views 5 --samples 1 --points 200 --quiet >out 2>err
+"$program" make-scene tabletop -o three --width 80 --height 64 --views 3 --samples 1 --points 100 --quiet >>out 2>>err
+report $? "scenes" "$(cat out err)"
+mkdir "my photos" && cp five/images/*.png "my photos/"
+
+says "no photos" 3 "^error: .*three/sparse: 0 photos (wanted 3 or more, PNG or JPEG)" pose three/sparse -o a
+says "nothing there" 4 "^error: nothing: no such file or folder" pose nothing -o a
+says "photos and data in one folder" 2 "^error: my photos: the photos are in the folder itself" pose "my photos" -o "my photos"
+says "a folder that holds another data set" 2 "^error: three/sparse: is there already (name another folder)" pose "my photos" -o three
+[ ! -e three/colmap ] && [ ! -e a ]
+report $? "and nothing was made" "$(ls three)"
+says "train names the command" 3 "^error: my photos: photos without camera poses (find them with: gbtrace pose my photos -o DATA)" train "my photos" -o run
+touch film.mp4
+says "and for a film" 3 "^error: film.mp4: a film without camera poses (find them with: gbtrace pose film.mp4 -o DATA)" train film.mp4 -o run
+
+# ---- no tools
+mkdir none
+tools=$work/none
+says "no colmap" 4 "^error: colmap: this program is needed, and is not there (Debian, Ubuntu: sudo apt-get install colmap)" pose "my photos" -o a
+tools=$work/tools:$PATH
+
+# ---- a false colmap: FALSE_COLMAP says what goes wrong, and where
+mkdir tools
+cat >tools/colmap <<'END'
+#!/usr/bin/env python3
+import os, shutil, signal, sqlite3, sys, time
+
+what = os.environ.get("FALSE_COLMAP", "")
+verb = sys.argv[1]
+given = dict(zip(sys.argv[2::2], sys.argv[3::2]))
+work = os.path.dirname(os.path.abspath(__file__))
+if "-h" in sys.argv:
+    print("  --SiftExtraction.use_gpu arg (=1)\n  --SiftMatching.use_gpu arg (=1)")
+    sys.exit(0)
+with open(work + "/calls", "a") as calls:
+    calls.write(verb + "\n")
+if what == verb + "-fails":
+    print("Processed file [1/5]\nERROR: no space left\n")
+    sys.exit(1)
+if what == verb + "-hangs":
+    def stop(*_):
+        open(work + "/interrupted", "w").close()
+        sys.exit(0)
+    signal.signal(signal.SIGINT, stop)
+    open(work + "/hanging", "w").close()
+    time.sleep(600)
+if what == verb + "-dies":
+    os.kill(os.getpid(), signal.SIGKILL)
+if verb == "feature_extractor":
+    if what == "junk":
+        open(given["--database_path"], "wb").write(b"no database at all" * 100)
+        sys.exit(0)
+    base = sqlite3.connect(given["--database_path"])
+    base.executescript("CREATE TABLE IF NOT EXISTS images(image_id INTEGER PRIMARY KEY, name TEXT UNIQUE, camera_id INTEGER, prior_tx REAL);"
+        "CREATE TABLE IF NOT EXISTS keypoints(image_id INTEGER PRIMARY KEY, rows INTEGER);"
+        "CREATE TABLE IF NOT EXISTS two_view_geometries(pair_id INTEGER PRIMARY KEY, rows INTEGER);")
+    names = open(given["--image_list_path"]).read().splitlines()
+    for i, name in enumerate(names):
+        base.execute("INSERT OR IGNORE INTO images(name, camera_id) VALUES (?, 1)", (name,))
+        base.execute("INSERT OR REPLACE INTO keypoints VALUES ((SELECT image_id FROM images WHERE name = ?), 500)", (name,))
+        print("Processed file [%d/%d]" % (i + 1, len(names)))
+    base.commit()
+elif verb == "exhaustive_matcher":
+    base = sqlite3.connect(given["--database_path"])
+    base.execute("INSERT OR REPLACE INTO two_view_geometries VALUES (?, 77)", (1 * 2147483647 + 4,))
+    base.commit()
+    print("Matching block [1/1, 1/1] in 0.1s")
+elif verb == "mapper":
+    if what == "no-start":
+        print("ERROR: failed to create sparse model")
+        sys.exit(1)
+    models = given["--output_path"]
+    for i, scene in enumerate(["three"] if what == "few" else ["three", "five"]):
+        shutil.copytree(work + "/../" + scene + "/sparse/0", "%s/%d" % (models, i))
+    if what == "garbage":
+        open(models + "/0/images.bin", "wb").write(b"garbage that goes on and on" * 9)
+    print("Registering image #4 (5)")
+END
+chmod +x tools/colmap
+
+export FALSE_COLMAP=feature_extractor-fails
+says "features fail: what it said, and the log" 4 "^error: colmap: failed (code 1): ERROR: no space left (log: fails/colmap/features.log)" pose "my photos" -o fails
+grep -q 'no space' fails/colmap/features.log && [ ! -e fails/sparse ]
+report $? "the log has it, and there is no model" "$(ls -R fails)"
+export FALSE_COLMAP=mapper-fails
+says "mapping fails" 4 "^error: colmap: failed (code 1): ERROR: no space left" pose "my photos" -o fails
+export FALSE_COLMAP=mapper-dies
+says "mapping is killed" 4 "^error: colmap: ended by signal 9, as when memory runs out (log: fails/colmap/mapping.log)" pose "my photos" -o fails
+export FALSE_COLMAP=no-start
+says "no two photos to begin with" 3 "^error: .*: no photo could be registered: too few matches" pose "my photos" -o nostart
+export FALSE_COLMAP=garbage
+says "a model that is none" 3 "^error: garbage/colmap/models/0/images.bin" pose "my photos" -o garbage
+[ ! -e garbage/sparse ]
+report $? "gives no data set" "$(ls garbage)"
+export FALSE_COLMAP=junk
+says "a database that is none" 3 "^error: junk/colmap/database.db: not a database of COLMAP" pose "my photos" -o junk
+export FALSE_COLMAP=
+says "after failures it goes on, and takes the larger of two models" 0 "^fails: 5 of 5 photos registered" pose "my photos" -o fails
+: >tools/calls
+says "once more it only reports" 0 "^fails: 5 of 5 photos registered" pose "my photos" -o fails
+[ ! -s tools/calls ] && "$program" info fails >out 2>&1 && grep -q '30 found\|5 found' out
+report $? "without COLMAP, and info reads it" "$(cat tools/calls out)"
+says "other options in the same folder" 2 "^error: fails: was begun with other photos or options" pose "my photos" -o fails --matcher sequential
+export FALSE_COLMAP=few
+says "some photos are not registered" 0 "^few: 3 of 5 photos registered" pose "my photos" -o few
+grep -q '^  without   0003.png: few matches: 77 with 1 registered photos' out && grep -q '^  without   0004.png: matches no other photo (500 features)' out
+report $? "and why" "$(cat out)"
+"$program" train few -o few_run --iterations 2 --quiet >out 2>err
+report $? "train reads it" "$(cat err)"
+
+# ---- a signal is passed on, and the next run goes on where the last one was
+export FALSE_COLMAP=exhaustive_matcher-hangs
+PATH=$tools "$program" pose "my photos" -o stopped >out_stopped 2>err_stopped </dev/null &
+gbtrace=$!
+while [ ! -e tools/hanging ] && kill -0 $gbtrace 2>/dev/null; do sleep 0.1; done
+says "two in one folder" 4 "^error: stopped: another process works in it" pose "my photos" -o stopped
+kill -INT $gbtrace
+wait $gbtrace
+[ $? = 130 ] && [ -e tools/interrupted ] && [ ! -e stopped/sparse ]
+report $? "SIGINT reaches colmap; 130" "$(cat err_stopped)"
+export FALSE_COLMAP=
+: >tools/calls
+says "the same command goes on" 0 "^stopped: 5 of 5 photos registered" pose "my photos" -o stopped
+[ "$(tr '\n' ' ' <tools/calls)" = "exhaustive_matcher mapper " ]
+report $? "finished stages are skipped" "$(cat tools/calls)"
+rm -f tools/hanging
+export FALSE_COLMAP=mapper-hangs
+PATH=$tools "$program" pose "my photos" -o killed >out_killed 2>err_killed </dev/null &
+gbtrace=$!
+while [ ! -e tools/hanging ] && kill -0 $gbtrace 2>/dev/null; do sleep 0.1; done
+kill -KILL $gbtrace
+wait $gbtrace 2>/dev/null
+export FALSE_COLMAP=
+says "after a kill too" 0 "^killed: 5 of 5 photos registered" pose "my photos" -o killed
+
+# ---- photos that are in DATA/images already
+mkdir placed && cp -R "my photos" placed/images && PATH=$tools "$program" pose placed -o placed >out 2>err && grep -q '^placed: 5 of 5' out
+report $? "in place" "$(cat out err)"
+
+# ---- a film
+printf '#!/bin/sh\necho "Invalid data found when processing input" >&2\nexit 1\n' >tools/ffmpeg
+chmod +x tools/ffmpeg
+says "ffmpeg fails" 4 "^error: ffmpeg: failed (code 1): Invalid data found when processing input (log: film/colmap/measure.log)" pose film.mp4 -o film
+printf '#!/bin/sh\necho "P5 what is this"\n' >tools/ffmpeg
+says "ffmpeg gives something else" 4 "^error: ffmpeg: its output is not as wanted" pose film.mp4 -o film
+[ ! -e film/images ]
+report $? "no frames are left" "$(ls -R film)"
+rm tools/ffmpeg
+if command -v ffmpeg >/dev/null; then
+    ffmpeg -hide_banner -loglevel error -y -f lavfi -i testsrc=size=320x240:rate=25:duration=4 "a film.mp4" </dev/null
+    says "a film of a test picture" 0 "^film 100%: 5 of 20 photos registered" pose "a film.mp4" -o "film 100%" --frames 20
+    [ "$(ls "film 100%/images" | wc -l)" = 20 ] && [ -e "film 100%/images/frame_00020.jpg" ]
+    report $? "20 of its frames" "$(ls -R "film 100%" | head -50; cat err)"
+else
+    skip "a film" "ffmpeg is not installed"
+fi
+finish

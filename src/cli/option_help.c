@@ -175,7 +175,7 @@ void options_notes(const option *o, bool names, char *out, size_t size)
 
 /* ---- help ---- */
 
-enum { HELP_COLUMNS = 100, HELP_INDENT = 30 };
+enum { HELP_COLUMNS = 100, HELP_INDENT = 30, WORD_WIDTH = 12 };
 
 /** `text` from column `at` on, its further lines indented. */
 static void print_wrapped(const char *text, int at)
@@ -215,9 +215,12 @@ static void print_row(const option *o, bool all)
 static void print_words(const char *title, const command_word *(*list)(void))
 {
     const command_word *words = list != NULL ? list() : NULL;
+    int width = WORD_WIDTH;
     for (int i = 0; words != NULL && words[i].name != NULL; i++)
-        printf("%s%s  %-16s%s\n%s", i == 0 ? title : "", i == 0 ? "\n" : "", words[i].name, words[i].help,
-               words[i + 1].name == NULL ? "\n" : "");
+        width = (int)strlen(words[i].name) >= width ? (int)strlen(words[i].name) + 1 : width;
+    for (int i = 0; words != NULL && words[i].name != NULL; i++)
+        printf("%s%s  %-*s%s\n%s", i == 0 ? title : "", i == 0 ? "\n" : "", width, words[i].name,
+               words[i].help, words[i + 1].name == NULL ? "\n" : "");
 }
 
 void options_print_help(const command *self, const option_table *t, bool all)

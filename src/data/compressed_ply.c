@@ -7,7 +7,6 @@
 #include <stdio.h>
 
 #include "base/file.h"
-#include "data/gaussian_formats.h"
 #include "data/gaussian_order.h"
 #include "data/gaussian_ply.h"
 
@@ -176,15 +175,8 @@ static void put_all(sink *s, const gaussian_cloud *cloud, const uint32_t *order,
             }
 }
 
-/*
- * Write one: 16 bytes a Gaussian, 72 a chunk, and a byte for each value of a harmonic above the first, in
- * steps of 1/32. Positions have 2^10 to 2^11 steps in the chunk's box, which is why Gaussians are put in the
- * order of space.
- *
- * @param origin [in] added to every mean in double
- */
-static gbt_status write_compressed(const char *path, const gaussian_cloud *cloud, const double origin[3],
-                                   gbt_error *err)
+gbt_status compressed_ply_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
+                                gbt_error *err)
 {
     uint32_t *order = gaussian_order(cloud, err);
     if (order == NULL)
@@ -364,11 +356,3 @@ gbt_status compressed_ply_read(const source_file *file, const ply_header *header
     mem_free(p.rest);
     return status;
 }
-
-const gaussian_format gaussian_format_compressed_ply = {
-    .ending = ".compressed.ply",
-    .what = "a quarter of a .ply: positions to 1/2000 of a chunk of 256, colours in 8 bits",
-    .degree = 3,
-    .read = gaussian_ply_read,
-    .holds = gaussian_ply_has_gaussians,
-    .write = write_compressed};

@@ -4,6 +4,7 @@
 #include <stdio.h>
 
 #include "base/file.h"
+#include "data/compressed_ply.h"
 #include "data/gaussian_formats.h"
 #include "data/gaussian_ply.h"
 
@@ -78,3 +79,11 @@ const gaussian_format gaussian_format_ply = {
     .read = gaussian_ply_read,
     .holds = gaussian_ply_has_gaussians,
     .write = write_ply};
+
+const gaussian_format gaussian_format_compressed_ply = {
+    .ending = ".compressed.ply",
+    .what = "a quarter of a .ply: positions to 1/2000 of a chunk of 256, colours in 8 bits",
+    .degree = 3,
+    .read = gaussian_ply_read,
+    .holds = gaussian_ply_has_gaussians,
+    .write = compressed_ply_write};

@@ -5,7 +5,6 @@
 #include <zstd.h>
 
 #include "base/file.h"
-#include "data/gaussian_formats.h"
 #include "data/spz_streams.h"
 
 enum {
@@ -48,14 +47,7 @@ static void put_header(sink *s, const spz_header *header, int streams)
     sink_put_uint(s, 0, 4);
 }
 
-/*
- * Write one: the values of version 3, packed better and unpacked faster.
- *
- * @param origin [in] added to every mean in double
- * @return as the writer of .spz
- */
-static gbt_status write_spz4(const char *path, const gaussian_cloud *cloud, const double origin[3],
-                             gbt_error *err)
+gbt_status spz4_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err)
 {
     spz_header header;
     GBT_TRY(spz_header_of(cloud, origin, 4, path, &header, err));
@@ -168,10 +160,3 @@ gbt_status spz4_read(const source_file *file, gaussian_cloud *out, gbt_error *er
     mem_free(streams);
     return status;
 }
-
-const gaussian_format gaussian_format_spz4 = {
-    .ending = ".v4.spz",
-    .what = "the values of .spz in version 4 of the format, zstd in place of gzip",
-    .degree = 3,
-    .read = spz_read,
-    .write = write_spz4};

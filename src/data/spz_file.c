@@ -165,3 +165,10 @@ const gaussian_format gaussian_format_spz = {
     .degree = 3,
     .read = spz_read,
     .write = write_spz};
+
+const gaussian_format gaussian_format_spz4 = {
+    .ending = ".v4.spz",
+    .what = "the values of .spz in version 4 of the format, zstd in place of gzip",
+    .degree = 3,
+    .read = spz_read,
+    .write = spz4_write};

@@ -49,4 +49,7 @@ gbt_status spz_unpack(const unsigned char *streams, const spz_header *header, ga
 gbt_status spz_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 gbt_status spz4_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
+/** Write version 4: the values of version 3, packed better and unpacked faster. As gaussian_format.write. */
+gbt_status spz4_write(const char *path, const gaussian_cloud *cloud, const double origin[3], gbt_error *err);
+
 #endif

@@ -132,7 +132,7 @@ static gbt_status write_usdz(const char *path, const gaussian_cloud *cloud, cons
 
 const gaussian_format gaussian_format_usda = {
     .ending = ".usda",
-    .what = "USD with ParticleField3DGaussianSplat: everything, as text, and the scene's origin in double",
+    .what = "USD, ParticleField3DGaussianSplat: everything, as text; the origin in double",
     .degree = 3,
     .keeps_origin = true,
     .read = usda_read,

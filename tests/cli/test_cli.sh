@@ -497,7 +497,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
         "$program" info all.$ending && "$program" export all.$ending again.ply || break
     done >>out 2>>err && [ "$(grep -c "gaussians $(sed -n 's/^  "gaussians": \([0-9]*\),$/\1/p' plain.json)," out)" = 5 ]
     report $? "every small format is written, looked into and converted" "$(cat err out)"
-    "$program" export run thin.sog --gaussians 1050 --refine 2 --json thin.json >out 2>err && grep -q '^  "gaussians": 1050,$' thin.json && grep -q '^  "thinned": [1-9]' thin.json &&
+    "$program" export run thin.sog --gaussians 1010 --refine 2 --json thin.json >out 2>err && grep -q '^  "gaussians": 1010,$' thin.json && grep -q '^  "thinned": [1-9]' thin.json &&
         grep -q ' that are blended least' out
     report $? "export keeps the Gaussians that are blended most" "$(cat err out)"
     misuse 2 "--gaussians: 10 of plain.ply (wanted 0 or more, and a trained model)" export plain.ply o.ply --gaussians 10
@@ -539,7 +539,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     misuse 2 "result: a result folder is made once, of a run" export result other/
     misuse 4 "nothing: cannot open: No such file or directory" import nothing -o imported
     misuse 4 "empty: no model of Scaffold-GS (wanted point_cloud/iteration_N/point_cloud.ply or point_cloud.ply in it)" import empty -o imported
-    misuse 2 "scene.obj: which format? (wanted .ply, .splat, .spz or .glb)" export run scene.obj
+    misuse 2 "scene.obj: which format? (wanted .ply, .compressed.ply, .splat, .spz, .v4.spz, .sog, .glb, .usda or .usdz)" export run scene.obj
     misuse 2 "--sh-degree: bad value (wanted a whole number from 0 to 3, got 4)" export run scene.ply --sh-degree 4
     misuse 4 "nothing: cannot open: No such file or directory" eval run --lpips nothing
     misuse 4 "nothing: cannot open: No such file or directory" compare pictures-same/*.png pictures-same/*.png --lpips nothing

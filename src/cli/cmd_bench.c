@@ -93,7 +93,7 @@ static const option *options_bench(int *count)
         {.name = "check",
          .kind = OPTION_FLAG,
          .value = &def.check,
-         .help = "compare with the double-precision reference"},
+         .help = "compare with the double-precision reference, with the same cut-offs and without any"},
         JSON_OPTION(&def.json, "write the figures to this file"),
         THREADS_OPTION,
     };

@@ -16,7 +16,7 @@ enum { GBT_TRAIN_MAX_EVALS = 16 };
 
 /** What text, range and default a field has: gbt_train_setting_at(). 0 stands for a choice of the program
    only where it can be no value of its own: init_count, voxel_size, offsets, iterations, budget_seconds,
-   scale_factor. */
+   downscale, scale_factor. */
 typedef struct gbt_train_def {
     gbt_init_kind init;
     double init_count; /* anchors per point of GBT_INIT_ADAPTIVE and _RANDOM, at least one; 0: half as many as
@@ -31,13 +31,15 @@ typedef struct gbt_train_def {
                               iterations is 0. 0: 600, or with `resume` as long as the run was to be */
     const char *pace; /* "n1,...,n20": iterations in each twentieth of the schedule, as a budget run records
                          them; NULL: as the budget allows */
-    double downscale;
+    double downscale; /* of the photos' width and height; 0: the median photo becomes 1,600 pixels wide if it
+                         is wider, with compat 1 */
     gbt_renderer renderer; /* what the photos are compared with; one that trains */
     double footprint; /* rays are as wide as pixels: variance of a pixel, px^2; 0: thin rays. 0 with compat,
                          splats are dilated then */
     double near; /* nothing is seen nearer to a camera than this part of the depth at which its photo's first
-                    sparse points are, of all training photos the least, nor than 2 % of the median distance
-                    of anchors, which is what counts where points have no tracks. 0 with compat */
+                    sparse points are: of all training photos the least but for one in twenty, which have a
+                    distance of their own; nor than 2 % of the median distance of anchors, which is what
+                    counts where points have no tracks. 0 with compat */
     int start_level; /* first steps look at 1 pixel in 4^start_level, at random places; all come last. 0 with
                         compat */
     const char *eval_split; /* held-out photos: "auto" (as the data set says, else every=8), "every=N",
@@ -56,6 +58,8 @@ typedef struct gbt_train_def {
     bool compat;               /* every quirk of the reference method (docs/compat.md) */
     bool exposure; /* learn a colour matrix per photo; held-out photos are then scored on their right half,
                       with a matrix fitted to the left */
+    bool find_exposure;  /* turn `exposure` on where the photos' exposures differ by a quarter of a stop or
+                            more.  Not with compat */
     double splats_until; /* splats stand for rays until this part of the run: their steps are quicker. Pinhole
                             photos, GBT_RENDERER_TRACE, not with compat */
     double grow_until;   /* anchors grow and are pruned until this part of the run */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/bench_query_cloud.c -- the clouds on which queries are measured, and the names of what is compared. */
+/* benchmark/bench_query_cloud.c -- clouds on which queries are measured, and the names of what is compared.
+ */
 #include <math.h>
 
 #include "base/rng.h"

@@ -16,6 +16,10 @@ typedef struct bench_reference {
     bool *left_out; /* optional (NULL), [rays]: what does not count in bench_reference_compare() */
 } bench_reference;
 
+/** The same without cut-offs but that of alpha_max, which is the model's: every Gaussian counts on every ray.
+ */
+trace_settings bench_settings_without_cuts(const trace_settings *settings);
+
 gbt_status bench_reference_make(const gaussians *g, const trace_settings *settings, const ray_image *rays,
                                 bench_reference *out, gbt_error *err);
 

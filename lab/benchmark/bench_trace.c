@@ -50,7 +50,8 @@ typedef struct measured {
     int kernel[KERNELS_MAX];
     bench_way ways[KERNELS_MAX];
     bench_splat splat;
-    bench_error error[KERNELS_MAX]; /* when checked */
+    bench_error error[KERNELS_MAX]; /* when checked: to the reference with the same cut-offs, */
+    bench_error whole[KERNELS_MAX]; /* and to the one without */
     size_t count, check_rays;
 } measured;
 
@@ -134,8 +135,11 @@ static void print_figures(const measured *m, FILE *out)
         fputs("\n", out);
     }
     for (size_t k = 0; m->def->check && k < m->count; k++)
-        fprintf(out, "%s to the double reference (%zu rays): PSNR %.1f dB, max error %.3g\n",
-                bench_kernel_name(m->kernel[k]), m->check_rays, m->error[k].psnr, m->error[k].max);
+        fprintf(out,
+                "%s to the double reference (%zu rays): PSNR %.1f dB, max error %.3g; to the one without "
+                "cut-offs: PSNR %.1f dB, max error %.3g\n",
+                bench_kernel_name(m->kernel[k]), m->check_rays, m->error[k].psnr, m->error[k].max,
+                m->whole[k].psnr, m->whole[k].max);
 }
 
 static json_t *way_to_json(const measured *m, size_t way)
@@ -153,6 +157,8 @@ static json_t *way_to_json(const measured *m, size_t way)
     if (m->def->check) {
         json_object_set_new(out, "psnr_to_reference", json_real(m->error[way].psnr));
         json_object_set_new(out, "max_error", json_real(m->error[way].max));
+        json_object_set_new(out, "psnr_without_cuts", json_real(m->whole[way].psnr));
+        json_object_set_new(out, "max_error_without_cuts", json_real(m->whole[way].max));
     }
     return out;
 }
@@ -177,6 +183,20 @@ static gbt_status save_figures(const measured *m, gbt_error *err)
     return status;
 }
 
+static gbt_status check(measured *m, const bench_scene *traced, bench_reference *want, gbt_error *err)
+{
+    const trace_settings without = bench_settings_without_cuts(&traced->settings);
+    const trace_settings *const settings[] = {&traced->settings, &without};
+    bench_error *const errors[] = {m->error, m->whole};
+    for (int i = 0; i < 2; i++) {
+        GBT_TRY(bench_reference_make(traced->gaussians, settings[i], &traced->rays, want, err));
+        for (size_t k = 0; k < m->count; k++)
+            errors[i][k] = bench_reference_compare(want, &m->ways[k].rgb);
+    }
+    m->check_rays = ray_image_count(&want->rays);
+    return GBT_OK;
+}
+
 static gbt_status bench(measured *m, bench_scene *traced, bench_reference *want, FILE *out, gbt_error *err)
 {
     const lab_bench_def *def = m->def;
@@ -197,10 +217,7 @@ static gbt_status bench(measured *m, bench_scene *traced, bench_reference *want,
                       traced->run != NULL ? &traced->run->frame.gaussians : traced->gaussians, RASTER_EWA};
     GBT_TRY(bench_measure(m->ways, m->count, traced->gaussians, &traced->rays, def->repeats, err));
     if (def->check)
-        GBT_TRY(bench_reference_make(traced->gaussians, &traced->settings, &traced->rays, want, err));
-    for (size_t k = 0; def->check && k < m->count; k++)
-        m->error[k] = bench_reference_compare(want, &m->ways[k].rgb);
-    m->check_rays = ray_image_count(&want->rays);
+        GBT_TRY(check(m, traced, want, err));
     print_figures(m, out);
     return def->json != NULL ? save_figures(m, err) : GBT_OK;
 }

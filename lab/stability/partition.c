@@ -47,7 +47,7 @@ static void colony_make(stability *s, colony *c, size_t count, double at, float 
             c->stats.grad_count[5 * i + k] = 100;
             c->stats.grad_accum[5 * i + k] = 100;
         }
-        c->stats.visit_count[i] = 100;
+        c->stats.visit_count[i] = c->stats.shown_count[i] = 100;
         c->stats.importance_accum[i] = 100 * opacity * (1 + rng_uniform(14, 30, i));
     }
 }

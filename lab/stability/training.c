@@ -313,6 +313,7 @@ static double held_out(stability *s, const practice *p, bool exposure)
     gbt_train_def def = practice_def(s);
     def.eval_split = "every=4";
     def.exposure = exposure;
+    def.find_exposure = false;
     def.iterations = (uint64_t)stability_number(s, "exposure_steps");
     double psnr = NAN;
     gbt_error why = {0};

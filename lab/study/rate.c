@@ -25,16 +25,19 @@ static gbt_status score_view(loaded_run *r, size_t view, image_scores *sum, gbt_
 {
     GBT_TRY(loaded_run_render(r, view, err));
     image photo = {0};
-    unsigned char *valid = NULL;
+    unsigned char *marks = NULL;
+    const unsigned char *valid = NULL;
     image_scores scores = {0};
     gbt_status status = scene_read_photo_valid(&r->scene.views[view], r->frame.rgb.width, r->frame.rgb.height,
-                                               &photo, &valid, err);
+                                               &photo, &marks, err);
+    if (status == GBT_OK)
+        status = frame_valid(&r->frame, marks, &valid, err);
     if (status == GBT_OK)
         status = image_score_photo(&r->frame.rgb, &photo, valid, r->def.exposure, NULL, &scores, err);
     sum->psnr += scores.psnr;
     sum->ssim += scores.ssim;
     image_free(&photo);
-    mem_free(valid);
+    mem_free(marks);
     return status;
 }
 

@@ -97,7 +97,9 @@ static const option *options_bench(int *count)
         {.name = "check",
          .kind = OPTION_FLAG,
          .value = &def.check,
-         .help = "compare with the double-precision reference; queries with brute force"},
+         .help =
+             "compare with the double-precision reference, with the same cut-offs and without any; queries "
+             "with brute force"},
         JSON_OPTION(&def.json, "write the figures to this file"),
         {.name = "points",
          .kind = OPTION_UINT64,

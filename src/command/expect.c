@@ -4,16 +4,30 @@
 
 #include <math.h>
 
+#include "train/photos.h"
+#include "train/rules.h"
+
 /* Measured on fox, plush and castle: 42 s of training with the default settings on two cores of a server CPU
    with AVX-512 (docs/training.md). */
 static const double program_bytes = 150e6, bytes_per_point = 3000, bytes_per_pixel = 300,
-                    cache_bytes_per_pixel = 3;
+                    score_bytes_per_pixel = 120, cache_bytes_per_pixel = 3;
 static const double step_core_seconds_per_megapixel = 0.29, score_core_seconds_per_megapixel = 3.3;
 static const double found_points = 20000; /* by photo consistency, where the data set has none */
 static const double default_budget_seconds = 600;
 
+/* Of a photo's pixels, those that steps look at: a quarter as many for each factor of 4 beyond their budget.
+ */
+static double seen_by_steps(double pixels)
+{
+    while (pixels > 2 * TRAIN_STEP_PIXELS)
+        pixels /= 4;
+    return pixels;
+}
+
 expectation expect_training(const scene *s, double downscale, int threads)
 {
+    if (downscale <= 0)
+        downscale = photos_usual_downscale(s);
     double train_pixels = 0, test_pixels = 0, largest = 0, train_count = 0;
     for (size_t i = 0; i < s->view_count; i++) {
         const gbt_camera *c = &s->views[i].camera;
@@ -23,9 +37,11 @@ expectation expect_training(const scene *s, double downscale, int threads)
         *(s->views[i].is_test ? &test_pixels : &train_pixels) += pixels;
     }
     const double points = s->points.count > 0 ? (double)s->points.count : found_points;
-    const double photo_megapixels = train_pixels / fmax(train_count, 1) / 1e6;
-    return (expectation){.bytes = program_bytes + cache_bytes_per_pixel * train_pixels +
-                                  bytes_per_pixel * largest + bytes_per_point * points,
+    const double photo_megapixels = seen_by_steps(train_pixels / fmax(train_count, 1)) / 1e6;
+    const double kept = fmin(cache_bytes_per_pixel * train_pixels, (double)PHOTOS_KEPT_BYTES);
+    const double picture =
+        fmax(bytes_per_pixel * fmin(largest, TRAIN_STEP_PIXELS), score_bytes_per_pixel * largest);
+    return (expectation){.bytes = program_bytes + kept + picture + bytes_per_point * points,
                          .step_seconds = step_core_seconds_per_megapixel * photo_megapixels / threads,
                          .score_seconds = score_core_seconds_per_megapixel * test_pixels / 1e6 / threads,
                          .threads = threads};

@@ -17,8 +17,8 @@ typedef struct expectation {
 } expectation;
 
 /**
- * Of a run with the default settings and photos divided by `downscale`. Good within a factor of 1.5 on scenes
- * like those it was measured on.
+ * Of a run with the default settings and photos divided by `downscale`; 0: as training divides them. Good
+ * within a factor of 1.5 on scenes like those it was measured on.
  */
 expectation expect_training(const scene *s, double downscale, int threads);
 

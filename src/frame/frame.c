@@ -275,12 +275,35 @@ gbt_status frame_blend_weights(frame *f, gbt_error *err)
     return status;
 }
 
+static bool has_ray(const ray_image *rays, size_t i)
+{
+    const float *d = rays->dir + 3 * i;
+    return d[0] != 0 || d[1] != 0 || d[2] != 0;
+}
+
+gbt_status frame_valid(frame *f, const unsigned char *photo, const unsigned char **out, gbt_error *err)
+{
+    const size_t count = ray_image_count(&f->rays);
+    size_t with_ray = 0;
+    while (with_ray < count && has_ray(&f->rays, with_ray))
+        with_ray++;
+    *out = photo;
+    if (with_ray == count)
+        return GBT_OK;
+    GBT_TRY(mem_reserve((void **)&f->valid, &f->valid_capacity, 0, count, 1, "valid pixels", err));
+    for (size_t i = 0; i < count; i++)
+        f->valid[i] = (photo == NULL || photo[i] != 0) && has_ray(&f->rays, i);
+    *out = f->valid;
+    return GBT_OK;
+}
+
 void frame_free(frame *f)
 {
     ray_image_free(&f->rays);
     mem_free(f->visible);
     mem_free(f->pixel_min);
     mem_free(f->blend_weight);
+    mem_free(f->valid);
     gaussians_free(&f->gaussians);
     gaussians_free(&f->wide);
     gaussians_free(&f->d_gaussians);

@@ -58,6 +58,8 @@ typedef struct frame {
     raster_scene splats;
     float *blend_weight; /* [gaussians] after an adjoint: sum over rays of T alpha */
     size_t blend_weight_capacity;
+    unsigned char *valid; /* of the last frame_valid(), where rays are missing */
+    size_t valid_capacity;
     image rgb; /* the render */
     kernel_counters counters;
     frame_times times;
@@ -129,6 +131,16 @@ gbt_status frame_backward_anchors(frame *f, const anchors *a, const decoder *d, 
 /** Both parts of a cloud. `d_cloud`: as many Gaussians as it has; see plain_backward(). */
 gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const image *d_image,
                                 gaussian_cloud *d_cloud, gbt_error *err);
+
+/**
+ * Which pixels of the last render can be compared with a photo: those that have a ray, where the photo's own
+ * marks allow it too.
+ *
+ * @param photo [in]  [height][width], 0: does not count; NULL: all count
+ * @param out   [out] `photo` where every pixel has a ray, else borrowed until the next call
+ * @return GBT_OK or GBT_ERR_NO_MEMORY
+ */
+gbt_status frame_valid(frame *f, const unsigned char *photo, const unsigned char **out, gbt_error *err);
 
 /** f->blend_weight of the last frame_render(keep_tape), and no gradient. */
 gbt_status frame_blend_weights(frame *f, gbt_error *err);

@@ -21,14 +21,14 @@ typedef struct growth_points {
 } growth_points;
 
 typedef struct growth_def {
-    float voxel_size;        /* v: cells are v * init_factor / hierarchy^level */
-    int level_count;         /* [0, GROWTH_MAX_LEVELS], default 3 */
-    int init_factor;         /* default 16 */
-    int hierarchy_factor;    /* default 4 */
-    float grad_threshold;    /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */
-    float importance_min;    /* anchors with less in the mean over their views are pruned. Default 0.005, an
-                                opacity */
-    float interval;          /* I: steps between rounds, default 100 */
+    float voxel_size;     /* v: cells are v * init_factor / hierarchy^level */
+    int level_count;      /* [0, GROWTH_MAX_LEVELS], default 3 */
+    int init_factor;      /* default 16 */
+    int hierarchy_factor; /* default 4 */
+    float grad_threshold; /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */
+    float importance_min; /* anchors with less in the mean over the views that show them are pruned. Default
+                             0.005, an opacity */
+    float interval;       /* I: steps between rounds, default 100 */
     float success_threshold; /* default 0.8: a Gaussian counts when grad_count > interval * success * 0.5; an
                                 anchor is judged when visit_count > interval * success. What was judged starts
                                 again from 0 */

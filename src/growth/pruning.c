@@ -2,21 +2,26 @@
 /* growth/pruning.c -- anchors whose mean importance is too small are pruned. */
 #include "growth/pruning.h"
 
+#include <math.h>
+
+/* What no view shows is worth nothing. */
+static float shown_count(const growth_stats *stats, size_t i) { return fmaxf(stats->shown_count[i], 1); }
+
 static bool is_pruned(const growth_stats *stats, const growth_def *def, size_t i)
 {
     return def->prune && growth_is_judged(def, stats->visit_count[i]) &&
-           stats->importance_accum[i] < def->importance_min * stats->visit_count[i];
+           stats->importance_accum[i] < def->importance_min * shown_count(stats, i);
 }
 
 size_t growth_mark_pruned(const growth_stats *stats, const growth_def *def, bool *pruned,
                           size_t *most_important)
 {
-    const float *importance = stats->importance_accum, *visits = stats->visit_count;
+    const float *importance = stats->importance_accum;
     size_t survivors = 0, most = 0;
     for (size_t i = 0; i < stats->count; i++) {
         pruned[i] = is_pruned(stats, def, i);
         survivors += !pruned[i];
-        if (importance[i] * visits[most] > importance[most] * visits[i])
+        if (importance[i] * shown_count(stats, most) > importance[most] * shown_count(stats, i))
             most = i;
     }
     *most_important = most;

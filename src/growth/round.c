@@ -76,6 +76,7 @@ static size_t compact(anchors *a, growth_stats *s, const growth_def *def, const 
         const bool used = def->prune && growth_is_judged(def, s->visit_count[i]);
         s->importance_accum[to] = used ? 0.0f : s->importance_accum[i];
         s->visit_count[to] = used ? 0.0f : s->visit_count[i];
+        s->shown_count[to] = used ? 0.0f : s->shown_count[i];
         for (size_t k = 0; k < offsets; k++) {
             const bool sampled = def->grow && growth_well_sampled(def, s->grad_count[i * offsets + k]);
             s->grad_accum[to * offsets + k] = sampled ? 0.0f : s->grad_accum[i * offsets + k];

@@ -46,12 +46,20 @@ static void gather_importance(growth_stats *s, const frame *f, growth_importance
     const float rays = (float)ray_image_count(&f->rays);
     for (size_t v = 0; v < f->visible_count; v++) {
         s->visit_count[f->visible[v]] += 1;
-        if (importance == GROWTH_BY_OPACITY)
+        if (importance == GROWTH_BY_OPACITY) {
             s->importance_accum[f->visible[v]] += f->tape.opacity_sum[v];
+            s->shown_count[f->visible[v]] += 1;
+        }
     }
-    for (size_t i = 0; importance == GROWTH_BY_SHARE && i < f->gaussians.count; i++)
-        s->importance_accum[f->visible[f->tape.slot[i] / (uint32_t)s->offset_count]] +=
-            f->blend_weight[i] / rays;
+    size_t last = SIZE_MAX; /* Gaussians of an anchor follow each other */
+    for (size_t i = 0; importance == GROWTH_BY_SHARE && i < f->gaussians.count; i++) {
+        const size_t anchor = f->visible[f->tape.slot[i] / (uint32_t)s->offset_count];
+        if (!(f->blend_weight[i] > 0))
+            continue;
+        s->importance_accum[anchor] += f->blend_weight[i] / rays;
+        s->shown_count[anchor] += anchor != last;
+        last = anchor;
+    }
 }
 
 static bool is_on_screen(const screen_view *s, const gaussians *g, size_t i)
@@ -62,42 +70,84 @@ static bool is_on_screen(const screen_view *s, const gaussians *g, size_t i)
     return screen_touches(s, mean, quat, scale);
 }
 
-/* The norm of dL/d(projected mean in NDC), from the ray-traced gradient of the mean in camera axes (g): (z
-   tan_x g.x, z tan_y g.y). Counted for every Gaussian whose box may touch the image, hit or not: counting
-   hits alone would grow what is mostly hidden. */
-static void gather_gradients(growth_stats *s, const frame *f, float t_near)
+/* Axes of the camera, and what a view is wide and high at distance 1. */
+typedef struct gradient_view {
+    float rotation[9], center[3], tan_half[2];
+    bool looks_forward;
+} gradient_view;
+
+static gradient_view view_of(const frame *f)
 {
-    const int k_count = s->offset_count;
-    float r[9], c[3];
+    gradient_view v = {.looks_forward = camera_lens_looks_forward(&f->rays.lens)};
     for (int i = 0; i < 9; i++)
-        r[i] = (float)f->camera.rotation[i];
+        v.rotation[i] = (float)f->camera.rotation[i];
     for (int i = 0; i < 3; i++)
-        c[i] = (float)f->camera.center[i];
-    const float tan_x = (float)f->half_fov_tan[0], tan_y = (float)f->half_fov_tan[1];
+        v.center[i] = (float)f->camera.center[i];
+    for (int i = 0; i < 2; i++)
+        v.tan_half[i] = (float)f->half_fov_tan[i];
+    return v;
+}
+
+static void to_camera(const gradient_view *v, const float world[3], float cam[3])
+{
+    for (int i = 0; i < 3; i++)
+        cam[i] = v->rotation[3 * i] * world[0] + v->rotation[3 * i + 1] * world[1] +
+                 v->rotation[3 * i + 2] * world[2];
+}
+
+/* The norm of dL/d(projected mean in NDC), from the gradient g of the mean p, both in camera axes: (z tan_x
+   g.x, z tan_y g.y). Where a lens looks to all sides no depth is the distance: there it is that of the mean
+   moved across its ray, with the picture's extent in radians. */
+static float screen_gradient(const gradient_view *v, const float p[3], const float g[3])
+{
+    const float *tan_half = v->tan_half;
+    if (v->looks_forward) {
+        const float x = p[2] * tan_half[0] * g[0], y = p[2] * tan_half[1] * g[1];
+        return sqrtf(x * x + y * y);
+    }
+    const float far_square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2],
+                g_square = g[0] * g[0] + g[1] * g[1] + g[2] * g[2],
+                along = p[0] * g[0] + p[1] * g[1] + p[2] * g[2];
+    return sqrtf(fmaxf(far_square * g_square - along * along, 0) * tan_half[0] * tan_half[1]);
+}
+
+/* Does the Gaussian's box touch the cone of a centred pinhole? Or, where a view goes by the screen, its splat
+   the picture? */
+static bool is_in_cone(const gradient_view *v, const frame *f, size_t i, const float p[3], float t_near)
+{
+    if (f->by_screen)
+        return p[2] > t_near && is_on_screen(&f->screen, &f->gaussians, i);
+    const gaussians *g = &f->gaussians;
+    const float reach = 3 * fmaxf(g->scale_x[i], fmaxf(g->scale_y[i], g->scale_z[i]));
+    return p[2] > t_near && fabsf(p[0]) <= v->tan_half[0] * p[2] + reach &&
+           fabsf(p[1]) <= v->tan_half[1] * p[2] + reach;
+}
+
+static void gather_gradients(growth_stats *s, const frame *f, growth_counting counting, float t_near)
+{
+    const uint32_t k_count = (uint32_t)s->offset_count;
+    const gradient_view view = view_of(f);
     const gaussians *g = &f->gaussians, *dg = &f->d_gaussians;
     for (size_t i = 0; i < g->count; i++) {
-        const float x = g->mean_x[i] - c[0], y = g->mean_y[i] - c[1], z = g->mean_z[i] - c[2];
-        const float cam_z = r[6] * x + r[7] * y + r[8] * z;
-        if (!(cam_z > t_near))
+        const float from[3] = {g->mean_x[i] - view.center[0], g->mean_y[i] - view.center[1],
+                               g->mean_z[i] - view.center[2]};
+        const float gradient[3] = {dg->mean_x[i], dg->mean_y[i], dg->mean_z[i]};
+        float p[3], d[3];
+        to_camera(&view, from, p);
+        if (counting == GROWTH_COUNT_IN_CONE ? !is_in_cone(&view, f, i, p, t_near)
+                                             : !(f->blend_weight[i] > 0))
             continue;
-        const float cam_x = r[0] * x + r[1] * y + r[2] * z, cam_y = r[3] * x + r[4] * y + r[5] * z;
-        const float reach = 3 * fmaxf(g->scale_x[i], fmaxf(g->scale_y[i], g->scale_z[i]));
-        if (f->by_screen ? !is_on_screen(&f->screen, g, i)
-                         : fabsf(cam_x) > tan_x * cam_z + reach || fabsf(cam_y) > tan_y * cam_z + reach)
-            continue;
-        const float gx = r[0] * dg->mean_x[i] + r[1] * dg->mean_y[i] + r[2] * dg->mean_z[i];
-        const float gy = r[3] * dg->mean_x[i] + r[4] * dg->mean_y[i] + r[5] * dg->mean_z[i];
-        const float sx = cam_z * tan_x * gx, sy = cam_z * tan_y * gy;
+        to_camera(&view, gradient, d);
         const uint32_t slot = f->tape.slot[i];
-        const size_t at =
-            (size_t)f->visible[slot / (uint32_t)k_count] * (size_t)k_count + slot % (uint32_t)k_count;
-        s->grad_accum[at] += fminf(sqrtf(sx * sx + sy * sy), gradient_max);
+        const size_t at = (size_t)f->visible[slot / k_count] * k_count + slot % k_count;
+        s->grad_accum[at] += fminf(screen_gradient(&view, p, d), gradient_max);
         s->grad_count[at] += 1;
     }
 }
 
-void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance, float t_near)
+void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance,
+                         growth_counting counting, float t_near)
 {
     gather_importance(s, f, importance);
-    gather_gradients(s, f, t_near);
+    gather_gradients(s, f, counting, t_near);
 }

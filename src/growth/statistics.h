@@ -10,8 +10,9 @@
 #define GROWTH_STAT_LIST(X)                                                                                  \
     X(importance_accum, "use_accum", false, "sum over views of the anchor's importance")                     \
     X(visit_count, "visit_count", false, "views in which the anchor was visible")                            \
+    X(shown_count, "shown_count", false, "views that its importance is the mean over")                       \
     X(grad_accum, "grad_accum", true, "sum of screen-space gradient norms")                                  \
-    X(grad_count, "grad_count", true, "views in which the Gaussian was geometrically visible")
+    X(grad_count, "grad_count", true, "views in which the Gaussian was seen")
 
 enum {
 #define X(name, label, per_offset, meaning) GROWTH_STAT_##name,
@@ -42,12 +43,22 @@ void growth_stats_free(growth_stats *s);
 
 /** How an anchor's importance is measured. */
 typedef enum growth_importance {
-    GROWTH_BY_SHARE,  /* of the picture that its Gaussians cover: mean over rays of T alpha */
-    GROWTH_BY_OPACITY /* sum of their decoded opacities, as the reference takes it */
+    GROWTH_BY_SHARE,  /* of the picture that its Gaussians cover: mean over rays of T alpha, over the views
+                         that  show it: those before which it is hidden say nothing of its worth */
+    GROWTH_BY_OPACITY /* sum of their decoded opacities, over all views, as the reference takes it */
 } growth_importance;
 
-/** Add what the last render of anchors and its adjoint (frame_backward_gaussians()) say; one thread. */
-void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance, float t_near);
+/** In which views a Gaussian counts as seen. */
+typedef enum growth_counting {
+    GROWTH_COUNT_BLENDED, /* a ray, or a splat's pixel, blended it: any lens */
+    GROWTH_COUNT_IN_CONE /* it touches the cone of a centred pinhole, hidden or not, as the reference takes it
+                          */
+} growth_counting;
+
+/** Add what the last render of anchors and its adjoint (frame_backward_gaussians()) say; one thread. `t_near`
+    of the cone. */
+void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance,
+                         growth_counting counting, float t_near);
 
 /** Mean over the views that saw the Gaussian `slot` (anchor * K + offset); 0 when none did. */
 static inline float growth_mean_gradient(const growth_stats *s, size_t slot)

@@ -13,7 +13,8 @@
 #include "data/cameras_json.h"
 #include "data/gaussian_file.h"
 #include "data/result_folder.h"
-#include "train/rules.h"
+#include "train/camera_sees.h"
+#include "train/near.h"
 
 /* What a result folder says beside its Gaussians: the data set, and what is behind them. */
 static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *err)
@@ -176,7 +177,9 @@ frame_subject loaded_run_subject(const loaded_run *r)
 gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(&r->photos, view, 0);
-    return frame_render(&r->frame, loaded_run_subject(r), &camera, &r->settings, false, err);
+    trace_settings settings = r->settings;
+    settings.t_near = view_near(settings.t_near, &r->def, &r->scene.views[view]);
+    return frame_render(&r->frame, loaded_run_subject(r), &camera, &settings, false, err);
 }
 
 gbt_status loaded_run_preset(gbt_preset preset, trace_settings *settings, gbt_error *err)

@@ -6,14 +6,22 @@
 
 #include "base/vec.h"
 
+bool camera_pixel(const gbt_camera *camera, const float position[3], double pixel[2])
+{
+    double d[3], cam[3];
+    for (int k = 0; k < 3; k++)
+        d[k] = (double)position[k] - camera->center[k];
+    dmat_apply(camera->rotation, d, cam);
+    return gbt_camera_project(camera, cam, pixel) && pixel[0] >= 0 && pixel[1] >= 0 &&
+           pixel[0] < camera->width && pixel[1] < camera->height;
+}
+
 bool camera_sees(const gbt_camera *camera, const float position[3], double *distance)
 {
-    double d[3], cam[3], pixel[2];
+    double d[3], pixel[2];
     for (int k = 0; k < 3; k++)
         d[k] = (double)position[k] - camera->center[k];
     if (distance != NULL)
         *distance = dvec_length(d);
-    dmat_apply(camera->rotation, d, cam);
-    return gbt_camera_project(camera, cam, pixel) && pixel[0] >= 0 && pixel[1] >= 0 &&
-           pixel[0] < camera->width && pixel[1] < camera->height;
+    return camera_pixel(camera, position, pixel);
 }

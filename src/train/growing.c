@@ -12,6 +12,7 @@
 #include "bvh/points.h"
 #include "train/def.h"
 #include "train/camera_sees.h"
+#include "train/near.h"
 
 static const float share_min = 2.5e-6f;     /* of short runs: schedule_threshold_factor() */
 static const double last_rounds_from = 0.9; /* of growing */
@@ -19,7 +20,8 @@ static const double last_rounds_from = 0.9; /* of growing */
 enum {
     ROUNDS_PER_RUN = 100,
     ROUND_INTERVAL = 100 /* steps, where rounds do not go by progress */,
-    INTERVAL_MIN = 20 /* a judgement of fewer views is chance */
+    INTERVAL_MIN = 20 /* a judgement of fewer views is chance */,
+    INTERVAL_MAX = 100 /* and more than these tell nothing new */
 };
 enum { VIEWS_MIN = 2 };
 
@@ -105,8 +107,9 @@ static bool two_views_see(const void *context, const float position[3])
     size_t seen = 0;
     for (size_t v = 0; v < t->train_count && seen < VIEWS_MIN; v++) {
         double distance;
-        seen += camera_sees(&t->scene.views[t->train_views[v]].camera, position, &distance) &&
-                distance > (double)t->settings.t_near;
+        const scene_view *view = &t->scene.views[t->train_views[v]];
+        seen += camera_sees(&view->camera, position, &distance) &&
+                distance > (double)view_near(t->settings.t_near, &t->def, view);
     }
     return seen == VIEWS_MIN;
 }
@@ -129,7 +132,8 @@ static growth_def def_of(const trainer *t)
     if (!t->rules.rounds_by_progress)
         def.interval = ROUND_INTERVAL;
     else
-        def.interval = fmaxf((float)(t->step + 1 - t->round_step), (float)INTERVAL_MIN);
+        def.interval =
+            fminf(fmaxf((float)(t->step + 1 - t->round_step), (float)INTERVAL_MIN), (float)INTERVAL_MAX);
     if (!t->rules.thresholds_by_length)
         return def;
     const float factor =

@@ -44,21 +44,24 @@ static double decay(double first, double last, double progress)
     return first == last ? first : exp((1 - progress) * log(first) + progress * log(last));
 }
 
-static double rate_at(const rate_rule *r, double progress, bool own, double extent, double factor)
+static double rate_at(const rate_rule *r, double progress, bool own, double extent, double factor, double end)
 {
-    const double scale = own ? r->own : r->times_extent ? extent : 1;
-    return factor * decay(r->first, r->last, progress) * scale;
+    const double scale = own               ? r->own
+                         : r->times_extent ? extent
+                                           : 1,
+                 last = own && r->first == r->last ? end * r->first : r->last;
+    return factor * decay(r->first, last, progress) * scale;
 }
 
-learning_rates learning_rates_at(double progress, bool own, double extent, double factor)
+learning_rates learning_rates_at(double progress, bool own, double extent, double factor, double end)
 {
     learning_rates rates = {0};
     if (own && progress > SCHEDULE_COOL_FROM)
         factor *= cool_end + (1 - cool_end) * fmax(1 - progress, 0) / (1 - SCHEDULE_COOL_FROM);
     for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
-        rates.anchor[f] = rate_at(&anchor_rules[f], progress, own, extent, factor);
+        rates.anchor[f] = rate_at(&anchor_rules[f], progress, own, extent, factor, end);
     for (int part = 0; part < DECODER_PARTS; part++)
-        rates.network[part] = rate_at(&network_rules[part], progress, own, extent, factor);
+        rates.network[part] = rate_at(&network_rules[part], progress, own, extent, factor, end);
     return rates;
 }
 

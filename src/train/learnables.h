@@ -37,8 +37,9 @@ typedef struct learning_rates {
  * @param own    [in] true: ours, higher, for runs of some thousand steps; false: the reference method's
  * @param extent [in] of the cameras; the reference's rate of offsets is proportional to it
  * @param factor [in] of all rates
+ * @param end    [in] own: schedule_rate_end(), to which rates without an end of their own decay
  */
-learning_rates learning_rates_at(double progress, bool own, double extent, double factor);
+learning_rates learning_rates_at(double progress, bool own, double extent, double factor, double end);
 
 /** A model in training: the values and what belongs to each. All borrowed. */
 typedef struct learning_model {

@@ -3,18 +3,48 @@
 #include "train/photos.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/fail.h"
+#include "base/machine.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "data/photo_size.h"
 
-enum { PICK_ROWS = 32 /* of one thread at a time */ };
+enum { PICK_ROWS = 32 /* of one thread at a time */, USUAL_WIDTH = 1600 /* as in 3DGS */ };
+
+double photos_usual_downscale(const scene *s)
+{
+    float *widths = mem_alloc(s->view_count, sizeof *widths, "photo widths", NULL);
+    double median = 0;
+    for (size_t i = 0; widths != NULL && i < s->view_count; i++)
+        widths[i] = (float)s->views[i].camera.width;
+    if (widths != NULL && s->view_count > 0) {
+        qsort(widths, s->view_count, sizeof *widths, compare_floats);
+        median = (double)widths[s->view_count / 2];
+    }
+    mem_free(widths);
+    return fmax(1, median / USUAL_WIDTH);
+}
+
+/* Nothing but time depends on it. */
+static size_t kept_bytes(void)
+{
+    const machine m = machine_read("");
+    size_t kept = PHOTOS_KEPT_BYTES;
+    if (m.memory_free_bytes > 0 && m.memory_free_bytes / 2 < kept)
+        kept = m.memory_free_bytes / 2;
+    return m.memory_limit_bytes / 2 < kept ? m.memory_limit_bytes / 2 : kept;
+}
 
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err)
 {
-    *p = (photos){.source = source, .downscale = downscale};
+    *p = (photos){.source = source,
+                  .downscale = downscale > 0 ? downscale : 1,
+                  .bytes_max = kept_bytes(),
+                  .passing = SIZE_MAX};
     p->full = mem_calloc(source->view_count, sizeof *p->full, "photo cache", err);
     p->pixels = mem_calloc(source->view_count, sizeof *p->pixels, "photo cache", err);
     p->full_valid = mem_calloc(source->view_count, sizeof *p->full_valid, "photo cache", err);
@@ -96,11 +126,27 @@ static void from_bytes(const unsigned char *bytes, image *out)
     parallel_blocks((size_t)out->height, PICK_ROWS, pick_rows, &job);
 }
 
-/* Into p->full, if it is not there. */
-static gbt_status read_full(photos *p, size_t view, gbt_error *err)
+static size_t full_bytes(const photos *p, size_t view)
 {
-    if (p->full[view] != NULL)
-        return GBT_OK;
+    const gbt_camera camera = photos_camera(p, view, 0);
+    return 3 * (size_t)camera.width * (size_t)camera.height;
+}
+
+static void drop_passing(photos *p)
+{
+    if (p->passing == SIZE_MAX)
+        return;
+    unsigned char **const caches[] = {p->full, p->full_valid};
+    for (int i = 0; i < 2; i++) {
+        mem_free(caches[i][p->passing]);
+        caches[i][p->passing] = NULL;
+    }
+    p->passing = SIZE_MAX;
+}
+
+/* Into p->full. */
+static gbt_status read_into(photos *p, size_t view, gbt_error *err)
+{
     const gbt_camera camera = photos_camera(p, view, 0);
     image photo;
     GBT_TRY(scene_read_photo_valid(&p->source->views[view], camera.width, camera.height, &photo,
@@ -114,6 +160,24 @@ static gbt_status read_full(photos *p, size_t view, gbt_error *err)
     return status;
 }
 
+/* Into p->full, if it is not there. Views come in random order, each as often as any other: the first that
+   were read stay, for whatever else stayed would be asked for no sooner. */
+static gbt_status read_full(photos *p, size_t view, gbt_error *err)
+{
+    if (p->full[view] != NULL)
+        return GBT_OK;
+    const size_t more = full_bytes(p, view);
+    const bool stays = p->bytes + more <= p->bytes_max;
+    if (!stays)
+        drop_passing(p);
+    GBT_TRY(read_into(p, view, err));
+    if (stays)
+        p->bytes += more;
+    else
+        p->passing = view;
+    return GBT_OK;
+}
+
 typedef struct load_job {
     photos *photos;
     const size_t *views;
@@ -125,11 +189,18 @@ static void load_one(size_t block, size_t begin, size_t end, void *context)
 {
     (void)end;
     const load_job *job = context;
-    job->status[block] = read_full(job->photos, job->views[begin], &job->error[block]);
+    const size_t view = job->views[begin];
+    job->status[block] =
+        job->photos->full[view] != NULL ? GBT_OK : read_into(job->photos, view, &job->error[block]);
 }
 
 gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *err)
 {
+    size_t fitting = 0;
+    for (size_t bytes = p->bytes; fitting < count && bytes + full_bytes(p, views[fitting]) <= p->bytes_max;
+         fitting++)
+        bytes += full_bytes(p, views[fitting]);
+    count = fitting;
     load_job job = {.photos = p,
                     .views = views,
                     .status = mem_calloc(count, sizeof *job.status, "photos", err),
@@ -140,6 +211,8 @@ gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *
     for (size_t i = 0; status == GBT_OK && i < count; i++)
         if (job.status[i] != GBT_OK)
             status = base_fail(err, job.status[i], "%s", job.error[i].text);
+        else
+            p->bytes += full_bytes(p, views[i]);
     mem_free(job.status);
     mem_free(job.error);
     return status;
@@ -197,45 +270,81 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *
     return GBT_OK;
 }
 
-/* The marks of every `stride`-th pixel from `phase` on, if the photo has any. */
-static gbt_status pick_valid(photos *p, size_t view, int full_width, const photo_sample *sample, int width,
-                             int height, const unsigned char **valid, gbt_error *err)
+/* The pixels of a photo that are picked: where the first is, how far apart they are, and how many. */
+typedef struct pick {
+    int first[2], step, width, height;
+} pick;
+
+/* The marks of picked pixels, if the photo has any. */
+static gbt_status pick_valid(photos *p, size_t view, int full_width, const pick *from,
+                             const unsigned char **valid, gbt_error *err)
 {
     const unsigned char *full = p->full_valid[view];
     *valid = NULL;
     if (full == NULL)
         return GBT_OK;
-    const size_t w = (size_t)width, h = (size_t)height, step = (size_t)1 << sample->level;
+    const size_t w = (size_t)from->width, h = (size_t)from->height, step = (size_t)from->step;
     GBT_TRY(
         mem_reserve((void **)&p->sample_valid, &p->sample_valid_capacity, 0, w * h, 1, "valid pixels", err));
     for (size_t y = 0; y < h; y++)
         for (size_t x = 0; x < w; x++)
-            p->sample_valid[y * w + x] = full[(y * step + (size_t)sample->phase[1]) * (size_t)full_width +
-                                              x * step + (size_t)sample->phase[0]];
+            p->sample_valid[y * w + x] = full[(y * step + (size_t)from->first[1]) * (size_t)full_width +
+                                              x * step + (size_t)from->first[0]];
     *valid = p->sample_valid;
     return GBT_OK;
+}
+
+/* One of `parts` along a length: all are as long, the first and the last reach its ends. */
+static int part_first(int length, int part_length, int part, int parts)
+{
+    return (int)((int64_t)(length - part_length) * part / (parts - 1));
+}
+
+/* The camera of picked pixels; false where the lens cannot be shifted. */
+static bool pick_camera(const gbt_camera *full, const photo_sample *sample, pick *from, gbt_camera *camera)
+{
+    if (sample->level > 0) {
+        *from = (pick){.first = {sample->phase[0], sample->phase[1]}, .step = 1 << sample->level};
+        if (!gbt_camera_every(full, from->step, from->first[0], from->first[1], camera))
+            return false;
+        from->width = camera->width;
+        from->height = camera->height;
+        return true;
+    }
+    const int parts = sample->parts, width = (full->width + parts - 1) / parts,
+              height = (full->height + parts - 1) / parts;
+    *from = (pick){.first = {part_first(full->width, width, sample->part[0], parts),
+                             part_first(full->height, height, sample->part[1], parts)},
+                   .step = 1,
+                   .width = width,
+                   .height = height};
+    if (!gbt_camera_shifted(full, from->first[0], from->first[1], camera))
+        return false;
+    camera->width = width;
+    camera->height = height;
+    return true;
 }
 
 gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out,
                              gbt_camera *camera, const unsigned char **valid, int *step, gbt_error *err)
 {
     const gbt_camera full = photos_camera(p, view, 0);
-    if (sample->level == 0 ||
-        !gbt_camera_every(&full, 1 << sample->level, sample->phase[0], sample->phase[1], camera)) {
+    pick from;
+    if ((sample->level == 0 && sample->parts <= 1) || !pick_camera(&full, sample, &from, camera)) {
         *camera = photos_camera(p, view, sample->level);
         *step = 1;
         GBT_TRY(photos_get(p, view, sample->level, out, err));
         *valid = photos_valid(p, view);
         return GBT_OK;
     }
-    *step = 1 << sample->level;
+    *step = from.step;
     GBT_TRY(read_full(p, view, err));
-    GBT_TRY(image_fit(out, camera->width, camera->height, 3, err));
+    GBT_TRY(image_fit(out, from.width, from.height, 3, err));
     const size_t row = 3 * (size_t)full.width;
-    pick_job job = {.from = p->full[view] + (size_t)sample->phase[1] * row + 3 * (size_t)sample->phase[0],
+    pick_job job = {.from = p->full[view] + (size_t)from.first[1] * row + 3 * (size_t)from.first[0],
                     .row = row,
-                    .step = (size_t)*step,
+                    .step = (size_t)from.step,
                     .out = out};
     parallel_blocks((size_t)out->height, PICK_ROWS, pick_rows, &job);
-    return pick_valid(p, view, full.width, sample, camera->width, camera->height, valid, err);
+    return pick_valid(p, view, full.width, &from, valid, err);
 }

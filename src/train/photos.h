@@ -1,14 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/photos.h -- the training photos, read once and kept as 8 bit; whole, smaller, or every n-th pixel of
-   them. */
+/* train/photos.h -- the training photos, kept as 8 bit as far as memory allows; whole, smaller, every n-th
+   pixel of them, or a part. */
 #ifndef GBT_TRAIN_PHOTOS_H
 #define GBT_TRAIN_PHOTOS_H
 
 #include "data/scene.h"
 
+/** Bytes of photos at full size that a run keeps at most: half of the memory that is free, and this. */
+#define PHOTOS_KEPT_BYTES ((size_t)1 << 32)
+
 typedef struct photos {
     const scene *source; /* borrowed */
     double downscale;
+    size_t bytes_max; /* of photos at full size that are kept; the others are read whenever they are asked for
+                       */
+    size_t bytes;     /* of those that are */
+    size_t passing;   /* a view whose photo stays until the next that finds no room; SIZE_MAX: none */
     int level;
     unsigned char **full;   /* [view_count] at level 0, NULL until asked for */
     unsigned char **pixels; /* [view_count] at `level` > 0, made from `full` */
@@ -19,17 +26,24 @@ typedef struct photos {
 } photos;
 
 /** Which pixels of a photo a training step looks at: every 2^level-th in both directions, from pixel `phase`
-    on. {0}: all. */
+    on; or at level 0 one of parts x parts equal parts. {0}: all. */
 typedef struct photo_sample {
     int level;    /* >= 0 */
     int phase[2]; /* x, y, [0, 2^level) */
+    int parts;    /* 0 and 1: whole */
+    int part[2];  /* x, y, [0, parts) */
 } photo_sample;
 
+/** By which the photos of a scene are divided where nobody says: the median one becomes 1,600 pixels wide, if
+    it is wider. */
+double photos_usual_downscale(const scene *s);
+
+/** `downscale` 0 is 1. */
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err);
 void photos_close(photos *p);
 
-/** Read the photos of `views` now, on all threads; else each is read when first asked for. The first failure
-    in their order is reported. */
+/** Read the photos of `views` now, on all threads, as many as may be kept; else each is read when first asked
+    for. The first failure in their order is reported. */
 gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *err);
 
 /** Camera of a view at a level: its size is round(stated / downscale / 2^level), at least 1. */
@@ -44,8 +58,9 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *
  * photo at full size through the middle of these pixels.
  *
  * Where the lens model has no principal point to shift (equirectangular), photo and camera are those of the
- * level instead.
- * @param camera [out] may be smaller than the photo / 2^level by a pixel: the same size for every phase
+ * level instead, and whole. Parts overlap where the size is no multiple of their number.
+ * @param camera [out] may be smaller than the photo / 2^level by a pixel: the same size for every phase, and
+ *                     for every part
  * @param valid  [out] as photos_valid(), of these pixels; borrowed until the next call
  * @param step   [out] how many of the photo's pixels lie from one pixel of `camera` to the next: 2^level, or
  *                     1 for a smaller photo

@@ -10,6 +10,10 @@
 #include "growth/statistics.h"
 #include "train/schedule.h"
 
+/** Pixels of a step at most, within a factor of 2: what the schedule was chosen on, photos of 320 x 480 to
+ * 360 x 640. */
+#define TRAIN_STEP_PIXELS 262144.0
+
 typedef struct train_rules {
     /* settings that are left open, or decided */
     int offsets;                                    /* Gaussians per anchor */
@@ -21,6 +25,8 @@ typedef struct train_rules {
     bool recentres;              /* local coordinates begin in the middle of the points; else the cells of
                                     voxels and of growth are where the world's coordinates put them */
     float near_depth;            /* scene units: nothing nearer, where uses_near does not say */
+    bool limits_width;           /* photos_usual_downscale(), where nobody says */
+    bool finds_exposure;         /* exposure is learned where photos differ in it */
     bool adds_to_few_points;     /* by photo consistency, where the data set has few points */
     bool limits_first_scale;     /* an isolated point would start as a floater */
     bool features_from_colors;   /* first features carry the colour of the nearest point */
@@ -35,28 +41,31 @@ typedef struct train_rules {
                          draws them */
 
     /* a step */
-    bool counts_from_one;             /* rates and growth go by the progress after a step, and growth leaves
-                                         out its first and last one; else by the progress before it */
-    bool last_step_learns;            /* else nothing changes in the last step of a run */
-    int start_level;                  /* first steps look at 1 pixel in 4^this */
-    double splats_until;              /* part of the run in which splats stand for rays */
-    bool loose_cutoffs;               /* SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN until SCHEDULE_WHOLE_FROM */
-    bool raises_first_opacity;        /* of offsets that begin below 0 */
-    bool own_rates;                   /* higher learning rates, that fall to nothing in the end */
+    bool counts_from_one;      /* rates and growth go by the progress after a step, and growth leaves
+                                  out its first and last one; else by the progress before it */
+    bool last_step_learns;     /* else nothing changes in the last step of a run */
+    int start_level;           /* first steps look at 1 pixel in 4^this */
+    double step_pixels;        /* a step looks at no more of a photo, and at 1 in 4^start_level of these
+                                  first */
+    double splats_until;       /* part of the run in which splats stand for rays */
+    bool loose_cutoffs;        /* SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN until SCHEDULE_WHOLE_FROM */
+    bool raises_first_opacity; /* of offsets that begin below 0 */
+    bool own_rates;            /* higher learning rates, that fall to nothing in the end */
     bool anchors_learn_when_adjusted; /* else they miss the step in which anchors change */
 
     /* growing and pruning */
-    growth_importance importance; /* by which anchors are pruned */
-    bool own_adam_age;            /* Adam's age of an anchor is from its start; else from the run's start */
-    bool rounds_by_progress;      /* each hundredth of the run; else every 100 steps */
-    bool thresholds_by_length;    /* of growing and pruning: schedule_threshold_factor() and the settings'
-                                     factors */
-    bool grows_at_points;         /* sparse points are candidates too */
-    bool needs_two_views;         /* new anchors stand where two training photos look */
-    bool integer_division;        /* of cell sizes and thresholds of levels: 4 / 16 is 0 */
-    bool coarse_level_gates;      /* a level that adds nothing ends the search */
-    bool at_cell_center;          /* new anchors stand in the middle of their cell; else at the candidate */
-    float shape_log_max;          /* scale_log[3..5] are cut to this in a round */
+    growth_importance importance;      /* by which anchors are pruned */
+    growth_counting gradient_counting; /* in which views the gradient of a Gaussian counts */
+    bool own_adam_age;         /* Adam's age of an anchor is from its start; else from the run's start */
+    bool rounds_by_progress;   /* each hundredth of the run; else every 100 steps */
+    bool thresholds_by_length; /* of growing and pruning: schedule_threshold_factor() and the settings'
+                                  factors */
+    bool grows_at_points;      /* sparse points are candidates too */
+    bool needs_two_views;      /* new anchors stand where two training photos look */
+    bool integer_division;     /* of cell sizes and thresholds of levels: 4 / 16 is 0 */
+    bool coarse_level_gates;   /* a level that adds nothing ends the search */
+    bool at_cell_center;       /* new anchors stand in the middle of their cell; else at the candidate */
+    float shape_log_max;       /* scale_log[3..5] are cut to this in a round */
 } train_rules;
 
 /** The rules for these settings: ours, or with `compat` all of the reference. */

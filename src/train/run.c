@@ -143,9 +143,8 @@ static void pace_extend(trainer *t, const speed *s)
     double per_step = 0;
     for (int i = 0; i < 8; i++) {
         const double progress = (part + (i + 0.5) / 8) / PACE_SEGMENTS;
-        const gbt_camera camera =
-            photos_camera(&t->photos, t->train_views[0], trainer_level(t, t->train_views[0], progress));
-        per_step += (s->fixed_seconds + s->pixel_seconds * camera.width * camera.height) / 8;
+        const double pixels = trainer_step_pixels(t, t->train_views[0], progress);
+        per_step += (s->fixed_seconds + s->pixel_seconds * pixels) / 8;
     }
     /* Before anything has been measured: a few steps, and the rest of the first part's time goes to the
        next. */

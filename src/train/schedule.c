@@ -86,6 +86,8 @@ float schedule_threshold_factor(double steps)
     return (float)fmin(fmax(sqrt(1000 / fmax(steps, 1)), 0.25), 1);
 }
 
+double schedule_rate_end(double steps) { return fmin(fmax(sqrt(4000 / fmax(steps, 1)), 0.1), 1); }
+
 double schedule_level_start(int level, int start_level)
 {
     if (level >= start_level)

@@ -65,6 +65,13 @@ double schedule_level_start(int level, int start_level);
  */
 float schedule_threshold_factor(double steps);
 
+/**
+ * Where the learning rates that a short run keeps (features, scales) end in a long one, as a part of where
+ * they begin: 1 up to 4000 steps, then falling with their square root, down to 0.1. A run that takes ten
+ * times the steps is to come ten times as near.
+ */
+double schedule_rate_end(double steps);
+
 /** From here on all pixels, and the cut-offs of rendering; before, SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN:
     half as many hits per ray. */
 #define SCHEDULE_WHOLE_FROM 0.85

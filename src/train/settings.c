@@ -46,8 +46,10 @@ static const gbt_train_setting settings[] = {
      .saved = true, .rare = true, .help = "whether the camera distance is an input of the networks"},
     {NAMED("pace", pace), .kind = GBT_SETTING_TEXT, .unit = "N1,...,N20", .saved = true, .rare = true,
      .help = "repeat a run with a budget bit for bit: the pace recorded in its train.json"},
-    {NAMED("downscale", downscale), RANGE(DOUBLE, 1, 64, "F"), .number = 1, .saved = true,
-     .help = "divide the photos' width and height by this", .aliases = "d r resolution data-factor"},
+    {NAMED("downscale", downscale), RANGE(DOUBLE, 1, 64, "F"), .or_zero = true, .number = 0, .saved = true,
+     .help =
+         "divide the photos' width and height by this; 0: photos wider than 1,600 pixels become that wide",
+     .aliases = "d r resolution data-factor"},
     {NAMED("renderer", renderer), CHOICE(GBT_RENDERER_TRAINING_NAMES), .number = GBT_RENDERER_TRACE,
      .saved = true, .rare = true,
      .help =
@@ -88,6 +90,8 @@ static const gbt_train_setting settings[] = {
      .help = "follow the reference implementation in every detail (docs/compat.md)"},
     {NAMED("exposure", exposure), FLAG, .saved = true,
      .help = "learn a colour matrix per photo, for photos that differ in exposure or white balance"},
+    {NAMED("find-exposure", find_exposure), FLAG, .rare = true, .number = 1, .saved = true,
+     .help = "do not turn exposure on where the photos' exposures differ"},
     {NAMED("splats-until", splats_until), RANGE(DOUBLE, 0, 1, "F"), .number = 0.7, .saved = true,
      .rare = true,
      .help =

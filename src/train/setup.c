@@ -14,8 +14,10 @@
 #include "bvh/points.h"
 #include "data/photo_check.h"
 #include "train/def.h"
+#include "train/light.h"
 #include "train/seed_points.h"
 #include "train/camera_sees.h"
+#include "train/near.h"
 #include "train/trainer.h"
 
 enum { STREAM_NETWORKS = 2, FEW_PLACES = 128 };
@@ -211,6 +213,34 @@ static gbt_status make_state(trainer *t, gbt_error *err)
     return growth_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
 }
 
+/* What photos are divided by, where that was left open. */
+static void choose_downscale(trainer *t)
+{
+    if (t->def.downscale > 0)
+        return;
+    t->def.downscale = t->rules.limits_width ? photos_usual_downscale(&t->scene) : 1;
+    if (t->def.downscale > 1)
+        log_info("%s: photos are trained on %.0f pixels wide, divided by %.4g (downscale 1: as they are)",
+                 t->scene.folder, t->scene.views[t->train_views[0]].camera.width / t->def.downscale,
+                 t->def.downscale);
+}
+
+/* Photos that differ in exposure contradict each other wherever they overlap. */
+static gbt_status choose_exposure(trainer *t, gbt_error *err)
+{
+    double stops;
+    if (t->def.exposure || !t->def.find_exposure || !t->rules.finds_exposure)
+        return GBT_OK;
+    GBT_TRY(light_spread(&t->photos, t->train_views, t->train_count, &stops, err));
+    t->def.exposure = stops > LIGHT_SPREAD_MIN;
+    if (t->def.exposure)
+        log_info(
+            "%s: the photos' exposures differ by about %.2g stops: a colour matrix is learned for each, as "
+            "with exposure (turned off by find_exposure)",
+            t->scene.folder, stops);
+    return GBT_OK;
+}
+
 static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
 {
     const gbt_train_def *def = &t->def;
@@ -225,30 +255,17 @@ static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
     photo_check check;
     photo_check_all(&t->scene, &check);
     photo_check_warn(&check, data);
+    choose_downscale(t);
     GBT_TRY(photos_open(&t->photos, &t->scene, def->downscale, err));
     GBT_TRY(photos_load(&t->photos, t->train_views, t->train_count, err));
     t->extent = scene_camera_extent(&t->scene);
     GBT_TRY(provide_points(t, err));
+    GBT_TRY(choose_exposure(t, err));
     t->voxel_size = def->voxel_size;
     if (t->voxel_size > 0)
         return GBT_OK;
     return balls_voxel_size(t->scene.points.position, t->scene.points.count, t->rules.voxel, &t->voxel_size,
                             err);
-}
-
-/* Nothing can be nearer to a camera than this. Where a photo was taken there is room up to what it shows,
-   also when the model puts a wall in its way that only others show, from afar, and from its other side.
-   `median` of the distances of anchors. */
-static float near_depth(const trainer *t, float median)
-{
-    const float least = 0.02f * median;
-    double nearest = INFINITY;
-    for (size_t v = 0; v < t->train_count; v++) {
-        const double of_view = t->scene.views[t->train_views[v]].nearest;
-        if (of_view > 0)
-            nearest = fmin(nearest, of_view);
-    }
-    return isfinite(nearest) ? fmaxf(least, (float)(t->def.near * nearest)) : least;
 }
 
 /* Networks with random weights, and what the anchors' distances say: their unit, t_near, the range of
@@ -270,7 +287,12 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     t->decoder.distance_min = p5 * t->decoder.distance_scale;
     t->decoder.distance_max = p95 * t->decoder.distance_scale;
     t->settings = trace_settings_default();
-    t->settings.t_near = t->rules.uses_near ? near_depth(t, median) : t->rules.near_depth;
+    if (t->rules.uses_near) {
+        GBT_TRY(scene_near(&t->scene, t->train_views, t->train_count, def->near, &t->settings.t_near, err));
+        t->settings.t_near = fmaxf(t->settings.t_near, 0.02f * median);
+    } else {
+        t->settings.t_near = t->rules.near_depth;
+    }
     if (!(p5 > t->settings.t_near))
         log_warn("%s: nothing nearer to a camera than %g is drawn, and some of the scene is at %g",
                  t->scene.folder, (double)t->settings.t_near, (double)p5);

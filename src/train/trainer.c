@@ -15,12 +15,15 @@
 #include "train/gradient_check.h"
 #include "train/growing.h"
 #include "train/loss.h"
+#include "train/camera_sees.h"
+#include "train/near.h"
 
 static const float raised_opacity = 0.1f;
 enum { MAX_SKIPPED_IN_ROW = 10 };
 enum {
     STREAM_VIEWS = 1,
     STREAM_PIXELS = 4,
+    STREAM_PARTS = 6,
     LEAST_PIXELS_ACROSS = 80, /* with fewer a step would not be faster */
     REASON_SIZE = 384,
     EMPTY_STEPS = 5
@@ -50,24 +53,53 @@ static size_t pick_view(trainer *t)
     return t->order[t->step % t->train_count];
 }
 
-int trainer_level(const trainer *t, size_t view, double progress)
+step_size trainer_step_size(const trainer *t, size_t view, double progress)
 {
     const gbt_camera camera = photos_camera(&t->photos, view, 0);
     const int across = camera.width < camera.height ? camera.width : camera.height;
+    const double budgets = (double)camera.width * camera.height / t->rules.step_pixels;
     int level = schedule_level(progress, t->rules.start_level);
+    if (level == 0) {
+        gbt_camera shifted;
+        const bool has_parts = budgets > 1 && gbt_camera_shifted(&camera, 0, 0, &shifted);
+        return (step_size){.parts = has_parts ? (int)fmax(1, round(sqrt(budgets))) : 1};
+    }
+    for (double left = budgets; left > 2; left /= 4)
+        level++;
     while (level > 0 && across >> level < LEAST_PIXELS_ACROSS)
         level--;
-    return level;
+    return (step_size){.level = level, .parts = 1};
 }
 
-/* Which of its pixels: every 2^level-th, the first at random. */
-static photo_sample pick_pixels(const trainer *t, int level)
+double trainer_step_pixels(const trainer *t, size_t view, double progress)
+{
+    const step_size size = trainer_step_size(t, view, progress);
+    const gbt_camera camera = photos_camera(&t->photos, view, size.level);
+    return (double)camera.width * camera.height / (size.parts * size.parts);
+}
+
+/* The first of every 2^level-th pixel: at most four places along a side, so that what is known of the lens at
+   these pixels (RAY_LENSES) serves other steps too. */
+static int random_phase(uint32_t word, int level)
+{
+    const int places = level < 2 ? 1 << level : 4, apart = (1 << level) / places;
+    return (int)(word % (uint32_t)places) * apart + apart / 2;
+}
+
+/* Which pixels of the photo: random ones of every 2^level-th; or a part, another one whenever the photo comes
+   up, so that all have their turn. */
+static photo_sample pick_pixels(const trainer *t, step_size size, size_t slot)
 {
     uint32_t words[4];
     rng_philox(t->def.seed, STREAM_PIXELS, t->step, words);
-    return (photo_sample){
-        .level = level,
-        .phase = {(int)(words[0] & ((1u << level) - 1)), (int)(words[1] & ((1u << level) - 1))}};
+    if (size.level > 0)
+        return (photo_sample){
+            .level = size.level,
+            .phase = {random_phase(words[0], size.level), random_phase(words[1], size.level)}};
+    rng_philox(t->def.seed, STREAM_PARTS, slot, words);
+    const uint64_t parts = (uint64_t)size.parts,
+                   turn = (words[0] + t->step / t->train_count) % (parts * parts);
+    return (photo_sample){.parts = size.parts, .part = {(int)(turn % parts), (int)(turn / parts)}};
 }
 
 /* Splats teach a model that is still rough in half the time of rays, which have the last word. */
@@ -158,13 +190,15 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     const bool learns = t->rules.last_step_learns || next < 1;
     const learning_rates rates =
         learning_rates_at(train_rules_progress(&t->rules, &t->pace, t->step), t->rules.own_rates, t->extent,
-                          t->def.learning_rate_factor);
+                          t->def.learning_rate_factor, schedule_rate_end(pace_expected(&t->pace, t->step)));
 
     /* A view, and as many of its pixels as the model can already use. */
     const size_t slot = pick_view(t), view = t->train_views[slot];
-    out->level = trainer_level(t, view, progress);
+    const step_size size = trainer_step_size(t, view, progress);
+    out->level = size.level;
+    out->parts = size.parts;
     double clock = clock_wall();
-    const photo_sample sample = pick_pixels(t, out->level);
+    const photo_sample sample = pick_pixels(t, size, slot);
     gbt_camera camera;
     const unsigned char *valid;
     frame *f = &t->frame;
@@ -177,6 +211,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     /* Render, compare. */
     f->draw.renderer = renderer_of_step(t, &camera, progress);
     trace_settings settings = t->settings;
+    settings.t_near = view_near(t->settings.t_near, &t->def, &t->scene.views[view]);
     if (t->rules.loose_cutoffs && progress < SCHEDULE_WHOLE_FROM) {
         settings.alpha_min = SCHEDULE_ALPHA_MIN;
         settings.transmittance_min = SCHEDULE_T_MIN;
@@ -188,6 +223,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     clock = clock_wall();
     image_loss_result loss;
     double d_exposure[AFFINE_NUMBERS];
+    GBT_TRY(frame_valid(f, valid, &valid, err));
     GBT_TRY(compare(t, slot, valid, &loss, d_exposure, err));
     out->loss = loss.loss + loss_of_gaussians(&f->gaussians);
     out->l1 = loss.l1;
@@ -229,7 +265,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     /* Anchors. */
     clock = clock_wall();
     if (growing_gathers(t))
-        growth_stats_gather(&t->stats, f, t->rules.importance, t->settings.t_near);
+        growth_stats_gather(&t->stats, f, t->rules.importance, t->rules.gradient_counting, settings.t_near);
     if (adjust)
         GBT_TRY(growing_round(t, err));
     out->adjust_seconds = clock_wall() - clock;
@@ -247,15 +283,20 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
     for (size_t i = 0; i < t->scene.view_count && status == GBT_OK; i++) {
         if (!t->scene.views[i].is_test)
             continue;
-        unsigned char *valid = NULL;
+        unsigned char *marks = NULL;
+        const unsigned char *valid = NULL;
         const gbt_camera camera = photos_camera(&t->photos, i, 0);
         t->frame.draw.pixel_step = 1;
         t->frame.draw.renderer = t->renderer;
-        status = frame_render(&t->frame, frame_neural(&t->anchors, &t->decoder), &camera, &t->settings, false,
-                              err);
+        trace_settings settings = t->settings;
+        settings.t_near = view_near(t->settings.t_near, &t->def, &t->scene.views[i]);
+        status =
+            frame_render(&t->frame, frame_neural(&t->anchors, &t->decoder), &camera, &settings, false, err);
         if (status == GBT_OK)
             status =
-                scene_read_photo_valid(&t->scene.views[i], camera.width, camera.height, &photo, &valid, err);
+                scene_read_photo_valid(&t->scene.views[i], camera.width, camera.height, &photo, &marks, err);
+        if (status == GBT_OK)
+            status = frame_valid(&t->frame, marks, &valid, err);
         image_scores scores = {0};
         if (status == GBT_OK)
             status =
@@ -265,7 +306,7 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
             count++;
         }
         image_free(&photo);
-        mem_free(valid);
+        mem_free(marks);
     }
     *psnr = count > 0 ? sum / (double)count : (double)NAN;
     return status;

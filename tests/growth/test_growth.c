@@ -99,17 +99,19 @@ static void two_candidates_in_one_cell(void **state) /* T6 */
 
 typedef struct prune_case {
     const char *name;
-    float accum, visits;
+    float accum, visits, shown;
     bool pruned, reset;
 } prune_case;
 
 static prune_case prune_cases[] = {
-    {"0.4 < 0.405 at 81 views (T7)", 0.4f, 81, true, false},
-    {"80 views are not enough (T7)", 0.4f, 80, false, false},
-    {"exactly 0.005 of the views stays", 0.005f * 81, 81, false, true},
-    {"a hair below goes", 0x1.fffffep-1f * 0.005f * 81, 81, true, false},
-    {"opaque stays and is reset", 20, 500, false, true},
-    {"never seen", 0, 0, false, false},
+    {"0.4 < 0.405 at 81 views (T7)", 0.4f, 81, 81, true, false},
+    {"80 views are not enough (T7)", 0.4f, 80, 80, false, false},
+    {"exactly 0.005 of the views stays", 0.005f * 81, 81, 81, false, true},
+    {"a hair below goes", 0x1.fffffep-1f * 0.005f * 81, 81, 81, true, false},
+    {"opaque stays and is reset", 20, 500, 500, false, true},
+    {"never seen", 0, 0, 0, false, false},
+    {"the views that it is hidden from do not count", 0.04f, 100, 8, false, true},
+    {"hidden from all", 0, 100, 0, true, false},
 };
 
 static void prunes(void **state)
@@ -118,6 +120,7 @@ static void prunes(void **state)
     scene sc = empty_scene(2, 1); /* anchor 0 keeps the scene from becoming empty */
     sc.s.importance_accum[1] = c->accum;
     sc.s.visit_count[1] = c->visits;
+    sc.s.shown_count[1] = c->shown;
     growth_def def = growth_def_default();
     def.voxel_size = 1.0f;
     growth_result r;
@@ -288,7 +291,7 @@ static void the_last_anchor_stays(void **state)
     (void)state;
     scene sc = empty_scene(3, 1);
     for (size_t i = 0; i < 3; i++) {
-        sc.s.visit_count[i] = 100;
+        sc.s.visit_count[i] = sc.s.shown_count[i] = 100;
         sc.s.importance_accum[i] = i == 1 ? 0.2f : 0.1f;
         sc.a.position[i * 3] = (float)i;
     }
@@ -310,7 +313,7 @@ static void parts_can_be_switched_off(void **state)
         scene sc = empty_scene(2, 1);
         sc.a.offset[0] = 17.0f;
         set_gradient(&sc, 0, 2.5e-4f);
-        sc.s.visit_count[1] = 100;
+        sc.s.visit_count[1] = sc.s.shown_count[1] = 100;
         growth_def def = growth_def_default();
         def.voxel_size = 1.0f;
         def.grow = mode & 1;
@@ -351,7 +354,7 @@ static void the_cap_takes_the_largest_gradients(void **state)
             sc.a.offset[i * 3] = 16.0f * (float)(i + 1);
             set_gradient(&sc, i, 2e-4f + gradients[i] * 1e-5f);
         }
-        sc.s.visit_count[6] = 100;
+        sc.s.visit_count[6] = sc.s.shown_count[6] = 100;
         growth_def def = growth_def_default();
         def.voxel_size = 1.0f;
         def.max_anchors = cases[t].max_anchors;
@@ -501,7 +504,8 @@ static scene random_scene(uint64_t seed, size_t count, int offset_count)
     assert_ok(growth_stats_resize(&sc.s, count, offset_count, NULL));
     for (size_t i = 0; i < count; i++) {
         sc.s.visit_count[i] = floorf(spread(seed, 50, i, 0, 160));
-        sc.s.importance_accum[i] = sc.s.visit_count[i] * spread(seed, 51, i, 0, 0.02f);
+        sc.s.shown_count[i] = floorf(sc.s.visit_count[i] * spread(seed, 52, i, 0.2f, 1));
+        sc.s.importance_accum[i] = sc.s.shown_count[i] * spread(seed, 51, i, 0, 0.02f);
     }
     for (size_t i = 0; i < count * (size_t)offset_count; i++) {
         sc.s.grad_count[i] = floorf(spread(seed, 52, i, 0, 80));
@@ -559,7 +563,8 @@ static void rounds_agree_with_brute_force(void **state)
         const size_t k = (size_t)offset_count;
         for (size_t i = 0; i < count; i++) {
             const bool is_judged = before.s.visit_count[i] > 80;
-            const bool transparent = before.s.importance_accum[i] < 0.005f * before.s.visit_count[i];
+            const bool transparent =
+                before.s.importance_accum[i] < 0.005f * fmaxf(before.s.shown_count[i], 1);
             if (is_judged && transparent && (row >= r.survivors || r.source[row] != i)) /* the last one may
                                                                                            have stayed */
                 continue;
@@ -570,6 +575,7 @@ static void rounds_agree_with_brute_force(void **state)
             assert_memory_equal(sc.a.scale_log + row * 6, before.a.scale_log + i * 6, 6 * sizeof(float));
             assert_memory_equal(sc.a.position + row * 3, before.a.position + i * 3, 3 * sizeof(float));
             assert_true(sc.s.visit_count[row] == (is_judged ? 0 : before.s.visit_count[i]));
+            assert_true(sc.s.shown_count[row] == (is_judged ? 0 : before.s.shown_count[i]));
             assert_true(sc.s.importance_accum[row] == (is_judged ? 0 : before.s.importance_accum[i]));
             for (size_t j = 0; j < k; j++) {
                 const bool sampled = before.s.grad_count[i * k + j] > 40;

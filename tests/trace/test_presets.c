@@ -248,6 +248,23 @@ static void dropped_hits_reach_their_bound(void **state)
     }
 }
 
+/* The bound is for one hit: of thousands that are left out on one ray the error is the sum, also with
+   "exact". */
+static void many_dropped_hits_add_up(void **state)
+{
+    (void)state;
+    enum { COUNT = 5000 };
+    const trace_settings s = preset(GBT_PRESET_EXACT), all = whole();
+    float opacity[COUNT], white[COUNT];
+    for (int k = 0; k < COUNT; k++) {
+        opacity[k] = 9.9e-6f;
+        white[k] = 1;
+    }
+    const double bound = COUNT * (double)s.alpha_min,
+                 error = blend_discs(&all, COUNT, opacity, white) - blend_discs(&s, COUNT, opacity, white);
+    assert_true(error > 0.048 && error <= bound && error > 20 * half_step);
+}
+
 /* A hit of alpha_max that would bring T just below T_min is not blended, and T_min / (1 - alpha_max) is what
    it would have covered. */
 static void the_stop_reaches_its_bound(void **state)
@@ -284,6 +301,7 @@ int main(void)
         cmocka_unit_test(random_scenes_stay_in_bounds),
         cmocka_unit_test(peer_scene_stays_in_bounds),
         cmocka_unit_test(dropped_hits_reach_their_bound),
+        cmocka_unit_test(many_dropped_hits_add_up),
         cmocka_unit_test(the_stop_reaches_its_bound),
         cmocka_unit_test(alpha_max_reaches_its_bound),
     };

@@ -124,6 +124,79 @@ static void masked_pixels_have_no_say(void **state)
     }
 }
 
+/* ---- pixels without a ray ---- */
+
+/* A lens that folds inside the picture: nearly two thirds of its pixels have no ray. */
+static gbt_camera folded(int width, int height)
+{
+    return (gbt_camera){.model = GBT_CAMERA_SIMPLE_RADIAL,
+                        .width = width,
+                        .height = height,
+                        .params = {0.7 * height, 0.5 * width, 0.5 * height, -0.5}};
+}
+
+static void scramble_without_ray(image *photo, size_t view)
+{
+    (void)view;
+    const gbt_camera camera = folded(photo->width, photo->height);
+    size_t without = 0;
+    for (int y = 0; y < photo->height; y++)
+        for (int x = 0; x < photo->width; x++) {
+            double dir[3];
+            const bool none = !gbt_camera_unproject(&camera, x + 0.5, y + 0.5, dir);
+            without += none;
+            for (int c = 0; c < 3 && none; c++)
+                photo->pixels[photo->channels * (y * photo->width + x) + c] =
+                    (x + y + c) % 2 == 0 ? scrambled : 0;
+        }
+    assert_true(without > (size_t)(photo->width * photo->height) / 4);
+}
+
+/* Of the tiny scene: one camera, as COLMAP writes it. */
+static void write_folded_camera(const char *folder)
+{
+    const gbt_camera camera = folded(48, 36);
+    const uint64_t count = 1, size[2] = {48, 36};
+    const uint32_t id = 1;
+    const int32_t lens = GBT_CAMERA_SIMPLE_RADIAL;
+    unsigned char file[64];
+    memcpy(file, &count, 8);
+    memcpy(file + 8, &id, 4);
+    memcpy(file + 12, &lens, 4);
+    memcpy(file + 16, size, 16);
+    memcpy(file + 32, camera.params, 32);
+    char path[PATH_SIZE + 32];
+    snprintf(path, sizeof path, "%s/sparse/0/cameras.bin", folder);
+    assert_ok(file_write_atomic(path, file, sizeof file, NULL));
+}
+
+/* What stands where the lens has no ray is in no loss and in no score. */
+static void pixels_without_a_ray_have_no_say(void **state)
+{
+    (void)state;
+    const char *folder = in_root("folded");
+    make_tiny_scene(folder);
+    write_folded_camera(folder);
+    json_t *metrics[2];
+    for (int i = 0; i < 2; i++) {
+        scrambled = (float)i;
+        change_photos(folder, scramble_without_ray);
+        const gbt_train_def def = run_def();
+        const char *run = in_root("folded_%d", i);
+        train_ok(folder, run, &def);
+        metrics[i] = scores_of(run);
+    }
+    assert_same_file(in_root("folded_0/model.gbt"), in_root("folded_1/model.gbt"));
+    static const char *const names[] = {"psnr", "ssim", "flip"};
+    for (int k = 0; k < 3; k++) {
+        const double a = json_real_value(json_object_get(metrics[0], names[k])),
+                     b = json_real_value(json_object_get(metrics[1], names[k]));
+        assert_true(a > 0 && a == b);
+    }
+    json_decref(metrics[0]);
+    json_decref(metrics[1]);
+}
+
 /* A photo that is masked whole is no score, and no step that fails. */
 static void a_black_mask_leaves_nothing(void **state)
 {
@@ -205,6 +278,7 @@ int main(void)
     be_quiet();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(masked_pixels_have_no_say),
+        cmocka_unit_test(pixels_without_a_ray_have_no_say),
         cmocka_unit_test(a_black_mask_leaves_nothing),
         cmocka_unit_test(alpha_is_what_it_is_said_to_be),
     };

@@ -659,6 +659,7 @@ static void exposure_is_learned(void **state)
     copy_scene(in_root("even"), in_root("exposed"), expose);
     gbt_train_def def = run_def();
     def.iterations = 400;
+    def.find_exposure = false;
     const double without = score_of(in_root("without"), in_root("exposed"), def);
     def.exposure = true;
     const double with = score_of(in_root("with"), in_root("exposed"), def);

@@ -474,7 +474,7 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     memcpy(before.scale_log, t.anchors.scale_log, n * 6 * sizeof(float));
     memcpy(before.feature, t.anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float));
     const learning_rates rates =
-        learning_rates_at(pace_progress(&t.pace, t.step), true, t.extent, t.def.learning_rate_factor);
+        learning_rates_at(pace_progress(&t.pace, t.step), true, t.extent, t.def.learning_rate_factor, 1);
     step_ok(&t, &r);
     assert_int_equal(t.anchors.count, n); /* no round: rows are where they were */
     double offset = 0, scale = 0, feature = 0;
@@ -522,7 +522,7 @@ static void moments_follow_their_rows(void **state)
     memcpy(m1, t.moment1.anchors.offset, n * 3 * k * sizeof *m1);
     memcpy(m2, t.moment2.anchors.scale_log, n * 6 * sizeof *m2);
     for (size_t i = 0; i < n; i++) {
-        t.stats.visit_count[i] = 1e6f;
+        t.stats.visit_count[i] = t.stats.shown_count[i] = 1e6f;
         t.stats.importance_accum[i] = i % 2 == 0 ? 0.0f : 1e6f;
         for (size_t j = 0; j < k; j++) {
             t.stats.grad_count[i * k + j] = 1e6f;
@@ -1003,7 +1003,7 @@ static void levels_and_rates(void **state)
     double before[6];
     for (int own = 0; own < 2; own++)
         for (int i = 0; i <= 100; i++) { /* positive, finite, and none ever rises */
-            const learning_rates r = learning_rates_at(i / 100.0, own, 2.0, 1);
+            const learning_rates r = learning_rates_at(i / 100.0, own, 2.0, 1, 1);
             const double now[6] = {r.anchor[ANCHOR_OFFSET],    r.anchor[ANCHOR_FEATURE],
                                    r.anchor[ANCHOR_SCALE_LOG], r.network[DECODER_OPACITY],
                                    r.network[DECODER_SHAPE],   r.network[DECODER_COLOR]};
@@ -1013,17 +1013,23 @@ static void levels_and_rates(void **state)
                 before[k] = now[k];
             }
         }
-    assert_true(learning_rates_at(1, true, 1, 1).anchor[ANCHOR_FEATURE] <
-                0.05 * learning_rates_at(0.9, true, 1, 1).anchor[ANCHOR_FEATURE]);
-    assert_true(learning_rates_at(1, false, 1, 1).anchor[ANCHOR_FEATURE] ==
-                learning_rates_at(0.9, false, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(learning_rates_at(1, true, 1, 1, 1).anchor[ANCHOR_FEATURE] <
+                0.05 * learning_rates_at(0.9, true, 1, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(learning_rates_at(1, false, 1, 1, 1).anchor[ANCHOR_FEATURE] ==
+                learning_rates_at(0.9, false, 1, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(schedule_rate_end(1) == 1 && schedule_rate_end(4000) == 1 &&
+                schedule_rate_end(16000) == 0.5 && schedule_rate_end(1e9) == 0.1);
+    const learning_rates at_last = learning_rates_at(0.9, true, 1, 1, 0.1),
+                         flat = learning_rates_at(0.9, true, 1, 1, 1);
+    assert_true(at_last.anchor[ANCHOR_SCALE_LOG] < 0.13 * flat.anchor[ANCHOR_SCALE_LOG] &&
+                at_last.anchor[ANCHOR_OFFSET] == flat.anchor[ANCHOR_OFFSET]);
     for (int i = 0; i <= 100; i++) {
-        const learning_rates r = learning_rates_at(i / 100.0, false, 2.0, 1);
-        assert_true(
-            fabs(r.anchor[ANCHOR_OFFSET] / learning_rates_at(i / 100.0, false, 1.0, 1).anchor[ANCHOR_OFFSET] -
-                 2) < 1e-12);
-        assert_true(learning_rates_at(i / 100.0, true, 2.0, 1).anchor[ANCHOR_OFFSET] ==
-                    learning_rates_at(i / 100.0, true, 1.0, 1).anchor[ANCHOR_OFFSET]);
+        const learning_rates r = learning_rates_at(i / 100.0, false, 2.0, 1, 1);
+        assert_true(fabs(r.anchor[ANCHOR_OFFSET] /
+                             learning_rates_at(i / 100.0, false, 1.0, 1, 1).anchor[ANCHOR_OFFSET] -
+                         2) < 1e-12);
+        assert_true(learning_rates_at(i / 100.0, true, 2.0, 1, 1).anchor[ANCHOR_OFFSET] ==
+                    learning_rates_at(i / 100.0, true, 1.0, 1, 1).anchor[ANCHOR_OFFSET]);
     }
 }
 
@@ -1223,6 +1229,131 @@ static void samples_are_pixels_of_the_photo(void **state)
     scene_free(&s);
 }
 
+/* Parts of a photo are its pixels with its rays, all of one size, and together the whole. */
+static void parts_make_up_the_photo(void **state)
+{
+    (void)state;
+    scene s;
+    photos p;
+    image full = {0}, got = {0};
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(tiny, &split, &s, NULL));
+    assert_ok(photos_open(&p, &s, 1, NULL));
+    assert_ok(photos_get(&p, 0, 0, &full, NULL));
+    const gbt_camera whole = photos_camera(&p, 0, 0);
+    for (int parts = 2; parts <= 5; parts++) {
+        bool seen[48 * 36] = {false};
+        for (int i = 0; i < parts * parts; i++) {
+            const photo_sample sample = {.parts = parts, .part = {i % parts, i / parts}};
+            gbt_camera camera;
+            const unsigned char *valid;
+            int step;
+            assert_ok(photos_get_sample(&p, 0, &sample, &got, &camera, &valid, &step, NULL));
+            assert_true(valid == NULL && step == 1);
+            assert_true(camera.width == (48 + parts - 1) / parts &&
+                        camera.height == (36 + parts - 1) / parts);
+            assert_true(got.width == camera.width && got.height == camera.height);
+            double middle[2];
+            const double ahead[3] = {0, 0, 1}; /* says where the part is */
+            assert_true(gbt_camera_project(&whole, ahead, middle));
+            double own[2];
+            assert_true(gbt_camera_project(&camera, ahead, own));
+            const int x0 = (int)round(middle[0] - own[0]), y0 = (int)round(middle[1] - own[1]);
+            for (int y = 0; y < got.height; y++)
+                for (int x = 0; x < got.width; x++) {
+                    const int at = (y0 + y) * full.width + x0 + x;
+                    seen[at] = true;
+                    assert_memory_equal(got.pixels + 3 * (y * got.width + x), full.pixels + 3 * at,
+                                        3 * sizeof(float));
+                }
+        }
+        for (int i = 0; i < 48 * 36; i++)
+            assert_true(seen[i]);
+    }
+    image_free(&full);
+    image_free(&got);
+    photos_close(&p);
+    scene_free(&s);
+}
+
+/* Photos for which there is no memory are read again, and are the same. */
+static void photos_keep_to_their_memory(void **state)
+{
+    (void)state;
+    scene s;
+    photos small, large;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(tiny, &split, &s, NULL));
+    assert_ok(photos_open(&small, &s, 1, NULL));
+    assert_ok(photos_open(&large, &s, 1, NULL));
+    small.bytes_max = 2 * 3 * 48 * 36 + 100;
+    const size_t views[] = {4, 2, 0, 1};
+    assert_ok(photos_load(&small, views, 4, NULL));
+    image a = {0}, b = {0};
+    for (size_t i = 0; i < 40; i++) {
+        const size_t view = i * 7 % VIEWS;
+        assert_ok(photos_get(&small, view, 0, &a, NULL));
+        assert_ok(photos_get(&large, view, 0, &b, NULL));
+        assert_memory_equal(a.pixels, b.pixels, 3 * 48 * 36 * sizeof(float));
+        size_t kept = 0;
+        for (size_t v = 0; v < VIEWS; v++)
+            kept += small.full[v] != NULL;
+        assert_true(kept <= 3 && small.full[4] != NULL && small.full[2] != NULL);
+    }
+    image_free(&a);
+    image_free(&b);
+    photos_close(&small);
+    photos_close(&large);
+    scene_free(&s);
+}
+
+/* A step looks at no more pixels than its budget, whatever the photo's size and the stage of the run. */
+static void steps_keep_to_their_pixels(void **state)
+{
+    (void)state;
+    trainer t;
+    const gbt_train_def def = run_def();
+    open_ok(&t, tiny, &def);
+    scene_view *view = &t.scene.views[t.train_views[0]];
+    for (int width = 560; width <= 8000; width = width * 5 / 4)
+        for (double progress = 0; progress < 1; progress += 0.05) {
+            view->camera.width = width;
+            view->camera.height = width * 2 / 3;
+            const step_size size = trainer_step_size(&t, t.train_views[0], progress);
+            const double pixels = trainer_step_pixels(&t, t.train_views[0], progress),
+                         all = (double)width * view->camera.height, budget = t.rules.step_pixels;
+            assert_true(pixels <= 2.3 * budget);
+            assert_int_equal(size.level == 0, progress >= SCHEDULE_WHOLE_FROM - 1e-9);
+            if (all <= 2 * budget)
+                assert_true(size.parts == 1 && size.level == schedule_level(progress, 2));
+            else /* nor at much fewer */
+                assert_true(pixels * (size.level == 0 ? 1 : exp2(2 * schedule_level(progress, 2))) >
+                            0.4 * budget);
+        }
+    view->camera = (gbt_camera){
+        .model = GBT_CAMERA_EQUIRECTANGULAR, .width = 4000, .height = 2000, .params = {4000, 2000}};
+    assert_int_equal(trainer_step_size(&t, t.train_views[0], 0.95).parts, 1); /* has no parts */
+    trainer_free(&t);
+}
+
+static void wide_photos_get_a_usual_width(void **state)
+{
+    (void)state;
+    scene_view views[3] = {
+        {.camera = {.width = 800}}, {.camera = {.width = 4000}}, {.camera = {.width = 3200}}};
+    const scene s = {.views = views, .view_count = 3};
+    assert_true(photos_usual_downscale(&s) == 2);
+    views[1].camera.width = 1600;
+    assert_true(photos_usual_downscale(&s) == 1);
+    views[2].camera.width = 100;
+    assert_true(photos_usual_downscale(&s) == 1);
+    trainer t;
+    const gbt_train_def def = run_def();
+    open_ok(&t, tiny, &def);
+    assert_true(t.def.downscale == 1);
+    trainer_free(&t);
+}
+
 static void quantize(image *im)
 {
     for (size_t i = 0; i < (size_t)im->width * (size_t)im->height * 3; i++)
@@ -1351,6 +1482,10 @@ int main(int argc, char **argv)
         cmocka_unit_test(settings_out_of_range_are_named),
         cmocka_unit_test(config_comes_back),
         cmocka_unit_test(samples_are_pixels_of_the_photo),
+        cmocka_unit_test(parts_make_up_the_photo),
+        cmocka_unit_test(photos_keep_to_their_memory),
+        cmocka_unit_test(steps_keep_to_their_pixels),
+        cmocka_unit_test(wide_photos_get_a_usual_width),
         cmocka_unit_test(photos_are_the_resized_reference),
         cmocka_unit_test(interrupted_and_resumed_is_straight),
         cmocka_unit_test(extra_checkpoints_change_nothing),

@@ -1,0 +1,78 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/light.c -- the exposures of photos, by the colours of sparse points in them. */
+#include "train/light.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/compare.h"
+#include "base/memory.h"
+#include "train/camera_sees.h"
+
+enum { POINTS_ASKED = 4000, POINTS_MIN = 50 };
+static const float darkest = 0.04f, brightest = 0.96f; /* outside noise or clipping decides */
+
+static bool is_exposed(const float rgb[3])
+{
+    for (int c = 0; c < 3; c++)
+        if (rgb[c] > brightest)
+            return false;
+    return rgb[0] + rgb[1] + rgb[2] > 3 * darkest;
+}
+
+/* log2 of how much brighter the photo is at the point; false where that says nothing. */
+static bool compare_at(const photos *p, size_t view, const gbt_camera *camera, size_t point, float *ratio)
+{
+    const scene_points *points = &p->source->points;
+    const float *known = points->color + 3 * point;
+    double pixel[2];
+    if (!is_exposed(known) || !camera_pixel(camera, points->position + 3 * point, pixel))
+        return false;
+    const size_t at = (size_t)pixel[1] * (size_t)camera->width + (size_t)pixel[0];
+    if (p->full_valid[view] != NULL && !p->full_valid[view][at])
+        return false;
+    const unsigned char *bytes = p->full[view] + 3 * at;
+    const float shown[3] = {(float)bytes[0] / 255, (float)bytes[1] / 255, (float)bytes[2] / 255};
+    if (!is_exposed(shown))
+        return false;
+    *ratio = log2f((shown[0] + shown[1] + shown[2]) / (known[0] + known[1] + known[2]));
+    return true;
+}
+
+/* The median over the points; false where too few say something. */
+static bool exposure_of(const photos *p, size_t view, float *room, double *stops)
+{
+    const gbt_camera camera = photos_camera(p, view, 0);
+    const size_t points = p->source->points.count, stride = points / POINTS_ASKED + 1;
+    size_t used = 0;
+    for (size_t i = 0; i < points; i += stride)
+        used += compare_at(p, view, &camera, i, &room[used]);
+    if (used < POINTS_MIN)
+        return false;
+    qsort(room, used, sizeof *room, compare_floats);
+    *stops = (double)room[used / 2];
+    return true;
+}
+
+gbt_status light_spread(const photos *p, const size_t *views, size_t count, double *stops, gbt_error *err)
+{
+    *stops = 0;
+    if (!p->source->points.has_color)
+        return GBT_OK;
+    float *room = mem_alloc(POINTS_ASKED + 1, sizeof *room, "exposures", err);
+    if (room == NULL)
+        return GBT_ERR_NO_MEMORY;
+    double sum = 0, squares = 0, known = 0;
+    for (size_t i = 0; i < count; i++) {
+        double exposure;
+        if (p->full[views[i]] == NULL || !exposure_of(p, views[i], room, &exposure))
+            continue;
+        known++;
+        sum += exposure;
+        squares += exposure * exposure;
+    }
+    mem_free(room);
+    if (known >= 2)
+        *stops = sqrt(fmax(0, squares - sum * sum / known) / (known - 1));
+    return GBT_OK;
+}

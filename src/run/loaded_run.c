@@ -15,6 +15,7 @@
 #include "data/result_folder.h"
 #include "train/camera_sees.h"
 #include "train/near.h"
+#include "train/rules.h"
 
 /* What a result folder says beside its Gaussians: the data set, and what is behind them. */
 static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *err)

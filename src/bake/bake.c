@@ -190,10 +190,6 @@ static void solve_shape(const sums *s, float scale_log[3], float quat[4])
     const double *c = s->covariance;
     double m[9] = {c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5]}, v[9];
     symmetric_eigen(m, v, 3, 1e-15);
-    const double det = v[0] * (v[4] * v[8] - v[5] * v[7]) - v[1] * (v[3] * v[8] - v[5] * v[6]) +
-                       v[2] * (v[3] * v[7] - v[4] * v[6]);
-    for (int k = 0; k < 3 && det < 0; k++)
-        v[3 * k + 2] = -v[3 * k + 2];
     double largest = fmax(m[0], fmax(m[4], m[8]));
     largest = largest > 0 ? largest : s->weight;
     for (int k = 0; k < 3; k++)

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -170,6 +171,23 @@ gbt_status file_make_folder(const char *path, gbt_error *err)
         return base_fail(err, GBT_ERR_IO, "%s: exists and is not a folder", path);
     return GBT_OK;
 }
+
+gbt_status file_lock_folder(const char *path, int *lock, gbt_error *err)
+{
+    const int fd = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", path, strerror(errno));
+    if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+        close(fd);
+        return base_fail(
+            err, GBT_ERR_IO,
+            "%s: another process is writing a run there (wait for its end, or name another folder)", path);
+    }
+    *lock = fd;
+    return GBT_OK;
+}
+
+void file_unlock_folder(int lock) { close(lock); }
 
 bool file_exists(const char *path)
 {

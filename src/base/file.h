@@ -33,6 +33,17 @@ gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_co
 /** Create a folder and its parents; an existing folder is fine. */
 gbt_status file_make_folder(const char *path, gbt_error *err);
 
+/**
+ * Hold a folder against other processes that hold it by this function, until file_unlock_folder() or the end
+ * of the process, however it ends. Nothing is written. Where a file system knows no locks this does nothing.
+ *
+ * @param lock [out] for file_unlock_folder(); unchanged after a failure
+ * @return GBT_OK; GBT_ERR_IO: somebody else holds it, or it cannot be opened
+ */
+gbt_status file_lock_folder(const char *path, int *lock, gbt_error *err);
+
+void file_unlock_folder(int lock);
+
 bool file_exists(const char *path);
 bool file_is_folder(const char *path);
 

@@ -9,7 +9,7 @@
  * on every machine.
  *
  * @param a      [in, out] [n][n] symmetric, finite; leaves the eigenvalues on its diagonal, in no order
- * @param v      [out] [n][n] unit eigenvectors in its columns
+ * @param v      [out] [n][n] unit eigenvectors in its columns: a rotation, its determinant is 1
  * @param small  [in] done when the off-diagonal halves sum to at most this share of the largest |a|; about
  *                    1e-15 to 1e-18
  * Cost: O(n^3) per sweep, 4 to 10 sweeps.

@@ -82,11 +82,12 @@ int main(int argc, char **argv)
 {
     signal(SIGXFSZ, SIG_IGN); /* a file that may not grow is a failed write: one line, and nothing left behind
                                */
+    signal(SIGPIPE, SIG_IGN); /* a training goes on when nobody reads its progress any longer */
     int code = dispatch(argc, argv);
     if ((fflush(stdout) != 0 || ferror(stdout)) && code == 0) { /* a full disk must not look like success */
         gbt_error err = {.status = GBT_ERR_IO};
         snprintf(err.text, sizeof err.text, "standard output: write failed: %s", strerror(errno));
-        code = command_failed(GBT_ERR_IO, &err);
+        code = errno == EPIPE ? 128 + SIGPIPE : command_failed(GBT_ERR_IO, &err); /* head has read enough */
     }
     progress_end(code);
     return code;

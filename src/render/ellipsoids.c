@@ -40,6 +40,9 @@ static void project(const gbt_camera *c, double x, double y, double z, double ou
     out[1] = FINE * (c->params[1] * y * scale + c->params[3]);
 }
 
+/** Both limits, before it becomes an integer: what lies a billion units aside is beyond all of those. */
+static int clamp_ray(double at, int end) { return (int)fmin(fmax(at, 0), end); }
+
 /** False: it is behind the camera, around it, or beside the picture. */
 static bool find_box(const gbt_camera *c, const double center[3], double radius, const drawing *d, solid *out)
 {
@@ -58,10 +61,10 @@ static bool find_box(const gbt_camera *c, const double center[3], double radius,
             high[k] = fmax(high[k], p[k]);
         }
     }
-    out->left = (int)fmax(floor(low[0]), 0);
-    out->right = (int)fmin(ceil(high[0]), d->width);
-    out->top = (int)fmax(floor(low[1]), 0);
-    out->bottom = (int)fmin(ceil(high[1]), d->height);
+    out->left = clamp_ray(floor(low[0]), d->width);
+    out->right = clamp_ray(ceil(high[0]), d->width);
+    out->top = clamp_ray(floor(low[1]), d->height);
+    out->bottom = clamp_ray(ceil(high[1]), d->height);
     return out->left < out->right && out->top < out->bottom;
 }
 

@@ -216,15 +216,12 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
     }
 }
 
-static gbt_status run_with_folder(trainer *t, const char *data, const char *run, const gbt_train_def *def,
-                                  config_strings *strings, gbt_error *err)
+static gbt_status run_in_folder(trainer *t, const char *data, const char *run, const run_paths *paths,
+                                const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
-    run_paths paths;
-    /* Before any work: a run that cannot be written must not start. */
-    GBT_TRY(open_folder(run, def, &paths, err));
     const double begin = clock_wall();
     if (def->resume)
-        GBT_TRY(resume_open(t, data, run, paths.checkpoint, paths.checkpoint_previous, def, strings, err));
+        GBT_TRY(resume_open(t, data, run, paths->checkpoint, paths->checkpoint_previous, def, strings, err));
     else
         GBT_TRY(trainer_open(t, data, def, err));
     t->frame.scene.tape_bytes_max = def->hit_bytes_max > 0 ? def->hit_bytes_max : 1; /* there 0 is no limit */
@@ -232,17 +229,30 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
         t->seconds = clock_wall() - begin; /* loading counts */
     char config[CONFIG_TEXT_SIZE];
     config_text(&t->def, t->scene.folder, config, sizeof config);
-    GBT_TRY(file_write_atomic(paths.config, config, strlen(config), err));
+    GBT_TRY(file_write_atomic(paths->config, config, strlen(config), err));
     GBT_TRY(run_data_save(run, t->scene.folder, err));
 
     run_log log;
-    GBT_TRY(run_log_open(&log, t, paths.log, paths.events, err));
-    gbt_status status = run_steps(t, &paths, &log, err);
+    GBT_TRY(run_log_open(&log, t, paths->log, paths->events, err));
+    gbt_status status = run_steps(t, paths, &log, err);
     if (status == GBT_OK)
-        status = save_all(t, &paths, err);
-    if (status == GBT_OK && (log.all.steps > 0 || !run_log_is_of_step(paths.json, t->step)))
-        status = run_log_summary(&log, t, paths.json, err);
+        status = save_all(t, paths, err);
+    if (status == GBT_OK && (log.all.steps > 0 || !run_log_is_of_step(paths->json, t->step)))
+        status = run_log_summary(&log, t, paths->json, err);
     run_log_close(&log);
+    return status;
+}
+
+/* Before any work: a run that cannot be written must not start. */
+static gbt_status run_with_folder(trainer *t, const char *data, const char *run, const gbt_train_def *def,
+                                  config_strings *strings, gbt_error *err)
+{
+    run_paths paths;
+    int lock;
+    GBT_TRY(open_folder(run, def, &paths, err));
+    GBT_TRY(file_lock_folder(run, &lock, err));
+    const gbt_status status = run_in_folder(t, data, run, &paths, def, strings, err);
+    file_unlock_folder(lock);
     return status;
 }
 

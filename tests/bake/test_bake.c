@@ -112,6 +112,89 @@ static void more_functions_and_steps_come_nearer(void **state)
     free_world(&w);
 }
 
+typedef struct mean_of_views {
+    double weight, opaque, color; /* of red */
+    int made, decoded;
+} mean_of_views;
+
+/* What each Gaussian is in every second pixel of the cameras. */
+static void look_at_all(world *w, mean_of_views *means)
+{
+    for (int c = 0; c < CAMERAS; c++) {
+        gbt_camera sparse = w->cameras[c];
+        w->f.draw.pixel_step = gbt_camera_every(&w->cameras[c], 2, 0, 0, &sparse) ? 2 : 1;
+        assert_ok(frame_render(&w->f, frame_neural(&w->a, &w->d), &sparse, &w->s, true, NULL));
+        assert_ok(frame_weigh(&w->f, NULL));
+        for (size_t v = 0; v < w->f.visible_count; v++)
+            for (uint32_t k = 0; k < OFFSETS; k++)
+                means[w->f.visible[v] * OFFSETS + k].decoded++;
+        for (size_t i = 0; i < w->f.gaussians.count; i++) {
+            const uint32_t slot = w->f.tape.slot[i];
+            mean_of_views *m = &means[w->f.visible[slot / OFFSETS] * OFFSETS + slot % OFFSETS];
+            const double weight = (double)w->f.seen[i];
+            m->made++;
+            m->weight += weight;
+            m->opaque += weight / (double)w->f.gaussians.opacity[i];
+            m->color += weight * ((double)w->f.gaussians.red[i] - 0.5);
+        }
+    }
+    w->f.draw.pixel_step = 0;
+}
+
+/* Constant colours: the mean of what the cameras see, and `prior` times that of directions around. `bias` of
+   the opacities: where one is below 0 the Gaussian is not made. */
+static void check_means(float bias, size_t *partly, size_t *turned)
+{
+    static mean_of_views means[ANCHORS * OFFSETS];
+    static const double priors[3] = {0, 0.25, 1}, y = 0.28209479177387814;
+    world w;
+    bake_result r[3];
+    decoder_part parts[3];
+    make_world(&w, false);
+    decoder_parts(&w.d, parts);
+    for (size_t k = 0; k < OFFSETS; k++)
+        w.d.params[parts[0].end - 1 - k] = bias;
+    memset(means, 0, sizeof means);
+    look_at_all(&w, means);
+    for (int p = 0; p < 3; p++)
+        bake_world(&w, 0, priors[p], &r[p]);
+    size_t row = 0;
+    *partly = *turned = 0;
+    for (size_t i = 0; i < ANCHORS * OFFSETS; i++) {
+        const mean_of_views *m = &means[i];
+        const double opacity = m->weight > 0 ? m->weight / m->opaque * m->made / m->decoded : 0;
+        if (opacity < 1.0 / 255 + 1e-6)
+            continue;
+        double around[3];
+        for (int p = 0; p < 3; p++) {
+            assert_near((double)r[p].cloud.opacity[row], opacity, 1e-5);
+            around[p] =
+                y * (double)r[p].cloud.sh[row * GAUSSIAN_SH_COUNT * 3] * (1 + priors[p]) * (1 + 1e-4) -
+                m->color / m->weight;
+        }
+        assert_near(around[0], 0, 1e-5);
+        if (m->made == m->decoded && bias > 0.5f) /* in each direction, too */
+            assert_near(around[1] / 0.25, around[2], 1e-4);
+        *partly += m->made < m->decoded;
+        *turned += fabs(around[2] - m->color / m->weight) > 0.01;
+        row++;
+    }
+    assert_int_equal(row, r[0].cloud.count);
+    for (int p = 0; p < 3; p++)
+        gaussian_cloud_free(&r[p].cloud);
+    free_world(&w);
+}
+
+static void opacities_and_colors_are_means(void **state)
+{
+    (void)state;
+    size_t partly, turned;
+    check_means(0.7f, &partly, &turned);
+    assert_true(partly == 0 && turned > 50);
+    check_means(0.1f, &partly, &turned);
+    assert_true(partly > 10);
+}
+
 static void same_bits_for_all_threads(void **state)
 {
     (void)state;
@@ -226,6 +309,30 @@ static void the_most_blended_are_kept(void **state)
     free_world(&w);
 }
 
+/* A disc thinner than any file may say is as thick as they may after a step, and none is turned into nothing.
+ */
+static void refined_scales_stay_in_their_limits(void **state)
+{
+    (void)state;
+    world w;
+    bake_result r;
+    refine_def def = refine_def_default();
+    make_world(&w, false);
+    bake_world(&w, 1, 0.3, &r);
+    for (size_t i = 0; i < r.cloud.count; i++)
+        r.cloud.scale_log[3 * i + i % 3] = -20;
+    def.steps = 1;
+    assert_ok(refine_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, &w.s, &def, &r.cloud, NULL));
+    for (size_t i = 0; i < r.cloud.count; i++) {
+        const float *s = r.cloud.scale_log + 3 * i, *q = r.cloud.quat + 4 * i;
+        const float most = fmaxf(s[0], fmaxf(s[1], s[2])), least = fminf(s[0], fminf(s[1], s[2]));
+        assert_near((double)(most - least), log(GAUSSIAN_SCALE_RATIO), 1e-4);
+        assert_near((double)(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), 1, 1e-5);
+    }
+    gaussian_cloud_free(&r.cloud);
+    free_world(&w);
+}
+
 static void refusals(void **state)
 {
     (void)state;
@@ -250,9 +357,11 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_is_lost_without_directions),
         cmocka_unit_test(more_functions_and_steps_come_nearer),
+        cmocka_unit_test(opacities_and_colors_are_means),
         cmocka_unit_test(same_bits_for_all_threads),
         cmocka_unit_test(a_backdrop_stands_for_the_background),
         cmocka_unit_test(the_most_blended_are_kept),
+        cmocka_unit_test(refined_scales_stay_in_their_limits),
         cmocka_unit_test(refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

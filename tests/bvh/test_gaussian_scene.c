@@ -11,6 +11,7 @@
 #include "bvh/device.h"
 #include "bvh/gaussian_scene.h"
 #include "bvh/gaussian_tree.h"
+#include "bvh/proxy.h"
 
 static const float alpha_min = 1.0f / 255.0f;
 
@@ -512,10 +513,47 @@ static void no_memory_is_an_error(void **state)
     gaussians_free(&g);
 }
 
+/* Far from 0, where the pad is larger than what rounding may take of it: on every face. */
+static void boxes_are_padded(void **state)
+{
+    (void)state;
+    const cloud_case c = {
+        .count = 300, .center = 1000, .spread = 5, .scale_low = 0.05f, .scale_high = 0.3f, .flatness = 1};
+    gaussians g = {0};
+    proxy_boxes boxes = {0};
+    fill_cloud(&c, 4, &g);
+    assert_ok(proxy_boxes_make(&g, alpha_min, INFINITY, 2000, &boxes, NULL));
+    const double pad = (double)bvh_box_pad(2000);
+    for (size_t b = 0; b < boxes.count; b++) {
+        const struct RTCBuildPrimitive *box = &boxes.box[b];
+        const size_t i = box->primID;
+        const float lower[3] = {box->lower_x, box->lower_y, box->lower_z},
+                    upper[3] = {box->upper_x, box->upper_y, box->upper_z},
+                    mean[3] = {g.mean_x[i], g.mean_y[i], g.mean_z[i]},
+                    scale[3] = {g.scale_x[i], g.scale_y[i], g.scale_z[i]},
+                    quat[4] = {g.quat_w[i], g.quat_x[i], g.quat_y[i], g.quat_z[i]};
+        const double reach = sqrt(2 * log((double)g.opacity[i] / (double)alpha_min));
+        float turn[9];
+        quat_to_matrix(quat, turn);
+        for (int k = 0; k < 3; k++) {
+            double square = 0;
+            for (int j = 0; j < 3; j++)
+                square += pow((double)turn[3 * k + j] * (double)scale[j], 2);
+            const double half = reach * sqrt(square), below = (double)mean[k] - half - (double)lower[k],
+                         above = (double)upper[k] - (double)mean[k] - half;
+            assert_true(below > 0.5 * pad && below < 1.5 * pad + 1e-4 * half);
+            assert_true(above > 0.5 * pad && above < 1.5 * pad + 1e-4 * half);
+        }
+    }
+    assert_true(boxes.count > 250);
+    proxy_boxes_free(&boxes);
+    gaussians_free(&g);
+}
+
 int main(void)
 {
     enum { CASES = sizeof cloud_cases / sizeof *cloud_cases };
-    struct CMUnitTest tests[CASES + 7];
+    struct CMUnitTest tests[CASES + 8];
     for (size_t i = 0; i < CASES; i++)
         tests[i] = (struct CMUnitTest){.name = cloud_cases[i].name,
                                        .test_func = agrees_with_brute_force,
@@ -524,6 +562,7 @@ int main(void)
         cmocka_unit_test(the_same_for_every_thread_count),
         cmocka_unit_test(empty_scenes),
         cmocka_unit_test(boxes_are_tight),
+        cmocka_unit_test(boxes_are_padded),
         cmocka_unit_test(bad_gaussians_are_counted),
         cmocka_unit_test(bad_rays_cross_nothing),
         cmocka_unit_test(memory_is_counted_and_limited),

@@ -204,6 +204,10 @@ if [ -w /dev/full ]; then
     report $? "full disk behind stdout" "  got $got: $(cat err)"
 fi
 
+( while [ ! -e closed ]; do sleep 0.05; done; "$program" --help 2>err; echo $? >code ) | { exec <&-; : >closed; }
+[ "$(cat code)" = 141 ] && [ ! -s err ]
+report $? "closed pipe behind stdout" "  got $(cat code): $(cat err)"
+
 # ---- procedural scenes
 prints "make-scene" '^wrote made$' make-scene tabletop -o made --width 32 --height 24 --views 4 --samples 1 --points 50
 [ -s made/sparse/0/cameras.bin ] && [ -s made/sparse/0/images.bin ] && [ -s made/sparse/0/points3D.bin ]
@@ -213,6 +217,10 @@ prints "info of a made scene" '^  photos    4 found, 0 unreadable, 32 x 24 pixel
 # ---- meshes among the Gaussians of a tiny run
 "$program" train made -o tiny --iterations 2 --eval-split none >out 2>err
 report $? "a tiny run" "$(cat err)"
+rm -f closed
+( while [ ! -e closed ]; do sleep 0.05; done; "$program" train made -o unread --iterations 2 --eval-split none 2>&1; echo $? >code ) | { exec <&-; : >closed; }
+[ "$(cat code)" = 0 ] && [ -s unread/model.gbt ]
+report $? "a training whose progress nobody reads" "  got $(cat code)"
 [ "$(tail -n 2 out)" = "Report: tiny/report.html
 Viewer: gbtrace view tiny" ]
 report $? "its last lines say what to look at" "$(cat out)"

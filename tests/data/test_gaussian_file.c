@@ -202,6 +202,25 @@ static void glb_is_what_gltf_wants(void **state)
     const float want[4] = {-a.quat[1], -a.quat[2], a.quat[3], a.quat[0]};
     for (int k = 0; k < 4; k++)
         assert_true(fabsf(quat[k] - want[k]) < 1e-6f);
+    /* Half a turn about z: places, and the odd functions of degrees 1 and 2. */
+    static const char *const names[] = {"POSITION", "KHR_gaussian_splatting:SH_DEGREE_1_COEF_0",
+                                        "KHR_gaussian_splatting:SH_DEGREE_1_COEF_1",
+                                        "KHR_gaussian_splatting:SH_DEGREE_2_COEF_3"};
+    static const size_t function[] = {0, 1, 2, 7};
+    for (int n = 0; n < 4; n++) {
+        json_t *accessor =
+            json_array_get(accessors, (size_t)json_integer_value(json_object_get(attributes, names[n])));
+        json_t *part =
+            json_array_get(views, (size_t)json_integer_value(json_object_get(accessor, "bufferView")));
+        const unsigned char *at =
+            bytes + data_at + (size_t)json_integer_value(json_object_get(part, "byteOffset"));
+        for (size_t i = 0; i < 3 * a.count; i++, at += 4) {
+            const float stored = n == 0 ? a.mean[i] : a.sh[(i / 3 * 16 + function[n]) * 3 + i % 3];
+            const bool turns = n == 0 ? i % 3 < 2 : function[n] % 2 == 1;
+            memcpy(&value, at, 4);
+            assert_true(value == (turns ? -stored : stored));
+        }
+    }
     json_decref(root);
     mem_free(bytes);
     gaussian_cloud_free(&a);

@@ -80,6 +80,8 @@ try() { # name, goes on (yes or no), command...
             prepare
             faulty "$call:$n:fail" "$@"
             look "$name, $call $n of $total fails" fail
+            # An export is one file: no failure may go unnoticed.
+            [ "$name" != export ] || [ $call = memory ] || [ $call = mkdir ] || [ "$code" != 0 ] || bad "$name, $call $n of $total fails" "a success"
             [ $call = memory ] && continue
             prepare
             faulty "$call:$n:kill" "$@"
@@ -115,6 +117,70 @@ try render no "$program" render case/run -o case/pictures --data case/data --qui
 try export no "$program" export case/run -o case/model.ply
 try compress no "$program" compress case/run -o case/small.gbt
 try report no "$program" report case/run
+
+# ---- what comes from outside
+same_bits() { # name
+    [ "$code" = 0 ] || bad "$1" "exit code $code"
+    cmp -s case/run/model.gbt "$whole/model.gbt" || bad "$1" "other bits"
+}
+
+long_run() { # options: in the background, until it has saved; $pid
+    "$program" train case/data -o case/run --iterations 1000000 --threads 1 --quiet "$@" >long 2>&1 &
+    pid=$!
+    while [ ! -s case/run/log.csv ] && kill -0 $pid 2>/dev/null; do sleep 0.05; done
+    runs=$((runs + 1))
+}
+
+outside() {
+    local name
+    for name in short:0:all clock:0:back; do
+        whole=straight
+        rm -rf base/run
+        prepare
+        faulty $name "$program" train case/data -o case/run --iterations 3 --threads 1 --quiet --tensorboard
+        faulty $name "$program" train case/data -o case/run --resume --iterations 6 --threads 1 --quiet --tensorboard
+        whole=resumed
+        same_bits "train and resume, $name"
+    done
+
+    prepare
+    long_run
+    "$program" train case/data -o case/run --overwrite --iterations 6 --threads 1 --quiet >said 2>&1
+    code=$?
+    [ $code = 4 ] && [ "$(grep -c '^error: case/run: another process' said)" = 1 ] || bad "two trainers in one folder" "exit code $code"
+    kill -INT $pid
+    wait $pid
+    code=$?
+    cp long said
+    [ $code = 130 ] || bad "SIGINT" "exit code $code"
+    "$program" train case/data -o case/run --resume --stop-at-step 1 --threads 1 --quiet >said 2>&1 # the lock is gone
+    grep -q 'another process' said && bad "a lock after the end" "it is still there"
+
+    prepare
+    long_run
+    kill -STOP $pid
+    kill -INT $pid
+    kill -TERM $pid # another signal: two of one kind, while it is stopped, would be one
+    kill -CONT $pid
+    wait $pid
+    code=$?
+    cp long said
+    [ $code = 130 ] || [ $code = 143 ] || bad "SIGINT, then SIGTERM" "exit code $code"
+    [ ! -e case/run/checkpoints/last.gbt ] || bad "SIGINT, then SIGTERM" "it saved before it ended"
+
+    prepare
+    long_run
+    rm case/data/images/0001.png
+    kill -INT $pid
+    wait $pid
+    code=$?
+    cp long said
+    [ $code = 130 ] || bad "a photo deleted in mid-run" "exit code $code"
+    "$program" train case/data -o case/run --resume --iterations 6 --threads 1 --quiet >said 2>&1
+    code=$?
+    [ $code = 3 ] && grep -q '^error: .*made from other data' said || bad "a run goes on without one of its photos" "exit code $code"
+}
+[ -n "$only" ] && [ "$only" != outside ] || outside
 
 # A full disk as the shell's limit on the size of a file sees it: in blocks of 1024 bytes.
 for limit in 0 1 8 64; do

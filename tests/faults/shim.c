@@ -4,8 +4,10 @@
 
    GBT_FAULT=CALL:N:WHAT: the N-th CALL (open, write, fsync, close, rename, mkdir, memory; from 1) does WHAT:
    fail, or kill. GBT_FAULT=CALL:0:count: nothing happens. In each case the number of such calls is written to
-   the file GBT_FAULT_COUNT when the process ends by itself. Calls count when they make, write or rename
-   files; memory is aligned_alloc(), which is all that the program's own code takes. */
+   the file GBT_FAULT_COUNT when the process ends by itself. GBT_FAULT=short:0:all: every read and write is
+   interrupted once, then moves some bytes only. GBT_FAULT=clock:0:back: the time of day goes back by an hour
+   at each look. Calls count when they make, write or rename files; memory is aligned_alloc(), which is all
+   that the program's own code takes. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -17,6 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 enum { FILES_MAX = 4096 };
@@ -101,6 +104,17 @@ int open64(const char *path, int flags, ...)
     return open_as("open64", path, flags, mode);
 }
 
+/* In turns: interrupted, or fewer bytes than were asked for. */
+static bool interrupts(size_t *count)
+{
+    static atomic_long turn;
+    if (strcmp(fault.call, "short") != 0)
+        return false;
+    errno = EINTR;
+    *count = (*count + 1) / 2;
+    return atomic_fetch_add(&turn, 1) % 2 == 0;
+}
+
 static bool counts(int fd) { return fd >= 0 && fd < FILES_MAX && atomic_load(&is_written[fd]); }
 
 ssize_t write(int fd, const void *bytes, size_t count)
@@ -108,7 +122,32 @@ ssize_t write(int fd, const void *bytes, size_t count)
     static ssize_t (*real)(int, const void *, size_t);
     if (real == NULL)
         *(void **)&real = next("write");
+    if (counts(fd) && interrupts(&count))
+        return -1;
     return counts(fd) && fails("write", ENOSPC) ? -1 : real(fd, bytes, count);
+}
+
+ssize_t read(int fd, void *bytes, size_t count)
+{
+    static ssize_t (*real)(int, void *, size_t);
+    struct stat info;
+    if (real == NULL)
+        *(void **)&real = next("read");
+    if (fstat(fd, &info) == 0 && S_ISREG(info.st_mode) && interrupts(&count))
+        return -1;
+    return real(fd, bytes, count);
+}
+
+int clock_gettime(clockid_t clock, struct timespec *out)
+{
+    static int (*real)(clockid_t, struct timespec *);
+    static atomic_long looks;
+    if (real == NULL)
+        *(void **)&real = next("clock_gettime");
+    const int result = real(clock, out);
+    if (clock == CLOCK_REALTIME && strcmp(fault.call, "clock") == 0)
+        out->tv_sec -= 3600 * atomic_fetch_add(&looks, 1);
+    return result;
 }
 
 int fsync(int fd)

@@ -814,6 +814,58 @@ static void statistics_follow_rows(void **state)
     assert_int_equal(s.count, 0);
 }
 
+/* A camera at 0 that looks along z, farther to the sides than up and down; balls of 3 x 0.1 around the
+   means. */
+static void gradients_are_of_what_is_in_view(void **state)
+{
+    (void)state;
+    static const struct {
+        float mean[3];
+        bool counts;
+    } cases[] = {{{0, 0, 2}, true},       {{0, 0, -2}, false},     {{0, 0, 0.2f}, false},
+                 {{0, 0, 0.21f}, true},   {{0, 1.25f, 2}, true},   {{0, 1.35f, 2}, false},
+                 {{0, -1.35f, 2}, false}, {{2.75f, 0, 2}, true},   {{2.85f, 0, 2}, false},
+                 {{-2.75f, 0, 2}, true},  {{-2.85f, 0, 2}, false}, {{2.75f, -1.25f, 2}, true}};
+    enum { COUNT = sizeof cases / sizeof *cases };
+    uint32_t visible[COUNT], slot[COUNT];
+    float opacity_sum[COUNT];
+    frame f = {.visible = visible,
+               .visible_count = COUNT,
+               .half_fov_tan = {1.25, 0.5},
+               .camera.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    growth_stats s = {0};
+    assert_ok(gaussians_resize(&f.gaussians, COUNT, NULL));
+    assert_ok(gaussians_resize(&f.d_gaussians, COUNT, NULL));
+    assert_ok(growth_stats_resize(&s, COUNT, 1, NULL));
+    gaussians_zero(&f.d_gaussians);
+    for (uint32_t i = 0; i < COUNT; i++) {
+        visible[i] = COUNT - 1 - i; /* rows and Gaussians have other orders */
+        slot[i] = i;
+        opacity_sum[i] = (float)i;
+        f.gaussians.mean_x[i] = cases[i].mean[0];
+        f.gaussians.mean_y[i] = cases[i].mean[1];
+        f.gaussians.mean_z[i] = cases[i].mean[2];
+        f.gaussians.scale_x[i] = f.gaussians.scale_y[i] = 0.05f;
+        f.gaussians.scale_z[i] = 0.1f;
+        f.d_gaussians.mean_x[i] = 2.4f;
+        f.d_gaussians.mean_y[i] = 8;
+        f.d_gaussians.mean_z[i] = 100;
+    }
+    f.tape.slot = slot;
+    f.tape.opacity_sum = opacity_sum;
+    for (int twice = 0; twice < 2; twice++)
+        growth_stats_gather(&s, &f, GROWTH_BY_OPACITY, 0.2f);
+    for (size_t i = 0; i < COUNT; i++) {
+        const size_t row = COUNT - 1 - i;
+        assert_true(s.grad_count[row] == (cases[i].counts ? 2.0f : 0.0f));
+        assert_float_equal(s.grad_accum[row], cases[i].counts ? 2 * 5 * cases[i].mean[2] : 0, 1e-5f);
+        assert_true(s.visit_count[row] == 2 && s.importance_accum[row] == 2 * (float)i);
+    }
+    growth_stats_free(&s);
+    gaussians_free(&f.gaussians);
+    gaussians_free(&f.d_gaussians);
+}
+
 int main(void)
 {
     struct CMUnitTest tests[64];
@@ -844,6 +896,7 @@ int main(void)
         cmocka_unit_test(wrong_arguments_are_refused),
         cmocka_unit_test(no_memory_changes_nothing),
         cmocka_unit_test(statistics_follow_rows),
+        cmocka_unit_test(gradients_are_of_what_is_in_view),
     };
     for (size_t i = 0; i < sizeof single / sizeof *single; i++)
         tests[count++] = single[i];

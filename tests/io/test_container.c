@@ -239,6 +239,40 @@ static void forged(void **state)
     mem_free(bytes);
 }
 
+/* One section that says to be longer than the file, then one that begins behind its end. */
+static void sections_beyond_the_end(void **state)
+{
+    (void)state;
+    for (int second = 0; second < 2; second++) {
+        container_writer w = {0};
+        container c;
+        size_t byte_count;
+        unsigned char *bytes;
+        gbt_error err = {0};
+        container_add(&w, "numbers", CONTAINER_F32, 1, (size_t[]){3}, floats);
+        if (second)
+            container_add(&w, "empty", CONTAINER_F32, 1, (size_t[]){0}, NULL);
+        assert_ok(container_encode(&w, &bytes, &byte_count, NULL));
+        container_writer_free(&w);
+        if (second) { /* cut where the first ends: the second would begin at the next multiple of 64 */
+            byte_count = 64 + 2 * 128 + 12;
+            memcpy(bytes + 16, &(uint64_t){byte_count}, 8);
+        } else {
+            memcpy(bytes + 64 + 72, &(uint64_t){1000}, 8);
+            memcpy(bytes + 64 + 112, &(uint64_t){4000}, 8);
+        }
+        repair_checksums(bytes, second ? 2 * 128 : 128);
+        unsigned char *exact = mem_alloc(byte_count, 1, "test", NULL); /* so that a sanitizer sees its end */
+        memcpy(exact, bytes, byte_count);
+        assert_int_equal(container_parse(exact, byte_count, "memory", &c, &err), GBT_ERR_FORMAT);
+        assert_non_null(
+            strstr(err.text, second ? "section empty: 0 bytes at 384 are not where they should be"
+                                    : "section numbers: 4000 bytes at 192 are not where they should be"));
+        mem_free(exact);
+        mem_free(bytes);
+    }
+}
+
 static void two_sections_of_one_name(void **state)
 {
     (void)state;
@@ -535,6 +569,7 @@ int main(void)
         cmocka_unit_test(no_section_at_all),
         cmocka_unit_test(every_flipped_bit_is_found),
         cmocka_unit_test(every_other_length_is_found),
+        cmocka_unit_test(sections_beyond_the_end),
         cmocka_unit_test(two_sections_of_one_name),
         cmocka_unit_test(unaligned_bytes_are_refused),
         cmocka_unit_test(wrong_questions),

@@ -226,6 +226,7 @@ static void edit(const char *folder, char *line)
     const int count = split(copy, w);
     if (count < 2)
         die(line, "wanted an edit and a file");
+    w[1][unescape(w[1])] = '\0';
     snprintf(path, sizeof path, "%s/%s", folder, w[1]);
     if (strcmp(w[0], "remove") == 0)
         unlink(path);

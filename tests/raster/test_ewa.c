@@ -15,15 +15,19 @@ static const cloud_def clouds[] = {
 /* Forms of the cuts. Backgrounds are not black, so that their gradients are seen. */
 static const struct {
     const char *name;
-    float dilation, near;
+    float dilation, near, alpha_max;
     bool exact_cut;
-} forms[] = {{"3DGS", 0.3f, 0.2f, false}, {"exact cut", 0.3f, 0.2f, true}, {"no dilation", 0, 0.05f, true}};
+} forms[] = {{"3DGS", 0.3f, 0.2f, 0.99f, false},
+             {"exact cut", 0.3f, 0.2f, 0.99f, true},
+             {"no dilation", 0, 0.05f, 0.99f, true},
+             {"half opaque at most", 0.3f, 0.2f, 0.5f, false}};
 
 static raster_settings settings_of(size_t form)
 {
     raster_settings s = raster_settings_default();
     s.dilation = forms[form].dilation;
     s.near = forms[form].near;
+    s.alpha_max = forms[form].alpha_max;
     s.exact_cut = forms[form].exact_cut;
     s.background[0] = 0.3f;
     s.background[1] = 0.6f;
@@ -88,7 +92,7 @@ static void gradients_agree(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof clouds / sizeof *clouds; i++) {
-        const raster_settings s = settings_of(i % 3);
+        const raster_settings s = settings_of(i % (sizeof forms / sizeof *forms));
         gaussians g = make_cloud(&clouds[i], 31 + i);
         const gbt_camera camera = make_camera(clouds[i].width, clouds[i].height, clouds[i].camera);
         image d_rgb = random_image(camera.width, camera.height, i);

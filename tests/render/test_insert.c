@@ -337,6 +337,7 @@ static void shadow_on_gaussians(void **state)
         const uint32_t triangles[6] = {0, 1, 2, 2, 3, 0};
         int dark = 0, half = 0;
         assert_ok(insert_add(&in, &matt, vertices, 4, triangles, 2, NULL));
+        add_plane(&in, &matt, -2, 99); /* behind the lamp: no shadow of it */
         shoot(&st, &in);
         for (size_t i = 0; i < W * H; i++) {
             const double x = 6 * (double)st.rays.dir[3 * i] / (double)st.rays.dir[3 * i + 2];
@@ -381,6 +382,7 @@ static void shadow_on_a_mesh(void **state)
     int screen = 0, dark = 0;
     add_plane(&in, &matt, 7, 99);
     assert_ok(insert_add(&in, &red, vertices, 4, triangles, 2, NULL));
+    add_plane(&in, &matt, -2, 99); /* behind the lamp: no shadow of it */
     shoot(&st, &in);
     for (size_t i = 0; i < W * H; i++) {
         const double slope[2] = {(double)st.rays.dir[3 * i] / (double)st.rays.dir[3 * i + 2],

@@ -219,6 +219,20 @@ static void a_black_mask_leaves_nothing(void **state)
     json_t *metrics = scores_of(in_root("black_run"));
     assert_true(json_is_null(json_object_get(json_array_get(json_object_get(metrics, "views"), 0), "psnr")));
     assert_true(json_real_value(json_object_get(metrics, "psnr")) > 5);
+    static const char *const scores[] = {"psnr", "ssim", "flip"}; /* means over the views that have some */
+    for (int k = 0; k < 3; k++) {
+        double sum = 0, count = 0;
+        const json_t *view;
+        size_t i;
+        json_array_foreach(json_object_get(metrics, "views"), i,
+                           view) if (json_is_real(json_object_get(view, "psnr")))
+        {
+            sum += json_real_value(json_object_get(view, scores[k]));
+            count++;
+        }
+        assert_true(count > 0 &&
+                    fabs(json_real_value(json_object_get(metrics, scores[k])) - sum / count) < 1e-6);
+    }
     json_decref(metrics);
 }
 

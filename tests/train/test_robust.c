@@ -645,6 +645,32 @@ static double score_of(const char *run, const char *data, gbt_train_def def)
     return psnr;
 }
 
+/* What one photo takes, the others give: the scene has the photos' mean exposure. */
+static void exposures_stay_centred(void **state)
+{
+    (void)state;
+    exposures e = {0};
+    float identity[AFFINE_NUMBERS];
+    affine_identity(identity);
+    assert_ok(exposures_make(&e, 4, NULL));
+    for (size_t step = 0; step < 10; step++) {
+        double gradient[AFFINE_NUMBERS];
+        for (size_t k = 0; k < AFFINE_NUMBERS; k++)
+            gradient[k] = (double)k - 4.5;
+        exposures_step(&e, step % 3, gradient, 0.01);
+        for (size_t k = 0; k < AFFINE_NUMBERS; k++) {
+            double mean = 0;
+            for (size_t i = 0; i < 4; i++)
+                mean += (double)e.matrix[i * AFFINE_NUMBERS + k] / 4;
+            assert_true(fabs(mean - (double)identity[k]) < 1e-6);
+            /* Against its gradient, more than photo 3, which is never seen. */
+            const float moved = e.matrix[step % 3 * AFFINE_NUMBERS + k] - e.matrix[3 * AFFINE_NUMBERS + k];
+            assert_true(k < 5 ? moved > 0.009f : moved < -0.009f);
+        }
+    }
+    exposures_free(&e);
+}
+
 /* Measured with 400 steps: 15.4 dB without, 27.9 dB with. */
 static void exposure_is_learned(void **state)
 {
@@ -716,6 +742,7 @@ int main(void)
         cmocka_unit_test(opacities_are_raised),
         cmocka_unit_test(points_that_tell_nothing_are_replaced),
         cmocka_unit_test(wild_rates_and_photos_leave_no_nan),
+        cmocka_unit_test(exposures_stay_centred),
         cmocka_unit_test(exposure_is_learned),
         cmocka_unit_test(exposure_resumes_to_the_same_bits),
     };

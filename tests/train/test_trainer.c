@@ -1173,6 +1173,22 @@ static void config_comes_back(void **state)
 /* ---- photos ---- */
 
 /* Every pixel of every phase is the photo's, seen by the photo's ray. */
+static void a_config_ends_with_its_buffer(void **state)
+{
+    (void)state;
+    const gbt_train_def def = gbt_train_def_default();
+    char whole[CONFIG_TEXT_SIZE], text[CONFIG_TEXT_SIZE];
+    config_text(&def, "data", whole, sizeof whole);
+    for (size_t size = 1; size <= strlen(whole) + 1; size++) {
+        memset(text, '#', sizeof text);
+        config_text(&def, "data", text, size);
+        assert_int_equal(strlen(text), size - 1);
+        assert_memory_equal(text, whole, size - 1);
+        for (size_t i = size; i < sizeof text; i++)
+            assert_int_equal(text[i], '#');
+    }
+}
+
 static void samples_are_pixels_of_the_photo(void **state)
 {
     (void)state;
@@ -1481,6 +1497,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(settings_are_whole),
         cmocka_unit_test(settings_out_of_range_are_named),
         cmocka_unit_test(config_comes_back),
+        cmocka_unit_test(a_config_ends_with_its_buffer),
         cmocka_unit_test(samples_are_pixels_of_the_photo),
         cmocka_unit_test(parts_make_up_the_photo),
         cmocka_unit_test(photos_keep_to_their_memory),

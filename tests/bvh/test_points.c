@@ -876,33 +876,9 @@ enum {
     SPACINGS = sizeof spacing_cases / sizeof *spacing_cases
 };
 
-/* Boxes hold what they are made for, by no more than a step of float32 on each side. */
-static void boxes_round_outward(void **state)
-{
-    (void)state;
-    for (uint64_t i = 0; i < 1000; i++) {
-        double lower[3], upper[3];
-        struct RTCBounds box;
-        for (uint64_t k = 0; k < 3; k++) {
-            lower[k] = (double)rng_normal(7, k, i) + 1e-9 * (double)rng_uniform(7, 3 + k, i);
-            upper[k] = lower[k] + (double)rng_uniform(7, 6 + k, i) / 3;
-        }
-        site_write_bounds(&box, lower, upper, 0);
-        const float got_lower[3] = {box.lower_x, box.lower_y, box.lower_z},
-                    got_upper[3] = {box.upper_x, box.upper_y, box.upper_z};
-        for (int k = 0; k < 3; k++) {
-            assert_true((double)got_lower[k] <= lower[k] &&
-                        (double)nextafterf(got_lower[k], INFINITY) > lower[k]);
-            assert_true((double)got_upper[k] >= upper[k] &&
-                        (double)nextafterf(got_upper[k], -INFINITY) < upper[k]);
-        }
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest others[] = {
-        cmocka_unit_test(boxes_round_outward),
         cmocka_unit_test(bad_queries_are_refused),
         cmocka_unit_test(bad_points_are_named),
         cmocka_unit_test(agrees_with_flann),

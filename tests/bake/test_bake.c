@@ -124,14 +124,14 @@ static void look_at_all(world *w, mean_of_views *means)
         gbt_camera sparse = w->cameras[c];
         w->f.draw.pixel_step = gbt_camera_every(&w->cameras[c], 2, 0, 0, &sparse) ? 2 : 1;
         assert_ok(frame_render(&w->f, frame_neural(&w->a, &w->d), &sparse, &w->s, true, NULL));
-        assert_ok(frame_weigh(&w->f, NULL));
+        assert_ok(frame_blend_weights(&w->f, NULL));
         for (size_t v = 0; v < w->f.visible_count; v++)
             for (uint32_t k = 0; k < OFFSETS; k++)
                 means[w->f.visible[v] * OFFSETS + k].decoded++;
         for (size_t i = 0; i < w->f.gaussians.count; i++) {
             const uint32_t slot = w->f.tape.slot[i];
             mean_of_views *m = &means[w->f.visible[slot / OFFSETS] * OFFSETS + slot % OFFSETS];
-            const double weight = (double)w->f.seen[i];
+            const double weight = (double)w->f.blend_weight[i];
             m->made++;
             m->weight += weight;
             m->opaque += weight / (double)w->f.gaussians.opacity[i];

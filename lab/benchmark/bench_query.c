@@ -7,7 +7,6 @@
 
 #include "base/clock.h"
 #include "base/fail.h"
-#include "base/log.h"
 #include "base/memory.h"
 #include "base/rng.h"
 #include "bvh/points.h"
@@ -233,10 +232,8 @@ gbt_status lab_bench_query(const lab_bench_query_def *def, const char *folder, F
     b->def = def;
     gbt_status status = def->check ? query_check_all(b, err) : GBT_OK;
     for (size_t points = 10000; points <= def->points && status == GBT_OK; points *= 10)
-        for (int cloud = 0; cloud < QUERY_CLOUDS && status == GBT_OK; cloud++) {
-            log_info("%s, %zu points", query_cloud_names[cloud], points);
+        for (int cloud = 0; cloud < QUERY_CLOUDS && status == GBT_OK; cloud++)
             status = measure(b, cloud, points, err);
-        }
     if (status == GBT_OK)
         status = query_bench_write(b, folder, out, err);
     mem_free(b);

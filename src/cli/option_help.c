@@ -87,12 +87,13 @@ static void add_duration(char *out, size_t size, double seconds)
 static void add_size(char *out, size_t size, double bytes)
 {
     int unit = 0;
+    if (bytes <= 0 || bytes > 0x1p50) /* 0: no default; beyond: no limit */
+        return;
     while (unit < 4 && bytes >= 1024) {
         bytes /= 1024;
         unit++;
     }
-    if (bytes > 0 && bytes <= 0x1p30) /* 0: no default; beyond: no limit */
-        add(out, size, " (default %g%.*s)", bytes, unit > 0, unit > 0 ? &"KMGT"[unit - 1] : "");
+    add(out, size, " (default %g%.*s)", bytes, unit > 0, unit > 0 ? &"KMGT"[unit - 1] : "");
 }
 
 /** What stands for "as it was trained" has no name. */

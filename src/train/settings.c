@@ -66,8 +66,8 @@ static const gbt_train_setting settings[] = {
     {NAMED("eval-split", eval_split), .kind = GBT_SETTING_TEXT, .unit = "SPLIT", .text = "auto",
      .choices = "auto|every=8|none|validate=8", .saved = true,
      .help = "held-out photos: auto (as the data set says, else every=8), every=N, every=N:K (from photo K "
-             "on), none, list=FILE; validate=N:K before it and a comma, or alone: leave those out and hold "
-             "out every N-th of the training photos, to choose settings by"},
+             "on), none, list=FILE; validate=N: every N-th of the others in their place, to choose settings "
+             "by"},
     {NAMED("alpha", alpha), CHOICE(GBT_ALPHA_NAMES), .number = GBT_ALPHA_AUTO, .saved = true,
      .help = "transparent pixels of photos: composited on black or white, or masked out of loss and scores; "
              "auto: "

@@ -146,7 +146,7 @@ misuse 4 "nothing: no such file or folder" train -s nothing -m run -r 2 --eval -
 misuse 4 "nothing: no such file or folder" train --source_path nothing --model_path run --resolution 2 --n_offsets 10 --voxel_size 0.01
 misuse 2 "--output: given twice" train -s nothing -m run --output run
 misuse 4 "nothing: no such file or folder" train nothing -o run --budget 10min
-misuse 2 "-r: bad value (wanted a number from 1 to 64, got 800)" train -s nothing -m run -r 800
+misuse 2 "-r: bad value (wanted a number from 0 to 64, got 800)" train -s nothing -m run -r 800
 misuse 2 "--white_background: not here; what no Gaussian covers shows the mean colour of the points; leave it out" train -s d -m r --white_background
 misuse 2 "-i: not here; photos are found from the cameras; for smaller ones use --downscale F" train -s d -m r -i images_4
 misuse 2 "--test_iterations: not here; use --eval-at 1m,2m for scores on the way" train -s d -m r --test_iterations 7000 30000

@@ -145,6 +145,7 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
     if (status == GBT_OK && e->backdrop)
         status = backdrop_add(out, cameras, count, r->model.background, err);
     out->antialiased = r->frame.draw.footprint > 0;
+    out->near = r->settings.t_near;
     mem_free(cameras);
     return status;
 }

@@ -36,7 +36,8 @@ typedef struct gaussian_cloud {
     int sh_degree;    /* 0..3 */
     bool antialiased; /* made to be drawn as wide as pixels (docs/antialiasing.md), without a blur on top: of
                          the formats that can say so */
-    size_t dropped;   /* rows with a value that is not usable */
+    float near; /* nothing nearer to a camera is to be drawn, scene units; 0: nobody says. Only .ply does */
+    size_t dropped;            /* rows with a value that is not usable */
     size_t identity_rotations; /* zero quaternions, read as no rotation */
     size_t scales_clamped;     /* rows with a scale raised to 1e-4 of their largest */
 } gaussian_cloud;

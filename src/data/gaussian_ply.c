@@ -7,6 +7,7 @@
 
 #include "base/file.h"
 #include "data/compressed_ply.h"
+#include "data/number.h"
 #include "data/ply.h"
 
 enum {
@@ -109,6 +110,24 @@ static gbt_status read_plain(const source_file *file, const ply_header *header, 
     return ply_read_rows(file, header, vertex, columns, FIXED_COLUMNS + rows.rest_count, add_row, &rows, err);
 }
 
+/* 0 where nobody says, or no usable distance. */
+static float near_of(const source_file *file, const ply_header *header)
+{
+    static const char mark[] = "\n" GAUSSIAN_PLY_NEAR;
+    const char *text = memmem(file->bytes, header->data_at, mark, sizeof mark - 1);
+    double near;
+    if (text == NULL)
+        return 0;
+    text += sizeof mark - 1;
+    const char *end = (const char *)file->bytes + header->data_at;
+    size_t length = 0;
+    while (text + length < end && text[length] != '\n' && text[length] != '\r')
+        length++;
+    if (number_parse_double(text, length, &near) != NUMBER_OK || !(near > 0 && near < 1e30))
+        return 0;
+    return (float)near;
+}
+
 /* A line of the header; a later one would count, but nobody writes two. */
 static bool says(const source_file *file, const ply_header *header, const char *line)
 {
@@ -127,6 +146,7 @@ gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_e
                                                    : read_plain(file, &header, vertex, out, err);
     out->antialiased =
         says(file, &header, "\n" GAUSSIAN_PLY_MIP) || says(file, &header, "\ncomment antialiased 1");
+    out->near = near_of(file, &header);
     if (status == GBT_OK && out->count == 0)
         status = base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu rows dropped)", file->name,
                            out->dropped);

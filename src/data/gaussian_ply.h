@@ -3,17 +3,27 @@
 #ifndef GBT_DATA_GAUSSIAN_PLY_H
 #define GBT_DATA_GAUSSIAN_PLY_H
 
+#include <stdio.h>
+
 #include "data/bytes.h"
 #include "data/gaussian_cloud.h"
 
 /** The line of a header that says that Gaussians are to be drawn as wide as pixels. */
 #define GAUSSIAN_PLY_MIP "comment SplatRenderMode: mip"
 
-/** What goes behind the line of the format: that line, or nothing. */
-static inline void gaussian_ply_put_comment(sink *s, const gaussian_cloud *cloud)
+/** The line of our own that says how near to a camera they are drawn, and a number. */
+#define GAUSSIAN_PLY_NEAR "comment gbtrace near "
+
+/** What goes behind the line of the format: those lines, as far as they hold. */
+static inline void gaussian_ply_put_comments(sink *s, const gaussian_cloud *cloud)
 {
+    char line[64];
     if (cloud->antialiased)
         sink_put_text(s, GAUSSIAN_PLY_MIP "\n");
+    if (!(cloud->near > 0))
+        return;
+    snprintf(line, sizeof line, GAUSSIAN_PLY_NEAR "%.9g\n", (double)cloud->near);
+    sink_put_text(s, line);
 }
 
 /**

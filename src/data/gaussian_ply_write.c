@@ -37,7 +37,7 @@ static gbt_status write_ply(const char *path, const gaussian_cloud *cloud, const
     sink s = {.err = err};
     char line[128];
     sink_put_text(&s, "ply\nformat binary_little_endian 1.0\n");
-    gaussian_ply_put_comment(&s, cloud);
+    gaussian_ply_put_comments(&s, cloud);
     snprintf(line, sizeof line, "element vertex %zu\n", cloud->count);
     sink_put_text(&s, line);
     sink_put_text(&s, "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty "

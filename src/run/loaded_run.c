@@ -45,6 +45,8 @@ void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud)
     r->cloud = *cloud;
     memset(cloud, 0, sizeof *cloud);
     gaussian_cloud *c = &r->cloud;
+    if (c->near > 0)
+        r->settings.t_near = c->near;
     double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
     for (size_t i = 0; i < 3 * c->count; i++) {
         low[i % 3] = fmin(low[i % 3], (double)c->mean[i]);

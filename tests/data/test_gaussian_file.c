@@ -28,7 +28,7 @@ static void ply_keeps_everything(void **state)
 static void ply_says_how_it_is_drawn(void **state)
 {
     static const char other[] =
-        "ply\nformat ascii 1.0\ncomment antialiased 1\nelement vertex 1\n"
+        "ply\nformat ascii 1.0\ncomment antialiased 1\ncomment gbtrace near -1\nelement vertex 1\n"
         "property float x\nproperty float y\nproperty float z\nproperty float f_dc_0\n"
         "property float f_dc_1\nproperty float f_dc_2\nproperty float opacity\n"
         "property float scale_0\nproperty float scale_1\nproperty float scale_2\n"
@@ -38,16 +38,18 @@ static void ply_says_how_it_is_drawn(void **state)
         gaussian_cloud a, b;
         make_cloud(&a, 3, 1);
         a.antialiased = marked == 1;
+        a.near = 4.90744f * (float)marked;
         must(gaussian_file_write(inside(*state, "a.ply", 0), &a, nowhere, &err));
         must(gaussian_file_read(inside(*state, "a.ply", 0), &b, &err));
         assert_int_equal(b.antialiased, marked);
+        assert_true(b.near == a.near);
         gaussian_cloud_free(&a);
         gaussian_cloud_free(&b);
     }
     write_text(*state, "b.ply", other);
     gaussian_cloud b;
     must(gaussian_file_read(inside(*state, "b.ply", 0), &b, &err));
-    assert_true(b.antialiased);
+    assert_true(b.antialiased && b.near == 0);
     gaussian_cloud_free(&b);
 }
 

@@ -118,7 +118,7 @@ for file in $(find . -name '*.exr'); do # they hold the time when they were writ
     LC_ALL=C sed -i 's/20[0-9][0-9]:[0-9][0-9]:[0-9][0-9] [0-9][0-9]:[0-9][0-9]:[0-9][0-9]/(the time)/' "$file"
 done
 find . -type f ! -name '*.json' ! -name '*.obj' | LC_ALL=C sort | xargs sha256sum | sed 's/ [ *]\.\// /' >"$work.now"
-platform="# $(getconf GNU_LIBC_VERSION), $("$program" doctor 2>/dev/null | sed -n 's/.*\(OpenImageIO [0-9.]*\).*/\1/p')"
+platform="# $(getconf GNU_LIBC_VERSION), $("$program" doctor 2>/dev/null | sed -n 's/.*\(OpenImageIO [0-9.]*\).*/\1/p'), $(uname -m)"
 if [ "$record" = - ]; then
     printf '%s\n' "$platform"
     cat "$work.now"

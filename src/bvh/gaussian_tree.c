@@ -3,41 +3,28 @@
 #include "bvh/gaussian_tree.h"
 
 #include <math.h>
-#include <stdatomic.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
+#include "bvh/binary_tree.h"
 #include "bvh/device.h"
-#include "bvh/embree_api.h"
 #include "bvh/proxy.h"
 
 enum { LEAF_BLOCK = 256 };
-
-/* What Embree builds: binary, because its wider builders make as many children as they can and leave leaves
-   almost empty. */
-typedef struct binary_node {
-    struct RTCBounds bounds[2];
-    uint64_t child[2]; /* address of a binary_node, or that of leaf_members + 1 */
-} binary_node;
-
-typedef struct leaf_members {
-    uint32_t count, id[TREE_WIDTH];
-} leaf_members;
 
 typedef struct builder {
     RTCBVH bvh;
     proxy_boxes boxes;
     const gaussians *g;
     float alpha_min, radius;
-    atomic_size_t binary_count, leaf_count;
-    atomic_bool refused; /* an allocation of Embree's was refused: the tree has holes */
+    binary_tree binary;
     tree_node *nodes;
     size_t node_count, node_capacity;
     tree_leaf *leaves;
-    const leaf_members **members; /* of each leaf */
+    const binary_leaf **members; /* of each leaf */
     size_t filled_count, leaf_capacity, member_capacity;
 } builder;
 
@@ -78,104 +65,27 @@ static void fill_leaves(size_t block, size_t begin, size_t end, void *context)
     (void)block;
     const builder *b = context;
     for (size_t at = begin; at < end; at++) {
-        const leaf_members *members = b->members[at];
+        const binary_leaf *members = b->members[at];
         b->leaves[at].count = members->count;
         for (size_t i = 0; i < TREE_WIDTH; i++)
             set_ellipsoid(b, members->id[i < members->count ? i : 0], &b->leaves[at], i);
     }
 }
 
-/* ---- Embree's callbacks; a leaf is a tagged address in place of a pointer ---- */
-
-static void *create_node(RTCThreadLocalAllocator allocator, unsigned child_count, void *user)
-{
-    (void)child_count;
-    builder *b = user;
-    embree_receive(b);
-    atomic_fetch_add_explicit(&b->binary_count, 1, memory_order_relaxed);
-    binary_node *node = rtcThreadLocalAlloc(allocator, sizeof(binary_node), 16);
-    if (node == NULL) /* the memory limit (bvh_limit_memory) */
-        atomic_store_explicit(&b->refused, true, memory_order_relaxed);
-    embree_publish(b);
-    return node;
-}
-
-static void set_children(void *pointer, void **children, unsigned child_count, void *user)
-{
-    binary_node *node = pointer;
-    embree_receive(user);
-    for (unsigned i = 0; i < child_count && node != NULL; i++)
-        node->child[i] = (uint64_t)(uintptr_t)children[i];
-    embree_publish(user);
-}
-
-static void set_bounds(void *pointer, const struct RTCBounds **bounds, unsigned child_count, void *user)
-{
-    binary_node *node = pointer;
-    embree_receive(user);
-    for (unsigned i = 0; i < child_count && node != NULL; i++)
-        node->bounds[i] = *bounds[i];
-    embree_publish(user);
-}
-
-static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuildPrimitive *primitives,
-                         size_t count, void *user)
-{
-    builder *b = user;
-    embree_receive(b);
-    atomic_fetch_add_explicit(&b->leaf_count, 1, memory_order_relaxed);
-    leaf_members *leaf = rtcThreadLocalAlloc(allocator, sizeof *leaf, 16);
-    if (leaf == NULL) {
-        atomic_store_explicit(&b->refused, true, memory_order_relaxed);
-        embree_publish(b);
-        return NULL;
-    }
-    leaf->count = (uint32_t)count;
-    for (size_t i = 0; i < count; i++)
-        leaf->id[i] = primitives[i].primID;
-    embree_publish(b);
-    return (char *)leaf + 1;
-}
-
 /* ---- binary nodes --> nodes of 16 ---- */
-
-static float half_area(const struct RTCBounds *b)
-{
-    const float x = b->upper_x - b->lower_x, y = b->upper_y - b->lower_y, z = b->upper_z - b->lower_z;
-    return x * y + y * z + z * x;
-}
 
 static uint64_t place_leaf(builder *b, uint64_t child)
 {
-    b->members[b->filled_count] = (const leaf_members *)(uintptr_t)(child - 1);
+    b->members[b->filled_count] = binary_leaf_of(child);
     return (uint64_t)(uintptr_t)&b->leaves[b->filled_count++] + 1;
 }
 
-/* The wide node for a binary one: its largest child is opened until there are 16. Depth first, so that
-   neighbours lie side by side. */
+/* The wide node for a binary one. Depth first, so that neighbours lie side by side. */
 static tree_node *widen(builder *b, const binary_node *root)
 {
     struct RTCBounds bounds[TREE_WIDTH];
     uint64_t child[TREE_WIDTH];
-    int count = 2;
-    memcpy(bounds, root->bounds, 2 * sizeof *bounds);
-    memcpy(child, root->child, 2 * sizeof *child);
-    while (count < TREE_WIDTH) {
-        int largest = -1;
-        float area = -1;
-        for (int i = 0; i < count; i++)
-            if ((child[i] & 1) == 0 && half_area(&bounds[i]) > area) {
-                largest = i;
-                area = half_area(&bounds[i]);
-            }
-        if (largest < 0)
-            break;
-        const binary_node *opened = (const binary_node *)(uintptr_t)child[largest];
-        bounds[largest] = opened->bounds[0];
-        child[largest] = opened->child[0];
-        bounds[count] = opened->bounds[1];
-        child[count++] = opened->child[1];
-    }
+    const int count = binary_node_open(root, TREE_WIDTH, bounds, child);
     tree_node *node = &b->nodes[b->node_count++];
     node_clear(node);
     for (int i = 0; i < count; i++) {
@@ -185,7 +95,7 @@ static tree_node *widen(builder *b, const binary_node *root)
         node->upper_y[i] = bounds[i].upper_y;
         node->lower_z[i] = bounds[i].lower_z;
         node->upper_z[i] = bounds[i].upper_z;
-        node->child[i] = (child[i] & 1) != 0
+        node->child[i] = binary_leaf_of(child[i]) != NULL
                              ? place_leaf(b, child[i])
                              : (uint64_t)(uintptr_t)widen(b, (const binary_node *)(uintptr_t)child[i]);
     }
@@ -206,52 +116,25 @@ static gbt_status run_builder(builder *b, void *device, gbt_error *err)
 {
     if (b->bvh == NULL)
         b->bvh = rtcNewBVH(device);
-    struct RTCBuildArguments arguments = rtcDefaultBuildArguments();
-    arguments.byteSize = sizeof arguments;
-    arguments.buildQuality = RTC_BUILD_QUALITY_MEDIUM; /* deterministic, unlike HIGH */
-    arguments.maxBranchingFactor = 2;
-    arguments.maxDepth = 48;
-    arguments.sahBlockSize = TREE_WIDTH; /* a leaf costs the same, whether it holds 1 or 16 */
-    arguments.minLeafSize = 1;
-    arguments.maxLeafSize = TREE_WIDTH;
-    arguments.traversalCost = 1;
-    arguments.intersectionCost = 1;
-    arguments.bvh = b->bvh;
-    arguments.primitives = b->boxes.box;
-    arguments.primitiveCount = b->boxes.count;
-    arguments.primitiveArrayCapacity = b->boxes.capacity;
-    arguments.createNode = create_node;
-    arguments.setNodeChildren = set_children;
-    arguments.setNodeBounds = set_bounds;
-    arguments.createLeaf = create_leaf;
-    arguments.userPtr = b;
-    atomic_store(&b->binary_count, 0);
-    atomic_store(&b->leaf_count, 0);
-    atomic_store(&b->refused, false);
-    embree_publish(b);
-    void *root = rtcBuildBVH(&arguments);
-    embree_receive(b);
-    const gbt_status complaint = bvh_check("tree", err);
-    if (b->refused || complaint != GBT_OK)
-        return base_fail(err, GBT_ERR_NO_MEMORY, "bvh: no memory for a tree over %zu Gaussians",
-                         b->boxes.count);
-    if (root == NULL)
-        return base_fail(err, GBT_ERR_INTERNAL,
-                         "bvh: Embree could not build a tree over %zu Gaussians (error %d)", b->boxes.count,
-                         (int)rtcGetDeviceError(device));
+    const gbt_status status = binary_tree_build(&b->binary, b->bvh, b->boxes.box, b->boxes.count,
+                                                b->boxes.capacity, TREE_WIDTH, "bvh", err);
+    if (status == GBT_ERR_NO_MEMORY)
+        return base_fail(err, status, "bvh: no memory for a tree over %zu Gaussians", b->boxes.count);
+    GBT_TRY(status);
+    const size_t leaf_count = b->binary.leaf_count;
     b->node_count = 0;
-    GBT_TRY(mem_reserve((void **)&b->nodes, &b->node_capacity, 0, b->binary_count + 1, sizeof *b->nodes,
+    GBT_TRY(mem_reserve((void **)&b->nodes, &b->node_capacity, 0, b->binary.node_count + 1, sizeof *b->nodes,
                         "bvh nodes", err));
-    GBT_TRY(mem_reserve((void **)&b->leaves, &b->leaf_capacity, 0, b->leaf_count, sizeof *b->leaves,
+    GBT_TRY(mem_reserve((void **)&b->leaves, &b->leaf_capacity, 0, leaf_count, sizeof *b->leaves,
                         "bvh leaves", err));
-    GBT_TRY(mem_reserve((void **)&b->members, &b->member_capacity, 0, b->leaf_count, sizeof *b->members,
+    GBT_TRY(mem_reserve((void **)&b->members, &b->member_capacity, 0, leaf_count, sizeof *b->members,
                         "bvh leaves", err));
     b->filled_count = 0;
-    if (b->binary_count > 0)
-        widen(b, root);
+    if (b->binary.node_count > 0)
+        widen(b, (const binary_node *)(uintptr_t)b->binary.root);
     else
-        single_node(b, (uint64_t)(uintptr_t)root);
-    parallel_blocks(b->leaf_count, LEAF_BLOCK, fill_leaves, b);
+        single_node(b, b->binary.root);
+    parallel_blocks(leaf_count, LEAF_BLOCK, fill_leaves, b);
     return GBT_OK;
 }
 
@@ -286,7 +169,7 @@ gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float radius
     tree->root = b->nodes;
     tree->leaves = b->leaves;
     tree->node_count = b->node_count;
-    tree->leaf_count = b->leaf_count;
+    tree->leaf_count = b->binary.leaf_count;
     tree->bytes = tree->node_count * sizeof(tree_node) + tree->leaf_count * sizeof(tree_leaf);
     return GBT_OK;
 }

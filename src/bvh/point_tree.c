@@ -9,22 +9,13 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "bvh/binary_tree.h"
 #include "bvh/device.h"
-#include "bvh/embree_api.h"
 
 enum { CHECK_BLOCK = 65536, LEAF_BLOCK = 1024, MEDIAN_SAMPLES = 4095 };
 
-typedef struct binary_node {
-    struct RTCBounds bounds[2];
-    uint64_t child[2]; /* address of a binary_node, or that of leaf_members + 1 */
-} binary_node;
-
-typedef struct leaf_members {
-    uint32_t count, id[POINT_WIDTH];
-} leaf_members;
-
 typedef struct leaf_place {
-    const leaf_members *members;
+    const binary_leaf *members;
     uint32_t first;
 } leaf_place;
 
@@ -34,8 +25,8 @@ typedef struct builder {
     double origin[3],
         scale; /* what Embree sees: (position - origin) scale, about 1 at most but for outliers */
     struct RTCBuildPrimitive *boxes;
-    atomic_size_t binary_count, leaf_count, bad;
-    atomic_bool refused; /* an allocation of Embree's was refused: the tree has holes */
+    atomic_size_t bad;
+    binary_tree binary;
     point_tree *tree;
     leaf_place *leaves;
     size_t filled_count, filled_points, node_capacity;
@@ -145,68 +136,7 @@ static void box_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* ---- Embree's callbacks; a leaf is a tagged address in place of a pointer ---- */
-
-static void *take(builder *b, RTCThreadLocalAllocator allocator, size_t size)
-{
-    void *memory = rtcThreadLocalAlloc(allocator, size, 16);
-    if (memory == NULL) /* the memory limit (bvh_limit_memory) */
-        atomic_store_explicit(&b->refused, true, memory_order_relaxed);
-    return memory;
-}
-
-static void *create_node(RTCThreadLocalAllocator allocator, unsigned child_count, void *user)
-{
-    (void)child_count;
-    builder *b = user;
-    embree_receive(b);
-    atomic_fetch_add_explicit(&b->binary_count, 1, memory_order_relaxed);
-    void *node = take(b, allocator, sizeof(binary_node));
-    embree_publish(b);
-    return node;
-}
-
-static void set_children(void *pointer, void **children, unsigned child_count, void *user)
-{
-    binary_node *node = pointer;
-    embree_receive(user);
-    for (unsigned i = 0; i < child_count && node != NULL; i++)
-        node->child[i] = (uint64_t)(uintptr_t)children[i];
-    embree_publish(user);
-}
-
-static void set_bounds(void *pointer, const struct RTCBounds **bounds, unsigned child_count, void *user)
-{
-    binary_node *node = pointer;
-    embree_receive(user);
-    for (unsigned i = 0; i < child_count && node != NULL; i++)
-        node->bounds[i] = *bounds[i];
-    embree_publish(user);
-}
-
-static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuildPrimitive *primitives,
-                         size_t count, void *user)
-{
-    builder *b = user;
-    embree_receive(b);
-    atomic_fetch_add_explicit(&b->leaf_count, 1, memory_order_relaxed);
-    leaf_members *leaf = take(b, allocator, sizeof *leaf);
-    if (leaf != NULL) {
-        leaf->count = (uint32_t)count;
-        for (size_t i = 0; i < count; i++)
-            leaf->id[i] = primitives[i].primID;
-    }
-    embree_publish(b);
-    return leaf == NULL ? NULL : (char *)leaf + 1;
-}
-
 /* ---- binary nodes --> nodes of 8 ---- */
-
-static float half_area(const struct RTCBounds *b)
-{
-    const float x = b->upper_x - b->lower_x, y = b->upper_y - b->lower_y, z = b->upper_z - b->lower_z;
-    return x * y + y * z + z * x;
-}
 
 static uint32_t add_node(builder *b)
 {
@@ -224,45 +154,26 @@ static uint32_t add_node(builder *b)
 
 static void place_leaf(builder *b, uint64_t child, point_node *node, int lane)
 {
-    const leaf_members *members = (const leaf_members *)(uintptr_t)(child - 1);
+    const binary_leaf *members = binary_leaf_of(child);
     b->leaves[b->filled_count++] = (leaf_place){members, (uint32_t)b->filled_points};
     node->child[lane] = (uint32_t)b->filled_points;
     node->size[lane] = (uint8_t)members->count;
     b->filled_points += members->count;
 }
 
-/* The wide node for a binary one: its largest child is opened until there are 8. Depth first, so that
-   neighbours lie side by side. */
+/* The wide node for a binary one. Depth first, so that neighbours lie side by side. */
 static uint32_t widen(builder *b, const binary_node *root, int depth)
 {
     struct RTCBounds bounds[POINT_WIDTH];
     uint64_t child[POINT_WIDTH];
-    int count = 2;
-    memcpy(bounds, root->bounds, 2 * sizeof *bounds);
-    memcpy(child, root->child, 2 * sizeof *child);
-    while (count < POINT_WIDTH) {
-        int largest = -1;
-        float area = -1;
-        for (int i = 0; i < count; i++)
-            if ((child[i] & 1) == 0 && half_area(&bounds[i]) > area) {
-                largest = i;
-                area = half_area(&bounds[i]);
-            }
-        if (largest < 0)
-            break;
-        const binary_node *opened = (const binary_node *)(uintptr_t)child[largest];
-        bounds[largest] = opened->bounds[0];
-        child[largest] = opened->child[0];
-        bounds[count] = opened->bounds[1];
-        child[count++] = opened->child[1];
-    }
+    const int count = binary_node_open(root, POINT_WIDTH, bounds, child);
     b->depth = depth > b->depth ? depth : b->depth;
     const uint32_t at = add_node(b);
     if (b->status != GBT_OK)
         return 0;
     b->tree->nodes[at].child_count = (uint8_t)count;
     for (int i = 0; i < count && b->status == GBT_OK; i++) {
-        if ((child[i] & 1) != 0)
+        if (binary_leaf_of(child[i]) != NULL)
             place_leaf(b, child[i], &b->tree->nodes[at], i);
         else if (depth < POINT_DEPTH_MAX) {
             const uint32_t below = widen(b, (const binary_node *)(uintptr_t)child[i], depth + 1);
@@ -280,7 +191,7 @@ static void fill_leaves(size_t block, size_t begin, size_t end, void *context)
     const builder *b = context;
     point_tree *t = b->tree;
     for (size_t at = begin; at < end; at++) {
-        const leaf_members *members = b->leaves[at].members;
+        const binary_leaf *members = b->leaves[at].members;
         const size_t first = b->leaves[at].first, count = members->count;
         for (size_t i = 0; i < count; i++) {
             const uint32_t id = members->id[i];
@@ -364,47 +275,19 @@ static void fill_nodes(point_tree *t)
 
 static gbt_status run_builder(builder *b, RTCBVH bvh, gbt_error *err)
 {
-    struct RTCBuildArguments arguments = rtcDefaultBuildArguments();
-    arguments.byteSize = sizeof arguments;
-    arguments.buildQuality = RTC_BUILD_QUALITY_MEDIUM; /* deterministic, unlike HIGH */
-    arguments.maxBranchingFactor = 2; /* wider ones make as many children as they can: leaves almost empty */
-    arguments.maxDepth = 48;
-    arguments.sahBlockSize = POINT_WIDTH; /* a leaf costs the same, whether it holds 1 or 8 */
-    arguments.minLeafSize = 1;
-    arguments.maxLeafSize = POINT_WIDTH;
-    arguments.traversalCost = 1;
-    arguments.intersectionCost = 1;
-    arguments.bvh = bvh;
-    arguments.primitives = b->boxes;
-    arguments.primitiveCount = b->count;
-    arguments.primitiveArrayCapacity = b->count;
-    arguments.createNode = create_node;
-    arguments.setNodeChildren = set_children;
-    arguments.setNodeBounds = set_bounds;
-    arguments.createLeaf = create_leaf;
-    arguments.userPtr = b;
-    embree_publish(b);
-    const void *root = rtcBuildBVH(&arguments);
-    embree_receive(b);
-    GBT_TRY(bvh_check("points", err));
-    if (b->refused)
-        return base_fail(err, GBT_ERR_NO_MEMORY, "points: embree: out of memory");
-    if (root == NULL)
-        return base_fail(err, GBT_ERR_INTERNAL, "points: Embree could not build a tree over %zu points",
-                         b->count);
-
+    GBT_TRY(binary_tree_build(&b->binary, bvh, b->boxes, b->count, b->count, POINT_WIDTH, "points", err));
     point_tree *t = b->tree;
-    b->leaves = mem_alloc(atomic_load(&b->leaf_count), sizeof *b->leaves, "points.leaves", err);
+    b->leaves = mem_alloc(b->binary.leaf_count, sizeof *b->leaves, "points.leaves", err);
     if (b->leaves == NULL)
         return GBT_ERR_NO_MEMORY;
     b->err = err;
-    if (atomic_load(&b->binary_count) > 0) {
-        widen(b, root, 1);
+    if (b->binary.node_count > 0) {
+        widen(b, (const binary_node *)(uintptr_t)b->binary.root, 1);
     } else { /* one leaf; the node above it is ours */
         const uint32_t at = add_node(b);
         if (b->status == GBT_OK) {
             t->nodes[at].child_count = 1;
-            place_leaf(b, (uint64_t)(uintptr_t)root, &t->nodes[at], 0);
+            place_leaf(b, b->binary.root, &t->nodes[at], 0);
         }
     }
     GBT_TRY(b->status);

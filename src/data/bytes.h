@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/file.h"
 #include "base/memory.h"
 
 /** A file in memory; `name` is for messages only. Borrowed by whoever gets it. */
@@ -145,6 +146,15 @@ static inline void sink_free(sink *s)
 {
     mem_free(s->bytes);
     memset(s, 0, sizeof *s);
+}
+
+/** All of it to a file, whole or not at all; freed either way. */
+static inline gbt_status sink_write(sink *s, const char *path)
+{
+    const gbt_status status =
+        s->status == GBT_OK ? file_write_atomic(path, s->bytes, s->size, s->err) : s->status;
+    sink_free(s);
+    return status;
 }
 
 #endif

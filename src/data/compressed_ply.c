@@ -184,11 +184,7 @@ gbt_status compressed_ply_write(const char *path, const gaussian_cloud *cloud, c
     sink s = {.err = err};
     put_all(&s, cloud, order, origin);
     mem_free(order);
-    gbt_status status = s.status;
-    if (status == GBT_OK)
-        status = file_write_atomic(path, s.bytes, s.size, err);
-    sink_free(&s);
-    return status;
+    return sink_write(&s, path);
 }
 
 /* ---- reading ---- */

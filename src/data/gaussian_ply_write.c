@@ -65,11 +65,7 @@ static gbt_status write_ply(const char *path, const gaussian_cloud *cloud, const
         for (size_t k = 0; k < 4; k++)
             sink_put_f32(&s, cloud->quat[4 * i + k]);
     }
-    gbt_status status = s.status;
-    if (status == GBT_OK)
-        status = file_write_atomic(path, s.bytes, s.size, err);
-    sink_free(&s);
-    return status;
+    return sink_write(&s, path);
 }
 
 const gaussian_format gaussian_format_ply = {

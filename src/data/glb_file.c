@@ -139,11 +139,7 @@ static gbt_status write_chunks(const char *path, const glb *g, const char *json,
     sink_put(&s, g->data.bytes, g->data.size);
     static const unsigned char zeros[3];
     sink_put(&s, zeros, data_padded - g->data.size);
-    gbt_status status = s.status;
-    if (status == GBT_OK)
-        status = file_write_atomic(path, s.bytes, s.size, err);
-    sink_free(&s);
-    return status;
+    return sink_write(&s, path);
 }
 
 /*

@@ -78,9 +78,5 @@ gbt_status ply_write(const char *path, const ply_cloud *cloud, gbt_error *err)
         for (size_t k = 0; k < 3; k++)
             sink_put_uint(&s, cloud->faces[3 * i + k], 4);
     }
-    gbt_status status = s.status;
-    if (status == GBT_OK)
-        status = file_write_atomic(path, s.bytes, s.size, err);
-    sink_free(&s);
-    return status;
+    return sink_write(&s, path);
 }

@@ -123,11 +123,7 @@ static gbt_status write_splat(const char *path, const gaussian_cloud *cloud, con
     for (size_t i = 0; i < cloud->count && s.status == GBT_OK; i++)
         put_row(&s, cloud, order[i].row, origin);
     mem_free(order);
-    gbt_status status = s.status;
-    if (status == GBT_OK)
-        status = file_write_atomic(path, s.bytes, s.size, err);
-    sink_free(&s);
-    return status;
+    return sink_write(&s, path);
 }
 
 const gaussian_format gaussian_format_splat = {.ending = ".splat",

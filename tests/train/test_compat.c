@@ -23,39 +23,43 @@ static trainer long_run(bool compat)
     return t;
 }
 
+/* Of a whole run the steps, counted from 1, in which something is done. */
+typedef struct steps_found {
+    size_t count, first, last;
+} steps_found;
+
+static steps_found find_steps(trainer *t, bool (*is_done)(const trainer *t))
+{
+    steps_found found = {0};
+    for (t->step = 0; t->step < WHOLE; t->step++)
+        if (is_done(t)) {
+            found.last = (size_t)t->step + 1;
+            found.first = found.count++ == 0 ? found.last : found.first;
+        }
+    return found;
+}
+
 /* 1600, 1700, ... 14900: neither the step at which growth may begin nor that at which it ends. */
 static void there_are_134_rounds(void **state)
 {
     (void)state;
     trainer t = long_run(true);
-    size_t rounds = 0, first = 0, last = 0;
-    for (t.step = 0; t.step < WHOLE; t.step++)
-        if (growing_is_due(&t)) {
-            last = (size_t)t.step + 1;
-            first = rounds++ == 0 ? last : first;
-        }
-    assert_int_equal(rounds, 134);
-    assert_int_equal(first, 1600);
-    assert_int_equal(last, 14900);
+    const steps_found rounds = find_steps(&t, growing_is_due);
+    assert_int_equal(rounds.count, 134);
+    assert_int_equal(rounds.first, 1600);
+    assert_int_equal(rounds.last, 14900);
     t = long_run(false);
-    for (t.step = rounds = 0; t.step < WHOLE; t.step++)
-        rounds += growing_is_due(&t);
-    assert_int_equal(rounds, 45);
+    assert_int_equal(find_steps(&t, growing_is_due).count, 45);
 }
 
 static void statistics_are_of_steps_501_to_14999(void **state)
 {
     (void)state;
     trainer t = long_run(true);
-    size_t steps = 0, first = 0, last = 0;
-    for (t.step = 0; t.step < WHOLE; t.step++)
-        if (growing_gathers(&t)) {
-            last = (size_t)t.step + 1;
-            first = steps++ == 0 ? last : first;
-        }
-    assert_int_equal(steps, 14499);
-    assert_int_equal(first, 501);
-    assert_int_equal(last, 14999);
+    const steps_found steps = find_steps(&t, growing_gathers);
+    assert_int_equal(steps.count, 14499);
+    assert_int_equal(steps.first, 501);
+    assert_int_equal(steps.last, 14999);
 }
 
 /* Growth to a third of the run ends before step 10,000, though a third is no double. */
@@ -64,10 +68,7 @@ static void growth_ends_before_its_last_step(void **state)
     (void)state;
     trainer t = long_run(true);
     t.def.grow_until = 1.0 / 3;
-    size_t last = 0;
-    for (t.step = 0; t.step < WHOLE; t.step++)
-        last = growing_is_due(&t) ? (size_t)t.step + 1 : last;
-    assert_int_equal(last, 9900);
+    assert_int_equal(find_steps(&t, growing_is_due).last, 9900);
 }
 
 /* Rates of the networks of colour and opacity, by the reference's formula at step 1, 1500, ... */

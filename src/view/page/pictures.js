@@ -37,7 +37,8 @@ export class Pictures {
         this.cost = { fixed: 0, pixel: 0 }; // ms, and ms per pixel; 0: nothing is known yet
         this.recent = [];     // times of the last pictures
         this.wake = () => {};
-        this.asked = new AbortController(); // of the picture that is waited for
+        this.asked = new AbortController(); // of the picture that is waited for, since askedAt
+        this.askedAt = 0;
         this.run();
     }
 

@@ -5,6 +5,7 @@
 #include "cli/finish_run.h"
 #include "cli/options.h"
 #include "cli/train_options.h"
+#include "gbtrace/cluster.h"
 
 static gbt_train_def def;
 static const char *output, *eval_at;
@@ -65,7 +66,7 @@ static int run(const operands *given)
     gbt_status status = train_options_finish(&def, eval_at, given, &err);
     if (status == GBT_OK)
         status = gbt_train(given->count > 0 ? given->value[0] : NULL, output, &def, &err);
-    if (status == GBT_OK)
+    if (status == GBT_OK && gbt_cluster_rank() == 0)
         status = finish_run(output, lossless, def.tensorboard, &err);
     if (status == GBT_OK)
         finish_run_say(output);
@@ -77,4 +78,5 @@ const command command_train = {.name = "train",
                                .usage = "DATA -o RUN",
                                .options = options,
                                .max_operands = 1,
+                               .shares_work = true,
                                .run = run};

@@ -5,7 +5,6 @@
 #include "cli/finish_run.h"
 #include "cli/options.h"
 #include "cli/train_options.h"
-#include "gbtrace/cluster.h"
 
 static gbt_train_def def;
 static const char *output, *eval_at;
@@ -66,7 +65,7 @@ static int run(const operands *given)
     gbt_status status = train_options_finish(&def, eval_at, given, &err);
     if (status == GBT_OK)
         status = gbt_train(given->count > 0 ? given->value[0] : NULL, output, &def, &err);
-    if (status == GBT_OK && gbt_cluster_rank() == 0)
+    if (status == GBT_OK)
         status = finish_run(output, lossless, def.tensorboard, &err);
     if (status == GBT_OK)
         finish_run_say(output);

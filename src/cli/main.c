@@ -2,6 +2,7 @@
 /* cli/main.c -- find the subcommand and run it. */
 #include <errno.h>
 #include <signal.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -55,7 +56,10 @@ static int run(const command *self, int argc, char **argv)
         return code;
     if (options_threads > 0)
         gbt_set_threads(options_threads);
-    return gbt_cluster_rank() == 0 || self->shares_work ? self->run(&given) : 0;
+    const bool first = gbt_cluster_rank() == 0;
+    if (!self->shares_work)
+        gbt_cluster_close(0, NULL);
+    return first || self->shares_work ? self->run(&given) : 0;
 }
 
 static int dispatch(int argc, char **argv)

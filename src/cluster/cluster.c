@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cluster/cluster.c -- finds the module of the MPI that started this process, and counts what goes through it. */
+/* cluster/cluster.c -- finds the module of the MPI that started this process, and counts what goes through
+ * it. */
 #include "cluster/cluster.h"
 
 #include <dlfcn.h>
@@ -29,15 +30,17 @@ cluster_traffic cluster_traffic_so_far(void) { return traffic; }
 
 /* ---- the module ---- */
 
-/* What an mpirun leaves in the environment of what it starts. */
+/* What an mpirun, or Slurm, leaves in the environment of what it starts. */
 static const struct {
     const char *size, *rank, *module, *name;
 } starters[] = {
     {"OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "gbtrace_openmpi.so", "Open MPI"},
     {"PMI_SIZE", "PMI_RANK", "gbtrace_mpich.so", "MPICH"},
+    {"SLURM_STEP_NUM_TASKS", "PMIX_RANK", "gbtrace_openmpi.so", "Open MPI"}, /* srun --mpi=pmix */
 };
 
-/* Beside the program or the library that this is part of, as built; or in the folder that it is installed to. */
+/* Beside the program or the library that this is part of, as built; or in the folder that it is installed to.
+ */
 static bool find_module(const char *name, char out[PATH_SIZE])
 {
     static const char *const folders[] = {".", "gbtrace", GBT_MODULE_FOLDER};
@@ -56,10 +59,11 @@ static gbt_status load_module(const char *file, const char *name, const char *va
 {
     char path[PATH_SIZE];
     if (!find_module(file, path))
-        return base_fail(err, GBT_ERR_IO,
-                         "started by mpirun of %s (%s is %s), but %s is not installed: build gbtrace where %s is "
-                         "(docs/cluster.md)",
-                         name, variable, getenv(variable), file, name);
+        return base_fail(
+            err, GBT_ERR_IO,
+            "started by mpirun of %s (%s is %s), but %s is not installed: build gbtrace where %s is "
+            "(docs/cluster.md)",
+            name, variable, getenv(variable), file, name);
     /* Global: parts that MPI itself loads look for its functions there. */
     void *library = dlopen(path, RTLD_NOW | RTLD_GLOBAL);
     module = library == NULL ? NULL : dlsym(library, CLUSTER_MODULE_SYMBOL);
@@ -88,9 +92,9 @@ gbt_status gbt_cluster_open(gbt_error *err)
 {
     for (size_t i = 0; i < sizeof starters / sizeof *starters && module == NULL; i++) {
         const char *size = getenv(starters[i].size), *rank = getenv(starters[i].rank);
-        if (size == NULL || atoi(size) <= 1)
+        if (size == NULL || rank == NULL || atoi(size) <= 1)
             continue;
-        if (rank != NULL && atoi(rank) > 0)
+        if (atoi(rank) > 0)
             be_silent();
         GBT_TRY(load_module(starters[i].module, starters[i].name, starters[i].size, err));
         module->open(&own_rank, &own_size);
@@ -104,8 +108,12 @@ void gbt_cluster_close(int exit_code, const char *error)
 {
     if (module == NULL)
         return;
-    if (exit_code == 0 || agreed != GBT_OK) {
+    enum { USAGE = 2 }; /* all have the same command line */
+    if (exit_code == 0 || exit_code == USAGE || agreed != GBT_OK) {
         module->close();
+        module = NULL;
+        own_rank = 0;
+        own_size = 1;
         return;
     }
     if (own_stderr >= 0 && error != NULL)

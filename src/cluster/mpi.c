@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cluster/mpi.c -- the module: collective calls of MPI 3. Built once for each MPI that is there, and loaded when
-   a process was started by its mpirun. MPI's own handler of errors stays: it ends all processes. */
+/* cluster/mpi.c -- the module: collective calls of MPI 3. Built once for each MPI that is there, and loaded
+   when a process was started by its mpirun. MPI's own handler of errors stays: it ends all processes. */
 #include <mpi.h>
 #include <stddef.h>
 

@@ -102,8 +102,8 @@ static void count_block(size_t block, size_t begin, size_t end, void *context)
     job->first[block] = count;
 }
 
-/* The sum of the rows with the walk's number in `size` lists from `list` on; NULL: none has one. `scratch` has
-   a row for each sum of the tree, `node` is this one's. */
+/* The sum of the rows with the walk's number in `size` lists from `list` on; NULL: none has one. `scratch`
+   has a row for each sum of the tree, `node` is this one's. */
 static const row_word *sum_rows(const walk *w, size_t list, size_t size, row_word *scratch, size_t node)
 {
     const size_t words = 1 + w->job->out->width;

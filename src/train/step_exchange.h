@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/step_exchange.h -- a step's views on several processes: what they came to, and the sum of their rows. */
+/* train/step_exchange.h -- a step's views on several processes: what they came to, and the sum of their rows.
+ */
 #ifndef GBT_TRAIN_STEP_EXCHANGE_H
 #define GBT_TRAIN_STEP_EXCHANGE_H
 
@@ -9,8 +10,8 @@
 void step_exchange_outcomes(trainer *t);
 
 /**
- * t->rows of all views from those of this process's: an equal share of the numbers goes to each process, which adds
- * up what it gets in the order of the tree, and tells everybody.
+ * t->rows of all views from those of this process's: an equal share of the numbers goes to each process,
+ * which adds up what it gets in the order of the tree, and tells everybody.
  *
  * @param numbers [in] all numbers of rows are below
  */

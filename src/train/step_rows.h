@@ -12,8 +12,8 @@
 gbt_status step_rows_take(const trainer *t, step_view *v, gbt_error *err);
 
 /**
- * The sum over all views of the step (row_list_sum(), in their order, those of other processes too): its mean is added to
- * t->gradient, and the statistics to t->stats. `out` gets the traffic.
+ * The sum over all views of the step (row_list_sum(), in their order, those of other processes too): its mean
+ * is added to t->gradient, and the statistics to t->stats. `out` gets the traffic.
  */
 gbt_status step_rows_add_up(trainer *t, step_report *out, gbt_error *err);
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* train/step_view.h -- one of the views of a step: which photo, which of its pixels, render, loss, adjoint.
 
-   What it says of itself is a view_outcome, plain bytes that may go to another process; its gradient is a list
-   of the rows of the anchors that it saw (train/row_list.h). */
+   What it says of itself is a view_outcome, plain bytes that may go to another process; its gradient is a
+   list of the rows of the anchors that it saw (train/row_list.h). */
 #ifndef GBT_TRAIN_STEP_VIEW_H
 #define GBT_TRAIN_STEP_VIEW_H
 
@@ -42,14 +42,15 @@ typedef struct step_view {
     view_outcome outcome;
     gbt_camera camera; /* of the pixels that it looks at */
     const unsigned char *valid;
-    double photo_seconds, loss_seconds, seconds; /* wall time of the last step; `seconds`: all but the photo */
+    double photo_seconds, loss_seconds,
+        seconds; /* wall time of the last step; `seconds`: all but the photo */
 } step_view;
 
 /** trainer.slots: the photos of the next step. */
 void step_photos_pick(trainer *t);
 
-/** Photo and pixels of view `index` of the next step, [0, trainer.def.views), after step_photos_pick(). One thread.
-    A failure is left in v->outcome. */
+/** Photo and pixels of view `index` of the next step, [0, trainer.def.views), after step_photos_pick(). One
+   thread. A failure is left in v->outcome. */
 void step_view_pick(trainer *t, step_view *v, size_t index);
 
 /**

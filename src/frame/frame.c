@@ -5,18 +5,10 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "frame/plain.h"
 #include "frame/visible.h"
-
-static double lap(double *since)
-{
-    const double now = clock_wall(), passed = now - *since;
-    *since = now;
-    return passed;
-}
 
 /* ---- render and back ---- */
 
@@ -70,7 +62,7 @@ static bool is_plain_view(const ray_shot *shot)
 static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
                           const trace_settings *settings, const frame_tracer *tracer, gbt_error *err)
 {
-    double clock = clock_wall();
+    stage_clock clock = stage_begin();
     ray_shot middle = *shot;
     middle.aperture_radius = 0;
     f->camera = shot->camera;
@@ -79,7 +71,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     memset(f->half_fov_tan, 0, sizeof f->half_fov_tan);
     if (lens != NULL)
         camera_lens_half_fov_tan(lens, shot->camera.width, shot->camera.height, f->half_fov_tan);
-    f->times.rays = lap(&clock);
+    f->times.rays = stage_lap(&clock);
     view_bounds bounds;
     GBT_TRY(view_bounds_find(shot, &f->rays, &bounds, err));
     memcpy(f->eye, bounds.center, sizeof f->eye);
@@ -101,7 +93,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
         .pixel_min = f->pixel_limited ? f->draw.anchor_pixel : NULL};
     GBT_TRY(visible_find(subject, &bounds, &extent, f->by_screen ? &f->screen : NULL, &f->visible,
                          &f->visible_count, &f->visible_capacity, err));
-    f->times.visible = lap(&clock);
+    f->times.visible = stage_lap(&clock);
     /* A Gaussian below alpha_min is never blended and so has no gradient: it need not be made. */
     if (subject.cloud != NULL)
         GBT_TRY(plain_forward(subject.cloud, f->eye, f->visible, f->visible_count, &f->gaussians, err));
@@ -110,8 +102,8 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
                                f->draw.makes_faint ? 0 : settings->alpha_min, &f->gaussians, &f->tape, err));
     if (f->widened)
         GBT_TRY(widen(f, subject, err));
-    f->times.decode = lap(&clock);
-    f->times.build = 0;
+    f->times.decode = stage_lap(&clock);
+    f->times.build = (stage_time){0};
     memset(&f->counters, 0, sizeof f->counters);
     GBT_TRY(fit_picture(&f->rgb, f->rays.width, f->rays.height, err));
     if (f->draw.renderer != GBT_RENDERER_TRACE)
@@ -119,7 +111,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     const float aperture = shot->given == NULL ? (float)shot->aperture_radius : 0;
     const float reach = fmaxf(ray_image_reach(&f->rays) + aperture, tracer != NULL ? tracer->reach : 0);
     GBT_TRY(trace_build(&f->scene, frame_drawn(f), settings, reach, err));
-    f->times.build = lap(&clock);
+    f->times.build = stage_lap(&clock);
     return GBT_OK;
 }
 
@@ -160,13 +152,13 @@ gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camer
 {
     const ray_shot shot = ray_shot_of(camera);
     GBT_TRY(prepare(f, subject, &shot, settings, NULL, err));
-    double clock = clock_wall();
+    stage_clock clock = stage_begin();
     if (f->draw.renderer == GBT_RENDERER_TRACE)
         GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters,
                               err));
     else
         GBT_TRY(splat(f, settings, keep_tape, err));
-    f->times.trace = lap(&clock);
+    f->times.trace = stage_lap(&clock);
     return GBT_OK;
 }
 
@@ -177,16 +169,16 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_trac
     const size_t values = 3 * ray_image_count(&f->rays);
     const int samples = ray_shot_sample_count(shot);
     for (int s = 0; s < samples; s++) {
-        double clock = clock_wall();
+        stage_clock clock = stage_begin();
         if (shot->given == NULL && shot->aperture_radius > 0)
             GBT_TRY(ray_image_from_shot(shot, s, &f->rays, err));
-        f->times.rays += lap(&clock);
+        stage_add(&f->times.rays, stage_lap(&clock));
         if (tracer != NULL)
             GBT_TRY(tracer->trace(tracer->context, &f->scene, &f->rays, &f->rgb, err));
         else
             GBT_TRY(trace_forward(&f->scene, &f->rays, false, &(trace_outputs){.rgb = &f->rgb}, &f->counters,
                                   err));
-        f->times.trace += lap(&clock);
+        stage_add(&f->times.trace, stage_lap(&clock));
         for (size_t i = 0; i < values; i++)
             sum[i] += (double)f->rgb.pixels[i];
     }
@@ -208,7 +200,7 @@ gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *sh
         return frame_render(f, subject, &shot->camera, settings, false, err);
     }
     GBT_TRY(prepare(f, subject, shot, settings, tracer, err));
-    f->times.trace = 0;
+    f->times.trace = (stage_time){0};
     double *sum = mem_calloc(ray_image_count(&f->rays), 3 * sizeof *sum, "picture", err);
     const gbt_status status = sum == NULL ? GBT_ERR_NO_MEMORY : trace_samples(f, shot, tracer, sum, err);
     mem_free(sum);
@@ -234,7 +226,7 @@ void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_CO
 
 gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err)
 {
-    double clock = clock_wall();
+    stage_clock clock = stage_begin();
     GBT_TRY(mem_reserve((void **)&f->blend_weight, &f->blend_weight_capacity, 0, f->gaussians.count + 1,
                         sizeof *f->blend_weight, "weights", err));
     if (f->draw.renderer == GBT_RENDERER_TRACE)
@@ -244,16 +236,16 @@ gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *e
     if (f->widened)
         footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians,
                            &f->d_gaussians);
-    f->times.adjoint = lap(&clock);
+    f->times.adjoint = stage_lap(&clock);
     return GBT_OK;
 }
 
 gbt_status frame_backward_anchors(frame *f, const anchors *a, const decoder *d, anchors *d_anchors,
                                   float *d_params, gbt_error *err)
 {
-    double clock = clock_wall();
+    stage_clock clock = stage_begin();
     GBT_TRY(decode_backward(a, d, &f->tape, &f->d_gaussians, d_anchors, d_params, err));
-    f->times.decode_adjoint = lap(&clock);
+    f->times.decode_adjoint = stage_lap(&clock);
     return GBT_OK;
 }
 

@@ -126,8 +126,8 @@ typedef struct speed {
 static void speed_follow(speed *s, const step_report *r, const frame_times *f)
 {
     const double pixels = (double)r->width * (double)r->height;
-    const double per_pixel = (f->rays + f->trace + f->adjoint + r->loss_seconds) / pixels;
-    const double fixed = fmax(0, r->total_seconds - per_pixel * pixels - r->photo_seconds);
+    const double per_pixel = (f->rays.wall + f->trace.wall + f->adjoint.wall + r->compare.wall) / pixels;
+    const double fixed = fmax(0, r->all.wall - per_pixel * pixels - r->photo.wall);
     const double keep = s->known ? 0.95 : 0;
     s->fixed_seconds = keep * s->fixed_seconds + (1 - keep) * fixed;
     s->pixel_seconds = keep * s->pixel_seconds + (1 - keep) * per_pixel;

@@ -8,12 +8,34 @@
 #include "train/event_records.h"
 #include "train/trainer.h"
 
+/** The stages of a step in their order: X(name in train.json, where its time stands: report `r`, frame `f`).
+ */
+#define RUN_STAGE_LIST(X)                                                                                    \
+    X(photo, r->photo)                                                                                       \
+    X(rays, f->times.rays)                                                                                   \
+    X(visible, f->times.visible)                                                                             \
+    X(decode, f->times.decode)                                                                               \
+    X(build, f->times.build)                                                                                 \
+    X(trace, f->times.trace)                                                                                 \
+    X(loss, r->compare)                                                                                      \
+    X(adjoint, f->times.adjoint)                                                                             \
+    X(decode_adjoint, f->times.decode_adjoint)                                                               \
+    X(optimizer, r->optimizer)                                                                               \
+    X(adjust, r->adjust)                                                                                     \
+    X(all, r->all)
+
+enum {
+#define X(name, time) RUN_STAGE_##name,
+    RUN_STAGE_LIST(X)
+#undef X
+        RUN_STAGES
+};
+
 /* Sums since the last row of log.csv. */
 typedef struct run_sums {
     uint64_t steps;
     double loss, l1, ssim, psnr, gaussians, visible, rays, hits, blended;
-    double seconds, photo, rays_seconds, visible_seconds, decode, build, trace, loss_seconds, adjoint,
-        decode_adjoint, optimizer, adjust;
+    stage_time stage[RUN_STAGES];
 } run_sums;
 
 typedef struct run_log {

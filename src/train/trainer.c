@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "base/fail.h"
 #include "base/log.h"
 #include "base/memory.h"
@@ -184,7 +183,7 @@ static gbt_status compare(trainer *t, size_t slot, const unsigned char *valid, i
 
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 {
-    const double start = clock_wall();
+    stage_clock start = stage_begin();
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
     const bool learns = t->rules.last_step_learns || next < 1;
@@ -197,14 +196,14 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     const step_size size = trainer_step_size(t, view, progress);
     out->level = size.level;
     out->parts = size.parts;
-    double clock = clock_wall();
+    stage_clock clock = stage_begin();
     const photo_sample sample = pick_pixels(t, size, slot);
     gbt_camera camera;
     const unsigned char *valid;
     frame *f = &t->frame;
     GBT_TRY(
         photos_get_sample(&t->photos, view, &sample, &t->photo, &camera, &valid, &f->draw.pixel_step, err));
-    out->photo_seconds = clock_wall() - clock;
+    out->photo = stage_lap(&clock);
     out->width = camera.width;
     out->height = camera.height;
 
@@ -220,7 +219,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     out->gaussians = f->gaussians.count;
     out->visible = f->visible_count;
     raise_opacities_when_empty(t);
-    clock = clock_wall();
+    clock = stage_begin();
     image_loss_result loss;
     double d_exposure[AFFINE_NUMBERS];
     GBT_TRY(frame_valid(f, valid, &valid, err));
@@ -229,7 +228,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     out->l1 = loss.l1;
     out->ssim = loss.ssim;
     out->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
-    out->loss_seconds = clock_wall() - clock;
+    out->compare = stage_lap(&clock);
 
     char reason[REASON_SIZE];
     if (!isfinite(out->loss)) {
@@ -242,7 +241,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     loss_add_gradient(&f->gaussians, &f->d_gaussians);
     GBT_TRY(
         frame_backward_anchors(f, &t->anchors, &t->decoder, &t->gradient.anchors, t->gradient.networks, err));
-    clock = clock_wall();
+    clock = stage_begin();
     char where[80];
     if (gradient_is_bad(t, t->exposures.count > 0 ? d_exposure : NULL, where, sizeof where)) {
         snprintf(reason, sizeof reason, "the gradient is not finite (%s; photo %.200s)", where,
@@ -260,17 +259,17 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
         learn_networks(&model, &rates, t->step + 1);
     if (learns && (!adjust || t->rules.anchors_learn_when_adjusted))
         learn_anchors(&model, &rates, ++t->anchor_t);
-    out->optimizer_seconds = clock_wall() - clock;
+    out->optimizer = stage_lap(&clock);
 
     /* Anchors. */
-    clock = clock_wall();
+    clock = stage_begin();
     if (growing_gathers(t))
         growth_stats_gather(&t->stats, f, t->rules.importance, t->rules.gradient_counting, settings.t_near);
     if (adjust)
         GBT_TRY(growing_round(t, err));
-    out->adjust_seconds = clock_wall() - clock;
+    out->adjust = stage_lap(&clock);
     t->step++;
-    out->total_seconds = clock_wall() - start;
+    out->all = stage_lap(&start);
     return GBT_OK;
 }
 

@@ -21,9 +21,8 @@ typedef struct step_report {
     double loss, l1, ssim, psnr;
     int width, height, level, parts;
     size_t gaussians, visible;
-    double photo_seconds, loss_seconds, optimizer_seconds, adjust_seconds,
-        total_seconds; /* frame times are in trainer.frame */
-    bool skipped;      /* the loss or a gradient was not finite: nothing has learned */
+    stage_time photo, compare, optimizer, adjust, all; /* those of the frame are in trainer.frame */
+    bool skipped; /* the loss or a gradient was not finite: nothing has learned */
 } step_report;
 
 typedef struct trainer {

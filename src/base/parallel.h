@@ -27,7 +27,8 @@ void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *cont
 /** Number of blocks that parallel_blocks() makes. */
 static inline size_t parallel_block_count(size_t count, size_t grain) { return (count + grain - 1) / grain; }
 
-/** Seconds that the calls of one thread have taken; those from inside a block count as part of it. */
+/** Seconds that the calls of one thread have taken; those from inside a block are part of its work and span.
+ */
 typedef struct parallel_account {
     double wall; /* from call to return */
     double work; /* of all blocks, on whatever threads */

@@ -3,12 +3,16 @@
 #include "frame/frame.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "frame/plain.h"
 #include "frame/visible.h"
+
+enum { VALID_BLOCK = 1 << 15 /* pixels */ };
 
 /* ---- render and back ---- */
 
@@ -273,18 +277,44 @@ static bool has_ray(const ray_image *rays, size_t i)
     return d[0] != 0 || d[1] != 0 || d[2] != 0;
 }
 
+typedef struct valid_job {
+    const ray_image *rays;
+    const unsigned char *photo;
+    unsigned char *out;
+    atomic_bool missing; /* a ray */
+} valid_job;
+
+static void look_for_missing(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    valid_job *job = context;
+    bool missing = false;
+    for (size_t i = begin; i < end; i++)
+        missing |= !has_ray(job->rays, i);
+    if (missing)
+        atomic_store(&job->missing, true);
+}
+
+static void mark_valid(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const valid_job *job = context;
+    for (size_t i = begin; i < end; i++)
+        job->out[i] = (job->photo == NULL || job->photo[i] != 0) && has_ray(job->rays, i);
+}
+
 gbt_status frame_valid(frame *f, const unsigned char *photo, const unsigned char **out, gbt_error *err)
 {
     const size_t count = ray_image_count(&f->rays);
-    size_t with_ray = 0;
-    while (with_ray < count && has_ray(&f->rays, with_ray))
-        with_ray++;
+    valid_job job = {.rays = &f->rays, .photo = photo};
+    atomic_init(&job.missing, false);
+    parallel_blocks(count, VALID_BLOCK, look_for_missing, &job);
     *out = photo;
-    if (with_ray == count)
+    if (!atomic_load(&job.missing))
         return GBT_OK;
     GBT_TRY(mem_reserve((void **)&f->valid, &f->valid_capacity, 0, count, 1, "valid pixels", err));
-    for (size_t i = 0; i < count; i++)
-        f->valid[i] = (photo == NULL || photo[i] != 0) && has_ray(&f->rays, i);
+    job.out = f->valid;
+    parallel_blocks(count, VALID_BLOCK, mark_valid, &job);
     *out = f->valid;
     return GBT_OK;
 }

@@ -290,6 +290,8 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     json_object_set_new(root, "hits_per_ray", json_real(s->hits / fmax(s->rays, 1)));
     json_object_set_new(root, "blended_per_ray", json_real(s->blended / fmax(s->rays, 1)));
     json_object_set_new(root, "gaussians_per_view", json_real(s->gaussians / n));
+    json_object_set_new(root, "visible_per_view", json_real(s->visible / n));
+    json_object_set_new(root, "rays_per_step", json_real(s->rays / n));
     add_stages(root, s);
     json_object_set_new(root, "pace", parts);
     json_object_set_new(root, "held_out", evals);

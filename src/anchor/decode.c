@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/decode.c -- anchors + camera centre -> Gaussians.
 
-   visible rows --> input --> hidden --> opacity --count per chunk--> prefix sum
-        --> shape, colour of the kept --> packed arrays
+   visible rows --> input --> opacity network --count per chunk--> prefix sum
+        --> rows that have Gaussians --> shape and colour networks --> packed arrays
                             (kept for the adjoint)
 
    Two passes over the same chunks: the first decides which Gaussians exist, the second computes the rest of
@@ -77,7 +77,7 @@ static void decide_rows(const forward_job *job, size_t begin, size_t end)
         row[INPUT_ONE] = 1.0f;
     }
     job->kernels->product(&(dense_product){.m = tiled,
-                                           .n = HIDDEN_STRIDE,
+                                           .n = ANCHOR_HIDDEN_DIM,
                                            .k = INPUT_COUNT,
                                            .a = input,
                                            .a_row = INPUT_STRIDE,
@@ -103,8 +103,9 @@ static void decide_rows(const forward_job *job, size_t begin, size_t end)
         for (size_t k = 0; k < offsets; k++)
             alpha[r * offsets + k] = logits[r * ALPHA_STRIDE + k];
     job->kernels->tanh(alpha, rows * offsets);
-    size_t kept = 0;
+    size_t kept = 0, filled = 0;
     for (size_t r = 0; r < rows; r++) {
+        const size_t before = kept;
         float sum = 0.0f;
         for (size_t k = 0; k < offsets; k++) {
             const float value = alpha[r * offsets + k];
@@ -112,8 +113,17 @@ static void decide_rows(const forward_job *job, size_t begin, size_t end)
             kept += value > job->opacity_min;
         }
         tape->opacity_sum[begin + r] = sum;
+        if (kept == before)
+            continue;
+        if (filled < r) {
+            memcpy(input + filled * INPUT_STRIDE, input + r * INPUT_STRIDE, INPUT_STRIDE * sizeof *input);
+            memcpy(hidden + filled * HIDDEN_STRIDE, hidden + r * HIDDEN_STRIDE,
+                   ANCHOR_HIDDEN_DIM * sizeof *hidden);
+        }
+        tape->row[begin + filled++] = (uint32_t)(begin + r);
     }
     tape->first[begin / DECODE_CHUNK] = kept;
+    tape->filled[begin / DECODE_CHUNK] = (uint32_t)filled;
 }
 
 static void decide_block(size_t block, size_t begin, size_t end, void *context)
@@ -135,8 +145,8 @@ static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, con
     float *kept = tape->output;
     size_t g = first;
     for (size_t r = 0; r < rows; r++) {
-        const size_t anchor = tape->visible[begin + r];
-        const float *alpha = tape->alpha + (begin + r) * offsets, *e = extent + r * 6;
+        const size_t row = tape->row[begin + r], anchor = tape->visible[row];
+        const float *alpha = tape->alpha + row * offsets, *e = extent + r * 6;
         const float *x = job->a->position + anchor * 3, *offset = job->a->offset + anchor * offsets * 3;
         for (size_t k = 0; k < offsets; k++) {
             if (!(alpha[k] > job->opacity_min))
@@ -156,7 +166,7 @@ static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, con
                 activation_clamp(x[1] + offset[k * 3 + 1] * e[1], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
             out->mean_z[g] =
                 activation_clamp(x[2] + offset[k * 3 + 2] * e[2], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
-            tape->slot[g] = (uint32_t)((begin + r) * offsets + k);
+            tape->slot[g] = (uint32_t)(row * offsets + k);
             row_of[g - first] = (uint16_t)r;
             g++;
         }
@@ -177,31 +187,44 @@ FASTEST_CLONE static void hold_ratio(float *const scale[3], size_t count)
     }
 }
 
-static void emit_rows(const forward_job *job, size_t begin, size_t end)
+static void emit_rows(const forward_job *job, size_t begin)
 {
     decode_tape *tape = job->tape;
-    const size_t rows = end - begin, tiled = round_up(rows, DECODE_TILE);
+    const size_t rows = tape->filled[begin / DECODE_CHUNK], tiled = round_up(rows, DECODE_TILE);
+    float *hidden = tape->hidden + begin * HIDDEN_STRIDE;
     _Alignas(64) float shape[DECODE_CHUNK * SHAPE_STRIDE_MAX], color[DECODE_CHUNK * COLOR_STRIDE_MAX],
         extent[DECODE_CHUNK * 6];
     uint16_t row_of[CHUNK_SLOTS];
     float *const logits[2] = {shape, color};
+    job->kernels->product(&(dense_product){.m = tiled,
+                                           .n = HIDDEN_STRIDE - ANCHOR_HIDDEN_DIM,
+                                           .k = INPUT_COUNT,
+                                           .a = tape->input + begin * INPUT_STRIDE,
+                                           .a_row = INPUT_STRIDE,
+                                           .a_step = 1,
+                                           .b = job->weights.input_hidden + ANCHOR_HIDDEN_DIM,
+                                           .b_row = HIDDEN_STRIDE,
+                                           .bias = job->weights.hidden_bias + ANCHOR_HIDDEN_DIM,
+                                           .relu = true,
+                                           .c = hidden + ANCHOR_HIDDEN_DIM,
+                                           .c_row = HIDDEN_STRIDE});
     for (int head = 1; head <= 2; head++) {
         const size_t stride = job->layout.out_stride[head];
-        job->kernels->product(
-            &(dense_product){.m = tiled,
-                             .n = stride,
-                             .k = ANCHOR_HIDDEN_DIM,
-                             .a = tape->hidden + begin * HIDDEN_STRIDE + head * ANCHOR_HIDDEN_DIM,
-                             .a_row = HIDDEN_STRIDE,
-                             .a_step = 1,
-                             .b = job->weights.hidden_out[head],
-                             .b_row = stride,
-                             .bias = job->weights.out_bias[head],
-                             .c = logits[head - 1],
-                             .c_row = stride});
+        job->kernels->product(&(dense_product){.m = tiled,
+                                               .n = stride,
+                                               .k = ANCHOR_HIDDEN_DIM,
+                                               .a = hidden + head * ANCHOR_HIDDEN_DIM,
+                                               .a_row = HIDDEN_STRIDE,
+                                               .a_step = 1,
+                                               .b = job->weights.hidden_out[head],
+                                               .b_row = stride,
+                                               .bias = job->weights.out_bias[head],
+                                               .c = logits[head - 1],
+                                               .c_row = stride});
     }
     for (size_t r = 0; r < rows; r++)
-        memcpy(extent + r * 6, job->a->scale_log + (size_t)tape->visible[begin + r] * 6, 6 * sizeof *extent);
+        memcpy(extent + r * 6, job->a->scale_log + (size_t)tape->visible[tape->row[begin + r]] * 6,
+               6 * sizeof *extent);
     job->kernels->exp(extent, rows * 6);
 
     const size_t n = gather_kept(job, begin, rows, shape, color, extent, row_of);
@@ -233,19 +256,19 @@ static void emit_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
     for (size_t row = begin; row < end; row += DECODE_CHUNK)
-        emit_rows(context, row, min_size(row + DECODE_CHUNK, end));
+        emit_rows(context, row);
 }
 
 static gbt_status reserve_rows(decode_tape *tape, size_t visible_count, gbt_error *err)
 {
     const size_t rows = round_up(visible_count, DECODE_TILE);
-    void *first = tape->first;
-    gbt_status status =
-        mem_reserve(&first, &tape->first_capacity, 0, parallel_block_count(visible_count, DECODE_CHUNK) + 1,
-                    sizeof(size_t), "decode tape", err);
-    if (status != GBT_OK)
-        return status;
-    tape->first = first;
+    const size_t chunks = parallel_block_count(visible_count, DECODE_CHUNK);
+    GBT_TRY(mem_reserve((void **)&tape->first, &tape->first_capacity, 0, chunks + 1, sizeof *tape->first,
+                        "decode tape", err));
+    GBT_TRY(mem_reserve((void **)&tape->filled, &tape->filled_capacity, 0, chunks, sizeof *tape->filled,
+                        "decode tape", err));
+    GBT_TRY(mem_reserve((void **)&tape->row, &tape->row_capacity, 0, rows, sizeof *tape->row, "decode tape",
+                        err));
     if (rows <= tape->capacity && tape->input != NULL)
         return GBT_OK;
     const size_t capacity = round_up(rows + rows / 4, DECODE_TILE),
@@ -344,6 +367,8 @@ void decode_tape_free(decode_tape *tape)
     mem_free(tape->input);
     mem_free(tape->output);
     mem_free(tape->first);
+    mem_free(tape->filled);
+    mem_free(tape->row);
     mem_free(tape->weights);
     mem_free(tape->block_grad);
     mem_free(tape->slot);

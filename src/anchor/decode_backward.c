@@ -84,11 +84,9 @@ static void activations_backward(const backward_job *job, size_t begin, size_t r
     const float *kept = tape->output;
     size_t g = tape->first[chunk];
     const size_t last = tape->first[chunk + 1];
-    for (size_t r = 0; r < rows && g < last; r++) {
-        const size_t slot_begin = (begin + r) * offsets;
-        if (tape->slot[g] >= slot_begin + offsets)
-            continue;
-        const size_t anchor = tape->visible[begin + r], target = gradient_row(job, begin + r);
+    for (size_t r = 0; r < rows; r++) {
+        const size_t visible_row = tape->row[begin + r], slot_begin = visible_row * offsets;
+        const size_t anchor = tape->visible[visible_row], target = gradient_row(job, visible_row);
         const float *x = job->a->position + anchor * 3, *offset = job->a->offset + anchor * offsets * 3;
         const float *e = extent + r * 6, *scale_log = job->a->scale_log + anchor * 6;
         float *row = d_out + r * job->out_stride;
@@ -172,8 +170,8 @@ static void hidden_backward(const backward_job *job, size_t begin, size_t tiled,
     relu_backward(hidden, tiled * HIDDEN_STRIDE, d_hidden);
 }
 
-/* dL/dcamera of one row from the gradient of its direction and distance: moving the camera is moving every
-   anchor the other way. */
+/* dL/dcamera of one row of the tape from the gradient of its direction and distance: moving the camera is
+   moving every anchor the other way. */
 static void view_backward(const backward_job *job, size_t row, const float *d_hidden, double d_camera[3])
 {
     double d_input[4] = {0}, offset[3], square = 0, along = 0;
@@ -182,7 +180,7 @@ static void view_backward(const backward_job *job, size_t row, const float *d_hi
         for (int h = 0; h < HIDDEN_STRIDE; h++)
             d_input[i] += (double)weight[h] * (double)d_hidden[h];
     }
-    const float *position = job->a->position + job->tape->visible[row] * (size_t)3;
+    const float *position = job->a->position + job->tape->visible[job->tape->row[row]] * (size_t)3;
     for (int c = 0; c < 3; c++) {
         offset[c] = (double)position[c] - job->camera[c];
         square += offset[c] * offset[c];
@@ -245,7 +243,8 @@ static void layers_backward(const backward_job *job, size_t begin, size_t rows, 
                                       .c = d_feature,
                                       .c_row = ANCHOR_FEATURE_DIM});
     for (size_t r = 0; r < rows; r++) {
-        float *target = job->d_anchors->feature + gradient_row(job, begin + r) * ANCHOR_FEATURE_DIM;
+        float *target =
+            job->d_anchors->feature + gradient_row(job, job->tape->row[begin + r]) * ANCHOR_FEATURE_DIM;
         for (int i = 0; i < ANCHOR_FEATURE_DIM; i++)
             target[i] += d_feature[r * ANCHOR_FEATURE_DIM + (size_t)i];
     }
@@ -258,7 +257,7 @@ static void chunk_backward(const backward_job *job, size_t begin, size_t rows, f
     const size_t tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
     memset(d_out, 0, tiled * job->out_stride * sizeof *d_out);
     for (size_t r = 0; r < rows; r++)
-        memcpy(extent + r * 6, job->a->scale_log + (size_t)job->tape->visible[begin + r] * 6,
+        memcpy(extent + r * 6, job->a->scale_log + (size_t)job->tape->visible[job->tape->row[begin + r]] * 6,
                6 * sizeof *extent);
     job->kernels->exp(extent, rows * 6);
     activations_backward(job, begin, rows, extent, d_out);
@@ -281,8 +280,8 @@ static void backward_block(size_t block, size_t begin, size_t end, void *context
     if (record != NULL)
         memset(record, 0, job->record.size * sizeof *record);
     for (size_t row = begin; row < end; row += DECODE_CHUNK)
-        if (tape->first[row / DECODE_CHUNK] != tape->first[row / DECODE_CHUNK + 1])
-            chunk_backward(job, row, end - row < DECODE_CHUNK ? end - row : DECODE_CHUNK, record, d_camera);
+        if (tape->filled[row / DECODE_CHUNK] > 0)
+            chunk_backward(job, row, tape->filled[row / DECODE_CHUNK], record, d_camera);
 }
 
 /* Entries [entry, entry + count) of the records, summed in block order. */

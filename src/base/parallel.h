@@ -27,6 +27,20 @@ void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *cont
 /** Number of blocks that parallel_blocks() makes. */
 static inline size_t parallel_block_count(size_t count, size_t grain) { return (count + grain - 1) / grain; }
 
+/** Seconds that the calls of one thread have taken; those from inside a block are part of its work and span.
+ */
+typedef struct parallel_account {
+    double wall; /* from call to return */
+    double work; /* of all blocks, on whatever threads */
+    double span; /* of the longest block of each call: more threads do not make it shorter */
+} parallel_account;
+
+/** Of the calling thread, since it began. */
+parallel_account parallel_account_now(void);
+
+/** What parallel_blocks() runs blocks by, without the account. */
+void parallel_run(size_t count, size_t grain, parallel_body *body, void *context);
+
 void parallel_set_threads(int threads); /* >= 1; process-wide */
 int parallel_threads(void);             /* the number set, else machine_threads() of this machine */
 

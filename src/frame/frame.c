@@ -3,30 +3,26 @@
 #include "frame/frame.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "frame/plain.h"
 #include "frame/visible.h"
 
-static double lap(double *since)
-{
-    const double now = clock_wall(), passed = now - *since;
-    *since = now;
-    return passed;
-}
+enum { VALID_BLOCK = 1 << 15 /* pixels */ };
 
 void frame_times_add(frame_times *sum, const frame_times *more)
 {
-    sum->rays += more->rays;
-    sum->visible += more->visible;
-    sum->decode += more->decode;
-    sum->build += more->build;
-    sum->trace += more->trace;
-    sum->adjoint += more->adjoint;
-    sum->decode_adjoint += more->decode_adjoint;
+    stage_add(&sum->rays, more->rays);
+    stage_add(&sum->visible, more->visible);
+    stage_add(&sum->decode, more->decode);
+    stage_add(&sum->build, more->build);
+    stage_add(&sum->trace, more->trace);
+    stage_add(&sum->adjoint, more->adjoint);
+    stage_add(&sum->decode_adjoint, more->decode_adjoint);
 }
 
 /* ---- render and back ---- */
@@ -81,7 +77,7 @@ static bool is_plain_view(const ray_shot *shot)
 static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
                           const trace_settings *settings, const frame_tracer *tracer, gbt_error *err)
 {
-    double clock = clock_wall();
+    stage_clock clock = stage_begin();
     ray_shot middle = *shot;
     middle.aperture_radius = 0;
     f->camera = shot->camera;
@@ -90,7 +86,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     memset(f->half_fov_tan, 0, sizeof f->half_fov_tan);
     if (lens != NULL)
         camera_lens_half_fov_tan(lens, shot->camera.width, shot->camera.height, f->half_fov_tan);
-    f->times.rays = lap(&clock);
+    f->times.rays = stage_lap(&clock);
     view_bounds bounds;
     GBT_TRY(view_bounds_find(shot, &f->rays, &bounds, err));
     memcpy(f->eye, bounds.center, sizeof f->eye);
@@ -112,7 +108,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
         .pixel_min = f->pixel_limited ? f->draw.anchor_pixel : NULL};
     GBT_TRY(visible_find(subject, &bounds, &extent, f->by_screen ? &f->screen : NULL, &f->visible,
                          &f->visible_count, &f->visible_capacity, err));
-    f->times.visible = lap(&clock);
+    f->times.visible = stage_lap(&clock);
     /* A Gaussian below alpha_min is never blended and so has no gradient: it need not be made. */
     if (subject.cloud != NULL)
         GBT_TRY(plain_forward(subject.cloud, f->eye, f->visible, f->visible_count, &f->gaussians, err));
@@ -121,8 +117,8 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
                                f->draw.makes_faint ? 0 : settings->alpha_min, &f->gaussians, &f->tape, err));
     if (f->widened)
         GBT_TRY(widen(f, subject, err));
-    f->times.decode = lap(&clock);
-    f->times.build = 0;
+    f->times.decode = stage_lap(&clock);
+    f->times.build = (stage_time){0};
     memset(&f->counters, 0, sizeof f->counters);
     GBT_TRY(fit_picture(&f->rgb, f->rays.width, f->rays.height, err));
     if (f->draw.renderer != GBT_RENDERER_TRACE)
@@ -130,7 +126,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     const float aperture = shot->given == NULL ? (float)shot->aperture_radius : 0;
     const float reach = fmaxf(ray_image_reach(&f->rays) + aperture, tracer != NULL ? tracer->reach : 0);
     GBT_TRY(trace_build(&f->scene, frame_drawn(f), settings, reach, err));
-    f->times.build = lap(&clock);
+    f->times.build = stage_lap(&clock);
     return GBT_OK;
 }
 
@@ -171,13 +167,13 @@ gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camer
 {
     const ray_shot shot = ray_shot_of(camera);
     GBT_TRY(prepare(f, subject, &shot, settings, NULL, err));
-    double clock = clock_wall();
+    stage_clock clock = stage_begin();
     if (f->draw.renderer == GBT_RENDERER_TRACE)
         GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters,
                               err));
     else
         GBT_TRY(splat(f, settings, keep_tape, err));
-    f->times.trace = lap(&clock);
+    f->times.trace = stage_lap(&clock);
     return GBT_OK;
 }
 
@@ -188,16 +184,16 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_trac
     const size_t values = 3 * ray_image_count(&f->rays);
     const int samples = ray_shot_sample_count(shot);
     for (int s = 0; s < samples; s++) {
-        double clock = clock_wall();
+        stage_clock clock = stage_begin();
         if (shot->given == NULL && shot->aperture_radius > 0)
             GBT_TRY(ray_image_from_shot(shot, s, &f->rays, err));
-        f->times.rays += lap(&clock);
+        stage_add(&f->times.rays, stage_lap(&clock));
         if (tracer != NULL)
             GBT_TRY(tracer->trace(tracer->context, &f->scene, &f->rays, &f->rgb, err));
         else
             GBT_TRY(trace_forward(&f->scene, &f->rays, false, &(trace_outputs){.rgb = &f->rgb}, &f->counters,
                                   err));
-        f->times.trace += lap(&clock);
+        stage_add(&f->times.trace, stage_lap(&clock));
         for (size_t i = 0; i < values; i++)
             sum[i] += (double)f->rgb.pixels[i];
     }
@@ -219,7 +215,7 @@ gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *sh
         return frame_render(f, subject, &shot->camera, settings, false, err);
     }
     GBT_TRY(prepare(f, subject, shot, settings, tracer, err));
-    f->times.trace = 0;
+    f->times.trace = (stage_time){0};
     double *sum = mem_calloc(ray_image_count(&f->rays), 3 * sizeof *sum, "picture", err);
     const gbt_status status = sum == NULL ? GBT_ERR_NO_MEMORY : trace_samples(f, shot, tracer, sum, err);
     mem_free(sum);
@@ -245,7 +241,7 @@ void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_CO
 
 gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err)
 {
-    double clock = clock_wall();
+    stage_clock clock = stage_begin();
     GBT_TRY(mem_reserve((void **)&f->blend_weight, &f->blend_weight_capacity, 0, f->gaussians.count + 1,
                         sizeof *f->blend_weight, "weights", err));
     if (f->draw.renderer == GBT_RENDERER_TRACE)
@@ -255,16 +251,16 @@ gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *e
     if (f->widened)
         footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians,
                            &f->d_gaussians);
-    f->times.adjoint = lap(&clock);
+    f->times.adjoint = stage_lap(&clock);
     return GBT_OK;
 }
 
 gbt_status frame_backward_anchors(frame *f, const anchors *a, const decoder *d, anchors *d_anchors,
                                   float *d_params, gbt_error *err)
 {
-    double clock = clock_wall();
+    stage_clock clock = stage_begin();
     GBT_TRY(decode_backward(a, d, &f->tape, &f->d_gaussians, d_anchors, d_params, err));
-    f->times.decode_adjoint = lap(&clock);
+    f->times.decode_adjoint = stage_lap(&clock);
     return GBT_OK;
 }
 
@@ -292,18 +288,44 @@ static bool has_ray(const ray_image *rays, size_t i)
     return d[0] != 0 || d[1] != 0 || d[2] != 0;
 }
 
+typedef struct valid_job {
+    const ray_image *rays;
+    const unsigned char *photo;
+    unsigned char *out;
+    atomic_bool missing; /* a ray */
+} valid_job;
+
+static void look_for_missing(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    valid_job *job = context;
+    bool missing = false;
+    for (size_t i = begin; i < end; i++)
+        missing |= !has_ray(job->rays, i);
+    if (missing)
+        atomic_store(&job->missing, true);
+}
+
+static void mark_valid(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const valid_job *job = context;
+    for (size_t i = begin; i < end; i++)
+        job->out[i] = (job->photo == NULL || job->photo[i] != 0) && has_ray(job->rays, i);
+}
+
 gbt_status frame_valid(frame *f, const unsigned char *photo, const unsigned char **out, gbt_error *err)
 {
     const size_t count = ray_image_count(&f->rays);
-    size_t with_ray = 0;
-    while (with_ray < count && has_ray(&f->rays, with_ray))
-        with_ray++;
+    valid_job job = {.rays = &f->rays, .photo = photo};
+    atomic_init(&job.missing, false);
+    parallel_blocks(count, VALID_BLOCK, look_for_missing, &job);
     *out = photo;
-    if (with_ray == count)
+    if (!atomic_load(&job.missing))
         return GBT_OK;
     GBT_TRY(mem_reserve((void **)&f->valid, &f->valid_capacity, 0, count, 1, "valid pixels", err));
-    for (size_t i = 0; i < count; i++)
-        f->valid[i] = (photo == NULL || photo[i] != 0) && has_ray(&f->rays, i);
+    job.out = f->valid;
+    parallel_blocks(count, VALID_BLOCK, mark_valid, &job);
     *out = f->valid;
     return GBT_OK;
 }

@@ -4,6 +4,7 @@
 #ifndef GBT_FRAME_FRAME_H
 #define GBT_FRAME_FRAME_H
 
+#include "base/stage.h"
 #include "frame/screen.h"
 #include "frame/subject.h"
 #include "gbtrace/choices.h"
@@ -11,9 +12,9 @@
 #include "trace/footprint.h"
 #include "trace/trace.h"
 
-/** Wall seconds by stage of the last passes. */
+/** Seconds by stage of the last passes. */
 typedef struct frame_times {
-    double rays, visible, decode, build, trace, adjoint, decode_adjoint;
+    stage_time rays, visible, decode, build, trace, adjoint, decode_adjoint;
 } frame_times;
 
 void frame_times_add(frame_times *sum, const frame_times *more);

@@ -7,7 +7,9 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 
+enum { GATHER_BLOCK = 1024 /* visible anchors */ };
 static const float gradient_max = 1e18f; /* sums of these stay finite */
 
 const row_field growth_stat_fields[GROWTH_STATS] = {
@@ -44,28 +46,54 @@ static size_t stat_row(const growth_stats *s, const frame *f, size_t row)
     return s->count == f->visible_count ? row : f->visible[row];
 }
 
+/* What is added of a view; rows of anchors, and their Gaussians, belong to one block. */
+typedef struct gather_job {
+    growth_stats *stats;
+    const frame *f;
+    growth_importance importance;
+    growth_counting counting;
+    float t_near;
+} gather_job;
+
+/* The first Gaussian of the visible anchors from `row` on. */
+static size_t first_gaussian(const gather_job *job, size_t row)
+{
+    const uint32_t *slot = job->f->tape.slot;
+    const size_t slot_first = row * (size_t)job->stats->offset_count;
+    size_t low = 0, high = job->f->gaussians.count;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (slot[middle] < slot_first)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
 /* The importance of an anchor is what pictures would miss without it: the share of them that its Gaussians
    cover. Opacity, which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of
-   all anchors. */
-static void gather_importance(growth_stats *s, const frame *f, growth_importance importance)
+   all anchors. Of visible anchors [begin, end), and their Gaussians [first, last). */
+static void gather_importance(const gather_job *job, size_t begin, size_t end, size_t first, size_t last)
 {
+    const frame *f = job->f;
+    growth_stats *s = job->stats;
     const float rays = (float)ray_image_count(&f->rays);
-    for (size_t v = 0; v < f->visible_count; v++) {
-        const size_t row = stat_row(s, f, v);
-        s->visit_count[row] += 1;
-        if (importance == GROWTH_BY_OPACITY) {
-            s->importance_accum[row] += f->tape.opacity_sum[v];
-            s->shown_count[row] += 1;
+    for (size_t v = begin; v < end; v++) {
+        s->visit_count[stat_row(s, f, v)] += 1;
+        if (job->importance == GROWTH_BY_OPACITY) {
+            s->importance_accum[stat_row(s, f, v)] += f->tape.opacity_sum[v];
+            s->shown_count[stat_row(s, f, v)] += 1;
         }
     }
-    size_t last = SIZE_MAX; /* Gaussians of an anchor follow each other */
-    for (size_t i = 0; importance == GROWTH_BY_SHARE && i < f->gaussians.count; i++) {
+    size_t before = SIZE_MAX; /* Gaussians of an anchor follow each other */
+    for (size_t i = first; job->importance == GROWTH_BY_SHARE && i < last; i++) {
         const size_t anchor = stat_row(s, f, f->tape.slot[i] / (uint32_t)s->offset_count);
         if (!(f->blend_weight[i] > 0))
             continue;
         s->importance_accum[anchor] += f->blend_weight[i] / rays;
-        s->shown_count[anchor] += anchor != last;
-        last = anchor;
+        s->shown_count[anchor] += anchor != before;
+        before = anchor;
     }
 }
 
@@ -130,31 +158,43 @@ static bool is_in_cone(const gradient_view *v, const frame *f, size_t i, const f
            fabsf(p[1]) <= v->tan_half[1] * p[2] + reach;
 }
 
-static void gather_gradients(growth_stats *s, const frame *f, growth_counting counting, float t_near)
+/* Of Gaussians [first, last). */
+static void gather_gradients(const gather_job *job, const gradient_view *view, size_t first, size_t last)
 {
+    const frame *f = job->f;
+    growth_stats *s = job->stats;
     const uint32_t k_count = (uint32_t)s->offset_count;
-    const gradient_view view = view_of(f);
     const gaussians *g = &f->gaussians, *dg = &f->d_gaussians;
-    for (size_t i = 0; i < g->count; i++) {
-        const float from[3] = {g->mean_x[i] - view.center[0], g->mean_y[i] - view.center[1],
-                               g->mean_z[i] - view.center[2]};
+    for (size_t i = first; i < last; i++) {
+        const float from[3] = {g->mean_x[i] - view->center[0], g->mean_y[i] - view->center[1],
+                               g->mean_z[i] - view->center[2]};
         const float gradient[3] = {dg->mean_x[i], dg->mean_y[i], dg->mean_z[i]};
         float p[3], d[3];
-        to_camera(&view, from, p);
-        if (counting == GROWTH_COUNT_IN_CONE ? !is_in_cone(&view, f, i, p, t_near)
-                                             : !(f->blend_weight[i] > 0))
+        to_camera(view, from, p);
+        if (job->counting == GROWTH_COUNT_IN_CONE ? !is_in_cone(view, f, i, p, job->t_near)
+                                                  : !(f->blend_weight[i] > 0))
             continue;
-        to_camera(&view, gradient, d);
+        to_camera(view, gradient, d);
         const uint32_t slot = f->tape.slot[i];
         const size_t at = stat_row(s, f, slot / k_count) * k_count + slot % k_count;
-        s->grad_accum[at] += fminf(screen_gradient(&view, p, d), gradient_max);
+        s->grad_accum[at] += fminf(screen_gradient(view, p, d), gradient_max);
         s->grad_count[at] += 1;
     }
+}
+
+static void gather_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const gather_job *job = context;
+    const gradient_view view = view_of(job->f);
+    const size_t first = first_gaussian(job, begin), last = first_gaussian(job, end);
+    gather_importance(job, begin, end, first, last);
+    gather_gradients(job, &view, first, last);
 }
 
 void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance,
                          growth_counting counting, float t_near)
 {
-    gather_importance(s, f, importance);
-    gather_gradients(s, f, counting, t_near);
+    gather_job job = {s, f, importance, counting, t_near};
+    parallel_blocks(f->visible_count, GATHER_BLOCK, gather_block, &job);
 }

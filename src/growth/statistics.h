@@ -55,8 +55,9 @@ typedef enum growth_counting {
                           */
 } growth_counting;
 
-/** Add what the last render of anchors and its adjoint (frame_backward_gaussians()) say; one thread. `t_near`
-    of the cone. `s` has a row for each anchor, or for each visible one alone, in their order. */
+/** Add what the last render of anchors and its adjoint (frame_backward_gaussians()) say. `t_near` of the
+   cone. `s` has a row for each anchor, or for each visible one alone, in their order. Threads: uses all; same
+   bits for every number. */
 void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance,
                          growth_counting counting, float t_near);
 

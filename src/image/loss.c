@@ -27,19 +27,23 @@ enum {
     CHANNELS = LOSS_CHANNELS,
     RADIUS = WINDOW_RADIUS,
     SEGMENT_MAX = 32, /* pixels; the rows of both rings then fit the second-level cache */
-    TILE_WIDTH = LOSS_LANES * SEGMENT_MAX,    /* pixels */
-    TILE_OWNED = TILE_WIDTH - 2 * RADIUS,     /* of them, those whose gradient it makes */
-    BAND_ROWS = 128,                          /* at most, owned by a tile */
-    ROW_MAX = TILE_WIDTH * CHANNELS,          /* values */
-    ROW_STRIDE = ROW_MAX + LOSS_STEP,         /* not a multiple of a page: rows fall on different lines */
-    WIDE_STRIDE = ROW_MAX + 2 * LOSS_MARGIN,  /* a row with both margins */
-    RING = 16,                                /* rows: LOSS_SPAN, in whole groups */
+    TILE_WIDTH = LOSS_LANES * SEGMENT_MAX,   /* pixels */
+    TILE_OWNED = TILE_WIDTH - 2 * RADIUS,    /* of them, those whose gradient it makes */
+    BAND_ROWS = 128,                         /* at most, owned by a tile */
+    BAND_LEAST = 40,                         /* with fewer a tile makes more rows around its own than those */
+    TILES_WANTED = 4,                        /* of a small picture */
+    ROW_MAX = TILE_WIDTH * CHANNELS,         /* values */
+    ROW_STRIDE = ROW_MAX + LOSS_STEP,        /* not a multiple of a page: rows fall on different lines */
+    WIDE_STRIDE = ROW_MAX + 2 * LOSS_MARGIN, /* a row with both margins */
+    RING = 16,                               /* rows: LOSS_SPAN, in whole groups */
     AHEAD = (RING - LOSS_GROUP) / LOSS_GROUP, /* groups by which a pass is ahead of the next */
+    COUNT_BLOCK = 1 << 16,                    /* pixels */
     SUMS = 3
 };
 
-/* Where one thread keeps the rows it is at. */
+/* Where a tile keeps the rows it is at. */
 typedef struct loss_room {
+    atomic_flag taken;
     double moments[LOSS_MOMENTS][RING][ROW_STRIDE], partials[LOSS_PARTIALS][RING][ROW_STRIDE];
     double wide[LOSS_GROUP * LOSS_PARTIALS][WIDE_STRIDE];
     double sums[SUMS][ROW_STRIDE]; /* of map, |x - y| and (x - y)^2, one for each place in a row */
@@ -57,7 +61,7 @@ typedef struct loss_job {
     size_t width, height, across, tile_count, band_rows;
     double *sums; /* [SUMS][tile_count] */
     loss_room *rooms;
-    atomic_size_t next; /* tile to be done */
+    size_t room_count;
 } loss_job;
 
 typedef struct loss_tile {
@@ -278,14 +282,31 @@ static void run_tile(const loss_job *job, loss_room *room, size_t index)
     }
 }
 
-/* Takes tiles until none is left. */
-static void run_tiles(size_t block, size_t begin, size_t end, void *context)
+/* There are as many rooms as threads. */
+static size_t take_room(const loss_job *job)
+{
+    for (size_t i = 0;; i = (i + 1) % job->room_count)
+        if (!atomic_flag_test_and_set(&job->rooms[i].taken))
+            return i;
+}
+
+static void run_one_tile(size_t tile, size_t begin, size_t end, void *context)
 {
     (void)begin;
     (void)end;
-    loss_job *job = context;
-    for (size_t tile; (tile = atomic_fetch_add(&job->next, 1)) < job->tile_count;)
-        run_tile(job, &job->rooms[block], tile);
+    const loss_job *job = context;
+    const size_t room = take_room(job);
+    run_tile(job, &job->rooms[room], tile);
+    atomic_flag_clear(&job->rooms[room].taken);
+}
+
+/* Rows of tiles: more of a small picture, or it would be one tile. */
+static size_t band_count(size_t height, size_t across)
+{
+    size_t bands = parallel_block_count(height, BAND_ROWS);
+    while (across * bands < TILES_WANTED && height / (bands + 1) >= BAND_LEAST)
+        bands++;
+    return bands;
 }
 
 /* ---- the loss ---- */
@@ -295,12 +316,27 @@ static bool is_size_equal(const image *a, const image *b)
     return a->width == b->width && a->height == b->height && a->channels == b->channels;
 }
 
+typedef struct count_job {
+    const unsigned char *valid;
+    atomic_size_t count;
+} count_job;
+
+static void count_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    count_job *job = context;
+    size_t count = 0;
+    for (size_t i = begin; i < end; i++)
+        count += job->valid[i] != 0;
+    atomic_fetch_add(&job->count, count);
+}
+
 static size_t count_valid(const unsigned char *valid, size_t pixels)
 {
-    size_t count = 0;
-    for (size_t i = 0; i < pixels; i++)
-        count += valid[i] != 0;
-    return count;
+    count_job job = {.valid = valid};
+    atomic_init(&job.count, 0);
+    parallel_blocks(pixels, COUNT_BLOCK, count_block, &job);
+    return atomic_load(&job.count);
 }
 
 gbt_status image_loss(const image *x, const image *y, const unsigned char *valid, double dssim_weight,
@@ -322,17 +358,18 @@ gbt_status image_loss(const image *x, const image *y, const unsigned char *valid
                     .d_x = d_x->pixels,
                     .width = (size_t)x->width,
                     .height = (size_t)x->height};
-    const size_t bands = parallel_block_count(job.height, BAND_ROWS);
     job.across = parallel_block_count(job.width, TILE_OWNED);
+    const size_t bands = band_count(job.height, job.across);
     job.tile_count = job.across * bands;
     job.band_rows = round_up(parallel_block_count(job.height, bands), LOSS_GROUP);
-    const size_t workers = min_size((size_t)parallel_threads(), job.tile_count),
-                 room_doubles = sizeof(loss_room) / sizeof(double);
+    job.room_count = min_size((size_t)parallel_threads(), job.tile_count);
+    const size_t room_doubles = job.room_count * sizeof(loss_room) / sizeof(double);
     GBT_TRY(mem_reserve((void **)&scratch->buffer, &scratch->capacity, 0,
-                        workers * room_doubles + SUMS * job.tile_count, sizeof *scratch->buffer,
-                        "loss scratch", err));
+                        room_doubles + SUMS * job.tile_count, sizeof *scratch->buffer, "loss scratch", err));
     job.rooms = (loss_room *)scratch->buffer;
-    job.sums = scratch->buffer + workers * room_doubles;
+    job.sums = scratch->buffer + room_doubles;
+    for (size_t i = 0; i < job.room_count; i++)
+        atomic_flag_clear(&job.rooms[i].taken);
 
     const size_t all = job.width * job.height, pixels = valid != NULL ? count_valid(valid, all) : all;
     if (pixels == 0) {
@@ -343,8 +380,7 @@ gbt_status image_loss(const image *x, const image *y, const unsigned char *valid
     const double values = (double)(CHANNELS * pixels);
     job.l1_scale = (1 - dssim_weight) / values;
     job.ssim_scale = -dssim_weight / values;
-    atomic_init(&job.next, 0);
-    parallel_blocks(workers, 1, run_tiles, &job);
+    parallel_blocks(job.tile_count, 1, run_one_tile, &job);
     out->ssim = window_sum(job.sums, job.tile_count) / values;
     out->l1 = window_sum(job.sums + job.tile_count, job.tile_count) / values;
     out->mse = window_sum(job.sums + 2 * job.tile_count, job.tile_count) / values;

@@ -18,6 +18,7 @@ enum {
     SORT_BLOCKS = 16,
     PAIR_BLOCKS = 64,
     BLOCK_LEAST = 2048,
+    TILE_GRAIN = 256,
     TILE_ENTRIES = 1 << 24
 };
 
@@ -77,12 +78,20 @@ static void move_keys(size_t block, size_t begin, size_t end, void *context)
 /* Counts per block and digit become the place of the first of each, digit by digit, block by block. */
 static void counts_to_places(uint32_t (*place)[RADIX], size_t blocks)
 {
-    uint32_t next = 0;
-    for (int digit = 0; digit < RADIX; digit++)
-        for (size_t block = 0; block < blocks; block++) {
+    uint32_t next[RADIX] = {0}, first = 0;
+    for (size_t block = 0; block < blocks; block++)
+        for (int digit = 0; digit < RADIX; digit++)
+            next[digit] += place[block][digit];
+    for (int digit = 0; digit < RADIX; digit++) {
+        const uint32_t count = next[digit];
+        next[digit] = first;
+        first += count;
+    }
+    for (size_t block = 0; block < blocks; block++)
+        for (int digit = 0; digit < RADIX; digit++) {
             const uint32_t count = place[block][digit];
-            place[block][digit] = next;
-            next += count;
+            place[block][digit] = next[digit];
+            next[digit] += count;
         }
 }
 
@@ -139,7 +148,7 @@ typedef struct pair_job {
     const raster_kernel *kernel;
     const raster_view *view;
     const splat *splats;
-    size_t tile_count;
+    size_t tile_count, block_count;
     atomic_bool failed;
 } pair_job;
 
@@ -188,38 +197,56 @@ static void place_pairs(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
+/* Of tiles [begin, end): all pairs, into the next tile's `first`. */
+static void count_tiles(size_t range, size_t begin, size_t end, void *context)
+{
+    (void)range;
+    const pair_job *job = context;
+    size_t *total = job->lists->first + 1;
+    for (size_t tile = begin; tile < end; tile++)
+        total[tile] = 0;
+    for (size_t block = 0; block < job->block_count; block++)
+        for (size_t tile = begin; tile < end; tile++)
+            total[tile] += job->lists->histogram[block * job->tile_count + tile];
+}
+
+/* Counts per block become places in the lists of tiles [begin, end). */
+static void place_blocks(size_t range, size_t begin, size_t end, void *context)
+{
+    (void)range;
+    const pair_job *job = context;
+    uint32_t next[TILE_GRAIN];
+    for (size_t tile = begin; tile < end; tile++)
+        next[tile - begin] = (uint32_t)job->lists->first[tile];
+    for (size_t block = 0; block < job->block_count; block++)
+        for (size_t tile = begin; tile < end; tile++) {
+            uint32_t *place = &job->lists->histogram[block * job->tile_count + tile];
+            const uint32_t count = *place;
+            *place = next[tile - begin];
+            next[tile - begin] += count;
+        }
+}
+
 /* Counts per block and tile become places in the list of all tiles. */
-static gbt_status place_blocks(const pair_job *job, size_t block_count, gbt_error *err)
+static gbt_status place_all(pair_job *job, gbt_error *err)
 {
     tile_lists *lists = job->lists;
     size_t *first = lists->first;
     uint64_t total = 0;
-    memset(first, 0, (job->tile_count + 1) * sizeof *first);
-    for (size_t block = 0; block < block_count; block++) {
+    for (size_t block = 0; block < job->block_count; block++)
         total += lists->blocks[block].count;
-        for (size_t tile = 0; tile < job->tile_count; tile++)
-            first[tile + 1] += lists->histogram[block * job->tile_count + tile];
-    }
     if (total > UINT32_MAX)
         return base_fail(err, GBT_ERR_NO_MEMORY, "raster: %llu pairs of Gaussian and tile (limit 2^32)",
                          (unsigned long long)total);
+    parallel_blocks(job->tile_count, TILE_GRAIN, count_tiles, job);
+    first[0] = 0;
     for (size_t tile = 0; tile < job->tile_count; tile++) {
         if (first[tile + 1] > TILE_ENTRIES)
             return base_fail(err, GBT_ERR_NO_MEMORY, "raster: %zu Gaussians in one tile (limit 2^24)",
                              first[tile + 1]);
         first[tile + 1] += first[tile];
     }
-    size_t *next = first; /* moved on block by block, and moved back by the total at the end */
-    for (size_t block = 0; block < block_count; block++)
-        for (size_t tile = 0; tile < job->tile_count; tile++) {
-            uint32_t *place = &lists->histogram[block * job->tile_count + tile];
-            const uint32_t count = *place;
-            *place = (uint32_t)next[tile];
-            next[tile] += count;
-        }
-    memmove(first + 1, first, job->tile_count * sizeof *first); /* each now stands where the next one begins
-                                                                 */
-    first[0] = 0;
+    parallel_blocks(job->tile_count, TILE_GRAIN, place_blocks, job);
     lists->pair_count = (size_t)total;
     return GBT_OK;
 }
@@ -252,14 +279,14 @@ gbt_status tile_lists_make(tile_lists *lists, const raster_kernel *kernel, const
 {
     GBT_TRY(number_splats(lists, drawn, count, err));
     GBT_TRY(sort_by_depth(lists, splats, count, err));
-    const size_t grain = grain_of(lists->splat_count, PAIR_BLOCKS),
-                 block_count = parallel_block_count(lists->splat_count, grain);
+    const size_t grain = grain_of(lists->splat_count, PAIR_BLOCKS);
     pair_job job = {.lists = lists, .kernel = kernel, .view = view, .splats = splats};
     job.tile_count = (size_t)view->tiles_across * (size_t)view->tiles_down;
+    job.block_count = parallel_block_count(lists->splat_count, grain);
     atomic_init(&job.failed, false);
-    GBT_TRY(reserve_blocks(lists, block_count, err));
+    GBT_TRY(reserve_blocks(lists, job.block_count, err));
     GBT_TRY(mem_reserve((void **)&lists->histogram, &lists->histogram_capacity, 0,
-                        block_count * job.tile_count, sizeof *lists->histogram, "raster tiles", err));
+                        job.block_count * job.tile_count, sizeof *lists->histogram, "raster tiles", err));
     GBT_TRY(mem_reserve((void **)&lists->first, &lists->first_capacity, 0, job.tile_count + 1,
                         sizeof *lists->first, "raster tiles", err));
     GBT_TRY(mem_reserve((void **)&lists->ranges, &lists->range_capacity, 0, count, sizeof *lists->ranges,
@@ -269,7 +296,7 @@ gbt_status tile_lists_make(tile_lists *lists, const raster_kernel *kernel, const
         return base_fail(err, GBT_ERR_NO_MEMORY,
                          "raster: no memory for the pairs of %zu Gaussians and %zu tiles", lists->splat_count,
                          job.tile_count);
-    GBT_TRY(place_blocks(&job, block_count, err));
+    GBT_TRY(place_all(&job, err));
     number_pairs(lists, count);
     GBT_TRY(mem_reserve((void **)&lists->entries, &lists->entry_capacity, 0, lists->pair_count,
                         sizeof *lists->entries, "raster pairs", err));

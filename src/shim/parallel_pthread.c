@@ -62,7 +62,7 @@ static void *work(void *argument)
     return NULL;
 }
 
-void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *context)
+void parallel_run(size_t count, size_t grain, parallel_body *body, void *context)
 {
     job j = {.count = count,
              .grain = grain,

@@ -61,7 +61,7 @@ class default_float_environment {
     ~default_float_environment() { std::fesetenv(&saved); }
 };
 
-extern "C" void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *context)
+extern "C" void parallel_run(size_t count, size_t grain, parallel_body *body, void *context)
 try {
     const int threads = parallel_threads();
     const size_t blocks = parallel_block_count(count, grain);

@@ -9,6 +9,7 @@
 #include "base/fail.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "bvh/points.h"
 #include "train/def.h"
 #include "train/camera_sees.h"
@@ -147,6 +148,37 @@ static growth_def def_of(const trainer *t)
     return def;
 }
 
+enum { FOLLOWERS = 3 };
+
+typedef struct follow_job {
+    const growth_result *result;
+    learnables *of[FOLLOWERS];
+    gbt_status status[FOLLOWERS];
+    gbt_error error[FOLLOWERS];
+} follow_job;
+
+static void follow_one(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)begin;
+    (void)end;
+    follow_job *job = context;
+    job->status[block] = learnables_follow(job->of[block], job->result, &job->error[block]);
+}
+
+/* What is kept of each anchor beside it. */
+static gbt_status follow_all(trainer *t, const growth_result *result, gbt_error *err)
+{
+    follow_job job = {.result = result, .of = {&t->gradient, &t->moment1, &t->moment2}};
+    parallel_blocks(FOLLOWERS, 1, follow_one, &job);
+    for (int i = 0; i < FOLLOWERS; i++)
+        if (job.status[i] != GBT_OK) {
+            if (err != NULL)
+                *err = job.error[i];
+            return job.status[i];
+        }
+    return follow_creation(t, result, err);
+}
+
 gbt_status growing_round(trainer *t, gbt_error *err)
 {
     growth_def def = def_of(t);
@@ -157,11 +189,8 @@ gbt_status growing_round(trainer *t, gbt_error *err)
         status = find_points(t, &known, &def.points, err);
     if (status == GBT_OK)
         status = growth_round(&t->anchors, &t->stats, &def, &result, err);
-    learnables *const kept[] = {&t->gradient, &t->moment1, &t->moment2};
-    for (int i = 0; i < 3 && status == GBT_OK; i++)
-        status = learnables_follow(kept[i], &result, err);
     if (status == GBT_OK)
-        status = follow_creation(t, &result, err);
+        status = follow_all(t, &result, err);
     mem_free(known.nearest);
     mem_free(known.scale);
     mem_free(result.source);

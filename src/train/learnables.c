@@ -5,13 +5,14 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/clones.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "train/adam.h"
 #include "train/schedule.h"
 
-enum { ADAM_BLOCK = 512 };
+enum { ADAM_BLOCK = 256 };
 
 typedef struct rate_rule {
     double first, last; /* of the reference: log-linear from one to the other over the run */
@@ -91,14 +92,14 @@ void learnables_zero(learnables *l, size_t param_count)
 
 gbt_status learnables_follow(learnables *l, const growth_result *result, gbt_error *err)
 {
-    anchors old = l->anchors;
-    l->anchors = (anchors){.offset_count = old.offset_count};
-    const gbt_status status = anchors_resize(&l->anchors, result->count, err);
-    for (size_t i = 0; status == GBT_OK && i < result->survivors; i++)
-        rows_move(l->anchors.field, anchor_fields, ANCHOR_FIELDS, old.offset_count, i, old.field,
-                  result->source[i]);
-    anchors_free(&old);
-    return status;
+    anchors *a = &l->anchors;
+    GBT_TRY(anchors_resize(a, result->count > a->count ? result->count : a->count, err));
+    for (size_t i = 0; i < result->survivors; i++)
+        if (result->source[i] != i) /* it comes from further on */
+            rows_move(a->field, anchor_fields, ANCHOR_FIELDS, a->offset_count, i, a->field,
+                      result->source[i]);
+    a->count = result->survivors;
+    return anchors_resize(a, result->count, err);
 }
 
 /* ---- Adam ---- */
@@ -108,6 +109,14 @@ typedef struct anchor_job {
     const learning_rates *rates;
     uint64_t age; /* of the run */
 } anchor_job;
+
+FASTEST_CLONE static void keep_between(float *values, size_t count, float least, float most)
+{
+    for (size_t i = 0; i < count; i++) { /* fminf() and fmaxf() would be calls */
+        const float above = values[i] > least ? values[i] : least;
+        values[i] = above < most ? above : most;
+    }
+}
 
 /* Rows [begin, end), all of one age. */
 static void learn_rows(const anchor_job *job, size_t begin, size_t end)
@@ -122,8 +131,8 @@ static void learn_rows(const anchor_job *job, size_t begin, size_t end)
                   m->moment2->anchors.field[f] + at, count,
                   adam_rates_of_views(job->rates->anchor[f], rule->ages_with_run ? job->age : age,
                                       job->rates->views));
-        for (size_t i = 0; rule->is_log_scale && i < count; i++)
-            values[i] = fminf(fmaxf(values[i], m->scale_log_min), m->scale_log_max);
+        if (rule->is_log_scale)
+            keep_between(values, count, m->scale_log_min, m->scale_log_max);
     }
 }
 

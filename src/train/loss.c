@@ -5,6 +5,8 @@
 
 #include <math.h>
 
+#include "base/parallel.h"
+
 static const float dssim_weight = (float)IMAGE_DSSIM_WEIGHT, volume_weight = 0.01f;
 
 /* ---- of the picture ---- */
@@ -23,22 +25,54 @@ double loss_of_value(double shown, double photo, double ssim)
 
 /* ---- of the Gaussians ---- */
 
+enum { GAUSSIAN_BLOCK = 4096, GAUSSIAN_BLOCKS = 64 };
+
+typedef struct volume_job {
+    const gaussians *g;
+    gaussians *d;
+    double sum[GAUSSIAN_BLOCKS]; /* added in their order */
+} volume_job;
+
+static void sum_volumes(size_t block, size_t begin, size_t end, void *context)
+{
+    volume_job *job = context;
+    const gaussians *g = job->g;
+    double volume = 0;
+    for (size_t i = begin; i < end; i++)
+        volume += (double)g->scale_x[i] * (double)g->scale_y[i] * (double)g->scale_z[i];
+    job->sum[block] = volume;
+}
+
 double loss_of_gaussians(const gaussians *g)
 {
+    volume_job job = {.g = g};
+    const size_t share = parallel_block_count(g->count, GAUSSIAN_BLOCKS),
+                 grain = share > GAUSSIAN_BLOCK ? share : GAUSSIAN_BLOCK;
+    parallel_blocks(g->count, grain, sum_volumes, &job);
     double volume = 0;
-    for (size_t i = 0; i < g->count; i++)
-        volume += (double)g->scale_x[i] * (double)g->scale_y[i] * (double)g->scale_z[i];
+    for (size_t i = 0; i < parallel_block_count(g->count, grain); i++)
+        volume += job.sum[i];
     return g->count > 0 ? (double)volume_weight * (volume / (double)g->count) : 0;
 }
 
-void loss_add_gradient(const gaussians *g, gaussians *d)
+static void add_volume_gradient(size_t block, size_t begin, size_t end, void *context)
 {
-    const float share = g->count > 0 ? volume_weight / (float)g->count : 0;
-    for (size_t i = 0; i < g->count; i++) {
+    (void)block;
+    const volume_job *job = context;
+    const gaussians *g = job->g;
+    gaussians *d = job->d;
+    const float share = volume_weight / (float)g->count;
+    for (size_t i = begin; i < end; i++) {
         d->scale_x[i] += share * g->scale_y[i] * g->scale_z[i];
         d->scale_y[i] += share * g->scale_x[i] * g->scale_z[i];
         d->scale_z[i] += share * g->scale_x[i] * g->scale_y[i];
     }
+}
+
+void loss_add_gradient(const gaussians *g, gaussians *d)
+{
+    volume_job job = {.g = g, .d = d};
+    parallel_blocks(g->count, GAUSSIAN_BLOCK, add_volume_gradient, &job);
 }
 
 double loss_of_gaussian(const double field[GAUSSIANS_FIELD_COUNT])

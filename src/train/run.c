@@ -135,8 +135,9 @@ static void speed_follow(speed *s, const step_report *r)
 {
     const frame_times *f = &r->times;
     const double pixels = (double)r->width * (double)r->height;
-    const double per_pixel = (f->rays + f->trace + f->adjoint + r->loss_seconds) / r->beside / pixels;
-    const double fixed = fmax(0, r->total_seconds - per_pixel * pixels - r->photo_seconds);
+    const double per_pixel =
+        (f->rays.wall + f->trace.wall + f->adjoint.wall + r->compare.wall) / r->beside / pixels;
+    const double fixed = fmax(0, r->all.wall - per_pixel * pixels - r->photo.wall);
     const double keep = s->known ? 0.95 : 0;
     s->fixed_seconds = keep * s->fixed_seconds + (1 - keep) * fixed;
     s->pixel_seconds = keep * s->pixel_seconds + (1 - keep) * per_pixel;
@@ -269,7 +270,7 @@ static gbt_status write_settings(const trainer *t, const char *run, const run_pa
     return run_data_save(run, t->scene.folder, err);
 }
 
-static gbt_status finish(const trainer *t, const run_paths *paths, run_log *log, gbt_error *err)
+static gbt_status finish(trainer *t, const run_paths *paths, run_log *log, gbt_error *err)
 {
     GBT_TRY(save_all(t, paths, err));
     return log->all.steps > 0 || !run_log_is_of_step(paths->json, t->step)

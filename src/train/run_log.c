@@ -18,6 +18,8 @@
 
 static const double row_every_seconds = 1;
 
+#define STAGE_MS(name) (1000 / n * s->stage[RUN_STAGE_##name].wall)
+
 /* One row: its column in log.csv, its tag for TensorBoard ("": not there), how it is printed, its value. */
 #define ROW_COLUMNS(X)                                                                                       \
     X("step", "", "%.0f", (double)t->step)                                                                   \
@@ -34,18 +36,18 @@ static const double row_every_seconds = 1;
     X("gaussians", "scene/gaussians", "%.0f", s->gaussians / n)                                              \
     X("visible_anchors", "scene/visible_anchors", "%.0f", s->visible / n)                                    \
     X("blended_per_ray", "scene/blended_per_ray", "%.2f", s->blended / fmax(s->rays, 1))                     \
-    X("rays_per_second", "run/rays_per_second", "%.0f", s->rays / fmax(s->seconds, 1e-9))                    \
-    X("photo_ms", "ms/photo", "%.3f", s->photo *ms)                                                          \
-    X("rays_ms", "ms/rays", "%.3f", s->rays_seconds *ms)                                                     \
-    X("visible_ms", "ms/visible", "%.3f", s->visible_seconds *ms)                                            \
-    X("decode_ms", "ms/decode", "%.3f", s->decode *ms)                                                       \
-    X("build_ms", "ms/build", "%.3f", s->build *ms)                                                          \
-    X("trace_ms", "ms/trace", "%.3f", s->trace *ms)                                                          \
-    X("loss_ms", "ms/loss", "%.3f", s->loss_seconds *ms)                                                     \
-    X("adjoint_ms", "ms/adjoint", "%.3f", s->adjoint *ms)                                                    \
-    X("decode_adjoint_ms", "ms/decode_adjoint", "%.3f", s->decode_adjoint *ms)                               \
-    X("optimizer_ms", "ms/optimizer", "%.3f", s->optimizer *ms)                                              \
-    X("adjust_ms", "ms/adjust", "%.3f", s->adjust *ms)                                                       \
+    X("rays_per_second", "run/rays_per_second", "%.0f", s->rays / fmax(seconds_of(s), 1e-9))                 \
+    X("photo_ms", "ms/photo", "%.3f", STAGE_MS(photo))                                                       \
+    X("rays_ms", "ms/rays", "%.3f", STAGE_MS(rays))                                                          \
+    X("visible_ms", "ms/visible", "%.3f", STAGE_MS(visible))                                                 \
+    X("decode_ms", "ms/decode", "%.3f", STAGE_MS(decode))                                                    \
+    X("build_ms", "ms/build", "%.3f", STAGE_MS(build))                                                       \
+    X("trace_ms", "ms/trace", "%.3f", STAGE_MS(trace))                                                       \
+    X("loss_ms", "ms/loss", "%.3f", STAGE_MS(loss))                                                          \
+    X("adjoint_ms", "ms/adjoint", "%.3f", STAGE_MS(adjoint))                                                 \
+    X("decode_adjoint_ms", "ms/decode_adjoint", "%.3f", STAGE_MS(decode_adjoint))                            \
+    X("optimizer_ms", "ms/optimizer", "%.3f", STAGE_MS(optimizer))                                           \
+    X("adjust_ms", "ms/adjust", "%.3f", STAGE_MS(adjust))                                                    \
     X("memory_bytes", "run/memory_bytes", "%.0f", (double)mem_peak_bytes())
 
 static const struct {
@@ -137,9 +139,10 @@ gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, co
     return GBT_OK;
 }
 
+static double seconds_of(const run_sums *s) { return s->stage[RUN_STAGE_all].wall; }
+
 static void add_step(run_sums *s, const step_report *r)
 {
-    const frame_times *f = &r->times;
     s->steps++;
     s->loss += r->loss;
     s->l1 += r->l1;
@@ -150,27 +153,18 @@ static void add_step(run_sums *s, const step_report *r)
     s->rays += (double)r->rays;
     s->hits += (double)r->hits;
     s->blended += (double)r->blended;
-    s->seconds += r->total_seconds;
-    s->photo += r->photo_seconds;
-    s->loss_seconds += r->loss_seconds;
-    s->optimizer += r->optimizer_seconds;
-    s->adjust += r->adjust_seconds;
     s->wait += r->wait_seconds;
     s->exchange += r->exchange_seconds;
     s->exchange_bytes += (double)r->exchange_bytes;
-    s->rays_seconds += f->rays;
-    s->visible_seconds += f->visible;
-    s->decode += f->decode;
-    s->build += f->build;
-    s->trace += f->trace;
-    s->adjoint += f->adjoint;
-    s->decode_adjoint += f->decode_adjoint;
+#define X(name, time) stage_add(&s->stage[RUN_STAGE_##name], time);
+    RUN_STAGE_LIST(X)
+#undef X
 }
 
 static void write_row(run_log *log, const trainer *t, int width, int height, double test_psnr)
 {
     const run_sums *s = &log->row;
-    const double n = s->steps > 0 ? (double)s->steps : 1, ms = 1000 / n;
+    const double n = s->steps > 0 ? (double)s->steps : 1;
     const double values[] = {
 #define X(name, tag, format, value) value,
         ROW_COLUMNS(X)
@@ -216,7 +210,7 @@ static void tell_progress(const run_log *log, const trainer *t)
              "step %llu  %3.0f %%  %dx%d  loss %.4f  psnr %.2f  anchors %zu  gaussians %zu  %.2f Mrays/s  "
              "%zu MB  %.0f:%02.0f left",
              (unsigned long long)t->step, 100 * progress, r->width, r->height, r->loss, log->psnr_smooth,
-             t->anchors.count, r->gaussians, s->rays / fmax(s->seconds, 1e-9) * 1e-6,
+             t->anchors.count, r->gaussians, s->rays / fmax(seconds_of(s), 1e-9) * 1e-6,
              mem_peak_bytes() / 1000000, floor(e.seconds_left / 60), floor(fmod(e.seconds_left, 60)));
     log_progress(&e);
 }
@@ -246,6 +240,29 @@ void run_log_evaluation(run_log *log, const trainer *t, double psnr)
              psnr);
 }
 
+/* Four tables by stage: waiting is what the threads did not work in the stage's time. */
+static void add_stages(json_t *root, const run_sums *s)
+{
+    static const char *const names[RUN_STAGES] = {
+#define X(name, time) #name,
+        RUN_STAGE_LIST(X)
+#undef X
+    };
+    const double ms = 1000 / (s->steps > 0 ? (double)s->steps : 1);
+    json_t *wall = json_object(), *work = json_object(), *span = json_object(), *waiting = json_object();
+    for (int i = 0; i < RUN_STAGES; i++) {
+        const stage_time *t = &s->stage[i];
+        json_object_set_new(wall, names[i], json_real(t->wall * ms));
+        json_object_set_new(work, names[i], json_real(t->work * ms));
+        json_object_set_new(span, names[i], json_real(t->span * ms));
+        json_object_set_new(waiting, names[i], json_real((parallel_threads() * t->wall - t->work) * ms));
+    }
+    json_object_set_new(root, "stage_ms_per_step", wall);
+    json_object_set_new(root, "stage_work_ms_per_step", work);
+    json_object_set_new(root, "stage_span_ms_per_step", span);
+    json_object_set_new(root, "stage_waiting_ms_per_step", waiting);
+}
+
 gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path, gbt_error *err)
 {
     if (log->row.steps > 0)
@@ -253,18 +270,8 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     if (log->all.steps > 0)
         tell_progress(log, t);
     const run_sums *s = &log->all;
-    const double n = s->steps > 0 ? (double)s->steps : 1, ms = 1000 / n;
-    json_t *root = json_object(), *stages = json_object(), *parts = json_array(), *evals = json_array();
-    const struct {
-        const char *name;
-        double value;
-    } stage[] = {
-        {"photo", s->photo},         {"rays", s->rays_seconds}, {"visible", s->visible_seconds},
-        {"decode", s->decode},       {"build", s->build},       {"trace", s->trace},
-        {"loss", s->loss_seconds},   {"adjoint", s->adjoint},   {"decode_adjoint", s->decode_adjoint},
-        {"optimizer", s->optimizer}, {"adjust", s->adjust},     {"all", s->seconds}};
-    for (size_t i = 0; i < sizeof stage / sizeof *stage; i++)
-        json_object_set_new(stages, stage[i].name, json_real(stage[i].value * ms));
+    const double n = s->steps > 0 ? (double)s->steps : 1;
+    json_t *root = json_object(), *parts = json_array(), *evals = json_array();
     for (int i = 0; i < t->pace.known; i++)
         json_array_append_new(parts, json_integer((json_int_t)t->pace.steps[i]));
     for (int i = 0; i < log->evaluated_count; i++)
@@ -284,16 +291,18 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     json_object_set_new(root, "opacity_raises", json_integer((json_int_t)t->opacity_raises));
     json_object_set_new(root, "exposure", json_boolean(t->exposures.count > 0));
     json_object_set_new(root, "train_seconds", json_real(t->seconds));
-    json_object_set_new(root, "rays_per_second", json_real(s->rays / fmax(s->seconds, 1e-9)));
+    json_object_set_new(root, "rays_per_second", json_real(s->rays / fmax(seconds_of(s), 1e-9)));
     json_object_set_new(root, "hits_per_ray", json_real(s->hits / fmax(s->rays, 1)));
     json_object_set_new(root, "blended_per_ray", json_real(s->blended / fmax(s->rays, 1)));
     json_object_set_new(root, "gaussians_per_view", json_real(s->gaussians / n));
-    json_object_set_new(root, "stage_ms_per_step", stages);
+    json_object_set_new(root, "visible_per_view", json_real(s->visible / n));
+    json_object_set_new(root, "rays_per_step", json_real(s->rays / n));
+    add_stages(root, s);
     if (gbt_cluster_size() > 1)
         json_object_set_new(root, "communication",
                             json_pack("{s:i,s:f,s:f,s:f}", "processes", gbt_cluster_size(), "bytes_per_step",
-                                      s->exchange_bytes / n, "ms_per_step", s->exchange * ms,
-                                      "waiting_ms_per_step", s->wait * ms));
+                                      s->exchange_bytes / n, "ms_per_step", 1000 * s->exchange / n,
+                                      "waiting_ms_per_step", 1000 * s->wait / n));
     json_object_set_new(root, "pace", parts);
     json_object_set_new(root, "held_out", evals);
     json_object_set_new(root, "downscale", json_real(t->def.downscale));

@@ -8,12 +8,35 @@
 #include "train/event_records.h"
 #include "train/trainer.h"
 
+/** The stages of a step in their order: X(name in train.json, where its time stands: report `r`).
+ */
+#define RUN_STAGE_LIST(X)                                                                                    \
+    X(photo, r->photo)                                                                                       \
+    X(rays, r->times.rays)                                                                                   \
+    X(visible, r->times.visible)                                                                             \
+    X(decode, r->times.decode)                                                                               \
+    X(build, r->times.build)                                                                                 \
+    X(trace, r->times.trace)                                                                                 \
+    X(loss, r->compare)                                                                                      \
+    X(adjoint, r->times.adjoint)                                                                             \
+    X(decode_adjoint, r->times.decode_adjoint)                                                               \
+    X(optimizer, r->optimizer)                                                                               \
+    X(adjust, r->adjust)                                                                                     \
+    X(all, r->all)
+
+enum {
+#define X(name, time) RUN_STAGE_##name,
+    RUN_STAGE_LIST(X)
+#undef X
+        RUN_STAGES
+};
+
 /* Sums since the last row of log.csv. */
 typedef struct run_sums {
     uint64_t steps;
     double loss, l1, ssim, psnr, gaussians, visible, rays, hits, blended;
-    double seconds, photo, rays_seconds, visible_seconds, decode, build, trace, loss_seconds, adjoint,
-        decode_adjoint, optimizer, adjust, wait, exchange, exchange_bytes;
+    stage_time stage[RUN_STAGES];
+    double wait, exchange, exchange_bytes;
 } run_sums;
 
 typedef struct run_log {

@@ -140,12 +140,12 @@ static void keep_failure(view_outcome *r, gbt_status status, const gbt_error *er
 
 void step_view_pick(trainer *t, step_view *v, size_t index)
 {
-    const double start = clock_wall();
+    stage_clock start = stage_begin();
     gbt_error err = {0};
     memset(&v->outcome, 0, sizeof v->outcome);
     v->slot = t->slots[index];
     keep_failure(&v->outcome, pick(t, v, views_before(t, index), &err), &err);
-    v->photo_seconds = clock_wall() - start;
+    v->photo_time = stage_lap(&start);
 }
 
 /* ---- its render ---- */
@@ -226,14 +226,14 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
     r->hits = f->counters.hits;
     r->blended = f->counters.blended;
 
-    const double clock = clock_wall();
+    stage_clock clock = stage_begin();
     image_loss_result loss;
     GBT_TRY(compare(t, v, &loss, err));
     r->loss = loss.loss + loss_of_gaussians(&f->gaussians);
     r->l1 = loss.l1;
     r->ssim = loss.ssim;
     r->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
-    v->loss_seconds = clock_wall() - clock;
+    v->compare_time = stage_lap(&clock);
     if (!isfinite(r->loss)) {
         r->bad = true;
         snprintf(r->text, sizeof r->text, "the loss is not finite (photo %.200s)", photo);
@@ -266,7 +266,7 @@ void step_view_run(trainer *t, step_view *v)
     const double start = clock_wall();
     gbt_error err = {0};
     v->rows.count = 0;
-    v->loss_seconds = 0;
+    v->compare_time = (stage_time){0};
     if (v->outcome.status == GBT_OK)
         keep_failure(&v->outcome, run(t, v, &err), &err);
     v->seconds = clock_wall() - start;

@@ -42,8 +42,8 @@ typedef struct step_view {
     view_outcome outcome;
     gbt_camera camera; /* of the pixels that it looks at */
     const unsigned char *valid;
-    double photo_seconds, loss_seconds,
-        seconds; /* wall time of the last step; `seconds`: all but the photo */
+    stage_time photo_time, compare_time; /* of the last step */
+    double seconds;                      /* wall time of all but the photo */
 } step_view;
 
 /** trainer.slots: the photos of the next step. */

@@ -105,8 +105,8 @@ static gbt_status run_views(trainer *t, step_report *out, gbt_error *err)
     for (size_t i = 0; i < t->view_count; i++) {
         const step_view *v = &t->views[i];
         frame_times_add(&out->times, &v->frame.times);
-        out->photo_seconds += v->photo_seconds;
-        out->loss_seconds += v->loss_seconds;
+        stage_add(&out->photo, v->photo_time);
+        stage_add(&out->compare, v->compare_time);
         views += v->seconds;
     }
     out->beside = fmax(1, views / wall);
@@ -165,7 +165,7 @@ static void gather_alone(trainer *t)
 
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 {
-    const double start = clock_wall();
+    stage_clock start = stage_begin();
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1),
                  views = t->def.views;
@@ -185,7 +185,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     t->skipped_in_row = 0;
 
     /* One gradient, then parameters. */
-    double clock = clock_wall();
+    stage_clock clock = stage_begin();
     if (t->def.views > 1)
         GBT_TRY(step_rows_add_up(t, out, err));
     if (learns)
@@ -196,17 +196,17 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
         learn_networks(&model, &rates, t->step + 1);
     if (learns && (!adjust || t->rules.anchors_learn_when_adjusted))
         learn_anchors(&model, &rates, ++t->anchor_t);
-    out->optimizer_seconds = clock_wall() - clock;
+    out->optimizer = stage_lap(&clock);
 
     /* Anchors. */
-    clock = clock_wall();
+    clock = stage_begin();
     if (t->def.views == 1 && growing_gathers(t))
         gather_alone(t);
     if (adjust)
         GBT_TRY(growing_round(t, err));
-    out->adjust_seconds = clock_wall() - clock;
+    out->adjust = stage_lap(&clock);
     t->step++;
-    out->total_seconds = clock_wall() - start;
+    out->all = stage_lap(&start);
     return GBT_OK;
 }
 

@@ -22,9 +22,9 @@ typedef struct step_report {
     int width, height, level, parts; /* of the first view */
     size_t gaussians, visible;
     uint64_t rays, hits, blended; /* of all views */
-    frame_times times;            /* sums over its views, as photo_seconds and loss_seconds */
+    frame_times times;            /* sums over its views, as photo and compare */
     double beside;                /* how many views ran at once, in the mean */
-    double photo_seconds, loss_seconds, optimizer_seconds, adjust_seconds, total_seconds;
+    stage_time photo, compare, optimizer, adjust, all;
     double wait_seconds, exchange_seconds; /* until all processes had their views; in sending rows */
     uint64_t exchange_bytes;
     bool skipped; /* the loss or a gradient was not finite: nothing has learned */

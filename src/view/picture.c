@@ -136,8 +136,8 @@ gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error 
     GBT_TRY(studio_prepare(s, traced ? &camera : &shifted, what, whole, err));
     const double prepared = clock_wall(), before = 1000 * (prepared - begin);
     if (whole) {
-        picture_times times = {.trace = fmin(1000 * f->times.trace, before)}; /* nothing, when it was drawn
-                                                                                 already */
+        picture_times times = {.trace = fmin(1000 * f->times.trace.wall, before)}; /* nothing, when it was
+                                                                                 drawn already */
         times.prepare = before - times.trace;
         return finish(s, &f->rgb, what, &times, out, err);
     }

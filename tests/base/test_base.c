@@ -16,6 +16,7 @@
 #include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"
+#include "base/stage.h"
 #include "base/rng.h"
 #include "base/vec.h"
 #include "test_support.h"
@@ -445,6 +446,35 @@ static void blocks_cover_once(void **state)
     }
 }
 
+/* Long enough for any clock. */
+static void spend(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    (void)begin;
+    (void)end;
+    const double until = clock_wall() + 1e-3;
+    while (clock_wall() < until)
+        if (context != NULL)
+            parallel_blocks(2, 1, spend, NULL);
+}
+
+/* What blocks took is counted once, also of calls from inside a block. */
+static void blocks_are_accounted(void **state)
+{
+    (void)state;
+    for (int nested = 0; nested < 2; nested++) {
+        parallel_set_threads(1);
+        stage_clock clock = stage_begin();
+        parallel_blocks(4, 1, spend, nested ? &nested : NULL);
+        spend(0, 0, 1, NULL);
+        const stage_time t = stage_lap(&clock);
+        assert_true(t.work >= 5e-3 && t.work <= t.wall + 1e-6);
+        assert_true(t.span >= 1.9e-3 && t.span < t.work);
+        const stage_time none = stage_lap(&clock);
+        assert_true(none.wall < t.wall && none.work <= none.wall + 1e-6 && none.span <= none.work + 1e-9);
+    }
+}
+
 static void halve(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
@@ -559,6 +589,7 @@ int main(void)
         cmocka_unit_test(gaussians_resize_pad_zero),
         cmocka_unit_test(image_sizes),
         cmocka_unit_test(blocks_cover_once),
+        cmocka_unit_test(blocks_are_accounted),
         cmocka_unit_test(denormals_are_kept),
         cmocka_unit_test(instruction_sets_only_go_down),
         cmocka_unit_test(rotations),

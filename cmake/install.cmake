@@ -12,7 +12,7 @@ install(DIRECTORY docs examples DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN "*.h
 
 # find_package(gbtrace), target gbtrace::gbtrace: the shared library.
 install(EXPORT gbtrace NAMESPACE gbtrace:: FILE gbtraceConfig.cmake DESTINATION ${package_folder})
-write_basic_package_version_file(${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake COMPATIBILITY SameMajorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake DESTINATION ${package_folder})
 
 # pkg-config gbtrace, and --static: our archive on the shared libraries of others. Paths are found from the file's own place, so the tree can be moved.

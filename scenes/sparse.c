@@ -186,7 +186,7 @@ static double reprojection_error(const search *q, size_t candidate, const double
         if (!gbt_camera_project(camera, in_camera, projected))
             continue;
         observe(q, candidate, v, observed);
-        sum += hypot(projected[0] - observed[0], projected[1] - observed[1]);
+        sum += dvec_length2(projected[0] - observed[0], projected[1] - observed[1]);
         count++;
     }
     return count > 0 ? sum / count : 0;

@@ -8,6 +8,7 @@ release() {
     [ -z "$(git status --porcelain)" ] || { say "error: a release is made of a commit: there are changes that are in none (git status)"; return 1; }
     version=$(sed -n 's/^#define GBT_VERSION "\(.*\)"/\1/p' include/gbtrace/version.h)
     grep -q "^## \[$version\] - [0-9]" CHANGELOG.md || { say "error: CHANGELOG.md has no day of version $version"; return 1; }
+    grep -q "gbtrace-$version.tar.gz" docs/packages.md || { say "error: docs/packages.md names the files of another version than $version"; return 1; }
     SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
     export SOURCE_DATE_EPOCH
     name=gbtrace-$version

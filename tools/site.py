@@ -66,7 +66,13 @@ def linked(page, pages, wrong):
         wrong.append(f"{page.source}: {target}: no such page or picture")
         return match[0]
 
-    return re.sub(r'\b(href|src)="([^"]*)"', turn, page.body), pictures
+    def name(match):  # docs/NAME.md in a sentence leads there, too
+        source = match[0]
+        return f'<a href="{page.to(pages[source].place)}">{source}</a>' if source in pages and source != page.source else source
+
+    body = re.sub(r'\b(href|src)="([^"]*)"', turn, page.body)
+    parts = re.split(r"(<pre>.*?</pre>|<a .*?</a>|<[^>]*>)", body, flags=re.S)
+    return "".join(part if part.startswith("<") else re.sub(r"\bdocs/[\w/-]+\.md\b", name, part) for part in parts), pictures
 
 
 def contents(pages):

@@ -19,9 +19,8 @@ gbtrace() {
         kill -0 $viewer 2>/dev/null || break
         sleep 0.1
     done
-    kill -TERM $viewer
-    wait $viewer
-    [ $? = 130 ] && grep 'http://' viewer
+    kill $viewer
+    wait $viewer && grep 'http://' viewer
 }
 
 # ---- what stands in the folder before each command
@@ -62,7 +61,7 @@ while IFS= read -r line; do
     row=$(awk -F ' [|] ' -v command="$command" '$1 == command { print substr($0, length($1) + 4) }' rows)
     case $row in "- "*) echo "not run: $command: ${row#- }"; continue ;; esac
     case $command in *film*) command -v ffmpeg >/dev/null || { skip "$command" "ffmpeg is not installed"; continue; } ;; esac
-    run=$(printf '%s' "${row:-$command}" | sed -E 's/--budget [0-9]+[ms]/--iterations 40/')
+    run=$(printf '%s' "${row:-$command}" | sed -E 's/--budget [0-9]+[ms]/--iterations 40/; /^gbtrace train/{/--iterations/!s/$/ --iterations 40/}')
     rm -rf here && cp -r fresh here && cd here || exit 1
     case $command in
     *--resume* | *"-o DATA") ;;

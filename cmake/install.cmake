@@ -1,5 +1,4 @@
 # What is installed, by cmake --install, into a Debian package (cpack -G DEB) and into a Python wheel.
-include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/gbtrace)
 

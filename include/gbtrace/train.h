@@ -29,6 +29,7 @@ typedef struct gbt_train_def {
     uint64_t iterations;   /* length of the run, with what was done before `resume`; 0: the budget decides */
     double budget_seconds; /* wall time for training, with what was spent before `resume`; used when
                               iterations is 0. 0: 600, or with `resume` as long as the run was to be */
+    int views;             /* photos that a step looks at, a power of two up to 64; results depend on it */
     const char *pace; /* "n1,...,n20": iterations in each twentieth of the schedule, as a budget run records
                          them; NULL: as the budget allows */
     double downscale; /* of the photos' width and height; 0: the median photo becomes 1,600 pixels wide if it
@@ -91,6 +92,10 @@ gbt_train_def gbt_train_def_default(void);
  * and GBT_ERR_INTERRUPTED is returned. The same seed and length give the same model.gbt, bit for bit, for any
  * number of threads, interrupted and resumed or not.
  *
+ * After gbt_cluster_open() all its processes call this together: they share the `views` of each step, the
+ * first one writes the files and has the clock, and the model has the same bytes for any number of processes.
+ * `data`, and with `resume` `run`, must be there for all of them.
+ *
  * A step whose loss or gradient is not finite changes nothing but a count; ten in a row end the run with
  * GBT_ERR_FORMAT and one line that names the photo or the parameter. Pixels of a float photo that are not
  * finite count in no loss.
@@ -145,7 +150,9 @@ typedef struct gbt_train_setting {
     const char *help;    /* one line */
     const char *aliases; /* names that other programs have, with blanks between; NULL: none */
     bool saved;          /* in RUN/config: it decides the result */
-    bool rare;           /* few people need it */
+    bool if_changed; /* in RUN/config only where it is not the default: a run without it has the bytes that it
+                        had before there was such a setting, and older versions read it */
+    bool rare;       /* few people need it */
 } gbt_train_setting;
 
 /** How many settings there are. */

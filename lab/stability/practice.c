@@ -190,10 +190,11 @@ static void mean_of_photos(trainer *t, float mean[3], gbt_status *status, gbt_er
 {
     double sum[3] = {0}, pixels = 0;
     for (size_t i = 0; i < t->train_count && *status == GBT_OK; i++) {
-        *status = photos_get(&t->photos, t->train_views[i], 0, &t->photo, why);
-        const size_t count = *status == GBT_OK ? (size_t)t->photo.width * (size_t)t->photo.height : 0;
+        *status = photos_get(&t->photos, t->train_views[i], 0, &t->views[0].photo, why);
+        const size_t count =
+            *status == GBT_OK ? (size_t)t->views[0].photo.width * (size_t)t->views[0].photo.height : 0;
         for (size_t k = 0; k < 3 * count; k++)
-            sum[k % 3] += (double)t->photo.pixels[k];
+            sum[k % 3] += (double)t->views[0].photo.pixels[k];
         pixels += (double)count;
     }
     for (int c = 0; c < 3; c++)
@@ -207,21 +208,21 @@ static gbt_status look_at(trainer *t, practice_result *out, gbt_error *why)
     mean_of_photos(t, mean, &status, why);
     for (size_t i = 0; i < t->train_count && status == GBT_OK; i++) {
         const gbt_camera camera = photos_camera(&t->photos, t->train_views[i], 0);
-        status = frame_render(&t->frame, frame_neural(&t->anchors, &t->decoder), &camera, &t->settings, false,
-                              why);
+        status = frame_render(&t->views[0].frame, frame_neural(&t->anchors, &t->decoder), &camera,
+                              &t->settings, false, why);
         if (status == GBT_OK)
-            status = photos_get(&t->photos, t->train_views[i], 0, &t->photo, why);
+            status = photos_get(&t->photos, t->train_views[i], 0, &t->views[0].photo, why);
         if (status != GBT_OK)
             break;
-        image *rgb = &t->frame.rgb;
+        image *rgb = &t->views[0].frame.rgb;
         const size_t values = 3 * (size_t)rgb->width * (size_t)rgb->height;
         out->bad += draw_count_bad(rgb->pixels, values);
         image_quantize(rgb);
-        out->psnr += metric_psnr(rgb, &t->photo) / (double)t->train_count;
+        out->psnr += metric_psnr(rgb, &t->views[0].photo) / (double)t->train_count;
         for (size_t k = 0; k < values; k++)
             rgb->pixels[k] = mean[k % 3];
         image_quantize(rgb);
-        out->constant += metric_psnr(rgb, &t->photo) / (double)t->train_count;
+        out->constant += metric_psnr(rgb, &t->views[0].photo) / (double)t->train_count;
     }
     return status;
 }

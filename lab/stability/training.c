@@ -49,8 +49,8 @@ static double beyond_range(const far_views *f)
 {
     const decoder *d = &f->t.decoder;
     double worst = 0;
-    for (size_t i = 0; i < f->t.frame.visible_count; i++) {
-        const double seen = (double)f->t.frame.tape.input[i * INPUT_STRIDE + INPUT_COUNT - 1];
+    for (size_t i = 0; i < f->t.views[0].frame.visible_count; i++) {
+        const double seen = (double)f->t.views[0].frame.tape.input[i * INPUT_STRIDE + INPUT_COUNT - 1];
         worst = fmax(worst, fmax(0.5 * (double)d->distance_min / seen, seen / (2 * (double)d->distance_max)));
     }
     return worst <= 1 + 1e-6 ? 0 : worst;
@@ -88,8 +88,8 @@ static bool render_model(stability *s, far_views *f, const gbt_camera *camera)
     for (int k = 0; k < 3; k++)
         local.center[k] -= f->t.scene.origin[k];
     return s->status == GBT_OK &&
-           stability_ok(s, frame_render(&f->t.frame, frame_neural(&f->t.anchors, &f->t.decoder), &local,
-                                        &f->t.settings, false, s->err));
+           stability_ok(s, frame_render(&f->t.views[0].frame, frame_neural(&f->t.anchors, &f->t.decoder),
+                                        &local, &f->t.settings, false, s->err));
 }
 
 /* PSNR to the truth of the model minus that of the Gaussians it makes for the nearest photo. */
@@ -100,11 +100,11 @@ static double loss_to_baked(stability *s, far_views *f, double azimuth, double e
                      far = practice_camera(f->p, azimuth, elevation, radius);
     if (!render_model(s, f, &near))
         return NAN;
-    if (!stability_ok(s, gaussians_copy(&f->t.frame.gaussians, &f->fixed, s->err)) ||
+    if (!stability_ok(s, gaussians_copy(&f->t.views[0].frame.gaussians, &f->fixed, s->err)) ||
         !render_model(s, f, &far))
         return NAN;
-    f->bad += draw_count_bad(f->t.frame.rgb.pixels, 3 * (size_t)far.width * (size_t)far.height) +
-              draw_count_bad_fields(&f->t.frame.gaussians);
+    f->bad += draw_count_bad(f->t.views[0].frame.rgb.pixels, 3 * (size_t)far.width * (size_t)far.height) +
+              draw_count_bad_fields(&f->t.views[0].frame.gaussians);
     f->out_of_range = fmax(f->out_of_range, beyond_range(f));
     gbt_camera local = far;
     for (int k = 0; k < 3; k++)
@@ -115,9 +115,9 @@ static double loss_to_baked(stability *s, far_views *f, double azimuth, double e
     const trace_settings settings = practice_settings();
     if (s->status == GBT_OK && stability_ok(s, ray_image_from_camera(&far, &f->rays, s->err)))
         draw_traced(s, &f->truth, &f->p->truth, &settings, &f->rays);
-    return s->status == GBT_OK
-               ? metric_psnr(&f->baked.rgb, &f->truth.rgb) - metric_psnr(&f->t.frame.rgb, &f->truth.rgb)
-               : (double)NAN;
+    return s->status == GBT_OK ? metric_psnr(&f->baked.rgb, &f->truth.rgb) -
+                                     metric_psnr(&f->t.views[0].frame.rgb, &f->truth.rgb)
+                               : (double)NAN;
 }
 
 static void look_from_everywhere(stability *s, far_views *f)
@@ -144,8 +144,8 @@ static void look_from_everywhere(stability *s, far_views *f)
     for (size_t k = 0; k < 3 && s->status == GBT_OK; k++)
         on.center[k] = (double)f->t.anchors.position[k] + f->t.scene.origin[k];
     if (render_model(s, f, &on))
-        f->bad += draw_count_bad(f->t.frame.rgb.pixels, 3 * (size_t)on.width * (size_t)on.height) +
-                  draw_count_bad_fields(&f->t.frame.gaussians);
+        f->bad += draw_count_bad(f->t.views[0].frame.rgb.pixels, 3 * (size_t)on.width * (size_t)on.height) +
+                  draw_count_bad_fields(&f->t.views[0].frame.gaussians);
     stability_check(s, "A12a", (double)f->bad, NAN,
                     "%zu places, one of them on an anchor, %.3g units from the origin.",
                     radius_count * elevation_count + 1, own);

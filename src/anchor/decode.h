@@ -57,7 +57,8 @@ gbt_status decode_forward(const anchors *a, const decoder *d, const float camera
  *
  * @param d_gaussians [in]  gradients in the order of the forward's `out`; quat_* is dL/d(unit quaternion),
  *                          any component along q is ignored
- * @param d_anchors   [out] same shape as `a` (position unused); added to, rows of `visible` only
+ * @param d_anchors   [out] same shape as `a` (position unused); added to, rows of `visible` only. Or these
+ * rows alone, in their order: d_anchors->count == visible_count
  * @param d_params    [out] [d->param_count], added to
  * @return GBT_OK, GBT_ERR_ARGUMENT (shapes differ from the forward's), GBT_ERR_NO_MEMORY: then nothing was
  *         added

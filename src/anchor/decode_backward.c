@@ -31,6 +31,7 @@ typedef struct backward_job {
     const decode_tape *tape;
     const gaussians *d_gaussians;
     anchors *d_anchors; /* with d_params; NULL: the camera's gradient alone is wanted */
+    bool packed;        /* d_anchors has a row for each visible anchor */
     float *d_params;
     const decoder *d; /* for the camera's gradient: */
     double camera[3];
@@ -40,6 +41,12 @@ typedef struct backward_job {
 } backward_job;
 
 static const float zeros[HIDDEN_STRIDE];
+
+/* Where the gradient of a visible anchor goes. */
+static size_t gradient_row(const backward_job *job, size_t row)
+{
+    return job->packed ? row : job->tape->visible[row];
+}
 
 static record_layout record_layout_of(const decode_layout *layout)
 {
@@ -81,12 +88,12 @@ static void activations_backward(const backward_job *job, size_t begin, size_t r
         const size_t slot_begin = (begin + r) * offsets;
         if (tape->slot[g] >= slot_begin + offsets)
             continue;
-        const size_t anchor = tape->visible[begin + r];
+        const size_t anchor = tape->visible[begin + r], target = gradient_row(job, begin + r);
         const float *x = job->a->position + anchor * 3, *offset = job->a->offset + anchor * offsets * 3;
         const float *e = extent + r * 6, *scale_log = job->a->scale_log + anchor * 6;
         float *row = d_out + r * job->out_stride;
         float sum[6] = {0}, unwanted[3 * ANCHOR_MAX_OFFSETS] = {0};
-        float *d_offset = job->d_anchors != NULL ? job->d_anchors->offset + anchor * offsets * 3 : unwanted;
+        float *d_offset = job->d_anchors != NULL ? job->d_anchors->offset + target * offsets * 3 : unwanted;
         for (; g < last && tape->slot[g] < slot_begin + offsets; g++) {
             const size_t k = tape->slot[g] - slot_begin;
             const float d_mean[3] = {d->mean_x[g], d->mean_y[g], d->mean_z[g]};
@@ -124,7 +131,7 @@ static void activations_backward(const backward_job *job, size_t begin, size_t r
         }
         if (job->d_anchors == NULL)
             continue;
-        float *d_scale_log = job->d_anchors->scale_log + anchor * 6;
+        float *d_scale_log = job->d_anchors->scale_log + target * 6;
         for (int c = 0; c < 6; c++)
             d_scale_log[c] += decode_cut_gradient(scale_log[c], sum[c]);
     }
@@ -238,7 +245,7 @@ static void layers_backward(const backward_job *job, size_t begin, size_t rows, 
                                       .c = d_feature,
                                       .c_row = ANCHOR_FEATURE_DIM});
     for (size_t r = 0; r < rows; r++) {
-        float *target = job->d_anchors->feature + (size_t)job->tape->visible[begin + r] * ANCHOR_FEATURE_DIM;
+        float *target = job->d_anchors->feature + gradient_row(job, begin + r) * ANCHOR_FEATURE_DIM;
         for (int i = 0; i < ANCHOR_FEATURE_DIM; i++)
             target[i] += d_feature[r * ANCHOR_FEATURE_DIM + (size_t)i];
     }
@@ -342,7 +349,8 @@ gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape
                            const gaussians *d_gaussians, anchors *d_anchors, float *d_params, gbt_error *err)
 {
     backward_job job;
-    if (d_anchors->offset_count != a->offset_count || d_anchors->count != a->count)
+    if (d_anchors->offset_count != a->offset_count ||
+        (d_anchors->count != a->count && d_anchors->count != tape->visible_count))
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "decode adjoint: gradient of %zu anchors with %d offsets (wanted %zu, %d)",
                          d_anchors->count, d_anchors->offset_count, a->count, a->offset_count);
@@ -350,6 +358,7 @@ gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape
     if (tape->kept_count == 0)
         return GBT_OK;
     job.d_anchors = d_anchors;
+    job.packed = d_anchors->count == tape->visible_count;
     job.d_params = d_params;
     job.record = record_layout_of(&job.layout);
     size_t row_count = HIDDEN_STRIDE;

@@ -50,4 +50,5 @@ const command command_compress = {.name = "compress",
                                   .options = options,
                                   .min_operands = 1,
                                   .max_operands = 1,
+                                  .shares_work = true,
                                   .run = run};

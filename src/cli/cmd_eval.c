@@ -44,5 +44,6 @@ const command command_eval = {.name = "eval",
                               .options = options,
                               .min_operands = 1,
                               .max_operands = 1,
+                              .shares_work = true,
                               .run = run,
                               .alias = "metrics"};

@@ -173,4 +173,5 @@ const command command_render = {.name = "render",
                                 .options = options,
                                 .min_operands = 1,
                                 .max_operands = 1,
+                                .shares_work = true,
                                 .run = run};

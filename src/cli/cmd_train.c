@@ -77,4 +77,5 @@ const command command_train = {.name = "train",
                                .usage = "DATA -o RUN",
                                .options = options,
                                .max_operands = 1,
+                               .shares_work = true,
                                .run = run};

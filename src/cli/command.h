@@ -3,6 +3,8 @@
 #ifndef GBT_CLI_COMMAND_H
 #define GBT_CLI_COMMAND_H
 
+#include <stdbool.h>
+
 #include "gbtrace/status.h"
 
 struct option;
@@ -21,9 +23,11 @@ typedef struct command {
                                                     it has none of its own */
     int min_operands, max_operands;              /* how many arguments without a dash */
     int (*run)(const struct operands *given);    /* after the command line was read; returns the exit code */
-    const char *alias;                           /* a second name, or NULL */
-    const command_word *(*words)(void);          /* what the first operand may be, up to a name of NULL; NULL:
-                                                    anything, such as a path */
+    bool shares_work;                     /* all processes that mpirun started run it; else the first one
+                                             alone */
+    const char *alias;                    /* a second name, or NULL */
+    const command_word *(*words)(void);   /* what the first operand may be, up to a name of NULL; NULL:
+                                             anything, such as a path */
     const command_word *(*endings)(void); /* what file names end in, and what that means, up to a name of
                                              NULL; NULL: nothing to tell */
 } command;

@@ -2,11 +2,13 @@
 /* cli/main.c -- find the subcommand and run it. */
 #include <errno.h>
 #include <signal.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "cli/options.h"
 #include "cli/progress.h"
+#include "gbtrace/cluster.h"
 #include "gbtrace/train.h"
 #include "gbtrace/version.h"
 
@@ -54,7 +56,10 @@ static int run(const command *self, int argc, char **argv)
         return code;
     if (options_threads > 0)
         gbt_set_threads(options_threads);
-    return self->run(&given);
+    const bool first = gbt_cluster_rank() == 0;
+    if (!self->shares_work)
+        gbt_cluster_close(0, NULL);
+    return first || self->shares_work ? self->run(&given) : 0;
 }
 
 static int dispatch(int argc, char **argv)
@@ -83,12 +88,15 @@ int main(int argc, char **argv)
     signal(SIGXFSZ, SIG_IGN); /* a file that may not grow is a failed write: one line, and nothing left behind
                                */
     signal(SIGPIPE, SIG_IGN); /* a training goes on when nobody reads its progress any longer */
-    int code = dispatch(argc, argv);
+    gbt_error alone = {0};
+    const gbt_status joined = gbt_cluster_open(&alone);
+    int code = joined == GBT_OK ? dispatch(argc, argv) : command_failed(joined, &alone);
     if ((fflush(stdout) != 0 || ferror(stdout)) && code == 0) { /* a full disk must not look like success */
         gbt_error err = {.status = GBT_ERR_IO};
         snprintf(err.text, sizeof err.text, "standard output: write failed: %s", strerror(errno));
         code = errno == EPIPE ? 128 + SIGPIPE : command_failed(GBT_ERR_IO, &err); /* head has read enough */
     }
     progress_end(code);
+    gbt_cluster_close(code, progress_last_error());
     return code;
 }

@@ -87,11 +87,12 @@ bool progress_for_people(void) { return !as_json && !silent; }
 
 void progress_error(const char *text)
 {
-    if (as_json)
-        snprintf(last_error, sizeof last_error, "%s", text);
-    else
+    snprintf(last_error, sizeof last_error, "%s", text);
+    if (!as_json)
         fprintf(stderr, "error: %s\n", text);
 }
+
+const char *progress_last_error(void) { return last_error[0] != '\0' ? last_error : NULL; }
 
 void progress_end(int exit_code)
 {

@@ -21,6 +21,9 @@ bool progress_for_people(void);
 /** One line of an error. */
 void progress_error(const char *text);
 
+/** The last one; NULL: there was none. */
+const char *progress_last_error(void);
+
 /** The last line with "json": how the program ends. */
 void progress_end(int exit_code);
 

@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "cluster/cluster.h"
 #include "data/json_out.h"
 #include "run/run_sensitivity.h"
 #include "io/model_code.h"
@@ -192,8 +193,8 @@ static gbt_status save_report(const compression *c, const gbt_compress_def *def,
     return status;
 }
 
-gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report,
-                        gbt_error *err)
+static gbt_status compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report,
+                           gbt_error *err)
 {
     GBT_TRY(def_check(def->cookie_, "gbt_compress_def_default", err));
     if (!def->lossless && !(def->quality >= 20 && def->quality <= 90))
@@ -219,4 +220,11 @@ gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char
     loaded_run_close(r);
     mem_free(r);
     return status;
+}
+
+/* One process does it for all. */
+gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report,
+                        gbt_error *err)
+{
+    return cluster_follow(cluster_leads() ? compress(run, def, out, report, err) : GBT_OK, err);
 }

@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "cluster/cluster.h"
 #include "data/json_out.h"
 #include "eval/score_files.h"
 #include "eval/score_run.h"
@@ -84,9 +85,11 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
     gbt_status status = open_run(run, def, r, &own, err);
     if (status == GBT_OK && def->lpips != NULL)
         status = lpips_open(def->lpips, &net, err);
+    status = cluster_agree(status, err);
     if (status == GBT_OK)
         status = score_run(r, run, own, net, &e, err);
-    if (status == GBT_OK) {
+    const bool writes = status == GBT_OK && cluster_leads(), scored = status == GBT_OK;
+    if (writes) {
         json_t *metrics = score_files_json(&e, run);
         if (def->preset != GBT_PRESET_AS_TRAINED)
             json_object_set_new(metrics, "preset", json_string(CHOICE_NAME(GBT_PRESET_NAMES, def->preset)));
@@ -98,6 +101,8 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
             status = json_save(metrics, def->json, err);
         json_decref(metrics);
     }
+    if (scored)
+        status = cluster_follow(status, err);
     if (status == GBT_OK)
         log_scores(&e);
     if (status == GBT_OK && !own && def->json != NULL)

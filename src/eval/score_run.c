@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "cluster/cluster.h"
 
 /* Pictures go into `folder`; NULL: none. */
 static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, const char *folder,
@@ -53,26 +54,67 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
     return status;
 }
 
+/* Views are dealt out to the processes. */
+static gbt_status score_own_views(loaded_run *r, const lpips *net, const char *folder, evaluation *e,
+                                  gbt_error *err)
+{
+    const size_t size = (size_t)gbt_cluster_size(), rank = (size_t)gbt_cluster_rank();
+    size_t index = 0, own = 0;
+    for (size_t i = 0; i < r->scene.view_count; i++) {
+        if (!r->scene.views[i].is_test || index++ % size != rank)
+            continue;
+        view_score *v = &e->views[own++];
+        GBT_TRY(score_view(r, i, net, folder, v, err));
+        log_count("score", index, e->view_count, v->psnr);
+    }
+    return GBT_OK;
+}
+
+/* e->views, of which this process has its own in front: everybody's, in the order of the views. */
+static gbt_status collect_scores(evaluation *e, gbt_error *err)
+{
+    enum { WORDS = sizeof(view_score) / sizeof(uint32_t) };
+    _Static_assert(sizeof(view_score) % sizeof(uint32_t) == 0, "messages are words");
+    const size_t size = (size_t)gbt_cluster_size();
+    if (size == 1)
+        return GBT_OK;
+    size_t counts[CLUSTER_SIZE_MAX], next = 0;
+    for (size_t rank = 0; rank < size; rank++)
+        counts[rank] = (e->view_count + size - 1 - rank) / size * WORDS;
+    view_score *dealt = mem_alloc(e->view_count + 1, sizeof *dealt, "view scores", err);
+    if (dealt == NULL)
+        return GBT_ERR_NO_MEMORY;
+    cluster_gather(e->views, counts, dealt);
+    for (size_t rank = 0; rank < size; rank++)
+        for (size_t i = rank; i < e->view_count; i += size)
+            e->views[i] = dealt[next++];
+    mem_free(dealt);
+    return GBT_OK;
+}
+
+static gbt_status score_views(loaded_run *r, const lpips *net, const char *folder, evaluation *e,
+                              gbt_error *err)
+{
+    e->views = mem_calloc(r->scene.view_count + 1, sizeof *e->views, "view scores", err);
+    if (e->views == NULL)
+        return GBT_ERR_NO_MEMORY;
+    if (folder != NULL)
+        GBT_TRY(file_make_folder(folder, err));
+    for (size_t i = 0; i < r->scene.view_count; i++)
+        e->view_count += r->scene.views[i].is_test;
+    return score_own_views(r, net, folder, e, err);
+}
+
 gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips *net, evaluation *e,
                      gbt_error *err)
 {
     char folder[4096];
     GBT_TRY(file_join(folder, sizeof folder, run, "renders/test", err));
-    if (pictures)
-        GBT_TRY(file_make_folder(folder, err));
+    GBT_TRY(cluster_agree(score_views(r, net, pictures ? folder : NULL, e, err), err));
+    GBT_TRY(collect_scores(e, err));
     size_t scored = 0;
-    e->views = mem_calloc(r->scene.view_count + 1, sizeof *e->views, "view scores", err);
-    if (e->views == NULL)
-        return GBT_ERR_NO_MEMORY;
-    size_t wanted = 0;
-    for (size_t i = 0; i < r->scene.view_count; i++)
-        wanted += r->scene.views[i].is_test;
-    for (size_t i = 0; i < r->scene.view_count; i++) {
-        if (!r->scene.views[i].is_test)
-            continue;
-        view_score *v = &e->views[e->view_count];
-        GBT_TRY(score_view(r, i, net, pictures ? folder : NULL, v, err));
-        log_count("score", ++e->view_count, wanted, v->psnr);
+    for (size_t i = 0; i < e->view_count; i++) {
+        const view_score *v = &e->views[i];
         e->masked = e->masked || v->masked;
         e->gaussians_per_view += (double)v->gaussians;
         if (!isfinite(v->psnr)) /* every pixel is masked */

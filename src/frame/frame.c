@@ -18,6 +18,17 @@ static double lap(double *since)
     return passed;
 }
 
+void frame_times_add(frame_times *sum, const frame_times *more)
+{
+    sum->rays += more->rays;
+    sum->visible += more->visible;
+    sum->decode += more->decode;
+    sum->build += more->build;
+    sum->trace += more->trace;
+    sum->adjoint += more->adjoint;
+    sum->decode_adjoint += more->decode_adjoint;
+}
+
 /* ---- render and back ---- */
 
 static gbt_status fit_picture(image *rgb, int width, int height, gbt_error *err)

@@ -16,6 +16,8 @@ typedef struct frame_times {
     double rays, visible, decode, build, trace, adjoint, decode_adjoint;
 } frame_times;
 
+void frame_times_add(frame_times *sum, const frame_times *more);
+
 /** The rasterizer's settings for what the tracer's say: alphas, T, near, background. The rest is its
     default. */
 raster_settings frame_splat_settings(const trace_settings *settings, raster_form form);
@@ -124,7 +126,7 @@ gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *sh
 gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err);
 
 /** The second part, of anchors: f->d_gaussians, and what the caller has added to it -> d_anchors (rows of
-    f->visible, added) and d_params (added). */
+    f->visible, added; or these rows alone: decode_backward()) and d_params (added). */
 gbt_status frame_backward_anchors(frame *f, const anchors *a, const decoder *d, anchors *d_anchors,
                                   float *d_params, gbt_error *err);
 

@@ -38,6 +38,12 @@ void growth_stats_free(growth_stats *s)
     memset(s, 0, sizeof *s);
 }
 
+/* Where the statistics of a visible anchor are. */
+static size_t stat_row(const growth_stats *s, const frame *f, size_t row)
+{
+    return s->count == f->visible_count ? row : f->visible[row];
+}
+
 /* The importance of an anchor is what pictures would miss without it: the share of them that its Gaussians
    cover. Opacity, which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of
    all anchors. */
@@ -45,15 +51,16 @@ static void gather_importance(growth_stats *s, const frame *f, growth_importance
 {
     const float rays = (float)ray_image_count(&f->rays);
     for (size_t v = 0; v < f->visible_count; v++) {
-        s->visit_count[f->visible[v]] += 1;
+        const size_t row = stat_row(s, f, v);
+        s->visit_count[row] += 1;
         if (importance == GROWTH_BY_OPACITY) {
-            s->importance_accum[f->visible[v]] += f->tape.opacity_sum[v];
-            s->shown_count[f->visible[v]] += 1;
+            s->importance_accum[row] += f->tape.opacity_sum[v];
+            s->shown_count[row] += 1;
         }
     }
     size_t last = SIZE_MAX; /* Gaussians of an anchor follow each other */
     for (size_t i = 0; importance == GROWTH_BY_SHARE && i < f->gaussians.count; i++) {
-        const size_t anchor = f->visible[f->tape.slot[i] / (uint32_t)s->offset_count];
+        const size_t anchor = stat_row(s, f, f->tape.slot[i] / (uint32_t)s->offset_count);
         if (!(f->blend_weight[i] > 0))
             continue;
         s->importance_accum[anchor] += f->blend_weight[i] / rays;
@@ -139,7 +146,7 @@ static void gather_gradients(growth_stats *s, const frame *f, growth_counting co
             continue;
         to_camera(&view, gradient, d);
         const uint32_t slot = f->tape.slot[i];
-        const size_t at = (size_t)f->visible[slot / k_count] * k_count + slot % k_count;
+        const size_t at = stat_row(s, f, slot / k_count) * k_count + slot % k_count;
         s->grad_accum[at] += fminf(screen_gradient(&view, p, d), gradient_max);
         s->grad_count[at] += 1;
     }

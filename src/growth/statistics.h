@@ -56,7 +56,7 @@ typedef enum growth_counting {
 } growth_counting;
 
 /** Add what the last render of anchors and its adjoint (frame_backward_gaussians()) say; one thread. `t_near`
-    of the cone. */
+    of the cone. `s` has a row for each anchor, or for each visible one alone, in their order. */
 void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance,
                          growth_counting counting, float t_near);
 

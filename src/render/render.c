@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "cluster/cluster.h"
 #include "gbtrace/evaluate.h"
 #include "render/camera_file.h"
 #include "render/insert_file.h"
@@ -84,32 +85,44 @@ static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, 
     return render_outputs_write(r, shot, st->outputs, out, name, err);
 }
 
+/* Pictures are dealt out to the processes. */
+static bool is_own(size_t index) { return index % (size_t)gbt_cluster_size() == (size_t)gbt_cluster_rank(); }
+
 static bool is_wanted(const scene_view *view, gbt_split split)
 {
     return split == GBT_SPLIT_ALL || view->is_test == (split == GBT_SPLIT_TEST);
 }
 
-static gbt_status render_views(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
+static gbt_status render_own_views(studio *st, const char *out, const gbt_render_def *def, size_t wanted,
+                                   gbt_error *err)
 {
     loaded_run *r = &st->run;
-    size_t rendered = 0, wanted = 0;
-    for (size_t i = 0; i < r->scene.view_count; i++)
-        wanted += is_wanted(&r->scene.views[i], def->split);
+    size_t index = 0;
     for (size_t i = 0; i < r->scene.view_count; i++) {
         const scene_view *view = &r->scene.views[i];
-        if (!is_wanted(view, def->split))
+        if (!is_wanted(view, def->split) || !is_own(index++))
             continue;
         char name[1024];
         loaded_run_view_name(view, name, sizeof name);
         const gbt_camera camera = photos_camera(&r->photos, i, 0);
         const ray_shot shot = ray_shot_of(&camera);
         GBT_TRY(render_one(st, &shot, out, name, def, err));
-        log_count("render", ++rendered, wanted, (double)NAN);
+        log_count("render", index, wanted, (double)NAN);
     }
-    if (rendered == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no views in this split (of %zu)", r->scene.folder,
-                         r->scene.view_count);
-    log_info("%zu views rendered into %s", rendered, out);
+    return GBT_OK;
+}
+
+static gbt_status render_views(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
+{
+    const scene *s = &st->run.scene;
+    size_t wanted = 0;
+    for (size_t i = 0; i < s->view_count; i++)
+        wanted += is_wanted(&s->views[i], def->split);
+    if (wanted == 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: no views in this split (of %zu)", s->folder,
+                         s->view_count);
+    GBT_TRY(cluster_agree(render_own_views(st, out, def, wanted, err), err));
+    log_info("%zu views rendered into %s", wanted, out);
     return GBT_OK;
 }
 
@@ -129,8 +142,9 @@ static gbt_status render_camera(studio *st, const char *out, const gbt_render_de
     char name[1024];
     camera_name(def->camera, name, sizeof name);
     gbt_status status = camera_file_read(def->camera, st->run.model.origin, &file, err);
-    if (status == GBT_OK)
+    if (status == GBT_OK && cluster_leads())
         status = render_one(st, &file.shot, out, name, def, err);
+    status = cluster_agree(status, err);
     if (status == GBT_OK)
         log_info("%s rendered into %s", name, out);
     camera_file_free(&file);
@@ -147,7 +161,7 @@ static void say_progress(size_t done, size_t count, double start, double *said)
     *said = now;
 }
 
-static gbt_status render_frames(studio *st, const camera_path *path, video *film, const char *out,
+static gbt_status render_frames(studio *st, const camera_path *path, const char *out,
                                 const gbt_render_def *def, gbt_error *err)
 {
     const double start = clock_wall();
@@ -155,30 +169,79 @@ static gbt_status render_frames(studio *st, const camera_path *path, video *film
     for (size_t i = 0; i < path->count; i++) {
         char name[32];
         snprintf(name, sizeof name, "frame_%05zu", i + 1);
-        if (film == NULL) {
+        if (is_own(i))
             GBT_TRY(render_one(st, &path->shots[i], out, name, def, err));
-        } else {
-            GBT_TRY(draw(st, &path->shots[i], def, err));
-            GBT_TRY(video_add(film, &st->run.frame.rgb, err));
-        }
         say_progress(i + 1, path->count, start, &said);
     }
     return GBT_OK;
 }
 
+/* The frames that all processes have drawn last go to the first one. `all`: room for `count` of them. */
+static void collect_frames(const image *own, size_t count, image *all)
+{
+    size_t send[CLUSTER_SIZE_MAX] = {0}, receive[CLUSTER_SIZE_MAX] = {0};
+    const size_t values = 3 * (size_t)own->width * (size_t)own->height, rank = (size_t)gbt_cluster_rank();
+    send[0] = rank < count ? values : 0;
+    for (size_t r = 0; rank == 0 && r < count; r++)
+        receive[r] = values;
+    cluster_exchange(own->pixels, send, all->pixels, receive);
+}
+
+/* A film is written in its order by the first process; in each round every process draws a frame. `all` is as
+   high as a round. */
+static gbt_status film_rounds(studio *st, const camera_path *path, video *film, image *all,
+                              const gbt_render_def *def, gbt_error *err)
+{
+    const size_t size = (size_t)gbt_cluster_size(), rank = (size_t)gbt_cluster_rank();
+    const double start = clock_wall();
+    double said = start;
+    for (size_t first = 0; first < path->count; first += size) {
+        const size_t count = path->count - first < size ? path->count - first : size;
+        gbt_status status = rank < count ? draw(st, &path->shots[first + rank], def, err) : GBT_OK;
+        GBT_TRY(cluster_agree(status, err));
+        const image *own = &st->run.frame.rgb;
+        collect_frames(own, count, all);
+        for (size_t i = 0; film != NULL && i < count && status == GBT_OK; i++) {
+            const int height = path->shots[0].camera.height;
+            const image picture = {.width = own->width,
+                                   .height = height,
+                                   .channels = 3,
+                                   .pixels = all->pixels + i * 3 * (size_t)own->width * (size_t)height};
+            status = video_add(film, &picture, err);
+        }
+        GBT_TRY(cluster_follow(status, err));
+        say_progress(first + count, path->count, start, &said);
+    }
+    return GBT_OK;
+}
+
+static gbt_status make_film(studio *st, const camera_path *path, const char *out, const gbt_render_def *def,
+                            gbt_error *err)
+{
+    const gbt_camera *camera = &path->shots[0].camera;
+    video *film = NULL;
+    image all = {0};
+    gbt_status status = GBT_OK;
+    if (cluster_leads()) {
+        status = video_open(out, camera->width, camera->height, path->fps, &film, err);
+        if (status == GBT_OK)
+            status = image_alloc(&all, camera->width, camera->height * gbt_cluster_size(), 3, err);
+    }
+    status = cluster_follow(status, err);
+    if (status == GBT_OK)
+        status = film_rounds(st, path, film, &all, def, err);
+    image_free(&all);
+    const gbt_status closed = video_close(film, status == GBT_OK, err);
+    return status == GBT_OK ? cluster_follow(closed, err) : status;
+}
+
 static gbt_status render_film(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
 {
     camera_path path;
-    video *film = NULL;
-    gbt_status status = render_path_make(&st->run, def, &path, err);
-    if (status == GBT_OK && video_named(out))
-        status =
-            video_open(out, path.shots[0].camera.width, path.shots[0].camera.height, path.fps, &film, err);
+    gbt_status status = cluster_agree(render_path_make(&st->run, def, &path, err), err);
     if (status == GBT_OK)
-        status = render_frames(st, &path, film, out, def, err);
-    const gbt_status closed = video_close(film, status == GBT_OK, err);
-    if (status == GBT_OK)
-        status = closed;
+        status = video_named(out) ? make_film(st, &path, out, def, err)
+                                  : cluster_agree(render_frames(st, &path, out, def, err), err);
     if (status == GBT_OK)
         log_info("%zu frames rendered into %s, %.2f s at %g frames per second", path.count, out,
                  (double)path.count / path.fps, path.fps);
@@ -274,6 +337,7 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
         status = choose_renderer(st, def, err);
     if (status == GBT_OK && def->insert != NULL)
         status = insert_file_read(def->insert, st->run.model.origin, &st->insert, err);
+    status = cluster_agree(status, err);
     if (status == GBT_OK)
         status = def->path != NULL     ? render_film(st, out, def, err)
                  : def->camera != NULL ? render_camera(st, out, def, err)

@@ -9,13 +9,17 @@
 
 void config_text(const gbt_train_def *d, const char *data, char *out, size_t size)
 {
+    const gbt_train_def usual = gbt_train_def_default();
     size_t used = (size_t)snprintf(out, size, "data = %s\n", data);
     for (size_t i = 0; i < gbt_train_setting_count(); i++) {
         const gbt_train_setting *s = gbt_train_setting_at(i);
-        char value[SETTING_TEXT_SIZE];
+        char value[SETTING_TEXT_SIZE], by_default[SETTING_TEXT_SIZE];
         if (!s->saved || used >= size)
             continue;
         setting_text(s, d, value, sizeof value);
+        setting_text(s, &usual, by_default, sizeof by_default);
+        if (s->if_changed && strcmp(value, by_default) == 0)
+            continue;
         used += (size_t)snprintf(out + used, size - used, "%s = %s\n", s->name, value);
     }
 }

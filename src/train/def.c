@@ -21,6 +21,8 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err)
     GBT_TRY(def_check(d->cookie_, "gbt_train_def_default", err));
     for (size_t i = 0; i < gbt_train_setting_count(); i++)
         GBT_TRY(setting_check(gbt_train_setting_at(i), d, err));
+    if ((d->views & (d->views - 1)) != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "views: %d (wanted a power of two)", d->views);
     if (d->resume && d->overwrite)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "overwrite: would lose the run that resume goes on with (wanted one of them)");

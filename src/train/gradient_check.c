@@ -29,9 +29,15 @@ static size_t first_bad(const float *values, size_t count)
 
 typedef struct row_job {
     const anchors *gradient;
-    const uint32_t *rows;
+    const uint32_t *anchor; /* of each row that is looked at */
+    bool packed;            /* the gradient has these rows alone */
     atomic_bool bad;
 } row_job;
+
+static const float *row_of(const row_job *job, size_t i, int field, size_t width)
+{
+    return job->gradient->field[field] + (job->packed ? i : job->anchor[i]) * width;
+}
 
 static void check_rows(size_t block, size_t begin, size_t end, void *context)
 {
@@ -41,7 +47,7 @@ static void check_rows(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end; i++)
         for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
             const size_t width = anchors_width(job->gradient, f);
-            bad |= any_bad(job->gradient->field[f] + job->rows[i] * width, width);
+            bad |= any_bad(row_of(job, i, f, width), width);
         }
     if (bad)
         atomic_store(&job->bad, true);
@@ -52,28 +58,31 @@ static void name_row(const row_job *job, size_t count, char *where, size_t size)
     for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
         for (size_t i = 0; i < count; i++) {
             const size_t width = anchors_width(job->gradient, f),
-                         at = first_bad(job->gradient->field[f] + job->rows[i] * width, width);
+                         at = first_bad(row_of(job, i, f, width), width);
             if (at < width) {
-                snprintf(where, size, "%s of anchor %u, value %zu", anchor_fields[f].label, job->rows[i], at);
+                snprintf(where, size, "%s of anchor %u, value %zu", anchor_fields[f].label, job->anchor[i],
+                         at);
                 return;
             }
         }
 }
 
-bool gradient_is_bad(const trainer *t, const double exposure[AFFINE_NUMBERS], char *where, size_t size)
+bool gradient_is_bad(const learnables *g, const frame *f, const decoder *d,
+                     const double exposure[AFFINE_NUMBERS], char *where, size_t size)
 {
-    row_job job = {.gradient = &t->gradient.anchors, .rows = t->frame.visible};
+    row_job job = {
+        .gradient = &g->anchors, .anchor = f->visible, .packed = g->anchors.count == f->visible_count};
     atomic_init(&job.bad, false);
-    parallel_blocks(t->frame.visible_count, ROW_BLOCK, check_rows, &job);
+    parallel_blocks(f->visible_count, ROW_BLOCK, check_rows, &job);
     if (atomic_load(&job.bad)) {
-        name_row(&job, t->frame.visible_count, where, size);
+        name_row(&job, f->visible_count, where, size);
         return true;
     }
     decoder_part parts[DECODER_PARTS];
-    decoder_parts(&t->decoder, parts);
+    decoder_parts(d, parts);
     for (int i = 0; i < DECODER_PARTS; i++) {
         const size_t count = parts[i].end - parts[i].begin,
-                     at = first_bad(t->gradient.networks + parts[i].begin, count);
+                     at = first_bad(g->networks + parts[i].begin, count);
         if (at < count) {
             snprintf(where, size, "%s network, value %zu", parts[i].label, at);
             return true;

@@ -3,16 +3,19 @@
 #ifndef GBT_TRAIN_GRADIENT_CHECK_H
 #define GBT_TRAIN_GRADIENT_CHECK_H
 
-#include "train/trainer.h"
+#include "frame/frame.h"
+#include "image/affine.h"
+#include "train/learnables.h"
 
 /** Beyond this a gradient is as bad as one that is not a number: Adam's moments square it, and the square
     must stay finite. */
 #define GRADIENT_LIMIT 1e18f
 
 /**
- * Look at every gradient of the last frame_backward_anchors(): rows of the visible anchors, networks, and the
- * photo's exposure.
+ * Look at every gradient of the last frame_backward_anchors() of `f`: rows of the visible anchors, networks,
+ * and the photo's exposure.
  *
+ * @param g        [in]  a row for each anchor, or for each visible one, as frame_backward_anchors() has it
  * @param exposure [in]  [12] gradient of the photo's colour matrix, NULL without
  * @param where    [out] "feature of anchor 17, value 3", "shape network, value 200": the first bad one, in
  *                       the order feature, offset, scale, opacity, shape and colour network, exposure;
@@ -20,6 +23,7 @@
  * @return true when one of them is NaN or larger than GRADIENT_LIMIT
  * Threads: parallel inside. Cost: one read of these rows.
  */
-bool gradient_is_bad(const trainer *t, const double exposure[AFFINE_NUMBERS], char *where, size_t size);
+bool gradient_is_bad(const learnables *g, const frame *f, const decoder *d,
+                     const double exposure[AFFINE_NUMBERS], char *where, size_t size);
 
 #endif

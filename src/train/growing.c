@@ -20,7 +20,7 @@ static const double last_rounds_from = 0.9; /* of growing */
 enum {
     ROUNDS_PER_RUN = 100,
     ROUND_INTERVAL = 100 /* steps, where rounds do not go by progress */,
-    INTERVAL_MIN = 20 /* a judgement of fewer views is chance */,
+    INTERVAL_MIN = 20 /* views: a judgement of fewer views is chance */,
     INTERVAL_MAX = 100 /* and more than these tell nothing new */
 };
 enum { VIEWS_MIN = 2 };
@@ -129,15 +129,16 @@ static growth_def def_of(const trainer *t)
         def.may_stand = two_views_see;
         def.may_stand_context = t;
     }
+    const float views = (float)t->def.views;
     if (!t->rules.rounds_by_progress)
-        def.interval = ROUND_INTERVAL;
+        def.interval = views * ROUND_INTERVAL;
     else
-        def.interval =
-            fminf(fmaxf((float)(t->step + 1 - t->round_step), (float)INTERVAL_MIN), (float)INTERVAL_MAX);
+        def.interval = fminf(fmaxf(views * (float)(t->step + 1 - t->round_step), (float)INTERVAL_MIN),
+                             (float)INTERVAL_MAX);
     if (!t->rules.thresholds_by_length)
         return def;
-    const float factor =
-        (float)t->def.threshold_factor * schedule_threshold_factor(pace_expected(&t->pace, t->step));
+    const float factor = (float)t->def.threshold_factor *
+                         schedule_threshold_factor(t->def.views * pace_expected(&t->pace, t->step));
     const bool last = t->def.final_prune_factor > 1 &&
                       pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;
     def.grad_threshold *= factor;

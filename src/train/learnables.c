@@ -53,9 +53,10 @@ static double rate_at(const rate_rule *r, double progress, bool own, double exte
     return factor * decay(r->first, last, progress) * scale;
 }
 
-learning_rates learning_rates_at(double progress, bool own, double extent, double factor, double end)
+learning_rates learning_rates_at(double progress, bool own, double extent, double factor, double end,
+                                 int views)
 {
-    learning_rates rates = {0};
+    learning_rates rates = {.views = views};
     if (own && progress > SCHEDULE_COOL_FROM)
         factor *= cool_end + (1 - cool_end) * fmax(1 - progress, 0) / (1 - SCHEDULE_COOL_FROM);
     for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
@@ -119,7 +120,8 @@ static void learn_rows(const anchor_job *job, size_t begin, size_t end)
         float *values = m->anchors->field[f] + at;
         adam_step(values, m->gradient->anchors.field[f] + at, m->moment1->anchors.field[f] + at,
                   m->moment2->anchors.field[f] + at, count,
-                  adam_rates_at(job->rates->anchor[f], rule->ages_with_run ? job->age : age));
+                  adam_rates_of_views(job->rates->anchor[f], rule->ages_with_run ? job->age : age,
+                                      job->rates->views));
         for (size_t i = 0; rule->is_log_scale && i < count; i++)
             values[i] = fminf(fmaxf(values[i], m->scale_log_min), m->scale_log_max);
     }
@@ -150,6 +152,7 @@ void learn_networks(const learning_model *m, const learning_rates *rates, uint64
     for (int i = 0; i < DECODER_PARTS; i++) {
         const size_t at = parts[i].begin;
         adam_step(m->decoder->params + at, m->gradient->networks + at, m->moment1->networks + at,
-                  m->moment2->networks + at, parts[i].end - at, adam_rates_at(rates->network[i], age));
+                  m->moment2->networks + at, parts[i].end - at,
+                  adam_rates_of_views(rates->network[i], age, rates->views));
     }
 }

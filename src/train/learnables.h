@@ -28,6 +28,7 @@ gbt_status learnables_follow(learnables *l, const growth_result *result, gbt_err
 typedef struct learning_rates {
     double anchor[ANCHOR_FIELDS]; /* of the fields that learn */
     double network[DECODER_PARTS];
+    int views; /* of a step: adam_rates_of_views() */
 } learning_rates;
 
 /**
@@ -38,8 +39,10 @@ typedef struct learning_rates {
  * @param extent [in] of the cameras; the reference's rate of offsets is proportional to it
  * @param factor [in] of all rates
  * @param end    [in] own: schedule_rate_end(), to which rates without an end of their own decay
+ * @param views  [in] of a step
  */
-learning_rates learning_rates_at(double progress, bool own, double extent, double factor, double end);
+learning_rates learning_rates_at(double progress, bool own, double extent, double factor, double end,
+                                 int views);
 
 /** A model in training: the values and what belongs to each. All borrowed. */
 typedef struct learning_model {

@@ -11,6 +11,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/stop_signal.h"
+#include "cluster/cluster.h"
 #include "io/model_file.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
@@ -31,7 +32,7 @@ typedef struct run_paths {
         exposure[PATH_SIZE], checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
 } run_paths;
 
-static gbt_status open_folder(const char *run, const gbt_train_def *def, run_paths *p, gbt_error *err)
+static gbt_status name_paths(const char *run, run_paths *p, gbt_error *err)
 {
     char checkpoints[PATH_SIZE];
     GBT_TRY(file_join(checkpoints, sizeof checkpoints, run, "checkpoints", err));
@@ -42,8 +43,14 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, run_pat
     GBT_TRY(file_join(p->json, sizeof p->json, run, "train.json", err));
     GBT_TRY(file_join(p->exposure, sizeof p->exposure, run, "exposure.json", err));
     GBT_TRY(file_join(p->checkpoint, sizeof p->checkpoint, checkpoints, "last.gbt", err));
-    GBT_TRY(
-        file_join(p->checkpoint_previous, sizeof p->checkpoint_previous, checkpoints, "last.gbt.prev", err));
+    return file_join(p->checkpoint_previous, sizeof p->checkpoint_previous, checkpoints, "last.gbt.prev",
+                     err);
+}
+
+static gbt_status open_folder(const char *run, const gbt_train_def *def, const run_paths *p, gbt_error *err)
+{
+    char checkpoints[PATH_SIZE];
+    GBT_TRY(file_join(checkpoints, sizeof checkpoints, run, "checkpoints", err));
     const bool has_checkpoint = file_exists(p->checkpoint) || file_exists(p->checkpoint_previous);
     if (def->resume && !has_checkpoint)
         return base_fail(err, GBT_ERR_IO, "%.1000s: holds no run to go on with (there is no %.1000s)", run,
@@ -117,16 +124,18 @@ static gbt_status save_exposures(const trainer *t, const char *path, gbt_error *
 
 /* ---- the time budget ---- */
 
-/* How long a step takes: so much by itself and so much per pixel, followed as the run changes. */
+/* How long a step takes: so much by itself and so much per pixel of its first view, followed as the run
+   changes. */
 typedef struct speed {
     double fixed_seconds, pixel_seconds;
     bool known;
 } speed;
 
-static void speed_follow(speed *s, const step_report *r, const frame_times *f)
+static void speed_follow(speed *s, const step_report *r)
 {
+    const frame_times *f = &r->times;
     const double pixels = (double)r->width * (double)r->height;
-    const double per_pixel = (f->rays + f->trace + f->adjoint + r->loss_seconds) / pixels;
+    const double per_pixel = (f->rays + f->trace + f->adjoint + r->loss_seconds) / r->beside / pixels;
     const double fixed = fmax(0, r->total_seconds - per_pixel * pixels - r->photo_seconds);
     const double keep = s->known ? 0.95 : 0;
     s->fixed_seconds = keep * s->fixed_seconds + (1 - keep) * fixed;
@@ -171,75 +180,122 @@ static gbt_status evaluate_in_passing(trainer *t, run_log *log, gbt_error *err)
     return GBT_OK;
 }
 
-static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gbt_error *err)
+/* What the first process does between steps. */
+typedef struct run_clock {
+    speed measured;
+    double begin, offset, paused, last_save; /* seconds; offset: of the runs before */
+    int next_eval;
+} run_clock;
+
+static run_clock clock_start(const trainer *t)
+{
+    run_clock c = {.begin = clock_wall(), .offset = t->seconds, .last_save = t->seconds};
+    while (c.next_eval < t->def.eval_at_count && t->def.eval_at_seconds[c.next_eval] <= t->seconds)
+        c.next_eval++;
+    return c;
+}
+
+/* Log, save, stop, evaluate: whatever is due after a step. */
+static gbt_status follow_step(trainer *t, const step_report *report, run_clock *c, const run_paths *paths,
+                              run_log *log, gbt_error *err)
 {
     const gbt_train_def *def = &t->def;
-    speed measured = {0};
-    double last_save = 0, clock_offset = t->seconds;
-    const double begin = clock_wall();
-    double paused = 0;
-    int next_eval = 0;
-    while (next_eval < def->eval_at_count && def->eval_at_seconds[next_eval] <= t->seconds)
-        next_eval++;
-    last_save = t->seconds;
+    if (!report->skipped)
+        speed_follow(&c->measured, report);
+    t->seconds = c->offset + clock_wall() - c->begin - c->paused;
+    run_log_step(log, t, report);
+
+    const bool stop = stop_signal_seen() || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
+    const bool due = def->save_every_seconds > 0 && t->seconds - c->last_save >= def->save_every_seconds;
+    const bool evaluate =
+        c->next_eval < def->eval_at_count && t->seconds >= def->eval_at_seconds[c->next_eval];
+    if (stop || due || (def->save_at_step > 0 && t->step == def->save_at_step)) {
+        GBT_TRY(save_all(t, paths, err));
+        c->last_save = t->seconds;
+        if (stop)
+            return base_fail(err, GBT_ERR_INTERRUPTED,
+                             "stopped after step %llu; saved in %s (resume goes on)",
+                             (unsigned long long)t->step, paths->checkpoint);
+    }
+    if (evaluate) {
+        const double before = clock_wall();
+        GBT_TRY(evaluate_in_passing(t, log, err));
+        c->paused += clock_wall() - before;
+        c->next_eval++;
+    }
+    return GBT_OK;
+}
+
+static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gbt_error *err)
+{
+    run_clock c = clock_start(t);
     for (;;) {
         if (pace_segment(&t->pace, t->step) >= t->pace.known) {
             if (t->pace.known >= PACE_SEGMENTS)
                 return GBT_OK;
-            pace_extend(t, &measured);
+            if (cluster_leads())
+                pace_extend(t, &c.measured);
+            cluster_broadcast(&t->pace, sizeof t->pace);
             continue;
         }
         step_report report;
         GBT_TRY(trainer_step(t, &report, err));
-        if (!report.skipped)
-            speed_follow(&measured, &report, &t->frame.times);
-        t->seconds = clock_offset + clock_wall() - begin - paused;
-        run_log_step(log, t, &report);
-
-        const bool stop = stop_signal_seen() || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
-        const bool due = def->save_every_seconds > 0 && t->seconds - last_save >= def->save_every_seconds;
-        const bool evaluate = next_eval < def->eval_at_count && t->seconds >= def->eval_at_seconds[next_eval];
-        if (stop || due || (def->save_at_step > 0 && t->step == def->save_at_step)) {
-            GBT_TRY(save_all(t, paths, err));
-            last_save = t->seconds;
-            if (stop)
-                return base_fail(err, GBT_ERR_INTERRUPTED,
-                                 "stopped after step %llu; saved in %s (resume goes on)",
-                                 (unsigned long long)t->step, paths->checkpoint);
-        }
-        if (evaluate) {
-            const double before = clock_wall();
-            GBT_TRY(evaluate_in_passing(t, log, err));
-            paused += clock_wall() - before;
-            next_eval++;
-        }
+        const gbt_status status = cluster_leads() ? follow_step(t, &report, &c, paths, log, err) : GBT_OK;
+        GBT_TRY(cluster_follow(status, err));
     }
 }
 
-static gbt_status run_in_folder(trainer *t, const char *data, const char *run, const run_paths *paths,
-                                const gbt_train_def *def, config_strings *strings, gbt_error *err)
+static gbt_status open_trainer(trainer *t, const char *data, const char *run, const run_paths *paths,
+                               const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
     const double begin = clock_wall();
     if (def->resume)
         GBT_TRY(resume_open(t, data, run, paths->checkpoint, paths->checkpoint_previous, def, strings, err));
     else
         GBT_TRY(trainer_open(t, data, def, err));
-    t->frame.scene.tape_bytes_max = def->hit_bytes_max > 0 ? def->hit_bytes_max : 1; /* there 0 is no limit */
+    for (size_t i = 0; i < t->view_count; i++) /* there 0 is no limit */
+        t->views[i].frame.scene.tape_bytes_max =
+            def->hit_bytes_max >= t->view_count ? def->hit_bytes_max / t->view_count : 1;
     if (t->step == 0)
         t->seconds = clock_wall() - begin; /* loading counts */
+    return GBT_OK;
+}
+
+static gbt_status write_settings(const trainer *t, const char *run, const run_paths *paths, gbt_error *err)
+{
     char config[CONFIG_TEXT_SIZE];
     config_text(&t->def, t->scene.folder, config, sizeof config);
     GBT_TRY(file_write_atomic(paths->config, config, strlen(config), err));
-    GBT_TRY(run_data_save(run, t->scene.folder, err));
+    return run_data_save(run, t->scene.folder, err);
+}
 
-    run_log log;
-    GBT_TRY(run_log_open(&log, t, paths->log, paths->events, err));
-    gbt_status status = run_steps(t, paths, &log, err);
+static gbt_status finish(const trainer *t, const run_paths *paths, run_log *log, gbt_error *err)
+{
+    GBT_TRY(save_all(t, paths, err));
+    return log->all.steps > 0 || !run_log_is_of_step(paths->json, t->step)
+               ? run_log_summary(log, t, paths->json, err)
+               : GBT_OK;
+}
+
+/* Files and words are the first process's. */
+static gbt_status run_in_folder(trainer *t, const char *data, const char *run, const run_paths *paths,
+                                const gbt_train_def *def, config_strings *strings, gbt_error *err)
+{
+    GBT_TRY(cluster_agree(open_trainer(t, data, run, paths, def, strings, err), err));
+    run_log log = {0};
+    gbt_status status = GBT_OK;
+    if (cluster_leads()) {
+        status = write_settings(t, run, paths, err);
+        if (status == GBT_OK)
+            status = run_log_open(&log, t, paths->log, paths->events, err);
+    }
+    status = cluster_follow(status, err);
     if (status == GBT_OK)
-        status = save_all(t, paths, err);
-    if (status == GBT_OK && (log.all.steps > 0 || !run_log_is_of_step(paths->json, t->step)))
-        status = run_log_summary(&log, t, paths->json, err);
-    run_log_close(&log);
+        status = run_steps(t, paths, &log, err);
+    if (status == GBT_OK)
+        status = cluster_follow(cluster_leads() ? finish(t, paths, &log, err) : GBT_OK, err);
+    if (cluster_leads())
+        run_log_close(&log);
     return status;
 }
 
@@ -248,11 +304,19 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
                                   config_strings *strings, gbt_error *err)
 {
     run_paths paths;
-    int lock;
-    GBT_TRY(open_folder(run, def, &paths, err));
-    GBT_TRY(file_lock_folder(run, &lock, err));
-    const gbt_status status = run_in_folder(t, data, run, &paths, def, strings, err);
-    file_unlock_folder(lock);
+    int lock = 0;
+    gbt_status status = name_paths(run, &paths, err);
+    if (status == GBT_OK && cluster_leads())
+        status = open_folder(run, def, &paths, err);
+    const bool opened = status == GBT_OK && cluster_leads();
+    if (opened)
+        status = file_lock_folder(run, &lock, err);
+    const bool locked = opened && status == GBT_OK;
+    status = cluster_follow(status, err);
+    if (status == GBT_OK)
+        status = run_in_folder(t, data, run, &paths, def, strings, err);
+    if (locked)
+        file_unlock_folder(lock);
     return status;
 }
 

@@ -14,6 +14,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "bvh/device.h"
+#include "gbtrace/cluster.h"
 
 static const double row_every_seconds = 1;
 
@@ -136,9 +137,9 @@ gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, co
     return GBT_OK;
 }
 
-static void add_step(run_sums *s, const trainer *t, const step_report *r)
+static void add_step(run_sums *s, const step_report *r)
 {
-    const frame *f = &t->frame;
+    const frame_times *f = &r->times;
     s->steps++;
     s->loss += r->loss;
     s->l1 += r->l1;
@@ -146,21 +147,24 @@ static void add_step(run_sums *s, const trainer *t, const step_report *r)
     s->psnr += r->psnr;
     s->gaussians += (double)r->gaussians;
     s->visible += (double)r->visible;
-    s->rays += (double)f->counters.rays;
-    s->hits += (double)f->counters.hits;
-    s->blended += (double)f->counters.blended;
+    s->rays += (double)r->rays;
+    s->hits += (double)r->hits;
+    s->blended += (double)r->blended;
     s->seconds += r->total_seconds;
     s->photo += r->photo_seconds;
     s->loss_seconds += r->loss_seconds;
     s->optimizer += r->optimizer_seconds;
     s->adjust += r->adjust_seconds;
-    s->rays_seconds += f->times.rays;
-    s->visible_seconds += f->times.visible;
-    s->decode += f->times.decode;
-    s->build += f->times.build;
-    s->trace += f->times.trace;
-    s->adjoint += f->times.adjoint;
-    s->decode_adjoint += f->times.decode_adjoint;
+    s->wait += r->wait_seconds;
+    s->exchange += r->exchange_seconds;
+    s->exchange_bytes += (double)r->exchange_bytes;
+    s->rays_seconds += f->rays;
+    s->visible_seconds += f->visible;
+    s->decode += f->decode;
+    s->build += f->build;
+    s->trace += f->trace;
+    s->adjoint += f->adjoint;
+    s->decode_adjoint += f->decode_adjoint;
 }
 
 static void write_row(run_log *log, const trainer *t, int width, int height, double test_psnr)
@@ -219,8 +223,8 @@ static void tell_progress(const run_log *log, const trainer *t)
 
 void run_log_step(run_log *log, const trainer *t, const step_report *report)
 {
-    add_step(&log->row, t, report);
-    add_step(&log->all, t, report);
+    add_step(&log->row, report);
+    add_step(&log->all, report);
     log->psnr_smooth = log->all.steps == 1 ? report->psnr : 0.98 * log->psnr_smooth + 0.02 * report->psnr;
     log->last = *report;
     if (log_progress_due())
@@ -236,7 +240,8 @@ void run_log_evaluation(run_log *log, const trainer *t, double psnr)
         log->evaluated_step[log->evaluated_count] = t->step;
         log->evaluated_psnr[log->evaluated_count++] = psnr;
     }
-    write_row(log, t, t->frame.rgb.width, t->frame.rgb.height, psnr);
+    const image *drawn = &t->views[0].frame.rgb;
+    write_row(log, t, drawn->width, drawn->height, psnr);
     log_info("held-out PSNR after %.1f s (step %llu): %.3f dB", t->seconds, (unsigned long long)t->step,
              psnr);
 }
@@ -274,6 +279,7 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     json_object_set_new(root, "anchors_initial", json_integer((json_int_t)t->anchors_initial));
     json_object_set_new(root, "anchors_final", json_integer((json_int_t)t->anchors.count));
     json_object_set_new(root, "iterations", json_integer((json_int_t)t->step));
+    json_object_set_new(root, "views", json_integer(t->def.views));
     json_object_set_new(root, "skipped_steps", json_integer((json_int_t)t->skipped_steps));
     json_object_set_new(root, "opacity_raises", json_integer((json_int_t)t->opacity_raises));
     json_object_set_new(root, "exposure", json_boolean(t->exposures.count > 0));
@@ -283,6 +289,11 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     json_object_set_new(root, "blended_per_ray", json_real(s->blended / fmax(s->rays, 1)));
     json_object_set_new(root, "gaussians_per_view", json_real(s->gaussians / n));
     json_object_set_new(root, "stage_ms_per_step", stages);
+    if (gbt_cluster_size() > 1)
+        json_object_set_new(root, "communication",
+                            json_pack("{s:i,s:f,s:f,s:f}", "processes", gbt_cluster_size(), "bytes_per_step",
+                                      s->exchange_bytes / n, "ms_per_step", s->exchange * ms,
+                                      "waiting_ms_per_step", s->wait * ms));
     json_object_set_new(root, "pace", parts);
     json_object_set_new(root, "held_out", evals);
     json_object_set_new(root, "downscale", json_real(t->def.downscale));

@@ -13,7 +13,7 @@ typedef struct run_sums {
     uint64_t steps;
     double loss, l1, ssim, psnr, gaussians, visible, rays, hits, blended;
     double seconds, photo, rays_seconds, visible_seconds, decode, build, trace, loss_seconds, adjoint,
-        decode_adjoint, optimizer, adjust;
+        decode_adjoint, optimizer, adjust, wait, exchange, exchange_bytes;
 } run_sums;
 
 typedef struct run_log {

@@ -27,6 +27,11 @@ static const gbt_train_setting settings[] = {
     {NAMED("iterations", iterations), RANGE(UINT64, 0, 1e15, "N"), .number = 0, .saved = true,
      .help = "number of iterations instead of a time budget; 0: the budget decides",
      .aliases = "max-steps num-iters"},
+    {NAMED("views", views), RANGE(INT, 1, 64, "V"), .number = 1, .saved = true, .rare = true,
+     .help =
+         "photos that a step looks at, a power of two; learning rates are multiplied by the square root of "
+         "it (docs/cluster.md)",
+     .aliases = "batch-size"},
     {NAMED("init", init), CHOICE(GBT_INIT_NAMES), .number = GBT_INIT_GB, .saved = true,
      .help =
          "initial anchors: the paper's granular balls, adaptive granular balls, voxels, or random points"},

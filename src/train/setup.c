@@ -13,6 +13,7 @@
 #include "base/vec.h"
 #include "bvh/points.h"
 #include "data/photo_check.h"
+#include "gbtrace/cluster.h"
 #include "train/def.h"
 #include "train/light.h"
 #include "train/seed_points.h"
@@ -213,6 +214,20 @@ static gbt_status make_state(trainer *t, gbt_error *err)
     return growth_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
 }
 
+static gbt_status make_views(trainer *t, gbt_error *err)
+{
+    t->view_count = (size_t)t->def.views / (size_t)gbt_cluster_size();
+    t->first_view = t->view_count * (size_t)gbt_cluster_rank();
+    t->views = mem_calloc(t->view_count, sizeof *t->views, "views", err);
+    if (t->views == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < t->view_count; i++) {
+        t->views[i].frame.draw = train_drawing_of(&t->def);
+        t->views[i].frame.draw.makes_faint = t->rules.makes_faint;
+    }
+    return GBT_OK;
+}
+
 /* What photos are divided by, where that was left open. */
 static void choose_downscale(trainer *t)
 {
@@ -308,12 +323,17 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->def = *def;
     train_def_settle(&t->def);
     t->rules = train_rules_of(&t->def);
+    if (t->def.views % gbt_cluster_size() != 0)
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "views: %d a step for %d processes (wanted as many for each: 1, 2, 4, ... processes, at "
+            "most one for each view)",
+            t->def.views, gbt_cluster_size());
     GBT_TRY(load_data(t, data, err));
     GBT_TRY(make_anchors(t, err));
     GBT_TRY(make_decoder(t, err));
     t->renderer = t->def.renderer;
-    t->frame.draw = train_drawing_of(&t->def);
-    t->frame.draw.makes_faint = t->rules.makes_faint;
+    GBT_TRY(make_views(t, err));
     GBT_TRY(make_state(t, err));
     if (!scene_background(&t->scene, t->settings.background) && t->rules.background_from_points &&
         t->scene.points.has_color)

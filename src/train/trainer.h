@@ -7,26 +7,30 @@
 #include "anchor/init.h"
 #include "data/scene.h"
 #include "gbtrace/train.h"
-#include "image/metrics.h"
-#include "train/exposure.h"
 #include "frame/frame.h"
 #include "growth/growth.h"
+#include "train/exposure.h"
 #include "train/learnables.h"
 #include "train/photos.h"
 #include "train/rules.h"
 #include "train/schedule.h"
+#include "train/step_view.h"
 
 /** What the last step did. */
 typedef struct step_report {
-    double loss, l1, ssim, psnr;
-    int width, height, level, parts;
+    double loss, l1, ssim, psnr;     /* means over its views, as gaussians and visible */
+    int width, height, level, parts; /* of the first view */
     size_t gaussians, visible;
-    double photo_seconds, loss_seconds, optimizer_seconds, adjust_seconds,
-        total_seconds; /* frame times are in trainer.frame */
-    bool skipped;      /* the loss or a gradient was not finite: nothing has learned */
+    uint64_t rays, hits, blended; /* of all views */
+    frame_times times;            /* sums over its views, as photo_seconds and loss_seconds */
+    double beside;                /* how many views ran at once, in the mean */
+    double photo_seconds, loss_seconds, optimizer_seconds, adjust_seconds, total_seconds;
+    double wait_seconds, exchange_seconds; /* until all processes had their views; in sending rows */
+    uint64_t exchange_bytes;
+    bool skipped; /* the loss or a gradient was not finite: nothing has learned */
 } step_report;
 
-typedef struct trainer {
+struct trainer {
     gbt_train_def def; /* strings borrowed from the caller */
     train_rules rules;
     scene scene;
@@ -61,27 +65,35 @@ typedef struct trainer {
                                          how often that was mended */
     double seconds; /* training time so far, over all runs that continued one another */
 
-    frame frame;
-    image photo, d_image, exposed; /* exposed: the render as the photo's exposure shows it */
-    loss_scratch loss_scratch;
-    uint32_t *order; /* views of the epoch */
+    step_view *views; /* [view_count] those of a step that this process renders; the first one's frame also
+                         draws the held-out views */
+    size_t view_count, first_view;         /* of the def.views of the step */
+    size_t slots[STEP_VIEWS_MAX];          /* their photos: indices into train_views */
+    view_outcome outcomes[STEP_VIEWS_MAX]; /* of all views of the step */
+    row_list rows, received, owned; /* the sum over the views; what it is made of with several processes
+                                     */
+    uint32_t *order;                /* photos of the epoch */
     uint64_t order_epoch;
     bool order_ready;
-} trainer;
+};
 
 /** Load the data, make the anchors. Start from {0}; free with trainer_free() after success or failure. */
 gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, gbt_error *err);
 
 /**
- * One iteration: pick a view, render, loss, adjoint, Adam, statistics, grow and prune. The pace must know
+ * One iteration: pick views, render, loss, adjoint, Adam, statistics, grow and prune. The pace must know
  * this step.
  *
- * A step whose loss or gradient is not finite is skipped: parameters, moments and statistics stay, it is
- * counted, and a warning names the photo or the first bad gradient. GBT_ERR_FORMAT after ten such steps in a
- * row.
+ * The gradient is the mean over the views of the step (def.views), which are rendered with the same
+ * parameters; it and the statistics are summed in a binary tree over the views, so their bits do not depend
+ * on which of them run at once.
+ *
+ * A step with a view whose loss or gradient is not finite is skipped: parameters, moments and statistics
+ * stay, it is counted, and a warning names the photo or the first bad gradient. GBT_ERR_FORMAT after ten such
+ * steps in a row.
  *
  * Gaussians below opacity 0 have no gradient, so a scene that has lost all of them (or begins without: the
- * first networks are random) would stay empty. After five views in a row with visible anchors and not one
+ * first networks are random) would stay empty. After five steps in a row with visible anchors and not one
  * Gaussian, opacities are raised to 0.1; in the first step (raises_first_opacity) those of each offset whose
  * mean is below 0.
  */

@@ -86,7 +86,7 @@ static void rates_count_from_one(void **state)
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
         t.step = wanted[i].step - 1;
         const learning_rates r =
-            learning_rates_at(train_rules_progress(&t.rules, &t.pace, t.step), t.rules.own_rates, 2, 1, 1);
+            learning_rates_at(train_rules_progress(&t.rules, &t.pace, t.step), t.rules.own_rates, 2, 1, 1, 1);
         assert_true(fabs(r.network[DECODER_COLOR] / wanted[i].color - 1) < 1e-6);
         assert_true(fabs(r.network[DECODER_OPACITY] / wanted[i].opacity - 1) < 1e-6);
         assert_true(fabs(r.anchor[ANCHOR_OFFSET] / (2 * wanted[i].offset) - 1) < 1e-6);
@@ -195,7 +195,7 @@ static void faint_gaussians_count(void **state)
                 t.anchors.scale_log[6 * i + c] = 0;
         step_ok(&t, &r);
         assert_int_equal(r.gaussians, compat == 1 ? r.visible * (size_t)t.def.offsets : 0);
-        assert_int_equal(t.frame.counters.blended, 0);
+        assert_int_equal(t.views[0].frame.counters.blended, 0);
         assert_true((r.loss - (0.8 * r.l1 + 0.2 * (1 - r.ssim)) > 1e-4) == (compat == 1));
         trainer_free(&t);
     }
@@ -226,12 +226,12 @@ static void anchors_are_seen_by_themselves(void **state)
         step_ok(&t, &r);
         size_t on_screen = 0;
         static const float quat[4] = {1, 0, 0, 0}, scale[3] = {1e-3f, 1e-3f, 1e-3f};
-        const screen_view screen = screen_of(&t.frame.camera, (double)t.settings.t_near);
+        const screen_view screen = screen_of(&t.views[0].frame.camera, (double)t.settings.t_near);
         for (size_t i = 0; i < t.anchors.count; i++)
             on_screen += screen_touches(&screen, t.anchors.position + 3 * i, quat, scale);
         assert_true(on_screen > 0 && on_screen < t.anchors.count);
         assert_int_equal(r.visible, compat == 1 ? on_screen : t.anchors.count);
-        assert_int_equal(t.frame.by_screen, compat == 1);
+        assert_int_equal(t.views[0].frame.by_screen, compat == 1);
         trainer_free(&t);
     }
 }

@@ -384,9 +384,9 @@ static void a_bad_gradient_is_named(void **state)
     step_ok(&t, &r);
     char where[80] = "untouched";
     double exposure[AFFINE_NUMBERS] = {1};
-    assert_false(gradient_is_bad(&t, exposure, where, sizeof where));
+    assert_false(gradient_is_bad(&t.gradient, &t.views[0].frame, &t.decoder, exposure, where, sizeof where));
     assert_string_equal(where, "untouched");
-    const size_t anchor = t.frame.visible[t.frame.visible_count - 1],
+    const size_t anchor = t.views[0].frame.visible[t.views[0].frame.visible_count - 1],
                  k = (size_t)t.gradient.anchors.offset_count;
     decoder_part parts[3];
     decoder_parts(&t.decoder, parts);
@@ -408,7 +408,8 @@ static void a_bad_gradient_is_named(void **state)
         for (size_t v = 0; v < sizeof values / sizeof *values; v++) {
             char wanted[80];
             *places[i].place = values[v];
-            assert_true(gradient_is_bad(&t, exposure, where, sizeof where));
+            assert_true(
+                gradient_is_bad(&t.gradient, &t.views[0].frame, &t.decoder, exposure, where, sizeof where));
             if (places[i].of_anchor)
                 snprintf(wanted, sizeof wanted, "%s of anchor %zu, value %zu", places[i].name, anchor,
                          places[i].value);
@@ -416,13 +417,14 @@ static void a_bad_gradient_is_named(void **state)
                 snprintf(wanted, sizeof wanted, "%s, value %zu", places[i].name, places[i].value);
             assert_string_equal(where, wanted);
             *places[i].place = v == 3 ? GRADIENT_LIMIT : 0; /* the limit itself is good */
-            assert_false(gradient_is_bad(&t, exposure, where, sizeof where));
+            assert_false(
+                gradient_is_bad(&t.gradient, &t.views[0].frame, &t.decoder, exposure, where, sizeof where));
             *places[i].place = 0;
         }
     exposure[11] = NAN;
-    assert_true(gradient_is_bad(&t, exposure, where, sizeof where));
+    assert_true(gradient_is_bad(&t.gradient, &t.views[0].frame, &t.decoder, exposure, where, sizeof where));
     assert_string_equal(where, "exposure, value 11");
-    assert_false(gradient_is_bad(&t, NULL, where, sizeof where));
+    assert_false(gradient_is_bad(&t.gradient, &t.views[0].frame, &t.decoder, NULL, where, sizeof where));
     trainer_free(&t);
 }
 
@@ -526,11 +528,11 @@ static void no_offset_is_born_dead(void **state)
         size_t count[2] = {0, 0};
         for (int step = 0; step < 2; step++) {
             step_ok(&t, &r);
-            for (size_t i = 0; i < t.frame.gaussians.count; i++)
-                count[step] += t.frame.tape.slot[i] % k_count == 0;
+            for (size_t i = 0; i < t.views[0].frame.gaussians.count; i++)
+                count[step] += t.views[0].frame.tape.slot[i] % k_count == 0;
         }
         assert_int_equal(count[0], 0);
-        assert_true(compat ? count[1] == 0 : count[1] > t.frame.visible_count / 2);
+        assert_true(compat ? count[1] == 0 : count[1] > t.views[0].frame.visible_count / 2);
         trainer_free(&t);
     }
 }
@@ -550,17 +552,17 @@ static void opacities_are_raised(void **state)
     bias[1] = 1.5f;
     const gbt_camera camera = photos_camera(&t.photos, 0, 0);
     for (int pass = 0; pass < 2; pass++) {
-        assert_ok(
-            frame_render(&t.frame, frame_neural(&t.anchors, &t.decoder), &camera, &t.settings, true, NULL));
+        assert_ok(frame_render(&t.views[0].frame, frame_neural(&t.anchors, &t.decoder), &camera, &t.settings,
+                               true, NULL));
         if (pass == 0)
-            decode_raise_opacity(&t.frame.tape, 0.1f, 0.25f, &t.decoder);
+            decode_raise_opacity(&t.views[0].frame.tape, 0.1f, 0.25f, &t.decoder);
     }
     assert_true(bias[0] > 0 && bias[1] == 1.5f);
     double sum = 0;
-    for (size_t i = 0; i < t.frame.gaussians.count; i++)
-        if (t.frame.tape.slot[i] % k_count == 0)
-            sum += (double)t.frame.gaussians.opacity[i];
-    assert_true(fabs(sum / (double)t.frame.visible_count - 0.25) < 0.05);
+    for (size_t i = 0; i < t.views[0].frame.gaussians.count; i++)
+        if (t.views[0].frame.tape.slot[i] % k_count == 0)
+            sum += (double)t.views[0].frame.gaussians.opacity[i];
+    assert_true(fabs(sum / (double)t.views[0].frame.visible_count - 0.25) < 0.05);
     trainer_free(&t);
 }
 

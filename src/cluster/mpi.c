@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* cluster/mpi.c -- the module: collective calls of MPI 3. Built once for each MPI that is there, and loaded
+   when a process was started by its mpirun. MPI's own handler of errors stays: it ends all processes. */
+#include <mpi.h>
+#include <stddef.h>
+
+#include "cluster/module.h"
+
+static void join(int *rank, int *size)
+{
+    int provided;
+    MPI_Init_thread(NULL, NULL, MPI_THREAD_FUNNELED, &provided);
+    MPI_Comm_rank(MPI_COMM_WORLD, rank);
+    MPI_Comm_size(MPI_COMM_WORLD, size);
+}
+
+static void gather(const void *mine, int count, void *all, const int *counts, const int *places)
+{
+    MPI_Allgatherv(mine, count, MPI_INT32_T, all, counts, places, MPI_INT32_T, MPI_COMM_WORLD);
+}
+
+static void exchange(const void *send, const int *send_counts, const int *send_places, void *all,
+                     const int *counts, const int *places)
+{
+    MPI_Alltoallv(send, send_counts, send_places, MPI_INT32_T, all, counts, places, MPI_INT32_T,
+                  MPI_COMM_WORLD);
+}
+
+static void broadcast(void *data, int count) { MPI_Bcast(data, count, MPI_INT32_T, 0, MPI_COMM_WORLD); }
+
+static void leave(void) { MPI_Finalize(); }
+
+static void end_all(int exit_code) { MPI_Abort(MPI_COMM_WORLD, exit_code); }
+
+__attribute__((visibility("default"))) extern const cluster_module gbt_cluster_module;
+const cluster_module gbt_cluster_module = {.version = CLUSTER_MODULE_VERSION,
+                                           .open = join,
+                                           .gather = gather,
+                                           .exchange = exchange,
+                                           .broadcast = broadcast,
+                                           .close = leave,
+                                           .abort = end_all};

@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/step_view.c -- a view of a step: its photo and pixels, its render, its gradient as rows. */
+#include "train/step_view.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/rng.h"
+#include "train/gradient_check.h"
+#include "train/growing.h"
+#include "train/loss.h"
+#include "train/near.h"
+#include "train/step_rows.h"
+#include "train/trainer.h"
+
+enum {
+    STREAM_VIEWS = 1,
+    STREAM_PIXELS = 4,
+    STREAM_PARTS = 6,
+    LEAST_PIXELS_ACROSS = 80 /* with fewer a step would not be faster */
+};
+
+/* ---- which photo ---- */
+
+/* How many views come before view `index` of the next step. */
+static uint64_t views_before(const trainer *t, size_t index)
+{
+    return t->step * (uint64_t)t->def.views + index;
+}
+
+/* An index into train_views: every view once per epoch, in an order that depends on (seed, epoch) only, so
+   that there is no state to save. */
+static size_t pick_photo(trainer *t, uint64_t before)
+{
+    const uint64_t epoch = before / t->train_count;
+    if (!t->order_ready || t->order_epoch != epoch) {
+        for (size_t i = 0; i < t->train_count; i++)
+            t->order[i] = (uint32_t)i;
+        for (size_t i = t->train_count; i > 1; i--) { /* Durstenfeld 1964 */
+            uint32_t words[4];
+            rng_philox(t->def.seed, STREAM_VIEWS, epoch << 32 | i, words);
+            const size_t j = (size_t)(((uint64_t)words[0] * i) >> 32);
+            const uint32_t swap = t->order[i - 1];
+            t->order[i - 1] = t->order[j];
+            t->order[j] = swap;
+        }
+        t->order_epoch = epoch;
+        t->order_ready = true;
+    }
+    return t->order[before % t->train_count];
+}
+
+step_size trainer_step_size(const trainer *t, size_t view, double progress)
+{
+    const gbt_camera camera = photos_camera(&t->photos, view, 0);
+    const int across = camera.width < camera.height ? camera.width : camera.height;
+    const double budgets = (double)camera.width * camera.height / t->rules.step_pixels;
+    int level = schedule_level(progress, t->rules.start_level);
+    if (level == 0) {
+        gbt_camera shifted;
+        const bool has_parts = budgets > 1 && gbt_camera_shifted(&camera, 0, 0, &shifted);
+        return (step_size){.parts = has_parts ? (int)fmax(1, round(sqrt(budgets))) : 1};
+    }
+    for (double left = budgets; left > 2; left /= 4)
+        level++;
+    while (level > 0 && across >> level < LEAST_PIXELS_ACROSS)
+        level--;
+    return (step_size){.level = level, .parts = 1};
+}
+
+double trainer_step_pixels(const trainer *t, size_t view, double progress)
+{
+    const step_size size = trainer_step_size(t, view, progress);
+    const gbt_camera camera = photos_camera(&t->photos, view, size.level);
+    return (double)camera.width * camera.height / (size.parts * size.parts);
+}
+
+/* The first of every 2^level-th pixel: at most four places along a side, so that what is known of the lens at
+   these pixels (RAY_LENSES) serves other steps too. */
+static int random_phase(uint32_t word, int level)
+{
+    const int places = level < 2 ? 1 << level : 4, apart = (1 << level) / places;
+    return (int)(word % (uint32_t)places) * apart + apart / 2;
+}
+
+/* Which pixels of the photo: random ones of every 2^level-th; or a part, another one whenever the photo comes
+   up, so that all have their turn. */
+static photo_sample pick_pixels(const trainer *t, step_size size, size_t slot, uint64_t before)
+{
+    uint32_t words[4];
+    rng_philox(t->def.seed, STREAM_PIXELS, before, words);
+    if (size.level > 0)
+        return (photo_sample){
+            .level = size.level,
+            .phase = {random_phase(words[0], size.level), random_phase(words[1], size.level)}};
+    rng_philox(t->def.seed, STREAM_PARTS, slot, words);
+    const uint64_t parts = (uint64_t)size.parts,
+                   turn = (words[0] + before / t->train_count) % (parts * parts);
+    return (photo_sample){.parts = size.parts, .part = {(int)(turn % parts), (int)(turn / parts)}};
+}
+
+void step_photos_pick(trainer *t)
+{
+    for (int i = 0; i < t->def.views; i++)
+        t->slots[i] = pick_photo(t, views_before(t, (size_t)i));
+}
+
+static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err)
+{
+    const size_t view = t->train_views[v->slot];
+    const step_size size = trainer_step_size(t, view, pace_progress(&t->pace, t->step));
+    v->outcome.level = size.level;
+    v->outcome.parts = size.parts;
+    const photo_sample sample = pick_pixels(t, size, v->slot, before);
+    GBT_TRY(photos_get_sample(&t->photos, view, &sample, &v->photo, &v->camera, &v->valid,
+                              &v->frame.draw.pixel_step, err));
+    v->outcome.width = v->camera.width;
+    v->outcome.height = v->camera.height;
+    if (v->valid == NULL || t->view_count == 1)
+        return GBT_OK;
+    const size_t pixels = (size_t)v->camera.width * (size_t)v->camera.height; /* the next photo has others */
+    GBT_TRY(mem_reserve((void **)&v->marks, &v->marks_capacity, 0, pixels, 1, "valid pixels", err));
+    memcpy(v->marks, v->valid, pixels);
+    v->valid = v->marks;
+    return GBT_OK;
+}
+
+static void keep_failure(view_outcome *r, gbt_status status, const gbt_error *err)
+{
+    if (status == GBT_OK)
+        return;
+    r->status = status;
+    snprintf(r->text, sizeof r->text, "%s", err->text);
+}
+
+void step_view_pick(trainer *t, step_view *v, size_t index)
+{
+    const double start = clock_wall();
+    gbt_error err = {0};
+    memset(&v->outcome, 0, sizeof v->outcome);
+    v->slot = t->slots[index];
+    keep_failure(&v->outcome, pick(t, v, views_before(t, index), &err), &err);
+    v->photo_seconds = clock_wall() - start;
+}
+
+/* ---- its render ---- */
+
+/* Splats teach a model that is still rough in half the time of rays, which have the last word. */
+static gbt_renderer renderer_of_step(const trainer *t, const gbt_camera *camera, double progress)
+{
+    const bool rays =
+        t->renderer != GBT_RENDERER_TRACE || progress >= t->rules.splats_until || !raster_takes(camera);
+    return rays ? t->renderer : GBT_RENDERER_RASTER;
+}
+
+float step_view_near(const trainer *t, const step_view *v)
+{
+    return view_near(t->settings.t_near, &t->def, &t->scene.views[t->train_views[v->slot]]);
+}
+
+static trace_settings settings_of(const trainer *t, const step_view *v, double progress)
+{
+    trace_settings settings = t->settings;
+    settings.t_near = step_view_near(t, v);
+    if (t->rules.loose_cutoffs && progress < SCHEDULE_WHOLE_FROM) {
+        settings.alpha_min = SCHEDULE_ALPHA_MIN;
+        settings.transmittance_min = SCHEDULE_T_MIN;
+    }
+    return settings;
+}
+
+/* The loss of the last render as the photo's exposure shows it; v->d_image becomes dL/drender. */
+static gbt_status compare(const trainer *t, step_view *v, image_loss_result *loss, gbt_error *err)
+{
+    const unsigned char *valid;
+    GBT_TRY(frame_valid(&v->frame, v->valid, &valid, err));
+    const image *shown = &v->frame.rgb;
+    image *fitted[] = {&v->d_image, &v->exposed};
+    for (int i = 0; i < (t->exposures.count > 0 ? 2 : 1); i++)
+        GBT_TRY(image_fit(fitted[i], shown->width, shown->height, 3, err));
+    if (t->exposures.count == 0)
+        return loss_of_image(shown, &v->photo, valid, &v->loss_scratch, &v->d_image, loss, err);
+    const float *matrix = t->exposures.matrix + v->slot * AFFINE_NUMBERS;
+    affine_apply(matrix, shown, &v->exposed);
+    GBT_TRY(loss_of_image(&v->exposed, &v->photo, valid, &v->loss_scratch, &v->d_image, loss, err));
+    affine_backward(matrix, shown, &v->d_image, v->outcome.d_exposure);
+    return GBT_OK;
+}
+
+/* ---- and back ---- */
+
+/* A row of zeros for each visible anchor. */
+static gbt_status make_rows(const trainer *t, step_view *v, gbt_error *err)
+{
+    const size_t count = v->frame.visible_count;
+    learnables *g = &v->gradient;
+    if (g->networks == NULL) {
+        g->anchors.offset_count = t->anchors.offset_count;
+        g->networks = mem_alloc(t->decoder.param_count, sizeof *g->networks, "networks", err);
+        if (g->networks == NULL)
+            return GBT_ERR_NO_MEMORY;
+    }
+    GBT_TRY(anchors_resize(&g->anchors, count, err));
+    learnables_zero(g, t->decoder.param_count);
+    GBT_TRY(growth_stats_resize(&v->stats, 0, t->anchors.offset_count, err));
+    return growth_stats_resize(&v->stats, count, t->anchors.offset_count, err);
+}
+
+static gbt_status run(trainer *t, step_view *v, gbt_error *err)
+{
+    const double progress = pace_progress(&t->pace, t->step);
+    const char *photo = t->scene.views[t->train_views[v->slot]].name;
+    view_outcome *r = &v->outcome;
+    frame *f = &v->frame;
+    const trace_settings settings = settings_of(t, v, progress);
+    f->draw.renderer = renderer_of_step(t, &v->camera, progress);
+    GBT_TRY(frame_render(f, frame_neural(&t->anchors, &t->decoder), &v->camera, &settings, true, err));
+    r->gaussians = f->gaussians.count;
+    r->visible = f->visible_count;
+    r->rays = f->counters.rays;
+    r->hits = f->counters.hits;
+    r->blended = f->counters.blended;
+
+    const double clock = clock_wall();
+    image_loss_result loss;
+    GBT_TRY(compare(t, v, &loss, err));
+    r->loss = loss.loss + loss_of_gaussians(&f->gaussians);
+    r->l1 = loss.l1;
+    r->ssim = loss.ssim;
+    r->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
+    v->loss_seconds = clock_wall() - clock;
+    if (!isfinite(r->loss)) {
+        r->bad = true;
+        snprintf(r->text, sizeof r->text, "the loss is not finite (photo %.200s)", photo);
+        return GBT_OK;
+    }
+
+    const bool alone = t->def.views == 1;
+    if (!alone)
+        GBT_TRY(make_rows(t, v, err));
+    learnables *gradient = alone ? &t->gradient : &v->gradient;
+    GBT_TRY(frame_backward_gaussians(f, &v->d_image, err));
+    loss_add_gradient(&f->gaussians, &f->d_gaussians);
+    GBT_TRY(frame_backward_anchors(f, &t->anchors, &t->decoder, &gradient->anchors, gradient->networks, err));
+    char where[80];
+    if (gradient_is_bad(gradient, f, &t->decoder, t->exposures.count > 0 ? r->d_exposure : NULL, where,
+                        sizeof where)) {
+        r->bad = true;
+        snprintf(r->text, sizeof r->text, "the gradient is not finite (%s; photo %.200s)", where, photo);
+        return GBT_OK;
+    }
+    if (alone)
+        return GBT_OK;
+    if (growing_gathers(t))
+        growth_stats_gather(&v->stats, f, t->rules.importance, t->rules.gradient_counting, settings.t_near);
+    return step_rows_take(t, v, err);
+}
+
+void step_view_run(trainer *t, step_view *v)
+{
+    const double start = clock_wall();
+    gbt_error err = {0};
+    v->rows.count = 0;
+    v->loss_seconds = 0;
+    if (v->outcome.status == GBT_OK)
+        keep_failure(&v->outcome, run(t, v, &err), &err);
+    v->seconds = clock_wall() - start;
+}
+
+void step_view_free(step_view *v)
+{
+    frame_free(&v->frame);
+    image_free(&v->photo);
+    image_free(&v->d_image);
+    image_free(&v->exposed);
+    mem_free(v->marks);
+    loss_scratch_free(&v->loss_scratch);
+    learnables_free(&v->gradient);
+    growth_stats_free(&v->stats);
+    row_list_free(&v->rows);
+    memset(v, 0, sizeof *v);
+}

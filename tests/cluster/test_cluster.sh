@@ -1,0 +1,107 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# tests/cluster/test_cluster.sh -- one task on several processes that mpirun has started: the same bytes as from one, one voice, one end.
+# Usage: test_cluster.sh PROGRAM BUILD openmpi|mpich
+set -u
+program=$1
+build=$2
+mpi=$3
+. "$(dirname "$0")/../cli/report.sh"
+command -v "mpirun.$mpi" >/dev/null || { skip "$mpi" "mpirun.$mpi is not installed"; finish; }
+[ -f "$build/gbtrace_$mpi.so" ] || { skip "$mpi" "its headers are not installed, so no module was built"; finish; }
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+GBTRACE_THREADS=1
+# More processes than processors: those that wait must let others run.
+OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=core:oversubscribe OMPI_MCA_mpi_yield_when_idle=1
+OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+export GBTRACE_THREADS OMPI_MCA_rmaps_base_oversubscribe PRTE_MCA_rmaps_default_mapping_policy OMPI_MCA_mpi_yield_when_idle
+export OMPI_ALLOW_RUN_AS_ROOT OMPI_ALLOW_RUN_AS_ROOT_CONFIRM
+on() { # PROCESSES COMMAND...
+    count=$1
+    shift
+    "mpirun.$mpi" -n "$count" "$@"
+}
+errors() { grep -c '^error:' err; }
+
+"$program" make-scene tabletop -o data --width 64 --height 48 --views 9 --samples 1 --points 200 --quiet >out 2>&1
+report $? "a scene" "$(cat out)"
+
+# ---- training
+"$program" train data -o alone --views 4 --iterations 30 --exposure --quiet >out 2>&1
+report $? "views of a step in one process" "$(cat out)"
+"$program" train data -o threads --views 4 --iterations 30 --exposure --quiet --threads 3 >out 2>&1 && cmp alone/model.gbt threads/model.gbt
+report $? "views of a step beside each other: the same model" "$(cat out)"
+for count in 2 4; do
+    on $count "$program" train data -o run$count --views 4 --iterations 30 --exposure --quiet >out 2>&1 && cmp alone/model.gbt run$count/model.gbt &&
+        cmp alone/exposure.json run$count/exposure.json
+    report $? "$count processes: the same model" "$(cat out)"
+done
+grep -q '"bytes_per_step"' run4/train.json && ! grep -q '"bytes_per_step"' alone/train.json
+report $? "train.json says what was sent" "$(cat run4/train.json)"
+on 2 "$program" train data -o goes-on --views 4 --iterations 30 --exposure --stop-at-step 12 --quiet >out 2>err
+code=$?
+[ $code = 130 ] && [ "$(errors)" = 1 ] && on 4 "$program" train -o goes-on --resume --quiet >out 2>&1 && cmp alone/model.gbt goes-on/model.gbt
+report $? "stopped with 2, resumed with 4: the same model" "code $code: $(cat out err)"
+on 4 "$program" train data -o many --iterations 30 >out 2>err
+code=$?
+[ $code = 2 ] && [ "$(errors)" = 1 ] && grep -q '^error: --views: 1 a step, for 4 processes (wanted a number of processes that divides it)$' err
+report $? "more processes than views" "code $code: $(cat out err)"
+on 2 "$program" train data -o many --no-such-option >out 2>err
+code=$?
+[ $code = 2 ] && [ "$(errors)" = 1 ]
+report $? "one process tells what is wrong with the command line" "code $code: $(cat out err)"
+
+# ---- trouble on another process
+on 2 sh -c 'case ${OMPI_COMM_WORLD_RANK:-$PMI_RANK} in 1) cd / ;; esac; exec "$@"' sh "$program" train data -o "$work/lost" --views 2 --iterations 30 >out 2>err
+code=$?
+[ $code = 4 ] && [ "$(errors)" = 1 ] && [ ! -e lost/model.gbt ]
+report $? "data that one process does not find" "code $code: $(cat out err)"
+on 2 "$program" train data -o "$work/killed" --views 2 --iterations 1000000 --save-every 1s --quiet >out 2>err &
+started=$!
+while [ ! -e killed/checkpoints/last.gbt ] && kill -0 $started; do sleep 0.1; done 2>/dev/null
+for process in /proc/[0-9]*; do
+    tr '\0' '\n' <"$process/cmdline" 2>/dev/null | grep -q "^$work/killed\$" && tr '\0' '\n' <"$process/environ" 2>/dev/null | grep -qE '^(OMPI_COMM_WORLD_RANK|PMI_RANK)=1$' &&
+        kill -9 "${process#/proc/}"
+done
+wait $started
+code=$?
+[ $code != 0 ]
+report $? "a process that is killed ends them all" "code $code: $(cat out err)"
+"$program" train -o killed --resume --stop-at-step 1 --quiet >out 2>err
+code=$?
+[ $code = 130 ] && [ "$(errors)" = 1 ]
+report $? "and the run goes on from what was saved" "code $code: $(cat out err)"
+
+# ---- pictures and scores
+same() { # FOLDER FOLDER: files of the same names and bytes
+    diff -r "$1" "$2" >different 2>&1
+}
+same alone/renders/test run4/renders/test
+report $? "pictures of a run that was scored by 4" "$(cat different)"
+"$program" eval alone --json one.json --quiet >out 2>&1 && on 2 "$program" eval alone --json two.json --quiet >out 2>&1 &&
+    grep -v '"seconds"' one.json >one && grep -v '"seconds"' two.json >two && cmp one two
+report $? "scores of 2 processes" "$(cat out; diff one two)"
+"$program" render alone -o views1 --split all --quiet >out 2>&1 && on 2 "$program" render alone -o views2 --split all --quiet >out 2>&1 && same views1 views2 &&
+    [ "$(ls views2 | wc -l)" = 9 ]
+report $? "views rendered by 2 processes" "$(cat out different)"
+"$program" render alone -o path1 --path orbit --frames 5 --quiet >out 2>&1 && on 4 "$program" render alone -o path2 --path orbit --frames 5 --quiet >out 2>&1 &&
+    same path1 path2
+report $? "frames rendered by 4 processes" "$(cat out different)"
+if command -v ffmpeg >/dev/null; then
+    "$program" render alone -o film1.gif --path orbit --frames 5 --quiet >out 2>&1 && on 2 "$program" render alone -o film2.gif --path orbit --frames 5 --quiet >out 2>&1 &&
+        cmp film1.gif film2.gif
+    report $? "a film by 2 processes" "$(cat out)"
+else
+    skip "a film" "ffmpeg is not installed"
+fi
+on 2 "$program" render alone -o nothing --camera no.json >out 2>err
+code=$?
+[ $code = 4 ] && [ "$(errors)" = 1 ]
+report $? "a failure to render is told once" "code $code: $(cat out err)"
+
+# ---- commands that do not share their work
+on 2 "$program" info run2/model.gbt >out 2>&1 && [ "$(grep -c '^  size ' out)" = 1 ]
+report $? "info is told once" "$(cat out)"
+finish

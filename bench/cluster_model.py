@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """What N machines would give: a model from one run on one machine.
 
-Usage: bench/cluster_model.py RUN...
+Usage: bench/cluster_model.py RUN [VIEW_MS REST_MS]
 
-RUN was trained with one view a step and one process on the kind of machine that is meant. Each of N machines renders one view of a step:
+RUN was trained with one view a step and one process. Each of N machines renders one view of a step:
 
     step(N) = view + rest + bytes(N) / bandwidth + messages(N) * latency
 
 `view` is what a process does alone (photo, rays, decode, tree, trace, loss, adjoints), `rest` what every process does again (Adam, growth):
-both from train.json. A row has 1 number and the values of an anchor (its gradient, its statistics). With A anchors, of which a view sees the part p, a
-process sends and receives (N - 1) / N of pA rows, then receives as much of the sums: A (1 - (1 - p)^N) rows, if views were independent;
-views overlap, so that is an upper bound. Sending and receiving go on at once; the switch is no limit. 50 us a message, log2 N messages for each
-of six calls.
+both from train.json, if they are not given. A row is the number of an anchor and its values (gradient, statistics). Of A anchors a view sees
+the part p. A process sends (N - 1) / N of pA rows, and while others send as many to it; then it gets as much of the sums: A (1 - (1 - p)^N)
+rows, if views were independent; views overlap, so that is an upper bound. The switch is no limit. 50 us a message, log2 N messages for each of
+six calls.
 """
 import csv
 import json
@@ -41,23 +41,21 @@ def offsets_of(run):
 
 
 def main():
-    for run in sys.argv[1:]:
-        view, rest, anchors, seen = read(run)
-        k = offsets_of(run)
-        row = 4 * (1 + 32 + 3 * k + 6 + 3 + 2 * k)
-        networks = 4 * 4200
-        print(f"{run}: {1e3 * view:.1f} ms a view, {1e3 * rest:.1f} ms for all; {anchors:.0f} anchors, {seen:.0f} in a view, {row} bytes a row\n")
-        print("| machines | MB a step | views a second, 1 Gbit/s | 10 Gbit/s | times one machine, 1 Gbit/s | 10 Gbit/s |\n|---|---|---|---|---|---|")
-        for n in (1, 2, 4, 8, 16, 32, 64):
-            union = anchors * (1 - (1 - seen / anchors) ** n)
-            size = 0 if n == 1 else (n - 1) / n * ((seen + union) * row + 2 * networks)
-            views = []
-            for gbit in (1, 10):
-                seconds = view + rest + size * 8 / (gbit * 1e9) + CALLS * math.log2(n) * LATENCY
-                views.append(n / seconds)
-            one = 1 / (view + rest)
-            print(f"| {n} | {size / 1e6:.2f} | {views[0]:.0f} | {views[1]:.0f} | {views[0] / one:.1f} | {views[1] / one:.1f} |")
-        print()
+    run = sys.argv[1]
+    view, rest, anchors, seen = read(run)
+    if len(sys.argv) > 3:
+        view, rest = float(sys.argv[2]) / 1e3, float(sys.argv[3]) / 1e3
+    k = offsets_of(run)
+    row = 4 * (1 + 32 + 3 * k + 6 + 3 + 2 * k)
+    networks = 4 * 4200
+    print(f"{1e3 * view:.1f} ms a view, {1e3 * rest:.1f} ms for all; {anchors:.0f} anchors, {seen:.0f} in a view, {row} bytes a row\n")
+    print("| machines | MB a step | ms, 1 Gbit/s | ms, 10 Gbit/s | times one machine, 1 Gbit/s | 10 Gbit/s |\n|---|---|---|---|---|---|")
+    for n in (2, 4, 8, 16, 32, 64):
+        union = anchors * (1 - (1 - seen / anchors) ** n)
+        size = (n - 1) / n * ((seen + union) * row + 2 * networks)
+        sent = [size * 8 / (gbit * 1e9) + CALLS * math.log2(n) * LATENCY for gbit in (1, 10)]
+        times = [n * (view + rest) / (view + rest + s) for s in sent]
+        print(f"| {n} | {size / 1e6:.1f} | {1e3 * sent[0]:.0f} | {1e3 * sent[1]:.0f} | {times[0]:.1f} | {times[1]:.1f} |")
 
 
 if __name__ == "__main__":

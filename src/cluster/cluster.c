@@ -46,7 +46,10 @@ static bool find_module(const char *name, char out[PATH_SIZE])
     static const char *const folders[] = {".", "gbtrace", GBT_MODULE_FOLDER};
     Dl_info here;
     char own[PATH_SIZE];
-    if (dladdr((const void *)&own_size, &here) == 0 || realpath(here.dli_fname, own) == NULL)
+    const bool found = dladdr((const void *)&own_size, &here) != 0;
+    /* A program that was found by PATH has a name without a place. */
+    const char *file = found && strchr(here.dli_fname, '/') != NULL ? here.dli_fname : "/proc/self/exe";
+    if (realpath(file, own) == NULL)
         return false;
     *strrchr(own, '/') = '\0';
     for (size_t i = 0; i < sizeof folders / sizeof *folders; i++)

@@ -27,7 +27,8 @@ static const gbt_train_setting settings[] = {
     {NAMED("iterations", iterations), RANGE(UINT64, 0, 1e15, "N"), .number = 0, .saved = true,
      .help = "number of iterations instead of a time budget; 0: the budget decides",
      .aliases = "max-steps num-iters"},
-    {NAMED("views", views), RANGE(INT, 1, 64, "V"), .number = 1, .saved = true, .rare = true,
+    {NAMED("views", views), RANGE(INT, 1, 64, "V"), .number = 1, .saved = true, .if_changed = true,
+     .rare = true,
      .help =
          "photos that a step looks at, a power of two; learning rates are multiplied by the square root of "
          "it (docs/cluster.md)",

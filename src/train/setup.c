@@ -324,11 +324,9 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     train_def_settle(&t->def);
     t->rules = train_rules_of(&t->def);
     if (t->def.views % gbt_cluster_size() != 0)
-        return base_fail(
-            err, GBT_ERR_ARGUMENT,
-            "views: %d a step for %d processes (wanted as many for each: 1, 2, 4, ... processes, at "
-            "most one for each view)",
-            t->def.views, gbt_cluster_size());
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "views: %d a step, for %d processes (wanted a number of processes that divides it)",
+                         t->def.views, gbt_cluster_size());
     GBT_TRY(load_data(t, data, err));
     GBT_TRY(make_anchors(t, err));
     GBT_TRY(make_decoder(t, err));

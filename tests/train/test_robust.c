@@ -312,9 +312,11 @@ static void assert_no_gradient_left(const trainer *t)
 static void a_bad_step_changes_nothing(void **state)
 {
     (void)state;
-    for (int kind = 0; kind <= 1; kind++) {
+    for (int test = 0; test < 4; test++) {
+        const int kind = test % 2;
         gbt_train_def def = run_def();
         def.exposure = true;
+        def.views = test < 2 ? 1 : 4;
         def.splats_until = 0; /* the rasterizer refuses such a background */
         trainer t;
         step_report r;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/train/test_row_list.c -- sums of numbered rows: against plain arrays that are added in the order of the tree, and in parts. */
+/* tests/train/test_row_list.c -- sums of numbered rows: against plain arrays that are added in the order of
+ * the tree, and in parts. */
 #include "test_support.h"
 
 #include <stdbool.h>

@@ -66,7 +66,7 @@ def linked(page, pages, wrong):
         wrong.append(f"{page.source}: {target}: no such page or picture")
         return match[0]
 
-    def name(match):  # docs/NAME.md in a sentence leads there, too
+    def name(match):  # a path of a document in a sentence leads there, too
         source = match[0]
         return f'<a href="{page.to(pages[source].place)}">{source}</a>' if source in pages and source != page.source else source
 

@@ -54,9 +54,8 @@ static void look_at_facade(const surface *s, look *l)
     const float column = u - floorf(u), row = v - floorf(v);
     float *albedo = l->albedo;
     memcpy(albedo, paints[s->variant % 6], 3 * sizeof *albedo);
-    texture_scale(albedo,
-                  0.95f + 0.16f * texture_fbm(0.8f * s->position[0], 0.8f * s->position[1],
-                                              0.8f * s->position[2], 4));
+    texture_scale(albedo, 0.95f + 0.16f * texture_fbm(0.8f * s->position[0], 0.8f * s->position[1],
+                                                      0.8f * s->position[2], 4));
     if (fabsf(column - 0.5f) < 0.27f && fabsf(row - 0.55f) < 0.30f) {
         const float lit = texture_hash((int)floorf(u), (int)floorf(v), s->variant);
         const bool bar = fabsf(column - 0.5f) < 0.02f || fabsf(row - 0.62f) < 0.015f;
@@ -118,7 +117,8 @@ static void build_house(world *w, int number, float x, float y, float half_x, fl
         const float normal[3] = {s, 0, 0};
         const uint32_t a = world_vertex(w, (const float[3]){s * half_x, -half_y, height}, normal, 0, 0),
                        b = world_vertex(w, (const float[3]){s * half_x, half_y, height}, normal, 0, 0),
-                       c = world_vertex(w, (const float[3]){s * half_x, 0, height + 0.9f * rise}, normal, 0, 0);
+                       c = world_vertex(w, (const float[3]){s * half_x, 0, height + 0.9f * rise}, normal, 0,
+                                        0);
         world_triangle(w, FACADE, number, a, b, c);
     }
 }
@@ -200,8 +200,10 @@ static void stand(int view, int view_count, double eye[3], double target[3])
 const recipe recipe_district = {
     .name = "district",
     .summary = "64 blocks of houses along 14 streets, walked and flown over: for large scenes",
-    .about = "A district of 8 x 8 blocks of gabled houses with yards and trees between straight streets, 190 units "
-             "across. Two of three cameras stand in the streets at the height of eyes, the others fly over the roofs; "
+    .about = "A district of 8 x 8 blocks of gabled houses with yards and trees between straight streets, 190 "
+             "units "
+             "across. Two of three cameras stand in the streets at the height of eyes, the others fly over "
+             "the roofs; "
              "each sees a small part of it. A sphere of 190 units around it carries the sky.",
     .build = build,
     .stand = stand,

@@ -148,10 +148,11 @@ static void put_block(size_t block, size_t begin, size_t end, void *context)
 static gbt_status write_header(size_t count, large_file *file, gbt_error *err)
 {
     char text[4096];
-    int used = snprintf(text, sizeof text,
-                        "ply\nformat binary_little_endian 1.0\nelement vertex %zu\nproperty float x\nproperty float "
-                        "y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\n",
-                        count);
+    int used =
+        snprintf(text, sizeof text,
+                 "ply\nformat binary_little_endian 1.0\nelement vertex %zu\nproperty float x\nproperty float "
+                 "y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\n",
+                 count);
     const struct {
         const char *stem;
         int count;

@@ -265,9 +265,10 @@ static gbt_status choose_renderer(studio *st, const gbt_render_def *def, gbt_err
         *renderer = def->renderer;
     if (st->run.cells.count > 0 &&
         (st->in_double || *renderer != GBT_RENDERER_TRACE || def->insert != NULL || st->outputs != 0))
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "memory: what is larger than it is traced, cell by cell, in colours alone (wanted the renderer "
-                         "trace, no outputs, no meshes)");
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "memory: what is larger than it is traced, cell by cell, in colours alone (wanted the renderer "
+            "trace, no outputs, no meshes)");
     if (def->insert != NULL && *renderer != GBT_RENDERER_TRACE)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
     if (st->outputs != 0 && *renderer != GBT_RENDERER_TRACE)
@@ -350,7 +351,8 @@ static gbt_status open_run(const char *run, const char *out, const gbt_render_de
         GBT_TRY(loaded_run_open_cells(run, def->memory, folder, &large, r, err));
     if (large)
         return wants_views ? loaded_run_open_views(run, def->data, def->downscale, r, err) : GBT_OK;
-    return wants_views ? loaded_run_open(run, def->data, def->downscale, r, err) : loaded_run_open_model(run, r, err);
+    return wants_views ? loaded_run_open(run, def->data, def->downscale, r, err)
+                       : loaded_run_open_model(run, r, err);
 }
 
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)

@@ -87,8 +87,8 @@ static gbt_status find_ply(const char *run, char out[RESULT_PATH_SIZE], bool *fo
     return GBT_OK;
 }
 
-gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *folder, bool *large, loaded_run *out,
-                                 gbt_error *err)
+gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *folder, bool *large,
+                                 loaded_run *out, gbt_error *err)
 {
     char ply[RESULT_PATH_SIZE];
     gaussian_ply_parts parts;

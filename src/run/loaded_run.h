@@ -19,7 +19,7 @@ typedef struct loaded_run {
                              is about the scene alone */
     cell_store cells;     /* of such a file that is larger than memory, in place of `cloud` */
     cell_drawer cell_drawer;
-    gbt_train_def def;    /* the settings it was trained with; strings point into `strings` */
+    gbt_train_def def; /* the settings it was trained with; strings point into `strings` */
     config_strings strings;
     run_data data; /* where its data set is */
     scene scene;   /* cameras and points in the model's local coordinates */
@@ -49,14 +49,14 @@ frame_subject loaded_run_subject(const loaded_run *r);
 gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *err);
 
 /**
- * The same of a .ply of plain Gaussians, or a result folder with one, that would take more than `memory` bytes:
- * it is sorted into out->cells, to be drawn by cell_draw() alone.
+ * The same of a .ply of plain Gaussians, or a result folder with one, that would take more than `memory`
+ * bytes: it is sorted into out->cells, to be drawn by cell_draw() alone.
  *
  * @param folder [in]  where the temporary file is made
  * @param large  [out] false: it would not, or it is something else; nothing has been opened then
  */
-gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *folder, bool *large, loaded_run *out,
-                                 gbt_error *err);
+gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *folder, bool *large,
+                                 loaded_run *out, gbt_error *err);
 
 /** The other half of loaded_run_open(), for a run that has no views open: `run` is what messages call it. */
 gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out,

@@ -15,8 +15,8 @@ typedef struct row_queue {
 
 /* What the rays of a packet still see. */
 typedef struct packet_sight {
-    vfloat16 far;     /* hits at this depth or behind are not seen */
-    vfloat16 near;    /* of parts of rays: nor are hits nearer than this */
+    vfloat16 far;  /* hits at this depth or behind are not seen */
+    vfloat16 near; /* of parts of rays: nor are hits nearer than this */
     bool parts;
     vfloat16 product; /* of 1 - alpha over all hits so far */
     vfloat16 reached; /* the farthest of them */
@@ -79,11 +79,12 @@ static void gather_rows(const kernel_scene *scene, const tile_list *list, const 
                    length = vfloat16_mul(vfloat16_load(seen->length), vfloat16_set1(0.99999f)),
                    zero = vfloat16_set1(0);
     /* Rays that are not active see nothing. */
-    packet_sight sight = {.far = vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
-                          .near = parts ? vfloat16_load(rays->near) : zero,
-                          .parts = parts,
-                          .product = parts ? vfloat16_load(rays->through) : vfloat16_set1(1),
-                          .reached = zero};
+    packet_sight sight = {
+        .far = vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
+        .near = parts ? vfloat16_load(rays->near) : zero,
+        .parts = parts,
+        .product = parts ? vfloat16_load(rays->through) : vfloat16_set1(1),
+        .reached = zero};
     row_queue queue = {.count = 0};
     rows->count = 0;
     for (size_t first = 0; first < list->count; first += 16) {
@@ -129,8 +130,8 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     tape_entry *entries = tape != NULL ? tape->entries : NULL;
     for (size_t i = 0; i < rows->count; i++) {
         const int row = (int)rows->order[i];
-        const vfloat16 T = vfloat16_mul(start, row_load(rows->through, (int)i)), alpha = row_load(rows->alpha, row),
-                       next = vfloat16_fnma(T, alpha, T);
+        const vfloat16 T = vfloat16_mul(start, row_load(rows->through, (int)i)),
+                       alpha = row_load(rows->alpha, row), next = vfloat16_fnma(T, alpha, T);
         const vmask16 hit = vfloat16_lt(zero, alpha), blend = vmask16_and(hit, vfloat16_le(stop_at, next));
         const vfloat16 weight = vfloat16_select(blend, vfloat16_mul(T, alpha), zero);
         const list_row *g = &list->row[rows->number[row]];

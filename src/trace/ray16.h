@@ -186,8 +186,9 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam 
     }
 }
 
-static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, bool parts, unsigned packet, int lane,
-                      packet_output *out, hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
+static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, bool parts, unsigned packet,
+                      int lane, packet_output *out, hit_tape *tape, kernel_scratch *scratch,
+                      kernel_counters *counters)
 {
     packet_rays alone[TILE_PACKETS];
     ray_state r = start_ray(rays, parts, lane, scratch);

@@ -90,8 +90,8 @@ typedef struct hit_list {
 } hit_list;
 
 static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s,
-                         const double origin[3], const double dir[3], double near, double far,
-                         hit_list *list, gbt_error *err)
+                         const double origin[3], const double dir[3], double near, double far, hit_list *list,
+                         gbt_error *err)
 {
     list->count = 0;
     if (dir[0] == 0 && dir[1] == 0 && dir[2] == 0)
@@ -177,9 +177,8 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++) {
         double origin[3], dir[3], transmittance;
         ray_of(job->rays, i, origin, dir);
-        job->status[block] =
-            gather(job->all, job->scene->count, job->s, origin, dir, near_of(job->rays, i),
-                   far_of(job->rays, i), &list, NULL);
+        job->status[block] = gather(job->all, job->scene->count, job->s, origin, dir, near_of(job->rays, i),
+                                    far_of(job->rays, i), &list, NULL);
         const double before = job->rays->near != NULL ? (double)job->rays->through[i] : 1;
         const size_t n = blend(job->scene, job->s, &list, before, job->rgb + 3 * i, &transmittance);
         if (job->transmittance != NULL)

@@ -470,7 +470,8 @@ static gbt_status prepare_view(trace_scene *scene, const ray_image *rays, gbt_er
     GBT_TRY(view_lists_make(&scene->lists, list_kernel_for(cpu_best_isa()), &view, scene->source, rays,
                             &scene->listed, err));
     if (!scene->listed && rays->near != NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT, "trace: parts of rays that have no lists (wanted TRACE_SINGLE)");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "trace: parts of rays that have no lists (wanted TRACE_SINGLE)");
     return scene->listed ? GBT_OK : build_tree(scene, err);
 }
 
@@ -482,8 +483,9 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
         return base_fail(err, GBT_ERR_ARGUMENT, "trace: image is %d x %d x %d (wanted %d x %d x 3)",
                          rgb->width, rgb->height, rgb->channels, rays->width, rays->height);
     if (rays->near != NULL && (keep_tape || (scene->kernel != TRACE_LIST && scene->kernel != TRACE_SINGLE)))
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "trace: parts of rays have no adjoint, and are traced by TRACE_LIST or TRACE_SINGLE");
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "trace: parts of rays have no adjoint, and are traced by TRACE_LIST or TRACE_SINGLE");
     GBT_TRY(prepare_view(scene, rays, err));
     pass p = {
         .scene = scene, .view = scene_for_kernel(scene), .rays = rays, .keep_tape = keep_tape, .out = *out};

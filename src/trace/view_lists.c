@@ -105,7 +105,8 @@ static void find_seeing(const box_job *job, int row, unsigned char *sees)
     const ray_image *rays = job->rays;
     const size_t first = (size_t)row * (size_t)rays->width;
     for (size_t x = 0; x < (size_t)rays->width; x++)
-        if (rays->near == NULL || rays->near[first + x] < (rays->far != NULL ? rays->far[first + x] : INFINITY))
+        if (rays->near == NULL ||
+            rays->near[first + x] < (rays->far != NULL ? rays->far[first + x] : INFINITY))
             sees[x / TILE_SIDE] = 1;
 }
 
@@ -487,8 +488,8 @@ void view_lists_free(view_lists *lists)
     list_view *v = &lists->view;
     for (size_t i = 0; i < lists->group_capacity; i++)
         mem_free(lists->groups[i].tiles);
-    void *const owned[] = {v->tiles,      v->records,       v->shapes,    v->kept,  v->slot_first,
-                           v->slot_count, v->pairs,         v->first,     v->slots, v->slot_used,
+    void *const owned[] = {v->tiles,      v->records,       v->shapes,     v->kept,    v->slot_first,
+                           v->slot_count, v->pairs,         v->first,      v->slots,   v->slot_used,
                            lists->groups, lists->histogram, lists->lookup, lists->sees};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         mem_free(owned[i]);

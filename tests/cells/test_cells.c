@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/cells/test_cells.c -- pictures cell by cell against those of the same file in memory, on the scenes on
-   which renderers fail (docs/stability.md names them A1 to A10); and what is refused. */
+/* tests/cells/test_cells.c -- pictures cell by cell against those of the same file in memory, on the scenes
+   on which renderers fail (docs/stability.md names them A1 to A10); and what is refused. */
 #include "test_support.h"
 
 #include <unistd.h>
@@ -209,8 +209,8 @@ static void camera_inside(void **state) /* A3 */
     open_both(&b, &cloud);
     b.drawer.cell_bytes = 340 * 600;
     for (size_t i = 0; i < 8; i++) {
-        const gbt_camera camera =
-            camera_at((double)b.cloud.mean[3 * i], (double)b.cloud.mean[3 * i + 1], (double)b.cloud.mean[3 * i + 2]);
+        const gbt_camera camera = camera_at((double)b.cloud.mean[3 * i], (double)b.cloud.mean[3 * i + 1],
+                                            (double)b.cloud.mean[3 * i + 2]);
         check_same(&b, &camera, rounding);
     }
     close_both(&b);
@@ -295,7 +295,8 @@ static void bad_values(void **state) /* A8 */
     random_cloud(&cloud, 1000);
     for (size_t i = 0; i < 60; i++) {
         const float bad[5] = {NAN, INFINITY, -INFINITY, 1e38f, -1e38f};
-        float *const fields[4] = {cloud.mean + 3 * i, cloud.scale_log + 3 * i, cloud.quat + 4 * i, cloud.sh + 48 * i};
+        float *const fields[4] = {cloud.mean + 3 * i, cloud.scale_log + 3 * i, cloud.quat + 4 * i,
+                                  cloud.sh + 48 * i};
         *fields[i % 4] = bad[i / 4 % 5];
     }
     open_both(&b, &cloud);
@@ -395,22 +396,26 @@ static void what_cannot_be_drawn(void **state)
     gbt_error err = {0};
     gbt_camera camera = camera_at(6, 2, 1);
     ray_shot shot = ray_shot_of(&camera);
-    assert_int_equal(cell_draw(&b.drawer, &b.store, &shot, &b.settings, 0, 1 << 20, &out, &err), GBT_ERR_NO_MEMORY);
+    assert_int_equal(cell_draw(&b.drawer, &b.store, &shot, &b.settings, 0, 1 << 20, &out, &err),
+                     GBT_ERR_NO_MEMORY);
     assert_non_null(strstr(err.text, "memory: 1 MB is too little for a picture of 72 x 56 (wanted "));
     memset(&err, 0, sizeof err);
     b.drawer.cell_bytes = 340 * 3; /* less than one chunk */
-    assert_int_equal(cell_draw(&b.drawer, &b.store, &shot, &b.settings, 0, plenty, &out, &err), GBT_ERR_NO_MEMORY);
+    assert_int_equal(cell_draw(&b.drawer, &b.store, &shot, &b.settings, 0, plenty, &out, &err),
+                     GBT_ERR_NO_MEMORY);
     assert_non_null(strstr(err.text, "of one place"));
     memset(&err, 0, sizeof err);
     shot.aperture_radius = 0.1;
     shot.focus_distance = 5;
-    assert_int_equal(cell_draw(&b.drawer, &b.store, &shot, &b.settings, 0, plenty, &out, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(cell_draw(&b.drawer, &b.store, &shot, &b.settings, 0, plenty, &out, &err),
+                     GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "aperture"));
     memset(&err, 0, sizeof err);
     shot = ray_shot_of(&camera);
     shot.shutter = RAY_SHUTTER_ROWS;
     shot.end.center[0] += 1;
-    assert_int_equal(cell_draw(&b.drawer, &b.store, &shot, &b.settings, 0, plenty, &out, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(cell_draw(&b.drawer, &b.store, &shot, &b.settings, 0, plenty, &out, &err),
+                     GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "rolling shutter"));
     image_free(&out);
     close_both(&b);
@@ -493,14 +498,22 @@ static int remove_file(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(views_from_all_sides),   cmocka_unit_test(turning),
-        cmocka_unit_test(needles_and_pancakes),   cmocka_unit_test(camera_inside),
-        cmocka_unit_test(many_in_one_place),      cmocka_unit_test(far_from_the_origin),
-        cmocka_unit_test(fog),                    cmocka_unit_test(opaque_stacks),
-        cmocka_unit_test(bad_values),             cmocka_unit_test(wide_lenses),
-        cmocka_unit_test(cuts_through_the_eye),   cmocka_unit_test(nothing_in_view),
-        cmocka_unit_test(threads_give_the_same_bits), cmocka_unit_test(what_cannot_be_drawn),
-        cmocka_unit_test(files_that_cannot_be_sorted), cmocka_unit_test(no_memory_is_a_status),
+        cmocka_unit_test(views_from_all_sides),
+        cmocka_unit_test(turning),
+        cmocka_unit_test(needles_and_pancakes),
+        cmocka_unit_test(camera_inside),
+        cmocka_unit_test(many_in_one_place),
+        cmocka_unit_test(far_from_the_origin),
+        cmocka_unit_test(fog),
+        cmocka_unit_test(opaque_stacks),
+        cmocka_unit_test(bad_values),
+        cmocka_unit_test(wide_lenses),
+        cmocka_unit_test(cuts_through_the_eye),
+        cmocka_unit_test(nothing_in_view),
+        cmocka_unit_test(threads_give_the_same_bits),
+        cmocka_unit_test(what_cannot_be_drawn),
+        cmocka_unit_test(files_that_cannot_be_sorted),
+        cmocka_unit_test(no_memory_is_a_status),
     };
     return cmocka_run_group_tests(tests, make_name, remove_file);
 }

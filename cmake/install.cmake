@@ -11,7 +11,7 @@ install(DIRECTORY docs examples DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN "*.h
 
 # find_package(gbtrace), target gbtrace::gbtrace: the shared library.
 install(EXPORT gbtrace NAMESPACE gbtrace:: FILE gbtraceConfig.cmake DESTINATION ${package_folder})
-write_basic_package_version_file(${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake COMPATIBILITY SameMajorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake DESTINATION ${package_folder})
 
 # pkg-config gbtrace, and --static: our archive on the shared libraries of others. Paths are found from the file's own place, so the tree can be moved.
@@ -36,11 +36,28 @@ No GPU is needed. Program, library and headers.")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+# A package is for the Debian that it was built on, whose libraries it needs, and says so in its version: 1.0.0+deb12.
+set(debian_version ${PROJECT_VERSION})
+if(EXISTS ${CMAKE_SYSROOT}/etc/os-release)
+  file(STRINGS ${CMAKE_SYSROOT}/etc/os-release debian REGEX "^(ID=debian|VERSION_ID=)")
+  if(debian MATCHES "ID=debian" AND debian MATCHES "VERSION_ID=\"([0-9]+)\"")
+    string(APPEND debian_version "+deb${CMAKE_MATCH_1}")
+  endif()
+endif()
+set(CPACK_DEBIAN_PACKAGE_VERSION ${debian_version})
+if(CMAKE_CROSSCOMPILING)
+  set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE arm64)
+endif()
+# The same bytes from the same sources: all files have one time, that of the release.
+set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/cmake/debian/one_time.cmake)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "colmap, ffmpeg")
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
-# Change log, copyright, and the place of zsh's completion, for a tree that goes into /usr.
+# Change log with the release's day, copyright, and the place of zsh's completion, for a tree that goes into /usr.
+file(STRINGS CHANGELOG.md release_day REGEX "^## \\[${PROJECT_VERSION}\\] - ")
+string(REGEX MATCH "[0-9]+-[0-9]+-[0-9]+$" release_day "${release_day}")
+execute_process(COMMAND date -u -R -d "${release_day}" OUTPUT_VARIABLE release_day OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
 foreach(file changelog copyright install.cmake)
   configure_file(cmake/debian/${file}.in ${CMAKE_BINARY_DIR}/debian/${file} @ONLY)
 endforeach()

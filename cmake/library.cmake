@@ -25,11 +25,7 @@ foreach(library gbtrace_library gbtrace_shared)
 endforeach()
 
 # The soname says which programs can run with which library: include/gbtrace/version.h.
-set(GBT_SOVERSION ${PROJECT_VERSION_MAJOR})
-if(PROJECT_VERSION_MAJOR EQUAL 0)
-  set(GBT_SOVERSION 0.${PROJECT_VERSION_MINOR})
-endif()
-set_target_properties(gbtrace_shared PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${GBT_SOVERSION} EXPORT_NAME gbtrace
+set_target_properties(gbtrace_shared PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR} EXPORT_NAME gbtrace
   LINK_DEPENDS ${CMAKE_SOURCE_DIR}/cmake/gbtrace.map)
 # The map hides what C++ headers export; calls among our own functions stay inside the library.
 target_link_options(gbtrace_shared PRIVATE -Wl,--version-script=${CMAKE_SOURCE_DIR}/cmake/gbtrace.map -Wl,-Bsymbolic-functions)

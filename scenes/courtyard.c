@@ -41,7 +41,7 @@ static void look_at_square(const surface *s, look *l)
     switch (s->material) {
     case PAVING: {
         /* Rings of setts around the fountain; big slabs outside. */
-        const float r = hypotf(p[0], p[1]), angle = atan2f(p[1], p[0]);
+        const float r = hypotf(p[0], p[1]), angle = (float)atan2(p[1], p[0]);
         float edge, tone;
         if (r < 8.0f) {
             const float ring = floorf(r / 0.55f), around = ring * 6 + 8;

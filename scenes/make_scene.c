@@ -17,8 +17,10 @@
 #include "scenes/photo.h"
 #include "scenes/recipe.h"
 #include "scenes/sparse.h"
+#include "scenes/surface_gaussians.h"
 
-static const recipe *const recipes[] = {&recipe_tabletop, &recipe_courtyard, &recipe_terrain};
+static const recipe *const recipes[] = {&recipe_tabletop, &recipe_courtyard, &recipe_terrain,
+                                        &recipe_district};
 
 enum {
     RECIPE_COUNT = sizeof recipes / sizeof recipes[0],
@@ -43,7 +45,7 @@ gbt_make_scene_def gbt_make_scene_def_default(void)
 const char *const *gbt_make_scene_names(void)
 {
     /* Kept beside `recipes`; tests compare the two through gbt_make_scene(). */
-    static const char *const names[RECIPE_COUNT + 1] = {"tabletop", "courtyard", "terrain", NULL};
+    static const char *const names[RECIPE_COUNT + 1] = {"tabletop", "courtyard", "terrain", "district", NULL};
     return names;
 }
 
@@ -83,6 +85,7 @@ static gbt_status check_def(const gbt_make_scene_def *def, gbt_error *err)
     GBT_TRY(check_range("height", def->height, 8, 8192, err));
     GBT_TRY(check_range("view_count", def->view_count, 3, 9999, err));
     GBT_TRY(check_range("points", def->points, 1, 10000000, err));
+    GBT_TRY(check_range("gaussians", def->gaussians, 0, 1000000000, err));
     GBT_TRY(check_range("samples", def->samples, 1, 1024, err));
     if (!(def->point_noise >= 0 && def->point_noise <= 0.1))
         return base_fail(err, GBT_ERR_ARGUMENT, "point_noise: %g (wanted 0 to 0.1)", def->point_noise);
@@ -105,11 +108,15 @@ static gbt_camera place_camera(const recipe *r, const gbt_make_scene_def *def, i
     const double angle = 6.283185307179586 * view / def->view_count;
     double eye[3] = {(double)ring->radius * cos(angle), (double)ring->radius * sin(angle),
                      (double)ring->height},
-           forward[3];
+           target[3], forward[3];
+    for (int k = 0; k < 3; k++)
+        target[k] = (double)r->target[k];
+    if (r->stand != NULL)
+        r->stand(view, def->view_count, eye, target);
     for (int k = 0; k < 3; k++) {
         eye[k] += (double)r->jitter * rng_normal(def->seed, STREAM_CAMERA + (uint64_t)k, (uint64_t)view);
         forward[k] =
-            (double)r->target[k] +
+            target[k] +
             (double)r->jitter * rng_normal(def->seed, STREAM_CAMERA + 3 + (uint64_t)k, (uint64_t)view) -
             eye[k];
     }
@@ -185,7 +192,9 @@ static gbt_status make_folder(const char *folder, const char *name, gbt_error *e
 static gbt_status write_about(const recipe *r, const gbt_make_scene_def *def, const char *folder,
                               gbt_error *err)
 {
-    char path[PATH_SIZE], text[4096];
+    char path[PATH_SIZE], text[4096], gaussians[32] = "";
+    if (def->gaussians > 0)
+        snprintf(gaussians, sizeof gaussians, " --gaussians %d", def->gaussians);
     GBT_TRY(file_join(path, sizeof path, folder, "SCENE.md", err));
     const int length =
         snprintf(text, sizeof text,
@@ -193,7 +202,7 @@ static gbt_status write_about(const recipe *r, const gbt_make_scene_def *def, co
                  "Made by gbtrace; everything here is computed, nothing was photographed. The command that "
                  "makes it again, bit for bit on the same kind of machine:\n\n"
                  "    gbtrace make-scene %s -o DIR --width %d --height %d --views %d --points %d "
-                 "--point-noise %.9g --samples %d --seed %" PRIu64 "%s%s\n\n"
+                 "--point-noise %.9g --samples %d --seed %" PRIu64 "%s%s%s\n\n"
                  "- `images/`: %d photos of %d x %d pixels, display-referred colours.\n"
                  "- `sparse/0/`: cameras (%s, exact poses) and at most %d points in COLMAP's binary format. "
                  "A point lies on a surface that at least\n"
@@ -202,7 +211,7 @@ static gbt_status write_about(const recipe *r, const gbt_make_scene_def *def, co
                  "%s",
                  r->name, r->about, r->name, def->width, def->height, def->view_count, def->points,
                  def->point_noise, def->samples, def->seed, def->depth ? " --depth" : "",
-                 def->distorted ? " --distorted" : "", def->view_count, def->width, def->height,
+                 def->distorted ? " --distorted" : "", gaussians, def->view_count, def->width, def->height,
                  def->distorted ? "OPENCV with distortion" : "PINHOLE", def->points, def->point_noise,
                  def->depth ? "- `depth/`: float EXR, distance along the ray through each pixel's centre to "
                               "the first surface, scene units; 0 where there is none.\n"
@@ -242,7 +251,13 @@ static gbt_status write_scene(const world *w, const recipe *r, const gbt_make_sc
             status = base_fail(err, job.status[v], "%s", job.errors[v].text);
     if (status == GBT_OK)
         status = sparse_write(w, cameras, name_list, views, job.seeds, per_view, (size_t)def->points,
-                              def->point_noise, def->seed, folder, err);
+                              def->point_noise, r->sight, def->seed, folder, err);
+    if (status == GBT_OK && def->gaussians > 0) {
+        char path[PATH_SIZE];
+        status = file_join(path, sizeof path, folder, "gaussians.ply", err);
+        if (status == GBT_OK)
+            status = surface_gaussians_write(w, path, (size_t)def->gaussians, def->seed, err);
+    }
     if (status == GBT_OK)
         status = write_about(r, def, folder, err);
 done:

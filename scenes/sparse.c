@@ -18,7 +18,7 @@
 /* Streams of random numbers; photos use 1 to 10000 (photo.c), cameras 2^24 and after (make_scene.c). */
 enum { STREAM_CHOICE = 1 << 20, STREAM_TRACK = 1 << 21, STREAM_NOISE = 1 << 22, STREAM_OUTLIER = 1 << 23 };
 
-enum { MIN_TRACK = 3, OUTLIER_EVERY = 100 };
+enum { MIN_TRACK = 3, OUTLIER_EVERY = 100, ROUND = 16384 /* candidates that are looked at together */ };
 
 static const double observation_noise_px = 0.3;
 static const float least_cosine = 0.15f; /* flatter views find no features */
@@ -60,7 +60,7 @@ typedef struct track {
     double point[3];
     float dir[3]; /* of the ray of its first view, unit */
     unsigned char color[3];
-    uint32_t first, count; /* in `views`, [first, first + count); count 0: no usable track */
+    uint32_t count; /* of these views; 0: no usable track */
 } track;
 
 typedef struct search {
@@ -69,9 +69,10 @@ typedef struct search {
     size_t view_count, per_view, candidate_count;
     const sparse_seed *seeds;
     uint64_t seed;
+    float sight;         /* 0: no limit */
     size_t first;        /* of the candidates that this round looks at */
-    track *tracks;       /* [candidate_count] */
-    unsigned char *seen; /* [candidate_count][view_count]: 1 where the view observes the candidate */
+    track *tracks;       /* [ROUND] of this round, as all that follows */
+    unsigned char *seen; /* [ROUND][view_count]: 1 where the view observes the candidate */
 } search;
 
 /** Does a view see this point of a surface in frame, unhidden and not too flat? */
@@ -81,6 +82,8 @@ static bool sees(const search *q, size_t view, const double point[3], const floa
     double to_point[3], in_camera[3], pixel[2];
     for (int k = 0; k < 3; k++)
         to_point[k] = point[k] - camera->center[k];
+    if (q->sight > 0 && dvec_length(to_point) > (double)q->sight)
+        return false;
     dmat_apply(camera->rotation, to_point, in_camera);
     if (in_camera[2] <= 0 || !gbt_camera_project(camera, in_camera, pixel))
         return false;
@@ -105,8 +108,8 @@ static void find_tracks(size_t block, size_t begin, size_t end, void *context)
         /* Candidates go round the views, so that a prefix of the list covers all of them. */
         const size_t view = i % q->view_count;
         const sparse_seed *at = q->seeds + view * q->per_view + i / q->view_count;
-        track *t = q->tracks + i;
-        unsigned char *seen = q->seen + i * q->view_count;
+        track *t = q->tracks + (i - q->first);
+        unsigned char *seen = q->seen + (i - q->first) * q->view_count;
         memset(t, 0, sizeof *t);
         memset(seen, 0, q->view_count);
         float origin[3], rgb[3];
@@ -122,8 +125,9 @@ static void find_tracks(size_t block, size_t begin, size_t end, void *context)
         }
         uint32_t count = 0;
         for (size_t v = 0; v < q->view_count; v++) {
-            const bool is_found = v == view || (double)rng_uniform(q->seed, STREAM_TRACK + v, i) < keep_share;
-            if (is_found && sees(q, v, t->point, s.geometric)) {
+            if (v != view && (double)rng_uniform(q->seed, STREAM_TRACK + v, i) >= keep_share)
+                continue;
+            if (sees(q, v, t->point, s.geometric)) {
                 seen[v] = 1;
                 count++;
             }
@@ -138,7 +142,7 @@ static void observe(const search *q, size_t candidate, size_t view, double pixel
     const gbt_camera *camera = q->cameras + view;
     double in_camera[3];
     for (int k = 0; k < 3; k++)
-        in_camera[k] = q->tracks[candidate].point[k] - camera->center[k];
+        in_camera[k] = q->tracks[candidate - q->first].point[k] - camera->center[k];
     dmat_apply(camera->rotation, in_camera, in_camera);
     gbt_camera_project(camera, in_camera, pixel);
     for (int k = 0; k < 2; k++)
@@ -149,8 +153,8 @@ static void observe(const search *q, size_t candidate, size_t view, double pixel
 /** The position that is written: the true one with noise, or an outlier. */
 static void disturb(const search *q, size_t candidate, size_t number, double point_noise, double out[3])
 {
-    const track *t = q->tracks + candidate;
-    const unsigned char *seen = q->seen + candidate * q->view_count;
+    const track *t = q->tracks + (candidate - q->first);
+    const unsigned char *seen = q->seen + (candidate - q->first) * q->view_count;
     double nearest = INFINITY;
     for (size_t v = 0; v < q->view_count; v++) {
         double to_point[3];
@@ -178,7 +182,7 @@ static double reprojection_error(const search *q, size_t candidate, const double
     for (size_t v = 0; v < q->view_count; v++) {
         const gbt_camera *camera = q->cameras + v;
         double in_camera[3], projected[2], observed[2];
-        if (q->seen[candidate * q->view_count + v] == 0)
+        if (q->seen[(candidate - q->first) * q->view_count + v] == 0)
             continue;
         for (int k = 0; k < 3; k++)
             in_camera[k] = position[k] - camera->center[k];
@@ -186,7 +190,7 @@ static double reprojection_error(const search *q, size_t candidate, const double
         if (!gbt_camera_project(camera, in_camera, projected))
             continue;
         observe(q, candidate, v, observed);
-        sum += hypot(projected[0] - observed[0], projected[1] - observed[1]);
+        sum += dvec_length2(projected[0] - observed[0], projected[1] - observed[1]);
         count++;
     }
     return count > 0 ? sum / count : 0;
@@ -214,10 +218,12 @@ static void cloud_free(cloud *c, size_t view_count)
     memset(c, 0, sizeof *c);
 }
 
-static gbt_status collect(const search *q, size_t wanted, double point_noise, cloud *c, gbt_error *err)
+/* The points of this round, up to `wanted` in all. */
+static gbt_status collect(const search *q, size_t count, size_t wanted, double point_noise, cloud *c,
+                          gbt_error *err)
 {
-    for (size_t i = 0; i < q->candidate_count && c->point_count < wanted; i++) {
-        track *t = q->tracks + i;
+    for (size_t i = q->first; i < q->first + count && c->point_count < wanted; i++) {
+        const track *t = q->tracks + (i - q->first);
         if (t->count == 0)
             continue;
         GBT_TRY(mem_reserve((void **)&c->points, &c->point_capacity, c->point_count, c->point_count + 1,
@@ -229,9 +235,8 @@ static gbt_status collect(const search *q, size_t wanted, double point_noise, cl
         memcpy(p->color, t->color, sizeof p->color);
         disturb(q, i, c->point_count, point_noise, p->position);
         p->error = reprojection_error(q, i, p->position);
-        t->first = (uint32_t)c->track_count;
         for (size_t v = 0; v < q->view_count; v++) {
-            if (q->seen[i * q->view_count + v] == 0)
+            if (q->seen[(i - q->first) * q->view_count + v] == 0)
                 continue;
             GBT_TRY(mem_reserve((void **)&c->observations[v], &c->observation_capacity[v],
                                 c->observation_count[v], c->observation_count[v] + 1,
@@ -247,17 +252,21 @@ static gbt_status collect(const search *q, size_t wanted, double point_noise, cl
         }
         c->point_count++;
     }
-    /* The track array has stopped moving: only now may points refer to it. */
+    return GBT_OK;
+}
+
+/* The track array has stopped moving: only now may points refer to it. */
+static void refer_to_tracks(cloud *c)
+{
     for (size_t i = 0, next = 0; i < c->point_count; i++) {
         c->points[i].track = &c->track[next][0];
         next += c->points[i].track_count;
     }
-    return GBT_OK;
 }
 
 gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *const *names,
                         size_t view_count, const sparse_seed *seeds, size_t per_view, size_t wanted,
-                        double point_noise, uint64_t seed, const char *folder, gbt_error *err)
+                        double point_noise, float sight, uint64_t seed, const char *folder, gbt_error *err)
 {
     gbt_status status = GBT_ERR_NO_MEMORY;
     cloud c = {0};
@@ -267,9 +276,10 @@ gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *c
                 .per_view = per_view,
                 .candidate_count = view_count * per_view,
                 .seeds = seeds,
-                .seed = seed};
-    q.tracks = mem_alloc(q.candidate_count, sizeof *q.tracks, "sparse candidates", err);
-    q.seen = mem_alloc(q.candidate_count, view_count, "sparse visibility", err);
+                .seed = seed,
+                .sight = sight};
+    q.tracks = mem_alloc(ROUND, sizeof *q.tracks, "sparse candidates", err);
+    q.seen = mem_alloc(ROUND, view_count, "sparse visibility", err);
     c.observations = mem_calloc(view_count, sizeof *c.observations, "sparse observations", err);
     c.observation_count = mem_calloc(view_count, sizeof *c.observation_count, "sparse observations", err);
     c.observation_capacity =
@@ -278,20 +288,16 @@ gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *c
     if (q.tracks == NULL || q.seen == NULL || c.observations == NULL || c.observation_count == NULL ||
         c.observation_capacity == NULL || c.images == NULL)
         goto done;
-    /* Rounds, because most scenes need only the first one or two: the others are for views that hardly
-       overlap. */
-    size_t usable = 0, looked_at = 0;
-    while (usable < wanted && looked_at < q.candidate_count) {
-        const size_t left = q.candidate_count - looked_at, round = left < wanted ? left : wanted;
-        q.first = looked_at;
+    status = GBT_OK;
+    while (status == GBT_OK && c.point_count < wanted && q.first < q.candidate_count) {
+        const size_t left = q.candidate_count - q.first, round = left < ROUND ? left : ROUND;
         parallel_blocks(round, 64, find_tracks, &q);
-        for (; looked_at < q.first + round; looked_at++)
-            usable += q.tracks[looked_at].count > 0;
+        status = collect(&q, round, wanted, point_noise, &c, err);
+        q.first += round;
     }
-    q.candidate_count = looked_at;
-    status = collect(&q, wanted, point_noise, &c, err);
     if (status != GBT_OK)
         goto done;
+    refer_to_tracks(&c);
     for (size_t v = 0; v < view_count; v++)
         c.images[v] = (colmap_image){names[v], cameras[v], c.observation_count[v], c.observations[v]};
     char path[4096];

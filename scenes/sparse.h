@@ -28,9 +28,12 @@ void sparse_choose(const image *photo, uint64_t seed, uint64_t view, size_t want
  *
  * @param seeds [view_count][per_view]
  * @param names [view_count]
+ * @param sight a view finds no point that is farther; 0: no limit
+ *
+ * Memory: the points and their observations, some 100 bytes and 32 for each view of a point.
  */
 gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *const *names,
                         size_t view_count, const sparse_seed *seeds, size_t per_view, size_t wanted,
-                        double point_noise, uint64_t seed, const char *folder, gbt_error *err);
+                        double point_noise, float sight, uint64_t seed, const char *folder, gbt_error *err);
 
 #endif

@@ -84,7 +84,7 @@ static void look_at_room(const surface *s, look *l)
         break;
     }
     case RUG: {
-        const float r = hypotf(p[0], p[1]), angle = atan2f(p[1], p[0]);
+        const float r = hypotf(p[0], p[1]), angle = (float)atan2(p[1], p[0]);
         const float wave = r + 0.035f * sinf(12 * angle);
         if (wave < 0.42f)
             set(albedo, 0.78f, 0.68f, 0.46f);
@@ -244,8 +244,9 @@ static void look_at_room(const surface *s, look *l)
                                          {0.82f, 0.50f, 0.10f},
                                          {0.42f, 0.16f, 0.46f}};
         const float half = 0.075f, a = u / half, b = v / half;
-        const int side =
-            s->normal[2] > 0.5f ? 4 : (int)floorf((atan2f(s->normal[1], s->normal[0]) + 6.6f) / 1.5708f) & 3;
+        const int side = s->normal[2] > 0.5f
+                             ? 4
+                             : (int)floorf(((float)atan2(s->normal[1], s->normal[0]) + 6.6f) / 1.5708f) & 3;
         const float *ink = inks[(s->variant + side) % 5];
         set(albedo, 0.86f, 0.76f, 0.56f);
         texture_scale(albedo, 1 + 0.08f * texture_noise(12 * p[0], 12 * p[1], 60 * p[2]));

@@ -22,6 +22,8 @@ typedef struct gbt_make_scene_def {
     uint64_t seed;      /* of the camera jitter, the samples and the sparse cloud; the geometry is fixed.
                            Default 1. */
     bool depth;         /* also write exact depth, depth/NNNN.exr. Default false. */
+    int gaussians;      /* also write so many flat Gaussians on the surfaces, gaussians.ply, [0, 1000000000].
+                           Default 0. */
     bool distorted;     /* OPENCV cameras with moderate distortion, else PINHOLE. Default false. */
     uint32_t cookie_;   /* set by gbt_make_scene_def_default() */
 } gbt_make_scene_def;
@@ -40,7 +42,9 @@ const char *gbt_make_scene_summary(const char *name);
  * Files: images/NNNN.png (8 bit, display-referred), sparse/0/{cameras,images,points3D}.bin, SCENE.md (what it
  * shows and how it was made) and, with def->depth, depth/NNNN.exr: one float channel, the distance along the
  * ray through the pixel's centre from the camera centre to the first surface, scene units (not z), 0 where
- * nothing is hit. Existing files of these names are replaced, others stay.
+ * nothing is hit; with def->gaussians, gaussians.ply: plain Gaussians of degree 3, 248 bytes each, spread
+ * evenly over the surfaces in the colours that are seen from in front. Existing files of these names are
+ * replaced, others stay.
  *
  * Every sparse point lies on a surface that at least three views really see, moved by Gaussian noise; its
  * observations are the projections of the true point with 0.3 px of noise. One point in a hundred is an

@@ -6,11 +6,10 @@
 #include "gbtrace/api.h"
 
 /**
- * The version of these headers. While the first number is 0, another second number means that programs must
- * be compiled again; after that, another first one. The name of the shared library (soname) says the same:
- * libgbtrace.so.0.2.
+ * The version of these headers. Another first number means that programs must be compiled again. The name of
+ * the shared library (soname) says the same: libgbtrace.so.1.
  */
-#define GBT_VERSION "0.2.0"
+#define GBT_VERSION "1.0.0"
 
 GBT_API_BEGIN
 

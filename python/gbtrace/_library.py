@@ -140,7 +140,7 @@ FUNCTIONS = {
 def _load():
     """The library in GBTRACE_LIBRARY, else the one in this package, else the system's."""
     own = Path(__file__).with_name("libgbtrace.so")
-    path = os.environ.get("GBTRACE_LIBRARY") or (str(own) if own.exists() else "libgbtrace.so.0.2")
+    path = os.environ.get("GBTRACE_LIBRARY") or (str(own) if own.exists() else "libgbtrace.so.1")
     try:
         library = c.CDLL(path)
     except OSError as error:

@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "base/camera_lens_radial.h"
+#include "base/vec.h"
 
 #define PI 3.14159265358979323846
 
@@ -120,7 +121,7 @@ static bool invert_radius(const camera_lens *lens, double wanted, double enough,
 
 static bool invert_radial(const camera_lens *lens, double enough, double p[2])
 {
-    const double wanted = hypot(p[0], p[1]);
+    const double wanted = dvec_length2(p[0], p[1]);
     double radius;
     if (!invert_radius(lens, wanted, enough, &radius))
         return false;
@@ -162,7 +163,7 @@ static bool invert_mixed(const camera_lens *lens, const double wanted[2], double
         if (!nearer)
             break;
     }
-    return hypot(rx, ry) <= tolerance_of(lens, hypot(wanted[0], wanted[1])) && unfolded(j);
+    return dvec_length2(rx, ry) <= tolerance_of(lens, dvec_length2(wanted[0], wanted[1])) && unfolded(j);
 }
 
 static bool undistort(const camera_lens *lens, double p[2])
@@ -171,7 +172,7 @@ static bool undistort(const camera_lens *lens, double p[2])
         const double wanted[2] = {p[0], p[1]};
         if (lens->radial && !lens->extra_last && !invert_radial(lens, 1e-3, p)) {
             /* The extra terms may reach a little beyond the radial range: start inside it. */
-            const double scale = 0.9 * lens->radius_max / hypot(wanted[0], wanted[1]);
+            const double scale = 0.9 * lens->radius_max / dvec_length2(wanted[0], wanted[1]);
             p[0] = wanted[0] * scale;
             p[1] = wanted[1] * scale;
         }
@@ -180,12 +181,12 @@ static bool undistort(const camera_lens *lens, double p[2])
     }
     if (lens->radial && (!lens->extra || lens->extra_last) && !invert_radial(lens, 0, p))
         return false;
-    return hypot(p[0], p[1]) <= lens->radius_max;
+    return dvec_length2(p[0], p[1]) <= lens->radius_max;
 }
 
 static bool unproject_fov(const camera_lens *lens, double p[2])
 {
-    const double omega = fabs(lens->shape[0]), wanted = hypot(p[0], p[1]);
+    const double omega = fabs(lens->shape[0]), wanted = dvec_length2(p[0], p[1]);
     if (!(wanted * omega < 0.5 * PI))
         return false;
     const double scale = wanted > 0 ? tan(wanted * omega) / (2 * tan(0.5 * omega) * wanted) : 1;
@@ -252,7 +253,7 @@ bool camera_lens_unproject(const camera_lens *lens, double px, double py, double
         return false;
     }
     if (lens->kind == LENS_FISHEYE) {
-        const double theta = hypot(p[0], p[1]);
+        const double theta = dvec_length2(p[0], p[1]);
         if (!(theta <= PI))
             return false;
         const double scale = theta > 0 ? sin(theta) / theta : 1;
@@ -300,14 +301,14 @@ static bool project_closed(const camera_lens *lens, const double point[3], doubl
 bool camera_lens_project(const camera_lens *lens, const double point_cam[3], double pixel[2])
 {
     const double x = point_cam[0], y = point_cam[1], z = point_cam[2];
-    const double rho = hypot(x, y);
+    const double rho = dvec_length2(x, y);
     if (!(isfinite(rho) && isfinite(z)) || (rho == 0 && z == 0))
         return false;
     double p[2] = {0, 0}, scale;
     switch (lens->kind) {
     case LENS_EQUIRECTANGULAR:
         pixel[0] = lens->fx * (atan2(x, z) / (2 * PI) + 0.5);
-        pixel[1] = lens->fy * (atan2(y, hypot(x, z)) / PI + 0.5);
+        pixel[1] = lens->fy * (atan2(y, dvec_length2(x, z)) / PI + 0.5);
         return true;
     case LENS_PERSPECTIVE:
     case LENS_FOV:
@@ -338,7 +339,7 @@ bool camera_lens_project(const camera_lens *lens, const double point_cam[3], dou
         break;
     }
     if (lens->kind == LENS_FOV) {
-        const double omega = lens->shape[0], r = hypot(p[0], p[1]);
+        const double omega = lens->shape[0], r = dvec_length2(p[0], p[1]);
         scale = r > 0 ? atan(2 * r * tan(0.5 * omega)) / (r * omega) : 1;
         p[0] *= scale;
         p[1] *= scale;

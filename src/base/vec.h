@@ -23,6 +23,9 @@ static inline void dvec_cross(const double a[3], const double b[3], double out[3
 
 static inline double dvec_length(const double a[3]) { return sqrt(dvec_dot(a, a)); }
 
+/** The length of (x, y): the same bits everywhere, which hypot does not have. */
+static inline double dvec_length2(double x, double y) { return sqrt(x * x + y * y); }
+
 /** a scaled to length 1; a zero vector stays zero. */
 static inline void dvec_normalize(double a[3])
 {

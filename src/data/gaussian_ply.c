@@ -92,6 +92,11 @@ static gbt_status find_columns(const source_file *file, const ply_header *header
     return GBT_OK;
 }
 
+static int degree_of(size_t rest_count)
+{
+    return rest_count == 45 ? 3 : rest_count == 24 ? 2 : rest_count == 9 ? 1 : 0;
+}
+
 static gbt_status read_plain(const source_file *file, const ply_header *header, int vertex,
                              gaussian_cloud *out, gbt_error *err)
 {
@@ -106,7 +111,7 @@ static gbt_status read_plain(const source_file *file, const ply_header *header, 
                          file->size - header->data_at);
     GBT_TRY(gaussian_cloud_alloc(out, (size_t)row_count, err));
     out->count = 0; /* of rows that are usable */
-    out->sh_degree = rows.rest_count == 45 ? 3 : rows.rest_count == 24 ? 2 : rows.rest_count == 9 ? 1 : 0;
+    out->sh_degree = degree_of(rows.rest_count);
     return ply_read_rows(file, header, vertex, columns, FIXED_COLUMNS + rows.rest_count, add_row, &rows, err);
 }
 
@@ -177,4 +182,85 @@ gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *e
     if (status == GBT_OK)
         gaussian_cloud_warn(out, path);
     return status;
+}
+
+/* ---- by parts ---- */
+
+static gbt_status open_parts(const char *path, gaussian_ply_parts *out, gbt_error *err)
+{
+    GBT_TRY(large_file_open(path, &out->file, err));
+    const size_t size = out->file.size < PLY_MAX_HEADER_BYTES ? (size_t)out->file.size : PLY_MAX_HEADER_BYTES;
+    out->head = mem_alloc(size + 1, 1, "header", err);
+    if (out->head == NULL)
+        return GBT_ERR_NO_MEMORY;
+    GBT_TRY(large_file_read(&out->file, 0, out->head, size, err));
+    const source_file head = {path, out->head, size};
+    ply_header *header = &out->header;
+    GBT_TRY(ply_read_header(&head, header, err));
+    const int vertex = ply_find_element(header, "vertex");
+    if (vertex != 0 || compressed_ply_is(header) || ply_row_bytes(header, vertex) == 0)
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: cannot be read by parts (wanted a binary .ply that begins with its Gaussians)", path);
+    GBT_TRY(find_columns(&head, header, vertex, out->columns, &out->rest_count, err));
+    out->row_bytes = ply_row_bytes(header, vertex);
+    const uint64_t rows = header->elements[vertex].count;
+    if (rows > (out->file.size - header->data_at) / out->row_bytes)
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu Gaussians cannot be in the %llu bytes that follow", path,
+                         header->data_at, (unsigned long long)rows,
+                         (unsigned long long)(out->file.size - header->data_at));
+    out->count = (size_t)rows;
+    out->sh_degree = degree_of(out->rest_count);
+    out->antialiased = says(&head, header, "\n" GAUSSIAN_PLY_MIP) || says(&head, header, "\ncomment antialiased 1");
+    out->near = near_of(&head, header);
+    return GBT_OK;
+}
+
+gbt_status gaussian_ply_open(const char *path, gaussian_ply_parts *out, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    const gbt_status status = open_parts(path, out, err);
+    if (status != GBT_OK)
+        gaussian_ply_close(out);
+    return status;
+}
+
+typedef struct part_rows {
+    gaussian_rows rows;
+    uint32_t number, *kept;
+} part_rows;
+
+static void add_part_row(void *context, const double *values)
+{
+    part_rows *part = context;
+    const size_t before = part->rows.out->count;
+    add_row(&part->rows, values);
+    if (part->rows.out->count > before)
+        part->kept[before] = part->number;
+    part->number++;
+}
+
+gbt_status gaussian_ply_part(const gaussian_ply_parts *parts, size_t first, size_t count, unsigned char *bytes,
+                             gaussian_cloud *out, uint32_t *kept, gbt_error *err)
+{
+    const size_t size = count * parts->row_bytes;
+    GBT_TRY(large_file_read(&parts->file, parts->header.data_at + (uint64_t)first * parts->row_bytes, bytes, size,
+                            err));
+    /* These rows as a file of their own. */
+    ply_header header = parts->header;
+    header.element_count = 1;
+    header.elements[0].count = count;
+    header.data_at = 0;
+    const source_file file = {parts->file.name, bytes, size};
+    part_rows part = {.rows = {out, parts->rest_count}, .kept = kept};
+    out->count = 0;
+    out->sh_degree = parts->sh_degree;
+    return ply_read_rows(&file, &header, 0, parts->columns, FIXED_COLUMNS + parts->rest_count, add_part_row, &part,
+                         err);
+}
+
+void gaussian_ply_close(gaussian_ply_parts *parts)
+{
+    large_file_close(&parts->file, false, NULL);
+    mem_free(parts->head);
+    memset(parts, 0, sizeof *parts);
 }

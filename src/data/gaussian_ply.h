@@ -5,8 +5,10 @@
 
 #include <stdio.h>
 
+#include "base/large_file.h"
 #include "data/bytes.h"
 #include "data/gaussian_cloud.h"
+#include "data/ply.h"
 
 /** The line of a header that says that Gaussians are to be drawn as wide as pixels. */
 #define GAUSSIAN_PLY_MIP "comment SplatRenderMode: mip"
@@ -45,5 +47,35 @@ gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *e
 
 /** Whether the header names what every Gaussian has: false for points, anchors, and what is no .ply. */
 bool gaussian_ply_has_gaussians(const source_file *file);
+
+/** A binary .ply of plain Gaussians that is read by parts, because it may be larger than memory. Start from
+    {0}; end with gaussian_ply_close(). */
+typedef struct gaussian_ply_parts {
+    size_t count; /* rows */
+    int sh_degree;
+    bool antialiased; /* as in gaussian_cloud */
+    float near;
+    large_file file; /* the rest is internal */
+    unsigned char *head;
+    ply_header header;
+    int columns[PLY_MAX_COLUMNS + 1];
+    size_t rest_count, row_bytes;
+} gaussian_ply_parts;
+
+/** GBT_OK; GBT_ERR_IO; GBT_ERR_FORMAT, also for files whose rows are not all of one size (ASCII, packed). */
+gbt_status gaussian_ply_open(const char *path, gaussian_ply_parts *out, gbt_error *err);
+
+/**
+ * Rows [first, first + count), checked as gaussian_ply_read() does.
+ *
+ * @param bytes [in,out] room for count * row_bytes
+ * @param out   [in,out] has room for `count`; its Gaussians are replaced, what was left out is added up
+ * @param kept  [out]    [count] number of the row of each Gaussian in `out`, from `first`
+ * Threads: any, with distinct arrays.
+ */
+gbt_status gaussian_ply_part(const gaussian_ply_parts *parts, size_t first, size_t count, unsigned char *bytes,
+                             gaussian_cloud *out, uint32_t *kept, gbt_error *err);
+
+void gaussian_ply_close(gaussian_ply_parts *parts);
 
 #endif

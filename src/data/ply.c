@@ -52,6 +52,15 @@ static size_t least_row_bytes(const ply_header *header, const ply_element *e)
     return bytes;
 }
 
+size_t ply_row_bytes(const ply_header *header, int element)
+{
+    const ply_element *e = &header->elements[element];
+    for (size_t i = 0; i < e->property_count; i++)
+        if (header->properties[e->first_property + i].is_list)
+            return 0;
+    return header->format == PLY_ASCII ? 0 : least_row_bytes(header, e);
+}
+
 static gbt_status check_count(const source_file *file, const cursor *c, const ply_header *header,
                               const ply_element *e, gbt_error *err)
 {

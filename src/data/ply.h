@@ -54,6 +54,9 @@ gbt_status ply_read_header(const source_file *file, ply_header *out, gbt_error *
 int ply_find_element(const ply_header *header, const char *name);
 int ply_find_property(const ply_header *header, int element, const char *name);
 
+/** Bytes of a row of an element whose rows all have the same number; 0: ASCII, or rows with lists. */
+size_t ply_row_bytes(const ply_header *header, int element);
+
 /** One row: the wanted columns in the order asked for, integers as they are. */
 typedef void ply_row(void *context, const double *values);
 

@@ -14,6 +14,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/vec.h"
 #include "data/colmap_bin.h"
 #include "data/colmap_txt.h"
 #include "data/ply.h"
@@ -391,7 +392,8 @@ double scene_camera_extent(const scene *s)
     for (size_t i = 0; i < s->view_count; i++)
         if (!s->views[i].is_test) {
             const double *c = s->views[i].camera.center;
-            farthest = fmax(farthest, hypot(hypot(c[0] - mean[0], c[1] - mean[1]), c[2] - mean[2]));
+            const double from_mean[3] = {c[0] - mean[0], c[1] - mean[1], c[2] - mean[2]};
+            farthest = fmax(farthest, dvec_length(from_mean));
         }
     return fmax(1.1 * farthest, 1e-3); /* one camera, or all at one place, must not freeze the learning rate
                                           at 0 */

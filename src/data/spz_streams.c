@@ -35,7 +35,7 @@ gbt_status spz_header_of(const gaussian_cloud *cloud, const double origin[3], un
                         .count = (uint32_t)cloud->count,
                         .degree = cloud->sh_degree,
                         .flags = cloud->antialiased ? SPZ_ANTIALIASED : 0};
-    while (out->fraction < FRACTION_BITS_MAX && largest * exp2(out->fraction + 1) <= COORDINATE_MAX)
+    while (out->fraction < FRACTION_BITS_MAX && ldexp(largest, out->fraction + 1) <= COORDINATE_MAX)
         out->fraction++;
     return GBT_OK;
 }
@@ -87,8 +87,8 @@ void spz_put_stream(sink *s, const gaussian_cloud *cloud, const double origin[3]
         const float *mean = cloud->mean + 3 * i, *scale = cloud->scale_log + 3 * i,
                     *sh = cloud->sh + i * GAUSSIAN_SH_COUNT * 3;
         for (size_t k = 0; k < 3 && stream == 0; k++)
-            sink_put_uint(
-                s, (uint64_t)(int64_t)llrint(((double)mean[k] + origin[k]) * exp2(header->fraction)), 3);
+            sink_put_uint(s, (uint64_t)(int64_t)llrint(ldexp((double)mean[k] + origin[k], header->fraction)),
+                          3);
         if (stream == 1)
             sink_put_level(s, 255 * (double)cloud->opacity[i]);
         for (size_t c = 0; c < 3 && stream == 2; c++)
@@ -156,7 +156,7 @@ gbt_status spz_unpack(const unsigned char *streams, const spz_header *header, ga
     for (size_t i = 0; i < 3 * n; i++) {
         const uint32_t bits =
             (uint32_t)at[3 * i] | (uint32_t)at[3 * i + 1] << 8 | (uint32_t)at[3 * i + 2] << 16;
-        out->mean[i] = (float)(((double)bits - (bits & 0x800000 ? 0x1p24 : 0)) * exp2(-header->fraction));
+        out->mean[i] = (float)(ldexp((double)bits - (bits & 0x800000 ? 0x1p24 : 0), -header->fraction));
         out->scale_log[i] = (float)scale[i] / 16 - 10;
     }
     memset(out->sh, 0, n * GAUSSIAN_SH_COUNT * 3 * sizeof *out->sh);

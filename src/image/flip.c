@@ -16,6 +16,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/vec.h"
 
 enum {
     ROWS_PER_BLOCK = 16,
@@ -90,7 +91,7 @@ static void invert(const double m[3][3], double out[3][3])
 static double lab_curve(double t)
 {
     const double delta = 6.0 / 29;
-    return t > delta * delta * delta ? cbrt(t) : t / (3 * delta * delta) + 4.0 / 29;
+    return t > delta * delta * delta ? pow(t, 1.0 / 3) : t / (3 * delta * delta) + 4.0 / 29;
 }
 
 /* Linear RGB to L*a*b*; then the Hunt effect: colours look less colourful in the dark. */
@@ -262,8 +263,10 @@ static void appearance(const flip_job *job, int source, size_t row, double *cons
         out[1][i] = lab[1];
         out[2][i] = lab[2];
         /* The detectors work on Y scaled to [0, 1]; their taps sum to 0, so only the factor matters. */
-        out[3][i] = hypot(filter_row(columns[4] + i, &f->edge), filter_row(columns[5] + i, &f->gauss)) / 116;
-        out[4][i] = hypot(filter_row(columns[4] + i, &f->point), filter_row(columns[6] + i, &f->gauss)) / 116;
+        out[3][i] =
+            dvec_length2(filter_row(columns[4] + i, &f->edge), filter_row(columns[5] + i, &f->gauss)) / 116;
+        out[4][i] =
+            dvec_length2(filter_row(columns[4] + i, &f->point), filter_row(columns[6] + i, &f->gauss)) / 116;
     }
 }
 

@@ -111,7 +111,7 @@ static gbt_status circle_make(const gbt_camera *cameras, size_t count, const cam
         const double x = dvec_dot(way, c->across[0]), y = dvec_dot(way, c->across[1]);
         /* from straight above there is no way around */
         station *s = &c->stations[i];
-        *s = (station){atan2(y, x), fmax(hypot(x, y), 0.05 * g->distance), dvec_dot(way, g->up), {0}};
+        *s = (station){atan2(y, x), fmax(dvec_length2(x, y), 0.05 * g->distance), dvec_dot(way, g->up), {0}};
         const double *forward = cameras[i].rotation + 6, depth = -dvec_dot(way, forward);
         for (int k = 0; k < 3 && depth > 0; k++)
             s->aim[k] = way[k] + depth * forward[k];

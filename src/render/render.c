@@ -67,6 +67,9 @@ typedef struct studio {
 static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *def, gbt_error *err)
 {
     loaded_run *r = &st->run;
+    if (r->cells.count > 0)
+        return cell_draw(&r->cell_drawer, &r->cells, shot, &r->settings, r->frame.draw.footprint, def->memory,
+                         &r->frame.rgb, err);
     const frame_tracer tracer = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
     GBT_TRY(frame_render_with(&r->frame, loaded_run_subject(r), shot, &r->settings,
                               def->insert != NULL ? &tracer : NULL, err));
@@ -260,6 +263,12 @@ static gbt_status choose_renderer(studio *st, const gbt_render_def *def, gbt_err
         *renderer = GBT_RENDERER_TRACE;
     else if (def->renderer != GBT_RENDERER_AS_TRAINED)
         *renderer = def->renderer;
+    if (st->run.cells.count > 0 &&
+        (st->in_double || *renderer != GBT_RENDERER_TRACE || def->insert != NULL || st->outputs != 0))
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "memory: what is larger than it is traced, cell by cell, in colours alone (wanted the renderer "
+            "trace, no outputs, no meshes)");
     if (def->insert != NULL && *renderer != GBT_RENDERER_TRACE)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
     if (st->outputs != 0 && *renderer != GBT_RENDERER_TRACE)
@@ -318,6 +327,34 @@ static gbt_status check_def(const char *out, const gbt_render_def *def, gbt_erro
     return check_path(out, def, err);
 }
 
+/* The folder that pictures or a film go to. */
+static void folder_of(const char *out, char folder[4096])
+{
+    const char *slash = strrchr(out, '/');
+    if (!video_named(out))
+        snprintf(folder, 4096, "%s", out);
+    else if (slash == NULL)
+        snprintf(folder, 4096, ".");
+    else
+        snprintf(folder, 4096, "%.*s", (int)(slash == out ? 1 : slash - out), out);
+}
+
+/* The model, and its views where they are wanted; by cells where memory is short. */
+static gbt_status open_run(const char *run, const char *out, const gbt_render_def *def, loaded_run *r,
+                           gbt_error *err)
+{
+    const bool wants_views = def->path != NULL ? render_path_wants_views(def->path) : def->camera == NULL;
+    char folder[4096];
+    bool large = false;
+    folder_of(out, folder);
+    if (def->memory > 0)
+        GBT_TRY(loaded_run_open_cells(run, def->memory, folder, &large, r, err));
+    if (large)
+        return wants_views ? loaded_run_open_views(run, def->data, def->downscale, r, err) : GBT_OK;
+    return wants_views ? loaded_run_open(run, def->data, def->downscale, r, err)
+                       : loaded_run_open_model(run, r, err);
+}
+
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)
 {
     GBT_TRY(check_def(out, def, err));
@@ -326,11 +363,9 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
     studio *st = mem_calloc(1, sizeof *st, "run", err);
     if (st == NULL)
         return GBT_ERR_NO_MEMORY;
-    const bool wants_views = def->path != NULL ? render_path_wants_views(def->path) : def->camera == NULL;
     gbt_status status = render_outputs_parse(def->outputs, &st->outputs, err);
     if (status == GBT_OK)
-        status = wants_views ? loaded_run_open(run, def->data, def->downscale, &st->run, err)
-                             : loaded_run_open_model(run, &st->run, err);
+        status = open_run(run, out, def, &st->run, err);
     if (status == GBT_OK)
         status = loaded_run_preset(def->preset, &st->run.settings, err);
     if (status == GBT_OK)

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "base/choice.h"
 #include "base/fail.h"
@@ -12,6 +13,7 @@
 #include "base/log.h"
 #include "data/cameras_json.h"
 #include "data/gaussian_file.h"
+#include "data/gaussian_ply.h"
 #include "data/result_folder.h"
 #include "train/camera_sees.h"
 #include "train/near.h"
@@ -69,6 +71,48 @@ static gbt_status open_cloud(const char *path, loaded_run *out, gbt_error *err)
     return file_is_folder(path) ? describe_folder(path, out, err) : GBT_OK;
 }
 
+/* The .ply of a result folder, or the file itself. */
+static gbt_status find_ply(const char *run, char out[RESULT_PATH_SIZE], bool *found, gbt_error *err)
+{
+    result_folder folder;
+    *found = false;
+    if (file_is_folder(run)) {
+        GBT_TRY(result_folder_find(run, &folder, found, err));
+        memcpy(out, folder.ply, RESULT_PATH_SIZE);
+        return GBT_OK;
+    }
+    const size_t length = strlen(run);
+    *found = length > 4 && length < RESULT_PATH_SIZE && strcasecmp(run + length - 4, ".ply") == 0;
+    snprintf(out, RESULT_PATH_SIZE, "%s", run);
+    return GBT_OK;
+}
+
+gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *folder, bool *large,
+                                 loaded_run *out, gbt_error *err)
+{
+    char ply[RESULT_PATH_SIZE];
+    gaussian_ply_parts parts;
+    memset(out, 0, sizeof *out);
+    GBT_TRY(find_ply(run, ply, large, err));
+    if (!*large)
+        return GBT_OK;
+    gbt_error why = {0}; /* what cannot be read by parts is read whole, and says what is wrong with it */
+    *large = gaussian_ply_open(ply, &parts, &why) == GBT_OK &&
+             cell_memory_whole(parts.count, parts.file.size) > memory;
+    gaussian_ply_close(&parts);
+    if (!*large)
+        return GBT_OK;
+    loaded_run_draw_plain(out);
+    GBT_TRY(cell_store_make(ply, folder, memory, 0, &out->cells, err));
+    memcpy(out->model.origin, out->cells.origin, sizeof out->model.origin);
+    if (out->cells.near > 0)
+        out->settings.t_near = out->cells.near;
+    if (file_is_folder(run))
+        GBT_TRY(describe_folder(run, out, err));
+    run_data_find(run, out->model.data_folder, &out->data);
+    return GBT_OK;
+}
+
 static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
 {
     char path[4096];
@@ -98,6 +142,8 @@ static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
     return GBT_OK;
 }
 
+static bool is_plain(const loaded_run *r) { return r->cloud.count > 0 || r->cells.count > 0; }
+
 /* Another data set of the same place has another local origin. */
 static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
 {
@@ -117,11 +163,11 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     const bool has_data = out->data.place[0] != '\0';
     char cameras[4096];
     GBT_TRY(file_join(cameras, sizeof cameras, run, "cameras.json", err));
-    if (data == NULL && out->cloud.count > 0 && !has_data && file_exists(cameras)) {
+    if (data == NULL && is_plain(out) && !has_data && file_exists(cameras)) {
         GBT_TRY(cameras_json_load(cameras, &out->scene, err));
         return place_views(downscale, out, err);
     }
-    if (data == NULL && out->cloud.count > 0 && !has_data)
+    if (data == NULL && is_plain(out) && !has_data)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%.1000s: plain Gaussians know no cameras (wanted `camera` or `data`)", run);
     if (data == NULL && !has_data)
@@ -160,6 +206,8 @@ void loaded_run_close(loaded_run *r)
 {
     model_free(&r->model);
     gaussian_cloud_free(&r->cloud);
+    cell_store_free(&r->cells);
+    cell_drawer_free(&r->cell_drawer);
     loaded_run_close_views(r);
     frame_free(&r->frame);
 }

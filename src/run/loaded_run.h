@@ -4,6 +4,7 @@
 #ifndef GBT_RUN_LOADED_RUN_H
 #define GBT_RUN_LOADED_RUN_H
 
+#include "cells/draw.h"
 #include "data/scene.h"
 #include "gbtrace/train.h"
 #include "io/model_file.h"
@@ -16,7 +17,9 @@ typedef struct loaded_run {
     model model;
     gaussian_cloud cloud; /* of a file of plain Gaussians, local coordinates; then `model` has no anchors and
                              is about the scene alone */
-    gbt_train_def def;    /* the settings it was trained with; strings point into `strings` */
+    cell_store cells;     /* of such a file that is larger than memory, in place of `cloud` */
+    cell_drawer cell_drawer;
+    gbt_train_def def; /* the settings it was trained with; strings point into `strings` */
     config_strings strings;
     run_data data; /* where its data set is */
     scene scene;   /* cameras and points in the model's local coordinates */
@@ -44,6 +47,16 @@ frame_subject loaded_run_subject(const loaded_run *r);
 
 /** The same without the data set: no views, no photos. For cameras that come from elsewhere. */
 gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *err);
+
+/**
+ * The same of a .ply of plain Gaussians, or a result folder with one, that would take more than `memory`
+ * bytes: it is sorted into out->cells, to be drawn by cell_draw() alone.
+ *
+ * @param folder [in]  where the temporary file is made
+ * @param large  [out] false: it would not, or it is something else; nothing has been opened then
+ */
+gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *folder, bool *large,
+                                 loaded_run *out, gbt_error *err);
 
 /** The other half of loaded_run_open(), for a run that has no views open: `run` is what messages call it. */
 gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out,

@@ -40,12 +40,15 @@ typedef struct packet_rays {
     _Alignas(64) float origin[3][PACKET_LANES];
     _Alignas(64) float dir[3][PACKET_LANES]; /* unit; lanes that are not active repeat an active one */
     _Alignas(64) float far[PACKET_LANES];    /* hits at this t_c or behind are not seen */
-    unsigned active;                         /* bit per lane; 0: the packet is not traced */
+    /* with tile_rays.parts, which list kernels and single rays know: */
+    _Alignas(64) float near[PACKET_LANES], through[PACKET_LANES]; /* see ray_image */
+    unsigned active; /* bit per lane; 0: the packet is not traced */
 } packet_rays;
 
 typedef struct packet_output {
     _Alignas(64) float rgb[3][PACKET_LANES]; /* with the background */
     _Alignas(64) float transmittance[PACKET_LANES];
+    unsigned ended; /* bit per lane, of parts of rays: it ended before a hit, by transmittance_min */
     /* with kernel_scene.extra; see trace_outputs */
     _Alignas(64) float weighted_depth[PACKET_LANES],
         median_depth[PACKET_LANES], normal[3][PACKET_LANES], hit_count[PACKET_LANES];
@@ -140,6 +143,7 @@ typedef struct kernel_scratch {
 typedef struct tile_rays {
     packet_rays packet[TILE_PACKETS];
     bool common_origin; /* all of them start at one point */
+    bool parts;         /* each sees a part of its way alone */
 } tile_rays;
 
 /** Trace a tile. `tape` is NULL when no adjoint will follow. False when memory ran out. */

@@ -15,7 +15,9 @@ typedef struct row_queue {
 
 /* What the rays of a packet still see. */
 typedef struct packet_sight {
-    vfloat16 far;     /* hits at this depth or behind are not seen */
+    vfloat16 far;  /* hits at this depth or behind are not seen */
+    vfloat16 near; /* of parts of rays: nor are hits nearer than this */
+    bool parts;
     vfloat16 product; /* of 1 - alpha over all hits so far */
     vfloat16 reached; /* the farthest of them */
 } packet_sight;
@@ -26,8 +28,9 @@ static inline void append_response(const list_rows *rows, size_t *count, const l
 {
     const int at = (int)*count;
     const vfloat16 zero = vfloat16_set1(0);
-    const vmask16 hit =
-        vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), vfloat16_lt(r.t, sight->far));
+    vmask16 hit = vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), vfloat16_lt(r.t, sight->far));
+    if (sight->parts)
+        hit = vmask16_and(hit, vfloat16_le(sight->near, r.t));
     const vfloat16 alpha = vfloat16_select(hit, vfloat16_min(r.raw, alpha_max), zero);
     row_store(rows->t, at, r.t);
     row_store(rows->alpha, at, alpha);
@@ -69,15 +72,19 @@ static void evaluate_queue(const kernel_scene *scene, const tile_list *list, con
 }
 
 /* All rows that can be seen. */
-static void gather_rows(const kernel_scene *scene, const tile_list *list, const packet_rays *rays,
+static void gather_rows(const kernel_scene *scene, const tile_list *list, const packet_rays *rays, bool parts,
                         const list_rays *seen, list_rows *rows, kernel_counters *counters)
 {
     const vfloat16 opaque = vfloat16_set1(0.9999f * scene->settings.transmittance_min),
                    length = vfloat16_mul(vfloat16_load(seen->length), vfloat16_set1(0.99999f)),
                    zero = vfloat16_set1(0);
     /* Rays that are not active see nothing. */
-    packet_sight sight = {vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
-                          vfloat16_set1(1), zero};
+    packet_sight sight = {
+        .far = vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
+        .near = parts ? vfloat16_load(rays->near) : zero,
+        .parts = parts,
+        .product = parts ? vfloat16_load(rays->through) : vfloat16_set1(1),
+        .reached = zero};
     row_queue queue = {.count = 0};
     rows->count = 0;
     for (size_t first = 0; first < list->count; first += 16) {
@@ -103,12 +110,13 @@ static void gather_rows(const kernel_scene *scene, const tile_list *list, const 
 }
 
 static bool blend_list(const kernel_scene *scene, const tile_list *list, const list_rows *from,
-                       const packet_rays *rays, int packet, packet_output *out, hit_tape *tape,
+                       const packet_rays *rays, bool parts, int packet, packet_output *out, hit_tape *tape,
                        kernel_counters *counters)
 {
     const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0), one = vfloat16_set1(1),
                    stop_at = vfloat16_set1(scene->settings.transmittance_min);
-    vfloat16 lowest = one, rgb[3] = {zero, zero, zero};
+    const vfloat16 start = parts ? vfloat16_load(rays->through) : one;
+    vfloat16 lowest = start, rgb[3] = {zero, zero, zero};
     const list_rows copy = *from, *rows = &copy;
     uint64_t hits = 0, blended = 0;
     size_t kept = tape != NULL ? tape->count : 0;
@@ -122,8 +130,8 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     tape_entry *entries = tape != NULL ? tape->entries : NULL;
     for (size_t i = 0; i < rows->count; i++) {
         const int row = (int)rows->order[i];
-        const vfloat16 T = row_load(rows->through, (int)i), alpha = row_load(rows->alpha, row),
-                       next = vfloat16_fnma(T, alpha, T);
+        const vfloat16 T = vfloat16_mul(start, row_load(rows->through, (int)i)),
+                       alpha = row_load(rows->alpha, row), next = vfloat16_fnma(T, alpha, T);
         const vmask16 hit = vfloat16_lt(zero, alpha), blend = vmask16_and(hit, vfloat16_le(stop_at, next));
         const vfloat16 weight = vfloat16_select(blend, vfloat16_mul(T, alpha), zero);
         const list_row *g = &list->row[rows->number[row]];
@@ -152,6 +160,7 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
         vfloat16_store(out->rgb[c],
                        vfloat16_fma(lowest, vfloat16_set1(scene->settings.background[c]), rgb[c]));
     vfloat16_store(out->transmittance, lowest);
+    out->ended = vmask16_bits(vfloat16_lt(vfloat16_mul(start, rows->product), stop_at));
     if (scene->extra)
         store_extra(&extra, out);
     return true;
@@ -176,11 +185,11 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
             continue;
         counters->rays += (uint64_t)__builtin_popcount(packet->active);
         slope_rays(&view->frame, packet, middle, &seen);
-        gather_rows(scene, &list, packet, &seen, &rows, counters);
+        gather_rows(scene, &list, packet, rays->parts, &seen, &rows, counters);
         order_by_middle(&list, scene->settings.t_near, &rows);
         insert_rows(&rows);
         if ((rows.crowded && !sort_rows_by_ray(&rows, scratch)) ||
-            !blend_list(scene, &list, &rows, packet, p, &out[p], tape, counters))
+            !blend_list(scene, &list, &rows, packet, rays->parts, p, &out[p], tape, counters))
             return false;
     }
     return true;

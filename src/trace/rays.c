@@ -440,6 +440,8 @@ void ray_image_free(ray_image *rays)
     mem_free(rays->origin);
     mem_free(rays->dir);
     mem_free(rays->far);
+    mem_free(rays->near);
+    mem_free(rays->through);
     for (int i = 0; i < RAY_LENSES; i++)
         mem_free(rays->lenses[i].dir);
     memset(rays, 0, sizeof *rays);

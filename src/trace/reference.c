@@ -90,7 +90,7 @@ typedef struct hit_list {
 } hit_list;
 
 static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s,
-                         const double origin[3], const double dir[3], double far, hit_list *list,
+                         const double origin[3], const double dir[3], double near, double far, hit_list *list,
                          gbt_error *err)
 {
     list->count = 0;
@@ -99,7 +99,7 @@ static gbt_status gather(const prepared *all, size_t all_count, const trace_sett
     for (size_t i = 0; i < all_count; i++) {
         reference_hit hit = {.id = (uint32_t)i};
         double v[3];
-        if (!respond(&all[i], s, origin, dir, &hit, v) || !(hit.t < far))
+        if (!respond(&all[i], s, origin, dir, &hit, v) || !(hit.t < far) || hit.t < near)
             continue;
         GBT_TRY(mem_reserve((void **)&list->hits, &list->capacity, list->count, list->count + 1, sizeof hit,
                             "reference hits", err));
@@ -111,10 +111,9 @@ static gbt_status gather(const prepared *all, size_t all_count, const trace_sett
 }
 
 /* Front to back; returns how many hits were added. */
-static size_t blend(const reference_scene *scene, const trace_settings *s, const hit_list *list,
+static size_t blend(const reference_scene *scene, const trace_settings *s, const hit_list *list, double T,
                     double rgb[3], double *transmittance)
 {
-    double T = 1;
     size_t n = 0;
     rgb[0] = rgb[1] = rgb[2] = 0;
     for (; n < list->count; n++) {
@@ -156,6 +155,11 @@ static double far_of(const ray_image *rays, size_t i)
     return rays->far == NULL ? HUGE_VAL : (double)rays->far[i];
 }
 
+static double near_of(const ray_image *rays, size_t i)
+{
+    return rays->near == NULL ? 0 : (double)rays->near[i];
+}
+
 typedef struct forward_job {
     const reference_scene *scene;
     const trace_settings *s;
@@ -173,9 +177,10 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++) {
         double origin[3], dir[3], transmittance;
         ray_of(job->rays, i, origin, dir);
-        job->status[block] =
-            gather(job->all, job->scene->count, job->s, origin, dir, far_of(job->rays, i), &list, NULL);
-        const size_t n = blend(job->scene, job->s, &list, job->rgb + 3 * i, &transmittance);
+        job->status[block] = gather(job->all, job->scene->count, job->s, origin, dir, near_of(job->rays, i),
+                                    far_of(job->rays, i), &list, NULL);
+        const double before = job->rays->near != NULL ? (double)job->rays->through[i] : 1;
+        const size_t n = blend(job->scene, job->s, &list, before, job->rgb + 3 * i, &transmittance);
         if (job->transmittance != NULL)
             job->transmittance[i] = transmittance;
         if (job->blended != NULL)
@@ -250,7 +255,7 @@ static void ray_backward(const reference_scene *scene, const prepared *all, cons
                          double d_background[3])
 {
     double rgb[3], T, behind[3], open = 1;
-    const size_t blended = blend(scene, s, list, rgb, &T);
+    const size_t blended = blend(scene, s, list, 1, rgb, &T);
     for (int c = 0; c < 3; c++) {
         behind[c] = (double)s->background[c];
         d_background[c] += T * d_rgb[c];
@@ -282,7 +287,7 @@ gbt_status reference_scene_backward(const reference_scene *scene, const trace_se
     for (size_t i = 0; i < ray_image_count(rays) && status == GBT_OK; i++) {
         double origin[3], dir[3];
         ray_of(rays, i, origin, dir);
-        status = gather(all, scene->count, s, origin, dir, far_of(rays, i), &list, err);
+        status = gather(all, scene->count, s, origin, dir, near_of(rays, i), far_of(rays, i), &list, err);
         if (status == GBT_OK)
             ray_backward(scene, all, s, origin, dir, &list, d_rgb + 3 * i,
                          d_transmittance != NULL ? d_transmittance[i] : 0, d_gaussians, d_background);
@@ -300,7 +305,7 @@ gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_se
     prepared *all = NULL;
     gbt_status status = prepare_all(scene, s, &all, err);
     if (status == GBT_OK)
-        status = gather(all, scene->count, s, origin, dir, HUGE_VAL, &list, err);
+        status = gather(all, scene->count, s, origin, dir, 0, HUGE_VAL, &list, err);
     mem_free(all);
     *hits = list.hits;
     *capacity = list.capacity;

@@ -190,6 +190,12 @@ static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
         p->origin[axis][lane] = o[axis];
     }
     p->far[lane] = rays->far == NULL ? INFINITY : rays->far[at];
+    if (rays->near != NULL) {
+        p->near[lane] = rays->near[at];
+        p->through[lane] = rays->through[at];
+        if (!(p->near[lane] < p->far[lane]))
+            return;
+    }
     p->active |= 1u << lane;
 }
 
@@ -220,11 +226,13 @@ static void load_whole_packet(const ray_image *rays, size_t first, packet_rays *
 static void load_tile(const ray_image *rays, int x0, int y0, tile_rays *out)
 {
     out->common_origin = rays->common_origin;
+    out->parts = rays->near != NULL;
     for (int packet = 0; packet < TILE_PACKETS; packet++) {
         packet_rays *p = &out->packet[packet];
         size_t at;
         p->active = 0;
-        if (packet_pixel(rays, x0, y0, packet, &at) && rays->common_origin && rays->far == NULL)
+        if (packet_pixel(rays, x0, y0, packet, &at) && rays->common_origin && rays->far == NULL &&
+            rays->near == NULL)
             load_whole_packet(rays, at, p);
         else
             for (int lane = 0; lane < PACKET_LANES; lane++)
@@ -241,6 +249,10 @@ static void load_tile(const ray_image *rays, int x0, int y0, tile_rays *out)
                 p->origin[axis][lane] = p->origin[axis][first];
             }
             p->far[lane] = p->far[first];
+            if (out->parts) {
+                p->near[lane] = p->near[first];
+                p->through[lane] = p->through[first];
+            }
         }
     }
 }
@@ -248,10 +260,13 @@ static void load_tile(const ray_image *rays, int x0, int y0, tile_rays *out)
 static void store_pixel(const pass *p, size_t at, const packet_output *o, int lane)
 {
     const trace_outputs *out = &p->out;
+    const float before = p->rays->near != NULL ? p->rays->through[at] : 1;
     for (size_t c = 0; c < 3; c++)
-        out->rgb->pixels[3 * at + c] = o == NULL ? p->view.settings.background[c] : o->rgb[c][lane];
+        out->rgb->pixels[3 * at + c] = o == NULL ? before * p->view.settings.background[c] : o->rgb[c][lane];
     if (out->transmittance != NULL)
-        out->transmittance[at] = o == NULL ? 1 : o->transmittance[lane];
+        out->transmittance[at] = o == NULL ? before : o->transmittance[lane];
+    if (out->ended != NULL)
+        out->ended[at] = o != NULL && (o->ended >> lane & 1) != 0;
     if (!p->view.extra)
         return;
     const float opacity = o == NULL ? 0 : 1 - o->transmittance[lane];
@@ -300,9 +315,11 @@ static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x
                          tile_scratch *scratch)
 {
     packet_output out[TILE_PACKETS];
+    for (int packet = 0; packet < TILE_PACKETS; packet++)
+        out[packet].ended = 0;
     if (!trace_tile_rays(p, tile, rays, out, p->keep_tape, scratch, &tile->counters))
         return false;
-    const bool color_alone = !p->view.extra && p->out.transmittance == NULL;
+    const bool color_alone = !p->view.extra && p->out.transmittance == NULL && p->out.ended == NULL;
     for (int packet = 0; packet < TILE_PACKETS; packet++) {
         size_t first;
         if (packet_pixel(p->rays, x0, y0, packet, &first) && color_alone &&
@@ -452,6 +469,9 @@ static gbt_status prepare_view(trace_scene *scene, const ray_image *rays, gbt_er
     const kernel_scene view = scene_for_kernel(scene);
     GBT_TRY(view_lists_make(&scene->lists, list_kernel_for(cpu_best_isa()), &view, scene->source, rays,
                             &scene->listed, err));
+    if (!scene->listed && rays->near != NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "trace: parts of rays that have no lists (wanted TRACE_SINGLE)");
     return scene->listed ? GBT_OK : build_tree(scene, err);
 }
 
@@ -462,6 +482,10 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
     if (rgb->width != rays->width || rgb->height != rays->height || rgb->channels != 3)
         return base_fail(err, GBT_ERR_ARGUMENT, "trace: image is %d x %d x %d (wanted %d x %d x 3)",
                          rgb->width, rgb->height, rgb->channels, rays->width, rays->height);
+    if (rays->near != NULL && (keep_tape || (scene->kernel != TRACE_LIST && scene->kernel != TRACE_SINGLE)))
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "trace: parts of rays have no adjoint, and are traced by TRACE_LIST or TRACE_SINGLE");
     GBT_TRY(prepare_view(scene, rays, err));
     pass p = {
         .scene = scene, .view = scene_for_kernel(scene), .rays = rays, .keep_tape = keep_tape, .out = *out};

@@ -61,8 +61,9 @@ typedef struct trace_outputs {
     float *median_depth;  /* t_c of the hit that takes T below 1/2; 0 where none does */
     float *normal; /* [3] sum of T alpha n; n: the shortest axis, unit, world, turned towards the ray's origin
                     */
-    float *hit_count;    /* hits that were blended */
-    uint32_t *strongest; /* Gaussian of the largest T alpha; UINT32_MAX where there is none */
+    float *hit_count;     /* hits that were blended */
+    uint32_t *strongest;  /* Gaussian of the largest T alpha; UINT32_MAX where there is none */
+    unsigned char *ended; /* of parts of rays: 1 where transmittance_min ended the ray */
 } trace_outputs;
 
 /**
@@ -84,7 +85,12 @@ gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_setti
  *                        (trace_scene.tape_bytes_max)
  * @param out       [out] colour costs what tracing costs; each other output a few per cent more
  * @param counters  [in,out] optional, added to
- * @return GBT_OK, GBT_ERR_ARGUMENT (size of out->rgb), GBT_ERR_NO_MEMORY
+ * Parts of rays (rays->near) are traced by TRACE_LIST and TRACE_SINGLE, without an adjoint. A hit has the
+ * same t_c and alpha, to the bit, in every part and whatever else is in the scene; so parts that touch count
+ * each hit once. Where TRACE_LIST can make no lists it does not walk the tree in their place: scene->listed
+ * is then false after GBT_ERR_ARGUMENT.
+ *
+ * @return GBT_OK, GBT_ERR_ARGUMENT (size of out->rgb; parts that cannot be traced so), GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count.
  */
 gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out,

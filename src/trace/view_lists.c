@@ -93,9 +93,22 @@ typedef struct box_job {
     const ray_image *rays;
     const view_frame *frame;
     slope_box *tiles;
+    unsigned char *sees;
     int across;
     atomic_bool apart;
 } box_job;
+
+/* The boxes of tiles do not depend on which parts of rays are asked for: depths round as those of whole rays.
+   But where no ray sees anything no Gaussian needs to be listed. */
+static void find_seeing(const box_job *job, int row, unsigned char *sees)
+{
+    const ray_image *rays = job->rays;
+    const size_t first = (size_t)row * (size_t)rays->width;
+    for (size_t x = 0; x < (size_t)rays->width; x++)
+        if (rays->near == NULL ||
+            rays->near[first + x] < (rays->far != NULL ? rays->far[first + x] : INFINITY))
+            sees[x / TILE_SIDE] = 1;
+}
 
 static void add_row_of_rays(const box_job *job, int row, slope_box *tiles, bool *apart)
 {
@@ -128,8 +141,10 @@ static void box_row(size_t block, size_t begin, size_t end, void *context)
     for (int x = 0; x < job->across; x++)
         tiles[x] = (slope_box){{FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX}};
     for (int row = (int)block * TILE_SIDE; row < ((int)block + 1) * TILE_SIDE && row < job->rays->height;
-         row++)
+         row++) {
         add_row_of_rays(job, row, tiles, &apart);
+        find_seeing(job, row, job->sees + block * (size_t)job->across);
+    }
     for (int x = 0; x < job->across; x++)
         for (int k = 0; k < 2 && tiles[x].low[0] <= tiles[x].high[0]; k++) {
             const float open = 4e-6f + 2e-3f * (tiles[x].high[k] - tiles[x].low[k]);
@@ -148,7 +163,13 @@ static gbt_status make_boxes(view_lists *lists, const ray_image *rays, bool *usa
     const size_t tiles = (size_t)view->tiles_across * (size_t)view->tiles_down;
     GBT_TRY(mem_reserve((void **)&view->tiles, &lists->tile_capacity, 0, tiles, sizeof *view->tiles,
                         "tile lists", err));
-    box_job job = {.rays = rays, .frame = &view->frame, .tiles = view->tiles, .across = view->tiles_across};
+    GBT_TRY(mem_reserve((void **)&lists->sees, &lists->sees_capacity, 0, tiles, 1, "tile lists", err));
+    memset(lists->sees, 0, tiles);
+    box_job job = {.rays = rays,
+                   .frame = &view->frame,
+                   .tiles = view->tiles,
+                   .sees = lists->sees,
+                   .across = view->tiles_across};
     atomic_init(&job.apart, false);
     parallel_blocks((size_t)view->tiles_down, 1, box_row, &job);
     *usable = !atomic_load(&job.apart);
@@ -294,7 +315,7 @@ static bool add_tiles(const list_job *job, list_group *group, size_t at)
             const uint32_t tile = (uint32_t)(row * view->tiles_across + column);
             const slope_box *bounds = &view->tiles[tile];
             group->tiles[group->count] = tile;
-            group->count += bounds->low[0] <= bounds->high[0] &&
+            group->count += job->lists->sees[tile] != 0 && bounds->low[0] <= bounds->high[0] &&
                             (record_is_general(r) ? ellipsoid_meets_box(&shape->ellipsoid, bounds)
                                                   : outline_in_box(&shape->outline, x, y, bounds));
         }
@@ -467,9 +488,9 @@ void view_lists_free(view_lists *lists)
     list_view *v = &lists->view;
     for (size_t i = 0; i < lists->group_capacity; i++)
         mem_free(lists->groups[i].tiles);
-    void *const owned[] = {v->tiles,      v->records,       v->shapes,    v->kept,  v->slot_first,
-                           v->slot_count, v->pairs,         v->first,     v->slots, v->slot_used,
-                           lists->groups, lists->histogram, lists->lookup};
+    void *const owned[] = {v->tiles,      v->records,       v->shapes,     v->kept,    v->slot_first,
+                           v->slot_count, v->pairs,         v->first,      v->slots,   v->slot_used,
+                           lists->groups, lists->histogram, lists->lookup, lists->sees};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         mem_free(owned[i]);
     memset(lists, 0, sizeof *lists);

@@ -13,6 +13,8 @@ typedef struct view_lists {
     struct list_group *groups; /* internal, as all that follows */
     uint32_t *histogram;
     uint16_t *lookup;
+    unsigned char *sees; /* [tiles] 0: no part of a ray in it is left */
+    size_t sees_capacity;
     size_t tile_capacity, record_capacity, kept_capacity, pair_capacity, first_capacity, group_capacity,
         histogram_capacity, lookup_capacity, slot_capacity, used_capacity;
 } view_lists;

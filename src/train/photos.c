@@ -76,7 +76,7 @@ void photos_close(photos *p)
 gbt_camera photos_camera(const photos *p, size_t view, int level)
 {
     const gbt_camera *stated = &p->source->views[view].camera;
-    const double divide = p->downscale * exp2(level);
+    const double divide = ldexp(p->downscale, level);
     const int width = (int)fmax(1, floor(stated->width / divide + 0.5)),
               height = (int)fmax(1, floor(stated->height / divide + 0.5));
     return gbt_camera_resized(stated, width, height);

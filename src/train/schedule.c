@@ -92,7 +92,7 @@ double schedule_level_start(int level, int start_level)
 {
     if (level >= start_level)
         return 0;
-    return level == 0 ? SCHEDULE_WHOLE_FROM : 0.3 * exp2(1 - level);
+    return level == 0 ? SCHEDULE_WHOLE_FROM : 0.3 * ldexp(1, 1 - level);
 }
 
 int schedule_level(double progress, int start_level)

@@ -5,6 +5,7 @@
 
 #include <float.h>
 #include <pthread.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -37,6 +38,8 @@ static void no_device_is_an_error(void **state)
         const rlim_t bytes = (rlim_t)pages * (rlim_t)sysconf(_SC_PAGESIZE) + (1 << 20);
         if (setrlimit(RLIMIT_AS, &(struct rlimit){bytes, bytes}) != 0)
             _exit(11);
+        if (mmap(NULL, 1 << 28, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0) != MAP_FAILED)
+            _exit(77); /* the limit is not held, as in an emulator */
         gbt_error err = {0};
         if (bvh_device(&err) != NULL)
             _exit(12);
@@ -62,6 +65,8 @@ static void no_device_is_an_error(void **state)
     int how = 0;
     assert_int_equal(waitpid(child, &how, 0), child);
     assert_true(WIFEXITED(how));
+    if (WEXITSTATUS(how) == 77)
+        skip();
     assert_int_equal(WEXITSTATUS(how), 0);
 }
 

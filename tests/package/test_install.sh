@@ -22,8 +22,8 @@ sed -n 's/^[a-z][a-z_ *]*[ *]\(gbt_[a-z0-9_]*\)(.*/\1/p; s/^const char \*const \
 check "the library shows what its headers declare, and no more" diff "$work/declared" "$work/shown"
 check "there are headers with functions" test "$(wc -l <"$work/declared")" -ge 40
 soname=$(readelf -d "$library" | sed -n 's/.*soname: \[\(.*\)\]/\1/p')
-version=$(sed -n 's/^#define GBT_VERSION "\([0-9]*\.[0-9]*\)\..*/\1/p' "$prefix/include/gbtrace/version.h")
-check "the soname is of the headers' version" test "$soname" = "libgbtrace.so.$version"
+version=$(sed -n 's/^#define GBT_VERSION "\([0-9]*\)\..*/\1/p' "$prefix/include/gbtrace/version.h")
+check "the soname is of the headers' first number" test "$soname" = "libgbtrace.so.$version"
 
 # Headers are complete: each alone, twice, as C11 and C++17, from the installed tree.
 alone() { # compiler, language, standard

@@ -24,6 +24,10 @@ library=$(find "$build" -maxdepth 1 -type f -name 'libgbtrace.so.*')
 check "pip install ." $pip install --no-compile --disable-pip-version-check --no-build-isolation --no-deps "$source" \
     --config-settings=build-dir="$work/wheel" --config-settings=cmake.define.GBT_WHEEL_LIBRARY="$library"
 check "the wheel is for every Python 3" grep -q '^Tag: py3-none-linux' "$work"/env/lib/python3*/site-packages/gbtrace-*.dist-info/WHEEL
+# The wheel of a release: without the library, for every machine; GBTRACE_LIBRARY stands for the Debian package's.
+check "the wheel of a release" $pip -q wheel --no-deps --disable-pip-version-check --no-build-isolation --config-settings=wheel.cmake=false --wheel-dir "$work/pure" "$source"
+check "is for every machine" test -f "$work"/pure/gbtrace-*-py3-none-any.whl
+check "and loads the system's library" env GBTRACE_LIBRARY="$library" PYTHONPATH="$(echo "$work"/pure/*.whl)" "$python" -c 'import gbtrace; gbtrace.version()'
 check "a scene" "$build/gbtrace" make-scene tabletop -o "$work/data" --width 64 --height 48 --views 12 --points 300 --samples 4
 check "a model" "$build/gbtrace" train "$work/data" -o "$work/run" --iterations 150
 mkdir "$work/scratch"

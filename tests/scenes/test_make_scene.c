@@ -12,6 +12,8 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
+#include "data/gaussian_cloud.h"
+#include "data/gaussian_ply.h"
 #include "data/scene.h"
 #include "gbtrace/make_scene.h"
 
@@ -253,6 +255,78 @@ static void points_and_cameras_are_true(void **state)
     mem_free(text);
 }
 
+/** Cameras all over it, and no point is found from farther than the scene says. */
+static void district_is_seen_in_parts(void **state)
+{
+    (void)state;
+    gbt_make_scene_def def = small_def("district");
+    def.width = 32;
+    def.height = 24;
+    def.view_count = 60;
+    def.points = 2000;
+    def.depth = false;
+    def.samples = 1;
+    const char *folder = under_root("district");
+    assert_ok(gbt_make_scene(&def, folder, NULL));
+    written w;
+    read_written(folder, &w);
+    assert_true(w.point_count > 50);
+    double low[2] = {0, 0}, high[2] = {0, 0}, in_camera[3];
+    for (size_t v = 0; v < w.s.view_count; v++)
+        for (int k = 0; k < 2; k++) {
+            low[k] = fmin(low[k], w.s.views[v].camera.center[k]);
+            high[k] = fmax(high[k], w.s.views[v].camera.center[k]);
+        }
+    assert_true(high[0] - low[0] > 150 && high[1] - low[1] > 150);
+    for (size_t i = 0; i < w.observation_count; i++)
+        if (w.track[i][0] % 100 != 99) /* not an outlier */
+            assert_true(distance_to(&w.s.views[w.track[i][1]].camera, w.position[w.track[i][0]], in_camera) <
+                        62);
+    free_written(&w);
+}
+
+static void gaussians_lie_on_surfaces(void **state)
+{
+    (void)state;
+    enum { COUNT = 1500 };
+    gbt_make_scene_def def = small_def("tabletop");
+    def.gaussians = COUNT;
+    char path[512];
+    const char *folder = under_root("gaussians");
+    assert_ok(gbt_make_scene(&def, folder, NULL));
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    scene s;
+    gaussian_cloud cloud;
+    assert_ok(scene_load(folder, &split, &s, NULL));
+    snprintf(path, sizeof path, "%s/gaussians.ply", folder);
+    assert_ok(gaussian_ply_load(path, &cloud, NULL));
+    assert_int_equal(cloud.count, COUNT);
+    assert_int_equal(cloud.sh_degree, 3);
+    image depth;
+    snprintf(path, sizeof path, "%s/depth/0000.exr", folder);
+    assert_ok(image_read(path, &depth, NULL));
+    const gbt_camera *camera = &s.views[0].camera;
+    size_t seen = 0, in_front = 0;
+    for (size_t i = 0; i < COUNT; i++) {
+        double point[3], in_camera[3], pixel[2];
+        for (size_t k = 0; k < 3; k++)
+            point[k] = (double)cloud.mean[3 * i + k] - s.origin[k];
+        const double distance = distance_to(camera, point, in_camera);
+        if (in_camera[2] <= 0 || !gbt_camera_project(camera, in_camera, pixel) || pixel[0] < 0 ||
+            pixel[1] < 0 || pixel[0] >= 96 || pixel[1] >= 72)
+            continue;
+        const size_t at = (size_t)pixel[1] * 96 + (size_t)pixel[0];
+        const double there = (double)depth.pixels[(size_t)depth.channels * at];
+        seen += fabs(there - distance) < 0.03 * distance;
+        in_front += distance < 0.9 * there;
+    }
+    assert_true(seen > COUNT / 10);     /* on what the camera sees */
+    assert_true(in_front < COUNT / 50); /* and next to nothing in the air before it */
+    image_free(&depth);
+    gaussian_cloud_free(&cloud);
+    scene_free(&s);
+}
+
 static void distorted_cameras_are_true(void **state)
 {
     (void)state;
@@ -407,8 +481,8 @@ static refusal refusals[] = {
     {"noise NaN", noise_nan, "noise"},
     {"noise below 0", noise_negative, "noise"},
     {"noise 0.11", noise_big, "noise"},
-    {"unknown name", name_unknown, "tabletop, courtyard, terrain"},
-    {"no name", name_null, "tabletop, courtyard, terrain"},
+    {"unknown name", name_unknown, "tabletop, courtyard, terrain, district"},
+    {"no name", name_null, "tabletop, courtyard, terrain, district"},
     {"zeroed def", all_zero, "gbt_make_scene_def_default"},
 };
 
@@ -473,7 +547,7 @@ static void names_are_the_scenes(void **state)
         assert_true(summary != NULL && strlen(summary) > 20 && strlen(summary) < 100 &&
                     strchr(summary, '\n') == NULL);
     }
-    assert_int_equal(count, 3);
+    assert_int_equal(count, 4);
     assert_null(gbt_make_scene_summary("none"));
 }
 
@@ -502,13 +576,15 @@ static void no_memory_is_a_status(void **state)
 
 int main(void)
 {
-    enum { REFUSALS = sizeof refusals / sizeof refusals[0], OTHERS = 10 };
+    enum { REFUSALS = sizeof refusals / sizeof refusals[0], OTHERS = 12 };
     static char tabletop[] = "tabletop", courtyard[] = "courtyard", terrain[] = "terrain";
     struct CMUnitTest tests[OTHERS + REFUSALS] = {
         {"tabletop: points and cameras are true", points_and_cameras_are_true, NULL, NULL, tabletop},
         {"courtyard: points and cameras are true", points_and_cameras_are_true, NULL, NULL, courtyard},
         {"terrain: points and cameras are true", points_and_cameras_are_true, NULL, NULL, terrain},
+        cmocka_unit_test(district_is_seen_in_parts),
         cmocka_unit_test(distorted_cameras_are_true),
+        cmocka_unit_test(gaussians_lie_on_surfaces),
         cmocka_unit_test(noise_is_what_was_asked),
         cmocka_unit_test(same_seed_same_bytes),
         cmocka_unit_test(missing_arguments_are_refused),

@@ -83,8 +83,13 @@ static pass_result *run(const gaussians *g, const trace_settings *s, const ray_i
     assert_ok(image_alloc(&d_rgb, WIDTH, HEIGHT, 3, NULL));
     for (size_t i = 0; i < 3 * RAYS; i++)
         d_rgb.pixels[i] = (float)rng_normal(5, 5, i);
-    const trace_outputs out = {&r->rgb,   r->transmittance, r->depth,    r->median,
-                               r->normal, r->hit_count,     r->strongest};
+    const trace_outputs out = {.rgb = &r->rgb,
+                               .transmittance = r->transmittance,
+                               .depth = r->depth,
+                               .median_depth = r->median,
+                               .normal = r->normal,
+                               .hit_count = r->hit_count,
+                               .strongest = r->strongest};
     assert_ok(trace_build(&scene, g, s, 5, NULL));
     assert_ok(trace_forward(&scene, rays, true, &out, &r->counters, NULL));
     assert_ok(trace_backward(&scene, rays, &d_rgb, &r->d, NULL, NULL, NULL));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/train/test_step_views.c -- several views a step: which photos, the mean of their gradients, the sum of
-   their statistics, the same bits for every number of threads. */
+/* tests/train/test_step_views.c -- several views a step: which photos, the mean of their gradients, the sum
+   of their statistics, the same bits for every number of threads. */
 #include "run_support.h"
 
 #include "base/parallel.h"
@@ -40,7 +40,8 @@ static void run_view(trainer *t, size_t i)
         fail_msg("%s", t->views[i].outcome.text);
 }
 
-/* The trainer's gradient is the mean of what each view says alone, added as a tree; statistics are the sum. */
+/* The trainer's gradient is the mean of what each view says alone, added as a tree; statistics are the sum.
+ */
 static void a_step_learns_from_the_mean(void **state)
 {
     (void)state;

@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/large_file.c -- files that are larger than memory, piece by piece. */
+#include "base/large_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/fail.h"
+
+static gbt_status set_name(large_file *out, const char *path, gbt_error *err)
+{
+    memset(out, 0, sizeof *out);
+    if (snprintf(out->name, sizeof out->name, "%s", path) >= (int)sizeof out->name)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
+    return GBT_OK;
+}
+
+gbt_status large_file_open(const char *path, large_file *out, gbt_error *err)
+{
+    struct stat info;
+    GBT_TRY(set_name(out, path, err));
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (fd < 0)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", path, strerror(errno));
+    if (fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
+        close(fd);
+        return base_fail(err, GBT_ERR_IO, "%s: not a regular file", path);
+    }
+    out->open = true;
+    out->descriptor = fd;
+    out->size = (uint64_t)info.st_size;
+    return GBT_OK;
+}
+
+gbt_status large_file_create(const char *path, large_file *out, gbt_error *err)
+{
+    GBT_TRY(set_name(out, path, err));
+    const char *slash = strrchr(path, '/');
+    const int folder_length = slash == NULL ? 0 : (int)(slash - path) + 1;
+    if (snprintf(out->temporary, sizeof out->temporary, "%.*s.%s.tmp", folder_length, path,
+                 path + folder_length) >= (int)sizeof out->temporary)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
+    const int fd = open(out->temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (fd < 0)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(errno));
+    out->open = true;
+    out->descriptor = fd;
+    return GBT_OK;
+}
+
+gbt_status large_file_scratch(const char *folder, large_file *out, gbt_error *err)
+{
+    GBT_TRY(set_name(out, folder, err));
+    char path[LARGE_FILE_NAME];
+    if (snprintf(path, sizeof path, "%s/.gbtrace-XXXXXX", folder) >= (int)sizeof path)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", folder);
+    const int fd = mkstemp(path);
+    if (fd < 0)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot create a temporary file: %s", folder, strerror(errno));
+    unlink(path);
+    out->open = true;
+    out->descriptor = fd;
+    return GBT_OK;
+}
+
+gbt_status large_file_put(large_file *file, const void *bytes, size_t count, gbt_error *err)
+{
+    const unsigned char *from = bytes;
+    for (size_t done = 0; done < count;) {
+        const ssize_t put = pwrite(file->descriptor, from + done, count - done, (off_t)file->size);
+        if (put < 0 && errno == EINTR)
+            continue;
+        if (put <= 0)
+            return base_fail(err, GBT_ERR_IO, "%s: write failed: %s", file->name,
+                             strerror(put < 0 ? errno : ENOSPC));
+        done += (size_t)put;
+        file->size += (uint64_t)put;
+    }
+    return GBT_OK;
+}
+
+gbt_status large_file_read(const large_file *file, uint64_t at, void *bytes, size_t count, gbt_error *err)
+{
+    unsigned char *to = bytes;
+    for (size_t done = 0; done < count;) {
+        const ssize_t got = pread(file->descriptor, to + done, count - done, (off_t)(at + done));
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got <= 0)
+            return base_fail(err, GBT_ERR_IO, "%s@%llu: read failed: %s", file->name,
+                             (unsigned long long)(at + done),
+                             got < 0 ? strerror(errno) : "file became shorter");
+        done += (size_t)got;
+    }
+    return GBT_OK;
+}
+
+gbt_status large_file_close(large_file *file, bool keep, gbt_error *err)
+{
+    if (!file->open)
+        return GBT_OK;
+    const bool made = file->temporary[0] != '\0';
+    gbt_status status = GBT_OK;
+    if (made && keep && fsync(file->descriptor) != 0)
+        status = base_fail(err, GBT_ERR_IO, "%s: fsync failed: %s", file->name, strerror(errno));
+    if (close(file->descriptor) != 0 && made && keep && status == GBT_OK)
+        status = base_fail(err, GBT_ERR_IO, "%s: close failed: %s", file->name, strerror(errno));
+    if (made && keep && status == GBT_OK && rename(file->temporary, file->name) != 0)
+        status = base_fail(err, GBT_ERR_IO, "%s: cannot replace: %s", file->name, strerror(errno));
+    if (made && (!keep || status != GBT_OK))
+        unlink(file->temporary);
+    memset(file, 0, sizeof *file);
+    return status;
+}

@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* cells/draw.c -- the cells of a view, front to back.
+
+   node of the tree --> no ray sees anything in it: done
+        --> it fits: load, trace the intervals of the rays, blend
+        --> else its children, the one with the eye first */
+#include "cells/draw.h"
+
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "cells/view.h"
+
+enum { RAY_BLOCK = 4096 };
+
+typedef struct picture {
+    cell_drawer *d;
+    image *out;
+} picture;
+
+/* What the cell adds, and what it leaves for those behind it. */
+static void add_cell(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const picture *p = context;
+    cell_drawer *d = p->d;
+    for (size_t i = begin; i < end; i++) {
+        for (size_t c = 0; c < 3; c++)
+            p->out->pixels[3 * i + c] += d->part.pixels[3 * i + c];
+        d->rays.through[i] = d->left[i];
+        d->over[i] |= d->ended[i];
+    }
+}
+
+static void add_background(const picture *p, const float background[3])
+{
+    for (size_t i = 0; i < ray_image_count(&p->d->rays); i++)
+        for (size_t c = 0; c < 3; c++)
+            p->out->pixels[3 * i + c] += p->d->rays.through[i] * background[c];
+}
+
+static gbt_status draw_cell(const picture *p, gbt_error *err)
+{
+    cell_drawer *d = p->d;
+    if (d->load.count == 0)
+        return GBT_OK;
+    d->drawn_cells++;
+    d->drawn_gaussians += d->load.count;
+    GBT_TRY(trace_build(&d->scene, &d->load.sorted, &d->settings, ray_image_reach(&d->rays), err));
+    const trace_outputs wanted = {.rgb = &d->part, .transmittance = d->left, .ended = d->ended};
+    GBT_TRY(trace_forward(&d->scene, &d->rays, false, &wanted, NULL, err));
+    parallel_blocks(ray_image_count(&d->rays), RAY_BLOCK, add_cell, (void *)p);
+    return GBT_OK;
+}
+
+static gbt_status draw_part(const picture *p, const cell_part *part, gbt_error *err)
+{
+    cell_drawer *d = p->d;
+    bool fits;
+    if (cell_view_cut(d, part) == 0)
+        return GBT_OK;
+    GBT_TRY(cell_load_part(d, part, &fits, err));
+    if (fits)
+        return draw_cell(p, err);
+    if (cell_is_chunk(d->store, part))
+        return base_fail(err, GBT_ERR_NO_MEMORY,
+                         "memory: %zu MB is too little for the Gaussians of one place (wanted more than %zu there)",
+                         d->memory >> 20, d->budget >> 20);
+    const cell_cut *cut = &d->store->cuts[part->node];
+    const bool from_below = d->rays.origin[cut->axis] < cut->at;
+    for (int k = 0; k < 2; k++) {
+        const cell_part child = cell_child(d->store, part, (k == 0) == from_below);
+        GBT_TRY(draw_part(p, &child, err));
+    }
+    return GBT_OK;
+}
+
+static gbt_status draw_all(cell_drawer *d, const ray_shot *shot, image *out, gbt_error *err)
+{
+    const picture p = {d, out};
+    const cell_part whole = cell_whole();
+    d->drawn_cells = d->drawn_gaussians = 0;
+    GBT_TRY(cell_view_start(d, shot, err));
+    GBT_TRY(image_fit(out, d->rays.width, d->rays.height, 3, err));
+    memset(out->pixels, 0, 3 * ray_image_count(&d->rays) * sizeof *out->pixels);
+    return draw_part(&p, &whole, err);
+}
+
+gbt_status cell_draw(cell_drawer *d, const cell_store *store, const ray_shot *shot, const trace_settings *settings,
+                     float variance, size_t memory, image *out, gbt_error *err)
+{
+    d->store = store;
+    d->memory = memory;
+    d->settings = *settings;
+    memset(d->settings.background, 0, sizeof d->settings.background);
+    d->variance = variance;
+    /* One kernel for all cells: the depths that two kernels find for a hit differ by rounding, and between two
+       cells it could be counted twice, or not at all. */
+    gbt_error lists = {0};
+    d->scene.kernel = TRACE_LIST;
+    gbt_status status = draw_all(d, shot, out, &lists);
+    if (status == GBT_ERR_ARGUMENT && d->drawn_cells > 0 && !d->scene.listed) {
+        d->scene.kernel = TRACE_SINGLE;
+        status = draw_all(d, shot, out, err);
+    } else if (status != GBT_OK)
+        status = base_fail(err, status, "%s", lists.text);
+    if (status == GBT_OK)
+        add_background(&(picture){d, out}, settings->background);
+    return status;
+}
+
+void cell_drawer_free(cell_drawer *d)
+{
+    ray_image_free(&d->rays);
+    mem_free(d->over);
+    mem_free(d->ended);
+    mem_free(d->left);
+    mem_free(d->visible);
+    image_free(&d->part);
+    trace_scene_free(&d->scene);
+    cell_load_free(&d->load);
+    memset(d, 0, sizeof *d);
+}

@@ -48,17 +48,35 @@ try {
 }
 
 /* The default floating-point environment as long as it lives. Embree switches its workers, which are ours
-   too, to flush denormals to zero: without this the bits would depend on the thread. */
+   too, to flush denormals to zero: without this the bits would depend on the thread. It is nearly always in
+   force already, and to ask is cheap where to set it is not. */
 class default_float_environment {
     std::fenv_t saved;
+    const bool was_default;
+
+    static bool is_default()
+    {
+#ifdef __SSE__
+        const unsigned flags = 0x3f, initial = 0x1f80; /* flags: what has happened, not what is in force */
+        return (__builtin_ia32_stmxcsr() & ~flags) == initial;
+#else
+        return false;
+#endif
+    }
 
   public:
-    default_float_environment()
+    default_float_environment() : was_default(is_default())
     {
+        if (was_default)
+            return;
         std::fegetenv(&saved);
         std::fesetenv(FE_DFL_ENV);
     }
-    ~default_float_environment() { std::fesetenv(&saved); }
+    ~default_float_environment()
+    {
+        if (!was_default)
+            std::fesetenv(&saved);
+    }
 };
 
 extern "C" void parallel_run(size_t count, size_t grain, parallel_body *body, void *context)

@@ -40,7 +40,7 @@ static const struct {
 } starters[] = {
     {"OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "gbtrace_openmpi.so", "Open MPI"},
     {"PMI_SIZE", "PMI_RANK", "gbtrace_mpich.so", "MPICH"},
-    {"SLURM_STEP_NUM_TASKS", "PMIX_RANK", "gbtrace_openmpi.so", "Open MPI"}, /* srun --mpi=pmix */
+    {"SLURM_STEP_NUM_TASKS", "PMIX_RANK", "gbtrace_openmpi.so", "Open MPI"}, /* srun, by PMIx */
 };
 
 /* Beside the program or the library that this is part of, as built; or in the folder that it is installed to.

@@ -8,6 +8,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "cluster/cluster.h"
 
 gbt_status study_grid_open(study_grid *g, const char *const *data, size_t data_count, size_t variant_count,
                            int seeds, gbt_error *err)
@@ -41,31 +42,45 @@ static void tell(size_t number, size_t count)
     log_progress(&e);
 }
 
+/* Every `step`-th run, from `first` on. */
 static gbt_status fill(study_grid *g, const bool *wanted, study_grid_run *run, const void *study,
-                       const char *folder, gbt_error *err)
+                       const char *folder, size_t first, size_t step, gbt_error *err)
 {
-    size_t variants = 0, done = 0;
+    size_t variants = 0, index = 0;
     for (size_t v = 0; v < g->variant_count; v++)
         variants += wanted == NULL || wanted[v];
     GBT_TRY(file_make_folder(folder, err));
     for (int seed = 0; seed < g->seeds; seed++)
         for (size_t scene = 0; scene < g->scene_count; scene++)
             for (size_t v = 0; v < g->variant_count; v++) {
-                if (wanted != NULL && !wanted[v])
+                if ((wanted != NULL && !wanted[v]) || index++ % step != first)
                     continue;
-                tell(++done, variants * g->scene_count * (size_t)g->seeds);
+                tell(index, variants * g->scene_count * (size_t)g->seeds);
                 GBT_TRY(run(study, scene, v, seed, folder, study_grid_at(g, scene, v, seed), err));
             }
     return GBT_OK;
 }
 
+/* With several processes each makes its share of the runs by itself; then the first one finds them all made.
+ */
 gbt_status study_grid_report(study_grid *g, const bool *wanted, study_grid_run *run,
                              const study_output *output, const void *study, const char *folder, FILE *out,
                              gbt_error *err)
 {
-    gbt_status status = fill(g, wanted, run, study, folder, err);
-    if (status == GBT_OK)
-        status = study_output_save(output, study, folder, out, err);
+    const size_t size = (size_t)gbt_cluster_size(), rank = (size_t)gbt_cluster_rank();
+    gbt_status status = GBT_OK;
+    cluster_apart(true);
+    if (size > 1)
+        status = fill(g, wanted, run, study, folder, rank, size, err);
+    cluster_apart(false);
+    status = cluster_agree(status, err);
+    if (status == GBT_OK && rank == 0) {
+        cluster_apart(true);
+        status = fill(g, wanted, run, study, folder, 0, 1, err);
+        if (status == GBT_OK)
+            status = study_output_save(output, study, folder, out, err);
+        cluster_apart(false);
+    }
     study_grid_close(g);
-    return status;
+    return cluster_follow(status, err);
 }

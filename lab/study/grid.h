@@ -34,7 +34,8 @@ typedef gbt_status study_grid_run(const void *study, size_t scene, size_t varian
 
 /**
  * Make `folder` and all runs, save what came out, close the grid. Seeds are outermost: an interrupted study
- * has whole comparisons of the first seeds.
+ * has whole comparisons of the first seeds. After gbt_cluster_open() all processes call this, and share the
+ * runs.
  *
  * @param wanted [in] [variant_count], false: not made, its figures stay zero; NULL: all
  * @return as `run`, which fails first, and study_output_save(); GBT_ERR_IO

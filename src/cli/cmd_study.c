@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cli/options.h"
+#include "gbtrace/cluster.h"
 #include "lab/lab.h"
 
 /* What the command line says, for all studies. */
@@ -65,9 +66,11 @@ static const command_word study_words[STUDY_COUNT + 1] = {
 static const struct {
     int models_min, models_max;
     gbt_status (*run)(const study_request *, gbt_error *);
-} studies[STUDY_COUNT] = {{1, 16, run_speed},    {1, 16, run_crosscheck}, {1, 6, run_rate},
-                          {0, 0, run_stability}, {1, 16, run_paper},      {1, 16, run_time},
-                          {1, 16, run_anchors}};
+    bool shares_work; /* as of a command */
+} studies[STUDY_COUNT] = {{1, 16, run_speed, false}, {1, 16, run_crosscheck, false},
+                          {1, 6, run_rate, false},   {0, 0, run_stability, false},
+                          {1, 16, run_paper, true},  {1, 16, run_time, true},
+                          {1, 16, run_anchors, true}};
 
 static const command_word *words_of_studies(void) { return study_words; }
 
@@ -203,6 +206,11 @@ static int run(const operands *given)
     if (iterations > 0)
         paper->iterations = anchors->iterations = iterations;
     gbt_error err = {0};
+    const bool first = gbt_cluster_rank() == 0;
+    if (!studies[which].shares_work)
+        gbt_cluster_close(0, NULL);
+    if (!first && !studies[which].shares_work)
+        return 0;
     return command_failed(studies[which].run(&request, &err), &err);
 }
 
@@ -213,5 +221,6 @@ const command command_study = {
     .options = options,
     .min_operands = 1,
     .max_operands = 17,
+    .shares_work = true,
     .run = run,
     .words = words_of_studies};

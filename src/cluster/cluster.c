@@ -20,12 +20,16 @@ enum { PATH_SIZE = 4096, WORD = 4 };
 
 static const cluster_module *module;
 static int own_rank, own_size = 1;
+static bool apart;                 /* cluster_apart() */
 static gbt_status agreed = GBT_OK; /* the last failure that all know of */
 static int own_stderr = -1;        /* of a process that is silent */
 static cluster_traffic traffic;
 
-int gbt_cluster_rank(void) { return own_rank; }
-int gbt_cluster_size(void) { return own_size; }
+static bool is_alone(void) { return module == NULL || apart; }
+
+int gbt_cluster_rank(void) { return is_alone() ? 0 : own_rank; }
+int gbt_cluster_size(void) { return is_alone() ? 1 : own_size; }
+void cluster_apart(bool on) { apart = on; }
 cluster_traffic cluster_traffic_so_far(void) { return traffic; }
 
 /* ---- the module ---- */
@@ -36,7 +40,7 @@ static const struct {
 } starters[] = {
     {"OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "gbtrace_openmpi.so", "Open MPI"},
     {"PMI_SIZE", "PMI_RANK", "gbtrace_mpich.so", "MPICH"},
-    {"SLURM_STEP_NUM_TASKS", "PMIX_RANK", "gbtrace_openmpi.so", "Open MPI"}, /* srun --mpi=pmix */
+    {"SLURM_STEP_NUM_TASKS", "PMIX_RANK", "gbtrace_openmpi.so", "Open MPI"}, /* srun, by PMIx */
 };
 
 /* Beside the program or the library that this is part of, as built; or in the folder that it is installed to.
@@ -159,7 +163,7 @@ static void count(size_t words, double since)
 
 void cluster_gather(const void *mine, const size_t *counts, void *all)
 {
-    if (module == NULL) {
+    if (is_alone()) {
         memcpy(all, mine, counts[0] * WORD);
         return;
     }
@@ -172,7 +176,7 @@ void cluster_gather(const void *mine, const size_t *counts, void *all)
 
 void cluster_exchange(const void *send, const size_t *send_counts, void *all, const size_t *counts)
 {
-    if (module == NULL) {
+    if (is_alone()) {
         memcpy(all, send, counts[0] * WORD);
         return;
     }
@@ -187,7 +191,7 @@ void cluster_exchange(const void *send, const size_t *send_counts, void *all, co
 
 void cluster_broadcast(void *data, size_t bytes)
 {
-    if (module == NULL)
+    if (is_alone())
         return;
     const double start = clock_wall();
     module->broadcast(data, (int)(bytes / WORD));
@@ -225,7 +229,7 @@ static gbt_status hear(const told *t, gbt_error *err)
 
 gbt_status cluster_agree(gbt_status status, gbt_error *err)
 {
-    if (module == NULL)
+    if (is_alone())
         return status;
     int32_t all[CLUSTER_SIZE_MAX];
     size_t counts[CLUSTER_SIZE_MAX];
@@ -246,7 +250,7 @@ gbt_status cluster_agree(gbt_status status, gbt_error *err)
 
 gbt_status cluster_follow(gbt_status status, gbt_error *err)
 {
-    if (module == NULL)
+    if (is_alone())
         return status;
     told first = tell(status, err);
     cluster_broadcast(&first, sizeof first);

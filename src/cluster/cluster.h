@@ -35,6 +35,9 @@ gbt_status cluster_agree(gbt_status status, gbt_error *err);
 /** The first process's status becomes everybody's, with its line. */
 gbt_status cluster_follow(gbt_status status, gbt_error *err);
 
+/** From now on, or no longer, this process does something of its own: as if it were alone. */
+void cluster_apart(bool on);
+
 /** What this process has sent to others so far, or received where all get the same; and how long it was in
    these calls. */
 typedef struct cluster_traffic {

@@ -836,7 +836,7 @@ static void gradients_are_of_what_is_in_view(void **state)
     growth_stats s = {0};
     assert_ok(gaussians_resize(&f.gaussians, COUNT, NULL));
     assert_ok(gaussians_resize(&f.d_gaussians, COUNT, NULL));
-    assert_ok(growth_stats_resize(&s, COUNT, 1, NULL));
+    assert_ok(growth_stats_resize(&s, COUNT + 1, 1, NULL)); /* the last one is out of view */
     gaussians_zero(&f.d_gaussians);
     for (uint32_t i = 0; i < COUNT; i++) {
         visible[i] = COUNT - 1 - i; /* rows and Gaussians have other orders */

@@ -65,13 +65,22 @@ static const gaussian_format *format_of(const char *path)
     return found;
 }
 
+/* Of .usd and .usdc the reader of text says whether they are binary. */
+static const gaussian_format *format_read_as(const char *path)
+{
+    const char *ending = strrchr(path, '.');
+    if (ending != NULL && (strcasecmp(ending, ".usd") == 0 || strcasecmp(ending, ".usdc") == 0))
+        return &gaussian_format_usda;
+    return format_of(path);
+}
+
 /* The file itself, or the newest one of a result folder; NULL when there is none that can be read. */
 static const char *find_file(const char *path, result_folder *folder)
 {
     bool found;
     if (file_is_folder(path))
         return result_folder_find(path, folder, &found, NULL) == GBT_OK && found ? folder->ply : NULL;
-    const gaussian_format *format = format_of(path);
+    const gaussian_format *format = format_read_as(path);
     return format != NULL && format->read != NULL ? path : NULL;
 }
 
@@ -96,14 +105,14 @@ bool gaussian_file_has_gaussians(const char *given)
 {
     result_folder folder;
     const char *path = find_file(given, &folder);
-    if (path == NULL || format_of(path)->holds == NULL)
+    if (path == NULL || format_read_as(path)->holds == NULL)
         return path != NULL;
     source_file file = {.name = path};
     unsigned char *bytes;
     if (file_read(path, &bytes, &file.size, NULL) != GBT_OK)
         return false;
     file.bytes = bytes;
-    const bool has = format_of(path)->holds(&file);
+    const bool has = format_read_as(path)->holds(&file);
     mem_free(bytes);
     return has;
 }
@@ -122,7 +131,7 @@ gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error 
     unsigned char *bytes;
     GBT_TRY(file_read(path, &bytes, &file.size, err));
     file.bytes = bytes;
-    const gbt_status status = format_of(path)->read(&file, out, err);
+    const gbt_status status = format_read_as(path)->read(&file, out, err);
     mem_free(bytes);
     if (status == GBT_OK)
         gaussian_cloud_warn(out, path);

@@ -165,5 +165,13 @@ const gbt_train_setting *gbt_train_setting_at(size_t index);
     control group's quota. */
 void gbt_set_threads(int threads);
 
+/**
+ * For the start of a program: `end` is called, on any thread, when an allocation fails inside a library
+ * written in C++ (OpenImageIO, oneTBB). It must end the process. Without this such a failure becomes
+ * GBT_ERR_NO_MEMORY where the library lets it; where it does not, the process ends by SIGABRT or waits
+ * forever.
+ */
+void gbt_when_out_of_memory(void (*end)(void));
+
 GBT_API_END
 #endif

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "cli/options.h"
 #include "cli/progress.h"
@@ -83,8 +84,18 @@ static int dispatch(int argc, char **argv)
     return found == NULL ? unknown(verb) : run(found, argc - 2, argv + 2);
 }
 
+/* Other threads may be at work, so not exit(). */
+static void end_without_memory(void)
+{
+    const int code = gbt_status_exit_code(GBT_ERR_NO_MEMORY);
+    progress_error("out of memory in a library");
+    progress_end(code);
+    _exit(code);
+}
+
 int main(int argc, char **argv)
 {
+    gbt_when_out_of_memory(end_without_memory);
     signal(SIGXFSZ, SIG_IGN); /* a file that may not grow is a failed write: one line, and nothing left behind
                                */
     signal(SIGPIPE, SIG_IGN); /* a training goes on when nobody reads its progress any longer */

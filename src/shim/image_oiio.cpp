@@ -27,6 +27,7 @@ extern "C" {
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/image_header.h"
+#include "base/library_end.h"
 #include "base/log.h"
 #include "base/memory.h"
 }
@@ -70,6 +71,29 @@ std::string reason_of(const OIIO::ImageInput *input)
     const std::string global = OIIO::has_error() ? OIIO::geterror() : std::string();
     const std::string own = input != nullptr && input->has_error() ? input->geterror() : std::string();
     return first_line(own.empty() ? global : own);
+}
+
+/* libpng and libjpeg say in words that they had no memory. */
+gbt_status status_of(const std::string &reason, gbt_status otherwise)
+{
+    for (const char *words : {"insufficient memory", "out of memory", "could not create png"})
+        if (OIIO::Strutil::icontains(reason, words))
+            return GBT_ERR_NO_MEMORY;
+    return otherwise;
+}
+
+gbt_status cannot_read(const char *path, const char *what, const OIIO::ImageInput *input, gbt_error *err)
+{
+    const std::string reason = reason_of(input);
+    return base_fail(err, status_of(reason, GBT_ERR_FORMAT), "%s: %s: %s", path, what, reason.c_str());
+}
+
+/* Without a reason when there was no memory to make it. */
+gbt_status no_plugin(const char *path, const char *plugin, const char *what, gbt_error *err)
+{
+    const std::string reason = OIIO::has_error() ? first_line(OIIO::geterror()) : "out of memory";
+    return base_fail(err, reason == "out of memory" ? GBT_ERR_NO_MEMORY : GBT_ERR_INTERNAL,
+                     "%s: OpenImageIO has no %s %s: %s", path, plugin, what, reason.c_str());
 }
 
 uint32_t big_endian(const unsigned char *p)
@@ -199,8 +223,7 @@ gbt_status open_image(const char *path, opened_image *o, gbt_error *err)
         return status;
     o->input = OIIO::ImageInput::create(plugin);
     if (!o->input)
-        return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO has no %s reader: %s", path, plugin,
-                         reason_of(nullptr).c_str());
+        return no_plugin(path, plugin, "reader", err);
     OIIO::ImageSpec config, spec;
     config.attribute("oiio:UnassociatedAlpha", 1); /* colours as stored, not multiplied by alpha */
     o->proxy = std::make_unique<OIIO::Filesystem::IOMemReader>(o->file.bytes, o->file.count);
@@ -208,8 +231,7 @@ gbt_status open_image(const char *path, opened_image *o, gbt_error *err)
         return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO's %s reader cannot read from memory", path,
                          plugin);
     if (!o->input->open(path, spec, config))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: cannot be read as %s: %s", path, plugin,
-                         reason_of(o->input.get()).c_str());
+        return cannot_read(path, (std::string("cannot be read as ") + plugin).c_str(), o->input.get(), err);
     return check_spec(path, plugin, o, err);
 }
 
@@ -250,8 +272,7 @@ gbt_status read_samples(const char *path, opened_image *o, OIIO::TypeDesc type, 
     const bool done = o->input->read_image(0, 0, 0, o->stored_channels, type, samples.data());
     /* A truncated JPEG is "read" with grey in the missing part; only the error text tells. */
     if (!done || o->input->has_error())
-        return base_fail(err, GBT_ERR_FORMAT, "%s: damaged or truncated: %s", path,
-                         reason_of(o->input.get()).c_str());
+        return cannot_read(path, "damaged or truncated", o->input.get(), err);
     expand(samples.data(), *o, pixels, out->pixels, to_float);
     return GBT_OK;
 }
@@ -324,8 +345,7 @@ gbt_status read_raw(const char *path, opened_image *o, image *out, image_names *
     gbt_status status = image_alloc(out, spec.width, spec.height, spec.nchannels, err);
     if (status == GBT_OK && (!o->input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeFloat, out->pixels) ||
                              o->input->has_error()))
-        status = base_fail(err, GBT_ERR_FORMAT, "%s: damaged or truncated: %s", path,
-                           reason_of(o->input.get()).c_str());
+        status = cannot_read(path, "damaged or truncated", o->input.get(), err);
     return status;
 }
 
@@ -355,12 +375,13 @@ gbt_status encode(const char *plugin, const char *name, const OIIO::ImageSpec &s
     OIIO::Filesystem::IOVecOutput proxy(*bytes);
     const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin);
     if (!output)
-        return base_fail(err, GBT_ERR_INTERNAL, "image: OpenImageIO has no %s writer: %s", plugin,
-                         first_line(OIIO::geterror()).c_str());
+        return no_plugin("image", plugin, "writer", err);
     if (!output->set_ioproxy(&proxy) || !output->open(name, spec) ||
-        !output->write_image(spec.format, samples) || !output->close())
-        return base_fail(err, GBT_ERR_INTERNAL, "image: %s writer failed: %s", plugin,
-                         first_line(output->geterror()).c_str());
+        !output->write_image(spec.format, samples) || !output->close()) {
+        const std::string reason = first_line(output->geterror());
+        return base_fail(err, status_of(reason, GBT_ERR_INTERNAL), "image: %s writer failed: %s", plugin,
+                         reason.c_str());
+    }
     return GBT_OK;
 }
 
@@ -390,6 +411,12 @@ gbt_status encode_exr(const image *im, std::vector<unsigned char> *bytes, gbt_er
     return encode("openexr", "image.exr", spec, im->pixels, bytes, err);
 }
 
+/* OpenImageIO leaves libjpeg's own answer to a failed allocation in place when it writes: exit(1). */
+struct jpeg_exit_guard {
+    jpeg_exit_guard() { library_exit_is_failure(true); }
+    ~jpeg_exit_guard() { library_exit_is_failure(false); }
+};
+
 gbt_status encode_jpeg(const image *im, int quality, std::vector<unsigned char> *bytes, gbt_error *err)
 {
     const int channels = im->channels < 3 ? 1 : 3; /* JPEG has no alpha */
@@ -397,6 +424,7 @@ gbt_status encode_jpeg(const image *im, int quality, std::vector<unsigned char> 
     OIIO::ImageSpec spec(im->width, im->height, channels, OIIO::TypeUInt8);
     spec.attribute("Compression", "jpeg:" + std::to_string(quality));
     spec.attribute("CompressionQuality", quality);
+    const jpeg_exit_guard guard;
     return encode("jpeg", "image.jpg", spec, samples.data(), bytes, err);
 }
 

@@ -4,7 +4,7 @@
 
 #include <cfenv>
 #include <cstdio>
-#include <cstdlib>
+#include <exception>
 #include <memory>
 #include <mutex>
 
@@ -102,10 +102,9 @@ try {
         },
         tbb::simple_partitioner());
 } catch (...) {
-    /* The bodies are C and cannot throw, so only TBB's own start-up can fail, and then there is no way to go
-       on. */
-    std::fputs("error: threads: oneTBB could not start\n", stderr);
-    std::abort();
+    /* The bodies are C and cannot throw, so only what TBB itself needs can fail, and then there is no way to
+       go on: gbt_when_out_of_memory(). */
+    std::terminate();
 }
 
 extern "C" const char *parallel_library(void)

@@ -6,6 +6,7 @@
 # code, or success where a failure does not matter; no temporary file left by a failure; the run that was there before still whole; and after a kill
 # of a training, --resume to the same bits as without.
 set -u
+here=$(cd "$(dirname "$0")" && pwd)
 program=$(realpath "$1") shim=$(realpath "$2") step=$3 only=${4:-}
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
@@ -20,9 +21,34 @@ bad() {
 faulty() { # CALL:N:WHAT, command
     local what=$1
     shift
+    with=(env GBT_FAULT="$what" GBT_FAULT_COUNT="$work/count" LD_PRELOAD="$shim")
     # the shell's own line about a killed program goes away
-    { GBT_FAULT=$what GBT_FAULT_COUNT=$work/count LD_PRELOAD=$shim "$@" >said 2>&1 </dev/null; code=$?; } 2>/dev/null
+    { if [ "$1" = viewed ]; then viewed >said 2>&1; else "${with[@]}" "$@" >said 2>&1 </dev/null; fi; code=$?; } 2>/dev/null
     runs=$((runs + 1))
+}
+
+# What a browser does, then SIGINT. A server that is still there after the fault must answer once more.
+viewed() {
+    local url='' server end target
+    "${with[@]}" "$program" view case/run --data case/data --port 0 --threads 1 >address &
+    server=$!
+    while [ -z "$url" ] && kill -0 $server 2>/dev/null; do
+        sleep 0.02
+        url=$(head -n 1 address 2>/dev/null)
+    done
+    for target in / '/render?view=0&format=png' '/render?view=0&format=jpeg' '/photo?view=0' '/render?view=1&format=png'; do
+        [ -n "$url" ] && kill -0 $server 2>/dev/null || break
+        (
+            exec 3<>"/dev/tcp/127.0.0.1/$(echo "$url" | sed 's/.*:\([0-9]*\).*/\1/')" &&
+                printf 'GET %s HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n' "$target" >&3 && cat <&3 >answer
+        ) 2>/dev/null || : >answer
+    done
+    end=$(head -c 12 answer 2>/dev/null)
+    kill -INT $server 2>/dev/null
+    wait $server
+    code=$?
+    [ $code != 0 ] || [ -z "$url" ] || [ "$end" = "HTTP/1.1 200" ] || { echo "no picture after the fault: $end"; return 99; }
+    return $code
 }
 
 prepare() { # a fresh copy of what a command works on
@@ -39,6 +65,7 @@ look() { # name, kind of end
         case $code in
         0) [ "$errors" = 0 ] || bad "$name" "a success with an error" ;;
         4 | 5) [ "$errors" = 1 ] || bad "$name" "$errors lines with an error" ;;
+        3) [[ "$name" == *library* ]] && grep -q 'not JSON' said || bad "$name" "exit code $code" ;; # jansson knows no better
         *) bad "$name" "exit code $code" ;;
         esac
         [ -z "$(find case -name '.*.tmp')" ] || bad "$name" "a temporary file is left: $(find case -name '.*.tmp')"
@@ -68,21 +95,23 @@ try() { # name, goes on (yes or no), command...
     local name=$1 on=$2 call total n each
     shift 2
     [ -z "$only" ] || [ "$only" = "$name" ] || return 0
-    for call in open write fsync close rename mkdir memory; do
+    for call in open write fsync close rename mkdir find read memory library; do
         prepare
         faulty "$call:0:count" "$@"
         [ $code = 0 ] || { bad "$name" "exit code $code without a fault"; return; }
         total=$(cat count)
-        [ "$total" -gt 0 ] || [ "$call" = mkdir ] || bad "$name" "no $call was counted: the shim does not work"
+        [ "$total" -gt 0 ] || [ "$call" = mkdir ] || [ "$name" = view ] || bad "$name" "no $call was counted: the shim does not work"
         each=$step
-        [ $call != memory ] || [ "$step" = 1 ] || each=$((total / 3 + 1)) # there are thousands
+        case $call in
+        memory | library) [ "$step" = 1 ] && each=$((total / 200 + 1)) || each=$((total / 3 + 1)) ;; # there are thousands
+        esac
         for ((n = 1; n <= total; n += each)); do
             prepare
             faulty "$call:$n:fail" "$@"
             look "$name, $call $n of $total fails" fail
             # An export is one file: no failure may go unnoticed.
-            [ "$name" != export ] || [ $call = memory ] || [ $call = mkdir ] || [ "$code" != 0 ] || bad "$name, $call $n of $total fails" "a success"
-            [ $call = memory ] && continue
+            [ "$name" != export ] || [[ " memory library mkdir find read " == *" $call "* ]] || [ "$code" != 0 ] || bad "$name, $call $n of $total fails" "a success"
+            [[ " memory library find read " == *" $call "* ]] && continue
             prepare
             faulty "$call:$n:kill" "$@"
             look "$name, killed at $call $n of $total" kill
@@ -117,6 +146,12 @@ try render no "$program" render case/run -o case/pictures --data case/data --qui
 try export no "$program" export case/run -o case/model.ply
 try compress no "$program" compress case/run -o case/small.gbt
 try report no "$program" report case/run
+try view no viewed
+mkdir tools && cp "$here/../pose/false_colmap.py" tools/colmap && chmod +x tools/colmap
+"$program" make-scene tabletop -o five --width 80 --height 64 --views 5 --points 50 --samples 1 --quiet >said 2>&1 && cp -R five three ||
+    { bad "a scene" "not made"; exit 1; }
+PATH=$work/tools:$PATH
+try pose no "$program" pose five/images -o case/posed
 
 # ---- what comes from outside
 same_bits() { # name

@@ -2,12 +2,13 @@
 /* tests/faults/shim.c -- loaded before a program's libraries (LD_PRELOAD): makes one of its system calls
    fail, or ends the process there.
 
-   GBT_FAULT=CALL:N:WHAT: the N-th CALL (open, write, fsync, close, rename, mkdir, memory; from 1) does WHAT:
-   fail, or kill. GBT_FAULT=CALL:0:count: nothing happens. In each case the number of such calls is written to
-   the file GBT_FAULT_COUNT when the process ends by itself. GBT_FAULT=short:0:all: every read and write is
-   interrupted once, then moves some bytes only. GBT_FAULT=clock:0:back: the time of day goes back by an hour
-   at each look. Calls count when they make, write or rename files; memory is aligned_alloc(), which is all
-   that the program's own code takes. */
+   GBT_FAULT=CALL:N:WHAT: the N-th CALL (open, write, fsync, close, rename, mkdir, find, read, memory,
+   library; from 1) does WHAT: fail, or kill. GBT_FAULT=CALL:0:count: nothing happens. In each case the number
+   of such calls is written to the file GBT_FAULT_COUNT when the process ends by itself.
+   GBT_FAULT=short:0:all: every read and write is interrupted once, then moves some bytes only.
+   GBT_FAULT=clock:0:back: the time of day goes back by an hour at each look. Calls count when they make,
+   write or rename files; find is open() to read; read counts for regular files; memory is aligned_alloc(),
+   which is all that the program's own code takes; library is malloc() and its like, which libraries take. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -39,6 +40,7 @@ __attribute__((constructor)) static void read_fault(void)
     char what[8] = "";
     if (text != NULL && sscanf(text, "%15[a-z]:%ld:%7[a-z]", fault.call, &fault.at, what) == 3)
         fault.kill = strcmp(what, "kill") == 0;
+    unsetenv("LD_PRELOAD"); /* programs that this one starts are not meant */
 }
 
 __attribute__((destructor)) static void write_count(void)
@@ -76,7 +78,7 @@ static int open_as(const char *name, const char *path, int flags, mode_t mode)
     int (*real)(const char *, int, ...);
     *(void **)&real = next(name);
     const bool writes = (flags & O_ACCMODE) != O_RDONLY && strncmp(path, "/dev/", 5) != 0;
-    if (writes && fails("open", EMFILE))
+    if (strncmp(path, "/dev/", 5) != 0 && fails(writes ? "open" : "find", EMFILE))
         return -1;
     const int fd = real(path, flags, mode);
     if (fd >= 0 && fd < FILES_MAX)
@@ -133,7 +135,7 @@ ssize_t read(int fd, void *bytes, size_t count)
     struct stat info;
     if (real == NULL)
         *(void **)&real = next("read");
-    if (fstat(fd, &info) == 0 && S_ISREG(info.st_mode) && interrupts(&count))
+    if (fstat(fd, &info) == 0 && S_ISREG(info.st_mode) && (interrupts(&count) || fails("read", EIO)))
         return -1;
     return real(fd, bytes, count);
 }
@@ -194,4 +196,27 @@ void *aligned_alloc(size_t align, size_t size)
     if (real == NULL)
         *(void **)&real = next("aligned_alloc");
     return fails("memory", ENOMEM) ? NULL : real(align, size);
+}
+
+/* glibc's own names: dlsym() itself would allocate. */
+void *__libc_malloc(size_t size);
+void *__libc_calloc(size_t count, size_t size);
+void *__libc_realloc(void *old, size_t size);
+void *__libc_memalign(size_t align, size_t size);
+
+void *malloc(size_t size) { return fails("library", ENOMEM) ? NULL : __libc_malloc(size); }
+
+void *calloc(size_t count, size_t size)
+{
+    return fails("library", ENOMEM) ? NULL : __libc_calloc(count, size);
+}
+
+void *realloc(void *old, size_t size) { return fails("library", ENOMEM) ? NULL : __libc_realloc(old, size); }
+
+int posix_memalign(void **out, size_t align, size_t size)
+{
+    if (fails("library", ENOMEM))
+        return ENOMEM;
+    *out = __libc_memalign(align, size);
+    return *out != NULL ? 0 : ENOMEM;
 }

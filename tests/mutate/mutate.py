@@ -1,34 +1,47 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 # tests/mutate/mutate.py -- changes single places of src/, and sees whether the tests of their room notice.
-"""usage: mutate.py [--count N] [--seed S] [--chosen] [--tree DIR] [FILE...]
+"""usage: mutate.py [--count N] [--seed S] [--begin K] [--chosen] [--tree DIR] [FILE...]
 
 Each mutant is one change of one line, in a copy of the tree under build/mutate: another comparison or arithmetic operator, another constant,
 a condition turned round, a statement left out. The tests of the file's room are built and run with it, the quickest first: a failed build of the
-tests, a failed test or one that takes much longer than before kills it. --count draws so many at random from the files (default 20 from all of
-src/); --chosen takes those of chosen.txt, with the tests that are named there; --tree puts the
-copy elsewhere. Prints one line for each, and totals; exit code 1 when one survives.
+tests, a failed test or one that takes much longer than before kills it; where the pictures' bits depend on a room, golden_avx2 comes last.
+--count draws so many at random from the files (default 20 from all of src/), those that do not compile not counted, from the K-th on; --chosen takes those of
+chosen.txt, with the tests that are named there; --tree puts the copy elsewhere. Prints one line for each, and totals; exit code 1 when one survives.
 """
-import argparse, glob, os, random, re, shutil, subprocess, sys, time
+import argparse, glob, os, random, re, resource, shutil, signal, subprocess, sys
 
 here = os.path.dirname(os.path.abspath(__file__))
 top = os.path.dirname(os.path.dirname(here))
 tree = build = None  # the copy, and its build folder
 jobs = os.environ.get("GBT_JOBS") or str(len(os.sched_getaffinity(0)))
 # Rooms without tests of their own, and rooms whose faults other tests see better.
-tests_of = {"shim": ["base", "image"], "run": ["train", "render"], "gb": ["gb"], "eval": ["eval", "train"]}
-slow_seconds = 30  # tests that take longer than this unchanged are left out
+tests_of = {"shim": ["base", "image"], "run": ["train", "render"], "eval": ["eval", "train"], "command": ["command", "cli", "render", "bake"],
+            "library": ["library", "train"], "render": ["render", "command"]}
+golden_rooms = "base image bvh gb anchor trace raster frame growth train run render".split()
+slow_seconds = 60  # tests that take longer than this unchanged are left out
 
 swaps = [(" < ", " <= "), (" <= ", " < "), (" > ", " >= "), (" >= ", " > "), (" == ", " != "), (" != ", " == "), (" + ", " - "), (" - ", " + "),
          (" * ", " / "), (" && ", " || "), (" || ", " && "), (" += ", " -= ")]
 
 
 def run(command, limit=None):
-    """True, or False after a failure or beyond the limit of seconds."""
+    """True, or False after a failure or beyond the limit: seconds of one process on a core, or thirty times as many by the clock."""
+    def bound():
+        if limit is not None:
+            resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit)))
+    nothing = subprocess.DEVNULL
+    child = subprocess.Popen(command, cwd=tree, stdout=nothing, stderr=nothing, stdin=nothing, preexec_fn=bound, start_new_session=True)
     try:
-        return subprocess.run(command, cwd=tree, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL, timeout=limit).returncode == 0
+        return child.wait(30 * limit if limit else None) == 0
     except subprocess.TimeoutExpired:
         return False
+    finally:  # what the test started, too
+        try:
+            os.killpg(child.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+        child.wait()
 
 
 def copy_tree():
@@ -83,7 +96,11 @@ def tests_in(folders):
     return found
 
 
-known_seconds = {}
+def tests_for(room):
+    return tests_in(tests_of.get(room, [room])) + ([("golden_avx2", "bash")] if room in golden_rooms else [])
+
+
+known_seconds = {}  # of processor time
 
 
 def unchanged(tests, longest):
@@ -95,9 +112,10 @@ def unchanged(tests, longest):
     if fresh and not run(["cmake", "--build", build, "-j", jobs, "--target", *targets]):
         sys.exit("mutate: the unchanged tree does not build: " + " ".join(targets))
     for name, _ in fresh:
-        begin = time.time()
+        begin = os.times()
         passed = run(["ctest", "--test-dir", build, "-R", "^%s$" % name])
-        known_seconds[name] = time.time() - begin if passed else None
+        end = os.times()
+        known_seconds[name] = end[2] + end[3] - begin[2] - begin[3] if passed else None
         if not passed:
             print("(%s fails unchanged and is left out)" % name)
     fine = [t for t in tests if known_seconds[t[0]] is not None and known_seconds[t[0]] < longest]
@@ -114,7 +132,7 @@ def judge(name, text, tests):
             target = program if program.startswith("test_") else "gbtrace"
             if not run(["cmake", "--build", build, "-j", jobs, "--target", target]):
                 return "the compiler"
-            if not run(["ctest", "--test-dir", build, "-R", "^%s$" % test], 30 + 10 * known_seconds[test]):
+            if not run(["ctest", "--test-dir", build, "-R", "^%s$" % test], 5 + 2 * known_seconds[test]):
                 return test
     finally:
         open(path, "w").write(good)
@@ -140,6 +158,7 @@ def main():
     parser = argparse.ArgumentParser(usage=__doc__.split("\n")[0][7:])
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--begin", type=int, default=0)
     parser.add_argument("--chosen", action="store_true")
     parser.add_argument("--tree", default=os.path.join(top, "build", "mutate"))
     parser.add_argument("files", nargs="*")
@@ -153,12 +172,14 @@ def main():
     if a.chosen:
         work = [(m, m[4]) for m in chosen(a.files)]
     else:
-        names = a.files or sorted(subprocess.run(["git", "ls-files", "src/*.c"], cwd=top, capture_output=True, text=True, check=True).stdout.split())
+        names = a.files or sorted(subprocess.run(["git", "ls-files", "src/*.c", "src/*.h"], cwd=top, capture_output=True, text=True, check=True).stdout.split())
         every = [m for name in names for m in mutants_of(name)]
         random.Random(a.seed).shuffle(every)
-        work = [(m, tests_in(tests_of.get(m[0].split("/")[1], [m[0].split("/")[1]]))) for m in sorted(every[: a.count])]
+        work = [(m, tests_for(m[0].split("/")[1])) for m in every[a.begin:]]
     killed = survived = 0
     for m, tests in work:
+        if not a.chosen and killed + survived == a.count:
+            break
         text = open(os.path.join(top, m[0])).read()
         if a.chosen:
             text = text.replace(m[2], m[3], 1)

@@ -4,7 +4,8 @@
 # COLMAP does is in test_known.c. Usage: test_pose.sh PROGRAM
 set -u
 program=$1
-. "$(dirname "$0")/../cli/report.sh"
+here=$(cd "$(dirname "$0")" && pwd)
+. "$here/../cli/report.sh"
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
@@ -48,63 +49,9 @@ tools=$work/none
 says "no colmap" 4 "^error: colmap: this program is needed, and is not there (Debian, Ubuntu: sudo apt-get install colmap)" pose "my photos" -o a
 tools=$work/tools:$PATH
 
-# ---- a false colmap: FALSE_COLMAP says what goes wrong, and where
+# ---- a false colmap: FALSE_COLMAP says what goes wrong, and where (false_colmap.py)
 mkdir tools
-cat >tools/colmap <<'END'
-#!/usr/bin/env python3
-import os, shutil, signal, sqlite3, sys, time
-
-what = os.environ.get("FALSE_COLMAP", "")
-verb = sys.argv[1]
-given = dict(zip(sys.argv[2::2], sys.argv[3::2]))
-work = os.path.dirname(os.path.abspath(__file__))
-if "-h" in sys.argv:
-    print("  --SiftExtraction.use_gpu arg (=1)\n  --SiftMatching.use_gpu arg (=1)")
-    sys.exit(0)
-with open(work + "/calls", "a") as calls:
-    calls.write(verb + "\n")
-if what == verb + "-fails":
-    print("Processed file [1/5]\nERROR: no space left\n")
-    sys.exit(1)
-if what == verb + "-hangs":
-    def stop(*_):
-        open(work + "/interrupted", "w").close()
-        sys.exit(0)
-    signal.signal(signal.SIGINT, stop)
-    open(work + "/hanging", "w").close()
-    time.sleep(600)
-if what == verb + "-dies":
-    os.kill(os.getpid(), signal.SIGKILL)
-if verb == "feature_extractor":
-    if what == "junk":
-        open(given["--database_path"], "wb").write(b"no database at all" * 100)
-        sys.exit(0)
-    base = sqlite3.connect(given["--database_path"])
-    base.executescript("CREATE TABLE IF NOT EXISTS images(image_id INTEGER PRIMARY KEY, name TEXT UNIQUE, camera_id INTEGER, prior_tx REAL);"
-        "CREATE TABLE IF NOT EXISTS keypoints(image_id INTEGER PRIMARY KEY, rows INTEGER);"
-        "CREATE TABLE IF NOT EXISTS two_view_geometries(pair_id INTEGER PRIMARY KEY, rows INTEGER);")
-    names = open(given["--image_list_path"]).read().splitlines()
-    for i, name in enumerate(names):
-        base.execute("INSERT OR IGNORE INTO images(name, camera_id) VALUES (?, 1)", (name,))
-        base.execute("INSERT OR REPLACE INTO keypoints VALUES ((SELECT image_id FROM images WHERE name = ?), 500)", (name,))
-        print("Processed file [%d/%d]" % (i + 1, len(names)))
-    base.commit()
-elif verb == "exhaustive_matcher":
-    base = sqlite3.connect(given["--database_path"])
-    base.execute("INSERT OR REPLACE INTO two_view_geometries VALUES (?, 77)", (1 * 2147483647 + 4,))
-    base.commit()
-    print("Matching block [1/1, 1/1] in 0.1s")
-elif verb == "mapper":
-    if what == "no-start":
-        print("ERROR: failed to create sparse model")
-        sys.exit(1)
-    models = given["--output_path"]
-    for i, scene in enumerate(["three"] if what == "few" else ["three", "five"]):
-        shutil.copytree(work + "/../" + scene + "/sparse/0", "%s/%d" % (models, i))
-    if what == "garbage":
-        open(models + "/0/images.bin", "wb").write(b"garbage that goes on and on" * 9)
-    print("Registering image #4 (5)")
-END
+cp "$here/false_colmap.py" tools/colmap
 chmod +x tools/colmap
 
 export FALSE_COLMAP=feature_extractor-fails

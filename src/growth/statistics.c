@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "base/memory.h"
+#include "base/paged.h"
 
 static const float gradient_max = 1e18f; /* sums of these stay finite */
 
@@ -34,7 +34,7 @@ gbt_status growth_stats_resize(growth_stats *s, size_t count, int offset_count, 
 void growth_stats_free(growth_stats *s)
 {
     for (int f = 0; f < GROWTH_STATS; f++)
-        mem_free(s->field[f]);
+        paged_free(s->field[f]);
     memset(s, 0, sizeof *s);
 }
 

@@ -49,11 +49,13 @@ typedef struct gbt_train_def {
                                even read, and every N-th of the training photos is held out in their place */
     gbt_alpha alpha;        /* black and white are also the background */
     uint64_t seed;
-    size_t hit_bytes_max;    /* memory for the hits of a view that are kept for the adjoint; tiles beyond are
-                                traced again, to the same bits. [0, 2^60], default 2^60 */
-    uint64_t max_anchors;    /* growth stops there */
-    bool grow;               /* grow and prune anchors */
-    double threshold_factor; /* of the thresholds of densification and of pruning. Not with compat */
+    size_t hit_bytes_max; /* memory for the hits of a view that are kept for the adjoint; tiles beyond are
+                             traced again, to the same bits. [0, 2^60], default 2^60 */
+    size_t memory; /* bytes that the program may take, docs/memory.md; the result does not depend on it. 0,
+                      the default: no limit */
+    uint64_t max_anchors;      /* growth stops there */
+    bool grow;                 /* grow and prune anchors */
+    double threshold_factor;   /* of the thresholds of densification and of pruning. Not with compat */
     double final_prune_factor; /* of the threshold of pruning, once more, in the last tenth of growing, when
                                   no anchors are made any more; 1: as before. Not with compat */
     bool compat;               /* every quirk of the reference method (docs/compat.md) */

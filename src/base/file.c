@@ -113,7 +113,7 @@ static gbt_status write_all(int fd, const unsigned char *bytes, size_t byte_coun
     return GBT_OK;
 }
 
-static void sync_folder_of(const char *path)
+void file_sync_folder_of(const char *path)
 {
     char folder[PATH_LIMIT];
     const char *slash = strrchr(path, '/');
@@ -148,7 +148,7 @@ gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_co
         unlink(temporary);
         return status;
     }
-    sync_folder_of(path);
+    file_sync_folder_of(path);
     return GBT_OK;
 }
 

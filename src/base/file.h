@@ -30,6 +30,9 @@ size_t file_read_ends(const char *path, size_t count, unsigned char *out);
  */
 gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err);
 
+/** fsync of the folder that `path` is in, as far as its file system knows that. */
+void file_sync_folder_of(const char *path);
+
 /** Create a folder and its parents; an existing folder is fine. */
 gbt_status file_make_folder(const char *path, gbt_error *err);
 

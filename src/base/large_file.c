@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "base/fail.h"
+#include "base/file.h"
 
 static gbt_status set_name(large_file *out, const char *path, gbt_error *err)
 {
@@ -112,7 +113,9 @@ gbt_status large_file_close(large_file *file, bool keep, gbt_error *err)
         status = base_fail(err, GBT_ERR_IO, "%s: close failed: %s", file->name, strerror(errno));
     if (made && keep && status == GBT_OK && rename(file->temporary, file->name) != 0)
         status = base_fail(err, GBT_ERR_IO, "%s: cannot replace: %s", file->name, strerror(errno));
-    if (made && (!keep || status != GBT_OK))
+    if (made && keep && status == GBT_OK)
+        file_sync_folder_of(file->name);
+    else if (made)
         unlink(file->temporary);
     memset(file, 0, sizeof *file);
     return status;

@@ -3,8 +3,9 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "base/file.h"
+#include "base/large_file.h"
 #include "base/memory.h"
+#include "base/paged.h"
 #include "io/container_format.h"
 
 static container_section *add_section(container_writer *w, const char *name, container_dtype dtype,
@@ -76,25 +77,24 @@ void container_add_text(container_writer *w, const char *name, const char *text)
     container_add(w, name, CONTAINER_U8, 1, &length, text);
 }
 
-gbt_status container_encode(const container_writer *w, unsigned char **bytes, size_t *byte_count,
-                            gbt_error *err)
+/* What stands before the sections: the header and the rows of the table. Free with mem_free(). */
+static container_header *make_head(const container_writer *w, size_t *head_bytes, gbt_error *err)
 {
-    *bytes = NULL;
-    *byte_count = 0;
-    if (w->failure.status != GBT_OK)
-        return base_fail(err, w->failure.status, "%s", w->failure.text);
     const size_t table_bytes = w->count * sizeof(container_row);
     size_t total = sizeof(container_header) + table_bytes;
+    *head_bytes = total;
     for (size_t i = 0; i < w->count; i++)
         if (!container_align_up(total, &total) ||
-            __builtin_add_overflow(total, w->sections[i].byte_count, &total))
-            return base_fail(err, GBT_ERR_NO_MEMORY, "section %s: the file is larger than memory can hold",
-                             w->sections[i].name);
-    unsigned char *file = mem_calloc(total, 1, "file image", err); /* zeros: the gaps */
-    if (file == NULL)
-        return GBT_ERR_NO_MEMORY;
-    container_row *rows = (container_row *)(void *)(file + sizeof(container_header));
-    size_t offset = sizeof(container_header) + table_bytes;
+            __builtin_add_overflow(total, w->sections[i].byte_count, &total)) {
+            base_fail(err, GBT_ERR_NO_MEMORY, "section %s: the file is larger than memory can hold",
+                      w->sections[i].name);
+            return NULL;
+        }
+    container_header *h = mem_calloc(*head_bytes, 1, "file image", err);
+    if (h == NULL)
+        return NULL;
+    container_row *rows = (container_row *)(void *)(h + 1);
+    size_t offset = *head_bytes;
     for (size_t i = 0; i < w->count; i++) {
         const container_section *s = &w->sections[i];
         container_row *row = &rows[i];
@@ -106,20 +106,61 @@ gbt_status container_encode(const container_writer *w, unsigned char **bytes, si
             row->dims[d] = s->dims[d];
         row->offset = offset;
         row->byte_count = s->byte_count;
-        if (s->byte_count > 0)
-            memcpy(file + offset, container_section_data(s), s->byte_count);
-        row->crc = container_checksum(file + offset, s->byte_count);
+        row->crc = container_checksum(container_section_data(s), s->byte_count);
         offset += s->byte_count;
+        paged_check();
     }
-    container_header *h = (container_header *)(void *)file;
     memcpy(h->magic, CONTAINER_MAGIC, sizeof h->magic);
     h->version = CONTAINER_VERSION;
     h->section_count = (uint32_t)w->count;
     h->file_bytes = total;
     h->table_crc = container_checksum(rows, table_bytes);
     h->crc = container_checksum(h, sizeof *h - sizeof h->crc);
-    *bytes = file;
-    *byte_count = total;
+    return h;
+}
+
+gbt_status container_encode(const container_writer *w, unsigned char **bytes, size_t *byte_count,
+                            gbt_error *err)
+{
+    *bytes = NULL;
+    *byte_count = 0;
+    if (w->failure.status != GBT_OK)
+        return base_fail(err, w->failure.status, "%s", w->failure.text);
+    size_t head_bytes;
+    container_header *head = make_head(w, &head_bytes, err);
+    if (head == NULL)
+        return GBT_ERR_NO_MEMORY;
+    const container_row *rows = (const container_row *)(const void *)(head + 1);
+    unsigned char *file = mem_calloc(head->file_bytes, 1, "file image", err); /* zeros: the gaps */
+    if (file != NULL) {
+        memcpy(file, head, head_bytes);
+        for (size_t i = 0; i < w->count; i++)
+            if (rows[i].byte_count > 0)
+                memcpy(file + rows[i].offset, container_section_data(&w->sections[i]), rows[i].byte_count);
+        *bytes = file;
+        *byte_count = head->file_bytes;
+    }
+    mem_free(head);
+    return file != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+}
+
+/* Section by section: what is saved may be larger than the memory that is left. */
+static gbt_status put_sections(const container_writer *w, const container_header *head, size_t head_bytes,
+                               large_file *file, gbt_error *err)
+{
+    enum { PIECE = 1 << 22 };
+    static const unsigned char gap[CONTAINER_ALIGN] = {0};
+    const container_row *rows = (const container_row *)(const void *)(head + 1);
+    GBT_TRY(large_file_put(file, head, head_bytes, err));
+    for (size_t i = 0; i < w->count; i++) {
+        const unsigned char *data = container_section_data(&w->sections[i]);
+        GBT_TRY(large_file_put(file, gap, (size_t)(rows[i].offset - file->size), err));
+        for (size_t at = 0; at < rows[i].byte_count; at += PIECE) {
+            const size_t left = rows[i].byte_count - at;
+            GBT_TRY(large_file_put(file, data + at, left < PIECE ? left : PIECE, err));
+            paged_check();
+        }
+    }
     return GBT_OK;
 }
 
@@ -127,11 +168,18 @@ gbt_status container_save(const container_writer *w, const char *path, gbt_error
 {
     if (w->failure.status != GBT_OK)
         return base_fail(err, w->failure.status, "%.200s: %s", path, w->failure.text);
-    unsigned char *bytes;
-    size_t byte_count;
-    GBT_TRY(container_encode(w, &bytes, &byte_count, err));
-    const gbt_status status = file_write_atomic(path, bytes, byte_count, err);
-    mem_free(bytes);
+    size_t head_bytes;
+    container_header *head = make_head(w, &head_bytes, err);
+    large_file *file = head != NULL ? mem_calloc(1, sizeof *file, "file", err) : NULL;
+    gbt_status status = file != NULL ? large_file_create(path, file, err) : GBT_ERR_NO_MEMORY;
+    if (status == GBT_OK)
+        status = put_sections(w, head, head_bytes, file, err);
+    if (file != NULL) {
+        const gbt_status closed = large_file_close(file, status == GBT_OK, err);
+        status = status != GBT_OK ? status : closed;
+    }
+    mem_free(file);
+    mem_free(head);
     return status;
 }
 

@@ -9,6 +9,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/paged.h"
 #include "base/parallel.h"
 #include "base/stop_signal.h"
 #include "cluster/cluster.h"
@@ -196,6 +197,20 @@ static run_clock clock_start(const trainer *t)
     return c;
 }
 
+/* A run that took more than it may ends, saved: with more memory it goes on. */
+static gbt_status check_memory(const trainer *t, const run_paths *paths, gbt_error *err)
+{
+    const size_t peak = mem_peak_bytes();
+    if (t->def.memory == 0 || peak <= t->def.memory)
+        return GBT_OK;
+    GBT_TRY(save_all(t, paths, err));
+    return base_fail(
+        err, GBT_ERR_NO_MEMORY,
+        "memory: %zu MB is too little: %zu anchors and a view of them took %zu after step %llu; saved in %s",
+        t->def.memory >> 20, t->anchors.count, (peak >> 20) + 1, (unsigned long long)t->step,
+        paths->checkpoint);
+}
+
 /* Log, save, stop, evaluate: whatever is due after a step. */
 static gbt_status follow_step(trainer *t, const step_report *report, run_clock *c, const run_paths *paths,
                               run_log *log, gbt_error *err)
@@ -205,6 +220,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
         speed_follow(&c->measured, report);
     t->seconds = c->offset + clock_wall() - c->begin - c->paused;
     run_log_step(log, t, report);
+    GBT_TRY(check_memory(t, paths, err));
 
     const bool stop = stop_signal_seen() || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
     const bool due = def->save_every_seconds > 0 && t->seconds - c->last_save >= def->save_every_seconds;
@@ -241,6 +257,7 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gb
         }
         step_report report;
         GBT_TRY(trainer_step(t, &report, err));
+        paged_check();
         const gbt_status status = cluster_leads() ? follow_step(t, &report, &c, paths, log, err) : GBT_OK;
         GBT_TRY(cluster_follow(status, err));
     }
@@ -254,9 +271,12 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
         GBT_TRY(resume_open(t, data, run, paths->checkpoint, paths->checkpoint_previous, def, strings, err));
     else
         GBT_TRY(trainer_open(t, data, def, err));
+    size_t hits = def->hit_bytes_max;
+    if (def->memory > 0 && hits > def->memory / 8)
+        hits = def->memory / 8;
     for (size_t i = 0; i < t->view_count; i++) /* there 0 is no limit */
         t->views[i].frame.scene.tape_bytes_max =
-            def->hit_bytes_max >= t->view_count ? def->hit_bytes_max / t->view_count : 1;
+            hits >= t->view_count ? hits / t->view_count : 1;
     if (t->step == 0)
         t->seconds = clock_wall() - begin; /* loading counts */
     return GBT_OK;
@@ -314,8 +334,11 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
         status = file_lock_folder(run, &lock, err);
     const bool locked = opened && status == GBT_OK;
     status = cluster_follow(status, err);
+    if (status == GBT_OK && def->memory > 0) /* what else there is must fit into the rest */
+        status = paged_start(run, def->memory / 4 * 3, err);
     if (status == GBT_OK)
         status = run_in_folder(t, data, run, &paths, def, strings, err);
+    paged_stop();
     if (locked)
         file_unlock_folder(lock);
     return status;

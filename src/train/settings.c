@@ -124,8 +124,12 @@ static const gbt_train_setting settings[] = {
              "another "
              "budget to that length in all, also when it was finished"},
     {NAMED("overwrite", overwrite), FLAG, .help = "train anew in a folder that holds a run, which is lost"},
-    {NAMED("hit-bytes-max", hit_bytes_max), .option = "memory", RANGE(BYTES, 0, 0x1p60, "BYTES"),
-     .number = 0x1p60,
+    {NAMED("memory", memory), RANGE(BYTES, 0, 0x1p60, "BYTES"),
+     .help =
+         "memory to take at most, such as 4G: photos are read again, hits traced again, anchors and what is "
+         "kept "
+         "beside them paged from a file in RUN (docs/memory.md); does not change the result; 0: no limit"},
+    {NAMED("hit-bytes-max", hit_bytes_max), RANGE(BYTES, 0, 0x1p60, "BYTES"), .rare = true, .number = 0x1p60,
      .help = "memory for ray hits kept for the backward pass, such as 100M; hits beyond it are traced again; "
              "does not change the result; default: no limit"},
 };

@@ -272,6 +272,8 @@ static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
     photo_check_warn(&check, data);
     choose_downscale(t);
     GBT_TRY(photos_open(&t->photos, &t->scene, def->downscale, err));
+    if (def->memory > 0 && t->photos.bytes_max > def->memory / 4)
+        t->photos.bytes_max = def->memory / 4;
     GBT_TRY(photos_load(&t->photos, t->train_views, t->train_count, err));
     t->extent = scene_camera_extent(&t->scene);
     GBT_TRY(provide_points(t, err));

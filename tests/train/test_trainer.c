@@ -12,6 +12,7 @@
 #include <time.h>
 
 #include "base/log.h"
+#include "base/paged.h"
 #include "base/parallel.h"
 #include "data/photo_size.h"
 #include "io/model_file.h"
@@ -192,10 +193,24 @@ static void threads_and_memory_do_not_change_bits(void **state)
         gbt_train_def def = run_def();
         def.hit_bytes_max =
             threads == 2 ? 1000 : (size_t)1 << 60; /* almost every tile is traced again for the adjoint */
+        if (threads == 3) /* anchors in files, whose pages are let go of all the time */
+            assert_ok(paged_start("/tmp", 1, NULL));
         train_ok(tiny, in_root("threads%d", threads), &def);
         assert_same_file(straight_run(), in_root("threads%d/model.gbt", threads));
     }
     gbt_set_threads(before);
+}
+
+static void more_memory_than_allowed(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    gbt_error err = {0};
+    def.memory = 1 << 20;
+    assert_int_equal(gbt_train(tiny, in_root("limit"), &def, &err), GBT_ERR_NO_MEMORY);
+    assert_non_null(strstr(err.text, "memory: 1 MB is too little"));
+    resume_ok(in_root("limit")); /* it was saved, and goes on with more */
+    assert_same_file(straight_run(), in_root("limit/model.gbt"));
 }
 
 static void another_seed_changes_bits(void **state)
@@ -1510,6 +1525,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(resumes_from_the_previous_checkpoint),
         cmocka_unit_test(a_signal_saves_and_ends),
         cmocka_unit_test(threads_and_memory_do_not_change_bits),
+        cmocka_unit_test(more_memory_than_allowed),
         cmocka_unit_test(another_seed_changes_bits),
         cmocka_unit_test(a_budget_run_can_be_repeated),
         cmocka_unit_test(a_budget_run_resumes_its_clock),

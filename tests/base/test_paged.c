@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/base/test_paged.c -- arrays in files, and files written piece by piece. */
+#include "test_support.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/file.h"
+#include "base/large_file.h"
+#include "base/memory.h"
+#include "base/paged.h"
+
+enum { NUMBERS = 16 << 20 };
+
+static void values_stay_when_pages_go(void **state)
+{
+    (void)state;
+    assert_ok(paged_start("/tmp", 1, NULL)); /* always over the limit */
+    uint32_t *a = paged_alloc(NUMBERS, sizeof *a, "test", NULL);
+    assert_non_null(a);
+    for (size_t i = 0; i < NUMBERS; i += 1021)
+        assert_int_equal(a[i], 0);
+    for (size_t i = 0; i < NUMBERS; i++)
+        a[i] = (uint32_t)(i * 2654435761u);
+    const size_t before = mem_resident_bytes();
+    paged_check();
+    assert_true(mem_resident_bytes() + (size_t)NUMBERS * 3 < before);
+    for (size_t i = 0; i < NUMBERS; i += 7)
+        if (a[i] != (uint32_t)(i * 2654435761u))
+            fail_msg("value %zu has changed", i);
+    paged_stop();
+    paged_check(); /* nothing is let go of any more */
+    assert_true(mem_resident_bytes() > (size_t)NUMBERS * 3);
+    paged_free(a);
+    assert_true(mem_resident_bytes() < (size_t)NUMBERS * 3);
+    paged_free(NULL);
+}
+
+static void memory_when_it_is_not_started(void **state)
+{
+    (void)state;
+    float *a = paged_alloc(1000, sizeof *a, "test", NULL);
+    assert_non_null(a);
+    a[999] = 1;
+    paged_free(a);
+    gbt_error err = {0};
+    assert_null(paged_alloc(SIZE_MAX, 8, "test", &err));
+    assert_int_equal(err.status, GBT_ERR_NO_MEMORY);
+}
+
+static void folders_that_are_not_there(void **state)
+{
+    (void)state;
+    gbt_error err = {0};
+    assert_int_equal(paged_start("/nowhere/at/all", 1, &err), GBT_ERR_IO);
+    assert_non_null(strstr(err.text, "/nowhere/at/all"));
+}
+
+static void many_arrays(void **state)
+{
+    (void)state;
+    enum { MANY = 300 }; /* more than can be mapped: the rest is memory */
+    unsigned char *a[MANY];
+    assert_ok(paged_start("/tmp", 1, NULL));
+    for (int i = 0; i < MANY; i++) {
+        a[i] = paged_alloc(70000, 1, "test", NULL);
+        assert_non_null(a[i]);
+        memset(a[i], i, 70000);
+    }
+    paged_check();
+    for (int i = 0; i < MANY; i++) {
+        assert_int_equal(a[i][69999], i & 255);
+        paged_free(a[i]);
+    }
+    paged_stop();
+}
+
+static void a_file_by_pieces(void **state)
+{
+    (void)state;
+    char path[64], temporary[80];
+    snprintf(path, sizeof path, "/tmp/gbt_paged_%ld", (long)getpid());
+    snprintf(temporary, sizeof temporary, "/tmp/.gbt_paged_%ld.tmp", (long)getpid());
+    static large_file file;
+    assert_ok(large_file_create(path, &file, NULL));
+    assert_ok(large_file_put(&file, "ab", 2, NULL));
+    assert_true(file_exists(temporary) && !file_exists(path));
+    assert_ok(large_file_close(&file, false, NULL));
+    assert_true(!file_exists(temporary) && !file_exists(path)); /* given up */
+    assert_ok(large_file_create(path, &file, NULL));
+    assert_ok(large_file_put(&file, "ab", 2, NULL));
+    assert_ok(large_file_put(&file, "cde", 3, NULL));
+    assert_ok(large_file_close(&file, true, NULL));
+    assert_true(!file_exists(temporary) && file_exists(path));
+    char text[4] = "";
+    assert_ok(large_file_open(path, &file, NULL));
+    assert_int_equal(file.size, 5);
+    assert_ok(large_file_read(&file, 2, text, 3, NULL));
+    assert_string_equal(text, "cde");
+    gbt_error err = {0};
+    assert_int_equal(large_file_read(&file, 3, text, 3, &err), GBT_ERR_IO);
+    assert_non_null(strstr(err.text, "became shorter"));
+    assert_ok(large_file_close(&file, false, NULL));
+    assert_true(file_exists(path));                  /* it was only read */
+    assert_ok(large_file_close(&file, false, NULL)); /* closed */
+    unlink(path);
+    assert_int_equal(large_file_open(path, &file, NULL), GBT_ERR_IO);
+    assert_int_equal(large_file_open("/tmp", &file, NULL), GBT_ERR_IO);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(values_stay_when_pages_go),  cmocka_unit_test(memory_when_it_is_not_started),
+        cmocka_unit_test(folders_that_are_not_there), cmocka_unit_test(many_arrays),
+        cmocka_unit_test(a_file_by_pieces),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -9,7 +9,9 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "frame/plain.h"
+#include "frame/plain_view.h"
 #include "frame/visible.h"
+#include "trace/pose_gradient.h"
 
 static double lap(double *since)
 {
@@ -257,6 +259,19 @@ gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *e
                            &f->d_gaussians);
     f->times.adjoint = lap(&clock);
     return GBT_OK;
+}
+
+gbt_status frame_backward_pose(frame *f, frame_subject subject, double d_pose[6], gbt_error *err)
+{
+    double d_eye[3];
+    if (subject.cloud != NULL)
+        GBT_TRY(plain_backward_view(subject.cloud, f->eye, f->visible, f->visible_count, &f->gaussians,
+                                    &f->d_gaussians, NULL, d_eye, err));
+    else
+        GBT_TRY(decode_backward_camera(subject.anchors, subject.decoder, f->eye, &f->tape, &f->d_gaussians,
+                                       d_eye, err));
+    const double eye[3] = {(double)f->eye[0], (double)f->eye[1], (double)f->eye[2]};
+    return pose_gradient(&f->gaussians, &f->d_gaussians, &f->camera, eye, d_eye, d_pose, err);
 }
 
 gbt_status frame_backward_anchors(frame *f, const anchors *a, const decoder *d, anchors *d_anchors,

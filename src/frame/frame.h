@@ -125,6 +125,13 @@ gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *sh
  * f->blend_weight. */
 gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err);
 
+/**
+ * Gradient by the six numbers of a motion of the camera (trace/pose_gradient.h), after
+ * frame_backward_gaussians() and before anything else is added to f->d_gaussians. Exact for rays, and for
+ * splats up to where their projection is cut at the border of the picture.
+ */
+gbt_status frame_backward_pose(frame *f, frame_subject subject, double d_pose[6], gbt_error *err);
+
 /** The second part, of anchors: f->d_gaussians, and what the caller has added to it -> d_anchors (rows of
     f->visible, added; or these rows alone: decode_backward()) and d_params (added). */
 gbt_status frame_backward_anchors(frame *f, const anchors *a, const decoder *d, anchors *d_anchors,

@@ -98,6 +98,8 @@ static const gbt_train_setting settings[] = {
      .help = "learn a colour matrix per photo, for photos that differ in exposure or white balance"},
     {NAMED("find-exposure", find_exposure), FLAG, .rare = true, .number = 1, .saved = true,
      .help = "do not turn exposure on where the photos' exposures differ"},
+    {NAMED("refine-poses", refine_poses), FLAG, .saved = true,
+     .help = "learn the photos' poses, too, where those of the data set are not exact"},
     {NAMED("splats-until", splats_until), RANGE(DOUBLE, 0, 1, "F"), .number = 0.7, .saved = true,
      .rare = true,
      .help =

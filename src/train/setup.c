@@ -211,6 +211,8 @@ static gbt_status make_state(trainer *t, gbt_error *err)
         return GBT_ERR_NO_MEMORY;
     if (t->def.exposure)
         GBT_TRY(exposures_make(&t->exposures, t->train_count, err));
+    if (t->def.refine_poses)
+        GBT_TRY(poses_make(&t->poses, &t->scene, t->train_count, t->distance, err));
     return growth_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
 }
 
@@ -298,6 +300,7 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     uint32_t words[4];
     rng_philox(def->seed, STREAM_NETWORKS, 0, words);
     GBT_TRY(decoder_init(&t->decoder, def->offsets, has_distance, (uint64_t)words[1] << 32 | words[0], err));
+    t->distance = (double)median;
     t->decoder.distance_scale = t->rules.distance_by_median ? 1 / median : 1.0f;
     t->decoder.distance_min = p5 * t->decoder.distance_scale;
     t->decoder.distance_max = p95 * t->decoder.distance_scale;

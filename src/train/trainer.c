@@ -12,6 +12,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "cluster/cluster.h"
+#include "train/align.h"
 #include "train/growing.h"
 #include "train/near.h"
 #include "train/step_exchange.h"
@@ -155,6 +156,15 @@ static void learn_exposures(trainer *t, double progress, double next)
         exposures_step(&t->exposures, t->slots[i], t->outcomes[i].d_exposure, rate);
 }
 
+/* So does the pose of each, but for the mean of all. */
+static void learn_poses(trainer *t, double progress, double next)
+{
+    const double rate =
+        t->def.learning_rate_factor * poses_rate(t->train_count, progress, (next - progress) / t->def.views);
+    for (int i = 0; t->poses.count > 0 && i < t->def.views; i++)
+        poses_step(&t->poses, &t->scene, t->train_views, t->slots[i], t->outcomes[i].d_pose, rate);
+}
+
 /* With one view a step, what it says goes straight to where several are added up to. */
 static void gather_alone(trainer *t)
 {
@@ -188,8 +198,10 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     double clock = clock_wall();
     if (t->def.views > 1)
         GBT_TRY(step_rows_add_up(t, out, err));
-    if (learns)
+    if (learns) {
         learn_exposures(t, progress, next);
+        learn_poses(t, progress, next);
+    }
     const bool adjust = growing_is_due(t);
     const learning_model model = model_of(t);
     if (learns)
@@ -212,6 +224,8 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 
 gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
 {
+    if (t->poses.count > 0)
+        GBT_TRY(align_held_out(t, err));
     double sum = 0;
     size_t count = 0;
     image photo = {0};
@@ -264,6 +278,7 @@ void trainer_free(trainer *t)
     for (int i = 0; i < 3; i++)
         row_list_free(rows[i]);
     exposures_free(&t->exposures);
+    poses_free(&t->poses);
     mem_free(t->order);
     mem_free(t->train_views);
     if (t->photos.source != NULL)

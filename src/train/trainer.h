@@ -12,6 +12,7 @@
 #include "train/exposure.h"
 #include "train/learnables.h"
 #include "train/photos.h"
+#include "train/poses.h"
 #include "train/rules.h"
 #include "train/schedule.h"
 #include "train/step_view.h"
@@ -46,8 +47,11 @@ struct trainer {
     growth_stats stats;
     exposures exposures; /* of the training photos, in the order of train_views; count 0 without --exposure */
 
+    poses poses; /* likewise; count 0 without --refine-poses. Those that are learned are in `scene` */
+
     gbt_renderer renderer; /* that the model is for */
     float voxel_size;
+    double distance;                    /* from training cameras to anchors, in the median */
     double extent, first_scale_max;     /* an isolated point would start as a floater */
     float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs,
                                            far inside what floats hold */
@@ -117,7 +121,7 @@ double trainer_step_pixels(const trainer *t, size_t view, double progress);
 
 /**
  * Mean PSNR over the held-out views at full training resolution, on 8-bit images; of their right halves with
- * --exposure (affine_split()).
+ * --exposure (affine_split()); from poses that fit them with --refine-poses (align_held_out()).
  */
 gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err);
 

@@ -48,6 +48,7 @@ typedef struct gbt_train_def {
                                "list=FILE". "validate=N:K," before it, for choosing constants: these are not
                                even read, and every N-th of the training photos is held out in their place */
     gbt_alpha alpha;        /* black and white are also the background */
+    gbt_background background;
     uint64_t seed;
     size_t hit_bytes_max;    /* memory for the hits of a view that are kept for the adjoint; tiles beyond are
                                 traced again, to the same bits. [0, 2^60], default 2^60 */

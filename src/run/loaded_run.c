@@ -133,6 +133,7 @@ static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
     out->settings = trace_settings_default();
     out->settings.t_near = out->model.t_near;
     memcpy(out->settings.background, out->model.background, sizeof out->settings.background);
+    out->settings.sky = out->model.sky;
     return GBT_OK;
 }
 

@@ -129,6 +129,14 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     }
     if (t->poses.count > 0)
         add_poses(&w, t);
+    const size_t sky_dims[2] = {SH_COUNT, 3};
+    float sky_values[SKY_NUMBERS];
+    if (t->settings.sky.varies) {
+        sky_pack(&t->settings, sky_values);
+        add_field(&w, "sky", "values", 2, sky_dims, sky_values);
+        add_field(&w, "sky", "moment1", 2, sky_dims, t->sky.first);
+        add_field(&w, "sky", "moment2", 2, sky_dims, t->sky.second);
+    }
     for (int i = 0; i < ANCHOR_SETS; i++)
         add_anchors(&w, anchor_set_names[i], sets[i]);
     container_add(&w, "anchors.born", CONTAINER_U64, 1, &rows, t->created);
@@ -189,6 +197,19 @@ static gbt_status read_poses(trainer *t, const container *c, gbt_error *err)
     }
     GBT_TRY(container_get(c, "pose.visits", CONTAINER_U64, p->count, p->visits, err));
     poses_unpack(p, &t->scene);
+    return GBT_OK;
+}
+
+static gbt_status read_sky(trainer *t, const container *c, gbt_error *err)
+{
+    static const char *const names[] = {"sky.values", "sky.moment1", "sky.moment2"};
+    float values[SKY_NUMBERS], *const out[] = {values, t->sky.first, t->sky.second};
+    for (int i = 0; i < 3; i++) {
+        const void *data;
+        GBT_TRY(container_find(c, names[i], CONTAINER_F32, 2, (size_t[]){SH_COUNT, 3}, &data, err));
+        memcpy(out[i], data, SKY_NUMBERS * sizeof *out[i]);
+    }
+    sky_unpack(values, &t->settings);
     return GBT_OK;
 }
 
@@ -258,6 +279,8 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
         GBT_TRY(read_exposures(c, &t->exposures, err));
     if (t->poses.count > 0)
         GBT_TRY(read_poses(t, c, err));
+    if (t->settings.sky.varies)
+        GBT_TRY(read_sky(t, c, err));
     GBT_TRY(container_get(c, "pace", CONTAINER_U64, PACE_SEGMENTS, t->pace.steps, err));
     GBT_TRY(container_get(c, "seconds", CONTAINER_F64, 1, &t->seconds, err));
     uint64_t in_row[3] = {0, 0, 0};

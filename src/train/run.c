@@ -91,6 +91,7 @@ static gbt_status save_model(const trainer *t, const char *path, gbt_error *err)
                .voxel_size = t->voxel_size,
                .extent = (float)t->extent,
                .t_near = t->settings.t_near,
+               .sky = t->settings.sky,
                .iterations = t->step};
     for (int i = 0; i < 3; i++) {
         m.origin[i] = t->scene.origin[i];

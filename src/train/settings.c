@@ -78,6 +78,9 @@ static const gbt_train_setting settings[] = {
      .help = "transparent pixels of photos: composited on black or white, or masked out of loss and scores; "
              "auto: "
              "white for Blender scenes, else black"},
+    {NAMED("background", background), CHOICE(GBT_BACKGROUND_NAMES), .number = GBT_BACKGROUND_CONSTANT,
+     .saved = true,
+     .help = "behind everything: one colour, or colours by direction that are learned, for skies"},
     {NAMED("seed", seed), RANGE(UINT64, 0, 0, "S"), .number = 0, .saved = true,
      .help = "of everything that is random"},
     {NAMED("max-anchors", max_anchors), RANGE(UINT64, 1, 1e8, "N"), .number = 2000000, .saved = true,

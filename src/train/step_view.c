@@ -245,6 +245,8 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
         GBT_TRY(make_rows(t, v, err));
     learnables *gradient = alone ? &t->gradient : &v->gradient;
     GBT_TRY(frame_backward_gaussians(f, &v->d_image, err));
+    if (t->settings.sky.varies)
+        GBT_TRY(frame_backward_sky(f, &v->d_image, r->d_sky, err));
     if (t->poses.count > 0)
         GBT_TRY(frame_backward_pose(f, frame_neural(&t->anchors, &t->decoder), r->d_pose, err));
     loss_add_gradient(&f->gaussians, &f->d_gaussians);

@@ -165,6 +165,18 @@ static void learn_poses(trainer *t, double progress, double next)
         poses_step(&t->poses, &t->scene, t->train_views, t->slots[i], t->outcomes[i].d_pose, rate);
 }
 
+/* What all views say of the background. */
+static void learn_sky(trainer *t, double rate)
+{
+    double sum[SH_COUNT][3] = {0};
+    if (!t->settings.sky.varies)
+        return;
+    for (int i = 0; i < t->def.views; i++)
+        for (int k = 0; k < 3 * SH_COUNT; k++)
+            sum[k / 3][k % 3] += t->outcomes[i].d_sky[k / 3][k % 3];
+    sky_step(&t->settings, &t->sky, sum, rate, t->step + 1);
+}
+
 /* With one view a step, what it says goes straight to where several are added up to. */
 static void gather_alone(trainer *t)
 {
@@ -201,6 +213,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     if (learns) {
         learn_exposures(t, progress, next);
         learn_poses(t, progress, next);
+        learn_sky(t, t->def.learning_rate_factor * sqrt(views) * sky_rate(progress));
     }
     const bool adjust = growing_is_due(t);
     const learning_model model = model_of(t);

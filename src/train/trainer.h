@@ -15,6 +15,7 @@
 #include "train/poses.h"
 #include "train/rules.h"
 #include "train/schedule.h"
+#include "train/sky_learning.h"
 #include "train/step_view.h"
 
 /** What the last step did. */
@@ -56,6 +57,7 @@ struct trainer {
     float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs,
                                            far inside what floats hold */
     trace_settings settings;
+    sky_moments sky; /* of the background in `settings`, where it varies */
     size_t anchors_initial, points_used;
     bool points_made;     /* the data set has no sparse points: ours */
     char start_text[160]; /* what the run starts from, for people */

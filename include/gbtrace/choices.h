@@ -45,6 +45,15 @@ typedef enum gbt_alpha {
 } gbt_alpha;
 #define GBT_ALPHA_NAMES "auto|black|white|mask"
 
+/** What is behind everything. */
+typedef enum gbt_background {
+    GBT_BACKGROUND_CONSTANT, /* one colour: what photos with an alpha channel lie on, else the mean of the
+                                sparse points */
+    GBT_BACKGROUND_SKY       /* colours by direction, learned: harmonics to degree 3. Not behind photos with
+                                an alpha channel */
+} gbt_background;
+#define GBT_BACKGROUND_NAMES "constant|sky"
+
 /** How Gaussians become a picture. */
 typedef enum gbt_renderer {
     GBT_RENDERER_TRACE,

@@ -48,6 +48,7 @@ typedef struct gbt_train_def {
                                "list=FILE". "validate=N:K," before it, for choosing constants: these are not
                                even read, and every N-th of the training photos is held out in their place */
     gbt_alpha alpha;        /* black and white are also the background */
+    gbt_background background;
     uint64_t seed;
     size_t hit_bytes_max; /* memory for the hits of a view that are kept for the adjoint; tiles beyond are
                              traced again, to the same bits. [0, 2^60], default 2^60 */
@@ -63,6 +64,8 @@ typedef struct gbt_train_def {
                       with a matrix fitted to the left */
     bool find_exposure;  /* turn `exposure` on where the photos' exposures differ by a quarter of a stop or
                             more.  Not with compat */
+    bool refine_poses;   /* learn the poses of the training photos, too, from where the data set has them;
+                            held-out photos are then scored from the poses at which the scene fits them best */
     double splats_until; /* splats stand for rays until this part of the run: their steps are quicker. Pinhole
                             photos, GBT_RENDERER_TRACE, not with compat */
     double grow_until;   /* anchors grow and are pruned until this part of the run */

@@ -152,9 +152,19 @@ static double response(const raster_reference *scene, const raster_settings *s, 
     return raw >= (double)s->alpha_min ? raw : 0;
 }
 
+/* What a pixel sees behind everything. */
+static void look_behind(const gbt_camera *camera, const raster_settings *s, int x, int y, double behind[3])
+{
+    double ray[3], world[3];
+    if (!gbt_camera_unproject(camera, x + 0.5, y + 0.5, ray))
+        return;
+    dmat_apply_transposed(camera->rotation, ray, world);
+    sky_color_exact(&s->sky, s->background, world, behind);
+}
+
 /* Front to back. Returns how many Gaussians of the list were passed. */
 static size_t blend(const raster_reference *scene, const raster_settings *s, const flat *all, size_t count,
-                    int x, int y, double rgb[3], double *T)
+                    int x, int y, const double behind[3], double rgb[3], double *T)
 {
     size_t i = 0;
     *T = 1;
@@ -169,12 +179,13 @@ static size_t blend(const raster_reference *scene, const raster_settings *s, con
         *T = next;
     }
     for (int c = 0; c < 3; c++)
-        rgb[c] += *T * (double)s->background[c];
+        rgb[c] += *T * behind[c];
     return i;
 }
 
 typedef struct forward_job {
     const raster_reference *scene;
+    const gbt_camera *camera;
     const raster_settings *s;
     const flat *all;
     size_t count;
@@ -187,9 +198,11 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
     (void)block;
     const forward_job *job = context;
     for (size_t i = begin; i < end; i++) {
-        double T;
-        blend(job->scene, job->s, job->all, job->count, (int)(i % (size_t)job->across) * job->step,
-              (int)(i / (size_t)job->across) * job->step, job->rgb + 3 * i, &T);
+        double T, behind[3] = {0};
+        const int x = (int)(i % (size_t)job->across) * job->step,
+                  y = (int)(i / (size_t)job->across) * job->step;
+        look_behind(job->camera, job->s, x, y, behind);
+        blend(job->scene, job->s, job->all, job->count, x, y, behind, job->rgb + 3 * i, &T);
     }
 }
 
@@ -197,8 +210,12 @@ gbt_status raster_reference_forward(const raster_reference *scene, const gbt_cam
                                     const raster_settings *settings, int step, double *rgb, gbt_error *err)
 {
     lens l;
-    forward_job job = {
-        .scene = scene, .s = settings, .across = (camera->width + step - 1) / step, .step = step, .rgb = rgb};
+    forward_job job = {.scene = scene,
+                       .camera = camera,
+                       .s = settings,
+                       .across = (camera->width + step - 1) / step,
+                       .step = step,
+                       .rgb = rgb};
     flat *all = NULL;
     const gbt_status status = flatten_all(scene, camera, settings, &l, &all, &job.count, err);
     job.all = all;
@@ -269,12 +286,11 @@ static void pixel_backward(const raster_reference *scene, const gbt_camera *came
                            const raster_settings *s, const flat *all, size_t count, int x, int y,
                            const double d_rgb[3], double *d_fields, double d_background[3])
 {
-    double rgb[3], T, behind[3];
-    const size_t n = scene->count, passed = blend(scene, s, all, count, x, y, rgb, &T);
-    for (int c = 0; c < 3; c++) {
-        behind[c] = (double)s->background[c];
+    double rgb[3], T, behind[3] = {0};
+    look_behind(camera, s, x, y, behind);
+    const size_t n = scene->count, passed = blend(scene, s, all, count, x, y, behind, rgb, &T);
+    for (int c = 0; c < 3; c++)
         d_background[c] += T * d_rgb[c];
-    }
     for (size_t i = passed; i-- > 0;) {
         const double raw = response(scene, s, &all[i], x, y), alpha = fmin((double)s->alpha_max, raw);
         if (raw == 0)

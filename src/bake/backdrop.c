@@ -33,7 +33,7 @@ static double radius_around(const gaussian_cloud *cloud, const gbt_camera *camer
 }
 
 gbt_status backdrop_add(gaussian_cloud *cloud, const gbt_camera *cameras, size_t count, const float color[3],
-                        gbt_error *err)
+                        const sky *behind, gbt_error *err)
 {
     const size_t n = cloud->count, sh_width = GAUSSIAN_SH_COUNT * 3;
     double middle[3] = {0};
@@ -53,11 +53,14 @@ gbt_status backdrop_add(gaussian_cloud *cloud, const gbt_camera *cameras, size_t
         const double z = 1 - (2 * (double)i + 1) / BACKDROP_COUNT, across = sqrt(1 - z * z),
                      turn = (double)i * 2.399963229728653;
         const double direction[3] = {across * cos(turn), across * sin(turn), z};
+        const float dir[3] = {(float)direction[0], (float)direction[1], (float)direction[2]};
+        float seen[3];
+        sky_color(behind, color, dir, seen);
         float *sh = memset(all.sh + to * sh_width, 0, sh_width * sizeof *all.sh);
         for (int k = 0; k < 3; k++) {
             all.mean[3 * to + (size_t)k] = (float)(middle[k] + radius * direction[k]);
             all.scale_log[3 * to + (size_t)k] = (float)log(deviation * radius);
-            sh[k] = (color[k] - 0.5f) / (float)GAUSSIAN_SH_0;
+            sh[k] = (seen[k] - 0.5f) / (float)GAUSSIAN_SH_0;
         }
         memcpy(all.quat + 4 * to, (const float[4]){1, 0, 0, 0}, 4 * sizeof *all.quat);
         all.opacity[to] = opacity;

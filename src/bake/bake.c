@@ -14,7 +14,7 @@
 #include "base/memory.h"
 #include "base/symmetric.h"
 #include "base/vec.h"
-#include "frame/sh.h"
+#include "base/sh.h"
 
 enum { TERMS = GAUSSIAN_SH_COUNT, PAIRS = TERMS * (TERMS + 1) / 2, DIRECTIONS = 64, PIXEL_STEP = 2 };
 

@@ -107,12 +107,14 @@ static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
     if (scene_background(&r->scene, laid_on))
         return GBT_OK;
     const float *behind = r->model.background;
-    e->backdrop = e->def->backdrop && (behind[0] > 0 || behind[1] > 0 || behind[2] > 0);
+    e->backdrop =
+        e->def->backdrop && (r->model.sky.varies || behind[0] > 0 || behind[1] > 0 || behind[2] > 0);
     if (e->backdrop && e->def->gaussians > 0 && e->def->gaussians <= BACKDROP_COUNT)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "gaussians: %d (wanted more than the %d of the background, or no background)",
                          e->def->gaussians, (int)BACKDROP_COUNT);
     memset(e->viewer.background, 0, sizeof e->viewer.background);
+    e->viewer.sky.varies = false;
     return GBT_OK;
 }
 
@@ -143,7 +145,7 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
                               &refine, out, err);
     e->refine_seconds = clock_wall() - clock;
     if (status == GBT_OK && e->backdrop)
-        status = backdrop_add(out, cameras, count, r->model.background, err);
+        status = backdrop_add(out, cameras, count, r->model.background, &r->model.sky, err);
     out->antialiased = r->frame.draw.footprint > 0;
     out->near = r->settings.t_near;
     mem_free(cameras);

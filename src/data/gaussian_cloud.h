@@ -23,7 +23,7 @@ enum { GAUSSIAN_SH_COUNT = 16 };
 
 /**
  * Checked and normalised. colour = max(0, 0.5 + sum sh_k Y_k(d)), d: unit, from the camera to the Gaussian
- * (frame/sh.h). Start from {0}.
+ * (base/sh.h). Start from {0}.
  */
 typedef struct gaussian_cloud {
     size_t count;

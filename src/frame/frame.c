@@ -10,7 +10,12 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "frame/plain.h"
+#include "frame/plain_view.h"
 #include "frame/visible.h"
+#include "trace/pose_gradient.h"
+
+enum { SKY_BLOCK = 4096 };
+static const float least_through = 0.01f; /* pixels with less of the sky say nothing of it */
 
 enum { VALID_BLOCK = 1 << 15 /* pixels */ };
 
@@ -139,17 +144,19 @@ raster_settings frame_splat_settings(const trace_settings *settings, raster_form
     s.transmittance_min = settings->transmittance_min;
     s.near = settings->t_near;
     memcpy(s.background, settings->background, sizeof s.background);
+    s.sky = settings->sky;
     return s;
 }
 
-static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape, gbt_error *err)
+static gbt_status splat(frame *f, const trace_settings *settings, bool keep_tape, float *through,
+                        gbt_error *err)
 {
     raster_settings s =
         frame_splat_settings(settings, f->draw.renderer == GBT_RENDERER_RASTER ? RASTER_EWA : RASTER_PER_RAY);
     s.dilation = dilation_of(f);
     raster_counters counted = {0};
-    GBT_TRY(
-        raster_forward(&f->splats, frame_drawn(f), &f->camera, &s, keep_tape, &f->rgb, NULL, &counted, err));
+    GBT_TRY(raster_forward(&f->splats, frame_drawn(f), &f->camera, &s, keep_tape, &f->rgb, through, &counted,
+                           err));
     f->counters.rays = counted.pixels;
     f->counters.hits = f->counters.blended = counted.blended;
     return GBT_OK;
@@ -168,11 +175,17 @@ gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camer
     const ray_shot shot = ray_shot_of(camera);
     GBT_TRY(prepare(f, subject, &shot, settings, NULL, err));
     stage_clock clock = stage_begin();
+    float *through = NULL;
+    if (keep_tape && settings->sky.varies) {
+        GBT_TRY(mem_reserve((void **)&f->through, &f->through_capacity, 0, ray_image_count(&f->rays),
+                            sizeof *f->through, "transmittances", err));
+        through = f->through;
+    }
     if (f->draw.renderer == GBT_RENDERER_TRACE)
-        GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape, &(trace_outputs){.rgb = &f->rgb}, &f->counters,
-                              err));
+        GBT_TRY(trace_forward(&f->scene, &f->rays, keep_tape,
+                              &(trace_outputs){.rgb = &f->rgb, .transmittance = through}, &f->counters, err));
     else
-        GBT_TRY(splat(f, settings, keep_tape, err));
+        GBT_TRY(splat(f, settings, keep_tape, through, err));
     f->times.trace = stage_lap(&clock);
     return GBT_OK;
 }
@@ -252,6 +265,56 @@ gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *e
         footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians,
                            &f->d_gaussians);
     f->times.adjoint = stage_lap(&clock);
+    return GBT_OK;
+}
+
+gbt_status frame_backward_pose(frame *f, frame_subject subject, double d_pose[6], gbt_error *err)
+{
+    double d_eye[3];
+    if (subject.cloud != NULL)
+        GBT_TRY(plain_backward_view(subject.cloud, f->eye, f->visible, f->visible_count, &f->gaussians,
+                                    &f->d_gaussians, NULL, d_eye, err));
+    else
+        GBT_TRY(decode_backward_camera(subject.anchors, subject.decoder, f->eye, &f->tape, &f->d_gaussians,
+                                       d_eye, err));
+    const double eye[3] = {(double)f->eye[0], (double)f->eye[1], (double)f->eye[2]};
+    return pose_gradient(&f->gaussians, &f->d_gaussians, &f->camera, eye, d_eye, d_pose, err);
+}
+
+typedef struct sky_job {
+    const frame *f;
+    const image *d_image;
+    double (*sums)[SH_COUNT][3]; /* per block */
+} sky_job;
+
+static void sum_sky(size_t block, size_t begin, size_t end, void *context)
+{
+    const sky_job *job = context;
+    double(*sum)[3] = job->sums[block];
+    for (size_t i = begin; i < end; i++) {
+        const float through = job->f->through[i], *d = job->d_image->pixels + 3 * i;
+        float y[SH_COUNT];
+        if (!(through > least_through))
+            continue;
+        sky_basis(job->f->rays.dir + 3 * i, y);
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < SH_COUNT; k++)
+                sum[k][c] += (double)(through * d[c] * y[k]);
+    }
+}
+
+gbt_status frame_backward_sky(const frame *f, const image *d_image, double d_sky[SH_COUNT][3], gbt_error *err)
+{
+    const size_t count = ray_image_count(&f->rays), blocks = parallel_block_count(count, SKY_BLOCK);
+    sky_job job = {f, d_image, mem_calloc(blocks, sizeof *job.sums, "gradient of the sky", err)};
+    if (job.sums == NULL)
+        return GBT_ERR_NO_MEMORY;
+    parallel_blocks(count, SKY_BLOCK, sum_sky, &job);
+    memset(d_sky, 0, SH_COUNT * sizeof *d_sky);
+    for (size_t b = 0; b < blocks; b++)
+        for (int k = 0; k < 3 * SH_COUNT; k++)
+            d_sky[k / 3][k % 3] += job.sums[b][k / 3][k % 3];
+    mem_free(job.sums);
     return GBT_OK;
 }
 
@@ -336,6 +399,7 @@ void frame_free(frame *f)
     mem_free(f->visible);
     mem_free(f->pixel_min);
     mem_free(f->blend_weight);
+    mem_free(f->through);
     mem_free(f->valid);
     gaussians_free(&f->gaussians);
     gaussians_free(&f->wide);

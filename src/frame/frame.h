@@ -61,6 +61,8 @@ typedef struct frame {
     raster_scene splats;
     float *blend_weight; /* [gaussians] after an adjoint: sum over rays of T alpha */
     size_t blend_weight_capacity;
+    float *through; /* [rays] transmittance of the last render for an adjoint, where the sky varies */
+    size_t through_capacity;
     unsigned char *valid; /* of the last frame_valid(), where rays are missing */
     size_t valid_capacity;
     image rgb; /* the render */
@@ -125,6 +127,19 @@ gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *sh
 /** Adjoint of the last frame_render(keep_tape), its first part: d_image -> f->d_gaussians and
  * f->blend_weight. */
 gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *err);
+
+/**
+ * Gradient by the six numbers of a motion of the camera (trace/pose_gradient.h), after
+ * frame_backward_gaussians() and before anything else is added to f->d_gaussians. Exact for rays, and for
+ * splats up to where their projection is cut at the border of the picture.
+ */
+gbt_status frame_backward_pose(frame *f, frame_subject subject, double d_pose[6], gbt_error *err);
+
+/** Gradient by the background's colour and the sky's harmonics (base/sky.h), after the last
+    frame_render(keep_tape) with a sky that varies; where a colour is cut as if it were not.
+    Pixels through which less than a hundredth of it shines are left out. */
+gbt_status frame_backward_sky(const frame *f, const image *d_image, double d_sky[SH_COUNT][3],
+                              gbt_error *err);
 
 /** The second part, of anchors: f->d_gaussians, and what the caller has added to it -> d_anchors (rows of
     f->visible, added; or these rows alone: decode_backward()) and d_params (added). */

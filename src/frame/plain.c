@@ -7,7 +7,7 @@
 
 #include "base/fail.h"
 #include "base/parallel.h"
-#include "frame/sh.h"
+#include "base/sh.h"
 
 enum { BLOCK = 2048, SH = GAUSSIAN_SH_COUNT * 3 };
 

@@ -9,7 +9,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
-#include "frame/sh.h"
+#include "base/sh.h"
 
 enum { BLOCK = 2048, SH = GAUSSIAN_SH_COUNT * 3 };
 

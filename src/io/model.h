@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "anchor/anchors.h"
+#include "base/sky.h"
 
 enum { MODEL_FOLDER_SIZE = 1024, MODEL_CONFIG_SIZE = 4096 };
 
@@ -18,6 +19,7 @@ typedef struct model {
     float voxel_size;    /* v, scene units, >= 0 */
     float extent;        /* of the training cameras, scene units, >= 0 */
     float background[3];
+    sky sky;                             /* what is added to it by direction */
     float t_near;                        /* scene units, >= 0 */
     char data_folder[MODEL_FOLDER_SIZE]; /* the data set it was trained on */
     char config[MODEL_CONFIG_SIZE];      /* key = value lines: how it was trained */

@@ -27,6 +27,8 @@ static void add_scene(container_writer *w, const model *m)
     container_add_small(w, "scene.numbers", CONTAINER_F32, SCENE_NUMBERS,
                         (float[SCENE_NUMBERS]){m->voxel_size, m->extent, m->t_near, m->background[0],
                                                m->background[1], m->background[2]});
+    if (m->sky.varies)
+        container_add(w, "scene.sky", CONTAINER_F32, 2, (size_t[]){SKY_HARMONICS, 3}, m->sky.harmonic);
     container_add_text(w, "scene.data_folder", m->data_folder);
     container_add_text(w, "train.config", m->config);
     container_add_small(w, "train.iterations", CONTAINER_U64, 1, &m->iterations);
@@ -90,6 +92,7 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
         {"scene.numbers", &m->extent, 1},
         {"scene.numbers", &m->t_near, 1},
         {"scene.numbers", m->background, 3},
+        {"scene.sky", m->sky.harmonic[0], m->sky.varies ? 3 * SKY_HARMONICS : 0},
         {"decoder.numbers", &d->distance_scale, 1},
     };
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
@@ -280,6 +283,18 @@ static gbt_status read_coded(const container *c, model *m, gbt_error *err)
     return model_decode(c, m->decoder.has_distance, m, err);
 }
 
+/* Models with a background of one colour have none. */
+static gbt_status read_sky(const container *c, sky *out, gbt_error *err)
+{
+    const void *data;
+    if (container_section_named(c, "scene.sky") == NULL)
+        return GBT_OK;
+    GBT_TRY(container_find(c, "scene.sky", CONTAINER_F32, 2, (size_t[]){SKY_HARMONICS, 3}, &data, err));
+    memcpy(out->harmonic, data, sizeof out->harmonic);
+    out->varies = true;
+    return GBT_OK;
+}
+
 static gbt_status read_scene(const container *c, model *m, gbt_error *err)
 {
     float numbers[SCENE_NUMBERS];
@@ -289,6 +304,7 @@ static gbt_status read_scene(const container *c, model *m, gbt_error *err)
     m->extent = numbers[SCENE_EXTENT];
     m->t_near = numbers[SCENE_T_NEAR];
     memcpy(m->background, numbers + SCENE_BACKGROUND, sizeof m->background);
+    GBT_TRY(read_sky(c, &m->sky, err));
     GBT_TRY(container_get_text(c, "scene.data_folder", m->data_folder, sizeof m->data_folder, err));
     GBT_TRY(container_get_text(c, "train.config", m->config, sizeof m->config, err));
     return container_get(c, "train.iterations", CONTAINER_U64, 1, &m->iterations, err);

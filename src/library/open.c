@@ -191,6 +191,8 @@ gbt_status gbt_model_set_settings(gbt_model *m, const gbt_model_settings *settin
             return base_fail(err, GBT_ERR_ARGUMENT, "settings: %s %g (wanted %g to %g)", ranges[k].name,
                              (double)*ranges[k].values, (double)ranges[k].low, (double)ranges[k].high);
     trace_settings *s = &m->run.settings;
+    if (memcmp(s->background, g->background, sizeof s->background) != 0)
+        s->sky.varies = false;
     memcpy(s->background, g->background, sizeof s->background);
     s->t_near = g->t_near;
     s->alpha_min = g->alpha_min;

@@ -8,7 +8,6 @@
 #include "frame/plain.h"
 #include "frame/plain_view.h"
 #include "library/handle.h"
-#include "trace/pose_gradient.h"
 
 gbt_status gbt_model_render(gbt_model *m, const gbt_camera *camera, bool keep, const gbt_picture *out,
                             gbt_error *err)
@@ -72,21 +71,6 @@ static gbt_status plain_gradient(gbt_model *m, const gbt_gaussians_gradient *out
     return GBT_OK;
 }
 
-static gbt_status camera_gradient(gbt_model *m, double d_pose[6], gbt_error *err)
-{
-    loaded_run *r = &m->run;
-    frame *f = &r->frame;
-    double d_eye[3];
-    if (r->cloud.count > 0)
-        GBT_TRY(plain_backward_view(&r->cloud, f->eye, f->visible, f->visible_count, &f->gaussians,
-                                    &f->d_gaussians, NULL, d_eye, err));
-    else
-        GBT_TRY(decode_backward_camera(&r->model.anchors, &r->model.decoder, f->eye, &f->tape,
-                                       &f->d_gaussians, d_eye, err));
-    const double eye[3] = {(double)f->eye[0], (double)f->eye[1], (double)f->eye[2]};
-    return pose_gradient(&f->gaussians, &f->d_gaussians, &f->camera, eye, d_eye, d_pose, err);
-}
-
 gbt_status gbt_model_gradient(gbt_model *m, const float *d_rgb, double d_pose[6],
                               const gbt_gaussians_gradient *d_gaussians, gbt_error *err)
 {
@@ -108,6 +92,6 @@ gbt_status gbt_model_gradient(gbt_model *m, const float *d_rgb, double d_pose[6]
                                                                                                        read */
     GBT_TRY(frame_backward_gaussians(f, &d_image, err));
     if (d_pose != NULL)
-        GBT_TRY(camera_gradient(m, d_pose, err));
+        GBT_TRY(frame_backward_pose(f, loaded_run_subject(&m->run), d_pose, err));
     return d_gaussians != NULL ? plain_gradient(m, d_gaussians, err) : GBT_OK;
 }

@@ -157,7 +157,7 @@ static bool forward_ewa(tile_job *job, ray_scratch *scratch)
         for (int c = 0; c < 3; c++)
             vfloat16_store(
                 job->pixels->rgb[block][c],
-                vfloat16_fma(b->transmittance, vfloat16_set1(job->view->settings.background[c]), b->rgb[c]));
+                vfloat16_fma(b->transmittance, vfloat16_load(job->pixels->background[block][c]), b->rgb[c]));
         vfloat16_store(job->pixels->transmittance[block], b->transmittance);
         if (job->tape != NULL)
             vfloat16_store(job->tape->transmittance[block], b->transmittance),
@@ -229,7 +229,7 @@ static bool backward_ewa(tile_job *job, ray_scratch *scratch)
         for (int c = 0; c < 3; c++) {
             b->d_rgb[c] = vfloat16_load(job->pixels->rgb[block][c]);
             b->behind =
-                vfloat16_fma(b->d_rgb[c], vfloat16_set1(job->view->settings.background[c]), b->behind);
+                vfloat16_fma(b->d_rgb[c], vfloat16_load(job->pixels->background[block][c]), b->behind);
             background[c] = vfloat16_fma(b->transmittance, b->d_rgb[c], background[c]);
         }
     }

@@ -66,6 +66,7 @@ typedef struct tile_pixels {
     _Alignas(64) float rgb[TILE_BLOCKS][3][PIXEL_LANES]; /* forward: out, with the background; backward:
                                                             dL/d(rgb), 0 outside the image */
     _Alignas(64) float transmittance[TILE_BLOCKS][PIXEL_LANES];
+    _Alignas(64) float background[TILE_BLOCKS][3][PIXEL_LANES]; /* in */
 } tile_pixels;
 
 /* What forward leaves for backward beside the lists. */

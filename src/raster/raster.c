@@ -12,6 +12,7 @@
 
 #include "base/fail.h"
 #include "base/parallel.h"
+#include "base/vec.h"
 #include "raster/gradients.h"
 
 struct raster_state {
@@ -180,6 +181,25 @@ static bool backward_tile(const pass *p, tile_job *job, ray_scratch *scratch)
     return p->state->kernel->backward[job->view->settings.form](job, scratch);
 }
 
+/* What every pixel of a tile sees behind everything. */
+static void look_behind(const tile_job *job)
+{
+    const raster_view *view = job->view;
+    float dir[3][PIXEL_LANES];
+    for (int block = 0; block < TILE_BLOCKS; block++) {
+        for (int lane = 0; lane < PIXEL_LANES && view->settings.sky.varies; lane++) {
+            const int x = job->x0 + block % BLOCKS_ACROSS * BLOCK_PIXELS + lane % BLOCK_PIXELS,
+                      y = job->y0 + block / BLOCKS_ACROSS * BLOCK_PIXELS + lane / BLOCK_PIXELS;
+            double ray[3] = {(x - view->cx) / view->fx, (y - view->cy) / view->fy, 1}, world[3];
+            dvec_normalize(ray);
+            dmat_apply_transposed(view->rotation, ray, world);
+            for (int k = 0; k < 3; k++)
+                dir[k][lane] = (float)world[k];
+        }
+        sky_colors(&view->settings.sky, view->settings.background, dir, job->pixels->background[block]);
+    }
+}
+
 static void run_tile(size_t index, size_t begin, size_t end, void *context)
 {
     (void)begin;
@@ -205,6 +225,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
                     .blocks = tape ? state->blocks + first : NULL,
                     .records = state->records,
                     .d_background = state->d_background[index]};
+    look_behind(&job);
     if (!(p->d_rgb == NULL ? forward_tile(p, &job, &scratch) : backward_tile(p, &job, &scratch)))
         atomic_store(&p->failed, true);
     state->counts[index] = job.counts;

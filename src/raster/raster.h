@@ -16,6 +16,7 @@
 #include "base/cpu.h"
 #include "base/gaussians.h"
 #include "base/image.h"
+#include "base/sky.h"
 #include "gbtrace/camera.h"
 #include "gbtrace/status.h"
 
@@ -33,6 +34,7 @@ typedef struct raster_settings {
     bool exact_cut;       /* EWA: draw to where alpha falls to alpha_min, not to 3 std-devs. Default false */
     bool order_by_center; /* per ray: blend in the order of the centres' depths, as EWA does. Default false */
     float background[3];  /* default 0 */
+    sky sky;              /* what is added to it by the ray's direction. Default nothing */
 } raster_settings;
 
 raster_settings raster_settings_default(void);

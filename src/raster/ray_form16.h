@@ -238,7 +238,6 @@ static inline size_t blend_ray(const tile_job *job, const ray_scratch *scratch, 
 
 static bool forward_rays(tile_job *job, ray_scratch *scratch)
 {
-    const raster_settings *settings = &job->view->settings;
     if (!find_reached(job, scratch))
         return false;
     for (int block = 0; block < TILE_BLOCKS; block++) {
@@ -251,21 +250,21 @@ static bool forward_rays(tile_job *job, ray_scratch *scratch)
             const size_t count = hits_of_ray(job, scratch, row_count, lane);
             job->counts.blended += blend_ray(job, scratch, count, lane, rgb, T);
             for (int c = 0; c < 3; c++)
-                job->pixels->rgb[block][c][lane] = fmaf(*T, settings->background[c], rgb[c]);
+                job->pixels->rgb[block][c][lane] = fmaf(*T, job->pixels->background[block][c][lane], rgb[c]);
         }
     }
     return true;
 }
 
 /* Back to front; t and alpha of the ray's rows become dL/dalpha and T alpha, 0 where nothing was blended. */
-static inline void return_ray(tile_job *job, ray_scratch *scratch, size_t row_count, int lane,
+static inline void return_ray(tile_job *job, ray_scratch *scratch, size_t row_count, int block, int lane,
                               const float d_rgb[3])
 {
     float rgb[3], T, behind = 0;
     const size_t count = hits_of_ray(job, scratch, row_count, lane),
                  blended = blend_ray(job, scratch, count, lane, rgb, &T);
     for (int c = 0; c < 3; c++) {
-        behind = fmaf(d_rgb[c], job->view->settings.background[c], behind);
+        behind = fmaf(d_rgb[c], job->pixels->background[block][c][lane], behind);
         job->d_background[c] += T * d_rgb[c];
     }
     for (size_t i = 0; i < row_count; i++)
@@ -336,7 +335,7 @@ static bool backward_rays(tile_job *job, ray_scratch *scratch)
             const float d[3] = {job->pixels->rgb[block][0][lane], job->pixels->rgb[block][1][lane],
                                 job->pixels->rgb[block][2][lane]};
             if (inside >> lane & 1)
-                return_ray(job, scratch, row_count, lane, d);
+                return_ray(job, scratch, row_count, block, lane, d);
         }
         /* Lanes outside the image have no hits: their alpha is 0 in all rows, so that their t is not read as
            a gradient. */

@@ -28,6 +28,7 @@ typedef struct surface_pass {
     float *far, *transmittance, *depth;
     image *rgb;
     float background[3];
+    sky sky;
     ray_image next; /* to the lamp, or mirrored; a zero direction where there is none */
     int sample;     /* of the lamp */
     float *lamp_transmittance,
@@ -171,8 +172,11 @@ static void add_background(size_t block, size_t begin, size_t end, void *context
     (void)block;
     surface_pass *s = context;
     for (size_t i = begin; i < end; i++)
-        if (s->surface[i].object == NO_OBJECT)
-            add_light(s, i, s->background);
+        if (s->surface[i].object == NO_OBJECT) {
+            float behind[3];
+            sky_color(&s->sky, s->background, s->rays->dir + 3 * i, behind);
+            add_light(s, i, behind);
+        }
 }
 
 static gbt_status allocate(surface_pass *s, gbt_error *err)
@@ -217,6 +221,7 @@ static gbt_status shade_mirrored(surface_pass *s, trace_scene *scene, gbt_error 
 {
     surface_pass mirrored = {.in = s->in, .rays = &s->next, .bounces = s->bounces + 1, .rgb = &s->next_rgb};
     memcpy(mirrored.background, s->background, sizeof mirrored.background);
+    mirrored.sky = s->sky;
     const gbt_status status = shade(&mirrored, scene, err);
     release(&mirrored);
     return status;
@@ -277,8 +282,11 @@ gbt_status insert_trace(void *context, trace_scene *scene, const ray_image *rays
     /* A surface hides the background, so it is not added before that is known. */
     memcpy(s.background, scene->settings.background, sizeof s.background);
     memset(scene->settings.background, 0, sizeof scene->settings.background);
+    s.sky = scene->settings.sky;
+    scene->settings.sky.varies = false;
     const gbt_status status = shade(&s, scene, err);
     memcpy(scene->settings.background, s.background, sizeof s.background);
+    scene->settings.sky = s.sky;
     release(&s);
     return status;
 }

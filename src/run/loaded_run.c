@@ -17,6 +17,7 @@
 #include "data/result_folder.h"
 #include "train/camera_sees.h"
 #include "train/near.h"
+#include "train/pose_file.h"
 #include "train/rules.h"
 
 /* What a result folder says beside its Gaussians: the data set, and what is behind them. */
@@ -132,6 +133,7 @@ static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
     out->settings = trace_settings_default();
     out->settings.t_near = out->model.t_near;
     memcpy(out->settings.background, out->model.background, sizeof out->settings.background);
+    out->settings.sky = out->model.sky;
     return GBT_OK;
 }
 
@@ -153,6 +155,17 @@ static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
     for (size_t i = 0; i < 3 * out->scene.points.count; i++)
         out->scene.points.position[i] += (float)(out->scene.origin[i % 3] - out->model.origin[i % 3]);
     return photos_open(&out->photos, &out->scene, downscale > 0 ? downscale : out->def.downscale, err);
+}
+
+/* Where training found that the photos were taken. */
+static gbt_status take_refined_poses(loaded_run *r, gbt_error *err)
+{
+    char path[4096];
+    GBT_TRY(file_join(path, sizeof path, r->data.folder, POSE_FILE_NAME, err));
+    if (file_exists(path))
+        return pose_file_read(path, &r->scene, err);
+    log_warn("%s is not there: photos have the poses of the data set, not those that training found", path);
+    return GBT_OK;
 }
 
 gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out,
@@ -178,6 +191,8 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
         log_info("%s: its data set is taken from %s, for both were moved", run, out->data.place);
     GBT_TRY(scene_load(data != NULL ? data : out->data.place, &split, &out->scene, err));
     scene_set_alpha(&out->scene, out->def.alpha);
+    if (out->def.refine_poses && (data == NULL || file_is_same(data, out->data.place)))
+        GBT_TRY(take_refined_poses(out, err));
     return place_views(downscale, out, err);
 }
 

@@ -251,9 +251,11 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
         return false;
     const vfloat16 alpha_max = vfloat16_set1(scene->settings.alpha_max), infinite = vfloat16_set1(INFINITY),
                    zero = vfloat16_set1(0);
-    vfloat16 d_rgb[3];
-    for (int c = 0; c < 3; c++)
+    vfloat16 d_rgb[3], behind_all[3];
+    for (int c = 0; c < 3; c++) {
         d_rgb[c] = vfloat16_load(d_rgb_in[c]);
+        behind_all[c] = vfloat16_load(rays->background[c]);
+    }
     replay_rows(scene, rays, beam, entry, d_rgb, &o);
     const vfloat16 transmittance = sort_rows(entry, &o);
     row_window window = {0};
@@ -275,7 +277,7 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
     }
     for (int i = count; i < count + ROW_BLOCK; i++)
         row_store(o.term, i, zero);
-    vfloat16 behind = vfloat16_mul(dot_lanes(scene->settings.background, d_rgb), transmittance);
+    vfloat16 behind = vfloat16_mul(dot16(behind_all, d_rgb), transmittance);
     row_store(o.after, count, behind);
     for (int i = count; i-- > 0;)
         row_store(o.after, i, behind = vfloat16_add(behind, row_load(o.term, i)));
@@ -354,7 +356,7 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
     }
     float behind = 0;
     for (int c = 0; c < 3; c++) {
-        behind = fmaf(scene->settings.background[c], d_rgb_in[c][lane], behind);
+        behind = fmaf(rays->background[c][lane], d_rgb_in[c][lane], behind);
         d_background[c] += transmittance * d_rgb_in[c][lane];
     }
     for (int i = count; i-- > 0;) {

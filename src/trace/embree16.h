@@ -98,7 +98,7 @@ static bool embree_packet(const kernel_scene *scene, const packet_rays *rays, un
             if (!blend_hits(&r, scene, INFINITY, packet, lane, tape, counters))
                 return false;
         }
-        finish_ray(&r, scene, lane, out);
+        finish_ray(&r, rays, lane, out);
     }
     return true;
 }

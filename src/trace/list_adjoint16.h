@@ -278,14 +278,16 @@ static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, 
                               float d_rgb_in[3][PACKET_LANES], vfloat16 d_background[3], list_rows *rows,
                               list_scratch *scratch)
 {
-    vfloat16 d_rgb[3];
-    for (int c = 0; c < 3; c++)
+    vfloat16 d_rgb[3], behind_all[3];
+    for (int c = 0; c < 3; c++) {
         d_rgb[c] = vfloat16_load(d_rgb_in[c]);
+        behind_all[c] = vfloat16_load(rays->background[c]);
+    }
     replay_list(scene, used, rays, seen, entry, count, rows);
     if (rows->crowded && !sort_rows_by_ray(rows, scratch))
         return false;
     const vfloat16 last = rows->product;
-    const vfloat16 background = vfloat16_mul(dot_lanes(scene->settings.background, d_rgb), last);
+    const vfloat16 background = vfloat16_mul(dot16(behind_all, d_rgb), last);
     if (!rows->crowded)
         collect_behind(rows, used, d_rgb, background);
     else if (!collect_behind_by_ray(rows, used, d_rgb, background, scratch))

@@ -157,8 +157,7 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     counters->pairs += rows->steps;
     counters->spilled_packets += rows->crowded;
     for (int c = 0; c < 3; c++)
-        vfloat16_store(out->rgb[c],
-                       vfloat16_fma(lowest, vfloat16_set1(scene->settings.background[c]), rgb[c]));
+        vfloat16_store(out->rgb[c], vfloat16_fma(lowest, vfloat16_load(rays->background[c]), rgb[c]));
     vfloat16_store(out->transmittance, lowest);
     out->ended = vmask16_bits(vfloat16_lt(vfloat16_mul(start, rows->product), stop_at));
     if (scene->extra)

@@ -37,10 +37,10 @@ static ray_state start_ray(const packet_rays *rays, bool parts, int lane, const 
                        .capacity = scratch->hit_bytes / sizeof(ray_hit) / 2};
 }
 
-static void finish_ray(const ray_state *r, const kernel_scene *scene, int lane, packet_output *out)
+static void finish_ray(const ray_state *r, const packet_rays *rays, int lane, packet_output *out)
 {
     for (int k = 0; k < 3; k++) {
-        out->rgb[k][lane] = fmaf(r->transmittance, scene->settings.background[k], r->rgb[k]);
+        out->rgb[k][lane] = fmaf(r->transmittance, rays->background[k][lane], r->rgb[k]);
         out->normal[k][lane] = r->normal[k];
     }
     out->transmittance[lane] = r->transmittance;
@@ -205,7 +205,7 @@ static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, bool p
     if (scene->root != NULL && make_beam(alone, scene, &beam) &&
         !gather_ray(&r, scene, &beam, &ray, packet, lane, tape, scratch, counters))
         return false;
-    finish_ray(&r, scene, lane, out);
+    finish_ray(&r, rays, lane, out);
     return true;
 }
 

@@ -111,9 +111,10 @@ static gbt_status gather(const prepared *all, size_t all_count, const trace_sett
 }
 
 /* Front to back; returns how many hits were added. */
-static size_t blend(const reference_scene *scene, const trace_settings *s, const hit_list *list, double T,
-                    double rgb[3], double *transmittance)
+static size_t blend(const reference_scene *scene, const trace_settings *s, const hit_list *list,
+                    const double dir[3], double T, double rgb[3], double *transmittance)
 {
+    double behind[3];
     size_t n = 0;
     rgb[0] = rgb[1] = rgb[2] = 0;
     for (; n < list->count; n++) {
@@ -125,8 +126,9 @@ static size_t blend(const reference_scene *scene, const trace_settings *s, const
             rgb[c] += T * hit->alpha * field(scene, REFERENCE_red + (unsigned)c, hit->id);
         T = T_next;
     }
+    sky_color_exact(&s->sky, s->background, dir, behind);
     for (int c = 0; c < 3; c++)
-        rgb[c] += T * (double)s->background[c];
+        rgb[c] += T * behind[c];
     *transmittance = T;
     return n;
 }
@@ -180,7 +182,7 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
         job->status[block] = gather(job->all, job->scene->count, job->s, origin, dir, near_of(job->rays, i),
                                     far_of(job->rays, i), &list, NULL);
         const double before = job->rays->near != NULL ? (double)job->rays->through[i] : 1;
-        const size_t n = blend(job->scene, job->s, &list, before, job->rgb + 3 * i, &transmittance);
+        const size_t n = blend(job->scene, job->s, &list, dir, before, job->rgb + 3 * i, &transmittance);
         if (job->transmittance != NULL)
             job->transmittance[i] = transmittance;
         if (job->blended != NULL)
@@ -255,11 +257,10 @@ static void ray_backward(const reference_scene *scene, const prepared *all, cons
                          double d_background[3])
 {
     double rgb[3], T, behind[3], open = 1;
-    const size_t blended = blend(scene, s, list, 1, rgb, &T);
-    for (int c = 0; c < 3; c++) {
-        behind[c] = (double)s->background[c];
+    const size_t blended = blend(scene, s, list, dir, 1, rgb, &T);
+    sky_color_exact(&s->sky, s->background, dir, behind);
+    for (int c = 0; c < 3; c++)
         d_background[c] += T * d_rgb[c];
-    }
     for (size_t i = blended; i-- > 0;) {
         const reference_hit *hit = &list->hits[i];
         double in_front = 1;

@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "base/sky.h"
 #include "gbtrace/choices.h"
 
 typedef struct trace_settings {
@@ -17,6 +18,7 @@ typedef struct trace_settings {
                             decides */
     float t_near;        /* nearest depth of a response, scene-local units, >= 0. Default 0.01 */
     float background[3]; /* blended last, with the remaining T. Default 0 */
+    sky sky;             /* what is added to it by the ray's direction. Default nothing */
 } trace_settings;
 
 static inline trace_settings trace_settings_default(void)

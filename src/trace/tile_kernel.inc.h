@@ -397,7 +397,7 @@ static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const 
         if (done >> p & 1) {
             for (int c = 0; c < 3; c++)
                 vfloat16_store(out[p].rgb[c], vfloat16_fma(s->packet[p].transmittance,
-                                                           vfloat16_set1(scene->settings.background[c]),
+                                                           vfloat16_load(rays->packet[p].background[c]),
                                                            s->packet[p].rgb[c]));
             vfloat16_store(out[p].transmittance, s->packet[p].transmittance);
             store_extra(&s->packet[p].extra, &out[p]);

@@ -222,8 +222,27 @@ static void load_whole_packet(const ray_image *rays, size_t first, packet_rays *
     p->active = here ? (unsigned)(sound[0] | sound[1] | sound[2] | sound[3]) : 0;
 }
 
+/* Lanes that are not active repeat one that is. */
+static void repeat_active(packet_rays *p, bool parts)
+{
+    const int first = __builtin_ctz(p->active);
+    for (int lane = 0; lane < PACKET_LANES; lane++) {
+        if (p->active >> lane & 1)
+            continue;
+        for (int axis = 0; axis < 3; axis++) {
+            p->dir[axis][lane] = p->dir[axis][first];
+            p->origin[axis][lane] = p->origin[axis][first];
+        }
+        p->far[lane] = p->far[first];
+        if (parts) {
+            p->near[lane] = p->near[first];
+            p->through[lane] = p->through[first];
+        }
+    }
+}
+
 /* Rays of the tile whose first pixel is (x0, y0); lanes outside the image or without a ray are not active. */
-static void load_tile(const ray_image *rays, int x0, int y0, tile_rays *out)
+static void load_tile(const ray_image *rays, const trace_settings *s, int x0, int y0, tile_rays *out)
 {
     out->common_origin = rays->common_origin;
     out->parts = rays->near != NULL;
@@ -238,22 +257,10 @@ static void load_tile(const ray_image *rays, int x0, int y0, tile_rays *out)
             for (int lane = 0; lane < PACKET_LANES; lane++)
                 if (lane_pixel(rays, x0, y0, packet, lane, &at))
                     load_ray(rays, at, lane, p);
-        if (p->active == 0 || p->active == (1u << PACKET_LANES) - 1)
-            continue;
-        const int first = __builtin_ctz(p->active);
-        for (int lane = 0; lane < PACKET_LANES; lane++) {
-            if (p->active >> lane & 1)
-                continue;
-            for (int axis = 0; axis < 3; axis++) {
-                p->dir[axis][lane] = p->dir[axis][first];
-                p->origin[axis][lane] = p->origin[axis][first];
-            }
-            p->far[lane] = p->far[first];
-            if (out->parts) {
-                p->near[lane] = p->near[first];
-                p->through[lane] = p->through[first];
-            }
-        }
+        if (p->active != 0 && p->active != (1u << PACKET_LANES) - 1)
+            repeat_active(p, out->parts);
+        if (p->active != 0)
+            sky_colors(&s->sky, s->background, p->dir, p->background);
     }
 }
 
@@ -415,7 +422,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
         empty_tape(p, &tile->tape);
         memset(&tile->counters, 0, sizeof tile->counters);
     }
-    load_tile(p->rays, x0, y0, &rays);
+    load_tile(p->rays, &p->view.settings, x0, y0, &rays);
     tile_scratch own = {{0}, {0}}, *place = scratch_take(p->scene->scratch),
                  *scratch = place != NULL ? place : &own;
     const bool fine = p->d_rgb == NULL ? forward_tile(p, tile, &rays, x0, y0, scratch)

@@ -55,15 +55,15 @@ static gbt_status read_anchors(const container *c, const char *prefix, size_t ro
 }
 
 /* FNV-1a of what tells one data set from another: the names, sizes and centres of its views. */
-static uint64_t hash_of_views(const scene *s)
+static uint64_t hash_of_views(const trainer *t)
 {
     uint64_t hash = 0xcbf29ce484222325u;
-    for (size_t i = 0; i < s->view_count; i++) {
-        const scene_view *v = &s->views[i];
+    for (size_t i = 0; i < t->scene.view_count; i++) {
+        const scene_view *v = &t->scene.views[i];
+        const gbt_camera *camera = t->poses.count > 0 ? &t->poses.given[i] : &v->camera;
         char text[512];
-        const int length =
-            snprintf(text, sizeof text, "%.300s %d %d %.6g %.6g %.6g", v->name, v->camera.width,
-                     v->camera.height, v->camera.center[0], v->camera.center[1], v->camera.center[2]);
+        const int length = snprintf(text, sizeof text, "%.300s %d %d %.6g %.6g %.6g", v->name, camera->width,
+                                    camera->height, camera->center[0], camera->center[1], camera->center[2]);
         for (int k = 0; k <= length; k++)
             hash = (hash ^ (unsigned char)text[k]) * 0x100000001b3u;
     }
@@ -82,6 +82,17 @@ static uint64_t hash_of_photos(const scene *s)
             hash = (hash ^ ends[k]) * 0x100000001b3u;
     }
     return hash;
+}
+
+static void add_poses(container_writer *w, const trainer *t)
+{
+    const poses *p = &t->poses;
+    const size_t dims[2] = {p->count, POSE_NUMBERS}, pose_dims[2] = {t->scene.view_count, POSE_PACKED};
+    poses_pack(p, &t->scene);
+    container_add(w, "pose.views", CONTAINER_F64, 2, pose_dims, p->packed);
+    add_field(w, "pose", "moment1", 2, dims, p->moment1);
+    add_field(w, "pose", "moment2", 2, dims, p->moment2);
+    container_add(w, "pose.visits", CONTAINER_U64, 1, &p->count, p->visits);
 }
 
 gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
@@ -106,7 +117,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     container_add_small(&w, "in_row", CONTAINER_U64, 3,
                         (const uint64_t[]){t->skipped_in_row, t->empty_in_row, t->opacity_raises});
     container_add_small(&w, "seconds", CONTAINER_F64, 1, &t->seconds);
-    container_add_small(&w, "views", CONTAINER_U64, 1, (const uint64_t[]){hash_of_views(&t->scene)});
+    container_add_small(&w, "views", CONTAINER_U64, 1, (const uint64_t[]){hash_of_views(t)});
     container_add_small(&w, "photos", CONTAINER_U64, 1, (const uint64_t[]){hash_of_photos(&t->scene)});
     const exposures *e = &t->exposures;
     const size_t exposure_dims[2] = {e->count, AFFINE_NUMBERS};
@@ -115,6 +126,16 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
         add_field(&w, "exposure", "moment1", 2, exposure_dims, e->moment1);
         add_field(&w, "exposure", "moment2", 2, exposure_dims, e->moment2);
         container_add(&w, "exposure.visits", CONTAINER_U64, 1, &e->count, e->visits);
+    }
+    if (t->poses.count > 0)
+        add_poses(&w, t);
+    const size_t sky_dims[2] = {SH_COUNT, 3};
+    float sky_values[SKY_NUMBERS];
+    if (t->settings.sky.varies) {
+        sky_pack(&t->settings, sky_values);
+        add_field(&w, "sky", "values", 2, sky_dims, sky_values);
+        add_field(&w, "sky", "moment1", 2, sky_dims, t->sky.first);
+        add_field(&w, "sky", "moment2", 2, sky_dims, t->sky.second);
     }
     for (int i = 0; i < ANCHOR_SETS; i++)
         add_anchors(&w, anchor_set_names[i], sets[i]);
@@ -157,6 +178,41 @@ static gbt_status read_exposures(const container *c, exposures *e, gbt_error *er
     return container_get(c, "exposure.visits", CONTAINER_U64, e->count, e->visits, err);
 }
 
+static gbt_status read_poses(trainer *t, const container *c, gbt_error *err)
+{
+    const poses *p = &t->poses;
+    const struct {
+        const char *name;
+        container_dtype dtype;
+        size_t dims[2], bytes;
+        void *out;
+    } parts[] = {{"pose.views", CONTAINER_F64, {t->scene.view_count, POSE_PACKED}, sizeof(double), p->packed},
+                 {"pose.moment1", CONTAINER_F32, {p->count, POSE_NUMBERS}, sizeof(float), p->moment1},
+                 {"pose.moment2", CONTAINER_F32, {p->count, POSE_NUMBERS}, sizeof(float), p->moment2}};
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        size_t dims[2] = {parts[i].dims[0], parts[i].dims[1]};
+        const void *data;
+        GBT_TRY(container_find(c, parts[i].name, parts[i].dtype, 2, dims, &data, err));
+        memcpy(parts[i].out, data, dims[0] * dims[1] * parts[i].bytes);
+    }
+    GBT_TRY(container_get(c, "pose.visits", CONTAINER_U64, p->count, p->visits, err));
+    poses_unpack(p, &t->scene);
+    return GBT_OK;
+}
+
+static gbt_status read_sky(trainer *t, const container *c, gbt_error *err)
+{
+    static const char *const names[] = {"sky.values", "sky.moment1", "sky.moment2"};
+    float values[SKY_NUMBERS], *const out[] = {values, t->sky.first, t->sky.second};
+    for (int i = 0; i < 3; i++) {
+        const void *data;
+        GBT_TRY(container_find(c, names[i], CONTAINER_F32, 2, (size_t[]){SH_COUNT, 3}, &data, err));
+        memcpy(out[i], data, SKY_NUMBERS * sizeof *out[i]);
+    }
+    sky_unpack(values, &t->settings);
+    return GBT_OK;
+}
+
 /* Older checkpoints have none. */
 static gbt_status read_creation(trainer *t, const container *c, const char *path, gbt_error *err)
 {
@@ -186,10 +242,10 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
                          (unsigned long long)counters[6],
                          t->scene.photos_missing > 0 ? "; photos that are missing: " : "",
                          t->scene.missing_names);
-    uint64_t views = hash_of_views(&t->scene);
+    uint64_t views = hash_of_views(t);
     if (container_section_named(c, "views") != NULL) /* older checkpoints have none */
         GBT_TRY(container_get(c, "views", CONTAINER_U64, 1, &views, err));
-    if (views != hash_of_views(&t->scene))
+    if (views != hash_of_views(t))
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: made from other data (%.1000s has photos of other names, sizes or cameras)",
                          path, t->scene.folder);
@@ -221,6 +277,10 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
                              t->stats.field, err));
     if (t->exposures.count > 0)
         GBT_TRY(read_exposures(c, &t->exposures, err));
+    if (t->poses.count > 0)
+        GBT_TRY(read_poses(t, c, err));
+    if (t->settings.sky.varies)
+        GBT_TRY(read_sky(t, c, err));
     GBT_TRY(container_get(c, "pace", CONTAINER_U64, PACE_SEGMENTS, t->pace.steps, err));
     GBT_TRY(container_get(c, "seconds", CONTAINER_F64, 1, &t->seconds, err));
     uint64_t in_row[3] = {0, 0, 0};

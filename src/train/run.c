@@ -14,8 +14,10 @@
 #include "base/stop_signal.h"
 #include "cluster/cluster.h"
 #include "io/model_file.h"
+#include "train/align.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
+#include "train/pose_file.h"
 #include "train/resume.h"
 #include "train/run_data.h"
 #include "train/run_log.h"
@@ -30,7 +32,7 @@ void gbt_set_threads(int threads) { parallel_set_threads(threads); }
 
 typedef struct run_paths {
     char model[PATH_SIZE], config[PATH_SIZE], log[PATH_SIZE], events[PATH_SIZE], json[PATH_SIZE],
-        exposure[PATH_SIZE], checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
+        exposure[PATH_SIZE], poses[PATH_SIZE], checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
 } run_paths;
 
 static gbt_status name_paths(const char *run, run_paths *p, gbt_error *err)
@@ -43,6 +45,7 @@ static gbt_status name_paths(const char *run, run_paths *p, gbt_error *err)
     GBT_TRY(file_join(p->events, sizeof p->events, run, EVENTS_TRAIN_NAME, err));
     GBT_TRY(file_join(p->json, sizeof p->json, run, "train.json", err));
     GBT_TRY(file_join(p->exposure, sizeof p->exposure, run, "exposure.json", err));
+    GBT_TRY(file_join(p->poses, sizeof p->poses, run, POSE_FILE_NAME, err));
     GBT_TRY(file_join(p->checkpoint, sizeof p->checkpoint, checkpoints, "last.gbt", err));
     return file_join(p->checkpoint_previous, sizeof p->checkpoint_previous, checkpoints, "last.gbt.prev",
                      err);
@@ -89,6 +92,7 @@ static gbt_status save_model(const trainer *t, const char *path, gbt_error *err)
                .voxel_size = t->voxel_size,
                .extent = (float)t->extent,
                .t_near = t->settings.t_near,
+               .sky = t->settings.sky,
                .iterations = t->step};
     for (int i = 0; i < 3; i++) {
         m.origin[i] = t->scene.origin[i];
@@ -171,7 +175,23 @@ static gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *
     GBT_TRY(checkpoint_save(t, paths->checkpoint, err));
     if (t->exposures.count > 0)
         GBT_TRY(save_exposures(t, paths->exposure, err));
+    if (t->poses.count > 0)
+        GBT_TRY(pose_file_write(&t->scene, paths->poses, err));
     return save_model(t, paths->model, err);
+}
+
+/* Of a whole run: the last poses of the photos, and what became of them. */
+static gbt_status finish_poses(trainer *t, gbt_error *err)
+{
+    double angle, distance;
+    if (t->poses.count == 0)
+        return GBT_OK;
+    GBT_TRY(align_held_out(t, err));
+    GBT_TRY(poses_moved(&t->poses, &t->scene, t->train_views, t->train_count, &angle, &distance, err));
+    log_info("%s: poses moved by %.2g degrees and %.2g scene units (the median photo); %zu held-out photos "
+             "are scored from where the scene fits them best",
+             t->scene.folder, angle * 57.29577951308232, distance, t->test_count);
+    return GBT_OK;
 }
 
 static gbt_status evaluate_in_passing(trainer *t, run_log *log, gbt_error *err)
@@ -292,6 +312,7 @@ static gbt_status write_settings(const trainer *t, const char *run, const run_pa
 
 static gbt_status finish(trainer *t, const run_paths *paths, run_log *log, gbt_error *err)
 {
+    GBT_TRY(finish_poses(t, err));
     GBT_TRY(save_all(t, paths, err));
     return log->all.steps > 0 || !run_log_is_of_step(paths->json, t->step)
                ? run_log_summary(log, t, paths->json, err)

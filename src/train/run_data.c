@@ -71,10 +71,11 @@ static char *take_line(char **rest)
 void run_data_find(const char *run, const char *named, run_data *out)
 {
     *out = (run_data){0};
-    char folder[RUN_DATA_PATH_SIZE], path[RUN_DATA_PATH_SIZE], near_run[RUN_DATA_PATH_SIZE];
+    char path[RUN_DATA_PATH_SIZE], near_run[RUN_DATA_PATH_SIZE];
     unsigned char *bytes = NULL;
     size_t byte_count;
-    snprintf(folder, sizeof folder, "%s", run);
+    char *folder = out->folder;
+    snprintf(folder, sizeof out->folder, "%s", run);
     if (!file_is_folder(run)) {
         char *slash = strrchr(folder, '/');
         snprintf(slash != NULL ? slash + 1 : folder, 2, "%s", slash != NULL ? "" : ".");

@@ -12,6 +12,7 @@
 enum { RUN_DATA_PATH_SIZE = 4096 };
 
 typedef struct run_data {
+    char folder[RUN_DATA_PATH_SIZE];    /* of the run */
     char place[RUN_DATA_PATH_SIZE];     /* where it is; empty: at none of the places */
     char tried[3 * RUN_DATA_PATH_SIZE]; /* the places, "A, B, C" */
     bool moved;                         /* found by its place relative to the run */

@@ -290,6 +290,7 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     json_object_set_new(root, "skipped_steps", json_integer((json_int_t)t->skipped_steps));
     json_object_set_new(root, "opacity_raises", json_integer((json_int_t)t->opacity_raises));
     json_object_set_new(root, "exposure", json_boolean(t->exposures.count > 0));
+    json_object_set_new(root, "refine_poses", json_boolean(t->poses.count > 0));
     json_object_set_new(root, "train_seconds", json_real(t->seconds));
     json_object_set_new(root, "rays_per_second", json_real(s->rays / fmax(seconds_of(s), 1e-9)));
     json_object_set_new(root, "hits_per_ray", json_real(s->hits / fmax(s->rays, 1)));

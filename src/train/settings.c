@@ -78,6 +78,9 @@ static const gbt_train_setting settings[] = {
      .help = "transparent pixels of photos: composited on black or white, or masked out of loss and scores; "
              "auto: "
              "white for Blender scenes, else black"},
+    {NAMED("background", background), CHOICE(GBT_BACKGROUND_NAMES), .number = GBT_BACKGROUND_CONSTANT,
+     .saved = true,
+     .help = "behind everything: one colour, or colours by direction that are learned, for skies"},
     {NAMED("seed", seed), RANGE(UINT64, 0, 0, "S"), .number = 0, .saved = true,
      .help = "of everything that is random"},
     {NAMED("max-anchors", max_anchors), RANGE(UINT64, 1, 1e8, "N"), .number = 2000000, .saved = true,
@@ -98,6 +101,8 @@ static const gbt_train_setting settings[] = {
      .help = "learn a colour matrix per photo, for photos that differ in exposure or white balance"},
     {NAMED("find-exposure", find_exposure), FLAG, .rare = true, .number = 1, .saved = true,
      .help = "do not turn exposure on where the photos' exposures differ"},
+    {NAMED("refine-poses", refine_poses), FLAG, .saved = true,
+     .help = "learn the photos' poses, too, where those of the data set are not exact"},
     {NAMED("splats-until", splats_until), RANGE(DOUBLE, 0, 1, "F"), .number = 0.7, .saved = true,
      .rare = true,
      .help =

@@ -211,6 +211,8 @@ static gbt_status make_state(trainer *t, gbt_error *err)
         return GBT_ERR_NO_MEMORY;
     if (t->def.exposure)
         GBT_TRY(exposures_make(&t->exposures, t->train_count, err));
+    if (t->def.refine_poses)
+        GBT_TRY(poses_make(&t->poses, &t->scene, t->train_count, t->distance, err));
     return growth_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
 }
 
@@ -300,6 +302,7 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     uint32_t words[4];
     rng_philox(def->seed, STREAM_NETWORKS, 0, words);
     GBT_TRY(decoder_init(&t->decoder, def->offsets, has_distance, (uint64_t)words[1] << 32 | words[0], err));
+    t->distance = (double)median;
     t->decoder.distance_scale = t->rules.distance_by_median ? 1 / median : 1.0f;
     t->decoder.distance_min = p5 * t->decoder.distance_scale;
     t->decoder.distance_max = p95 * t->decoder.distance_scale;
@@ -335,9 +338,11 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->renderer = t->def.renderer;
     GBT_TRY(make_views(t, err));
     GBT_TRY(make_state(t, err));
-    if (!scene_background(&t->scene, t->settings.background) && t->rules.background_from_points &&
-        t->scene.points.has_color)
-        mean_color(&t->scene.points, t->settings.background);
+    if (!scene_background(&t->scene, t->settings.background)) {
+        if (t->rules.background_from_points && t->scene.points.has_color)
+            mean_color(&t->scene.points, t->settings.background);
+        t->settings.sky.varies = t->def.background == GBT_BACKGROUND_SKY;
+    }
 
     if (def->pace != NULL)
         GBT_TRY(pace_parse(def->pace, &t->pace, err));

@@ -245,6 +245,10 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
         GBT_TRY(make_rows(t, v, err));
     learnables *gradient = alone ? &t->gradient : &v->gradient;
     GBT_TRY(frame_backward_gaussians(f, &v->d_image, err));
+    if (t->settings.sky.varies)
+        GBT_TRY(frame_backward_sky(f, &v->d_image, r->d_sky, err));
+    if (t->poses.count > 0)
+        GBT_TRY(frame_backward_pose(f, frame_neural(&t->anchors, &t->decoder), r->d_pose, err));
     loss_add_gradient(&f->gaussians, &f->d_gaussians);
     GBT_TRY(frame_backward_anchors(f, &t->anchors, &t->decoder, &gradient->anchors, gradient->networks, err));
     char where[80];
@@ -252,6 +256,11 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
                         sizeof where)) {
         r->bad = true;
         snprintf(r->text, sizeof r->text, "the gradient is not finite (%s; photo %.200s)", where, photo);
+        return GBT_OK;
+    }
+    if (t->poses.count > 0 && !pose_is_finite(r->d_pose)) {
+        r->bad = true;
+        snprintf(r->text, sizeof r->text, "the gradient is not finite (pose; photo %.200s)", photo);
         return GBT_OK;
     }
     if (alone)

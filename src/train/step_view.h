@@ -11,6 +11,7 @@
 #include "image/affine.h"
 #include "image/metrics.h"
 #include "train/learnables.h"
+#include "train/poses.h"
 #include "train/row_list.h"
 
 enum { STEP_VIEWS_MAX = 64, VIEW_TEXT_SIZE = 512 };
@@ -24,6 +25,8 @@ typedef struct view_outcome {
     char text[VIEW_TEXT_SIZE];
     double loss, l1, ssim, psnr;
     double d_exposure[AFFINE_NUMBERS]; /* dL/d(colour matrix of its photo), with exposures */
+    double d_pose[POSE_NUMBERS];       /* dL/d(motion of its camera), with poses */
+    double d_sky[SH_COUNT][3];         /* dL/d(background's coefficients), with a sky */
     int width, height, level, parts;
     uint64_t gaussians, visible, rays, hits, blended;
 } view_outcome;

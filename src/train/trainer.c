@@ -12,6 +12,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "cluster/cluster.h"
+#include "train/align.h"
 #include "train/growing.h"
 #include "train/near.h"
 #include "train/step_exchange.h"
@@ -155,6 +156,27 @@ static void learn_exposures(trainer *t, double progress, double next)
         exposures_step(&t->exposures, t->slots[i], t->outcomes[i].d_exposure, rate);
 }
 
+/* So does the pose of each, but for the mean of all. */
+static void learn_poses(trainer *t, double progress, double next)
+{
+    const double rate =
+        t->def.learning_rate_factor * poses_rate(t->train_count, progress, (next - progress) / t->def.views);
+    for (int i = 0; t->poses.count > 0 && i < t->def.views; i++)
+        poses_step(&t->poses, &t->scene, t->train_views, t->slots[i], t->outcomes[i].d_pose, rate);
+}
+
+/* What all views say of the background. */
+static void learn_sky(trainer *t, double rate)
+{
+    double sum[SH_COUNT][3] = {0};
+    if (!t->settings.sky.varies)
+        return;
+    for (int i = 0; i < t->def.views; i++)
+        for (int k = 0; k < 3 * SH_COUNT; k++)
+            sum[k / 3][k % 3] += t->outcomes[i].d_sky[k / 3][k % 3];
+    sky_step(&t->settings, &t->sky, sum, rate, t->step + 1);
+}
+
 /* With one view a step, what it says goes straight to where several are added up to. */
 static void gather_alone(trainer *t)
 {
@@ -188,8 +210,11 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     stage_clock clock = stage_begin();
     if (t->def.views > 1)
         GBT_TRY(step_rows_add_up(t, out, err));
-    if (learns)
+    if (learns) {
         learn_exposures(t, progress, next);
+        learn_poses(t, progress, next);
+        learn_sky(t, t->def.learning_rate_factor * sqrt(views) * sky_rate(progress));
+    }
     const bool adjust = growing_is_due(t);
     const learning_model model = model_of(t);
     if (learns)
@@ -212,6 +237,8 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 
 gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
 {
+    if (t->poses.count > 0)
+        GBT_TRY(align_held_out(t, err));
     double sum = 0;
     size_t count = 0;
     image photo = {0};
@@ -264,6 +291,7 @@ void trainer_free(trainer *t)
     for (int i = 0; i < 3; i++)
         row_list_free(rows[i]);
     exposures_free(&t->exposures);
+    poses_free(&t->poses);
     mem_free(t->order);
     mem_free(t->train_views);
     if (t->photos.source != NULL)

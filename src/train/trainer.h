@@ -12,8 +12,10 @@
 #include "train/exposure.h"
 #include "train/learnables.h"
 #include "train/photos.h"
+#include "train/poses.h"
 #include "train/rules.h"
 #include "train/schedule.h"
+#include "train/sky_learning.h"
 #include "train/step_view.h"
 
 /** What the last step did. */
@@ -46,12 +48,16 @@ struct trainer {
     growth_stats stats;
     exposures exposures; /* of the training photos, in the order of train_views; count 0 without --exposure */
 
+    poses poses; /* likewise; count 0 without --refine-poses. Those that are learned are in `scene` */
+
     gbt_renderer renderer; /* that the model is for */
     float voxel_size;
+    double distance;                    /* from training cameras to anchors, in the median */
     double extent, first_scale_max;     /* an isolated point would start as a floater */
     float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs,
                                            far inside what floats hold */
     trace_settings settings;
+    sky_moments sky; /* of the background in `settings`, where it varies */
     size_t anchors_initial, points_used;
     bool points_made;     /* the data set has no sparse points: ours */
     char start_text[160]; /* what the run starts from, for people */
@@ -117,7 +123,7 @@ double trainer_step_pixels(const trainer *t, size_t view, double progress);
 
 /**
  * Mean PSNR over the held-out views at full training resolution, on 8-bit images; of their right halves with
- * --exposure (affine_split()).
+ * --exposure (affine_split()); from poses that fit them with --refine-poses (align_held_out()).
  */
 gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err);
 

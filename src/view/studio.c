@@ -166,6 +166,7 @@ gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *wh
     memset(&s->last, 0, sizeof s->last);
     r->frame.draw.renderer = what->renderer;
     memcpy(r->settings.background, wanted.background, sizeof wanted.background);
+    r->settings.sky.varies = r->model.sky.varies && !what->has_background;
     trace_settings_preset(what->preset, &r->settings);
     GBT_TRY(draw ? frame_render(&r->frame, loaded_run_subject(r), camera, &r->settings, false, err)
                  : frame_prepare(&r->frame, loaded_run_subject(r), camera, &r->settings, err));

@@ -6,7 +6,7 @@
 #include "base/vec.h"
 #include "frame/frame.h"
 #include "frame/ring.h"
-#include "frame/sh.h"
+#include "base/sh.h"
 
 /* ---- spherical harmonics ---- */
 

@@ -35,6 +35,8 @@ static void make_model(model *m, size_t count, int offset_count, bool has_distan
         m->anchor_pixel = mem_alloc(count, sizeof *m->anchor_pixel, "test", NULL);
         for (size_t i = 0; i < count; i++)
             m->anchor_pixel[i] = rng_uniform(7, 5, i);
+        m->sky.varies = true;
+        fill_values(m->sky.harmonic[0], 3 * SKY_HARMONICS, 6);
     }
     assert_ok(decoder_init(&m->decoder, offset_count, has_distance, 9, NULL));
     m->decoder.distance_scale = 0.25f;
@@ -65,6 +67,8 @@ static void check_same(const model *a, const model *b)
     assert_memory_equal(a->decoder.params, b->decoder.params, a->decoder.param_count * 4);
     assert_memory_equal(a->origin, b->origin, sizeof a->origin);
     assert_memory_equal(a->background, b->background, sizeof a->background);
+    assert_int_equal(a->sky.varies, b->sky.varies);
+    assert_memory_equal(a->sky.harmonic, b->sky.harmonic, sizeof a->sky.harmonic);
     assert_true(a->voxel_size == b->voxel_size && a->extent == b->extent && a->t_near == b->t_near);
     assert_string_equal(a->data_folder, b->data_folder);
     assert_string_equal(a->config, b->config);

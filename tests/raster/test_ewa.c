@@ -32,6 +32,9 @@ static raster_settings settings_of(size_t form)
     s.background[0] = 0.3f;
     s.background[1] = 0.6f;
     s.background[2] = 0.1f;
+    s.sky.varies = true;
+    for (int k = 0; k < 3 * SKY_HARMONICS; k++)
+        s.sky.harmonic[k / 3][k % 3] = 0.1f * cosf(1.7f * (float)k);
     return s;
 }
 

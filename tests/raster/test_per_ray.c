@@ -22,6 +22,10 @@ static raster_settings settings_of(trace_settings *traced)
     s.near = traced->t_near;
     for (int c = 0; c < 3; c++)
         s.background[c] = traced->background[c] = 0.2f + 0.3f * (float)c;
+    s.sky.varies = true;
+    for (int k = 0; k < 3 * SKY_HARMONICS; k++)
+        s.sky.harmonic[k / 3][k % 3] = 0.1f * cosf(1.7f * (float)k);
+    traced->sky = s.sky;
     return s;
 }
 

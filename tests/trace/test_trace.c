@@ -305,6 +305,9 @@ static trace_settings with_background(void)
     s.background[0] = 0.3f;
     s.background[1] = 0.6f;
     s.background[2] = 0.1f;
+    s.sky.varies = true;
+    for (int k = 0; k < 3 * SKY_HARMONICS; k++)
+        s.sky.harmonic[k / 3][k % 3] = 0.1f * cosf(1.7f * (float)k);
     return s;
 }
 
@@ -777,7 +780,9 @@ static void broken_gaussians_are_left_out(void **state)
     traced_free(&t);
     gaussians nobody = some(0, 0); /* no Gaussian, no tree */
     t = trace_all(&nobody, &s, &rays, &d_rgb);
-    assert_true(t.rgb.pixels[0] == s.background[0] && t.T[20] == 1 && t.d.count == 0);
+    float behind[3];
+    sky_color(&s.sky, s.background, rays.dir, behind);
+    assert_true(t.rgb.pixels[0] == behind[0] && t.T[20] == 1 && t.d.count == 0);
     traced_free(&t);
     gaussians_free(&nobody);
     image_free(&d_rgb);

@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/sky.c -- colours of a background by direction. */
+#include "base/sky.h"
+
+#include "base/clones.h"
+
+void sky_basis(const float dir[3], float y[SH_COUNT])
+{
+    sh_basis(dir, y);
+    y[0] = 1;
+}
+
+void sky_color(const sky *s, const float color[3], const float dir[3], float out[3])
+{
+    float dirs[3][SKY_LANES], colors[3][SKY_LANES];
+    for (int k = 0; k < 3; k++)
+        for (int lane = 0; lane < SKY_LANES; lane++)
+            dirs[k][lane] = dir[k];
+    sky_colors(s, color, dirs, colors);
+    for (int c = 0; c < 3; c++)
+        out[c] = colors[c][0];
+}
+
+FASTEST_CLONE static void varying_colors(const sky *s, const float color[3], float dir[3][SKY_LANES],
+                                         float out[3][SKY_LANES])
+{
+    float basis[SH_COUNT][SKY_LANES];
+    for (int lane = 0; lane < SKY_LANES; lane++) {
+        const float d[3] = {dir[0][lane], dir[1][lane], dir[2][lane]};
+        float y[SH_COUNT];
+        sh_basis(d, y);
+        for (int k = 0; k < SH_COUNT; k++)
+            basis[k][lane] = y[k];
+    }
+    for (int c = 0; c < 3; c++)
+        for (int lane = 0; lane < SKY_LANES; lane++) {
+            float sum = color[c];
+            for (int k = 1; k < SH_COUNT; k++)
+                sum += s->harmonic[k - 1][c] * basis[k][lane];
+            sum = sum > 0 ? sum : 0;
+            out[c][lane] = sum < 1 ? sum : 1;
+        }
+}
+
+void sky_colors(const sky *s, const float color[3], float dir[3][SKY_LANES], float out[3][SKY_LANES])
+{
+    if (s->varies) {
+        varying_colors(s, color, dir, out);
+        return;
+    }
+    for (int c = 0; c < 3; c++)
+        for (int lane = 0; lane < SKY_LANES; lane++)
+            out[c][lane] = color[c];
+}
+
+void sky_color_exact(const sky *s, const float color[3], const double dir[3], double out[3])
+{
+    double y[SH_COUNT];
+    sh_basis_exact(dir, y);
+    for (int c = 0; c < 3; c++) {
+        out[c] = (double)color[c];
+        for (int k = 1; k < SH_COUNT && s->varies; k++)
+            out[c] += (double)s->harmonic[k - 1][c] * y[k];
+        if (s->varies)
+            out[c] = out[c] > 0 ? out[c] < 1 ? out[c] : 1 : 0;
+    }
+}

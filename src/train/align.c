@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/align.c -- poses of held-out photos by the gradient of the loss. */
+#include "train/align.h"
+
+#include <math.h>
+
+#include "base/fail.h"
+#include "train/loss.h"
+#include "train/near.h"
+
+enum { LEVELS = 3, STEPS = 75, LEAST_ACROSS = 60 };
+static const double first_rate = 0.002, last_rate = 0.00003; /* radians */
+
+/* The loss of a view's picture from `camera`, as its exposure shows it: v->d_image. */
+static gbt_status compare_view(trainer *t, step_view *v, size_t view, const gbt_camera *camera,
+                               gbt_error *err)
+{
+    trace_settings settings = t->settings;
+    settings.t_near = view_near(t->settings.t_near, &t->def, &t->scene.views[view]);
+    GBT_TRY(frame_render(&v->frame, frame_neural(&t->anchors, &t->decoder), camera, &settings, true, err));
+    const image *shown = &v->frame.rgb;
+    const unsigned char *valid;
+    image_loss_result loss;
+    GBT_TRY(frame_valid(&v->frame, photos_valid(&t->photos, view), &valid, err));
+    GBT_TRY(image_fit(&v->d_image, shown->width, shown->height, 3, err));
+    if (t->exposures.count == 0)
+        return loss_of_image(shown, &v->photo, valid, &v->loss_scratch, &v->d_image, &loss, err);
+    float matrix[AFFINE_NUMBERS];
+    double unused[AFFINE_NUMBERS];
+    GBT_TRY(image_fit(&v->exposed, shown->width, shown->height, 3, err));
+    affine_fit(shown, &v->photo, valid, 0, shown->width, matrix);
+    affine_apply(matrix, shown, &v->exposed);
+    GBT_TRY(loss_of_image(&v->exposed, &v->photo, valid, &v->loss_scratch, &v->d_image, &loss, err));
+    affine_backward(matrix, shown, &v->d_image, unused);
+    return GBT_OK;
+}
+
+/* The finest level at which a step has about as many pixels as one of training. */
+static int finest_level(const trainer *t, size_t view)
+{
+    for (int level = 0;; level++) {
+        const gbt_camera camera = photos_camera(&t->photos, view, level);
+        if ((double)camera.width * camera.height <= 2 * TRAIN_STEP_PIXELS)
+            return level;
+    }
+}
+
+/* How many levels there are to go through, the finest last. */
+static int level_count(const trainer *t, size_t view, int finest)
+{
+    int count = 1;
+    for (; count < LEVELS; count++) {
+        const gbt_camera camera = photos_camera(&t->photos, view, finest + count);
+        if (camera.width < LEAST_ACROSS || camera.height < LEAST_ACROSS)
+            break;
+    }
+    return count;
+}
+
+static gbt_status align_view(trainer *t, step_view *v, size_t view, gbt_error *err)
+{
+    gbt_camera *pose = &t->scene.views[view].camera;
+    float moment1[POSE_NUMBERS] = {0}, moment2[POSE_NUMBERS] = {0};
+    const int finest = finest_level(t, view), levels = level_count(t, view, finest);
+    *pose = t->poses.given[view];
+    for (int i = 0; i < STEPS; i++) {
+        const int level = finest + levels - 1 - i * levels / STEPS;
+        const gbt_camera camera = photos_camera(&t->photos, view, level);
+        double gradient[POSE_NUMBERS], motion[POSE_NUMBERS];
+        GBT_TRY(photos_get(&t->photos, view, level, &v->photo, err));
+        GBT_TRY(compare_view(t, v, view, &camera, err));
+        GBT_TRY(frame_backward_gaussians(&v->frame, &v->d_image, err));
+        GBT_TRY(frame_backward_pose(&v->frame, frame_neural(&t->anchors, &t->decoder), gradient, err));
+        if (!pose_is_finite(gradient))
+            return GBT_OK;
+        pose_learn(moment1, moment2, gradient, t->poses.unit, (uint64_t)i + 1,
+                   first_rate * pow(last_rate / first_rate, (double)i / STEPS), motion);
+        *pose = gbt_camera_moved(pose, motion);
+    }
+    return GBT_OK;
+}
+
+gbt_status align_held_out(trainer *t, gbt_error *err)
+{
+    step_view *v = &t->views[0]; /* its memory is free between steps */
+    v->frame.draw.pixel_step = 1;
+    v->frame.draw.renderer = t->renderer;
+    for (size_t i = 0; i < t->scene.view_count; i++)
+        if (t->scene.views[i].is_test)
+            GBT_TRY(align_view(t, v, i, err));
+    return GBT_OK;
+}

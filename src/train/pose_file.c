@@ -1,0 +1,104 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/pose_file.c -- poses as JSON. */
+#include "train/pose_file.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/file.h"
+#include "base/vec.h"
+
+static json_t *numbers(const double *values, int count)
+{
+    json_t *array = json_array();
+    for (int i = 0; i < count; i++)
+        json_array_append_new(array, json_real(values[i]));
+    return array;
+}
+
+gbt_status pose_file_write(const scene *s, const char *path, gbt_error *err)
+{
+    json_t *root = json_object(), *photos = json_array();
+    json_object_set_new(root, "schema", json_integer(1));
+    json_object_set_new(root, "meaning",
+                        json_string("point in camera axes (x right, y down, z forward) = rotation (3 x 3, "
+                                    "rows) * (point in world axes - center)"));
+    for (size_t i = 0; i < s->view_count; i++) {
+        const gbt_camera *camera = &s->views[i].camera;
+        double center[3];
+        for (int k = 0; k < 3; k++)
+            center[k] = camera->center[k] + s->origin[k];
+        json_array_append_new(photos, json_pack("{s:s,s:b,s:o,s:o}", "name", s->views[i].name, "held_out",
+                                                s->views[i].is_test, "rotation", numbers(camera->rotation, 9),
+                                                "center", numbers(center, 3)));
+    }
+    json_object_set_new(root, "photos", photos);
+    char *text = json_dumps(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    json_decref(root);
+    if (text == NULL)
+        return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path);
+    const gbt_status status = file_write_atomic(path, text, strlen(text), err);
+    free(text);
+    return status;
+}
+
+static bool get_numbers(const json_t *array, size_t count, double *out)
+{
+    bool fine = json_array_size(array) == count;
+    for (size_t i = 0; fine && i < count; i++) {
+        const json_t *value = json_array_get(array, i);
+        out[i] = json_number_value(value);
+        fine = json_is_number(value) && isfinite(out[i]);
+    }
+    return fine;
+}
+
+static scene_view *find_view(const scene *s, const char *name)
+{
+    for (size_t i = 0; name != NULL && i < s->view_count; i++)
+        if (strcmp(s->views[i].name, name) == 0)
+            return &s->views[i];
+    return NULL;
+}
+
+static gbt_status take_poses(const json_t *root, const char *path, scene *s, gbt_error *err)
+{
+    const json_t *photos = json_object_get(root, "photos"), *photo;
+    size_t i;
+    if (!json_is_array(photos))
+        return base_fail(err, GBT_ERR_FORMAT, "%s: poses of no photos (wanted an array \"photos\")", path);
+    json_array_foreach(photos, i, photo)
+    {
+        double rotation[9], center[3];
+        if (!get_numbers(json_object_get(photo, "rotation"), 9, rotation) ||
+            !get_numbers(json_object_get(photo, "center"), 3, center) || !dmat_is_rotation(rotation, 1e-6))
+            return base_fail(err, GBT_ERR_FORMAT,
+                             "%s: photo %zu: no pose (wanted a rotation of 9 numbers and a center of 3)",
+                             path, i);
+        scene_view *view = find_view(s, json_string_value(json_object_get(photo, "name")));
+        if (view == NULL)
+            continue;
+        memcpy(view->camera.rotation, rotation, sizeof rotation);
+        for (int k = 0; k < 3; k++)
+            view->camera.center[k] = center[k] - s->origin[k];
+    }
+    return GBT_OK;
+}
+
+gbt_status pose_file_read(const char *path, scene *s, gbt_error *err)
+{
+    unsigned char *bytes;
+    size_t count;
+    GBT_TRY(file_read(path, &bytes, &count, err));
+    json_error_t fault;
+    json_t *root = json_loadb((const char *)bytes, count, 0, &fault);
+    mem_free(bytes);
+    const gbt_status status =
+        root != NULL ? take_poses(root, path, s, err)
+                     : base_fail(err, GBT_ERR_FORMAT, "%s:%d: %.200s", path, fault.line, fault.text);
+    json_decref(root);
+    return status;
+}

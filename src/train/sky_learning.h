@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/sky_learning.h -- the background's colours, learned beside the scene. */
+#ifndef GBT_TRAIN_SKY_LEARNING_H
+#define GBT_TRAIN_SKY_LEARNING_H
+
+#include <stdint.h>
+
+#include "trace/settings.h"
+
+/** The colour, then the harmonics. */
+enum { SKY_NUMBERS = SH_COUNT * 3 };
+
+/** Adam's, of one sky. Start from {0}. */
+typedef struct sky_moments {
+    float first[SKY_NUMBERS], second[SKY_NUMBERS];
+} sky_moments;
+
+/** All coefficients as one array, and back. */
+void sky_pack(const trace_settings *s, float out[SKY_NUMBERS]);
+void sky_unpack(const float in[SKY_NUMBERS], trace_settings *s);
+
+/** One Adam step of s->background and s->sky; `age` >= 1 counts the steps. `gradient` is finite. */
+void sky_step(trace_settings *s, sky_moments *m, double gradient[SH_COUNT][3], double rate, uint64_t age);
+
+/** The learning rate at a progress in [0, 1]. */
+double sky_rate(double progress);
+
+#endif

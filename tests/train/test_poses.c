@@ -1,0 +1,221 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/train/test_poses.c -- poses that are learned: they come back where they were disturbed, all of them
+   do not drift, a run goes on with them, and whoever opens the run sees from there. */
+#include "run_support.h"
+
+#include "base/rng.h"
+#include "base/vec.h"
+#include "run/loaded_run.h"
+#include "train/align.h"
+#include "train/pose_file.h"
+
+/* The small turn from one camera to another, in world axes: the antisymmetric part of A^T B. */
+static void turn_between(const gbt_camera *from, const gbt_camera *to, double axis[3])
+{
+    for (int k = 0; k < 3; k++) {
+        const int a = (k + 1) % 3, b = (k + 2) % 3;
+        double ab = 0, ba = 0;
+        for (int row = 0; row < 3; row++) {
+            ab += to->rotation[3 * row + a] * from->rotation[3 * row + b];
+            ba += to->rotation[3 * row + b] * from->rotation[3 * row + a];
+        }
+        axis[k] = 0.5 * (ba - ab);
+    }
+}
+
+/* ---- the optimizer ---- */
+
+static void the_mean_stays(void **state)
+{
+    (void)state;
+    trainer t;
+    gbt_train_def def = run_def();
+    def.refine_poses = true;
+    open_ok(&t, tiny, &def);
+    assert_int_equal(t.poses.count, t.train_count);
+    for (uint64_t i = 0; i < 200; i++) {
+        double gradient[POSE_NUMBERS];
+        for (int k = 0; k < POSE_NUMBERS; k++)
+            gradient[k] = 1 + rng_normal(1, i, (uint64_t)k); /* always to one side */
+        poses_step(&t.poses, &t.scene, t.train_views, i % t.train_count, gradient, 1e-4);
+    }
+    double way[3] = {0}, turn[3] = {0}, longest = 0, largest = 0;
+    for (size_t i = 0; i < t.train_count; i++) {
+        const gbt_camera *now = &t.scene.views[t.train_views[i]].camera,
+                         *given = &t.poses.given[t.train_views[i]];
+        double move[3], axis[3];
+        for (int k = 0; k < 3; k++)
+            move[k] = now->center[k] - given->center[k];
+        turn_between(given, now, axis);
+        longest = fmax(longest, dvec_length(move));
+        largest = fmax(largest, dvec_length(axis));
+        for (int k = 0; k < 3; k++) {
+            way[k] += move[k] / (double)t.train_count;
+            turn[k] += axis[k] / (double)t.train_count;
+        }
+    }
+    print_message("moved by up to %.2e, mean %.1e; turned by up to %.2e, mean %.1e\n", longest,
+                  dvec_length(way), largest, dvec_length(turn));
+    assert_true(dvec_length(way) < 1e-3 * longest && dvec_length(turn) < 1e-2 * largest);
+    trainer_free(&t);
+}
+
+/* ---- a scene whose poses are wrong ---- */
+
+/* Mean angle, in degrees, between where the photos are and where they were, when all are turned by the mean
+   of the training photos, which is held where it is. */
+static double error_of(const trainer *t, const gbt_camera *truth, bool test)
+{
+    double mean[3] = {0}, sum = 0;
+    for (size_t i = 0; i < t->train_count; i++) {
+        const size_t v = t->train_views[i];
+        double turn[3];
+        turn_between(&truth[v], &t->scene.views[v].camera, turn);
+        for (int k = 0; k < 3; k++)
+            mean[k] += turn[k] / (double)t->train_count;
+    }
+    for (size_t v = 0; v < t->scene.view_count; v++) {
+        double turn[3];
+        turn_between(&truth[v], &t->scene.views[v].camera, turn);
+        for (int k = 0; k < 3; k++)
+            turn[k] -= mean[k];
+        sum += t->scene.views[v].is_test == test ? dvec_length(turn) : 0;
+    }
+    return sum / (double)(test ? t->test_count : t->train_count) * 57.29577951308232;
+}
+
+/* More photos, and larger ones: of few, any poses explain what is in them. */
+static const char *many_photos(void)
+{
+    gbt_make_scene_def def = gbt_make_scene_def_default();
+    def.width = 80;
+    def.height = 60;
+    def.view_count = 24;
+    def.points = 600;
+    def.samples = 4;
+    assert_ok(gbt_make_scene(&def, in_root("many"), NULL));
+    return in_root("many");
+}
+
+static void disturbed_poses_come_back(void **state)
+{
+    (void)state;
+    enum { MOST = 24 };
+    trainer t;
+    gbt_camera truth[MOST];
+    gbt_train_def def = run_def();
+    def.refine_poses = true;
+    def.iterations = 800;
+    open_ok(&t, many_photos(), &def);
+    assert_true(t.scene.view_count <= MOST);
+    for (size_t i = 0; i < t.scene.view_count; i++) {
+        double motion[POSE_NUMBERS] = {0};
+        truth[i] = t.scene.views[i].camera;
+        for (int k = 3; k < POSE_NUMBERS; k++)
+            motion[k] = 0.012 * rng_normal(9, i, (uint64_t)k);
+        t.scene.views[i].camera = t.poses.given[i] = gbt_camera_moved(&truth[i], motion);
+    }
+    const double before = error_of(&t, truth, false), test_before = error_of(&t, truth, true);
+    step_report report;
+    for (uint64_t i = 0; i < def.iterations; i++)
+        step_ok(&t, &report);
+    assert_ok(align_held_out(&t, NULL));
+    const double after = error_of(&t, truth, false), test_after = error_of(&t, truth, true);
+    print_message("training photos turned by %.2f degrees, then %.2f; held-out ones by %.2f, then %.2f\n",
+                  before, after, test_before, test_after);
+    assert_true(after < 0.5 * before && test_after < 0.7 * test_before);
+    trainer_free(&t);
+}
+
+/* ---- runs ---- */
+
+static void a_run_goes_on_with_its_poses(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.refine_poses = true;
+    train_ok(tiny, in_root("whole"), &def);
+    def.stop_at_step = STEPS / 2;
+    train_fails(tiny, in_root("parts"), &def, GBT_ERR_INTERRUPTED, "stopped");
+    def.stop_at_step = 0;
+    def.resume = true;
+    train_ok(NULL, in_root("parts"), &def);
+    const char *const files[] = {"model.gbt", "poses.json"};
+    for (int i = 0; i < 2; i++) {
+        const bytes a = read_bytes(in_root("whole/%s", files[i])),
+                    b = read_bytes(in_root("parts/%s", files[i]));
+        assert_int_equal(a.count, b.count);
+        assert_memory_equal(a.data, b.data, a.count);
+        mem_free(a.data);
+        mem_free(b.data);
+    }
+}
+
+/* Poses differ from those of the data set, and whoever opens the run has them; with other data that has its
+   own, not. */
+static void whoever_opens_the_run_has_them(void **state)
+{
+    (void)state;
+    static loaded_run run, of_data;
+    assert_ok(loaded_run_open(in_root("whole"), NULL, 0, &run, NULL));
+    make_tiny_scene(in_root("again"));
+    assert_ok(loaded_run_open(in_root("whole"), in_root("again"), 0, &of_data, NULL));
+    double moved = 0;
+    for (size_t i = 0; i < run.scene.view_count; i++)
+        for (int k = 0; k < 3; k++)
+            moved = fmax(moved,
+                         fabs(run.scene.views[i].camera.center[k] - of_data.scene.views[i].camera.center[k]));
+    assert_true(moved > 1e-6 && moved < 0.1);
+    loaded_run_close(&run);
+    loaded_run_close(&of_data);
+}
+
+static void write_text(const char *path, const char *text)
+{
+    assert_ok(file_write_atomic(path, text, strlen(text), NULL));
+}
+
+static void what_is_no_pose_is_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *says;
+    } cases[] = {
+        {"{", "poses.json:1"},
+        {"{\"photos\": 3}", "wanted an array"},
+        {"{\"photos\": [{\"name\": \"a\", \"center\": [0, 0, 0]}]}", "photo 0: no pose"},
+        {"{\"photos\": [{\"name\": \"a\", \"center\": [0, 0, 0], \"rotation\": [2, 0, 0, 0, 1, 0, 0, 0, "
+         "1]}]}",
+         "photo 0: no pose"},
+        {"{\"photos\": [{\"name\": \"a\", \"center\": [0, 0], \"rotation\": [1, 0, 0, 0, 1, 0, 0, 0, 1]}]}",
+         "photo 0: no pose"},
+    };
+    scene s;
+    assert_ok(scene_load(tiny, NULL, &s, NULL));
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        gbt_error err = {0};
+        write_text(in_root("poses.json"), cases[i].text);
+        assert_int_equal(pose_file_read(in_root("poses.json"), &s, &err), GBT_ERR_FORMAT);
+        if (strstr(err.text, cases[i].says) == NULL)
+            fail_msg("wanted \"%s\", got: %s", cases[i].says, err.text);
+    }
+    assert_ok(pose_file_write(&s, in_root("poses.json"), NULL));
+    gbt_camera first = s.views[0].camera;
+    s.views[0].camera.center[1] += 1;
+    assert_ok(pose_file_read(in_root("poses.json"), &s, NULL));
+    for (int k = 0; k < 3; k++)
+        assert_true(fabs(s.views[0].camera.center[k] - first.center[k]) < 1e-12);
+    scene_free(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_mean_stays),
+        cmocka_unit_test(disturbed_poses_come_back),
+        cmocka_unit_test(a_run_goes_on_with_its_poses),
+        cmocka_unit_test(whoever_opens_the_run_has_them),
+        cmocka_unit_test(what_is_no_pose_is_refused),
+    };
+    return cmocka_run_group_tests(tests, make_root, remove_root);
+}

@@ -37,29 +37,29 @@ static void exchange_counts(const size_t *mine, size_t *theirs)
         theirs[r] = in[r];
 }
 
-gbt_status step_exchange_rows(trainer *t, size_t numbers, gbt_error *err)
+gbt_status step_exchange_rows(trainer *t, const row_list *mine, size_t numbers, gbt_error *err)
 {
-    const size_t size = (size_t)gbt_cluster_size(), words = 1 + t->rows.width;
+    const size_t size = (size_t)gbt_cluster_size(), width = mine->width, words = 1 + width;
     size_t send[STEP_VIEWS_MAX], receive[STEP_VIEWS_MAX], rows = 0, begin = 0;
 
     /* To the owners. */
     for (size_t r = 0; r < size; r++) {
-        const size_t end = row_list_find(&t->rows, (uint32_t)(numbers * (r + 1) / size));
+        const size_t end = row_list_find(mine, (uint32_t)(numbers * (r + 1) / size));
         send[r] = (end - begin) * words;
         begin = end;
     }
     exchange_counts(send, receive);
     for (size_t r = 0; r < size; r++)
         rows += receive[r] / words;
-    GBT_TRY(row_list_resize(&t->received, rows, t->rows.width, err));
-    cluster_exchange(t->rows.words, send, t->received.words, receive);
+    GBT_TRY(row_list_resize(&t->received, rows, width, err));
+    cluster_exchange(mine->words, send, t->received.words, receive);
 
     /* Their sums. */
     row_list parts[STEP_VIEWS_MAX];
     const row_list *lists[STEP_VIEWS_MAX];
     row_word *at = t->received.words;
     for (size_t r = 0; r < size; r++) {
-        parts[r] = (row_list){.count = receive[r] / words, .width = t->rows.width, .words = at};
+        parts[r] = (row_list){.count = receive[r] / words, .width = width, .words = at};
         lists[r] = &parts[r];
         at += receive[r];
     }
@@ -72,7 +72,7 @@ gbt_status step_exchange_rows(trainer *t, size_t numbers, gbt_error *err)
     exchange_counts(send, receive);
     for (size_t r = 0; r < size; r++)
         rows += receive[r] / words;
-    GBT_TRY(row_list_resize(&t->rows, rows, t->rows.width, err));
+    GBT_TRY(row_list_resize(&t->rows, rows, width, err));
     cluster_gather(t->owned.words, receive, t->rows.words);
     return GBT_OK;
 }

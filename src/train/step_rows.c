@@ -119,22 +119,26 @@ static void give_block(size_t block, size_t begin, size_t end, void *context)
 
 gbt_status step_rows_add_up(trainer *t, step_report *out, gbt_error *err)
 {
-    const row_list *lists[STEP_VIEWS_MAX];
+    const row_list *lists[STEP_VIEWS_MAX], *sum = &t->rows;
     for (size_t i = 0; i < t->view_count; i++)
         lists[i] = &t->views[i].rows;
-    GBT_TRY(row_list_sum(lists, t->view_count, &t->rows, err));
-    const size_t network_rows = (t->decoder.param_count + t->rows.width - 1) / t->rows.width;
+    if (t->view_count > 1)
+        GBT_TRY(row_list_sum(lists, t->view_count, &t->own_rows, err));
+    const row_list *own = t->view_count > 1 ? &t->own_rows : lists[0];
     if (gbt_cluster_size() > 1) {
+        const size_t network_rows = (t->decoder.param_count + own->width - 1) / own->width;
         const cluster_traffic before = cluster_traffic_so_far();
-        GBT_TRY(step_exchange_rows(t, t->anchors.count + network_rows, err));
+        GBT_TRY(step_exchange_rows(t, own, t->anchors.count + network_rows, err));
         const cluster_traffic after = cluster_traffic_so_far();
         out->exchange_bytes = after.bytes - before.bytes;
         out->exchange_seconds = after.seconds - before.seconds;
+    } else {
+        sum = own;
     }
     give_job job = {.shape = shape_of(&t->gradient.anchors, &t->stats, growing_gathers(t)),
                     .t = t,
-                    .rows = &t->rows,
+                    .rows = sum,
                     .share = 1 / (float)t->def.views};
-    parallel_blocks(t->rows.count, ROW_BLOCK, give_block, &job);
+    parallel_blocks(sum->count, ROW_BLOCK, give_block, &job);
     return GBT_OK;
 }

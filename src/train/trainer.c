@@ -287,8 +287,8 @@ void trainer_free(trainer *t)
     for (size_t i = 0; i < t->view_count; i++)
         step_view_free(&t->views[i]);
     mem_free(t->views);
-    row_list *const rows[] = {&t->rows, &t->received, &t->owned};
-    for (int i = 0; i < 3; i++)
+    row_list *const rows[] = {&t->own_rows, &t->rows, &t->received, &t->owned};
+    for (int i = 0; i < 4; i++)
         row_list_free(rows[i]);
     exposures_free(&t->exposures);
     poses_free(&t->poses);

@@ -76,9 +76,10 @@ struct trainer {
     size_t view_count, first_view;         /* of the def.views of the step */
     size_t slots[STEP_VIEWS_MAX];          /* their photos: indices into train_views */
     view_outcome outcomes[STEP_VIEWS_MAX]; /* of all views of the step */
-    row_list rows, received, owned; /* the sum over the views; what it is made of with several processes
-                                     */
-    uint32_t *order;                /* photos of the epoch */
+    row_list own_rows;                     /* the sum over the views of this process */
+    row_list rows, received,
+        owned;       /* with several processes: the sum over all views, and what it is made of */
+    uint32_t *order; /* photos of the epoch */
     uint64_t order_epoch;
     bool order_ready;
 };

@@ -102,7 +102,7 @@ code=$?
 report $? "a failure to render is told once" "code $code: $(cat out err)"
 
 # ---- studies
-"$program" study anchors data -o study1 --iterations 10 --seeds 1 --quiet >out 2>&1 && on 2 "$program" study anchors data -o study2 --iterations 10 --seeds 1 --quiet >out 2>&1 &&
+"$program" study anchors data -o study1 --iterations 20 --seeds 1 --quiet >out 2>&1 && on 2 "$program" study anchors data -o study2 --iterations 20 --seeds 1 --quiet >out 2>&1 &&
     (cd study1 && find runs -name model.gbt | sort | xargs sha256sum) >one && (cd study2 && find runs -name model.gbt | sort | xargs sha256sum) >two && [ -s one ] && cmp one two &&
     [ -s study2/anchors.json ]
 report $? "a study by 2 processes" "$(cat out; diff one two)"

@@ -43,8 +43,9 @@ typedef struct growth_def {
     uint64_t seed;           /* of the random candidate drop: level j keeps 1 - 0.5^(j+1) of the candidates */
     uint64_t step;
     bool grow, prune;                                                /* both true by default */
-    bool (*may_stand)(const void *context, const float position[3]); /* where Gaussians may have an anchor.
-                                                                        Default growth_anywhere() */
+    bool (*may_stand)(const void *context, const float position[3]); /* where Gaussians may have an anchor;
+                                                                        asked by several threads. Default
+                                                                        growth_anywhere() */
     const void *may_stand_context;                                   /* borrowed */
     growth_points points;                                            /* default none */
 } growth_def;

@@ -3,11 +3,15 @@
 #include "growth/search.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/parallel.h"
+
+enum { MARK_BLOCK = 2048 /* anchors */, ASK_BLOCK = 64 /* cells */ };
 
 bool growth_anywhere(const void *context, const float position[3])
 {
@@ -20,7 +24,7 @@ typedef struct cell {
     int64_t at[3];
     float position[3], scale, gradient; /* of the candidate with the largest gradient */
     size_t feature;                     /* row of new_anchors.feature */
-    bool occupied;
+    atomic_bool occupied;               /* or no place for an anchor */
 } cell;
 
 /* False where the cell has no 64-bit address, or the position is not finite. */
@@ -117,14 +121,22 @@ gbt_status growth_search_add(growth_search *s, const growth_candidate *c, gbt_er
     return GBT_OK;
 }
 
-static void mark_occupied(growth_search *s, const float position[3])
+static void mark_occupied(const growth_search *s, const float position[3])
 {
     int64_t at[3];
     if (!cell_of(position, s->size, at))
         return;
     const size_t slot = find_slot(s, at);
     if (s->table[slot] != 0)
-        s->cells[s->table[slot] - 1].occupied = true;
+        atomic_store_explicit(&s->cells[s->table[slot] - 1].occupied, true, memory_order_relaxed);
+}
+
+static void mark_anchors(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const growth_search *s = context;
+    for (size_t i = begin; i < end; i++)
+        mark_occupied(s, s->a->position + i * 3);
 }
 
 static int compare_cells(const int64_t a[3], const int64_t b[3])
@@ -202,24 +214,59 @@ bool growth_search_begin(growth_search *s, int level)
     return true;
 }
 
+/* There is surface; the middle of a cell is where the cell is. */
+static void place_in(const growth_search *s, const cell *c, float position[3])
+{
+    for (int k = 0; k < 3; k++)
+        position[k] = s->def->at_cell_center ? (float)c->at[k] * s->size : c->position[k];
+}
+
+typedef struct stand_job {
+    const growth_search *s;
+    bool (*may_stand)(const void *context, const float position[3]);
+    const void *context;
+} stand_job;
+
+static void ask_places(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const stand_job *job = context;
+    for (size_t i = begin; i < end; i++) {
+        float position[3];
+        place_in(job->s, &job->s->cells[i], position);
+        job->s->cells[i].occupied = !job->may_stand(job->context, position);
+    }
+}
+
+/* The cells that are free come first; the table no longer names them. */
+static void drop_occupied(growth_search *s)
+{
+    size_t left = 0;
+    for (size_t i = 0; i < s->cell_count; i++)
+        if (!s->cells[i].occupied)
+            s->cells[left++] = s->cells[i];
+    s->cell_count = left;
+}
+
 gbt_status growth_search_end(growth_search *s,
                              bool (*may_stand)(const void *context, const float position[3]),
                              const void *context, gbt_error *err)
 {
     if (s->cell_count == 0)
         return GBT_OK;
-    for (size_t i = 0; i < s->a->count; i++)
-        mark_occupied(s, s->a->position + i * 3);
+    stand_job job = {s, may_stand, context};
+    parallel_blocks(s->a->count, MARK_BLOCK, mark_anchors, s);
     for (size_t i = 0; i < s->out->count; i++)
         mark_occupied(s, s->out->rows[i].position);
-    qsort(s->cells, s->cell_count, sizeof *s->cells, by_cell);
+    drop_occupied(s);
+    parallel_blocks(s->cell_count, ASK_BLOCK, ask_places, &job);
+    drop_occupied(s);
+    if (s->cell_count > 0)
+        qsort(s->cells, s->cell_count, sizeof *s->cells, by_cell);
     for (size_t i = 0; i < s->cell_count; i++) {
-        const cell *c = &s->cells[i];
         float position[3];
-        for (int k = 0; k < 3; k++) /* there is surface; the middle of a cell is where the cell is */
-            position[k] = s->def->at_cell_center ? (float)c->at[k] * s->size : c->position[k];
-        if (!c->occupied && may_stand(context, position))
-            GBT_TRY(add_new_anchor(s, c, position, err));
+        place_in(s, &s->cells[i], position);
+        GBT_TRY(add_new_anchor(s, &s->cells[i], position, err));
     }
     return GBT_OK;
 }

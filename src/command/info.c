@@ -183,8 +183,7 @@ static gbt_status info_of_gaussians(const char *path, bool json, FILE *out, gbt_
                 cloud.sh_degree);
         if (cloud.dropped > 0)
             fprintf(out, ", %zu unusable rows dropped", cloud.dropped);
-        fprintf(out, "\n  memory    %.0f MB to draw all of it at once (render --memory: less)",
-                (double)memory / 0x1p20);
+        fprintf(out, "\n  memory    %.0f MB to draw all of it at once", (double)memory / 0x1p20);
         fprintf(out, "\n  box       90 %% within %g x %g x %g around %g %g %g\n", high[0] - low[0],
                 high[1] - low[1], high[2] - low[2], 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]),
                 0.5 * (low[2] + high[2]));

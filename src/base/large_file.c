@@ -73,7 +73,7 @@ gbt_status large_file_put(large_file *file, const void *bytes, size_t count, gbt
 {
     const unsigned char *from = bytes;
     for (size_t done = 0; done < count;) {
-        const ssize_t put = pwrite(file->descriptor, from + done, count - done, (off_t)file->size);
+        const ssize_t put = write(file->descriptor, from + done, count - done);
         if (put < 0 && errno == EINTR)
             continue;
         if (put <= 0)

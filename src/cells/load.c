@@ -254,13 +254,26 @@ static void place_rows(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
+/* So many that reading them to see what is visible is not worth it. */
+static bool is_far_too_much(const cell_drawer *d, const cell_part *part)
+{
+    size_t rows = 0;
+    for (size_t i = 0; i < d->visible_count; i++) {
+        const cell_chunk *c = &d->store->chunks[d->visible[i]];
+        rows += c->count > 0 && chunk_reaches_into(d, c, part) ? c->count : 0;
+    }
+    return (double)rows * (double)d->bytes_each > 4 * (double)d->budget;
+}
+
 gbt_status cell_load_part(cell_drawer *d, const cell_part *part, bool *fits, gbt_error *err)
 {
     cell_load *load = &d->load;
+    *fits = cell_is_chunk(d->store, part) || !is_far_too_much(d, part);
+    if (!*fits)
+        return GBT_OK;
     GBT_TRY(reserve(d, err));
     load->count = 0;
     load->pairs = 0;
-    *fits = true;
     for (size_t i = 0; i < d->visible_count && *fits; i++) {
         const cell_chunk *c = &d->store->chunks[d->visible[i]];
         if (c->count > 0 && chunk_reaches_into(d, c, part))

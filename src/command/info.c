@@ -12,6 +12,7 @@
 #include "base/file.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "cells/draw.h"
 #include "data/gaussian_file.h"
 #include "data/json_out.h"
 #include "data/photo_check.h"
@@ -166,11 +167,15 @@ static gbt_status info_of_gaussians(const char *path, bool json, FILE *out, gbt_
     double low[3], high[3];
     GBT_TRY(gaussian_file_read(path, &cloud, err));
     gbt_status status = find_box(cloud.mean, cloud.count, cloud.origin, low, high, err);
+    const int functions = (cloud.sh_degree + 1) * (cloud.sh_degree + 1);
+    const size_t memory =
+        cell_memory_whole(cloud.count, (uint64_t)cloud.count * 4 * (14 + 3 * (uint64_t)functions));
     if (status == GBT_OK && json) {
-        json_t *value = json_pack("{s:i,s:s,s:o,s:I,s:i,s:I,s:[[f,f,f],[f,f,f]]}", "schema", 1, "kind",
-                                  "gaussians", "path", json_text(path), "gaussians", (json_int_t)cloud.count,
-                                  "sh_degree", cloud.sh_degree, "dropped", (json_int_t)cloud.dropped, "box",
-                                  low[0], low[1], low[2], high[0], high[1], high[2]);
+        json_t *value =
+            json_pack("{s:i,s:s,s:o,s:I,s:i,s:I,s:I,s:[[f,f,f],[f,f,f]]}", "schema", 1, "kind", "gaussians",
+                      "path", json_text(path), "gaussians", (json_int_t)cloud.count, "sh_degree",
+                      cloud.sh_degree, "dropped", (json_int_t)cloud.dropped, "memory_bytes",
+                      (json_int_t)memory, "box", low[0], low[1], low[2], high[0], high[1], high[2]);
         status = json_print(value, out, err);
         json_decref(value);
     } else if (status == GBT_OK) {
@@ -178,6 +183,7 @@ static gbt_status info_of_gaussians(const char *path, bool json, FILE *out, gbt_
                 cloud.sh_degree);
         if (cloud.dropped > 0)
             fprintf(out, ", %zu unusable rows dropped", cloud.dropped);
+        fprintf(out, "\n  memory    %.0f MB to draw all of it at once", (double)memory / 0x1p20);
         fprintf(out, "\n  box       90 %% within %g x %g x %g around %g %g %g\n", high[0] - low[0],
                 high[1] - low[1], high[2] - low[2], 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]),
                 0.5 * (low[2] + high[2]));

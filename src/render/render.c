@@ -73,7 +73,14 @@ static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *d
     const frame_tracer tracer = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
     GBT_TRY(frame_render_with(&r->frame, loaded_run_subject(r), shot, &r->settings,
                               def->insert != NULL ? &tracer : NULL, err));
-    return st->in_double ? render_reference(r, shot, err) : GBT_OK;
+    if (st->in_double)
+        GBT_TRY(render_reference(r, shot, err));
+    const size_t peak = mem_peak_bytes();
+    if (def->memory > 0 && peak > def->memory)
+        return base_fail(err, GBT_ERR_NO_MEMORY,
+                         "memory: %zu MB is too little: this took %zu (a .ply alone is drawn cell by cell)",
+                         def->memory >> 20, (peak >> 20) + 1);
+    return GBT_OK;
 }
 
 static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, const char *name,

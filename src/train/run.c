@@ -287,6 +287,8 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
                                const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
     const double begin = clock_wall();
+    if (def->memory > 0) /* what else there is must fit into the rest */
+        GBT_TRY(paged_start(run, def->memory / 4 * 3, err));
     if (def->resume)
         GBT_TRY(resume_open(t, data, run, paths->checkpoint, paths->checkpoint_previous, def, strings, err));
     else
@@ -295,8 +297,7 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
     if (def->memory > 0 && hits > def->memory / 8)
         hits = def->memory / 8;
     for (size_t i = 0; i < t->view_count; i++) /* there 0 is no limit */
-        t->views[i].frame.scene.tape_bytes_max =
-            hits >= t->view_count ? hits / t->view_count : 1;
+        t->views[i].frame.scene.tape_bytes_max = hits >= t->view_count ? hits / t->view_count : 1;
     if (t->step == 0)
         t->seconds = clock_wall() - begin; /* loading counts */
     return GBT_OK;
@@ -355,8 +356,6 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
         status = file_lock_folder(run, &lock, err);
     const bool locked = opened && status == GBT_OK;
     status = cluster_follow(status, err);
-    if (status == GBT_OK && def->memory > 0) /* what else there is must fit into the rest */
-        status = paged_start(run, def->memory / 4 * 3, err);
     if (status == GBT_OK)
         status = run_in_folder(t, data, run, &paths, def, strings, err);
     paged_stop();

@@ -283,6 +283,76 @@ static void surfaces_and_radius(void **state)
     gaussians_free(&g);
 }
 
+/* Rays in two parts: each as the reference sees it, and both together as whole rays. */
+static void parts_of_rays(void **state)
+{
+    (void)state;
+    gaussians g = cloud(900, 9, 0.8f, 0.2f, 0.95f);
+    trace_settings s = trace_settings_default();
+    ray_image rays = make_rays(false);
+    double *wanted = mem_alloc(RAYS, 4 * sizeof *wanted, "test", NULL);
+    float *cut = mem_alloc(RAYS, sizeof *cut, "test", NULL), *through[2];
+    unsigned char *ended = mem_alloc(RAYS, 1, "test", NULL);
+    for (int i = 0; i < 2; i++)
+        through[i] = mem_alloc(RAYS, sizeof *through[i], "test", NULL);
+    for (size_t i = 0; i < RAYS; i++)
+        cut[i] = 3 + 4 * rng_uniform(1, 3, i);
+    for (int kernel = TRACE_LIST; kernel <= TRACE_SINGLE; kernel += TRACE_SINGLE - TRACE_LIST) {
+        pass_result *whole = run(&g, &s, &rays, (trace_kernel)kernel, 0);
+        trace_scene scene = {.kernel = (trace_kernel)kernel};
+        image rgb, sum;
+        assert_ok(image_alloc(&rgb, WIDTH, HEIGHT, 3, NULL));
+        assert_ok(image_alloc(&sum, WIDTH, HEIGHT, 3, NULL));
+        memset(sum.pixels, 0, 3 * RAYS * sizeof *sum.pixels);
+        assert_ok(trace_build(&scene, &g, &s, 5, NULL));
+        ray_image part = rays;
+        part.near = mem_alloc(RAYS, sizeof *part.near, "test", NULL);
+        part.far = mem_alloc(RAYS, sizeof *part.far, "test", NULL);
+        part.through = mem_alloc(RAYS, sizeof *part.through, "test", NULL);
+        for (int half = 0; half < 2; half++) {
+            for (size_t i = 0; i < RAYS; i++) {
+                part.near[i] = half == 0 ? 0 : cut[i];
+                part.far[i] = half == 0 ? cut[i] : ended[i] != 0 ? 0 : INFINITY;
+                part.through[i] = half == 0 ? 1 : through[0][i];
+            }
+            const trace_outputs out = {.rgb = &rgb, .transmittance = through[half], .ended = ended};
+            assert_ok(trace_forward(&scene, &part, false, &out, NULL, NULL));
+            assert_ok(reference_forward(&g, &s, &part, wanted, wanted + 3 * RAYS, NULL, NULL));
+            size_t off = 0;
+            for (size_t i = 0; i < RAYS; i++) {
+                double error = fabs(wanted[3 * RAYS + i] - (double)through[half][i]);
+                for (size_t c = 0; c < 3; c++) {
+                    error = fmax(error, fabs(wanted[3 * i + c] - (double)rgb.pixels[3 * i + c]));
+                    sum.pixels[3 * i + c] += rgb.pixels[3 * i + c];
+                }
+                off += !(error < 2e-5);
+            }
+            assert_true(off <= RAYS / 200); /* a hit at a cut may be on the other side */
+        }
+        for (size_t i = 0; i < 3 * RAYS; i++) /* the background is black */
+            if (!(fabsf(sum.pixels[i] - whole->rgb.pixels[i]) < 3e-6f))
+                fail_msg("%s: value %zu is %g in parts, %g whole", kernel_names[kernel], i,
+                         (double)sum.pixels[i], (double)whole->rgb.pixels[i]);
+        gbt_error err = {0};
+        assert_int_equal(trace_forward(&scene, &part, true, &(trace_outputs){.rgb = &rgb}, NULL, &err),
+                         GBT_ERR_ARGUMENT); /* there is no adjoint */
+        mem_free(part.near);
+        mem_free(part.far);
+        mem_free(part.through);
+        trace_scene_free(&scene);
+        image_free(&rgb);
+        image_free(&sum);
+        pass_free(whole);
+    }
+    mem_free(wanted);
+    mem_free(cut);
+    mem_free(ended);
+    for (int i = 0; i < 2; i++)
+        mem_free(through[i]);
+    ray_image_free(&rays);
+    gaussians_free(&g);
+}
+
 /* Tiles that are traced again for the adjoint give the same bits as those that were kept. */
 static void no_room_for_the_tape(void **state)
 {
@@ -402,8 +472,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_kernels_all_outputs), cmocka_unit_test(kernels_share_the_adjoint),
-        cmocka_unit_test(surfaces_and_radius),     cmocka_unit_test(no_room_for_the_tape),
-        cmocka_unit_test(rows_are_in_exact_order),
+        cmocka_unit_test(surfaces_and_radius),     cmocka_unit_test(parts_of_rays),
+        cmocka_unit_test(no_room_for_the_tape),    cmocka_unit_test(rows_are_in_exact_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -29,11 +29,10 @@ typedef struct gbt_export_def {
 
 gbt_export_def gbt_export_def_default(void);
 
-/** A format of plain Gaussians. Texts are static. */
+/** A format of plain Gaussians, written and read. Texts are static. */
 typedef struct gbt_export_format {
     const char *ending; /* of its files: ".ply" */
     const char *what;   /* what it keeps, in a few words */
-    bool readable;      /* else it is only written */
 } gbt_export_format;
 
 /** How many formats there are, and the one of a place in their list, 0 to count - 1. */

@@ -73,14 +73,10 @@ static int run(const operands *given)
 
 static const command_word *format_words(void)
 {
-    enum { FORMATS_MAX = 16, TEXT_SIZE = 160 };
+    enum { FORMATS_MAX = 16 };
     static command_word words[FORMATS_MAX + 1];
-    static char texts[FORMATS_MAX][TEXT_SIZE];
-    for (int i = 0; i < gbt_export_format_count() && i < FORMATS_MAX; i++) {
-        const gbt_export_format f = gbt_export_format_at(i);
-        snprintf(texts[i], TEXT_SIZE, "%s%s", f.what, f.readable ? "" : "; written, not read");
-        words[i] = (command_word){f.ending, texts[i]};
-    }
+    for (int i = 0; i < gbt_export_format_count() && i < FORMATS_MAX; i++)
+        words[i] = (command_word){gbt_export_format_at(i).ending, gbt_export_format_at(i).what};
     return words;
 }
 

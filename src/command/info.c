@@ -257,7 +257,6 @@ gbt_status gbt_info(const char *path, bool json, FILE *out, gbt_error *err)
         if (file_exists(inside))
             return info_of_model(inside, json, out, err);
     }
-    GBT_TRY(gaussian_file_check_readable(path, err));
     if (gaussian_file_has_gaussians(path))
         return info_of_gaussians(path, json, out, err);
     return is_model_name(path) ? info_of_model(path, json, out, err) : info_of_dataset(path, json, out, err);

@@ -28,26 +28,20 @@ int gbt_export_format_count(void) { return FORMAT_COUNT; }
 gbt_export_format gbt_export_format_at(int index)
 {
     const gaussian_format *f = formats[index];
-    return (gbt_export_format){.ending = f->ending, .what = f->what, .readable = f->read != NULL};
+    return (gbt_export_format){.ending = f->ending, .what = f->what};
 }
 
-/* ".ply, .splat or .glb": of those that can be read, or of all. */
-static const char *list(bool readable, const char *before_last, char out[LIST_SIZE])
+/* ".ply, .splat or .glb" */
+static const char *list(const char *before_last, char out[LIST_SIZE])
 {
-    int wanted = 0, count = 0;
     size_t used = 0;
-    for (int i = 0; i < FORMAT_COUNT; i++)
-        wanted += !readable || formats[i]->read != NULL;
     out[0] = '\0';
     for (int i = 0; i < FORMAT_COUNT && used < LIST_SIZE; i++)
-        if (!readable || formats[i]->read != NULL) {
-            used += (size_t)snprintf(out + used, LIST_SIZE - used, "%s%s",
-                                     count == 0            ? ""
-                                     : count == wanted - 1 ? before_last
-                                                           : ", ",
-                                     formats[i]->ending);
-            count++;
-        }
+        used += (size_t)snprintf(out + used, LIST_SIZE - used, "%s%s",
+                                 i == 0                  ? ""
+                                 : i == FORMAT_COUNT - 1 ? before_last
+                                                         : ", ",
+                                 formats[i]->ending);
     return out;
 }
 
@@ -80,25 +74,13 @@ static const char *find_file(const char *path, result_folder *folder)
     bool found;
     if (file_is_folder(path))
         return result_folder_find(path, folder, &found, NULL) == GBT_OK && found ? folder->ply : NULL;
-    const gaussian_format *format = format_read_as(path);
-    return format != NULL && format->read != NULL ? path : NULL;
+    return format_read_as(path) != NULL ? path : NULL;
 }
 
 bool gaussian_file_readable(const char *path)
 {
     result_folder folder;
     return find_file(path, &folder) != NULL;
-}
-
-gbt_status gaussian_file_check_readable(const char *path, gbt_error *err)
-{
-    char readable[LIST_SIZE];
-    const gaussian_format *format = format_of(path);
-    if (format == NULL || format->read != NULL || file_is_folder(path))
-        return GBT_OK;
-    return base_fail(err, GBT_ERR_ARGUMENT,
-                     "%s: %s is written for other programs, not read (wanted %s, or a run)", path,
-                     format->ending, list(true, ", ", readable));
 }
 
 bool gaussian_file_has_gaussians(const char *given)
@@ -119,14 +101,14 @@ bool gaussian_file_has_gaussians(const char *given)
 
 gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error *err)
 {
-    char readable[LIST_SIZE];
+    char all[LIST_SIZE];
     memset(out, 0, sizeof *out);
     result_folder folder;
     const char *path = find_file(given, &folder);
     if (path == NULL)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%s: cannot be read as Gaussians (wanted %s or a 3DGS result folder)", given,
-                         list(true, ", ", readable));
+                         list(", ", all));
     source_file file = {.name = path};
     unsigned char *bytes;
     GBT_TRY(file_read(path, &bytes, &file.size, err));
@@ -141,9 +123,9 @@ gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error 
 gbt_status gaussian_file_check_writable(const char *path, gbt_error *err)
 {
     char all[LIST_SIZE];
-    return format_of(path) != NULL ? GBT_OK
-                                   : base_fail(err, GBT_ERR_ARGUMENT, "%s: which format? (wanted %s)", path,
-                                               list(false, " or ", all));
+    return format_of(path) != NULL
+               ? GBT_OK
+               : base_fail(err, GBT_ERR_ARGUMENT, "%s: which format? (wanted %s)", path, list(" or ", all));
 }
 
 int gaussian_file_degree(const char *path)

@@ -7,18 +7,15 @@
 
 #include "data/gaussian_cloud.h"
 
-/** Whether gaussian_file_read() takes it: a name with the ending of a format that is read
-    (data/gaussian_formats.h), or a result folder of 3DGS (data/result_folder.h). */
+/** Whether gaussian_file_read() takes it: a name with the ending of a format
+    (data/gaussian_formats.h), .usd or .usdc, or a result folder of 3DGS (data/result_folder.h). */
 bool gaussian_file_readable(const char *path);
 
 /** gaussian_file_readable(), and a .ply is not a cloud of points or of another program's anchors: its header
     is looked at. */
 bool gaussian_file_has_gaussians(const char *path);
 
-/** GBT_ERR_ARGUMENT for a format that is written, and not read: .glb. GBT_OK for any other name. */
-gbt_status gaussian_file_check_readable(const char *path, gbt_error *err);
-
-/** Read a file of a format that is read, or the newest .ply of a result folder. GBT_ERR_ARGUMENT for anything
+/** Read a file, or the newest .ply of a result folder. GBT_ERR_ARGUMENT for anything
    else; else as its reader. Free with gaussian_cloud_free(). */
 gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error *err);
 

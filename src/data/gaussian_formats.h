@@ -13,7 +13,7 @@ typedef struct gaussian_format {
     int degree;         /* of the colours it keeps */
     bool keeps_origin;  /* apart from the means, in double */
 
-    /** Free the cloud with gaussian_cloud_free(); zeroed on failure. NULL: the format is only written. */
+    /** Free the cloud with gaussian_cloud_free(); zeroed on failure. */
     gbt_status (*read)(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
     /** Are there Gaussians in such a file? NULL: in every one. */

@@ -7,15 +7,7 @@
 
 #include "base/file.h"
 #include "data/gaussian_formats.h"
-
-enum {
-    GLB_MAGIC = 0x46546C67,
-    CHUNK_JSON = 0x4E4F534A,
-    CHUNK_BIN = 0x004E4942,
-    TYPE_UBYTE = 5121,
-    TYPE_FLOAT = 5126,
-    MODE_POINTS = 0
-};
+#include "data/glb.h"
 
 typedef struct glb {
     sink data; /* the binary chunk */
@@ -45,7 +37,7 @@ static void put_positions(glb *g, const gaussian_cloud *cloud)
         high[i % 3] = fmax(high[i % 3], (double)turned);
         sink_put_f32(&g->data, turned);
     }
-    json_t *accessor = add_attribute(g, "POSITION", "VEC3", TYPE_FLOAT, from);
+    json_t *accessor = add_attribute(g, "POSITION", "VEC3", GLB_FLOAT, from);
     json_object_set_new(accessor, "min", json_pack("[f,f,f]", low[0], low[1], low[2])); /* glTF wants them,
                                                                                            exactly */
     json_object_set_new(accessor, "max", json_pack("[f,f,f]", high[0], high[1], high[2]));
@@ -67,7 +59,7 @@ static void put_shape(glb *g, const gaussian_cloud *cloud)
             sink_put_uint(s, (uint64_t)(255 * linear_of(0.5 + GAUSSIAN_SH_0 * (double)sh[c]) + 0.5), 1);
         sink_put_uint(s, (uint64_t)(255 * fmin(fmax((double)cloud->opacity[i], 0), 1) + 0.5), 1);
     }
-    json_object_set_new(add_attribute(g, "COLOR_0", "VEC4", TYPE_UBYTE, from), "normalized", json_true());
+    json_object_set_new(add_attribute(g, "COLOR_0", "VEC4", GLB_UBYTE, from), "normalized", json_true());
     from = s->size;
     for (size_t i = 0; i < cloud->count; i++) { /* w x y z becomes x y z w */
         const float *q = cloud->quat + 4 * i;
@@ -76,15 +68,15 @@ static void put_shape(glb *g, const gaussian_cloud *cloud)
         for (int k = 0; k < 4; k++)
             sink_put_f32(s, turned[k] / norm);
     }
-    add_attribute(g, "KHR_gaussian_splatting:ROTATION", "VEC4", TYPE_FLOAT, from);
+    add_attribute(g, "KHR_gaussian_splatting:ROTATION", "VEC4", GLB_FLOAT, from);
     from = s->size;
     for (size_t i = 0; i < 3 * cloud->count; i++)
         sink_put_f32(s, expf(cloud->scale_log[i]));
-    add_attribute(g, "KHR_gaussian_splatting:SCALE", "VEC3", TYPE_FLOAT, from);
+    add_attribute(g, "KHR_gaussian_splatting:SCALE", "VEC3", GLB_FLOAT, from);
     from = s->size;
     for (size_t i = 0; i < cloud->count; i++)
         sink_put_f32(s, cloud->opacity[i]);
-    add_attribute(g, "KHR_gaussian_splatting:OPACITY", "SCALAR", TYPE_FLOAT, from);
+    add_attribute(g, "KHR_gaussian_splatting:OPACITY", "SCALAR", GLB_FLOAT, from);
 }
 
 /* Half a turn about z: every second function in the files' order changes its sign. */
@@ -100,7 +92,7 @@ static void put_harmonics(glb *g, const gaussian_cloud *cloud)
                     sink_put_f32(&g->data, k % 2 == 0 ? value : -value);
                 }
             snprintf(name, sizeof name, "KHR_gaussian_splatting:SH_DEGREE_%zu_COEF_%zu", degree, n);
-            add_attribute(g, name, "VEC3", TYPE_FLOAT, from);
+            add_attribute(g, name, "VEC3", GLB_FLOAT, from);
         }
 }
 
@@ -108,7 +100,7 @@ static void put_harmonics(glb *g, const gaussian_cloud *cloud)
 static json_t *document(const glb *g, const double origin[3])
 {
     json_t *primitive =
-        json_pack("{s:i,s:O,s:{s:{s:s,s:s,s:s,s:s}}}", "mode", (int)MODE_POINTS, "attributes", g->attributes,
+        json_pack("{s:i,s:O,s:{s:{s:s,s:s,s:s,s:s}}}", "mode", (int)GLB_POINTS, "attributes", g->attributes,
                   "extensions", "KHR_gaussian_splatting", "kernel", "ellipse", "colorSpace",
                   "srgb_rec709_display", "sortingMethod", "cameraDistance", "projection", "perspective");
     return json_pack("{s:{s:s,s:s},s:[s],s:[{s:I}],s:O,s:O,s:[{s:[o]}],s:[{s:i,s:[f,f,f]}],s:[{s:[i]}],s:i}",
@@ -128,14 +120,14 @@ static gbt_status write_chunks(const char *path, const glb *g, const char *json,
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu bytes are too many for a .glb file (limit 4 GiB)",
                          path, total);
     sink s = {.err = err};
-    const uint32_t head[5] = {GLB_MAGIC, 2, (uint32_t)total, (uint32_t)json_padded, CHUNK_JSON};
+    const uint32_t head[5] = {GLB_MAGIC, 2, (uint32_t)total, (uint32_t)json_padded, GLB_JSON};
     for (int i = 0; i < 5; i++)
         sink_put_uint(&s, head[i], 4);
     sink_put_text(&s, json);
     for (size_t i = json_size; i < json_padded; i++)
         sink_put_text(&s, " ");
     sink_put_uint(&s, data_padded, 4);
-    sink_put_uint(&s, CHUNK_BIN, 4);
+    sink_put_uint(&s, GLB_BINARY, 4);
     sink_put(&s, g->data.bytes, g->data.size);
     static const unsigned char zeros[3];
     sink_put(&s, zeros, data_padded - g->data.size);
@@ -184,4 +176,5 @@ const gaussian_format gaussian_format_glb = {
     .what = "glTF 2.0 with KHR_gaussian_splatting: everything, as floats",
     .degree = 3,
     .keeps_origin = true,
+    .read = glb_read,
     .write = write_glb};

@@ -117,7 +117,6 @@ gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *fol
 static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
 {
     char path[4096];
-    GBT_TRY(gaussian_file_check_readable(run, err));
     if (gaussian_file_readable(run))
         return open_cloud(run, out, err);
     if (file_is_folder(run))

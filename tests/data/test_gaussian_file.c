@@ -150,6 +150,60 @@ static void spz_bytes(void **state)
             fail_msg("byte %zu: %u (wanted %u)", k, got[k], expected[k]);
 }
 
+static void glb_round_trip(void **state)
+{
+    const double origin[3] = {4.5e6, -3, 0.25};
+    for (int degree = 0; degree <= 3; degree++) {
+        gaussian_cloud a, b;
+        make_cloud(&a, 100, degree);
+        must(gaussian_file_write(inside(*state, "r.glb", 0), &a, origin, &err));
+        must(gaussian_file_read(inside(*state, "r.glb", 0), &b, &err));
+        assert_int_equal(b.sh_degree, degree);
+        for (int k = 0; k < 3; k++)
+            assert_true(b.origin[k] == origin[k]);
+        check_near(&a, &b, origin, &(limits){.mean = 1e-8, .scale = 1e-6, .quat = 1e-6, .opacity = 1e-7});
+        gaussian_cloud_free(&a);
+        gaussian_cloud_free(&b);
+    }
+}
+
+/* Words of a file's JSON, replaced by others of the same length: what each of them is answered by. */
+static void glb_that_is_wrong(void **state)
+{
+    static const struct {
+        const char *before, *after, *wanted;
+    } rows[] = {{"glTF\2", "glTF\1", "no binary glTF 2.0"},
+                {"\"KHR_gaussian_splatting\":{", "\"KHR_gaussian_splattinx\":{", "no primitive"},
+                {"srgb_rec709_display", "lin0_rec709_display", "another space"},
+                {"\"translation\":", "\"translation\" ", "glTF: JSON"},
+                {"translation\":", "scale\":      ", "matrix, rotation or scale"},
+                {"\"POSITION\"", "\"POSITIOM\"", "POSITION is no array"},
+                {"\"count\":20", "\"count\":21", "wanted 21"},
+                {"\"buffer\":0", "\"buffer\":1", "in the binary chunk"},
+                {"\"componentType\":5126", "\"componentType\":5125", "in the binary chunk"}};
+    gaussian_cloud a, b;
+    make_cloud(&a, 20, 1);
+    must(gaussian_file_write(inside(*state, "w.glb", 0), &a, nowhere, &err));
+    unsigned char *bytes;
+    size_t size;
+    must(file_read(inside(*state, "w.glb", 0), &bytes, &size, &err));
+    const source_file file = {"w.glb", bytes, size};
+    for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
+        const size_t length = strlen(rows[r].before);
+        unsigned char *at = memmem(bytes, size, rows[r].before, length);
+        assert_non_null(at);
+        assert_int_equal(strlen(rows[r].after), length);
+        memcpy(at, rows[r].after, length);
+        gbt_error said = {0};
+        assert_int_equal(gaussian_format_glb.read(&file, &b, &said), GBT_ERR_FORMAT);
+        if (strstr(said.text, rows[r].wanted) == NULL)
+            fail_msg("%s: %s", rows[r].after, said.text);
+        memcpy(at, rows[r].before, length);
+    }
+    mem_free(bytes);
+    gaussian_cloud_free(&a);
+}
+
 static void glb_is_what_gltf_wants(void **state)
 {
     gaussian_cloud a;
@@ -231,11 +285,13 @@ static void glb_is_what_gltf_wants(void **state)
 /* Every truncation and flip of the zipped bytes, then of what was zipped. */
 static void damaged_files(void **state)
 {
-    gaussian_attempts spz = {.read = gaussian_format_spz.read}, splat = {.read = gaussian_format_splat.read};
+    gaussian_attempts spz = {.read = gaussian_format_spz.read}, splat = {.read = gaussian_format_splat.read},
+                      glb = {.read = gaussian_format_glb.read};
     gaussian_cloud a;
     make_cloud(&a, 2, 1);
     must(gaussian_file_write(inside(*state, "a.spz", 0), &a, nowhere, &err));
     must(gaussian_file_write(inside(*state, "a.splat", 1), &a, nowhere, &err));
+    must(gaussian_file_write(inside(*state, "a.glb", 2), &a, nowhere, &err));
     gaussian_cloud_free(&a);
     unsigned char *bytes, plain[256];
     size_t size;
@@ -261,6 +317,9 @@ static void damaged_files(void **state)
         }
     must(file_read(inside(*state, "a.splat", 0), &bytes, &size, &err));
     mutate_all(bytes, size, try_gaussians, &splat);
+    mem_free(bytes);
+    must(file_read(inside(*state, "a.glb", 0), &bytes, &size, &err));
+    mutate_all(bytes, size, try_gaussians, &glb);
     mem_free(bytes);
 }
 
@@ -297,6 +356,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(spz_keeps_its_steps, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(splat_keeps_one_color, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(spz_bytes, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(glb_round_trip, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(glb_that_is_wrong, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(glb_is_what_gltf_wants, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(damaged_files, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(refusals, make_temporary, remove_temporary),

@@ -24,6 +24,7 @@ static const struct {
     {"splat", fuzz_splat},
     {"spz", fuzz_spz},
     {"sog", fuzz_sog},
+    {"glb", fuzz_glb},
     {"usda", fuzz_usda},
     {"usdz", fuzz_usdz},
     {"safetensors", fuzz_safetensors},

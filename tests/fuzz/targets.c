@@ -105,6 +105,8 @@ void fuzz_spz(const source_file *file) { gaussians_of(file, gaussian_format_spz.
 
 void fuzz_sog(const source_file *file) { gaussians_of(file, gaussian_format_sog.read); }
 
+void fuzz_glb(const source_file *file) { gaussians_of(file, gaussian_format_glb.read); }
+
 void fuzz_usda(const source_file *file) { gaussians_of(file, gaussian_format_usda.read); }
 
 void fuzz_usdz(const source_file *file) { gaussians_of(file, gaussian_format_usdz.read); }

@@ -8,7 +8,7 @@
 typedef void fuzz_target(const source_file *file);
 
 fuzz_target fuzz_colmap_bin, fuzz_colmap_txt, fuzz_transforms, fuzz_ply_points, fuzz_ply_gaussians,
-    fuzz_splat, fuzz_spz, fuzz_sog, fuzz_usda, fuzz_usdz, fuzz_safetensors, fuzz_model, fuzz_mesh,
+    fuzz_splat, fuzz_spz, fuzz_sog, fuzz_glb, fuzz_usda, fuzz_usdz, fuzz_safetensors, fuzz_model, fuzz_mesh,
     fuzz_config, fuzz_camera, fuzz_path, fuzz_photo, fuzz_request;
 
 void fuzz_one(fuzz_target *target, const unsigned char *bytes, size_t size);

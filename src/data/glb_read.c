@@ -1,0 +1,262 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* data/glb_read.c -- glTF's JSON chunk and binary chunk to Gaussians: the first primitive that has them. */
+#include "data/glb.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+
+typedef struct reading {
+    const source_file *file;
+    json_t *root;
+    const json_t *attributes;
+    cursor data; /* over the whole file, at the binary chunk's first byte */
+    size_t data_size, count;
+} reading;
+
+static gbt_status wrong(const reading *r, const char *what, gbt_error *err)
+{
+    return base_fail(err, GBT_ERR_FORMAT, "%s: glTF: %s", r->file->name, what);
+}
+
+static gbt_status read_chunks(reading *r, gbt_error *err)
+{
+    cursor c = {.file = r->file};
+    GBT_TRY(cursor_need(&c, 20, "the header of glTF", err));
+    const uint32_t magic = cursor_u32(&c), version = cursor_u32(&c);
+    if (magic != GLB_MAGIC || version != 2)
+        return wrong(r, "no binary glTF 2.0", err);
+    cursor_u32(&c); /* the whole length */
+    const uint32_t json_size = cursor_u32(&c);
+    if (cursor_u32(&c) != GLB_JSON)
+        return wrong(r, "the first chunk is not JSON", err);
+    GBT_TRY(cursor_need(&c, json_size, "the JSON of glTF", err));
+    json_error_t why;
+    r->root = json_loadb((const char *)r->file->bytes + c.at, json_size, 0, &why);
+    if (r->root == NULL)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: glTF: JSON, line %d: %s", r->file->name, why.line,
+                         why.text);
+    cursor_skip(&c, json_size);
+    GBT_TRY(cursor_need(&c, 8, "the binary chunk of glTF", err));
+    r->data_size = cursor_u32(&c);
+    if (cursor_u32(&c) != GLB_BINARY)
+        return wrong(r, "the second chunk is not binary", err);
+    GBT_TRY(cursor_need(&c, r->data_size, "the binary chunk of glTF", err));
+    r->data = c;
+    return GBT_OK;
+}
+
+/* ---- where the Gaussians are ---- */
+
+/* The mesh that has them, and their attributes. */
+static gbt_status find_primitive(reading *r, size_t *mesh_index, gbt_error *err)
+{
+    const json_t *mesh, *primitive;
+    size_t i, k;
+    json_array_foreach(json_object_get(r->root, "meshes"), i, mesh)
+    {
+        json_array_foreach(json_object_get(mesh, "primitives"), k, primitive)
+        {
+            const json_t *own =
+                json_object_get(json_object_get(primitive, "extensions"), "KHR_gaussian_splatting");
+            if (own == NULL)
+                continue;
+            const json_t *space = json_object_get(own, "colorSpace");
+            if (json_is_string(space) && strcmp(json_string_value(space), "srgb_rec709_display") != 0)
+                return wrong(r, "colours of another space (wanted srgb_rec709_display)", err);
+            if (json_object_size(json_object_get(own, "extensions")) > 0)
+                return wrong(r, "compressed Gaussians are not read", err);
+            r->attributes = json_object_get(primitive, "attributes");
+            *mesh_index = i;
+            return GBT_OK;
+        }
+    }
+    return wrong(r, "no primitive with KHR_gaussian_splatting", err);
+}
+
+static bool is_placed(const json_t *node)
+{
+    return json_object_get(node, "matrix") != NULL || json_object_get(node, "rotation") != NULL ||
+           json_object_get(node, "scale") != NULL;
+}
+
+/* The translation of the mesh's node, which is the cloud's origin. Other transformations are not read. */
+static gbt_status read_place(const reading *r, size_t mesh_index, double place[3], gbt_error *err)
+{
+    const json_t *node, *nodes = json_object_get(r->root, "nodes");
+    size_t i;
+    json_array_foreach(nodes, i, node)
+    {
+        const json_t *mesh = json_object_get(node, "mesh"),
+                     *translation = json_object_get(node, "translation");
+        const bool own = json_is_integer(mesh) && json_integer_value(mesh) == (json_int_t)mesh_index;
+        if (is_placed(node) || (translation != NULL && !own))
+            return wrong(r, "nodes with a matrix, rotation or scale, or one in another, are not read", err);
+        for (size_t k = 0; own && k < 3; k++)
+            place[k] = json_number_value(json_array_get(translation, k));
+        if (own && !(fabs(place[0]) < 1e12 && fabs(place[1]) < 1e12 && fabs(place[2]) < 1e12))
+            return wrong(r, "the node is too far away", err);
+    }
+    return GBT_OK;
+}
+
+/* ---- attributes ---- */
+
+typedef struct column {
+    size_t from, stride; /* bytes, in the binary chunk */
+    size_t width;        /* bytes of one number */
+    int type;            /* glTF's componentType */
+} column;
+
+static size_t width_of(int type)
+{
+    switch (type) {
+    case GLB_BYTE:
+    case GLB_UBYTE:
+        return 1;
+    case GLB_SHORT:
+    case GLB_USHORT:
+        return 2;
+    case GLB_FLOAT:
+        return 4;
+    default:
+        return 0;
+    }
+}
+
+/* A whole number of an object in [0, 2^40]; `missing` when it is not there, SIZE_MAX for anything else. */
+static size_t whole(const json_t *object, const char *key, size_t missing)
+{
+    const json_t *value = json_object_get(object, key);
+    if (value == NULL)
+        return missing;
+    const json_int_t number = json_is_integer(value) ? json_integer_value(value) : -1;
+    return number >= 0 && number <= (json_int_t)1 << 40 ? (size_t)number : SIZE_MAX;
+}
+
+static gbt_status find_column(reading *r, const char *name, const char *kind, size_t numbers, column *out,
+                              gbt_error *err)
+{
+    char what[120];
+    snprintf(what, sizeof what, "%s is no array of numbers, %s, in the binary chunk", name, kind);
+    const json_t *accessor = json_array_get(json_object_get(r->root, "accessors"),
+                                            whole(r->attributes, name, SIZE_MAX)),
+                 *view = json_array_get(json_object_get(r->root, "bufferViews"),
+                                        whole(accessor, "bufferView", SIZE_MAX)),
+                 *type = json_object_get(accessor, "type");
+    const size_t count = whole(accessor, "count", 0);
+    out->type = (int)whole(accessor, "componentType", 0);
+    out->width = width_of(out->type);
+    const size_t record = out->width * numbers, in_view = whole(accessor, "byteOffset", 0),
+                 from = whole(view, "byteOffset", 0);
+    out->stride = whole(view, "byteStride", record);
+    if (view == NULL || out->width == 0 || !json_is_string(type) ||
+        strcmp(json_string_value(type), kind) != 0 || json_object_get(accessor, "sparse") != NULL ||
+        whole(view, "buffer", SIZE_MAX) != 0 || count == 0 || count == SIZE_MAX || in_view == SIZE_MAX ||
+        from == SIZE_MAX || out->stride < record || out->stride > 1 << 16)
+        return wrong(r, what, err);
+    out->from = from + in_view;
+    if (out->from > r->data_size || r->data_size - out->from < record ||
+        (r->data_size - out->from - record) / out->stride < count - 1)
+        return wrong(r, what, err);
+    if (r->count != 0 && r->count != count)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: glTF: %s has %zu values (wanted %zu)", r->file->name, name,
+                         count, r->count);
+    r->count = count;
+    return GBT_OK;
+}
+
+/* Whole numbers stand for [0, 1] or [-1, 1]. */
+static double number(const reading *r, const column *c, size_t i, size_t k)
+{
+    cursor at = r->data;
+    at.at += c->from + i * c->stride + k * c->width;
+    switch (c->type) {
+    case GLB_BYTE:
+        return fmax((double)(int8_t)cursor_uint(&at, 1) / 127, -1);
+    case GLB_UBYTE:
+        return (double)cursor_uint(&at, 1) / 255;
+    case GLB_SHORT:
+        return fmax((double)(int16_t)cursor_uint(&at, 2) / 32767, -1);
+    case GLB_USHORT:
+        return (double)cursor_uint(&at, 2) / 65535;
+    default:
+        return (double)cursor_f32(&at);
+    }
+}
+
+typedef struct columns {
+    column mean, rotation, scale, opacity, sh[GAUSSIAN_SH_COUNT];
+} columns;
+
+static gbt_status find_columns(reading *r, columns *c, int *degree, gbt_error *err)
+{
+    GBT_TRY(find_column(r, "POSITION", "VEC3", 3, &c->mean, err));
+    GBT_TRY(find_column(r, "KHR_gaussian_splatting:ROTATION", "VEC4", 4, &c->rotation, err));
+    GBT_TRY(find_column(r, "KHR_gaussian_splatting:SCALE", "VEC3", 3, &c->scale, err));
+    GBT_TRY(find_column(r, "KHR_gaussian_splatting:OPACITY", "SCALAR", 1, &c->opacity, err));
+    size_t k = 0;
+    for (int d = 0; d <= 3; d++)
+        for (int n = 0; n <= 2 * d; n++, k++) {
+            char name[64];
+            snprintf(name, sizeof name, "KHR_gaussian_splatting:SH_DEGREE_%d_COEF_%d", d, n);
+            if (d > 0 && n == 0 && json_object_get(r->attributes, name) == NULL)
+                return GBT_OK;
+            GBT_TRY(find_column(r, name, "VEC3", 3, &c->sh[k], err));
+            *degree = d;
+        }
+    return GBT_OK;
+}
+
+/* Half a turn about z, as the writer does. */
+static void take(const reading *r, const columns *c, size_t i, gaussian_cloud *out)
+{
+    gaussian_row row = {.opacity = number(r, &c->opacity, i, 0)};
+    const size_t coefficients = (size_t)((out->sh_degree + 1) * (out->sh_degree + 1));
+    for (size_t k = 0; k < 3; k++) {
+        const double scale = number(r, &c->scale, i, k);
+        row.mean[k] = (k < 2 ? -1 : 1) * number(r, &c->mean, i, k);
+        row.scale_log[k] = scale >= 0 ? log(scale) : (double)NAN;
+    }
+    row.quat[0] = number(r, &c->rotation, i, 3);
+    for (size_t k = 0; k < 3; k++)
+        row.quat[k + 1] = (k < 2 ? -1 : 1) * number(r, &c->rotation, i, k);
+    for (size_t k = 0; k < coefficients; k++)
+        for (size_t channel = 0; channel < 3; channel++)
+            row.sh[k][channel] = (k % 2 == 0 ? 1 : -1) * number(r, &c->sh[k], i, channel);
+    gaussian_cloud_add(out, &row);
+}
+
+static gbt_status read_root(reading *r, gaussian_cloud *out, gbt_error *err)
+{
+    size_t mesh = 0;
+    double place[3] = {0, 0, 0};
+    columns c;
+    int degree = 0;
+    GBT_TRY(find_primitive(r, &mesh, err));
+    GBT_TRY(read_place(r, mesh, place, err));
+    GBT_TRY(find_columns(r, &c, &degree, err));
+    GBT_TRY(gaussian_cloud_alloc(out, r->count, err));
+    out->count = 0;
+    out->sh_degree = degree;
+    for (size_t i = 0; i < r->count; i++)
+        take(r, &c, i, out);
+    for (int k = 0; k < 3; k++)
+        out->origin[k] = (k < 2 ? 0 - place[k] : place[k]);
+    return out->count > 0 ? GBT_OK
+                          : base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu dropped)",
+                                      r->file->name, out->dropped);
+}
+
+gbt_status glb_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
+{
+    reading r = {.file = file};
+    memset(out, 0, sizeof *out);
+    gbt_status status = read_chunks(&r, err);
+    if (status == GBT_OK)
+        status = read_root(&r, out, err);
+    json_decref(r.root);
+    if (status != GBT_OK)
+        gaussian_cloud_free(out);
+    return status;
+}

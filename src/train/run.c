@@ -295,8 +295,7 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
     if (def->memory > 0 && hits > def->memory / 8)
         hits = def->memory / 8;
     for (size_t i = 0; i < t->view_count; i++) /* there 0 is no limit */
-        t->views[i].frame.scene.tape_bytes_max =
-            hits >= t->view_count ? hits / t->view_count : 1;
+        t->views[i].frame.scene.tape_bytes_max = hits >= t->view_count ? hits / t->view_count : 1;
     if (t->step == 0)
         t->seconds = clock_wall() - begin; /* loading counts */
     return GBT_OK;

@@ -37,8 +37,8 @@ FASTEST_CLONE static void varying_colors(const sky *s, const float color[3], flo
             float sum = color[c];
             for (int k = 1; k < SH_COUNT; k++)
                 sum += s->harmonic[k - 1][c] * basis[k][lane];
-            sum = sum > 0 ? sum : 0;
-            out[c][lane] = sum < 1 ? sum : 1;
+            sum = sum < 0 ? 0 : sum; /* what is not a number stays none */
+            out[c][lane] = sum > 1 ? 1 : sum;
         }
 }
 
@@ -62,6 +62,6 @@ void sky_color_exact(const sky *s, const float color[3], const double dir[3], do
         for (int k = 1; k < SH_COUNT && s->varies; k++)
             out[c] += (double)s->harmonic[k - 1][c] * y[k];
         if (s->varies)
-            out[c] = out[c] > 0 ? out[c] < 1 ? out[c] : 1 : 0;
+            out[c] = out[c] < 0 ? 0 : out[c] > 1 ? 1 : out[c];
     }
 }

@@ -9,6 +9,7 @@
 #include "base/compare.h"
 #include "base/vec.h"
 #include "train/adam.h"
+#include "train/schedule.h"
 
 gbt_status poses_make(poses *p, const scene *s, size_t count, double unit, gbt_error *err)
 {
@@ -85,10 +86,11 @@ void poses_step(poses *p, scene *s, const size_t *train_views, size_t index,
 
 double poses_rate(size_t count, double progress, double step)
 {
-    const double begin = 0.03, way = 0.04, most = 0.002, last = 0.005, mean = 0.188; /* of last^progress */
+    const double begin = 0.03, way = 0.04, most = 0.002, last = 0.05, mean = 0.32; /* of last^progress */
     if (progress < begin)
         return 0;
-    return fmin(way / mean * (double)count * step, most) * exp(progress * log(last));
+    const double cool = fmin((1 - progress) / (1 - SCHEDULE_COOL_FROM), 1); /* as all rates */
+    return fmin(way / mean * (double)count * step, most) * exp(progress * log(last)) * fmax(cool, 0);
 }
 
 void poses_pack(const poses *p, const scene *s)

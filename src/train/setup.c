@@ -338,8 +338,8 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->renderer = t->def.renderer;
     GBT_TRY(make_views(t, err));
     GBT_TRY(make_state(t, err));
-    if (!scene_background(&t->scene, t->settings.background)) {
-        if (t->rules.background_from_points && t->scene.points.has_color)
+    if (!scene_background(&t->scene, t->settings.background) && t->rules.background_from_points) {
+        if (t->scene.points.has_color)
             mean_color(&t->scene.points, t->settings.background);
         t->settings.sky.varies = t->def.background == GBT_BACKGROUND_SKY;
     }

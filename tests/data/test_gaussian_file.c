@@ -81,7 +81,7 @@ static void splat_keeps_one_color(void **state)
     for (size_t i = 0; i < a.count; i++) { /* sorted already */
         for (size_t k = 0; k < 3; k++)
             a.scale_log[3 * i + k] = -0.1f * (float)i - 0.01f * (float)k;
-        a.opacity[i] = 0.5f;
+        a.opacity[i] = 0.95f - 0.02f * (float)i;
     }
     must(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &err));
     must(gaussian_file_read(inside(*state, "a.splat", 0), &b, &err));

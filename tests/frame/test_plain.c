@@ -28,6 +28,39 @@ static void basis_is_orthonormal(void **state)
             assert_near(product[k][l], k == l, 1e-4);
 }
 
+/* Differences over four points along a line are exact for polynomials of the third degree. */
+static void basis_gradient_is_the_derivative(void **state)
+{
+    (void)state;
+    const float step = 0.25f;
+    for (uint64_t i = 0; i < 100; i++) {
+        double d[3], u[3], t[3];
+        for (uint64_t k = 0; k < 3; k++) {
+            d[k] = rng_normal(2, 1 + k, i);
+            u[k] = rng_normal(2, 4 + k, i);
+        }
+        dvec_normalize(d);
+        dvec_cross(d, u, t);
+        dvec_normalize(t);
+        float y[4][GAUSSIAN_SH_COUNT], gradient[GAUSSIAN_SH_COUNT][3];
+        for (int p = 0; p < 4; p++) {
+            const double at = (double)step * (p < 2 ? p - 2 : p - 1);
+            sh_basis((const float[3]){(float)(d[0] + at * t[0]), (float)(d[1] + at * t[1]),
+                                      (float)(d[2] + at * t[2])},
+                     y[p]);
+        }
+        sh_basis_gradient((const float[3]){(float)d[0], (float)d[1], (float)d[2]}, gradient);
+        for (int k = 0; k < GAUSSIAN_SH_COUNT; k++) {
+            double along = 0;
+            for (int c = 0; c < 3; c++)
+                along += (double)gradient[k][c] * t[c];
+            assert_near((8 * ((double)y[2][k] - (double)y[1][k]) - ((double)y[3][k] - (double)y[0][k])) /
+                            (12 * (double)step),
+                        along, 1e-5);
+        }
+    }
+}
+
 /* Half a turn about z, which .glb files need: every second function changes its sign. */
 static void half_a_turn(void **state)
 {
@@ -184,6 +217,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(basis_is_orthonormal),
+        cmocka_unit_test(basis_gradient_is_the_derivative),
         cmocka_unit_test(half_a_turn),
         cmocka_unit_test(nothing_visible_is_left_out),
         cmocka_unit_test(adjoint_of_colors_and_shapes),

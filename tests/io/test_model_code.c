@@ -162,6 +162,36 @@ static void rounded_by_half_a_step(void **state)
     model_free(&back);
 }
 
+/* A step grows where the largest value has more steps than a coded number holds. */
+static void large_values_get_larger_steps(void **state)
+{
+    (void)state;
+    const float large[3] = {3e8f, -2e7f, 5e6f};
+    const size_t at[3] = {40 * ANCHOR_FEATURE_DIM + 5, 40 * 6 + 5, 40 * 6 + 1};
+    model m, back;
+    model_steps steps;
+    model_sizes sizes;
+    make_model(&m, 50, 2, false);
+    make_steps(&steps, 50, false);
+    m.anchors.feature[at[0]] = large[0];
+    m.anchors.offset[at[1]] = large[1];
+    m.anchors.offset[at[2]] = large[2];
+    assert_ok(model_save_coded(test_path("large.gbt"), &m, &steps, &sizes, NULL));
+    assert_ok(model_load(test_path("large.gbt"), &back, NULL));
+    double apart[3] = {INFINITY, INFINITY, INFINITY}; /* anchors come in another order */
+    for (size_t i = 0; i < 50; i++) {
+        const float values[3] = {back.anchors.feature[i * ANCHOR_FEATURE_DIM + 5],
+                                 back.anchors.offset[i * 6 + 5], back.anchors.offset[i * 6 + 1]};
+        for (int k = 0; k < 3; k++)
+            apart[k] = fmin(apart[k], fabs((double)values[k] - (double)large[k]));
+    }
+    for (int k = 0; k < 3; k++)
+        assert_true(apart[k] <= fabs((double)large[k]) * 0x1p-20);
+    model_steps_free(&steps);
+    model_free(&m);
+    model_free(&back);
+}
+
 static void lossless_keeps_bits_and_order(void **state)
 {
     const shape_case *row = *state;
@@ -517,9 +547,10 @@ static void steps_of_anchors(void **state)
 
 int main(void)
 {
-    enum { SHAPES = sizeof shape_cases / sizeof *shape_cases, SINGLE = 8 };
+    enum { SHAPES = sizeof shape_cases / sizeof *shape_cases, SINGLE = 9 };
     static char names[2 * SHAPES][96];
     struct CMUnitTest tests[SINGLE + 2 * SHAPES] = {
+        cmocka_unit_test(large_values_get_larger_steps),
         cmocka_unit_test(odd_models),
         cmocka_unit_test(the_format_has_not_changed),
         cmocka_unit_test(damage),

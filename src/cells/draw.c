@@ -65,9 +65,10 @@ static gbt_status draw_part(const picture *p, const cell_part *part, gbt_error *
     if (fits)
         return draw_cell(p, err);
     if (cell_is_chunk(d->store, part))
-        return base_fail(err, GBT_ERR_NO_MEMORY,
-                         "memory: %zu MB is too little for the Gaussians of one place (wanted more than %zu there)",
-                         d->memory >> 20, d->budget >> 20);
+        return base_fail(
+            err, GBT_ERR_NO_MEMORY,
+            "memory: %zu MB is too little for the Gaussians of one place (wanted more than %zu there)",
+            d->memory >> 20, d->budget >> 20);
     const cell_cut *cut = &d->store->cuts[part->node];
     const bool from_below = d->rays.origin[cut->axis] < cut->at;
     for (int k = 0; k < 2; k++) {
@@ -88,16 +89,17 @@ static gbt_status draw_all(cell_drawer *d, const ray_shot *shot, image *out, gbt
     return draw_part(&p, &whole, err);
 }
 
-gbt_status cell_draw(cell_drawer *d, const cell_store *store, const ray_shot *shot, const trace_settings *settings,
-                     float variance, size_t memory, image *out, gbt_error *err)
+gbt_status cell_draw(cell_drawer *d, const cell_store *store, const ray_shot *shot,
+                     const trace_settings *settings, float variance, size_t memory, image *out,
+                     gbt_error *err)
 {
     d->store = store;
     d->memory = memory;
     d->settings = *settings;
     memset(d->settings.background, 0, sizeof d->settings.background);
     d->variance = variance;
-    /* One kernel for all cells: the depths that two kernels find for a hit differ by rounding, and between two
-       cells it could be counted twice, or not at all. */
+    /* One kernel for all cells: the depths that two kernels find for a hit differ by rounding, and between
+       two cells it could be counted twice, or not at all. */
     gbt_error lists = {0};
     d->scene.kernel = TRACE_LIST;
     gbt_status status = draw_all(d, shot, out, &lists);

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cells/draw.h -- pictures of Gaussians that do not fit in memory, cell by cell.
 
-   Cells are parts of space, nodes of the store's tree, small enough for the memory allowed. Each cuts every ray
-   to an interval; a hit belongs to the cell whose interval holds its t_c. From the point where all rays start
-   the tree has one order front to back, and the cells of it blend one behind the other, in that order. */
+   Cells are parts of space, nodes of the store's tree, small enough for the memory allowed. Each cuts every
+   ray to an interval; a hit belongs to the cell whose interval holds its t_c. From the point where all rays
+   start the tree has one order front to back, and the cells of it blend one behind the other, in that order.
+ */
 #ifndef GBT_CELLS_DRAW_H
 #define GBT_CELLS_DRAW_H
 
@@ -31,15 +32,15 @@ typedef struct cell_load {
 typedef struct cell_drawer {
     const cell_store *store;
     size_t cell_bytes; /* set before drawing: of one cell at most; 0, the default: as `memory` allows */
-    size_t memory; /* bytes that this process may take */
-    size_t budget; /* of them, for one cell */
+    size_t memory;     /* bytes that this process may take */
+    size_t budget;     /* of them, for one cell */
     size_t bytes_each, bytes_pair;
     float variance; /* of a pixel, px^2; 0: thin rays */
     trace_settings settings;
-    ray_image rays;  /* `near`, `far` and `through` are those of the cell being drawn */
+    ray_image rays;              /* `near`, `far` and `through` are those of the cell being drawn */
     unsigned char *over, *ended; /* [rays] 1: transmittance_min ended the ray; so it did in this cell */
     float *left;                 /* [rays] transmittance behind this cell */
-    image part; /* of this cell */
+    image part;                  /* of this cell */
     view_bounds bounds;
     visible_reach reach;
     footprint_view view;
@@ -58,13 +59,13 @@ typedef struct cell_drawer {
  * @param memory   [in]  bytes that the process may take in all
  * @param out      [in,out] resized to the shot
  * @return GBT_OK; GBT_ERR_ARGUMENT: rays that start at different points (an aperture, a rolling shutter, an
- *         orthographic camera); GBT_ERR_NO_MEMORY: `memory` is too little, and the text says how much is wanted;
- *         GBT_ERR_IO
- * Threads: uses all; same bits for every thread count. The picture is that of all Gaussians in memory, but for
- * the rounding of the products of transmittances.
+ *         orthographic camera); GBT_ERR_NO_MEMORY: `memory` is too little, and the text says how much is
+ * wanted; GBT_ERR_IO Threads: uses all; same bits for every thread count. The picture is that of all
+ * Gaussians in memory, but for the rounding of the products of transmittances.
  */
-gbt_status cell_draw(cell_drawer *d, const cell_store *store, const ray_shot *shot, const trace_settings *settings,
-                     float variance, size_t memory, image *out, gbt_error *err);
+gbt_status cell_draw(cell_drawer *d, const cell_store *store, const ray_shot *shot,
+                     const trace_settings *settings, float variance, size_t memory, image *out,
+                     gbt_error *err);
 
 void cell_drawer_free(cell_drawer *d);
 

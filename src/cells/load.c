@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cells/load.c -- the Gaussians that a view may see of a part of space: read, coloured, widened, and kept where
-   they reach into it; then in the order of the .ply. */
+/* cells/load.c -- the Gaussians that a view may see of a part of space: read, coloured, widened, and kept
+   where they reach into it; then in the order of the .ply. */
 #include <math.h>
 #include <string.h>
 
@@ -37,8 +37,8 @@ static void unpack_rows(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* How far a Gaussian reaches along each axis where its response counts, and a little more: depths in float have
-   errors, and so have the places of hits. False for what is never hit. */
+/* How far a Gaussian reaches along each axis where its response counts, and a little more: depths in float
+   have errors, and so have the places of hits. False for what is never hit. */
 static bool find_extent(const cell_drawer *d, const gaussians *g, size_t i, float half[3], float *radius)
 {
     const float share = g->opacity[i] / d->settings.alpha_min;
@@ -51,7 +51,8 @@ static bool find_extent(const cell_drawer *d, const gaussians *g, size_t i, floa
                            {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
                            {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
     for (int a = 0; a < 3; a++)
-        half[a] = sqrtf(m[a][0] * m[a][0] * sx * sx + m[a][1] * m[a][1] * sy * sy + m[a][2] * m[a][2] * sz * sz);
+        half[a] =
+            sqrtf(m[a][0] * m[a][0] * sx * sx + m[a][1] * m[a][1] * sy * sy + m[a][2] * m[a][2] * sz * sz);
     *radius = fmaxf(sx, fmaxf(sy, sz));
     return true;
 }
@@ -59,7 +60,8 @@ static bool find_extent(const cell_drawer *d, const gaussians *g, size_t i, floa
 /* Tiles that a ball of the Gaussian's reach covers, about and rather more. */
 static double count_tiles(const cell_drawer *d, const float mean[3], float radius)
 {
-    const double tiles = ceil((double)d->rays.width / TILE_PIXELS) * ceil((double)d->rays.height / TILE_PIXELS);
+    const double tiles =
+        ceil((double)d->rays.width / TILE_PIXELS) * ceil((double)d->rays.height / TILE_PIXELS);
     double to[3], square = 0, along = 0;
     for (int k = 0; k < 3; k++) {
         to[k] = (double)mean[k] - d->view.center[k];
@@ -68,14 +70,16 @@ static double count_tiles(const cell_drawer *d, const float mean[3], float radiu
     }
     const double distance = sqrt(square) - (double)radius;
     /* Off the axis of a perspective picture things are larger. */
-    const double depth = d->view.kind == FOOTPRINT_PERSPECTIVE ? along * along / sqrt(square) - (double)radius : distance;
+    const double depth =
+        d->view.kind == FOOTPRINT_PERSPECTIVE ? along * along / sqrt(square) - (double)radius : distance;
     if (!(depth > 0) || !(distance > 0))
         return tiles;
     const double across = 2 * (double)radius / (depth * d->view.pixel * TILE_PIXELS) + 1.5;
     return fmin(tiles, across * across);
 }
 
-static bool reaches_into(const cell_drawer *d, const cell_part *part, const float mean[3], const float half[3])
+static bool reaches_into(const cell_drawer *d, const cell_part *part, const float mean[3],
+                         const float half[3])
 {
     float rounding = 0;
     for (int k = 0; k < 3; k++)
@@ -102,7 +106,8 @@ static bool keep_rows(cell_drawer *d, const cell_part *part, const gaussians *g)
         if (!find_extent(d, g, i, half, &radius) || !reaches_into(d, part, mean, half))
             continue;
         load->pairs += count_tiles(d, mean, radius);
-        const double bytes = (double)(load->count + 1) * (double)d->bytes_each + load->pairs * (double)d->bytes_pair;
+        const double bytes =
+            (double)(load->count + 1) * (double)d->bytes_each + load->pairs * (double)d->bytes_pair;
         if (bytes > (double)d->budget || load->count == load->capacity)
             return false;
         uint32_t number;
@@ -122,9 +127,10 @@ static gbt_status keep_piece(cell_drawer *d, const cell_part *part, size_t count
     load->cloud.count = count;
     load->cloud.sh_degree = d->store->sh_degree;
     parallel_blocks(count, UNPACK_BLOCK, unpack_rows, &job);
-    GBT_TRY(visible_find(frame_plain(&load->cloud), &d->bounds, &d->reach, NULL, &load->visible, &load->visible_count,
-                         &load->visible_capacity, err));
-    GBT_TRY(plain_forward(&load->cloud, d->bounds.center, load->visible, load->visible_count, &load->seen, err));
+    GBT_TRY(visible_find(frame_plain(&load->cloud), &d->bounds, &d->reach, NULL, &load->visible,
+                         &load->visible_count, &load->visible_capacity, err));
+    GBT_TRY(
+        plain_forward(&load->cloud, d->bounds.center, load->visible, load->visible_count, &load->seen, err));
     if (d->variance > 0)
         GBT_TRY(footprint_forward(&d->view, d->variance, NULL, &load->seen, &load->wide, err));
     *fits = keep_rows(d, part, d->variance > 0 ? &load->wide : &load->seen);
@@ -150,7 +156,8 @@ static bool chunk_reaches_into(const cell_drawer *d, const cell_chunk *c, const 
     return true;
 }
 
-static gbt_status load_chunk(cell_drawer *d, const cell_chunk *c, const cell_part *part, bool *fits, gbt_error *err)
+static gbt_status load_chunk(cell_drawer *d, const cell_chunk *c, const cell_part *part, bool *fits,
+                             gbt_error *err)
 {
     const cell_store *store = d->store;
     size_t have = 0, left = c->count;

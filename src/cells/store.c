@@ -73,7 +73,8 @@ static void read_block(size_t block, size_t begin, size_t end, void *context)
 {
     sorting *s = context;
     block_rows *b = &s->blocks[block];
-    b->status = gaussian_ply_part(&s->ply, s->first + begin, end - begin, b->bytes, &b->cloud, b->number, &b->error);
+    b->status =
+        gaussian_ply_part(&s->ply, s->first + begin, end - begin, b->bytes, &b->cloud, b->number, &b->error);
     if (b->status == GBT_OK)
         find_sigmas(b);
 }
@@ -107,7 +108,8 @@ static gbt_status take_sample(sorting *s, gbt_error *err)
         return GBT_ERR_NO_MEMORY;
     block_rows *b = &s->blocks[0];
     for (size_t i = 0; i < parts; i++) {
-        const size_t first = count <= wanted ? i * SAMPLE_ROWS : (count - SAMPLE_ROWS) / (SAMPLE_BLOCKS - 1) * i,
+        const size_t first =
+                         count <= wanted ? i * SAMPLE_ROWS : (count - SAMPLE_ROWS) / (SAMPLE_BLOCKS - 1) * i,
                      left = count - first, rows = left < SAMPLE_ROWS ? left : SAMPLE_ROWS;
         GBT_TRY(gaussian_ply_part(&s->ply, first, rows, b->bytes, &b->cloud, b->number, err));
         memcpy(s->sample + 3 * s->sample_count, b->cloud.mean, 3 * b->cloud.count * sizeof *s->sample);
@@ -118,8 +120,14 @@ static gbt_status take_sample(sorting *s, gbt_error *err)
 }
 
 static int by_x(const void *a, const void *b) { return compare_floats(a, b); }
-static int by_y(const void *a, const void *b) { return compare_floats((const float *)a + 1, (const float *)b + 1); }
-static int by_z(const void *a, const void *b) { return compare_floats((const float *)a + 2, (const float *)b + 2); }
+static int by_y(const void *a, const void *b)
+{
+    return compare_floats((const float *)a + 1, (const float *)b + 1);
+}
+static int by_z(const void *a, const void *b)
+{
+    return compare_floats((const float *)a + 2, (const float *)b + 2);
+}
 
 /* Along the widest axis, in the middle of the sample. */
 static void cut_node(cell_store *store, size_t node, float *sample, size_t count)
@@ -223,7 +231,8 @@ static gbt_status add_row(sorting *s, const block_rows *b, size_t i, uint32_t nu
     memcpy(row + CELL_ROW_SCALE, cloud->scale_log + 3 * i, 3 * sizeof *row);
     memcpy(row + CELL_ROW_QUAT, cloud->quat + 4 * i, 4 * sizeof *row);
     row[CELL_ROW_OPACITY] = cloud->opacity[i];
-    memcpy(row + CELL_ROW_SH, cloud->sh + i * GAUSSIAN_SH_COUNT * 3, (store->row_floats - CELL_ROW_SH) * sizeof *row);
+    memcpy(row + CELL_ROW_SH, cloud->sh + i * GAUSSIAN_SH_COUNT * 3,
+           (store->row_floats - CELL_ROW_SH) * sizeof *row);
     c->count++;
     store->count++;
     return ++s->buffered[chunk] == s->extent_rows ? flush(s, chunk, err) : GBT_OK;
@@ -277,8 +286,8 @@ static gbt_status sort_rows(sorting *s, gbt_error *err)
         s->all.scales_clamped += s->blocks[i].cloud.scales_clamped;
     }
     if (s->store->count == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu rows dropped)", s->ply.file.name,
-                         s->all.dropped);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu rows dropped)",
+                         s->ply.file.name, s->all.dropped);
     gaussian_cloud_warn(&s->all, s->ply.file.name);
     return GBT_OK;
 }
@@ -298,8 +307,8 @@ static void release(sorting *s)
     gaussian_ply_close(&s->ply);
 }
 
-gbt_status cell_store_make(const char *ply, const char *folder, size_t memory, size_t chunk_rows, cell_store *out,
-                           gbt_error *err)
+gbt_status cell_store_make(const char *ply, const char *folder, size_t memory, size_t chunk_rows,
+                           cell_store *out, gbt_error *err)
 {
     sorting *s = mem_calloc(1, sizeof *s, "sorting of Gaussians", err);
     if (s == NULL)
@@ -327,8 +336,8 @@ gbt_status cell_store_make(const char *ply, const char *folder, size_t memory, s
     return status;
 }
 
-gbt_status cell_store_read(const cell_store *store, const cell_extent *extent, size_t from, size_t count, float *out,
-                           gbt_error *err)
+gbt_status cell_store_read(const cell_store *store, const cell_extent *extent, size_t from, size_t count,
+                           float *out, gbt_error *err)
 {
     const size_t row = store->row_floats * sizeof *out;
     return large_file_read(&store->rows, extent->at + from * row, out, count * row, err);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cells/store.h -- a plain .ply in the order of space: its Gaussians in a temporary file, in the chunks that are
-   the leaves of a k-d tree over their means. One pass over the .ply, in bounded memory. */
+/* cells/store.h -- a plain .ply in the order of space: its Gaussians in a temporary file, in the chunks that
+   are the leaves of a k-d tree over their means. One pass over the .ply, in bounded memory. */
 #ifndef GBT_CELLS_STORE_H
 #define GBT_CELLS_STORE_H
 
@@ -10,14 +10,22 @@
 #include "base/large_file.h"
 #include "data/gaussian_cloud.h"
 
-/** Floats of a row before the harmonics: number in the .ply (its bits), mean, scale_log, quaternion, opacity. */
-enum { CELL_ROW_NUMBER, CELL_ROW_MEAN, CELL_ROW_SCALE = 4, CELL_ROW_QUAT = 7, CELL_ROW_OPACITY = 11, CELL_ROW_SH };
+/** Floats of a row before the harmonics: number in the .ply (its bits), mean, scale_log, quaternion, opacity.
+ */
+enum {
+    CELL_ROW_NUMBER,
+    CELL_ROW_MEAN,
+    CELL_ROW_SCALE = 4,
+    CELL_ROW_QUAT = 7,
+    CELL_ROW_OPACITY = 11,
+    CELL_ROW_SH
+};
 
 /** A leaf of the tree. Its Gaussians reach out of its part of space: see `sigma`. */
 typedef struct cell_chunk {
     size_t count;
-    float low[3], high[3]; /* of the means, local */
-    float sigma[3];        /* largest std-dev along each axis */
+    float low[3], high[3];              /* of the means, local */
+    float sigma[3];                     /* largest std-dev along each axis */
     uint32_t first_extent, last_extent; /* valid when count > 0 */
 } cell_chunk;
 
@@ -27,8 +35,8 @@ typedef struct cell_extent {
     uint32_t count, next; /* next: of the same chunk; not set in its last */
 } cell_extent;
 
-/** Node i of the tree is cut at `at` along `axis` (local coordinates); its children are nodes 2 i + 1 (below) and
-    2 i + 2; those from chunk_count - 1 on are chunks. */
+/** Node i of the tree is cut at `at` along `axis` (local coordinates); its children are nodes 2 i + 1 (below)
+   and 2 i + 2; those from chunk_count - 1 on are chunks. */
 typedef struct cell_cut {
     int axis;
     float at;
@@ -62,12 +70,12 @@ typedef struct cell_store {
  * Local coordinates, and so pictures, are those of the same file read whole.
  * Threads: uses all; the same store for every thread count.
  */
-gbt_status cell_store_make(const char *ply, const char *folder, size_t memory, size_t chunk_rows, cell_store *out,
-                           gbt_error *err);
+gbt_status cell_store_make(const char *ply, const char *folder, size_t memory, size_t chunk_rows,
+                           cell_store *out, gbt_error *err);
 
 /** `count` rows of an extent from `from` on, as they are in the file; [count * row_floats]. Threads: any. */
-gbt_status cell_store_read(const cell_store *store, const cell_extent *extent, size_t from, size_t count, float *out,
-                           gbt_error *err);
+gbt_status cell_store_read(const cell_store *store, const cell_extent *extent, size_t from, size_t count,
+                           float *out, gbt_error *err);
 
 void cell_store_free(cell_store *store);
 

@@ -15,8 +15,8 @@ enum { RAY_BLOCK = 4096 };
 /* What the program itself takes, the buffers of threads and of files. */
 static const size_t base_bytes = (size_t)128 << 20, cell_bytes_least = (size_t)48 << 20;
 
-/* Directions and what the lens makes of the pixels, intervals, colours of the cell and in all, and the picture as
-   it is written. */
+/* Directions and what the lens makes of the pixels, intervals, colours of the cell and in all, and the
+   picture as it is written. */
 enum { PIXEL_BYTES = 120 };
 
 size_t cell_memory_least(size_t pixels) { return base_bytes + cell_bytes_least + PIXEL_BYTES * pixels; }
@@ -158,13 +158,15 @@ static gbt_status find_budget(cell_drawer *d, gbt_error *err)
 {
     const size_t pixels = ray_image_count(&d->rays), least = cell_memory_least(pixels);
     if (d->memory < least)
-        return base_fail(err, GBT_ERR_NO_MEMORY, "memory: %zu MB is too little for a picture of %d x %d (wanted %zu)",
+        return base_fail(err, GBT_ERR_NO_MEMORY,
+                         "memory: %zu MB is too little for a picture of %d x %d (wanted %zu)",
                          d->memory >> 20, d->rays.width, d->rays.height, (least >> 20) + 1);
     d->budget = d->memory - base_bytes - PIXEL_BYTES * pixels;
     if (d->cell_bytes > 0 && d->cell_bytes < d->budget)
         d->budget = d->cell_bytes;
     const bool lists = d->scene.kernel == TRACE_LIST;
-    d->bytes_each = lists ? 340 : 560; /* rows as read and sorted, records; then those of the view, or a tree */
+    d->bytes_each =
+        lists ? 340 : 560; /* rows as read and sorted, records; then those of the view, or a tree */
     d->bytes_pair = lists ? 20 : 0;
     return GBT_OK;
 }
@@ -177,9 +179,10 @@ gbt_status cell_view_start(cell_drawer *d, const ray_shot *shot, gbt_error *err)
                          "memory: an open aperture is not drawn cell by cell (wanted rays from one point)");
     GBT_TRY(ray_image_from_shot(shot, 0, &d->rays, err));
     if (!d->rays.common_origin)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "memory: rays that start at different points are not drawn cell by cell (a rolling shutter, "
-                         "an orthographic camera)");
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "memory: rays that start at different points are not drawn cell by cell (a rolling shutter, "
+            "an orthographic camera)");
     GBT_TRY(find_budget(d, err));
     GBT_TRY(reserve_rays(d, err));
     GBT_TRY(view_bounds_find(shot, &d->rays, &d->bounds, err));

@@ -200,17 +200,20 @@ static gbt_status open_parts(const char *path, gaussian_ply_parts *out, gbt_erro
     const int vertex = ply_find_element(header, "vertex");
     if (vertex != 0 || compressed_ply_is(header) || ply_row_bytes(header, vertex) == 0)
         return base_fail(err, GBT_ERR_FORMAT,
-                         "%s: cannot be read by parts (wanted a binary .ply that begins with its Gaussians)", path);
+                         "%s: cannot be read by parts (wanted a binary .ply that begins with its Gaussians)",
+                         path);
     GBT_TRY(find_columns(&head, header, vertex, out->columns, &out->rest_count, err));
     out->row_bytes = ply_row_bytes(header, vertex);
     const uint64_t rows = header->elements[vertex].count;
     if (rows > (out->file.size - header->data_at) / out->row_bytes)
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu Gaussians cannot be in the %llu bytes that follow", path,
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s@%zu: %llu Gaussians cannot be in the %llu bytes that follow", path,
                          header->data_at, (unsigned long long)rows,
                          (unsigned long long)(out->file.size - header->data_at));
     out->count = (size_t)rows;
     out->sh_degree = degree_of(out->rest_count);
-    out->antialiased = says(&head, header, "\n" GAUSSIAN_PLY_MIP) || says(&head, header, "\ncomment antialiased 1");
+    out->antialiased =
+        says(&head, header, "\n" GAUSSIAN_PLY_MIP) || says(&head, header, "\ncomment antialiased 1");
     out->near = near_of(&head, header);
     return GBT_OK;
 }
@@ -239,12 +242,12 @@ static void add_part_row(void *context, const double *values)
     part->number++;
 }
 
-gbt_status gaussian_ply_part(const gaussian_ply_parts *parts, size_t first, size_t count, unsigned char *bytes,
-                             gaussian_cloud *out, uint32_t *kept, gbt_error *err)
+gbt_status gaussian_ply_part(const gaussian_ply_parts *parts, size_t first, size_t count,
+                             unsigned char *bytes, gaussian_cloud *out, uint32_t *kept, gbt_error *err)
 {
     const size_t size = count * parts->row_bytes;
-    GBT_TRY(large_file_read(&parts->file, parts->header.data_at + (uint64_t)first * parts->row_bytes, bytes, size,
-                            err));
+    GBT_TRY(large_file_read(&parts->file, parts->header.data_at + (uint64_t)first * parts->row_bytes, bytes,
+                            size, err));
     /* These rows as a file of their own. */
     ply_header header = parts->header;
     header.element_count = 1;
@@ -254,8 +257,8 @@ gbt_status gaussian_ply_part(const gaussian_ply_parts *parts, size_t first, size
     part_rows part = {.rows = {out, parts->rest_count}, .kept = kept};
     out->count = 0;
     out->sh_degree = parts->sh_degree;
-    return ply_read_rows(&file, &header, 0, parts->columns, FIXED_COLUMNS + parts->rest_count, add_part_row, &part,
-                         err);
+    return ply_read_rows(&file, &header, 0, parts->columns, FIXED_COLUMNS + parts->rest_count, add_part_row,
+                         &part, err);
 }
 
 void gaussian_ply_close(gaussian_ply_parts *parts)

@@ -73,8 +73,8 @@ gbt_status gaussian_ply_open(const char *path, gaussian_ply_parts *out, gbt_erro
  * @param kept  [out]    [count] number of the row of each Gaussian in `out`, from `first`
  * Threads: any, with distinct arrays.
  */
-gbt_status gaussian_ply_part(const gaussian_ply_parts *parts, size_t first, size_t count, unsigned char *bytes,
-                             gaussian_cloud *out, uint32_t *kept, gbt_error *err);
+gbt_status gaussian_ply_part(const gaussian_ply_parts *parts, size_t first, size_t count,
+                             unsigned char *bytes, gaussian_cloud *out, uint32_t *kept, gbt_error *err);
 
 void gaussian_ply_close(gaussian_ply_parts *parts);
 

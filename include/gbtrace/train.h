@@ -65,7 +65,8 @@ typedef struct gbt_train_def {
     bool find_exposure;  /* turn `exposure` on where the photos' exposures differ by a quarter of a stop or
                             more.  Not with compat */
     bool refine_poses;   /* learn the poses of the training photos, too, from where the data set has them;
-                            held-out photos are then scored from the poses at which the scene fits them best */
+                            held-out photos are then scored from the poses at which the scene fits them
+                            best */
     double splats_until; /* splats stand for rays until this part of the run: their steps are quicker. Pinhole
                             photos, GBT_RENDERER_TRACE, not with compat */
     double grow_until;   /* anchors grow and are pruned until this part of the run */

@@ -73,10 +73,12 @@ std::string reason_of(const OIIO::ImageInput *input)
     return first_line(own.empty() ? global : own);
 }
 
-/* libpng and libjpeg say in words that they had no memory. */
+/* libpng and libjpeg say in words that they had no memory; the last are those for a list that could not grow.
+ */
 gbt_status status_of(const std::string &reason, gbt_status otherwise)
 {
-    for (const char *words : {"insufficient memory", "out of memory", "could not create png"})
+    for (const char *words :
+         {"insufficient memory", "out of memory", "could not create png", "too many text chunks"})
         if (OIIO::Strutil::icontains(reason, words))
             return GBT_ERR_NO_MEMORY;
     return otherwise;

@@ -169,20 +169,38 @@ typedef struct list_reduction {
     float *weight;
 } list_reduction;
 
-/* Gaussians [begin, end), whose records are those of a block. */
+/* The sums of Gaussian `begin` and those after it over all faces, in their order. */
+static void add_faces(const list_reduction *job, size_t block, size_t begin, gradient_record *sum, bool *seen)
+{
+    const list_view *view = job->view;
+    gradient_record of_face[VIEW_GRAIN];
+    for (int f = 0; f < view->face_count; f++) {
+        const view_kept *kept = &view->kept[(size_t)f * view->block_count + block];
+        job->kernel->turn_sums(job->scene, view, &view->face[f], kept->first, kept->first + kept->records,
+                               of_face);
+        for (size_t k = 0; k < kept->records; k++) {
+            const size_t i = of_face[k].id - begin;
+            if (!(of_face[k].sum[GRADIENT_WEIGHT] > 0))
+                continue;
+            if (!seen[i])
+                sum[i] = of_face[k];
+            else
+                for (int j = 0; j < GRADIENT_FLOATS; j++)
+                    sum[i].sum[j] += of_face[k].sum[j];
+            seen[i] = true;
+        }
+    }
+}
+
 static void reduce_view_block(size_t block, size_t begin, size_t end, void *context)
 {
     const list_reduction *job = context;
-    const size_t kept = job->view->kept[block].records;
     gradient_record sum[VIEW_GRAIN];
-    job->kernel->turn_sums(job->scene, job->view, begin, begin + kept, sum);
-    size_t next = 0;
-    for (size_t i = begin; i < end; i++) {
-        const bool listed = next < kept && sum[next].id == i,
-                   seen = listed && sum[next].sum[GRADIENT_WEIGHT] > 0;
-        write_gradient(job->g, job->scene->records, i, seen ? sum[next].sum : NULL, job->out, job->weight);
-        next += listed;
-    }
+    bool seen[VIEW_GRAIN] = {false};
+    add_faces(job, block, begin, sum, seen);
+    for (size_t i = begin; i < end; i++)
+        write_gradient(job->g, job->scene->records, i, seen[i - begin] ? sum[i - begin].sum : NULL, job->out,
+                       job->weight);
 }
 
 gbt_status gradients_reduce_view(const list_kernel *kernel, const kernel_scene *scene, const list_view *view,

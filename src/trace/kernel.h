@@ -143,8 +143,9 @@ typedef struct kernel_scratch {
 /* The rays of a tile of pixels. */
 typedef struct tile_rays {
     packet_rays packet[TILE_PACKETS];
-    bool common_origin; /* all of them start at one point */
-    bool parts;         /* each sees a part of its way alone */
+    bool common_origin;               /* all of them start at one point */
+    bool parts;                       /* each sees a part of its way alone */
+    uint16_t elsewhere[TILE_PACKETS]; /* bit per lane: its pixel is another face's (list_view.h) */
 } tile_rays;
 
 /** Trace a tile. `tape` is NULL when no adjoint will follow. False when memory ran out. */

@@ -34,10 +34,10 @@ typedef struct tile_list {
 typedef struct list_rays {
     _Alignas(64) float a[PACKET_LANES], b[PACKET_LANES], length[PACKET_LANES];
     slope_box box;      /* of the active ones, and a little more */
-    slope_box view_box; /* the same in the axes of the view */
+    slope_box view_box; /* the same in the axes of the face */
 } list_rays;
 
-/* Slopes of a packet's rays in the axes of the view, from (middle_a, middle_b): in double from the rays' own
+/* Slopes of a packet's rays in the axes of the face, from (middle_a, middle_b): in double from the rays' own
    directions. */
 static inline void slope_rays(const view_frame *frame, const packet_rays *rays, const double middle[2],
                               list_rays *out)
@@ -237,12 +237,12 @@ static inline void place_shape(const list_memory *m, size_t from, size_t i)
     list->shape[SHAPE_DOWN][i] = -c[0] * c[1] / (c[1] * c[1] + c[2] * c[2]);
 }
 
-/* The list of tile `tile`, in order. False when memory ran out. */
-static bool load_list(const kernel_scene *scene, const list_view *view, size_t tile, const double middle[2],
+/* The list of a part of a tile, in order. False when memory ran out. */
+static bool load_list(const kernel_scene *scene, const list_view *view, size_t part, const double middle[2],
                       list_scratch *scratch, tile_list *out)
 {
-    const size_t begin = view->first[tile], count = view->first[tile + 1] - begin;
-    const slope_box *box = &view->tiles[tile];
+    const size_t begin = view->first[part], count = view->first[part + 1] - begin;
+    const slope_box *box = &view->boxes[part];
     list_memory m;
     if (!reserve_list(scratch, count, &m))
         return false;
@@ -271,7 +271,7 @@ static bool load_list(const kernel_scene *scene, const list_view *view, size_t t
     for (size_t i = 0; i < count; i++)
         if (m.unsorted[i].pair & ROW_GENERAL) {
             m.list.any_general = true;
-            depth_of_ellipsoid(scene, &view->frame, middle, &m, i);
+            depth_of_ellipsoid(scene, part_frame(view, part), middle, &m, i);
         }
     const uint64_t *order = sort_list(m.key, count, m.order, m.spare);
     memset(m.list.general, 0, n / 16 * sizeof *m.list.general);

@@ -16,10 +16,10 @@ typedef struct used_list {
     size_t count;
 } used_list;
 
-static bool load_used(const kernel_scene *scene, const list_view *view, size_t tile, const double middle[2],
+static bool load_used(const kernel_scene *scene, const list_view *view, size_t part, const double middle[2],
                       const hit_tape *tape, list_scratch *scratch, used_list *out)
 {
-    const size_t begin = view->first[tile], count = view->first[tile + 1] - begin;
+    const size_t begin = view->first[part], count = view->first[part + 1] - begin;
     if (mem_reserve((void **)&scratch->list, &scratch->list_capacity, 0, 18 * count + 1, sizeof(float),
                     "list of a tile", NULL) != GBT_OK ||
         mem_reserve((void **)&scratch->sums, &scratch->sum_capacity, 0, count, sizeof *scratch->sums,
@@ -299,16 +299,16 @@ static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, 
     return true;
 }
 
-static bool backward_list(const kernel_scene *scene, list_view *view, size_t tile, const tile_rays *rays,
+static bool backward_list(const kernel_scene *scene, list_view *view, size_t part, const tile_rays *rays,
                           float d_rgb[TILE_PACKETS][3][PACKET_LANES], const hit_tape *tape,
                           float d_background[3], list_scratch *scratch)
 {
-    const size_t begin = view->first[tile], pairs = view->first[tile + 1] - begin;
+    const size_t begin = view->first[part], pairs = view->first[part + 1] - begin;
     double middle[2];
     used_list used;
     list_rows rows;
-    tile_middle(&view->tiles[tile], middle);
-    if (!load_used(scene, view, tile, middle, tape, scratch, &used) ||
+    tile_middle(&view->boxes[part], middle);
+    if (!load_used(scene, view, part, middle, tape, scratch, &used) ||
         !reserve_rows_of_list(scratch, used.count, true, &rows))
         return false;
     size_t at = 0;
@@ -322,7 +322,7 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t til
             continue;
         while (at < tape->count && tape->entries[at].packet == p)
             at++;
-        slope_rays(&view->frame, &rays->packet[p], middle, &seen);
+        slope_rays(part_frame(view, part), &rays->packet[p], middle, &seen);
         if (!adjoint_of_packet(scene, &used, &rays->packet[p], &seen, tape->entries + from, at - from,
                                d_rgb[p], total, &rows, scratch))
             return false;
@@ -358,9 +358,9 @@ static inline void gather_slots(const list_view *view, size_t first, size_t end,
     }
 }
 
-/* From the turned axes of the view to the Gaussians' own. */
-static void turn_sums(const kernel_scene *scene, const list_view *view, size_t begin, size_t end,
-                      gradient_record *out)
+/* From the turned axes of a face to the Gaussians' own. */
+static void turn_sums(const kernel_scene *scene, const list_view *view, const view_face *face, size_t begin,
+                      size_t end, gradient_record *out)
 {
     static const int at[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}}; /* in xx yy zz yz zx xy */
     for (size_t first = begin; first < end; first += 16) {
@@ -380,7 +380,7 @@ static void turn_sums(const kernel_scene *scene, const list_view *view, size_t b
             slope[2][i] = r->depth;
         }
         const gaussian_lanes g = load_gaussians(scene, id, NULL);
-        view_form_find(view->frame.axis, &g, vfloat16_load(slope[0]), vfloat16_load(slope[1]),
+        view_form_find(face->frame.axis, &g, vfloat16_load(slope[0]), vfloat16_load(slope[1]),
                        vfloat16_load(slope[2]), &form);
         vfloat16_load_turned(rows, sum);
         const vfloat16 zero = vfloat16_set1(0), R = form.distance, RR = vfloat16_mul(R, R);

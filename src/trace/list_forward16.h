@@ -165,15 +165,15 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     return true;
 }
 
-static bool forward_list(const kernel_scene *scene, const list_view *view, size_t tile, const tile_rays *rays,
+static bool forward_list(const kernel_scene *scene, const list_view *view, size_t part, const tile_rays *rays,
                          packet_output out[TILE_PACKETS], hit_tape *tape, list_scratch *scratch,
                          kernel_counters *counters)
 {
     double middle[2];
     tile_list list;
     list_rows rows;
-    tile_middle(&view->tiles[tile], middle);
-    if (!load_list(scene, view, tile, middle, scratch, &list) ||
+    tile_middle(&view->boxes[part], middle);
+    if (!load_list(scene, view, part, middle, scratch, &list) ||
         !reserve_rows_of_list(scratch, list.count, false, &rows))
         return false;
     counters->candidates += (uint64_t)list.count;
@@ -183,7 +183,7 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
         if (packet->active == 0)
             continue;
         counters->rays += (uint64_t)__builtin_popcount(packet->active);
-        slope_rays(&view->frame, packet, middle, &seen);
+        slope_rays(part_frame(view, part), packet, middle, &seen);
         gather_rows(scene, &list, packet, rays->parts, &seen, &rows, counters);
         order_by_middle(&list, scene->settings.t_near, &rows);
         insert_rows(&rows);

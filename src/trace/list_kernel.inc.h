@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* trace/list_kernel.inc.h -- rays from one point, tile by tile over lists. Compiled once per instruction set.
 
-     Gaussians --> records in the view's axes (view_records16.h) --> lists of the tiles (view_lists.c)
-     list of a tile, in the order of depth (list16.h)
+     Gaussians --> records in a face's axes (view_records16.h) --> parts that each may be hit in
+         (list_parts16.h) --> lists of the parts (view_lists.c)
+     list of a part, in the order of depth (list16.h)
          --> every packet: the rows that reach into it, evaluated, put in each ray's order (list_rows16.h),
              blended (list_forward16.h)
          --> back: list_adjoint16.h
@@ -11,5 +12,7 @@
 
 #include "trace/list_adjoint16.h"
 #include "trace/list_forward16.h"
+#include "trace/list_parts16.h"
 
-const list_kernel KERNEL_NAME = {make_records, forward_list, backward_list, turn_sums};
+const list_kernel KERNEL_NAME = {find_reached, make_records,  find_parts,
+                                 forward_list, backward_list, turn_sums};

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/list_view.h -- one view of Gaussians from the point where all its rays start: records in the view's
-   axes, and the list of each tile. What view_lists.c makes and the list kernels read.
+/* trace/list_view.h -- one view of Gaussians from the point where all its rays start: records in the axes of
+   its faces, and the list of each tile. What view_faces.c and view_lists.c make and the list kernels read.
 
-   In the axes u, v, w of the view a ray is s (a, b, 1): a and b are its slopes. */
+   In the axes u, v, w of a face a ray is s (a, b, 1): a and b are its slopes. Rays that look into one half
+   space have one face; others the six of a cube. */
 #ifndef GBT_TRACE_LIST_VIEW_H
 #define GBT_TRACE_LIST_VIEW_H
 
@@ -15,7 +16,10 @@
 #include "base/gaussians.h"
 #include "trace/kernel.h"
 
-enum { VIEW_GRAIN = 2048 /* Gaussians whose records are made together; a multiple of 16 */ };
+enum {
+    VIEW_GRAIN = 2048, /* Gaussians whose records are made together; a multiple of 16 */
+    VIEW_FACES = 6
+};
 
 /* x = x_u u + x_v v + x_w w with x_u = dual[0] . x and so on: exact for axes that are at right angles only to
    float rounding. */
@@ -30,7 +34,30 @@ typedef struct slope_box {
     float low[2], high[2]; /* a, b */
 } slope_box;
 
-/* A Gaussian on the rays of the view (view_form16.h has the formulas). */
+/* Rays of a tile of pixels that one face sees. */
+typedef struct view_part {
+    uint32_t tile;
+    uint8_t face;
+    bool whole; /* all of the tile's rays */
+    bool first; /* of the tile: pixels without a ray are its */
+    bool sees;  /* of some ray a part of its way is left (ray_image.near); else no Gaussian is listed */
+} view_part;
+
+/* Slopes of sixteen parts, or of sixteen such boxes: lowest a, highest a, lowest b, highest b. */
+typedef struct part_boxes {
+    _Alignas(64) float edge[4][16];
+} part_boxes;
+
+/* One face and its parts, which stand together. */
+typedef struct view_face {
+    view_frame frame;
+    slope_box bounds; /* of all its parts */
+    size_t first_part, part_count;
+    size_t first_boxes, first_group; /* of its boxes; of the boxes around sixteen of those */
+    size_t boxes, groups;            /* how many */
+} view_face;
+
+/* A Gaussian on the rays of a face (view_form16.h has the formulas). */
 typedef struct view_record {
     double a, b; /* slopes of the mean */
     float q[5], depth, falloff, opacity, color[3];
@@ -49,7 +76,7 @@ typedef struct view_outline {
 } view_outline;
 
 /* In place of the outline of a Gaussian that the form does not hold for, because it reaches behind the near
-   depth or is as large as it is far: centre and covariance of its ellipsoid in the view's axes. */
+   depth or is as large as it is far: centre and covariance of its ellipsoid in the face's axes. */
 typedef struct view_ellipsoid {
     float center[3], uu, vv, ww, uw, vw;
 } view_ellipsoid;
@@ -75,26 +102,66 @@ typedef struct gradient_slot {
     _Alignas(64) float sum[16];
 } gradient_slot;
 
+/* The records that one face has of a block of VIEW_GRAIN Gaussians. */
 typedef struct view_kept {
+    size_t first;
     uint32_t records, general; /* general: those of them whose shapes are ellipsoids */
-    uint32_t rejected;         /* Gaussians with non-finite fields */
+    uint32_t rejected;         /* Gaussians with non-finite fields; the first face counts them */
 } view_kept;
 
 typedef struct list_view {
-    view_frame frame;
-    int tiles_across, tiles_down;
-    slope_box *tiles;     /* of each tile's rays */
-    view_record *records; /* those of block i of VIEW_GRAIN Gaussians begin at i * VIEW_GRAIN */
+    view_face face[VIEW_FACES];
+    int face_count;   /* 1 or VIEW_FACES */
+    view_part *parts; /* face by face, in the order of the tiles; with one face, a part is a tile */
+    size_t part_count;
+    slope_box *boxes;   /* of each part's rays */
+    part_boxes *fine;   /* the same, face by face, */
+    part_boxes *group;  /* and boxes around sixteen of those */
+    size_t block_count; /* of Gaussians */
+    uint16_t *reached;  /* six faces: which of sixteen Gaussians may reach into one, [face][block] */
+    view_kept *kept;    /* [face][block] */
+    view_record *records;
     view_shape *shapes;   /* as many, and one more: shapes are read two at a time */
-    view_kept *kept;      /* records of each block */
     uint32_t *slot_first; /* [records] */
     uint32_t *slot_count;
-    list_pair *pairs; /* tile by tile, by index of the Gaussian */
-    size_t *first;    /* [tiles + 1] */
-    size_t pair_count, block_count;
+    list_pair *pairs; /* part by part, by index of the Gaussian */
+    size_t *first;    /* [parts + 1] */
+    size_t pair_count;
     gradient_slot *slots; /* [pairs] after an adjoint */
     uint8_t *slot_used;   /* [pairs]; the others are not set */
 } list_view;
+
+static inline const view_frame *part_frame(const list_view *view, size_t part)
+{
+    return &view->face[view->parts[part].face].frame;
+}
+
+/* x . axis of the first face's three. */
+static inline void face_components(const view_frame *frame, const float d[3], float out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = (float)frame->dual[k][0] * d[0] + (float)frame->dual[k][1] * d[1] +
+                 (float)frame->dual[k][2] * d[2];
+}
+
+/* The face of six that a ray belongs to: that of its largest component. Faces look along w, -w, u, -u, v,
+   -v. */
+static inline int face_of(const float component[3])
+{
+    const float u = fabsf(component[0]), v = fabsf(component[1]), w = fabsf(component[2]);
+    const int axis = w >= u && w >= v ? 2 : u >= v ? 0 : 1;
+    return (axis + 1) % 3 * 2 + (component[axis] < 0);
+}
+
+/* Whether a ray of the part's tile is one of the part. */
+static inline bool part_has_ray(const list_view *view, const view_part *part, const float d[3])
+{
+    float component[3];
+    if (part->whole)
+        return true;
+    face_components(&view->face[0].frame, d, component);
+    return face_of(component) == part->face;
+}
 
 /* May a ray of these slopes meet the ellipsoid? By its tangent planes. */
 static inline bool ellipsoid_meets_box(const view_ellipsoid *e, const slope_box *box)
@@ -138,22 +205,27 @@ static inline void list_scratch_free(list_scratch *s)
 }
 
 typedef struct list_kernel {
-    /** Write the records of the Gaussians [begin, end) that can be seen through `bounds`, in their order.
-        begin is a multiple of 16. */
-    view_kept (*make_records)(const kernel_scene *scene, const gaussians *g, const view_frame *frame,
-                              const slope_box *bounds, size_t begin, size_t end, view_record *records,
+    /** Set view->reached of the Gaussians of a block. */
+    void (*find_reached)(const kernel_scene *scene, const gaussians *g, list_view *view, size_t block);
+    /** Write the records of those Gaussians of a block that can be seen through the bounds of a face, in
+       their order. `reached`: bits of those that come into question, a word for sixteen; NULL: all. */
+    view_kept (*make_records)(const kernel_scene *scene, const gaussians *g, const view_face *face,
+                              size_t block, const uint16_t *reached, view_record *records,
                               view_shape *shapes);
-    /** Trace a tile of the view, as tile_forward_fn. */
-    bool (*forward)(const kernel_scene *scene, const list_view *view, size_t tile, const tile_rays *rays,
+    /** The parts of a face that a record may be hit in, in their order; returned is how many. There is room
+        for sixteen more than the face has. */
+    size_t (*find_parts)(const list_view *view, const view_face *face, size_t record, uint32_t *parts);
+    /** Trace a part of the view, as tile_forward_fn. */
+    bool (*forward)(const kernel_scene *scene, const list_view *view, size_t part, const tile_rays *rays,
                     packet_output out[TILE_PACKETS], hit_tape *tape, list_scratch *scratch,
                     kernel_counters *counters);
-    /** Its adjoint, into the slots of the tile's pairs. */
-    bool (*backward)(const kernel_scene *scene, list_view *view, size_t tile, const tile_rays *rays,
+    /** Its adjoint, into the slots of the part's pairs. */
+    bool (*backward)(const kernel_scene *scene, list_view *view, size_t part, const tile_rays *rays,
                      float d_rgb[TILE_PACKETS][3][PACKET_LANES], const hit_tape *tape, float d_background[3],
                      list_scratch *scratch);
-    /** Sums of the records [begin, end) over their slots, turned into the Gaussians' own axes. */
-    void (*turn_sums)(const kernel_scene *scene, const list_view *view, size_t begin, size_t end,
-                      gradient_record *out);
+    /** Sums of the records [begin, end) of a face over their slots, turned into the Gaussians' own axes. */
+    void (*turn_sums)(const kernel_scene *scene, const list_view *view, const view_face *face, size_t begin,
+                      size_t end, gradient_record *out);
 } list_kernel;
 
 CPU_DECLARE_VARIANTS(list_kernel, list_kernel);

@@ -17,7 +17,7 @@
 
 enum { TILE_PIXELS = TILE_ACROSS * PACKET_PIXELS, RECORD_BLOCK = 2048 };
 
-typedef struct trace_tile {
+typedef struct trace_tile { /* or the part of one that a face of a view sees */
     hit_tape tape;
     bool tape_dropped; /* it did not fit in the memory allowed: backward traces the tile again */
     gradient_list gradients;
@@ -241,8 +241,23 @@ static void repeat_active(packet_rays *p, bool parts)
     }
 }
 
-/* Rays of the tile whose first pixel is (x0, y0); lanes outside the image or without a ray are not active. */
-static void load_tile(const ray_image *rays, const trace_settings *s, int x0, int y0, tile_rays *out)
+/* Leave to a part of a tile what is its own. */
+static void keep_part(const list_view *view, const view_part *part, packet_rays *p, uint16_t *elsewhere)
+{
+    unsigned own = part->first ? ~p->active : 0;
+    for (int lane = 0; lane < PACKET_LANES; lane++) {
+        const float d[3] = {p->dir[0][lane], p->dir[1][lane], p->dir[2][lane]};
+        if (p->active >> lane & 1 && part_has_ray(view, part, d))
+            own |= 1u << lane;
+    }
+    *elsewhere = (uint16_t)~own;
+    p->active &= own;
+}
+
+/* Rays of the tile whose first pixel is (x0, y0), or of a part of it (NULL: all); lanes outside the image or
+   without a ray are not active. */
+static void load_tile(const ray_image *rays, const trace_settings *s, int x0, int y0, const list_view *view,
+                      const view_part *part, tile_rays *out)
 {
     out->common_origin = rays->common_origin;
     out->parts = rays->near != NULL;
@@ -257,6 +272,9 @@ static void load_tile(const ray_image *rays, const trace_settings *s, int x0, in
             for (int lane = 0; lane < PACKET_LANES; lane++)
                 if (lane_pixel(rays, x0, y0, packet, lane, &at))
                     load_ray(rays, at, lane, p);
+        out->elsewhere[packet] = 0;
+        if (part != NULL && !part->whole)
+            keep_part(view, part, p, &out->elsewhere[packet]);
         if (p->active != 0 && p->active != (1u << PACKET_LANES) - 1)
             repeat_active(p, out->parts);
         if (p->active != 0)
@@ -336,7 +354,7 @@ static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x
         }
         for (int lane = 0; lane < PACKET_LANES; lane++) {
             size_t at;
-            if (lane_pixel(p->rays, x0, y0, packet, lane, &at))
+            if (lane_pixel(p->rays, x0, y0, packet, lane, &at) && !(rays->elsewhere[packet] >> lane & 1))
                 store_pixel(p, at, rays->packet[packet].active >> lane & 1 ? &out[packet] : NULL, lane);
         }
     }
@@ -377,7 +395,7 @@ static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int 
         memset(d_rgb[packet], 0, sizeof d_rgb[packet]);
         for (int lane = 0; lane < PACKET_LANES; lane++) {
             size_t at;
-            if (!lane_pixel(p->rays, x0, y0, packet, lane, &at))
+            if (!lane_pixel(p->rays, x0, y0, packet, lane, &at) || rays->elsewhere[packet] >> lane & 1)
                 continue;
             const float *d = p->d_rgb->pixels + 3 * at;
             for (int c = 0; c < 3; c++)
@@ -412,8 +430,11 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     pass *p = context;
     trace_tile *tile = &p->scene->tiles[index];
     tile_rays rays;
-    const int x0 = (int)(index % (size_t)p->tiles_across) * TILE_PIXELS,
-              y0 = (int)(index / (size_t)p->tiles_across) * TILE_PIXELS;
+    const list_view *view = &p->scene->lists.view;
+    const view_part *part = p->list != NULL ? &view->parts[index] : NULL;
+    const size_t number = part != NULL ? part->tile : index;
+    const int x0 = (int)(number % (size_t)p->tiles_across) * TILE_PIXELS,
+              y0 = (int)(number / (size_t)p->tiles_across) * TILE_PIXELS;
     if (atomic_load_explicit(&p->failed, memory_order_relaxed) || is_stopped(p->scene))
         return;
     gradient_list_free(&tile->gradients);
@@ -422,7 +443,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
         empty_tape(p, &tile->tape);
         memset(&tile->counters, 0, sizeof tile->counters);
     }
-    load_tile(p->rays, &p->view.settings, x0, y0, &rays);
+    load_tile(p->rays, &p->view.settings, x0, y0, view, part, &rays);
     tile_scratch own = {{0}, {0}}, *place = scratch_take(p->scene->scratch),
                  *scratch = place != NULL ? place : &own;
     const bool fine = p->d_rgb == NULL ? forward_tile(p, tile, &rays, x0, y0, scratch)
@@ -439,8 +460,9 @@ static gbt_status run_pass(pass *p, gbt_error *err)
 {
     trace_scene *scene = p->scene;
     p->tiles_across = (p->rays->width + TILE_PIXELS - 1) / TILE_PIXELS;
-    const size_t count =
-        (size_t)p->tiles_across * (size_t)((p->rays->height + TILE_PIXELS - 1) / TILE_PIXELS);
+    const size_t tiles =
+                     (size_t)p->tiles_across * (size_t)((p->rays->height + TILE_PIXELS - 1) / TILE_PIXELS),
+                 count = scene->listed ? scene->lists.view.part_count : tiles;
     if (count > scene->tile_capacity) {
         const size_t old = scene->tile_capacity;
         GBT_TRY(mem_reserve((void **)&scene->tiles, &scene->tile_capacity, old, count, sizeof *scene->tiles,

@@ -22,7 +22,7 @@
 /** Which way rays go. All give the same picture to float rounding; the adjoint is the same for all. */
 typedef enum trace_kernel {
     TRACE_LIST,   /* the default: 16 x 16 pixels over a list of what they may see, where all rays start at one
-                     point and look into the same half space; other rays as TRACE_TILE */
+                     point; other rays as TRACE_TILE */
     TRACE_TILE,   /* 16 x 16 pixels share one way through the tree */
     TRACE_SINGLE, /* ray by ray: for rays that do not run together */
     TRACE_EMBREE  /* packets of 16 under Embree's own traversal: the baseline of every benchmark */
@@ -43,7 +43,7 @@ typedef struct trace_scene {
     float *records;
     size_t record_capacity;
     float reach;              /* largest |coordinate| of the ray origins announced to trace_build() */
-    struct trace_tile *tiles; /* internal: tape and gradient records of each tile */
+    struct trace_tile *tiles; /* internal: tape and gradient records of each tile or part */
     size_t tile_count, tile_capacity;
     int tape_width, tape_height;  /* rays of the forward pass that the tape holds; 0: none */
     gradient_order order;         /* internal */

@@ -12,19 +12,17 @@ typedef struct view_lists {
     list_view view;
     struct list_group *groups; /* internal, as all that follows */
     uint32_t *histogram;
-    uint16_t *lookup;
-    unsigned char *sees; /* [tiles] 0: no part of a ray in it is left */
-    size_t sees_capacity;
-    size_t tile_capacity, record_capacity, kept_capacity, pair_capacity, first_capacity, group_capacity,
-        histogram_capacity, lookup_capacity, slot_capacity, used_capacity;
+    uint8_t *faces; /* that see each tile, a bit for each */
+    size_t part_capacity, tile_capacity, fine_capacity, boxes_capacity, face_capacity, reached_capacity,
+        record_capacity, kept_capacity, pair_capacity, first_capacity, group_capacity, histogram_capacity,
+        slot_capacity, used_capacity;
 } view_lists;
 
 /**
  * Make the lists for `rays`.
  *
- * @param usable [out] false: these rays do not start at one point or run too far apart (beyond 72 degrees
- * from their middle), or too many Gaussians are near that point: there are no lists, and the tree has to be
- * walked
+ * @param usable [out] false: these rays do not start at one point, or too many Gaussians are near that point:
+ *                     there are no lists, and the tree has to be walked
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: uses all; the same lists for every thread count.
  */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/view_records16.h -- the records of a view, sixteen Gaussians at a time, and where each can be hit.
+/* trace/view_records16.h -- the records of a face of a view, sixteen Gaussians at a time, and where each can
+   be hit.
 
    With kappa = c / R^2, c the d2 where the response falls to alpha_min, a ray is hit where y <= lambda w1^2,
    lambda = kappa / (1 - kappa): an ellipse in (a, b) when all of the ellipsoid lies ahead. With p = q1 q4 -
@@ -152,15 +153,70 @@ static inline void find_ellipsoids(const gaussian_lanes *g, const view_frame *fr
         out[k] = vfloat16_add(out[k], slack);
 }
 
-static view_kept make_records(const kernel_scene *scene, const gaussians *g, const view_frame *frame,
-                              const slope_box *bounds, size_t begin, size_t end, view_record *records,
-                              view_shape *shapes)
+/* Bounding spheres of sixteen Gaussians against the planes of each face, a little opened for rounding. */
+static void find_reached(const kernel_scene *scene, const gaussians *g, list_view *view, size_t block)
 {
-    uint32_t count = 0, general = 0, rejected = 0;
-    const vfloat16 low[2] = {vfloat16_set1(bounds->low[0]), vfloat16_set1(bounds->low[1])},
-                   high[2] = {vfloat16_set1(bounds->high[0]), vfloat16_set1(bounds->high[1])};
+    const vfloat16 one = vfloat16_set1(1);
+    const size_t begin = block * VIEW_GRAIN,
+                 end = begin + VIEW_GRAIN < g->count ? begin + VIEW_GRAIN : g->count;
+    uint32_t rejected = 0;
     for (size_t first = begin; first < end; first += 16) {
         const unsigned visible = visible_lanes(scene, g, first, end, &rejected);
+        uint32_t id[16];
+        for (unsigned i = 0; i < 16; i++)
+            id[i] = (uint32_t)(first + i < end ? first + i : first);
+        const gaussian_lanes lanes = load_gaussians(scene, id, NULL);
+        vfloat16 thinnest = dot16(lanes.matrix, lanes.matrix), from[3], far = vfloat16_set1(0);
+        for (int k = 1; k < 3; k++)
+            thinnest = vfloat16_min(thinnest, dot16(lanes.matrix + 3 * k, lanes.matrix + 3 * k));
+        for (int k = 0; k < 3; k++) {
+            const float o = (float)view->face[0].frame.origin[k];
+            from[k] = vfloat16_sub(lanes.mean[k], vfloat16_set1(o));
+            far =
+                vfloat16_add(far, vfloat16_add(vfloat16_max(from[k], vfloat16_sub(vfloat16_set1(0), from[k])),
+                                               vfloat16_set1(fabsf(o))));
+        }
+        const vfloat16 cut = cut_squares(scene, g->opacity + first, visible),
+                       radius = vfloat16_fma(
+                           vfloat16_set1(1e-5f), far,
+                           vfloat16_mul(vfloat16_set1(1.001f), vfloat16_sqrt(vfloat16_div(cut, thinnest))));
+        for (int f = 0; f < view->face_count; f++) {
+            const view_face *face = &view->face[f];
+            const float(*axis)[3] = face->frame.axis;
+            const vfloat16 depth = dot_lanes(axis[2], from);
+            vmask16 out = vfloat16_lt(vfloat16_add(depth, radius), vfloat16_set1(0));
+            for (int k = 0; k < 2; k++) {
+                const vfloat16 low = vfloat16_set1(face->bounds.low[k]),
+                               high = vfloat16_set1(face->bounds.high[k]), x = dot_lanes(axis[k], from),
+                               low_length = vfloat16_sqrt(vfloat16_fma(low, low, one)),
+                               high_length = vfloat16_sqrt(vfloat16_fma(high, high, one));
+                out = vmask16_or(out, vfloat16_lt(vfloat16_mul(radius, low_length),
+                                                  vfloat16_fnma(x, one, vfloat16_mul(low, depth))));
+                out = vmask16_or(
+                    out, vfloat16_lt(vfloat16_mul(radius, high_length), vfloat16_fnma(high, depth, x)));
+            }
+            const unsigned bits = face->part_count > 0 ? visible & ~vmask16_bits(out) : 0;
+            const size_t entry = (size_t)f * view->block_count + block;
+            view->reached[entry * (VIEW_GRAIN / 16) + (first - begin) / 16] = (uint16_t)bits;
+            view->kept[entry].records += (uint32_t)__builtin_popcount(bits);
+        }
+    }
+    view->kept[block].rejected = rejected;
+}
+
+static view_kept make_records(const kernel_scene *scene, const gaussians *g, const view_face *face,
+                              size_t block, const uint16_t *reached, view_record *records, view_shape *shapes)
+{
+    uint32_t count = 0, general = 0, rejected = 0;
+    const view_frame *frame = &face->frame;
+    const slope_box *bounds = &face->bounds;
+    const vfloat16 low[2] = {vfloat16_set1(bounds->low[0]), vfloat16_set1(bounds->low[1])},
+                   high[2] = {vfloat16_set1(bounds->high[0]), vfloat16_set1(bounds->high[1])};
+    const size_t begin = block * VIEW_GRAIN,
+                 end = begin + VIEW_GRAIN < g->count ? begin + VIEW_GRAIN : g->count;
+    for (size_t first = begin; first < end; first += 16) {
+        const unsigned visible =
+            reached != NULL ? reached[(first - begin) / 16] : visible_lanes(scene, g, first, end, &rejected);
         if (visible == 0)
             continue;
         uint32_t id[16];
@@ -219,7 +275,7 @@ static view_kept make_records(const kernel_scene *scene, const gaussians *g, con
             count++;
         }
     }
-    return (view_kept){count, general, rejected};
+    return (view_kept){.records = count, .general = general, .rejected = rejected};
 }
 
 #endif

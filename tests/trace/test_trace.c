@@ -426,6 +426,46 @@ static void needles_one_by_one(void **state)
     }
 }
 
+/* Rays from one point into all directions go over the faces of a cube. Tiles as small as a face, tiles that
+   several faces share, the poles, and pixels without a ray. */
+static void faces_of_a_cube(void **state)
+{
+    (void)state;
+    const cloud_def def = {"", 400, 1, 0.05f, 0.5f, 1, 0.6f, {0, 0, 0}};
+    gaussians g = make_cloud(&def, 17);
+    const trace_settings s = with_background();
+    static const struct {
+        const char *name;
+        gbt_camera_model model;
+        int width, height;
+        double params[8];
+    } rows[] = {{"panorama, 1 tile", GBT_CAMERA_EQUIRECTANGULAR, 16, 8, {16, 8}},
+                {"panorama", GBT_CAMERA_EQUIRECTANGULAR, 100, 50, {100, 50}},
+                {"fisheye 180", GBT_CAMERA_FISHEYE, 48, 48, {15, 15, 24, 24}},
+                {"fisheye 330", GBT_CAMERA_FISHEYE, 48, 48, {8.3, 8.3, 24, 24}},
+                {"fisheye 360", GBT_CAMERA_FISHEYE, 32, 32, {4.5, 4.5, 16, 16}}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        gbt_camera camera =
+            camera_at((double[3]){0.1, 0.2, 0}, (double[3]){0.3, 0.1, 1}, rows[i].width, rows[i].height, 60);
+        camera.model = rows[i].model;
+        memcpy(camera.params, rows[i].params, sizeof rows[i].params);
+        ray_image rays = {0};
+        assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+        const figures f = compare(&g, &s, &rays, 130 + i, 1e-6);
+        assert_figures(rows[i].name, &f, 1e-5);
+        trace_scene scene = {.kernel = TRACE_LIST};
+        image rgb;
+        assert_ok(image_alloc(&rgb, rays.width, rays.height, 3, NULL));
+        assert_ok(trace_build(&scene, &g, &s, reach_of(&rays), NULL));
+        assert_ok(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = &rgb}, NULL, NULL));
+        assert_true(scene.listed && scene.lists.view.face_count == VIEW_FACES);
+        image_free(&rgb);
+        trace_scene_free(&scene);
+        ray_image_free(&rays);
+    }
+    gaussians_free(&g);
+}
+
 static void rays_that_do_not_run_together(void **state)
 {
     (void)state;
@@ -955,6 +995,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_scenes),
         cmocka_unit_test(needles_one_by_one),
+        cmocka_unit_test(faces_of_a_cube),
         cmocka_unit_test(rays_that_do_not_run_together),
         cmocka_unit_test(one_hundred_thousand_hits),
         cmocka_unit_test(coincident_gaussians),

@@ -79,6 +79,19 @@ static gbt_status check_range(const char *field, int value, int low, int high, g
     return GBT_OK;
 }
 
+typedef struct scene_lens {
+    gbt_camera_model model;
+    const char *option, *about;
+} scene_lens;
+
+static const scene_lens lenses[] = {
+    [GBT_MAKE_SCENE_PINHOLE] = {GBT_CAMERA_PINHOLE, "", "PINHOLE"},
+    [GBT_MAKE_SCENE_DISTORTED] = {GBT_CAMERA_OPENCV, " --lens distorted", "OPENCV with distortion"},
+    [GBT_MAKE_SCENE_FISHEYE] = {GBT_CAMERA_FISHEYE, " --lens fisheye", "FISHEYE"},
+    [GBT_MAKE_SCENE_PANORAMA] = {GBT_CAMERA_EQUIRECTANGULAR, " --lens panorama", "EQUIRECTANGULAR"},
+};
+enum { LENSES = sizeof lenses / sizeof *lenses };
+
 static gbt_status check_def(const gbt_make_scene_def *def, gbt_error *err)
 {
     GBT_TRY(check_range("width", def->width, 8, 8192, err));
@@ -87,21 +100,39 @@ static gbt_status check_def(const gbt_make_scene_def *def, gbt_error *err)
     GBT_TRY(check_range("points", def->points, 1, 10000000, err));
     GBT_TRY(check_range("gaussians", def->gaussians, 0, 1000000000, err));
     GBT_TRY(check_range("samples", def->samples, 1, 1024, err));
+    GBT_TRY(check_range("lens", (int)def->lens, 0, LENSES - 1, err));
     if (!(def->point_noise >= 0 && def->point_noise <= 0.1))
         return base_fail(err, GBT_ERR_ARGUMENT, "point_noise: %g (wanted 0 to 0.1)", def->point_noise);
     return GBT_OK;
 }
 
+static void set_lens(const recipe *r, const gbt_make_scene_def *def, gbt_camera *camera)
+{
+    const double width = def->width, height = def->height, focal = (double)r->focal_widths * width,
+                 bent = fmin(width, height) / 3.14159265358979323846; /* 180 degrees */
+    const double perspective[8] = {focal, focal, 0.5 * width, 0.5 * height, -0.10, 0.03, 0.0008, -0.0006},
+                 fisheye[4] = {bent, bent, 0.5 * width, 0.5 * height}, panorama[2] = {width, height};
+    camera->model = lenses[def->lens].model;
+    switch (def->lens) {
+    case GBT_MAKE_SCENE_PINHOLE:
+    case GBT_MAKE_SCENE_DISTORTED:
+        memcpy(camera->params, perspective,
+               (def->lens == GBT_MAKE_SCENE_DISTORTED ? 8 : 4) * sizeof *perspective);
+        break;
+    case GBT_MAKE_SCENE_FISHEYE:
+        memcpy(camera->params, fisheye, sizeof fisheye);
+        break;
+    case GBT_MAKE_SCENE_PANORAMA:
+        memcpy(camera->params, panorama, sizeof panorama);
+        break;
+    }
+}
+
 /** View number `view` of `def`: on one of the rings, looking at the target, both moved a little. */
 static gbt_camera place_camera(const recipe *r, const gbt_make_scene_def *def, int view)
 {
-    gbt_camera camera = {.model = def->distorted ? GBT_CAMERA_OPENCV : GBT_CAMERA_PINHOLE,
-                         .width = def->width,
-                         .height = def->height};
-    const double focal = (double)r->focal_widths * def->width;
-    const double params[8] = {focal, focal, 0.5 * def->width, 0.5 * def->height,
-                              -0.10, 0.03,  0.0008,           -0.0006};
-    memcpy(camera.params, params, (def->distorted ? 8 : 4) * sizeof *params);
+    gbt_camera camera = {.width = def->width, .height = def->height};
+    set_lens(r, def, &camera);
     /* Rings alternate, and skip once in eight views, so that a split that holds out every eighth view takes
        from both. */
     const recipe_ring *ring = &r->rings[(view + view / 8) % 2];
@@ -196,26 +227,25 @@ static gbt_status write_about(const recipe *r, const gbt_make_scene_def *def, co
     if (def->gaussians > 0)
         snprintf(gaussians, sizeof gaussians, " --gaussians %d", def->gaussians);
     GBT_TRY(file_join(path, sizeof path, folder, "SCENE.md", err));
-    const int length =
-        snprintf(text, sizeof text,
-                 "# %s\n\n%s\n\n"
-                 "Made by gbtrace; everything here is computed, nothing was photographed. The command that "
-                 "makes it again, bit for bit on the same kind of machine:\n\n"
-                 "    gbtrace make-scene %s -o DIR --width %d --height %d --views %d --points %d "
-                 "--point-noise %.9g --samples %d --seed %" PRIu64 "%s%s%s\n\n"
-                 "- `images/`: %d photos of %d x %d pixels, display-referred colours.\n"
-                 "- `sparse/0/`: cameras (%s, exact poses) and at most %d points in COLMAP's binary format. "
-                 "A point lies on a surface that at least\n"
-                 "  three views see, with noise of %.9g of its distance per axis; observations have 0.3 "
-                 "pixels of noise; 1 point in 100 is an outlier.\n"
-                 "%s",
-                 r->name, r->about, r->name, def->width, def->height, def->view_count, def->points,
-                 def->point_noise, def->samples, def->seed, def->depth ? " --depth" : "",
-                 def->distorted ? " --distorted" : "", gaussians, def->view_count, def->width, def->height,
-                 def->distorted ? "OPENCV with distortion" : "PINHOLE", def->points, def->point_noise,
-                 def->depth ? "- `depth/`: float EXR, distance along the ray through each pixel's centre to "
-                              "the first surface, scene units; 0 where there is none.\n"
-                            : "");
+    const int length = snprintf(
+        text, sizeof text,
+        "# %s\n\n%s\n\n"
+        "Made by gbtrace; everything here is computed, nothing was photographed. The command that "
+        "makes it again, bit for bit on the same kind of machine:\n\n"
+        "    gbtrace make-scene %s -o DIR --width %d --height %d --views %d --points %d "
+        "--point-noise %.9g --samples %d --seed %" PRIu64 "%s%s%s\n\n"
+        "- `images/`: %d photos of %d x %d pixels, display-referred colours.\n"
+        "- `sparse/0/`: cameras (%s, exact poses) and at most %d points in COLMAP's binary format. "
+        "A point lies on a surface that at least\n"
+        "  three views see, with noise of %.9g of its distance per axis; observations have 0.3 "
+        "pixels of noise; 1 point in 100 is an outlier.\n"
+        "%s",
+        r->name, r->about, r->name, def->width, def->height, def->view_count, def->points, def->point_noise,
+        def->samples, def->seed, def->depth ? " --depth" : "", lenses[def->lens].option, gaussians,
+        def->view_count, def->width, def->height, lenses[def->lens].about, def->points, def->point_noise,
+        def->depth ? "- `depth/`: float EXR, distance along the ray through each pixel's centre to "
+                     "the first surface, scene units; 0 where there is none.\n"
+                   : "");
     return file_write_atomic(path, text, (size_t)length, err);
 }
 

@@ -85,7 +85,7 @@ static bool sees(const search *q, size_t view, const double point[3], const floa
     if (q->sight > 0 && dvec_length(to_point) > (double)q->sight)
         return false;
     dmat_apply(camera->rotation, to_point, in_camera);
-    if (in_camera[2] <= 0 || !gbt_camera_project(camera, in_camera, pixel))
+    if (!gbt_camera_project(camera, in_camera, pixel))
         return false;
     if (!(pixel[0] >= 0 && pixel[0] < camera->width && pixel[1] >= 0 && pixel[1] < camera->height))
         return false;

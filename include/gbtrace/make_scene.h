@@ -11,6 +11,15 @@
 
 GBT_API_BEGIN
 
+typedef enum gbt_make_scene_lens {
+    GBT_MAKE_SCENE_PINHOLE,   /* PINHOLE, the default */
+    GBT_MAKE_SCENE_DISTORTED, /* OPENCV with moderate distortion */
+    GBT_MAKE_SCENE_FISHEYE,   /* FISHEYE, 180 degrees across the shorter side */
+    GBT_MAKE_SCENE_PANORAMA   /* EQUIRECTANGULAR, all around; the width should be twice the height */
+} gbt_make_scene_lens;
+/** Their names in the order of the enum, as options offer them. */
+#define GBT_MAKE_SCENE_LENS_NAMES "pinhole|distorted|fisheye|panorama"
+
 typedef struct gbt_make_scene_def {
     const char *name;   /* one of gbt_make_scene_names(). Default "tabletop". */
     int width, height;  /* photo size, pixels, [8, 8192]. Default 320 x 240. */
@@ -24,8 +33,8 @@ typedef struct gbt_make_scene_def {
     bool depth;         /* also write exact depth, depth/NNNN.exr. Default false. */
     int gaussians;      /* also write so many flat Gaussians on the surfaces, gaussians.ply, [0, 1000000000].
                            Default 0. */
-    bool distorted;     /* OPENCV cameras with moderate distortion, else PINHOLE. Default false. */
-    uint32_t cookie_;   /* set by gbt_make_scene_def_default() */
+    gbt_make_scene_lens lens; /* of all cameras. Default GBT_MAKE_SCENE_PINHOLE. */
+    uint32_t cookie_;         /* set by gbt_make_scene_def_default() */
 } gbt_make_scene_def;
 
 gbt_make_scene_def gbt_make_scene_def_default(void);

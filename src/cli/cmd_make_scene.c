@@ -82,10 +82,12 @@ static const option *options(int *count)
          .max = 1000000000,
          .value_name = "N",
          .help = "also write N plain Gaussians on the surfaces, gaussians.ply: for tests of large files"},
-        {.name = "distorted",
-         .kind = OPTION_FLAG,
-         .value = &def.distorted,
-         .help = "cameras with lens distortion"},
+        {.name = "lens",
+         .kind = OPTION_CHOICE,
+         .value = &def.lens,
+         .choices = GBT_MAKE_SCENE_LENS_NAMES,
+         .help = "of all cameras; fisheye: 180 degrees across the shorter side; panorama: twice as wide as "
+                 "high"},
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

@@ -9,7 +9,7 @@ work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
 "$program" make-scene tabletop -o made --width 64 --height 48 --views 6 --samples 2 --points 300 --quiet &&
-    "$program" make-scene tabletop -o bent --width 64 --height 48 --views 6 --samples 2 --points 300 --distorted --quiet &&
+    "$program" make-scene tabletop -o bent --width 64 --height 48 --views 6 --samples 2 --points 300 --lens distorted --quiet &&
     cp -r made masked && mkdir masked/masks && for photo in masked/images/*.png; do
         # a mask is any picture: bright parts of a photo of the scene count
         cp masked/images/0001.png "masked/masks/${photo##*/}"

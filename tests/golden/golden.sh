@@ -46,7 +46,7 @@ make() { # RECIPE NAME OPTIONS...
     rm -r photos
 }
 make tabletop plain
-make courtyard bent --distorted
+make courtyard bent --lens distorted
 # The same photos, said to be from another lens.
 cp -r plain fisheye
 { head -c 12 plain/sparse/0/cameras.bin && printf '\5\0\0\0' && tail -c +17 plain/sparse/0/cameras.bin | head -c 48 && head -c 32 /dev/zero; } >fisheye/sparse/0/cameras.bin

@@ -331,7 +331,7 @@ static void distorted_cameras_are_true(void **state)
 {
     (void)state;
     gbt_make_scene_def def = small_def("tabletop");
-    def.distorted = 1;
+    def.lens = GBT_MAKE_SCENE_DISTORTED;
     const char *folder = under_root("distorted");
     assert_ok(gbt_make_scene(&def, folder, NULL));
     check_written(folder, def.points, def.point_noise);
@@ -341,6 +341,39 @@ static void distorted_cameras_are_true(void **state)
     assert_int_equal(s.views[0].camera.model, GBT_CAMERA_OPENCV);
     assert_true(s.views[0].camera.params[4] != 0);
     scene_free(&s);
+}
+
+static void lenses_that_see_far_around(void **state)
+{
+    (void)state;
+    static const struct {
+        gbt_make_scene_lens lens;
+        gbt_camera_model model;
+    } rows[] = {{GBT_MAKE_SCENE_FISHEYE, GBT_CAMERA_FISHEYE},
+                {GBT_MAKE_SCENE_PANORAMA, GBT_CAMERA_EQUIRECTANGULAR}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        gbt_make_scene_def def = small_def("courtyard");
+        def.depth = 0;
+        def.samples = 1;
+        def.lens = rows[i].lens;
+        const char *folder = under_root(i == 0 ? "fisheye" : "panorama");
+        assert_ok(gbt_make_scene(&def, folder, NULL));
+        written w;
+        read_written(folder, &w);
+        assert_int_equal(w.s.views[0].camera.model, rows[i].model);
+        assert_int_equal(w.point_count, def.points);
+        size_t behind = 0;
+        for (size_t k = 0; k < w.observation_count; k++) {
+            double in_camera[3];
+            distance_to(&w.s.views[w.track[k][1]].camera, w.position[w.track[k][0]], in_camera);
+            behind += in_camera[2] < 0;
+        }
+        assert_true(behind > 10); /* corners of a fisheye see behind themselves, too */
+        free_written(&w);
+    }
+    gbt_make_scene_def def = small_def("courtyard");
+    def.lens = (gbt_make_scene_lens)9;
+    assert_int_equal(gbt_make_scene(&def, under_root("no lens"), NULL), GBT_ERR_ARGUMENT);
 }
 
 /* Without noise a point is on the surface: the exact depth along its first ray ends at it. With noise it is
@@ -585,6 +618,7 @@ int main(void)
         cmocka_unit_test(district_is_seen_in_parts),
         cmocka_unit_test(distorted_cameras_are_true),
         cmocka_unit_test(gaussians_lie_on_surfaces),
+        cmocka_unit_test(lenses_that_see_far_around),
         cmocka_unit_test(noise_is_what_was_asked),
         cmocka_unit_test(same_seed_same_bytes),
         cmocka_unit_test(missing_arguments_are_refused),

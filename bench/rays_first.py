@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# rays_first -- training by rays from the first step beside splats first, at equal time; and training on fisheyes and panoramas beside
+# pinholes.
+#
+#     python3 bench/rays_first.py PHOTOS -o DIR [--budget 42s] [--seeds 3] [--gbtrace build/release/gbtrace]
+#
+# PHOTOS holds the data sets plush, fox, castle and aerial; the courtyard is made by `gbtrace make-scene`, also as a fisheye of 180 degrees and
+# as a panorama, with as many pixels. Each run goes into DIR/NAME and is not repeated when it is there. Two tables go to stdout: per scene the
+# mean and the range over seeds of PSNR, SSIM and steps; per lens the same, and what a step cost. Let nothing else run meanwhile: 5 scenes, 2
+# ways, 3 seeds at 42 s take 25 minutes, the lenses 12.
+import argparse
+import json
+import os
+import subprocess
+import sys
+
+parser = argparse.ArgumentParser()
+parser.add_argument("photos")
+parser.add_argument("-o", "--output", required=True)
+parser.add_argument("--budget", default="42s")
+parser.add_argument("--seeds", type=int, default=3)
+parser.add_argument("--gbtrace", default="build/release/gbtrace")
+args = parser.parse_args()
+gbtrace = os.path.abspath(args.gbtrace)
+os.makedirs(args.output, exist_ok=True)
+
+
+def call(*words):
+    subprocess.run([gbtrace, *words], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=args.output)
+
+
+def make_scene(name, *words):
+    """The courtyard as photos; 76,800 pixels each, whatever the lens."""
+    if not os.path.exists(os.path.join(args.output, name, "SCENE.md")):
+        call("make-scene", "courtyard", "-o", name, "--views", "100", *words)
+    return name
+
+
+def load(run, file):
+    with open(os.path.join(args.output, run, file)) as text:
+        return json.load(text)
+
+
+def train(data, name, seed, *words):
+    """Scores of a run, and what is in its train.json."""
+    run = f"{name}_{args.budget}_{seed}"
+    if not os.path.exists(os.path.join(args.output, run, "metrics.json")):
+        print(run, file=sys.stderr)
+        call("train", data, "-o", run, "--budget", args.budget, "--seed", str(seed), "--overwrite", *words)
+    return load(run, "metrics.json"), load(run, "train.json")
+
+
+def cell(runs, value, form):
+    values = [value(m, t) for m, t in runs]
+    return f"{sum(values) / len(values):{form}} ({min(values):{form}} to {max(values):{form}})"
+
+
+def row(name, way, runs):
+    print(f"| {name} | {way} | {cell(runs, lambda m, t: m['psnr'], '.2f')} | {cell(runs, lambda m, t: m['ssim'], '.4f')} | "
+          f"{cell(runs, lambda m, t: t['iterations'], ',')} |", end="")
+
+
+seeds = range(1, args.seeds + 1)
+pinhole = make_scene("courtyard", "--width", "320", "--height", "240")
+scenes = {name: os.path.abspath(os.path.join(args.photos, name)) for name in ("plush", "fox", "castle", "aerial")}
+scenes["courtyard"] = pinhole
+print("| scene | training | PSNR | SSIM | steps |\n|---|---|---|---|---|")
+for scene, data in scenes.items():
+    large = ("--downscale", "1.33333") if scene != "courtyard" else ()
+    for way, words in (("rays from the first step", ("--splats-until", "0")), ("splats first", ())):
+        row(scene, way, [train(data, f"{scene}_{way.split()[0]}", seed, *large, *words) for seed in seeds])
+        print(flush=True)
+
+lenses = {"pinhole": pinhole,
+          "fisheye of 180 degrees": make_scene("courtyard_fisheye", "--lens", "fisheye", "--width", "277", "--height", "277"),
+          "panorama": make_scene("courtyard_panorama", "--lens", "panorama", "--width", "392", "--height", "196")}
+print("\n| lens | training | PSNR | SSIM | steps | build, trace and adjoint, ms a step |\n|---|---|---|---|---|---|")
+for lens, data in lenses.items():
+    runs = [train(data, f"{os.path.basename(data)}_rays", seed, "--splats-until", "0") for seed in seeds]
+    row(lens, "rays from the first step", runs)
+    print(" " + cell(runs, lambda m, t: sum(t["stage_ms_per_step"][s] for s in ("build", "trace", "adjoint")), ".1f") + " |", flush=True)

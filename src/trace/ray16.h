@@ -110,6 +110,85 @@ static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, u
     return true;
 }
 
+/* What nodes and leaves are tested with. */
+typedef struct ray_walk {
+    float origin[3], inverse[3]; /* 1 / direction, finite */
+    int enter[3], leave[3];      /* float offset of lower_* or upper_* in a tree_node */
+    float across[2][3];          /* two axes at right angles to the ray */
+    float square[3][6];          /* their products: uu vv uv */
+    float open;                  /* added to variances for what coordinates may be off */
+    float t_near;
+} ray_walk;
+
+static ray_walk make_walk(const kernel_scene *scene, const float origin[3], const float dir[3])
+{
+    ray_walk w = {.t_near = scene->settings.t_near};
+    int least = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        const float size = fabsf(dir[axis]), d = size > 1e-20f ? dir[axis] : 1e-20f;
+        w.origin[axis] = origin[axis];
+        w.inverse[axis] = 1 / d;
+        w.enter[axis] = 2 * axis * TREE_WIDTH + (d < 0 ? TREE_WIDTH : 0);
+        w.leave[axis] = 2 * axis * TREE_WIDTH + (d < 0 ? 0 : TREE_WIDTH);
+        least = size < fabsf(dir[least]) ? axis : least;
+    }
+    float *u = w.across[0], *v = w.across[1];
+    for (int axis = 0; axis < 3; axis++)
+        u[axis] = (axis == least ? 1.0f : 0.0f) - dir[least] * dir[axis];
+    const float inverse = 1 / sqrtf(dot3(u, u));
+    for (int axis = 0; axis < 3; axis++)
+        u[axis] *= inverse;
+    v[0] = dir[1] * u[2] - dir[2] * u[1];
+    v[1] = dir[2] * u[0] - dir[0] * u[2];
+    v[2] = dir[0] * u[1] - dir[1] * u[0];
+    axis_products(u, u, w.square[0]);
+    axis_products(v, v, w.square[1]);
+    axis_products(u, v, w.square[2]);
+    /* An ellipse and a disc of radius s around it lie within 1.001 times its covariance and 1001 s^2. */
+    const float slack = 0x1p-20f * scene->coordinate_max;
+    w.open = 1001 * slack * slack;
+    return w;
+}
+
+/* Which children the ray enters, and a lower bound of t_c inside each. */
+static inline unsigned walk_children(const ray_walk *w, const tree_node *node, float entry[TREE_WIDTH])
+{
+    const float *base = (const float *)node;
+    vfloat16 enter = vfloat16_set1(w->t_near), leave = vfloat16_set1(FLT_MAX);
+    for (int axis = 0; axis < 3; axis++) {
+        const vfloat16 o = vfloat16_set1(w->origin[axis]), inverse = vfloat16_set1(w->inverse[axis]);
+        enter =
+            vfloat16_max(enter, vfloat16_mul(vfloat16_sub(vfloat16_load(base + w->enter[axis]), o), inverse));
+        leave =
+            vfloat16_min(leave, vfloat16_mul(vfloat16_sub(vfloat16_load(base + w->leave[axis]), o), inverse));
+    }
+    vfloat16_store(entry, vfloat16_mul(enter, vfloat16_set1(0.999999f)));
+    return vmask16_bits(vfloat16_le(vfloat16_mul(enter, vfloat16_set1(0.999998f)), leave));
+}
+
+/* Which ellipsoids the ray's line meets: (x, y) is the line as seen from the centre, across the line. */
+static inline unsigned walk_leaf(const ray_walk *w, const tree_leaf *leaf)
+{
+    vfloat16 offset[3], s[6];
+    for (int axis = 0; axis < 3; axis++)
+        offset[axis] = vfloat16_sub(vfloat16_load(leaf->mean[axis]), vfloat16_set1(w->origin[axis]));
+    for (int k = 0; k < 6; k++)
+        s[k] = vfloat16_load(leaf->spread[k]);
+    const vfloat16 grow = vfloat16_set1(1.001f),
+                   slack = vfloat16_fma(vfloat16_set1(0x1p-18f), vfloat16_add(s[0], vfloat16_add(s[1], s[2])),
+                                        vfloat16_set1(w->open));
+    const vfloat16 x = dot_lanes(w->across[0], offset), y = dot_lanes(w->across[1], offset),
+                   xx = vfloat16_fma(grow, spread_dot(s, w->square[0]), slack),
+                   yy = vfloat16_fma(grow, spread_dot(s, w->square[1]), slack),
+                   xy = vfloat16_mul(grow, spread_dot(s, w->square[2]));
+    const vfloat16 cross = vfloat16_mul(vfloat16_mul(x, y), xy),
+                   form = vfloat16_fma(
+                       vfloat16_mul(x, x), yy,
+                       vfloat16_fma(vfloat16_mul(y, y), xx, vfloat16_mul(vfloat16_set1(-2), cross))),
+                   most = vfloat16_fnma(xy, xy, vfloat16_mul(xx, yy));
+    return vmask16_bits(vfloat16_lt(most, form)) ^ 0xFFFF; /* NaN: it may */
+}
+
 /* Evaluate `count` of the waiting Gaussians, at most sixteen, from the end. */
 static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes *ray, int count,
                         kernel_scratch *scratch, kernel_counters *counters)
@@ -139,7 +218,7 @@ static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes
     return true;
 }
 
-static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam *beam, const ray_lanes *ray,
+static bool gather_ray(ray_state *r, const kernel_scene *scene, const ray_walk *walk, const ray_lanes *ray,
                        unsigned packet, int lane, hit_tape *tape, kernel_scratch *scratch,
                        kernel_counters *counters)
 {
@@ -149,10 +228,8 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam 
         const tree_leaf *leaf = tree_child_leaf(child);
         counters->nodes++;
         if (leaf != NULL) {
-            ellipsoids16 e;
-            turn_ellipsoids(leaf, beam, &e);
-            for (unsigned bits = test_ellipsoids(&beam->whole, &e) & (0xFFFFu >> (TREE_WIDTH - leaf->count));
-                 bits != 0; bits &= bits - 1) {
+            for (unsigned bits = walk_leaf(walk, leaf) & (0xFFFFu >> (TREE_WIDTH - leaf->count)); bits != 0;
+                 bits &= bits - 1) {
                 const uint32_t id = leaf->id[__builtin_ctz(bits)];
                 __builtin_prefetch(scene->records + (size_t)id * RECORD_FLOATS);
                 r->waiting[r->waiting_count++] = id;
@@ -167,8 +244,7 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const tile_beam 
                             (size_t)heap_count + TREE_WIDTH, sizeof *scratch->heap, "nodes of a ray",
                             NULL) != GBT_OK)
                 return false;
-            for (unsigned bits = test_children(beam, node, scene->settings.t_near, entry); bits != 0;
-                 bits &= bits - 1)
+            for (unsigned bits = walk_children(walk, node, entry); bits != 0; bits &= bits - 1)
                 heap_push(scratch->heap, &heap_count, entry[__builtin_ctz(bits)],
                           node->child[__builtin_ctz(bits)]);
         }
@@ -190,20 +266,20 @@ static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, bool p
                       int lane, packet_output *out, hit_tape *tape, kernel_scratch *scratch,
                       kernel_counters *counters)
 {
-    packet_rays alone[TILE_PACKETS];
+    packet_rays alone;
     ray_state r = start_ray(rays, parts, lane, scratch);
-    tile_beam beam;
+    float origin[3];
     ray_lanes ray;
-    for (int p = 0; p < TILE_PACKETS; p++)
-        alone[p].active = p == 0;
-    for (int axis = 0; axis < 3; axis++)
+    for (int axis = 0; axis < 3; axis++) {
+        origin[axis] = rays->origin[axis][lane];
         for (int i = 0; i < PACKET_LANES; i++) {
-            alone[0].origin[axis][i] = rays->origin[axis][lane];
-            alone[0].dir[axis][i] = rays->dir[axis][lane];
+            alone.origin[axis][i] = origin[axis];
+            alone.dir[axis][i] = r.dir[axis];
         }
-    load_rays(&alone[0], &ray);
-    if (scene->root != NULL && make_beam(alone, scene, &beam) &&
-        !gather_ray(&r, scene, &beam, &ray, packet, lane, tape, scratch, counters))
+    }
+    load_rays(&alone, &ray);
+    const ray_walk walk = make_walk(scene, origin, r.dir);
+    if (scene->root != NULL && !gather_ray(&r, scene, &walk, &ray, packet, lane, tape, scratch, counters))
         return false;
     finish_ray(&r, rays, lane, out);
     return true;

@@ -117,8 +117,8 @@ typedef struct gbt_render_def {
     double orbit_height; /* path "orbit": height above that point, scene units; NaN: as the photos' cameras.
                             Default NaN */
     size_t memory;       /* bytes that the program may take, docs/memory.md: a .ply of plain Gaussians that is
-                            larger       is drawn cell by cell, by the tracer, without outputs and meshes. 0: no
-                            limit.       Default 0 */
+                            larger       is drawn cell by cell, by the tracer, without outputs and meshes. 0: no limit.
+                            Default 0 */
     uint32_t cookie_;    /* set by gbt_render_def_default() */
 } gbt_render_def;
 

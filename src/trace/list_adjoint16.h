@@ -161,10 +161,12 @@ static bool collect_behind_by_ray(list_rows *rows, const used_list *used, const 
 {
     _Alignas(64) float last[PACKET_LANES];
     vfloat16_store(last, background);
-    for (int i = 0; i < (int)rows->count; i++)
+    for (int i = 0; i < (int)rows->count; i++) {
         row_store(rows->term, i,
                   vfloat16_mul(vfloat16_mul(row_load(rows->through, i), row_load(rows->alpha, i)),
                                dot_lanes(used->row[rows->number[i]].color, d_rgb)));
+        row_store(rows->behind, i, vfloat16_set1(0)); /* rays without a hit in it read it, too */
+    }
     for (int lane = 0; lane < PACKET_LANES; lane++) {
         size_t count;
         const ray_hit *hits = sort_lane(rows, lane, scratch, &count);

@@ -79,12 +79,11 @@ static const gbt_train_setting settings[] = {
              "auto: "
              "white for Blender scenes, else black"},
     {NAMED("background", background), CHOICE(GBT_BACKGROUND_NAMES), .number = GBT_BACKGROUND_CONSTANT,
-     .saved = true,
-     .help = "behind everything: one colour, or colours by direction that are learned, for skies"},
+     .saved = true, .if_changed = true, .help = "one colour, or learned colours by direction"},
     {NAMED("seed", seed), RANGE(UINT64, 0, 0, "S"), .number = 0, .saved = true,
      .help = "of everything that is random"},
     {NAMED("max-anchors", max_anchors), RANGE(UINT64, 1, 1e8, "N"), .number = 2000000, .saved = true,
-     .help = "maximum number of anchors"},
+     .rare = true, .help = "maximum number of anchors"},
     {NAMED("grow", grow), FLAG, .rare = true, .number = 1, .saved = true,
      .help = "keep the initial anchors: no growing, no pruning"},
     {NAMED("threshold-factor", threshold_factor), RANGE(DOUBLE, 0.1, 10, "F"), .number = 1, .saved = true,
@@ -101,8 +100,8 @@ static const gbt_train_setting settings[] = {
      .help = "learn a colour matrix per photo, for photos that differ in exposure or white balance"},
     {NAMED("find-exposure", find_exposure), FLAG, .rare = true, .number = 1, .saved = true,
      .help = "do not turn exposure on where the photos' exposures differ"},
-    {NAMED("refine-poses", refine_poses), FLAG, .saved = true,
-     .help = "learn the photos' poses, too, where those of the data set are not exact"},
+    {NAMED("refine-poses", refine_poses), FLAG, .saved = true, .if_changed = true,
+     .help = "learn the photos' poses, too, where they are not exact"},
     {NAMED("splats-until", splats_until), RANGE(DOUBLE, 0, 1, "F"), .number = 0.7, .saved = true,
      .rare = true,
      .help =
@@ -130,10 +129,7 @@ static const gbt_train_setting settings[] = {
              "budget to that length in all, also when it was finished"},
     {NAMED("overwrite", overwrite), FLAG, .help = "train anew in a folder that holds a run, which is lost"},
     {NAMED("memory", memory), RANGE(BYTES, 0, 0x1p60, "BYTES"),
-     .help =
-         "memory to take at most, such as 4G: photos are read again, hits traced again, anchors and what is "
-         "kept "
-         "beside them paged from a file in RUN (docs/memory.md); does not change the result; 0: no limit"},
+     .help = "memory to take at most, such as 4G (docs/memory.md); does not change the result; 0: no limit"},
     {NAMED("hit-bytes-max", hit_bytes_max), RANGE(BYTES, 0, 0x1p60, "BYTES"), .rare = true, .number = 0x1p60,
      .help = "memory for ray hits kept for the backward pass, such as 100M; hits beyond it are traced again; "
              "does not change the result; default: no limit"},

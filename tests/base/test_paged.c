@@ -30,9 +30,10 @@ static void values_stay_when_pages_go(void **state)
             fail_msg("value %zu has changed", i);
     paged_stop();
     paged_check(); /* nothing is let go of any more */
-    assert_true(mem_resident_bytes() > (size_t)NUMBERS * 3);
+    const size_t held = mem_resident_bytes();
+    assert_true(held > (size_t)NUMBERS * 3);
     paged_free(a);
-    assert_true(mem_resident_bytes() < (size_t)NUMBERS * 3);
+    assert_true(mem_resident_bytes() + (size_t)NUMBERS * 3 < held); /* sanitizers keep memory of their own */
     paged_free(NULL);
 }
 

@@ -5,7 +5,6 @@
 #include <math.h>
 
 #include "base/fail.h"
-#include "train/loss.h"
 #include "train/near.h"
 
 enum { LEVELS = 3, STEPS = 75, LEAST_ACROSS = 60 };
@@ -18,21 +17,15 @@ static gbt_status compare_view(trainer *t, step_view *v, size_t view, const gbt_
     trace_settings settings = t->settings;
     settings.t_near = view_near(t->settings.t_near, &t->def, &t->scene.views[view]);
     GBT_TRY(frame_render(&v->frame, frame_neural(&t->anchors, &t->decoder), camera, &settings, true, err));
-    const image *shown = &v->frame.rgb;
     const unsigned char *valid;
     image_loss_result loss;
-    GBT_TRY(frame_valid(&v->frame, photos_valid(&t->photos, view), &valid, err));
-    GBT_TRY(image_fit(&v->d_image, shown->width, shown->height, 3, err));
-    if (t->exposures.count == 0)
-        return loss_of_image(shown, &v->photo, valid, &v->loss_scratch, &v->d_image, &loss, err);
     float matrix[AFFINE_NUMBERS];
     double unused[AFFINE_NUMBERS];
-    GBT_TRY(image_fit(&v->exposed, shown->width, shown->height, 3, err));
-    affine_fit(shown, &v->photo, valid, 0, shown->width, matrix);
-    affine_apply(matrix, shown, &v->exposed);
-    GBT_TRY(loss_of_image(&v->exposed, &v->photo, valid, &v->loss_scratch, &v->d_image, &loss, err));
-    affine_backward(matrix, shown, &v->d_image, unused);
-    return GBT_OK;
+    GBT_TRY(frame_valid(&v->frame, photos_valid(&t->photos, view), &valid, err));
+    const bool exposed = t->exposures.count > 0;
+    if (exposed)
+        affine_fit(&v->frame.rgb, &v->photo, valid, 0, v->frame.rgb.width, matrix);
+    return step_view_compare(v, valid, exposed ? matrix : NULL, &loss, unused, err);
 }
 
 /* The finest level at which a step has about as many pixels as one of training. */

@@ -174,22 +174,27 @@ static trace_settings settings_of(const trainer *t, const step_view *v, double p
     return settings;
 }
 
-/* The loss of the last render as the photo's exposure shows it; v->d_image becomes dL/drender. */
+gbt_status step_view_compare(step_view *v, const unsigned char *valid, const float *matrix,
+                             image_loss_result *loss, double d_matrix[AFFINE_NUMBERS], gbt_error *err)
+{
+    const image *shown = &v->frame.rgb;
+    GBT_TRY(image_fit(&v->d_image, shown->width, shown->height, 3, err));
+    if (matrix == NULL)
+        return loss_of_image(shown, &v->photo, valid, &v->loss_scratch, &v->d_image, loss, err);
+    GBT_TRY(image_fit(&v->exposed, shown->width, shown->height, 3, err));
+    affine_apply(matrix, shown, &v->exposed);
+    GBT_TRY(loss_of_image(&v->exposed, &v->photo, valid, &v->loss_scratch, &v->d_image, loss, err));
+    affine_backward(matrix, shown, &v->d_image, d_matrix);
+    return GBT_OK;
+}
+
+/* As the photo's exposure shows it. */
 static gbt_status compare(const trainer *t, step_view *v, image_loss_result *loss, gbt_error *err)
 {
     const unsigned char *valid;
     GBT_TRY(frame_valid(&v->frame, v->valid, &valid, err));
-    const image *shown = &v->frame.rgb;
-    image *fitted[] = {&v->d_image, &v->exposed};
-    for (int i = 0; i < (t->exposures.count > 0 ? 2 : 1); i++)
-        GBT_TRY(image_fit(fitted[i], shown->width, shown->height, 3, err));
-    if (t->exposures.count == 0)
-        return loss_of_image(shown, &v->photo, valid, &v->loss_scratch, &v->d_image, loss, err);
-    const float *matrix = t->exposures.matrix + v->slot * AFFINE_NUMBERS;
-    affine_apply(matrix, shown, &v->exposed);
-    GBT_TRY(loss_of_image(&v->exposed, &v->photo, valid, &v->loss_scratch, &v->d_image, loss, err));
-    affine_backward(matrix, shown, &v->d_image, v->outcome.d_exposure);
-    return GBT_OK;
+    const float *matrix = t->exposures.count > 0 ? t->exposures.matrix + v->slot * AFFINE_NUMBERS : NULL;
+    return step_view_compare(v, valid, matrix, loss, v->outcome.d_exposure, err);
 }
 
 /* ---- and back ---- */

@@ -67,6 +67,17 @@ void step_view_pick(trainer *t, step_view *v, size_t index);
  */
 void step_view_run(trainer *t, step_view *v);
 
+/**
+ * The loss of the last render to v->photo, as the colour matrix shows it (NULL: as it is); v->d_image becomes
+ * dL/drender.
+ *
+ * @param valid     which pixels count, from frame_valid()
+ * @param matrix    [3][4], or NULL
+ * @param d_matrix  [out] dL/dmatrix; not written without one
+ */
+gbt_status step_view_compare(step_view *v, const unsigned char *valid, const float *matrix,
+                             image_loss_result *loss, double d_matrix[AFFINE_NUMBERS], gbt_error *err);
+
 /** Nothing nearer to the camera of its photo is drawn. */
 float step_view_near(const trainer *t, const step_view *v);
 

@@ -60,3 +60,13 @@ gbt_status json_save(const json_t *value, const char *path, gbt_error *err)
     free(text);
     return status;
 }
+
+gbt_status json_save_styled(const json_t *value, size_t style, const char *path, gbt_error *err)
+{
+    char *text = value != NULL ? json_dumps(value, style) : NULL;
+    if (text == NULL)
+        return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path);
+    const gbt_status status = file_write_atomic(path, text, strlen(text), err);
+    free(text);
+    return status;
+}

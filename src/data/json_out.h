@@ -19,4 +19,8 @@ json_t *json_number(double value);
 gbt_status json_print(const json_t *value, FILE *out, gbt_error *err);
 gbt_status json_save(const json_t *value, const char *path, gbt_error *err); /* atomically */
 
+/** The same in a style of jansson's (JSON_INDENT(n) | JSON_REAL_PRECISION(n) ...), without a newline at the
+ * end. */
+gbt_status json_save_styled(const json_t *value, size_t style, const char *path, gbt_error *err);
+
 #endif

@@ -4,12 +4,11 @@
 
 #include <jansson.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
-#include "base/file.h"
 #include "base/memory.h"
+#include "data/json_out.h"
 #include "train/adam.h"
 
 gbt_status exposures_make(exposures *e, size_t count, gbt_error *err)
@@ -82,11 +81,7 @@ gbt_status exposures_write(const exposures *e, const char *const *names, const c
         json_array_append_new(photos, photo);
     }
     json_object_set_new(root, "photos", photos);
-    char *text = json_dumps(root, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
+    const gbt_status status = json_save_styled(root, JSON_INDENT(1) | JSON_REAL_PRECISION(9), path, err);
     json_decref(root);
-    if (text == NULL)
-        return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path);
-    const gbt_status status = file_write_atomic(path, text, strlen(text), err);
-    free(text);
     return status;
 }

@@ -4,12 +4,12 @@
 
 #include <jansson.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
-#include "base/file.h"
 #include "base/vec.h"
+#include "data/json_fields.h"
+#include "data/json_out.h"
 
 static json_t *numbers(const double *values, int count)
 {
@@ -36,12 +36,8 @@ gbt_status pose_file_write(const scene *s, const char *path, gbt_error *err)
                                                 "center", numbers(center, 3)));
     }
     json_object_set_new(root, "photos", photos);
-    char *text = json_dumps(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    const gbt_status status = json_save_styled(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17), path, err);
     json_decref(root);
-    if (text == NULL)
-        return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path);
-    const gbt_status status = file_write_atomic(path, text, strlen(text), err);
-    free(text);
     return status;
 }
 
@@ -90,15 +86,9 @@ static gbt_status take_poses(const json_t *root, const char *path, scene *s, gbt
 
 gbt_status pose_file_read(const char *path, scene *s, gbt_error *err)
 {
-    unsigned char *bytes;
-    size_t count;
-    GBT_TRY(file_read(path, &bytes, &count, err));
-    json_error_t fault;
-    json_t *root = json_loadb((const char *)bytes, count, 0, &fault);
-    mem_free(bytes);
-    const gbt_status status =
-        root != NULL ? take_poses(root, path, s, err)
-                     : base_fail(err, GBT_ERR_FORMAT, "%s:%d: %.200s", path, fault.line, fault.text);
+    json_t *root;
+    GBT_TRY(json_read(path, &root, err));
+    const gbt_status status = take_poses(root, path, s, err);
     json_decref(root);
     return status;
 }

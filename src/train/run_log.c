@@ -14,6 +14,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "bvh/device.h"
+#include "data/json_out.h"
 #include "gbtrace/cluster.h"
 
 static const double row_every_seconds = 1;
@@ -316,12 +317,8 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     json_object_set_new(root, "isa", json_string(cpu_isa_name(cpu_best_isa())));
     json_object_set_new(root, "embree_version", json_string(bvh_embree_version()));
     json_object_set_new(root, "peak_memory_bytes", json_integer((json_int_t)mem_peak_bytes()));
-    char *text = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    const gbt_status status = json_save_styled(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9), json_path, err);
     json_decref(root);
-    if (text == NULL)
-        return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", json_path);
-    const gbt_status status = file_write_atomic(json_path, text, strlen(text), err);
-    free(text);
     return status;
 }
 

@@ -4,6 +4,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/vec.h"
 
 enum { CHECK_WIDTH = 48, CHECK_WIDTH_LARGE = 24, LARGE_COUNT = 50000 };
 
@@ -15,7 +16,7 @@ gbt_status grad_render_at(grad_checker *c, size_t view, int width, gbt_error *er
     c->ray_count = (size_t)c->width * (size_t)c->height;
     const gbt_camera camera = gbt_camera_resized(&full, c->width, c->height);
     for (int k = 0; k < 3; k++)
-        c->camera[k] = (double)(float)camera.center[k];
+        c->camera[k] = rounded_to_float(camera.center[k]);
     return frame_render(c->frame, frame_neural(&c->run->model.anchors, &c->run->model.decoder), &camera,
                         &c->run->settings, true, err);
 }

@@ -43,7 +43,7 @@ static gbt_status read_lens(const gbt_camera *camera, lens *out, gbt_error *err)
         out->limit[k] = 1.3 * side[k] / (2 * out->focal[k]);
     }
     for (int k = 0; k < 3; k++)
-        out->center[k] = (double)(float)camera->center[k]; /* where the rays of the tracer start */
+        out->center[k] = rounded_to_float(camera->center[k]); /* where the rays of the tracer start */
     return GBT_OK;
 }
 

@@ -8,6 +8,14 @@
 #include <math.h>
 #include <stdbool.h>
 
+/** x to the precision of a float. Through memory: GCC 12 for x86-64 leaves both conversions out where it puts
+   two neighbours into one register. */
+static inline double rounded_to_float(double x)
+{
+    volatile float rounded = (float)x;
+    return (double)rounded;
+}
+
 static inline double dvec_dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -92,7 +92,7 @@ static gbt_status make_view(const gbt_camera *camera, const raster_settings *set
     for (int i = 0; i < 9; i++)
         sum += out->rotation[i] = camera->rotation[i];
     for (int i = 0; i < 3; i++)
-        sum += out->center[i] = (double)(float)camera->center[i];
+        sum += out->center[i] = rounded_to_float(camera->center[i]);
     const int side_limit = TILE_LIMIT * TILE_PIXELS;
     if (!isfinite(sum) || !(out->fx > 0 && out->fx < 1e12) || !(out->fy > 0 && out->fy < 1e12) ||
         out->width < 1 || out->height < 1 || out->width > side_limit || out->height > side_limit)

@@ -52,7 +52,7 @@ static inline block_rays rays_of(const tile_job *job, int block)
         dvec_normalize(dir);
         dmat_apply_transposed(view->rotation, dir, dir);
         for (int k = 0; k < 3; k++)
-            dir[k] = (double)(float)dir[k]; /* the ray that the tracer is given */
+            dir[k] = rounded_to_float(dir[k]); /* the ray that the tracer is given */
         dmat_apply(view->rotation, dir, dir);
         a[i] = (float)(dir[0] / dir[2] - r.middle[0]);
         b[i] = (float)(dir[1] / dir[2] - r.middle[1]);

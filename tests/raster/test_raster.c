@@ -66,6 +66,30 @@ static void one_gaussian_by_hand(void **state)
     gaussians_free(&g);
 }
 
+/* A centre is that of the tracer's rays, a float in each coordinate. */
+static void centre_of_the_rays(void **state)
+{
+    (void)state;
+    const cloud_def clouds[] = {RASTER_CLOUDS(20)};
+    const cloud_def *def = &clouds[1];
+    gaussians g = make_cloud(def, 7);
+    gbt_camera exact = make_camera(def->width, def->height, (const double[3]){3.1, -2.2, -5.3}),
+               rounded = exact;
+    for (int k = 0; k < 3; k++) {
+        volatile float as_float = (float)exact.center[k];
+        rounded.center[k] = (double)as_float;
+    }
+    for (int form = 0; form < 2; form++) {
+        const raster_settings s = form_settings(form);
+        drawn a = draw(&g, &exact, &s, NULL), b = draw(&g, &rounded, &s, NULL);
+        assert_memory_equal(a.rgb.pixels, b.rgb.pixels,
+                            3 * (size_t)(def->width * def->height) * sizeof(float));
+        drawn_free(&a);
+        drawn_free(&b);
+    }
+    gaussians_free(&g);
+}
+
 /* Along the ray (1, 0, 100) / 100 the nearest point is at sin(angle) * 10 from the centre. */
 static void one_ray_by_hand(void **state)
 {
@@ -459,6 +483,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_gaussian_by_hand),
+        cmocka_unit_test(centre_of_the_rays),
         cmocka_unit_test(one_ray_by_hand),
         cmocka_unit_test(three_sigma_goes_by_tiles),
         cmocka_unit_test(stops_before_it_is_dark),

@@ -8,7 +8,6 @@
 #include "anchor/rows.h"
 #include "base/fail.h"
 #include "base/memory.h"
-#include "base/paged.h"
 #include "base/rng.h"
 
 const row_field anchor_fields[ANCHOR_FIELDS] = {
@@ -31,7 +30,7 @@ gbt_status anchors_resize(anchors *a, size_t count, gbt_error *err)
 void anchors_free(anchors *a)
 {
     for (int f = 0; f < ANCHOR_FIELDS; f++)
-        paged_free(a->field[f]);
+        mem_free(a->field[f]);
     memset(a, 0, sizeof *a);
 }
 

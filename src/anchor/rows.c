@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "base/memory.h"
 #include "base/paged.h"
 
 int row_field_dims(const row_field *field, size_t count, size_t offset_count, size_t dims[ROWS_DIMS_MAX])
@@ -27,19 +28,18 @@ gbt_status rows_resize(float **arrays, const row_field *fields, int field_count,
             wanted = count;
         float *bigger[ROWS_FIELDS_MAX] = {NULL};
         for (int f = 0; f < field_count; f++) {
-            bigger[f] =
-                paged_alloc(wanted, row_field_width(&fields[f], offset_count) * sizeof(float), what, err);
+            bigger[f] = mem_alloc(wanted, row_field_width(&fields[f], offset_count) * sizeof(float), what, err);
             if (bigger[f] == NULL) {
                 while (f-- > 0)
-                    paged_free(bigger[f]);
+                    mem_free(bigger[f]);
                 return GBT_ERR_NO_MEMORY;
             }
         }
         for (int f = 0; f < field_count; f++) {
             const size_t width = row_field_width(&fields[f], offset_count);
             if (kept > 0)
-                memcpy(bigger[f], arrays[f], kept * width * sizeof(float));
-            paged_free(arrays[f]);
+                mem_copy(bigger[f], arrays[f], kept * width * sizeof(float));
+            mem_free(arrays[f]);
             arrays[f] = bigger[f];
         }
         *capacity = wanted;
@@ -47,6 +47,7 @@ gbt_status rows_resize(float **arrays, const row_field *fields, int field_count,
     for (int f = 0; f < field_count; f++) {
         const size_t width = row_field_width(&fields[f], offset_count);
         memset(arrays[f] + kept * width, 0, (count - kept) * width * sizeof(float));
+        paged_check();
     }
     return GBT_OK;
 }

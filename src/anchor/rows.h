@@ -30,7 +30,7 @@ int row_field_dims(const row_field *field, size_t count, size_t offset_count, si
 /**
  * Make every array hold `count` rows: the first min(used, count) are kept, the others are zero.
  *
- * @param arrays      [in,out] [field_count], owned by the caller, freed by paged_free(); NULL at the start
+ * @param arrays      [in,out] [field_count], owned by the caller, freed by mem_free(); NULL at the start
  * @param fields      [in] [field_count] what a row of each is; at most ROWS_FIELDS_MAX
  * @param capacity    [in,out] rows allocated; grows by half at least
  * @return GBT_OK or GBT_ERR_NO_MEMORY: then nothing has changed

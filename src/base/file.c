@@ -16,8 +16,9 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/paged.h"
 
-enum { PATH_LIMIT = 4096 };
+enum { PATH_LIMIT = 4096, READ_BYTES = 1 << 22 };
 
 gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count, gbt_error *err)
 {
@@ -42,7 +43,8 @@ gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count
     }
     size_t have = 0;
     while (have < size) {
-        const ssize_t got = read(fd, buffer + have, size - have);
+        const ssize_t got = read(fd, buffer + have, size - have < READ_BYTES ? size - have : READ_BYTES);
+        paged_check();
         if (got < 0 && errno == EINTR)
             continue;
         if (got <= 0) {

@@ -11,7 +11,9 @@
 #include <sys/resource.h>
 
 #include "base/fail.h"
+#include "base/paged.h"
 
+enum { COPY_BYTES = 1 << 22 };
 static const size_t LARGE_PAGE = (size_t)2 << 20;
 
 static atomic_long fail_countdown = -1;
@@ -25,9 +27,11 @@ static int must_fail(void)
 
 void mem_fail_after(long n) { atomic_store(&fail_countdown, n < 0 ? -1 : n); }
 
-void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err)
+/* As mem_alloc(). A fresh file is zero. */
+static void *take(size_t count, size_t size, const char *what, bool *zero, gbt_error *err)
 {
     size_t bytes;
+    *zero = false;
     if (__builtin_mul_overflow(count, size, &bytes) || bytes > PTRDIFF_MAX - LARGE_PAGE) {
         base_fail(err, GBT_ERR_NO_MEMORY, "%s: %zu elements of %zu bytes are more than memory can hold", what,
                   count, size);
@@ -36,13 +40,19 @@ void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err)
     bytes = (bytes + MEM_ALIGN - 1) / MEM_ALIGN * MEM_ALIGN;
     if (bytes == 0)
         bytes = MEM_ALIGN;
+    void *pointer = NULL;
+    const bool fails = must_fail();
+    if (!fails && paged_map(bytes, what, &pointer, err) != GBT_OK)
+        return NULL;
+    *zero = pointer != NULL;
+    if (pointer != NULL)
+        return pointer;
     /* Large arrays ask for large pages: a tree is walked in no order, and misses of the address cache cost as
        much as misses of the data. */
     const bool large = bytes >= 4 * LARGE_PAGE;
-    void *pointer = must_fail()
-                        ? NULL
-                        : aligned_alloc(large ? LARGE_PAGE : MEM_ALIGN,
-                                        large ? (bytes + LARGE_PAGE - 1) / LARGE_PAGE * LARGE_PAGE : bytes);
+    if (!fails)
+        pointer = aligned_alloc(large ? LARGE_PAGE : MEM_ALIGN,
+                                large ? (bytes + LARGE_PAGE - 1) / LARGE_PAGE * LARGE_PAGE : bytes);
     if (pointer != NULL && large)
         madvise(pointer, bytes, MADV_HUGEPAGE); /* a wish */
     if (pointer == NULL)
@@ -50,12 +60,27 @@ void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err)
     return pointer;
 }
 
+void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err)
+{
+    bool zero;
+    return take(count, size, what, &zero, err);
+}
+
 void *mem_calloc(size_t count, size_t size, const char *what, gbt_error *err)
 {
-    void *pointer = mem_alloc(count, size, what, err);
-    if (pointer != NULL)
+    bool zero;
+    void *pointer = take(count, size, what, &zero, err);
+    if (pointer != NULL && !zero)
         memset(pointer, 0, count * size);
     return pointer;
+}
+
+void mem_copy(void *to, const void *from, size_t bytes)
+{
+    for (size_t at = 0; at < bytes; at += COPY_BYTES) {
+        memcpy((char *)to + at, (const char *)from + at, bytes - at < COPY_BYTES ? bytes - at : COPY_BYTES);
+        paged_check();
+    }
 }
 
 gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count, size_t size,
@@ -70,7 +95,7 @@ gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count
     if (bigger == NULL)
         return GBT_ERR_NO_MEMORY;
     if (used > 0)
-        memcpy(bigger, *array, used * size);
+        mem_copy(bigger, *array, used * size);
     mem_free(*array);
     *array = bigger;
     *capacity = grown;
@@ -86,14 +111,18 @@ gbt_status mem_trim(void **array, size_t *capacity, size_t used, size_t size, co
     if (exact == NULL)
         return GBT_ERR_NO_MEMORY;
     if (used > 0)
-        memcpy(exact, *array, used * size);
+        mem_copy(exact, *array, used * size);
     mem_free(*array);
     *array = exact;
     *capacity = used;
     return GBT_OK;
 }
 
-void mem_free(void *pointer) { free(pointer); }
+void mem_free(void *pointer)
+{
+    if (!paged_unmap(pointer))
+        free(pointer);
+}
 
 size_t mem_peak_bytes(void)
 {

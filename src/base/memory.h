@@ -2,7 +2,8 @@
 /* base/memory.h -- the only allocator: checked sizes, 64-byte alignment, a failure switch for tests, a count
    of bytes in use.
 
-   Every array of the library is owned by the object that allocated it here and is freed with mem_free(). */
+   Every array of the library is owned by the object that allocated it here and is freed with mem_free(). Below
+   a limit large ones are in files (base/paged.h). */
 #ifndef GBT_BASE_MEMORY_H
 #define GBT_BASE_MEMORY_H
 
@@ -34,6 +35,9 @@ gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count
     failure nothing changes. */
 gbt_status mem_trim(void **array, size_t *capacity, size_t used, size_t size, const char *what,
                     gbt_error *err);
+
+/** memcpy() of what may be as large as the memory that there is: with paged_check() on the way. */
+void mem_copy(void *to, const void *from, size_t bytes);
 
 void mem_free(void *pointer); /* NULL is fine */
 

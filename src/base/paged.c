@@ -7,6 +7,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdbool.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -16,15 +17,16 @@
 #include "base/large_file.h"
 #include "base/memory.h"
 
-enum { MAPPINGS_MOST = 128 };
-static const size_t least_bytes = (size_t)1 << 16; /* smaller arrays are memory like others */
+enum { MAPPINGS_MOST = 4096, PAGE_LEAST = 4096 };
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static struct {
     void *start;
     size_t bytes;
 } mappings[MAPPINGS_MOST];           /* a free place has no start */
+static atomic_size_t mapping_end;    /* no mapping from here on */
 static atomic_size_t resident_limit; /* 0: not started */
+static atomic_size_t let_go_above;   /* the limit; or, where what stays is more, that and a little */
 static char place[LARGE_FILE_NAME];
 
 gbt_status paged_start(const char *folder, size_t limit, gbt_error *err)
@@ -39,79 +41,81 @@ gbt_status paged_start(const char *folder, size_t limit, gbt_error *err)
     pthread_mutex_lock(&lock);
     snprintf(place, sizeof place, "%s", folder);
     pthread_mutex_unlock(&lock);
+    atomic_store(&let_go_above, limit);
     atomic_store(&resident_limit, limit > 0 ? limit : 1);
     return GBT_OK;
 }
 
 void paged_stop(void) { atomic_store(&resident_limit, 0); }
 
-/* `bytes` of a new file, mapped; NULL with a message. */
-static void *map_file(size_t bytes, const char *what, gbt_error *err)
+static gbt_status map_file(large_file *file, size_t bytes, const char *what, void **out, gbt_error *err)
 {
-    large_file *file = mem_calloc(1, sizeof *file, what, err);
-    if (file == NULL)
-        return NULL;
-    void *start = MAP_FAILED;
-    if (large_file_scratch(place, file, err) == GBT_OK) {
-        /* Room on the disk now, or a write to the array would end the process later. */
-        const int failed = posix_fallocate(file->descriptor, 0, (off_t)bytes);
-        if (failed != 0)
-            base_fail(err, GBT_ERR_IO, "%s: no room for %zu bytes of %s: %s", place, bytes, what,
-                      strerror(failed));
-        else
-            start = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file->descriptor, 0);
-        if (failed == 0 && start == MAP_FAILED)
-            base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for %zu bytes", what, bytes);
-    }
-    large_file_close(file, false, NULL); /* the mapping keeps it */
-    mem_free(file);
-    return start == MAP_FAILED ? NULL : start;
+    GBT_TRY(large_file_scratch(place, file, err));
+    /* Room on the disk now, or a write to the array would end the process later. */
+    const int failed = posix_fallocate(file->descriptor, 0, (off_t)bytes);
+    if (failed != 0)
+        return base_fail(err, GBT_ERR_IO, "%s: no room for %zu bytes of %s: %s", place, bytes, what,
+                         strerror(failed));
+    void *start = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file->descriptor, 0);
+    if (start == MAP_FAILED)
+        return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for %zu bytes", what, bytes);
+    *out = start;
+    return GBT_OK;
 }
 
-void *paged_alloc(size_t count, size_t size, const char *what, gbt_error *err)
+gbt_status paged_map(size_t bytes, const char *what, void **out, gbt_error *err)
 {
-    size_t bytes;
-    if (atomic_load(&resident_limit) == 0 || __builtin_mul_overflow(count, size, &bytes) ||
-        bytes < least_bytes)
-        return mem_alloc(count, size, what, err);
+    gbt_status status = GBT_OK;
+    *out = NULL;
+    if (atomic_load_explicit(&resident_limit, memory_order_relaxed) == 0 || bytes < PAGED_LEAST_BYTES)
+        return GBT_OK;
     pthread_mutex_lock(&lock);
-    int at = 0;
+    size_t at = 0;
     while (at < MAPPINGS_MOST && mappings[at].start != NULL)
         at++;
-    void *start = NULL;
     if (at < MAPPINGS_MOST) {
-        start = map_file(bytes, what, err);
-        mappings[at].start = start;
+        static large_file file; /* two paths long, so not on the stack of a thread */
+        memset(&file, 0, sizeof file);
+        status = map_file(&file, bytes, what, out, err);
+        large_file_close(&file, false, NULL); /* the mapping keeps it */
+        mappings[at].start = *out;
         mappings[at].bytes = bytes;
+        if (at >= atomic_load(&mapping_end))
+            atomic_store(&mapping_end, at + 1);
     }
     pthread_mutex_unlock(&lock);
-    return at < MAPPINGS_MOST ? start : mem_alloc(count, size, what, err);
+    return status;
 }
 
-void paged_free(void *pointer)
+bool paged_unmap(void *pointer)
 {
-    bool mapped = false;
+    if (atomic_load_explicit(&mapping_end, memory_order_relaxed) == 0 || (uintptr_t)pointer % PAGE_LEAST != 0)
+        return false;
     pthread_mutex_lock(&lock);
-    for (int i = 0; i < MAPPINGS_MOST && pointer != NULL && !mapped; i++)
-        if (mappings[i].start == pointer) {
-            munmap(pointer, mappings[i].bytes);
-            mappings[i].start = NULL;
-            mapped = true;
-        }
+    size_t at = 0;
+    const size_t end = atomic_load(&mapping_end);
+    while (at < end && (mappings[at].start != pointer || pointer == NULL))
+        at++;
+    if (at < end) {
+        munmap(pointer, mappings[at].bytes);
+        mappings[at].start = NULL;
+    }
     pthread_mutex_unlock(&lock);
-    if (!mapped)
-        mem_free(pointer);
+    return at < end;
 }
 
+/* Where more than the limit cannot be let go of, to ask for it at every turn would only cost time. */
 void paged_check(void)
 {
     const size_t limit = atomic_load_explicit(&resident_limit, memory_order_relaxed);
-    if (limit == 0 || mem_resident_bytes() <= limit)
+    if (limit == 0 || mem_resident_bytes() <= atomic_load_explicit(&let_go_above, memory_order_relaxed))
         return;
     pthread_mutex_lock(&lock);
-    for (int i = 0; i < MAPPINGS_MOST; i++)
+    for (size_t i = 0; i < atomic_load(&mapping_end); i++)
         if (mappings[i].start != NULL)
             madvise(mappings[i].start, mappings[i].bytes, MADV_DONTNEED); /* of a shared file: values stay */
+    const size_t stays = mem_resident_bytes() + limit / 16;
+    atomic_store(&let_go_above, stays > limit ? stays : limit);
     pthread_mutex_unlock(&lock);
 }
 

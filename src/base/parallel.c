@@ -5,6 +5,7 @@
 #include <stdatomic.h>
 #include <stdint.h>
 
+#include "base/paged.h"
 #include "base/stage.h"
 
 typedef struct accounted_call {
@@ -19,6 +20,7 @@ static _Thread_local parallel_account account;
 static void run_accounted(size_t block, size_t begin, size_t end, void *context)
 {
     accounted_call *call = context;
+    paged_check();
     stage_clock clock = stage_begin();
     call->body(block, begin, end, call->context);
     const stage_time took = stage_lap(&clock);

@@ -5,7 +5,10 @@
 #include <math.h>
 
 #include "base/camera_model.h"
+#include "base/paged.h"
 #include "data/number.h"
+
+enum { CHECK_LINES = 1 << 14 };
 
 /* Lines of a file, one at a time; `at` walks inside the current line. */
 typedef struct text_lines {
@@ -35,7 +38,8 @@ static bool next_line(text_lines *lines)
     lines->at = start;
     lines->end = newline != NULL ? newline : start + left;
     lines->next += (size_t)(lines->end - start) + 1;
-    lines->number++;
+    if (lines->number++ % CHECK_LINES == 0)
+        paged_check();
     return true;
 }
 

@@ -12,6 +12,9 @@
 #include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/paged.h"
+
+enum { CHECK_POINTS = 1 << 14 };
 
 gbt_status raw_fail(gbt_error *err, raw_place place, const char *format, ...)
 {
@@ -78,6 +81,8 @@ gbt_status raw_reserve_points(raw_scene *raw, size_t count, gbt_error *err)
 
 void raw_add_point(raw_scene *raw, const double position[3], const float color[3])
 {
+    if ((raw->point_count + raw->points_dropped) % CHECK_POINTS == 0)
+        paged_check();
     for (int k = 0; k < 3; k++)
         if (!(fabs(position[k]) <= RAW_COORDINATE_LIMIT)) {
             raw->points_dropped++;

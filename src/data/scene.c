@@ -14,6 +14,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/paged.h"
 #include "base/vec.h"
 #include "data/colmap_bin.h"
 #include "data/colmap_txt.h"
@@ -23,7 +24,7 @@
 #include "data/transforms.h"
 #include "data/unposed.h"
 
-enum { PATH_SIZE = RAW_NAME_LIMIT + 4096 };
+enum { PATH_SIZE = RAW_NAME_LIMIT + 4096, CHECK_NUMBERS = 1 << 16 };
 
 static gbt_status load_file(const char *path, source_file *out, unsigned char **owned, gbt_error *err)
 {
@@ -275,8 +276,11 @@ static gbt_status place(raw_scene *raw, scene *out, gbt_error *err)
     out->views = mem_calloc(raw->view_count, sizeof *out->views, "views", err);
     if (out->points.position == NULL || out->views == NULL)
         return GBT_ERR_NO_MEMORY;
-    for (size_t i = 0; i < 3 * raw->point_count; i++)
+    for (size_t i = 0; i < 3 * raw->point_count; i++) {
         out->points.position[i] = (float)(raw->position[i] - out->origin[i % 3]);
+        if (i % CHECK_NUMBERS == 0)
+            paged_check();
+    }
     out->points.count = raw->point_count;
     out->points.has_color = raw->has_color;
     out->points.color = raw->color;

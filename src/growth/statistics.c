@@ -7,7 +7,6 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "base/paged.h"
 #include "base/parallel.h"
 
 enum { GATHER_BLOCK = 1024 /* visible anchors */ };
@@ -37,7 +36,7 @@ gbt_status growth_stats_resize(growth_stats *s, size_t count, int offset_count, 
 void growth_stats_free(growth_stats *s)
 {
     for (int f = 0; f < GROWTH_STATS; f++)
-        paged_free(s->field[f]);
+        mem_free(s->field[f]);
     memset(s, 0, sizeof *s);
 }
 

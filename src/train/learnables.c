@@ -8,7 +8,6 @@
 #include "base/clones.h"
 #include "base/fail.h"
 #include "base/memory.h"
-#include "base/paged.h"
 #include "base/parallel.h"
 #include "train/adam.h"
 #include "train/schedule.h"
@@ -141,7 +140,6 @@ static void learn_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
     const anchor_job *job = context;
-    paged_check();
     const uint64_t *created = job->m->created;
     for (size_t i = begin, next; i < end; i = next) {
         for (next = i + 1; next < end && created[next] == created[i];)

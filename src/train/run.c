@@ -13,7 +13,6 @@
 #include "base/parallel.h"
 #include "base/stop_signal.h"
 #include "cluster/cluster.h"
-#include "io/model_file.h"
 #include "train/align.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
@@ -21,23 +20,16 @@
 #include "train/resume.h"
 #include "train/run_data.h"
 #include "train/run_log.h"
-#include "train/sampling.h"
+#include "train/save.h"
 #include "train/trainer.h"
-
-enum { PATH_SIZE = 4096 };
 
 void gbt_set_threads(int threads) { parallel_set_threads(threads); }
 
 /* ---- the run's folder ---- */
 
-typedef struct run_paths {
-    char model[PATH_SIZE], config[PATH_SIZE], log[PATH_SIZE], events[PATH_SIZE], json[PATH_SIZE],
-        exposure[PATH_SIZE], poses[PATH_SIZE], checkpoint[PATH_SIZE], checkpoint_previous[PATH_SIZE];
-} run_paths;
-
 static gbt_status name_paths(const char *run, run_paths *p, gbt_error *err)
 {
-    char checkpoints[PATH_SIZE];
+    char checkpoints[RUN_PATH_SIZE];
     GBT_TRY(file_join(checkpoints, sizeof checkpoints, run, "checkpoints", err));
     GBT_TRY(file_join(p->model, sizeof p->model, run, "model.gbt", err));
     GBT_TRY(file_join(p->config, sizeof p->config, run, "config", err));
@@ -53,7 +45,7 @@ static gbt_status name_paths(const char *run, run_paths *p, gbt_error *err)
 
 static gbt_status open_folder(const char *run, const gbt_train_def *def, const run_paths *p, gbt_error *err)
 {
-    char checkpoints[PATH_SIZE];
+    char checkpoints[RUN_PATH_SIZE];
     GBT_TRY(file_join(checkpoints, sizeof checkpoints, run, "checkpoints", err));
     const bool has_checkpoint = file_exists(p->checkpoint) || file_exists(p->checkpoint_previous);
     if (def->resume && !has_checkpoint)
@@ -65,66 +57,6 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, const r
                          "lose it by `overwrite`)",
                          run);
     return file_make_folder(checkpoints, err);
-}
-
-/* The smallest pixel of each anchor, from the training views; NULL without a footprint. */
-static gbt_status find_anchor_pixels(const trainer *t, float **out, gbt_error *err)
-{
-    *out = NULL;
-    if (t->def.footprint == 0)
-        return GBT_OK;
-    gbt_camera *cameras = mem_alloc(t->train_count, sizeof *cameras, "cameras", err);
-    *out = mem_alloc(t->anchors.count, sizeof **out, "pixel sizes", err);
-    const bool fine = cameras != NULL && *out != NULL;
-    if (fine) {
-        for (size_t i = 0; i < t->train_count; i++)
-            cameras[i] = photos_camera(&t->photos, t->train_views[i], 0);
-        sampling_find(&t->anchors, cameras, t->train_count, *out);
-    }
-    mem_free(cameras);
-    return fine ? GBT_OK : GBT_ERR_NO_MEMORY;
-}
-
-static gbt_status save_model(const trainer *t, const char *path, gbt_error *err)
-{
-    model m = {.anchors = t->anchors,
-               .decoder = t->decoder,
-               .voxel_size = t->voxel_size,
-               .extent = (float)t->extent,
-               .t_near = t->settings.t_near,
-               .sky = t->settings.sky,
-               .iterations = t->step};
-    for (int i = 0; i < 3; i++) {
-        m.origin[i] = t->scene.origin[i];
-        m.background[i] = t->settings.background[i];
-    }
-    snprintf(m.data_folder, sizeof m.data_folder, "%s", t->scene.folder);
-    /* A run on a budget is told by its pace, so that a repetition by --pace writes the same file. */
-    gbt_train_def def = t->def;
-    char text[PACE_TEXT_SIZE];
-    if (def.iterations == 0 && t->pace.known == PACE_SEGMENTS) {
-        pace_text(&t->pace, text);
-        def.pace = text;
-        def.budget_seconds = 0;
-    }
-    config_text(&def, t->scene.folder, m.config, sizeof m.config);
-    gbt_status status = find_anchor_pixels(t, &m.anchor_pixel, err);
-    if (status == GBT_OK)
-        status = model_save(path, &m, err);
-    mem_free(m.anchor_pixel);
-    return status;
-}
-
-static gbt_status save_exposures(const trainer *t, const char *path, gbt_error *err)
-{
-    const char **names = mem_alloc(t->train_count, sizeof *names, "photo names", err);
-    if (names == NULL)
-        return GBT_ERR_NO_MEMORY;
-    for (size_t i = 0; i < t->train_count; i++)
-        names[i] = t->scene.views[t->train_views[i]].name;
-    const gbt_status status = exposures_write(&t->exposures, names, path, err);
-    mem_free(names);
-    return status;
 }
 
 /* ---- the time budget ---- */
@@ -170,16 +102,6 @@ static void pace_extend(trainer *t, const speed *s)
 
 /* ---- the loop ---- */
 
-static gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *err)
-{
-    GBT_TRY(checkpoint_save(t, paths->checkpoint, err));
-    if (t->exposures.count > 0)
-        GBT_TRY(save_exposures(t, paths->exposure, err));
-    if (t->poses.count > 0)
-        GBT_TRY(pose_file_write(&t->scene, paths->poses, err));
-    return save_model(t, paths->model, err);
-}
-
 /* Of a whole run: the last poses of the photos, and what became of them. */
 static gbt_status finish_poses(trainer *t, gbt_error *err)
 {
@@ -207,11 +129,12 @@ typedef struct run_clock {
     speed measured;
     double begin, offset, paused, last_save; /* seconds; offset: of the runs before */
     int next_eval;
+    save_beside *saving;
 } run_clock;
 
-static run_clock clock_start(const trainer *t)
+static run_clock clock_start(const trainer *t, save_beside *saving)
 {
-    run_clock c = {.begin = clock_wall(), .offset = t->seconds, .last_save = t->seconds};
+    run_clock c = {.begin = clock_wall(), .offset = t->seconds, .last_save = t->seconds, .saving = saving};
     while (c.next_eval < t->def.eval_at_count && t->def.eval_at_seconds[c.next_eval] <= t->seconds)
         c.next_eval++;
     return c;
@@ -240,14 +163,20 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
         speed_follow(&c->measured, report);
     t->seconds = c->offset + clock_wall() - c->begin - c->paused;
     run_log_step(log, t, report);
+    if (!save_is_under_way(c->saving))
+        GBT_TRY(save_finish(c->saving, err));
     GBT_TRY(check_memory(t, paths, err));
 
     const bool stop = stop_signal_seen() || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
-    const bool due = def->save_every_seconds > 0 && t->seconds - c->last_save >= def->save_every_seconds;
+    const bool asked = def->save_at_step > 0 && t->step == def->save_at_step;
+    const bool due = def->save_every_seconds > 0 && t->seconds - c->last_save >= def->save_every_seconds &&
+                     !save_is_under_way(c->saving);
     const bool evaluate =
         c->next_eval < def->eval_at_count && t->seconds >= def->eval_at_seconds[c->next_eval];
-    if (stop || due || (def->save_at_step > 0 && t->step == def->save_at_step)) {
-        GBT_TRY(save_all(t, paths, err));
+    if (stop || due || asked) {
+        GBT_TRY(save_finish(c->saving, err));
+        const bool at_once = stop || def->memory > 0; /* a copy is memory, too */
+        GBT_TRY(at_once ? save_all(t, paths, err) : save_begin(c->saving, t, paths, err));
         c->last_save = t->seconds;
         if (stop)
             return base_fail(err, GBT_ERR_INTERRUPTED,
@@ -263,9 +192,10 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
     return GBT_OK;
 }
 
-static gbt_status run_steps(trainer *t, const run_paths *paths, run_log *log, gbt_error *err)
+static gbt_status run_steps(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
+                            gbt_error *err)
 {
-    run_clock c = clock_start(t);
+    run_clock c = clock_start(t, saving);
     for (;;) {
         if (pace_segment(&t->pace, t->step) >= t->pace.known) {
             if (t->pace.known >= PACE_SEGMENTS)
@@ -311,8 +241,10 @@ static gbt_status write_settings(const trainer *t, const char *run, const run_pa
     return run_data_save(run, t->scene.folder, err);
 }
 
-static gbt_status finish(trainer *t, const run_paths *paths, run_log *log, gbt_error *err)
+static gbt_status finish(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
+                         gbt_error *err)
 {
+    GBT_TRY(save_finish(saving, err));
     GBT_TRY(finish_poses(t, err));
     GBT_TRY(save_all(t, paths, err));
     return log->all.steps > 0 || !run_log_is_of_step(paths->json, t->step)
@@ -327,6 +259,8 @@ static gbt_status run_in_folder(trainer *t, const char *data, const char *run, c
     GBT_TRY(cluster_agree(open_trainer(t, data, run, paths, def, strings, err), err));
     run_log log = {0};
     gbt_status status = GBT_OK;
+    save_beside *saving = mem_calloc(1, sizeof *saving, "checkpoint", err);
+    GBT_TRY(cluster_agree(saving != NULL ? GBT_OK : GBT_ERR_NO_MEMORY, err));
     if (cluster_leads()) {
         status = write_settings(t, run, paths, err);
         if (status == GBT_OK)
@@ -334,9 +268,11 @@ static gbt_status run_in_folder(trainer *t, const char *data, const char *run, c
     }
     status = cluster_follow(status, err);
     if (status == GBT_OK)
-        status = run_steps(t, paths, &log, err);
+        status = run_steps(t, paths, saving, &log, err);
     if (status == GBT_OK)
-        status = cluster_follow(cluster_leads() ? finish(t, paths, &log, err) : GBT_OK, err);
+        status = cluster_follow(cluster_leads() ? finish(t, paths, saving, &log, err) : GBT_OK, err);
+    save_finish(saving, NULL); /* of a run that failed */
+    mem_free(saving);
     if (cluster_leads())
         run_log_close(&log);
     return status;

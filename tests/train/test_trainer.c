@@ -139,6 +139,19 @@ static void extra_checkpoints_change_nothing(void **state)
     assert_true(file_exists(in_root("saves/checkpoints/last.gbt.prev")));
 }
 
+/* The copy that was written while steps went on has all that the run had. */
+static void resumes_from_a_save_beside_the_steps(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.save_at_step = 29; /* before anchors grow */
+    train_ok(tiny, in_root("beside"), &def);
+    assert_int_equal(remove(in_root("beside/checkpoints/last.gbt")), 0);
+    assert_int_equal(remove(in_root("beside/model.gbt")), 0);
+    resume_ok(in_root("beside"));
+    assert_same_file(straight_run(), in_root("beside/model.gbt"));
+}
+
 static void killed_and_resumed_is_straight(void **state)
 {
     (void)state;
@@ -1524,6 +1537,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(photos_are_the_resized_reference),
         cmocka_unit_test(interrupted_and_resumed_is_straight),
         cmocka_unit_test(extra_checkpoints_change_nothing),
+        cmocka_unit_test(resumes_from_a_save_beside_the_steps),
         cmocka_unit_test(killed_and_resumed_is_straight),
         cmocka_unit_test(resumes_from_the_previous_checkpoint),
         cmocka_unit_test(a_signal_saves_and_ends),

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* base/beside.c -- one job on a thread of its own. */
+#include "base/beside.h"
+
+#include <signal.h>
+#include <stddef.h>
+
+static void *run_job(void *context)
+{
+    beside *b = context;
+    b->run(b->context);
+    atomic_store(&b->over, true);
+    return NULL;
+}
+
+void beside_start(beside *b, void (*run)(void *context), void *context)
+{
+    sigset_t all, before;
+    b->run = run;
+    b->context = context;
+    atomic_store(&b->over, false);
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before); /* a thread begins with the mask of who made it */
+    b->started = pthread_create(&b->thread, NULL, run_job, b) == 0;
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    if (!b->started)
+        run_job(b);
+}
+
+bool beside_is_over(beside *b) { return atomic_load(&b->over); }
+
+void beside_wait(beside *b)
+{
+    if (b->started)
+        pthread_join(b->thread, NULL);
+    b->started = false;
+}

@@ -173,9 +173,9 @@ void gbt_set_threads(int threads);
 
 /**
  * For the start of a program: `end` is called, on any thread, when an allocation fails inside a library
- * written in C++ (OpenImageIO, oneTBB). It must end the process. Without this such a failure becomes
- * GBT_ERR_NO_MEMORY where the library lets it; where it does not, the process ends by SIGABRT or waits
- * forever.
+ * that leaves no way back (OpenImageIO, oneTBB, jansson). It must end the process. Without this such a
+ * failure becomes GBT_ERR_NO_MEMORY where the library lets it; where it does not, the process ends by
+ * SIGABRT or waits forever, and JSON may be taken for no JSON or be written without some of its fields.
  */
 void gbt_when_out_of_memory(void (*end)(void));
 

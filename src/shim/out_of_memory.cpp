@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* shim/out_of_memory.cpp -- the end of a program in which a library written in C++ has no memory.
+/* shim/out_of_memory.cpp -- the end of a program in which a library has no memory.
 
    At the failed allocation itself, not where its exception is caught: OpenImageIO throws with locks held, so
    the next thread that wants one of them would wait forever. oneTBB throws without asking the handler of new,
-   on threads of its own, where nobody catches. */
+   on threads of its own, where nobody catches. jansson would say of a text that it is not JSON, and write a
+   file without the fields that it had no memory for. */
 #include <atomic>
 #include <cstdlib>
 #include <exception>
 #include <new>
 
+#include <jansson.h>
 #include <unistd.h>
 
 extern "C" {
@@ -41,6 +43,14 @@ static void end_by_exception()
     std::terminate();
 }
 
+static void *alloc_for_json(size_t size)
+{
+    void *memory = std::malloc(size);
+    if (memory == nullptr)
+        end_once();
+    return memory;
+}
+
 /* exit() calls this on its own thread. */
 static void at_exit()
 {
@@ -56,4 +66,5 @@ extern "C" void gbt_when_out_of_memory(void (*end)(void))
     std::set_new_handler(end_once);
     std::set_terminate(end_by_exception);
     std::atexit(at_exit);
+    json_set_alloc_funcs(alloc_for_json, std::free);
 }

@@ -21,6 +21,23 @@
 #include "base/vec.h"
 #include "test_support.h"
 
+/* A turn by 90 degrees about z: nothing that follows it in memory counts, and no column or row may be wrong.
+ */
+static void a_rotation_has_nine_numbers(void **state)
+{
+    (void)state;
+    const double turn[12] = {0, -1, 0, 1, 0, 0, 0, 0, 1, 7, 7, 7};
+    assert_true(dmat_is_rotation(turn, 1e-9));
+    for (int i = 0; i < 9; i++) {
+        double other[12];
+        memcpy(other, turn, sizeof other);
+        other[i] += 0.01;
+        assert_false(dmat_is_rotation(other, 1e-3));
+    }
+    const double mirror[9] = {1, 0, 0, 0, 1, 0, 0, 0, -1};
+    assert_false(dmat_is_rotation(mirror, 1e-3));
+}
+
 static void first_cause_wins(void **state)
 {
     (void)state;
@@ -573,6 +590,7 @@ static void rotations(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_rotation_has_nine_numbers),
         cmocka_unit_test(first_cause_wins),
         cmocka_unit_test(exit_codes),
         cmocka_unit_test(memory_is_aligned_and_zeroed),

@@ -44,6 +44,19 @@ report $? "quiet" "$(cat err)"
 "$program" train --config run/config -o again 2>err && cmp run/model.gbt again/model.gbt >>err 2>&1
 report $? "RUN/config repeats a run" "$(cat err)"
 
+# ---- a terminal: lines are written over, unless it cannot, or is none
+on_terminal() { # command
+    python3 -c 'import pty, sys; sys.exit(pty.spawn(sys.argv[1:]))' "$@" >seen 2>&1 </dev/null
+}
+over=$(printf '\r.*step 3 .*\033.K')
+set -- "$program" train made -o seen_run --overwrite --iterations 3
+TERM=xterm on_terminal "$@" && grep -q "$over" seen
+report $? "a line that is written over" "$(cat seen)"
+TERM=dumb on_terminal "$@" && grep -q 'step 3 ' seen && ! grep -q "$over" seen && (unset TERM && on_terminal "$@") && grep -q 'step 3 ' seen && ! grep -q "$over" seen
+report $? "no such terminal" "$(cat seen)"
+TERM=xterm "$@" >seen 2>&1 && grep -q 'step 3 ' seen && ! grep -q "$over" seen
+report $? "no terminal" "$(cat seen)"
+
 # ---- TensorBoard, read by itself
 python=python3
 if ! $python -c 'import tensorboard' 2>/dev/null; then

@@ -16,6 +16,8 @@ if "-h" in sys.argv:
     sys.exit(0)
 with open(work + "/calls", "a") as calls:
     calls.write(verb + "\n")
+with open(work + "/arguments", "a") as arguments:
+    arguments.write(" ".join(sys.argv[1:]) + "\n")
 if what == verb + "-fails":
     print("Processed file [1/5]\nERROR: no space left\n")
     sys.exit(1)

@@ -149,6 +149,7 @@ static void test_poses_of_a_known_scene(void **state)
     /* Once finished, the same call says the same again, without COLMAP. */
     assert_int_equal(setenv("PATH", "/nothing", 1), 0);
     assert_ok(find(&def));
+    assert_ok(gbt_pose(in_work("the photos"), &def, in_work("the data"), NULL, &err)); /* to nobody */
     def.camera_model = GBT_POSE_CAMERA_OPENCV;
     assert_int_equal(find(&def), GBT_ERR_ARGUMENT);
 }

@@ -113,6 +113,17 @@ says "after a kill too" 0 "^killed: 5 of 5 photos registered" pose "my photos" -
 mkdir placed && cp -R "my photos" placed/images && PATH=$tools "$program" pose placed -o placed >out 2>err && grep -q '^placed: 5 of 5' out
 report $? "in place" "$(cat out err)"
 
+# ---- two cameras: progress goes over both, and a stage that is done again keeps the cameras of the database
+"$program" make-scene tabletop -o other --width 96 --height 72 --views 3 --samples 1 --points 50 --quiet >out 2>err
+mkdir both && cp five/images/*.png both/ && for file in other/images/*.png; do cp "$file" "both/other_${file##*/}"; done
+says "photos of two cameras" 0 '"stage": "features", "done": 8, "total": 8' pose both -o two --progress json
+grep -q 'features: 8 photos, .*, 2 cameras by size and EXIF' err && [ "$(wc -l <two/colmap/camera_2.txt)" = 3 ]
+report $? "and which they are" "$(cat err; ls two/colmap)"
+rm -r two/sparse two/colmap/features.done two/colmap/m*.done tools/arguments
+says "features once more" 0 '5 of 8 photos registered' pose both -o two
+grep -q 'existing_camera_id 1' tools/arguments
+report $? "with the camera that they had" "$(cat tools/arguments)"
+
 # ---- a film
 printf '#!/bin/sh\necho "Invalid data found when processing input" >&2\nexit 1\n' >tools/ffmpeg
 chmod +x tools/ffmpeg
@@ -127,6 +138,10 @@ if command -v ffmpeg >/dev/null; then
     says "a film of a test picture" 0 "^film 100%: 5 of 20 photos registered" pose "a film.mp4" -o "film 100%" --frames 20
     [ "$(ls "film 100%/images" | wc -l)" = 20 ] && [ -e "film 100%/images/frame_00020.jpg" ]
     report $? "20 of its frames" "$(ls -R "film 100%" | head -50; cat err)"
+    rm tools/calls
+    says "frames that follow each other" 0 "^seq: 5 of 20 photos registered" pose "a film.mp4" -o seq --frames 20 --matcher sequential
+    grep -q '^sequential_matcher' tools/calls && grep -q '^matches_importer' tools/calls && [ "$(wc -l <seq/colmap/key_frames.txt)" = 45 ]
+    report $? "and key frames with each other" "$(cat tools/calls; wc -l seq/colmap/key_frames.txt)"
 else
     skip "a film" "ffmpeg is not installed"
 fi

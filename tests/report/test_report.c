@@ -862,6 +862,25 @@ static double lightness_of(const float rgb[3])
     return luminance > 216.0 / 24389 ? 116 * cbrt(luminance) - 16 : luminance * 24389 / 27;
 }
 
+/* OKLab's lightness (Ottosson 2020). */
+static double oklab_lightness_of(const float rgb[3])
+{
+    static const double to_cones[3][3] = {{0.4122214708, 0.5363325363, 0.0514459929},
+                                          {0.2119034982, 0.6806995451, 0.1073969566},
+                                          {0.0883024619, 0.2817188376, 0.6299787005}};
+    static const double weight[3] = {0.2104542553, 0.7936177850, -0.0040720468};
+    double lightness = 0;
+    for (int i = 0; i < 3; i++) {
+        double cone = 0;
+        for (int k = 0; k < 3; k++) {
+            const double x = (double)rgb[k];
+            cone += to_cones[i][k] * (x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4));
+        }
+        lightness += weight[i] * cbrt(cone);
+    }
+    return lightness;
+}
+
 static void error_colors_are_even(void **state)
 {
     (void)state;
@@ -869,6 +888,7 @@ static void error_colors_are_even(void **state)
     for (int i = 0; i <= 255; i++) {
         float rgb[3];
         error_color(i / 255.0, rgb);
+        assert_true(fabs(oklab_lightness_of(rgb) - (0.09 + 0.88 * i / 255)) < 1e-3);
         const double lightness =
             lightness_of(rgb); /* CIELAB: another space than the one that they were made in */
         if (i > 0)

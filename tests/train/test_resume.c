@@ -195,6 +195,29 @@ static void other_data_are_refused(void **state)
     train_fails(tiny, in_root("first"), &on, GBT_ERR_ARGUMENT, "wanted one of them");
 }
 
+/* Its colours are learned, are in the model, and have their moments in a checkpoint. */
+static void a_learned_sky_goes_on(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.background = GBT_BACKGROUND_SKY;
+    train_ok(tiny, in_root("sky"), &def);
+    def.stop_at_step = STEPS / 2;
+    train_fails(tiny, in_root("sky_in_two"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    const gbt_train_def on = resume_def(STEPS, 0);
+    train_ok(tiny, in_root("sky_in_two"), &on);
+    assert_same_file(in_root("sky/model.gbt"), in_root("sky_in_two/model.gbt"));
+    model m;
+    assert_ok(model_load(in_root("sky/model.gbt"), &m, NULL));
+    assert_true(m.sky.varies);
+    double size = 0;
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < SH_COUNT - 1; i++)
+            size += fabs((double)m.sky.harmonic[i][k]);
+    assert_true(size > 0.01);
+    model_free(&m);
+}
+
 int main(void)
 {
     be_quiet();
@@ -202,7 +225,7 @@ int main(void)
         cmocka_unit_test(a_finished_run_goes_on),       cmocka_unit_test(the_new_length_decides),
         cmocka_unit_test(a_run_goes_on_for_a_time),     cmocka_unit_test(a_length_that_has_passed_is_refused),
         cmocka_unit_test(nothing_left_changes_nothing), cmocka_unit_test(the_run_knows_its_data),
-        cmocka_unit_test(other_data_are_refused),
+        cmocka_unit_test(other_data_are_refused),       cmocka_unit_test(a_learned_sky_goes_on),
     };
     return cmocka_run_group_tests_name("resume", tests, make_root, remove_root);
 }

@@ -1,0 +1,61 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# tests/cli/test_rare.sh -- options and inputs that are used seldom, and what must come out. Usage: test_rare.sh PROGRAM
+set -u
+program=$1
+. "$(dirname "$0")/report.sh"
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+
+# holds NAME CODE PATTERN ARGUMENTS...: exit code; a line of what it prints matches.
+holds() {
+    name=$1
+    code=$2
+    pattern=$3
+    shift 3
+    "$program" "$@" >out 2>err </dev/null
+    got=$?
+    [ "$got" = "$code" ] && cat out err | grep -q -e "$pattern"
+    report $? "$name" "  wanted $code with $pattern
+  got    $got: $(head -c 2000 err) $(head -c 1000 out)"
+}
+
+"$program" make-scene tabletop -o made --width 32 --height 24 --views 9 --samples 1 --points 60 >out 2>&1
+report $? "a scene" "$(cat out)"
+
+# ---- training
+holds "times of scores on the way" 0 '^3 held-out views: ' train made -o run --iterations 40 --eval-split every=3 --eval-at 1h,2h
+holds "times that fall" 2 '^error: --eval-at: "1s" (wanted up to [0-9]* rising times' train made -o none --eval-at 2s,1s
+holds "a time that is none" 2 '^error: --eval-at: "soon"' train made -o none --eval-at soon
+holds "a list that is too long" 2 '^error: --eval-at: the list is too long' train made -o none --eval-at "$(printf '%0600d' 1)"
+mkdir wide && cp -r made/* wide && holds "a sky that is learned" 0 '^2 held-out views: ' train wide -o wide/run --iterations 5 --background sky
+holds "and what it was trained with" 0 '^  config    background = sky$' info wide/run
+
+# ---- pictures
+"$program" render run -o shown --format exr >out 2>err && "$program" render run -o exact --renderer reference --format exr >>out 2>>err &&
+    "$program" compare shown/0000.exr exact/0000.exr --json >scores 2>>err &&
+    grep -q '^{"schema": 1, "width": 32, "height": 24, "psnr": [0-9.]*, "ssim": [0-9.]*, "ssim_interior": [0-9.]*, "flip": [0-9.e-]*}$' scores &&
+    [ "$(sed 's/.*"psnr": \([0-9]*\).*/\1/' scores)" -ge 90 ]
+report $? "render in double, and compare as JSON" "$(cat err out; ls shown; cat scores)"
+"$program" render run -o path --path orbit --frames 2 --size 20x10 >out 2>err && [ "$(ls path | wc -l)" = 2 ]
+report $? "an orbit of another size" "$(cat err)"
+cat >path.json <<'END'
+{"width": 40, "height": 30, "fov_x_deg": 60, "fps": 5, "up": [0, -1, 0], "cameras": [{"origin": [0, 0, -4], "target": [0, 0, 0]}, {"origin": [1, 0, -4], "target": [0, 0, 0]}]}
+END
+"$program" render run -o resized --path path.json --frames 3 --size 20x10 --fps 7 >out 2>err && grep -q '^3 frames .* at 7 frames per second' err &&
+    [ "$(ls resized | wc -l)" = 3 ] && "$program" compare resized/*1.png path/*1.png >>out 2>>err
+report $? "a path file of another size" "$(cat err out)"
+"$program" export run result/ --sh-degree 1 >out 2>err && "$program" render result -o whole --format exr >>out 2>>err &&
+    "$program" render result -o cells --format exr --memory 177M >>out 2>>err && "$program" compare whole/*0.exr cells/*0.exr >>out 2>>err
+report $? "a result folder within a memory limit" "$(cat err out)"
+"$program" export run plain.ply >out 2>err && holds "info of plain Gaussians, as JSON" 0 '^  "kind": "gaussians",$' info plain.ply --json
+
+# ---- counts and places
+"$program" init made -o anchors.ply --json counts.json >out 2>err && [ "$(grep -c '"color_rms": 0\.1' counts.json)" -ge 3 ]
+report $? "init tells how well anchors stand for points" "$(cat err out; cat counts.json)"
+holds "query of a data set" 0 '[0-9]' query nearest made --at 0,0,0 --count 3
+"$program" report run >out 2>err && grep -c 'class="view' run/report.html >>out
+report $? "a report from a run's own scores" "$(cat err)"
+
+finish

@@ -60,12 +60,12 @@ for data in args.data:
         place = os.path.join(args.output, f"{scene}-{seed}")
         os.makedirs(place, exist_ok=True)
         length = ("--iterations", str(args.iterations))
-        traced = train(data, os.path.join(place, "traced"), seed, "--splats-until", "0", *length)
+        traced = train(data, os.path.join(place, "traced"), seed, *length)
         budget = ("--budget", f"{traced['train_seconds']:.0f}s")
         rows["rays"].append(traced)
         rows["splats, equal iterations"].append(train(data, os.path.join(place, "splatted"), seed, "--renderer", "raster", *length))
         rows["splats, equal time"].append(train(data, os.path.join(place, "splatted-time"), seed, "--renderer", "raster", *budget))
-        rows["splats, then rays, equal time"].append(train(data, os.path.join(place, "default-time"), seed, *budget))
+        rows["splats, then rays, equal time"].append(train(data, os.path.join(place, "splats-first"), seed, "--splats-until", "0.7", *budget))
     for name, runs in rows.items():
         print(f"| {scene} | {name} | {show([r['iterations'] for r in runs], 0)} | {show([r['train_seconds'] for r in runs], 0)} "
               f"| {show([r['psnr'] for r in runs], 2)} | {show([r['ssim'] for r in runs], 4)} | {show([r['crossed'] for r in runs], 2)} "

@@ -67,8 +67,8 @@ typedef struct gbt_train_def {
     bool refine_poses;   /* learn the poses of the training photos, too, from where the data set has them;
                             held-out photos are then scored from the poses at which the scene fits them
                             best */
-    double splats_until; /* splats stand for rays until this part of the run: their steps are quicker. Pinhole
-                            photos, GBT_RENDERER_TRACE, not with compat */
+    double splats_until; /* splats stand for rays until this part of the run. Pinhole photos,
+                            GBT_RENDERER_TRACE, not with compat */
     double grow_until;   /* anchors grow and are pruned until this part of the run */
     double scale_factor; /* of the anchors' first scales; 0: 2 with the balls' scale prior, 0.7 with spacing,
                             1 with compat */

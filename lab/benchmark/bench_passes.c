@@ -23,11 +23,9 @@ enum {
     SAMPLE_COUNT
 };
 
-static const char *const kernel_names[] = {[TRACE_LIST] = "list",
-                                           [TRACE_TILE] = "tile",
-                                           [TRACE_SINGLE] = "single",
-                                           [TRACE_EMBREE] = "embree",
-                                           [BENCH_SPLATS] = "splats"};
+static const char *const kernel_names[] = {
+    [TRACE_LIST] = "list",     [TRACE_TILE] = "tile",     [TRACE_SINGLE] = "single",
+    [TRACE_EMBREE] = "embree", [BENCH_SPLATS] = "splats", [BENCH_PACKET_ORDER] = "packet"};
 
 const char *bench_kernel_name(int kernel) { return kernel_names[kernel]; }
 

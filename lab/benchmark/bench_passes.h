@@ -51,10 +51,10 @@ gbt_status bench_measure(bench_way *ways, size_t count, const gaussians *g, cons
 
 void bench_way_free(bench_way *way);
 
-/** What is measured: a trace_kernel, or splats in their place. */
-enum { BENCH_SPLATS = TRACE_EMBREE + 1, BENCH_KERNELS };
+/** What is measured: a trace_kernel; splats in their place; lists with trace_settings.packet_order. */
+enum { BENCH_SPLATS = TRACE_EMBREE + 1, BENCH_PACKET_ORDER, BENCH_KERNELS };
 
-/** "list", "tile", "single", "embree" or "splats". */
+/** "list", "tile", "single", "embree", "splats" or "packet". */
 const char *bench_kernel_name(int kernel);
 
 /** A list of kernels, "tile,embree", of at most `capacity`; 0 when there is another word in it, or one

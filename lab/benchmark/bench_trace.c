@@ -207,10 +207,11 @@ static gbt_status bench(measured *m, bench_scene *traced, bench_reference *want,
         m->ways[k].isa = cpu_best_isa();
         m->ways[k].settings = traced->settings;
         m->ways[k].tape_bytes_max = def->tape_bytes_max > 0 ? def->tape_bytes_max : 1;
+        m->ways[k].settings.packet_order = m->kernel[k] == BENCH_PACKET_ORDER;
         if (m->kernel[k] == BENCH_SPLATS)
             m->ways[k].splat = &m->splat;
         else
-            m->ways[k].kernel = (trace_kernel)m->kernel[k];
+            m->ways[k].kernel = m->kernel[k] == BENCH_PACKET_ORDER ? TRACE_LIST : (trace_kernel)m->kernel[k];
     }
     m->splat =
         (bench_splat){&traced->camera.shot.camera,
@@ -232,10 +233,11 @@ gbt_status lab_bench_trace(const lab_bench_def *def, FILE *out, gbt_error *err)
     const char *list = def->kernel != NULL ? def->kernel : "list";
     m.count = bench_kernels_parse(list, m.kernel, KERNELS_MAX);
     if (m.count == 0)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "--kernel: \"%.60s\" (wanted list, tile, single, embree or splats, or some of them "
-                         "with commas between)",
-                         list);
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "--kernel: \"%.60s\" (wanted list, packet, tile, single, embree or splats, or some of them "
+            "with commas between)",
+            list);
     const gbt_status status = bench(&m, &traced, &want, out, err);
     for (size_t k = 0; k < m.count; k++)
         bench_way_free(&m.ways[k]);

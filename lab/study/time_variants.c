@@ -9,7 +9,7 @@ const time_variant time_variants[] = {
     {"default", "", 1},
     {"faithful protocol", "compat = 1", 5},
     {"all pixels from the start", "start-level = 0", 1},
-    {"rays from the start", "splats-until = 0", 1},
+    {"splats first", "splats-until = 0.7", 1},
     {"first scales x 1", "scale-factor = 1", 1},
     {"no growth", "grow = 0", 1},
     {"final prune factor 1", "final-prune-factor = 1", 1},

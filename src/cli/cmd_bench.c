@@ -75,10 +75,11 @@ static const option *options_bench(int *count)
          .kind = OPTION_STRING,
          .value = &def.kernel,
          .value_name = "LIST",
-         .choices = "list|tile|single|embree|splats",
+         .choices = "list|packet|tile|single|embree|splats",
          .list = true,
          .help =
-             "list, tile, single, embree or splats; list,tile measures both alternately and compares them"},
+             "list, packet (lists, with one order for 16 rays), tile, single, embree or splats; list,tile "
+             "measures both alternately and compares them"},
         {.name = "memory",
          .kind = OPTION_SIZE,
          .value = &def.tape_bytes_max,

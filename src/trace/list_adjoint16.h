@@ -57,6 +57,7 @@ static void replay_list(const kernel_scene *scene, const used_list *used, const 
     const uint32_t *used_number = used->number;
     const vfloat16 a = vfloat16_load(seen->a), b = vfloat16_load(seen->b),
                    length = vfloat16_load(seen->length), alpha_max = vfloat16_set1(scene->settings.alpha_max);
+    const bool one_order = scene->settings.packet_order;
     insertion s = start_insertion();
     for (size_t first = 0; first < count; first += TOGETHER) {
         const list_row *g[TOGETHER];
@@ -81,10 +82,16 @@ static void replay_list(const kernel_scene *scene, const used_list *used, const 
             row_store(rows.inverse, i, r[k].inverse);
             rows.order[i] = (uint32_t)i;
             rows.number[i] = number[k];
-            insert_row(&rows, &s, i, r[k].t, alpha);
+            if (one_order)
+                append_row(&rows, &s, i, alpha);
+            else
+                insert_row(&rows, &s, i, r[k].t, alpha);
         }
     }
-    end_insertion(out, &s);
+    if (one_order)
+        end_appending(out, &s);
+    else
+        end_insertion(out, &s);
 }
 
 /* Row i goes on past `other`: what lies behind is added to the one in front. */
@@ -153,6 +160,22 @@ static void collect_behind(list_rows *out, const used_list *used, const vfloat16
     }
     row_store(rows->behind, 1, second.value);
     row_store(rows->behind, 0, next.value);
+}
+
+/* The same where all rays have one order. */
+static void collect_behind_in_order(list_rows *out, const used_list *used, const vfloat16 d_rgb[3],
+                                    vfloat16 background)
+{
+    const list_rows copy = *out, *const rows = &copy;
+    const vfloat16 direction[3] = {d_rgb[0], d_rgb[1], d_rgb[2]};
+    vfloat16 behind = background;
+    for (int i = (int)rows->count; i-- > 0;) {
+        const vfloat16 term = vfloat16_mul(vfloat16_mul(row_load(rows->through, i), row_load(rows->alpha, i)),
+                                           dot_lanes(used->row[rows->number[i]].color, direction));
+        row_store(rows->term, i, term);
+        row_store(rows->behind, i, behind);
+        behind = vfloat16_add(behind, term);
+    }
 }
 
 /* The same ray by ray. False when memory ran out. */
@@ -290,7 +313,9 @@ static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, 
         return false;
     const vfloat16 last = rows->product;
     const vfloat16 background = vfloat16_mul(dot16(behind_all, d_rgb), last);
-    if (!rows->crowded)
+    if (scene->settings.packet_order)
+        collect_behind_in_order(rows, used, d_rgb, background);
+    else if (!rows->crowded)
         collect_behind(rows, used, d_rgb, background);
     else if (!collect_behind_by_ray(rows, used, d_rgb, background, scratch))
         return false;

@@ -186,7 +186,10 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
         slope_rays(part_frame(view, part), packet, middle, &seen);
         gather_rows(scene, &list, packet, rays->parts, &seen, &rows, counters);
         order_by_middle(&list, scene->settings.t_near, &rows);
-        insert_rows(&rows);
+        if (scene->settings.packet_order)
+            append_rows(&rows);
+        else
+            insert_rows(&rows);
         if ((rows.crowded && !sort_rows_by_ray(&rows, scratch)) ||
             !blend_list(scene, &list, &rows, packet, rays->parts, p, &out[p], tape, counters))
             return false;

@@ -270,6 +270,29 @@ static inline void end_insertion(list_rows *out, const insertion *s)
     out->crowded = s->crowded;
 }
 
+/* Row i of one order for all rays (trace_settings.packet_order). */
+static inline void append_row(const list_rows *rows, insertion *s, int i, vfloat16 alpha)
+{
+    row_store(rows->through, i, s->before);
+    s->before = vfloat16_fnma(s->before, alpha, s->before);
+}
+
+static inline void end_appending(list_rows *out, const insertion *s)
+{
+    out->product = s->before;
+    out->steps = 0;
+    out->crowded = false;
+}
+
+static void append_rows(list_rows *out)
+{
+    const list_rows rows = *out;
+    insertion s = start_insertion();
+    for (int i = 0; i < (int)rows.count; i++)
+        append_row(&rows, &s, i, row_load(rows.alpha, (int)rows.order[i]));
+    end_appending(out, &s);
+}
+
 static void insert_rows(list_rows *out)
 {
     const list_rows rows = *out;

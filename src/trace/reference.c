@@ -79,8 +79,8 @@ static bool respond(const prepared *p, const trace_settings *s, const double ori
 static int by_depth_then_id(const void *a, const void *b)
 {
     const reference_hit *p = a, *q = b;
-    if (p->t != q->t)
-        return p->t < q->t ? -1 : 1;
+    if (p->order != q->order)
+        return p->order < q->order ? -1 : 1;
     return p->id < q->id ? -1 : p->id > q->id;
 }
 
@@ -89,18 +89,35 @@ typedef struct hit_list {
     size_t count, capacity;
 } hit_list;
 
-static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s,
-                         const double origin[3], const double dir[3], double near, double far, hit_list *list,
-                         gbt_error *err)
+/* One ray and what it sees of. */
+typedef struct sight {
+    double origin[3], dir[3], near, far;
+    double order_dir[3]; /* hits are sorted by their depth on this ray from the same origin */
+    bool own_order;      /* which is this one */
+} sight;
+
+static double depth_on(const prepared *p, const trace_settings *s, const double origin[3],
+                       const double dir[3])
 {
+    reference_hit hit = {.t = HUGE_VAL};
+    double v[3];
+    respond(p, s, origin, dir, &hit, v);
+    return hit.t;
+}
+
+static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s, const sight *ray,
+                         hit_list *list, gbt_error *err)
+{
+    const double *dir = ray->dir;
     list->count = 0;
     if (dir[0] == 0 && dir[1] == 0 && dir[2] == 0)
         return GBT_OK;
     for (size_t i = 0; i < all_count; i++) {
         reference_hit hit = {.id = (uint32_t)i};
         double v[3];
-        if (!respond(&all[i], s, origin, dir, &hit, v) || !(hit.t < far) || hit.t < near)
+        if (!respond(&all[i], s, ray->origin, dir, &hit, v) || !(hit.t < ray->far) || hit.t < ray->near)
             continue;
+        hit.order = ray->own_order ? hit.t : depth_on(&all[i], s, ray->origin, ray->order_dir);
         GBT_TRY(mem_reserve((void **)&list->hits, &list->capacity, list->count, list->count + 1, sizeof hit,
                             "reference hits", err));
         list->hits[list->count++] = hit;
@@ -162,6 +179,28 @@ static double near_of(const ray_image *rays, size_t i)
     return rays->near == NULL ? 0 : (double)rays->near[i];
 }
 
+/* Ray i; with packet_order, in the order of the ray in the second row and column of its 4 x 4 pixels, or,
+   where that is none, of the first of them that is one. */
+static void see(const trace_settings *s, const ray_image *rays, size_t i, sight *out)
+{
+    enum { SIDE = 4 };
+    const size_t width = (size_t)rays->width, x0 = i % width / SIDE * SIDE, y0 = i / width / SIDE * SIDE;
+    ray_of(rays, i, out->origin, out->dir);
+    out->near = near_of(rays, i);
+    out->far = far_of(rays, i);
+    out->own_order = !s->packet_order;
+    for (int lane = -1; lane < SIDE * SIDE && s->packet_order; lane++) {
+        const size_t x = x0 + (size_t)(lane < 0 ? 1 : lane % SIDE),
+                     y = y0 + (size_t)(lane < 0 ? 1 : lane / SIDE);
+        double origin[3];
+        if (x >= width || y >= (size_t)rays->height)
+            continue;
+        ray_of(rays, y * width + x, origin, out->order_dir);
+        if (dvec_dot(out->order_dir, out->order_dir) > 0)
+            break;
+    }
+}
+
 typedef struct forward_job {
     const reference_scene *scene;
     const trace_settings *s;
@@ -177,12 +216,12 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
     const forward_job *job = context;
     hit_list list = {0};
     for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++) {
-        double origin[3], dir[3], transmittance;
-        ray_of(job->rays, i, origin, dir);
-        job->status[block] = gather(job->all, job->scene->count, job->s, origin, dir, near_of(job->rays, i),
-                                    far_of(job->rays, i), &list, NULL);
+        double transmittance;
+        sight ray;
+        see(job->s, job->rays, i, &ray);
+        job->status[block] = gather(job->all, job->scene->count, job->s, &ray, &list, NULL);
         const double before = job->rays->near != NULL ? (double)job->rays->through[i] : 1;
-        const size_t n = blend(job->scene, job->s, &list, dir, before, job->rgb + 3 * i, &transmittance);
+        const size_t n = blend(job->scene, job->s, &list, ray.dir, before, job->rgb + 3 * i, &transmittance);
         if (job->transmittance != NULL)
             job->transmittance[i] = transmittance;
         if (job->blended != NULL)
@@ -286,11 +325,11 @@ gbt_status reference_scene_backward(const reference_scene *scene, const trace_se
     hit_list list = {0};
     gbt_status status = prepare_all(scene, s, &all, err);
     for (size_t i = 0; i < ray_image_count(rays) && status == GBT_OK; i++) {
-        double origin[3], dir[3];
-        ray_of(rays, i, origin, dir);
-        status = gather(all, scene->count, s, origin, dir, near_of(rays, i), far_of(rays, i), &list, err);
+        sight ray;
+        see(s, rays, i, &ray);
+        status = gather(all, scene->count, s, &ray, &list, err);
         if (status == GBT_OK)
-            ray_backward(scene, all, s, origin, dir, &list, d_rgb + 3 * i,
+            ray_backward(scene, all, s, ray.origin, ray.dir, &list, d_rgb + 3 * i,
                          d_transmittance != NULL ? d_transmittance[i] : 0, d_gaussians, d_background);
     }
     mem_free(list.hits);
@@ -303,10 +342,13 @@ gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_se
                                     size_t *count, size_t *capacity, gbt_error *err)
 {
     hit_list list = {*hits, 0, *capacity};
+    sight ray = {.far = HUGE_VAL, .own_order = true};
+    memcpy(ray.origin, origin, sizeof ray.origin);
+    memcpy(ray.dir, dir, sizeof ray.dir);
     prepared *all = NULL;
     gbt_status status = prepare_all(scene, s, &all, err);
     if (status == GBT_OK)
-        status = gather(all, scene->count, s, origin, dir, 0, HUGE_VAL, &list, err);
+        status = gather(all, scene->count, s, &ray, &list, err);
     mem_free(all);
     *hits = list.hits;
     *capacity = list.capacity;

@@ -20,6 +20,7 @@
 
 typedef struct reference_hit {
     double t, alpha, d2; /* t = t_c, in lengths of the direction */
+    double order;        /* what hits are sorted by: t, or with packet_order the t of the packet's ray */
     uint32_t id;
 } reference_hit;
 
@@ -41,7 +42,8 @@ gbt_status reference_scene_make(const gaussians *g, reference_scene *out, gbt_er
 void reference_scene_free(reference_scene *scene); /* zeroes the struct */
 
 /**
- * All hits of one ray with alpha >= alpha_min, sorted by (t, id).
+ * All hits of one ray with alpha >= alpha_min, sorted by (t, id). A ray alone has no packet, and packet_order
+ * is not heeded.
  *
  * @param hits, capacity [in,out] array that grows by mem_reserve(); start from NULL and 0, free with
  *              mem_free()

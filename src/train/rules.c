@@ -27,7 +27,7 @@ static train_rules own_rules(const gbt_train_def *def)
         .start_level = def->start_level,
         .step_pixels = TRAIN_STEP_PIXELS,
         .splats_until = def->splats_until,
-        .loose_cutoffs = true,
+        .loose_rays = true,
         .raises_first_opacity = true,
         .last_step_learns = true,
         .own_rates = true,

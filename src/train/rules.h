@@ -41,16 +41,17 @@ typedef struct train_rules {
                          draws them */
 
     /* a step */
-    bool counts_from_one;      /* rates and growth go by the progress after a step, and growth leaves
-                                  out its first and last one; else by the progress before it */
-    bool last_step_learns;     /* else nothing changes in the last step of a run */
-    int start_level;           /* first steps look at 1 pixel in 4^this */
-    double step_pixels;        /* a step looks at no more of a photo, and at 1 in 4^start_level of these
-                                  first */
-    double splats_until;       /* part of the run in which splats stand for rays */
-    bool loose_cutoffs;        /* SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN until SCHEDULE_WHOLE_FROM */
-    bool raises_first_opacity; /* of offsets that begin below 0 */
-    bool own_rates;            /* higher learning rates, that fall to nothing in the end */
+    bool counts_from_one;  /* rates and growth go by the progress after a step, and growth leaves
+                              out its first and last one; else by the progress before it */
+    bool last_step_learns; /* else nothing changes in the last step of a run */
+    int start_level;       /* first steps look at 1 pixel in 4^this */
+    double step_pixels;    /* a step looks at no more of a photo, and at 1 in 4^start_level of these
+                              first */
+    double splats_until;   /* part of the run in which splats stand for rays */
+    bool loose_rays;       /* SCHEDULE_ALPHA_MIN, SCHEDULE_T_MIN and one order for each packet of rays until
+                              SCHEDULE_EXACT_FROM */
+    bool raises_first_opacity;        /* of offsets that begin below 0 */
+    bool own_rates;                   /* higher learning rates, that fall to nothing in the end */
     bool anchors_learn_when_adjusted; /* else they miss the step in which anchors change */
 
     /* growing and pruning */

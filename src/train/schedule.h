@@ -72,9 +72,12 @@ float schedule_threshold_factor(double steps);
  */
 double schedule_rate_end(double steps);
 
-/** From here on all pixels, and the cut-offs of rendering; before, SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN:
-    half as many hits per ray. */
+/** From here on all pixels. */
 #define SCHEDULE_WHOLE_FROM 0.85
+
+/** From here on the cut-offs and the order of rendering. Before, SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN, which
+    leave half as many hits per ray, and trace_settings.packet_order. */
+#define SCHEDULE_EXACT_FROM 0.925
 #define SCHEDULE_ALPHA_MIN 0.02f
 #define SCHEDULE_T_MIN 0.003f
 

@@ -102,11 +102,8 @@ static const gbt_train_setting settings[] = {
      .help = "do not turn exposure on where the photos' exposures differ"},
     {NAMED("refine-poses", refine_poses), FLAG, .saved = true, .if_changed = true,
      .help = "learn the photos' poses, too, where they are not exact"},
-    {NAMED("splats-until", splats_until), RANGE(DOUBLE, 0, 1, "F"), .number = 0.7, .saved = true,
-     .rare = true,
-     .help =
-         "train by splatting, which is faster, up to this fraction of the run, then by ray tracing; 0: ray "
-         "tracing throughout"},
+    {NAMED("splats-until", splats_until), RANGE(DOUBLE, 0, 1, "F"), .saved = true, .rare = true,
+     .help = "train by splatting up to this fraction of the run, then by ray tracing"},
     {NAMED("grow-until", grow_until), RANGE(DOUBLE, 0, 1, "F"), .number = 0.5, .saved = true, .rare = true,
      .help = "grow and prune anchors up to this fraction of the run"},
     {NAMED("scale-factor", scale_factor), RANGE(DOUBLE, 0.01, 100, "F"), .or_zero = true, .number = 0,

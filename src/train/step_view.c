@@ -150,7 +150,6 @@ void step_view_pick(trainer *t, step_view *v, size_t index)
 
 /* ---- its render ---- */
 
-/* Splats teach a model that is still rough in half the time of rays, which have the last word. */
 static gbt_renderer renderer_of_step(const trainer *t, const gbt_camera *camera, double progress)
 {
     const bool rays =
@@ -167,9 +166,10 @@ static trace_settings settings_of(const trainer *t, const step_view *v, double p
 {
     trace_settings settings = t->settings;
     settings.t_near = step_view_near(t, v);
-    if (t->rules.loose_cutoffs && progress < SCHEDULE_WHOLE_FROM) {
+    if (t->rules.loose_rays && progress < SCHEDULE_EXACT_FROM) {
         settings.alpha_min = SCHEDULE_ALPHA_MIN;
         settings.transmittance_min = SCHEDULE_T_MIN;
+        settings.packet_order = true;
     }
     return settings;
 }

@@ -347,7 +347,7 @@ report $? "bench names kernels and their errors" "$(cat two.json)"
 prints "bench with little memory" '^tape, MB  *0.00$' $bench --memory 64
 prints "bench with a preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001, proxy radius inf; medians of 1$' $bench --preset fast
 prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.001, proxy radius 2; medians of 1$' $bench --preset fast --alpha-min 0.05 --alpha-max 0.9 --proxy-radius 2
-misuse 2 '--kernel: "tile,tile" (wanted list, tile, single, embree or splats, or some of them with commas between)' $bench --kernel tile,tile
+misuse 2 '--kernel: "tile,tile" (wanted list, packet, tile, single, embree or splats, or some of them with commas between)' $bench --kernel tile,tile
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
 misuse 2 "gaussians.ply: plain Gaussians know no cameras (wanted --camera FILE.json)" bench trace --model gaussians.ply
 mkdir alone && cp gaussians.ply alone && "$program" export gaussians.ply alone/gaussians.splat >out 2>err
@@ -513,7 +513,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     for file in plain.ply plain.splat plain.spz plain.glb; do
         prints "info of $file" "^$file: plain Gaussians$" info $file
     done
-    "$program" info run >out 2>err && grep -q '^  config    splats-until = 0.7$' out && ! grep -q '[0-9]\{15\}' out
+    "$program" info run >out 2>err && grep -q '^  config    footprint = 0.1$' out && ! grep -q '[0-9]\{15\}' out
     report $? "info writes numbers as people do" "$(cat out err)"
     misuse 2 "argument missing (usage: $("$program" export --help | sed -n 's/^usage: \(.*\) \[options\]$/\1/p'))" export run
     rm -f out # of the row before: an old one would be read as the address

@@ -83,7 +83,8 @@ run nearest plain --scale-prior nn --offsets 4 --distance on
 run compat plain --compat
 run raster plain --renderer raster
 run per-ray plain --renderer per-ray
-run rays plain --splats-until 0 --footprint 0
+run rays plain --footprint 0
+run splats-first plain --splats-until 0.7
 run exposure plain --exposure
 run masked-run masked
 run fisheye-run fisheye

@@ -317,7 +317,6 @@ static void a_bad_step_changes_nothing(void **state)
         gbt_train_def def = run_def();
         def.exposure = true;
         def.views = test < 2 ? 1 : 4;
-        def.splats_until = 0; /* the rasterizer refuses such a background */
         trainer t;
         step_report r;
         open_ok(&t, tiny, &def);
@@ -355,7 +354,6 @@ static void ten_bad_steps_end_the_run(void **state)
     for (int kind = 0; kind <= 1; kind++) {
         gbt_train_def def = run_def();
         def.exposure = cases[kind].exposure;
-        def.splats_until = 0;
         trainer t;
         step_report r;
         open_ok(&t, tiny, &def);

@@ -1154,8 +1154,7 @@ static void config_comes_back(void **state)
 
     def = gbt_train_def_default();
     config_text(&def, "d", text, sizeof text);
-    static const char *const shortest[] = {"\nsplats-until = 0.7\n", "\nfootprint = 0.1\n", "\nnear = 0.5\n",
-                                           "\nscale-factor = 0\n"};
+    static const char *const shortest[] = {"\nfootprint = 0.1\n", "\nnear = 0.5\n", "\nscale-factor = 0\n"};
     for (size_t i = 0; i < sizeof shortest / sizeof *shortest; i++)
         assert_non_null(strstr(text, shortest[i]));
     back.pace = "1";

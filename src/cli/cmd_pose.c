@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_pose.c -- gbtrace pose. */
 #include <stdio.h>
-#include <string.h>
 
 #include "cli/options.h"
 #include "gbtrace/pose.h"
@@ -48,9 +47,7 @@ static int run(const operands *given)
     gbt_error err = {0};
     const gbt_status status = gbt_pose(given->value[0], &def, out, stdout, &err);
     if (status == GBT_OK)
-        printf(strchr(out, ' ') != NULL ? "Train: gbtrace train '%s' -o RUN\n"
-                                        : "Train: gbtrace train %s -o RUN\n",
-               out);
+        printf("Train: gbtrace train %s%s%s -o RUN\n", shell_quote(out), out, shell_quote(out));
     return command_failed(status, &err);
 }
 

@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 
+#include "cli/command.h"
 #include "cli/progress.h"
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
@@ -24,5 +25,6 @@ gbt_status finish_run(const char *run, bool lossless, bool tensorboard, gbt_erro
 void finish_run_say(const char *run)
 {
     if (progress_for_people())
-        printf("Report: %s/report.html\nViewer: gbtrace view %s\n", run, run);
+        printf("Report: %s/report.html\nViewer: gbtrace view %s%s%s\n", run, shell_quote(run), run,
+               shell_quote(run));
 }

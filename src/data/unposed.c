@@ -26,6 +26,14 @@ bool unposed_is_photo(const char *name)
     return ends_as(name, endings, sizeof endings / sizeof *endings);
 }
 
+bool unposed_is_other_photo(const char *name)
+{
+    static const char *const endings[] = {".heic", ".heif", ".avif", ".webp", ".tif", ".tiff",
+                                          ".bmp",  ".jxl",  ".dng",  ".cr2",  ".cr3", ".nef",
+                                          ".arw",  ".raf",  ".orf",  ".rw2"};
+    return ends_as(name, endings, sizeof endings / sizeof *endings);
+}
+
 bool unposed_is_film(const char *name)
 {
     static const char *const endings[] = {".mp4", ".mov",  ".m4v", ".mkv", ".webm", ".avi",
@@ -33,7 +41,7 @@ bool unposed_is_film(const char *name)
     return ends_as(name, endings, sizeof endings / sizeof *endings);
 }
 
-bool unposed_has_photos(const char *folder, int depth)
+static bool has_files(const char *folder, int depth, bool (*wanted)(const char *name))
 {
     DIR *entries = opendir(folder);
     bool found = false;
@@ -43,19 +51,23 @@ bool unposed_has_photos(const char *folder, int depth)
         char path[PATH_SIZE];
         if (entry->d_name[0] == '.' || file_join(path, sizeof path, folder, entry->d_name, NULL) != GBT_OK)
             continue;
-        found = file_is_folder(path) ? depth > 0 && unposed_has_photos(path, depth - 1)
-                                     : unposed_is_photo(entry->d_name);
+        found =
+            file_is_folder(path) ? depth > 0 && has_files(path, depth - 1, wanted) : wanted(entry->d_name);
     }
     closedir(entries);
     return found;
 }
 
+bool unposed_has_photos(const char *folder, int depth) { return has_files(folder, depth, unposed_is_photo); }
+
 gbt_status unposed_check(const char *path, gbt_error *err)
 {
     const bool is_film = !file_is_folder(path) && unposed_is_film(path);
-    if (!is_film && !unposed_has_photos(path, 1))
+    if (!is_film && !unposed_has_photos(path, 1) && !has_files(path, 1, unposed_is_other_photo))
         return GBT_OK;
+    const char *quote =
+        strpbrk(path, " &;()") != NULL ? "'" : ""; /* as a shell takes the name for one word */
     return base_fail(err, GBT_ERR_FORMAT,
-                     "%s: %s without camera poses (find them with: gbtrace pose %s -o DATA)", path,
-                     is_film ? "a film" : "photos", path);
+                     "%s: %s without camera poses (find them with: gbtrace pose %s%s%s -o DATA)", path,
+                     is_film ? "a film" : "photos", quote, path, quote);
 }

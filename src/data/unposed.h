@@ -10,6 +10,9 @@
 /** Whether a file name ends as those of photos do that can be read: .jpg, .jpeg, .png. */
 bool unposed_is_photo(const char *name);
 
+/** Whether a file name ends as those of photos do that cannot: .heic, .webp, .tif, raw ones and others. */
+bool unposed_is_other_photo(const char *name);
+
 /** Whether a file name ends as those of films do: .mp4, .mov, .mkv and others. */
 bool unposed_is_film(const char *name);
 

@@ -23,9 +23,11 @@ typedef struct job {
     char data[JOB_PATH_SIZE], images[JOB_PATH_SIZE], work[JOB_PATH_SIZE], database[JOB_PATH_SIZE],
         models[JOB_PATH_SIZE]; /* DATA, DATA/images, DATA/colmap and in it */
     size_t photo_count, photo_capacity;
-    job_photo *photos; /* sorted by name */
-    int groups;        /* more than JOB_GROUPS_MAX: every photo has a camera of its own */
-    size_t left_out;   /* files that are no usable photos */
+    job_photo *photos;         /* sorted by name */
+    int groups;                /* more than JOB_GROUPS_MAX: every photo has a camera of its own */
+    size_t left_out;           /* files that are no usable photos */
+    size_t other_count;        /* photos in formats that are not read */
+    char other[JOB_PATH_SIZE]; /* the name of the first of them */
 } job;
 
 /** The path of a file in DATA/colmap. */

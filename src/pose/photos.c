@@ -75,6 +75,8 @@ static gbt_status walk(job *j, const char *root, const char *below, int depth, g
                 status = walk(j, root, name, depth + 1, err);
         } else if (status == GBT_OK && unposed_is_photo(name)) {
             status = take_photo(j, path, name, err);
+        } else if (status == GBT_OK && unposed_is_other_photo(name) && j->other_count++ == 0) {
+            snprintf(j->other, sizeof j->other, "%s", name);
         }
     }
     closedir(entries);
@@ -91,6 +93,10 @@ gbt_status photos_list(job *j, const char *folder, gbt_error *err)
     GBT_TRY(walk(j, folder, "", 0, err));
     if (j->left_out > WARNINGS_MAX)
         log_warn("left out: %zu files more", j->left_out - WARNINGS_MAX);
+    if (j->other_count > 0)
+        log_warn("left out: %zu photos in formats that are not read, %s for one: convert them to JPEG "
+                 "(HEIC: heif-convert, in Debian's libheif-examples)",
+                 j->other_count, j->other);
     if (j->photo_count < 3)
         return base_fail(err, GBT_ERR_FORMAT, "%s: %zu photos (wanted 3 or more, PNG or JPEG)", folder,
                          j->photo_count);

@@ -39,9 +39,13 @@ says "photos and data in one folder" 2 "^error: my photos: the photos are in the
 says "a folder that holds another data set" 2 "^error: three/sparse: is there already (name another folder)" pose "my photos" -o three
 [ ! -e three/colmap ] && [ ! -e a ]
 report $? "and nothing was made" "$(ls three)"
-says "train names the command" 3 "^error: my photos: photos without camera poses (find them with: gbtrace pose my photos -o DATA)" train "my photos" -o run
+says "train names the command" 3 "^error: my photos: photos without camera poses (find them with: gbtrace pose 'my photos' -o DATA)" train "my photos" -o run
 touch film.mp4
 says "and for a film" 3 "^error: film.mp4: a film without camera poses (find them with: gbtrace pose film.mp4 -o DATA)" train film.mp4 -o run
+
+mkdir phone && touch phone/IMG_1.HEIC phone/IMG_2.HEIC
+says "photos of a phone that are not read" 3 "^warning: left out: 2 photos in formats that are not read, IMG_[12].HEIC for one: convert them" pose phone -o a
+says "train, of the same photos" 3 "^error: phone: photos without camera poses" train phone -o run
 
 # ---- no tools
 mkdir none

@@ -172,6 +172,16 @@ const gbt_train_setting *gbt_train_setting_at(size_t index);
 void gbt_set_threads(int threads);
 
 /**
+ * Memory that the process shall take for everything that follows, bytes; 0: no limit. Large arrays are then
+ * in files without a name in `folder` (docs/memory.md), which must be on a disk. Results do not depend on it.
+ * What cannot be let go of may still take more. gbt_train() with gbt_train_def.memory does this for its own
+ * time.
+ *
+ * @return GBT_OK, or GBT_ERR_IO when no file can be made there
+ */
+gbt_status gbt_set_memory(size_t bytes, const char *folder, gbt_error *err);
+
+/**
  * For the start of a program: `end` is called, on any thread, when an allocation fails inside a library
  * that leaves no way back (OpenImageIO, oneTBB, jansson). It must end the process. Without this such a
  * failure becomes GBT_ERR_NO_MEMORY where the library lets it; where it does not, the process ends by

@@ -28,7 +28,8 @@ gbt_status rows_resize(float **arrays, const row_field *fields, int field_count,
             wanted = count;
         float *bigger[ROWS_FIELDS_MAX] = {NULL};
         for (int f = 0; f < field_count; f++) {
-            bigger[f] = mem_alloc(wanted, row_field_width(&fields[f], offset_count) * sizeof(float), what, err);
+            bigger[f] =
+                mem_alloc(wanted, row_field_width(&fields[f], offset_count) * sizeof(float), what, err);
             if (bigger[f] == NULL) {
                 while (f-- > 0)
                     mem_free(bigger[f]);

@@ -2,8 +2,8 @@
 /* base/memory.h -- the only allocator: checked sizes, 64-byte alignment, a failure switch for tests, a count
    of bytes in use.
 
-   Every array of the library is owned by the object that allocated it here and is freed with mem_free(). Below
-   a limit large ones are in files (base/paged.h). */
+   Every array of the library is owned by the object that allocated it here and is freed with mem_free().
+   Below a limit large ones are in files (base/paged.h). */
 #ifndef GBT_BASE_MEMORY_H
 #define GBT_BASE_MEMORY_H
 

@@ -17,7 +17,7 @@
 #include "base/large_file.h"
 #include "base/memory.h"
 
-enum { MAPPINGS_MOST = 4096, PAGE_LEAST = 4096 };
+enum { MAPPINGS_MOST = 512, PAGE_LEAST = 4096 };
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static struct {

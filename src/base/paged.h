@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/paged.h -- a process below a limit: its large arrays are mapped from unnamed files, whose pages are let
-   go of when it takes more than it may, and come back when they are touched. */
+/* base/paged.h -- a process below a limit: its large arrays are mapped from unnamed files, whose pages are
+   let go of when it takes more than it may, and come back when they are touched. */
 #ifndef GBT_BASE_PAGED_H
 #define GBT_BASE_PAGED_H
 
@@ -13,7 +13,8 @@
 #define PAGED_LEAST_BYTES ((size_t)1 << 18)
 
 /**
- * From now on mem_alloc() maps large arrays from files in `folder`; until paged_stop(). For the whole process.
+ * From now on mem_alloc() maps large arrays from files in `folder`; until paged_stop(). For the whole
+ * process.
  *
  * @param limit [in] bytes of resident memory above which paged_check() lets go
  * @return GBT_OK, or GBT_ERR_IO when no file can be made there
@@ -32,8 +33,9 @@ void paged_stop(void);
  */
 void paged_check(void);
 
-/** For mem_alloc(): `bytes` of zeros, mapped from a file. `*out` stays NULL before paged_start(), and where there
-    are fewer than PAGED_LEAST_BYTES or very many arrays. @return GBT_OK, or GBT_ERR_IO: the disk is full */
+/** For mem_alloc(): `bytes` of zeros, mapped from a file. `*out` stays NULL before paged_start(), and where
+   there are fewer than PAGED_LEAST_BYTES or very many arrays. @return GBT_OK, or GBT_ERR_IO: the disk is full
+ */
 gbt_status paged_map(size_t bytes, const char *what, void **out, gbt_error *err);
 
 /** For mem_free(): true when `pointer` was mapped; it is no more. */

@@ -8,11 +8,12 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/paged.h"
 #include "base/parallel.h"
 #include "bvh/binary_tree.h"
 #include "bvh/device.h"
 
-enum { CHECK_BLOCK = 65536, LEAF_BLOCK = 1024, MEDIAN_SAMPLES = 4095 };
+enum { CHECK_BLOCK = 65536, LEAF_BLOCK = 1024, MEDIAN_SAMPLES = 4095, CHECK_NODES = 1 << 12 };
 
 typedef struct leaf_place {
     const binary_leaf *members;
@@ -147,6 +148,8 @@ static uint32_t add_node(builder *b)
                                 "points.nodes", b->err);
     if (b->status != GBT_OK)
         return 0;
+    if (t->node_count % CHECK_NODES == 0)
+        paged_check();
     t->nodes = nodes;
     memset(&t->nodes[t->node_count], 0, sizeof *t->nodes);
     return (uint32_t)t->node_count++;
@@ -252,6 +255,8 @@ static void fill_nodes(point_tree *t)
 {
     for (size_t at = t->node_count; at-- > 0;) {
         point_node *node = &t->nodes[at];
+        if (at % CHECK_NODES == 0)
+            paged_check();
         for (int i = 0; i < POINT_WIDTH; i++) {
             const int from = i < node->child_count ? i : 0;
             const lane_sum s = node->size[from] > 0 ? sum_leaf(t, node->child[from], node->size[from])

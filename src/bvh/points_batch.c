@@ -6,10 +6,11 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/paged.h"
 #include "base/parallel.h"
 #include "bvh/point_tree.h"
 
-enum { GRAIN_MIN = 256, GRAIN_MAX = 32768, BLOCKS_WANTED = 64, CODE_BITS = 10, SPACING_MAX = 64 };
+enum { GRAIN_MIN = 256, GRAIN_MAX = 32768, BLOCKS_WANTED = 64, CODE_BITS = 10, SPACING_MAX = 64, CHECK_QUERIES = 1024 };
 
 /* A function of the number of queries alone. */
 static size_t grain_of(size_t count)
@@ -99,6 +100,8 @@ static void nearest_block(size_t block, size_t begin, size_t end, void *context)
     uint64_t *order = order_of(job->tree, job->query, begin, end, &failed->error);
     for (size_t n = 0; n < end - begin && order != NULL; n++) {
         const size_t i = begin + (uint32_t)order[n];
+        if (n % CHECK_QUERIES == 0)
+            paged_check();
         point_query q = {.what = POINTS_CONTAINING};
         for (size_t j = 0; j < 3; j++)
             q.a[j] = number_at(job->query, 3 * i + j);
@@ -167,6 +170,8 @@ static void spacing_block(size_t block, size_t begin, size_t end, void *context)
     uint64_t *order = order_of(job->tree, job->position, begin, end, &job->failure[block].error);
     for (size_t n = 0; n < end - begin && order != NULL; n++) {
         const size_t i = begin + (uint32_t)order[n];
+        if (n % CHECK_QUERIES == 0)
+            paged_check();
         const double p[3] = {number_at(job->position, 3 * i), number_at(job->position, 3 * i + 1),
                              number_at(job->position, 3 * i + 2)};
         const size_t found = point_tree_nearest(job->tree, p, job->k, i, index, d2);

@@ -25,6 +25,7 @@ static const option *options(int *count)
          .value = &def.lpips,
          .value_name = "FILE",
          .help = LPIPS_HELP},
+        MEMORY_OPTION,
         THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;

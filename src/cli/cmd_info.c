@@ -9,6 +9,7 @@ static const option *options(int *count)
 {
     static const option rows[] = {
         {.name = "json", .kind = OPTION_FLAG, .value = &json, .help = "print JSON"},
+        MEMORY_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

@@ -65,6 +65,7 @@ static const option *options(int *count)
          .value = &def.mesh,
          .help = "write each ball as a sphere mesh instead of a point"},
         JSON_OPTION(&json, "write the counts to this file"),
+        MEMORY_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

@@ -3,6 +3,13 @@
 #include "cli/options.h"
 #include "gbtrace/evaluate.h"
 
+static const option *options(int *count)
+{
+    static const option rows[] = {MEMORY_OPTION};
+    *count = sizeof rows / sizeof *rows;
+    return rows;
+}
+
 static int run(const operands *given)
 {
     gbt_error err = {0};
@@ -13,6 +20,7 @@ static int run(const operands *given)
 const command command_report = {.name = "report",
                                 .summary = "write the report of a run again, with the charts of studies",
                                 .usage = "RUN [STUDY...]",
+                                .options = options,
                                 .min_operands = 1,
                                 .max_operands = OPTIONS_MAX_OPERANDS,
                                 .run = run};

@@ -66,7 +66,11 @@ static int run(const operands *given)
     if (status == GBT_OK)
         status = gbt_train(given->count > 0 ? given->value[0] : NULL, output, &def, &err);
     if (status == GBT_OK)
+        status = gbt_set_memory(def.memory, output, &err);
+    if (status == GBT_OK)
         status = finish_run(output, lossless, def.tensorboard, &err);
+    if (status == GBT_OK)
+        status = options_memory_kept(def.memory, &err);
     if (status == GBT_OK)
         finish_run_say(output);
     return command_failed(status, &err);

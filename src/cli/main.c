@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -60,7 +61,15 @@ static int run(const command *self, int argc, char **argv)
     const bool first = gbt_cluster_rank() == 0;
     if (!self->shares_work)
         gbt_cluster_close(0, NULL);
-    return first || self->shares_work ? self->run(&given) : 0;
+    if (!first && !self->shares_work)
+        return 0;
+    gbt_error err = {0};
+    const char *folder = getenv("TMPDIR");
+    if (options_memory > 0 && /* not /tmp, which may be memory itself */
+        gbt_set_memory(options_memory, folder != NULL ? folder : "/var/tmp", &err) != GBT_OK)
+        return command_failed(err.status, &err);
+    const int done = self->run(&given);
+    return done == 0 ? command_failed(options_memory_kept(options_memory, &err), &err) : done;
 }
 
 static int dispatch(int argc, char **argv)

@@ -6,12 +6,25 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 
 #include "cli/progress.h"
 
 enum { GO_ON = -1, TABLE_MAX = OPTIONS_MAX + OPTIONS_COMMON };
 
 int options_threads;
+size_t options_memory;
+
+gbt_status options_memory_kept(size_t limit, gbt_error *err)
+{
+    struct rusage used;
+    if (limit == 0 || getrusage(RUSAGE_SELF, &used) != 0 || (size_t)used.ru_maxrss * 1024 <= limit)
+        return GBT_OK;
+    err->status = GBT_ERR_NO_MEMORY;
+    snprintf(err->text, sizeof err->text, "memory: %zu MB is too little: this took %ld (all is done)",
+             limit >> 20, (used.ru_maxrss >> 10) + 1);
+    return err->status;
+}
 
 /* ---- the table: a command's own rows, then those that every command has ---- */
 
@@ -52,6 +65,7 @@ void options_table(const command *self, option_table *t)
     int own = 0;
     const option *rows = self->options != NULL ? self->options(&own) : NULL;
     options_threads = 0;
+    options_memory = 0;
     wanted_progress = PROGRESS_AUTO;
     config_path = NULL;
     first_operand = NULL;

@@ -57,6 +57,20 @@ typedef struct option {
     }
 extern int options_threads;
 
+/** The row of a command whose data may be larger than memory; it is kept for it as for gbt_set_memory(). */
+#define MEMORY_OPTION                                                                                        \
+    {                                                                                                        \
+        .name = "memory", .kind = OPTION_SIZE, .value = &options_memory, .min = 0, .max = 0x1p60,            \
+        .value_name = "BYTES",                                                                               \
+        .help = "memory to take at most, such as 1G (docs/memory.md); does not change the result; 0: no "    \
+                "limit",                                                                                     \
+        .rare = true                                                                                         \
+    }
+extern size_t options_memory;
+
+/** GBT_OK, or a line that says how much more than so many bytes the process has taken; 0: no limit. */
+gbt_status options_memory_kept(size_t limit, gbt_error *err);
+
 /* Rows that several commands have; each says where the value goes. */
 #define DATA_OPTION(place, text)                                                                             \
     {                                                                                                        \

@@ -8,9 +8,10 @@
 #include <stdio.h>
 
 #include "data/scene.h"
+#include "train/memory_need.h"
 
 typedef struct expectation {
-    double bytes;         /* peak memory */
+    memory_need memory;
     double step_seconds;  /* one iteration, the mean over a run with a budget */
     double score_seconds; /* the held-out views: rendered, compared, written */
     int threads;          /* that the times are for */

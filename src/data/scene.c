@@ -26,11 +26,13 @@
 
 enum { PATH_SIZE = RAW_NAME_LIMIT + 4096, CHECK_NUMBERS = 1 << 16 };
 
-static gbt_status load_file(const char *path, source_file *out, unsigned char **owned, gbt_error *err)
+static gbt_status load_file(const char *path, raw_scene *raw, source_file *out, unsigned char **owned,
+                            gbt_error *err)
 {
     *out = (source_file){.name = path};
     const gbt_status status = file_read(path, owned, &out->size, err);
     out->bytes = *owned;
+    raw->file_bytes += out->size;
     return status;
 }
 
@@ -93,7 +95,7 @@ static gbt_status load_colmap(const char *model, const char *ending, raw_scene *
             status = base_fail(err, GBT_ERR_IO, "%s: missing (wanted cameras, images and points3D together)",
                                paths[i]);
         if (status == GBT_OK)
-            status = load_file(paths[i], &loaded[i], &owned[i], err);
+            status = load_file(paths[i], raw, &loaded[i], &owned[i], err);
     }
     const colmap_files files = {.cameras = loaded[0], .images = loaded[1], .points = loaded[2]};
     if (status == GBT_OK)
@@ -114,7 +116,7 @@ static gbt_status load_points(const char *path, raw_scene *raw, gbt_error *err)
 {
     source_file file;
     unsigned char *owned;
-    GBT_TRY(load_file(path, &file, &owned, err));
+    GBT_TRY(load_file(path, raw, &file, &owned, err));
     const gbt_status status = ply_read_points(&file, raw, err);
     mem_free(owned);
     return status;
@@ -126,7 +128,7 @@ static gbt_status add_transforms(const char *path, const char *folder, raw_scene
     source_file file;
     unsigned char *owned;
     char *points_name = NULL;
-    GBT_TRY(load_file(path, &file, &owned, err));
+    GBT_TRY(load_file(path, raw, &file, &owned, err));
     gbt_status status = transforms_read(&file, folder, raw, &points_name, err);
     mem_free(owned);
     if (status == GBT_OK && points_name != NULL && raw->position == NULL) {
@@ -308,6 +310,7 @@ static gbt_status place(raw_scene *raw, scene *out, gbt_error *err)
     out->view_count = raw->view_count;
     out->points_dropped = raw->points_dropped;
     out->photos_missing = raw->photos_missing;
+    out->file_bytes = raw->file_bytes;
     memcpy(out->missing_names, raw->missing_names, sizeof out->missing_names);
     out->has_split = raw->has_split;
     return GBT_OK;

@@ -53,6 +53,7 @@ typedef struct scene {
     scene_points points;
     size_t points_dropped;   /* non-finite ones */
     size_t photos_missing;   /* views left out because their photo is not there */
+    size_t file_bytes;       /* of the files that say all this, without photos */
     char missing_names[256]; /* of the first of them */
     bool has_split;          /* the data set itself says which views are held out */
 } scene;

@@ -25,6 +25,12 @@
 
 void gbt_set_threads(int threads) { parallel_set_threads(threads); }
 
+gbt_status gbt_set_memory(size_t bytes, const char *folder, gbt_error *err)
+{
+    paged_stop();
+    return bytes > 0 ? paged_start(folder, bytes / 4 * 3, err) : GBT_OK; /* the rest is for what must stay */
+}
+
 /* ---- the run's folder ---- */
 
 static gbt_status name_paths(const char *run, run_paths *p, gbt_error *err)
@@ -217,8 +223,8 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
                                const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
     const double begin = clock_wall();
-    if (def->memory > 0) /* what else there is must fit into the rest */
-        GBT_TRY(paged_start(run, def->memory / 4 * 3, err));
+    if (def->memory > 0)
+        GBT_TRY(gbt_set_memory(def->memory, run, err));
     if (def->resume)
         GBT_TRY(resume_open(t, data, run, paths->checkpoint, paths->checkpoint_previous, def, strings, err));
     else

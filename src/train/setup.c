@@ -18,6 +18,7 @@
 #include "train/light.h"
 #include "train/seed_points.h"
 #include "train/camera_sees.h"
+#include "train/memory_need.h"
 #include "train/near.h"
 #include "train/trainer.h"
 
@@ -242,6 +243,20 @@ static void choose_downscale(trainer *t)
                  t->def.downscale);
 }
 
+/* Before any work: a limit that cannot be kept. */
+static gbt_status check_memory(const trainer *t, gbt_error *err)
+{
+    const memory_need need = memory_need_of(&t->scene, t->def.downscale);
+    if (t->def.memory == 0 || (double)t->def.memory >= need.least)
+        return GBT_OK;
+    return base_fail(
+        err, GBT_ERR_NO_MEMORY,
+        "memory: %zu MB is too little: %zu points and photos of %d x %d take about %.0f, or %.0f "
+        "without a limit",
+        t->def.memory >> 20, t->scene.points.count, t->scene.views[0].camera.width,
+        t->scene.views[0].camera.height, need.least / 0x1p20, need.whole / 0x1p20);
+}
+
 /* Photos that differ in exposure contradict each other wherever they overlap. */
 static gbt_status choose_exposure(trainer *t, gbt_error *err)
 {
@@ -273,6 +288,7 @@ static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
     photo_check_all(&t->scene, &check);
     photo_check_warn(&check, data);
     choose_downscale(t);
+    GBT_TRY(check_memory(t, err));
     GBT_TRY(photos_open(&t->photos, &t->scene, def->downscale, err));
     if (def->memory > 0 && t->photos.bytes_max > def->memory / 4)
         t->photos.bytes_max = def->memory / 4;

@@ -16,7 +16,7 @@ static void values_stay_when_pages_go(void **state)
 {
     (void)state;
     assert_ok(paged_start("/tmp", 1, NULL)); /* always over the limit */
-    uint32_t *a = paged_alloc(NUMBERS, sizeof *a, "test", NULL);
+    uint32_t *a = mem_calloc(NUMBERS, sizeof *a, "test", NULL);
     assert_non_null(a);
     for (size_t i = 0; i < NUMBERS; i += 1021)
         assert_int_equal(a[i], 0);
@@ -25,6 +25,11 @@ static void values_stay_when_pages_go(void **state)
     const size_t before = mem_resident_bytes();
     paged_check();
     assert_true(mem_resident_bytes() + (size_t)NUMBERS * 3 < before);
+    void *longer = a;
+    size_t capacity = NUMBERS;
+    assert_ok(mem_reserve(&longer, &capacity, NUMBERS, NUMBERS + 1, sizeof *a, "test", NULL));
+    a = longer;
+    assert_true(mem_resident_bytes() < before); /* neither of them is whole in memory */
     for (size_t i = 0; i < NUMBERS; i += 7)
         if (a[i] != (uint32_t)(i * 2654435761u))
             fail_msg("value %zu has changed", i);
@@ -32,21 +37,28 @@ static void values_stay_when_pages_go(void **state)
     paged_check(); /* nothing is let go of any more */
     const size_t held = mem_resident_bytes();
     assert_true(held > (size_t)NUMBERS * 3);
-    paged_free(a);
+    mem_free(a);
     assert_true(mem_resident_bytes() + (size_t)NUMBERS * 3 < held); /* sanitizers keep memory of their own */
-    paged_free(NULL);
 }
 
-static void memory_when_it_is_not_started(void **state)
+static void small_arrays_are_memory(void **state)
 {
     (void)state;
-    float *a = paged_alloc(1000, sizeof *a, "test", NULL);
-    assert_non_null(a);
-    a[999] = 1;
-    paged_free(a);
+    void *out = state;
+    assert_ok(paged_map(PAGED_LEAST_BYTES, "test", &out, NULL)); /* not started */
+    assert_null(out);
+    assert_ok(paged_start("/tmp", 1, NULL));
+    assert_ok(paged_map(PAGED_LEAST_BYTES - 1, "test", &out, NULL));
+    assert_null(out);
+    assert_ok(paged_map(PAGED_LEAST_BYTES, "test", &out, NULL));
+    assert_non_null(out);
+    assert_true(paged_unmap(out));
+    assert_false(paged_unmap(out));
+    assert_false(paged_unmap(NULL));
     gbt_error err = {0};
-    assert_null(paged_alloc(SIZE_MAX, 8, "test", &err));
-    assert_int_equal(err.status, GBT_ERR_NO_MEMORY);
+    assert_null(mem_alloc((size_t)1 << 50, 1, "far too much", &err)); /* than there is on any disk */
+    assert_true(err.status == GBT_ERR_IO && strstr(err.text, "far too much") != NULL);
+    paged_stop();
 }
 
 static void folders_that_are_not_there(void **state)
@@ -60,18 +72,18 @@ static void folders_that_are_not_there(void **state)
 static void many_arrays(void **state)
 {
     (void)state;
-    enum { MANY = 300 }; /* more than can be mapped: the rest is memory */
-    unsigned char *a[MANY];
+    enum { MANY = 520 }; /* more than can be mapped: the rest is memory */
+    static unsigned char *a[MANY];
     assert_ok(paged_start("/tmp", 1, NULL));
     for (int i = 0; i < MANY; i++) {
-        a[i] = paged_alloc(70000, 1, "test", NULL);
+        a[i] = mem_alloc(PAGED_LEAST_BYTES, 1, "test", NULL);
         assert_non_null(a[i]);
-        memset(a[i], i, 70000);
+        a[i][PAGED_LEAST_BYTES - 1] = (unsigned char)i;
     }
     paged_check();
     for (int i = 0; i < MANY; i++) {
-        assert_int_equal(a[i][69999], i & 255);
-        paged_free(a[i]);
+        assert_int_equal(a[i][PAGED_LEAST_BYTES - 1], i & 255);
+        mem_free(a[i]);
     }
     paged_stop();
 }
@@ -112,7 +124,7 @@ static void a_file_by_pieces(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(values_stay_when_pages_go),  cmocka_unit_test(memory_when_it_is_not_started),
+        cmocka_unit_test(values_stay_when_pages_go),  cmocka_unit_test(small_arrays_are_memory),
         cmocka_unit_test(folders_that_are_not_there), cmocka_unit_test(many_arrays),
         cmocka_unit_test(a_file_by_pieces),
     };

@@ -12,6 +12,10 @@ add_test(NAME messages COMMAND ${SH_PROGRAM} -c "! grep -rnE '\"([^\"]*[^-\"a-z]
 # Functions of the C library whose last bits differ between x86-64 and ARM, or between its versions (docs/reliability.md).
 add_test(NAME functions COMMAND ${SH_PROGRAM} -c "! grep -rnE '(^|[^a-z_0-9])(hypot|cbrtf?|exp2f?|exp10f?|a?(sin|cos|tan)hf|a(sin|cos|tan|tan2)f|tanf|erfc?f?|[lt]gammaf?)\\(' --include=*.c --include=*.h src lab scenes"
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+find_program(PYTHON_PROGRAM python3)
+if(PYTHON_PROGRAM)
+  add_test(NAME mutants COMMAND ${PYTHON_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/mutate/mutate.py --check)
+endif()
 foreach(test site commands)
   add_test(NAME ${test} COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/test_${test}.sh ${CMAKE_SOURCE_DIR} $<TARGET_FILE:gbtrace>)
 endforeach()

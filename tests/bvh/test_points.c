@@ -118,6 +118,22 @@ static void one_ball(void **state)
     point_tree_free(tree);
 }
 
+/* Nodes keep a radius as a float: 0.7 is above the nearest one, and the query lies between them. */
+static void radii_of_nodes_are_not_too_small(void **state)
+{
+    (void)state;
+    const double center[3] = {0, 0, 0}, radius = 0.7, query[3] = {0.5 * ((double)0.7f + radius), 0, 0};
+    assert_true((double)0.7f < radius);
+    point_tree *tree = NULL;
+    assert_ok(point_tree_build(number_doubles(center), number_doubles(&radius), 1, &tree, NULL));
+    point_list list = {0};
+    const point_query around_it = {.what = POINTS_CONTAINING, .a = {query[0], query[1], query[2]}};
+    assert_ok(point_tree_list(tree, &around_it, &list, NULL));
+    assert_int_equal(list.count, 1);
+    point_list_free(&list);
+    point_tree_free(tree);
+}
+
 typedef struct ray_case {
     const char *name;
     float center[3], radius, origin[3], dir[3], t_min, t_max;
@@ -879,6 +895,7 @@ enum {
 int main(void)
 {
     const struct CMUnitTest others[] = {
+        cmocka_unit_test(radii_of_nodes_are_not_too_small),
         cmocka_unit_test(bad_queries_are_refused),
         cmocka_unit_test(bad_points_are_named),
         cmocka_unit_test(agrees_with_flann),

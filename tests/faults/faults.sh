@@ -102,7 +102,7 @@ try() { # name, goes on (yes or no), command...
         [ "$total" -gt 0 ] || [ "$call" = mkdir ] || [ "$name" = view ] || bad "$name" "no $call was counted: the shim does not work"
         each=$step
         case $call in
-        memory | library) [ "$step" = 1 ] && each=$((total / 200 + 1)) || each=$((total / 3 + 1)) ;; # there are thousands
+        memory | library) each=$((total / (step < 60 ? 200 / step : 3) + 1)) ;; # there are thousands
         esac
         for ((n = 1; n <= total; n += each)); do
             prepare

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 # tests/mutate/mutate.py -- changes single places of src/, and sees whether the tests of their room notice.
-"""usage: mutate.py [--count N] [--seed S] [--begin K] [--chosen] [--tree DIR] [FILE...]
+"""usage: mutate.py [--count N] [--seed S] [--begin K] [--chosen] [--check] [--tree DIR] [FILE...]
 
 Each mutant is one change of one line, in a copy of the tree under build/mutate: another comparison or arithmetic operator, another constant,
 a condition turned round, a statement left out. The tests of the file's room are built and run with it, the quickest first: a failed build of the
 tests, a failed test or one that takes much longer than before kills it; where the pictures' bits depend on a room, golden_avx2 comes last.
 --count draws so many at random from the files (default 20 from all of src/), those that do not compile not counted, from the K-th on; --chosen takes those of
-chosen.txt, with the tests that are named there; --tree puts the copy elsewhere. Prints one line for each, and totals; exit code 1 when one survives.
+chosen.txt, with the tests that are named there; --check only sees whether each of them can still be made; --tree puts the copy elsewhere. Prints one line for each, and totals; exit code 1 when one survives.
 """
 import argparse, glob, os, random, re, resource, shutil, signal, subprocess, sys
 
@@ -140,8 +140,7 @@ def judge(name, text, tests):
 
 
 def chosen(files):
-    """(file, line, old, new, tests) of chosen.txt; every old text must be in its file."""
-    every = tests_in(["*"])
+    """(file, line, old, new, names of tests) of chosen.txt; every old text must be in its file."""
     for row in open(os.path.join(here, "chosen.txt")):
         if row.startswith("#") or not row.strip():
             continue
@@ -151,7 +150,7 @@ def chosen(files):
         text = open(os.path.join(top, name)).read()
         if old not in text:
             sys.exit("mutate: chosen.txt: %s: no \"%s\"" % (name, old))
-        yield name, text[: text.index(old)].count("\n") + 1, old, new, [t for t in every if t[0] in names.split()]
+        yield name, text[: text.index(old)].count("\n") + 1, old, new, names.split()
 
 
 def main():
@@ -160,9 +159,13 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--begin", type=int, default=0)
     parser.add_argument("--chosen", action="store_true")
+    parser.add_argument("--check", action="store_true")
     parser.add_argument("--tree", default=os.path.join(top, "build", "mutate"))
     parser.add_argument("files", nargs="*")
     a = parser.parse_args()
+    if a.check:
+        print("%d changes can be made" % len(list(chosen([]))))
+        return 0
     global tree, build
     tree = os.path.abspath(a.tree)
     build = os.path.join(tree, "build", "release")
@@ -170,7 +173,8 @@ def main():
     if not run(["cmake", "--preset", "release"]):
         sys.exit("mutate: cmake --preset release failed in " + tree)
     if a.chosen:
-        work = [(m, m[4]) for m in chosen(a.files)]
+        every = tests_in(["*"])
+        work = [(m, [t for t in every if t[0] in m[4]]) for m in chosen(a.files)]
     else:
         names = a.files or sorted(subprocess.run(["git", "ls-files", "src/*.c", "src/*.h"], cwd=top, capture_output=True, text=True, check=True).stdout.split())
         every = [m for name in names for m in mutants_of(name)]

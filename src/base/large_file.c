@@ -12,6 +12,7 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/unnamed_file.h"
 
 static gbt_status set_name(large_file *out, const char *path, gbt_error *err)
 {
@@ -57,15 +58,8 @@ gbt_status large_file_create(const char *path, large_file *out, gbt_error *err)
 gbt_status large_file_scratch(const char *folder, large_file *out, gbt_error *err)
 {
     GBT_TRY(set_name(out, folder, err));
-    char path[LARGE_FILE_NAME];
-    if (snprintf(path, sizeof path, "%s/.gbtrace-XXXXXX", folder) >= (int)sizeof path)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", folder);
-    const int fd = mkstemp(path);
-    if (fd < 0)
-        return base_fail(err, GBT_ERR_IO, "%s: cannot create a temporary file: %s", folder, strerror(errno));
-    unlink(path);
+    GBT_TRY(unnamed_file_open(folder, &out->descriptor, err));
     out->open = true;
-    out->descriptor = fd;
     return GBT_OK;
 }
 

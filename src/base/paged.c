@@ -14,8 +14,7 @@
 #include <unistd.h>
 
 #include "base/fail.h"
-#include "base/large_file.h"
-#include "base/memory.h"
+#include "base/unnamed_file.h"
 
 enum { MAPPINGS_MOST = 512, PAGE_LEAST = 4096 };
 
@@ -27,17 +26,13 @@ static struct {
 static atomic_size_t mapping_end;    /* no mapping from here on */
 static atomic_size_t resident_limit; /* 0: not started */
 static atomic_size_t let_go_above;   /* the limit; or, where what stays is more, that and a little */
-static char place[LARGE_FILE_NAME];
+static char place[4096];
 
 gbt_status paged_start(const char *folder, size_t limit, gbt_error *err)
 {
-    large_file *probe = mem_calloc(1, sizeof *probe, "temporary file", err);
-    if (probe == NULL)
-        return GBT_ERR_NO_MEMORY;
-    const gbt_status status = large_file_scratch(folder, probe, err);
-    large_file_close(probe, false, NULL);
-    mem_free(probe);
-    GBT_TRY(status);
+    int probe;
+    GBT_TRY(unnamed_file_open(folder, &probe, err));
+    close(probe);
     pthread_mutex_lock(&lock);
     snprintf(place, sizeof place, "%s", folder);
     pthread_mutex_unlock(&lock);
@@ -48,15 +43,17 @@ gbt_status paged_start(const char *folder, size_t limit, gbt_error *err)
 
 void paged_stop(void) { atomic_store(&resident_limit, 0); }
 
-static gbt_status map_file(large_file *file, size_t bytes, const char *what, void **out, gbt_error *err)
+static gbt_status map_file(size_t bytes, const char *what, void **out, gbt_error *err)
 {
-    GBT_TRY(large_file_scratch(place, file, err));
+    int file;
+    GBT_TRY(unnamed_file_open(place, &file, err));
     /* Room on the disk now, or a write to the array would end the process later. */
-    const int failed = posix_fallocate(file->descriptor, 0, (off_t)bytes);
+    const int failed = posix_fallocate(file, 0, (off_t)bytes);
+    void *start = failed == 0 ? mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0) : MAP_FAILED;
+    close(file); /* the mapping keeps it */
     if (failed != 0)
         return base_fail(err, GBT_ERR_IO, "%s: no room for %zu bytes of %s: %s", place, bytes, what,
                          strerror(failed));
-    void *start = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file->descriptor, 0);
     if (start == MAP_FAILED)
         return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for %zu bytes", what, bytes);
     *out = start;
@@ -74,10 +71,7 @@ gbt_status paged_map(size_t bytes, const char *what, void **out, gbt_error *err)
     while (at < MAPPINGS_MOST && mappings[at].start != NULL)
         at++;
     if (at < MAPPINGS_MOST) {
-        static large_file file; /* two paths long, so not on the stack of a thread */
-        memset(&file, 0, sizeof file);
-        status = map_file(&file, bytes, what, out, err);
-        large_file_close(&file, false, NULL); /* the mapping keeps it */
+        status = map_file(bytes, what, out, err);
         mappings[at].start = *out;
         mappings[at].bytes = bytes;
         if (at >= atomic_load(&mapping_end))

@@ -10,7 +10,14 @@
 #include "base/parallel.h"
 #include "bvh/point_tree.h"
 
-enum { GRAIN_MIN = 256, GRAIN_MAX = 32768, BLOCKS_WANTED = 64, CODE_BITS = 10, SPACING_MAX = 64, CHECK_QUERIES = 1024 };
+enum {
+    GRAIN_MIN = 256,
+    GRAIN_MAX = 32768,
+    BLOCKS_WANTED = 64,
+    CODE_BITS = 10,
+    SPACING_MAX = 64,
+    CHECK_QUERIES = 1024
+};
 
 /* A function of the number of queries alone. */
 static size_t grain_of(size_t count)

@@ -69,7 +69,7 @@ void expect_print(const expectation *e, FILE *out)
     fprintf(out,
             "\n  memory    of that, MB: program %.0f; at first files %.0f, then trees %.0f, then anchors "
             "%.0f and a "
-            "view %.0f; all along points %.0f, photos %.0f; --memory can be %.0fM\n",
+            "view %.0f; all along points %.0f, photos %.0f; the least limit %.0f MiB\n",
             rounded(m->program / 1e6), rounded(m->reading / 1e6), rounded(m->trees / 1e6),
             rounded(m->anchors / 1e6), rounded(m->view / 1e6), rounded(m->points / 1e6),
             rounded(m->photos / 1e6), ceil(m->least / 0x1p20));

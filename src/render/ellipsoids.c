@@ -7,9 +7,11 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/paged.h"
 #include "base/parallel.h"
 #include "base/vec.h"
 
+enum { CHECK_SOLIDS = 1 << 12 };
 enum {
     FINE = 2 /* rays per pixel, in each direction */,
     BAND = 16 /* rows of rays that are drawn together */
@@ -223,8 +225,11 @@ gbt_status ellipsoids_draw(const ellipsoids *set, const gbt_camera *camera, imag
     if (status == GBT_OK) {
         for (size_t i = 0; i < rays; i++)
             d.depth[i] = INFINITY;
-        for (size_t i = 0; i < set->count; i++)
+        for (size_t i = 0; i < set->count; i++) {
             d.count += make_solid(set, i, &d, &solids[d.count]);
+            if (i % CHECK_SOLIDS == 0)
+                paged_check();
+        }
         thin_out(solids, &d.count);
         d.solids = solids;
         parallel_blocks((size_t)d.height, BAND, draw_band, &d);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/train/test_memory_limit.c -- a run below a limit is the run without one, and the kernel's peak is below
-   it. */
+/* tests/train/test_memory_limit.c -- a run below a limit is the run without one, and the kernel's peak is
+   below it. */
 #include "run_support.h"
 
 #include <sys/resource.h>
@@ -104,7 +104,8 @@ static void what_it_takes(void **state)
     s.points.count = 0;
     assert_true(s.file_bytes > 0 && small.reading > (double)s.file_bytes);
     assert_true(small.least > small.program && small.whole >= small.least);
-    assert_true(large.whole > small.whole && large.least > small.least && large.whole > large.least && fine.photos < large.photos);
+    assert_true(large.whole > small.whole && large.least > small.least && large.whole > large.least &&
+                fine.photos < large.photos);
     scene_free(&s);
 }
 

@@ -9,8 +9,9 @@
 enum { RUN_PATH_SIZE = 4096 };
 
 typedef struct run_paths {
-    char model[RUN_PATH_SIZE], config[RUN_PATH_SIZE], log[RUN_PATH_SIZE], events[RUN_PATH_SIZE], json[RUN_PATH_SIZE],
-        exposure[RUN_PATH_SIZE], poses[RUN_PATH_SIZE], checkpoint[RUN_PATH_SIZE], checkpoint_previous[RUN_PATH_SIZE];
+    char model[RUN_PATH_SIZE], config[RUN_PATH_SIZE], log[RUN_PATH_SIZE], events[RUN_PATH_SIZE],
+        json[RUN_PATH_SIZE], exposure[RUN_PATH_SIZE], poses[RUN_PATH_SIZE], checkpoint[RUN_PATH_SIZE],
+        checkpoint_previous[RUN_PATH_SIZE];
 } run_paths;
 
 /** Write all of them. */
@@ -27,8 +28,8 @@ typedef struct save_beside {
 } save_beside;
 
 /**
- * Begin one; `paths` are borrowed until save_finish(). Without memory for the copy it is done when this returns.
- * None may be under way: save_finish() first.
+ * Begin one; `paths` are borrowed until save_finish(). Without memory for the copy it is done when this
+ * returns. None may be under way: save_finish() first.
  */
 gbt_status save_begin(save_beside *s, const trainer *t, const run_paths *paths, gbt_error *err);
 

@@ -38,6 +38,9 @@ for count in 2 4; do
         cmp alone/exposure.json run$count/exposure.json
     report $? "$count processes: the same model" "$(cat out)"
 done
+"$program" train data -o alone8 --views 8 --iterations 15 --quiet >out 2>&1 && on 8 "$program" train data -o run8 --views 8 --iterations 15 --quiet >out 2>&1 &&
+    cmp alone8/model.gbt run8/model.gbt
+report $? "8 processes: the same model" "$(cat out)"
 grep -q '"bytes_per_step"' run4/train.json && ! grep -q '"bytes_per_step"' alone/train.json
 report $? "train.json says what was sent" "$(cat run4/train.json)"
 on 2 "$program" train data -o goes-on --views 4 --iterations 30 --exposure --stop-at-step 12 --quiet >out 2>err
@@ -110,4 +113,10 @@ report $? "a study by 2 processes" "$(cat out; diff one two)"
 # ---- commands that do not share their work
 on 2 "$program" info run2/model.gbt >out 2>&1 && [ "$(grep -c '^  size ' out)" = 1 ]
 report $? "info is told once" "$(cat out)"
+on 2 "$program" export run2 -o two.ply >out 2>err && "$program" export run2 -o one.ply >out1 2>&1 && cmp one.ply two.ply && [ "$(wc -l <out)" = "$(wc -l <out1)" ]
+report $? "an export is written once" "$(cat out err)"
+on 2 "$program" export nothing -o two.ply >out 2>err
+code=$?
+[ $code = 4 ] && [ "$(errors)" = 1 ]
+report $? "a failure to export is told once" "code $code: $(cat out err)"
 finish

@@ -29,21 +29,25 @@ faulty() { # CALL:N:WHAT, command
 
 # What a browser does, then SIGINT. A server that is still there after the fault must answer once more.
 viewed() {
-    local url='' server end target
+    local url='' server end='' target
     "${with[@]}" "$program" view case/run --data case/data --port 0 --threads 1 >address &
     server=$!
     while [ -z "$url" ] && kill -0 $server 2>/dev/null; do
         sleep 0.02
         url=$(head -n 1 address 2>/dev/null)
     done
-    for target in / '/render?view=0&format=png' '/render?view=0&format=jpeg' '/photo?view=0' '/render?view=1&format=png'; do
-        [ -n "$url" ] && kill -0 $server 2>/dev/null || break
+    ask() { # target
         (
             exec 3<>"/dev/tcp/127.0.0.1/$(echo "$url" | sed 's/.*:\([0-9]*\).*/\1/')" &&
-                printf 'GET %s HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n' "$target" >&3 && cat <&3 >answer
+                printf 'GET %s HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n' "$1" >&3 && cat <&3 >answer
         ) 2>/dev/null || : >answer
+        end=$(head -c 12 answer 2>/dev/null)
+    }
+    for target in / '/render?view=0&format=png' '/render?view=0&format=jpeg' '/photo?view=0' '/render?view=1&format=png'; do
+        [ -n "$url" ] && kill -0 $server 2>/dev/null || break
+        ask "$target"
     done
-    end=$(head -c 12 answer 2>/dev/null)
+    [ "$end" != "HTTP/1.1 500" ] || ask "$target" # the fault was in the last one
     kill -INT $server 2>/dev/null
     wait $server
     code=$?

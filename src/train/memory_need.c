@@ -9,7 +9,7 @@
 
 /* Measured on fox, plush, castle and a district of 3 million points (docs/memory.md). */
 static const double program_bytes = 150e6, raw_point_bytes = 36 + 24, point_bytes = 24, tree_bytes = 100,
-                    tree_fixed_bytes = 80, learning_point_bytes = 3000, model_point_bytes = 600,
+                    tree_fixed_bytes = 95, learning_point_bytes = 3000, model_point_bytes = 600,
                     step_pixel_bytes = 300, score_pixel_bytes = 120, kept_pixel_bytes = 3;
 static const double found_points = 20000, /* by photo consistency, where the data set has none */
     most_points = 131072;                 /* the tree of balls is 18 deep: more points make no more anchors */

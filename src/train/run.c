@@ -28,7 +28,7 @@ void gbt_set_threads(int threads) { parallel_set_threads(threads); }
 gbt_status gbt_set_memory(size_t bytes, const char *folder, gbt_error *err)
 {
     paged_stop();
-    return bytes > 0 ? paged_start(folder, bytes / 4 * 3, err) : GBT_OK; /* the rest is for what must stay */
+    return bytes > 0 ? paged_start(folder, bytes / 8 * 5, err) : GBT_OK; /* the rest is for what must stay */
 }
 
 /* ---- the run's folder ---- */

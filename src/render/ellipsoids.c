@@ -176,7 +176,9 @@ static void draw_band(size_t block, size_t begin, size_t end, void *context)
 /** The mean of each pixel's rays, over what is there. */
 static void blend(const drawing *d, image *out)
 {
-    for (int y = 0; y < out->height; y++)
+    for (int y = 0; y < out->height; y++) {
+        if (y % BAND == 0)
+            paged_check();
         for (int x = 0; x < out->width; x++) {
             float sum[4] = {0};
             for (int v = 0; v < FINE; v++)
@@ -193,6 +195,7 @@ static void blend(const drawing *d, image *out)
                 pixel[k] = (sum[k] + under * pixel[k]) / whole;
             pixel[3] = whole;
         }
+    }
 }
 
 /** Solids that all cover the picture hide one another: of more than can be drawn in seconds every n-th stays.
@@ -225,6 +228,7 @@ gbt_status ellipsoids_draw(const ellipsoids *set, const gbt_camera *camera, imag
     if (status == GBT_OK) {
         for (size_t i = 0; i < rays; i++)
             d.depth[i] = INFINITY;
+        paged_check();
         for (size_t i = 0; i < set->count; i++) {
             d.count += make_solid(set, i, &d, &solids[d.count]);
             if (i % CHECK_SOLIDS == 0)

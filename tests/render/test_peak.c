@@ -2,8 +2,8 @@
 /* tests/render/test_peak.c -- memory as the kernel counts it, of a file drawn below a limit, and the picture.
  */
 #include "test_support.h"
+#include "child.h"
 
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -51,29 +51,28 @@ static void write_scene(void)
     assert_ok(file_write_atomic(in_root("view.json"), camera, sizeof camera - 1, NULL));
 }
 
-/* In a process of its own. @return its largest resident memory */
+typedef struct drawing {
+    const char *out;
+    size_t memory;
+} drawing;
+
+static int render(void *context)
+{
+    const drawing *d = context;
+    gbt_render_def def = gbt_render_def_default();
+    def.camera = in_root("view.json");
+    def.format = GBT_PICTURE_EXR;
+    def.memory = d->memory;
+    gbt_error err = {0};
+    const gbt_status status = gbt_render(in_root("large.ply"), in_root(d->out), &def, &err);
+    if (status != GBT_OK)
+        fprintf(stderr, "%s\n", err.text);
+    return (int)status;
+}
+
 static size_t draw(const char *out, size_t memory, int *exit_code)
 {
-    struct rusage used;
-    int ended;
-    fflush(NULL);
-    const pid_t child = fork();
-    assert_true(child >= 0);
-    if (child == 0) {
-        gbt_render_def def = gbt_render_def_default();
-        def.camera = in_root("view.json");
-        def.format = GBT_PICTURE_EXR;
-        def.memory = memory;
-        gbt_error err = {0};
-        const gbt_status status = gbt_render(in_root("large.ply"), in_root(out), &def, &err);
-        if (status != GBT_OK)
-            fprintf(stderr, "%s\n", err.text);
-        _exit((int)status);
-    }
-    assert_int_equal(wait4(child, &ended, 0, &used), child);
-    assert_true(WIFEXITED(ended));
-    *exit_code = WEXITSTATUS(ended);
-    return (size_t)used.ru_maxrss * 1024;
+    return in_child(render, &(drawing){out, memory}, exit_code);
 }
 
 static void below_the_limit(void **state)

@@ -3,9 +3,7 @@
    below it. */
 #include "run_support.h"
 
-#include <sys/resource.h>
-#include <sys/wait.h>
-
+#include "child.h"
 #include "train/memory_need.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -17,24 +15,7 @@ enum { SANITIZED = 0 };
 enum { POINTS = 160000 };
 static const size_t limit = (size_t)220 << 20;
 
-/* In a process of its own, whose memory is not that of others. @return its largest resident memory */
-static size_t in_child(void (*work)(void *), void *context)
-{
-    struct rusage used;
-    int ended;
-    fflush(NULL);
-    const pid_t child = fork();
-    assert_true(child >= 0);
-    if (child == 0) {
-        work(context);
-        _exit(0);
-    }
-    assert_int_equal(wait4(child, &ended, 0, &used), child);
-    assert_true(WIFEXITED(ended) && WEXITSTATUS(ended) == 0);
-    return (size_t)used.ru_maxrss * 1024;
-}
-
-static void make_large_scene(void *folder)
+static int make_large_scene(void *folder)
 {
     gbt_make_scene_def def = gbt_make_scene_def_default();
     def.width = 64;
@@ -42,8 +23,7 @@ static void make_large_scene(void *folder)
     def.view_count = VIEWS;
     def.points = POINTS;
     def.samples = 1;
-    if (gbt_make_scene(&def, folder, NULL) != GBT_OK)
-        _exit(1);
+    return gbt_make_scene(&def, folder, NULL) != GBT_OK;
 }
 
 typedef struct limited_run {
@@ -52,7 +32,7 @@ typedef struct limited_run {
     gbt_status wanted;
 } limited_run;
 
-static void train(void *context)
+static int train(void *context)
 {
     const limited_run *r = context;
     gbt_error err = {0};
@@ -62,7 +42,15 @@ static void train(void *context)
     const gbt_status status = gbt_train(r->data, r->run, &def, &err);
     if (status != r->wanted)
         fprintf(stderr, "%s: %s\n", r->run, err.text);
-    _exit(status != r->wanted);
+    return status != r->wanted;
+}
+
+static size_t train_in_child(const char *data, const char *run, size_t memory)
+{
+    int failed;
+    const size_t peak = in_child(train, &(limited_run){data, run, memory, GBT_OK}, &failed);
+    assert_int_equal(failed, 0);
+    return peak;
 }
 
 static void the_same_run_in_less_memory(void **state)
@@ -72,12 +60,13 @@ static void the_same_run_in_less_memory(void **state)
         skip();
     char data[PATH_SIZE];
     snprintf(data, sizeof data, "%s", in_root("large"));
-    in_child(make_large_scene, data);
+    int failed;
+    in_child(make_large_scene, data, &failed);
+    assert_int_equal(failed, 0);
     char whole[PATH_SIZE], less[PATH_SIZE];
     snprintf(whole, sizeof whole, "%s", in_root("whole"));
     snprintf(less, sizeof less, "%s", in_root("less"));
-    const size_t without = in_child(train, &(limited_run){data, whole, 0, GBT_OK}),
-                 with = in_child(train, &(limited_run){data, less, limit, GBT_OK});
+    const size_t without = train_in_child(data, whole, 0), with = train_in_child(data, less, limit);
     print_message("%zu MB without a limit, %zu with %zu\n", without >> 20, with >> 20, limit >> 20);
     assert_true(without > limit && with <= limit);
     assert_same_file(in_root("whole/model.gbt"), in_root("less/model.gbt"));

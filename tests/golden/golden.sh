@@ -2,16 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 # tests/golden/golden.sh -- the bits of models, pictures and exports, on every instruction set and number of threads.
 #
-# Usage: golden.sh PROGRAM RECORD THREADS [ISA]
+# Usage: golden.sh PROGRAM RECORD THREADS [ISA [SCENES]]
 #
 # Makes small scenes, trains each kind of run on them, draws, exports, and hashes every file. RECORD holds the hashes as they were recorded,
 # under the name of the C library, image library and compiler whose arithmetic and files they have; elsewhere the comparison is skipped.
 # `golden.sh PROGRAM - THREADS ISA > RECORD` records. A change that should alter no result leaves RECORD as it is.
+# A folder SCENES gets the scenes if it is not there, and gives them if it is: so another processor is asked about the same scenes, and compared
+# whatever its name, because the sparse points of a procedural scene are found by Embree, whose arithmetic is another there.
 set -u
 program=$1
 record=$2
 threads=$3
 isa=${4:-}
+scenes=${5:-}
+[ -z "$scenes" ] || { mkdir -p "$(dirname "$scenes")" && scenes=$(cd "$(dirname "$scenes")" && pwd)/$(basename "$scenes"); } || exit 1
 [ "$record" = - ] || record=$(cd "$(dirname "$record")" && pwd)/$(basename "$record")
 . "$(dirname "$0")/../cli/report.sh"
 work=$(mktemp -d) || exit 1
@@ -45,28 +49,33 @@ make() { # RECIPE NAME OPTIONS...
     for photo in "$name"/images/*.png; do mv "photos/${photo##*/}" "$photo" || exit 1; done
     rm -r photos
 }
-make tabletop plain
-make courtyard bent --lens distorted
-# The same photos, said to be from another lens.
-cp -r plain fisheye
-{ head -c 12 plain/sparse/0/cameras.bin && printf '\5\0\0\0' && tail -c +17 plain/sparse/0/cameras.bin | head -c 48 && head -c 32 /dev/zero; } >fisheye/sparse/0/cameras.bin
-cp -r plain masked
-mkdir masked/masks
-for photo in plain/images/*.png; do cp plain/images/0003.png "masked/masks/${photo##*/}"; done
-mkdir pointless # cameras around, and no points
-cp -r plain/images pointless/
-{
-    printf '{"fl_x": 90, "fl_y": 90, "cx": 48, "cy": 36, "w": 96, "h": 72, "frames": ['
-    i=0
-    for c_s in '1 0' '0.70710678 0.70710678' '0 1' '-0.70710678 0.70710678' '-1 0' '-0.70710678 -0.70710678' '0 -1' '0.70710678 -0.70710678'; do
-        c=${c_s% *} s=${c_s#* }
-        [ $i = 0 ] || printf ','
-        # OpenGL axes: right (-s, c, 0), up (0, 0, 1), back (c, s, 0), at 3 times back
-        echo "$c $s $i" | awk '{printf "{\"file_path\": \"images/%04d.png\", \"transform_matrix\": [[%.9g,0,%.9g,%.9g],[%.9g,0,%.9g,%.9g],[0,1,0,0.5],[0,0,0,1]]}", $3, -$2, $1, 3*$1, $1, $2, 3*$2}'
-        i=$((i + 1))
-    done
-    printf ']}\n'
-} >pointless/transforms.json
+if [ -d "$scenes" ]; then
+    cp -r "$scenes"/. . || exit 1
+else
+    make tabletop plain
+    make courtyard bent --lens distorted
+    # The same photos, said to be from another lens.
+    cp -r plain fisheye
+    { head -c 12 plain/sparse/0/cameras.bin && printf '\5\0\0\0' && tail -c +17 plain/sparse/0/cameras.bin | head -c 48 && head -c 32 /dev/zero; } >fisheye/sparse/0/cameras.bin
+    cp -r plain masked
+    mkdir masked/masks
+    for photo in plain/images/*.png; do cp plain/images/0003.png "masked/masks/${photo##*/}"; done
+    mkdir pointless # cameras around, and no points
+    cp -r plain/images pointless/
+    {
+        printf '{"fl_x": 90, "fl_y": 90, "cx": 48, "cy": 36, "w": 96, "h": 72, "frames": ['
+        i=0
+        for c_s in '1 0' '0.70710678 0.70710678' '0 1' '-0.70710678 0.70710678' '-1 0' '-0.70710678 -0.70710678' '0 -1' '0.70710678 -0.70710678'; do
+            c=${c_s% *} s=${c_s#* }
+            [ $i = 0 ] || printf ','
+            # OpenGL axes: right (-s, c, 0), up (0, 0, 1), back (c, s, 0), at 3 times back
+            echo "$c $s $i" | awk '{printf "{\"file_path\": \"images/%04d.png\", \"transform_matrix\": [[%.9g,0,%.9g,%.9g],[%.9g,0,%.9g,%.9g],[0,1,0,0.5],[0,0,0,1]]}", $3, -$2, $1, 3*$1, $1, $2, 3*$2}'
+            i=$((i + 1))
+        done
+        printf ']}\n'
+    } >pointless/transforms.json
+    [ -z "$scenes" ] || { mkdir "$scenes" && cp -r gaussians.ply plain bent fisheye masked pointless "$scenes"; } || exit 1
+fi
 
 # ---- what is made of them
 [ -z "$isa" ] || export GBT_ISA="$isa"
@@ -119,7 +128,9 @@ for file in $(find . -name '*.exr'); do # they hold the time when they were writ
     LC_ALL=C sed -i 's/20[0-9][0-9]:[0-9][0-9]:[0-9][0-9] [0-9][0-9]:[0-9][0-9]:[0-9][0-9]/(the time)/' "$file"
 done
 find . -type f ! -name '*.json' ! -name '*.obj' | LC_ALL=C sort | xargs sha256sum | sed 's/ [ *]\.\// /' >"$work.now"
-platform="# $(getconf GNU_LIBC_VERSION), $("$program" doctor 2>/dev/null | sed -n 's/.*\(OpenImageIO [0-9.]*\).*/\1/p'), $(uname -m)"
+processor=$(uname -m)
+[ -z "$scenes" ] || [ "$record" = - ] || processor=$(sed -n '1s/.* //p' "$record")
+platform="# $(getconf GNU_LIBC_VERSION), $("$program" doctor 2>/dev/null | sed -n 's/.*\(OpenImageIO [0-9.]*\).*/\1/p'), $processor"
 if [ "$record" = - ]; then
     printf '%s\n' "$platform"
     cat "$work.now"

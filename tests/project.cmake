@@ -19,7 +19,6 @@ endif()
 foreach(test site commands)
   add_test(NAME ${test} COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/test_${test}.sh ${CMAKE_SOURCE_DIR} $<TARGET_FILE:gbtrace>)
 endforeach()
-set_tests_properties(layers tools figures circles lines messages functions site PROPERTIES TIMEOUT 60)
 
 # Every public header alone, twice, as C11 and as C++17: it compiles or the build fails.
 file(GLOB public_headers CONFIGURE_DEPENDS RELATIVE ${CMAKE_SOURCE_DIR}/include ${CMAKE_SOURCE_DIR}/include/gbtrace/*.h)

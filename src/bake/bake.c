@@ -157,7 +157,7 @@ static gbt_status add_directions(baking *b, frame *f, const decoder *trained, do
 static void solve_color(const baking *b, const sums *s, float *sh)
 {
     const int n = b->functions;
-    double m[TERMS * TERMS], l[TERMS * TERMS], trace = 0;
+    double m[TERMS * TERMS] = {0}, l[TERMS * TERMS], trace = 0;
     for (int k = 0, at = 0; k < n; k++)
         for (int j = 0; j <= k; j++, at++)
             m[k * n + j] = m[j * n + k] = s->normal[at];

@@ -33,7 +33,7 @@ def by_plyfile(path):
 def by_gsply(path):
     import gsply
 
-    read = gsply.read_spz(path) if path.endswith(".spz") else gsply.plyread(path)
+    read = gsply.read_spz(path) if path.endswith(".spz") else gsply.sogread(path) if path.endswith(".sog") else gsply.plyread(path)
     return columns_of(read.means, read.scales, read.quats, read.opacities, numpy.concatenate([read.sh0[:, None, :], read.shN], axis=1))
 
 

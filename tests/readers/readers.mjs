@@ -83,7 +83,7 @@ function compare(ending, reader, read, limit = limits[ending]) {
 
 for (const ending of ["ply", "splat", "spz", "compressed.ply", "v4.spz", "sog"])
     compare(ending, "splat-transform", columns(file(ending)));
-for (const ending of ["spz", "compressed.ply", "v4.spz"])
+for (const ending of ["spz", "compressed.ply", "v4.spz", "sog"])
     compare(ending, "gsply", byPython("gsply", file(ending)));
 for (const ending of ["usda", "usdz"])
     for (const reader of ["usd-core", "tinyusdz"])

@@ -64,7 +64,8 @@ done:
     return status;
 }
 
-static size_t read_at(int fd, unsigned char *out, size_t count, off_t at)
+static gbt_status read_at(int fd, unsigned char *out, size_t count, off_t at, const char *path,
+                          gbt_error *err)
 {
     size_t have = 0;
     while (have < count) {
@@ -72,29 +73,33 @@ static size_t read_at(int fd, unsigned char *out, size_t count, off_t at)
         if (got < 0 && errno == EINTR)
             continue;
         if (got <= 0)
-            break;
+            return base_fail(err, GBT_ERR_IO, "%s@%zu: read failed: %s", path, (size_t)at + have,
+                             got < 0 ? strerror(errno) : "file became shorter");
         have += (size_t)got;
     }
-    return have;
+    return GBT_OK;
 }
 
-size_t file_read_ends(const char *path, size_t count, unsigned char *out)
+gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, size_t *used, gbt_error *err)
 {
+    *used = 0;
     const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    struct stat info;
     if (fd < 0)
-        return 0;
-    size_t used = 0;
+        return base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", path, strerror(errno));
+    gbt_status status = GBT_OK;
+    struct stat info;
     if (fstat(fd, &info) == 0 && S_ISREG(info.st_mode)) {
         const uint64_t size = (uint64_t)info.st_size, first = size < count ? size : count,
                        last = size - first < count ? size - first : count;
         for (int i = 0; i < 8; i++)
-            out[used++] = (unsigned char)(size >> (8 * i));
-        used += read_at(fd, out + used, (size_t)first, 0);
-        used += read_at(fd, out + used, (size_t)last, (off_t)(size - last));
+            out[i] = (unsigned char)(size >> (8 * i));
+        *used = (size_t)(8 + first + last);
+        status = read_at(fd, out + 8, (size_t)first, 0, path, err);
+        if (status == GBT_OK)
+            status = read_at(fd, out + 8 + first, (size_t)last, (off_t)(size - last), path, err);
     }
     close(fd);
-    return used;
+    return status;
 }
 
 static gbt_status write_all(int fd, const unsigned char *bytes, size_t byte_count, const char *path,

@@ -18,9 +18,10 @@ gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count
  * bytes (all of it when it has fewer than 2 * count).
  *
  * @param out [out] 2 * count + 8 bytes
- * @return how many are used; 0 when it cannot be read
+ * @param used [out] how many are used; 0 for what is no regular file
+ * @return GBT_OK; GBT_ERR_IO: it cannot be opened or read
  */
-size_t file_read_ends(const char *path, size_t count, unsigned char *out);
+gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, size_t *used, gbt_error *err);
 
 /**
  * Replace a file atomically: temporary name in the same folder, write, fsync, rename, fsync of the folder.

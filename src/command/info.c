@@ -119,10 +119,10 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
         if (p->problem_count > PHOTO_CHECK_SHOWN)
             fprintf(out, "\n            and %zu more", p->problem_count - PHOTO_CHECK_SHOWN);
         if (p->with_alpha + p->with_mask > 0)
-            fprintf(
-                out,
-                "\n  masks     %zu photos have a mask, %zu an alpha channel (on %s; see the setting alpha)",
-                p->with_mask, p->with_alpha, strcmp(s->source, "blender") == 0 ? "white" : "black");
+            fprintf(out,
+                    "\n  masks     photos with a mask: %zu, with an alpha channel: %zu (on %s; see the "
+                    "setting alpha)",
+                    p->with_mask, p->with_alpha, strcmp(s->source, "blender") == 0 ? "white" : "black");
         fprintf(out, "\n  extent    %g (of the training cameras)\n", f->extent);
     }
     fprintf(out, "  points    %zu%s", s->points.count,

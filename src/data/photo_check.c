@@ -84,10 +84,10 @@ void photo_check_all(const scene *s, photo_check *out)
 void photo_check_warn(const photo_check *check, const char *data)
 {
     if (check->turned > 0)
-        log_warn(
-            "%s: %zu photos have an EXIF rotation, which is not applied: they are used as they are stored",
-            data, check->turned);
+        log_warn("%s: photos with an EXIF rotation, which is not applied, so that they are used as they are "
+                 "stored: %zu",
+                 data, check->turned);
     if (check->tiny > 0)
-        log_warn("%s: %zu photos have less than 1/%d of their camera's width or height", data, check->tiny,
-                 (int)TINY_RATIO);
+        log_warn("%s: photos with less than 1/%d of their camera's width or height: %zu", data,
+                 (int)TINY_RATIO, check->tiny);
 }

@@ -319,22 +319,23 @@ static gbt_status place(raw_scene *raw, scene *out, gbt_error *err)
 static void warn_about(const char *path, const raw_scene *raw, const scene *s)
 {
     if (raw->points_dropped > 0)
-        log_warn("%s: dropped %zu points with unusable coordinates", path, raw->points_dropped);
+        log_warn("%s: points with unusable coordinates, dropped: %zu", path, raw->points_dropped);
     if (raw->tracks_missing > 0)
-        log_warn("%s: %zu track entries name images that are not there", path, raw->tracks_missing);
+        log_warn("%s: track entries of images that are not there: %zu", path, raw->tracks_missing);
     if (raw->trailing_bytes > 0)
-        log_warn("%s: %zu bytes behind the last record were ignored", path, raw->trailing_bytes);
+        log_warn("%s: bytes behind the last record, ignored: %zu", path, raw->trailing_bytes);
     if (raw->photos_missing > 0)
-        log_warn("%s: left out %zu views whose photo is missing, %zu remain%s%s", path, raw->photos_missing,
-                 raw->view_count, raw->missing_names[0] != '\0' ? ": " : "", raw->missing_names);
+        log_warn("%s: views left out because their photo is missing: %zu, %zu remain%s%s", path,
+                 raw->photos_missing, raw->view_count, raw->missing_names[0] != '\0' ? ": " : "",
+                 raw->missing_names);
     size_t masks = 0;
     for (size_t i = 0; i < s->view_count; i++)
         masks += s->views[i].mask_path != NULL;
     if (masks > 0 && masks < s->view_count)
-        log_warn("%s: %zu of %zu photos have no mask, and count whole", path, s->view_count - masks,
+        log_warn("%s: without a mask, and so counted whole: %zu of %zu photos", path, s->view_count - masks,
                  s->view_count);
     if (raw->angles_disagreeing > 0)
-        log_warn("%s: camera_angle_x contradicts fl_x in %zu frames, fl_x is used", path,
+        log_warn("%s: frames whose camera_angle_x contradicts fl_x, which is used: %zu", path,
                  raw->angles_disagreeing);
     if (raw->view_count == 1)
         log_warn("%s: only one view", path);

@@ -70,18 +70,18 @@ static uint64_t hash_of_views(const trainer *t)
     return hash;
 }
 
-/* FNV-1a of the sizes of all photos, and of the bytes at both ends of each: another photo under the same name
-   has another one. */
-static uint64_t hash_of_photos(const scene *s)
+gbt_status checkpoint_hash_photos(const scene *s, uint64_t *out, gbt_error *err)
 {
-    uint64_t hash = 0xcbf29ce484222325u;
+    *out = 0xcbf29ce484222325u;
     for (size_t i = 0; i < s->view_count; i++) {
         unsigned char ends[2 * PHOTO_END_BYTES + sizeof(uint64_t)];
-        const size_t count = file_read_ends(s->views[i].path, PHOTO_END_BYTES, ends);
+        size_t count = 0;
+        if (s->views[i].path != NULL)
+            GBT_TRY(file_read_ends(s->views[i].path, PHOTO_END_BYTES, ends, &count, err));
         for (size_t k = 0; k < count; k++)
-            hash = (hash ^ ends[k]) * 0x100000001b3u;
+            *out = (*out ^ ends[k]) * 0x100000001b3u;
     }
-    return hash;
+    return GBT_OK;
 }
 
 static void add_poses(container_writer *w, const trainer *t)
@@ -118,7 +118,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
                         (const uint64_t[]){t->skipped_in_row, t->empty_in_row, t->opacity_raises});
     container_add_small(&w, "seconds", CONTAINER_F64, 1, &t->seconds);
     container_add_small(&w, "views", CONTAINER_U64, 1, (const uint64_t[]){hash_of_views(t)});
-    container_add_small(&w, "photos", CONTAINER_U64, 1, (const uint64_t[]){hash_of_photos(&t->scene)});
+    container_add_small(&w, "photos", CONTAINER_U64, 1, &t->photos_hash);
     const exposures *e = &t->exposures;
     const size_t exposure_dims[2] = {e->count, AFFINE_NUMBERS};
     if (e->count > 0) {
@@ -252,7 +252,7 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     uint64_t saved;
     if (container_section_named(c, "photos") != NULL) { /* older checkpoints have none */
         GBT_TRY(container_get(c, "photos", CONTAINER_U64, 1, &saved, err));
-        if (saved != hash_of_photos(&t->scene))
+        if (saved != t->photos_hash)
             return base_fail(
                 err, GBT_ERR_FORMAT,
                 "%s: made from other data (%.1000s has photos of the same names, but other pictures)", path,

@@ -143,6 +143,10 @@ static run_clock clock_start(const trainer *t, save_beside *saving)
     run_clock c = {.begin = clock_wall(), .offset = t->seconds, .last_save = t->seconds, .saving = saving};
     while (c.next_eval < t->def.eval_at_count && t->def.eval_at_seconds[c.next_eval] <= t->seconds)
         c.next_eval++;
+    if (c.next_eval > 0 && t->step == 0)
+        log_warn("eval_at: before the first step, which came after %.1f s, nothing can be scored: times left "
+                 "out: %d",
+                 t->seconds, c.next_eval);
     return c;
 }
 

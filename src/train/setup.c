@@ -18,6 +18,7 @@
 #include "train/light.h"
 #include "train/seed_points.h"
 #include "train/camera_sees.h"
+#include "train/checkpoint.h"
 #include "train/memory_need.h"
 #include "train/near.h"
 #include "train/trainer.h"
@@ -293,6 +294,7 @@ static gbt_status load_data(trainer *t, const char *data, gbt_error *err)
     if (def->memory > 0 && t->photos.bytes_max > def->memory / 4)
         t->photos.bytes_max = def->memory / 4;
     GBT_TRY(photos_load(&t->photos, t->train_views, t->train_count, err));
+    GBT_TRY(checkpoint_hash_photos(&t->scene, &t->photos_hash, err));
     t->extent = scene_camera_extent(&t->scene);
     GBT_TRY(provide_points(t, err));
     GBT_TRY(choose_exposure(t, err));

@@ -37,7 +37,8 @@ struct trainer {
     train_rules rules;
     scene scene;
     photos photos;
-    size_t *train_views; /* indices into scene.views */
+    uint64_t photos_hash; /* checkpoint_hash_photos() */
+    size_t *train_views;  /* indices into scene.views */
     size_t train_count, test_count;
 
     /* What learns; its gradient and its Adam moments have the same shapes. */

@@ -333,6 +333,29 @@ static void reads_refuse_what_is_no_file(void **state)
     remove(path);
 }
 
+static void ends_tell_files_apart(void **state)
+{
+    (void)state;
+    char path[512];
+    unsigned char out[12];
+    size_t used = 9;
+    gbt_error err = {0};
+    assert_ok(file_join(path, sizeof path, folder, "ends", NULL));
+    assert_ok(file_write_atomic(path, "abcde", 5, NULL));
+    assert_ok(file_read_ends(path, 2, out, &used, NULL));
+    assert_int_equal(used, 12);
+    assert_memory_equal(out, "\5\0\0\0\0\0\0\0abde", 12);
+    assert_ok(file_write_atomic(path, "abc", 3, NULL));
+    assert_ok(file_read_ends(path, 2, out, &used, NULL));
+    assert_int_equal(used, 11);
+    assert_memory_equal(out + 8, "abc", 3);
+    remove(path);
+    assert_int_equal(file_read_ends(path, 2, out, &used, &err), GBT_ERR_IO);
+    assert_ptr_equal(strstr(err.text, path), err.text);
+    assert_ok(file_read_ends(folder, 2, out, &used, NULL));
+    assert_int_equal(used, 0);
+}
+
 static void folders_and_names(void **state)
 {
     (void)state;
@@ -603,6 +626,7 @@ int main(void)
         cmocka_unit_test(failed_writes_leave_nothing),
         cmocka_unit_test(full_disk_keeps_the_old_file),
         cmocka_unit_test(reads_refuse_what_is_no_file),
+        cmocka_unit_test(ends_tell_files_apart),
         cmocka_unit_test(folders_and_names),
         cmocka_unit_test(gaussians_resize_pad_zero),
         cmocka_unit_test(image_sizes),

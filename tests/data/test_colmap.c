@@ -194,6 +194,8 @@ static bin_case bin_cases[] = {
      .says = "file ends inside the count of observations"},
     {"4 points cut", POINTS, CUT, 125, .status = BAD, .says = "points3D.bin@75: file ends inside a point"},
     {"5 extra bytes", IMAGES, APPEND, 5, .status = GBT_OK, .trailing = 5},
+    {"5 extra bytes of cameras", CAMERAS, APPEND, 6, .status = GBT_OK, .trailing = 6},
+    {"5 extra bytes of points", POINTS, APPEND, 7, .status = GBT_OK, .trailing = 7},
     {"6 model 99", CAMERAS, SET_UINT, 12, 4, 99, .status = BAD,
      .says = "cameras.bin@8: unknown camera model id 99"},
     {"6 model -1", CAMERAS, SET_UINT, 12, 4, UINT32_MAX, .status = BAD, .says = "unknown camera model id -1"},

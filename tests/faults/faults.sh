@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# tests/faults/faults.sh -- system calls that fail, and kills at them. Usage: faults.sh PROGRAM SHIM STEP [COMMAND]
+# tests/faults/faults.sh -- system calls that fail, and kills at them. Usage: faults.sh PROGRAM SHIM STEP [COMMAND [CALLS]]
 #
 # Each command is run over a tiny scene with its 1st, 1 + STEP-th, ... call of every kind made to fail, and killed there. Wanted: one line and an exit
 # code, or success where a failure does not matter; no temporary file left by a failure; the run that was there before still whole; and after a kill
 # of a training, --resume to the same bits as without.
 set -u
 here=$(cd "$(dirname "$0")" && pwd)
-program=$(realpath "$1") shim=$(realpath "$2") step=$3 only=${4:-}
+program=$(realpath "$1") shim=$(realpath "$2") step=$3 only=${4:-} calls=${5:-open write fsync close rename mkdir find read memory library}
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
@@ -98,7 +98,7 @@ try() { # name, goes on (yes or no), command...
     local name=$1 on=$2 call total n each
     shift 2
     [ -z "$only" ] || [ "$only" = "$name" ] || return 0
-    for call in open write fsync close rename mkdir find read memory library; do
+    for call in $calls; do
         prepare
         faulty "$call:0:count" "$@"
         [ $code = 0 ] || { bad "$name" "exit code $code without a fault"; return; }

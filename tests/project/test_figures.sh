@@ -1,16 +1,22 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# tests/project/test_figures.sh -- pages say what docs/figures.txt (bench/figures.py) holds. Usage: test_figures.sh PROJECT
+# tests/project/test_figures.sh -- pages say what docs/figures.txt (bench/figures.py) holds, and how many wrong inputs and chosen changes there
+# are. Usage: test_figures.sh PROJECT
 set -u
 cd "$1" || exit 1
 . tests/cli/report.sh
 one_line() { tr '\n' ' ' <"$1" | tr -s ' '; }
+rows() { grep -cvE '^(#|make |edit |[[:space:]]*$)' "$1"; }
 while IFS= read -r line; do
     page=${line%%: *}
     says=${line#*: }
     one_line "$page" | grep -qF -- "$says"
     report $? "$page: $says" "  wanted: $says"
-done <docs/figures.txt
+done <<END
+$(cat docs/figures.txt)
+docs/reliability.md: \`malformed\`: $(rows tests/malformed/cases.txt) spoiled inputs
+docs/reliability.md: \`./run mutate --chosen\` | $(rows tests/mutate/chosen.txt)
+END
 [ "$passed" -ge 10 ]
 report $? "there are figures" "  only $passed"
 finish

@@ -574,6 +574,7 @@ static void moments_follow_their_rows(void **state)
             t.stats.grad_count[i * k + j] = 1e6f;
             t.stats.grad_accum[i * k + j] = i < 20 ? 1e9f : 0.0f;
         }
+        t.created[i] = i * 50 / n;
     }
     step_ok(&t, &r);
     assert_rows_agree(&t);
@@ -586,6 +587,7 @@ static void moments_follow_their_rows(void **state)
         if (from < n) {
             kept++;
             assert_int_equal(from % 2, 1);
+            assert_int_equal(t.created[row], from * 50 / n);
             assert_memory_equal(t.moment1.anchors.offset + row * 3 * k, m1 + from * 3 * k,
                                 3 * k * sizeof *m1);
             assert_memory_equal(t.moment2.anchors.scale_log + row * 6, m2 + from * 6, 6 * sizeof *m2);

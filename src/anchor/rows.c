@@ -6,6 +6,7 @@
 
 #include "base/memory.h"
 #include "base/paged.h"
+#include "base/parallel.h"
 
 int row_field_dims(const row_field *field, size_t count, size_t offset_count, size_t dims[ROWS_DIMS_MAX])
 {
@@ -53,11 +54,29 @@ gbt_status rows_resize(float **arrays, const row_field *fields, int field_count,
     return GBT_OK;
 }
 
-void rows_move(float *const *arrays, const row_field *fields, int field_count, int offset_count, size_t to,
-               float *const *source, size_t from)
+typedef struct keep_job {
+    float *const *arrays;
+    const row_field *fields;
+    int offset_count;
+    const size_t *source;
+    size_t count;
+} keep_job;
+
+static void keep_rows(size_t f, size_t begin, size_t end, void *context)
 {
-    for (int f = 0; f < field_count; f++) {
-        const size_t width = row_field_width(&fields[f], offset_count);
-        memmove(arrays[f] + to * width, source[f] + from * width, width * sizeof(float));
-    }
+    (void)begin;
+    (void)end;
+    const keep_job *job = context;
+    const size_t width = row_field_width(&job->fields[f], job->offset_count);
+    float *rows = job->arrays[f];
+    for (size_t i = 0; i < job->count; i++) /* a row comes from its own place or from further on */
+        if (job->source[i] != i)
+            memcpy(rows + i * width, rows + job->source[i] * width, width * sizeof *rows);
+}
+
+void rows_keep(float *const *arrays, const row_field *fields, int field_count, int offset_count,
+               const size_t *source, size_t count)
+{
+    keep_job job = {arrays, fields, offset_count, source, count};
+    parallel_blocks((size_t)field_count, 1, keep_rows, &job);
 }

@@ -38,8 +38,8 @@ int row_field_dims(const row_field *field, size_t count, size_t offset_count, si
 gbt_status rows_resize(float **arrays, const row_field *fields, int field_count, int offset_count,
                        size_t *capacity, size_t used, size_t count, const char *what, gbt_error *err);
 
-/** Row `to` of every array becomes row `from` of `source`, which may be `arrays`. */
-void rows_move(float *const *arrays, const row_field *fields, int field_count, int offset_count, size_t to,
-               float *const *source, size_t from);
+/** The rows source[0] < source[1] < ... become the first `count` of every array. Threads: uses several. */
+void rows_keep(float *const *arrays, const row_field *fields, int field_count, int offset_count,
+               const size_t *source, size_t count);
 
 #endif

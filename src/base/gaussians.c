@@ -47,14 +47,28 @@ void gaussians_zero(gaussians *g)
 #undef X
 }
 
+void gaussians_zero_padding(gaussians *g)
+{
+    for (size_t i = g->count; i < padded(g->count); i++) {
+#define X(name, pad, meaning) g->name[i] = 0;
+        GAUSSIANS_FIELDS(X)
+#undef X
+    }
+}
+
+void gaussians_copy_range(const gaussians *g, size_t begin, size_t end, gaussians *out)
+{
+    if (begin >= end)
+        return;
+#define X(name, pad, meaning) memcpy(out->name + begin, g->name + begin, (end - begin) * sizeof *g->name);
+    GAUSSIANS_FIELDS(X)
+#undef X
+}
+
 gbt_status gaussians_copy(const gaussians *g, gaussians *out, gbt_error *err)
 {
     GBT_TRY(gaussians_resize(out, g->count, err));
-#define X(name, pad, meaning)                                                                                \
-    if (g->count > 0)                                                                                        \
-        memcpy(out->name, g->name, g->count * sizeof *g->name);
-    GAUSSIANS_FIELDS(X)
-#undef X
+    gaussians_copy_range(g, 0, g->count, out);
     gaussians_pad(out);
     return GBT_OK;
 }

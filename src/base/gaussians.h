@@ -48,6 +48,12 @@ void gaussians_pad(gaussians *g);
 /** All fields to 0, padding included: the state in which gradients start. */
 void gaussians_zero(gaussians *g);
 
+/** The padding alone. */
+void gaussians_zero_padding(gaussians *g);
+
+/** All fields of [begin, end) of `g` to the same places of `out`, which has room for them. */
+void gaussians_copy_range(const gaussians *g, size_t begin, size_t end, gaussians *out);
+
 /** `out` becomes a copy of `g`, padded. `out` as for gaussians_resize(); not `g`. */
 gbt_status gaussians_copy(const gaussians *g, gaussians *out, gbt_error *err);
 

@@ -27,6 +27,7 @@ static const option *options(int *count)
          .value = &def.renderer,
          .choices = GBT_RENDERER_TRAINING_NAMES,
          .help = "renderer of the run"},
+        MEMORY_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

@@ -88,6 +88,7 @@ static const option *options(int *count)
          .choices = GBT_MAKE_SCENE_LENS_NAMES,
          .help = "of all cameras; fisheye: 180 degrees across the shorter side; panorama: twice as wide as "
                  "high"},
+        MEMORY_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

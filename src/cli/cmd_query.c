@@ -48,6 +48,7 @@ static const option *options(int *count)
          .max = 1e100,
          .value_name = "R",
          .help = "of within and overlapping"},
+        MEMORY_OPTION,
         THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;

@@ -176,6 +176,7 @@ static const option *options(int *count)
          .max = 10,
          .value_name = "N",
          .help = "paper, time, anchors: runs of each variant; 0: 3, 1 and 3"},
+        MEMORY_OPTION,
         THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;

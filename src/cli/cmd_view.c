@@ -37,6 +37,7 @@ static const option *options(int *count)
          .help = "listen at this IPv4 address of the machine, 0.0.0.0: at all; others than 127.0.0.1 answer "
                  "only with the token printed"},
         DATA_OPTION(&def.data, "photos of another data set"),
+        MEMORY_OPTION,
         THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;

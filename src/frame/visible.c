@@ -12,7 +12,7 @@
 #include "base/vec.h"
 
 enum {
-    PART_BLOCK = 4096,
+    PART_BLOCK = 1024,
     ROW_GRAIN = 16,
     LANES = 4,
     AXIS_STEP = 7 /* one ray of so many gives the mean direction */

@@ -5,8 +5,12 @@
 
 #include "anchor/activations.h"
 #include "base/fail.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "base/rng.h"
 #include "growth/sources.h"
+
+enum { CHOOSE_BLOCK = 4096 /* Gaussians */ };
 
 /* Not lost to the random drop. */
 static bool is_drawn(const growth_def *def, int level, uint64_t slot)
@@ -15,18 +19,37 @@ static bool is_drawn(const growth_def *def, int level, uint64_t slot)
            ldexpf(1.0f, -(level + 1));
 }
 
-static gbt_status add_means(growth_search *s, int level, gbt_error *err)
+typedef struct choose_job {
+    const growth_search *s;
+    int level;
+    float threshold;
+    bool *chosen; /* of all Gaussians */
+} choose_job;
+
+static void choose_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const choose_job *job = context;
+    const growth_search *s = job->s;
+    for (size_t slot = begin; slot < end; slot++)
+        job->chosen[slot] = growth_well_sampled(s->def, s->stats->grad_count[slot]) &&
+                            growth_mean_gradient(s->stats, slot) >= job->threshold &&
+                            is_drawn(s->def, job->level, slot);
+}
+
+static gbt_status add_means(growth_search *s, int level, bool *chosen, gbt_error *err)
 {
     const anchors *a = s->a;
-    const size_t offsets = (size_t)a->offset_count;
-    const float threshold = growth_level_threshold(s->def, level);
-    for (size_t slot = 0; slot < a->count * offsets; slot++) {
-        const float gradient = growth_mean_gradient(s->stats, slot);
-        if (!growth_well_sampled(s->def, s->stats->grad_count[slot]) || !(gradient >= threshold) ||
-            !is_drawn(s->def, level, slot))
+    const size_t offsets = (size_t)a->offset_count, slots = a->count * offsets;
+    choose_job job = {s, level, growth_level_threshold(s->def, level), chosen};
+    parallel_blocks(slots, CHOOSE_BLOCK, choose_block, &job);
+    for (size_t slot = 0; slot < slots; slot++) {
+        if (!chosen[slot])
             continue;
         const size_t i = slot / offsets;
-        growth_candidate mean = {.scale = growth_cell_size(s->def, level), .gradient = gradient, .parent = i};
+        growth_candidate mean = {.scale = growth_cell_size(s->def, level),
+                                 .gradient = growth_mean_gradient(s->stats, slot),
+                                 .parent = i};
         for (size_t c = 0; c < 3; c++)
             mean.position[c] =
                 a->position[i * 3 + c] + a->offset[slot * 3 + c] * activation_exp(a->scale_log[i * 6 + c]);
@@ -37,11 +60,15 @@ static gbt_status add_means(growth_search *s, int level, gbt_error *err)
 
 gbt_status growth_from_gaussians(growth_search *s, gbt_error *err)
 {
-    for (int level = 0; level < s->def->level_count; level++) {
+    bool *chosen = mem_alloc(s->a->count * (size_t)s->a->offset_count, sizeof *chosen, "growth", err);
+    gbt_status status = chosen != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+    for (int level = 0; level < s->def->level_count && status == GBT_OK; level++) {
         if (!growth_search_begin(s, level))
             continue;
-        GBT_TRY(add_means(s, level, err));
-        GBT_TRY(growth_search_end(s, s->def->may_stand, s->def->may_stand_context, err));
+        status = add_means(s, level, chosen, err);
+        if (status == GBT_OK)
+            status = growth_search_end(s, s->def->may_stand, s->def->may_stand_context, err);
     }
-    return GBT_OK;
+    mem_free(chosen);
+    return status;
 }

@@ -14,8 +14,11 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "growth/pruning.h"
 #include "growth/sources.h"
+
+enum { ROW_BLOCK = 1024 };
 
 growth_def growth_def_default(void)
 {
@@ -63,28 +66,49 @@ static gbt_status check_arguments(const anchors *a, const growth_stats *stats, c
     return GBT_OK;
 }
 
-/* Survivors move up in their order; their statistics are reset where they were used. */
-static size_t compact(anchors *a, growth_stats *s, const growth_def *def, const bool *pruned, size_t *source)
+typedef struct round_job {
+    anchors *a;
+    growth_stats *stats;
+    const growth_def *def;
+} round_job;
+
+/* Statistics that were used begin again. */
+static void reset_block(size_t block, size_t begin, size_t end, void *context)
 {
-    const size_t offsets = (size_t)a->offset_count, before = a->count;
-    size_t to = 0;
-    for (size_t i = 0; i < before; i++) {
-        if (pruned[i])
-            continue;
-        source[to] = i;
-        rows_move(a->field, anchor_fields, ANCHOR_FIELDS, a->offset_count, to, a->field, i);
-        const bool used = def->prune && growth_is_judged(def, s->visit_count[i]);
-        s->importance_accum[to] = used ? 0.0f : s->importance_accum[i];
-        s->visit_count[to] = used ? 0.0f : s->visit_count[i];
-        s->shown_count[to] = used ? 0.0f : s->shown_count[i];
-        for (size_t k = 0; k < offsets; k++) {
-            const bool sampled = def->grow && growth_well_sampled(def, s->grad_count[i * offsets + k]);
-            s->grad_accum[to * offsets + k] = sampled ? 0.0f : s->grad_accum[i * offsets + k];
-            s->grad_count[to * offsets + k] = sampled ? 0.0f : s->grad_count[i * offsets + k];
-        }
-        to++;
-    }
-    return to;
+    (void)block;
+    const round_job *job = context;
+    growth_stats *s = job->stats;
+    const size_t offsets = (size_t)s->offset_count;
+    for (size_t i = begin; i < end; i++)
+        if (job->def->prune && growth_is_judged(job->def, s->visit_count[i]))
+            s->importance_accum[i] = s->visit_count[i] = s->shown_count[i] = 0;
+    for (size_t k = begin * offsets; k < end * offsets; k++)
+        if (job->def->grow && growth_well_sampled(job->def, s->grad_count[k]))
+            s->grad_accum[k] = s->grad_count[k] = 0;
+}
+
+static void cut_scales(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const round_job *job = context;
+    for (size_t i = begin; i < end; i++)
+        for (size_t c = 3; c < 6; c++)
+            job->a->scale_log[i * 6 + c] = fminf(job->a->scale_log[i * 6 + c], job->def->shape_log_max);
+}
+
+/* Survivors move up in their order. */
+static void compact(const round_job *job, const bool *pruned, size_t *source)
+{
+    anchors *a = job->a;
+    growth_stats *s = job->stats;
+    size_t left = 0;
+    for (size_t i = 0; i < a->count; i++)
+        if (!pruned[i])
+            source[left++] = i;
+    rows_keep(a->field, anchor_fields, ANCHOR_FIELDS, a->offset_count, source, left);
+    rows_keep(s->field, growth_stat_fields, GROWTH_STATS, s->offset_count, source, left);
+    parallel_blocks(left, ROW_BLOCK, reset_block, (void *)job);
+    a->count = s->count = left;
 }
 
 /* Rows are zero but for what is set here. */
@@ -115,13 +139,12 @@ static gbt_status apply(anchors *a, growth_stats *stats, const growth_def *def, 
         mem_free(source);
         return status;
     }
-    a->count = stats->count = compact(a, stats, def, pruned, source);
+    round_job job = {a, stats, def};
+    compact(&job, pruned, source);
     (void)anchors_resize(a, after, NULL);
     (void)growth_stats_resize(stats, after, a->offset_count, NULL);
     append(a, n, survivors);
-    for (size_t i = 0; i < after; i++)
-        for (size_t c = 3; c < 6; c++)
-            a->scale_log[i * 6 + c] = fminf(a->scale_log[i * 6 + c], def->shape_log_max);
+    parallel_blocks(after, ROW_BLOCK, cut_scales, &job);
     *out = (growth_result){.grown = n->count,
                            .pruned = before - survivors,
                            .count = after,

@@ -48,7 +48,7 @@ static void *work(void *argument)
     fenv_t saved; /* the same floating-point environment on every thread, whatever a library made of it */
     fegetenv(&saved);
     fesetenv(FE_DFL_ENV);
-    inside++;
+    inside += j->blocks > 1; /* one block alone leaves the threads to the calls in it */
     for (;;) {
         const size_t block = atomic_fetch_add(&j->next, 1);
         if (block >= j->blocks)
@@ -57,7 +57,7 @@ static void *work(void *argument)
         const size_t end = begin + j->grain < j->count ? begin + j->grain : j->count;
         j->body(block, begin, end, j->context);
     }
-    inside--;
+    inside -= j->blocks > 1;
     fesetenv(&saved);
     return NULL;
 }

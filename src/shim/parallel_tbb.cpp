@@ -10,8 +10,10 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
 #include <tbb/version.h>
 
 extern "C" {
@@ -19,15 +21,21 @@ extern "C" {
 }
 
 static std::unique_ptr<tbb::global_control> limit;
+/* More threads than processors need an arena of their own: the one that oneTBB makes has a place for each
+   processor. */
+static std::unique_ptr<tbb::task_arena> wide;
 static int thread_count = 0;
 
 extern "C" void parallel_set_threads(int threads)
 try {
     if (threads < 1)
         threads = 1;
+    wide.reset();
     limit.reset();
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                   static_cast<size_t>(threads));
+    if (threads > tbb::info::default_concurrency())
+        wide = std::make_unique<tbb::task_arena>(threads);
     thread_count = threads;
 } catch (...) {
     /* Without a limit TBB uses every processor: slower to share, never wrong. */
@@ -94,13 +102,19 @@ try {
             run(block);
         return;
     }
-    tbb::parallel_for(
-        tbb::blocked_range<size_t>(0, blocks, 1),
-        [&](const tbb::blocked_range<size_t> &range) {
-            for (size_t block = range.begin(); block != range.end(); block++)
-                run(block);
-        },
-        tbb::simple_partitioner());
+    const auto run_all = [=] {
+        tbb::parallel_for(
+            tbb::blocked_range<size_t>(0, blocks, 1),
+            [=](const tbb::blocked_range<size_t> &range) {
+                for (size_t block = range.begin(); block != range.end(); block++)
+                    run(block);
+            },
+            tbb::simple_partitioner());
+    };
+    if (wide)
+        wide->execute(run_all);
+    else
+        run_all();
 } catch (...) {
     /* The bodies are C and cannot throw, so only what TBB itself needs can fail, and then there is no way to
        go on: gbt_when_out_of_memory(). */

@@ -14,7 +14,7 @@
 #include "base/fail.h"
 #include "base/parallel.h"
 
-enum { LANES = 8, WIDEN_BLOCK = 1024 /* a multiple of LANES */ };
+enum { LANES = 8, WIDEN_BLOCK = 512 /* a multiple of LANES */ };
 
 typedef double d8 __attribute__((vector_size(LANES * sizeof(double))));
 typedef float f8 __attribute__((vector_size(LANES * sizeof(float))));
@@ -316,6 +316,7 @@ FASTEST_CLONE static void widen_block(size_t block, size_t begin, size_t end, vo
 {
     (void)block;
     const widen_job *job = context;
+    gaussians_copy_range(job->g, begin, end, job->out);
     for (size_t i = begin; i < end; i += LANES) {
         const size_t count = end - i;
         gaussian8 g = load_gaussians(job->g, i, count);
@@ -346,7 +347,8 @@ FASTEST_CLONE static void adjoint_block(size_t block, size_t begin, size_t end, 
 gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min,
                              const gaussians *g, gaussians *out, gbt_error *err)
 {
-    GBT_TRY(gaussians_copy(g, out, err));
+    GBT_TRY(gaussians_resize(out, g->count, err));
+    gaussians_pad(out);
     widen_job job = {view, (double)variance, pixel_min, g, out};
     parallel_blocks(g->count, WIDEN_BLOCK, widen_block, &job);
     return GBT_OK;

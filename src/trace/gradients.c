@@ -8,7 +8,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 
-enum { RECORD_BLOCK = 2048, FIRST_SLOTS = 4096 };
+enum { RECORD_BLOCK = 512, FIRST_SLOTS = 4096 };
 
 static size_t slot_of(uint32_t id, size_t slot_count)
 {
@@ -136,7 +136,7 @@ gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *l
     if (total > UINT32_MAX)
         return base_fail(err, GBT_ERR_NO_MEMORY, "trace: %zu gradient records (limit 2^32)", total);
     GBT_TRY(gaussians_resize(out, g->count, err));
-    gaussians_zero(out);
+    gaussians_zero_padding(out);
     GBT_TRY(mem_reserve((void **)&order->record, &order->record_capacity, 0, total + 1, sizeof *order->record,
                         "record order", err));
     GBT_TRY(mem_reserve((void **)&order->first, &order->first_capacity, 0, g->count + 2, sizeof *order->first,
@@ -207,7 +207,7 @@ gbt_status gradients_reduce_view(const list_kernel *kernel, const kernel_scene *
                                  const gaussians *g, gaussians *out, float *weight, gbt_error *err)
 {
     GBT_TRY(gaussians_resize(out, g->count, err));
-    gaussians_zero(out);
+    gaussians_zero_padding(out);
     list_reduction job = {
         .kernel = kernel, .scene = scene, .view = view, .g = g, .out = out, .weight = weight};
     parallel_blocks(g->count, VIEW_GRAIN, reduce_view_block, &job);

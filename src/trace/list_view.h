@@ -17,7 +17,7 @@
 #include "trace/kernel.h"
 
 enum {
-    VIEW_GRAIN = 2048, /* Gaussians whose records are made together; a multiple of 16 */
+    VIEW_GRAIN = 512, /* Gaussians whose records are made together; a multiple of 16 */
     VIEW_FACES = 6
 };
 

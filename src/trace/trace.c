@@ -15,7 +15,7 @@
 #include "base/vec.h"
 #include "trace/triples.h"
 
-enum { TILE_PIXELS = TILE_ACROSS * PACKET_PIXELS, RECORD_BLOCK = 2048 };
+enum { TILE_PIXELS = TILE_ACROSS * PACKET_PIXELS, RECORD_BLOCK = 512 };
 
 typedef struct trace_tile { /* or the part of one that a face of a view sees */
     hit_tape tape;

@@ -94,10 +94,7 @@ gbt_status learnables_follow(learnables *l, const growth_result *result, gbt_err
 {
     anchors *a = &l->anchors;
     GBT_TRY(anchors_resize(a, result->count > a->count ? result->count : a->count, err));
-    for (size_t i = 0; i < result->survivors; i++)
-        if (result->source[i] != i) /* it comes from further on */
-            rows_move(a->field, anchor_fields, ANCHOR_FIELDS, a->offset_count, i, a->field,
-                      result->source[i]);
+    rows_keep(a->field, anchor_fields, ANCHOR_FIELDS, a->offset_count, result->source, result->survivors);
     a->count = result->survivors;
     return anchors_resize(a, result->count, err);
 }

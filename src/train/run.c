@@ -304,7 +304,8 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
     status = cluster_follow(status, err);
     if (status == GBT_OK)
         status = run_in_folder(t, data, run, &paths, def, strings, err);
-    paged_stop();
+    if (def->memory > 0)
+        paged_stop();
     if (locked)
         file_unlock_folder(lock);
     return status;

@@ -55,6 +55,11 @@ report $? "a result folder within a memory limit" "$(cat err out)"
 # ---- counts and places
 "$program" init made -o anchors.ply --json counts.json >out 2>err && [ "$(grep -c '"color_rms": 0\.1' counts.json)" -ge 3 ]
 report $? "init tells how well anchors stand for points" "$(cat err out; cat counts.json)"
+cp -r run small && "$program" compress run -o small.gbt >out 2>err && "$program" compress small -o limited.gbt --memory 400M >>out 2>>err && cmp small.gbt limited.gbt >>out
+report $? "compress within a memory limit" "$(cat err out)"
+"$program" query nearest run --at 0,0,0 >free 2>err && "$program" query nearest run --at 0,0,0 --memory 400M >out 2>>err && cmp free out >>err
+report $? "query within a memory limit" "$(cat err out)"
+holds "a limit that is passed" 5 '^error: memory: ' query nearest run --at 0,0,0 --memory 1M
 holds "query of a data set" 0 '[0-9]' query nearest made --at 0,0,0 --count 3
 "$program" report run >out 2>err && grep -c 'class="view' run/report.html >>out
 report $? "a report from a run's own scores" "$(cat err)"

@@ -57,9 +57,22 @@ static inline vfloat16 vfloat16_mul_where(vmask16 m, vfloat16 x, vfloat16 y)
 {
     return vfloat16_select(m, vfloat16_mul(x, y), x);
 }
+/* Here -0 becomes 0 where nothing is added: sums that begin with 0 are never -0. */
 static inline vfloat16 vfloat16_add_where(vmask16 m, vfloat16 x, vfloat16 y)
 {
-    return vfloat16_select(m, vfloat16_add(x, y), x);
+    return vfloat16_add(x, VFLOAT16_BOTH(_mm256_and_ps, m, y));
+}
+static inline vfloat16 vfloat16_add_unless(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_add(x, VFLOAT16_BOTH(_mm256_andnot_ps, m, y));
+}
+static inline vfloat16 vfloat16_less_where(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_fnma(x, VFLOAT16_BOTH(_mm256_and_ps, m, y), x);
+}
+static inline vfloat16 vfloat16_less_unless(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_fnma(x, VFLOAT16_BOTH(_mm256_andnot_ps, m, y), x);
 }
 static inline vfloat16 vfloat16_round(vfloat16 x)
 {

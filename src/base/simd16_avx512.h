@@ -40,6 +40,18 @@ static inline vfloat16 vfloat16_add_where(vmask16 m, vfloat16 a, vfloat16 b)
 {
     return _mm512_mask_add_ps(a, m, a, b);
 } /* m ? a + b : a */
+static inline vfloat16 vfloat16_add_unless(vmask16 m, vfloat16 a, vfloat16 b)
+{
+    return vfloat16_add_where((vmask16)~m, a, b);
+}
+static inline vfloat16 vfloat16_less_where(vmask16 m, vfloat16 a, vfloat16 b)
+{
+    return _mm512_mask_fnmadd_ps(a, m, b, a);
+} /* m ? a - a b : a, rounded once */
+static inline vfloat16 vfloat16_less_unless(vmask16 m, vfloat16 a, vfloat16 b)
+{
+    return vfloat16_less_where((vmask16)~m, a, b);
+}
 static inline vfloat16 vfloat16_round(vfloat16 a)
 {
     return _mm512_roundscale_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);

@@ -91,6 +91,18 @@ static inline vfloat16 vfloat16_add_where(vmask16 m, vfloat16 x, vfloat16 y)
 {
     return vfloat16_select(m, vfloat16_add(x, y), x);
 }
+static inline vfloat16 vfloat16_add_unless(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_select(m, x, vfloat16_add(x, y));
+}
+static inline vfloat16 vfloat16_less_where(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_select(m, vfloat16_fnma(x, y, x), x);
+}
+static inline vfloat16 vfloat16_less_unless(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_select(m, x, vfloat16_fnma(x, y, x));
+}
 static inline vfloat16 vfloat16_round(vfloat16 x) { return VFLOAT16_EACH(vrndnq_f32, x); }
 static inline float32x4_t scale_pow2_4(float32x4_t x, float32x4_t n)
 {

@@ -99,20 +99,18 @@ static inline void pass_on(const near_row *now, near_row *other, vfloat16 *sum)
 {
     const vmask16 behind = vfloat16_lt(other->t, now->t);
     other->value = vfloat16_add_where(behind, other->value, now->term);
-    *sum = vfloat16_add_where(vmask16_andnot(behind, vmask16_from_bits(0xFFFF)), *sum, other->term);
+    *sum = vfloat16_add_unless(behind, *sum, other->term);
 }
 
 /* Row i goes on past row j and those after it, too; returned is what lies behind it from there on. */
 static inline __attribute__((always_inline)) vfloat16 step_on(const list_rows *rows, const near_row *now,
                                                               vmask16 hit, int j)
 {
-    const vfloat16 zero = vfloat16_set1(0);
-    vfloat16 sum = zero;
+    vfloat16 sum = vfloat16_set1(0);
     do {
         const vmask16 behind = vfloat16_lt(row_load(rows->t, j), now->t);
-        sum = vfloat16_add(sum, vfloat16_select(behind, zero, row_load(rows->term, j)));
-        row_store(rows->behind, j,
-                  vfloat16_add(row_load(rows->behind, j), vfloat16_select(behind, now->term, zero)));
+        sum = vfloat16_add_unless(behind, sum, row_load(rows->term, j));
+        row_store(rows->behind, j, vfloat16_add_where(behind, row_load(rows->behind, j), now->term));
         j++;
     } while (vmask16_any(vmask16_and(vfloat16_lt(row_load(rows->reached, j), now->t), hit)));
     return vfloat16_add(row_load(rows->before, j), sum);
@@ -137,7 +135,7 @@ static void collect_behind(list_rows *out, const used_list *used, const vfloat16
     }
     for (int i = count; i-- > 0;) {
         const vfloat16 alpha = row_load(rows->alpha, i);
-        near_row now = {.t = row_load(rows->t, i), .clear = zero};
+        near_row now = {.t = row_load(rows->t, i), .alpha = zero};
         now.term = vfloat16_mul(vfloat16_mul(row_load(rows->through, i), alpha),
                                 dot_lanes(used_row[rows->number[i]].color, direction));
         const vmask16 hit = vfloat16_lt(zero, alpha);

@@ -187,31 +187,30 @@ static void order_by_middle(const tile_list *list, float t_near, list_rows *rows
 
 /* A row whose neighbours in the order may still change its value: T, or the sum of what lies behind. */
 typedef struct near_row {
-    vfloat16 t, clear, term, value; /* clear: 1 - alpha; term: adjoint */
+    vfloat16 t, alpha, term, value; /* term: adjoint */
 } near_row;
 
 /* Row i goes back past `other`: where it lies in front, the other's T is less by its alpha; elsewhere its own
    is. */
-static inline void pass_row(vfloat16 t, vfloat16 clear, near_row *other, vfloat16 *product)
+static inline void pass_row(const near_row *now, near_row *other, vfloat16 *product)
 {
-    const vmask16 front = vfloat16_lt(t, other->t);
-    other->value = vfloat16_mul_where(front, other->value, clear);
-    *product = vfloat16_mul_where(vmask16_andnot(front, vmask16_from_bits(0xFFFF)), *product, other->clear);
+    const vmask16 front = vfloat16_lt(now->t, other->t);
+    other->value = vfloat16_less_where(front, other->value, now->alpha);
+    *product = vfloat16_less_unless(front, *product, other->alpha);
 }
 
 /* Row i goes back past those before j, too; returned is its T. */
 static inline __attribute__((always_inline)) vfloat16 step_back(const list_rows *rows, const near_row *now,
                                                                 vmask16 hit, int j, size_t *steps)
 {
-    const vfloat16 one = vfloat16_set1(1), t = now->t, clear = now->clear;
-    vfloat16 product = one;
+    const vfloat16 t = now->t, alpha = now->alpha;
+    vfloat16 product = vfloat16_set1(1);
     const int from = j;
     do {
         const int other = (int)rows->order[--j];
         const vmask16 front = vfloat16_lt(t, row_load(rows->t, other));
-        row_store(rows->through, j, vfloat16_mul_where(front, row_load(rows->through, j), clear));
-        product = vfloat16_mul(product,
-                               vfloat16_select(front, one, vfloat16_sub(one, row_load(rows->alpha, other))));
+        row_store(rows->through, j, vfloat16_less_where(front, row_load(rows->through, j), alpha));
+        product = vfloat16_less_unless(front, product, row_load(rows->alpha, other));
     } while (vmask16_any(vmask16_and(vfloat16_lt(t, row_load(rows->reached, j)), hit)));
     *steps += (size_t)(from - j);
     return vfloat16_mul(row_load(rows->before, j), product);
@@ -229,7 +228,7 @@ typedef struct insertion {
 static inline insertion start_insertion(const list_rows *rows)
 {
     const vfloat16 zero = vfloat16_set1(0), one = vfloat16_set1(1);
-    const near_row none = {zero, one, zero, one};
+    const near_row none = {zero, zero, zero, one};
     for (int i = -2; i < 0; i++) {
         row_store(rows->before, i, one);
         row_store(rows->reached, i, zero);
@@ -242,14 +241,14 @@ static inline insertion start_insertion(const list_rows *rows)
    so that compilers know what stores cannot change. */
 static inline void insert_row(const list_rows *rows, insertion *s, int i, vfloat16 t, vfloat16 alpha)
 {
-    const vfloat16 zero = vfloat16_set1(0), one = vfloat16_set1(1);
-    near_row now = {.t = t, .clear = vfloat16_sub(one, alpha), .term = zero};
+    const vfloat16 zero = vfloat16_set1(0);
+    near_row now = {.t = t, .alpha = alpha, .term = zero};
     const vmask16 hit = vfloat16_lt(zero, alpha);
-    vfloat16 product = one;
+    vfloat16 product = vfloat16_set1(1);
     row_store(rows->before, i, s->before);
     row_store(rows->reached, i, s->reached);
-    pass_row(now.t, now.clear, &s->last, &product);
-    pass_row(now.t, now.clear, &s->second, &product);
+    pass_row(&now, &s->last, &product);
+    pass_row(&now, &s->second, &product);
     now.value = vfloat16_mul(row_load(rows->before, i - 2), product);
     if (vmask16_any(vmask16_and(vfloat16_lt(now.t, row_load(rows->reached, i - 2)), hit)) && !s->crowded) {
         now.value = vfloat16_mul(step_back(rows, &now, hit, i - 2, &s->steps), product);
@@ -258,7 +257,7 @@ static inline void insert_row(const list_rows *rows, insertion *s, int i, vfloat
     row_store(rows->through, i - 2, s->second.value);
     s->second = s->last;
     s->last = now;
-    s->before = vfloat16_mul(s->before, now.clear);
+    s->before = vfloat16_fnma(s->before, alpha, s->before);
     s->reached = vfloat16_max(s->reached, vfloat16_select(hit, now.t, zero));
 }
 

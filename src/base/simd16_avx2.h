@@ -123,27 +123,21 @@ static inline vmask16 vmask16_from_bits(unsigned bits)
                      _mm256_castsi256_ps(_mm256_cmpeq_epi32(high, pick))};
 }
 
-/* out[j] = all lanes of in[j] combined, in the order that simd16_avx512.h has. All in registers: four lanes
-   stored at a time would not be ready when eight of them are loaded. */
+/* All in registers: four lanes stored at a time would not be ready when eight of them are loaded. */
 #define VFLOAT16_REDUCE_ROWS(name, op)                                                                       \
-    static inline __m256 name##_four(const __m256 *p)                                                        \
-    {                                                                                                        \
-        const __m256 x0 = op(_mm256_unpacklo_ps(p[0], p[2]), _mm256_unpackhi_ps(p[0], p[2]));                \
-        const __m256 x1 = op(_mm256_unpacklo_ps(p[4], p[6]), _mm256_unpackhi_ps(p[4], p[6]));                \
-        const __m256d d0 = _mm256_castps_pd(x0), d1 = _mm256_castps_pd(x1);                                  \
-        return op(_mm256_castpd_ps(_mm256_unpacklo_pd(d0, d1)),                                              \
-                  _mm256_castpd_ps(_mm256_unpackhi_pd(d0, d1)));                                             \
-    }                                                                                                        \
     static inline __m256 name##_eight(const vfloat16 in[8])                                                  \
     {                                                                                                        \
-        __m256 half[2];                                                                                      \
-        for (int h = 0; h < 2; h++) { /* vfloat16 is two __m256: stride 2 */                                 \
-            const __m256 first = name##_four((const __m256 *)in + h),                                        \
-                         second = name##_four((const __m256 *)(in + 4) + h);                                 \
-            half[h] = op(_mm256_permute2f128_ps(first, second, 0x20),                                        \
-                         _mm256_permute2f128_ps(first, second, 0x31));                                       \
+        __m256 y[4], z[2];                                                                                   \
+        for (int j = 0; j < 4; j++) { /* rows j and j + 4, of four lanes */                                  \
+            const __m256 first = op(in[j].a, in[j].b), second = op(in[j + 4].a, in[j + 4].b);                \
+            y[j] = op(_mm256_permute2f128_ps(first, second, 0x20),                                           \
+                      _mm256_permute2f128_ps(first, second, 0x31));                                          \
         }                                                                                                    \
-        return op(half[0], half[1]);                                                                         \
+        for (int j = 0; j < 2; j++)                                                                          \
+            z[j] =                                                                                           \
+                op(_mm256_unpacklo_ps(y[2 * j], y[2 * j + 1]), _mm256_unpackhi_ps(y[2 * j], y[2 * j + 1]));  \
+        const __m256d a = _mm256_castps_pd(z[0]), b = _mm256_castps_pd(z[1]);                                \
+        return op(_mm256_castpd_ps(_mm256_unpacklo_pd(a, b)), _mm256_castpd_ps(_mm256_unpackhi_pd(a, b)));   \
     }                                                                                                        \
     static inline vfloat16 name(const vfloat16 in[16])                                                       \
     {                                                                                                        \

@@ -57,9 +57,22 @@ static inline vfloat16 vfloat16_mul_where(vmask16 m, vfloat16 x, vfloat16 y)
 {
     return vfloat16_select(m, vfloat16_mul(x, y), x);
 }
+/* Here -0 becomes 0 where nothing is added: sums that begin with 0 are never -0. */
 static inline vfloat16 vfloat16_add_where(vmask16 m, vfloat16 x, vfloat16 y)
 {
-    return vfloat16_select(m, vfloat16_add(x, y), x);
+    return vfloat16_add(x, VFLOAT16_BOTH(_mm256_and_ps, m, y));
+}
+static inline vfloat16 vfloat16_add_unless(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_add(x, VFLOAT16_BOTH(_mm256_andnot_ps, m, y));
+}
+static inline vfloat16 vfloat16_less_where(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_fnma(x, VFLOAT16_BOTH(_mm256_and_ps, m, y), x);
+}
+static inline vfloat16 vfloat16_less_unless(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_fnma(x, VFLOAT16_BOTH(_mm256_andnot_ps, m, y), x);
 }
 static inline vfloat16 vfloat16_round(vfloat16 x)
 {
@@ -110,29 +123,29 @@ static inline vmask16 vmask16_from_bits(unsigned bits)
                      _mm256_castsi256_ps(_mm256_cmpeq_epi32(high, pick))};
 }
 
-#define VFLOAT16_REDUCE_ROWS(name, op8, op4)                                                                 \
+/* All in registers: four lanes stored at a time would not be ready when eight of them are loaded. */
+#define VFLOAT16_REDUCE_ROWS(name, op)                                                                       \
+    static inline __m256 name##_eight(const vfloat16 in[8])                                                  \
+    {                                                                                                        \
+        __m256 y[4], z[2];                                                                                   \
+        for (int j = 0; j < 4; j++) { /* rows j and j + 4, of four lanes */                                  \
+            const __m256 first = op(in[j].a, in[j].b), second = op(in[j + 4].a, in[j + 4].b);                \
+            y[j] = op(_mm256_permute2f128_ps(first, second, 0x20),                                           \
+                      _mm256_permute2f128_ps(first, second, 0x31));                                          \
+        }                                                                                                    \
+        for (int j = 0; j < 2; j++)                                                                          \
+            z[j] =                                                                                           \
+                op(_mm256_unpacklo_ps(y[2 * j], y[2 * j + 1]), _mm256_unpackhi_ps(y[2 * j], y[2 * j + 1]));  \
+        const __m256d a = _mm256_castps_pd(z[0]), b = _mm256_castps_pd(z[1]);                                \
+        return op(_mm256_castpd_ps(_mm256_unpacklo_pd(a, b)), _mm256_castpd_ps(_mm256_unpackhi_pd(a, b)));   \
+    }                                                                                                        \
     static inline vfloat16 name(const vfloat16 in[16])                                                       \
     {                                                                                                        \
-        _Alignas(64) float out[16];                                                                          \
-        for (int group = 0; group < 4; group++) {                                                            \
-            __m256 half[2];                                                                                  \
-            for (int h = 0; h < 2; h++) {                                                                    \
-                const __m256 *p = (const __m256 *)&in[4 * group] + h; /* vfloat16 is two __m256: stride 2 */ \
-                const __m256 x0 = op8(_mm256_unpacklo_ps(p[0], p[2]), _mm256_unpackhi_ps(p[0], p[2]));       \
-                const __m256 x1 = op8(_mm256_unpacklo_ps(p[4], p[6]), _mm256_unpackhi_ps(p[4], p[6]));       \
-                const __m256d d0 = _mm256_castps_pd(x0), d1 = _mm256_castps_pd(x1);                          \
-                half[h] = op8(_mm256_castpd_ps(_mm256_unpacklo_pd(d0, d1)),                                  \
-                              _mm256_castpd_ps(_mm256_unpackhi_pd(d0, d1)));                                 \
-            }                                                                                                \
-            const __m128 low = op4(_mm256_castps256_ps128(half[0]), _mm256_extractf128_ps(half[0], 1));      \
-            const __m128 high = op4(_mm256_castps256_ps128(half[1]), _mm256_extractf128_ps(half[1], 1));     \
-            _mm_store_ps(out + 4 * group, op4(low, high));                                                   \
-        }                                                                                                    \
-        return vfloat16_load(out);                                                                           \
+        return (vfloat16){name##_eight(in), name##_eight(in + 8)};                                           \
     }
-VFLOAT16_REDUCE_ROWS(vfloat16_sum_rows, _mm256_add_ps, _mm_add_ps)
-VFLOAT16_REDUCE_ROWS(vfloat16_min_rows, _mm256_min_ps, _mm_min_ps)
-VFLOAT16_REDUCE_ROWS(vfloat16_max_rows, _mm256_max_ps, _mm_max_ps)
+VFLOAT16_REDUCE_ROWS(vfloat16_sum_rows, _mm256_add_ps)
+VFLOAT16_REDUCE_ROWS(vfloat16_min_rows, _mm256_min_ps)
+VFLOAT16_REDUCE_ROWS(vfloat16_max_rows, _mm256_max_ps)
 #undef VFLOAT16_REDUCE_ROWS
 
 /* Eight rows of eight, turned. */

@@ -40,6 +40,18 @@ static inline vfloat16 vfloat16_add_where(vmask16 m, vfloat16 a, vfloat16 b)
 {
     return _mm512_mask_add_ps(a, m, a, b);
 } /* m ? a + b : a */
+static inline vfloat16 vfloat16_add_unless(vmask16 m, vfloat16 a, vfloat16 b)
+{
+    return vfloat16_add_where((vmask16)~m, a, b);
+}
+static inline vfloat16 vfloat16_less_where(vmask16 m, vfloat16 a, vfloat16 b)
+{
+    return _mm512_mask_fnmadd_ps(a, m, b, a);
+} /* m ? a - a b : a, rounded once */
+static inline vfloat16 vfloat16_less_unless(vmask16 m, vfloat16 a, vfloat16 b)
+{
+    return vfloat16_less_where((vmask16)~m, a, b);
+}
 static inline vfloat16 vfloat16_round(vfloat16 a)
 {
     return _mm512_roundscale_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);
@@ -70,24 +82,23 @@ static inline unsigned vmask16_numbers(vmask16 m, uint32_t first, uint32_t *out)
     return (unsigned)__builtin_popcount(m);
 }
 
-/* out[j] = all lanes of in[j] combined, j = 0..15, in the fixed order ((e0+e2)+(e1+e3)) per group of 4 lanes,
-   then (g0+g1)+(g2+g3). */
+/* Rows k, k + 4, k + 8, k + 12 of each of four vectors, so that the last step leaves them in order. */
 #define VFLOAT16_REDUCE_ROWS(name, op)                                                                       \
     static inline vfloat16 name(const vfloat16 in[16])                                                       \
     {                                                                                                        \
         vfloat16 x[8], y[4], z[2];                                                                           \
-        for (int j = 0; j < 8; j++)                                                                          \
-            x[j] = op(_mm512_unpacklo_ps(in[2 * j], in[2 * j + 1]),                                          \
-                      _mm512_unpackhi_ps(in[2 * j], in[2 * j + 1]));                                         \
-        for (int j = 0; j < 4; j++) {                                                                        \
-            const __m512d a = _mm512_castps_pd(x[2 * j]), b = _mm512_castps_pd(x[2 * j + 1]);                \
-            y[j] =                                                                                           \
-                op(_mm512_castpd_ps(_mm512_unpacklo_pd(a, b)), _mm512_castpd_ps(_mm512_unpackhi_pd(a, b)));  \
+        for (int j = 0; j < 8; j++) { /* two rows of eight lanes */                                          \
+            const vfloat16 first = in[j / 2 + 8 * (j % 2)], second = in[j / 2 + 8 * (j % 2) + 4];            \
+            x[j] = op(_mm512_shuffle_f32x4(first, second, 0x44), _mm512_shuffle_f32x4(first, second, 0xEE)); \
         }                                                                                                    \
+        for (int j = 0; j < 4; j++) /* four rows of four */                                                  \
+            y[j] = op(_mm512_shuffle_f32x4(x[2 * j], x[2 * j + 1], 0x88),                                    \
+                      _mm512_shuffle_f32x4(x[2 * j], x[2 * j + 1], 0xDD));                                   \
         for (int j = 0; j < 2; j++)                                                                          \
-            z[j] = op(_mm512_shuffle_f32x4(y[2 * j], y[2 * j + 1], 0x88),                                    \
-                      _mm512_shuffle_f32x4(y[2 * j], y[2 * j + 1], 0xDD));                                   \
-        return op(_mm512_shuffle_f32x4(z[0], z[1], 0x88), _mm512_shuffle_f32x4(z[0], z[1], 0xDD));           \
+            z[j] =                                                                                           \
+                op(_mm512_unpacklo_ps(y[2 * j], y[2 * j + 1]), _mm512_unpackhi_ps(y[2 * j], y[2 * j + 1]));  \
+        const __m512d a = _mm512_castps_pd(z[0]), b = _mm512_castps_pd(z[1]);                                \
+        return op(_mm512_castpd_ps(_mm512_unpacklo_pd(a, b)), _mm512_castpd_ps(_mm512_unpackhi_pd(a, b)));   \
     }
 VFLOAT16_REDUCE_ROWS(vfloat16_sum_rows, _mm512_add_ps)
 VFLOAT16_REDUCE_ROWS(vfloat16_min_rows, _mm512_min_ps)

@@ -91,6 +91,18 @@ static inline vfloat16 vfloat16_add_where(vmask16 m, vfloat16 x, vfloat16 y)
 {
     return vfloat16_select(m, vfloat16_add(x, y), x);
 }
+static inline vfloat16 vfloat16_add_unless(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_select(m, x, vfloat16_add(x, y));
+}
+static inline vfloat16 vfloat16_less_where(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_select(m, vfloat16_fnma(x, y, x), x);
+}
+static inline vfloat16 vfloat16_less_unless(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_select(m, x, vfloat16_fnma(x, y, x));
+}
 static inline vfloat16 vfloat16_round(vfloat16 x) { return VFLOAT16_EACH(vrndnq_f32, x); }
 static inline float32x4_t scale_pow2_4(float32x4_t x, float32x4_t n)
 {
@@ -145,21 +157,15 @@ static inline float32x4_t upper_halves(float32x4_t x, float32x4_t y)
     return vreinterpretq_f32_f64(vzip2q_f64(vreinterpretq_f64_f32(x), vreinterpretq_f64_f32(y)));
 }
 
-/* out[j] = all lanes of in[j] combined, four rows at a time: (e0 op e2) op (e1 op e3) of each group of four
-   lanes, then (g0 op g1) op (g2 op g3). */
 #define VFLOAT16_REDUCE_ROWS(name, op)                                                                       \
-    static inline float32x4_t name##_group(float32x4_t x, float32x4_t y, float32x4_t z, float32x4_t w)       \
+    static inline float32x4_t name##_lanes(vfloat16 x) { return op(op(x.a, x.c), op(x.b, x.d)); }            \
+    static inline float32x4_t name##_four(const vfloat16 *in)                                                \
     {                                                                                                        \
+        const float32x4_t x = name##_lanes(in[0]), y = name##_lanes(in[1]), z = name##_lanes(in[2]),         \
+                          w = name##_lanes(in[3]);                                                           \
         const float32x4_t xy = op(lower_halves(x, y), upper_halves(x, y));                                   \
         const float32x4_t zw = op(lower_halves(z, w), upper_halves(z, w));                                   \
         return op(vuzp1q_f32(xy, zw), vuzp2q_f32(xy, zw));                                                   \
-    }                                                                                                        \
-    static inline float32x4_t name##_four(const vfloat16 *in)                                                \
-    {                                                                                                        \
-        return op(op(name##_group(in[0].a, in[1].a, in[2].a, in[3].a),                                       \
-                     name##_group(in[0].b, in[1].b, in[2].b, in[3].b)),                                      \
-                  op(name##_group(in[0].c, in[1].c, in[2].c, in[3].c),                                       \
-                     name##_group(in[0].d, in[1].d, in[2].d, in[3].d)));                                     \
     }                                                                                                        \
     static inline vfloat16 name(const vfloat16 in[16])                                                       \
     {                                                                                                        \

@@ -98,6 +98,18 @@ static inline vfloat16 vfloat16_add_where(vmask16 m, vfloat16 a, vfloat16 b)
 {
     return vfloat16_select(m, vfloat16_add(a, b), a);
 }
+static inline vfloat16 vfloat16_add_unless(vmask16 m, vfloat16 a, vfloat16 b)
+{
+    return vfloat16_select(m, a, vfloat16_add(a, b));
+}
+static inline vfloat16 vfloat16_less_where(vmask16 m, vfloat16 a, vfloat16 b)
+{
+    return vfloat16_select(m, vfloat16_fnma(a, b, a), a);
+}
+static inline vfloat16 vfloat16_less_unless(vmask16 m, vfloat16 a, vfloat16 b)
+{
+    return vfloat16_select(m, a, vfloat16_fnma(a, b, a));
+}
 static inline vfloat16 vfloat16_round(vfloat16 a)
 {
     EACH a.v[i] = rintf(a.v[i]);
@@ -131,17 +143,18 @@ static inline vmask16 vmask16_or(vmask16 a, vmask16 b) { return (vmask16){a.bits
 static inline vmask16 vmask16_andnot(vmask16 a, vmask16 b) { return (vmask16){b.bits & ~a.bits}; }
 static inline unsigned vmask16_bits(vmask16 m) { return m.bits; }
 static inline vmask16 vmask16_from_bits(unsigned bits) { return (vmask16){bits & 0xFFFF}; }
+/* out[j] = all lanes of in[j] combined, j = 0..15, in a fixed order: lanes eight apart, then four apart, then
+   two, then the last two. */
 static inline vfloat16 vfloat16_sum_rows(const vfloat16 in[16])
 {
     vfloat16 out;
     EACH
     {
-        float g[4];
-        for (int k = 0; k < 4; k++) {
-            const float *e = in[i].v + 4 * k;
-            g[k] = (e[0] + e[2]) + (e[1] + e[3]);
-        }
-        out.v[i] = (g[0] + g[1]) + (g[2] + g[3]);
+        const float *e = in[i].v;
+        float four[4];
+        for (int k = 0; k < 4; k++)
+            four[k] = (e[k] + e[k + 8]) + (e[k + 4] + e[k + 12]);
+        out.v[i] = (four[0] + four[2]) + (four[1] + four[3]);
     }
     return out;
 }

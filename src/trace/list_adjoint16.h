@@ -58,7 +58,7 @@ static void replay_list(const kernel_scene *scene, const used_list *used, const 
     const vfloat16 a = vfloat16_load(seen->a), b = vfloat16_load(seen->b),
                    length = vfloat16_load(seen->length), alpha_max = vfloat16_set1(scene->settings.alpha_max);
     const bool one_order = scene->settings.packet_order;
-    insertion s = start_insertion();
+    insertion s = start_insertion(&rows);
     for (size_t first = 0; first < count; first += TOGETHER) {
         const list_row *g[TOGETHER];
         row_response r[TOGETHER];
@@ -99,20 +99,18 @@ static inline void pass_on(const near_row *now, near_row *other, vfloat16 *sum)
 {
     const vmask16 behind = vfloat16_lt(other->t, now->t);
     other->value = vfloat16_add_where(behind, other->value, now->term);
-    *sum = vfloat16_add_where(vmask16_andnot(behind, vmask16_from_bits(0xFFFF)), *sum, other->term);
+    *sum = vfloat16_add_unless(behind, *sum, other->term);
 }
 
 /* Row i goes on past row j and those after it, too; returned is what lies behind it from there on. */
 static inline __attribute__((always_inline)) vfloat16 step_on(const list_rows *rows, const near_row *now,
                                                               vmask16 hit, int j)
 {
-    const vfloat16 zero = vfloat16_set1(0);
-    vfloat16 sum = zero;
+    vfloat16 sum = vfloat16_set1(0);
     do {
         const vmask16 behind = vfloat16_lt(row_load(rows->t, j), now->t);
-        sum = vfloat16_add(sum, vfloat16_select(behind, zero, row_load(rows->term, j)));
-        row_store(rows->behind, j,
-                  vfloat16_add(row_load(rows->behind, j), vfloat16_select(behind, now->term, zero)));
+        sum = vfloat16_add_unless(behind, sum, row_load(rows->term, j));
+        row_store(rows->behind, j, vfloat16_add_where(behind, row_load(rows->behind, j), now->term));
         j++;
     } while (vmask16_any(vmask16_and(vfloat16_lt(row_load(rows->reached, j), now->t), hit)));
     return vfloat16_add(row_load(rows->before, j), sum);
@@ -130,12 +128,14 @@ static void collect_behind(list_rows *out, const used_list *used, const vfloat16
     const vfloat16 direction[3] = {d_rgb[0], d_rgb[1], d_rgb[2]};
     const int count = (int)rows->count;
     near_row next = {infinite, zero, zero, zero}, second = next;
-    vfloat16 after[3] = {background, background, background}, nearest[3] = {infinite, infinite, infinite};
-    row_store(rows->before, count, background);
-    row_store(rows->reached, count, infinite);
+    vfloat16 after = background, nearest = infinite;
+    for (int i = count; i < count + 3; i++) {
+        row_store(rows->before, i, background);
+        row_store(rows->reached, i, infinite);
+    }
     for (int i = count; i-- > 0;) {
         const vfloat16 alpha = row_load(rows->alpha, i);
-        near_row now = {.t = row_load(rows->t, i), .clear = zero};
+        near_row now = {.t = row_load(rows->t, i), .alpha = zero};
         now.term = vfloat16_mul(vfloat16_mul(row_load(rows->through, i), alpha),
                                 dot_lanes(used_row[rows->number[i]].color, direction));
         const vmask16 hit = vfloat16_lt(zero, alpha);
@@ -143,20 +143,16 @@ static void collect_behind(list_rows *out, const used_list *used, const vfloat16
         row_store(rows->term, i, now.term);
         pass_on(&now, &next, &sum);
         pass_on(&now, &second, &sum);
-        now.value = vfloat16_add(after[2], sum);
-        if (vmask16_any(vmask16_and(vfloat16_lt(nearest[2], now.t), hit)))
+        now.value = vfloat16_add(row_load(rows->before, i + 3), sum);
+        if (vmask16_any(vmask16_and(vfloat16_lt(row_load(rows->reached, i + 3), now.t), hit)))
             now.value = vfloat16_add(step_on(rows, &now, hit, i + 3), sum);
         row_store(rows->behind, i + 2, second.value);
         second = next;
         next = now;
-        for (int k = 2; k > 0; k--) {
-            after[k] = after[k - 1];
-            nearest[k] = nearest[k - 1];
-        }
-        after[0] = vfloat16_add(after[0], now.term);
-        nearest[0] = vfloat16_min(nearest[0], vfloat16_select(hit, now.t, infinite));
-        row_store(rows->before, i, after[0]);
-        row_store(rows->reached, i, nearest[0]);
+        after = vfloat16_add(after, now.term);
+        nearest = vfloat16_min(nearest, vfloat16_select(hit, now.t, infinite));
+        row_store(rows->before, i, after);
+        row_store(rows->reached, i, nearest);
     }
     row_store(rows->behind, 1, second.value);
     row_store(rows->behind, 0, next.value);

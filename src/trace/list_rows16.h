@@ -24,8 +24,8 @@ typedef struct list_rows {
     float *alpha; /* 0 where the ray has no hit in this row */
     /* By place in the order: */
     float *through; /* T in front of the hit; two more stand before the first */
-    float *before;  /* product of 1 - alpha over all rows before this one */
-    float *reached; /* farthest hit of all rows before this one */
+    float *before;  /* product of 1 - alpha over all rows before this one; two more, too */
+    float *reached; /* farthest hit of all rows before this one; two more, too */
     /* Adjoint: T alpha g . color, and the sum of that behind, of which two more stand after the last; of a
        row, 1 / den of its response. */
     float *term, *behind, *inverse;
@@ -51,6 +51,8 @@ static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoin
     for (size_t k = 0; k < arrays; k++, at += wide)
         *field[k] = at;
     out->through += 2 * PACKET_LANES;
+    out->before += 2 * PACKET_LANES;
+    out->reached += 2 * PACKET_LANES;
     out->key = at;
     uint32_t *word = (uint32_t *)(void *)(at + n + 9); /* whole sixteens */
     out->order = word;
@@ -185,31 +187,30 @@ static void order_by_middle(const tile_list *list, float t_near, list_rows *rows
 
 /* A row whose neighbours in the order may still change its value: T, or the sum of what lies behind. */
 typedef struct near_row {
-    vfloat16 t, clear, term, value; /* clear: 1 - alpha; term: adjoint */
+    vfloat16 t, alpha, term, value; /* term: adjoint */
 } near_row;
 
 /* Row i goes back past `other`: where it lies in front, the other's T is less by its alpha; elsewhere its own
    is. */
-static inline void pass_row(vfloat16 t, vfloat16 clear, near_row *other, vfloat16 *product)
+static inline void pass_row(const near_row *now, near_row *other, vfloat16 *product)
 {
-    const vmask16 front = vfloat16_lt(t, other->t);
-    other->value = vfloat16_mul_where(front, other->value, clear);
-    *product = vfloat16_mul_where(vmask16_andnot(front, vmask16_from_bits(0xFFFF)), *product, other->clear);
+    const vmask16 front = vfloat16_lt(now->t, other->t);
+    other->value = vfloat16_less_where(front, other->value, now->alpha);
+    *product = vfloat16_less_unless(front, *product, other->alpha);
 }
 
 /* Row i goes back past those before j, too; returned is its T. */
 static inline __attribute__((always_inline)) vfloat16 step_back(const list_rows *rows, const near_row *now,
                                                                 vmask16 hit, int j, size_t *steps)
 {
-    const vfloat16 one = vfloat16_set1(1), t = now->t, clear = now->clear;
-    vfloat16 product = one;
+    const vfloat16 t = now->t, alpha = now->alpha;
+    vfloat16 product = vfloat16_set1(1);
     const int from = j;
     do {
         const int other = (int)rows->order[--j];
         const vmask16 front = vfloat16_lt(t, row_load(rows->t, other));
-        row_store(rows->through, j, vfloat16_mul_where(front, row_load(rows->through, j), clear));
-        product = vfloat16_mul(product,
-                               vfloat16_select(front, one, vfloat16_sub(one, row_load(rows->alpha, other))));
+        row_store(rows->through, j, vfloat16_less_where(front, row_load(rows->through, j), alpha));
+        product = vfloat16_less_unless(front, product, row_load(rows->alpha, other));
     } while (vmask16_any(vmask16_and(vfloat16_lt(t, row_load(rows->reached, j)), hit)));
     *steps += (size_t)(from - j);
     return vfloat16_mul(row_load(rows->before, j), product);
@@ -218,17 +219,21 @@ static inline __attribute__((always_inline)) vfloat16 step_back(const list_rows 
 /* The end of the rows so far, for the next one. */
 typedef struct insertion {
     near_row last, second;
-    vfloat16 before, before1, before2;    /* product of 1 - alpha before the next row, the last, the second */
-    vfloat16 reached, reached1, reached2; /* farthest hit there */
+    vfloat16 before;  /* product of 1 - alpha over all of them */
+    vfloat16 reached; /* farthest hit of them */
     size_t steps;
     bool crowded;
 } insertion;
 
-static inline insertion start_insertion(void)
+static inline insertion start_insertion(const list_rows *rows)
 {
     const vfloat16 zero = vfloat16_set1(0), one = vfloat16_set1(1);
-    const near_row none = {zero, one, zero, one};
-    return (insertion){none, none, one, one, one, zero, zero, zero, 0, false};
+    const near_row none = {zero, zero, zero, one};
+    for (int i = -2; i < 0; i++) {
+        row_store(rows->before, i, one);
+        row_store(rows->reached, i, zero);
+    }
+    return (insertion){none, none, one, zero, 0, false};
 }
 
 /* Row i of the order: T in front of its hits, and in front of those that they hide. Each goes back past the
@@ -236,27 +241,23 @@ static inline insertion start_insertion(void)
    so that compilers know what stores cannot change. */
 static inline void insert_row(const list_rows *rows, insertion *s, int i, vfloat16 t, vfloat16 alpha)
 {
-    const vfloat16 zero = vfloat16_set1(0), one = vfloat16_set1(1);
-    near_row now = {.t = t, .clear = vfloat16_sub(one, alpha), .term = zero};
+    const vfloat16 zero = vfloat16_set1(0);
+    near_row now = {.t = t, .alpha = alpha, .term = zero};
     const vmask16 hit = vfloat16_lt(zero, alpha);
-    vfloat16 product = one;
+    vfloat16 product = vfloat16_set1(1);
     row_store(rows->before, i, s->before);
     row_store(rows->reached, i, s->reached);
-    pass_row(now.t, now.clear, &s->last, &product);
-    pass_row(now.t, now.clear, &s->second, &product);
-    now.value = vfloat16_mul(s->before2, product);
-    if (vmask16_any(vmask16_and(vfloat16_lt(now.t, s->reached2), hit)) && !s->crowded) {
+    pass_row(&now, &s->last, &product);
+    pass_row(&now, &s->second, &product);
+    now.value = vfloat16_mul(row_load(rows->before, i - 2), product);
+    if (vmask16_any(vmask16_and(vfloat16_lt(now.t, row_load(rows->reached, i - 2)), hit)) && !s->crowded) {
         now.value = vfloat16_mul(step_back(rows, &now, hit, i - 2, &s->steps), product);
         s->crowded = s->steps > STEPS_PER_ROW * (size_t)i + STEPS_FREE;
     }
     row_store(rows->through, i - 2, s->second.value);
     s->second = s->last;
     s->last = now;
-    s->before2 = s->before1;
-    s->before1 = s->before;
-    s->before = vfloat16_mul(s->before, now.clear);
-    s->reached2 = s->reached1;
-    s->reached1 = s->reached;
+    s->before = vfloat16_fnma(s->before, alpha, s->before);
     s->reached = vfloat16_max(s->reached, vfloat16_select(hit, now.t, zero));
 }
 
@@ -287,7 +288,7 @@ static inline void end_appending(list_rows *out, const insertion *s)
 static void append_rows(list_rows *out)
 {
     const list_rows rows = *out;
-    insertion s = start_insertion();
+    insertion s = start_insertion(&rows);
     for (int i = 0; i < (int)rows.count; i++)
         append_row(&rows, &s, i, row_load(rows.alpha, (int)rows.order[i]));
     end_appending(out, &s);
@@ -296,7 +297,7 @@ static void append_rows(list_rows *out)
 static void insert_rows(list_rows *out)
 {
     const list_rows rows = *out;
-    insertion s = start_insertion();
+    insertion s = start_insertion(&rows);
     for (int i = 0; i < (int)rows.count; i++) {
         const int row = (int)rows.order[i];
         insert_row(&rows, &s, i, row_load(rows.t, row), row_load(rows.alpha, row));

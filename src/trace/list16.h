@@ -180,37 +180,38 @@ static inline void depth_of_ellipsoid(const kernel_scene *scene, const view_fram
     m->key[i] = t > 0.5f * t_near && t < 1e30f ? t : 0.5f * t_near; /* NaN fails */
 }
 
-/* Numbers of the rows by key; those whose keys have the same sixteen bits, by number. */
+/* Numbers of the rows by key, then number: whatever else is in the list, two rows have one order. */
 static const uint64_t *sort_list(const float *key, size_t count, uint64_t *from, uint64_t *to)
 {
-    uint32_t lowest = UINT32_MAX, highest = 0, place[2][256] = {{0}};
+    enum { DIGITS = 4, VALUES = 256 };
+    uint32_t lowest = UINT32_MAX, highest = 0, place[DIGITS][VALUES] = {{0}};
     for (size_t i = 0; i < count; i++) {
         uint32_t bits;
         memcpy(&bits, &key[i], sizeof bits);
         lowest = bits < lowest ? bits : lowest;
         highest = bits > highest ? bits : highest;
     }
-    int shift = 0;
-    while ((highest - lowest) >> shift > 0xFFFF)
-        shift++;
     for (size_t i = 0; i < count; i++) {
         uint32_t bits;
         memcpy(&bits, &key[i], sizeof bits);
-        bits = (bits - lowest) >> shift;
+        bits -= lowest;
         from[i] = (uint64_t)bits << 32 | i;
-        place[0][bits & 255]++;
-        place[1][bits >> 8]++;
+        for (int d = 0; d < DIGITS; d++)
+            place[d][bits >> 8 * d & (VALUES - 1)]++;
     }
-    for (uint32_t d = 0, next[2] = {0, 0}; d < 256; d++)
-        for (int pass = 0; pass < 2; pass++) {
-            const uint32_t of_digit = place[pass][d];
-            place[pass][d] = next[pass];
-            next[pass] += of_digit;
+    for (int d = 0; d < DIGITS && (highest - lowest) >> 8 * d != 0; d++) {
+        uint32_t next = 0;
+        for (int v = 0; v < VALUES; v++) {
+            const uint32_t of_digit = place[d][v];
+            place[d][v] = next;
+            next += of_digit;
         }
-    for (size_t i = 0; i < count; i++)
-        to[place[0][from[i] >> 32 & 255]++] = from[i];
-    for (size_t i = 0; i < count; i++)
-        from[place[1][to[i] >> 40]++] = to[i];
+        for (size_t i = 0; i < count; i++)
+            to[place[d][from[i] >> (32 + 8 * d) & (VALUES - 1)]++] = from[i];
+        uint64_t *swap = from;
+        from = to;
+        to = swap;
+    }
     return from;
 }
 

@@ -24,6 +24,7 @@ typedef struct reader {
     int fd;
     uint64_t size;
     bool is_short;
+    int failure; /* errno of a read that failed; 0: none */
     gbt_error *err;
 } reader;
 
@@ -34,6 +35,8 @@ static void take(reader *r, uint64_t at, void *out, size_t count)
         const ssize_t got = pread(r->fd, (char *)out + have, count - have, (off_t)(at + have));
         if (got < 0 && errno == EINTR)
             continue;
+        if (got < 0)
+            r->failure = errno;
         if (got <= 0)
             break;
         have += (size_t)got;
@@ -324,6 +327,8 @@ gbt_status image_header_read(const char *path, image_header *out, gbt_error *err
         } else {
             status = refuse_format(&r, magic);
         }
+        if (r.failure != 0) /* whatever the zeros in its place looked like */
+            status = base_fail(err, GBT_ERR_IO, "%s: read failed: %s", path, strerror(r.failure));
     }
     close(r.fd);
     return status;

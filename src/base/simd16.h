@@ -24,6 +24,32 @@
 #include "base/simd16_plain.h"
 #endif
 
+#ifndef VFLOAT16_WHERE
+/* m ? x y : x */
+static inline vfloat16 vfloat16_mul_where(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_select(m, vfloat16_mul(x, y), x);
+}
+/* m ? x + y : x */
+static inline vfloat16 vfloat16_add_where(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_select(m, vfloat16_add(x, y), x);
+}
+static inline vfloat16 vfloat16_add_unless(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_select(m, x, vfloat16_add(x, y));
+}
+/* m ? x - x y : x, rounded once */
+static inline vfloat16 vfloat16_less_where(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_select(m, vfloat16_fnma(x, y, x), x);
+}
+static inline vfloat16 vfloat16_less_unless(vmask16 m, vfloat16 x, vfloat16 y)
+{
+    return vfloat16_select(m, x, vfloat16_fnma(x, y, x));
+}
+#endif
+
 #ifndef VMASK16_NUMBERS
 static inline unsigned vmask16_numbers(vmask16 m, uint32_t first, uint32_t *out)
 {

@@ -53,6 +53,7 @@ static inline vfloat16 vfloat16_select(vmask16 m, vfloat16 yes, vfloat16 no)
 {
     return (vfloat16){_mm256_blendv_ps(no.a, yes.a, m.a), _mm256_blendv_ps(no.b, yes.b, m.b)};
 }
+#define VFLOAT16_WHERE
 static inline vfloat16 vfloat16_mul_where(vmask16 m, vfloat16 x, vfloat16 y)
 {
     return vfloat16_select(m, vfloat16_mul(x, y), x);

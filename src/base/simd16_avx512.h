@@ -32,6 +32,7 @@ static inline vfloat16 vfloat16_select(vmask16 m, vfloat16 yes, vfloat16 no)
 {
     return _mm512_mask_blend_ps(m, no, yes);
 }
+#define VFLOAT16_WHERE
 static inline vfloat16 vfloat16_mul_where(vmask16 m, vfloat16 a, vfloat16 b)
 {
     return _mm512_mask_mul_ps(a, m, a, b);

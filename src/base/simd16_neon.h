@@ -83,26 +83,6 @@ static inline vfloat16 vfloat16_select(vmask16 m, vfloat16 yes, vfloat16 no)
     return (vfloat16){vbslq_f32(m.a, yes.a, no.a), vbslq_f32(m.b, yes.b, no.b), vbslq_f32(m.c, yes.c, no.c),
                       vbslq_f32(m.d, yes.d, no.d)};
 }
-static inline vfloat16 vfloat16_mul_where(vmask16 m, vfloat16 x, vfloat16 y)
-{
-    return vfloat16_select(m, vfloat16_mul(x, y), x);
-}
-static inline vfloat16 vfloat16_add_where(vmask16 m, vfloat16 x, vfloat16 y)
-{
-    return vfloat16_select(m, vfloat16_add(x, y), x);
-}
-static inline vfloat16 vfloat16_add_unless(vmask16 m, vfloat16 x, vfloat16 y)
-{
-    return vfloat16_select(m, x, vfloat16_add(x, y));
-}
-static inline vfloat16 vfloat16_less_where(vmask16 m, vfloat16 x, vfloat16 y)
-{
-    return vfloat16_select(m, vfloat16_fnma(x, y, x), x);
-}
-static inline vfloat16 vfloat16_less_unless(vmask16 m, vfloat16 x, vfloat16 y)
-{
-    return vfloat16_select(m, x, vfloat16_fnma(x, y, x));
-}
 static inline vfloat16 vfloat16_round(vfloat16 x) { return VFLOAT16_EACH(vrndnq_f32, x); }
 static inline float32x4_t scale_pow2_4(float32x4_t x, float32x4_t n)
 {

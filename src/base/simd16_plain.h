@@ -90,26 +90,6 @@ static inline vfloat16 vfloat16_select(vmask16 m, vfloat16 yes, vfloat16 no)
     EACH no.v[i] = m.bits >> i & 1 ? yes.v[i] : no.v[i];
     return no;
 }
-static inline vfloat16 vfloat16_mul_where(vmask16 m, vfloat16 a, vfloat16 b)
-{
-    return vfloat16_select(m, vfloat16_mul(a, b), a);
-}
-static inline vfloat16 vfloat16_add_where(vmask16 m, vfloat16 a, vfloat16 b)
-{
-    return vfloat16_select(m, vfloat16_add(a, b), a);
-}
-static inline vfloat16 vfloat16_add_unless(vmask16 m, vfloat16 a, vfloat16 b)
-{
-    return vfloat16_select(m, a, vfloat16_add(a, b));
-}
-static inline vfloat16 vfloat16_less_where(vmask16 m, vfloat16 a, vfloat16 b)
-{
-    return vfloat16_select(m, vfloat16_fnma(a, b, a), a);
-}
-static inline vfloat16 vfloat16_less_unless(vmask16 m, vfloat16 a, vfloat16 b)
-{
-    return vfloat16_select(m, a, vfloat16_fnma(a, b, a));
-}
 static inline vfloat16 vfloat16_round(vfloat16 a)
 {
     EACH a.v[i] = rintf(a.v[i]);

@@ -12,7 +12,9 @@ import argparse
 import csv
 import json
 import os
+import socket
 import subprocess
+import time
 
 parser = argparse.ArgumentParser()
 parser.add_argument("photos")
@@ -56,7 +58,12 @@ def shot(url, size, out, click=""):
 def shot_of_viewer(run, out):
     viewer = subprocess.Popen([gbtrace, "view", run, "--port", "8479", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        subprocess.run(["sleep", "3"], check=True)
+        while viewer.poll() is None: # until it answers
+            try:
+                socket.create_connection(("127.0.0.1", 8479)).close()
+                break
+            except OSError:
+                time.sleep(0.2)
         shot("http://127.0.0.1:8479/", "1100x760", out, "input[name=compare][value=slider]")
     finally:
         viewer.terminate()

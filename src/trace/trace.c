@@ -13,9 +13,9 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
-#include "trace/triples.h"
+#include "trace/tile_pixels.h"
 
-enum { TILE_PIXELS = TILE_ACROSS * PACKET_PIXELS, RECORD_BLOCK = 512 };
+enum { RECORD_BLOCK = 512 };
 
 typedef struct trace_tile { /* or the part of one that a face of a view sees */
     hit_tape tape;
@@ -155,168 +155,6 @@ typedef struct pass {
     atomic_bool failed;
 } pass;
 
-/* Pixel of a lane; false when it lies outside the image. */
-static bool lane_pixel(const ray_image *rays, int x0, int y0, int packet, int lane, size_t *out)
-{
-    const int x = x0 + packet % TILE_ACROSS * PACKET_PIXELS + lane % PACKET_PIXELS;
-    const int y = y0 + packet / TILE_ACROSS * PACKET_PIXELS + lane / PACKET_PIXELS;
-    *out = (size_t)y * (size_t)rays->width + (size_t)x;
-    return x < rays->width && y < rays->height;
-}
-
-/* First pixel of a packet all of whose pixels lie in the image; false for others. */
-static bool packet_pixel(const ray_image *rays, int x0, int y0, int packet, size_t *out)
-{
-    const int x = x0 + packet % TILE_ACROSS * PACKET_PIXELS, y = y0 + packet / TILE_ACROSS * PACKET_PIXELS;
-    *out = (size_t)y * (size_t)rays->width + (size_t)x;
-    return x + PACKET_PIXELS <= rays->width && y + PACKET_PIXELS <= rays->height;
-}
-
-/* Written so that NaN fails: a ray that is not a unit vector from a sensible place sees the background. */
-static bool ray_is_sound(const float d[3], const float o[3])
-{
-    const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    return square > 0.99f && square < 1.01f && fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f;
-}
-
-/* A ray of the packet; it is not active when it is outside the image or none. */
-static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
-{
-    const float *d = rays->dir + 3 * at, *o = ray_image_origin(rays, at);
-    if (!ray_is_sound(d, o))
-        return;
-    for (int axis = 0; axis < 3; axis++) {
-        p->dir[axis][lane] = d[axis];
-        p->origin[axis][lane] = o[axis];
-    }
-    p->far[lane] = rays->far == NULL ? INFINITY : rays->far[at];
-    if (rays->near != NULL) {
-        p->near[lane] = rays->near[at];
-        p->through[lane] = rays->through[at];
-        if (!(p->near[lane] < p->far[lane]))
-            return;
-    }
-    p->active |= 1u << lane;
-}
-
-/* The common case: pixels in the image, rays from one point, nothing in their way. */
-static void load_whole_packet(const ray_image *rays, size_t first, packet_rays *p)
-{
-    const float *o = rays->origin;
-    const bool here = fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f;
-    const four_ints lane_bits = {1, 2, 4, 8};
-    four_ints sound = {0, 0, 0, 0};
-    for (int row = 0; row < PACKET_PIXELS; row++) {
-        four_floats d[3];
-        load_triples(rays->dir + 3 * (first + (size_t)row * (size_t)rays->width), d);
-        for (int axis = 0; axis < 3; axis++)
-            four_store(p->dir[axis] + PACKET_PIXELS * row, d[axis]);
-        const four_floats square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]; /* as ray_is_sound */
-        sound |= (square > 0.99f) & (square < 1.01f) & (lane_bits << (PACKET_PIXELS * row));
-    }
-    for (int axis = 0; axis < 3; axis++)
-        for (int lane = 0; lane < PACKET_LANES; lane++)
-            p->origin[axis][lane] = o[axis];
-    for (int lane = 0; lane < PACKET_LANES; lane++)
-        p->far[lane] = INFINITY;
-    p->active = here ? (unsigned)(sound[0] | sound[1] | sound[2] | sound[3]) : 0;
-}
-
-/* Lanes that are not active repeat one that is. */
-static void repeat_active(packet_rays *p, bool parts)
-{
-    const int first = __builtin_ctz(p->active);
-    for (int lane = 0; lane < PACKET_LANES; lane++) {
-        if (p->active >> lane & 1)
-            continue;
-        for (int axis = 0; axis < 3; axis++) {
-            p->dir[axis][lane] = p->dir[axis][first];
-            p->origin[axis][lane] = p->origin[axis][first];
-        }
-        p->far[lane] = p->far[first];
-        if (parts) {
-            p->near[lane] = p->near[first];
-            p->through[lane] = p->through[first];
-        }
-    }
-}
-
-/* Leave to a part of a tile what is its own. */
-static void keep_part(const list_view *view, const view_part *part, packet_rays *p, uint16_t *elsewhere)
-{
-    unsigned own = part->first ? ~p->active : 0;
-    for (int lane = 0; lane < PACKET_LANES; lane++) {
-        const float d[3] = {p->dir[0][lane], p->dir[1][lane], p->dir[2][lane]};
-        if (p->active >> lane & 1 && part_has_ray(view, part, d))
-            own |= 1u << lane;
-    }
-    *elsewhere = (uint16_t)~own;
-    p->active &= own;
-}
-
-/* Rays of the tile whose first pixel is (x0, y0), or of a part of it (NULL: all); lanes outside the image or
-   without a ray are not active. */
-static void load_tile(const ray_image *rays, const trace_settings *s, int x0, int y0, const list_view *view,
-                      const view_part *part, tile_rays *out)
-{
-    out->common_origin = rays->common_origin;
-    out->parts = rays->near != NULL;
-    for (int packet = 0; packet < TILE_PACKETS; packet++) {
-        packet_rays *p = &out->packet[packet];
-        size_t at;
-        p->active = 0;
-        if (packet_pixel(rays, x0, y0, packet, &at) && rays->common_origin && rays->far == NULL &&
-            rays->near == NULL)
-            load_whole_packet(rays, at, p);
-        else
-            for (int lane = 0; lane < PACKET_LANES; lane++)
-                if (lane_pixel(rays, x0, y0, packet, lane, &at))
-                    load_ray(rays, at, lane, p);
-        out->elsewhere[packet] = 0;
-        if (part != NULL && !part->whole)
-            keep_part(view, part, p, &out->elsewhere[packet]);
-        if (p->active != 0 && p->active != (1u << PACKET_LANES) - 1)
-            repeat_active(p, out->parts);
-        if (p->active != 0)
-            sky_colors(&s->sky, s->background, p->dir, p->background);
-    }
-}
-
-static void store_pixel(const pass *p, size_t at, const packet_output *o, int lane)
-{
-    const trace_outputs *out = &p->out;
-    const float before = p->rays->near != NULL ? p->rays->through[at] : 1;
-    for (size_t c = 0; c < 3; c++)
-        out->rgb->pixels[3 * at + c] = o == NULL ? before * p->view.settings.background[c] : o->rgb[c][lane];
-    if (out->transmittance != NULL)
-        out->transmittance[at] = o == NULL ? before : o->transmittance[lane];
-    if (out->ended != NULL)
-        out->ended[at] = o != NULL && (o->ended >> lane & 1) != 0;
-    if (!p->view.extra)
-        return;
-    const float opacity = o == NULL ? 0 : 1 - o->transmittance[lane];
-    if (out->depth != NULL)
-        out->depth[at] = opacity > 0 ? o->weighted_depth[lane] / opacity : 0;
-    if (out->median_depth != NULL)
-        out->median_depth[at] = o != NULL && isfinite(o->median_depth[lane]) ? o->median_depth[lane] : 0;
-    for (size_t k = 0; k < 3 && out->normal != NULL; k++)
-        out->normal[3 * at + k] = o == NULL ? 0 : o->normal[k][lane];
-    if (out->hit_count != NULL)
-        out->hit_count[at] = o == NULL ? 0 : o->hit_count[lane];
-    if (out->strongest != NULL)
-        out->strongest[at] = o == NULL ? UINT32_MAX : o->strongest[lane];
-}
-
-static void store_colors(const pass *p, size_t first, const packet_output *o)
-{
-    for (int row = 0; row < PACKET_PIXELS; row++) {
-        four_floats rgb[3];
-        for (int c = 0; c < 3; c++)
-            rgb[c] = four_load(o->rgb[c] + PACKET_PIXELS * row);
-        store_triples(rgb, p->out.rgb->pixels + 3 * (first + (size_t)row * (size_t)p->rays->width));
-    }
-}
-
 static bool trace_tile_rays(pass *p, trace_tile *tile, const tile_rays *rays, packet_output out[TILE_PACKETS],
                             bool keep_tape, tile_scratch *scratch, kernel_counters *counters)
 {
@@ -344,20 +182,7 @@ static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x
         out[packet].ended = 0;
     if (!trace_tile_rays(p, tile, rays, out, p->keep_tape, scratch, &tile->counters))
         return false;
-    const bool color_alone = !p->view.extra && p->out.transmittance == NULL && p->out.ended == NULL;
-    for (int packet = 0; packet < TILE_PACKETS; packet++) {
-        size_t first;
-        if (packet_pixel(p->rays, x0, y0, packet, &first) && color_alone &&
-            rays->packet[packet].active == (1u << PACKET_LANES) - 1) {
-            store_colors(p, first, &out[packet]);
-            continue;
-        }
-        for (int lane = 0; lane < PACKET_LANES; lane++) {
-            size_t at;
-            if (lane_pixel(p->rays, x0, y0, packet, lane, &at) && !(rays->elsewhere[packet] >> lane & 1))
-                store_pixel(p, at, rays->packet[packet].active >> lane & 1 ? &out[packet] : NULL, lane);
-        }
-    }
+    tile_store_pixels(p->rays, &p->view, &p->out, x0, y0, rays, out);
     const size_t bytes = tile->tape.count * sizeof *tile->tape.entries;
     tile->tape_dropped = p->keep_tape &&
                          atomic_fetch_add(&p->tape_bytes, bytes) + bytes > p->scene->tape_bytes_max &&
@@ -371,40 +196,11 @@ static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x
     return true;
 }
 
-static void load_gradients(const pass *p, size_t first, float d_rgb[3][PACKET_LANES])
-{
-    for (int row = 0; row < PACKET_PIXELS; row++) {
-        four_floats d[3];
-        load_triples(p->d_rgb->pixels + 3 * (first + (size_t)row * (size_t)p->rays->width), d);
-        for (int c = 0; c < 3; c++)
-            four_store(d_rgb[c] + PACKET_PIXELS * row, d[c]);
-    }
-}
-
 static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x0, int y0,
                           tile_scratch *scratch)
 {
     _Alignas(64) float d_rgb[TILE_PACKETS][3][PACKET_LANES];
-    for (int packet = 0; packet < TILE_PACKETS; packet++) {
-        size_t first;
-        if (packet_pixel(p->rays, x0, y0, packet, &first) &&
-            rays->packet[packet].active == (1u << PACKET_LANES) - 1) {
-            load_gradients(p, first, d_rgb[packet]);
-            continue;
-        }
-        memset(d_rgb[packet], 0, sizeof d_rgb[packet]);
-        for (int lane = 0; lane < PACKET_LANES; lane++) {
-            size_t at;
-            if (!lane_pixel(p->rays, x0, y0, packet, lane, &at) || rays->elsewhere[packet] >> lane & 1)
-                continue;
-            const float *d = p->d_rgb->pixels + 3 * at;
-            for (int c = 0; c < 3; c++)
-                if (rays->packet[packet].active >> lane & 1)
-                    d_rgb[packet][c][lane] = d[c];
-                else
-                    tile->d_background[c] += d[c]; /* the pixel is the background */
-        }
-    }
+    tile_load_gradients(p->rays, p->d_rgb, x0, y0, rays, d_rgb, tile->d_background);
     packet_output again[TILE_PACKETS];
     kernel_counters counters = {0};
     bool fine = !tile->tape_dropped || trace_tile_rays(p, tile, rays, again, true, scratch, &counters);
@@ -443,7 +239,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
         empty_tape(p, &tile->tape);
         memset(&tile->counters, 0, sizeof tile->counters);
     }
-    load_tile(p->rays, &p->view.settings, x0, y0, view, part, &rays);
+    tile_load_rays(p->rays, &p->view.settings, x0, y0, view, part, &rays);
     tile_scratch own = {{0}, {0}}, *place = scratch_take(p->scene->scratch),
                  *scratch = place != NULL ? place : &own;
     const bool fine = p->d_rgb == NULL ? forward_tile(p, tile, &rays, x0, y0, scratch)

@@ -5,37 +5,55 @@
 #include <math.h>
 
 #include "train/photos.h"
-#include "train/rules.h"
+#include "train/step_size.h"
 
-/* Measured on fox, plush and castle: 42 s of training with the default settings on two cores of a server CPU
-   with AVX-512 (docs/training.md). */
-static const double step_core_seconds_per_megapixel = 0.29, score_core_seconds_per_megapixel = 3.3;
+/* Core-seconds of a step, for the anchors in view and by its pixels, with AVX2; in the last part of a run
+   rays have twice the hits. Chosen on runs of 42, 84 and 120 s of plush, fox, castle, aerial and the demo on
+   two cores of a server CPU (bench/figures.py), which they meet within a quarter. */
+static const double anchors_core_seconds = 0.028, core_seconds_per_megapixel = 0.76, hits_of_last_part = 2;
+static const double score_core_seconds_per_megapixel = 5.5;
 static const double default_budget_seconds = 600;
 
-/* Of a photo's pixels, those that steps look at: a quarter as many for each factor of 4 beyond their budget.
- */
-static double seen_by_steps(double pixels)
+/* How many times as long the same takes. AVX-512 from runs of 42 s on another such machine; NEON and plain C
+   from instructions counted, and the tracer's time (docs/performance.md). */
+static const double slower_than_avx2[CPU_ISA_COUNT] = {
+    [CPU_PLAIN] = 8, [CPU_NEON] = 1.7, [CPU_AVX2] = 1, [CPU_AVX512] = 0.6};
+
+/* The mean over a run with a budget, whose parts take equal times: photos of `camera`. */
+static double core_seconds_of_step(const gbt_camera *camera)
 {
-    while (pixels > 2 * TRAIN_STEP_PIXELS)
-        pixels /= 4;
-    return pixels;
+    const gbt_train_def def = gbt_train_def_default();
+    const train_rules rules = train_rules_of(&def);
+    double steps_per_second = 0;
+    for (int part = 0; part < PACE_SEGMENTS; part++) {
+        const double progress = (part + 0.5) / PACE_SEGMENTS,
+                     megapixels = step_size_of(camera, &rules, progress).pixels / 1e6,
+                     hits = progress < SCHEDULE_EXACT_FROM ? 1 : hits_of_last_part;
+        steps_per_second +=
+            1 / (anchors_core_seconds + core_seconds_per_megapixel * megapixels * hits) / PACE_SEGMENTS;
+    }
+    return 1 / steps_per_second;
 }
 
-expectation expect_training(const scene *s, double downscale, int threads)
+expectation expect_training(const scene *s, double downscale, int threads, cpu_isa isa)
 {
     if (downscale <= 0)
         downscale = photos_usual_downscale(s);
-    double train_pixels = 0, test_pixels = 0, train_count = 0;
+    double test_pixels = 0, train_count = 0, seconds = 0;
     for (size_t i = 0; i < s->view_count; i++) {
-        const gbt_camera *c = &s->views[i].camera;
-        const double pixels = (double)c->width * (double)c->height / (downscale * downscale);
+        const gbt_camera *stated = &s->views[i].camera,
+                         camera = gbt_camera_resized(stated, (int)fmax(1, round(stated->width / downscale)),
+                                                     (int)fmax(1, round(stated->height / downscale)));
+        if (s->views[i].is_test)
+            test_pixels += (double)camera.width * camera.height;
+        else
+            seconds += core_seconds_of_step(&camera);
         train_count += !s->views[i].is_test;
-        *(s->views[i].is_test ? &test_pixels : &train_pixels) += pixels;
     }
-    const double photo_megapixels = seen_by_steps(train_pixels / fmax(train_count, 1)) / 1e6;
+    const double speed = slower_than_avx2[isa] / threads;
     return (expectation){.memory = memory_need_of(s, downscale),
-                         .step_seconds = step_core_seconds_per_megapixel * photo_megapixels / threads,
-                         .score_seconds = score_core_seconds_per_megapixel * test_pixels / 1e6 / threads,
+                         .step_seconds = speed * seconds / fmax(train_count, 1),
+                         .score_seconds = speed * score_core_seconds_per_megapixel * test_pixels / 1e6,
                          .threads = threads};
 }
 

@@ -7,6 +7,7 @@
 #include <jansson.h>
 #include <stdio.h>
 
+#include "base/cpu.h"
 #include "data/scene.h"
 #include "train/memory_need.h"
 
@@ -19,9 +20,9 @@ typedef struct expectation {
 
 /**
  * Of a run with the default settings and photos divided by `downscale`; 0: as training divides them. Good
- * within a factor of 1.5 on scenes like those it was measured on.
+ * within a quarter on scenes and processors like those it was measured on.
  */
-expectation expect_training(const scene *s, double downscale, int threads);
+expectation expect_training(const scene *s, double downscale, int threads, cpu_isa isa);
 
 json_t *expect_to_json(const expectation *e);
 

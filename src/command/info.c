@@ -147,7 +147,7 @@ static gbt_status info_of_dataset(const char *path, bool json, FILE *out, gbt_er
         facts.views_by_model[s.views[i].camera.model]++;
         facts.test_views += s.views[i].is_test;
     }
-    facts.expect = expect_training(&s, 0, parallel_threads());
+    facts.expect = expect_training(&s, 0, parallel_threads(), cpu_best_isa());
     gbt_status status = find_box(s.points.position, s.points.count, s.origin, facts.low, facts.high, err);
     if (status == GBT_OK && json) {
         json_t *value = dataset_to_json(path, &facts);

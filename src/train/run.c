@@ -21,6 +21,7 @@
 #include "train/run_data.h"
 #include "train/run_log.h"
 #include "train/save.h"
+#include "train/step_size.h"
 #include "train/trainer.h"
 
 void gbt_set_threads(int threads) { parallel_set_threads(threads); }
@@ -93,10 +94,11 @@ static void pace_extend(trainer *t, const speed *s)
 {
     const int part = t->pace.known;
     const double seconds = fmax(0, t->def.budget_seconds - t->seconds) / (PACE_SEGMENTS - part);
+    const gbt_camera camera = photos_camera(&t->photos, t->train_views[0], 0);
     double per_step = 0;
     for (int i = 0; i < 8; i++) {
         const double progress = (part + (i + 0.5) / 8) / PACE_SEGMENTS;
-        const double pixels = trainer_step_pixels(t, t->train_views[0], progress);
+        const double pixels = step_size_of(&camera, &t->rules, progress).pixels;
         per_step += (s->fixed_seconds + s->pixel_seconds * pixels) / 8;
     }
     /* Before anything has been measured: a few steps, and the rest of the first part's time goes to the

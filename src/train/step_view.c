@@ -16,14 +16,10 @@
 #include "train/loss.h"
 #include "train/near.h"
 #include "train/step_rows.h"
+#include "train/step_size.h"
 #include "train/trainer.h"
 
-enum {
-    STREAM_VIEWS = 1,
-    STREAM_PIXELS = 4,
-    STREAM_PARTS = 6,
-    LEAST_PIXELS_ACROSS = 80 /* with fewer a step would not be faster */
-};
+enum { STREAM_VIEWS = 1, STREAM_PIXELS = 4, STREAM_PARTS = 6 };
 
 /* ---- which photo ---- */
 
@@ -55,29 +51,11 @@ static size_t pick_photo(trainer *t, uint64_t before)
     return t->order[before % t->train_count];
 }
 
-step_size trainer_step_size(const trainer *t, size_t view, double progress)
+/* Of a photo, at the progress of this step. */
+static step_size size_of_step(const trainer *t, size_t view)
 {
     const gbt_camera camera = photos_camera(&t->photos, view, 0);
-    const int across = camera.width < camera.height ? camera.width : camera.height;
-    const double budgets = (double)camera.width * camera.height / t->rules.step_pixels;
-    int level = schedule_level(progress, t->rules.start_level);
-    if (level == 0) {
-        gbt_camera shifted;
-        const bool has_parts = budgets > 1 && gbt_camera_shifted(&camera, 0, 0, &shifted);
-        return (step_size){.parts = has_parts ? (int)fmax(1, round(sqrt(budgets))) : 1};
-    }
-    for (double left = budgets; left > 2; left /= 4)
-        level++;
-    while (level > 0 && across >> level < LEAST_PIXELS_ACROSS)
-        level--;
-    return (step_size){.level = level, .parts = 1};
-}
-
-double trainer_step_pixels(const trainer *t, size_t view, double progress)
-{
-    const step_size size = trainer_step_size(t, view, progress);
-    const gbt_camera camera = photos_camera(&t->photos, view, size.level);
-    return (double)camera.width * camera.height / (size.parts * size.parts);
+    return step_size_of(&camera, &t->rules, pace_progress(&t->pace, t->step));
 }
 
 /* The first of every 2^level-th pixel: at most four places along a side, so that what is known of the lens at
@@ -113,7 +91,7 @@ void step_photos_pick(trainer *t)
 static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err)
 {
     const size_t view = t->train_views[v->slot];
-    const step_size size = trainer_step_size(t, view, pace_progress(&t->pace, t->step));
+    const step_size size = size_of_step(t, view);
     v->outcome.level = size.level;
     v->outcome.parts = size.parts;
     const photo_sample sample = pick_pixels(t, size, v->slot, before);

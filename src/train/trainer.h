@@ -107,22 +107,6 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
  */
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err);
 
-/** How many pixels of a view a step looks at: 1 in 4^level, or where that is 0 one of parts x parts parts of
-    the photo. */
-typedef struct step_size {
-    int level, parts;
-} step_size;
-
-/**
- * The schedule's level at `progress`, and as many more, each a factor of 4, as bring the photo nearest to
- * rules.step_pixels; but never fewer than 80 pixels across. At level 0 parts of about step_pixels; panoramas
- * are whole.
- */
-step_size trainer_step_size(const trainer *t, size_t view, double progress);
-
-/** Pixels of such a step. */
-double trainer_step_pixels(const trainer *t, size_t view, double progress);
-
 /**
  * Mean PSNR over the held-out views at full training resolution, on 8-bit images; of their right halves with
  * --exposure (affine_split()); from poses that fit them with --refine-poses (align_held_out()).

@@ -21,6 +21,7 @@
 #include "train/checkpoint.h"
 #include "train/config.h"
 #include "train/seed_points.h"
+#include "train/step_size.h"
 
 /* The run that others are compared with: STEPS steps in one go. */
 static const char *straight_run(void)
@@ -1382,9 +1383,9 @@ static void steps_keep_to_their_pixels(void **state)
         for (double progress = 0; progress < 1; progress += 0.05) {
             view->camera.width = width;
             view->camera.height = width * 2 / 3;
-            const step_size size = trainer_step_size(&t, t.train_views[0], progress);
-            const double pixels = trainer_step_pixels(&t, t.train_views[0], progress),
-                         all = (double)width * view->camera.height, budget = t.rules.step_pixels;
+            const step_size size = step_size_of(&view->camera, &t.rules, progress);
+            const double pixels = size.pixels, all = (double)width * view->camera.height,
+                         budget = t.rules.step_pixels;
             assert_true(pixels <= 2.3 * budget);
             assert_int_equal(size.level == 0, progress >= SCHEDULE_WHOLE_FROM - 1e-9);
             if (all <= 2 * budget)
@@ -1395,7 +1396,7 @@ static void steps_keep_to_their_pixels(void **state)
         }
     view->camera = (gbt_camera){
         .model = GBT_CAMERA_EQUIRECTANGULAR, .width = 4000, .height = 2000, .params = {4000, 2000}};
-    assert_int_equal(trainer_step_size(&t, t.train_views[0], 0.95).parts, 1); /* has no parts */
+    assert_int_equal(step_size_of(&view->camera, &t.rules, 0.95).parts, 1); /* has no parts */
     trainer_free(&t);
 }
 

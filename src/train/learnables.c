@@ -54,14 +54,16 @@ static double rate_at(const rate_rule *r, double progress, bool own, double exte
     return factor * decay(r->first, last, progress) * scale;
 }
 
-learning_rates learning_rates_at(double progress, bool own, double extent, double factor, double end,
-                                 int views)
+learning_rates learning_rates_at(double progress, bool own, double geometry_from, double extent,
+                                 double factor, double end, int views)
 {
     learning_rates rates = {.views = views};
     if (own && progress > SCHEDULE_COOL_FROM)
         factor *= cool_end + (1 - cool_end) * fmax(1 - progress, 0) / (1 - SCHEDULE_COOL_FROM);
     for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
         rates.anchor[f] = rate_at(&anchor_rules[f], progress, own, extent, factor, end);
+    if (progress < geometry_from)
+        rates.anchor[ANCHOR_OFFSET] = rates.anchor[ANCHOR_SCALE_LOG] = 0;
     for (int part = 0; part < DECODER_PARTS; part++)
         rates.network[part] = rate_at(&network_rules[part], progress, own, extent, factor, end);
     return rates;

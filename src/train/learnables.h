@@ -38,11 +38,12 @@ typedef struct learning_rates {
  * @param own    [in] true: ours, higher, for runs of some thousand steps; false: the reference method's
  * @param extent [in] of the cameras; the reference's rate of offsets is proportional to it
  * @param factor [in] of all rates
+ * @param geometry_from [in] offsets and scales have no rate before that progress
  * @param end    [in] own: schedule_rate_end(), to which rates without an end of their own decay
  * @param views  [in] of a step
  */
-learning_rates learning_rates_at(double progress, bool own, double extent, double factor, double end,
-                                 int views);
+learning_rates learning_rates_at(double progress, bool own, double geometry_from, double extent,
+                                 double factor, double end, int views);
 
 /** A model in training: the values and what belongs to each. All borrowed. */
 typedef struct learning_model {

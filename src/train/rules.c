@@ -31,6 +31,7 @@ static train_rules own_rules(const gbt_train_def *def)
         .raises_first_opacity = true,
         .last_step_learns = true,
         .own_rates = true,
+        .geometry_from = def->refine_poses ? SCHEDULE_POSES_SETTLED : 0,
         .anchors_learn_when_adjusted = true,
         .importance = GROWTH_BY_SHARE,
         .gradient_counting = GROWTH_COUNT_BLENDED,

@@ -90,6 +90,9 @@ double schedule_rate_end(double steps);
 /** Statistics are gathered from STATS_FROM on; anchors grow and are pruned from ADJUST_FROM on. */
 #define SCHEDULE_STATS_FROM (500.0 / 30000)
 #define SCHEDULE_ADJUST_FROM (1500.0 / 30000)
+/** With --refine-poses, until then the poses settle on the anchors as they start: none moves, grows or is
+    pruned. */
+#define SCHEDULE_POSES_SETTLED 0.1
 /** Until then anchors grow at sparse points too: the start left most of them out. */
 #define SCHEDULE_POINTS_UNTIL 0.15
 

@@ -193,8 +193,8 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
                  views = t->def.views;
     const bool learns = t->rules.last_step_learns || next < 1;
     const learning_rates rates =
-        learning_rates_at(train_rules_progress(&t->rules, &t->pace, t->step), t->rules.own_rates, t->extent,
-                          t->def.learning_rate_factor * sqrt(views),
+        learning_rates_at(train_rules_progress(&t->rules, &t->pace, t->step), t->rules.own_rates,
+                          t->rules.geometry_from, t->extent, t->def.learning_rate_factor * sqrt(views),
                           schedule_rate_end(views * pace_expected(&t->pace, t->step)), t->def.views);
 
     /* Views, and as many of their pixels as the model can already use: renders, losses, gradients. */

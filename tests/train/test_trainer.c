@@ -521,7 +521,8 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     memcpy(before.scale_log, t.anchors.scale_log, n * 6 * sizeof(float));
     memcpy(before.feature, t.anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float));
     const learning_rates rates =
-        learning_rates_at(pace_progress(&t.pace, t.step), true, t.extent, t.def.learning_rate_factor, 1, 1);
+        learning_rates_at(pace_progress(&t.pace, t.step), true, t.rules.geometry_from, t.extent,
+                          t.def.learning_rate_factor, 1, 1);
     step_ok(&t, &r);
     assert_int_equal(t.anchors.count, n); /* no round: rows are where they were */
     double offset = 0, scale = 0, feature = 0;
@@ -1052,7 +1053,7 @@ static void levels_and_rates(void **state)
     double before[6];
     for (int own = 0; own < 2; own++)
         for (int i = 0; i <= 100; i++) { /* positive, finite, and none ever rises */
-            const learning_rates r = learning_rates_at(i / 100.0, own, 2.0, 1, 1, 1);
+            const learning_rates r = learning_rates_at(i / 100.0, own, 0, 2.0, 1, 1, 1);
             const double now[6] = {r.anchor[ANCHOR_OFFSET],    r.anchor[ANCHOR_FEATURE],
                                    r.anchor[ANCHOR_SCALE_LOG], r.network[DECODER_OPACITY],
                                    r.network[DECODER_SHAPE],   r.network[DECODER_COLOR]};
@@ -1062,23 +1063,28 @@ static void levels_and_rates(void **state)
                 before[k] = now[k];
             }
         }
-    assert_true(learning_rates_at(1, true, 1, 1, 1, 1).anchor[ANCHOR_FEATURE] <
-                0.05 * learning_rates_at(0.9, true, 1, 1, 1, 1).anchor[ANCHOR_FEATURE]);
-    assert_true(learning_rates_at(1, false, 1, 1, 1, 1).anchor[ANCHOR_FEATURE] ==
-                learning_rates_at(0.9, false, 1, 1, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(learning_rates_at(1, true, 0, 1, 1, 1, 1).anchor[ANCHOR_FEATURE] <
+                0.05 * learning_rates_at(0.9, true, 0, 1, 1, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(learning_rates_at(1, false, 0, 1, 1, 1, 1).anchor[ANCHOR_FEATURE] ==
+                learning_rates_at(0.9, false, 0, 1, 1, 1, 1).anchor[ANCHOR_FEATURE]);
     assert_true(schedule_rate_end(1) == 1 && schedule_rate_end(4000) == 1 &&
                 schedule_rate_end(16000) == 0.5 && schedule_rate_end(1e9) == 0.1);
-    const learning_rates at_last = learning_rates_at(0.9, true, 1, 1, 0.1, 1),
-                         flat = learning_rates_at(0.9, true, 1, 1, 1, 1);
+    const learning_rates waits = learning_rates_at(0.0499, true, 0.05, 1, 1, 1, 1),
+                         learns = learning_rates_at(0.05, true, 0.05, 1, 1, 1, 1);
+    assert_true(waits.anchor[ANCHOR_OFFSET] == 0 && waits.anchor[ANCHOR_SCALE_LOG] == 0 &&
+                waits.anchor[ANCHOR_FEATURE] > 0 && waits.network[DECODER_SHAPE] > 0);
+    assert_true(learns.anchor[ANCHOR_OFFSET] > 0 && learns.anchor[ANCHOR_SCALE_LOG] > 0);
+    const learning_rates at_last = learning_rates_at(0.9, true, 0, 1, 1, 0.1, 1),
+                         flat = learning_rates_at(0.9, true, 0, 1, 1, 1, 1);
     assert_true(at_last.anchor[ANCHOR_SCALE_LOG] < 0.13 * flat.anchor[ANCHOR_SCALE_LOG] &&
                 at_last.anchor[ANCHOR_OFFSET] == flat.anchor[ANCHOR_OFFSET]);
     for (int i = 0; i <= 100; i++) {
-        const learning_rates r = learning_rates_at(i / 100.0, false, 2.0, 1, 1, 1);
+        const learning_rates r = learning_rates_at(i / 100.0, false, 0, 2.0, 1, 1, 1);
         assert_true(fabs(r.anchor[ANCHOR_OFFSET] /
-                             learning_rates_at(i / 100.0, false, 1.0, 1, 1, 1).anchor[ANCHOR_OFFSET] -
+                             learning_rates_at(i / 100.0, false, 0, 1.0, 1, 1, 1).anchor[ANCHOR_OFFSET] -
                          2) < 1e-12);
-        assert_true(learning_rates_at(i / 100.0, true, 2.0, 1, 1, 1).anchor[ANCHOR_OFFSET] ==
-                    learning_rates_at(i / 100.0, true, 1.0, 1, 1, 1).anchor[ANCHOR_OFFSET]);
+        assert_true(learning_rates_at(i / 100.0, true, 0, 2.0, 1, 1, 1).anchor[ANCHOR_OFFSET] ==
+                    learning_rates_at(i / 100.0, true, 0, 1.0, 1, 1, 1).anchor[ANCHOR_OFFSET]);
     }
 }
 

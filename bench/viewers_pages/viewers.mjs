@@ -72,7 +72,7 @@ function difference(picture, own) {
 
 run("export", scene, ...files.map((file) => path.join(work, file)));
 const server = http.createServer(serve).listen(0);
-const browser = await puppeteer.launch({executablePath: browserPath, args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]});
+const browser = await puppeteer.launch({executablePath: browserPath, protocolTimeout: 1800000, args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]});
 const whole = model === undefined ? null : modelPicture();
 console.log("| file | bytes | Gaussians, degree | drawn by | to our splats: PSNR, FLIP | to our rays |" + (whole ? " to the run |" : ""));
 console.log("|---|---|---|---|---|---|" + (whole ? "---|" : ""));

@@ -35,6 +35,7 @@ typedef struct raw_scene {
     size_t tracks_missing;     /* track entries that name an image which is not there */
     size_t trailing_bytes;     /* behind the last record */
     size_t photos_missing;     /* views left out because their photo is not there */
+    bool has_masks;            /* there is a folder of masks */
     size_t file_bytes;         /* of the files that were read */
     char missing_names[256];   /* the first of them, ended by "..." when there are more */
     bool has_split;            /* the data set says which views are held out */

@@ -331,9 +331,9 @@ static void warn_about(const char *path, const raw_scene *raw, const scene *s)
     size_t masks = 0;
     for (size_t i = 0; i < s->view_count; i++)
         masks += s->views[i].mask_path != NULL;
-    if (masks > 0 && masks < s->view_count)
-        log_warn("%s: without a mask, and so counted whole: %zu of %zu photos", path, s->view_count - masks,
-                 s->view_count);
+    if ((raw->has_masks || masks > 0) && masks < s->view_count)
+        log_warn("%s: without a mask, and so counted whole: %zu of %zu photos%s", path, s->view_count - masks,
+                 s->view_count, raw->has_masks ? " (wanted masks/NAME.png)" : "");
     if (raw->angles_disagreeing > 0)
         log_warn("%s: frames whose camera_angle_x contradicts fl_x, which is used: %zu", path,
                  raw->angles_disagreeing);

@@ -53,12 +53,12 @@ gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
     char images[PATH_SIZE], masks[PATH_SIZE];
     GBT_TRY(file_join(images, sizeof images, folder, "images", err));
     GBT_TRY(file_join(masks, sizeof masks, folder, "masks", err));
-    const bool has_masks = file_is_folder(masks);
+    raw->has_masks = file_is_folder(masks);
     size_t kept = 0;
     gbt_status status = GBT_OK;
     for (size_t i = 0; i < raw->view_count && status == GBT_OK; i++) {
         raw_view view = raw->views[i];
-        status = find_files(folder, images, has_masks ? masks : NULL, &view, err);
+        status = find_files(folder, images, raw->has_masks ? masks : NULL, &view, err);
         if (view.path == NULL)
             raw_count_missing(raw, view.name);
         raw->views[i] = raw->views[kept]; /* what is left out goes behind, where raw_free() finds it */

@@ -12,6 +12,7 @@
 #include "data/photo_size.h"
 #include "data/ply.h"
 #include "data/scene.h"
+#include "gbtrace/progress.h"
 
 enum { VIEW_COUNT = 9, POINT_COUNT = 5 };
 
@@ -170,19 +171,31 @@ static void missing_photos(void **state)
         fail_msg("%s", err.text);
 }
 
-/* COLMAP's NAME.png, and two other habits; what has none stays without. */
+static void keep_text(const gbt_event *event, void *text) { snprintf(text, 300, "%s", event->text); }
+
+/* COLMAP's NAME.png, and two other habits; what has none stays without, and a warning counts it. */
 static void masks_are_found(void **state)
 {
     const char *folder = *state;
+    char text[300] = "";
     write_model(folder, false, true);
     static const char *const files[] = {"masks/v1.png.png", "masks/v2.png"};
     scene s;
+    gbt_listen(keep_text, text);
     must(scene_load(folder, NULL, &s, &err));
     assert_null(s.views[0].mask_path);
+    assert_null(strstr(text, "mask"));
+    scene_free(&s);
+    write_picture(folder, "masks/other.png", 8, 6);
+    must(scene_load(folder, NULL, &s, &err));
+    assert_null(s.views[0].mask_path);
+    assert_non_null(strstr(text, "counted whole: 9 of 9 photos (wanted masks/NAME.png)"));
     scene_free(&s);
     for (int i = 0; i < 2; i++)
         write_picture(folder, files[i], 8, 6);
     must(scene_load(folder, NULL, &s, &err));
+    gbt_listen(NULL, NULL);
+    assert_non_null(strstr(text, "counted whole: 7 of 9 photos"));
     for (int i = 0; i < 2; i++)
         assert_string_equal(s.views[i].mask_path, inside(folder, files[i], 0));
     assert_null(s.views[2].mask_path);

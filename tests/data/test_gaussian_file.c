@@ -172,15 +172,17 @@ static void glb_that_is_wrong(void **state)
 {
     static const struct {
         const char *before, *after, *wanted;
-    } rows[] = {{"glTF\2", "glTF\1", "no binary glTF 2.0"},
-                {"\"KHR_gaussian_splatting\":{", "\"KHR_gaussian_splattinx\":{", "no primitive"},
-                {"srgb_rec709_display", "lin0_rec709_display", "another space"},
-                {"\"translation\":", "\"translation\" ", "glTF: JSON"},
-                {"translation\":", "scale\":      ", "matrix, rotation or scale"},
-                {"\"POSITION\"", "\"POSITIOM\"", "POSITION is no array"},
-                {"\"count\":20", "\"count\":21", "wanted 21"},
-                {"\"buffer\":0", "\"buffer\":1", "in the binary chunk"},
-                {"\"componentType\":5126", "\"componentType\":5125", "in the binary chunk"}};
+    } rows[] = {
+        {"glTF\2", "glTF\1", "no binary glTF 2.0"},
+        {"\"KHR_gaussian_splatting\":{", "\"KHR_gaussian_splattinx\":{", "no primitive"},
+        {"srgb_rec709_display", "lin0_rec709_display", "another space"},
+        {"\"colorSpace\":\"srgb_rec709_display\"", "\"extensions\":{\"KHR_compressed\":{}}", "compressed"},
+        {"\"translation\":", "\"translation\" ", "glTF: JSON"},
+        {"translation\":", "scale\":      ", "matrix, rotation or scale"},
+        {"\"POSITION\"", "\"POSITIOM\"", "POSITION is no array"},
+        {"\"count\":20", "\"count\":21", "wanted 21"},
+        {"\"buffer\":0", "\"buffer\":1", "in the binary chunk"},
+        {"\"componentType\":5126", "\"componentType\":5125", "in the binary chunk"}};
     gaussian_cloud a, b;
     make_cloud(&a, 20, 1);
     must(gaussian_file_write(inside(*state, "w.glb", 0), &a, nowhere, &err));

@@ -148,6 +148,12 @@ static void spz_bytes(void **state)
     for (size_t k = 0; k < sizeof want; k++)
         if (got[k] != expected[k])
             fail_msg("byte %zu: %u (wanted %u)", k, got[k], expected[k]);
+    must(gaussian_file_read(inside(*state, "one.spz", 0), &a, &err)); /* these have bytes of their own */
+    assert_memory_equal(a.mean, mean, sizeof mean);
+    assert_true(a.scale_log[1] == 0 && a.scale_log[2] == -1.5f); /* the first is raised: a needle */
+    for (int k = 3; k < 12; k++)
+        assert_true(a.sh[k] == (k == 3 ? 0.25f : k == 11 ? -0.5f : 0));
+    gaussian_cloud_free(&a);
 }
 
 static void glb_round_trip(void **state)

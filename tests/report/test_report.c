@@ -328,6 +328,9 @@ static void whole_page(void **state)
         {"900 sparse points", 1},
         {"grow and prune", 1},
         {">Render, s<", 1},
+        {"<th>One held-out view</th><td>0.125\xc2\xa0"
+         "s: decode",
+         1},
         {"Made by gbtrace " GBT_VERSION, 1},
         {"\xc2\xa0ms</td>", 1},
     };

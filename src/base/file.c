@@ -64,20 +64,21 @@ done:
     return status;
 }
 
-static gbt_status read_at(int fd, unsigned char *out, size_t count, off_t at, const char *path,
-                          gbt_error *err)
+size_t file_read_at(int fd, uint64_t at, void *out, size_t count, int *failure)
 {
     size_t have = 0;
+    *failure = 0;
     while (have < count) {
-        const ssize_t got = pread(fd, out + have, count - have, at + (off_t)have);
+        const ssize_t got = pread(fd, (char *)out + have, count - have, (off_t)(at + have));
         if (got < 0 && errno == EINTR)
             continue;
+        if (got < 0)
+            *failure = errno;
         if (got <= 0)
-            return base_fail(err, GBT_ERR_IO, "%s@%zu: read failed: %s", path, (size_t)at + have,
-                             got < 0 ? strerror(errno) : "file became shorter");
+            break;
         have += (size_t)got;
     }
-    return GBT_OK;
+    return have;
 }
 
 gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, size_t *used, gbt_error *err)
@@ -94,9 +95,13 @@ gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, si
         for (int i = 0; i < 8; i++)
             out[i] = (unsigned char)(size >> (8 * i));
         *used = (size_t)(8 + first + last);
-        status = read_at(fd, out + 8, (size_t)first, 0, path, err);
-        if (status == GBT_OK)
-            status = read_at(fd, out + 8 + first, (size_t)last, (off_t)(size - last), path, err);
+        int failure;
+        size_t got = file_read_at(fd, 0, out + 8, (size_t)first, &failure);
+        if (failure == 0)
+            got += file_read_at(fd, size - last, out + 8 + first, (size_t)last, &failure);
+        if (got < first + last)
+            status = base_fail(err, GBT_ERR_IO, "%s: read failed: %s", path,
+                               failure != 0 ? strerror(failure) : "file became shorter");
     }
     close(fd);
     return status;

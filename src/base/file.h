@@ -6,12 +6,21 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "gbtrace/status.h"
 
 /** Read a regular file whole. `*bytes` has one extra zero byte at the end (not counted). Free with
     mem_free(). */
 gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count, gbt_error *err);
+
+/**
+ * Bytes [at, at + count) of an open file, fewer where it ends.
+ *
+ * @param failure [out] errno of a read that failed, else 0
+ * @return how many were read
+ */
+size_t file_read_at(int fd, uint64_t at, void *out, size_t count, int *failure);
 
 /**
  * What tells one file from another at little cost: its size as 8 bytes, then its first and its last `count`

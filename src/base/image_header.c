@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "base/fail.h"
+#include "base/file.h"
 
 enum {
     HEADER_PARTS_MAX = 10000, /* markers, attributes, or chunks before the pixels, that are looked at */
@@ -30,17 +31,11 @@ typedef struct reader {
 
 static void take(reader *r, uint64_t at, void *out, size_t count)
 {
-    size_t have = 0;
-    while (have < count && at + have < r->size) {
-        const ssize_t got = pread(r->fd, (char *)out + have, count - have, (off_t)(at + have));
-        if (got < 0 && errno == EINTR)
-            continue;
-        if (got < 0)
-            r->failure = errno;
-        if (got <= 0)
-            break;
-        have += (size_t)got;
-    }
+    const uint64_t rest = at < r->size ? r->size - at : 0;
+    int failure;
+    const size_t have = file_read_at(r->fd, at, out, rest < count ? (size_t)rest : count, &failure);
+    if (failure != 0)
+        r->failure = failure;
     if (have < count) {
         memset((char *)out + have, 0, count - have);
         r->is_short = true;

@@ -81,18 +81,12 @@ gbt_status large_file_put(large_file *file, const void *bytes, size_t count, gbt
 
 gbt_status large_file_read(const large_file *file, uint64_t at, void *bytes, size_t count, gbt_error *err)
 {
-    unsigned char *to = bytes;
-    for (size_t done = 0; done < count;) {
-        const ssize_t got = pread(file->descriptor, to + done, count - done, (off_t)(at + done));
-        if (got < 0 && errno == EINTR)
-            continue;
-        if (got <= 0)
-            return base_fail(err, GBT_ERR_IO, "%s@%llu: read failed: %s", file->name,
-                             (unsigned long long)(at + done),
-                             got < 0 ? strerror(errno) : "file became shorter");
-        done += (size_t)got;
-    }
-    return GBT_OK;
+    int failure;
+    const size_t got = file_read_at(file->descriptor, at, bytes, count, &failure);
+    return got == count ? GBT_OK
+                        : base_fail(err, GBT_ERR_IO, "%s@%llu: read failed: %s", file->name,
+                                    (unsigned long long)(at + got),
+                                    failure != 0 ? strerror(failure) : "file became shorter");
 }
 
 gbt_status large_file_close(large_file *file, bool keep, gbt_error *err)

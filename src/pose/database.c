@@ -18,6 +18,10 @@ struct database {
 
 static gbt_status failed(const database *d, gbt_error *err)
 {
+    const int code = sqlite3_errcode(d->file) & 0xff; /* SQLITE_NOMEM when there is not even a `file` */
+    if (code == SQLITE_NOMEM || code == SQLITE_IOERR)
+        return base_fail(err, code == SQLITE_NOMEM ? GBT_ERR_NO_MEMORY : GBT_ERR_IO, "%s: %s", d->path,
+                         sqlite3_errmsg(d->file));
     return base_fail(err, GBT_ERR_FORMAT, "%s: not a database of COLMAP: %s", d->path,
                      sqlite3_errmsg(d->file));
 }

@@ -231,6 +231,40 @@ static void pixels_come_back(void **state)
     }
 }
 
+/* Lenses whose terms mix x and y have no closed inverse. Random strong ones: what is seen in the picture
+ * comes back. */
+static void strong_lenses_come_back(void **state)
+{
+    (void)state;
+    static const gbt_camera_model models[] = {GBT_CAMERA_OPENCV, GBT_CAMERA_FULL_OPENCV,
+                                              GBT_CAMERA_THIN_PRISM_FISHEYE,
+                                              GBT_CAMERA_RAD_TAN_THIN_PRISM_FISHEYE};
+    size_t seen = 0;
+    for (uint64_t i = 0; i < 4000; i++) {
+        gbt_camera camera =
+            camera_of(models[i % 4], (const double[GBT_CAMERA_MAX_PARAMS]){400, 400, 320, 240});
+        for (int k = 4; k < gbt_camera_param_count(camera.model); k++)
+            camera.params[k] = 0.05 * rng_normal(23, (uint64_t)k, i);
+        for (uint64_t k = 0; k < 10; k++) {
+            double point[3] = {0.5 * rng_normal(24, 2 * k, i), 0.5 * rng_normal(24, 2 * k + 1, i), 1};
+            double pixel[2], dir[3];
+            if (!gbt_camera_project(&camera, point, pixel) || !(pixel[0] >= 0 && pixel[0] <= WIDTH) ||
+                !(pixel[1] >= 0 && pixel[1] <= HEIGHT))
+                continue;
+            seen++;
+            dvec_normalize(point);
+            if (!gbt_camera_unproject(&camera, pixel[0], pixel[1], dir))
+                fail_msg("lens %d, %s: no ray at %g %g", (int)i, gbt_camera_model_name(camera.model),
+                         pixel[0], pixel[1]);
+            for (int axis = 0; axis < 3; axis++)
+                if (!(fabs(dir[axis] - point[axis]) <= 1e-9))
+                    fail_msg("lens %d, %s: direction %.12g, wanted %.12g", (int)i,
+                             gbt_camera_model_name(camera.model), dir[axis], point[axis]);
+        }
+    }
+    assert_true(seen > 20000);
+}
+
 /* Directions over the whole sphere: what is seen comes back as the same direction, and wide lenses see behind
    themselves. */
 static void directions_come_back(void **state)
@@ -713,6 +747,7 @@ int main(void)
         cmocka_unit_test(the_page_has_the_list),
         cmocka_unit_test(projects_as_the_formula),
         cmocka_unit_test(pixels_come_back),
+        cmocka_unit_test(strong_lenses_come_back),
         cmocka_unit_test(directions_come_back),
         cmocka_unit_test(no_distortion_is_the_plain_model),
         cmocka_unit_test(nothing_beyond_the_fold),

@@ -9,7 +9,7 @@ trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
 
 for form in man bash zsh fish; do
-    "$program" describe $form >$form 2>err && [ ! -s err ]
+    "$program" describe $form >$form 2>err && [ ! -s err ] && [ "$(tr -dc '\0' <$form | wc -c)" = 0 ]
     report $? "describe $form" "$(cat err)"
 done
 

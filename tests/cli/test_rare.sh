@@ -39,6 +39,9 @@ holds "and what it was trained with" 0 '^  config    background = sky$' info wid
     grep -q '^{"schema": 1, "width": 32, "height": 24, "psnr": [0-9.]*, "ssim": [0-9.]*, "ssim_interior": [0-9.]*, "flip": [0-9.e-]*}$' scores &&
     [ "$(sed 's/.*"psnr": \([0-9]*\).*/\1/' scores)" -ge 90 ]
 report $? "render in double, and compare as JSON" "$(cat err out; ls shown; cat scores)"
+"$program" train made -o splats --renderer raster --iterations 3 --quiet >out 2>err && ! "$program" render splats -o none --outputs depth >>out 2>>err &&
+    "$program" render splats -o splats-exact --renderer reference --outputs depth >>out 2>>err && [ -s splats-exact/0000.depth.exr ]
+report $? "the reference, and depth beside it, of a model of splats" "$(cat err out; ls splats-exact)"
 "$program" render run -o path --path orbit --frames 2 --size 20x10 >out 2>err && [ "$(ls path | wc -l)" = 2 ]
 report $? "an orbit of another size" "$(cat err)"
 cat >path.json <<'END'

@@ -148,6 +148,12 @@ static void spz_bytes(void **state)
     for (size_t k = 0; k < sizeof want; k++)
         if (got[k] != expected[k])
             fail_msg("byte %zu: %u (wanted %u)", k, got[k], expected[k]);
+    must(gaussian_file_read(inside(*state, "one.spz", 0), &a, &err)); /* these have bytes of their own */
+    assert_memory_equal(a.mean, mean, sizeof mean);
+    assert_true(a.scale_log[1] == 0 && a.scale_log[2] == -1.5f); /* the first is raised: a needle */
+    for (int k = 3; k < 12; k++)
+        assert_true(a.sh[k] == (k == 3 ? 0.25f : k == 11 ? -0.5f : 0));
+    gaussian_cloud_free(&a);
 }
 
 static void glb_round_trip(void **state)
@@ -172,15 +178,17 @@ static void glb_that_is_wrong(void **state)
 {
     static const struct {
         const char *before, *after, *wanted;
-    } rows[] = {{"glTF\2", "glTF\1", "no binary glTF 2.0"},
-                {"\"KHR_gaussian_splatting\":{", "\"KHR_gaussian_splattinx\":{", "no primitive"},
-                {"srgb_rec709_display", "lin0_rec709_display", "another space"},
-                {"\"translation\":", "\"translation\" ", "glTF: JSON"},
-                {"translation\":", "scale\":      ", "matrix, rotation or scale"},
-                {"\"POSITION\"", "\"POSITIOM\"", "POSITION is no array"},
-                {"\"count\":20", "\"count\":21", "wanted 21"},
-                {"\"buffer\":0", "\"buffer\":1", "in the binary chunk"},
-                {"\"componentType\":5126", "\"componentType\":5125", "in the binary chunk"}};
+    } rows[] = {
+        {"glTF\2", "glTF\1", "no binary glTF 2.0"},
+        {"\"KHR_gaussian_splatting\":{", "\"KHR_gaussian_splattinx\":{", "no primitive"},
+        {"srgb_rec709_display", "lin0_rec709_display", "another space"},
+        {"\"colorSpace\":\"srgb_rec709_display\"", "\"extensions\":{\"KHR_compressed\":{}}", "compressed"},
+        {"\"translation\":", "\"translation\" ", "glTF: JSON"},
+        {"translation\":", "scale\":      ", "matrix, rotation or scale"},
+        {"\"POSITION\"", "\"POSITIOM\"", "POSITION is no array"},
+        {"\"count\":20", "\"count\":21", "wanted 21"},
+        {"\"buffer\":0", "\"buffer\":1", "in the binary chunk"},
+        {"\"componentType\":5126", "\"componentType\":5125", "in the binary chunk"}};
     gaussian_cloud a, b;
     make_cloud(&a, 20, 1);
     must(gaussian_file_write(inside(*state, "w.glb", 0), &a, nowhere, &err));

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 #include "frame/frame.h"
+#include "frame/visible.h"
 
 enum { OFFSETS = 3, ANCHORS = 400, W = 24, H = 16, KINDS = 9 };
 
@@ -157,6 +158,33 @@ static void nothing_reached_is_left_out(void **state)
     }
 }
 
+/* The cone around a lens's rays holds them, and little more. */
+static void the_cone_is_narrow(void **state)
+{
+    (void)state;
+    static const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_FISHEYE};
+    for (uint64_t seed = 0; seed < 20; seed++) {
+        gbt_camera camera = {
+            .model = models[seed % 2], .width = W, .height = H, .params = {0, 0, 0.5 * W, 0.4 * H}};
+        camera.params[0] = camera.params[1] = uniform(seed, 0, 6, 60);
+        random_pose(seed, 1, 3, &camera);
+        const ray_shot shot = ray_shot_of(&camera);
+        ray_image rays = {0};
+        view_bounds b;
+        assert_ok(ray_image_from_shot(&shot, 0, &rays, NULL));
+        assert_ok(view_bounds_find(&shot, &rays, &b, NULL));
+        float least = 1;
+        for (size_t i = 0; i < W * H; i++)
+            least = fminf(least, b.axis[0] * rays.dir[3 * i] + b.axis[1] * rays.dir[3 * i + 1] +
+                                     b.axis[2] * rays.dir[3 * i + 2]);
+        if (!(b.cos_angle <= least + 1e-6f && b.cos_angle > least - 5e-3f) ||
+            !(fabsf(b.cos_angle * b.cos_angle + b.sin_angle * b.sin_angle - 1) < 1e-6f))
+            fail_msg("seed %d: cosine %g, sine %g; of the rays %g", (int)seed, (double)b.cos_angle,
+                     (double)b.sin_angle, (double)least);
+        ray_image_free(&rays);
+    }
+}
+
 /* frame_render() is the shot of a still camera. */
 static void a_camera_is_a_shot(void **state)
 {
@@ -258,6 +286,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_reached_is_left_out),
+        cmocka_unit_test(the_cone_is_narrow),
         cmocka_unit_test(a_camera_is_a_shot),
         cmocka_unit_test(a_tracer_of_the_caller),
         cmocka_unit_test(same_bits_for_every_thread_count),

@@ -465,6 +465,19 @@ static void threads_agree(void **state)
     image_free(&first);
 }
 
+static void a_corner_that_is_no_vertex(void **state)
+{
+    (void)state;
+    static const float corners[9] = {0, 0, 1, 1, 0, 1, 0, 1, 1};
+    insert_scene in = {0};
+    gbt_error err = {0};
+    assert_int_equal(insert_add(&in, &matt, corners, 3, (const uint32_t[3]){0, 1, 3}, 1, &err),
+                     GBT_ERR_ARGUMENT);
+    assert_string_equal(err.text, "mesh: triangle 0: bad vertex number (wanted < 3, got 3)");
+    assert_ok(insert_add(&in, &matt, corners, 3, (const uint32_t[3]){0, 1, 2}, 1, NULL));
+    insert_scene_free(&in);
+}
+
 static void without_memory(void **state)
 {
     (void)state;
@@ -509,6 +522,7 @@ int main(void)
         cmocka_unit_test(shadow_on_a_mesh),
         cmocka_unit_test(no_surface_hides_itself),
         cmocka_unit_test(threads_agree),
+        cmocka_unit_test(a_corner_that_is_no_vertex),
         cmocka_unit_test(without_memory),
     };
     const int failures = cmocka_run_group_tests_name("insert, tables", tables, NULL, NULL);

@@ -328,6 +328,9 @@ static void whole_page(void **state)
         {"900 sparse points", 1},
         {"grow and prune", 1},
         {">Render, s<", 1},
+        {"<th>One held-out view</th><td>0.125\xc2\xa0"
+         "s: decode",
+         1},
         {"Made by gbtrace " GBT_VERSION, 1},
         {"\xc2\xa0ms</td>", 1},
     };
@@ -498,6 +501,70 @@ static void scene_on_the_page(void **state)
         close_run(r);
         free(e.views);
     }
+}
+
+/** Cameras along a slanted line: on both maps it lies across, and the camera in the middle is between the
+ * ends. */
+static void maps_lie_along_the_cameras(void **state)
+{
+    (void)state;
+    write_log(5, "");
+    write_pictures();
+    evaluation e = make_views(2);
+    loaded_run *r = make_run(GBT_CAMERA_PINHOLE);
+    for (int i = 0; i < VIEWS; i++) {
+        const double at[3] = {i - 2, -4, 3 * (i - 2)}, ahead[3] = {at[0] + 3, -4, at[2] - 1},
+                     up[3] = {0, -1, 0};
+        assert_true(gbt_camera_look_at(at, ahead, up, &r->scene.views[i].camera));
+    }
+    assert_ok(report_write(folder, &e, NULL, &(report_more){.open = r}, &assert_ok_err_));
+    char *page = check_page();
+    const char *at = page;
+    for (int map = 0; map < 2; map++) {
+        double x[VIEWS], y[VIEWS];
+        for (int i = 0; i < VIEWS; i++) {
+            at = strstr(at, "<path class=\"camera");
+            assert_non_null(at);
+            at = strstr(at, " d=\"M");
+            assert_int_equal(sscanf(at, " d=\"M%lf %lf", &x[i], &y[i]), 2);
+        }
+        double least = x[0], most = x[0];
+        for (int i = 0; i < VIEWS; i++) {
+            assert_true(fabs(y[i] - y[0]) <= 0.2);
+            least = fmin(least, x[i]);
+            most = fmax(most, x[i]);
+        }
+        assert_true(most - least > 100);
+    }
+    free(page);
+    close_run(r);
+    free(e.views);
+}
+
+/** The layers of a step's time are as high as the log says: 1 + 2, 3 + 4, 5, 6 ... 11 ms. */
+static void layers_have_the_logged_heights(void **state)
+{
+    (void)state;
+    static const double wanted[] = {3, 7, 5, 6, 7, 8, 9, 10, 11};
+    enum { LAYERS = sizeof wanted / sizeof *wanted };
+    write_log(50, "");
+    const evaluation none = {0};
+    char *page = write_report(&none, NULL);
+    double top[LAYERS + 1], x;
+    const char *at = strstr(page, "<path class=\"area ");
+    assert_non_null(at);
+    const char *end = strchr(at, 'Z');
+    while (*end != 'L')
+        end--;
+    assert_int_equal(sscanf(end, "L%lf %lf", &x, &top[0]), 2);
+    for (int k = 0; k < LAYERS; k++, at++) {
+        at = strstr(at, "<path class=\"area ");
+        assert_non_null(at);
+        assert_int_equal(sscanf(strstr(at, " d=\"M"), " d=\"M%lf %lf", &x, &top[k + 1]), 2);
+    }
+    for (int k = 0; k < LAYERS; k++)
+        assert_true(fabs((top[k] - top[k + 1]) - wanted[k] * (top[0] - top[LAYERS]) / 66) < 0.25);
+    free(page);
 }
 
 /** Values that no sane run has, of the wrong type or out of range. */
@@ -848,6 +915,7 @@ static void log_ticks_are_round(void **state)
     double ticks[CHART_MAX_TICKS];
     assert_int_equal(chart_log_ticks(0.0448, 0.3788, ticks), 5); /* 0.02 0.05 0.1 0.2 0.5 */
     assert_true(fabs(ticks[0] - 0.02) < 1e-12 && fabs(ticks[4] - 0.5) < 1e-12);
+    assert_int_equal(chart_log_ticks(1, 10, ticks), 4); /* ends that are ticks need no others: 1 2 5 10 */
 }
 
 static double lightness_of(const float rgb[3])
@@ -946,6 +1014,8 @@ int main(void)
     ADD(whole_page);
     ADD_ROWS(bare_page, bare_cases);
     ADD(scene_on_the_page);
+    ADD(maps_lie_along_the_cameras);
+    ADD(layers_have_the_logged_heights);
     ADD(odd_metrics);
     ADD(many_views);
     ADD(no_memory);

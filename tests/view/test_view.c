@@ -189,6 +189,33 @@ static double mean_difference(const reply *a, const reply *b)
     return sum / (double)a->body_count;
 }
 
+/* What a picture says of its own time is no more than the time that its client waited. */
+static void times_are_part_of_the_wait(void **state)
+{
+    (void)state;
+    static const char *const paths[] = {"/render?view=1", "/render?view=1&sample=2",
+                                        "/render?view=1&output=depth&format=float",
+                                        "/render?view=1&renderer=raster"};
+    viewer v;
+    const int port = open_viewer(&v, run_folder);
+    for (size_t i = 0; i < sizeof paths / sizeof *paths; i++) {
+        const double begin = clock_wall();
+        reply r = get_ok(port, paths[i]);
+        const double waited = 1000 * (clock_wall() - begin);
+        const char *about = strstr(r.text, "X-Picture: ");
+        assert_non_null(about);
+        json_t *said = json_loads(about + strlen("X-Picture: "), JSON_DISABLE_EOF_CHECK, NULL);
+        assert_non_null(said);
+        const double prepare = number_of(said, "prepare_ms"), trace = number_of(said, "trace_ms"),
+                     encode = number_of(said, "encode_ms");
+        if (!(prepare >= 0 && trace > 0 && encode > 0 && prepare + trace + encode < waited + 0.01))
+            fail_msg("%s: %g + %g + %g ms of %g", paths[i], prepare, trace, encode, waited);
+        json_decref(said);
+        free(r.text);
+    }
+    close_viewer(&v, SIGINT);
+}
+
 static void samples_are_other_points_of_the_pixels(void **state)
 {
     (void)state;
@@ -495,6 +522,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(views_are_what_render_draws),
         cmocka_unit_test(cameras_are_what_render_draws),
+        cmocka_unit_test(times_are_part_of_the_wait),
         cmocka_unit_test(samples_are_other_points_of_the_pixels),
         cmocka_unit_test(a_background_is_chosen),
         cmocka_unit_test(every_format_and_output),

@@ -58,7 +58,7 @@ def shot(url, size, out, click=""):
 def shot_of_viewer(run, out):
     viewer = subprocess.Popen([gbtrace, "view", run, "--port", "8479", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        while viewer.poll() is None: # until it answers
+        while viewer.poll() is None:  # until it answers
             try:
                 socket.create_connection(("127.0.0.1", 8479)).close()
                 break

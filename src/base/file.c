@@ -81,6 +81,16 @@ size_t file_read_at(int fd, uint64_t at, void *out, size_t count, int *failure)
     return have;
 }
 
+gbt_status file_read_all_at(int fd, uint64_t at, void *out, size_t count, const char *path, gbt_error *err)
+{
+    int failure;
+    const size_t have = file_read_at(fd, at, out, count, &failure);
+    return have == count
+               ? GBT_OK
+               : base_fail(err, GBT_ERR_IO, "%s@%llu: read failed: %s", path, (unsigned long long)(at + have),
+                           failure != 0 ? strerror(failure) : "file became shorter");
+}
+
 gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, size_t *used, gbt_error *err)
 {
     *used = 0;
@@ -95,13 +105,9 @@ gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, si
         for (int i = 0; i < 8; i++)
             out[i] = (unsigned char)(size >> (8 * i));
         *used = (size_t)(8 + first + last);
-        int failure;
-        size_t got = file_read_at(fd, 0, out + 8, (size_t)first, &failure);
-        if (failure == 0)
-            got += file_read_at(fd, size - last, out + 8 + first, (size_t)last, &failure);
-        if (got < first + last)
-            status = base_fail(err, GBT_ERR_IO, "%s: read failed: %s", path,
-                               failure != 0 ? strerror(failure) : "file became shorter");
+        status = file_read_all_at(fd, 0, out + 8, (size_t)first, path, err);
+        if (status == GBT_OK)
+            status = file_read_all_at(fd, size - last, out + 8 + first, (size_t)last, path, err);
     }
     close(fd);
     return status;

@@ -22,6 +22,9 @@ gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count
  */
 size_t file_read_at(int fd, uint64_t at, void *out, size_t count, int *failure);
 
+/** The same where all of them must be there: GBT_ERR_IO, with `path`, the place and the reason, if not. */
+gbt_status file_read_all_at(int fd, uint64_t at, void *out, size_t count, const char *path, gbt_error *err);
+
 /**
  * What tells one file from another at little cost: its size as 8 bytes, then its first and its last `count`
  * bytes (all of it when it has fewer than 2 * count).

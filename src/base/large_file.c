@@ -81,12 +81,7 @@ gbt_status large_file_put(large_file *file, const void *bytes, size_t count, gbt
 
 gbt_status large_file_read(const large_file *file, uint64_t at, void *bytes, size_t count, gbt_error *err)
 {
-    int failure;
-    const size_t got = file_read_at(file->descriptor, at, bytes, count, &failure);
-    return got == count ? GBT_OK
-                        : base_fail(err, GBT_ERR_IO, "%s@%llu: read failed: %s", file->name,
-                                    (unsigned long long)(at + got),
-                                    failure != 0 ? strerror(failure) : "file became shorter");
+    return file_read_all_at(file->descriptor, at, bytes, count, file->name, err);
 }
 
 gbt_status large_file_close(large_file *file, bool keep, gbt_error *err)

@@ -20,14 +20,12 @@ static const double slower_than_avx2[CPU_ISA_COUNT] = {
     [CPU_PLAIN] = 8, [CPU_NEON] = 1.7, [CPU_AVX2] = 1, [CPU_AVX512] = 0.6};
 
 /* The mean over a run with a budget, whose parts take equal times: photos of `camera`. */
-static double core_seconds_of_step(const gbt_camera *camera)
+static double core_seconds_of_step(const gbt_camera *camera, const train_rules *rules)
 {
-    const gbt_train_def def = gbt_train_def_default();
-    const train_rules rules = train_rules_of(&def);
     double steps_per_second = 0;
     for (int part = 0; part < PACE_SEGMENTS; part++) {
         const double progress = (part + 0.5) / PACE_SEGMENTS,
-                     megapixels = step_size_of(camera, &rules, progress).pixels / 1e6,
+                     megapixels = step_size_of(camera, rules, progress).pixels / 1e6,
                      hits = progress < SCHEDULE_EXACT_FROM ? 1 : hits_of_last_part;
         steps_per_second +=
             1 / (anchors_core_seconds + core_seconds_per_megapixel * megapixels * hits) / PACE_SEGMENTS;
@@ -39,16 +37,17 @@ expectation expect_training(const scene *s, double downscale, int threads, cpu_i
 {
     if (downscale <= 0)
         downscale = photos_usual_downscale(s);
+    const gbt_train_def def = gbt_train_def_default();
+    const train_rules rules = train_rules_of(&def);
     double test_pixels = 0, train_count = 0, seconds = 0;
     for (size_t i = 0; i < s->view_count; i++) {
-        const gbt_camera *stated = &s->views[i].camera,
-                         camera = gbt_camera_resized(stated, (int)fmax(1, round(stated->width / downscale)),
-                                                     (int)fmax(1, round(stated->height / downscale)));
-        if (s->views[i].is_test)
+        const gbt_camera camera = photo_camera_divided(&s->views[i].camera, downscale);
+        if (s->views[i].is_test) {
             test_pixels += (double)camera.width * camera.height;
-        else
-            seconds += core_seconds_of_step(&camera);
-        train_count += !s->views[i].is_test;
+            continue;
+        }
+        seconds += core_seconds_of_step(&camera, &rules);
+        train_count++;
     }
     const double speed = slower_than_avx2[isa] / threads;
     return (expectation){.memory = memory_need_of(s, downscale),

@@ -26,12 +26,11 @@ enum {
 };
 enum { VIEWS_MIN = 2 };
 
-/* Is the next step one of those from `from` to the end of growth? Poses that are learned settle first. */
+/* Is the next step one of those from `from` to the end of growth, and may geometry change? */
 static bool is_within(const trainer *t, double from)
 {
     const double progress = train_rules_progress(&t->rules, &t->pace, t->step);
-    if (t->def.refine_poses && progress < t->rules.geometry_from)
-        return false;
+    from = fmax(from, t->rules.geometry_from);
     if (!t->def.grow)
         return false;
     if (!t->rules.counts_from_one)

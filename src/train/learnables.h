@@ -36,9 +36,9 @@ typedef struct learning_rates {
  * (docs/training.md).
  *
  * @param own    [in] true: ours, higher, for runs of some thousand steps; false: the reference method's
+ * @param geometry_from [in] offsets and scales have no rate before that progress
  * @param extent [in] of the cameras; the reference's rate of offsets is proportional to it
  * @param factor [in] of all rates
- * @param geometry_from [in] offsets and scales have no rate before that progress
  * @param end    [in] own: schedule_rate_end(), to which rates without an end of their own decay
  * @param views  [in] of a step
  */

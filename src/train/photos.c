@@ -73,13 +73,16 @@ void photos_close(photos *p)
     memset(p, 0, sizeof *p);
 }
 
-gbt_camera photos_camera(const photos *p, size_t view, int level)
+gbt_camera photo_camera_divided(const gbt_camera *stated, double divide)
 {
-    const gbt_camera *stated = &p->source->views[view].camera;
-    const double divide = ldexp(p->downscale, level);
     const int width = (int)fmax(1, floor(stated->width / divide + 0.5)),
               height = (int)fmax(1, floor(stated->height / divide + 0.5));
     return gbt_camera_resized(stated, width, height);
+}
+
+gbt_camera photos_camera(const photos *p, size_t view, int level)
+{
+    return photo_camera_divided(&p->source->views[view].camera, ldexp(p->downscale, level));
 }
 
 static gbt_status to_bytes(const image *im, unsigned char **out, gbt_error *err)

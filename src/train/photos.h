@@ -46,7 +46,10 @@ void photos_close(photos *p);
     for. The first failure in their order is reported. */
 gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *err);
 
-/** Camera of a view at a level: its size is round(stated / downscale / 2^level), at least 1. */
+/** Camera of a photo that is divided: its size is round(stated / divide), at least 1. */
+gbt_camera photo_camera_divided(const gbt_camera *stated, double divide);
+
+/** Camera of a view at a level: divided by downscale 2^level. */
 gbt_camera photos_camera(const photos *p, size_t view, int level);
 
 /** A photo as float at a level; asking for another level drops what is kept. `out` is resized as needed

@@ -52,7 +52,8 @@ typedef struct train_rules {
                               SCHEDULE_EXACT_FROM */
     bool raises_first_opacity;        /* of offsets that begin below 0 */
     bool own_rates;                   /* higher learning rates, that fall to nothing in the end */
-    double geometry_from;             /* progress from which offsets and scales learn */
+    double geometry_from;             /* progress from which offsets and scales learn, and anchors may grow
+                                         and be pruned */
     bool anchors_learn_when_adjusted; /* else they miss the step in which anchors change */
 
     /* growing and pruning */

@@ -117,8 +117,15 @@ static void disturbed_poses_come_back(void **state)
     }
     const double before = error_of(&t, truth, false), test_before = error_of(&t, truth, true);
     step_report report;
-    for (uint64_t i = 0; i < def.iterations; i++)
+    const size_t anchors_first = t.anchors.count;
+    const float scale_first = t.anchors.scale_log[0];
+    for (uint64_t i = 0; i < def.iterations; i++) {
         step_ok(&t, &report);
+        if (pace_progress(&t.pace, i) < SCHEDULE_POSES_SETTLED)
+            assert_true(t.anchors.count == anchors_first && t.anchors.scale_log[0] == scale_first &&
+                        t.anchors.offset[0] == 0);
+    }
+    assert_true(t.anchors.count != anchors_first);
     assert_ok(align_held_out(&t, NULL));
     const double after = error_of(&t, truth, false), test_after = error_of(&t, truth, true);
     print_message("training photos turned by %.2f degrees, then %.2f; held-out ones by %.2f, then %.2f\n",

@@ -207,16 +207,27 @@ gbt_status file_lock_folder(const char *path, int *lock, gbt_error *err)
 
 void file_unlock_folder(int lock) { close(lock); }
 
-bool file_exists(const char *path)
+gbt_status file_look(const char *path, file_kind *out, gbt_error *err)
 {
     struct stat info;
-    return stat(path, &info) == 0;
+    *out = FILE_NONE;
+    if (stat(path, &info) == 0)
+        *out = S_ISDIR(info.st_mode) ? FILE_FOLDER : FILE_OTHER;
+    else if (errno != ENOENT && errno != ENOTDIR && errno != ENAMETOOLONG && errno != ELOOP)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot look it up: %s", path, strerror(errno));
+    return GBT_OK;
+}
+
+bool file_exists(const char *path)
+{
+    file_kind kind;
+    return file_look(path, &kind, NULL) != GBT_OK || kind != FILE_NONE;
 }
 
 bool file_is_folder(const char *path)
 {
-    struct stat info;
-    return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
+    file_kind kind;
+    return file_look(path, &kind, NULL) == GBT_OK && kind == FILE_FOLDER;
 }
 
 bool file_is_same(const char *a, const char *b)

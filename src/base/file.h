@@ -60,6 +60,12 @@ gbt_status file_lock_folder(const char *path, int *lock, gbt_error *err);
 
 void file_unlock_folder(int lock);
 
+typedef enum file_kind { FILE_NONE, FILE_FOLDER, FILE_OTHER } file_kind;
+
+/** What is at a path; GBT_ERR_IO when that cannot be told: a failed look-up is no absence. */
+gbt_status file_look(const char *path, file_kind *out, gbt_error *err);
+
+/** Also what cannot be told: who opens it then says why. */
 bool file_exists(const char *path);
 bool file_is_folder(const char *path);
 

@@ -176,9 +176,11 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
 {
     char place[PATH_SIZE];
     const char *ending;
-    if (!file_exists(path))
+    file_kind kind;
+    GBT_TRY(file_look(path, &kind, err));
+    if (kind == FILE_NONE)
         return base_fail(err, GBT_ERR_IO, "%s: no such file or folder", path);
-    if (!file_is_folder(path) && ends_with(path, ".ply")) {
+    if (kind == FILE_OTHER && ends_with(path, ".ply")) {
         *source = "ply";
         GBT_TRY(load_points(path, raw, err));
         if (raw->point_count == 0)
@@ -186,7 +188,7 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
                              raw->points_dropped);
         return GBT_OK;
     }
-    if (!file_is_folder(path) && ends_with(path, ".json")) {
+    if (kind == FILE_OTHER && ends_with(path, ".json")) {
         *source = "transforms";
         const char *slash = strrchr(path, '/');
         if (slash != NULL && (size_t)(slash - path) >= sizeof place)
@@ -195,11 +197,11 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
                  slash == NULL ? "." : path);
         return load_transforms(path, place, raw, err);
     }
-    if (!file_is_folder(path))
+    if (kind == FILE_OTHER) {
         GBT_TRY(unposed_check(path, err));
-    if (!file_is_folder(path))
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: not a data set (wanted a folder, a .ply or a transforms.json)", path);
+    }
     GBT_TRY(find_colmap(path, place, &ending, err));
     if (place[0] != '\0') {
         *source = strcmp(ending, "bin") == 0 ? "colmap-bin" : "colmap-txt";
@@ -212,13 +214,13 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
         return load_transforms(place, path, raw, err);
     }
     GBT_TRY(file_join(place, sizeof place, path, "transforms_train.json", err));
-    if (!file_exists(place))
+    if (!file_exists(place)) {
         GBT_TRY(unposed_check(path, err));
-    if (!file_exists(place))
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: not a data set (wanted sparse/0/cameras.bin, transforms.json or "
                          "transforms_train.json in it)",
                          path);
+    }
     *source = "blender";
     return load_blender(place, path, raw, err);
 }

@@ -12,14 +12,14 @@
 
 enum { PATH_SIZE = RAW_NAME_LIMIT + 4096 };
 
-static bool is_file(const char *path) { return file_exists(path) && !file_is_folder(path); }
-
 /* A copy of folder/name in `out` when that is a file; else `out` stays. */
 static gbt_status take_file(const char *folder, const char *name, char **out, gbt_error *err)
 {
     char path[PATH_SIZE];
+    file_kind kind;
     GBT_TRY(file_join(path, sizeof path, folder, name, err));
-    if (!is_file(path))
+    GBT_TRY(file_look(path, &kind, err));
+    if (kind != FILE_OTHER)
         return GBT_OK;
     *out = raw_copy_text(path, strlen(path), err);
     return *out != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
@@ -51,9 +51,11 @@ static gbt_status find_files(const char *folder, const char *images, const char 
 gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
 {
     char images[PATH_SIZE], masks[PATH_SIZE];
+    file_kind kind;
     GBT_TRY(file_join(images, sizeof images, folder, "images", err));
     GBT_TRY(file_join(masks, sizeof masks, folder, "masks", err));
-    raw->has_masks = file_is_folder(masks);
+    GBT_TRY(file_look(masks, &kind, err));
+    raw->has_masks = kind == FILE_FOLDER;
     size_t kept = 0;
     gbt_status status = GBT_OK;
     for (size_t i = 0; i < raw->view_count && status == GBT_OK; i++) {

@@ -21,11 +21,13 @@ static gbt_status find_photo(const char *folder, const char *name, char path[PAT
                              gbt_error *err)
 {
     static const char *const endings[] = {"", ".png", ".jpg"};
+    file_kind kind;
     *found = false;
     for (size_t i = 0; i < sizeof endings / sizeof endings[0] && !*found; i++) {
         GBT_TRY(file_join(path, PATH_SIZE - 8, folder, name, err));
         memcpy(path + strlen(path), endings[i], strlen(endings[i]) + 1); /* the 8 bytes left out above */
-        *found = file_exists(path) && !file_is_folder(path);
+        GBT_TRY(file_look(path, &kind, err));
+        *found = kind == FILE_OTHER;
     }
     return GBT_OK;
 }
@@ -41,10 +43,12 @@ static gbt_status find_mask(const transforms_frame *s, const char *folder, char 
         return transforms_fail(s, err, "wanted a string", "mask_path");
     const char *name = json_string_value(value);
     char path[PATH_SIZE];
+    file_kind kind;
     GBT_TRY(
         raw_check_name(name, strlen(name), (raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, err));
     GBT_TRY(file_join(path, sizeof path, folder, name, err));
-    if (!file_exists(path) || file_is_folder(path))
+    GBT_TRY(file_look(path, &kind, err));
+    if (kind != FILE_OTHER)
         return base_fail(err, GBT_ERR_IO, "%s: frame %zu: mask is missing: %.200s", s->file->name,
                          s->frame_index, path);
     *out = raw_copy_text(path, strlen(path), err);

@@ -182,17 +182,26 @@ static gbt_status write_list(const job *j, int group, char path[JOB_PATH_SIZE], 
 }
 
 /* The camera that photos of the group have from a run that was stopped; 0: none. */
-static uint32_t camera_of(const job *j, int group)
+static gbt_status camera_of(const job *j, int group, uint32_t *camera, gbt_error *err)
 {
     database *d;
     database_photo found = {0};
-    if (!file_exists(j->database) || database_open(j->database, &d, NULL) != GBT_OK)
-        return 0;
-    for (size_t i = 0; i < j->photo_count && found.camera == 0; i++)
+    gbt_error why = {0};
+    *camera = 0;
+    if (!file_exists(j->database))
+        return GBT_OK;
+    gbt_status status = database_open(j->database, &d, &why);
+    if (status == GBT_ERR_FORMAT)
+        return GBT_OK; /* COLMAP was stopped before it had made its tables; else it says itself what it finds
+                        */
+    if (status != GBT_OK)
+        return base_fail(err, status, "%s", why.text);
+    for (size_t i = 0; i < j->photo_count && found.camera == 0 && status == GBT_OK; i++)
         if (j->photos[i].group == group)
-            database_find(d, j->photos[i].name, &found);
+            status = database_find(d, j->photos[i].name, &found, err);
     database_close(d);
-    return found.camera;
+    *camera = found.camera;
+    return status;
 }
 
 static gbt_status extract_group(const job *j, const dialect *d, int group, progress *p, gbt_error *err)
@@ -207,7 +216,8 @@ static gbt_status extract_group(const job *j, const dialect *d, int group, progr
     add(&c, "image_list_path", list);
     add(&c, "ImageReader.camera_model", model_name(j, model));
     if (group >= 0) {
-        const uint32_t camera = camera_of(j, group);
+        uint32_t camera;
+        GBT_TRY(camera_of(j, group, &camera, err));
         add(&c, "ImageReader.single_camera", "1");
         if (camera > 0)
             add_number(&c, "ImageReader.existing_camera_id", (long)camera);
@@ -294,8 +304,10 @@ static gbt_status match(const job *j, const dialect *d, gbt_error *err)
     GBT_TRY(job_path(j, "matching.log", log_path, err));
     unlink(log_path);
     GBT_TRY(database_open(j->database, &base, err));
-    const size_t with_position = database_positions(base);
+    size_t with_position;
+    const gbt_status status = database_positions(base, &with_position, err);
     database_close(base);
+    GBT_TRY(status);
     const gbt_pose_matcher matcher = matcher_of(j, with_position);
     if (matcher == GBT_POSE_MATCHER_SPATIAL && with_position == 0)
         return base_fail(err, GBT_ERR_FORMAT,

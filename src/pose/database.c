@@ -3,6 +3,7 @@
 #include "pose/database.h"
 
 #include <sqlite3.h>
+#include <stdbool.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
@@ -19,10 +20,10 @@ struct database {
 static gbt_status failed(const database *d, gbt_error *err)
 {
     const int code = sqlite3_errcode(d->file) & 0xff; /* SQLITE_NOMEM when there is not even a `file` */
-    if (code == SQLITE_NOMEM || code == SQLITE_IOERR)
-        return base_fail(err, code == SQLITE_NOMEM ? GBT_ERR_NO_MEMORY : GBT_ERR_IO, "%s: %s", d->path,
+    if (code == SQLITE_ERROR || code == SQLITE_CORRUPT || code == SQLITE_NOTADB)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: not a database of COLMAP: %s", d->path,
                          sqlite3_errmsg(d->file));
-    return base_fail(err, GBT_ERR_FORMAT, "%s: not a database of COLMAP: %s", d->path,
+    return base_fail(err, code == SQLITE_NOMEM ? GBT_ERR_NO_MEMORY : GBT_ERR_IO, "%s: %s", d->path,
                      sqlite3_errmsg(d->file));
 }
 
@@ -55,34 +56,41 @@ void database_close(database *d)
     mem_free(d);
 }
 
-bool database_find(database *d, const char *name, database_photo *out)
+gbt_status database_find(database *d, const char *name, database_photo *out, gbt_error *err)
 {
+    *out = (database_photo){0};
     sqlite3_reset(d->find);
-    sqlite3_bind_text(d->find, 1, name, -1, SQLITE_STATIC);
-    if (sqlite3_step(d->find) != SQLITE_ROW)
-        return false;
-    *out = (database_photo){.id = (uint32_t)sqlite3_column_int64(d->find, 0),
-                            .camera = (uint32_t)sqlite3_column_int64(d->find, 1),
-                            .features = sqlite3_column_int64(d->find, 2)};
-    return true;
+    if (sqlite3_bind_text(d->find, 1, name, -1, SQLITE_STATIC) != SQLITE_OK)
+        return failed(d, err);
+    const int code = sqlite3_step(d->find);
+    if (code == SQLITE_ROW)
+        *out = (database_photo){.id = (uint32_t)sqlite3_column_int64(d->find, 0),
+                                .camera = (uint32_t)sqlite3_column_int64(d->find, 1),
+                                .features = sqlite3_column_int64(d->find, 2)};
+    return code == SQLITE_ROW || code == SQLITE_DONE ? GBT_OK : failed(d, err);
 }
 
-static size_t count_of(database *d, const char *query)
+/* A query of a table or a column that is not there counts nothing. */
+static gbt_status add_count(database *d, const char *query, size_t *count, gbt_error *err)
 {
     sqlite3_stmt *statement;
-    size_t count = 0;
-    if (sqlite3_prepare_v2(d->file, query, -1, &statement, NULL) == SQLITE_OK &&
-        sqlite3_step(statement) == SQLITE_ROW)
-        count = (size_t)sqlite3_column_int64(statement, 0);
+    const int prepared = sqlite3_prepare_v2(d->file, query, -1, &statement, NULL);
+    if (prepared != SQLITE_OK)
+        return prepared == SQLITE_ERROR ? GBT_OK : failed(d, err);
+    const bool found = sqlite3_step(statement) == SQLITE_ROW;
+    if (found)
+        *count += (size_t)sqlite3_column_int64(statement, 0);
+    const gbt_status status = found ? GBT_OK : failed(d, err);
     sqlite3_finalize(statement);
-    return count;
+    return status;
 }
 
-/* COLMAP 3.12 moved positions to a table of their own; a query of what is not there counts nothing. */
-size_t database_positions(database *d)
+/* COLMAP 3.12 moved positions to a table of their own. */
+gbt_status database_positions(database *d, size_t *count, gbt_error *err)
 {
-    return count_of(d, "SELECT count(*) FROM images WHERE prior_tx IS NOT NULL") +
-           count_of(d, "SELECT count(*) FROM pose_priors");
+    *count = 0;
+    GBT_TRY(add_count(d, "SELECT count(*) FROM images WHERE prior_tx IS NOT NULL", count, err));
+    return add_count(d, "SELECT count(*) FROM pose_priors", count, err);
 }
 
 gbt_status database_pairs(database *d, void (*pair)(uint32_t a, uint32_t b, int64_t matches, void *context),

@@ -3,7 +3,6 @@
 #ifndef GBT_POSE_DATABASE_H
 #define GBT_POSE_DATABASE_H
 
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -20,11 +19,11 @@ typedef struct database_photo {
     int64_t features;
 } database_photo;
 
-/** Whether the photo is there. */
-bool database_find(database *d, const char *name, database_photo *out);
+/** A photo that is not there has id 0, which COLMAP gives to none. */
+gbt_status database_find(database *d, const char *name, database_photo *out, gbt_error *err);
 
 /** How many photos have a position from GPS. */
-size_t database_positions(database *d);
+gbt_status database_positions(database *d, size_t *count, gbt_error *err);
 
 /** Pairs of photos whose matches fit one geometry: `pair` is called with both ids and their matches, >= 1. */
 gbt_status database_pairs(database *d, void (*pair)(uint32_t a, uint32_t b, int64_t matches, void *context),

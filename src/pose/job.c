@@ -17,8 +17,10 @@ gbt_status job_path(const job *j, const char *name, char out[JOB_PATH_SIZE], gbt
 bool job_is_done(const job *j, const char *stage)
 {
     char name[32], path[JOB_PATH_SIZE];
+    file_kind kind;
     snprintf(name, sizeof name, "%s.done", stage);
-    return job_path(j, name, path, NULL) == GBT_OK && file_exists(path);
+    return job_path(j, name, path, NULL) == GBT_OK && file_look(path, &kind, NULL) == GBT_OK &&
+           kind != FILE_NONE; /* when in doubt, it is done once more */
 }
 
 gbt_status job_set_done(const job *j, const char *stage, gbt_error *err)

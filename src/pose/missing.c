@@ -58,7 +58,8 @@ static gbt_status read_facts(const job *j, table *t, gbt_error *err)
     uint32_t *ids = mem_calloc(j->photo_count, sizeof *ids, "photos", err);
     gbt_status status = ids != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < j->photo_count && status == GBT_OK; i++) {
-        if (!database_find(d, j->photos[i].name, &found) || found.id >= UINT32_C(1) << 24)
+        status = database_find(d, j->photos[i].name, &found, err);
+        if (found.id == 0 || found.id >= UINT32_C(1) << 24)
             continue;
         ids[i] = found.id;
         t->rows[i].features = found.features;

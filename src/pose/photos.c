@@ -61,6 +61,7 @@ static gbt_status walk(job *j, const char *root, const char *below, int depth, g
     if (entries == NULL)
         return base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", folder, strerror(errno));
     gbt_status status = GBT_OK;
+    file_kind found;
     for (const struct dirent *entry; status == GBT_OK && (entry = readdir(entries)) != NULL;) {
         if (entry->d_name[0] == '.')
             continue;
@@ -69,7 +70,9 @@ static gbt_status walk(job *j, const char *root, const char *below, int depth, g
             break;
         }
         status = file_join(path, sizeof path, root, name, err);
-        if (status == GBT_OK && file_is_folder(path)) {
+        if (status == GBT_OK)
+            status = file_look(path, &found, err);
+        if (status == GBT_OK && found == FILE_FOLDER) {
             strcat(name, "/");
             if (depth < DEPTH_MAX)
                 status = walk(j, root, name, depth + 1, err);
@@ -156,9 +159,11 @@ gbt_status photos_link(const job *j, gbt_error *err)
 {
     for (size_t i = 0; i < j->photo_count; i++) {
         char from[JOB_PATH_SIZE], to[JOB_PATH_SIZE];
+        file_kind found;
         GBT_TRY(file_join(from, sizeof from, j->source, j->photos[i].name, err));
         GBT_TRY(file_join(to, sizeof to, j->images, j->photos[i].name, err));
-        if (file_exists(to))
+        GBT_TRY(file_look(to, &found, err));
+        if (found != FILE_NONE)
             continue;
         GBT_TRY(make_folder_of(to, err));
         if (linkat(AT_FDCWD, from, AT_FDCWD, to, AT_SYMLINK_FOLLOW) == 0)

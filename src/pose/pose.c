@@ -54,10 +54,12 @@ static gbt_status absolute(const char *path, char out[JOB_PATH_SIZE], gbt_error 
 
 static gbt_status set_folders(job *j, const char *source, const char *data, gbt_error *err)
 {
-    if (!file_exists(source))
+    file_kind kind;
+    GBT_TRY(file_look(source, &kind, err));
+    if (kind == FILE_NONE)
         return base_fail(err, GBT_ERR_IO, "%s: no such file or folder", source);
     GBT_TRY(absolute(source, j->source, err));
-    j->is_film = !file_is_folder(source);
+    j->is_film = kind == FILE_OTHER;
     if (!j->is_film && !unposed_has_photos(j->source, 0)) {
         char images[JOB_PATH_SIZE];
         GBT_TRY(file_join(images, sizeof images, j->source, "images", err));
@@ -128,12 +130,15 @@ static gbt_status check_folder(const job *j, gbt_error *err)
     GBT_TRY(file_join(sparse, sizeof sparse, j->data, "sparse", err));
     if (file_exists(settings))
         return GBT_OK;
-    const char *taken = file_exists(sparse)                      ? sparse
-                        : !j->in_place && file_exists(j->images) ? j->images
-                                                                 : NULL;
-    return taken == NULL
-               ? GBT_OK
-               : base_fail(err, GBT_ERR_ARGUMENT, "%s: is there already (name another folder)", taken);
+    const char *const not_ours[] = {sparse, j->in_place ? NULL : j->images};
+    for (int i = 0; i < 2 && not_ours[i] != NULL; i++) {
+        file_kind kind;
+        GBT_TRY(file_look(not_ours[i], &kind, err));
+        if (kind != FILE_NONE)
+            return base_fail(err, GBT_ERR_ARGUMENT, "%s: is there already (name another folder)",
+                             not_ours[i]);
+    }
+    return GBT_OK;
 }
 
 static gbt_status begin(const job *j, gbt_error *err)

@@ -87,9 +87,11 @@ static gbt_status find_largest(const job *j, char best[JOB_PATH_SIZE], gbt_error
     for (unsigned long i = 0; file_largest_number(j->models, "", &largest) && i <= largest; i++) {
         char name[32], folder[JOB_PATH_SIZE];
         found_model *m;
+        file_kind kind;
         snprintf(name, sizeof name, "%lu", i);
         GBT_TRY(file_join(folder, sizeof folder, j->models, name, err));
-        if (!file_is_folder(folder))
+        GBT_TRY(file_look(folder, &kind, err));
+        if (kind != FILE_FOLDER)
             continue;
         GBT_TRY(model_read(folder, &m, err));
         models++;

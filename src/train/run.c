@@ -54,11 +54,15 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, const r
 {
     char checkpoints[RUN_PATH_SIZE];
     GBT_TRY(file_join(checkpoints, sizeof checkpoints, run, "checkpoints", err));
-    const bool has_checkpoint = file_exists(p->checkpoint) || file_exists(p->checkpoint_previous);
+    const char *const held[] = {p->checkpoint, p->checkpoint_previous, p->model};
+    file_kind kinds[3];
+    for (int i = 0; i < 3; i++)
+        GBT_TRY(file_look(held[i], &kinds[i], err));
+    const bool has_checkpoint = kinds[0] != FILE_NONE || kinds[1] != FILE_NONE;
     if (def->resume && !has_checkpoint)
         return base_fail(err, GBT_ERR_IO, "%.1000s: holds no run to go on with (there is no %.1000s)", run,
                          p->checkpoint);
-    if (!def->resume && !def->overwrite && (file_exists(p->model) || has_checkpoint))
+    if (!def->resume && !def->overwrite && (kinds[2] != FILE_NONE || has_checkpoint))
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%.1000s: holds a run already (go on with it by `resume`, name another folder, or "
                          "lose it by `overwrite`)",

@@ -2,6 +2,7 @@
 /* view/studio.c -- open, follow, prepare; the picture itself is made in picture.c. */
 #include "view/studio.h"
 
+#include <errno.h>
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -78,6 +79,8 @@ gbt_status studio_open(const char *input, const char *data, studio *out, gbt_err
     }
     if (stat(out->model_path, &file) == 0)
         return reopen(out, &file, err);
+    if (errno != ENOENT)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot look it up: %s", out->model_path, strerror(errno));
     if (!folder || !file_exists(config))
         return base_fail(err, GBT_ERR_IO,
                          "%.1000s: not there (wanted a run, a model file or plain Gaussians)",

@@ -2,13 +2,14 @@
 /* tests/faults/shim.c -- loaded before a program's libraries (LD_PRELOAD): makes one of its system calls
    fail, or ends the process there.
 
-   GBT_FAULT=CALL:N:WHAT: the N-th CALL (open, write, fsync, close, rename, mkdir, find, read, memory,
+   GBT_FAULT=CALL:N:WHAT: the N-th CALL (open, write, fsync, close, rename, mkdir, find, look, read, memory,
    library; from 1) does WHAT: fail, or kill. GBT_FAULT=CALL:0:count: nothing happens. In each case the number
    of such calls is written to the file GBT_FAULT_COUNT when the process ends by itself.
    GBT_FAULT=short:0:all: every read and write is interrupted once, then moves some bytes only.
    GBT_FAULT=clock:0:back: the time of day goes back by an hour at each look. Calls count when they make,
-   write or rename files; find is open() to read; read counts for regular files; memory is aligned_alloc(),
-   which is all that the program's own code takes; library is malloc() and its like, which libraries take. */
+   write or rename files; find is open() to read, look is stat(); read counts for regular files; memory is
+   aligned_alloc(), which is all that the program's own code takes; library is malloc() and its like, which
+   libraries take. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -140,16 +141,34 @@ ssize_t read(int fd, void *bytes, size_t count)
     return real(fd, bytes, count);
 }
 
-ssize_t pread(int fd, void *bytes, size_t count, off_t at)
+static int stat_as(const char *name, const char *path, void *out)
 {
-    static ssize_t (*real)(int, void *, size_t, off_t);
+    int (*real)(const char *, void *);
+    *(void **)&real = next(name);
+    const bool is_system = strncmp(path, "/sys/", 5) == 0 || strncmp(path, "/proc/", 6) == 0;
+    return !is_system && fails("look", EIO) ? -1 : real(path, out);
+}
+
+static ssize_t pread_as(const char *name, int fd, void *bytes, size_t count, off_t at)
+{
+    ssize_t (*real)(int, void *, size_t, off_t);
     struct stat info;
-    if (real == NULL)
-        *(void **)&real = next("pread");
+    *(void **)&real = next(name);
     if (fstat(fd, &info) == 0 && S_ISREG(info.st_mode) && (interrupts(&count) || fails("read", EIO)))
         return -1;
     return real(fd, bytes, count, at);
 }
+
+ssize_t pread(int fd, void *bytes, size_t count, off_t at) { return pread_as("pread", fd, bytes, count, at); }
+
+ssize_t pread64(int fd, void *bytes, size_t count, off_t at)
+{
+    return pread_as("pread64", fd, bytes, count, at);
+}
+
+int stat(const char *path, struct stat *out) { return stat_as("stat", path, out); }
+
+int stat64(const char *path, struct stat64 *out) { return stat_as("stat64", path, out); }
 
 int clock_gettime(clockid_t clock, struct timespec *out)
 {

@@ -19,8 +19,8 @@ struct database {
 
 static gbt_status failed(const database *d, gbt_error *err)
 {
-    const int code = sqlite3_errcode(d->file) & 0xff; /* SQLITE_NOMEM when there is not even a `file` */
-    if (code == SQLITE_ERROR || code == SQLITE_CORRUPT || code == SQLITE_NOTADB)
+    const int code = sqlite3_errcode(d->file) & 0xff;  /* SQLITE_NOMEM when there is not even a `file` */
+    if (code == SQLITE_ERROR || code == SQLITE_NOTADB) /* a read that fails may be SQLITE_CORRUPT */
         return base_fail(err, GBT_ERR_FORMAT, "%s: not a database of COLMAP: %s", d->path,
                          sqlite3_errmsg(d->file));
     return base_fail(err, code == SQLITE_NOMEM ? GBT_ERR_NO_MEMORY : GBT_ERR_IO, "%s: %s", d->path,

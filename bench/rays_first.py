@@ -58,7 +58,7 @@ def cell(runs, value, form):
 
 def row(name, way, runs):
     print(f"| {name} | {way} | {cell(runs, lambda m, t: m['psnr'], '.2f')} | {cell(runs, lambda m, t: m['ssim'], '.4f')} | "
-          f"{cell(runs, lambda m, t: t['iterations'], ',')} |", end="")
+          f"{cell(runs, lambda m, t: t['iterations'], ',.0f')} |", end="")
 
 
 seeds = range(1, args.seeds + 1)

@@ -207,15 +207,21 @@ gbt_status file_lock_folder(const char *path, int *lock, gbt_error *err)
 
 void file_unlock_folder(int lock) { close(lock); }
 
+gbt_status file_stat(const char *path, struct stat *out, bool *exists, gbt_error *err)
+{
+    *exists = stat(path, out) == 0;
+    if (!*exists && errno != ENOENT && errno != ENOTDIR && errno != ENAMETOOLONG && errno != ELOOP)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot look it up: %s", path, strerror(errno));
+    return GBT_OK;
+}
+
 gbt_status file_look(const char *path, file_kind *out, gbt_error *err)
 {
     struct stat info;
-    *out = FILE_NONE;
-    if (stat(path, &info) == 0)
-        *out = S_ISDIR(info.st_mode) ? FILE_FOLDER : FILE_OTHER;
-    else if (errno != ENOENT && errno != ENOTDIR && errno != ENAMETOOLONG && errno != ELOOP)
-        return base_fail(err, GBT_ERR_IO, "%s: cannot look it up: %s", path, strerror(errno));
-    return GBT_OK;
+    bool exists;
+    const gbt_status status = file_stat(path, &info, &exists, err);
+    *out = !exists ? FILE_NONE : S_ISDIR(info.st_mode) ? FILE_FOLDER : FILE_OTHER;
+    return status;
 }
 
 bool file_exists(const char *path)

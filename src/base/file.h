@@ -60,9 +60,15 @@ gbt_status file_lock_folder(const char *path, int *lock, gbt_error *err);
 
 void file_unlock_folder(int lock);
 
+struct stat;
+
+/** stat(), where a failed look-up is no absence: GBT_ERR_IO when it cannot be told whether the path exists.
+    `out` is set when it does. */
+gbt_status file_stat(const char *path, struct stat *out, bool *exists, gbt_error *err);
+
 typedef enum file_kind { FILE_NONE, FILE_FOLDER, FILE_OTHER } file_kind;
 
-/** What is at a path; GBT_ERR_IO when that cannot be told: a failed look-up is no absence. */
+/** What is at a path; errors as of file_stat(). */
 gbt_status file_look(const char *path, file_kind *out, gbt_error *err);
 
 /** Also what cannot be told: who opens it then says why. */

@@ -2,7 +2,6 @@
 /* view/studio.c -- open, follow, prepare; the picture itself is made in picture.c. */
 #include "view/studio.h"
 
-#include <errno.h>
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -66,6 +65,7 @@ static gbt_status reopen(studio *s, const struct stat *file, gbt_error *err)
 gbt_status studio_open(const char *input, const char *data, studio *out, gbt_error *err)
 {
     struct stat file;
+    bool exists;
     char config[4096];
     *out = (studio){.input = input, .data = data};
     const bool folder = file_is_folder(input);
@@ -77,10 +77,9 @@ gbt_status studio_open(const char *input, const char *data, studio *out, gbt_err
                (int)sizeof out->model_path) {
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", input);
     }
-    if (stat(out->model_path, &file) == 0)
+    GBT_TRY(file_stat(out->model_path, &file, &exists, err));
+    if (exists)
         return reopen(out, &file, err);
-    if (errno != ENOENT)
-        return base_fail(err, GBT_ERR_IO, "%s: cannot look it up: %s", out->model_path, strerror(errno));
     if (!folder || !file_exists(config))
         return base_fail(err, GBT_ERR_IO,
                          "%.1000s: not there (wanted a run, a model file or plain Gaussians)",

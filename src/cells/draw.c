@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cells/draw.c -- the cells of a view, front to back.
 
-   node of the tree --> no ray sees anything in it: done
+   node of the tree --> nothing of the share in it, or no ray sees anything in it: done
         --> it fits: load, trace the intervals of the rays, blend
         --> else its children, the one with the eye first */
 #include "cells/draw.h"
@@ -55,13 +55,17 @@ static gbt_status draw_cell(const picture *p, gbt_error *err)
     return GBT_OK;
 }
 
-static gbt_status draw_part(const picture *p, const cell_part *part, gbt_error *err)
+/* `first`: how many chunks are in front of the part. */
+static gbt_status draw_part(const picture *p, const cell_part *part, size_t first, gbt_error *err)
 {
     cell_drawer *d = p->d;
-    bool fits;
-    if (cell_view_cut(d, part) == 0)
+    const size_t chunks = d->store->chunk_count >> part->depth;
+    const bool whole = first >= d->first && first + chunks <= d->end;
+    bool fits = false;
+    if (first >= d->end || first + chunks <= d->first || cell_view_cut(d, part) == 0)
         return GBT_OK;
-    GBT_TRY(cell_load_part(d, part, &fits, err));
+    if (whole)
+        GBT_TRY(cell_load_part(d, part, &fits, err));
     if (fits)
         return draw_cell(p, err);
     if (cell_is_chunk(d->store, part))
@@ -73,7 +77,7 @@ static gbt_status draw_part(const picture *p, const cell_part *part, gbt_error *
     const bool from_below = d->rays.origin[cut->axis] < cut->at;
     for (int k = 0; k < 2; k++) {
         const cell_part child = cell_child(d->store, part, (k == 0) == from_below);
-        GBT_TRY(draw_part(p, &child, err));
+        GBT_TRY(draw_part(p, &child, first + (k == 0 ? 0 : chunks / 2), err));
     }
     return GBT_OK;
 }
@@ -84,9 +88,10 @@ static gbt_status draw_all(cell_drawer *d, const ray_shot *shot, image *out, gbt
     const cell_part whole = cell_whole();
     d->drawn_cells = d->drawn_gaussians = 0;
     GBT_TRY(cell_view_start(d, shot, err));
+    GBT_TRY(cell_share_find(d, err));
     GBT_TRY(image_fit(out, d->rays.width, d->rays.height, 3, err));
     memset(out->pixels, 0, 3 * ray_image_count(&d->rays) * sizeof *out->pixels);
-    return draw_part(&p, &whole, err);
+    return draw_part(&p, &whole, 0, err);
 }
 
 gbt_status cell_draw(cell_drawer *d, const cell_store *store, const ray_shot *shot,
@@ -108,7 +113,7 @@ gbt_status cell_draw(cell_drawer *d, const cell_store *store, const ray_shot *sh
         status = draw_all(d, shot, out, err);
     } else if (status != GBT_OK)
         status = base_fail(err, status, "%s", lists.text);
-    if (status == GBT_OK)
+    if (status == GBT_OK && d->share.count <= 1)
         add_background(&(picture){d, out}, settings->background);
     return status;
 }

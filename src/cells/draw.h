@@ -28,12 +28,21 @@ typedef struct cell_load {
     gaussians seen, wide;
 } cell_load;
 
+/** Which of the cells are drawn: of `count` runs of them, front to back, the one of this index; {0}: all. */
+typedef struct cell_share {
+    int index, count;
+} cell_share;
+
 /** All that pictures by cells need, from view to view. Start from {0}; end with cell_drawer_free(). */
 typedef struct cell_drawer {
     const cell_store *store;
-    size_t cell_bytes; /* set before drawing: of one cell at most; 0, the default: as `memory` allows */
-    size_t memory;     /* bytes that this process may take */
-    size_t budget;     /* of them, for one cell */
+    size_t cell_bytes;  /* set before drawing: of one cell at most; 0, the default: as `memory` allows */
+    cell_share share;   /* set before drawing */
+    const float *enter; /* set before drawing: [pixels] transmittance that rays have in front of the share, 0:
+                           not drawn; NULL, the default: all have 1 */
+    size_t first, end;  /* of the chunks, front to back: those of the share */
+    size_t memory;      /* bytes that this process may take */
+    size_t budget;      /* of them, for one cell */
     size_t bytes_each, bytes_pair;
     float variance; /* of a pixel, px^2; 0: thin rays */
     trace_settings settings;
@@ -66,6 +75,18 @@ typedef struct cell_drawer {
 gbt_status cell_draw(cell_drawer *d, const cell_store *store, const ray_shot *shot,
                      const trace_settings *settings, float variance, size_t memory, image *out,
                      gbt_error *err);
+
+/**
+ * As cell_draw(), by all processes of the cluster together: each draws a share of the cells, which has about
+ * as many Gaussians in view as any other, and all get the picture. As cell_draw() in a process that is alone.
+ *
+ * A share is first drawn as if nothing were in front of it; rays that end in it by what the others have left
+ * are drawn in it once more. So the picture is that of cell_draw() but for the rounding of transmittances.
+ * Same bits for every number of threads, not of processes.
+ */
+gbt_status cell_draw_together(cell_drawer *d, const cell_store *store, const ray_shot *shot,
+                              const trace_settings *settings, float variance, size_t memory, image *out,
+                              gbt_error *err);
 
 void cell_drawer_free(cell_drawer *d);
 

@@ -16,8 +16,8 @@ enum { RAY_BLOCK = 4096 };
 static const size_t base_bytes = (size_t)128 << 20, cell_bytes_least = (size_t)48 << 20;
 
 /* Directions and what the lens makes of the pixels, intervals, colours of the cell and in all, and the
-   picture as it is written. */
-enum { PIXEL_BYTES = 120 };
+   picture as it is written; layers, where there are shares. */
+enum { PIXEL_BYTES = 120, PIXEL_LAYER_BYTES = 80 };
 
 size_t cell_memory_least(size_t pixels) { return base_bytes + cell_bytes_least + PIXEL_BYTES * pixels; }
 
@@ -114,9 +114,9 @@ static gbt_status reserve_rays(cell_drawer *d, gbt_error *err)
                 return GBT_ERR_NO_MEMORY;
         }
     }
-    memset(d->over, 0, count);
     for (size_t i = 0; i < count; i++) {
-        rays->through[i] = 1;
+        rays->through[i] = d->enter != NULL ? d->enter[i] : 1;
+        d->over[i] = !(rays->through[i] > 0);
         rays->near[i] = 0;
         rays->far[i] = INFINITY;
     }
@@ -156,12 +156,13 @@ static gbt_status find_chunks(cell_drawer *d, gbt_error *err)
 
 static gbt_status find_budget(cell_drawer *d, gbt_error *err)
 {
-    const size_t pixels = ray_image_count(&d->rays), least = cell_memory_least(pixels);
+    const size_t pixel = PIXEL_BYTES + (d->share.count > 1 ? PIXEL_LAYER_BYTES : 0);
+    const size_t pixels = ray_image_count(&d->rays), least = base_bytes + cell_bytes_least + pixel * pixels;
     if (d->memory < least)
         return base_fail(err, GBT_ERR_NO_MEMORY,
                          "memory: %zu MB is too little for a picture of %d x %d (wanted %zu)",
                          d->memory >> 20, d->rays.width, d->rays.height, (least >> 20) + 1);
-    d->budget = d->memory - base_bytes - PIXEL_BYTES * pixels;
+    d->budget = d->memory - base_bytes - pixel * pixels;
     if (d->cell_bytes > 0 && d->cell_bytes < d->budget)
         d->budget = d->cell_bytes;
     const bool lists = d->scene.kernel == TRACE_LIST;

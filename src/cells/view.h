@@ -29,6 +29,27 @@ static inline bool cell_is_chunk(const cell_store *store, const cell_part *part)
 /** Rays, bounds, visible chunks and budgets of a shot; all rays whole. */
 gbt_status cell_view_start(cell_drawer *d, const ray_shot *shot, gbt_error *err);
 
+/** The run of chunks that is the drawer's share of this view. */
+gbt_status cell_share_find(cell_drawer *d, gbt_error *err);
+
+/** Floats of a pixel of a layer, the picture of one share: colour, and the transmittance behind it, below 0
+    where the ray has ended. */
+enum { CELL_LAYER_FLOATS = 4 };
+
+/** What has just been drawn, without a background, as a layer of [pixels][CELL_LAYER_FLOATS]. */
+void cell_layer_take(const cell_drawer *d, const image *drawn, float *layer);
+
+/**
+ * Layers one behind the other, the first one in front; each was drawn as if nothing were in front of it.
+ *
+ * @param sum   [out] [pixels][CELL_LAYER_FLOATS] colour, and the transmittance behind it
+ * @param enter [out] [count][pixels] above 0: the ray ends in this layer, which is not in `sum`: draw it
+ * again for rays that enter with this transmittance (cell_drawer.enter), then cell_layers_add()
+ */
+void cell_layers_blend(const float *const layers[], int count, size_t pixels, float transmittance_min,
+                       float *sum, float *enter);
+void cell_layers_add(const float *const again[], int count, size_t pixels, const float *enter, float *sum);
+
 /** Set the interval of every ray to what is in `part`. @return how many rays still see something there */
 size_t cell_view_cut(cell_drawer *d, const cell_part *part);
 

@@ -61,15 +61,29 @@ typedef struct studio {
     insert_scene insert;
     unsigned outputs; /* render_outputs_parse() */
     bool in_double;   /* by the reference */
+    bool together;    /* deal_out() */
 } studio;
+
+/* Pictures are dealt out to the processes. When there are fewer of them, what is larger than memory all draw
+   together, each some of its cells. */
+static void deal_out(studio *st, size_t pictures)
+{
+    st->together = st->run.cells.count > 0 && pictures < (size_t)gbt_cluster_size();
+}
+
+static bool is_own(const studio *st, size_t index)
+{
+    return st->together || index % (size_t)gbt_cluster_size() == (size_t)gbt_cluster_rank();
+}
 
 /* Into run.frame.rgb. */
 static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *def, gbt_error *err)
 {
     loaded_run *r = &st->run;
     if (r->cells.count > 0)
-        return cell_draw(&r->cell_drawer, &r->cells, shot, &r->settings, r->frame.draw.footprint, def->memory,
-                         &r->frame.rgb, err);
+        return (st->together ? cell_draw_together : cell_draw)(&r->cell_drawer, &r->cells, shot, &r->settings,
+                                                               r->frame.draw.footprint, def->memory,
+                                                               &r->frame.rgb, err);
     const frame_tracer tracer = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
     GBT_TRY(frame_render_with(&r->frame, loaded_run_subject(r), shot, &r->settings,
                               def->insert != NULL ? &tracer : NULL, err));
@@ -83,20 +97,25 @@ static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *d
     return GBT_OK;
 }
 
-static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, const char *name,
-                             const gbt_render_def *def, gbt_error *err)
+static gbt_status write_one(studio *st, const ray_shot *shot, const char *out, const char *name,
+                            const gbt_render_def *def, gbt_error *err)
 {
     char file[1100], path[4096];
     loaded_run *r = &st->run;
-    GBT_TRY(draw(st, shot, def, err));
     snprintf(file, sizeof file, "%s.%s", name, CHOICE_NAME(GBT_PICTURE_FORMAT_NAMES, def->format));
     GBT_TRY(file_join(path, sizeof path, out, file, err));
     GBT_TRY(image_write(path, &r->frame.rgb, err));
     return render_outputs_write(r, shot, st->outputs, out, name, err);
 }
 
-/* Pictures are dealt out to the processes. */
-static bool is_own(size_t index) { return index % (size_t)gbt_cluster_size() == (size_t)gbt_cluster_rank(); }
+static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, const char *name,
+                             const gbt_render_def *def, gbt_error *err)
+{
+    GBT_TRY(draw(st, shot, def, err));
+    if (!st->together)
+        return write_one(st, shot, out, name, def, err);
+    return cluster_follow(cluster_leads() ? write_one(st, shot, out, name, def, err) : GBT_OK, err);
+}
 
 static bool is_wanted(const scene_view *view, gbt_split split)
 {
@@ -110,7 +129,7 @@ static gbt_status render_own_views(studio *st, const char *out, const gbt_render
     size_t index = 0;
     for (size_t i = 0; i < r->scene.view_count; i++) {
         const scene_view *view = &r->scene.views[i];
-        if (!is_wanted(view, def->split) || !is_own(index++))
+        if (!is_wanted(view, def->split) || !is_own(st, index++))
             continue;
         char name[1024];
         loaded_run_view_name(view, name, sizeof name);
@@ -131,6 +150,7 @@ static gbt_status render_views(studio *st, const char *out, const gbt_render_def
     if (wanted == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no views in this split (of %zu)", s->folder,
                          s->view_count);
+    deal_out(st, wanted);
     GBT_TRY(cluster_agree(render_own_views(st, out, def, wanted, err), err));
     log_info("%zu views rendered into %s", wanted, out);
     return GBT_OK;
@@ -151,8 +171,9 @@ static gbt_status render_camera(studio *st, const char *out, const gbt_render_de
     camera_file file = {0};
     char name[1024];
     camera_name(def->camera, name, sizeof name);
-    gbt_status status = camera_file_read(def->camera, st->run.model.origin, &file, err);
-    if (status == GBT_OK && cluster_leads())
+    gbt_status status = cluster_agree(camera_file_read(def->camera, st->run.model.origin, &file, err), err);
+    deal_out(st, 1);
+    if (status == GBT_OK && is_own(st, 0))
         status = render_one(st, &file.shot, out, name, def, err);
     status = cluster_agree(status, err);
     if (status == GBT_OK)
@@ -179,7 +200,7 @@ static gbt_status render_frames(studio *st, const camera_path *path, const char 
     for (size_t i = 0; i < path->count; i++) {
         char name[32];
         snprintf(name, sizeof name, "frame_%05zu", i + 1);
-        if (is_own(i))
+        if (is_own(st, i))
             GBT_TRY(render_one(st, &path->shots[i], out, name, def, err));
         say_progress(i + 1, path->count, start, &said);
     }
@@ -197,12 +218,13 @@ static void collect_frames(const image *own, size_t count, image *all)
     cluster_exchange(own->pixels, send, all->pixels, receive);
 }
 
-/* A film is written in its order by the first process; in each round every process draws a frame. `all` is as
-   high as a round. */
+/* A film is written in its order by the first process; in each round every process draws a frame, or all draw
+   one. `all`: room for a frame of every process. */
 static gbt_status film_rounds(studio *st, const camera_path *path, video *film, image *all,
                               const gbt_render_def *def, gbt_error *err)
 {
-    const size_t size = (size_t)gbt_cluster_size(), rank = (size_t)gbt_cluster_rank();
+    const size_t size = st->together ? 1 : (size_t)gbt_cluster_size();
+    const size_t rank = st->together ? 0 : (size_t)gbt_cluster_rank();
     const double start = clock_wall();
     double said = start;
     for (size_t first = 0; first < path->count; first += size) {
@@ -249,6 +271,7 @@ static gbt_status render_film(studio *st, const char *out, const gbt_render_def 
 {
     camera_path path;
     gbt_status status = cluster_agree(render_path_make(&st->run, def, &path, err), err);
+    deal_out(st, path.count);
     if (status == GBT_OK)
         status = video_named(out) ? make_film(st, &path, out, def, err)
                                   : cluster_agree(render_frames(st, &path, out, def, err), err);

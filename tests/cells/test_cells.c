@@ -9,7 +9,7 @@
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "base/vec.h"
-#include "cells/draw.h"
+#include "cells/view.h"
 #include "data/gaussian_file.h"
 #include "data/gaussian_ply.h"
 #include "frame/frame.h"
@@ -359,6 +359,94 @@ static void nothing_in_view(void **state)
     close_both(&b);
 }
 
+/* Shares drawn one by one, and their layers blended, as by so many processes. @return the largest difference
+   to the picture drawn alone */
+static double difference_of_shares(both *b, const ray_shot *shot, int count, size_t *again)
+{
+    enum { MOST = 9, PIXELS = WIDTH * HEIGHT };
+    float *layers[MOST], *sum = malloc(PIXELS * CELL_LAYER_FLOATS * sizeof *sum),
+                         *enter = malloc((size_t)count * PIXELS * sizeof *enter);
+    image whole = {0}, part = {0};
+    size_t next = 0, cells = 0;
+    assert_ok(cell_draw(&b->drawer, &b->store, shot, &b->settings, b->variance, plenty, &whole, NULL));
+    for (int k = 0; k < count; k++) {
+        b->drawer.share = (cell_share){k, count};
+        assert_ok(cell_draw(&b->drawer, &b->store, shot, &b->settings, b->variance, plenty, &part, NULL));
+        assert_int_equal(b->drawer.first, next);
+        next = b->drawer.end;
+        cells += b->drawer.drawn_cells;
+        layers[k] = malloc(PIXELS * CELL_LAYER_FLOATS * sizeof(float));
+        cell_layer_take(&b->drawer, &part, layers[k]);
+    }
+    assert_int_equal(next, b->store.chunk_count);
+    assert_true(cells >= (size_t)count);
+    cell_layers_blend((const float *const *)layers, count, PIXELS, b->settings.transmittance_min, sum, enter);
+    *again = 0;
+    for (int k = 0; k < count; k++) {
+        for (size_t i = 0; i < PIXELS; i++)
+            *again += enter[(size_t)k * PIXELS + i] > 0;
+        b->drawer.share = (cell_share){k, count};
+        b->drawer.enter = enter + (size_t)k * PIXELS;
+        assert_ok(cell_draw(&b->drawer, &b->store, shot, &b->settings, b->variance, plenty, &part, NULL));
+        cell_layer_take(&b->drawer, &part, layers[k]);
+    }
+    cell_layers_add((const float *const *)layers, count, PIXELS, enter, sum);
+    b->drawer.share = (cell_share){0};
+    b->drawer.enter = NULL;
+    double largest = 0;
+    for (size_t i = 0; i < (size_t)3 * PIXELS; i++) {
+        const float *at = sum + i / 3 * CELL_LAYER_FLOATS;
+        const double value = (double)(at[i % 3] + at[3] * b->settings.background[i % 3]);
+        largest = fmax(largest, fabs(value - (double)whole.pixels[i]));
+    }
+    for (int k = 0; k < count; k++)
+        free(layers[k]);
+    free(sum);
+    free(enter);
+    image_free(&whole);
+    image_free(&part);
+    return largest;
+}
+
+/* As views_from_all_sides() and opaque_stacks(), in shares. */
+static void check_shares(gaussian_cloud *cloud, bool ends)
+{
+    static const int counts[] = {2, 3, 9};
+    both b;
+    size_t again, sum = 0;
+    open_both(&b, cloud);
+    for (int i = 0; i < 9; i++) {
+        const gbt_camera camera = camera_at((9 - i) * cos(i), (9 - i) * sin(i), 0.7 * i - 3);
+        const ray_shot shot = ray_shot_of(&camera);
+        const double difference = difference_of_shares(&b, &shot, counts[i % 3], &again);
+        if (!(difference <= rounding))
+            fail_msg("view %d: largest difference %g (limit %g)", i, difference, rounding);
+        sum += again;
+    }
+    assert_int_equal(sum > 0, ends);
+    close_both(&b);
+}
+
+static void shares_make_the_picture(void **state)
+{
+    (void)state;
+    gaussian_cloud cloud;
+    random_cloud(&cloud, 3000);
+    for (size_t i = 0; i < cloud.count; i++)
+        cloud.opacity[i] *= 0.1f;
+    check_shares(&cloud, false);
+}
+
+static void rays_that_end_in_a_share(void **state)
+{
+    (void)state;
+    gaussian_cloud cloud;
+    random_cloud(&cloud, 3000);
+    for (size_t i = 0; i < cloud.count; i++)
+        cloud.opacity[i] = i % 3 == 0 ? 1 : 0.99f;
+    check_shares(&cloud, true);
+}
+
 static void threads_give_the_same_bits(void **state)
 {
     (void)state;
@@ -510,6 +598,8 @@ int main(void)
         cmocka_unit_test(wide_lenses),
         cmocka_unit_test(cuts_through_the_eye),
         cmocka_unit_test(nothing_in_view),
+        cmocka_unit_test(shares_make_the_picture),
+        cmocka_unit_test(rays_that_end_in_a_share),
         cmocka_unit_test(threads_give_the_same_bits),
         cmocka_unit_test(what_cannot_be_drawn),
         cmocka_unit_test(files_that_cannot_be_sorted),

@@ -99,6 +99,26 @@ if command -v ffmpeg >/dev/null; then
 else
     skip "a film" "ffmpeg is not installed"
 fi
+"$program" make-scene district -o large --views 6 --points 1000 --samples 1 --gaussians 200000 --quiet >out 2>&1
+echo '{"origin": [-30, -50, 30], "target": [10, 10, 0], "up": [0, 0, 1], "fov_x_deg": 75, "width": 160, "height": 90}' >roofs.json
+below() { # WHERE COMMAND...: all of the scene does not fit
+    where=$1
+    shift
+    "$@" render large/gaussians.ply --memory 190M --camera roofs.json --format exr -o "$where" --quiet >out 2>&1
+}
+below cells1 "$program"
+report $? "a picture by cells in one process" "$(cat out)"
+for count in 2 3; do
+    below cells$count on $count "$program" && "$program" compare cells$count/roofs.exr cells1/roofs.exr >out 2>&1 && awk '/PSNR/ && $2 >= 90 { good = 1 } END { exit !good }' out
+    report $? "a picture by cells that $count processes share" "$(cat out)"
+done
+"$program" render large/gaussians.ply --memory 190M --data large --path orbit --size 64x36 --frames 2 -o orbit1 --quiet >out 2>&1 &&
+    on 2 "$program" render large/gaussians.ply --memory 190M --data large --path orbit --size 64x36 --frames 2 -o orbit2 --quiet >out 2>&1 && same orbit1 orbit2
+report $? "as many pictures by cells as processes: the same bytes" "$(cat out different)"
+on 2 "$program" render large/gaussians.ply --memory 1M --camera roofs.json -o cells0 >out 2>err
+code=$?
+[ $code = 5 ] && [ "$(errors)" = 1 ] && [ ! -e cells0/roofs.png ]
+report $? "too little memory for shares is told once" "code $code: $(cat out err)"
 on 2 "$program" render alone -o nothing --camera no.json >out 2>err
 code=$?
 [ $code = 4 ] && [ "$(errors)" = 1 ]

@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* cells/share.c -- a picture in shares: each a run of cells, front to back; how their layers are blended. */
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "cells/view.h"
+
+/* ---- which cells ---- */
+
+typedef struct share_walk {
+    const cell_drawer *d;
+    const size_t *weight; /* [chunk_count] */
+    size_t before, total; /* of the weights */
+    size_t first, end;
+} share_walk;
+
+/* Chunks from the eye on: one belongs to the share in which the Gaussians in front of it end. */
+static void walk_part(share_walk *w, const cell_part *part)
+{
+    const cell_store *store = w->d->store;
+    if (cell_is_chunk(store, part)) {
+        const size_t of = w->total > 0 ? w->before * (size_t)w->d->share.count / w->total : 0;
+        w->before += w->weight[part->node - (store->chunk_count - 1)];
+        w->first += of < (size_t)w->d->share.index;
+        w->end += of <= (size_t)w->d->share.index;
+        return;
+    }
+    const cell_cut *cut = &store->cuts[part->node];
+    const bool from_below = w->d->rays.origin[cut->axis] < cut->at;
+    for (int k = 0; k < 2; k++) {
+        const cell_part child = cell_child(store, part, (k == 0) == from_below);
+        walk_part(w, &child);
+    }
+}
+
+gbt_status cell_share_find(cell_drawer *d, gbt_error *err)
+{
+    d->first = 0;
+    d->end = d->store->chunk_count;
+    if (d->share.count <= 1)
+        return GBT_OK;
+    size_t *weight = mem_calloc(d->store->chunk_count, sizeof *weight, "shares of a picture", err);
+    if (weight == NULL)
+        return GBT_ERR_NO_MEMORY;
+    share_walk walk = {.d = d, .weight = weight};
+    for (size_t i = 0; i < d->visible_count; i++) {
+        weight[d->visible[i]] = d->store->chunks[d->visible[i]].count;
+        walk.total += weight[d->visible[i]];
+    }
+    const cell_part whole = cell_whole();
+    walk_part(&walk, &whole);
+    d->first = walk.first;
+    d->end = walk.end;
+    mem_free(weight);
+    return GBT_OK;
+}
+
+/* ---- layers ---- */
+
+void cell_layer_take(const cell_drawer *d, const image *drawn, float *layer)
+{
+    for (size_t i = 0; i < ray_image_count(&d->rays); i++) {
+        float *out = layer + i * CELL_LAYER_FLOATS;
+        for (size_t c = 0; c < 3; c++)
+            out[c] = drawn->pixels[3 * i + c];
+        out[3] = d->over[i] != 0 ? -d->rays.through[i] : d->rays.through[i];
+    }
+}
+
+/* Behind the layer in which a ray ends nothing counts; in it the ray ends later than where it would have
+   ended with what those in front have left, unless they have left all. */
+void cell_layers_blend(const float *const layers[], int count, size_t pixels, float transmittance_min,
+                       float *sum, float *enter)
+{
+    memset(enter, 0, (size_t)count * pixels * sizeof *enter);
+    for (size_t i = 0; i < pixels; i++) {
+        float *out = sum + i * CELL_LAYER_FLOATS, through = 1;
+        bool over = false;
+        out[0] = out[1] = out[2] = 0;
+        for (int k = 0; k < count && !over; k++) {
+            const float *in = layers[k] + i * CELL_LAYER_FLOATS;
+            over = in[3] < 0 || through * in[3] < transmittance_min;
+            if (over && through < 1) {
+                enter[(size_t)k * pixels + i] = through;
+                break;
+            }
+            for (size_t c = 0; c < 3; c++)
+                out[c] += through * in[c];
+            through *= fabsf(in[3]);
+        }
+        out[3] = through;
+    }
+}
+
+void cell_layers_add(const float *const again[], int count, size_t pixels, const float *enter, float *sum)
+{
+    for (int k = 0; k < count; k++)
+        for (size_t i = 0; i < pixels; i++) {
+            if (!(enter[(size_t)k * pixels + i] > 0))
+                continue;
+            const float *in = again[k] + i * CELL_LAYER_FLOATS;
+            float *out = sum + i * CELL_LAYER_FLOATS;
+            for (size_t c = 0; c < 3; c++)
+                out[c] += in[c];
+            out[3] = fabsf(in[3]);
+        }
+}

@@ -9,32 +9,6 @@
 #include "base/file.h"
 #include "base/memory.h"
 
-static const struct {
-    const char *name;
-    int channels;
-} outputs[OUTPUT_COUNT] = {{"transmittance", 1}, {"depth", 1}, {"median-depth", 1},
-                           {"normal", 3},        {"hits", 1},  {"anchor", 1}};
-
-gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *err)
-{
-    *wanted = 0;
-    for (const char *word = list; word != NULL;) {
-        const size_t length = strcspn(word, ",");
-        int i = 0;
-        while (i < OUTPUT_COUNT &&
-               (strlen(outputs[i].name) != length || strncmp(word, outputs[i].name, length) != 0))
-            i++;
-        if (i == OUTPUT_COUNT)
-            return base_fail(err, GBT_ERR_ARGUMENT,
-                             "outputs: \"%.*s\" (wanted transmittance, depth, median-depth, normal, hits "
-                             "or anchor, with commas between)",
-                             length < 40 ? (int)length : 40, word);
-        *wanted |= 1u << i;
-        word = word[length] == ',' ? word + length + 1 : NULL;
-    }
-    return GBT_OK;
-}
-
 /* The anchor that each ray's strongest Gaussian was decoded from, or the plain Gaussian; -1 where there is
    none. */
 static void name_anchors(const loaded_run *r, const uint32_t *strongest, image *out)
@@ -50,7 +24,7 @@ static gbt_status write_one(const image *pixels, render_output which, const char
                             gbt_error *err)
 {
     char file[1200], path[4096];
-    snprintf(file, sizeof file, "%s.%s.exr", name, outputs[which].name);
+    snprintf(file, sizeof file, "%s.%s.exr", name, render_output_kinds[which].name);
     GBT_TRY(file_join(path, sizeof path, folder, file, err));
     return image_write(path, pixels, err);
 }
@@ -74,7 +48,8 @@ gbt_status render_outputs_trace(loaded_run *r, const ray_shot *shot, unsigned wa
     GBT_TRY(image_alloc(&o->rgb, o->rays.width, o->rays.height, 3, err));
     for (int i = 0; i < OUTPUT_COUNT; i++)
         if (wanted >> i & 1)
-            GBT_TRY(image_alloc(&o->of[i], o->rays.width, o->rays.height, outputs[i].channels, err));
+            GBT_TRY(
+                image_alloc(&o->of[i], o->rays.width, o->rays.height, render_output_kinds[i].channels, err));
     if (wanted >> OUTPUT_ANCHOR & 1) {
         o->strongest = mem_alloc(ray_image_count(&o->rays), sizeof *o->strongest, "strongest Gaussians", err);
         if (o->strongest == NULL)

@@ -3,17 +3,8 @@
 #ifndef GBT_RENDER_RENDER_OUTPUTS_H
 #define GBT_RENDER_RENDER_OUTPUTS_H
 
+#include "render/output_names.h"
 #include "run/loaded_run.h"
-
-typedef enum render_output {
-    OUTPUT_TRANSMITTANCE,
-    OUTPUT_DEPTH,
-    OUTPUT_MEDIAN_DEPTH,
-    OUTPUT_NORMAL,
-    OUTPUT_HITS,
-    OUTPUT_ANCHOR,
-    OUTPUT_COUNT
-} render_output;
 
 /** Pictures of one pass. Start from {0}; render_output_images_free() after success or failure. */
 typedef struct render_output_images {
@@ -21,15 +12,6 @@ typedef struct render_output_images {
     image rgb, of[OUTPUT_COUNT]; /* those that were wanted */
     uint32_t *strongest;
 } render_output_images;
-
-/**
- * A list of names with commas between: transmittance, depth, median-depth, normal, hits, anchor.
- *
- * @param list   [in]  NULL: none
- * @param wanted [out] a bit for each
- * @return GBT_OK, or GBT_ERR_ARGUMENT for another name
- */
-gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *err);
 
 /**
  * Trace the Gaussians of the last render of `r` once more, along the rays of `shot` through the middle of its

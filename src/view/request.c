@@ -8,7 +8,7 @@
 #include "base/fail.h"
 #include "data/number.h"
 #include "render/camera_file.h"
-#include "render/render_outputs.h"
+#include "render/output_names.h"
 
 typedef struct words {
     request_word *word;

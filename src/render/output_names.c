@@ -6,8 +6,8 @@
 
 #include "base/fail.h"
 
-const struct render_output_kind render_output_kinds[OUTPUT_COUNT] = {{"transmittance", 1}, {"depth", 1}, {"median-depth", 1},
-                           {"normal", 3},        {"hits", 1},  {"anchor", 1}};
+const struct render_output_kind render_output_kinds[OUTPUT_COUNT] = {
+    {"transmittance", 1}, {"depth", 1}, {"median-depth", 1}, {"normal", 3}, {"hits", 1}, {"anchor", 1}};
 
 gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *err)
 {
@@ -15,8 +15,8 @@ gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *e
     for (const char *word = list; word != NULL;) {
         const size_t length = strcspn(word, ",");
         int i = 0;
-        while (i < OUTPUT_COUNT &&
-               (strlen(render_output_kinds[i].name) != length || strncmp(word, render_output_kinds[i].name, length) != 0))
+        while (i < OUTPUT_COUNT && (strlen(render_output_kinds[i].name) != length ||
+                                    strncmp(word, render_output_kinds[i].name, length) != 0))
             i++;
         if (i == OUTPUT_COUNT)
             return base_fail(err, GBT_ERR_ARGUMENT,

@@ -73,10 +73,8 @@ static gbt_status draw_part(const picture *p, const cell_part *part, size_t firs
             err, GBT_ERR_NO_MEMORY,
             "memory: %zu MB is too little for the Gaussians of one place (wanted more than %zu there)",
             d->memory >> 20, d->budget >> 20);
-    const cell_cut *cut = &d->store->cuts[part->node];
-    const bool from_below = d->rays.origin[cut->axis] < cut->at;
     for (int k = 0; k < 2; k++) {
-        const cell_part child = cell_child(d->store, part, (k == 0) == from_below);
+        const cell_part child = cell_child_from_eye(d, part, k);
         GBT_TRY(draw_part(p, &child, first + (k == 0 ? 0 : chunks / 2), err));
     }
     return GBT_OK;

@@ -37,7 +37,7 @@ typedef struct cell_share {
 typedef struct cell_drawer {
     const cell_store *store;
     size_t cell_bytes;  /* set before drawing: of one cell at most; 0, the default: as `memory` allows */
-    cell_share share;   /* set before drawing */
+    cell_share share;   /* set before drawing; a share has no background */
     const float *enter; /* set before drawing: [pixels] transmittance that rays have in front of the share, 0:
                            not drawn; NULL, the default: all have 1 */
     size_t first, end;  /* of the chunks, front to back: those of the share */
@@ -89,9 +89,6 @@ gbt_status cell_draw_together(cell_drawer *d, const cell_store *store, const ray
                               gbt_error *err);
 
 void cell_drawer_free(cell_drawer *d);
-
-/** Bytes of memory that a picture of `pixels` pixels wants at least. */
-size_t cell_memory_least(size_t pixels);
 
 /** Bytes of memory that all of a .ply takes: while it is read, or while pictures of it are drawn. */
 size_t cell_memory_whole(size_t count, uint64_t file_bytes);

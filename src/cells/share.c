@@ -9,27 +9,24 @@
 /* ---- which cells ---- */
 
 typedef struct share_walk {
-    const cell_drawer *d;
+    cell_drawer *d;
     const size_t *weight; /* [chunk_count] */
     size_t before, total; /* of the weights */
-    size_t first, end;
 } share_walk;
 
 /* Chunks from the eye on: one belongs to the share in which the Gaussians in front of it end. */
 static void walk_part(share_walk *w, const cell_part *part)
 {
-    const cell_store *store = w->d->store;
-    if (cell_is_chunk(store, part)) {
-        const size_t of = w->total > 0 ? w->before * (size_t)w->d->share.count / w->total : 0;
-        w->before += w->weight[part->node - (store->chunk_count - 1)];
-        w->first += of < (size_t)w->d->share.index;
-        w->end += of <= (size_t)w->d->share.index;
+    cell_drawer *d = w->d;
+    if (cell_is_chunk(d->store, part)) {
+        const size_t of = w->total > 0 ? w->before * (size_t)d->share.count / w->total : 0;
+        w->before += w->weight[part->node - (d->store->chunk_count - 1)];
+        d->first += of < (size_t)d->share.index;
+        d->end += of <= (size_t)d->share.index;
         return;
     }
-    const cell_cut *cut = &store->cuts[part->node];
-    const bool from_below = w->d->rays.origin[cut->axis] < cut->at;
     for (int k = 0; k < 2; k++) {
-        const cell_part child = cell_child(store, part, (k == 0) == from_below);
+        const cell_part child = cell_child_from_eye(d, part, k);
         walk_part(w, &child);
     }
 }
@@ -49,9 +46,8 @@ gbt_status cell_share_find(cell_drawer *d, gbt_error *err)
         walk.total += weight[d->visible[i]];
     }
     const cell_part whole = cell_whole();
+    d->end = 0;
     walk_part(&walk, &whole);
-    d->first = walk.first;
-    d->end = walk.end;
     mem_free(weight);
     return GBT_OK;
 }

@@ -5,8 +5,6 @@
         --> strip k of it goes to process k, which blends all layers there
         --> rays that end by what is in front of a share: drawn in it again, added
         --> everybody gets all strips */
-#include <string.h>
-
 #include "base/memory.h"
 #include "cells/view.h"
 #include "cluster/cluster.h"

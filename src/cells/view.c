@@ -19,8 +19,6 @@ static const size_t base_bytes = (size_t)128 << 20, cell_bytes_least = (size_t)4
    picture as it is written; layers, where there are shares. */
 enum { PIXEL_BYTES = 120, PIXEL_LAYER_BYTES = 80 };
 
-size_t cell_memory_least(size_t pixels) { return base_bytes + cell_bytes_least + PIXEL_BYTES * pixels; }
-
 size_t cell_memory_whole(size_t count, uint64_t file_bytes)
 {
     const size_t cloud = 236 * count, drawing = 400 * count;
@@ -32,7 +30,7 @@ cell_part cell_whole(void)
     return (cell_part){.low = {-INFINITY, -INFINITY, -INFINITY}, .high = {INFINITY, INFINITY, INFINITY}};
 }
 
-cell_part cell_child(const cell_store *store, const cell_part *of, bool below)
+static cell_part child_of(const cell_store *store, const cell_part *of, bool below)
 {
     const cell_cut *cut = &store->cuts[of->node];
     cell_part child = *of;
@@ -43,6 +41,13 @@ cell_part cell_child(const cell_store *store, const cell_part *of, bool below)
     else
         child.low[cut->axis] = cut->at;
     return child;
+}
+
+cell_part cell_child_from_eye(const cell_drawer *d, const cell_part *of, int k)
+{
+    const cell_cut *cut = &d->store->cuts[of->node];
+    const bool from_below = d->rays.origin[cut->axis] < cut->at;
+    return child_of(d->store, of, (k == 0) == from_below);
 }
 
 /* ---- intervals ---- */

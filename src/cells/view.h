@@ -20,7 +20,8 @@ typedef struct cell_part {
 } cell_part;
 
 cell_part cell_whole(void);
-cell_part cell_child(const cell_store *store, const cell_part *of, bool below);
+/** The child that rays from the eye meet first (k = 0) or second (k = 1). */
+cell_part cell_child_from_eye(const cell_drawer *d, const cell_part *of, int k);
 static inline bool cell_is_chunk(const cell_store *store, const cell_part *part)
 {
     return part->node >= store->chunk_count - 1;

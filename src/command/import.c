@@ -55,6 +55,7 @@ static gbt_status describe(model *m, const result_folder *from, const gbt_import
     gbt_train_def train = gbt_train_def_default();
     train.renderer = def->renderer;
     train.footprint = 0;
+    train.downscale = from->downscale;
     train.compat = true;
     train.offsets = m->anchors.offset_count;
     train.alpha = from->white_background ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK;

@@ -3,6 +3,7 @@
 #include "data/result_folder.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -17,6 +18,17 @@ static void find_text(const char *text, const char *key, char *out, size_t size)
         snprintf(out, size, "%.*s", (int)((size_t)(end - at) - strlen(key)), at + strlen(key));
 }
 
+/* resolution=1, 2, 4 or 8 divides the photos' width and height; other numbers are a width, or none. */
+static double find_downscale(const char *text)
+{
+    static const char key[] = "resolution=";
+    const char *at = strstr(text, key);
+    if (at == NULL)
+        return 0;
+    const long value = strtol(at + sizeof key - 1, NULL, 10);
+    return value == 1 || value == 2 || value == 4 || value == 8 ? (double)value : 0;
+}
+
 static gbt_status read_settings(const char *folder, result_folder *out, gbt_error *err)
 {
     char path[RESULT_PATH_SIZE];
@@ -28,6 +40,7 @@ static gbt_status read_settings(const char *folder, result_folder *out, gbt_erro
     GBT_TRY(file_read(path, &bytes, &size, err));
     find_text((const char *)bytes, "source_path='", out->source, sizeof out->source);
     out->white_background = strstr((const char *)bytes, "white_background=True") != NULL;
+    out->downscale = find_downscale((const char *)bytes);
     mem_free(bytes);
     return GBT_OK;
 }

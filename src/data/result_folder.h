@@ -16,6 +16,7 @@ typedef struct result_folder {
     unsigned long iteration;       /* N */
     char source[RESULT_PATH_SIZE]; /* cfg_args' source_path, the data set; empty when it does not say */
     bool white_background;         /* cfg_args */
+    double downscale;              /* cfg_args' resolution, of the data set's photos; 0: it does not say */
 } result_folder;
 
 /**

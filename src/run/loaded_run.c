@@ -29,6 +29,7 @@ static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *
     snprintf(out->model.data_folder, sizeof out->model.data_folder, "%.*s",
              (int)sizeof out->model.data_folder - 1, folder.source);
     out->model.iterations = folder.iteration;
+    out->def.downscale = folder.downscale;
     out->def.alpha = folder.white_background ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK;
     for (int c = 0; c < 3; c++)
         out->settings.background[c] = folder.white_background;

@@ -54,6 +54,17 @@ static int kind_of(const char *path)
 
 bool video_named(const char *path) { return kind_of(path) < KINDS; }
 
+enum { NOT_STARTED = 127 }; /* exit code of a process whose program could not be started (POSIX) */
+
+static gbt_status missing(const video *v, gbt_error *err)
+{
+    return base_fail(
+        err, GBT_ERR_IO,
+        "%s: a film wants the program ffmpeg, which is not there (install it: apt install ffmpeg, "
+        "or give a folder for pictures)",
+        v->path);
+}
+
 /** posix_spawnp() with a socket as standard input. A pipe would raise SIGPIPE in the whole program when
     ffmpeg ends early. */
 static gbt_status start(video *v, char *const *arguments, gbt_error *err)
@@ -74,11 +85,7 @@ static gbt_status start(video *v, char *const *arguments, gbt_error *err)
         return GBT_OK;
     v->process = 0;
     if (code == ENOENT)
-        return base_fail(err, GBT_ERR_IO,
-                         "%s: a film wants the program ffmpeg, which is not there (install it: apt install "
-                         "ffmpeg, or give a "
-                         "folder for pictures)",
-                         v->path);
+        return missing(v, err);
     return base_fail(err, GBT_ERR_IO, "%s: ffmpeg does not start: %s", v->path, strerror(code));
 }
 
@@ -160,6 +167,8 @@ static int finish(video *v)
 static gbt_status failed(video *v, int code, gbt_error *err)
 {
     char line[200], last[200] = "it said nothing";
+    if (code == NOT_STARTED) /* where posix_spawnp() cannot say so */
+        return missing(v, err);
     rewind(v->complaints);
     while (fgets(line, sizeof line, v->complaints) != NULL) {
         line[strcspn(line, "\r\n")] = '\0';

@@ -606,10 +606,12 @@ static void film_without_ffmpeg(void **state)
     snprintf(path, sizeof path, "%s/clip.mp4", folder);
     snprintf(search, sizeof search, "%s", getenv("PATH") != NULL ? getenv("PATH") : "");
     setenv("PATH", "/nowhere", 1);
-    const gbt_status status = video_open(path, 16, 16, 30, &v, &err);
+    gbt_status status = video_open(path, 16, 16, 30, &v, &err);
     setenv("PATH", search, 1);
+    assert_true(status == GBT_OK || v == NULL);
+    if (status == GBT_OK) /* where posix_spawnp() cannot say so: emulators */
+        status = video_close(v, true, &err);
     assert_int_equal(status, GBT_ERR_IO);
-    assert_null(v);
     assert_non_null(strstr(err.text, "a film wants the program ffmpeg, which is not there"));
     no_film_left(path);
     memset(&err, 0, sizeof err);

@@ -14,6 +14,7 @@
 #include "data/gaussian_file.h"
 #include "data/json_out.h"
 #include "data/ply.h"
+#include "data/result_folder.h"
 
 enum { PATH_SIZE = 4096 };
 
@@ -45,12 +46,11 @@ static gbt_status write_settings(const char *folder, const loaded_run *r, int sh
                        laid_on[0] > 0; /* any other background is in the file, or black */
     put_path(r->scene.folder, source, sizeof source);
     put_path(folder, result, sizeof result);
-    const double downscale = r->def.downscale;
-    const bool known = downscale == 1 || downscale == 2 || downscale == 4 || downscale == 8;
+    const int resolution = result_resolution_divides(r->def.downscale) ? (int)r->def.downscale : -1;
     snprintf(text, sizeof text,
              "Namespace(sh_degree=%d, source_path='%s', model_path='%s', images='images', resolution=%d, "
              "white_background=%s, data_device='cpu', eval=True)",
-             sh_degree, source, result, known ? (int)downscale : -1, white ? "True" : "False");
+             sh_degree, source, result, resolution, white ? "True" : "False");
     GBT_TRY(file_join(path, sizeof path, folder, "cfg_args", err));
     return file_write_atomic(path, text, strlen(text), err);
 }

@@ -18,15 +18,17 @@ static void find_text(const char *text, const char *key, char *out, size_t size)
         snprintf(out, size, "%.*s", (int)((size_t)(end - at) - strlen(key)), at + strlen(key));
 }
 
-/* resolution=1, 2, 4 or 8 divides the photos' width and height; other numbers are a width, or none. */
+bool result_resolution_divides(double resolution)
+{
+    return resolution == 1 || resolution == 2 || resolution == 4 || resolution == 8;
+}
+
 static double find_downscale(const char *text)
 {
     static const char key[] = "resolution=";
     const char *at = strstr(text, key);
-    if (at == NULL)
-        return 0;
-    const long value = strtol(at + sizeof key - 1, NULL, 10);
-    return value == 1 || value == 2 || value == 4 || value == 8 ? (double)value : 0;
+    const double value = at != NULL ? (double)strtol(at + sizeof key - 1, NULL, 10) : 0;
+    return result_resolution_divides(value) ? value : 0;
 }
 
 static gbt_status read_settings(const char *folder, result_folder *out, gbt_error *err)

@@ -25,4 +25,8 @@ typedef struct result_folder {
  */
 gbt_status result_folder_find(const char *folder, result_folder *out, bool *found, gbt_error *err);
 
+/** Whether cfg_args' `resolution=` of this value divides the photos' width and height; others are a width, or
+ * leave it open. */
+bool result_resolution_divides(double resolution);
+
 #endif

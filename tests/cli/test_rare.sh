@@ -55,6 +55,11 @@ report $? "a path file of another size" "$(cat err out)"
 "$program" export run result/ --sh-degree 1 >out 2>err && "$program" render result -o whole --format exr >>out 2>>err &&
     "$program" render result -o cells --format exr --memory "$limit" >>out 2>>err && "$program" compare whole/*0.exr cells/*0.exr >>out 2>>err
 report $? "a result folder within a memory limit" "$(cat err out)"
+sed -i 's/resolution=1/resolution=2/' result/cfg_args && "$program" render result -o half --format exr >out 2>err && "$program" render result -o asked --format exr -d 1 >>out 2>>err &&
+    "$program" compare whole/*0.exr asked/*0.exr >>out 2>>err && ! "$program" compare whole/*0.exr half/*0.exr >>out 2>>err && grep -q '16 x 12' err
+report $? "a result folder of photos at half size" "$(cat err out)"
+sed -i "s/source_path='[^']*'/source_path=''/" result/cfg_args && "$program" render result -o listed --format exr >out 2>err && "$program" compare whole/*0.exr listed/*0.exr >>out 2>>err
+report $? "the cameras in a result folder have sizes of their own" "$(cat err out)"
 "$program" export run plain.ply >out 2>err && holds "info of plain Gaussians, as JSON" 0 '^  "kind": "gaussians",$' info plain.ply --json
 
 # ---- counts and places

@@ -323,8 +323,8 @@ static void a_budget_run_resumes_its_clock(void **state)
     def.stop_at_step = 10; /* in the first part */
     train_fails(tiny, in_root("clock"), &def, GBT_ERR_INTERRUPTED, "after step 10");
     def.stop_at_step = 0;
-    trainer t = {0};
-    assert_ok(trainer_open(&t, tiny, &def, NULL));
+    trainer t;
+    open_ok(&t, tiny, &def);
     assert_ok(checkpoint_load(&t, in_root("clock/checkpoints/last.gbt"), NULL));
     const uint64_t first_part = t.pace.steps[0];
     assert_true(t.seconds > 0);
@@ -333,6 +333,7 @@ static void a_budget_run_resumes_its_clock(void **state)
     trainer_free(&t);
     resume_ok(in_root("clock"));
     json_t *summary = read_summary(in_root("clock"));
+    assert_int_equal(json_array_size(json_object_get(summary, "pace")), PACE_SEGMENTS);
     assert_true(json_number_value(json_object_get(summary, "train_seconds")) > 1e6);
     assert_int_equal(json_integer_value(json_object_get(summary, "iterations")),
                      first_part + PACE_SEGMENTS - 1);

@@ -2,20 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 # tests/golden/golden.sh -- the bits of models, pictures and exports, on every instruction set and number of threads.
 #
-# Usage: golden.sh PROGRAM RECORD THREADS [ISA [SCENES]]
+# Usage: golden.sh PROGRAM RECORD THREADS [ISA]
 #
 # Makes small scenes, trains each kind of run on them, draws, exports, and hashes every file. RECORD holds the hashes as they were recorded,
-# under the name of the C library, image library and compiler whose arithmetic and files they have; elsewhere the comparison is skipped.
+# under the name of the C library and image library whose arithmetic and files they have; elsewhere the comparison is skipped.
 # `golden.sh PROGRAM - THREADS ISA > RECORD` records. A change that should alter no result leaves RECORD as it is.
-# A folder SCENES gets the scenes if it is not there, and gives them if it is: so another processor is asked about the same scenes, and compared
-# whatever its name, because the sparse points of a procedural scene are found by Embree, whose arithmetic is another there.
 set -u
 program=$1
 record=$2
 threads=$3
 isa=${4:-}
-scenes=${5:-}
-[ -z "$scenes" ] || { mkdir -p "$(dirname "$scenes")" && scenes=$(cd "$(dirname "$scenes")" && pwd)/$(basename "$scenes"); } || exit 1
 [ "$record" = - ] || record=$(cd "$(dirname "$record")" && pwd)/$(basename "$record")
 . "$(dirname "$0")/../cli/report.sh"
 work=$(mktemp -d) || exit 1
@@ -24,58 +20,52 @@ cd "$work" || exit 1
 GBTRACE_THREADS=$threads
 export GBTRACE_THREADS
 
-# ---- scenes. Cameras and points are procedural. Photos are the tracer's pictures of plain Gaussians: Embree's own arithmetic, which the
-# procedural photos are made with, differs between instruction sets and between processors.
+# ---- scenes. 400 Gaussians, their centres as sparse points, nine cameras around them, and the tracer's pictures as photos. Nothing of Embree's
+# own arithmetic is in them, as it would be in those of `gbtrace make-scene`: it differs between instruction sets and between processors.
 awk 'function random() { state = (state * 16807) % 2147483647; return state / 2147483647 }
+    function start(file, names) {
+        printf "ply\nformat ascii 1.0\nelement vertex 400\n" >file
+        n = split(names, name, " ")
+        for (k = 1; k <= n; k++) printf "property %s %s\n", name[k] ~ /red|green|blue/ ? "uchar" : "float", name[k] >file
+        print "end_header" >file
+    }
     BEGIN {
         state = 1
-        printf "ply\nformat ascii 1.0\nelement vertex 400\n"
-        n = split("x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3", name, " ")
-        for (k = 1; k <= n; k++) printf "property float %s\n", name[k]
-        print "end_header"
+        start("gaussians.ply", "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3")
+        start("points.ply", "x y z red green blue")
         for (i = 0; i < 400; i++) {
-            for (k = 0; k < 3; k++) printf "%.6f ", 3 * random() - 1.5
-            for (k = 0; k < 3; k++) printf "%.6f ", 3 * random() - 1.5
-            printf "%.6f ", 6 * random() - 2
-            for (k = 0; k < 3; k++) printf "%.6f ", -3 + 2 * random()
-            printf "%.6f %.6f %.6f %.6f\n", 0.1 + random(), random() - 0.5, random() - 0.5, random() - 0.5
+            for (k = 0; k < 3; k++) center[k] = 3 * random() - 1.5
+            for (k = 0; k < 3; k++) color[k] = 3 * random() - 1.5
+            where = sprintf("%.6f %.6f %.6f", center[0], center[1], center[2])
+            printf "%s %.6f %.6f %.6f %.6f", where, color[0], color[1], color[2], 6 * random() - 2 >"gaussians.ply"
+            for (k = 0; k < 3; k++) printf " %.6f", -3 + 2 * random() >"gaussians.ply"
+            printf " %.6f %.6f %.6f %.6f\n", 0.1 + random(), random() - 0.5, random() - 0.5, random() - 0.5 >"gaussians.ply"
+            printf "%s %d %d %d\n", where, 128 + 70 * color[0], 128 + 70 * color[1], 128 + 70 * color[2] >"points.ply"
         }
-    }' >gaussians.ply
-make() { # RECIPE NAME OPTIONS...
-    recipe=$1 name=$2
-    shift 2
-    GBT_ISA=plain "$program" make-scene "$recipe" -o "$name" "$@" --width 96 --height 72 --views 9 --points 500 --samples 2 --quiet >out 2>&1 &&
-        GBT_ISA=plain "$program" render gaussians.ply -o photos --data "$name" --split all --quiet >out 2>&1 || { cat out; exit 1; }
-    for photo in "$name"/images/*.png; do mv "photos/${photo##*/}" "$photo" || exit 1; done
-    rm -r photos
+    }'
+make() { # NAME FIELDS: those of transforms.json beside the pinhole camera's
+    mkdir "$1" "$1/images" && cp points.ply "$1" || exit 1
+    for i in 0 1 2 3 4 5 6 7 8; do
+        if [ "$1" = plain ]; then : >"$1/images/000$i.png"; else cp plain/images/000$i.png "$1/images" || exit 1; fi
+        # OpenGL axes: right (-s, c, 0), up (0, 0, 1), back (c, s, 0), at 4 times back
+        awk -v i=$i -v fields="$2" 'BEGIN {
+            c = cos(0.7 * i); s = sin(0.7 * i)
+            if (i == 0) printf "{\"fl_x\": 90, \"fl_y\": 90, \"cx\": 48, \"cy\": 36, \"w\": 96, \"h\": 72, %s\"frames\": [\n", fields
+            printf "{\"file_path\": \"images/%04d.png\", \"transform_matrix\": [[%.9g,0,%.9g,%.9g],[%.9g,0,%.9g,%.9g],[0,1,0,0.5],[0,0,0,1]]}%s\n",
+                i, -s, c, 4 * c, c, s, 4 * s, i < 8 ? "," : "]}"
+        }'
+    done >"$1/transforms.json"
 }
-if [ -d "$scenes" ]; then
-    cp -r "$scenes"/. . || exit 1
-else
-    make tabletop plain
-    make courtyard bent --lens distorted
-    # The same photos, said to be from another lens.
-    cp -r plain fisheye
-    { head -c 12 plain/sparse/0/cameras.bin && printf '\5\0\0\0' && tail -c +17 plain/sparse/0/cameras.bin | head -c 48 && head -c 32 /dev/zero; } >fisheye/sparse/0/cameras.bin
-    cp -r plain masked
-    mkdir masked/masks
-    for photo in plain/images/*.png; do cp plain/images/0003.png "masked/masks/${photo##*/}"; done
-    mkdir pointless # cameras around, and no points
-    cp -r plain/images pointless/
-    {
-        printf '{"fl_x": 90, "fl_y": 90, "cx": 48, "cy": 36, "w": 96, "h": 72, "frames": ['
-        i=0
-        for c_s in '1 0' '0.70710678 0.70710678' '0 1' '-0.70710678 0.70710678' '-1 0' '-0.70710678 -0.70710678' '0 -1' '0.70710678 -0.70710678'; do
-            c=${c_s% *} s=${c_s#* }
-            [ $i = 0 ] || printf ','
-            # OpenGL axes: right (-s, c, 0), up (0, 0, 1), back (c, s, 0), at 3 times back
-            echo "$c $s $i" | awk '{printf "{\"file_path\": \"images/%04d.png\", \"transform_matrix\": [[%.9g,0,%.9g,%.9g],[%.9g,0,%.9g,%.9g],[0,1,0,0.5],[0,0,0,1]]}", $3, -$2, $1, 3*$1, $1, $2, 3*$2}'
-            i=$((i + 1))
-        done
-        printf ']}\n'
-    } >pointless/transforms.json
-    [ -z "$scenes" ] || { mkdir "$scenes" && cp -r gaussians.ply plain bent fisheye masked pointless "$scenes"; } || exit 1
-fi
+points='"ply_file_path": "points.ply", '
+make plain "$points"
+"$program" render gaussians.ply -o photos --data plain --split all --quiet >out 2>&1 || { cat out; exit 1; }
+for photo in photos/*.png; do mv "$photo" "plain/images/${photo##*images_}" || exit 1; done
+rm -r photos
+make bent "$points\"k1\": -0.12, \"k2\": 0.03, \"p1\": 0.002, \"p2\": -0.001, "
+make fisheye "$points\"camera_model\": \"OPENCV_FISHEYE\", "
+make masked "$points" && mkdir masked/masks || exit 1
+for photo in plain/images/*.png; do cp plain/images/0003.png "masked/masks/${photo##*/}"; done
+make pointless ''
 
 # ---- what is made of them
 [ -z "$isa" ] || export GBT_ISA="$isa"
@@ -123,14 +113,12 @@ draw exports/a.ply -o drawn-ply --data plain --format exr
 for init in gb adaptive voxel; do "$program" init plain -o exports/$init.ply --init $init --quiet >out 2>&1 || cat out; done
 
 # ---- compare
-rm -rf plain bent fisheye masked pointless out gaussians.ply
+rm -rf plain bent fisheye masked pointless out gaussians.ply points.ply
 for file in $(find . -name '*.exr'); do # they hold the time when they were written
     LC_ALL=C sed -i 's/20[0-9][0-9]:[0-9][0-9]:[0-9][0-9] [0-9][0-9]:[0-9][0-9]:[0-9][0-9]/(the time)/' "$file"
 done
 find . -type f ! -name '*.json' ! -name '*.obj' | LC_ALL=C sort | xargs sha256sum | sed 's/ [ *]\.\// /' >"$work.now"
-processor=$(uname -m)
-[ -z "$scenes" ] || [ "$record" = - ] || processor=$(sed -n '1s/.* //p' "$record")
-platform="# $(getconf GNU_LIBC_VERSION), $("$program" doctor 2>/dev/null | sed -n 's/.*\(OpenImageIO [0-9.]*\).*/\1/p'), $processor"
+platform="# $(getconf GNU_LIBC_VERSION), $("$program" doctor 2>/dev/null | sed -n 's/.*\(OpenImageIO [0-9.]*\).*/\1/p')"
 if [ "$record" = - ]; then
     printf '%s\n' "$platform"
     cat "$work.now"

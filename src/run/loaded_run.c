@@ -154,7 +154,11 @@ static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
             out->scene.views[i].camera.center[k] += out->scene.origin[k] - out->model.origin[k];
     for (size_t i = 0; i < 3 * out->scene.points.count; i++)
         out->scene.points.position[i] += (float)(out->scene.origin[i % 3] - out->model.origin[i % 3]);
-    return photos_open(&out->photos, &out->scene, downscale > 0 ? downscale : out->def.downscale, err);
+    if (downscale <= 0)
+        downscale = out->def.downscale;
+    if (downscale <= 0) /* Gaussians of others, whose file says nothing */
+        downscale = photos_usual_downscale(&out->scene);
+    return photos_open(&out->photos, &out->scene, downscale, err);
 }
 
 /* Where training found that the photos were taken. */
@@ -178,7 +182,7 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     GBT_TRY(file_join(cameras, sizeof cameras, run, "cameras.json", err));
     if (data == NULL && is_plain(out) && !has_data && file_exists(cameras)) {
         GBT_TRY(cameras_json_load(cameras, &out->scene, err));
-        out->def.downscale = 0; /* what cfg_args says is of the data set's photos */
+        out->def.downscale = 1; /* what cfg_args says is of the data set's photos */
         return place_views(downscale, out, err);
     }
     if (data == NULL && is_plain(out) && !has_data)

@@ -58,9 +58,13 @@ report $? "a result folder within a memory limit" "$(cat err out)"
 sed -i 's/resolution=1/resolution=2/' result/cfg_args && "$program" render result -o half --format exr >out 2>err && "$program" render result -o asked --format exr -d 1 >>out 2>>err &&
     "$program" compare whole/*0.exr asked/*0.exr >>out 2>>err && ! "$program" compare whole/*0.exr half/*0.exr >>out 2>>err && grep -q '16 x 12' err
 report $? "a result folder of photos at half size" "$(cat err out)"
+"$program" export run plain.ply >out 2>err && "$program" make-scene tabletop -o wide --width 1920 --height 12 --views 3 --points 20 --samples 1 --quiet >>out 2>>err && "$program" render plain.ply -o usual --data wide >>out 2>>err &&
+    "$program" render plain.ply -o as-is --data wide -d 1 >>out 2>>err && ! "$program" compare usual/0000.png as-is/0000.png >>out 2>>err &&
+    grep -q '1600 x 10' err && grep -q '1920 x 12' err
+report $? "wide photos of plain Gaussians" "$(cat err out)"
 sed -i "s/source_path='[^']*'/source_path=''/" result/cfg_args && "$program" render result -o listed --format exr >out 2>err && "$program" compare whole/*0.exr listed/*0.exr >>out 2>>err
 report $? "the cameras in a result folder have sizes of their own" "$(cat err out)"
-"$program" export run plain.ply >out 2>err && holds "info of plain Gaussians, as JSON" 0 '^  "kind": "gaussians",$' info plain.ply --json
+holds "info of plain Gaussians, as JSON" 0 '^  "kind": "gaussians",$' info plain.ply --json
 
 # ---- counts and places
 "$program" init made -o anchors.ply --json counts.json >out 2>err && [ "$(grep -c '"color_rms": 0\.1' counts.json)" -ge 3 ]

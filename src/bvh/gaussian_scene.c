@@ -46,6 +46,7 @@ static void box_bounds(const struct RTCBoundsFunctionArguments *args)
                                          .upper_x = box->upper_x,
                                          .upper_y = box->upper_y,
                                          .upper_z = box->upper_z};
+    embree_publish(c); /* that the boxes have been read: the next build writes them */
 }
 
 /* Interval of t in which each ray is between two planes, cut with what is there. */
@@ -130,6 +131,7 @@ static gbt_status commit(content *c, RTCDevice device, gbt_error *err)
     rtcCommitGeometry(c->geometry);
     embree_publish(c);
     rtcCommitScene(c->scene);
+    embree_receive(c);
     return bvh_check("bvh", err);
 }
 

@@ -208,7 +208,9 @@ static void times_are_part_of_the_wait(void **state)
         assert_non_null(said);
         const double prepare = number_of(said, "prepare_ms"), trace = number_of(said, "trace_ms"),
                      encode = number_of(said, "encode_ms");
-        if (!(prepare >= 0 && trace > 0 && encode > 0 && prepare + trace + encode < waited + 0.01))
+        const bool copied = strstr(paths[i], "format=float") != NULL; /* in less than is told */
+        if (!(prepare >= 0 && trace > 0 && (copied ? encode >= 0 : encode > 0) &&
+              prepare + trace + encode < waited + 0.01))
             fail_msg("%s: %g + %g + %g ms of %g", paths[i], prepare, trace, encode, waited);
         json_decref(said);
         free(r.text);

@@ -150,12 +150,3 @@ class Browser:
         os.close(self.to)
         os.close(self.come)
         shutil.rmtree(self.profile, ignore_errors=True)
-
-
-def starts(program):
-    """Whether it runs here at all: in an emulator of another processor it ends by itself."""
-    try:
-        Browser(program, 320, 240).close()
-    except (PageError, OSError):
-        return False
-    return True

@@ -30,13 +30,16 @@ static bool load_used(const kernel_scene *scene, const list_view *view, size_t p
     out->count = 0;
     uint32_t *pair = out->number + count;
     memset(out->number, 0xFF, count * sizeof *out->number);
-    for (size_t i = 0; i < tape->count; i++) {
-        const uint32_t at = tape->entries[i].id;
-        const bool first = out->number[at] == UINT32_MAX;
-        pair[out->count] = at;
-        out->number[at] = first ? (uint32_t)out->count : out->number[at];
-        out->count += first;
+    for (size_t i = 0; i < tape->count; i++)
+        out->number[tape->entries[i].id] = 0;
+    size_t used = 0;
+    for (size_t i = 0; i < count; i++) {
+        const bool is_used = out->number[i] == 0;
+        pair[used] = (uint32_t)i;
+        out->number[i] = is_used ? (uint32_t)used : UINT32_MAX;
+        used += is_used;
     }
+    out->count = used;
     const list_pair *pairs = view->pairs + begin;
     memset(scratch->sums, 0, out->count * sizeof *scratch->sums);
     for (size_t i = 0; i < out->count; i++) {

@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# kernel_tables -- the tables of docs/performance.md from the .json files that bench/kernel_figures has made.
+#
+#     python3 bench/kernel_tables.py OUT
+#
+# A file that is not there leaves out its row.
+import json
+import os
+import sys
+
+MODELS = ("fox", "castle", "plush", "aerial", "courtyard", "vol10k", "vol100k", "surf200k")
+LENSES = ("pinhole", "fisheye", "panorama")
+
+
+def load(name):
+    path = os.path.join(sys.argv[1], name + ".json")
+    if not os.path.exists(path):
+        return None
+    with open(path) as file:
+        return json.load(file)["kernels"]
+
+
+def table(title, heads, rows):
+    print(f"\n{title}\n\n| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
+    for row in rows:
+        print(f"| {' | '.join(row)} |")
+
+
+def passes(kernel):
+    build = kernel["build_core_us_per_ray"]
+    parts = [kernel["forward_core_us_per_ray"], kernel["adjoint_core_us_per_ray"], kernel["core_us_per_ray"]]
+    return ", ".join(f"{value:.3f}" for value in ([build] if build >= 0.0005 else []) + parts)
+
+
+def ratio(kernel, other):
+    return f"{kernel['core_us_per_ray'] / other['core_us_per_ray']:.2f}"
+
+
+def forward(kernel):
+    return kernel["build_core_us_per_ray"] + kernel["forward_core_us_per_ray"]
+
+
+def rows_of(prefix, names, row):
+    for name in names:
+        kernels = load(f"{prefix}_{name}")
+        if kernels:
+            yield [name, *row(*kernels)]
+
+
+def errors(*kernels):
+    return ", ".join(f"{kernel['psnr_to_reference']:.0f}" for kernel in kernels)
+
+
+table("Each ray in its own order, the default's cut-offs",
+      ("scene", "blended per ray", "list: forward, adjoint, all", "tile: build, forward, adjoint, all", "splats, all", "tile / list", "list / splats", "dB: list, tile, splats"),
+      rows_of("kernels", MODELS, lambda l, t, s: (f"{l['blended_per_ray']:.0f}", passes(l), passes(t), f"{s['core_us_per_ray']:.3f}", ratio(t, l), ratio(l, s), errors(l, t, s))))
+table("As in the first 92.5 % of training",
+      ("scene", "blended per ray", "list, all", "packet: forward, adjoint, all", "splats, all", "list / splats", "packet / splats", "dB: list, packet, splats"),
+      rows_of("training", MODELS, lambda l, p, s: (f"{l['blended_per_ray']:.0f}", f"{l['core_us_per_ray']:.3f}", passes(p), f"{s['core_us_per_ray']:.3f}", ratio(l, s), ratio(p, s), errors(l, p, s))))
+table("Lenses in vol100k", ("lens", "blended per ray", "list: forward, adjoint, all", "tile: build, forward, adjoint, all", "tile / list", "dB: list, tile"),
+      rows_of("lens", LENSES, lambda l, t: (f"{l['blended_per_ray']:.0f}", passes(l), passes(t), ratio(t, l), errors(l, t))))
+table("Embree's own traversal", ("scene", "list: forward, all", "embree: forward, all", "ratio, forward", "ratio, all"),
+      rows_of("embree", MODELS, lambda l, e: (f"{forward(l):.3f}, {l['core_us_per_ray']:.3f}", f"{forward(e):.3f}, {e['core_us_per_ray']:.3f}",
+                                              f"{forward(e) / forward(l):.1f}", ratio(e, l))))
+table("Rays one by one", ("scene", "tile: forward", "single: forward", "single / tile"),
+      rows_of("single", MODELS, lambda t, s: (f"{t['forward_core_us_per_ray']:.3f}", f"{s['forward_core_us_per_ray']:.3f}",
+                                              f"{s['forward_core_us_per_ray'] / t['forward_core_us_per_ray']:.1f}")))
+table("Instruction sets, fox", ("set", "list: forward, adjoint, all"),
+      ([name, passes(kernels[0])] for name in ("avx512", "avx2", "plain") if (kernels := load(f"isa_{name}"))))
+table("Work, list", ("scene", "candidates per packet", "rows per packet", "blended per ray", "bytes of tape per ray"),
+      ([name, f"{k['candidates_per_packet']:.0f}", f"{k['rows_per_packet']:.0f}", f"{k['blended_per_ray']:.0f}", f"{k['tape_bytes'] / rays:.0f}"]
+       for name in MODELS if (kernels := load(f"kernels_{name}")) and (k := kernels[0]) and (rays := json.load(open(os.path.join(sys.argv[1], f"kernels_{name}.json")))["rays"])))

@@ -3,6 +3,7 @@
 #include "image/affine.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -79,6 +80,42 @@ void affine_backward(const float m[AFFINE_NUMBERS], const image *in, image *d, d
     for (size_t b = 0; b < parallel_block_count(count, grain); b++)
         for (int k = 0; k < AFFINE_NUMBERS; k++)
             d_m[k] += job.sums[b][k];
+}
+
+/* ---- the ends of a camera's range ---- */
+
+typedef struct cut_job {
+    const image *photo;
+    image *shown;
+    image *d; /* NULL: cut; else its adjoint */
+} cut_job;
+
+static void cut_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const cut_job *job = context;
+    const float white = 0.99f, black = 0.01f, *photo = job->photo->pixels;
+    float *shown = job->shown->pixels;
+    for (size_t i = 3 * begin; i < 3 * end; i++) {
+        const bool beyond =
+            (photo[i] >= white && shown[i] >= photo[i]) || (photo[i] <= black && shown[i] <= photo[i]);
+        if (job->d == NULL)
+            shown[i] = beyond ? photo[i] : shown[i];
+        else
+            job->d->pixels[i] = beyond ? 0 : job->d->pixels[i];
+    }
+}
+
+void affine_cut(const image *photo, image *shown)
+{
+    cut_job job = {.photo = photo, .shown = shown};
+    parallel_blocks(pixel_count(shown), block_grain(pixel_count(shown)), cut_block, &job);
+}
+
+void affine_cut_backward(const image *photo, const image *shown, image *d)
+{
+    cut_job job = {.photo = photo, .shown = (image *)shown, .d = d};
+    parallel_blocks(pixel_count(shown), block_grain(pixel_count(shown)), cut_block, &job);
 }
 
 /* ---- least squares ---- */

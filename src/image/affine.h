@@ -26,6 +26,19 @@ void affine_apply(const float m[AFFINE_NUMBERS], const image *in, image *out);
 void affine_backward(const float m[AFFINE_NUMBERS], const image *in, image *d, double d_m[AFFINE_NUMBERS]);
 
 /**
+ * What a camera does to light beyond its range: where a channel of `photo` is white (>= 0.99) or black (<=
+ * 0.01) and that of `shown` lies beyond it, `shown` becomes the photo, so that the difference asks nothing of
+ * it.
+ *
+ * @param shown [in,out] a picture through the photo's matrix, 3 channels, the size of `photo`
+ * Threads: parallel inside.
+ */
+void affine_cut(const image *photo, image *shown);
+
+/** Adjoint of affine_cut(): d (dL/d shown) is 0 where it has cut `shown`. Threads: parallel inside. */
+void affine_cut_backward(const image *photo, const image *shown, image *d);
+
+/**
  * The matrix that brings the columns [begin, end) of `from` nearest to those of `to`, by least squares, over
  * the pixels where `valid` (NULL: all).
  *

@@ -161,7 +161,9 @@ gbt_status step_view_compare(step_view *v, const unsigned char *valid, const flo
         return loss_of_image(shown, &v->photo, valid, &v->loss_scratch, &v->d_image, loss, err);
     GBT_TRY(image_fit(&v->exposed, shown->width, shown->height, 3, err));
     affine_apply(matrix, shown, &v->exposed);
+    affine_cut(&v->photo, &v->exposed);
     GBT_TRY(loss_of_image(&v->exposed, &v->photo, valid, &v->loss_scratch, &v->d_image, loss, err));
+    affine_cut_backward(&v->photo, &v->exposed, &v->d_image);
     affine_backward(matrix, shown, &v->d_image, d_matrix);
     return GBT_OK;
 }

@@ -32,6 +32,27 @@ static void by_hand(void **state)
     image_free(&same);
 }
 
+/* What lies beyond the white or the black of a photo asks nothing; what lies within its range does. */
+static void beyond_the_range_is_cut(void **state)
+{
+    (void)state;
+    const float photo_is[6] = {1, 0.995f, 1, 0, 0.5f, 0.005f},
+                shown_is[6] = {1.4f, 0.9f, 0.8f, -0.3f, 0.7f, 0.2f}, want[6] = {1, 0.9f, 0.8f, 0, 0.7f, 0.2f},
+                d_want[6] = {0, 2, 3, 0, 5, 6};
+    image photo = make_image(2, 1, 3), shown = make_image(2, 1, 3), d = make_image(2, 1, 3);
+    memcpy(photo.pixels, photo_is, sizeof photo_is);
+    memcpy(shown.pixels, shown_is, sizeof shown_is);
+    for (int i = 0; i < 6; i++)
+        d.pixels[i] = (float)(i + 1);
+    affine_cut(&photo, &shown);
+    affine_cut_backward(&photo, &shown, &d);
+    assert_memory_equal(shown.pixels, want, sizeof want);
+    assert_memory_equal(d.pixels, d_want, sizeof d_want);
+    image_free(&photo);
+    image_free(&shown);
+    image_free(&d);
+}
+
 /* f = sum of weight * m(in), in double. */
 static double weighted(const float m[AFFINE_NUMBERS], const image *in, const image *weight)
 {
@@ -217,6 +238,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(by_hand),
+        cmocka_unit_test(beyond_the_range_is_cut),
         cmocka_unit_test(adjoint_agrees_with_differences),
         cmocka_unit_test(threads_give_the_same_bits),
         cmocka_unit_test(a_fit_finds_the_matrix),

@@ -11,6 +11,7 @@ import sys
 
 MODELS = ("fox", "castle", "plush", "aerial", "courtyard", "vol10k", "vol100k", "surf200k")
 LENSES = ("pinhole", "fisheye", "panorama")
+VECTOR_OPERATIONS = 6.8e9  # of 16 floats, in a second of one core: bench/machine.c on the machine of docs/performance.md
 
 
 def load(name):
@@ -54,6 +55,14 @@ def errors(*kernels):
     return ", ".join(f"{kernel['psnr_to_reference']:.0f}" for kernel in kernels)
 
 
+def limits(kernel):
+    """Vector operations of sixteen rays, counted by hand from the source, forward and back, and the time that they alone would take."""
+    evaluated, rows, steps = kernel["tests_per_ray"], kernel["rows_per_packet"], kernel["row_pairs_per_packet"]
+    operations = 40 * evaluated + 34 * rows + rows * rows / 8 + 10 * steps + 140 * rows
+    alone, measured = 1e6 * operations / VECTOR_OPERATIONS / 16, kernel["core_us_per_ray"]
+    return (f"{evaluated:.0f}", f"{rows:.0f}, {steps:.0f}", f"{round(operations, -2):,.0f}", f"{alone:.3f}", f"{measured:.3f}", f"{100 * alone / measured:.0f} %")
+
+
 table("Each ray in its own order, the default's cut-offs",
       ("scene", "blended per ray", "list: forward, adjoint, all", "tile: build, forward, adjoint, all", "splats, all", "tile / list", "list / splats", "dB: list, tile, splats"),
       rows_of("kernels", MODELS, lambda l, t, s: (f"{l['blended_per_ray']:.0f}", passes(l), build_and_passes(t), f"{s['core_us_per_ray']:.3f}", ratio(t, l), ratio(l, s), errors(l, t, s))))
@@ -70,6 +79,6 @@ table("Rays one by one", ("scene", "tile: forward", "single: forward", "single /
                                               f"{s['forward_core_us_per_ray'] / t['forward_core_us_per_ray']:.1f}")))
 table("Instruction sets, fox", ("set", "list: forward, adjoint, all"),
       ([name, passes(kernels[0])] for name in ("avx512", "avx2", "plain") if (kernels := load(f"isa_{name}"))))
-table("Work, list", ("scene", "candidates per packet", "rows per packet", "blended per ray", "bytes of tape per ray"),
-      ([name, f"{k['candidates_per_packet']:.0f}", f"{k['rows_per_packet']:.0f}", f"{k['blended_per_ray']:.0f}", f"{k['tape_bytes'] / rays:.0f}"]
-       for name in MODELS if (kernels := load(f"kernels_{name}")) and (k := kernels[0]) and (rays := json.load(open(os.path.join(sys.argv[1], f"kernels_{name}.json")))["rays"])))
+table("Limits, list", ("scene", "rows evaluated per packet of 16 rays", "rows with a hit, steps back", "vector operations per packet", "arithmetic alone, core-us/ray", "measured",
+                       "arithmetic / measured"),
+      rows_of("kernels", MODELS, lambda l, t, s: limits(l)))

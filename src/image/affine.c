@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* image/affine.c -- colour matrices: apply, adjoint, least squares. */
+/* image/affine.c -- colour matrices: apply, adjoint, what cameras cut, least squares. */
 #include "image/affine.h"
 
 #include <math.h>
@@ -85,37 +85,45 @@ void affine_backward(const float m[AFFINE_NUMBERS], const image *in, image *d, d
 /* ---- the ends of a camera's range ---- */
 
 typedef struct cut_job {
-    const image *photo;
-    image *shown;
-    image *d; /* NULL: cut; else its adjoint */
+    const image *photo, *seen; /* seen: shown, as it is read */
+    image *out;                /* shown itself, or its gradient */
 } cut_job;
+
+static bool is_beyond(float photo, float shown)
+{
+    const float white = 0.99f, black = 0.01f;
+    return (photo >= white && shown >= photo) || (photo <= black && shown <= photo);
+}
 
 static void cut_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
     const cut_job *job = context;
-    const float white = 0.99f, black = 0.01f, *photo = job->photo->pixels;
-    float *shown = job->shown->pixels;
-    for (size_t i = 3 * begin; i < 3 * end; i++) {
-        const bool beyond =
-            (photo[i] >= white && shown[i] >= photo[i]) || (photo[i] <= black && shown[i] <= photo[i]);
-        if (job->d == NULL)
-            shown[i] = beyond ? photo[i] : shown[i];
-        else
-            job->d->pixels[i] = beyond ? 0 : job->d->pixels[i];
-    }
+    const float *photo = job->photo->pixels, *shown = job->seen->pixels;
+    for (size_t i = 3 * begin; i < 3 * end; i++)
+        job->out->pixels[i] = is_beyond(photo[i], shown[i]) ? photo[i] : shown[i];
+}
+
+static void cut_backward_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    const cut_job *job = context;
+    const float *photo = job->photo->pixels, *shown = job->seen->pixels;
+    float *d = job->out->pixels;
+    for (size_t i = 3 * begin; i < 3 * end; i++)
+        d[i] = is_beyond(photo[i], shown[i]) ? 0 : d[i];
 }
 
 void affine_cut(const image *photo, image *shown)
 {
-    cut_job job = {.photo = photo, .shown = shown};
+    cut_job job = {photo, shown, shown};
     parallel_blocks(pixel_count(shown), block_grain(pixel_count(shown)), cut_block, &job);
 }
 
 void affine_cut_backward(const image *photo, const image *shown, image *d)
 {
-    cut_job job = {.photo = photo, .shown = (image *)shown, .d = d};
-    parallel_blocks(pixel_count(shown), block_grain(pixel_count(shown)), cut_block, &job);
+    cut_job job = {photo, shown, d};
+    parallel_blocks(pixel_count(shown), block_grain(pixel_count(shown)), cut_backward_block, &job);
 }
 
 /* ---- least squares ---- */

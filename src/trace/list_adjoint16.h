@@ -27,8 +27,9 @@ static bool load_used(const kernel_scene *scene, const list_view *view, size_t p
         return false;
     out->row = (list_row *)(void *)scratch->list;
     out->number = (uint32_t *)(void *)(scratch->list + 16 * count);
-    out->count = 0;
     uint32_t *pair = out->number + count;
+    /* Marked, then numbered: a number for each entry would wait for the counter that the one before stored.
+     */
     memset(out->number, 0xFF, count * sizeof *out->number);
     for (size_t i = 0; i < tape->count; i++)
         out->number[tape->entries[i].id] = 0;
